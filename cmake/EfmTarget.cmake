@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# What every target of the project has in common.
+
+# efm_target_defaults(<target>): C++17, warnings, position-independent code.
+function(efm_target_defaults target)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  set_target_properties(${target} PROPERTIES
+    CXX_EXTENSIONS OFF
+    POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+    $<$<BOOL:${EFM_WARNINGS_AS_ERRORS}>:-Werror>)
+endfunction()
+
+# efm_library(<name> SOURCES … HEADERS …): a static library efm_<name> with the alias efm::<name>,
+# included as "<folder>/<header>.h" from the project's root. Headers are verified to be
+# self-contained by the target all_verify_interface_header_sets.
+function(efm_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
+  set(target efm_${name})
+  add_library(${target} STATIC ${arg_SOURCES})
+  add_library(efm::${name} ALIAS ${target})
+  target_sources(${target} PUBLIC
+    FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${arg_HEADERS})
+  set_target_properties(${target} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
+  efm_target_defaults(${target})
+endfunction()

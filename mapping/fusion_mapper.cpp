@@ -1,0 +1,365 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/fusion_mapper.h"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "mapping/option_check.h"
+#include "mapping/timestamp.h"
+
+namespace efm {
+namespace {
+
+/// A camera whose newest event is older than the others' by this much is taken to be silent.
+constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
+/// How much later than a newer one an event or a pose may come.
+constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
+constexpr std::int64_t kMaxPoseDelayNs = kNanosecondsPerSecond;
+constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+
+bool earlierThan(const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; }
+
+[[noreturn]] void refuse(const Event& event, int camera, const std::string& expected) {
+  throw std::invalid_argument("camera " + std::to_string(camera) + ", event at " +
+                              formatSeconds(event.t_ns) + " s: " + expected);
+}
+
+void requireValid(const Event& event, const CameraModel& model, int camera) {
+  if (event.x >= model.width || event.y >= model.height) {
+    refuse(event, camera,
+           "pixel (" + std::to_string(event.x) + ", " + std::to_string(event.y) +
+               ") must lie inside the sensor of " + std::to_string(model.width) + "x" +
+               std::to_string(model.height));
+  }
+  if (event.t_ns < -kEndOfTimeNs || event.t_ns > kEndOfTimeNs) {
+    refuse(event, camera, "times must lie within " + formatSeconds(kEndOfTimeNs) + " s");
+  }
+}
+
+}  // namespace
+
+/// Events of one camera that may still be needed, on the trajectory's clock.
+struct FusionMapper::CameraBuffer {
+  std::vector<Event> events;
+  std::vector<char> used;  // beside `events`: voted in a keyframe
+  std::size_t begin = 0;   // what is before is forgotten
+  std::size_t pose_cursor = 0;
+  std::optional<std::int64_t> newest_ns;  // of all events that were added
+  std::int64_t covered_ns = kNever;       // everything before this time is here
+
+  std::size_t indexOf(std::int64_t t_ns) const {
+    const auto from = events.begin() + static_cast<std::ptrdiff_t>(begin);
+    return static_cast<std::size_t>(std::lower_bound(from, events.end(), t_ns, earlierThan) -
+                                    events.begin());
+  }
+  void cover(std::int64_t t_ns) { covered_ns = std::max(covered_ns, t_ns); }
+  /// @return whether a newer event had come before.
+  bool insert(const Event& event) {
+    if (begin == events.size() || events.back().t_ns <= event.t_ns) {
+      events.push_back(event);
+      used.push_back(0);
+      return false;
+    }
+    const auto at = std::upper_bound(
+        events.begin() + static_cast<std::ptrdiff_t>(begin), events.end(), event.t_ns,
+        [](std::int64_t t_ns, const Event& other) { return t_ns < other.t_ns; });
+    used.insert(used.begin() + (at - events.begin()), 0);
+    events.insert(at, event);
+    return true;
+  }
+  void compact() {
+    if (begin < events.size() / 2) return;
+    const auto count = static_cast<std::ptrdiff_t>(begin);
+    events.erase(events.begin(), events.begin() + count);
+    used.erase(used.begin(), used.begin() + count);
+    begin = 0;
+  }
+};
+
+void TimeLimits::validate() const {
+  if (!t0_ns || !t1_ns || *t0_ns < *t1_ns) return;
+  throw std::invalid_argument("t1 = " + formatSeconds(*t1_ns) +
+                              " s: must be after t0 = " + formatSeconds(*t0_ns) + " s");
+}
+
+void FusionMapperOptions::validate() const {
+  trajectory.validate();
+  keyframes.validate();
+  keyframe.validate();
+  limits.validate();
+  for (auto camera = cameras.begin(); camera != cameras.end(); ++camera) {
+    requireOption(*camera >= 0, "cameras", *camera, "0 or above");
+    requireOption(std::find(cameras.begin(), camera, *camera) == camera, "cameras", *camera,
+                  "there once");
+  }
+  if (only_window && !(only_window->t0_ns < only_window->t1_ns)) {
+    throw std::invalid_argument("the window from " + formatSeconds(only_window->t0_ns) + " s to " +
+                                formatSeconds(only_window->t1_ns) + " s: must end after it begins");
+  }
+}
+
+EventCounts& EventCounts::operator+=(const EventCounts& other) {
+  read += other.read;
+  used += other.used;
+  without_pose += other.without_pose;
+  outside_window += other.outside_window;
+  dropped += other.dropped;
+  return *this;
+}
+
+EventCounts MapperCounts::total() const {
+  EventCounts sum;
+  for (const EventCounts& camera : cameras) sum += camera;
+  return sum;
+}
+
+FusionMapper::FusionMapper(const FusionMapperOptions& options)
+    : options_(options), trajectory_(options.trajectory) {
+  options_.validate();
+  policy_ = options_.only_window ? makeSingleWindowPolicy(*options_.only_window)
+                                 : makeKeyframePolicy(options_.keyframes);
+}
+
+FusionMapper::~FusionMapper() = default;
+
+int FusionMapper::addCamera(const RigCamera& camera) {
+  if (mapper_) throw std::logic_error("a camera was added after the first keyframe");
+  camera.model.validate();
+  rig_.cameras.push_back(camera);
+  buffers_.emplace_back();
+  counts_.cameras.emplace_back();
+  return static_cast<int>(rig_.cameras.size()) - 1;
+}
+
+void FusionMapper::addPose(const StampedPose& pose) {
+  if (!trajectory_.empty()) {
+    const std::int64_t newest_ns = trajectory_.poses().back().t_ns;
+    if (pose.t_ns < newest_ns - kMaxPoseDelayNs) {
+      throw std::invalid_argument("the pose at " + formatSeconds(pose.t_ns) +
+                                  " s comes after one at " + formatSeconds(newest_ns) +
+                                  " s: poses must come in time order, up to a second");
+    }
+  }
+  if (!trajectory_.add(pose)) ++counts_.duplicate_poses;
+}
+
+bool FusionMapper::selected(int camera) const {
+  const std::vector<int>& cameras = options_.cameras;
+  return cameras.empty() || std::find(cameras.begin(), cameras.end(), camera) != cameras.end();
+}
+
+void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
+  const auto index = static_cast<std::size_t>(camera);
+  const RigCamera& rig_camera = rig_.cameras.at(index);
+  CameraBuffer& buffer = buffers_[index];
+  EventCounts& counts = counts_.cameras[index];
+  if (events.empty()) return;
+
+  std::int64_t newest_ns = buffer.newest_ns.value_or(kNever + kMaxEventDelayNs);
+  for (const Event& event : events) {
+    requireValid(event, rig_camera.model, camera);
+    const std::int64_t t_ns = event.t_ns + rig_camera.time_offset_ns;
+    if (t_ns < newest_ns - kMaxEventDelayNs) {
+      refuse(event, camera,
+             "must not come more than 10 ms after a newer one, that at " +
+                 formatSeconds(newest_ns - rig_camera.time_offset_ns) + " s");
+    }
+    newest_ns = std::max(newest_ns, t_ns);
+  }
+
+  counts.read += events.size();
+  buffer.newest_ns = newest_ns;
+  buffer.cover(newest_ns - kMaxEventDelayNs);
+  reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
+  if (!selected(camera)) {
+    counts.dropped += events.size();
+    return;
+  }
+  for (Event event : events) {
+    event.t_ns += rig_camera.time_offset_ns;
+    if (!options_.limits.hold(event.t_ns)) {
+      ++counts.outside_window;
+    } else if (settled_ns_ && event.t_ns < *settled_ns_) {
+      ++counts.dropped;
+    } else if (buffer.insert(event)) {
+      ++counts_.sorted_events;
+    }
+  }
+}
+
+void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
+  const auto index = static_cast<std::size_t>(camera);
+  const std::int64_t bounded_ns = std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs);
+  buffers_.at(index).cover(bounded_ns + rig_.cameras[index].time_offset_ns);
+}
+
+void FusionMapper::finish() { finished_ = true; }
+
+/// The time before which nothing more is to come from a camera.
+std::int64_t FusionMapper::completeUntil(std::size_t camera) const {
+  if (finished_) return kEver;
+  const std::int64_t silent_ns = reached_ns_ ? *reached_ns_ - kMaxCameraLagNs : kNever;
+  return std::max(buffers_[camera].covered_ns, silent_ns);
+}
+
+bool FusionMapper::camerasCover(std::int64_t t_ns) const {
+  for (std::size_t c = 0; c < buffers_.size(); ++c) {
+    if (selected(static_cast<int>(c)) && completeUntil(c) < t_ns) return false;
+  }
+  return true;
+}
+
+/// Whether a window is full: the recording goes on to its end, and all its events and poses are
+/// here.
+bool FusionMapper::covered(const Window& window) const {
+  if (options_.limits.t1_ns && window.t1_ns > *options_.limits.t1_ns) return false;
+  if (!reached_ns_ || *reached_ns_ < window.t1_ns || !camerasCover(window.t1_ns)) return false;
+  return !trajectory_.empty() &&
+         trajectory_.poses().back().t_ns >= std::max(window.t1_ns, window.t_ref_ns);
+}
+
+/// Looks for the first event with a pose. Events before it have none and are forgotten.
+void FusionMapper::findStart() {
+  if (trajectory_.empty()) return;
+  const std::int64_t newest_pose_ns = trajectory_.poses().back().t_ns;
+  std::optional<std::int64_t> first_ns;
+  for (std::size_t c = 0; c < buffers_.size(); ++c) {
+    CameraBuffer& buffer = buffers_[c];
+    for (; buffer.begin < buffer.events.size(); ++buffer.begin) {
+      const std::int64_t t_ns = buffer.events[buffer.begin].t_ns;
+      if (t_ns > newest_pose_ns) break;  // its pose may still come
+      if (trajectory_.segmentAt(t_ns, buffer.pose_cursor)) {
+        first_ns = std::min(first_ns.value_or(t_ns), t_ns);
+        break;
+      }
+      ++counts_.cameras[c].without_pose;
+    }
+    buffer.compact();
+  }
+  if (first_ns && camerasCover(*first_ns)) start_ns_ = first_ns;
+}
+
+/// A gap in the events, however long, costs nothing.
+void FusionMapper::passEmptyWindows() {
+  const std::optional<Window> window = policy_->current(*start_ns_);
+  if (!window || !reached_ns_) return;
+  std::int64_t empty_until_ns = std::min(*reached_ns_, options_.limits.t1_ns.value_or(kEver));
+  for (std::size_t c = 0; c < buffers_.size(); ++c) {
+    if (!selected(static_cast<int>(c))) continue;
+    const CameraBuffer& buffer = buffers_[c];
+    const std::size_t next = buffer.indexOf(window->t0_ns);
+    const bool there = next < buffer.events.size();
+    empty_until_ns = std::min(empty_until_ns, there ? buffer.events[next].t_ns : completeUntil(c));
+  }
+  counts_.windows_without_events += policy_->advancePast(*start_ns_, empty_until_ns);
+}
+
+std::vector<std::vector<Event>> FusionMapper::eventsOf(const Window& window) const {
+  std::vector<std::vector<Event>> events;
+  for (const CameraBuffer& buffer : buffers_) {
+    const auto from = buffer.events.begin();
+    events.emplace_back(from + static_cast<std::ptrdiff_t>(buffer.indexOf(window.t0_ns)),
+                        from + static_cast<std::ptrdiff_t>(buffer.indexOf(window.t1_ns)));
+  }
+  return events;
+}
+
+void FusionMapper::countKeyframe(const KeyframeDepthMap& keyframe) {
+  ++counts_.keyframes;
+  counts_.votes += keyframe.votes;
+  counts_.event_uses =
+      std::accumulate(keyframe.events.begin(), keyframe.events.end(), counts_.event_uses);
+  for (CameraBuffer& buffer : buffers_) {
+    const std::size_t end = buffer.indexOf(keyframe.window.t1_ns);
+    for (std::size_t i = buffer.indexOf(keyframe.window.t0_ns); i < end; ++i) {
+      if (trajectory_.segmentAt(buffer.events[i].t_ns, buffer.pose_cursor)) buffer.used[i] = 1;
+    }
+  }
+}
+
+/// The time before which every event is here, its poses known, and no window to come needs it.
+std::int64_t FusionMapper::settledUntil() const {
+  const std::optional<Window> window = policy_->current(*start_ns_);
+  std::int64_t settled_ns = window ? window->t0_ns : kEver;
+  if (finished_) return settled_ns;
+  for (std::size_t c = 0; c < buffers_.size(); ++c) {
+    if (selected(static_cast<int>(c))) settled_ns = std::min(settled_ns, completeUntil(c));
+  }
+  return std::min(settled_ns, trajectory_.empty() ? kNever : trajectory_.poses().back().t_ns);
+}
+
+/// Lets go of events and poses before a time, and says what became of the events.
+void FusionMapper::settleBefore(std::int64_t t_ns) {
+  if (settled_ns_ && t_ns <= *settled_ns_) return;
+  settled_ns_ = t_ns;
+  for (std::size_t c = 0; c < buffers_.size(); ++c) {
+    CameraBuffer& buffer = buffers_[c];
+    EventCounts& counts = counts_.cameras[c];
+    const std::size_t end = buffer.indexOf(t_ns);
+    for (; buffer.begin < end; ++buffer.begin) {
+      if (buffer.used[buffer.begin] != 0) {
+        ++counts.used;
+      } else if (trajectory_.segmentAt(buffer.events[buffer.begin].t_ns, buffer.pose_cursor)) {
+        ++counts.outside_window;
+      } else {
+        ++counts.without_pose;
+      }
+    }
+    buffer.compact();
+  }
+  // The view of a window may stand before it.
+  const std::optional<Window> window = start_ns_ ? policy_->current(*start_ns_) : std::nullopt;
+  trajectory_.forgetBefore(window ? std::min(t_ns, window->t_ref_ns) : t_ns);
+}
+
+std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
+  if (options_.only_window) start_ns_ = options_.only_window->t0_ns;
+  if (!start_ns_) findStart();
+  while (start_ns_) {
+    passEmptyWindows();
+    const std::optional<Window> window = policy_->current(*start_ns_);
+    // The one window that was asked for is mapped with what there is.
+    const bool due = window && (covered(*window) || (finished_ && options_.only_window));
+    if (!due) break;
+    std::optional<KeyframeDepthMap> keyframe = mapWindow(*window, sink, stages);
+    policy_->advance();
+    settleBefore(settledUntil());
+    if (keyframe) return keyframe;
+  }
+  if (finished_) {
+    settleBefore(kEver);
+  } else if (start_ns_) {
+    settleBefore(settledUntil());
+  }
+  return std::nullopt;
+}
+
+std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, DsiSink* sink,
+                                                        StageHook* stages) {
+  const std::vector<std::vector<Event>> events = eventsOf(window);
+  if (std::all_of(events.begin(), events.end(), [](const auto& some) { return some.empty(); })) {
+    ++counts_.windows_without_events;
+    return std::nullopt;
+  }
+  if (!mapper_) {
+    std::vector<int> cameras = options_.cameras;
+    if (cameras.empty()) {
+      cameras.resize(rig_.cameras.size());
+      std::iota(cameras.begin(), cameras.end(), 0);
+    }
+    mapper_ = std::make_unique<KeyframeMapper>(rig_, cameras, options_.keyframe);
+  }
+  auto keyframe = mapper_->map(window, events, trajectory_, sink, stages);
+  if (keyframe) {
+    countKeyframe(*keyframe);
+  } else {
+    ++counts_.keyframes_without_pose;
+  }
+  return keyframe;
+}
+
+}  // namespace efm

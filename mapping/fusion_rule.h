@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+namespace efm {
+
+/// How the ray densities of several DSIs become one, voxel by voxel (Ghosh and Gallego 2022,
+/// Eqs. 6-11): means of n inputs with equal weights, symmetric, and ordered
+/// min <= harmonic <= geometric <= arithmetic <= rms <= max.
+enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax };
+
+/// "min", "harmonic", "geometric", "arithmetic", "rms", "max".
+std::string_view nameOf(FusionRule rule);
+/// @throws std::invalid_argument naming the value and what is known.
+FusionRule fusionRuleFromName(std::string_view name);
+/// All rules, in their order.
+const std::vector<FusionRule>& allFusionRules();
+
+/// A running mean of planes under one rule: all six rules fold, so that one plane of memory serves
+/// any number of inputs. Inputs are ray densities, not negative; zero in any input makes the
+/// AND-like rules (min, harmonic, geometric) zero.
+///
+/// Use: `begin`, `fold` per input, `finish`; then `values` holds the mean.
+class FusionAccumulator {
+ public:
+  FusionAccumulator(FusionRule rule, std::size_t voxels);
+
+  void begin();
+  /// @param values as many as there are voxels.
+  void fold(const float* values);
+  /// With no input folded the mean is zero.
+  void finish();
+
+  const std::vector<float>& values() const { return values_; }
+
+ private:
+  FusionRule rule_;
+  int inputs_ = 0;
+  std::vector<float> values_;
+};
+
+}  // namespace efm

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+namespace efm {
+
+/// One enumerator and the name that files and people use for it.
+template <typename Enum>
+struct NamedChoice {
+  Enum value;
+  std::string_view name;
+};
+
+/// The name of an enumerator. `table` names every one.
+template <typename Enum, std::size_t N>
+std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
+  for (const auto& choice : table) {
+    if (choice.value == value) return choice.name;
+  }
+  throw std::logic_error("an enumerator has no name");
+}
+
+/// The enumerator with a name.
+/// @throws std::invalid_argument naming the value and what is known.
+template <typename Enum, std::size_t N>
+Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
+  std::string known;
+  for (const auto& choice : table) {
+    if (choice.name == name) return choice.value;
+    known += (known.empty() ? "" : ", ") + std::string(choice.name);
+  }
+  throw std::invalid_argument("'" + std::string(name) + "' is not one of: " + known);
+}
+
+}  // namespace efm

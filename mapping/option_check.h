@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+namespace efm {
+
+/// Refuses an option whose value breaks its range. Written so that NaN is refused too: pass the
+/// condition that must hold.
+/// @throws std::invalid_argument "key = value: must be expected".
+template <typename Value>
+void requireOption(bool holds, std::string_view key, const Value& value,
+                   std::string_view expected) {
+  if (holds) return;
+  std::ostringstream message;
+  message.precision(17);
+  message << key << " = " << value << ": must be " << expected;
+  throw std::invalid_argument(message.str());
+}
+
+}  // namespace efm

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+
+namespace efm {
+
+/// A rigid transform T_a_b of space: p_a = T_a_b * p_b = rotation * p_b + translation.
+/// Neighbouring letters match in every product: T_a_c = T_a_b * T_b_c.
+///
+/// Invariant: `rotation` has unit norm; whoever fills it from outside normalises it.
+struct Rigid3 {
+  Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< Metres.
+
+  Rigid3 inverse() const {
+    const Eigen::Quaterniond inverse_rotation = rotation.conjugate();
+    return {inverse_rotation, -(inverse_rotation * translation)};
+  }
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point) const {
+    return rotation * point + translation;
+  }
+  Rigid3 operator*(const Rigid3& other) const {
+    return {(rotation * other.rotation).normalized(), rotation * other.translation + translation};
+  }
+};
+
+/// The pose at `fraction` in [0, 1] of the way from one pose to another: linear in position,
+/// slerp along the shorter arc in rotation.
+inline Rigid3 interpolate(const Rigid3& T_a_b0, const Rigid3& T_a_b1, double fraction) {
+  return {T_a_b0.rotation.slerp(fraction, T_a_b1.rotation),
+          (1.0 - fraction) * T_a_b0.translation + fraction * T_a_b1.translation};
+}
+
+}  // namespace efm

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace efm {
+
+/// Time is integer nanoseconds everywhere: a double holds today's Unix time only to about 240 ns.
+
+inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
+
+/// Later than any time in a recording (the year 2116), and its negative earlier; half the range, so
+/// that sums and differences of times stay inside it.
+inline constexpr std::int64_t kEndOfTimeNs = std::numeric_limits<std::int64_t>::max() / 2;
+
+/// Parses decimal seconds ("12", "-0.5", "1.5e-3", "1700000000.123456789") to nanoseconds without
+/// passing through a double. Digits past the ninth decimal are rounded to the nearest nanosecond.
+/// @return nothing where the text is not a number from end to end, or does not fit 64 bits.
+std::optional<std::int64_t> parseSeconds(std::string_view text);
+
+/// Decimal seconds with nine decimals ("%.9f"), exact.
+std::string formatSeconds(std::int64_t t_ns);
+
+/// Nearest nanosecond of a duration in seconds. For durations, not for absolute times.
+/// @throws std::invalid_argument where it is not finite or does not fit 64 bits.
+std::int64_t durationFromSeconds(double duration_s);
+
+/// A difference of two times, in seconds.
+inline double secondsBetween(std::int64_t from_ns, std::int64_t to_ns) {
+  return static_cast<double>(to_ns - from_ns) * 1e-9;
+}
+
+}  // namespace efm

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/keyframe_policy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'007;
+
+TEST(KeyframePolicy, WindowKStartsKStridesAfterTheStart) {
+  const auto policy =
+      makeKeyframePolicy({KeyframePolicyKind::kPeriod, 0.5, 0.2, ReferenceTime::kMiddle});
+  for (int k = 0; k < 5; ++k) {
+    const auto window = policy->current(kStart_ns);
+    ASSERT_TRUE(window);
+    EXPECT_EQ(window->t0_ns, kStart_ns + k * 200'000'000);
+    EXPECT_EQ(window->t1_ns, window->t0_ns + 500'000'000);
+    EXPECT_EQ(window->t_ref_ns, window->t0_ns + 250'000'000);
+    policy->advance();
+  }
+}
+
+TEST(KeyframePolicy, ForwardLookingVehiclesReferToTheEnd) {
+  const auto policy =
+      makeKeyframePolicy({KeyframePolicyKind::kPeriod, 0.5, 0.5, ReferenceTime::kEnd});
+  EXPECT_EQ(policy->current(0)->t_ref_ns, 500'000'000);
+}
+
+TEST(KeyframePolicy, WindowsThatEndByATimeArePassedTogether) {
+  const auto policy =
+      makeKeyframePolicy({KeyframePolicyKind::kPeriod, 0.5, 0.2, ReferenceTime::kMiddle});
+  EXPECT_EQ(policy->advancePast(0, 499'999'999), 0U);
+  EXPECT_EQ(policy->advancePast(0, 500'000'000), 1U);
+  EXPECT_EQ(policy->current(0)->t0_ns, 200'000'000);
+  EXPECT_EQ(policy->advancePast(0, 500'000'000), 0U) << "not twice";
+  EXPECT_EQ(policy->advancePast(0, 1'000'000'000'000'000'000), 4'999'999'997U);
+  EXPECT_GT(policy->current(0)->t1_ns, 1'000'000'000'000'000'000);
+}
+
+TEST(KeyframePolicy, ASingleWindowComesOnce) {
+  const auto policy = makeSingleWindowPolicy({10, 20, 15});
+  ASSERT_TRUE(policy->current(kStart_ns));
+  EXPECT_EQ(policy->current(kStart_ns)->t0_ns, 10);
+  policy->advance();
+  EXPECT_FALSE(policy->current(kStart_ns));
+}
+
+TEST(KeyframePolicy, OptionsOutOfRangeAreNamed) {
+  KeyframePolicyOptions options;
+  options.window_s = 0;
+  EXPECT_THAT([&] { makeKeyframePolicy(options); }, ::testing::ThrowsMessage<std::invalid_argument>(
+                                                        ::testing::HasSubstr("window_s = 0")));
+  options = {};
+  options.stride_s = -1;
+  EXPECT_THAT([&] { makeKeyframePolicy(options); }, ::testing::ThrowsMessage<std::invalid_argument>(
+                                                        ::testing::HasSubstr("stride_s = -1")));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/space_sweep.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <set>
+
+#include "test/mapping/random_scene.h"
+#include "test/oracle/naive_mapper.h"
+
+namespace efm {
+namespace {
+
+using test::RandomScene;
+
+constexpr std::int64_t kStart_ns = 0;
+
+/// Keeps the whole DSI.
+class KeptDsi : public DsiSink {
+ public:
+  KeptDsi(const DepthPlanes& planes, const ReferenceView& view)
+      : pixels_(view.pixels()), values(static_cast<std::size_t>(planes.size()) * pixels_, -1.0F) {}
+
+  void takePlane(int plane, const float* plane_values) override {
+    const std::lock_guard lock(mutex_);
+    EXPECT_TRUE(planes_seen_.insert(plane).second) << "plane " << plane << " came twice";
+    std::copy(plane_values, plane_values + pixels_,
+              values.begin() + static_cast<std::ptrdiff_t>(plane * static_cast<int>(pixels_)));
+  }
+  std::size_t planesSeen() const { return planes_seen_.size(); }
+
+ private:
+  std::size_t pixels_;
+  std::mutex mutex_;
+  std::set<int> planes_seen_;
+
+ public:
+  std::vector<float> values;
+};
+
+/// Cameras around the origin that see random events.
+struct Input {
+  ReferenceView view = ReferenceView::of(test::smallCamera());
+  DepthPlanes planes;
+  std::vector<RayBundle> rays;
+  std::vector<oracle::Dsi> densities;  // the oracle's, in the same poses
+  std::vector<VoteCounts> counts;
+};
+
+Input makeInput(std::uint32_t seed, int cameras, int planes, std::size_t events_per_camera) {
+  RandomScene random(seed);
+  Input input;
+  input.planes = DepthPlanes({0.4, 4.0, planes, PlaneSpacing::kInverse});
+  const Trajectory trajectory = random.motion(kStart_ns, 0.1, 3.0, 4.0);
+  for (int c = 0; c < cameras; ++c) {
+    const RigCamera camera{test::smallCamera(), random.pose(0.2, 0.3), 0};
+    const UndistortionTable undistortion(camera.model);
+    const auto events = random.events(camera.model, events_per_camera, kStart_ns, 100'000'000);
+    const PacketGeometry geometry{{}, input.view, 0.4, 4.0};
+    const PosePackets packets =
+        splitIntoPosePackets(events, camera, undistortion, trajectory, geometry, {0.02});
+    input.rays.push_back(backProject(events, packets, undistortion, input.view));
+    VoteCounts counts;
+    input.densities.push_back(oracle::rayDensity(oracle::poseByPacket(events, packets),
+                                                 undistortion, input.view, input.planes, &counts));
+    input.counts.push_back(counts);
+  }
+  return input;
+}
+
+SweepResult sweep(const Input& input, FusionRule rule, int threads, DsiSink* sink = nullptr) {
+  SpaceSweepOptions options;
+  options.across_cameras = rule;
+  options.threads = threads;
+  return SpaceSweep(options).run(input.rays, input.view, input.planes, sink);
+}
+
+bool same(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() &&
+         std::equal(a.datastart, a.dataend, b.datastart);
+}
+
+TEST(SpaceSweep, TheDsiIsTheOraclesForEveryRuleAndOneToThreeCameras) {
+  for (int cameras = 1; cameras <= 3; ++cameras) {
+    const Input input = makeInput(7, cameras, 11, 4000);
+    for (const FusionRule rule : allFusionRules()) {
+      KeptDsi dsi(input.planes, input.view);
+      sweep(input, rule, 2, &dsi);
+      EXPECT_EQ(dsi.planesSeen(), 11U);
+      const oracle::Dsi exact = oracle::fuse(rule, input.densities);
+      double mass = 0;
+      double error = 0;
+      for (std::size_t i = 0; i < exact.values.size(); ++i) {
+        mass += exact.values[i];
+        error += std::abs(static_cast<double>(dsi.values[i]) - exact.values[i]);
+      }
+      EXPECT_GT(mass, 0);
+      // Float coordinates of some 40 px are good to 4e-6 px, at which a vote moves.
+      EXPECT_LE(error, 1e-4 * mass) << nameOf(rule) << " of " << cameras;
+    }
+  }
+}
+
+TEST(SpaceSweep, VotesAreCountedAsTheOracleCountsThem) {
+  const Input input = makeInput(8, 2, 9, 3000);
+  const SweepResult result = sweep(input, FusionRule::kHarmonic, 2);
+  ASSERT_EQ(result.votes.size(), 2U);
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(result.votes[c].total(), input.rays[c].size() * 9);
+    EXPECT_EQ(result.votes[c].behind_camera, input.counts[c].behind_camera);
+    // A vote within 1e-5 px of the border may fall on either side of it.
+    EXPECT_NEAR(static_cast<double>(result.votes[c].cast),
+                static_cast<double>(input.counts[c].cast), 3);
+  }
+}
+
+TEST(SpaceSweep, ThePeakAndItsNeighboursAreThoseOfTheVolume) {
+  for (const int planes : {1, 2, 3, 17}) {
+    for (const int threads : {1, 2, 5}) {
+      const Input input = makeInput(9, 2, planes, 3000);
+      KeptDsi dsi(input.planes, input.view);
+      const DsiPeaks peaks = sweep(input, FusionRule::kArithmetic, threads, &dsi).peaks;
+      const auto value = [&](int plane, int x, int y) {
+        if (plane < 0 || plane >= planes) return -1.0F;
+        return dsi
+            .values[(static_cast<std::size_t>(plane) * 36 + static_cast<std::size_t>(y)) * 48 +
+                    static_cast<std::size_t>(x)];
+      };
+      for (int y = 0; y < 36; ++y) {
+        for (int x = 0; x < 48; ++x) {
+          int best = 0;
+          for (int plane = 1; plane < planes; ++plane) {
+            if (value(plane, x, y) > value(best, x, y)) best = plane;
+          }
+          ASSERT_EQ(peaks.plane(y, x), best) << x << ", " << y << " of " << planes;
+          ASSERT_EQ(peaks.confidence(y, x), value(best, x, y));
+          ASSERT_EQ(peaks.before(y, x), value(best - 1, x, y));
+          ASSERT_EQ(peaks.after(y, x), value(best + 1, x, y));
+        }
+      }
+    }
+  }
+}
+
+TEST(SpaceSweep, TheNumberOfThreadsNeverChangesTheResult) {
+  const Input input = makeInput(10, 3, 50, 3000);
+  for (const FusionRule rule : allFusionRules()) {
+    const SweepResult one = sweep(input, rule, 1);
+    for (const int threads : {2, 3, 16, 64}) {
+      const SweepResult many = sweep(input, rule, threads);
+      EXPECT_TRUE(same(one.peaks.confidence, many.peaks.confidence)) << threads;
+      EXPECT_TRUE(same(one.peaks.plane, many.peaks.plane)) << threads;
+      EXPECT_TRUE(same(one.peaks.before, many.peaks.before)) << threads;
+      EXPECT_TRUE(same(one.peaks.after, many.peaks.after)) << threads;
+    }
+  }
+}
+
+TEST(SpaceSweep, WithoutEventsEveryPeakIsZeroAtTheNearestPlane) {
+  Input input = makeInput(11, 2, 5, 100);
+  input.rays = {RayBundle(), RayBundle()};
+  const DsiPeaks peaks = sweep(input, FusionRule::kHarmonic, 2).peaks;
+  EXPECT_EQ(cv::countNonZero(peaks.confidence), 0);
+  EXPECT_EQ(cv::countNonZero(peaks.plane), 0);
+}
+
+TEST(SpaceSweep, ASilentCameraSilencesTheAndLikeRules) {
+  Input input = makeInput(12, 2, 5, 1000);
+  input.rays[1] = RayBundle();
+  EXPECT_EQ(cv::countNonZero(sweep(input, FusionRule::kHarmonic, 1).peaks.confidence), 0);
+  EXPECT_GT(cv::countNonZero(sweep(input, FusionRule::kArithmetic, 1).peaks.confidence), 0);
+}
+
+TEST(SpaceSweep, ThreadsOutOfRangeAreNamed) {
+  SpaceSweepOptions options;
+  options.threads = 0;
+  EXPECT_THAT([&] { SpaceSweep sweep(options); },
+              ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr("threads = 0")));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "mapping/depth_planes.h"
+#include "mapping/event.h"
+#include "mapping/fusion_rule.h"
+#include "mapping/pose_packets.h"
+#include "mapping/reference_view.h"
+#include "mapping/rig.h"
+#include "mapping/trajectory.h"
+#include "mapping/vote_counts.h"
+
+namespace efm::oracle {
+
+/// The method written down as simply as possible and in double precision: every event is a ray in
+/// space, met with every plane by itself; every DSI is a whole volume. What the fast code is held
+/// against, and never used for anything else.
+
+/// A whole DSI: [plane][row][column].
+struct Dsi {
+  int planes = 0;
+  int width = 0;
+  int height = 0;
+  std::vector<double> values;
+
+  Dsi(int planes_, const ReferenceView& view);
+  double& at(int plane, int x, int y);
+  double at(int plane, int x, int y) const;
+};
+
+/// An event as a ray: where its camera was in the reference view.
+struct PosedEvent {
+  Event event;
+  Rigid3 T_ref_cam;
+};
+
+/// Each event with the pose of its own time; those without one are left out.
+std::vector<PosedEvent> poseEach(const std::vector<Event>& events, const RigCamera& camera,
+                                 const Trajectory& trajectory, const Rigid3& T_world_ref);
+/// Each event with the pose of its packet.
+std::vector<PosedEvent> poseByPacket(const std::vector<Event>& events, const PosePackets& packets);
+
+/// The ray density of one camera's events (Ghosh and Gallego 2022, Eq. 2).
+Dsi rayDensity(const std::vector<PosedEvent>& events, const UndistortionTable& undistortion,
+               const ReferenceView& view, const DepthPlanes& planes, VoteCounts* counts = nullptr);
+
+/// The mean of numbers under a rule, from its textbook formula.
+double fuse(FusionRule rule, const std::vector<double>& values);
+Dsi fuse(FusionRule rule, const std::vector<Dsi>& inputs);
+
+/// Per pixel the plane of the largest value, the nearest of equals.
+std::vector<int> peakPlanes(const Dsi& dsi);
+/// Per pixel the largest value.
+std::vector<double> peakValues(const Dsi& dsi);
+
+}  // namespace efm::oracle
