@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/pixel_rays.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mapping/option_check.h"
+#include "mapping/undistortion.h"
+
+namespace efm {
+
+PixelRays::PixelRays(const CameraModel& model) : width_(model.width), height_(model.height) {
+  requireOption(width_ >= 2, "width", width_, "at least 2 pixels to be simulated");
+  requireOption(height_ >= 2, "height", height_, "at least 2 pixels to be simulated");
+  const UndistortionTable table(model);
+  rays_.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  bounds_ = {table.ray(0, 0), table.ray(0, 0)};
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const int left = std::max(x - 1, 0);
+      const int right = std::min(x + 1, width_ - 1);
+      const int up = std::max(y - 1, 0);
+      const int down = std::min(y + 1, height_ - 1);
+      PixelRay pixel;
+      pixel.ray = table.ray(x, y);
+      pixel.per_x = (table.ray(right, y) - table.ray(left, y)) / (right - left);
+      pixel.per_y = (table.ray(x, down) - table.ray(x, up)) / (down - up);
+      pixel.pitch = std::sqrt(0.5 * (pixel.per_x.squaredNorm() + pixel.per_y.squaredNorm()));
+      rays_.push_back(pixel);
+      const Eigen::Vector2d reach = 0.5 * (pixel.per_x.cwiseAbs() + pixel.per_y.cwiseAbs());
+      bounds_.min = bounds_.min.cwiseMin(pixel.ray - reach);
+      bounds_.max = bounds_.max.cwiseMax(pixel.ray + reach);
+    }
+  }
+}
+
+}  // namespace efm

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/smooth_motion.h"
+
+#include <cmath>
+
+#include "mapping/timestamp.h"
+
+namespace efm {
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586476925;
+
+double valueAt(const std::vector<Sine>& sines, double t_s) {
+  double sum = 0;
+  for (const Sine& sine : sines) {
+    sum += sine.amplitude * std::sin(kTwoPi * sine.frequency_hz * t_s + sine.phase_rad);
+  }
+  return sum;
+}
+
+Eigen::Vector3d valueAt(const std::array<std::vector<Sine>, 3>& axes, double t_s) {
+  return {valueAt(axes[0], t_s), valueAt(axes[1], t_s), valueAt(axes[2], t_s)};
+}
+
+}  // namespace
+
+Rigid3 SmoothMotion::poseAt(std::int64_t t_ns) const {
+  const double t_s = secondsBetween(options_.start_ns, t_ns);
+  const Eigen::Vector3d rotation = valueAt(options_.rotation, t_s);
+  const double angle = rotation.norm();
+  Rigid3 T_center_rig;
+  T_center_rig.translation = valueAt(options_.translation, t_s);
+  if (angle > 0) {
+    T_center_rig.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation / angle));
+  }
+  return options_.T_world_center * T_center_rig;
+}
+
+}  // namespace efm

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace efm {
+
+/// Log intensity painted on a plane, sampled without aliasing: a pyramid of the painting under ever
+/// wider Gaussian blurs, in which a sample interpolates trilinearly. The blur stands for lens and
+/// pixel; it acts on log intensity, so that an edge keeps its place whatever lies on its two sides.
+class Texture {
+ public:
+  /// @param log_intensity the painting; texel (i, j) covers [i, i+1) x [j, j+1) times `texel_m`.
+  Texture(const cv::Mat1f& log_intensity, double texel_m);
+
+  /// Log intensity at (u, v) metres from the painting's corner, blurred with a Gaussian of standard
+  /// deviation `sigma_m` (at least that of the finest level, one texel). Beyond the painting its
+  /// border goes on.
+  float sample(double u_m, double v_m, double sigma_m) const;
+
+ private:
+  struct Level {
+    cv::Mat1f image;  // blurred with a standard deviation of one of its texels
+    float texels_per_m = 0;
+  };
+  static float sampleLevel(const Level& level, double u_m, double v_m);
+
+  std::vector<Level> levels_;
+};
+
+}  // namespace efm

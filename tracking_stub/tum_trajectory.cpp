@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/tum_trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <iomanip>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include "mapping/quoted_text.h"
+#include "mapping/timestamp.h"
+
+namespace efm {
+namespace {
+
+constexpr std::array<std::string_view, 8> kFieldNames = {"t",  "tx", "ty", "tz",
+                                                         "qx", "qy", "qz", "qw"};
+constexpr std::string_view kBlanks = " \t\r\v\f";
+
+std::vector<std::string_view> splitFields(std::string_view line) {
+  line = line.substr(0, line.find('#'));
+  std::vector<std::string_view> fields;
+  for (std::size_t begin = line.find_first_not_of(kBlanks); begin != std::string_view::npos;) {
+    const std::size_t end = std::min(line.find_first_of(kBlanks, begin), line.size());
+    fields.push_back(line.substr(begin, end - begin));
+    begin = line.find_first_not_of(kBlanks, end);
+  }
+  return fields;
+}
+
+std::runtime_error fieldError(std::size_t field, std::string_view text, const char* expected) {
+  return std::runtime_error(std::string(kFieldNames[field]) + " = " + inQuotes(text) +
+                            ": expected " + expected);
+}
+
+double parseNumber(const std::vector<std::string_view>& fields, std::size_t field) {
+  const std::string_view text = fields[field];
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    throw fieldError(field, text, "a finite number");
+  }
+  return value;
+}
+
+StampedPose parsePose(const std::vector<std::string_view>& fields) {
+  if (fields.size() != kFieldNames.size()) {
+    throw std::runtime_error(std::to_string(fields.size()) +
+                             " fields: expected 8, t tx ty tz qx qy qz qw");
+  }
+  const std::optional<std::int64_t> t_ns = parseSeconds(fields[0]);
+  if (!t_ns) throw fieldError(0, fields[0], "a time in decimal seconds");
+  if (*t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
+    throw fieldError(0, fields[0], "a time within 4.6e9 s of 0");
+  }
+  StampedPose pose;
+  pose.t_ns = *t_ns;
+  pose.T_world_rig.translation = {parseNumber(fields, 1), parseNumber(fields, 2),
+                                  parseNumber(fields, 3)};
+  const Eigen::Quaterniond rotation(parseNumber(fields, 7), parseNumber(fields, 4),
+                                    parseNumber(fields, 5), parseNumber(fields, 6));
+  const double norm = rotation.coeffs().stableNorm();
+  if (!(norm > 0) || !std::isfinite(norm)) {
+    throw std::runtime_error("quaternion of length " + std::to_string(norm) +
+                             ": expected a rotation (of unit length)");
+  }
+  pose.T_world_rig.rotation.coeffs() = rotation.coeffs() / norm;
+  return pose;
+}
+
+}  // namespace
+
+std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  return readTumTrajectory(stream, file.string());
+}
+
+std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::string& name) {
+  std::vector<StampedPose> poses;
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const std::vector<std::string_view> fields = splitFields(line);
+    if (fields.empty()) continue;
+    try {
+      poses.push_back(parsePose(fields));
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(name + ":" + std::to_string(number) + ": " + error.what());
+    }
+  }
+  if (stream.bad()) throw std::runtime_error(name + ": cannot be read to its end");
+  return poses;
+}
+
+void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses) {
+  std::ofstream stream(file);
+  writeTumTrajectory(stream, poses);
+  stream.close();
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses) {
+  stream << "# t tx ty tz qx qy qz qw\n" << std::setprecision(17);
+  for (const StampedPose& pose : poses) {
+    const Eigen::Vector3d& p = pose.T_world_rig.translation;
+    const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
+    stream << formatSeconds(pose.t_ns) << ' ' << p.x() << ' ' << p.y() << ' ' << p.z() << ' '
+           << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+  }
+}
+
+}  // namespace efm
