@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The method end to end on the simulated desk, held against the naive oracle and the exact truth.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "mapping/fusion_mapper.h"
+#include "maps/depth_metrics.h"
+#include "maps/global_cloud.h"
+#include "maps/keyframe_cloud.h"
+#include "test/oracle/naive_mapper.h"
+#include "tracking_stub/depth_rendering.h"
+#include "tracking_stub/simulation_preset.h"
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+
+/// Keeps the whole DSI: [plane][row][column].
+class KeptDsi : public DsiSink {
+ public:
+  KeptDsi(int planes, const ReferenceView& view)
+      : pixels_(view.pixels()), values(static_cast<std::size_t>(planes) * pixels_) {}
+  void takePlane(int plane, const float* plane_values) override {
+    const std::size_t at = static_cast<std::size_t>(plane) * pixels_;
+    std::copy(plane_values, plane_values + pixels_,
+              values.begin() + static_cast<std::ptrdiff_t>(at));
+  }
+
+ private:
+  std::size_t pixels_;
+
+ public:
+  std::vector<float> values;
+};
+
+class DeskStereo : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    simulation_ = new Simulation(makeSimulation({"desk_stereo", std::nullopt, 1}));
+    for (CameraRecording& recording : simulateEvents(*simulation_)) {
+      events_.push_back(std::move(recording.events));
+    }
+    poses_ = samplePoses(*simulation_);
+  }
+  static void TearDownTestSuite() {
+    delete simulation_;
+    simulation_ = nullptr;
+  }
+
+  static FusionMapperOptions options(double window_s, double stride_s) {
+    FusionMapperOptions options;
+    options.keyframes.window_s = window_s;
+    options.keyframes.stride_s = stride_s;
+    options.keyframe.planes = {0.55, 5.0, 100, PlaneSpacing::kInverse};
+    return options;
+  }
+
+  static std::vector<KeyframeDepthMap> map(const FusionMapperOptions& options) {
+    FusionMapper mapper(options);
+    for (std::size_t c = 0; c < events_.size(); ++c) mapper.addCamera(simulation_->rig.cameras[c]);
+    for (const StampedPose& pose : poses_) mapper.addPose(pose);
+    for (std::size_t c = 0; c < events_.size(); ++c) {
+      mapper.addEvents(static_cast<int>(c), events_[c]);
+    }
+    mapper.finish();
+    std::vector<KeyframeDepthMap> keyframes;
+    while (auto keyframe = mapper.next()) keyframes.push_back(std::move(*keyframe));
+    return keyframes;
+  }
+
+  /// Estimate and truth wherever there is an estimate, the truth within one pixel.
+  static std::vector<DepthPair> pairs(const KeyframeDepthMap& keyframe) {
+    const cv::Mat1f truth = renderDepth(
+        simulation_->scene, simulation_->motion->poseAt(keyframe.window.t_ref_ns), keyframe.view);
+    DepthPairingOptions pairing;
+    pairing.tolerance_px = 1;
+    return pairDepths(keyframe.map.depth, truth, pairing);
+  }
+
+  /// Over all keyframes together.
+  static DepthErrors errors(const std::vector<KeyframeDepthMap>& keyframes) {
+    std::vector<DepthPair> all;
+    for (const KeyframeDepthMap& keyframe : keyframes) {
+      const auto some = pairs(keyframe);
+      all.insert(all.end(), some.begin(), some.end());
+    }
+    const RigCamera& right = simulation_->rig.cameras.at(1);
+    return depthErrors(all, right.model.fx * right.T_rig_cam.translation.norm());
+  }
+
+  static Simulation* simulation_;
+  static std::vector<std::vector<Event>> events_;
+  static std::vector<StampedPose> poses_;
+};
+
+Simulation* DeskStereo::simulation_ = nullptr;
+std::vector<std::vector<Event>> DeskStereo::events_;
+std::vector<StampedPose> DeskStereo::poses_;
+
+TEST_F(DeskStereo, EachCameraFiresAboutAMillionEvents) {
+  for (const auto& events : events_) {
+    EXPECT_GE(events.size(), 800'000U);
+    EXPECT_LE(events.size(), 1'200'000U);
+  }
+}
+
+/// 0.2 s of the recording, fused by the harmonic mean: by the mapper, and by the oracle with the
+/// poses of the same packets and with a pose per event.
+class DeskStereoDsi : public DeskStereo {
+ protected:
+  struct Error {
+    double l1 = 0;  ///< Of the mass.
+    double same_peak = 0;        ///< Share of the pixels with votes.
+    double near_peak_kept = 0;   ///< Within one plane: share of the pixels with a depth.
+  };
+
+  void SetUp() override {
+    const std::int64_t t0_ns = simulation_->start_ns + 900 * kMs;
+    options_ = options(0.2, 0.2);
+    options_.only_window = Window{t0_ns, t0_ns + 200 * kMs, t0_ns + 100 * kMs};
+    FusionMapper mapper(options_);
+    for (const StampedPose& pose : poses_) trajectory_.add(pose);
+    for (std::size_t c = 0; c < 2; ++c) {
+      const auto in_window = [&](const Event& event) {
+        return event.t_ns >= t0_ns && event.t_ns < t0_ns + 200 * kMs;
+      };
+      window_events_.emplace_back();
+      std::copy_if(events_[c].begin(), events_[c].end(), std::back_inserter(window_events_[c]),
+                   in_window);
+    }
+    const KeyframeMapper keyframe_mapper(simulation_->rig, {0, 1}, options_.keyframe);
+    dsi_ = std::make_unique<KeptDsi>(100, keyframe_mapper.view());
+    keyframe_ = *keyframe_mapper.map(*options_.only_window, window_events_, trajectory_, dsi_.get());
+  }
+
+  oracle::Dsi oracleDsi(bool by_packet) const {
+    const DepthPlanes planes(options_.keyframe.planes);
+    std::vector<oracle::Dsi> densities;
+    for (std::size_t c = 0; c < 2; ++c) {
+      const RigCamera& camera = simulation_->rig.cameras[c];
+      const UndistortionTable undistortion(camera.model);
+      const PacketGeometry geometry{keyframe_.T_world_ref.inverse(), keyframe_.view,
+                                    planes.depth(0), planes.depth(99)};
+      const auto posed =
+          by_packet
+              ? oracle::poseByPacket(
+                    window_events_[c],
+                    splitIntoPosePackets(window_events_[c], camera, undistortion, trajectory_,
+                                         geometry, options_.keyframe.packets))
+              : oracle::poseEach(window_events_[c], camera, trajectory_, keyframe_.T_world_ref);
+      densities.push_back(oracle::rayDensity(posed, undistortion, keyframe_.view, planes));
+    }
+    return oracle::fuse(FusionRule::kHarmonic, densities);
+  }
+
+  Error compareWith(const oracle::Dsi& exact) const {
+    double mass = 0;
+    double difference = 0;
+    oracle::Dsi ours(100, keyframe_.view);
+    for (std::size_t i = 0; i < exact.values.size(); ++i) {
+      ours.values[i] = dsi_->values[i];
+      mass += exact.values[i];
+      difference += std::abs(ours.values[i] - exact.values[i]);
+    }
+    const auto exact_planes = oracle::peakPlanes(exact);
+    const auto exact_values = oracle::peakValues(exact);
+    const auto our_planes = oracle::peakPlanes(ours);
+    double with_votes = 0;
+    double same = 0;
+    double kept = 0;
+    double near = 0;
+    for (std::size_t i = 0; i < exact_planes.size(); ++i) {
+      const int x = static_cast<int>(i) % keyframe_.view.width;
+      const int y = static_cast<int>(i) / keyframe_.view.width;
+      if (exact_values[i] > 0) {
+        ++with_votes;
+        same += exact_planes[i] == our_planes[i] ? 1 : 0;
+      }
+      if (keyframe_.map.depth(y, x) > 0) {
+        ++kept;
+        near += std::abs(exact_planes[i] - our_planes[i]) <= 1 ? 1 : 0;
+      }
+    }
+    return {difference / mass, same / with_votes, near / kept};
+  }
+
+  FusionMapperOptions options_;
+  Trajectory trajectory_;
+  std::vector<std::vector<Event>> window_events_;
+  KeyframeDepthMap keyframe_;
+  std::unique_ptr<KeptDsi> dsi_;
+};
+
+TEST_F(DeskStereoDsi, TheKernelIsExactUpToTheRoundingOfFloats) {
+  const Error error = compareWith(oracleDsi(true));
+  std::cout << "kernel error: L1 " << error.l1 << " of the mass, same peak plane "
+            << error.same_peak << "\n";
+  EXPECT_LE(error.l1, 1e-4);
+  EXPECT_GE(error.same_peak, 0.999);
+}
+
+TEST_F(DeskStereoDsi, SharingPosesCostsNextToNothing) {
+  const Error error = compareWith(oracleDsi(false));
+  std::cout << "packet error: L1 " << error.l1 << " of the mass, peak within one plane on "
+            << error.near_peak_kept << " of the kept pixels\n";
+  EXPECT_LE(error.l1, 3e-3);
+  EXPECT_GE(error.near_peak_kept, 0.995);
+}
+
+TEST_F(DeskStereo, DepthIsGoodToAFractionOfAPlane) {
+  const auto keyframes = map(options(0.5, 0.25));
+  ASSERT_GE(keyframes.size(), 5U);
+  const double step = DepthPlanes(options(0.5, 0.25).keyframe.planes).inverseDepthStep();
+  double mean = 0;
+  for (const KeyframeDepthMap& keyframe : keyframes) {
+    mean += depthErrors(pairs(keyframe)).median_inverse / step / static_cast<double>(keyframes.size());
+  }
+  std::cout << "median inverse depth error: " << mean << " plane steps, mean of "
+            << keyframes.size() << " keyframes\n";
+  EXPECT_LE(mean, 0.8);
+}
+
+TEST_F(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
+  FusionMapperOptions harmonic = options(0.1, 0.1);
+  FusionMapperOptions arithmetic = harmonic;
+  arithmetic.keyframe.sweep.across_cameras = FusionRule::kArithmetic;
+  FusionMapperOptions one_camera = harmonic;
+  one_camera.cameras = {0};
+  const DepthErrors of_harmonic = errors(map(harmonic));
+  const DepthErrors of_arithmetic = errors(map(arithmetic));
+  const DepthErrors of_one = errors(map(one_camera));
+  for (const auto& [name, e] : {std::pair{"harmonic", of_harmonic},
+                                std::pair{"arithmetic", of_arithmetic},
+                                std::pair{"one camera", of_one}}) {
+    std::cout << name << ": bad-pix " << 100 * *e.bad_pix_3px << " % of " << e.points
+              << " points\n";
+  }
+  EXPECT_LE(*of_harmonic.bad_pix_3px, 0.85 * *of_arithmetic.bad_pix_3px);
+  EXPECT_LE(*of_harmonic.bad_pix_3px, 0.85 * *of_one.bad_pix_3px);
+}
+
+/// Distance to the nearest point of any surface.
+double distanceToScene(const Scene& scene, const Eigen::Vector3d& p_world) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int surface = 0; surface < scene.size(); ++surface) {
+    const Rectangle& rectangle = scene.rectangle(surface);
+    const Eigen::Vector3d from_corner = p_world - rectangle.corner;
+    const double u = std::clamp(from_corner.dot(rectangle.axis_u), 0.0, rectangle.width_m);
+    const double v = std::clamp(from_corner.dot(rectangle.axis_v), 0.0, rectangle.height_m);
+    nearest = std::min(nearest, (p_world - rectangle.pointAt(u, v)).norm());
+  }
+  return nearest;
+}
+
+TEST_F(DeskStereo, TheMapLiesOnTheTrueSurfaces) {
+  GlobalCloud cloud;
+  std::uint64_t id = 0;
+  for (const KeyframeDepthMap& keyframe : map(options(0.5, 0.25))) {
+    cloud.insert(id++, keyframeCloud(keyframe));
+  }
+  std::vector<double> distances;
+  for (const CloudPoint& point : cloud.points()) {
+    distances.push_back(distanceToScene(simulation_->scene, point.p_world));
+  }
+  ASSERT_GT(distances.size(), 10'000U);
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  std::cout << "map: " << distances.size() << " points, median distance to the surfaces "
+            << 100 * *middle << " cm\n";
+  EXPECT_LE(*middle, 0.03);
+}
+
+}  // namespace
+}  // namespace efm
