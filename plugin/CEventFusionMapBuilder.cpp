@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/CEventFusionMapBuilder.h"
+
+#include <mrpt/maps/CPointsMapXYZI.h>
+#include <mrpt/maps/CSimpleMap.h>
+#include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationRobotPose.h>
+#include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/poses/CPose3DPDFGaussian.h>
+
+#include <exception>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/timestamp.h"
+#include "maps/whole_file.h"
+#include "plugin/CObservationEvents.h"
+#include "plugin/depth_picture.h"
+#include "plugin/mrpt_pose.h"
+#include "plugin/mrpt_time.h"
+
+IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
+
+namespace efm {
+namespace {
+
+CameraPacket packetOf(const CObservationEvents& observation) {
+  CameraPacket packet;
+  packet.camera = observation.camera_index;
+  packet.calibration.model = observation.camera;
+  packet.calibration.T_rig_cam = rigidFrom(observation.camera_pose);
+  packet.events = observation.events;
+  packet.covered_until_ns = observation.covered_until_ns;
+  return packet;
+}
+
+/// @throws std::invalid_argument where the observation has no time.
+StampedPose poseOf(const mrpt::obs::CObservationRobotPose& observation) {
+  if (observation.timestamp == INVALID_TIMESTAMP) {
+    throw std::invalid_argument("a pose of '" + observation.sensorLabel +
+                                "' has no time stamp: every pose must have one");
+  }
+  const Rigid3 T_world_sensor = rigidFrom(observation.pose.mean);
+  const Rigid3 T_rig_sensor = rigidFrom(observation.sensorPose);
+  return {nanosecondsFrom(observation.timestamp), T_world_sensor * T_rig_sensor.inverse()};
+}
+
+/// One point map of the exported points: MRPT's points are float32.
+mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& points) {
+  auto map = mrpt::maps::CPointsMapXYZI::Create();
+  map->resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f p_world = points[i].p_world.cast<float>();
+    map->setPointFast(i, p_world.x(), p_world.y(), p_world.z());
+    map->setPointIntensity(i, points[i].confidence);
+  }
+  map->mark_as_modified();
+  return map;
+}
+
+}  // namespace
+
+CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder_options)
+    : options_(builder_options) {
+  setLoggerName("CEventFusionMapBuilder");
+  restart();
+}
+
+CEventFusionMapBuilder::~CEventFusionMapBuilder() = default;
+
+void CEventFusionMapBuilder::restart() {
+  session_ = std::make_unique<MappingSession>(options_);
+  finished_ = false;
+  ignored_observations_ = 0;
+  newest_pose_.reset();
+  keyframe_poses_.clear();
+  newest_depth_ = {};
+  silent_cameras_.clear();
+  metric_map_.maps.clear();
+  keyframes_in_metric_map_ = 0;
+}
+
+void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_options) {
+  builder_options.mapper.validate();
+  builder_options.cloud.validate();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  options_ = builder_options;
+
+  restart();
+}
+
+void CEventFusionMapBuilder::setKeyframeTaker(KeyframeTaker taker) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  taker_ = std::move(taker);
+}
+
+void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sink_ = sink;
+}
+
+void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>& feed) {
+  std::vector<KeyframeDepthMap> keyframes;
+  KeyframeTaker taker;
+  std::exception_ptr refusal;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (finished_) throw std::logic_error("the builder was given an observation after its end");
+    try {
+      feed(*session_);
+    } catch (...) {
+      refusal = std::current_exception();  // what came before is mapped all the same
+    }
+    keyframes = session_->mapDue(sink_);
+    for (const KeyframeDepthMap& keyframe : keyframes) {
+      keyframe_poses_.push_back({keyframe.window.t_ref_ns, keyframe.T_world_ref});
+      newest_depth_ = keyframe.map.depth;
+      warnOfSilence(keyframe);
+    }
+    taker = taker_;
+  }
+  if (taker) {
+    for (const KeyframeDepthMap& keyframe : keyframes) taker(keyframe);
+  }
+  if (refusal) std::rethrow_exception(refusal);
+}
+
+/// Once per camera: `status` counts the rest.
+void CEventFusionMapBuilder::warnOfSilence(const KeyframeDepthMap& keyframe) {
+  for (const int camera : keyframe.silent_cameras) {
+    if (!silent_cameras_.insert(camera).second) continue;
+    MRPT_LOG_WARN_STREAM("camera " << camera << " had no event for the keyframe at "
+                                   << formatSeconds(keyframe.window.t_ref_ns) << " s");
+  }
+}
+
+void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
+  using mrpt::obs::CObservationRobotPose;
+  if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
+    advance([&](MappingSession& session) { session.addEvents(packetOf(*events)); });
+  } else if (const auto robot = std::dynamic_pointer_cast<CObservationRobotPose>(observation)) {
+    const StampedPose pose = poseOf(*robot);
+    advance([&](MappingSession& session) {
+      session.addPose(pose);
+      if (!newest_pose_ || pose.t_ns >= newest_pose_->t_ns) newest_pose_ = pose;
+    });
+  } else {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++ignored_observations_;
+  }
+}
+
+void CEventFusionMapBuilder::finish() {
+  advance([this](MappingSession& session) {
+    finished_ = true;
+    session.finish();
+  });
+}
+
+SessionStatus CEventFusionMapBuilder::status() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return session_->status();
+}
+
+std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return ignored_observations_;
+}
+
+std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return session_->cloud().points();
+}
+
+// --- mrpt::slam::CMetricMapBuilder -----------------------------------------------------------
+
+void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_map,
+                                        const mrpt::poses::CPosePDF* /*x0*/) {
+  if (!initial_map.empty()) {
+    throw std::invalid_argument("CEventFusionMapBuilder cannot continue an earlier map");
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  restart();
+}
+
+mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  auto estimate = mrpt::poses::CPose3DPDFGaussian::Create();
+  if (newest_pose_) estimate->mean = mrptPoseFrom(newest_pose_->T_world_rig);
+  return estimate;
+}
+
+void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollection& /*action*/,
+                                                      mrpt::obs::CSensoryFrame& observations) {
+  for (const mrpt::obs::CObservation::Ptr& observation : observations) {
+    processObservation(observation);
+  }
+}
+
+void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  out_map.clear();
+  for (const StampedPose& keyframe : keyframe_poses_) {
+    auto pose = mrpt::poses::CPose3DPDFGaussian::Create();
+    pose->mean = mrptPoseFrom(keyframe.T_world_rig);
+    auto comment = mrpt::obs::CObservationComment::Create();
+    comment->timestamp = mrptTimeFrom(keyframe.t_ns);
+    comment->sensorLabel = "keyframe";
+    comment->text = "keyframe at " + formatSeconds(keyframe.t_ns) + " s";
+    auto frame = mrpt::obs::CSensoryFrame::Create();
+    frame->insert(comment);
+    out_map.insert(pose, frame);
+  }
+}
+
+unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return static_cast<unsigned int>(keyframe_poses_.size());
+}
+
+const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::size_t keyframes = session_->cloud().keyframes();
+  if (metric_map_.maps.empty() || keyframes != keyframes_in_metric_map_) {
+    metric_map_.maps.clear();
+    metric_map_.maps.push_back(pointsMapOf(session_->cloud().points()));
+    keyframes_in_metric_map_ = keyframes;
+  }
+  return &metric_map_;
+}
+
+void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
+                                                          bool /*format_emf_bmp*/) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (newest_depth_.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
+  const cv::Mat3b picture = depthPicture(newest_depth_, options_.mapper.keyframe.planes);
+  writeWhole(file, [&](const std::filesystem::path& temporary) {
+    if (!cv::imwrite(temporary.string(), picture)) throw std::runtime_error("imwrite failed");
+  });
+}
+
+}  // namespace efm

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace efm {
+
+struct ImportArguments {
+  std::vector<std::filesystem::path> sources;
+  std::string format = "auto";
+  std::optional<std::int64_t> t0_ns;
+  std::optional<std::int64_t> t1_ns;
+  std::filesystem::path out;
+};
+
+/// `event-fusion import`: turns a recording into a rawlog.
+/// @return the process's exit status.
+/// @throws std::exception where the recording cannot be read to its end or the rawlog not written:
+/// then there is none.
+int runImport(const ImportArguments& arguments);
+
+}  // namespace efm

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/app/map_command.h"
+
+#include <cstdio>
+#include <iostream>
+#include <memory>
+
+#include "maps/keyframe_cloud.h"
+#include "plugin/app/mapping_run.h"
+#include "plugin/map_output.h"
+#include "plugin/npy_file.h"
+
+namespace efm {
+namespace {
+
+EventFusionOptions optionsOf(const MappingArguments& arguments) {
+  OptionReader reader;
+  reader.readFile(arguments.config);
+  for (const std::string& assignment : arguments.sets) reader.set(assignment);
+  return reader.options();
+}
+
+void printSummary(const MapReport& report, const std::filesystem::path& folder) {
+  std::printf("%llu keyframes, %llu points, %.1f million votes/s; written to %s\n",
+              static_cast<unsigned long long>(report.counts.keyframes),
+              static_cast<unsigned long long>(report.points), votesPerSecond(report) * 1e-6,
+              folder.c_str());
+}
+
+/// What `map` and `depth` end with: the report, then words to the user.
+int conclude(const MappingOutcome& outcome, MapOutput& output) {
+  // A run that failed before its first keyframe leaves the results of an earlier one as they were.
+  const bool made_nothing = outcome.error && outcome.report.counts.keyframes == 0;
+  if (!made_nothing || !std::filesystem::exists(output.folder() / "report.json")) {
+    output.writeReport(reportJson(outcome.report));
+  }
+  for (const std::string& warning : outcome.warnings) {
+    std::cerr << "event-fusion: warning: " << warning << "\n";
+  }
+  if (outcome.report.counts.keyframes > 0) printSummary(outcome.report, output.folder());
+  if (!outcome.error) return 0;
+  std::cerr << "event-fusion: error: " << *outcome.error << "\n";
+  return 1;
+}
+
+Window windowOf(const DepthArguments& arguments, ReferenceTime reference) {
+  const std::int64_t middle_ns = arguments.t0_ns + (arguments.t1_ns - arguments.t0_ns) / 2;
+  const std::int64_t by_options_ns =
+      reference == ReferenceTime::kMiddle ? middle_ns : arguments.t1_ns;
+  return {arguments.t0_ns, arguments.t1_ns, arguments.t_ref_ns.value_or(by_options_ns)};
+}
+
+}  // namespace
+
+int runMap(const MapArguments& arguments) {
+  StageSeconds clock;
+  MappingOutcome outcome;
+  std::optional<MapOutput> output;
+  {
+    const SecondsScope total(clock.total);
+    MappingJob job;
+    job.options = optionsOf(arguments);
+    job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
+    job.options.mapper.limits.validate();
+    const std::unique_ptr<Recording> recording = openRecording(arguments.sources, arguments.format);
+    output.emplace(arguments.out, OutputKind::kMap, job.options.mapper.keyframe.planes);
+    job.take_keyframe = [&](const KeyframeDepthMap& keyframe) { output->writeKeyframe(keyframe); };
+
+    outcome = runMapping(job, *recording);
+    if (outcome.report.counts.keyframes > 0) {
+      const SecondsScope map(outcome.report.seconds.map);
+      output->writeCloud("map.pcd", outcome.points);
+      output->writeTrajectory();
+    }
+  }
+  outcome.report.seconds.total = clock.total;
+  return conclude(outcome, *output);
+}
+
+int runDepth(const DepthArguments& arguments) {
+  StageSeconds clock;
+  MappingOutcome outcome;
+  std::optional<MapOutput> output;
+  {
+    const SecondsScope total(clock.total);
+    MappingJob job;
+    job.options = optionsOf(arguments);
+    job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
+    job.options.mapper.validate();
+    const std::unique_ptr<Recording> recording = openRecording(arguments.sources, arguments.format);
+    output.emplace(arguments.out, OutputKind::kDepth, job.options.mapper.keyframe.planes);
+
+    std::vector<CloudPoint> points;
+    job.take_keyframe = [&](const KeyframeDepthMap& keyframe) {
+      output->writeImages(keyframe);
+      points = keyframeCloud(keyframe);
+    };
+    std::unique_ptr<NpyDsiFile> dsi;
+    if (arguments.save_dsi) {
+      job.make_dsi_sink = [&](const ReferenceView& view) {
+        dsi = std::make_unique<NpyDsiFile>(arguments.out / "dsi.npy",
+                                           job.options.mapper.keyframe.planes.num_planes, view);
+        return dsi.get();
+      };
+    }
+
+    outcome = runMapping(job, *recording);
+    outcome.report.points = points.size();
+    if (outcome.report.counts.keyframes > 0) {
+      output->writeCloud("points.pcd", points);
+      if (dsi) dsi->finish();
+    }
+  }
+  outcome.report.seconds.total = clock.total;
+  return conclude(outcome, *output);
+}
+
+}  // namespace efm

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/app/mapping_run.h"
+
+#include <mrpt/obs/CObservation.h>
+
+#include <array>
+#include <cstdio>
+
+#include "plugin/CEventFusionMapBuilder.h"
+#include "plugin/CObservationEvents.h"
+#include "plugin/app/progress.h"
+
+namespace efm {
+namespace {
+
+/// The loop over a recording: reads, feeds the builder, hands keyframes over.
+class Player {
+ public:
+  Player(const MappingJob& job, Recording& recording, StageSeconds& seconds)
+      : job_(job), recording_(recording), seconds_(seconds) {
+    builder_.setOptions(job.options);
+    builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // its warnings come in one, at the end
+    builder_.setKeyframeTaker(
+        [this](const KeyframeDepthMap& keyframe) { made_.push_back(keyframe); });
+  }
+
+  /// @return what stopped it before the recording's end, if anything did.
+  std::optional<std::string> play() {
+    std::optional<std::string> error;
+    for (bool more = true; more;) {
+      more = tried([this] { return playOne(); }, error);
+      handOver();
+      if (progress_.due()) showProgress();
+    }
+    tried([this] { return builder_.finish(), false; }, error);
+    handOver();
+    return error;
+  }
+
+  const CEventFusionMapBuilder& builder() const { return builder_; }
+
+ private:
+  /// Runs a step of reading; its error, the first one, ends the loop.
+  template <typename Step>
+  static bool tried(Step step, std::optional<std::string>& error) {
+    try {
+      return step();
+    } catch (const std::exception& caught) {
+      if (!error) error = caught.what();
+      return false;
+    }
+  }
+
+  /// @return false at the recording's end.
+  bool playOne() {
+    mrpt::obs::CObservation::Ptr observation;
+    {
+      const SecondsScope scope(seconds_.read);
+      observation = recording_.next();
+    }
+    if (!observation) return false;
+    offerDsiSink(*observation);
+    try {
+      builder_.processObservation(observation);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(recording_.place() + ": " + error.what());
+    }
+    return true;
+  }
+
+  /// The size of the DSI's planes is known once the reference camera is.
+  void offerDsiSink(const mrpt::obs::CObservation& observation) {
+    if (sink_offered_ || !job_.make_dsi_sink) return;
+    const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
+    if (!events || events->camera_index != job_.options.mapper.keyframe.reference_camera) return;
+    sink_offered_ = true;
+    builder_.setDsiSink(job_.make_dsi_sink(ReferenceView::of(events->camera)));
+  }
+
+  /// Outside the steps of reading: an error of writing must not be taken for one of reading.
+  void handOver() {
+    for (const KeyframeDepthMap& keyframe : made_) job_.take_keyframe(keyframe);
+    made_.clear();
+  }
+
+  void showProgress() {
+    std::array<char, 64> line{};
+    std::snprintf(line.data(), line.size(), "%3.0f %%, %llu keyframes", 100 * recording_.progress(),
+                  static_cast<unsigned long long>(builder_.status().counts.keyframes));
+    progress_.show(line.data());
+  }
+
+  const MappingJob& job_;
+  Recording& recording_;
+  StageSeconds& seconds_;
+  CEventFusionMapBuilder builder_;
+  std::vector<KeyframeDepthMap> made_;
+  bool sink_offered_ = false;
+  Progress progress_;
+};
+
+std::vector<std::string> warningsOf(const SessionStatus& status) {
+  std::vector<std::string> warnings;
+  if (status.counts.sorted_events > 0) {
+    warnings.push_back(std::to_string(status.counts.sorted_events) +
+                       " events came later than newer ones and were sorted");
+  }
+  for (std::size_t c = 0; c < status.silent_keyframes.size(); ++c) {
+    if (status.silent_keyframes[c] == 0) continue;
+    warnings.push_back("camera " + std::to_string(c) + " had no event in " +
+                       std::to_string(status.silent_keyframes[c]) + " of " +
+                       std::to_string(status.counts.keyframes) +
+                       " keyframes: rules that ask all cameras (min, harmonic, geometric) find "
+                       "nothing there");
+  }
+  if (status.counts.duplicate_poses > 0) {
+    warnings.push_back(std::to_string(status.counts.duplicate_poses) +
+                       " poses had the time of an earlier one and were left out");
+  }
+  if (status.counts.keyframes > 0 && status.counts.keyframes_without_pose > 0) {
+    warnings.push_back(std::to_string(status.counts.keyframes_without_pose) +
+                       " windows were left out: no pose at their reference time");
+  }
+  if (status.counts.keyframes > 0 && status.counts.windows_without_events > 0) {
+    warnings.push_back(std::to_string(status.counts.windows_without_events) +
+                       " windows were left out: the selected cameras saw nothing");
+  }
+  return warnings;
+}
+
+}  // namespace
+
+MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
+  MappingOutcome outcome;
+  StageSeconds reading;
+  Player player(job, recording, reading);
+  outcome.error = player.play();
+
+  SessionStatus status = player.builder().status();
+  status.counts.sorted_events += recording.counts().sorted_events;
+  outcome.report.counts = status.counts;
+  outcome.report.options = job.options;
+  outcome.report.seconds = status.seconds;
+  outcome.report.seconds.read = reading.read;
+  {
+    const SecondsScope scope(outcome.report.seconds.map);
+    outcome.points = player.builder().points();
+  }
+  outcome.report.points = outcome.points.size();
+  outcome.warnings = warningsOf(status);
+  if (status.counts.event_uses == 0 && !outcome.error) {
+    outcome.error = status.counts.keyframes == 0
+                        ? "there is no keyframe: " + whyNoKeyframe(status, job.options.mapper)
+                        : "no event of the keyframes' windows could be used";
+  }
+  return outcome;
+}
+
+}  // namespace efm

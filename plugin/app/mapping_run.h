@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/keyframe_mapper.h"
+#include "maps/cloud_point.h"
+#include "plugin/mapping_session.h"
+#include "plugin/option_file.h"
+#include "plugin/recording.h"
+#include "plugin/report.h"
+
+namespace efm {
+
+/// How to map a recording, and who receives what is made on the way.
+struct MappingJob {
+  EventFusionOptions options;
+
+  /// Receives each keyframe, in order.
+  std::function<void(const KeyframeDepthMap&)> take_keyframe;
+  /// Asked once, when the reference camera is known, for a receiver of the DSI's planes. May be
+  /// empty.
+  std::function<DsiSink*(const ReferenceView&)> make_dsi_sink;
+};
+
+/// What a run made.
+struct MappingOutcome {
+  MapReport report;  ///< Without the total of seconds.
+  std::vector<CloudPoint> points;
+  /// What was odd about the input, though it was mapped: one line each.
+  std::vector<std::string> warnings;
+  /// Why the recording was not read to its end or gave no keyframe.
+  std::optional<std::string> error;
+};
+
+/// Plays a recording through a map builder, with progress on stderr where that is a terminal. Where
+/// reading stops with an error, what came before is mapped to its end.
+/// @throws std::invalid_argument where the options are not valid; what `take_keyframe` and
+/// `make_dsi_sink` throw.
+MappingOutcome runMapping(const MappingJob& job, Recording& recording);
+
+}  // namespace efm

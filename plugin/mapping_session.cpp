@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mapping_session.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/option_check.h"
+#include "mapping/timestamp.h"
+#include "maps/keyframe_cloud.h"
+
+namespace efm {
+namespace {
+
+/// How long after the recording's first event cameras may first appear.
+constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
+
+bool sameCalibration(const RigCamera& a, const RigCamera& b) {
+  return a.model == b.model && a.T_rig_cam.translation == b.T_rig_cam.translation &&
+         a.T_rig_cam.rotation.coeffs() == b.T_rig_cam.rotation.coeffs() &&
+         a.time_offset_ns == b.time_offset_ns;
+}
+
+void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
+  if (!span) span = TimeSpan{t_ns, t_ns};
+  span->first_ns = std::min(span->first_ns, t_ns);
+  span->last_ns = std::max(span->last_ns, t_ns);
+}
+
+std::string asText(const TimeSpan& span) {
+  return formatSeconds(span.first_ns) + " to " + formatSeconds(span.last_ns) + " s";
+}
+
+}  // namespace
+
+MappingSession::MappingSession(const EventFusionOptions& options)
+    : options_(options), mapper_(options.mapper), cloud_(options.cloud) {}
+
+void MappingSession::addEvents(CameraPacket packet) {
+  if (packet.camera < 0) {
+    throw std::invalid_argument("camera " + std::to_string(packet.camera) + ": must be 0 or above");
+  }
+  admit(std::move(packet));
+
+  // The next camera in line may be among those that wait for this one.
+  const auto is_next = [this](const CameraPacket& waiting) {
+    return waiting.camera <= static_cast<int>(mapper_.rig().cameras.size());
+  };
+  for (auto next = std::find_if(waiting_.begin(), waiting_.end(), is_next); next != waiting_.end();
+       next = std::find_if(waiting_.begin(), waiting_.end(), is_next)) {
+    CameraPacket freed = std::move(*next);
+    waiting_.erase(next);
+    admit(std::move(freed));
+  }
+}
+
+/// Feeds a packet whose camera is in the rig or comes next; lets the others wait.
+void MappingSession::admit(CameraPacket packet) {
+  const auto known = static_cast<int>(mapper_.rig().cameras.size());
+  if (packet.camera >= known && rig_complete_) {
+    throw std::invalid_argument("camera " + std::to_string(packet.camera) +
+                                " first appears more than a second after the first event: all "
+                                "cameras must be there by then");
+  }
+  if (packet.camera > known) {
+    waiting_.push_back(std::move(packet));
+    return;
+  }
+  if (packet.camera == known) {
+    mapper_.addCamera(packet.calibration);
+    status_.silent_keyframes.push_back(0);
+  }
+  feed(std::move(packet));
+}
+
+void MappingSession::feed(CameraPacket packet) {
+  const RigCamera& camera = mapper_.rig().cameras[static_cast<std::size_t>(packet.camera)];
+  if (!sameCalibration(camera, packet.calibration)) {
+    throw std::invalid_argument("camera " + std::to_string(packet.camera) +
+                                ": its calibration or its pose on the rig differs from that of its "
+                                "first packet");
+  }
+  std::optional<TimeSpan> span = status_.events;
+  if (!packet.events.empty()) {
+    extend(span, packet.events.front().t_ns + camera.time_offset_ns);
+    extend(span, packet.events.back().t_ns + camera.time_offset_ns);
+  }
+  mapper_.addEvents(packet.camera, packet.events);
+  if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
+  status_.events = span;
+  if (span && span->last_ns - span->first_ns > kRigCompletesNs) completeRig();
+}
+
+/// From now on no camera may come, and those that the options name must be there.
+void MappingSession::completeRig() {
+  if (rig_complete_) return;
+  const auto count = static_cast<int>(mapper_.rig().cameras.size());
+  const std::string expected = "a camera of the recording: 0 to " + std::to_string(count - 1);
+  for (const int camera : options_.mapper.cameras) {
+    requireOption(camera < count, "[rig] cameras", camera, expected);
+  }
+  const int reference = options_.mapper.keyframe.reference_camera;
+  requireOption(count == 0 || reference < count, "[dsi] reference_camera", reference, expected);
+  rig_complete_ = true;
+}
+
+void MappingSession::addPose(const StampedPose& pose) {
+  mapper_.addPose(pose);
+  extend(status_.poses, pose.t_ns);
+}
+
+void MappingSession::finish() {
+  mapper_.finish();
+  completeRig();
+  if (!waiting_.empty()) {
+    throw std::invalid_argument("the recording has events of camera " +
+                                std::to_string(waiting_.front().camera) + " but none of camera " +
+                                std::to_string(mapper_.rig().cameras.size()));
+  }
+}
+
+std::vector<KeyframeDepthMap> MappingSession::mapDue(DsiSink* sink) {
+  std::vector<KeyframeDepthMap> keyframes;
+  if (!rig_complete_) return keyframes;
+  StageTimer timer(status_.seconds);
+  while (auto keyframe = mapper_.next(sink, &timer)) {
+    const SecondsScope scope(status_.seconds.map);
+    cloud_.insert(cloud_.keyframes(), keyframeCloud(*keyframe));
+    for (const int camera : keyframe->silent_cameras) {
+      ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
+    }
+    keyframes.push_back(std::move(*keyframe));
+  }
+  return keyframes;
+}
+
+SessionStatus MappingSession::status() const {
+  SessionStatus status = status_;
+  status.counts = mapper_.counts();
+  return status;
+}
+
+std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
+  if (!status.events) return "the recording has no events";
+  if (!status.poses) return "the recording has no poses";
+  const std::string spans =
+      "the events span " + asText(*status.events) + ", the poses " + asText(*status.poses);
+  const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);
+  const std::int64_t last_ns = std::min(status.events->last_ns, status.poses->last_ns);
+  if (first_ns > last_ns) {
+    return spans + ": they miss each other by " + formatSeconds(first_ns - last_ns) + " s";
+  }
+  const bool saw_nothing =
+      status.counts.keyframes_without_pose == 0 && status.counts.windows_without_events > 0;
+  if (options.only_window) {
+    const Window& window = *options.only_window;
+    const std::string stretch = "the window " + asText({window.t0_ns, window.t1_ns});
+    return saw_nothing ? "the selected cameras have no event in " + stretch + "; " + spans
+                       : "there is no pose at the reference time " +
+                             formatSeconds(window.t_ref_ns) + " s of " + stretch + "; " + spans;
+  }
+  if (saw_nothing) {
+    return "the selected cameras have no event in any window that was full: " + spans;
+  }
+  if (status.counts.keyframes_without_pose > 0) {
+    return std::to_string(status.counts.keyframes_without_pose) +
+           " windows were full, but had no pose at their reference times: poses are more than "
+           "max_pose_gap_s apart there";
+  }
+  return "no window of " + formatSeconds(durationFromSeconds(options.keyframes.window_s)) +
+         " s (window_s) was full: " + spans + ", " + formatSeconds(last_ns - first_ns) +
+         " s of them together";
+}
+
+}  // namespace efm

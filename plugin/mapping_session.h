@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/fusion_mapper.h"
+#include "maps/global_cloud.h"
+#include "plugin/option_file.h"
+#include "plugin/stage_timer.h"
+
+namespace efm {
+
+/// First and last time of what came in, on the trajectory's clock.
+struct TimeSpan {
+  std::int64_t first_ns = 0;
+  std::int64_t last_ns = 0;
+};
+
+/// A stretch of one camera's recording.
+struct CameraPacket {
+  int camera = 0;         ///< Index in the rig.
+  RigCamera calibration;  ///< The same in all packets of a camera.
+  std::vector<Event> events;
+  /// Everything that the camera saw before this time (its own clock) has been given by now.
+  std::optional<std::int64_t> covered_until_ns;
+};
+
+/// What a session was given and did so far.
+struct SessionStatus {
+  MapperCounts counts;   ///< Complete after `finish`.
+  StageSeconds seconds;  ///< sweep, depth and map; the rest is the caller's.
+  std::optional<TimeSpan> events;
+  std::optional<TimeSpan> poses;
+  std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: those that it had no event for.
+};
+
+/// From packets of events and poses, in the order of a recording, to keyframes and the global
+/// cloud: puts the rig together as its cameras appear, feeds the mapper and collects what it makes.
+/// Not thread-safe. Knows nothing of MRPT.
+///
+/// Use: add, and after each `mapDue`; at the end `finish`, and `mapDue` again.
+class MappingSession {
+ public:
+  /// @throws std::invalid_argument where the options are not valid.
+  explicit MappingSession(const EventFusionOptions& options);
+
+  /// @throws std::invalid_argument where the packet contradicts its sensor or those before it, or
+  /// its camera first appears more than a second after the recording's first event: the rig is
+  /// complete by then; or where the options name a camera that the rig does not have.
+  void addEvents(CameraPacket packet);
+  /// @throws std::invalid_argument where the pose is not finite.
+  void addPose(const StampedPose& pose);
+  /// No more will come.
+  /// @throws std::invalid_argument where a camera's events came but none of one before it: what can
+  /// be mapped without can be mapped all the same.
+  void finish();
+
+  /// Maps the windows that are covered and puts them into the cloud.
+  /// @param sink receives every fused plane where given.
+  std::vector<KeyframeDepthMap> mapDue(DsiSink* sink = nullptr);
+
+  const GlobalCloud& cloud() const { return cloud_; }
+  SessionStatus status() const;
+
+ private:
+  void admit(CameraPacket packet);
+  void feed(CameraPacket packet);
+  void completeRig();
+
+  EventFusionOptions options_;
+
+  FusionMapper mapper_;
+  GlobalCloud cloud_;
+  bool rig_complete_ = false;
+  std::vector<CameraPacket> waiting_;  // for a camera of a lower index to appear
+  SessionStatus status_;               // counts: see status()
+};
+
+/// Says in a sentence why a session that is finished made no keyframe: no events, no poses, poses
+/// and events that miss each other (by how much), or too little of both for one window.
+std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options);
+
+}  // namespace efm

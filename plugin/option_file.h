@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "mapping/fusion_mapper.h"
+#include "maps/global_cloud.h"
+
+namespace efm {
+
+/// Everything that an option file says.
+struct EventFusionOptions {
+  FusionMapperOptions mapper;
+  GlobalCloudOptions cloud;
+};
+
+using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
+
+/// One option as the files name it.
+struct NamedOption {
+  std::string_view section;
+  std::string_view key;
+  OptionValue value;
+};
+
+/// All options, in the order of the table that files are read by, so that what is read, overridden
+/// and reported cannot differ.
+std::vector<NamedOption> listOptions(const EventFusionOptions& options);
+/// As a file has it: numbers with the fewest digits that read back the same.
+std::string textOf(const OptionValue& value);
+
+/// Reads options from .ini files and from the command line, strictly: what is not understood is an
+/// error that names the file and line, the section, the key, the value and what was expected.
+/// (`mrpt::config::CConfigFile` reads "abc" as 0 and ignores unknown keys and missing files.)
+///
+/// Keys that are not given keep their defaults. Comments start with ';', '#' or "//", at the start
+/// of a line or after a blank.
+class OptionReader {
+ public:
+  /// @throws std::runtime_error where the file cannot be read; std::invalid_argument at an unknown
+  /// section or key, a key given twice, or a value of the wrong kind.
+  void readFile(const std::filesystem::path& path);
+  /// As `readFile`, of text that is called `name` in errors.
+  void readText(std::string_view text, const std::string& name);
+  /// Overrides one option: "section.key=value". The last one counts.
+  /// @throws std::invalid_argument as `readFile` does.
+  void set(std::string_view assignment);
+
+  /// @throws std::invalid_argument where a value is out of range.
+  EventFusionOptions options() const;
+
+ private:
+  void assign(std::string_view section, std::string_view key, std::string_view value,
+              const std::string& origin);
+
+  EventFusionOptions options_;
+  std::map<std::pair<std::string, std::string>, std::string> origins_;  // (section, key) -> where
+};
+
+}  // namespace efm

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/registration.h"
+
+#include <mrpt/rtti/CObject.h>
+
+#include "plugin/CEventFusionMapBuilder.h"
+#include "plugin/CObservationEvents.h"
+
+namespace efm {
+
+void registerClasses() {
+  // One line per class.
+  for (const mrpt::rtti::TRuntimeClassId* id : {
+           CLASS_ID(CObservationEvents),
+           CLASS_ID(CEventFusionMapBuilder),
+       }) {
+    if (!mrpt::rtti::findRegisteredClass(id->className, false)) mrpt::rtti::registerClass(id);
+  }
+}
+
+namespace {
+
+/// At load. Class ids are constants: the order in which files are initialised does not matter.
+const struct AtLoad {
+  AtLoad() { registerClasses(); }
+} kAtLoad;
+
+}  // namespace
+
+}  // namespace efm

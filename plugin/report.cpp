@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/report.h"
+
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+#include <variant>
+
+namespace efm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json asJson(const EventCounts& counts) {
+  return {{"read", counts.read},
+          {"used", counts.used},
+          {"without_pose", counts.without_pose},
+          {"outside_window", counts.outside_window},
+          {"dropped", counts.dropped},
+          {"filtered", 0}};  // no event filter exists yet
+}
+
+Json asJson(const StageSeconds& seconds) {
+  return {{"total", seconds.total}, {"read", seconds.read},     {"sweep", seconds.sweep},
+          {"depth", seconds.depth}, {"refine", seconds.refine}, {"map", seconds.map}};
+}
+
+Json asJson(const EventFusionOptions& options) {
+  Json json = Json::object();
+  for (const NamedOption& option : listOptions(options)) {
+    std::visit(
+        [&](const auto& value) {
+          json[std::string(option.section)][std::string(option.key)] = value;
+        },
+        option.value);
+  }
+  return json;
+}
+
+std::uint64_t peakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
+}
+
+}  // namespace
+
+double votesPerSecond(const MapReport& report) {
+  if (!(report.seconds.sweep > 0)) return 0;
+  return static_cast<double>(report.counts.votes.total()) / report.seconds.sweep;
+}
+
+std::string reportJson(const MapReport& report) {
+  const MapperCounts& counts = report.counts;
+  const SpaceSweepOptions& sweep = report.options.mapper.keyframe.sweep;
+
+  Json events = asJson(counts.total());
+  events["cameras"] = Json::array();
+  for (const EventCounts& camera : counts.cameras) events["cameras"].push_back(asJson(camera));
+
+  Json json;
+  json["version"] = EFM_VERSION;
+  json["events"] = events;
+  json["event_uses"] = counts.event_uses;
+  json["votes"] = {{"cast", counts.votes.cast},
+                   {"outside_view", counts.votes.outside_view},
+                   {"behind_camera", counts.votes.behind_camera}};
+  json["keyframes"] = counts.keyframes;
+  json["keyframes_without_pose"] = counts.keyframes_without_pose;
+  json["windows_without_events"] = counts.windows_without_events;
+  json["sorted_events"] = counts.sorted_events;
+  json["duplicate_poses"] = counts.duplicate_poses;
+  json["points"] = report.points;
+  json["seconds"] = asJson(report.seconds);
+  json["votes_per_second"] = votesPerSecond(report);
+  json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
+  json["threads"] = sweep.threadsOrCores();
+  json["peak_memory_bytes"] = peakMemoryBytes();
+  json["options"] = asJson(report.options);
+  return json.dump(2) + "\n";
+}
+
+}  // namespace efm

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "mapping/fusion_mapper.h"
+#include "plugin/option_file.h"
+#include "plugin/stage_timer.h"
+
+namespace efm {
+
+/// What a run read, did and took: the content of report.json.
+struct MapReport {
+  MapperCounts counts;
+  std::uint64_t points = 0;  ///< Of the exported map.
+  StageSeconds seconds;
+  EventFusionOptions options;  ///< As used.
+};
+
+/// The report as indented JSON: events (total and per camera; read = used + without_pose +
+/// outside_window + dropped + filtered), event_uses, votes (event_uses x planes = their sum),
+/// keyframes, points, seconds, votes_per_second, kernel, threads, peak_memory_bytes (of this
+/// process), options (all of them) and version.
+std::string reportJson(const MapReport& report);
+
+/// Votes (used events times planes) over the sweep's seconds; 0 where nothing was swept.
+double votesPerSecond(const MapReport& report);
+
+}  // namespace efm

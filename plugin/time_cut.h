@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "plugin/recording.h"
+
+namespace efm {
+
+/// A stretch of a recording, [t0, t1): the events in it, and the poses in it with the nearest one
+/// before and after, so that every event has a pose on both sides that had.
+class TimeCut : public Recording {
+ public:
+  /// @param t0_ns, t1_ns no limit where not given.
+  /// @throws std::invalid_argument where t1 is not after t0.
+  TimeCut(std::unique_ptr<Recording> recording, std::optional<std::int64_t> t0_ns,
+          std::optional<std::int64_t> t1_ns);
+
+  mrpt::obs::CObservation::Ptr next() override;
+  std::string place() const override { return recording_->place(); }
+  double progress() const override { return recording_->progress(); }
+  RecordingCounts counts() const override { return recording_->counts(); }
+
+ private:
+  bool readOne();
+  void takePose(const mrpt::obs::CObservation::Ptr& pose, std::int64_t t_ns);
+  void takeOther(const mrpt::obs::CObservation::Ptr& observation, std::int64_t t_ns);
+  void give(const mrpt::obs::CObservation::Ptr& observation);
+
+  std::unique_ptr<Recording> recording_;
+  std::int64_t t0_ns_;
+  std::int64_t t1_ns_;
+  bool began_ = false;                                // something from t0 on was read
+  mrpt::obs::CObservation::Ptr pose_before_;          // the newest before t0, until it is given
+  std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until it is given
+  std::deque<mrpt::obs::CObservation::Ptr> ready_;
+  bool events_ended_ = false;
+  bool poses_ended_ = false;
+};
+
+/// The recording itself where no limit is given.
+/// @throws std::invalid_argument as TimeCut does.
+std::unique_ptr<Recording> cutTime(std::unique_ptr<Recording> recording,
+                                   std::optional<std::int64_t> t0_ns,
+                                   std::optional<std::int64_t> t1_ns);
+
+}  // namespace efm

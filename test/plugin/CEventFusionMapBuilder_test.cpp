@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/CEventFusionMapBuilder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/maps/CPointsMapXYZI.h>
+#include <mrpt/maps/CSimpleMap.h>
+#include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationRobotPose.h>
+#include <mrpt/obs/CSensoryFrame.h>
+
+#include <thread>
+
+#include "test/plugin/observations.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using mrpt::obs::CObservation;
+
+std::vector<CloudPoint> mapOf(const std::vector<CObservation::Ptr>& observations,
+                              const EventFusionOptions& options) {
+  CEventFusionMapBuilder builder(options);
+  for (const CObservation::Ptr& observation : observations) builder.processObservation(observation);
+  builder.finish();
+  return builder.points();
+}
+
+void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].p_world, b[i].p_world);
+    EXPECT_EQ(a[i].confidence, b[i].confidence);
+  }
+}
+
+TEST(CEventFusionMapBuilder, TurnsObservationsIntoAMapOfTheWorld) {
+  const auto points = mapOf(observationsOf(SyntheticRecording()), syntheticOptions());
+
+  ASSERT_GT(points.size(), 30U);
+  for (const CloudPoint& point : points) {
+    EXPECT_GE(point.p_world.z(), 1);
+    EXPECT_LE(point.p_world.z(), 5);
+  }
+}
+
+TEST(CEventFusionMapBuilder, IsMadeByName) {
+  const auto object = mrpt::rtti::classFactory("efm::CEventFusionMapBuilder");
+  ASSERT_TRUE(object);
+  EXPECT_TRUE(std::dynamic_pointer_cast<mrpt::slam::CMetricMapBuilder>(object));
+}
+
+TEST(CEventFusionMapBuilder, ThreadsOfTheSweepDoNotChangeTheMap) {
+  const auto observations = observationsOf(SyntheticRecording());
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.keyframe.sweep.threads = 1;
+  const auto one = mapOf(observations, options);
+  options.mapper.keyframe.sweep.threads = 2;
+  expectSameBits(one, mapOf(observations, options));
+}
+
+TEST(CEventFusionMapBuilder, KeyframesAreHandedOutOnceAndInOrder) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::vector<std::int64_t> times;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap& keyframe) {
+    times.push_back(keyframe.window.t_ref_ns);
+    EXPECT_GE(builder.status().counts.keyframes, times.size()) << "the taker may use the builder";
+  });
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  builder.finish();
+
+  EXPECT_EQ(times.size(), 3U);
+  EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+}
+
+TEST(CEventFusionMapBuilder, ASensorPoseOnTheRobotIsTakenOutOfThePose) {
+  // A tracker half a metre above the rig, turned by 90 degrees: the same map.
+  const SyntheticRecording recording;
+  auto observations = observationsOf(recording);
+  const mrpt::poses::CPose3D sensor_on_rig(0.1, -0.5, 0.2, 1.5, 0, 0);
+  for (const auto& observation : observations) {
+    auto pose = std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation);
+    if (!pose) continue;
+    pose->sensorPose = sensor_on_rig;
+    pose->pose.mean = pose->pose.mean + sensor_on_rig;
+  }
+
+  const auto expected = mapOf(observationsOf(recording), syntheticOptions());
+  const auto points = mapOf(observations, syntheticOptions());
+
+  ASSERT_EQ(points.size(), expected.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-6);
+  }
+}
+
+TEST(CEventFusionMapBuilder, OtherObservationsAreCountedAndIgnored) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.processObservation(mrpt::obs::CObservationComment::Create());
+  EXPECT_EQ(builder.ignoredObservations(), 1U);
+}
+
+TEST(CEventFusionMapBuilder, SensoryFramesGiveTheSameMap) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  mrpt::obs::CActionCollection action;
+  for (const auto& observation : observations) {
+    mrpt::obs::CSensoryFrame frame;
+    frame.insert(observation);
+    builder.processActionObservation(action, frame);
+  }
+  builder.finish();
+
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, GivesMrptItsMaps) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  EXPECT_THROW(builder.saveCurrentEstimationToImage("/tmp/never.png"), std::logic_error);
+  const SyntheticRecording recording;
+  for (const auto& observation : observationsOf(recording)) builder.processObservation(observation);
+  builder.finish();
+
+  const auto* metric = builder.getCurrentlyBuiltMetricMap();
+  ASSERT_EQ(metric->maps.size(), 1U);
+  const auto map = metric->mapByClass<mrpt::maps::CPointsMapXYZI>();
+  ASSERT_TRUE(map);
+  const auto points = builder.points();
+  ASSERT_EQ(map->size(), points.size());
+  float x = 0;
+  float y = 0;
+  float z = 0;
+  map->getPoint(3, x, y, z);
+  EXPECT_EQ(z, static_cast<float>(points[3].p_world.z()));
+  EXPECT_EQ(map->getPointIntensity(3), points[3].confidence);
+
+  mrpt::maps::CSimpleMap simple;
+  builder.getCurrentlyBuiltMap(simple);
+  EXPECT_EQ(simple.size(), builder.getCurrentlyBuiltMapSize());
+
+  mrpt::poses::CPose3D pose;
+  builder.getCurrentPoseEstimation()->getMean(pose);
+  EXPECT_NEAR(pose.x(), recording.poses.back().T_world_rig.translation.x(), 1e-12);
+}
+
+TEST(CEventFusionMapBuilder, StartsOver) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  builder.finish();
+  const auto first = builder.points();
+  EXPECT_THROW(builder.processObservation(observations[0]), std::logic_error) << "after its end";
+
+  builder.initialize();
+  EXPECT_TRUE(builder.points().empty());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  builder.finish();
+
+  expectSameBits(builder.points(), first);
+}
+
+TEST(CEventFusionMapBuilder, AnEarlierMapIsRefusedRatherThanForgotten) {
+  mrpt::maps::CSimpleMap map;
+  map.insert(mrpt::poses::CPose3DPDFGaussian::Create(), mrpt::obs::CSensoryFrame::Create());
+  EXPECT_THROW(CEventFusionMapBuilder().initialize(map), std::invalid_argument);
+}
+
+TEST(CEventFusionMapBuilder, OptionsThatAreNotValidChangeNothing) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  EventFusionOptions wrong = syntheticOptions();
+  wrong.cloud.voxel_size_m = -1;
+  EXPECT_THROW(builder.setOptions(wrong), std::invalid_argument);
+  EXPECT_THROW(CEventFusionMapBuilder{wrong}, std::invalid_argument);
+}
+
+TEST(CEventFusionMapBuilder, ARefusedObservationLeavesTheMapSoFar) {
+  const SyntheticRecording recording;
+  auto observations = observationsOf(recording);
+  const auto whole = mapOf(observations, syntheticOptions());
+
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  EXPECT_THROW(builder.processObservation(packetOutsideTheSensor(recording)),
+               std::invalid_argument);
+  builder.finish();
+
+  expectSameBits(builder.points(), whole);
+}
+
+TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::thread feeder([&] {
+    for (const auto& observation : observations) builder.processObservation(observation);
+    builder.finish();
+  });
+  for (int i = 0; i < 50; ++i) {
+    builder.getCurrentPoseEstimation();
+    builder.points();
+    builder.status();
+    mrpt::maps::CSimpleMap map;
+    builder.getCurrentlyBuiltMap(map);
+  }
+  feeder.join();
+
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/depth_evaluation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+
+class EvaluateDepth : public TemporaryFolder {
+ protected:
+  std::filesystem::path tiff(const std::string& name, float depth_m, cv::Size size = {4, 3}) {
+    const auto path = folder() / name;
+    std::filesystem::create_directories(path.parent_path());
+    cv::imwrite(path.string(), cv::Mat1f(size, depth_m));
+    return path;
+  }
+
+  std::string errorOf(const std::filesystem::path& estimate, const std::filesystem::path& truth) {
+    try {
+      evaluateDepth(estimate, truth, {});
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+};
+
+TEST_F(EvaluateDepth, ComparesTwoFiles) {
+  const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), {});
+  ASSERT_EQ(evaluation.maps.size(), 1U);
+  EXPECT_EQ(evaluation.all.points, 12U);
+  EXPECT_EQ(evaluation.all.mean_abs_m, 2);
+  EXPECT_EQ(evaluation.all.median_inverse, 0.25);
+}
+
+TEST_F(EvaluateDepth, PairsFoldersByTimeAndAveragesMaps) {
+  tiff("out/keyframes/1.000000000/depth.tiff", 2);
+  tiff("out/keyframes/2.000000000/depth.tiff", 2);
+  tiff("out/keyframes/3.000000000/depth.tiff", 2);
+  tiff("data/depth/cam0_a.tiff", 3);
+  tiff("data/depth/cam0_b.tiff", 4);
+  std::ofstream(folder() / "data/depth/index.txt")
+      << "# t file\n2.0005 cam0_b.tiff\n0.9995 cam0_a.tiff\n3.002 cam0_a.tiff\n";
+
+  const auto evaluation = evaluateDepth(folder() / "out", folder() / "data", {});
+
+  ASSERT_EQ(evaluation.maps.size(), 2U);
+  EXPECT_EQ(evaluation.maps[0].name, "1.000000000");
+  EXPECT_EQ(evaluation.maps[0].errors.mean_abs_m, 1);
+  EXPECT_EQ(evaluation.maps[1].errors.mean_abs_m, 2);
+  EXPECT_EQ(evaluation.mean.median_abs_m, 1.5);
+  EXPECT_EQ(evaluation.all.points, 24U);
+  EXPECT_EQ(evaluation.without_truth, 1U);
+  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 keyframes have no truth within 1 ms"));
+  const auto json = nlohmann::json::parse(evaluationJson(evaluation));
+  EXPECT_EQ(json["maps"].size(), 2U);
+  EXPECT_EQ(json["mean"]["mean_abs_m"], 1.5);
+
+  // The inner folders may be given as well.
+  EXPECT_EQ(evaluateDepth(folder() / "out/keyframes", folder() / "data/depth", {}).maps.size(), 2U);
+}
+
+TEST_F(EvaluateDepth, BadPixelsNeedFocalLengthTimesBaseline) {
+  DepthEvaluationOptions options;
+  options.focal_baseline = 40;  // 20 px and 10 px
+  const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), options);
+  EXPECT_EQ(evaluation.mean.bad_pix_5px, 1);
+  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("bad 3px/5%"));
+}
+
+TEST_F(EvaluateDepth, WhatCannotBeComparedIsAnErrorThatNamesIt) {
+  const auto a = tiff("a.tiff", 2);
+  EXPECT_THAT(errorOf(folder() / "nowhere.tiff", a), HasSubstr("nowhere.tiff"));
+  EXPECT_THAT(errorOf(folder(), a), HasSubstr("two files or two folders"));
+  EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("index.txt"));
+  EXPECT_THAT(errorOf(a, tiff("wide.tiff", 2, {8, 3})), HasSubstr("wide.tiff"));
+  cv::imwrite((folder() / "grey.png").string(), cv::Mat1b(3, 4, uchar{1}));
+  EXPECT_THAT(errorOf(a, folder() / "grey.png"), HasSubstr("must be a float32 image"));
+  std::ofstream(folder() / "text.tiff") << "text";
+  EXPECT_THAT(errorOf(a, folder() / "text.tiff"), HasSubstr("cannot read the depth map"));
+
+  std::ofstream(folder() / "index.txt") << "1.0\n";
+  EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("index.txt:1: '1.0': expected"));
+  std::ofstream(folder() / "index.txt") << "1.0 a.tiff\n";
+  EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("no keyframes"));
+  tiff("7.0/depth.tiff", 1);
+  EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("within 1 ms"));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mapping_session.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "maps/depth_metrics.h"
+#include "test/plugin/synthetic_recording.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+CameraPacket packetOf(const SyntheticRecording& recording, int camera) {
+  const auto index = static_cast<std::size_t>(camera);
+  return {camera, recording.cameras[index], recording.events[index], std::nullopt};
+}
+
+/// Everything at once: poses, then each camera's events in one packet.
+std::vector<KeyframeDepthMap> mapAll(MappingSession& session, const SyntheticRecording& recording) {
+  for (const StampedPose& pose : recording.poses) session.addPose(pose);
+  for (int c = 0; c < static_cast<int>(recording.cameras.size()); ++c) {
+    session.addEvents(packetOf(recording, c));
+  }
+  session.finish();
+  return session.mapDue();
+}
+
+void expectCountsAddUp(const SessionStatus& status, std::uint64_t events, int planes) {
+  const EventCounts total = status.counts.total();
+  EXPECT_EQ(total.read, events);
+  EXPECT_EQ(total.read, total.used + total.without_pose + total.outside_window + total.dropped);
+  EXPECT_EQ(status.counts.votes.total(),
+            status.counts.event_uses * static_cast<std::uint64_t>(planes));
+}
+
+TEST(MappingSession, MapsThePlaneThatTheDotsLieOn) {
+  const SyntheticRecording recording;
+  MappingSession session(syntheticOptions());
+
+  const auto keyframes = mapAll(session, recording);
+
+  EXPECT_EQ(keyframes.size(),
+            3U);  // [0, .2), [.1, .3), [.2, .4); [.3, .5) ends after the last event
+  std::vector<DepthPair> pairs;
+  for (const CloudPoint& point : session.cloud().points()) {
+    pairs.push_back({point.p_world.z(), SyntheticRecording::kDepthM});
+  }
+  ASSERT_GT(pairs.size(), 30U);
+  // A window sees 8 px of parallax of dots that are rounded to pixels: an error of half a pixel is
+  // 0.5 / 8 of 1 / (2 m), a little over one step of the planes.
+  const double step = (1.0 / 1.0 - 1.0 / 5.0) / 29;
+  EXPECT_LT(depthErrors(pairs).median_inverse, 1.5 * step);
+}
+
+TEST(MappingSession, CountsOfOverlappingWindowsAddUp) {
+  const SyntheticRecording recording;
+  MappingSession session(syntheticOptions());
+
+  mapAll(session, recording);
+
+  const SessionStatus status = session.status();
+  expectCountsAddUp(status, recording.totalEvents(), 30);
+  EXPECT_GT(status.counts.event_uses, status.counts.total().used) << "windows overlap";
+  EXPECT_GT(status.counts.total().outside_window, 0U) << "the last window is not full";
+}
+
+TEST(MappingSession, TheMapDoesNotDependOnHowTheRecordingWasCut) {
+  const SyntheticRecording recording;
+  MappingSession at_once(syntheticOptions());
+  mapAll(at_once, recording);
+
+  MappingSession piecewise(syntheticOptions());
+  std::size_t keyframes = 0;
+  std::vector<std::size_t> begin(recording.cameras.size(), 0);
+  for (const StampedPose& pose : recording.poses) {
+    for (std::size_t c = recording.cameras.size(); c-- > 0;) {  // camera 1 comes first
+      const std::vector<Event>& events = recording.events[c];
+      CameraPacket packet{static_cast<int>(c), recording.cameras[c], {}, pose.t_ns};
+      for (; begin[c] < events.size() && events[begin[c]].t_ns < pose.t_ns; ++begin[c]) {
+        packet.events.push_back(events[begin[c]]);
+      }
+      piecewise.addEvents(packet);
+    }
+    piecewise.addPose(pose);
+    keyframes += piecewise.mapDue().size();
+  }
+  piecewise.finish();
+  keyframes += piecewise.mapDue().size();
+
+  EXPECT_EQ(keyframes, at_once.cloud().keyframes());
+  const auto expected = at_once.cloud().points();
+  const auto points = piecewise.cloud().points();
+  ASSERT_EQ(points.size(), expected.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(points[i].p_world, expected[i].p_world);
+  }
+}
+
+TEST(MappingSession, EventsOutsideTheTimeLimitsCountAsOutsideAnyWindow) {
+  const SyntheticRecording recording;
+  const std::int64_t start_ns = SyntheticRecording::kStartNs;
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.limits = {start_ns + 100'000'000, start_ns + 350'000'000};
+  MappingSession session(options);
+
+  const auto keyframes = mapAll(session, recording);
+
+  ASSERT_EQ(keyframes.size(), 1U);  // [.1, .3); [.2, .4) reaches beyond the limit
+  EXPECT_GE(keyframes[0].window.t0_ns, start_ns + 100'000'000);
+  expectCountsAddUp(session.status(), recording.totalEvents(), 30);
+}
+
+TEST(MappingSession, CamerasThatSeeNothingAreCounted) {
+  SyntheticRecording recording;
+  recording.events[1].clear();
+  MappingSession session(syntheticOptions());
+
+  const auto keyframes = mapAll(session, recording);
+
+  EXPECT_THAT(session.status().silent_keyframes, testing::ElementsAre(0, keyframes.size()));
+}
+
+TEST(MappingSession, OptionsThatNameACameraWhichIsNotThereAreErrors) {
+  const SyntheticRecording recording;
+  const auto refusal = [&](auto change) -> std::string {
+    EventFusionOptions options = syntheticOptions();
+    change(options.mapper);
+    MappingSession session(options);
+    try {
+      mapAll(session, recording);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(refusal([](FusionMapperOptions& mapper) {
+              mapper.cameras = {1, 7};
+            }),
+            "[rig] cameras = 7: must be a camera of the recording: 0 to 1");
+  EXPECT_EQ(refusal([](FusionMapperOptions& mapper) { mapper.keyframe.reference_camera = 5; }),
+            "[dsi] reference_camera = 5: must be a camera of the recording: 0 to 1");
+}
+
+TEST(MappingSession, ACameraWithoutThoseBeforeItIsAnError) {
+  const SyntheticRecording recording;
+  MappingSession session(syntheticOptions());
+  session.addEvents(packetOf(recording, 1));
+  try {
+    session.finish();
+    FAIL() << "no error";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "the recording has events of camera 1 but none of camera 0");
+  }
+  EXPECT_TRUE(session.mapDue().empty());
+}
+
+TEST(MappingSession, ACameraThatAppearsAfterTheFirstSecondIsAnError) {
+  const SyntheticRecording recording(1.2);
+  MappingSession session(syntheticOptions());
+  session.addEvents(packetOf(recording, 0));
+  EXPECT_THROW(session.addEvents(packetOf(recording, 1)), std::invalid_argument);
+}
+
+TEST(MappingSession, ACalibrationThatChangesIsAnError) {
+  const SyntheticRecording recording;
+  MappingSession session(syntheticOptions());
+  session.addEvents(packetOf(recording, 0));
+  CameraPacket other{0, recording.cameras[0], {}, std::nullopt};
+  other.calibration.model.fx += 1;
+  EXPECT_THROW(session.addEvents(other), std::invalid_argument);
+}
+
+TEST(MappingSession, ARefusedPacketLeavesTheCountsAsTheyWere) {
+  const SyntheticRecording recording;
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.limits.t0_ns = SyntheticRecording::kStartNs;
+  MappingSession session(options);
+  CameraPacket packet = packetOf(recording, 0);
+  packet.events.front().t_ns = 0;  // outside the limits
+  packet.events.back().x = 120;    // outside the sensor
+  EXPECT_THROW(session.addEvents(packet), std::invalid_argument);
+  EXPECT_EQ(session.status().counts.total().read, 0U);
+  EXPECT_FALSE(session.status().events);
+}
+
+// --- Why there is no keyframe ----------------------------------------------------------------
+
+std::string why(const SyntheticRecording& recording, const EventFusionOptions& options) {
+  MappingSession session(options);
+  EXPECT_TRUE(mapAll(session, recording).empty());
+  return whyNoKeyframe(session.status(), options.mapper);
+}
+
+TEST(WhyNoKeyframe, SaysByHowMuchPosesAndEventsMissEachOther) {
+  SyntheticRecording recording(0.4, 1);
+  recording.events[0].resize(1);
+  recording.events[0][0].t_ns = 10'100'000'000;
+  for (StampedPose& pose : recording.poses) pose.t_ns += 5'000'000'000;
+
+  EXPECT_EQ(why(recording, syntheticOptions()),
+            "the events span 10.100000000 to 10.100000000 s, the poses 15.000000000 to "
+            "15.400000000 s: they miss each other by 4.900000000 s");
+
+  for (StampedPose& pose : recording.poses) pose.t_ns -= 10'000'000'000;
+  EXPECT_THAT(why(recording, syntheticOptions()), HasSubstr("miss each other by 4.700000000 s"));
+}
+
+TEST(WhyNoKeyframe, SaysWhatIsMissingAltogether) {
+  SyntheticRecording recording;
+  recording.poses.clear();
+  EXPECT_EQ(why(recording, syntheticOptions()), "the recording has no poses");
+  recording.events.assign(2, {});
+  EXPECT_EQ(why(recording, syntheticOptions()), "the recording has no events");
+}
+
+TEST(WhyNoKeyframe, SaysThatTheRecordingIsShorterThanAWindow) {
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.keyframes.window_s = 2;
+  EXPECT_THAT(why(SyntheticRecording(), options),
+              AllOf(HasSubstr("no window of 2.000000000 s (window_s) was full"),
+                    HasSubstr("the poses 10.000000000 to 10.500000000 s")));
+}
+
+TEST(WhyNoKeyframe, SaysThatWindowsHadNoPoseWhereTheyNeedOne) {
+  SyntheticRecording recording;
+  EventFusionOptions options = syntheticOptions();
+  std::vector<StampedPose>& poses = recording.poses;  // the tracker is lost for 0.4 s
+  poses.erase(poses.begin() + 6, poses.begin() + 45);
+  EXPECT_THAT(why(recording, options), HasSubstr("had no pose at their reference times"));
+
+  options.mapper.only_window = Window{10'000'000'000, 10'500'000'000, 500'000'000};
+  EXPECT_THAT(why(recording, options),
+              HasSubstr("no pose at the reference time 0.500000000 s of the window"));
+}
+
+TEST(WhyNoKeyframe, SaysThatTheWindowHasNoEvents) {
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.only_window = Window{0, 1'000'000'000, 500'000'000};
+  EXPECT_THAT(why(SyntheticRecording(), options),
+              HasSubstr("no event in the window 0.000000000 to 1.000000000 s; the events span"));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+#include <mrpt/poses/CPose3D.h>
+#include <mrpt/rtti/CObject.h>
+#include <mrpt/serialization/CArchive.h>
+#include <mrpt/serialization/archiveFrom_std_vector.h>
+#include <mrpt/system/datetime.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "plugin/mrpt_pose.h"
+#include "plugin/mrpt_time.h"
+#include "plugin/registration.h"
+
+namespace efm {
+namespace {
+
+// --- mrpt_time.h -------------------------------------------------------------------------------
+
+TEST(MrptTime, ZeroIsTheBeginningOf1970) {
+  EXPECT_EQ(mrpt::system::dateTimeToString(mrptTimeFrom(0)), "1970/01/01,00:00:00.000000");
+  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(0)), 0);
+}
+
+TEST(MrptTime, IsTheNearestTick) {
+  const std::int64_t today_ns = 1'700'000'000'000'000'000;
+  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(today_ns + 149)), today_ns + 100);
+  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(today_ns + 150)), today_ns + 200);
+  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(-149)), -100);
+  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(-151)), -200);
+}
+
+RC_GTEST_PROP(MrptTime, IsExactForWholeTicksAndAtMostHalfATickAwayOtherwise, ()) {
+  const auto t_ns =
+      *rc::gen::inRange<std::int64_t>(-4'000'000'000'000'000'000, 4'000'000'000'000'000'000);
+  const std::int64_t back_ns = nanosecondsFrom(mrptTimeFrom(t_ns));
+  RC_ASSERT(std::abs(back_ns - t_ns) <= kMrptTickNs / 2);
+  RC_ASSERT(mrptTimeFrom(back_ns) == mrptTimeFrom(t_ns));
+  RC_ASSERT(nanosecondsFrom(mrptTimeFrom(back_ns)) == back_ns);
+}
+
+// --- mrpt_pose.h -------------------------------------------------------------------------------
+
+double angleBetween(const Rigid3& a, const Rigid3& b) {
+  return 2 * (a.rotation.conjugate() * b.rotation).vec().norm();
+}
+
+/// Random rotations, or such with a pitch that is `from_vertical` times a normal number off 90
+/// degrees, where MRPT's angles are singular.
+Rigid3 randomPose(std::mt19937& random, double from_vertical) {
+  std::normal_distribution<double> normal;
+  const auto draw = [&] { return normal(random); };
+  Rigid3 pose;
+  pose.translation = {draw(), draw(), draw()};
+  pose.rotation = Eigen::Quaterniond(draw(), draw(), draw(), draw()).normalized();
+  if (from_vertical == 0) return pose;
+  pose.rotation = Eigen::AngleAxisd(draw(), Eigen::Vector3d::UnitZ()) *
+                  Eigen::AngleAxisd(M_PI / 2 - from_vertical * draw(), Eigen::Vector3d::UnitY()) *
+                  Eigen::AngleAxisd(draw(), Eigen::Vector3d::UnitX());
+  return pose;
+}
+
+class MrptPose : public testing::TestWithParam<double> {};
+
+TEST_P(MrptPose, IsTheSameThereAndBackAndThroughAnArchive) {
+  std::mt19937 random(1);
+  for (int i = 0; i < 1000; ++i) {
+    const Rigid3 T_a_b = randomPose(random, GetParam());
+    const mrpt::poses::CPose3D pose = mrptPoseFrom(T_a_b);
+    EXPECT_EQ(rigidFrom(pose).translation, T_a_b.translation);
+    EXPECT_LT(angleBetween(rigidFrom(pose), T_a_b), 1e-14);
+
+    std::vector<std::uint8_t> bytes;
+    auto archive = mrpt::serialization::archiveFrom(bytes);
+    archive << pose;
+    mrpt::poses::CPose3D stored;
+    archive >> stored;
+    EXPECT_EQ(rigidFrom(stored).translation, T_a_b.translation);
+    EXPECT_LT(angleBetween(rigidFrom(stored), T_a_b), 1e-14);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(FromVertical, MrptPose, testing::Values(0, 1e-3, 1e-6, 1e-9),
+                         [](const auto& at) {
+                           return at.param == 0
+                                      ? std::string("Anywhere")
+                                      : "OneInTenToThe" +
+                                            std::to_string(std::lround(-std::log10(at.param)));
+                         });
+
+TEST(MrptPoseOf, APointGoesWhereOursSendsIt) {
+  Rigid3 T_a_b;
+  T_a_b.translation = {1, 2, 3};
+  T_a_b.rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, -1).normalized());
+  const Eigen::Vector3d expected = T_a_b * Eigen::Vector3d(0.5, -0.25, 4);
+  const auto p_a = mrptPoseFrom(T_a_b).composePoint({0.5, -0.25, 4});
+  EXPECT_NEAR(p_a.x, expected.x(), 1e-14);
+  EXPECT_NEAR(p_a.y, expected.y(), 1e-14);
+  EXPECT_NEAR(p_a.z, expected.z(), 1e-14);
+}
+
+// --- registration.h ----------------------------------------------------------------------------
+
+TEST(Registration, ClassesCanBeMadeByName) {
+  registerClasses();
+  registerClasses();  // may be called again
+  for (const char* name : {"efm::CObservationEvents", "efm::CEventFusionMapBuilder"}) {
+    const mrpt::rtti::CObject::Ptr object = mrpt::rtti::classFactory(name);
+    ASSERT_TRUE(object) << name;
+    EXPECT_STREQ(object->GetRuntimeClass()->className, name);
+  }
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/option_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <set>
+#include <sstream>
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+const std::filesystem::path kConfigFolder = EFM_SOURCE_DIR "/config";
+
+EventFusionOptions optionsOf(std::string_view text) {
+  OptionReader reader;
+  reader.readText(text, "rig.ini");
+  return reader.options();
+}
+
+/// The message of the error that reading a text gives.
+std::string errorOf(std::string_view text) {
+  try {
+    optionsOf(text);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string errorOfSet(std::string_view assignment) {
+  try {
+    OptionReader reader;
+    reader.set(assignment);
+    reader.options();
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+std::string listed(const EventFusionOptions& options) {
+  std::string list;
+  for (const NamedOption& option : listOptions(options)) {
+    list += std::string(option.section) + "." + std::string(option.key) + "=" +
+            textOf(option.value) + "\n";
+  }
+  return list;
+}
+
+TEST(OptionReader, KeysThatAreNotGivenKeepTheirDefaults) {
+  EXPECT_EQ(listed(optionsOf("")), listed(EventFusionOptions{}));
+}
+
+TEST(OptionReader, EveryKeyReachesItsField) {
+  const EventFusionOptions options = optionsOf(R"(
+[rig]
+cameras = 0, 2
+max_pose_gap_s = 0.5
+[keyframes]
+policy = period
+window_s = 0.25
+stride_s = 1e-1
+reference = end
+[dsi]
+min_depth_m = 1
+max_depth_m = 20
+num_planes = 64
+spacing = linear
+reference_camera = 2
+[fusion]
+across_cameras = geometric
+[depth]
+extraction = paper
+threshold_kernel = 7
+threshold_c = -2.5
+max_confidence = 31.5
+median_size = 3
+subplane = false
+[map]
+voxel_size_m = 0.05
+min_keyframes = 3
+[performance]
+threads = 2
+kernel = plain
+packet_error_px = 0
+)");
+
+  const FusionMapperOptions& mapper = options.mapper;
+  EXPECT_EQ(mapper.cameras, (std::vector<int>{0, 2}));
+  EXPECT_EQ(mapper.trajectory.max_pose_gap_s, 0.5);
+  EXPECT_EQ(mapper.keyframes.policy, KeyframePolicyKind::kPeriod);
+  EXPECT_EQ(mapper.keyframes.window_s, 0.25);
+  EXPECT_EQ(mapper.keyframes.stride_s, 0.1);
+  EXPECT_EQ(mapper.keyframes.reference, ReferenceTime::kEnd);
+  EXPECT_EQ(mapper.keyframe.planes.min_depth_m, 1);
+  EXPECT_EQ(mapper.keyframe.planes.max_depth_m, 20);
+  EXPECT_EQ(mapper.keyframe.planes.num_planes, 64);
+  EXPECT_EQ(mapper.keyframe.planes.spacing, PlaneSpacing::kLinear);
+  EXPECT_EQ(mapper.keyframe.reference_camera, 2);
+  EXPECT_EQ(mapper.keyframe.sweep.across_cameras, FusionRule::kGeometric);
+  EXPECT_EQ(mapper.keyframe.extraction.extraction, ExtractionMethod::kPaper);
+  EXPECT_EQ(mapper.keyframe.extraction.threshold_kernel, 7);
+  EXPECT_EQ(mapper.keyframe.extraction.threshold_c, -2.5);
+  EXPECT_EQ(mapper.keyframe.extraction.max_confidence, 31.5);
+  EXPECT_EQ(mapper.keyframe.extraction.median_size, 3);
+  EXPECT_FALSE(mapper.keyframe.extraction.subplane);
+  EXPECT_EQ(options.cloud.voxel_size_m, 0.05);
+  EXPECT_EQ(options.cloud.min_keyframes, 3);
+  EXPECT_EQ(mapper.keyframe.sweep.threads, 2);
+  EXPECT_EQ(mapper.keyframe.sweep.kernel, VotingKernel::kPlain);
+  EXPECT_EQ(mapper.keyframe.packets.packet_error_px, 0);
+}
+
+TEST(OptionReader, WhatIsListedReadsBackTheSame) {
+  EventFusionOptions options;
+  options.mapper.cameras = {1, 0};
+  options.mapper.trajectory.max_pose_gap_s = 0.1 + 0.2;  // 0.30000000000000004
+  options.mapper.keyframe.extraction.max_confidence = 1e-7;
+  options.mapper.keyframe.sweep.threads = 3;
+  options.mapper.keyframe.planes.spacing = PlaneSpacing::kLinear;
+
+  OptionReader reader;
+  for (const NamedOption& option : listOptions(options)) {
+    reader.set(std::string(option.section) + "." + std::string(option.key) + "=" +
+               textOf(option.value));
+  }
+
+  EXPECT_EQ(listed(reader.options()), listed(options));
+  EXPECT_EQ(reader.options().mapper.trajectory.max_pose_gap_s, 0.1 + 0.2);
+}
+
+TEST(OptionReader, CommentsAndBlanksAreLeftOut) {
+  const EventFusionOptions options = optionsOf(
+      "; a comment\r\n"
+      "# another\n"
+      "   // and another\n"
+      "  [dsi]   ; the volume\r\n"
+      "\tnum_planes\t=\t50 // fifty\r\n"
+      "[rig]\n"
+      "cameras = ; all\n");
+
+  EXPECT_EQ(options.mapper.keyframe.planes.num_planes, 50);
+  EXPECT_TRUE(options.mapper.cameras.empty());
+}
+
+TEST(OptionReader, AByteOrderMarkAndLineEndsOfWindowsDoNotMatter) {
+  const EventFusionOptions options = optionsOf(
+      "\xEF\xBB\xBF[dsi]\r\nnum_planes = 50\r\n\r\nspacing = linear\r\n[rig]\r\ncameras = 0,1\r");
+  EXPECT_EQ(options.mapper.keyframe.planes.num_planes, 50);
+  EXPECT_EQ(options.mapper.keyframe.planes.spacing, PlaneSpacing::kLinear);
+  EXPECT_EQ(options.mapper.cameras, (std::vector<int>{0, 1}));
+  EXPECT_TRUE(optionsOf("\xEF\xBB\xBF").mapper.cameras.empty());
+}
+
+TEST(OptionReader, UnknownSectionsAndKeysAreErrorsThatNameTheLine) {
+  EXPECT_THAT(errorOf("\n[dsii]\n"), AllOf(StartsWith("rig.ini:2: "), HasSubstr("[dsii]"),
+                                           HasSubstr("known: [rig], [keyframes], [dsi]")));
+  EXPECT_THAT(errorOf("[dsi]\nplanes = 3\n"),
+              AllOf(StartsWith("rig.ini:2: [dsi] planes: unknown key"), HasSubstr("num_planes")));
+}
+
+TEST(OptionReader, LinesThatAreNeitherSectionNorKeyAreErrors) {
+  EXPECT_THAT(errorOf("num_planes = 3\n"), StartsWith("rig.ini:1: 'num_planes = 3': expected"));
+  EXPECT_THAT(errorOf("[dsi]\nnum_planes 3\n"), StartsWith("rig.ini:2: 'num_planes 3': expected"));
+  EXPECT_THAT(errorOf("[dsi\nnum_planes = 3\n"), StartsWith("rig.ini:1: '[dsi': expected"));
+}
+
+TEST(OptionReader, ValuesOfTheWrongKindAreErrorsThatSayWhatWasExpected) {
+  const auto error = [](const std::string& key_and_value) {
+    return errorOf("[dsi]\n" + key_and_value + "\n");
+  };
+  EXPECT_EQ(error("num_planes = abc"), "rig.ini:2: [dsi] num_planes = abc: must be a whole number");
+  EXPECT_THAT(error("num_planes = 1e3"), HasSubstr("must be a whole number"));
+  EXPECT_THAT(error("num_planes = 0x10"), HasSubstr("must be a whole number"));
+  EXPECT_THAT(error("num_planes = 100 planes"), HasSubstr("must be a whole number"));
+  EXPECT_THAT(error("num_planes = 99999999999"), HasSubstr("must be a whole number"));
+  EXPECT_THAT(error("num_planes ="), HasSubstr("must be a whole number"));
+  EXPECT_THAT(error("min_depth_m = 1,5"), HasSubstr("must be a number"));
+  EXPECT_THAT(error("min_depth_m = 1.5m"), HasSubstr("must be a number"));
+  EXPECT_THAT(error("min_depth_m = nan"), HasSubstr("must be a number"));
+  EXPECT_THAT(error("min_depth_m = inf"), HasSubstr("must be a number"));
+  EXPECT_THAT(error("spacing = cubic"), HasSubstr("'cubic' is not one of: inverse, linear"));
+  EXPECT_THAT(errorOf("[depth]\nsubplane = yes\n"), HasSubstr("must be true or false"));
+  EXPECT_THAT(errorOf("[depth]\nmax_confidence = most\n"),
+              HasSubstr("must be a number, or keyframe"));
+  EXPECT_THAT(errorOf("[performance]\nthreads = many\n"),
+              HasSubstr("must be a whole number, or auto"));
+  for (const std::string list : {"0,", ",1", "0,,1", "0 1", "a"}) {
+    EXPECT_THAT(errorOf("[rig]\ncameras = " + list + "\n"), HasSubstr("separated by commas"))
+        << list;
+  }
+}
+
+TEST(OptionReader, ValuesOutOfRangeAreErrorsThatNameSectionKeyValueAndRange) {
+  EXPECT_THAT(errorOf("[dsi]\n\nnum_planes = 0\n"),
+              StartsWith("rig.ini:3: [dsi] num_planes = 0: must be"));
+  EXPECT_THAT(errorOf("[map]\nvoxel_size_m = -1\n"),
+              StartsWith("rig.ini:2: [map] voxel_size_m = -1: must be"));
+  EXPECT_THAT(errorOf("[keyframes]\nwindow_s = 0\n"),
+              StartsWith("rig.ini:2: [keyframes] window_s = 0: must be"));
+  EXPECT_THAT(errorOf("[rig]\nmax_pose_gap_s = 0\n"),
+              StartsWith("rig.ini:2: [rig] max_pose_gap_s = 0: must be"));
+  EXPECT_THAT(errorOf("[depth]\nthreshold_kernel = 4\n"),
+              StartsWith("rig.ini:2: [depth] threshold_kernel = 4: must be"));
+  EXPECT_THAT(errorOf("[performance]\nthreads = 0\n"),
+              StartsWith("rig.ini:2: [performance] threads = 0: must be"));
+  EXPECT_THAT(errorOf("[performance]\npacket_error_px = 11\n"),
+              StartsWith("rig.ini:2: [performance] packet_error_px = 11: must be"));
+}
+
+TEST(OptionReader, LimitsThatContradictADefaultAreErrors) {
+  // The far limit is not in the file: its default is 5.
+  EXPECT_THAT(errorOf("[dsi]\nmin_depth_m = 6\n"), AllOf(HasSubstr("[dsi]"), HasSubstr("must be")));
+}
+
+TEST(OptionReader, AKeyGivenTwiceIsAnErrorThatNamesBothLines) {
+  EXPECT_EQ(errorOf("[dsi]\nnum_planes = 3\n[rig]\n[dsi]\nnum_planes = 3\n"),
+            "rig.ini:5: [dsi] num_planes: given twice, first in line 2");
+}
+
+TEST(OptionReader, SetOverridesTheFileAndTheLastOneCounts) {
+  OptionReader reader;
+  reader.readText("[dsi]\nnum_planes = 3\n", "rig.ini");
+  reader.set("dsi.num_planes=4");
+  reader.set("dsi.num_planes = 5");
+
+  EXPECT_EQ(reader.options().mapper.keyframe.planes.num_planes, 5);
+}
+
+TEST(OptionReader, LimitsMaySetEachOtherRightBeforeTheyAreChecked) {
+  OptionReader reader;
+  reader.set("dsi.min_depth_m=6");
+  reader.set("dsi.max_depth_m=10");
+
+  EXPECT_EQ(reader.options().mapper.keyframe.planes.min_depth_m, 6);
+}
+
+TEST(OptionReader, WrongSetsAreErrorsThatNameThem) {
+  EXPECT_THAT(errorOfSet("dsi.num_planes"), StartsWith("--set dsi.num_planes: expected"));
+  EXPECT_THAT(errorOfSet("num_planes=3"), StartsWith("--set num_planes=3: expected"));
+  EXPECT_THAT(errorOfSet("dsii.num_planes=3"), HasSubstr("unknown section [dsii]"));
+  EXPECT_THAT(errorOfSet("dsi.planes=3"), StartsWith("--set: [dsi] planes: unknown key"));
+  EXPECT_THAT(errorOfSet("dsi.num_planes=x"), StartsWith("--set: [dsi] num_planes = x: must be"));
+  EXPECT_THAT(errorOfSet("dsi.num_planes=0"), StartsWith("--set: [dsi] num_planes = 0: must be"));
+}
+
+TEST(OptionReader, ErrorsShowNothingThatATerminalWouldObey) {
+  const std::string wild = "\x1b[2J" + std::string(10'000, 'x');
+  for (const std::string& text :
+       {wild + "\n", "[" + wild + "]\n", "[dsi]\n" + wild + " = 1\n", "[dsi]\nspacing = " + wild,
+        "[dsi]\nnum_planes = " + wild + "\n"}) {
+    const std::string error = errorOf(text);
+    EXPECT_THAT(error,
+                AllOf(StartsWith("rig.ini:"), HasSubstr("\\x1b[2J"), Not(HasSubstr("\x1b"))));
+    EXPECT_LT(error.size(), 400U);
+  }
+  for (const std::string& assignment :
+       {wild, wild + ".a=b", "dsi." + wild + "=1", "dsi.spacing=" + wild}) {
+    const std::string error = errorOfSet(assignment);
+    EXPECT_THAT(error, AllOf(HasSubstr("\\x1b[2J"), Not(HasSubstr("\x1b"))));
+    EXPECT_LT(error.size(), 400U);
+  }
+}
+
+TEST(OptionReader, FilesThatCannotBeReadAreErrorsThatNameThem) {
+  for (const std::string path : {"/nowhere/rig.ini", "/"}) {
+    try {
+      OptionReader().readFile(path);
+      ADD_FAILURE() << "no error for " << path;
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(path));
+    }
+  }
+}
+
+TEST(ConfigFolder, DefaultFileEqualsTheDefaultsAndNamesEveryKey) {
+  OptionReader reader;
+  reader.readFile(kConfigFolder / "default.ini");
+  EXPECT_EQ(listed(reader.options()), listed(EventFusionOptions{}));
+
+  std::ifstream file(kConfigFolder / "default.ini");
+  std::multiset<std::string> named;
+  std::string section;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == ';') continue;
+    if (line[0] == '[') section = line.substr(1, line.size() - 2);
+    if (line[0] != '[') named.insert(section + "." + line.substr(0, line.find(' ')));
+  }
+  std::multiset<std::string> known;
+  for (const NamedOption& option : listOptions({})) {
+    known.insert(std::string(option.section) + "." + std::string(option.key));
+  }
+  EXPECT_EQ(named, known);
+}
+
+TEST(ConfigFolder, EveryFileIsRead) {
+  int files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(kConfigFolder)) {
+    if (entry.path().extension() != ".ini") continue;
+    OptionReader reader;
+    EXPECT_NO_THROW(reader.readFile(entry.path())) << entry.path();
+    EXPECT_NO_THROW(reader.options()) << entry.path();
+    ++files;
+  }
+  EXPECT_GE(files, 3);
+}
+
+}  // namespace
+}  // namespace efm
