@@ -82,10 +82,7 @@ int runImport(const ImportArguments& arguments) {
       } else {
         ++others;
       }
-      if (progress.due()) {
-        const int percent = static_cast<int>(100 * recording->progress());
-        progress.show("importing: " + std::to_string(percent) + " %");
-      }
+      progress.showShare("importing", recording->progress());
     }
     if (all_events == 0) refuseStretchWithoutEvents(arguments);
     if (all_events + poses + others == 0) {

@@ -145,10 +145,7 @@ int runInfo(const InfoArguments& arguments) {
     try {
       while (const auto observation = recording->next()) {
         contents.add(*observation);
-        if (progress.due()) {
-          const int percent = static_cast<int>(100 * recording->progress());
-          progress.show("reading: " + std::to_string(percent) + " %");
-        }
+        progress.showShare("reading", recording->progress());
       }
     } catch (const std::exception&) {
       stopped = std::current_exception();

@@ -29,4 +29,8 @@ void Progress::show(const std::string& line) {
   next_ = std::chrono::steady_clock::now() + kPeriod;
 }
 
+void Progress::showShare(const std::string& doing, double share) {
+  if (due()) show(doing + ": " + std::to_string(static_cast<int>(100 * share)) + " %");
+}
+
 }  // namespace efm

@@ -18,6 +18,8 @@ class Progress {
   /// Whether a line would be shown now.
   bool due() const;
   void show(const std::string& line);
+  /// "doing: 42 %", where a line is due. @param share 0 to 1.
+  void showShare(const std::string& doing, double share);
 
  private:
   bool terminal_;

@@ -2,7 +2,6 @@
 #include "plugin/app/simulate_command.h"
 
 #include <cstdio>
-#include <string>
 
 #include "plugin/app/progress.h"
 #include "tracking_stub/dataset_writer.h"
@@ -17,11 +16,7 @@ int runSimulate(const SimulateArguments& arguments) {
   {
     Progress progress;
     SimulationRun run;
-    run.progress = [&progress](double share) {
-      if (progress.due()) {
-        progress.show("simulating: " + std::to_string(static_cast<int>(100 * share)) + " %");
-      }
-    };
+    run.progress = [&progress](double share) { progress.showShare("simulating", share); };
     recordings = simulateEvents(simulation, run);
     progress.show("writing");
     writer.write(simulation, recordings);
