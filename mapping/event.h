@@ -5,6 +5,9 @@
 
 namespace efm {
 
+/// An event may come after one of its camera that is newer by up to this: it is sorted and counted.
+inline constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
+
 /// One brightness change seen by one pixel of an event camera (Ghosh and Gallego 2022, Eq. 1).
 struct Event {
   std::int64_t t_ns = 0;  ///< Time in the recording's own clock, integer nanoseconds.

@@ -15,8 +15,7 @@ namespace {
 
 /// A camera whose newest event is older than the others' by this much is taken to be silent.
 constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
-/// How much later than a newer one an event or a pose may come.
-constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
+/// How much later than a newer one a pose may come.
 constexpr std::int64_t kMaxPoseDelayNs = kNanosecondsPerSecond;
 constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();

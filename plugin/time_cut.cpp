@@ -5,10 +5,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 
-#include "mapping/timestamp.h"
+#include "mapping/fusion_mapper.h"
 #include "plugin/CObservationEvents.h"
 #include "plugin/mrpt_time.h"
 
@@ -39,9 +38,7 @@ TimeCut::TimeCut(std::unique_ptr<Recording> recording, std::optional<std::int64_
     : recording_(std::move(recording)),
       t0_ns_(t0_ns.value_or(std::numeric_limits<std::int64_t>::min())),
       t1_ns_(t1_ns.value_or(std::numeric_limits<std::int64_t>::max())) {
-  if (t0_ns_ < t1_ns_) return;
-  throw std::invalid_argument("t1 = " + formatSeconds(t1_ns_) +
-                              " s: must be after t0 = " + formatSeconds(t0_ns_) + " s");
+  TimeLimits{t0_ns, t1_ns}.validate();
 }
 
 CObservation::Ptr TimeCut::next() {

@@ -23,8 +23,6 @@ struct CameraSize {
 
 /// Events come in packets on a grid of this period: [k·10 ms, (k+1)·10 ms).
 inline constexpr std::int64_t kPacketPeriodNs = 10'000'000;
-/// An event may follow one that is newer by up to this.
-inline constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
 
 /// Reads events from text, one `t x y p` a line: decimal seconds (exact), pixel, polarity 0 or 1.
 /// Blank lines, what follows a `#`, repeated blanks, tabs and CRLF do not matter.
