@@ -28,7 +28,7 @@ class PacketProjector {
 
 }  // namespace
 
-RayBundle backProject(const std::vector<Event>& events, const PosePackets& packets,
+RayBundle backProject(EventSpan events, const PosePackets& packets,
                       const UndistortionTable& undistortion, const ReferenceView& view) {
   RayBundle bundle;
   bundle.x_inf.reserve(events.size());

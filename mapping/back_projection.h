@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "mapping/event.h"
+#include "mapping/event_span.h"
 #include "mapping/pose_packets.h"
 #include "mapping/reference_view.h"
 #include "mapping/undistortion.h"
@@ -45,7 +45,7 @@ struct RayBundle {
 };
 
 /// Carries the events of the packets into the reference view; events between packets are left out.
-RayBundle backProject(const std::vector<Event>& events, const PosePackets& packets,
+RayBundle backProject(EventSpan events, const PosePackets& packets,
                       const UndistortionTable& undistortion, const ReferenceView& view);
 
 /// The transfer of a packet's rays to the plane at depth `depth_m`.

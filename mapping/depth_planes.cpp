@@ -57,6 +57,13 @@ double DepthPlanes::positionOf(double depth_m) const {
   return (u - first_u) / (last_u - first_u) * (options_.num_planes - 1);
 }
 
+double DepthPlanes::inverseDepthStepAt(double position) const {
+  if (size() < 2) return 0.0;
+  const double before = std::max(0.0, position - 0.5);
+  const double after = std::min(size() - 1.0, position + 0.5);
+  return (1.0 / depthAt(before) - 1.0 / depthAt(after)) / (after - before);
+}
+
 double DepthPlanes::inverseDepthStep() const {
   return size() < 2 ? 0.0 : 1.0 / depth(0) - 1.0 / depth(1);
 }

@@ -42,6 +42,9 @@ class DepthPlanes {
   /// Distance of two neighbouring planes in inverse depth (1/m) at the near limit: everywhere the
   /// same with inverse spacing. 0 with one plane.
   double inverseDepthStep() const;
+  /// That distance around a position between planes, which changes with it with linear spacing.
+  /// @param position 0 to size() - 1.
+  double inverseDepthStepAt(double position) const;
 
  private:
   DepthPlanesOptions options_;

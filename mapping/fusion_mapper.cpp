@@ -116,11 +116,51 @@ EventCounts MapperCounts::total() const {
   return sum;
 }
 
+/// What the mapper tells its policy, once the recording has started.
+class FusionMapper::SoFar : public RecordingSoFar {
+ public:
+  explicit SoFar(FusionMapper& mapper) : mapper_(mapper) {}
+
+  std::int64_t startNs() const override { return *mapper_.start_ns_; }
+  std::int64_t reachedNs() const override { return mapper_.reached_ns_.value_or(kNever); }
+  std::int64_t completeNs() const override { return mapper_.completeNs(); }
+
+  std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns, std::int64_t count) const override {
+    const std::size_t last = mapper_.countBefore(from_ns) + static_cast<std::size_t>(count);
+    std::int64_t after_ns = mapper_.completeNs();
+    if (mapper_.countBefore(after_ns) < last) return std::nullopt;
+    // The first time such that so many events come before the one after it.
+    std::int64_t t_ns = from_ns;
+    for (--after_ns; t_ns < after_ns;) {
+      const std::int64_t middle_ns = t_ns + (after_ns - t_ns) / 2;
+      if (mapper_.countBefore(middle_ns + 1) >= last) {
+        after_ns = middle_ns;
+      } else {
+        t_ns = middle_ns + 1;
+      }
+    }
+    return t_ns;
+  }
+
+  std::optional<Rigid3> T_world_ref(std::int64_t t_ns) const override {
+    const std::optional<Rigid3> T_world_rig = mapper_.trajectory_.poseAt(t_ns);
+    if (!T_world_rig) return std::nullopt;
+    return mapper_.keyframeMapper().referencePose(*T_world_rig);
+  }
+  const ReferenceView& view() const override { return mapper_.keyframeMapper().view(); }
+
+ private:
+  FusionMapper& mapper_;
+};
+
 FusionMapper::FusionMapper(const FusionMapperOptions& options)
     : options_(options), trajectory_(options.trajectory) {
   options_.validate();
+  // What is uniform in inverse depth has its middle at the harmonic mean.
+  const DepthPlanesOptions& planes = options_.keyframe.planes;
+  const double depth_guess_m = 2.0 / (1.0 / planes.min_depth_m + 1.0 / planes.max_depth_m);
   policy_ = options_.only_window ? makeSingleWindowPolicy(*options_.only_window)
-                                 : makeKeyframePolicy(options_.keyframes);
+                                 : makeKeyframePolicy(options_.keyframes, depth_guess_m);
 }
 
 FusionMapper::~FusionMapper() = default;
@@ -212,11 +252,30 @@ bool FusionMapper::camerasCover(std::int64_t t_ns) const {
   return true;
 }
 
-/// Whether a window is full: the recording goes on to its end, and all its events and poses are
-/// here.
-bool FusionMapper::covered(const Window& window) const {
+/// All events of the selected cameras before this time are here, and poses reach it.
+std::int64_t FusionMapper::completeNs() const {
+  std::int64_t complete_ns = trajectory_.empty() ? kNever : trajectory_.poses().back().t_ns;
+  for (std::size_t c = 0; c < buffers_.size(); ++c) {
+    if (selected(static_cast<int>(c))) complete_ns = std::min(complete_ns, completeUntil(c));
+  }
+  return complete_ns;
+}
+
+/// Events of the selected cameras in the buffers before a time.
+std::size_t FusionMapper::countBefore(std::int64_t t_ns) const {
+  std::size_t count = 0;
+  for (const CameraBuffer& buffer : buffers_) count += buffer.indexOf(t_ns) - buffer.begin;
+  return count;
+}
+
+/// Whether all of a window's events and poses are here. The one window that was asked for is mapped
+/// with what there is in the end.
+bool FusionMapper::isDue(const Window& window) const {
+  const bool asked_for = options_.only_window.has_value();
+  if (asked_for && finished_) return true;
+  if (asked_for && (!reached_ns_ || *reached_ns_ < window.t1_ns)) return false;
   if (options_.limits.t1_ns && window.t1_ns > *options_.limits.t1_ns) return false;
-  if (!reached_ns_ || *reached_ns_ < window.t1_ns || !camerasCover(window.t1_ns)) return false;
+  if (!camerasCover(window.t1_ns)) return false;
   return !trajectory_.empty() &&
          trajectory_.poses().back().t_ns >= std::max(window.t1_ns, window.t_ref_ns);
 }
@@ -244,25 +303,25 @@ void FusionMapper::findStart() {
 
 /// A gap in the events, however long, costs nothing.
 void FusionMapper::passEmptyWindows() {
-  const std::optional<Window> window = policy_->current(*start_ns_);
-  if (!window || !reached_ns_) return;
+  if (!reached_ns_) return;
+  const SoFar recording(*this);
+  const std::int64_t from_ns = policy_->earliestStart(recording);
   std::int64_t empty_until_ns = std::min(*reached_ns_, options_.limits.t1_ns.value_or(kEver));
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
     if (!selected(static_cast<int>(c))) continue;
     const CameraBuffer& buffer = buffers_[c];
-    const std::size_t next = buffer.indexOf(window->t0_ns);
+    const std::size_t next = buffer.indexOf(from_ns);
     const bool there = next < buffer.events.size();
     empty_until_ns = std::min(empty_until_ns, there ? buffer.events[next].t_ns : completeUntil(c));
   }
-  counts_.windows_without_events += policy_->advancePast(*start_ns_, empty_until_ns);
+  counts_.windows_without_events += policy_->advancePast(recording, empty_until_ns);
 }
 
-std::vector<std::vector<Event>> FusionMapper::eventsOf(const Window& window) const {
-  std::vector<std::vector<Event>> events;
+std::vector<EventSpan> FusionMapper::eventsOf(const Window& window) const {
+  std::vector<EventSpan> events;
   for (const CameraBuffer& buffer : buffers_) {
-    const auto from = buffer.events.begin();
-    events.emplace_back(from + static_cast<std::ptrdiff_t>(buffer.indexOf(window.t0_ns)),
-                        from + static_cast<std::ptrdiff_t>(buffer.indexOf(window.t1_ns)));
+    events.push_back(
+        EventSpan(buffer.events).part(buffer.indexOf(window.t0_ns), buffer.indexOf(window.t1_ns)));
   }
   return events;
 }
@@ -270,6 +329,7 @@ std::vector<std::vector<Event>> FusionMapper::eventsOf(const Window& window) con
 void FusionMapper::countKeyframe(const KeyframeDepthMap& keyframe) {
   ++counts_.keyframes;
   counts_.votes += keyframe.votes;
+  counts_.silent_subintervals += keyframe.silent_subintervals;
   counts_.event_uses =
       std::accumulate(keyframe.events.begin(), keyframe.events.end(), counts_.event_uses);
   for (CameraBuffer& buffer : buffers_) {
@@ -281,14 +341,9 @@ void FusionMapper::countKeyframe(const KeyframeDepthMap& keyframe) {
 }
 
 /// The time before which every event is here, its poses known, and no window to come needs it.
-std::int64_t FusionMapper::settledUntil() const {
-  const std::optional<Window> window = policy_->current(*start_ns_);
-  std::int64_t settled_ns = window ? window->t0_ns : kEver;
-  if (finished_) return settled_ns;
-  for (std::size_t c = 0; c < buffers_.size(); ++c) {
-    if (selected(static_cast<int>(c))) settled_ns = std::min(settled_ns, completeUntil(c));
-  }
-  return std::min(settled_ns, trajectory_.empty() ? kNever : trajectory_.poses().back().t_ns);
+std::int64_t FusionMapper::settledUntil() {
+  const std::int64_t settled_ns = policy_->earliestStart(SoFar(*this));
+  return finished_ ? settled_ns : std::min(settled_ns, completeNs());
 }
 
 /// Lets go of events and poses before a time, and says what became of the events.
@@ -311,8 +366,8 @@ void FusionMapper::settleBefore(std::int64_t t_ns) {
     buffer.compact();
   }
   // The view of a window may stand before it.
-  const std::optional<Window> window = start_ns_ ? policy_->current(*start_ns_) : std::nullopt;
-  trajectory_.forgetBefore(window ? std::min(t_ns, window->t_ref_ns) : t_ns);
+  trajectory_.forgetBefore(start_ns_ ? std::min(t_ns, policy_->earliestReference(SoFar(*this)))
+                                     : t_ns);
 }
 
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
@@ -320,12 +375,10 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
   if (!start_ns_) findStart();
   while (start_ns_) {
     passEmptyWindows();
-    const std::optional<Window> window = policy_->current(*start_ns_);
-    // The one window that was asked for is mapped with what there is.
-    const bool due = window && (covered(*window) || (finished_ && options_.only_window));
-    if (!due) break;
+    const std::optional<Window> window = policy_->current(SoFar(*this));
+    if (!window || !isDue(*window)) break;
     std::optional<KeyframeDepthMap> keyframe = mapWindow(*window, sink, stages);
-    policy_->advance();
+    policy_->advance(*window, keyframe ? &*keyframe : nullptr);
     settleBefore(settledUntil());
     if (keyframe) return keyframe;
   }
@@ -337,13 +390,8 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
   return std::nullopt;
 }
 
-std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, DsiSink* sink,
-                                                        StageHook* stages) {
-  const std::vector<std::vector<Event>> events = eventsOf(window);
-  if (std::all_of(events.begin(), events.end(), [](const auto& some) { return some.empty(); })) {
-    ++counts_.windows_without_events;
-    return std::nullopt;
-  }
+/// Made when it is first needed: by then the rig is complete.
+KeyframeMapper& FusionMapper::keyframeMapper() {
   if (!mapper_) {
     std::vector<int> cameras = options_.cameras;
     if (cameras.empty()) {
@@ -352,7 +400,17 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
     }
     mapper_ = std::make_unique<KeyframeMapper>(rig_, cameras, options_.keyframe);
   }
-  auto keyframe = mapper_->map(window, events, trajectory_, sink, stages);
+  return *mapper_;
+}
+
+std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, DsiSink* sink,
+                                                        StageHook* stages) {
+  const std::vector<EventSpan> events = eventsOf(window);
+  if (std::all_of(events.begin(), events.end(), [](EventSpan some) { return some.empty(); })) {
+    ++counts_.windows_without_events;
+    return std::nullopt;
+  }
+  auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, stages);
   if (keyframe) {
     countKeyframe(*keyframe);
   } else {

@@ -59,6 +59,7 @@ struct MapperCounts {
   std::uint64_t keyframes = 0;
   std::uint64_t keyframes_without_pose = 0;  ///< Windows whose reference time had no pose.
   std::uint64_t windows_without_events = 0;  ///< Passed over: no selected camera saw anything.
+  std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes, but of silent cameras.
   std::uint64_t sorted_events = 0;           ///< Came after a newer one of their camera.
   std::uint64_t duplicate_poses = 0;
 
@@ -106,24 +107,28 @@ class FusionMapper {
 
  private:
   struct CameraBuffer;
+  class SoFar;
 
+  std::int64_t completeNs() const;
+  std::size_t countBefore(std::int64_t t_ns) const;
+  KeyframeMapper& keyframeMapper();
   bool selected(int camera) const;
   std::int64_t completeUntil(std::size_t camera) const;
   bool camerasCover(std::int64_t t_ns) const;
-  bool covered(const Window& window) const;
+  bool isDue(const Window& window) const;
   void findStart();
   void passEmptyWindows();
-  std::vector<std::vector<Event>> eventsOf(const Window& window) const;
+  std::vector<EventSpan> eventsOf(const Window& window) const;
   std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageHook* stages);
   void countKeyframe(const KeyframeDepthMap& keyframe);
-  std::int64_t settledUntil() const;
+  std::int64_t settledUntil();
   void settleBefore(std::int64_t t_ns);
 
   FusionMapperOptions options_;
   Rig rig_;
   Trajectory trajectory_;
   std::unique_ptr<KeyframePolicy> policy_;
-  std::unique_ptr<KeyframeMapper> mapper_;  // once the first window starts
+  std::unique_ptr<KeyframeMapper> mapper_;  // once the recording starts
   std::vector<CameraBuffer> buffers_;       // per camera
   std::optional<std::int64_t> start_ns_;    // first event with a pose
   std::optional<std::int64_t> reached_ns_;  // newest event of any camera, selected or not

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/keyframe_mapper.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -34,11 +35,25 @@ void requireCamera(const Rig& rig, int camera, const char* key) {
                 "a camera of the recording: 0 to " + std::to_string(count - 1));
 }
 
+EventImage eventImage(int camera, const CameraModel& model, EventSpan events) {
+  EventImage image{camera, cv::Mat_<cv::Vec2i>::zeros(model.height, model.width)};
+  for (const Event& event : events) ++image.counts(event.y, event.x)[event.polarity ? 1 : 0];
+  return image;
+}
+
+double largestOf(const cv::Mat1f& confidence) {
+  double largest = 0;
+  cv::minMaxLoc(confidence, nullptr, &largest);
+  return largest;
+}
+
 }  // namespace
 
 void KeyframeMapperOptions::validate() const {
   planes.validate();
   requireOption(reference_camera >= 0, "reference_camera", reference_camera, "0 or above");
+  view.validate();
+  subintervals.validate();
   packets.validate();
   sweep.validate();
   extraction.validate();
@@ -52,55 +67,124 @@ KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
       planes_(options.planes),
       sweep_(options.sweep) {
   options_.validate();
+  if (selected_.empty()) throw std::invalid_argument("cameras: at least one must take part");
   requireCamera(rig_, options_.reference_camera, "reference_camera");
-  view_ =
-      ReferenceView::of(rig_.cameras[static_cast<std::size_t>(options_.reference_camera)].model);
+  view_ = makeReferenceView(rig_.cameras[static_cast<std::size_t>(options_.reference_camera)].model,
+                            options_.view);
   for (const int camera : selected_) {
     requireCamera(rig_, camera, "cameras");
     undistortion_.emplace_back(rig_.cameras[static_cast<std::size_t>(camera)].model);
   }
 }
 
+Rigid3 KeyframeMapper::referencePose(const Rigid3& T_world_rig) const {
+  const auto& reference = rig_.cameras[static_cast<std::size_t>(options_.reference_camera)];
+  const Rigid3 T_cam_ref{Eigen::Quaterniond::Identity(), options_.view.offset_m};
+  return T_world_rig * reference.T_rig_cam * T_cam_ref;
+}
+
 std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
-                                                    const std::vector<std::vector<Event>>& events,
+                                                    const std::vector<EventSpan>& events,
                                                     const Trajectory& trajectory, DsiSink* sink,
-                                                    StageHook* stages) const {
+                                                    StageHook* stages) {
   // 1-2. The reference view, common to all DSIs.
   const std::optional<Rigid3> T_world_rig = trajectory.poseAt(window.t_ref_ns);
   if (!T_world_rig) return std::nullopt;
-  const auto& reference = rig_.cameras[static_cast<std::size_t>(options_.reference_camera)];
   KeyframeDepthMap keyframe;
   keyframe.window = window;
-  keyframe.T_world_ref = *T_world_rig * reference.T_rig_cam;
+  keyframe.T_world_ref = referencePose(*T_world_rig);
   keyframe.view = view_;
   keyframe.events.resize(rig_.cameras.size());
 
+  // 3. Back-project the events of each camera and sub-interval.
+  std::vector<CameraInput> inputs;
+  {
+    const StageScope scope(stages, Stage::kSweep);
+    const PacketGeometry geometry{keyframe.T_world_ref.inverse(), view_, planes_.depth(0),
+                                  planes_.depth(planes_.size() - 1)};
+    for (std::size_t i = 0; i < selected_.size(); ++i) {
+      inputs.push_back(backProjectCamera(i, events[static_cast<std::size_t>(selected_[i])], window,
+                                         trajectory, geometry, keyframe));
+    }
+  }
+  fuse(std::move(inputs), sink, stages, keyframe);
+
+  if (options_.event_images) {
+    for (const int selected : selected_) {
+      const auto camera = static_cast<std::size_t>(selected);
+      keyframe.event_images.push_back(
+          eventImage(selected, rig_.cameras[camera].model, events[camera]));
+    }
+  }
+  return keyframe;
+}
+
+/// Counts what became of the camera's events.
+KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
+    std::size_t selected, EventSpan events, const Window& window, const Trajectory& trajectory,
+    const PacketGeometry& geometry, KeyframeDepthMap& keyframe) const {
+  const auto camera = static_cast<std::size_t>(selected_[selected]);
+  const UndistortionTable& undistortion = undistortion_[selected];
+  CameraInput input{selected_[selected], {}};
+  std::uint64_t used = 0;
+  std::uint64_t silent = 0;
+  for (const EventSpan part :
+       splitIntoSubintervals(events, window.t0_ns, window.t1_ns, options_.subintervals)) {
+    const PosePackets packets = splitIntoPosePackets(part, rig_.cameras[camera], undistortion,
+                                                     trajectory, geometry, options_.packets);
+    const RayBundle& rays =
+        input.rays.emplace_back(backProject(part, packets, undistortion, view_));
+    keyframe.without_pose += packets.without_pose;
+    used += rays.size();
+    if (rays.size() == 0) ++silent;
+  }
+  keyframe.events[camera] = used;
+  if (used == 0) {
+    keyframe.silent_cameras.push_back(selected_[selected]);
+  } else {
+    keyframe.silent_subintervals += silent;
+  }
+  return input;
+}
+
+/// Steps 4 and 5: from rays to depth.
+void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
+                          KeyframeDepthMap& keyframe) {
+  const bool all_silent = keyframe.silent_cameras.size() == selected_.size();
+  if (options_.exclude_silent && !all_silent) {
+    inputs.erase(std::remove_if(inputs.begin(), inputs.end(),
+                                [&](const CameraInput& input) {
+                                  return keyframe.events[static_cast<std::size_t>(input.camera)] ==
+                                         0;
+                                }),
+                 inputs.end());
+  }
+  const auto slots = assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals);
+  std::vector<CameraRays> rays(inputs.size());
+  for (std::size_t c = 0; c < inputs.size(); ++c) {
+    for (const int part : slots[c]) {
+      rays[c].push_back(std::move(inputs[c].rays[static_cast<std::size_t>(part)]));
+    }
+  }
+
+  // 4. Vote and fuse, plane by plane.
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
-    // 3. Back-project the events of each camera.
-    const PacketGeometry geometry{keyframe.T_world_ref.inverse(), view_, planes_.depth(0),
-                                  planes_.depth(planes_.size() - 1)};
-    std::vector<RayBundle> rays;
-    for (std::size_t i = 0; i < selected_.size(); ++i) {
-      const auto camera = static_cast<std::size_t>(selected_[i]);
-      const PosePackets packets =
-          splitIntoPosePackets(events[camera], rig_.cameras[camera], undistortion_[i], trajectory,
-                               geometry, options_.packets);
-      rays.push_back(backProject(events[camera], packets, undistortion_[i], view_));
-      keyframe.events[camera] = rays.back().size();
-      keyframe.without_pose += packets.without_pose;
-      if (rays.back().size() == 0) keyframe.silent_cameras.push_back(selected_[i]);
-    }
-    // 4. Vote and fuse, plane by plane.
-    swept = sweep_.run(rays, view_, planes_, sink);
+    swept = sweep_.run(rays, view_, planes_, {options_.camera_maps, sink});
   }
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
 
   // 5. Depth and confidence from the fused DSI.
   const StageScope scope(stages, Stage::kDepth);
-  keyframe.map = extractDepth(swept.peaks, planes_, options_.extraction);
-  return keyframe;
+  keyframe.largest_confidence = largestOf(swept.peaks.confidence);
+  sequence_maximum_.take(keyframe.largest_confidence);
+  keyframe.map = extractDepth(swept.peaks, planes_, options_.extraction, sequence_maximum_.value());
+  for (std::size_t c = 0; c < swept.camera_peaks.size(); ++c) {
+    // A camera alone has higher densities than the fusion: it goes by its own maximum.
+    keyframe.camera_maps.push_back(
+        {inputs[c].camera, extractDepth(swept.camera_peaks[c], planes_, options_.extraction)});
+  }
 }
 
 }  // namespace efm

@@ -1,49 +1,48 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
 #include "mapping/depth_extraction.h"
 #include "mapping/depth_planes.h"
-#include "mapping/event.h"
-#include "mapping/keyframe_policy.h"
+#include "mapping/event_span.h"
+#include "mapping/keyframe_depth_map.h"
 #include "mapping/pose_packets.h"
 #include "mapping/reference_view.h"
 #include "mapping/rig.h"
+#include "mapping/robust_maximum.h"
 #include "mapping/space_sweep.h"
 #include "mapping/stage.h"
+#include "mapping/subintervals.h"
 #include "mapping/trajectory.h"
+#include "mapping/undistortion.h"
 
 namespace efm {
 
-/// What one window of events became.
-struct KeyframeDepthMap {
-  Window window;
-  Rigid3 T_world_ref;  ///< Pose of the reference view.
-  ReferenceView view;
-  DepthMap map;
-  std::vector<std::uint64_t>
-      events;                       ///< Events that voted, per camera of the rig (0: not selected).
-  std::uint64_t without_pose = 0;   ///< Events of the window that had no pose.
-  VoteCounts votes;                 ///< Summed over cameras.
-  std::vector<int> silent_cameras;  ///< Selected, but without an event to vote.
-};
-
 struct KeyframeMapperOptions {
   DepthPlanesOptions planes;
-  int reference_camera = 0;  ///< Whose pinhole view and pose the keyframe takes.
+  /// Whose pinhole view and pose the keyframe takes; it need not be among the selected ones.
+  int reference_camera = 0;
+  ReferenceViewOptions view;
+  SubintervalOptions subintervals;
+  /// Leave cameras without an event to vote out of the fusion: with the AND-like rules a silent
+  /// camera makes everything zero.
+  bool exclude_silent = false;
   PosePacketsOptions packets;
   SpaceSweepOptions sweep;
   DepthExtractionOptions extraction;
+  bool camera_maps = false;   ///< Also a depth map of each camera alone, in the same view.
+  bool event_images = false;  ///< Also each camera's events as an image.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
 /// The method itself: the events and poses of one window in, one semi-dense depth map out (Ghosh
-/// and Gallego 2022, Algorithm 1 for any number of cameras).
+/// and Gallego 2022, Algorithm 2 for any number of cameras; with one sub-interval Algorithm 1).
+/// Keeps nothing from one window to the next but the confidences' running maximum.
 class KeyframeMapper {
  public:
   /// @param selected indices of the rig's cameras whose events take part.
@@ -53,16 +52,29 @@ class KeyframeMapper {
   /// @param events per camera of the rig: the window's, in time order, on the trajectory's clock,
   /// inside the sensor (asserted).
   /// @return nothing where the reference time has no pose.
-  std::optional<KeyframeDepthMap> map(const Window& window,
-                                      const std::vector<std::vector<Event>>& events,
+  std::optional<KeyframeDepthMap> map(const Window& window, const std::vector<EventSpan>& events,
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
-                                      StageHook* stages = nullptr) const;
+                                      StageHook* stages = nullptr);
 
+  /// T_world_ref where the rig is there.
+  Rigid3 referencePose(const Rigid3& T_world_rig) const;
   const Rig& rig() const { return rig_; }
   const DepthPlanes& planes() const { return planes_; }
   const ReferenceView& view() const { return view_; }
 
  private:
+  /// One camera's events on their way to the sweep.
+  struct CameraInput {
+    int camera = 0;
+    CameraRays rays;  // by sub-interval
+  };
+
+  CameraInput backProjectCamera(std::size_t selected, EventSpan events, const Window& window,
+                                const Trajectory& trajectory, const PacketGeometry& geometry,
+                                KeyframeDepthMap& keyframe) const;
+  void fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
+            KeyframeDepthMap& keyframe);
+
   Rig rig_;
   std::vector<int> selected_;
   KeyframeMapperOptions options_;
@@ -70,6 +82,7 @@ class KeyframeMapper {
   ReferenceView view_;
   SpaceSweep sweep_;
   std::vector<UndistortionTable> undistortion_;  // per selected camera
+  RobustMaximum sequence_maximum_;
 };
 
 }  // namespace efm

@@ -30,9 +30,8 @@ std::array<Eigen::Vector3d, kGridSide * kGridSide> gridRays(const UndistortionTa
 
 class PacketSplitter {
  public:
-  PacketSplitter(const std::vector<Event>& events, const RigCamera& camera,
-                 const UndistortionTable& undistortion, const PacketGeometry& geometry,
-                 double error_px)
+  PacketSplitter(EventSpan events, const RigCamera& camera, const UndistortionTable& undistortion,
+                 const PacketGeometry& geometry, double error_px)
       : events_(events),
         T_rig_cam_(camera.T_rig_cam),
         rays_(gridRays(undistortion)),
@@ -52,11 +51,10 @@ class PacketSplitter {
       packets.push_back({begin, end, T_ref_cam});
       return;
     }
-    const auto from = events_.begin();
-    const auto middle = std::upper_bound(
-        from + static_cast<std::ptrdiff_t>(begin), from + static_cast<std::ptrdiff_t>(end),
-        middle_ns, [](std::int64_t t_ns, const Event& event) { return t_ns < event.t_ns; });
-    const auto second_half = static_cast<std::size_t>(middle - from);
+    const Event* middle =
+        std::upper_bound(events_.begin() + begin, events_.begin() + end, middle_ns,
+                         [](std::int64_t t_ns, const Event& event) { return t_ns < event.t_ns; });
+    const auto second_half = static_cast<std::size_t>(middle - events_.begin());
     split(segment, begin, second_half, packets);
     split(segment, second_half, end, packets);
   }
@@ -106,7 +104,7 @@ class PacketSplitter {
     return any_near_view ? near_view : anywhere;
   }
 
-  const std::vector<Event>& events_;
+  EventSpan events_;
   Rigid3 T_rig_cam_;
   std::array<Eigen::Vector3d, kGridSide * kGridSide> rays_;
   PacketGeometry geometry_;
@@ -120,7 +118,7 @@ void PosePacketsOptions::validate() const {
                 "0 to 10");
 }
 
-PosePackets splitIntoPosePackets(const std::vector<Event>& events, const RigCamera& camera,
+PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,
                                  const PosePacketsOptions& options) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mapping/camera.h"
-#include "mapping/event.h"
+#include "mapping/event_span.h"
 #include "mapping/reference_view.h"
 #include "mapping/rig.h"
 #include "mapping/trajectory.h"
@@ -54,7 +54,7 @@ struct PacketGeometry {
 /// nothing there and everything behind it. Packets do not cross a recorded pose, so that the motion
 /// within one is a single smooth piece and its ends are its extremes. Rays that end far outside the
 /// view are left out where others do not.
-PosePackets splitIntoPosePackets(const std::vector<Event>& events, const RigCamera& camera,
+PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,
                                  const PosePacketsOptions& options);

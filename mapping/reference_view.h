@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 
 #include "mapping/camera.h"
 
@@ -32,5 +33,24 @@ struct ReferenceView {
     return {(x - cx) / fx * depth_m, (y - cy) / fy * depth_m, depth_m};
   }
 };
+
+struct ReferenceViewOptions {
+  /// Horizontal field of view in degrees, above 0 and below 180, with square or not square pixels
+  /// as the camera's and the principal point in the middle; the camera's own view where not given.
+  std::optional<double> fov_deg;
+  /// Size in pixels, 1 to 65,535. Not given: the camera's; one alone keeps the shape of its image.
+  std::optional<int> width;
+  std::optional<int> height;
+  /// Shift along the view's own axes (x right, y down, z forward), metres.
+  Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// The view of a camera without its distortion, with the field of view and size of the options. A
+/// size alone keeps the camera's field of view: the same image at another resolution.
+/// @throws std::invalid_argument where the options are not valid.
+ReferenceView makeReferenceView(const CameraModel& model, const ReferenceViewOptions& options);
 
 }  // namespace efm

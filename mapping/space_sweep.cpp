@@ -22,75 +22,14 @@ constexpr NamedChoice<VotingKernel> kKernels[] = {{VotingKernel::kPlain, "plain"
 
 /// Two groups of planes per thread even out that some planes cost more than others.
 constexpr int kGroupsPerThread = 2;
-constexpr float kNoValue = -1;
 
-/// The best value along each ray over a group of consecutive planes, and the group's outermost
-/// planes: what its neighbours need to complete their parabolas.
-class GroupPeaks {
- public:
-  explicit GroupPeaks(std::size_t pixels)
-      : best_(pixels, kNoValue),
-        before_(pixels, kNoValue),
-        after_(pixels, kNoValue),
-        plane_(pixels, -1),
-        previous_(pixels, kNoValue) {}
-
-  /// Planes in increasing order.
-  void take(int plane, const std::vector<float>& values) {
-    if (first_.empty()) first_ = values;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      const float value = values[i];
-      if (value > best_[i]) {
-        best_[i] = value;
-        before_[i] = previous_[i];
-        after_[i] = kNoValue;
-        plane_[i] = plane;
-      } else if (plane_[i] == plane - 1) {
-        after_[i] = value;
-      }
-      previous_[i] = value;
-    }
-  }
-
-  /// Takes the group that follows this one.
-  void append(const GroupPeaks& next, int first_plane_of_next) {
-    for (std::size_t i = 0; i < best_.size(); ++i) {
-      if (next.best_[i] > best_[i]) {
-        best_[i] = next.best_[i];
-        before_[i] = next.plane_[i] == first_plane_of_next ? previous_[i] : next.before_[i];
-        after_[i] = next.after_[i];
-        plane_[i] = next.plane_[i];
-      } else if (plane_[i] == first_plane_of_next - 1) {
-        after_[i] = next.first_[i];
-      }
-    }
-    previous_ = next.previous_;
-  }
-
-  DsiPeaks images(const ReferenceView& view) const {
-    const auto image = [&view](const auto& values) {
-      using Value = typename std::decay_t<decltype(values)>::value_type;
-      cv::Mat_<Value> result(view.height, view.width);
-      std::copy(values.begin(), values.end(), result.begin());
-      return result;
-    };
-    return {image(best_), image(plane_), image(before_), image(after_)};
-  }
-
- private:
-  std::vector<float> best_;
-  std::vector<float> before_;
-  std::vector<float> after_;
-  std::vector<std::int32_t> plane_;
-  std::vector<float> first_;     // the group's first plane
-  std::vector<float> previous_;  // the last plane taken
-};
-
+/// Consecutive planes that one thread sweeps.
 struct PlaneGroup {
   int begin = 0;
   int end = 0;
-  std::optional<GroupPeaks> peaks;
-  std::vector<VoteCounts> votes;  // per camera
+  std::optional<RunningPeaks> peaks;
+  std::vector<RunningPeaks> camera_peaks;  // per camera, where asked for
+  std::vector<VoteCounts> votes;           // per camera
 };
 
 std::vector<PlaneGroup> groupPlanes(int planes, int threads) {
@@ -156,24 +95,31 @@ SpaceSweep::SpaceSweep(const SpaceSweepOptions& options) : options_(options) {
   options_.validate();
 }
 
-SweepResult SpaceSweep::run(const std::vector<RayBundle>& cameras, const ReferenceView& view,
-                            const DepthPlanes& planes, DsiSink* sink) const {
+SweepResult SpaceSweep::run(const std::vector<CameraRays>& cameras, const ReferenceView& view,
+                            const DepthPlanes& planes, const SweepRequest& request) const {
+  const std::size_t kept_cameras = request.camera_peaks ? cameras.size() : 0;
   std::vector<PlaneGroup> groups = groupPlanes(planes.size(), options_.threadsOrCores());
 
   const auto sweep_group = [&](PlaneGroup& group) {
-    GroupPeaks& peaks = group.peaks.emplace(view.pixels());
+    RunningPeaks& peaks = group.peaks.emplace(view.pixels());
+    group.camera_peaks.assign(kept_cameras, RunningPeaks(view.pixels()));
     group.votes.resize(cameras.size());
-    std::vector<float> votes(view.pixels());
-    FusionAccumulator across_cameras(options_.across_cameras, view.pixels());
+    PlaneFusion fusion(
+        options_.fusion, static_cast<int>(cameras.size()), static_cast<int>(cameras.front().size()),
+        view.pixels(),
+        request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly);
     for (int plane = group.begin; plane < group.end; ++plane) {
-      across_cameras.begin();
-      for (std::size_t c = 0; c < cameras.size(); ++c) {
-        group.votes[c] += votePlane(cameras[c], view, planes.depth(plane), votes);
-        across_cameras.fold(votes.data());
+      const std::vector<float>& fused =
+          fusion.fuse([&](int camera, int slot, std::vector<float>& votes) {
+            const auto c = static_cast<std::size_t>(camera);
+            group.votes[c] += votePlane(cameras[c][static_cast<std::size_t>(slot)], view,
+                                        planes.depth(plane), votes);
+          });
+      peaks.take(plane, fused);
+      for (std::size_t c = 0; c < kept_cameras; ++c) {
+        group.camera_peaks[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
       }
-      across_cameras.finish();
-      peaks.take(plane, across_cameras.values());
-      if (sink != nullptr) sink->takePlane(plane, across_cameras.values().data());
+      if (request.sink != nullptr) request.sink->takePlane(plane, fused.data());
     }
   };
   tbb::task_arena arena(options_.threadsOrCores());
@@ -186,14 +132,18 @@ SweepResult SpaceSweep::run(const std::vector<RayBundle>& cameras, const Referen
         tbb::simple_partitioner());
   });
 
-  SweepResult result;
-  result.votes.resize(cameras.size());
-  GroupPeaks& all = *groups.front().peaks;
-  for (const PlaneGroup& group : groups) {
-    if (&group != &groups.front()) all.append(*group.peaks, group.begin);
-    for (std::size_t c = 0; c < cameras.size(); ++c) result.votes[c] += group.votes[c];
+  PlaneGroup& all = groups.front();
+  for (auto group = groups.begin() + 1; group != groups.end(); ++group) {
+    all.peaks->append(*group->peaks);
+    for (std::size_t c = 0; c < kept_cameras; ++c) {
+      all.camera_peaks[c].append(group->camera_peaks[c]);
+    }
+    for (std::size_t c = 0; c < cameras.size(); ++c) all.votes[c] += group->votes[c];
   }
-  result.peaks = all.images(view);
+  SweepResult result{all.peaks->images(view), {}, all.votes};
+  for (const RunningPeaks& peaks : all.camera_peaks) {
+    result.camera_peaks.push_back(peaks.images(view));
+  }
   return result;
 }
 

@@ -2,14 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "mapping/back_projection.h"
 #include "mapping/depth_planes.h"
-#include "mapping/fusion_rule.h"
+#include "mapping/dsi_peaks.h"
+#include "mapping/plane_fusion.h"
 #include "mapping/reference_view.h"
 #include "mapping/vote_counts.h"
 
@@ -23,7 +23,7 @@ std::string_view nameOf(VotingKernel kernel);
 VotingKernel votingKernelFromName(std::string_view name);
 
 struct SpaceSweepOptions {
-  FusionRule across_cameras = FusionRule::kHarmonic;
+  FusionOptions fusion;
 
   // Performance only: the result is the same, bit for bit.
   std::optional<int> threads;          ///< 1 to 1024; as many as there are cores where not given.
@@ -45,32 +45,34 @@ class DsiSink {
   virtual void takePlane(int plane, const float* values) = 0;
 };
 
-/// The peak of the fused DSI along every ray of the reference view: four images of its size.
-struct DsiPeaks {
-  cv::Mat1f confidence;  ///< The largest fused value; 0 where nothing voted.
-  cv::Mat1i plane;       ///< Its plane; of equals the nearest.
-  cv::Mat1f before;      ///< The value one plane nearer; -1 at the nearest plane.
-  cv::Mat1f after;       ///< The value one plane farther; -1 at the farthest plane.
+/// One camera's rays by slot of the time axis: one bundle without temporal fusion. All cameras have
+/// equally many.
+using CameraRays = std::vector<RayBundle>;
+
+struct SweepRequest {
+  bool camera_peaks = false;  ///< Also the peaks of each camera alone, fused across time.
+  DsiSink* sink = nullptr;    ///< Receives the whole fused DSI where given; not owned.
 };
 
 struct SweepResult {
   DsiPeaks peaks;
-  std::vector<VoteCounts> votes;  ///< Per camera.
+  std::vector<DsiPeaks> camera_peaks;  ///< Per camera, where asked for.
+  std::vector<VoteCounts> votes;       ///< Per camera.
 };
 
-/// Sweeps the planes through space: for each, votes every camera into an accumulator of one plane,
-/// fuses them, and keeps the best value along each ray so far. No volume is held: memory is
-/// O(threads * (cameras + few) * width * height), whatever the number of planes. The order of
-/// planes and threads never changes the result.
+/// Sweeps the planes through space: for each, votes every camera and sub-interval into one plane,
+/// folds it into the running means of the two axes, and keeps the best value along each ray so far.
+/// No volume is held: memory is O(threads * width * height), whatever the number of planes, cameras
+/// and sub-intervals (with `camera_peaks`, times the cameras). The order of planes and threads
+/// never changes the result.
 class SpaceSweep {
  public:
   /// @throws std::invalid_argument where the options are not valid.
   explicit SpaceSweep(const SpaceSweepOptions& options = {});
 
-  /// @param cameras one bundle of rays per camera that takes part.
-  /// @param sink receives the whole DSI where given.
-  SweepResult run(const std::vector<RayBundle>& cameras, const ReferenceView& view,
-                  const DepthPlanes& planes, DsiSink* sink = nullptr) const;
+  /// @param cameras the rays of each camera that takes part; at least one.
+  SweepResult run(const std::vector<CameraRays>& cameras, const ReferenceView& view,
+                  const DepthPlanes& planes, const SweepRequest& request = {}) const;
 
  private:
   SpaceSweepOptions options_;

@@ -2,6 +2,8 @@
 #include "plugin/depth_picture.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
 namespace efm {
@@ -28,6 +30,24 @@ cv::Mat1b confidencePicture(const cv::Mat1f& confidence) {
   cv::minMaxLoc(confidence, nullptr, &largest);
   cv::Mat1b picture;
   confidence.convertTo(picture, CV_8U, largest > 0 ? -255 / largest : 0, 255);
+  return picture;
+}
+
+cv::Mat3b eventPicture(const cv::Mat_<cv::Vec2i>& counts) {
+  constexpr int kStrong = 3;  // events
+  cv::Mat3b picture(counts.size(), cv::Vec3b(255, 255, 255));
+  for (int y = 0; y < counts.rows; ++y) {
+    for (int x = 0; x < counts.cols; ++x) {
+      const int darker = counts(y, x)[0];
+      const int brighter = counts(y, x)[1];
+      if (darker + brighter == 0) continue;
+      const int difference = std::clamp(brighter - darker, -kStrong, kStrong);
+      const auto rest = static_cast<std::uint8_t>(180 - 60 * std::abs(difference));
+      picture(y, x) = {rest, rest, rest};
+      if (difference > 0) picture(y, x)[2] = 255;
+      if (difference < 0) picture(y, x)[0] = 255;
+    }
+  }
   return picture;
 }
 

@@ -16,4 +16,9 @@ cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limit
 /// map's maximum.
 cv::Mat1b confidencePicture(const cv::Mat1f& confidence);
 
+/// Accumulated events for the eye: red where more became brighter than darker, blue where more
+/// became darker, grey where as many, white where there was none; strong colours from 3 events on.
+/// @param counts per pixel: darker, brighter.
+cv::Mat3b eventPicture(const cv::Mat_<cv::Vec2i>& counts);
+
 }  // namespace efm

@@ -21,8 +21,10 @@
 namespace efm {
 namespace {
 
+/// The images of one depth map, and that of a camera's events.
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
+constexpr std::string_view kEventImage = "events.png";
 constexpr std::array<std::string_view, 3> kMapFiles = {"map.pcd", "trajectory.txt", "report.json"};
 constexpr std::array<std::string_view, 3> kDepthFiles = {"points.pcd", "dsi.npy", "report.json"};
 
@@ -48,6 +50,31 @@ void removeFiles(const std::filesystem::path& folder,
   }
 }
 
+constexpr std::string_view kCameraFolder = "cam";  // and the camera's index
+
+std::string cameraFolder(int camera) { return std::string(kCameraFolder) + std::to_string(camera); }
+
+bool isCameraFolder(const std::filesystem::directory_entry& entry) {
+  const std::string name = entry.path().filename().string();
+  return name.size() > kCameraFolder.size() && name.rfind(kCameraFolder, 0) == 0 &&
+         name.find_first_not_of("0123456789", kCameraFolder.size()) == std::string::npos &&
+         std::filesystem::is_directory(entry.symlink_status());
+}
+
+/// Removes what is kept of a keyframe: its own images, and those of its single cameras.
+void removeImages(const std::filesystem::path& folder) {
+  removeFiles(folder, kImages);
+  std::vector<std::filesystem::path> cameras;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (isCameraFolder(entry)) cameras.push_back(entry.path());
+  }
+  for (const std::filesystem::path& camera : cameras) {
+    removeFiles(camera, kImages);
+    removeFiles(camera, std::array{kEventImage});
+    if (std::filesystem::is_empty(camera)) std::filesystem::remove(camera);
+  }
+}
+
 bool isKeyframeFolder(const std::filesystem::directory_entry& entry) {
   const std::string name = entry.path().filename().string();
   const std::optional<std::int64_t> t_ns = parseSeconds(name);
@@ -62,7 +89,7 @@ void removeKeyframes(const std::filesystem::path& keyframes) {
     if (isKeyframeFolder(entry)) earlier.push_back(entry.path());
   }
   for (const std::filesystem::path& keyframe : earlier) {
-    removeFiles(keyframe, kImages);
+    removeImages(keyframe);
     if (std::filesystem::is_empty(keyframe)) std::filesystem::remove(keyframe);
   }
 }
@@ -100,7 +127,7 @@ void MapOutput::removeEarlier() {
     removeKeyframes(folder_ / "keyframes");
   } else {
     removeFiles(folder_, kDepthFiles);
-    removeFiles(folder_, kImages);
+    removeImages(folder_);
   }
 }
 
@@ -120,10 +147,24 @@ void MapOutput::writeImages(const KeyframeDepthMap& keyframe) {
 
 void MapOutput::writeImagesTo(const std::filesystem::path& folder,
                               const KeyframeDepthMap& keyframe) const {
-  writeImage(folder / "depth.tiff", keyframe.map.depth);
-  writeImage(folder / "confidence.tiff", keyframe.map.confidence);
-  writeImage(folder / "depth.png", depthPicture(keyframe.map.depth, limits_));
-  writeImage(folder / "confidence.png", confidencePicture(keyframe.map.confidence));
+  writeMap(folder, keyframe.map);
+  for (const CameraDepthMap& camera : keyframe.camera_maps) {
+    const std::filesystem::path own = folder / cameraFolder(camera.camera);
+    makeFolder(own);
+    writeMap(own, camera.map);
+  }
+  for (const EventImage& image : keyframe.event_images) {
+    const std::filesystem::path own = folder / cameraFolder(image.camera);
+    makeFolder(own);
+    writeImage(own / kEventImage, eventPicture(image.counts));
+  }
+}
+
+void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) const {
+  writeImage(folder / "depth.tiff", map.depth);
+  writeImage(folder / "confidence.tiff", map.confidence);
+  writeImage(folder / "depth.png", depthPicture(map.depth, limits_));
+  writeImage(folder / "confidence.png", confidencePicture(map.confidence));
 }
 
 void MapOutput::writeTrajectory() {

@@ -23,6 +23,7 @@ enum class OutputKind {
 ///
 ///     map.pcd  trajectory.txt  report.json
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
+///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   where the keyframe has them
 class MapOutput {
  public:
   /// Creates the folder. What an earlier run of the same kind left in it is removed right before
@@ -46,6 +47,7 @@ class MapOutput {
  private:
   void removeEarlier();
   void writeImagesTo(const std::filesystem::path& folder, const KeyframeDepthMap& keyframe) const;
+  void writeMap(const std::filesystem::path& folder, const DepthMap& map) const;
 
   std::filesystem::path folder_;
   OutputKind kind_;

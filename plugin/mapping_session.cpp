@@ -31,10 +31,32 @@ std::string asText(const TimeSpan& span) {
   return formatSeconds(span.first_ns) + " to " + formatSeconds(span.last_ns) + " s";
 }
 
+/// What the policy waits for before a window is one.
+std::string fullWindow(const KeyframePolicyOptions& options) {
+  const std::string duration =
+      formatSeconds(durationFromSeconds(options.window_s)) + " s (window_s)";
+  switch (options.policy) {
+    case KeyframePolicyKind::kPeriod:
+      return duration;
+    case KeyframePolicyKind::kEvents:
+      return std::to_string(options.window_events) + " events (window_events)";
+    case KeyframePolicyKind::kBaseline:
+      return "at most " + duration + " with motion enough (min_baseline_ratio, min_visible_share)";
+  }
+  return duration;
+}
+
+/// What an option asks for although it is another's.
+FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
+  FusionMapperOptions mapper = options.mapper;
+  if (options.late_fusion) mapper.keyframe.camera_maps = true;
+  return mapper;
+}
+
 }  // namespace
 
 MappingSession::MappingSession(const EventFusionOptions& options)
-    : options_(options), mapper_(options.mapper), cloud_(options.cloud) {}
+    : options_(options), mapper_(mapperOptions(options)), cloud_(options.cloud) {}
 
 void MappingSession::addEvents(CameraPacket packet) {
   if (packet.camera < 0) {
@@ -125,7 +147,8 @@ std::vector<KeyframeDepthMap> MappingSession::mapDue(DsiSink* sink) {
   StageTimer timer(status_.seconds);
   while (auto keyframe = mapper_.next(sink, &timer)) {
     const SecondsScope scope(status_.seconds.map);
-    cloud_.insert(cloud_.keyframes(), keyframeCloud(*keyframe));
+    cloud_.insert(cloud_.keyframes(),
+                  options_.late_fusion ? lateFusionCloud(*keyframe) : keyframeCloud(*keyframe));
     for (const int camera : keyframe->silent_cameras) {
       ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
     }
@@ -167,9 +190,8 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
            " windows were full, but had no pose at their reference times: poses are more than "
            "max_pose_gap_s apart there";
   }
-  return "no window of " + formatSeconds(durationFromSeconds(options.keyframes.window_s)) +
-         " s (window_s) was full: " + spans + ", " + formatSeconds(last_ns - first_ns) +
-         " s of them together";
+  return "no window of " + fullWindow(options.keyframes) + " was full: " + spans + ", " +
+         formatSeconds(last_ns - first_ns) + " s of them together";
 }
 
 }  // namespace efm

@@ -35,6 +35,16 @@ void parseInto(std::string_view text, int& field) {
   if (!parsesWhole(text, field)) throw std::invalid_argument("must be a whole number");
 }
 
+void parseInto(std::string_view text, std::int64_t& field) {
+  if (!parsesWhole(text, field)) throw std::invalid_argument("must be a whole number");
+}
+
+void parseInto(std::string_view text, std::uint32_t& field) {
+  if (!parsesWhole(text, field)) {
+    throw std::invalid_argument("must be a whole number, 0 to 4294967295");
+  }
+}
+
 void parseInto(std::string_view text, bool& field) {
   if (text != "true" && text != "false") throw std::invalid_argument("must be true or false");
   field = text == "true";
@@ -47,16 +57,42 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
-void parseInto(std::string_view text, std::vector<int>& field) {
-  field.clear();
+/// Items separated by commas. @return whether each is one.
+template <typename Item>
+bool parsesList(std::string_view text, std::vector<Item>& items) {
+  items.clear();
   while (!text.empty()) {
     const std::size_t comma = text.find(',');
-    int item = 0;
-    if (!parsesWhole(trimmed(text.substr(0, comma)), item) || comma + 1 == text.size()) {
-      throw std::invalid_argument("must be whole numbers separated by commas, or nothing");
+    if (!parsesWhole(trimmed(text.substr(0, comma)), items.emplace_back()) ||
+        comma + 1 == text.size()) {
+      return false;
     }
-    field.push_back(item);
     text = comma == std::string_view::npos ? std::string_view{} : text.substr(comma + 1);
+  }
+  return true;
+}
+
+void parseInto(std::string_view text, std::vector<int>& field) {
+  if (!parsesList(text, field)) {
+    throw std::invalid_argument("must be whole numbers separated by commas, or nothing");
+  }
+}
+
+void parseInto(std::string_view text, Eigen::Vector3d& field) {
+  std::vector<double> items;
+  if (!parsesList(text, items) || items.size() != 3) {
+    throw std::invalid_argument("must be three numbers separated by commas");
+  }
+  field = {items[0], items[1], items[2]};
+}
+
+void parseInto(std::string_view text, MaxConfidence& field) {
+  if (text == "keyframe" || text == "sequence") {
+    field = {text == "keyframe" ? WhiteLevel::kKeyframe : WhiteLevel::kSequence, 0};
+  } else if (double votes = 0; parsesWhole(text, votes) && std::isfinite(votes)) {
+    field = MaxConfidence::of(votes);
+  } else {
+    throw std::invalid_argument("must be a number, keyframe or sequence");
   }
 }
 
@@ -73,6 +109,15 @@ void parseInto(std::string_view text, PlaneSpacing& field) {
 void parseInto(std::string_view text, FusionRule& field) {
   field = fusionRuleFromName(printable(text));
 }
+void parseInto(std::string_view text, FusionOrder& field) {
+  field = fusionOrderFromName(printable(text));
+}
+void parseInto(std::string_view text, SubintervalSplit& field) {
+  field = subintervalSplitFromName(printable(text));
+}
+void parseInto(std::string_view text, SubintervalShuffle& field) {
+  field = subintervalShuffleFromName(printable(text));
+}
 void parseInto(std::string_view text, ExtractionMethod& field) {
   field = extractionMethodFromName(printable(text));
 }
@@ -80,13 +125,29 @@ void parseInto(std::string_view text, VotingKernel& field) {
   field = votingKernelFromName(printable(text));
 }
 
+/// The fewest digits that read back the same.
+std::string shortestText(double number) {
+  std::array<char, 32> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+  return {digits.data(), end};
+}
+
 OptionValue valueOf(double field) { return field; }
 OptionValue valueOf(int field) { return std::int64_t{field}; }
+OptionValue valueOf(std::int64_t field) { return field; }
+OptionValue valueOf(std::uint32_t field) { return std::int64_t{field}; }
 OptionValue valueOf(bool field) { return field; }
 OptionValue valueOf(const std::vector<int>& field) {
   std::string text;
   for (const int item : field) text += (text.empty() ? "" : ",") + std::to_string(item);
   return text;
+}
+OptionValue valueOf(const Eigen::Vector3d& field) {
+  return shortestText(field.x()) + "," + shortestText(field.y()) + "," + shortestText(field.z());
+}
+OptionValue valueOf(const MaxConfidence& field) {
+  if (field.level == WhiteLevel::kFixed) return field.fixed;
+  return std::string(field.level == WhiteLevel::kKeyframe ? "keyframe" : "sequence");
 }
 template <typename Enum, typename = std::enable_if_t<std::is_enum_v<Enum>>>
 OptionValue valueOf(Enum field) {
@@ -141,6 +202,9 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "rig"sv, "max_pose_gap_s"sv,
           [](auto& o) -> auto& { return o.mapper.trajectory.max_pose_gap_s; }),
+      option(
+          "rig"sv, "exclude_silent"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.exclude_silent; }),
 
       option(
           "keyframes"sv, "policy"sv, [](auto& o) -> auto& { return o.mapper.keyframes.policy; }),
@@ -150,6 +214,15 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "keyframes"sv, "stride_s"sv,
           [](auto& o) -> auto& { return o.mapper.keyframes.stride_s; }),
+      option(
+          "keyframes"sv, "window_events"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.window_events; }),
+      option(
+          "keyframes"sv, "min_baseline_ratio"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.min_baseline_ratio; }),
+      option(
+          "keyframes"sv, "min_visible_share"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.min_visible_share; }),
       option(
           "keyframes"sv, "reference"sv,
           [](auto& o) -> auto& { return o.mapper.keyframes.reference; }),
@@ -168,10 +241,42 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "dsi"sv, "reference_camera"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.reference_camera; }),
+      optionOr(
+          "auto"sv, "dsi"sv, "fov_deg"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.fov_deg; }),
+      optionOr(
+          "auto"sv, "dsi"sv, "width"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.width; }),
+      optionOr(
+          "auto"sv, "dsi"sv, "height"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.height; }),
+      option(
+          "dsi"sv, "rv_offset_m"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.offset_m; }),
 
       option(
           "fusion"sv, "across_cameras"sv,
-          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.across_cameras; }),
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.fusion.across_cameras; }),
+      option(
+          "fusion"sv, "across_time"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.fusion.across_time; }),
+      option(
+          "fusion"sv, "order"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.fusion.order; }),
+      option(
+          "fusion"sv, "subintervals"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.count; }),
+      option(
+          "fusion"sv, "split"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.split; }),
+      option(
+          "fusion"sv, "shuffle"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.shuffle; }),
+      option(
+          "fusion"sv, "shuffle_seed"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.shuffle_seed; }),
+      option(
+          "fusion"sv, "late"sv, [](auto& o) -> auto& { return o.late_fusion; }),
 
       option(
           "depth"sv, "extraction"sv,
@@ -182,12 +287,15 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "depth"sv, "threshold_c"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.extraction.threshold_c; }),
-      optionOr(
-          "keyframe"sv, "depth"sv, "max_confidence"sv,
+      option(
+          "depth"sv, "max_confidence"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.extraction.max_confidence; }),
       option(
           "depth"sv, "median_size"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.extraction.median_size; }),
+      option(
+          "depth"sv, "dilate"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.dilate; }),
       option(
           "depth"sv, "subplane"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.extraction.subplane; }),
@@ -196,6 +304,13 @@ const std::vector<OptionKey>& optionKeys() {
           "map"sv, "voxel_size_m"sv, [](auto& o) -> auto& { return o.cloud.voxel_size_m; }),
       option(
           "map"sv, "min_keyframes"sv, [](auto& o) -> auto& { return o.cloud.min_keyframes; }),
+
+      option(
+          "output"sv, "camera_maps"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.camera_maps; }),
+      option(
+          "output"sv, "event_images"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.event_images; }),
 
       optionOr(
           "auto"sv, "performance"sv, "threads"sv,
@@ -277,10 +392,7 @@ std::string textOf(const OptionValue& value) {
   if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
   if (const auto* text = std::get_if<std::string>(&value)) return *text;
   if (const auto* whole = std::get_if<std::int64_t>(&value)) return std::to_string(*whole);
-  std::array<char, 32> digits{};
-  const auto end =
-      std::to_chars(digits.data(), digits.data() + digits.size(), std::get<double>(value)).ptr;
-  return {digits.data(), end};
+  return shortestText(std::get<double>(value));
 }
 
 void OptionReader::readFile(const std::filesystem::path& path) {

@@ -18,6 +18,9 @@ namespace efm {
 /// Everything that an option file says.
 struct EventFusionOptions {
   FusionMapperOptions mapper;
+  /// The cloud of a keyframe is those of its single cameras, concatenated: the naive baseline
+  /// (Ghosh and Gallego 2022, Sec. 3.1). Depth maps stay fused.
+  bool late_fusion = false;
   GlobalCloudOptions cloud;
 };
 

@@ -68,6 +68,8 @@ std::string reportJson(const MapReport& report) {
   json["keyframes"] = counts.keyframes;
   json["keyframes_without_pose"] = counts.keyframes_without_pose;
   json["windows_without_events"] = counts.windows_without_events;
+  json["silent"] = {{"keyframes", report.silent_keyframes},
+                    {"subintervals", counts.silent_subintervals}};
   json["sorted_events"] = counts.sorted_events;
   json["duplicate_poses"] = counts.duplicate_poses;
   json["points"] = report.points;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "mapping/fusion_mapper.h"
 #include "plugin/option_file.h"
@@ -13,15 +14,16 @@ namespace efm {
 /// What a run read, did and took: the content of report.json.
 struct MapReport {
   MapperCounts counts;
-  std::uint64_t points = 0;  ///< Of the exported map.
+  std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: those that it had no event for.
+  std::uint64_t points = 0;                     ///< Of the exported map.
   StageSeconds seconds;
   EventFusionOptions options;  ///< As used.
 };
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
 /// outside_window + dropped + filtered), event_uses, votes (event_uses x planes = their sum),
-/// keyframes, points, seconds, votes_per_second, kernel, threads, peak_memory_bytes (of this
-/// process), options (all of them) and version.
+/// keyframes, silent (keyframes per camera, sub-intervals), points, seconds, votes_per_second,
+/// kernel, threads, peak_memory_bytes (of this process), options (all of them) and version.
 std::string reportJson(const MapReport& report);
 
 /// Votes (used events times planes) over the sweep's seconds; 0 where nothing was swept.

@@ -74,7 +74,8 @@ class Player {
     const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
     if (!events || events->camera_index != job_.options.mapper.keyframe.reference_camera) return;
     sink_offered_ = true;
-    builder_.setDsiSink(job_.make_dsi_sink(ReferenceView::of(events->camera)));
+    builder_.setDsiSink(
+        job_.make_dsi_sink(makeReferenceView(events->camera, job_.options.mapper.keyframe.view)));
   }
 
   /// Outside the steps of reading: an error of writing must not be taken for one of reading.
@@ -99,7 +100,7 @@ class Player {
   Progress progress_;
 };
 
-std::vector<std::string> warningsOf(const SessionStatus& status) {
+std::vector<std::string> warningsOf(const SessionStatus& status, bool exclude_silent) {
   std::vector<std::string> warnings;
   if (status.counts.sorted_events > 0) {
     warnings.push_back(std::to_string(status.counts.sorted_events) +
@@ -107,11 +108,19 @@ std::vector<std::string> warningsOf(const SessionStatus& status) {
   }
   for (std::size_t c = 0; c < status.silent_keyframes.size(); ++c) {
     if (status.silent_keyframes[c] == 0) continue;
-    warnings.push_back("camera " + std::to_string(c) + " had no event in " +
-                       std::to_string(status.silent_keyframes[c]) + " of " +
-                       std::to_string(status.counts.keyframes) +
-                       " keyframes: rules that ask all cameras (min, harmonic, geometric) find "
-                       "nothing there");
+    warnings.push_back(
+        "camera " + std::to_string(c) + " had no event in " +
+        std::to_string(status.silent_keyframes[c]) + " of " +
+        std::to_string(status.counts.keyframes) + " keyframes: " +
+        (exclude_silent
+             ? "the others were fused without it"
+             : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
+               "([rig] exclude_silent leaves silent cameras out)"));
+  }
+  if (status.counts.silent_subintervals > 0) {
+    warnings.push_back(std::to_string(status.counts.silent_subintervals) +
+                       " sub-intervals of a camera had no event: rules that ask all of them (min, "
+                       "harmonic, geometric) find nothing where one is empty");
   }
   if (status.counts.duplicate_poses > 0) {
     warnings.push_back(std::to_string(status.counts.duplicate_poses) +
@@ -139,6 +148,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   SessionStatus status = player.builder().status();
   status.counts.sorted_events += recording.counts().sorted_events;
   outcome.report.counts = status.counts;
+  outcome.report.silent_keyframes = status.silent_keyframes;
   outcome.report.options = job.options;
   outcome.report.seconds = status.seconds;
   outcome.report.seconds.read = reading.read;
@@ -147,7 +157,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
     outcome.points = player.builder().points();
   }
   outcome.report.points = outcome.points.size();
-  outcome.warnings = warningsOf(status);
+  outcome.warnings = warningsOf(status, job.options.mapper.keyframe.exclude_silent);
   if (status.counts.event_uses == 0 && !outcome.error) {
     outcome.error = status.counts.keyframes == 0
                         ? "there is no keyframe: " + whyNoKeyframe(status, job.options.mapper)

@@ -138,9 +138,10 @@ TEST(DepthExtraction, AFixedMaximumClipsAndMakesKeyframesComparable) {
   DsiPeaks peaks = flatPeaks(9, 9);
   peaks.confidence(4, 4) = 10;
   DepthExtractionOptions options;
-  options.max_confidence = 1000;  // 10 of 1000 is 3 grey values of 255: below C = 5
+  options.max_confidence =
+      MaxConfidence::of(1000);  // 10 of 1000 is 3 grey values of 255: below C = 5
   EXPECT_EQ(cv::countNonZero(extractDepth(peaks, kPlanes, options).depth), 0);
-  options.max_confidence = 5;
+  options.max_confidence = MaxConfidence::of(5);
   EXPECT_EQ(cv::countNonZero(extractDepth(peaks, kPlanes, options).depth), 1);
 }
 
@@ -177,7 +178,7 @@ TEST(DepthExtraction, OptionsOutOfRangeAreNamed) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("threshold_kernel = 4")));
   EXPECT_THAT(with([](Options& o) { o.threshold_c = 300; }),
               ThrowsMessage<std::invalid_argument>(HasSubstr("threshold_c = 300")));
-  EXPECT_THAT(with([](Options& o) { o.max_confidence = 0; }),
+  EXPECT_THAT(with([](Options& o) { o.max_confidence = MaxConfidence::of(0); }),
               ThrowsMessage<std::invalid_argument>(HasSubstr("max_confidence = 0")));
   EXPECT_THAT(with([](Options& o) { o.median_size = 0; }),
               ThrowsMessage<std::invalid_argument>(HasSubstr("median_size = 0")));

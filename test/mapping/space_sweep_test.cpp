@@ -74,9 +74,11 @@ Input makeInput(std::uint32_t seed, int cameras, int planes, std::size_t events_
 
 SweepResult sweep(const Input& input, FusionRule rule, int threads, DsiSink* sink = nullptr) {
   SpaceSweepOptions options;
-  options.across_cameras = rule;
+  options.fusion.across_cameras = rule;
   options.threads = threads;
-  return SpaceSweep(options).run(input.rays, input.view, input.planes, sink);
+  std::vector<CameraRays> rays;
+  for (const RayBundle& camera : input.rays) rays.push_back({camera});
+  return SpaceSweep(options).run(rays, input.view, input.planes, {false, sink});
 }
 
 bool same(const cv::Mat& a, const cv::Mat& b) {

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "mapping/reference_view.h"
+
+namespace efm {
+
+/// The peak of the fused DSI along every ray of the reference view: four images of its size.
+struct DsiPeaks {
+  cv::Mat1f confidence;  ///< The largest fused value; 0 where nothing voted.
+  cv::Mat1i plane;       ///< Its plane; of equals the nearest.
+  cv::Mat1f before;      ///< The value one plane nearer; -1 at the nearest plane.
+  cv::Mat1f after;       ///< The value one plane farther; -1 at the farthest plane.
+};
+
+/// The best value along each ray over a group of consecutive planes, taken one by one, and the
+/// group's outermost planes: what its neighbours need to complete their peaks. Groups that follow
+/// each other join to what one group over all planes would have found, bit for bit.
+class RunningPeaks {
+ public:
+  explicit RunningPeaks(std::size_t pixels);
+
+  /// Planes in increasing order, without a gap.
+  void take(int plane, const std::vector<float>& values);
+  /// Takes in the group that follows this one.
+  void append(const RunningPeaks& next);
+
+  DsiPeaks images(const ReferenceView& view) const;
+
+ private:
+  std::vector<float> best_;
+  std::vector<float> before_;
+  std::vector<float> after_;
+  std::vector<std::int32_t> plane_;
+  int first_plane_ = 0;
+  std::vector<float> first_;     // the values of the group's first plane
+  std::vector<float> previous_;  // and of the last one taken
+};
+
+}  // namespace efm

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/plane_fusion.h"
+
+#include <cassert>
+
+#include "mapping/named_choice.h"
+
+namespace efm {
+namespace {
+
+constexpr NamedChoice<FusionOrder> kOrders[] = {
+    {FusionOrder::kCamerasThenTime, "cameras_then_time"},
+    {FusionOrder::kTimeThenCameras, "time_then_cameras"},
+};
+
+/// An axis of one input needs no accumulator.
+std::size_t voxelsFor(int inputs, std::size_t voxels) { return inputs > 1 ? voxels : 0; }
+
+}  // namespace
+
+std::string_view nameOf(FusionOrder order) { return nameIn(kOrders, order); }
+FusionOrder fusionOrderFromName(std::string_view name) { return valueIn(kOrders, name); }
+
+PlaneFusion::PlaneFusion(const FusionOptions& options, int cameras, int slots, std::size_t voxels,
+                         Keep keep)
+    : cameras_first_(options.order == FusionOrder::kCamerasThenTime),
+      inner_count_(cameras_first_ ? cameras : slots),
+      outer_count_(cameras_first_ ? slots : cameras),
+      votes_(voxels),
+      inner_(cameras_first_ ? options.across_cameras : options.across_time,
+             voxelsFor(inner_count_, voxels)),
+      outer_(cameras_first_ ? options.across_time : options.across_cameras,
+             voxelsFor(outer_count_, voxels)) {
+  assert(cameras >= 1 && slots >= 1);
+  if (keep == Keep::kCameras) {
+    // The maximum of one input is that input.
+    const FusionRule rule = slots > 1 ? options.across_time : FusionRule::kMax;
+    cameras_.assign(static_cast<std::size_t>(cameras), FusionAccumulator(rule, voxels));
+  }
+}
+
+const std::vector<float>& PlaneFusion::fuseInner(int outer, const Vote& vote) {
+  if (inner_count_ > 1) inner_.begin();
+  for (int inner = 0; inner < inner_count_; ++inner) {
+    const int camera = cameras_first_ ? inner : outer;
+    vote(camera, cameras_first_ ? outer : inner, votes_);
+    if (!cameras_.empty()) cameras_[static_cast<std::size_t>(camera)].fold(votes_.data());
+    if (inner_count_ > 1) inner_.fold(votes_.data());
+  }
+  if (inner_count_ == 1) return votes_;
+  inner_.finish();
+  return inner_.values();
+}
+
+const std::vector<float>& PlaneFusion::fuse(const Vote& vote) {
+  for (FusionAccumulator& camera : cameras_) camera.begin();
+  const std::vector<float>* fused = nullptr;
+  if (outer_count_ == 1) {
+    fused = &fuseInner(0, vote);
+  } else {
+    outer_.begin();
+    for (int outer = 0; outer < outer_count_; ++outer) {
+      outer_.fold(fuseInner(outer, vote).data());
+    }
+    outer_.finish();
+    fused = &outer_.values();
+  }
+  for (FusionAccumulator& camera : cameras_) camera.finish();
+  return *fused;
+}
+
+}  // namespace efm

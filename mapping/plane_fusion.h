@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "mapping/fusion_rule.h"
+
+namespace efm {
+
+/// Which axis is fused first. The paper writes S_t∘S_c for cameras first, S_c∘S_t for time first.
+enum class FusionOrder { kCamerasThenTime, kTimeThenCameras };
+
+/// "cameras_then_time", "time_then_cameras".
+std::string_view nameOf(FusionOrder order);
+/// @throws std::invalid_argument naming the value and what is known.
+FusionOrder fusionOrderFromName(std::string_view name);
+
+/// How the DSIs of several cameras and sub-intervals become one (Ghosh and Gallego 2022, Sec. 3.4
+/// and 3.5): any rule on either axis, in either order. Algorithm 1 is harmonic across cameras with
+/// one sub-interval, and the same as harmonic across cameras after arithmetic across time;
+/// Algorithm 2 is arithmetic across time after harmonic across cameras, the default.
+struct FusionOptions {
+  FusionRule across_cameras = FusionRule::kHarmonic;
+  FusionRule across_time = FusionRule::kArithmetic;
+  FusionOrder order = FusionOrder::kCamerasThenTime;
+};
+
+/// Fuses one plane of the DSIs of all cameras and sub-intervals. Holds a plane for the votes and
+/// one for each axis, whatever the number of cameras and sub-intervals. An axis with one input is
+/// left out, bit for bit.
+class PlaneFusion {
+ public:
+  /// Fills the plane with the ray density of one camera in one slot of the time axis.
+  using Vote = std::function<void(int camera, int slot, std::vector<float>& votes)>;
+
+  /// What else is kept of a plane.
+  enum class Keep {
+    kFusedOnly,
+    kCameras,  ///< Also each camera alone, fused across time: a plane of memory per camera.
+  };
+
+  /// @param cameras, slots at least 1.
+  PlaneFusion(const FusionOptions& options, int cameras, int slots, std::size_t voxels,
+              Keep keep = Keep::kFusedOnly);
+
+  /// Asks for every input once. @return the fused plane, until the next call.
+  const std::vector<float>& fuse(const Vote& vote);
+
+  /// A camera's own plane after `fuse`, where cameras are kept.
+  const std::vector<float>& ofCamera(int camera) const {
+    return cameras_[static_cast<std::size_t>(camera)].values();
+  }
+
+ private:
+  const std::vector<float>& fuseInner(int outer, const Vote& vote);
+
+  bool cameras_first_;
+  int inner_count_;
+  int outer_count_;
+  std::vector<float> votes_;
+  FusionAccumulator inner_;
+  FusionAccumulator outer_;
+  std::vector<FusionAccumulator> cameras_;
+};
+
+}  // namespace efm
