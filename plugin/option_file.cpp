@@ -80,7 +80,8 @@ void parseInto(std::string_view text, std::vector<int>& field) {
 
 void parseInto(std::string_view text, Eigen::Vector3d& field) {
   std::vector<double> items;
-  if (!parsesList(text, items) || items.size() != 3) {
+  if (!parsesList(text, items) || items.size() != 3 ||
+      !std::all_of(items.begin(), items.end(), [](double item) { return std::isfinite(item); })) {
     throw std::invalid_argument("must be three numbers separated by commas");
   }
   field = {items[0], items[1], items[2]};

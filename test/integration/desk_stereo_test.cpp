@@ -133,9 +133,11 @@ class DeskStereoDsi : public DeskStereo {
       std::copy_if(events_[c].begin(), events_[c].end(), std::back_inserter(window_events_[c]),
                    in_window);
     }
-    const KeyframeMapper keyframe_mapper(simulation_->rig, {0, 1}, options_.keyframe);
+    KeyframeMapper keyframe_mapper(simulation_->rig, {0, 1}, options_.keyframe);
     dsi_ = std::make_unique<KeptDsi>(100, keyframe_mapper.view());
-    keyframe_ = *keyframe_mapper.map(*options_.only_window, window_events_, trajectory_, dsi_.get());
+    keyframe_ = *keyframe_mapper.map(*options_.only_window,
+                                     {window_events_.begin(), window_events_.end()}, trajectory_,
+                                     dsi_.get());
   }
 
   oracle::Dsi oracleDsi(bool by_packet) const {
@@ -228,7 +230,7 @@ TEST_F(DeskStereo, DepthIsGoodToAFractionOfAPlane) {
 TEST_F(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
   FusionMapperOptions harmonic = options(0.1, 0.1);
   FusionMapperOptions arithmetic = harmonic;
-  arithmetic.keyframe.sweep.across_cameras = FusionRule::kArithmetic;
+  arithmetic.keyframe.sweep.fusion.across_cameras = FusionRule::kArithmetic;
   FusionMapperOptions one_camera = harmonic;
   one_camera.cameras = {0};
   const DepthErrors of_harmonic = errors(map(harmonic));

@@ -63,10 +63,14 @@ TEST(OptionReader, EveryKeyReachesItsField) {
 [rig]
 cameras = 0, 2
 max_pose_gap_s = 0.5
+exclude_silent = true
 [keyframes]
-policy = period
+policy = baseline
 window_s = 0.25
 stride_s = 1e-1
+window_events = 5000000000
+min_baseline_ratio = 0.3
+min_visible_share = 0.25
 reference = end
 [dsi]
 min_depth_m = 1
@@ -74,15 +78,30 @@ max_depth_m = 20
 num_planes = 64
 spacing = linear
 reference_camera = 2
+fov_deg = 100.5
+width = 800
+height = 1
+rv_offset_m = -0.5, 1e-3,2
 [fusion]
 across_cameras = geometric
+across_time = rms
+order = time_then_cameras
+subintervals = 8
+split = count
+shuffle = random
+shuffle_seed = 4294967295
+late = true
 [depth]
 extraction = paper
 threshold_kernel = 7
 threshold_c = -2.5
 max_confidence = 31.5
 median_size = 3
+dilate = true
 subplane = false
+[output]
+camera_maps = true
+event_images = true
 [map]
 voxel_size_m = 0.05
 min_keyframes = 3
@@ -95,7 +114,11 @@ packet_error_px = 0
   const FusionMapperOptions& mapper = options.mapper;
   EXPECT_EQ(mapper.cameras, (std::vector<int>{0, 2}));
   EXPECT_EQ(mapper.trajectory.max_pose_gap_s, 0.5);
-  EXPECT_EQ(mapper.keyframes.policy, KeyframePolicyKind::kPeriod);
+  EXPECT_TRUE(mapper.keyframe.exclude_silent);
+  EXPECT_EQ(mapper.keyframes.policy, KeyframePolicyKind::kBaseline);
+  EXPECT_EQ(mapper.keyframes.window_events, 5'000'000'000);
+  EXPECT_EQ(mapper.keyframes.min_baseline_ratio, 0.3);
+  EXPECT_EQ(mapper.keyframes.min_visible_share, 0.25);
   EXPECT_EQ(mapper.keyframes.window_s, 0.25);
   EXPECT_EQ(mapper.keyframes.stride_s, 0.1);
   EXPECT_EQ(mapper.keyframes.reference, ReferenceTime::kEnd);
@@ -104,12 +127,27 @@ packet_error_px = 0
   EXPECT_EQ(mapper.keyframe.planes.num_planes, 64);
   EXPECT_EQ(mapper.keyframe.planes.spacing, PlaneSpacing::kLinear);
   EXPECT_EQ(mapper.keyframe.reference_camera, 2);
-  EXPECT_EQ(mapper.keyframe.sweep.across_cameras, FusionRule::kGeometric);
+  EXPECT_EQ(mapper.keyframe.view.fov_deg, 100.5);
+  EXPECT_EQ(mapper.keyframe.view.width, 800);
+  EXPECT_EQ(mapper.keyframe.view.height, 1);
+  EXPECT_EQ(mapper.keyframe.view.offset_m, Eigen::Vector3d(-0.5, 1e-3, 2));
+  EXPECT_EQ(mapper.keyframe.sweep.fusion.across_cameras, FusionRule::kGeometric);
+  EXPECT_EQ(mapper.keyframe.sweep.fusion.across_time, FusionRule::kRms);
+  EXPECT_EQ(mapper.keyframe.sweep.fusion.order, FusionOrder::kTimeThenCameras);
+  EXPECT_EQ(mapper.keyframe.subintervals.count, 8);
+  EXPECT_EQ(mapper.keyframe.subintervals.split, SubintervalSplit::kCount);
+  EXPECT_EQ(mapper.keyframe.subintervals.shuffle, SubintervalShuffle::kRandom);
+  EXPECT_EQ(mapper.keyframe.subintervals.shuffle_seed, 4'294'967'295U);
+  EXPECT_TRUE(options.late_fusion);
   EXPECT_EQ(mapper.keyframe.extraction.extraction, ExtractionMethod::kPaper);
   EXPECT_EQ(mapper.keyframe.extraction.threshold_kernel, 7);
   EXPECT_EQ(mapper.keyframe.extraction.threshold_c, -2.5);
-  EXPECT_EQ(mapper.keyframe.extraction.max_confidence, 31.5);
+  EXPECT_EQ(mapper.keyframe.extraction.max_confidence.level, WhiteLevel::kFixed);
+  EXPECT_EQ(mapper.keyframe.extraction.max_confidence.fixed, 31.5);
   EXPECT_EQ(mapper.keyframe.extraction.median_size, 3);
+  EXPECT_TRUE(mapper.keyframe.extraction.dilate);
+  EXPECT_TRUE(mapper.keyframe.camera_maps);
+  EXPECT_TRUE(mapper.keyframe.event_images);
   EXPECT_FALSE(mapper.keyframe.extraction.subplane);
   EXPECT_EQ(options.cloud.voxel_size_m, 0.05);
   EXPECT_EQ(options.cloud.min_keyframes, 3);
@@ -122,7 +160,8 @@ TEST(OptionReader, WhatIsListedReadsBackTheSame) {
   EventFusionOptions options;
   options.mapper.cameras = {1, 0};
   options.mapper.trajectory.max_pose_gap_s = 0.1 + 0.2;  // 0.30000000000000004
-  options.mapper.keyframe.extraction.max_confidence = 1e-7;
+  options.mapper.keyframe.extraction.max_confidence = MaxConfidence::of(1e-7);
+  options.mapper.keyframe.view.offset_m = {0.1, -0.2, 1.0 / 3};
   options.mapper.keyframe.sweep.threads = 3;
   options.mapper.keyframe.planes.spacing = PlaneSpacing::kLinear;
 
@@ -189,7 +228,15 @@ TEST(OptionReader, ValuesOfTheWrongKindAreErrorsThatSayWhatWasExpected) {
   EXPECT_THAT(error("spacing = cubic"), HasSubstr("'cubic' is not one of: inverse, linear"));
   EXPECT_THAT(errorOf("[depth]\nsubplane = yes\n"), HasSubstr("must be true or false"));
   EXPECT_THAT(errorOf("[depth]\nmax_confidence = most\n"),
-              HasSubstr("must be a number, or keyframe"));
+              HasSubstr("must be a number, keyframe or sequence"));
+  EXPECT_THAT(error("fov_deg = wide"), HasSubstr("must be a number, or auto"));
+  for (const std::string offset : {"1", "1,2", "1,2,3,4", "1,2,", "1 2 3", "a,b,c", ""}) {
+    EXPECT_THAT(error("rv_offset_m = " + offset), HasSubstr("three numbers separated by commas"))
+        << offset;
+  }
+  EXPECT_THAT(errorOf("[fusion]\nshuffle_seed = -1\n"), HasSubstr("0 to 4294967295"));
+  EXPECT_THAT(errorOf("[fusion]\norder = time\n"),
+              HasSubstr("'time' is not one of: cameras_then_time, time_then_cameras"));
   EXPECT_THAT(errorOf("[performance]\nthreads = many\n"),
               HasSubstr("must be a whole number, or auto"));
   for (const std::string list : {"0,", ",1", "0,,1", "0 1", "a"}) {
@@ -209,6 +256,16 @@ TEST(OptionReader, ValuesOutOfRangeAreErrorsThatNameSectionKeyValueAndRange) {
               StartsWith("rig.ini:2: [rig] max_pose_gap_s = 0: must be"));
   EXPECT_THAT(errorOf("[depth]\nthreshold_kernel = 4\n"),
               StartsWith("rig.ini:2: [depth] threshold_kernel = 4: must be"));
+  EXPECT_THAT(errorOf("[depth]\nmax_confidence = 0\n"),
+              StartsWith("rig.ini:2: [depth] max_confidence = 0: must be"));
+  EXPECT_THAT(errorOf("[dsi]\nfov_deg = 180\n"),
+              StartsWith("rig.ini:2: [dsi] fov_deg = 180: must be"));
+  EXPECT_THAT(errorOf("[dsi]\nheight = 0\n"), StartsWith("rig.ini:2: [dsi] height = 0: must be"));
+  EXPECT_THAT(errorOf("[dsi]\nrv_offset_m = 0,inf,0\n"), HasSubstr("three numbers"));
+  EXPECT_THAT(errorOf("[fusion]\nsubintervals = 1001\n"),
+              StartsWith("rig.ini:2: [fusion] subintervals = 1001: must be"));
+  EXPECT_THAT(errorOf("[keyframes]\nwindow_events = 0\n"),
+              StartsWith("rig.ini:2: [keyframes] window_events = 0: must be"));
   EXPECT_THAT(errorOf("[performance]\nthreads = 0\n"),
               StartsWith("rig.ini:2: [performance] threads = 0: must be"));
   EXPECT_THAT(errorOf("[performance]\npacket_error_px = 11\n"),

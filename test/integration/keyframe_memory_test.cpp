@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How much memory a keyframe takes beyond its events. A program of its own, because a process has
+// only one peak.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "mapping/keyframe_mapper.h"
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kWindow_ns = 200'000'000;
+constexpr double kMegabyte = 1e6;
+
+/// A line of /proc/self/status, in bytes.
+double memoryBytes(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  while (status >> word) {
+    double kibibytes = 0;
+    if (word == key + ":" && status >> kibibytes) return 1024 * kibibytes;
+  }
+  return 0;
+}
+
+RigCamera hdCamera(double x_m) {
+  RigCamera camera;
+  camera.model = {1280, 720, 900, 900, 639.5, 359.5, DistortionModel::kNone, {}};
+  camera.T_rig_cam.translation.x() = x_m;
+  return camera;
+}
+
+/// Events all over the sensor, in time order: where they lie costs no memory.
+std::vector<Event> eventsEverywhere(std::size_t count, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::vector<Event> events(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    events[i].t_ns = static_cast<std::int64_t>(i) * kWindow_ns / static_cast<std::int64_t>(count);
+    events[i].x = static_cast<std::uint16_t>(random() % 1280);
+    events[i].y = static_cast<std::uint16_t>(random() % 720);
+  }
+  return events;
+}
+
+/// A quick hand-held motion, so that there are many pose packets.
+Trajectory shakyMotion() {
+  Trajectory trajectory;
+  for (std::int64_t t_ns = 0; t_ns <= kWindow_ns; t_ns += 5'000'000) {
+    const double t_s = 1e-9 * static_cast<double>(t_ns);
+    StampedPose pose{t_ns, {}};
+    pose.T_world_rig.translation = {0.5 * t_s, 0.05 * std::sin(20 * t_s), 0};
+    pose.T_world_rig.rotation = Eigen::AngleAxisd(0.8 * t_s, Eigen::Vector3d::UnitY());
+    trajectory.add(pose);
+  }
+  return trajectory;
+}
+
+TEST(KeyframeMemory, OfAStereoPairInHighDefinitionIsUnder400MbAboveTheEvents) {
+  const std::vector<std::vector<Event>> events = {eventsEverywhere(2'000'000, 1),
+                                                  eventsEverywhere(2'000'000, 2)};
+  const Trajectory trajectory = shakyMotion();
+  KeyframeMapperOptions options;
+  options.planes.num_planes = 100;
+  options.subintervals.count = 8;
+  options.sweep.threads = 2;
+
+  const double before = memoryBytes("VmRSS");
+  KeyframeMapper mapper({{hdCamera(0), hdCamera(0.1)}}, {0, 1}, options);
+  const auto keyframe =
+      mapper.map({0, kWindow_ns, kWindow_ns / 2}, {events[0], events[1]}, trajectory);
+  const double above = memoryBytes("VmHWM") - before;
+
+  ASSERT_TRUE(keyframe);
+  ASSERT_EQ(keyframe->events[1], 2'000'000U);
+  ASSERT_GT(above, 0);
+  RecordProperty("megabytes", std::to_string(above / kMegabyte));
+  // A volume of such a keyframe would take 2 x 8 x 369 MB.
+  EXPECT_LT(above, 400 * kMegabyte) << above / kMegabyte << " MB";
+}
+
+}  // namespace
+}  // namespace efm
