@@ -6,6 +6,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 #include "mapping/option_check.h"
 
@@ -20,14 +21,6 @@ namespace {
   throw std::invalid_argument(message.str());
 }
 
-/// The finaliser of splitmix64: every bit of the result depends on every bit of the value.
-std::uint64_t mixed(std::uint64_t value) {
-  value += 0x9e3779b97f4a7c15ULL;
-  value = (value ^ (value >> 30)) * 0xbf58476d1ce4e5b9ULL;
-  value = (value ^ (value >> 27)) * 0x94d049bb133111ebULL;
-  return value ^ (value >> 31);
-}
-
 }  // namespace
 
 void GlobalCloudOptions::validate() const {
@@ -40,10 +33,16 @@ bool GlobalCloud::VoxelIndex::operator<(const VoxelIndex& o) const {
   return std::tie(x, y, z) < std::tie(o.x, o.y, o.z);
 }
 
-std::size_t GlobalCloud::VoxelHash::operator()(const VoxelIndex& index) const {
-  std::uint64_t hash = mixed(static_cast<std::uint64_t>(index.x));
-  hash = mixed(hash ^ static_cast<std::uint64_t>(index.y));
-  return mixed(hash ^ static_cast<std::uint64_t>(index.z));
+void GlobalCloud::Sums::add(const PlacedPoint& point) {
+  ++count;
+  weight += point.weight;
+  weighted_offset += point.weight * point.offset;
+}
+
+void GlobalCloud::Sums::add(const Sums& other) {
+  count += other.count;
+  weight += other.weight;
+  weighted_offset += other.weighted_offset;
 }
 
 GlobalCloud::GlobalCloud(const GlobalCloudOptions& options) : options_(options) {
@@ -57,34 +56,69 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
   std::vector<PlacedPoint> placed;
   placed.reserve(points.size());
   for (const CloudPoint& point : points) placed.push_back(place(point));
+  // Stable: within a voxel, points are summed in the order in which they came.
+  std::stable_sort(placed.begin(), placed.end(),
+                   [](const PlacedPoint& a, const PlacedPoint& b) { return a.index < b.index; });
 
-  keyframes_.insert(keyframe);
+  std::vector<Sums> voxels;
   for (const PlacedPoint& point : placed) {
-    std::vector<Sums>& voxel = voxels_[point.index];
-    const auto at = std::lower_bound(
-        voxel.begin(), voxel.end(), keyframe,
-        [](const Sums& sums, std::uint64_t number) { return sums.keyframe < number; });
-    const bool known = at != voxel.end() && at->keyframe == keyframe;
-    Sums& sums = known ? *at : *voxel.insert(at, Sums{keyframe});
-    ++sums.count;
-    sums.weight += point.weight;
-    sums.weighted_offset += point.weight * point.offset;
+    if (voxels.empty() || !(voxels.back().index == point.index)) voxels.push_back({point.index});
+    voxels.back().add(point);
+  }
+  voxels.shrink_to_fit();
+  keyframes_.emplace(keyframe, std::move(voxels));
+}
+
+/// Merges the keyframes' sorted voxels: visit(total, support), in the order of voxels. Within a
+/// voxel, keyframes are summed in the order of their numbers.
+template <typename Visit>
+void GlobalCloud::visitVoxels(const Visit& visit) const {
+  struct Run {
+    const Sums* next;
+    const Sums* end;
+    std::size_t rank;  // in the order of keyframe numbers
+  };
+  const auto comes_later = [](const Run& a, const Run& b) {
+    if (b.next->index < a.next->index) return true;
+    return a.next->index == b.next->index && b.rank < a.rank;
+  };
+  std::vector<Run> runs;
+  for (const auto& [number, voxels] : keyframes_) {
+    if (voxels.empty()) continue;
+    runs.push_back({voxels.data(), voxels.data() + voxels.size(), runs.size()});
+  }
+  std::make_heap(runs.begin(), runs.end(), comes_later);
+
+  while (!runs.empty()) {
+    Sums total;
+    total.index = runs.front().next->index;
+    std::uint32_t support = 0;
+    while (!runs.empty() && runs.front().next->index == total.index) {
+      std::pop_heap(runs.begin(), runs.end(), comes_later);
+      total.add(*runs.back().next);
+      ++support;
+      if (++runs.back().next == runs.back().end) {
+        runs.pop_back();
+      } else {
+        std::push_heap(runs.begin(), runs.end(), comes_later);
+      }
+    }
+    visit(total, support);
   }
 }
 
 std::vector<CloudPoint> GlobalCloud::points(int min_keyframes) const {
-  using Voxel = decltype(voxels_)::value_type;
-  std::vector<const Voxel*> kept;
-  for (const Voxel& voxel : voxels_) {
-    if (static_cast<std::int64_t>(voxel.second.size()) >= min_keyframes) kept.push_back(&voxel);
-  }
-  std::sort(kept.begin(), kept.end(),
-            [](const Voxel* a, const Voxel* b) { return a->first < b->first; });
-
   std::vector<CloudPoint> points;
-  points.reserve(kept.size());
-  for (const Voxel* voxel : kept) points.push_back(pointOf(voxel->first, voxel->second));
+  visitVoxels([&](const Sums& total, std::uint32_t support) {
+    if (std::int64_t{support} >= min_keyframes) points.push_back(pointOf(total, support));
+  });
   return points;
+}
+
+std::size_t GlobalCloud::voxels() const {
+  std::size_t count = 0;
+  visitVoxels([&](const Sums&, std::uint32_t) { ++count; });
+  return count;
 }
 
 GlobalCloud::PlacedPoint GlobalCloud::place(const CloudPoint& point) const {
@@ -105,20 +139,13 @@ GlobalCloud::PlacedPoint GlobalCloud::place(const CloudPoint& point) const {
           static_cast<double>(point.confidence)};
 }
 
-CloudPoint GlobalCloud::pointOf(const VoxelIndex& index, const std::vector<Sums>& sums) const {
-  Sums total;
-  for (const Sums& one : sums) {
-    total.count += one.count;
-    total.weight += one.weight;
-    total.weighted_offset += one.weighted_offset;
-  }
+CloudPoint GlobalCloud::pointOf(const Sums& total, std::uint32_t support) const {
   const Eigen::Vector3d corner =
-      Eigen::Vector3d(static_cast<double>(index.x), static_cast<double>(index.y),
-                      static_cast<double>(index.z)) *
+      Eigen::Vector3d(static_cast<double>(total.index.x), static_cast<double>(total.index.y),
+                      static_cast<double>(total.index.z)) *
       options_.voxel_size_m;
   return {corner + total.weighted_offset / total.weight,
-          static_cast<float>(total.weight / static_cast<double>(total.count)),
-          static_cast<std::uint32_t>(sums.size())};
+          static_cast<float>(total.weight / static_cast<double>(total.count)), support};
 }
 
 }  // namespace efm

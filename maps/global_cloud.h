@@ -4,8 +4,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <unordered_map>
-#include <unordered_set>
+#include <map>
 #include <vector>
 
 #include "maps/cloud_point.h"
@@ -25,10 +24,12 @@ struct GlobalCloudOptions {
 
 /// The map: all keyframes' points in the world, one per occupied voxel.
 ///
-/// Each voxel keeps apart the sums that each keyframe put there. Its point is the mean position of
-/// all its points weighted by their confidence, its confidence their mean, its support the number
-/// of keyframes. Totals are formed in the order of keyframe numbers, so the map does not depend on
-/// the order of insertion, bit for bit.
+/// Each keyframe keeps apart the sums that it puts into its voxels, and totals are formed only when
+/// points are asked for: a voxel's point is the mean position of all its points weighted by their
+/// confidence, its confidence their mean, its support the number of keyframes. So inserting a
+/// keyframe does not touch what the others put there, and costs no more in a larger map. Totals are
+/// formed in the order of keyframe numbers: the map does not depend on the order of insertion, bit
+/// for bit.
 ///
 /// Voxel (i, j, k) holds [i, i + 1) x [j, j + 1) x [k, k + 1) times the voxel size; indices are 64
 /// bits wide. Not thread-safe.
@@ -37,17 +38,20 @@ class GlobalCloud {
   /// @throws std::invalid_argument where the options are not valid.
   explicit GlobalCloud(const GlobalCloudOptions& options = {});
 
-  /// Puts a keyframe's points into the map. Cost: that of the points, whatever the size of the map.
+  /// Puts a keyframe's points into the map. Cost: that of sorting the points, whatever the size of
+  /// the map.
   /// @param keyframe its number: each is inserted once.
   /// @throws std::invalid_argument where the number was inserted before, a point is not finite, has
   /// no confidence above 0, or lies outside the range of voxel indices: nothing is inserted then.
   void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points);
 
   /// The points that at least `min_keyframes` of the options support, sorted by voxel (x, y, z).
+  /// Cost: that of merging what the keyframes put there.
   std::vector<CloudPoint> points() const { return points(options_.min_keyframes); }
   std::vector<CloudPoint> points(int min_keyframes) const;
 
-  std::size_t voxels() const { return voxels_.size(); }
+  /// Occupied voxels. Costs about what `points` does.
+  std::size_t voxels() const;
   std::size_t keyframes() const { return keyframes_.size(); }
   const GlobalCloudOptions& options() const { return options_; }
 
@@ -57,29 +61,30 @@ class GlobalCloud {
     bool operator==(const VoxelIndex& o) const { return x == o.x && y == o.y && z == o.z; }
     bool operator<(const VoxelIndex& o) const;
   };
-  struct VoxelHash {
-    std::size_t operator()(const VoxelIndex& index) const;
-  };
-  /// What one keyframe put into a voxel. Offsets are from the voxel's corner: sums of coordinates
-  /// would lose the precision that the voxel needs.
-  struct Sums {
-    std::uint64_t keyframe = 0;
-    std::uint64_t count = 0;
-    double weight = 0;
-    Eigen::Vector3d weighted_offset = Eigen::Vector3d::Zero();
-  };
   struct PlacedPoint {
     VoxelIndex index;
     Eigen::Vector3d offset;
     double weight = 0;
   };
+  /// What one keyframe put into a voxel, or all of them. Offsets are from the voxel's corner: sums
+  /// of coordinates would lose the precision that the voxel needs.
+  struct Sums {
+    VoxelIndex index;
+    std::uint64_t count = 0;
+    double weight = 0;
+    Eigen::Vector3d weighted_offset = Eigen::Vector3d::Zero();
+
+    void add(const PlacedPoint& point);
+    void add(const Sums& other);
+  };
 
   PlacedPoint place(const CloudPoint& point) const;
-  CloudPoint pointOf(const VoxelIndex& index, const std::vector<Sums>& sums) const;
+  CloudPoint pointOf(const Sums& total, std::uint32_t support) const;
+  template <typename Visit>
+  void visitVoxels(const Visit& visit) const;
 
   GlobalCloudOptions options_;
-  std::unordered_map<VoxelIndex, std::vector<Sums>, VoxelHash> voxels_;  // by keyframe number
-  std::unordered_set<std::uint64_t> keyframes_;
+  std::map<std::uint64_t, std::vector<Sums>> keyframes_;  // by number; each sorted by voxel
 };
 
 }  // namespace efm
