@@ -69,6 +69,12 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
   keyframes_.emplace(keyframe, std::move(voxels));
 }
 
+void GlobalCloud::remove(std::uint64_t keyframe) {
+  if (keyframes_.erase(keyframe) == 0) {
+    throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is not in the map");
+  }
+}
+
 /// Merges the keyframes' sorted voxels: visit(total, support), in the order of voxels. Within a
 /// voxel, keyframes are summed in the order of their numbers.
 template <typename Visit>

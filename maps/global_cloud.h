@@ -26,10 +26,10 @@ struct GlobalCloudOptions {
 ///
 /// Each keyframe keeps apart the sums that it puts into its voxels, and totals are formed only when
 /// points are asked for: a voxel's point is the mean position of all its points weighted by their
-/// confidence, its confidence their mean, its support the number of keyframes. So inserting a
-/// keyframe does not touch what the others put there, and costs no more in a larger map. Totals are
-/// formed in the order of keyframe numbers: the map does not depend on the order of insertion, bit
-/// for bit.
+/// confidence, its confidence their mean, its support the number of keyframes. So neither inserting
+/// nor removing a keyframe touches what the others put there, and neither costs more in a larger
+/// map. Totals are formed in the order of keyframe numbers: the map depends on what is in it, not
+/// on the order in which that came and what has left, bit for bit.
 ///
 /// Voxel (i, j, k) holds [i, i + 1) x [j, j + 1) x [k, k + 1) times the voxel size; indices are 64
 /// bits wide. Not thread-safe.
@@ -40,10 +40,16 @@ class GlobalCloud {
 
   /// Puts a keyframe's points into the map. Cost: that of sorting the points, whatever the size of
   /// the map.
-  /// @param keyframe its number: each is inserted once.
-  /// @throws std::invalid_argument where the number was inserted before, a point is not finite, has
-  /// no confidence above 0, or lies outside the range of voxel indices: nothing is inserted then.
+  /// @param keyframe its number, by which it can be removed; in the map once.
+  /// @throws std::invalid_argument where the number is in the map, a point is not finite, has no
+  /// confidence above 0, or lies outside the range of voxel indices: nothing is inserted then.
   void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points);
+
+  /// Takes a keyframe out: the map is as if it had never been inserted, its memory is given back,
+  /// and its number is free for another insertion, of a refined keyframe for example. Cost: at most
+  /// that of its points.
+  /// @throws std::invalid_argument where the number is not in the map.
+  void remove(std::uint64_t keyframe);
 
   /// The points that at least `min_keyframes` of the options support, sorted by voxel (x, y, z).
   /// Cost: that of merging what the keyframes put there.

@@ -145,6 +145,88 @@ RC_GTEST_PROP(GlobalCloud, OrderOfInsertionDoesNotMatterBitForBit, ()) {
   expectSameBits(in_order, shuffled);
 }
 
+RC_GTEST_PROP(GlobalCloud, IsAsIfWhatWasRemovedHadNeverBeenThereBitForBit, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  std::uniform_int_distribution<std::uint64_t> number(0, 7);
+  std::uniform_int_distribution<int> count(0, 120);
+  GlobalCloud cloud({0.4, 1});
+  std::map<std::uint64_t, std::vector<CloudPoint>> inside;
+  for (int step = 0; step < 40; ++step) {
+    const std::uint64_t keyframe = number(random);
+    if (inside.count(keyframe) != 0) {
+      cloud.remove(keyframe);
+      inside.erase(keyframe);
+    } else {
+      inside[keyframe] = randomPoints(random, count(random), 1.0);
+      cloud.insert(keyframe, inside[keyframe]);
+    }
+
+    GlobalCloud fresh({0.4, 1});
+    for (const auto& [fresh_number, points] : inside) fresh.insert(fresh_number, points);
+    for (const int min_keyframes : {1, 2, 4}) {
+      expectSameBits(cloud.points(min_keyframes), fresh.points(min_keyframes));
+    }
+    RC_ASSERT(cloud.voxels() == fresh.voxels());
+    RC_ASSERT(cloud.keyframes() == inside.size());
+  }
+}
+
+RC_GTEST_PROP(GlobalCloud, RemovalAndReinsertionOfTheSamePointsChangeNoBit, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  Keyframes keyframes;
+  GlobalCloud cloud({0.4, 2});
+  for (std::uint64_t k = 0; k < 6; ++k) {
+    keyframes.push_back(randomPoints(random, 100, 1.0));
+    cloud.insert(k, keyframes.back());
+  }
+  const std::vector<CloudPoint> before = cloud.points();
+
+  const auto refined = static_cast<std::size_t>(*rc::gen::inRange(0, 6));
+  cloud.remove(refined);
+  cloud.insert(refined, keyframes[refined]);
+
+  expectSameBits(before, cloud.points());
+}
+
+TEST(GlobalCloud, SupportIsThatOfTheKeyframesThatRemain) {
+  GlobalCloud cloud({1.0, 2});
+  cloud.insert(0, {{{0.2, 0.5, 0.5}, 1.0F}});
+  cloud.insert(1, {{{0.6, 0.5, 0.5}, 1.0F}, {{5.5, 0.5, 0.5}, 1.0F}});
+  ASSERT_EQ(cloud.points().size(), 1U);
+
+  cloud.remove(0);
+  EXPECT_EQ(cloud.points().size(), 0U);
+  EXPECT_EQ(cloud.points(1).size(), 2U);
+  EXPECT_EQ(cloud.points(1)[0].support, 1U);
+
+  cloud.insert(0, {{{5.7, 0.5, 0.5}, 1.0F}});  // refined: it moved by five voxels
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_NEAR(cloud.points()[0].p_world.x(), 5.6, 1e-15);
+}
+
+TEST(GlobalCloud, IsEmptyWhenTheLastKeyframeLeaves) {
+  GlobalCloud cloud;
+  cloud.insert(4, {{{0, 0, 0}, 1.0F}});
+  cloud.remove(4);
+
+  EXPECT_EQ(cloud.voxels(), 0U);
+  EXPECT_EQ(cloud.keyframes(), 0U);
+  EXPECT_TRUE(cloud.points().empty());
+}
+
+TEST(GlobalCloud, AKeyframeThatIsNotInTheMapCannotBeRemoved) {
+  GlobalCloud cloud;
+  cloud.insert(4, {{{0, 0, 0}, 1.0F}});
+  try {
+    cloud.remove(3);
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("keyframe 3 is not in the map"));
+  }
+  cloud.remove(4);
+  EXPECT_THROW(cloud.remove(4), std::invalid_argument);
+}
+
 TEST(GlobalCloud, MillimetreVoxelsAThousandKilometresFromTheOriginStayApart) {
   const double far_m = 1e6;
   GlobalCloud cloud({0.001, 1});
