@@ -27,6 +27,7 @@ void GlobalCloudOptions::validate() const {
   requireOption(voxel_size_m >= 1e-6 && voxel_size_m <= 1000, "voxel_size_m", voxel_size_m,
                 "from 1e-6 to 1000 (metres)");
   requireOption(min_keyframes >= 1, "min_keyframes", min_keyframes, "at least 1");
+  outliers.validate();
 }
 
 bool GlobalCloud::VoxelIndex::operator<(const VoxelIndex& o) const {
@@ -53,9 +54,10 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
   if (keyframes_.count(keyframe) != 0) {
     throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is in the map already");
   }
+  const std::vector<CloudPoint> inliers = removeOutliers(points, options_.outliers);
   std::vector<PlacedPoint> placed;
-  placed.reserve(points.size());
-  for (const CloudPoint& point : points) placed.push_back(place(point));
+  placed.reserve(inliers.size());
+  for (const CloudPoint& point : inliers) placed.push_back(place(point));
   // Stable: within a voxel, points are summed in the order in which they came.
   std::stable_sort(placed.begin(), placed.end(),
                    [](const PlacedPoint& a, const PlacedPoint& b) { return a.index < b.index; });

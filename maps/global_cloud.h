@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "maps/cloud_point.h"
+#include "maps/outlier_removal.h"
 
 namespace efm {
 
@@ -17,6 +18,8 @@ struct GlobalCloudOptions {
   double voxel_size_m = 0.01;
   /// Export what at least so many keyframes saw. Range: at least 1, which keeps everything.
   int min_keyframes = 1;
+  /// What of each keyframe stays outside.
+  OutlierRemovalOptions outliers = {};
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
@@ -38,11 +41,13 @@ class GlobalCloud {
   /// @throws std::invalid_argument where the options are not valid.
   explicit GlobalCloud(const GlobalCloudOptions& options = {});
 
-  /// Puts a keyframe's points into the map. Cost: that of sorting the points, whatever the size of
-  /// the map.
+  /// Puts a keyframe's points into the map, less the outliers among them: `removeOutliers` with
+  /// this map's options sees the keyframe alone. Cost: that of sorting the points, whatever the
+  /// size of the map.
   /// @param keyframe its number, by which it can be removed; in the map once.
-  /// @throws std::invalid_argument where the number is in the map, a point is not finite, has no
-  /// confidence above 0, or lies outside the range of voxel indices: nothing is inserted then.
+  /// @throws std::invalid_argument where the number is in the map, a point is not finite, or one
+  /// that is no outlier has no confidence above 0 or lies outside the range of voxel indices:
+  /// nothing is inserted then.
   void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points);
 
   /// Takes a keyframe out: the map is as if it had never been inserted, its memory is given back,

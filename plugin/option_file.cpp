@@ -305,6 +305,12 @@ const std::vector<OptionKey>& optionKeys() {
           "map"sv, "voxel_size_m"sv, [](auto& o) -> auto& { return o.cloud.voxel_size_m; }),
       option(
           "map"sv, "min_keyframes"sv, [](auto& o) -> auto& { return o.cloud.min_keyframes; }),
+      option(
+          "map"sv, "outlier_radius_m"sv,
+          [](auto& o) -> auto& { return o.cloud.outliers.outlier_radius_m; }),
+      option(
+          "map"sv, "outlier_min_neighbors"sv,
+          [](auto& o) -> auto& { return o.cloud.outliers.outlier_min_neighbors; }),
 
       option(
           "output"sv, "camera_maps"sv,

@@ -227,6 +227,23 @@ TEST(GlobalCloud, AKeyframeThatIsNotInTheMapCannotBeRemoved) {
   EXPECT_THROW(cloud.remove(4), std::invalid_argument);
 }
 
+TEST(GlobalCloud, OutliersOfAKeyframeStayOutsideEvenWhereAnotherKeyframeHasPoints) {
+  GlobalCloudOptions options;
+  options.voxel_size_m = 1.0;
+  options.outliers = {0.5, 1};
+  GlobalCloud cloud(options);
+  cloud.insert(0, {{{0.5, 0, 0}, 1.0F}, {{0.6, 0, 0}, 1.0F}, {{5.5, 0, 0}, 1.0F}});
+  cloud.insert(1, {{{5.5, 0, 0}, 1.0F}, {{5.6, 0, 0}, 1.0F}, {{0.5, 0, 0}, 1.0F}});
+
+  const std::vector<CloudPoint> points = cloud.points();
+
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_NEAR(points[0].p_world.x(), 0.55, 1e-15);
+  EXPECT_EQ(points[0].support, 1U);
+  EXPECT_NEAR(points[1].p_world.x(), 5.55, 1e-15);
+  EXPECT_EQ(points[1].support, 1U);
+}
+
 TEST(GlobalCloud, MillimetreVoxelsAThousandKilometresFromTheOriginStayApart) {
   const double far_m = 1e6;
   GlobalCloud cloud({0.001, 1});
@@ -281,6 +298,9 @@ TEST(GlobalCloudOptions, ValuesOutOfRangeAreNamed) {
   }
   options = {};
   options.min_keyframes = 0;
+  EXPECT_THROW(GlobalCloud{options}, std::invalid_argument);
+  options = {};
+  options.outliers.outlier_min_neighbors = 0;
   EXPECT_THROW(GlobalCloud{options}, std::invalid_argument);
 }
 
