@@ -6,9 +6,7 @@
 namespace efm {
 namespace {
 
-void appendPoints(const DepthMap& map, const KeyframeDepthMap& keyframe,
-                  std::vector<CloudPoint>& points) {
-  const ReferenceView& view = keyframe.view;
+void appendPoints(const DepthMap& map, const ReferenceView& view, std::vector<ViewPoint>& points) {
   const cv::Size size(view.width, view.height);
   if (map.depth.size() != size || map.confidence.size() != size) {
     throw std::invalid_argument("the keyframe's images are not of its view's size");
@@ -18,26 +16,43 @@ void appendPoints(const DepthMap& map, const KeyframeDepthMap& keyframe,
     const float* confidence_row = map.confidence[y];
     for (int x = 0; x < view.width; ++x) {
       if (!(depth_row[x] > 0) || !(confidence_row[x] > 0)) continue;
-      const Eigen::Vector3d p_ref = view.pointAt(x, y, depth_row[x]);
-      points.push_back({keyframe.T_world_ref * p_ref, confidence_row[x]});
+      points.push_back({view.pointAt(x, y, depth_row[x]).cast<float>(), confidence_row[x]});
     }
   }
 }
 
 }  // namespace
 
-std::vector<CloudPoint> keyframeCloud(const KeyframeDepthMap& keyframe) {
-  std::vector<CloudPoint> points;
-  appendPoints(keyframe.map, keyframe, points);
+std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe) {
+  std::vector<ViewPoint> points;
+  appendPoints(keyframe.map, keyframe.view, points);
   return points;
 }
 
-std::vector<CloudPoint> lateFusionCloud(const KeyframeDepthMap& keyframe) {
-  std::vector<CloudPoint> points;
+std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe) {
+  std::vector<ViewPoint> points;
   for (const CameraDepthMap& camera : keyframe.camera_maps) {
-    appendPoints(camera.map, keyframe, points);
+    appendPoints(camera.map, keyframe.view, points);
   }
   return points;
+}
+
+std::vector<CloudPoint> placedInWorld(const std::vector<ViewPoint>& points,
+                                      const Rigid3& T_world_ref) {
+  std::vector<CloudPoint> placed;
+  placed.reserve(points.size());
+  for (const ViewPoint& point : points) {
+    placed.push_back({T_world_ref * point.p_ref.cast<double>(), point.confidence});
+  }
+  return placed;
+}
+
+std::vector<CloudPoint> keyframeCloud(const KeyframeDepthMap& keyframe) {
+  return placedInWorld(viewPoints(keyframe), keyframe.T_world_ref);
+}
+
+std::vector<CloudPoint> lateFusionCloud(const KeyframeDepthMap& keyframe) {
+  return placedInWorld(lateFusionPoints(keyframe), keyframe.T_world_ref);
 }
 
 }  // namespace efm

@@ -34,6 +34,24 @@ TEST(KeyframeCloud, PointOfAPixelIsWorkedOutByHand) {
   EXPECT_EQ(points[0].support, 1U);
 }
 
+TEST(KeyframeCloud, IsThePointsOfTheViewPlacedInTheWorld) {
+  KeyframeDepthMap keyframe = smallKeyframe();
+  keyframe.map.depth = 1.1F;
+  keyframe.view.fx = 2.3;  // no coordinate is a float
+  keyframe.T_world_ref.rotation = Eigen::AngleAxisd(1, Eigen::Vector3d(1, 2, 3).normalized());
+  keyframe.T_world_ref.translation = {1e5, 2e5, 3e5};
+
+  const std::vector<ViewPoint> seen = viewPoints(keyframe);
+  const std::vector<CloudPoint> points = keyframeCloud(keyframe);
+
+  ASSERT_EQ(points.size(), 6U);
+  const std::vector<CloudPoint> placed = placedInWorld(seen, keyframe.T_world_ref);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(points[i].p_world, placed[i].p_world) << "bit for bit";
+    EXPECT_EQ(points[i].confidence, seen[i].confidence);
+  }
+}
+
 TEST(KeyframeCloud, PixelsWithoutDepthOrConfidenceGiveNoPoint) {
   KeyframeDepthMap keyframe = smallKeyframe();
   keyframe.map.depth(0, 0) = 1.0F;
