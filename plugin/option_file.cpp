@@ -353,8 +353,6 @@ std::string knownSections() {
   return known;
 }
 
-bool isSection(std::string_view section) { return !knownKeys(section).empty(); }
-
 // --- The text --------------------------------------------------------------------------------
 
 std::string joined(std::initializer_list<std::string_view> parts) {
@@ -363,9 +361,9 @@ std::string joined(std::initializer_list<std::string_view> parts) {
   return text;
 }
 
-/// Where an option stands: "rig.ini:3: [dsi] num_planes".
-std::string placeOf(std::string_view origin, std::string_view section, std::string_view key) {
-  return joined({origin, ": [", section, "] ", printable(key)});
+/// Where an option stands: "rig.ini:3: [dsi]".
+std::string placeOf(std::string_view origin, std::string_view section) {
+  return joined({origin, ": [", section, "]"});
 }
 
 [[noreturn]] void refuse(std::initializer_list<std::string_view> message) {
@@ -394,6 +392,8 @@ std::vector<NamedOption> listOptions(const EventFusionOptions& options) {
   }
   return list;
 }
+
+bool isOptionSection(std::string_view section) { return !knownKeys(section).empty(); }
 
 std::string textOf(const OptionValue& value) {
   if (const auto* flag = std::get_if<bool>(&value)) return *flag ? "true" : "false";
@@ -429,7 +429,7 @@ void OptionReader::readText(std::string_view text, const std::string& name) {
 
     if (line.front() == '[' && line.back() == ']') {
       section = trimmed(line.substr(1, line.size() - 2));
-      if (!isSection(section)) {
+      if (!isOptionSection(section)) {
         refuse({origin, ": unknown section [", printable(section), "]; known: ", knownSections()});
       }
       continue;
@@ -442,10 +442,10 @@ void OptionReader::readText(std::string_view text, const std::string& name) {
     const std::string key(trimmed(line.substr(0, equals)));
     const auto [first, is_new] = lines.emplace(std::make_pair(section, key), number);
     if (!is_new) {
-      refuse({placeOf(origin, section, key), ": given twice, first in line ",
+      refuse({placeOf(origin, section), " ", printable(key), ": given twice, first in line ",
               std::to_string(first->second)});
     }
-    assign(section, key, trimmed(line.substr(equals + 1)), origin);
+    assign(section, key, trimmed(line.substr(equals + 1)), placeOf(origin, section));
   }
 }
 
@@ -456,30 +456,35 @@ void OptionReader::set(std::string_view assignment) {
     refuse({"--set ", printable(assignment), ": expected section.key=value"});
   }
   const std::string_view section = trimmed(assignment.substr(0, dot));
-  if (!isSection(section)) {
+  if (!isOptionSection(section)) {
     refuse({"--set ", printable(assignment), ": unknown section [", printable(section),
             "]; known: ", knownSections()});
   }
   assign(section, trimmed(assignment.substr(dot + 1, equals - dot - 1)),
-         trimmed(assignment.substr(equals + 1)), "--set");
+         trimmed(assignment.substr(equals + 1)), placeOf("--set", section));
+}
+
+void OptionReader::set(std::string_view section, std::string_view key, std::string_view value,
+                       const std::string& place) {
+  if (!isOptionSection(section)) refuse({place, " unknown section; known: ", knownSections()});
+  assign(section, key, trimmed(withoutComment(value)), place);
 }
 
 void OptionReader::assign(std::string_view section, std::string_view key, std::string_view value,
-                          const std::string& origin) {
+                          const std::string& place) {
   const auto& keys = optionKeys();
   const auto entry = std::find_if(keys.begin(), keys.end(), [&](const OptionKey& candidate) {
     return candidate.section == section && candidate.key == key;
   });
-  const std::string place = placeOf(origin, section, key);
   if (entry == keys.end()) {
-    refuse({place, ": unknown key; known: ", knownKeys(section)});
+    refuse({place, " ", printable(key), ": unknown key; known: ", knownKeys(section)});
   }
   try {
     entry->read(options_, value);
   } catch (const std::invalid_argument& error) {
-    refuse({place, " = ", printable(value), ": ", error.what()});
+    refuse({place, " ", printable(key), " = ", printable(value), ": ", error.what()});
   }
-  origins_[{std::string(section), std::string(key)}] = origin;
+  places_[{std::string(section), std::string(key)}] = place;
 }
 
 EventFusionOptions OptionReader::options() const {
@@ -492,9 +497,9 @@ EventFusionOptions OptionReader::options() const {
     const std::string key = message.substr(0, message.find(" = "));
     for (const OptionKey& entry : optionKeys()) {
       if (entry.key != key) continue;
-      const auto origin = origins_.find({std::string(entry.section), key});
-      const std::string file = origin == origins_.end() ? "default" : origin->second;
-      refuse({file, ": [", entry.section, "] ", message});
+      const auto place = places_.find({std::string(entry.section), key});
+      refuse({place == places_.end() ? placeOf("default", entry.section) : place->second, " ",
+              message});
     }
     throw;
   }

@@ -36,6 +36,8 @@ struct NamedOption {
 /// All options, in the order of the table that files are read by, so that what is read, overridden
 /// and reported cannot differ.
 std::vector<NamedOption> listOptions(const EventFusionOptions& options);
+/// Whether an option file may have a section of this name.
+bool isOptionSection(std::string_view section);
 /// As a file has it: numbers with the fewest digits that read back the same.
 std::string textOf(const OptionValue& value);
 
@@ -43,10 +45,13 @@ std::string textOf(const OptionValue& value);
 /// error that names the file and line, the section, the key, the value and what was expected.
 /// (`mrpt::config::CConfigFile` reads "abc" as 0 and ignores unknown keys and missing files.)
 ///
-/// Keys that are not given keep their defaults. Comments start with ';', '#' or "//", at the start
+/// Keys that are not given keep what they were. Comments start with ';', '#' or "//", at the start
 /// of a line or after a blank.
 class OptionReader {
  public:
+  /// @param start what keys that are not given keep.
+  explicit OptionReader(const EventFusionOptions& start = {}) : options_(start) {}
+
   /// @throws std::runtime_error where the file cannot be read; std::invalid_argument at an unknown
   /// section or key, a key given twice, or a value of the wrong kind.
   void readFile(const std::filesystem::path& path);
@@ -55,16 +60,22 @@ class OptionReader {
   /// Overrides one option: "section.key=value". The last one counts.
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view assignment);
+  /// Sets one option that stands in a file of somebody else's, where its section has another name.
+  /// @param value up to a comment.
+  /// @param place what errors begin with: "host.ini, section mapper_dsi:".
+  /// @throws std::invalid_argument as `readFile` does.
+  void set(std::string_view section, std::string_view key, std::string_view value,
+           const std::string& place);
 
   /// @throws std::invalid_argument where a value is out of range.
   EventFusionOptions options() const;
 
  private:
   void assign(std::string_view section, std::string_view key, std::string_view value,
-              const std::string& origin);
+              const std::string& place);
 
   EventFusionOptions options_;
-  std::map<std::pair<std::string, std::string>, std::string> origins_;  // (section, key) -> where
+  std::map<std::pair<std::string, std::string>, std::string> places_;  // (section, key) -> where
 };
 
 }  // namespace efm

@@ -3,6 +3,7 @@
 
 #include <mrpt/rtti/CObject.h>
 
+#include "plugin/CEventFusionMap.h"
 #include "plugin/CEventFusionMapBuilder.h"
 #include "plugin/CObservationEvents.h"
 
@@ -12,6 +13,7 @@ void registerClasses() {
   // One line per class.
   for (const mrpt::rtti::TRuntimeClassId* id : {
            CLASS_ID(CObservationEvents),
+           CLASS_ID(CEventFusionMap),
            CLASS_ID(CEventFusionMapBuilder),
        }) {
     if (!mrpt::rtti::findRegisteredClass(id->className, false)) mrpt::rtti::registerClass(id);

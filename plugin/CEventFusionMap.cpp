@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/CEventFusionMap.h"
+
+#include <mrpt/img/color_maps.h>
+#include <mrpt/opengl/CPointCloudColoured.h>
+#include <mrpt/opengl/CSetOfObjects.h>
+#include <mrpt/poses/CPose3D.h>
+#include <mrpt/serialization/CArchive.h>
+
+#include <algorithm>
+#include <array>
+#include <ostream>
+#include <stdexcept>
+#include <string_view>
+
+#include "maps/point_cloud_file.h"
+#include "plugin/host_options.h"
+#include "plugin/mrpt_pose.h"
+
+MAP_DEFINITION_REGISTER("efm::CEventFusionMap,eventFusionMap", efm::CEventFusionMap)
+
+IMPLEMENTS_SERIALIZABLE(CEventFusionMap, CMetricMap, efm)
+
+namespace efm {
+namespace {
+
+/// What MRPT itself reads for every map, from a section of its own.
+void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::string& section) {
+  constexpr std::array<std::string_view, 3> kKnown = {
+      "enableSaveAs3DObject", "enableObservationLikelihood", "enableObservationInsertion"};
+  std::vector<std::string> keys;
+  source.getAllKeys(section, keys);
+  for (const std::string& key : keys) {
+    if (std::find(kKnown.begin(), kKnown.end(), key) != kKnown.end()) continue;
+    throw std::invalid_argument(placeIn(source, section) + " " + key + ": unknown key");
+  }
+}
+
+}  // namespace
+
+using mrpt::maps::CPointsMapXYZI;
+using mrpt::maps::CSimplePointsMap;
+using mrpt::serialization::CArchive;
+
+// --- From an .ini ----------------------------------------------------------------------------
+
+CEventFusionMap::TMapDefinition::TMapDefinition() = default;
+
+void CEventFusionMap::TMapDefinition::loadFromConfigFile_map_specific(
+    const mrpt::config::CConfigFileBase& source, const std::string& prefix) {
+  EventFusionOptions start;
+  start.cloud = options;
+  OptionReader reader(start);
+  for (const std::string& section : sectionsBelow(source, prefix)) {
+    if (section == prefix + "_insertOpts") {
+      readHostSection(source, section, "map", reader);
+    } else if (section == prefix + "_creationOpts") {
+      checkGenericKeys(source, section);
+    } else {
+      throw std::invalid_argument(placeIn(source, section) + " unknown section; known: " + prefix +
+                                  "_insertOpts, " + prefix + "_creationOpts");
+    }
+  }
+  options = reader.options().cloud;
+}
+
+void CEventFusionMap::TMapDefinition::dumpToTextStream_map_specific(std::ostream& out) const {
+  EventFusionOptions all;
+  all.cloud = options;
+  for (const NamedOption& option : listOptions(all)) {
+    if (option.section == "map") out << option.key << " = " << textOf(option.value) << "\n";
+  }
+}
+
+mrpt::maps::CMetricMap* CEventFusionMap::internal_CreateFromMapDefinition(
+    const mrpt::maps::TMetricMapInitializer& definition) {
+  // MRPT takes ownership of a plain pointer.
+  return new CEventFusionMap(dynamic_cast<const TMapDefinition&>(definition).options);
+}
+
+CEventFusionMap::CEventFusionMap(const GlobalCloudOptions& options) : cloud_(options) {}
+
+// --- In --------------------------------------------------------------------------------------
+
+void CEventFusionMap::insertKeyframe(const StoredKeyframe& keyframe) {
+  cloud_.insert(keyframes_.size(), worldPointsOf(keyframe));
+  keyframes_.push_back(keyframe);
+  simple_points_.reset();
+}
+
+bool CEventFusionMap::internal_insertObservation(
+    const mrpt::obs::CObservation& observation,
+    const std::optional<const mrpt::poses::CPose3D>& robot_pose) {
+  const Rigid3 T_world_rig = robot_pose ? rigidFrom(*robot_pose) : Rigid3{};
+  std::optional<StoredKeyframe> keyframe = keyframeFrom(observation, T_world_rig);
+  if (!keyframe) return false;
+  keyframe->points =
+      std::make_shared<CPointsMapXYZI>(*keyframe->points);  // the caller's may change
+  insertKeyframe(*keyframe);
+  return true;
+}
+
+void CEventFusionMap::internal_clear() {
+  keyframes_.clear();
+  cloud_ = GlobalCloud(cloud_.options());
+  simple_points_.reset();
+}
+
+bool CEventFusionMap::internal_canComputeObservationLikelihood(
+    const mrpt::obs::CObservation& /*observation*/) const {
+  return false;
+}
+
+double CEventFusionMap::internal_computeObservationLikelihood(
+    const mrpt::obs::CObservation& /*observation*/,
+    const mrpt::poses::CPose3D& /*taken_from*/) const {
+  return 0;
+}
+
+// --- Stored ----------------------------------------------------------------------------------
+
+std::uint8_t CEventFusionMap::serializeGetVersion() const { return 0; }
+
+void CEventFusionMap::serializeTo(CArchive& out) const {
+  out << genericMapParams << cloud_.options().voxel_size_m;
+  out.WriteAs<std::int32_t>(cloud_.options().min_keyframes);
+  out.WriteAs<std::uint32_t>(keyframes_.size());
+  for (const StoredKeyframe& keyframe : keyframes_) {
+    // Not as a pose of MRPT's, which would give the last digit another value.
+    const Eigen::Vector3d& t = keyframe.T_world_ref.translation;
+    const Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
+    out << keyframe.t_ref_ns << t.x() << t.y() << t.z() << q.x() << q.y() << q.z() << q.w()
+        << *keyframe.points;
+  }
+}
+
+void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
+  if (version != 0) {
+    throw std::runtime_error("an event fusion map of version " + std::to_string(version) +
+                             ": this program reads version 0");
+  }
+  GlobalCloudOptions options;
+  in >> genericMapParams >> options.voxel_size_m;
+  options.min_keyframes = in.ReadAs<std::int32_t>();
+  CEventFusionMap read(options);
+  const auto count = in.ReadAs<std::uint32_t>();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    StoredKeyframe keyframe;
+    Eigen::Vector3d& t = keyframe.T_world_ref.translation;
+    Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
+    in >> keyframe.t_ref_ns >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
+    keyframe.points = CPointsMapXYZI::Create();
+    in >> *keyframe.points;
+    read.insertKeyframe(keyframe);
+  }
+  keyframes_ = std::move(read.keyframes_);
+  cloud_ = std::move(read.cloud_);
+  simple_points_.reset();
+}
+
+// --- Shown -----------------------------------------------------------------------------------
+
+std::string CEventFusionMap::asString() const {
+  return "event fusion map of " + std::to_string(cloud_.keyframes()) + " keyframes in " +
+         std::to_string(cloud_.voxels()) + " voxels of " +
+         textOf(OptionValue(cloud_.options().voxel_size_m)) + " m";
+}
+
+void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
+  if (!genericMapParams.enableSaveAs3DObject) return;
+  const std::vector<CloudPoint> points = cloud_.points();
+  // A few points are confident beyond all others: the scale ends where a twentieth is above it.
+  std::vector<float> sorted;
+  for (const CloudPoint& point : points) sorted.push_back(point.confidence);
+  const std::size_t top = sorted.size() - sorted.size() / 20;
+  std::sort(sorted.begin(), sorted.end());
+  const float scale = sorted.empty() ? 1.0F : sorted[top > 0 ? top - 1 : 0];
+
+  auto drawn = mrpt::opengl::CPointCloudColoured::Create();
+  drawn->setPointSize(2);
+  drawn->reserve(points.size());
+  for (const CloudPoint& point : points) {
+    const Eigen::Vector3f p_world = point.p_world.cast<float>();
+    const mrpt::img::TColor colour =
+        mrpt::img::colormap(mrpt::img::cmJET, std::min(1.0F, point.confidence / scale));
+    drawn->insertPoint({p_world.x(), p_world.y(), p_world.z(), colour.R, colour.G, colour.B});
+  }
+  out.insert(drawn);
+}
+
+void CEventFusionMap::saveMetricMapRepresentationToFile(const std::string& prefix) const {
+  writePcd(prefix + ".pcd", cloud_.points());
+}
+
+const CSimplePointsMap* CEventFusionMap::getAsSimplePointsMap() const {
+  if (!simple_points_) {
+    simple_points_.emplace();
+    for (const CloudPoint& point : cloud_.points()) {
+      const Eigen::Vector3f p_world = point.p_world.cast<float>();
+      simple_points_->insertPointFast(p_world.x(), p_world.y(), p_world.z());
+    }
+    simple_points_->mark_as_modified();
+  }
+  return &*simple_points_;
+}
+
+}  // namespace efm
