@@ -160,9 +160,16 @@ void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
 
 // --- Shown -----------------------------------------------------------------------------------
 
+bool CEventFusionMap::isEmpty() const {
+  return std::all_of(keyframes_.begin(), keyframes_.end(),
+                     [](const StoredKeyframe& keyframe) { return keyframe.points->empty(); });
+}
+
 std::string CEventFusionMap::asString() const {
-  return "event fusion map of " + std::to_string(cloud_.keyframes()) + " keyframes in " +
-         std::to_string(cloud_.voxels()) + " voxels of " +
+  std::size_t points = 0;
+  for (const StoredKeyframe& keyframe : keyframes_) points += keyframe.points->size();
+  return "event fusion map of " + std::to_string(cloud_.keyframes()) + " keyframes with " +
+         std::to_string(points) + " points in voxels of " +
          textOf(OptionValue(cloud_.options().voxel_size_m)) + " m";
 }
 

@@ -43,7 +43,7 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
   const GlobalCloud& cloud() const { return cloud_; }
 
   /// Whether there is no point.
-  bool isEmpty() const override { return cloud_.voxels() == 0; }
+  bool isEmpty() const override;
   std::string asString() const override;
   /// The exported points, coloured by their confidence.
   void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;

@@ -3,7 +3,6 @@
 
 #include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
-#include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
@@ -17,6 +16,7 @@
 #include "maps/whole_file.h"
 #include "plugin/CObservationEvents.h"
 #include "plugin/depth_picture.h"
+#include "plugin/host_options.h"
 #include "plugin/mrpt_pose.h"
 #include "plugin/mrpt_time.h"
 
@@ -44,6 +44,12 @@ StampedPose poseOf(const mrpt::obs::CObservationRobotPose& observation) {
   const Rigid3 T_world_sensor = rigidFrom(observation.pose.mean);
   const Rigid3 T_rig_sensor = rigidFrom(observation.sensorPose);
   return {nanosecondsFrom(observation.timestamp), T_world_sensor * T_rig_sensor.inverse()};
+}
+
+void handOut(const std::vector<KeyframeDepthMap>& keyframes,
+             const CEventFusionMapBuilder::KeyframeTaker& taker) {
+  if (!taker) return;
+  for (const KeyframeDepthMap& keyframe : keyframes) taker(keyframe);
 }
 
 /// One point map of the exported points: MRPT's points are float32.
@@ -74,11 +80,11 @@ void CEventFusionMapBuilder::restart() {
   finished_ = false;
   ignored_observations_ = 0;
   newest_pose_.reset();
-  keyframe_poses_.clear();
+  keyframes_.clear();
   newest_depth_ = {};
   silent_cameras_.clear();
   metric_map_.maps.clear();
-  keyframes_in_metric_map_ = 0;
+  event_map_.reset();
 }
 
 void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_options) {
@@ -88,6 +94,11 @@ void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_option
   options_ = builder_options;
 
   restart();
+}
+
+EventFusionOptions CEventFusionMapBuilder::usedOptions() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return options_;
 }
 
 void CEventFusionMapBuilder::setKeyframeTaker(KeyframeTaker taker) {
@@ -112,18 +123,34 @@ void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>&
     } catch (...) {
       refusal = std::current_exception();  // what came before is mapped all the same
     }
-    keyframes = session_->mapDue(sink_);
-    for (const KeyframeDepthMap& keyframe : keyframes) {
-      keyframe_poses_.push_back({keyframe.window.t_ref_ns, keyframe.T_world_ref});
-      newest_depth_ = keyframe.map.depth;
-      warnOfSilence(keyframe);
-    }
+    keyframes = mapDue();
     taker = taker_;
   }
-  if (taker) {
-    for (const KeyframeDepthMap& keyframe : keyframes) taker(keyframe);
-  }
+  handOut(keyframes, taker);
   if (refusal) std::rethrow_exception(refusal);
+}
+
+void CEventFusionMapBuilder::mapWhenAsked() const {
+  auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: see the declaration
+  std::vector<KeyframeDepthMap> keyframes;
+  KeyframeTaker taker;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    session_->completeEarly();
+    keyframes = self->mapDue();
+    taker = taker_;
+  }
+  handOut(keyframes, taker);
+}
+
+std::vector<KeyframeDepthMap> CEventFusionMapBuilder::mapDue() {
+  std::vector<KeyframeDepthMap> keyframes = session_->mapDue(sink_);
+  for (const KeyframeDepthMap& keyframe : keyframes) {
+    keyframes_.push_back(storedKeyframe(keyframe, session_->pointsOf(keyframe)));
+    newest_depth_ = keyframe.map.depth;
+    warnOfSilence(keyframe);
+  }
+  return keyframes;
 }
 
 /// Once per camera: `status` counts the rest.
@@ -173,15 +200,31 @@ std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
   return session_->cloud().points();
 }
 
+// --- mrpt::config::CLoadableOptions ----------------------------------------------------------
+
+void CEventFusionMapBuilder::loadFromConfigFile(const mrpt::config::CConfigFileBase& source,
+                                                const std::string& prefix) {
+  OptionReader reader(usedOptions());
+  readHostOptions(source, prefix, reader);
+  setOptions(reader.options());
+}
+
+void CEventFusionMapBuilder::saveToConfigFile(mrpt::config::CConfigFileBase& target,
+                                              const std::string& prefix) const {
+  writeHostOptions(usedOptions(), prefix, target);
+}
+
 // --- mrpt::slam::CMetricMapBuilder -----------------------------------------------------------
 
 void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_map,
                                         const mrpt::poses::CPosePDF* /*x0*/) {
-  if (!initial_map.empty()) {
-    throw std::invalid_argument("CEventFusionMapBuilder cannot continue an earlier map");
-  }
+  std::vector<StoredKeyframe> earlier = keyframesOf(initial_map);
   const std::lock_guard<std::mutex> lock(mutex_);
+  auto session = std::make_unique<MappingSession>(options_);
+  for (const StoredKeyframe& keyframe : earlier) session->insertEarlier(worldPointsOf(keyframe));
   restart();
+  session_ = std::move(session);
+  keyframes_ = std::move(earlier);
 }
 
 mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() const {
@@ -199,39 +242,35 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
 }
 
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
+  mapWhenAsked();
   const std::lock_guard<std::mutex> lock(mutex_);
   out_map.clear();
-  for (const StampedPose& keyframe : keyframe_poses_) {
-    auto pose = mrpt::poses::CPose3DPDFGaussian::Create();
-    pose->mean = mrptPoseFrom(keyframe.T_world_rig);
-    auto comment = mrpt::obs::CObservationComment::Create();
-    comment->timestamp = mrptTimeFrom(keyframe.t_ns);
-    comment->sensorLabel = "keyframe";
-    comment->text = "keyframe at " + formatSeconds(keyframe.t_ns) + " s";
-    auto frame = mrpt::obs::CSensoryFrame::Create();
-    frame->insert(comment);
-    out_map.insert(pose, frame);
-  }
+  for (const StoredKeyframe& keyframe : keyframes_) insertInto(out_map, keyframe);
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
+  mapWhenAsked();
   const std::lock_guard<std::mutex> lock(mutex_);
-  return static_cast<unsigned int>(keyframe_poses_.size());
+  return static_cast<unsigned int>(keyframes_.size());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
+  mapWhenAsked();
   const std::lock_guard<std::mutex> lock(mutex_);
-  const std::size_t keyframes = session_->cloud().keyframes();
-  if (metric_map_.maps.empty() || keyframes != keyframes_in_metric_map_) {
+  if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(options_.cloud);
+  std::size_t known = event_map_->keyframes().size();
+  if (metric_map_.maps.empty() || known != keyframes_.size()) {
+    for (; known < keyframes_.size(); ++known) event_map_->insertKeyframe(keyframes_[known]);
     metric_map_.maps.clear();
-    metric_map_.maps.push_back(pointsMapOf(session_->cloud().points()));
-    keyframes_in_metric_map_ = keyframes;
+    metric_map_.maps.push_back(event_map_);
+    metric_map_.maps.push_back(pointsMapOf(event_map_->cloud().points()));
   }
   return &metric_map_;
 }
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
+  mapWhenAsked();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (newest_depth_.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(newest_depth_, options_.mapper.keyframe.planes);

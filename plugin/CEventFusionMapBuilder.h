@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <mrpt/config/CLoadableOptions.h>
 #include <mrpt/obs/CObservation.h>
 #include <mrpt/rtti/CObject.h>
 #include <mrpt/slam/CMetricMapBuilder.h>
@@ -15,8 +16,10 @@
 #include <vector>
 
 #include "maps/cloud_point.h"
+#include "plugin/CEventFusionMap.h"
 #include "plugin/mapping_session.h"
 #include "plugin/option_file.h"
+#include "plugin/stored_keyframe.h"
 
 namespace efm {
 
@@ -26,15 +29,24 @@ namespace efm {
 /// observations, same map, bit for bit.
 ///
 /// The rig is complete once a second of events has been seen: nothing is mapped until then, and a
-/// camera that first appears later is an error.
+/// camera that first appears later is an error. Who asks for the map completes the rig after a
+/// tenth of a second, so that a short recording becomes a map without `finish`.
+///
+/// A program that has MRPT alone makes the builder by its name, gives it options as a
+/// CLoadableOptions and uses it as a CMetricMapBuilder. Asking for the map maps every window that
+/// is covered by then; what only `finish` can know, that nothing more will come, matters for a
+/// window that ends in the recording's last 10 ms, where its packets do not say what they cover.
 ///
 /// Thread-safe: one mutex. `processObservation` returns after mapping what became due.
-class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder, public mrpt::rtti::CObject {
+class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
+                               public mrpt::config::CLoadableOptions,
+                               public mrpt::rtti::CObject {
   DEFINE_MRPT_OBJECT(CEventFusionMapBuilder, efm)
 
  public:
-  /// Receives each keyframe once, after it went into the map, by the thread that fed the builder,
-  /// which may use the builder. In the order of their windows where one thread feeds.
+  /// Receives each keyframe once, after it went into the map, by the thread that fed the builder or
+  /// asked it for the map, and which may use the builder. In the order of their windows where one
+  /// thread feeds.
   using KeyframeTaker = std::function<void(const KeyframeDepthMap&)>;
 
   /// @throws std::invalid_argument where the options are not valid.
@@ -44,6 +56,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder, public mrpt
   /// Starts over with other options.
   /// @throws std::invalid_argument where the options are not valid; nothing changes then.
   void setOptions(const EventFusionOptions& builder_options);
+  EventFusionOptions usedOptions() const;
   void setKeyframeTaker(KeyframeTaker taker);
   /// Receives every fused plane of every keyframe; not owned, may be null.
   void setDsiSink(DsiSink* sink);
@@ -62,8 +75,20 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder, public mrpt
   /// The exported points of the global cloud.
   std::vector<CloudPoint> points() const;
 
-  /// Starts over with the same options. The pose does not matter: poses come from outside.
-  /// @throws std::invalid_argument where the initial map is not empty, which cannot be continued.
+  /// Reads the sections "[<prefix>_dsi]", "[<prefix>_map]" ..., or "[dsi]", "[map]" ... where the
+  /// prefix is empty, and starts over; see plugin/host_options.h. Keys that are not given keep what
+  /// they were.
+  /// @throws std::invalid_argument naming the file, section, key and value; std::runtime_error
+  /// where the file is missing. Nothing changes then.
+  void loadFromConfigFile(const mrpt::config::CConfigFileBase& source,
+                          const std::string& prefix) override;
+  /// Writes all options to the sections that `loadFromConfigFile` reads.
+  void saveToConfigFile(mrpt::config::CConfigFileBase& target,
+                        const std::string& prefix) const override;
+
+  /// Starts over with the same options. An initial map is one that `getCurrentlyBuiltMap` gave: its
+  /// keyframes are the first of the new map. The pose does not matter: poses come from outside.
+  /// @throws std::invalid_argument where a frame of the initial map is no keyframe.
   void initialize(const mrpt::maps::CSimpleMap& initial_map = mrpt::maps::CSimpleMap(),
                   const mrpt::poses::CPosePDF* x0 = nullptr) override;
   /// The newest pose of the rig that came in, without covariance; the identity before the first.
@@ -71,12 +96,14 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder, public mrpt
   /// Processes each observation of the frame; the action says nothing that is used.
   void processActionObservation(mrpt::obs::CActionCollection& action,
                                 mrpt::obs::CSensoryFrame& observations) override;
-  /// One entry per keyframe: the pose of its reference view, and a frame that says its time.
+  /// One entry per keyframe: the pose of its reference view, and a frame that holds its cloud; see
+  /// `insertInto` in plugin/stored_keyframe.h. The clouds are the builder's own: not to be changed.
   void getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const override;
   /// The number of keyframes.
   unsigned int getCurrentlyBuiltMapSize() override;
-  /// Holds one CPointsMapXYZI: the exported points. Belongs to the builder and changes with the
-  /// next call of this function; cost: that of the whole map where it grew.
+  /// Holds a CEventFusionMap and, for programs that know MRPT's classes alone, its exported points
+  /// as a CPointsMapXYZI. Belongs to the builder and changes with the next call of this function;
+  /// cost: that of exporting the whole map where it grew.
   const mrpt::maps::CMultiMetricMap* getCurrentlyBuiltMetricMap() const override;
   /// The picture of the newest keyframe's depth map, in the format of the file's extension.
   /// @throws std::logic_error before the first keyframe; std::runtime_error naming the file.
@@ -85,9 +112,14 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder, public mrpt
  private:
   void restart();
   void warnOfSilence(const KeyframeDepthMap& keyframe);
-  /// Feeds the session under the lock, then hands out the keyframes that became due. What `feed`
-  /// throws goes to the caller at the end.
+  /// Feeds the session under the lock, then maps and hands out what became due. What `feed` throws
+  /// goes to the caller at the end.
   void advance(const std::function<void(MappingSession&)>& feed);
+  /// Under the lock: maps what is due.
+  std::vector<KeyframeDepthMap> mapDue();
+  /// Maps what is due for somebody who asks for the map. Const as MRPT has those who ask: what is
+  /// asked for is the map of what came in, which mapping it does not change.
+  void mapWhenAsked() const;
 
   mutable std::mutex mutex_;  // of everything below
   EventFusionOptions options_;
@@ -98,11 +130,11 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder, public mrpt
   bool finished_ = false;
   std::uint64_t ignored_observations_ = 0;
   std::optional<StampedPose> newest_pose_;
-  std::vector<StampedPose> keyframe_poses_;  // T_world_ref
-  cv::Mat1f newest_depth_;                   // of the newest keyframe
-  std::set<int> silent_cameras_;             // that were warned of
+  std::vector<StoredKeyframe> keyframes_;
+  cv::Mat1f newest_depth_;        // of the newest keyframe
+  std::set<int> silent_cameras_;  // that were warned of
   mutable mrpt::maps::CMultiMetricMap metric_map_;
-  mutable std::size_t keyframes_in_metric_map_ = 0;
+  mutable CEventFusionMap::Ptr event_map_;  // in metric_map_
 };
 
 }  // namespace efm

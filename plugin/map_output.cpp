@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/map_output.h"
 
+#include <mrpt/maps/CSimpleMap.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -25,7 +27,8 @@ namespace {
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
-constexpr std::array<std::string_view, 3> kMapFiles = {"map.pcd", "trajectory.txt", "report.json"};
+constexpr std::array<std::string_view, 4> kMapFiles = {"map.pcd", "map.simplemap", "trajectory.txt",
+                                                       "report.json"};
 constexpr std::array<std::string_view, 3> kDepthFiles = {"points.pcd", "dsi.npy", "report.json"};
 
 void makeFolder(const std::filesystem::path& folder) {
@@ -176,6 +179,15 @@ void MapOutput::writeTrajectory() {
 void MapOutput::writeCloud(const std::string& name, const std::vector<CloudPoint>& points) {
   removeEarlier();
   writePcd(folder_ / name, points);
+}
+
+void MapOutput::writeSimplemap(const mrpt::maps::CSimpleMap& map) {
+  removeEarlier();
+  writeWhole(folder_ / "map.simplemap", [&](const std::filesystem::path& temporary) {
+    if (!map.saveToFile(temporary.string())) {
+      throw std::runtime_error("the file cannot be created or the disk is full");
+    }
+  });
 }
 
 void MapOutput::writeReport(const std::string& json) {

@@ -10,18 +10,22 @@
 #include "mapping/trajectory.h"
 #include "maps/cloud_point.h"
 
+namespace mrpt::maps {
+class CSimpleMap;
+}
+
 namespace efm {
 
 /// Whose files a folder receives; each kind replaces its own alone.
 enum class OutputKind {
-  kMap,    ///< map.pcd, trajectory.txt, report.json, keyframes/<t_ref>/ with images
+  kMap,    ///< map.pcd, map.simplemap, trajectory.txt, report.json, keyframes/<t_ref>/ with images
   kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
 };
 
 /// The folder that a map is written to. Files appear under their names only when they are complete;
 /// where one cannot be written, an error names it (std::runtime_error).
 ///
-///     map.pcd  trajectory.txt  report.json
+///     map.pcd  map.simplemap  trajectory.txt  report.json
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
 ///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   where the keyframe has them
 class MapOutput {
@@ -40,6 +44,8 @@ class MapOutput {
   void writeTrajectory();
   /// @param name "map.pcd" or "points.pcd".
   void writeCloud(const std::string& name, const std::vector<CloudPoint>& points);
+  /// Writes map.simplemap: the keyframes' clouds and poses, as MRPT has them.
+  void writeSimplemap(const mrpt::maps::CSimpleMap& map);
   void writeReport(const std::string& json);
 
   const std::filesystem::path& folder() const { return folder_; }

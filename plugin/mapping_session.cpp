@@ -7,13 +7,15 @@
 
 #include "mapping/option_check.h"
 #include "mapping/timestamp.h"
-#include "maps/keyframe_cloud.h"
 
 namespace efm {
 namespace {
 
 /// How long after the recording's first event cameras may first appear.
 constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
+/// The same where somebody asks for the map: longer than a packet, so that each camera has sent
+/// one.
+constexpr std::int64_t kRigCompletesEarlyNs = kNanosecondsPerSecond / 10;
 
 bool sameCalibration(const RigCamera& a, const RigCamera& b) {
   return a.model == b.model && a.T_rig_cam.translation == b.T_rig_cam.translation &&
@@ -131,6 +133,16 @@ void MappingSession::addPose(const StampedPose& pose) {
   extend(status_.poses, pose.t_ns);
 }
 
+void MappingSession::insertEarlier(const std::vector<CloudPoint>& points) {
+  cloud_.insert(cloud_.keyframes(), points);
+}
+
+void MappingSession::completeEarly() {
+  const std::optional<TimeSpan>& span = status_.events;
+  if (!waiting_.empty() || !span || span->last_ns - span->first_ns < kRigCompletesEarlyNs) return;
+  completeRig();
+}
+
 void MappingSession::finish() {
   mapper_.finish();
   completeRig();
@@ -147,14 +159,17 @@ std::vector<KeyframeDepthMap> MappingSession::mapDue(DsiSink* sink) {
   StageTimer timer(status_.seconds);
   while (auto keyframe = mapper_.next(sink, &timer)) {
     const SecondsScope scope(status_.seconds.map);
-    cloud_.insert(cloud_.keyframes(),
-                  options_.late_fusion ? lateFusionCloud(*keyframe) : keyframeCloud(*keyframe));
+    cloud_.insert(cloud_.keyframes(), placedInWorld(pointsOf(*keyframe), keyframe->T_world_ref));
     for (const int camera : keyframe->silent_cameras) {
       ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
     }
     keyframes.push_back(std::move(*keyframe));
   }
   return keyframes;
+}
+
+std::vector<ViewPoint> MappingSession::pointsOf(const KeyframeDepthMap& keyframe) const {
+  return options_.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe);
 }
 
 SessionStatus MappingSession::status() const {

@@ -8,6 +8,7 @@
 
 #include "mapping/fusion_mapper.h"
 #include "maps/global_cloud.h"
+#include "maps/keyframe_cloud.h"
 #include "plugin/option_file.h"
 #include "plugin/stage_timer.h"
 
@@ -53,6 +54,13 @@ class MappingSession {
   void addEvents(CameraPacket packet);
   /// @throws std::invalid_argument where the pose is not finite.
   void addPose(const StampedPose& pose);
+  /// Puts a keyframe of an earlier map into the cloud, before those to come.
+  /// @throws std::invalid_argument as GlobalCloud::insert does.
+  void insertEarlier(const std::vector<CloudPoint>& points);
+  /// Somebody asks for the map: takes the rig to be complete where a tenth of a second of events
+  /// has been seen, so that a short recording need not be finished to be mapped.
+  /// @throws std::invalid_argument where the options name a camera that the rig does not have.
+  void completeEarly();
   /// No more will come.
   /// @throws std::invalid_argument where a camera's events came but none of one before it: what can
   /// be mapped without can be mapped all the same.
@@ -61,6 +69,9 @@ class MappingSession {
   /// Maps the windows that are covered and puts them into the cloud.
   /// @param sink receives every fused plane where given.
   std::vector<KeyframeDepthMap> mapDue(DsiSink* sink = nullptr);
+
+  /// The points that a keyframe has in the cloud: of its fused map, or by option of its cameras'.
+  std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;
 
   const GlobalCloud& cloud() const { return cloud_; }
   SessionStatus status() const;

@@ -16,8 +16,8 @@ namespace efm {
 using mrpt::maps::CPointsMapXYZI;
 using mrpt::obs::CObservationPointCloud;
 
-StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe) {
-  const std::vector<ViewPoint> points = viewPoints(keyframe);
+StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
+                              const std::vector<ViewPoint>& points) {
   auto cloud = CPointsMapXYZI::Create();
   cloud->resize(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {

@@ -24,7 +24,9 @@ struct StoredKeyframe {
   mrpt::maps::CPointsMapXYZI::Ptr points;
 };
 
-StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe);
+/// @param points the keyframe's, as they went into the map.
+StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
+                              const std::vector<ViewPoint>& points);
 
 /// The points of a cloud that weigh something. MRPT's clouds may hold points of intensity 0.
 std::vector<ViewPoint> viewPointsOf(const mrpt::maps::CPointsMapXYZI& cloud);

@@ -70,6 +70,7 @@ int runMap(const MapArguments& arguments) {
     if (outcome.report.counts.keyframes > 0) {
       const SecondsScope map(outcome.report.seconds.map);
       output->writeCloud("map.pcd", outcome.points);
+      output->writeSimplemap(outcome.keyframes);
       output->writeTrajectory();
     }
   }

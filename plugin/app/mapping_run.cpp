@@ -155,6 +155,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   {
     const SecondsScope scope(outcome.report.seconds.map);
     outcome.points = player.builder().points();
+    player.builder().getCurrentlyBuiltMap(outcome.keyframes);
   }
   outcome.report.points = outcome.points.size();
   outcome.warnings = warningsOf(status, job.options.mapper.keyframe.exclude_silent);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <mrpt/maps/CSimpleMap.h>
+
 #include <functional>
 #include <optional>
 #include <string>
@@ -30,6 +32,7 @@ struct MappingJob {
 struct MappingOutcome {
   MapReport report;  ///< Without the total of seconds.
   std::vector<CloudPoint> points;
+  mrpt::maps::CSimpleMap keyframes;  ///< Their clouds and poses.
   /// What was odd about the input, though it was mapped: one line each.
   std::vector<std::string> warnings;
   /// Why the recording was not read to its end or gave no keyframe.

@@ -126,7 +126,9 @@ TEST(CEventFusionMapBuilder, GivesMrptItsMaps) {
   builder.finish();
 
   const auto* metric = builder.getCurrentlyBuiltMetricMap();
-  ASSERT_EQ(metric->maps.size(), 1U);
+  const auto event_map = metric->mapByClass<CEventFusionMap>();
+  ASSERT_TRUE(event_map);
+  expectSameBits(event_map->cloud().points(), builder.points());
   const auto map = metric->mapByClass<mrpt::maps::CPointsMapXYZI>();
   ASSERT_TRUE(map);
   const auto points = builder.points();

@@ -99,8 +99,9 @@ TEST_F(MapCommand, WritesTheFilesOfTheContract) {
   EXPECT_THAT(result.err, IsEmpty()) << "quiet when not on a terminal";
   EXPECT_THAT(result.out, AllOf(HasSubstr("3 keyframes"), HasSubstr("out")));
   const auto files = filesIn("out");
-  EXPECT_EQ(files.size(), 3U + 3 * 4) << testing::PrintToString(files);
-  EXPECT_THAT(files, testing::IsSupersetOf({"map.pcd", "report.json", "trajectory.txt"}));
+  EXPECT_EQ(files.size(), 4U + 3 * 4) << testing::PrintToString(files);
+  EXPECT_THAT(files,
+              testing::IsSupersetOf({"map.pcd", "map.simplemap", "report.json", "trajectory.txt"}));
   const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
   ASSERT_EQ(poses.size(), 3U);
   for (const StampedPose& pose : poses) {

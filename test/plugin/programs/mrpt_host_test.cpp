@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A program that has MRPT alone (mrpt_host.cpp) maps a rawlog with the plugin.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "test/plugin/programs/pcd_points.h"
+#include "test/plugin/programs/program_test.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class MrptHost : public ProgramTest {
+ protected:
+  Result host(const std::string& prefix) const {
+    return run("'" EFM_MRPT_HOST "' '" EFM_PLUGIN "' host.ini '" + prefix + "' data.rawlog saved");
+  }
+
+  void expectTheMapOfEventFusion() const {
+    const auto expected = pointsOfPcd(folder() / "out" / "map.pcd");
+    std::istringstream text(contentOf("saved.txt"));
+    std::size_t count = 0;
+    for (float x = 0, y = 0, z = 0, confidence = 0; text >> x >> y >> z >> confidence; ++count) {
+      ASSERT_LT(count, expected.size());
+      EXPECT_NEAR(x, expected[count].x, 1e-5);
+      EXPECT_NEAR(y, expected[count].y, 1e-5);
+      EXPECT_NEAR(z, expected[count].z, 1e-5);
+      EXPECT_NEAR(confidence, expected[count].intensity, 1e-5 * expected[count].intensity);
+    }
+    EXPECT_EQ(count, expected.size());
+  }
+};
+
+TEST_F(MrptHost, MapsARecordingShorterThanASecond) {
+  importRecording(SyntheticRecording());
+  map(syntheticOptions());
+  write("host.ini", "[camera]\nfps = abc\n" + optionText(syntheticOptions(), "mapper_"));
+
+  const Result result = host("mapper");
+
+  ASSERT_EQ(result.status, 0) << result.out;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("3 keyframes"), HasSubstr("event fusion map")));
+  EXPECT_GT(file_size(folder() / "saved.simplemap"), 1000U);
+  expectTheMapOfEventFusion();
+}
+
+TEST_F(MrptHost, MapsAllOfALongerRecording) {
+  importRecording(SyntheticRecording(1.5));
+  map(syntheticOptions());
+  write("host.ini", optionText(syntheticOptions()));
+
+  const Result result = host("");
+
+  ASSERT_EQ(result.status, 0) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("13 keyframes"));
+  expectTheMapOfEventFusion();
+}
+
+TEST_F(MrptHost, IsToldWhatIsWrongInItsFile) {
+  importRecording(SyntheticRecording());
+  write("host.ini", "[mapper_dsi]\nnum_planes = abc\n");
+  EXPECT_THAT(host("mapper").out,
+              HasSubstr("host.ini, section mapper_dsi: num_planes = abc: must be"));
+  write("host.ini", "[mapper_dsy]\nnum_planes = 100\n");
+  EXPECT_THAT(host("mapper").out, HasSubstr("host.ini, section mapper_dsy: unknown section"));
+}
+
+}  // namespace
+}  // namespace efm

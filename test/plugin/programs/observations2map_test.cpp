@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// MRPT's observations2map builds our map from the simplemap that `event-fusion map` wrote.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "test/plugin/programs/pcd_points.h"
+#include "test/plugin/programs/program_test.h"
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+
+class Observations2map : public ProgramTest {
+ protected:
+  void SetUp() override {
+    if (!isInstalled("observations2map")) GTEST_SKIP() << "observations2map is not installed";
+    importRecording(SyntheticRecording());
+    map(syntheticOptions());
+  }
+
+  Result build(const std::string& insert_options) const {
+    write("map.ini",
+          "[MappingApplication]\neventFusionMap_count = 1\n"
+          "[MappingApplication_eventFusionMap_00_insertOpts]\n" +
+              insert_options);
+    return runWithPlugin("observations2map map.ini out/map.simplemap built");
+  }
+};
+
+TEST_F(Observations2map, BuildsTheMapThatEventFusionWrote) {
+  const Result result = build("voxel_size_m = 0.01\n");
+  ASSERT_EQ(result.status, 0) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("3 observations"));
+
+  const auto expected = pointsOfPcd(folder() / "out" / "map.pcd");
+  const auto built = pointsOfPcd(folder() / "built_efm__CEventFusionMap_00.pcd");
+  ASSERT_GT(expected.size(), 30U);
+  ASSERT_EQ(built.size(), expected.size());
+  for (std::size_t i = 0; i < built.size(); ++i) {
+    EXPECT_LT((built[i].getVector3fMap() - expected[i].getVector3fMap()).norm(), 1e-6);
+    EXPECT_EQ(built[i].intensity, expected[i].intensity);
+  }
+}
+
+TEST_F(Observations2map, TakesOptionsAndRefusesWrongOnes) {
+  EXPECT_EQ(build("voxel_size_m = 0.5\n").status, 0);
+  EXPECT_LT(pointsOfPcd(folder() / "built_efm__CEventFusionMap_00.pcd").size(),
+            pointsOfPcd(folder() / "out" / "map.pcd").size());
+
+  const Result refused = build("voxel_size_m = abc\n");
+  EXPECT_NE(refused.status, 0);
+  EXPECT_THAT(refused.out,
+              HasSubstr("map.ini, section MappingApplication_eventFusionMap_00_insertOpts: "
+                        "voxel_size_m = abc: must be a number"));
+}
+
+}  // namespace
+}  // namespace efm
