@@ -1,47 +1,56 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/point_cloud_file.h"
 
-#include <pcl/io/pcd_io.h>
-#include <pcl/point_types.h>
-
+#include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <stdexcept>
+#include <string>
 
+#include "mapping/quoted_text.h"
+#include "maps/pcd_file.h"
+#include "maps/ply_file.h"
 #include "maps/whole_file.h"
 
 namespace efm {
 namespace {
 
-pcl::PointCloud<pcl::PointXYZI> asPclCloud(const std::vector<CloudPoint>& points) {
-  pcl::PointCloud<pcl::PointXYZI> cloud;
-  cloud.reserve(points.size());
-  for (const CloudPoint& point : points) {
-    pcl::PointXYZI p;
-    p.getVector3fMap() = point.p_world.cast<float>();
-    p.intensity = point.confidence;
-    cloud.push_back(p);
-  }
-  return cloud;
+enum class Format { kPcd, kPly };
+
+Format formatOf(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  if (extension == ".pcd") return Format::kPcd;
+  if (extension == ".ply") return Format::kPly;
+  throw std::runtime_error("extension " + inQuotes(extension) + ": expected .pcd or .ply");
 }
 
-/// The writer refuses an empty cloud, but an empty map is a map.
-void writeHeaderOnly(const std::filesystem::path& path,
-                     const pcl::PointCloud<pcl::PointXYZI>& cloud) {
+void writeFile(const std::filesystem::path& path, Format format,
+               const std::vector<CloudPoint>& points, PointCloudEncoding encoding) {
   std::ofstream file(path, std::ios::binary);
-  file << pcl::PCDWriter::generateHeader(cloud) << "DATA binary\n";
+  if (format == Format::kPcd) {
+    writePcdTo(file, points, encoding);
+  } else {
+    writePlyTo(file, points, encoding);
+  }
   file.close();
   if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
 }
 
 }  // namespace
 
-void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& points) {
-  const pcl::PointCloud<pcl::PointXYZI> cloud = asPclCloud(points);
+void writePointCloud(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
+                     PointCloudEncoding encoding) {
   writeWhole(path, [&](const std::filesystem::path& temporary) {
-    if (cloud.empty()) return writeHeaderOnly(temporary, cloud);
-    if (pcl::PCDWriter().writeBinary(temporary.string(), cloud) != 0) {
-      throw std::runtime_error("the PCD writer failed");
-    }
+    writeFile(temporary, formatOf(path), points, encoding);
+  });
+}
+
+void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
+              PointCloudEncoding encoding) {
+  writeWhole(path, [&](const std::filesystem::path& temporary) {
+    writeFile(temporary, Format::kPcd, points, encoding);
   });
 }
 

@@ -4,15 +4,36 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pcl/io/pcd_io.h>
+#include <pcl/io/ply_io.h>
 #include <pcl/point_types.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
+
+#include "maps/whole_file.h"
 
 namespace efm {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
+
+/// What we write: extension and encoding.
+struct Kind {
+  const char* name;
+  PointCloudEncoding encoding;
+};
+const std::vector<Kind> kKinds = {
+    {"binary.pcd", PointCloudEncoding::kBinary},
+    {"text.pcd", PointCloudEncoding::kAscii},
+    {"compressed.pcd", PointCloudEncoding::kCompressed},
+    {"binary.ply", PointCloudEncoding::kBinary},
+    {"text.ply", PointCloudEncoding::kAscii},
+};
+
+bool isPly(const std::filesystem::path& path) { return path.extension() == ".ply"; }
 
 class PointCloudFile : public testing::Test {
  protected:
@@ -33,38 +54,83 @@ class PointCloudFile : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(PointCloudFile, IsReadBackByPclAsItWas) {
+std::vector<CloudPoint> plainPoints() {
   std::vector<CloudPoint> points;
-  for (int i = 0; i < 1000; ++i) points.push_back({{i * 0.125, -i * 0.25, 3.5}, i * 0.5F + 1});
+  points.reserve(1000);
+  for (int i = 0; i < 1000; ++i) points.push_back({{i * 0.1, -i / 3.0, 3.5}, i * 0.7F + 1});
+  return points;
+}
 
-  writePcd(folder_ / "map.pcd", points);
+TEST_F(PointCloudFile, IsReadBackByPclAsItWas) {
+  const std::vector<CloudPoint> points = plainPoints();
+  for (const Kind& kind : kKinds) {
+    SCOPED_TRACE(kind.name);
+    const std::filesystem::path path = folder_ / kind.name;
+    writePointCloud(path, points, kind.encoding);
 
-  pcl::PointCloud<pcl::PointXYZI> cloud;
-  ASSERT_EQ(pcl::io::loadPCDFile((folder_ / "map.pcd").string(), cloud), 0);
-  ASSERT_EQ(cloud.size(), points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    EXPECT_EQ(cloud[i].x, static_cast<float>(points[i].p_world.x()));
-    EXPECT_EQ(cloud[i].y, static_cast<float>(points[i].p_world.y()));
-    EXPECT_EQ(cloud[i].z, static_cast<float>(points[i].p_world.z()));
-    EXPECT_EQ(cloud[i].intensity, points[i].confidence);
+    pcl::PointCloud<pcl::PointXYZI> cloud;
+    ASSERT_EQ(isPly(path) ? pcl::io::loadPLYFile(path.string(), cloud)
+                          : pcl::io::loadPCDFile(path.string(), cloud),
+              0);
+    ASSERT_EQ(cloud.size(), points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(cloud[i].x, static_cast<float>(points[i].p_world.x()));
+      EXPECT_EQ(cloud[i].y, static_cast<float>(points[i].p_world.y()));
+      EXPECT_EQ(cloud[i].z, static_cast<float>(points[i].p_world.z()));
+      EXPECT_EQ(cloud[i].intensity, points[i].confidence);
+    }
   }
-  EXPECT_EQ(filesInFolder(), 1U) << "a temporary file stayed";
+  EXPECT_EQ(filesInFolder(), kKinds.size()) << "a temporary file stayed";
 }
 
 TEST_F(PointCloudFile, OfNoPointsIsAFileOfNoPoints) {
-  writePcd(folder_ / "map.pcd", {});
+  for (const Kind& kind : kKinds) {
+    SCOPED_TRACE(kind.name);
+    const std::filesystem::path path = folder_ / kind.name;
+    writePointCloud(path, {}, kind.encoding);
 
-  pcl::PCLPointCloud2 cloud;
-  Eigen::Vector4f origin;
-  Eigen::Quaternionf orientation;
-  int version = 0;
-  int type = 0;
-  unsigned int offset = 0;
-  EXPECT_GE(pcl::PCDReader().readHeader((folder_ / "map.pcd").string(), cloud, origin, orientation,
-                                        version, type, offset),
-            0);
-  EXPECT_EQ(cloud.width * cloud.height, 0U);
-  EXPECT_EQ(cloud.fields.size(), 4U);
+    pcl::PCLPointCloud2 cloud;
+    ASSERT_EQ(isPly(path) ? pcl::PLYReader().read(path.string(), cloud)
+                          : pcl::PCDReader().read(path.string(), cloud),
+              0);
+    EXPECT_EQ(cloud.width * cloud.height, 0U);
+    EXPECT_EQ(cloud.fields.size(), 4U);
+  }
+}
+
+TEST_F(PointCloudFile, OfAnUnknownFormatOrEncodingIsNotWritten) {
+  const auto refusal = [this](const char* name, PointCloudEncoding encoding) -> std::string {
+    try {
+      writePointCloud(folder_ / name, {{{1, 2, 3}, 1.0F}}, encoding);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(refusal("map.las", PointCloudEncoding::kBinary),
+              AllOf(HasSubstr("map.las"), HasSubstr("expected .pcd or .ply")));
+  EXPECT_THAT(refusal("map", PointCloudEncoding::kBinary), HasSubstr("expected .pcd or .ply"));
+  EXPECT_THAT(refusal("map.ply", PointCloudEncoding::kCompressed),
+              HasSubstr("compressed PLY: expected binary or ASCII"));
+  EXPECT_EQ(refusal("MAP.PLY", PointCloudEncoding::kAscii), "accepted");
+  EXPECT_EQ(filesInFolder(), 1U);
+}
+
+TEST_F(PointCloudFile, WithAPointThatAFloatCannotHoldIsNotWritten) {
+  for (const CloudPoint& point :
+       {CloudPoint{{1e39, 0, 0}, 1.0F}, CloudPoint{{0, std::nan(""), 0}, 1.0F},
+        CloudPoint{{0, 0, 0}, std::numeric_limits<float>::infinity()}}) {
+    for (const Kind& kind : kKinds) {
+      try {
+        writePointCloud(folder_ / kind.name, {{{1, 2, 3}, 1.0F}, point}, kind.encoding);
+        ADD_FAILURE() << "accepted";
+      } catch (const std::runtime_error& error) {
+        EXPECT_THAT(error.what(), AllOf(HasSubstr(kind.name), HasSubstr("point 1 ("),
+                                        HasSubstr("expected finite numbers")));
+      }
+    }
+  }
+  EXPECT_EQ(filesInFolder(), 0U);
 }
 
 TEST_F(PointCloudFile, ReplacesTheFileThatWasThere) {
@@ -102,10 +168,13 @@ TEST_F(PointCloudFile, ThatCannotBeWrittenLeavesNoHalfFile) {
 
 TEST_F(PointCloudFile, OnAFullDeviceIsAnError) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
-  std::filesystem::create_symlink("/dev/full", folder_ / "map.partial.pcd");
+  for (const Kind& kind : kKinds) {
+    const std::filesystem::path path = folder_ / kind.name;
+    std::filesystem::create_symlink("/dev/full", temporaryName(path));
 
-  EXPECT_THROW(writePcd(folder_ / "map.pcd", {{{1, 2, 3}, 1.0F}}), std::runtime_error);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "map.pcd"));
+    EXPECT_THROW(writePointCloud(path, {{{1, 2, 3}, 1.0F}}, kind.encoding), std::runtime_error);
+    EXPECT_FALSE(std::filesystem::exists(path));
+  }
 }
 
 }  // namespace
