@@ -19,12 +19,14 @@ using testing::HasSubstr;
 /// Points on the x axis, numbered by their confidence from 1 on.
 std::vector<CloudPoint> onALine(const std::vector<double>& xs) {
   std::vector<CloudPoint> points;
+  points.reserve(xs.size());
   for (const double x : xs) points.push_back({{x, 0, 0}, static_cast<float>(points.size() + 1)});
   return points;
 }
 
 std::vector<float> numbers(const std::vector<CloudPoint>& points) {
   std::vector<float> numbers;
+  numbers.reserve(points.size());
   for (const CloudPoint& point : points) numbers.push_back(point.confidence);
   return numbers;
 }
