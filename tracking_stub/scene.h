@@ -42,6 +42,14 @@ struct RayHit {
   SurfacePoint place;
 };
 
+/// An upright prism that stands for a thin pole, a lamp post or the leg of a table.
+struct Pole {
+  Rigid3 T_world_pole;     ///< Frame `pole`: origin in its middle, z along it.
+  double radius_m = 0.02;  ///< Of the corners, above 0.
+  double length_m = 1;
+  int facets = 8;  ///< Even, at least 4.
+};
+
 /// Textured rectangles in the world.
 class Scene {
  public:
@@ -52,6 +60,15 @@ class Scene {
   int addRectangle(const Rectangle& rectangle, const Painter& paint);
   /// Six rectangles, seen from outside; frame `box` has its origin at the centre of the box.
   void addBox(const Rigid3& T_world_box, const Eigen::Vector3d& size_m, const Painter& paint);
+
+  /// As many rectangles as it has facets, with u around the pole and v along it, and at both ends
+  /// half as many that overlap: rectangles between opposite facets, which together are the regular
+  /// polygon. Each is painted, so paint alike what lies in one place.
+  /// @throws std::invalid_argument where the pole is not valid.
+  void addPole(const Pole& pole, const Painter& paint);
+
+  /// Moves all there is: what was at p is at T_world_old * p.
+  void move(const Rigid3& T_world_old);
 
   int size() const { return static_cast<int>(rectangles_.size()); }
   const Rectangle& rectangle(int surface) const {

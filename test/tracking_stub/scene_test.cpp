@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <stdexcept>
+
 #include "test/tracking_stub/edge_scene.h"
 #include "tracking_stub/random_numbers.h"
 #include "tracking_stub/scene_view.h"
@@ -50,6 +53,54 @@ TEST(Scene, ABoxShowsItsNearestFaceFromEverySide) {
       EXPECT_NEAR(hit->distance_m, 5 - 0.1 * (axis + 1), 1e-12);
     }
   }
+}
+
+TEST(Scene, APoleIsARegularPrismFromEverySide) {
+  Scene scene;
+  Rigid3 T_world_pole;
+  T_world_pole.translation = {1, 2, 3};
+  T_world_pole.rotation = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized());
+  scene.addPole({T_world_pole, 0.1, 2, 8}, test::evenPaint(0));
+  RandomNumbers random(3);
+  const double apothem = 0.1 * std::cos(M_PI / 8);
+  for (int i = 0; i < 500; ++i) {
+    // Across: a horizontal ray at the axis meets the side between the apothem and the corner.
+    const double angle = random.uniform(0, 2 * M_PI);
+    const Eigen::Vector3d out_pole(std::cos(angle), std::sin(angle), 0);
+    const Eigen::Vector3d on_axis_pole(0, 0, random.uniform(-0.999, 0.999));
+    const Eigen::Vector3d out_world = T_world_pole.rotation * out_pole;
+    const auto side = scene.cast(T_world_pole * on_axis_pole + 5 * out_world, -out_world);
+    ASSERT_TRUE(side.has_value());
+    EXPECT_GE(5 - side->distance_m, apothem - 1e-9);
+    EXPECT_LE(5 - side->distance_m, 0.1 + 1e-9);
+    // Along: an end is closed wherever it is inside the polygon.
+    const Eigen::Vector3d inside_pole = random.uniform(0, 0.999 * apothem) * out_pole;
+    const double end = random.below(2) == 0 ? -1 : 1;
+    const Eigen::Vector3d along_world = T_world_pole.rotation * Eigen::Vector3d(0, 0, end);
+    const auto cap = scene.cast(T_world_pole * inside_pole + 5 * along_world, -along_world);
+    ASSERT_TRUE(cap.has_value());
+    EXPECT_NEAR(cap->distance_m, 4, 1e-9);
+  }
+}
+
+TEST(Scene, RefusesAPoleThatIsNone) {
+  Scene scene;
+  EXPECT_THROW(scene.addPole({{}, 0, 1, 8}, test::evenPaint(0)), std::invalid_argument);
+  EXPECT_THROW(scene.addPole({{}, 0.1, 0, 8}, test::evenPaint(0)), std::invalid_argument);
+  EXPECT_THROW(scene.addPole({{}, 0.1, 1, 7}, test::evenPaint(0)), std::invalid_argument);
+}
+
+TEST(Scene, MovesAllThereIs) {
+  Scene scene;
+  scene.addRectangle(test::facingWall(2, 1, 1), test::evenPaint(0));
+  Rigid3 T_world_old;
+  T_world_old.rotation = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY());  // z becomes x
+  T_world_old.translation = {0, 0.3, 0};
+  scene.move(T_world_old);
+  const auto hit = scene.cast({0, 0.3, 0}, {1, 0, 0});
+  ASSERT_TRUE(hit.has_value());
+  EXPECT_NEAR(hit->distance_m, 2, 1e-12);
+  EXPECT_NEAR(hit->place.u_m, 0.5, 1e-6);
 }
 
 TEST(SceneView, FindsWhatThePlainRayCastFinds) {
