@@ -78,7 +78,8 @@ Texture paintClutter(const ClutterOptions& options) {
   const int rows = std::max(4, static_cast<int>(std::ceil(options.height_m / options.texel_m)));
   const double px_per_m = kOversampling / options.texel_m;
   const double ground = random.uniform(-options.ground, options.ground);
-  cv::Mat1f canvas(rows * kOversampling, columns * kOversampling, static_cast<float>(ground));
+  cv::Mat1f canvas(rows * kOversampling, columns * kOversampling);
+  std::fill(canvas.begin(), canvas.end(), static_cast<float>(ground));
   const double area = options.width_m * options.height_m;
   const int shapes = static_cast<int>(
       std::lround(options.coverage * area / (options.feature_m * options.feature_m)));

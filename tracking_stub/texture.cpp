@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
@@ -49,15 +50,17 @@ float Texture::sample(double u_m, double v_m, double sigma_m) const {
 float Texture::sampleLevel(const Level& level, double u_m, double v_m) {
   const int columns = level.image.cols;
   const int rows = level.image.rows;
-  const float x = std::clamp(static_cast<float>(u_m) * level.texels_per_m - 0.5F, 0.0F,
-                             static_cast<float>(columns - 1));
-  const float y = std::clamp(static_cast<float>(v_m) * level.texels_per_m - 0.5F, 0.0F,
-                             static_cast<float>(rows - 1));
+  const float x = std::min(std::max(static_cast<float>(u_m) * level.texels_per_m - 0.5F, 0.0F),
+                           static_cast<float>(columns - 1));
+  const float y = std::min(std::max(static_cast<float>(v_m) * level.texels_per_m - 0.5F, 0.0F),
+                           static_cast<float>(rows - 1));
   const int x0 = static_cast<int>(x);
   const int y0 = static_cast<int>(y);
   const int right = x0 + 1 < columns ? 1 : 0;
-  const float* upper = level.image.ptr<float>(y0) + x0;
-  const float* lower = y0 + 1 < rows ? level.image.ptr<float>(y0 + 1) + x0 : upper;
+  const int below = y0 + 1 < rows ? columns : 0;
+  const float* upper = reinterpret_cast<const float*>(level.image.data) +
+                       static_cast<std::ptrdiff_t>(y0) * columns + x0;
+  const float* lower = upper + below;
   const float fx = x - static_cast<float>(x0);
   const float fy = y - static_cast<float>(y0);
   const float top = upper[0] + fx * (upper[right] - upper[0]);

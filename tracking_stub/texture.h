@@ -21,7 +21,7 @@ class Texture {
 
  private:
   struct Level {
-    cv::Mat1f image;  // blurred with a standard deviation of one of its texels
+    cv::Mat1f image;  // continuous; blurred with a standard deviation of one of its texels
     float texels_per_m = 0;
   };
   static float sampleLevel(const Level& level, double u_m, double v_m);
