@@ -5,7 +5,9 @@
 #include <memory>
 
 #include "mapping/timestamp.h"
-#include "tracking_stub/clutter.h"
+#include "tracking_stub/furnishing.h"
+#include "tracking_stub/painting.h"
+#include "tracking_stub/preset_rigs.h"
 #include "tracking_stub/smooth_motion.h"
 
 namespace efm {
@@ -13,45 +15,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kFocalPx = 226.0;
 constexpr double kBaselineM = 0.10;
-
-double radians(double deg) { return deg * kPi / 180; }
-
-/// Paints a scene's surfaces one after the other, each its own way.
-class Painting {
- public:
-  explicit Painting(std::uint64_t seed) : seed_(seed * 1000) {}
-
-  /// @param nearest_m the nearest that the surface is seen from.
-  /// @param feature_m size of the shapes on it.
-  Scene::Painter clutter(double nearest_m, double feature_m, double contrast = 0.9) {
-    return [this, nearest_m, feature_m, contrast](double width_m, double height_m) {
-      ClutterOptions options;
-      options.width_m = width_m;
-      options.height_m = height_m;
-      options.texel_m = 0.5 * nearest_m / kFocalPx;
-      options.feature_m = feature_m;
-      options.coverage = 0.28;
-      options.contrast = contrast;
-      options.seed = seed_++;
-      return paintClutter(options);
-    };
-  }
-
- private:
-  std::uint64_t seed_;
-};
-
-/// A box that stands on a ground, turned around the vertical.
-void addStandingBox(Scene& scene, const Vector3d& foot, const Vector3d& size_m, double yaw_deg,
-                    const Scene::Painter& paint) {
-  Rigid3 T_world_box;
-  T_world_box.rotation = Eigen::AngleAxisd(radians(yaw_deg), Vector3d::UnitZ());
-  T_world_box.translation = foot + Vector3d(0, 0, 0.5 * size_m.z());
-  scene.addBox(T_world_box, size_m, paint);
-}
 
 void addRoom(Scene& scene, Painting& painting) {
   const Vector3d x = Vector3d::UnitX();
@@ -91,19 +56,6 @@ void addThingsOnDesk(Scene& scene, Painting& painting) {
   scene.addBox(T_world_board, {0.36, 0.03, 0.48}, painting.clutter(0.8, 0.11));
 }
 
-Rig makeRig() {
-  RigCamera camera;
-  camera.model.width = 346;
-  camera.model.height = 260;
-  camera.model.fx = camera.model.fy = kFocalPx;
-  camera.model.cx = 173.0;
-  camera.model.cy = 130.0;
-  Rig rig;
-  rig.cameras.assign(2, camera);
-  rig.cameras[1].T_rig_cam.translation = {kBaselineM, 0, 0};
-  return rig;
-}
-
 std::shared_ptr<const Motion> makeMotion(std::int64_t start_ns) {
   SmoothMotionOptions options;
   options.start_ns = start_ns;
@@ -128,11 +80,14 @@ std::shared_ptr<const Motion> makeMotion(std::int64_t start_ns) {
 
 Simulation makeDeskStereo(std::uint64_t seed) {
   Simulation simulation;
-  Painting painting(seed);
+  PaintingOptions painting_options;
+  painting_options.seed = seed;
+  painting_options.focal_px = kFocalPx;
+  Painting painting(painting_options);
   addRoom(simulation.scene, painting);
   addFurniture(simulation.scene, painting);
   addThingsOnDesk(simulation.scene, painting);
-  simulation.rig = makeRig();
+  simulation.rig = makeStereoRig(makePinhole(346, 260, kFocalPx), kBaselineM);
   simulation.start_ns = kNanosecondsPerSecond;
   simulation.duration_ns = 2 * kNanosecondsPerSecond;
   simulation.motion = makeMotion(simulation.start_ns);

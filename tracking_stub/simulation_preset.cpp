@@ -7,6 +7,9 @@
 #include "mapping/option_check.h"
 #include "mapping/timestamp.h"
 #include "tracking_stub/desk_stereo.h"
+#include "tracking_stub/hd_stereo.h"
+#include "tracking_stub/room_stereo.h"
+#include "tracking_stub/trinocular.h"
 
 namespace efm {
 namespace {
@@ -15,6 +18,9 @@ using MakePreset = Simulation (*)(std::uint64_t seed);
 
 constexpr NamedChoice<MakePreset> kPresets[] = {
     {makeDeskStereo, "desk_stereo"},
+    {makeHdStereo, "hd_stereo"},
+    {makeRoomStereo, "room_stereo"},
+    {makeTrinocular, "trinocular"},
 };
 
 }  // namespace

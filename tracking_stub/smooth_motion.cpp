@@ -29,7 +29,7 @@ Rigid3 SmoothMotion::poseAt(std::int64_t t_ns) const {
   const Eigen::Vector3d rotation = valueAt(options_.rotation, t_s);
   const double angle = rotation.norm();
   Rigid3 T_center_rig;
-  T_center_rig.translation = valueAt(options_.translation, t_s);
+  T_center_rig.translation = valueAt(options_.translation, t_s) + options_.velocity * t_s;
   if (angle > 0) {
     T_center_rig.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation / angle));
   }

@@ -17,13 +17,15 @@ struct Sine {
 };
 
 struct SmoothMotionOptions {
-  std::int64_t start_ns = 0;                     ///< t = 0 of the sines.
-  Rigid3 T_world_center;                         ///< The pose that the rig moves around.
-  std::array<std::vector<Sine>, 3> translation;  ///< Along the axes of `center`, metres.
-  std::array<std::vector<Sine>, 3> rotation;     ///< A rotation vector in `center`, radians.
+  std::int64_t start_ns = 0;                           ///< t = 0 of the sines.
+  Rigid3 T_world_center;                               ///< The pose that the rig moves around.
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< Along the axes of `center`, m/s.
+  std::array<std::vector<Sine>, 3> translation;        ///< Along the axes of `center`, metres.
+  std::array<std::vector<Sine>, 3> rotation;           ///< A rotation vector in `center`, radians.
 };
 
-/// Hand-held motion: in each of the six degrees of freedom a sum of sines.
+/// Hand-held motion: in each of the six degrees of freedom a sum of sines, on top of a constant
+/// velocity.
 class SmoothMotion : public Motion {
  public:
   explicit SmoothMotion(const SmoothMotionOptions& options) : options_(options) {}

@@ -21,6 +21,15 @@ TEST(SmoothMotion, MovesAlongAndAroundTheAxesOfItsCenter) {
             1e-7);
 }
 
+TEST(SmoothMotion, TravelsAlongTheAxesOfItsCenter) {
+  SmoothMotionOptions options;
+  options.start_ns = 5'000'000'000;
+  options.T_world_center.rotation = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ());
+  options.velocity = {0.5, 0, 0.1};
+  const Rigid3 T_world_rig = SmoothMotion(options).poseAt(7'000'000'000);
+  EXPECT_LT((T_world_rig.translation - Eigen::Vector3d(0, 1, 0.2)).norm(), 1e-12);
+}
+
 TEST(SmoothMotion, StandsAtItsCenterWithoutSines) {
   SmoothMotionOptions options;
   options.T_world_center.translation = {1, 2, 3};

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "mapping/rig.h"
+
+namespace efm {
+
+inline double radians(double deg) { return deg * 3.14159265358979323846 / 180; }
+
+/// No distortion, the principal point in the middle.
+inline CameraModel makePinhole(int width, int height, double focal_px) {
+  CameraModel model;
+  model.width = width;
+  model.height = height;
+  model.fx = model.fy = focal_px;
+  model.cx = 0.5 * width;
+  model.cy = 0.5 * height;
+  return model;
+}
+
+/// Two alike, the second `baseline_m` to the right of the first, which is the rig's frame.
+inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
+  Rig rig;
+  rig.cameras.resize(2);
+  rig.cameras[0].model = rig.cameras[1].model = model;
+  rig.cameras[1].T_rig_cam.translation = {baseline_m, 0, 0};
+  return rig;
+}
+
+}  // namespace efm
