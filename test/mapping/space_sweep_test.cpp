@@ -5,42 +5,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <mutex>
 #include <opencv2/core.hpp>
-#include <set>
 
+#include "test/mapping/kept_dsi.h"
 #include "test/mapping/random_scene.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {
 namespace {
 
+using test::KeptDsi;
 using test::RandomScene;
 
 constexpr std::int64_t kStart_ns = 0;
-
-/// Keeps the whole DSI.
-class KeptDsi : public DsiSink {
- public:
-  KeptDsi(const DepthPlanes& planes, const ReferenceView& view)
-      : pixels_(view.pixels()), values(static_cast<std::size_t>(planes.size()) * pixels_, -1.0F) {}
-
-  void takePlane(int plane, const float* plane_values) override {
-    const std::lock_guard lock(mutex_);
-    EXPECT_TRUE(planes_seen_.insert(plane).second) << "plane " << plane << " came twice";
-    std::copy(plane_values, plane_values + pixels_,
-              values.begin() + static_cast<std::ptrdiff_t>(plane * static_cast<int>(pixels_)));
-  }
-  std::size_t planesSeen() const { return planes_seen_.size(); }
-
- private:
-  std::size_t pixels_;
-  std::mutex mutex_;
-  std::set<int> planes_seen_;
-
- public:
-  std::vector<float> values;
-};
 
 /// Cameras around the origin that see random events.
 struct Input {
@@ -94,15 +71,8 @@ TEST(SpaceSweep, TheDsiIsTheOraclesForEveryRuleAndOneToThreeCameras) {
       sweep(input, rule, 2, &dsi);
       EXPECT_EQ(dsi.planesSeen(), 11U);
       const oracle::Dsi exact = oracle::fuse(rule, input.densities);
-      double mass = 0;
-      double error = 0;
-      for (std::size_t i = 0; i < exact.values.size(); ++i) {
-        mass += exact.values[i];
-        error += std::abs(static_cast<double>(dsi.values[i]) - exact.values[i]);
-      }
-      EXPECT_GT(mass, 0);
       // Float coordinates of some 40 px are good to 4e-6 px, at which a vote moves.
-      EXPECT_LE(error, 1e-4 * mass) << nameOf(rule) << " of " << cameras;
+      EXPECT_LE(test::errorOverMass(dsi.values, exact), 1e-4) << nameOf(rule) << " of " << cameras;
     }
   }
 }
