@@ -133,6 +133,49 @@ Dsi fuse(FusionRule rule, const std::vector<Dsi>& inputs) {
   return fused;
 }
 
+std::vector<std::vector<Event>> splitEvents(const std::vector<Event>& events, std::int64_t t0_ns,
+                                            std::int64_t t1_ns, int count, SubintervalSplit split) {
+  std::vector<std::vector<Event>> parts;
+  for (int s = 0; s < count; ++s) {
+    std::vector<Event>& part = parts.emplace_back();
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const bool by_count = split == SubintervalSplit::kCount;
+      const std::int64_t whole =
+          by_count ? static_cast<std::int64_t>(events.size()) : t1_ns - t0_ns;
+      const std::int64_t place = by_count ? static_cast<std::int64_t>(i) : events[i].t_ns - t0_ns;
+      if (whole * s / count <= place && place < whole * (s + 1) / count) part.push_back(events[i]);
+    }
+  }
+  return parts;
+}
+
+double fuse(const FusionOptions& options, const std::vector<std::vector<double>>& values) {
+  std::vector<double> fused;
+  if (options.order == FusionOrder::kTimeThenCameras) {
+    for (const auto& camera : values) fused.push_back(fuse(options.across_time, camera));
+    return fuse(options.across_cameras, fused);
+  }
+  for (std::size_t slot = 0; slot < values.front().size(); ++slot) {
+    std::vector<double> simultaneous;
+    for (const auto& camera : values) simultaneous.push_back(camera[slot]);
+    fused.push_back(fuse(options.across_cameras, simultaneous));
+  }
+  return fuse(options.across_time, fused);
+}
+
+Dsi fuse(const FusionOptions& options, const std::vector<std::vector<Dsi>>& inputs) {
+  Dsi fused = inputs.front().front();
+  for (std::size_t i = 0; i < fused.values.size(); ++i) {
+    std::vector<std::vector<double>> values;
+    for (const auto& camera : inputs) {
+      auto& of_camera = values.emplace_back();
+      for (const Dsi& slot : camera) of_camera.push_back(slot.values[i]);
+    }
+    fused.values[i] = fuse(options, values);
+  }
+  return fused;
+}
+
 std::vector<int> peakPlanes(const Dsi& dsi) {
   std::vector<int> peaks;
   for (int y = 0; y < dsi.height; ++y) {

@@ -2,15 +2,18 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "mapping/depth_planes.h"
 #include "mapping/event.h"
 #include "mapping/fusion_rule.h"
+#include "mapping/plane_fusion.h"
 #include "mapping/pose_packets.h"
 #include "mapping/reference_view.h"
 #include "mapping/rig.h"
+#include "mapping/subintervals.h"
 #include "mapping/trajectory.h"
 #include "mapping/vote_counts.h"
 
@@ -51,6 +54,15 @@ Dsi rayDensity(const std::vector<PosedEvent>& events, const UndistortionTable& u
 /// The mean of numbers under a rule, from its textbook formula.
 double fuse(FusionRule rule, const std::vector<double>& values);
 Dsi fuse(FusionRule rule, const std::vector<Dsi>& inputs);
+
+/// The events of the window [t0, t1) by sub-interval; windows of up to 100 days.
+std::vector<std::vector<Event>> splitEvents(const std::vector<Event>& events, std::int64_t t0_ns,
+                                            std::int64_t t1_ns, int count, SubintervalSplit split);
+
+/// One number, or DSI, per camera and slot of the time axis, [camera][slot], fused along both axes
+/// in their order (Ghosh and Gallego 2022, Algorithm 2).
+double fuse(const FusionOptions& options, const std::vector<std::vector<double>>& values);
+Dsi fuse(const FusionOptions& options, const std::vector<std::vector<Dsi>>& inputs);
 
 /// Per pixel the plane of the largest value, the nearest of equals.
 std::vector<int> peakPlanes(const Dsi& dsi);
