@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "mapping/keyframe_mapper.h"
+#include "test/mapping/kept_dsi.h"
+#include "test/mapping/random_scene.h"
+#include "test/oracle/naive_mapper.h"
+
+namespace efm {
+namespace {
+
+using test::errorOverMass;
+using test::KeptDsi;
+using test::RandomScene;
+
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'001;
+constexpr std::int64_t kDuration_ns = 100'000'007;  // divisible by no number of sub-intervals
+const Window kWindow{kStart_ns, kStart_ns + kDuration_ns, kStart_ns + kDuration_ns / 2};
+
+/// A window of random events of some cameras in motion.
+struct Recording {
+  Rig rig;
+  Trajectory trajectory;
+  std::vector<std::vector<Event>> events;
+
+  std::vector<int> cameras() const {
+    std::vector<int> all;
+    for (std::size_t c = 0; c < events.size(); ++c) all.push_back(static_cast<int>(c));
+    return all;
+  }
+  std::vector<EventSpan> spans() const { return {events.begin(), events.end()}; }
+};
+
+Recording record(std::uint32_t seed, int cameras, std::size_t events_per_camera) {
+  RandomScene random(seed);
+  Recording recording;
+  recording.trajectory = random.motion(kStart_ns, 0.11, 2.0, 2.0);
+  for (int c = 0; c < cameras; ++c) {
+    recording.rig.cameras.push_back({test::smallCamera(), random.pose(0.1, 0.1), 0});
+    recording.events.push_back(
+        random.events(test::smallCamera(), events_per_camera, kStart_ns, kDuration_ns));
+  }
+  return recording;
+}
+
+/// Every event with a pose of its own, so that nothing but rounding is left to differ.
+KeyframeMapperOptions exactOptions(int planes, int subintervals) {
+  KeyframeMapperOptions options;
+  options.planes = {0.5, 4.0, planes, PlaneSpacing::kInverse};
+  options.packets.packet_error_px = 0;
+  options.subintervals.count = subintervals;
+  options.sweep.threads = 1;
+  return options;
+}
+
+struct Mapped {
+  KeyframeDepthMap keyframe;
+  std::vector<float> dsi;
+};
+
+Mapped mapWith(const Recording& recording, const KeyframeMapperOptions& options) {
+  KeyframeMapper mapper(recording.rig, recording.cameras(), options);
+  KeptDsi dsi(mapper.planes(), mapper.view());
+  auto keyframe = mapper.map(kWindow, recording.spans(), recording.trajectory, &dsi);
+  EXPECT_TRUE(keyframe);
+  return {keyframe.value_or(KeyframeDepthMap()), dsi.values};
+}
+
+/// The oracle's DSIs by camera and sub-interval.
+std::vector<std::vector<oracle::Dsi>> exactParts(const Recording& recording,
+                                                 const KeyframeMapperOptions& options) {
+  const KeyframeMapper mapper(recording.rig, recording.cameras(), options);
+  const Rigid3 T_world_ref = mapper.referencePose(*recording.trajectory.poseAt(kWindow.t_ref_ns));
+  std::vector<std::vector<oracle::Dsi>> parts;
+  for (std::size_t c = 0; c < recording.events.size(); ++c) {
+    const RigCamera& camera = recording.rig.cameras[c];
+    const UndistortionTable undistortion(camera.model);
+    auto& of_camera = parts.emplace_back();
+    for (const auto& part :
+         oracle::splitEvents(recording.events[c], kWindow.t0_ns, kWindow.t1_ns,
+                             options.subintervals.count, options.subintervals.split)) {
+      of_camera.push_back(
+          oracle::rayDensity(oracle::poseEach(part, camera, recording.trajectory, T_world_ref),
+                             undistortion, mapper.view(), mapper.planes()));
+    }
+  }
+  return parts;
+}
+
+/// Puts the sub-intervals into the slots in which they meet.
+std::vector<std::vector<oracle::Dsi>> shuffled(const std::vector<std::vector<oracle::Dsi>>& parts,
+                                               const SubintervalOptions& options) {
+  const auto slots = assignSubintervals(static_cast<int>(parts.size()), options);
+  std::vector<std::vector<oracle::Dsi>> result;
+  for (std::size_t c = 0; c < parts.size(); ++c) {
+    auto& of_camera = result.emplace_back();
+    for (const int part : slots[c]) of_camera.push_back(parts[c][static_cast<std::size_t>(part)]);
+  }
+  return result;
+}
+
+// Float coordinates of some 40 px are good to 4e-6 px, at which a vote moves.
+constexpr double kMaxErrorOverMass = 1e-4;
+
+TEST(TemporalFusion, FromEventsToTheDsiItIsTheOraclesForAllRulesAndOrders) {
+  for (int cameras = 1; cameras <= 3; ++cameras) {
+    const Recording recording = record(20 + static_cast<std::uint32_t>(cameras), cameras, 1500);
+    KeyframeMapperOptions options = exactOptions(2, 3);
+    options.view.width = 24;  // a quarter of the pixels, so that each has votes in every slot
+    const auto parts = exactParts(recording, options);
+    for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
+      for (const FusionRule across_cameras : allFusionRules()) {
+        for (const FusionRule across_time : allFusionRules()) {
+          options.sweep.fusion = {across_cameras, across_time, order};
+          EXPECT_LE(errorOverMass(mapWith(recording, options).dsi,
+                                  oracle::fuse(options.sweep.fusion, parts)),
+                    kMaxErrorOverMass)
+              << cameras << " cameras " << nameOf(across_cameras) << ", " << nameOf(across_time)
+              << ", " << nameOf(order);
+        }
+      }
+    }
+  }
+}
+
+TEST(TemporalFusion, EverySplitAndShuffleIsTheOracles) {
+  const Recording recording = record(31, 3, 5000);
+  for (const int count : {2, 5}) {
+    for (const auto split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
+      KeyframeMapperOptions options = exactOptions(4, count);
+      options.subintervals.split = split;
+      const auto parts = exactParts(recording, options);
+      std::vector<std::vector<float>> dsis;
+      for (const auto shuffle :
+           {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
+        options.subintervals.shuffle = shuffle;
+        for (const auto order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
+          options.sweep.fusion.order = order;
+          dsis.push_back(mapWith(recording, options).dsi);
+          EXPECT_LE(errorOverMass(dsis.back(), oracle::fuse(options.sweep.fusion,
+                                                            shuffled(parts, options.subintervals))),
+                    kMaxErrorOverMass)
+              << count << " by " << nameOf(split) << ", " << nameOf(shuffle);
+        }
+      }
+      EXPECT_NE(dsis[0], dsis[2]) << "a shift lets other sub-intervals meet";
+    }
+  }
+}
+
+TEST(TemporalFusion, ArithmeticAcrossTimeThenHarmonicAcrossCamerasIsAlgorithmOne) {
+  const Recording recording = record(32, 2, 5000);
+  const std::vector<float> whole = mapWith(recording, exactOptions(7, 1)).dsi;
+  for (const int count : {2, 3, 8}) {
+    KeyframeMapperOptions options = exactOptions(7, count);
+    options.sweep.fusion = {FusionRule::kHarmonic, FusionRule::kArithmetic,
+                            FusionOrder::kTimeThenCameras};
+    const std::vector<float> parts = mapWith(recording, options).dsi;
+    ASSERT_EQ(parts.size(), whole.size());
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      // Means, not sums: 1/N_s of it. Votes of some 20 events per voxel, summed in another order.
+      ASSERT_NEAR(static_cast<double>(parts[i]) * count, whole[i], 1e-5 * whole[i] + 1e-9);
+    }
+  }
+}
+
+bool same(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() &&
+         std::equal(a.datastart, a.dataend, b.datastart);
+}
+
+bool same(const DsiPeaks& a, const DsiPeaks& b) {
+  return same(a.confidence, b.confidence) && same(a.plane, b.plane) && same(a.before, b.before) &&
+         same(a.after, b.after);
+}
+
+/// Rays of all cameras and sub-intervals, as the keyframe mapper makes them.
+std::vector<CameraRays> raysOf(const Recording& recording, const ReferenceView& view, int count) {
+  std::vector<CameraRays> rays;
+  SubintervalOptions subintervals;
+  subintervals.count = count;
+  for (std::size_t c = 0; c < recording.events.size(); ++c) {
+    const RigCamera& camera = recording.rig.cameras[c];
+    const UndistortionTable undistortion(camera.model);
+    const PacketGeometry geometry{{}, view, 0.5, 4.0};
+    auto& of_camera = rays.emplace_back();
+    for (const EventSpan part : splitIntoSubintervals(EventSpan(recording.events[c]), kWindow.t0_ns,
+                                                      kWindow.t1_ns, subintervals)) {
+      const PosePackets packets =
+          splitIntoPosePackets(part, camera, undistortion, recording.trajectory, geometry, {0.02});
+      of_camera.push_back(backProject(part, packets, undistortion, view));
+    }
+  }
+  return rays;
+}
+
+TEST(TemporalFusion, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
+  const tbb::global_control as_if_sixteen_cores(tbb::global_control::max_allowed_parallelism, 16);
+  const Recording recording = record(33, 3, 3000);
+  const ReferenceView view = ReferenceView::of(test::smallCamera());
+  const std::vector<CameraRays> rays = raysOf(recording, view, 4);
+  for (const int planes : {1, 2, 31, 40}) {
+    const DepthPlanes depths({0.5, 4.0, planes, PlaneSpacing::kInverse});
+    for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
+      SpaceSweepOptions options;
+      options.fusion.order = order;
+      options.threads = 1;
+      const SweepResult one = SpaceSweep(options).run(rays, view, depths, {true, nullptr});
+      ASSERT_EQ(one.camera_peaks.size(), 3U);
+      for (const int threads : {2, 3, 16}) {
+        options.threads = threads;
+        EXPECT_EQ(options.threadsOrCores(), threads);
+        const SweepResult many = SpaceSweep(options).run(rays, view, depths, {true, nullptr});
+        EXPECT_TRUE(same(one.peaks, many.peaks)) << planes << " planes, " << threads;
+        ASSERT_EQ(many.camera_peaks.size(), 3U);
+        for (std::size_t c = 0; c < 3; ++c) {
+          EXPECT_TRUE(same(one.camera_peaks[c], many.camera_peaks[c]))
+              << "camera " << c << ", " << planes << " planes, " << threads << " threads";
+          EXPECT_EQ(one.votes[c].total(), many.votes[c].total());
+          EXPECT_EQ(one.votes[c].cast, many.votes[c].cast);
+        }
+      }
+    }
+  }
+}
+
+TEST(TemporalFusion, ACamerasPeaksAreThoseOfItsOwnSweep) {
+  const Recording recording = record(34, 3, 3000);
+  const ReferenceView view = ReferenceView::of(test::smallCamera());
+  const DepthPlanes planes({0.5, 4.0, 20, PlaneSpacing::kInverse});
+  for (const int count : {1, 4}) {
+    const std::vector<CameraRays> rays = raysOf(recording, view, count);
+    for (const FusionRule across_time : allFusionRules()) {
+      SpaceSweepOptions options;
+      options.fusion.across_time = across_time;
+      const SweepResult all = SpaceSweep(options).run(rays, view, planes, {true, nullptr});
+      EXPECT_TRUE(same(all.peaks, SpaceSweep(options).run(rays, view, planes).peaks))
+          << "keeping the cameras changes nothing";
+      for (std::size_t c = 0; c < rays.size(); ++c) {
+        const DsiPeaks alone = SpaceSweep(options).run({rays[c]}, view, planes).peaks;
+        EXPECT_TRUE(same(all.camera_peaks[c], alone)) << "camera " << c << ", " << count;
+      }
+    }
+  }
+}
+
+TEST(TemporalFusion, ASilentSubintervalSilencesTheAndLikeRulesInItsSlotOnly) {
+  const Recording recording = record(35, 2, 4000);
+  const ReferenceView view = ReferenceView::of(test::smallCamera());
+  const DepthPlanes planes({0.5, 4.0, 5, PlaneSpacing::kInverse});
+  std::vector<CameraRays> rays = raysOf(recording, view, 2);
+  rays[1][0] = RayBundle();
+  const auto confidence = [&](FusionRule across_time, FusionOrder order) {
+    SpaceSweepOptions options;
+    options.fusion = {FusionRule::kHarmonic, across_time, order};
+    return SpaceSweep(options).run(rays, view, planes).peaks.confidence;
+  };
+  const auto cameras_first = FusionOrder::kCamerasThenTime;
+  EXPECT_EQ(cv::countNonZero(confidence(FusionRule::kHarmonic, cameras_first)), 0);
+  EXPECT_EQ(cv::countNonZero(confidence(FusionRule::kHarmonic, FusionOrder::kTimeThenCameras)), 0);
+  EXPECT_GT(cv::countNonZero(confidence(FusionRule::kArithmetic, cameras_first)), 0);
+}
+
+}  // namespace
+}  // namespace efm
