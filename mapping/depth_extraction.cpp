@@ -110,7 +110,9 @@ DepthMap depthsAt(const cv::Mat1b& mask, const cv::Mat1f& positions, const DsiPe
       const double variance =
           peakVariance(peaks.before(y, x), peaks.confidence(y, x), peaks.after(y, x));
       result.depth(y, x) = static_cast<float>(planes.depthAt(position));
-      result.variance(y, x) = static_cast<float>(step * step * variance);
+      // A single plane has no step: 0 times infinite would be nothing at all.
+      result.variance(y, x) =
+          static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
     }
   }
   return result;
