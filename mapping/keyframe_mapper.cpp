@@ -69,8 +69,10 @@ KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
   options_.validate();
   if (selected_.empty()) throw std::invalid_argument("cameras: at least one must take part");
   requireCamera(rig_, options_.reference_camera, "reference_camera");
-  view_ = makeReferenceView(rig_.cameras[static_cast<std::size_t>(options_.reference_camera)].model,
-                            options_.view);
+  const CameraModel& reference =
+      rig_.cameras[static_cast<std::size_t>(options_.reference_camera)].model;
+  reference.validate();  // it need not be among those that are looked at below
+  view_ = makeReferenceView(reference, options_.view);
   for (const int camera : selected_) {
     requireCamera(rig_, camera, "cameras");
     undistortion_.emplace_back(rig_.cameras[static_cast<std::size_t>(camera)].model);

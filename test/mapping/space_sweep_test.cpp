@@ -9,6 +9,7 @@
 
 #include "test/mapping/kept_dsi.h"
 #include "test/mapping/random_scene.h"
+#include "test/mapping/same_image.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {
@@ -16,6 +17,7 @@ namespace {
 
 using test::KeptDsi;
 using test::RandomScene;
+using test::same;
 
 constexpr std::int64_t kStart_ns = 0;
 
@@ -56,11 +58,6 @@ SweepResult sweep(const Input& input, FusionRule rule, int threads, DsiSink* sin
   std::vector<CameraRays> rays;
   for (const RayBundle& camera : input.rays) rays.push_back({camera});
   return SpaceSweep(options).run(rays, input.view, input.planes, {false, sink});
-}
-
-bool same(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() &&
-         std::equal(a.datastart, a.dataend, b.datastart);
 }
 
 TEST(SpaceSweep, TheDsiIsTheOraclesForEveryRuleAndOneToThreeCameras) {

@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include <algorithm>
 #include <opencv2/core.hpp>
-#include <string>
 
 #include "mapping/keyframe_mapper.h"
 #include "test/mapping/kept_dsi.h"
-#include "test/mapping/random_scene.h"
+#include "test/mapping/random_recording.h"
+#include "test/mapping/same_image.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {
@@ -17,37 +16,10 @@ namespace {
 
 using test::errorOverMass;
 using test::KeptDsi;
-using test::RandomScene;
+using test::same;
+using Recording = test::RandomRecording;
 
-constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'001;
-constexpr std::int64_t kDuration_ns = 100'000'007;  // divisible by no number of sub-intervals
-const Window kWindow{kStart_ns, kStart_ns + kDuration_ns, kStart_ns + kDuration_ns / 2};
-
-/// A window of random events of some cameras in motion.
-struct Recording {
-  Rig rig;
-  Trajectory trajectory;
-  std::vector<std::vector<Event>> events;
-
-  std::vector<int> cameras() const {
-    std::vector<int> all;
-    for (std::size_t c = 0; c < events.size(); ++c) all.push_back(static_cast<int>(c));
-    return all;
-  }
-  std::vector<EventSpan> spans() const { return {events.begin(), events.end()}; }
-};
-
-Recording record(std::uint32_t seed, int cameras, std::size_t events_per_camera) {
-  RandomScene random(seed);
-  Recording recording;
-  recording.trajectory = random.motion(kStart_ns, 0.11, 2.0, 2.0);
-  for (int c = 0; c < cameras; ++c) {
-    recording.rig.cameras.push_back({test::smallCamera(), random.pose(0.1, 0.1), 0});
-    recording.events.push_back(
-        random.events(test::smallCamera(), events_per_camera, kStart_ns, kDuration_ns));
-  }
-  return recording;
-}
+constexpr Window kWindow = Recording::kWindow;
 
 /// Every event with a pose of its own, so that nothing but rounding is left to differ.
 KeyframeMapperOptions exactOptions(int planes, int subintervals) {
@@ -110,7 +82,7 @@ constexpr double kMaxErrorOverMass = 1e-4;
 
 TEST(TemporalFusion, FromEventsToTheDsiItIsTheOraclesForAllRulesAndOrders) {
   for (int cameras = 1; cameras <= 3; ++cameras) {
-    const Recording recording = record(20 + static_cast<std::uint32_t>(cameras), cameras, 1500);
+    const Recording recording(20 + static_cast<std::uint32_t>(cameras), cameras, 1500);
     KeyframeMapperOptions options = exactOptions(2, 3);
     options.view.width = 24;  // a quarter of the pixels, so that each has votes in every slot
     const auto parts = exactParts(recording, options);
@@ -130,7 +102,7 @@ TEST(TemporalFusion, FromEventsToTheDsiItIsTheOraclesForAllRulesAndOrders) {
 }
 
 TEST(TemporalFusion, EverySplitAndShuffleIsTheOracles) {
-  const Recording recording = record(31, 3, 5000);
+  const Recording recording(31, 3, 5000);
   for (const int count : {2, 5}) {
     for (const auto split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
       KeyframeMapperOptions options = exactOptions(4, count);
@@ -155,7 +127,7 @@ TEST(TemporalFusion, EverySplitAndShuffleIsTheOracles) {
 }
 
 TEST(TemporalFusion, ArithmeticAcrossTimeThenHarmonicAcrossCamerasIsAlgorithmOne) {
-  const Recording recording = record(32, 2, 5000);
+  const Recording recording(32, 2, 5000);
   const std::vector<float> whole = mapWith(recording, exactOptions(7, 1)).dsi;
   for (const int count : {2, 3, 8}) {
     KeyframeMapperOptions options = exactOptions(7, count);
@@ -168,16 +140,6 @@ TEST(TemporalFusion, ArithmeticAcrossTimeThenHarmonicAcrossCamerasIsAlgorithmOne
       ASSERT_NEAR(static_cast<double>(parts[i]) * count, whole[i], 1e-5 * whole[i] + 1e-9);
     }
   }
-}
-
-bool same(const cv::Mat& a, const cv::Mat& b) {
-  return a.size() == b.size() && a.type() == b.type() &&
-         std::equal(a.datastart, a.dataend, b.datastart);
-}
-
-bool same(const DsiPeaks& a, const DsiPeaks& b) {
-  return same(a.confidence, b.confidence) && same(a.plane, b.plane) && same(a.before, b.before) &&
-         same(a.after, b.after);
 }
 
 /// Rays of all cameras and sub-intervals, as the keyframe mapper makes them.
@@ -202,7 +164,7 @@ std::vector<CameraRays> raysOf(const Recording& recording, const ReferenceView& 
 
 TEST(TemporalFusion, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
   const tbb::global_control as_if_sixteen_cores(tbb::global_control::max_allowed_parallelism, 16);
-  const Recording recording = record(33, 3, 3000);
+  const Recording recording(33, 3, 3000);
   const ReferenceView view = ReferenceView::of(test::smallCamera());
   const std::vector<CameraRays> rays = raysOf(recording, view, 4);
   for (const int planes : {1, 2, 31, 40}) {
@@ -231,7 +193,7 @@ TEST(TemporalFusion, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
 }
 
 TEST(TemporalFusion, ACamerasPeaksAreThoseOfItsOwnSweep) {
-  const Recording recording = record(34, 3, 3000);
+  const Recording recording(34, 3, 3000);
   const ReferenceView view = ReferenceView::of(test::smallCamera());
   const DepthPlanes planes({0.5, 4.0, 20, PlaneSpacing::kInverse});
   for (const int count : {1, 4}) {
@@ -251,7 +213,7 @@ TEST(TemporalFusion, ACamerasPeaksAreThoseOfItsOwnSweep) {
 }
 
 TEST(TemporalFusion, ASilentSubintervalSilencesTheAndLikeRulesInItsSlotOnly) {
-  const Recording recording = record(35, 2, 4000);
+  const Recording recording(35, 2, 4000);
   const ReferenceView view = ReferenceView::of(test::smallCamera());
   const DepthPlanes planes({0.5, 4.0, 5, PlaneSpacing::kInverse});
   std::vector<CameraRays> rays = raysOf(recording, view, 2);
