@@ -3,7 +3,7 @@
 
 #include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
-#include <mrpt/obs/CObservationRobotPose.h>
+#include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
 
@@ -19,6 +19,7 @@
 #include "plugin/host_options.h"
 #include "plugin/mrpt_pose.h"
 #include "plugin/mrpt_time.h"
+#include "plugin/pose_observation.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 
@@ -33,17 +34,6 @@ CameraPacket packetOf(const CObservationEvents& observation) {
   packet.events = observation.events;
   packet.covered_until_ns = observation.covered_until_ns;
   return packet;
-}
-
-/// @throws std::invalid_argument where the observation has no time.
-StampedPose poseOf(const mrpt::obs::CObservationRobotPose& observation) {
-  if (observation.timestamp == INVALID_TIMESTAMP) {
-    throw std::invalid_argument("a pose of '" + observation.sensorLabel +
-                                "' has no time stamp: every pose must have one");
-  }
-  const Rigid3 T_world_sensor = rigidFrom(observation.pose.mean);
-  const Rigid3 T_rig_sensor = rigidFrom(observation.sensorPose);
-  return {nanosecondsFrom(observation.timestamp), T_world_sensor * T_rig_sensor.inverse()};
 }
 
 void handOut(const std::vector<KeyframeDepthMap>& keyframes,
@@ -67,16 +57,16 @@ mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& point
 
 }  // namespace
 
-CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder_options)
-    : options_(builder_options) {
+CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder_options) {
   setLoggerName("CEventFusionMapBuilder");
-  restart();
+  restart(builder_options);
 }
 
 CEventFusionMapBuilder::~CEventFusionMapBuilder() = default;
 
-void CEventFusionMapBuilder::restart() {
-  session_ = std::make_unique<MappingSession>(options_);
+void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options) {
+  session_ = std::make_unique<MappingSession>(builder_options);
+  options_ = builder_options;
   finished_ = false;
   ignored_observations_ = 0;
   newest_pose_.reset();
@@ -91,9 +81,7 @@ void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_option
   builder_options.mapper.validate();
   builder_options.cloud.validate();
   const std::lock_guard<std::mutex> lock(mutex_);
-  options_ = builder_options;
-
-  restart();
+  restart(builder_options);
 }
 
 EventFusionOptions CEventFusionMapBuilder::usedOptions() const {
@@ -163,12 +151,12 @@ void CEventFusionMapBuilder::warnOfSilence(const KeyframeDepthMap& keyframe) {
 }
 
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
-  using mrpt::obs::CObservationRobotPose;
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     advance([&](MappingSession& session) { session.addEvents(packetOf(*events)); });
-  } else if (const auto robot = std::dynamic_pointer_cast<CObservationRobotPose>(observation)) {
-    const StampedPose pose = poseOf(*robot);
+  } else if (const auto observed = poseIn(*observation)) {
     advance([&](MappingSession& session) {
+      const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
+      const StampedPose pose = {observed->t_ns, observed->T_world_body * T_body_rig};
       session.addPose(pose);
       if (!newest_pose_ || pose.t_ns >= newest_pose_->t_ns) newest_pose_ = pose;
     });
@@ -222,7 +210,7 @@ void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_ma
   const std::lock_guard<std::mutex> lock(mutex_);
   auto session = std::make_unique<MappingSession>(options_);
   for (const StoredKeyframe& keyframe : earlier) session->insertEarlier(worldPointsOf(keyframe));
-  restart();
+  restart(EventFusionOptions(options_));
   session_ = std::move(session);
   keyframes_ = std::move(earlier);
 }

@@ -54,7 +54,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   ~CEventFusionMapBuilder() override;
 
   /// Starts over with other options.
-  /// @throws std::invalid_argument where the options are not valid; nothing changes then.
+  /// @throws std::invalid_argument where the options are not valid, std::runtime_error where a file
+  /// that they name cannot be read; nothing changes then.
   void setOptions(const EventFusionOptions& builder_options);
   EventFusionOptions usedOptions() const;
   void setKeyframeTaker(KeyframeTaker taker);
@@ -62,7 +63,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void setDsiSink(DsiSink* sink);
 
   /// Takes events and poses; other observations are counted and ignored. A CObservationRobotPose of
-  /// a sensor on the rig gives T_world_rig = T_world_sensor * inverse(T_rig_sensor).
+  /// a sensor on the rig gives T_world_rig = T_world_sensor * inverse(T_rig_sensor), and with a
+  /// hand-eye transform in the options T_world_rig = T_world_sensor * T_body_rig.
   /// @throws std::invalid_argument where the observation contradicts its sensor or those before it;
   /// std::logic_error after `finish`.
   void processObservation(const mrpt::obs::CObservation::Ptr& observation);
@@ -110,7 +112,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void saveCurrentEstimationToImage(const std::string& file, bool format_emf_bmp = true) override;
 
  private:
-  void restart();
+  void restart(const EventFusionOptions& builder_options);
   void warnOfSilence(const KeyframeDepthMap& keyframe);
   /// Feeds the session under the lock, then maps and hands out what became due. What `feed` throws
   /// goes to the caller at the end.

@@ -58,12 +58,16 @@ FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
 }  // namespace
 
 MappingSession::MappingSession(const EventFusionOptions& options)
-    : options_(options), mapper_(mapperOptions(options)), cloud_(options.cloud) {}
+    : options_(options),
+      setup_(readRigSetup(options.rig)),
+      mapper_(mapperOptions(options)),
+      cloud_(options.cloud) {}
 
 void MappingSession::addEvents(CameraPacket packet) {
   if (packet.camera < 0) {
     throw std::invalid_argument("camera " + std::to_string(packet.camera) + ": must be 0 or above");
   }
+  refit(packet);
   admit(std::move(packet));
 
   // The next camera in line may be among those that wait for this one.
@@ -76,6 +80,21 @@ void MappingSession::addEvents(CameraPacket packet) {
     waiting_.erase(next);
     admit(std::move(freed));
   }
+}
+
+/// Gives a packet the calibration and the time offset that the options say.
+void MappingSession::refit(CameraPacket& packet) const {
+  const auto camera = static_cast<std::size_t>(packet.camera);
+  RigCamera& calibration = packet.calibration;
+  if (setup_.calibration) {
+    calibration = setup_.calibration->camera(
+        camera, CameraSize{calibration.model.width, calibration.model.height});
+  }
+  const std::vector<std::int64_t>& offsets_ns = options_.rig.time_offsets_ns;
+  if (offsets_ns.empty()) return;
+  requireOption(camera < offsets_ns.size(), "[rig] time_offsets_s (how many)", offsets_ns.size(),
+                "one per camera, and there is camera " + std::to_string(camera));
+  calibration.time_offset_ns = offsets_ns[camera];
 }
 
 /// Feeds a packet whose camera is in the rig or comes next; lets the others wait.
@@ -125,6 +144,13 @@ void MappingSession::completeRig() {
   }
   const int reference = options_.mapper.keyframe.reference_camera;
   requireOption(count == 0 || reference < count, "[dsi] reference_camera", reference, expected);
+  if (count > 0 && setup_.calibration) {
+    setup_.calibration->requireCameras(static_cast<std::size_t>(count));
+  }
+  const std::size_t offsets = options_.rig.time_offsets_ns.size();
+  requireOption(count == 0 || offsets == 0 || offsets == static_cast<std::size_t>(count),
+                "[rig] time_offsets_s (how many)", offsets,
+                "one per camera of the recording: " + std::to_string(count));
   rig_complete_ = true;
 }
 

@@ -10,6 +10,7 @@
 #include "maps/global_cloud.h"
 #include "maps/keyframe_cloud.h"
 #include "plugin/option_file.h"
+#include "plugin/rig_setup.h"
 #include "plugin/stage_timer.h"
 
 namespace efm {
@@ -23,7 +24,7 @@ struct TimeSpan {
 /// A stretch of one camera's recording.
 struct CameraPacket {
   int camera = 0;         ///< Index in the rig.
-  RigCamera calibration;  ///< The same in all packets of a camera.
+  RigCamera calibration;  ///< The same in all packets of a camera; the options may replace it.
   std::vector<Event> events;
   /// Everything that the camera saw before this time (its own clock) has been given by now.
   std::optional<std::int64_t> covered_until_ns;
@@ -45,7 +46,8 @@ struct SessionStatus {
 /// Use: add, and after each `mapDue`; at the end `finish`, and `mapDue` again.
 class MappingSession {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
+  /// @throws std::invalid_argument where the options are not valid; std::runtime_error naming a
+  /// file that they name and that cannot be read.
   explicit MappingSession(const EventFusionOptions& options);
 
   /// @throws std::invalid_argument where the packet contradicts its sensor or those before it, or
@@ -74,14 +76,18 @@ class MappingSession {
   std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;
 
   const GlobalCloud& cloud() const { return cloud_; }
+  /// What the options say of the rig.
+  const RigSetup& setup() const { return setup_; }
   SessionStatus status() const;
 
  private:
+  void refit(CameraPacket& packet) const;
   void admit(CameraPacket packet);
   void feed(CameraPacket packet);
   void completeRig();
 
   EventFusionOptions options_;
+  RigSetup setup_;
 
   FusionMapper mapper_;
   GlobalCloud cloud_;

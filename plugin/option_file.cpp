@@ -11,8 +11,10 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <type_traits>
 
 #include "mapping/quoted_text.h"
+#include "mapping/timestamp.h"
 
 namespace efm {
 namespace {
@@ -57,6 +59,8 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
+void parseInto(std::string_view text, std::filesystem::path& field) { field = text; }
+
 /// Items separated by commas. @return whether each is one.
 template <typename Item>
 bool parsesList(std::string_view text, std::vector<Item>& items) {
@@ -94,6 +98,21 @@ void parseInto(std::string_view text, MaxConfidence& field) {
     field = MaxConfidence::of(votes);
   } else {
     throw std::invalid_argument("must be a number, keyframe or sequence");
+  }
+}
+
+/// Seconds, exact to the nanosecond.
+void parseInto(std::string_view text, std::vector<std::int64_t>& field) {
+  field.clear();
+  while (!text.empty()) {
+    const std::size_t comma = text.find(',');
+    const std::optional<std::int64_t> t_ns = parseSeconds(trimmed(text.substr(0, comma)));
+    if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs || comma + 1 == text.size()) {
+      throw std::invalid_argument(
+          "must be seconds within 4.6e9 of 0, separated by commas, or nothing");
+    }
+    field.push_back(*t_ns);
+    text = comma == std::string_view::npos ? std::string_view{} : text.substr(comma + 1);
   }
 }
 
@@ -150,6 +169,12 @@ OptionValue valueOf(const MaxConfidence& field) {
   if (field.level == WhiteLevel::kFixed) return field.fixed;
   return std::string(field.level == WhiteLevel::kKeyframe ? "keyframe" : "sequence");
 }
+OptionValue valueOf(const std::filesystem::path& field) { return field.string(); }
+OptionValue valueOf(const std::vector<std::int64_t>& times_ns) {
+  std::string text;
+  for (const std::int64_t t_ns : times_ns) text += (text.empty() ? "" : ",") + formatSeconds(t_ns);
+  return text;
+}
 template <typename Enum, typename = std::enable_if_t<std::is_enum_v<Enum>>>
 OptionValue valueOf(Enum field) {
   return std::string(nameOf(field));
@@ -163,15 +188,18 @@ struct OptionKey {
   std::string_view key;
   std::function<void(EventFusionOptions&, std::string_view)> read;
   std::function<OptionValue(const EventFusionOptions&)> value;
+  bool is_path = false;
 };
 
 template <typename Field>
 OptionKey option(std::string_view section, std::string_view key, Field field) {
+  using Value = std::decay_t<std::invoke_result_t<Field, EventFusionOptions&>>;
   return {section, key,
           [field](EventFusionOptions& options, std::string_view text) {
             parseInto(text, field(options));
           },
-          [field](const EventFusionOptions& options) { return valueOf(field(options)); }};
+          [field](const EventFusionOptions& options) { return valueOf(field(options)); },
+          std::is_same_v<Value, std::filesystem::path>};
 }
 
 /// A key whose field is a std::optional, which a word of its own leaves empty.
@@ -199,7 +227,13 @@ const std::vector<OptionKey>& optionKeys() {
   using std::string_view_literals::operator""sv;
   static const std::vector<OptionKey> keys = {
       option(
+          "rig"sv, "calibration"sv, [](auto& o) -> auto& { return o.rig.calibration; }),
+      option(
+          "rig"sv, "hand_eye"sv, [](auto& o) -> auto& { return o.rig.hand_eye; }),
+      option(
           "rig"sv, "cameras"sv, [](auto& o) -> auto& { return o.mapper.cameras; }),
+      option(
+          "rig"sv, "time_offsets_s"sv, [](auto& o) -> auto& { return o.rig.time_offsets_ns; }),
       option(
           "rig"sv, "max_pose_gap_s"sv,
           [](auto& o) -> auto& { return o.mapper.trajectory.max_pose_gap_s; }),
@@ -410,7 +444,9 @@ void OptionReader::readFile(const std::filesystem::path& path) {
       std::filesystem::is_directory(path)) {
     throw std::runtime_error("cannot read the option file " + path.string());
   }
+  folder_ = path.parent_path();
   readText(text.str(), path.string());
+  folder_.clear();
 }
 
 void OptionReader::readText(std::string_view text, const std::string& name) {
@@ -480,7 +516,8 @@ void OptionReader::assign(std::string_view section, std::string_view key, std::s
     refuse({place, " ", printable(key), ": unknown key; known: ", knownKeys(section)});
   }
   try {
-    entry->read(options_, value);
+    const std::filesystem::path path = folder_ / value;
+    entry->read(options_, entry->is_path && !value.empty() ? path.native() : value);
   } catch (const std::invalid_argument& error) {
     refuse({place, " ", printable(key), " = ", printable(value), ": ", error.what()});
   }

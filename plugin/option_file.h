@@ -12,6 +12,7 @@
 
 #include "mapping/fusion_mapper.h"
 #include "maps/global_cloud.h"
+#include "plugin/rig_setup.h"
 
 namespace efm {
 
@@ -22,6 +23,7 @@ struct EventFusionOptions {
   /// (Ghosh and Gallego 2022, Sec. 3.1). Depth maps stay fused.
   bool late_fusion = false;
   GlobalCloudOptions cloud;
+  RigOptions rig;
 };
 
 using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
@@ -46,7 +48,8 @@ std::string textOf(const OptionValue& value);
 /// (`mrpt::config::CConfigFile` reads "abc" as 0 and ignores unknown keys and missing files.)
 ///
 /// Keys that are not given keep what they were. Comments start with ';', '#' or "//", at the start
-/// of a line or after a blank.
+/// of a line or after a blank. Paths are relative to the file that says them; on the command line,
+/// to where that was typed.
 class OptionReader {
  public:
   /// @param start what keys that are not given keep.
@@ -75,6 +78,7 @@ class OptionReader {
               const std::string& place);
 
   EventFusionOptions options_;
+  std::filesystem::path folder_;  // of the file being read, which paths in it are relative to
   std::map<std::pair<std::string, std::string>, std::string> places_;  // (section, key) -> where
 };
 

@@ -3,10 +3,15 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 #include "plugin/datasets/dataset_folder.h"
+#include "plugin/datasets/poses_file.h"
 #include "plugin/datasets/uzh_text.h"
 #include "plugin/rawlog_recording.h"
+#include "plugin/recording_with_poses.h"
+#include "plugin/refitted_recording.h"
+#include "plugin/rig_setup.h"
 
 namespace efm {
 namespace {
@@ -17,14 +22,14 @@ using Path = std::filesystem::path;
 struct Format {
   std::string name;
   bool (*looks_like)(const Path&);
-  std::unique_ptr<Recording> (*open)(const Path&);
+  std::unique_ptr<Recording> (*open)(const Path&, const GivenParts&);
   std::string looks;  ///< What `looks_like` looks for.
 };
 
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
       {"rawlog", [](const Path& source) { return std::filesystem::is_regular_file(source); },
-       [](const Path& source) -> std::unique_ptr<Recording> {
+       [](const Path& source, const GivenParts&) -> std::unique_ptr<Recording> {
          return std::make_unique<RawlogRecording>(source);
        },
        "a rawlog file"},
@@ -36,6 +41,19 @@ const std::vector<Format>& formats() {
   return all;
 }
 
+std::unique_ptr<Recording> openAs(const std::string& format, const Path& path,
+                                  const GivenParts& given) {
+  std::string expected;
+  for (const Format& known : formats()) {
+    if (format == known.name || (format == "auto" && known.looks_like(path))) {
+      return known.open(path, given);
+    }
+    expected += (expected.empty() ? "" : ", ") + known.looks;
+  }
+  if (format != "auto") throw std::runtime_error("'" + format + "' is not a known format");
+  throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
+}
+
 }  // namespace
 
 std::vector<std::string> recordingFormats() {
@@ -44,24 +62,27 @@ std::vector<std::string> recordingFormats() {
   return names;
 }
 
-std::unique_ptr<Recording> openRecording(const std::vector<Path>& sources,
-                                         const std::string& format) {
-  if (sources.size() != 1) {
-    throw std::runtime_error(std::to_string(sources.size()) + " sources: expected one");
+std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
+  if (source.files.size() != 1) {
+    throw std::runtime_error(std::to_string(source.files.size()) + " sources: expected one");
   }
-  const Path& source = sources.front();
-  if (!std::filesystem::exists(source)) {
-    throw std::runtime_error(source.string() + ": no such file or folder");
+  const Path& path = source.files.front();
+  if (!std::filesystem::exists(path)) {
+    throw std::runtime_error(path.string() + ": no such file or folder");
   }
-  std::string expected;
-  for (const Format& known : formats()) {
-    if (format == known.name || (format == "auto" && known.looks_like(source))) {
-      return known.open(source);
-    }
-    expected += (expected.empty() ? "" : ", ") + known.looks;
+  const RigSetup setup = readRigSetup({source.calibration, source.hand_eye, {}});
+  std::vector<StampedPose> poses;
+  if (!source.poses.empty()) poses = readPosesFile(source.poses);
+
+  const GivenParts given = {setup.calibration ? &*setup.calibration : nullptr, !poses.empty()};
+  std::unique_ptr<Recording> recording = openAs(source.format, path, given);
+  if (given.poses) {
+    recording = std::make_unique<RecordingWithPoses>(std::move(recording), std::move(poses));
   }
-  if (format != "auto") throw std::runtime_error("'" + format + "' is not a known format");
-  throw std::runtime_error(source.string() + ": not a recording; expected " + expected);
+  if (setup.calibration || setup.T_body_rig) {
+    recording = std::make_unique<RefittedRecording>(std::move(recording), setup);
+  }
+  return recording;
 }
 
 }  // namespace efm

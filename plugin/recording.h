@@ -36,15 +36,23 @@ class Recording {
   virtual RecordingCounts counts() const { return {}; }
 };
 
+/// Where a recording is, and what is given in place of what it holds itself: then a recording need
+/// not hold it at all.
+struct RecordingSource {
+  std::vector<std::filesystem::path> files;  ///< What the format needs; each of these takes one.
+  std::string format = "auto";               ///< One of `recordingFormats`; "auto" looks at it.
+  std::filesystem::path poses;               ///< TUM, T_world_body; empty: the recording's.
+  std::filesystem::path calibration;         ///< As `readCalibration` takes it; empty: as recorded.
+  std::filesystem::path hand_eye;            ///< As `readHandEye` takes it; empty: as recorded.
+};
+
 /// The formats that `openRecording` knows, "auto" first.
 std::vector<std::string> recordingFormats();
 
 /// Opens a recording: a rawlog, a dataset folder (camchain.yaml, camN/events.txt, poses.txt) or a
 /// folder in the UZH text layout (events.txt, groundtruth.txt, calib.txt).
-/// @param sources what the format needs; each of these takes one.
-/// @param format one of `recordingFormats`; "auto" looks at the source.
-/// @throws std::runtime_error naming what is missing or not understood, and what was looked for.
-std::unique_ptr<Recording> openRecording(const std::vector<std::filesystem::path>& sources,
-                                         const std::string& format = "auto");
+/// @throws std::runtime_error naming what is missing or not understood, and what was looked for;
+/// std::invalid_argument where the calibration is of other cameras.
+std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
 }  // namespace efm

@@ -32,15 +32,30 @@ std::shared_ptr<Arguments> onCommand(CLI::App& command, Run& run,
 template <typename Arguments>
 void addSource(CLI::App& command, Arguments& arguments) {
   command
-      .add_option("SOURCE", arguments.sources,
+      .add_option("SOURCE", arguments.source.files,
                   "The recording: a rawlog, or a folder with text files (camchain.yaml, "
                   "cam0/events.txt, poses.txt; or the UZH layout events.txt, groundtruth.txt, "
                   "calib.txt)")
       ->required();
   command
-      .add_option("--format", arguments.format, "How the recording is stored (auto: look at it)")
+      .add_option("--format", arguments.source.format,
+                  "How the recording is stored (auto: look at it)")
       ->check(CLI::IsMember(recordingFormats()))
       ->capture_default_str();
+  command
+      .add_option("--poses", arguments.source.poses,
+                  "Poses in place of the recording's: t tx ty tz qx qy qz qw, the rig in the world")
+      ->type_name("TUM.txt");
+  command
+      .add_option("--calibration", arguments.source.calibration,
+                  "Calibration in place of the recording's: a Kalibr camera chain (YAML), or fx fy "
+                  "cx cy k1 k2 p1 p2 k3 of one camera")
+      ->type_name("FILE");
+  command
+      .add_option("--hand-eye", arguments.source.hand_eye,
+                  "Where the rig is on the tracked body: YAML with T_body_rig, 4x4; the poses are "
+                  "then the body's")
+      ->type_name("FILE");
 }
 
 /// A time in seconds of the recording's own clock, exact to the nanosecond.

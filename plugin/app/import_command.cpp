@@ -36,7 +36,7 @@ std::string askedFor(const ImportArguments& arguments) {
 
 /// Times of the first and the last event of the whole recording.
 std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(const ImportArguments& arguments) {
-  const std::unique_ptr<Recording> recording = openRecording(arguments.sources, arguments.format);
+  const std::unique_ptr<Recording> recording = openRecording(arguments.source);
   std::optional<std::pair<std::int64_t, std::int64_t>> span_ns;
   while (const auto observation = recording->next()) {
     const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
@@ -64,7 +64,7 @@ void refuseStretchWithoutEvents(const ImportArguments& arguments) {
 
 int runImport(const ImportArguments& arguments) {
   const std::unique_ptr<Recording> recording =
-      cutTime(openRecording(arguments.sources, arguments.format), arguments.t0_ns, arguments.t1_ns);
+      cutTime(openRecording(arguments.source), arguments.t0_ns, arguments.t1_ns);
   RawlogWriter writer(arguments.out);
   std::map<std::string, std::uint64_t> events;  // per label
   std::uint64_t all_events = 0;

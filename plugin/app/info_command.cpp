@@ -137,7 +137,7 @@ void print(const Contents& contents, const RecordingCounts& counts) {
 
 int runInfo(const InfoArguments& arguments) {
   const std::unique_ptr<Recording> recording =
-      cutTime(openRecording(arguments.sources, arguments.format), arguments.t0_ns, arguments.t1_ns);
+      cutTime(openRecording(arguments.source), arguments.t0_ns, arguments.t1_ns);
   Contents contents;
   std::exception_ptr stopped;
   {

@@ -4,14 +4,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <string>
-#include <vector>
+
+#include "plugin/recording.h"
 
 namespace efm {
 
 struct InfoArguments {
-  std::vector<std::filesystem::path> sources;
-  std::string format = "auto";
+  RecordingSource source;
   std::optional<std::int64_t> t0_ns;
   std::optional<std::int64_t> t1_ns;
 };

@@ -17,7 +17,18 @@ EventFusionOptions optionsOf(const MappingArguments& arguments) {
   OptionReader reader;
   reader.readFile(arguments.config);
   for (const std::string& assignment : arguments.sets) reader.set(assignment);
-  return reader.options();
+  EventFusionOptions options = reader.options();
+  if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
+  if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
+  return options;
+}
+
+/// The recording with what the options say of its rig.
+RecordingSource sourceOf(const MappingArguments& arguments, const RigOptions& rig) {
+  RecordingSource source = arguments.source;
+  source.calibration = rig.calibration;
+  source.hand_eye = rig.hand_eye;
+  return source;
 }
 
 void printSummary(const MapReport& report, const std::filesystem::path& folder) {
@@ -62,7 +73,8 @@ int runMap(const MapArguments& arguments) {
     job.options = optionsOf(arguments);
     job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
     job.options.mapper.limits.validate();
-    const std::unique_ptr<Recording> recording = openRecording(arguments.sources, arguments.format);
+    const std::unique_ptr<Recording> recording =
+        openRecording(sourceOf(arguments, job.options.rig));
     output.emplace(arguments.out, OutputKind::kMap, job.options.mapper.keyframe.planes);
     job.take_keyframe = [&](const KeyframeDepthMap& keyframe) { output->writeKeyframe(keyframe); };
 
@@ -88,7 +100,8 @@ int runDepth(const DepthArguments& arguments) {
     job.options = optionsOf(arguments);
     job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
     job.options.mapper.validate();
-    const std::unique_ptr<Recording> recording = openRecording(arguments.sources, arguments.format);
+    const std::unique_ptr<Recording> recording =
+        openRecording(sourceOf(arguments, job.options.rig));
     output.emplace(arguments.out, OutputKind::kDepth, job.options.mapper.keyframe.planes);
 
     std::vector<CloudPoint> points;

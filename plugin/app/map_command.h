@@ -7,13 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "plugin/recording.h"
+
 namespace efm {
 
 /// What `map` and `depth` have in common on the command line.
 struct MappingArguments {
   std::filesystem::path config;
-  std::vector<std::filesystem::path> sources;
-  std::string format = "auto";
+  RecordingSource source;
   std::filesystem::path out;
   std::vector<std::string> sets;  ///< section.key=value
 };

@@ -10,37 +10,63 @@
 #include "plugin/datasets/camchain.h"
 #include "plugin/datasets/merged_recording.h"
 #include "plugin/datasets/poses_file.h"
+#include "plugin/recording_with_poses.h"
 
 namespace efm {
 namespace {
 
 namespace fs = std::filesystem;
 
+bool isFile(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+fs::path eventsOf(const fs::path& folder, std::size_t camera) {
+  return folder / ("cam" + std::to_string(camera)) / "events.txt";
+}
+
 std::vector<StampedPose> readPoses(const fs::path& folder) {
   for (const char* name : {"poses.txt", "groundtruth.txt"}) {
     std::error_code ignored;
     if (fs::exists(folder / name, ignored)) return readPosesFile(folder / name);
   }
-  throw std::runtime_error(folder.string() + ": no poses: expected poses.txt or groundtruth.txt");
+  throw std::runtime_error(folder.string() +
+                           ": no poses: expected poses.txt or groundtruth.txt, or --poses FILE");
+}
+
+/// One camera for each camN/events.txt.
+Rig rigOf(const Calibration& calibration, const fs::path& folder) {
+  Rig rig;
+  while (isFile(eventsOf(folder, rig.cameras.size()))) {
+    rig.cameras.push_back(calibration.camera(rig.cameras.size(), std::nullopt));
+  }
+  calibration.requireCameras(rig.cameras.size());
+  return rig;
+}
+
+Rig readRig(const fs::path& folder) {
+  if (isFile(folder / "camchain.yaml")) return readCamchain(folder / "camchain.yaml");
+  throw std::runtime_error(folder.string() +
+                           ": no calibration: expected camchain.yaml, or --calibration FILE");
 }
 
 }  // namespace
 
 bool looksLikeDatasetFolder(const fs::path& folder) {
-  std::error_code ignored;
-  return fs::is_regular_file(folder / "camchain.yaml", ignored) ||
-         fs::is_regular_file(folder / "cam0" / "events.txt", ignored);
+  return isFile(folder / "camchain.yaml") || isFile(eventsOf(folder, 0));
 }
 
-std::unique_ptr<Recording> openDatasetFolder(const fs::path& folder) {
-  Rig rig = readCamchain(folder / "camchain.yaml");
+std::unique_ptr<Recording> openDatasetFolder(const fs::path& folder, const GivenParts& given) {
+  Rig rig = given.calibration != nullptr ? rigOf(*given.calibration, folder) : readRig(folder);
   std::vector<EventTextReader> readers;
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
     const CameraModel& model = rig.cameras[camera].model;
-    readers.emplace_back(folder / ("cam" + std::to_string(camera)) / "events.txt",
-                         CameraSize{model.width, model.height});
+    readers.emplace_back(eventsOf(folder, camera), CameraSize{model.width, model.height});
   }
-  return std::make_unique<MergedRecording>(std::move(rig), std::move(readers), readPoses(folder));
+  auto events = std::make_unique<MergedRecording>(std::move(rig), std::move(readers));
+  if (given.poses) return events;
+  return std::make_unique<RecordingWithPoses>(std::move(events), readPoses(folder));
 }
 
 }  // namespace efm

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "plugin/datasets/calibration_file.h"
 #include "plugin/recording.h"
 
 namespace efm {
@@ -18,7 +19,9 @@ namespace efm {
 /// `openDatasetFolder` to say.
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 
-/// @throws std::runtime_error naming the file (and line) that is missing or not understood.
-std::unique_ptr<Recording> openDatasetFolder(const std::filesystem::path& folder);
+/// @throws std::runtime_error naming the file (and line) that is missing or not understood;
+/// std::invalid_argument where a given calibration has more or fewer cameras.
+std::unique_ptr<Recording> openDatasetFolder(const std::filesystem::path& folder,
+                                             const GivenParts& given = {});
 
 }  // namespace efm

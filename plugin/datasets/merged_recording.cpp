@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/datasets/merged_recording.h"
 
-#include <mrpt/obs/CObservationRobotPose.h>
-
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -14,25 +12,10 @@
 #include "plugin/mrpt_time.h"
 
 namespace efm {
-namespace {
-
-mrpt::obs::CObservation::Ptr observationOf(const StampedPose& pose) {
-  auto observation = mrpt::obs::CObservationRobotPose::Create();
-  observation->sensorLabel = "pose";
-  observation->timestamp = mrptTimeFrom(pose.t_ns);
-  observation->pose.mean = mrptPoseFrom(pose.T_world_rig);
-  return observation;
-}
-
-}  // namespace
-
-MergedRecording::MergedRecording(Rig rig, std::vector<EventTextReader> readers,
-                                 std::vector<StampedPose> poses)
-    : rig_(std::move(rig)), readers_(std::move(readers)), poses_(std::move(poses)) {
+MergedRecording::MergedRecording(Rig rig, std::vector<EventTextReader> readers)
+    : rig_(std::move(rig)), readers_(std::move(readers)) {
   requireOption(!readers_.empty() && readers_.size() == rig_.cameras.size(), "readers",
                 readers_.size(), "one per camera, at least one");
-  std::stable_sort(poses_.begin(), poses_.end(),
-                   [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
   if (!nextCamera()) {
     std::string files;
     for (const EventTextReader& reader : readers_) {
@@ -44,14 +27,9 @@ MergedRecording::MergedRecording(Rig rig, std::vector<EventTextReader> readers,
 
 mrpt::obs::CObservation::Ptr MergedRecording::next() {
   const std::optional<std::size_t> camera = nextCamera();
-  const std::int64_t t_ns = camera ? *readers_[*camera].nextTime() : kEndOfTimeNs;
-  const bool poses_left = next_pose_ < poses_.size();
-  if (poses_left && (!camera || poses_[next_pose_].t_ns <= t_ns)) {
-    place_ = "the poses";
-    return observationOf(poses_[next_pose_++]);
-  }
   if (!camera) return nullptr;
   place_ = readers_[*camera].file().string();
+  const std::int64_t t_ns = *readers_[*camera].nextTime();
   if (announced_ < readers_.size()) return packetOf(announced_++, t_ns, {});
   return packetOf(*camera, t_ns, readers_[*camera].nextPacket());
 }

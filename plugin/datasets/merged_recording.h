@@ -8,28 +8,23 @@
 #include <vector>
 
 #include "mapping/rig.h"
-#include "mapping/trajectory.h"
 #include "plugin/datasets/event_text.h"
 #include "plugin/recording.h"
 
 namespace efm {
 
-/// One event file per camera of a rig and the rig's poses, as observations in the order of time.
+/// One event file per camera of a rig, as observations in the order of time.
 ///
 /// When the first events come, an empty packet of each camera goes before them, so that the whole
 /// rig is known. Then a packet holds what its camera saw in a stretch of 10 ms. A packet is covered
 /// until its camera's next event, a camera's last one for good (`kEndOfTimeNs`): nobody waits for a
 /// camera that sees nothing, and one without any event is known to be silent from the beginning.
 /// The last packet of all is not covered: the recording ends there, it does not go on in silence.
-///
-/// Poses are CObservationRobotPose "pose" (T_world_rig), held in memory. MRPT rounds their times to
-/// 100 ns: at 300 px/s, 1.5e-5 px.
 class MergedRecording : public Recording {
  public:
   /// @param readers one per camera of the rig.
-  /// @param poses T_world_rig, in any order.
   /// @throws std::runtime_error where no camera has an event, and as the readers do.
-  MergedRecording(Rig rig, std::vector<EventTextReader> readers, std::vector<StampedPose> poses);
+  MergedRecording(Rig rig, std::vector<EventTextReader> readers);
 
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return place_; }
@@ -43,8 +38,6 @@ class MergedRecording : public Recording {
 
   Rig rig_;
   std::vector<EventTextReader> readers_;  // per camera
-  std::vector<StampedPose> poses_;        // in time order
-  std::size_t next_pose_ = 0;
   std::string place_ = "the recording";
   std::size_t announced_ = 0;  // cameras whose empty packet was given
 };

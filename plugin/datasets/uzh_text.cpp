@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -15,6 +16,7 @@
 #include "mapping/quoted_text.h"
 #include "plugin/datasets/merged_recording.h"
 #include "plugin/datasets/poses_file.h"
+#include "plugin/recording_with_poses.h"
 
 namespace efm {
 namespace {
@@ -45,6 +47,50 @@ std::vector<double> readNumbers(const fs::path& file) {
   return numbers;
 }
 
+/// That of the first image of images.txt that exists.
+std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
+  std::ifstream list(folder / "images.txt");
+  std::string line;
+  while (std::getline(list, line)) {
+    std::istringstream fields(line);
+    std::string time;
+    std::string name;
+    if (!(fields >> time >> name) || time[0] == '#') continue;
+    const fs::path file = folder / name;
+    std::error_code ignored;
+    if (!fs::is_regular_file(file, ignored)) continue;
+    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+    if (image.empty()) {
+      throw std::runtime_error(file.string() +
+                               ": cannot be read as an image: expected one as large as the sensor");
+    }
+    return CameraSize{image.cols, image.rows};
+  }
+  return std::nullopt;
+}
+
+void requireFile(const fs::path& folder, const char* name, const char* what, const char* option) {
+  std::error_code ignored;
+  if (fs::exists(folder / name, ignored)) return;
+  throw std::runtime_error(folder.string() + ": no " + what + ": expected " + name + ", or " +
+                           option + " FILE");
+}
+
+RigCamera ownCamera(const fs::path& folder) {
+  requireFile(folder, "calib.txt", "calibration", "--calibration");
+  RigCamera camera;
+  camera.model = readUzhCalibration(folder / "calib.txt", uzhSensorSize(folder));
+  return camera;
+}
+
+/// The folder knows its sensor's size for certain only from an image.
+RigCamera givenCamera(const Calibration& calibration, const fs::path& folder) {
+  calibration.requireCameras(1);
+  const bool says_size = calibration.rig.cameras[0].model.width > 0;
+  const std::optional<CameraSize> size = sizeOfImages(folder);
+  return calibration.camera(0, size || says_size ? size : kDavis240c);
+}
+
 }  // namespace
 
 bool looksLikeUzhFolder(const fs::path& folder) {
@@ -52,14 +98,18 @@ bool looksLikeUzhFolder(const fs::path& folder) {
   return fs::is_regular_file(folder / "events.txt", ignored);
 }
 
-std::unique_ptr<Recording> openUzhFolder(const fs::path& folder) {
-  const CameraSize size = uzhSensorSize(folder);
+std::unique_ptr<Recording> openUzhFolder(const fs::path& folder, const GivenParts& given) {
   Rig rig;
-  rig.cameras.emplace_back().model = readUzhCalibration(folder / "calib.txt", size);
+  rig.cameras.push_back(given.calibration != nullptr ? givenCamera(*given.calibration, folder)
+                                                     : ownCamera(folder));
+  const CameraModel& model = rig.cameras[0].model;
   std::vector<EventTextReader> readers;
-  readers.emplace_back(folder / "events.txt", size);
-  return std::make_unique<MergedRecording>(std::move(rig), std::move(readers),
-                                           readPosesFile(folder / "groundtruth.txt"));
+  readers.emplace_back(folder / "events.txt", CameraSize{model.width, model.height});
+  auto events = std::make_unique<MergedRecording>(std::move(rig), std::move(readers));
+  if (given.poses) return events;
+  requireFile(folder, "groundtruth.txt", "poses", "--poses");
+  return std::make_unique<RecordingWithPoses>(std::move(events),
+                                              readPosesFile(folder / "groundtruth.txt"));
 }
 
 CameraModel readUzhCalibration(const fs::path& file, CameraSize size) {
@@ -86,24 +136,7 @@ CameraModel readUzhCalibration(const fs::path& file, CameraSize size) {
 }
 
 CameraSize uzhSensorSize(const fs::path& folder) {
-  std::ifstream list(folder / "images.txt");
-  std::string line;
-  while (std::getline(list, line)) {
-    std::istringstream fields(line);
-    std::string time;
-    std::string name;
-    if (!(fields >> time >> name) || time[0] == '#') continue;
-    const fs::path file = folder / name;
-    std::error_code ignored;
-    if (!fs::is_regular_file(file, ignored)) continue;
-    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
-    if (image.empty()) {
-      throw std::runtime_error(file.string() +
-                               ": cannot be read as an image: expected one as large as the sensor");
-    }
-    return {image.cols, image.rows};
-  }
-  return kDavis240c;
+  return sizeOfImages(folder).value_or(kDavis240c);
 }
 
 }  // namespace efm

@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "mapping/camera.h"
+#include "plugin/datasets/calibration_file.h"
 #include "plugin/datasets/event_text.h"
 #include "plugin/recording.h"
 
@@ -19,8 +20,10 @@ namespace efm {
 /// Whether it is a folder with an events.txt; what else is missing is for `openUzhFolder` to say.
 bool looksLikeUzhFolder(const std::filesystem::path& folder);
 
-/// @throws std::runtime_error naming the file (and line) that is missing or not understood.
-std::unique_ptr<Recording> openUzhFolder(const std::filesystem::path& folder);
+/// @throws std::runtime_error naming the file (and line) that is missing or not understood;
+/// std::invalid_argument where a given calibration has more cameras or one of another size.
+std::unique_ptr<Recording> openUzhFolder(const std::filesystem::path& folder,
+                                         const GivenParts& given = {});
 
 /// Nine numbers; distortion is radtan with five coefficients, even where all are zero.
 /// @throws std::runtime_error naming the file, the value or the count, and what was expected.

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <random>
 #include <set>
 #include <sstream>
 
@@ -61,7 +62,10 @@ TEST(OptionReader, KeysThatAreNotGivenKeepTheirDefaults) {
 TEST(OptionReader, EveryKeyReachesItsField) {
   const EventFusionOptions options = optionsOf(R"(
 [rig]
+calibration = a.yaml
+hand_eye = /b.yaml
 cameras = 0, 2
+time_offsets_s = 0, 0.001
 max_pose_gap_s = 0.5
 exclude_silent = true
 [keyframes]
@@ -112,6 +116,9 @@ packet_error_px = 0
 )");
 
   const FusionMapperOptions& mapper = options.mapper;
+  EXPECT_EQ(options.rig.calibration, "a.yaml");
+  EXPECT_EQ(options.rig.hand_eye, "/b.yaml");
+  EXPECT_EQ(options.rig.time_offsets_ns, (std::vector<std::int64_t>{0, 1'000'000}));
   EXPECT_EQ(mapper.cameras, (std::vector<int>{0, 2}));
   EXPECT_EQ(mapper.trajectory.max_pose_gap_s, 0.5);
   EXPECT_TRUE(mapper.keyframe.exclude_silent);
@@ -158,6 +165,8 @@ packet_error_px = 0
 
 TEST(OptionReader, WhatIsListedReadsBackTheSame) {
   EventFusionOptions options;
+  options.rig.hand_eye = "rigs/b.yaml";
+  options.rig.time_offsets_ns = {-1, 1'600'000'000'000'000'001};
   options.mapper.cameras = {1, 0};
   options.mapper.trajectory.max_pose_gap_s = 0.1 + 0.2;  // 0.30000000000000004
   options.mapper.keyframe.extraction.max_confidence = MaxConfidence::of(1e-7);
@@ -297,6 +306,35 @@ TEST(OptionReader, LimitsMaySetEachOtherRightBeforeTheyAreChecked) {
   reader.set("dsi.max_depth_m=10");
 
   EXPECT_EQ(reader.options().mapper.keyframe.planes.min_depth_m, 6);
+}
+
+TEST(OptionReader, PathsAreRelativeToTheFileThatSaysThem) {
+  const auto folder = std::filesystem::temp_directory_path() /
+                      ("efm_option_paths_" + std::to_string(std::random_device()()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "rig.ini") << "[rig]\ncalibration = rigs/a.yaml\nhand_eye = /b.yaml\n";
+  OptionReader reader;
+  reader.readFile(folder / "rig.ini");
+  EXPECT_EQ(reader.options().rig.calibration, folder / "rigs" / "a.yaml");
+  EXPECT_EQ(reader.options().rig.hand_eye, "/b.yaml");
+  reader.set("rig.calibration=c.yaml");
+  EXPECT_EQ(reader.options().rig.calibration, "c.yaml") << "typed, not said by a file";
+  reader.set("rig.calibration=");
+  EXPECT_EQ(reader.options().rig.calibration, "") << "the recording's own";
+  std::filesystem::remove_all(folder);
+}
+
+TEST(OptionReader, TimeOffsetsAreExactToTheNanosecond) {
+  const auto offsets = [](const std::string& text) {
+    return optionsOf("[rig]\ntime_offsets_s = " + text + "\n").rig.time_offsets_ns;
+  };
+  EXPECT_EQ(offsets("0, -0.042, 1600000000.123456789"),
+            (std::vector<std::int64_t>{0, -42'000'000, 1'600'000'000'123'456'789}));
+  EXPECT_TRUE(offsets("").empty());
+  for (const std::string list : {"0,", "0 1", "a", "0,,1", "5e9", "nan"}) {
+    EXPECT_THAT(errorOf("[rig]\ntime_offsets_s = " + list + "\n"), HasSubstr("must be seconds"))
+        << list;
+  }
 }
 
 TEST(OptionReader, WrongSetsAreErrorsThatNameThem) {

@@ -71,7 +71,8 @@ TEST_F(DatasetFolder, OtherFilesDoNotMatter) {
 TEST_F(DatasetFolder, IsKnownByItsCalibrationOrItsFirstCamera) {
   remove("camchain.yaml");
   EXPECT_TRUE(looksLikeDatasetFolder(folder()));
-  EXPECT_THAT(errorOfOpening(), HasSubstr("camchain.yaml: cannot be opened"));
+  EXPECT_THAT(errorOfOpening(),
+              HasSubstr(": no calibration: expected camchain.yaml, or --calibration FILE"));
   remove("cam0/events.txt");
   EXPECT_FALSE(looksLikeDatasetFolder(folder()));
   EXPECT_FALSE(looksLikeDatasetFolder(folder() / "poses.txt"));
@@ -87,8 +88,9 @@ TEST_F(DatasetFolder, WithoutPosesIsAnErrorThatSaysWhatIsLookedFor) {
   write("poses.txt", "# none\n");
   EXPECT_THAT(errorOfOpening(), HasSubstr("poses.txt: no poses"));
   remove("poses.txt");
-  EXPECT_THAT(errorOfOpening(), AllOf(StartsWith(folder().string()),
-                                      HasSubstr("expected poses.txt or groundtruth.txt")));
+  EXPECT_THAT(errorOfOpening(),
+              AllOf(StartsWith(folder().string()),
+                    HasSubstr("expected poses.txt or groundtruth.txt, or --poses FILE")));
 }
 
 TEST_F(DatasetFolder, ErrorsInsideAFileNameItAndTheLine) {

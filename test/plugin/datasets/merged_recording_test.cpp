@@ -12,6 +12,7 @@
 #include "plugin/CObservationEvents.h"
 #include "plugin/mrpt_pose.h"
 #include "plugin/mrpt_time.h"
+#include "plugin/recording_with_poses.h"
 #include "test/plugin/datasets/files.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -49,7 +50,8 @@ std::vector<std::string> shortly(Recording& recording) {
 class MergedRecordingTest : public TemporaryFolder {
  protected:
   /// @param texts of each camera's events; camera n stands n metres to the right.
-  MergedRecording open(const std::vector<std::string>& texts, std::vector<StampedPose> poses = {}) {
+  RecordingWithPoses open(const std::vector<std::string>& texts,
+                          std::vector<StampedPose> poses = {}) {
     Rig rig;
     std::vector<EventTextReader> readers;
     for (std::size_t n = 0; n < texts.size(); ++n) {
@@ -62,7 +64,8 @@ class MergedRecordingTest : public TemporaryFolder {
       writeFile(file, texts[n]);
       readers.emplace_back(file, CameraSize{240, 180});
     }
-    return MergedRecording(std::move(rig), std::move(readers), std::move(poses));
+    return RecordingWithPoses(std::make_unique<MergedRecording>(std::move(rig), std::move(readers)),
+                              std::move(poses));
   }
 };
 
@@ -74,7 +77,7 @@ StampedPose poseAt(std::int64_t t_ns) {
 }
 
 TEST_F(MergedRecordingTest, ComesInTheOrderOfTimePosesBeforePacketsThatBeginThenOrLater) {
-  MergedRecording recording = open(
+  RecordingWithPoses recording = open(
       {"0.012 0 0 0\n0.018 0 0 0\n0.031 0 0 0\n", "0.015 0 0 0\n0.022 0 0 0\n"},
       {poseAt(31 * kMs), poseAt(5 * kMs), poseAt(12 * kMs), poseAt(16 * kMs), poseAt(90 * kMs)});
   EXPECT_THAT(shortly(recording),
@@ -84,7 +87,7 @@ TEST_F(MergedRecordingTest, ComesInTheOrderOfTimePosesBeforePacketsThatBeginThen
 }
 
 TEST_F(MergedRecordingTest, APacketTellsItsCameraAndItsEvents) {
-  MergedRecording recording = open({"0.1 1 2 0\n", "0.100000049 3 4 1\n"});
+  RecordingWithPoses recording = open({"0.1 1 2 0\n", "0.100000049 3 4 1\n"});
   const auto observations = readAll(recording);
   ASSERT_EQ(observations.size(), 4U);
   const auto& packet = dynamic_cast<const CObservationEvents&>(*observations[3]);
@@ -99,7 +102,7 @@ TEST_F(MergedRecordingTest, APacketTellsItsCameraAndItsEvents) {
 TEST_F(MergedRecordingTest, APoseIsTheRigsInTheWorld) {
   StampedPose pose = poseAt(1'700'000'000'123'456'789);
   pose.T_world_rig = {Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {1, 2, 3}};
-  MergedRecording recording = open({"1700000001 0 0 0\n"}, {pose});
+  RecordingWithPoses recording = open({"1700000001 0 0 0\n"}, {pose});
   const auto observation = recording.next();
   const auto& robot = dynamic_cast<const mrpt::obs::CObservationRobotPose&>(*observation);
   EXPECT_EQ(robot.sensorLabel, "pose");
@@ -110,7 +113,7 @@ TEST_F(MergedRecordingTest, APoseIsTheRigsInTheWorld) {
 }
 
 TEST_F(MergedRecordingTest, APacketIsCoveredUntilItsCamerasNextEvent) {
-  MergedRecording recording = open({"0.012 0 0 0\n0.018 0 0 0\n5 0 0 0\n", "0.015 0 0 0\n"});
+  RecordingWithPoses recording = open({"0.012 0 0 0\n0.018 0 0 0\n5 0 0 0\n", "0.015 0 0 0\n"});
   std::vector<std::optional<std::int64_t>> covered;
   for (const auto& observation : readAll(recording)) {
     covered.push_back(dynamic_cast<const CObservationEvents&>(*observation).covered_until_ns);
@@ -122,7 +125,7 @@ TEST_F(MergedRecordingTest, APacketIsCoveredUntilItsCamerasNextEvent) {
 }
 
 TEST_F(MergedRecordingTest, ACameraWithoutEventsIsKnownToBeSilentFromTheBeginning) {
-  MergedRecording recording = open({"", "0.5 0 0 0\n0.6 0 0 0\n", "# nothing\n"});
+  RecordingWithPoses recording = open({"", "0.5 0 0 0\n0.6 0 0 0\n", "# nothing\n"});
   const auto observations = readAll(recording);
   std::vector<std::string> texts;
   texts.reserve(observations.size());
@@ -145,7 +148,7 @@ TEST_F(MergedRecordingTest, WithoutAnyEventIsAnErrorThatNamesTheFiles) {
 TEST_F(MergedRecordingTest, ACameraWhoseFileBreaksOffIsAnErrorWhenItIsReached) {
   std::string text;
   for (int i = 0; i < 200'000; ++i) text += std::to_string(i / 1000) + ".5 1 2 0\n";
-  MergedRecording recording = open({text + "900 1"});
+  RecordingWithPoses recording = open({text + "900 1"});
   EXPECT_NO_THROW(recording.next());
   EXPECT_THAT(errorOf([&] { readAll(recording); }),
               AllOf(HasSubstr("events.txt:200001: "), HasSubstr("the file ends")));
@@ -154,7 +157,7 @@ TEST_F(MergedRecordingTest, ACameraWhoseFileBreaksOffIsAnErrorWhenItIsReached) {
 TEST_F(MergedRecordingTest, ProgressGoesFromTheBeginningToOne) {
   std::string text;
   for (int i = 0; i < 400'000; ++i) text += std::to_string(i / 1000) + ".5 1 2 0\n";  // 5 MB
-  MergedRecording recording = open({text, "1 0 0 0\n"});
+  RecordingWithPoses recording = open({text, "1 0 0 0\n"});
   recording.next();
   double before = recording.progress();
   EXPECT_LT(before, 0.5);
@@ -166,7 +169,7 @@ TEST_F(MergedRecordingTest, ProgressGoesFromTheBeginningToOne) {
 }
 
 TEST_F(MergedRecordingTest, SortedEventsOfAllCamerasAreCounted) {
-  MergedRecording recording =
+  RecordingWithPoses recording =
       open({"0.2 0 0 0\n0.199 0 0 0\n", "0.1 0 0 0\n0.099 0 0 0\n0.098 0 0 0\n"});
   readAll(recording);
   EXPECT_EQ(recording.counts().sorted_events, 3U);

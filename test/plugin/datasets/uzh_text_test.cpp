@@ -94,9 +94,9 @@ TEST_F(UzhText, AnImageThatCannotBeReadIsAnError) {
 TEST_F(UzhText, AMissingFileIsNamed) {
   EXPECT_TRUE(looksLikeUzhFolder(folder()));
   remove("groundtruth.txt");
-  EXPECT_THAT(errorOfOpening(), HasSubstr("groundtruth.txt: cannot be opened"));
+  EXPECT_THAT(errorOfOpening(), HasSubstr(": no poses: expected groundtruth.txt, or --poses FILE"));
   remove("calib.txt");
-  EXPECT_THAT(errorOfOpening(), HasSubstr("calib.txt: cannot be opened"));
+  EXPECT_THAT(errorOfOpening(), HasSubstr(": no calibration: expected calib.txt, or --calibration FILE"));
   remove("events.txt");
   EXPECT_FALSE(looksLikeUzhFolder(folder()));
   EXPECT_FALSE(looksLikeUzhFolder(folder() / "nowhere"));

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "mapping/rig.h"
+#include "plugin/datasets/event_text.h"
+
+namespace efm {
+
+/// A rig's calibration from a file of its own.
+struct Calibration {
+  std::filesystem::path file;
+  Rig rig;  ///< Cameras without width and height where the file does not say them.
+
+  /// Camera `index` of the recording.
+  /// @param sensor its size where the recording knows it.
+  /// @throws std::invalid_argument naming the file, where it has no such camera, has one of another
+  /// size, or nothing says the size.
+  RigCamera camera(std::size_t index, const std::optional<CameraSize>& sensor) const;
+
+  /// @throws std::invalid_argument naming the file, where it has more or fewer cameras.
+  void requireCameras(std::size_t count) const;
+};
+
+/// What a folder of text files need not hold, because it was given beside it.
+struct GivenParts {
+  const Calibration* calibration = nullptr;  ///< Null: the folder's own.
+  bool poses = false;                        ///< They are put in later.
+};
+
+/// Reads a camera chain as `readCamchain` does, or nine numbers as `readUzhCalibration` does, which
+/// leave the sensor's size open.
+/// @throws std::runtime_error naming the file, the place, the value and what was expected.
+Calibration readCalibration(const std::filesystem::path& file);
+
+}  // namespace efm
