@@ -69,7 +69,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options) 
   options_ = builder_options;
   finished_ = false;
   ignored_observations_ = 0;
-  newest_pose_.reset();
+  reckoning_ = {};
   keyframes_.clear();
   newest_depth_ = {};
   silent_cameras_.clear();
@@ -156,9 +156,8 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
   } else if (const auto observed = poseIn(*observation)) {
     advance([&](MappingSession& session) {
       const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
-      const StampedPose pose = {observed->t_ns, observed->T_world_body * T_body_rig};
-      session.addPose(pose);
-      if (!newest_pose_ || pose.t_ns >= newest_pose_->t_ns) newest_pose_ = pose;
+      session.addPose({observed->t_ns, observed->T_world_body * T_body_rig},
+                      *poseSourceOf(*observation));
     });
   } else {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -218,12 +217,19 @@ void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_ma
 mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   auto estimate = mrpt::poses::CPose3DPDFGaussian::Create();
-  if (newest_pose_) estimate->mean = mrptPoseFrom(newest_pose_->T_world_rig);
+  const std::optional<StampedPose>& newest = session_->newestPose();
+  if (newest) estimate->mean = mrptPoseFrom(newest->T_world_rig);
   return estimate;
 }
 
-void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollection& /*action*/,
+void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollection& action,
                                                       mrpt::obs::CSensoryFrame& observations) {
+  mrpt::obs::CObservation::Ptr pose;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    pose = reckoning_.poseAfter(action, observations);
+  }
+  if (pose) processObservation(pose);
   for (const mrpt::obs::CObservation::Ptr& observation : observations) {
     processObservation(observation);
   }

@@ -17,6 +17,7 @@
 
 #include "maps/cloud_point.h"
 #include "plugin/CEventFusionMap.h"
+#include "plugin/dead_reckoning.h"
 #include "plugin/mapping_session.h"
 #include "plugin/option_file.h"
 #include "plugin/stored_keyframe.h"
@@ -62,7 +63,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// Receives every fused plane of every keyframe; not owned, may be null.
   void setDsiSink(DsiSink* sink);
 
-  /// Takes events and poses; other observations are counted and ignored. A CObservationRobotPose of
+  /// Takes events and poses (CObservationRobotPose, CObservationOdometry), the latter of one
+  /// source: see PoseChoice; other observations are counted and ignored. A CObservationRobotPose of
   /// a sensor on the rig gives T_world_rig = T_world_sensor * inverse(T_rig_sensor), and with a
   /// hand-eye transform in the options T_world_rig = T_world_sensor * T_body_rig.
   /// @throws std::invalid_argument where the observation contradicts its sensor or those before it;
@@ -93,9 +95,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// @throws std::invalid_argument where a frame of the initial map is no keyframe.
   void initialize(const mrpt::maps::CSimpleMap& initial_map = mrpt::maps::CSimpleMap(),
                   const mrpt::poses::CPosePDF* x0 = nullptr) override;
-  /// The newest pose of the rig that came in, without covariance; the identity before the first.
+  /// The newest pose of the rig that is used, without covariance; the identity before the first.
   mrpt::poses::CPose3DPDF::Ptr getCurrentPoseEstimation() const override;
-  /// Processes each observation of the frame; the action says nothing that is used.
+  /// Takes the action's movement for a pose (see DeadReckoning), then each observation of the
+  /// frame.
   void processActionObservation(mrpt::obs::CActionCollection& action,
                                 mrpt::obs::CSensoryFrame& observations) override;
   /// One entry per keyframe: the pose of its reference view, and a frame that holds its cloud; see
@@ -131,7 +134,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::unique_ptr<MappingSession> session_;
   bool finished_ = false;
   std::uint64_t ignored_observations_ = 0;
-  std::optional<StampedPose> newest_pose_;
+  DeadReckoning reckoning_;  // from the actions
   std::vector<StoredKeyframe> keyframes_;
   cv::Mat1f newest_depth_;        // of the newest keyframe
   std::set<int> silent_cameras_;  // that were warned of

@@ -61,7 +61,8 @@ MappingSession::MappingSession(const EventFusionOptions& options)
     : options_(options),
       setup_(readRigSetup(options.rig)),
       mapper_(mapperOptions(options)),
-      cloud_(options.cloud) {}
+      cloud_(options.cloud),
+      pose_choice_(options.rig.pose_source) {}
 
 void MappingSession::addEvents(CameraPacket packet) {
   if (packet.camera < 0) {
@@ -151,12 +152,20 @@ void MappingSession::completeRig() {
   requireOption(count == 0 || offsets == 0 || offsets == static_cast<std::size_t>(count),
                 "[rig] time_offsets_s (how many)", offsets,
                 "one per camera of the recording: " + std::to_string(count));
+  take(pose_choice_.settle());
   rig_complete_ = true;
 }
 
-void MappingSession::addPose(const StampedPose& pose) {
-  mapper_.addPose(pose);
-  extend(status_.poses, pose.t_ns);
+void MappingSession::addPose(const StampedPose& pose, const PoseSource& source) {
+  take(pose_choice_.add(source, pose));
+}
+
+void MappingSession::take(const std::vector<StampedPose>& poses) {
+  for (const StampedPose& pose : poses) {
+    mapper_.addPose(pose);
+    extend(status_.poses, pose.t_ns);
+    if (!newest_pose_ || pose.t_ns >= newest_pose_->t_ns) newest_pose_ = pose;
+  }
 }
 
 void MappingSession::insertEarlier(const std::vector<CloudPoint>& points) {
@@ -170,6 +179,7 @@ void MappingSession::completeEarly() {
 }
 
 void MappingSession::finish() {
+  take(pose_choice_.settle());
   mapper_.finish();
   completeRig();
   if (!waiting_.empty()) {
@@ -201,12 +211,21 @@ std::vector<ViewPoint> MappingSession::pointsOf(const KeyframeDepthMap& keyframe
 SessionStatus MappingSession::status() const {
   SessionStatus status = status_;
   status.counts = mapper_.counts();
+  status.pose_source = pose_choice_.chosen();
+  status.other_poses = pose_choice_.unused();
   return status;
 }
 
 std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
   if (!status.events) return "the recording has no events";
-  if (!status.poses) return "the recording has no poses";
+  if (!status.poses) {
+    std::string why = "the recording has no poses";
+    const char* before = " of the source that [rig] pose_source says, but of ";
+    for (const auto& [source, count] : status.other_poses) {
+      why += std::exchange(before, ", ") + asText(source);
+    }
+    return why;
+  }
   const std::string spans =
       "the events span " + asText(*status.events) + ", the poses " + asText(*status.poses);
   const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "maps/global_cloud.h"
 #include "maps/keyframe_cloud.h"
 #include "plugin/option_file.h"
+#include "plugin/pose_choice.h"
 #include "plugin/rig_setup.h"
 #include "plugin/stage_timer.h"
 
@@ -36,7 +38,9 @@ struct SessionStatus {
   StageSeconds seconds;  ///< sweep, depth and map; the rest is the caller's.
   std::optional<TimeSpan> events;
   std::optional<TimeSpan> poses;
-  std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: those that it had no event for.
+  std::optional<PoseSource> pose_source;            ///< Whose poses are used.
+  std::map<PoseSource, std::uint64_t> other_poses;  ///< Of other sources: not used.
+  std::vector<std::uint64_t> silent_keyframes;      ///< Per camera: those that it had no event for.
 };
 
 /// From packets of events and poses, in the order of a recording, to keyframes and the global
@@ -54,8 +58,10 @@ class MappingSession {
   /// its camera first appears more than a second after the recording's first event: the rig is
   /// complete by then; or where the options name a camera that the rig does not have.
   void addEvents(CameraPacket packet);
+  /// Poses of one source are used, see PoseChoice; a better one is waited for until the rig is
+  /// complete.
   /// @throws std::invalid_argument where the pose is not finite.
-  void addPose(const StampedPose& pose);
+  void addPose(const StampedPose& pose, const PoseSource& source = {});
   /// Puts a keyframe of an earlier map into the cloud, before those to come.
   /// @throws std::invalid_argument as GlobalCloud::insert does.
   void insertEarlier(const std::vector<CloudPoint>& points);
@@ -78,6 +84,8 @@ class MappingSession {
   const GlobalCloud& cloud() const { return cloud_; }
   /// What the options say of the rig.
   const RigSetup& setup() const { return setup_; }
+  /// Of those that are used.
+  const std::optional<StampedPose>& newestPose() const { return newest_pose_; }
   SessionStatus status() const;
 
  private:
@@ -85,15 +93,18 @@ class MappingSession {
   void admit(CameraPacket packet);
   void feed(CameraPacket packet);
   void completeRig();
+  void take(const std::vector<StampedPose>& poses);
 
   EventFusionOptions options_;
   RigSetup setup_;
 
   FusionMapper mapper_;
   GlobalCloud cloud_;
+  PoseChoice pose_choice_;
   bool rig_complete_ = false;
   std::vector<CameraPacket> waiting_;  // for a camera of a lower index to appear
-  SessionStatus status_;               // counts: see status()
+  std::optional<StampedPose> newest_pose_;
+  SessionStatus status_;  // counts: see status()
 };
 
 /// Says in a sentence why a session that is finished made no keyframe: no events, no poses, poses

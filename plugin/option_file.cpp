@@ -59,6 +59,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
+void parseInto(std::string_view text, std::string& field) { field = text; }
 void parseInto(std::string_view text, std::filesystem::path& field) { field = text; }
 
 /// Items separated by commas. @return whether each is one.
@@ -162,6 +163,7 @@ OptionValue valueOf(const std::vector<int>& field) {
   for (const int item : field) text += (text.empty() ? "" : ",") + std::to_string(item);
   return text;
 }
+OptionValue valueOf(const std::string& field) { return field; }
 OptionValue valueOf(const Eigen::Vector3d& field) {
   return shortestText(field.x()) + "," + shortestText(field.y()) + "," + shortestText(field.z());
 }
@@ -234,6 +236,8 @@ const std::vector<OptionKey>& optionKeys() {
           "rig"sv, "cameras"sv, [](auto& o) -> auto& { return o.mapper.cameras; }),
       option(
           "rig"sv, "time_offsets_s"sv, [](auto& o) -> auto& { return o.rig.time_offsets_ns; }),
+      option(
+          "rig"sv, "pose_source"sv, [](auto& o) -> auto& { return o.rig.pose_source; }),
       option(
           "rig"sv, "max_pose_gap_s"sv,
           [](auto& o) -> auto& { return o.mapper.trajectory.max_pose_gap_s; }),

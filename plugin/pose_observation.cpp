@@ -1,30 +1,45 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/pose_observation.h"
 
+#include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 
 #include <stdexcept>
 
+#include "mapping/quoted_text.h"
+#include "plugin/dead_reckoning.h"
 #include "plugin/mrpt_pose.h"
 #include "plugin/mrpt_time.h"
 
 namespace efm {
 
+using mrpt::obs::CObservationOdometry;
 using mrpt::obs::CObservationRobotPose;
 
-bool isPose(const mrpt::obs::CObservation& observation) {
-  return dynamic_cast<const CObservationRobotPose*>(&observation) != nullptr;
+std::optional<PoseSource> poseSourceOf(const mrpt::obs::CObservation& observation) {
+  const std::string& label = observation.sensorLabel;
+  if (dynamic_cast<const CObservationRobotPose*>(&observation) != nullptr) {
+    return PoseSource{label == kActionsLabel ? PoseKind::kActions : PoseKind::kPose, label};
+  }
+  if (dynamic_cast<const CObservationOdometry*>(&observation) != nullptr) {
+    return PoseSource{PoseKind::kOdometry, label};
+  }
+  return std::nullopt;
 }
 
 std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation) {
   const auto* robot = dynamic_cast<const CObservationRobotPose*>(&observation);
-  if (robot == nullptr) return std::nullopt;
-  if (robot->timestamp == INVALID_TIMESTAMP) {
-    throw std::invalid_argument("a pose of '" + robot->sensorLabel +
-                                "' has no time stamp: every pose must have one");
+  const auto* odometry = dynamic_cast<const CObservationOdometry*>(&observation);
+  if (robot == nullptr && odometry == nullptr) return std::nullopt;
+  if (observation.timestamp == INVALID_TIMESTAMP) {
+    throw std::invalid_argument("a pose of " + inQuotes(observation.sensorLabel) +
+                                " has no time stamp: every pose must have one");
   }
-  return ObservedPose{nanosecondsFrom(robot->timestamp), rigidFrom(robot->pose.mean),
-                      rigidFrom(robot->sensorPose).inverse()};
+  const std::int64_t t_ns = nanosecondsFrom(observation.timestamp);
+  if (robot == nullptr) {
+    return ObservedPose{t_ns, rigidFrom(mrpt::poses::CPose3D(odometry->odometry)), {}};
+  }
+  return ObservedPose{t_ns, rigidFrom(robot->pose.mean), rigidFrom(robot->sensorPose).inverse()};
 }
 
 mrpt::obs::CObservation::Ptr poseObservation(const ObservedPose& pose, const std::string& label) {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "mapping/trajectory.h"
+#include "plugin/pose_choice.h"
 
 namespace efm {
 
@@ -17,11 +17,12 @@ struct ObservedPose {
   Rigid3 T_body_rig;    ///< As the observation says; the identity where it does not.
 };
 
-/// Whether the observation is a CObservationRobotPose.
-bool isPose(const mrpt::obs::CObservation& observation);
+/// Who says a pose: a CObservationRobotPose (one that is labelled "actions" was composed from them)
+/// or a CObservationOdometry. @return nothing where the observation is neither.
+std::optional<PoseSource> poseSourceOf(const mrpt::obs::CObservation& observation);
 
 /// What a pose's observation says: T_world_body is its pose, T_body_rig the inverse of its sensor's
-/// pose on the robot.
+/// pose on the robot; odometry is a pose in the plane z = 0, of which velocities do not matter.
 /// @return nothing where it is none. @throws std::invalid_argument where it has no time.
 std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation);
 
@@ -29,6 +30,7 @@ std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation);
 mrpt::obs::CObservation::Ptr poseObservation(const ObservedPose& pose, const std::string& label);
 
 /// Says where the rig is on the tracked body, in place of what a pose's observation says.
+/// CObservationOdometry cannot hold it and stays as it is.
 void setBodyToRig(mrpt::obs::CObservation& pose, const Rigid3& T_body_rig);
 
 }  // namespace efm

@@ -64,18 +64,31 @@ void RawlogRecording::readEntry() {
   auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);
   const mrpt::serialization::CSerializable::Ptr entry = archive.ReadObject();
   if (!entry) throw std::runtime_error("an empty object");
+  if (auto action = std::dynamic_pointer_cast<mrpt::obs::CActionCollection>(entry)) {
+    actions_.push_back(action);
+    return;
+  }
   if (auto observation = std::dynamic_pointer_cast<mrpt::obs::CObservation>(entry)) {
+    takeActions({});
     if (!IS_CLASS(*observation, mrpt::obs::CObservationComment)) pending_.push_back(observation);
     return;
   }
   if (auto frame = std::dynamic_pointer_cast<mrpt::obs::CSensoryFrame>(entry)) {
+    takeActions(*frame);
     for (const auto& observation : *frame) pending_.push_back(observation);
     return;
   }
-  if (!std::dynamic_pointer_cast<mrpt::obs::CActionCollection>(entry)) {
-    throw std::runtime_error(std::string("an object of class '") +
-                             entry->GetRuntimeClass()->className +
-                             "': expected observations, sensory frames and actions");
+  throw std::runtime_error(std::string("an object of class '") +
+                           entry->GetRuntimeClass()->className +
+                           "': expected observations, sensory frames and actions");
+}
+
+/// Turns the actions so far into poses, at the frame's time where they have none.
+void RawlogRecording::takeActions(const mrpt::obs::CSensoryFrame& frame) {
+  while (!actions_.empty()) {
+    const auto action = actions_.front();
+    actions_.pop_front();
+    if (auto pose = reckoning_.poseAfter(*action, frame)) pending_.push_back(pose);
   }
 }
 
@@ -96,7 +109,9 @@ mrpt::obs::CObservation::Ptr RawlogRecording::next() {
     try {
       if (stream_.atEnd()) {
         if (entries_ == 0) throw std::runtime_error("the file is empty");
-        return nullptr;
+        takeActions({});
+        if (pending_.empty()) return nullptr;
+        break;
       }
       readEntry();
     } catch (const std::exception& error) {

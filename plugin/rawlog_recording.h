@@ -4,13 +4,15 @@
 #include <deque>
 #include <filesystem>
 
+#include "plugin/dead_reckoning.h"
 #include "plugin/gz_stream.h"
 #include "plugin/recording.h"
 
 namespace efm {
 
 /// A rawlog, gzip-compressed or plain, read entry by entry: observations as they are, and those of
-/// sensory frames one after the other; actions and comments are passed over.
+/// sensory frames one after the other. The movements of actions are composed to poses, which come
+/// before the frame that follows (see DeadReckoning); other actions and comments are passed over.
 class RawlogRecording : public Recording {
  public:
   /// @throws std::runtime_error naming the file where it cannot be opened.
@@ -25,12 +27,15 @@ class RawlogRecording : public Recording {
 
  private:
   void readEntry();
+  void takeActions(const mrpt::obs::CSensoryFrame& frame);
   std::string whyStopped(const std::exception& error);
 
   std::filesystem::path file_;
   GzInputStream stream_;
   std::uint64_t entries_ = 0;  // read so far
   std::deque<mrpt::obs::CObservation::Ptr> pending_;
+  std::deque<mrpt::obs::CActionCollection::Ptr> actions_;  // until the frame after them is read
+  DeadReckoning reckoning_;
 };
 
 }  // namespace efm

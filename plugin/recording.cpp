@@ -70,7 +70,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   if (!std::filesystem::exists(path)) {
     throw std::runtime_error(path.string() + ": no such file or folder");
   }
-  const RigSetup setup = readRigSetup({source.calibration, source.hand_eye, {}});
+  const RigSetup setup = readRigSetup({source.calibration, source.hand_eye, {}, {}});
   std::vector<StampedPose> poses;
   if (!source.poses.empty()) poses = readPosesFile(source.poses);
 

@@ -33,7 +33,7 @@ void RecordingWithPoses::readAhead() {
   while (!ahead_ && !ended_) {
     ahead_ = recording_->next();
     ended_ = ahead_ == nullptr;
-    if (ahead_ && isPose(*ahead_)) ahead_ = nullptr;
+    if (ahead_ && poseSourceOf(*ahead_)) ahead_ = nullptr;
   }
 }
 

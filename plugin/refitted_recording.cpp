@@ -26,7 +26,7 @@ mrpt::obs::CObservation::Ptr RefittedRecording::next() {
       packet->camera = camera.model;
       packet->camera_pose = mrptPoseFrom(camera.T_rig_cam);
     }
-  } else if (setup_.T_body_rig && isPose(*observation)) {
+  } else if (setup_.T_body_rig && poseSourceOf(*observation)) {
     setBodyToRig(*observation, *setup_.T_body_rig);
   }
   return observation;

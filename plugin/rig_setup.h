@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "plugin/datasets/calibration_file.h"
@@ -15,6 +16,7 @@ struct RigOptions {
   std::filesystem::path calibration;          ///< Empty: from the recording.
   std::filesystem::path hand_eye;             ///< Empty: from the recording.
   std::vector<std::int64_t> time_offsets_ns;  ///< One per camera; empty: none.
+  std::string pose_source;                    ///< The label of its sensor; empty: the best.
 };
 
 /// The same, with its files read. Applying it twice is as good as once: it replaces.

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/time_cut.h"
 
-#include <mrpt/obs/CObservationRobotPose.h>
-
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -10,6 +8,7 @@
 #include "mapping/fusion_mapper.h"
 #include "plugin/CObservationEvents.h"
 #include "plugin/mrpt_time.h"
+#include "plugin/pose_observation.h"
 
 namespace efm {
 namespace {
@@ -53,25 +52,30 @@ CObservation::Ptr TimeCut::next() {
 /// @return false once nothing can follow.
 bool TimeCut::readOne() {
   const CObservation::Ptr observation =
-      events_ended_ && poses_ended_ ? nullptr : recording_->next();
+      events_ended_ && posesEnded() ? nullptr : recording_->next();
   if (!observation) {
     const bool something_left = !began_ && !across_.empty();
     give(nullptr);
     return something_left;
   }
   const std::int64_t t_ns = nanosecondsFrom(observation->timestamp);
-  if (std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation)) {
-    takePose(observation, t_ns);
+  if (const auto source = poseSourceOf(*observation)) {
+    takePose(observation, poses_[*source], t_ns);
   } else {
     takeOther(observation, t_ns);
   }
   return true;
 }
 
-void TimeCut::takePose(const CObservation::Ptr& pose, std::int64_t t_ns) {
+bool TimeCut::posesEnded() const {
+  return !poses_.empty() && std::all_of(poses_.begin(), poses_.end(),
+                                        [](const auto& entry) { return entry.second.ended; });
+}
+
+void TimeCut::takePose(const CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns) {
   if (t_ns < t0_ns_) {
-    pose_before_ = pose;
-  } else if (t_ns < t1_ns_ || !std::exchange(poses_ended_, true)) {
+    track.before = pose;
+  } else if (t_ns < t1_ns_ || !std::exchange(track.ended, true)) {
     give(pose);  // the first one after the cut is the last one needed
   }
 }
@@ -93,7 +97,13 @@ void TimeCut::takeOther(const CObservation::Ptr& observation, std::int64_t t_ns)
 /// What lies across t0 goes before everything from t0 on, and the pose before it goes first.
 void TimeCut::give(const CObservation::Ptr& observation) {
   if (!std::exchange(began_, true)) {
-    if (pose_before_) ready_.push_back(std::exchange(pose_before_, nullptr));
+    std::vector<CObservation::Ptr> before;
+    for (auto& [source, track] : poses_) {
+      if (track.before) before.push_back(std::exchange(track.before, nullptr));
+    }
+    std::stable_sort(before.begin(), before.end(),
+                     [](const auto& a, const auto& b) { return a->timestamp < b->timestamp; });
+    ready_.insert(ready_.end(), before.begin(), before.end());
     ready_.insert(ready_.end(), across_.begin(), across_.end());
     across_.clear();
   }

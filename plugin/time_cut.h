@@ -3,16 +3,18 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "plugin/pose_choice.h"
 #include "plugin/recording.h"
 
 namespace efm {
 
 /// A stretch of a recording, [t0, t1): the events in it, and the poses in it with the nearest one
-/// before and after, so that every event has a pose on both sides that had.
+/// of each source before and after, so that every event has a pose on both sides that had.
 class TimeCut : public Recording {
  public:
   /// @param t0_ns, t1_ns no limit where not given.
@@ -26,20 +28,25 @@ class TimeCut : public Recording {
   RecordingCounts counts() const override { return recording_->counts(); }
 
  private:
+  struct PoseTrack {
+    mrpt::obs::CObservation::Ptr before;  // the newest before t0, until it is given
+    bool ended = false;                   // the one after t1 was given
+  };
+
   bool readOne();
-  void takePose(const mrpt::obs::CObservation::Ptr& pose, std::int64_t t_ns);
+  bool posesEnded() const;
+  void takePose(const mrpt::obs::CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns);
   void takeOther(const mrpt::obs::CObservation::Ptr& observation, std::int64_t t_ns);
   void give(const mrpt::obs::CObservation::Ptr& observation);
 
   std::unique_ptr<Recording> recording_;
   std::int64_t t0_ns_;
   std::int64_t t1_ns_;
-  bool began_ = false;                                // something from t0 on was read
-  mrpt::obs::CObservation::Ptr pose_before_;          // the newest before t0, until it is given
+  bool began_ = false;  // something from t0 on was read
+  std::map<PoseSource, PoseTrack> poses_;
   std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until it is given
   std::deque<mrpt::obs::CObservation::Ptr> ready_;
   bool events_ended_ = false;
-  bool poses_ended_ = false;
 };
 
 /// The recording itself where no limit is given.

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/import_command.h"
 
-#include <mrpt/obs/CObservationRobotPose.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
+#include <iostream>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -15,13 +14,12 @@
 #include "mapping/timestamp.h"
 #include "plugin/CObservationEvents.h"
 #include "plugin/app/progress.h"
+#include "plugin/pose_observation.h"
 #include "plugin/rawlog_writer.h"
 #include "plugin/recording.h"
 #include "plugin/time_cut.h"
 
 namespace efm {
-
-using mrpt::obs::CObservationRobotPose;
 
 namespace {
 
@@ -69,6 +67,7 @@ int runImport(const ImportArguments& arguments) {
   std::map<std::string, std::uint64_t> events;  // per label
   std::uint64_t all_events = 0;
   std::uint64_t poses = 0;
+  std::uint64_t odometry = 0;  // of them
   std::uint64_t others = 0;
   {
     Progress progress;
@@ -77,8 +76,9 @@ int runImport(const ImportArguments& arguments) {
       if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
         events[packet->sensorLabel] += packet->events.size();
         all_events += packet->events.size();
-      } else if (std::dynamic_pointer_cast<CObservationRobotPose>(observation)) {
+      } else if (const auto source = poseSourceOf(*observation)) {
         ++poses;
+        if (source->kind == PoseKind::kOdometry) ++odometry;
       } else {
         ++others;
       }
@@ -99,6 +99,10 @@ int runImport(const ImportArguments& arguments) {
   std::printf("%llu poses; %llu events were out of order and sorted\n",
               static_cast<unsigned long long>(poses),
               static_cast<unsigned long long>(recording->counts().sorted_events));
+  if (odometry > 0 && !arguments.source.hand_eye.empty()) {
+    std::cerr << "event-fusion: warning: odometry (" << odometry
+              << " observations) cannot hold the hand-eye transform: give it to map as well\n";
+  }
   const auto bytes = static_cast<double>(std::filesystem::file_size(arguments.out));
   std::printf("written to %s, %.1f MB, %.2f bytes per event\n", arguments.out.c_str(), bytes * 1e-6,
               all_events == 0 ? 0.0 : bytes / static_cast<double>(all_events));

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/info_command.h"
 
-#include <mrpt/obs/CObservationRobotPose.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <exception>
@@ -16,6 +14,7 @@
 #include "plugin/CObservationEvents.h"
 #include "plugin/app/progress.h"
 #include "plugin/mrpt_time.h"
+#include "plugin/pose_observation.h"
 #include "plugin/recording.h"
 #include "plugin/time_cut.h"
 
@@ -28,10 +27,14 @@ struct Stream {
   std::optional<std::int64_t> first_ns;
   std::optional<std::int64_t> last_ns;
   std::int64_t largest_gap_ns = 0;
+  std::int64_t largest_gap_at_ns = 0;  ///< Where it begins.
 
   void add(std::int64_t t_ns) {
     ++count;
-    if (last_ns) largest_gap_ns = std::max(largest_gap_ns, t_ns - *last_ns);
+    if (last_ns && t_ns - *last_ns > largest_gap_ns) {
+      largest_gap_ns = t_ns - *last_ns;
+      largest_gap_at_ns = *last_ns;
+    }
     first_ns = std::min(first_ns.value_or(t_ns), t_ns);
     last_ns = std::max(last_ns.value_or(t_ns), t_ns);
   }
@@ -57,7 +60,8 @@ class Contents {
  public:
   std::uint64_t observations = 0;
   std::map<std::string, CameraInfo> cameras;  // by label
-  Stream poses;
+  std::map<PoseSource, Stream> pose_sources;
+  Stream poses;                                 // of all sources
   std::uint64_t events_before_poses = 0;        // earlier than the first pose
   std::uint64_t events_after_poses = 0;         // later than the last pose
   std::map<std::string, std::uint64_t> others;  // by class
@@ -66,8 +70,10 @@ class Contents {
     ++observations;
     if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
       addPacket(*packet);
-    } else if (dynamic_cast<const mrpt::obs::CObservationRobotPose*>(&observation) != nullptr) {
-      addPose(nanosecondsFrom(observation.timestamp));
+    } else if (const auto source = poseSourceOf(observation)) {
+      const std::int64_t t_ns = nanosecondsFrom(observation.timestamp);
+      pose_sources[*source].add(t_ns);
+      addPose(t_ns);
     } else {
       ++others[observation.GetRuntimeClass()->className];
     }
@@ -118,11 +124,15 @@ void print(const Contents& contents, const RecordingCounts& counts) {
               << nameOf(camera.model.distortion) << "\n  ";
     printStream(camera.events, "events");
   }
-  printStream(contents.poses, "poses");
-  if (contents.poses.count > 1) {
-    std::cout << "  largest gap " << 1e-9 * static_cast<double>(contents.poses.largest_gap_ns)
-              << " s\n";
+  for (const auto& [source, poses] : contents.pose_sources) {
+    std::cout << asText(source) << ":\n  ";
+    printStream(poses, "poses");
+    if (poses.count > 1) {
+      std::cout << "  largest gap " << 1e-9 * static_cast<double>(poses.largest_gap_ns)
+                << " s, after " << formatSeconds(poses.largest_gap_at_ns) << " s\n";
+    }
   }
+  if (contents.pose_sources.empty()) std::cout << "0 poses\n";
   std::cout << "  " << contents.events_before_poses << " events before the first pose, "
             << contents.events_after_poses << " after the last\n";
   for (const auto& [name, count] : contents.others) {

@@ -19,6 +19,7 @@ EventFusionOptions optionsOf(const MappingArguments& arguments) {
   for (const std::string& assignment : arguments.sets) reader.set(assignment);
   EventFusionOptions options = reader.options();
   if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
+  if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // there are no others
   if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
   return options;
 }

@@ -122,6 +122,11 @@ std::vector<std::string> warningsOf(const SessionStatus& status, bool exclude_si
                        " sub-intervals of a camera had no event: rules that ask all of them (min, "
                        "harmonic, geometric) find nothing where one is empty");
   }
+  for (const auto& [source, count] : status.other_poses) {
+    if (!status.pose_source) break;  // then there is no keyframe, which is said elsewhere
+    warnings.push_back(std::to_string(count) + " poses were not used: " + asText(source) +
+                       ", beside " + asText(*status.pose_source));
+  }
   if (status.counts.duplicate_poses > 0) {
     warnings.push_back(std::to_string(status.counts.duplicate_poses) +
                        " poses had the time of an earlier one and were left out");

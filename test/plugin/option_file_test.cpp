@@ -66,6 +66,7 @@ calibration = a.yaml
 hand_eye = /b.yaml
 cameras = 0, 2
 time_offsets_s = 0, 0.001
+pose_source = wheels
 max_pose_gap_s = 0.5
 exclude_silent = true
 [keyframes]
@@ -119,6 +120,7 @@ packet_error_px = 0
   EXPECT_EQ(options.rig.calibration, "a.yaml");
   EXPECT_EQ(options.rig.hand_eye, "/b.yaml");
   EXPECT_EQ(options.rig.time_offsets_ns, (std::vector<std::int64_t>{0, 1'000'000}));
+  EXPECT_EQ(options.rig.pose_source, "wheels");
   EXPECT_EQ(mapper.cameras, (std::vector<int>{0, 2}));
   EXPECT_EQ(mapper.trajectory.max_pose_gap_s, 0.5);
   EXPECT_TRUE(mapper.keyframe.exclude_silent);
