@@ -110,8 +110,9 @@ void BaselinePolicy::advance(const Window& window, const KeyframeDepthMap* keyfr
   startAt(window.t1_ns);
   if (keyframe == nullptr) return;
   SeenPoints seen = seenIn(*keyframe);
-  if (seen.points_world.empty()) return;
-  mean_depth_m_ = seen.mean_depth_m;
+  if (!seen.points_world.empty()) mean_depth_m_ = seen.mean_depth_m;
+  // Also where it saw nothing: points of an older one that are out of view now would end every
+  // window after one stride, too short to see anything again.
   seen_world_ = std::move(seen.points_world);
 }
 

@@ -13,8 +13,9 @@ namespace efm {
 /// A window starts with the first event after the one before it and grows, stride by stride, until
 /// the reference camera has moved far enough from where it was at the window's start, compared with
 /// the scene's mean depth, or has turned away from what it saw: the last keyframe's points, and
-/// before the first one a view full of points at the guessed depth. So a keyframe has the parallax
-/// that depth needs, however fast or slow the motion (Rebecq et al., IJCV 2018, Sec. 7).
+/// where there are none a view full of points at the mean depth, at first a guess. So a keyframe
+/// has the parallax that depth needs, however fast or slow the motion (Rebecq et al., IJCV 2018,
+/// Sec. 7).
 ///
 /// Where the longest window is not enough the start moves on by a stride: events of standing still
 /// are in no window.
