@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <opencv2/core.hpp>
 #include <random>
 #include <vector>
+
+#include "test/mapping/played_recording.h"
 
 namespace efm {
 namespace {
@@ -44,6 +47,38 @@ TEST(RobustMaximum, IsTheSmallestValueThatNinetyFivePercentDoNotExceed) {
     });
     ASSERT_EQ(*maximum.value(), *enough) << n;
   }
+}
+
+/// Which pixels a fixed white level keeps.
+cv::Mat1b keptWith(const cv::Mat1f& confidence, double white) {
+  const cv::Mat1f none(confidence.size(), -1.0F);
+  DepthExtractionOptions options;
+  options.max_confidence = MaxConfidence::of(white);
+  return extractDepth({confidence, cv::Mat1i::zeros(confidence.size()), none, none}, DepthPlanes(),
+                      options)
+             .depth > 0;
+}
+
+TEST(RobustMaximum, OfTheKeyframesSoFarIsTheWhiteLevelOfTheSequence) {
+  const test::LongRecording recording(1, 1.0);
+  FusionMapperOptions options = test::playedOptions();
+  options.keyframes.window_s = 0.05;
+  options.keyframes.stride_s = 0.015;
+  options.keyframe.extraction.max_confidence.level = WhiteLevel::kSequence;
+  const test::Played played = test::play(recording, options, 0);
+  EXPECT_GE(played.keyframes.size(), 22U) << "more than the nineteen that are a plain maximum";
+  RobustMaximum maximum;
+  int unlike_its_own = 0;
+  for (const KeyframeDepthMap& keyframe : played.keyframes) {
+    double largest = 0;
+    cv::minMaxLoc(keyframe.map.confidence, nullptr, &largest);
+    EXPECT_EQ(keyframe.largest_confidence, largest);
+    maximum.take(largest);
+    const cv::Mat1b kept = keyframe.map.depth > 0;
+    EXPECT_EQ(cv::countNonZero(kept != keptWith(keyframe.map.confidence, *maximum.value())), 0);
+    if (cv::countNonZero(kept != keptWith(keyframe.map.confidence, largest)) > 0) ++unlike_its_own;
+  }
+  EXPECT_GT(unlike_its_own, 5) << "or the test would not tell";
 }
 
 }  // namespace
