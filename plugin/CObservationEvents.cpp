@@ -11,6 +11,7 @@
 #include <string>
 
 #include "mapping/timestamp.h"
+#include "plugin/event_drawing.h"
 #include "plugin/event_encoding.h"
 
 IMPLEMENTS_SERIALIZABLE(CObservationEvents, CObservation, efm)
@@ -127,11 +128,33 @@ void CObservationEvents::getDescriptionAsText(std::ostream& stream) const {
     stream << "From " << formatSeconds(events.front().t_ns) << " s to "
            << formatSeconds(events.back().t_ns) << " s, " << brighter << " of them brighter\n";
   }
+  if (covered_until_ns && *covered_until_ns < kEndOfTimeNs) {
+    stream << "Everything before " << formatSeconds(*covered_until_ns) << " s is here by now\n";
+  } else if (covered_until_ns) {
+    stream << "The last packet of its camera\n";
+  }
   stream << "Sensor: " << camera.width << "x" << camera.height << " pixels, fx " << camera.fx
          << " fy " << camera.fy << " cx " << camera.cx << " cy " << camera.cy << ", distortion "
          << nameOf(camera.distortion);
   for (const double coefficient : camera.coefficients) stream << " " << coefficient;
   stream << "\nPose on the rig: " << camera_pose.asString() << "\n";
+}
+
+void CObservationEvents::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
+  drawEvents(*this, out);
+}
+
+std::string CObservationEvents::exportTxtHeader() const {
+  return "NUM_EVENTS [TIME_S X Y POLARITY] x NUM_EVENTS";
+}
+
+std::string CObservationEvents::exportTxtDataRow() const {
+  std::string row = std::to_string(events.size());
+  for (const Event& event : events) {
+    row += ' ' + formatSeconds(event.t_ns) + ' ' + std::to_string(event.x) + ' ' +
+           std::to_string(event.y) + (event.polarity ? " 1" : " 0");
+  }
+  return row;
 }
 
 }  // namespace efm

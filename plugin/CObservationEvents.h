@@ -2,14 +2,20 @@
 #pragma once
 
 #include <mrpt/obs/CObservation.h>
+#include <mrpt/opengl/Visualizable.h>
 #include <mrpt/poses/CPose3D.h>
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mapping/camera.h"
 #include "mapping/event.h"
+
+// Visualizable's destructor is not virtual; nobody deletes an observation as one.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wnon-virtual-dtor"
 
 namespace efm {
 
@@ -19,7 +25,7 @@ namespace efm {
 /// Event times are integer nanoseconds of the recording's own clock, exact; `timestamp` is the
 /// packet's first time rounded to MRPT's tick. Stored at about 3 bytes per event, under a checksum:
 /// a packet that was damaged is an error when it is read, not other events.
-class CObservationEvents : public mrpt::obs::CObservation {
+class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::Visualizable {
   DEFINE_SERIALIZABLE(CObservationEvents, efm)
 
  public:
@@ -34,6 +40,15 @@ class CObservationEvents : public mrpt::obs::CObservation {
   void getSensorPose(mrpt::poses::CPose3D& out_pose) const override { out_pose = camera_pose; }
   void setSensorPose(const mrpt::poses::CPose3D& pose) override { camera_pose = pose; }
   void getDescriptionAsText(std::ostream& stream) const override;
+  /// As plugin/event_drawing.h says; what RawLogViewer shows in its 3D tab.
+  void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;
+
+  /// For `rawlog-edit --export-txt`, which writes a line per packet: the number of events, then
+  /// four columns per event: its time in seconds of the recording's clock, x, y and polarity (0 or
+  /// 1).
+  bool exportTxtSupported() const override { return true; }
+  std::string exportTxtHeader() const override;
+  std::string exportTxtDataRow() const override;
 
  private:
   void writeContent(mrpt::serialization::CArchive& out) const;
@@ -41,3 +56,5 @@ class CObservationEvents : public mrpt::obs::CObservation {
 };
 
 }  // namespace efm
+
+#pragma GCC diagnostic pop

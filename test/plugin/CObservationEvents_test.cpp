@@ -9,6 +9,7 @@
 
 #include <limits>
 
+#include "mapping/timestamp.h"
 #include "plugin/event_encoding.h"
 #include "plugin/mrpt_pose.h"
 #include "plugin/mrpt_time.h"
@@ -201,6 +202,24 @@ TEST(CObservationEvents, IsDescribedByEventsTimesAndCamera) {
   EXPECT_THAT(text.str(), HasSubstr("1700000000.123456789 s to 1700000000.133257789 s"));
   EXPECT_THAT(text.str(), HasSubstr("346x260 pixels"));
   EXPECT_THAT(text.str(), HasSubstr("radtan 0.1 0.2 0.3 0.4"));
+  EXPECT_THAT(text.str(), HasSubstr("Everything before 1700000000.133456789 s is here by now"));
+}
+
+TEST(CObservationEvents, ThatIsEmptyIsDescribedToo) {
+  CObservationEvents packet;
+  packet.covered_until_ns = kEndOfTimeNs;
+  std::ostringstream text;
+  packet.getDescriptionAsText(text);
+  EXPECT_THAT(text.str(), HasSubstr("Events of camera 0: 0\nThe last packet of its camera\n"));
+}
+
+TEST(CObservationEvents, IsExportedAsALineOfItsEvents) {
+  CObservationEvents packet;
+  EXPECT_TRUE(packet.exportTxtSupported());
+  EXPECT_EQ(packet.exportTxtDataRow(), "0");
+  packet.events = {{kTodayNs, 5, 6, true}, {kTodayNs + 1000, 7, 8, false}};
+  EXPECT_EQ(packet.exportTxtDataRow(), "2 1700000000.123456789 5 6 1 1700000000.123457789 7 8 0");
+  EXPECT_THAT(packet.exportTxtHeader(), HasSubstr("TIME_S X Y POLARITY"));
 }
 
 TEST(CObservationEvents, GivesTheCamerasPoseAsItsSensors) {
