@@ -6,6 +6,7 @@
 #include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationPointCloud.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CSensoryFrame.h>
 
@@ -165,12 +166,6 @@ TEST(CEventFusionMapBuilder, StartsOver) {
   expectSameBits(builder.points(), first);
 }
 
-TEST(CEventFusionMapBuilder, AnEarlierMapIsRefusedRatherThanForgotten) {
-  mrpt::maps::CSimpleMap map;
-  map.insert(mrpt::poses::CPose3DPDFGaussian::Create(), mrpt::obs::CSensoryFrame::Create());
-  EXPECT_THROW(CEventFusionMapBuilder().initialize(map), std::invalid_argument);
-}
-
 TEST(CEventFusionMapBuilder, OptionsThatAreNotValidChangeNothing) {
   CEventFusionMapBuilder builder(syntheticOptions());
   EventFusionOptions wrong = syntheticOptions();
@@ -210,6 +205,157 @@ TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
   feeder.join();
 
   expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+// --- Asked by a program that cannot finish it --------------------------------------------------
+
+TEST(CEventFusionMapBuilder, AskedForTheMapMapsWhatIsCoveredOfAShortRecording) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::size_t taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  for (const auto& observation : observations) builder.processObservation(observation);
+  EXPECT_TRUE(builder.points().empty()) << "half a second, and nobody asked";
+
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+
+  EXPECT_EQ(taken, 3U);
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, AskedAfterEachObservationMakesTheSameMap) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) {
+    builder.processObservation(observation);
+    builder.getCurrentlyBuiltMapSize();
+  }
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, AskedForAMapOfACameraThatIsNotThereSaysSo) {
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.keyframe.reference_camera = 2;
+  CEventFusionMapBuilder builder(options);
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  EXPECT_THROW(builder.getCurrentlyBuiltMetricMap(), std::invalid_argument);
+}
+
+TEST(CEventFusionMapBuilder, AskedBeforeItKnowsAnythingGivesAnEmptyMap) {
+  const CEventFusionMapBuilder builder(syntheticOptions());
+  const auto* metric = builder.getCurrentlyBuiltMetricMap();
+  ASSERT_EQ(metric->maps.size(), 2U);
+  EXPECT_TRUE(metric->isEmpty());
+}
+
+// --- Keyframes and their clouds ----------------------------------------------------------------
+
+/// The map of a whole recording, and what the builder stores of it.
+struct StoredMap {
+  explicit StoredMap(const std::vector<CObservation::Ptr>& observations,
+                     const EventFusionOptions& options = syntheticOptions()) {
+    CEventFusionMapBuilder builder(options);
+    for (const auto& observation : observations) builder.processObservation(observation);
+    builder.finish();
+    points = builder.points();
+    builder.getCurrentlyBuiltMap(keyframes);
+  }
+  std::vector<CloudPoint> points;
+  mrpt::maps::CSimpleMap keyframes;
+};
+
+TEST(CEventFusionMapBuilder, KeyframesOfTheSimplemapHoldTheirCloudsWhereTheyWereSeen) {
+  const StoredMap map(observationsOf(SyntheticRecording()));
+  ASSERT_EQ(map.keyframes.size(), 3U);
+  const auto [pose, frame] = map.keyframes.get(1);
+  EXPECT_NEAR(pose->getMeanVal().x(), 0.8 * 0.2, 0.01) << "the middle of 0.1 to 0.3 s";
+  ASSERT_EQ(frame->size(), 1U);
+  const auto seen = frame->getObservationByClass<mrpt::obs::CObservationPointCloud>();
+  ASSERT_TRUE(seen);
+  EXPECT_EQ(seen->sensorLabel, "keyframe");
+  EXPECT_NEAR(static_cast<double>(nanosecondsFrom(seen->timestamp) - SyntheticRecording::kStartNs),
+              0.2e9, 0.01e9);
+  EXPECT_EQ(seen->sensorPose, mrpt::poses::CPose3D());
+  EXPECT_GT(seen->pointcloud->size(), 30U);
+}
+
+TEST(CEventFusionMapBuilder, AMapOfSingleCamerasIsStoredAsItIs) {
+  EventFusionOptions options = syntheticOptions();
+  options.late_fusion = true;
+  const StoredMap map(observationsOf(SyntheticRecording()), options);
+  CEventFusionMap read(options.cloud);
+  read.loadFromSimpleMap(map.keyframes);
+  const auto points = read.cloud().points();
+  ASSERT_EQ(points.size(), map.points.size());
+  EXPECT_NE(points.size(), StoredMap(observationsOf(SyntheticRecording())).points.size());
+}
+
+TEST(CEventFusionMapBuilder, ContinuesAnEarlierMap) {
+  const StoredMap earlier(observationsOf(SyntheticRecording()));
+  const auto observations = observationsOf(SyntheticRecording(0.7));
+  const StoredMap later(observations);
+
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.initialize(earlier.keyframes);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+  EXPECT_EQ(builder.points().size(), earlier.points.size());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  builder.finish();
+
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U + 5U);
+  GlobalCloud both(syntheticOptions().cloud);
+  for (const auto* map : {&earlier, &later}) {
+    for (const StoredKeyframe& keyframe : keyframesOf(map->keyframes)) {
+      both.insert(both.keyframes(), worldPointsOf(keyframe));
+    }
+  }
+  const auto points = builder.points();
+  const auto expected = both.points();
+  ASSERT_EQ(points.size(), expected.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-9);
+    EXPECT_EQ(points[i].support, expected[i].support);
+  }
+  const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
+  expectSameBits(event_map->cloud().points(), points);
+  builder.clear();
+  EXPECT_TRUE(builder.points().empty());
+}
+
+TEST(CEventFusionMapBuilder, AFrameThatIsNoKeyframeIsRefusedRatherThanForgotten) {
+  mrpt::maps::CSimpleMap map = StoredMap(observationsOf(SyntheticRecording())).keyframes;
+  map.insert(mrpt::poses::CPose3DPDFGaussian::Create(), mrpt::obs::CSensoryFrame::Create());
+  CEventFusionMapBuilder builder;
+  try {
+    builder.initialize(map);
+    FAIL() << "no error";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("frame 3 of the simplemap"));
+  }
+}
+
+class CEventFusionMapBuilderFile : public TemporaryFolder {};
+
+TEST_F(CEventFusionMapBuilderFile, SavesItsMapAndContinuesIt) {
+  const std::string file = (folder() / "saved.simplemap").string();
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setMinLoggingLevel(mrpt::system::LVL_ERROR);
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  builder.saveCurrentMapToFile(file);
+  const auto points = builder.points();
+
+  builder.loadCurrentMapFromFile(file);
+
+  const auto loaded = builder.points();
+  ASSERT_EQ(loaded.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_LT((loaded[i].p_world - points[i].p_world).norm(), 1e-9);
+    EXPECT_EQ(loaded[i].confidence, points[i].confidence);
+  }
 }
 
 }  // namespace

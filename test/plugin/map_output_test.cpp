@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <mrpt/maps/CSimpleMap.h>
 
 #include <cstring>
 #include <fstream>
@@ -66,6 +67,7 @@ TEST_F(MapOutputTest, AnEarlierMapGoesWithTheFirstFileAndOtherFilesStay) {
     MapOutput earlier(folder(), OutputKind::kMap, {});
     earlier.writeKeyframe(smallKeyframe(1'000'000'000));
     earlier.writeCloud("map.pcd", {});
+    earlier.writeSimplemap({});
     earlier.writeReport("{}");
   }
   const auto keyframes = folder() / "keyframes";
@@ -82,6 +84,7 @@ TEST_F(MapOutputTest, AnEarlierMapGoesWithTheFirstFileAndOtherFilesStay) {
   output.writeReport("{}");
 
   EXPECT_FALSE(exists(folder() / "map.pcd"));
+  EXPECT_FALSE(exists(folder() / "map.simplemap"));
   EXPECT_FALSE(exists(keyframes / "1.000000000" / "depth.tiff"));
   EXPECT_TRUE(exists(keyframes / "1.000000000" / "notes.txt"));
   EXPECT_TRUE(exists(folder() / "notes.txt"));
