@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "plugin/CObservationEvents.h"
 #include "plugin/recording.h"
 #include "plugin/rig_setup.h"
 
@@ -21,12 +22,15 @@ class RefittedRecording : public Recording {
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return recording_->place(); }
   double progress() const override { return recording_->progress(); }
-  RecordingCounts counts() const override { return recording_->counts(); }
+  RecordingCounts counts() const override;
 
  private:
+  void recalibrate(CObservationEvents& packet);
+
   std::unique_ptr<Recording> recording_;
   RigSetup setup_;
-  std::set<int> cameras_;  // that were seen
+  std::set<int> cameras_;       // that were seen
+  std::set<int> recalibrated_;  // of them: whose own calibration is another
 };
 
 }  // namespace efm

@@ -39,6 +39,16 @@ void printSummary(const MapReport& report, const std::filesystem::path& folder) 
               folder.c_str());
 }
 
+/// An option file that names a calibration must not replace a better one in silence.
+void warnOfRecalibration(const MappingArguments& arguments, const Recording& recording,
+                         MappingOutcome& outcome) {
+  if (recording.counts().recalibrated_cameras == 0) return;
+  if (!arguments.source.calibration.empty()) return;  // it was asked for
+  outcome.warnings.push_back(outcome.report.options.rig.calibration.string() +
+                             " replaced another calibration, the recording's own; --set "
+                             "rig.calibration= keeps that");
+}
+
 /// What `map` and `depth` end with: the report, then words to the user.
 int conclude(const MappingOutcome& outcome, MapOutput& output) {
   // A run that failed before its first keyframe leaves the results of an earlier one as they were.
@@ -80,6 +90,7 @@ int runMap(const MapArguments& arguments) {
     job.take_keyframe = [&](const KeyframeDepthMap& keyframe) { output->writeKeyframe(keyframe); };
 
     outcome = runMapping(job, *recording);
+    warnOfRecalibration(arguments, *recording, outcome);
     if (outcome.report.counts.keyframes > 0) {
       const SecondsScope map(outcome.report.seconds.map);
       output->writeCloud("map.pcd", outcome.points);
@@ -120,6 +131,7 @@ int runDepth(const DepthArguments& arguments) {
     }
 
     outcome = runMapping(job, *recording);
+    warnOfRecalibration(arguments, *recording, outcome);
     outcome.report.points = points.size();
     if (outcome.report.counts.keyframes > 0) {
       output->writeCloud("points.pcd", points);

@@ -145,6 +145,20 @@ TEST_F(GivenParts, TheOptionFileMaySayThemAndTheCommandLineWins) {
   EXPECT_THAT(errorOf(map + " --set rig.calibration="), HasSubstr("data: no calibration"));
 }
 
+TEST_F(GivenParts, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  const std::string map = "map rig.ini r.rawlog --out out ";
+  fs::copy_file(folder() / "data" / "camchain.yaml", folder() / "same.yaml");
+  EXPECT_EQ(run(map + "--set rig.calibration=same.yaml").err, "");
+  Rig rig{SyntheticRecording().cameras};
+  rig.cameras[1].T_rig_cam.translation.y() += 0.001;
+  writeText("other.yaml", formatCamchain(rig));
+  EXPECT_THAT(run(map + "--set rig.calibration=other.yaml").err,
+              HasSubstr("warning: other.yaml replaced another calibration, the recording's own; "
+                        "--set rig.calibration= keeps that"));
+  EXPECT_EQ(run(map + "--calibration other.yaml").err, "") << "it was asked for";
+}
+
 TEST_F(GivenParts, OfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   const auto write_cameras = [&](const std::string& name, int count, int width) {

@@ -404,9 +404,10 @@ TEST(ConfigFolder, EveryFileIsRead) {
     OptionReader reader;
     EXPECT_NO_THROW(reader.readFile(entry.path())) << entry.path();
     EXPECT_NO_THROW(reader.options()) << entry.path();
+    EXPECT_NO_THROW(readRigSetup(reader.options().rig)) << entry.path();
     ++files;
   }
-  EXPECT_GE(files, 3);
+  EXPECT_GE(files, 6);
 }
 
 }  // namespace

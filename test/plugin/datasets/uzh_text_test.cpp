@@ -96,7 +96,8 @@ TEST_F(UzhText, AMissingFileIsNamed) {
   remove("groundtruth.txt");
   EXPECT_THAT(errorOfOpening(), HasSubstr(": no poses: expected groundtruth.txt, or --poses FILE"));
   remove("calib.txt");
-  EXPECT_THAT(errorOfOpening(), HasSubstr(": no calibration: expected calib.txt, or --calibration FILE"));
+  EXPECT_THAT(errorOfOpening(),
+              HasSubstr(": no calibration: expected calib.txt, or --calibration FILE"));
   remove("events.txt");
   EXPECT_FALSE(looksLikeUzhFolder(folder()));
   EXPECT_FALSE(looksLikeUzhFolder(folder() / "nowhere"));
