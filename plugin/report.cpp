@@ -78,6 +78,7 @@ std::string reportJson(const MapReport& report) {
   json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
   json["threads"] = sweep.threadsOrCores();
   json["peak_memory_bytes"] = peakMemoryBytes();
+  if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
   json["options"] = asJson(report.options);
   return json.dump(2) + "\n";
 }

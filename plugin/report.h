@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,8 @@ struct MapReport {
   std::uint64_t points = 0;                     ///< Of the exported map.
   StageSeconds seconds;
   EventFusionOptions options;  ///< As used.
+  /// What `max_confidence = sequence` stood for, where a pass of its own found it.
+  std::optional<double> sequence_maximum;
 };
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "maps/keyframe_cloud.h"
+#include "maps/outlier_removal.h"
 #include "plugin/app/mapping_run.h"
 #include "plugin/map_output.h"
 #include "plugin/npy_file.h"
@@ -84,8 +85,11 @@ int runMap(const MapArguments& arguments) {
     job.options = optionsOf(arguments);
     job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
     job.options.mapper.limits.validate();
-    const std::unique_ptr<Recording> recording =
-        openRecording(sourceOf(arguments, job.options.rig));
+    const RecordingSource source = sourceOf(arguments, job.options.rig);
+    if (job.options.mapper.keyframe.extraction.max_confidence.level == WhiteLevel::kSequence) {
+      job.sequence_maximum = sequenceMaximum(job.options, *openRecording(source));
+    }
+    const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(arguments.out, OutputKind::kMap, job.options.mapper.keyframe.planes);
     job.take_keyframe = [&](const KeyframeDepthMap& keyframe) { output->writeKeyframe(keyframe); };
 
@@ -119,7 +123,9 @@ int runDepth(const DepthArguments& arguments) {
     std::vector<CloudPoint> points;
     job.take_keyframe = [&](const KeyframeDepthMap& keyframe) {
       output->writeImages(keyframe);
-      points = keyframeCloud(keyframe);
+      const std::vector<CloudPoint> cloud =
+          job.options.late_fusion ? lateFusionCloud(keyframe) : keyframeCloud(keyframe);
+      points = removeOutliers(cloud, job.options.cloud.outliers);
     };
     std::unique_ptr<NpyDsiFile> dsi;
     if (arguments.save_dsi) {

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdio>
 
+#include "mapping/robust_maximum.h"
 #include "plugin/CEventFusionMapBuilder.h"
 #include "plugin/CObservationEvents.h"
 #include "plugin/app/progress.h"
@@ -18,7 +19,11 @@ class Player {
  public:
   Player(const MappingJob& job, Recording& recording, StageSeconds& seconds)
       : job_(job), recording_(recording), seconds_(seconds) {
-    builder_.setOptions(job.options);
+    EventFusionOptions options = job.options;
+    if (job.sequence_maximum && *job.sequence_maximum > 0) {
+      options.mapper.keyframe.extraction.max_confidence = MaxConfidence::of(*job.sequence_maximum);
+    }
+    builder_.setOptions(options);
     builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // its warnings come in one, at the end
     builder_.setKeyframeTaker(
         [this](const KeyframeDepthMap& keyframe) { made_.push_back(keyframe); });
@@ -155,6 +160,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.report.counts = status.counts;
   outcome.report.silent_keyframes = status.silent_keyframes;
   outcome.report.options = job.options;
+  outcome.report.sequence_maximum = job.sequence_maximum;
   outcome.report.seconds = status.seconds;
   outcome.report.seconds.read = reading.read;
   {
@@ -170,6 +176,18 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
                         : "no event of the keyframes' windows could be used";
   }
   return outcome;
+}
+
+std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recording& recording) {
+  RobustMaximum maximum;
+  MappingJob job;
+  job.options = options;
+  job.take_keyframe = [&](const KeyframeDepthMap& keyframe) {
+    maximum.take(keyframe.largest_confidence);
+  };
+  StageSeconds ignored;
+  Player(job, recording, ignored).play();
+  return maximum.value();
 }
 
 }  // namespace efm

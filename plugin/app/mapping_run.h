@@ -20,6 +20,8 @@ namespace efm {
 /// How to map a recording, and who receives what is made on the way.
 struct MappingJob {
   EventFusionOptions options;
+  /// What `max_confidence = sequence` stands for; the running maximum where not given.
+  std::optional<double> sequence_maximum;
 
   /// Receives each keyframe, in order.
   std::function<void(const KeyframeDepthMap&)> take_keyframe;
@@ -44,5 +46,11 @@ struct MappingOutcome {
 /// @throws std::invalid_argument where the options are not valid; what `take_keyframe` and
 /// `make_dsi_sink` throw.
 MappingOutcome runMapping(const MappingJob& job, Recording& recording);
+
+/// The first of two passes: plays a recording for the robust maximum of its keyframes' confidences
+/// alone. Costs as much as mapping it. Nothing where there is no keyframe; what is wrong with the
+/// recording is left for `runMapping` to say.
+/// @throws std::invalid_argument where the options are not valid.
+std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recording& recording);
 
 }  // namespace efm
