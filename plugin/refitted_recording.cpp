@@ -22,7 +22,7 @@ RefittedRecording::RefittedRecording(std::unique_ptr<Recording> recording, RigSe
     : recording_(std::move(recording)), setup_(std::move(setup)) {}
 
 mrpt::obs::CObservation::Ptr RefittedRecording::next() {
-  const mrpt::obs::CObservation::Ptr observation = recording_->next();
+  mrpt::obs::CObservation::Ptr observation = recording_->next();
   if (!observation) {
     if (setup_.calibration && !cameras_.empty())
       setup_.calibration->requireCameras(cameras_.size());

@@ -18,6 +18,7 @@ const PoseSource kActions = {PoseKind::kActions, "actions"};
 
 std::vector<std::int64_t> timesOf(const std::vector<StampedPose>& poses) {
   std::vector<std::int64_t> times;
+  times.reserve(poses.size());
   for (const StampedPose& pose : poses) times.push_back(pose.t_ns);
   return times;
 }
