@@ -57,8 +57,12 @@ void CEventFusionMap::TMapDefinition::loadFromConfigFile_map_specific(
     } else if (section == prefix + "_creationOpts") {
       checkGenericKeys(source, section);
     } else {
-      throw std::invalid_argument(placeIn(source, section) + " unknown section; known: " + prefix +
-                                  "_insertOpts, " + prefix + "_creationOpts");
+      throw std::invalid_argument(placeIn(source, section)
+                                      .append(" unknown section; known: ")
+                                      .append(prefix)
+                                      .append("_insertOpts, ")
+                                      .append(prefix)
+                                      .append("_creationOpts"));
     }
   }
   options = reader.options().cloud;
@@ -178,6 +182,7 @@ void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) con
   const std::vector<CloudPoint> points = cloud_.points();
   // A few points are confident beyond all others: the scale ends where a twentieth is above it.
   std::vector<float> sorted;
+  sorted.reserve(points.size());
   for (const CloudPoint& point : points) sorted.push_back(point.confidence);
   const std::size_t top = sorted.size() - sorted.size() / 20;
   std::sort(sorted.begin(), sorted.end());

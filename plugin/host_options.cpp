@@ -11,17 +11,22 @@
 namespace efm {
 namespace {
 
-std::string nameOf(const mrpt::config::CConfigFileBase& source) {
+/// Empty where the source is none.
+std::filesystem::path fileOf(const mrpt::config::CConfigFileBase& source) {
   const auto* file = dynamic_cast<const mrpt::config::CConfigFile*>(&source);
-  return file && !file->getAssociatedFile().empty() ? file->getAssociatedFile() : "options";
+  return file ? file->getAssociatedFile() : std::string();
 }
 
 /// MRPT takes a missing file for an empty one.
 void requireFile(const mrpt::config::CConfigFileBase& source) {
-  const auto* file = dynamic_cast<const mrpt::config::CConfigFile*>(&source);
-  if (!file || file->getAssociatedFile().empty()) return;
-  if (std::filesystem::exists(file->getAssociatedFile())) return;
-  throw std::runtime_error("cannot read the option file " + file->getAssociatedFile());
+  const std::filesystem::path file = fileOf(source);
+  if (file.empty() || std::filesystem::exists(file)) return;
+  throw std::runtime_error("cannot read the option file " + file.string());
+}
+
+std::string nameOf(const mrpt::config::CConfigFileBase& source) {
+  const std::filesystem::path file = fileOf(source);
+  return file.empty() ? "options" : file.string();
 }
 
 }  // namespace
@@ -44,7 +49,10 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
                      std::string_view section, OptionReader& reader) {
   std::vector<std::string> keys;
   source.getAllKeys(host_section, keys);
-  const std::string place = placeIn(source, host_section);
+  OptionPlace place{placeIn(source, host_section), {}};
+  // Absolute, so that what is saved elsewhere names the same files.
+  const std::filesystem::path file = fileOf(source);
+  if (!file.empty()) place.folder = std::filesystem::absolute(file).parent_path();
   for (const std::string& key : keys) {
     reader.set(section, key, source.read_string(host_section, key, ""), place);
   }

@@ -505,9 +505,11 @@ void OptionReader::set(std::string_view assignment) {
 }
 
 void OptionReader::set(std::string_view section, std::string_view key, std::string_view value,
-                       const std::string& place) {
-  if (!isOptionSection(section)) refuse({place, " unknown section; known: ", knownSections()});
-  assign(section, key, trimmed(withoutComment(value)), place);
+                       const OptionPlace& place) {
+  if (!isOptionSection(section)) refuse({place.name, " unknown section; known: ", knownSections()});
+  folder_ = place.folder;
+  assign(section, key, trimmed(withoutComment(value)), place.name);
+  folder_.clear();
 }
 
 void OptionReader::assign(std::string_view section, std::string_view key, std::string_view value,

@@ -43,6 +43,12 @@ bool isOptionSection(std::string_view section);
 /// As a file has it: numbers with the fewest digits that read back the same.
 std::string textOf(const OptionValue& value);
 
+/// Where an option of somebody else's file stands.
+struct OptionPlace {
+  std::string name;              ///< What errors begin with: "host.ini, section mapper_dsi:".
+  std::filesystem::path folder;  ///< What paths are relative to; empty: the working folder.
+};
+
 /// Reads options from .ini files and from the command line, strictly: what is not understood is an
 /// error that names the file and line, the section, the key, the value and what was expected.
 /// (`mrpt::config::CConfigFile` reads "abc" as 0 and ignores unknown keys and missing files.)
@@ -65,10 +71,9 @@ class OptionReader {
   void set(std::string_view assignment);
   /// Sets one option that stands in a file of somebody else's, where its section has another name.
   /// @param value up to a comment.
-  /// @param place what errors begin with: "host.ini, section mapper_dsi:".
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view section, std::string_view key, std::string_view value,
-           const std::string& place);
+           const OptionPlace& place);
 
   /// @throws std::invalid_argument where a value is out of range.
   EventFusionOptions options() const;

@@ -83,6 +83,15 @@ TEST_F(HostOptionsFile, ErrorsNameTheFile) {
   }
 }
 
+TEST_F(HostOptionsFile, PathsAreRelativeToIt) {
+  const std::string file = (folder() / "host.ini").string();
+  std::ofstream(file) << "[a_rig]\ncalibration = rig/cams.yaml\n";
+  OptionReader reader;
+  readHostOptions(mrpt::config::CConfigFile(file), "a", reader);
+  EXPECT_EQ(reader.options().rig.calibration, folder() / "rig" / "cams.yaml");
+  EXPECT_EQ(optionsOf("[rig]\ncalibration = cams.yaml\n", "").rig.calibration, "cams.yaml");
+}
+
 TEST_F(HostOptionsFile, AMissingFileIsAnError) {
   CEventFusionMapBuilder builder;
   EXPECT_THROW(builder.loadFromConfigFileName((folder() / "none.ini").string(), ""),
