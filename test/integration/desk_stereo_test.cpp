@@ -9,47 +9,23 @@
 
 #include "mapping/fusion_mapper.h"
 #include "maps/depth_metrics.h"
-#include "maps/global_cloud.h"
-#include "maps/keyframe_cloud.h"
+#include "test/integration/simulated_recording.h"
+#include "test/mapping/kept_dsi.h"
 #include "test/oracle/naive_mapper.h"
-#include "tracking_stub/depth_rendering.h"
-#include "tracking_stub/simulation_preset.h"
 
 namespace efm {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
 
-/// Keeps the whole DSI: [plane][row][column].
-class KeptDsi : public DsiSink {
- public:
-  KeptDsi(int planes, const ReferenceView& view)
-      : pixels_(view.pixels()), values(static_cast<std::size_t>(planes) * pixels_) {}
-  void takePlane(int plane, const float* plane_values) override {
-    const std::size_t at = static_cast<std::size_t>(plane) * pixels_;
-    std::copy(plane_values, plane_values + pixels_,
-              values.begin() + static_cast<std::ptrdiff_t>(at));
-  }
-
- private:
-  std::size_t pixels_;
-
- public:
-  std::vector<float> values;
-};
-
 class DeskStereo : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    simulation_ = new Simulation(makeSimulation({"desk_stereo", std::nullopt, 1}));
-    for (CameraRecording& recording : simulateEvents(*simulation_)) {
-      events_.push_back(std::move(recording.events));
-    }
-    poses_ = samplePoses(*simulation_);
+    recording_ = new test::SimulatedRecording({"desk_stereo", std::nullopt, 1});
   }
   static void TearDownTestSuite() {
-    delete simulation_;
-    simulation_ = nullptr;
+    delete recording_;
+    recording_ = nullptr;
   }
 
   static FusionMapperOptions options(double window_s, double stride_s) {
@@ -60,50 +36,24 @@ class DeskStereo : public ::testing::Test {
     return options;
   }
 
-  static std::vector<KeyframeDepthMap> map(const FusionMapperOptions& options) {
-    FusionMapper mapper(options);
-    for (std::size_t c = 0; c < events_.size(); ++c) mapper.addCamera(simulation_->rig.cameras[c]);
-    for (const StampedPose& pose : poses_) mapper.addPose(pose);
-    for (std::size_t c = 0; c < events_.size(); ++c) {
-      mapper.addEvents(static_cast<int>(c), events_[c]);
-    }
-    mapper.finish();
-    std::vector<KeyframeDepthMap> keyframes;
-    while (auto keyframe = mapper.next()) keyframes.push_back(std::move(*keyframe));
-    return keyframes;
-  }
-
-  /// Estimate and truth wherever there is an estimate, the truth within one pixel.
-  static std::vector<DepthPair> pairs(const KeyframeDepthMap& keyframe) {
-    const cv::Mat1f truth = renderDepth(
-        simulation_->scene, simulation_->motion->poseAt(keyframe.window.t_ref_ns), keyframe.view);
-    DepthPairingOptions pairing;
-    pairing.tolerance_px = 1;
-    return pairDepths(keyframe.map.depth, truth, pairing);
-  }
-
   /// Over all keyframes together.
   static DepthErrors errors(const std::vector<KeyframeDepthMap>& keyframes) {
     std::vector<DepthPair> all;
     for (const KeyframeDepthMap& keyframe : keyframes) {
-      const auto some = pairs(keyframe);
+      const auto some = recording_->pairs(keyframe);
       all.insert(all.end(), some.begin(), some.end());
     }
-    const RigCamera& right = simulation_->rig.cameras.at(1);
+    const RigCamera& right = recording_->simulation().rig.cameras.at(1);
     return depthErrors(all, right.model.fx * right.T_rig_cam.translation.norm());
   }
 
-  static Simulation* simulation_;
-  static std::vector<std::vector<Event>> events_;
-  static std::vector<StampedPose> poses_;
+  static test::SimulatedRecording* recording_;
 };
 
-Simulation* DeskStereo::simulation_ = nullptr;
-std::vector<std::vector<Event>> DeskStereo::events_;
-std::vector<StampedPose> DeskStereo::poses_;
+test::SimulatedRecording* DeskStereo::recording_ = nullptr;
 
 TEST_F(DeskStereo, EachCameraFiresAboutAMillionEvents) {
-  for (const auto& events : events_) {
+  for (const auto& events : recording_->events()) {
     EXPECT_GE(events.size(), 800'000U);
     EXPECT_LE(events.size(), 1'200'000U);
   }
@@ -114,37 +64,36 @@ TEST_F(DeskStereo, EachCameraFiresAboutAMillionEvents) {
 class DeskStereoDsi : public DeskStereo {
  protected:
   struct Error {
-    double l1 = 0;  ///< Of the mass.
-    double same_peak = 0;        ///< Share of the pixels with votes.
-    double near_peak_kept = 0;   ///< Within one plane: share of the pixels with a depth.
+    double l1 = 0;              ///< Of the mass.
+    double same_peak = 0;       ///< Share of the pixels with votes.
+    double near_peak_kept = 0;  ///< Within one plane: share of the pixels with a depth.
   };
 
   void SetUp() override {
-    const std::int64_t t0_ns = simulation_->start_ns + 900 * kMs;
+    const std::int64_t t0_ns = recording_->simulation().start_ns + 900 * kMs;
     options_ = options(0.2, 0.2);
     options_.only_window = Window{t0_ns, t0_ns + 200 * kMs, t0_ns + 100 * kMs};
-    FusionMapper mapper(options_);
-    for (const StampedPose& pose : poses_) trajectory_.add(pose);
+    for (const StampedPose& pose : recording_->poses()) trajectory_.add(pose);
     for (std::size_t c = 0; c < 2; ++c) {
       const auto in_window = [&](const Event& event) {
         return event.t_ns >= t0_ns && event.t_ns < t0_ns + 200 * kMs;
       };
       window_events_.emplace_back();
-      std::copy_if(events_[c].begin(), events_[c].end(), std::back_inserter(window_events_[c]),
-                   in_window);
+      std::copy_if(recording_->events()[c].begin(), recording_->events()[c].end(),
+                   std::back_inserter(window_events_[c]), in_window);
     }
-    KeyframeMapper keyframe_mapper(simulation_->rig, {0, 1}, options_.keyframe);
-    dsi_ = std::make_unique<KeptDsi>(100, keyframe_mapper.view());
-    keyframe_ = *keyframe_mapper.map(*options_.only_window,
-                                     {window_events_.begin(), window_events_.end()}, trajectory_,
-                                     dsi_.get());
+    KeyframeMapper keyframe_mapper(recording_->simulation().rig, {0, 1}, options_.keyframe);
+    dsi_ = std::make_unique<test::KeptDsi>(keyframe_mapper.planes(), keyframe_mapper.view());
+    keyframe_ =
+        *keyframe_mapper.map(*options_.only_window, {window_events_.begin(), window_events_.end()},
+                             trajectory_, dsi_.get());
   }
 
   oracle::Dsi oracleDsi(bool by_packet) const {
     const DepthPlanes planes(options_.keyframe.planes);
     std::vector<oracle::Dsi> densities;
     for (std::size_t c = 0; c < 2; ++c) {
-      const RigCamera& camera = simulation_->rig.cameras[c];
+      const RigCamera& camera = recording_->simulation().rig.cameras[c];
       const UndistortionTable undistortion(camera.model);
       const PacketGeometry geometry{keyframe_.T_world_ref.inverse(), keyframe_.view,
                                     planes.depth(0), planes.depth(99)};
@@ -195,7 +144,7 @@ class DeskStereoDsi : public DeskStereo {
   Trajectory trajectory_;
   std::vector<std::vector<Event>> window_events_;
   KeyframeDepthMap keyframe_;
-  std::unique_ptr<KeptDsi> dsi_;
+  std::unique_ptr<test::KeptDsi> dsi_;
 };
 
 TEST_F(DeskStereoDsi, TheKernelIsExactUpToTheRoundingOfFloats) {
@@ -215,12 +164,13 @@ TEST_F(DeskStereoDsi, SharingPosesCostsNextToNothing) {
 }
 
 TEST_F(DeskStereo, DepthIsGoodToAFractionOfAPlane) {
-  const auto keyframes = map(options(0.5, 0.25));
+  const auto keyframes = recording_->map(options(0.5, 0.25));
   ASSERT_GE(keyframes.size(), 5U);
   const double step = DepthPlanes(options(0.5, 0.25).keyframe.planes).inverseDepthStep();
   double mean = 0;
   for (const KeyframeDepthMap& keyframe : keyframes) {
-    mean += depthErrors(pairs(keyframe)).median_inverse / step / static_cast<double>(keyframes.size());
+    mean += depthErrors(recording_->pairs(keyframe)).median_inverse / step /
+            static_cast<double>(keyframes.size());
   }
   std::cout << "median inverse depth error: " << mean << " plane steps, mean of "
             << keyframes.size() << " keyframes\n";
@@ -233,12 +183,12 @@ TEST_F(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
   arithmetic.keyframe.sweep.fusion.across_cameras = FusionRule::kArithmetic;
   FusionMapperOptions one_camera = harmonic;
   one_camera.cameras = {0};
-  const DepthErrors of_harmonic = errors(map(harmonic));
-  const DepthErrors of_arithmetic = errors(map(arithmetic));
-  const DepthErrors of_one = errors(map(one_camera));
-  for (const auto& [name, e] : {std::pair{"harmonic", of_harmonic},
-                                std::pair{"arithmetic", of_arithmetic},
-                                std::pair{"one camera", of_one}}) {
+  const DepthErrors of_harmonic = errors(recording_->map(harmonic));
+  const DepthErrors of_arithmetic = errors(recording_->map(arithmetic));
+  const DepthErrors of_one = errors(recording_->map(one_camera));
+  for (const auto& [name, e] :
+       {std::pair{"harmonic", of_harmonic}, std::pair{"arithmetic", of_arithmetic},
+        std::pair{"one camera", of_one}}) {
     std::cout << name << ": bad-pix " << 100 * *e.bad_pix_3px << " % of " << e.points
               << " points\n";
   }
@@ -246,35 +196,13 @@ TEST_F(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
   EXPECT_LE(*of_harmonic.bad_pix_3px, 0.85 * *of_one.bad_pix_3px);
 }
 
-/// Distance to the nearest point of any surface.
-double distanceToScene(const Scene& scene, const Eigen::Vector3d& p_world) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (int surface = 0; surface < scene.size(); ++surface) {
-    const Rectangle& rectangle = scene.rectangle(surface);
-    const Eigen::Vector3d from_corner = p_world - rectangle.corner;
-    const double u = std::clamp(from_corner.dot(rectangle.axis_u), 0.0, rectangle.width_m);
-    const double v = std::clamp(from_corner.dot(rectangle.axis_v), 0.0, rectangle.height_m);
-    nearest = std::min(nearest, (p_world - rectangle.pointAt(u, v)).norm());
-  }
-  return nearest;
-}
-
 TEST_F(DeskStereo, TheMapLiesOnTheTrueSurfaces) {
-  GlobalCloud cloud;
-  std::uint64_t id = 0;
-  for (const KeyframeDepthMap& keyframe : map(options(0.5, 0.25))) {
-    cloud.insert(id++, keyframeCloud(keyframe));
-  }
-  std::vector<double> distances;
-  for (const CloudPoint& point : cloud.points()) {
-    distances.push_back(distanceToScene(simulation_->scene, point.p_world));
-  }
-  ASSERT_GT(distances.size(), 10'000U);
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  std::cout << "map: " << distances.size() << " points, median distance to the surfaces "
-            << 100 * *middle << " cm\n";
-  EXPECT_LE(*middle, 0.03);
+  const auto points = test::globalCloudOf(recording_->map(options(0.5, 0.25)));
+  ASSERT_GT(points.size(), 10'000U);
+  const double median_m = recording_->medianDistanceToSurfaces(points);
+  std::cout << "map: " << points.size() << " points, median distance to the surfaces "
+            << 100 * median_m << " cm\n";
+  EXPECT_LE(median_m, 0.03);
 }
 
 }  // namespace

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "test/integration/simulated_recording.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "maps/global_cloud.h"
+#include "maps/keyframe_cloud.h"
+#include "tracking_stub/depth_rendering.h"
+
+namespace efm::test {
+namespace {
+
+/// Distance to the nearest point of any surface.
+double distanceToScene(const Scene& scene, const Eigen::Vector3d& p_world) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int surface = 0; surface < scene.size(); ++surface) {
+    const Rectangle& rectangle = scene.rectangle(surface);
+    const Eigen::Vector3d from_corner = p_world - rectangle.corner;
+    const double u = std::clamp(from_corner.dot(rectangle.axis_u), 0.0, rectangle.width_m);
+    const double v = std::clamp(from_corner.dot(rectangle.axis_v), 0.0, rectangle.height_m);
+    nearest = std::min(nearest, (p_world - rectangle.pointAt(u, v)).norm());
+  }
+  return nearest;
+}
+
+}  // namespace
+
+SimulatedRecording::SimulatedRecording(const SimulationOptions& options)
+    : simulation_(makeSimulation(options)) {
+  for (CameraRecording& recording : simulateEvents(simulation_)) {
+    events_.push_back(std::move(recording.events));
+  }
+  poses_ = samplePoses(simulation_);
+}
+
+std::vector<KeyframeDepthMap> SimulatedRecording::map(const FusionMapperOptions& options) const {
+  FusionMapper mapper(options);
+  for (const RigCamera& camera : simulation_.rig.cameras) mapper.addCamera(camera);
+  for (const StampedPose& pose : poses_) mapper.addPose(pose);
+  for (std::size_t c = 0; c < events_.size(); ++c) {
+    mapper.addEvents(static_cast<int>(c), events_[c]);
+  }
+  mapper.finish();
+  std::vector<KeyframeDepthMap> keyframes;
+  while (auto keyframe = mapper.next()) keyframes.push_back(std::move(*keyframe));
+  return keyframes;
+}
+
+cv::Mat1f SimulatedRecording::truthOf(const KeyframeDepthMap& keyframe) const {
+  return renderDepth(simulation_.scene, keyframe.T_world_ref, keyframe.view);
+}
+
+std::vector<DepthPair> SimulatedRecording::pairs(const KeyframeDepthMap& keyframe) const {
+  DepthPairingOptions pairing;
+  pairing.tolerance_px = 1;
+  return pairDepths(keyframe.map.depth, truthOf(keyframe), pairing);
+}
+
+double SimulatedRecording::medianDistanceToSurfaces(const std::vector<CloudPoint>& points) const {
+  std::vector<double> distances;
+  for (const CloudPoint& point : points) {
+    distances.push_back(distanceToScene(simulation_.scene, point.p_world));
+  }
+  if (distances.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes) {
+  GlobalCloud cloud;
+  for (const KeyframeDepthMap& keyframe : keyframes) {
+    cloud.insert(cloud.keyframes(), keyframeCloud(keyframe));
+  }
+  return cloud.points();
+}
+
+}  // namespace efm::test

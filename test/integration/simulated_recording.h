@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "mapping/fusion_mapper.h"
+#include "maps/cloud_point.h"
+#include "maps/depth_metrics.h"
+#include "tracking_stub/simulation_preset.h"
+
+namespace efm::test {
+
+/// A preset with its events and poses, to be mapped in several ways and held against the truth.
+class SimulatedRecording {
+ public:
+  explicit SimulatedRecording(const SimulationOptions& options);
+
+  const Simulation& simulation() const { return simulation_; }
+  const std::vector<std::vector<Event>>& events() const { return events_; }  ///< Per camera.
+  const std::vector<StampedPose>& poses() const { return poses_; }
+
+  std::vector<KeyframeDepthMap> map(const FusionMapperOptions& options) const;
+
+  /// The true z-depth in the keyframe's view.
+  cv::Mat1f truthOf(const KeyframeDepthMap& keyframe) const;
+  /// Estimate and truth wherever there is an estimate, the truth within one pixel.
+  std::vector<DepthPair> pairs(const KeyframeDepthMap& keyframe) const;
+
+  /// Median distance of a cloud's points to the nearest point of any surface, metres.
+  double medianDistanceToSurfaces(const std::vector<CloudPoint>& points) const;
+
+ private:
+  Simulation simulation_;
+  std::vector<std::vector<Event>> events_;
+  std::vector<StampedPose> poses_;
+};
+
+/// All keyframes in one cloud of voxels of a centimetre.
+std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes);
+
+}  // namespace efm::test

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Three cameras that look in different directions see more than two of them.
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <vector>
+
+#include "test/integration/simulated_recording.h"
+
+namespace efm {
+namespace {
+
+class Trinocular : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    SimulationOptions simulation;
+    simulation.preset = "trinocular";
+    simulation.duration_s = 0.25;
+    recording_ = new test::SimulatedRecording(simulation);
+  }
+  static void TearDownTestSuite() {
+    delete recording_;
+    recording_ = nullptr;
+  }
+
+  static KeyframeDepthMap keyframe(const std::vector<int>& cameras, FusionRule rule) {
+    FusionMapperOptions options;
+    options.cameras = cameras;
+    options.keyframe.planes = {0.5, 5.0, 100, PlaneSpacing::kInverse};
+    options.keyframe.sweep.fusion.across_cameras = rule;
+    options.keyframe.camera_maps = true;
+    auto keyframes = recording_->map(options);
+    EXPECT_EQ(keyframes.size(), 1U);
+    return std::move(keyframes.at(0));
+  }
+
+  static test::SimulatedRecording* recording_;
+};
+
+test::SimulatedRecording* Trinocular::recording_ = nullptr;
+
+TEST_F(Trinocular, ThreeCamerasAreSurerThanTwoWhereAllVote) {
+  const KeyframeDepthMap all = keyframe({0, 1, 2}, FusionRule::kHarmonic);
+  ASSERT_EQ(all.camera_maps.size(), 3U);
+  cv::Mat1b every_camera_votes(all.map.depth.size(), 255);
+  for (const CameraDepthMap& camera : all.camera_maps) {
+    every_camera_votes &= camera.map.confidence > 0;
+  }
+  EXPECT_GT(cv::countNonZero(every_camera_votes), 100'000) << "of 307,200 pixels";
+
+  const auto median_error = [&](KeyframeDepthMap of, const char* name) {
+    of.map.depth.setTo(0, ~every_camera_votes);
+    const DepthErrors errors = depthErrors(recording_->pairs(of));
+    std::cout << name << ": median error " << 100 * errors.median_abs_m << " cm of "
+              << errors.points << " points\n";
+    EXPECT_GT(errors.points, 1000U) << name;
+    return errors.median_abs_m;
+  };
+  const double of_all = median_error(all, "0+1+2");
+  EXPECT_LT(of_all, median_error(keyframe({0, 1}, FusionRule::kHarmonic), "0+1"));
+  EXPECT_LT(of_all, median_error(keyframe({0, 2}, FusionRule::kHarmonic), "0+2"));
+}
+
+TEST_F(Trinocular, NoRuleIgnoresTheThirdCamera) {
+  for (const FusionRule rule : allFusionRules()) {
+    const KeyframeDepthMap all = keyframe({0, 1, 2}, rule);
+    for (const std::vector<int>& two : {std::vector{0, 1}, {0, 2}, {1, 2}}) {
+      const KeyframeDepthMap pair = keyframe(two, rule);
+      const cv::Mat1b differs = all.map.confidence != pair.map.confidence;
+      EXPECT_GT(cv::countNonZero(differs), 1000)
+          << nameOf(rule) << " without " << 3 - two[0] - two[1];
+    }
+  }
+}
+
+}  // namespace
+}  // namespace efm
