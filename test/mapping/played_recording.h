@@ -34,7 +34,7 @@ struct LongRecording {
   std::vector<StampedPose> poses;
   std::vector<std::vector<Event>> events;  // on the cameras' own clocks
 
-  LongRecording(std::uint32_t seed, double speed_m_s) {
+  LongRecording(std::uint32_t seed, double speed_m_s, std::size_t events_per_camera = 3000) {
     RandomScene random(seed);
     const std::int64_t gap_ns =
         kStart_ns + static_cast<std::int64_t>(random.uniform(100, 400)) * kMs;
@@ -48,7 +48,8 @@ struct LongRecording {
     for (int c = 0; c < 3; ++c) {
       const std::int64_t offset_ns = c == 1 ? kOffset_ns : 0;
       rig.cameras.push_back({smallCamera(), random.pose(0.05, 0.1), offset_ns});
-      events.push_back(random.events(smallCamera(), 3000, kStart_ns - 20 * kMs, 600 * kMs));
+      events.push_back(
+          random.events(smallCamera(), events_per_camera, kStart_ns - 20 * kMs, 600 * kMs));
       for (Event& event : events.back()) event.t_ns -= event.t_ns % 50'000;
     }
   }
@@ -64,7 +65,7 @@ struct LongRecording {
   }
 };
 
-/// Few planes, no parallax too small, cameras 0 and 1 of three.
+/// Few planes, cameras 0 and 1 of three.
 inline FusionMapperOptions playedOptions() {
   FusionMapperOptions options;
   options.trajectory.max_pose_gap_s = LongRecording::kMaxPoseGap_s;
@@ -98,7 +99,7 @@ inline Played play(const LongRecording& recording, const FusionMapperOptions& op
   };
   while (left()) {
     const std::size_t stream = random() % (cameras + 1);
-    const std::size_t most = cut_seed == 0 ? sizeOf(stream) : stream < cameras ? 300 : 12;
+    const std::size_t most = cut_seed == 0 ? sizeOf(stream) : sizeOf(stream) / 10;
     const std::size_t size = cut_seed == 0 ? most : 1 + random() % most;
     const std::size_t end = std::min(sizeOf(stream), done[stream] + size);
     if (stream < cameras) {
