@@ -60,10 +60,8 @@ std::shared_ptr<const Motion> makeMotion(std::int64_t start_ns) {
   SmoothMotionOptions options;
   options.start_ns = start_ns;
   // Looks along +y and 15 degrees down; camera x is world x.
-  Eigen::Matrix3d R_world_level;
-  R_world_level << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   options.T_world_center.rotation =
-      Eigen::Quaterniond(R_world_level) * Eigen::AngleAxisd(radians(-15), Vector3d::UnitX());
+      lookingAlongY() * Eigen::AngleAxisd(radians(-15), Vector3d::UnitX());
   options.T_world_center.translation = {-0.05, 0, 0.68};
   // A quarter of a period apart, x and y make a circle: never at rest, and parallax for edges of
   // every orientation.
@@ -91,7 +89,7 @@ Simulation makeDeskStereo(std::uint64_t seed) {
   simulation.start_ns = kNanosecondsPerSecond;
   simulation.duration_ns = 2 * kNanosecondsPerSecond;
   simulation.motion = makeMotion(simulation.start_ns);
-  simulation.contrast_threshold = 0.21;
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = 0.21;
   simulation.seed = seed;
   return simulation;
 }

@@ -27,10 +27,8 @@ Rig makeRig() {
 std::shared_ptr<const Motion> makeMotion(std::int64_t start_ns) {
   SmoothMotionOptions options;
   options.start_ns = start_ns;
-  Eigen::Matrix3d R_world_level;  // looks along +y
-  R_world_level << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   options.T_world_center.rotation =
-      Eigen::Quaterniond(R_world_level) * Eigen::AngleAxisd(radians(-8), Eigen::Vector3d::UnitX());
+      lookingAlongY() * Eigen::AngleAxisd(radians(-8), Eigen::Vector3d::UnitX());
   options.T_world_center.translation = {0.3, 0.1, 1.3};
   options.velocity = {0.2, 0, 0.05};
   options.translation[1] = {{0.04, 0.8, 0.5}};
@@ -54,7 +52,7 @@ Simulation makeHdStereo(std::uint64_t seed) {
   simulation.start_ns = kNanosecondsPerSecond;
   simulation.duration_ns = kNanosecondsPerSecond / 2;
   simulation.motion = makeMotion(simulation.start_ns);
-  simulation.contrast_threshold = 0.16;
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = 0.16;
   simulation.max_step_px = 0.5;  // misplaces an edge by 0.04 pixels at most
   simulation.seed = seed;
   return simulation;

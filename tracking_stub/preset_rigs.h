@@ -1,11 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
+
 #include "mapping/rig.h"
 
 namespace efm {
 
+/// What presets put their rigs and motions together from.
+
 inline double radians(double deg) { return deg * 3.14159265358979323846 / 180; }
+
+/// R_world_cam of a level camera (x right, y down, z forward) that looks along y in a world whose z
+/// is up.
+inline Eigen::Quaterniond lookingAlongY() {
+  Eigen::Matrix3d R_world_cam;
+  R_world_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  return Eigen::Quaterniond(R_world_cam);
+}
 
 /// No distortion, the principal point in the middle.
 inline CameraModel makePinhole(int width, int height, double focal_px) {

@@ -21,11 +21,11 @@ std::shared_ptr<const Motion> makeSway(std::int64_t start_ns) {
   options.start_ns = start_ns;
   const double once = 1 / kDurationS;
   options.translation[0] = {{0.02, 7 * once, 0.4}};
-  options.translation[1] = {{0.10, 5 * once, 1.1}, {0.01, 13 * once, 0.2}};
+  options.translation[1] = {{0.08, 5 * once, 1.1}};
   options.translation[2] = {{0.06, 6 * once, 2.0}};
-  options.rotation[0] = {{radians(5), 3 * once, 0.3}, {radians(0.3), 15 * once, 1.1}};
+  options.rotation[0] = {{radians(5), 3 * once, 0.3}, {radians(0.2), 11 * once, 1.1}};
   options.rotation[1] = {{radians(2), 4 * once, 2.0}};
-  options.rotation[2] = {{radians(3), 5 * once, 1.9}, {radians(0.4), 12 * once, 0.2}};
+  options.rotation[2] = {{radians(2), 5 * once, 1.9}};
   return std::make_shared<SmoothMotion>(options);
 }
 
@@ -41,8 +41,8 @@ Simulation makeRoomStereo(std::uint64_t seed) {
   LoopMotionOptions loop;
   loop.start_ns = kNanosecondsPerSecond;
   loop.period_s = kDurationS;
-  loop.radius_x_m = 1.2;
-  loop.radius_y_m = 0.8;
+  loop.radius_x_m = 1.0;
+  loop.radius_y_m = 0.65;
   loop.height_m = 1.25;
   loop.heading_rad = radians(35);
   loop.sway = makeSway(loop.start_ns);
@@ -53,8 +53,8 @@ Simulation makeRoomStereo(std::uint64_t seed) {
   simulation.start_ns = loop.start_ns;
   simulation.duration_ns = durationFromSeconds(kDurationS);
   simulation.motion = std::make_shared<LoopMotion>(loop);
-  simulation.contrast_threshold = 0.36;
-  simulation.max_step_px = 0.5;  // misplaces an edge by 0.04 pixels at most
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = 0.36;
+  simulation.max_step_px = 0.7;  // misplaces an edge by 0.08 pixels at most
   simulation.seed = seed;
   return simulation;
 }

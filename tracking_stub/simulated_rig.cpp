@@ -14,7 +14,6 @@
 
 #include "mapping/option_check.h"
 #include "mapping/timestamp.h"
-#include "tracking_stub/event_pixels.h"
 #include "tracking_stub/frame_renderer.h"
 #include "tracking_stub/scene_view.h"
 
@@ -34,8 +33,8 @@ struct AttributedEvent {
 void validate(const Simulation& simulation) {
   requireOption(simulation.motion != nullptr, "motion", "none", "given");
   requireOption(simulation.duration_ns > 0, "duration_ns", simulation.duration_ns, "above 0");
-  requireOption(simulation.contrast_threshold > 0, "contrast_threshold",
-                simulation.contrast_threshold, "above 0");
+  simulation.pixels.validate();
+  simulation.noise.validate();
   requireOption(simulation.max_step_px > 0, "max_step_px", simulation.max_step_px, "above 0");
   for (const RigCamera& camera : simulation.rig.cameras) {
     camera.model.validate();
@@ -52,7 +51,9 @@ class CameraRun {
         camera_(simulation.rig.cameras[camera]),
         seed_(simulation.seed * 1024 + camera),
         renderer_(camera_.model),
-        pixels_(camera_.model.width, camera_.model.height, simulation.contrast_threshold),
+        pixels_(camera_.model.width, camera_.model.height, simulation.pixels, seed_),
+        noise_(camera_.model.width, camera_.model.height, simulation.noise,
+               {seed_, simulation.start_ns}),
         rows_(static_cast<std::size_t>(camera_.model.height)) {}
 
   template <typename Progress>
@@ -121,6 +122,9 @@ class CameraRun {
       rows_[static_cast<std::size_t>(y)].push_back(
           {event, renderer_.sourceOf(view, after_, event.x, y)});
     }
+    fired.clear();
+    noise_.fireRow(y, step.t1_ns, fired);
+    for (const Event& event : fired) rows_[static_cast<std::size_t>(y)].push_back({event, {}});
   }
 
   CameraRecording inOrderOfTime() {
@@ -149,6 +153,7 @@ class CameraRun {
   std::uint64_t seed_;
   FrameRenderer renderer_;
   EventPixels pixels_;
+  EventNoise noise_;
   Frame before_;
   Frame after_;
   std::vector<std::vector<AttributedEvent>> rows_;

@@ -10,6 +10,8 @@
 #include "mapping/event.h"
 #include "mapping/rig.h"
 #include "mapping/trajectory.h"
+#include "tracking_stub/event_noise.h"
+#include "tracking_stub/event_pixels.h"
 #include "tracking_stub/motion.h"
 #include "tracking_stub/scene.h"
 
@@ -20,19 +22,22 @@ struct Simulation {
   Scene scene;
   Rig rig;  ///< Synchronised: time offsets are 0. The dataset folder wants camera 0 for its frame.
   std::shared_ptr<const Motion> motion;
-  std::int64_t start_ns = 0;        ///< Of the recording, in its own clock.
-  std::int64_t duration_ns = 0;     ///< Above 0.
-  double contrast_threshold = 0.3;  ///< Log intensity, above 0.
+  std::int64_t start_ns = 0;     ///< Of the recording, in its own clock.
+  std::int64_t duration_ns = 0;  ///< Above 0.
+  EventPixelOptions pixels;
+  EventNoiseOptions noise;
   /// Largest motion in the image from one frame to the next, in pixels, above 0. Within it log
   /// intensity is taken to change linearly: under a blur of half a pixel that misplaces an edge by
   /// 0.02 pixels at most.
   double max_step_px = 0.35;
-  std::uint64_t seed = 0;  ///< Of the pixels' memory when the recording starts.
+  /// Of the pixels' memory when the recording starts, their mismatch and their noise.
+  std::uint64_t seed = 0;
+  double truth_cell_m = 0.01;  ///< Of the truth clouds: one point per cell of the surfaces.
 
   std::int64_t endNs() const { return start_ns + duration_ns; }
 };
 
-/// One camera's events and, for each, the place that its pixel saw.
+/// One camera's events and, for each, the place that its pixel saw; none for noise.
 struct CameraRecording {
   std::vector<Event> events;  ///< By time, then row, then column; start <= t <= end.
   std::vector<SurfacePoint> sources;

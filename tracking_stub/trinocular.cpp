@@ -46,9 +46,7 @@ Rig makeRig() {
 std::shared_ptr<const Motion> makeMotion(std::int64_t start_ns) {
   SmoothMotionOptions options;
   options.start_ns = start_ns;
-  Eigen::Matrix3d R_world_level;  // looks along +y
-  R_world_level << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  options.T_world_center.rotation = Eigen::Quaterniond(R_world_level) * turned(15, -12, 0);
+  options.T_world_center.rotation = lookingAlongY() * turned(15, -12, 0);
   options.T_world_center.translation = {-0.5, 0.2, 1.35};
   options.translation[0] = {{0.14, 0.55, 0.0}, {0.008, 1.9, 0.9}};
   options.translation[1] = {{0.12, 0.60, 1.4}, {0.006, 1.7, 2.5}};
@@ -75,7 +73,7 @@ Simulation makeTrinocular(std::uint64_t seed) {
   simulation.start_ns = kNanosecondsPerSecond;
   simulation.duration_ns = kNanosecondsPerSecond;
   simulation.motion = makeMotion(simulation.start_ns);
-  simulation.contrast_threshold = 0.21;
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = 0.21;
   simulation.seed = seed;
   return simulation;
 }

@@ -10,7 +10,6 @@
 namespace efm {
 namespace {
 
-constexpr double kCellM = 0.01;
 constexpr std::uint32_t kEventsOfAnEdge = 3;
 /// A far pixel sees less than every cell at once; the motion between looks fills the gaps.
 constexpr std::int64_t kLookPeriodNs = 20'000'000;
@@ -30,8 +29,8 @@ void addWhatIsSeen(const Scene& scene, const PixelRays& rays, const Rigid3& T_wo
 
 TruthClouds makeTruthClouds(const Simulation& simulation,
                             const std::vector<CameraRecording>& recordings) {
-  SurfaceCells seen(simulation.scene, kCellM);
-  SurfaceCells fired(simulation.scene, kCellM);
+  SurfaceCells seen(simulation.scene, simulation.truth_cell_m);
+  SurfaceCells fired(simulation.scene, simulation.truth_cell_m);
   for (const RigCamera& camera : simulation.rig.cameras) {
     const PixelRays rays(camera.model);
     for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs();

@@ -9,7 +9,7 @@
 namespace efm {
 
 /// What a map of a simulated recording is compared with: points on the true surfaces, one per cell
-/// of about 1 cm, frame `world`.
+/// of about `Simulation::truth_cell_m`, frame `world`.
 struct TruthClouds {
   std::vector<Eigen::Vector3f> surfaces;  ///< Every cell that a camera's pixel saw.
   /// Those that fired at least 3 events: what a semi-dense map can be asked to find.

@@ -29,7 +29,7 @@ Simulation passingEdge() {
   simulation.motion = std::make_shared<test::StraightMotion>(Eigen::Vector3d(kSpeed, 0, 0));
   simulation.start_ns = -1'000'000'000;
   simulation.duration_ns = 2'000'000'000;
-  simulation.contrast_threshold = kThreshold;
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = kThreshold;
   simulation.max_step_px = 0.1;
   return simulation;
 }
@@ -133,18 +133,74 @@ TEST(SimulatedRig, EventsAreInOrderWithinTheRecording) {
 
 TEST(SimulatedRig, TheSameSeedGivesTheSameEventsWithAnyNumberOfThreads) {
   SimulationOptions options;
-  options.duration_s = 0.03;
+  options.duration_s = 0.02;
+  Simulation desk = makeSimulation(options);
+  desk.pixels.mismatch = 0.05;
+  desk.pixels.refractory_ns = 500'000;
+  desk.noise.background_hz = 2;
   std::vector<std::vector<Event>> events;
   for (const int threads : {1, 2, 3}) {
     SimulationRun run;
     run.threads = threads;
-    events.push_back(simulateEvents(makeSimulation(options), run)[1].events);
+    events.push_back(simulateEvents(desk, run)[1].events);
   }
   ASSERT_GT(events[0].size(), 1000U);
   EXPECT_EQ(events[0], events[1]);
   EXPECT_EQ(events[0], events[2]);
-  options.seed = 2;
-  EXPECT_NE(simulateEvents(makeSimulation(options))[1].events, events[0]);
+  desk.seed = 2;
+  EXPECT_NE(simulateEvents(desk)[1].events, events[0]);
+}
+
+TEST(SimulatedRig, NoiseComesOnTopAndFromNoPlace) {
+  Simulation simulation = passingEdge();
+  const auto ideal = simulateEvents(simulation)[0];
+  simulation.noise.background_hz = 1;
+  const auto noisy = simulateEvents(simulation)[0];
+  std::vector<Event> without;
+  for (std::size_t i = 0; i < noisy.events.size(); ++i) {
+    if (noisy.sources[i].surface >= 0) without.push_back(noisy.events[i]);
+  }
+  EXPECT_EQ(without, ideal.events);
+  const double expected = 64 * 48 * 2;  // pixels and seconds
+  EXPECT_NEAR(static_cast<double>(noisy.events.size() - without.size()), expected,
+              5 * std::sqrt(expected));
+}
+
+TEST(SimulatedRig, APassingEdgeIsWhereTheLensBendsIt) {
+  for (const DistortionModel distortion :
+       {DistortionModel::kRadtan, DistortionModel::kEquidistant}) {
+    Simulation simulation = passingEdge();
+    RigCamera& camera = simulation.rig.cameras[0];
+    camera.model.distortion = distortion;
+    camera.model.coefficients = distortion == DistortionModel::kRadtan
+                                    ? std::vector<double>{-0.3, 0.1, 0.002, -0.003}
+                                    : std::vector<double>{-0.05, 0.01, -0.02, 0.005};
+    // A camera upright on the rig, beside its origin.
+    camera.T_rig_cam.rotation = Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitZ()) *
+                                Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX());
+    camera.T_rig_cam.translation = {0.05, -0.1, 0.02};
+    const auto recording = simulateEvents(simulation)[0];
+    ASSERT_GT(recording.events.size(), 1000U);
+    double off_px = 0;
+    std::size_t compared = 0;
+    for (std::size_t i = 0; i < recording.events.size(); i += 7, ++compared) {
+      const Event& event = recording.events[i];
+      // The nearest point of the edge x = 0, z = 1 in the image.
+      const Rigid3 T_cam_world =
+          (simulation.motion->poseAt(event.t_ns) * camera.T_rig_cam).inverse();
+      double nearest_px = 1e9;
+      for (double y = -2; y <= 2; y += 0.01) {
+        const Eigen::Vector3d p_cam = T_cam_world * Eigen::Vector3d(0, y, kDepth);
+        if (p_cam.z() < 0.2 || p_cam.hnormalized().norm() > 1.5) continue;
+        nearest_px = std::min(
+            nearest_px, (camera.model.project(p_cam) - Eigen::Vector2d(event.x, event.y)).norm());
+      }
+      // The blur is felt two pixels away; a pixel that starts a hair from its threshold feels more.
+      ASSERT_LT(nearest_px, 5);
+      off_px += nearest_px;
+    }
+    EXPECT_LT(off_px / static_cast<double>(compared), 0.8);
+  }
 }
 
 TEST(SimulatedRig, ReportsItsProgressUpToTheEnd) {
