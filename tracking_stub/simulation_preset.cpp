@@ -7,8 +7,11 @@
 #include "mapping/option_check.h"
 #include "mapping/timestamp.h"
 #include "tracking_stub/desk_stereo.h"
+#include "tracking_stub/drive_stereo.h"
 #include "tracking_stub/hd_stereo.h"
+#include "tracking_stub/poles_stereo.h"
 #include "tracking_stub/room_stereo.h"
+#include "tracking_stub/slider.h"
 #include "tracking_stub/trinocular.h"
 
 namespace efm {
@@ -17,9 +20,9 @@ namespace {
 using MakePreset = Simulation (*)(std::uint64_t seed);
 
 constexpr NamedChoice<MakePreset> kPresets[] = {
-    {makeDeskStereo, "desk_stereo"},
-    {makeHdStereo, "hd_stereo"},
-    {makeRoomStereo, "room_stereo"},
+    {makeDeskStereo, "desk_stereo"}, {makeDriveStereo, "drive_stereo"},
+    {makeHdStereo, "hd_stereo"},     {makePolesStereo, "poles_stereo"},
+    {makeRoomStereo, "room_stereo"}, {makeSlider, "slider"},
     {makeTrinocular, "trinocular"},
 };
 

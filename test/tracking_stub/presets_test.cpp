@@ -97,7 +97,10 @@ TEST_P(Presets, KeepWhatTheyPromise) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Presets,
-                         ::testing::Values(Promise{"hd_stereo", 2, 1280, 720, 0.8, 5},
+                         ::testing::Values(Promise{"slider", 1, 240, 180, 0.5, 2.4},
+                                           Promise{"poles_stereo", 2, 346, 260, 0.85, 4.2},
+                                           Promise{"drive_stereo", 2, 640, 480, 4, 50, 0.35},
+                                           Promise{"hd_stereo", 2, 1280, 720, 0.8, 5},
                                            Promise{"room_stereo", 2, 346, 260, 0.9, 7},
                                            Promise{"trinocular", 3, 640, 480, 0.7, 5}),
                          [](const auto& preset) { return preset.param.preset; });
