@@ -14,6 +14,8 @@
 #include "plugin/app/map_command.h"
 #include "plugin/app/simulate_command.h"
 #include "plugin/recording.h"
+#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/trajectory_simulation.h"
 
 namespace efm {
 namespace {
@@ -78,9 +80,9 @@ CLI::Option* addTime(CLI::App& command, const std::string& name, std::int64_t& t
       ->type_name("SECONDS");
 }
 
-void addTime(CLI::App& command, const std::string& name, std::optional<std::int64_t>& t_ns,
-             const std::string& help) {
-  command
+CLI::Option* addTime(CLI::App& command, const std::string& name, std::optional<std::int64_t>& t_ns,
+                     const std::string& help) {
+  return command
       .add_option_function<std::string>(
           name, [&t_ns, name](const std::string& text) { setTime(text, name, t_ns.emplace(0)); },
           help)
@@ -109,22 +111,84 @@ void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
       ->allow_extra_args(false);
 }
 
+void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
+  constexpr const char* kGroup = "Pixels (ideal by default)";
+  command
+      .add_option(
+          "--threshold-on", arguments.threshold_on,
+          "Log intensity by which a pixel gets brighter per event; the preset's own, or 0.3")
+      ->group(kGroup);
+  command
+      .add_option("--threshold-off", arguments.threshold_off,
+                  "Log intensity by which a pixel gets darker per event; the preset's own, or 0.3")
+      ->group(kGroup);
+  command
+      .add_option("--mismatch", arguments.mismatch,
+                  "Standard deviation of the pixels' thresholds, as a share of them, 0 to 0.5")
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option("--refractory-us", arguments.refractory_us,
+                  "Microseconds for which a pixel sees nothing after an event")
+      ->capture_default_str()
+      ->group(kGroup);
+  command
+      .add_option("--noise-hz", arguments.noise.background_hz,
+                  "Events per second and pixel that nothing caused")
+      ->capture_default_str()
+      ->group(kGroup);
+  command.add_option("--hot-pixels", arguments.noise.hot_share, "Share of hot pixels, 0 to 1")
+      ->capture_default_str()
+      ->group(kGroup);
+  command.add_option("--hot-hz", arguments.noise.hot_hz, "Events per second of a hot pixel")
+      ->capture_default_str()
+      ->group(kGroup);
+}
+
 void addSimulate(CLI::App& app, Run& run) {
   CLI::App& command = *app.add_subcommand(
-      "simulate", "Make a recording with exact ground truth, as a dataset folder");
+      "simulate",
+      "Make a recording with exact ground truth, as a dataset folder: a preset, or a scene around "
+      "a trajectory seen by a calibrated rig");
   auto arguments = onCommand(command, run, runSimulate);
-  command.add_option("--preset", arguments->simulation.preset, "Scene, rig and motion")
-      ->required()
-      ->check(CLI::IsMember(simulationPresets()));
+  CLI::Option* preset = command.add_option("--preset", arguments->preset, "Scene, rig and motion")
+                            ->check(CLI::IsMember(simulationPresets()));
+  CLI::Option* scene = command
+                           .add_option("--scene", arguments->scene,
+                                       "Built around the trajectory, upright as the cameras are")
+                           ->check(CLI::IsMember(simulationScenes()))
+                           ->excludes(preset);
+  CLI::Option* trajectory =
+      command
+          .add_option("--trajectory", arguments->trajectory,
+                      "Poses of camera 0 (z forward), TUM format; smoothed, cut above 10 Hz, they "
+                      "are the truth")
+          ->type_name("TUM.txt");
+  CLI::Option* calibration =
+      command.add_option("--calibration", arguments->calibration, "The rig, as Kalibr writes it")
+          ->type_name("CAMCHAIN.yaml");
+  trajectory->needs(scene);
+  calibration->needs(scene);
+  scene->needs(trajectory)->needs(calibration);
+  addTime(command, "--start", arguments->start_ns,
+          "Where to begin on the trajectory, in its clock; by default where it gets under way: "
+          "first moves, for half a second, at half its mean speed or more")
+      ->needs(scene);
   command
-      .add_option("--duration", arguments->simulation.duration_s,
-                  "Length of the recording; the preset's own by default")
+      .add_option("--duration", arguments->duration_s,
+                  "Length of the recording; the preset's own by default, on a trajectory 5 or what "
+                  "is left of it")
       ->type_name("SECONDS");
-  command.add_option("--seed", arguments->simulation.seed, "Of everything random")
-      ->capture_default_str();
+  command.add_option("--seed", arguments->seed, "Of everything random")->capture_default_str();
+  addPixelOptions(command, *arguments);
   command.add_option("--out", arguments->out, "The folder to write; must not exist or be empty")
       ->required()
       ->type_name("DIR");
+  command.parse_complete_callback([preset, scene] {
+    if (preset->count() + scene->count() == 0) {
+      throw CLI::RequiredError("--preset, or --scene with --trajectory and --calibration,");
+    }
+  });
 }
 
 void addImport(CLI::App& app, Run& run) {

@@ -1,14 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <optional>
+#include <string>
 
-#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/event_noise.h"
 
 namespace efm {
 
 struct SimulateArguments {
-  SimulationOptions simulation;
+  std::string preset;  ///< Empty: scene, trajectory and calibration count.
+  std::string scene;
+  std::filesystem::path trajectory;   ///< TUM, T_world_cam0.
+  std::filesystem::path calibration;  ///< Kalibr camera chain.
+  std::optional<std::int64_t> start_ns;
+  std::optional<double> duration_s;
+  std::uint64_t seed = 1;
+  // The preset's pixels, or ideal ones, where not given.
+  std::optional<double> threshold_on;
+  std::optional<double> threshold_off;
+  double mismatch = 0;
+  double refractory_us = 0;
+  EventNoiseOptions noise;
   std::filesystem::path out;
 };
 
