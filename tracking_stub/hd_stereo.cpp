@@ -50,7 +50,7 @@ Simulation makeHdStereo(std::uint64_t seed) {
   simulation.scene = makeRoom(room);
   simulation.rig = makeRig();
   simulation.start_ns = kNanosecondsPerSecond;
-  simulation.duration_ns = kNanosecondsPerSecond / 2;
+  simulation.duration_ns = kNanosecondsPerSecond * 4 / 5;
   simulation.motion = makeMotion(simulation.start_ns);
   simulation.pixels.threshold_on = simulation.pixels.threshold_off = 0.16;
   simulation.max_step_px = 0.5;  // misplaces an edge by 0.04 pixels at most

@@ -14,7 +14,7 @@ struct PolesOptions {
   /// Half of what the camera sees at a depth of 1 m, to the side: the poles stand in the view.
   double half_view = 0.75;
   double focal_px = 226;  ///< Of the sharpest camera that will look.
-  int poles = 14;
+  int poles = 11;
   std::uint64_t seed = 0;
 };
 

@@ -17,11 +17,11 @@ std::shared_ptr<const Motion> makeMotion(std::int64_t start_ns) {
   SmoothMotionOptions options;
   options.start_ns = start_ns;
   options.T_world_center.rotation = lookingAlongY();
-  options.translation[0] = {{0.10, 0.45, 0.0}, {0.008, 1.7, 0.9}};
-  options.translation[1] = {{0.09, 0.55, 1.3}, {0.006, 1.9, 2.5}};
-  options.translation[2] = {{0.05, 0.50, 3.6}, {0.004, 1.5, 0.4}};
-  options.rotation[0] = {{radians(0.8), 0.8, 0.3}};
-  options.rotation[1] = {{radians(0.8), 0.7, 2.0}};
+  options.translation[0] = {{0.16, 0.45, 0.0}, {0.010, 1.7, 0.9}};
+  options.translation[1] = {{0.12, 0.55, 1.3}, {0.006, 1.9, 2.5}};
+  options.translation[2] = {{0.10, 0.50, 2.0}, {0.004, 1.5, 0.4}};
+  options.rotation[0] = {{radians(1.2), 0.8, 0.3}};
+  options.rotation[1] = {{radians(1.2), 0.7, 2.0}};
   options.rotation[2] = {{radians(2.0), 0.6, 1.9}};
   return std::make_shared<SmoothMotion>(options);
 }
@@ -30,7 +30,7 @@ std::shared_ptr<const Motion> makeMotion(std::int64_t start_ns) {
 
 Simulation makePolesStereo(std::uint64_t seed) {
   PolesOptions poles;
-  poles.nearest_m = 1.0;
+  poles.nearest_m = 1.05;
   poles.farthest_m = 3;
   poles.wall_m = 4;
   poles.focal_px = kFocalPx;

@@ -40,6 +40,8 @@ Scene makeScene(std::uint64_t seed) {
   addThing(scene, {-0.62, 0.28, 1.9}, {0.42, 0.5, 0.1}, 20, painting.clutter(1.7, 0.14));
   addThing(scene, {0.58, -0.22, 1.75}, {0.4, 0.34, 0.06}, -25, painting.clutter(1.6, 0.13));
   addThing(scene, {0.02, -0.3, 1.5}, {0.3, 0.26, 0.2}, 30, painting.clutter(1.3, 0.11));
+  addThing(scene, {0.36, 0.32, 1.45}, {0.5, 0.3, 0.05}, 28, painting.clutter(1.3, 0.12));
+  addThing(scene, {-0.5, -0.36, 1.6}, {0.4, 0.3, 0.08}, -22, painting.clutter(1.4, 0.12));
   addThing(scene, {-0.34, -0.1, 1.1}, {0.16, 0.3, 0.12}, 15, painting.clutter(0.95, 0.08));
   addThing(scene, {0.3, 0.2, 0.95}, {0.2, 0.18, 0.1}, -18, painting.clutter(0.8, 0.07));
   addThing(scene, {-0.06, 0.14, 0.68}, {0.1, 0.1, 0.04}, 12, painting.clutter(0.6, 0.045));

@@ -165,7 +165,6 @@ std::vector<std::string> simulationScenes() {
 Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                                     const std::vector<StampedPose>& measured, const Rig& rig) {
   constexpr double kDurationS = 5;
-  constexpr double kTruthCellOfStreetM = 0.05;
   options.validate();
   requireOption(measured.size() >= 2, "poses", measured.size(), "at least 2");
   std::vector<StampedPose> poses = measured;
@@ -189,7 +188,10 @@ Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                 "at most the " + formatSeconds(left_ns) + " s that are left of the trajectory");
   simulation.motion = std::make_shared<SampledMotion>(
       smoothTrajectory(posesAround(poses, simulation.start_ns, simulation.endNs())));
-  if (options.scene == "street") simulation.truth_cell_m = kTruthCellOfStreetM;
+  if (options.scene == "street") {  // as drive_stereo
+    simulation.truth_cell_m = 0.05;
+    simulation.max_step_px = 1;
+  }
   simulation.scene = valueIn(kScenes, options.scene)(wayOf(simulation));
   return simulation;
 }
