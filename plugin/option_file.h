@@ -1,47 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <variant>
-#include <vector>
 
-#include "mapping/fusion_mapper.h"
-#include "maps/global_cloud.h"
-#include "plugin/rig_setup.h"
+#include "plugin/event_fusion_options.h"
+#include "plugin/option_keys.h"
 
 namespace efm {
-
-/// Everything that an option file says.
-struct EventFusionOptions {
-  FusionMapperOptions mapper;
-  /// The cloud of a keyframe is those of its single cameras, concatenated: the naive baseline
-  /// (Ghosh and Gallego 2022, Sec. 3.1). Depth maps stay fused.
-  bool late_fusion = false;
-  GlobalCloudOptions cloud;
-  RigOptions rig;
-};
-
-using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
-
-/// One option as the files name it.
-struct NamedOption {
-  std::string_view section;
-  std::string_view key;
-  OptionValue value;
-};
-
-/// All options, in the order of the table that files are read by, so that what is read, overridden
-/// and reported cannot differ.
-std::vector<NamedOption> listOptions(const EventFusionOptions& options);
-/// Whether an option file may have a section of this name.
-bool isOptionSection(std::string_view section);
-/// As a file has it: numbers with the fewest digits that read back the same.
-std::string textOf(const OptionValue& value);
 
 /// Where an option of somebody else's file stands.
 struct OptionPlace {

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/option_keys.h"
+
+#include <optional>
+#include <stdexcept>
+#include <type_traits>
+
+namespace efm {
+namespace {
+
+template <typename Field>
+OptionKey option(std::string_view section, std::string_view key, Field field) {
+  using Value = std::decay_t<std::invoke_result_t<Field, EventFusionOptions&>>;
+  return {section, key,
+          [field](EventFusionOptions& options, std::string_view text) {
+            parseInto(text, field(options));
+          },
+          [field](const EventFusionOptions& options) { return valueOf(field(options)); },
+          std::is_same_v<Value, std::filesystem::path>};
+}
+
+/// A key whose field is a std::optional, which a word of its own leaves empty.
+template <typename Field>
+OptionKey optionOr(std::string_view word, std::string_view section, std::string_view key,
+                   Field field) {
+  return {section, key,
+          [field, word](EventFusionOptions& options, std::string_view text) {
+            auto& target = field(options);
+            target.reset();
+            if (text == word) return;
+            try {
+              parseInto(text, target.emplace());
+            } catch (const std::invalid_argument& error) {
+              throw std::invalid_argument(std::string(error.what()) + ", or " + std::string(word));
+            }
+          },
+          [field, word](const EventFusionOptions& options) {
+            const auto& source = field(options);
+            return source ? valueOf(*source) : OptionValue(std::string(word));
+          }};
+}
+
+}  // namespace
+
+const std::vector<OptionKey>& optionKeys() {
+  using std::string_view_literals::operator""sv;
+  static const std::vector<OptionKey> keys = {
+      option(
+          "rig"sv, "calibration"sv, [](auto& o) -> auto& { return o.rig.calibration; }),
+      option(
+          "rig"sv, "hand_eye"sv, [](auto& o) -> auto& { return o.rig.hand_eye; }),
+      option(
+          "rig"sv, "cameras"sv, [](auto& o) -> auto& { return o.mapper.cameras; }),
+      option(
+          "rig"sv, "time_offsets_s"sv, [](auto& o) -> auto& { return o.rig.time_offsets_ns; }),
+      option(
+          "rig"sv, "pose_source"sv, [](auto& o) -> auto& { return o.rig.pose_source; }),
+      option(
+          "rig"sv, "max_pose_gap_s"sv,
+          [](auto& o) -> auto& { return o.mapper.trajectory.max_pose_gap_s; }),
+      option(
+          "rig"sv, "exclude_silent"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.exclude_silent; }),
+
+      option(
+          "keyframes"sv, "policy"sv, [](auto& o) -> auto& { return o.mapper.keyframes.policy; }),
+      option(
+          "keyframes"sv, "window_s"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.window_s; }),
+      option(
+          "keyframes"sv, "stride_s"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.stride_s; }),
+      option(
+          "keyframes"sv, "window_events"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.window_events; }),
+      option(
+          "keyframes"sv, "min_baseline_ratio"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.min_baseline_ratio; }),
+      option(
+          "keyframes"sv, "min_visible_share"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.min_visible_share; }),
+      option(
+          "keyframes"sv, "reference"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframes.reference; }),
+
+      option(
+          "dsi"sv, "min_depth_m"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.planes.min_depth_m; }),
+      option(
+          "dsi"sv, "max_depth_m"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.planes.max_depth_m; }),
+      option(
+          "dsi"sv, "num_planes"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.planes.num_planes; }),
+      option(
+          "dsi"sv, "spacing"sv, [](auto& o) -> auto& { return o.mapper.keyframe.planes.spacing; }),
+      option(
+          "dsi"sv, "reference_camera"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.reference_camera; }),
+      optionOr(
+          "auto"sv, "dsi"sv, "fov_deg"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.fov_deg; }),
+      optionOr(
+          "auto"sv, "dsi"sv, "width"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.width; }),
+      optionOr(
+          "auto"sv, "dsi"sv, "height"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.height; }),
+      option(
+          "dsi"sv, "rv_offset_m"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.view.offset_m; }),
+
+      option(
+          "fusion"sv, "across_cameras"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.fusion.across_cameras; }),
+      option(
+          "fusion"sv, "across_time"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.fusion.across_time; }),
+      option(
+          "fusion"sv, "order"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.fusion.order; }),
+      option(
+          "fusion"sv, "subintervals"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.count; }),
+      option(
+          "fusion"sv, "split"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.split; }),
+      option(
+          "fusion"sv, "shuffle"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.shuffle; }),
+      option(
+          "fusion"sv, "shuffle_seed"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.shuffle_seed; }),
+      option(
+          "fusion"sv, "late"sv, [](auto& o) -> auto& { return o.late_fusion; }),
+
+      option(
+          "depth"sv, "extraction"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.extraction; }),
+      option(
+          "depth"sv, "threshold_kernel"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.threshold_kernel; }),
+      option(
+          "depth"sv, "threshold_c"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.threshold_c; }),
+      option(
+          "depth"sv, "max_confidence"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.max_confidence; }),
+      option(
+          "depth"sv, "median_size"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.median_size; }),
+      option(
+          "depth"sv, "dilate"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.dilate; }),
+      option(
+          "depth"sv, "subplane"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.subplane; }),
+
+      option(
+          "map"sv, "voxel_size_m"sv, [](auto& o) -> auto& { return o.cloud.voxel_size_m; }),
+      option(
+          "map"sv, "min_keyframes"sv, [](auto& o) -> auto& { return o.cloud.min_keyframes; }),
+      option(
+          "map"sv, "outlier_radius_m"sv,
+          [](auto& o) -> auto& { return o.cloud.outliers.outlier_radius_m; }),
+      option(
+          "map"sv, "outlier_min_neighbors"sv,
+          [](auto& o) -> auto& { return o.cloud.outliers.outlier_min_neighbors; }),
+
+      option(
+          "output"sv, "camera_maps"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.camera_maps; }),
+      option(
+          "output"sv, "event_images"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.event_images; }),
+
+      optionOr(
+          "auto"sv, "performance"sv, "threads"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.threads; }),
+      optionOr(
+          "auto"sv, "performance"sv, "kernel"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.sweep.kernel; }),
+      option(
+          "performance"sv, "packet_error_px"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.packets.packet_error_px; }),
+  };
+  return keys;
+}
+
+std::string knownOptionKeys(std::string_view section) {
+  std::string known;
+  for (const OptionKey& entry : optionKeys()) {
+    if (entry.section == section) known += (known.empty() ? "" : ", ") + std::string(entry.key);
+  }
+  return known;
+}
+
+std::string knownOptionSections() {
+  std::string known;
+  std::string_view last;
+  for (const OptionKey& entry : optionKeys()) {
+    if (entry.section != last) {
+      known += (known.empty() ? "[" : ", [") + std::string(entry.section) + "]";
+    }
+    last = entry.section;
+  }
+  return known;
+}
+
+std::vector<NamedOption> listOptions(const EventFusionOptions& options) {
+  std::vector<NamedOption> list;
+  for (const OptionKey& entry : optionKeys()) {
+    list.push_back({entry.section, entry.key, entry.value(options)});
+  }
+  return list;
+}
+
+bool isOptionSection(std::string_view section) { return !knownOptionKeys(section).empty(); }
+
+}  // namespace efm
