@@ -17,9 +17,9 @@ constexpr NamedChoice<ExtractionMethod> kMethods[] = {{ExtractionMethod::kPaper,
 
 constexpr int kFrame = 2;  ///< Pixels cleared at each side of the image.
 
-/// A ridge of votes is wider than the errors of its top. With this share of the squared width, 73 to
-/// 78 % of a simulated desk's depths lie within one standard deviation of the truth and 98 % within
-/// two, before the median filter, which halves the errors that remain.
+/// A ridge of votes is wider than the errors of its top. With this share of the squared width, 73
+/// to 78 % of a simulated desk's depths lie within one standard deviation of the truth and 98 %
+/// within two, before the median filter, which halves the errors that remain.
 constexpr double kErrorOfWidth = 0.17;
 
 /// The confidence that becomes 255.

@@ -20,8 +20,6 @@ constexpr std::int64_t kMaxPoseDelayNs = kNanosecondsPerSecond;
 constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
 constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
-bool earlierThan(const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; }
-
 [[noreturn]] void refuse(const Event& event, int camera, const std::string& expected) {
   throw std::invalid_argument("camera " + std::to_string(camera) + ", event at " +
                               formatSeconds(event.t_ns) + " s: " + expected);
@@ -40,44 +38,6 @@ void requireValid(const Event& event, const CameraModel& model, int camera) {
 }
 
 }  // namespace
-
-/// Events of one camera that may still be needed, on the trajectory's clock.
-struct FusionMapper::CameraBuffer {
-  std::vector<Event> events;
-  std::vector<char> used;  // beside `events`: voted in a keyframe
-  std::size_t begin = 0;   // what is before is forgotten
-  std::size_t pose_cursor = 0;
-  std::optional<std::int64_t> newest_ns;  // of all events that were added
-  std::int64_t covered_ns = kNever;       // everything before this time is here
-
-  std::size_t indexOf(std::int64_t t_ns) const {
-    const auto from = events.begin() + static_cast<std::ptrdiff_t>(begin);
-    return static_cast<std::size_t>(std::lower_bound(from, events.end(), t_ns, earlierThan) -
-                                    events.begin());
-  }
-  void cover(std::int64_t t_ns) { covered_ns = std::max(covered_ns, t_ns); }
-  /// @return whether a newer event had come before.
-  bool insert(const Event& event) {
-    if (begin == events.size() || events.back().t_ns <= event.t_ns) {
-      events.push_back(event);
-      used.push_back(0);
-      return false;
-    }
-    const auto at = std::upper_bound(
-        events.begin() + static_cast<std::ptrdiff_t>(begin), events.end(), event.t_ns,
-        [](std::int64_t t_ns, const Event& other) { return t_ns < other.t_ns; });
-    used.insert(used.begin() + (at - events.begin()), 0);
-    events.insert(at, event);
-    return true;
-  }
-  void compact() {
-    if (begin < events.size() / 2) return;
-    const auto count = static_cast<std::ptrdiff_t>(begin);
-    events.erase(events.begin(), events.begin() + count);
-    used.erase(used.begin(), used.begin() + count);
-    begin = 0;
-  }
-};
 
 void TimeLimits::validate() const {
   if (!t0_ns || !t1_ns || *t0_ns < *t1_ns) return;
@@ -99,21 +59,6 @@ void FusionMapperOptions::validate() const {
     throw std::invalid_argument("the window from " + formatSeconds(only_window->t0_ns) + " s to " +
                                 formatSeconds(only_window->t1_ns) + " s: must end after it begins");
   }
-}
-
-EventCounts& EventCounts::operator+=(const EventCounts& other) {
-  read += other.read;
-  used += other.used;
-  without_pose += other.without_pose;
-  outside_window += other.outside_window;
-  dropped += other.dropped;
-  return *this;
-}
-
-EventCounts MapperCounts::total() const {
-  EventCounts sum;
-  for (const EventCounts& camera : cameras) sum += camera;
-  return sum;
 }
 
 /// What the mapper tells its policy, once the recording has started.
@@ -194,7 +139,7 @@ bool FusionMapper::selected(int camera) const {
 void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
   const auto index = static_cast<std::size_t>(camera);
   const RigCamera& rig_camera = rig_.cameras.at(index);
-  CameraBuffer& buffer = buffers_[index];
+  EventBuffer& buffer = buffers_[index];
   EventCounts& counts = counts_.cameras[index];
   if (events.empty()) return;
 
@@ -212,7 +157,7 @@ void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
 
   counts.read += events.size();
   buffer.newest_ns = newest_ns;
-  buffer.cover(newest_ns - kMaxEventDelayNs);
+  buffer.coverUntil(newest_ns - kMaxEventDelayNs);
   reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
   if (!selected(camera)) {
     counts.dropped += events.size();
@@ -233,7 +178,7 @@ void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
 void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
   const auto index = static_cast<std::size_t>(camera);
   const std::int64_t bounded_ns = std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs);
-  buffers_.at(index).cover(bounded_ns + rig_.cameras[index].time_offset_ns);
+  buffers_.at(index).coverUntil(bounded_ns + rig_.cameras[index].time_offset_ns);
 }
 
 void FusionMapper::finish() { finished_ = true; }
@@ -264,7 +209,7 @@ std::int64_t FusionMapper::completeNs() const {
 /// Events of the selected cameras in the buffers before a time.
 std::size_t FusionMapper::countBefore(std::int64_t t_ns) const {
   std::size_t count = 0;
-  for (const CameraBuffer& buffer : buffers_) count += buffer.indexOf(t_ns) - buffer.begin;
+  for (const EventBuffer& buffer : buffers_) count += buffer.indexOf(t_ns) - buffer.begin;
   return count;
 }
 
@@ -286,7 +231,7 @@ void FusionMapper::findStart() {
   const std::int64_t newest_pose_ns = trajectory_.poses().back().t_ns;
   std::optional<std::int64_t> first_ns;
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
-    CameraBuffer& buffer = buffers_[c];
+    EventBuffer& buffer = buffers_[c];
     for (; buffer.begin < buffer.events.size(); ++buffer.begin) {
       const std::int64_t t_ns = buffer.events[buffer.begin].t_ns;
       if (t_ns > newest_pose_ns) break;  // its pose may still come
@@ -309,7 +254,7 @@ void FusionMapper::passEmptyWindows() {
   std::int64_t empty_until_ns = std::min(*reached_ns_, options_.limits.t1_ns.value_or(kEver));
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
     if (!selected(static_cast<int>(c))) continue;
-    const CameraBuffer& buffer = buffers_[c];
+    const EventBuffer& buffer = buffers_[c];
     const std::size_t next = buffer.indexOf(from_ns);
     const bool there = next < buffer.events.size();
     empty_until_ns = std::min(empty_until_ns, there ? buffer.events[next].t_ns : completeUntil(c));
@@ -319,7 +264,7 @@ void FusionMapper::passEmptyWindows() {
 
 std::vector<EventSpan> FusionMapper::eventsOf(const Window& window) const {
   std::vector<EventSpan> events;
-  for (const CameraBuffer& buffer : buffers_) {
+  for (const EventBuffer& buffer : buffers_) {
     events.push_back(
         EventSpan(buffer.events).part(buffer.indexOf(window.t0_ns), buffer.indexOf(window.t1_ns)));
   }
@@ -332,7 +277,7 @@ void FusionMapper::countKeyframe(const KeyframeDepthMap& keyframe) {
   counts_.silent_subintervals += keyframe.silent_subintervals;
   counts_.event_uses =
       std::accumulate(keyframe.events.begin(), keyframe.events.end(), counts_.event_uses);
-  for (CameraBuffer& buffer : buffers_) {
+  for (EventBuffer& buffer : buffers_) {
     const std::size_t end = buffer.indexOf(keyframe.window.t1_ns);
     for (std::size_t i = buffer.indexOf(keyframe.window.t0_ns); i < end; ++i) {
       if (trajectory_.segmentAt(buffer.events[i].t_ns, buffer.pose_cursor)) buffer.used[i] = 1;
@@ -351,7 +296,7 @@ void FusionMapper::settleBefore(std::int64_t t_ns) {
   if (settled_ns_ && t_ns <= *settled_ns_) return;
   settled_ns_ = t_ns;
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
-    CameraBuffer& buffer = buffers_[c];
+    EventBuffer& buffer = buffers_[c];
     EventCounts& counts = counts_.cameras[c];
     const std::size_t end = buffer.indexOf(t_ns);
     for (; buffer.begin < end; ++buffer.begin) {

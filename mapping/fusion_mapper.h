@@ -8,8 +8,10 @@
 #include <vector>
 
 #include "mapping/event.h"
+#include "mapping/event_buffer.h"
 #include "mapping/keyframe_mapper.h"
 #include "mapping/keyframe_policy.h"
+#include "mapping/mapper_counts.h"
 #include "mapping/rig.h"
 #include "mapping/stage.h"
 #include "mapping/trajectory.h"
@@ -39,31 +41,6 @@ struct FusionMapperOptions {
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
-};
-
-/// What became of one camera's events: distinct events, so read = used + the rest.
-struct EventCounts {
-  std::uint64_t read = 0;
-  std::uint64_t used = 0;            ///< Voted in at least one keyframe.
-  std::uint64_t without_pose = 0;    ///< Not used: the trajectory has no pose at its time.
-  std::uint64_t outside_window = 0;  ///< Not used: in no window that was mapped.
-  std::uint64_t dropped = 0;  ///< Came after its window was closed, or of an unselected camera.
-
-  EventCounts& operator+=(const EventCounts& other);
-};
-
-struct MapperCounts {
-  std::vector<EventCounts> cameras;
-  std::uint64_t event_uses = 0;  ///< Summed over keyframes, which may overlap.
-  VoteCounts votes;
-  std::uint64_t keyframes = 0;
-  std::uint64_t keyframes_without_pose = 0;  ///< Windows whose reference time had no pose.
-  std::uint64_t windows_without_events = 0;  ///< Passed over: no selected camera saw anything.
-  std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes, but of silent cameras.
-  std::uint64_t sorted_events = 0;           ///< Came after a newer one of their camera.
-  std::uint64_t duplicate_poses = 0;
-
-  EventCounts total() const;
 };
 
 /// Events and poses in, keyframes out: buffers what arrives, and maps a window as soon as events
@@ -106,7 +83,6 @@ class FusionMapper {
   const Trajectory& trajectory() const { return trajectory_; }
 
  private:
-  struct CameraBuffer;
   class SoFar;
 
   std::int64_t completeNs() const;
@@ -129,7 +105,7 @@ class FusionMapper {
   Trajectory trajectory_;
   std::unique_ptr<KeyframePolicy> policy_;
   std::unique_ptr<KeyframeMapper> mapper_;  // once the recording starts
-  std::vector<CameraBuffer> buffers_;       // per camera
+  std::vector<EventBuffer> buffers_;        // per camera
   std::optional<std::int64_t> start_ns_;    // first event with a pose
   std::optional<std::int64_t> reached_ns_;  // newest event of any camera, selected or not
   std::optional<std::int64_t> settled_ns_;  // what is before is counted and gone
