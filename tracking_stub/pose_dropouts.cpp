@@ -50,14 +50,14 @@ bool PoseDropouts::isLost(const StampedPose& pose) {
 
 bool PoseDropouts::isInRandomGap(std::int64_t t_ns) {
   if (options_.random_gaps_hz == 0) return false;
-  const auto gapAfter = [this](std::int64_t from_ns) {
+  const auto gap_after = [this](std::int64_t from_ns) {
     constexpr double kLongestS = 1e9;  // longer than any recording, and sums of it fit 64 bits
     const double wait_s = -std::log(1 - gap_.uniform()) / options_.random_gaps_hz;
     const std::int64_t begin_ns = from_ns + durationFromSeconds(std::min(wait_s, kLongestS));
     return TimeGap{begin_ns, begin_ns + durationFromSeconds(options_.random_gap_s)};
   };
-  if (!next_gap_) next_gap_ = gapAfter(t_ns);
-  while (t_ns >= next_gap_->end_ns) next_gap_ = gapAfter(next_gap_->end_ns);
+  if (!next_gap_) next_gap_ = gap_after(t_ns);
+  while (t_ns >= next_gap_->end_ns) next_gap_ = gap_after(next_gap_->end_ns);
   return t_ns >= next_gap_->begin_ns;
 }
 

@@ -54,8 +54,9 @@ Simulation makeRoomStereo(std::uint64_t seed) {
   simulation.duration_ns = durationFromSeconds(kDurationS);
   simulation.motion = std::make_shared<LoopMotion>(loop);
   simulation.pixels.threshold_on = simulation.pixels.threshold_off = 0.42;
-  simulation.max_step_px =
-      1;  // in the corners; misplaces an edge by 0.15 pixels at most, 0 on average
+  // In the corners, where turning moves the image fastest; 0.8 in the middle. Misplaces an edge by
+  // 0.25 and 0.1 pixels at most, forwards as often as back.
+  simulation.max_step_px = 1.25;
   simulation.seed = seed;
   return simulation;
 }

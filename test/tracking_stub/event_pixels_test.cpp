@@ -117,7 +117,7 @@ TEST(EventPixels, MismatchScattersThresholdsFromPixelToPixel) {
   options.mismatch = 0.1;
   const cv::Mat1f low(60, 60, 0.0F);
   const cv::Mat1f high(60, 60, 10.0F);
-  const auto countsOf = [&](std::uint64_t seed) {
+  const auto counts_of = [&](std::uint64_t seed) {
     EventPixels pixels(60, 60, options, seed);
     pixels.start(low);
     std::vector<Event> events;
@@ -129,14 +129,14 @@ TEST(EventPixels, MismatchScattersThresholdsFromPixelToPixel) {
   // A pixel fires 10 / threshold times: its threshold is 10 / count, to 1 %.
   double sum = 0;
   double squares = 0;
-  for (const double count : countsOf(3)) {
+  for (const double count : counts_of(3)) {
     sum += 10 / count;
     squares += 100 / count / count;
   }
   EXPECT_NEAR(sum / 3600, 0.1, 0.001);
   EXPECT_NEAR(std::sqrt(squares / 3600 - sum * sum / 3600 / 3600), 0.01, 0.0005);
-  EXPECT_EQ(countsOf(3), countsOf(3));
-  EXPECT_NE(countsOf(3), countsOf(4));
+  EXPECT_EQ(counts_of(3), counts_of(3));
+  EXPECT_NE(counts_of(3), counts_of(4));
 }
 
 TEST(EventPixels, AreBlindForTheRefractoryPeriodAndThenStartFromWhatTheySee) {
