@@ -159,6 +159,8 @@ void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
   buffer.newest_ns = newest_ns;
   buffer.coverUntil(newest_ns - kMaxEventDelayNs);
   reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
+  const std::int64_t begin_ns = events.front().t_ns + rig_camera.time_offset_ns;
+  begun_ns_ = std::max(begun_ns_.value_or(begin_ns), begin_ns);
   if (!selected(camera)) {
     counts.dropped += events.size();
     return;
@@ -186,7 +188,8 @@ void FusionMapper::finish() { finished_ = true; }
 /// The time before which nothing more is to come from a camera.
 std::int64_t FusionMapper::completeUntil(std::size_t camera) const {
   if (finished_) return kEver;
-  const std::int64_t silent_ns = reached_ns_ ? *reached_ns_ - kMaxCameraLagNs : kNever;
+  // From where packets begin: a long one of another camera says nothing of this one yet.
+  const std::int64_t silent_ns = begun_ns_ ? *begun_ns_ - kMaxCameraLagNs : kNever;
   return std::max(buffers_[camera].covered_ns, silent_ns);
 }
 
@@ -225,22 +228,28 @@ bool FusionMapper::isDue(const Window& window) const {
          trajectory_.poses().back().t_ns >= std::max(window.t1_ns, window.t_ref_ns);
 }
 
-/// Looks for the first event with a pose. Events before it have none and are forgotten.
+/// Looks for the first event with a pose. Events before it have none and are forgotten; what comes
+/// after it, with a pose or without, is the policy's.
 void FusionMapper::findStart() {
   if (trajectory_.empty()) return;
   const std::int64_t newest_pose_ns = trajectory_.poses().back().t_ns;
   std::optional<std::int64_t> first_ns;
+  for (EventBuffer& buffer : buffers_) {
+    for (std::size_t i = buffer.begin; i < buffer.events.size(); ++i) {
+      const std::int64_t t_ns = buffer.events[i].t_ns;
+      if (t_ns > newest_pose_ns || t_ns >= first_ns.value_or(kEver)) break;
+      if (!trajectory_.segmentAt(t_ns, buffer.pose_cursor)) continue;
+      first_ns = t_ns;
+      break;
+    }
+  }
+  // A camera that lags may still bring an earlier one.
+  const std::int64_t forgotten_ns = std::min(completeNs(), first_ns.value_or(kEver));
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
     EventBuffer& buffer = buffers_[c];
-    for (; buffer.begin < buffer.events.size(); ++buffer.begin) {
-      const std::int64_t t_ns = buffer.events[buffer.begin].t_ns;
-      if (t_ns > newest_pose_ns) break;  // its pose may still come
-      if (trajectory_.segmentAt(t_ns, buffer.pose_cursor)) {
-        first_ns = std::min(first_ns.value_or(t_ns), t_ns);
-        break;
-      }
-      ++counts_.cameras[c].without_pose;
-    }
+    const std::size_t end = buffer.indexOf(forgotten_ns);
+    counts_.cameras[c].without_pose += end - buffer.begin;
+    buffer.begin = end;
     buffer.compact();
   }
   if (first_ns && camerasCover(*first_ns)) start_ns_ = first_ns;

@@ -68,8 +68,8 @@ class FusionMapper {
   void addEvents(int camera, const std::vector<Event>& events);
   /// Says that all of a camera's events before `t_ns` (its own clock) have been added: a camera
   /// that sees nothing does not hold the others up. Without it, a camera's events are known to be
-  /// complete until 10 ms before its newest, and one that is a second behind the others is taken to
-  /// be silent.
+  /// complete until 10 ms before its newest, and one that is a second behind where the others'
+  /// newest packets begin is taken to be silent.
   void coverUntil(int camera, std::int64_t t_ns);
   /// No more data will come: windows that are not full by now never will be.
   void finish();
@@ -108,6 +108,7 @@ class FusionMapper {
   std::vector<EventBuffer> buffers_;        // per camera
   std::optional<std::int64_t> start_ns_;    // first event with a pose
   std::optional<std::int64_t> reached_ns_;  // newest event of any camera, selected or not
+  std::optional<std::int64_t> begun_ns_;    // where the newest packet of any camera begins
   std::optional<std::int64_t> settled_ns_;  // what is before is counted and gone
   bool finished_ = false;
   MapperCounts counts_;

@@ -51,6 +51,13 @@ std::vector<Event> steadyEvents(std::int64_t from_ns, std::int64_t to_ns) {
   return events;
 }
 
+/// The same, handed over in packets of 10 ms.
+void addSteadyPackets(FusionMapper& mapper, int camera, std::int64_t from_ns, std::int64_t to_ns) {
+  for (std::int64_t t_ns = from_ns; t_ns < to_ns; t_ns += 10 * kMs) {
+    mapper.addEvents(camera, steadyEvents(t_ns, std::min(t_ns + 10 * kMs, to_ns)));
+  }
+}
+
 std::vector<KeyframeDepthMap> takeAll(FusionMapper& mapper) {
   std::vector<KeyframeDepthMap> keyframes;
   while (auto keyframe = mapper.next()) keyframes.push_back(*keyframe);
@@ -212,7 +219,7 @@ TEST(FusionMapper, ASilentCameraIsReportedAndHoldsNothingUp) {
   mapper.addCamera(camera());
   mapper.addCamera(camera(0.1));
   addPoses(mapper, kStart_ns, kStart_ns + 2000 * kMs);
-  mapper.addEvents(0, steadyEvents(kStart_ns, kStart_ns + 1500 * kMs));
+  addSteadyPackets(mapper, 0, kStart_ns, kStart_ns + 1500 * kMs);
   const auto keyframes = takeAll(mapper);
   EXPECT_EQ(keyframes.size(), 4U) << "those that end a second before the newest event";
   ASSERT_FALSE(keyframes.empty());
@@ -221,12 +228,24 @@ TEST(FusionMapper, ASilentCameraIsReportedAndHoldsNothingUp) {
   EXPECT_EQ(takeAll(mapper).size(), 10U) << "once the camera is known to have seen nothing";
 }
 
+TEST(FusionMapper, ALongPacketDoesNotMakeTheOtherCameraLate) {
+  FusionMapper mapper(options(0.1, 0.1));
+  mapper.addCamera(camera());
+  mapper.addCamera(camera(0.1));
+  addPoses(mapper, kStart_ns, kStart_ns + 3000 * kMs);
+  mapper.addEvents(0, steadyEvents(kStart_ns, kStart_ns + 2500 * kMs));
+  EXPECT_THAT(takeAll(mapper), ::testing::IsEmpty()) << "camera 1's packet may begin as early";
+  mapper.addEvents(1, steadyEvents(kStart_ns, kStart_ns + 2500 * kMs));
+  EXPECT_EQ(takeAll(mapper).size(), 24U);
+  EXPECT_EQ(mapper.counts().total().dropped, 0U);
+}
+
 TEST(FusionMapper, EventsThatComeAfterTheirWindowAreDroppedAndCounted) {
   FusionMapper mapper(options(0.1, 0.1));
   mapper.addCamera(camera());
   mapper.addCamera(camera(0.1));
   addPoses(mapper, kStart_ns, kStart_ns + 2000 * kMs);
-  mapper.addEvents(0, steadyEvents(kStart_ns, kStart_ns + 1500 * kMs));
+  addSteadyPackets(mapper, 0, kStart_ns, kStart_ns + 1500 * kMs);
   takeAll(mapper);
   mapper.addEvents(1, steadyEvents(kStart_ns, kStart_ns + 50 * kMs));
   mapper.finish();

@@ -99,6 +99,22 @@ TEST(WindowPolicies, NorWhereEventsAreFewAndFarBetween) {
   EXPECT_GE(keyframes, 500U);
 }
 
+TEST(WindowPolicies, NorWhereCamerasStartLateAndPosesAreMissing) {
+  std::size_t keyframes = 0;
+  for (FusionMapperOptions options : allPolicies()) {
+    options.keyframes.window_events = 40;
+    for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+      // Camera 1 begins anywhere: often in the gap of the poses, after camera 0 has started.
+      LongRecording recording(seed, 1.0, 100);
+      std::vector<Event>& late = recording.events[1];
+      late.erase(late.begin(), late.begin() + static_cast<std::ptrdiff_t>(seed * 7 % 80));
+      keyframes +=
+          expectTheSameHoweverCut(recording, options, "late camera, " + labelOf(options, seed));
+    }
+  }
+  EXPECT_GE(keyframes, 500U);
+}
+
 TEST(WindowPolicies, EveryEventIsCountedForWhatBecameOfIt) {
   std::uint64_t used = 0;
   std::uint64_t without_pose = 0;
