@@ -126,8 +126,11 @@ double CEventFusionMap::internal_computeObservationLikelihood(
 std::uint8_t CEventFusionMap::serializeGetVersion() const { return 0; }
 
 void CEventFusionMap::serializeTo(CArchive& out) const {
-  out << genericMapParams << cloud_.options().voxel_size_m;
-  out.WriteAs<std::int32_t>(cloud_.options().min_keyframes);
+  const GlobalCloudOptions& options = cloud_.options();
+  out << genericMapParams << options.voxel_size_m;
+  out.WriteAs<std::int32_t>(options.min_keyframes);
+  out << options.outliers.outlier_radius_m;
+  out.WriteAs<std::int32_t>(options.outliers.outlier_min_neighbors);
   out.WriteAs<std::uint32_t>(keyframes_.size());
   for (const StoredKeyframe& keyframe : keyframes_) {
     // Not as a pose of MRPT's, which would give the last digit another value.
@@ -146,6 +149,8 @@ void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
   GlobalCloudOptions options;
   in >> genericMapParams >> options.voxel_size_m;
   options.min_keyframes = in.ReadAs<std::int32_t>();
+  in >> options.outliers.outlier_radius_m;
+  options.outliers.outlier_min_neighbors = in.ReadAs<std::int32_t>();
   CEventFusionMap read(options);
   const auto count = in.ReadAs<std::uint32_t>();
   for (std::uint32_t i = 0; i < count; ++i) {

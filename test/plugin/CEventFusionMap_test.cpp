@@ -49,9 +49,13 @@ StoredKeyframe randomKeyframe(unsigned seed, int count = 200) {
   return keyframe;
 }
 
-CEventFusionMap mapOf(unsigned keyframes) {
+GlobalCloudOptions bigVoxels() {
   GlobalCloudOptions options;
   options.voxel_size_m = 0.25;
+  return options;
+}
+
+CEventFusionMap mapOf(unsigned keyframes, const GlobalCloudOptions& options = bigVoxels()) {
   CEventFusionMap map(options);
   for (unsigned k = 0; k < keyframes; ++k) map.insertKeyframe(randomKeyframe(k));
   return map;
@@ -192,10 +196,20 @@ TEST(CEventFusionMap, RefusesAPointThatIsNoneAndStaysAsItWas) {
 }
 
 TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAndGoesOnLikeIt) {
-  CEventFusionMap map = mapOf(3);
+  // No option is the default, and each decides which points there are.
+  GlobalCloudOptions options = bigVoxels();
+  options.voxel_size_m = 2;
+  options.min_keyframes = 2;
+  options.outliers.outlier_radius_m = 0.6;
+  options.outliers.outlier_min_neighbors = 2;
+  CEventFusionMap map = mapOf(3, options);
+  ASSERT_GT(map.cloud().points().size(), 0U);
   const auto read = objectFrom<CEventFusionMap>(bytesOf(map));
   ASSERT_TRUE(read);
-  EXPECT_EQ(read->cloud().options().voxel_size_m, 0.25);
+  EXPECT_EQ(read->cloud().options().voxel_size_m, 2);
+  EXPECT_EQ(read->cloud().options().min_keyframes, 2);
+  EXPECT_EQ(read->cloud().options().outliers.outlier_radius_m, 0.6);
+  EXPECT_EQ(read->cloud().options().outliers.outlier_min_neighbors, 2);
   EXPECT_EQ(read->keyframes()[2].t_ref_ns, map.keyframes()[2].t_ref_ns);
   expectSamePoints(*read, map);
 
