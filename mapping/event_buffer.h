@@ -28,10 +28,16 @@ struct EventBuffer {
     return EventSpan(events).part(indexOf(t0_ns), indexOf(t1_ns));
   }
   void coverUntil(std::int64_t t_ns);
-  /// Puts an event in its place. @return whether a newer one had come before.
-  bool insert(const Event& event);
+  /// Puts events in their places, after others of the same time. Cost: linear where they are in
+  /// time order, otherwise that of sorting what lies behind the earliest of them.
+  /// @return how many came after a newer one.
+  std::uint64_t insert(const std::vector<Event>& added);
   /// Gives back the memory of what is forgotten; cost is constant on average.
   void compact();
+
+ private:
+  std::size_t indexOfUnsorted(std::int64_t t_ns, std::size_t end) const;
+  void sortFrom(std::size_t index);
 };
 
 }  // namespace efm

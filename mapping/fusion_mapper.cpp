@@ -165,16 +165,19 @@ void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
     counts.dropped += events.size();
     return;
   }
+  std::vector<Event> wanted;
+  wanted.reserve(events.size());
   for (Event event : events) {
     event.t_ns += rig_camera.time_offset_ns;
     if (!options_.limits.hold(event.t_ns)) {
       ++counts.outside_window;
     } else if (settled_ns_ && event.t_ns < *settled_ns_) {
       ++counts.dropped;
-    } else if (buffer.insert(event)) {
-      ++counts_.sorted_events;
+    } else {
+      wanted.push_back(event);
     }
   }
+  counts_.sorted_events += buffer.insert(wanted);
 }
 
 void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
