@@ -50,7 +50,7 @@ struct DepthExtractionOptions {
 /// A semi-dense depth map in the reference view.
 struct DepthMap {
   cv::Mat1f depth;       ///< z-depth in metres; 0 where there is none.
-  cv::Mat1f confidence;  ///< The raw fused value at the peak, at every pixel.
+  cv::Mat1f confidence;  ///< The raw fused value at the peak, at every pixel but dilated ones.
   /// Variance of inverse depth, 1/m^2: 0 where there is no depth, infinite where the peak lies on
   /// the first or last plane or is flat.
   cv::Mat1f variance;

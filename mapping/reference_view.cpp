@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <string>
 
 #include "mapping/option_check.h"
 
@@ -14,6 +16,13 @@ constexpr double kPi = 3.14159265358979323846;
 
 void requireSide(const std::optional<int>& side, const char* key) {
   requireOption(!side || (*side >= 1 && *side <= kMaxSide), key, side.value_or(0), "1 to 65535");
+}
+
+/// A view of more pixels is a mistake that would end without memory.
+void requirePixels(std::int64_t width, std::int64_t height) {
+  constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
+  requireOption(width * height <= kMaxPixels, "width", width,
+                "at most 67108864 pixels together with the height of " + std::to_string(height));
 }
 
 /// A side of the image that follows from the other one.
@@ -29,6 +38,7 @@ void ReferenceViewOptions::validate() const {
                 "above 0 and below 180");
   requireSide(width, "width");
   requireSide(height, "height");
+  if (width && height) requirePixels(*width, *height);
   for (int axis = 0; axis < 3; ++axis) {
     requireOption(std::isfinite(offset_m[axis]), "rv_offset_m", offset_m[axis], "finite");
   }
@@ -45,6 +55,7 @@ ReferenceView makeReferenceView(const CameraModel& model, const ReferenceViewOpt
     view.height = *options.height;
     if (!options.width) view.width = sideInProportion(*options.height, model.width, model.height);
   }
+  requirePixels(view.width, view.height);
   if (options.fov_deg) {
     // Pixels are squares around their centres: the image reaches from -0.5 to width - 0.5.
     view.fx = 0.5 * view.width / std::tan(0.5 * *options.fov_deg * kPi / 180.0);

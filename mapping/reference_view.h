@@ -38,7 +38,8 @@ struct ReferenceViewOptions {
   /// Horizontal field of view in degrees, above 0 and below 180, with square or not square pixels
   /// as the camera's and the principal point in the middle; the camera's own view where not given.
   std::optional<double> fov_deg;
-  /// Size in pixels, 1 to 65,535. Not given: the camera's; one alone keeps the shape of its image.
+  /// Size in pixels, 1 to 65,535, and at most 2^26 pixels together. Not given: the camera's; one
+  /// alone keeps the shape of its image.
   std::optional<int> width;
   std::optional<int> height;
   /// Shift along the view's own axes (x right, y down, z forward), metres.

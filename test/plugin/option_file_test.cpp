@@ -272,6 +272,9 @@ TEST(OptionReader, ValuesOutOfRangeAreErrorsThatNameSectionKeyValueAndRange) {
   EXPECT_THAT(errorOf("[dsi]\nfov_deg = 180\n"),
               StartsWith("rig.ini:2: [dsi] fov_deg = 180: must be"));
   EXPECT_THAT(errorOf("[dsi]\nheight = 0\n"), StartsWith("rig.ini:2: [dsi] height = 0: must be"));
+  EXPECT_THAT(errorOf("[dsi]\nwidth = 65535\nheight = 65535\n"),
+              AllOf(StartsWith("rig.ini:2: [dsi] width = 65535: must be at most"),
+                    HasSubstr("height of 65535")));
   EXPECT_THAT(errorOf("[dsi]\nrv_offset_m = 0,inf,0\n"), HasSubstr("three numbers"));
   EXPECT_THAT(errorOf("[fusion]\nsubintervals = 1001\n"),
               StartsWith("rig.ini:2: [fusion] subintervals = 1001: must be"));
