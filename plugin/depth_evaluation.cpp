@@ -94,9 +94,12 @@ const TimedFile* truthAt(const std::vector<TimedFile>& truths, std::int64_t t_ns
 
 DepthErrors meanOf(const std::vector<EvaluatedMap>& maps) {
   DepthErrors mean;
-  const double share = 1 / static_cast<double>(maps.size());
+  const auto with_points = std::count_if(
+      maps.begin(), maps.end(), [](const EvaluatedMap& map) { return map.errors.points > 0; });
+  const double share = 1 / static_cast<double>(with_points);
   for (const EvaluatedMap& map : maps) {
     const DepthErrors& errors = map.errors;
+    if (errors.points == 0) continue;
     mean.points += errors.points;
     mean.mean_abs_m += share * errors.mean_abs_m;
     mean.median_abs_m += share * errors.median_abs_m;
@@ -113,6 +116,11 @@ DepthErrors meanOf(const std::vector<EvaluatedMap>& maps) {
 
 std::string row(const std::string& name, const DepthErrors& errors) {
   std::array<char, 160> line{};
+  if (errors.points == 0) {
+    std::snprintf(line.data(), line.size(), "%-22s %9d %11s %13s %15s\n", name.c_str(), 0, "-", "-",
+                  "-");
+    return line.data();
+  }
   std::snprintf(line.data(), line.size(), "%-22s %9llu %11.4f %13.4f %15.5f", name.c_str(),
                 static_cast<unsigned long long>(errors.points), errors.mean_abs_m,
                 errors.median_abs_m, errors.median_inverse);
@@ -126,6 +134,7 @@ std::string row(const std::string& name, const DepthErrors& errors) {
 }
 
 nlohmann::ordered_json asJson(const DepthErrors& errors) {
+  if (errors.points == 0) return {{"points", 0}};
   nlohmann::ordered_json json = {{"points", errors.points},
                                  {"mean_abs_m", errors.mean_abs_m},
                                  {"median_abs_m", errors.median_abs_m},
@@ -183,6 +192,10 @@ DepthEvaluation evaluateDepth(const std::filesystem::path& estimated,
     }
   } else {
     compare(estimate.filename().string(), estimate, truth);
+  }
+  if (all.empty()) {
+    throw std::runtime_error("no pixel of " + estimate.string() +
+                             " has a depth where the truth has one");
   }
   evaluation.mean = meanOf(evaluation.maps);
   evaluation.all = depthErrors(all, options.focal_baseline);

@@ -26,8 +26,9 @@ struct EvaluatedMap {
 /// The errors of depth maps against their truth.
 struct DepthEvaluation {
   std::vector<EvaluatedMap> maps;
-  DepthErrors mean;  ///< Mean over the maps, each counting the same; `points` is their sum.
-  DepthErrors all;   ///< Over all points of all maps.
+  /// Mean over the maps that have points, each counting the same; `points` is their sum.
+  DepthErrors mean;
+  DepthErrors all;                  ///< Over all points of all maps.
   std::uint64_t without_truth = 0;  ///< Estimated maps that no truth lies within 1 ms of.
 };
 

@@ -231,7 +231,8 @@ void addEvaluate(CLI::App& app, Run& run) {
   auto arguments = onCommand(command, run, runEvaluateDepth);
   command
       .add_option("EST", arguments->estimate,
-                  "Depth map (float32 TIFF, metres), or what `map` or `depth` wrote")
+                  "Depth map (float32 TIFF, metres), what `depth` wrote (against a file), or what "
+                  "`map` wrote")
       ->required();
   command.add_option("GT", arguments->truth, "True depth map, or a folder of them with index.txt")
       ->required();

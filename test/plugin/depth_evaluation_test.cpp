@@ -77,6 +77,18 @@ TEST_F(EvaluateDepth, BadPixelsNeedFocalLengthTimesBaseline) {
   EXPECT_THAT(evaluationTable(evaluation), HasSubstr("bad 3px/5%"));
 }
 
+TEST_F(EvaluateDepth, AMapWithoutPointsIsNotAPerfectOne) {
+  tiff("out/keyframes/1.000000000/depth.tiff", 2);
+  tiff("out/keyframes/2.000000000/depth.tiff", 0);
+  tiff("data/depth/a.tiff", 3);
+  std::ofstream(folder() / "data/depth/index.txt") << "1 a.tiff\n2 a.tiff\n";
+  const auto evaluation = evaluateDepth(folder() / "out", folder() / "data", {});
+  EXPECT_EQ(evaluation.mean.mean_abs_m, 1) << "of the one that has points";
+  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("  -"));
+  EXPECT_THAT(evaluationJson(evaluation), HasSubstr("\"points\": 0,\n      \"name\""));
+  EXPECT_THAT(errorOf(tiff("none.tiff", 0), tiff("b.tiff", 3)), HasSubstr("no pixel"));
+}
+
 TEST_F(EvaluateDepth, WhatCannotBeComparedIsAnErrorThatNamesIt) {
   const auto a = tiff("a.tiff", 2);
   EXPECT_THAT(errorOf(folder() / "nowhere.tiff", a), HasSubstr("nowhere.tiff"));
