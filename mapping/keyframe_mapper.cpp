@@ -181,9 +181,11 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   const StageScope scope(stages, Stage::kDepth);
   keyframe.largest_confidence = largestOf(swept.peaks.confidence);
   sequence_maximum_.take(keyframe.largest_confidence);
-  keyframe.map = extractDepth(swept.peaks, planes_, options_.extraction, sequence_maximum_.value());
+  const auto sequence_maximum =
+      options_.sequence_maximum ? options_.sequence_maximum : sequence_maximum_.value();
+  keyframe.map = extractDepth(swept.peaks, planes_, options_.extraction, sequence_maximum);
   for (std::size_t c = 0; c < swept.camera_peaks.size(); ++c) {
-    // A camera alone has higher densities than the fusion: it goes by its own maximum.
+    // A camera alone has other densities than the fusion: the recording's maximum is not its own.
     keyframe.camera_maps.push_back(
         {inputs[c].camera, extractDepth(swept.camera_peaks[c], planes_, options_.extraction)});
   }

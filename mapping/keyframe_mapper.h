@@ -33,6 +33,9 @@ struct KeyframeMapperOptions {
   PosePacketsOptions packets;
   SpaceSweepOptions sweep;
   DepthExtractionOptions extraction;
+  /// What `WhiteLevel::kSequence` stands for, where an earlier pass over the recording found it;
+  /// the robust maximum of the keyframes so far where not given.
+  std::optional<double> sequence_maximum;
   bool camera_maps = false;   ///< Also a depth map of each camera alone, in the same view.
   bool event_images = false;  ///< Also each camera's events as an image.
 

@@ -116,8 +116,13 @@ int runDepth(const DepthArguments& arguments) {
     job.options = optionsOf(arguments);
     job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
     job.options.mapper.validate();
-    const std::unique_ptr<Recording> recording =
-        openRecording(sourceOf(arguments, job.options.rig));
+    const RecordingSource source = sourceOf(arguments, job.options.rig);
+    if (job.options.mapper.keyframe.extraction.max_confidence.level == WhiteLevel::kSequence) {
+      EventFusionOptions whole = job.options;
+      whole.mapper.only_window.reset();
+      job.sequence_maximum = sequenceMaximum(whole, *openRecording(source));
+    }
+    const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(arguments.out, OutputKind::kDepth, job.options.mapper.keyframe.planes);
 
     std::vector<CloudPoint> points;

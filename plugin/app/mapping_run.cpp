@@ -20,9 +20,7 @@ class Player {
   Player(const MappingJob& job, Recording& recording, StageSeconds& seconds)
       : job_(job), recording_(recording), seconds_(seconds) {
     EventFusionOptions options = job.options;
-    if (job.sequence_maximum && *job.sequence_maximum > 0) {
-      options.mapper.keyframe.extraction.max_confidence = MaxConfidence::of(*job.sequence_maximum);
-    }
+    options.mapper.keyframe.sequence_maximum = job.sequence_maximum;
     builder_.setOptions(options);
     builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // its warnings come in one, at the end
     builder_.setKeyframeTaker(

@@ -50,6 +50,25 @@ TEST_F(MapOptions, TheSequencesWhiteLevelIsFoundInAPassOfItsOwn) {
   EXPECT_EQ(contentOf(folder() / "out" / "map.pcd"), contentOf(folder() / "fixed" / "map.pcd"));
 }
 
+TEST_F(MapOptions, SingleCamerasKeepTheirOwnWhiteLevel) {
+  write(SyntheticRecording());
+  const std::string maps = "map rig.ini data --set output.camera_maps=true ";
+  ASSERT_EQ(run(maps + "--out own").status, 0);
+  ASSERT_EQ(run(maps + "--out all --set depth.max_confidence=sequence").status, 0);
+  for (const std::string& file : filesIn("own")) {
+    if (file.find("/cam") == std::string::npos) continue;
+    EXPECT_EQ(contentOf(folder() / "own" / file), contentOf(folder() / "all" / file)) << file;
+  }
+}
+
+TEST_F(MapOptions, OneKeyframeHasTheWhiteLevelOfTheWholeRecording) {
+  write(SyntheticRecording());
+  const std::string sequence = " --set depth.max_confidence=sequence";
+  ASSERT_EQ(run("map rig.ini data --out out" + sequence).status, 0);
+  ASSERT_EQ(run("depth rig.ini data --t0 10.1 --t1 10.4 --out one" + sequence).status, 0);
+  EXPECT_EQ(reportIn("one")["sequence_maximum"], reportIn("out")["sequence_maximum"]);
+}
+
 TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
   write(SyntheticRecording());
   ASSERT_EQ(run("map rig.ini data --out out --set output.camera_maps=true"
