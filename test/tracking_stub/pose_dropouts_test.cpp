@@ -16,6 +16,7 @@ constexpr std::int64_t kMillisecondNs = 1'000'000;
 /// 100 Hz, 100 s.
 std::unique_ptr<PoseSource> tracker() {
   std::vector<StampedPose> poses;
+  poses.reserve(10'000);
   for (int i = 0; i < 10'000; ++i) poses.push_back({i * 10 * kMillisecondNs, {}});
   return std::make_unique<TumReplay>(std::move(poses));
 }

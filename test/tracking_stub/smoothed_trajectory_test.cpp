@@ -31,11 +31,11 @@ std::vector<StampedPose> sampled(const Curve& curve, double rate_hz, double dura
 }
 
 Rigid3 handHeld(double t_s) {
-  Rigid3 T;
-  T.translation = {0.3 * t_s, 0.1 * std::sin(6 * t_s), 0.05 * std::cos(9 * t_s)};
-  T.rotation = Eigen::AngleAxisd(2.5 * t_s, Vector3d(0.2, 1, 0.1).normalized()) *
-               Eigen::AngleAxisd(0.1 * std::sin(8 * t_s), Vector3d::UnitX());
-  return T;
+  Rigid3 T_world_rig;
+  T_world_rig.translation = {0.3 * t_s, 0.1 * std::sin(6 * t_s), 0.05 * std::cos(9 * t_s)};
+  T_world_rig.rotation = Eigen::AngleAxisd(2.5 * t_s, Vector3d(0.2, 1, 0.1).normalized()) *
+                         Eigen::AngleAxisd(0.1 * std::sin(8 * t_s), Vector3d::UnitX());
+  return T_world_rig;
 }
 
 /// The worst distance and angle between a trajectory and a curve, its first and last 0.25 s apart.
@@ -64,11 +64,12 @@ TEST(SmoothTrajectory, KeepsAMotionOfAFewHertz) {
 
 TEST(SmoothTrajectory, CutsWhatIsFasterThanTenHertz) {
   const Curve shaken = [](double t_s) {
-    Rigid3 T = handHeld(t_s);
-    T.translation.x() += 0.01 * std::sin(2 * M_PI * 20 * t_s);
-    T.rotation =
-        T.rotation * Eigen::AngleAxisd(0.02 * std::sin(2 * M_PI * 20 * t_s), Vector3d::UnitZ());
-    return T;
+    Rigid3 T_world_rig = handHeld(t_s);
+    T_world_rig.translation.x() += 0.01 * std::sin(2 * M_PI * 20 * t_s);
+    T_world_rig.rotation =
+        T_world_rig.rotation *
+        Eigen::AngleAxisd(0.02 * std::sin(2 * M_PI * 20 * t_s), Vector3d::UnitZ());
+    return T_world_rig;
   };
   const auto [metres, radians] = worst(smoothTrajectory(sampled(shaken, 200, 4)), handHeld);
   EXPECT_LT(metres, 0.03 * 0.01);
@@ -106,10 +107,10 @@ TEST(SmoothTrajectory, BridgesGapsAndTakesEitherSignOfAQuaternion) {
 
 TEST(SmoothTrajectory, OdometryOfTenHertzHasNoCorners) {
   const Curve drive = [](double t_s) {
-    Rigid3 T;
-    T.translation = {20 * std::sin(0.3 * t_s), 20 * std::cos(0.3 * t_s), 0};
-    T.rotation = Eigen::AngleAxisd(-0.3 * t_s, Vector3d::UnitZ());
-    return T;
+    Rigid3 T_world_rig;
+    T_world_rig.translation = {20 * std::sin(0.3 * t_s), 20 * std::cos(0.3 * t_s), 0};
+    T_world_rig.rotation = Eigen::AngleAxisd(-0.3 * t_s, Vector3d::UnitZ());
+    return T_world_rig;
   };
   const auto smooth = smoothTrajectory(sampled(drive, 10, 8));
   EXPECT_LT(worst(smooth, drive).first, 0.01);
@@ -124,10 +125,10 @@ TEST(SmoothTrajectory, OdometryOfTenHertzHasNoCorners) {
 
 TEST(SmoothTrajectory, KeepsPlaceAndSpeedAtItsEnds) {
   const Curve straight = [](double t_s) {
-    Rigid3 T;
-    T.translation = {0.5 * t_s, 0, 1};
-    T.rotation = Eigen::AngleAxisd(0.8 * t_s, Vector3d::UnitY());
-    return T;
+    Rigid3 T_world_rig;
+    T_world_rig.translation = {0.5 * t_s, 0, 1};
+    T_world_rig.rotation = Eigen::AngleAxisd(0.8 * t_s, Vector3d::UnitY());
+    return T_world_rig;
   };
   for (const StampedPose& pose : smoothTrajectory(sampled(straight, 100, 1))) {
     const Rigid3 truth = straight(static_cast<double>(pose.t_ns - kStartNs) * 1e-9);
@@ -155,9 +156,9 @@ TEST(SmoothTrajectory, RefusesWhatItCannotBridge) {
 
 TEST(Departure, IsWhereHalfTheMeanSpeedIsReached) {
   const Curve late = [](double t_s) {
-    Rigid3 T;
-    T.translation.x() = t_s < 3 ? 0.01 * std::sin(7 * t_s) : 0.4 * (t_s - 3);
-    return T;
+    Rigid3 T_world_rig;
+    T_world_rig.translation.x() = t_s < 3 ? 0.01 * std::sin(7 * t_s) : 0.4 * (t_s - 3);
+    return T_world_rig;
   };
   const double departure_s =
       static_cast<double>(departureOf(sampled(late, 100, 10)) - kStartNs) * 1e-9;
