@@ -2,6 +2,8 @@
 #include "plugin/app/map_command.h"
 
 #include <cstdio>
+#include <functional>
+#include <initializer_list>
 #include <iostream>
 #include <memory>
 
@@ -48,6 +50,17 @@ void warnOfRecalibration(const MappingArguments& arguments, const Recording& rec
   outcome.warnings.push_back(outcome.report.options.rig.calibration.string() +
                              " replaced another calibration, the recording's own; --set "
                              "rig.calibration= keeps that");
+}
+
+/// Writes each file, also where one before it could not be: the first error is the outcome's.
+void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void()>> files) {
+  for (const auto& write : files) {
+    try {
+      write();
+    } catch (const std::runtime_error& error) {
+      if (!outcome.error) outcome.error = error.what();
+    }
+  }
 }
 
 /// What `map` and `depth` end with: the report, then words to the user.
@@ -97,9 +110,9 @@ int runMap(const MapArguments& arguments) {
     warnOfRecalibration(arguments, *recording, outcome);
     if (outcome.report.counts.keyframes > 0) {
       const SecondsScope map(outcome.report.seconds.map);
-      output->writeCloud("map.pcd", outcome.points);
-      output->writeSimplemap(outcome.keyframes);
-      output->writeTrajectory();
+      writeAll(outcome, {[&] { output->writeCloud("map.pcd", outcome.points); },
+                         [&] { output->writeSimplemap(outcome.keyframes); },
+                         [&] { output->writeTrajectory(); }});
     }
   }
   outcome.report.seconds.total = clock.total;
@@ -145,8 +158,10 @@ int runDepth(const DepthArguments& arguments) {
     warnOfRecalibration(arguments, *recording, outcome);
     outcome.report.points = points.size();
     if (outcome.report.counts.keyframes > 0) {
-      output->writeCloud("points.pcd", points);
-      if (dsi) dsi->finish();
+      writeAll(outcome, {[&] { output->writeCloud("points.pcd", points); },
+                         [&] {
+                           if (dsi) dsi->finish();
+                         }});
     }
   }
   outcome.report.seconds.total = clock.total;

@@ -114,6 +114,17 @@ TEST_F(MapOptions, OutliersAreLeftOutOfTheCloudOfOneKeyframeToo) {
   EXPECT_EQ(reportIn("some")["points"], pointsIn("some/points.pcd"));
 }
 
+TEST_F(MapOptions, AFileThatCannotBeWrittenDoesNotTakeTheOthersAlong) {
+  write(SyntheticRecording());
+  std::filesystem::create_directories(folder() / "out" / "map.pcd" / "in the way");
+  const Result result = run("map rig.ini data --out out");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("map.pcd"));
+  for (const char* file : {"map.simplemap", "trajectory.txt", "report.json"}) {
+    EXPECT_TRUE(exists(folder() / "out" / file)) << file;
+  }
+}
+
 TEST_F(MapOptions, SubintervalsOfEveryKindMapTheRecording) {
   write(SyntheticRecording());
   for (const std::string options :
