@@ -78,11 +78,11 @@ std::optional<Window> BaselinePolicy::current(const RecordingSoFar& recording) {
   while (true) {
     const auto t0_ns = recording.timeOfEvent(earliestStart(recording), 1);
     if (!t0_ns) return std::nullopt;
-    const auto T_world_ref0 = recording.T_world_ref(*t0_ns);
+    const auto T_world_ref0 = recording.viewPoseAt(*t0_ns);
     for (; T_world_ref0 && grown_ns_ <= window_ns_; grown_ns_ += stride_ns_) {
       const std::int64_t t1_ns = *t0_ns + grown_ns_;
       if (t1_ns > recording.completeNs()) return std::nullopt;
-      const auto T_world_ref1 = recording.T_world_ref(t1_ns);
+      const auto T_world_ref1 = recording.viewPoseAt(t1_ns);
       if (T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
         return windowOf(*t0_ns, t1_ns, options_.reference);
       }

@@ -87,7 +87,7 @@ class FusionMapper::SoFar : public RecordingSoFar {
     return t_ns;
   }
 
-  std::optional<Rigid3> T_world_ref(std::int64_t t_ns) const override {
+  std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const override {
     const std::optional<Rigid3> T_world_rig = mapper_.trajectory_.poseAt(t_ns);
     if (!T_world_rig) return std::nullopt;
     return mapper_.keyframeMapper().referencePose(*T_world_rig);

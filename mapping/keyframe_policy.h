@@ -68,8 +68,8 @@ class RecordingSoFar {
   /// nothing where so many are not complete.
   virtual std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns,
                                                   std::int64_t count) const = 0;
-  /// Pose of the reference view, or nothing.
-  virtual std::optional<Rigid3> T_world_ref(std::int64_t t_ns) const = 0;
+  /// T_world_ref: where the reference view would stand at a time, or nothing.
+  virtual std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const = 0;
   virtual const ReferenceView& view() const = 0;
 };
 

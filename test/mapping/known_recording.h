@@ -30,7 +30,7 @@ class KnownRecording : public RecordingSoFar {
     event += count - 1;
     return *event < complete_ns ? std::optional(*event) : std::nullopt;
   }
-  std::optional<Rigid3> T_world_ref(std::int64_t t_ns) const override {
+  std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const override {
     return T_world_ref_at(t_ns);
   }
   const ReferenceView& view() const override { return image; }
