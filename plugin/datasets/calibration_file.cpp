@@ -73,6 +73,14 @@ void Calibration::requireCameras(std::size_t count) const {
                               ": expected " + std::to_string(count) + ", as the recording has");
 }
 
+void Calibration::requireLike(const Rig& recorded) const {
+  for (std::size_t i = 0; i < recorded.cameras.size(); ++i) {
+    const CameraModel& model = recorded.cameras[i].model;
+    camera(i, CameraSize{model.width, model.height});
+  }
+  requireCameras(recorded.cameras.size());
+}
+
 Calibration readCalibration(const std::filesystem::path& file) {
   const std::string word = firstWord(file);
   if (!word.empty() && word.front() == '{') {

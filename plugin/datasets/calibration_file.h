@@ -22,11 +22,16 @@ struct Calibration {
 
   /// @throws std::invalid_argument naming the file, where it has more or fewer cameras.
   void requireCameras(std::size_t count) const;
+
+  /// @param recorded the recording's own cameras, which this can take the place of.
+  /// @throws std::invalid_argument naming the file, where it has more or fewer cameras or one of
+  /// another size.
+  void requireLike(const Rig& recorded) const;
 };
 
 /// What a folder of text files need not hold, because it was given beside it.
 struct GivenParts {
-  const Calibration* calibration = nullptr;  ///< Null: the folder's own.
+  const Calibration* calibration = nullptr;  ///< Only where the folder has none; may be null.
   bool poses = false;                        ///< They are put in later.
 };
 

@@ -35,8 +35,8 @@ std::vector<StampedPose> readPoses(const fs::path& folder) {
                            ": no poses: expected poses.txt or groundtruth.txt, or --poses FILE");
 }
 
-/// One camera for each camN/events.txt.
-Rig rigOf(const Calibration& calibration, const fs::path& folder) {
+/// A given rig, with one camera for each camN/events.txt.
+Rig givenRig(const Calibration& calibration, const fs::path& folder) {
   Rig rig;
   while (isFile(eventsOf(folder, rig.cameras.size()))) {
     rig.cameras.push_back(calibration.camera(rig.cameras.size(), std::nullopt));
@@ -45,8 +45,16 @@ Rig rigOf(const Calibration& calibration, const fs::path& folder) {
   return rig;
 }
 
-Rig readRig(const fs::path& folder) {
-  if (isFile(folder / "camchain.yaml")) return readCamchain(folder / "camchain.yaml");
+/// The folder's own rig where it has one: that another was given is then for who replaces it to
+/// count.
+Rig readRig(const fs::path& folder, const GivenParts& given) {
+  const fs::path own = folder / "camchain.yaml";
+  if (isFile(own)) {
+    Rig rig = readCamchain(own);
+    if (given.calibration != nullptr) given.calibration->requireLike(rig);
+    return rig;
+  }
+  if (given.calibration != nullptr) return givenRig(*given.calibration, folder);
   throw std::runtime_error(folder.string() +
                            ": no calibration: expected camchain.yaml, or --calibration FILE");
 }
@@ -58,7 +66,7 @@ bool looksLikeDatasetFolder(const fs::path& folder) {
 }
 
 std::unique_ptr<Recording> openDatasetFolder(const fs::path& folder, const GivenParts& given) {
-  Rig rig = given.calibration != nullptr ? rigOf(*given.calibration, folder) : readRig(folder);
+  Rig rig = readRig(folder, given);
   std::vector<EventTextReader> readers;
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
     const CameraModel& model = rig.cameras[camera].model;

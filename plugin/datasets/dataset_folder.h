@@ -20,7 +20,8 @@ namespace efm {
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 
 /// @throws std::runtime_error naming the file (and line) that is missing or not understood;
-/// std::invalid_argument where a given calibration has more or fewer cameras.
+/// std::invalid_argument where a given calibration has more or fewer cameras or one of another
+/// size.
 std::unique_ptr<Recording> openDatasetFolder(const std::filesystem::path& folder,
                                              const GivenParts& given = {});
 

@@ -76,19 +76,25 @@ void requireFile(const fs::path& folder, const char* name, const char* what, con
                            option + " FILE");
 }
 
-RigCamera ownCamera(const fs::path& folder) {
-  requireFile(folder, "calib.txt", "calibration", "--calibration");
-  RigCamera camera;
-  camera.model = readUzhCalibration(folder / "calib.txt", uzhSensorSize(folder));
-  return camera;
-}
-
 /// The folder knows its sensor's size for certain only from an image.
 RigCamera givenCamera(const Calibration& calibration, const fs::path& folder) {
   calibration.requireCameras(1);
   const bool says_size = calibration.rig.cameras[0].model.width > 0;
   const std::optional<CameraSize> size = sizeOfImages(folder);
   return calibration.camera(0, size || says_size ? size : kDavis240c);
+}
+
+/// The folder's own camera where it has one: that another was given is then for who replaces it to
+/// count.
+RigCamera readCamera(const fs::path& folder, const GivenParts& given) {
+  std::optional<RigCamera> camera;
+  if (given.calibration != nullptr) camera = givenCamera(*given.calibration, folder);
+  std::error_code ignored;
+  if (camera && !fs::exists(folder / "calib.txt", ignored)) return *camera;
+  requireFile(folder, "calib.txt", "calibration", "--calibration");
+  const CameraSize size =
+      camera ? CameraSize{camera->model.width, camera->model.height} : uzhSensorSize(folder);
+  return {readUzhCalibration(folder / "calib.txt", size), {}, 0};
 }
 
 }  // namespace
@@ -100,8 +106,7 @@ bool looksLikeUzhFolder(const fs::path& folder) {
 
 std::unique_ptr<Recording> openUzhFolder(const fs::path& folder, const GivenParts& given) {
   Rig rig;
-  rig.cameras.push_back(given.calibration != nullptr ? givenCamera(*given.calibration, folder)
-                                                     : ownCamera(folder));
+  rig.cameras.push_back(readCamera(folder, given));
   const CameraModel& model = rig.cameras[0].model;
   std::vector<EventTextReader> readers;
   readers.emplace_back(folder / "events.txt", CameraSize{model.width, model.height});

@@ -147,16 +147,40 @@ TEST_F(GivenParts, TheOptionFileMaySayThemAndTheCommandLineWins) {
 
 TEST_F(GivenParts, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
-  const std::string map = "map rig.ini r.rawlog --out out ";
   fs::copy_file(folder() / "data" / "camchain.yaml", folder() / "same.yaml");
-  EXPECT_EQ(run(map + "--set rig.calibration=same.yaml").err, "");
   Rig rig{SyntheticRecording().cameras};
   rig.cameras[1].T_rig_cam.translation.y() += 0.001;
   writeText("other.yaml", formatCamchain(rig));
-  EXPECT_THAT(run(map + "--set rig.calibration=other.yaml").err,
-              HasSubstr("warning: other.yaml replaced another calibration, the recording's own; "
-                        "--set rig.calibration= keeps that"));
-  EXPECT_EQ(run(map + "--calibration other.yaml").err, "") << "it was asked for";
+  for (const std::string recording : {"data", "r.rawlog"}) {
+    const std::string map = "map rig.ini " + recording + " --out out ";
+    EXPECT_EQ(run(map + "--set rig.calibration=same.yaml").err, "") << recording;
+    EXPECT_THAT(run(map + "--set rig.calibration=other.yaml").err,
+                HasSubstr("warning: other.yaml replaced another calibration, the recording's own; "
+                          "--set rig.calibration= keeps that"))
+        << recording;
+    EXPECT_EQ(run(map + "--calibration other.yaml").err, "") << recording << ": it was asked for";
+  }
+  takeOut("camchain.yaml");
+  EXPECT_EQ(run("map rig.ini data --out out --set rig.calibration=other.yaml").err, "")
+      << "there is no other";
+}
+
+TEST_F(GivenParts, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning) {
+  fs::create_directory(folder() / "uzh");
+  fs::rename(folder() / "data" / "cam0" / "events.txt", folder() / "uzh" / "events.txt");
+  fs::rename(folder() / "data" / "poses.txt", folder() / "uzh" / "groundtruth.txt");
+  writeText("uzh/calib.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
+  writeText("same.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
+  writeText("other.txt", "100 101 59.5 44.5 0 0 0 0 0\n");
+  const std::string map = "map rig.ini uzh --out out ";
+  const auto warning = HasSubstr("warning: other.txt replaced another calibration");
+  EXPECT_THAT(run(map + "--set rig.calibration=same.txt").err, Not(HasSubstr("replaced")));
+  EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, warning);
+  EXPECT_THAT(run(map + "--calibration other.txt").err, Not(HasSubstr("replaced")));
+  ASSERT_EQ(run("import uzh --out r.rawlog").status, 0);
+  EXPECT_THAT(run("map rig.ini r.rawlog --out out --set rig.calibration=other.txt").err, warning);
+  fs::remove(folder() / "uzh" / "calib.txt");
+  EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, Not(HasSubstr("replaced")));
 }
 
 TEST_F(GivenParts, OfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
