@@ -24,6 +24,7 @@ mrpt::obs::CObservation::Ptr RecordingWithPoses::next() {
     const StampedPose& pose = poses_[next_pose_++];
     return poseObservation({pose.t_ns, pose.T_world_rig, {}}, "pose");
   }
+  if (error_) std::rethrow_exception(error_);
   if (ended_) return nullptr;
   place_ = recording_->place();
   return std::exchange(ahead_, nullptr);
@@ -31,7 +32,11 @@ mrpt::obs::CObservation::Ptr RecordingWithPoses::next() {
 
 void RecordingWithPoses::readAhead() {
   while (!ahead_ && !ended_) {
-    ahead_ = recording_->next();
+    try {
+      ahead_ = recording_->next();
+    } catch (const std::exception&) {
+      error_ = std::current_exception();
+    }
     ended_ = ahead_ == nullptr;
     if (ahead_ && poseSourceOf(*ahead_)) ahead_ = nullptr;
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <memory>
 #include <string>
 #include <vector>
@@ -18,6 +19,7 @@ class RecordingWithPoses : public Recording {
   /// @param poses T_world_body, in any order; those of equal time keep theirs.
   RecordingWithPoses(std::unique_ptr<Recording> recording, std::vector<StampedPose> poses);
 
+  /// Where the recording cannot be read on, its error comes when the poses were given.
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return place_; }
   double progress() const override { return recording_->progress(); }
@@ -31,6 +33,7 @@ class RecordingWithPoses : public Recording {
   std::size_t next_pose_ = 0;
   mrpt::obs::CObservation::Ptr ahead_;  // the recording's next one, where it was read already
   bool ended_ = false;
+  std::exception_ptr error_;  // that ended it
   std::string place_ = "the recording";
 };
 

@@ -69,7 +69,10 @@ EventTextReader::EventTextReader(std::filesystem::path file, CameraSize size)
 
 std::vector<Event> EventTextReader::nextPacket() {
   readAhead();
-  if (first_ == events_.size()) return {};
+  if (first_ == events_.size()) {
+    if (error_) std::rethrow_exception(error_);
+    return {};
+  }
   const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first_);
   const auto end = std::partition_point(
       begin, events_.end(),
@@ -80,20 +83,30 @@ std::vector<Event> EventTextReader::nextPacket() {
 
 std::optional<std::int64_t> EventTextReader::nextTime() {
   readAhead();
-  if (first_ == events_.size()) return std::nullopt;
-  return events_[first_].t_ns;
+  if (first_ < events_.size()) return events_[first_].t_ns;
+  if (!error_) return std::nullopt;
+  if (newest_ns_ == -kEndOfTimeNs) std::rethrow_exception(error_);
+  return newest_ns_;
 }
 
 void EventTextReader::readAhead() {
-  while (!ended_ && !packetIsComplete()) {
+  while (!ended_ && !error_ && !packetIsComplete()) {
     events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(first_));
     first_ = 0;
-    readBlock();
-    if (!disordered_) continue;
-    std::stable_sort(events_.begin(), events_.end(),
-                     [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
-    disordered_ = false;
+    try {
+      readBlock();
+    } catch (const std::runtime_error&) {
+      error_ = std::current_exception();  // the good lines above it come first
+    }
+    sortEvents();
   }
+}
+
+void EventTextReader::sortEvents() {
+  if (!disordered_) return;
+  std::stable_sort(events_.begin(), events_.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  disordered_ = false;
 }
 
 /// No event of the first packet's stretch can come any more.

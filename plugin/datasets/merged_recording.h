@@ -20,6 +20,7 @@ namespace efm {
 /// until its camera's next event, a camera's last one for good (`kEndOfTimeNs`): nobody waits for a
 /// camera that sees nothing, and one without any event is known to be silent from the beginning.
 /// The last packet of all is not covered: the recording ends there, it does not go on in silence.
+/// Where a file cannot be read on, the error comes when all that was seen before was given.
 class MergedRecording : public Recording {
  public:
   /// @param readers one per camera of the rig.

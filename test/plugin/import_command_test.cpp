@@ -179,6 +179,16 @@ TEST_F(ImportCommand, AnEventOutsideTheSensorIsAnErrorThatNamesTheLineAndLeavesN
   EXPECT_FALSE(exists(folder() / "s.partial.rawlog"));
 }
 
+TEST_F(ImportCommand, InfoOfACutFolderSaysWhatCameBeforeAndFails) {
+  writeSmallRecording();
+  write("small/events.txt", "0.010 1 2 1\n0.020 3 4 0\n0.030 5");
+  const Result result = run("info small");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("2 events from 0.010000000 s to 0.020000000 s"),
+                                HasSubstr("3 poses from 0.015000000 s to 0.045000000 s")));
+  EXPECT_THAT(result.err, HasSubstr("small/events.txt:3: '0.030 5': expected t x y p, but the"));
+}
+
 TEST_F(ImportCommand, InfoOfACutRawlogSaysWhatCameBeforeAndFails) {
   writeSmallRecording();
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);

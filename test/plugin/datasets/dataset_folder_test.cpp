@@ -98,7 +98,14 @@ TEST_F(DatasetFolder, ErrorsInsideAFileNameItAndTheLine) {
   EXPECT_THAT(errorOfOpening(), HasSubstr("poses.txt:2: "));
   write("cam1/events.txt", "0.2 0 0 0\n0.3 240 0 0\n");
   write("poses.txt", "0.3 1 2 3 0 0 0 1\n");
-  EXPECT_THAT(errorOfOpening(), AllOf(HasSubstr("cam1/events.txt:2: "), HasSubstr("'240'")));
+  const auto recording = openDatasetFolder(folder());
+  EXPECT_THAT(errorOf([&] {
+                while (recording->next()) {
+                }
+              }),
+              AllOf(HasSubstr("cam1/events.txt:2: "), HasSubstr("'240'")));
+  write("cam1/events.txt", "0.3 240 0 0\n");
+  EXPECT_THAT(errorOfOpening(), AllOf(HasSubstr("cam1/events.txt:1: "), HasSubstr("'240'")));
 }
 
 }  // namespace

@@ -220,6 +220,32 @@ TEST_F(EventText, AnErrorBehindManyBlocksNamesItsLine) {
               AllOf(StartsWith(line(150'001)), HasSubstr("'340'")));
 }
 
+TEST_F(EventText, WhatIsAboveALineThatIsAnErrorIsGivenBefore) {
+  std::vector<Event> events;
+  for (std::int64_t i = 0; i < 5000; ++i) {  // 5 s; disorder that is sorted, too
+    const std::int64_t late_ms = i % 7 == 0 ? 3 : 0;
+    events.push_back({(i - late_ms) * 1'000'000, static_cast<std::uint16_t>(i % 240), 7, true});
+  }
+  const std::string good = textOf(events);
+  std::stable_sort(events.begin(), events.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  for (const std::string& bad :
+       {std::string("garbage\n"), std::string("0.0 1 2 1\n"), std::string("5.1 1"),
+        std::string("5.1 240 2 1\n5.2 1 2 1\n"), std::string(3 << 20, 'x')}) {
+    writeFile(file(), good + bad);
+    EventTextReader reader(file(), kSize);
+    std::vector<Event> given;
+    const std::string error = errorOf([&] {
+      while (reader.nextTime()) {
+        for (const Event& event : reader.nextPacket()) given.push_back(event);
+      }
+    });
+    EXPECT_TRUE(given == events) << given.size() << " of " << events.size() << " events";
+    EXPECT_THAT(error, StartsWith(line(5001)));
+    EXPECT_EQ(errorOf([&] { reader.nextPacket(); }), error) << "it stays";
+  }
+}
+
 TEST_F(EventText, ABinaryFileIsAnErrorThatATerminalSurvives) {
   EXPECT_THAT(errorOfText(std::string(3 << 20, '\x1b')),
               AllOf(StartsWith(line(1)), HasSubstr("\\x1b\\x1b"), HasSubstr("1048576 bytes"),

@@ -154,6 +154,19 @@ TEST_F(MergedRecordingTest, ACameraWhoseFileBreaksOffIsAnErrorWhenItIsReached) {
               AllOf(HasSubstr("events.txt:200001: "), HasSubstr("the file ends")));
 }
 
+TEST_F(MergedRecordingTest, WhatWasSeenBeforeAFileBreaksOffIsGivenBeforeTheError) {
+  RecordingWithPoses recording = open({"0.012 0 0 0\n0.018 0 0 0\n0.019 0 0\n0.025 0 0 0\n",
+                                       "0.011 0 0 0\n0.015 0 0 0\n0.022 0 0 0\n"},
+                                      {poseAt(5 * kMs), poseAt(17 * kMs), poseAt(90 * kMs)});
+  std::vector<std::string> given;
+  const std::string error = errorOf([&] {
+    while (const auto observation = recording.next()) given.push_back(shortly(*observation));
+  });
+  EXPECT_THAT(error, HasSubstr("cam0/events.txt:3: '0.019 0 0'"));
+  EXPECT_THAT(given, ElementsAre("pose@5", "cam0@11:0", "cam1@11:0", "cam1@11:2", "cam0@12:2",
+                                 "pose@17", "pose@90"));
+}
+
 TEST_F(MergedRecordingTest, ProgressGoesFromTheBeginningToOne) {
   std::string text;
   for (int i = 0; i < 400'000; ++i) text += std::to_string(i / 1000) + ".5 1 2 0\n";  // 5 MB
