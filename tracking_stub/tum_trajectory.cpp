@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iomanip>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
@@ -21,6 +22,8 @@ namespace {
 constexpr std::array<std::string_view, 8> kFieldNames = {"t",  "tx", "ty", "tz",
                                                          "qx", "qy", "qz", "qw"};
 constexpr std::string_view kBlanks = " \t\r\v\f";
+constexpr double kMaxLengthError =
+    0.01;  // of a quaternion: two digits are enough to tell a mistake
 
 std::vector<std::string_view> splitFields(std::string_view line) {
   line = line.substr(0, line.find('#'));
@@ -48,6 +51,17 @@ double parseNumber(const std::vector<std::string_view>& fields, std::size_t fiel
   return value;
 }
 
+std::runtime_error quaternionError(const std::vector<std::string_view>& fields, double norm) {
+  std::string values;
+  for (std::size_t field = 4; field < fields.size(); ++field) {
+    values += (values.empty() ? "" : " ") + std::string(fields[field]);
+  }
+  std::ostringstream text;
+  text << "qx qy qz qw = " << inQuotes(values) << ", of length " << norm
+       << ": expected a rotation, of length 1 within 1 %";
+  return std::runtime_error(text.str());
+}
+
 StampedPose parsePose(const std::vector<std::string_view>& fields) {
   if (fields.size() != kFieldNames.size()) {
     throw std::runtime_error(std::to_string(fields.size()) +
@@ -65,10 +79,7 @@ StampedPose parsePose(const std::vector<std::string_view>& fields) {
   const Eigen::Quaterniond rotation(parseNumber(fields, 7), parseNumber(fields, 4),
                                     parseNumber(fields, 5), parseNumber(fields, 6));
   const double norm = rotation.coeffs().stableNorm();
-  if (!(norm > 0) || !std::isfinite(norm)) {
-    throw std::runtime_error("quaternion of length " + std::to_string(norm) +
-                             ": expected a rotation (of unit length)");
-  }
+  if (!(std::abs(norm - 1) <= kMaxLengthError)) throw quaternionError(fields, norm);
   pose.T_world_rig.rotation.coeffs() = rotation.coeffs() / norm;
   return pose;
 }

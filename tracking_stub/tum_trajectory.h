@@ -14,7 +14,8 @@ namespace efm {
 /// Trajectories as text, the format of the TUM RGB-D benchmark: one pose `t tx ty tz qx qy qz qw` a
 /// line, metres and decimal seconds; blank lines and what follows a `#` do not count.
 
-/// The poses in the order of the file, quaternions normalised, times exact.
+/// The poses in the order of the file, times exact. Quaternions are normalised, which takes away
+/// the rounding of few digits: one whose length is off 1 by more than 1 % is an error.
 /// @throws std::runtime_error naming file and line, the value and what was expected.
 std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file);
 /// @param name what errors call the stream.

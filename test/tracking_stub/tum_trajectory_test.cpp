@@ -56,11 +56,12 @@ TEST(TumTrajectory, SkipsCommentsAndBlankLinesAndTakesAnyBlanks) {
   EXPECT_EQ(poses[0].T_world_rig.translation, Eigen::Vector3d(1, 2, 3));
 }
 
-TEST(TumTrajectory, ReadsTheQuaternionAsXyzwAndNormalisesIt) {
-  const auto poses = read("0 0 0 0 0 0 2 0\n1 0 0 0 1e200 0 0 0\n");
+TEST(TumTrajectory, ReadsTheQuaternionAsXyzwAndNormalisesWhatWasRounded) {
+  const auto poses = read("0 0 0 0 0 0 1.009 0\n1 0 0 0 0.991 0 0 0\n2 0 0 0 .71 .71 0 0\n");
   EXPECT_DOUBLE_EQ(poses[0].T_world_rig.rotation.z(), 1);
   EXPECT_DOUBLE_EQ(poses[0].T_world_rig.rotation.w(), 0);
   EXPECT_DOUBLE_EQ(poses[1].T_world_rig.rotation.x(), 1);
+  EXPECT_DOUBLE_EQ(poses[2].T_world_rig.rotation.norm(), 1);
 }
 
 TEST(TumTrajectory, NamesTheLineWithTooFewOrTooManyFields) {
@@ -94,9 +95,17 @@ TEST(TumTrajectory, RefusesTimesWhoseDifferencesWouldNotFit) {
   EXPECT_EQ(read("4.6e9 0 0 0 0 0 0 1\n").size(), 1U);
 }
 
-TEST(TumTrajectory, RefusesAQuaternionWithoutLength) {
-  EXPECT_THAT(errorOf("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 0\n"),
-              AllOf(HasSubstr("poses.txt:2: "), HasSubstr("quaternion")));
+TEST(TumTrajectory, RefusesAQuaternionThatIsNotOfUnitLength) {
+  const auto error_of = [](const std::string& quaternion) {
+    return errorOf("0 0 0 0 0 0 0 1\n1 0 0 0 " + quaternion + "\n");
+  };
+  EXPECT_EQ(error_of("5 5 0 0"),
+            "poses.txt:2: qx qy qz qw = '5 5 0 0', of length 7.07107: expected a rotation, of "
+            "length 1 within 1 %");
+  EXPECT_THAT(error_of("0 0 0 0"), HasSubstr("of length 0: expected"));
+  EXPECT_THAT(error_of("0 0 0 0.98"), HasSubstr("of length 0.98: expected"));
+  EXPECT_THAT(error_of("0 0 0 1.02"), HasSubstr("of length 1.02: expected"));
+  EXPECT_THAT(error_of("1e300 1e300 0 0"), HasSubstr("of length 1.41421e+300: expected"));
 }
 
 TEST(TumTrajectory, NamesTheFileThatIsMissing) {
