@@ -9,6 +9,7 @@
 #include "plugin/datasets/poses_file.h"
 #include "plugin/datasets/uzh_text.h"
 #include "plugin/rawlog_recording.h"
+#include "plugin/rawlog_start.h"
 #include "plugin/recording_with_poses.h"
 #include "plugin/refitted_recording.h"
 #include "plugin/rig_setup.h"
@@ -30,6 +31,7 @@ const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
       {"rawlog", [](const Path& source) { return std::filesystem::is_regular_file(source); },
        [](const Path& source, const GivenParts&) -> std::unique_ptr<Recording> {
+         requireRawlog(source);
          return std::make_unique<RawlogRecording>(source);
        },
        "a rawlog file"},

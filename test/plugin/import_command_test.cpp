@@ -204,6 +204,32 @@ TEST_F(ImportCommand, InfoOfACutRawlogSaysWhatCameBeforeAndFails) {
       << result.err;
 }
 
+TEST_F(ImportCommand, AFileThatIsNoRawlogIsAnErrorThatSaysWhatWasExpected) {
+  writeSmallRecording();
+  ASSERT_EQ(std::system(("gzip -k '" + (folder() / "small/events.txt").string() + "'").c_str()), 0);
+  write("empty.rawlog", "");
+  write("picture.png", "\x89PNG\r\n\x1a\n");
+  write("short", "\x97");
+  write("words.bin", std::string("\x05\0\0\0a b c", 9));
+  const std::string expected = ": expected a rawlog, or the folder of a recording as text files\n";
+  const std::pair<const char*, const char*> cases[] = {
+      {"small/events.txt", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
+      {"small/events.txt.gz", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
+      {"empty.rawlog", "it is empty"},
+      {"picture.png", "it begins with '\\x89PNG\\x0d\\x0a\\x1a\\x0a'"},
+      {"words.bin", "it begins with '\\x05\\x00\\x00\\x00a b c'"}};
+  for (const auto& [file, why] : cases) {
+    for (const char* format : {"", " --format rawlog"}) {
+      const Result result = run(std::string("info ") + file + format);
+      EXPECT_NE(result.status, 0) << file;
+      EXPECT_EQ(result.err, "event-fusion: error: " + std::string(file) + ": not a rawlog (" + why +
+                                ")" + expected);
+    }
+  }
+  EXPECT_THAT(run("info short").err, HasSubstr("stopped at entry 0 of short: the file ends in the"))
+      << "it may be cut";
+}
+
 TEST_F(ImportCommand, ARawlogThatCannotBeWrittenIsAnError) {
   writeSmallRecording();
   const Result result = run("import small --out nowhere/s.rawlog");
