@@ -35,8 +35,7 @@ std::string asText(const TimeSpan& span) {
 
 /// What the policy waits for before a window is one.
 std::string fullWindow(const KeyframePolicyOptions& options) {
-  const std::string duration =
-      formatSeconds(durationFromSeconds(options.window_s)) + " s (window_s)";
+  std::string duration = formatSeconds(durationFromSeconds(options.window_s)) + " s (window_s)";
   switch (options.policy) {
     case KeyframePolicyKind::kPeriod:
       return duration;

@@ -121,7 +121,6 @@ TEST(CEventFusionMapBuilder, SensoryFramesGiveTheSameMap) {
 
 TEST(CEventFusionMapBuilder, GivesMrptItsMaps) {
   CEventFusionMapBuilder builder(syntheticOptions());
-  EXPECT_THROW(builder.saveCurrentEstimationToImage("/tmp/never.png"), std::logic_error);
   const SyntheticRecording recording;
   for (const auto& observation : observationsOf(recording)) builder.processObservation(observation);
   builder.finish();
@@ -337,6 +336,12 @@ TEST(CEventFusionMapBuilder, AFrameThatIsNoKeyframeIsRefusedRatherThanForgotten)
 }
 
 class CEventFusionMapBuilderFile : public TemporaryFolder {};
+
+TEST_F(CEventFusionMapBuilderFile, ThereIsNoPictureBeforeTheFirstKeyframe) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  const std::string file = (folder() / "never.png").string();
+  EXPECT_THROW(builder.saveCurrentEstimationToImage(file), std::logic_error);
+}
 
 TEST_F(CEventFusionMapBuilderFile, SavesItsMapAndContinuesIt) {
   const std::string file = (folder() / "saved.simplemap").string();
