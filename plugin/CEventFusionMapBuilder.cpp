@@ -151,6 +151,7 @@ void CEventFusionMapBuilder::warnOfSilence(const KeyframeDepthMap& keyframe) {
 }
 
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
+  if (!observation) throw std::invalid_argument("the builder was given no observation (null)");
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     advance([&](MappingSession& session) { session.addEvents(packetOf(*events)); });
   } else if (const auto observed = poseIn(*observation)) {

@@ -67,7 +67,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// source: see PoseChoice; other observations are counted and ignored. A CObservationRobotPose of
   /// a sensor on the rig gives T_world_rig = T_world_sensor * inverse(T_rig_sensor), and with a
   /// hand-eye transform in the options T_world_rig = T_world_sensor * T_body_rig.
-  /// @throws std::invalid_argument where the observation contradicts its sensor or those before it;
+  /// @throws std::invalid_argument where the observation is null or contradicts its sensor or those
+  /// before it;
   /// std::logic_error after `finish`.
   void processObservation(const mrpt::obs::CObservation::Ptr& observation);
   /// No more observations will come: maps what is left.

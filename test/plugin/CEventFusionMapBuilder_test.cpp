@@ -187,6 +187,12 @@ TEST(CEventFusionMapBuilder, ARefusedObservationLeavesTheMapSoFar) {
   expectSameBits(builder.points(), whole);
 }
 
+TEST(CEventFusionMapBuilder, NoObservationAtAllIsAnError) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  EXPECT_THROW(builder.processObservation(nullptr), std::invalid_argument);
+  EXPECT_EQ(builder.ignoredObservations(), 0U);
+}
+
 TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
   const auto observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(syntheticOptions());
