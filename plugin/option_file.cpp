@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "mapping/quoted_text.h"
 
@@ -40,6 +41,20 @@ std::string_view withoutComment(std::string_view line) {
   return line;
 }
 
+/// Says what paths are relative to for as long as it lives, also where reading throws.
+class FolderScope {
+ public:
+  FolderScope(std::filesystem::path& current, std::filesystem::path folder) : current_(current) {
+    current_ = std::move(folder);
+  }
+  ~FolderScope() { current_.clear(); }
+  FolderScope(const FolderScope&) = delete;
+  FolderScope& operator=(const FolderScope&) = delete;
+
+ private:
+  std::filesystem::path& current_;
+};
+
 }  // namespace
 
 void OptionReader::readFile(const std::filesystem::path& path) {
@@ -50,9 +65,8 @@ void OptionReader::readFile(const std::filesystem::path& path) {
       std::filesystem::is_directory(path)) {
     throw std::runtime_error("cannot read the option file " + path.string());
   }
-  folder_ = path.parent_path();
+  const FolderScope scope(folder_, path.parent_path());
   readText(text.str(), path.string());
-  folder_.clear();
 }
 
 void OptionReader::readText(std::string_view text, const std::string& name) {
@@ -111,9 +125,8 @@ void OptionReader::set(std::string_view section, std::string_view key, std::stri
                        const OptionPlace& place) {
   if (!isOptionSection(section))
     refuse({place.name, " unknown section; known: ", knownOptionSections()});
-  folder_ = place.folder;
+  const FolderScope scope(folder_, place.folder);
   assign(section, key, trimmed(withoutComment(value)), place.name);
-  folder_.clear();
 }
 
 void OptionReader::assign(std::string_view section, std::string_view key, std::string_view value,

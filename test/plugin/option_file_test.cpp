@@ -9,6 +9,8 @@
 #include <set>
 #include <sstream>
 
+#include "test/plugin/temporary_folder.h"
+
 namespace efm {
 namespace {
 
@@ -327,6 +329,20 @@ TEST(OptionReader, PathsAreRelativeToTheFileThatSaysThem) {
   reader.set("rig.calibration=");
   EXPECT_EQ(reader.options().rig.calibration, "") << "the recording's own";
   std::filesystem::remove_all(folder);
+}
+
+class OptionReaderFile : public TemporaryFolder {};
+
+TEST_F(OptionReaderFile, AfterAnErrorPathsAreNotRelativeToTheFileThatHadIt) {
+  std::ofstream(folder() / "wrong.ini") << "[dsi]\nnum_planes = x\n";
+  OptionReader reader;
+  EXPECT_THROW(reader.readFile(folder() / "wrong.ini"), std::invalid_argument);
+  reader.set("rig.calibration=c.yaml");
+  EXPECT_EQ(reader.options().rig.calibration, "c.yaml");
+
+  EXPECT_THROW(reader.set("dsi", "num_planes", "x", {"host.ini", folder()}), std::invalid_argument);
+  reader.set("rig.calibration=d.yaml");
+  EXPECT_EQ(reader.options().rig.calibration, "d.yaml");
 }
 
 TEST(OptionReader, TimeOffsetsAreExactToTheNanosecond) {
