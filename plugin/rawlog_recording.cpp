@@ -83,12 +83,18 @@ void RawlogRecording::readEntry() {
                            "': expected observations, sensory frames and actions");
 }
 
-/// Turns the actions so far into poses, at the frame's time where they have none.
+/// Turns the actions so far into poses, at the frame's time where they have none. Of several poses
+/// of one time the last one, to which all movements led, is where the frame was seen.
 void RawlogRecording::takeActions(const mrpt::obs::CSensoryFrame& frame) {
+  mrpt::obs::CObservation::Ptr newest;
   while (!actions_.empty()) {
     const auto action = actions_.front();
     actions_.pop_front();
-    if (auto pose = reckoning_.poseAfter(*action, frame)) pending_.push_back(pose);
+    const auto pose = reckoning_.poseAfter(*action, frame);
+    if (!pose) continue;
+    if (newest && newest->timestamp == pose->timestamp) pending_.pop_back();
+    pending_.push_back(pose);
+    newest = pose;
   }
 }
 

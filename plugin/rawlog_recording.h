@@ -12,7 +12,8 @@ namespace efm {
 
 /// A rawlog, gzip-compressed or plain, read entry by entry: observations as they are, and those of
 /// sensory frames one after the other. The movements of actions are composed to poses, which come
-/// before the frame that follows (see DeadReckoning); other actions and comments are passed over.
+/// before the frame that follows (see DeadReckoning), one for each time: the last; other actions
+/// and comments are passed over.
 class RawlogRecording : public Recording {
  public:
   /// @throws std::runtime_error naming the file where it cannot be opened.

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <mrpt/obs/CActionCollection.h>
+#include <mrpt/obs/CActionRobotMovement2D.h>
 #include <mrpt/obs/CObservationGPS.h>
 #include <mrpt/obs/CRawlog.h>
 #include <mrpt/obs/CSensoryFrame.h>
@@ -12,6 +13,7 @@
 #include <iterator>
 
 #include "plugin/gz_stream.h"
+#include "plugin/pose_observation.h"
 #include "plugin/rawlog_recording.h"
 #include "plugin/rawlog_writer.h"
 #include "plugin/registration.h"
@@ -163,6 +165,30 @@ TEST_F(Rawlog, ObservationsOfFramesComeOneByOneAndActionsNotAtAll) {
   ASSERT_EQ(delivery.observations.size(), 4);
   expectSame(*delivery.observations[2], *recorded[0]);
   expectSame(*delivery.observations[3], *recorded[1]);
+}
+
+TEST_F(Rawlog, OfMovementsInARowWithoutATimeTheLastPoseIsThatOfTheirFrame) {
+  mrpt::obs::CActionRobotMovement2D movement;
+  movement.timestamp = INVALID_TIMESTAMP;
+  movement.computeFromOdometry(mrpt::poses::CPose2D(1, 0, 0), {});
+  const mrpt::obs::CActionCollection action(movement);
+  mrpt::obs::CSensoryFrame frame;
+  frame.insert(recorded[0]);
+  mrpt::obs::CSensoryFrame later;
+  later.insert(recorded[30]);
+  writeObjects(action, action, action, frame, action, later);
+
+  const Delivery delivery = read(file());
+  EXPECT_EQ(delivery.error, "");
+  ASSERT_EQ(delivery.observations.size(), 4);
+  const auto first = poseIn(*delivery.observations[0]);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(delivery.observations[0]->timestamp, recorded[0]->timestamp);
+  EXPECT_NEAR(first->T_world_body.translation.x(), 3, 1e-12);
+  const auto second = poseIn(*delivery.observations[2]);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(delivery.observations[2]->timestamp, recorded[30]->timestamp);
+  EXPECT_NEAR(second->T_world_body.translation.x(), 4, 1e-12);
 }
 
 TEST_F(Rawlog, OtherObservationsPassThrough) {
