@@ -36,10 +36,15 @@ CameraPacket packetOf(const CObservationEvents& observation) {
   return packet;
 }
 
-void handOut(const std::vector<KeyframeDepthMap>& keyframes,
-             const CEventFusionMapBuilder::KeyframeTaker& taker) {
-  if (!taker) return;
-  for (const KeyframeDepthMap& keyframe : keyframes) taker(keyframe);
+/// What a step throws, if it does.
+template <typename Step>
+std::exception_ptr errorOf(Step step) {
+  try {
+    step();
+  } catch (...) {
+    return std::current_exception();
+  }
+  return nullptr;
 }
 
 /// One point map of the exported points: MRPT's points are float32.
@@ -73,6 +78,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options) 
   keyframes_.clear();
   newest_depth_ = {};
   silent_cameras_.clear();
+  mapping_failed_ = false;
   metric_map_.maps.clear();
   event_map_.reset();
 }
@@ -100,45 +106,59 @@ void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
 }
 
 void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>& feed) {
-  std::vector<KeyframeDepthMap> keyframes;
-  KeyframeTaker taker;
-  std::exception_ptr refusal;
+  std::exception_ptr error;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (finished_) throw std::logic_error("the builder was given an observation after its end");
-    try {
-      feed(*session_);
-    } catch (...) {
-      refusal = std::current_exception();  // what came before is mapped all the same
-    }
-    keyframes = mapDue();
-    taker = taker_;
+    error = errorOf([&] { feed(*session_); });
   }
-  handOut(keyframes, taker);
-  if (refusal) std::rethrow_exception(refusal);
+  // What came before a refused observation is mapped all the same.
+  const std::exception_ptr mapping_error = errorOf([this] { mapDue(); });
+  if (!error) error = mapping_error;
+  if (error) std::rethrow_exception(error);
 }
 
 void CEventFusionMapBuilder::mapWhenAsked() const {
   auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: see the declaration
-  std::vector<KeyframeDepthMap> keyframes;
-  KeyframeTaker taker;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     session_->completeEarly();
-    keyframes = self->mapDue();
-    taker = taker_;
+    if (mapping_failed_) return;  // which was said: now the map so far is asked for
   }
-  handOut(keyframes, taker);
+  self->mapDue();
 }
 
-std::vector<KeyframeDepthMap> CEventFusionMapBuilder::mapDue() {
-  std::vector<KeyframeDepthMap> keyframes = session_->mapDue(sink_);
-  for (const KeyframeDepthMap& keyframe : keyframes) {
-    keyframes_.push_back(storedKeyframe(keyframe, session_->pointsOf(keyframe)));
-    newest_depth_ = keyframe.map.depth;
-    warnOfSilence(keyframe);
+void CEventFusionMapBuilder::mapDue() {
+  while (const std::optional<MadeKeyframe> made = mapNext()) handOut(*made);
+}
+
+std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapNext() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  // Within a taker: whoever called it maps on.
+  if (handing_out_.count(std::this_thread::get_id()) != 0) return std::nullopt;
+  mapping_failed_ = true;
+  std::optional<KeyframeDepthMap> keyframe = session_->next(sink_);
+  mapping_failed_ = false;
+  if (!keyframe) return std::nullopt;
+  keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
+  newest_depth_ = keyframe->map.depth;
+  warnOfSilence(*keyframe);
+  return MadeKeyframe{std::move(*keyframe), taker_};
+}
+
+void CEventFusionMapBuilder::handOut(const MadeKeyframe& made) {
+  if (!made.taker) return;
+  const auto self = std::this_thread::get_id();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    handing_out_.insert(self);
   }
-  return keyframes;
+  const std::exception_ptr error = errorOf([&] { made.taker(made.keyframe); });
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    handing_out_.erase(self);
+  }
+  if (error) std::rethrow_exception(error);
 }
 
 /// Once per camera: `status` counts the rest.

@@ -13,6 +13,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "maps/cloud_point.h"
@@ -33,21 +34,27 @@ namespace efm {
 /// camera that first appears later is an error. Who asks for the map completes the rig after a
 /// tenth of a second, so that a short recording becomes a map without `finish`.
 ///
+/// Where mapping fails (no memory, a sink that throws), whoever fed the builder gets the error, as
+/// does everyone who feeds it until it succeeds; who asks for the map gets what there is.
+///
 /// A program that has MRPT alone makes the builder by its name, gives it options as a
 /// CLoadableOptions and uses it as a CMetricMapBuilder. Asking for the map maps every window that
 /// is covered by then; what only `finish` can know, that nothing more will come, matters for a
 /// window that ends in the recording's last 10 ms, where its packets do not say what they cover.
 ///
-/// Thread-safe: one mutex. `processObservation` returns after mapping what became due.
+/// Thread-safe: one mutex, held while a keyframe is made but not while it is handed out.
+/// `processObservation` returns after mapping what became due. Several threads may feed: calls that
+/// overlap have no order, but observations in the order of time make the same map whichever thread
+/// maps them.
 class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
                                public mrpt::config::CLoadableOptions,
                                public mrpt::rtti::CObject {
   DEFINE_MRPT_OBJECT(CEventFusionMapBuilder, efm)
 
  public:
-  /// Receives each keyframe once, after it went into the map, by the thread that fed the builder or
-  /// asked it for the map, and which may use the builder. In the order of their windows where one
-  /// thread feeds.
+  /// Receives each keyframe once, right after it went into the map and before the next one is made,
+  /// by the thread that fed the builder or asked it for the map: in the order of their windows
+  /// where one thread does that. May use the builder, whose map is that up to this keyframe then.
   using KeyframeTaker = std::function<void(const KeyframeDepthMap&)>;
 
   /// @throws std::invalid_argument where the options are not valid.
@@ -68,8 +75,9 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// a sensor on the rig gives T_world_rig = T_world_sensor * inverse(T_rig_sensor), and with a
   /// hand-eye transform in the options T_world_rig = T_world_sensor * T_body_rig.
   /// @throws std::invalid_argument where the observation is null or contradicts its sensor or those
-  /// before it;
-  /// std::logic_error after `finish`.
+  /// before it; std::logic_error after `finish`. What became due is mapped all the same; where that
+  /// fails too, the first error counts. The keyframes before an error are in the map and were
+  /// handed out.
   void processObservation(const mrpt::obs::CObservation::Ptr& observation);
   /// No more observations will come: maps what is left.
   void finish();
@@ -116,13 +124,21 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void saveCurrentEstimationToImage(const std::string& file, bool format_emf_bmp = true) override;
 
  private:
+  /// A keyframe that is in the map, and who receives it.
+  struct MadeKeyframe {
+    KeyframeDepthMap keyframe;
+    KeyframeTaker taker;
+  };
+
   void restart(const EventFusionOptions& builder_options);
   void warnOfSilence(const KeyframeDepthMap& keyframe);
-  /// Feeds the session under the lock, then maps and hands out what became due. What `feed` throws
+  /// Feeds the session under the lock, then maps and hands out what became due. The first error
   /// goes to the caller at the end.
   void advance(const std::function<void(MappingSession&)>& feed);
-  /// Under the lock: maps what is due.
-  std::vector<KeyframeDepthMap> mapDue();
+  /// Maps what is due and hands it out, keyframe by keyframe: one alone is held at a time.
+  void mapDue();
+  std::optional<MadeKeyframe> mapNext();
+  void handOut(const MadeKeyframe& made);
   /// Maps what is due for somebody who asks for the map. Const as MRPT has those who ask: what is
   /// asked for is the map of what came in, which mapping it does not change.
   void mapWhenAsked() const;
@@ -137,8 +153,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::uint64_t ignored_observations_ = 0;
   DeadReckoning reckoning_;  // from the actions
   std::vector<StoredKeyframe> keyframes_;
-  cv::Mat1f newest_depth_;        // of the newest keyframe
-  std::set<int> silent_cameras_;  // that were warned of
+  cv::Mat1f newest_depth_;                 // of the newest keyframe
+  std::set<int> silent_cameras_;           // that were warned of
+  bool mapping_failed_ = false;            // the last time
+  std::set<std::thread::id> handing_out_;  // within a taker
   mutable mrpt::maps::CMultiMetricMap metric_map_;
   mutable CEventFusionMap::Ptr event_map_;  // in metric_map_
 };

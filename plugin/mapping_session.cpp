@@ -188,19 +188,17 @@ void MappingSession::finish() {
   }
 }
 
-std::vector<KeyframeDepthMap> MappingSession::mapDue(DsiSink* sink) {
-  std::vector<KeyframeDepthMap> keyframes;
-  if (!rig_complete_) return keyframes;
+std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
+  if (!rig_complete_) return std::nullopt;
   StageTimer timer(status_.seconds);
-  while (auto keyframe = mapper_.next(sink, &timer)) {
-    const SecondsScope scope(status_.seconds.map);
-    cloud_.insert(cloud_.keyframes(), placedInWorld(pointsOf(*keyframe), keyframe->T_world_ref));
-    for (const int camera : keyframe->silent_cameras) {
-      ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
-    }
-    keyframes.push_back(std::move(*keyframe));
+  std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
+  if (!keyframe) return std::nullopt;
+  const SecondsScope scope(status_.seconds.map);
+  cloud_.insert(cloud_.keyframes(), placedInWorld(pointsOf(*keyframe), keyframe->T_world_ref));
+  for (const int camera : keyframe->silent_cameras) {
+    ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }
-  return keyframes;
+  return keyframe;
 }
 
 std::vector<ViewPoint> MappingSession::pointsOf(const KeyframeDepthMap& keyframe) const {

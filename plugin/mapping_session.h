@@ -47,7 +47,7 @@ struct SessionStatus {
 /// cloud: puts the rig together as its cameras appear, feeds the mapper and collects what it makes.
 /// Not thread-safe. Knows nothing of MRPT.
 ///
-/// Use: add, and after each `mapDue`; at the end `finish`, and `mapDue` again.
+/// Use: add, and after each `next` until it gives nothing; at the end `finish`, and `next` again.
 class MappingSession {
  public:
   /// @throws std::invalid_argument where the options are not valid; std::runtime_error naming a
@@ -74,9 +74,11 @@ class MappingSession {
   /// be mapped without can be mapped all the same.
   void finish();
 
-  /// Maps the windows that are covered and puts them into the cloud.
+  /// Maps the next window that is covered, if there is one, and puts it into the cloud. Data in the
+  /// order of time may be added in between: it changes no window that is covered. Where this
+  /// throws, the keyframes before it stay as they are.
   /// @param sink receives every fused plane where given.
-  std::vector<KeyframeDepthMap> mapDue(DsiSink* sink = nullptr);
+  std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr);
 
   /// The points that a keyframe has in the cloud: of its fused map, or by option of its cameras'.
   std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;

@@ -10,6 +10,7 @@
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CSensoryFrame.h>
 
+#include <atomic>
 #include <thread>
 
 #include "test/plugin/observations.h"
@@ -191,6 +192,135 @@ TEST(CEventFusionMapBuilder, NoObservationAtAllIsAnError) {
   CEventFusionMapBuilder builder(syntheticOptions());
   EXPECT_THROW(builder.processObservation(nullptr), std::invalid_argument);
   EXPECT_EQ(builder.ignoredObservations(), 0U);
+}
+
+// --- What stays where mapping fails ------------------------------------------------------------
+
+/// Takes the planes of so many keyframes.
+class FullDisk : public DsiSink {
+ public:
+  explicit FullDisk(int keyframes)
+      : planes_(keyframes * syntheticOptions().mapper.keyframe.planes.num_planes) {}
+  void takePlane(int /*plane*/, const float* /*values*/) override {
+    if (planes_-- <= 0) throw std::runtime_error("the disk is full");
+  }
+
+ private:
+  std::atomic<int> planes_;
+};
+
+TEST(CEventFusionMapBuilder, KeyframesThatWereMadeBeforeMappingFailsStayAndAreHandedOut) {
+  FullDisk disk(2);
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setDsiSink(&disk);
+  std::size_t taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+
+  EXPECT_THROW(builder.finish(), std::runtime_error);
+
+  EXPECT_EQ(taken, 2U);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U) << "the error was said: now the map is asked";
+  EXPECT_EQ(builder.status().counts.keyframes, 2U);
+  const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
+  expectSameBits(event_map->cloud().points(), builder.points());
+  EXPECT_EQ(taken, 2U);
+}
+
+TEST(CEventFusionMapBuilder, ARefusalIsSaidThoughMappingFailsToo) {
+  const SyntheticRecording recording(1.2);
+  FullDisk disk(0);
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setDsiSink(&disk);
+  std::size_t failures = 0;
+  for (const auto& observation : observationsOf(recording)) {
+    try {
+      builder.processObservation(observation);
+    } catch (const std::runtime_error&) {
+      ++failures;
+    }
+  }
+  EXPECT_GT(failures, 0U);
+  EXPECT_THROW(builder.processObservation(packetOutsideTheSensor(recording)),
+               std::invalid_argument);
+
+  builder.setDsiSink(nullptr);
+  builder.finish();
+  expectSameBits(builder.points(), mapOf(observationsOf(recording), syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, ATakerThatThrowsDoesNotStopTheMap) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setKeyframeTaker([](const KeyframeDepthMap&) { throw std::runtime_error("no room"); });
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  EXPECT_THROW(builder.finish(), std::runtime_error);
+  builder.setKeyframeTaker(nullptr);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+}
+
+TEST(CEventFusionMapBuilder, EachKeyframeIsHandedOutBeforeTheNextIsMade) {
+  // Poses come last: all keyframes become due at once.
+  std::vector<CObservation::Ptr> poses;
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::size_t taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) {
+    ++taken;
+    EXPECT_EQ(builder.status().counts.keyframes, taken);
+    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), taken) << "the map up to this keyframe";
+  });
+  const auto observations = observationsOf(SyntheticRecording());
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, mrpt::obs::CObservationRobotPose)) {
+      poses.push_back(observation);
+    } else {
+      builder.processObservation(observation);
+    }
+  }
+  for (const auto& pose : poses) builder.processObservation(pose);
+  EXPECT_EQ(taken, 0U);
+  builder.finish();
+
+  EXPECT_EQ(taken, 3U);
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+// --- Threads -----------------------------------------------------------------------------------
+
+TEST(CEventFusionMapBuilder, SeveralThreadsMayFeed) {
+  // Poses before all and a packet of each camera, then a thread per camera.
+  const auto observations = observationsOf(SyntheticRecording(0.9));
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::atomic<std::size_t> taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, mrpt::obs::CObservationRobotPose)) {
+      builder.processObservation(observation);
+    }
+  }
+  std::vector<CObservation::Ptr> packets;
+  std::copy_if(observations.begin(), observations.end(), std::back_inserter(packets),
+               [](const auto& one) { return !IS_CLASS(*one, mrpt::obs::CObservationRobotPose); });
+  for (int i = 0; i < 2; ++i) builder.processObservation(packets[static_cast<std::size_t>(i)]);
+  packets.erase(packets.begin(), packets.begin() + 2);
+  std::vector<std::thread> feeders;
+  for (const std::string camera : {"cam0", "cam1"}) {
+    feeders.emplace_back([&, camera] {
+      for (const auto& packet : packets) {
+        if (packet->sensorLabel != camera) continue;
+        builder.processObservation(packet);
+        builder.getCurrentlyBuiltMapSize();
+      }
+    });
+  }
+  for (std::thread& feeder : feeders) feeder.join();
+  builder.finish();
+
+  EXPECT_EQ(taken, builder.getCurrentlyBuiltMapSize());
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
 }
 
 TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
