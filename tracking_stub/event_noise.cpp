@@ -11,10 +11,9 @@
 namespace efm {
 namespace {
 
-constexpr double kMaxHz = 1e5;
 constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
 
-bool isRate(double hz) { return hz >= 0 && hz <= kMaxHz; }
+bool isRate(double hz) { return hz >= 0 && hz <= EventNoiseOptions::kMaxHz; }
 
 }  // namespace
 

@@ -11,6 +11,8 @@ namespace efm {
 
 /// Events that nothing caused. The default is none.
 struct EventNoiseOptions {
+  static constexpr double kMaxHz = 1e5;
+
   double background_hz =
       0;                 ///< Of every pixel, 0 to 1e5. Real sensors: 0.1 to 10, more in the dark.
   double hot_share = 0;  ///< Of the pixels that are hot, 0 to 1, drawn at random.

@@ -32,10 +32,10 @@ double normal(RandomNumbers& random) {
 }  // namespace
 
 void EventPixelOptions::validate() const {
-  requireOption(threshold_on > 0 && std::isfinite(threshold_on), "threshold_on", threshold_on,
-                "above 0");
-  requireOption(threshold_off > 0 && std::isfinite(threshold_off), "threshold_off", threshold_off,
-                "above 0");
+  requireOption(threshold_on >= kMinThreshold && std::isfinite(threshold_on), "threshold_on",
+                threshold_on, "0.01 or more");
+  requireOption(threshold_off >= kMinThreshold && std::isfinite(threshold_off), "threshold_off",
+                threshold_off, "0.01 or more");
   requireOption(mismatch >= 0 && mismatch <= 0.5, "mismatch", mismatch, "0 to 0.5");
   requireOption(refractory_ns >= 0 && refractory_ns <= kNanosecondsPerSecond, "refractory_ns",
                 refractory_ns, "0 to 1e9");

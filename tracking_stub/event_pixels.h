@@ -17,8 +17,12 @@ struct FrameStep {
 
 /// The default is the ideal pixel.
 struct EventPixelOptions {
-  double threshold_on = 0.3;   ///< Log intensity, above 0: brighter by this fires.
-  double threshold_off = 0.3;  ///< Log intensity, above 0: darker by this fires.
+  /// Of both thresholds. Real sensors have 0.1 or more; events, and the time to make them, grow as
+  /// thresholds shrink.
+  static constexpr double kMinThreshold = 0.01;
+
+  double threshold_on = 0.3;   ///< Log intensity, 0.01 or more: brighter by this fires.
+  double threshold_off = 0.3;  ///< Log intensity, 0.01 or more: darker by this fires.
   /// How thresholds differ from pixel to pixel: the standard deviation of a factor on both, 0 to
   /// 0.5. Real sensors have 0.02 to 0.1. No pixel's factor is below 0.2.
   double mismatch = 0;

@@ -179,7 +179,9 @@ void addSimulate(CLI::App& app, Run& run) {
                   "Length of the recording; the preset's own by default, on a trajectory 5 or what "
                   "is left of it")
       ->type_name("SECONDS");
-  command.add_option("--seed", arguments->seed, "Of everything random")->capture_default_str();
+  command.add_option("--seed", arguments->seed, "Of everything random, a whole number from 0")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   addPixelOptions(command, *arguments);
   command.add_option("--out", arguments->out, "The folder to write; must not exist or be empty")
       ->required()

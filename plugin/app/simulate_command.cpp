@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/simulate_command.h"
 
+#include <cmath>
 #include <cstdio>
 #include <stdexcept>
 #include <vector>
 
+#include "mapping/option_check.h"
 #include "mapping/timestamp.h"
 #include "plugin/app/progress.h"
 #include "plugin/datasets/camchain.h"
@@ -16,6 +18,35 @@
 
 namespace efm {
 namespace {
+
+void requireThreshold(const char* option, const std::optional<double>& threshold) {
+  if (!threshold) return;
+  requireOption(*threshold >= EventPixelOptions::kMinThreshold && std::isfinite(*threshold), option,
+                *threshold, "0.01 or more (log intensity)");
+}
+
+void requireRate(const char* option, double hz) {
+  requireOption(hz >= 0 && hz <= EventNoiseOptions::kMaxHz, option, hz,
+                "0 to 1e5 (events per second and pixel)");
+}
+
+/// What the simulator checks, too, but by the names and in the units of the command line.
+void requireRanges(const SimulateArguments& arguments) {
+  if (arguments.duration_s) {
+    requireOption(*arguments.duration_s >= 0.001 && *arguments.duration_s <= 600, "--duration",
+                  *arguments.duration_s, "0.001 to 600 (seconds)");
+  }
+  requireThreshold("--threshold-on", arguments.threshold_on);
+  requireThreshold("--threshold-off", arguments.threshold_off);
+  requireOption(arguments.mismatch >= 0 && arguments.mismatch <= 0.5, "--mismatch",
+                arguments.mismatch, "0 to 0.5 (a share of the thresholds)");
+  requireOption(arguments.refractory_us >= 0 && arguments.refractory_us <= 1e6, "--refractory-us",
+                arguments.refractory_us, "0 to 1e6 (microseconds)");
+  requireRate("--noise-hz", arguments.noise.background_hz);
+  requireOption(arguments.noise.hot_share >= 0 && arguments.noise.hot_share <= 1, "--hot-pixels",
+                arguments.noise.hot_share, "0 to 1 (a share of the pixels)");
+  requireRate("--hot-hz", arguments.noise.hot_hz);
+}
 
 Simulation makePreset(const SimulateArguments& arguments) {
   SimulationOptions options;
@@ -54,6 +85,7 @@ void setPixels(const SimulateArguments& arguments, Simulation& simulation) {
 }  // namespace
 
 int runSimulate(const SimulateArguments& arguments) {
+  requireRanges(arguments);
   Simulation simulation =
       arguments.preset.empty() ? makeOnTrajectory(arguments) : makePreset(arguments);
   setPixels(arguments, simulation);

@@ -102,6 +102,30 @@ TEST_F(SimulateCommand, ErrorsNameTheFileOrTheOption) {
   EXPECT_FALSE(std::filesystem::exists(folder() / "sim"));
 }
 
+TEST_F(SimulateCommand, AValueOutOfRangeIsAnErrorThatNamesTheOptionAndItsUnit) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"--duration -1", "--duration = -1: must be 0.001 to 600 (seconds)"},
+      {"--threshold-on 1e-3", "--threshold-on = 0.001: must be 0.01 or more (log intensity)"},
+      {"--threshold-off 0", "--threshold-off = 0: must be 0.01 or more (log intensity)"},
+      {"--threshold-off inf", "--threshold-off = inf: must be 0.01 or more (log intensity)"},
+      {"--mismatch 2", "--mismatch = 2: must be 0 to 0.5 (a share of the thresholds)"},
+      {"--refractory-us -1", "--refractory-us = -1: must be 0 to 1e6 (microseconds)"},
+      {"--refractory-us 1e300", "--refractory-us = "},
+      {"--refractory-us nan", "--refractory-us = nan"},
+      {"--noise-hz -1", "--noise-hz = -1: must be 0 to 1e5 (events per second and pixel)"},
+      {"--hot-pixels 2", "--hot-pixels = 2: must be 0 to 1 (a share of the pixels)"},
+      {"--hot-hz 1e6", "--hot-hz = 1000000: must be 0 to 1e5 (events per second and pixel)"},
+      {"--seed -1", "--seed"},
+      {"--seed 1.5", "--seed"}};
+  for (const auto& [option, expected] : cases) {
+    EXPECT_FALSE(run("--preset slider --out sim " + std::string(option))) << option;
+    EXPECT_THAT(errors(), HasSubstr(expected));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder() / "sim"));
+  EXPECT_TRUE(run("--preset slider --duration 0.002 --seed 18446744073709551615 --out sim"))
+      << errors();
+}
+
 TEST_F(SimulateCommand, DrivesTheSharedRigsOnTheSharedTrajectories) {
   const std::filesystem::path shared = EFM_SHARED_DATA;
   if (!std::filesystem::exists(shared / "trajectories")) GTEST_SKIP() << shared << " is not there";
