@@ -134,7 +134,7 @@ void CEventFusionMapBuilder::mapDue() {
 
 std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapNext() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  // Within a taker: whoever called it maps on.
+  // Within a taker or the log: whoever called it maps on.
   if (handing_out_.count(std::this_thread::get_id()) != 0) return std::nullopt;
   mapping_failed_ = true;
   std::optional<KeyframeDepthMap> keyframe = session_->next(sink_);
@@ -142,18 +142,20 @@ std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapN
   if (!keyframe) return std::nullopt;
   keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
   newest_depth_ = keyframe->map.depth;
-  warnOfSilence(*keyframe);
-  return MadeKeyframe{std::move(*keyframe), taker_};
+  std::vector<std::string> warnings = warningsOfSilence(*keyframe);
+  return MadeKeyframe{std::move(*keyframe), taker_, std::move(warnings)};
 }
 
 void CEventFusionMapBuilder::handOut(const MadeKeyframe& made) {
-  if (!made.taker) return;
   const auto self = std::this_thread::get_id();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     handing_out_.insert(self);
   }
-  const std::exception_ptr error = errorOf([&] { made.taker(made.keyframe); });
+  const std::exception_ptr error = errorOf([&] {
+    for (const std::string& warning : made.warnings) MRPT_LOG_WARN(warning);
+    if (made.taker) made.taker(made.keyframe);
+  });
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     handing_out_.erase(self);
@@ -162,12 +164,15 @@ void CEventFusionMapBuilder::handOut(const MadeKeyframe& made) {
 }
 
 /// Once per camera: `status` counts the rest.
-void CEventFusionMapBuilder::warnOfSilence(const KeyframeDepthMap& keyframe) {
+std::vector<std::string> CEventFusionMapBuilder::warningsOfSilence(
+    const KeyframeDepthMap& keyframe) {
+  std::vector<std::string> warnings;
   for (const int camera : keyframe.silent_cameras) {
     if (!silent_cameras_.insert(camera).second) continue;
-    MRPT_LOG_WARN_STREAM("camera " << camera << " had no event for the keyframe at "
-                                   << formatSeconds(keyframe.window.t_ref_ns) << " s");
+    warnings.push_back("camera " + std::to_string(camera) + " had no event for the keyframe at " +
+                       formatSeconds(keyframe.window.t_ref_ns) + " s");
   }
+  return warnings;
 }
 
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {

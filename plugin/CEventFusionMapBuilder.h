@@ -42,7 +42,8 @@ namespace efm {
 /// is covered by then; what only `finish` can know, that nothing more will come, matters for a
 /// window that ends in the recording's last 10 ms, where its packets do not say what they cover.
 ///
-/// Thread-safe: one mutex, held while a keyframe is made but not while it is handed out.
+/// Thread-safe: one mutex, held while a keyframe is made, but neither while it is handed out nor
+/// while something is logged: a callback of the log may use the builder as a taker may.
 /// `processObservation` returns after mapping what became due. Several threads may feed: calls that
 /// overlap have no order, but observations in the order of time make the same map whichever thread
 /// maps them.
@@ -67,7 +68,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void setOptions(const EventFusionOptions& builder_options);
   EventFusionOptions usedOptions() const;
   void setKeyframeTaker(KeyframeTaker taker);
-  /// Receives every fused plane of every keyframe; not owned, may be null.
+  /// Receives every fused plane of every keyframe; not owned, may be null. Called while the mutex
+  /// is held, by the threads of the sweep: it must not use the builder.
   void setDsiSink(DsiSink* sink);
 
   /// Takes events and poses (CObservationRobotPose, CObservationOdometry), the latter of one
@@ -124,14 +126,15 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void saveCurrentEstimationToImage(const std::string& file, bool format_emf_bmp = true) override;
 
  private:
-  /// A keyframe that is in the map, and who receives it.
+  /// A keyframe that is in the map, who receives it, and what the log is to say of it.
   struct MadeKeyframe {
     KeyframeDepthMap keyframe;
     KeyframeTaker taker;
+    std::vector<std::string> warnings;
   };
 
   void restart(const EventFusionOptions& builder_options);
-  void warnOfSilence(const KeyframeDepthMap& keyframe);
+  std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
   /// Feeds the session under the lock, then maps and hands out what became due. The first error
   /// goes to the caller at the end.
   void advance(const std::function<void(MappingSession&)>& feed);
@@ -156,7 +159,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   cv::Mat1f newest_depth_;                 // of the newest keyframe
   std::set<int> silent_cameras_;           // that were warned of
   bool mapping_failed_ = false;            // the last time
-  std::set<std::thread::id> handing_out_;  // within a taker
+  std::set<std::thread::id> handing_out_;  // within a taker or the log
   mutable mrpt::maps::CMultiMetricMap metric_map_;
   mutable CEventFusionMap::Ptr event_map_;  // in metric_map_
 };

@@ -11,6 +11,7 @@
 #include <mrpt/obs/CSensoryFrame.h>
 
 #include <atomic>
+#include <future>
 #include <thread>
 
 #include "test/plugin/observations.h"
@@ -321,6 +322,27 @@ TEST(CEventFusionMapBuilder, SeveralThreadsMayFeed) {
 
   EXPECT_EQ(taken, builder.getCurrentlyBuiltMapSize());
   expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, WhoReadsItsLogMayAskIt) {
+  SyntheticRecording recording;
+  recording.events[1].resize(1);
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.logging_enable_console_output = false;
+  std::size_t warnings = 0;
+  builder.logRegisterCallback([&](std::string_view message, auto&&...) {
+    ++warnings;
+    EXPECT_THAT(std::string(message), testing::HasSubstr("camera 1 had no event"));
+    // The first keyframe saw the one event. Another thread may ask, too, while this one waits.
+    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U);
+    const auto ask = [&] { return builder.status().counts.keyframes; };
+    EXPECT_EQ(std::async(std::launch::async, ask).get(), 2U);
+  });
+  for (const auto& observation : observationsOf(recording)) {
+    builder.processObservation(observation);
+  }
+  builder.finish();
+  EXPECT_EQ(warnings, 1U);
 }
 
 TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
