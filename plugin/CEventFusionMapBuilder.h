@@ -30,9 +30,10 @@ namespace efm {
 /// locates nothing. What goes in by `processObservation` alone decides what comes out: same
 /// observations, same map, bit for bit.
 ///
-/// The rig is complete once a second of events has been seen: nothing is mapped until then, and a
-/// camera that first appears later is an error. Who asks for the map completes the rig after a
-/// tenth of a second, so that a short recording becomes a map without `finish`.
+/// The rig is complete once a packet begins more than a second after the first event: nothing is
+/// mapped until then, and a camera that first appears later is an error. Who asks for the map
+/// completes the rig after a tenth of a second, so that a short recording becomes a map without
+/// `finish`; but not while there is odometry alone, as poses, which are better, may still come.
 ///
 /// Where mapping fails (no memory, a sink that throws), whoever fed the builder gets the error, as
 /// does everyone who feeds it until it succeeds; who asks for the map gets what there is.

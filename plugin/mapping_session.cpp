@@ -13,8 +13,7 @@ namespace {
 
 /// How long after the recording's first event cameras may first appear.
 constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
-/// The same where somebody asks for the map: longer than a packet, so that each camera has sent
-/// one.
+/// The same where somebody asks for the map.
 constexpr std::int64_t kRigCompletesEarlyNs = kNanosecondsPerSecond / 10;
 
 bool sameCalibration(const RigCamera& a, const RigCamera& b) {
@@ -102,8 +101,9 @@ void MappingSession::admit(CameraPacket packet) {
   const auto known = static_cast<int>(mapper_.rig().cameras.size());
   if (packet.camera >= known && rig_complete_) {
     throw std::invalid_argument("camera " + std::to_string(packet.camera) +
-                                " first appears more than a second after the first event: all "
-                                "cameras must be there by then");
+                                " first appears when the rig is complete: all cameras must be "
+                                "there within a second of the first event, and before that where "
+                                "somebody asks for the map");
   }
   if (packet.camera > known) {
     waiting_.push_back(std::move(packet));
@@ -131,7 +131,16 @@ void MappingSession::feed(CameraPacket packet) {
   mapper_.addEvents(packet.camera, packet.events);
   if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
   status_.events = span;
-  if (span && span->last_ns - span->first_ns > kRigCompletesNs) completeRig();
+  if (packet.events.empty()) return;
+  const std::int64_t begin_ns = packet.events.front().t_ns + camera.time_offset_ns;
+  newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
+  if (seenFor(kRigCompletesNs)) completeRig();
+}
+
+/// Whether a packet began so long after the first event: by then every camera has sent one, however
+/// long they are.
+bool MappingSession::seenFor(std::int64_t duration_ns) const {
+  return newest_begin_ns_ && *newest_begin_ns_ - status_.events->first_ns > duration_ns;
 }
 
 /// From now on no camera may come, and those that the options name must be there.
@@ -172,8 +181,8 @@ void MappingSession::insertEarlier(const std::vector<CloudPoint>& points) {
 }
 
 void MappingSession::completeEarly() {
-  const std::optional<TimeSpan>& span = status_.events;
-  if (!waiting_.empty() || !span || span->last_ns - span->first_ns < kRigCompletesEarlyNs) return;
+  // Neither a camera nor a better source of poses is shut out that may still come.
+  if (!waiting_.empty() || !pose_choice_.chosen() || !seenFor(kRigCompletesEarlyNs)) return;
   completeRig();
 }
 

@@ -54,9 +54,11 @@ class MappingSession {
   /// file that they name and that cannot be read.
   explicit MappingSession(const EventFusionOptions& options);
 
+  /// The rig is complete once a packet begins more than a second after the recording's first event,
+  /// however long packets are.
   /// @throws std::invalid_argument where the packet contradicts its sensor or those before it, or
-  /// its camera first appears more than a second after the recording's first event: the rig is
-  /// complete by then; or where the options name a camera that the rig does not have.
+  /// its camera first appears when the rig is complete; or where the options name a camera that the
+  /// rig does not have.
   void addEvents(CameraPacket packet);
   /// Poses of one source are used, see PoseChoice; a better one is waited for until the rig is
   /// complete.
@@ -65,8 +67,10 @@ class MappingSession {
   /// Puts a keyframe of an earlier map into the cloud, before those to come.
   /// @throws std::invalid_argument as GlobalCloud::insert does.
   void insertEarlier(const std::vector<CloudPoint>& points);
-  /// Somebody asks for the map: takes the rig to be complete where a tenth of a second of events
-  /// has been seen, so that a short recording need not be finished to be mapped.
+  /// Somebody asks for the map: takes the rig to be complete where a packet began more than a tenth
+  /// of a second after the first event and the source of poses is chosen, so that a short recording
+  /// need not be finished to be mapped. Changes no keyframe; a camera that first appears later is
+  /// an error already.
   /// @throws std::invalid_argument where the options name a camera that the rig does not have.
   void completeEarly();
   /// No more will come.
@@ -94,6 +98,7 @@ class MappingSession {
   void refit(CameraPacket& packet) const;
   void admit(CameraPacket packet);
   void feed(CameraPacket packet);
+  bool seenFor(std::int64_t duration_ns) const;
   void completeRig();
   void take(const std::vector<StampedPose>& poses);
 
@@ -104,7 +109,8 @@ class MappingSession {
   GlobalCloud cloud_;
   PoseChoice pose_choice_;
   bool rig_complete_ = false;
-  std::vector<CameraPacket> waiting_;  // for a camera of a lower index to appear
+  std::vector<CameraPacket> waiting_;            // for a camera of a lower index to appear
+  std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
   std::optional<StampedPose> newest_pose_;
   SessionStatus status_;  // counts: see status()
 };

@@ -6,6 +6,7 @@
 #include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationPointCloud.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CSensoryFrame.h>
@@ -388,6 +389,70 @@ TEST(CEventFusionMapBuilder, AskedAfterEachObservationMakesTheSameMap) {
     builder.getCurrentlyBuiltMapSize();
   }
   expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+/// A drifting odometry from the beginning, and poses that begin 0.3 s later.
+std::vector<CObservation::Ptr> odometryThenPoses() {
+  std::vector<CObservation::Ptr> observations;
+  for (const auto& observation : observationsOf(SyntheticRecording(0.9))) {
+    const auto pose = std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation);
+    if (pose) {
+      auto odometry = mrpt::obs::CObservationOdometry::Create();
+      odometry->timestamp = pose->timestamp;
+      odometry->odometry = mrpt::poses::CPose2D(1.5 * pose->pose.mean.x(), 0, 0);
+      observations.push_back(odometry);
+      if (nanosecondsFrom(pose->timestamp) < SyntheticRecording::kStartNs + 300'000'000) continue;
+    }
+    observations.push_back(observation);
+  }
+  return observations;
+}
+
+TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotChooseTheSourceOfPoses) {
+  const auto observations = odometryThenPoses();
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) {
+    builder.processObservation(observation);
+    builder.getCurrentlyBuiltMapSize();
+  }
+  builder.finish();
+  EXPECT_EQ(builder.status().pose_source->kind, PoseKind::kPose);
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotRefuseTheSecondOfTwoLongPackets) {
+  // 200 ms of each camera, then the poses in them.
+  std::vector<CObservation::Ptr> observations;
+  std::vector<CObservation::Ptr> poses;
+  std::vector<CObservationEvents::Ptr> packets(2);
+  const SyntheticRecording recording(0.6);
+  const auto flush = [&] {
+    for (auto& packet : packets) observations.push_back(std::exchange(packet, nullptr));
+    observations.insert(observations.end(), poses.begin(), poses.end());
+    poses.clear();
+  };
+  for (const auto& observation : observationsOf(recording)) {
+    const auto part = std::dynamic_pointer_cast<CObservationEvents>(observation);
+    if (!part) {
+      poses.push_back(observation);
+      if (poses.size() == 20) flush();
+      continue;
+    }
+    auto& packet = packets[static_cast<std::size_t>(part->camera_index)];
+    if (!packet) packet = packetObservation(recording, part->camera_index);
+    packet->covered_until_ns = part->covered_until_ns;
+    packet->events.insert(packet->events.end(), part->events.begin(), part->events.end());
+  }
+  flush();
+  ASSERT_LT(observations.size(), 80U);
+
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) {
+    builder.processObservation(observation);
+    builder.getCurrentlyBuiltMapSize();
+  }
+  builder.finish();
+  expectSameBits(builder.points(), mapOf(observationsOf(recording), syntheticOptions()));
 }
 
 TEST(CEventFusionMapBuilder, AskedForAMapOfACameraThatIsNotThereSaysSo) {

@@ -185,6 +185,29 @@ TEST(MappingSession, ACameraThatAppearsAfterTheFirstSecondIsAnError) {
   EXPECT_THROW(session.addEvents(packetOf(recording, 1)), std::invalid_argument);
 }
 
+TEST(MappingSession, PacketsMayBeLongerThanASecond) {
+  const SyntheticRecording recording(1.5);
+  MappingSession expected(syntheticOptions());
+  for (const StampedPose& pose : recording.poses) expected.addPose(pose);
+  for (int i = 0; i < 15; ++i) {
+    for (const int camera : {0, 1}) {
+      expected.addEvents(pieceOf(recording, camera, 0.1 * i, 0.1 * (i + 1)));
+    }
+  }
+  expected.finish();
+  mapDue(expected);
+
+  MappingSession session(syntheticOptions());
+  mapAll(session, recording);
+
+  EXPECT_EQ(session.cloud().keyframes(), expected.cloud().keyframes());
+  const auto points = session.cloud().points();
+  ASSERT_EQ(points.size(), expected.cloud().points().size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(points[i].p_world, expected.cloud().points()[i].p_world);
+  }
+}
+
 TEST(MappingSession, ACalibrationThatChangesIsAnError) {
   const SyntheticRecording recording;
   MappingSession session(syntheticOptions());
