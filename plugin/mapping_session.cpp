@@ -2,6 +2,8 @@
 #include "plugin/mapping_session.h"
 
 #include <algorithm>
+#include <exception>
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -67,17 +69,13 @@ void MappingSession::addEvents(CameraPacket packet) {
     throw std::invalid_argument("camera " + std::to_string(packet.camera) + ": must be 0 or above");
   }
   refit(packet);
-  admit(std::move(packet));
-
-  // The next camera in line may be among those that wait for this one.
-  const auto is_next = [this](const CameraPacket& waiting) {
-    return waiting.camera <= static_cast<int>(mapper_.rig().cameras.size());
-  };
-  for (auto next = std::find_if(waiting_.begin(), waiting_.end(), is_next); next != waiting_.end();
-       next = std::find_if(waiting_.begin(), waiting_.end(), is_next)) {
-    CameraPacket freed = std::move(*next);
-    waiting_.erase(next);
-    admit(std::move(freed));
+  const int known = numCameras();
+  if (packet.camera > known) {
+    letWait(std::move(packet));
+  } else if (packet.camera == known) {
+    addCameras(std::move(packet));
+  } else {
+    feed(std::move(packet));
   }
 }
 
@@ -96,24 +94,60 @@ void MappingSession::refit(CameraPacket& packet) const {
   calibration.time_offset_ns = offsets_ns[camera];
 }
 
-/// Feeds a packet whose camera is in the rig or comes next; lets the others wait.
-void MappingSession::admit(CameraPacket packet) {
-  const auto known = static_cast<int>(mapper_.rig().cameras.size());
-  if (packet.camera >= known && rig_complete_) {
-    throw std::invalid_argument("camera " + std::to_string(packet.camera) +
-                                " first appears when the rig is complete: all cameras must be "
-                                "there within a second of the first event, and before that where "
-                                "somebody asks for the map");
+int MappingSession::numCameras() const { return static_cast<int>(mapper_.rig().cameras.size()); }
+
+void MappingSession::refuseOnceComplete(int camera) const {
+  if (!rig_complete_) return;
+  throw std::invalid_argument("camera " + std::to_string(camera) +
+                              " first appears when the rig is complete: all cameras must be there "
+                              "within a second of the first event, and before that where somebody "
+                              "asks for the map");
+}
+
+void MappingSession::refuseWithoutNext(int camera) const {
+  throw std::invalid_argument("the recording has events of camera " + std::to_string(camera) +
+                              " but none of camera " + std::to_string(numCameras()));
+}
+
+/// For the cameras before it to appear, as long as they may.
+void MappingSession::letWait(CameraPacket packet) {
+  const int camera = packet.camera;
+  if (rig_complete_ && waiting_.count(camera) != 0) refuseWithoutNext(camera);
+  refuseOnceComplete(camera);
+  packet.calibration.model.validate();
+  if (!packet.events.empty()) {
+    const std::int64_t begin_ns = packet.events.front().t_ns + packet.calibration.time_offset_ns;
+    if (!waiting_since_ns_) waiting_since_ns_ = begin_ns;
+    if (begin_ns - *waiting_since_ns_ > kRigCompletesNs) refuseWithoutNext(camera);
   }
-  if (packet.camera > known) {
-    waiting_.push_back(std::move(packet));
-    return;
+  waiting_[camera].push_back(std::move(packet));
+}
+
+/// Adds the camera that comes next, and those after it that wait for it alone, before any of their
+/// packets is fed: these may complete the rig. A packet that is refused takes no other with it.
+void MappingSession::addCameras(CameraPacket first) {
+  refuseOnceComplete(first.camera);
+  std::vector<CameraPacket> packets;
+  packets.push_back(std::move(first));
+  addCamera(packets.front().calibration);
+  for (auto next = waiting_.extract(numCameras()); next; next = waiting_.extract(numCameras())) {
+    addCamera(next.mapped().front().calibration);
+    std::move(next.mapped().begin(), next.mapped().end(), std::back_inserter(packets));
   }
-  if (packet.camera == known) {
-    mapper_.addCamera(packet.calibration);
-    status_.silent_keyframes.push_back(0);
+  std::exception_ptr refusal;
+  for (CameraPacket& packet : packets) {
+    try {
+      feed(std::move(packet));
+    } catch (const std::invalid_argument&) {
+      if (!refusal) refusal = std::current_exception();
+    }
   }
-  feed(std::move(packet));
+  if (refusal) std::rethrow_exception(refusal);
+}
+
+void MappingSession::addCamera(const RigCamera& camera) {
+  mapper_.addCamera(camera);
+  status_.silent_keyframes.push_back(0);
 }
 
 void MappingSession::feed(CameraPacket packet) {
@@ -146,7 +180,7 @@ bool MappingSession::seenFor(std::int64_t duration_ns) const {
 /// From now on no camera may come, and those that the options name must be there.
 void MappingSession::completeRig() {
   if (rig_complete_) return;
-  const auto count = static_cast<int>(mapper_.rig().cameras.size());
+  const int count = numCameras();
   const std::string expected = "a camera of the recording: 0 to " + std::to_string(count - 1);
   for (const int camera : options_.mapper.cameras) {
     requireOption(camera < count, "[rig] cameras", camera, expected);
@@ -190,11 +224,7 @@ void MappingSession::finish() {
   take(pose_choice_.settle());
   mapper_.finish();
   completeRig();
-  if (!waiting_.empty()) {
-    throw std::invalid_argument("the recording has events of camera " +
-                                std::to_string(waiting_.front().camera) + " but none of camera " +
-                                std::to_string(mapper_.rig().cameras.size()));
-  }
+  if (!waiting_.empty()) refuseWithoutNext(waiting_.begin()->first);
 }
 
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {

@@ -57,8 +57,8 @@ class MappingSession {
   /// The rig is complete once a packet begins more than a second after the recording's first event,
   /// however long packets are.
   /// @throws std::invalid_argument where the packet contradicts its sensor or those before it, or
-  /// its camera first appears when the rig is complete; or where the options name a camera that the
-  /// rig does not have.
+  /// its camera first appears when the rig is complete, or waits for one of a lower index for more
+  /// than a second of events; or where the options name a camera that the rig does not have.
   void addEvents(CameraPacket packet);
   /// Poses of one source are used, see PoseChoice; a better one is waited for until the rig is
   /// complete.
@@ -96,7 +96,12 @@ class MappingSession {
 
  private:
   void refit(CameraPacket& packet) const;
-  void admit(CameraPacket packet);
+  int numCameras() const;
+  void refuseOnceComplete(int camera) const;
+  [[noreturn]] void refuseWithoutNext(int camera) const;
+  void letWait(CameraPacket packet);
+  void addCameras(CameraPacket first);
+  void addCamera(const RigCamera& camera);
   void feed(CameraPacket packet);
   bool seenFor(std::int64_t duration_ns) const;
   void completeRig();
@@ -109,7 +114,9 @@ class MappingSession {
   GlobalCloud cloud_;
   PoseChoice pose_choice_;
   bool rig_complete_ = false;
-  std::vector<CameraPacket> waiting_;            // for a camera of a lower index to appear
+  // Per camera, for those of a lower index to appear; since their first event.
+  std::map<int, std::vector<CameraPacket>> waiting_;
+  std::optional<std::int64_t> waiting_since_ns_;
   std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
   std::optional<StampedPose> newest_pose_;
   SessionStatus status_;  // counts: see status()

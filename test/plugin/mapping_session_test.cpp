@@ -163,6 +163,16 @@ TEST(MappingSession, ACameraWithoutThoseBeforeItIsAnError) {
   EXPECT_FALSE(session.next());
 }
 
+/// What adding a packet is refused with.
+std::string refusalOf(MappingSession& session, CameraPacket packet) {
+  try {
+    session.addEvents(std::move(packet));
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
 /// The events of one camera in [begin, end), seconds since the recording's start.
 CameraPacket pieceOf(const SyntheticRecording& recording, int camera, double begin_s,
                      double end_s) {
@@ -174,6 +184,67 @@ CameraPacket pieceOf(const SyntheticRecording& recording, int camera, double beg
   };
   events.erase(std::remove_if(events.begin(), events.end(), outside), events.end());
   return packet;
+}
+
+TEST(MappingSession, ACameraThatWaitsForOneThatNeverComesIsAnErrorAfterASecond) {
+  const SyntheticRecording recording(1.5, 3);
+  for (const bool zero_is_there : {false, true}) {
+    MappingSession session(syntheticOptions());
+    std::size_t refused = 0;
+    for (int i = 0; i < 150; ++i) {
+      if (zero_is_there) session.addEvents(pieceOf(recording, 0, 0.01 * i, 0.01 * (i + 1)));
+      CameraPacket packet = pieceOf(recording, 2, 0.01 * i, 0.01 * (i + 1));
+      if (packet.events.empty()) continue;
+      const std::string refusal = refusalOf(session, std::move(packet));
+      if (refusal == "no error") continue;
+      EXPECT_GE(i, 100);
+      ++refused;
+      EXPECT_THAT(refusal,
+                  HasSubstr(zero_is_there ? "has events of camera 2 but none of camera 1"
+                                          : "has events of camera 2 but none of camera 0"));
+    }
+    EXPECT_GT(refused, 40U);
+    EXPECT_THROW(session.finish(), std::invalid_argument);
+  }
+}
+
+TEST(MappingSession, CamerasThatComeInAnyOrderMakeTheSameMap) {
+  const SyntheticRecording recording(0.5, 3);
+  MappingSession expected(syntheticOptions());
+  mapAll(expected, recording);
+
+  MappingSession session(syntheticOptions());
+  for (const StampedPose& pose : recording.poses) session.addPose(pose);
+  for (int i = 0; i < 50; ++i) {
+    for (const int camera : {2, 1}) {
+      session.addEvents(pieceOf(recording, camera, 0.01 * i, 0.01 * (i + 1)));
+    }
+  }
+  EXPECT_FALSE(session.status().events);
+  session.addEvents(packetOf(recording, 0));
+  EXPECT_EQ(session.status().counts.cameras.size(), 3U);
+  session.finish();
+  mapDue(session);
+
+  const auto points = session.cloud().points();
+  ASSERT_EQ(points.size(), expected.cloud().points().size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(points[i].p_world, expected.cloud().points()[i].p_world);
+  }
+}
+
+TEST(MappingSession, APacketThatWaitedAndIsRefusedTakesNoOtherWithIt) {
+  const SyntheticRecording recording;
+  MappingSession session(syntheticOptions());
+  CameraPacket outside = pieceOf(recording, 1, 0, 0.1);
+  outside.events.back().x = 120;
+  session.addEvents(outside);
+  session.addEvents(pieceOf(recording, 1, 0.1, 0.5));
+  EXPECT_THAT(refusalOf(session, packetOf(recording, 0)), HasSubstr("pixel (120"));
+  EXPECT_EQ(session.status().counts.cameras.at(0).read, recording.events[0].size());
+  EXPECT_EQ(session.status().counts.cameras.at(1).read,
+            pieceOf(recording, 1, 0.1, 0.5).events.size());
+  EXPECT_NO_THROW(session.finish());
 }
 
 TEST(MappingSession, ACameraThatAppearsAfterTheFirstSecondIsAnError) {
