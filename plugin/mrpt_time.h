@@ -4,6 +4,9 @@
 #include <mrpt/core/Clock.h>
 
 #include <cstdint>
+#include <limits>
+#include <optional>
+#include <stdexcept>
 
 namespace efm {
 
@@ -20,9 +23,22 @@ inline mrpt::Clock::time_point mrptTimeFrom(std::int64_t t_ns) {
   return mrpt::Clock::time_point(mrpt::Clock::duration(ticks + kMrptTicksAtUnixEpoch));
 }
 
-/// Exact.
+/// Exact. @return nothing where there is no time (INVALID_TIMESTAMP, 0 ticks), or one that
+/// nanoseconds do not reach: before 1677 or after 2262.
+inline std::optional<std::int64_t> nanosecondsIfKnown(const mrpt::Clock::time_point& time) {
+  constexpr std::int64_t kMaxTicks = std::numeric_limits<std::int64_t>::max() / kMrptTickNs;
+  const std::int64_t ticks = time.time_since_epoch().count();
+  if (ticks < kMrptTicksAtUnixEpoch - kMaxTicks || ticks > kMrptTicksAtUnixEpoch + kMaxTicks) {
+    return std::nullopt;
+  }
+  return (ticks - kMrptTicksAtUnixEpoch) * kMrptTickNs;
+}
+
+/// Exact. @throws std::invalid_argument where `nanosecondsIfKnown` gives nothing.
 inline std::int64_t nanosecondsFrom(const mrpt::Clock::time_point& time) {
-  return (time.time_since_epoch().count() - kMrptTicksAtUnixEpoch) * kMrptTickNs;
+  const std::optional<std::int64_t> t_ns = nanosecondsIfKnown(time);
+  if (!t_ns) throw std::invalid_argument("a time stamp is missing or not between 1678 and 2261");
+  return *t_ns;
 }
 
 }  // namespace efm

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "mapping/fusion_mapper.h"
-#include "plugin/CObservationEvents.h"
 #include "plugin/mrpt_time.h"
 #include "plugin/pose_observation.h"
 
@@ -15,15 +14,29 @@ namespace {
 
 using mrpt::obs::CObservation;
 
+constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
+
+/// Where a packet begins: the earliest of what it says. Its own time may be missing, or that of its
+/// making, which MRPT gives where nobody says another.
+/// @return nothing where it has neither an event nor news.
+std::optional<std::int64_t> beginOf(const CObservationEvents& packet) {
+  if (packet.events.empty() && !packet.covered_until_ns) return std::nullopt;
+  std::int64_t begin_ns = packet.covered_until_ns.value_or(kEver);
+  if (!packet.events.empty()) begin_ns = std::min(begin_ns, packet.events.front().t_ns);
+  return std::min(begin_ns, nanosecondsIfKnown(packet.timestamp).value_or(kEver));
+}
+
 /// @return whether something is left: an event, or the news that there was none.
-bool cutEvents(CObservationEvents& packet, std::int64_t t0_ns, std::int64_t t1_ns) {
+bool cutEvents(CObservationEvents& packet, std::int64_t begin_ns, std::int64_t t0_ns,
+               std::int64_t t1_ns) {
   auto& events = packet.events;
   const auto outside = [&](const Event& event) {
     return event.t_ns < t0_ns || event.t_ns >= t1_ns;
   };
   events.erase(std::remove_if(events.begin(), events.end(), outside), events.end());
-  const std::int64_t begin_ns = nanosecondsFrom(packet.timestamp);
-  if (begin_ns < t0_ns) packet.timestamp = mrptTimeFrom(events.empty() ? t0_ns : events[0].t_ns);
+  if (nanosecondsIfKnown(packet.timestamp).value_or(kEver) < t0_ns) {
+    packet.timestamp = mrptTimeFrom(events.empty() ? t0_ns : events[0].t_ns);
+  }
   if (!packet.covered_until_ns) return !events.empty();
   const bool covers = *packet.covered_until_ns > t0_ns && begin_ns < t1_ns;
   packet.covered_until_ns = std::min(*packet.covered_until_ns, t1_ns);
@@ -36,7 +49,7 @@ TimeCut::TimeCut(std::unique_ptr<Recording> recording, std::optional<std::int64_
                  std::optional<std::int64_t> t1_ns)
     : recording_(std::move(recording)),
       t0_ns_(t0_ns.value_or(std::numeric_limits<std::int64_t>::min())),
-      t1_ns_(t1_ns.value_or(std::numeric_limits<std::int64_t>::max())) {
+      t1_ns_(t1_ns.value_or(kEver)) {
   TimeLimits{t0_ns, t1_ns}.validate();
 }
 
@@ -58,11 +71,12 @@ bool TimeCut::readOne() {
     give(nullptr);
     return something_left;
   }
-  const std::int64_t t_ns = nanosecondsFrom(observation->timestamp);
-  if (const auto source = poseSourceOf(*observation)) {
-    takePose(observation, poses_[*source], t_ns);
+  if (const auto pose = poseIn(*observation)) {
+    takePose(observation, poses_[*poseSourceOf(*observation)], pose->t_ns);
+  } else if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
+    takePacket(packet);
   } else {
-    takeOther(observation, t_ns);
+    takeOther(observation);
   }
   return true;
 }
@@ -80,18 +94,21 @@ void TimeCut::takePose(const CObservation::Ptr& pose, PoseTrack& track, std::int
   }
 }
 
-void TimeCut::takeOther(const CObservation::Ptr& observation, std::int64_t t_ns) {
-  if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
-    if (t_ns >= t1_ns_) events_ended_ = true;
-    if (!cutEvents(*packet, t0_ns_, t1_ns_)) return;
-    if (t_ns < t0_ns_) {
-      across_.push_back(packet);
-    } else {
-      give(packet);
-    }
-  } else if (t_ns >= t0_ns_ && t_ns < t1_ns_) {
-    give(observation);
+void TimeCut::takePacket(const CObservationEvents::Ptr& packet) {
+  const std::optional<std::int64_t> begin_ns = beginOf(*packet);
+  if (!begin_ns) return;
+  if (*begin_ns >= t1_ns_) events_ended_ = true;
+  if (!cutEvents(*packet, *begin_ns, t0_ns_, t1_ns_)) return;
+  if (*begin_ns < t0_ns_) {
+    across_.push_back(packet);
+  } else {
+    give(packet);
   }
+}
+
+void TimeCut::takeOther(const CObservation::Ptr& observation) {
+  const std::optional<std::int64_t> t_ns = nanosecondsIfKnown(observation->timestamp);
+  if (!t_ns || (*t_ns >= t0_ns_ && *t_ns < t1_ns_)) give(observation);
 }
 
 /// What lies across t0 goes before everything from t0 on, and the pose before it goes first.

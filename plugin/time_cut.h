@@ -8,13 +8,15 @@
 #include <optional>
 #include <vector>
 
+#include "plugin/CObservationEvents.h"
 #include "plugin/pose_choice.h"
 #include "plugin/recording.h"
 
 namespace efm {
 
 /// A stretch of a recording, [t0, t1): the events in it, and the poses in it with the nearest one
-/// of each source before and after, so that every event has a pose on both sides that had.
+/// of each source before and after, so that every event has a pose on both sides that had. Packets
+/// without a time go by their events', other observations without one pass.
 class TimeCut : public Recording {
  public:
   /// @param t0_ns, t1_ns no limit where not given.
@@ -22,6 +24,7 @@ class TimeCut : public Recording {
   TimeCut(std::unique_ptr<Recording> recording, std::optional<std::int64_t> t0_ns,
           std::optional<std::int64_t> t1_ns);
 
+  /// @throws std::invalid_argument where a pose has no time.
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return recording_->place(); }
   double progress() const override { return recording_->progress(); }
@@ -36,7 +39,8 @@ class TimeCut : public Recording {
   bool readOne();
   bool posesEnded() const;
   void takePose(const mrpt::obs::CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns);
-  void takeOther(const mrpt::obs::CObservation::Ptr& observation, std::int64_t t_ns);
+  void takePacket(const CObservationEvents::Ptr& packet);
+  void takeOther(const mrpt::obs::CObservation::Ptr& observation);
   void give(const mrpt::obs::CObservation::Ptr& observation);
 
   std::unique_ptr<Recording> recording_;

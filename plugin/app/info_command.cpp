@@ -13,7 +13,6 @@
 #include "mapping/timestamp.h"
 #include "plugin/CObservationEvents.h"
 #include "plugin/app/progress.h"
-#include "plugin/mrpt_time.h"
 #include "plugin/pose_observation.h"
 #include "plugin/recording.h"
 #include "plugin/time_cut.h"
@@ -71,7 +70,7 @@ class Contents {
     if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
       addPacket(*packet);
     } else if (const auto source = poseSourceOf(observation)) {
-      const std::int64_t t_ns = nanosecondsFrom(observation.timestamp);
+      const std::int64_t t_ns = poseIn(observation)->t_ns;
       pose_sources[*source].add(t_ns);
       addPose(t_ns);
     } else {

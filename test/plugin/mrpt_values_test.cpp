@@ -7,8 +7,11 @@
 #include <mrpt/system/datetime.h>
 #include <rapidcheck/gtest.h>
 
+#include <chrono>
 #include <cmath>
+#include <limits>
 #include <random>
+#include <stdexcept>
 
 #include "plugin/mrpt_pose.h"
 #include "plugin/mrpt_time.h"
@@ -39,6 +42,17 @@ RC_GTEST_PROP(MrptTime, IsExactForWholeTicksAndAtMostHalfATickAwayOtherwise, ())
   RC_ASSERT(std::abs(back_ns - t_ns) <= kMrptTickNs / 2);
   RC_ASSERT(mrptTimeFrom(back_ns) == mrptTimeFrom(t_ns));
   RC_ASSERT(nanosecondsFrom(mrptTimeFrom(back_ns)) == back_ns);
+}
+
+TEST(MrptTime, OneThatIsMissingOrBeyondTheRangeIsAnError) {
+  EXPECT_THROW(nanosecondsFrom(INVALID_TIMESTAMP), std::invalid_argument);
+  const auto now = mrptTimeFrom(1'700'000'000'000'000'000);
+  const std::chrono::hours three_hundred_years(300 * 365 * 24);
+  EXPECT_THROW(nanosecondsFrom(now + three_hundred_years), std::invalid_argument);
+  for (const std::int64_t limit_ns :
+       {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max()}) {
+    EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(limit_ns)), limit_ns / 100 * 100);
+  }
 }
 
 // --- mrpt_pose.h -------------------------------------------------------------------------------

@@ -3,9 +3,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <mrpt/obs/CObservationComment.h>
 
 #include <fstream>
 
+#include "plugin/pose_observation.h"
 #include "plugin/time_cut.h"
 #include "test/plugin/observations.h"
 #include "test/plugin/temporary_folder.h"
@@ -69,6 +71,7 @@ class Playback : public Recording {
   }
   std::string place() const override { return "here"; }
   double progress() const override { return 0; }
+  std::size_t given() const { return next_; }
 
  private:
   std::vector<CObservation::Ptr> observations_;
@@ -93,9 +96,10 @@ CObservation::Ptr packet(int camera, std::int64_t begin_ns, std::int64_t covered
 
 /// "pose 100", "cam0 200 (210 250) 300": begin, events, until where it is covered.
 std::string describe(const CObservation& observation) {
-  const std::string begin = std::to_string(nanosecondsFrom(observation.timestamp));
+  const bool timed = observation.timestamp != INVALID_TIMESTAMP;
+  const std::string begin = timed ? std::to_string(nanosecondsFrom(observation.timestamp)) : "?";
   const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
-  if (!events) return "pose " + begin;
+  if (!events) return (poseSourceOf(observation) ? "pose " : "other ") + begin;
   std::string text = "cam" + std::to_string(events->camera_index) + " " + begin + " (";
   for (const Event& event : events->events) {
     text += (text.back() == '(' ? "" : " ") + std::to_string(event.t_ns);
@@ -144,6 +148,44 @@ TEST(TimeCut, KeepsTheNewsThatACameraIsSilent) {
 }
 
 TEST(TimeCut, OfNothingIsEmpty) { EXPECT_THAT(cut(threePackets(), 10'000, 20'000), ElementsAre()); }
+
+/// Three packets of which none says when it begins, but all this.
+std::vector<CObservation::Ptr> threePacketsAt(const mrpt::Clock::time_point& time) {
+  std::vector<CObservation::Ptr> observations = threePackets();
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, CObservationEvents)) observation->timestamp = time;
+  }
+  return observations;
+}
+
+TEST(TimeCut, GoesByTheTimesOfEventsWhereAPacketHasNone) {
+  EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 1100, 2100),
+              ElementsAre("pose 600", "cam0 ? (1100 2000) 2100", "pose 1600", "pose 2600"));
+  EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 2500, std::nullopt),
+              ElementsAre("pose 1600", "cam0 ? (3000) 9900", "pose 2600", "pose 3600"));
+  // MRPT gives an observation the time at which it was made where nobody says another.
+  const auto now = mrptTimeFrom(1'700'000'000'000'000'000);
+  EXPECT_EQ(cut(threePacketsAt(now), 100, 3000).size(), 8U);
+}
+
+TEST(TimeCut, LetsOtherObservationsWithoutATimePass) {
+  auto comment = mrpt::obs::CObservationComment::Create();
+  comment->timestamp = INVALID_TIMESTAMP;
+  EXPECT_THAT(cut({pose(100), comment, packet(0, 100, 1100, {100}), pose(1600)}, 100, 1100),
+              ElementsAre("pose 100", "other ?", "cam0 100 (100) 1100", "pose 1600"));
+}
+
+TEST(TimeCut, APoseWithoutATimeIsAnErrorThatNamesItsSource) {
+  const CObservation::Ptr timeless = pose(0);
+  timeless->timestamp = INVALID_TIMESTAMP;
+  timeless->sensorLabel = "tracker";
+  try {
+    cut({timeless}, 100, 1100);
+    FAIL() << "no error";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("'tracker' has no time stamp"));
+  }
+}
 
 TEST(TimeCut, MustEndAfterItBegins) {
   EXPECT_THROW(cut(threePackets(), 1000, 1000), std::invalid_argument);
