@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mapping/fusion_mapper.h"
+#include "mapping/timestamp.h"
 #include "plugin/mrpt_time.h"
 #include "plugin/pose_observation.h"
 
@@ -15,6 +16,8 @@ namespace {
 using mrpt::obs::CObservation;
 
 constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
+/// How long after another camera's packets one may first come, or come on.
+constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
 
 /// Where a packet begins: the earliest of what it says. Its own time may be missing, or that of its
 /// making, which MRPT gives where nobody says another.
@@ -94,12 +97,25 @@ void TimeCut::takePose(const CObservation::Ptr& pose, PoseTrack& track, std::int
   }
 }
 
+/// Events end when every camera has passed t1, and all have had the time to appear; at the latest
+/// when one is far beyond it: then the others are silent.
+void TimeCut::noteProgress(int camera, std::int64_t begin_ns, std::int64_t covered_until_ns) {
+  bool& passed = passed_t1_[camera];
+  passed = passed || begin_ns >= t1_ns_ || covered_until_ns >= t1_ns_;
+  first_begin_ns_ = std::min(first_begin_ns_, begin_ns);
+  const bool all_passed = std::all_of(passed_t1_.begin(), passed_t1_.end(),
+                                      [](const auto& entry) { return entry.second; });
+  const bool all_there = begin_ns - kMaxCameraLagNs >= first_begin_ns_;
+  const bool far_beyond = begin_ns - kMaxCameraLagNs >= t1_ns_;
+  if ((all_passed && all_there) || far_beyond) events_ended_ = true;
+}
+
 void TimeCut::takePacket(const CObservationEvents::Ptr& packet) {
   const std::optional<std::int64_t> begin_ns = beginOf(*packet);
   if (!begin_ns) return;
-  if (*begin_ns >= t1_ns_) events_ended_ = true;
+  noteProgress(packet->camera_index, *begin_ns, packet->covered_until_ns.value_or(*begin_ns));
   if (!cutEvents(*packet, *begin_ns, t0_ns_, t1_ns_)) return;
-  if (*begin_ns < t0_ns_) {
+  if (*begin_ns < t0_ns_ && !began_) {
     across_.push_back(packet);
   } else {
     give(packet);

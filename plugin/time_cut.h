@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -16,7 +17,8 @@ namespace efm {
 
 /// A stretch of a recording, [t0, t1): the events in it, and the poses in it with the nearest one
 /// of each source before and after, so that every event has a pose on both sides that had. Packets
-/// without a time go by their events', other observations without one pass.
+/// without a time go by their events', other observations without one pass. Reads on until each
+/// camera has passed t1, whose packets may come when they end, but no more than a second.
 class TimeCut : public Recording {
  public:
   /// @param t0_ns, t1_ns no limit where not given.
@@ -39,6 +41,7 @@ class TimeCut : public Recording {
   bool readOne();
   bool posesEnded() const;
   void takePose(const mrpt::obs::CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns);
+  void noteProgress(int camera, std::int64_t begin_ns, std::int64_t covered_until_ns);
   void takePacket(const CObservationEvents::Ptr& packet);
   void takeOther(const mrpt::obs::CObservation::Ptr& observation);
   void give(const mrpt::obs::CObservation::Ptr& observation);
@@ -50,6 +53,8 @@ class TimeCut : public Recording {
   std::map<PoseSource, PoseTrack> poses_;
   std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until it is given
   std::deque<mrpt::obs::CObservation::Ptr> ready_;
+  std::map<int, bool> passed_t1_;                                           // per camera
+  std::int64_t first_begin_ns_ = std::numeric_limits<std::int64_t>::max();  // of packets
   bool events_ended_ = false;
 };
 

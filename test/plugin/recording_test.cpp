@@ -187,6 +187,40 @@ TEST(TimeCut, APoseWithoutATimeIsAnErrorThatNamesItsSource) {
   }
 }
 
+TEST(TimeCut, EndsOnceEachCameraHasPassedT1) {
+  // Camera 1's packets are longer, and come when they end.
+  EXPECT_THAT(cut({pose(0), packet(0, 100, 200, {100}), packet(0, 200, 300, {200}),
+                   packet(1, 100, 300, {150, 200, 250}), packet(0, 300, 400, {300}),
+                   packet(0, 400, 500, {400}), pose(500), packet(1, 300, 500, {310, 390}),
+                   packet(0, 500, 600, {500}), pose(700)},
+                  200, 350),
+              ElementsAre("pose 0", "cam0 200 (200) 300", "cam1 200 (200 250) 300",
+                          "cam0 300 (300) 350", "pose 500", "cam1 300 (310) 350"));
+}
+
+TEST(TimeCut, HasACameraThatFirstAppearsWhenAnotherHasPassedT1) {
+  EXPECT_THAT(cut({pose(0), packet(0, 100, 200, {100}), packet(0, 200, 300, {200}), pose(300),
+                   packet(1, 100, 300, {150, 250})},
+                  100, 200),
+              ElementsAre("pose 0", "cam0 100 (100) 200", "pose 300", "cam1 100 (150) 200"));
+}
+
+TEST(TimeCut, DoesNotWaitLongForACameraThatIsSilent) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  std::vector<CObservation::Ptr> observations = {pose(0), packet(1, 0, 1, {0})};
+  for (int i = 0; i < 100; ++i) {
+    observations.push_back(packet(0, i * kSecond / 4, i * kSecond / 4 + 1, {i * kSecond / 4}));
+    observations.push_back(pose(i * kSecond / 4));
+  }
+  auto playback = std::make_unique<Playback>(observations);
+  const Playback& played = *playback;
+  const auto recording = cutTime(std::move(playback), 0, kSecond);
+  std::size_t given = 0;
+  while (recording->next()) ++given;
+  EXPECT_EQ(given, 1U + 1U + 4U + 5U);
+  EXPECT_LT(played.given(), 2U + 2U * 10U) << "a second beyond t1 and no more";
+}
+
 TEST(TimeCut, MustEndAfterItBegins) {
   EXPECT_THROW(cut(threePackets(), 1000, 1000), std::invalid_argument);
 }
