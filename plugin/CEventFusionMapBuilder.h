@@ -119,8 +119,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// The number of keyframes.
   unsigned int getCurrentlyBuiltMapSize() override;
   /// Holds a CEventFusionMap and, for programs that know MRPT's classes alone, its exported points
-  /// as a CPointsMapXYZI. Belongs to the builder and changes with the next call of this function;
-  /// cost: that of exporting the whole map where it grew.
+  /// as a CPointsMapXYZI. Belongs to the builder and is for one thread at a time, no lock guards
+  /// it: what is returned changes or vanishes with the next call of this function, by any thread,
+  /// of setOptions, loadFromConfigFile or initialize. Threads that need the map besides take
+  /// `points` or `getCurrentlyBuiltMap`. Cost: that of exporting the whole map where it grew.
   const mrpt::maps::CMultiMetricMap* getCurrentlyBuiltMetricMap() const override;
   /// The picture of the newest keyframe's depth map, in the format of the file's extension.
   /// @throws std::logic_error before the first keyframe; std::runtime_error naming the file.
