@@ -62,9 +62,9 @@ struct DepthMap {
 /// 3. position of the peak along the ray, between planes where `subplane` is set;
 /// 4. lower median of the positions of the kept pixels in the window;
 /// 5. clear a frame of 2 pixels;
-/// 6. where `dilate` is set, give each pixel beside a kept one the depth, confidence and variance
-/// of
-///    the most confident of them (of equals the nearer depth), the frame left alone.
+/// 6. where `dilate` is set, give each pixel beside a kept one the depth, confidence and
+///    variance of the most confident of them (of equals the nearer depth), the frame left
+///    alone.
 /// @param sequence_maximum what `WhiteLevel::kSequence` stands for at present; the keyframe's own
 /// maximum where not given.
 /// @throws std::invalid_argument where the options are not valid.

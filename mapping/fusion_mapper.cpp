@@ -226,9 +226,7 @@ bool FusionMapper::isDue(const Window& window) const {
   if (asked_for && finished_) return true;
   if (asked_for && (!reached_ns_ || *reached_ns_ < window.t1_ns)) return false;
   if (options_.limits.t1_ns && window.t1_ns > *options_.limits.t1_ns) return false;
-  if (!camerasCover(window.t1_ns)) return false;
-  return !trajectory_.empty() &&
-         trajectory_.poses().back().t_ns >= std::max(window.t1_ns, window.t_ref_ns);
+  return completeNs() >= window.t1_ns && trajectory_.poses().back().t_ns >= window.t_ref_ns;
 }
 
 /// Looks for the first event with a pose. Events before it have none and are forgotten; what comes
@@ -277,8 +275,7 @@ void FusionMapper::passEmptyWindows() {
 std::vector<EventSpan> FusionMapper::eventsOf(const Window& window) const {
   std::vector<EventSpan> events;
   for (const EventBuffer& buffer : buffers_) {
-    events.push_back(
-        EventSpan(buffer.events).part(buffer.indexOf(window.t0_ns), buffer.indexOf(window.t1_ns)));
+    events.push_back(buffer.between(window.t0_ns, window.t1_ns));
   }
   return events;
 }

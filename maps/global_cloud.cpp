@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "mapping/option_check.h"
+#include "maps/point_text.h"
 
 namespace efm {
 namespace {
@@ -16,8 +17,7 @@ namespace {
 [[noreturn]] void refusePoint(const CloudPoint& point, const std::string& why) {
   std::ostringstream message;
   message.precision(17);
-  message << "point (" << point.p_world.x() << ", " << point.p_world.y() << ", "
-          << point.p_world.z() << ") with confidence " << point.confidence << ": " << why;
+  message << pointText(point) << " with confidence " << point.confidence << ": " << why;
   throw std::invalid_argument(message.str());
 }
 

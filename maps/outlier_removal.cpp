@@ -5,20 +5,16 @@
 #include <pcl/point_types.h>
 
 #include <algorithm>
-#include <sstream>
 #include <stdexcept>
 
 #include "mapping/option_check.h"
+#include "maps/point_text.h"
 
 namespace efm {
 namespace {
 
 [[noreturn]] void refusePoint(const CloudPoint& point, const std::string& why) {
-  std::ostringstream message;
-  message.precision(17);
-  message << "point (" << point.p_world.x() << ", " << point.p_world.y() << ", "
-          << point.p_world.z() << "): " << why;
-  throw std::invalid_argument(message.str());
+  throw std::invalid_argument(pointText(point) + ": " + why);
 }
 
 /// The median of each coordinate: unlike the mean or the middle of the bounds, a stray point far

@@ -20,19 +20,34 @@ bool parsesWhole(std::string_view text, Number& number) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-/// Items separated by commas. @return whether each is one.
-template <typename Item>
-bool parsesList(std::string_view text, std::vector<Item>& items) {
+/// Items separated by commas, each read by `parses(text, item)`. @return whether each is one.
+template <typename Item, typename Parse>
+bool parsesList(std::string_view text, std::vector<Item>& items, const Parse& parses) {
   items.clear();
   while (!text.empty()) {
     const std::size_t comma = text.find(',');
-    if (!parsesWhole(trimmed(text.substr(0, comma)), items.emplace_back()) ||
-        comma + 1 == text.size()) {
+    if (!parses(trimmed(text.substr(0, comma)), items.emplace_back()) || comma + 1 == text.size()) {
       return false;
     }
     text = comma == std::string_view::npos ? std::string_view{} : text.substr(comma + 1);
   }
   return true;
+}
+
+/// Seconds, exact to the nanosecond.
+bool parsesTime(std::string_view text, std::int64_t& t_ns) {
+  const std::optional<std::int64_t> parsed = parseSeconds(text);
+  if (!parsed || *parsed >= kEndOfTimeNs || *parsed <= -kEndOfTimeNs) return false;
+  t_ns = *parsed;
+  return true;
+}
+
+/// Items separated by commas.
+template <typename Item, typename Text>
+std::string listText(const std::vector<Item>& items, const Text& text_of) {
+  std::string list;
+  for (const Item& item : items) list += (list.empty() ? "" : ",") + text_of(item);
+  return list;
 }
 
 /// The fewest digits that read back the same.
@@ -80,14 +95,14 @@ void parseInto(std::string_view text, std::string& field) { field = text; }
 void parseInto(std::string_view text, std::filesystem::path& field) { field = text; }
 
 void parseInto(std::string_view text, std::vector<int>& field) {
-  if (!parsesList(text, field)) {
+  if (!parsesList(text, field, parsesWhole<int>)) {
     throw std::invalid_argument("must be whole numbers separated by commas, or nothing");
   }
 }
 
 void parseInto(std::string_view text, Eigen::Vector3d& field) {
   std::vector<double> items;
-  if (!parsesList(text, items) || items.size() != 3 ||
+  if (!parsesList(text, items, parsesWhole<double>) || items.size() != 3 ||
       !std::all_of(items.begin(), items.end(), [](double item) { return std::isfinite(item); })) {
     throw std::invalid_argument("must be three numbers separated by commas");
   }
@@ -104,18 +119,10 @@ void parseInto(std::string_view text, MaxConfidence& field) {
   }
 }
 
-/// Seconds, exact to the nanosecond.
 void parseInto(std::string_view text, std::vector<std::int64_t>& field) {
-  field.clear();
-  while (!text.empty()) {
-    const std::size_t comma = text.find(',');
-    const std::optional<std::int64_t> t_ns = parseSeconds(trimmed(text.substr(0, comma)));
-    if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs || comma + 1 == text.size()) {
-      throw std::invalid_argument(
-          "must be seconds within 4.6e9 of 0, separated by commas, or nothing");
-    }
-    field.push_back(*t_ns);
-    text = comma == std::string_view::npos ? std::string_view{} : text.substr(comma + 1);
+  if (!parsesList(text, field, parsesTime)) {
+    throw std::invalid_argument(
+        "must be seconds within 4.6e9 of 0, separated by commas, or nothing");
   }
 }
 
@@ -154,9 +161,7 @@ OptionValue valueOf(std::int64_t field) { return field; }
 OptionValue valueOf(std::uint32_t field) { return std::int64_t{field}; }
 OptionValue valueOf(bool field) { return field; }
 OptionValue valueOf(const std::vector<int>& field) {
-  std::string text;
-  for (const int item : field) text += (text.empty() ? "" : ",") + std::to_string(item);
-  return text;
+  return listText(field, [](int item) { return std::to_string(item); });
 }
 OptionValue valueOf(const std::string& field) { return field; }
 OptionValue valueOf(const Eigen::Vector3d& field) {
@@ -168,9 +173,7 @@ OptionValue valueOf(const MaxConfidence& field) {
 }
 OptionValue valueOf(const std::filesystem::path& field) { return field.string(); }
 OptionValue valueOf(const std::vector<std::int64_t>& times_ns) {
-  std::string text;
-  for (const std::int64_t t_ns : times_ns) text += (text.empty() ? "" : ",") + formatSeconds(t_ns);
-  return text;
+  return listText(times_ns, formatSeconds);
 }
 
 std::string textOf(const OptionValue& value) {

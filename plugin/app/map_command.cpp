@@ -80,10 +80,18 @@ int conclude(const MappingOutcome& outcome, MapOutput& output) {
 }
 
 Window windowOf(const DepthArguments& arguments, ReferenceTime reference) {
-  const std::int64_t middle_ns = arguments.t0_ns + (arguments.t1_ns - arguments.t0_ns) / 2;
-  const std::int64_t by_options_ns =
-      reference == ReferenceTime::kMiddle ? middle_ns : arguments.t1_ns;
-  return {arguments.t0_ns, arguments.t1_ns, arguments.t_ref_ns.value_or(by_options_ns)};
+  Window window = windowOf(arguments.t0_ns, arguments.t1_ns, reference);
+  window.t_ref_ns = arguments.t_ref_ns.value_or(window.t_ref_ns);
+  return window;
+}
+
+/// The first pass over the whole recording, where the options ask for its maximum.
+std::optional<double> sequenceMaximumOf(const RecordingSource& source, EventFusionOptions options) {
+  if (options.mapper.keyframe.extraction.max_confidence.level != WhiteLevel::kSequence) {
+    return std::nullopt;
+  }
+  options.mapper.only_window.reset();
+  return sequenceMaximum(options, *openRecording(source));
 }
 
 }  // namespace
@@ -99,9 +107,7 @@ int runMap(const MapArguments& arguments) {
     job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
     job.options.mapper.limits.validate();
     const RecordingSource source = sourceOf(arguments, job.options.rig);
-    if (job.options.mapper.keyframe.extraction.max_confidence.level == WhiteLevel::kSequence) {
-      job.sequence_maximum = sequenceMaximum(job.options, *openRecording(source));
-    }
+    job.sequence_maximum = sequenceMaximumOf(source, job.options);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(arguments.out, OutputKind::kMap, job.options.mapper.keyframe.planes);
     job.take_keyframe = [&](const KeyframeDepthMap& keyframe) { output->writeKeyframe(keyframe); };
@@ -130,11 +136,7 @@ int runDepth(const DepthArguments& arguments) {
     job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
     job.options.mapper.validate();
     const RecordingSource source = sourceOf(arguments, job.options.rig);
-    if (job.options.mapper.keyframe.extraction.max_confidence.level == WhiteLevel::kSequence) {
-      EventFusionOptions whole = job.options;
-      whole.mapper.only_window.reset();
-      job.sequence_maximum = sequenceMaximum(whole, *openRecording(source));
-    }
+    job.sequence_maximum = sequenceMaximumOf(source, job.options);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(arguments.out, OutputKind::kDepth, job.options.mapper.keyframe.planes);
 

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "test/plugin/dataset_of.h"
 #include "test/plugin/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/dataset_writer.h"
@@ -49,15 +50,7 @@ class MapCommand : public TemporaryFolder {
 
   /// Writes the recording as a dataset folder "data" and the options as "rig.ini".
   void write(const SyntheticRecording& recording) const {
-    Rig rig;
-    rig.cameras = recording.cameras;
-    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      const auto camera = folder() / "data" / ("cam" + std::to_string(c));
-      std::filesystem::create_directories(camera);
-      writeEvents(camera / "events.txt", recording.events[c]);
-    }
-    std::ofstream(folder() / "data" / "camchain.yaml") << formatCamchain(rig);
-    writeTumTrajectory(folder() / "data" / "poses.txt", recording.poses);
+    writeDataset(recording, folder() / "data");
 
     std::ofstream options(folder() / "rig.ini");
     std::string section;

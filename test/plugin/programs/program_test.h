@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "test/plugin/dataset_of.h"
 #include "test/plugin/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/dataset_writer.h"
@@ -49,15 +50,7 @@ class ProgramTest : public TemporaryFolder {
 
   /// Imports a recording as "data.rawlog".
   void importRecording(const SyntheticRecording& recording) const {
-    Rig rig;
-    rig.cameras = recording.cameras;
-    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      const auto camera = folder() / "data" / ("cam" + std::to_string(c));
-      std::filesystem::create_directories(camera);
-      writeEvents(camera / "events.txt", recording.events[c]);
-    }
-    write("data/camchain.yaml", formatCamchain(rig));
-    writeTumTrajectory(folder() / "data" / "poses.txt", recording.poses);
+    writeDataset(recording, folder() / "data");
     const Result result = run("'" EFM_EVENT_FUSION "' import data --out data.rawlog");
     ASSERT_EQ(result.status, 0) << result.out;
   }
