@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "test/bench/synthetic_window.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+
+namespace efm::bench {
+namespace {
+
+constexpr std::int64_t kStart_ns = 1'000'000'000;
+constexpr std::int64_t kPoseStep_ns = 5'000'000;
+constexpr double kBaseline_m = 0.1;
+constexpr int kEdges = 400;
+constexpr double kNoiseShare = 0.1;
+
+struct Edge {
+  Eigen::Vector3d from;
+  Eigen::Vector3d to;
+};
+
+/// The field of view of a DAVIS346, at any size. Without distortion: it costs nothing once the
+/// table of rays is made, and much here.
+CameraModel cameraOf(int width, int height) {
+  const double scale = width / 346.0;
+  return {width, height, 226.0 * scale, 226.0 * scale, 0.5 * (width - 1), 0.5 * (height - 1)};
+}
+
+Rig rigOf(const SyntheticWindowOptions& options) {
+  Rig rig;
+  for (int c = 0; c < options.cameras; ++c) {
+    const Rigid3 T_rig_cam{Eigen::Quaterniond::Identity(), {kBaseline_m * c, 0, 0}};
+    rig.cameras.push_back({cameraOf(options.width, options.height), T_rig_cam, 0});
+  }
+  return rig;
+}
+
+/// Half a metre per second to and fro, with a hand's turning.
+Rigid3 poseAt(double t_s) {
+  const Eigen::Vector3d position(0.08 * std::sin(7 * t_s), 0.05 * std::sin(9 * t_s + 1),
+                                 0.04 * std::sin(6 * t_s + 2));
+  const Eigen::Vector3d turn(0.03 * std::sin(8 * t_s), 0.04 * std::sin(5 * t_s),
+                             0.03 * std::sin(6 * t_s + 1));
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), position};
+}
+
+Trajectory trajectoryOver(double duration_s) {
+  Trajectory trajectory;
+  for (int i = -1;; ++i) {
+    const std::int64_t t_ns = i * kPoseStep_ns;
+    const double t_s = 1e-9 * static_cast<double>(t_ns);
+    trajectory.add({kStart_ns + t_ns, poseAt(1 + t_s)});
+    if (t_s > duration_s) return trajectory;
+  }
+}
+
+std::vector<Edge> randomEdges(std::mt19937& random) {
+  std::uniform_real_distribution<double> depth_m(1, 6);
+  std::uniform_real_distribution<double> side(-0.9, 0.9);
+  std::normal_distribution<double> extent_m(0, 0.4);
+  std::vector<Edge> edges;
+  for (int i = 0; i < kEdges; ++i) {
+    const double z = depth_m(random);
+    const Eigen::Vector3d from(side(random) * z, 0.75 * side(random) * z, z);
+    edges.push_back(
+        {from, from + Eigen::Vector3d(extent_m(random), extent_m(random), 0.3 * extent_m(random))});
+  }
+  return edges;
+}
+
+class EventMaker {
+ public:
+  EventMaker(const CameraModel& model, const std::vector<Edge>& edges, std::mt19937& random)
+      : pinhole_(ReferenceView::of(model)), edges_(edges), random_(random) {}
+
+  /// An event of a random point of a random edge, or noise.
+  Event event(std::int64_t t_ns, const Rigid3& T_cam_world) {
+    if (share_(random_) >= kNoiseShare) {
+      constexpr int kTries = 20;  // what lies outside the image is drawn again
+      for (int i = 0; i < kTries; ++i) {
+        const auto& edge = edges_[random_() % edges_.size()];
+        const double along = share_(random_);
+        const Eigen::Vector3d point = T_cam_world * ((1 - along) * edge.from + along * edge.to);
+        if (point.z() < 0.1) continue;
+        const Eigen::Vector2d pixel = pinhole_.project(point).array().round();
+        if (pixel.x() < 0 || pixel.x() >= pinhole_.width || pixel.y() < 0 ||
+            pixel.y() >= pinhole_.height) {
+          continue;
+        }
+        return {t_ns, static_cast<std::uint16_t>(pixel.x()), static_cast<std::uint16_t>(pixel.y()),
+                random_() % 2 == 0};
+      }
+    }
+    return {t_ns, static_cast<std::uint16_t>(random_() % static_cast<unsigned>(pinhole_.width)),
+            static_cast<std::uint16_t>(random_() % static_cast<unsigned>(pinhole_.height)),
+            random_() % 2 == 0};
+  }
+
+ private:
+  ReferenceView pinhole_;
+  const std::vector<Edge>& edges_;
+  std::mt19937& random_;
+  std::uniform_real_distribution<double> share_{0, 1};
+};
+
+}  // namespace
+
+SyntheticWindow makeSyntheticWindow(const SyntheticWindowOptions& options) {
+  SyntheticWindow made;
+  made.rig = rigOf(options);
+  made.trajectory = trajectoryOver(options.duration_s);
+  const auto duration_ns = static_cast<std::int64_t>(1e9 * options.duration_s);
+  made.window = {kStart_ns, kStart_ns + duration_ns, kStart_ns + duration_ns / 2};
+  made.options.planes.min_depth_m = 0.8;
+  made.options.planes.max_depth_m = 8.0;
+
+  std::mt19937 random(options.seed);
+  const std::vector<Edge> edges = randomEdges(random);
+  for (const RigCamera& camera : made.rig.cameras) {
+    EventMaker maker(camera.model, edges, random);
+    std::vector<Event>& events = made.events.emplace_back();
+    events.reserve(options.events_per_camera);
+    const auto count = static_cast<std::int64_t>(options.events_per_camera);
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::int64_t t_ns =
+          kStart_ns + duration_ns / count * i + duration_ns % count * i / count;
+      const Rigid3 T_world_cam = *made.trajectory.poseAt(t_ns) * camera.T_rig_cam;
+      events.push_back(maker.event(t_ns, T_world_cam.inverse()));
+    }
+  }
+  return made;
+}
+
+}  // namespace efm::bench

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "mapping/event.h"
+#include "mapping/keyframe_mapper.h"
+#include "mapping/rig.h"
+#include "mapping/trajectory.h"
+#include "mapping/window.h"
+
+namespace efm::bench {
+
+struct SyntheticWindowOptions {
+  int width = 346;
+  int height = 260;
+  std::size_t events_per_camera = 235'000;
+  int cameras = 2;  ///< Side by side, 0.1 m apart.
+  double duration_s = 0.2;
+  unsigned seed = 1;
+};
+
+/// The events of one window of a hand-held rig that looks at straight edges 1 to 6 m away through
+/// a lens with distortion; every tenth event is noise. Made directly from the edges, without
+/// images: millions of events in less than a second, in the places and the order that real ones
+/// have.
+struct SyntheticWindow {
+  Rig rig;
+  Trajectory trajectory;
+  Window window;
+  std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
+  KeyframeMapperOptions options;           ///< 100 planes, 0.8 to 8 m; otherwise the defaults.
+};
+
+SyntheticWindow makeSyntheticWindow(const SyntheticWindowOptions& options);
+
+}  // namespace efm::bench
