@@ -8,17 +8,14 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-
+#include <string>
 #include <utility>
 
 #include "mapping/kernels/vote.h"
-#include "mapping/named_choice.h"
 #include "mapping/option_check.h"
 
 namespace efm {
 namespace {
-
-constexpr NamedChoice<VotingKernel> kKernels[] = {{VotingKernel::kPlain, "plain"}};
 
 /// Two groups of planes per thread even out that some planes cost more than others.
 constexpr int kGroupsPerThread = 2;
@@ -69,15 +66,22 @@ VoteCounts votePlane(const RayBundle& camera, const ReferenceView& view, double 
   return counts;
 }
 
-}  // namespace
+std::string namesOfAvailableKernels() {
+  std::string names;
+  for (const VotingKernel kernel : availableKernels()) {
+    names += (names.empty() ? "" : ", ") + std::string(nameOf(kernel));
+  }
+  return names;
+}
 
-std::string_view nameOf(VotingKernel kernel) { return nameIn(kKernels, kernel); }
-VotingKernel votingKernelFromName(std::string_view name) { return valueIn(kKernels, name); }
+}  // namespace
 
 void SpaceSweepOptions::validate() const {
   constexpr int kMaxThreads = 1024;
   requireOption(!threads || (*threads >= 1 && *threads <= kMaxThreads), "threads",
                 threads.value_or(0), "1 to 1024");
+  requireOption(isAvailable(kernelOrFastest()), "kernel", nameOf(kernelOrFastest()),
+                "one that this build and processor have: " + namesOfAvailableKernels());
 }
 
 int SpaceSweepOptions::threadsOrCores() const {
@@ -87,9 +91,7 @@ int SpaceSweepOptions::threadsOrCores() const {
   return std::max(1, std::min(threads.value_or(allowed), allowed));
 }
 
-VotingKernel SpaceSweepOptions::kernelOrFastest() const {
-  return kernel.value_or(VotingKernel::kPlain);
-}
+VotingKernel SpaceSweepOptions::kernelOrFastest() const { return kernel.value_or(fastestKernel()); }
 
 SpaceSweep::SpaceSweep(const SpaceSweepOptions& options) : options_(options) {
   options_.validate();

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "mapping/back_projection.h"
@@ -12,22 +11,16 @@
 #include "mapping/plane_fusion.h"
 #include "mapping/reference_view.h"
 #include "mapping/vote_counts.h"
+#include "mapping/voting_kernel.h"
 
 namespace efm {
-
-/// Which voting kernel runs.
-enum class VotingKernel { kPlain };
-
-std::string_view nameOf(VotingKernel kernel);
-/// @throws std::invalid_argument naming the value and what is known.
-VotingKernel votingKernelFromName(std::string_view name);
 
 struct SpaceSweepOptions {
   FusionOptions fusion;
 
-  // Performance only: the result is the same, bit for bit.
+  // Performance only. The number of threads never changes the result; kernels agree up to rounding.
   std::optional<int> threads;          ///< 1 to 1024; as many as there are cores where not given.
-  std::optional<VotingKernel> kernel;  ///< The fastest that the processor has where not given.
+  std::optional<VotingKernel> kernel;  ///< An available one; the fastest of them where not given.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;

@@ -27,6 +27,7 @@ front='CLI/|yaml-cpp/'
 
 forbid mapping "(maps|tracking_stub|plugin|test)/" "may include mapping/ alone"
 forbid mapping "$mrpt|$pcl|$ceres|$recordings|$front" "may use Eigen, OpenCV, oneTBB and Highway"
+forbid mapping "hwy/" "Highway stays in mapping/kernels/" '^mapping/kernels/'
 forbid mapping/kernels "Eigen|opencv2|tbb|oneapi" "may use Highway alone"
 forbid mapping/kernels "mapping/[^k]" "may include mapping/kernels/ alone"
 forbid maps "(tracking_stub|plugin|test)/" "may include mapping/ and maps/"

@@ -284,6 +284,11 @@ TEST(OptionReader, ValuesOutOfRangeAreErrorsThatNameSectionKeyValueAndRange) {
               StartsWith("rig.ini:2: [keyframes] window_events = 0: must be"));
   EXPECT_THAT(errorOf("[performance]\nthreads = 0\n"),
               StartsWith("rig.ini:2: [performance] threads = 0: must be"));
+  // No processor has both.
+  const std::string missing = isAvailable(VotingKernel::kNeon) ? "avx2" : "neon";
+  EXPECT_THAT(errorOf("[performance]\nkernel = " + missing + "\n"),
+              AllOf(StartsWith("rig.ini:2: [performance] kernel = " + missing + ": must be"),
+                    HasSubstr(": plain, ")));
   EXPECT_THAT(errorOf("[performance]\npacket_error_px = 11\n"),
               StartsWith("rig.ini:2: [performance] packet_error_px = 11: must be"));
 }
