@@ -2,9 +2,10 @@
 #include "mapping/fusion_rule.h"
 
 #include <algorithm>
-#include <cmath>
-#include <limits>
+#include <cassert>
+#include <stdexcept>
 
+#include "mapping/kernels/fusion.h"
 #include "mapping/named_choice.h"
 
 namespace efm {
@@ -19,65 +20,23 @@ constexpr NamedChoice<FusionRule> kRules[] = {
     {FusionRule::kMax, "max"},
 };
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-// A rule is three small functions: what the sum starts from, how an input joins it, and what the
-// sum of n inputs means. Zeros need no branch: IEEE arithmetic carries 1/0 and log 0 to a mean of
-// zero.
-
-struct Min {
-  static constexpr float kStart = kInfinity;
-  static float fold(float sum, float value) { return std::min(sum, value); }
-  static float finish(float sum, float) { return sum; }
-};
-
-struct Harmonic {
-  static constexpr float kStart = 0;
-  static float fold(float sum, float value) { return sum + 1.0F / value; }
-  static float finish(float sum, float inputs) { return inputs / sum; }
-};
-
-struct Geometric {
-  static constexpr float kStart = 0;
-  static float fold(float sum, float value) { return sum + std::log(value); }
-  static float finish(float sum, float inputs) { return std::exp(sum / inputs); }
-};
-
-struct Arithmetic {
-  static constexpr float kStart = 0;
-  static float fold(float sum, float value) { return sum + value; }
-  static float finish(float sum, float inputs) { return sum / inputs; }
-};
-
-struct Rms {
-  static constexpr float kStart = 0;
-  static float fold(float sum, float value) { return sum + value * value; }
-  static float finish(float sum, float inputs) { return std::sqrt(sum / inputs); }
-};
-
-struct Max {
-  static constexpr float kStart = 0;
-  static float fold(float sum, float value) { return std::max(sum, value); }
-  static float finish(float sum, float) { return sum; }
-};
-
-/// Calls `visitor` with the rule's functions: the only place that chooses between rules.
-template <typename Visitor>
-void visitRule(FusionRule rule, const Visitor& visitor) {
+/// The rule's arithmetic: the only place that chooses between rules.
+const kernels::FusionSteps& stepsOf(FusionRule rule, const kernels::FusionFunctions& functions) {
   switch (rule) {
     case FusionRule::kMin:
-      return visitor(Min());
+      return functions.min;
     case FusionRule::kHarmonic:
-      return visitor(Harmonic());
+      return functions.harmonic;
     case FusionRule::kGeometric:
-      return visitor(Geometric());
+      return functions.geometric;
     case FusionRule::kArithmetic:
-      return visitor(Arithmetic());
+      return functions.arithmetic;
     case FusionRule::kRms:
-      return visitor(Rms());
+      return functions.rms;
     case FusionRule::kMax:
-      return visitor(Max());
+      return functions.max;
   }
+  throw std::logic_error("a fusion rule has no arithmetic");
 }
 
 }  // namespace
@@ -94,34 +53,36 @@ const std::vector<FusionRule>& allFusionRules() {
   return rules;
 }
 
-FusionAccumulator::FusionAccumulator(FusionRule rule, std::size_t voxels)
-    : rule_(rule), values_(voxels) {}
+FusionAccumulator::FusionAccumulator(FusionRule rule, std::size_t voxels, VotingKernel kernel)
+    : steps_(&stepsOf(rule, kernels::fusionFunctions(kernel))), values_(voxels) {}
 
-void FusionAccumulator::begin() {
-  inputs_ = 0;
-  visitRule(rule_, [this](auto functions) {
-    std::fill(values_.begin(), values_.end(), decltype(functions)::kStart);
-  });
+void FusionAccumulator::begin(int inputs) {
+  inputs_ = inputs;
+  folded_ = 0;
 }
 
 void FusionAccumulator::fold(const float* values) {
-  ++inputs_;
-  visitRule(rule_, [this, values](auto functions) {
-    for (std::size_t i = 0; i < values_.size(); ++i) {
-      values_[i] = decltype(functions)::fold(values_[i], values[i]);
+  assert(folded_ < inputs_);
+  const bool first = folded_++ == 0;
+  if (inputs_ <= 2) {
+    // One input is its own mean, and two have a mean without a sum in between.
+    if (!first) {
+      steps_->pair(values_.data(), values, values_.size());
+    } else if (values != values_.data()) {
+      std::copy_n(values, values_.size(), values_.begin());
     }
-  });
+    return;
+  }
+  if (first) std::fill(values_.begin(), values_.end(), steps_->start);
+  steps_->fold(values_.data(), values, values_.size());
 }
 
 void FusionAccumulator::finish() {
-  if (inputs_ == 0) {
-    std::fill(values_.begin(), values_.end(), 0.0F);
-    return;
+  assert(folded_ == inputs_);
+  if (inputs_ == 0) std::fill(values_.begin(), values_.end(), 0.0F);
+  if (inputs_ > 2) {
+    steps_->finish(values_.data(), static_cast<float>(inputs_), values_.size());
   }
-  const auto inputs = static_cast<float>(inputs_);
-  visitRule(rule_, [this, inputs](auto functions) {
-    for (float& value : values_) value = decltype(functions)::finish(value, inputs);
-  });
 }
 
 }  // namespace efm

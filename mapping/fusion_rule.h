@@ -5,7 +5,13 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/voting_kernel.h"
+
 namespace efm {
+
+namespace kernels {
+struct FusionSteps;
+}  // namespace kernels
 
 /// How the ray densities of several DSIs become one, voxel by voxel (Ghosh and Gallego 2022,
 /// Eqs. 6-11): means of n inputs with equal weights, symmetric, and ordered
@@ -21,24 +27,29 @@ const std::vector<FusionRule>& allFusionRules();
 
 /// A running mean of planes under one rule: all six rules fold, so that one plane of memory serves
 /// any number of inputs. Inputs are ray densities, not negative; zero in any input makes the
-/// AND-like rules (min, harmonic, geometric) zero.
+/// AND-like rules (min, harmonic, geometric) zero. One input is its own mean, bit for bit.
 ///
 /// Use: `begin`, `fold` per input, `finish`; then `values` holds the mean.
 class FusionAccumulator {
  public:
-  FusionAccumulator(FusionRule rule, std::size_t voxels);
+  /// @param kernel an available one.
+  FusionAccumulator(FusionRule rule, std::size_t voxels, VotingKernel kernel = fastestKernel());
 
-  void begin();
-  /// @param values as many as there are voxels.
+  /// @param inputs how many will be folded. With none the mean is zero.
+  void begin(int inputs);
+  /// @param values as many as there are voxels, or `values` itself: see `place`.
   void fold(const float* values);
-  /// With no input folded the mean is zero.
   void finish();
 
   const std::vector<float>& values() const { return values_; }
 
+  /// Where the first of two inputs may be written before it is folded, which saves a copy.
+  std::vector<float>& place() { return values_; }
+
  private:
-  FusionRule rule_;
+  const kernels::FusionSteps* steps_;
   int inputs_ = 0;
+  int folded_ = 0;
   std::vector<float> values_;
 };
 

@@ -22,30 +22,31 @@ std::string_view nameOf(FusionOrder order) { return nameIn(kOrders, order); }
 FusionOrder fusionOrderFromName(std::string_view name) { return valueIn(kOrders, name); }
 
 PlaneFusion::PlaneFusion(const FusionOptions& options, int cameras, int slots, std::size_t voxels,
-                         Keep keep)
+                         Keep keep, VotingKernel kernel)
     : cameras_first_(options.order == FusionOrder::kCamerasThenTime),
+      slots_(slots),
       inner_count_(cameras_first_ ? cameras : slots),
       outer_count_(cameras_first_ ? slots : cameras),
       votes_(voxels),
       inner_(cameras_first_ ? options.across_cameras : options.across_time,
-             voxelsFor(inner_count_, voxels)),
+             voxelsFor(inner_count_, voxels), kernel),
       outer_(cameras_first_ ? options.across_time : options.across_cameras,
-             voxelsFor(outer_count_, voxels)) {
+             voxelsFor(outer_count_, voxels), kernel) {
   assert(cameras >= 1 && slots >= 1);
   if (keep == Keep::kCameras) {
-    // The maximum of one input is that input.
-    const FusionRule rule = slots > 1 ? options.across_time : FusionRule::kMax;
-    cameras_.assign(static_cast<std::size_t>(cameras), FusionAccumulator(rule, voxels));
+    cameras_.assign(static_cast<std::size_t>(cameras),
+                    FusionAccumulator(options.across_time, voxels, kernel));
   }
 }
 
 const std::vector<float>& PlaneFusion::fuseInner(int outer, const Vote& vote) {
-  if (inner_count_ > 1) inner_.begin();
+  inner_.begin(inner_count_);
   for (int inner = 0; inner < inner_count_; ++inner) {
     const int camera = cameras_first_ ? inner : outer;
-    vote(camera, cameras_first_ ? outer : inner, votes_);
-    if (!cameras_.empty()) cameras_[static_cast<std::size_t>(camera)].fold(votes_.data());
-    if (inner_count_ > 1) inner_.fold(votes_.data());
+    std::vector<float>& votes = inner_count_ == 2 && inner == 0 ? inner_.place() : votes_;
+    vote(camera, cameras_first_ ? outer : inner, votes);
+    if (!cameras_.empty()) cameras_[static_cast<std::size_t>(camera)].fold(votes.data());
+    if (inner_count_ > 1) inner_.fold(votes.data());
   }
   if (inner_count_ == 1) return votes_;
   inner_.finish();
@@ -53,12 +54,12 @@ const std::vector<float>& PlaneFusion::fuseInner(int outer, const Vote& vote) {
 }
 
 const std::vector<float>& PlaneFusion::fuse(const Vote& vote) {
-  for (FusionAccumulator& camera : cameras_) camera.begin();
+  for (FusionAccumulator& camera : cameras_) camera.begin(slots_);
   const std::vector<float>* fused = nullptr;
   if (outer_count_ == 1) {
     fused = &fuseInner(0, vote);
   } else {
-    outer_.begin();
+    outer_.begin(outer_count_);
     for (int outer = 0; outer < outer_count_; ++outer) {
       outer_.fold(fuseInner(outer, vote).data());
     }

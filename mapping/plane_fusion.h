@@ -43,8 +43,10 @@ class PlaneFusion {
   };
 
   /// @param cameras, slots at least 1.
+  /// @param voxels of a plane or of a part of it: each is fused by itself.
+  /// @param kernel an available one.
   PlaneFusion(const FusionOptions& options, int cameras, int slots, std::size_t voxels,
-              Keep keep = Keep::kFusedOnly);
+              Keep keep = Keep::kFusedOnly, VotingKernel kernel = fastestKernel());
 
   /// Asks for every input once. @return the fused plane, until the next call.
   const std::vector<float>& fuse(const Vote& vote);
@@ -58,6 +60,7 @@ class PlaneFusion {
   const std::vector<float>& fuseInner(int outer, const Vote& vote);
 
   bool cameras_first_;
+  int slots_;
   int inner_count_;
   int outer_count_;
   std::vector<float> votes_;

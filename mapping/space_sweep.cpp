@@ -109,7 +109,8 @@ SweepResult SpaceSweep::run(const std::vector<CameraRays>& cameras, const Refere
     PlaneFusion fusion(
         options_.fusion, static_cast<int>(cameras.size()), static_cast<int>(cameras.front().size()),
         view.pixels(),
-        request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly);
+        request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
+        options_.kernelOrFastest());
     for (int plane = group.begin; plane < group.end; ++plane) {
       const std::vector<float>& fused =
           fusion.fuse([&](int camera, int slot, std::vector<float>& votes) {

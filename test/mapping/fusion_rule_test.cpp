@@ -6,7 +6,10 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
+#include <string>
 
 #include "test/oracle/naive_mapper.h"
 
@@ -26,72 +29,105 @@ rc::Gen<std::vector<float>> densities() {
   });
 }
 
-float fuse(FusionRule rule, const std::vector<float>& inputs) {
-  FusionAccumulator accumulator(rule, 1);
-  accumulator.begin();
-  for (const float& input : inputs) accumulator.fold(&input);
+/// Full vectors of any instruction set, and a rest.
+constexpr std::size_t kVoxels = 37;
+
+/// The mean of one input each, which every voxel of a plane must have, bit for bit.
+float fuse(VotingKernel kernel, FusionRule rule, const std::vector<float>& inputs) {
+  FusionAccumulator accumulator(rule, kVoxels, kernel);
+  accumulator.begin(static_cast<int>(inputs.size()));
+  for (const float input : inputs) accumulator.fold(std::vector<float>(kVoxels, input).data());
   accumulator.finish();
-  return accumulator.values().front();
+  const std::vector<float>& values = accumulator.values();
+  const bool same = std::all_of(values.begin(), values.end(),
+                                [&](float value) { return value == values.front(); });
+  return same ? values.front() : std::numeric_limits<float>::quiet_NaN();
 }
 
 /// Folding n floats errs by at most n roundings, log and exp by a few more: 16 inputs of up to
 /// log 4000 = 8.3 summed and exponentiated stay within 16 * 16 * 8.3 * 6e-8 = 1.3e-4.
 constexpr double kRounding = 2e-4;
 
+/// Calls with every kernel that runs here and every rule.
+template <typename Check>
+void forEachKernelAndRule(const Check& check) {
+  for (const VotingKernel kernel : availableKernels()) {
+    for (const FusionRule rule : allFusionRules()) check(kernel, rule);
+  }
+}
+
+std::string labelOf(VotingKernel kernel, FusionRule rule) {
+  return std::string(nameOf(kernel)) + ", " + std::string(nameOf(rule));
+}
+
 RC_GTEST_PROP(FusionRule, EveryRuleIsItsTextbookMean, ()) {
   const auto inputs = *densities();
   const std::vector<double> exact(inputs.begin(), inputs.end());
-  for (const FusionRule rule : allFusionRules()) {
+  forEachKernelAndRule([&](VotingKernel kernel, FusionRule rule) {
     const double expected = oracle::fuse(rule, exact);
-    RC_ASSERT(std::abs(fuse(rule, inputs) - expected) <= kRounding * expected);
-  }
+    RC_ASSERT(std::abs(fuse(kernel, rule, inputs) - expected) <= kRounding * expected);
+  });
 }
 
 RC_GTEST_PROP(FusionRule, MeansAreOrdered, ()) {
   const auto inputs = *densities();
-  double previous = 0;
-  for (const FusionRule rule : allFusionRules()) {  // from min to max (the paper's Eq. 12)
-    const double mean = fuse(rule, inputs);
-    RC_ASSERT(mean >= previous * (1 - kRounding));
-    previous = mean;
+  for (const VotingKernel kernel : availableKernels()) {
+    double previous = 0;
+    for (const FusionRule rule : allFusionRules()) {  // from min to max (the paper's Eq. 12)
+      const double mean = fuse(kernel, rule, inputs);
+      RC_ASSERT(mean >= previous * (1 - kRounding));
+      previous = mean;
+    }
   }
 }
 
 RC_GTEST_PROP(FusionRule, TheOrderOfInputsDoesNotMatter, ()) {
-  auto inputs = *densities();
-  for (const FusionRule rule : allFusionRules()) {
-    const double mean = fuse(rule, inputs);
-    auto reversed = inputs;
-    std::reverse(reversed.begin(), reversed.end());
-    RC_ASSERT(std::abs(fuse(rule, reversed) - mean) <= kRounding * mean);
-  }
+  const auto inputs = *densities();
+  auto reversed = inputs;
+  std::reverse(reversed.begin(), reversed.end());
+  forEachKernelAndRule([&](VotingKernel kernel, FusionRule rule) {
+    const double mean = fuse(kernel, rule, inputs);
+    RC_ASSERT(std::abs(fuse(kernel, rule, reversed) - mean) <= kRounding * mean);
+  });
 }
 
 RC_GTEST_PROP(FusionRule, EqualInputsAreTheirOwnMean, ()) {
   const std::vector<float> inputs(*rc::gen::inRange<std::size_t>(1, 17), *density());
-  for (const FusionRule rule : allFusionRules()) {
-    RC_ASSERT(std::abs(fuse(rule, inputs) - inputs.front()) <= kRounding * inputs.front());
-  }
+  forEachKernelAndRule([&](VotingKernel kernel, FusionRule rule) {
+    const double mean = fuse(kernel, rule, inputs);
+    RC_ASSERT(std::abs(mean - inputs.front()) <= kRounding * inputs.front());
+  });
 }
 
 TEST(FusionRule, AZeroInputSilencesTheAndLikeRulesOnly) {
-  const std::vector<float> inputs = {0.0F, 8.0F, 3.0F};
-  for (const FusionRule rule : {FusionRule::kMin, FusionRule::kHarmonic, FusionRule::kGeometric}) {
-    EXPECT_EQ(fuse(rule, inputs), 0.0F) << nameOf(rule);
-  }
-  for (const FusionRule rule : {FusionRule::kArithmetic, FusionRule::kRms, FusionRule::kMax}) {
-    EXPECT_GT(fuse(rule, inputs), 0.0F) << nameOf(rule);
-  }
+  forEachKernelAndRule([](VotingKernel kernel, FusionRule rule) {
+    for (const std::vector<float>& inputs : {std::vector<float>{0.0F, 8.0F, 3.0F}, {8.0F, 0.0F}}) {
+      if (rule <= FusionRule::kGeometric) {
+        EXPECT_EQ(fuse(kernel, rule, inputs), 0.0F) << labelOf(kernel, rule);
+      } else {
+        EXPECT_GT(fuse(kernel, rule, inputs), 0.0F) << labelOf(kernel, rule);
+      }
+    }
+  });
 }
 
 TEST(FusionRule, TheThirdInputCounts) {
-  for (const FusionRule rule : allFusionRules()) {
-    EXPECT_NE(fuse(rule, {4.0F, 6.0F, 1.0F}), fuse(rule, {4.0F, 6.0F, 9.0F})) << nameOf(rule);
-  }
+  forEachKernelAndRule([](VotingKernel kernel, FusionRule rule) {
+    EXPECT_NE(fuse(kernel, rule, {4.0F, 6.0F, 1.0F}), fuse(kernel, rule, {4.0F, 6.0F, 9.0F}))
+        << labelOf(kernel, rule);
+  });
+}
+
+TEST(FusionRule, OneInputIsItselfBitForBit) {
+  forEachKernelAndRule([](VotingKernel kernel, FusionRule rule) {
+    EXPECT_EQ(fuse(kernel, rule, {0.3F}), 0.3F) << labelOf(kernel, rule);
+  });
 }
 
 TEST(FusionRule, NoInputMeansZero) {
-  for (const FusionRule rule : allFusionRules()) EXPECT_EQ(fuse(rule, {}), 0.0F) << nameOf(rule);
+  forEachKernelAndRule([](VotingKernel kernel, FusionRule rule) {
+    EXPECT_EQ(fuse(kernel, rule, {}), 0.0F) << labelOf(kernel, rule);
+  });
 }
 
 TEST(FusionRule, NamesGoBothWays) {

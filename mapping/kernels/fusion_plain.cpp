@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mapping/kernels/fusion.h"
+
+namespace efm::kernels {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kSmallest = std::numeric_limits<float>::min();
+
+// A rule is what the sum starts from and three small functions: how an input joins the sum, what
+// the sum of n inputs means, and the mean of two. Zeros need no branch in the first two: IEEE
+// arithmetic carries 1/0 and log 0 to a mean of zero.
+
+struct Min {
+  static constexpr float kStart = kInfinity;
+  static float fold(float sum, float value) { return std::min(sum, value); }
+  static float finish(float sum, float) { return sum; }
+  static float pair(float a, float b) { return std::min(a, b); }
+};
+
+struct Harmonic {
+  static constexpr float kStart = 0;
+  static float fold(float sum, float value) { return sum + 1.0F / value; }
+  static float finish(float sum, float inputs) { return inputs / sum; }
+  /// 2ab / (a + b) with one division, without a product that could leave the range of floats and
+  /// without a branch for 0/0.
+  static float pair(float a, float b) {
+    const float low = std::min(a, b);
+    const float high = std::max(a, b);
+    return 2 * low * (high / std::max(low + high, kSmallest));
+  }
+};
+
+struct Geometric {
+  static constexpr float kStart = 0;
+  static float fold(float sum, float value) { return sum + std::log(value); }
+  static float finish(float sum, float inputs) { return std::exp(sum / inputs); }
+  static float pair(float a, float b) { return std::sqrt(a) * std::sqrt(b); }
+};
+
+struct Arithmetic {
+  static constexpr float kStart = 0;
+  static float fold(float sum, float value) { return sum + value; }
+  static float finish(float sum, float inputs) { return sum / inputs; }
+  static float pair(float a, float b) { return (a + b) / 2; }
+};
+
+struct Rms {
+  static constexpr float kStart = 0;
+  static float fold(float sum, float value) { return sum + value * value; }
+  static float finish(float sum, float inputs) { return std::sqrt(sum / inputs); }
+  static float pair(float a, float b) { return std::sqrt((a * a + b * b) / 2); }
+};
+
+struct Max {
+  static constexpr float kStart = 0;
+  static float fold(float sum, float value) { return std::max(sum, value); }
+  static float finish(float sum, float) { return sum; }
+  static float pair(float a, float b) { return std::max(a, b); }
+};
+
+template <typename Rule>
+void fold(float* sum, const float* values, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) sum[i] = Rule::fold(sum[i], values[i]);
+}
+
+template <typename Rule>
+void finish(float* sum, float inputs, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) sum[i] = Rule::finish(sum[i], inputs);
+}
+
+template <typename Rule>
+void pair(float* values, const float* others, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) values[i] = Rule::pair(values[i], others[i]);
+}
+
+template <typename Rule>
+constexpr FusionSteps steps() {
+  return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>};
+}
+
+}  // namespace
+
+const FusionFunctions& plainFusion() {
+  static constexpr FusionFunctions kFunctions = {steps<Min>(),       steps<Harmonic>(),
+                                                 steps<Geometric>(), steps<Arithmetic>(),
+                                                 steps<Rms>(),       steps<Max>()};
+  return kFunctions;
+}
+
+}  // namespace efm::kernels
