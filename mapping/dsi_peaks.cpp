@@ -2,6 +2,9 @@
 #include "mapping/dsi_peaks.h"
 
 #include <algorithm>
+#include <cassert>
+
+#include "mapping/kernels/peaks.h"
 
 namespace efm {
 namespace {
@@ -9,38 +12,35 @@ namespace {
 constexpr float kNoValue = -1;
 
 template <typename Value>
-cv::Mat_<Value> imageOf(const std::vector<Value>& values, const ReferenceView& view) {
-  cv::Mat_<Value> image(view.height, view.width);
-  std::copy(values.begin(), values.end(), image.begin());
-  return image;
+void write(const std::vector<Value>& values, cv::Mat_<Value> tile) {
+  assert(values.size() == tile.total());
+  auto row = values.begin();
+  for (int y = 0; y < tile.rows; ++y, row += tile.cols) std::copy_n(row, tile.cols, tile[y]);
 }
 
 }  // namespace
 
-RunningPeaks::RunningPeaks(std::size_t pixels)
-    : best_(pixels, kNoValue),
+DsiPeaks unwrittenPeaks(const ReferenceView& view) {
+  const cv::Size size(view.width, view.height);
+  return {cv::Mat1f(size), cv::Mat1i(size), cv::Mat1f(size), cv::Mat1f(size)};
+}
+
+RunningPeaks::RunningPeaks(std::size_t pixels, VotingKernel kernel)
+    : functions_(&kernels::peakFunctions(kernel)),
+      best_(pixels, kNoValue),
       before_(pixels, kNoValue),
       after_(pixels, kNoValue),
       plane_(pixels, -1),
       previous_(pixels, kNoValue) {}
 
 void RunningPeaks::take(int plane, const std::vector<float>& values) {
+  assert(values.size() == best_.size());
   if (first_.empty()) {
     first_ = values;
     first_plane_ = plane;
   }
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const float value = values[i];
-    if (value > best_[i]) {
-      best_[i] = value;
-      before_[i] = previous_[i];
-      after_[i] = kNoValue;
-      plane_[i] = plane;
-    } else if (plane_[i] == plane - 1) {
-      after_[i] = value;
-    }
-    previous_[i] = value;
-  }
+  functions_->take({best_.data(), plane_.data(), before_.data(), after_.data(), previous_.data()},
+                   plane, values.data(), values.size());
 }
 
 void RunningPeaks::append(const RunningPeaks& next) {
@@ -58,8 +58,16 @@ void RunningPeaks::append(const RunningPeaks& next) {
 }
 
 DsiPeaks RunningPeaks::images(const ReferenceView& view) const {
-  return {imageOf(best_, view), imageOf(plane_, view), imageOf(before_, view),
-          imageOf(after_, view)};
+  DsiPeaks images = unwrittenPeaks(view);
+  writeTo(images, {0, 0, view.width, view.height});
+  return images;
+}
+
+void RunningPeaks::writeTo(DsiPeaks& images, const cv::Rect& tile) const {
+  write(best_, images.confidence(tile));
+  write(plane_, images.plane(tile));
+  write(before_, images.before(tile));
+  write(after_, images.after(tile));
 }
 
 }  // namespace efm

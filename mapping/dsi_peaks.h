@@ -7,8 +7,13 @@
 #include <vector>
 
 #include "mapping/reference_view.h"
+#include "mapping/voting_kernel.h"
 
 namespace efm {
+
+namespace kernels {
+struct PeakFunctions;
+}  // namespace kernels
 
 /// The peak of the fused DSI along every ray of the reference view: four images of its size.
 struct DsiPeaks {
@@ -18,21 +23,31 @@ struct DsiPeaks {
   cv::Mat1f after;       ///< The value one plane farther; -1 at the farthest plane.
 };
 
-/// The best value along each ray over a group of consecutive planes, taken one by one, and the
-/// group's outermost planes: what its neighbours need to complete their peaks. Groups that follow
-/// each other join to what one group over all planes would have found, bit for bit.
+/// Images of a view's size, to be written: their pixels have no values yet.
+DsiPeaks unwrittenPeaks(const ReferenceView& view);
+
+/// The best value along each ray of a view or of a tile of it, over a group of consecutive planes,
+/// taken one by one, and the group's outermost planes: what its neighbours need to complete their
+/// peaks. Groups that follow each other join to what one group over all planes would have found,
+/// bit for bit.
 class RunningPeaks {
  public:
-  explicit RunningPeaks(std::size_t pixels);
+  /// @param kernel an available one; every kernel gives the same bits.
+  explicit RunningPeaks(std::size_t pixels, VotingKernel kernel = fastestKernel());
 
   /// Planes in increasing order, without a gap.
   void take(int plane, const std::vector<float>& values);
   /// Takes in the group that follows this one.
   void append(const RunningPeaks& next);
 
+  /// Of pixels that are the whole view.
   DsiPeaks images(const ReferenceView& view) const;
+  /// Writes pixels that are a tile of the view, row by row, into its place. Tiles that do not
+  /// overlap may be written by several threads at once.
+  void writeTo(DsiPeaks& images, const cv::Rect& tile) const;
 
  private:
+  const kernels::PeakFunctions* functions_;
   std::vector<float> best_;
   std::vector<float> before_;
   std::vector<float> after_;

@@ -103,8 +103,9 @@ SweepResult SpaceSweep::run(const std::vector<CameraRays>& cameras, const Refere
   std::vector<PlaneGroup> groups = groupPlanes(planes.size(), options_.threadsOrCores());
 
   const auto sweep_group = [&](PlaneGroup& group) {
-    RunningPeaks& peaks = group.peaks.emplace(view.pixels());
-    group.camera_peaks.assign(kept_cameras, RunningPeaks(view.pixels()));
+    RunningPeaks& peaks = group.peaks.emplace(view.pixels(), options_.kernelOrFastest());
+    group.camera_peaks.assign(kept_cameras,
+                              RunningPeaks(view.pixels(), options_.kernelOrFastest()));
     group.votes.resize(cameras.size());
     PlaneFusion fusion(
         options_.fusion, static_cast<int>(cameras.size()), static_cast<int>(cameras.front().size()),

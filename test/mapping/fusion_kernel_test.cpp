@@ -66,7 +66,8 @@ std::vector<float> randomValues(std::mt19937& random, std::size_t n) {
 }
 
 bool sameBits(const std::vector<float>& a, const std::vector<float>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
+  const std::size_t bytes = a.size() * sizeof(float);
+  return a.size() == b.size() && (bytes == 0 || std::memcmp(a.data(), b.data(), bytes) == 0);
 }
 
 /// The three steps of a rule by themselves.

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/kernels/peaks.h"
+
+#include "mapping/kernels/highway_targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "mapping/kernels/peaks.cpp"
+#include <hwy/foreach_target.h>
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace efm::kernels::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Stores the value's lanes where the mask says so.
+template <class D, class M>
+HWY_INLINE void storeWhere(D d, M where, hn::Vec<D> value, hn::TFromD<D>* to) {
+#if HWY_TARGET == HWY_AVX3
+  // Masked stores are cheap here alone. A vector of one lane must not use them: its mask has more.
+  if constexpr (hn::MaxLanes(D()) > 1) return hn::BlendedStore(value, where, d, to);
+#endif
+  hn::StoreU(hn::IfThenElse(where, value, hn::LoadU(d, to)), d, to);
+}
+
+/// Pixels [i, n) by whole vectors of the tag's lanes. @return the first pixel left.
+template <class D>
+HWY_INLINE std::size_t takeBy(D d, std::size_t i, std::size_t n, const PeakArrays& peaks,
+                              std::int32_t plane, const float* values) {
+  const hn::RebindToSigned<D> d_plane;
+  const auto none = hn::Set(d, -1.0F);
+  const auto this_plane = hn::Set(d_plane, plane);
+  const auto last_plane = hn::Set(d_plane, plane - 1);
+  for (; i + hn::Lanes(d) <= n; i += hn::Lanes(d)) {
+    const auto value = hn::LoadU(d, values + i);
+    const auto previous = hn::LoadU(d, peaks.previous + i);
+    const auto better = hn::Gt(value, hn::LoadU(d, peaks.best + i));
+    const auto follows = hn::RebindMask(d, hn::Eq(hn::LoadU(d_plane, peaks.plane + i), last_plane));
+    // No branch where no lane changes: noise makes it unpredictable, and that costs more.
+    storeWhere(d, better, value, peaks.best + i);
+    storeWhere(d_plane, hn::RebindMask(d_plane, better), this_plane, peaks.plane + i);
+    storeWhere(d, better, previous, peaks.before + i);
+    storeWhere(d, hn::Or(better, follows), hn::IfThenElse(better, none, value), peaks.after + i);
+    hn::StoreU(value, d, peaks.previous + i);
+  }
+  return i;
+}
+
+// Full vectors first, then the rest in vectors of one lane.
+void take(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
+  const std::size_t done = takeBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
+  takeBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
+}
+
+constexpr PeakFunctions kPeaks = {take};
+
+}  // namespace efm::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace efm::kernels {
+
+const PeakFunctions& peakFunctions(VotingKernel kernel) {
+  static const KernelTable<PeakFunctions> kTable = EFM_KERNEL_TABLE(plainPeaks(), kPeaks);
+  return kernelIn(kTable, kernel);
+}
+
+}  // namespace efm::kernels
+#endif
