@@ -25,7 +25,7 @@ constexpr Target kTargets[] = {
 
 std::vector<VotingKernel> runnableKernels() {
   // What the compiler may use everywhere runs, whatever Highway's own build detects.
-  const std::int64_t runnable = (hwy::SupportedTargets() | HWY_STATIC_TARGET) & HWY_TARGETS;
+  const std::int64_t runnable = (HWY_SUPPORTED_TARGETS | HWY_STATIC_TARGET) & HWY_TARGETS;
   std::vector<VotingKernel> kernels = {VotingKernel::kPlain};
   for (const Target& target : kTargets) {
     if ((runnable & target.bits) != 0) kernels.push_back(target.kernel);
