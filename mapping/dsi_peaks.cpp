@@ -12,7 +12,7 @@ namespace {
 constexpr float kNoValue = -1;
 
 template <typename Value>
-void write(const std::vector<Value>& values, cv::Mat_<Value> tile) {
+void write(const PixelValues<Value>& values, cv::Mat_<Value> tile) {
   assert(values.size() == tile.total());
   auto row = values.begin();
   for (int y = 0; y < tile.rows; ++y, row += tile.cols) std::copy_n(row, tile.cols, tile[y]);
@@ -33,7 +33,7 @@ RunningPeaks::RunningPeaks(std::size_t pixels, VotingKernel kernel)
       plane_(pixels, -1),
       previous_(pixels, kNoValue) {}
 
-void RunningPeaks::take(int plane, const std::vector<float>& values) {
+void RunningPeaks::take(int plane, const PlaneValues& values) {
   assert(values.size() == best_.size());
   if (first_.empty()) {
     first_ = values;

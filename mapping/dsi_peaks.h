@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
-#include <vector>
 
+#include "mapping/plane_values.h"
 #include "mapping/reference_view.h"
 #include "mapping/voting_kernel.h"
 
@@ -36,7 +36,7 @@ class RunningPeaks {
   explicit RunningPeaks(std::size_t pixels, VotingKernel kernel = fastestKernel());
 
   /// Planes in increasing order, without a gap.
-  void take(int plane, const std::vector<float>& values);
+  void take(int plane, const PlaneValues& values);
   /// Takes in the group that follows this one.
   void append(const RunningPeaks& next);
 
@@ -48,13 +48,13 @@ class RunningPeaks {
 
  private:
   const kernels::PeakFunctions* functions_;
-  std::vector<float> best_;
-  std::vector<float> before_;
-  std::vector<float> after_;
-  std::vector<std::int32_t> plane_;
+  PlaneValues best_;
+  PlaneValues before_;
+  PlaneValues after_;
+  PixelValues<std::int32_t> plane_;
   int first_plane_ = 0;
-  std::vector<float> first_;     // the values of the group's first plane
-  std::vector<float> previous_;  // and of the last one taken
+  PlaneValues first_;     // the values of the group's first plane
+  PlaneValues previous_;  // and of the last one taken
 };
 
 }  // namespace efm

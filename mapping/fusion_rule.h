@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/plane_values.h"
 #include "mapping/voting_kernel.h"
 
 namespace efm {
@@ -41,16 +42,16 @@ class FusionAccumulator {
   void fold(const float* values);
   void finish();
 
-  const std::vector<float>& values() const { return values_; }
+  const PlaneValues& values() const { return values_; }
 
   /// Where the first of two inputs may be written before it is folded, which saves a copy.
-  std::vector<float>& place() { return values_; }
+  PlaneValues& place() { return values_; }
 
  private:
   const kernels::FusionSteps* steps_;
   int inputs_ = 0;
   int folded_ = 0;
-  std::vector<float> values_;
+  PlaneValues values_;
 };
 
 }  // namespace efm

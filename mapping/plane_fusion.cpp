@@ -39,11 +39,11 @@ PlaneFusion::PlaneFusion(const FusionOptions& options, int cameras, int slots, s
   }
 }
 
-const std::vector<float>& PlaneFusion::fuseInner(int outer, const Vote& vote) {
+const PlaneValues& PlaneFusion::fuseInner(int outer, const Vote& vote) {
   inner_.begin(inner_count_);
   for (int inner = 0; inner < inner_count_; ++inner) {
     const int camera = cameras_first_ ? inner : outer;
-    std::vector<float>& votes = inner_count_ == 2 && inner == 0 ? inner_.place() : votes_;
+    PlaneValues& votes = inner_count_ == 2 && inner == 0 ? inner_.place() : votes_;
     vote(camera, cameras_first_ ? outer : inner, votes);
     if (!cameras_.empty()) cameras_[static_cast<std::size_t>(camera)].fold(votes.data());
     if (inner_count_ > 1) inner_.fold(votes.data());
@@ -53,9 +53,9 @@ const std::vector<float>& PlaneFusion::fuseInner(int outer, const Vote& vote) {
   return inner_.values();
 }
 
-const std::vector<float>& PlaneFusion::fuse(const Vote& vote) {
+const PlaneValues& PlaneFusion::fuse(const Vote& vote) {
   for (FusionAccumulator& camera : cameras_) camera.begin(slots_);
-  const std::vector<float>* fused = nullptr;
+  const PlaneValues* fused = nullptr;
   if (outer_count_ == 1) {
     fused = &fuseInner(0, vote);
   } else {

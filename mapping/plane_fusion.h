@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapping/fusion_rule.h"
+#include "mapping/plane_values.h"
 
 namespace efm {
 
@@ -34,7 +35,7 @@ struct FusionOptions {
 class PlaneFusion {
  public:
   /// Fills the plane with the ray density of one camera in one slot of the time axis.
-  using Vote = std::function<void(int camera, int slot, std::vector<float>& votes)>;
+  using Vote = std::function<void(int camera, int slot, PlaneValues& votes)>;
 
   /// What else is kept of a plane.
   enum class Keep {
@@ -49,21 +50,21 @@ class PlaneFusion {
               Keep keep = Keep::kFusedOnly, VotingKernel kernel = fastestKernel());
 
   /// Asks for every input once. @return the fused plane, until the next call.
-  const std::vector<float>& fuse(const Vote& vote);
+  const PlaneValues& fuse(const Vote& vote);
 
   /// A camera's own plane after `fuse`, where cameras are kept.
-  const std::vector<float>& ofCamera(int camera) const {
+  const PlaneValues& ofCamera(int camera) const {
     return cameras_[static_cast<std::size_t>(camera)].values();
   }
 
  private:
-  const std::vector<float>& fuseInner(int outer, const Vote& vote);
+  const PlaneValues& fuseInner(int outer, const Vote& vote);
 
   bool cameras_first_;
   int slots_;
   int inner_count_;
   int outer_count_;
-  std::vector<float> votes_;
+  PlaneValues votes_;
   FusionAccumulator inner_;
   FusionAccumulator outer_;
   std::vector<FusionAccumulator> cameras_;

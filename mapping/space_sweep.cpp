@@ -47,7 +47,7 @@ kernels::RayTransfer narrow(const RayPacket& packet, const PlaneTransfer& transf
 
 /// Votes one camera's rays on one plane; `votes` is cleared first.
 VoteCounts votePlane(const RayBundle& camera, const ReferenceView& view, double depth_m,
-                     std::vector<float>& votes) {
+                     PlaneValues& votes) {
   std::fill(votes.begin(), votes.end(), 0.0F);
   const kernels::VotePlane plane{votes.data(), view.width, view.height};
   VoteCounts counts;
@@ -113,8 +113,8 @@ SweepResult SpaceSweep::run(const std::vector<CameraRays>& cameras, const Refere
         request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
         options_.kernelOrFastest());
     for (int plane = group.begin; plane < group.end; ++plane) {
-      const std::vector<float>& fused =
-          fusion.fuse([&](int camera, int slot, std::vector<float>& votes) {
+      const PlaneValues& fused =
+          fusion.fuse([&](int camera, int slot, PlaneValues& votes) {
             const auto c = static_cast<std::size_t>(camera);
             group.votes[c] += votePlane(cameras[c][static_cast<std::size_t>(slot)], view,
                                         planes.depth(plane), votes);

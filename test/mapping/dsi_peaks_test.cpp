@@ -14,11 +14,11 @@
 namespace efm {
 namespace {
 
-using Planes = std::vector<std::vector<float>>;
+using Planes = std::vector<PlaneValues>;
 
 /// Small whole numbers, so that many planes tie.
 Planes randomPlanes(std::mt19937& random, int planes, std::size_t pixels) {
-  Planes values(static_cast<std::size_t>(planes), std::vector<float>(pixels));
+  Planes values(static_cast<std::size_t>(planes), PlaneValues(pixels));
   for (auto& plane : values) {
     for (float& value : plane) value = static_cast<float>(random() % 6);
   }
@@ -92,7 +92,7 @@ TEST_P(RunningPeaksOn, TilesFillTheView) {
       const cv::Rect tile = cv::Rect(x, y, kSide, kSide) & cv::Rect(0, 0, view.width, view.height);
       RunningPeaks peaks(static_cast<std::size_t>(tile.area()), GetParam());
       for (std::size_t p = 0; p < planes.size(); ++p) {
-        std::vector<float> values;
+        PlaneValues values;
         for (int row = tile.y; row < tile.br().y; ++row) {
           const auto begin = planes[p].begin() + row * view.width + tile.x;
           values.insert(values.end(), begin, begin + tile.width);

@@ -38,7 +38,7 @@ float fuse(VotingKernel kernel, FusionRule rule, const std::vector<float>& input
   accumulator.begin(static_cast<int>(inputs.size()));
   for (const float input : inputs) accumulator.fold(std::vector<float>(kVoxels, input).data());
   accumulator.finish();
-  const std::vector<float>& values = accumulator.values();
+  const PlaneValues& values = accumulator.values();
   const bool same = std::all_of(values.begin(), values.end(),
                                 [&](float value) { return value == values.front(); });
   return same ? values.front() : std::numeric_limits<float>::quiet_NaN();

@@ -26,14 +26,14 @@ constexpr std::size_t kVoxels = 35;
 constexpr double kRounding = 5e-5;
 
 /// Ray densities of one plane: [camera][slot][voxel].
-using Densities = std::vector<std::vector<std::vector<float>>>;
+using Densities = std::vector<std::vector<PlaneValues>>;
 
 /// Zero in one voxel out of eight, else anything from 1e-4 to 1e4.
 Densities randomDensities(std::mt19937& random, int cameras, int slots) {
   std::uniform_real_distribution<double> exponent(-4, 4);
   Densities densities(static_cast<std::size_t>(cameras));
   for (auto& camera : densities) {
-    camera.assign(static_cast<std::size_t>(slots), std::vector<float>(kVoxels));
+    camera.assign(static_cast<std::size_t>(slots), PlaneValues(kVoxels));
     for (auto& slot : camera) {
       for (float& value : slot) {
         value = random() % 8 == 0 ? 0.0F : static_cast<float>(std::pow(10.0, exponent(random)));
@@ -44,7 +44,7 @@ Densities randomDensities(std::mt19937& random, int cameras, int slots) {
 }
 
 PlaneFusion::Vote votesOf(const Densities& densities) {
-  return [&densities](int camera, int slot, std::vector<float>& votes) {
+  return [&densities](int camera, int slot, PlaneValues& votes) {
     votes = densities[static_cast<std::size_t>(camera)][static_cast<std::size_t>(slot)];
   };
 }
@@ -59,8 +59,7 @@ PlaneFusion fusionOf(VotingKernel kernel, const Densities& densities, const Fusi
           kernel};
 }
 
-std::vector<float> fuse(VotingKernel kernel, const Densities& densities,
-                        const FusionOptions& options) {
+PlaneValues fuse(VotingKernel kernel, const Densities& densities, const FusionOptions& options) {
   PlaneFusion fusion = fusionOf(kernel, densities, options);
   return fusion.fuse(votesOf(densities));
 }
@@ -89,7 +88,7 @@ std::string labelOf(const Densities& densities, const FusionOptions& options) {
          std::string(nameOf(options.order));
 }
 
-void expectNear(const std::vector<float>& a, const std::vector<float>& b, double relative,
+void expectNear(const PlaneValues& a, const PlaneValues& b, double relative,
                 const std::string& label) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -108,7 +107,7 @@ TEST_P(PlaneFusionOn, EveryPairOfRulesInEitherOrderIsTheOracles) {
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     forEachInput(seed, [](const Densities& densities) {
       forEachChoice([&](const FusionOptions& options) {
-        const std::vector<float> fused = fuse(GetParam(), densities, options);
+        const PlaneValues fused = fuse(GetParam(), densities, options);
         ASSERT_EQ(fused.size(), kVoxels);
         for (std::size_t i = 0; i < kVoxels; ++i) {
           std::vector<std::vector<double>> values;
@@ -126,9 +125,9 @@ TEST_P(PlaneFusionOn, EveryPairOfRulesInEitherOrderIsTheOracles) {
 
 TEST_P(PlaneFusionOn, EqualRulesOnBothAxesAreOrderedAndBetweenTheExtremes) {
   forEachInput(11, [](const Densities& densities) {
-    std::vector<float> previous = fuse(GetParam(), densities, {FusionRule::kMin, FusionRule::kMin});
+    PlaneValues previous = fuse(GetParam(), densities, {FusionRule::kMin, FusionRule::kMin});
     for (const FusionRule rule : allFusionRules()) {  // min, H, G, A, RMS, max
-      const std::vector<float> fused = fuse(GetParam(), densities, {rule, rule});
+      const PlaneValues fused = fuse(GetParam(), densities, {rule, rule});
       for (std::size_t i = 0; i < kVoxels; ++i) {
         ASSERT_GE(fused[i], previous[i] * (1 - kRounding)) << nameOf(rule);
       }
@@ -141,9 +140,9 @@ TEST_P(PlaneFusionOn, AHigherRuleOnEitherAxisNeverLowersTheResult) {
   const auto& rules = allFusionRules();
   forEachInput(12, [&](const Densities& densities) {
     forEachChoice([&](const FusionOptions& options) {
-      const std::vector<float> fused = fuse(GetParam(), densities, options);
+      const PlaneValues fused = fuse(GetParam(), densities, options);
       const auto check = [&](FusionOptions higher) {
-        const std::vector<float> raised = fuse(GetParam(), densities, higher);
+        const PlaneValues raised = fuse(GetParam(), densities, higher);
         for (std::size_t i = 0; i < kVoxels; ++i) {
           ASSERT_GE(raised[i], fused[i] * (1 - kRounding)) << labelOf(densities, options);
         }
@@ -207,8 +206,8 @@ TEST_P(PlaneFusionOn, TheSameRuleOnBothAxesCommutes) {
 }
 
 TEST_P(PlaneFusionOn, DifferentRulesDoNotCommute) {
-  const Densities densities = {{std::vector<float>(kVoxels, 1), std::vector<float>(kVoxels, 9)},
-                               {std::vector<float>(kVoxels, 4), std::vector<float>(kVoxels, 1)}};
+  const Densities densities = {{PlaneValues(kVoxels, 1), PlaneValues(kVoxels, 9)},
+                               {PlaneValues(kVoxels, 4), PlaneValues(kVoxels, 1)}};
   const FusionRule h = FusionRule::kHarmonic;
   const FusionRule a = FusionRule::kArithmetic;
   // (H(1, 4) + H(9, 1)) / 2 = (1.6 + 1.8) / 2, and H(5, 2.5) = 10 / 3.
@@ -216,7 +215,7 @@ TEST_P(PlaneFusionOn, DifferentRulesDoNotCommute) {
   EXPECT_FLOAT_EQ(fuse(GetParam(), densities, {h, a, FusionOrder::kTimeThenCameras})[0], 10.0F / 3);
 }
 
-bool sameBits(const std::vector<float>& a, const std::vector<float>& b) {
+bool sameBits(const PlaneValues& a, const PlaneValues& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(float)) == 0;
 }
 
@@ -225,7 +224,7 @@ TEST_P(PlaneFusionOn, AnAxisOfOneInputIsLeftOutBitForBit) {
   const Densities one = randomDensities(random, 1, 1);
   const Densities in_time = randomDensities(random, 1, 5);
   const Densities in_cameras = randomDensities(random, 3, 1);
-  const auto folded = [](FusionRule rule, const std::vector<std::vector<float>>& inputs) {
+  const auto folded = [](FusionRule rule, const std::vector<PlaneValues>& inputs) {
     FusionAccumulator accumulator(rule, kVoxels, GetParam());
     accumulator.begin(static_cast<int>(inputs.size()));
     for (const auto& input : inputs) accumulator.fold(input.data());
@@ -248,7 +247,7 @@ TEST_P(PlaneFusionOn, KeptCamerasAreFusedAcrossTimeAloneAndChangeNothing) {
   forEachInput(17, [](const Densities& densities) {
     forEachChoice([&](const FusionOptions& options) {
       PlaneFusion fusion = fusionOf(GetParam(), densities, options, PlaneFusion::Keep::kCameras);
-      const std::vector<float> fused = fusion.fuse(votesOf(densities));
+      const PlaneValues fused = fusion.fuse(votesOf(densities));
       ASSERT_TRUE(sameBits(fused, fuse(GetParam(), densities, options)))
           << labelOf(densities, options);
       for (std::size_t c = 0; c < densities.size(); ++c) {
@@ -277,7 +276,7 @@ TEST_P(PlaneFusionOn, AsksForEveryInputOnce) {
     std::vector<int> asked(3 * 4);
     PlaneFusion fusion({FusionRule::kMin, FusionRule::kMax, order}, 3, 4, kVoxels,
                        PlaneFusion::Keep::kFusedOnly, GetParam());
-    fusion.fuse([&](int camera, int slot, std::vector<float>&) {
+    fusion.fuse([&](int camera, int slot, PlaneValues&) {
       ++asked[static_cast<std::size_t>(4 * camera + slot)];
     });
     EXPECT_THAT(asked, ::testing::Each(1));
