@@ -37,7 +37,9 @@ UndistortionTable::UndistortionTable(const CameraModel& model) {
   std::vector<cv::Point2d> row(static_cast<std::size_t>(width_));
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) row[static_cast<std::size_t>(x)] = cv::Point2d(x, y);
-    for (const cv::Point2d& ray : undistort(model, row)) rays_.emplace_back(ray.x, ray.y);
+    for (const cv::Point2d& ray : undistort(model, row)) {
+      rays_.emplace_back(static_cast<float>(ray.x), static_cast<float>(ray.y));
+    }
   }
 }
 

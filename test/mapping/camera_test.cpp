@@ -39,8 +39,9 @@ TEST(Undistortion, EveryRayProjectsBackToItsPixel) {
         largest_px = std::max(largest_px, (pixel - Eigen::Vector2d(x, y)).norm());
       }
     }
-    // The iteration stops at 1e-9 px or better; a thousandth of a packet's error is far above.
-    EXPECT_LT(largest_px, 1e-6) << nameOf(model.distortion);
+    // The iteration stops at 1e-9 px or better. What is left is the rounding to floats: 2^-25 of
+    // offsets of up to 200 px from the principal point, a thousandth of a packet's error.
+    EXPECT_LT(largest_px, 2e-5) << nameOf(model.distortion);
   }
 }
 
