@@ -65,7 +65,7 @@ class BundleBuilder {
   }
 
  private:
-  Eigen::Vector2f rayOf(const Event& event) const {
+  const Eigen::Vector2f& rayOf(const Event& event) const {
     return undistortion_
         .rays()[std::size_t{event.y} * static_cast<std::size_t>(undistortion_.width()) + event.x];
   }
@@ -84,7 +84,7 @@ class BundleBuilder {
     float* x = bundle_.x_inf.data() + first;
     float* y = bundle_.y_inf.data() + first;
     for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector2f ray = rayOf(events_[packet.begin + i]);
+      const Eigen::Vector2f& ray = rayOf(events_[packet.begin + i]);
       x[i] = ray.x();
       y[i] = ray.y();
     }
@@ -109,7 +109,7 @@ class BundleBuilder {
   void appendSome(const PosePacket& packet, const InfinityHomography& project, bool forward) {
     const std::size_t begin = bundle_.size();
     for (std::size_t i = packet.begin; i < packet.end; ++i) {
-      const Eigen::Vector2f ray_cam = rayOf(events_[i]);
+      const Eigen::Vector2f& ray_cam = rayOf(events_[i]);
       const ProjectedRay ray = project(ray_cam.x(), ray_cam.y());
       if ((ray.z < 0) == forward) continue;
       bundle_.x_inf.push_back(ray.x);
