@@ -2,114 +2,99 @@
 #include "mapping/pose_packets.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 #include <optional>
 
+#include "mapping/camera_motion.h"
 #include "mapping/option_check.h"
+#include "mapping/vote_motion.h"
 
 namespace efm {
 namespace {
 
-constexpr std::size_t kGridSide = 3;
-
-/// Viewing rays spread over the sensor, corners included.
-std::array<Eigen::Vector3d, kGridSide * kGridSide> gridRays(const UndistortionTable& table) {
-  std::array<Eigen::Vector3d, kGridSide * kGridSide> rays;
-  const auto spread = [](std::size_t i, int side) {
-    return static_cast<int>(i) * (side - 1) / static_cast<int>(kGridSide - 1);
-  };
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    const int x = spread(i % kGridSide, table.width());
-    const int y = spread(i / kGridSide, table.height());
-    rays[i] = table.ray(x, y).homogeneous();
-  }
-  return rays;
-}
-
+/// The events of one camera during one segment of the trajectory, into packets.
 class PacketSplitter {
  public:
-  PacketSplitter(EventSpan events, const RigCamera& camera, const UndistortionTable& undistortion,
-                 const PacketGeometry& geometry, double error_px)
-      : events_(events),
-        T_rig_cam_(camera.T_rig_cam),
-        rays_(gridRays(undistortion)),
-        geometry_(geometry),
-        error_px_(error_px) {}
+  PacketSplitter(EventSpan events, const CameraMotion& camera, const VoteGrid& grid,
+                 double error_px, std::vector<PosePacket>& packets)
+      : events_(events), camera_(camera), grid_(grid), error_px_(error_px), packets_(packets) {}
 
-  /// Splits events [begin, end), which lie in one segment, at the middle of their time until each
-  /// part is good enough.
-  void split(const TrajectorySegment& segment, std::size_t begin, std::size_t end,
-             std::vector<PosePacket>& packets) const {
-    const std::int64_t first_ns = events_[begin].t_ns;
-    const std::int64_t last_ns = events_[end - 1].t_ns;
-    const std::int64_t middle_ns = first_ns + (last_ns - first_ns) / 2;
-    const Rigid3 T_ref_cam = pose(segment, middle_ns);
-    if (first_ns == last_ns || (error(T_ref_cam, pose(segment, first_ns)) <= error_px_ &&
-                                error(T_ref_cam, pose(segment, last_ns)) <= error_px_)) {
-      packets.push_back({begin, end, T_ref_cam});
-      return;
+  /// Splits events [begin, end) at the middle of their time until each part is good enough. Once
+  /// votes are seen to move evenly, how far they move in any part follows from their speed.
+  void split(std::size_t begin, std::size_t end) const {
+    const Span span = spanOf(begin, end);
+    if (span.first_ns == span.last_ns) return append(begin, end, camera_.poseAt(span.first_ns));
+    const Rigid3 T_ref_cam = camera_.poseAt(span.middle_ns);
+    const std::optional<VoteMotion> motion = measure(span, T_ref_cam);
+    if (motion && motion->fromMiddle() <= error_px_) return append(begin, end, T_ref_cam);
+    const std::size_t second_half = firstAfter(span.middle_ns, begin, end);
+    if (motion && motion->isEven()) {
+      splitBySpeed(*motion, begin, second_half);
+      splitBySpeed(*motion, second_half, end);
+    } else {
+      split(begin, second_half);
+      split(second_half, end);
     }
-    const Event* middle =
-        std::upper_bound(events_.begin() + begin, events_.begin() + end, middle_ns,
-                         [](std::int64_t t_ns, const Event& event) { return t_ns < event.t_ns; });
-    const auto second_half = static_cast<std::size_t>(middle - events_.begin());
-    split(segment, begin, second_half, packets);
-    split(segment, second_half, end, packets);
   }
 
  private:
-  Rigid3 pose(const TrajectorySegment& segment, std::int64_t t_ns) const {
-    return geometry_.T_ref_world * segment.poseAt(t_ns) * T_rig_cam_;
+  /// When some events happened.
+  struct Span {
+    std::int64_t first_ns;
+    std::int64_t middle_ns;
+    std::int64_t last_ns;
+  };
+
+  Span spanOf(std::size_t begin, std::size_t end) const {
+    const std::int64_t first_ns = events_[begin].t_ns;
+    const std::int64_t last_ns = events_[end - 1].t_ns;
+    return {first_ns, first_ns + (last_ns - first_ns) / 2, last_ns};
   }
 
-  /// Where a ray of frame `cam` meets the plane, in pixels; nothing where that is behind the
-  /// camera.
-  std::optional<Eigen::Vector2d> meet(const Rigid3& T_ref_cam, const Eigen::Vector3d& ray,
-                                      double depth_m) const {
-    const Eigen::Vector3d direction = T_ref_cam.rotation * ray;
-    const double along = (depth_m - T_ref_cam.translation.z()) / direction.z();
-    if (!(along > 0) || !std::isfinite(along)) return std::nullopt;
-    return geometry_.view.project(T_ref_cam.translation + along * direction);
+  std::size_t firstAfter(std::int64_t t_ns, std::size_t begin, std::size_t end) const {
+    const Event* first =
+        std::upper_bound(events_.begin() + begin, events_.begin() + end, t_ns,
+                         [](std::int64_t time, const Event& event) { return time < event.t_ns; });
+    return static_cast<std::size_t>(first - events_.begin());
   }
 
-  /// Inside the view or at most its own size away from it.
-  bool isNearView(const Eigen::Vector2d& pixel) const {
-    const ReferenceView& view = geometry_.view;
-    return pixel.x() >= -view.width && pixel.x() <= 2 * view.width && pixel.y() >= -view.height &&
-           pixel.y() <= 2 * view.height;
+  std::optional<VoteMotion> measure(const Span& span, const Rigid3& T_ref_cam) const {
+    const GridVotes first = grid_.votesFrom(camera_.poseAt(span.first_ns));
+    const GridVotes middle = grid_.votesFrom(T_ref_cam);
+    const GridVotes last = grid_.votesFrom(camera_.poseAt(span.last_ns));
+    return VoteMotion::between(span.first_ns, span.last_ns, {&first, &middle, &last});
   }
 
-  /// The largest distance between the votes of two poses, in pixels.
-  double error(const Rigid3& T_ref_cam0, const Rigid3& T_ref_cam1) const {
-    double near_view = 0;
-    double anywhere = 0;
-    bool any_near_view = false;
-    for (const double depth_m : {geometry_.nearest_depth_m, geometry_.farthest_depth_m}) {
-      for (const Eigen::Vector3d& ray : rays_) {
-        const auto pixel0 = meet(T_ref_cam0, ray, depth_m);
-        const auto pixel1 = meet(T_ref_cam1, ray, depth_m);
-        if (pixel0.has_value() != pixel1.has_value()) {
-          return std::numeric_limits<double>::infinity();
-        }
-        if (!pixel0) continue;
-        const double distance = (*pixel0 - *pixel1).norm();
-        anywhere = std::max(anywhere, distance);
-        if (!isNearView(*pixel0)) continue;
-        near_view = std::max(near_view, distance);
-        any_near_view = true;
-      }
+  void splitBySpeed(const VoteMotion& motion, std::size_t begin, std::size_t end) const {
+    const Span span = spanOf(begin, end);
+    if (motion.between(span.first_ns, span.middle_ns) <= error_px_ &&
+        motion.between(span.middle_ns, span.last_ns) <= error_px_) {
+      return append(begin, end, camera_.poseAt(span.middle_ns));
     }
-    return any_near_view ? near_view : anywhere;
+    const std::size_t second_half = firstAfter(span.middle_ns, begin, end);
+    splitBySpeed(motion, begin, second_half);
+    splitBySpeed(motion, second_half, end);
+  }
+
+  void append(std::size_t begin, std::size_t end, const Rigid3& T_ref_cam) const {
+    packets_.push_back({begin, end, T_ref_cam});
   }
 
   EventSpan events_;
-  Rigid3 T_rig_cam_;
-  std::array<Eigen::Vector3d, kGridSide * kGridSide> rays_;
-  PacketGeometry geometry_;
+  const CameraMotion& camera_;
+  const VoteGrid& grid_;
   double error_px_;
+  std::vector<PosePacket>& packets_;
 };
+
+/// One past the last event that shares a segment with event `begin`. At its end a segment gives way
+/// to the next one, except where the poses end.
+std::size_t endOfSegment(EventSpan events, std::size_t begin, const TrajectorySegment& segment) {
+  const std::int64_t end_ns = std::max(segment.last.t_ns, events[begin].t_ns + 1);
+  const Event* end =
+      std::lower_bound(events.begin() + begin, events.end(), end_ns,
+                       [](const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; });
+  return static_cast<std::size_t>(end - events.begin());
+}
 
 }  // namespace
 
@@ -122,7 +107,8 @@ PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,
                                  const PosePacketsOptions& options) {
-  const PacketSplitter splitter(events, camera, undistortion, geometry, options.packet_error_px);
+  const VoteGrid grid(undistortion, geometry.view, geometry.nearest_depth_m,
+                      geometry.farthest_depth_m);
   PosePackets result;
   std::size_t cursor = 0;
   std::size_t begin = 0;
@@ -133,14 +119,9 @@ PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
       ++begin;
       continue;
     }
-    // At its end a segment gives way to the next one, except where the poses end.
-    const std::int64_t last_ns = segment->last.t_ns;
-    std::size_t end = begin + 1;
-    while (end < events.size() &&
-           (events[end].t_ns < last_ns || events[end].t_ns == events[begin].t_ns)) {
-      ++end;
-    }
-    splitter.split(*segment, begin, end, result.packets);
+    const std::size_t end = endOfSegment(events, begin, *segment);
+    const CameraMotion motion(*segment, geometry.T_ref_world, camera.T_rig_cam);
+    PacketSplitter(events, motion, grid, options.packet_error_px, result.packets).split(begin, end);
     begin = end;
   }
   return result;

@@ -51,9 +51,10 @@ struct PacketGeometry {
 ///
 /// The error is measured on a grid of viewing rays over the whole sensor, at both ends of the
 /// packet, on the nearest and on the farthest plane: a camera that turns around a near point moves
-/// nothing there and everything behind it. Packets do not cross a recorded pose, so that the motion
-/// within one is a single smooth piece and its ends are its extremes. Rays that end far outside the
-/// view are left out where others do not.
+/// nothing there and everything behind it. Within a stretch of even motion it follows from how fast
+/// votes move there, to a percent and rather too large. Packets do not cross a recorded pose, so
+/// that the motion within one is a single smooth piece and its ends are its extremes. Rays that end
+/// far outside the view are left out where others do not.
 PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,
