@@ -2,11 +2,14 @@
 #include "mapping/depth_extraction.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "mapping/kept_pixels.h"
+#include "mapping/masked_median.h"
 #include "mapping/named_choice.h"
 #include "mapping/option_check.h"
 
@@ -47,42 +50,16 @@ cv::Mat1b standOut(const cv::Mat1b& grey, const DepthExtractionOptions& options)
   return mask;
 }
 
-/// Positions of the peaks between planes, where the mask is set.
-cv::Mat1f positionsOf(const DsiPeaks& peaks, const cv::Mat1b& mask, bool subplane) {
-  cv::Mat1f positions = cv::Mat1f::zeros(mask.size());
-  for (int y = 0; y < mask.rows; ++y) {
-    for (int x = 0; x < mask.cols; ++x) {
-      if (mask(y, x) == 0) continue;
-      const int plane = peaks.plane(y, x);
-      positions(y, x) =
-          static_cast<float>(subplane ? peakPosition(plane, peaks.before(y, x),
-                                                     peaks.confidence(y, x), peaks.after(y, x))
-                                      : plane);
-    }
-  }
+/// Positions of the kept peaks between planes.
+std::vector<float> positionsOf(const DsiPeaks& peaks, const KeptPixels& kept, bool subplane) {
+  std::vector<float> positions(kept.size());
+  kept.forEach([&](std::size_t i, cv::Point at) {
+    const int plane = peaks.plane(at);
+    positions[i] = static_cast<float>(
+        subplane ? peakPosition(plane, peaks.before(at), peaks.confidence(at), peaks.after(at))
+                 : plane);
+  });
   return positions;
-}
-
-/// Replaces each kept position by the lower median of the kept ones in the window around it.
-cv::Mat1f maskedMedian(const cv::Mat1f& positions, const cv::Mat1b& mask, int window) {
-  const int reach = window / 2;
-  cv::Mat1f medians = cv::Mat1f::zeros(mask.size());
-  std::vector<float> around;
-  for (int y = 0; y < mask.rows; ++y) {
-    for (int x = 0; x < mask.cols; ++x) {
-      if (mask(y, x) == 0) continue;
-      around.clear();
-      for (int j = std::max(0, y - reach); j <= std::min(mask.rows - 1, y + reach); ++j) {
-        for (int i = std::max(0, x - reach); i <= std::min(mask.cols - 1, x + reach); ++i) {
-          if (mask(j, i) != 0) around.push_back(positions(j, i));
-        }
-      }
-      const auto middle = around.begin() + static_cast<std::ptrdiff_t>((around.size() - 1) / 2);
-      std::nth_element(around.begin(), middle, around.end());
-      medians(y, x) = *middle;
-    }
-  }
-  return medians;
 }
 
 /// The image without the frame that is cleared; empty where nothing is left.
@@ -91,32 +68,26 @@ cv::Rect insideFrame(cv::Size size) {
           std::max(0, size.height - 2 * kFrame)};
 }
 
-void clearFrame(cv::Mat1b& mask) {
-  const cv::Rect inner = insideFrame(mask.size());
-  cv::Mat1b kept = cv::Mat1b::zeros(mask.size());
-  if (!inner.empty()) mask(inner).copyTo(kept(inner));
-  mask = kept;
-}
-
-/// The depth map of the kept pixels.
-DepthMap depthsAt(const cv::Mat1b& mask, const cv::Mat1f& positions, const DsiPeaks& peaks,
-                  const DepthPlanes& planes) {
-  DepthMap result{cv::Mat1f::zeros(mask.size()), peaks.confidence, cv::Mat1f::zeros(mask.size())};
-  for (int y = 0; y < mask.rows; ++y) {
-    for (int x = 0; x < mask.cols; ++x) {
-      if (mask(y, x) == 0) continue;
-      const double position = positions(y, x);
-      const double step = planes.inverseDepthStepAt(position);
-      const double variance =
-          peakVariance(peaks.before(y, x), peaks.confidence(y, x), peaks.after(y, x));
-      result.depth(y, x) = static_cast<float>(planes.depthAt(position));
-      // A single plane has no step: 0 times infinite would be nothing at all.
-      result.variance(y, x) =
-          static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
-    }
-  }
+/// The depth map of the kept pixels inside the frame. Shares the image of confidences.
+DepthMap depthsAt(const KeptPixels& kept, const std::vector<float>& positions,
+                  const DsiPeaks& peaks, const DepthPlanes& planes) {
+  const cv::Size size = peaks.confidence.size();
+  const cv::Rect inner = insideFrame(size);
+  DepthMap result{cv::Mat1f::zeros(size), peaks.confidence, cv::Mat1f::zeros(size)};
+  kept.forEach([&](std::size_t i, cv::Point at) {
+    if (!inner.contains(at)) return;
+    const double position = positions[i];
+    const double step = planes.inverseDepthStepAt(position);
+    const double variance = peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at));
+    result.depth(at) = static_cast<float>(planes.depthAt(position));
+    // A single plane has no step: 0 times infinite would be nothing at all.
+    result.variance(at) =
+        static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
+  });
   return result;
 }
+
+constexpr std::array<std::array<int, 2>, 4> kBeside{{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
 
 /// Whether the pixel at `a` is the better one to copy from.
 bool outranks(const DepthMap& map, cv::Point a, cv::Point b) {
@@ -124,28 +95,33 @@ bool outranks(const DepthMap& map, cv::Point a, cv::Point b) {
   return map.depth(a) < map.depth(b);
 }
 
-/// Grows the depths into empty pixels that a kept pixel lies beside.
-DepthMap dilated(const DepthMap& map) {
-  DepthMap grown{map.depth.clone(), map.confidence.clone(), map.variance.clone()};
-  const cv::Rect inner = insideFrame(map.depth.size());
-  const cv::Rect image(cv::Point(0, 0), map.depth.size());
-  for (int y = inner.y; y < inner.y + inner.height; ++y) {
-    for (int x = inner.x; x < inner.x + inner.width; ++x) {
-      const cv::Point here(x, y);
-      if (map.depth(here) > 0) continue;
-      std::optional<cv::Point> best;
-      for (const cv::Point& step : {cv::Point(0, -1), {-1, 0}, {1, 0}, {0, 1}}) {
-        const cv::Point there = here + step;
-        if (!image.contains(there) || !(map.depth(there) > 0)) continue;
-        if (!best || outranks(map, there, *best)) best = there;
-      }
-      if (!best) continue;
-      grown.depth(here) = map.depth(*best);
-      grown.confidence(here) = map.confidence(*best);
-      grown.variance(here) = map.variance(*best);
-    }
+/// Gives an empty pixel what the best of the kept ones beside it has.
+void fillFromBeside(const cv::Mat1b& mask, cv::Point here, DepthMap& map) {
+  const cv::Rect inner = insideFrame(mask.size());
+  std::optional<cv::Point> best;
+  for (const auto& [dx, dy] : kBeside) {
+    const cv::Point there = here + cv::Point(dx, dy);
+    if (!inner.contains(there) || mask(there) == 0) continue;
+    if (!best || outranks(map, there, *best)) best = there;
   }
-  return grown;
+  map.depth(here) = map.depth(*best);
+  map.confidence(here) = map.confidence(*best);
+  map.variance(here) = map.variance(*best);
+}
+
+/// Grows the depths into empty pixels that a kept pixel lies beside. In place: what is filled is
+/// not in the mask, and never copied from.
+void dilate(const KeptPixels& kept, const cv::Mat1b& mask, DepthMap& map) {
+  map.confidence = map.confidence.clone();  // it was the peaks'
+  const cv::Rect inner = insideFrame(mask.size());
+  kept.forEach([&](std::size_t, cv::Point at) {
+    if (!inner.contains(at)) return;
+    for (const auto& [dx, dy] : kBeside) {
+      const cv::Point beside = at + cv::Point(dx, dy);
+      const bool empty = inner.contains(beside) && mask(beside) == 0 && map.depth(beside) == 0;
+      if (empty) fillFromBeside(mask, beside, map);
+    }
+  });
 }
 
 }  // namespace
@@ -184,12 +160,13 @@ DepthMap extractDepth(const DsiPeaks& peaks, const DepthPlanes& planes,
                       std::optional<double> sequence_maximum) {
   options.validate();
   const double white = whiteOf(peaks.confidence, options.max_confidence, sequence_maximum);
-  cv::Mat1b mask = standOut(quantise(peaks.confidence, white), options);
-  const cv::Mat1f positions = positionsOf(peaks, mask, options.subplane);
-  const cv::Mat1f medians = maskedMedian(positions, mask, options.median_size);
-  clearFrame(mask);
-  const DepthMap map = depthsAt(mask, medians, peaks, planes);
-  return options.dilate ? dilated(map) : map;
+  const cv::Mat1b mask = standOut(quantise(peaks.confidence, white), options);
+  const KeptPixels kept(mask);
+  const std::vector<float> positions = positionsOf(peaks, kept, options.subplane);
+  const std::vector<float> medians = maskedMedian(kept, positions, options.median_size);
+  DepthMap map = depthsAt(kept, medians, peaks, planes);
+  if (options.dilate) dilate(kept, mask, map);
+  return map;
 }
 
 }  // namespace efm
