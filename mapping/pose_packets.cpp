@@ -66,8 +66,9 @@ class PacketSplitter {
 
   void splitBySpeed(const VoteMotion& motion, std::size_t begin, std::size_t end) const {
     const Span span = spanOf(begin, end);
-    if (motion.between(span.first_ns, span.middle_ns) <= error_px_ &&
-        motion.between(span.middle_ns, span.last_ns) <= error_px_) {
+    if (span.first_ns == span.last_ns ||
+        (motion.between(span.first_ns, span.middle_ns) <= error_px_ &&
+         motion.between(span.middle_ns, span.last_ns) <= error_px_)) {
       return append(begin, end, camera_.poseAt(span.middle_ns));
     }
     const std::size_t second_half = firstAfter(span.middle_ns, begin, end);
