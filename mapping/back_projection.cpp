@@ -22,15 +22,16 @@ class InfinityHomography {
  public:
   InfinityHomography(const Rigid3& T_ref_cam, const ReferenceView& view)
       : cx_(static_cast<float>(view.cx)), cy_(static_cast<float>(view.cy)) {
-    Eigen::Matrix3d H_ref_cam = T_ref_cam.rotation.toRotationMatrix();
-    H_ref_cam.row(0) *= view.fx;
-    H_ref_cam.row(1) *= view.fy;
-    H_ref_cam_ = H_ref_cam.cast<float>();
+    const Eigen::Matrix3d R_ref_cam = T_ref_cam.rotation.toRotationMatrix();
+    const Eigen::Matrix3d H_ref_cam = Eigen::Vector3d(view.fx, view.fy, 1).asDiagonal() * R_ref_cam;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) H_ref_cam_[i][j] = static_cast<float>(H_ref_cam(i, j));
+    }
   }
 
   ProjectedRay operator()(float ray_x, float ray_y) const {
     const auto row = [&](int i) {
-      return H_ref_cam_(i, 0) * ray_x + H_ref_cam_(i, 1) * ray_y + H_ref_cam_(i, 2);
+      return H_ref_cam_[i][0] * ray_x + H_ref_cam_[i][1] * ray_y + H_ref_cam_[i][2];
     };
     const float z = row(2);
     const float inverse_z = 1.0F / z;
@@ -38,7 +39,7 @@ class InfinityHomography {
   }
 
  private:
-  Eigen::Matrix3f H_ref_cam_;
+  float H_ref_cam_[3][3];
   float cx_;
   float cy_;
 };
@@ -90,7 +91,8 @@ class BundleBuilder {
     }
   }
 
-  /// Projects the rays from `begin` on in place. @return how many of them run backward.
+  /// Projects the rays from `begin` on in place. The homography is a copy, which writing to the
+  /// rays cannot change: it stays in registers. @return how many of them run backward.
   std::uint32_t projectFrom(std::size_t begin, const InfinityHomography project) {
     const std::size_t count = bundle_.size() - begin;
     float* x = bundle_.x_inf.data() + begin;
