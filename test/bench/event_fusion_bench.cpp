@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <benchmark/benchmark.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "test/bench/benches.h"
+#include "test/bench/machine.h"
+#include "test/bench/performance_ratios.h"
+#include "test/bench/performance_table.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace efm::bench;  // NOLINT(google-build-using-namespace)
+
+constexpr const char* kUsage =
+    "usage: event_fusion_bench [--quick] [--out DIR] [--commit TEXT] [GROUP ...] "
+    "[--benchmark_...]\n"
+    "Runs the groups (all of them: voting keyframe fusion extraction global_cloud reading growth)\n"
+    "and writes DIR/performance.csv and DIR/performance.md.\n";
+
+struct Group {
+  const char* name;
+  void (*run)(BenchSession&);
+};
+
+constexpr Group kGroups[] = {
+    {"voting", benchVoting},         {"keyframe", benchKeyframes},       {"fusion", benchFusion},
+    {"extraction", benchExtraction}, {"global_cloud", benchGlobalCloud}, {"reading", benchReading},
+    {"growth", benchGrowth}};
+
+struct Arguments {
+  bool quick = false;
+  fs::path out;
+  std::string commit = "unknown";
+  std::vector<std::string> groups;  // empty: all
+  std::vector<std::string> of_benchmark;
+};
+
+Arguments readArguments(const std::vector<std::string>& words) {
+  Arguments arguments;
+  for (auto word = words.begin(); word != words.end(); ++word) {
+    const auto value = [&] {
+      if (word + 1 == words.end()) throw std::invalid_argument(*word + ": expected a value");
+      return *++word;
+    };
+    const auto is_it = [&](const Group& group) { return *word == group.name; };
+    if (*word == "--quick") {
+      arguments.quick = true;
+    } else if (*word == "--out") {
+      arguments.out = value();
+    } else if (*word == "--commit") {
+      arguments.commit = value();
+    } else if (word->rfind("--benchmark_", 0) == 0) {
+      arguments.of_benchmark.push_back(*word);
+    } else if (std::any_of(std::begin(kGroups), std::end(kGroups), is_it)) {
+      arguments.groups.push_back(*word);
+    } else {
+      throw std::invalid_argument(*word + " is not known\n" + kUsage);
+    }
+  }
+  return arguments;
+}
+
+/// Members of a batch take turns unless told otherwise.
+void initializeBenchmark(std::string program, std::vector<std::string> words) {
+  words.insert(words.begin(), "--benchmark_enable_random_interleaving=true");
+  words.insert(words.begin(), std::move(program));
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  auto argc = static_cast<int>(argv.size());
+  benchmark::Initialize(&argc, argv.data());
+  if (benchmark::ReportUnrecognizedArguments(argc, argv.data())) {
+    throw std::invalid_argument(kUsage);
+  }
+}
+
+/// A folder that is there as long as this object.
+class ScratchFolder {
+ public:
+  ScratchFolder()
+      : path_(fs::temp_directory_path() / ("event_fusion_bench." + std::to_string(getpid()))) {
+    fs::create_directories(path_);
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+template <typename Write>
+void writeFile(const fs::path& file, Write write, const std::vector<PerformanceRow>& rows,
+               const Conditions& conditions) {
+  std::ofstream stream(file);
+  write(stream, rows, conditions);
+  stream.close();
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+  std::cout << "written to " << file.string() << '\n';
+}
+
+void run(const Arguments& arguments) {
+  if (!arguments.out.empty()) fs::create_directories(arguments.out);
+  Conditions conditions = describeMachine();
+  conditions.emplace_back("commit", arguments.commit);
+  conditions.emplace_back("load before", loadAverage());
+
+  const ScratchFolder scratch;
+  BenchPlan plan = arguments.quick ? BenchPlan::quick() : BenchPlan::full();
+  plan.scratch = scratch.path();
+  BenchSession session(plan);
+  for (const Group& group : kGroups) {
+    const auto& asked = arguments.groups;
+    if (!asked.empty() && std::find(asked.begin(), asked.end(), group.name) == asked.end()) {
+      continue;
+    }
+    group.run(session);
+  }
+  conditions.emplace_back("load after", loadAverage());
+
+  std::vector<PerformanceRow> rows = session.rows();
+  addRatios(rows);
+  addExponents(rows);
+  for (const PerformanceRow& row : rows) {
+    for (const Quantity& quantity : row.quantities) {
+      const bool derived = quantity.name == "exponent" || quantity.name.rfind("times_", 0) == 0;
+      if (!derived) continue;
+      std::cout << row.group << '/' << row.name << ' ' << row.kernel << ' ' << row.threads
+                << (row.threads == 1 ? " thread: " : " threads: ") << quantity.name << ' '
+                << quantity.value << '\n';
+    }
+  }
+  if (arguments.out.empty()) return;
+  writeFile(arguments.out / "performance.csv", writeCsv, rows, conditions);
+  writeFile(arguments.out / "performance.md", writeMarkdown, rows, conditions);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const Arguments arguments = readArguments({argv + 1, argv + argc});
+    initializeBenchmark(argv[0], arguments.of_benchmark);
+    run(arguments);
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "event_fusion_bench: " << error.what() << '\n';
+    return 1;
+  }
+}

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plugin/CObservationEvents.h"
+#include "plugin/rawlog_writer.h"
+#include "plugin/recording.h"
+#include "test/bench/benches.h"
+#include "test/bench/synthetic_window.h"
+
+namespace efm::bench {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder in the UZH layout: one camera, decimal seconds with nine digits.
+void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
+  fs::create_directories(folder);
+  const CameraModel& camera = made.rig.cameras.front().model;
+  std::ofstream calibration(folder / "calib.txt");
+  calibration << camera.fx << ' ' << camera.fy << ' ' << camera.cx << ' ' << camera.cy;
+  for (const double coefficient : camera.coefficients) calibration << ' ' << coefficient;
+  calibration << " 0\n";
+  std::ofstream(folder / "groundtruth.txt") << "1 0 0 0 0 0 0 1\n";
+  std::ofstream events(folder / "events.txt");
+  constexpr std::int64_t kNanoseconds = 1'000'000'000;
+  std::array<char, 64> line{};
+  for (const Event& event : made.events.front()) {
+    std::snprintf(line.data(), line.size(), "%lld.%09lld %d %d %d\n",
+                  static_cast<long long>(event.t_ns / kNanoseconds),
+                  static_cast<long long>(event.t_ns % kNanoseconds), event.x, event.y,
+                  event.polarity ? 1 : 0);
+    events << line.data();
+  }
+}
+
+/// What `import` makes of that folder.
+void writeRawlog(const fs::path& file, const fs::path& folder) {
+  RecordingSource source;
+  source.files = {folder};
+  const std::unique_ptr<Recording> recording = openRecording(source);
+  RawlogWriter writer(file);
+  while (const auto observation = recording->next()) writer.write(*observation);
+  writer.close();
+}
+
+/// Reads a recording from beginning to end.
+void readAll(benchmark::State& state, const fs::path& path) {
+  RecordingSource source;
+  source.files = {path};
+  std::size_t events = 0;
+  for (auto _ : state) {
+    events = 0;
+    const std::unique_ptr<Recording> recording = openRecording(source);
+    while (const auto observation = recording->next()) {
+      const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
+      if (packet != nullptr) events += packet->events.size();
+    }
+  }
+  state.counters["events/s"] = benchmark::Counter(static_cast<double>(events),
+                                                  benchmark::Counter::kIsIterationInvariantRate);
+}
+
+}  // namespace
+
+void benchReading(BenchSession& session) {
+  // 240x180 is the size of a UZH folder without images.
+  SyntheticWindowOptions options = session.plan().sensors.back().window(1);
+  options.width = 240;
+  options.height = 180;
+  const SyntheticWindow made = makeSyntheticWindow(options);
+  const fs::path folder = session.plan().scratch / "text";
+  const fs::path rawlog = session.plan().scratch / "events.rawlog";
+  writeTextFolder(folder, made);
+  writeRawlog(rawlog, folder);
+  session.add({"reading", "text", ""}, [&](benchmark::State& state) { readAll(state, folder); });
+  session.add({"reading", "rawlog", ""}, [&](benchmark::State& state) { readAll(state, rawlog); });
+  session.run();
+}
+
+}  // namespace efm::bench

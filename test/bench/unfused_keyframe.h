@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "mapping/depth_extraction.h"
+#include "mapping/depth_planes.h"
+#include "mapping/event_span.h"
+#include "mapping/keyframe_mapper.h"
+#include "mapping/reference_view.h"
+#include "mapping/rig.h"
+#include "mapping/stage.h"
+#include "mapping/trajectory.h"
+#include "mapping/undistortion.h"
+#include "mapping/window.h"
+
+namespace efm::bench {
+
+/// A keyframe in the shape of the published research code of this method, what the fused sweep is
+/// measured against: each camera votes into a volume of its own with the plain kernel; a fusion
+/// call copies the volumes and takes their harmonic mean; the peaks are looked for in the fused
+/// volume. Packets, rays and the extraction of depth are the mapper's. One thread, no
+/// sub-intervals.
+///
+/// Its volumes are held from one keyframe to the next, so that it pays for their memory once.
+class UnfusedKeyframe {
+ public:
+  /// All cameras of the rig take part.
+  UnfusedKeyframe(const Rig& rig, const KeyframeMapperOptions& options);
+
+  /// @return nothing where the reference time has no pose.
+  std::optional<DepthMap> map(const Window& window, const std::vector<EventSpan>& events,
+                              const Trajectory& trajectory, StageHook* stages = nullptr);
+
+ private:
+  using Volume = std::vector<float>;  // [z][y][x]
+
+  void vote(const RayBundle& rays, Volume& volume) const;
+  void fuse();
+  DsiPeaks findPeaks() const;
+
+  Rig rig_;
+  KeyframeMapperOptions options_;
+  DepthPlanes planes_;
+  ReferenceView view_;
+  std::vector<UndistortionTable> undistortion_;  // per camera
+  std::vector<Volume> volumes_;                  // per camera
+  std::vector<Volume> copies_;                   // what the fusion works on
+  Volume fused_;
+};
+
+}  // namespace efm::bench
