@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -6,7 +7,9 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "plugin/CObservationEvents.h"
@@ -20,14 +23,26 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Gives the events times as a sensor does: irregular, about one a microsecond.
+void makeIrregular(std::vector<Event>& events, std::int64_t tick_ns) {
+  std::mt19937_64 random(1);
+  const auto end_tick = static_cast<std::int64_t>(events.size()) * 1000 / tick_ns;
+  std::uniform_int_distribution<std::int64_t> tick(0, end_tick);
+  for (Event& event : events) event.t_ns = 1'000'000'000 + tick_ns * tick(random);
+  std::sort(events.begin(), events.end(),
+            [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+}
+
 /// A folder in the UZH layout: one camera, decimal seconds with nine digits.
 void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
   fs::create_directories(folder);
   const CameraModel& camera = made.rig.cameras.front().model;
+  std::vector<double> coefficients = camera.coefficients;
+  coefficients.resize(5);
   std::ofstream calibration(folder / "calib.txt");
   calibration << camera.fx << ' ' << camera.fy << ' ' << camera.cx << ' ' << camera.cy;
-  for (const double coefficient : camera.coefficients) calibration << ' ' << coefficient;
-  calibration << " 0\n";
+  for (const double coefficient : coefficients) calibration << ' ' << coefficient;
+  calibration << '\n';
   std::ofstream(folder / "groundtruth.txt") << "1 0 0 0 0 0 0 1\n";
   std::ofstream events(folder / "events.txt");
   constexpr std::int64_t kNanoseconds = 1'000'000'000;
@@ -75,13 +90,19 @@ void benchReading(BenchSession& session) {
   SyntheticWindowOptions options = session.plan().sensors.back().window(1);
   options.width = 240;
   options.height = 180;
-  const SyntheticWindow made = makeSyntheticWindow(options);
-  const fs::path folder = session.plan().scratch / "text";
-  const fs::path rawlog = session.plan().scratch / "events.rawlog";
-  writeTextFolder(folder, made);
-  writeRawlog(rawlog, folder);
-  session.add({"reading", "text", ""}, [&](benchmark::State& state) { readAll(state, folder); });
-  session.add({"reading", "rawlog", ""}, [&](benchmark::State& state) { readAll(state, rawlog); });
+  SyntheticWindow made = makeSyntheticWindow(options);
+  const auto add = [&](const char* name, const fs::path& path) {
+    session.add({"reading", name, ""}, [path](benchmark::State& state) { readAll(state, path); });
+  };
+  const fs::path& scratch = session.plan().scratch;
+  for (const auto& [unit, tick_ns] : {std::pair("us", 1000), std::pair("ns", 1)}) {
+    makeIrregular(made.events.front(), tick_ns);
+    writeTextFolder(scratch / unit, made);
+    const std::string rawlog = std::string("rawlog of ") + unit;  // fewer or more bytes an event
+    writeRawlog(scratch / rawlog, scratch / unit);
+    add(rawlog.c_str(), scratch / rawlog);
+  }
+  add("text", scratch / "us");
   session.run();
 }
 
