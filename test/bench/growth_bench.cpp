@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,7 @@ struct GrownKeyframe {
   SyntheticWindowOptions window;
   int planes = 0;
   int subintervals = 1;
+  double size = 0;  // of what was changed
 };
 
 /// Something that a keyframe's time grows with.
@@ -59,9 +61,8 @@ const std::vector<Growth>& growths() {
   return all;
 }
 
-void makeKeyframes(benchmark::State& state, const GrownKeyframe& grown, VotingKernel kernel,
-                   double size) {
-  const SyntheticWindow made = makeSyntheticWindow(grown.window);
+void makeKeyframes(benchmark::State& state, const GrownKeyframe& grown, const SyntheticWindow& made,
+                   VotingKernel kernel) {
   KeyframeMapperOptions options = made.options;
   options.planes.num_planes = grown.planes;
   options.subintervals.count = grown.subintervals;
@@ -72,7 +73,7 @@ void makeKeyframes(benchmark::State& state, const GrownKeyframe& grown, VotingKe
   const std::vector<EventSpan> events(made.events.begin(), made.events.end());
   KeyframeMapper mapper(made.rig, cameras, options);
   for (auto _ : state) benchmark::DoNotOptimize(mapper.map(made.window, events, made.trajectory));
-  state.counters["size"] = size;
+  state.counters["size"] = grown.size;
 }
 
 }  // namespace
@@ -80,12 +81,15 @@ void makeKeyframes(benchmark::State& state, const GrownKeyframe& grown, VotingKe
 void benchGrowth(BenchSession& session) {
   for (const Growth& growth : growths()) {
     for (int step = 0; step < session.plan().growth_steps; ++step) {
-      GrownKeyframe grown{session.plan().sensors.front().window(2), session.plan().planes, 1};
-      const double size = growth.grow(grown, step);
+      GrownKeyframe grown;
+      grown.window = session.plan().sensors.front().window(2);
+      grown.planes = session.plan().planes;
+      grown.size = growth.grow(grown, step);
+      const auto made = std::make_shared<SyntheticWindow>(makeSyntheticWindow(grown.window));
       for (const VotingKernel kernel : kernelsToMeasure()) {
-        session.add({"growth", growth.name + "/" + std::to_string(std::llround(size)),
+        session.add({"growth", growth.name + "/" + std::to_string(std::llround(grown.size)),
                      std::string(nameOf(kernel))},
-                    [=](benchmark::State& state) { makeKeyframes(state, grown, kernel, size); });
+                    [=](benchmark::State& state) { makeKeyframes(state, grown, *made, kernel); });
       }
     }
     session.run();

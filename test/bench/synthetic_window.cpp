@@ -24,7 +24,14 @@ struct Edge {
 /// table of rays is made, and much here.
 CameraModel cameraOf(int width, int height) {
   const double scale = width / 346.0;
-  return {width, height, 226.0 * scale, 226.0 * scale, 0.5 * (width - 1), 0.5 * (height - 1)};
+  return {width,
+          height,
+          226.0 * scale,
+          226.0 * scale,
+          0.5 * (width - 1),
+          0.5 * (height - 1),
+          DistortionModel::kNone,
+          {}};
 }
 
 Rig rigOf(const SyntheticWindowOptions& options) {
