@@ -7,7 +7,8 @@ namespace efm::bench {
 
 /// Votes of one camera on one thread, per kernel and sensor, and the yardstick.
 void benchVoting(BenchSession& session);
-/// Whole stereo keyframes with their stages and memory, fused and unfused.
+/// Whole stereo keyframes with their stages and memory, fused and unfused; of the kernels between
+/// the plain and the fastest one only the smallest size on one thread.
 void benchKeyframes(BenchSession& session);
 /// The six rules, and the running peaks.
 void benchFusion(BenchSession& session);

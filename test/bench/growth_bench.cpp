@@ -2,13 +2,14 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "mapping/keyframe_mapper.h"
+#include "mapping/voting_kernel.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
-#include "test/bench/voting_kernels.h"
 
 namespace efm::bench {
 namespace {
@@ -86,7 +87,7 @@ void benchGrowth(BenchSession& session) {
       grown.planes = session.plan().planes;
       grown.size = growth.grow(grown, step);
       const auto made = std::make_shared<SyntheticWindow>(makeSyntheticWindow(grown.window));
-      for (const VotingKernel kernel : kernelsToMeasure()) {
+      for (const VotingKernel kernel : std::set{VotingKernel::kPlain, fastestKernel()}) {
         session.add({"growth", growth.name + "/" + std::to_string(std::llround(grown.size)),
                      std::string(nameOf(kernel))},
                     [=](benchmark::State& state) { makeKeyframes(state, grown, *made, kernel); });

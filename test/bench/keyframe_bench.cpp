@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "mapping/keyframe_mapper.h"
+#include "mapping/voting_kernel.h"
 #include "test/bench/benches.h"
 #include "test/bench/peak_memory.h"
 #include "test/bench/performance_ratios.h"
 #include "test/bench/stage_clock.h"
 #include "test/bench/synthetic_window.h"
 #include "test/bench/unfused_keyframe.h"
-#include "test/bench/voting_kernels.h"
 
 namespace efm::bench {
 namespace {
@@ -81,8 +81,12 @@ void benchKeyframes(BenchSession& session) {
     SyntheticWindow made = makeSyntheticWindow(sensor.window(2));
     made.options.planes.num_planes = session.plan().planes;
     addKeyframe(session, {"keyframe", sensor.name(), kUnfused}, made, unfused(made));
-    for (const VotingKernel kernel : kernelsToMeasure()) {
+    const bool smallest = sensor.width == session.plan().sensors.front().width;
+    for (const VotingKernel kernel : availableKernels()) {
+      const bool outermost = kernel == VotingKernel::kPlain || kernel == fastestKernel();
+      if (!outermost && !smallest) continue;
       for (const int threads : {1, 2}) {
+        if (!outermost && threads > 1) continue;
         addKeyframe(session, {"keyframe", sensor.name(), std::string(nameOf(kernel)), threads},
                     made, fused(made, kernel, threads));
       }

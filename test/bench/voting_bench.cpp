@@ -6,10 +6,10 @@
 #include "mapping/back_projection.h"
 #include "mapping/kernels/vote.h"
 #include "mapping/space_sweep.h"
+#include "mapping/voting_kernel.h"
 #include "test/bench/benches.h"
 #include "test/bench/performance_ratios.h"
 #include "test/bench/synthetic_window.h"
-#include "test/bench/voting_kernels.h"
 
 namespace efm::bench {
 namespace {
@@ -94,7 +94,7 @@ void benchVoting(BenchSession& session) {
     const VotingInput input = makeInput(sensor, session.plan().planes);
     session.add({"voting", sensor.name(), kYardstick},
                 [&](benchmark::State& state) { voteYardstick(state, input); });
-    for (const VotingKernel kernel : kernelsToMeasure()) {
+    for (const VotingKernel kernel : availableKernels()) {
       session.add({"voting", sensor.name(), std::string(nameOf(kernel))},
                   [&, kernel](benchmark::State& state) { sweep(state, input, kernel); });
     }
