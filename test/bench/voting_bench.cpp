@@ -9,48 +9,27 @@
 #include "mapping/voting_kernel.h"
 #include "test/bench/benches.h"
 #include "test/bench/performance_ratios.h"
-#include "test/bench/synthetic_window.h"
+#include "test/bench/sweep_input.h"
 
 namespace efm::bench {
 namespace {
 
-/// One camera's events as rays, ready to vote.
-struct VotingInput {
-  ReferenceView view;
-  DepthPlanes planes;
-  std::vector<CameraRays> cameras;
+const RayBundle& raysOf(const SweepInput& input) { return input.cameras.front().front(); }
 
-  const RayBundle& rays() const { return cameras.front().front(); }
-};
-
-VotingInput makeInput(const SensorSize& sensor, int planes) {
-  SyntheticWindow made = makeSyntheticWindow(sensor.window(1));
-  made.options.planes.num_planes = planes;
-  const RigCamera& camera = made.rig.cameras.front();
-  VotingInput input{ReferenceView::of(camera.model), DepthPlanes(made.options.planes), {}};
-  const UndistortionTable undistortion(camera.model);
-  const PacketGeometry geometry{made.trajectory.poseAt(made.window.t_ref_ns)->inverse(), input.view,
-                                input.planes.depth(0), input.planes.depth(planes - 1)};
-  const PosePackets packets = splitIntoPosePackets(made.events.front(), camera, undistortion,
-                                                   made.trajectory, geometry, made.options.packets);
-  input.cameras.push_back({backProject(made.events.front(), packets, undistortion, input.view)});
-  return input;
-}
-
-void countVotes(benchmark::State& state, const VotingInput& input) {
-  const auto events = static_cast<double>(input.rays().size());
+void countVotes(benchmark::State& state, const SweepInput& input) {
+  const auto events = static_cast<double>(raysOf(input).size());
   const double votes = events * input.planes.size();
   state.counters["events/s"] =
       benchmark::Counter(events, benchmark::Counter::kIsIterationInvariantRate);
   state.counters["votes/s"] =
       benchmark::Counter(votes, benchmark::Counter::kIsIterationInvariantRate);
-  state.counters["packets"] = static_cast<double>(input.rays().packets.size());
+  state.counters["packets"] = static_cast<double>(raysOf(input).packets.size());
 }
 
 /// What every ratio is against: the plain kernel on one plane that is cleared for each depth. Where
 /// the rays go is computed beforehand.
-void voteYardstick(benchmark::State& state, const VotingInput& input) {
-  const RayBundle& rays = input.rays();
+void voteYardstick(benchmark::State& state, const SweepInput& input) {
+  const RayBundle& rays = raysOf(input);
   std::vector<std::vector<kernels::RayTransfer>> transfers;  // per plane
   for (int plane = 0; plane < input.planes.size(); ++plane) {
     auto& of_plane = transfers.emplace_back();
@@ -76,7 +55,7 @@ void voteYardstick(benchmark::State& state, const VotingInput& input) {
   countVotes(state, input);
 }
 
-void sweep(benchmark::State& state, const VotingInput& input, VotingKernel kernel) {
+void sweep(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
   SpaceSweepOptions options;
   options.threads = 1;
   options.kernel = kernel;
@@ -91,7 +70,8 @@ void sweep(benchmark::State& state, const VotingInput& input, VotingKernel kerne
 
 void benchVoting(BenchSession& session) {
   for (const SensorSize& sensor : session.plan().sensors) {
-    const VotingInput input = makeInput(sensor, session.plan().planes);
+    const SweepInput input =
+        makeSweepInput(makeSyntheticWindow(sensor.window(1)), session.plan().planes);
     session.add({"voting", sensor.name(), kYardstick},
                 [&](benchmark::State& state) { voteYardstick(state, input); });
     for (const VotingKernel kernel : availableKernels()) {

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "mapping/depth_planes.h"
+#include "mapping/reference_view.h"
+#include "mapping/space_sweep.h"
+#include "test/bench/synthetic_window.h"
+
+namespace efm::bench {
+
+/// What a sweep takes: events as rays, ready to vote.
+struct SweepInput {
+  ReferenceView view;
+  DepthPlanes planes;
+  std::vector<CameraRays> cameras;
+};
+
+/// Back-projects the window's cameras into the view of the first.
+SweepInput makeSweepInput(const SyntheticWindow& made, int planes);
+
+}  // namespace efm::bench
