@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/back_projection.h"
@@ -61,7 +62,10 @@ void sweep(benchmark::State& state, const SweepInput& input, VotingKernel kernel
   options.kernel = kernel;
   const SpaceSweep space_sweep(options);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(space_sweep.run(input.cameras, input.view, input.planes));
+    state.PauseTiming();
+    std::vector<CameraRays> cameras = input.cameras;  // the sweep takes them over
+    state.ResumeTiming();
+    benchmark::DoNotOptimize(space_sweep.run(std::move(cameras), input.view, input.planes));
   }
   countVotes(state, input);
 }
