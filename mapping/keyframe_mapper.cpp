@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/keyframe_mapper.h"
 
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -98,17 +101,21 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   keyframe.view = view_;
   keyframe.events.resize(rig_.cameras.size());
 
-  // 3. Back-project the events of each camera and sub-interval.
-  std::vector<CameraInput> inputs;
+  // 3. Back-project the events of each camera and sub-interval, cameras side by side.
+  std::vector<CameraInput> inputs(selected_.size());
   {
     const StageScope scope(stages, Stage::kSweep);
     const PacketGeometry geometry{keyframe.T_world_ref.inverse(), view_, planes_.depth(0),
                                   planes_.depth(planes_.size() - 1)};
-    for (std::size_t i = 0; i < selected_.size(); ++i) {
-      inputs.push_back(backProjectCamera(i, events[static_cast<std::size_t>(selected_[i])], window,
-                                         trajectory, geometry, keyframe));
-    }
+    tbb::task_arena arena(options_.sweep.threadsOrCores());
+    arena.execute([&] {
+      tbb::parallel_for(std::size_t{0}, selected_.size(), [&](std::size_t i) {
+        inputs[i] = backProjectCamera(i, events[static_cast<std::size_t>(selected_[i])], window,
+                                      trajectory, geometry);
+      });
+    });
   }
+  for (const CameraInput& input : inputs) count(input, keyframe);
   fuse(std::move(inputs), sink, stages, keyframe);
 
   if (options_.event_images) {
@@ -121,32 +128,34 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   return keyframe;
 }
 
-/// Counts what became of the camera's events.
 KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
     std::size_t selected, EventSpan events, const Window& window, const Trajectory& trajectory,
-    const PacketGeometry& geometry, KeyframeDepthMap& keyframe) const {
-  const auto camera = static_cast<std::size_t>(selected_[selected]);
+    const PacketGeometry& geometry) const {
   const UndistortionTable& undistortion = undistortion_[selected];
   CameraInput input{selected_[selected], {}};
-  std::uint64_t used = 0;
-  std::uint64_t silent = 0;
   for (const EventSpan part :
        splitIntoSubintervals(events, window.t0_ns, window.t1_ns, options_.subintervals)) {
-    const PosePackets packets = splitIntoPosePackets(part, rig_.cameras[camera], undistortion,
-                                                     trajectory, geometry, options_.packets);
+    const PosePackets packets =
+        splitIntoPosePackets(part, rig_.cameras[static_cast<std::size_t>(input.camera)],
+                             undistortion, trajectory, geometry, options_.packets);
     const RayBundle& rays =
         input.rays.emplace_back(backProject(part, packets, undistortion, view_));
-    keyframe.without_pose += packets.without_pose;
-    used += rays.size();
-    if (rays.size() == 0) ++silent;
-  }
-  keyframe.events[camera] = used;
-  if (used == 0) {
-    keyframe.silent_cameras.push_back(selected_[selected]);
-  } else {
-    keyframe.silent_subintervals += silent;
+    input.without_pose += packets.without_pose;
+    input.events += rays.size();
+    if (rays.size() == 0) ++input.silent_subintervals;
   }
   return input;
+}
+
+/// Counts what became of a camera's events.
+void KeyframeMapper::count(const CameraInput& input, KeyframeDepthMap& keyframe) {
+  keyframe.events[static_cast<std::size_t>(input.camera)] = input.events;
+  keyframe.without_pose += input.without_pose;
+  if (input.events == 0) {
+    keyframe.silent_cameras.push_back(input.camera);
+  } else {
+    keyframe.silent_subintervals += input.silent_subintervals;
+  }
 }
 
 /// Steps 4 and 5: from rays to depth.
@@ -173,7 +182,7 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
-    swept = sweep_.run(rays, view_, planes_, {options_.camera_maps, sink});
+    swept = sweep_.run(std::move(rays), view_, planes_, {options_.camera_maps, sink});
   }
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
 

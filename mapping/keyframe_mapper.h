@@ -70,11 +70,14 @@ class KeyframeMapper {
   struct CameraInput {
     int camera = 0;
     CameraRays rays;  // by sub-interval
+    std::uint64_t events = 0;
+    std::uint64_t without_pose = 0;
+    std::uint64_t silent_subintervals = 0;
   };
 
   CameraInput backProjectCamera(std::size_t selected, EventSpan events, const Window& window,
-                                const Trajectory& trajectory, const PacketGeometry& geometry,
-                                KeyframeDepthMap& keyframe) const;
+                                const Trajectory& trajectory, const PacketGeometry& geometry) const;
+  static void count(const CameraInput& input, KeyframeDepthMap& keyframe);
   void fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
             KeyframeDepthMap& keyframe);
 

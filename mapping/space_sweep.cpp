@@ -1,70 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/space_sweep.h"
 
-#include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/partitioner.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <string>
 #include <utility>
 
-#include "mapping/kernels/vote.h"
 #include "mapping/option_check.h"
+#include "mapping/plane_sweep.h"
+#include "mapping/tiled_sweep.h"
 
 namespace efm {
 namespace {
-
-/// Two groups of planes per thread even out that some planes cost more than others.
-constexpr int kGroupsPerThread = 2;
-
-/// Consecutive planes that one thread sweeps.
-struct PlaneGroup {
-  int begin = 0;
-  int end = 0;
-  std::optional<RunningPeaks> peaks;
-  std::vector<RunningPeaks> camera_peaks;  // per camera, where asked for
-  std::vector<VoteCounts> votes;           // per camera
-};
-
-std::vector<PlaneGroup> groupPlanes(int planes, int threads) {
-  const int count = threads == 1 ? 1 : std::min(planes, threads * kGroupsPerThread);
-  std::vector<PlaneGroup> groups(static_cast<std::size_t>(count));
-  for (int g = 0; g < count; ++g) {
-    auto& group = groups[static_cast<std::size_t>(g)];
-    group.begin = static_cast<int>(std::int64_t{planes} * g / count);
-    group.end = static_cast<int>(std::int64_t{planes} * (g + 1) / count);
-  }
-  return groups;
-}
-
-kernels::RayTransfer narrow(const RayPacket& packet, const PlaneTransfer& transfer) {
-  return {packet.begin, packet.end, static_cast<float>(transfer.scale),
-          static_cast<float>(transfer.offset_x), static_cast<float>(transfer.offset_y)};
-}
-
-/// Votes one camera's rays on one plane; `votes` is cleared first.
-VoteCounts votePlane(const RayBundle& camera, const ReferenceView& view, double depth_m,
-                     PlaneValues& votes) {
-  std::fill(votes.begin(), votes.end(), 0.0F);
-  const kernels::VotePlane plane{votes.data(), view.width, view.height};
-  VoteCounts counts;
-  for (const RayPacket& packet : camera.packets) {
-    const std::uint64_t rays = packet.end - packet.begin;
-    const PlaneTransfer transfer = transferToPlane(packet, view, depth_m);
-    if (!transfer.in_front) {
-      counts.behind_camera += rays;
-      continue;
-    }
-    const std::uint64_t cast = kernels::votePlain({camera.x_inf.data(), camera.y_inf.data()},
-                                                  narrow(packet, transfer), plane);
-    counts.cast += cast;
-    counts.outside_view += rays - cast;
-  }
-  return counts;
-}
 
 std::string namesOfAvailableKernels() {
   std::string names;
@@ -97,58 +45,11 @@ SpaceSweep::SpaceSweep(const SpaceSweepOptions& options) : options_(options) {
   options_.validate();
 }
 
-SweepResult SpaceSweep::run(const std::vector<CameraRays>& cameras, const ReferenceView& view,
+SweepResult SpaceSweep::run(std::vector<CameraRays> cameras, const ReferenceView& view,
                             const DepthPlanes& planes, const SweepRequest& request) const {
-  const std::size_t kept_cameras = request.camera_peaks ? cameras.size() : 0;
-  std::vector<PlaneGroup> groups = groupPlanes(planes.size(), options_.threadsOrCores());
-
-  const auto sweep_group = [&](PlaneGroup& group) {
-    RunningPeaks& peaks = group.peaks.emplace(view.pixels(), options_.kernelOrFastest());
-    group.camera_peaks.assign(kept_cameras,
-                              RunningPeaks(view.pixels(), options_.kernelOrFastest()));
-    group.votes.resize(cameras.size());
-    PlaneFusion fusion(
-        options_.fusion, static_cast<int>(cameras.size()), static_cast<int>(cameras.front().size()),
-        view.pixels(),
-        request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
-        options_.kernelOrFastest());
-    for (int plane = group.begin; plane < group.end; ++plane) {
-      const PlaneValues& fused =
-          fusion.fuse([&](int camera, int slot, PlaneValues& votes) {
-            const auto c = static_cast<std::size_t>(camera);
-            group.votes[c] += votePlane(cameras[c][static_cast<std::size_t>(slot)], view,
-                                        planes.depth(plane), votes);
-          });
-      peaks.take(plane, fused);
-      for (std::size_t c = 0; c < kept_cameras; ++c) {
-        group.camera_peaks[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
-      }
-      if (request.sink != nullptr) request.sink->takePlane(plane, fused.data());
-    }
-  };
-  tbb::task_arena arena(options_.threadsOrCores());
-  arena.execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, groups.size()),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t g = range.begin(); g < range.end(); ++g) sweep_group(groups[g]);
-        },
-        tbb::simple_partitioner());
-  });
-
-  PlaneGroup& all = groups.front();
-  for (auto group = groups.begin() + 1; group != groups.end(); ++group) {
-    all.peaks->append(*group->peaks);
-    for (std::size_t c = 0; c < kept_cameras; ++c) {
-      all.camera_peaks[c].append(group->camera_peaks[c]);
-    }
-    for (std::size_t c = 0; c < cameras.size(); ++c) all.votes[c] += group->votes[c];
-  }
-  SweepResult result{all.peaks->images(view), {}, all.votes};
-  for (const RunningPeaks& peaks : all.camera_peaks) {
-    result.camera_peaks.push_back(peaks.images(view));
-  }
-  return result;
+  return options_.kernelOrFastest() == VotingKernel::kPlain
+             ? sweepPlanes(cameras, view, planes, options_, request)
+             : sweepTiles(std::move(cameras), view, planes, options_, request);
 }
 
 }  // namespace efm

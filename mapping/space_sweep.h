@@ -53,18 +53,18 @@ struct SweepResult {
   std::vector<VoteCounts> votes;       ///< Per camera.
 };
 
-/// Sweeps the planes through space: for each, votes every camera and sub-interval into one plane,
-/// folds it into the running means of the two axes, and keeps the best value along each ray so far.
-/// No volume is held: memory is O(threads * width * height), whatever the number of planes, cameras
-/// and sub-intervals (with `camera_peaks`, times the cameras). The order of planes and threads
-/// never changes the result.
+/// Sweeps the planes through space: on each, votes every camera and sub-interval, folds the votes
+/// into the running means of the two axes, and keeps the best value along each ray so far. No
+/// volume is held: memory beside the rays is O(width * height), whatever the number of planes,
+/// cameras and sub-intervals (with `camera_peaks`, times the cameras; with the plain kernel, times
+/// the threads). The order of planes and threads never changes the result.
 class SpaceSweep {
  public:
   /// @throws std::invalid_argument where the options are not valid.
   explicit SpaceSweep(const SpaceSweepOptions& options = {});
 
   /// @param cameras the rays of each camera that takes part; at least one.
-  SweepResult run(const std::vector<CameraRays>& cameras, const ReferenceView& view,
+  SweepResult run(std::vector<CameraRays> cameras, const ReferenceView& view,
                   const DepthPlanes& planes, const SweepRequest& request = {}) const;
 
  private:

@@ -74,12 +74,13 @@
 #define EFM_NEON_OF(name) nullptr
 #endif
 
-/// A KernelTable of `plain` and of the object `name` that each instruction set's namespace has.
-#define EFM_KERNEL_TABLE(plain, name)                                                           \
-  {                                                                                             \
-    &(plain), EFM_BASELINE_OF(name), EFM_SSE4_OF(name), EFM_AVX2_OF(name), EFM_AVX512_OF(name), \
-        EFM_NEON_OF(name)                                                                       \
-  }
+/// The object `name` of each instruction set's namespace, in the order of a KernelTable.
+#define EFM_VECTOR_KERNELS(name)                                                    \
+  EFM_BASELINE_OF(name), EFM_SSE4_OF(name), EFM_AVX2_OF(name), EFM_AVX512_OF(name), \
+      EFM_NEON_OF(name)
+/// A KernelTable of `plain` and of these.
+#define EFM_KERNEL_TABLE(plain, name) \
+  { &(plain), EFM_VECTOR_KERNELS(name) }
 
 namespace efm::kernels {
 

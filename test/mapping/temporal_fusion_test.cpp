@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "mapping/keyframe_mapper.h"
+#include "test/mapping/fast_kernels.h"
 #include "test/mapping/kept_dsi.h"
 #include "test/mapping/random_recording.h"
 #include "test/mapping/same_image.h"
@@ -77,13 +78,16 @@ std::vector<std::vector<oracle::Dsi>> shuffled(const std::vector<std::vector<ora
   return result;
 }
 
-// Float coordinates of some 40 px are good to 4e-6 px, at which a vote moves.
-constexpr double kMaxErrorOverMass = 1e-4;
+class TemporalFusionOn : public ::testing::TestWithParam<VotingKernel> {};
 
-TEST(TemporalFusion, FromEventsToTheDsiItIsTheOraclesForAllRulesAndOrders) {
+INSTANTIATE_TEST_SUITE_P(Kernels, TemporalFusionOn, ::testing::ValuesIn(availableKernels()),
+                         test::nameOfKernel);
+
+TEST_P(TemporalFusionOn, FromEventsToTheDsiItIsTheOraclesForAllRulesAndOrders) {
   for (int cameras = 1; cameras <= 3; ++cameras) {
     const Recording recording(20 + static_cast<std::uint32_t>(cameras), cameras, 1500);
     KeyframeMapperOptions options = exactOptions(2, 3);
+    options.sweep.kernel = GetParam();
     options.view.width = 24;  // a quarter of the pixels, so that each has votes in every slot
     const auto parts = exactParts(recording, options);
     for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
@@ -92,7 +96,7 @@ TEST(TemporalFusion, FromEventsToTheDsiItIsTheOraclesForAllRulesAndOrders) {
           options.sweep.fusion = {across_cameras, across_time, order};
           EXPECT_LE(errorOverMass(mapWith(recording, options).dsi,
                                   oracle::fuse(options.sweep.fusion, parts)),
-                    kMaxErrorOverMass)
+                    test::errorOverMassOf(GetParam()))
               << cameras << " cameras " << nameOf(across_cameras) << ", " << nameOf(across_time)
               << ", " << nameOf(order);
         }
@@ -101,11 +105,12 @@ TEST(TemporalFusion, FromEventsToTheDsiItIsTheOraclesForAllRulesAndOrders) {
   }
 }
 
-TEST(TemporalFusion, EverySplitAndShuffleIsTheOracles) {
+TEST_P(TemporalFusionOn, EverySplitAndShuffleIsTheOracles) {
   const Recording recording(31, 3, 5000);
   for (const int count : {2, 5}) {
     for (const auto split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
       KeyframeMapperOptions options = exactOptions(4, count);
+      options.sweep.kernel = GetParam();
       options.subintervals.split = split;
       const auto parts = exactParts(recording, options);
       std::vector<std::vector<float>> dsis;
@@ -117,7 +122,7 @@ TEST(TemporalFusion, EverySplitAndShuffleIsTheOracles) {
           dsis.push_back(mapWith(recording, options).dsi);
           EXPECT_LE(errorOverMass(dsis.back(), oracle::fuse(options.sweep.fusion,
                                                             shuffled(parts, options.subintervals))),
-                    kMaxErrorOverMass)
+                    test::errorOverMassOf(GetParam()))
               << count << " by " << nameOf(split) << ", " << nameOf(shuffle);
         }
       }
@@ -128,9 +133,11 @@ TEST(TemporalFusion, EverySplitAndShuffleIsTheOracles) {
 
 TEST(TemporalFusion, ArithmeticAcrossTimeThenHarmonicAcrossCamerasIsAlgorithmOne) {
   const Recording recording(32, 2, 5000);
-  const std::vector<float> whole = mapWith(recording, exactOptions(7, 1)).dsi;
+  KeyframeMapperOptions options = exactOptions(7, 1);
+  options.sweep.kernel = VotingKernel::kPlain;  // which rounds the votes alike in both
+  const std::vector<float> whole = mapWith(recording, options).dsi;
   for (const int count : {2, 3, 8}) {
-    KeyframeMapperOptions options = exactOptions(7, count);
+    options.subintervals.count = count;
     options.sweep.fusion = {FusionRule::kHarmonic, FusionRule::kArithmetic,
                             FusionOrder::kTimeThenCameras};
     const std::vector<float> parts = mapWith(recording, options).dsi;
@@ -162,7 +169,7 @@ std::vector<CameraRays> raysOf(const Recording& recording, const ReferenceView& 
   return rays;
 }
 
-TEST(TemporalFusion, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
+TEST_P(TemporalFusionOn, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
   const tbb::global_control as_if_sixteen_cores(tbb::global_control::max_allowed_parallelism, 16);
   const Recording recording(33, 3, 3000);
   const ReferenceView view = ReferenceView::of(test::smallCamera());
@@ -172,6 +179,7 @@ TEST(TemporalFusion, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
     for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
       SpaceSweepOptions options;
       options.fusion.order = order;
+      options.kernel = GetParam();
       options.threads = 1;
       const SweepResult one = SpaceSweep(options).run(rays, view, depths, {true, nullptr});
       ASSERT_EQ(one.camera_peaks.size(), 3U);

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/plane_sweep.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+#include "mapping/kernels/vote.h"
+
+namespace efm {
+namespace {
+
+/// Two groups of planes per thread even out that some planes cost more than others.
+constexpr int kGroupsPerThread = 2;
+
+/// Consecutive planes that one thread sweeps.
+struct SweptGroup {
+  int begin = 0;
+  int end = 0;
+  std::optional<RunningPeaks> peaks;
+  std::vector<RunningPeaks> camera_peaks;  // per camera, where asked for
+  std::vector<VoteCounts> votes;           // per camera
+};
+
+std::vector<SweptGroup> groupPlanes(int planes, int threads) {
+  const int count = threads == 1 ? 1 : std::min(planes, threads * kGroupsPerThread);
+  std::vector<SweptGroup> groups(static_cast<std::size_t>(count));
+  for (int g = 0; g < count; ++g) {
+    auto& group = groups[static_cast<std::size_t>(g)];
+    group.begin = static_cast<int>(std::int64_t{planes} * g / count);
+    group.end = static_cast<int>(std::int64_t{planes} * (g + 1) / count);
+  }
+  return groups;
+}
+
+kernels::RayTransfer narrow(const RayPacket& packet, const PlaneTransfer& transfer) {
+  return {packet.begin, packet.end, static_cast<float>(transfer.scale),
+          static_cast<float>(transfer.offset_x), static_cast<float>(transfer.offset_y)};
+}
+
+/// Votes one camera's rays on one plane; `votes` is cleared first.
+VoteCounts votePlane(const RayBundle& camera, const ReferenceView& view, double depth_m,
+                     PlaneValues& votes) {
+  std::fill(votes.begin(), votes.end(), 0.0F);
+  const kernels::VotePlane plane{votes.data(), view.width, view.height};
+  VoteCounts counts;
+  for (const RayPacket& packet : camera.packets) {
+    const std::uint64_t rays = packet.end - packet.begin;
+    const PlaneTransfer transfer = transferToPlane(packet, view, depth_m);
+    if (!transfer.in_front) {
+      counts.behind_camera += rays;
+      continue;
+    }
+    const std::uint64_t cast = kernels::votePlain({camera.x_inf.data(), camera.y_inf.data()},
+                                                  narrow(packet, transfer), plane);
+    counts.cast += cast;
+    counts.outside_view += rays - cast;
+  }
+  return counts;
+}
+
+}  // namespace
+
+SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceView& view,
+                        const DepthPlanes& planes, const SpaceSweepOptions& options,
+                        const SweepRequest& request) {
+  const std::size_t kept_cameras = request.camera_peaks ? cameras.size() : 0;
+  std::vector<SweptGroup> groups = groupPlanes(planes.size(), options.threadsOrCores());
+
+  const auto sweep_group = [&](SweptGroup& group) {
+    RunningPeaks& peaks = group.peaks.emplace(view.pixels(), options.kernelOrFastest());
+    group.camera_peaks.assign(kept_cameras, RunningPeaks(view.pixels(), options.kernelOrFastest()));
+    group.votes.resize(cameras.size());
+    PlaneFusion fusion(
+        options.fusion, static_cast<int>(cameras.size()), static_cast<int>(cameras.front().size()),
+        view.pixels(),
+        request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
+        options.kernelOrFastest());
+    for (int plane = group.begin; plane < group.end; ++plane) {
+      const PlaneValues& fused = fusion.fuse([&](int camera, int slot, PlaneValues& votes) {
+        const auto c = static_cast<std::size_t>(camera);
+        group.votes[c] +=
+            votePlane(cameras[c][static_cast<std::size_t>(slot)], view, planes.depth(plane), votes);
+      });
+      peaks.take(plane, fused);
+      for (std::size_t c = 0; c < kept_cameras; ++c) {
+        group.camera_peaks[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
+      }
+      if (request.sink != nullptr) request.sink->takePlane(plane, fused.data());
+    }
+  };
+  tbb::task_arena arena(options.threadsOrCores());
+  arena.execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, groups.size()),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t g = range.begin(); g < range.end(); ++g) sweep_group(groups[g]);
+        },
+        tbb::simple_partitioner());
+  });
+
+  SweptGroup& all = groups.front();
+  for (auto group = groups.begin() + 1; group != groups.end(); ++group) {
+    all.peaks->append(*group->peaks);
+    for (std::size_t c = 0; c < kept_cameras; ++c) {
+      all.camera_peaks[c].append(group->camera_peaks[c]);
+    }
+    for (std::size_t c = 0; c < cameras.size(); ++c) all.votes[c] += group->votes[c];
+  }
+  SweepResult result{all.peaks->images(view), {}, all.votes};
+  for (const RunningPeaks& peaks : all.camera_peaks) {
+    result.camera_peaks.push_back(peaks.images(view));
+  }
+  return result;
+}
+
+}  // namespace efm

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core/types.hpp>
+#include <vector>
+
+#include "mapping/kernels/tile_vote.h"
+#include "mapping/plane_values.h"
+#include "mapping/reference_view.h"
+#include "mapping/tile_rays.h"
+
+namespace efm {
+
+/// Votes on one tile of the view, plane by plane. One per thread.
+class TileVoter {
+ public:
+  explicit TileVoter(const kernels::TileFunctions& functions);
+
+  /// Turns to a tile of at most `kTilePixels` on a side.
+  void moveTo(const cv::Rect& tile, const ReferenceView& view);
+  static constexpr int kTilePixels = kernels::kTileCells - 1;
+
+  /// The cells that the tile's pixels get votes from, by their upper left pixels.
+  const cv::Rect& cells() const { return inside_; }
+  const kernels::TileFunctions& functions() const { return functions_; }
+  /// What coordinates of rays count from, for `RayBins::gather`.
+  cv::Point origin() const;
+
+  /// The ray density on one plane.
+  /// @param rays padded. @param to_plane from the rays' home plane, 1/m.
+  /// @param density one value per pixel of the tile, row-major.
+  /// @return the votes of the cells whose upper left pixel lies in the tile: over all tiles, those
+  /// of all cells.
+  std::uint64_t vote(TileRays& rays, double to_plane, float* density);
+
+ private:
+  std::uint64_t addFullCells(const kernels::FullCell* end, float* density) const;
+
+  const kernels::TileFunctions& functions_;
+  PixelValues<std::uint64_t> cells_;
+  std::vector<kernels::FullCell> full_;
+  cv::Rect tile_;
+  cv::Rect inside_;                 // the tile's cells that are inside the view
+  std::uint32_t first_inside_ = 0;  // the first of them in cells_
+};
+
+}  // namespace efm
