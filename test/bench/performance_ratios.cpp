@@ -38,7 +38,8 @@ void addRatios(std::vector<PerformanceRow>& rows) {
     };
     const auto other_kernel = [&](const char* kernel) -> std::optional<double> {
       if (row.kernel == kernel || row.threads != 1) return std::nullopt;
-      return quantityOf(rows, {row.group, row.name, kernel, 1, {}}, "cpu_ms");
+      const std::string group = row.group == kOneCameraSweep ? kVoting : row.group;
+      return quantityOf(rows, {group, row.name, kernel, 1, {}}, "cpu_ms");
     };
     add("times_yardstick", other_kernel(kYardstick), "cpu_ms");
     add("times_unfused", other_kernel(kUnfused), "cpu_ms");

@@ -11,6 +11,10 @@ namespace efm::bench {
 inline constexpr const char* kYardstick = "yardstick";  ///< votePlain on one plane, nothing else.
 inline constexpr const char* kUnfused = "unfused";      ///< A keyframe over whole volumes.
 
+// Groups that are held against one another.
+inline constexpr const char* kVoting = "voting";                    ///< Up to ray densities.
+inline constexpr const char* kOneCameraSweep = "one-camera sweep";  ///< With binning and peaks.
+
 /// Adds to the rows what follows from several of them, how many times as fast each is:
 ///   times_yardstick   as the yardstick at the same size, by CPU time;
 ///   times_unfused     as the unfused keyframe at the same size, by CPU time, with one thread;

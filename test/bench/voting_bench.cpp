@@ -5,8 +5,12 @@
 #include <vector>
 
 #include "mapping/back_projection.h"
+#include "mapping/binned_rays.h"
 #include "mapping/kernels/vote.h"
 #include "mapping/space_sweep.h"
+#include "mapping/tile_rays.h"
+#include "mapping/tile_voter.h"
+#include "mapping/view_tiles.h"
 #include "mapping/voting_kernel.h"
 #include "test/bench/benches.h"
 #include "test/bench/performance_ratios.h"
@@ -56,6 +60,30 @@ void voteYardstick(benchmark::State& state, const SweepInput& input) {
   countVotes(state, input);
 }
 
+/// Votes as the fast kernels cast them, up to the ray density of every plane. As for the yardstick,
+/// where the rays go is there beforehand: they lie in bins.
+void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
+  BinnedRays rays(input.cameras, input.view, input.planes);
+  TileVoter voter(kernels::tileFunctions(kernel));
+  TileRays gathered;
+  std::vector<float> density(TileVoter::kTilePixels * TileVoter::kTilePixels);
+  const std::vector<cv::Rect> tiles = tilesOf(input.view, TileVoter::kTilePixels);
+  for (auto _ : state) {
+    for (const PlaneGroup& group : rays.groupPlanes()) {
+      rays.moveTo(group);
+      for (const cv::Rect& tile : tiles) {
+        voter.moveTo(tile, input.view);
+        rays.gather(0, voter, gathered);
+        for (int plane = group.begin; plane < group.end; ++plane) {
+          benchmark::DoNotOptimize(voter.vote(gathered, rays.fromHome(plane), density.data()));
+          benchmark::ClobberMemory();
+        }
+      }
+    }
+  }
+  countVotes(state, input);
+}
+
 void sweep(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
   SpaceSweepOptions options;
   options.threads = 1;
@@ -76,10 +104,15 @@ void benchVoting(BenchSession& session) {
   for (const SensorSize& sensor : session.plan().sensors) {
     const SweepInput input =
         makeSweepInput(makeSyntheticWindow(sensor.window(1)), session.plan().planes);
-    session.add({"voting", sensor.name(), kYardstick},
+    session.add({kVoting, sensor.name(), kYardstick},
                 [&](benchmark::State& state) { voteYardstick(state, input); });
     for (const VotingKernel kernel : availableKernels()) {
-      session.add({"voting", sensor.name(), std::string(nameOf(kernel))},
+      if (kernel == VotingKernel::kPlain) continue;  // the yardstick
+      session.add({kVoting, sensor.name(), std::string(nameOf(kernel))},
+                  [&, kernel](benchmark::State& state) { voteTiles(state, input, kernel); });
+    }
+    for (const VotingKernel kernel : availableKernels()) {
+      session.add({kOneCameraSweep, sensor.name(), std::string(nameOf(kernel))},
                   [&, kernel](benchmark::State& state) { sweep(state, input, kernel); });
     }
     session.run();

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "test/bench/synthetic_window.h"
+#include "test/mapping/fast_kernels.h"
+#include "test/mapping/random_scene.h"
+#include "test/mapping/swept_dsi.h"
+#include "test/oracle/naive_mapper.h"
+
+namespace efm {
+namespace {
+
+using bench::SyntheticWindow;
+
+// What every kernel must keep to, against the oracle with the same packets.
+constexpr double kMostError = 1e-3;         // of the mass
+constexpr double kMostSignedError = 1e-5;   // of the mass
+constexpr double kLeastEqualPeaks = 0.995;  // of the pixels with votes
+// The least of two cameras often is a single vote, which moves so little from plane to plane that
+// rounding decides between them: the planes differ by less than 2e-3 of a vote there.
+constexpr double kLeastEqualPeaksOfMin = 0.99;
+
+constexpr int kPlanes = 50;
+
+/// One stereo keyframe, for the sweep and by the oracle.
+struct Keyframe {
+  test::SweepCase input;
+  std::vector<oracle::Dsi> exact;  // per camera
+};
+
+Keyframe keyframeOf(const SyntheticWindow& made) {
+  DepthPlanesOptions planes = made.options.planes;
+  planes.num_planes = kPlanes;
+  const RigCamera& reference = made.rig.cameras.front();
+  Keyframe keyframe{{ReferenceView::of(reference.model), DepthPlanes(planes), {}}, {}};
+  const test::SweepCase& input = keyframe.input;
+  const Rigid3 T_world_ref = *made.trajectory.poseAt(made.window.t_ref_ns) * reference.T_rig_cam;
+  const PacketGeometry geometry{T_world_ref.inverse(), input.view, input.planes.depth(0),
+                                input.planes.depth(kPlanes - 1)};
+  for (std::size_t c = 0; c < made.events.size(); ++c) {
+    const RigCamera& camera = made.rig.cameras[c];
+    const UndistortionTable undistortion(camera.model);
+    const PosePackets packets = splitIntoPosePackets(
+        made.events[c], camera, undistortion, made.trajectory, geometry, made.options.packets);
+    keyframe.input.cameras.push_back(
+        {backProject(made.events[c], packets, undistortion, input.view)});
+    keyframe.exact.push_back(oracle::rayDensity(oracle::poseByPacket(made.events[c], packets),
+                                                undistortion, input.view, input.planes));
+  }
+  return keyframe;
+}
+
+/// Half the size of a DAVIS346, with as many events per pixel.
+const Keyframe& edges() {
+  static const Keyframe kKeyframe = [] {
+    bench::SyntheticWindowOptions options;
+    options.width = 173;
+    options.height = 130;
+    options.events_per_camera = 60'000;
+    return keyframeOf(makeSyntheticWindow(options));
+  }();
+  return kKeyframe;
+}
+
+/// The same rig and motion with events all over the sensor: no peak stands out.
+const Keyframe& noise() {
+  static const Keyframe kKeyframe = [] {
+    bench::SyntheticWindowOptions options;
+    options.width = 173;
+    options.height = 130;
+    options.events_per_camera = 60'000;
+    SyntheticWindow made = makeSyntheticWindow(options);
+    test::RandomScene random(3);
+    for (std::size_t c = 0; c < made.events.size(); ++c) {
+      made.events[c] = random.events(made.rig.cameras[c].model, options.events_per_camera,
+                                     made.window.t0_ns, made.window.t1_ns - made.window.t0_ns);
+    }
+    return keyframeOf(made);
+  }();
+  return kKeyframe;
+}
+
+/// The share of pixels with votes whose peak lies on the exact plane.
+double equalPeaks(const SweepResult& result, const oracle::Dsi& exact) {
+  const std::vector<int> planes = oracle::peakPlanes(exact);
+  const std::vector<double> values = oracle::peakValues(exact);
+  double with_votes = 0;
+  double equal = 0;
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    if (values[i] <= 0) continue;
+    const auto x = static_cast<int>(i) % exact.width;
+    const auto y = static_cast<int>(i) / exact.width;
+    ++with_votes;
+    if (result.peaks.plane(y, x) == planes[i]) ++equal;
+  }
+  EXPECT_GT(with_votes, 0);
+  return equal / with_votes;
+}
+
+class SweepAccuracyOn : public ::testing::TestWithParam<VotingKernel> {
+ protected:
+  static void expectExact(const Keyframe& keyframe, FusionRule rule) {
+    test::SweepCase input = keyframe.input;
+    input.fusion.across_cameras = rule;
+    const test::SweptDsi swept = sweep(input, GetParam(), 2);
+    const oracle::Dsi exact = oracle::fuse(rule, keyframe.exact);
+    const test::DsiDifference difference = test::differenceOf(swept.dsi, exact.values);
+    const double equal_peaks = equalPeaks(swept.result, exact);
+    EXPECT_LE(difference.error, kMostError) << nameOf(rule);
+    EXPECT_LE(std::abs(difference.signed_error), kMostSignedError) << nameOf(rule);
+    EXPECT_GE(equal_peaks, rule == FusionRule::kMin ? kLeastEqualPeaksOfMin : kLeastEqualPeaks)
+        << nameOf(rule);
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Kernels, SweepAccuracyOn, ::testing::ValuesIn(availableKernels()),
+                         test::nameOfKernel);
+
+TEST_P(SweepAccuracyOn, EventsOfEdgesGiveTheOraclesDsiAndPeaksWithEveryRule) {
+  for (const FusionRule rule : allFusionRules()) expectExact(edges(), rule);
+}
+
+TEST_P(SweepAccuracyOn, RandomEventsGiveTheOraclesDsiAndPeaksWithEveryRule) {
+  for (const FusionRule rule : allFusionRules()) expectExact(noise(), rule);
+}
+
+}  // namespace
+}  // namespace efm
