@@ -29,17 +29,22 @@ std::vector<cv::Point2d> undistort(const CameraModel& model,
 
 }  // namespace
 
+std::vector<Eigen::Vector2d> viewingRays(const CameraModel& model, int y) {
+  std::vector<cv::Point2d> pixels;
+  for (int x = 0; x < model.width; ++x) pixels.emplace_back(x, y);
+  std::vector<Eigen::Vector2d> rays;
+  rays.reserve(pixels.size());
+  for (const cv::Point2d& ray : undistort(model, pixels)) rays.emplace_back(ray.x, ray.y);
+  return rays;
+}
+
 UndistortionTable::UndistortionTable(const CameraModel& model) {
   model.validate();
   width_ = model.width;
   height_ = model.height;
   rays_.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  std::vector<cv::Point2d> row(static_cast<std::size_t>(width_));
   for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) row[static_cast<std::size_t>(x)] = cv::Point2d(x, y);
-    for (const cv::Point2d& ray : undistort(model, row)) {
-      rays_.emplace_back(static_cast<float>(ray.x), static_cast<float>(ray.y));
-    }
+    for (const Eigen::Vector2d& ray : viewingRays(model, y)) rays_.push_back(ray.cast<float>());
   }
 }
 

@@ -9,6 +9,9 @@
 
 namespace efm {
 
+/// (X/Z, Y/Z) of the rays through the centres of the raw pixels of row `y`, frame `cam`.
+std::vector<Eigen::Vector2d> viewingRays(const CameraModel& model, int y);
+
 /// The viewing ray of every pixel of one camera, computed once through OpenCV's iterative
 /// undistortion and looked up per event.
 ///
