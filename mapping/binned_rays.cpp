@@ -34,7 +34,9 @@ std::uint64_t countBehind(const RayBundle& rays, const ReferenceView& view,
 
 BinnedRays::BinnedRays(std::vector<CameraRays> cameras, const ReferenceView& view,
                        const DepthPlanes& planes)
-    : planes_(planes), slots_(static_cast<int>(cameras.front().size())) {
+    : planes_(planes),
+      home_(RayBins::middleOf(planes)),
+      slots_(static_cast<int>(cameras.front().size())) {
   for (CameraRays& camera : cameras) {
     VoteCounts& votes = not_cast_.emplace_back();
     for (RayBundle& slot : camera) {
@@ -83,8 +85,6 @@ void BinnedRays::gather(std::size_t input, const TileVoter& voter, TileRays& ray
   rays.pad();
 }
 
-double BinnedRays::fromHome(int plane) const {
-  return 1 / planes_.depth(plane) - RayBins::middleOf(planes_);
-}
+double BinnedRays::fromHome(int plane) const { return 1 / planes_.depth(plane) - home_; }
 
 }  // namespace efm

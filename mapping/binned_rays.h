@@ -42,6 +42,7 @@ class BinnedRays {
 
  private:
   const DepthPlanes& planes_;
+  double home_;  // inverse depth of the home plane
   int slots_;
   std::vector<std::vector<RayBins>> bins_;  // by camera and slot
   std::vector<VoteCounts> not_cast_;

@@ -11,13 +11,6 @@ namespace {
 
 constexpr float kNoValue = -1;
 
-template <typename Value>
-void write(const PixelValues<Value>& values, cv::Mat_<Value> tile) {
-  assert(values.size() == tile.total());
-  auto row = values.begin();
-  for (int y = 0; y < tile.rows; ++y, row += tile.cols) std::copy_n(row, tile.cols, tile[y]);
-}
-
 }  // namespace
 
 DsiPeaks unwrittenPeaks(const ReferenceView& view) {
@@ -64,10 +57,10 @@ DsiPeaks RunningPeaks::images(const ReferenceView& view) const {
 }
 
 void RunningPeaks::writeTo(DsiPeaks& images, const cv::Rect& tile) const {
-  write(best_, images.confidence(tile));
-  write(plane_, images.plane(tile));
-  write(before_, images.before(tile));
-  write(after_, images.after(tile));
+  efm::writeTo(images.confidence(tile), best_);
+  efm::writeTo(images.plane(tile), plane_);
+  efm::writeTo(images.before(tile), before_);
+  efm::writeTo(images.after(tile), after_);
 }
 
 }  // namespace efm

@@ -3,6 +3,9 @@
 
 #include <tbb/cache_aligned_allocator.h>
 
+#include <algorithm>
+#include <cassert>
+#include <opencv2/core.hpp>
 #include <vector>
 
 namespace efm {
@@ -12,5 +15,13 @@ namespace efm {
 template <typename Value>
 using PixelValues = std::vector<Value, tbb::cache_aligned_allocator<Value>>;
 using PlaneValues = PixelValues<float>;
+
+/// Writes the values of a tile into its part of an image.
+template <typename Value>
+void writeTo(cv::Mat_<Value> part, const PixelValues<Value>& values) {
+  assert(values.size() == part.total());
+  auto row = values.begin();
+  for (int y = 0; y < part.rows; ++y, row += part.cols) std::copy_n(row, part.cols, part[y]);
+}
 
 }  // namespace efm

@@ -4,7 +4,9 @@
 #include <tbb/parallel_for_each.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -115,16 +117,19 @@ std::vector<RayPacket>::const_iterator RayBins::endOfSlowMotion(
 
 std::vector<RayBins> RayBins::sort(const RayBundle& rays, const ReferenceView& view,
                                    const DepthPlanes& planes) {
+  constexpr Kind kKinds[] = {Kind::kAllPlanes, Kind::kFarPlanes, Kind::kNearPlanes};
+  std::array<std::vector<RayPacket>, std::size(kKinds)> packets;
+  for (const RayPacket& packet : rays.packets) {
+    const auto kind = kindOf(packet, view, planes);
+    if (kind) packets[static_cast<std::size_t>(*kind)].push_back(packet);
+  }
   std::vector<RayBins> all;
-  for (const Kind kind : {Kind::kAllPlanes, Kind::kFarPlanes, Kind::kNearPlanes}) {
-    std::vector<RayPacket> packets;
-    for (const RayPacket& packet : rays.packets) {
-      if (kindOf(packet, view, planes) == kind) packets.push_back(packet);
-    }
-    for (auto begin = packets.cbegin(); begin != packets.cend();) {
+  for (const Kind kind : kKinds) {
+    const std::vector<RayPacket>& of_kind = packets[static_cast<std::size_t>(kind)];
+    for (auto begin = of_kind.begin(); begin != of_kind.end();) {
       const auto end = kind == Kind::kAllPlanes
-                           ? endOfSlowMotion(begin, packets.cend(), view, planes)
-                           : packets.cend();
+                           ? endOfSlowMotion(begin, of_kind.end(), view, planes)
+                           : of_kind.end();
       all.push_back(RayBins(kind, std::vector<RayPacket>(begin, end), view, planes));
       begin = end;
     }
@@ -177,9 +182,8 @@ void RayBins::spanBins(const DepthPlanes& planes) {
     axis->bins = static_cast<int>(std::ceil((axis->pixels + 2 * border) / kBin_px));
     // The largest difference of two shifts in the same place is that of the largest number.
     const Range u = axis->fromPrincipal();
-    const double largest =
-        0.5 * (axis->at_center.greatest - axis->at_center.least) +
-        0.5 * (c_.greatest - c_.least) * std::max(std::abs(u.least), std::abs(u.greatest));
+    const double largest = 0.5 * axis->at_center.width() +
+                           0.5 * c_.width() * std::max(std::abs(u.least), std::abs(u.greatest));
     axis->step = largest / kLargestOwnShift;
   }
 }

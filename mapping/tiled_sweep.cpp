@@ -40,11 +40,7 @@ class GroupPlanes {
   }
   void take(int plane, const cv::Rect& tile, const PlaneValues& values) {
     if (sink_ == nullptr) return;
-    auto from = values.begin();
-    cv::Mat1f part = planes_[static_cast<std::size_t>(plane - first_)](tile);
-    for (int y = 0; y < tile.height; ++y, from += tile.width) {
-      std::copy(from, from + tile.width, part[y]);
-    }
+    writeTo(planes_[static_cast<std::size_t>(plane - first_)](tile), values);
   }
   void end() {
     for (std::size_t i = 0; i < planes_.size(); ++i) {

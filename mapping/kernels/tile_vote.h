@@ -31,15 +31,17 @@ struct CellSums {
   std::uint32_t a = 0, b = 0, ab = 0, votes = 0;
 };
 
-inline constexpr int kSumBits = 18;            ///< Of the sum of a, and of b.
-inline constexpr int kProductShift = 36 - 32;  ///< Of the sum of ab, in the upper 32 bits,
-inline constexpr int kCountShift = 57 - 32;    ///< and of the number of votes.
+inline constexpr int kSumBits = 18;  ///< Of the sum of a, and of b.
+inline constexpr int kProductShift =
+    2 * kSumBits - 32;                       ///< Of the sum of ab, in the upper 32 bits,
+inline constexpr int kCountShift = 57 - 32;  ///< and of the number of votes.
 
 inline CellSums unpack(std::uint64_t cell) {
   const auto field = [cell](int first, int end) {
     return static_cast<std::uint32_t>(cell >> first & ((std::uint64_t{1} << (end - first)) - 1));
   };
-  return {field(0, 18), field(18, 36), field(36, 57), field(57, 64)};
+  return {field(0, kSumBits), field(kSumBits, 2 * kSumBits),
+          field(32 + kProductShift, 32 + kCountShift), field(32 + kCountShift, 64)};
 }
 
 /// Coordinates count from a pixel that neighbouring tiles share, so that a vote on the border of

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "mapping/undistortion.h"
+#include "test/bench/sweep_input.h"
 #include "test/bench/synthetic_window.h"
 #include "test/mapping/fast_kernels.h"
 #include "test/mapping/random_scene.h"
@@ -13,7 +15,9 @@
 namespace efm {
 namespace {
 
+using bench::SweepInput;
 using bench::SyntheticWindow;
+using bench::SyntheticWindowOptions;
 
 // What every kernel must keep to, against the oracle with the same packets.
 constexpr double kMostError = 1e-3;         // of the mass
@@ -32,46 +36,35 @@ struct Keyframe {
 };
 
 Keyframe keyframeOf(const SyntheticWindow& made) {
-  DepthPlanesOptions planes = made.options.planes;
-  planes.num_planes = kPlanes;
-  const RigCamera& reference = made.rig.cameras.front();
-  Keyframe keyframe{{ReferenceView::of(reference.model), DepthPlanes(planes), {}}, {}};
-  const test::SweepCase& input = keyframe.input;
-  const Rigid3 T_world_ref = *made.trajectory.poseAt(made.window.t_ref_ns) * reference.T_rig_cam;
-  const PacketGeometry geometry{T_world_ref.inverse(), input.view, input.planes.depth(0),
-                                input.planes.depth(kPlanes - 1)};
+  const SweepInput input = makeSweepInput(made, kPlanes);
+  Keyframe keyframe{{input.view, input.planes, input.cameras}, {}};
   for (std::size_t c = 0; c < made.events.size(); ++c) {
-    const RigCamera& camera = made.rig.cameras[c];
-    const UndistortionTable undistortion(camera.model);
-    const PosePackets packets = splitIntoPosePackets(
-        made.events[c], camera, undistortion, made.trajectory, geometry, made.options.packets);
-    keyframe.input.cameras.push_back(
-        {backProject(made.events[c], packets, undistortion, input.view)});
-    keyframe.exact.push_back(oracle::rayDensity(oracle::poseByPacket(made.events[c], packets),
-                                                undistortion, input.view, input.planes));
+    const UndistortionTable undistortion(made.rig.cameras[c].model);
+    keyframe.exact.push_back(
+        oracle::rayDensity(oracle::poseByPacket(made.events[c], input.packets[c]), undistortion,
+                           input.view, input.planes));
   }
   return keyframe;
 }
 
 /// Half the size of a DAVIS346, with as many events per pixel.
+SyntheticWindowOptions halfSize() {
+  SyntheticWindowOptions options;
+  options.width = 173;
+  options.height = 130;
+  options.events_per_camera = 60'000;
+  return options;
+}
+
 const Keyframe& edges() {
-  static const Keyframe kKeyframe = [] {
-    bench::SyntheticWindowOptions options;
-    options.width = 173;
-    options.height = 130;
-    options.events_per_camera = 60'000;
-    return keyframeOf(makeSyntheticWindow(options));
-  }();
+  static const Keyframe kKeyframe = keyframeOf(makeSyntheticWindow(halfSize()));
   return kKeyframe;
 }
 
 /// The same rig and motion with events all over the sensor: no peak stands out.
 const Keyframe& noise() {
   static const Keyframe kKeyframe = [] {
-    bench::SyntheticWindowOptions options;
-    options.width = 173;
-    options.height = 130;
-    options.events_per_camera = 60'000;
+    const SyntheticWindowOptions options = halfSize();
     SyntheticWindow made = makeSyntheticWindow(options);
     test::RandomScene random(3);
     for (std::size_t c = 0; c < made.events.size(); ++c) {

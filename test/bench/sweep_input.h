@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "mapping/depth_planes.h"
+#include "mapping/pose_packets.h"
 #include "mapping/reference_view.h"
 #include "mapping/space_sweep.h"
 #include "test/bench/synthetic_window.h"
@@ -15,6 +16,7 @@ struct SweepInput {
   ReferenceView view;
   DepthPlanes planes;
   std::vector<CameraRays> cameras;
+  std::vector<PosePackets> packets;  ///< Per camera, of its events.
 };
 
 /// Back-projects the window's cameras into the view of the first.
