@@ -57,6 +57,7 @@ void KeyframeMapperOptions::validate() const {
   requireOption(reference_camera >= 0, "reference_camera", reference_camera, "0 or above");
   view.validate();
   subintervals.validate();
+  split.validate();
   packets.validate();
   sweep.validate();
   extraction.validate();
@@ -133,8 +134,7 @@ KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
     const PacketGeometry& geometry) const {
   const UndistortionTable& undistortion = undistortion_[selected];
   CameraInput input{selected_[selected], {}};
-  for (const EventSpan part :
-       splitIntoSubintervals(events, window.t0_ns, window.t1_ns, options_.subintervals)) {
+  const auto add = [&](EventSpan part) {
     const PosePackets packets =
         splitIntoPosePackets(part, rig_.cameras[static_cast<std::size_t>(input.camera)],
                              undistortion, trajectory, geometry, options_.packets);
@@ -143,8 +143,32 @@ KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
     input.without_pose += packets.without_pose;
     input.events += rays.size();
     if (rays.size() == 0) ++input.silent_subintervals;
+  };
+  for (const std::vector<EventSpan>& slice : slicesOf(events, window)) {
+    for (int polarity = 0; polarity < options_.split.polarities(); ++polarity) {
+      for (const EventSpan& part : slice) {
+        if (options_.split.polarity) {
+          add(eventsOfPolarity(part, polarity == 1));
+        } else {
+          add(part);
+        }
+      }
+    }
   }
   return input;
+}
+
+std::vector<std::vector<EventSpan>> KeyframeMapper::slicesOf(EventSpan events,
+                                                             const Window& window) const {
+  SubintervalOptions all = options_.subintervals;
+  all.count *= options_.split.time_slices;
+  const std::vector<EventSpan> parts =
+      splitIntoSubintervals(events, window.t0_ns, window.t1_ns, all);
+  std::vector<std::vector<EventSpan>> slices;
+  for (auto part = parts.begin(); part != parts.end(); part += options_.subintervals.count) {
+    slices.emplace_back(part, part + options_.subintervals.count);
+  }
+  return slices;
 }
 
 /// Counts what became of a camera's events.
@@ -170,19 +194,19 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
                                 }),
                  inputs.end());
   }
-  const auto slots = assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals);
-  std::vector<CameraRays> rays(inputs.size());
-  for (std::size_t c = 0; c < inputs.size(); ++c) {
-    for (const int part : slots[c]) {
-      rays[c].push_back(std::move(inputs[c].rays[static_cast<std::size_t>(part)]));
-    }
-  }
+  std::vector<CameraRays> rays;
+  for (CameraInput& input : inputs) rays.push_back(std::move(input.rays));
+  SplitRays split = arrangeGroups(
+      std::move(rays), options_.split,
+      assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals));
 
   // 4. Vote and fuse, plane by plane.
+  const bool cameras_apart = split.inputs.size() == inputs.size();  // not slices of a single one
+  const bool camera_peaks = options_.camera_maps && cameras_apart;
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
-    swept = sweep_.run(std::move(rays), view_, planes_, {options_.camera_maps, sink});
+    swept = sweep_.run(std::move(split.inputs), view_, planes_, {camera_peaks, sink, split.groups});
   }
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
 
@@ -193,6 +217,9 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   const auto sequence_maximum =
       options_.sequence_maximum ? options_.sequence_maximum : sequence_maximum_.value();
   keyframe.map = extractDepth(swept.peaks, planes_, options_.extraction, sequence_maximum);
+  if (options_.camera_maps && !cameras_apart) {
+    keyframe.camera_maps.push_back({inputs.front().camera, keyframe.map});
+  }
   for (std::size_t c = 0; c < swept.camera_peaks.size(); ++c) {
     // A camera alone has other densities than the fusion: the recording's maximum is not its own.
     keyframe.camera_maps.push_back(

@@ -14,6 +14,7 @@
 #include "mapping/rig.h"
 #include "mapping/robust_maximum.h"
 #include "mapping/space_sweep.h"
+#include "mapping/split_fusion.h"
 #include "mapping/stage.h"
 #include "mapping/subintervals.h"
 #include "mapping/trajectory.h"
@@ -27,6 +28,7 @@ struct KeyframeMapperOptions {
   int reference_camera = 0;
   ReferenceViewOptions view;
   SubintervalOptions subintervals;
+  SplitFusionOptions split;  ///< Into groups of events, each with its own sub-intervals.
   /// Leave cameras without an event to vote out of the fusion: with the AND-like rules a silent
   /// camera makes everything zero.
   bool exclude_silent = false;
@@ -69,7 +71,7 @@ class KeyframeMapper {
   /// One camera's events on their way to the sweep.
   struct CameraInput {
     int camera = 0;
-    CameraRays rays;  // by sub-interval
+    CameraRays rays;  // by time slice, polarity and sub-interval
     std::uint64_t events = 0;
     std::uint64_t without_pose = 0;
     std::uint64_t silent_subintervals = 0;
@@ -77,6 +79,7 @@ class KeyframeMapper {
 
   CameraInput backProjectCamera(std::size_t selected, EventSpan events, const Window& window,
                                 const Trajectory& trajectory, const PacketGeometry& geometry) const;
+  std::vector<std::vector<EventSpan>> slicesOf(EventSpan events, const Window& window) const;
   static void count(const CameraInput& input, KeyframeDepthMap& keyframe);
   void fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
             KeyframeDepthMap& keyframe);

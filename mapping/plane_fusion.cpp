@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/plane_fusion.h"
 
+#include <algorithm>
 #include <cassert>
 
 #include "mapping/named_choice.h"
@@ -16,35 +17,42 @@ constexpr NamedChoice<FusionOrder> kOrders[] = {
 /// An axis of one input needs no accumulator.
 std::size_t voxelsFor(int inputs, std::size_t voxels) { return inputs > 1 ? voxels : 0; }
 
+void addTo(PlaneValues& sum, const PlaneValues& values) {
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += values[i];
+}
+
 }  // namespace
 
 std::string_view nameOf(FusionOrder order) { return nameIn(kOrders, order); }
 FusionOrder fusionOrderFromName(std::string_view name) { return valueIn(kOrders, name); }
 
-PlaneFusion::PlaneFusion(const FusionOptions& options, int cameras, int slots, std::size_t voxels,
-                         Keep keep, VotingKernel kernel)
+PlaneFusion::PlaneFusion(const FusionOptions& options, const FusionInputs& inputs,
+                         std::size_t voxels, Keep keep, VotingKernel kernel)
     : cameras_first_(options.order == FusionOrder::kCamerasThenTime),
-      slots_(slots),
-      inner_count_(cameras_first_ ? cameras : slots),
-      outer_count_(cameras_first_ ? slots : cameras),
+      slots_(inputs.slots),
+      groups_(inputs.groups),
+      inner_count_(cameras_first_ ? inputs.cameras : inputs.slots),
+      outer_count_(cameras_first_ ? inputs.slots : inputs.cameras),
       votes_(voxels),
       inner_(cameras_first_ ? options.across_cameras : options.across_time,
              voxelsFor(inner_count_, voxels), kernel),
       outer_(cameras_first_ ? options.across_time : options.across_cameras,
-             voxelsFor(outer_count_, voxels), kernel) {
-  assert(cameras >= 1 && slots >= 1);
-  if (keep == Keep::kCameras) {
-    cameras_.assign(static_cast<std::size_t>(cameras),
-                    FusionAccumulator(options.across_time, voxels, kernel));
-  }
+             voxelsFor(outer_count_, voxels), kernel),
+      sum_(voxelsFor(groups_, voxels)) {
+  assert(inputs.cameras >= 1 && inputs.slots >= 1 && inputs.groups >= 1);
+  if (keep == Keep::kFusedOnly) return;
+  const auto cameras = static_cast<std::size_t>(inputs.cameras);
+  cameras_.assign(cameras, FusionAccumulator(options.across_time, voxels, kernel));
+  camera_sums_.assign(cameras, PlaneValues(voxelsFor(groups_, voxels)));
 }
 
-const PlaneValues& PlaneFusion::fuseInner(int outer, const Vote& vote) {
+const PlaneValues& PlaneFusion::fuseInner(int group, int outer, const Vote& vote) {
   inner_.begin(inner_count_);
   for (int inner = 0; inner < inner_count_; ++inner) {
     const int camera = cameras_first_ ? inner : outer;
+    const int slot = cameras_first_ ? outer : inner;
     PlaneValues& votes = inner_count_ == 2 && inner == 0 ? inner_.place() : votes_;
-    vote(camera, cameras_first_ ? outer : inner, votes);
+    vote(camera, group * slots_ + slot, votes);
     if (!cameras_.empty()) cameras_[static_cast<std::size_t>(camera)].fold(votes.data());
     if (inner_count_ > 1) inner_.fold(votes.data());
   }
@@ -53,21 +61,32 @@ const PlaneValues& PlaneFusion::fuseInner(int outer, const Vote& vote) {
   return inner_.values();
 }
 
-const PlaneValues& PlaneFusion::fuse(const Vote& vote) {
+const PlaneValues& PlaneFusion::fuseGroup(int group, const Vote& vote) {
   for (FusionAccumulator& camera : cameras_) camera.begin(slots_);
   const PlaneValues* fused = nullptr;
   if (outer_count_ == 1) {
-    fused = &fuseInner(0, vote);
+    fused = &fuseInner(group, 0, vote);
   } else {
     outer_.begin(outer_count_);
     for (int outer = 0; outer < outer_count_; ++outer) {
-      outer_.fold(fuseInner(outer, vote).data());
+      outer_.fold(fuseInner(group, outer, vote).data());
     }
     outer_.finish();
     fused = &outer_.values();
   }
   for (FusionAccumulator& camera : cameras_) camera.finish();
   return *fused;
+}
+
+const PlaneValues& PlaneFusion::fuse(const Vote& vote) {
+  if (groups_ == 1) return fuseGroup(0, vote);
+  std::fill(sum_.begin(), sum_.end(), 0.0F);
+  for (PlaneValues& sum : camera_sums_) std::fill(sum.begin(), sum.end(), 0.0F);
+  for (int group = 0; group < groups_; ++group) {
+    addTo(sum_, fuseGroup(group, vote));
+    for (std::size_t c = 0; c < cameras_.size(); ++c) addTo(camera_sums_[c], cameras_[c].values());
+  }
+  return sum_;
 }
 
 }  // namespace efm

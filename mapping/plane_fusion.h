@@ -29,12 +29,21 @@ struct FusionOptions {
   FusionOrder order = FusionOrder::kCamerasThenTime;
 };
 
-/// Fuses one plane of the DSIs of all cameras and sub-intervals. Holds a plane for the votes and
-/// one for each axis, whatever the number of cameras and sub-intervals. An axis with one input is
-/// left out, bit for bit.
+/// What a plane is fused of.
+struct FusionInputs {
+  int cameras = 1;  ///< At least 1.
+  int slots = 1;    ///< Per camera and group, at least 1.
+  int groups = 1;   ///< Fused each by itself, then summed; at least 1.
+};
+
+/// Fuses one plane of the DSIs of all cameras and sub-intervals, in groups where there are several:
+/// the sum of what the groups give. Holds a plane for the votes, one for each axis and one for the
+/// sum, whatever the number of cameras, sub-intervals and groups. An axis with one input is left
+/// out, bit for bit.
 class PlaneFusion {
  public:
-  /// Fills the plane with the ray density of one camera in one slot of the time axis.
+  /// Fills the plane with the ray density of one camera in one slot of the time axis; those of
+  /// group g begin at g * slots.
   using Vote = std::function<void(int camera, int slot, PlaneValues& votes)>;
 
   /// What else is kept of a plane.
@@ -43,10 +52,9 @@ class PlaneFusion {
     kCameras,  ///< Also each camera alone, fused across time: a plane of memory per camera.
   };
 
-  /// @param cameras, slots at least 1.
   /// @param voxels of a plane or of a part of it: each is fused by itself.
   /// @param kernel an available one.
-  PlaneFusion(const FusionOptions& options, int cameras, int slots, std::size_t voxels,
+  PlaneFusion(const FusionOptions& options, const FusionInputs& inputs, std::size_t voxels,
               Keep keep = Keep::kFusedOnly, VotingKernel kernel = fastestKernel());
 
   /// Asks for every input once. @return the fused plane, until the next call.
@@ -54,20 +62,25 @@ class PlaneFusion {
 
   /// A camera's own plane after `fuse`, where cameras are kept.
   const PlaneValues& ofCamera(int camera) const {
-    return cameras_[static_cast<std::size_t>(camera)].values();
+    const auto c = static_cast<std::size_t>(camera);
+    return groups_ == 1 ? cameras_[c].values() : camera_sums_[c];
   }
 
  private:
-  const PlaneValues& fuseInner(int outer, const Vote& vote);
+  const PlaneValues& fuseInner(int group, int outer, const Vote& vote);
+  const PlaneValues& fuseGroup(int group, const Vote& vote);
 
   bool cameras_first_;
   int slots_;
+  int groups_;
   int inner_count_;
   int outer_count_;
   PlaneValues votes_;
   FusionAccumulator inner_;
   FusionAccumulator outer_;
   std::vector<FusionAccumulator> cameras_;
+  PlaneValues sum_;  // of several groups
+  std::vector<PlaneValues> camera_sums_;
 };
 
 }  // namespace efm

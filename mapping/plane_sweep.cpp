@@ -77,8 +77,7 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceV
     group.camera_peaks.assign(kept_cameras, RunningPeaks(view.pixels(), options.kernelOrFastest()));
     group.votes.resize(cameras.size());
     PlaneFusion fusion(
-        options.fusion, static_cast<int>(cameras.size()), static_cast<int>(cameras.front().size()),
-        view.pixels(),
+        options.fusion, fusionInputs(cameras, request.groups), view.pixels(),
         request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
         options.kernelOrFastest());
     for (int plane = group.begin; plane < group.end; ++plane) {

@@ -4,6 +4,7 @@
 #include <tbb/global_control.h>
 
 #include <algorithm>
+#include <cassert>
 #include <string>
 #include <utility>
 
@@ -40,6 +41,12 @@ int SpaceSweepOptions::threadsOrCores() const {
 }
 
 VotingKernel SpaceSweepOptions::kernelOrFastest() const { return kernel.value_or(fastestKernel()); }
+
+FusionInputs fusionInputs(const std::vector<CameraRays>& cameras, int groups) {
+  const auto slots = static_cast<int>(cameras.front().size());
+  assert(groups >= 1 && slots % groups == 0);
+  return {static_cast<int>(cameras.size()), slots / groups, groups};
+}
 
 SpaceSweep::SpaceSweep(const SpaceSweepOptions& options) : options_(options) {
   options_.validate();

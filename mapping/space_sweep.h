@@ -45,7 +45,13 @@ using CameraRays = std::vector<RayBundle>;
 struct SweepRequest {
   bool camera_peaks = false;  ///< Also the peaks of each camera alone, fused across time.
   DsiSink* sink = nullptr;    ///< Receives the whole fused DSI where given; not owned.
+  /// Each camera's slots are of so many groups, one after the other: each is fused by itself, and
+  /// the fused groups are summed. Divides the number of slots.
+  int groups = 1;
 };
+
+/// @param groups divides the number of slots (asserted).
+FusionInputs fusionInputs(const std::vector<CameraRays>& cameras, int groups);
 
 struct SweepResult {
   DsiPeaks peaks;

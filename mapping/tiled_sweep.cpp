@@ -64,7 +64,7 @@ class TiledSweep {
         request_(request),
         kernel_(options.kernelOrFastest()),
         cameras_(static_cast<int>(cameras.size())),
-        slots_(static_cast<int>(cameras.front().size())),
+        inputs_(fusionInputs(cameras, request.groups)),
         tiles_(tilesOf(view, TileVoter::kTilePixels)),
         rays_(std::move(cameras), view, planes),
         whole_planes_(request.sink, view) {
@@ -109,7 +109,7 @@ class TiledSweep {
       rays_.gather(i, workplace.voter, workplace.rays[i]);
     }
     PlaneFusion fusion(
-        options_.fusion, cameras_, slots_, static_cast<std::size_t>(tile.area()),
+        options_.fusion, inputs_, static_cast<std::size_t>(tile.area()),
         request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
         kernel_);
     for (int plane = group.begin; plane < group.end; ++plane) {
@@ -152,7 +152,7 @@ class TiledSweep {
   SweepRequest request_;
   VotingKernel kernel_;
   int cameras_;
-  int slots_;
+  FusionInputs inputs_;
   std::vector<cv::Rect> tiles_;
   BinnedRays rays_;
   GroupPlanes whole_planes_;

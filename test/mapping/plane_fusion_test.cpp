@@ -52,8 +52,7 @@ PlaneFusion::Vote votesOf(const Densities& densities) {
 PlaneFusion fusionOf(VotingKernel kernel, const Densities& densities, const FusionOptions& options,
                      PlaneFusion::Keep keep = PlaneFusion::Keep::kFusedOnly) {
   return {options,
-          static_cast<int>(densities.size()),
-          static_cast<int>(densities[0].size()),
+          {static_cast<int>(densities.size()), static_cast<int>(densities[0].size())},
           kVoxels,
           keep,
           kernel};
@@ -274,7 +273,7 @@ TEST_P(PlaneFusionOn, NothingIsLeftOverFromThePlaneBefore) {
 TEST_P(PlaneFusionOn, AsksForEveryInputOnce) {
   for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
     std::vector<int> asked(3 * 4);
-    PlaneFusion fusion({FusionRule::kMin, FusionRule::kMax, order}, 3, 4, kVoxels,
+    PlaneFusion fusion({FusionRule::kMin, FusionRule::kMax, order}, {3, 4}, kVoxels,
                        PlaneFusion::Keep::kFusedOnly, GetParam());
     fusion.fuse([&](int camera, int slot, PlaneValues&) {
       ++asked[static_cast<std::size_t>(4 * camera + slot)];
