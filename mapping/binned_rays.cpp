@@ -47,6 +47,14 @@ BinnedRays::BinnedRays(std::vector<CameraRays> cameras, const ReferenceView& vie
       bins_.push_back(RayBins::sort(rays, view, planes));
     }
   }
+  groups_ = groupPlanes();
+  for (const PlaneGroup& group : groups_) {
+    auto& reach = reach_.emplace_back();
+    for (const auto& input : bins_) {
+      auto& of_input = reach.emplace_back();
+      for (const RayBins& bins : input) of_input.push_back(bins.reachIn(group));
+    }
+  }
 }
 
 std::vector<PlaneGroup> BinnedRays::groupPlanes() const {
@@ -71,16 +79,12 @@ std::vector<PlaneGroup> BinnedRays::groupPlanes() const {
   return groups;
 }
 
-void BinnedRays::moveTo(const PlaneGroup& group) {
-  for (auto& input : bins_) {
-    for (RayBins& bins : input) bins.moveTo(group);
-  }
-}
-
-void BinnedRays::gather(std::size_t input, const TileVoter& voter, TileRays& rays) const {
+void BinnedRays::gather(std::size_t group, std::size_t input, const TileVoter& voter,
+                        TileRays& rays) const {
   rays.clear();
-  for (const RayBins& bins : bins_[input]) {
-    bins.gather(voter.cells(), voter.origin(), voter.functions(), rays);
+  for (std::size_t i = 0; i < bins_[input].size(); ++i) {
+    bins_[input][i].gather(reach_[group][input][i], voter.cells(), voter.origin(),
+                           voter.functions(), rays);
   }
   rays.pad();
 }

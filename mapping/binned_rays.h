@@ -22,29 +22,34 @@ class BinnedRays {
 
   /// Groups in which no ray moves far, from the nearest plane to the farthest; of one plane, where
   /// there are rays that are not on all planes.
-  std::vector<PlaneGroup> groupPlanes() const;
-  /// Turns to a group.
-  void moveTo(const PlaneGroup& group);
+  const std::vector<PlaneGroup>& groups() const { return groups_; }
 
   std::size_t inputs() const { return bins_.size(); }
   std::size_t inputOf(int camera, int slot) const {
     return static_cast<std::size_t>(camera * slots_ + slot);
   }
-  /// The rays of an input that the voter's tile may see in the group. Thread-safe.
-  void gather(std::size_t input, const TileVoter& voter, TileRays& rays) const;
+  /// The rays of an input that the voter's tile may see in a group, by its index. Thread-safe.
+  void gather(std::size_t group, std::size_t input, const TileVoter& voter, TileRays& rays) const;
   /// How far the planes of a group are from the home of gathered rays, 1/m.
   double fromHome(int plane) const;
 
   /// Gives the rays' memory back; the counts stay.
-  void release() { bins_ = {}; }
+  void release() {
+    bins_ = {};
+    reach_ = {};
+  }
   /// Per camera, what the votes come to if none is cast.
   const std::vector<VoteCounts>& notCast() const { return not_cast_; }
 
  private:
+  std::vector<PlaneGroup> groupPlanes() const;
+
   const DepthPlanes& planes_;
   double home_;  // inverse depth of the home plane
   int slots_;
   std::vector<std::vector<RayBins>> bins_;  // by camera and slot
+  std::vector<PlaneGroup> groups_;
+  std::vector<std::vector<std::vector<RayBins::GroupReach>>> reach_;  // by group, beside bins_
   std::vector<VoteCounts> not_cast_;
 };
 

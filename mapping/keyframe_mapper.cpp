@@ -203,27 +203,28 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   // 4. Vote and fuse, plane by plane.
   const bool cameras_apart = split.inputs.size() == inputs.size();  // not slices of a single one
   const bool camera_peaks = options_.camera_maps && cameras_apart;
+  const int ray_window = keepsRays(options_.extraction.extraction) ? options_.extraction.threshold_kernel : 0;
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
-    swept = sweep_.run(std::move(split.inputs), view_, planes_, {camera_peaks, sink, split.groups});
+    swept = sweep_.run(std::move(split.inputs), view_, planes_, {camera_peaks, sink, split.groups, ray_window});
   }
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
 
   // 5. Depth and confidence from the fused DSI.
   const StageScope scope(stages, Stage::kDepth);
-  keyframe.largest_confidence = largestOf(swept.peaks.confidence);
+  keyframe.largest_confidence = largestOf(swept.fused.peaks.confidence);
   sequence_maximum_.take(keyframe.largest_confidence);
   const auto sequence_maximum =
       options_.sequence_maximum ? options_.sequence_maximum : sequence_maximum_.value();
-  keyframe.map = extractDepth(swept.peaks, planes_, options_.extraction, sequence_maximum);
+  keyframe.map = extractDepth(swept.fused, planes_, options_.extraction, sequence_maximum);
   if (options_.camera_maps && !cameras_apart) {
     keyframe.camera_maps.push_back({inputs.front().camera, keyframe.map});
   }
-  for (std::size_t c = 0; c < swept.camera_peaks.size(); ++c) {
+  for (std::size_t c = 0; c < swept.cameras.size(); ++c) {
     // A camera alone has other densities than the fusion: the recording's maximum is not its own.
     keyframe.camera_maps.push_back(
-        {inputs[c].camera, extractDepth(swept.camera_peaks[c], planes_, options_.extraction)});
+        {inputs[c].camera, extractDepth(swept.cameras[c], planes_, options_.extraction)});
   }
 }
 

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "mapping/kernels/vote.h"
 
@@ -25,6 +26,31 @@ struct SweptGroup {
   std::optional<RunningPeaks> peaks;
   std::vector<RunningPeaks> camera_peaks;  // per camera, where asked for
   std::vector<VoteCounts> votes;           // per camera
+};
+
+/// DSIs as a whole, where values along rays are asked for: the simplest way to have them.
+class Volumes {
+ public:
+  Volumes(const ReferenceView& view, int planes, std::size_t count, int ray_window)
+      : planes_(planes), ray_window_(ray_window) {
+    if (ray_window > 0) volumes_.assign(count, TileVolume(planes, view.pixels()));
+  }
+  /// Several threads may give different planes at once.
+  void take(std::size_t volume, int plane, const PlaneValues& values) {
+    if (!volumes_.empty()) volumes_[volume].take(plane, values);
+  }
+  SweptDsi swept(std::size_t volume, DsiPeaks peaks) const {
+    if (volumes_.empty()) return {std::move(peaks), {}};
+    const cv::Size size = peaks.confidence.size();
+    std::vector<DsiRays::Tile> all = {DsiRays::pick({{0, 0}, size}, peaks.confidence,
+                                                    volumes_[volume], planes_, ray_window_)};
+    return {std::move(peaks), DsiRays(size, planes_, std::move(all))};
+  }
+
+ private:
+  int planes_;
+  int ray_window_;
+  std::vector<TileVolume> volumes_;
 };
 
 std::vector<SweptGroup> groupPlanes(int planes, int threads) {
@@ -71,6 +97,7 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceV
                         const SweepRequest& request) {
   const std::size_t kept_cameras = request.camera_peaks ? cameras.size() : 0;
   std::vector<SweptGroup> groups = groupPlanes(planes.size(), options.threadsOrCores());
+  Volumes volumes(view, planes.size(), 1 + kept_cameras, request.ray_window);
 
   const auto sweep_group = [&](SweptGroup& group) {
     RunningPeaks& peaks = group.peaks.emplace(view.pixels(), options.kernelOrFastest());
@@ -87,8 +114,11 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceV
             votePlane(cameras[c][static_cast<std::size_t>(slot)], view, planes.depth(plane), votes);
       });
       peaks.take(plane, fused);
+      volumes.take(0, plane, fused);
       for (std::size_t c = 0; c < kept_cameras; ++c) {
-        group.camera_peaks[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
+        const PlaneValues& alone = fusion.ofCamera(static_cast<int>(c));
+        group.camera_peaks[c].take(plane, alone);
+        volumes.take(c + 1, plane, alone);
       }
       if (request.sink != nullptr) request.sink->takePlane(plane, fused.data());
     }
@@ -111,9 +141,9 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceV
     }
     for (std::size_t c = 0; c < cameras.size(); ++c) all.votes[c] += group->votes[c];
   }
-  SweepResult result{all.peaks->images(view), {}, all.votes};
-  for (const RunningPeaks& peaks : all.camera_peaks) {
-    result.camera_peaks.push_back(peaks.images(view));
+  SweepResult result{volumes.swept(0, all.peaks->images(view)), {}, all.votes};
+  for (std::size_t c = 0; c < kept_cameras; ++c) {
+    result.cameras.push_back(volumes.swept(c + 1, all.camera_peaks[c].images(view)));
   }
   return result;
 }

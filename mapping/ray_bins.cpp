@@ -283,25 +283,26 @@ double RayBins::fastestShift() const {
   return std::max(along(columns_), along(rows_));
 }
 
-void RayBins::moveTo(const PlaneGroup& group) {
-  group_ = group;
-  setReach(columns_);
-  setReach(rows_);
-  if (onAllPlanes()) return;
-  transfers_.clear();
+RayBins::GroupReach RayBins::reachIn(const PlaneGroup& group) const {
+  GroupReach reach;
+  reach.group_ = group;
+  reach.columns_ = reachAlong(columns_, group);
+  reach.rows_ = reachAlong(rows_, group);
+  if (onAllPlanes()) return reach;
   for (const RayPacket& packet : packets_) {
-    transfers_.push_back(transferToPlane(packet, view_, group.first_depth_m));
+    reach.transfers_.push_back(transferToPlane(packet, view_, group.first_depth_m));
   }
+  return reach;
 }
 
-void RayBins::setReach(Axis& axis) const {
+std::vector<RayBins::Range> RayBins::reachAlong(const Axis& axis, const PlaneGroup& group) const {
   const auto rangeOf = [](std::initializer_list<double> values) {
     const auto [least, greatest] = std::minmax(values);
     return Range{least, greatest};
   };
-  const double to_first = 1 / group_.first_depth_m - home_;
-  const double to_last = 1 / group_.last_depth_m - home_;
-  axis.reach.resize(static_cast<std::size_t>(axis.bins));
+  const double to_first = 1 / group.first_depth_m - home_;
+  const double to_last = 1 / group.last_depth_m - home_;
+  std::vector<Range> reach(static_cast<std::size_t>(axis.bins));
   for (int bin = 0; bin < axis.bins; ++bin) {
     const double begin = axis.begin + bin * kBin_px;
     const double u0 = begin - axis.principal;
@@ -311,13 +312,14 @@ void RayBins::setReach(Axis& axis) const {
     const Range moved = rangeOf({to_first * shift.least, to_first * shift.greatest,
                                  to_last * shift.least, to_last * shift.greatest});
     const bool open = !onAllPlanes() && (bin == 0 || bin == axis.bins - 1);
-    axis.reach[static_cast<std::size_t>(bin)] =
+    reach[static_cast<std::size_t>(bin)] =
         open ? Range{-kInfinity, kInfinity}
              : Range{begin + moved.least, begin + kBin_px + moved.greatest};
   }
+  return reach;
 }
 
-void RayBins::gather(const cv::Rect& cells, cv::Point origin,
+void RayBins::gather(const GroupReach& reach, const cv::Rect& cells, cv::Point origin,
                      const kernels::TileFunctions& functions, TileRays& found) const {
   constexpr double kRounding_px = 0.01;  // coordinates are rounded to 1/4096 px later
   constexpr double kHalfUnit_px = 0.5 / 4096;
@@ -330,8 +332,8 @@ void RayBins::gather(const cv::Rect& cells, cv::Point origin,
   request.c = narrow(c_.middle());
   request.step_x = narrow(columns_.step);
   request.step_y = narrow(rows_.step);
-  request.to_first = narrow(1 / group_.first_depth_m - home_);
-  request.to_last = narrow(1 / group_.last_depth_m - home_);
+  request.to_first = narrow(1 / reach.group_.first_depth_m - home_);
+  request.to_last = narrow(1 / reach.group_.last_depth_m - home_);
   request.left = narrow(cells.x - kRounding_px);
   request.right = narrow(cells.x + cells.width + kRounding_px);
   request.top = narrow(cells.y - kRounding_px);
@@ -339,15 +341,15 @@ void RayBins::gather(const cv::Rect& cells, cv::Point origin,
   request.origin_x = narrow(origin.x);
   request.origin_y = narrow(origin.y);
 
-  const auto touches = [](const Range& reach, float least, float greatest) {
-    return reach.greatest >= least && reach.least <= greatest;
+  const auto touches = [](const Range& bin, float least, float greatest) {
+    return bin.greatest >= least && bin.least <= greatest;
   };
   for (int row = 0; row < rows_.bins; ++row) {
-    if (!touches(rows_.reach[static_cast<std::size_t>(row)], request.top, request.bottom)) continue;
+    if (!touches(reach.rows_[static_cast<std::size_t>(row)], request.top, request.bottom)) continue;
     request.corner_y = narrow(rows_.begin + row * kBin_px + kHalfUnit_px);
     for (int column = 0; column < columns_.bins; ++column) {
-      const Range& reach = columns_.reach[static_cast<std::size_t>(column)];
-      if (!touches(reach, request.left, request.right)) continue;
+      const Range& bin_columns = reach.columns_[static_cast<std::size_t>(column)];
+      if (!touches(bin_columns, request.left, request.right)) continue;
       request.corner_x = narrow(columns_.begin + column * kBin_px + kHalfUnit_px);
       const std::size_t bin = binAt(column, row);
       const std::size_t count = begin_[bin + 1] - begin_[bin];
@@ -356,7 +358,7 @@ void RayBins::gather(const cv::Rect& cells, cv::Point origin,
       if (onAllPlanes()) {
         found.resize(functions.gather(compact_.data() + begin_[bin], count, request, found.view()));
       } else {
-        gatherWide(bin, request, found);
+        gatherWide(reach, bin, request, found);
       }
     }
   }
@@ -364,12 +366,12 @@ void RayBins::gather(const cv::Rect& cells, cv::Point origin,
 
 /// Of rays that need not be on all planes: where they meet the group's one plane, as the plain
 /// kernel has it.
-void RayBins::gatherWide(std::size_t bin, const kernels::GatherRequest& request,
-                         TileRays& found) const {
+void RayBins::gatherWide(const GroupReach& reach, std::size_t bin,
+                         const kernels::GatherRequest& request, TileRays& found) const {
   constexpr auto kScale = static_cast<float>(1 << kernels::kFractionBits);
   for (std::size_t i = begin_[bin]; i < begin_[bin + 1]; ++i) {
     const WideRay& ray = wide_[i];
-    const PlaneTransfer& transfer = transfers_[ray.packet];
+    const PlaneTransfer& transfer = reach.transfers_[ray.packet];
     if (!transfer.in_front) continue;
     const float x =
         static_cast<float>(transfer.scale) * ray.x_inf + static_cast<float>(transfer.offset_x);

@@ -47,13 +47,14 @@ class RayBins {
   /// How far a ray inside the view moves at most in x or y, in pixels per unit of inverse depth.
   double fastestShift() const;
 
+  class GroupReach;
   /// Prepares for a group of planes: one plane, where rays are not on all of them.
-  void moveTo(const PlaneGroup& group);
+  GroupReach reachIn(const PlaneGroup& group) const;
   /// Appends the rays that may fall into some cells on planes of the group. Thread-safe.
   /// @param cells by their upper left pixels.
   /// @param origin what the coordinates of `found` count from.
-  void gather(const cv::Rect& cells, cv::Point origin, const kernels::TileFunctions& functions,
-              TileRays& found) const;
+  void gather(const GroupReach& reach, const cv::Rect& cells, cv::Point origin,
+              const kernels::TileFunctions& functions, TileRays& found) const;
 
  private:
   /// From the least to the greatest of many numbers.
@@ -80,9 +81,8 @@ class RayBins {
     int pixels = 0;        // side of the view
     double begin = 0;      // corner of the first bin, pixels
     int bins = 0;
-    Range at_center;           // shifts of the packets at the principal point: their a or b
-    double step = 0;           // unit of compact rays' own shifts
-    std::vector<Range> reach;  // where the rays of each may be in the group, pixels
+    Range at_center;   // shifts of the packets at the principal point: their a or b
+    double step = 0;   // unit of compact rays' own shifts
 
     Range fromPrincipal() const;
   };
@@ -106,8 +106,9 @@ class RayBins {
   void place(const RayBundle& rays);
   void placeCompact(const RayBundle& rays);
   void placeWide(const RayBundle& rays);
-  void setReach(Axis& axis) const;
-  void gatherWide(std::size_t bin, const kernels::GatherRequest& request, TileRays& found) const;
+  std::vector<Range> reachAlong(const Axis& axis, const PlaneGroup& group) const;
+  void gatherWide(const GroupReach& reach, std::size_t bin, const kernels::GatherRequest& request,
+                  TileRays& found) const;
 
   Kind kind_;
   ReferenceView view_;
@@ -119,8 +120,17 @@ class RayBins {
   std::vector<kernels::CompactRay> compact_;
   std::vector<WideRay> wide_;
   std::vector<RayPacket> packets_;
-  std::vector<PlaneTransfer> transfers_;  // of packets of wide rays, to the group's one plane
+};
+
+/// Where the rays of each bin may be in a group of planes.
+class RayBins::GroupReach {
+ private:
+  friend class RayBins;
+
   PlaneGroup group_;
+  std::vector<Range> columns_;            // by bin, pixels
+  std::vector<Range> rows_;
+  std::vector<PlaneTransfer> transfers_;  // of packets of wide rays, to the group's one plane
 };
 
 }  // namespace efm

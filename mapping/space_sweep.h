@@ -7,9 +7,9 @@
 
 #include "mapping/back_projection.h"
 #include "mapping/depth_planes.h"
-#include "mapping/dsi_peaks.h"
 #include "mapping/plane_fusion.h"
 #include "mapping/reference_view.h"
+#include "mapping/swept_dsi.h"
 #include "mapping/vote_counts.h"
 #include "mapping/voting_kernel.h"
 
@@ -48,22 +48,27 @@ struct SweepRequest {
   /// Each camera's slots are of so many groups, one after the other: each is fused by itself, and
   /// the fused groups are summed. Divides the number of slots.
   int groups = 1;
+  /// Also keeps the fused values along the rays whose confidence stands out from a Gaussian window
+  /// of so many pixels: odd, at least 3. 0: none are kept.
+  int ray_window = 0;
 };
 
 /// @param groups divides the number of slots (asserted).
 FusionInputs fusionInputs(const std::vector<CameraRays>& cameras, int groups);
 
 struct SweepResult {
-  DsiPeaks peaks;
-  std::vector<DsiPeaks> camera_peaks;  ///< Per camera, where asked for.
-  std::vector<VoteCounts> votes;       ///< Per camera.
+  SweptDsi fused;
+  std::vector<SweptDsi> cameras;  ///< Each alone, where asked for.
+  std::vector<VoteCounts> votes;  ///< Per camera.
 };
 
 /// Sweeps the planes through space: on each, votes every camera and sub-interval, folds the votes
 /// into the running means of the two axes, and keeps the best value along each ray so far. No
 /// volume is held: memory beside the rays is O(width * height), whatever the number of planes,
 /// cameras and sub-intervals (with `camera_peaks`, times the cameras; with the plain kernel, times
-/// the threads). The order of planes and threads never changes the result.
+/// the threads). Where values along rays or whole planes are asked for, they come on top: two bytes
+/// per plane of a pixel that stands out, four of any pixel. The order of planes and threads never
+/// changes the result.
 class SpaceSweep {
  public:
   /// @throws std::invalid_argument where the options are not valid.

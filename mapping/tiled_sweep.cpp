@@ -7,8 +7,8 @@
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
 
-#include <algorithm>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <utility>
 
 #include "mapping/binned_rays.h"
@@ -20,39 +20,80 @@
 namespace efm {
 namespace {
 
+/// What is found on one tile, of the fused DSI or of one camera's.
+class TileFinds {
+ public:
+  TileFinds(int planes, int ray_window)
+      : planes_(planes),
+        ray_window_(ray_window),
+        volume_(ray_window > 0 ? planes : 0, TileVoter::kTilePixels * TileVoter::kTilePixels) {}
+
+  void moveTo(const cv::Rect& tile, VotingKernel kernel) {
+    tile_ = tile;
+    peaks_.emplace(static_cast<std::size_t>(tile.area()), kernel);
+  }
+  /// Planes in increasing order, without a gap.
+  void take(int plane, const PlaneValues& values) {
+    peaks_->take(plane, values);
+    if (ray_window_ > 0) volume_.take(plane, values);
+  }
+  /// Writes into places of the tile's own.
+  void writeTo(DsiPeaks& peaks, DsiRays::Tile& rays) const {
+    peaks_->writeTo(peaks, tile_);
+    if (ray_window_ > 0) {
+      rays = DsiRays::pick(tile_, peaks.confidence(tile_), volume_, planes_, ray_window_);
+    }
+  }
+
+ private:
+  int planes_;
+  int ray_window_;
+  cv::Rect tile_;
+  std::optional<RunningPeaks> peaks_;
+  TileVolume volume_;
+};
+
 /// What one thread needs, kept from tile to tile.
 struct Workplace {
   TileVoter voter;
   std::vector<TileRays> rays;        // by camera and slot
   std::vector<std::uint64_t> votes;  // by camera
+  TileFinds fused;
+  std::vector<TileFinds> cameras;  // where they are asked for
 };
 
-/// The planes of a group as a whole, where somebody wants to see them.
-class GroupPlanes {
+/// The whole DSI, where somebody wants to see it.
+class WholePlanes {
  public:
-  GroupPlanes(DsiSink* sink, const ReferenceView& view) : sink_(sink), view_(view) {}
+  WholePlanes(DsiSink* sink, const ReferenceView& view, int planes) : sink_(sink) {
+    planes_.resize(sink == nullptr ? 0 : static_cast<std::size_t>(planes));
+    for (cv::Mat1f& plane : planes_) plane.create(view.height, view.width);
+  }
 
-  void begin(const PlaneGroup& group) {
-    first_ = group.begin;
-    const int count = sink_ == nullptr ? 0 : group.end - group.begin;
-    planes_.resize(static_cast<std::size_t>(count));
-    for (cv::Mat1f& plane : planes_) plane.create(view_.height, view_.width);
-  }
+  /// Several threads may give different tiles at once.
   void take(int plane, const cv::Rect& tile, const PlaneValues& values) {
-    if (sink_ == nullptr) return;
-    writeTo(planes_[static_cast<std::size_t>(plane - first_)](tile), values);
+    if (sink_ != nullptr) writeTo(planes_[static_cast<std::size_t>(plane)](tile), values);
   }
-  void end() {
-    for (std::size_t i = 0; i < planes_.size(); ++i) {
-      sink_->takePlane(first_ + static_cast<int>(i), planes_[i][0]);
+  void give() {
+    for (std::size_t plane = 0; plane < planes_.size(); ++plane) {
+      sink_->takePlane(static_cast<int>(plane), planes_[plane][0]);
     }
   }
 
  private:
   DsiSink* sink_;
-  ReferenceView view_;
-  int first_ = 0;
   std::vector<cv::Mat1f> planes_;
+};
+
+/// What is found on all tiles.
+struct Found {
+  DsiPeaks peaks;
+  std::vector<DsiRays::Tile> rays;  // by tile
+
+  Found(const ReferenceView& view, std::size_t tiles) : peaks(unwrittenPeaks(view)), rays(tiles) {}
+  SweptDsi whole(int planes) {
+    return {peaks, DsiRays(peaks.confidence.size(), planes, std::move(rays))};
+  }
 };
 
 class TiledSweep {
@@ -60,6 +101,7 @@ class TiledSweep {
   TiledSweep(std::vector<CameraRays> cameras, const ReferenceView& view, const DepthPlanes& planes,
              const SpaceSweepOptions& options, const SweepRequest& request)
       : view_(view),
+        planes_(planes.size()),
         options_(options),
         request_(request),
         kernel_(options.kernelOrFastest()),
@@ -67,77 +109,78 @@ class TiledSweep {
         inputs_(fusionInputs(cameras, request.groups)),
         tiles_(tilesOf(view, TileVoter::kTilePixels)),
         rays_(std::move(cameras), view, planes),
-        whole_planes_(request.sink, view) {
-    for (const cv::Rect& tile : tiles_) {
-      const RunningPeaks none(static_cast<std::size_t>(tile.area()), kernel_);
-      peaks_.push_back(none);
-      if (request.camera_peaks) camera_peaks_.emplace_back(cameras_, none);
-    }
+        whole_planes_(request.sink, view, planes_),
+        fused_(view, tiles_.size()) {
+    for (std::size_t c = 0; c < seenAlone(); ++c) alone_.emplace_back(view, tiles_.size());
   }
 
   /// On the threads of the task arena that it is called in.
   SweepResult run() {
-    for (const PlaneGroup& group : rays_.groupPlanes()) {
-      rays_.moveTo(group);
-      whole_planes_.begin(group);
-      tbb::parallel_for(
-          tbb::blocked_range<std::size_t>(0, tiles_.size()),
-          [&](const tbb::blocked_range<std::size_t>& range) {
-            Workplace& workplace = workplaces_.local();
-            for (std::size_t t = range.begin(); t < range.end(); ++t) {
-              sweepTile(t, group, workplace);
-            }
-          },
-          tbb::simple_partitioner());
-      whole_planes_.end();
-    }
-    rays_.release();  // before there are images
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, tiles_.size()),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          Workplace& workplace = workplaces_.local();
+          for (std::size_t t = range.begin(); t < range.end(); ++t) sweepTile(t, workplace);
+        },
+        tbb::simple_partitioner());
+    rays_.release();
+    whole_planes_.give();
     return result();
   }
 
  private:
-  Workplace newWorkplace() const {
-    return {TileVoter(kernels::tileFunctions(kernel_)), std::vector<TileRays>(rays_.inputs()),
-            std::vector<std::uint64_t>(static_cast<std::size_t>(cameras_))};
+  /// The number of cameras whose own DSIs are asked for.
+  std::size_t seenAlone() const {
+    return request_.camera_peaks ? static_cast<std::size_t>(cameras_) : 0;
   }
 
-  /// All planes of a group on one tile.
-  void sweepTile(std::size_t t, const PlaneGroup& group, Workplace& workplace) {
+  Workplace newWorkplace() const {
+    const TileFinds finds(planes_, request_.ray_window);
+    return {TileVoter(kernels::tileFunctions(kernel_)), std::vector<TileRays>(rays_.inputs()),
+            std::vector<std::uint64_t>(static_cast<std::size_t>(cameras_)), finds,
+            std::vector<TileFinds>(seenAlone(), finds)};
+  }
+
+  /// All planes on one tile.
+  void sweepTile(std::size_t t, Workplace& workplace) {
     const cv::Rect& tile = tiles_[t];
     workplace.voter.moveTo(tile, view_);
-    for (std::size_t i = 0; i < rays_.inputs(); ++i) {
-      rays_.gather(i, workplace.voter, workplace.rays[i]);
-    }
+    workplace.fused.moveTo(tile, kernel_);
+    for (TileFinds& camera : workplace.cameras) camera.moveTo(tile, kernel_);
     PlaneFusion fusion(
         options_.fusion, inputs_, static_cast<std::size_t>(tile.area()),
         request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
         kernel_);
-    for (int plane = group.begin; plane < group.end; ++plane) {
-      const PlaneValues& fused = fusion.fuse([&](int camera, int slot, PlaneValues& density) {
-        workplace.votes[static_cast<std::size_t>(camera)] += workplace.voter.vote(
-            workplace.rays[rays_.inputOf(camera, slot)], rays_.fromHome(plane), density.data());
-      });
-      peaks_[t].take(plane, fused);
-      if (request_.camera_peaks) {
-        for (int c = 0; c < cameras_; ++c) {
-          camera_peaks_[t][static_cast<std::size_t>(c)].take(plane, fusion.ofCamera(c));
-        }
+    for (std::size_t group = 0; group < rays_.groups().size(); ++group) {
+      for (std::size_t i = 0; i < rays_.inputs(); ++i) {
+        rays_.gather(group, i, workplace.voter, workplace.rays[i]);
       }
-      whole_planes_.take(plane, tile, fused);
+      const PlaneGroup& planes = rays_.groups()[group];
+      for (int plane = planes.begin; plane < planes.end; ++plane) {
+        sweepPlane(plane, tile, fusion, workplace);
+      }
+    }
+    workplace.fused.writeTo(fused_.peaks, fused_.rays[t]);
+    for (std::size_t c = 0; c < alone_.size(); ++c) {
+      workplace.cameras[c].writeTo(alone_[c].peaks, alone_[c].rays[t]);
     }
   }
 
+  void sweepPlane(int plane, const cv::Rect& tile, PlaneFusion& fusion, Workplace& workplace) {
+    const PlaneValues& fused = fusion.fuse([&](int camera, int slot, PlaneValues& density) {
+      workplace.votes[static_cast<std::size_t>(camera)] += workplace.voter.vote(
+          workplace.rays[rays_.inputOf(camera, slot)], rays_.fromHome(plane), density.data());
+    });
+    workplace.fused.take(plane, fused);
+    for (std::size_t c = 0; c < workplace.cameras.size(); ++c) {
+      workplace.cameras[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
+    }
+    whole_planes_.take(plane, tile, fused);
+  }
+
   SweepResult result() {
-    SweepResult result{unwrittenPeaks(view_), {}, rays_.notCast()};
-    if (request_.camera_peaks) {
-      for (int c = 0; c < cameras_; ++c) result.camera_peaks.push_back(unwrittenPeaks(view_));
-    }
-    for (std::size_t t = 0; t < tiles_.size(); ++t) {
-      peaks_[t].writeTo(result.peaks, tiles_[t]);
-      for (std::size_t c = 0; c < result.camera_peaks.size(); ++c) {
-        camera_peaks_[t][c].writeTo(result.camera_peaks[c], tiles_[t]);
-      }
-    }
+    SweepResult result{fused_.whole(planes_), {}, rays_.notCast()};
+    for (Found& camera : alone_) result.cameras.push_back(camera.whole(planes_));
     for (const Workplace& workplace : workplaces_) {
       for (std::size_t c = 0; c < workplace.votes.size(); ++c) {
         result.votes[c].cast += workplace.votes[c];
@@ -148,6 +191,7 @@ class TiledSweep {
   }
 
   ReferenceView view_;
+  int planes_;
   SpaceSweepOptions options_;
   SweepRequest request_;
   VotingKernel kernel_;
@@ -155,9 +199,9 @@ class TiledSweep {
   FusionInputs inputs_;
   std::vector<cv::Rect> tiles_;
   BinnedRays rays_;
-  GroupPlanes whole_planes_;
-  std::vector<RunningPeaks> peaks_;                      // by tile
-  std::vector<std::vector<RunningPeaks>> camera_peaks_;  // by tile and camera
+  WholePlanes whole_planes_;
+  Found fused_;
+  std::vector<Found> alone_;  // by camera, where asked for
   tbb::enumerable_thread_specific<Workplace> workplaces_{[this] { return newWorkplace(); }};
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/depth_extraction.h"
+#include "mapping/paper_extraction.h"
 #include "mapping/space_sweep.h"
 #include "test/bench/benches.h"
 #include "test/bench/sweep_input.h"
@@ -10,9 +10,9 @@ void benchExtraction(BenchSession& session) {
   for (const SensorSize& sensor : session.plan().sensors) {
     const SweepInput input =
         makeSweepInput(makeSyntheticWindow(sensor.window(2)), session.plan().planes);
-    const DsiPeaks peaks = SpaceSweep().run(input.cameras, input.view, input.planes).peaks;
+    const DsiPeaks peaks = SpaceSweep().run(input.cameras, input.view, input.planes).fused.peaks;
     session.add({"extraction", sensor.name(), ""}, [&](benchmark::State& state) {
-      for (auto _ : state) benchmark::DoNotOptimize(extractDepth(peaks, input.planes, {}));
+      for (auto _ : state) benchmark::DoNotOptimize(extractAsPaper(peaks, input.planes, {}));
       state.counters["pixels/s"] = benchmark::Counter(
           static_cast<double>(input.view.pixels()), benchmark::Counter::kIsIterationInvariantRate);
     });

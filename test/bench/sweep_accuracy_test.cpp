@@ -87,7 +87,7 @@ double equalPeaks(const SweepResult& result, const oracle::Dsi& exact) {
     const auto x = static_cast<int>(i) % exact.width;
     const auto y = static_cast<int>(i) / exact.width;
     ++with_votes;
-    if (result.peaks.plane(y, x) == planes[i]) ++equal;
+    if (result.fused.peaks.plane(y, x) == planes[i]) ++equal;
   }
   EXPECT_GT(with_votes, 0);
   return equal / with_votes;

@@ -6,6 +6,7 @@
 
 #include "mapping/back_projection.h"
 #include "mapping/kernels/vote.h"
+#include "mapping/paper_extraction.h"
 #include "mapping/pose_packets.h"
 
 namespace efm::bench {
@@ -50,7 +51,7 @@ std::optional<DepthMap> UnfusedKeyframe::map(const Window& window,
     peaks = findPeaks();
   });
   DepthMap map;
-  stage(Stage::kDepth, [&] { map = extractDepth(peaks, planes_, options_.extraction); });
+  stage(Stage::kDepth, [&] { map = extractAsPaper(peaks, planes_, options_.extraction); });
   return map;
 }
 

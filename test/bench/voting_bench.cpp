@@ -63,17 +63,17 @@ void voteYardstick(benchmark::State& state, const SweepInput& input) {
 /// Votes as the fast kernels cast them, up to the ray density of every plane. As for the yardstick,
 /// where the rays go is there beforehand: they lie in bins.
 void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
-  BinnedRays rays(input.cameras, input.view, input.planes);
+  const BinnedRays rays(input.cameras, input.view, input.planes);
   TileVoter voter(kernels::tileFunctions(kernel));
   TileRays gathered;
   std::vector<float> density(TileVoter::kTilePixels * TileVoter::kTilePixels);
   const std::vector<cv::Rect> tiles = tilesOf(input.view, TileVoter::kTilePixels);
   for (auto _ : state) {
-    for (const PlaneGroup& group : rays.groupPlanes()) {
-      rays.moveTo(group);
+    for (std::size_t g = 0; g < rays.groups().size(); ++g) {
+      const PlaneGroup& group = rays.groups()[g];
       for (const cv::Rect& tile : tiles) {
         voter.moveTo(tile, input.view);
-        rays.gather(0, voter, gathered);
+        rays.gather(g, 0, voter, gathered);
         for (int plane = group.begin; plane < group.end; ++plane) {
           benchmark::DoNotOptimize(voter.vote(gathered, rays.fromHome(plane), density.data()));
           benchmark::ClobberMemory();

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "mapping/depth_extraction.h"
+#include "mapping/paper_extraction.h"
 #include "test/mapping/same_image.h"
 
 namespace efm {
@@ -42,7 +42,7 @@ DepthMap extract(const DsiPeaks& peaks, bool dilate) {
   DepthExtractionOptions options;
   options.median_size = 1;
   options.dilate = dilate;
-  return extractDepth(peaks, kPlanes, options);
+  return extractAsPaper(peaks, kPlanes, options);
 }
 
 TEST(Dilation, APixelGrowsIntoItsFourNeighbours) {
@@ -115,10 +115,10 @@ TEST(Dilation, AFullMapStaysAsItIs) {
   const DsiPeaks peaks = randomPeaks(4, 32, 24);
   DepthExtractionOptions all;
   all.threshold_c = -255;  // keeps every pixel
-  const DepthMap full = extractDepth(peaks, kPlanes, all);
+  const DepthMap full = extractAsPaper(peaks, kPlanes, all);
   EXPECT_EQ(cv::countNonZero(full.depth), 28 * 20);
   all.dilate = true;
-  EXPECT_TRUE(test::same(extractDepth(peaks, kPlanes, all), full));
+  EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, all), full));
 }
 
 TEST(Dilation, ImagesSmallerThanTheFrameStayEmpty) {
@@ -134,11 +134,11 @@ TEST(WhiteLevel, OfTheSequenceThresholdsLikeTheSameFixedNumber) {
   for (const double white : {4.0, 11.0, 37.5, 200.0}) {
     DepthExtractionOptions fixed;
     fixed.max_confidence = MaxConfidence::of(white);
-    EXPECT_TRUE(test::same(extractDepth(peaks, kPlanes, sequence, white),
-                           extractDepth(peaks, kPlanes, fixed)))
+    EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, sequence, white),
+                           extractAsPaper(peaks, kPlanes, fixed)))
         << white;
   }
-  EXPECT_TRUE(test::same(extractDepth(peaks, kPlanes, sequence), extractDepth(peaks, kPlanes, {})))
+  EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, sequence), extractAsPaper(peaks, kPlanes, {})))
       << "where no sequence is known, the keyframe's own maximum";
 }
 
@@ -147,7 +147,7 @@ TEST(WhiteLevel, OfTheKeyframeIsItsMaximumWhateverTheSequence) {
   DepthExtractionOptions fixed;
   fixed.max_confidence = MaxConfidence::of(11);  // of random() % 12
   EXPECT_TRUE(
-      test::same(extractDepth(peaks, kPlanes, {}, 1000.0), extractDepth(peaks, kPlanes, fixed)));
+      test::same(extractAsPaper(peaks, kPlanes, {}, 1000.0), extractAsPaper(peaks, kPlanes, fixed)));
 }
 
 }  // namespace

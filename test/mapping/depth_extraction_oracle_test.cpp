@@ -6,7 +6,7 @@
 #include <random>
 #include <sstream>
 
-#include "mapping/depth_extraction.h"
+#include "mapping/paper_extraction.h"
 #include "test/mapping/same_image.h"
 #include "test/oracle/naive_depth.h"
 
@@ -82,7 +82,7 @@ std::vector<DepthExtractionOptions> manyOptions() {
 void expectSame(const DsiPeaks& peaks, const DepthExtractionOptions& options) {
   const DepthPlanes planes({0.5, 5.0, kPlanes, PlaneSpacing::kInverse});
   const cv::Mat1f confidence = peaks.confidence.clone();
-  const DepthMap actual = extractDepth(peaks, planes, options);
+  const DepthMap actual = extractAsPaper(peaks, planes, options);
   const DepthMap expected = oracle::extractDepth(peaks, planes, options);
   EXPECT_TRUE(test::same(actual.depth, expected.depth));
   EXPECT_TRUE(test::same(actual.confidence, expected.confidence));

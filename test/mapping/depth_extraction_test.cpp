@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/depth_extraction.h"
+#include "mapping/paper_extraction.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -57,7 +57,7 @@ TEST(DepthExtraction, KeepsThePixelsThatExceedTheGaussianOfTheirSurroundings) {
   const DsiPeaks peaks = randomPeaks(60, 40, 1);
   DepthExtractionOptions options = plainOptions();
   options.threshold_c = 7;
-  const DepthMap map = extractDepth(peaks, kPlanes, options);
+  const DepthMap map = extractAsPaper(peaks, kPlanes, options);
 
   const double largest = *std::max_element(peaks.confidence.begin(), peaks.confidence.end());
   cv::Mat1f grey(40, 60);
@@ -87,7 +87,7 @@ TEST(DepthExtraction, AKeptPixelHasTheDepthOfItsPlane) {
   DsiPeaks peaks = flatPeaks(9, 9);
   peaks.confidence(4, 4) = 10;
   peaks.plane(4, 4) = 37;
-  const DepthMap map = extractDepth(peaks, kPlanes, DepthExtractionOptions());
+  const DepthMap map = extractAsPaper(peaks, kPlanes, DepthExtractionOptions());
   EXPECT_EQ(cv::countNonZero(map.depth), 1);
   EXPECT_EQ(map.depth(4, 4), static_cast<float>(kPlanes.depth(37)));
   EXPECT_EQ(map.confidence(4, 4), 10.0F);
@@ -105,7 +105,7 @@ TEST(DepthExtraction, TheMedianIsTheLowerOneOfTheKeptPixelsAlone) {
   DepthExtractionOptions options;
   options.subplane = false;
   options.median_size = 9;  // reaches the neighbours on both sides
-  const DepthMap map = extractDepth(peaks, kPlanes, options);
+  const DepthMap map = extractAsPaper(peaks, kPlanes, options);
   EXPECT_EQ(map.depth(4, 10), static_cast<float>(kPlanes.depth(10))) << "of {10, 20}";
   EXPECT_EQ(map.depth(4, 14), static_cast<float>(kPlanes.depth(20))) << "of {10, 20, 30}";
   EXPECT_EQ(map.depth(4, 18), static_cast<float>(kPlanes.depth(30))) << "of {20, 30, 40}";
@@ -114,7 +114,7 @@ TEST(DepthExtraction, TheMedianIsTheLowerOneOfTheKeptPixelsAlone) {
 
 TEST(DepthExtraction, AFrameOfTwoPixelsIsClearedOnAllFourSides) {
   const DsiPeaks peaks = randomPeaks(30, 20, 2);
-  const DepthMap map = extractDepth(peaks, kPlanes, plainOptions());
+  const DepthMap map = extractAsPaper(peaks, kPlanes, plainOptions());
   const cv::Rect inner(2, 2, 26, 16);
   EXPECT_EQ(cv::countNonZero(map.depth), cv::countNonZero(map.depth(inner)));
   for (const cv::Rect& side : {cv::Rect(2, 2, 26, 1), cv::Rect(2, 17, 26, 1), cv::Rect(2, 2, 1, 16),
@@ -129,7 +129,7 @@ TEST(DepthExtraction, SubPlanePositionsLieBetweenThePlanes) {
   peaks.before(4, 4) = 8;
   peaks.after(4, 4) = 9;
   peaks.plane(4, 4) = 37;
-  const DepthMap map = extractDepth(peaks, kPlanes, DepthExtractionOptions());
+  const DepthMap map = extractAsPaper(peaks, kPlanes, DepthExtractionOptions());
   // Offset (9 - 8) / (2 * (20 - 17)) = 1/6 of a plane.
   EXPECT_NEAR(map.depth(4, 4), kPlanes.depthAt(37 + 1.0 / 6), 1e-6);
 }
@@ -140,17 +140,17 @@ TEST(DepthExtraction, AFixedMaximumClipsAndMakesKeyframesComparable) {
   DepthExtractionOptions options;
   options.max_confidence =
       MaxConfidence::of(1000);  // 10 of 1000 is 3 grey values of 255: below C = 5
-  EXPECT_EQ(cv::countNonZero(extractDepth(peaks, kPlanes, options).depth), 0);
+  EXPECT_EQ(cv::countNonZero(extractAsPaper(peaks, kPlanes, options).depth), 0);
   options.max_confidence = MaxConfidence::of(5);
-  EXPECT_EQ(cv::countNonZero(extractDepth(peaks, kPlanes, options).depth), 1);
+  EXPECT_EQ(cv::countNonZero(extractAsPaper(peaks, kPlanes, options).depth), 1);
 }
 
 TEST(DepthExtraction, AnEmptyDsiGivesAnEmptyMap) {
   EXPECT_EQ(
-      cv::countNonZero(extractDepth(flatPeaks(16, 16), kPlanes, DepthExtractionOptions()).depth),
+      cv::countNonZero(extractAsPaper(flatPeaks(16, 16), kPlanes, DepthExtractionOptions()).depth),
       0);
   EXPECT_EQ(
-      cv::countNonZero(extractDepth(flatPeaks(3, 2), kPlanes, DepthExtractionOptions()).depth), 0)
+      cv::countNonZero(extractAsPaper(flatPeaks(3, 2), kPlanes, DepthExtractionOptions()).depth), 0)
       << "smaller than its frame";
 }
 
@@ -159,7 +159,7 @@ TEST(DepthExtraction, MoreThan255PlanesKeepTheirIndex) {
   DsiPeaks peaks = flatPeaks(9, 9);
   peaks.confidence(4, 4) = 10;
   peaks.plane(4, 4) = 4321;
-  EXPECT_NEAR(extractDepth(peaks, many, DepthExtractionOptions()).depth(4, 4), many.depth(4321),
+  EXPECT_NEAR(extractAsPaper(peaks, many, DepthExtractionOptions()).depth(4, 4), many.depth(4321),
               1e-6);
 }
 

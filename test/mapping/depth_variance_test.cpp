@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "mapping/depth_extraction.h"
+#include "mapping/paper_extraction.h"
 
 namespace efm {
 namespace {
@@ -53,7 +53,7 @@ DsiPeaks onePeak(int plane, float before, float peak, float after) {
 TEST(DepthVariance, IsThatOfInverseDepth) {
   // Planes 1/m apart by 0.1: from 1 m to 1 / 0.5 m.
   const DepthPlanes planes({1.0, 2.0, 6, PlaneSpacing::kInverse});
-  const DepthMap map = extractDepth(onePeak(3, 7, 8, 7), planes, {});
+  const DepthMap map = extractAsPaper(onePeak(3, 7, 8, 7), planes, {});
   EXPECT_NEAR(map.variance(4, 4), 0.1 * 0.1 * kErrorOfWidth * 4, 1e-8);
   EXPECT_EQ(cv::countNonZero(map.variance), 1) << "0 where there is no depth";
 }
@@ -63,7 +63,7 @@ TEST(DepthVariance, WithLinearSpacingGoesByTheStepsAroundThePeak) {
   const DepthPlanes planes({1.0, 3.0, 5, PlaneSpacing::kLinear});
   const double step = 1 / 1.75 - 1 / 2.25;
   EXPECT_NEAR(planes.inverseDepthStepAt(2), step, 1e-12);
-  const DepthMap map = extractDepth(onePeak(2, 7, 8, 7), planes, {});
+  const DepthMap map = extractAsPaper(onePeak(2, 7, 8, 7), planes, {});
   EXPECT_NEAR(map.variance(4, 4), step * step * kErrorOfWidth * 4, 1e-7);
 }
 
@@ -78,14 +78,14 @@ TEST(DepthVariance, AtTheLimitsIsInfiniteWhateverTheSpacing) {
   for (const PlaneSpacing spacing : {PlaneSpacing::kInverse, PlaneSpacing::kLinear}) {
     const DepthPlanes planes({1.0, 3.0, 5, spacing});
     for (const auto& peaks : {onePeak(0, -1, 8, 7), onePeak(4, 7, 8, -1), onePeak(2, 8, 8, 8)}) {
-      EXPECT_TRUE(std::isinf(extractDepth(peaks, planes, {}).variance(4, 4)));
+      EXPECT_TRUE(std::isinf(extractAsPaper(peaks, planes, {}).variance(4, 4)));
     }
   }
 }
 
 TEST(DepthVariance, OfASinglePlaneIsInfinite) {
   const DepthPlanes planes({1.0, 3.0, 1, PlaneSpacing::kInverse});
-  const DepthMap map = extractDepth(onePeak(0, -1, 8, -1), planes, {});
+  const DepthMap map = extractAsPaper(onePeak(0, -1, 8, -1), planes, {});
   EXPECT_EQ(map.depth(4, 4), 1.0F);
   EXPECT_TRUE(std::isinf(map.variance(4, 4))) << map.variance(4, 4);
 }

@@ -77,7 +77,9 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
   std::vector<RayPath> gather(const std::vector<RayBins>& all, const TileVoter& voter,
                               const PlaneGroup& group, const DepthPlanes& planes) const {
     TileRays found;
-    for (const RayBins& bins : all) bins.gather(voter.cells(), voter.origin(), functions_, found);
+    for (const RayBins& bins : all) {
+      bins.gather(bins.reachIn(group), voter.cells(), voter.origin(), functions_, found);
+    }
     const double to_first = 1 / group.first_depth_m - RayBins::middleOf(planes);
     const double to_last = 1 / group.last_depth_m - RayBins::middleOf(planes);
     const Eigen::Vector2d origin(voter.origin().x, voter.origin().y);
@@ -95,7 +97,7 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
   /// Every ray that votes in some tile is found there, once, where it is; others are not.
   void expectEveryRayOnce(const RayBundle& rays, const ReferenceView& view,
                           const DepthPlanes& planes, int planes_per_group) const {
-    std::vector<RayBins> all = RayBins::sort(rays, view, planes);
+    const std::vector<RayBins> all = RayBins::sort(rays, view, planes);
     const bool on_all_planes =
         std::all_of(all.begin(), all.end(), [](const RayBins& bins) { return bins.onAllPlanes(); });
     if (!on_all_planes) planes_per_group = 1;
@@ -104,7 +106,6 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
       const int end = std::min(planes.size(), begin + planes_per_group);
       const PlaneGroup group{begin, end, planes.depth(begin), planes.depth(end - 1)};
       const std::vector<RayPath> paths = pathsOf(rays, view, group);
-      for (RayBins& bins : all) bins.moveTo(group);
       for (const cv::Rect& tile : tilesOf(view, TileVoter::kTilePixels)) {
         voter.moveTo(tile, view);
         SCOPED_TRACE(testing::Message() << "tile " << tile.x << ", " << tile.y << ", planes "

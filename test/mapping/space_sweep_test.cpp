@@ -102,7 +102,7 @@ TEST_P(SpaceSweepOn, ThePeakAndItsNeighboursAreThoseOfTheVolume) {
     for (const int threads : {1, 2, 5}) {
       const Input input = makeInput(9, 2, planes, 3000);
       KeptDsi dsi(input.planes, input.view);
-      const DsiPeaks peaks = sweep(input, FusionRule::kArithmetic, threads, &dsi).peaks;
+      const DsiPeaks peaks = sweep(input, FusionRule::kArithmetic, threads, &dsi).fused.peaks;
       const auto value = [&](int plane, int x, int y) {
         if (plane < 0 || plane >= planes) return -1.0F;
         return dsi
@@ -131,10 +131,10 @@ TEST_P(SpaceSweepOn, TheNumberOfThreadsNeverChangesTheResult) {
     const SweepResult one = sweep(input, rule, 1);
     for (const int threads : {2, 3, 16, 64}) {
       const SweepResult many = sweep(input, rule, threads);
-      EXPECT_TRUE(same(one.peaks.confidence, many.peaks.confidence)) << threads;
-      EXPECT_TRUE(same(one.peaks.plane, many.peaks.plane)) << threads;
-      EXPECT_TRUE(same(one.peaks.before, many.peaks.before)) << threads;
-      EXPECT_TRUE(same(one.peaks.after, many.peaks.after)) << threads;
+      EXPECT_TRUE(same(one.fused.peaks.confidence, many.fused.peaks.confidence)) << threads;
+      EXPECT_TRUE(same(one.fused.peaks.plane, many.fused.peaks.plane)) << threads;
+      EXPECT_TRUE(same(one.fused.peaks.before, many.fused.peaks.before)) << threads;
+      EXPECT_TRUE(same(one.fused.peaks.after, many.fused.peaks.after)) << threads;
     }
   }
 }
@@ -142,7 +142,7 @@ TEST_P(SpaceSweepOn, TheNumberOfThreadsNeverChangesTheResult) {
 TEST_P(SpaceSweepOn, WithoutEventsEveryPeakIsZeroAtTheNearestPlane) {
   Input input = makeInput(11, 2, 5, 100);
   input.rays = {RayBundle(), RayBundle()};
-  const DsiPeaks peaks = sweep(input, FusionRule::kHarmonic, 2).peaks;
+  const DsiPeaks peaks = sweep(input, FusionRule::kHarmonic, 2).fused.peaks;
   EXPECT_EQ(cv::countNonZero(peaks.confidence), 0);
   EXPECT_EQ(cv::countNonZero(peaks.plane), 0);
 }
@@ -150,8 +150,8 @@ TEST_P(SpaceSweepOn, WithoutEventsEveryPeakIsZeroAtTheNearestPlane) {
 TEST_P(SpaceSweepOn, ASilentCameraSilencesTheAndLikeRules) {
   Input input = makeInput(12, 2, 5, 1000);
   input.rays[1] = RayBundle();
-  EXPECT_EQ(cv::countNonZero(sweep(input, FusionRule::kHarmonic, 1).peaks.confidence), 0);
-  EXPECT_GT(cv::countNonZero(sweep(input, FusionRule::kArithmetic, 1).peaks.confidence), 0);
+  EXPECT_EQ(cv::countNonZero(sweep(input, FusionRule::kHarmonic, 1).fused.peaks.confidence), 0);
+  EXPECT_GT(cv::countNonZero(sweep(input, FusionRule::kArithmetic, 1).fused.peaks.confidence), 0);
 }
 
 TEST(SpaceSweep, ThreadsOutOfRangeAreNamed) {

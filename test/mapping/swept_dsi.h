@@ -35,7 +35,7 @@ inline SweptDsi sweep(const SweepCase& input, VotingKernel kernel, int threads =
   SweepResult result =
       SpaceSweep(options).run(input.cameras, input.view, input.planes, {true, &dsi});
   EXPECT_EQ(dsi.planesSeen(), static_cast<std::size_t>(input.planes.size()));
-  return {dsi.values, result};
+  return {dsi.values, std::move(result)};
 }
 
 /// How one DSI differs from another.

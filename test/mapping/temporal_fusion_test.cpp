@@ -182,15 +182,15 @@ TEST_P(TemporalFusionOn, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
       options.kernel = GetParam();
       options.threads = 1;
       const SweepResult one = SpaceSweep(options).run(rays, view, depths, {true, nullptr});
-      ASSERT_EQ(one.camera_peaks.size(), 3U);
+      ASSERT_EQ(one.cameras.size(), 3U);
       for (const int threads : {2, 3, 16}) {
         options.threads = threads;
         EXPECT_EQ(options.threadsOrCores(), threads);
         const SweepResult many = SpaceSweep(options).run(rays, view, depths, {true, nullptr});
-        EXPECT_TRUE(same(one.peaks, many.peaks)) << planes << " planes, " << threads;
-        ASSERT_EQ(many.camera_peaks.size(), 3U);
+        EXPECT_TRUE(same(one.fused.peaks, many.fused.peaks)) << planes << " planes, " << threads;
+        ASSERT_EQ(many.cameras.size(), 3U);
         for (std::size_t c = 0; c < 3; ++c) {
-          EXPECT_TRUE(same(one.camera_peaks[c], many.camera_peaks[c]))
+          EXPECT_TRUE(same(one.cameras[c].peaks, many.cameras[c].peaks))
               << "camera " << c << ", " << planes << " planes, " << threads << " threads";
           EXPECT_EQ(one.votes[c].total(), many.votes[c].total());
           EXPECT_EQ(one.votes[c].cast, many.votes[c].cast);
@@ -210,11 +210,11 @@ TEST(TemporalFusion, ACamerasPeaksAreThoseOfItsOwnSweep) {
       SpaceSweepOptions options;
       options.fusion.across_time = across_time;
       const SweepResult all = SpaceSweep(options).run(rays, view, planes, {true, nullptr});
-      EXPECT_TRUE(same(all.peaks, SpaceSweep(options).run(rays, view, planes).peaks))
+      EXPECT_TRUE(same(all.fused.peaks, SpaceSweep(options).run(rays, view, planes).fused.peaks))
           << "keeping the cameras changes nothing";
       for (std::size_t c = 0; c < rays.size(); ++c) {
-        const DsiPeaks alone = SpaceSweep(options).run({rays[c]}, view, planes).peaks;
-        EXPECT_TRUE(same(all.camera_peaks[c], alone)) << "camera " << c << ", " << count;
+        const DsiPeaks alone = SpaceSweep(options).run({rays[c]}, view, planes).fused.peaks;
+        EXPECT_TRUE(same(all.cameras[c].peaks, alone)) << "camera " << c << ", " << count;
       }
     }
   }
@@ -229,7 +229,7 @@ TEST(TemporalFusion, ASilentSubintervalSilencesTheAndLikeRulesInItsSlotOnly) {
   const auto confidence = [&](FusionRule across_time, FusionOrder order) {
     SpaceSweepOptions options;
     options.fusion = {FusionRule::kHarmonic, across_time, order};
-    return SpaceSweep(options).run(rays, view, planes).peaks.confidence;
+    return SpaceSweep(options).run(rays, view, planes).fused.peaks.confidence;
   };
   const auto cameras_first = FusionOrder::kCamerasThenTime;
   EXPECT_EQ(cv::countNonZero(confidence(FusionRule::kHarmonic, cameras_first)), 0);

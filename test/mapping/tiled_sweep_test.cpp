@@ -31,10 +31,10 @@ const std::vector<cv::Size> kOddSizes = {{1, 1},   {2, 2},    {1, 50},   {50, 1}
 
 void expectSame(const SweptDsi& a, const SweptDsi& b) {
   EXPECT_EQ(a.dsi, b.dsi);
-  EXPECT_TRUE(test::same(a.result.peaks, b.result.peaks));
-  ASSERT_EQ(a.result.camera_peaks.size(), b.result.camera_peaks.size());
-  for (std::size_t c = 0; c < a.result.camera_peaks.size(); ++c) {
-    EXPECT_TRUE(test::same(a.result.camera_peaks[c], b.result.camera_peaks[c])) << "camera " << c;
+  EXPECT_TRUE(test::same(a.result.fused.peaks, b.result.fused.peaks));
+  ASSERT_EQ(a.result.cameras.size(), b.result.cameras.size());
+  for (std::size_t c = 0; c < a.result.cameras.size(); ++c) {
+    EXPECT_TRUE(test::same(a.result.cameras[c].peaks, b.result.cameras[c].peaks)) << "camera " << c;
     EXPECT_EQ(a.result.votes[c].cast, b.result.votes[c].cast);
     EXPECT_EQ(a.result.votes[c].outside_view, b.result.votes[c].outside_view);
     EXPECT_EQ(a.result.votes[c].behind_camera, b.result.votes[c].behind_camera);
@@ -71,8 +71,8 @@ TEST_P(TiledSweepOn, NeitherASinkNorCameraPeaksChangeTheResult) {
   options.fusion = input.fusion;
   options.kernel = GetParam();
   const SweepResult plainest = SpaceSweep(options).run(input.cameras, input.view, input.planes);
-  EXPECT_TRUE(test::same(plainest.peaks, sweep(input, GetParam()).result.peaks));
-  EXPECT_TRUE(plainest.camera_peaks.empty());
+  EXPECT_TRUE(test::same(plainest.fused.peaks, sweep(input, GetParam()).result.fused.peaks));
+  EXPECT_TRUE(plainest.cameras.empty());
 }
 
 TEST_P(TiledSweepOn, ThePeaksAreThoseOfTheDsiItHandsOut) {
@@ -90,8 +90,8 @@ TEST_P(TiledSweepOn, ThePeaksAreThoseOfTheDsiItHandsOut) {
         if (value(plane) > value(best)) best = plane;
       }
       const auto index = static_cast<int>(pixel);
-      ASSERT_EQ(swept.result.peaks.plane(index / size.width, index % size.width), best);
-      ASSERT_EQ(swept.result.peaks.confidence(index / size.width, index % size.width), value(best));
+      ASSERT_EQ(swept.result.fused.peaks.plane(index / size.width, index % size.width), best);
+      ASSERT_EQ(swept.result.fused.peaks.confidence(index / size.width, index % size.width), value(best));
     }
   }
 }

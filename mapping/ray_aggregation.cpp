@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/ray_aggregation.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "mapping/depth_extraction.h"
+#include "mapping/pixel_neighbours.h"
+
+namespace efm {
+namespace {
+
+constexpr float kSigma_px = 1.5F;
+constexpr double kBesidePeak = 3;  ///< Places on each side that belong to a peak.
+
+/// Finds the peak of a sum of rays.
+class PeakFinder {
+ public:
+  explicit PeakFinder(int planes)
+      : planes_(planes), place_(planesOfOnePlace(planes)) {}
+
+  AggregatedPeak find(const std::vector<float>& sum) const {
+    const auto top = std::max_element(sum.begin(), sum.end());
+    const auto plane = static_cast<int>(top - sum.begin());
+    const float before = plane > 0 ? sum[static_cast<std::size_t>(plane - 1)] : -1;
+    const float after = plane < planes_ - 1 ? sum[static_cast<std::size_t>(plane + 1)] : -1;
+    AggregatedPeak peak;
+    peak.at_end = before < 0 || after < 0;
+    peak.position = static_cast<float>(peakPosition(plane, before, *top, after));
+    const float curvature = 2 * *top - before - after;
+    peak.width_sq = peak.at_end || !(curvature > 0) ? std::numeric_limits<float>::infinity()
+                                                    : *top / curvature;
+    const int beside = static_cast<int>(std::lround(kBesidePeak * place_));
+    const float second = std::max(largest(sum, 0, plane - beside),
+                                  largest(sum, plane + beside + 1, planes_));
+    peak.ambiguity = *top > 0 ? second / *top : 1;
+    return peak;
+  }
+
+  /// A ray's largest value at a position, as a share of its peak.
+  float shareAt(const DsiRays& rays, cv::Point pixel, float position, float confidence) const {
+    const int plane = static_cast<int>(std::lround(position));
+    const int around = static_cast<int>(std::ceil(place_));
+    float value = 0;
+    for (int p = std::max(0, plane - around); p <= std::min(planes_ - 1, plane + around); ++p) {
+      value = std::max(value, rays.value(pixel, p));
+    }
+    return std::min(1.0F, value / confidence);
+  }
+
+ private:
+  static float largest(const std::vector<float>& sum, int begin, int end) {
+    return begin >= end ? 0 : *std::max_element(sum.begin() + begin, sum.begin() + end);
+  }
+
+  int planes_;
+  double place_;
+};
+
+}  // namespace
+
+double planesOfOnePlace(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
+
+std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRays& rays,
+                                          const cv::Mat1f& confidence) {
+  const PixelNeighbours neighbours(chosen, confidence.size());
+  const PeakFinder finder(rays.planes());
+  std::vector<AggregatedPeak> peaks(chosen.size());
+  tbb::parallel_for(tbb::blocked_range<int>(0, chosen.rows()), [&](const auto& rows) {
+    std::vector<float> sum(static_cast<std::size_t>(rays.planes()));
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      for (std::size_t i = chosen.rowBegin(y); i < chosen.rowBegin(y + 1); ++i) {
+        const cv::Point pixel(chosen.column(i), y);
+        assert(rays.has(pixel));
+        std::fill(sum.begin(), sum.end(), 0.0F);
+        neighbours.forEach(pixel, [&](std::size_t, cv::Point offset) {
+          const auto distance_sq = static_cast<float>(offset.dot(offset));
+          rays.addTo(sum.data(), pixel + offset,
+                     std::exp(-distance_sq / (2 * kSigma_px * kSigma_px)));
+        });
+        peaks[i] = finder.find(sum);
+        peaks[i].own = finder.shareAt(rays, pixel, peaks[i].position, confidence(pixel));
+      }
+    }
+  });
+  return peaks;
+}
+
+}  // namespace efm
