@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/plot_axis.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace efm {
+namespace {
+
+constexpr double kMargin = 0.04;
+
+std::string shortText(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is not under `least`.
+double roundStep(double least) {
+  const double power = std::pow(10.0, std::floor(std::log10(least)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= least * (1 - 1e-9)) return factor * power;
+  }
+  return 10 * power;
+}
+
+std::vector<AxisTick> linearTicks(const AxisRange& range, int at_most) {
+  const double step = roundStep((range.to - range.from) / (at_most - 1));
+  const double slack = 1e-9 * step;
+  std::vector<AxisTick> ticks;
+  const auto last = static_cast<long long>(std::floor((range.to + slack) / step));
+  for (auto k = static_cast<long long>(std::ceil((range.from - slack) / step)); k <= last; ++k) {
+    const double value = static_cast<double>(k) * step;
+    ticks.push_back({value, shortText(value)});
+  }
+  return ticks;
+}
+
+std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int at_most) {
+  const int first = static_cast<int>(std::floor(std::log10(range.from)));
+  const int last = static_cast<int>(std::ceil(std::log10(range.to)));
+  const bool few = 3 * (last - first) <= at_most + 2;
+  const int stride = few ? 1 : 1 + (last - first) / at_most;
+  std::vector<AxisTick> ticks;
+  for (int power = first; power <= last; power += stride) {
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      const double value = factor * std::pow(10.0, power);
+      if (value < range.from * (1 - 1e-9) || value > range.to * (1 + 1e-9)) continue;
+      if (factor == 1 || few) ticks.push_back({value, shortText(value)});
+    }
+  }
+  return ticks;
+}
+
+}  // namespace
+
+double AxisRange::shareAlong(double value) const {
+  if (scale == AxisScale::kLinear) return (value - from) / (to - from);
+  if (!(value > 0)) return std::numeric_limits<double>::quiet_NaN();
+  return std::log(value / from) / std::log(to / from);
+}
+
+AxisRange rangeAround(const std::vector<double>& values, AxisScale scale) {
+  const bool logarithmic = scale == AxisScale::kLogarithmic;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const double value : values) {
+    if (!std::isfinite(value) || (logarithmic && !(value > 0))) continue;
+    const double place = logarithmic ? std::log10(value) : value;
+    low = std::min(low, place);
+    high = std::max(high, place);
+  }
+  if (low > high) low = high = 0;
+  double margin = kMargin * (high - low);
+  if (!(margin > 1e-12 * std::abs(high))) margin = std::max(0.1, 0.1 * std::abs(high));
+  low -= margin;
+  high += margin;
+  if (logarithmic) return {std::pow(10.0, low), std::pow(10.0, high), scale};
+  return {low, high, scale};
+}
+
+std::vector<AxisTick> ticksOf(const AxisRange& range, int at_most) {
+  if (!(range.from < range.to)) return {};
+  return range.scale == AxisScale::kLinear ? linearTicks(range, at_most)
+                                           : logarithmicTicks(range, at_most);
+}
+
+}  // namespace efm
