@@ -1,38 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
-#include <limits>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
+#include "maps/depth_pairs.h"
+
 namespace efm {
 
-/// One pixel where an estimate and a truth stand side by side, z-depths in metres.
-struct DepthPair {
-  double estimate_m = 0;
-  double truth_m = 0;
-};
-
-struct DepthPairingOptions {
-  /// The truth of a pixel is the best within so many columns and rows: the one nearest in inverse
-  /// depth. 1 forgives silhouettes, where an edge may fall on the far background. Range: 0 to 100.
-  int tolerance_px = 0;
-  /// Truth farther than this counts as none. Above 0.
-  double max_depth_m = std::numeric_limits<double>::infinity();
-
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
-  void validate() const;
-};
-
-/// Pairs the two maps (metres; 0, negative or not finite: none) wherever both have a depth, in the
-/// order of the image's rows.
-/// @throws std::invalid_argument where the maps differ in size or the options are not valid.
-std::vector<DepthPair> pairDepths(const cv::Mat1f& estimate, const cv::Mat1f& truth,
-                                  const DepthPairingOptions& options = {});
-
-/// Errors over a set of pixels. All are 0 where there is no point.
+/// Errors over a set of pixels; Z estimated, Z_true the truth, d = ln Z - ln Z_true. All are 0
+/// where there is no point.
 struct DepthErrors {
   std::uint64_t points = 0;
   double mean_abs_m = 0;    ///< Mean |Z - Z_true| (Ghosh and Gallego 2022, Table II).
@@ -44,10 +23,25 @@ struct DepthErrors {
   std::optional<double> bad_pix_5px;
   /// Share with a disparity error over 3 px and over 5 % (Geiger et al., CVPR 2012; KITTI 2015).
   std::optional<double> bad_pix_3px;
+  /// Scale-invariant logarithmic error, 100 (mean d^2 - (mean d)^2): the variance of d (Eigen et
+  /// al., NIPS 2014, Eq. 1 with lambda = 1, as KITTI's depth benchmark and Ye et al. 2019 have it).
+  double silog = 0;
+  /// Mean |Z - Z_true| / Z_true (Ghosh and Gallego 2022, "AErrR"; Ye et al. 2019).
+  double aerrr = 0;
+  /// The same over Z, as the scripts that accompany the paper divide.
+  double aerrr_by_estimate = 0;
+  double log_rmse = 0;  ///< 100 sqrt(mean d^2) (Eigen et al., NIPS 2014, "RMSE log").
+  /// Shares with max(Z/Z_true, Z_true/Z) under 1.25, 1.25^2 and 1.25^3 (Ladicky et al., CVPR 2014;
+  /// Eigen et al., NIPS 2014).
+  std::array<double, 3> delta{};
+  /// Share with |Z - Z_true| over a tenth of Z_true.
+  double beyond_tenth = 0;
 };
 
 /// @param focal_baseline focal length in pixels times baseline in metres, which turns depth into
-/// disparity; above 0. Medians of an even number of points are the mean of the two in the middle.
+/// disparity, focal_baseline / Z; above 0. Medians of an even number of points are the mean of the
+/// two in the middle.
+/// @throws std::invalid_argument where it is not above 0.
 DepthErrors depthErrors(const std::vector<DepthPair>& pairs,
                         std::optional<double> focal_baseline = std::nullopt);
 

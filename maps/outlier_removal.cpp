@@ -4,51 +4,10 @@
 #include <pcl/filters/radius_outlier_removal.h>
 #include <pcl/point_types.h>
 
-#include <algorithm>
-#include <stdexcept>
-
 #include "mapping/option_check.h"
-#include "maps/point_text.h"
+#include "maps/pcl_cloud.h"
 
 namespace efm {
-namespace {
-
-[[noreturn]] void refusePoint(const CloudPoint& point, const std::string& why) {
-  throw std::invalid_argument(pointText(point) + ": " + why);
-}
-
-/// The median of each coordinate: unlike the mean or the middle of the bounds, a stray point far
-/// away does not carry it from where the points are.
-Eigen::Vector3d middleOf(const std::vector<CloudPoint>& points) {
-  Eigen::Vector3d middle;
-  std::vector<double> values(points.size());
-  for (int axis = 0; axis < 3; ++axis) {
-    std::transform(points.begin(), points.end(), values.begin(),
-                   [axis](const CloudPoint& point) { return point.p_world[axis]; });
-    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), half, values.end());
-    middle[axis] = *half;
-  }
-  return middle;
-}
-
-pcl::PointCloud<pcl::PointXYZ>::Ptr aroundMiddle(const std::vector<CloudPoint>& points) {
-  for (const CloudPoint& point : points) {
-    if (!point.p_world.allFinite()) refusePoint(point, "the position is not finite");
-  }
-  const Eigen::Vector3d middle = middleOf(points);
-  auto cloud = pcl::make_shared<pcl::PointCloud<pcl::PointXYZ>>();
-  cloud->reserve(points.size());
-  for (const CloudPoint& point : points) {
-    const Eigen::Vector3f offset = (point.p_world - middle).cast<float>();
-    // The search squares and adds.
-    if (!(offset.cwiseAbs().maxCoeff() < 1e18F)) refusePoint(point, "too far from the others");
-    cloud->push_back({offset.x(), offset.y(), offset.z()});
-  }
-  return cloud;
-}
-
-}  // namespace
 
 void OutlierRemovalOptions::validate() const {
   requireOption(outlier_radius_m == 0 || (outlier_radius_m >= 1e-6 && outlier_radius_m <= 1e6),
@@ -62,7 +21,7 @@ std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
   options.validate();
   if (options.outlier_radius_m == 0 || points.empty()) return points;
   pcl::RadiusOutlierRemoval<pcl::PointXYZ> filter;
-  filter.setInputCloud(aroundMiddle(points));
+  filter.setInputCloud(pclCloudAround(middleOf(points), points));
   filter.setRadiusSearch(options.outlier_radius_m);
   filter.setMinNeighborsInRadius(options.outlier_min_neighbors);
   pcl::Indices kept;

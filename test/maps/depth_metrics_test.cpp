@@ -10,39 +10,6 @@
 namespace efm {
 namespace {
 
-TEST(PairDepths, PixelsWithoutAnEstimateOrATruthAreLeftOut) {
-  const float nan = std::nanf("");
-  const cv::Mat1f estimate = (cv::Mat1f(1, 5) << 1, 0, 2, nan, 3);
-  const cv::Mat1f truth = (cv::Mat1f(1, 5) << 1, 1, 0, 1, INFINITY);
-
-  const std::vector<DepthPair> pairs = pairDepths(estimate, truth);
-
-  ASSERT_EQ(pairs.size(), 1U);
-  EXPECT_EQ(pairs[0].estimate_m, 1);
-  EXPECT_EQ(pairs[0].truth_m, 1);
-}
-
-TEST(PairDepths, TruthFartherThanTheLimitCountsAsNone) {
-  const cv::Mat1f estimate = (cv::Mat1f(1, 2) << 2, 2);
-  const cv::Mat1f truth = (cv::Mat1f(1, 2) << 5, 6);
-
-  EXPECT_EQ(pairDepths(estimate, truth, {0, 5.0}).size(), 1U);
-}
-
-TEST(PairDepths, ToleranceTakesTheTruthNearestInInverseDepth) {
-  // Around the middle pixel: 1 m and 4 m. |1/2 - 1/1| = 0.5, |1/2 - 1/4| = 0.25, although 1 m is
-  // the nearer one in depth.
-  const cv::Mat1f estimate = (cv::Mat1f(1, 3) << 0, 2, 0);
-  const cv::Mat1f truth = (cv::Mat1f(1, 3) << 1, 9, 4);
-
-  EXPECT_EQ(pairDepths(estimate, truth, {0})[0].truth_m, 9);
-  EXPECT_EQ(pairDepths(estimate, truth, {1})[0].truth_m, 4);
-}
-
-TEST(PairDepths, MapsOfDifferentSizeAreRefused) {
-  EXPECT_THROW(pairDepths(cv::Mat1f::ones(2, 3), cv::Mat1f::ones(3, 2)), std::invalid_argument);
-}
-
 TEST(DepthErrors, AreWorkedOutByHand) {
   // |Z - Z_true| = 0, 1/6, 1, 1; |1/Z - 1/Z_true| = 0, 1/2, 1/2, 1/12.
   const DepthErrors errors = depthErrors({{2, 2}, {0.5, 1.0 / 1.5}, {2, 1}, {4, 3}});
@@ -68,12 +35,43 @@ TEST(DepthErrors, BadPixelsExceedTheLimitInPixelsAndFivePercent) {
   EXPECT_DOUBLE_EQ(errors.bad_pix_3px.value(), 0.5);
 }
 
+TEST(DepthErrors, LogarithmicOnesAreWorkedOutByHand) {
+  // d = ln 2, 0, -ln 2, ln 2: mean ln 2 / 4, mean of squares 3/4 ln^2 2.
+  const DepthErrors errors = depthErrors({{2, 1}, {3, 3}, {1, 2}, {4, 2}});
+  const double ln2 = std::log(2.0);
+  EXPECT_NEAR(errors.silog, 100 * (0.75 - 0.0625) * ln2 * ln2, 1e-12);
+  EXPECT_NEAR(errors.log_rmse, 100 * std::sqrt(0.75) * ln2, 1e-12);
+}
+
+TEST(DepthErrors, RelativeOnesAreWorkedOutByHand) {
+  // |Z - Z_true| = 1, 0, 1, 2; over the truth 1, 0, 1/2, 1; over the estimate 1/2, 0, 1, 1/2.
+  const DepthErrors errors = depthErrors({{2, 1}, {3, 3}, {1, 2}, {4, 2}});
+  EXPECT_NEAR(errors.aerrr, 2.5 / 4, 1e-15);
+  EXPECT_NEAR(errors.aerrr_by_estimate, 2.0 / 4, 1e-15);
+  EXPECT_EQ(errors.beyond_tenth, 0.75);
+}
+
+TEST(DepthErrors, DeltaCountsRatiosUnderPowersOfFiveFourths) {
+  // Ratios, either way up: 1.2, 1.25 (not under 1.25), 1.5, 1.9, 2.
+  const DepthErrors errors = depthErrors({{1.2, 1}, {1, 1.25}, {1.5, 1}, {1, 1.9}, {2, 1}});
+  EXPECT_DOUBLE_EQ(errors.delta[0], 1.0 / 5);
+  EXPECT_DOUBLE_EQ(errors.delta[1], 3.0 / 5);
+  EXPECT_DOUBLE_EQ(errors.delta[2], 4.0 / 5);
+}
+
 TEST(DepthErrors, OfNoPointsAreZero) {
   const DepthErrors errors = depthErrors({}, 100.0);
   EXPECT_EQ(errors.points, 0U);
   EXPECT_EQ(errors.mean_abs_m, 0);
   EXPECT_EQ(errors.median_abs_m, 0);
   EXPECT_EQ(errors.bad_pix_3px.value(), 0);
+  EXPECT_EQ(errors.silog, 0);
+  EXPECT_EQ(errors.delta[0], 0);
+}
+
+TEST(DepthErrors, DisparityNeedsAFocalLengthTimesBaselineAboveZero) {
+  EXPECT_THROW(depthErrors({{1, 1}}, 0.0), std::invalid_argument);
+  EXPECT_THROW(depthErrors({{1, 1}}, std::nan("")), std::invalid_argument);
 }
 
 RC_GTEST_PROP(DepthErrors, ScaleWithTheWorldAndInverseDepthAgainstIt, ()) {
@@ -93,6 +91,46 @@ RC_GTEST_PROP(DepthErrors, ScaleWithTheWorldAndInverseDepthAgainstIt, ()) {
   RC_ASSERT(std::abs(b.median_abs_m - 4 * a.median_abs_m) < 1e-9);
   RC_ASSERT(std::abs(4 * b.median_inverse - a.median_inverse) < 1e-9);
   RC_ASSERT(a.bad_pix_5px.value() <= a.bad_pix_3px.value());
+  // What is relative does not see the scale of the world.
+  RC_ASSERT(std::abs(b.silog - a.silog) < 1e-9);
+  RC_ASSERT(std::abs(b.log_rmse - a.log_rmse) < 1e-9);
+  RC_ASSERT(std::abs(b.aerrr - a.aerrr) < 1e-9);
+  RC_ASSERT(std::abs(b.aerrr_by_estimate - a.aerrr_by_estimate) < 1e-9);
+}
+
+RC_GTEST_PROP(DepthErrors, SilogDoesNotSeeTheScaleOfTheEstimateAloneAndTheRestDoes, ()) {
+  const auto drawn = *rc::gen::nonEmpty(rc::gen::container<std::vector<std::pair<int, int>>>(
+      rc::gen::pair(rc::gen::inRange(100, 1000), rc::gen::inRange(100, 1000))));
+  std::vector<DepthPair> pairs;
+  std::vector<DepthPair> scaled;
+  for (const auto& [estimate, truth] : drawn) {
+    pairs.push_back({estimate * 0.01, truth * 0.01});
+    scaled.push_back({estimate * 1.0, truth * 0.01});
+  }
+  const DepthErrors a = depthErrors(pairs);
+  const DepthErrors b = depthErrors(scaled);
+  RC_ASSERT(std::abs(b.silog - a.silog) < 1e-8);
+  RC_ASSERT(b.log_rmse > a.log_rmse);
+  RC_ASSERT(b.aerrr > a.aerrr);
+}
+
+RC_GTEST_PROP(DepthErrors, SwappingEstimateAndTruthLeavesTheLogarithmicOnes, ()) {
+  const auto drawn = *rc::gen::nonEmpty(rc::gen::container<std::vector<std::pair<int, int>>>(
+      rc::gen::pair(rc::gen::inRange(1, 1000), rc::gen::inRange(1, 1000))));
+  std::vector<DepthPair> pairs;
+  std::vector<DepthPair> swapped;
+  for (const auto& [estimate, truth] : drawn) {
+    pairs.push_back({estimate * 0.01, truth * 0.01});
+    swapped.push_back({truth * 0.01, estimate * 0.01});
+  }
+  const DepthErrors a = depthErrors(pairs);
+  const DepthErrors b = depthErrors(swapped);
+  RC_ASSERT(std::abs(a.silog - b.silog) < 1e-9 * (1 + a.silog));
+  RC_ASSERT(std::abs(a.log_rmse - b.log_rmse) < 1e-9 * (1 + a.log_rmse));
+  RC_ASSERT(std::abs(a.aerrr - b.aerrr_by_estimate) < 1e-9 * (1 + a.aerrr));
+  RC_ASSERT(a.delta == b.delta);
+  RC_ASSERT(a.delta[0] <= a.delta[1]);
+  RC_ASSERT(a.delta[1] <= a.delta[2]);
 }
 
 }  // namespace
