@@ -48,18 +48,25 @@ std::vector<double> usualCloudDistances() {
 
 CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
                         const std::vector<double>& distances_m) {
+  return cloudErrors(map, truth, truth, distances_m);
+}
+
+CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
+                        const std::vector<CloudPoint>& to_find,
+                        const std::vector<double>& distances_m) {
   if (map.empty()) throw std::invalid_argument("the map has no points");
-  if (truth.empty()) throw std::invalid_argument("the truth has no points");
+  if (truth.empty() || to_find.empty()) throw std::invalid_argument("the truth has no points");
   for (const double distance_m : distances_m) {
     requireOption(distance_m > 0, "distance", distance_m, "above 0 (metres)");
   }
   const std::vector<double> to_truth = nearestDistances(map, truth);
-  const std::vector<double> to_map = nearestDistances(truth, map);
+  const std::vector<double> to_map = nearestDistances(to_find, map);
 
   CloudErrors errors;
   errors.accuracy = statisticsOf(to_truth);
   errors.accuracy_90_m = quantileOf(to_truth, 0.9);
   errors.gaps = statisticsOf(to_map);
+  errors.gaps_90_m = quantileOf(to_map, 0.9);
   for (const double distance_m : distances_m) {
     CloudErrors::Step step;
     step.distance_m = distance_m;

@@ -26,6 +26,7 @@ struct CloudErrors {
   double accuracy_90_m = 0;
   /// Distances from the true points to the map, metres.
   SampleStatistics gaps;
+  double gaps_90_m = 0;  ///< The distance that 90 % of the true points have the map within.
 
   /// One distance d that the two are held against.
   struct Step {
@@ -46,6 +47,10 @@ std::vector<double> usualCloudDistances();
 /// @throws std::invalid_argument where a cloud is empty, a point is not finite or a distance is not
 /// above 0.
 CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
+                        const std::vector<double>& distances_m);
+/// The same with a truth of its own for completeness: `to_find`, what of the surfaces can be found.
+CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
+                        const std::vector<CloudPoint>& to_find,
                         const std::vector<double>& distances_m);
 
 }  // namespace efm

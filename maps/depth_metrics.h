@@ -45,4 +45,8 @@ struct DepthErrors {
 DepthErrors depthErrors(const std::vector<DepthPair>& pairs,
                         std::optional<double> focal_baseline = std::nullopt);
 
+/// The mean of every field over those that have points, each counting the same; `points` is their
+/// sum. A field that one of them lacks is left out.
+DepthErrors meanOfErrors(const std::vector<DepthErrors>& maps);
+
 }  // namespace efm

@@ -38,19 +38,6 @@ void writeFile(const std::filesystem::path& path, Format format,
   if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
 }
 
-std::string bytesOfFile(const std::filesystem::path& path) {
-  if (!std::filesystem::exists(path)) throw std::runtime_error("there is no such file");
-  if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("it is not a regular file");
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
-  const auto end = file.tellg();
-  if (!file || end < 0) throw std::runtime_error("the file cannot be opened");
-  std::string bytes(static_cast<std::size_t>(end), '\0');
-  file.seekg(0);
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (!file) throw std::runtime_error("the file cannot be read to its end");
-  return bytes;
-}
-
 }  // namespace
 
 void writePointCloud(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
@@ -70,7 +57,7 @@ void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& 
 PointCloudContent readPointCloud(const std::filesystem::path& path) {
   try {
     const Format format = formatOf(path);
-    const std::string bytes = bytesOfFile(path);
+    const std::string bytes = readWhole(path);
     return format == Format::kPcd ? parsePcd(bytes) : parsePly(bytes);
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot read " + path.string() + ": " + error.what());

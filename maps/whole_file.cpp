@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/whole_file.h"
 
+#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -46,6 +47,19 @@ void writeWhole(const std::filesystem::path& path,
     std::filesystem::remove(temporary, ignored);
     throw std::runtime_error("cannot write " + path.string() + ": " + error.what());
   }
+}
+
+std::string readWhole(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) throw std::runtime_error("there is no such file");
+  if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("it is not a regular file");
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const auto end = file.tellg();
+  if (!file || end < 0) throw std::runtime_error("the file cannot be opened");
+  std::string bytes(static_cast<std::size_t>(end), '\0');
+  file.seekg(0);
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (!file) throw std::runtime_error("the file cannot be read to its end");
+  return bytes;
 }
 
 }  // namespace efm

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 
 namespace efm {
 
@@ -23,5 +24,10 @@ std::filesystem::path temporaryName(const std::filesystem::path& path);
 /// `write` throws becomes part of the message, and no temporary file stays.
 void writeWhole(const std::filesystem::path& path,
                 const std::function<void(const std::filesystem::path& temporary)>& write);
+
+/// All bytes of a file.
+/// @throws std::runtime_error saying why it cannot be read (there is none, it is no regular file,
+/// it ends before its end), without its name.
+std::string readWhole(const std::filesystem::path& path);
 
 }  // namespace efm

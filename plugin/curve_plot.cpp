@@ -89,7 +89,7 @@ struct Frame {
   cv::Point2d place(const cv::Point2d& point) const { return {column(point.x), row(point.y)}; }
 };
 
-int ticksSideways(const cv::Rect& area) { return std::max(2, area.width / 70); }
+int ticksSideways(const cv::Rect& area) { return std::max(2, area.width / 55); }
 int ticksUpwards(const cv::Rect& area) { return std::max(2, area.height / 45); }
 
 Frame layOut(const CurvePlot& plot) {

@@ -249,6 +249,7 @@ SessionStatus MappingSession::status() const {
   status.counts = mapper_.counts();
   status.pose_source = pose_choice_.chosen();
   status.other_poses = pose_choice_.unused();
+  status.rig = mapper_.rig();
   return status;
 }
 

@@ -41,6 +41,7 @@ struct SessionStatus {
   std::optional<PoseSource> pose_source;            ///< Whose poses are used.
   std::map<PoseSource, std::uint64_t> other_poses;  ///< Of other sources: not used.
   std::vector<std::uint64_t> silent_keyframes;      ///< Per camera: those that it had no event for.
+  Rig rig;  ///< The cameras that have appeared, as the options refit them.
 };
 
 /// From packets of events and poses, in the order of a recording, to keyframes and the global

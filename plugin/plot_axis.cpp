@@ -27,14 +27,23 @@ double roundStep(double least) {
   return 10 * power;
 }
 
-std::vector<AxisTick> linearTicks(const AxisRange& range, int at_most) {
-  const double step = roundStep((range.to - range.from) / (at_most - 1));
+std::vector<AxisTick> multiplesInside(const AxisRange& range, double step) {
   const double slack = 1e-9 * step;
+  const double last = std::floor((range.to + slack) / step);
   std::vector<AxisTick> ticks;
-  const auto last = static_cast<long long>(std::floor((range.to + slack) / step));
-  for (auto k = static_cast<long long>(std::ceil((range.from - slack) / step)); k <= last; ++k) {
-    const double value = static_cast<double>(k) * step;
-    ticks.push_back({value, shortText(value)});
+  // The sum takes the sign from a zero.
+  for (double k = std::ceil((range.from - slack) / step) + 0.0; k <= last; ++k) {
+    ticks.push_back({k * step, shortText(k * step)});
+  }
+  return ticks;
+}
+
+std::vector<AxisTick> linearTicks(const AxisRange& range, int at_most) {
+  double step = roundStep((range.to - range.from) / (at_most + 1));
+  std::vector<AxisTick> ticks = multiplesInside(range, step);
+  while (ticks.size() > static_cast<std::size_t>(at_most)) {
+    step = roundStep(1.5 * step);
+    ticks = multiplesInside(range, step);
   }
   return ticks;
 }
@@ -52,7 +61,8 @@ std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int at_most) {
       if (factor == 1 || few) ticks.push_back({value, shortText(value)});
     }
   }
-  return ticks;
+  // Over so short a stretch the axis is nearly linear.
+  return ticks.size() < 3 ? linearTicks(range, at_most) : ticks;
 }
 
 }  // namespace

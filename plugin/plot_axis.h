@@ -34,7 +34,8 @@ struct AxisTick {
 };
 
 /// Round values inside the range: 1, 2 or 5 times a power of ten apart; on a logarithmic axis the
-/// powers of ten, with 2 and 5 between them where they are few.
+/// powers of ten, with 2 and 5 between them where they are few, or evenly apart where even so there
+/// are hardly any.
 /// @param at_most how many, at least 2; a logarithmic axis may need one or two more.
 std::vector<AxisTick> ticksOf(const AxisRange& range, int at_most);
 

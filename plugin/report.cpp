@@ -37,6 +37,11 @@ Json asJson(const EventFusionOptions& options) {
   return json;
 }
 
+Json asJson(const ReferenceView& view) {
+  return {{"width", view.width}, {"height", view.height}, {"fx", view.fx},
+          {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
+}
+
 std::uint64_t peakMemoryBytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -79,6 +84,8 @@ std::string reportJson(const MapReport& report) {
   json["threads"] = sweep.threadsOrCores();
   json["peak_memory_bytes"] = peakMemoryBytes();
   if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
+  if (report.view) json["reference_view"] = asJson(*report.view);
+  if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
   json["options"] = asJson(report.options);
   return json.dump(2) + "\n";
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mapping/fusion_mapper.h"
+#include "mapping/reference_view.h"
 #include "plugin/option_file.h"
 #include "plugin/stage_timer.h"
 
@@ -21,12 +22,17 @@ struct MapReport {
   EventFusionOptions options;  ///< As used.
   /// What `max_confidence = sequence` stood for, where a pass of its own found it.
   std::optional<double> sequence_maximum;
+  /// The view of the depth maps, and how far its camera is from the nearest other that took part:
+  /// what turns depth into disparity. Not given where the rig was never complete or has one camera.
+  std::optional<ReferenceView> view;
+  std::optional<double> baseline_m;
 };
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
 /// outside_window + dropped + filtered), event_uses, votes (event_uses x planes = their sum),
 /// keyframes, silent (keyframes per camera, sub-intervals), points, seconds, votes_per_second,
-/// kernel, threads, peak_memory_bytes (of this process), options (all of them) and version.
+/// kernel, threads, peak_memory_bytes (of this process), reference_view and baseline_m where known,
+/// options (all of them) and version.
 std::string reportJson(const MapReport& report);
 
 /// Votes (used events times planes) over the sweep's seconds; 0 where nothing was swept.

@@ -8,7 +8,8 @@
 
 #include "mapping/quoted_text.h"
 #include "mapping/timestamp.h"
-#include "plugin/app/evaluate_command.h"
+#include "plugin/app/chosen_command.h"
+#include "plugin/app/evaluate_arguments.h"
 #include "plugin/app/import_command.h"
 #include "plugin/app/info_command.h"
 #include "plugin/app/map_command.h"
@@ -19,17 +20,6 @@
 
 namespace efm {
 namespace {
-
-using Run = std::function<int()>;
-
-/// A command whose arguments live as long as the program's description.
-template <typename Arguments>
-std::shared_ptr<Arguments> onCommand(CLI::App& command, Run& run,
-                                     int (*handler)(const Arguments&)) {
-  auto arguments = std::make_shared<Arguments>();
-  command.callback([arguments, handler, &run] { run = [=] { return handler(*arguments); }; });
-  return arguments;
-}
 
 template <typename Arguments>
 void addSource(CLI::App& command, Arguments& arguments) {
@@ -223,30 +213,6 @@ void addDepth(CLI::App& app, Run& run) {
           "Time of the reference view; the middle of the stretch by default");
   command.add_flag("--save-dsi", arguments->save_dsi,
                    "Also write the whole DSI, dsi.npy (float32, [plane][row][column])");
-}
-
-void addEvaluate(CLI::App& app, Run& run) {
-  CLI::App& evaluate = *app.add_subcommand("evaluate", "Hold results against the truth");
-  evaluate.require_subcommand(1);
-  CLI::App& command = *evaluate.add_subcommand(
-      "depth", "Errors of depth maps: one file against another, or folders paired by time");
-  auto arguments = onCommand(command, run, runEvaluateDepth);
-  command
-      .add_option("EST", arguments->estimate,
-                  "Depth map (float32 TIFF, metres), what `depth` wrote (against a file), or what "
-                  "`map` wrote")
-      ->required();
-  command.add_option("GT", arguments->truth, "True depth map, or a folder of them with index.txt")
-      ->required();
-  command.add_option("--focal", arguments->focal_px, "Focal length in pixels, for bad-pix");
-  command.add_option("--baseline", arguments->baseline_m, "Baseline in metres, for bad-pix");
-  command
-      .add_option("--tolerance-px", arguments->pairing.tolerance_px,
-                  "Compare with the best truth within so many pixels")
-      ->capture_default_str();
-  command.add_option("--max-depth", arguments->pairing.max_depth_m,
-                     "Leave out truth beyond this depth in metres");
-  command.add_flag("--json", arguments->json, "Print JSON instead of a table");
 }
 
 void addInfo(CLI::App& app, Run& run) {

@@ -4,19 +4,74 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "plugin/depth_evaluation.h"
+#include "plugin/depth_evaluation_text.h"
+#include "plugin/evaluation_plot.h"
+#include "plugin/stereo_base.h"
 
 namespace efm {
+namespace {
+
+/// What is given, and what the folders say of the rest.
+std::optional<StereoBase> stereoBase(const EvaluateDepthArguments& arguments) {
+  if (arguments.focal_px && arguments.baseline_m) {
+    return StereoBase{*arguments.focal_px, *arguments.baseline_m, "as given"};
+  }
+  std::optional<StereoBase> base = findStereoBase(arguments.estimate, arguments.truth);
+  if (!base && (arguments.focal_px || arguments.baseline_m)) {
+    throw std::invalid_argument("bad-pix needs both --focal and --baseline: neither " +
+                                arguments.estimate.string() + " nor " + arguments.truth.string() +
+                                " says the other");
+  }
+  if (arguments.focal_px) base->focal_px = *arguments.focal_px;
+  if (arguments.baseline_m) base->baseline_m = *arguments.baseline_m;
+  return base;
+}
+
+TrajectoryAlignment alignmentOf(const std::string& name) {
+  if (name == "se3") return TrajectoryAlignment::kSe3;
+  if (name == "origin") return TrajectoryAlignment::kOrigin;
+  if (name == "none") return TrajectoryAlignment::kNone;
+  throw std::invalid_argument("--align " + name + ": expected se3, origin or none");
+}
+
+}  // namespace
 
 int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
-  DepthEvaluationOptions options;
-  options.pairing = arguments.pairing;
-  if (arguments.focal_px.has_value() != arguments.baseline_m.has_value()) {
-    throw std::invalid_argument("bad-pix needs both --focal and --baseline");
-  }
-  if (arguments.focal_px) options.focal_baseline = *arguments.focal_px * *arguments.baseline_m;
+  const std::optional<StereoBase> base = stereoBase(arguments);
+  DepthEvaluationOptions options = arguments.options;
+  if (base) options.focal_baseline = base->focalBaseline();
   const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
-  std::cout << (arguments.json ? evaluationJson(evaluation) : evaluationTable(evaluation));
+  if (!arguments.output.plot.empty()) {
+    writePlot(arguments.output.plot, evaluationPlot(evaluation, options));
+  }
+  std::cout << (arguments.output.json ? evaluationJson(evaluation, base)
+                                      : evaluationTable(evaluation, base));
+  return 0;
+}
+
+int runEvaluateMap(const EvaluateMapArguments& arguments) {
+  const CloudEvaluation evaluation =
+      evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
+  if (!arguments.output.plot.empty()) writePlot(arguments.output.plot, evaluationPlot(evaluation));
+  std::cout << (arguments.output.json ? evaluationJson(evaluation) : evaluationTable(evaluation));
+  return 0;
+}
+
+int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
+  using Unit = RelativeSpacing::Unit;
+  TrajectoryEvaluationOptions options = arguments.options;
+  options.alignment = alignmentOf(arguments.alignment);
+  for (const double frames : arguments.frames) options.spacings.push_back({Unit::kFrames, frames});
+  for (const double delta_s : arguments.deltas_s) {
+    options.spacings.push_back({Unit::kSeconds, delta_s});
+  }
+  for (const double length_m : arguments.lengths_m) {
+    options.spacings.push_back({Unit::kMetres, length_m});
+  }
+  const TrajectoryEvaluation evaluation =
+      evaluateTrajectory(arguments.estimate, arguments.truth, options);
+  if (!arguments.output.plot.empty()) writePlot(arguments.output.plot, evaluationPlot(evaluation));
+  std::cout << (arguments.output.json ? evaluationJson(evaluation) : evaluationTable(evaluation));
   return 0;
 }
 

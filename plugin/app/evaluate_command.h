@@ -3,23 +3,53 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
-#include "maps/depth_metrics.h"
+#include "plugin/cloud_evaluation.h"
+#include "plugin/depth_evaluation.h"
+#include "plugin/trajectory_evaluation.h"
 
 namespace efm {
+
+struct EvaluationOutput {
+  bool json = false;
+  std::filesystem::path plot;  ///< Empty: none.
+};
 
 struct EvaluateDepthArguments {
   std::filesystem::path estimate;
   std::filesystem::path truth;
   std::optional<double> focal_px;
   std::optional<double> baseline_m;
-  DepthPairingOptions pairing;
-  bool json = false;
+  DepthEvaluationOptions options;
+  EvaluationOutput output;
 };
 
-/// `event-fusion evaluate depth`: prints the errors of depth maps against the truth.
+struct EvaluateMapArguments {
+  std::filesystem::path estimate;
+  std::filesystem::path truth;
+  CloudEvaluationOptions options;
+  EvaluationOutput output;
+};
+
+struct EvaluateTrajectoryArguments {
+  std::filesystem::path estimate;
+  std::filesystem::path truth;
+  std::string alignment = "se3";  ///< se3, origin or none.
+  std::vector<double> lengths_m;
+  std::vector<double> deltas_s;
+  std::vector<double> frames;
+  TrajectoryEvaluationOptions options;
+  EvaluationOutput output;
+};
+
+/// `event-fusion evaluate …`: print the errors of results against the truth, and draw them where
+/// asked for.
 /// @return the process's exit status.
-/// @throws std::exception where something cannot be compared.
+/// @throws std::exception where something cannot be compared or written.
 int runEvaluateDepth(const EvaluateDepthArguments& arguments);
+int runEvaluateMap(const EvaluateMapArguments& arguments);
+int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments);
 
 }  // namespace efm

@@ -3,6 +3,7 @@
 
 #include <mrpt/obs/CObservation.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 
@@ -145,6 +146,24 @@ std::vector<std::string> warningsOf(const SessionStatus& status, bool exclude_si
   return warnings;
 }
 
+/// What turns the keyframes' depths into disparities.
+void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport& report) {
+  const auto reference = static_cast<std::size_t>(options.keyframe.reference_camera);
+  if (reference >= rig.cameras.size()) return;
+  report.view = makeReferenceView(rig.cameras[reference].model, options.keyframe.view);
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const auto& used = options.cameras;
+    const bool takes_part =
+        used.empty() || std::count(used.begin(), used.end(), static_cast<int>(c)) > 0;
+    if (c == reference || !takes_part) continue;
+    const double distance_m =
+        (rig.cameras[c].T_rig_cam.translation - rig.cameras[reference].T_rig_cam.translation)
+            .norm();
+    if (distance_m == 0) continue;  // as good as one camera
+    report.baseline_m = std::min(report.baseline_m.value_or(distance_m), distance_m);
+  }
+}
+
 }  // namespace
 
 MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
@@ -158,6 +177,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.report.counts = status.counts;
   outcome.report.silent_keyframes = status.silent_keyframes;
   outcome.report.options = job.options;
+  describeView(status.rig, job.options.mapper, outcome.report);
   outcome.report.sequence_maximum = job.sequence_maximum;
   outcome.report.seconds = status.seconds;
   outcome.report.seconds.read = reading.read;

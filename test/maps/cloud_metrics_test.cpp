@@ -51,6 +51,13 @@ TEST(CloudErrors, AreWorkedOutByHand) {
   EXPECT_DOUBLE_EQ(errors.steps[2].completeness, 1);
 }
 
+TEST(CloudErrors, CompletenessMayHaveATruthOfItsOwn) {
+  const Points map = pointsAt({{0, 0, 0}, {1, 0, 0}});
+  const CloudErrors errors = cloudErrors(map, pointsAt({{0, 0, 0}}), pointsAt({{1, 0, 0}}), {0.5});
+  EXPECT_EQ(errors.steps[0].within, 0.5);
+  EXPECT_EQ(errors.steps[0].completeness, 1);
+}
+
 TEST(CloudErrors, AreExactFarFromTheOrigin) {
   const Eigen::Vector3d far(1e6, -2e6, 3e6);
   const std::vector<double> distances =

@@ -74,6 +74,20 @@ TEST(DepthErrors, DisparityNeedsAFocalLengthTimesBaselineAboveZero) {
   EXPECT_THROW(depthErrors({{1, 1}}, std::nan("")), std::invalid_argument);
 }
 
+TEST(DepthErrors, MeanOverMapsCountsEachMapTheSameAndEmptyOnesNot) {
+  const DepthErrors a = depthErrors({{2, 1}}, 10.0);
+  const DepthErrors b = depthErrors({{4, 1}, {4, 1}, {4, 1}}, 10.0);
+  const DepthErrors mean = meanOfErrors({a, depthErrors({}, 10.0), b});
+  EXPECT_EQ(mean.points, 4U);
+  EXPECT_EQ(mean.mean_abs_m, 2);
+  EXPECT_EQ(mean.median_abs_m, 2);
+  EXPECT_EQ(mean.aerrr, 2);
+  EXPECT_EQ(mean.bad_pix_3px, 1);
+  EXPECT_NEAR(mean.log_rmse, 150 * std::log(2.0), 1e-12);
+  EXPECT_FALSE(meanOfErrors({a, depthErrors({{1, 1}})}).bad_pix_3px.has_value());
+  EXPECT_EQ(meanOfErrors({}).points, 0U);
+}
+
 RC_GTEST_PROP(DepthErrors, ScaleWithTheWorldAndInverseDepthAgainstIt, ()) {
   // Scaling the world by s scales depth errors by s and inverse depth errors by 1/s.
   const auto drawn = *rc::gen::nonEmpty(rc::gen::container<std::vector<std::pair<int, int>>>(
