@@ -49,6 +49,10 @@ AxisRange rangeOf(const CurvePlot& plot, const PlotAxis& axis, bool across) {
   for (const Curve& curve : plot.curves) {
     for (const cv::Point2d& point : curve.points) values.push_back(across ? point.x : point.y);
   }
+  // A given end belongs to what is seen, so that the other leaves it some room.
+  for (const auto& end : {axis.from, axis.to}) {
+    if (end) values.push_back(*end);
+  }
   AxisRange range = rangeAround(values, axis.scale);
   if (axis.from) range.from = *axis.from;
   if (axis.to) range.to = *axis.to;
@@ -90,7 +94,7 @@ struct Frame {
 };
 
 int ticksSideways(const cv::Rect& area) { return std::max(2, area.width / 55); }
-int ticksUpwards(const cv::Rect& area) { return std::max(2, area.height / 45); }
+int ticksUpwards(const cv::Rect& area) { return std::max(2, area.height / 36); }
 
 Frame layOut(const CurvePlot& plot) {
   Frame frame;

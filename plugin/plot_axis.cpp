@@ -48,21 +48,31 @@ std::vector<AxisTick> linearTicks(const AxisRange& range, int at_most) {
   return ticks;
 }
 
-std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int at_most) {
+/// Powers of ten times each factor inside the range; every `stride`-th power.
+std::vector<AxisTick> powersInside(const AxisRange& range, const std::vector<double>& factors,
+                                   int stride) {
   const int first = static_cast<int>(std::floor(std::log10(range.from)));
   const int last = static_cast<int>(std::ceil(std::log10(range.to)));
-  const bool few = 3 * (last - first) <= at_most + 2;
-  const int stride = few ? 1 : 1 + (last - first) / at_most;
   std::vector<AxisTick> ticks;
   for (int power = first; power <= last; power += stride) {
-    for (const double factor : {1.0, 2.0, 5.0}) {
+    for (const double factor : factors) {
       const double value = factor * std::pow(10.0, power);
       if (value < range.from * (1 - 1e-9) || value > range.to * (1 + 1e-9)) continue;
-      if (factor == 1 || few) ticks.push_back({value, shortText(value)});
+      ticks.push_back({value, shortText(value)});
     }
   }
+  return ticks;
+}
+
+std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int at_most) {
+  const auto room = static_cast<std::size_t>(at_most);
+  std::vector<AxisTick> ticks = powersInside(range, {1, 2, 5}, 1);
   // Over so short a stretch the axis is nearly linear.
-  return ticks.size() < 3 ? linearTicks(range, at_most) : ticks;
+  if (ticks.size() < 3) return linearTicks(range, at_most);
+  if (ticks.size() <= room + 2) return ticks;
+  for (int stride = 1; (ticks = powersInside(range, {1}, stride)).size() > room; ++stride) {
+  }
+  return ticks;
 }
 
 }  // namespace

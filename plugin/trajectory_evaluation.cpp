@@ -100,7 +100,8 @@ double durationOf(const TrajectoryEvaluation& evaluation) {
 TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
                                         const std::filesystem::path& truth,
                                         const TrajectoryEvaluationOptions& options) {
-  const auto estimate_file = fileInFolder(estimated, {"trajectory.txt"});
+  const auto estimate_file =
+      fileInFolder(estimated, {"trajectory.txt", "poses.txt", "groundtruth.txt"});
   const auto truth_file = fileInFolder(truth, {"poses.txt", "groundtruth.txt"});
   const std::vector<StampedPose> estimate = readPosesFile(estimate_file);
   const std::vector<StampedPose> true_poses = readPosesFile(truth_file);

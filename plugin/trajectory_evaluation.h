@@ -38,8 +38,8 @@ struct TrajectoryEvaluation {
   std::vector<EvaluatedSpacing> relative;
 };
 
-/// Holds a trajectory against the truth: TUM files, or a run's folder (its trajectory.txt) and a
-/// dataset's (its poses.txt or groundtruth.txt).
+/// Holds a trajectory against the truth: TUM files, or the folder of a run (its trajectory.txt) or
+/// of a dataset (its poses.txt or groundtruth.txt).
 /// @throws std::runtime_error naming the file that cannot be read, and where no poses pair up or
 /// they cannot be aligned; std::invalid_argument where the options are not valid.
 TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,

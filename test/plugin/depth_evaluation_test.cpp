@@ -70,12 +70,59 @@ TEST_F(EvaluateDepth, PairsFoldersByTimeAndAveragesMaps) {
   EXPECT_EQ(evaluateDepth(folder() / "out/keyframes", folder() / "data/depth", {}).maps.size(), 2U);
 }
 
+TEST_F(EvaluateDepth, TakesAllPixelsOfAllMapsTogetherForPrecisionAndRecall) {
+  tiff("out/1/depth.tiff", 2);
+  tiff("out/2/depth.tiff", 3);
+  tiff("data/a.tiff", 2.5);
+  std::ofstream(folder() / "data/index.txt") << "1 a.tiff\n2 a.tiff\n3 a.tiff\n";
+  DepthEvaluationOptions options;
+  options.thresholds_m = {0.25, 0.5};
+  const auto evaluation = evaluateDepth(folder() / "out", folder() / "data", options);
+  EXPECT_EQ(evaluation.detection.truths, 24U);
+  EXPECT_EQ(evaluation.detection.precision(0), 0);
+  EXPECT_EQ(evaluation.detection.f1(1), 1);
+  EXPECT_EQ(evaluation.without_estimate, 1U);
+  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 true maps have no estimate"));
+  EXPECT_EQ(nlohmann::json::parse(evaluationJson(evaluation))["curve"][1]["recall"], 1);
+}
+
+TEST_F(EvaluateDepth, AMaskAndAScaleApplyToAllMaps) {
+  cv::Mat1b mask(3, 4, uchar{0});
+  mask.row(1).setTo(255);
+  cv::imwrite((folder() / "mask.png").string(), mask);
+  cv::imwrite((folder() / "gt.png").string(), cv::Mat_<std::uint16_t>(3, 4, std::uint16_t{512}));
+  DepthEvaluationOptions options;
+  options.mask = folder() / "mask.png";
+  options.png_scale = 256;
+  const auto evaluation = evaluateDepth(tiff("a.tiff", 3), folder() / "gt.png", options);
+  EXPECT_EQ(evaluation.all.points, 4U);
+  EXPECT_EQ(evaluation.all.mean_abs_m, 1);
+  EXPECT_EQ(evaluation.detection.truths, 4U);
+}
+
+TEST_F(EvaluateDepth, EveryKeyOfTheJsonIsInTheHelp) {
+  DepthEvaluationOptions options;
+  options.focal_baseline = 40;
+  const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), options);
+  const auto json =
+      nlohmann::json::parse(evaluationJson(evaluation, StereoBase{400, 0.1, "as given"}));
+  for (const auto& part : {json, json["maps"][0], json["curve"][0]}) {
+    for (const auto& [key, value] : part.items()) {
+      EXPECT_THAT(depthEvaluationKeys(), HasSubstr(key));
+    }
+  }
+  EXPECT_EQ(json["focal_px"], 400);
+}
+
 TEST_F(EvaluateDepth, BadPixelsNeedFocalLengthTimesBaseline) {
   DepthEvaluationOptions options;
   options.focal_baseline = 40;  // 20 px and 10 px
   const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), options);
   EXPECT_EQ(evaluation.mean.bad_pix_5px, 1);
-  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("3px 5% %"));
+  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("100.00    100.00"));
+  const auto without = evaluateDepth(folder() / "a.tiff", folder() / "b.tiff", {});
+  EXPECT_THAT(evaluationTable(without), HasSubstr("no bad-pix: it needs"));
+  EXPECT_FALSE(nlohmann::json::parse(evaluationJson(without))["all"].contains("bad_pix_5px"));
 }
 
 TEST_F(EvaluateDepth, AMapWithoutPointsIsNotAPerfectOne) {
@@ -105,6 +152,12 @@ TEST_F(EvaluateDepth, WhatCannotBeComparedIsAnErrorThatNamesIt) {
   std::ofstream(folder() / "index.txt") << "1.0\n";
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("index.txt:1: '1.0': expected"));
   std::ofstream(folder() / "index.txt") << "1.0 a.tiff\n";
+  DepthEvaluationOptions wide;
+  wide.mask = folder() / "wide.png";
+  cv::imwrite(wide.mask.string(), cv::Mat1b(3, 8, uchar{1}));
+  EXPECT_THROW(evaluateDepth(a, a, wide), std::runtime_error);
+  wide.mask = folder() / "nowhere.png";
+  EXPECT_THROW(evaluateDepth(a, a, wide), std::runtime_error);
   tiff("7.0/depth.tiff", 1);
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("within 1 ms"));
 }

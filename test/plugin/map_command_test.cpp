@@ -305,30 +305,5 @@ TEST_F(MapCommand, TimesWhoseDifferencesWouldNotFitAreErrors) {
   }
 }
 
-// --- evaluate depth --------------------------------------------------------------------------
-
-TEST_F(MapCommand, EvaluateDepthPrintsErrors) {
-  write(SyntheticRecording());
-  ASSERT_EQ(run("depth rig.ini data --out out --t0 10.1 --t1 10.3").status, 0);
-  cv::imwrite((folder() / "truth.tiff").string(),
-              cv::Mat1f(90, 120, static_cast<float>(SyntheticRecording::kDepthM)));
-
-  const Result table = run("evaluate depth out truth.tiff");
-  EXPECT_EQ(table.status, 0) << table.err;
-  EXPECT_THAT(table.out, AllOf(HasSubstr("median"), HasSubstr("bad-pix with focal length 100.00")));
-  const Result result =
-      run("evaluate depth out/depth.tiff truth.tiff --focal 100 --baseline 0.1 --json");
-  ASSERT_EQ(result.status, 0) << result.err;
-  const json errors = json::parse(result.out)["all"];
-  EXPECT_LT(errors["median_inverse"], 0.06);
-  EXPECT_TRUE(errors.contains("bad_pix_3px"));
-
-  // Away from the run's report, nothing says the baseline.
-  const Result half = run("evaluate depth truth.tiff truth.tiff --focal 100");
-  EXPECT_NE(half.status, 0);
-  EXPECT_THAT(half.err, HasSubstr("--baseline"));
-  EXPECT_NE(run("evaluate depth out/depth.tiff nowhere.tiff").status, 0);
-}
-
 }  // namespace
 }  // namespace efm

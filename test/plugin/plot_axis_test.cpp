@@ -30,10 +30,13 @@ TEST(PlotAxis, LogarithmicTicksArePowersOfTenAndWhatLiesBetweenWhereTheyAreFew) 
               ElementsAre("0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"));
   EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 7),
               ElementsAre("1", "10", "100", "1000", "10000", "100000", "1e+06"));
+  EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 4),
+              ElementsAre("1", "100", "10000", "1e+06"));
 }
 
 TEST(PlotAxis, AShortLogarithmicAxisHasTicksEvenlyApart) {
-  EXPECT_THAT(textsOf({0.7, 3.2, AxisScale::kLogarithmic}, 5), ElementsAre("1", "1.5", "2", "2.5", "3"));
+  EXPECT_THAT(textsOf({0.7, 3.2, AxisScale::kLogarithmic}, 5),
+              ElementsAre("1", "1.5", "2", "2.5", "3"));
 }
 
 TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengths) {
