@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "plugin/plot_text.h"
+
 namespace efm {
 namespace {
 
@@ -13,16 +15,8 @@ constexpr int kTitleHeight = 24;  // pixels, as are all below
 constexpr int kBarHeight = 12;
 constexpr int kBarGap = 6;
 constexpr int kTickHeight = 18;
-constexpr double kTextScale = 0.42;
-const cv::Scalar kInk(40, 40, 40);
 
-void write(cv::Mat3b& picture, const std::string& text, cv::Point at) {
-  cv::putText(picture, text, at, cv::FONT_HERSHEY_SIMPLEX, kTextScale, kInk, 1, cv::LINE_AA);
-}
-
-int widthOf(const std::string& text) {
-  return cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, kTextScale, 1, nullptr).width;
-}
+int widthOf(const std::string& text) { return plotTextSize(text).width; }
 
 /// The colour of each share of the range; white where there is none.
 cv::Mat3b coloured(const cv::Mat1f& shares, bool red_first) {
@@ -60,7 +54,7 @@ cv::Mat3b barOf(const ValuePicture& picture, int width) {
     shares.col(x).setTo(static_cast<float>(x) / static_cast<float>(area.width - 1));
   }
   coloured(shares, picture.red_first).copyTo(bar(area));
-  cv::rectangle(bar, area, kInk);
+  cv::rectangle(bar, area, plotInk());
   const int baseline = bar.rows - 5;
   int free_from = 0;
   const int unit_from = width - widthOf(picture.unit) - 2;
@@ -68,12 +62,12 @@ cv::Mat3b barOf(const ValuePicture& picture, int width) {
     const int x = area.x + cvRound(picture.range.shareAlong(tick.value) * (area.width - 1));
     const int from = x - widthOf(tick.text) / 2;
     const int to = from + widthOf(tick.text);
-    cv::line(bar, {x, area.br().y}, {x, area.br().y + 2}, kInk);
+    cv::line(bar, {x, area.br().y}, {x, area.br().y + 2}, plotInk());
     if (from < free_from || to + 6 > unit_from) continue;
-    write(bar, tick.text, {from, baseline});
+    writeText(bar, tick.text, {from, baseline});
     free_from = to + 6;
   }
-  write(bar, picture.unit, {unit_from, baseline});
+  writeText(bar, picture.unit, {unit_from, baseline});
   return bar;
 }
 
@@ -89,7 +83,7 @@ cv::Mat3b drawValues(const ValuePicture& picture) {
   const cv::Mat3b bar = barOf(picture, image.cols);
 
   cv::Mat3b whole(kTitleHeight + image.rows + bar.rows, image.cols, cv::Vec3b(255, 255, 255));
-  write(whole, picture.title, {2, kTitleHeight - 8});
+  writeText(whole, picture.title, {2, kTitleHeight - 8});
   image.copyTo(whole(cv::Rect({0, kTitleHeight}, image.size())));
   cv::rectangle(whole, cv::Rect({0, kTitleHeight}, image.size()), cv::Scalar::all(200));
   bar.copyTo(whole(cv::Rect({0, kTitleHeight + image.rows}, bar.size())));
