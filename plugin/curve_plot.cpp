@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
@@ -85,19 +86,21 @@ int hiddenBy(const cv::Rect& rectangle, const CurvePlot& plot, const PlotFrame& 
   return hidden;
 }
 
+/// The corners and the middles of the sides, the upper right first.
 cv::Rect legendPlace(cv::Size size, const CurvePlot& plot, const PlotFrame& frame) {
   const cv::Point low = frame.area.tl() + cv::Point(kGap, kGap);
   const cv::Point high = frame.area.br() - cv::Point(size.width + kGap + 1, size.height + kGap + 1);
-  const std::array<cv::Point, 4> corners = {cv::Point(high.x, low.y), low, high,
-                                            cv::Point(low.x, high.y)};
-  cv::Rect best(corners[0], size);
-  int fewest = hiddenBy(best, plot, frame);
-  for (const cv::Point& corner : corners) {
-    const cv::Rect box(corner, size);
-    const int hidden = hiddenBy(box, plot, frame);
-    if (hidden >= fewest) continue;
-    fewest = hidden;
-    best = box;
+  const int middle = (low.y + high.y) / 2;
+  cv::Rect best;
+  int fewest = std::numeric_limits<int>::max();
+  for (const int y : {low.y, high.y, middle}) {
+    for (const int x : {high.x, low.x}) {
+      const cv::Rect box({x, y}, size);
+      const int hidden = hiddenBy(box, plot, frame);
+      if (hidden >= fewest) continue;
+      fewest = hidden;
+      best = box;
+    }
   }
   return best;
 }

@@ -46,8 +46,8 @@ struct CurvePlot {
   cv::Size size = {640, 480};  ///< Pixels, at least 240x180.
 };
 
-/// A white picture with title, axes, ticks, grid, curves, and a legend in the corner that hides
-/// least.
+/// A white picture with title, axes, ticks, grid, curves, and a legend at the side or in the corner
+/// where it hides least.
 /// @throws std::invalid_argument naming the plot where an end of an axis does not fit its scale or
 /// the other end, or the picture is too small.
 cv::Mat3b drawCurves(const CurvePlot& plot);

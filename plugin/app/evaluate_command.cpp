@@ -4,9 +4,12 @@
 #include <iostream>
 #include <stdexcept>
 
+#include "plugin/cloud_evaluation_plot.h"
+#include "plugin/depth_evaluation_plot.h"
 #include "plugin/depth_evaluation_text.h"
-#include "plugin/evaluation_plot.h"
+#include "plugin/picture_file.h"
 #include "plugin/stereo_base.h"
+#include "plugin/trajectory_evaluation_plot.h"
 
 namespace efm {
 namespace {
@@ -42,7 +45,7 @@ int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
   if (base) options.focal_baseline = base->focalBaseline();
   const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
   if (!arguments.output.plot.empty()) {
-    writePlot(arguments.output.plot, evaluationPlot(evaluation, options));
+    writePicture(arguments.output.plot, evaluationPlot(evaluation, options));
   }
   std::cout << (arguments.output.json ? evaluationJson(evaluation, base)
                                       : evaluationTable(evaluation, base));
@@ -52,7 +55,8 @@ int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
 int runEvaluateMap(const EvaluateMapArguments& arguments) {
   const CloudEvaluation evaluation =
       evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
-  if (!arguments.output.plot.empty()) writePlot(arguments.output.plot, evaluationPlot(evaluation));
+  if (!arguments.output.plot.empty())
+    writePicture(arguments.output.plot, evaluationPlot(evaluation));
   std::cout << (arguments.output.json ? evaluationJson(evaluation) : evaluationTable(evaluation));
   return 0;
 }
@@ -70,7 +74,8 @@ int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
   }
   const TrajectoryEvaluation evaluation =
       evaluateTrajectory(arguments.estimate, arguments.truth, options);
-  if (!arguments.output.plot.empty()) writePlot(arguments.output.plot, evaluationPlot(evaluation));
+  if (!arguments.output.plot.empty())
+    writePicture(arguments.output.plot, evaluationPlot(evaluation));
   std::cout << (arguments.output.json ? evaluationJson(evaluation) : evaluationTable(evaluation));
   return 0;
 }

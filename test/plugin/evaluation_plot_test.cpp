@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/evaluation_plot.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +6,12 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
+#include "plugin/cloud_evaluation_plot.h"
+#include "plugin/depth_evaluation_plot.h"
+#include "plugin/picture_file.h"
 #include "plugin/picture_grid.h"
 #include "plugin/text_table.h"
+#include "plugin/trajectory_evaluation_plot.h"
 #include "plugin/value_picture.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -88,13 +91,21 @@ TEST_F(EvaluationPlot, OfATrajectoryWithoutErrorIsAPictureToo) {
   EXPECT_FALSE(evaluationPlot(evaluation).empty());
 }
 
+TEST_F(EvaluationPlot, OfACloudDrawsItsDistancesInOrder) {
+  CloudEvaluation evaluation;
+  evaluation.errors.steps = {{1, 1, 0, 1, 1}, {0.1, 0.2, 0.8, 0.1, 0.13}};
+  CloudEvaluation sorted = evaluation;
+  std::swap(sorted.errors.steps[0], sorted.errors.steps[1]);
+  EXPECT_EQ(cv::norm(evaluationPlot(evaluation), evaluationPlot(sorted)), 0);
+}
+
 TEST_F(EvaluationPlot, IsWrittenAsPngAlone) {
   const cv::Mat3b picture(3, 4, kWhite);
-  writePlot(folder() / "a.png", picture);
+  writePicture(folder() / "a.png", picture);
   EXPECT_EQ(cv::imread((folder() / "a.png").string()).size(), picture.size());
   const auto errorOf = [&](const std::filesystem::path& file) -> std::string {
     try {
-      writePlot(file, picture);
+      writePicture(file, picture);
     } catch (const std::runtime_error& error) {
       return error.what();
     }

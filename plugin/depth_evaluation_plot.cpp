@@ -1,23 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/evaluation_plot.h"
+#include "plugin/depth_evaluation_plot.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mapping/timestamp.h"
 #include "maps/sample_statistics.h"
-#include "maps/whole_file.h"
 #include "plugin/curve_plot.h"
 #include "plugin/depth_file.h"
 #include "plugin/picture_grid.h"
-#include "plugin/text_table.h"
 #include "plugin/value_picture.h"
 
 namespace efm {
@@ -135,63 +131,6 @@ cv::Mat3b errorsOverTime(const std::vector<EvaluatedMap>& maps) {
   return drawCurves(plot);
 }
 
-/// The two axes that positions extend most along.
-std::pair<int, int> widestAxes(const std::vector<PosePair>& pairs) {
-  Eigen::Vector3d low = pairs.front().T_world_rig.translation;
-  Eigen::Vector3d high = low;
-  for (const PosePair& pair : pairs) {
-    low = low.cwiseMin(pair.T_world_rig.translation);
-    high = high.cwiseMax(pair.T_world_rig.translation);
-  }
-  int least = 2;  // z where they are alike: from above
-  for (const int axis : {1, 0}) {
-    if (high[axis] - low[axis] < high[least] - low[least]) least = axis;
-  }
-  return {least == 0 ? 1 : 0, least == 2 ? 1 : 2};
-}
-
-cv::Mat3b topView(const TrajectoryEvaluation& evaluation) {
-  constexpr std::array<const char*, 3> kLabels = {"x [m]", "y [m]", "z [m]"};
-  const auto [across, upwards] = widestAxes(evaluation.pairs);
-  const auto place = [a = across, u = upwards](const Eigen::Vector3d& p) {
-    return cv::Point2d(p[a], p[u]);
-  };
-  std::vector<cv::Point2d> truth;
-  std::vector<cv::Point2d> estimate;
-  for (const PosePair& pair : evaluation.pairs) {
-    truth.push_back(place(pair.T_world_rig.translation));
-    estimate.push_back(place(evaluation.T_world_map * pair.T_map_rig.translation));
-  }
-  CurvePlot plot;
-  plot.title = "trajectories";
-  plot.x.label = kLabels[static_cast<std::size_t>(across)];
-  plot.y.label = kLabels[static_cast<std::size_t>(upwards)];
-  plot.curves = {{"truth", truth, CurveStyle::kLine, curveColour(6)},
-                 {"estimate, aligned", estimate, CurveStyle::kLine, curveColour(1)}};
-  plot.equal_units = true;
-  plot.size = {560, 520};
-  return drawCurves(plot);
-}
-
-cv::Mat3b overTime(const TrajectoryEvaluation& evaluation, const std::vector<double>& errors,
-                   double factor, const std::string& label) {
-  std::vector<cv::Point2d> points;
-  for (std::size_t i = 0; i < errors.size(); ++i) {
-    points.emplace_back(secondsBetween(evaluation.pairs.front().t_ns, evaluation.pairs[i].t_ns),
-                        factor * errors[i]);
-  }
-  const double rmse = factor * statisticsOf(errors).rms;
-  CurvePlot plot;
-  plot.title = "absolute error of " + label + ", RMSE " + fixedText(rmse, 4);
-  plot.x.label = "time since the first pose [s]";
-  plot.y.label = label;
-  plot.y.from = 0;
-  if (!(rmse > 0)) plot.y.to = 1;
-  plot.curves = {{"", points, CurveStyle::kLine, std::nullopt}};
-  plot.size = {560, 256};
-  return drawCurves(plot);
-}
-
 }  // namespace
 
 cv::Mat3b evaluationPlot(const DepthEvaluation& evaluation, const DepthEvaluationOptions& options) {
@@ -200,44 +139,6 @@ cv::Mat3b evaluationPlot(const DepthEvaluation& evaluation, const DepthEvaluatio
   return oneBelowAnother(
       {depthImages(typicalMap(evaluation), options),
        several ? sideBySide({curves, errorsOverTime(evaluation.maps)}) : curves});
-}
-
-cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation) {
-  std::vector<CloudErrors::Step> steps = evaluation.errors.steps;
-  std::sort(steps.begin(), steps.end(),
-            [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; });
-  std::array<std::vector<cv::Point2d>, 3> points;
-  for (const CloudErrors::Step& step : steps) {
-    points[0].emplace_back(step.distance_m, 100 * step.within);
-    points[1].emplace_back(step.distance_m, 100 * step.completeness);
-    points[2].emplace_back(step.distance_m, 100 * step.f1);
-  }
-  CurvePlot plot;
-  plot.title = "map and truth";
-  plot.x = {"distance [m]", AxisScale::kLogarithmic, std::nullopt, std::nullopt};
-  plot.y = {"share within [%]", AxisScale::kLinear, 0, 102};
-  plot.curves = {curveOf("accuracy: map to truth", points[0]),
-                 curveOf("completeness: truth to map", points[1]), curveOf("F1", points[2])};
-  return drawCurves(plot);
-}
-
-cv::Mat3b evaluationPlot(const TrajectoryEvaluation& evaluation) {
-  return sideBySide(
-      {topView(evaluation),
-       oneBelowAnother(
-           {overTime(evaluation, evaluation.errors.translation_m, 1, "position [m]"),
-            overTime(evaluation, evaluation.errors.rotation_rad, 180 / M_PI, "rotation [deg]")})});
-}
-
-void writePlot(const std::filesystem::path& file, const cv::Mat3b& picture) {
-  if (file.extension() != ".png") {
-    throw std::runtime_error(file.string() + ": expected a name that ends in .png for the plot");
-  }
-  writeWhole(file, [&](const std::filesystem::path& temporary) {
-    if (!cv::imwrite(temporary.string(), picture)) {
-      throw std::runtime_error("the file cannot be created or the disk is full");
-    }
-  });
 }
 
 }  // namespace efm
