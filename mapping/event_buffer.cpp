@@ -31,9 +31,9 @@ std::uint64_t EventBuffer::insert(const std::vector<Event>& added) {
       earliest_late = std::min(earliest_late, event.t_ns);
     }
     newest = std::max(newest, event.t_ns);
-    events.push_back(event);
-    used.push_back(0);
   }
+  events.insert(events.end(), added.begin(), added.end());
+  used.resize(events.size(), 0);
   if (late > 0) sortFrom(indexOfUnsorted(earliest_late, events.size() - added.size()));
   return late;
 }

@@ -50,6 +50,7 @@ void FusionMapperOptions::validate() const {
   keyframes.validate();
   keyframe.validate();
   limits.validate();
+  filter.validate();
   for (auto camera = cameras.begin(); camera != cameras.end(); ++camera) {
     requireOption(*camera >= 0, "cameras", *camera, "0 or above");
     requireOption(std::find(cameras.begin(), camera, *camera) == camera, "cameras", *camera,
@@ -115,6 +116,9 @@ int FusionMapper::addCamera(const RigCamera& camera) {
   camera.model.validate();
   rig_.cameras.push_back(camera);
   buffers_.emplace_back();
+  if (options_.filter.any()) {
+    incoming_.emplace_back(EventFilter(camera.model.width, camera.model.height, options_.filter));
+  }
   counts_.cameras.emplace_back();
   return static_cast<int>(rig_.cameras.size()) - 1;
 }
@@ -177,7 +181,8 @@ void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
       wanted.push_back(event);
     }
   }
-  counts_.sorted_events += buffer.insert(wanted);
+  counts_.sorted_events +=
+      incoming_.empty() ? buffer.insert(wanted) : incoming_[index].insert(wanted);
 }
 
 void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
@@ -194,6 +199,13 @@ std::int64_t FusionMapper::completeUntil(std::size_t camera) const {
   // From where packets begin: a long one of another camera says nothing of this one yet.
   const std::int64_t silent_ns = begun_ns_ ? *begun_ns_ - kMaxCameraLagNs : kNever;
   return std::max(buffers_[camera].covered_ns, silent_ns);
+}
+
+/// Events reach the buffers through the filters, as soon as all before them are here.
+void FusionMapper::releaseFiltered() {
+  for (std::size_t c = 0; c < incoming_.size(); ++c) {
+    counts_.cameras[c].filtered += incoming_[c].release(completeUntil(c), buffers_[c]);
+  }
 }
 
 bool FusionMapper::camerasCover(std::int64_t t_ns) const {
@@ -325,6 +337,7 @@ void FusionMapper::settleBefore(std::int64_t t_ns) {
 }
 
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
+  releaseFiltered();
   if (options_.only_window) start_ns_ = options_.only_window->t0_ns;
   if (!start_ns_) findStart();
   while (start_ns_) {

@@ -9,6 +9,8 @@
 
 #include "mapping/event.h"
 #include "mapping/event_buffer.h"
+#include "mapping/event_filter.h"
+#include "mapping/filtered_events.h"
 #include "mapping/keyframe_mapper.h"
 #include "mapping/keyframe_policy.h"
 #include "mapping/mapper_counts.h"
@@ -36,8 +38,9 @@ struct FusionMapperOptions {
   /// Where given, this window is the only keyframe and `keyframes` does not matter.
   std::optional<Window> only_window;
   KeyframeMapperOptions keyframe;
-  std::vector<int> cameras;  ///< Indices of the cameras that take part, each once; empty: all.
-  TimeLimits limits;         ///< Events outside are in no window, and no window reaches beyond.
+  std::vector<int> cameras;   ///< Indices of the cameras that take part, each once; empty: all.
+  TimeLimits limits;          ///< Events outside are in no window, and no window reaches beyond.
+  EventFilterOptions filter;  ///< What of the events inside no window ever sees.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
@@ -91,6 +94,7 @@ class FusionMapper {
   bool selected(int camera) const;
   std::int64_t completeUntil(std::size_t camera) const;
   bool camerasCover(std::int64_t t_ns) const;
+  void releaseFiltered();
   bool isDue(const Window& window) const;
   void findStart();
   void passEmptyWindows();
@@ -106,6 +110,7 @@ class FusionMapper {
   std::unique_ptr<KeyframePolicy> policy_;
   std::unique_ptr<KeyframeMapper> mapper_;  // once the recording starts
   std::vector<EventBuffer> buffers_;        // per camera
+  std::vector<FilteredEvents> incoming_;    // per camera, where there is a filter
   std::optional<std::int64_t> start_ns_;    // first event with a pose
   std::optional<std::int64_t> reached_ns_;  // newest event of any camera, selected or not
   std::optional<std::int64_t> begun_ns_;    // where the newest packet of any camera begins

@@ -8,6 +8,7 @@ EventCounts& EventCounts::operator+=(const EventCounts& other) {
   used += other.used;
   without_pose += other.without_pose;
   outside_window += other.outside_window;
+  filtered += other.filtered;
   dropped += other.dropped;
   return *this;
 }

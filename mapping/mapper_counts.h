@@ -14,7 +14,8 @@ struct EventCounts {
   std::uint64_t used = 0;            ///< Voted in at least one keyframe.
   std::uint64_t without_pose = 0;    ///< Not used: the trajectory has no pose at its time.
   std::uint64_t outside_window = 0;  ///< Not used: in no window that was mapped.
-  std::uint64_t dropped = 0;  ///< Came after its window was closed, or of an unselected camera.
+  std::uint64_t dropped = 0;   ///< Came after its window was closed, or of an unselected camera.
+  std::uint64_t filtered = 0;  ///< Left out as noise, whether they have a pose or not.
 
   EventCounts& operator+=(const EventCounts& other);
 };

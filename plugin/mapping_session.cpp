@@ -270,6 +270,11 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
   if (first_ns > last_ns) {
     return spans + ": they miss each other by " + formatSeconds(first_ns - last_ns) + " s";
   }
+  const EventCounts counts = status.counts.total();
+  if (counts.filtered > 0 && counts.used == 0 && counts.filtered + counts.dropped == counts.read) {
+    return "the filters took all " + std::to_string(counts.filtered) +
+           " events of the selected cameras for noise: [filter] is too strict for this recording";
+  }
   const bool saw_nothing =
       status.counts.keyframes_without_pose == 0 && status.counts.windows_without_events > 0;
   if (options.only_window) {

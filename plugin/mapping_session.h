@@ -124,7 +124,8 @@ class MappingSession {
 };
 
 /// Says in a sentence why a session that is finished made no keyframe: no events, no poses, poses
-/// and events that miss each other (by how much), or too little of both for one window.
+/// and events that miss each other (by how much), nothing but noise, or too little of both for one
+/// window.
 std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options);
 
 }  // namespace efm

@@ -168,6 +168,21 @@ const std::vector<OptionKey>& optionKeys() {
           [](auto& o) -> auto& { return o.cloud.outliers.outlier_min_neighbors; }),
 
       option(
+          "filter"sv, "hot_pixels"sv, [](auto& o) -> auto& { return o.mapper.filter.hot_pixels; }),
+      option(
+          "filter"sv, "hot_pixel_ratio"sv,
+          [](auto& o) -> auto& { return o.mapper.filter.hot_pixel.ratio; }),
+      option(
+          "filter"sv, "hot_pixel_period_s"sv,
+          [](auto& o) -> auto& { return o.mapper.filter.hot_pixel.period_s; }),
+      option(
+          "filter"sv, "hot_pixel_min_events"sv,
+          [](auto& o) -> auto& { return o.mapper.filter.hot_pixel.min_events; }),
+      option(
+          "filter"sv, "background_activity_s"sv,
+          [](auto& o) -> auto& { return o.mapper.filter.background_activity_s; }),
+
+      option(
           "output"sv, "camera_maps"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.camera_maps; }),
       option(

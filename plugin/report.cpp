@@ -17,7 +17,7 @@ Json asJson(const EventCounts& counts) {
           {"without_pose", counts.without_pose},
           {"outside_window", counts.outside_window},
           {"dropped", counts.dropped},
-          {"filtered", 0}};  // no event filter exists yet
+          {"filtered", counts.filtered}};
 }
 
 Json asJson(const StageSeconds& seconds) {

@@ -154,8 +154,8 @@ TEST(WindowPolicies, EveryEventIsCountedForWhatBecameOfIt) {
         EXPECT_EQ(counts.without_pose, expected.without_pose) << labelOf(options, seed);
         EXPECT_EQ(counts.outside_window, expected.outside_window) << labelOf(options, seed);
         EXPECT_EQ(counts.dropped, expected.dropped) << labelOf(options, seed);
-        EXPECT_EQ(counts.read,
-                  counts.used + counts.without_pose + counts.outside_window + counts.dropped);
+        EXPECT_EQ(counts.read, counts.used + counts.without_pose + counts.outside_window +
+                                   counts.dropped + counts.filtered);
       }
       EXPECT_EQ(played.counts.event_uses, uses) << labelOf(options, seed);
       EXPECT_EQ(played.counts.votes.total(), uses * 4) << "of four planes";

@@ -37,7 +37,8 @@ std::vector<KeyframeDepthMap> mapAll(MappingSession& session, const SyntheticRec
 void expectCountsAddUp(const SessionStatus& status, std::uint64_t events, int planes) {
   const EventCounts total = status.counts.total();
   EXPECT_EQ(total.read, events);
-  EXPECT_EQ(total.read, total.used + total.without_pose + total.outside_window + total.dropped);
+  EXPECT_EQ(total.read, total.used + total.without_pose + total.outside_window + total.dropped +
+                            total.filtered);
   EXPECT_EQ(status.counts.votes.total(),
             status.counts.event_uses * static_cast<std::uint64_t>(planes));
 }
@@ -321,6 +322,15 @@ TEST(WhyNoKeyframe, SaysByHowMuchPosesAndEventsMissEachOther) {
 
   for (StampedPose& pose : recording.poses) pose.t_ns -= 10'000'000'000;
   EXPECT_THAT(why(recording, syntheticOptions()), HasSubstr("miss each other by 4.700000000 s"));
+}
+
+TEST(WhyNoKeyframe, SaysThatTheFiltersLeftNothing) {
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.filter.background_activity_s = 1e-9;
+  const SyntheticRecording recording;
+  EXPECT_THAT(why(recording, options),
+              HasSubstr("the filters took all " + std::to_string(recording.totalEvents()) +
+                        " events of the selected cameras for noise"));
 }
 
 TEST(WhyNoKeyframe, SaysWhatIsMissingAltogether) {

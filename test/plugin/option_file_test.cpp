@@ -71,6 +71,12 @@ time_offsets_s = 0, 0.001
 pose_source = wheels
 max_pose_gap_s = 0.5
 exclude_silent = true
+[filter]
+hot_pixels = false
+hot_pixel_ratio = 7.5
+hot_pixel_period_s = 2
+hot_pixel_min_events = 9
+background_activity_s = 0.02
 [keyframes]
 policy = baseline
 window_s = 0.25
@@ -126,6 +132,11 @@ packet_error_px = 0
   EXPECT_EQ(mapper.cameras, (std::vector<int>{0, 2}));
   EXPECT_EQ(mapper.trajectory.max_pose_gap_s, 0.5);
   EXPECT_TRUE(mapper.keyframe.exclude_silent);
+  EXPECT_FALSE(mapper.filter.hot_pixels);
+  EXPECT_EQ(mapper.filter.hot_pixel.ratio, 7.5);
+  EXPECT_EQ(mapper.filter.hot_pixel.period_s, 2);
+  EXPECT_EQ(mapper.filter.hot_pixel.min_events, 9);
+  EXPECT_EQ(mapper.filter.background_activity_s, 0.02);
   EXPECT_EQ(mapper.keyframes.policy, KeyframePolicyKind::kBaseline);
   EXPECT_EQ(mapper.keyframes.window_events, 5'000'000'000);
   EXPECT_EQ(mapper.keyframes.min_baseline_ratio, 0.3);

@@ -12,7 +12,7 @@ using nlohmann::json;
 
 MapReport smallReport() {
   MapReport report;
-  report.counts.cameras = {{10, 6, 1, 2, 1}, {5, 5, 0, 0, 0}};
+  report.counts.cameras = {{10, 6, 1, 1, 1, 1}, {5, 5, 0, 0, 0, 0}};
   report.counts.event_uses = 20;
   report.counts.votes = {1500, 400, 100};
   report.counts.keyframes = 2;
@@ -42,6 +42,7 @@ TEST(Report, TotalsAreTheSumsOfTheCameras) {
   const json events = json::parse(reportJson(smallReport()))["events"];
   EXPECT_EQ(events["read"], 15);
   EXPECT_EQ(events["used"], 11);
+  EXPECT_EQ(events["filtered"], 1);
   EXPECT_EQ(events["cameras"][0]["read"], 10);
   EXPECT_EQ(events["cameras"][1]["used"], 5);
 }
