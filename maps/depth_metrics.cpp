@@ -97,33 +97,33 @@ DepthErrors meanOfErrors(const std::vector<DepthErrors>& maps) {
   }
   DepthErrors mean;
   if (given.empty()) return mean;
-  const auto meanOver = [&](auto value) {
+  const auto mean_over = [&](auto value) {
     double sum = 0;
     for (const DepthErrors& map : given) sum += value(map);
     return sum / static_cast<double>(given.size());
   };
-  const auto meanOfField = [&](double DepthErrors::*field) {
-    mean.*field = meanOver([field](const DepthErrors& map) { return map.*field; });
+  const auto average = [&](double DepthErrors::*field) {
+    mean.*field = mean_over([field](const DepthErrors& map) { return map.*field; });
   };
-  const auto meanIfAllHave = [&](std::optional<double> DepthErrors::*field) {
+  const auto average_if_all_have = [&](std::optional<double> DepthErrors::*field) {
     const bool all = std::all_of(given.begin(), given.end(),
                                  [&](const DepthErrors& map) { return (map.*field).has_value(); });
-    if (all) mean.*field = meanOver([&](const DepthErrors& map) { return *(map.*field); });
+    if (all) mean.*field = mean_over([&](const DepthErrors& map) { return *(map.*field); });
   };
   for (const DepthErrors& map : given) mean.points += map.points;
-  meanOfField(&DepthErrors::mean_abs_m);
-  meanOfField(&DepthErrors::median_abs_m);
-  meanOfField(&DepthErrors::median_inverse);
-  meanIfAllHave(&DepthErrors::bad_pix_5px);
-  meanIfAllHave(&DepthErrors::bad_pix_3px);
-  meanOfField(&DepthErrors::silog);
-  meanOfField(&DepthErrors::aerrr);
-  meanOfField(&DepthErrors::aerrr_by_estimate);
-  meanOfField(&DepthErrors::log_rmse);
+  average(&DepthErrors::mean_abs_m);
+  average(&DepthErrors::median_abs_m);
+  average(&DepthErrors::median_inverse);
+  average_if_all_have(&DepthErrors::bad_pix_5px);
+  average_if_all_have(&DepthErrors::bad_pix_3px);
+  average(&DepthErrors::silog);
+  average(&DepthErrors::aerrr);
+  average(&DepthErrors::aerrr_by_estimate);
+  average(&DepthErrors::log_rmse);
   for (std::size_t k = 0; k < mean.delta.size(); ++k) {
-    mean.delta[k] = meanOver([k](const DepthErrors& map) { return map.delta[k]; });
+    mean.delta[k] = mean_over([k](const DepthErrors& map) { return map.delta[k]; });
   }
-  meanOfField(&DepthErrors::beyond_tenth);
+  average(&DepthErrors::beyond_tenth);
   return mean;
 }
 

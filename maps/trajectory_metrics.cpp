@@ -122,9 +122,9 @@ PoseErrors relativeErrors(const std::vector<PosePair>& pairs, const RelativeSpac
     const auto j =
         nearestPlace(places, i, places[i] + spacing.amount, kMaxSpacingError * spacing.amount);
     if (!j || *j == i) continue;
-    const Rigid3 T_truth_i_j = pairs[i].T_world_rig.inverse() * pairs[*j].T_world_rig;
-    const Rigid3 T_estimate_i_j = pairs[i].T_map_rig.inverse() * pairs[*j].T_map_rig;
-    const Rigid3 error = T_truth_i_j.inverse() * T_estimate_i_j;
+    const Rigid3 T_ti_tj = pairs[i].T_world_rig.inverse() * pairs[*j].T_world_rig;
+    const Rigid3 T_ei_ej = pairs[i].T_map_rig.inverse() * pairs[*j].T_map_rig;
+    const Rigid3 error = T_ti_tj.inverse() * T_ei_ej;
     errors.translation_m.push_back(error.translation.norm());
     errors.rotation_rad.push_back(error.rotation.angularDistance(Eigen::Quaterniond::Identity()));
   }

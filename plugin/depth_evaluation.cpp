@@ -89,6 +89,12 @@ DepthEvaluation evaluateDepth(const fs::path& estimated, const fs::path& truth,
   const bool one_map = fs::exists(estimated / "depth.tiff") && !fs::is_directory(truth);
   const fs::path estimate = one_map ? estimated / "depth.tiff" : estimated;
   const bool folders = fs::is_directory(estimate);
+  if (folders && fs::exists(estimate / "depth.tiff")) {
+    throw std::runtime_error(estimate.string() +
+                             " holds one depth map without its time: expected a "
+                             "file of truth beside it, not the folder " +
+                             truth.string());
+  }
   if (folders != fs::is_directory(truth)) {
     throw std::runtime_error(estimate.string() + " and " + truth.string() +
                              ": must be two files or two folders");

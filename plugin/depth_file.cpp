@@ -52,7 +52,7 @@ cv::Mat decoded(const std::string& bytes, int flags) {
 }
 
 cv::Mat1f parseTiff(const std::string& bytes) {
-  const cv::Mat image = decoded(bytes, cv::IMREAD_UNCHANGED);
+  cv::Mat image = decoded(bytes, cv::IMREAD_UNCHANGED);
   if (image.type() != CV_32FC1) {
     throw std::runtime_error("a TIFF image, " + kindOf(image) +
                              ": must be a float32 image of one channel");

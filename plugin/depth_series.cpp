@@ -53,8 +53,8 @@ std::vector<TimedFile> listedIn(const fs::path& index) {
 
 /// The time in a name like "1.25.tiff" or "cam0_1.25.tiff".
 std::optional<std::int64_t> timeInName(const fs::path& file) {
-  static const std::set<std::string> kExtensions = {".tiff", ".tif", ".pfm", ".npy", ".png"};
-  if (kExtensions.count(file.extension().string()) == 0) return std::nullopt;
+  const std::set<std::string> extensions = {".tiff", ".tif", ".pfm", ".npy", ".png"};
+  if (extensions.count(file.extension().string()) == 0) return std::nullopt;
   const std::string stem = file.stem().string();
   return parseSeconds(stem.substr(stem.rfind('_') + 1));
 }

@@ -62,19 +62,19 @@ PlotFrame layOut(const CurvePlot& plot) {
   frame.x = rangeOf(plot, plot.x, true);
   frame.y = rangeOf(plot, plot.y, false);
   const int line = plotTextSize("0").height;
-  const auto areaWith = [&](int tick_width) {
+  const auto area_with = [&](int tick_width) {
     const int left = 2 * kGap + (plot.y.label.empty() ? 0 : line + kGap) + tick_width + kGap;
     const int top = plot.title.empty() ? 2 * kGap : line + 3 * kGap;
     const int bottom = 2 * kGap + line + (plot.x.label.empty() ? 0 : line + kGap);
     return cv::Rect(left, top, plot.size.width - left - 3 * kGap, plot.size.height - top - bottom);
   };
-  frame.area = areaWith(0);
+  frame.area = area_with(0);
   if (plot.equal_units) makeUnitsEqual(frame.x, frame.y, frame.area.size());
   int tick_width = 0;
   for (const AxisTick& tick : ticksOf(frame.y, ticksUpwards(frame.area))) {
     tick_width = std::max(tick_width, plotTextSize(tick.text).width);
   }
-  frame.area = areaWith(tick_width);
+  frame.area = area_with(tick_width);
   if (plot.equal_units) makeUnitsEqual(frame.x, frame.y, frame.area.size());
   return frame;
 }

@@ -46,11 +46,11 @@ bool isUsable(const StereoBase& base) { return base.focal_px > 0 && base.baselin
 
 std::optional<StereoBase> findStereoBase(const fs::path& estimate, const fs::path& truth) {
   if (const auto report = fileAtOrAbove(estimate, "report.json", 3)) {
-    const auto base = fromReport(*report);
+    auto base = fromReport(*report);
     if (base && isUsable(*base)) return base;
   }
   if (const auto camchain = fileAtOrAbove(truth, "camchain.yaml", 2)) {
-    const auto base = fromCamchain(*camchain);
+    auto base = fromCamchain(*camchain);
     if (base && isUsable(*base)) return base;
   }
   return std::nullopt;

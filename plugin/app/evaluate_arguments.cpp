@@ -78,7 +78,9 @@ void addDepth(CLI::App& evaluate, Run& run) {
 
 void addMap(CLI::App& evaluate, Run& run) {
   CLI::App& command = *evaluate.add_subcommand(
-      "map", "Accuracy and completeness of a point cloud. Clouds are PCD or PLY, of any encoding");
+      "map",
+      "Accuracy, completeness and outliers of a point cloud. Clouds are PCD (ascii, binary, "
+      "compressed) or PLY (ascii, binary)");
   auto arguments = onCommand(command, run, runEvaluateMap);
   command.add_option("EST", arguments->estimate, "The map, or the folder that `map` wrote")
       ->required();
@@ -105,8 +107,9 @@ void addTrajectory(CLI::App& evaluate, Run& run) {
       "Trajectories are TUM files: t tx ty tz qx qy qz qw");
   auto arguments = onCommand(command, run, runEvaluateTrajectory);
   command
-      .add_option("EST", arguments->estimate,
-                  "The estimate, or the folder that `map` wrote (its trajectory.txt)")
+      .add_option(
+          "EST", arguments->estimate,
+          "The estimate, or the folder that `map` wrote (its trajectory.txt: the keyframes' poses)")
       ->required();
   command
       .add_option("GT", arguments->truth,

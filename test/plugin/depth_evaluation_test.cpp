@@ -152,6 +152,8 @@ TEST_F(EvaluateDepth, WhatCannotBeComparedIsAnErrorThatNamesIt) {
   std::ofstream(folder() / "index.txt") << "1.0\n";
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("index.txt:1: '1.0': expected"));
   std::ofstream(folder() / "index.txt") << "1.0 a.tiff\n";
+  tiff("one/depth.tiff", 1);
+  EXPECT_THAT(errorOf(folder() / "one", folder()), HasSubstr("one holds one depth map without"));
   DepthEvaluationOptions wide;
   wide.mask = folder() / "wide.png";
   cv::imwrite(wide.mask.string(), cv::Mat1b(3, 8, uchar{1}));

@@ -72,6 +72,8 @@ TEST_F(MapCommand, CountsOfTheReportAddUp) {
   EXPECT_GT(report["votes_per_second"], 0);
   EXPECT_GT(report["seconds"]["total"], report["seconds"]["sweep"]);
   EXPECT_EQ(report["options"]["dsi"]["num_planes"], 30);
+  EXPECT_EQ(report["reference_view"]["fx"], 100);
+  EXPECT_NEAR(report["baseline_m"], 0.1, 1e-9);
 }
 
 TEST_F(MapCommand, ThreadsDoNotChangeAByteOfTheMap) {
