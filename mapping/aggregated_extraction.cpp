@@ -30,6 +30,7 @@ cv::Mat1f excessOf(const cv::Mat1f& confidence, int window) {
 cv::Mat1b standOut(const cv::Mat1f& excess, double min_excess) {
   cv::Mat1b mask = cv::Mat1b::zeros(excess.size());
   const cv::Rect inner = insideFrame(excess.size());
+  if (inner.empty()) return mask;
   cv::compare(excess(inner), min_excess, mask(inner), cv::CMP_GT);
   return mask;
 }

@@ -38,7 +38,7 @@ struct MaxConfidence {
 };
 
 struct DepthExtractionOptions {
-  ExtractionMethod extraction = ExtractionMethod::kPaper;
+  ExtractionMethod extraction = ExtractionMethod::kAggregated;
   int threshold_kernel = 5;  ///< Side of the Gaussian window in pixels; odd, 3 to 255.
   bool dilate = false;  ///< Grow the kept pixels by their four neighbours: the paper's MF.
 

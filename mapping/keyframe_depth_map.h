@@ -38,7 +38,8 @@ struct KeyframeDepthMap {
   std::uint64_t without_pose = 0;   ///< Events of the window that had no pose.
   VoteCounts votes;                 ///< Summed over cameras.
   std::vector<int> silent_cameras;  ///< Selected, but without an event to vote.
-  /// Sub-intervals without an event to vote, summed over the cameras that are not silent.
+  /// Sub-intervals (of all slices of time) without an event to vote, summed over the cameras that
+  /// are not silent.
   std::uint64_t silent_subintervals = 0;
 
   std::vector<CameraDepthMap> camera_maps;  ///< Of the cameras that were fused, where asked for.

@@ -142,18 +142,18 @@ KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
         input.rays.emplace_back(backProject(part, packets, undistortion, view_));
     input.without_pose += packets.without_pose;
     input.events += rays.size();
-    if (rays.size() == 0) ++input.silent_subintervals;
+    return rays.size();
   };
   for (const std::vector<EventSpan>& slice : slicesOf(events, window)) {
+    std::vector<std::size_t> voting(slice.size());  // by sub-interval, of both polarities
     for (int polarity = 0; polarity < options_.split.polarities(); ++polarity) {
-      for (const EventSpan& part : slice) {
-        if (options_.split.polarity) {
-          add(eventsOfPolarity(part, polarity == 1));
-        } else {
-          add(part);
-        }
+      for (std::size_t s = 0; s < slice.size(); ++s) {
+        voting[s] += options_.split.polarity ? add(eventsOfPolarity(slice[s], polarity == 1))
+                                             : add(slice[s]);
       }
     }
+    input.silent_subintervals +=
+        static_cast<std::uint64_t>(std::count(voting.begin(), voting.end(), 0U));
   }
   return input;
 }
@@ -161,7 +161,7 @@ KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
 std::vector<std::vector<EventSpan>> KeyframeMapper::slicesOf(EventSpan events,
                                                              const Window& window) const {
   SubintervalOptions all = options_.subintervals;
-  all.count *= options_.split.time_slices;
+  all.count *= options_.split.slices(selected_.size());
   const std::vector<EventSpan> parts =
       splitIntoSubintervals(events, window.t0_ns, window.t1_ns, all);
   std::vector<std::vector<EventSpan>> slices;
@@ -197,7 +197,7 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   std::vector<CameraRays> rays;
   for (CameraInput& input : inputs) rays.push_back(std::move(input.rays));
   SplitRays split = arrangeGroups(
-      std::move(rays), options_.split,
+      std::move(rays), options_.split.slices(selected_.size()),
       assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals));
 
   // 4. Vote and fuse, plane by plane.

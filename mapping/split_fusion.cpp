@@ -27,8 +27,8 @@ CameraRays inSlots(CameraRays rays, const std::vector<int>& slots) {
 }  // namespace
 
 void SplitFusionOptions::validate() const {
-  requireOption(time_slices >= 1 && time_slices <= kMaxTimeSlices, "time_slices", time_slices,
-                "1 to 1000");
+  const int slices = time_slices.value_or(1);
+  requireOption(slices >= 1 && slices <= kMaxTimeSlices, "time_slices", slices, "1 to 1000");
 }
 
 std::vector<Event> eventsOfPolarity(EventSpan events, bool polarity) {
@@ -39,24 +39,27 @@ std::vector<Event> eventsOfPolarity(EventSpan events, bool polarity) {
   return chosen;
 }
 
-SplitRays arrangeGroups(std::vector<CameraRays> cameras, const SplitFusionOptions& options,
+SplitRays arrangeGroups(std::vector<CameraRays> cameras, int slices,
                         const std::vector<std::vector<int>>& slots) {
   assert(!cameras.empty() && slots.size() == cameras.size());
   SplitRays split;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     split.inputs.push_back(inSlots(std::move(cameras[c]), slots[c]));
   }
-  split.groups = options.time_slices * options.polarities();
-  if (split.inputs.size() > 1 || options.time_slices == 1) return split;
+  const auto groups_of = [&](const CameraRays& rays) {
+    return static_cast<int>(rays.size() / slots.front().size());
+  };
+  split.groups = groups_of(split.inputs.front());
+  if (split.inputs.size() > 1 || slices == 1) return split;
 
   // A single camera: its slices stand for cameras.
   CameraRays rays = std::move(split.inputs.front());
-  split.inputs.assign(static_cast<std::size_t>(options.time_slices), {});
+  split.inputs.assign(static_cast<std::size_t>(slices), {});
   const std::size_t parts_of_slice = rays.size() / split.inputs.size();
   for (std::size_t i = 0; i < rays.size(); ++i) {
     split.inputs[i / parts_of_slice].push_back(std::move(rays[i]));
   }
-  split.groups = options.polarities();
+  split.groups = groups_of(split.inputs.front());
   return split;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "mapping/event.h"
@@ -16,12 +18,18 @@ namespace efm {
 /// mean of sums is at least the sum of harmonic means, and equal where cameras agree: confidences
 /// keep their scale.
 struct SplitFusionOptions {
-  bool polarity = false;  ///< A group per polarity.
+  /// All events in one group: the paper's fusion.
+  static SplitFusionOptions none() { return {false, 1}; }
+
+  bool polarity = true;  ///< A group per polarity.
   /// Groups in time, 1 to 1000. Where a single camera is fused, its slices take the place of
-  /// cameras: the rule across cameras fuses them, and only polarities are summed.
-  int time_slices = 1;
+  /// cameras: the rule across cameras fuses them, and only polarities are summed. Not given: 2 with
+  /// several cameras, where more gain nothing in windows of 0.2 and 0.5 s and cost time; 4 with
+  /// one, which has nothing else to fuse.
+  std::optional<int> time_slices;
 
   int polarities() const { return polarity ? 2 : 1; }
+  int slices(std::size_t cameras) const { return time_slices.value_or(cameras > 1 ? 2 : 4); }
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
@@ -37,8 +45,9 @@ struct SplitRays {
 
 /// Arranges the rays of each camera for the sweep.
 /// @param cameras rays[slice][polarity][sub-interval], flat in this order; at least one camera.
+/// @param slices of time, in each camera.
 /// @param slots which of its sub-intervals each camera puts into each slot: [camera][slot].
-SplitRays arrangeGroups(std::vector<CameraRays> cameras, const SplitFusionOptions& options,
+SplitRays arrangeGroups(std::vector<CameraRays> cameras, int slices,
                         const std::vector<std::vector<int>>& slots);
 
 }  // namespace efm

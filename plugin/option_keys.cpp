@@ -132,6 +132,12 @@ const std::vector<OptionKey>& optionKeys() {
           "fusion"sv, "shuffle_seed"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.subintervals.shuffle_seed; }),
       option(
+          "fusion"sv, "split_polarity"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.split.polarity; }),
+      optionOr(
+          "auto"sv, "fusion"sv, "time_slices"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.split.time_slices; }),
+      option(
           "fusion"sv, "late"sv, [](auto& o) -> auto& { return o.late_fusion; }),
 
       option(
@@ -140,6 +146,12 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "depth"sv, "threshold_kernel"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.extraction.threshold_kernel; }),
+      option(
+          "depth"sv, "min_excess"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.min_excess; }),
+      option(
+          "depth"sv, "min_quality"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.extraction.min_quality; }),
       option(
           "depth"sv, "threshold_c"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.extraction.threshold_c; }),

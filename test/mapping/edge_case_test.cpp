@@ -19,6 +19,8 @@ constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
 
 FusionMapperOptions options(int planes = 4) {
   FusionMapperOptions options;
+  options.keyframe.split = SplitFusionOptions::none();
+  options.keyframe.extraction.extraction = ExtractionMethod::kPaper;
   options.keyframes.window_s = 0.1;
   options.keyframes.stride_s = 0.1;
   options.keyframe.planes = {0.5, 4.0, planes, PlaneSpacing::kInverse};

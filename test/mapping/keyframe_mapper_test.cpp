@@ -24,6 +24,8 @@ using Recording = test::RandomRecording;
 
 KeyframeMapperOptions fewPlanes(int subintervals = 1) {
   KeyframeMapperOptions options;
+  options.split = SplitFusionOptions::none();
+  options.extraction.extraction = ExtractionMethod::kPaper;
   options.planes = {0.5, 4.0, 8, PlaneSpacing::kInverse};
   options.subintervals.count = subintervals;
   options.sweep.threads = 1;

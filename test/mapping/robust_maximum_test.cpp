@@ -63,6 +63,7 @@ cv::Mat1b keptWith(const cv::Mat1f& confidence, double white) {
 TEST(RobustMaximum, OfTheKeyframesSoFarIsTheWhiteLevelOfTheSequence) {
   const test::LongRecording recording(1, 1.0);
   FusionMapperOptions options = test::playedOptions();
+  options.keyframe.extraction.extraction = ExtractionMethod::kPaper;
   options.keyframes.window_s = 0.05;
   options.keyframes.stride_s = 0.015;
   options.keyframe.extraction.max_confidence.level = WhiteLevel::kSequence;

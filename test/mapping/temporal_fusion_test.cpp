@@ -25,6 +25,7 @@ constexpr Window kWindow = Recording::kWindow;
 /// Every event with a pose of its own, so that nothing but rounding is left to differ.
 KeyframeMapperOptions exactOptions(int planes, int subintervals) {
   KeyframeMapperOptions options;
+  options.split = SplitFusionOptions::none();
   options.planes = {0.5, 4.0, planes, PlaneSpacing::kInverse};
   options.packets.packet_error_px = 0;
   options.subintervals.count = subintervals;
