@@ -44,6 +44,11 @@ const kernels::FusionSteps& stepsOf(FusionRule rule, const kernels::FusionFuncti
 std::string_view nameOf(FusionRule rule) { return nameIn(kRules, rule); }
 FusionRule fusionRuleFromName(std::string_view name) { return valueIn(kRules, name); }
 
+bool isAndLike(FusionRule rule) {
+  return rule == FusionRule::kMin || rule == FusionRule::kHarmonic ||
+         rule == FusionRule::kGeometric;
+}
+
 const std::vector<FusionRule>& allFusionRules() {
   static const std::vector<FusionRule> rules = [] {
     std::vector<FusionRule> all;
@@ -83,6 +88,11 @@ void FusionAccumulator::finish() {
   if (inputs_ > 2) {
     steps_->finish(values_.data(), static_cast<float>(inputs_), values_.size());
   }
+}
+
+void FusionAccumulator::addPair(const float* second, const kernels::PixelBlocks& blocks,
+                                PlaneValues& sum) const {
+  steps_->addPair(sum.data(), values_.data(), second, blocks);
 }
 
 }  // namespace efm

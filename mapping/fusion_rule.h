@@ -12,6 +12,7 @@ namespace efm {
 
 namespace kernels {
 struct FusionSteps;
+struct PixelBlocks;
 }  // namespace kernels
 
 /// How the ray densities of several DSIs become one, voxel by voxel (Ghosh and Gallego 2022,
@@ -23,6 +24,8 @@ enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax };
 std::string_view nameOf(FusionRule rule);
 /// @throws std::invalid_argument naming the value and what is known.
 FusionRule fusionRuleFromName(std::string_view name);
+/// Whether zero in any input makes the mean zero.
+bool isAndLike(FusionRule rule);
 /// All rules, in their order.
 const std::vector<FusionRule>& allFusionRules();
 
@@ -41,6 +44,10 @@ class FusionAccumulator {
   /// @param values as many as there are voxels, or `values` itself: see `place`.
   void fold(const float* values);
   void finish();
+
+  /// Adds the mean of two inputs to a sum, in some blocks of a tile: the first input lies in
+  /// `place`.
+  void addPair(const float* second, const kernels::PixelBlocks& blocks, PlaneValues& sum) const;
 
   const PlaneValues& values() const { return values_; }
 

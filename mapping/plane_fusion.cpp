@@ -14,6 +14,11 @@ constexpr NamedChoice<FusionOrder> kOrders[] = {
     {FusionOrder::kTimeThenCameras, "time_then_cameras"},
 };
 
+/// Whether a group is the mean of two inputs, which is zero where one of them is.
+bool fusesPairs(const FusionOptions& options, const FusionInputs& inputs) {
+  return inputs.cameras == 2 && inputs.slots == 1 && isAndLike(options.across_cameras);
+}
+
 /// An axis of one input needs no accumulator.
 std::size_t voxelsFor(int inputs, std::size_t voxels) { return inputs > 1 ? voxels : 0; }
 
@@ -38,7 +43,8 @@ PlaneFusion::PlaneFusion(const FusionOptions& options, const FusionInputs& input
              voxelsFor(inner_count_, voxels), kernel),
       outer_(cameras_first_ ? options.across_time : options.across_cameras,
              voxelsFor(outer_count_, voxels), kernel),
-      sum_(voxelsFor(groups_, voxels)) {
+      pairs_(keep == Keep::kFusedOnly && fusesPairs(options, inputs)),
+      sum_(pairs_ ? voxels : voxelsFor(groups_, voxels)) {
   assert(inputs.cameras >= 1 && inputs.slots >= 1 && inputs.groups >= 1);
   if (keep == Keep::kFusedOnly) return;
   const auto cameras = static_cast<std::size_t>(inputs.cameras);
@@ -86,6 +92,43 @@ const PlaneValues& PlaneFusion::fuse(const Vote& vote) {
     addTo(sum_, fuseGroup(group, vote));
     for (std::size_t c = 0; c < cameras_.size(); ++c) addTo(camera_sums_[c], cameras_[c].values());
   }
+  return sum_;
+}
+
+/// Where one input has no vote the mean is zero, whatever the other has.
+void PlaneFusion::addPairOfGroup(int group, const TileVote& vote) {
+  FusionAccumulator& mean = cameras_first_ ? inner_ : outer_;
+  TileDensity first{mean.place().data(), true};
+  TileDensity second{votes_.data(), true};
+  vote(0, group, first);
+  vote(1, group, second);
+  if (first.waiting == nullptr && second.waiting == nullptr) {
+    mean.begin(2);
+    mean.fold(first.values);
+    mean.fold(second.values);
+    mean.finish();
+    addTo(sum_, mean.values());
+    return;
+  }
+  const TileVotes& waiting = *(first.waiting != nullptr ? first.waiting : second.waiting);
+  kernels::TilePixels both = waiting.found();
+  if (second.waiting != nullptr) both.intersect(second.waiting->found());
+  const kernels::PixelBlocks blocks = waiting.blocksOf(both);
+  for (const TileDensity& density : {first, second}) {
+    if (density.waiting != nullptr) density.waiting->foldSome(blocks, density.values);
+  }
+  mean.addPair(second.values, blocks, sum_);
+}
+
+const PlaneValues& PlaneFusion::fuse(const TileVote& vote) {
+  if (!pairs_) {
+    return fuse(Vote([&vote](int camera, int slot, PlaneValues& votes) {
+      TileDensity density{votes.data()};
+      vote(camera, slot, density);
+    }));
+  }
+  std::fill(sum_.begin(), sum_.end(), 0.0F);
+  for (int group = 0; group < groups_; ++group) addPairOfGroup(group, vote);
   return sum_;
 }
 

@@ -8,6 +8,7 @@
 
 #include "mapping/fusion_rule.h"
 #include "mapping/plane_values.h"
+#include "mapping/tile_votes.h"
 
 namespace efm {
 
@@ -45,6 +46,8 @@ class PlaneFusion {
   /// Fills the plane with the ray density of one camera in one slot of the time axis; those of
   /// group g begin at g * slots.
   using Vote = std::function<void(int camera, int slot, PlaneValues& votes)>;
+  /// The same on a tile, where votes may wait until it is known which densities matter.
+  using TileVote = std::function<void(int camera, int slot, TileDensity& density)>;
 
   /// What else is kept of a plane.
   enum class Keep {
@@ -59,6 +62,8 @@ class PlaneFusion {
 
   /// Asks for every input once. @return the fused plane, until the next call.
   const PlaneValues& fuse(const Vote& vote);
+  /// The same bits. Two cameras under an AND-like rule are fused only where both have votes.
+  const PlaneValues& fuse(const TileVote& vote);
 
   /// A camera's own plane after `fuse`, where cameras are kept.
   const PlaneValues& ofCamera(int camera) const {
@@ -69,6 +74,7 @@ class PlaneFusion {
  private:
   const PlaneValues& fuseInner(int group, int outer, const Vote& vote);
   const PlaneValues& fuseGroup(int group, const Vote& vote);
+  void addPairOfGroup(int group, const TileVote& vote);
 
   bool cameras_first_;
   int slots_;
@@ -79,7 +85,8 @@ class PlaneFusion {
   FusionAccumulator inner_;
   FusionAccumulator outer_;
   std::vector<FusionAccumulator> cameras_;
-  PlaneValues sum_;  // of several groups
+  bool pairs_;       // whether a group is a pair, zero where either is
+  PlaneValues sum_;  // of several groups, or of pairs
   std::vector<PlaneValues> camera_sums_;
 };
 

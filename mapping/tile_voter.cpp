@@ -8,16 +8,15 @@ namespace efm {
 namespace {
 
 constexpr int kStride = kernels::kTileCells;
+/// Up to so many rays per pixel it pays to look for empty cells.
+constexpr double kMostSparse = 1;
 
 int roundDown(int value, int unit) { return value / unit * unit; }
 
 }  // namespace
 
-TileVoter::TileVoter(const kernels::TileFunctions& functions)
-    : functions_(functions),
-      // Vectors read past the last row; what adds nothing may do so up to a tile from the first
-      // cell inside the view.
-      cells_(static_cast<std::size_t>((kStride + 2) * kStride), 0) {}
+TileVoter::TileVoter(VotingKernel kernel)
+    : functions_(kernels::tileFunctions(kernel)), votes_{TileVotes(kernel), TileVotes(kernel)} {}
 
 void TileVoter::moveTo(const cv::Rect& tile, const ReferenceView& view) {
   assert(tile.width <= kTilePixels && tile.height <= kTilePixels);
@@ -37,20 +36,33 @@ cv::Point TileVoter::origin() const {
           roundDown(inside_.y, kernels::kSharedOrigin)};
 }
 
-std::uint64_t TileVoter::vote(TileRays& rays, double to_plane, float* density) {
-  if (rays.size() == 0 || inside_.empty()) {
-    std::fill_n(density, tile_.area(), 0.0F);
-    return 0;
-  }
+const kernels::FullCell* TileVoter::cast(TileRays& rays, double to_plane, TileVotes& votes) {
   full_.resize(std::max(full_.size(), rays.size() / kernels::kVotesPerCell + 1));
+  if (rays.size() == 0 || inside_.empty()) return full_.data();
   const cv::Point corner = inside_.tl() - origin();
-  const kernels::FullCell* full_end = functions_.vote(
+  return functions_.vote(
       rays.view(), static_cast<float>(to_plane),
-      {cells_.data() + first_inside_, corner.x, corner.y, static_cast<std::uint32_t>(inside_.width),
+      {votes.cells(), first_inside_, corner.x, corner.y, static_cast<std::uint32_t>(inside_.width),
        static_cast<std::uint32_t>(inside_.height)},
       full_.data());
-  const std::uint64_t votes = functions_.fold(cells_.data(), tile_.width, tile_.height, density);
-  return votes + addFullCells(full_end, density);
+}
+
+std::uint64_t TileVoter::vote(TileRays& rays, double to_plane, float* density) {
+  TileDensity all{density};
+  return vote(rays, to_plane, all);
+}
+
+std::uint64_t TileVoter::vote(TileRays& rays, double to_plane, TileDensity& density) {
+  TileVotes& votes = votes_[votes_[0].waiting() ? 1 : 0];
+  assert(!votes.waiting());
+  const kernels::FullCell* full_end = cast(rays, to_plane, votes);
+  const bool sparse = static_cast<double>(rays.size()) <= kMostSparse * tile_.area();
+  if (density.may_wait && sparse && full_end == full_.data()) {
+    density.waiting = &votes;
+    return votes.find(tile_.size());
+  }
+  const std::uint64_t folded = votes.foldAll(tile_.size(), density.values);
+  return folded + addFullCells(full_end, density.values);
 }
 
 /// The four weights of a full cell's votes, from their sums of 1, a, b and ab.
@@ -64,7 +76,7 @@ std::uint64_t TileVoter::addFullCells(const kernels::FullCell* end, float* densi
     const float b = kFraction * static_cast<float>(sums.b);
     const float ab = kProduct * static_cast<float>(sums.ab);
     const auto number = static_cast<float>(sums.votes);
-    const std::uint32_t place = first_inside_ + cell->index;
+    const std::uint32_t place = cell->index;
     // Of the pixel to the lower right.
     const int x = static_cast<int>(place) % kStride;
     const int y = static_cast<int>(place) / kStride;

@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <opencv2/core/types.hpp>
 #include <vector>
 
 #include "mapping/kernels/tile_vote.h"
-#include "mapping/plane_values.h"
 #include "mapping/reference_view.h"
 #include "mapping/tile_rays.h"
+#include "mapping/tile_votes.h"
+#include "mapping/voting_kernel.h"
 
 namespace efm {
 
 /// Votes on one tile of the view, plane by plane. One per thread.
 class TileVoter {
  public:
-  explicit TileVoter(const kernels::TileFunctions& functions);
+  /// @param kernel one of `runnableKernels`, but not the plain one.
+  explicit TileVoter(VotingKernel kernel);
 
   /// Turns to a tile of at most `kTilePixels` on a side.
   void moveTo(const cv::Rect& tile, const ReferenceView& view);
@@ -33,16 +36,20 @@ class TileVoter {
   /// @return the votes of the cells whose upper left pixel lies in the tile: over all tiles, those
   /// of all cells.
   std::uint64_t vote(TileRays& rays, double to_plane, float* density);
+  /// The same; votes of few rays wait where they may.
+  std::uint64_t vote(TileRays& rays, double to_plane, TileDensity& density);
 
  private:
+  /// Casts the votes. @return one past the last full cell.
+  const kernels::FullCell* cast(TileRays& rays, double to_plane, TileVotes& votes);
   std::uint64_t addFullCells(const kernels::FullCell* end, float* density) const;
 
   const kernels::TileFunctions& functions_;
-  PixelValues<std::uint64_t> cells_;
+  std::array<TileVotes, 2> votes_;  // one of them may wait while another input votes
   std::vector<kernels::FullCell> full_;
   cv::Rect tile_;
   cv::Rect inside_;                 // the tile's cells that are inside the view
-  std::uint32_t first_inside_ = 0;  // the first of them in cells_
+  std::uint32_t first_inside_ = 0;  // which cell of the tile is the first of them
 };
 
 }  // namespace efm

@@ -136,7 +136,7 @@ class TiledSweep {
 
   Workplace newWorkplace() const {
     const TileFinds finds(planes_, request_.ray_window);
-    return {TileVoter(kernels::tileFunctions(kernel_)), std::vector<TileRays>(rays_.inputs()),
+    return {TileVoter(kernel_), std::vector<TileRays>(rays_.inputs()),
             std::vector<std::uint64_t>(static_cast<std::size_t>(cameras_)), finds,
             std::vector<TileFinds>(seenAlone(), finds)};
   }
@@ -167,9 +167,9 @@ class TiledSweep {
   }
 
   void sweepPlane(int plane, const cv::Rect& tile, PlaneFusion& fusion, Workplace& workplace) {
-    const PlaneValues& fused = fusion.fuse([&](int camera, int slot, PlaneValues& density) {
+    const PlaneValues& fused = fusion.fuse([&](int camera, int slot, TileDensity& density) {
       workplace.votes[static_cast<std::size_t>(camera)] += workplace.voter.vote(
-          workplace.rays[rays_.inputOf(camera, slot)], rays_.fromHome(plane), density.data());
+          workplace.rays[rays_.inputOf(camera, slot)], rays_.fromHome(plane), density);
     });
     workplace.fused.take(plane, fused);
     for (std::size_t c = 0; c < workplace.cameras.size(); ++c) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/kernels/fusion.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <limits>
 
 #include "mapping/kernels/highway_targets.h"
@@ -171,9 +173,41 @@ void pair(float* values, const float* others, std::size_t n) {
   pairBy<Rule>(One(), done, n, values, others);
 }
 
+/// @param within which lanes to add to.
+template <class Rule, class D>
+HWY_INLINE void addPairAt(D d, hn::Mask<D> within, float* sum, const float* values,
+                          const float* others) {
+  const auto mean = Rule::pair(d, hn::LoadU(d, values), hn::LoadU(d, others));
+  const auto before = hn::LoadU(d, sum);
+  hn::StoreU(hn::IfThenElse(within, hn::Add(before, mean), before), d, sum);
+}
+
+template <class Rule>
+void addPair(float* sum, const float* values, const float* others, const PixelBlocks& blocks) {
+  const auto end = static_cast<std::size_t>(blocks.width * blocks.height);
+  const auto width = static_cast<std::size_t>(blocks.width);
+  for (std::size_t block = 0; block < blocks.size; ++block) {
+    const std::size_t first = blocks.blocks[block] % kBlocksInRow * kBlockPixels;
+    const std::size_t row = blocks.blocks[block] / kBlocksInRow * width;
+    const std::size_t last = std::min(first + kBlockPixels, width);
+    const Wide wide;
+    const One one;
+    for (std::size_t x = first; x < last; x += hn::Lanes(wide)) {
+      std::size_t i = row + x;
+      if (i + hn::Lanes(wide) <= end) {
+        addPairAt<Rule>(wide, hn::FirstN(wide, last - x), sum + i, values + i, others + i);
+      } else {
+        for (; i < row + last; ++i) {
+          addPairAt<Rule>(one, hn::FirstN(one, 1), sum + i, values + i, others + i);
+        }
+      }
+    }
+  }
+}
+
 template <class Rule>
 constexpr FusionSteps steps() {
-  return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>};
+  return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>, addPair<Rule>};
 }
 
 constexpr FusionFunctions kFusion = {steps<Min>(),        steps<Harmonic>(), steps<Geometric>(),

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "mapping/kernels/instruction_set.h"
+#include "mapping/kernels/tile_pixels.h"
 
 namespace efm::kernels {
 
@@ -17,6 +18,10 @@ struct FusionSteps {
   void (*finish)(float* sum, float inputs, std::size_t n) = nullptr;
   /// The mean of two inputs, in place of the first: the same without a sum in between.
   void (*pair)(float* values, const float* others, std::size_t n) = nullptr;
+  /// Adds the mean of two inputs to a sum in some blocks of a tile; no pixel that lies outside them
+  /// is touched.
+  void (*addPair)(float* sum, const float* values, const float* others,
+                  const PixelBlocks& blocks) = nullptr;
 };
 
 struct FusionFunctions {

@@ -79,8 +79,20 @@ void pair(float* values, const float* others, std::size_t n) {
 }
 
 template <typename Rule>
+void addPair(float* sum, const float* values, const float* others, const PixelBlocks& blocks) {
+  for (std::size_t block = 0; block < blocks.size; ++block) {
+    const auto row = static_cast<int>(blocks.blocks[block]) / kBlocksInRow;
+    const auto first = static_cast<int>(blocks.blocks[block]) % kBlocksInRow * kBlockPixels;
+    for (int x = first; x < std::min(first + kBlockPixels, blocks.width); ++x) {
+      const auto i = static_cast<std::size_t>(row * blocks.width + x);
+      sum[i] += Rule::pair(values[i], others[i]);
+    }
+  }
+}
+
+template <typename Rule>
 constexpr FusionSteps steps() {
-  return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>};
+  return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>, addPair<Rule>};
 }
 
 }  // namespace

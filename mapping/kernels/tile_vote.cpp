@@ -2,7 +2,6 @@
 #include "mapping/kernels/tile_vote.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "mapping/kernels/highway_targets.h"
 
@@ -143,7 +142,8 @@ class VoteEncoder {
         left_(hn::Set(Unsigned(), bitsAt(window.left))),
         top_(hn::Set(Unsigned(), bitsAt(window.top))),
         width_(hn::Set(Unsigned(), window.columns << kFractionBits)),
-        height_(hn::Set(Unsigned(), window.rows << kFractionBits)) {}
+        height_(hn::Set(Unsigned(), window.rows << kFractionBits)),
+        first_(hn::Set(Unsigned(), window.first)) {}
 
   HWY_INLINE void encode(std::size_t ray, std::uint32_t* index, std::uint64_t* sums) const {
     const Unsigned du;
@@ -155,7 +155,7 @@ class VoteEncoder {
                                            hn::ShiftRight<kFractionBits>(x)),
                                    hn::Set(du, kTileCells * kTileCells - 1));
     static_assert(kTileCells == 1 << 6);
-    hn::Store(cell, du, index);
+    hn::Store(hn::Add(cell, first_), du, index);
     const UnsignedV fraction_mask = hn::Set(du, kFractionMask);
     const UnsignedV a = hn::And(x, fraction_mask);
     const UnsignedV b = hn::And(y, fraction_mask);
@@ -178,12 +178,14 @@ class VoteEncoder {
 
   TileRays rays_;
   FloatV to_plane_;
-  UnsignedV left_, top_, width_, height_;
+  UnsignedV left_, top_, width_, height_, first_;
 };
 
 /// Adds a batch's votes to their cells.
-HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, std::uint64_t* cells,
+HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const MarkedCells& tile,
                              FullCell* full) {
+  std::uint64_t* const cells = tile.cells;
+  std::uint8_t* const marks = tile.marks;
   constexpr std::size_t kLanes = hn::MaxLanes(Floats());
   for (std::size_t i = 0; i < count; i += kLanes) {
 #pragma GCC unroll 16
@@ -192,6 +194,7 @@ HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, std::uin
       const std::uint32_t index = batch.index[vote];
       const std::uint64_t sums = batch.sums[i + k] + cells[index];
       cells[index] = sums;
+      marks[index / kLineCells] = 1;
       if (HWY_UNLIKELY(static_cast<std::int64_t>(sums) < 0)) {
         *full++ = {index, sums};
         cells[index] = 0;
@@ -212,90 +215,12 @@ FullCell* vote(const TileRays& rays, float to_plane, const CellWindow& window, F
     for (std::size_t i = 0; i < size; i += lanes) {
       encoder.encode(begin + i, batch.index + i, batch.sums + i);
     }
-    full = scatter(batch, size, window.cells, full);
+    full = scatter(batch, size, window.tile, full);
   }
   return full;
 }
 
-// ---------------------------------------------------------------- folding
-
-/// `CellSums` of as many cells as a vector has lanes, a and b in the units of ab.
-struct CellSumsV {
-  UnsignedV a, b, ab, votes;
-};
-
-HWY_INLINE CellSumsV unpackVector(const std::uint64_t* cells) {
-  const Unsigned d;
-#if HWY_TARGET == HWY_SCALAR
-  const UnsignedV lower = hn::Set(d, static_cast<std::uint32_t>(*cells));
-  const UnsignedV upper = hn::Set(d, static_cast<std::uint32_t>(*cells >> 32));
-#else
-  const hn::Repartition<std::uint64_t, Unsigned> d64;
-  const UnsignedV first = hn::BitCast(d, hn::LoadU(d64, cells));
-  const UnsignedV second = hn::BitCast(d, hn::LoadU(d64, cells + hn::Lanes(d64)));
-  const UnsignedV lower = hn::ConcatEven(d, second, first);
-  const UnsignedV upper = hn::ConcatOdd(d, second, first);
-#endif
-  constexpr int kUp = kProductBits - kFractionBits;
-  const UnsignedV sum_mask = hn::Set(d, kSumMask);
-  const UnsignedV b = hn::Or(hn::ShiftRight<kSumBits>(lower), hn::ShiftLeft<32 - kSumBits>(upper));
-  return {hn::ShiftLeft<kUp>(hn::And(lower, sum_mask)), hn::ShiftLeft<kUp>(hn::And(b, sum_mask)),
-          hn::And(hn::ShiftRight<kProductShift>(upper), hn::Set(d, kProductMask)),
-          hn::ShiftRight<kCountShift>(upper)};
-}
-
-HWY_INLINE void clearRow(std::uint64_t* cells) {
-  const hn::ScalableTag<std::uint64_t> d;
-  for (int x = 0; x < kTileCells; x += static_cast<int>(hn::Lanes(d))) {
-    hn::Store(hn::Zero(d), d, cells + x);
-  }
-}
-
-std::uint64_t fold(std::uint64_t* cells, int width, int height, float* values) {
-  const Floats d;
-  const Unsigned du;
-  const Signed di;
-  const int lanes = static_cast<int>(hn::Lanes(d));
-  const FloatV unit = hn::Set(d, 1.0F / (1 << kProductBits));
-  // What the row of cells above adds to a pixel row.
-  HWY_ALIGN std::uint32_t from_above[kTileCells] = {};
-  HWY_ALIGN float tail[kTileCells];
-  const float* end = values + static_cast<std::ptrdiff_t>(width) * height;
-  UnsignedV votes = hn::Zero(du);
-  for (int row = 0; row <= height; ++row) {
-    std::uint64_t* left = cells + static_cast<std::ptrdiff_t>(row) * kTileCells;
-    for (int x = 0; x < width; x += lanes) {
-      const CellSumsV west = unpackVector(left + x);
-      const CellSumsV east = unpackVector(left + x + 1);
-      const auto within = hn::FirstN(du, static_cast<std::size_t>(width - x));
-      // Of the cells to the lower right and left of a pixel, then of those above it.
-      const UnsignedV both_rows =
-          hn::Add(hn::Sub(hn::ShiftLeft<kProductBits>(east.votes), east.a), west.a);
-      const UnsignedV to_below = hn::Add(hn::Sub(east.b, east.ab), west.ab);
-      const UnsignedV above = hn::Load(du, from_above + x);
-      hn::Store(to_below, du, from_above + x);
-      if (row == 0) continue;
-      votes = hn::Add(votes, hn::IfThenElseZero(within, east.votes));
-      // Rounded products can leave less than nothing.
-      const auto density =
-          hn::Max(hn::BitCast(di, hn::Add(hn::Sub(both_rows, to_below), above)), hn::Zero(di));
-      const FloatV value = hn::Mul(hn::ConvertTo(d, density), unit);
-      float* pixels = values + static_cast<std::ptrdiff_t>(row - 1) * width + x;
-      if (pixels + lanes <= end) {
-        hn::StoreU(value, d, pixels);  // what is written beyond this row is written again
-      } else {
-        hn::Store(value, d, tail);
-        std::copy(tail, tail + std::min<std::ptrdiff_t>(lanes, end - pixels), pixels);
-      }
-    }
-    clearRow(left);
-  }
-  HWY_ALIGN std::uint32_t lanes_votes[kTileCells];
-  hn::Store(votes, du, lanes_votes);
-  return std::accumulate(lanes_votes, lanes_votes + lanes, std::uint64_t{0});
-}
-
-constexpr TileFunctions kTile = {gather, vote, fold};
+constexpr TileFunctions kTile = {gather, vote};
 
 }  // namespace efm::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "mapping/kernels/instruction_set.h"
+#include "mapping/kernels/tile_pixels.h"
 
 namespace efm::kernels {
 
@@ -13,7 +14,7 @@ namespace efm::kernels {
 // A vote falls into the cell between four pixels: cell (x, y) is the square from pixel (x, y) to
 // (x + 1, y + 1). Its four bilinear weights are linear in 1, a, b and ab, where (a, b) is the place
 // in the cell. A cell therefore sums these four, packed into 64 bits, and a vote is one addition;
-// the weights of all votes are worked out once per cell and plane:
+// the weights of all votes are worked out once per cell and plane (`tile_fold.h`):
 //
 //   bits  0 to 17: sum of a, in 1/4096        bits 36 to 56: sum of ab, in 1/32,768
 //   bits 18 to 35: sum of b, in 1/4096        bits 57 to 63: number of votes
@@ -21,7 +22,6 @@ namespace efm::kernels {
 // The number reaches the top bit with the 64th vote, when no sum can have left its field yet: a
 // cell whose sign changes is full. It is put aside and begins anew.
 
-inline constexpr int kTileCells = 64;     ///< Cells on a side of a tile at most; a row's stride.
 inline constexpr int kFractionBits = 12;  ///< Of a coordinate within its cell.
 inline constexpr int kProductBits = 15;   ///< Of the product of two.
 inline constexpr int kVotesPerCell = 64;  ///< After so many a cell is full.
@@ -85,16 +85,28 @@ struct TileRays {
   std::size_t size = 0;
 };
 
+/// A line of cells, eight of a row, begins on a cache line and has a mark.
+inline constexpr int kLineCells = 8;
+inline constexpr int kMarks = kTileCells * (kTileCells + 2) / kLineCells;
+
+/// A tile's cells in rows of kTileCells, with two rows more than votes may fall into.
+struct MarkedCells {
+  std::uint64_t* cells = nullptr;
+  /// Not zero for each line that votes may have fallen into: kMarks and the padding of rays.
+  std::uint8_t* marks = nullptr;
+};
+
 /// The cells of a tile that votes may fall into.
 struct CellWindow {
-  std::uint64_t* cells = nullptr;  ///< The first of them; rows are kTileCells apart.
+  MarkedCells tile;
+  std::uint32_t first = 0;         ///< Which of the tile's cells is the window's first.
   std::int32_t left = 0, top = 0;  ///< Its place, counted as the rays' coordinates are.
   std::uint32_t columns = 0, rows = 0;
 };
 
 /// A full cell that was put aside.
 struct FullCell {
-  std::uint32_t index = 0;  ///< From the window's first cell.
+  std::uint32_t index = 0;  ///< Of the tile's cells.
   std::uint64_t sums = 0;
 };
 
@@ -108,10 +120,6 @@ struct TileFunctions {
   /// aside.
   FullCell* (*vote)(const TileRays& rays, float to_plane, const CellWindow& window,
                     FullCell* full) = nullptr;
-  /// Works out the ray density of the pixels right of and below the first cells, and clears the
-  /// cells. @param values width x height, row-major. @return the votes of the cells right of and
-  /// below the first ones.
-  std::uint64_t (*fold)(std::uint64_t* cells, int width, int height, float* values) = nullptr;
 };
 
 /// @param kernel one of `runnableKernels`, but not the plain one, which needs no tiles.

@@ -64,7 +64,7 @@ void voteYardstick(benchmark::State& state, const SweepInput& input) {
 /// where the rays go is there beforehand: they lie in bins.
 void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
   const BinnedRays rays(input.cameras, input.view, input.planes);
-  TileVoter voter(kernels::tileFunctions(kernel));
+  TileVoter voter(kernel);
   TileRays gathered;
   std::vector<float> density(TileVoter::kTilePixels * TileVoter::kTilePixels);
   const std::vector<cv::Rect> tiles = tilesOf(input.view, TileVoter::kTilePixels);

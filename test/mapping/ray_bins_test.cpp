@@ -101,7 +101,7 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
     const bool on_all_planes =
         std::all_of(all.begin(), all.end(), [](const RayBins& bins) { return bins.onAllPlanes(); });
     if (!on_all_planes) planes_per_group = 1;
-    TileVoter voter(functions_);
+    TileVoter voter(GetParam());
     for (int begin = 0; begin < planes.size(); begin += planes_per_group) {
       const int end = std::min(planes.size(), begin + planes_per_group);
       const PlaneGroup group{begin, end, planes.depth(begin), planes.depth(end - 1)};

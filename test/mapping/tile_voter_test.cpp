@@ -54,7 +54,7 @@ TileVotes voteWith(TileVoter& voter, const cv::Rect& tile, const Points& points)
 
 /// The whole view, tile by tile.
 TileVotes voteOnView(VotingKernel kernel, const Points& points) {
-  TileVoter voter(kernels::tileFunctions(kernel));
+  TileVoter voter(kernel);
   TileVotes all{std::vector<float>(kView.pixels(), -1.0F), 0};
   for (const cv::Rect& tile : tilesOf(kView, TileVoter::kTilePixels)) {
     const TileVotes part = voteWith(voter, tile, points);
@@ -175,7 +175,7 @@ TEST_P(TileVoterOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
         }
       }
     }
-    TileVoter voter(kernels::tileFunctions(GetParam()));
+    TileVoter voter(GetParam());
     const TileVotes votes = voteWith(voter, tile, points);
     EXPECT_EQ(votes.votes, std::uint64_t{kVotes} * 63 * 63);
     // The four weights around a pixel are those of one vote, whatever the fraction.
@@ -230,7 +230,7 @@ TEST_P(TileVoterOn, ARayThatIsNowhereNearOrNoNumberVotesNowhere) {
 }
 
 TEST_P(TileVoterOn, RaysMoveAlongTheirShiftToThePlane) {
-  TileVoter voter(kernels::tileFunctions(GetParam()));
+  TileVoter voter(GetParam());
   const cv::Rect tile(0, 0, 50, 43);
   voter.moveTo(tile, kView);
   TileRays rays = raysAt({{10, 10}}, voter.origin());
@@ -246,7 +246,7 @@ TEST_P(TileVoterOn, RaysMoveAlongTheirShiftToThePlane) {
 }
 
 TEST_P(TileVoterOn, NothingIsLeftOfEarlierTilesAndPlanes) {
-  TileVoter used(kernels::tileFunctions(GetParam()));
+  TileVoter used(GetParam());
   const cv::Rect large(0, 0, 63, 63);
   for (const cv::Rect tile : {large, cv::Rect(100, 100, 1, 1), cv::Rect(149, 0, 1, 63),
                               cv::Rect(60, 129, 17, 1), cv::Rect(148, 128, 2, 2), large}) {
@@ -259,7 +259,7 @@ TEST_P(TileVoterOn, NothingIsLeftOfEarlierTilesAndPlanes) {
     voteWith(used, tile, full);
     const Points few = {
         {1.0 * tile.x, 1.0 * tile.y}, {tile.x + 0.5, tile.y + 0.25}, {tile.x - 0.5, tile.y - 0.5}};
-    TileVoter unused(kernels::tileFunctions(GetParam()));
+    TileVoter unused(GetParam());
     const TileVotes after = voteWith(used, tile, few);
     const TileVotes alone = voteWith(unused, tile, few);
     EXPECT_EQ(after.votes, alone.votes) << "tile " << tile.x << ", " << tile.y;
