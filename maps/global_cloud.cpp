@@ -2,6 +2,7 @@
 #include "maps/global_cloud.h"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -21,6 +22,24 @@ namespace {
   throw std::invalid_argument(message.str());
 }
 
+constexpr unsigned kReachBits = GlobalCloud::kReach;
+
+/// The bit that stands for a keyframe in what is kept of another's voxels: the numbers below that
+/// one's, from the lowest, then those above.
+unsigned bitOf(std::uint64_t judge, std::uint64_t judged) {
+  return judge < judged ? kReachBits - static_cast<unsigned>(judged - judge)
+                        : kReachBits - 1 + static_cast<unsigned>(judge - judged);
+}
+
+/// The keyframes that the bits of one's voxel stand for.
+void appendNumbers(unsigned bits, std::uint64_t judged, std::vector<std::uint64_t>& numbers) {
+  for (unsigned bit = 0; bit < 2 * kReachBits; ++bit) {
+    if ((bits >> bit & 1U) == 0) continue;
+    numbers.push_back(bit < kReachBits ? judged - (kReachBits - bit)
+                                       : judged + (bit - kReachBits + 1));
+  }
+}
+
 }  // namespace
 
 void GlobalCloudOptions::validate() const {
@@ -28,6 +47,7 @@ void GlobalCloudOptions::validate() const {
                 "from 1e-6 to 1000 (metres)");
   requireOption(min_keyframes >= 1, "min_keyframes", min_keyframes, "at least 1");
   outliers.validate();
+  consistency.validate();
 }
 
 bool GlobalCloud::VoxelIndex::operator<(const VoxelIndex& o) const {
@@ -50,14 +70,28 @@ GlobalCloud::GlobalCloud(const GlobalCloudOptions& options) : options_(options) 
   options_.validate();
 }
 
-void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points) {
+void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
+                         const std::optional<Rigid3>& T_world_ref) {
   if (keyframes_.count(keyframe) != 0) {
     throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is in the map already");
   }
   const std::vector<CloudPoint> inliers = removeOutliers(points, options_.outliers);
+  Keyframe inserted;
+  inserted.voxels = voxelsOf(inliers);
+  const bool consistent = options_.consistency.consistency != Consistency::kNone;
+  if (consistent) inserted.verdicts.resize(inserted.voxels.size());
+  if (consistent && T_world_ref) {
+    inserted.sight.emplace(inliers, *T_world_ref, options_.consistency);
+  }
+  keyframes_.emplace(keyframe, std::move(inserted));
+  if (consistent) compareWithOthers(keyframe);
+}
+
+/// One sum per voxel, sorted.
+std::vector<GlobalCloud::Sums> GlobalCloud::voxelsOf(const std::vector<CloudPoint>& points) const {
   std::vector<PlacedPoint> placed;
-  placed.reserve(inliers.size());
-  for (const CloudPoint& point : inliers) placed.push_back(place(point));
+  placed.reserve(points.size());
+  for (const CloudPoint& point : points) placed.push_back(place(point));
   // Stable: within a voxel, points are summed in the order in which they came.
   std::stable_sort(placed.begin(), placed.end(),
                    [](const PlacedPoint& a, const PlacedPoint& b) { return a.index < b.index; });
@@ -68,13 +102,59 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
     voxels.back().add(point);
   }
   voxels.shrink_to_fit();
-  keyframes_.emplace(keyframe, std::move(voxels));
+  return voxels;
+}
+
+/// visit(number, keyframe) for those that a keyframe of this number is compared with.
+template <typename Visit>
+void GlobalCloud::visitWithinReach(std::uint64_t number, const Visit& visit) {
+  constexpr std::uint64_t kFar = kReach;
+  auto other = keyframes_.lower_bound(number < kFar ? 0 : number - kFar);
+  for (; other != keyframes_.end(); ++other) {
+    if (other->first > number && other->first - number > kFar) break;
+    if (other->first != number) visit(other->first, other->second);
+  }
+}
+
+void GlobalCloud::judge(Keyframe& judged, const Keyframe& by, unsigned bit) const {
+  if (!by.sight) return;
+  for (std::size_t i = 0; i < judged.voxels.size(); ++i) {
+    const Verdict verdict = by.sight->verdictOn(positionOf(judged.voxels[i]));
+    if (verdict == Verdict::kNothing) continue;
+    Verdicts& verdicts = judged.verdicts[i];
+    std::uint16_t& bits =
+        verdict == Verdict::kSupports ? verdicts.supports : verdicts.looks_through;
+    bits = static_cast<std::uint16_t>(bits | 1U << bit);
+  }
+}
+
+void GlobalCloud::compareWithOthers(std::uint64_t number) {
+  Keyframe& keyframe = keyframes_.at(number);
+  visitWithinReach(number, [&](std::uint64_t other, Keyframe& within_reach) {
+    judge(keyframe, within_reach, bitOf(other, number));
+    judge(within_reach, keyframe, bitOf(number, other));
+  });
 }
 
 void GlobalCloud::remove(std::uint64_t keyframe) {
   if (keyframes_.erase(keyframe) == 0) {
     throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is not in the map");
   }
+  visitWithinReach(keyframe, [&](std::uint64_t other, Keyframe& within_reach) {
+    const unsigned bits_left = ~(1U << bitOf(keyframe, other));
+    for (Verdicts& verdicts : within_reach.verdicts) {
+      verdicts.supports = static_cast<std::uint16_t>(verdicts.supports & bits_left);
+      verdicts.looks_through = static_cast<std::uint16_t>(verdicts.looks_through & bits_left);
+    }
+  });
+}
+
+bool GlobalCloud::leftOut(const Keyframe& keyframe, std::size_t voxel) const {
+  if (options_.consistency.consistency != Consistency::kVisibility) return false;
+  const Verdicts& verdicts = keyframe.verdicts[voxel];
+  const auto looks_through = std::bitset<16>(verdicts.looks_through).count();
+  return verdicts.supports == 0 &&
+         looks_through > static_cast<std::size_t>(options_.consistency.max_contradictions);
 }
 
 /// Merges the keyframes' sorted voxels: visit(total, support), in the order of voxels. Within a
@@ -82,36 +162,47 @@ void GlobalCloud::remove(std::uint64_t keyframe) {
 template <typename Visit>
 void GlobalCloud::visitVoxels(const Visit& visit) const {
   struct Run {
-    const Sums* next;
-    const Sums* end;
-    std::size_t rank;  // in the order of keyframe numbers
+    const Keyframe* keyframe;
+    std::uint64_t number;
+    std::size_t next;
+
+    const VoxelIndex& index() const { return keyframe->voxels[next].index; }
   };
   const auto comes_later = [](const Run& a, const Run& b) {
-    if (b.next->index < a.next->index) return true;
-    return a.next->index == b.next->index && b.rank < a.rank;
+    if (b.index() < a.index()) return true;
+    return a.index() == b.index() && b.number < a.number;
   };
   std::vector<Run> runs;
-  for (const auto& [number, voxels] : keyframes_) {
-    if (voxels.empty()) continue;
-    runs.push_back({voxels.data(), voxels.data() + voxels.size(), runs.size()});
+  for (const auto& [number, keyframe] : keyframes_) {
+    if (!keyframe.voxels.empty()) runs.push_back({&keyframe, number, 0});
   }
   std::make_heap(runs.begin(), runs.end(), comes_later);
 
+  std::vector<std::uint64_t> supporting;  // numbers of keyframes
   while (!runs.empty()) {
     Sums total;
-    total.index = runs.front().next->index;
-    std::uint32_t support = 0;
-    while (!runs.empty() && runs.front().next->index == total.index) {
+    total.index = runs.front().index();
+    supporting.clear();
+    while (!runs.empty() && runs.front().index() == total.index) {
       std::pop_heap(runs.begin(), runs.end(), comes_later);
-      total.add(*runs.back().next);
-      ++support;
-      if (++runs.back().next == runs.back().end) {
+      Run& run = runs.back();
+      if (!leftOut(*run.keyframe, run.next)) {
+        total.add(run.keyframe->voxels[run.next]);
+        supporting.push_back(run.number);
+        if (!run.keyframe->verdicts.empty()) {
+          appendNumbers(run.keyframe->verdicts[run.next].supports, run.number, supporting);
+        }
+      }
+      if (++run.next == run.keyframe->voxels.size()) {
         runs.pop_back();
       } else {
         std::push_heap(runs.begin(), runs.end(), comes_later);
       }
     }
-    visit(total, support);
+    if (supporting.empty()) continue;
+    std::sort(supporting.begin(), supporting.end());
+    const auto end = std::unique(supporting.begin(), supporting.end());
+    visit(total, static_cast<std::uint32_t>(end - supporting.begin()));
   }
 }
 
@@ -147,13 +238,17 @@ GlobalCloud::PlacedPoint GlobalCloud::place(const CloudPoint& point) const {
           static_cast<double>(point.confidence)};
 }
 
-CloudPoint GlobalCloud::pointOf(const Sums& total, std::uint32_t support) const {
+Eigen::Vector3d GlobalCloud::positionOf(const Sums& sums) const {
   const Eigen::Vector3d corner =
-      Eigen::Vector3d(static_cast<double>(total.index.x), static_cast<double>(total.index.y),
-                      static_cast<double>(total.index.z)) *
+      Eigen::Vector3d(static_cast<double>(sums.index.x), static_cast<double>(sums.index.y),
+                      static_cast<double>(sums.index.z)) *
       options_.voxel_size_m;
-  return {corner + total.weighted_offset / total.weight,
-          static_cast<float>(total.weight / static_cast<double>(total.count)), support};
+  return corner + sums.weighted_offset / sums.weight;
+}
+
+CloudPoint GlobalCloud::pointOf(const Sums& total, std::uint32_t support) const {
+  return {positionOf(total), static_cast<float>(total.weight / static_cast<double>(total.count)),
+          support};
 }
 
 }  // namespace efm

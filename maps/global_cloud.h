@@ -5,9 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
+#include "mapping/rigid3.h"
 #include "maps/cloud_point.h"
+#include "maps/keyframe_consistency.h"
+#include "maps/keyframe_sight.h"
 #include "maps/outlier_removal.h"
 
 namespace efm {
@@ -20,6 +24,8 @@ struct GlobalCloudOptions {
   int min_keyframes = 1;
   /// What of each keyframe stays outside.
   OutlierRemovalOptions outliers = {};
+  /// What keyframes say of each other's points.
+  ConsistencyOptions consistency = {};
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
@@ -29,9 +35,17 @@ struct GlobalCloudOptions {
 ///
 /// Each keyframe keeps apart the sums that it puts into its voxels, and totals are formed only when
 /// points are asked for: a voxel's point is the mean position of all its points weighted by their
-/// confidence, its confidence their mean, its support the number of keyframes. So neither inserting
-/// nor removing a keyframe touches what the others put there, and neither costs more in a larger
-/// map. Totals are formed in the order of keyframe numbers: the map depends on what is in it, not
+/// confidence, its confidence their mean, its support the number of keyframes that have a point in
+/// it or support one that has. So neither inserting nor removing a keyframe touches what the others
+/// put there, and neither costs more in a larger map.
+///
+/// A keyframe that is inserted with its pose is compared with those whose numbers are at most
+/// `kReach` from its own, each with the other's points (KeyframeSight). What they say is kept in
+/// two bits per voxel of a keyframe and other keyframe, set when the later of the two comes and
+/// cleared when one goes. By these bits keyframes support each other, and what others look through
+/// and none supports is left out.
+///
+/// Totals are formed in the order of keyframe numbers: the map depends on what is in it, not
 /// on the order in which that came and what has left, bit for bit.
 ///
 /// Voxel (i, j, k) holds [i, i + 1) x [j, j + 1) x [k, k + 1) times the voxel size; indices are 64
@@ -41,18 +55,24 @@ class GlobalCloud {
   /// @throws std::invalid_argument where the options are not valid.
   explicit GlobalCloud(const GlobalCloudOptions& options = {});
 
+  /// Keyframes whose numbers differ by more are not compared with each other.
+  static constexpr int kReach = 8;
+
   /// Puts a keyframe's points into the map, less the outliers among them: `removeOutliers` with
-  /// this map's options sees the keyframe alone. Cost: that of sorting the points, whatever the
-  /// size of the map.
+  /// this map's options sees the keyframe alone. Cost: that of sorting the points and of comparing
+  /// them with at most 2 `kReach` others, whatever the size of the map.
   /// @param keyframe its number, by which it can be removed; in the map once.
+  /// @param T_world_ref pose of the view that saw the points; without it the keyframe says nothing
+  /// of other keyframes' points, but they of its.
   /// @throws std::invalid_argument where the number is in the map, a point is not finite, or one
   /// that is no outlier has no confidence above 0 or lies outside the range of voxel indices:
   /// nothing is inserted then.
-  void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points);
+  void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
+              const std::optional<Rigid3>& T_world_ref = std::nullopt);
 
   /// Takes a keyframe out: the map is as if it had never been inserted, its memory is given back,
   /// and its number is free for another insertion, of a refined keyframe for example. Cost: at most
-  /// that of its points.
+  /// that of its points and of those that it was compared with.
   /// @throws std::invalid_argument where the number is not in the map.
   void remove(std::uint64_t keyframe);
 
@@ -61,7 +81,7 @@ class GlobalCloud {
   std::vector<CloudPoint> points() const { return points(options_.min_keyframes); }
   std::vector<CloudPoint> points(int min_keyframes) const;
 
-  /// Occupied voxels. Costs about what `points` does.
+  /// Voxels with something that is not left out. Costs about what `points` does.
   std::size_t voxels() const;
   std::size_t keyframes() const { return keyframes_.size(); }
   const GlobalCloudOptions& options() const { return options_; }
@@ -89,13 +109,31 @@ class GlobalCloud {
     void add(const Sums& other);
   };
 
+  /// What others say of a keyframe's voxel: a bit for each number within reach, below and above.
+  struct Verdicts {
+    std::uint16_t supports = 0;
+    std::uint16_t looks_through = 0;
+  };
+  struct Keyframe {
+    std::vector<Sums> voxels;            // sorted
+    std::vector<Verdicts> verdicts;      // beside `voxels`; empty without consistency
+    std::optional<KeyframeSight> sight;  // with consistency, where the pose is known
+  };
+
   PlacedPoint place(const CloudPoint& point) const;
+  std::vector<Sums> voxelsOf(const std::vector<CloudPoint>& points) const;
+  Eigen::Vector3d positionOf(const Sums& sums) const;
   CloudPoint pointOf(const Sums& total, std::uint32_t support) const;
+  void judge(Keyframe& judged, const Keyframe& by, unsigned bit) const;
+  template <typename Visit>
+  void visitWithinReach(std::uint64_t number, const Visit& visit);
+  void compareWithOthers(std::uint64_t number);
+  bool leftOut(const Keyframe& keyframe, std::size_t voxel) const;
   template <typename Visit>
   void visitVoxels(const Visit& visit) const;
 
   GlobalCloudOptions options_;
-  std::map<std::uint64_t, std::vector<Sums>> keyframes_;  // by number; each sorted by voxel
+  std::map<std::uint64_t, Keyframe> keyframes_;  // by number
 };
 
 }  // namespace efm

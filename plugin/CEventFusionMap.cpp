@@ -36,6 +36,17 @@ void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::st
   }
 }
 
+/// Maps of version 0 did not know it: they stay what they were.
+void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
+                     ConsistencyOptions& options) {
+  options.consistency = Consistency::kNone;
+  if (version == 0) return;
+  std::string name;
+  in >> name >> options.consistency_tolerance >> options.consistency_cell_deg;
+  options.consistency = consistencyFromName(name);
+  options.max_contradictions = in.ReadAs<std::int32_t>();
+}
+
 }  // namespace
 
 using mrpt::maps::CPointsMapXYZI;
@@ -87,7 +98,7 @@ CEventFusionMap::CEventFusionMap(const GlobalCloudOptions& options) : cloud_(opt
 // --- In --------------------------------------------------------------------------------------
 
 void CEventFusionMap::insertKeyframe(const StoredKeyframe& keyframe) {
-  cloud_.insert(keyframes_.size(), worldPointsOf(keyframe));
+  cloud_.insert(keyframes_.size(), worldPointsOf(keyframe), keyframe.T_world_ref);
   keyframes_.push_back(keyframe);
   simple_points_.reset();
 }
@@ -123,7 +134,7 @@ double CEventFusionMap::internal_computeObservationLikelihood(
 
 // --- Stored ----------------------------------------------------------------------------------
 
-std::uint8_t CEventFusionMap::serializeGetVersion() const { return 0; }
+std::uint8_t CEventFusionMap::serializeGetVersion() const { return 1; }
 
 void CEventFusionMap::serializeTo(CArchive& out) const {
   const GlobalCloudOptions& options = cloud_.options();
@@ -131,6 +142,9 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
   out.WriteAs<std::int32_t>(options.min_keyframes);
   out << options.outliers.outlier_radius_m;
   out.WriteAs<std::int32_t>(options.outliers.outlier_min_neighbors);
+  out << std::string(nameOf(options.consistency.consistency))
+      << options.consistency.consistency_tolerance << options.consistency.consistency_cell_deg;
+  out.WriteAs<std::int32_t>(options.consistency.max_contradictions);
   out.WriteAs<std::uint32_t>(keyframes_.size());
   for (const StoredKeyframe& keyframe : keyframes_) {
     // Not as a pose of MRPT's, which would give the last digit another value.
@@ -142,15 +156,16 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
 }
 
 void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
-  if (version != 0) {
+  if (version > 1) {
     throw std::runtime_error("an event fusion map of version " + std::to_string(version) +
-                             ": this program reads version 0");
+                             ": this program reads versions 0 and 1");
   }
   GlobalCloudOptions options;
   in >> genericMapParams >> options.voxel_size_m;
   options.min_keyframes = in.ReadAs<std::int32_t>();
   in >> options.outliers.outlier_radius_m;
   options.outliers.outlier_min_neighbors = in.ReadAs<std::int32_t>();
+  readConsistency(in, version, options.consistency);
   CEventFusionMap read(options);
   const auto count = in.ReadAs<std::uint32_t>();
   for (std::uint32_t i = 0; i < count; ++i) {

@@ -234,7 +234,9 @@ void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_ma
   std::vector<StoredKeyframe> earlier = keyframesOf(initial_map);
   const std::lock_guard<std::mutex> lock(mutex_);
   auto session = std::make_unique<MappingSession>(options_);
-  for (const StoredKeyframe& keyframe : earlier) session->insertEarlier(worldPointsOf(keyframe));
+  for (const StoredKeyframe& keyframe : earlier) {
+    session->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
+  }
   restart(EventFusionOptions(options_));
   session_ = std::move(session);
   keyframes_ = std::move(earlier);

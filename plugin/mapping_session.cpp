@@ -210,8 +210,9 @@ void MappingSession::take(const std::vector<StampedPose>& poses) {
   }
 }
 
-void MappingSession::insertEarlier(const std::vector<CloudPoint>& points) {
-  cloud_.insert(cloud_.keyframes(), points);
+void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
+                                   const Rigid3& T_world_ref) {
+  cloud_.insert(cloud_.keyframes(), points, T_world_ref);
 }
 
 void MappingSession::completeEarly() {
@@ -233,7 +234,8 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
   if (!keyframe) return std::nullopt;
   const SecondsScope scope(status_.seconds.map);
-  cloud_.insert(cloud_.keyframes(), placedInWorld(pointsOf(*keyframe), keyframe->T_world_ref));
+  cloud_.insert(cloud_.keyframes(), placedInWorld(pointsOf(*keyframe), keyframe->T_world_ref),
+                keyframe->T_world_ref);
   for (const int camera : keyframe->silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }

@@ -67,7 +67,7 @@ class MappingSession {
   void addPose(const StampedPose& pose, const PoseSource& source = {});
   /// Puts a keyframe of an earlier map into the cloud, before those to come.
   /// @throws std::invalid_argument as GlobalCloud::insert does.
-  void insertEarlier(const std::vector<CloudPoint>& points);
+  void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
   /// Somebody asks for the map: takes the rig to be complete where a packet began more than a tenth
   /// of a second after the first event and the source of poses is chosen, so that a short recording
   /// need not be finished to be mapped. Changes no keyframe; a camera that first appears later is

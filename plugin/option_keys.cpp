@@ -178,6 +178,18 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "map"sv, "outlier_min_neighbors"sv,
           [](auto& o) -> auto& { return o.cloud.outliers.outlier_min_neighbors; }),
+      option(
+          "map"sv, "consistency"sv,
+          [](auto& o) -> auto& { return o.cloud.consistency.consistency; }),
+      option(
+          "map"sv, "consistency_tolerance"sv,
+          [](auto& o) -> auto& { return o.cloud.consistency.consistency_tolerance; }),
+      option(
+          "map"sv, "consistency_cell_deg"sv,
+          [](auto& o) -> auto& { return o.cloud.consistency.consistency_cell_deg; }),
+      option(
+          "map"sv, "max_contradictions"sv,
+          [](auto& o) -> auto& { return o.cloud.consistency.max_contradictions; }),
 
       option(
           "filter"sv, "hot_pixels"sv, [](auto& o) -> auto& { return o.mapper.filter.hot_pixels; }),

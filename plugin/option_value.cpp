@@ -154,6 +154,9 @@ void parseInto(std::string_view text, ExtractionMethod& field) {
 void parseInto(std::string_view text, VotingKernel& field) {
   field = votingKernelFromName(printable(text));
 }
+void parseInto(std::string_view text, Consistency& field) {
+  field = consistencyFromName(printable(text));
+}
 
 OptionValue valueOf(double field) { return field; }
 OptionValue valueOf(int field) { return std::int64_t{field}; }

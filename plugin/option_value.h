@@ -14,6 +14,7 @@
 #include "mapping/keyframe_policy.h"
 #include "mapping/space_sweep.h"
 #include "mapping/subintervals.h"
+#include "maps/keyframe_consistency.h"
 
 namespace efm {
 
@@ -49,6 +50,7 @@ void parseInto(std::string_view text, SubintervalSplit& field);
 void parseInto(std::string_view text, SubintervalShuffle& field);
 void parseInto(std::string_view text, ExtractionMethod& field);
 void parseInto(std::string_view text, VotingKernel& field);
+void parseInto(std::string_view text, Consistency& field);
 
 /// The value of a field, which reads back the same.
 OptionValue valueOf(double field);

@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "maps/global_cloud.h"
 #include "maps/keyframe_cloud.h"
 #include "tracking_stub/depth_rendering.h"
 
@@ -69,10 +68,19 @@ double SimulatedRecording::medianDistanceToSurfaces(const std::vector<CloudPoint
   return *middle;
 }
 
-std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes) {
-  GlobalCloud cloud;
+double SimulatedRecording::shareBeyond(const std::vector<CloudPoint>& points,
+                                       double distance_m) const {
+  const auto beyond = std::count_if(points.begin(), points.end(), [&](const CloudPoint& point) {
+    return distanceToScene(simulation_.scene, point.p_world) > distance_m;
+  });
+  return static_cast<double>(beyond) / static_cast<double>(points.size());
+}
+
+std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes,
+                                      const GlobalCloudOptions& options) {
+  GlobalCloud cloud(options);
   for (const KeyframeDepthMap& keyframe : keyframes) {
-    cloud.insert(cloud.keyframes(), keyframeCloud(keyframe));
+    cloud.insert(cloud.keyframes(), keyframeCloud(keyframe), keyframe.T_world_ref);
   }
   return cloud.points();
 }

@@ -6,6 +6,7 @@
 #include "mapping/fusion_mapper.h"
 #include "maps/cloud_point.h"
 #include "maps/depth_metrics.h"
+#include "maps/global_cloud.h"
 #include "tracking_stub/simulation_preset.h"
 
 namespace efm::test {
@@ -28,6 +29,8 @@ class SimulatedRecording {
 
   /// Median distance of a cloud's points to the nearest point of any surface, metres.
   double medianDistanceToSurfaces(const std::vector<CloudPoint>& points) const;
+  /// Share of a cloud's points that are farther than this from any surface.
+  double shareBeyond(const std::vector<CloudPoint>& points, double distance_m) const;
 
  private:
   Simulation simulation_;
@@ -36,6 +39,7 @@ class SimulatedRecording {
 };
 
 /// All keyframes in one cloud of voxels of a centimetre.
-std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes);
+std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes,
+                                      const GlobalCloudOptions& options = {});
 
 }  // namespace efm::test

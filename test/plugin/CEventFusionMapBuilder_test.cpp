@@ -530,7 +530,7 @@ TEST(CEventFusionMapBuilder, ContinuesAnEarlierMap) {
   GlobalCloud both(syntheticOptions().cloud);
   for (const auto* map : {&earlier, &later}) {
     for (const StoredKeyframe& keyframe : keyframesOf(map->keyframes)) {
-      both.insert(both.keyframes(), worldPointsOf(keyframe));
+      both.insert(both.keyframes(), worldPointsOf(keyframe), keyframe.T_world_ref);
     }
   }
   const auto points = builder.points();

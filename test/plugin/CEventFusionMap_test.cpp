@@ -202,6 +202,7 @@ TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAndGoesOnLikeIt) {
   options.min_keyframes = 2;
   options.outliers.outlier_radius_m = 0.6;
   options.outliers.outlier_min_neighbors = 2;
+  options.consistency = {Consistency::kSupport, 0.5, 5.0, 1};
   CEventFusionMap map = mapOf(3, options);
   ASSERT_GT(map.cloud().points().size(), 0U);
   const auto read = objectFrom<CEventFusionMap>(bytesOf(map));
@@ -210,6 +211,10 @@ TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAndGoesOnLikeIt) {
   EXPECT_EQ(read->cloud().options().min_keyframes, 2);
   EXPECT_EQ(read->cloud().options().outliers.outlier_radius_m, 0.6);
   EXPECT_EQ(read->cloud().options().outliers.outlier_min_neighbors, 2);
+  EXPECT_EQ(read->cloud().options().consistency.consistency, Consistency::kSupport);
+  EXPECT_EQ(read->cloud().options().consistency.consistency_tolerance, 0.5);
+  EXPECT_EQ(read->cloud().options().consistency.consistency_cell_deg, 5);
+  EXPECT_EQ(read->cloud().options().consistency.max_contradictions, 1);
   EXPECT_EQ(read->keyframes()[2].t_ref_ns, map.keyframes()[2].t_ref_ns);
   expectSamePoints(*read, map);
 

@@ -118,6 +118,10 @@ event_images = true
 [map]
 voxel_size_m = 0.05
 min_keyframes = 3
+consistency = support
+consistency_tolerance = 0.2
+consistency_cell_deg = 1.5
+max_contradictions = 2
 [performance]
 threads = 2
 kernel = plain
@@ -173,6 +177,10 @@ packet_error_px = 0
   EXPECT_FALSE(mapper.keyframe.extraction.subplane);
   EXPECT_EQ(options.cloud.voxel_size_m, 0.05);
   EXPECT_EQ(options.cloud.min_keyframes, 3);
+  EXPECT_EQ(options.cloud.consistency.consistency, Consistency::kSupport);
+  EXPECT_EQ(options.cloud.consistency.consistency_tolerance, 0.2);
+  EXPECT_EQ(options.cloud.consistency.consistency_cell_deg, 1.5);
+  EXPECT_EQ(options.cloud.consistency.max_contradictions, 2);
   EXPECT_EQ(mapper.keyframe.sweep.threads, 2);
   EXPECT_EQ(mapper.keyframe.sweep.kernel, VotingKernel::kPlain);
   EXPECT_EQ(mapper.keyframe.packets.packet_error_px, 0);
