@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "test/studies/method_comparison.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/robust_maximum.h"
+#include "tracking_stub/depth_rendering.h"
+
+namespace efm::studies {
+namespace {
+
+bool earlierThan(const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; }
+
+std::vector<EventSpan> eventsOf(const Recording& recording, const Window& window) {
+  std::vector<EventSpan> spans;
+  for (const std::vector<Event>& events : recording.events) {
+    const auto first = std::lower_bound(events.begin(), events.end(), window.t0_ns, earlierThan);
+    const auto last = std::lower_bound(first, events.end(), window.t1_ns, earlierThan);
+    spans.push_back(EventSpan(events).part(static_cast<std::size_t>(first - events.begin()),
+                                           static_cast<std::size_t>(last - events.begin())));
+  }
+  return spans;
+}
+
+std::vector<KeyframeDepthMap> mapOnce(const Recording& recording,
+                                      const std::vector<Window>& windows, const Method& method) {
+  KeyframeMapper mapper(recording.simulation.rig, method.cameras, method.options);
+  std::vector<KeyframeDepthMap> keyframes;
+  for (const Window& window : windows) {
+    auto keyframe = mapper.map(window, eventsOf(recording, window), recording.trajectory);
+    if (!keyframe) throw std::logic_error(method.name + ": a window has no pose");
+    keyframes.push_back(std::move(*keyframe));
+  }
+  return keyframes;
+}
+
+std::vector<KeyframeDepthMap> mapLate(const Recording& recording,
+                                      const std::vector<Window>& windows, const Method& method) {
+  std::vector<KeyframeDepthMap> merged;
+  for (const int camera : method.cameras) {
+    Method alone = method;
+    alone.late = false;
+    alone.cameras = {camera};
+    std::vector<KeyframeDepthMap> maps = mapWindows(recording, windows, alone);
+    if (merged.empty()) {
+      merged = std::move(maps);
+      continue;
+    }
+    for (std::size_t i = 0; i < maps.size(); ++i) {
+      const DepthMap& other = maps[i].map;
+      DepthMap& map = merged[i].map;
+      const cv::Mat1b better =
+          (other.depth > 0) & ((map.depth == 0) | (other.confidence > map.confidence));
+      other.depth.copyTo(map.depth, better);
+      other.variance.copyTo(map.variance, better);
+      map.confidence = cv::max(map.confidence, other.confidence);
+    }
+  }
+  return merged;
+}
+
+/// The pixels of a map that stand out most from their surroundings, so many of them.
+cv::Mat1b mostOutstanding(const DepthMap& map, const cv::Mat1b& among, int count) {
+  cv::Mat1f mean;
+  cv::GaussianBlur(map.confidence, mean, {5, 5}, 0);
+  const cv::Mat1f excess = map.confidence - mean;
+  std::vector<float> values;
+  for (int y = 0; y < among.rows; ++y) {
+    for (int x = 0; x < among.cols; ++x) {
+      if (among(y, x) != 0) values.push_back(excess(y, x));
+    }
+  }
+  if (static_cast<int>(values.size()) <= count) return among;
+  if (count == 0) return cv::Mat1b::zeros(among.size());
+  const auto last = values.begin() + count - 1;
+  std::nth_element(values.begin(), last, values.end(), std::greater<>());
+  return among & (excess >= *last);
+}
+
+/// The depths of a map at some pixels, 0 elsewhere.
+cv::Mat1f only(const cv::Mat1f& depth, const cv::Mat1b& mask) {
+  cv::Mat1f some = cv::Mat1f::zeros(depth.size());
+  depth.copyTo(some, mask);
+  return some;
+}
+
+void append(std::vector<DepthPair>& all, const std::vector<DepthPair>& some) {
+  all.insert(all.end(), some.begin(), some.end());
+}
+
+}  // namespace
+
+KeyframeMapperOptions paperOptions(double min_depth_m, double max_depth_m) {
+  KeyframeMapperOptions options;
+  options.planes = {min_depth_m, max_depth_m, 100, PlaneSpacing::kInverse};
+  options.reference_camera = 0;
+  options.view = {};
+  options.subintervals = {1, SubintervalSplit::kDuration, SubintervalShuffle::kNone, 1};
+  options.exclude_silent = false;
+  options.sweep.fusion = {FusionRule::kHarmonic, FusionRule::kArithmetic,
+                          FusionOrder::kCamerasThenTime};
+  options.extraction.extraction = ExtractionMethod::kPaper;
+  options.extraction.threshold_kernel = 5;
+  options.extraction.threshold_c = 5;
+  options.extraction.max_confidence = {WhiteLevel::kSequence, 0};
+  options.extraction.median_size = 5;
+  options.extraction.dilate = false;
+  options.extraction.subplane = false;
+  return options;
+}
+
+std::vector<KeyframeDepthMap> mapWindows(const Recording& recording,
+                                         const std::vector<Window>& windows, const Method& method) {
+  if (method.late) return mapLate(recording, windows, method);
+  std::vector<KeyframeDepthMap> keyframes = mapOnce(recording, windows, method);
+  if (method.options.extraction.max_confidence.level != WhiteLevel::kSequence) return keyframes;
+  RobustMaximum maximum;
+  for (const KeyframeDepthMap& keyframe : keyframes) maximum.take(keyframe.largest_confidence);
+  Method again = method;
+  again.options.sequence_maximum = maximum.value();
+  return mapOnce(recording, windows, again);
+}
+
+cv::Mat1f truthOf(const Recording& recording, const KeyframeDepthMap& keyframe,
+                  int reference_camera) {
+  const Simulation& simulation = recording.simulation;
+  const auto camera = static_cast<std::size_t>(reference_camera);
+  return renderDepth(simulation.scene,
+                     simulation.motion->poseAt(keyframe.window.t_ref_ns) *
+                         simulation.rig.cameras.at(camera).T_rig_cam,
+                     keyframe.view);
+}
+
+DepthPairingOptions studyPairing() {
+  DepthPairingOptions pairing;
+  pairing.tolerance_px = 1;
+  return pairing;
+}
+
+std::vector<MethodResult> compareMethods(const Recording& recording,
+                                         const std::vector<Window>& windows,
+                                         const std::vector<Method>& methods,
+                                         const ComparisonOptions& options) {
+  std::vector<MethodResult> results;
+  for (const Method& method : methods) {
+    results.push_back({method.name, mapWindows(recording, windows, method), {}, {}, {}});
+  }
+  struct Pairs {
+    std::vector<DepthPair> own, common, equal;
+  };
+  std::vector<Pairs> pairs(methods.size());
+  for (std::size_t w = 0; w < windows.size(); ++w) {
+    const KeyframeDepthMap& first = results.front().keyframes[w];
+    const cv::Mat1f truth = truthOf(recording, first, methods.front().options.reference_camera);
+    cv::Mat1b common(truth.size(), 255);
+    int fewest = std::numeric_limits<int>::max();
+    for (const MethodResult& result : results) {
+      const cv::Mat1b chosen = result.keyframes[w].map.depth > 0;
+      common &= chosen;
+      fewest = std::min(fewest, cv::countNonZero(chosen));
+    }
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      const DepthMap& map = results[m].keyframes[w].map;
+      const cv::Mat1b chosen = map.depth > 0;
+      append(pairs[m].own, pairDepths(map.depth, truth, options.pairing));
+      append(pairs[m].common, pairDepths(only(map.depth, common), truth, options.pairing));
+      append(pairs[m].equal, pairDepths(only(map.depth, mostOutstanding(map, chosen, fewest)),
+                                        truth, options.pairing));
+    }
+  }
+  for (std::size_t m = 0; m < methods.size(); ++m) {
+    results[m].own = depthErrors(pairs[m].own, options.focal_baseline);
+    results[m].common = depthErrors(pairs[m].common, options.focal_baseline);
+    results[m].equal = depthErrors(pairs[m].equal, options.focal_baseline);
+  }
+  return results;
+}
+
+}  // namespace efm::studies

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "mapping/event.h"
+#include "mapping/trajectory.h"
+#include "mapping/window.h"
+#include "tracking_stub/simulated_rig.h"
+
+namespace efm::studies {
+
+/// A simulation with its events and poses, to be mapped in several ways and held against its truth.
+struct Recording {
+  Simulation simulation;
+  std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
+  Trajectory trajectory;                   ///< The true poses, every millisecond.
+
+  /// `count` windows of equal duration spread evenly over the recording, the first at its start and
+  /// the last at its end, each with its reference view in the middle; they overlap where there is
+  /// no room.
+  std::vector<Window> windows(double window_s, int count) const;
+  /// Of all cameras in a window.
+  std::uint64_t eventsIn(const Window& window) const;
+};
+
+/// Identifies what a simulation makes: cameras, motion, surfaces and what is painted on them,
+/// pixels, noise, seed and duration.
+std::uint64_t fingerprintOf(const Simulation& simulation);
+
+/// Simulated events on disk, so that they are simulated once. A file is known by the fingerprint of
+/// its simulation: whatever a study changes of it makes another file. What a change of the
+/// simulator itself does is not seen: remove the folder then.
+class RecordingCache {
+ public:
+  /// @param folder made where it is not there.
+  explicit RecordingCache(std::filesystem::path folder);
+
+  /// @param name what the file and the progress on the console are called.
+  /// @throws std::runtime_error naming the file that cannot be read or written.
+  Recording make(const std::string& name, const Simulation& simulation) const;
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace efm::studies

@@ -1,0 +1,39 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Runs the studies and writes docs/studies.md and docs/studies/*.png.
+#   run.sh [--quick] [--build DIR] [--out DIR] [--cache DIR] [NAME ...]
+# --quick   tiny, into a folder that is removed: shows that every study runs through
+# --build   the build folder; build/release where not given, and then built
+# --out     docs where not given
+# --cache   simulated events; build/studies_cache where not given
+# NAME      studies; all of them where not given
+set -euo pipefail
+root=$(cd "$(dirname "$0")/../.." && pwd)
+build=
+out=$root/docs
+cache=$root/build/studies_cache
+quick=no
+names=()
+while [ $# -gt 0 ]; do
+  case $1 in
+    --quick) quick=yes ;;
+    --build) build=${2:?--build: expected a folder}; shift ;;
+    --out) out=${2:?--out: expected a folder}; shift ;;
+    --cache) cache=${2:?--cache: expected a folder}; shift ;;
+    *) names+=("$1") ;;
+  esac
+  shift
+done
+if [ -z "$build" ]; then
+  build=$root/build/release
+  (cd "$root" && cmake --preset release >/dev/null)
+  cmake --build "$build" --target event_fusion_studies
+fi
+studies=$build/bin/event_fusion_studies
+if [ "$quick" = yes ]; then
+  scratch=$(mktemp -d)
+  trap 'rm -rf "$scratch"' EXIT
+  "$studies" --quick --out "$scratch" --cache "$scratch/cache" "${names[@]}"
+  exit
+fi
+exec "$studies" --out "$out" --cache "$cache" "${names[@]}"

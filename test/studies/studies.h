@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "test/studies/study_run.h"
+#include "test/studies/study_section.h"
+
+namespace efm::studies {
+
+/// The six fusion functions across cameras.
+void studyFusionFunctions(const StudyRun& run, StudySection& section);
+
+}  // namespace efm::studies
