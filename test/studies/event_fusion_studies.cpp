@@ -28,6 +28,7 @@ struct Study {
 /// In the order of the report.
 constexpr Study kStudies[] = {
     {"fusion_functions", "1. Fusion functions across cameras", studyFusionFunctions},
+    {"algorithms", "2. Comparison of algorithms", studyAlgorithms},
 };
 
 constexpr const char* kUsage =

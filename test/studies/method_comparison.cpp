@@ -181,4 +181,11 @@ std::vector<MethodResult> compareMethods(const Recording& recording,
   return results;
 }
 
+const MethodResult& resultOf(const std::vector<MethodResult>& results, const std::string& name) {
+  for (const MethodResult& result : results) {
+    if (result.name == name) return result;
+  }
+  throw std::logic_error("no method is called " + name);
+}
+
 }  // namespace efm::studies

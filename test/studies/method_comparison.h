@@ -61,4 +61,8 @@ std::vector<MethodResult> compareMethods(const Recording& recording,
                                          const std::vector<Method>& methods,
                                          const ComparisonOptions& options);
 
+/// The result of the method with a name.
+/// @throws std::logic_error naming it where there is none.
+const MethodResult& resultOf(const std::vector<MethodResult>& results, const std::string& name);
+
 }  // namespace efm::studies
