@@ -29,6 +29,10 @@ struct Study {
 constexpr Study kStudies[] = {
     {"fusion_functions", "1. Fusion functions across cameras", studyFusionFunctions},
     {"algorithms", "2. Comparison of algorithms", studyAlgorithms},
+    {"subintervals", "3. Temporal fusion", studySubintervals},
+    {"driving", "4. Driving", studyDriving},
+    {"runtime", "8. Runtime and complexity", studyRuntime},
+    {"convergence", "9. Convergence over time", studyConvergence},
 };
 
 constexpr const char* kUsage =

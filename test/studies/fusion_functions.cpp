@@ -135,8 +135,7 @@ void byWindow(const StudyRun& run, const Recording& recording, const ComparisonO
 }  // namespace
 
 void studyFusionFunctions(const StudyRun& run, StudySection& section) {
-  const Recording recording =
-      run.recordings->make("mvsec_room", mvsecInRoom(run, run.pick(10.0, 0.2)));
+  const Recording recording = roomRecording(run);
   const auto windows = recording.windows(0.1, run.pick(40, 2));
   ComparisonOptions options;
   options.focal_baseline = focalBaselineOf(recording.simulation.rig);

@@ -14,15 +14,10 @@
 namespace efm::studies {
 namespace {
 
-bool earlierThan(const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; }
-
 std::vector<EventSpan> eventsOf(const Recording& recording, const Window& window) {
   std::vector<EventSpan> spans;
-  for (const std::vector<Event>& events : recording.events) {
-    const auto first = std::lower_bound(events.begin(), events.end(), window.t0_ns, earlierThan);
-    const auto last = std::lower_bound(first, events.end(), window.t1_ns, earlierThan);
-    spans.push_back(EventSpan(events).part(static_cast<std::size_t>(first - events.begin()),
-                                           static_cast<std::size_t>(last - events.begin())));
+  for (std::size_t c = 0; c < recording.events.size(); ++c) {
+    spans.push_back(recording.eventsOf(c, window));
   }
   return spans;
 }
@@ -82,13 +77,6 @@ cv::Mat1b mostOutstanding(const DepthMap& map, const cv::Mat1b& among, int count
   return among & (excess >= *last);
 }
 
-/// The depths of a map at some pixels, 0 elsewhere.
-cv::Mat1f only(const cv::Mat1f& depth, const cv::Mat1b& mask) {
-  cv::Mat1f some = cv::Mat1f::zeros(depth.size());
-  depth.copyTo(some, mask);
-  return some;
-}
-
 void append(std::vector<DepthPair>& all, const std::vector<DepthPair>& some) {
   all.insert(all.end(), some.begin(), some.end());
 }
@@ -136,10 +124,47 @@ cv::Mat1f truthOf(const Recording& recording, const KeyframeDepthMap& keyframe,
                      keyframe.view);
 }
 
+cv::Mat1f only(const cv::Mat1f& depth, const cv::Mat1b& mask) {
+  cv::Mat1f some = cv::Mat1f::zeros(depth.size());
+  depth.copyTo(some, mask);
+  return some;
+}
+
 DepthPairingOptions studyPairing() {
   DepthPairingOptions pairing;
   pairing.tolerance_px = 1;
   return pairing;
+}
+
+void scoreMethods(const Recording& recording, const ComparisonOptions& options,
+                  std::vector<MethodResult>& results) {
+  struct Pairs {
+    std::vector<DepthPair> own, common, equal;
+  };
+  std::vector<Pairs> pairs(results.size());
+  for (std::size_t w = 0; w < results.front().keyframes.size(); ++w) {
+    const cv::Mat1f truth =
+        truthOf(recording, results.front().keyframes[w], options.reference_camera);
+    cv::Mat1b common(truth.size(), 255);
+    int fewest = std::numeric_limits<int>::max();
+    for (const MethodResult& result : results) {
+      const cv::Mat1b chosen = result.keyframes.at(w).map.depth > 0;
+      common &= chosen;
+      fewest = std::min(fewest, cv::countNonZero(chosen));
+    }
+    for (std::size_t m = 0; m < results.size(); ++m) {
+      const DepthMap& map = results[m].keyframes[w].map;
+      const cv::Mat1b equal = mostOutstanding(map, map.depth > 0, fewest);
+      append(pairs[m].own, pairDepths(map.depth, truth, options.pairing));
+      append(pairs[m].common, pairDepths(only(map.depth, common), truth, options.pairing));
+      append(pairs[m].equal, pairDepths(only(map.depth, equal), truth, options.pairing));
+    }
+  }
+  for (std::size_t m = 0; m < results.size(); ++m) {
+    results[m].own = depthErrors(pairs[m].own, options.focal_baseline);
+    results[m].common = depthErrors(pairs[m].common, options.focal_baseline);
+    results[m].equal = depthErrors(pairs[m].equal, options.focal_baseline);
+  }
 }
 
 std::vector<MethodResult> compareMethods(const Recording& recording,
@@ -150,34 +175,7 @@ std::vector<MethodResult> compareMethods(const Recording& recording,
   for (const Method& method : methods) {
     results.push_back({method.name, mapWindows(recording, windows, method), {}, {}, {}});
   }
-  struct Pairs {
-    std::vector<DepthPair> own, common, equal;
-  };
-  std::vector<Pairs> pairs(methods.size());
-  for (std::size_t w = 0; w < windows.size(); ++w) {
-    const KeyframeDepthMap& first = results.front().keyframes[w];
-    const cv::Mat1f truth = truthOf(recording, first, methods.front().options.reference_camera);
-    cv::Mat1b common(truth.size(), 255);
-    int fewest = std::numeric_limits<int>::max();
-    for (const MethodResult& result : results) {
-      const cv::Mat1b chosen = result.keyframes[w].map.depth > 0;
-      common &= chosen;
-      fewest = std::min(fewest, cv::countNonZero(chosen));
-    }
-    for (std::size_t m = 0; m < methods.size(); ++m) {
-      const DepthMap& map = results[m].keyframes[w].map;
-      const cv::Mat1b chosen = map.depth > 0;
-      append(pairs[m].own, pairDepths(map.depth, truth, options.pairing));
-      append(pairs[m].common, pairDepths(only(map.depth, common), truth, options.pairing));
-      append(pairs[m].equal, pairDepths(only(map.depth, mostOutstanding(map, chosen, fewest)),
-                                        truth, options.pairing));
-    }
-  }
-  for (std::size_t m = 0; m < methods.size(); ++m) {
-    results[m].own = depthErrors(pairs[m].own, options.focal_baseline);
-    results[m].common = depthErrors(pairs[m].common, options.focal_baseline);
-    results[m].equal = depthErrors(pairs[m].equal, options.focal_baseline);
-  }
+  scoreMethods(recording, options, results);
   return results;
 }
 
@@ -186,6 +184,18 @@ const MethodResult& resultOf(const std::vector<MethodResult>& results, const std
     if (result.name == name) return result;
   }
   throw std::logic_error("no method is called " + name);
+}
+
+std::size_t richestWindow(const MethodResult& result) {
+  std::size_t best = 0;
+  int most = 0;
+  for (std::size_t w = 0; w < result.keyframes.size(); ++w) {
+    const int points = cv::countNonZero(result.keyframes[w].map.depth);
+    if (points <= most) continue;
+    most = points;
+    best = w;
+  }
+  return best;
 }
 
 }  // namespace efm::studies

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -50,12 +51,21 @@ struct MethodResult {
 /// far background.
 DepthPairingOptions studyPairing();
 
+/// The depths of a map at some pixels, 0 elsewhere.
+cv::Mat1f only(const cv::Mat1f& depth, const cv::Mat1b& mask);
+
 struct ComparisonOptions {
+  int reference_camera = 0;
   DepthPairingOptions pairing = studyPairing();
   std::optional<double> focal_baseline;  ///< Which bad-pix needs.
 };
 
-/// Maps the windows with each method. All have the same reference view.
+/// Fills in the errors of keyframes that were made before, as many of each method, the ones of
+/// equal number in the same reference view.
+void scoreMethods(const Recording& recording, const ComparisonOptions& options,
+                  std::vector<MethodResult>& results);
+
+/// Maps the windows with each method, and scores them. All have the same reference view.
 std::vector<MethodResult> compareMethods(const Recording& recording,
                                          const std::vector<Window>& windows,
                                          const std::vector<Method>& methods,
@@ -64,5 +74,8 @@ std::vector<MethodResult> compareMethods(const Recording& recording,
 /// The result of the method with a name.
 /// @throws std::logic_error naming it where there is none.
 const MethodResult& resultOf(const std::vector<MethodResult>& results, const std::string& name);
+
+/// The window in which a method found most points: the one to show.
+std::size_t richestWindow(const MethodResult& result);
 
 }  // namespace efm::studies

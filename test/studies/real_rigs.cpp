@@ -31,6 +31,10 @@ Simulation mvsecInRoom(const StudyRun& run, double duration_s) {
   return simulate(run, "mvsec", "mvsec_indoor_flying1.txt", options);
 }
 
+Recording roomRecording(const StudyRun& run) {
+  return run.recordings->make("mvsec_room", mvsecInRoom(run, run.pick(10.0, 0.2)));
+}
+
 Simulation dsecInStreet(const StudyRun& run, double duration_s) {
   TrajectorySimulationOptions options;
   options.scene = "street";

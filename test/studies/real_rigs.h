@@ -19,6 +19,9 @@ class MissingData : public std::runtime_error {
 /// @throws MissingData naming the file that is not there.
 Simulation mvsecInRoom(const StudyRun& run, double duration_s);
 
+/// The recording of it that most studies share: 10 s, or a moment where the run is quick.
+Recording roomRecording(const StudyRun& run);
+
 /// DSEC's two Prophesee Gen3 on the smoothed trajectory of zurich_city_04, through a street.
 /// @throws MissingData naming the file that is not there.
 Simulation dsecInStreet(const StudyRun& run, double duration_s);

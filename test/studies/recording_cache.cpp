@@ -131,13 +131,18 @@ std::vector<Window> Recording::windows(double window_s, int count) const {
   return windows;
 }
 
+EventSpan Recording::eventsOf(std::size_t camera, const Window& window) const {
+  const std::vector<Event>& all = events.at(camera);
+  const auto earlier = [](const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; };
+  const auto first = std::lower_bound(all.begin(), all.end(), window.t0_ns, earlier);
+  const auto last = std::lower_bound(first, all.end(), window.t1_ns, earlier);
+  return EventSpan(all).part(static_cast<std::size_t>(first - all.begin()),
+                             static_cast<std::size_t>(last - all.begin()));
+}
+
 std::uint64_t Recording::eventsIn(const Window& window) const {
   std::uint64_t count = 0;
-  for (const std::vector<Event>& of_camera : events) {
-    for (const Event& event : of_camera) {
-      count += event.t_ns >= window.t0_ns && event.t_ns < window.t1_ns ? 1 : 0;
-    }
-  }
+  for (std::size_t c = 0; c < events.size(); ++c) count += eventsOf(c, window).size();
   return count;
 }
 

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "mapping/event.h"
+#include "mapping/event_span.h"
 #include "mapping/trajectory.h"
 #include "mapping/window.h"
 #include "tracking_stub/simulated_rig.h"
@@ -23,7 +25,9 @@ struct Recording {
   /// the last at its end, each with its reference view in the middle; they overlap where there is
   /// no room.
   std::vector<Window> windows(double window_s, int count) const;
-  /// Of all cameras in a window.
+  /// A camera's events in a window.
+  EventSpan eventsOf(std::size_t camera, const Window& window) const;
+  /// How many events of all cameras are in a window.
   std::uint64_t eventsIn(const Window& window) const;
 };
 

@@ -11,4 +11,13 @@ void studyFusionFunctions(const StudyRun& run, StudySection& section);
 /// One camera, every order of fusing two across cameras and time, and late fusion.
 void studyAlgorithms(const StudyRun& run, StudySection& section);
 
+/// Sub-intervals, what each of them would have given, and one camera fused across time.
+void studySubintervals(const StudyRun& run, StudySection& section);
+/// DSEC's car in a street.
+void studyDriving(const StudyRun& run, StudySection& section);
+/// What a keyframe costs by step, and the formulas of its complexity.
+void studyRuntime(const StudyRun& run, StudySection& section);
+/// How the DSI becomes clear as events come in.
+void studyConvergence(const StudyRun& run, StudySection& section);
+
 }  // namespace efm::studies

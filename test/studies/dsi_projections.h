@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <mutex>
+#include <opencv2/core.hpp>
+
+#include "mapping/depth_planes.h"
+#include "mapping/reference_view.h"
+#include "mapping/space_sweep.h"
+
+namespace efm::studies {
+
+/// The largest values of a DSI along each of its three axes (Ghosh and Gallego 2022, Fig. 2): what
+/// is seen of it from the front, from above and from the side. Plane 0, the nearest, is the lowest
+/// row of the view from above and the first column of the view from the side.
+class DsiProjections : public DsiSink {
+ public:
+  DsiProjections(const DepthPlanes& planes, const ReferenceView& view);
+
+  void takePlane(int plane, const float* values) override;
+
+  const cv::Mat1f& front() const { return front_; }  ///< Width x height.
+  const cv::Mat1f& top() const { return top_; }      ///< Width x planes.
+  const cv::Mat1f& side() const { return side_; }    ///< Planes x height.
+  /// The three as one picture, front above left, top below it, side to its right: blue (none) to
+  /// yellow (the largest value of all).
+  cv::Mat3b picture() const;
+
+ private:
+  std::mutex mutex_;
+  cv::Mat1f front_;
+  cv::Mat1f top_;
+  cv::Mat1f side_;
+};
+
+}  // namespace efm::studies
