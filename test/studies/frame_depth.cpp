@@ -3,183 +3,21 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "mapping/depth_extraction.h"
 #include "mapping/option_check.h"
+#include "test/studies/frame_sweep.h"
 
 namespace efm::studies {
 namespace {
 
-/// Fewer frames than this say nothing of a pixel.
-constexpr int kMinFrames = 2;
-/// Keeps windows without contrast from correlating by chance, squared grey values.
-constexpr double kNoiseVariance = 1.0;
-/// The correlation of a frame that does not see all of the window.
-constexpr float kUnseen = -2.0F;
-
-cv::Mat1f blurred(const cv::Mat1f& image, double sigma_px) {
-  cv::Mat1f result;
-  cv::GaussianBlur(image, result, {0, 0}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
-  return result;
+FrameSweepOptions choiceOf(const FrameDepthOptions& options) {
+  return {options.min_baseline_m, options.max_baseline_m, options.max_frames,
+          options.window_sigmas_px};
 }
-
-/// A frame as the view would see it if everything lay on one plane.
-struct WarpedFrame {
-  cv::Mat1f image;
-  std::vector<cv::Mat1b> seen;  // per size of the window: 255 where all of it is seen, else 0
-};
-
-/// The frames around one view, and what a plane makes of them.
-class FrameSweep {
- public:
-  FrameSweep(const PosedFrames& sequence, std::size_t key, const ReferenceView& view,
-             const Rigid3& T_world_ref, const FrameDepthOptions& options)
-      : sequence_(sequence),
-        view_(view),
-        T_world_ref_(T_world_ref),
-        sigmas_px_(options.window_sigmas_px) {
-    key_ = sourceOf(sequence.frames[key]);
-    std::vector<std::size_t> usable;
-    for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
-      const double baseline_m =
-          (sequence.frames[i].T_world_cam.translation - T_world_ref.translation).norm();
-      const bool in_reach =
-          baseline_m >= options.min_baseline_m && baseline_m <= options.max_baseline_m;
-      if (i != key && in_reach) usable.push_back(i);
-    }
-    const auto wanted = static_cast<std::size_t>(options.max_frames);
-    const std::size_t count = std::min(wanted, usable.size());
-    for (std::size_t k = 0; k < count; ++k) {
-      others_.push_back(sourceOf(sequence.frames[usable[k * usable.size() / count]]));
-    }
-  }
-
-  const ReferenceView& view() const { return view_; }
-  const Rigid3& T_world_ref() const { return T_world_ref_; }
-
-  /// Per pixel the mean correlation of the better half of the frames, -1 where too few look: for
-  /// each size of the window.
-  std::vector<cv::Mat1f> scoresAt(double depth_m) const {
-    const WarpedFrame key = warp(key_, depth_m);
-    std::vector<WarpedFrame> others;
-    for (const Source& other : others_) others.push_back(warp(other, depth_m));
-    std::vector<cv::Mat1f> scores;
-    for (std::size_t w = 0; w < sigmas_px_.size(); ++w) scores.push_back(correlate(key, others, w));
-    return scores;
-  }
-
- private:
-  /// A frame, and where windows around its pixels lie in what its lens saw.
-  struct Source {
-    const PosedFrame* frame = nullptr;
-    std::vector<cv::Mat1b> seen;  // per size of the window
-  };
-
-  Source sourceOf(const PosedFrame& frame) const {
-    Source source{&frame, {}};
-    for (const double sigma_px : sigmas_px_) {
-      const int side = 2 * static_cast<int>(std::lround(2 * sigma_px)) + 1;
-      cv::Mat1b seen;
-      cv::erode(frame.seen, seen, cv::Mat1b(side, side, 1), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
-      source.seen.push_back(seen);
-    }
-    return source;
-  }
-
-  /// H_frame_ref of the plane at a depth: pixel of the view to pixel of the frame.
-  cv::Matx33d homography(const Rigid3& T_world_cam, double depth_m) const {
-    const Rigid3 T_cam_ref = T_world_cam.inverse() * T_world_ref_;
-    // On the plane, p_cam = R p_ref + t = (R + t n^T / d) p_ref with n = (0, 0, 1).
-    Eigen::Matrix3d H_cam_ref = T_cam_ref.rotation.toRotationMatrix();
-    H_cam_ref.col(2) += T_cam_ref.translation / depth_m;
-    const auto intrinsics = [](const ReferenceView& of) {
-      Eigen::Matrix3d matrix = Eigen::Matrix3d::Identity();
-      matrix.diagonal().head<2>() << of.fx, of.fy;
-      matrix.col(2).head<2>() << of.cx, of.cy;
-      return matrix;
-    };
-    const Eigen::Matrix3d H_frame_view =
-        intrinsics(sequence_.view) * H_cam_ref * intrinsics(view_).inverse();
-    cv::Matx33d matrix;
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) matrix(r, c) = H_frame_view(r, c);
-    }
-    return matrix;
-  }
-
-  WarpedFrame warp(const Source& source, double depth_m) const {
-    const cv::Matx33d H_frame_view = homography(source.frame->T_world_cam, depth_m);
-    const cv::Size size(view_.width, view_.height);
-    WarpedFrame warped;
-    cv::warpPerspective(source.frame->image, warped.image, H_frame_view, size,
-                        cv::INTER_CUBIC | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
-    for (const cv::Mat1b& whole : source.seen) {
-      cv::Mat1b seen;
-      cv::warpPerspective(whole, seen, H_frame_view, size, cv::INTER_NEAREST | cv::WARP_INVERSE_MAP,
-                          cv::BORDER_CONSTANT, 0);
-      warped.seen.push_back(seen);
-    }
-    return warped;
-  }
-
-  /// @param window index of its size.
-  cv::Mat1f correlate(const WarpedFrame& key, const std::vector<WarpedFrame>& others,
-                      std::size_t window) const {
-    const double sigma_px = sigmas_px_[window];
-    const cv::Mat1f mean = blurred(key.image, sigma_px);
-    const cv::Mat1f variance =
-        blurred(key.image.mul(key.image), sigma_px) - cv::Mat1f(mean.mul(mean));
-    std::vector<cv::Mat1f> correlations;
-    for (const WarpedFrame& other : others) {
-      const cv::Mat1f other_mean = blurred(other.image, sigma_px);
-      const cv::Mat1f other_variance =
-          blurred(other.image.mul(other.image), sigma_px) - cv::Mat1f(other_mean.mul(other_mean));
-      const cv::Mat1f covariance =
-          blurred(key.image.mul(other.image), sigma_px) - cv::Mat1f(mean.mul(other_mean));
-      const cv::Mat1b seen = key.seen[window] & other.seen[window];
-      cv::Mat1f correlation;
-      cv::sqrt(
-          (cv::max(variance, 0) + kNoiseVariance).mul(cv::max(other_variance, 0) + kNoiseVariance),
-          correlation);
-      correlation = covariance / correlation;
-      correlation.setTo(kUnseen, ~seen);
-      correlations.push_back(correlation);
-    }
-    cv::Mat1f score(mean.size(), -1.0F);
-    std::vector<float> of_pixel;
-    for (int y = 0; y < mean.rows; ++y) {
-      for (int x = 0; x < mean.cols; ++x) {
-        of_pixel.clear();
-        for (const cv::Mat1f& correlation : correlations) {
-          if (correlation(y, x) > kUnseen) of_pixel.push_back(correlation(y, x));
-        }
-        if (of_pixel.size() < kMinFrames) continue;
-        score(y, x) = meanOfBetterHalf(of_pixel);
-      }
-    }
-    return score;
-  }
-
-  static float meanOfBetterHalf(std::vector<float>& values) {
-    const std::size_t half = (values.size() + 1) / 2;
-    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(half - 1),
-                     values.end(), std::greater<>());
-    float sum = 0;
-    for (std::size_t i = 0; i < half; ++i) sum += values[i];
-    return sum / static_cast<float>(half);
-  }
-
-  const PosedFrames& sequence_;
-  ReferenceView view_;
-  Rigid3 T_world_ref_;
-  std::vector<double> sigmas_px_;
-  Source key_;
-  std::vector<Source> others_;
-};
 
 /// For one size of the window.
 using ScoreVolume = std::vector<cv::Mat1f>;  // per plane
@@ -365,7 +203,7 @@ void FrameDepthOptions::validate() const {
   requireOption(min_baseline_m >= 0, "min_baseline_m", min_baseline_m, "0 or above");
   requireOption(max_baseline_m > min_baseline_m, "max_baseline_m", max_baseline_m,
                 "above min_baseline_m");
-  requireOption(max_frames >= kMinFrames, "max_frames", max_frames, "at least 2");
+  requireOption(max_frames >= FrameSweep::kMinFrames, "max_frames", max_frames, "at least 2");
   requireOption(!window_sigmas_px.empty(), "window_sigmas_px (how many)", window_sigmas_px.size(),
                 "at least 1");
   for (const double sigma_px : window_sigmas_px) {
@@ -382,12 +220,13 @@ void FrameDepthOptions::validate() const {
 FrameDepth frameDepth(const PosedFrames& sequence, std::size_t key, const ReferenceView& view,
                       const Rigid3& T_world_ref, const FrameDepthOptions& options) {
   options.validate();
-  FrameDepth result = depthOf(FrameSweep(sequence, key, view, T_world_ref, options), options);
+  FrameDepth result =
+      depthOf(FrameSweep(sequence, key, view, T_world_ref, choiceOf(options)), options);
 
   const std::size_t second = frameAtDistance(sequence, T_world_ref, options.check_baseline_m);
   const Rigid3& T_world_second = sequence.frames[second].T_world_cam;
   const FrameDepth checked =
-      depthOf(FrameSweep(sequence, second, view, T_world_second, options), options);
+      depthOf(FrameSweep(sequence, second, view, T_world_second, choiceOf(options)), options);
   const Rigid3 T_second_ref = T_world_second.inverse() * T_world_ref;
   for (int y = 0; y < view.height; ++y) {
     for (int x = 0; x < view.width; ++x) {
