@@ -33,6 +33,7 @@ constexpr Study kStudies[] = {
     {"driving", "4. Driving", studyDriving},
     {"runtime", "8. Runtime and complexity", studyRuntime},
     {"convergence", "9. Convergence over time", studyConvergence},
+    {"slider", "11. The real slider", studySlider},
 };
 
 constexpr const char* kUsage =

@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "maps/depth_metrics.h"
+#include "maps/depth_pairs.h"
+#include "test/studies/rendered_frames.h"
 #include "tracking_stub/depth_rendering.h"
-#include "tracking_stub/frame_renderer.h"
 #include "tracking_stub/painting.h"
 
 namespace efm::studies {
@@ -32,23 +32,14 @@ CameraModel smallCamera() {
 
 /// A camera that moves to the right takes a frame every 2 cm.
 PosedFrames framesOf(const Scene& scene) {
-  const CameraModel camera = smallCamera();
-  const FrameRenderer renderer(camera);
-  const FrameUndistortion undistort(camera);
-  PosedFrames sequence{ReferenceView::of(camera), {}};
+  std::vector<StampedPose> poses;
   for (int i = -5; i <= 5; ++i) {
-    Rigid3 T_world_cam;
-    T_world_cam.translation.x() = 0.02 * i;
-    Frame rendered;
-    renderer.render(renderer.viewFrom(scene, T_world_cam), rendered);
-    cv::Mat1f grey;
-    cv::exp(rendered.log_intensity, grey);
-    PosedFrame frame = undistort(60 * grey);
-    frame.t_ns = i;
-    frame.T_world_cam = T_world_cam;
-    sequence.frames.push_back(frame);
+    StampedPose pose;
+    pose.t_ns = i;
+    pose.T_world_rig.translation.x() = 0.02 * i;
+    poses.push_back(pose);
   }
-  return sequence;
+  return renderedFrames(scene, smallCamera(), poses, {60, 0, 1});
 }
 
 FrameDepthOptions fewPlanes() {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -59,24 +58,6 @@ std::vector<KeyframeDepthMap> mapLate(const Recording& recording,
   return merged;
 }
 
-/// The pixels of a map that stand out most from their surroundings, so many of them.
-cv::Mat1b mostOutstanding(const DepthMap& map, const cv::Mat1b& among, int count) {
-  cv::Mat1f mean;
-  cv::GaussianBlur(map.confidence, mean, {5, 5}, 0);
-  const cv::Mat1f excess = map.confidence - mean;
-  std::vector<float> values;
-  for (int y = 0; y < among.rows; ++y) {
-    for (int x = 0; x < among.cols; ++x) {
-      if (among(y, x) != 0) values.push_back(excess(y, x));
-    }
-  }
-  if (static_cast<int>(values.size()) <= count) return among;
-  if (count == 0) return cv::Mat1b::zeros(among.size());
-  const auto last = values.begin() + count - 1;
-  std::nth_element(values.begin(), last, values.end(), std::greater<>());
-  return among & (excess >= *last);
-}
-
 void append(std::vector<DepthPair>& all, const std::vector<DepthPair>& some) {
   all.insert(all.end(), some.begin(), some.end());
 }
@@ -122,12 +103,6 @@ cv::Mat1f truthOf(const Recording& recording, const KeyframeDepthMap& keyframe,
                      simulation.motion->poseAt(keyframe.window.t_ref_ns) *
                          simulation.rig.cameras.at(camera).T_rig_cam,
                      keyframe.view);
-}
-
-cv::Mat1f only(const cv::Mat1f& depth, const cv::Mat1b& mask) {
-  cv::Mat1f some = cv::Mat1f::zeros(depth.size());
-  depth.copyTo(some, mask);
-  return some;
 }
 
 DepthPairingOptions studyPairing() {

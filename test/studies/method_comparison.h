@@ -8,6 +8,7 @@
 
 #include "mapping/keyframe_mapper.h"
 #include "maps/depth_metrics.h"
+#include "test/studies/outstanding_points.h"
 #include "test/studies/recording_cache.h"
 
 namespace efm::studies {
@@ -50,9 +51,6 @@ struct MethodResult {
 /// What estimates are paired with: the truth within a pixel, because an edge pixel may fall on the
 /// far background.
 DepthPairingOptions studyPairing();
-
-/// The depths of a map at some pixels, 0 elsewhere.
-cv::Mat1f only(const cv::Mat1f& depth, const cv::Mat1b& mask);
 
 struct ComparisonOptions {
   int reference_camera = 0;

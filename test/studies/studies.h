@@ -19,5 +19,7 @@ void studyDriving(const StudyRun& run, StudySection& section);
 void studyRuntime(const StudyRun& run, StudySection& section);
 /// How the DSI becomes clear as events come in.
 void studyConvergence(const StudyRun& run, StudySection& section);
+/// The real slider, against depth from its own frames.
+void studySlider(const StudyRun& run, StudySection& section);
 
 }  // namespace efm::studies
