@@ -31,8 +31,12 @@ constexpr Study kStudies[] = {
     {"algorithms", "2. Comparison of algorithms", studyAlgorithms},
     {"subintervals", "3. Temporal fusion", studySubintervals},
     {"driving", "4. Driving", studyDriving},
+    {"resolution", "5. Resolution", studyResolution},
+    {"contrast_threshold", "6. Contrast threshold", studyContrastThreshold},
+    {"three_cameras", "7. Three cameras", studyThreeCameras},
     {"runtime", "8. Runtime and complexity", studyRuntime},
     {"convergence", "9. Convergence over time", studyConvergence},
+    {"pose_accuracy", "10. Accuracy of the poses", studyPoseAccuracy},
     {"slider", "11. The real slider", studySlider},
 };
 

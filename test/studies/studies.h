@@ -19,6 +19,14 @@ void studyDriving(const StudyRun& run, StudySection& section);
 void studyRuntime(const StudyRun& run, StudySection& section);
 /// How the DSI becomes clear as events come in.
 void studyConvergence(const StudyRun& run, StudySection& section);
+/// Sensors of more and fewer pixels.
+void studyResolution(const StudyRun& run, StudySection& section);
+/// Sensors of more and less sensitivity.
+void studyContrastThreshold(const StudyRun& run, StudySection& section);
+/// Three cameras against two and one.
+void studyThreeCameras(const StudyRun& run, StudySection& section);
+/// Poses and clocks that are wrong.
+void studyPoseAccuracy(const StudyRun& run, StudySection& section);
 /// The real slider, against depth from its own frames.
 void studySlider(const StudyRun& run, StudySection& section);
 

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "test/studies/pose_errors.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "mapping/timestamp.h"
+#include "tracking_stub/random_numbers.h"
+
+namespace efm::studies {
+namespace {
+
+/// Box and Muller, Ann. Math. Statist. 1958.
+double normal(RandomNumbers& random) {
+  constexpr double kTwoPi = 6.283185307179586;
+  const double radius = std::sqrt(-2 * std::log(1 - random.uniform()));
+  return radius * std::cos(kTwoPi * random.uniform());
+}
+
+Eigen::Vector3d normalVector(RandomNumbers& random) {
+  Eigen::Vector3d values;
+  for (int axis = 0; axis < 3; ++axis) values[axis] = normal(random);
+  return values;
+}
+
+Eigen::Quaterniond turnBy(const Eigen::Vector3d& rotation_vector) {
+  const double angle = rotation_vector.norm();
+  if (angle <= 0) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
+}
+
+}  // namespace
+
+Recording withPoseErrors(const Recording& recording, const PoseErrors& errors) {
+  Recording wrong = recording;
+  wrong.trajectory = Trajectory();
+  RandomNumbers random(errors.seed);
+  const Eigen::Vector3d every_axis = Eigen::Vector3d::Ones();
+  const std::int64_t start_ns = recording.simulation.start_ns;
+  const std::int64_t end_ns = recording.simulation.endNs();
+  for (std::int64_t t_ns = start_ns; t_ns <= end_ns; t_ns += errors.period_ns) {
+    StampedPose pose{t_ns + errors.late_ns, recording.simulation.motion->poseAt(t_ns)};
+    const double elapsed_s = secondsBetween(start_ns, t_ns);
+    const Eigen::Vector3d shift_m =
+        errors.noise_m * normalVector(random) + errors.drift_m_s * elapsed_s * every_axis;
+    const Eigen::Vector3d turn =
+        errors.noise_rad * normalVector(random) + errors.drift_rad_s * elapsed_s * every_axis;
+    pose.T_world_rig.translation += shift_m;
+    pose.T_world_rig.rotation = (pose.T_world_rig.rotation * turnBy(turn)).normalized();
+    wrong.trajectory.add(pose);
+  }
+  return wrong;
+}
+
+Recording withLateCamera(const Recording& recording, std::size_t camera, std::int64_t late_ns) {
+  Recording wrong = recording;
+  for (Event& event : wrong.events.at(camera)) event.t_ns += late_ns;
+  return wrong;
+}
+
+}  // namespace efm::studies
