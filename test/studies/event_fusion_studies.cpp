@@ -38,6 +38,7 @@ constexpr Study kStudies[] = {
     {"convergence", "9. Convergence over time", studyConvergence},
     {"pose_accuracy", "10. Accuracy of the poses", studyPoseAccuracy},
     {"slider", "11. The real slider", studySlider},
+    {"better_depth", "12. Depth better than the paper's", studyBetterDepth},
 };
 
 constexpr const char* kUsage =

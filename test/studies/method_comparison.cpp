@@ -70,6 +70,7 @@ KeyframeMapperOptions paperOptions(double min_depth_m, double max_depth_m) {
   options.reference_camera = 0;
   options.view = {};
   options.subintervals = {1, SubintervalSplit::kDuration, SubintervalShuffle::kNone, 1};
+  options.split = SplitFusionOptions::none();
   options.exclude_silent = false;
   options.sweep.fusion = {FusionRule::kHarmonic, FusionRule::kArithmetic,
                           FusionOrder::kCamerasThenTime};

@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
@@ -18,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMagic = 0x31'59'44'55'54'53'4d'45;  // "EMSTUDY1", little-endian
+constexpr std::uint64_t kMagic = 0x32'59'44'55'54'53'4d'45;  // "EMSTUDY2", little-endian
 
 /// FNV-1a over the bytes of numbers.
 class Fingerprint {
@@ -81,41 +82,93 @@ void addScene(const Simulation& simulation, Fingerprint& print) {
   print.addImage(frame.log_intensity);
 }
 
-std::vector<std::vector<Event>> readEvents(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const auto number = [&] {
-    std::uint64_t value = 0;
-    stream.read(reinterpret_cast<char*>(&value), sizeof value);
-    return value;
-  };
-  if (number() != kMagic) throw std::runtime_error(file.string() + ": not a recording of studies");
-  std::vector<std::vector<Event>> cameras(number());
-  for (std::vector<Event>& events : cameras) {
-    events.resize(number());
-    stream.read(reinterpret_cast<char*>(events.data()),
-                static_cast<std::streamsize>(events.size() * sizeof(Event)));
+/// Numbers and arrays of plain values, one after the other.
+class RecordingReader {
+ public:
+  explicit RecordingReader(const fs::path& file) : file_(file), stream_(file, std::ios::binary) {
+    if (number() != kMagic) {
+      throw std::runtime_error(file.string() + ": not a recording of studies: remove it");
+    }
   }
-  if (!stream) throw std::runtime_error(file.string() + ": ends too soon: remove it");
-  return cameras;
+  std::uint64_t number() {
+    std::uint64_t value = 0;
+    stream_.read(reinterpret_cast<char*>(&value), sizeof value);
+    return value;
+  }
+  template <typename Value>
+  std::vector<Value> array() {
+    std::vector<Value> values(number());
+    stream_.read(reinterpret_cast<char*>(values.data()),
+                 static_cast<std::streamsize>(values.size() * sizeof(Value)));
+    if (!stream_) throw std::runtime_error(file_.string() + ": ends too soon: remove it");
+    return values;
+  }
+
+ private:
+  fs::path file_;
+  std::ifstream stream_;
+};
+
+/// The file has its name once it is whole.
+class RecordingWriter {
+ public:
+  explicit RecordingWriter(const fs::path& file)
+      : file_(file),
+        unfinished_(file.string() + ".unfinished"),
+        stream_(unfinished_, std::ios::binary) {
+    number(kMagic);
+  }
+  void number(std::uint64_t value) {
+    stream_.write(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  template <typename Value>
+  void array(const std::vector<Value>& values) {
+    number(values.size());
+    stream_.write(reinterpret_cast<const char*>(values.data()),
+                  static_cast<std::streamsize>(values.size() * sizeof(Value)));
+  }
+  void finish() {
+    stream_.close();
+    if (!stream_) throw std::runtime_error(unfinished_.string() + ": cannot be written");
+    fs::rename(unfinished_, file_);
+  }
+
+ private:
+  fs::path file_;
+  fs::path unfinished_;
+  std::ofstream stream_;
+};
+
+void read(const fs::path& file, Recording& recording) {
+  RecordingReader reader(file);
+  const std::uint64_t cameras = reader.number();
+  for (std::uint64_t camera = 0; camera < cameras; ++camera) {
+    recording.events.push_back(reader.array<Event>());
+    recording.sources.push_back(reader.array<Eigen::Vector3f>());
+  }
 }
 
-void writeEvents(const fs::path& file, const std::vector<std::vector<Event>>& cameras) {
+void write(const fs::path& file, const Recording& recording) {
   static_assert(std::is_trivially_copyable_v<Event>);
-  const fs::path unfinished = file.string() + ".unfinished";
-  std::ofstream stream(unfinished, std::ios::binary);
-  const auto number = [&](std::uint64_t value) {
-    stream.write(reinterpret_cast<const char*>(&value), sizeof value);
-  };
-  number(kMagic);
-  number(cameras.size());
-  for (const std::vector<Event>& events : cameras) {
-    number(events.size());
-    stream.write(reinterpret_cast<const char*>(events.data()),
-                 static_cast<std::streamsize>(events.size() * sizeof(Event)));
+  RecordingWriter writer(file);
+  writer.number(recording.events.size());
+  for (std::size_t camera = 0; camera < recording.events.size(); ++camera) {
+    writer.array(recording.events[camera]);
+    writer.array(recording.sources[camera]);
   }
-  stream.close();
-  if (!stream) throw std::runtime_error(unfinished.string() + ": cannot be written");
-  fs::rename(unfinished, file);
+  writer.finish();
+}
+
+std::vector<Eigen::Vector3f> placesOf(const std::vector<SurfacePoint>& sources,
+                                      const Scene& scene) {
+  std::vector<Eigen::Vector3f> places;
+  places.reserve(sources.size());
+  for (const SurfacePoint& source : sources) {
+    places.push_back(source.surface < 0
+                         ? Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN())
+                         : scene.pointAt(source).cast<float>());
+  }
+  return places;
 }
 
 }  // namespace
@@ -182,15 +235,16 @@ Recording RecordingCache::make(const std::string& name, const Simulation& simula
                 static_cast<unsigned long long>(fingerprintOf(simulation)));
   const fs::path file = folder_ / (name + "_" + print + ".events");
   if (fs::exists(file)) {
-    recording.events = readEvents(file);
+    read(file, recording);
     return recording;
   }
   std::cout << "  simulating " << name << std::flush;
   const auto began = std::chrono::steady_clock::now();
   for (CameraRecording& camera : simulateEvents(simulation)) {
+    recording.sources.push_back(placesOf(camera.sources, simulation.scene));
     recording.events.push_back(std::move(camera.events));
   }
-  writeEvents(file, recording.events);
+  write(file, recording);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
   std::cout << ": " << took.count() << " s\n";
   return recording;

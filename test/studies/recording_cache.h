@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -19,6 +20,8 @@ namespace efm::studies {
 struct Recording {
   Simulation simulation;
   std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
+  /// For each event the place that its pixel saw, frame `world`, metres; NaN for noise.
+  std::vector<std::vector<Eigen::Vector3f>> sources;
   Trajectory trajectory;                   ///< The true poses, every millisecond.
 
   /// `count` windows of equal duration spread evenly over the recording, the first at its start and

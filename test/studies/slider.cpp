@@ -24,6 +24,7 @@ namespace {
 
 constexpr int kPoints = 2500;
 constexpr const char* kPaper = "EMVS (the paper)";
+constexpr const char* kBoth = "split fusion and aggregation (default)";
 
 std::string percent(double share) { return formatNumber(100 * share, 1); }
 
@@ -43,7 +44,16 @@ std::vector<Method> methods() {
   slices.name = "H_t of 4 slices, between planes";
   slices.options.subintervals = {4, SubintervalSplit::kCount, SubintervalShuffle::kNone, 1};
   slices.options.sweep.fusion.across_time = FusionRule::kHarmonic;
-  return {paper, subplane, slices};
+  Method split = subplane;
+  split.name = "split fusion";
+  split.options.split = SplitFusionOptions();
+  Method aggregated = paper;
+  aggregated.name = "aggregation";
+  aggregated.options.extraction = DepthExtractionOptions();
+  Method both = aggregated;
+  both.name = kBoth;
+  both.options.split = SplitFusionOptions();
+  return {paper, subplane, slices, split, aggregated, both};
 }
 
 /// A method's map with its own threshold and with the number of points that all are compared at.
@@ -53,14 +63,33 @@ struct SliderResult {
   cv::Mat1f equal_m;
 };
 
-/// With the largest whole threshold that keeps as many; of these the most outstanding.
+/// Thresholds from strict to loose.
+std::vector<DepthExtractionOptions> thresholdsOf(const DepthExtractionOptions& options) {
+  std::vector<DepthExtractionOptions> thresholds;
+  if (options.extraction == ExtractionMethod::kPaper) {
+    for (int c = 20; c >= 0; --c) {
+      thresholds.push_back(options);
+      thresholds.back().threshold_c = c;
+    }
+    return thresholds;
+  }
+  for (double quality = 1; quality > 0.002; quality *= 0.97) {
+    thresholds.push_back(options);
+    // Whoever wants more points looks at more.
+    thresholds.back().min_excess *= std::clamp(quality / options.min_quality, 0.3, 1.0);
+    thresholds.back().min_quality = quality;
+  }
+  return thresholds;
+}
+
+/// With the strictest threshold that keeps as many; of these the most outstanding.
 SliderResult mapSlider(const SliderRecording& recording, Method method, int points) {
   SliderResult result;
   result.name = method.name;
   result.own = sliderKeyframe(recording, method.options).map;
   DepthMap enough;
-  for (int c = 20; c >= 0; --c) {
-    method.options.extraction.threshold_c = c;
+  for (const DepthExtractionOptions& thresholds : thresholdsOf(method.options.extraction)) {
+    method.options.extraction = thresholds;
     enough = sliderKeyframe(recording, method.options).map;
     if (cv::countNonZero(enough.depth > 0) >= points) break;
   }
@@ -167,6 +196,25 @@ cv::Mat3b errorPicture(const cv::Mat1f& depth_m, const cv::Mat1f& truth_m) {
   return picture;
 }
 
+void judgeSlider(const std::vector<SliderResult>& results, const SliderTruth& truth,
+                 StudySection& section) {
+  const SliderScore paper = scoreOnSlider(results.front().equal_m, truth);
+  const SliderScore ours = scoreOnSlider(results.back().equal_m, truth);
+  const auto ratio = [](double value, double to) { return to > 0 ? value / to : 0; };
+  const double beyond = ratio(ours.beyond_10, paper.beyond_10);
+  const double median = ratio(ours.median_error, paper.median_error);
+  const double horizontal = ratio(ours.on_horizontal, paper.on_horizontal);
+  section.trend("At the same number of points the default leaves at most 0.2 of the paper's points "
+                "beyond 10 %",
+                beyond <= 0.2, formatNumber(beyond, 2));
+  section.trend("and at most 0.4 of its median error", median <= 0.4, formatNumber(median, 2));
+  section.trend("The share of points on horizontal edges falls to at most 0.45 of the paper's",
+                horizontal <= 0.45, formatNumber(horizontal, 2));
+  section.trend("The share of vertical edges that are covered does not fall",
+                ours.vertical_covered >= paper.vertical_covered,
+                percent(paper.vertical_covered) + " to " + percent(ours.vertical_covered) + " %");
+}
+
 double shareWithTruth(const cv::Mat1b& lines, const cv::Mat1f& truth_m) {
   return static_cast<double>(cv::countNonZero(lines & (truth_m > 0))) /
          std::max(1, cv::countNonZero(lines));
@@ -224,9 +272,10 @@ void studySlider(const StudyRun& run, StudySection& section) {
       "Errors are shares of the depth, the truth the best within a pixel, of the points that have "
       "one. *equal*: " +
       std::to_string(kPoints) +
-      " points, those that stand out most with the largest whole threshold that keeps as many. "
+      " points, those that stand out most with the strictest threshold that keeps as many. "
       "*common*: those of them that all methods chose.");
   scoreTable(results, truth, section);
+  judgeSlider(results, truth, section);
 
   const DepthPlanesOptions limits = options().planes;
   PictureGrid above;
@@ -235,15 +284,18 @@ void studySlider(const StudyRun& run, StudySection& section) {
   above.pictures = {{edgePicture(truth), depthPicture(truth.frames.depth, limits)}};
   PictureGrid below;
   below.width_px = 480;
-  below.columns = {"the paper's map", "its errors"};
-  below.pictures = {{depthPicture(results[0].equal_m, limits),
-                     errorPicture(results[0].equal_m, truth.frames.depth)}};
+  below.columns = {"map", "its errors"};
+  below.rows = {"the paper", "default"};
+  for (const SliderResult* result : {&results.front(), &results.back()}) {
+    below.pictures.push_back({depthPicture(result->equal_m, limits),
+                              errorPicture(result->equal_m, truth.frames.depth)});
+  }
   cv::Mat3b picture;
   cv::vconcat(drawGrid(above), drawGrid(below), picture);
   section.picture("slider.png", picture,
                   "The frame with vertical (red) and horizontal (green) edges; depth from the "
-                  "frames, red 0.47 m to blue 2.4 m; 2,500 points of the paper's extraction; their "
-                  "errors: green within 3 %, yellow within 10 %, red beyond, grey without truth");
+                  "frames, red 0.47 m to blue 2.4 m; 2,500 points of the paper's extraction and of "
+                  "the default; their errors: green within 3 %, yellow within 10 %, red beyond, grey without truth");
 }
 
 }  // namespace efm::studies

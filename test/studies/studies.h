@@ -30,4 +30,7 @@ void studyPoseAccuracy(const StudyRun& run, StudySection& section);
 /// The real slider, against depth from its own frames.
 void studySlider(const StudyRun& run, StudySection& section);
 
+/// Split fusion and aggregation against the paper's extraction.
+void studyBetterDepth(const StudyRun& run, StudySection& section);
+
 }  // namespace efm::studies
