@@ -186,7 +186,7 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
                kShuffled, kAtHc, 1.2);
   judge.atMost("but it costs something", kAtHc, kShuffled, 1);
   judge.atMost(
-      "late fusion is worse than fusing DSIs (the paper says so in Sec. 3.1, without "
+      "late fusion is worse than fusing DSIs (the paper says so in Sec. 3.3.1, without "
       "figures)",
       kHcAt, kLate, 1);
 }

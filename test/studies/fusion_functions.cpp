@@ -55,13 +55,11 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
         eachOf(results, own, meanCm), " cm");
   check("so does the median error", eachOf(results, own, medianCm), " cm");
   check("so does bad-pix", eachOf(results, own, badPercent), " %");
-  const auto common = &MethodResult::common;
   check(
-      "all three grow on common pixels, too: it is not only that the later functions choose "
-      "other pixels",
-      eachOf(results, common, badPercent), " % bad-pix");
-  const auto equal = &MethodResult::equal;
-  check("and at equal numbers", eachOf(results, equal, badPercent), " % bad-pix");
+      "bad-pix grows on common pixels, too: it is not only that the later functions choose other "
+      "pixels",
+      eachOf(results, &MethodResult::common, badPercent), " %");
+  check("and at equal numbers", eachOf(results, &MethodResult::equal, badPercent), " %");
 
   const DepthErrors& min = resultOf(results, "min").own;
   const DepthErrors& harmonic = resultOf(results, "harmonic").own;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Sec. 3.6 and 4.9: what a keyframe costs, by step, and the formulas of its
-// complexity.
+// Ghosh and Gallego 2022, Secs. 3.7 and 4.9: what a keyframe costs, by step, and the formulas of
+// its complexity.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <string>
 #include <utility>
@@ -74,7 +75,7 @@ Times measure(const StudyRun& run, const Sizes& sizes,
   return best;
 }
 
-/// The terms of the paper's Eq. 15: DSI creation, DSI fusion, arg max.
+/// The terms of the paper's Eq. 19: DSI creation, DSI fusion, arg max.
 constexpr int kTerms = 3;
 
 std::array<double, kTerms> termsOf(const Sizes& sizes) {
@@ -239,6 +240,12 @@ TextTable stepsOf(const std::vector<Sample>& samples, const Fit& formula) {
   return table;
 }
 
+/// Processes that ran or wanted to, over the last minute: what disturbs the clock.
+double loadAverage() {
+  double load = 0;
+  return getloadavg(&load, 1) == 1 ? load : 0;
+}
+
 void judge(const std::vector<Sample>& samples, const Fit& formula, StudySection& section) {
   section.trend("the formula fits all sizes: it is off by at most a quarter", formula.worst <= 0.25,
                 formatNumber(100 * formula.worst, 0) + " % at worst",
@@ -322,7 +329,7 @@ void byKernel(const StudyRun& run, StudySection& section) {
 
 void studyRuntime(const StudyRun& run, StudySection& section) {
   section.text(
-      "The paper gives the complexity of its algorithms (Eqs. 13 to 15) as "
+      "The paper gives the complexity of its algorithms (Eqs. 17 to 19) as "
       "O(N_c N_e N_Z + N_s N_c N_Z N_p + N_Z N_p + N_p N_k): DSI creation, DSI fusion, "
       "arg max and AGT; and the time of each step (Table 6: N_e = 235 thousand, N_c = 2, "
       "N_p = 90 thousand, N_Z = 100, N_k = 25, N_s = 2; an Intel i7-10510U). Cited:");
@@ -335,7 +342,8 @@ void studyRuntime(const StudyRun& run, StudySection& section) {
       "formula: its first three terms, fitted to the times of keyframes of many sizes, "
       "one changed at a time. The synthetic window of the benchmarks, process CPU time of "
       "one thread, the fastest of several runs, kernel " +
-      std::string(nameOf(fastestKernel())) + ".");
+      std::string(nameOf(fastestKernel())) + "; load average of the machine meanwhile " +
+      formatNumber(loadAverage(), 1) + ".");
   section.table(tableOf(samples, formula));
   section.text("The fit: " + formatNumber(formula.ns[0], 3) + " ns a vote (N_c N_e N_Z), " +
                formatNumber(formula.ns[1], 3) + " ns a voxel of each input (N_s N_c N_Z N_p), " +

@@ -72,8 +72,13 @@ double medianQuarterStepCm(const Recording& recording, const MethodResult& resul
   return *middle;
 }
 
-void judgeNumbers(const std::vector<MethodResult>& results, const std::string& departure,
+/// @param departure why trends depart: said once.
+void judgeNumbers(const std::vector<MethodResult>& results, std::string departure,
                   StudySection& section) {
+  const auto judged = [&](const std::string& claim, bool agrees, const std::string& figures) {
+    section.trend(claim, agrees, figures, departure);
+    if (!agrees && !departure.empty()) departure = "For the same reason.";
+  };
   const auto eachOfThem = [&](DepthErrors MethodResult::*pixels, ErrorFigure figure) {
     std::vector<double> values;
     for (const char* name : {"N_s = 2", "N_s = 4", "N_s = 8"}) {
@@ -83,17 +88,15 @@ void judgeNumbers(const std::vector<MethodResult>& results, const std::string& d
   };
   const auto falls = [&](const std::string& claim, ErrorFigure figure, const std::string& unit) {
     const std::vector<double> values = eachOfThem(&MethodResult::own, figure);
-    section.trend(claim, values[0] > values[1] && values[1] > values[2],
-                  listed(values, 2) + unit + "; on common pixels " +
-                      listed(eachOfThem(&MethodResult::common, figure), 2),
-                  departure);
+    judged(claim, values[0] > values[1] && values[1] > values[2],
+           listed(values, 2) + unit + "; on common pixels " +
+               listed(eachOfThem(&MethodResult::common, figure), 2));
   };
   falls("the mean error falls with N_s from 2 to 8", meanCm, " cm");
   falls("so does the median error", medianCm, " cm");
   falls("so does bad-pix", badPercent, " %");
   const std::vector<double> points = eachOfThem(&MethodResult::own, thousandPoints);
-  section.trend("the number of points rises", grows(points), listed(points, 2) + " thousand",
-                departure);
+  judged("the number of points rises", grows(points), listed(points, 2) + " thousand");
   const DepthErrors& two = resultOf(results, "N_s = 2").own;
   const double by_camera = 1 - two.median_abs_m / results[0].own.median_abs_m;
   const double by_time = 1 - resultOf(results, "N_s = 8").own.median_abs_m / two.median_abs_m;
@@ -145,8 +148,8 @@ void numberOfSubintervals(const StudyRun& run, const Recording& recording,
   judgeNumbers(in_less,
                "Eight sub-intervals are too many for such windows: each holds " +
                    formatNumber(1e-3 * events / 8 / static_cast<double>(shorter.size()), 1) +
-                   " thousand events of both cameras, and where one camera has none in a "
-                   "sub-interval, the harmonic mean is zero. (The paper's hold some 70 thousand.)",
+                   " thousand events of both cameras, and where one camera saw none in a "
+                   "sub-interval the harmonic mean is zero. (The paper's hold some 70 thousand.)",
                section);
 }
 
