@@ -72,7 +72,7 @@ cv::Mat3b projectionsOf(const Recording& recording, const Window& window, const 
 }
 
 void showProjections(const StudyRun& run, const Recording& recording, StudySection& section) {
-  std::vector<double> durations_s = {0.05, 0.1, 0.2, 1};
+  std::vector<double> durations_s = {0.05, 0.2, 1};
   if (run.quick) durations_s = {0.05, 0.1};
   PictureGrid grid;
   grid.width_px = 343;

@@ -211,8 +211,10 @@ void studyDriving(const StudyRun& run, StudySection& section) {
   grid.pictures[0].push_back(
       depthPicture(truthOf(recording, results[0].keyframes[shown]), two.options.planes));
   grid.pictures[1].emplace_back();
-  section.picture("driving.png", drawGrid(grid),
-                  "A window of 0.2 s: depth (red 4 m to blue 50 m) and confidence");
+  section.picture(
+      "driving.png", drawGrid(grid),
+      "A window of 0.2 s: depth (red 4 m to blue 50 m; without MF drawn 3 pixels wide) and "
+      "confidence");
   judge(recording, results, section);
   findReasons(recording, windows, {one, two, dilated}, options, section);
 }
