@@ -36,17 +36,23 @@ Recording withPoseErrors(const Recording& recording, const PoseErrors& errors) {
   wrong.trajectory = Trajectory();
   RandomNumbers random(errors.seed);
   const Eigen::Vector3d every_axis = Eigen::Vector3d::Ones();
+  const Motion& motion = *recording.simulation.motion;
   const std::int64_t start_ns = recording.simulation.start_ns;
   const std::int64_t end_ns = recording.simulation.endNs();
+  Eigen::Vector3d true_m = motion.poseAt(start_ns).translation;
+  Eigen::Vector3d drifted_m = true_m;
   for (std::int64_t t_ns = start_ns; t_ns <= end_ns; t_ns += errors.period_ns) {
-    StampedPose pose{t_ns + errors.late_ns, recording.simulation.motion->poseAt(t_ns)};
+    const Rigid3 T_world_rig = motion.poseAt(t_ns);
     const double elapsed_s = secondsBetween(start_ns, t_ns);
-    const Eigen::Vector3d shift_m =
-        errors.noise_m * normalVector(random) + errors.drift_m_s * elapsed_s * every_axis;
-    const Eigen::Vector3d turn =
-        errors.noise_rad * normalVector(random) + errors.drift_rad_s * elapsed_s * every_axis;
-    pose.T_world_rig.translation += shift_m;
-    pose.T_world_rig.rotation = (pose.T_world_rig.rotation * turnBy(turn)).normalized();
+    const Eigen::Quaterniond turned = turnBy(errors.drift_rad_s * elapsed_s * every_axis);
+    drifted_m += turned * (T_world_rig.translation - true_m);
+    true_m = T_world_rig.translation;
+    StampedPose pose{t_ns + errors.late_ns, {}};
+    pose.T_world_rig.translation = drifted_m + errors.drift_m_s * elapsed_s * every_axis +
+                                   errors.noise_m * normalVector(random);
+    pose.T_world_rig.rotation =
+        (turned * T_world_rig.rotation * turnBy(errors.noise_rad * normalVector(random)))
+            .normalized();
     wrong.trajectory.add(pose);
   }
   return wrong;

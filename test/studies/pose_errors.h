@@ -14,8 +14,8 @@ struct PoseErrors {
   /// Of every pose on its own: standard deviation on each axis.
   double noise_m = 0;
   double noise_rad = 0;
-  /// The tracked rig runs away at constant speed: along each axis of the world, and about each
-  /// axis of the rig.
+  /// As odometry drifts: it adds up what it saw of the way along a heading that turns away at a
+  /// constant rate about each axis of the world, and runs away at a constant speed along each.
   double drift_m_s = 0;
   double drift_rad_s = 0;
   /// The poses' stamps are so much late.
