@@ -161,7 +161,7 @@ KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
 std::vector<std::vector<EventSpan>> KeyframeMapper::slicesOf(EventSpan events,
                                                              const Window& window) const {
   SubintervalOptions all = options_.subintervals;
-  all.count *= options_.split.slices(selected_.size());
+  all.count *= options_.split.time_slices;
   const std::vector<EventSpan> parts =
       splitIntoSubintervals(events, window.t0_ns, window.t1_ns, all);
   std::vector<std::vector<EventSpan>> slices;
@@ -197,7 +197,7 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   std::vector<CameraRays> rays;
   for (CameraInput& input : inputs) rays.push_back(std::move(input.rays));
   SplitRays split = arrangeGroups(
-      std::move(rays), options_.split.slices(selected_.size()),
+      std::move(rays), options_.split.time_slices,
       assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals));
 
   // 4. Vote and fuse, plane by plane.

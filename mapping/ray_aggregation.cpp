@@ -16,7 +16,6 @@ namespace efm {
 namespace {
 
 constexpr float kSigma_px = 1.5F;
-constexpr double kBesidePeak = 3;  ///< Places on each side that belong to a peak.
 
 /// Finds the peak of a sum of rays.
 class PeakFinder {
@@ -35,22 +34,14 @@ class PeakFinder {
     const float curvature = 2 * *top - before - after;
     peak.width_sq = peak.at_end || !(curvature > 0) ? std::numeric_limits<float>::infinity()
                                                     : *top / curvature;
-    const int beside = static_cast<int>(std::lround(kBesidePeak * place_));
-    const float second = std::max(largest(sum, 0, plane - beside),
-                                  largest(sum, plane + beside + 1, planes_));
-    peak.ambiguity = *top > 0 ? second / *top : 1;
-    return peak;
-  }
-
-  /// A ray's largest value at a position, as a share of its peak.
-  float shareAt(const DsiRays& rays, cv::Point pixel, float position, float confidence) const {
-    const int plane = static_cast<int>(std::lround(position));
-    const int around = static_cast<int>(std::ceil(place_));
-    float value = 0;
-    for (int p = std::max(0, plane - around); p <= std::min(planes_ - 1, plane + around); ++p) {
-      value = std::max(value, rays.value(pixel, p));
+    for (std::size_t i = 0; i < peak.beyond.size(); ++i) {
+      const double places = AggregatedPeak::kLeastBeside + static_cast<double>(i);
+      const auto beside = static_cast<int>(std::lround(places * place_));
+      const float second = std::max(largest(sum, 0, plane - beside),
+                                    largest(sum, plane + beside + 1, planes_));
+      peak.beyond[i] = *top > 0 ? second / *top : 1;
     }
-    return std::min(1.0F, value / confidence);
+    return peak;
   }
 
  private:
@@ -67,8 +58,8 @@ class PeakFinder {
 double planesOfOnePlace(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
 
 std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRays& rays,
-                                          const cv::Mat1f& confidence) {
-  const PixelNeighbours neighbours(chosen, confidence.size());
+                                          cv::Size size) {
+  const PixelNeighbours neighbours(chosen, size);
   const PeakFinder finder(rays.planes());
   std::vector<AggregatedPeak> peaks(chosen.size());
   tbb::parallel_for(tbb::blocked_range<int>(0, chosen.rows()), [&](const auto& rows) {
@@ -84,7 +75,6 @@ std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRay
                      std::exp(-distance_sq / (2 * kSigma_px * kSigma_px)));
         });
         peaks[i] = finder.find(sum);
-        peaks[i].own = finder.shareAt(rays, pixel, peaks[i].position, confidence(pixel));
       }
     }
   });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "mapping/dsi_rays.h"
@@ -13,9 +14,11 @@ struct AggregatedPeak {
   float position = 0;   ///< Of the largest sum, between planes.
   float width_sq = 0;   ///< c / (2c - before - after) there, planes^2; infinite where flat or at an
                         ///< end.
-  float ambiguity = 0;  ///< The largest sum that is not beside the peak, as a share of it: 0 to 1.
-  /// What the pixel's own ray has at the common peak, as a share of its own peak: 0 to 1.
-  float own = 0;
+  /// The largest sum more than so many places from the peak, as a share of it: by
+  /// `kLeastBeside` places and by each more, to `kMostBeside`. 0 to 1.
+  static constexpr int kLeastBeside = 3;
+  static constexpr int kMostBeside = 12;
+  std::array<float, kMostBeside - kLeastBeside + 1> beyond{};
   bool at_end = false;  ///< The peak lies on the first or the last plane.
 };
 
@@ -23,10 +26,10 @@ struct AggregatedPeak {
 /// distance, and finds the peak of the sum and a parabola through it and its neighbours. Only pixels
 /// that stand out are summed: the DSI between edges is noise, and smoothing it all moves peaks
 /// instead of sharpening them.
-/// @param chosen have rays (asserted); @param confidence their peaks.
+/// @param chosen have rays (asserted). @param size of the view.
 /// @return one per chosen pixel. Runs on the threads of the task arena that it is called in.
 std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRays& rays,
-                                          const cv::Mat1f& confidence);
+                                          cv::Size size);
 
 /// Planes that count as one place, for a DSI of so many: with more planes than a hundred, the same
 /// ridge spans more of them.

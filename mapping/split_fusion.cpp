@@ -27,8 +27,8 @@ CameraRays inSlots(CameraRays rays, const std::vector<int>& slots) {
 }  // namespace
 
 void SplitFusionOptions::validate() const {
-  const int slices = time_slices.value_or(1);
-  requireOption(slices >= 1 && slices <= kMaxTimeSlices, "time_slices", slices, "1 to 1000");
+  requireOption(time_slices >= 1 && time_slices <= kMaxTimeSlices, "time_slices", time_slices,
+                "1 to 1000");
 }
 
 std::vector<Event> eventsOfPolarity(EventSpan events, bool polarity) {

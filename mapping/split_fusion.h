@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
-#include <optional>
 #include <vector>
 
 #include "mapping/event.h"
@@ -23,13 +21,11 @@ struct SplitFusionOptions {
 
   bool polarity = true;  ///< A group per polarity.
   /// Groups in time, 1 to 1000. Where a single camera is fused, its slices take the place of
-  /// cameras: the rule across cameras fuses them, and only polarities are summed. Not given: 2 with
-  /// several cameras, where more gain nothing in windows of 0.2 and 0.5 s and cost time; 4 with
-  /// one, which has nothing else to fuse.
-  std::optional<int> time_slices;
+  /// cameras: the rule across cameras fuses them, and only polarities are summed. More than 2 gain
+  /// nothing in windows of 0.2 and 0.5 s, cost time, and lose weak edges of a single camera.
+  int time_slices = 2;
 
   int polarities() const { return polarity ? 2 : 1; }
-  int slices(std::size_t cameras) const { return time_slices.value_or(cameras > 1 ? 2 : 4); }
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };

@@ -134,8 +134,8 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "fusion"sv, "split_polarity"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.split.polarity; }),
-      optionOr(
-          "auto"sv, "fusion"sv, "time_slices"sv,
+      option(
+          "fusion"sv, "time_slices"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.split.time_slices; }),
       option(
           "fusion"sv, "late"sv, [](auto& o) -> auto& { return o.late_fusion; }),

@@ -163,10 +163,11 @@ std::vector<Eigen::Vector3f> placesOf(const std::vector<SurfacePoint>& sources,
                                       const Scene& scene) {
   std::vector<Eigen::Vector3f> places;
   places.reserve(sources.size());
+  const Eigen::Vector3f nowhere =
+      Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   for (const SurfacePoint& source : sources) {
-    places.push_back(source.surface < 0
-                         ? Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN())
-                         : scene.pointAt(source).cast<float>());
+    places.push_back(nowhere);
+    if (source.surface >= 0) places.back() = scene.pointAt(source).cast<float>();
   }
   return places;
 }

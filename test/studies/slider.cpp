@@ -281,6 +281,7 @@ void studySlider(const StudyRun& run, StudySection& section) {
   PictureGrid above;
   above.width_px = 480;
   above.columns = {"frame and edges", "depth of the frames"};
+  above.rows = {"frames"};
   above.pictures = {{edgePicture(truth), depthPicture(truth.frames.depth, limits)}};
   PictureGrid below;
   below.width_px = 480;
