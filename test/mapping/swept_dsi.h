@@ -18,6 +18,9 @@ struct SweepCase {
   std::vector<CameraRays> cameras;
   FusionOptions fusion = {FusionRule::kArithmetic, FusionRule::kArithmetic,
                           FusionOrder::kCamerasThenTime};
+  int groups = 1;
+  bool camera_peaks = true;
+  int ray_window = 0;
 };
 
 struct SweptDsi {
@@ -25,7 +28,7 @@ struct SweptDsi {
   SweepResult result;
 };
 
-/// The whole DSI, the peaks and those of each camera.
+/// The whole DSI, and what was asked for beside it.
 inline SweptDsi sweep(const SweepCase& input, VotingKernel kernel, int threads = 1) {
   SpaceSweepOptions options;
   options.fusion = input.fusion;
@@ -33,7 +36,8 @@ inline SweptDsi sweep(const SweepCase& input, VotingKernel kernel, int threads =
   options.threads = threads;
   KeptDsi dsi(input.planes, input.view);
   SweepResult result =
-      SpaceSweep(options).run(input.cameras, input.view, input.planes, {true, &dsi});
+      SpaceSweep(options).run(input.cameras, input.view, input.planes,
+                              {input.camera_peaks, &dsi, input.groups, input.ray_window});
   EXPECT_EQ(dsi.planesSeen(), static_cast<std::size_t>(input.planes.size()));
   return {dsi.values, std::move(result)};
 }
