@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "mapping/depth_extraction.h"
+#include "mapping/depth_planes.h"
+
+namespace efm::oracle {
+
+/// `extractAggregated` written down as simply as possible, in double precision and from the whole
+/// DSI: every step looks at every pixel, no ray is rounded and none is left out.
+/// @param dsi [plane][row][column]. Without dilation.
+DepthMap extractAggregated(const std::vector<float>& dsi, const cv::Size& size,
+                           const DepthPlanes& planes, const DepthExtractionOptions& options);
+
+}  // namespace efm::oracle
