@@ -213,18 +213,22 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
 
   // 5. Depth and confidence from the fused DSI.
   const StageScope scope(stages, Stage::kDepth);
+  tbb::task_arena arena(options_.sweep.threadsOrCores());
+  const auto extract = [&](const SweptDsi& dsi, std::optional<double> sequence_maximum) {
+    return arena.execute(
+        [&] { return extractDepth(dsi, planes_, options_.extraction, sequence_maximum); });
+  };
   keyframe.largest_confidence = largestOf(swept.fused.peaks.confidence);
   sequence_maximum_.take(keyframe.largest_confidence);
   const auto sequence_maximum =
       options_.sequence_maximum ? options_.sequence_maximum : sequence_maximum_.value();
-  keyframe.map = extractDepth(swept.fused, planes_, options_.extraction, sequence_maximum);
+  keyframe.map = extract(swept.fused, sequence_maximum);
   if (options_.camera_maps && !cameras_apart) {
     keyframe.camera_maps.push_back({inputs.front().camera, keyframe.map});
   }
   for (std::size_t c = 0; c < swept.cameras.size(); ++c) {
     // A camera alone has other densities than the fusion: the recording's maximum is not its own.
-    keyframe.camera_maps.push_back(
-        {inputs[c].camera, extractDepth(swept.cameras[c], planes_, options_.extraction)});
+    keyframe.camera_maps.push_back({inputs[c].camera, extract(swept.cameras[c], std::nullopt)});
   }
 }
 

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
+#include <tbb/task_scheduler_observer.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <opencv2/core.hpp>
 
@@ -108,6 +110,29 @@ TEST_P(KeyframeDefaultsOn, TheNumberOfThreadsChangesNoBit) {
       }
     }
   }
+}
+
+/// Counts the workers that come to the thread that it is made on.
+class WorkersThatCome : public tbb::task_scheduler_observer {
+ public:
+  WorkersThatCome() { observe(true); }
+  ~WorkersThatCome() override { observe(false); }
+  void on_scheduler_entry(bool is_worker) override { count_ += is_worker ? 1 : 0; }
+  int count() const { return count_; }
+
+ private:
+  std::atomic<int> count_ = 0;
+};
+
+TEST(KeyframeDefaults, OneThreadHasNoWorkersInAnyStep) {
+  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
+  const MovingEdges recording(2);
+  KeyframeMapper mapper(recording.rig, recording.cameras(), defaults());
+  const WorkersThatCome workers;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_TRUE(mapper.map(MovingEdges::kWindow, recording.spans(), recording.trajectory));
+  }
+  EXPECT_EQ(workers.count(), 0);
 }
 
 TEST_P(KeyframeDefaultsOn, DepthsAreThePlainKernels) {
