@@ -19,8 +19,10 @@ struct TilePixels {
 };
 
 TilePixels standingOut(const cv::Mat1f& confidence, int window) {
+  // Isolated: what lies around the tile may be being written.
   cv::Mat1f surroundings;
-  cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0, cv::BORDER_REPLICATE);
+  cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0,
+                   cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
   const int reach = window / 2;
   const cv::Rect inner(reach, reach, confidence.cols - 2 * reach, confidence.rows - 2 * reach);
   TilePixels pixels;
