@@ -223,7 +223,7 @@ TEST(KeyframeDefaults, ASingleCamerasMapIsTheFusedOneOfItsSlices) {
 
 TEST(KeyframeDefaults, SilentSubintervalsAreCountedInAllSlicesButNotByPolarity) {
   test::RandomRecording recording(9, 2, 3000);
-  for (Event& event : recording.events[0]) event.polarity = true;
+  for (Event& event : recording.events[0]) event.polarity = false;
   // The second camera sees nothing in the third and fourth of six parts.
   auto& events = recording.events[1];
   events.erase(std::remove_if(events.begin(), events.end(),

@@ -2,6 +2,7 @@
 #include "mapping/local_agreement.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -140,6 +141,13 @@ TEST(LocalAgreement, ThoseWithinNearAgreeAndTheMedianHasHalfTheWeight) {
   EXPECT_NEAR(found.spread, 0.2, 1e-5) << "of 0, 0.2 and 2.6";
 }
 
+TEST(LocalAgreement, OfTwoWithTheSameWeightTheMedianIsTheNearer) {
+  Depths depths({20, 20});
+  depths.keep({10, 10}, 40);
+  depths.keep({11, 10}, 30);
+  EXPECT_EQ(depths.at({10, 10}).median, 30);
+}
+
 TEST(LocalAgreement, OthersCountForTheShareMoreTheNearerTheyAre) {
   Depths depths({20, 20});
   depths.keep({10, 10}, 30);
@@ -163,6 +171,7 @@ TEST(LocalAgreement, WeightsInAnotherUnitChangeNothing) {
 }
 
 TEST(LocalAgreement, TheNumberOfThreadsChangesNoBit) {
+  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
   const Depths depths = randomDepths(6, {40, 30}, 2);
   const auto on = [&](int threads) {
     tbb::task_arena arena(threads);

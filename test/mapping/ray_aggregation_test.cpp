@@ -2,6 +2,7 @@
 #include "mapping/ray_aggregation.h"
 
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -232,6 +233,7 @@ TEST(RayAggregation, TwiceTheVotesChangeNoBit) {
 }
 
 TEST(RayAggregation, TheNumberOfThreadsChangesNoBit) {
+  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
   const ChosenDsi dsi = randomDsi(12, {31, 22}, 100);
   const cv::Mat1b mask = randomMask(12, dsi.size, 2);
   const auto on = [&](int threads) {
