@@ -11,6 +11,7 @@
 
 #include "mapping/back_projection.h"
 #include "mapping/option_check.h"
+#include "mapping/revote_sweep.h"
 
 namespace efm {
 namespace {
@@ -58,6 +59,7 @@ void KeyframeMapperOptions::validate() const {
   view.validate();
   subintervals.validate();
   split.validate();
+  revoting.validate();
   packets.validate();
   sweep.validate();
   extraction.validate();
@@ -203,11 +205,13 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   // 4. Vote and fuse, plane by plane.
   const bool cameras_apart = split.inputs.size() == inputs.size();  // not slices of a single one
   const bool camera_peaks = options_.camera_maps && cameras_apart;
-  const int ray_window = keepsRays(options_.extraction.extraction) ? options_.extraction.threshold_kernel : 0;
+  const int ray_window =
+      keepsRays(options_.extraction.extraction) ? options_.extraction.threshold_kernel : 0;
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
-    swept = sweep_.run(std::move(split.inputs), view_, planes_, {camera_peaks, sink, split.groups, ray_window});
+    const SweepRequest request{camera_peaks, sink, split.groups, ray_window};
+    swept = sweep(std::move(split), inputs.size() > 1, request);
   }
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
 
@@ -230,6 +234,18 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
     // A camera alone has other densities than the fusion: the recording's maximum is not its own.
     keyframe.camera_maps.push_back({inputs[c].camera, extract(swept.cameras[c], std::nullopt)});
   }
+}
+
+SweepResult KeyframeMapper::sweep(SplitRays rays, bool several_cameras,
+                                  const SweepRequest& request) const {
+  if (!options_.revoting.revote) {
+    return sweep_.run(std::move(rays.inputs), view_, planes_, request);
+  }
+  constexpr float kMinShare = 0.05F;  // see VoteSharing
+  const VoteSharing sharing{options_.revoting.revote_power, several_cameras ? kMinShare : 0,
+                            options_.sweep.kernelOrFastest()};
+  return sweepTwice(std::move(rays), options_.split.polarities(), view_, planes_, options_.sweep,
+                    sharing, request);
 }
 
 }  // namespace efm

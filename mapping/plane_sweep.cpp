@@ -42,8 +42,8 @@ class Volumes {
   SweptDsi swept(std::size_t volume, DsiPeaks peaks) const {
     if (volumes_.empty()) return {std::move(peaks), {}};
     const cv::Size size = peaks.confidence.size();
-    std::vector<DsiRays::Tile> all = {DsiRays::pick({{0, 0}, size}, peaks.confidence,
-                                                    volumes_[volume], planes_, ray_window_)};
+    std::vector<DsiRays::Tile> all = {
+        DsiRays::pick({{0, 0}, size}, peaks.confidence, volumes_[volume], planes_, ray_window_)};
     return {std::move(peaks), DsiRays(size, planes_, std::move(all))};
   }
 
@@ -92,26 +92,25 @@ VoteCounts votePlane(const RayBundle& camera, const ReferenceView& view, double 
 
 }  // namespace
 
-SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceView& view,
-                        const DepthPlanes& planes, const SpaceSweepOptions& options,
-                        const SweepRequest& request) {
-  const std::size_t kept_cameras = request.camera_peaks ? cameras.size() : 0;
+SweepResult sweepPlanes(const PlaneVoter& voter, const FusionInputs& inputs,
+                        const ReferenceView& view, const DepthPlanes& planes,
+                        const SpaceSweepOptions& options, const SweepRequest& request) {
+  const auto cameras = static_cast<std::size_t>(inputs.cameras);
+  const std::size_t kept_cameras = request.camera_peaks ? cameras : 0;
   std::vector<SweptGroup> groups = groupPlanes(planes.size(), options.threadsOrCores());
   Volumes volumes(view, planes.size(), 1 + kept_cameras, request.ray_window);
 
   const auto sweep_group = [&](SweptGroup& group) {
     RunningPeaks& peaks = group.peaks.emplace(view.pixels(), options.kernelOrFastest());
     group.camera_peaks.assign(kept_cameras, RunningPeaks(view.pixels(), options.kernelOrFastest()));
-    group.votes.resize(cameras.size());
+    group.votes.resize(cameras);
     PlaneFusion fusion(
-        options.fusion, fusionInputs(cameras, request.groups), view.pixels(),
+        options.fusion, inputs, view.pixels(),
         request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
         options.kernelOrFastest());
     for (int plane = group.begin; plane < group.end; ++plane) {
       const PlaneValues& fused = fusion.fuse([&](int camera, int slot, PlaneValues& votes) {
-        const auto c = static_cast<std::size_t>(camera);
-        group.votes[c] +=
-            votePlane(cameras[c][static_cast<std::size_t>(slot)], view, planes.depth(plane), votes);
+        group.votes[static_cast<std::size_t>(camera)] += voter(camera, slot, plane, votes);
       });
       peaks.take(plane, fused);
       volumes.take(0, plane, fused);
@@ -121,6 +120,9 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceV
         volumes.take(c + 1, plane, alone);
       }
       if (request.sink != nullptr) request.sink->takePlane(plane, fused.data());
+      if (request.tile_sink != nullptr) {
+        request.tile_sink->takeTile(plane, {0, 0, view.width, view.height}, fused);
+      }
     }
   };
   tbb::task_arena arena(options.threadsOrCores());
@@ -139,13 +141,23 @@ SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceV
     for (std::size_t c = 0; c < kept_cameras; ++c) {
       all.camera_peaks[c].append(group->camera_peaks[c]);
     }
-    for (std::size_t c = 0; c < cameras.size(); ++c) all.votes[c] += group->votes[c];
+    for (std::size_t c = 0; c < cameras; ++c) all.votes[c] += group->votes[c];
   }
   SweepResult result{volumes.swept(0, all.peaks->images(view)), {}, all.votes};
   for (std::size_t c = 0; c < kept_cameras; ++c) {
     result.cameras.push_back(volumes.swept(c + 1, all.camera_peaks[c].images(view)));
   }
   return result;
+}
+
+SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceView& view,
+                        const DepthPlanes& planes, const SpaceSweepOptions& options,
+                        const SweepRequest& request) {
+  const auto voter = [&](int camera, int slot, int plane, PlaneValues& density) {
+    const CameraRays& rays = cameras[static_cast<std::size_t>(camera)];
+    return votePlane(rays[static_cast<std::size_t>(slot)], view, planes.depth(plane), density);
+  };
+  return sweepPlanes(voter, fusionInputs(cameras, request.groups), view, planes, options, request);
 }
 
 }  // namespace efm

@@ -8,50 +8,17 @@
 #include <tbb/task_arena.h>
 
 #include <opencv2/core.hpp>
-#include <optional>
 #include <utility>
 
 #include "mapping/binned_rays.h"
 #include "mapping/plane_group.h"
+#include "mapping/tile_finds.h"
 #include "mapping/tile_rays.h"
 #include "mapping/tile_voter.h"
 #include "mapping/view_tiles.h"
 
 namespace efm {
 namespace {
-
-/// What is found on one tile, of the fused DSI or of one camera's.
-class TileFinds {
- public:
-  TileFinds(int planes, int ray_window)
-      : planes_(planes),
-        ray_window_(ray_window),
-        volume_(ray_window > 0 ? planes : 0, TileVoter::kTilePixels * TileVoter::kTilePixels) {}
-
-  void moveTo(const cv::Rect& tile, VotingKernel kernel) {
-    tile_ = tile;
-    peaks_.emplace(static_cast<std::size_t>(tile.area()), kernel);
-  }
-  /// Planes in increasing order, without a gap.
-  void take(int plane, const PlaneValues& values) {
-    peaks_->take(plane, values);
-    if (ray_window_ > 0) volume_.take(plane, values);
-  }
-  /// Writes into places of the tile's own.
-  void writeTo(DsiPeaks& peaks, DsiRays::Tile& rays) const {
-    peaks_->writeTo(peaks, tile_);
-    if (ray_window_ > 0) {
-      rays = DsiRays::pick(tile_, peaks.confidence(tile_), volume_, planes_, ray_window_);
-    }
-  }
-
- private:
-  int planes_;
-  int ray_window_;
-  cv::Rect tile_;
-  std::optional<RunningPeaks> peaks_;
-  TileVolume volume_;
-};
 
 /// What one thread needs, kept from tile to tile.
 struct Workplace {
@@ -83,17 +50,6 @@ class WholePlanes {
  private:
   DsiSink* sink_;
   std::vector<cv::Mat1f> planes_;
-};
-
-/// What is found on all tiles.
-struct Found {
-  DsiPeaks peaks;
-  std::vector<DsiRays::Tile> rays;  // by tile
-
-  Found(const ReferenceView& view, std::size_t tiles) : peaks(unwrittenPeaks(view)), rays(tiles) {}
-  SweptDsi whole(int planes) {
-    return {peaks, DsiRays(peaks.confidence.size(), planes, std::move(rays))};
-  }
 };
 
 class TiledSweep {
@@ -135,7 +91,8 @@ class TiledSweep {
   }
 
   Workplace newWorkplace() const {
-    const TileFinds finds(planes_, request_.ray_window);
+    const TileFinds finds(planes_, request_.ray_window,
+                          TileVoter::kTilePixels * TileVoter::kTilePixels);
     return {TileVoter(kernel_), std::vector<TileRays>(rays_.inputs()),
             std::vector<std::uint64_t>(static_cast<std::size_t>(cameras_)), finds,
             std::vector<TileFinds>(seenAlone(), finds)};
@@ -176,6 +133,7 @@ class TiledSweep {
       workplace.cameras[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
     }
     whole_planes_.take(plane, tile, fused);
+    if (request_.tile_sink != nullptr) request_.tile_sink->takeTile(plane, tile, fused);
   }
 
   SweepResult result() {

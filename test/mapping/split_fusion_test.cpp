@@ -173,24 +173,14 @@ TEST(EventsOfPolarity, OfNoneAreNone) {
   EXPECT_TRUE(eventsOfPolarity(std::vector<Event>{{1, 2, 3, true}}, false).empty());
 }
 
-TEST(SplitFusionOptions, SlicesNotGivenAreTwoOfSeveralCamerasAndFourOfOne) {
-  const SplitFusionOptions options;
-  EXPECT_EQ(options.polarities(), 2);
-  EXPECT_EQ(options.slices(1), 4);
-  EXPECT_EQ(options.slices(2), 2);
-  EXPECT_EQ(options.slices(3), 2);
-  SplitFusionOptions given;
-  given.time_slices = 3;
-  given.polarity = false;
-  EXPECT_EQ(given.polarities(), 1);
-  EXPECT_EQ(given.slices(1), 3);
-  EXPECT_EQ(given.slices(2), 3);
+TEST(SplitFusionOptions, AreTwoSlicesOfTwoPolarities) {
+  EXPECT_EQ(SplitFusionOptions().polarities(), 2);
+  EXPECT_EQ(SplitFusionOptions().time_slices, 2);
 }
 
 TEST(SplitFusionOptions, NoneIsOneGroup) {
   EXPECT_EQ(SplitFusionOptions::none().polarities(), 1);
-  EXPECT_EQ(SplitFusionOptions::none().slices(1), 1);
-  EXPECT_EQ(SplitFusionOptions::none().slices(2), 1);
+  EXPECT_EQ(SplitFusionOptions::none().time_slices, 1);
 }
 
 TEST(SplitFusionOptions, SlicesOutOfRangeAreNamed) {

@@ -17,9 +17,9 @@ struct Pixel {
   double excess = 0;
   double position = 0;
   double width_sq = 0;
-  double ambiguity = 0;
-  double own = 0;
   bool at_end = false;
+  std::vector<double> sum;  // by plane
+  int peak = 0;
 };
 
 class NaiveAggregation {
@@ -33,16 +33,17 @@ class NaiveAggregation {
     lookAt(confidence, options);
     for (std::size_t i = 0; i < seen_.size(); ++i) aggregate(seen_[i], pixels_[i]);
 
+    const int of_peak = beside();
     DepthMap map{cv::Mat1f::zeros(size_), confidence, cv::Mat1f::zeros(size_)};
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       const auto [median, spread, share] = agreement(i);
       const Pixel& pixel = pixels_[i];
       if (planes_ > 2 && pixel.at_end) continue;
-      const double quality = pixel.excess * std::sqrt(std::max(0.0, 1 - pixel.ambiguity)) *
-                             pixel.own * pixel.own *
-                             std::exp(-std::abs(pixel.position - median) / (2 * place_)) * share;
+      const double quality = pixel.excess *
+                             std::pow(std::max(0.0, 1 - ambiguity(pixel, of_peak)), 1.25) *
+                             std::exp(-std::abs(pixel.position - median) / (10 * place_)) * share;
       if (quality <= options.min_quality) continue;
-      const double variance = 0.045 * std::sqrt(pixel.width_sq) * (spread + 0.03);
+      const double variance = 0.09 * 0.09 + 0.0143 * pixel.width_sq * (spread + 0.03);
       const double step = depths.inverseDepthStepAt(median);
       map.depth(seen_[i]) = static_cast<float>(depths.depthAt(median));
       map.variance(seen_[i]) =
@@ -150,18 +151,26 @@ class NaiveAggregation {
       pixel.position += 0.5 * (after - before) / (2 * top - before - after);
       pixel.width_sq = top / (2 * top - before - after);
     }
-    const auto beside = static_cast<int>(std::lround(3 * place_));
-    const auto around = static_cast<int>(std::ceil(place_));
-    double own = 0;
-    for (int plane = 0; plane < planes_; ++plane) {
-      if (std::abs(plane - best) > beside) {
-        pixel.ambiguity = std::max(pixel.ambiguity, sum[static_cast<std::size_t>(plane)] / top);
-      }
-      if (std::abs(plane - static_cast<int>(std::lround(pixel.position))) <= around) {
-        own = std::max(own, at(at_pixel, plane));
-      }
+    pixel.sum = sum;
+    pixel.peak = best;
+  }
+
+  /// Planes on each side that belong to a peak: by the median width of all.
+  int beside() const {
+    std::vector<double> widths;
+    for (const Pixel& pixel : pixels_) widths.push_back(std::sqrt(pixel.width_sq));
+    if (widths.empty()) return 0;
+    std::sort(widths.begin(), widths.end());
+    const double places = std::round(1.6 * widths[widths.size() / 2] / place_);
+    return static_cast<int>(std::lround(std::clamp(places, 3.0, 12.0) * place_));
+  }
+  static double ambiguity(const Pixel& pixel, int beside) {
+    double second = 0;
+    for (int plane = 0; plane < static_cast<int>(pixel.sum.size()); ++plane) {
+      if (std::abs(plane - pixel.peak) <= beside) continue;
+      second = std::max(second, pixel.sum[static_cast<std::size_t>(plane)]);
     }
-    pixel.own = own / largestOf(at_pixel);
+    return second / pixel.sum[static_cast<std::size_t>(pixel.peak)];
   }
 
   Agreement agreement(std::size_t of) const {
