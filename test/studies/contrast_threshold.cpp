@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Sec. 4.9: events of more and less sensitive sensors.
+// Ghosh and Gallego 2022, Sec. 4.10: events of more and less sensitive sensors.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -182,7 +182,7 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
   std::vector<double> events;
   for (const Sensitivity& level : levels) events.push_back(level.million_events);
   section.text(
-      "The paper (Sec. 4.9, Figs. 15 and 16) simulates flying_room with ESIM at five contrast "
+      "The paper (Sec. 4.10) simulates flying_room with ESIM at five contrast "
       "thresholds. Here: the room, the rig and the windows of study 5 at 640x480, contrast "
       "thresholds of " +
       listed(thresholds, 2) + ", which make " + listed(events, 2) +

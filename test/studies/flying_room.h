@@ -7,7 +7,7 @@
 
 namespace efm::studies {
 
-/// What the paper simulates with ESIM in its scene flying_room (Secs. 4.7 and 4.9), here in the
+/// What the paper simulates with ESIM in its scene flying_room (Secs. 4.7 and 4.10), here in the
 /// room of the preset hd_stereo: two cameras without distortion, 0.20 m apart, 77 degrees wide and
 /// 4:3 at any resolution.
 

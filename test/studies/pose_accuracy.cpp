@@ -214,7 +214,7 @@ void studyPoseAccuracy(const StudyRun& run, StudySection& section) {
   section.text(
       "The paper has no such experiment; it finds (Sec. 4.6, TUM-VIE) that poses of "
       "visual-inertial odometry serve as well as motion capture for intervals of 0.5 s, and "
-      "(Sec. 4.11) that the method needs accurate poses. Here: the recording of study 1, " +
+      "that the method needs accurate poses (its limitations). Here: the recording of study 1, " +
       std::to_string(windows.size()) +
       " windows of 0.5 s, planes from 1 to 6.5 m; poses at 100 Hz with noise, normal and of its "
       "own on each axis of every pose; as odometry that drifts gives them, with a heading that "

@@ -273,7 +273,7 @@ cv::Mat3b errorCurves(const std::vector<Sensor>& sensors, const ByResolution& mo
                       const ByResolution& stereo) {
   CurvePlot plot;
   plot.title = "Depth error by resolution";
-  plot.x = {"width [px]", AxisScale::kLogarithmic, {}, {}};
+  plot.x = {"width [px]", AxisScale::kLinear, 0, {}};
   plot.y = {"error [cm], own pixels", AxisScale::kLinear, 0, {}};
   const auto add = [&](const std::string& name, const ByResolution& of, ErrorFigure figure) {
     Curve curve{name, {}, CurveStyle::kMarkedLine, {}};
@@ -309,7 +309,7 @@ void studyResolution(const StudyRun& run, StudySection& section) {
     events += (events.empty() ? "" : ", ") + formatNumber(1e-6 * eventsOf(sensor), 2);
   }
   section.text(
-      "The paper (Sec. 4.7, Figs. 13 and 14) simulates its scene flying_room with ESIM at three "
+      "The paper (Sec. 4.7) simulates its scene flying_room with ESIM at three "
       "resolutions with the same field of view, 0.25, 2.25 and 14.3 million events. Here: a "
       "furnished room, two cameras 0.20 m apart, 77° wide, contrast threshold 0.2; " +
       std::to_string(sensors.front().windows.size()) + " windows of 0.2 s with " + events +

@@ -109,7 +109,7 @@ void studyThreeCameras(const StudyRun& run, StudySection& section) {
   options.focal_baseline = focalBaselineOf(recording.simulation.rig);
   const auto results = compareMethods(recording, windows, methods, options);
   section.text(
-      "The paper (Sec. 4.8, Fig. 17) fuses the three cameras of EVIMO2's rig and looks at the "
+      "The paper (Sec. 4.8) fuses the three cameras of EVIMO2's rig and looks at the "
       "maps. "
       "Here, with exact truth: the preset `trinocular`, three fisheyes of 640x480, one of them in "
       "portrait, that look up to 6° apart, in a furnished room; " +
