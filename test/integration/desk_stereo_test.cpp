@@ -36,6 +36,14 @@ class DeskStereo : public ::testing::Test {
     return options;
   }
 
+  /// As the paper has it, whose claims are tested: no groups of events, its extraction.
+  static FusionMapperOptions paperOptions(double window_s, double stride_s) {
+    FusionMapperOptions paper = options(window_s, stride_s);
+    paper.keyframe.split = SplitFusionOptions::none();
+    paper.keyframe.extraction.extraction = ExtractionMethod::kPaper;
+    return paper;
+  }
+
   /// Over all keyframes together.
   static DepthErrors errors(const std::vector<KeyframeDepthMap>& keyframes) {
     std::vector<DepthPair> all;
@@ -71,7 +79,7 @@ class DeskStereoDsi : public DeskStereo {
 
   void SetUp() override {
     const std::int64_t t0_ns = recording_->simulation().start_ns + 900 * kMs;
-    options_ = options(0.2, 0.2);
+    options_ = paperOptions(0.2, 0.2);
     options_.only_window = Window{t0_ns, t0_ns + 200 * kMs, t0_ns + 100 * kMs};
     for (const StampedPose& pose : recording_->poses()) trajectory_.add(pose);
     for (std::size_t c = 0; c < 2; ++c) {
@@ -180,7 +188,7 @@ TEST_F(DeskStereo, DepthIsGoodToAFractionOfAPlane) {
 }
 
 TEST_F(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
-  FusionMapperOptions harmonic = options(0.1, 0.1);
+  FusionMapperOptions harmonic = paperOptions(0.1, 0.1);
   FusionMapperOptions arithmetic = harmonic;
   arithmetic.keyframe.sweep.fusion.across_cameras = FusionRule::kArithmetic;
   FusionMapperOptions one_camera = harmonic;

@@ -71,11 +71,12 @@ TEST_F(MapOptions, OneKeyframeHasTheWhiteLevelOfTheWholeRecording) {
 
 TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
   write(SyntheticRecording());
-  ASSERT_EQ(run("map rig.ini data --out out --set output.camera_maps=true"
-                " --set output.event_images=true")
+  // With slices of time a camera alone is fused across them.
+  const std::string map = "map rig.ini data --set fusion.time_slices=1 ";
+  ASSERT_EQ(run(map + "--out out --set output.camera_maps=true --set output.event_images=true")
                 .status,
             0);
-  ASSERT_EQ(run("map rig.ini data --out alone --set rig.cameras=1").status, 0);
+  ASSERT_EQ(run(map + "--out alone --set rig.cameras=1").status, 0);
   const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
   for (const StampedPose& pose : poses) {
     const std::filesystem::path keyframe = "keyframes/" + formatSeconds(pose.t_ns);
@@ -93,7 +94,9 @@ TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
 
 TEST_F(MapOptions, LateFusionPutsTheCloudsOfSingleCamerasTogether) {
   write(SyntheticRecording());
-  const std::string depth = "depth rig.ini data --t0 10.1 --t1 10.4 --set map.voxel_size_m=0.001 ";
+  const std::string depth =
+      "depth rig.ini data --t0 10.1 --t1 10.4 --set map.voxel_size_m=0.001 "
+      "--set fusion.time_slices=1 ";
   ASSERT_EQ(run(depth + "--out both --set fusion.late=true").status, 0);
   ASSERT_EQ(run(depth + "--out first --set rig.cameras=0").status, 0);
   ASSERT_EQ(run(depth + "--out second --set rig.cameras=1").status, 0);
