@@ -13,9 +13,9 @@
 namespace efm {
 namespace {
 
-constexpr double kNear = 2.5;       ///< Places within which depths agree.
-constexpr double kMedianNear = 10;  ///< Places by which a depth may differ from the median.
-constexpr double kSteepness = 1.25;  ///< Power of how much the peak stands above the second.
+constexpr double kNear = 2.5;          ///< Places within which depths agree.
+constexpr double kMedianNear = 10;     ///< Places by which a depth may differ from the median.
+constexpr double kSteepness = 1.25;    ///< Power of how much the peak stands above the second.
 constexpr double kWidthsOfPeak = 1.6;  ///< On each side, of the median width of a keyframe's peaks.
 
 /// By how much each pixel exceeds its surroundings, as a share of the mean confidence of those that
@@ -52,9 +52,9 @@ PeakScale scaleOf(const std::vector<AggregatedPeak>& peaks, int planes) {
   for (const AggregatedPeak& peak : peaks) widths_sq.push_back(peak.width_sq);
   const auto middle = widths_sq.begin() + static_cast<std::ptrdiff_t>(widths_sq.size() / 2);
   std::nth_element(widths_sq.begin(), middle, widths_sq.end());
-  const double places = std::clamp(std::round(kWidthsOfPeak * std::sqrt(*middle) / scale.place),
-                                   double{AggregatedPeak::kLeastBeside},
-                                   double{AggregatedPeak::kMostBeside});
+  const double places =
+      std::clamp(std::round(kWidthsOfPeak * std::sqrt(*middle) / scale.place),
+                 double{AggregatedPeak::kLeastBeside}, double{AggregatedPeak::kMostBeside});
   scale.beside = static_cast<std::size_t>(places) - AggregatedPeak::kLeastBeside;
   return scale;
 }
@@ -67,9 +67,9 @@ double qualityOf(double excess, const AggregatedPeak& peak, const LocalAgreement
   return excess * unambiguous * std::exp(-off_median / (kMedianNear * scale.place)) * around.share;
 }
 
-/// Variance of a position, planes^2: a wide peak in scattered surroundings is uncertain, and none is
-/// surer than a tenth of a plane. Fitted to the errors of the simulated presets, where 58 to 78 % lie
-/// within one standard deviation and 84 to 94 % within two.
+/// Variance of a position, planes^2: a wide peak in scattered surroundings is uncertain, and none
+/// is surer than a tenth of a plane. Fitted to the errors of the simulated presets, where 58 to 78
+/// % lie within one standard deviation and 84 to 94 % within two.
 double varianceOf(const AggregatedPeak& peak, const LocalAgreement& around) {
   constexpr double kLeastSigma = 0.09;
   constexpr double kOfWidthAndSpread = 0.0143;
@@ -94,9 +94,8 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
     weights[i] = excess(at);
   });
   const PeakScale scale = scaleOf(peaks, planes.size());
-  const std::vector<LocalAgreement> around =
-      localAgreement(looked_at, confidence.size(), positions, weights,
-                     static_cast<float>(kNear * scale.place));
+  const std::vector<LocalAgreement> around = localAgreement(
+      looked_at, confidence.size(), positions, weights, static_cast<float>(kNear * scale.place));
 
   const bool has_inner_planes = planes.size() > 2;
   cv::Mat1b mask = cv::Mat1b::zeros(confidence.size());

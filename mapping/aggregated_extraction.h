@@ -10,9 +10,10 @@ namespace efm {
 /// 1. Look at the pixels whose confidence exceeds its Gaussian surroundings by `min_excess`.
 /// 2. Sum the rays of those around each (`aggregateRays`); the peak of the sum is its depth.
 /// 3. Take the median of the depths in 9x9 pixels, weighted by the excess.
-/// 4. Quality: the excess, less where the summed ray has a second peak nearly as high or is flat (an
-///    edge along the motion has no depth), where the median differs, and where few of the neighbours
-///    agree. Keep where it is above `min_quality`.
+/// 4. Quality: the excess, less where the summed ray has a second peak nearly as high or is flat
+/// (an
+///    edge along the motion has no depth), where the median differs, and where few of the
+///    neighbours agree. Keep where it is above `min_quality`.
 /// 5. Variance from the width of the peak and the scatter of depths around the pixel.
 /// Peaks on the first and the last plane are not kept where there are planes between: what lies
 /// beyond the planes peaks there.

@@ -4,8 +4,8 @@
 #include <optional>
 #include <string_view>
 
-#include "mapping/depth_planes.h"
 #include "mapping/depth_map.h"
+#include "mapping/depth_planes.h"
 #include "mapping/swept_dsi.h"
 
 namespace efm {
@@ -40,7 +40,7 @@ struct MaxConfidence {
 struct DepthExtractionOptions {
   ExtractionMethod extraction = ExtractionMethod::kAggregated;
   int threshold_kernel = 5;  ///< Side of the Gaussian window in pixels; odd, 3 to 255.
-  bool dilate = false;  ///< Grow the kept pixels by their four neighbours: the paper's MF.
+  bool dilate = false;       ///< Grow the kept pixels by their four neighbours: the paper's MF.
 
   // `kAggregated`. Both are shares of the mean confidence of the pixels that have any, which makes
   // them the same for all recordings.
@@ -61,8 +61,8 @@ struct DepthExtractionOptions {
   void validate() const;
 };
 
-/// Chooses the pixels whose confidence stands out and gives each its depth. `kAggregated` is told in
-/// `extractAggregated`; `kPaper`:
+/// Chooses the pixels whose confidence stands out and gives each its depth. `kAggregated` is told
+/// in `extractAggregated`; `kPaper`:
 /// 1. c8 = round(255 c / max_confidence), clipped;
 /// 2. keep where c8 - round(gauss(c8)) > C;
 /// 3. position of the peak along the ray, between planes where `subplane` is set;

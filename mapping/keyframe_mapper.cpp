@@ -198,9 +198,9 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   }
   std::vector<CameraRays> rays;
   for (CameraInput& input : inputs) rays.push_back(std::move(input.rays));
-  SplitRays split = arrangeGroups(
-      std::move(rays), options_.split.time_slices,
-      assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals));
+  SplitRays split =
+      arrangeGroups(std::move(rays), options_.split.time_slices,
+                    assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals));
 
   // 4. Vote and fuse, plane by plane.
   const bool cameras_apart = split.inputs.size() == inputs.size();  // not slices of a single one

@@ -60,8 +60,7 @@ DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
   const std::vector<float> medians = maskedMedian(kept, positions, options.median_size);
   std::vector<PlanePosition> found(kept.size());
   kept.forEach([&](std::size_t i, cv::Point at) {
-    found[i] = {medians[i],
-                peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at))};
+    found[i] = {medians[i], peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at))};
   });
   DepthMap map = depthMapOf(kept, found, peaks.confidence, planes);
   if (options.dilate) dilate(kept, mask, map);

@@ -19,9 +19,9 @@ class PixelNeighbours {
   /// Calls `visit(index, offset)` for each, row by row.
   template <typename Visit>
   void forEach(cv::Point pixel, Visit visit) const {
-    const cv::Rect window = cv::Rect(pixel.x - kReach_px, pixel.y - kReach_px, 2 * kReach_px + 1,
-                                     2 * kReach_px + 1) &
-                            cv::Rect({0, 0}, index_.size());
+    const cv::Rect window =
+        cv::Rect(pixel.x - kReach_px, pixel.y - kReach_px, 2 * kReach_px + 1, 2 * kReach_px + 1) &
+        cv::Rect({0, 0}, index_.size());
     for (int y = window.y; y < window.y + window.height; ++y) {
       const int* row = index_[y];
       for (int x = window.x; x < window.x + window.width; ++x) {

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <limits>
@@ -20,8 +21,7 @@ constexpr float kSigma_px = 1.5F;
 /// Finds the peak of a sum of rays.
 class PeakFinder {
  public:
-  explicit PeakFinder(int planes)
-      : planes_(planes), place_(planesOfOnePlace(planes)) {}
+  explicit PeakFinder(int planes) : planes_(planes), place_(planesOfOnePlace(planes)) {}
 
   AggregatedPeak find(const std::vector<float>& sum) const {
     const auto top = std::max_element(sum.begin(), sum.end());
@@ -32,13 +32,19 @@ class PeakFinder {
     peak.at_end = before < 0 || after < 0;
     peak.position = static_cast<float>(peakPosition(plane, before, *top, after));
     const float curvature = 2 * *top - before - after;
-    peak.width_sq = peak.at_end || !(curvature > 0) ? std::numeric_limits<float>::infinity()
-                                                    : *top / curvature;
-    for (std::size_t i = 0; i < peak.beyond.size(); ++i) {
+    peak.width_sq =
+        peak.at_end || !(curvature > 0) ? std::numeric_limits<float>::infinity() : *top / curvature;
+    // From far to near: each adds what lies between.
+    float second = 0;
+    int left = 0;
+    int right = planes_;
+    for (std::size_t i = peak.beyond.size(); i-- > 0;) {
       const double places = AggregatedPeak::kLeastBeside + static_cast<double>(i);
       const auto beside = static_cast<int>(std::lround(places * place_));
-      const float second = std::max(largest(sum, 0, plane - beside),
-                                    largest(sum, plane + beside + 1, planes_));
+      second = std::max(
+          {second, largest(sum, left, plane - beside), largest(sum, plane + beside + 1, right)});
+      left = std::max(left, plane - beside);
+      right = std::min(right, plane + beside + 1);
       peak.beyond[i] = *top > 0 ? second / *top : 1;
     }
     return peak;
@@ -62,6 +68,10 @@ std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRay
   const PixelNeighbours neighbours(chosen, size);
   const PeakFinder finder(rays.planes());
   std::vector<AggregatedPeak> peaks(chosen.size());
+  std::array<float, 2 * PixelNeighbours::kReach_px * PixelNeighbours::kReach_px + 1> weights{};
+  for (std::size_t distance_sq = 0; distance_sq < weights.size(); ++distance_sq) {
+    weights[distance_sq] = std::exp(-static_cast<float>(distance_sq) / (2 * kSigma_px * kSigma_px));
+  }
   tbb::parallel_for(tbb::blocked_range<int>(0, chosen.rows()), [&](const auto& rows) {
     std::vector<float> sum(static_cast<std::size_t>(rays.planes()));
     for (int y = rows.begin(); y < rows.end(); ++y) {
@@ -70,9 +80,8 @@ std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRay
         assert(rays.has(pixel));
         std::fill(sum.begin(), sum.end(), 0.0F);
         neighbours.forEach(pixel, [&](std::size_t, cv::Point offset) {
-          const auto distance_sq = static_cast<float>(offset.dot(offset));
           rays.addTo(sum.data(), pixel + offset,
-                     std::exp(-distance_sq / (2 * kSigma_px * kSigma_px)));
+                     weights[static_cast<std::size_t>(offset.dot(offset))]);
         });
         peaks[i] = finder.find(sum);
       }

@@ -11,9 +11,9 @@ namespace efm {
 
 /// What the rays around a pixel say together.
 struct AggregatedPeak {
-  float position = 0;   ///< Of the largest sum, between planes.
-  float width_sq = 0;   ///< c / (2c - before - after) there, planes^2; infinite where flat or at an
-                        ///< end.
+  float position = 0;  ///< Of the largest sum, between planes.
+  float width_sq = 0;  ///< c / (2c - before - after) there, planes^2; infinite where flat or at an
+                       ///< end.
   /// The largest sum more than so many places from the peak, as a share of it: by
   /// `kLeastBeside` places and by each more, to `kMostBeside`. 0 to 1.
   static constexpr int kLeastBeside = 3;
@@ -23,9 +23,9 @@ struct AggregatedPeak {
 };
 
 /// Sums the rays of the chosen pixels around each chosen pixel, weighted by a Gaussian of the
-/// distance, and finds the peak of the sum and a parabola through it and its neighbours. Only pixels
-/// that stand out are summed: the DSI between edges is noise, and smoothing it all moves peaks
-/// instead of sharpening them.
+/// distance, and finds the peak of the sum and a parabola through it and its neighbours. Only
+/// pixels that stand out are summed: the DSI between edges is noise, and smoothing it all moves
+/// peaks instead of sharpening them.
 /// @param chosen have rays (asserted). @param size of the view.
 /// @return one per chosen pixel. Runs on the threads of the task arena that it is called in.
 std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRays& rays,

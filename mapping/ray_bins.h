@@ -81,8 +81,8 @@ class RayBins {
     int pixels = 0;        // side of the view
     double begin = 0;      // corner of the first bin, pixels
     int bins = 0;
-    Range at_center;   // shifts of the packets at the principal point: their a or b
-    double step = 0;   // unit of compact rays' own shifts
+    Range at_center;  // shifts of the packets at the principal point: their a or b
+    double step = 0;  // unit of compact rays' own shifts
 
     Range fromPrincipal() const;
   };
@@ -128,7 +128,7 @@ class RayBins::GroupReach {
   friend class RayBins;
 
   PlaneGroup group_;
-  std::vector<Range> columns_;            // by bin, pixels
+  std::vector<Range> columns_;  // by bin, pixels
   std::vector<Range> rows_;
   std::vector<PlaneTransfer> transfers_;  // of packets of wide rays, to the group's one plane
 };

@@ -119,6 +119,8 @@ SyntheticWindow makeSyntheticWindow(const SyntheticWindowOptions& options) {
   made.trajectory = trajectoryOver(options.duration_s);
   const auto duration_ns = static_cast<std::int64_t>(1e9 * options.duration_s);
   made.window = {kStart_ns, kStart_ns + duration_ns, kStart_ns + duration_ns / 2};
+  made.options.split = SplitFusionOptions::none();
+  made.options.extraction.extraction = ExtractionMethod::kPaper;
   made.options.planes.min_depth_m = 0.8;
   made.options.planes.max_depth_m = 8.0;
 

@@ -30,7 +30,7 @@ struct SyntheticWindow {
   Trajectory trajectory;
   Window window;
   std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
-  KeyframeMapperOptions options;           ///< 100 planes, 0.8 to 8 m; otherwise the defaults.
+  KeyframeMapperOptions options;  ///< 100 planes, 0.8 to 8 m, the paper's fusion and depths.
 };
 
 SyntheticWindow makeSyntheticWindow(const SyntheticWindowOptions& options);

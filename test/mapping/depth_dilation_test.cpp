@@ -138,7 +138,8 @@ TEST(WhiteLevel, OfTheSequenceThresholdsLikeTheSameFixedNumber) {
                            extractAsPaper(peaks, kPlanes, fixed)))
         << white;
   }
-  EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, sequence), extractAsPaper(peaks, kPlanes, {})))
+  EXPECT_TRUE(
+      test::same(extractAsPaper(peaks, kPlanes, sequence), extractAsPaper(peaks, kPlanes, {})))
       << "where no sequence is known, the keyframe's own maximum";
 }
 
@@ -146,8 +147,8 @@ TEST(WhiteLevel, OfTheKeyframeIsItsMaximumWhateverTheSequence) {
   const DsiPeaks peaks = randomPeaks(7, 32, 24);
   DepthExtractionOptions fixed;
   fixed.max_confidence = MaxConfidence::of(11);  // of random() % 12
-  EXPECT_TRUE(
-      test::same(extractAsPaper(peaks, kPlanes, {}, 1000.0), extractAsPaper(peaks, kPlanes, fixed)));
+  EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, {}, 1000.0),
+                         extractAsPaper(peaks, kPlanes, fixed)));
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/paper_extraction.h"
 #include "mapping/robust_maximum.h"
+#include "mapping/paper_extraction.h"
 
 #include <gtest/gtest.h>
 
@@ -55,8 +55,8 @@ cv::Mat1b keptWith(const cv::Mat1f& confidence, double white) {
   const cv::Mat1f none(confidence.size(), -1.0F);
   DepthExtractionOptions options;
   options.max_confidence = MaxConfidence::of(white);
-  return extractAsPaper({confidence, cv::Mat1i::zeros(confidence.size()), none, none}, DepthPlanes(),
-                      options)
+  return extractAsPaper({confidence, cv::Mat1i::zeros(confidence.size()), none, none},
+                        DepthPlanes(), options)
              .depth > 0;
 }
 

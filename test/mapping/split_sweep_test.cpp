@@ -142,8 +142,8 @@ TEST_P(SplitSweepOn, FromEventsToTheDsiItIsTheOraclesForAllRulesAndSplits) {
             EXPECT_LE(errorOverMass(dsiOf(recording, options), exactSplit(parts, options)),
                       test::errorOverMassOf(GetParam()))
                 << cameras << " cameras " << nameOf(across_cameras) << ", " << nameOf(order)
-                << ", polarities " << split.polarities() << ", slices "
-                << split.time_slices << " of " << subintervals;
+                << ", polarities " << split.polarities() << ", slices " << split.time_slices
+                << " of " << subintervals;
           }
         }
       }

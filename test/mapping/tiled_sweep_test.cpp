@@ -91,7 +91,8 @@ TEST_P(TiledSweepOn, ThePeaksAreThoseOfTheDsiItHandsOut) {
       }
       const auto index = static_cast<int>(pixel);
       ASSERT_EQ(swept.result.fused.peaks.plane(index / size.width, index % size.width), best);
-      ASSERT_EQ(swept.result.fused.peaks.confidence(index / size.width, index % size.width), value(best));
+      ASSERT_EQ(swept.result.fused.peaks.confidence(index / size.width, index % size.width),
+                value(best));
     }
   }
 }

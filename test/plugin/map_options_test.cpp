@@ -73,9 +73,9 @@ TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
   write(SyntheticRecording());
   // With slices of time a camera alone is fused across them.
   const std::string map = "map rig.ini data --set fusion.time_slices=1 ";
-  ASSERT_EQ(run(map + "--out out --set output.camera_maps=true --set output.event_images=true")
-                .status,
-            0);
+  ASSERT_EQ(
+      run(map + "--out out --set output.camera_maps=true --set output.event_images=true").status,
+      0);
   ASSERT_EQ(run(map + "--out alone --set rig.cameras=1").status, 0);
   const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
   for (const StampedPose& pose : poses) {

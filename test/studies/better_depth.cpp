@@ -102,8 +102,9 @@ std::string ratio(double value, double to) {
 /// Each method at the paper's own number of points.
 TextTable equalNumbers(const std::vector<CaseResult>& results) {
   TextTable table;
-  table.head = {"case",       "points", "method", "beyond 10 % [%]",    "of (a)",    "median [%]",
-                "of (a)", "beyond a plane [%]", "recall [%]"};
+  table.head = {"case",      "points",     "method", "beyond 10 % [%]",
+                "of (a)",    "median [%]", "of (a)", "beyond a plane [%]",
+                "recall [%]"};
   for (const CaseResult& result : results) {
     const PointQuality paper = result.curves.front().at(result.points);
     for (const DepthCurve& curve : result.curves) {
@@ -111,9 +112,9 @@ TextTable equalNumbers(const std::vector<CaseResult>& results) {
       const bool first = &curve == &result.curves.front();
       table.rows.push_back({first ? result.name : "", first ? formatNumber(result.points, 0) : "",
                             curve.name, percent(quality.beyond_10, 2),
-                            ratio(quality.beyond_10, paper.beyond_10),
-                            percent(quality.median, 2), ratio(quality.median, paper.median),
-                            percent(quality.beyond_plane), percent(quality.recall)});
+                            ratio(quality.beyond_10, paper.beyond_10), percent(quality.median, 2),
+                            ratio(quality.median, paper.median), percent(quality.beyond_plane),
+                            percent(quality.recall)});
     }
   }
   return table;
@@ -122,15 +123,16 @@ TextTable equalNumbers(const std::vector<CaseResult>& results) {
 /// The shipped thresholds against the best of each case, and variances against errors.
 TextTable asShipped(const std::vector<CaseResult>& results) {
   TextTable table;
-  table.head = {"case",      "points",      "beyond 10 % [%]", "recall [%]",
-                "F1 [%]", "best F1 [%]", "within σ [%]",     "within 2 σ [%]"};
+  table.head = {"case",   "points",      "beyond 10 % [%]", "recall [%]",
+                "F1 [%]", "best F1 [%]", "within σ [%]",    "within 2 σ [%]"};
   for (const CaseResult& result : results) {
     const PointQuality& quality = result.as_shipped;
     double best = 0;
     for (const PointQuality& step : result.curves.back().steps) best = std::max(best, step.f1());
-    table.rows.push_back({result.name, formatNumber(quality.points, 0), percent(quality.beyond_10, 2),
-                          percent(quality.recall), percent(quality.f1()), percent(best),
-                          percent(quality.within_sigma), percent(quality.within_2_sigma)});
+    table.rows.push_back({result.name, formatNumber(quality.points, 0),
+                          percent(quality.beyond_10, 2), percent(quality.recall),
+                          percent(quality.f1()), percent(best), percent(quality.within_sigma),
+                          percent(quality.within_2_sigma)});
   }
   return table;
 }
@@ -145,7 +147,8 @@ cv::Mat drawCurvesOf(const CaseResult& result) {
   for (const DepthCurve& curve : result.curves) {
     Curve line{curve.name, {}, CurveStyle::kMarkedLine, {}};
     for (const PointQuality& step : curve.steps) {
-      if (step.points > 0) line.points.emplace_back(step.points, std::max(0.05, 100 * step.beyond_10));
+      if (step.points > 0)
+        line.points.emplace_back(step.points, std::max(0.05, 100 * step.beyond_10));
     }
     plot.curves.push_back(line);
   }
@@ -186,9 +189,10 @@ void judgeAll(const std::vector<CaseResult>& results, StudySection& section) {
   const double split = worst(results, beyond(4));
   const double plain = worst(results, beyond(3));
   const double of_median = worst(results, median);
-  section.trend("At the paper's number of points both together leave at most 0.3 of its wrong points",
-                split <= 0.3, "worst case " + formatNumber(split, 2),
-                "Where the paper has few wrong points, what is left are outlines within two pixels.");
+  section.trend(
+      "At the paper's number of points both together leave at most 0.3 of its wrong points",
+      split <= 0.3, "worst case " + formatNumber(split, 2),
+      "Where the paper has few wrong points, what is left are outlines within two pixels.");
   section.trend("Aggregation alone leaves at most half of them", plain <= 0.5,
                 "worst case " + formatNumber(plain, 2),
                 "Poles before a textured wall repeat along the baseline: without the split, wrong "
@@ -208,12 +212,13 @@ void judgeAll(const std::vector<CaseResult>& results, StudySection& section) {
   }
   section.trend("The shipped thresholds reach 90 % of the best F1 of every case", least_f1 >= 0.9,
                 "at least " + percent(least_f1) + " %");
-  section.trend("Of the points within five plane steps 60 to 76 % lie within one standard deviation "
-                "and at least 88 % within two",
-                least_sigma >= 0.6 && most_sigma <= 0.76 && least_2_sigma >= 0.88,
-                percent(least_sigma) + " to " + percent(most_sigma) + " %; at least " +
-                    percent(least_2_sigma) + " %",
-                "One scale serves all scenes; they differ by more than it allows.");
+  section.trend(
+      "Of the points within five plane steps 60 to 76 % lie within one standard deviation "
+      "and at least 88 % within two",
+      least_sigma >= 0.6 && most_sigma <= 0.76 && least_2_sigma >= 0.88,
+      percent(least_sigma) + " to " + percent(most_sigma) + " %; at least " +
+          percent(least_2_sigma) + " %",
+      "One scale serves all scenes; they differ by more than it allows.");
 }
 
 }  // namespace
@@ -224,11 +229,13 @@ void studyBetterDepth(const StudyRun& run, StudySection& section) {
 
   section.text(
       "The paper keeps a plane index and takes any peak that stands out from its neighbours in the "
-      "image, however flat it is along the ray. Here: *split fusion* divides the events by polarity "
+      "image, however flat it is along the ray. Here: *split fusion* divides the events by "
+      "polarity "
       "and into slices of time, fuses each group by itself and sums; *aggregation* takes the depth "
       "from the rays of neighbouring pixels that stand out, and keeps where the common peak is "
       "unambiguous and neighbours agree (`extraction = aggregated`). Options were chosen on seed 1 "
-      "of the presets; what follows is seed 7, two windows each. A point is wrong where its depth is "
+      "of the presets; what follows is seed 7, two windows each. A point is wrong where its depth "
+      "is "
       "off by more than 10 %, the truth the best within a pixel; recall is the share of visible "
       "edges with a right point within a pixel.");
   section.heading("At the paper's number of points (C = 5)");

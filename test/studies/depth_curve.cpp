@@ -12,7 +12,7 @@
 namespace efm::studies {
 namespace {
 
-constexpr double kWrong = 0.1;        ///< Relative depth error of a wrong point.
+constexpr double kWrong = 0.1;       ///< Relative depth error of a wrong point.
 constexpr double kInlierPlanes = 5;  ///< Of points that a variance is asked to tell.
 
 /// Counts over all keyframes.

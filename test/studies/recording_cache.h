@@ -22,7 +22,7 @@ struct Recording {
   std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
   /// For each event the place that its pixel saw, frame `world`, metres; NaN for noise.
   std::vector<std::vector<Eigen::Vector3f>> sources;
-  Trajectory trajectory;                   ///< The true poses, every millisecond.
+  Trajectory trajectory;  ///< The true poses, every millisecond.
 
   /// `count` windows of equal duration spread evenly over the recording, the first at its start and
   /// the last at its end, each with its reference view in the middle; they overlap where there is

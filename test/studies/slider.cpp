@@ -204,9 +204,10 @@ void judgeSlider(const std::vector<SliderResult>& results, const SliderTruth& tr
   const double beyond = ratio(ours.beyond_10, paper.beyond_10);
   const double median = ratio(ours.median_error, paper.median_error);
   const double horizontal = ratio(ours.on_horizontal, paper.on_horizontal);
-  section.trend("At the same number of points the default leaves at most 0.2 of the paper's points "
-                "beyond 10 %",
-                beyond <= 0.2, formatNumber(beyond, 2));
+  section.trend(
+      "At the same number of points the default leaves at most 0.2 of the paper's points "
+      "beyond 10 %",
+      beyond <= 0.2, formatNumber(beyond, 2));
   section.trend("and at most 0.4 of its median error", median <= 0.4, formatNumber(median, 2));
   section.trend("The share of points on horizontal edges falls to at most 0.45 of the paper's",
                 horizontal <= 0.45, formatNumber(horizontal, 2));
@@ -288,15 +289,16 @@ void studySlider(const StudyRun& run, StudySection& section) {
   below.columns = {"map", "its errors"};
   below.rows = {"the paper", "default"};
   for (const SliderResult* result : {&results.front(), &results.back()}) {
-    below.pictures.push_back({depthPicture(result->equal_m, limits),
-                              errorPicture(result->equal_m, truth.frames.depth)});
+    below.pictures.push_back(
+        {depthPicture(result->equal_m, limits), errorPicture(result->equal_m, truth.frames.depth)});
   }
   cv::Mat3b picture;
   cv::vconcat(drawGrid(above), drawGrid(below), picture);
   section.picture("slider.png", picture,
                   "The frame with vertical (red) and horizontal (green) edges; depth from the "
                   "frames, red 0.47 m to blue 2.4 m; 2,500 points of the paper's extraction and of "
-                  "the default; their errors: green within 3 %, yellow within 10 %, red beyond, grey without truth");
+                  "the default; their errors: green within 3 %, yellow within 10 %, red beyond, "
+                  "grey without truth");
 }
 
 }  // namespace efm::studies

@@ -16,9 +16,8 @@ constexpr double kSameDepth = 0.03;  ///< Share within which two depths are of o
 std::optional<cv::Point> pixelOf(const Eigen::Vector3d& p_ref, const ReferenceView& view,
                                  const cv::Mat1f& truth_m) {
   if (!(p_ref.z() > 0)) return std::nullopt;
-  const cv::Point pixel(
-      static_cast<int>(std::lround(view.fx * p_ref.x() / p_ref.z() + view.cx)),
-      static_cast<int>(std::lround(view.fy * p_ref.y() / p_ref.z() + view.cy)));
+  const cv::Point pixel(static_cast<int>(std::lround(view.fx * p_ref.x() / p_ref.z() + view.cx)),
+                        static_cast<int>(std::lround(view.fy * p_ref.y() / p_ref.z() + view.cy)));
   if (!cv::Rect(0, 0, view.width, view.height).contains(pixel)) return std::nullopt;
   const double true_m = truth_m(pixel);
   if (!(std::abs(true_m - p_ref.z()) < kSameDepth * true_m)) return std::nullopt;
