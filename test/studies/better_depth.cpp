@@ -84,7 +84,7 @@ CaseResult runCase(const StudyRun& run, const Case& what) {
       run.recordings->make("better_" + what.scene.preset, makeSimulation(simulation));
   const std::vector<Window> windows = recording.windows(what.window_s, run.pick(2, 1));
   const std::vector<Method> methods = methodsFor(what.scene);
-  const DepthJudge judge(recording, methods.front().options.planes);
+  DepthJudge judge(recording, methods.front().options.planes);
   for (const Method& method : methods) {
     result.curves.push_back(depthCurve(recording, windows, method, judge));
   }

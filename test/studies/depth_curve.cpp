@@ -72,11 +72,21 @@ DepthJudge::DepthJudge(const Recording& recording, const DepthPlanesOptions& pla
     : recording_(&recording),
       step_((1 / planes.min_depth_m - 1 / planes.max_depth_m) / (planes.num_planes - 1)) {}
 
-PointQuality DepthJudge::judge(const std::vector<KeyframeDepthMap>& keyframes) const {
+const DepthJudge::Truth& DepthJudge::truthFor(const KeyframeDepthMap& keyframe) {
+  const auto [place, is_new] = truths_.try_emplace(keyframe.window.t_ref_ns);
+  Truth& truth = place->second;
+  if (is_new) {
+    truth.depth_m = truthOf(*recording_, keyframe);
+    truth.edges = visibleEdges(*recording_, keyframe, truth.depth_m);
+  }
+  return truth;
+}
+
+PointQuality DepthJudge::judge(const std::vector<KeyframeDepthMap>& keyframes) {
   Tally tally;
   const DepthPairingOptions pairing = studyPairing();
   for (const KeyframeDepthMap& keyframe : keyframes) {
-    const cv::Mat1f truth_m = truthOf(*recording_, keyframe);
+    const auto& [truth_m, edges] = truthFor(keyframe);
     const ComparedDepths depths{keyframe.map.depth, truth_m, {}};
     cv::Mat1b right = cv::Mat1b::zeros(truth_m.size());
     for (int y = 0; y < truth_m.rows; ++y) {
@@ -98,7 +108,6 @@ PointQuality DepthJudge::judge(const std::vector<KeyframeDepthMap>& keyframes) c
         if (sigmas <= 2) ++tally.within_2_sigma;
       }
     }
-    const cv::Mat1b edges = visibleEdges(*recording_, keyframe, truth_m);
     cv::dilate(right, right, cv::Mat1b::ones(3, 3));
     tally.edges += cv::countNonZero(edges);
     tally.edges_found += cv::countNonZero(edges & right);
@@ -120,7 +129,7 @@ PointQuality DepthJudge::judge(const std::vector<KeyframeDepthMap>& keyframes) c
 }
 
 DepthCurve depthCurve(const Recording& recording, const std::vector<Window>& windows,
-                      const Method& method, const DepthJudge& judge) {
+                      const Method& method, DepthJudge& judge) {
   DepthCurve curve{method.name, {}};
   for (const double threshold : thresholdsOf(method.options.extraction.extraction)) {
     Method with = method;
@@ -131,7 +140,7 @@ DepthCurve depthCurve(const Recording& recording, const std::vector<Window>& win
 }
 
 PointQuality asItIs(const Recording& recording, const std::vector<Window>& windows,
-                    const Method& method, const DepthJudge& judge) {
+                    const Method& method, DepthJudge& judge) {
   return judge.judge(mapWindows(recording, windows, method));
 }
 

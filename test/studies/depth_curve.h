@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -38,20 +40,30 @@ class DepthJudge {
   /// @param planes whose step is the unit.
   DepthJudge(const Recording& recording, const DepthPlanesOptions& planes);
 
-  PointQuality judge(const std::vector<KeyframeDepthMap>& keyframes) const;
+  /// @param keyframes of one view, whatever their methods: the truth of a reference time is made
+  /// once.
+  PointQuality judge(const std::vector<KeyframeDepthMap>& keyframes);
 
  private:
+  struct Truth {
+    cv::Mat1f depth_m;
+    cv::Mat1b edges;
+  };
+
+  const Truth& truthFor(const KeyframeDepthMap& keyframe);
+
   const Recording* recording_;
-  double step_;  // of inverse depth, 1/m
+  std::map<std::int64_t, Truth> truths_;  // by reference time
+  double step_;                           // of inverse depth, 1/m
 };
 
 /// Over the thresholds of its extraction: `threshold_c` of `kPaper`, `min_quality` of
 /// `kAggregated`.
 DepthCurve depthCurve(const Recording& recording, const std::vector<Window>& windows,
-                      const Method& method, const DepthJudge& judge);
+                      const Method& method, DepthJudge& judge);
 
 /// With the method's own threshold.
 PointQuality asItIs(const Recording& recording, const std::vector<Window>& windows,
-                    const Method& method, const DepthJudge& judge);
+                    const Method& method, DepthJudge& judge);
 
 }  // namespace efm::studies
