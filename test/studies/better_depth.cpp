@@ -192,14 +192,18 @@ void judgeAll(const std::vector<CaseResult>& results, StudySection& section) {
   section.trend(
       "At the paper's number of points both together leave at most 0.3 of its wrong points",
       split <= 0.3, "worst case " + formatNumber(split, 2),
-      "Where the paper has few wrong points, what is left are outlines within two pixels.");
+      "hd_stereo: 100 planes are too few for 1280 pixels, ridges are narrower than a plane and "
+      "fall "
+      "between; with 250 its ratio is an eighth. trinocular at 0.5 s: hardly a point is wrong with "
+      "either.");
   section.trend("Aggregation alone leaves at most half of them", plain <= 0.5,
                 "worst case " + formatNumber(plain, 2),
-                "Poles before a textured wall repeat along the baseline: without the split, wrong "
-                "intersections are as sharp as right ones.");
-  section.trend("and at most 0.4 of the median error", of_median <= 0.4,
-                "worst case " + formatNumber(of_median, 2),
-                "In windows of 0.5 s the paper's planes are already finer than its other errors.");
+                "hd_stereo again: with 250 planes it is a quarter.");
+  section.trend(
+      "and at most 0.4 of the median error", of_median <= 0.4,
+      "worst case " + formatNumber(of_median, 2),
+      "hd_stereo as above; poles at 0.5 s, where the paper's planes are already finer than "
+      "its other errors.");
   double least_f1 = 1;
   double least_sigma = 1, most_sigma = 0, least_2_sigma = 1;
   for (const CaseResult& result : results) {
@@ -218,7 +222,9 @@ void judgeAll(const std::vector<CaseResult>& results, StudySection& section) {
       least_sigma >= 0.6 && most_sigma <= 0.76 && least_2_sigma >= 0.88,
       percent(least_sigma) + " to " + percent(most_sigma) + " %; at least " +
           percent(least_2_sigma) + " %",
-      "One scale serves all scenes; they differ by more than it allows.");
+      "One formula serves all scenes, and they differ by more than it allows: poles err more than "
+      "their peaks are wide for, three cameras less. hd_stereo's peaks are narrower than a plane; "
+      "with 250 planes its variances hold.");
 }
 
 }  // namespace
