@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
-#include "mapping/quoted_text.h"
 #include "mapping/timestamp.h"
 
 namespace efm {
@@ -30,23 +27,7 @@ std::vector<TimedFile> keyframesOf(const fs::path& folder) {
 }
 
 std::vector<TimedFile> listedIn(const fs::path& index) {
-  std::ifstream file(index);
-  if (!file) throw std::runtime_error("cannot read " + index.string());
-  std::vector<TimedFile> maps;
-  int number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
-    std::istringstream fields(line.substr(0, line.find('#')));
-    std::string time;
-    std::string name;
-    if (!(fields >> time)) continue;
-    const auto t_ns = parseSeconds(time);
-    if (!t_ns || !(fields >> name)) {
-      throw std::runtime_error(index.string() + ":" + std::to_string(number) + ": " +
-                               inQuotes(line) + ": expected a time in seconds and a file");
-    }
-    maps.push_back({*t_ns, index.parent_path() / name});
-  }
+  std::vector<TimedFile> maps = timedFilesIn(index);
   if (maps.empty()) throw std::runtime_error(index.string() + " lists no depth maps");
   return maps;
 }

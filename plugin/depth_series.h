@@ -5,12 +5,9 @@
 #include <filesystem>
 #include <vector>
 
-namespace efm {
+#include "plugin/timed_files.h"
 
-struct TimedFile {
-  std::int64_t t_ns = 0;
-  std::filesystem::path file;
-};
+namespace efm {
 
 /// What a folder's depth maps are wanted for: it may hold both kinds.
 enum class DepthSeriesRole { kEstimate, kTruth };

@@ -3,19 +3,16 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
-#include "mapping/quoted_text.h"
-#include "mapping/timestamp.h"
 #include "mapping/trajectory.h"
 #include "plugin/datasets/poses_file.h"
 #include "plugin/datasets/uzh_text.h"
+#include "plugin/timed_files.h"
 
 namespace efm::studies {
 namespace {
@@ -69,26 +66,13 @@ PosedFrames readUzhFrames(const fs::path& folder) {
   for (const StampedPose& pose : readPosesFile(folder / "groundtruth.txt")) trajectory.add(pose);
 
   const fs::path list = folder / "images.txt";
-  std::ifstream stream(list);
-  if (!stream) throw std::runtime_error(list.string() + ": cannot be opened for reading");
   const FrameUndistortion undistort(camera);
   PosedFrames sequence{ReferenceView::of(camera), {}};
-  int number = 0;
-  for (std::string line; std::getline(stream, line);) {
-    ++number;
-    std::istringstream fields(line.substr(0, line.find('#')));
-    std::string time;
-    std::string name;
-    if (!(fields >> time)) continue;
-    const auto t_ns = parseSeconds(time);
-    if (!t_ns || !(fields >> name)) {
-      throw std::runtime_error(list.string() + ":" + std::to_string(number) + ": " +
-                               inQuotes(line) + ": expected a time in seconds and a file");
-    }
-    const auto T_world_cam = trajectory.poseAt(*t_ns);
+  for (const TimedFile& image : timedFilesIn(list)) {
+    const auto T_world_cam = trajectory.poseAt(image.t_ns);
     if (!T_world_cam) continue;
-    PosedFrame frame = undistort(readImage(folder / name, camera));
-    frame.t_ns = *t_ns;
+    PosedFrame frame = undistort(readImage(image.file, camera));
+    frame.t_ns = image.t_ns;
     frame.T_world_cam = *T_world_cam;
     sequence.frames.push_back(std::move(frame));
   }
