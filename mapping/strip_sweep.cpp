@@ -43,8 +43,9 @@ class StripSweep {
           for (int strip = range.begin(); strip < range.end(); ++strip) sweep(strip, finds);
         },
         tbb::simple_partitioner());
-    SweepResult result{fused_.whole(planes_), {}, {}};
-    for (Found& camera : alone_) result.cameras.push_back(camera.whole(planes_));
+    SweepResult result{fused_.whole(planes_, request_.ray_window > 0), {}, {}};
+    for (Found& camera : alone_)
+      result.cameras.push_back(camera.whole(planes_, request_.ray_window > 0));
     return result;
   }
 

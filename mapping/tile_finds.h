@@ -55,7 +55,9 @@ struct Found {
   std::vector<DsiRays::Tile> rays;  // by tile
 
   Found(const ReferenceView& view, std::size_t tiles) : peaks(unwrittenPeaks(view)), rays(tiles) {}
-  SweptDsi whole(int planes) {
+  /// @param with_rays that rays were asked for: without them there is nothing to find them by.
+  SweptDsi whole(int planes, bool with_rays) {
+    if (!with_rays) return {peaks, {}};
     return {peaks, DsiRays(peaks.confidence.size(), planes, std::move(rays))};
   }
 };

@@ -137,8 +137,9 @@ class TiledSweep {
   }
 
   SweepResult result() {
-    SweepResult result{fused_.whole(planes_), {}, rays_.notCast()};
-    for (Found& camera : alone_) result.cameras.push_back(camera.whole(planes_));
+    SweepResult result{fused_.whole(planes_, request_.ray_window > 0), {}, rays_.notCast()};
+    for (Found& camera : alone_)
+      result.cameras.push_back(camera.whole(planes_, request_.ray_window > 0));
     for (const Workplace& workplace : workplaces_) {
       for (std::size_t c = 0; c < workplace.votes.size(); ++c) {
         result.votes[c].cast += workplace.votes[c];
