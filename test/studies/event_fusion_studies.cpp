@@ -39,6 +39,7 @@ constexpr Study kStudies[] = {
     {"pose_accuracy", "10. Accuracy of the poses", studyPoseAccuracy},
     {"slider", "11. The real slider", studySlider},
     {"better_depth", "12. Depth better than the paper's", studyBetterDepth},
+    {"revoting", "13. Each event's one vote", studyRevoting},
 };
 
 constexpr const char* kUsage =

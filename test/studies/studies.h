@@ -33,4 +33,7 @@ void studySlider(const StudyRun& run, StudySection& section);
 /// Split fusion and aggregation against the paper's extraction.
 void studyBetterDepth(const StudyRun& run, StudySection& section);
 
+/// Each event's one vote, shared by what the first pass fused.
+void studyRevoting(const StudyRun& run, StudySection& section);
+
 }  // namespace efm::studies
