@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/keyframe_refiner.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "mapping/option_check.h"
+
+namespace efm {
+namespace {
+
+/// Keyframes with less in common are not registered with each other.
+constexpr double kLeastOverlap = 0.1;
+/// Fewer pairs, or a smaller share of the points, say nothing.
+constexpr std::size_t kLeastInliers = 30;
+constexpr double kLeastInlierRatio = 0.3;
+/// A registration farther from the prior, in its standard deviations, is taken for a failure.
+constexpr double kFarthestFromPrior = 6;
+/// Registrations expect at least this share of the errors that the tracker was said to have: one
+/// that was exact for long may become worse.
+constexpr double kCautiousShare = 0.25;
+/// Samples that errors are learnt from: some 25 keyframes.
+constexpr std::size_t kMaxSamples = 100;
+/// Loops are solved when the map has grown by this share of them.
+constexpr std::size_t kLoopShare = 20;
+/// A loop whose error is larger once everything is solved was wrong.
+constexpr double kContradicted = 8;
+
+bool isFinite(const Rigid3& pose) {
+  return pose.translation.allFinite() && pose.rotation.coeffs().allFinite();
+}
+
+}  // namespace
+
+void RefinementOptions::validate() const {
+  tracker.validate();
+  points.validate();
+  registration.validate();
+  loop.validate();
+  graph.validate();
+  requireOption(window >= 1 && window <= 1000, "window", window, "from 1 to 1000 (keyframes)");
+  requireOption(map_keyframes >= 1 && map_keyframes <= 100, "map_keyframes", map_keyframes,
+                "from 1 to 100");
+}
+
+/// A pose graph of some of the keyframes. Each has two poses: its own, and the one that the tracker
+/// would have given without noise.
+class KeyframeRefiner::WindowGraph {
+ public:
+  WindowGraph(const std::vector<Keyframe>& keyframes, std::size_t first_free)
+      : keyframes_(keyframes), first_free_(first_free), place_(keyframes.size()) {}
+
+  void add(RelativePoseFactor factor) {
+    if (factor.from < first_free_ && factor.to < first_free_) return;
+    factor.from = ownNode(factor.from);
+    factor.to = ownNode(factor.to);
+    graph.factors.push_back(factor);
+  }
+  void addTracker(const TrackerErrors& errors) {
+    const Matrix6d noise = sqrtInformation(errors.noiseCovariance());
+    for (std::size_t i = first_free_ - 1; i < keyframes_.size(); ++i) {
+      graph.factors.push_back({trackedNode(i), ownNode(i), Rigid3{}, noise});
+      if (i + 1 == keyframes_.size()) break;
+      const Keyframe& from = keyframes_[i];
+      const Keyframe& to = keyframes_[i + 1];
+      graph.factors.push_back({trackedNode(i), trackedNode(i + 1),
+                               from.T_tracker_ref.inverse() * to.T_tracker_ref,
+                               sqrtInformation(errors.driftCovariance(to.way_m - from.way_m))});
+    }
+  }
+  bool has(std::size_t keyframe) const { return place_[keyframe].has_value(); }
+  std::size_t ownNode(std::size_t keyframe) {
+    std::optional<std::size_t>& place = place_[keyframe];
+    if (!place) {
+      place = graph.T_world_node.size();
+      graph.T_world_node.push_back(keyframes_[keyframe].T_world_ref);
+      graph.T_world_node.push_back(keyframes_[keyframe].T_world_tracked);
+      graph.fixed.push_back(keyframe < first_free_);
+      // The first keyframe has all of the tracker's noise by definition: what it is comes later.
+      graph.fixed.push_back(keyframe < first_free_ && keyframe > 0);
+    }
+    return *place;
+  }
+  std::size_t trackedNode(std::size_t keyframe) { return ownNode(keyframe) + 1; }
+
+  PoseGraph graph;
+
+ private:
+  const std::vector<Keyframe>& keyframes_;
+  std::size_t first_free_;
+  std::vector<std::optional<std::size_t>> place_;  // of a keyframe's first node
+};
+
+KeyframeRefiner::KeyframeRefiner(const RefinementOptions& options)
+    : options_(options), errors_(options.tracker) {
+  options_.validate();
+}
+
+void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref) {
+  const std::size_t number = keyframes_.size();
+  if (!isFinite(T_tracker_ref)) {
+    throw std::invalid_argument("keyframe " + std::to_string(number) +
+                                ": its pose is not finite, expected numbers");
+  }
+  Keyframe keyframe{std::move(cloud), T_tracker_ref, T_tracker_ref, T_tracker_ref};
+  keyframe.first_factor = factors_.size();
+  if (number > 0) {
+    // 1. Where the tracker says.
+    const Keyframe& last = keyframes_.back();
+    const Rigid3 T_last_ref = last.T_tracker_ref.inverse() * T_tracker_ref;
+    keyframe.T_world_tracked = last.T_world_tracked * T_last_ref;
+    keyframe.T_world_ref = keyframe.T_world_tracked;
+    keyframe.way_m = last.way_m + T_last_ref.translation.norm();
+  }
+  keyframes_.push_back(std::move(keyframe));
+  if (number == 0) return;
+
+  registerNewest();  // 2.
+  const auto window = static_cast<std::size_t>(options_.window);
+  solveFrom(number + 1 > window ? number + 1 - window : 0);  // 3.
+  closeLoops();                                              // 4.
+  if (number > window) keyframes_[number - window - 1].cloud.forgetTree();
+}
+
+double KeyframeRefiner::overlapOf(std::size_t newer, std::size_t older) const {
+  const Keyframe& of = keyframes_[newer];
+  const Keyframe& in = keyframes_[older];
+  return viewOverlap(of.cloud, in.cloud, in.T_world_ref.inverse() * of.T_world_ref);
+}
+
+/// Of the keyframes from `first` to before `last`, those that have most of the newest one's points
+/// in view.
+std::vector<std::size_t> KeyframeRefiner::bestOverlaps(std::size_t first, std::size_t last,
+                                                       double least, int count) const {
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t older = first; older < last; ++older) {
+    const double overlap = overlapOf(keyframes_.size() - 1, older);
+    if (overlap >= least) ranked.emplace_back(overlap, older);
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(count)));
+  std::vector<std::size_t> best;
+  for (const auto& [overlap, older] : ranked) best.push_back(older);
+  return best;
+}
+
+TrackerErrors KeyframeRefiner::cautiousErrors() const {
+  const TrackerErrors& expected = options_.tracker;
+  return {std::max(errors_.noise_m, kCautiousShare * expected.noise_m),
+          std::max(errors_.noise_rad, kCautiousShare * expected.noise_rad),
+          std::max(errors_.drift_m, kCautiousShare * expected.drift_m),
+          std::max(errors_.drift_rad, kCautiousShare * expected.drift_rad)};
+}
+
+void KeyframeRefiner::registerNewest() {
+  const std::size_t number = keyframes_.size() - 1;
+  Keyframe& newest = keyframes_[number];
+  const auto window = static_cast<std::size_t>(options_.window);
+  std::vector<MapKeyframe> map;
+  for (const std::size_t i : bestOverlaps(number > window ? number - window : 0, number,
+                                          kLeastOverlap, options_.map_keyframes)) {
+    map.push_back({i, &keyframes_[i].cloud, keyframes_[i].T_world_ref});
+  }
+  const TrackerErrors errors = cautiousErrors();
+  const Matrix6d covariance = 2 * errors.noiseCovariance() +
+                              errors.driftCovariance(newest.way_m - keyframes_[number - 1].way_m);
+  const Registration registration =
+      registerKeyframe(number, newest.cloud, map, {newest.T_world_ref, sqrtInformation(covariance)},
+                       options_.registration);
+  if (registration.inliers < kLeastInliers || registration.inlierRatio() < kLeastInlierRatio ||
+      registration.from_prior > kFarthestFromPrior) {
+    return;
+  }
+  ++counts_.registered;
+  newest.T_world_ref = registration.T_world_ref;
+  for (const RelativePoseFactor& factor : registration.factors) {
+    factors_.push_back(factor);
+    learnFrom(factor);
+  }
+  if (options_.adapt_tracker) {
+    errors_ = estimateTrackerErrors({samples_.begin(), samples_.end()}, options_.tracker);
+  }
+}
+
+/// Holds the tracker's motion against the one that a registration found.
+void KeyframeRefiner::learnFrom(const RelativePoseFactor& factor) {
+  const Keyframe& from = keyframes_[factor.from];
+  const Keyframe& to = keyframes_[factor.to];
+  // Directions that the points leave open have a variance of 1 m^2, 1 rad^2.
+  const Matrix6d information =
+      factor.sqrt_information.transpose() * factor.sqrt_information + Matrix6d::Identity();
+  MotionSample sample;
+  sample.covariance = information.inverse();
+  const Vector6d to_minimum =
+      -sample.covariance * (factor.sqrt_information.transpose() * factor.offset);
+  const Rigid3 T_from_to = factor.T_from_to * rigidFromDifference(to_minimum);
+  sample.difference =
+      differenceOf(T_from_to.inverse() * (from.T_tracker_ref.inverse() * to.T_tracker_ref));
+  sample.way_m = to.way_m - from.way_m;
+  samples_.push_back(sample);
+  if (samples_.size() > kMaxSamples) samples_.pop_front();
+}
+
+/// Solves the keyframes from this one on, but never the first.
+void KeyframeRefiner::solveFrom(std::size_t first_free) {
+  first_free = std::max<std::size_t>(first_free, 1);
+  WindowGraph window(keyframes_, first_free);
+  for (std::size_t f = keyframes_[first_free].first_factor; f < factors_.size(); ++f) {
+    window.add(factors_[f]);
+  }
+  window.addTracker(errors_);
+  solvePoseGraph(options_.graph, window.graph);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    if (!window.has(i)) continue;
+    Keyframe& keyframe = keyframes_[i];
+    const Rigid3& T_world_ref = window.graph.T_world_node[window.ownNode(i)];
+    keyframe.T_world_tracked = window.graph.T_world_node[window.trackedNode(i)];
+    if (i < first_free) continue;
+    keyframe.T_world_ref = T_world_ref;
+    keyframe.moved = true;
+  }
+  covariance_ = poseCovariance(window.graph, window.trackedNode(keyframes_.size() - 1))
+                    .value_or(Matrix6d::Zero()) +
+                errors_.noiseCovariance();
+}
+
+bool KeyframeRefiner::check(const LoopCandidate& candidate) {
+  const Keyframe& older = keyframes_[candidate.older];
+  const Keyframe& newer = keyframes_[candidate.newer];
+  ++counts_.loop_checks;
+  const TrackerErrors errors = cautiousErrors();
+  const Matrix6d covariance =
+      2 * errors.noiseCovariance() + errors.driftCovariance(std::abs(newer.way_m - older.way_m));
+  const std::optional<RelativePoseFactor> factor = verifyLoop(
+      candidate, older.cloud, newer.cloud, covariance, options_.loop, options_.registration);
+  if (!factor) return false;
+  factors_.push_back(*factor);
+  ++counts_.loops;
+  const std::size_t oldest = std::min(candidate.older, candidate.newer);
+  open_loop_ = std::min(open_loop_.value_or(oldest), oldest);
+  return true;
+}
+
+bool KeyframeRefiner::propose(const LoopCandidate& candidate) {
+  const auto require = [&](std::size_t keyframe, const char* name) {
+    requireOption(keyframe < keyframes_.size(), name, keyframe,
+                  "the number of a keyframe, below " + std::to_string(keyframes_.size()));
+  };
+  require(candidate.older, "older keyframe of a loop");
+  require(candidate.newer, "newer keyframe of a loop");
+  requireOption(candidate.older != candidate.newer, "newer keyframe of a loop", candidate.newer,
+                "another one than the older one");
+  return check(candidate);
+}
+
+void KeyframeRefiner::closeLoops() {
+  const std::size_t number = keyframes_.size() - 1;
+  const auto window = static_cast<std::size_t>(options_.window);
+  if (options_.loop.loops && number > window) {
+    for (const std::size_t older : bestOverlaps(0, number - window, options_.loop.loop_min_overlap,
+                                                options_.loop.loop_checks)) {
+      check({older, number,
+             keyframes_[older].T_world_ref.inverse() * keyframes_[number].T_world_ref});
+      if (older + window < number) keyframes_[older].cloud.forgetTree();
+    }
+  }
+  if (!open_loop_ || (number - solved_loops_at_) * kLoopShare < number - *open_loop_) return;
+  solveFrom(*open_loop_);
+  dropContradicted();
+  open_loop_.reset();
+  solved_loops_at_ = number;
+}
+
+/// Takes out loops that the other factors do not agree with, and solves again without them.
+void KeyframeRefiner::dropContradicted() {
+  const auto contradicted = [&](const RelativePoseFactor& factor) {
+    return factor.doubtful && errorOf(factor, keyframes_[factor.from].T_world_ref,
+                                      keyframes_[factor.to].T_world_ref) > kContradicted;
+  };
+  std::uint64_t dropped = 0;
+  for (RelativePoseFactor& factor : factors_) {
+    if (!contradicted(factor)) continue;
+    factor.sqrt_information.setZero();  // stays in its place, says nothing
+    factor.offset.setZero();
+    ++dropped;
+  }
+  if (dropped == 0) return;
+  counts_.loops_dropped += dropped;
+  solveFrom(*open_loop_);
+}
+
+void KeyframeRefiner::finish() {
+  if (keyframes_.size() < 2) return;
+  open_loop_ = 1;
+  solveFrom(1);
+  dropContradicted();
+  open_loop_.reset();
+}
+
+std::vector<std::size_t> KeyframeRefiner::takeMoved() {
+  std::vector<std::size_t> moved;
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    if (std::exchange(keyframes_[i].moved, false)) moved.push_back(i);
+  }
+  return moved;
+}
+
+Rigid3 KeyframeRefiner::T_world_tracker() const {
+  if (keyframes_.empty()) return {};
+  return keyframes_.back().T_world_tracked * keyframes_.back().T_tracker_ref.inverse();
+}
+
+}  // namespace efm

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/loop_closing.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "mapping/option_check.h"
+
+namespace efm {
+namespace {
+
+/// Every so manieth point says enough of an overlap.
+constexpr std::size_t kOverlapStride = 10;
+/// Fewer are chance.
+constexpr std::size_t kLeastInliers = 100;
+/// Pairs of the same place differ by their noise; of places that are not the same, by as much as
+/// neighbours may.
+constexpr double kLargestMedianError = 1.0;
+/// From where the candidate was expected, in standard deviations: 1 in 10^5 loops is farther.
+constexpr double kFarthestFromPrior = 5.5;
+/// Two registrations of the same points agree within so many standard deviations of one.
+constexpr double kBothWaysSigmas = 4;
+
+Matrix6d informationOf(const RelativePoseFactor& factor) {
+  return factor.sqrt_information.transpose() * factor.sqrt_information;
+}
+
+double largestSigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff());
+}
+
+bool isSure(const RelativePoseFactor& factor, const LoopOptions& options) {
+  // What is quite open has a variance of 1e6 then, not none.
+  const Matrix6d covariance = (informationOf(factor) + 1e-6 * Matrix6d::Identity()).inverse();
+  return largestSigma(covariance.topLeftCorner<3, 3>()) <= options.loop_max_sigma_m &&
+         largestSigma(covariance.bottomRightCorner<3, 3>()) <= options.loop_max_sigma_rad;
+}
+
+/// Registers one keyframe with another that stands at the origin.
+Registration registerBeside(const RegistrationCloud& cloud, const RegistrationCloud& other,
+                            const Rigid3& T_other_ref, const Matrix6d& covariance,
+                            const KeyframeRegistrationOptions& options) {
+  return registerKeyframe(1, cloud, {{0, &other, Rigid3{}}},
+                          {T_other_ref, sqrtInformation(covariance)}, options);
+}
+
+bool holds(const Registration& registration, const LoopOptions& options) {
+  return !registration.factors.empty() && registration.inliers >= kLeastInliers &&
+         registration.inlierRatio() >= options.loop_min_inliers &&
+         registration.median_error <= kLargestMedianError &&
+         registration.from_prior <= kFarthestFromPrior &&
+         isSure(registration.factors.front(), options);
+}
+
+}  // namespace
+
+void LoopOptions::validate() const {
+  requireOption(loop_min_overlap > 0 && loop_min_overlap <= 1, "loop_min_overlap", loop_min_overlap,
+                "above 0, at most 1");
+  requireOption(loop_min_inliers >= 0 && loop_min_inliers <= 1, "loop_min_inliers",
+                loop_min_inliers, "from 0 to 1");
+  requireOption(loop_max_sigma_m > 0, "loop_max_sigma_m", loop_max_sigma_m, "above 0");
+  requireOption(loop_max_sigma_rad > 0, "loop_max_sigma_deg", loop_max_sigma_rad, "above 0");
+  requireOption(loop_checks >= 0 && loop_checks <= 100, "loop_checks", loop_checks,
+                "from 0 to 100");
+}
+
+double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in,
+                   const Rigid3& T_in_of) {
+  std::size_t looked_at = 0;
+  std::size_t seen = 0;
+  for (std::size_t i = 0; i < of.numChosen(); i += kOverlapStride) {
+    ++looked_at;
+    if (in.sees(T_in_of * of.points()[i].p_ref.cast<double>())) ++seen;
+  }
+  return looked_at > 0 ? static_cast<double>(seen) / static_cast<double>(looked_at) : 0;
+}
+
+std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
+                                             const RegistrationCloud& older,
+                                             const RegistrationCloud& newer,
+                                             const Matrix6d& covariance, const LoopOptions& options,
+                                             const KeyframeRegistrationOptions& registration) {
+  const Registration there =
+      registerBeside(newer, older, candidate.T_older_newer, covariance, registration);
+  if (!holds(there, options)) return std::nullopt;
+  const Registration back =
+      registerBeside(older, newer, there.T_world_ref.inverse(), covariance, registration);
+  if (!holds(back, options)) return std::nullopt;
+  const Vector6d apart = differenceOf(there.T_world_ref * back.T_world_ref);
+  if (apart.head<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_m ||
+      apart.tail<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_rad) {
+    return std::nullopt;
+  }
+  RelativePoseFactor factor = there.factors.front();
+  factor.from = candidate.older;
+  factor.to = candidate.newer;
+  factor.doubtful = true;
+  return factor;
+}
+
+}  // namespace efm
