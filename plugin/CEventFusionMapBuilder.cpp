@@ -183,7 +183,7 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
     advance([&](MappingSession& session) {
       const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
       session.addPose({observed->t_ns, observed->T_world_body * T_body_rig},
-                      *poseSourceOf(*observation));
+                      *poseOriginOf(*observation));
     });
   } else {
     const std::lock_guard<std::mutex> lock(mutex_);

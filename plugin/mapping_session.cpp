@@ -198,7 +198,7 @@ void MappingSession::completeRig() {
   rig_complete_ = true;
 }
 
-void MappingSession::addPose(const StampedPose& pose, const PoseSource& source) {
+void MappingSession::addPose(const StampedPose& pose, const PoseOrigin& source) {
   take(pose_choice_.add(source, pose));
 }
 

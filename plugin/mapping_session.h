@@ -38,8 +38,8 @@ struct SessionStatus {
   StageSeconds seconds;  ///< sweep, depth and map; the rest is the caller's.
   std::optional<TimeSpan> events;
   std::optional<TimeSpan> poses;
-  std::optional<PoseSource> pose_source;            ///< Whose poses are used.
-  std::map<PoseSource, std::uint64_t> other_poses;  ///< Of other sources: not used.
+  std::optional<PoseOrigin> pose_source;            ///< Whose poses are used.
+  std::map<PoseOrigin, std::uint64_t> other_poses;  ///< Of other sources: not used.
   std::vector<std::uint64_t> silent_keyframes;      ///< Per camera: those that it had no event for.
   Rig rig;  ///< The cameras that have appeared, as the options refit them.
 };
@@ -64,7 +64,7 @@ class MappingSession {
   /// Poses of one source are used, see PoseChoice; a better one is waited for until the rig is
   /// complete.
   /// @throws std::invalid_argument where the pose is not finite.
-  void addPose(const StampedPose& pose, const PoseSource& source = {});
+  void addPose(const StampedPose& pose, const PoseOrigin& source = {});
   /// Puts a keyframe of an earlier map into the cloud, before those to come.
   /// @throws std::invalid_argument as GlobalCloud::insert does.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);

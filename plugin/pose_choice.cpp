@@ -7,7 +7,7 @@
 
 namespace efm {
 
-std::string asText(const PoseSource& source) {
+std::string asText(const PoseOrigin& source) {
   switch (source.kind) {
     case PoseKind::kPose:
       return "poses " + inQuotes(source.label);
@@ -19,7 +19,7 @@ std::string asText(const PoseSource& source) {
   return "actions";
 }
 
-std::vector<StampedPose> PoseChoice::add(const PoseSource& source, const StampedPose& pose) {
+std::vector<StampedPose> PoseChoice::add(const PoseOrigin& source, const StampedPose& pose) {
   const bool may_be_taken = label_.empty() || source.label == label_;
   if (!chosen_ && may_be_taken) {
     held_.push_back({source, pose});
@@ -37,11 +37,11 @@ std::vector<StampedPose> PoseChoice::settle() {
   const auto best = std::min_element(held_.begin(), held_.end(), [](const Held& a, const Held& b) {
     return a.source.kind < b.source.kind;
   });
-  return choose(PoseSource(best->source));
+  return choose(PoseOrigin(best->source));
 }
 
 /// Gives what was held of a source and counts the rest.
-std::vector<StampedPose> PoseChoice::choose(const PoseSource& source) {
+std::vector<StampedPose> PoseChoice::choose(const PoseOrigin& source) {
   chosen_ = source;
   std::vector<StampedPose> poses;
   for (const Held& held : held_) {

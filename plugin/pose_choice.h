@@ -21,20 +21,20 @@ enum class PoseKind {
 };
 
 /// Who says it: a kind, and the label of its sensor.
-struct PoseSource {
+struct PoseOrigin {
   PoseKind kind = PoseKind::kPose;
   std::string label;
 
-  friend bool operator<(const PoseSource& a, const PoseSource& b) {
+  friend bool operator<(const PoseOrigin& a, const PoseOrigin& b) {
     return std::tie(a.kind, a.label) < std::tie(b.kind, b.label);
   }
-  friend bool operator==(const PoseSource& a, const PoseSource& b) {
+  friend bool operator==(const PoseOrigin& a, const PoseOrigin& b) {
     return a.kind == b.kind && a.label == b.label;
   }
 };
 
 /// "odometry 'wheels'", for messages.
-std::string asText(const PoseSource& source);
+std::string asText(const PoseOrigin& source);
 
 /// Takes the poses of one source and counts those of the others: two sources have two worlds, or
 /// one of them is worse, and their mixture is none.
@@ -47,27 +47,27 @@ class PoseChoice {
   explicit PoseChoice(std::string label) : label_(std::move(label)) {}
 
   /// @return the poses that are to be used from now on, in the order they came.
-  std::vector<StampedPose> add(const PoseSource& source, const StampedPose& pose);
+  std::vector<StampedPose> add(const PoseOrigin& source, const StampedPose& pose);
   /// Ends the waiting for a better source. @return as `add`.
   std::vector<StampedPose> settle();
 
-  const std::optional<PoseSource>& chosen() const { return chosen_; }
+  const std::optional<PoseOrigin>& chosen() const { return chosen_; }
   /// Poses of other sources.
-  const std::map<PoseSource, std::uint64_t>& unused() const { return unused_; }
+  const std::map<PoseOrigin, std::uint64_t>& unused() const { return unused_; }
 
  private:
   struct Held {
-    PoseSource source;
+    PoseOrigin source;
     StampedPose pose;
   };
 
-  std::vector<StampedPose> choose(const PoseSource& source);
+  std::vector<StampedPose> choose(const PoseOrigin& source);
 
   std::string label_;
-  std::optional<PoseSource> chosen_;
+  std::optional<PoseOrigin> chosen_;
   bool settled_ = false;
   std::vector<Held> held_;
-  std::map<PoseSource, std::uint64_t> unused_;
+  std::map<PoseOrigin, std::uint64_t> unused_;
 };
 
 }  // namespace efm

@@ -16,13 +16,13 @@ namespace efm {
 using mrpt::obs::CObservationOdometry;
 using mrpt::obs::CObservationRobotPose;
 
-std::optional<PoseSource> poseSourceOf(const mrpt::obs::CObservation& observation) {
+std::optional<PoseOrigin> poseOriginOf(const mrpt::obs::CObservation& observation) {
   const std::string& label = observation.sensorLabel;
   if (dynamic_cast<const CObservationRobotPose*>(&observation) != nullptr) {
-    return PoseSource{label == kActionsLabel ? PoseKind::kActions : PoseKind::kPose, label};
+    return PoseOrigin{label == kActionsLabel ? PoseKind::kActions : PoseKind::kPose, label};
   }
   if (dynamic_cast<const CObservationOdometry*>(&observation) != nullptr) {
-    return PoseSource{PoseKind::kOdometry, label};
+    return PoseOrigin{PoseKind::kOdometry, label};
   }
   return std::nullopt;
 }

@@ -29,7 +29,7 @@ mrpt::obs::CObservation::Ptr RefittedRecording::next() {
   } else if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     cameras_.insert(packet->camera_index);
     if (setup_.calibration) recalibrate(*packet);
-  } else if (setup_.T_body_rig && poseSourceOf(*observation)) {
+  } else if (setup_.T_body_rig && poseOriginOf(*observation)) {
     setBodyToRig(*observation, *setup_.T_body_rig);
   }
   return observation;

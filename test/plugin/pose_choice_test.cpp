@@ -11,10 +11,10 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Pair;
 
-const PoseSource kMocap = {PoseKind::kPose, "mocap"};
-const PoseSource kSlam = {PoseKind::kPose, "slam"};
-const PoseSource kWheels = {PoseKind::kOdometry, "wheels"};
-const PoseSource kActions = {PoseKind::kActions, "actions"};
+const PoseOrigin kMocap = {PoseKind::kPose, "mocap"};
+const PoseOrigin kSlam = {PoseKind::kPose, "slam"};
+const PoseOrigin kWheels = {PoseKind::kOdometry, "wheels"};
+const PoseOrigin kActions = {PoseKind::kActions, "actions"};
 
 std::vector<std::int64_t> timesOf(const std::vector<StampedPose>& poses) {
   std::vector<std::int64_t> times;
