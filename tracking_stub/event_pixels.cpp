@@ -22,13 +22,6 @@ std::int64_t roundToMicroseconds(std::int64_t base_ns, double offset_ns) {
          kNanosecondsPerMicrosecond;
 }
 
-/// Standard normal (Box and Muller).
-double normal(RandomNumbers& random) {
-  constexpr double kTwoPi = 6.283185307179586476925;
-  const double radius = std::sqrt(-2 * std::log(1 - random.uniform()));
-  return radius * std::cos(kTwoPi * random.uniform());
-}
-
 }  // namespace
 
 void EventPixelOptions::validate() const {
@@ -54,7 +47,7 @@ EventPixels::EventPixels(int width, int height, const EventPixelOptions& options
     factor_.create(height, width);
     RandomNumbers random(seed, kMismatchStream);
     for (float& factor : factor_) {
-      factor = static_cast<float>(std::max(kSmallestFactor, 1 + options.mismatch * normal(random)));
+      factor = static_cast<float>(std::max(kSmallestFactor, 1 + options.mismatch * random.normal()));
     }
   }
   if (refractory_ns_ > 0) blind_until_.assign(last_.total(), -kEndOfTimeNs);

@@ -24,6 +24,8 @@ struct PoseDropoutOptions {
   double random_gap_s = 0.5;    ///< Length of such a gap, above 0.
   std::uint64_t seed = 0;
 
+  /// Whether a pose may be lost.
+  bool any() const { return drop_probability > 0 || !gaps.empty() || random_gaps_hz > 0; }
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace efm {
@@ -19,6 +20,13 @@ class RandomNumbers {
   double uniform(double from, double to) { return from + (to - from) * uniform(); }
   /// Uniform in {0, ..., count - 1}.
   int below(int count) { return static_cast<int>(uniform() * count); }
+  /// Normal, of mean 0 and standard deviation 1 (Box and Muller, Ann. Math. Statist. 1958). Takes
+  /// two of `next`.
+  double normal() {
+    constexpr double kTwoPi = 6.283185307179586;
+    const double radius = std::sqrt(-2 * std::log(1 - uniform()));
+    return radius * std::cos(kTwoPi * uniform());
+  }
   std::uint64_t next() { return mix(state_ += 0x9e3779b97f4a7c15U); }
 
  private:

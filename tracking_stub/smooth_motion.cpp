@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "mapping/rotation_vector.h"
 #include "mapping/timestamp.h"
 
 namespace efm {
@@ -26,13 +27,9 @@ Eigen::Vector3d valueAt(const std::array<std::vector<Sine>, 3>& axes, double t_s
 
 Rigid3 SmoothMotion::poseAt(std::int64_t t_ns) const {
   const double t_s = secondsBetween(options_.start_ns, t_ns);
-  const Eigen::Vector3d rotation = valueAt(options_.rotation, t_s);
-  const double angle = rotation.norm();
   Rigid3 T_center_rig;
   T_center_rig.translation = valueAt(options_.translation, t_s) + options_.velocity * t_s;
-  if (angle > 0) {
-    T_center_rig.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation / angle));
-  }
+  T_center_rig.rotation = turnBy(valueAt(options_.rotation, t_s));
   return options_.T_world_center * T_center_rig;
 }
 

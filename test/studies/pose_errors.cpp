@@ -2,34 +2,12 @@
 #include "test/studies/pose_errors.h"
 
 #include <Eigen/Geometry>
-#include <cmath>
 
+#include "mapping/rotation_vector.h"
 #include "mapping/timestamp.h"
-#include "tracking_stub/random_numbers.h"
+#include "tracking_stub/random_vectors.h"
 
 namespace efm::studies {
-namespace {
-
-/// Box and Muller, Ann. Math. Statist. 1958.
-double normal(RandomNumbers& random) {
-  constexpr double kTwoPi = 6.283185307179586;
-  const double radius = std::sqrt(-2 * std::log(1 - random.uniform()));
-  return radius * std::cos(kTwoPi * random.uniform());
-}
-
-Eigen::Vector3d normalVector(RandomNumbers& random) {
-  Eigen::Vector3d values;
-  for (int axis = 0; axis < 3; ++axis) values[axis] = normal(random);
-  return values;
-}
-
-Eigen::Quaterniond turnBy(const Eigen::Vector3d& rotation_vector) {
-  const double angle = rotation_vector.norm();
-  if (angle <= 0) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
-}
-
-}  // namespace
 
 Recording withPoseErrors(const Recording& recording, const PoseErrors& errors) {
   Recording wrong = recording;
