@@ -8,6 +8,7 @@
 #include "plugin/datasets/dataset_folder.h"
 #include "plugin/datasets/poses_file.h"
 #include "plugin/datasets/uzh_text.h"
+#include "plugin/perturbed_recording.h"
 #include "plugin/rawlog_recording.h"
 #include "plugin/rawlog_start.h"
 #include "plugin/recording_with_poses.h"
@@ -80,6 +81,9 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   std::unique_ptr<Recording> recording = openAs(source.format, path, given);
   if (given.poses) {
     recording = std::make_unique<RecordingWithPoses>(std::move(recording), std::move(poses));
+  }
+  if (source.faults.any()) {
+    recording = std::make_unique<PerturbedRecording>(std::move(recording), source.faults);
   }
   if (setup.calibration || setup.T_body_rig) {
     recording = std::make_unique<RefittedRecording>(std::move(recording), setup);

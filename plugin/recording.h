@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "tracking_stub/tracker_faults.h"
+
 namespace efm {
 
 /// What was odd about a recording, though it could be read.
@@ -45,6 +47,7 @@ struct RecordingSource {
   std::filesystem::path poses;               ///< TUM, T_world_body; empty: the recording's.
   std::filesystem::path calibration;         ///< As `readCalibration` takes it; empty: as recorded.
   std::filesystem::path hand_eye;            ///< As `readHandEye` takes it; empty: as recorded.
+  TrackerFaults faults;                      ///< Of its CObservationRobotPose; none by default.
 };
 
 /// The formats that `openRecording` knows, "auto" first.
@@ -53,7 +56,7 @@ std::vector<std::string> recordingFormats();
 /// Opens a recording: a rawlog, a dataset folder (camchain.yaml, camN/events.txt, poses.txt) or a
 /// folder in the UZH text layout (events.txt, groundtruth.txt, calib.txt).
 /// @throws std::runtime_error naming what is missing or not understood, and what was looked for;
-/// std::invalid_argument where the calibration is of other cameras.
+/// std::invalid_argument where the calibration is of other cameras or the faults are not valid.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
 }  // namespace efm

@@ -6,6 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <variant>
 
+#include "plugin/tracker_fault_keys.h"
+
 namespace efm {
 namespace {
 
@@ -33,6 +35,14 @@ Json asJson(const EventFusionOptions& options) {
           json[std::string(option.section)][std::string(option.key)] = value;
         },
         option.value);
+  }
+  return json;
+}
+
+Json asJson(const TrackerFaults& faults) {
+  Json json = Json::object();
+  for (const auto& named : listTrackerFaults(faults)) {
+    std::visit([&](const auto& value) { json[named.first] = value; }, named.second);
   }
   return json;
 }
@@ -86,6 +96,7 @@ std::string reportJson(const MapReport& report) {
   if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
   if (report.view) json["reference_view"] = asJson(*report.view);
   if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
+  if (report.faults.any()) json["perturbation"] = asJson(report.faults);
   json["options"] = asJson(report.options);
   return json.dump(2) + "\n";
 }

@@ -10,6 +10,7 @@
 #include "mapping/reference_view.h"
 #include "plugin/option_file.h"
 #include "plugin/stage_timer.h"
+#include "tracking_stub/tracker_faults.h"
 
 namespace efm {
 
@@ -20,6 +21,7 @@ struct MapReport {
   std::uint64_t points = 0;                     ///< Of the exported map.
   StageSeconds seconds;
   EventFusionOptions options;  ///< As used.
+  TrackerFaults faults;        ///< That the poses were given.
   /// What `max_confidence = sequence` stood for, where a pass of its own found it.
   std::optional<double> sequence_maximum;
   /// The view of the depth maps, and how far its camera is from the nearest other that took part:
@@ -32,7 +34,8 @@ struct MapReport {
 /// outside_window + dropped + filtered), event_uses, votes (event_uses x planes = their sum),
 /// keyframes, silent (keyframes per camera, sub-intervals), points, seconds, votes_per_second,
 /// kernel, threads, peak_memory_bytes (of this process), reference_view and baseline_m where known,
-/// options (all of them) and version.
+/// perturbation (the faults that the poses were given, where there are any), options (all of them)
+/// and version.
 std::string reportJson(const MapReport& report);
 
 /// Votes (used events times planes) over the sweep's seconds; 0 where nothing was swept.

@@ -90,10 +90,12 @@ bool TimeCut::posesEnded() const {
 }
 
 void TimeCut::takePose(const CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns) {
-  if (t_ns < t0_ns_) {
+  if (t_ns < t0_ns_ && !began_) {
     track.before = pose;
   } else if (t_ns < t1_ns_ || !std::exchange(track.ended, true)) {
-    give(pose);  // the first one after the cut is the last one needed
+    // One before t0 may come behind what is after it, where the tracker is late. The first one after
+    // the cut is the last one needed.
+    give(pose);
   }
 }
 

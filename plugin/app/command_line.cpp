@@ -4,7 +4,9 @@
 #include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "mapping/quoted_text.h"
 #include "mapping/timestamp.h"
@@ -15,11 +17,20 @@
 #include "plugin/app/map_command.h"
 #include "plugin/app/simulate_command.h"
 #include "plugin/recording.h"
+#include "plugin/tracker_fault_keys.h"
 #include "tracking_stub/simulation_preset.h"
 #include "tracking_stub/trajectory_simulation.h"
 
 namespace efm {
 namespace {
+
+void setFaults(const std::vector<std::string>& assignments, TrackerFaults& faults) {
+  try {
+    for (const std::string& assignment : assignments) setTrackerFault(assignment, faults);
+  } catch (const std::invalid_argument& error) {
+    throw CLI::ValidationError("--perturb", error.what());
+  }
+}
 
 template <typename Arguments>
 void addSource(CLI::App& command, Arguments& arguments) {
@@ -48,6 +59,28 @@ void addSource(CLI::App& command, Arguments& arguments) {
                   "Where the rig is on the tracked body: YAML with T_body_rig, 4x4; the poses are "
                   "then the body's")
       ->type_name("FILE");
+  command
+      .add_option_function<std::vector<std::string>>(
+          "--perturb",
+          [&arguments](const std::vector<std::string>& assignments) {
+            setFaults(assignments, arguments.source.faults);
+          },
+          "Faults for the tracker, seeded: " + knownTrackerFaults() + "; may be repeated")
+      ->type_name("KEY=VALUE[,KEY=VALUE...]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+}
+
+/// A command that has no options to say how long a keyframe is.
+template <typename Arguments>
+void requireKeyframeLengthOf(CLI::App& command, const std::shared_ptr<Arguments>& arguments) {
+  command.parse_complete_callback([arguments] {
+    try {
+      requireKeyframeLength(arguments->source.faults);
+    } catch (const std::invalid_argument& error) {
+      throw CLI::ValidationError("--perturb", error.what());
+    }
+  });
 }
 
 /// A time in seconds of the recording's own clock, exact to the nanosecond.
@@ -192,6 +225,7 @@ void addImport(CLI::App& app, Run& run) {
       ->required()
       ->type_name("FILE.rawlog");
   addTimeLimits(command, *arguments);
+  requireKeyframeLengthOf(command, arguments);
 }
 
 void addMap(CLI::App& app, Run& run) {
@@ -220,6 +254,7 @@ void addInfo(CLI::App& app, Run& run) {
   auto arguments = onCommand(command, run, runInfo);
   addSource(command, *arguments);
   addTimeLimits(command, *arguments);
+  requireKeyframeLengthOf(command, arguments);
 }
 
 }  // namespace

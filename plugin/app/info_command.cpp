@@ -145,8 +145,10 @@ void print(const Contents& contents, const RecordingCounts& counts) {
 }  // namespace
 
 int runInfo(const InfoArguments& arguments) {
+  RecordingSource source = arguments.source;
+  source.faults.latency_ns = 0;  // stamps are what counts
   const std::unique_ptr<Recording> recording =
-      cutTime(openRecording(arguments.source), arguments.t0_ns, arguments.t1_ns);
+      cutTime(openRecording(source), arguments.t0_ns, arguments.t1_ns);
   Contents contents;
   std::exception_ptr stopped;
   {

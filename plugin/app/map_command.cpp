@@ -7,6 +7,7 @@
 #include <iostream>
 #include <memory>
 
+#include "mapping/timestamp.h"
 #include "maps/keyframe_cloud.h"
 #include "maps/outlier_removal.h"
 #include "plugin/app/mapping_run.h"
@@ -27,11 +28,17 @@ EventFusionOptions optionsOf(const MappingArguments& arguments) {
   return options;
 }
 
-/// The recording with what the options say of its rig.
-RecordingSource sourceOf(const MappingArguments& arguments, const RigOptions& rig) {
+/// The recording with what the options say of its rig, and of keyframes to a tracker whose noise is
+/// constant in each.
+RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOptions& options) {
   RecordingSource source = arguments.source;
-  source.calibration = rig.calibration;
-  source.hand_eye = rig.hand_eye;
+  source.calibration = options.rig.calibration;
+  source.hand_eye = options.rig.hand_eye;
+  PosePerturbationOptions& perturbation = source.faults.perturbation;
+  perturbation.max_pose_gap_s = options.mapper.trajectory.max_pose_gap_s;
+  if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
+    perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.keyframes.stride_s);
+  }
   return source;
 }
 
@@ -106,13 +113,14 @@ int runMap(const MapArguments& arguments) {
     job.options = optionsOf(arguments);
     job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
     job.options.mapper.limits.validate();
-    const RecordingSource source = sourceOf(arguments, job.options.rig);
+    const RecordingSource source = sourceOf(arguments, job.options);
     job.sequence_maximum = sequenceMaximumOf(source, job.options);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(arguments.out, OutputKind::kMap, job.options.mapper.keyframe.planes);
     job.take_keyframe = [&](const KeyframeDepthMap& keyframe) { output->writeKeyframe(keyframe); };
 
     outcome = runMapping(job, *recording);
+    outcome.report.faults = source.faults;
     warnOfRecalibration(arguments, *recording, outcome);
     if (outcome.report.counts.keyframes > 0) {
       const SecondsScope map(outcome.report.seconds.map);
@@ -135,7 +143,7 @@ int runDepth(const DepthArguments& arguments) {
     job.options = optionsOf(arguments);
     job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
     job.options.mapper.validate();
-    const RecordingSource source = sourceOf(arguments, job.options.rig);
+    const RecordingSource source = sourceOf(arguments, job.options);
     job.sequence_maximum = sequenceMaximumOf(source, job.options);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(arguments.out, OutputKind::kDepth, job.options.mapper.keyframe.planes);
@@ -157,6 +165,7 @@ int runDepth(const DepthArguments& arguments) {
     }
 
     outcome = runMapping(job, *recording);
+    outcome.report.faults = source.faults;
     warnOfRecalibration(arguments, *recording, outcome);
     outcome.report.points = points.size();
     if (outcome.report.counts.keyframes > 0) {

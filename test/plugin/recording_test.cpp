@@ -28,7 +28,7 @@ class OpenRecording : public TemporaryFolder {
   static std::string errorOf(const std::vector<std::filesystem::path>& sources,
                              const std::string& format = "auto") {
     try {
-      openRecording({sources, format, {}, {}, {}});
+      openRecording({sources, format, {}, {}, {}, {}});
     } catch (const std::exception& error) {
       return error.what();
     }

@@ -38,6 +38,18 @@ TEST(Report, HasEveryKeyOfTheContract) {
   }
 }
 
+TEST(Report, SaysThatPosesWerePerturbedWhereTheyWere) {
+  MapReport report = smallReport();
+  EXPECT_FALSE(json::parse(reportJson(report)).contains("perturbation"));
+  report.faults.latency_ns = 200'000'000;
+  report.faults.perturbation.seed = 9;
+  const json perturbation = json::parse(reportJson(report))["perturbation"];
+  EXPECT_EQ(perturbation["latency_s"], 0.2);
+  EXPECT_EQ(perturbation["noise_m"], 0);
+  EXPECT_EQ(perturbation["seed"], 9);
+  EXPECT_FALSE(perturbation.contains("keyframe_s"));
+}
+
 TEST(Report, TotalsAreTheSumsOfTheCameras) {
   const json events = json::parse(reportJson(smallReport()))["events"];
   EXPECT_EQ(events["read"], 15);
