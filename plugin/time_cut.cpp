@@ -93,8 +93,8 @@ void TimeCut::takePose(const CObservation::Ptr& pose, PoseTrack& track, std::int
   if (t_ns < t0_ns_ && !began_) {
     track.before = pose;
   } else if (t_ns < t1_ns_ || !std::exchange(track.ended, true)) {
-    // One before t0 may come behind what is after it, where the tracker is late. The first one after
-    // the cut is the last one needed.
+    // One before t0 may come behind what is after it, where the tracker is late. The first one
+    // after the cut is the last one needed.
     give(pose);
   }
 }

@@ -47,7 +47,8 @@ EventPixels::EventPixels(int width, int height, const EventPixelOptions& options
     factor_.create(height, width);
     RandomNumbers random(seed, kMismatchStream);
     for (float& factor : factor_) {
-      factor = static_cast<float>(std::max(kSmallestFactor, 1 + options.mismatch * random.normal()));
+      factor =
+          static_cast<float>(std::max(kSmallestFactor, 1 + options.mismatch * random.normal()));
     }
   }
   if (refractory_ns_ > 0) blind_until_.assign(last_.total(), -kEndOfTimeNs);
