@@ -3,11 +3,13 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "mapping/option_check.h"
+#include "maps/window_graph.h"
 
 namespace efm {
 namespace {
@@ -46,70 +48,40 @@ void RefinementOptions::validate() const {
                 "from 1 to 100");
 }
 
-/// A pose graph of some of the keyframes. Each has two poses: its own, and the one that the tracker
-/// would have given without noise.
-class KeyframeRefiner::WindowGraph {
- public:
-  WindowGraph(const std::vector<Keyframe>& keyframes, std::size_t first_free)
-      : keyframes_(keyframes), first_free_(first_free), place_(keyframes.size()) {}
-
-  void add(RelativePoseFactor factor) {
-    if (factor.from < first_free_ && factor.to < first_free_) return;
-    factor.from = ownNode(factor.from);
-    factor.to = ownNode(factor.to);
-    graph.factors.push_back(factor);
-  }
-  void addTracker(const TrackerErrors& errors) {
-    const Matrix6d noise = sqrtInformation(errors.noiseCovariance());
-    for (std::size_t i = first_free_ - 1; i < keyframes_.size(); ++i) {
-      graph.factors.push_back({trackedNode(i), ownNode(i), Rigid3{}, noise});
-      if (i + 1 == keyframes_.size()) break;
-      const Keyframe& from = keyframes_[i];
-      const Keyframe& to = keyframes_[i + 1];
-      graph.factors.push_back({trackedNode(i), trackedNode(i + 1),
-                               from.T_tracker_ref.inverse() * to.T_tracker_ref,
-                               sqrtInformation(errors.driftCovariance(to.way_m - from.way_m))});
-    }
-  }
-  bool has(std::size_t keyframe) const { return place_[keyframe].has_value(); }
-  std::size_t ownNode(std::size_t keyframe) {
-    std::optional<std::size_t>& place = place_[keyframe];
-    if (!place) {
-      place = graph.T_world_node.size();
-      graph.T_world_node.push_back(keyframes_[keyframe].T_world_ref);
-      graph.T_world_node.push_back(keyframes_[keyframe].T_world_tracked);
-      graph.fixed.push_back(keyframe < first_free_);
-      // The first keyframe has all of the tracker's noise by definition: what it is comes later.
-      graph.fixed.push_back(keyframe < first_free_ && keyframe > 0);
-    }
-    return *place;
-  }
-  std::size_t trackedNode(std::size_t keyframe) { return ownNode(keyframe) + 1; }
-
-  PoseGraph graph;
-
- private:
-  const std::vector<Keyframe>& keyframes_;
-  std::size_t first_free_;
-  std::vector<std::optional<std::size_t>> place_;  // of a keyframe's first node
-};
-
 KeyframeRefiner::KeyframeRefiner(const RefinementOptions& options)
     : options_(options), errors_(options.tracker) {
   options_.validate();
 }
 
-void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref) {
+/// How many times the noise that is expected of all poses this one states.
+PoseNoise KeyframeRefiner::timesOthers(const std::optional<PoseNoise>& stated) const {
+  if (!stated) return kCommonNoise;
+  const auto times = [](double of_this, double of_all) {
+    return of_all > 0 ? of_this / of_all : 1;
+  };
+  return {times(stated->noise_m, options_.tracker.noise_m),
+          times(stated->noise_rad, options_.tracker.noise_rad)};
+}
+
+void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
+                          const std::optional<PoseNoise>& stated) {
   const std::size_t number = keyframes_.size();
+  const std::string name = "keyframe " + std::to_string(number);
   if (!isFinite(T_tracker_ref)) {
-    throw std::invalid_argument("keyframe " + std::to_string(number) +
-                                ": its pose is not finite, expected numbers");
+    throw std::invalid_argument(name + ": its pose is not finite, expected numbers");
   }
-  Keyframe keyframe{std::move(cloud), T_tracker_ref, T_tracker_ref, T_tracker_ref};
+  if (stated) {
+    requireOption(stated->noise_m >= 0 && std::isfinite(stated->noise_m), name + ": noise_m",
+                  stated->noise_m, "0 or above");
+    requireOption(stated->noise_rad >= 0 && std::isfinite(stated->noise_rad), name + ": noise_rad",
+                  stated->noise_rad, "0 or above");
+  }
+  RefinedKeyframe keyframe{std::move(cloud), T_tracker_ref, T_tracker_ref, T_tracker_ref};
+  keyframe.noise = timesOthers(stated);
   keyframe.first_factor = factors_.size();
   if (number > 0) {
     // 1. Where the tracker says.
-    const Keyframe& last = keyframes_.back();
+    const RefinedKeyframe& last = keyframes_.back();
     const Rigid3 T_last_ref = last.T_tracker_ref.inverse() * T_tracker_ref;
     keyframe.T_world_tracked = last.T_world_tracked * T_last_ref;
     keyframe.T_world_ref = keyframe.T_world_tracked;
@@ -126,8 +98,8 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref) 
 }
 
 double KeyframeRefiner::overlapOf(std::size_t newer, std::size_t older) const {
-  const Keyframe& of = keyframes_[newer];
-  const Keyframe& in = keyframes_[older];
+  const RefinedKeyframe& of = keyframes_[newer];
+  const RefinedKeyframe& in = keyframes_[older];
   return viewOverlap(of.cloud, in.cloud, in.T_world_ref.inverse() * of.T_world_ref);
 }
 
@@ -158,7 +130,7 @@ TrackerErrors KeyframeRefiner::cautiousErrors() const {
 
 void KeyframeRefiner::registerNewest() {
   const std::size_t number = keyframes_.size() - 1;
-  Keyframe& newest = keyframes_[number];
+  RefinedKeyframe& newest = keyframes_[number];
   const auto window = static_cast<std::size_t>(options_.window);
   std::vector<MapKeyframe> map;
   for (const std::size_t i : bestOverlaps(number > window ? number - window : 0, number,
@@ -166,7 +138,7 @@ void KeyframeRefiner::registerNewest() {
     map.push_back({i, &keyframes_[i].cloud, keyframes_[i].T_world_ref});
   }
   const TrackerErrors errors = cautiousErrors();
-  const Matrix6d covariance = 2 * errors.noiseCovariance() +
+  const Matrix6d covariance = errors.noiseCovariance() + errors.noiseCovariance(newest.noise) +
                               errors.driftCovariance(newest.way_m - keyframes_[number - 1].way_m);
   const Registration registration =
       registerKeyframe(number, newest.cloud, map, {newest.T_world_ref, sqrtInformation(covariance)},
@@ -188,8 +160,8 @@ void KeyframeRefiner::registerNewest() {
 
 /// Holds the tracker's motion against the one that a registration found.
 void KeyframeRefiner::learnFrom(const RelativePoseFactor& factor) {
-  const Keyframe& from = keyframes_[factor.from];
-  const Keyframe& to = keyframes_[factor.to];
+  const RefinedKeyframe& from = keyframes_[factor.from];
+  const RefinedKeyframe& to = keyframes_[factor.to];
   // Directions that the points leave open have a variance of 1 m^2, 1 rad^2.
   const Matrix6d information =
       factor.sqrt_information.transpose() * factor.sqrt_information + Matrix6d::Identity();
@@ -201,6 +173,8 @@ void KeyframeRefiner::learnFrom(const RelativePoseFactor& factor) {
   sample.difference =
       differenceOf(T_from_to.inverse() * (from.T_tracker_ref.inverse() * to.T_tracker_ref));
   sample.way_m = to.way_m - from.way_m;
+  sample.from = from.noise;
+  sample.to = to.noise;
   samples_.push_back(sample);
   if (samples_.size() > kMaxSamples) samples_.pop_front();
 }
@@ -213,28 +187,28 @@ void KeyframeRefiner::solveFrom(std::size_t first_free) {
     window.add(factors_[f]);
   }
   window.addTracker(errors_);
-  solvePoseGraph(options_.graph, window.graph);
+  window.solve(options_.graph);
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
     if (!window.has(i)) continue;
-    Keyframe& keyframe = keyframes_[i];
-    const Rigid3& T_world_ref = window.graph.T_world_node[window.ownNode(i)];
-    keyframe.T_world_tracked = window.graph.T_world_node[window.trackedNode(i)];
+    RefinedKeyframe& keyframe = keyframes_[i];
+    keyframe.T_world_tracked = window.T_world_tracked(i);
     if (i < first_free) continue;
-    keyframe.T_world_ref = T_world_ref;
+    keyframe.T_world_ref = window.T_world_ref(i);
     keyframe.moved = true;
   }
-  covariance_ = poseCovariance(window.graph, window.trackedNode(keyframes_.size() - 1))
-                    .value_or(Matrix6d::Zero()) +
-                errors_.noiseCovariance();
+  const std::size_t newest = keyframes_.size() - 1;
+  covariance_ = window.trackedCovariance(newest).value_or(Matrix6d::Zero()) +
+                errors_.noiseCovariance(keyframes_[newest].noise);
 }
 
 bool KeyframeRefiner::check(const LoopCandidate& candidate) {
-  const Keyframe& older = keyframes_[candidate.older];
-  const Keyframe& newer = keyframes_[candidate.newer];
+  const RefinedKeyframe& older = keyframes_[candidate.older];
+  const RefinedKeyframe& newer = keyframes_[candidate.newer];
   ++counts_.loop_checks;
   const TrackerErrors errors = cautiousErrors();
-  const Matrix6d covariance =
-      2 * errors.noiseCovariance() + errors.driftCovariance(std::abs(newer.way_m - older.way_m));
+  const Matrix6d covariance = errors.noiseCovariance(older.noise) +
+                              errors.noiseCovariance(newer.noise) +
+                              errors.driftCovariance(std::abs(newer.way_m - older.way_m));
   const std::optional<RelativePoseFactor> factor = verifyLoop(
       candidate, older.cloud, newer.cloud, covariance, options_.loop, options_.registration);
   if (!factor) return false;

@@ -11,6 +11,7 @@
 #include "maps/keyframe_registration.h"
 #include "maps/loop_closing.h"
 #include "maps/pose_refinement.h"
+#include "maps/refined_keyframe.h"
 #include "maps/registration_cloud.h"
 #include "maps/tracker_errors.h"
 
@@ -61,8 +62,13 @@ class KeyframeRefiner {
   explicit KeyframeRefiner(const RefinementOptions& options);
 
   /// Takes the next keyframe; its number is the one before plus 1, the first one's 0.
-  /// @throws std::invalid_argument where the pose is not finite: nothing is taken then.
-  void add(RegistrationCloud cloud, const Rigid3& T_tracker_ref);
+  /// @param stated what the tracker itself says that this pose errs by, in place of what is
+  /// expected of all; where errors are learnt, this is corrected by the factor that the expected
+  /// ones are.
+  /// @throws std::invalid_argument where the pose or what is stated is not finite, or below 0:
+  /// nothing is taken then.
+  void add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
+           const std::optional<PoseNoise>& stated = std::nullopt);
   /// Checks a loop that somebody else suspects, and closes it where it holds.
   /// @return whether it does.
   /// @throws std::invalid_argument where a keyframe is not there, or is the other one too.
@@ -86,21 +92,11 @@ class KeyframeRefiner {
   const RefinementCounts& counts() const { return counts_; }
 
  private:
-  struct Keyframe {
-    RegistrationCloud cloud;
-    Rigid3 T_tracker_ref;
-    Rigid3 T_world_ref;
-    Rigid3 T_world_tracked;  // where the tracker would have put it without noise
-    double way_m = 0;        // up to here, by the tracker
-    std::size_t first_factor = 0;
-    bool moved = true;
-  };
-  class WindowGraph;
-
   double overlapOf(std::size_t newer, std::size_t older) const;
   std::vector<std::size_t> bestOverlaps(std::size_t first, std::size_t last, double least,
                                         int count) const;
   TrackerErrors cautiousErrors() const;
+  PoseNoise timesOthers(const std::optional<PoseNoise>& stated) const;
   void registerNewest();
   void learnFrom(const RelativePoseFactor& factor);
   void solveFrom(std::size_t first_free);
@@ -109,7 +105,7 @@ class KeyframeRefiner {
   void dropContradicted();
 
   RefinementOptions options_;
-  std::vector<Keyframe> keyframes_;
+  std::vector<RefinedKeyframe> keyframes_;
   std::vector<RelativePoseFactor> factors_;  // by points; in the order of `to`, but loops proposed
   std::deque<MotionSample> samples_;
   TrackerErrors errors_;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "maps/keyframe_registration.h"
+#include "maps/tracker_errors.h"
 
 namespace efm {
 
@@ -18,7 +19,7 @@ struct LoopOptions {
   /// How sure the registration must be: standard deviations in the direction that it is least sure
   /// of. Above 0.
   double loop_max_sigma_m = 0.03;
-  double loop_max_sigma_rad = 0.5 * 3.14159265358979 / 180;
+  double loop_max_sigma_rad = 0.5 * kRadiansPerDegree;
   int loop_checks = 2;  ///< Candidates that are registered per keyframe, 0 to 100.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.

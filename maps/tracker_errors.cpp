@@ -40,8 +40,9 @@ Matrix6d covarianceOf(double variance_m2, double variance_rad2) {
 double logLikelihood(const std::vector<MotionSample>& samples, const TrackerErrors& errors) {
   double sum = 0;
   for (const MotionSample& sample : samples) {
-    const Matrix6d covariance =
-        sample.covariance + 2 * errors.noiseCovariance() + errors.driftCovariance(sample.way_m);
+    const Matrix6d covariance = sample.covariance + errors.noiseCovariance(sample.from) +
+                                errors.noiseCovariance(sample.to) +
+                                errors.driftCovariance(sample.way_m);
     const Eigen::LLT<Matrix6d> llt(covariance);
     const double squared = llt.matrixL().solve(sample.difference).squaredNorm();
     sum -= llt.matrixLLT().diagonal().array().log().sum() +
@@ -69,8 +70,10 @@ void TrackerErrors::validate() const {
   require("tracker_drift_deg_per_m", drift_rad);
 }
 
-Matrix6d TrackerErrors::noiseCovariance() const {
-  return covarianceOf(noise_m * noise_m, noise_rad * noise_rad);
+Matrix6d TrackerErrors::noiseCovariance(const PoseNoise& times) const {
+  const double sigma_m = times.noise_m * noise_m;
+  const double sigma_rad = times.noise_rad * noise_rad;
+  return covarianceOf(sigma_m * sigma_m, sigma_rad * sigma_rad);
 }
 
 Matrix6d TrackerErrors::driftCovariance(double way_m) const {
