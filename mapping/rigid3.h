@@ -25,6 +25,12 @@ struct Rigid3 {
   }
 };
 
+/// Whether two transforms are the same bit for bit.
+inline bool isSame(const Rigid3& T_a_b, const Rigid3& other) {
+  return T_a_b.translation == other.translation &&
+         T_a_b.rotation.coeffs() == other.rotation.coeffs();
+}
+
 /// The pose at `fraction` in [0, 1] of the way from one pose to another: linear in position,
 /// slerp along the shorter arc in rotation.
 inline Rigid3 interpolate(const Rigid3& T_a_b0, const Rigid3& T_a_b1, double fraction) {

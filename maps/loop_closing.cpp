@@ -62,7 +62,8 @@ void LoopOptions::validate() const {
   requireOption(loop_min_inliers >= 0 && loop_min_inliers <= 1, "loop_min_inliers",
                 loop_min_inliers, "from 0 to 1");
   requireOption(loop_max_sigma_m > 0, "loop_max_sigma_m", loop_max_sigma_m, "above 0");
-  requireOption(loop_max_sigma_rad > 0, "loop_max_sigma_deg", loop_max_sigma_rad, "above 0");
+  requireOption(loop_max_sigma_rad > 0, "loop_max_sigma_deg",
+                loop_max_sigma_rad / kRadiansPerDegree, "above 0");
   requireOption(loop_checks >= 0 && loop_checks <= 100, "loop_checks", loop_checks,
                 "from 0 to 100");
 }

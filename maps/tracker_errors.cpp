@@ -65,9 +65,9 @@ void TrackerErrors::validate() const {
     requireOption(value >= 0 && value <= 1e3, name, value, "from 0 to 1000");
   };
   require("tracker_noise_m", noise_m);
-  require("tracker_noise_deg", noise_rad);
+  require("tracker_noise_deg", noise_rad / kRadiansPerDegree);
   require("tracker_drift", drift_m);
-  require("tracker_drift_deg_per_m", drift_rad);
+  require("tracker_drift_deg_per_m", drift_rad / kRadiansPerDegree);
 }
 
 Matrix6d TrackerErrors::noiseCovariance(const PoseNoise& times) const {

@@ -12,6 +12,7 @@
 #include <ostream>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "maps/point_cloud_file.h"
 #include "plugin/host_options.h"
@@ -100,6 +101,20 @@ CEventFusionMap::CEventFusionMap(const GlobalCloudOptions& options) : cloud_(opt
 void CEventFusionMap::insertKeyframe(const StoredKeyframe& keyframe) {
   cloud_.insert(keyframes_.size(), worldPointsOf(keyframe), keyframe.T_world_ref);
   keyframes_.push_back(keyframe);
+  simple_points_.reset();
+}
+
+void CEventFusionMap::moveKeyframe(std::size_t keyframe, const Rigid3& T_world_ref) {
+  StoredKeyframe& stored = keyframes_.at(keyframe);
+  const Rigid3 T_before_ref = std::exchange(stored.T_world_ref, T_world_ref);
+  cloud_.remove(keyframe);
+  try {
+    cloud_.insert(keyframe, worldPointsOf(stored), T_world_ref);
+  } catch (const std::invalid_argument&) {
+    stored.T_world_ref = T_before_ref;
+    cloud_.insert(keyframe, worldPointsOf(stored), T_before_ref);
+    throw;
+  }
   simple_points_.reset();
 }
 

@@ -38,6 +38,10 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
   /// @throws std::invalid_argument where a point is not finite or its confidence is below 0, or it
   /// lies outside the range of voxel indices: nothing is inserted then.
   void insertKeyframe(const StoredKeyframe& keyframe);
+  /// Moves a keyframe to another pose: takes it out and puts it back.
+  /// @param keyframe its place among `keyframes`.
+  /// @throws std::invalid_argument as `insertKeyframe` does: the keyframe stays then.
+  void moveKeyframe(std::size_t keyframe, const Rigid3& T_world_ref);
 
   const std::vector<StoredKeyframe>& keyframes() const { return keyframes_; }
   const GlobalCloud& cloud() const { return cloud_; }

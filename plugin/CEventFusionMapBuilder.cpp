@@ -60,6 +60,20 @@ mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& point
   return map;
 }
 
+/// Moves and adds keyframes of a map until they are these. @return whether anything had to be done.
+bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
+  bool changed = map.keyframes().size() < keyframes.size();
+  for (std::size_t i = 0; i < map.keyframes().size(); ++i) {
+    if (isSame(map.keyframes()[i].T_world_ref, keyframes[i].T_world_ref)) continue;
+    map.moveKeyframe(i, keyframes[i].T_world_ref);
+    changed = true;
+  }
+  for (std::size_t i = map.keyframes().size(); i < keyframes.size(); ++i) {
+    map.insertKeyframe(keyframes[i]);
+  }
+  return changed;
+}
+
 }  // namespace
 
 CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder_options) {
@@ -86,6 +100,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options) 
 void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_options) {
   builder_options.mapper.validate();
   builder_options.cloud.validate();
+  builder_options.refinement.validate();
   const std::lock_guard<std::mutex> lock(mutex_);
   restart(builder_options);
 }
@@ -120,12 +135,25 @@ void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>&
 
 void CEventFusionMapBuilder::mapWhenAsked() const {
   auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: see the declaration
+  bool failed = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     session_->completeEarly();
-    if (mapping_failed_) return;  // which was said: now the map so far is asked for
+    failed = mapping_failed_;
   }
-  self->mapDue();
+  if (!failed) self->mapDue();  // a failure was said: now the map so far is asked for
+  const std::lock_guard<std::mutex> lock(mutex_);
+  session_->settle();
+  self->followRefinement();
+}
+
+/// The stored keyframes stand where those of the cloud do.
+void CEventFusionMapBuilder::followRefinement() {
+  const std::vector<Rigid3>& T_world_ref = session_->T_world_ref();
+  const std::size_t earlier = keyframes_.size() - T_world_ref.size();
+  for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
+    keyframes_[earlier + i].T_world_ref = T_world_ref[i];
+  }
 }
 
 void CEventFusionMapBuilder::mapDue() {
@@ -139,8 +167,9 @@ std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapN
   mapping_failed_ = true;
   std::optional<KeyframeDepthMap> keyframe = session_->next(sink_);
   mapping_failed_ = false;
+  if (keyframe) keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
+  followRefinement();
   if (!keyframe) return std::nullopt;
-  keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
   newest_depth_ = keyframe->map.depth;
   std::vector<std::string> warnings = warningsOfSilence(*keyframe);
   return MadeKeyframe{std::move(*keyframe), taker_, std::move(warnings)};
@@ -183,7 +212,7 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
     advance([&](MappingSession& session) {
       const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
       session.addPose({observed->t_ns, observed->T_world_body * T_body_rig},
-                      *poseOriginOf(*observation));
+                      *poseOriginOf(*observation), observed->noise);
     });
   } else {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -210,7 +239,28 @@ std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
 
 std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
   const std::lock_guard<std::mutex> lock(mutex_);
+  session_->settle();
   return session_->cloud().points();
+}
+
+std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<StampedPose> poses;
+  for (const StoredKeyframe& keyframe : keyframes_) {
+    poses.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
+  }
+  return poses;
+}
+
+std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
+  std::vector<StampedPose> poses = trajectory();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::vector<Rigid3>& T_tracker_ref = session_->T_tracker_ref();
+  const std::size_t earlier = poses.size() - T_tracker_ref.size();
+  for (std::size_t i = 0; i < T_tracker_ref.size(); ++i) {
+    poses[earlier + i].T_world_rig = T_tracker_ref[i];
+  }
+  return poses;
 }
 
 // --- mrpt::config::CLoadableOptions ----------------------------------------------------------
@@ -246,8 +296,15 @@ mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() 
   const std::lock_guard<std::mutex> lock(mutex_);
   auto estimate = mrpt::poses::CPose3DPDFGaussian::Create();
   const std::optional<StampedPose>& newest = session_->newestPose();
-  if (newest) estimate->mean = mrptPoseFrom(newest->T_world_rig);
-  return estimate;
+  if (!newest) return estimate;
+  const std::optional<RefinementState> refinement = session_->status().refinement;
+  if (!refinement) {
+    estimate->mean = mrptPoseFrom(newest->T_world_rig);
+    return estimate;
+  }
+  const Rigid3 T_world_rig = refinement->T_world_tracker * newest->T_world_rig;
+  return std::make_shared<mrpt::poses::CPose3DPDFGaussian>(
+      mrptPoseFrom(T_world_rig, refinement->covariance));
 }
 
 void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollection& action,
@@ -280,9 +337,8 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
   mapWhenAsked();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(options_.cloud);
-  std::size_t known = event_map_->keyframes().size();
-  if (metric_map_.maps.empty() || known != keyframes_.size()) {
-    for (; known < keyframes_.size(); ++known) event_map_->insertKeyframe(keyframes_[known]);
+  const bool changed = bringUpToDate(*event_map_, keyframes_);
+  if (metric_map_.maps.empty() || changed) {
     metric_map_.maps.clear();
     metric_map_.maps.push_back(event_map_);
     metric_map_.maps.push_back(pointsMapOf(event_map_->cloud().points()));

@@ -55,6 +55,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
 
  public:
   /// Receives each keyframe once, right after it went into the map and before the next one is made,
+  /// with the pose that is known by then (a refinement may move it later: see `trajectory`),
   /// by the thread that fed the builder or asked it for the map: in the order of their windows
   /// where one thread does that. May use the builder, whose map is that up to this keyframe then.
   using KeyframeTaker = std::function<void(const KeyframeDepthMap&)>;
@@ -90,6 +91,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::uint64_t ignoredObservations() const;
   /// The exported points of the global cloud.
   std::vector<CloudPoint> points() const;
+  /// T_world_ref at t_ref of all keyframes, as they are in the map; and as the tracker has them,
+  /// which is the same but for those that were refined.
+  std::vector<StampedPose> trajectory() const;
+  std::vector<StampedPose> trackerTrajectory() const;
 
   /// Reads the sections "[<prefix>_dsi]", "[<prefix>_map]" ..., or "[dsi]", "[map]" ... where the
   /// prefix is empty, and starts over; see plugin/host_options.h. Keys that are not given keep what
@@ -107,7 +112,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// @throws std::invalid_argument where a frame of the initial map is no keyframe.
   void initialize(const mrpt::maps::CSimpleMap& initial_map = mrpt::maps::CSimpleMap(),
                   const mrpt::poses::CPosePDF* x0 = nullptr) override;
-  /// The newest pose of the rig that is used, without covariance; the identity before the first.
+  /// The newest pose of the rig that is used; the identity before the first. Where poses are
+  /// refined, corrected by the latest refinement, with the covariance that this gives it (against
+  /// the oldest keyframes that its last window left in place); otherwise as it came, without
+  /// covariance.
   mrpt::poses::CPose3DPDF::Ptr getCurrentPoseEstimation() const override;
   /// Takes the action's movement for a pose (see DeadReckoning), then each observation of the
   /// frame.
@@ -137,6 +145,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   };
 
   void restart(const EventFusionOptions& builder_options);
+  void followRefinement();
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
   /// Feeds the session under the lock, then maps and hands out what became due. The first error
   /// goes to the caller at the end.
@@ -157,8 +166,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::unique_ptr<MappingSession> session_;
   bool finished_ = false;
   std::uint64_t ignored_observations_ = 0;
-  DeadReckoning reckoning_;  // from the actions
-  std::vector<StoredKeyframe> keyframes_;
+  DeadReckoning reckoning_;                // from the actions
+  std::vector<StoredKeyframe> keyframes_;  // those of an earlier map first
   cv::Mat1f newest_depth_;                 // of the newest keyframe
   std::set<int> silent_cameras_;           // that were warned of
   bool mapping_failed_ = false;            // the last time

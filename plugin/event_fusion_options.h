@@ -3,6 +3,7 @@
 
 #include "mapping/fusion_mapper.h"
 #include "maps/global_cloud.h"
+#include "plugin/map_refinement.h"
 #include "plugin/rig_setup.h"
 
 namespace efm {
@@ -14,6 +15,7 @@ struct EventFusionOptions {
   /// (Ghosh and Gallego 2022, Sec. 3.1). Depth maps stay fused.
   bool late_fusion = false;
   GlobalCloudOptions cloud;
+  MapRefinementOptions refinement;
   RigOptions rig;
 };
 

@@ -27,8 +27,8 @@ namespace {
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
-constexpr std::array<std::string_view, 4> kMapFiles = {"map.pcd", "map.simplemap", "trajectory.txt",
-                                                       "report.json"};
+constexpr std::array<std::string_view, 5> kMapFiles = {"map.pcd", "map.simplemap", "trajectory.txt",
+                                                       "trajectory_tracker.txt", "report.json"};
 constexpr std::array<std::string_view, 3> kDepthFiles = {"points.pcd", "dsi.npy", "report.json"};
 
 void makeFolder(const std::filesystem::path& folder) {
@@ -140,7 +140,6 @@ void MapOutput::writeKeyframe(const KeyframeDepthMap& keyframe) {
       folder_ / "keyframes" / formatSeconds(keyframe.window.t_ref_ns);
   makeFolder(folder);
   writeImagesTo(folder, keyframe);
-  poses_.push_back({keyframe.window.t_ref_ns, keyframe.T_world_ref});
 }
 
 void MapOutput::writeImages(const KeyframeDepthMap& keyframe) {
@@ -170,10 +169,9 @@ void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& ma
   writeImage(folder / "confidence.png", confidencePicture(map.confidence));
 }
 
-void MapOutput::writeTrajectory() {
+void MapOutput::writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses) {
   removeEarlier();
-  writeText(folder_ / "trajectory.txt",
-            [&](std::ostream& stream) { writeTumTrajectory(stream, poses_); });
+  writeText(folder_ / name, [&](std::ostream& stream) { writeTumTrajectory(stream, poses); });
 }
 
 void MapOutput::writeCloud(const std::string& name, const std::vector<CloudPoint>& points) {

@@ -26,6 +26,7 @@ enum class OutputKind {
 /// where one cannot be written, an error names it (std::runtime_error).
 ///
 ///     map.pcd  map.simplemap  trajectory.txt  report.json
+///     trajectory_tracker.txt   where poses were refined
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
 ///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   where the keyframe has them
 class MapOutput {
@@ -36,12 +37,13 @@ class MapOutput {
   /// @throws std::runtime_error where the folder cannot be made.
   MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits);
 
-  /// Writes the keyframe's four images below keyframes/ and remembers its pose.
+  /// Writes the keyframe's four images below keyframes/.
   void writeKeyframe(const KeyframeDepthMap& keyframe);
   /// Writes the four images straight into the folder: for a folder of one keyframe.
   void writeImages(const KeyframeDepthMap& keyframe);
-  /// T_world_ref at t_ref of all keyframes written, TUM format.
-  void writeTrajectory();
+  /// T_world_ref at t_ref of the keyframes, TUM format.
+  /// @param name "trajectory.txt" or "trajectory_tracker.txt".
+  void writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses);
   /// @param name "map.pcd" or "points.pcd".
   void writeCloud(const std::string& name, const std::vector<CloudPoint>& points);
   /// Writes map.simplemap: the keyframes' clouds and poses, as MRPT has them.
@@ -58,8 +60,7 @@ class MapOutput {
   std::filesystem::path folder_;
   OutputKind kind_;
   DepthPlanesOptions limits_;
-  bool began_ = false;              // something was written
-  std::vector<StampedPose> poses_;  // T_world_ref of the keyframes
+  bool began_ = false;  // something was written
 };
 
 }  // namespace efm

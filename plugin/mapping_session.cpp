@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <exception>
 #include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -19,8 +20,7 @@ constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
 constexpr std::int64_t kRigCompletesEarlyNs = kNanosecondsPerSecond / 10;
 
 bool sameCalibration(const RigCamera& a, const RigCamera& b) {
-  return a.model == b.model && a.T_rig_cam.translation == b.T_rig_cam.translation &&
-         a.T_rig_cam.rotation.coeffs() == b.T_rig_cam.rotation.coeffs() &&
+  return a.model == b.model && isSame(a.T_rig_cam, b.T_rig_cam) &&
          a.time_offset_ns == b.time_offset_ns;
 }
 
@@ -61,8 +61,12 @@ MappingSession::MappingSession(const EventFusionOptions& options)
     : options_(options),
       setup_(readRigSetup(options.rig)),
       mapper_(mapperOptions(options)),
-      cloud_(options.cloud),
-      pose_choice_(options.rig.pose_source) {}
+      cloud_(options.cloud, options.refinement.enabled),
+      pose_choice_(options.rig.pose_source) {
+  if (options.refinement.enabled) {
+    refinement_ = std::make_unique<MapRefinement>(options.refinement);
+  }
+}
 
 void MappingSession::addEvents(CameraPacket packet) {
   if (packet.camera < 0) {
@@ -198,8 +202,19 @@ void MappingSession::completeRig() {
   rig_complete_ = true;
 }
 
-void MappingSession::addPose(const StampedPose& pose, const PoseOrigin& source) {
-  take(pose_choice_.add(source, pose));
+void MappingSession::addPose(const StampedPose& pose, const PoseOrigin& origin,
+                             const std::optional<PoseNoise>& noise) {
+  take(pose_choice_.add(origin, pose));
+  const bool used = !pose_choice_.chosen() || *pose_choice_.chosen() == origin;
+  if (refinement_ && noise && used) noises_[pose.t_ns] = *noise;
+}
+
+/// What the tracker said that the last pose before a time errs by. Forgets those before it.
+std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
+  const auto after = noises_.upper_bound(t_ns);
+  if (after == noises_.begin()) return std::nullopt;
+  noises_.erase(noises_.begin(), std::prev(after));
+  return noises_.begin()->second;
 }
 
 void MappingSession::take(const std::vector<StampedPose>& poses) {
@@ -212,7 +227,7 @@ void MappingSession::take(const std::vector<StampedPose>& poses) {
 
 void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
                                    const Rigid3& T_world_ref) {
-  cloud_.insert(cloud_.keyframes(), points, T_world_ref);
+  cloud_.insertFixed(points, T_world_ref);
 }
 
 void MappingSession::completeEarly() {
@@ -222,6 +237,7 @@ void MappingSession::completeEarly() {
 }
 
 void MappingSession::finish() {
+  finished_ = true;
   take(pose_choice_.settle());
   mapper_.finish();
   completeRig();
@@ -232,14 +248,47 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
   if (!rig_complete_) return std::nullopt;
   StageTimer timer(status_.seconds);
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
-  if (!keyframe) return std::nullopt;
-  const SecondsScope scope(status_.seconds.map);
-  cloud_.insert(cloud_.keyframes(), placedInWorld(pointsOf(*keyframe), keyframe->T_world_ref),
-                keyframe->T_world_ref);
-  for (const int camera : keyframe->silent_cameras) {
-    ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
+  if (keyframe) {
+    place(*keyframe);
+  } else if (finished_ && refinement_ && !std::exchange(all_refined_, true)) {
+    refinement_->finish();
+    settle();
   }
   return keyframe;
+}
+
+/// Puts a keyframe into the cloud where it stands by now, and others where they stand then.
+void MappingSession::place(KeyframeDepthMap& keyframe) {
+  const Rigid3 T_tracker_ref = keyframe.T_world_ref;
+  if (refinement_) {
+    keyframe.T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
+  }
+  const SecondsScope scope(status_.seconds.map);
+  cloud_.insert(pointsOf(keyframe), keyframe.T_world_ref);
+  T_tracker_ref_.push_back(T_tracker_ref);
+  for (const int camera : keyframe.silent_cameras) {
+    ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
+  }
+  // What nobody would see is not worth moving.
+  constexpr double kVoxelShare = 0.1;
+  if (refinement_) follow(kVoxelShare * options_.cloud.voxel_size_m);
+}
+
+/// Puts keyframes that the refinement moved where they stand now; when live, some of them at a
+/// time: the mapping goes on.
+void MappingSession::follow(double tolerance_m) {
+  constexpr std::size_t kMostWhenLive = 16;
+  for (const auto& [keyframe, T_world_ref] : refinement_->takeMoved()) {
+    cloud_.move(keyframe, T_world_ref);
+  }
+  const bool some = options_.refinement.background && tolerance_m > 0;
+  cloud_.settle(tolerance_m, some ? kMostWhenLive : std::numeric_limits<std::size_t>::max());
+}
+
+void MappingSession::settle() {
+  if (!refinement_) return;
+  const SecondsScope scope(status_.seconds.map);
+  follow(0);
 }
 
 std::vector<ViewPoint> MappingSession::pointsOf(const KeyframeDepthMap& keyframe) const {
@@ -252,6 +301,10 @@ SessionStatus MappingSession::status() const {
   status.pose_source = pose_choice_.chosen();
   status.other_poses = pose_choice_.unused();
   status.rig = mapper_.rig();
+  if (refinement_) {
+    status.refinement = refinement_->state();
+    status.seconds.refine = status.refinement->seconds;
+  }
   return status;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,8 @@
 #include "mapping/fusion_mapper.h"
 #include "maps/global_cloud.h"
 #include "maps/keyframe_cloud.h"
+#include "maps/refined_cloud.h"
+#include "plugin/map_refinement.h"
 #include "plugin/option_file.h"
 #include "plugin/pose_choice.h"
 #include "plugin/rig_setup.h"
@@ -42,6 +45,7 @@ struct SessionStatus {
   std::map<PoseOrigin, std::uint64_t> other_poses;  ///< Of other sources: not used.
   std::vector<std::uint64_t> silent_keyframes;      ///< Per camera: those that it had no event for.
   Rig rig;  ///< The cameras that have appeared, as the options refit them.
+  std::optional<RefinementState> refinement;  ///< Where poses are refined.
 };
 
 /// From packets of events and poses, in the order of a recording, to keyframes and the global
@@ -63,8 +67,10 @@ class MappingSession {
   void addEvents(CameraPacket packet);
   /// Poses of one source are used, see PoseChoice; a better one is waited for until the rig is
   /// complete.
+  /// @param noise what the tracker says that the pose errs by.
   /// @throws std::invalid_argument where the pose is not finite.
-  void addPose(const StampedPose& pose, const PoseOrigin& source = {});
+  void addPose(const StampedPose& pose, const PoseOrigin& origin = {},
+               const std::optional<PoseNoise>& noise = std::nullopt);
   /// Puts a keyframe of an earlier map into the cloud, before those to come.
   /// @throws std::invalid_argument as GlobalCloud::insert does.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
@@ -79,19 +85,28 @@ class MappingSession {
   /// be mapped without can be mapped all the same.
   void finish();
 
-  /// Maps the next window that is covered, if there is one, and puts it into the cloud. Data in the
-  /// order of time may be added in between: it changes no window that is covered. Where this
-  /// throws, the keyframes before it stay as they are.
+  /// Maps the next window that is covered, if there is one, and puts it into the cloud; by option
+  /// refines its pose, and moves the keyframes that this moves. Data in the order of time may be
+  /// added in between: it changes no window that is covered. Where this throws, the keyframes
+  /// before it stay as they are.
   /// @param sink receives every fused plane where given.
+  /// @return T_world_ref is the refined pose as far as it is known now.
   std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr);
 
   /// The points that a keyframe has in the cloud: of its fused map, or by option of its cameras'.
   std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;
 
-  const GlobalCloud& cloud() const { return cloud_; }
+  /// Moves the keyframes in the cloud that the refinement has moved and that are not there yet.
+  void settle();
+
+  const GlobalCloud& cloud() const { return cloud_.cloud(); }
+  /// Where the keyframes of this session stand in the cloud, by their order; and where the tracker
+  /// put them.
+  const std::vector<Rigid3>& T_world_ref() const { return cloud_.T_world_ref(); }
+  const std::vector<Rigid3>& T_tracker_ref() const { return T_tracker_ref_; }
   /// What the options say of the rig.
   const RigSetup& setup() const { return setup_; }
-  /// Of those that are used.
+  /// Of those that are used, as the tracker has it.
   const std::optional<StampedPose>& newestPose() const { return newest_pose_; }
   SessionStatus status() const;
 
@@ -107,12 +122,20 @@ class MappingSession {
   bool seenFor(std::int64_t duration_ns) const;
   void completeRig();
   void take(const std::vector<StampedPose>& poses);
+  std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
+  void place(KeyframeDepthMap& keyframe);
+  void follow(double tolerance_m);
 
   EventFusionOptions options_;
   RigSetup setup_;
 
   FusionMapper mapper_;
-  GlobalCloud cloud_;
+  RefinedCloud cloud_;
+  std::unique_ptr<MapRefinement> refinement_;  // where poses are refined
+  std::vector<Rigid3> T_tracker_ref_;
+  std::map<std::int64_t, PoseNoise> noises_;  // that the tracker said, by time
+  bool finished_ = false;
+  bool all_refined_ = false;
   PoseChoice pose_choice_;
   bool rig_complete_ = false;
   // Per camera, for those of a lower index to appear; since their first event.

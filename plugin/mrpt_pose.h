@@ -2,10 +2,12 @@
 #pragma once
 
 #include "mapping/rigid3.h"
+#include "maps/pose_difference.h"
 
 namespace mrpt::poses {
 class CPose3D;
-}
+class CPose3DPDFGaussian;
+}  // namespace mrpt::poses
 
 namespace efm {
 
@@ -13,5 +15,10 @@ namespace efm {
 /// are exact to some 1e-15, at any rotation.
 Rigid3 rigidFrom(const mrpt::poses::CPose3D& pose);
 mrpt::poses::CPose3D mrptPoseFrom(const Rigid3& T_a_b);
+
+/// A pose with the covariance of a small motion of it: a translation along the axes of a, then a
+/// rotation vector about them, as `poseCovariance` gives it. MRPT's is that of x, y, z, yaw, pitch
+/// and roll.
+mrpt::poses::CPose3DPDFGaussian mrptPoseFrom(const Rigid3& T_a_b, const Matrix6d& covariance);
 
 }  // namespace efm

@@ -151,6 +151,7 @@ EventFusionOptions OptionReader::options() const {
   try {
     options_.mapper.validate();
     options_.cloud.validate();
+    options_.refinement.validate();
   } catch (const std::invalid_argument& error) {
     // The structs say "key = value: must be ..."; they know neither sections nor files.
     const std::string message = error.what();

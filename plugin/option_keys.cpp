@@ -40,6 +40,21 @@ OptionKey optionOr(std::string_view word, std::string_view section, std::string_
           }};
 }
 
+/// A key in degrees whose field is in radians.
+template <typename Field>
+OptionKey degrees(std::string_view section, std::string_view key, Field field) {
+  return {section, key,
+          [field](EventFusionOptions& options, std::string_view text) {
+            double value = 0;
+            parseInto(text, value);
+            field(options) = value * kRadiansPerDegree;
+          },
+          [field](const EventFusionOptions& options) {
+            return valueOf(field(options) / kRadiansPerDegree);
+          },
+          false};
+}
+
 }  // namespace
 
 const std::vector<OptionKey>& optionKeys() {
@@ -211,6 +226,65 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "filter"sv, "background_activity_s"sv,
           [](auto& o) -> auto& { return o.mapper.filter.background_activity_s; }),
+
+      option(
+          "refinement"sv, "enabled"sv, [](auto& o) -> auto& { return o.refinement.enabled; }),
+      option(
+          "refinement"sv, "background"sv, [](auto& o) -> auto& { return o.refinement.background; }),
+      option(
+          "refinement"sv, "window"sv, [](auto& o) -> auto& { return o.refinement.refiner.window; }),
+      option(
+          "refinement"sv, "map_keyframes"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.map_keyframes; }),
+      option(
+          "refinement"sv, "max_points"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.points.max_points; }),
+      option(
+          "refinement"sv, "max_map_points"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.points.max_map_points; }),
+      option(
+          "refinement"sv, "tracker_noise_m"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.tracker.noise_m; }),
+      degrees(
+          "refinement"sv, "tracker_noise_deg"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.tracker.noise_rad; }),
+      option(
+          "refinement"sv, "tracker_drift"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.tracker.drift_m; }),
+      degrees(
+          "refinement"sv, "tracker_drift_deg_per_m"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.tracker.drift_rad; }),
+      option(
+          "refinement"sv, "adapt_tracker"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.adapt_tracker; }),
+      option(
+          "refinement"sv, "robust_sigmas"sv, [](auto& o) -> auto& {
+            return o.refinement.refiner.registration.alignment.robust_sigmas;
+          }),
+      option(
+          "refinement"sv, "first_distance_px"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.registration.first_distance_px; }),
+      option(
+          "refinement"sv, "last_distance_px"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.registration.last_distance_px; }),
+      option(
+          "refinement"sv, "loops"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.loop.loops; }),
+      option(
+          "refinement"sv, "loop_min_overlap"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.loop.loop_min_overlap; }),
+      option(
+          "refinement"sv, "loop_min_inliers"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.loop.loop_min_inliers; }),
+      option(
+          "refinement"sv, "loop_max_sigma_m"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.loop.loop_max_sigma_m; }),
+      degrees(
+          "refinement"sv, "loop_max_sigma_deg"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.loop.loop_max_sigma_rad; }),
+      option(
+          "refinement"sv, "loop_checks"sv,
+          [](auto& o) -> auto& { return o.refinement.refiner.loop.loop_checks; }),
 
       option(
           "output"sv, "camera_maps"sv,

@@ -4,6 +4,7 @@
 #include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "mapping/quoted_text.h"
@@ -15,6 +16,20 @@ namespace efm {
 
 using mrpt::obs::CObservationOdometry;
 using mrpt::obs::CObservationRobotPose;
+
+namespace {
+
+std::optional<PoseNoise> noiseOf(const mrpt::poses::CPose3DPDFGaussian& pose) {
+  const double variance_m2 = (pose.cov(0, 0) + pose.cov(1, 1) + pose.cov(2, 2)) / 3;
+  const double variance_rad2 = (pose.cov(3, 3) + pose.cov(4, 4) + pose.cov(5, 5)) / 3;
+  if (!(variance_m2 >= 0) || !(variance_rad2 >= 0) || !(variance_m2 + variance_rad2 > 0) ||
+      !std::isfinite(variance_m2 + variance_rad2)) {
+    return std::nullopt;
+  }
+  return PoseNoise{std::sqrt(variance_m2), std::sqrt(variance_rad2)};
+}
+
+}  // namespace
 
 std::optional<PoseOrigin> poseOriginOf(const mrpt::obs::CObservation& observation) {
   const std::string& label = observation.sensorLabel;
@@ -39,7 +54,8 @@ std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation) {
   if (robot == nullptr) {
     return ObservedPose{t_ns, rigidFrom(mrpt::poses::CPose3D(odometry->odometry)), {}};
   }
-  return ObservedPose{t_ns, rigidFrom(robot->pose.mean), rigidFrom(robot->sensorPose).inverse()};
+  return ObservedPose{t_ns, rigidFrom(robot->pose.mean), rigidFrom(robot->sensorPose).inverse(),
+                      noiseOf(robot->pose)};
 }
 
 mrpt::obs::CObservation::Ptr poseObservation(const ObservedPose& pose, const std::string& label) {

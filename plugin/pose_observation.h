@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "maps/tracker_errors.h"
 #include "plugin/pose_choice.h"
 
 namespace efm {
@@ -15,6 +16,9 @@ struct ObservedPose {
   std::int64_t t_ns = 0;
   Rigid3 T_world_body;  ///< Of what was tracked.
   Rigid3 T_body_rig;    ///< As the observation says; the identity where it does not.
+  /// What the tracker says of its noise: the size of its covariance, not its shape. None where that
+  /// is zero or no covariance.
+  std::optional<PoseNoise> noise = std::nullopt;
 };
 
 /// Who says a pose: a CObservationRobotPose (one that is labelled "actions" was composed from them)

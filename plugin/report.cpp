@@ -47,6 +47,20 @@ Json asJson(const TrackerFaults& faults) {
   return json;
 }
 
+Json asJson(const RefinementState& refinement) {
+  const RefinementCounts& counts = refinement.counts;
+  const TrackerErrors& tracker = refinement.tracker;
+  return {{"registered", counts.registered},
+          {"loop_checks", counts.loop_checks},
+          {"loops", counts.loops},
+          {"loops_dropped", counts.loops_dropped},
+          {"tracker",
+           {{"noise_m", tracker.noise_m},
+            {"noise_deg", tracker.noise_rad / kRadiansPerDegree},
+            {"drift", tracker.drift_m},
+            {"drift_deg_per_m", tracker.drift_rad / kRadiansPerDegree}}}};
+}
+
 Json asJson(const ReferenceView& view) {
   return {{"width", view.width}, {"height", view.height}, {"fx", view.fx},
           {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
@@ -96,6 +110,7 @@ std::string reportJson(const MapReport& report) {
   if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
   if (report.view) json["reference_view"] = asJson(*report.view);
   if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
+  if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
   json["options"] = asJson(report.options);
   return json.dump(2) + "\n";

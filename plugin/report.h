@@ -8,6 +8,7 @@
 
 #include "mapping/fusion_mapper.h"
 #include "mapping/reference_view.h"
+#include "plugin/map_refinement.h"
 #include "plugin/option_file.h"
 #include "plugin/stage_timer.h"
 #include "tracking_stub/tracker_faults.h"
@@ -20,8 +21,9 @@ struct MapReport {
   std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: those that it had no event for.
   std::uint64_t points = 0;                     ///< Of the exported map.
   StageSeconds seconds;
-  EventFusionOptions options;  ///< As used.
-  TrackerFaults faults;        ///< That the poses were given.
+  EventFusionOptions options;                 ///< As used.
+  TrackerFaults faults;                       ///< That the poses were given.
+  std::optional<RefinementState> refinement;  ///< Where poses were refined.
   /// What `max_confidence = sequence` stood for, where a pass of its own found it.
   std::optional<double> sequence_maximum;
   /// The view of the depth maps, and how far its camera is from the nearest other that took part:
@@ -33,6 +35,7 @@ struct MapReport {
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
 /// outside_window + dropped + filtered), event_uses, votes (event_uses x planes = their sum),
 /// keyframes, silent (keyframes per camera, sub-intervals), points, seconds, votes_per_second,
+/// refinement where there was one (keyframes registered, loops, the tracker's errors as learnt),
 /// kernel, threads, peak_memory_bytes (of this process), reference_view and baseline_m where known,
 /// perturbation (the faults that the poses were given, where there are any), options (all of them)
 /// and version.

@@ -8,11 +8,11 @@
 
 #include "mapping/quoted_text.h"
 #include "mapping/timestamp.h"
+#include "maps/tracker_errors.h"
 
 namespace efm {
 namespace {
 
-constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180;
 
 struct FaultKey {
   std::string_view key;

@@ -98,6 +98,7 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, EventFusi
     return std::nullopt;
   }
   options.mapper.only_window.reset();
+  options.refinement.enabled = false;  // moves no confidence
   return sequenceMaximum(options, *openRecording(source));
 }
 
@@ -126,7 +127,12 @@ int runMap(const MapArguments& arguments) {
       const SecondsScope map(outcome.report.seconds.map);
       writeAll(outcome, {[&] { output->writeCloud("map.pcd", outcome.points); },
                          [&] { output->writeSimplemap(outcome.keyframes); },
-                         [&] { output->writeTrajectory(); }});
+                         [&] { output->writeTrajectory("trajectory.txt", outcome.trajectory); },
+                         [&] {
+                           if (!job.options.refinement.enabled) return;
+                           output->writeTrajectory("trajectory_tracker.txt",
+                                                   outcome.tracker_trajectory);
+                         }});
     }
   }
   outcome.report.seconds.total = clock.total;

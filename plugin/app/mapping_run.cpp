@@ -135,6 +135,12 @@ std::vector<std::string> warningsOf(const SessionStatus& status, bool exclude_si
     warnings.push_back(std::to_string(status.counts.duplicate_poses) +
                        " poses had the time of an earlier one and were left out");
   }
+  if (status.refinement && status.refinement->counts.registered + 1 < status.counts.keyframes) {
+    warnings.push_back(
+        std::to_string(status.counts.keyframes - 1 - status.refinement->counts.registered) +
+        " of " + std::to_string(status.counts.keyframes) +
+        " keyframes found no place by their points: the tracker's motion stands there");
+  }
   if (status.counts.keyframes > 0 && status.counts.keyframes_without_pose > 0) {
     warnings.push_back(std::to_string(status.counts.keyframes_without_pose) +
                        " windows were left out: no pose at their reference time");
@@ -179,12 +185,15 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.report.options = job.options;
   describeView(status.rig, job.options.mapper, outcome.report);
   outcome.report.sequence_maximum = job.sequence_maximum;
+  outcome.report.refinement = status.refinement;
   outcome.report.seconds = status.seconds;
   outcome.report.seconds.read = reading.read;
   {
     const SecondsScope scope(outcome.report.seconds.map);
     outcome.points = player.builder().points();
     player.builder().getCurrentlyBuiltMap(outcome.keyframes);
+    outcome.trajectory = player.builder().trajectory();
+    outcome.tracker_trajectory = player.builder().trackerTrajectory();
   }
   outcome.report.points = outcome.points.size();
   outcome.warnings = warningsOf(status, job.options.mapper.keyframe.exclude_silent);

@@ -35,6 +35,9 @@ struct MappingOutcome {
   MapReport report;  ///< Without the total of seconds.
   std::vector<CloudPoint> points;
   mrpt::maps::CSimpleMap keyframes;  ///< Their clouds and poses.
+  /// T_world_ref of the keyframes at t_ref: in the map, and by the tracker.
+  std::vector<StampedPose> trajectory;
+  std::vector<StampedPose> tracker_trajectory;
   /// What was odd about the input, though it was mapped: one line each.
   std::vector<std::string> warnings;
   /// Why the recording was not read to its end or gave no keyframe.
