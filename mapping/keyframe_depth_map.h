@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "mapping/depth_extraction.h"
 #include "mapping/reference_view.h"
 #include "mapping/rigid3.h"
+#include "mapping/velocity_correction.h"
 #include "mapping/vote_counts.h"
 #include "mapping/window.h"
 
@@ -32,6 +34,8 @@ struct KeyframeDepthMap {
   ReferenceView view;
   DepthMap map;
   double largest_confidence = 0;  ///< Of all pixels, kept or not.
+  /// By which the tracker's motion in the window was corrected; none where it stood as it was.
+  std::optional<VelocityCorrection> motion_correction;
 
   /// Events that voted, per camera of the rig (0: not selected).
   std::vector<std::uint64_t> events;

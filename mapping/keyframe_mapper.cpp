@@ -5,6 +5,8 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -51,6 +53,11 @@ double largestOf(const cv::Mat1f& confidence) {
   return largest;
 }
 
+/// How well the events of all cameras meet: the contrast of the fused DSI along its peaks.
+double sharpnessOf(const KeyframeDepthMap& keyframe) {
+  return keyframe.map.confidence.dot(keyframe.map.confidence);
+}
+
 }  // namespace
 
 void KeyframeMapperOptions::validate() const {
@@ -63,6 +70,7 @@ void KeyframeMapperOptions::validate() const {
   packets.validate();
   sweep.validate();
   extraction.validate();
+  motion.validate();
 }
 
 KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
@@ -98,9 +106,30 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   // 1-2. The reference view, common to all DSIs.
   const std::optional<Rigid3> T_world_rig = trajectory.poseAt(window.t_ref_ns);
   if (!T_world_rig) return std::nullopt;
+  const Scene scene{window, events, referencePose(*T_world_rig)};
+
+  // 3-5. Along the tracker's motion, and along what that should have been.
+  const bool corrects = options_.motion.correct_motion;
+  KeyframeDepthMap keyframe = mapAlong(trajectory, scene, corrects ? nullptr : sink, stages);
+  if (corrects) correctMotion(trajectory, scene, sink, stages, keyframe);
+  sequence_maximum_.take(keyframe.largest_confidence);
+
+  if (options_.event_images) {
+    for (const int selected : selected_) {
+      const auto camera = static_cast<std::size_t>(selected);
+      keyframe.event_images.push_back(
+          eventImage(selected, rig_.cameras[camera].model, events[camera]));
+    }
+  }
+  return keyframe;
+}
+
+/// Steps 3 to 5: from events to depth.
+KeyframeDepthMap KeyframeMapper::mapAlong(const Trajectory& trajectory, const Scene& scene,
+                                          DsiSink* sink, StageHook* stages) const {
   KeyframeDepthMap keyframe;
-  keyframe.window = window;
-  keyframe.T_world_ref = referencePose(*T_world_rig);
+  keyframe.window = scene.window;
+  keyframe.T_world_ref = scene.T_world_ref;
   keyframe.view = view_;
   keyframe.events.resize(rig_.cameras.size());
 
@@ -113,22 +142,67 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
     tbb::task_arena arena(options_.sweep.threadsOrCores());
     arena.execute([&] {
       tbb::parallel_for(std::size_t{0}, selected_.size(), [&](std::size_t i) {
-        inputs[i] = backProjectCamera(i, events[static_cast<std::size_t>(selected_[i])], window,
-                                      trajectory, geometry);
+        inputs[i] = backProjectCamera(i, scene.events[static_cast<std::size_t>(selected_[i])],
+                                      scene.window, trajectory, geometry);
       });
     });
   }
   for (const CameraInput& input : inputs) count(input, keyframe);
   fuse(std::move(inputs), sink, stages, keyframe);
-
-  if (options_.event_images) {
-    for (const int selected : selected_) {
-      const auto camera = static_cast<std::size_t>(selected);
-      keyframe.event_images.push_back(
-          eventImage(selected, rig_.cameras[camera].model, events[camera]));
-    }
-  }
   return keyframe;
+}
+
+/// Depth and the motion's correction in turn, as long as the fused DSI becomes sharper.
+void KeyframeMapper::correctMotion(const Trajectory& trajectory, const Scene& scene, DsiSink* sink,
+                                   StageHook* stages, KeyframeDepthMap& keyframe) const {
+  Trajectory motion = trajectory;
+  for (int round = 0; round < options_.motion.rounds; ++round) {
+    const VelocityCorrection correction =
+        sharpestMotion(warpAlong(motion, scene, keyframe), cv::Size(view_.width, view_.height),
+                       options_.motion, keyframe.motion_correction.value_or(VelocityCorrection{}));
+    Trajectory corrected = correctedTrajectory(trajectory, scene.window, correction);
+    KeyframeDepthMap sharper = mapAlong(corrected, scene, nullptr, stages);
+    const double gain = sharpnessOf(sharper) / sharpnessOf(keyframe) - 1;
+    if (std::getenv("EFM_SAY")) {
+      std::fprintf(stderr, "round %d gain %.4f v %.4f %.4f %.4f w %.3f %.3f %.3f deg\n", round,
+                   gain, correction.linear_m_s.x(), correction.linear_m_s.y(),
+                   correction.linear_m_s.z(), correction.angular_rad_s.x() * 57.3,
+                   correction.angular_rad_s.y() * 57.3, correction.angular_rad_s.z() * 57.3);
+    }
+    if (!(gain > (round == 0 ? options_.motion.min_gain : 0))) break;
+    motion = std::move(corrected);
+    keyframe = std::move(sharper);
+    keyframe.motion_correction = correction;
+  }
+  if (sink == nullptr) return;
+  const auto found = keyframe.motion_correction;
+  keyframe = mapAlong(motion, scene, sink, stages);
+  keyframe.motion_correction = found;
+}
+
+/// The events of all cameras where the keyframe has depth, a bounded number of them.
+std::vector<std::vector<WarpedEvent>> KeyframeMapper::warpAlong(
+    const Trajectory& motion, const Scene& scene, const KeyframeDepthMap& keyframe) const {
+  constexpr double kReachPx = 4;  // a blurred keyframe has its depths that far from where they are
+  const NearestDepths depths(keyframe.map.depth, kReachPx);
+  std::vector<std::vector<WarpedEvent>> warped(selected_.size());
+  if (depths.empty()) return warped;
+  std::size_t events = 0;
+  for (const int camera : selected_)
+    events += scene.events[static_cast<std::size_t>(camera)].size();
+  const auto most = static_cast<std::size_t>(options_.motion.max_events);
+  const std::size_t every = std::max<std::size_t>(1, (events + most - 1) / most);
+  const WarpTarget target{scene.T_world_ref.inverse(), view_, &planes_, &depths,
+                          scene.window.t_ref_ns};
+  tbb::task_arena arena(options_.sweep.threadsOrCores());
+  arena.execute([&] {
+    tbb::parallel_for(std::size_t{0}, selected_.size(), [&](std::size_t i) {
+      const auto camera = static_cast<std::size_t>(selected_[i]);
+      warped[i] = warpEvents(scene.events[camera], every, rig_.cameras[camera], undistortion_[i],
+                             motion, target);
+    });
+  });
+  return warped;
 }
 
 KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
@@ -186,7 +260,7 @@ void KeyframeMapper::count(const CameraInput& input, KeyframeDepthMap& keyframe)
 
 /// Steps 4 and 5: from rays to depth.
 void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
-                          KeyframeDepthMap& keyframe) {
+                          KeyframeDepthMap& keyframe) const {
   const bool all_silent = keyframe.silent_cameras.size() == selected_.size();
   if (options_.exclude_silent && !all_silent) {
     inputs.erase(std::remove_if(inputs.begin(), inputs.end(),
@@ -223,9 +297,10 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
         [&] { return extractDepth(dsi, planes_, options_.extraction, sequence_maximum); });
   };
   keyframe.largest_confidence = largestOf(swept.fused.peaks.confidence);
-  sequence_maximum_.take(keyframe.largest_confidence);
+  RobustMaximum so_far = sequence_maximum_;
+  so_far.take(keyframe.largest_confidence);
   const auto sequence_maximum =
-      options_.sequence_maximum ? options_.sequence_maximum : sequence_maximum_.value();
+      options_.sequence_maximum ? options_.sequence_maximum : so_far.value();
   keyframe.map = extract(swept.fused, sequence_maximum);
   if (options_.camera_maps && !cameras_apart) {
     keyframe.camera_maps.push_back({inputs.front().camera, keyframe.map});

@@ -9,6 +9,7 @@
 #include "mapping/depth_planes.h"
 #include "mapping/event_span.h"
 #include "mapping/keyframe_depth_map.h"
+#include "mapping/motion_correction.h"
 #include "mapping/pose_packets.h"
 #include "mapping/reference_view.h"
 #include "mapping/revoting.h"
@@ -37,6 +38,7 @@ struct KeyframeMapperOptions {
   PosePacketsOptions packets;
   SpaceSweepOptions sweep;
   DepthExtractionOptions extraction;
+  MotionCorrectionOptions motion;  ///< Of the poses within a window.
   /// What `WhiteLevel::kSequence` stands for, where an earlier pass over the recording found it;
   /// the robust maximum of the keyframes so far where not given.
   std::optional<double> sequence_maximum;
@@ -79,12 +81,25 @@ class KeyframeMapper {
     std::uint64_t silent_subintervals = 0;
   };
 
+  /// What is mapped: the events of a window, along a motion, seen from a place.
+  struct Scene {
+    const Window& window;
+    const std::vector<EventSpan>& events;
+    Rigid3 T_world_ref;
+  };
+
+  KeyframeDepthMap mapAlong(const Trajectory& trajectory, const Scene& scene, DsiSink* sink,
+                            StageHook* stages) const;
+  void correctMotion(const Trajectory& trajectory, const Scene& scene, DsiSink* sink,
+                     StageHook* stages, KeyframeDepthMap& keyframe) const;
+  std::vector<std::vector<WarpedEvent>> warpAlong(const Trajectory& motion, const Scene& scene,
+                                                  const KeyframeDepthMap& keyframe) const;
   CameraInput backProjectCamera(std::size_t selected, EventSpan events, const Window& window,
                                 const Trajectory& trajectory, const PacketGeometry& geometry) const;
   std::vector<std::vector<EventSpan>> slicesOf(EventSpan events, const Window& window) const;
   static void count(const CameraInput& input, KeyframeDepthMap& keyframe);
   void fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
-            KeyframeDepthMap& keyframe);
+            KeyframeDepthMap& keyframe) const;
   SweepResult sweep(SplitRays rays, bool several_cameras, const SweepRequest& request) const;
 
   Rig rig_;

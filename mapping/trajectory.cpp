@@ -65,6 +65,21 @@ void Trajectory::forgetBefore(std::int64_t t_ns) {
   }
 }
 
+Trajectory Trajectory::moved(std::int64_t from_ns, std::int64_t to_ns,
+                             const std::function<Rigid3(const StampedPose&)>& T_world_moved) const {
+  // A segment's ends may lie on both sides of each time.
+  auto begin = std::upper_bound(poses_.begin(), poses_.end(), from_ns, later);
+  if (begin != poses_.begin()) --begin;
+  auto end = std::lower_bound(begin, poses_.end(), to_ns, earlier);
+  if (end != poses_.end()) ++end;
+  Trajectory result;
+  result.max_gap_ns_ = max_gap_ns_;
+  for (auto pose = begin; pose != end; ++pose) {
+    result.poses_.push_back({pose->t_ns, T_world_moved(*pose)});
+  }
+  return result;
+}
+
 bool Trajectory::isGap(const StampedPose& before, const StampedPose& after) const {
   return after.t_ns - before.t_ns > max_gap_ns_;
 }

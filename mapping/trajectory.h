@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -58,6 +59,11 @@ class Trajectory {
   /// `cursor` is any number at first and then what the previous call left: neighbouring queries
   /// cost no search.
   std::optional<TrajectorySegment> segmentAt(std::int64_t t_ns, std::size_t& cursor) const;
+
+  /// The poses that matter from one time to another, each put where `T_world_moved` says; gaps stay
+  /// gaps.
+  Trajectory moved(std::int64_t from_ns, std::int64_t to_ns,
+                   const std::function<Rigid3(const StampedPose&)>& T_world_moved) const;
 
   bool empty() const { return poses_.empty(); }
   const std::vector<StampedPose>& poses() const { return poses_; }

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace efm {
+
+/// A semi-dense depth map spread over the surroundings of its pixels: which depth is near, and how
+/// far its pixel is.
+class NearestDepths {
+ public:
+  /// @param depth 0 where there is none.
+  /// @param radius_px how far a depth reaches.
+  NearestDepths(const cv::Mat1f& depth, double radius_px);
+
+  /// No pixel has a depth.
+  bool empty() const { return empty_; }
+  /// Inverse depth (1/m) of the nearest pixel that has one; 0 where none is within the radius.
+  float inverseDepth(int x, int y) const { return inverse_(y, x); }
+  float distancePx(int x, int y) const { return distance_(y, x); }
+
+ private:
+  bool empty_ = true;
+  cv::Mat1f inverse_;
+  cv::Mat1f distance_;
+};
+
+}  // namespace efm

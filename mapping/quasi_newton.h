@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+
+namespace efm {
+
+/// Where a smooth function has a minimum, by the method of Broyden, Fletcher, Goldfarb and Shanno
+/// with a line search that halves its steps (Nocedal and Wright, Numerical Optimization, 2006, Alg.
+/// 6.1). For few variables of about the same scale.
+struct QuasiNewtonOptions {
+  int max_evaluations = 60;
+  double first_step = 0.1;  ///< Length of the first step tried, in the variables' unit.
+  double min_step = 1e-4;   ///< A shorter step ends the search.
+};
+
+/// @param function gives the value at a place and sets the gradient.
+/// @return the best place seen; never worse than the start.
+Eigen::VectorXd minimise(
+    const std::function<double(const Eigen::VectorXd&, Eigen::VectorXd&)>& function,
+    const Eigen::VectorXd& start, const QuasiNewtonOptions& options = {});
+
+}  // namespace efm

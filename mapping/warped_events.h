@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "mapping/depth_planes.h"
+#include "mapping/event_span.h"
+#include "mapping/nearest_depths.h"
+#include "mapping/reference_view.h"
+#include "mapping/rig.h"
+#include "mapping/trajectory.h"
+#include "mapping/undistortion.h"
+#include "mapping/velocity_correction.h"
+
+namespace efm {
+
+/// An event carried to the reference view at the depth of what it saw, and how it moves there with
+/// a correction of the rig's velocity: to the first order, which is good to 0.02 pixels for turns
+/// of half a degree at a focal length of 300 pixels.
+struct WarpedEvent {
+  Eigen::Vector2f pixel;  ///< Of the reference view, without a correction.
+  /// Derivative of the pixel by (linear in m/s, angular in rad/s).
+  Eigen::Matrix<float, 2, 6> by_velocity;
+};
+
+/// What events are warped to.
+struct WarpTarget {
+  Rigid3 T_ref_world;
+  ReferenceView view;
+  const DepthPlanes* planes = nullptr;    ///< Depths that are tried; not owned.
+  const NearestDepths* depths = nullptr;  ///< Of the view; not owned.
+  std::int64_t t_ref_ns = 0;
+};
+
+/// One camera's events that saw something whose depth is known: along an event's ray the place
+/// whose depth is that of a pixel near by, the nearest of them. The others are left out.
+/// @param every takes each so manieth event, from the middle of the first so many.
+std::vector<WarpedEvent> warpEvents(EventSpan events, std::size_t every, const RigCamera& camera,
+                                    const UndistortionTable& undistortion,
+                                    const Trajectory& trajectory, const WarpTarget& target);
+
+}  // namespace efm
