@@ -1,29 +1,82 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/event_contrast.h"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <opencv2/imgproc.hpp>
 
 namespace efm {
 namespace {
 
+/// The harmonic mean of the images, squared and summed over all pixels; each image becomes the
+/// derivative by its own values.
+double fuse(std::vector<cv::Mat1f>& images) {
+  const auto cameras = static_cast<float>(images.size());
+  double contrast = 0;
+  for (int y = 0; y < images.front().rows; ++y) {
+    double row_contrast = 0;
+    for (int x = 0; x < images.front().cols; ++x) {
+      constexpr float kNothing = 1e-6F;  // of an event: keeps what is divided by above 0
+      float inverse_sum = 0;
+      for (const cv::Mat1f& image : images) inverse_sum += 1 / (image(y, x) + kNothing);
+      const float mean = cameras / inverse_sum;
+      row_contrast += double{mean} * double{mean};
+      for (cv::Mat1f& image : images) {
+        const float ratio = mean / (image(y, x) + kNothing);
+        image(y, x) = 2 * mean * ratio * ratio / cameras;
+      }
+    }
+    contrast += row_contrast;
+  }
+  return contrast;
+}
+
+}  // namespace
+
 /// The four pixels between which an event lies.
-struct Cell {
+struct EventContrast::Cell {
   int x = 0;
   int y = 0;
   float right = 0;  // share of the right two
-  float below = 0;
+  float below = 0;  // share of the lower two
   bool inside = false;
 };
 
-Cell cellOf(const WarpedEvent& event, const Eigen::Matrix<float, 6, 1>& velocity, cv::Size view) {
-  const Eigen::Vector2f pixel = event.pixel + event.by_velocity * velocity;
+EventContrast::EventContrast(const std::vector<std::vector<WarpedEvent>>& events, cv::Size view,
+                             int patch_px)
+    : events_(events), view_(view) {
+  const int columns = (view.width - 1) / patch_px + 1;
+  const int rows = (view.height - 1) / patch_px + 1;
+  std::vector<int> variable_of(static_cast<std::size_t>(columns * rows), -1);
+  for (const auto& some : events) {
+    std::vector<int>& patches = patches_.emplace_back();
+    for (const WarpedEvent& event : some) {
+      const auto column =
+          std::clamp(static_cast<int>(event.pixel.x()), 0, view.width - 1) / patch_px;
+      const auto row = std::clamp(static_cast<int>(event.pixel.y()), 0, view.height - 1) / patch_px;
+      int& variable = variable_of[static_cast<std::size_t>(row * columns + column)];
+      if (variable < 0) {
+        variable = static_cast<int>(events_in_patch_.size());
+        events_in_patch_.push_back(0);
+      }
+      ++events_in_patch_[static_cast<std::size_t>(variable)];
+      patches.push_back(variable);
+    }
+  }
+}
+
+EventContrast::Cell EventContrast::cellOf(std::size_t camera, std::size_t event,
+                                          const Change& change) const {
+  const WarpedEvent& warped = events_[camera][event];
+  const Eigen::Vector2f pixel = warped.pixel + warped.by_velocity * change.head<6>() +
+                                warped.by_inverse_depth * change[6 + patches_[camera][event]];
   Cell cell;
   const float x = std::floor(pixel.x());
   const float y = std::floor(pixel.y());
-  cell.inside = x >= 0 && y >= 0 && x < static_cast<float>(view.width - 1) &&
-                y < static_cast<float>(view.height - 1);
+  cell.inside = x >= 0 && y >= 0 && x < static_cast<float>(view_.width - 1) &&
+                y < static_cast<float>(view_.height - 1);
   if (!cell.inside) return cell;
   cell.x = static_cast<int>(x);
   cell.y = static_cast<int>(y);
@@ -31,94 +84,61 @@ Cell cellOf(const WarpedEvent& event, const Eigen::Matrix<float, 6, 1>& velocity
   cell.below = pixel.y() - y;
   return cell;
 }
-int mode() {
-  const char* m = std::getenv("EFM_MODE");
-  return m ? std::atoi(m) : 1;
-}
 
-}  // namespace
-
-EventContrast::EventContrast(const std::vector<std::vector<WarpedEvent>>& events, cv::Size view,
-                             double blur_px)
-    : events_(events), view_(view), blur_px_(blur_px) {}
-
-cv::Mat1f EventContrast::imageOf(const std::vector<WarpedEvent>& events,
-                                 const VelocityVector& velocity) const {
+cv::Mat1f EventContrast::imageOf(std::size_t camera, const Change& change) const {
   cv::Mat1f image = cv::Mat1f::zeros(view_);
-  const Eigen::Matrix<float, 6, 1> v = velocity.cast<float>();
-  for (const WarpedEvent& event : events) {
-    const Cell cell = cellOf(event, v, view_);
+  for (std::size_t i = 0; i < events_[camera].size(); ++i) {
+    const Cell cell = cellOf(camera, i, change);
     if (!cell.inside) continue;
-    float* row = image[cell.y] + cell.x;
-    float* next = image[cell.y + 1] + cell.x;
-    row[0] += (1 - cell.right) * (1 - cell.below);
-    row[1] += cell.right * (1 - cell.below);
-    next[0] += (1 - cell.right) * cell.below;
-    next[1] += cell.right * cell.below;
+    float* upper = image[cell.y] + cell.x;
+    float* lower = image[cell.y + 1] + cell.x;
+    upper[0] += (1 - cell.right) * (1 - cell.below);
+    upper[1] += cell.right * (1 - cell.below);
+    lower[0] += (1 - cell.right) * cell.below;
+    lower[1] += cell.right * cell.below;
   }
   return image;
 }
 
 cv::Mat1f EventContrast::smoothed(const cv::Mat1f& image) const {
   cv::Mat1f result;
-  // Zeros around, so that smoothing is its own transpose.
+  // Zeros around, so that smoothing is its own transpose: the gradient needs that.
   cv::GaussianBlur(image, result, cv::Size(), blur_px_, blur_px_, cv::BORDER_CONSTANT);
   return result;
 }
 
-EventContrast::Value EventContrast::at(const VelocityVector& velocity) const {
-  Value value;
-  const std::size_t n = events_.size();
-  std::vector<cv::Mat1f> images;
-  for (const auto& events : events_) images.push_back(smoothed(imageOf(events, velocity)));
-  std::vector<cv::Mat1f> slopes(n);  // d contrast / d image
-  const int m = mode();
-  if (m == 0) {
-    for (std::size_t c = 0; c < n; ++c) {
-      value.contrast += images[c].dot(images[c]);
-      slopes[c] = 2 * images[c];
-    }
-  } else if (m == 1) {
-    cv::Mat1f sum = images[0].clone();
-    for (std::size_t c = 1; c < n; ++c) sum += images[c];
-    value.contrast = sum.dot(sum);
-    for (std::size_t c = 0; c < n; ++c) slopes[c] = 2 * sum;
-  } else if (m == 2) {  // cross only (two)
-    value.contrast = n > 1 ? images[0].dot(images[1]) : images[0].dot(images[0]);
-    if (n > 1) {
-      slopes[0] = images[1];
-      slopes[1] = images[0];
-    } else
-      slopes[0] = 2 * images[0];
-  } else {  // squared harmonic mean
-    for (std::size_t c = 0; c < n; ++c) slopes[c] = cv::Mat1f::zeros(view_);
-    for (int y = 0; y < view_.height; ++y)
-      for (int x = 0; x < view_.width; ++x) {
-        double inv = 0;
-        for (std::size_t c = 0; c < n; ++c) inv += 1 / (images[c](y, x) + 1e-6);
-        const double h = n / inv;
-        value.contrast += h * h;
-        for (std::size_t c = 0; c < n; ++c) {
-          const double i = images[c](y, x) + 1e-6;
-          slopes[c](y, x) = 2 * h * h * h / (n * i * i);
-        }
-      }
+Eigen::VectorXd EventContrast::gradientOf(std::size_t camera, const Change& change,
+                                          const cv::Mat1f& slope) const {
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(variables());
+  for (std::size_t i = 0; i < events_[camera].size(); ++i) {
+    const Cell cell = cellOf(camera, i, change);
+    if (!cell.inside) continue;
+    const float* upper = slope[cell.y] + cell.x;
+    const float* lower = slope[cell.y + 1] + cell.x;
+    const Eigen::RowVector2f by_pixel(
+        (1 - cell.below) * (upper[1] - upper[0]) + cell.below * (lower[1] - lower[0]),
+        (1 - cell.right) * (lower[0] - upper[0]) + cell.right * (lower[1] - upper[1]));
+    const WarpedEvent& event = events_[camera][i];
+    gradient.head<6>() += (by_pixel * event.by_velocity).transpose().cast<double>();
+    gradient[6 + patches_[camera][i]] += static_cast<double>(by_pixel * event.by_inverse_depth);
   }
-  const Eigen::Matrix<float, 6, 1> v = velocity.cast<float>();
-  for (std::size_t c = 0; c < n; ++c) {
-    const cv::Mat1f slope = smoothed(slopes[c]);
-    for (const WarpedEvent& event : events_[c]) {
-      const Cell cell = cellOf(event, v, view_);
-      if (!cell.inside) continue;
-      const float* row = slope[cell.y] + cell.x;
-      const float* next = slope[cell.y + 1] + cell.x;
-      const double dx = (1 - cell.below) * (row[1] - row[0]) + cell.below * (next[1] - next[0]);
-      const double dy = (1 - cell.right) * (next[0] - row[0]) + cell.right * (next[1] - row[1]);
-      value.gradient += event.by_velocity.row(0).transpose().cast<double>() * dx +
-                        event.by_velocity.row(1).transpose().cast<double>() * dy;
-    }
-  }
-  return value;
+  return gradient;
+}
+
+double EventContrast::at(const Eigen::VectorXd& change, Eigen::VectorXd& gradient) const {
+  const Change narrow = change.cast<float>();
+  std::vector<cv::Mat1f> images(events_.size());
+  tbb::parallel_for(std::size_t{0}, events_.size(), [&](std::size_t camera) {
+    images[camera] = smoothed(imageOf(camera, narrow));
+  });
+  const double contrast = fuse(images);
+  std::vector<Eigen::VectorXd> gradients(events_.size());
+  tbb::parallel_for(std::size_t{0}, events_.size(), [&](std::size_t camera) {
+    gradients[camera] = gradientOf(camera, narrow, smoothed(images[camera]));
+  });
+  gradient = Eigen::VectorXd::Zero(variables());
+  for (const Eigen::VectorXd& some : gradients) gradient += some;
+  return contrast;
 }
 
 }  // namespace efm

@@ -5,8 +5,6 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -152,32 +150,37 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const Trajectory& trajectory, const Sc
   return keyframe;
 }
 
-/// Depth and the motion's correction in turn, as long as the fused DSI becomes sharper.
+/// Depth and the correction of the motion in turn, as long as the fused DSI becomes sharper.
 void KeyframeMapper::correctMotion(const Trajectory& trajectory, const Scene& scene, DsiSink* sink,
                                    StageHook* stages, KeyframeDepthMap& keyframe) const {
   Trajectory motion = trajectory;
   for (int round = 0; round < options_.motion.rounds; ++round) {
-    const VelocityCorrection correction =
-        sharpestMotion(warpAlong(motion, scene, keyframe), cv::Size(view_.width, view_.height),
-                       options_.motion, keyframe.motion_correction.value_or(VelocityCorrection{}));
+    const VelocityCorrection correction = sharpestAlong(motion, scene, stages, keyframe);
     Trajectory corrected = correctedTrajectory(trajectory, scene.window, correction);
     KeyframeDepthMap sharper = mapAlong(corrected, scene, nullptr, stages);
-    const double gain = sharpnessOf(sharper) / sharpnessOf(keyframe) - 1;
-    if (std::getenv("EFM_SAY")) {
-      std::fprintf(stderr, "round %d gain %.4f v %.4f %.4f %.4f w %.3f %.3f %.3f deg\n", round,
-                   gain, correction.linear_m_s.x(), correction.linear_m_s.y(),
-                   correction.linear_m_s.z(), correction.angular_rad_s.x() * 57.3,
-                   correction.angular_rad_s.y() * 57.3, correction.angular_rad_s.z() * 57.3);
-    }
-    if (!(gain > (round == 0 ? options_.motion.min_gain : 0))) break;
+    const double least = keyframe.motion_correction ? 0 : options_.motion.min_gain;
+    if (!(sharpnessOf(sharper) > (1 + least) * sharpnessOf(keyframe))) break;
     motion = std::move(corrected);
     keyframe = std::move(sharper);
     keyframe.motion_correction = correction;
   }
   if (sink == nullptr) return;
-  const auto found = keyframe.motion_correction;
+  const std::optional<VelocityCorrection> correction = keyframe.motion_correction;
   keyframe = mapAlong(motion, scene, sink, stages);
-  keyframe.motion_correction = found;
+  keyframe.motion_correction = correction;
+}
+
+VelocityCorrection KeyframeMapper::sharpestAlong(const Trajectory& motion, const Scene& scene,
+                                                 StageHook* stages,
+                                                 const KeyframeDepthMap& keyframe) const {
+  const StageScope scope(stages, Stage::kSweep);
+  constexpr double kSigmaPlanes = 2;  // that a wrong motion makes depths wrong by
+  const SharpestMotionInput input{cv::Size(view_.width, view_.height),
+                                  kSigmaPlanes * planes_.inverseDepthStep(),
+                                  keyframe.motion_correction.value_or(VelocityCorrection{})};
+  const auto warped = warpAlong(motion, scene, keyframe);
+  tbb::task_arena arena(options_.sweep.threadsOrCores());
+  return arena.execute([&] { return sharpestMotion(warped, input, options_.motion); });
 }
 
 /// The events of all cameras where the keyframe has depth, a bounded number of them.
@@ -192,7 +195,7 @@ std::vector<std::vector<WarpedEvent>> KeyframeMapper::warpAlong(
     events += scene.events[static_cast<std::size_t>(camera)].size();
   const auto most = static_cast<std::size_t>(options_.motion.max_events);
   const std::size_t every = std::max<std::size_t>(1, (events + most - 1) / most);
-  const WarpTarget target{scene.T_world_ref.inverse(), view_, &planes_, &depths,
+  const WarpTarget target{scene.T_world_ref.inverse(), view_, inversePlanes(planes_), &depths,
                           scene.window.t_ref_ns};
   tbb::task_arena arena(options_.sweep.threadsOrCores());
   arena.execute([&] {

@@ -92,6 +92,8 @@ class KeyframeMapper {
                             StageHook* stages) const;
   void correctMotion(const Trajectory& trajectory, const Scene& scene, DsiSink* sink,
                      StageHook* stages, KeyframeDepthMap& keyframe) const;
+  VelocityCorrection sharpestAlong(const Trajectory& motion, const Scene& scene, StageHook* stages,
+                                   const KeyframeDepthMap& keyframe) const;
   std::vector<std::vector<WarpedEvent>> warpAlong(const Trajectory& motion, const Scene& scene,
                                                   const KeyframeDepthMap& keyframe) const;
   CameraInput backProjectCamera(std::size_t selected, EventSpan events, const Window& window,

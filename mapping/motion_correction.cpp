@@ -2,21 +2,12 @@
 #include "mapping/motion_correction.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
 
 #include "mapping/option_check.h"
 #include "mapping/quasi_newton.h"
 
 namespace efm {
-namespace {
-double env(const char* name, double otherwise) {
-  const char* v = std::getenv(name);
-  return v ? std::atof(v) : otherwise;
-}
-
-}  // namespace
-
 void MotionCorrectionOptions::validate() const {
   requireOption(sigma_m_s > 0 && sigma_m_s <= 10, "motion_sigma_m_s", sigma_m_s,
                 "above 0 and at most 10");
@@ -29,31 +20,50 @@ void MotionCorrectionOptions::validate() const {
 }
 
 VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& events,
-                                  cv::Size view, const MotionCorrectionOptions& options,
-                                  const VelocityCorrection& warped_with) {
-  const std::size_t count =
-      std::accumulate(events.begin(), events.end(), std::size_t{0},
-                      [](std::size_t sum, const auto& some) { return sum + some.size(); });
-  if (count == 0) return warped_with;
-  // In units of the standard deviations, so that all directions have about the same scale.
-  VelocityVector sigmas;
-  sigmas << options.sigma_m_s, options.sigma_m_s, options.sigma_m_s, options.sigma_rad_s,
-      options.sigma_rad_s, options.sigma_rad_s;
-  const double kPrior = env("EFM_PRIOR", 0.01);
-  VelocityVector before;
-  before << warped_with.linear_m_s, warped_with.angular_rad_s;
-  Eigen::VectorXd place = before.cwiseQuotient(sigmas);
-  for (const double blur_px : {env("EFM_BLUR1", 2.0), env("EFM_BLUR2", 1.0)}) {
-    const EventContrast contrast(events, view, blur_px);
-    const auto cost = [&](const Eigen::VectorXd& at, Eigen::VectorXd& slope) {
-      const EventContrast::Value value = contrast.at(sigmas.cwiseProduct(at) - before);
-      slope = kPrior * at - sigmas.cwiseProduct(value.gradient) / value.contrast;
-      return 0.5 * kPrior * at.squaredNorm() - std::log(value.contrast);
-    };
-    place = minimise(cost, place);
+                                  const SharpestMotionInput& input,
+                                  const MotionCorrectionOptions& options) {
+  constexpr int kPatchPx = 24;
+  EventContrast contrast(events, input.view, kPatchPx);
+  const std::vector<std::size_t>& in_patch = contrast.eventsInPatch();
+  if (in_patch.empty()) return input.warped_with;
+
+  // Variables in units of their standard deviations: all have about the same scale.
+  const Eigen::Index count = contrast.variables();
+  const auto patches = static_cast<Eigen::Index>(in_patch.size());
+  Eigen::VectorXd sigmas(count);
+  sigmas << Eigen::Vector3d::Constant(options.sigma_m_s),
+      Eigen::Vector3d::Constant(options.sigma_rad_s),
+      Eigen::VectorXd::Constant(patches, input.sigma_inverse_depth);
+  // By how much a standard deviation must raise the contrast to be worth it, as a share: of that of
+  // its own events.
+  constexpr double kVelocityPrior = 1e-3;
+  constexpr double kDepthPrior = 5e-3;
+  Eigen::VectorXd prior(count);
+  prior.head<6>().setConstant(kVelocityPrior);
+  const auto events_in_all =
+      static_cast<double>(std::accumulate(in_patch.begin(), in_patch.end(), std::size_t{0}));
+  for (Eigen::Index i = 0; i < patches; ++i) {
+    prior[6 + i] =
+        kDepthPrior * static_cast<double>(in_patch[static_cast<std::size_t>(i)]) / events_in_all;
   }
-  const VelocityVector velocity = sigmas.cwiseProduct(place);
-  return {velocity.head<3>(), velocity.tail<3>()};
+
+  Eigen::VectorXd warped_with = Eigen::VectorXd::Zero(count);
+  warped_with.head<6>() << input.warped_with.linear_m_s, input.warped_with.angular_rad_s;
+  const auto cost = [&](const Eigen::VectorXd& at, Eigen::VectorXd& slope) {
+    const double value = contrast.at(sigmas.cwiseProduct(at) - warped_with, slope);
+    slope = prior.cwiseProduct(at) - sigmas.cwiseProduct(slope) / value;
+    return 0.5 * prior.dot(at.cwiseAbs2()) - std::log(value);
+  };
+  QuasiNewtonOptions search;
+  search.max_evaluations = 25;
+  Eigen::VectorXd place = warped_with.cwiseQuotient(sigmas);
+  // Smooth images lead from afar, sharp ones to the place.
+  for (const double blur_px : {2.0, 1.0}) {
+    contrast.setBlur(blur_px);
+    place = minimise(cost, place, search);
+  }
+  const Eigen::VectorXd found = sigmas.cwiseProduct(place);
+  return {found.head<3>(), found.segment<3>(3)};
 }
 
 }  // namespace efm

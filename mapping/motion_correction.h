@@ -23,21 +23,29 @@ struct MotionCorrectionOptions {
   /// Events that are warped, of all cameras together: more take longer. 100 to 10,000,000.
   int max_events = 20000;
   /// Times that depth and velocity are found, one from the other. 1 to 10.
-  int rounds = 1;
+  int rounds = 2;
   /// Share by which the contrast of the fused DSI must grow for a correction to be taken: less is
   /// what a correction of exact poses would gain by chance. 0 to 1.
-  double min_gain = 0.02;
+  double min_gain = 0.01;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// The correction that makes the events of all cameras sharpest, no larger than the standard
-/// deviations of the options make likely.
-/// @param warped_with the correction that the events were warped with.
-/// @return `warped_with` where there are no events.
+/// What a correction is looked for with.
+struct SharpestMotionInput {
+  cv::Size view;
+  /// Standard deviation of the depths that events were warped to, 1/m.
+  double sigma_inverse_depth = 0;
+  /// The correction that events were warped with.
+  VelocityCorrection warped_with;
+};
+
+/// The correction that makes the events of all cameras sharpest; what says nothing of it leaves it
+/// near none. Bounded in time by the number of events.
+/// @return that of the input where there are no events.
 VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& events,
-                                  cv::Size view, const MotionCorrectionOptions& options,
-                                  const VelocityCorrection& warped_with = {});
+                                  const SharpestMotionInput& input,
+                                  const MotionCorrectionOptions& options);
 
 }  // namespace efm

@@ -16,8 +16,8 @@ class NearestDepths {
   /// No pixel has a depth.
   bool empty() const { return empty_; }
   /// Inverse depth (1/m) of the nearest pixel that has one; 0 where none is within the radius.
-  float inverseDepth(int x, int y) const { return inverse_(y, x); }
-  float distancePx(int x, int y) const { return distance_(y, x); }
+  float inverseDepth(cv::Point pixel) const { return inverse_(pixel); }
+  float distancePx(cv::Point pixel) const { return distance_(pixel); }
 
  private:
   bool empty_ = true;

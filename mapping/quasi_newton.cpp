@@ -36,10 +36,9 @@ Eigen::VectorXd minimise(
     slope = next_slope;
     const double curvature = step.dot(change);
     if (curvature <= 0) continue;  // not convex there: nothing is learned
-    const Eigen::MatrixXd project =
-        Eigen::MatrixXd::Identity(size, size) - step * change.transpose() / curvature;
-    inverse_hessian =
-        project * inverse_hessian * project.transpose() + step * step.transpose() / curvature;
+    const Eigen::VectorXd turned = inverse_hessian * change;
+    inverse_hessian -= (step * turned.transpose() + turned * step.transpose()) / curvature;
+    inverse_hessian += (1 + change.dot(turned) / curvature) / curvature * step * step.transpose();
   }
   return place;
 }

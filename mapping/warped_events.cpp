@@ -41,6 +41,10 @@ class EventRays {
     event.pixel = view.project(p_ref).cast<float>();
     event.by_velocity =
         (since_s / *depth_m * pixel_by_point * R_ref_rig_ * point_by_velocity).cast<float>();
+    event.by_inverse_depth =
+        Eigen::Vector2d(view.fx * (center_ref.x() - center_ref.z() * ray_ref.x() / ray_ref.z()),
+                        view.fy * (center_ref.y() - center_ref.z() * ray_ref.y() / ray_ref.z()))
+            .cast<float>();
     return event;
   }
 
@@ -55,27 +59,30 @@ class EventRays {
   /// a pixel is nearest.
   std::optional<double> depthAlong(const Eigen::Vector3d& center_ref,
                                    const Eigen::Vector3d& ray_ref) const {
+    // In inverse depth a ray's pixel moves evenly.
     const ReferenceView& view = target_.view;
+    const double right = ray_ref.x() / ray_ref.z();
+    const double down = ray_ref.y() / ray_ref.z();
+    const auto x_inf = static_cast<float>(view.fx * right + view.cx);
+    const auto y_inf = static_cast<float>(view.fy * down + view.cy);
+    const auto x_slope = static_cast<float>(view.fx * (center_ref.x() - center_ref.z() * right));
+    const auto y_slope = static_cast<float>(view.fy * (center_ref.y() - center_ref.z() * down));
+    const auto width = static_cast<float>(view.width);
+    const auto height = static_cast<float>(view.height);
     float nearest_px = std::numeric_limits<float>::infinity();
     std::optional<double> found_m;
-    for (int plane = 0; plane < target_.planes->size(); ++plane) {
-      const double plane_m = target_.planes->depth(plane);
-      const double reach = (plane_m - center_ref.z()) / ray_ref.z();
-      if (!(reach > 0)) continue;
-      const Eigen::Vector2d pixel = view.project(center_ref + reach * ray_ref);
-      if (!(pixel.x() > -0.5 && pixel.x() < view.width - 0.5 && pixel.y() > -0.5 &&
-            pixel.y() < view.height - 0.5)) {
-        continue;
-      }
-      const auto x = static_cast<int>(std::lround(pixel.x()));
-      const auto y = static_cast<int>(std::lround(pixel.y()));
-      const double inverse_depth = target_.depths->inverseDepth(x, y);
-      const double half_step = 0.5 * target_.planes->inverseDepthStepAt(plane);
-      if (std::abs(inverse_depth - 1 / plane_m) > half_step) continue;
-      const float distance_px = target_.depths->distancePx(x, y);
+    for (const InversePlane& plane : target_.planes) {
+      if ((1 / plane.inverse_depth - center_ref.z()) * ray_ref.z() <= 0) continue;
+      const float x = x_inf + plane.inverse_depth * x_slope + 0.5F;
+      const float y = y_inf + plane.inverse_depth * y_slope + 0.5F;
+      if (!(x >= 0 && x < width && y >= 0 && y < height)) continue;
+      const cv::Point pixel(static_cast<int>(x), static_cast<int>(y));
+      const float inverse_depth = target_.depths->inverseDepth(pixel);
+      if (std::abs(inverse_depth - plane.inverse_depth) > plane.half_step) continue;
+      const float distance_px = target_.depths->distancePx(pixel);
       if (distance_px >= nearest_px) continue;
       nearest_px = distance_px;
-      found_m = 1 / inverse_depth;
+      found_m = 1 / double{inverse_depth};
     }
     return found_m;
   }
@@ -87,6 +94,15 @@ class EventRays {
 };
 
 }  // namespace
+
+std::vector<InversePlane> inversePlanes(const DepthPlanes& planes) {
+  std::vector<InversePlane> result;
+  for (int plane = 0; plane < planes.size(); ++plane) {
+    result.push_back({static_cast<float>(1 / planes.depth(plane)),
+                      static_cast<float>(0.5 * planes.inverseDepthStepAt(plane))});
+  }
+  return result;
+}
 
 std::vector<WarpedEvent> warpEvents(EventSpan events, std::size_t every, const RigCamera& camera,
                                     const UndistortionTable& undistortion,

@@ -17,19 +17,27 @@
 namespace efm {
 
 /// An event carried to the reference view at the depth of what it saw, and how it moves there with
-/// a correction of the rig's velocity: to the first order, which is good to 0.02 pixels for turns
-/// of half a degree at a focal length of 300 pixels.
+/// a correction of the rig's velocity and of that depth: to the first order, which is good to 0.02
+/// pixels for turns of half a degree at a focal length of 300 pixels.
 struct WarpedEvent {
   Eigen::Vector2f pixel;  ///< Of the reference view, without a correction.
   /// Derivative of the pixel by (linear in m/s, angular in rad/s).
   Eigen::Matrix<float, 2, 6> by_velocity;
+  Eigen::Vector2f by_inverse_depth;  ///< Derivative of the pixel by inverse depth in 1/m.
 };
+
+/// A depth plane, as rays are searched.
+struct InversePlane {
+  float inverse_depth = 0;  ///< 1/m.
+  float half_step = 0;      ///< Half the distance to its neighbours, 1/m.
+};
+std::vector<InversePlane> inversePlanes(const DepthPlanes& planes);
 
 /// What events are warped to.
 struct WarpTarget {
   Rigid3 T_ref_world;
   ReferenceView view;
-  const DepthPlanes* planes = nullptr;    ///< Depths that are tried; not owned.
+  std::vector<InversePlane> planes;       ///< Depths that are tried.
   const NearestDepths* depths = nullptr;  ///< Of the view; not owned.
   std::int64_t t_ref_ns = 0;
 };
