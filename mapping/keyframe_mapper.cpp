@@ -154,7 +154,7 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const Trajectory& trajectory, const Sc
 void KeyframeMapper::correctMotion(const Trajectory& trajectory, const Scene& scene, DsiSink* sink,
                                    StageHook* stages, KeyframeDepthMap& keyframe) const {
   Trajectory motion = trajectory;
-  for (int round = 0; round < options_.motion.rounds; ++round) {
+  for (int round = 0; round < options_.motion.motion_rounds; ++round) {
     const VelocityCorrection correction = sharpestAlong(motion, scene, stages, keyframe);
     Trajectory corrected = correctedTrajectory(trajectory, scene.window, correction);
     KeyframeDepthMap sharper = mapAlong(corrected, scene, nullptr, stages);

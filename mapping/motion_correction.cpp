@@ -9,20 +9,22 @@
 
 namespace efm {
 void MotionCorrectionOptions::validate() const {
-  requireOption(sigma_m_s > 0 && sigma_m_s <= 10, "motion_sigma_m_s", sigma_m_s,
-                "above 0 and at most 10");
-  requireOption(sigma_rad_s > 0 && sigma_rad_s <= 10, "motion_sigma_rad_s", sigma_rad_s,
-                "above 0 and at most 10");
-  requireOption(max_events >= 100 && max_events <= 10'000'000, "motion_max_events", max_events,
+  requireOption(motion_sigma_m_s > 0 && motion_sigma_m_s <= 10, "motion_sigma_m_s",
+                motion_sigma_m_s, "above 0 and at most 10");
+  requireOption(motion_sigma_deg_s > 0 && motion_sigma_deg_s <= 1000, "motion_sigma_deg_s",
+                motion_sigma_deg_s, "above 0 and at most 1000");
+  requireOption(motion_rounds >= 1 && motion_rounds <= 10, "motion_rounds", motion_rounds,
+                "1 to 10");
+  requireOption(max_events >= 100 && max_events <= 10'000'000, "max_events", max_events,
                 "100 to 10,000,000");
-  requireOption(rounds >= 1 && rounds <= 10, "motion_rounds", rounds, "1 to 10");
-  requireOption(min_gain >= 0 && min_gain <= 1, "motion_min_gain", min_gain, "0 to 1");
+  requireOption(min_gain >= 0 && min_gain <= 1, "min_gain", min_gain, "0 to 1");
 }
 
 VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& events,
                                   const SharpestMotionInput& input,
                                   const MotionCorrectionOptions& options) {
   constexpr int kPatchPx = 24;
+  constexpr double kDegree = 0.017453292519943295;
   EventContrast contrast(events, input.view, kPatchPx);
   const std::vector<std::size_t>& in_patch = contrast.eventsInPatch();
   if (in_patch.empty()) return input.warped_with;
@@ -31,8 +33,8 @@ VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& e
   const Eigen::Index count = contrast.variables();
   const auto patches = static_cast<Eigen::Index>(in_patch.size());
   Eigen::VectorXd sigmas(count);
-  sigmas << Eigen::Vector3d::Constant(options.sigma_m_s),
-      Eigen::Vector3d::Constant(options.sigma_rad_s),
+  sigmas << Eigen::Vector3d::Constant(options.motion_sigma_m_s),
+      Eigen::Vector3d::Constant(kDegree * options.motion_sigma_deg_s),
       Eigen::VectorXd::Constant(patches, input.sigma_inverse_depth);
   // By how much a standard deviation must raise the contrast to be worth it, as a share: of that of
   // its own events.

@@ -10,22 +10,23 @@
 
 namespace efm {
 
-/// Inside the keyframe: a tracker's jitter makes its motion within a window wrong, which blurs the
-/// DSI. The mean velocity by which it is wrong is found as the one that makes the images of warped
-/// events sharpest (contrast maximisation: Gallego et al., CVPR 2018), events being warped to the
-/// depths that were mapped without a correction.
+/// A tracker that jitters gives a window a motion that is wrong, which blurs the DSI. The constant
+/// velocity by which it is wrong is the one that makes the images of warped events sharpest
+/// (contrast maximisation: Gallego et al., CVPR 2018; Ghosh and Gallego 2022, Sec. 3.4.3, see the
+/// DSI as such images). For trackers that are wrong within a window: exact poses gain nothing.
 struct MotionCorrectionOptions {
   bool correct_motion = false;
-  /// Standard deviations on each axis of the velocity that the tracker is wrong by: how far a
-  /// correction is looked for. Above 0, at most 10 m/s and 10 rad/s.
-  double sigma_m_s = 0.05;
-  double sigma_rad_s = 0.09;
+  /// Standard deviations, on each axis, of the velocity that the tracker is wrong by: what the
+  /// events leave open is held near 0 by them. Above 0, at most 10 m/s and 1000 degrees per second.
+  double motion_sigma_m_s = 0.05;
+  double motion_sigma_deg_s = 5;
+  /// How often depth and velocity are found, one from the other: each takes two to three times as
+  /// long as the keyframe without. 1 to 10. The second finds most of what the first left.
+  int motion_rounds = 2;
   /// Events that are warped, of all cameras together: more take longer. 100 to 10,000,000.
   int max_events = 20000;
-  /// Times that depth and velocity are found, one from the other. 1 to 10.
-  int rounds = 2;
-  /// Share by which the contrast of the fused DSI must grow for a correction to be taken: less is
-  /// what a correction of exact poses would gain by chance. 0 to 1.
+  /// Share by which the sharpness of the fused DSI must grow for a correction to be taken: less may
+  /// be chance. 0 to 1.
   double min_gain = 0.01;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.

@@ -285,6 +285,18 @@ const std::vector<OptionKey>& optionKeys() {
       option(
           "refinement"sv, "loop_checks"sv,
           [](auto& o) -> auto& { return o.refinement.refiner.loop.loop_checks; }),
+      option(
+          "refinement"sv, "correct_motion"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.motion.correct_motion; }),
+      option(
+          "refinement"sv, "motion_sigma_m_s"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.motion.motion_sigma_m_s; }),
+      option(
+          "refinement"sv, "motion_sigma_deg_s"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.motion.motion_sigma_deg_s; }),
+      option(
+          "refinement"sv, "motion_rounds"sv,
+          [](auto& o) -> auto& { return o.mapper.keyframe.motion.motion_rounds; }),
 
       option(
           "output"sv, "camera_maps"sv,

@@ -122,6 +122,11 @@ consistency = support
 consistency_tolerance = 0.2
 consistency_cell_deg = 1.5
 max_contradictions = 2
+[refinement]
+correct_motion = true
+motion_sigma_m_s = 0.02
+motion_sigma_deg_s = 3
+motion_rounds = 4
 [performance]
 threads = 2
 kernel = plain
@@ -141,6 +146,10 @@ packet_error_px = 0
   EXPECT_EQ(mapper.filter.hot_pixel.period_s, 2);
   EXPECT_EQ(mapper.filter.hot_pixel.min_events, 9);
   EXPECT_EQ(mapper.filter.background_activity_s, 0.02);
+  EXPECT_TRUE(mapper.keyframe.motion.correct_motion);
+  EXPECT_EQ(mapper.keyframe.motion.motion_sigma_m_s, 0.02);
+  EXPECT_EQ(mapper.keyframe.motion.motion_sigma_deg_s, 3);
+  EXPECT_EQ(mapper.keyframe.motion.motion_rounds, 4);
   EXPECT_EQ(mapper.keyframes.policy, KeyframePolicyKind::kBaseline);
   EXPECT_EQ(mapper.keyframes.window_events, 5'000'000'000);
   EXPECT_EQ(mapper.keyframes.min_baseline_ratio, 0.3);

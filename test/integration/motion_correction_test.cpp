@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A tracker that is wrong within the window, on the simulated desk.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "mapping/keyframe_mapper.h"
+#include "mapping/velocity_correction.h"
+#include "test/integration/simulated_recording.h"
+#include "test/mapping/same_image.h"
+
+namespace efm {
+namespace {
+
+constexpr double kDegree = 0.017453292519943295;
+
+class MotionCorrectionOnTheDesk : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    recording_ = new test::SimulatedRecording({"desk_stereo", 0.2, 1});
+  }
+  static void TearDownTestSuite() {
+    delete recording_;
+    recording_ = nullptr;
+  }
+
+  static Window window() {
+    const Simulation& simulation = recording_->simulation();
+    const std::int64_t start_ns = simulation.start_ns;
+    const std::int64_t end_ns = simulation.endNs();
+    return {start_ns, end_ns, start_ns + (end_ns - start_ns) / 2};
+  }
+
+  static Trajectory truth() {
+    Trajectory trajectory;
+    for (const StampedPose& pose : recording_->poses()) trajectory.add(pose);
+    return trajectory;
+  }
+
+  static KeyframeDepthMap map(const Trajectory& trajectory, bool correct_motion) {
+    KeyframeMapperOptions options;
+    options.planes = {0.55, 5.0, 100, PlaneSpacing::kInverse};
+    options.motion.correct_motion = correct_motion;
+    options.motion.motion_rounds = 3;
+    KeyframeMapper mapper(recording_->simulation().rig, {0, 1}, options);
+    const auto& events = recording_->events();
+    return mapper.map(window(), {events[0], events[1]}, trajectory).value();
+  }
+
+  /// Median of the relative depth errors.
+  static double error(const KeyframeDepthMap& keyframe) {
+    std::vector<double> errors;
+    for (const DepthPair& pair : recording_->pairs(keyframe)) {
+      errors.push_back(std::abs(pair.estimate_m / pair.truth_m - 1));
+    }
+    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+    std::nth_element(errors.begin(), middle, errors.end());
+    return *middle;
+  }
+
+  static test::SimulatedRecording* recording_;
+};
+
+test::SimulatedRecording* MotionCorrectionOnTheDesk::recording_ = nullptr;
+
+TEST_F(MotionCorrectionOnTheDesk, AWrongVelocityIsFoundAndDepthIsNearlyThatOfExactPoses) {
+  const Eigen::Vector3d linear_m_s = 0.05 * Eigen::Vector3d(2, -1, 1).normalized();
+  const Eigen::Vector3d angular_rad_s = 5 * kDegree * Eigen::Vector3d(1, 2, -2).normalized();
+  const double exact = error(map(truth(), false));
+  for (const double sign : {1.0, -1.0}) {
+    const Trajectory wrong =
+        correctedTrajectory(truth(), window(), {-sign * linear_m_s, -sign * angular_rad_s});
+    const KeyframeDepthMap corrected = map(wrong, true);
+    ASSERT_TRUE(corrected.motion_correction);
+    // At the ends of the window, 0.1 s away, 0.1 degrees are half a pixel, which is what votes are
+    // spread over. Sliding looks much like turning, but for how depths differ: half of it is found.
+    EXPECT_LT((corrected.motion_correction->angular_rad_s - sign * angular_rad_s).norm(),
+              1.0 * kDegree);
+    EXPECT_LT((corrected.motion_correction->linear_m_s - sign * linear_m_s).norm(), 0.035);
+    EXPECT_LT(error(corrected), 1.5 * exact);
+    EXPECT_LT(error(corrected), 0.6 * error(map(wrong, false)));
+  }
+}
+
+TEST_F(MotionCorrectionOnTheDesk, ExactPosesStayAsTheyAre) {
+  const KeyframeDepthMap kept = map(truth(), true);
+  EXPECT_FALSE(kept.motion_correction);
+  EXPECT_TRUE(test::same(kept.map, map(truth(), false).map));
+}
+
+}  // namespace
+}  // namespace efm
