@@ -12,7 +12,7 @@ namespace efm {
 
 /// How well the events of all cameras meet: the contrast of their images of warped events (Gallego
 /// et al., CVPR 2018), fused pixel by pixel by the harmonic mean as DSIs are (Ghosh and Gallego
-/// 2022, Sec. 3.4.3): the sum of the squares of the fused image.
+/// 2022, Sec. 3.4): the sum of the squares of the fused image.
 ///
 /// Events are moved by six numbers for the rig's velocity, linear (m/s) and angular (rad/s), and
 /// one for each square patch of the view: by how much inverse depth (1/m) is larger there. Depth

@@ -183,7 +183,8 @@ VelocityCorrection KeyframeMapper::sharpestAlong(const Trajectory& motion, const
   return arena.execute([&] { return sharpestMotion(warped, input, options_.motion); });
 }
 
-/// The events of all cameras where the keyframe has depth, a bounded number of them.
+/// The events of each camera where the keyframe has depth, a bounded number of them; of the cameras
+/// that have any.
 std::vector<std::vector<WarpedEvent>> KeyframeMapper::warpAlong(
     const Trajectory& motion, const Scene& scene, const KeyframeDepthMap& keyframe) const {
   constexpr double kReachPx = 4;  // a blurred keyframe has its depths that far from where they are
@@ -191,8 +192,9 @@ std::vector<std::vector<WarpedEvent>> KeyframeMapper::warpAlong(
   std::vector<std::vector<WarpedEvent>> warped(selected_.size());
   if (depths.empty()) return warped;
   std::size_t events = 0;
-  for (const int camera : selected_)
+  for (const int camera : selected_) {
     events += scene.events[static_cast<std::size_t>(camera)].size();
+  }
   const auto most = static_cast<std::size_t>(options_.motion.max_events);
   const std::size_t every = std::max<std::size_t>(1, (events + most - 1) / most);
   const WarpTarget target{scene.T_world_ref.inverse(), view_, inversePlanes(planes_), &depths,
@@ -205,6 +207,10 @@ std::vector<std::vector<WarpedEvent>> KeyframeMapper::warpAlong(
                              motion, target);
     });
   });
+  // With a camera that sees nothing of the keyframe nobody would meet anybody.
+  warped.erase(
+      std::remove_if(warped.begin(), warped.end(), [](const auto& some) { return some.empty(); }),
+      warped.end());
   return warped;
 }
 

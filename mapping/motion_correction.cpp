@@ -8,6 +8,7 @@
 #include "mapping/quasi_newton.h"
 
 namespace efm {
+
 void MotionCorrectionOptions::validate() const {
   requireOption(motion_sigma_m_s > 0 && motion_sigma_m_s <= 10, "motion_sigma_m_s",
                 motion_sigma_m_s, "above 0 and at most 10");
@@ -36,8 +37,8 @@ VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& e
   sigmas << Eigen::Vector3d::Constant(options.motion_sigma_m_s),
       Eigen::Vector3d::Constant(kDegree * options.motion_sigma_deg_s),
       Eigen::VectorXd::Constant(patches, input.sigma_inverse_depth);
-  // By how much a standard deviation must raise the contrast to be worth it, as a share: of that of
-  // its own events.
+  // A standard deviation costs half of this share of the contrast; of a patch, of the contrast that
+  // its events have a part in. Small: they decide only where events do not.
   constexpr double kVelocityPrior = 1e-3;
   constexpr double kDepthPrior = 5e-3;
   Eigen::VectorXd prior(count);
@@ -58,7 +59,8 @@ VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& e
   };
   QuasiNewtonOptions search;
   search.max_evaluations = 25;
-  Eigen::VectorXd place = warped_with.cwiseQuotient(sigmas);
+  Eigen::VectorXd place = Eigen::VectorXd::Zero(count);
+  place.head<6>() = warped_with.head<6>().cwiseQuotient(sigmas.head<6>());
   // Smooth images lead from afar, sharp ones to the place.
   for (const double blur_px : {2.0, 1.0}) {
     contrast.setBlur(blur_px);

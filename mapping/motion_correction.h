@@ -12,8 +12,11 @@ namespace efm {
 
 /// A tracker that jitters gives a window a motion that is wrong, which blurs the DSI. The constant
 /// velocity by which it is wrong is the one that makes the images of warped events sharpest
-/// (contrast maximisation: Gallego et al., CVPR 2018; Ghosh and Gallego 2022, Sec. 3.4.3, see the
-/// DSI as such images). For trackers that are wrong within a window: exact poses gain nothing.
+/// (contrast maximisation: Gallego et al., CVPR 2018; Ghosh and Gallego 2022, Sec. 3.4.2, see the
+/// DSI as such images).
+///
+/// For several cameras: a single one sees a wrong motion as well with wrong depths, and little is
+/// found. For trackers that are wrong within a window: exact poses gain nothing.
 struct MotionCorrectionOptions {
   bool correct_motion = false;
   /// Standard deviations, on each axis, of the velocity that the tracker is wrong by: what the

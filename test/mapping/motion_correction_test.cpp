@@ -180,6 +180,17 @@ TEST(MotionCorrection, ARigAtRestDoesNoHarm) {
   }
 }
 
+TEST(MotionCorrection, ACameraThatSeesNothingAndASinglePlaneDoNoHarm) {
+  MovingEdges recording = blurred(2);
+  KeyframeMapperOptions one_plane = options(true);
+  one_plane.planes.num_planes = 1;
+  EXPECT_TRUE(cv::checkRange(map(recording, {0, 1}, one_plane).map.depth));
+  recording.events[1].clear();
+  KeyframeMapperOptions excluding = options(true);
+  excluding.exclude_silent = true;
+  expectSame(map(recording, {0}, options(true)), map(recording, {0, 1}, excluding));
+}
+
 TEST(MotionCorrection, WithoutEventsTheCorrectionIsThatOfTheInput) {
   SharpestMotionInput input{cv::Size(20, 10), 0.01, {{1, 2, 3}, {4, 5, 6}}};
   const VelocityCorrection found = sharpestMotion({{}, {}}, input, {});
