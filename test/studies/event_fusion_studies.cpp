@@ -40,6 +40,7 @@ constexpr Study kStudies[] = {
     {"slider", "11. The real slider", studySlider},
     {"better_depth", "12. Depth better than the paper's", studyBetterDepth},
     {"revoting", "13. Each event's one vote", studyRevoting},
+    {"motion", "14. Motion corrected inside the keyframe", studyMotionCorrection},
 };
 
 constexpr const char* kUsage =

@@ -35,5 +35,7 @@ void studyBetterDepth(const StudyRun& run, StudySection& section);
 
 /// Each event's one vote, shared by what the first pass fused.
 void studyRevoting(const StudyRun& run, StudySection& section);
+/// A tracker that is wrong within the window, corrected.
+void studyMotionCorrection(const StudyRun& run, StudySection& section);
 
 }  // namespace efm::studies
