@@ -13,22 +13,26 @@ namespace {
 /// The harmonic mean of the images, squared and summed over all pixels; each image becomes the
 /// derivative by its own values.
 double fuse(std::vector<cv::Mat1f>& images) {
+  constexpr float kNothing = 1e-6F;  // of an event: where a camera has less, the mean is 0
   const auto cameras = static_cast<float>(images.size());
   double contrast = 0;
   for (int y = 0; y < images.front().rows; ++y) {
-    double row_contrast = 0;
     for (int x = 0; x < images.front().cols; ++x) {
-      constexpr float kNothing = 1e-6F;  // of an event: keeps what is divided by above 0
+      float least = images.front()(y, x);
+      for (const cv::Mat1f& image : images) least = std::min(least, image(y, x));
+      if (least < kNothing) {
+        for (cv::Mat1f& image : images) image(y, x) = 0;
+        continue;
+      }
       float inverse_sum = 0;
-      for (const cv::Mat1f& image : images) inverse_sum += 1 / (image(y, x) + kNothing);
+      for (const cv::Mat1f& image : images) inverse_sum += 1 / image(y, x);
       const float mean = cameras / inverse_sum;
-      row_contrast += double{mean} * double{mean};
+      contrast += double{mean} * double{mean};
       for (cv::Mat1f& image : images) {
-        const float ratio = mean / (image(y, x) + kNothing);
+        const float ratio = mean / image(y, x);
         image(y, x) = 2 * mean * ratio * ratio / cameras;
       }
     }
-    contrast += row_contrast;
   }
   return contrast;
 }
@@ -102,8 +106,9 @@ cv::Mat1f EventContrast::imageOf(std::size_t camera, const Change& change) const
 
 cv::Mat1f EventContrast::smoothed(const cv::Mat1f& image) const {
   cv::Mat1f result;
+  const int side = 2 * static_cast<int>(std::ceil(3 * blur_px_)) + 1;
   // Zeros around, so that smoothing is its own transpose: the gradient needs that.
-  cv::GaussianBlur(image, result, cv::Size(), blur_px_, blur_px_, cv::BORDER_CONSTANT);
+  cv::GaussianBlur(image, result, cv::Size(side, side), blur_px_, blur_px_, cv::BORDER_CONSTANT);
   return result;
 }
 

@@ -31,7 +31,8 @@ class EventContrast {
   /// Per patch that has events.
   const std::vector<std::size_t>& eventsInPatch() const { return events_in_patch_; }
 
-  /// The contrast with a change of the variables, and its gradient. Cameras run side by side.
+  /// The contrast with a change of the variables, and its gradient: 0 where the cameras' events do
+  /// not meet. Cameras run side by side.
   double at(const Eigen::VectorXd& change, Eigen::VectorXd& gradient) const;
 
  private:

@@ -2,6 +2,7 @@
 #include "mapping/motion_correction.h"
 
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "mapping/option_check.h"
@@ -54,6 +55,7 @@ VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& e
   warped_with.head<6>() << input.warped_with.linear_m_s, input.warped_with.angular_rad_s;
   const auto cost = [&](const Eigen::VectorXd& at, Eigen::VectorXd& slope) {
     const double value = contrast.at(sigmas.cwiseProduct(at) - warped_with, slope);
+    if (!(value > 0)) return std::numeric_limits<double>::infinity();
     slope = prior.cwiseProduct(at) - sigmas.cwiseProduct(slope) / value;
     return 0.5 * prior.dot(at.cwiseAbs2()) - std::log(value);
   };

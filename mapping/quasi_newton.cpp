@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/quasi_newton.h"
 
-#include <algorithm>
+#include <cmath>
 
 namespace efm {
 
@@ -13,7 +13,7 @@ Eigen::VectorXd minimise(
   Eigen::VectorXd slope(size);
   double value = function(place, slope);
   int left = options.max_evaluations - 1;
-  if (!(slope.norm() > 0)) return place;
+  if (!(std::isfinite(value) && slope.norm() > 0)) return place;
   Eigen::MatrixXd inverse_hessian =
       options.first_step / slope.norm() * Eigen::MatrixXd::Identity(size, size);
 

@@ -15,7 +15,7 @@ struct QuasiNewtonOptions {
   double min_step = 1e-4;   ///< A shorter step ends the search.
 };
 
-/// @param function gives the value at a place and sets the gradient.
+/// @param function gives the value at a place and sets the gradient; infinite where there is none.
 /// @return the best place seen; never worse than the start.
 Eigen::VectorXd minimise(
     const std::function<double(const Eigen::VectorXd&, Eigen::VectorXd&)>& function,

@@ -198,6 +198,19 @@ TEST(MotionCorrection, WithoutEventsTheCorrectionIsThatOfTheInput) {
   EXPECT_EQ(found.angular_rad_s, input.warped_with.angular_rad_s);
 }
 
+TEST(MotionCorrection, WhereCamerasDoNotMeetTheCorrectionIsThatOfTheInput) {
+  WarpedEvent event;
+  event.by_velocity.setOnes();
+  event.by_inverse_depth.setOnes();
+  event.pixel = {10, 10};
+  WarpedEvent other = event;
+  other.pixel = {50, 10};
+  SharpestMotionInput input{cv::Size(60, 20), 0.01, {{1, 2, 3}, {4, 5, 6}}};
+  const VelocityCorrection found = sharpestMotion({{event}, {other}}, input, {});
+  EXPECT_LT((found.linear_m_s - input.warped_with.linear_m_s).norm(), 1e-12);
+  EXPECT_LT((found.angular_rad_s - input.warped_with.angular_rad_s).norm(), 1e-12);
+}
+
 TEST(MotionCorrection, WhatCannotBeIsNamed) {
   const auto refused = [](const char* message,
                           const std::function<void(MotionCorrectionOptions&)>& set) {
