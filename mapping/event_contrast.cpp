@@ -53,7 +53,8 @@ EventContrast::EventContrast(const std::vector<std::vector<WarpedEvent>>& events
     : events_(events), view_(view) {
   const int columns = (view.width - 1) / patch_px + 1;
   const int rows = (view.height - 1) / patch_px + 1;
-  std::vector<int> variable_of(static_cast<std::size_t>(columns * rows), -1);
+  std::vector<int> variable_of(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows),
+                               -1);
   for (const auto& some : events) {
     std::vector<int>& patches = patches_.emplace_back();
     for (const WarpedEvent& event : some) {

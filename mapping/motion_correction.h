@@ -23,7 +23,7 @@ struct MotionCorrectionOptions {
   /// events leave open is held near 0 by them. Above 0, at most 10 m/s and 1000 degrees per second.
   double motion_sigma_m_s = 0.05;
   double motion_sigma_deg_s = 5;
-  /// How often depth and velocity are found, one from the other: each takes about two to three times as
+  /// How often depth and velocity are found, one from the other; each takes two to three times as
   /// long as the keyframe without. 1 to 10. The second finds most of what the first left.
   int motion_rounds = 2;
   /// Events that are warped, of all cameras together: more take longer. 100 to 10,000,000.

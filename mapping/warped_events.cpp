@@ -97,6 +97,7 @@ class EventRays {
 
 std::vector<InversePlane> inversePlanes(const DepthPlanes& planes) {
   std::vector<InversePlane> result;
+  result.reserve(static_cast<std::size_t>(planes.size()));
   for (int plane = 0; plane < planes.size(); ++plane) {
     result.push_back({static_cast<float>(1 / planes.depth(plane)),
                       static_cast<float>(0.5 * planes.inverseDepthStepAt(plane))});

@@ -44,7 +44,7 @@ struct WarpTarget {
 
 /// One camera's events that saw something whose depth is known: along an event's ray the place
 /// whose depth is that of a pixel near by, the nearest of them. The others are left out.
-/// @param every takes each so manieth event, from the middle of the first so many.
+/// @param every takes one event of so many, the middle one.
 std::vector<WarpedEvent> warpEvents(EventSpan events, std::size_t every, const RigCamera& camera,
                                     const UndistortionTable& undistortion,
                                     const Trajectory& trajectory, const WarpTarget& target);
