@@ -53,21 +53,22 @@ EventContrast::EventContrast(const std::vector<std::vector<WarpedEvent>>& events
     : events_(events), view_(view) {
   const int columns = (view.width - 1) / patch_px + 1;
   const int rows = (view.height - 1) / patch_px + 1;
-  std::vector<int> variable_of(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows),
-                               -1);
+  const auto patches = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  std::vector<int> variable_of(patches, -1);
   for (const auto& some : events) {
-    std::vector<int>& patches = patches_.emplace_back();
+    std::vector<int>& patch_of = patches_.emplace_back();
     for (const WarpedEvent& event : some) {
       const auto column =
           std::clamp(static_cast<int>(event.pixel.x()), 0, view.width - 1) / patch_px;
       const auto row = std::clamp(static_cast<int>(event.pixel.y()), 0, view.height - 1) / patch_px;
-      int& variable = variable_of[static_cast<std::size_t>(row * columns + column)];
+      const int patch = row * columns + column;
+      int& variable = variable_of[static_cast<std::size_t>(patch)];
       if (variable < 0) {
         variable = static_cast<int>(events_in_patch_.size());
         events_in_patch_.push_back(0);
       }
       ++events_in_patch_[static_cast<std::size_t>(variable)];
-      patches.push_back(variable);
+      patch_of.push_back(variable);
     }
   }
 }
