@@ -150,6 +150,8 @@ ceres::Solver::Options solverOptions(int max_iterations, ceres::LinearSolverType
   options.linear_solver_type = solver;
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
+  // Steps are held against how large the numbers are: far from the world's origin any is small.
+  options.parameter_tolerance = 0;
   return options;
 }
 
