@@ -4,6 +4,7 @@
 #include <pcl/kdtree/kdtree_flann.h>
 #include <pcl/point_types.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -27,13 +28,18 @@ struct CertainPixel {
   float relative_sigma = 0;  // of depth
 };
 
+/// Whether a pixel holds a depth that errs by something known.
+bool isMeasured(float depth, float variance) {
+  return depth > 0 && std::isfinite(depth) && variance >= 0 && std::isfinite(variance);
+}
+
 std::vector<CertainPixel> certainPixels(const DepthMap& map) {
   std::vector<CertainPixel> pixels;
   for (int y = 0; y < map.depth.rows; ++y) {
     for (int x = 0; x < map.depth.cols; ++x) {
       const float depth = map.depth(y, x);
       const float variance = map.variance(y, x);
-      if (!(depth > 0) || !std::isfinite(depth) || !std::isfinite(variance)) continue;
+      if (!isMeasured(depth, variance)) continue;
       const float sigma = std::sqrt(variance);
       pixels.push_back({x, y, 1 / depth, sigma, sigma * depth});
     }
@@ -85,7 +91,7 @@ Eigen::Matrix3d shapeAround(const KeyframeDepthMap& keyframe, const CertainPixel
     for (int x = window.x; x < window.br().x; ++x) {
       const float depth = map.depth(y, x);
       const float variance = map.variance(y, x);
-      if (!(depth > 0) || !std::isfinite(variance)) continue;
+      if (!isMeasured(depth, variance)) continue;
       const float sigma = std::max(pixel.sigma, std::sqrt(variance));
       if (std::abs(1 / depth - pixel.inverse_depth) > kSameEdgeSigmas * sigma) continue;
       const Eigen::Vector3d offset = keyframe.view.pointAt(x, y, depth) - p_ref;
@@ -108,6 +114,12 @@ RegistrationPoint pointOf(const KeyframeDepthMap& keyframe, const CertainPixel& 
       along * along.transpose() + shapeAround(keyframe, pixel, p_ref, options.neighbourhood_px);
   covariance.diagonal().array() += across_m * across_m;
   return {p_ref.cast<float>(), covariance.cast<float>()};
+}
+
+/// Not where a depth is so large or small that floats do not hold its square.
+bool isUsable(const RegistrationPoint& point) {
+  const Eigen::LLT<Eigen::Matrix3d> llt(point.covariance.cast<double>());
+  return point.p_ref.allFinite() && point.covariance.allFinite() && llt.info() == Eigen::Success;
 }
 
 float typicalSigma(std::vector<CertainPixel> pixels) {
@@ -143,14 +155,17 @@ RegistrationCloud::RegistrationCloud(const KeyframeDepthMap& keyframe,
   const std::vector<CertainPixel> pixels =
       spreadOver(certainPixels(keyframe.map), keyframe.map.depth.size(), options.max_map_points);
   if (pixels.empty()) return;
-  num_chosen_ = std::min(pixels.size(), static_cast<std::size_t>(options.max_points));
   points_.reserve(pixels.size());
   farthest_ = std::numeric_limits<double>::infinity();
   for (const CertainPixel& pixel : pixels) {
-    points_.push_back(pointOf(keyframe, pixel, options));
+    const RegistrationPoint point = pointOf(keyframe, pixel, options);
+    if (!isUsable(point)) continue;
+    points_.push_back(point);
     nearest_ = std::max<double>(nearest_, pixel.inverse_depth);
     farthest_ = std::min<double>(farthest_, pixel.inverse_depth);
   }
+  if (points_.empty()) farthest_ = 0;
+  num_chosen_ = std::min(points_.size(), static_cast<std::size_t>(options.max_points));
   constexpr float kLeastSigma = 1e-9F;  // 1/m: a variance may be given as 0
   px_per_inverse_depth_ = 1 / std::max(typicalSigma(pixels), kLeastSigma);
 }
