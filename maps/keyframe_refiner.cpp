@@ -197,7 +197,7 @@ void KeyframeRefiner::solveFrom(std::size_t first_free) {
     keyframe.moved = true;
   }
   const std::size_t newest = keyframes_.size() - 1;
-  covariance_ = window.trackedCovariance(newest).value_or(Matrix6d::Zero()) +
+  covariance_ = window.trackedCovariance(options_.graph, newest).value_or(Matrix6d::Zero()) +
                 errors_.noiseCovariance(keyframes_[newest].noise);
 }
 

@@ -14,6 +14,26 @@
 namespace efm {
 namespace {
 
+// Ceres writes to stderr what is wrong with numbers that are none.
+bool isFinite(const Rigid3& pose) {
+  return pose.translation.allFinite() && pose.rotation.coeffs().allFinite();
+}
+
+bool isFinite(const PointPair& pair) {
+  return pair.p_map.allFinite() && pair.p_ref.allFinite() && pair.sqrt_information.allFinite();
+}
+
+bool isFinite(const RelativePoseFactor& factor) {
+  return isFinite(factor.T_from_to) && factor.sqrt_information.allFinite() &&
+         factor.offset.allFinite();
+}
+
+bool isFinite(const PoseGraph& graph) {
+  const auto finite = [](const auto& value) { return isFinite(value); };
+  return std::all_of(graph.T_world_node.begin(), graph.T_world_node.end(), finite) &&
+         std::all_of(graph.factors.begin(), graph.factors.end(), finite);
+}
+
 /// A pose as Ceres changes it: the quaternion (x, y, z, w), then the translation.
 constexpr int kPoseSize = 7;
 using PoseBlock = std::array<double, kPoseSize>;
@@ -189,8 +209,8 @@ class GraphProblem {
 };
 
 void requireSolver(double robust_sigmas, int max_iterations) {
-  requireOption(robust_sigmas > 0 && robust_sigmas <= 1e6, "robust_sigmas", robust_sigmas,
-                "above 0, at most 1e6");
+  requireOption(robust_sigmas > 0 && robust_sigmas <= 1e3, "robust_sigmas", robust_sigmas,
+                "above 0, at most 1000");
   requireOption(max_iterations >= 1 && max_iterations <= 1000, "max_iterations", max_iterations,
                 "from 1 to 1000");
 }
@@ -202,6 +222,9 @@ void PoseGraphOptions::validate() const { requireSolver(robust_sigmas, max_itera
 
 Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
                   const Rigid3& T_map_start, const AlignmentOptions& options) {
+  if (!std::all_of(pairs.begin(), pairs.end(), [](const auto& pair) { return isFinite(pair); })) {
+    return T_map_start;
+  }
   PoseBlock pose = blockOf(T_map_start);
   PoseManifold manifold = poseManifold();
   ceres::CauchyLoss loss(options.robust_sigmas);
@@ -226,6 +249,7 @@ double errorOf(const RelativePoseFactor& factor, const Rigid3& T_world_from,
 }
 
 void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph) {
+  if (!isFinite(graph)) return;
   GraphProblem problem(graph, options.robust_sigmas);
   if (problem.empty()) return;
   ceres::Solver::Summary summary;
@@ -237,12 +261,14 @@ void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph) {
   }
 }
 
-std::optional<Matrix6d> poseCovariance(const PoseGraph& graph, std::size_t node) {
-  GraphProblem problem(graph, PoseGraphOptions().robust_sigmas);
+std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const PoseGraph& graph,
+                                       std::size_t node) {
+  if (!isFinite(graph)) return std::nullopt;
+  GraphProblem problem(graph, options.robust_sigmas);
   if (graph.fixed[node] || !problem.has(node)) return std::nullopt;
-  ceres::Covariance::Options options;
-  options.num_threads = 1;
-  ceres::Covariance covariance(options);
+  ceres::Covariance::Options of_solver;
+  of_solver.num_threads = 1;
+  ceres::Covariance covariance(of_solver);
   const double* block = problem.block(node).data();
   const std::vector<std::pair<const double*, const double*>> wanted = {{block, block}};
   if (!covariance.Compute(wanted, &problem.problem())) return std::nullopt;

@@ -31,7 +31,7 @@ struct PosePrior {
 
 struct AlignmentOptions {
   /// Errors of a pair in standard deviations beyond which it counts less and less (Cauchy's loss).
-  /// Range: above 0, at most 1e6.
+  /// Range: above 0, at most 1000.
   double robust_sigmas = 3;
   int max_iterations = 10;  ///< 1 to 1000.
 
@@ -41,7 +41,7 @@ struct AlignmentOptions {
 
 /// The pose that brings a keyframe's points onto those of the map: where all errors together are
 /// least, found by Levenberg and Marquardt's method from a pose near by. What the pairs leave open
-/// stays with the prior.
+/// stays with the prior. Where that cannot be computed the start is the result.
 Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
                   const Rigid3& T_map_start, const AlignmentOptions& options);
 
@@ -83,7 +83,8 @@ void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph);
 /// Covariance of a pose that is not fixed, given those that are: of a small motion of it, the
 /// translation along the world's axes in metres, then a rotation vector about them in radians.
 /// @return nothing where the factors leave it open.
-std::optional<Matrix6d> poseCovariance(const PoseGraph& graph, std::size_t node);
+std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const PoseGraph& graph,
+                                       std::size_t node);
 
 /// How a pair's error changes with small motions of the pose, as `poseCovariance` has them: what
 /// the solver goes by.

@@ -19,6 +19,9 @@ namespace {
 /// How far inverse depths of neighbours may differ, in standard deviations, and still be of one
 /// edge.
 constexpr double kSameEdgeSigmas = 3;
+/// How far beyond its nearest and farthest point a keyframe sees: a wall that faces it has one
+/// depth.
+constexpr double kDepthMarginSigmas = 3;
 
 struct CertainPixel {
   int x = 0;
@@ -180,9 +183,10 @@ Eigen::Vector3f RegistrationCloud::seenAt(const Eigen::Vector3d& p_ref) const {
 }
 
 bool RegistrationCloud::sees(const Eigen::Vector3d& p_ref) const {
-  if (!(p_ref.z() > 0) || !(p_ref.z() * nearest_ >= 1) || !(p_ref.z() * farthest_ <= 1)) {
-    return false;
-  }
+  if (!(p_ref.z() > 0)) return false;
+  const double margin = kDepthMarginSigmas / px_per_inverse_depth_;
+  const double inverse_depth = 1 / p_ref.z();
+  if (inverse_depth > nearest_ + margin || inverse_depth < farthest_ - margin) return false;
   const Eigen::Vector2d pixel = view_.project(p_ref);
   return pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= view_.width - 1 &&
          pixel.y() <= view_.height - 1;

@@ -56,7 +56,7 @@ class RegistrationCloud {
   double focalPx() const { return view_.fx; }
   double middleInverseDepth() const { return 0.5 * (nearest_ + farthest_); }
 
-  /// Whether a point lies in the view, between its nearest and its farthest point.
+  /// Whether a point lies in the view, between its nearest and its farthest point or about there.
   bool sees(const Eigen::Vector3d& p_ref) const;
   /// The point that looks nearest from the keyframe's view: by column, row, and inverse depth in
   /// units of its typical standard deviation; there errors are alike in all directions and at all

@@ -39,8 +39,9 @@ const Rigid3& WindowGraph::T_world_tracked(std::size_t keyframe) const {
   return graph_.T_world_node[place_[keyframe].value() + 1];
 }
 
-std::optional<Matrix6d> WindowGraph::trackedCovariance(std::size_t keyframe) const {
-  return poseCovariance(graph_, place_[keyframe].value() + 1);
+std::optional<Matrix6d> WindowGraph::trackedCovariance(const PoseGraphOptions& options,
+                                                       std::size_t keyframe) const {
+  return poseCovariance(options, graph_, place_[keyframe].value() + 1);
 }
 
 /// The keyframe's first node, made where it is not there.

@@ -34,7 +34,8 @@ class WindowGraph {
   const Rigid3& T_world_ref(std::size_t keyframe) const;
   const Rigid3& T_world_tracked(std::size_t keyframe) const;
   /// See `poseCovariance`: of T_world_tracked.
-  std::optional<Matrix6d> trackedCovariance(std::size_t keyframe) const;
+  std::optional<Matrix6d> trackedCovariance(const PoseGraphOptions& options,
+                                            std::size_t keyframe) const;
 
  private:
   std::size_t ownNode(std::size_t keyframe);

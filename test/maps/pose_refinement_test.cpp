@@ -439,7 +439,7 @@ RC_GTEST_PROP(PoseCovariance, IsTheInverseOfTheNumericInformation, ()) {
   }
   const Eigen::MatrixXd expected = information.inverse();
   for (int node = 1; node < 4; ++node) {
-    const auto covariance = poseCovariance(graph, static_cast<std::size_t>(node));
+    const auto covariance = poseCovariance(PoseGraphOptions(), graph, static_cast<std::size_t>(node));
     RC_ASSERT(covariance.has_value());
     const Matrix6d block = expected.block<6, 6>(6 * (node - 1), 6 * (node - 1));
     RC_ASSERT((*covariance - block).norm() < 1e-5 * block.norm());
@@ -448,24 +448,24 @@ RC_GTEST_PROP(PoseCovariance, IsTheInverseOfTheNumericInformation, ()) {
 
 TEST(PoseCovariance, IsNothingWhereFactorsLeaveThePoseOpen) {
   PoseGraph graph = ring(4);
-  EXPECT_FALSE(poseCovariance(graph, 0)) << "it is fixed";
-  EXPECT_TRUE(poseCovariance(graph, 1));
+  EXPECT_FALSE(poseCovariance(PoseGraphOptions(), graph, 0)) << "it is fixed";
+  EXPECT_TRUE(poseCovariance(PoseGraphOptions(), graph, 1));
   PoseGraph floating = graph;
   floating.fixed[0] = false;
-  EXPECT_FALSE(poseCovariance(floating, 1)) << "all may move together";
+  EXPECT_FALSE(poseCovariance(PoseGraphOptions(), floating, 1)) << "all may move together";
   PoseGraph alone = graph;
   alone.factors.clear();
-  EXPECT_FALSE(poseCovariance(alone, 1)) << "no factors";
+  EXPECT_FALSE(poseCovariance(PoseGraphOptions(), alone, 1)) << "no factors";
   PoseGraph pair{{Rigid3{}, Rigid3{}}, {true, false}, {factorBetween(0, 1, {}, 0.01, 0.01)}};
-  EXPECT_TRUE(poseCovariance(pair, 1));
+  EXPECT_TRUE(poseCovariance(PoseGraphOptions(), pair, 1));
   pair.factors[0].sqrt_information(0, 0) = 0;
-  EXPECT_FALSE(poseCovariance(pair, 1)) << "one direction is open";
+  EXPECT_FALSE(poseCovariance(PoseGraphOptions(), pair, 1)) << "one direction is open";
 }
 
 TEST(PoseCovariance, IsNothingOfWhatIsNotANumber) {
   PoseGraph graph = ring(4);
   graph.factors[1].sqrt_information(2, 2) = kNan;
-  EXPECT_FALSE(poseCovariance(graph, 1));
+  EXPECT_FALSE(poseCovariance(PoseGraphOptions(), graph, 1));
 }
 
 TEST(AlignmentOptions, OutOfRangeAreRefusedByName) {
