@@ -17,7 +17,8 @@ struct KeyframeRegistrationOptions {
   /// last one. Range: above 0, the first not below the last.
   double first_distance_px = 16;
   double last_distance_px = 2;
-  AlignmentOptions alignment;
+  /// Neighbours change after it anyway: exactness beyond a share of a thousandth is no use.
+  AlignmentOptions alignment{3, 10, 1e-3};
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;

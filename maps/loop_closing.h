@@ -20,7 +20,7 @@ struct LoopOptions {
   /// of. Above 0.
   double loop_max_sigma_m = 0.03;
   double loop_max_sigma_rad = 0.5 * kRadiansPerDegree;
-  int loop_checks = 2;  ///< Candidates that are registered per keyframe, 0 to 100.
+  int loop_checks = 1;  ///< Candidates that are registered per keyframe, 0 to 100.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
