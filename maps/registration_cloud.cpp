@@ -23,6 +23,9 @@ constexpr double kSameEdgeSigmas = 3;
 /// depth.
 constexpr double kDepthMarginSigmas = 3;
 
+/// A point errs along its ray at most so many times as much as across: as floats hold a covariance.
+constexpr double kLongest = 1000;
+
 struct CertainPixel {
   int x = 0;
   int y = 0;
@@ -112,7 +115,8 @@ RegistrationPoint pointOf(const KeyframeDepthMap& keyframe, const CertainPixel& 
   const double depth = keyframe.map.depth(pixel.y, pixel.x);
   const Eigen::Vector3d p_ref = keyframe.view.pointAt(pixel.x, pixel.y, depth);
   const Eigen::Vector3d along = p_ref * (options.depth_sigmas * pixel.relative_sigma);
-  const double across_m = options.pixel_sigma * depth / keyframe.view.fx;
+  const double across_m =
+      std::max(options.pixel_sigma * depth / keyframe.view.fx, along.norm() / kLongest);
   Eigen::Matrix3d covariance =
       along * along.transpose() + shapeAround(keyframe, pixel, p_ref, options.neighbourhood_px);
   covariance.diagonal().array() += across_m * across_m;

@@ -276,6 +276,21 @@ TEST(RegistrationCloud, AnInfiniteDepthBesideAPointDoesNotSpoilItsCovariance) {
   for (const RegistrationPoint& point : cloud.points()) EXPECT_TRUE(point.covariance.allFinite());
 }
 
+TEST(RegistrationCloud, ADepthThatSaysNothingLeavesACovarianceThatFloatsHold) {
+  for (const float sigma : {1.0F, 31.0F, 1e4F}) {
+    KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+    for (int x = 3; x < 157; x += 7) put(keyframe, x, 5, 3, sigma);
+    const RegistrationCloud cloud(keyframe, {});
+    EXPECT_EQ(cloud.points().size(), 22U) << sigma;
+    for (const RegistrationPoint& point : cloud.points()) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(point.covariance.cast<double>());
+      // A thousandth of its length, squared; a float's rounding is a twentieth of that.
+      const double least = 1e-6 * eigen.eigenvalues().maxCoeff();
+      EXPECT_NEAR(eigen.eigenvalues().minCoeff(), least, 0.3 * least) << sigma;
+    }
+  }
+}
+
 TEST(RegistrationCloud, OfNothingIsEmptyAndSeesNothing) {
   const RegistrationCloud cloud(emptyKeyframe(smallView()), {});
   EXPECT_TRUE(cloud.points().empty());
