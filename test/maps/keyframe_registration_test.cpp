@@ -170,7 +170,7 @@ TEST(KeyframeRegistration, WithoutOverlapItIsThePriorAndSaysNothing) {
   std::mt19937 random(6);
   const Step step(test::edgesAround(150, random), random);
   const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
-  const auto expectPrior = [](const Registration& found, const Rigid3& prior, const char* why) {
+  const auto stays = [](const Registration& found, const Rigid3& prior, const char* why) {
     EXPECT_LT(metresApart(found.T_world_ref, prior), 1e-12) << why;
     EXPECT_LT(radiansApart(found.T_world_ref, prior), 1e-12) << why;
     EXPECT_TRUE(found.factors.empty()) << why;
@@ -180,15 +180,15 @@ TEST(KeyframeRegistration, WithoutOverlapItIsThePriorAndSaysNothing) {
     EXPECT_NEAR(found.from_prior, 0, 1e-9) << why;
   };
   const Rigid3 behind = viewTurned(M_PI, {0, 0, 0});
-  expectPrior(step.from(priorOf(behind, 0.02, 0.02)), behind, "looks the other way");
+  stays(step.from(priorOf(behind, 0.02, 0.02)), behind, "looks the other way");
   const Rigid3 away = viewTurned(0, {50, 0, 0});
-  expectPrior(step.from(priorOf(away, 0.02, 0.02)), away, "is elsewhere");
+  stays(step.from(priorOf(away, 0.02, 0.02)), away, "is elsewhere");
   const PosePrior prior = priorOf(step.T_world_ref, 0.02, 0.02);
-  expectPrior(registerKeyframe(1, nothing, {{0, &step.map, {}}}, prior, {}), step.T_world_ref,
-              "no points");
-  expectPrior(registerKeyframe(1, step.cloud, {{0, &nothing, {}}}, prior, {}), step.T_world_ref,
-              "no points in the map");
-  expectPrior(registerKeyframe(1, step.cloud, {}, prior, {}), step.T_world_ref, "no map");
+  stays(registerKeyframe(1, nothing, {{0, &step.map, {}}}, prior, {}), step.T_world_ref,
+        "no points");
+  stays(registerKeyframe(1, step.cloud, {{0, &nothing, {}}}, prior, {}), step.T_world_ref,
+        "no points in the map");
+  stays(registerKeyframe(1, step.cloud, {}, prior, {}), step.T_world_ref, "no map");
 }
 
 /// Edges that all run along x, on one wall.

@@ -81,8 +81,8 @@ RC_GTEST_PROP(SqrtInformation, MakesErrorsOfThatCovarianceToUnitOnes, ()) {
   Matrix6d factor = drawMatrix<6>(random);
   factor.topRows<3>() *= 1e-2;  // as different as metres and radians may be
   const Matrix6d covariance = factor * factor.transpose();
-  const Matrix6d L = sqrtInformation(covariance);
-  RC_ASSERT((L * covariance * L.transpose() - Matrix6d::Identity()).norm() < 1e-10);
+  const Matrix6d unit = sqrtInformation(covariance);
+  RC_ASSERT((unit * covariance * unit.transpose() - Matrix6d::Identity()).norm() < 1e-10);
 }
 
 }  // namespace

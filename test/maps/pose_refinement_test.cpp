@@ -28,12 +28,12 @@ using testing::ThrowsMessage;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// Derivative of an error by the small motions of a pose: central differences.
-Eigen::MatrixXd byMotions(const std::function<Eigen::VectorXd(const Rigid3&)>& errorAt,
+Eigen::MatrixXd byMotions(const std::function<Eigen::VectorXd(const Rigid3&)>& error,
                           const Rigid3& pose, double step) {
-  Eigen::MatrixXd jacobian(errorAt(pose).size(), 6);
+  Eigen::MatrixXd jacobian(error(pose).size(), 6);
   for (int i = 0; i < 6; ++i) {
     const Vector6d d = step * Vector6d::Unit(i);
-    jacobian.col(i) = (errorAt(moved(pose, d)) - errorAt(moved(pose, -d))) / (2 * step);
+    jacobian.col(i) = (error(moved(pose, d)) - error(moved(pose, -d))) / (2 * step);
   }
   return jacobian;
 }
@@ -121,11 +121,11 @@ RC_GTEST_PROP(PoseJacobians, OfAPairAreTheNumericOnes, ()) {
     pair.p_ref = drawVector(3, random);
     pair.p_map = T_map_ref * pair.p_ref + drawVector(0.1, random);
     pair.sqrt_information = 10 * drawMatrix<3>(random);
-    const auto errorAt = [&](const Rigid3& T) -> Eigen::VectorXd {
-      return pair.sqrt_information * (pair.p_map - T * pair.p_ref);
+    const auto error = [&](const Rigid3& T_a_b) -> Eigen::VectorXd {
+      return pair.sqrt_information * (pair.p_map - T_a_b * pair.p_ref);
     };
     // At 1e6 m a place is known to 1e-10 m: over steps of 1e-4 that is 1e-6, times 20 / m.
-    const auto numeric = byMotions(errorAt, T_map_ref, 1e-4);
+    const auto numeric = byMotions(error, T_map_ref, 1e-4);
     RC_ASSERT((pairJacobian(pair, T_map_ref) - numeric).cwiseAbs().maxCoeff() < 1e-4);
   }
 }
@@ -141,10 +141,11 @@ RC_GTEST_PROP(PoseJacobians, OfAFactorAreTheNumericOnes, ()) {
     const Rigid3 off{Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)), drawVector(0.3, random)};
     const Rigid3 T_world_to = T_world_from * factor.T_from_to * off;
     Eigen::MatrixXd numeric(6, 12);
-    numeric << byMotions([&](const Rigid3& T) { return errorVector(factor, T, T_world_to); },
-                         T_world_from, 1e-5),
-        byMotions([&](const Rigid3& T) { return errorVector(factor, T_world_from, T); }, T_world_to,
-                  1e-5);
+    numeric << byMotions(
+        [&](const Rigid3& T_a_b) { return errorVector(factor, T_a_b, T_world_to); }, T_world_from,
+        1e-5),
+        byMotions([&](const Rigid3& T_a_b) { return errorVector(factor, T_world_from, T_a_b); },
+                  T_world_to, 1e-5);
     RC_ASSERT((factorJacobian(factor, T_world_from, T_world_to) - numeric).cwiseAbs().maxCoeff() <
               1e-6);
   }
@@ -155,8 +156,9 @@ TEST(PoseJacobians, OfAFactorAreTheNumericOnesFarFromTheOrigin) {
   const Rigid3 T_world_from = drawPose(1e6, random);
   const RelativePoseFactor factor{0, 1, drawPose(2, random), drawMatrix<6>(random)};
   const Rigid3 T_world_to = T_world_from * factor.T_from_to * drawMotion(0.1, 0.1, random);
-  const auto numeric = byMotions(
-      [&](const Rigid3& T) { return errorVector(factor, T, T_world_to); }, T_world_from, 1e-4);
+  const auto numeric =
+      byMotions([&](const Rigid3& T_a_b) { return errorVector(factor, T_a_b, T_world_to); },
+                T_world_from, 1e-4);
   const Eigen::Matrix<double, 6, 6> automatic =
       factorJacobian(factor, T_world_from, T_world_to).leftCols<6>();
   EXPECT_LT((automatic - numeric).cwiseAbs().maxCoeff(), 1e-4);  // 1e-10 m over 1e-4, as above
@@ -371,7 +373,7 @@ TEST(SolvePoseGraph, LeavesPosesWhereThereIsNothingToSolve) {
   PoseGraph graph = ring(6);
   perturbFree(graph, 0.1, 0.1, random);
   const std::vector<Rigid3> before = graph.T_world_node;
-  const auto expectUnmoved = [&](PoseGraph changed, const char* why) {
+  const auto unmoved = [&](PoseGraph changed, const char* why) {
     solvePoseGraph({}, changed);
     for (std::size_t i = 0; i < before.size(); ++i) {
       EXPECT_LT(metresApart(changed.T_world_node[i], before[i]), 1e-12) << why;
@@ -380,13 +382,13 @@ TEST(SolvePoseGraph, LeavesPosesWhereThereIsNothingToSolve) {
   };
   PoseGraph no_factors = graph;
   no_factors.factors.clear();
-  expectUnmoved(no_factors, "no factors");
+  unmoved(no_factors, "no factors");
   PoseGraph all_fixed = graph;
   all_fixed.fixed.assign(6, true);
-  expectUnmoved(all_fixed, "everything fixed");
+  unmoved(all_fixed, "everything fixed");
   PoseGraph says_nothing = graph;
   for (RelativePoseFactor& factor : says_nothing.factors) factor.sqrt_information.setZero();
-  expectUnmoved(says_nothing, "no information");
+  unmoved(says_nothing, "no information");
   for (int what = 0; what < 4; ++what) {
     PoseGraph not_a_number = graph;
     RelativePoseFactor& factor = not_a_number.factors[3];
@@ -395,7 +397,7 @@ TEST(SolvePoseGraph, LeavesPosesWhereThereIsNothingToSolve) {
     if (what == 1) factor.sqrt_information(0, 0) = kNan;
     if (what == 2) factor.offset[4] = std::numeric_limits<double>::infinity();
     if (what == 3) factor.T_from_to.rotation.coeffs().setConstant(kNan);
-    expectUnmoved(not_a_number, "not a number");
+    unmoved(not_a_number, "not a number");
   }
 }
 
@@ -427,13 +429,13 @@ RC_GTEST_PROP(PoseCovariance, IsTheInverseOfTheNumericInformation, ()) {
   for (const RelativePoseFactor& factor : graph.factors) {
     Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(6, 24);
     for (const std::size_t node : {factor.from, factor.to}) {
-      const auto errorAt = [&](const Rigid3& T) {
+      const auto error = [&](const Rigid3& T_a_b) {
         std::vector<Rigid3> poses = graph.T_world_node;
-        poses[node] = T;
+        poses[node] = T_a_b;
         return errorVector(factor, poses[factor.from], poses[factor.to]);
       };
       jacobian.middleCols(6 * static_cast<int>(node), 6) =
-          byMotions(errorAt, graph.T_world_node[node], 1e-5);
+          byMotions(error, graph.T_world_node[node], 1e-5);
     }
     information += jacobian.rightCols(18).transpose() * jacobian.rightCols(18);
   }

@@ -176,7 +176,7 @@ RC_GTEST_PROP(RegistrationCloud, FindsTheSameNeighbourAsLookingAtAll, ()) {
   const test::EdgeWorld world = test::edgesAround(40, random);
   const RegistrationCloud cloud(test::seenFrom(world, {}, kInverseDepthSigma, random), {});
   const ReferenceView view = smallView();
-  const auto seenAt = [&](const Eigen::Vector3d& p) {
+  const auto looks = [&](const Eigen::Vector3d& p) {
     const Eigen::Vector2d pixel = view.project(p);
     return Eigen::Vector3d(pixel.x(), pixel.y(), 1 / p.z() / kInverseDepthSigma);
   };
@@ -188,15 +188,15 @@ RC_GTEST_PROP(RegistrationCloud, FindsTheSameNeighbourAsLookingAtAll, ()) {
     for (const double within_px : {2.0, 16.0}) {
       double least = std::numeric_limits<double>::infinity();
       for (const RegistrationPoint& point : cloud.points()) {
-        least = std::min(least, (seenAt(point.p_ref.cast<double>()) - seenAt(p_ref)).norm());
+        least = std::min(least, (looks(point.p_ref.cast<double>()) - looks(p_ref)).norm());
       }
       const auto index = cloud.nearest(p_ref, within_px);
       constexpr double kFloatPx = 1e-3;  // columns and inverse depths of some hundreds
       if (least < within_px - kFloatPx) RC_ASSERT(index.has_value());
       if (least > within_px + kFloatPx) RC_ASSERT(!index.has_value());
       if (!index) continue;
-      const Eigen::Vector3d found = seenAt(cloud.points()[*index].p_ref.cast<double>());
-      RC_ASSERT((found - seenAt(p_ref)).norm() <= least + kFloatPx);
+      const Eigen::Vector3d found = looks(cloud.points()[*index].p_ref.cast<double>());
+      RC_ASSERT((found - looks(p_ref)).norm() <= least + kFloatPx);
     }
   }
 }
