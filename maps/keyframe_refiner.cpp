@@ -4,6 +4,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -31,8 +32,21 @@ constexpr std::size_t kLoopShare = 20;
 /// A loop whose error is larger once everything is solved was wrong.
 constexpr double kContradicted = 8;
 
-bool isFinite(const Rigid3& pose) {
-  return pose.translation.allFinite() && pose.rotation.coeffs().allFinite();
+/// Beyond this the differences of poses lose what matters, and their squares overflow.
+constexpr double kFarthestM = 1e9;
+/// Older keyframes whose overlap is looked at in search of a loop.
+constexpr std::size_t kLoopNeighbours = 50;
+
+bool isUsable(const Rigid3& pose) {
+  return pose.translation.allFinite() && pose.rotation.coeffs().allFinite() &&
+         pose.translation.cwiseAbs().maxCoeff() <= kFarthestM;
+}
+
+/// A point in the middle of what a keyframe sees.
+Eigen::Vector3d middleOfView(const RefinedKeyframe& keyframe) {
+  const double inverse_depth = keyframe.cloud.middleInverseDepth();
+  const double depth = inverse_depth > 0 ? 1 / inverse_depth : 0;
+  return keyframe.T_world_ref * Eigen::Vector3d(0, 0, depth);
 }
 
 }  // namespace
@@ -67,8 +81,8 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
                           const std::optional<PoseNoise>& stated) {
   const std::size_t number = keyframes_.size();
   const std::string name = "keyframe " + std::to_string(number);
-  if (!isFinite(T_tracker_ref)) {
-    throw std::invalid_argument(name + ": its pose is not finite, expected numbers");
+  if (!isUsable(T_tracker_ref)) {
+    throw std::invalid_argument(name + ": its pose is not finite, or farther than 1e9 m");
   }
   if (stated) {
     requireOption(stated->noise_m >= 0 && std::isfinite(stated->noise_m), name + ": noise_m",
@@ -103,21 +117,35 @@ double KeyframeRefiner::overlapOf(std::size_t newer, std::size_t older) const {
   return viewOverlap(of.cloud, in.cloud, in.T_world_ref.inverse() * of.T_world_ref);
 }
 
-/// Of the keyframes from `first` to before `last`, those that have most of the newest one's points
-/// in view.
-std::vector<std::size_t> KeyframeRefiner::bestOverlaps(std::size_t first, std::size_t last,
+/// Of these keyframes, those that have most of the newest one's points in view.
+std::vector<std::size_t> KeyframeRefiner::bestOverlaps(const std::vector<std::size_t>& older,
                                                        double least, int count) const {
   std::vector<std::pair<double, std::size_t>> ranked;
-  for (std::size_t older = first; older < last; ++older) {
-    const double overlap = overlapOf(keyframes_.size() - 1, older);
-    if (overlap >= least) ranked.emplace_back(overlap, older);
+  for (const std::size_t keyframe : older) {
+    const double overlap = overlapOf(keyframes_.size() - 1, keyframe);
+    if (overlap >= least) ranked.emplace_back(overlap, keyframe);
   }
   std::stable_sort(ranked.begin(), ranked.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(count)));
   std::vector<std::size_t> best;
-  for (const auto& [overlap, older] : ranked) best.push_back(older);
+  for (const auto& [overlap, keyframe] : ranked) best.push_back(keyframe);
   return best;
+}
+
+/// The keyframes before one that look nearest to where the newest one looks; a bounded number.
+std::vector<std::size_t> KeyframeRefiner::nearestBefore(std::size_t last) const {
+  const Eigen::Vector3d middle = middleOfView(keyframes_.back());
+  std::vector<std::pair<double, std::size_t>> ranked;
+  for (std::size_t i = 0; i < last; ++i) {
+    ranked.emplace_back((middleOfView(keyframes_[i]) - middle).squaredNorm(), i);
+  }
+  const auto end =
+      ranked.begin() + static_cast<std::ptrdiff_t>(std::min(ranked.size(), kLoopNeighbours));
+  std::partial_sort(ranked.begin(), end, ranked.end());
+  std::vector<std::size_t> nearest;
+  for (auto next = ranked.begin(); next != end; ++next) nearest.push_back(next->second);
+  return nearest;
 }
 
 TrackerErrors KeyframeRefiner::cautiousErrors() const {
@@ -132,9 +160,10 @@ void KeyframeRefiner::registerNewest() {
   const std::size_t number = keyframes_.size() - 1;
   RefinedKeyframe& newest = keyframes_[number];
   const auto window = static_cast<std::size_t>(options_.window);
+  std::vector<std::size_t> last(std::min(number, window));
+  std::iota(last.begin(), last.end(), number - last.size());
   std::vector<MapKeyframe> map;
-  for (const std::size_t i : bestOverlaps(number > window ? number - window : 0, number,
-                                          kLeastOverlap, options_.map_keyframes)) {
+  for (const std::size_t i : bestOverlaps(last, kLeastOverlap, options_.map_keyframes)) {
     map.push_back({i, &keyframes_[i].cloud, keyframes_[i].T_world_ref});
   }
   const TrackerErrors errors = cautiousErrors();
@@ -193,11 +222,13 @@ void KeyframeRefiner::solveFrom(std::size_t first_free) {
     RefinedKeyframe& keyframe = keyframes_[i];
     keyframe.T_world_tracked = window.T_world_tracked(i);
     if (i < first_free) continue;
+    keyframe.moved = keyframe.moved || !isSame(keyframe.T_world_ref, window.T_world_ref(i));
     keyframe.T_world_ref = window.T_world_ref(i);
-    keyframe.moved = true;
   }
   const std::size_t newest = keyframes_.size() - 1;
-  covariance_ = window.trackedCovariance(options_.graph, newest).value_or(Matrix6d::Zero()) +
+  // What cannot be computed is what the whole way adds.
+  covariance_ = window.trackedCovariance(options_.graph, newest)
+                    .value_or(errors_.driftCovariance(keyframes_[newest].way_m)) +
                 errors_.noiseCovariance(keyframes_[newest].noise);
 }
 
@@ -211,6 +242,11 @@ bool KeyframeRefiner::check(const LoopCandidate& candidate) {
                               errors.driftCovariance(std::abs(newer.way_m - older.way_m));
   const std::optional<RelativePoseFactor> factor = verifyLoop(
       candidate, older.cloud, newer.cloud, covariance, options_.loop, options_.registration);
+  for (const std::size_t keyframe : {candidate.older, candidate.newer}) {
+    if (keyframe + static_cast<std::size_t>(options_.window) < keyframes_.size()) {
+      keyframes_[keyframe].cloud.forgetTree();
+    }
+  }
   if (!factor) return false;
   factors_.push_back(*factor);
   ++counts_.loops;
@@ -234,12 +270,12 @@ bool KeyframeRefiner::propose(const LoopCandidate& candidate) {
 void KeyframeRefiner::closeLoops() {
   const std::size_t number = keyframes_.size() - 1;
   const auto window = static_cast<std::size_t>(options_.window);
-  if (options_.loop.loops && number > window) {
-    for (const std::size_t older : bestOverlaps(0, number - window, options_.loop.loop_min_overlap,
-                                                options_.loop.loop_checks)) {
+  if (options_.loop.loops && options_.loop.loop_checks > 0 && number > window) {
+    for (const std::size_t older :
+         bestOverlaps(nearestBefore(number - window), options_.loop.loop_min_overlap,
+                      options_.loop.loop_checks)) {
       check({older, number,
              keyframes_[older].T_world_ref.inverse() * keyframes_[number].T_world_ref});
-      if (older + window < number) keyframes_[older].cloud.forgetTree();
     }
   }
   if (!open_loop_ || (number - solved_loops_at_) * kLoopShare < number - *open_loop_) return;

@@ -65,8 +65,8 @@ class KeyframeRefiner {
   /// @param stated what the tracker itself says that this pose errs by, in place of what is
   /// expected of all; where errors are learnt, this is corrected by the factor that the expected
   /// ones are.
-  /// @throws std::invalid_argument where the pose or what is stated is not finite, or below 0:
-  /// nothing is taken then.
+  /// @throws std::invalid_argument where the pose is not finite or beyond a million kilometres, or
+  /// what is stated is not finite or below 0: nothing is taken then.
   void add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
            const std::optional<PoseNoise>& stated = std::nullopt);
   /// Checks a loop that somebody else suspects, and closes it where it holds.
@@ -93,8 +93,9 @@ class KeyframeRefiner {
 
  private:
   double overlapOf(std::size_t newer, std::size_t older) const;
-  std::vector<std::size_t> bestOverlaps(std::size_t first, std::size_t last, double least,
+  std::vector<std::size_t> bestOverlaps(const std::vector<std::size_t>& older, double least,
                                         int count) const;
+  std::vector<std::size_t> nearestBefore(std::size_t last) const;
   TrackerErrors cautiousErrors() const;
   PoseNoise timesOthers(const std::optional<PoseNoise>& stated) const;
   void registerNewest();

@@ -19,8 +19,8 @@ constexpr std::size_t kLeastInliers = 100;
 constexpr double kLargestMedianError = 1.0;
 /// From where the candidate was expected, in standard deviations: 1 in 10^5 loops is farther.
 constexpr double kFarthestFromPrior = 5.5;
-/// Two registrations of the same points agree within so many standard deviations of one.
-constexpr double kBothWaysSigmas = 4;
+/// Two registrations of the same points agree within so many of the largest standard deviations.
+constexpr double kBothWaysSigmas = 1.5;
 
 Matrix6d informationOf(const RelativePoseFactor& factor) {
   return factor.sqrt_information.transpose() * factor.sqrt_information;

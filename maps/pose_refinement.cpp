@@ -235,7 +235,8 @@ Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
   }
   problem.AddResidualBlock(new PriorCost(new PriorError{prior}), nullptr, pose.data());
   ceres::Solver::Summary summary;
-  ceres::Solver::Options solver = solverOptions(options.max_iterations, ceres::DENSE_NORMAL_CHOLESKY);
+  ceres::Solver::Options solver =
+      solverOptions(options.max_iterations, ceres::DENSE_NORMAL_CHOLESKY);
   solver.function_tolerance = options.least_gain;
   ceres::Solve(solver, &problem, &summary);
   return summary.IsSolutionUsable() ? rigidOf(pose) : T_map_start;

@@ -34,8 +34,8 @@ struct AlignmentOptions {
   /// Range: above 0, at most 1000.
   double robust_sigmas = 3;
   int max_iterations = 10;  ///< 1 to 1000.
-  /// An iteration that takes away less than this share of the errors' squares is the last one. Range:
-  /// 0 to 1.
+  /// An iteration that takes away less than this share of the errors' squares is the last one.
+  /// Range: 0 to 1.
   double least_gain = 1e-8;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.

@@ -5,6 +5,7 @@
 #include <pcl/point_types.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -19,6 +20,10 @@ namespace {
 /// How far inverse depths of neighbours may differ, in standard deviations, and still be of one
 /// edge.
 constexpr double kSameEdgeSigmas = 3;
+/// Points around one are an edge where they vary so many times as much in one direction as across.
+constexpr double kEdgeElongation = 4;
+/// What a point's place along its edge errs by, pixels: anything.
+constexpr double kAlongEdgePx = 100;
 /// How far beyond its nearest and farthest point a keyframe sees: a wall that faces it has one
 /// depth.
 constexpr double kDepthMarginSigmas = 3;
@@ -84,13 +89,19 @@ std::vector<CertainPixel> spreadOver(const std::vector<CertainPixel>& pixels, cv
   return spread;
 }
 
-/// Covariance of the points around one, which is among them.
-Eigen::Matrix3d shapeAround(const KeyframeDepthMap& keyframe, const CertainPixel& pixel,
-                            const Eigen::Vector3d& p_ref, int reach) {
+/// The points around one, which is among them.
+struct Neighbourhood {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< m^2, frame `ref`.
+  Eigen::Matrix2d in_image = Eigen::Matrix2d::Zero();    ///< Of their pixels, px^2.
+};
+
+Neighbourhood neighbourhoodOf(const KeyframeDepthMap& keyframe, const CertainPixel& pixel,
+                              const Eigen::Vector3d& p_ref, int reach) {
+  using Offset = Eigen::Matrix<double, 5, 1>;  // in space, in the image
   const DepthMap& map = keyframe.map;
   int count = 0;
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();  // from the point: squares lose nothing
-  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+  Offset sum = Offset::Zero();  // from the point: squares lose nothing
+  Eigen::Matrix<double, 5, 5> squares = Eigen::Matrix<double, 5, 5>::Zero();
   const cv::Rect window = cv::Rect(pixel.x - reach, pixel.y - reach, 2 * reach + 1, 2 * reach + 1) &
                           cv::Rect({0, 0}, map.depth.size());
   for (int y = window.y; y < window.br().y; ++y) {
@@ -100,25 +111,42 @@ Eigen::Matrix3d shapeAround(const KeyframeDepthMap& keyframe, const CertainPixel
       if (!isMeasured(depth, variance)) continue;
       const float sigma = std::max(pixel.sigma, std::sqrt(variance));
       if (std::abs(1 / depth - pixel.inverse_depth) > kSameEdgeSigmas * sigma) continue;
-      const Eigen::Vector3d offset = keyframe.view.pointAt(x, y, depth) - p_ref;
+      Offset offset;
+      offset << keyframe.view.pointAt(x, y, depth) - p_ref, x - pixel.x, y - pixel.y;
       ++count;
       sum += offset;
       squares += offset * offset.transpose();
     }
   }
-  if (count == 0) return squares;
-  return squares / count - (sum / count) * (sum / count).transpose();
+  if (count == 0) return {};
+  const Eigen::Matrix<double, 5, 5> covariance =
+      squares / count - (sum / count) * (sum / count).transpose();
+  return {covariance.topLeftCorner<3, 3>(), covariance.bottomRightCorner<2, 2>()};
+}
+
+/// Where along an edge a point lies is no measurement: its neighbour there is just the next one of
+/// the same edge.
+Eigen::Matrix3d alongEdge(const Neighbourhood& around, const ReferenceView& view, double depth) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen;
+  eigen.computeDirect(around.in_image);
+  const Eigen::Vector2d variances = eigen.eigenvalues();  // ascending
+  if (!(variances[1] > kEdgeElongation * variances[0])) return Eigen::Matrix3d::Zero();
+  const Eigen::Vector2d edge = eigen.eigenvectors().col(1);
+  const Eigen::Vector3d along =
+      kAlongEdgePx * depth * Eigen::Vector3d(edge.x() / view.fx, edge.y() / view.fy, 0);
+  return along * along.transpose();
 }
 
 RegistrationPoint pointOf(const KeyframeDepthMap& keyframe, const CertainPixel& pixel,
                           const RegistrationCloudOptions& options) {
   const double depth = keyframe.map.depth(pixel.y, pixel.x);
   const Eigen::Vector3d p_ref = keyframe.view.pointAt(pixel.x, pixel.y, depth);
-  const Eigen::Vector3d along = p_ref * (options.depth_sigmas * pixel.relative_sigma);
+  const Neighbourhood around = neighbourhoodOf(keyframe, pixel, p_ref, options.neighbourhood_px);
+  const Eigen::Vector3d along_ray = p_ref * (options.depth_sigmas * pixel.relative_sigma);
   const double across_m =
-      std::max(options.pixel_sigma * depth / keyframe.view.fx, along.norm() / kLongest);
-  Eigen::Matrix3d covariance =
-      along * along.transpose() + shapeAround(keyframe, pixel, p_ref, options.neighbourhood_px);
+      std::max(options.pixel_sigma * depth / keyframe.view.fx, along_ray.norm() / kLongest);
+  Eigen::Matrix3d covariance = along_ray * along_ray.transpose() + around.covariance +
+                               alongEdge(around, keyframe.view, depth);
   covariance.diagonal().array() += across_m * across_m;
   return {p_ref.cast<float>(), covariance.cast<float>()};
 }
@@ -187,7 +215,7 @@ Eigen::Vector3f RegistrationCloud::seenAt(const Eigen::Vector3d& p_ref) const {
 }
 
 bool RegistrationCloud::sees(const Eigen::Vector3d& p_ref) const {
-  if (!(p_ref.z() > 0)) return false;
+  if (points_.empty() || !(p_ref.z() > 0)) return false;
   const double margin = kDepthMarginSigmas / px_per_inverse_depth_;
   const double inverse_depth = 1 / p_ref.z();
   if (inverse_depth > nearest_ + margin || inverse_depth < farthest_ - margin) return false;

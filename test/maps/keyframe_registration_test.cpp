@@ -82,10 +82,10 @@ TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByTwoCentimetresAndADegre
     squared_sigmas += std::pow(errorOf(factor, step.T_world_map, step.T_world_ref), 2) -
                       std::pow(errorOf(factor, step.T_world_map, found.T_world_ref), 2);
   }
-  // Pixels of 0.44 deg, 1.3 cm wide at 3 m, and some 800 points: over 30 seeds 3.7 mm and 0.074
-  // deg, as rotation and translation go together.
-  EXPECT_LT(std::sqrt(squared_m / kSeeds), 0.0055);
-  EXPECT_LT(std::sqrt(squared_rad / kSeeds), 0.11 * kDeg);
+  // Pixels of 0.44 deg, 1.3 cm wide at 3 m, and some 800 points, each of which says something across
+  // its edge alone: 6.6 mm and 0.15 deg, as rotation and translation go together.
+  EXPECT_LT(std::sqrt(squared_m / kSeeds), 0.009);
+  EXPECT_LT(std::sqrt(squared_rad / kSeeds), 0.2 * kDeg);
   // Six directions: 6 where factors know what they err by, 48 for all. More than 75 (1 % of such
   // draws) would be too sure.
   EXPECT_LT(squared_sigmas, 75);
@@ -98,8 +98,9 @@ TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByManyPixelsWhereItSaysSo
     const Step step(test::edgesAround(150, random), random);
     const Rigid3 off = viewTurned(3 * kDeg, {0.06, -0.04, 0.03});  // 7 px and 2 px
     const Registration found = step.from(priorOf(step.T_world_ref * off, 0.05, 2 * kDeg));
-    EXPECT_LT(metresApart(found.T_world_ref, step.T_world_ref), 0.008) << seed;
-    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.15 * kDeg) << seed;
+    // Twice what one is off by with the prior above, which is surer.
+    EXPECT_LT(metresApart(found.T_world_ref, step.T_world_ref), 0.018) << seed;
+    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.4 * kDeg) << seed;
   }
 }
 

@@ -212,5 +212,16 @@ TEST(LoopOptions, OutOfRangeAreRefusedByName) {
   refused(options, "loop_checks = -1");
 }
 
+TEST(VerifyLoop, StripesThatDoNotSayWhereAlongThemAreNoLoop) {
+  EdgeWorld stripes;
+  for (int y = -4; y <= 4; ++y) stripes.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
+  std::mt19937 random(4);
+  const RegistrationCloud older = cloudFrom(stripes, {}, random);
+  const RegistrationCloud newer = cloudFrom(stripes, viewTurned(0, {0.2, 0, 0}), random);
+  const auto factor = verify({}, older, newer, 0.1, 1 * kDeg);
+  EXPECT_FALSE(factor && std::abs(factor->T_from_to.translation.x() - 0.2) > 0.05)
+      << "surely at " << factor->T_from_to.translation.transpose();
+}
+
 }  // namespace
 }  // namespace efm

@@ -441,7 +441,8 @@ RC_GTEST_PROP(PoseCovariance, IsTheInverseOfTheNumericInformation, ()) {
   }
   const Eigen::MatrixXd expected = information.inverse();
   for (int node = 1; node < 4; ++node) {
-    const auto covariance = poseCovariance(PoseGraphOptions(), graph, static_cast<std::size_t>(node));
+    const auto covariance =
+        poseCovariance(PoseGraphOptions(), graph, static_cast<std::size_t>(node));
     RC_ASSERT(covariance.has_value());
     const Matrix6d block = expected.block<6, 6>(6 * (node - 1), 6 * (node - 1));
     RC_ASSERT((*covariance - block).norm() < 1e-5 * block.norm());
