@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <stdexcept>
 #include <utility>
 
 namespace efm {
@@ -46,22 +47,35 @@ void RefinedCloud::move(std::size_t keyframe, const Rigid3& T_world_ref) {
 void RefinedCloud::settle(double tolerance_m, std::size_t most) {
   std::size_t moved = 0;
   for (auto next = pending_.begin(); next != pending_.end() && moved < most;) {
-    const auto& [keyframe, T_world_ref] = *next;
+    const auto [keyframe, T_world_ref] = *next;
     const Rigid3& T_before_ref = T_world_ref_[keyframe];
-    const KeptPoints& kept = kept_[keyframe];
     const bool stays = isSame(T_before_ref, T_world_ref);
-    if (!stays && largestMotion(T_before_ref, T_world_ref, kept.radius_m) <= tolerance_m) {
+    // A motion in the last digits has a length of 0.
+    if (!stays && tolerance_m > 0 &&
+        largestMotion(T_before_ref, T_world_ref, kept_[keyframe].radius_m) <= tolerance_m) {
       ++next;  // until it is farther, or nothing is tolerated
       continue;
     }
-    if (!stays) {
-      cloud_.remove(fixed_ + keyframe);
-      cloud_.insert(fixed_ + keyframe, placedInWorld(kept.points, T_world_ref), T_world_ref);
-      T_world_ref_[keyframe] = T_world_ref;
-      ++moved;
-    }
     next = pending_.erase(next);
+    if (stays) continue;
+    put(keyframe, T_world_ref);
+    ++moved;
   }
+}
+
+void RefinedCloud::put(std::size_t keyframe, const Rigid3& T_world_ref) {
+  const std::vector<ViewPoint>& points = kept_[keyframe].points;
+  const auto insert = [&](const Rigid3& T_in_world) {
+    cloud_.insert(fixed_ + keyframe, placedInWorld(points, T_in_world), T_in_world);
+  };
+  cloud_.remove(fixed_ + keyframe);
+  try {
+    insert(T_world_ref);
+  } catch (const std::invalid_argument&) {
+    insert(T_world_ref_[keyframe]);
+    throw;
+  }
+  T_world_ref_[keyframe] = T_world_ref;
 }
 
 }  // namespace efm

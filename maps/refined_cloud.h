@@ -31,7 +31,9 @@ class RefinedCloud {
   /// Where a keyframe of those inserted should stand from now on; `settle` puts it there.
   void move(std::size_t keyframe, const Rigid3& T_world_ref);
   /// Puts keyframes where they should stand whose points would otherwise be off by more than the
-  /// tolerance, the oldest first, but no more than so many.
+  /// tolerance, the oldest first, but no more than so many. Without tolerance all stand where they
+  /// should, bit for bit.
+  /// @throws std::invalid_argument as GlobalCloud::insert does: that keyframe stays where it was.
   void settle(double tolerance_m, std::size_t most = std::numeric_limits<std::size_t>::max());
 
   const GlobalCloud& cloud() const { return cloud_; }
@@ -39,6 +41,8 @@ class RefinedCloud {
   const std::vector<Rigid3>& T_world_ref() const { return T_world_ref_; }
 
  private:
+  void put(std::size_t keyframe, const Rigid3& T_world_ref);
+
   struct KeptPoints {
     std::vector<ViewPoint> points;
     double radius_m = 0;  // no point is farther from the view
