@@ -143,8 +143,14 @@ void CEventFusionMapBuilder::mapWhenAsked() const {
   }
   if (!failed) self->mapDue();  // a failure was said: now the map so far is asked for
   const std::lock_guard<std::mutex> lock(mutex_);
+  settle();
+}
+
+/// Brings cloud and keyframes to where the refinement has them by now, under the lock: whatever is
+/// asked for next agrees.
+void CEventFusionMapBuilder::settle() const {
   session_->settle();
-  self->followRefinement();
+  const_cast<CEventFusionMapBuilder*>(this)->followRefinement();  // NOLINT: as in mapWhenAsked
 }
 
 /// The stored keyframes stand where those of the cloud do.
@@ -239,12 +245,17 @@ std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
 
 std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  session_->settle();
+  settle();
   return session_->cloud().points();
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
   const std::lock_guard<std::mutex> lock(mutex_);
+  settle();
+  return keyframePoses();
+}
+
+std::vector<StampedPose> CEventFusionMapBuilder::keyframePoses() const {
   std::vector<StampedPose> poses;
   for (const StoredKeyframe& keyframe : keyframes_) {
     poses.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
@@ -253,8 +264,8 @@ std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
-  std::vector<StampedPose> poses = trajectory();
   const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<StampedPose> poses = keyframePoses();
   const std::vector<Rigid3>& T_tracker_ref = session_->T_tracker_ref();
   const std::size_t earlier = poses.size() - T_tracker_ref.size();
   for (std::size_t i = 0; i < T_tracker_ref.size(); ++i) {

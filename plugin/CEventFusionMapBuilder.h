@@ -146,6 +146,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
 
   void restart(const EventFusionOptions& builder_options);
   void followRefinement();
+  void settle() const;
+  std::vector<StampedPose> keyframePoses() const;
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
   /// Feeds the session under the lock, then maps and hands out what became due. The first error
   /// goes to the caller at the end.
