@@ -87,6 +87,10 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
   if (consistent) compareWithOthers(keyframe);
 }
 
+void GlobalCloud::requireInsertable(const std::vector<CloudPoint>& points) const {
+  for (const CloudPoint& point : points) place(point);
+}
+
 /// One sum per voxel, sorted.
 std::vector<GlobalCloud::Sums> GlobalCloud::voxelsOf(const std::vector<CloudPoint>& points) const {
   std::vector<PlacedPoint> placed;

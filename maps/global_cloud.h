@@ -70,6 +70,10 @@ class GlobalCloud {
   void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
               const std::optional<Rigid3>& T_world_ref = std::nullopt);
 
+  /// Whether points lie where the map has voxels.
+  /// @throws std::invalid_argument as `insert` does of a point.
+  void requireInsertable(const std::vector<CloudPoint>& points) const;
+
   /// Takes a keyframe out: the map is as if it had never been inserted, its memory is given back,
   /// and its number is free for another insertion, of a refined keyframe for example. Cost: at most
   /// that of its points and of those that it was compared with.

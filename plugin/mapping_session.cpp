@@ -206,15 +206,19 @@ void MappingSession::addPose(const StampedPose& pose, const PoseOrigin& origin,
                              const std::optional<PoseNoise>& noise) {
   take(pose_choice_.add(origin, pose));
   const bool used = !pose_choice_.chosen() || *pose_choice_.chosen() == origin;
-  if (refinement_ && noise && used) noises_[pose.t_ns] = *noise;
+  // As of poses, of two with the same time the first stands.
+  if (refinement_ && used) noises_[origin].try_emplace(pose.t_ns, noise);
 }
 
-/// What the tracker said that the last pose before a time errs by. Forgets those before it.
+/// What the tracker said that the last pose before a time errs by, if it did. Forgets those before
+/// it.
 std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
-  const auto after = noises_.upper_bound(t_ns);
-  if (after == noises_.begin()) return std::nullopt;
-  noises_.erase(noises_.begin(), std::prev(after));
-  return noises_.begin()->second;
+  if (!pose_choice_.chosen()) return std::nullopt;
+  auto& noises = noises_[*pose_choice_.chosen()];
+  const auto after = noises.upper_bound(t_ns);
+  if (after == noises.begin()) return std::nullopt;
+  noises.erase(noises.begin(), std::prev(after));
+  return noises.begin()->second;
 }
 
 void MappingSession::take(const std::vector<StampedPose>& poses) {
@@ -260,11 +264,15 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
 /// Puts a keyframe into the cloud where it stands by now, and others where they stand then.
 void MappingSession::place(KeyframeDepthMap& keyframe) {
   const Rigid3 T_tracker_ref = keyframe.T_world_ref;
+  std::vector<ViewPoint> points = pointsOf(keyframe);
   if (refinement_) {
+    // What the map refuses must not be refined either: both number keyframes alike.
+    const Rigid3 T_world_ref = refinement_->state().T_world_tracker * T_tracker_ref;
+    cloud_.cloud().requireInsertable(placedInWorld(points, T_world_ref));
     keyframe.T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
   }
   const SecondsScope scope(status_.seconds.map);
-  cloud_.insert(pointsOf(keyframe), keyframe.T_world_ref);
+  cloud_.insert(std::move(points), keyframe.T_world_ref);
   T_tracker_ref_.push_back(T_tracker_ref);
   for (const int camera : keyframe.silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];

@@ -133,7 +133,8 @@ class MappingSession {
   RefinedCloud cloud_;
   std::unique_ptr<MapRefinement> refinement_;  // where poses are refined
   std::vector<Rigid3> T_tracker_ref_;
-  std::map<std::int64_t, PoseNoise> noises_;  // that the tracker said, by time
+  // That poses of each source may have, by their time.
+  std::map<PoseOrigin, std::map<std::int64_t, std::optional<PoseNoise>>> noises_;
   bool finished_ = false;
   bool all_refined_ = false;
   PoseChoice pose_choice_;
