@@ -63,7 +63,7 @@ void RefinementOptions::validate() const {
 }
 
 KeyframeRefiner::KeyframeRefiner(const RefinementOptions& options)
-    : options_(options), errors_(options.tracker) {
+    : options_(options), errors_(options.tracker), covariance_(errors_.noiseCovariance()) {
   options_.validate();
 }
 
@@ -322,6 +322,10 @@ std::vector<std::size_t> KeyframeRefiner::takeMoved() {
 Rigid3 KeyframeRefiner::T_world_tracker() const {
   if (keyframes_.empty()) return {};
   return keyframes_.back().T_world_tracked * keyframes_.back().T_tracker_ref.inverse();
+}
+
+Rigid3 KeyframeRefiner::T_world_tracked() const {
+  return keyframes_.empty() ? Rigid3{} : keyframes_.back().T_world_tracked;
 }
 
 }  // namespace efm

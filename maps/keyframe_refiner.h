@@ -85,8 +85,11 @@ class KeyframeRefiner {
   /// What brings the tracker's poses of now to the world of the refined ones; the identity before
   /// the first keyframe.
   Rigid3 T_world_tracker() const;
-  /// Of a pose of the tracker after that correction, as `poseCovariance` has it: against the oldest
-  /// keyframes that the last window leaves in place. Zero before the second keyframe.
+  /// Where the tracker would have put the newest keyframe without noise; the identity before one.
+  Rigid3 T_world_tracked() const;
+  /// Of a pose of the tracker that is there, after that correction, as `poseCovariance` has it:
+  /// against the oldest keyframes that the last window leaves in place. Before the second keyframe
+  /// that of a pose's noise.
   const Matrix6d& covariance() const { return covariance_; }
   const TrackerErrors& trackerErrors() const { return errors_; }
   const RefinementCounts& counts() const { return counts_; }
@@ -110,7 +113,7 @@ class KeyframeRefiner {
   std::vector<RelativePoseFactor> factors_;  // by points; in the order of `to`, but loops proposed
   std::deque<MotionSample> samples_;
   TrackerErrors errors_;
-  Matrix6d covariance_ = Matrix6d::Zero();
+  Matrix6d covariance_;
   RefinementCounts counts_;
   std::optional<std::size_t> open_loop_;  // the oldest keyframe of loops that are not solved yet
   std::size_t solved_loops_at_ = 0;

@@ -315,7 +315,7 @@ mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() 
   }
   const Rigid3 T_world_rig = refinement->T_world_tracker * newest->T_world_rig;
   return std::make_shared<mrpt::poses::CPose3DPDFGaussian>(
-      mrptPoseFrom(T_world_rig, refinement->covariance));
+      mrptPoseFrom(T_world_rig, covarianceAt(*refinement, T_world_rig)));
 }
 
 void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollection& action,

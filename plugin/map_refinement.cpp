@@ -6,10 +6,27 @@
 #include "plugin/stage_timer.h"
 
 namespace efm {
+namespace {
+
+/// Keyframes that may wait with their points.
+constexpr std::size_t kMostWaiting = 50;
+
+}  // namespace
+
+Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig) {
+  const Eigen::Vector3d lever_m = T_world_rig.translation - state.T_world_tracked.translation;
+  Matrix6d by_motion = Matrix6d::Identity();  // a turn v moves the rig by v x lever
+  by_motion.topRightCorner<3, 3>() << 0, lever_m.z(), -lever_m.y(),  //
+      -lever_m.z(), 0, lever_m.x(),                                  //
+      lever_m.y(), -lever_m.x(), 0;
+  return by_motion * state.covariance * by_motion.transpose() +
+         state.tracker.driftCovariance(lever_m.norm());
+}
 
 MapRefinement::MapRefinement(const MapRefinementOptions& options)
     : options_(options), refiner_(options.refiner) {
   state_.tracker = options.refiner.tracker;
+  state_.covariance = refiner_.covariance();
   if (options.background) thread_ = std::thread([this] { runInBackground(); });
 }
 
@@ -31,6 +48,7 @@ Rigid3 MapRefinement::add(const KeyframeDepthMap& keyframe,
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   if (error_) std::rethrow_exception(error_);
+  if (waiting_.size() >= kMostWaiting) task.cloud = RegistrationCloud({}, options_.refiner.points);
   waiting_.push_back(std::move(task));
   changed_.notify_all();
   return state_.T_world_tracker * keyframe.T_world_ref;
@@ -80,6 +98,7 @@ void MapRefinement::publish(double seconds) {
     moved_[number] = refiner_.T_world_ref(number);
   }
   state_.T_world_tracker = refiner_.T_world_tracker();
+  state_.T_world_tracked = refiner_.T_world_tracked();
   state_.covariance = refiner_.covariance();
   state_.counts = refiner_.counts();
   state_.tracker = refiner_.trackerErrors();

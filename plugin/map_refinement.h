@@ -30,15 +30,22 @@ struct MapRefinementOptions {
 /// What a refinement knows by now.
 struct RefinementState {
   Rigid3 T_world_tracker;  ///< Takes the tracker's newest poses to the refined world.
-  Matrix6d covariance = Matrix6d::Zero();  ///< See KeyframeRefiner.
+  Rigid3 T_world_tracked;  ///< The newest keyframe's, less its noise.
+  Matrix6d covariance = Matrix6d::Zero();  ///< Of a pose there; see KeyframeRefiner.
   RefinementCounts counts;
   TrackerErrors tracker;    ///< As they seem to be.
   std::size_t waiting = 0;  ///< Keyframes that are not refined yet.
   double seconds = 0;       ///< Spent on it.
 };
 
+/// The covariance of a pose of the tracker after the correction: that of the newest keyframe,
+/// turned about it with a lever, and what the way from there adds. As `poseCovariance` has it.
+Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig);
+
 /// Refines keyframes as they are made, beside the mapping where that is asked for. For one thread,
-/// which it never lets wait but in `add` without a background, and in `finish`.
+/// which it never lets wait but in `add` without a background, and in `finish`. Where the
+/// background falls 50 keyframes behind, the next ones are given no points: the tracker's motion
+/// stands there.
 class MapRefinement {
  public:
   /// @throws std::invalid_argument where the options are not valid.
