@@ -7,24 +7,9 @@
 
 #include "maps/keyframe_cloud.h"
 #include "tracking_stub/depth_rendering.h"
+#include "tracking_stub/nearest_surface.h"
 
 namespace efm::test {
-namespace {
-
-/// Distance to the nearest point of any surface.
-double distanceToScene(const Scene& scene, const Eigen::Vector3d& p_world) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (int surface = 0; surface < scene.size(); ++surface) {
-    const Rectangle& rectangle = scene.rectangle(surface);
-    const Eigen::Vector3d from_corner = p_world - rectangle.corner;
-    const double u = std::clamp(from_corner.dot(rectangle.axis_u), 0.0, rectangle.width_m);
-    const double v = std::clamp(from_corner.dot(rectangle.axis_v), 0.0, rectangle.height_m);
-    nearest = std::min(nearest, (p_world - rectangle.pointAt(u, v)).norm());
-  }
-  return nearest;
-}
-
-}  // namespace
 
 SimulatedRecording::SimulatedRecording(const SimulationOptions& options)
     : simulation_(makeSimulation(options)) {
@@ -60,7 +45,7 @@ std::vector<DepthPair> SimulatedRecording::pairs(const KeyframeDepthMap& keyfram
 double SimulatedRecording::medianDistanceToSurfaces(const std::vector<CloudPoint>& points) const {
   std::vector<double> distances;
   for (const CloudPoint& point : points) {
-    distances.push_back(distanceToScene(simulation_.scene, point.p_world));
+    distances.push_back(nearestSurface(simulation_.scene, point.p_world).distance_m);
   }
   if (distances.empty()) return std::numeric_limits<double>::infinity();
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
@@ -71,7 +56,7 @@ double SimulatedRecording::medianDistanceToSurfaces(const std::vector<CloudPoint
 double SimulatedRecording::shareBeyond(const std::vector<CloudPoint>& points,
                                        double distance_m) const {
   const auto beyond = std::count_if(points.begin(), points.end(), [&](const CloudPoint& point) {
-    return distanceToScene(simulation_.scene, point.p_world) > distance_m;
+    return nearestSurface(simulation_.scene, point.p_world).distance_m > distance_m;
   });
   return static_cast<double>(beyond) / static_cast<double>(points.size());
 }

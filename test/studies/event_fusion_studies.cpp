@@ -41,6 +41,7 @@ constexpr Study kStudies[] = {
     {"better_depth", "12. Depth better than the paper's", studyBetterDepth},
     {"revoting", "13. Each event's one vote", studyRevoting},
     {"motion", "14. Motion corrected inside the keyframe", studyMotionCorrection},
+    {"refinement", "15. Poses refined, the map corrected", studyRefinement},
 };
 
 constexpr const char* kUsage =

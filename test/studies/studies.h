@@ -37,5 +37,7 @@ void studyBetterDepth(const StudyRun& run, StudySection& section);
 void studyRevoting(const StudyRun& run, StudySection& section);
 /// A tracker that is wrong within the window, corrected.
 void studyMotionCorrection(const StudyRun& run, StudySection& section);
+/// A tracker that drifts and errs, its keyframes' poses refined.
+void studyRefinement(const StudyRun& run, StudySection& section);
 
 }  // namespace efm::studies
