@@ -77,11 +77,11 @@ class LoopForger {
 }  // namespace
 
 FalseLoops proposeFalseLoops(const std::vector<KeyframeDepthMap>& keyframes,
+                             const std::vector<Rigid3>& T_world_true,
                              const std::vector<Rigid3>& T_world_ref,
                              const RefinementOptions& options, std::uint64_t seed) {
   FalseLoops result;
-  LoopForger forger(keyframes, T_world_ref, options, seed);
-  const RefinerRun without = refineKeyframes(keyframes, options);
+  LoopForger forger(keyframes, T_world_true, options, seed);
   const RefinerRun with =
       refineKeyframes(keyframes, options, [&](KeyframeRefiner& refiner, std::size_t newer) {
         const std::optional<LoopCandidate> loop = forger.next(newer);
@@ -90,7 +90,7 @@ FalseLoops proposeFalseLoops(const std::vector<KeyframeDepthMap>& keyframes,
         if (refiner.propose(*loop)) ++result.accepted;
       });
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
-    const Rigid3& a = without.T_world_ref[i];
+    const Rigid3& a = T_world_ref[i];
     const Rigid3& b = with.T_world_ref[i];
     result.moved_m = std::max(result.moved_m, (a.translation - b.translation).norm());
     result.moved_rad = std::max(result.moved_rad, a.rotation.angularDistance(b.rotation));

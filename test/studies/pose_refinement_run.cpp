@@ -75,6 +75,7 @@ PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOption
   run.T_tracker_ref = session.T_tracker_ref();
   run.T_world_ref = session.T_world_ref();
   run.refined_map = session.cloud().points();
+  if (const auto state = session.status().refinement) run.counts = state->counts;
   return run;
 }
 

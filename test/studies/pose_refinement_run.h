@@ -21,6 +21,7 @@ struct PoseRefinementRun {
   std::vector<Rigid3> T_tracker_ref;
   std::vector<Rigid3> T_world_ref;      ///< Refined, once nothing more came.
   std::vector<CloudPoint> refined_map;  ///< As the session exports it.
+  RefinementCounts counts;
 };
 
 /// Plays the recording into a MappingSession as it would come in: events in packets of 50 ms, and
