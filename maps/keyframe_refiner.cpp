@@ -29,6 +29,9 @@ constexpr double kCautiousShare = 0.25;
 constexpr std::size_t kMaxSamples = 100;
 /// Loops are solved when the map has grown by this share of them.
 constexpr std::size_t kLoopShare = 20;
+/// How many times larger than usual the errors of loops may be that are to be solved.
+constexpr double kTrusting = 30;
+constexpr double kLargestRobustSigmas = 1000;
 /// A loop whose error is larger once everything is solved was wrong.
 constexpr double kContradicted = 8;
 
@@ -216,6 +219,12 @@ void KeyframeRefiner::solveFrom(std::size_t first_free) {
     window.add(factors_[f]);
   }
   window.addTracker(errors_);
+  if (open_loop_) {
+    // From far off a loop would count as a mistake: at first it counts in full.
+    PoseGraphOptions trusting = options_.graph;
+    trusting.robust_sigmas = std::min(kTrusting * trusting.robust_sigmas, kLargestRobustSigmas);
+    window.solve(trusting);
+  }
   window.solve(options_.graph);
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
     if (!window.has(i)) continue;

@@ -19,6 +19,12 @@ constexpr std::size_t kLeastInliers = 100;
 constexpr double kLargestMedianError = 1.0;
 /// From where the candidate was expected, in standard deviations: 1 in 10^5 loops is farther.
 constexpr double kFarthestFromPrior = 5.5;
+/// How much farther than others a loop's neighbours may be at first: drift adds up along it.
+constexpr double kFartherNeighbours = 3;
+/// What a loop's pose errs by beyond its pairs' noise: depths that are wrong alike, edges that look
+/// elsewhere from there.
+constexpr double kSystematicM = 0.005;
+constexpr double kSystematicRad = 0.1 * kRadiansPerDegree;
 /// Two registrations of the same points agree within so many of the largest standard deviations.
 constexpr double kBothWaysSigmas = 1.5;
 
@@ -29,6 +35,18 @@ Matrix6d informationOf(const RelativePoseFactor& factor) {
 double largestSigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff());
+}
+
+/// The same factor, as sure as a loop can be.
+RelativePoseFactor withSystematicError(RelativePoseFactor factor) {
+  Matrix6d covariance = (informationOf(factor) + 1e-6 * Matrix6d::Identity()).inverse();
+  const Vector6d to_minimum = -covariance * (factor.sqrt_information.transpose() * factor.offset);
+  covariance.diagonal().head<3>().array() += kSystematicM * kSystematicM;
+  covariance.diagonal().tail<3>().array() += kSystematicRad * kSystematicRad;
+  factor.T_from_to = factor.T_from_to * rigidFromDifference(to_minimum);
+  factor.sqrt_information = sqrtInformation(covariance);
+  factor.offset.setZero();
+  return factor;
 }
 
 bool isSure(const RelativePoseFactor& factor, const LoopOptions& options) {
@@ -84,8 +102,10 @@ std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
                                              const RegistrationCloud& newer,
                                              const Matrix6d& covariance, const LoopOptions& options,
                                              const KeyframeRegistrationOptions& registration) {
+  KeyframeRegistrationOptions wider = registration;
+  wider.first_distance_px *= kFartherNeighbours;
   const Registration there =
-      registerBeside(newer, older, candidate.T_older_newer, covariance, registration);
+      registerBeside(newer, older, candidate.T_older_newer, covariance, wider);
   if (!holds(there, options)) return std::nullopt;
   const Registration back =
       registerBeside(older, newer, there.T_world_ref.inverse(), covariance, registration);
@@ -95,7 +115,7 @@ std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
       apart.tail<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_rad) {
     return std::nullopt;
   }
-  RelativePoseFactor factor = there.factors.front();
+  RelativePoseFactor factor = withSystematicError(there.factors.front());
   factor.from = candidate.older;
   factor.to = candidate.newer;
   factor.doubtful = true;
