@@ -61,13 +61,13 @@ TrackerErrors departed(TrackerErrors errors, const LogFactors& log_factors) {
 }  // namespace
 
 void TrackerErrors::validate() const {
-  const auto require = [](const char* name, double value) {
-    requireOption(value >= 0 && value <= 1e3, name, value, "from 0 to 1000");
+  const auto require = [](const char* name, double value, double unit = 1) {
+    requireOption(value >= 0 && value <= 1e3 * unit, name, value / unit, "from 0 to 1000");
   };
   require("tracker_noise_m", noise_m);
-  require("tracker_noise_deg", noise_rad / kRadiansPerDegree);
+  require("tracker_noise_deg", noise_rad, kRadiansPerDegree);
   require("tracker_drift", drift_m);
-  require("tracker_drift_deg_per_m", drift_rad / kRadiansPerDegree);
+  require("tracker_drift_deg_per_m", drift_rad, kRadiansPerDegree);
 }
 
 Matrix6d TrackerErrors::noiseCovariance(const PoseNoise& times) const {

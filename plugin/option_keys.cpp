@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/option_keys.h"
 
+#include <array>
+#include <charconv>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -40,6 +42,22 @@ OptionKey optionOr(std::string_view word, std::string_view section, std::string_
           }};
 }
 
+/// Degrees with the fewest digits that are these radians: what was written, where that had no more
+/// than 15.
+double degreesThatReadAs(double angle_rad) {
+  double angle_deg = angle_rad / kRadiansPerDegree;
+  for (const int digits : {15, 16, 17}) {
+    std::array<char, 32> text{};
+    const auto end = std::to_chars(text.data(), text.data() + text.size(), angle_deg,
+                                   std::chars_format::scientific, digits - 1)
+                         .ptr;
+    double rounded_deg = 0;
+    std::from_chars(text.data(), end, rounded_deg);
+    if (rounded_deg * kRadiansPerDegree == angle_rad) return rounded_deg;
+  }
+  return angle_deg;
+}
+
 /// A key in degrees whose field is in radians.
 template <typename Field>
 OptionKey degrees(std::string_view section, std::string_view key, Field field) {
@@ -50,7 +68,7 @@ OptionKey degrees(std::string_view section, std::string_view key, Field field) {
             field(options) = value * kRadiansPerDegree;
           },
           [field](const EventFusionOptions& options) {
-            return valueOf(field(options) / kRadiansPerDegree);
+            return valueOf(degreesThatReadAs(field(options)));
           },
           false};
 }

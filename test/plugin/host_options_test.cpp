@@ -6,6 +6,7 @@
 #include <mrpt/config/CConfigFile.h>
 #include <mrpt/config/CConfigFileMemory.h>
 
+#include <cmath>
 #include <fstream>
 #include <sstream>
 
@@ -49,6 +50,17 @@ TEST(HostOptions, SectionsStandUnderThePrefixAndOthersAreTheHosts) {
   const EventFusionOptions options = optionsOf(text, "front");
   EXPECT_EQ(options.mapper.keyframe.planes.max_depth_m, 9);
   EXPECT_EQ(options.cloud.voxel_size_m, 0.5);
+}
+
+TEST(HostOptions, TheRefinementStandsUnderThePrefixToo) {
+  const EventFusionOptions options =
+      optionsOf("[front_refinement]\nenabled = true\ntracker_noise_deg = 90\n", "front");
+  EXPECT_TRUE(options.refinement.enabled);
+  EXPECT_DOUBLE_EQ(options.refinement.refiner.tracker.noise_rad, M_PI / 2);
+  EXPECT_THAT(errorOf("[front_refinement]\nwindow = 0\n", "front"),
+              HasSubstr("section front_refinement: window = 0: must be from 1 to 1000"));
+  EXPECT_THAT(errorOf("[front_refinement]\nenable = true\n", "front"),
+              HasSubstr("section front_refinement: enable: unknown key"));
 }
 
 TEST(HostOptions, WithoutPrefixTheSectionsHaveTheirOwnNames) {

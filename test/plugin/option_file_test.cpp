@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <random>
 #include <set>
@@ -127,6 +128,26 @@ correct_motion = true
 motion_sigma_m_s = 0.02
 motion_sigma_deg_s = 3
 motion_rounds = 4
+enabled = true
+background = true
+window = 5
+map_keyframes = 2
+max_points = 100
+max_map_points = 300
+tracker_noise_m = 0.03
+tracker_noise_deg = 90
+tracker_drift = 0.04
+tracker_drift_deg_per_m = 180
+adapt_tracker = false
+robust_sigmas = 4
+first_distance_px = 8
+last_distance_px = 1.5
+loops = false
+loop_min_overlap = 0.6
+loop_min_inliers = 0.7
+loop_max_sigma_m = 0.08
+loop_max_sigma_deg = 45
+loop_checks = 9
 [performance]
 threads = 2
 kernel = plain
@@ -190,6 +211,27 @@ packet_error_px = 0
   EXPECT_EQ(options.cloud.consistency.consistency_tolerance, 0.2);
   EXPECT_EQ(options.cloud.consistency.consistency_cell_deg, 1.5);
   EXPECT_EQ(options.cloud.consistency.max_contradictions, 2);
+  EXPECT_TRUE(options.refinement.enabled);
+  EXPECT_TRUE(options.refinement.background);
+  const RefinementOptions& refiner = options.refinement.refiner;
+  EXPECT_EQ(refiner.window, 5);
+  EXPECT_EQ(refiner.map_keyframes, 2);
+  EXPECT_EQ(refiner.points.max_points, 100);
+  EXPECT_EQ(refiner.points.max_map_points, 300);
+  EXPECT_EQ(refiner.tracker.noise_m, 0.03);
+  EXPECT_DOUBLE_EQ(refiner.tracker.noise_rad, M_PI / 2);
+  EXPECT_EQ(refiner.tracker.drift_m, 0.04);
+  EXPECT_DOUBLE_EQ(refiner.tracker.drift_rad, M_PI);
+  EXPECT_FALSE(refiner.adapt_tracker);
+  EXPECT_EQ(refiner.registration.alignment.robust_sigmas, 4);
+  EXPECT_EQ(refiner.registration.first_distance_px, 8);
+  EXPECT_EQ(refiner.registration.last_distance_px, 1.5);
+  EXPECT_FALSE(refiner.loop.loops);
+  EXPECT_EQ(refiner.loop.loop_min_overlap, 0.6);
+  EXPECT_EQ(refiner.loop.loop_min_inliers, 0.7);
+  EXPECT_EQ(refiner.loop.loop_max_sigma_m, 0.08);
+  EXPECT_DOUBLE_EQ(refiner.loop.loop_max_sigma_rad, M_PI / 4);
+  EXPECT_EQ(refiner.loop.loop_checks, 9);
   EXPECT_EQ(mapper.keyframe.sweep.threads, 2);
   EXPECT_EQ(mapper.keyframe.sweep.kernel, VotingKernel::kPlain);
   EXPECT_EQ(mapper.keyframe.packets.packet_error_px, 0);
@@ -319,6 +361,76 @@ TEST(OptionReader, ValuesOutOfRangeAreErrorsThatNameSectionKeyValueAndRange) {
                     HasSubstr(": plain, ")));
   EXPECT_THAT(errorOf("[performance]\npacket_error_px = 11\n"),
               StartsWith("rig.ini:2: [performance] packet_error_px = 11: must be"));
+}
+
+TEST(OptionReader, ValuesOfTheRefinementOutOfRangeAreErrorsInTheUnitsOfTheFile) {
+  const std::vector<std::pair<std::string, std::string>> wrong = {
+      {"window = 0", "from 1 to 1000"},
+      {"window = 1001", "from 1 to 1000"},
+      {"map_keyframes = 0", "from 1 to 100"},
+      {"max_points = 9", "from 10 to 100000"},
+      {"max_map_points = 1999", "from max_points to 1000000"},
+      {"tracker_noise_m = -1", "from 0 to 1000"},
+      {"tracker_noise_deg = -0.5", "from 0 to 1000"},
+      {"tracker_noise_deg = 1001", "from 0 to 1000"},
+      {"tracker_drift = 1001", "from 0 to 1000"},
+      {"tracker_drift_deg_per_m = -2", "from 0 to 1000"},
+      {"robust_sigmas = 0", "above 0"},
+      {"first_distance_px = 1", "from last_distance_px"},
+      {"last_distance_px = 0", "above 0"},
+      {"loop_min_overlap = 0", "above 0"},
+      {"loop_min_inliers = 1.5", "0 to 1"},
+      {"loop_max_sigma_m = 0", "above 0"},
+      {"loop_max_sigma_deg = -1", "above 0"},
+      {"loop_checks = 101", "0 to 100"}};
+  for (const auto& [option, range] : wrong) {
+    EXPECT_THAT(
+        errorOf("[refinement]\n" + option + "\n"),
+        AllOf(StartsWith("rig.ini:2: [refinement] " + option + ": must be"), HasSubstr(range)));
+  }
+  EXPECT_THAT(errorOf("[refinement]\nenabled = 1\n"), HasSubstr("must be true or false"));
+  EXPECT_THAT(
+      errorOf("[refinement]\nenable = true\n"),
+      AllOf(HasSubstr("rig.ini:2: [refinement] enable: unknown key"), HasSubstr("background")));
+}
+
+TEST(OptionReader, DegreesAreGivenBackAsTheyWereWritten) {
+  for (const char* key : {"tracker_noise_deg", "tracker_drift_deg_per_m", "loop_max_sigma_deg"}) {
+    const auto value_of = [&](const EventFusionOptions& options) -> std::string {
+      for (const NamedOption& option : listOptions(options)) {
+        if (option.key == key) return textOf(option.value);
+      }
+      return "none";
+    };
+    for (int i = 1; i < 2000; ++i) {
+      std::string written = std::to_string(i / 100) + "." + std::to_string(100 + i % 100).substr(1);
+      while (written.back() == '0') written.pop_back();
+      if (written.back() == '.') written.pop_back();
+      const auto options = optionsOf("[refinement]\n" + std::string(key) + " = " + written + "\n");
+      ASSERT_EQ(value_of(options), written) << key;
+    }
+  }
+}
+
+TEST(OptionReader, TheLargestDegreesAreInRange) {
+  EXPECT_NO_THROW(
+      optionsOf("[refinement]\ntracker_noise_deg = 1000\ntracker_drift_deg_per_m = 1000\n"));
+}
+
+TEST(OptionReader, DegreesOfAnyNumberReadBackTheSame) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> exponent(-12, 0);
+  for (int i = 0; i < 300; ++i) {
+    EventFusionOptions options;
+    options.refinement.refiner.tracker.noise_rad = std::pow(10.0, exponent(random));
+    OptionReader reader;
+    for (const NamedOption& option : listOptions(options)) {
+      if (option.key != "tracker_noise_deg") continue;
+      reader.set("refinement.tracker_noise_deg=" + textOf(option.value));
+    }
+    const double read = reader.options().refinement.refiner.tracker.noise_rad;
+    EXPECT_NEAR(read / options.refinement.refiner.tracker.noise_rad, 1, 4e-16);
+  }
 }
 
 TEST(OptionReader, LimitsThatContradictADefaultAreErrors) {
