@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 #include <mrpt/poses/CPose3D.h>
+#include <mrpt/poses/CPose3DPDFGaussian.h>
 #include <mrpt/rtti/CObject.h>
 #include <mrpt/serialization/CArchive.h>
 #include <mrpt/serialization/archiveFrom_std_vector.h>
@@ -113,6 +114,67 @@ TEST(MrptPoseOf, APointGoesWhereOursSendsIt) {
   EXPECT_NEAR(p_a.x, expected.x(), 1e-14);
   EXPECT_NEAR(p_a.y, expected.y(), 1e-14);
   EXPECT_NEAR(p_a.z, expected.z(), 1e-14);
+}
+
+Eigen::Vector3d drawn(std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  const double x = normal(random);
+  const double y = normal(random);
+  return {x, y, normal(random)};
+}
+
+/// x, y, z, yaw, pitch and roll, as MRPT has them.
+Vector6d coordinatesOf(const Rigid3& T_a_b) {
+  const mrpt::poses::CPose3D pose = mrptPoseFrom(T_a_b);
+  Vector6d coordinates;
+  coordinates << pose.x(), pose.y(), pose.z(), pose.yaw(), pose.pitch(), pose.roll();
+  return coordinates;
+}
+
+TEST(MrptPoseOf, ACovarianceIsThatOfManySmallMotions) {
+  std::mt19937 random(5);
+  for (int trial = 0; trial < 20; ++trial) {
+    Rigid3 T_a_b;
+    T_a_b.translation = 10 * drawn(random);
+    std::uniform_real_distribution<double> share(-1, 1);
+    const double yaw = 2.5 * share(random);
+    const double pitch = 1.2 * share(random);  // MRPT's angles are singular at 90 degrees
+    T_a_b.rotation = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+                     Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+                     Eigen::AngleAxisd(2.5 * share(random), Eigen::Vector3d::UnitX());
+    Matrix6d root;  // motions are this times standard normal numbers
+    for (int column = 0; column < 6; ++column) {
+      root.col(column) << 1e-3 * drawn(random), 1e-4 * drawn(random);
+    }
+    const Matrix6d covariance = root * root.transpose();
+
+    constexpr int kDraws = 4000;
+    const Vector6d at = coordinatesOf(T_a_b);
+    Matrix6d squares = Matrix6d::Zero();
+    for (int draw = 0; draw < kDraws; ++draw) {
+      Vector6d unit;
+      unit << drawn(random), drawn(random);
+      const Vector6d motion = root * unit;
+      const Eigen::Vector3d turn = motion.tail<3>();
+      Rigid3 moved = T_a_b;
+      moved.translation += motion.head<3>();
+      moved.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()) * T_a_b.rotation;
+      const Vector6d change = coordinatesOf(moved) - at;
+      squares += change * change.transpose();
+    }
+    const auto estimate = mrptPoseFrom(T_a_b, covariance);
+    const Matrix6d found = estimate.cov.asEigen();
+    EXPECT_LT((rigidFrom(estimate.mean).translation - T_a_b.translation).norm(), 1e-12);
+    EXPECT_LT(angleBetween(rigidFrom(estimate.mean), T_a_b), 1e-12);
+    for (int i = 0; i < 6; ++i) {
+      for (int j = 0; j < 6; ++j) {
+        // A mean of 4000 products is known to 1.6 % of both deviations: five times that.
+        EXPECT_NEAR(squares(i, j) / kDraws, found(i, j),
+                    0.11 * std::sqrt(found(i, i) * found(j, j)))
+            << "pitch " << pitch << ", element " << i << ", " << j;
+      }
+    }
+  }
 }
 
 // --- registration.h ----------------------------------------------------------------------------
