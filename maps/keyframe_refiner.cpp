@@ -29,6 +29,11 @@ constexpr double kCautiousShare = 0.25;
 constexpr std::size_t kMaxSamples = 100;
 /// Loops are solved when the map has grown by this share of them.
 constexpr std::size_t kLoopShare = 20;
+/// A loop whose error is larger, in standard deviations, while it counts in full, says that drift
+/// is so many times larger than learnt, and again, up to so many times.
+constexpr double kDoubted = 3;
+constexpr double kMoreDrift = 3;
+constexpr double kLargestDriftFactor = 9;
 /// How many times larger than usual the errors of loops may be that are to be solved.
 constexpr double kTrusting = 30;
 constexpr double kLargestRobustSigmas = 1000;
@@ -109,8 +114,8 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
 
   registerNewest();  // 2.
   const auto window = static_cast<std::size_t>(options_.window);
-  solveFrom(number + 1 > window ? number + 1 - window : 0);  // 3.
-  closeLoops();                                              // 4.
+  solveFrom(number + 1 > window ? number + 1 - window : 0, options_.graph);  // 3.
+  closeLoops();                                                              // 4.
   if (number > window) keyframes_[number - window - 1].cloud.forgetTree();
 }
 
@@ -212,20 +217,17 @@ void KeyframeRefiner::learnFrom(const RelativePoseFactor& factor) {
 }
 
 /// Solves the keyframes from this one on, but never the first.
-void KeyframeRefiner::solveFrom(std::size_t first_free) {
+void KeyframeRefiner::solveFrom(std::size_t first_free, const PoseGraphOptions& graph) {
   first_free = std::max<std::size_t>(first_free, 1);
   WindowGraph window(keyframes_, first_free);
   for (std::size_t f = keyframes_[first_free].first_factor; f < factors_.size(); ++f) {
     window.add(factors_[f]);
   }
-  window.addTracker(errors_);
-  if (open_loop_) {
-    // From far off a loop would count as a mistake: at first it counts in full.
-    PoseGraphOptions trusting = options_.graph;
-    trusting.robust_sigmas = std::min(kTrusting * trusting.robust_sigmas, kLargestRobustSigmas);
-    window.solve(trusting);
-  }
-  window.solve(options_.graph);
+  TrackerErrors tracker = errors_;
+  tracker.drift_m *= drift_factor_;
+  tracker.drift_rad *= drift_factor_;
+  window.addTracker(tracker);
+  window.solve(graph);
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
     if (!window.has(i)) continue;
     RefinedKeyframe& keyframe = keyframes_[i];
@@ -288,36 +290,54 @@ void KeyframeRefiner::closeLoops() {
     }
   }
   if (!open_loop_ || (number - solved_loops_at_) * kLoopShare < number - *open_loop_) return;
-  solveFrom(*open_loop_);
+  solveLoops();
+  solved_loops_at_ = number;
+}
+
+/// The loops that are contradicted by so many standard deviations, or more.
+std::vector<RelativePoseFactor*> KeyframeRefiner::contradicted(double sigmas) {
+  std::vector<RelativePoseFactor*> loops;
+  for (RelativePoseFactor& factor : factors_) {
+    if (factor.doubtful && errorOf(factor, keyframes_[factor.from].T_world_ref,
+                                   keyframes_[factor.to].T_world_ref) > sigmas) {
+      loops.push_back(&factor);
+    }
+  }
+  return loops;
+}
+
+/// Solves everything since the oldest loop that is open.
+void KeyframeRefiner::solveLoops() {
+  // From far off a loop would count as a mistake: at first it counts in full. Where loops do not
+  // fit even so, drift is larger than short ways told.
+  PoseGraphOptions trusting = options_.graph;
+  trusting.robust_sigmas = std::min(kTrusting * trusting.robust_sigmas, kLargestRobustSigmas);
+  solveFrom(*open_loop_, trusting);
+  while (drift_factor_ < kLargestDriftFactor && !contradicted(kDoubted).empty()) {
+    drift_factor_ *= kMoreDrift;
+    solveFrom(*open_loop_, trusting);
+  }
+  solveFrom(*open_loop_, options_.graph);
   dropContradicted();
   open_loop_.reset();
-  solved_loops_at_ = number;
 }
 
 /// Takes out loops that the other factors do not agree with, and solves again without them.
 void KeyframeRefiner::dropContradicted() {
-  const auto contradicted = [&](const RelativePoseFactor& factor) {
-    return factor.doubtful && errorOf(factor, keyframes_[factor.from].T_world_ref,
-                                      keyframes_[factor.to].T_world_ref) > kContradicted;
-  };
-  std::uint64_t dropped = 0;
-  for (RelativePoseFactor& factor : factors_) {
-    if (!contradicted(factor)) continue;
-    factor.sqrt_information.setZero();  // stays in its place, says nothing
-    factor.offset.setZero();
-    ++dropped;
+  const std::vector<RelativePoseFactor*> wrong = contradicted(kContradicted);
+  for (RelativePoseFactor* factor : wrong) {
+    factor->sqrt_information.setZero();  // stays in its place, says nothing
+    factor->offset.setZero();
   }
-  if (dropped == 0) return;
-  counts_.loops_dropped += dropped;
-  solveFrom(*open_loop_);
+  if (wrong.empty()) return;
+  counts_.loops_dropped += wrong.size();
+  solveFrom(*open_loop_, options_.graph);
 }
 
 void KeyframeRefiner::finish() {
   if (keyframes_.size() < 2) return;
   open_loop_ = 1;
-  solveFrom(1);
-  dropContradicted();
-  open_loop_.reset();
+  solveLoops();
 }
 
 std::vector<std::size_t> KeyframeRefiner::takeMoved() {

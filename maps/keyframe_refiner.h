@@ -103,7 +103,9 @@ class KeyframeRefiner {
   PoseNoise timesOthers(const std::optional<PoseNoise>& stated) const;
   void registerNewest();
   void learnFrom(const RelativePoseFactor& factor);
-  void solveFrom(std::size_t first_free);
+  void solveFrom(std::size_t first_free, const PoseGraphOptions& graph);
+  void solveLoops();
+  std::vector<RelativePoseFactor*> contradicted(double sigmas);
   bool check(const LoopCandidate& candidate);
   void closeLoops();
   void dropContradicted();
@@ -113,6 +115,7 @@ class KeyframeRefiner {
   std::vector<RelativePoseFactor> factors_;  // by points; in the order of `to`, but loops proposed
   std::deque<MotionSample> samples_;
   TrackerErrors errors_;
+  double drift_factor_ = 1;  // by which loops have shown drift to be larger than that
   Matrix6d covariance_;
   RefinementCounts counts_;
   std::optional<std::size_t> open_loop_;  // the oldest keyframe of loops that are not solved yet

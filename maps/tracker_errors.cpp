@@ -2,6 +2,7 @@
 #include "maps/tracker_errors.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -77,7 +78,9 @@ Matrix6d TrackerErrors::noiseCovariance(const PoseNoise& times) const {
 }
 
 Matrix6d TrackerErrors::driftCovariance(double way_m) const {
-  return covarianceOf(drift_m * drift_m * way_m, drift_rad * drift_rad * way_m);
+  // A random walk on short ways; on long ones what goes on in one direction is more.
+  const double squared_way = way_m * std::max(way_m, 1.0);
+  return covarianceOf(drift_m * drift_m * squared_way, drift_rad * drift_rad * squared_way);
 }
 
 TrackerErrors estimateTrackerErrors(const std::vector<MotionSample>& samples,
