@@ -27,7 +27,7 @@ struct RefinementOptions {
   int window = 10;
   /// Of these keyframes, those that a new one is registered with: that have most of its points in
   /// view. Range: 1 to 100.
-  int map_keyframes = 4;
+  int map_keyframes = 3;
   LoopOptions loop;
   PoseGraphOptions graph;
 

@@ -12,12 +12,12 @@ namespace efm {
 namespace {
 
 /// From one round to the next.
-constexpr double kShrink = 0.7;
+constexpr double kShrink = 0.65;
 /// Rounds with all points, once neighbours are as near as they must be.
 constexpr int kLastRounds = 2;
 /// Points that take part before that, and iterations: the next round changes the neighbours anyway.
-constexpr std::size_t kCoarsePoints = 500;
-constexpr int kCoarseIterations = 4;
+constexpr std::size_t kCoarsePoints = 300;
+constexpr int kCoarseIterations = 2;
 
 /// A keyframe's points beside the map's.
 struct Neighbours {

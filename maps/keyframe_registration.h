@@ -53,7 +53,7 @@ struct Registration {
 /// (generalised ICP: Segal, Haehnel and Thrun, RSS 2009), again and again with nearer neighbours.
 /// Each keyframe of the map has a tree of its own, in its own view: so neighbours stay right when
 /// keyframes move, and what is found holds two keyframes together, not one and a map that moves.
-/// Deterministic. Bounded: six rounds with 500 points for the default distances, two with all.
+/// Deterministic. Bounded: six rounds with 300 points for the default distances, two with all.
 /// @param number the keyframe's, for the factors.
 /// @param prior in the world; what the map says nothing of stays with it. Not singular.
 Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud,

@@ -44,8 +44,9 @@ class MapOutputTest : public TemporaryFolder {};
 
 TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
   MapOutput output(folder() / "out", OutputKind::kMap, {});
-  output.writeKeyframe(smallKeyframe(1'700'000'000'123'456'789));
-  output.writeTrajectory();
+  const KeyframeDepthMap small = smallKeyframe(1'700'000'000'123'456'789);
+  output.writeKeyframe(small);
+  output.writeTrajectory("trajectory.txt", {{small.window.t_ref_ns, small.T_world_ref}});
 
   const auto keyframe = folder() / "out" / "keyframes" / "1700000000.123456789";
   const cv::Mat depth = cv::imread((keyframe / "depth.tiff").string(), cv::IMREAD_UNCHANGED);
@@ -95,7 +96,7 @@ TEST_F(MapOutputTest, AnEarlierMapGoesWithTheFirstFileAndOtherFilesStay) {
 TEST_F(MapOutputTest, EachKindLeavesTheFilesOfTheOther) {
   MapOutput map(folder(), OutputKind::kMap, {});
   map.writeKeyframe(smallKeyframe(1'000'000'000));
-  map.writeTrajectory();
+  map.writeTrajectory("trajectory.txt", {});
   map.writeCloud("map.pcd", {});
   MapOutput depth(folder(), OutputKind::kDepth, {});
   depth.writeImages(smallKeyframe(1'000'000'000));

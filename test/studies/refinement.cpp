@@ -54,10 +54,9 @@ void judgeNoise(const RefinementStudyResults& all, StudySection& section) {
 
 void judgeDrift(const RefinementStudyResults& all, StudySection& section) {
   const std::string loops_lost =
-      "Of seed 1's loops most are found right to a centimetre or two, but against the drift they "
-      "are "
-      "off by ten and more of the standard deviations that they state: the robust loss lets them "
-      "count for little, and they are taken out as contradicted.";
+      "Within its windows drift bends the depth maps themselves, which no pose of a keyframe "
+      "mends, "
+      "and registrations then show half of it.";
   for (const auto& [what, results] : all) {
     if (!what.is_loop) continue;
     const double exact_m = meanOf(results.exact, &RefinementOutcome::without, kWalls);
