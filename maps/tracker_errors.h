@@ -18,8 +18,8 @@ struct PoseNoise {
 inline constexpr PoseNoise kCommonNoise{1, 1};
 
 /// What a tracker's poses err by: each keyframe's on its own, and all of them more and more along
-/// the way, as a random walk. All are standard deviations on each axis, 0 to 1e3; the defaults are
-/// those of good visual-inertial odometry.
+/// the way: as a random walk up to a metre, in proportion to it beyond. All are standard deviations
+/// on each axis, 0 to 1e3; the defaults are those of good visual-inertial odometry.
 struct TrackerErrors {
   double noise_m = 0.01;
   double noise_rad = 0.5 * kRadiansPerDegree;

@@ -67,9 +67,12 @@ TEST(TrackerErrors, CovariancesAreWorkedOutByHand) {
   Vector6d noise;
   noise << Eigen::Vector3d::Constant(9e-4 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
   EXPECT_LT((errors.noiseCovariance() - Matrix6d(noise.asDiagonal())).norm(), 1e-15);
-  Vector6d drift;  // a random walk: 4 m are twice a metre's standard deviation
-  drift << Eigen::Vector3d::Constant(4e-4 + 1e-8), Eigen::Vector3d::Constant(1e-4 + 1e-10);
-  EXPECT_LT((errors.driftCovariance(4) - Matrix6d(drift.asDiagonal())).norm(), 1e-15);
+  Vector6d drift;  // a random walk: a quarter of a metre has half of a metre's standard deviation
+  drift << Eigen::Vector3d::Constant(2.5e-5 + 1e-8), Eigen::Vector3d::Constant(6.25e-6 + 1e-10);
+  EXPECT_LT((errors.driftCovariance(0.25) - Matrix6d(drift.asDiagonal())).norm(), 1e-15);
+  Vector6d far;  // always in one direction: 4 m have four times as much
+  far << Eigen::Vector3d::Constant(1.6e-3 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
+  EXPECT_LT((errors.driftCovariance(4) - Matrix6d(far.asDiagonal())).norm(), 1e-15);
 }
 
 TEST(TrackerErrors, CovariancesAreNeverSingular) {
