@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "mapping/option_check.h"
-#include "maps/window_graph.h"
 
 namespace efm {
 namespace {
@@ -114,8 +113,8 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
 
   registerNewest();  // 2.
   const auto window = static_cast<std::size_t>(options_.window);
-  solveFrom(number + 1 > window ? number + 1 - window : 0, options_.graph);  // 3.
-  closeLoops();                                                              // 4.
+  takeCovariance(solveFrom(number + 1 > window ? number + 1 - window : 0, options_.graph));  // 3.
+  closeLoops();                                                                              // 4.
   if (number > window) keyframes_[number - window - 1].cloud.forgetTree();
 }
 
@@ -199,16 +198,12 @@ void KeyframeRefiner::registerNewest() {
 void KeyframeRefiner::learnFrom(const RelativePoseFactor& factor) {
   const RefinedKeyframe& from = keyframes_[factor.from];
   const RefinedKeyframe& to = keyframes_[factor.to];
-  // Directions that the points leave open have a variance of 1 m^2, 1 rad^2.
-  const Matrix6d information =
-      factor.sqrt_information.transpose() * factor.sqrt_information + Matrix6d::Identity();
+  constexpr double kOpenVariance = 1;  // of directions that the points leave open, m^2 and rad^2
+  const MotionEstimate motion = motionOf(factor, kOpenVariance);
   MotionSample sample;
-  sample.covariance = information.inverse();
-  const Vector6d to_minimum =
-      -sample.covariance * (factor.sqrt_information.transpose() * factor.offset);
-  const Rigid3 T_from_to = factor.T_from_to * rigidFromDifference(to_minimum);
+  sample.covariance = motion.covariance;
   sample.difference =
-      differenceOf(T_from_to.inverse() * (from.T_tracker_ref.inverse() * to.T_tracker_ref));
+      differenceOf(motion.T_from_to.inverse() * (from.T_tracker_ref.inverse() * to.T_tracker_ref));
   sample.way_m = to.way_m - from.way_m;
   sample.from = from.noise;
   sample.to = to.noise;
@@ -217,7 +212,7 @@ void KeyframeRefiner::learnFrom(const RelativePoseFactor& factor) {
 }
 
 /// Solves the keyframes from this one on, but never the first.
-void KeyframeRefiner::solveFrom(std::size_t first_free, const PoseGraphOptions& graph) {
+WindowGraph KeyframeRefiner::solveFrom(std::size_t first_free, const PoseGraphOptions& graph) {
   first_free = std::max<std::size_t>(first_free, 1);
   WindowGraph window(keyframes_, first_free);
   for (std::size_t f = keyframes_[first_free].first_factor; f < factors_.size(); ++f) {
@@ -236,6 +231,11 @@ void KeyframeRefiner::solveFrom(std::size_t first_free, const PoseGraphOptions& 
     keyframe.moved = keyframe.moved || !isSame(keyframe.T_world_ref, window.T_world_ref(i));
     keyframe.T_world_ref = window.T_world_ref(i);
   }
+  return window;
+}
+
+/// What a window that was solved says of the newest keyframe.
+void KeyframeRefiner::takeCovariance(const WindowGraph& window) {
   const std::size_t newest = keyframes_.size() - 1;
   // What cannot be computed is what the whole way adds.
   covariance_ = window.trackedCovariance(options_.graph, newest)
@@ -317,7 +317,7 @@ void KeyframeRefiner::solveLoops() {
     drift_factor_ *= kMoreDrift;
     solveFrom(*open_loop_, trusting);
   }
-  solveFrom(*open_loop_, options_.graph);
+  takeCovariance(solveFrom(*open_loop_, options_.graph));
   dropContradicted();
   open_loop_.reset();
 }
@@ -331,7 +331,7 @@ void KeyframeRefiner::dropContradicted() {
   }
   if (wrong.empty()) return;
   counts_.loops_dropped += wrong.size();
-  solveFrom(*open_loop_, options_.graph);
+  takeCovariance(solveFrom(*open_loop_, options_.graph));
 }
 
 void KeyframeRefiner::finish() {

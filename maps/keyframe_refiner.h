@@ -14,6 +14,7 @@
 #include "maps/refined_keyframe.h"
 #include "maps/registration_cloud.h"
 #include "maps/tracker_errors.h"
+#include "maps/window_graph.h"
 
 namespace efm {
 
@@ -103,7 +104,8 @@ class KeyframeRefiner {
   PoseNoise timesOthers(const std::optional<PoseNoise>& stated) const;
   void registerNewest();
   void learnFrom(const RelativePoseFactor& factor);
-  void solveFrom(std::size_t first_free, const PoseGraphOptions& graph);
+  WindowGraph solveFrom(std::size_t first_free, const PoseGraphOptions& graph);
+  void takeCovariance(const WindowGraph& window);
   void solveLoops();
   std::vector<RelativePoseFactor*> contradicted(double sigmas);
   bool check(const LoopCandidate& candidate);

@@ -25,12 +25,10 @@ constexpr double kFartherNeighbours = 3;
 /// elsewhere from there.
 constexpr double kSystematicM = 0.005;
 constexpr double kSystematicRad = 0.1 * kRadiansPerDegree;
+/// Of directions that a registration leaves open: nobody would call that sure.
+constexpr double kOpenVariance = 1e6;
 /// Two registrations of the same points agree within so many of the largest standard deviations.
 constexpr double kBothWaysSigmas = 1.5;
-
-Matrix6d informationOf(const RelativePoseFactor& factor) {
-  return factor.sqrt_information.transpose() * factor.sqrt_information;
-}
 
 double largestSigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(
@@ -39,19 +37,17 @@ double largestSigma(const Eigen::Matrix3d& covariance) {
 
 /// The same factor, as sure as a loop can be.
 RelativePoseFactor withSystematicError(RelativePoseFactor factor) {
-  Matrix6d covariance = (informationOf(factor) + 1e-6 * Matrix6d::Identity()).inverse();
-  const Vector6d to_minimum = -covariance * (factor.sqrt_information.transpose() * factor.offset);
-  covariance.diagonal().head<3>().array() += kSystematicM * kSystematicM;
-  covariance.diagonal().tail<3>().array() += kSystematicRad * kSystematicRad;
-  factor.T_from_to = factor.T_from_to * rigidFromDifference(to_minimum);
-  factor.sqrt_information = sqrtInformation(covariance);
+  MotionEstimate motion = motionOf(factor, kOpenVariance);
+  motion.covariance.diagonal().head<3>().array() += kSystematicM * kSystematicM;
+  motion.covariance.diagonal().tail<3>().array() += kSystematicRad * kSystematicRad;
+  factor.T_from_to = motion.T_from_to;
+  factor.sqrt_information = sqrtInformation(motion.covariance);
   factor.offset.setZero();
   return factor;
 }
 
 bool isSure(const RelativePoseFactor& factor, const LoopOptions& options) {
-  // What is quite open has a variance of 1e6 then, not none.
-  const Matrix6d covariance = (informationOf(factor) + 1e-6 * Matrix6d::Identity()).inverse();
+  const Matrix6d covariance = motionOf(factor, kOpenVariance).covariance;
   return largestSigma(covariance.topLeftCorner<3, 3>()) <= options.loop_max_sigma_m &&
          largestSigma(covariance.bottomRightCorner<3, 3>()) <= options.loop_max_sigma_rad;
 }

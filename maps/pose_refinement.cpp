@@ -250,6 +250,17 @@ double errorOf(const RelativePoseFactor& factor, const Rigid3& T_world_from,
       .norm();
 }
 
+MotionEstimate motionOf(const RelativePoseFactor& factor, double open_variance) {
+  const Matrix6d information = factor.sqrt_information.transpose() * factor.sqrt_information +
+                               1 / open_variance * Matrix6d::Identity();
+  MotionEstimate motion;
+  motion.covariance = information.inverse();
+  const Vector6d to_minimum =
+      -motion.covariance * (factor.sqrt_information.transpose() * factor.offset);
+  motion.T_from_to = factor.T_from_to * rigidFromDifference(to_minimum);
+  return motion;
+}
+
 void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph) {
   if (!isFinite(graph)) return;
   GraphProblem problem(graph, options.robust_sigmas);

@@ -64,6 +64,16 @@ struct RelativePoseFactor {
 double errorOf(const RelativePoseFactor& factor, const Rigid3& T_world_from,
                const Rigid3& T_world_to);
 
+/// A motion between two poses, and of its `differenceOf` the covariance.
+struct MotionEstimate {
+  Rigid3 T_from_to;
+  Matrix6d covariance = Matrix6d::Identity();
+};
+
+/// Where a factor's error is least.
+/// @param open_variance of what the factor leaves open, m^2 and rad^2: above 0.
+MotionEstimate motionOf(const RelativePoseFactor& factor, double open_variance);
+
 /// Poses, and what is known of them by each other.
 struct PoseGraph {
   std::vector<Rigid3> T_world_node;
