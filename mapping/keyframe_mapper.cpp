@@ -11,7 +11,6 @@
 
 #include "mapping/back_projection.h"
 #include "mapping/option_check.h"
-#include "mapping/revote_sweep.h"
 
 namespace efm {
 namespace {
@@ -64,7 +63,6 @@ void KeyframeMapperOptions::validate() const {
   view.validate();
   subintervals.validate();
   split.validate();
-  revoting.validate();
   packets.validate();
   sweep.validate();
   extraction.validate();
@@ -294,7 +292,7 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
   {
     const StageScope scope(stages, Stage::kSweep);
     const SweepRequest request{camera_peaks, sink, split.groups, ray_window};
-    swept = sweep(std::move(split), inputs.size() > 1, request);
+    swept = sweep_.run(std::move(split.inputs), view_, planes_, request);
   }
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
 
@@ -318,18 +316,6 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
     // A camera alone has other densities than the fusion: the recording's maximum is not its own.
     keyframe.camera_maps.push_back({inputs[c].camera, extract(swept.cameras[c], std::nullopt)});
   }
-}
-
-SweepResult KeyframeMapper::sweep(SplitRays rays, bool several_cameras,
-                                  const SweepRequest& request) const {
-  if (!options_.revoting.revote) {
-    return sweep_.run(std::move(rays.inputs), view_, planes_, request);
-  }
-  constexpr float kMinShare = 0.05F;  // see VoteSharing
-  const VoteSharing sharing{options_.revoting.revote_power, several_cameras ? kMinShare : 0,
-                            options_.sweep.kernelOrFastest()};
-  return sweepTwice(std::move(rays), options_.split.polarities(), view_, planes_, options_.sweep,
-                    sharing, request);
 }
 
 }  // namespace efm

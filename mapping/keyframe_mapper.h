@@ -12,7 +12,6 @@
 #include "mapping/motion_correction.h"
 #include "mapping/pose_packets.h"
 #include "mapping/reference_view.h"
-#include "mapping/revoting.h"
 #include "mapping/rig.h"
 #include "mapping/robust_maximum.h"
 #include "mapping/space_sweep.h"
@@ -31,7 +30,6 @@ struct KeyframeMapperOptions {
   ReferenceViewOptions view;
   SubintervalOptions subintervals;
   SplitFusionOptions split;  ///< Into groups of events, each with its own sub-intervals.
-  RevotingOptions revoting;  ///< A second pass over the events, without those groups.
   /// Leave cameras without an event to vote out of the fusion: with the AND-like rules a silent
   /// camera makes everything zero.
   bool exclude_silent = false;
@@ -102,7 +100,6 @@ class KeyframeMapper {
   static void count(const CameraInput& input, KeyframeDepthMap& keyframe);
   void fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
             KeyframeDepthMap& keyframe) const;
-  SweepResult sweep(SplitRays rays, bool several_cameras, const SweepRequest& request) const;
 
   Rig rig_;
   std::vector<int> selected_;

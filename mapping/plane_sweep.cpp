@@ -92,10 +92,10 @@ VoteCounts votePlane(const RayBundle& camera, const ReferenceView& view, double 
 
 }  // namespace
 
-SweepResult sweepPlanes(const PlaneVoter& voter, const FusionInputs& inputs,
-                        const ReferenceView& view, const DepthPlanes& planes,
-                        const SpaceSweepOptions& options, const SweepRequest& request) {
-  const auto cameras = static_cast<std::size_t>(inputs.cameras);
+SweepResult sweepPlanes(const std::vector<CameraRays>& rays, const ReferenceView& view,
+                        const DepthPlanes& planes, const SpaceSweepOptions& options,
+                        const SweepRequest& request) {
+  const std::size_t cameras = rays.size();
   const std::size_t kept_cameras = request.camera_peaks ? cameras : 0;
   std::vector<SweptGroup> groups = groupPlanes(planes.size(), options.threadsOrCores());
   Volumes volumes(view, planes.size(), 1 + kept_cameras, request.ray_window);
@@ -105,12 +105,14 @@ SweepResult sweepPlanes(const PlaneVoter& voter, const FusionInputs& inputs,
     group.camera_peaks.assign(kept_cameras, RunningPeaks(view.pixels(), options.kernelOrFastest()));
     group.votes.resize(cameras);
     PlaneFusion fusion(
-        options.fusion, inputs, view.pixels(),
+        options.fusion, fusionInputs(rays, request.groups), view.pixels(),
         request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
         options.kernelOrFastest());
     for (int plane = group.begin; plane < group.end; ++plane) {
       const PlaneValues& fused = fusion.fuse([&](int camera, int slot, PlaneValues& votes) {
-        group.votes[static_cast<std::size_t>(camera)] += voter(camera, slot, plane, votes);
+        const auto c = static_cast<std::size_t>(camera);
+        group.votes[c] +=
+            votePlane(rays[c][static_cast<std::size_t>(slot)], view, planes.depth(plane), votes);
       });
       peaks.take(plane, fused);
       volumes.take(0, plane, fused);
@@ -120,9 +122,6 @@ SweepResult sweepPlanes(const PlaneVoter& voter, const FusionInputs& inputs,
         volumes.take(c + 1, plane, alone);
       }
       if (request.sink != nullptr) request.sink->takePlane(plane, fused.data());
-      if (request.tile_sink != nullptr) {
-        request.tile_sink->takeTile(plane, {0, 0, view.width, view.height}, fused);
-      }
     }
   };
   tbb::task_arena arena(options.threadsOrCores());
@@ -148,16 +147,6 @@ SweepResult sweepPlanes(const PlaneVoter& voter, const FusionInputs& inputs,
     result.cameras.push_back(volumes.swept(c + 1, all.camera_peaks[c].images(view)));
   }
   return result;
-}
-
-SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const ReferenceView& view,
-                        const DepthPlanes& planes, const SpaceSweepOptions& options,
-                        const SweepRequest& request) {
-  const auto voter = [&](int camera, int slot, int plane, PlaneValues& density) {
-    const CameraRays& rays = cameras[static_cast<std::size_t>(camera)];
-    return votePlane(rays[static_cast<std::size_t>(slot)], view, planes.depth(plane), density);
-  };
-  return sweepPlanes(voter, fusionInputs(cameras, request.groups), view, planes, options, request);
 }
 
 }  // namespace efm

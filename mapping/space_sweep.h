@@ -39,15 +39,6 @@ class DsiSink {
   virtual void takePlane(int plane, const float* values) = 0;
 };
 
-/// Receives the fused DSI in the parts that the sweep makes, as they are made. Called from several
-/// threads at once; each value comes once.
-class DsiTileSink {
- public:
-  virtual ~DsiTileSink() = default;
-  /// @param tile of the reference view. @param values of its pixels; gone after the call.
-  virtual void takeTile(int plane, const cv::Rect& tile, const PlaneValues& values) = 0;
-};
-
 /// One camera's rays by slot of the time axis: one bundle without temporal fusion. All cameras have
 /// equally many.
 using CameraRays = std::vector<RayBundle>;
@@ -61,7 +52,6 @@ struct SweepRequest {
   /// Also keeps the fused values along the rays whose confidence stands out from a Gaussian window
   /// of so many pixels: odd, at least 3. 0: none are kept.
   int ray_window = 0;
-  DsiTileSink* tile_sink = nullptr;  ///< Receives the fused DSI part by part; not owned.
 };
 
 /// @param groups divides the number of slots (asserted).

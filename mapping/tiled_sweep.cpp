@@ -133,7 +133,6 @@ class TiledSweep {
       workplace.cameras[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
     }
     whole_planes_.take(plane, tile, fused);
-    if (request_.tile_sink != nullptr) request_.tile_sink->takeTile(plane, tile, fused);
   }
 
   SweepResult result() {

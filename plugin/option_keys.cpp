@@ -171,12 +171,6 @@ const std::vector<OptionKey>& optionKeys() {
           "fusion"sv, "time_slices"sv,
           [](auto& o) -> auto& { return o.mapper.keyframe.split.time_slices; }),
       option(
-          "fusion"sv, "revote"sv,
-          [](auto& o) -> auto& { return o.mapper.keyframe.revoting.revote; }),
-      option(
-          "fusion"sv, "revote_power"sv,
-          [](auto& o) -> auto& { return o.mapper.keyframe.revoting.revote_power; }),
-      option(
           "fusion"sv, "late"sv, [](auto& o) -> auto& { return o.late_fusion; }),
 
       option(

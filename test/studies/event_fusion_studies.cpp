@@ -39,9 +39,8 @@ constexpr Study kStudies[] = {
     {"pose_accuracy", "10. Accuracy of the poses", studyPoseAccuracy},
     {"slider", "11. The real slider", studySlider},
     {"better_depth", "12. Depth better than the paper's", studyBetterDepth},
-    {"revoting", "13. Each event's one vote", studyRevoting},
-    {"motion", "14. Motion corrected inside the keyframe", studyMotionCorrection},
-    {"refinement", "15. Poses refined, the map corrected", studyRefinement},
+    {"motion", "13. Motion corrected inside the keyframe", studyMotionCorrection},
+    {"refinement", "14. Poses refined, the map corrected", studyRefinement},
 };
 
 constexpr const char* kUsage =

@@ -34,7 +34,6 @@ void studySlider(const StudyRun& run, StudySection& section);
 void studyBetterDepth(const StudyRun& run, StudySection& section);
 
 /// Each event's one vote, shared by what the first pass fused.
-void studyRevoting(const StudyRun& run, StudySection& section);
 /// A tracker that is wrong within the window, corrected.
 void studyMotionCorrection(const StudyRun& run, StudySection& section);
 /// A tracker that drifts and errs, its keyframes' poses refined.
