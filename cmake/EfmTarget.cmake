@@ -12,8 +12,21 @@ function(efm_target_defaults target)
     $<$<BOOL:${EFM_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 
+# efm_unity_rooms(<target>): where unity builds are on (CMAKE_UNITY_BUILD), the files of a room are
+# compiled together. Kernel files stay alone: Highway includes each once per instruction set.
+function(efm_unity_rooms target)
+  set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    get_filename_component(room ${source} DIRECTORY)
+    if(room AND NOT room STREQUAL "kernels")
+      set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
+    endif()
+  endforeach()
+endfunction()
+
 # efm_library(<name> SOURCES … HEADERS …): a static library efm_<name> with the alias efm::<name>,
-# included as "<folder>/<header>.h" from the project's root. Headers are verified to be
+# included as "<folder>/<room>/<header>.h" from the project's root. Headers are verified to be
 # self-contained by the target all_verify_interface_header_sets.
 function(efm_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
@@ -24,4 +37,5 @@ function(efm_library name)
     FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${arg_HEADERS})
   set_target_properties(${target} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
   efm_target_defaults(${target})
+  efm_unity_rooms(${target})
 endfunction()

@@ -8,18 +8,18 @@
 #include <string>
 #include <vector>
 
-#include "mapping/quoted_text.h"
-#include "mapping/timestamp.h"
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/quoted_text.h"
 #include "plugin/app/chosen_command.h"
 #include "plugin/app/evaluate_arguments.h"
 #include "plugin/app/import_command.h"
 #include "plugin/app/info_command.h"
 #include "plugin/app/map_command.h"
 #include "plugin/app/simulate_command.h"
-#include "plugin/recording.h"
-#include "plugin/tracker_fault_keys.h"
-#include "tracking_stub/simulation_preset.h"
-#include "tracking_stub/trajectory_simulation.h"
+#include "plugin/options/tracker_fault_keys.h"
+#include "plugin/recordings/recording.h"
+#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/trajectory_simulation.h"
 
 namespace efm {
 namespace {

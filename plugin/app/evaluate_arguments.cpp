@@ -5,7 +5,7 @@
 #include <string>
 
 #include "plugin/app/evaluate_command.h"
-#include "plugin/depth_evaluation_text.h"
+#include "plugin/evaluation/depth_evaluation_text.h"
 
 namespace efm {
 namespace {

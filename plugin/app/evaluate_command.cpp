@@ -4,12 +4,12 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "plugin/cloud_evaluation_plot.h"
-#include "plugin/depth_evaluation_plot.h"
-#include "plugin/depth_evaluation_text.h"
-#include "plugin/picture_file.h"
-#include "plugin/stereo_base.h"
-#include "plugin/trajectory_evaluation_plot.h"
+#include "plugin/evaluation/cloud_evaluation_plot.h"
+#include "plugin/evaluation/depth_evaluation_plot.h"
+#include "plugin/evaluation/depth_evaluation_text.h"
+#include "plugin/evaluation/stereo_baseline.h"
+#include "plugin/evaluation/trajectory_evaluation_plot.h"
+#include "plugin/pictures/picture_file.h"
 
 namespace efm {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "plugin/cloud_evaluation.h"
-#include "plugin/depth_evaluation.h"
-#include "plugin/trajectory_evaluation.h"
+#include "plugin/evaluation/cloud_evaluation.h"
+#include "plugin/evaluation/depth_evaluation.h"
+#include "plugin/evaluation/trajectory_evaluation.h"
 
 namespace efm {
 

@@ -11,13 +11,13 @@
 #include <string>
 #include <utility>
 
-#include "mapping/timestamp.h"
-#include "plugin/CObservationEvents.h"
+#include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
-#include "plugin/pose_observation.h"
-#include "plugin/rawlog_writer.h"
-#include "plugin/recording.h"
-#include "plugin/time_cut.h"
+#include "plugin/formats/rawlog_writer.h"
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/pose_observation.h"
+#include "plugin/recordings/recording.h"
+#include "plugin/recordings/time_cut.h"
 
 namespace efm {
 

@@ -10,12 +10,12 @@
 #include <optional>
 #include <vector>
 
-#include "mapping/timestamp.h"
-#include "plugin/CObservationEvents.h"
+#include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
-#include "plugin/pose_observation.h"
-#include "plugin/recording.h"
-#include "plugin/time_cut.h"
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/pose_observation.h"
+#include "plugin/recordings/recording.h"
+#include "plugin/recordings/time_cut.h"
 
 namespace efm {
 namespace {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "plugin/recording.h"
+#include "plugin/recordings/recording.h"
 
 namespace efm {
 

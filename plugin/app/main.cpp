@@ -10,7 +10,7 @@
 #include <string>
 
 #include "plugin/app/command_line.h"
-#include "plugin/registration.h"
+#include "plugin/mrpt/registration.h"
 
 namespace {
 

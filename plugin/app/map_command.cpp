@@ -7,12 +7,12 @@
 #include <iostream>
 #include <memory>
 
-#include "mapping/timestamp.h"
-#include "maps/keyframe_cloud.h"
-#include "maps/outlier_removal.h"
+#include "mapping/geometry/timestamp.h"
+#include "maps/cloud/keyframe_cloud.h"
+#include "maps/cloud/outlier_removal.h"
 #include "plugin/app/mapping_run.h"
-#include "plugin/map_output.h"
-#include "plugin/npy_file.h"
+#include "plugin/output/map_output.h"
+#include "plugin/output/npy_file.h"
 
 namespace efm {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/recording.h"
+#include "plugin/recordings/recording.h"
 
 namespace efm {
 

@@ -7,10 +7,10 @@
 #include <array>
 #include <cstdio>
 
-#include "mapping/robust_maximum.h"
-#include "plugin/CEventFusionMapBuilder.h"
-#include "plugin/CObservationEvents.h"
+#include "mapping/depth/robust_maximum.h"
 #include "plugin/app/progress.h"
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
+#include "plugin/mrpt/CObservationEvents.h"
 
 namespace efm {
 namespace {

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
-#include "maps/cloud_point.h"
-#include "plugin/mapping_session.h"
-#include "plugin/option_file.h"
-#include "plugin/recording.h"
-#include "plugin/report.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "maps/cloud/cloud_point.h"
+#include "plugin/options/option_file.h"
+#include "plugin/output/report.h"
+#include "plugin/recordings/recording.h"
+#include "plugin/session/mapping_session.h"
 
 namespace efm {
 

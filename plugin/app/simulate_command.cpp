@@ -6,15 +6,15 @@
 #include <stdexcept>
 #include <vector>
 
-#include "mapping/option_check.h"
-#include "mapping/timestamp.h"
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
 #include "plugin/app/progress.h"
-#include "plugin/datasets/camchain.h"
-#include "tracking_stub/dataset_writer.h"
-#include "tracking_stub/simulated_rig.h"
-#include "tracking_stub/simulation_preset.h"
-#include "tracking_stub/trajectory_simulation.h"
-#include "tracking_stub/tum_trajectory.h"
+#include "plugin/calibration/camchain.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/trajectory_simulation.h"
+#include "tracking_stub/sensor/simulated_rig.h"
+#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 namespace {

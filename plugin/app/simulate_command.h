@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "tracking_stub/event_noise.h"
+#include "tracking_stub/sensor/event_noise.h"
 
 namespace efm {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/paper_extraction.h"
-#include "mapping/space_sweep.h"
+#include "mapping/depth/paper_extraction.h"
+#include "mapping/sweep/space_sweep.h"
 #include "test/bench/benches.h"
 #include "test/bench/sweep_input.h"
 

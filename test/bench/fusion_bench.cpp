@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "mapping/dsi_peaks.h"
-#include "mapping/fusion_rule.h"
-#include "mapping/plane_values.h"
-#include "mapping/voting_kernel.h"
+#include "mapping/dsi/dsi_peaks.h"
+#include "mapping/dsi/fusion_rule.h"
+#include "mapping/dsi/plane_values.h"
+#include "mapping/dsi/voting_kernel.h"
 #include "test/bench/benches.h"
 
 namespace efm::bench {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
-#include "maps/global_cloud.h"
-#include "maps/keyframe_cloud.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "maps/cloud/global_cloud.h"
+#include "maps/cloud/keyframe_cloud.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
 

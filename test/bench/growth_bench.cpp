@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
-#include "mapping/voting_kernel.h"
+#include "mapping/dsi/voting_kernel.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
-#include "mapping/voting_kernel.h"
+#include "mapping/dsi/voting_kernel.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 #include "test/bench/benches.h"
 #include "test/bench/peak_memory.h"
 #include "test/bench/performance_ratios.h"

@@ -3,7 +3,7 @@
 
 #include <ctime>
 
-#include "mapping/stage.h"
+#include "mapping/keyframes/stage.h"
 
 namespace efm::bench {
 

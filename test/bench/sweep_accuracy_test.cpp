@@ -4,12 +4,12 @@
 #include <cmath>
 #include <vector>
 
-#include "mapping/undistortion.h"
+#include "mapping/geometry/undistortion.h"
 #include "test/bench/sweep_input.h"
 #include "test/bench/synthetic_window.h"
-#include "test/mapping/fast_kernels.h"
-#include "test/mapping/random_scene.h"
-#include "test/mapping/swept_dsi.h"
+#include "test/mapping/dsi/swept_dsi.h"
+#include "test/mapping/kernels/fast_kernels.h"
+#include "test/mapping/keyframes/random_scene.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {

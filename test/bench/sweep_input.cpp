@@ -3,8 +3,8 @@
 
 #include <cstddef>
 
-#include "mapping/back_projection.h"
-#include "mapping/undistortion.h"
+#include "mapping/geometry/undistortion.h"
+#include "mapping/rays/back_projection.h"
 
 namespace efm::bench {
 

@@ -3,10 +3,10 @@
 
 #include <vector>
 
-#include "mapping/depth_planes.h"
-#include "mapping/pose_packets.h"
-#include "mapping/reference_view.h"
-#include "mapping/space_sweep.h"
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/rays/pose_packets.h"
+#include "mapping/sweep/space_sweep.h"
 #include "test/bench/synthetic_window.h"
 
 namespace efm::bench {

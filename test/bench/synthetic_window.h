@@ -4,11 +4,11 @@
 #include <cstddef>
 #include <vector>
 
-#include "mapping/event.h"
-#include "mapping/keyframe_mapper.h"
-#include "mapping/rig.h"
-#include "mapping/trajectory.h"
-#include "mapping/window.h"
+#include "mapping/events/event.h"
+#include "mapping/events/window.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/trajectory.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 
 namespace efm::bench {
 

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "mapping/back_projection.h"
-#include "mapping/kernels/vote.h"
-#include "mapping/paper_extraction.h"
-#include "mapping/pose_packets.h"
+#include "mapping/depth/paper_extraction.h"
+#include "mapping/kernels/bilinear_vote.h"
+#include "mapping/rays/back_projection.h"
+#include "mapping/rays/pose_packets.h"
 
 namespace efm::bench {
 

@@ -4,16 +4,16 @@
 #include <optional>
 #include <vector>
 
-#include "mapping/depth_extraction.h"
-#include "mapping/depth_planes.h"
-#include "mapping/event_span.h"
-#include "mapping/keyframe_mapper.h"
-#include "mapping/reference_view.h"
-#include "mapping/rig.h"
-#include "mapping/stage.h"
-#include "mapping/trajectory.h"
-#include "mapping/undistortion.h"
-#include "mapping/window.h"
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/events/event_span.h"
+#include "mapping/events/window.h"
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/trajectory.h"
+#include "mapping/geometry/undistortion.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "mapping/keyframes/stage.h"
 
 namespace efm::bench {
 

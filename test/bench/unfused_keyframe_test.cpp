@@ -5,7 +5,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "mapping/keyframe_mapper.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 #include "test/bench/synthetic_window.h"
 
 namespace efm::bench {

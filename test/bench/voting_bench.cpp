@@ -4,14 +4,14 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/back_projection.h"
-#include "mapping/binned_rays.h"
-#include "mapping/kernels/vote.h"
-#include "mapping/space_sweep.h"
-#include "mapping/tile_rays.h"
-#include "mapping/tile_voter.h"
-#include "mapping/view_tiles.h"
-#include "mapping/voting_kernel.h"
+#include "mapping/dsi/voting_kernel.h"
+#include "mapping/kernels/bilinear_vote.h"
+#include "mapping/rays/back_projection.h"
+#include "mapping/sweep/ray_index.h"
+#include "mapping/sweep/space_sweep.h"
+#include "mapping/sweep/tile_accumulator.h"
+#include "mapping/sweep/tile_rays.h"
+#include "mapping/sweep/view_tiles.h"
 #include "test/bench/benches.h"
 #include "test/bench/performance_ratios.h"
 #include "test/bench/sweep_input.h"

@@ -7,10 +7,10 @@
 #include <numeric>
 #include <vector>
 
-#include "mapping/fusion_mapper.h"
-#include "maps/depth_metrics.h"
+#include "mapping/keyframes/fusion_mapper.h"
+#include "maps/metrics/depth_metrics.h"
 #include "test/integration/simulated_recording.h"
-#include "test/mapping/kept_dsi.h"
+#include "test/mapping/dsi/kept_dsi.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {

@@ -7,10 +7,10 @@
 #include <iostream>
 #include <vector>
 
-#include "mapping/fusion_mapper.h"
-#include "maps/depth_metrics.h"
-#include "tracking_stub/depth_rendering.h"
-#include "tracking_stub/simulation_preset.h"
+#include "mapping/keyframes/fusion_mapper.h"
+#include "maps/metrics/depth_metrics.h"
+#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm {
 namespace {

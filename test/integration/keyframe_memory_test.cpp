@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 
 namespace efm {
 namespace {

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
-#include "mapping/velocity_correction.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "mapping/motion/velocity_correction.h"
 #include "test/integration/simulated_recording.h"
-#include "test/mapping/same_image.h"
+#include "test/mapping/depth/same_image.h"
 
 namespace efm {
 namespace {

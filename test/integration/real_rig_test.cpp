@@ -8,8 +8,9 @@
 #include <iostream>
 #include <string>
 
-#include "mapping/depth_planes.h"
-#include "plugin/depth_evaluation.h"
+#include "mapping/geometry/depth_planes.h"
+#include "plugin/evaluation/depth_evaluation.h"
+#include "test/paths.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -5,9 +5,9 @@
 #include <limits>
 #include <utility>
 
-#include "maps/keyframe_cloud.h"
-#include "tracking_stub/depth_rendering.h"
-#include "tracking_stub/nearest_surface.h"
+#include "maps/cloud/keyframe_cloud.h"
+#include "test/tracking_stub/truth/nearest_surface.h"
+#include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::test {
 

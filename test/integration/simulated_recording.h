@@ -3,11 +3,11 @@
 
 #include <vector>
 
-#include "mapping/fusion_mapper.h"
-#include "maps/cloud_point.h"
-#include "maps/depth_metrics.h"
-#include "maps/global_cloud.h"
-#include "tracking_stub/simulation_preset.h"
+#include "mapping/keyframes/fusion_mapper.h"
+#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/global_cloud.h"
+#include "maps/metrics/depth_metrics.h"
+#include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm::test {
 

@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Holds every #include of the project against the table of layers (CONTRIBUTING.md, "Layers"):
-# who may include whom, and which library may appear where. Prints each line that breaks it.
+# Compares every #include of the project with the table of layers (CONTRIBUTING.md, "Layers") and
+# the table of rooms (rooms.txt): who may include whom, and which library may appear where. Prints
+# each line that breaks them.
 #   check_layers.sh ROOT
 set -euo pipefail
+tables=$(cd "$(dirname "$0")" && pwd)
 cd "${1:?usage: check_layers.sh ROOT}"
 broken=0
 
@@ -32,12 +34,45 @@ forbid mapping/kernels "Eigen|opencv2|tbb|oneapi" "may use Highway alone"
 forbid mapping/kernels "mapping/[^k]" "may include mapping/kernels/ alone"
 forbid maps "(tracking_stub|plugin|test)/" "may include mapping/ and maps/"
 forbid maps "$mrpt|$recordings|$front" "may use PCL, Ceres and what mapping/ uses"
-forbid maps "$ceres" "Ceres stays in one pair of files" '^maps/pose_refinement\.(h|cpp):'
+forbid maps "$ceres" "Ceres stays in one pair of files" '^maps/refinement/pose_refinement\.(h|cpp):'
 forbid tracking_stub "(maps|plugin|test)/" "may include mapping/ and tracking_stub/"
 forbid tracking_stub "$mrpt|$pcl|$ceres|$recordings|$front" "may use what mapping/ uses"
 forbid plugin "(test|plugin/app)/" "never includes the application or the tests" '^plugin/app/'
 forbid plugin "$ceres" "refinement is reached through maps/"
-forbid plugin "$recordings" "HDF5 and ROS bags stay in plugin/datasets/" '^plugin/datasets/'
+forbid plugin "$recordings" "HDF5 and ROS bags stay in plugin/formats/" '^plugin/formats/'
+
+forbid plugin "$mrpt" "MRPT stays in mrpt/, recordings/, formats/ and app/" \
+  '^plugin/(mrpt|recordings|formats|app)/'
+
+# Every room is in the table, and includes only the rooms that the table allows it.
+rooms=$(awk '
+  FNR == NR {
+    if ($0 ~ /^#/ || NF == 0) next
+    room = $1; sub(/:$/, "", room)
+    folder = room; sub(/\/.*/, "", folder)
+    known[room] = 1
+    for (i = 2; i <= NF; ++i) {
+      if ($i != "*") { allowed[room, folder "/" $i] = 1; continue }
+      for (other in known) if (index(other, folder "/") == 1) allowed[room, other] = 1
+    }
+    next
+  }
+  {
+    split($0, parts, ":")
+    split(parts[1], path, "/")
+    room = path[1] "/" path[2]
+    match($0, /"[^"]+"/)
+    split(substr($0, RSTART + 1, RLENGTH - 2), included, "/")
+    other = included[1] "/" included[2]
+    if (!(room in known)) print $0 ": " room " is no room of rooms.txt"
+    else if (included[1] == path[1] && room != other && !((room, other) in allowed))
+      print $0 ": " room " may not include " other
+  }' "$tables/rooms.txt" <(grep -rnE --include='*.h' --include='*.cpp' \
+    '^[[:space:]]*#[[:space:]]*include[[:space:]]+"' mapping maps tracking_stub plugin))
+if [ -n "$rooms" ]; then
+  printf 'rooms:\n%s\n' "$rooms"
+  broken=1
+fi
 
 if [ "$broken" -ne 0 ]; then
   echo "the layers are broken" >&2

@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/depth_extraction.h"
-#include "mapping/depth_planes.h"
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/geometry/depth_planes.h"
 
 namespace efm::oracle {
 

@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "mapping/depth_extraction.h"
+#include "mapping/depth/depth_extraction.h"
 
 namespace efm::oracle {
 

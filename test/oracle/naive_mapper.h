@@ -6,16 +6,16 @@
 #include <optional>
 #include <vector>
 
-#include "mapping/depth_planes.h"
-#include "mapping/event.h"
-#include "mapping/fusion_rule.h"
-#include "mapping/plane_fusion.h"
-#include "mapping/pose_packets.h"
-#include "mapping/reference_view.h"
-#include "mapping/rig.h"
-#include "mapping/subintervals.h"
-#include "mapping/trajectory.h"
-#include "mapping/vote_counts.h"
+#include "mapping/dsi/fusion_rule.h"
+#include "mapping/dsi/plane_fusion.h"
+#include "mapping/dsi/vote_counts.h"
+#include "mapping/events/event.h"
+#include "mapping/events/subintervals.h"
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/trajectory.h"
+#include "mapping/rays/pose_packets.h"
 
 namespace efm::oracle {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/depth_picture.h"
+#include "plugin/pictures/depth_picture.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
 #include "test/studies/method_comparison.h"

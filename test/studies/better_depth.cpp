@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/curve_plot.h"
+#include "plugin/pictures/curve_plot.h"
 #include "test/studies/depth_curve.h"
 #include "test/studies/method_comparison.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm::studies {
 namespace {

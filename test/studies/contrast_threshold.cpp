@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "plugin/curve_plot.h"
-#include "plugin/depth_picture.h"
+#include "plugin/pictures/curve_plot.h"
+#include "plugin/pictures/depth_picture.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
 #include "test/studies/flying_room.h"

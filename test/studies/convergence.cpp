@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/curve_plot.h"
+#include "plugin/pictures/curve_plot.h"
 #include "test/studies/dsi_projections.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
@@ -14,7 +14,7 @@
 #include "test/studies/picture_grid.h"
 #include "test/studies/real_rigs.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm::studies {
 namespace {

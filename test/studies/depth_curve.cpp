@@ -5,8 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "mapping/depth_planes.h"
-#include "maps/depth_metrics.h"
+#include "mapping/geometry/depth_planes.h"
+#include "maps/metrics/depth_metrics.h"
 #include "test/studies/visible_edges.h"
 
 namespace efm::studies {

@@ -4,9 +4,9 @@
 #include <mutex>
 #include <opencv2/core.hpp>
 
-#include "mapping/depth_planes.h"
-#include "mapping/reference_view.h"
-#include "mapping/space_sweep.h"
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/sweep/space_sweep.h"
 
 namespace efm::studies {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "mapping/option_check.h"
+#include "mapping/options/option_check.h"
 
 namespace efm::studies {
 namespace {

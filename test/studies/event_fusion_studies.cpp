@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "test/paths.h"
 #include "test/studies/real_rigs.h"
 #include "test/studies/studies.h"
 #include "test/studies/study_report.h"

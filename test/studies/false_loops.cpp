@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <optional>
 
-#include "mapping/rotation_vector.h"
+#include "mapping/geometry/rotation_vector.h"
 #include "test/studies/pose_refinement_run.h"
-#include "tracking_stub/random_vectors.h"
+#include "tracking_stub/random/random_vectors.h"
 
 namespace efm::studies {
 namespace {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "mapping/keyframe_depth_map.h"
-#include "maps/keyframe_refiner.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
+#include "maps/refinement/keyframe_refiner.h"
 
 namespace efm::studies {
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "mapping/timestamp.h"
-#include "tracking_stub/hd_stereo.h"
-#include "tracking_stub/preset_rigs.h"
+#include "mapping/geometry/timestamp.h"
+#include "tracking_stub/presets/hd_stereo.h"
+#include "tracking_stub/presets/preset_rigs.h"
 
 namespace efm::studies {
 namespace {

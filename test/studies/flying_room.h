@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "mapping/depth_planes.h"
+#include "mapping/geometry/depth_planes.h"
 #include "test/studies/method_comparison.h"
-#include "tracking_stub/simulated_rig.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::studies {
 

@@ -7,8 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "mapping/depth_extraction.h"
-#include "mapping/option_check.h"
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/options/option_check.h"
 #include "test/studies/frame_sweep.h"
 
 namespace efm::studies {

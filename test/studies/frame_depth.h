@@ -5,9 +5,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/depth_planes.h"
-#include "mapping/reference_view.h"
-#include "mapping/rigid3.h"
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/studies/posed_frames.h"
 
 namespace efm::studies {

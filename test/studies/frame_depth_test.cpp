@@ -8,10 +8,11 @@
 #include <filesystem>
 #include <vector>
 
-#include "maps/depth_pairs.h"
+#include "maps/metrics/depth_pairs.h"
+#include "test/paths.h"
 #include "test/studies/rendered_frames.h"
-#include "tracking_stub/depth_rendering.h"
-#include "tracking_stub/painting.h"
+#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/scenes/painting.h"
 
 namespace efm::studies {
 namespace {

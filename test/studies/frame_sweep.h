@@ -5,8 +5,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/reference_view.h"
-#include "mapping/rigid3.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/studies/posed_frames.h"
 
 namespace efm::studies {

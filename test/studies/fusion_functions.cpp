@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "mapping/timestamp.h"
-#include "plugin/curve_plot.h"
-#include "plugin/depth_picture.h"
+#include "mapping/geometry/timestamp.h"
+#include "plugin/pictures/curve_plot.h"
+#include "plugin/pictures/depth_picture.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
 #include "test/studies/method_comparison.h"

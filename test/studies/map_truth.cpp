@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "maps/keyframe_cloud.h"
-#include "maps/sample_statistics.h"
-#include "maps/trajectory_metrics.h"
-#include "tracking_stub/depth_rendering.h"
+#include "maps/cloud/keyframe_cloud.h"
+#include "maps/metrics/sample_statistics.h"
+#include "maps/metrics/trajectory_metrics.h"
+#include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::studies {
 

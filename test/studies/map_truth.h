@@ -6,10 +6,10 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/keyframe_depth_map.h"
-#include "maps/cloud_point.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
+#include "maps/cloud/cloud_point.h"
 #include "test/studies/wall_thickness.h"
-#include "tracking_stub/simulated_rig.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::studies {
 

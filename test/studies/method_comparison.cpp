@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/robust_maximum.h"
-#include "tracking_stub/depth_rendering.h"
+#include "mapping/depth/robust_maximum.h"
+#include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::studies {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
-#include "maps/depth_metrics.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "maps/metrics/depth_metrics.h"
 #include "test/studies/outstanding_points.h"
 #include "test/studies/recording_cache.h"
 

@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "mapping/velocity_correction.h"
-#include "plugin/curve_plot.h"
+#include "mapping/motion/velocity_correction.h"
+#include "plugin/pictures/curve_plot.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/method_comparison.h"
 #include "test/studies/recording_errors.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/random_numbers.h"
-#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/random/random_numbers.h"
 
 namespace efm::studies {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "mapping/depth_extraction.h"
+#include "mapping/depth/depth_extraction.h"
 
 namespace efm::studies {
 

@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "plugin/depth_picture.h"
+#include "plugin/pictures/depth_picture.h"
 
 namespace efm::studies {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/depth_planes.h"
+#include "mapping/geometry/depth_planes.h"
 
 namespace efm::studies {
 

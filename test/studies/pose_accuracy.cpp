@@ -6,16 +6,16 @@
 #include <string>
 #include <vector>
 
-#include "mapping/timestamp.h"
-#include "maps/depth_metrics.h"
-#include "plugin/curve_plot.h"
+#include "mapping/geometry/timestamp.h"
+#include "maps/metrics/depth_metrics.h"
+#include "plugin/pictures/curve_plot.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
 #include "test/studies/method_comparison.h"
 #include "test/studies/pose_errors.h"
 #include "test/studies/real_rigs.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/depth_rendering.h"
+#include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::studies {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <Eigen/Geometry>
 
-#include "mapping/rotation_vector.h"
-#include "mapping/timestamp.h"
-#include "tracking_stub/random_vectors.h"
+#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/timestamp.h"
+#include "tracking_stub/random/random_vectors.h"
 
 namespace efm::studies {
 

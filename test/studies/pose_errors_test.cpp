@@ -6,7 +6,7 @@
 #include <cmath>
 #include <memory>
 
-#include "tracking_stub/smooth_motion.h"
+#include "tracking_stub/motion/smooth_motion.h"
 
 namespace efm::studies {
 namespace {

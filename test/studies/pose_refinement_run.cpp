@@ -10,11 +10,11 @@
 #include <string>
 #include <utility>
 
-#include "mapping/timestamp.h"
-#include "maps/keyframe_cloud.h"
-#include "maps/registration_cloud.h"
-#include "plugin/mapping_session.h"
-#include "tracking_stub/tum_replay.h"
+#include "mapping/geometry/timestamp.h"
+#include "maps/cloud/keyframe_cloud.h"
+#include "maps/refinement/registration_cloud.h"
+#include "plugin/session/mapping_session.h"
+#include "test/tracking_stub/poses/tum_replay.h"
 
 namespace efm::studies {
 namespace {

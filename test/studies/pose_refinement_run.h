@@ -5,13 +5,13 @@
 #include <functional>
 #include <vector>
 
-#include "mapping/keyframe_depth_map.h"
-#include "maps/cloud_point.h"
-#include "maps/global_cloud.h"
-#include "maps/keyframe_refiner.h"
-#include "plugin/event_fusion_options.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
+#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/global_cloud.h"
+#include "maps/refinement/keyframe_refiner.h"
+#include "plugin/session/event_fusion_options.h"
 #include "test/studies/recording_cache.h"
-#include "tracking_stub/tracker_faults.h"
+#include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm::studies {
 

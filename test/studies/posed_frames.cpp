@@ -9,10 +9,10 @@
 #include <string>
 #include <utility>
 
-#include "mapping/trajectory.h"
-#include "plugin/datasets/poses_file.h"
-#include "plugin/datasets/uzh_text.h"
-#include "plugin/timed_files.h"
+#include "mapping/geometry/trajectory.h"
+#include "plugin/evaluation/timed_files.h"
+#include "plugin/formats/uzh_text.h"
+#include "tracking_stub/poses/poses_file.h"
 
 namespace efm::studies {
 namespace {

@@ -7,9 +7,9 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/camera.h"
-#include "mapping/reference_view.h"
-#include "mapping/rigid3.h"
+#include "mapping/geometry/camera.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm::studies {
 

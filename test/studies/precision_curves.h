@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "maps/precision_recall.h"
+#include "maps/metrics/precision_recall.h"
 #include "test/studies/method_comparison.h"
 #include "test/studies/study_section.h"
 

@@ -3,9 +3,9 @@
 
 #include <string>
 
-#include "plugin/datasets/camchain.h"
-#include "tracking_stub/trajectory_simulation.h"
-#include "tracking_stub/tum_trajectory.h"
+#include "plugin/calibration/camchain.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+#include "tracking_stub/presets/trajectory_simulation.h"
 
 namespace efm::studies {
 namespace {

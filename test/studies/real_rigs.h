@@ -4,7 +4,7 @@
 #include <stdexcept>
 
 #include "test/studies/study_run.h"
-#include "tracking_stub/simulated_rig.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::studies {
 

@@ -11,8 +11,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "mapping/timestamp.h"
-#include "tracking_stub/frame_renderer.h"
+#include "mapping/geometry/timestamp.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm::studies {
 namespace {

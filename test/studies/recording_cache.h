@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "mapping/event.h"
-#include "mapping/event_span.h"
-#include "mapping/trajectory.h"
-#include "mapping/window.h"
-#include "tracking_stub/simulated_rig.h"
+#include "mapping/events/event.h"
+#include "mapping/events/event_span.h"
+#include "mapping/events/window.h"
+#include "mapping/geometry/trajectory.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::studies {
 

@@ -8,7 +8,7 @@
 
 #include "test/plugin/temporary_folder.h"
 #include "test/studies/recording_errors.h"
-#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm::studies {
 namespace {

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "mapping/timestamp.h"
+#include "mapping/geometry/timestamp.h"
 
 namespace efm::studies {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 
 #include "test/studies/recording_cache.h"
-#include "tracking_stub/event_noise.h"
+#include "tracking_stub/sensor/event_noise.h"
 
 namespace efm::studies {
 

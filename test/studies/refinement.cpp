@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "maps/sample_statistics.h"
+#include "maps/metrics/sample_statistics.h"
 #include "test/studies/refinement_pictures.h"
 #include "test/studies/refinement_tables.h"
 #include "test/studies/studies.h"

@@ -9,7 +9,7 @@
 #include "test/studies/pose_refinement_run.h"
 #include "test/studies/real_rigs.h"
 #include "test/studies/room_loop.h"
-#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm::studies {
 namespace {

@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "maps/cloud_point.h"
-#include "maps/keyframe_refiner.h"
+#include "maps/cloud/cloud_point.h"
+#include "maps/refinement/keyframe_refiner.h"
 #include "test/studies/false_loops.h"
 #include "test/studies/map_truth.h"
 #include "test/studies/study_run.h"
-#include "tracking_stub/simulated_rig.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::studies {
 

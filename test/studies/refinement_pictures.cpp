@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "plugin/curve_plot.h"
-#include "plugin/picture_grid.h"
+#include "plugin/pictures/curve_plot.h"
+#include "plugin/pictures/picture_grid.h"
 #include "test/studies/picture_grid.h"
 #include "test/studies/top_view.h"
 

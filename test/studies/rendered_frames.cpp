@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "tracking_stub/frame_renderer.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm::studies {
 

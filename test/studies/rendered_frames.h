@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "mapping/camera.h"
-#include "mapping/trajectory.h"
+#include "mapping/geometry/camera.h"
+#include "mapping/geometry/trajectory.h"
 #include "test/studies/posed_frames.h"
-#include "tracking_stub/scene.h"
+#include "tracking_stub/scenes/scene.h"
 
 namespace efm::studies {
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "plugin/curve_plot.h"
-#include "plugin/depth_picture.h"
+#include "plugin/pictures/curve_plot.h"
+#include "plugin/pictures/depth_picture.h"
 #include "test/studies/edge_kinds.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
@@ -20,7 +20,7 @@
 #include "test/studies/real_rigs.h"
 #include "test/studies/rendered_frames.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/depth_rendering.h"
+#include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::studies {
 namespace {

@@ -3,11 +3,11 @@
 
 #include <memory>
 
-#include "mapping/timestamp.h"
-#include "tracking_stub/loop_motion.h"
-#include "tracking_stub/preset_rigs.h"
-#include "tracking_stub/room_stereo.h"
-#include "tracking_stub/smooth_motion.h"
+#include "mapping/geometry/timestamp.h"
+#include "tracking_stub/motion/loop_motion.h"
+#include "tracking_stub/motion/smooth_motion.h"
+#include "tracking_stub/presets/preset_rigs.h"
+#include "tracking_stub/presets/room_stereo.h"
 
 namespace efm::studies {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "tracking_stub/simulated_rig.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::studies {
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/keyframe_mapper.h"
-#include "mapping/voting_kernel.h"
-#include "plugin/curve_plot.h"
+#include "mapping/dsi/voting_kernel.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "plugin/pictures/curve_plot.h"
 #include "test/bench/growth_fit.h"
 #include "test/bench/stage_clock.h"
 #include "test/bench/synthetic_window.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/depth_picture.h"
+#include "plugin/pictures/depth_picture.h"
 #include "test/studies/method_comparison.h"
 #include "test/studies/outstanding_points.h"
 #include "test/studies/picture_grid.h"
@@ -16,8 +16,8 @@
 #include "test/studies/slider_keyframe.h"
 #include "test/studies/slider_truth.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/depth_rendering.h"
-#include "tracking_stub/slider.h"
+#include "tracking_stub/presets/slider.h"
+#include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::studies {
 namespace {

@@ -5,9 +5,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/keyframe_policy.h"
-#include "plugin/datasets/poses_file.h"
-#include "plugin/datasets/uzh_text.h"
+#include "mapping/keyframes/keyframe_policy.h"
+#include "plugin/formats/uzh_text.h"
+#include "tracking_stub/poses/poses_file.h"
 
 namespace efm::studies {
 

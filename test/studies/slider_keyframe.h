@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <vector>
 
-#include "mapping/event.h"
-#include "mapping/keyframe_mapper.h"
-#include "mapping/trajectory.h"
+#include "mapping/events/event.h"
+#include "mapping/geometry/trajectory.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 
 namespace efm::studies {
 

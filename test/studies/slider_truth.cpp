@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "maps/depth_metrics.h"
+#include "maps/metrics/depth_metrics.h"
 #include "test/studies/posed_frames.h"
 
 namespace efm::studies {

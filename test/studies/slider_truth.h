@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <opencv2/core.hpp>
 
-#include "mapping/depth_extraction.h"
-#include "mapping/reference_view.h"
-#include "mapping/rigid3.h"
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/studies/edge_kinds.h"
 #include "test/studies/frame_depth.h"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/depth_picture.h"
+#include "plugin/pictures/depth_picture.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
 #include "test/studies/method_comparison.h"
@@ -12,7 +12,7 @@
 #include "test/studies/precision_curves.h"
 #include "test/studies/real_rigs.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/simulation_preset.h"
+#include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm::studies {
 namespace {

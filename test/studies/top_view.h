@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "maps/cloud_point.h"
+#include "maps/cloud/cloud_point.h"
 #include "test/studies/wall_thickness.h"
 
 namespace efm::studies {

@@ -3,7 +3,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "mapping/keyframe_depth_map.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 #include "test/studies/recording_cache.h"
 
 namespace efm::studies {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "maps/sample_statistics.h"
+#include "maps/metrics/sample_statistics.h"
 
 namespace efm::studies {
 namespace {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "tracking_stub/nearest_surface.h"
-#include "tracking_stub/scene.h"
+#include "test/tracking_stub/truth/nearest_surface.h"
+#include "tracking_stub/scenes/scene.h"
 
 namespace efm::studies {
 

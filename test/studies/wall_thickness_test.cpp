@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "tracking_stub/random_numbers.h"
-#include "tracking_stub/room_scene.h"
+#include "tracking_stub/random/random_numbers.h"
+#include "tracking_stub/scenes/room_scene.h"
 
 namespace efm::studies {
 namespace {

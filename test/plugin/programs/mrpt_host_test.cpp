@@ -6,6 +6,7 @@
 
 #include <sstream>
 
+#include "test/paths.h"
 #include "test/plugin/programs/pcd_points.h"
 #include "test/plugin/programs/program_test.h"
 

@@ -9,11 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "test/plugin/dataset_of.h"
-#include "test/plugin/synthetic_recording.h"
+#include "test/paths.h"
+#include "test/plugin/formats/dataset_of.h"
+#include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
-#include "tracking_stub/dataset_writer.h"
-#include "tracking_stub/tum_trajectory.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "test/paths.h"
 #include "test/plugin/programs/program_test.h"
 
 namespace efm {

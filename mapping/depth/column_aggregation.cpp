@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/depth/column_aggregation.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/depth/pixel_neighbours.h"
+
+namespace efm {
+namespace {
+
+constexpr float kSigma_px = 1.5F;
+
+/// Finds the peak of a sum of rays.
+class PeakFinder {
+ public:
+  explicit PeakFinder(int planes) : planes_(planes), place_(planesOfOnePlace(planes)) {}
+
+  AggregatedPeak find(const std::vector<float>& sum) const {
+    const auto top = std::max_element(sum.begin(), sum.end());
+    const auto plane = static_cast<int>(top - sum.begin());
+    const float before = plane > 0 ? sum[static_cast<std::size_t>(plane - 1)] : -1;
+    const float after = plane < planes_ - 1 ? sum[static_cast<std::size_t>(plane + 1)] : -1;
+    AggregatedPeak peak;
+    peak.at_end = before < 0 || after < 0;
+    peak.position = static_cast<float>(peakPosition(plane, before, *top, after));
+    const float curvature = 2 * *top - before - after;
+    peak.width_sq =
+        peak.at_end || !(curvature > 0) ? std::numeric_limits<float>::infinity() : *top / curvature;
+    // From far to near: each adds what lies between.
+    float second = 0;
+    int left = 0;
+    int right = planes_;
+    for (std::size_t i = peak.beyond.size(); i-- > 0;) {
+      const double places = AggregatedPeak::kLeastBeside + static_cast<double>(i);
+      const auto beside = static_cast<int>(std::lround(places * place_));
+      second = std::max(
+          {second, largest(sum, left, plane - beside), largest(sum, plane + beside + 1, right)});
+      left = std::max(left, plane - beside);
+      right = std::min(right, plane + beside + 1);
+      peak.beyond[i] = *top > 0 ? second / *top : 1;
+    }
+    return peak;
+  }
+
+ private:
+  static float largest(const std::vector<float>& sum, int begin, int end) {
+    return begin >= end ? 0 : *std::max_element(sum.begin() + begin, sum.begin() + end);
+  }
+
+  int planes_;
+  double place_;
+};
+
+}  // namespace
+
+double planesOfOnePlace(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
+
+std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRays& rays,
+                                          cv::Size size) {
+  const PixelNeighbours neighbours(chosen, size);
+  const PeakFinder finder(rays.planes());
+  std::vector<AggregatedPeak> peaks(chosen.size());
+  std::array<float, 2 * PixelNeighbours::kReach_px * PixelNeighbours::kReach_px + 1> weights{};
+  for (std::size_t distance_sq = 0; distance_sq < weights.size(); ++distance_sq) {
+    weights[distance_sq] = std::exp(-static_cast<float>(distance_sq) / (2 * kSigma_px * kSigma_px));
+  }
+  tbb::parallel_for(tbb::blocked_range<int>(0, chosen.rows()), [&](const auto& rows) {
+    std::vector<float> sum(static_cast<std::size_t>(rays.planes()));
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      for (std::size_t i = chosen.rowBegin(y); i < chosen.rowBegin(y + 1); ++i) {
+        const cv::Point pixel(chosen.column(i), y);
+        assert(rays.has(pixel));
+        std::fill(sum.begin(), sum.end(), 0.0F);
+        neighbours.forEach(pixel, [&](std::size_t, cv::Point offset) {
+          rays.addTo(sum.data(), pixel + offset,
+                     weights[static_cast<std::size_t>(offset.dot(offset))]);
+        });
+        peaks[i] = finder.find(sum);
+      }
+    }
+  });
+  return peaks;
+}
+
+}  // namespace efm

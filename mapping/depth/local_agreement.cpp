@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/depth/local_agreement.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "mapping/depth/pixel_neighbours.h"
+
+namespace efm {
+namespace {
+
+/// Of the distance at which others count for the share.
+constexpr float kShareSigma_px = 2;
+
+/// A position and its weight.
+using Weighted = std::pair<float, float>;
+
+/// The least position that has half of the weight at or below it. Reorders the positions.
+float weightedMedian(std::vector<Weighted>& positions) {
+  std::sort(positions.begin(), positions.end());
+  double total = 0;
+  for (const auto& [position, weight] : positions) total += weight;
+  double below = 0;
+  for (const auto& [position, weight] : positions) {
+    below += weight;
+    if (2 * below >= total) return position;
+  }
+  return positions.back().first;
+}
+
+/// Median distance from a position. Reorders the positions.
+float medianDistance(std::vector<Weighted>& positions, float from) {
+  for (auto& [position, weight] : positions) position = std::abs(position - from);
+  const auto middle = positions.begin() + static_cast<std::ptrdiff_t>(positions.size() / 2);
+  std::nth_element(positions.begin(), middle, positions.end());
+  return middle->first;
+}
+
+}  // namespace
+
+std::vector<LocalAgreement> localAgreement(const KeptPixels& kept, cv::Size size,
+                                           const std::vector<float>& positions,
+                                           const std::vector<float>& weights, float near) {
+  const PixelNeighbours neighbours(kept, size);
+  std::vector<LocalAgreement> agreement(kept.size());
+  tbb::parallel_for(tbb::blocked_range<int>(0, kept.rows()), [&](const auto& rows) {
+    std::vector<Weighted> around;
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      for (std::size_t i = kept.rowBegin(y); i < kept.rowBegin(y + 1); ++i) {
+        around.clear();
+        float agreeing = 0;
+        float others = 0;
+        neighbours.forEach({kept.column(i), y}, [&](std::size_t j, cv::Point offset) {
+          around.emplace_back(positions[j], weights[j]);
+          if (i == j) return;
+          const auto distance_sq = static_cast<float>(offset.dot(offset));
+          const float weight =
+              weights[j] * std::exp(-distance_sq / (2 * kShareSigma_px * kShareSigma_px));
+          others += weight;
+          if (std::abs(positions[j] - positions[i]) < near) agreeing += weight;
+        });
+        agreement[i].median = weightedMedian(around);
+        agreement[i].spread = medianDistance(around, agreement[i].median);
+        agreement[i].share = others > 0 ? agreeing / others : 0;
+      }
+    }
+  });
+  return agreement;
+}
+
+}  // namespace efm

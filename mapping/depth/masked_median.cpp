@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/depth/masked_median.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+
+namespace efm {
+namespace {
+
+struct IndexedKey {
+  std::uint32_t key = 0;
+  std::uint32_t index = 0;
+};
+
+/// Unsigned numbers in the order of the floats.
+std::uint32_t keyOf(float value) {
+  static_assert(sizeof(float) == sizeof(std::uint32_t));
+  constexpr std::uint32_t kSign = 0x80000000U;
+  std::uint32_t bits = 0;
+  std::memcpy(&bits, &value, sizeof(bits));
+  return (bits & kSign) != 0 ? ~bits : bits | kSign;
+}
+
+/// Sorts by one digit of the key; equals keep their order.
+void sortByDigit(const std::vector<IndexedKey>& from, int shift, std::vector<IndexedKey>& to) {
+  constexpr std::uint32_t kDigits = 2048;
+  std::array<std::uint32_t, kDigits + 1> next{};
+  const auto digit = [&](const IndexedKey& item) { return (item.key >> shift) % kDigits; };
+  for (const IndexedKey& item : from) ++next[digit(item) + 1];
+  for (std::uint32_t d = 0; d < kDigits; ++d) next[d + 1] += next[d];
+  for (const IndexedKey& item : from) to[next[digit(item)]++] = item;
+}
+
+/// The indices of the values in increasing order. By digits: a fifth of the time of comparing.
+std::vector<std::uint32_t> inOrder(const std::vector<float>& values) {
+  std::vector<IndexedKey> items(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    items[i] = {keyOf(values[i]), static_cast<std::uint32_t>(i)};
+  }
+  std::vector<IndexedKey> sorted(values.size());
+  for (const int shift : {0, 11, 22}) {
+    sortByDigit(items, shift, sorted);
+    items.swap(sorted);
+  }
+  std::vector<std::uint32_t> order(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) order[i] = items[i].index;
+  return order;
+}
+
+/// A set of ranks below a limit that knows its k-th. Counted one by one, by 16 and by 256; where
+/// the last search ended is remembered, since the next one ends nearby.
+class RankSet {
+ public:
+  explicit RankSet(std::size_t limit)
+      : ones_((limit / 256 + 1) * 256), by_16_((limit / 256 + 1) * 16), by_256_(limit / 256 + 1) {}
+
+  void add(std::uint32_t rank) {
+    ++ones_[rank];
+    ++by_16_[rank / 16];
+    ++by_256_[rank / 256];
+    below_ += rank / 256 < here_ ? 1 : 0;
+    ++size_;
+  }
+  void remove(std::uint32_t rank) {
+    --ones_[rank];
+    --by_16_[rank / 16];
+    --by_256_[rank / 256];
+    below_ -= rank / 256 < here_ ? 1 : 0;
+    --size_;
+  }
+  std::size_t size() const { return size_; }
+
+  /// @param k from 0, below `size()`.
+  std::size_t at(std::size_t k) {
+    while (below_ > k) below_ -= by_256_[--here_];
+    while (below_ + by_256_[here_] <= k) below_ += by_256_[here_++];
+    std::size_t left = k - below_;
+    std::size_t place = here_ * 16;
+    while (by_16_[place] <= left) left -= by_16_[place++];
+    place *= 16;
+    while (ones_[place] <= left) left -= ones_[place++];
+    return place;
+  }
+
+ private:
+  std::vector<std::uint8_t> ones_;
+  std::vector<std::uint8_t> by_16_;
+  std::vector<std::uint16_t> by_256_;
+  std::size_t size_ = 0;
+  std::size_t here_ = 0;   // index into by_256_
+  std::size_t below_ = 0;  // ranks in the counts before it
+};
+
+/// The pixels of one row that are in the window: [left, right) of those up to `end`.
+struct RowWindow {
+  std::size_t left = 0;
+  std::size_t right = 0;
+  std::size_t end = 0;
+};
+
+/// The windows around the pixels of row `y`, before the first of them.
+void startRow(const KeptPixels& kept, int y, int reach, std::vector<RowWindow>& rows) {
+  rows.clear();
+  const int last = std::min(kept.rows() - 1, y + reach);
+  for (int j = std::max(0, y - reach); j <= last; ++j) {
+    const std::size_t begin = kept.rowBegin(j);
+    const std::size_t end = kept.rowBegin(j + 1);
+    if (begin < end) rows.push_back({begin, begin, end});
+  }
+}
+
+}  // namespace
+
+std::vector<float> maskedMedian(const KeptPixels& kept, const std::vector<float>& values,
+                                int window) {
+  if (window == 1) return values;
+  const int reach = window / 2;
+  const std::vector<std::uint32_t> order = inOrder(values);
+  std::vector<std::uint32_t> rank(values.size());
+  for (std::size_t i = 0; i < order.size(); ++i) rank[order[i]] = static_cast<std::uint32_t>(i);
+
+  std::vector<float> medians(values.size());
+  RankSet inside(values.size());
+  std::vector<RowWindow> rows;
+  for (int y = 0; y < kept.rows(); ++y) {
+    if (kept.rowBegin(y) == kept.rowBegin(y + 1)) continue;
+    startRow(kept, y, reach, rows);
+    for (std::size_t i = kept.rowBegin(y); i < kept.rowBegin(y + 1); ++i) {
+      const int x = kept.column(i);
+      for (RowWindow& row : rows) {
+        while (row.right < row.end && kept.column(row.right) <= x + reach) {
+          inside.add(rank[row.right++]);
+        }
+        while (row.left < row.right && kept.column(row.left) < x - reach) {
+          inside.remove(rank[row.left++]);
+        }
+      }
+      medians[i] = values[order[inside.at((inside.size() - 1) / 2)]];
+    }
+    for (RowWindow& row : rows) {
+      while (row.left < row.right) inside.remove(rank[row.left++]);
+    }
+  }
+  return medians;
+}
+
+}  // namespace efm

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/depth/paper_extraction.h"
+
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "mapping/depth/masked_median.h"
+#include "mapping/depth/sparse_pixels.h"
+
+namespace efm {
+namespace {
+
+/// The confidence that becomes 255.
+double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
+               std::optional<double> sequence_maximum) {
+  if (option.level == WhiteLevel::kFixed) return option.fixed;
+  if (option.level == WhiteLevel::kSequence && sequence_maximum) return *sequence_maximum;
+  double largest = 0;
+  cv::minMaxLoc(confidence, nullptr, &largest);
+  return largest;
+}
+
+/// Grey values of the confidence: 255 at `white`.
+cv::Mat1b quantise(const cv::Mat1f& confidence, double white) {
+  cv::Mat1b grey = cv::Mat1b::zeros(confidence.size());
+  if (white > 0) confidence.convertTo(grey, CV_8U, 255.0 / white);  // rounds and clips
+  return grey;
+}
+
+/// Adaptive Gaussian thresholding: non-zero where a pixel stands out from its surroundings.
+cv::Mat1b standOut(const cv::Mat1b& grey, const DepthExtractionOptions& options) {
+  cv::Mat1b mask;
+  cv::adaptiveThreshold(grey, mask, 1, cv::ADAPTIVE_THRESH_GAUSSIAN_C, cv::THRESH_BINARY,
+                        options.threshold_kernel, -options.threshold_c);
+  return mask;
+}
+
+/// Positions of the kept peaks between planes.
+std::vector<float> positionsOf(const DsiPeaks& peaks, const KeptPixels& kept, bool subplane) {
+  std::vector<float> positions(kept.size());
+  kept.forEach([&](std::size_t i, cv::Point at) {
+    const int plane = peaks.plane(at);
+    positions[i] = static_cast<float>(
+        subplane ? peakPosition(plane, peaks.before(at), peaks.confidence(at), peaks.after(at))
+                 : plane);
+  });
+  return positions;
+}
+
+}  // namespace
+
+DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
+                        const DepthExtractionOptions& options,
+                        std::optional<double> sequence_maximum) {
+  options.validate();
+  const double white = whiteOf(peaks.confidence, options.max_confidence, sequence_maximum);
+  const cv::Mat1b mask = standOut(quantise(peaks.confidence, white), options);
+  const KeptPixels kept(mask);
+  const std::vector<float> positions = positionsOf(peaks, kept, options.subplane);
+  const std::vector<float> medians = maskedMedian(kept, positions, options.median_size);
+  std::vector<PlanePosition> found(kept.size());
+  kept.forEach([&](std::size_t i, cv::Point at) {
+    found[i] = {medians[i], peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at))};
+  });
+  DepthMap map = depthMapOf(kept, found, peaks.confidence, planes);
+  if (options.dilate) dilate(kept, mask, map);
+  return map;
+}
+
+}  // namespace efm

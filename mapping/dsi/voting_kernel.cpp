@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/dsi/voting_kernel.h"
+
+#include <algorithm>
+
+#include "mapping/options/named_choice.h"
+
+namespace efm {
+namespace {
+
+constexpr NamedChoice<VotingKernel> kKernels[] = {
+    {VotingKernel::kPlain, "plain"},   {VotingKernel::kBaseline, "baseline"},
+    {VotingKernel::kSse4, "sse4"},     {VotingKernel::kAvx2, "avx2"},
+    {VotingKernel::kAvx512, "avx512"}, {VotingKernel::kNeon, "neon"},
+};
+
+}  // namespace
+
+std::string_view nameOf(VotingKernel kernel) { return nameIn(kKernels, kernel); }
+VotingKernel votingKernelFromName(std::string_view name) { return valueIn(kKernels, name); }
+
+const std::vector<VotingKernel>& availableKernels() {
+  static const std::vector<VotingKernel> kernels = kernels::runnableKernels();
+  return kernels;
+}
+
+bool isAvailable(VotingKernel kernel) {
+  const auto& all = availableKernels();
+  return std::find(all.begin(), all.end(), kernel) != all.end();
+}
+
+VotingKernel fastestKernel() { return availableKernels().back(); }
+
+}  // namespace efm

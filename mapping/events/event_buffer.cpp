@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/events/event_buffer.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
+constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
+
+}  // namespace
+
+std::size_t EventBuffer::indexOf(std::int64_t t_ns) const {
+  const auto first =
+      std::lower_bound(events.begin() + static_cast<std::ptrdiff_t>(begin), events.end(), t_ns,
+                       [](const Event& event, std::int64_t time) { return event.t_ns < time; });
+  return static_cast<std::size_t>(first - events.begin());
+}
+
+void EventBuffer::coverUntil(std::int64_t t_ns) { covered_ns = std::max(covered_ns, t_ns); }
+
+std::uint64_t EventBuffer::insert(const std::vector<Event>& added) {
+  std::int64_t newest = begin < events.size() ? events.back().t_ns : kNever;
+  std::int64_t earliest_late = kEver;
+  std::uint64_t late = 0;
+  for (const Event& event : added) {
+    if (event.t_ns < newest) {
+      ++late;
+      earliest_late = std::min(earliest_late, event.t_ns);
+    }
+    newest = std::max(newest, event.t_ns);
+  }
+  events.insert(events.end(), added.begin(), added.end());
+  used.resize(events.size(), 0);
+  if (late > 0) sortFrom(indexOfUnsorted(earliest_late, events.size() - added.size()));
+  return late;
+}
+
+/// The first event before `end`, up to which events are sorted, that is later than a time; or
+/// `end`.
+std::size_t EventBuffer::indexOfUnsorted(std::int64_t t_ns, std::size_t end) const {
+  const auto first =
+      std::upper_bound(events.begin() + static_cast<std::ptrdiff_t>(begin),
+                       events.begin() + static_cast<std::ptrdiff_t>(end), t_ns,
+                       [](std::int64_t time, const Event& event) { return time < event.t_ns; });
+  return static_cast<std::size_t>(first - events.begin());
+}
+
+void EventBuffer::sortFrom(std::size_t index) {
+  std::vector<std::pair<Event, char>> tail;
+  for (std::size_t i = index; i < events.size(); ++i) tail.emplace_back(events[i], used[i]);
+  std::stable_sort(tail.begin(), tail.end(),
+                   [](const auto& a, const auto& b) { return a.first.t_ns < b.first.t_ns; });
+  for (const auto& [event, was_used] : tail) {
+    events[index] = event;
+    used[index++] = was_used;
+  }
+}
+
+void EventBuffer::compact() {
+  if (begin < events.size() / 2) return;
+  const auto count = static_cast<std::ptrdiff_t>(begin);
+  events.erase(events.begin(), events.begin() + count);
+  used.erase(used.begin(), used.begin() + count);
+  begin = 0;
+}
+
+}  // namespace efm

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rigid3.h"
+
+namespace efm {
+
+/// One camera of the rig. In imported recordings the rig's frame is that of camera 0.
+struct RigCamera {
+  CameraModel model;
+  Rigid3 T_rig_cam;                 ///< Extrinsic calibration.
+  std::int64_t time_offset_ns = 0;  ///< Added to the camera's stamps: t = t_event + offset.
+};
+
+/// Any number of calibrated cameras, rigidly attached and synchronised.
+struct Rig {
+  std::vector<RigCamera> cameras;
+};
+
+}  // namespace efm

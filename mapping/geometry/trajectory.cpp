@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/geometry/trajectory.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+bool earlier(const StampedPose& pose, std::int64_t t_ns) { return pose.t_ns < t_ns; }
+bool later(std::int64_t t_ns, const StampedPose& pose) { return t_ns < pose.t_ns; }
+
+}  // namespace
+
+void TrajectoryOptions::validate() const {
+  requireOption(max_pose_gap_s > 0 && max_pose_gap_s <= 1e6, "max_pose_gap_s", max_pose_gap_s,
+                "above 0 and at most 1e6");
+}
+
+Rigid3 TrajectorySegment::poseAt(std::int64_t t_ns) const {
+  const std::int64_t length_ns = last.t_ns - first.t_ns;
+  if (length_ns == 0) return first.T_world_rig;
+  const double fraction = static_cast<double>(t_ns - first.t_ns) / static_cast<double>(length_ns);
+  return interpolate(first.T_world_rig, last.T_world_rig, fraction);
+}
+
+Trajectory::Trajectory(const TrajectoryOptions& options) {
+  options.validate();
+  max_gap_ns_ = durationFromSeconds(options.max_pose_gap_s);
+}
+
+bool Trajectory::add(const StampedPose& pose) {
+  if (pose.t_ns < -kEndOfTimeNs || pose.t_ns > kEndOfTimeNs) {
+    throw std::invalid_argument("the pose at " + formatSeconds(pose.t_ns) +
+                                " s: times must lie within " + formatSeconds(kEndOfTimeNs) + " s");
+  }
+  const Eigen::Quaterniond& rotation = pose.T_world_rig.rotation;
+  if (!pose.T_world_rig.translation.allFinite() || !rotation.coeffs().allFinite() ||
+      rotation.norm() < 1e-6) {
+    throw std::invalid_argument("the pose at " + formatSeconds(pose.t_ns) +
+                                " s: must be finite, with a quaternion that has a length");
+  }
+  StampedPose normalised = pose;
+  normalised.T_world_rig.rotation.normalize();
+  if (poses_.empty() || poses_.back().t_ns < pose.t_ns) {
+    poses_.push_back(normalised);
+    return true;
+  }
+  const auto at = std::lower_bound(poses_.begin(), poses_.end(), pose.t_ns, earlier);
+  if (at->t_ns == pose.t_ns) return false;
+  poses_.insert(at, normalised);
+  return true;
+}
+
+void Trajectory::forgetBefore(std::int64_t t_ns) {
+  // The last pose at or before t_ns is one end of the segment that holds it.
+  const auto after = std::upper_bound(poses_.begin(), poses_.end(), t_ns, later);
+  const auto unneeded = (after - poses_.begin()) - 1;
+  // Moving what stays is paid for by what goes.
+  if (unneeded > static_cast<std::ptrdiff_t>(poses_.size() / 2)) {
+    poses_.erase(poses_.begin(), poses_.begin() + unneeded);
+  }
+}
+
+Trajectory Trajectory::moved(std::int64_t from_ns, std::int64_t to_ns,
+                             const std::function<Rigid3(const StampedPose&)>& T_world_moved) const {
+  // A segment's ends may lie on both sides of each time.
+  auto begin = std::upper_bound(poses_.begin(), poses_.end(), from_ns, later);
+  if (begin != poses_.begin()) --begin;
+  auto end = std::lower_bound(begin, poses_.end(), to_ns, earlier);
+  if (end != poses_.end()) ++end;
+  Trajectory result;
+  result.max_gap_ns_ = max_gap_ns_;
+  for (auto pose = begin; pose != end; ++pose) {
+    result.poses_.push_back({pose->t_ns, T_world_moved(*pose)});
+  }
+  return result;
+}
+
+bool Trajectory::isGap(const StampedPose& before, const StampedPose& after) const {
+  return after.t_ns - before.t_ns > max_gap_ns_;
+}
+
+std::optional<Rigid3> Trajectory::poseAt(std::int64_t t_ns) const {
+  std::size_t cursor = 0;
+  const std::optional<TrajectorySegment> segment = segmentAt(t_ns, cursor);
+  if (!segment) return std::nullopt;
+  return segment->poseAt(t_ns);
+}
+
+std::optional<TrajectorySegment> Trajectory::segmentAt(std::int64_t t_ns,
+                                                       std::size_t& cursor) const {
+  if (poses_.empty() || t_ns < poses_.front().t_ns || t_ns > poses_.back().t_ns) {
+    return std::nullopt;
+  }
+  // The cursor is the pose at or before t_ns: try where it stands and the next, then search.
+  const auto holds = [&](std::size_t i) {
+    return i < poses_.size() && poses_[i].t_ns <= t_ns &&
+           (i + 1 == poses_.size() || t_ns < poses_[i + 1].t_ns);
+  };
+  if (!holds(cursor)) {
+    if (holds(cursor + 1)) {
+      ++cursor;
+    } else {
+      const auto after = std::upper_bound(poses_.begin(), poses_.end(), t_ns, later);
+      cursor = static_cast<std::size_t>(after - poses_.begin()) - 1;
+    }
+  }
+  const StampedPose& first = poses_[cursor];
+  if (cursor + 1 < poses_.size() && !isGap(first, poses_[cursor + 1])) {
+    return TrajectorySegment{first, poses_[cursor + 1]};
+  }
+  if (first.t_ns == t_ns) return TrajectorySegment{first, first};
+  return std::nullopt;
+}
+
+}  // namespace efm

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "mapping/geometry/camera.h"
+
+namespace efm {
+
+/// (X/Z, Y/Z) of the rays through the centres of the raw pixels of row `y`, frame `cam`.
+std::vector<Eigen::Vector2d> viewingRays(const CameraModel& model, int y);
+
+/// The viewing ray of every pixel of one camera, computed once through OpenCV's iterative
+/// undistortion and looked up per event.
+///
+/// Kept as floats: looking up costs a random access to memory per event, and half the table is half
+/// the caches. A ray is rounded by at most 2^-25 of itself, 2e-5 pixels at the corner of an HD
+/// image.
+class UndistortionTable {
+ public:
+  /// Cost: one undistortion per pixel; memory: 8 bytes per pixel.
+  /// @throws std::invalid_argument where the model is not valid.
+  explicit UndistortionTable(const CameraModel& model);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+
+  /// (X/Z, Y/Z) of the ray through the centre of raw pixel (x, y), frame `cam`.
+  Eigen::Vector2d ray(int x, int y) const {
+    const auto row = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
+    return rays_[row + static_cast<std::size_t>(x)].cast<double>();
+  }
+  /// The same of all pixels, row-major: pixel (x, y) has element y * width() + x.
+  const Eigen::Vector2f* rays() const { return rays_.data(); }
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  std::vector<Eigen::Vector2f> rays_;  // row-major
+};
+
+}  // namespace efm

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/kernels/tile_scatter.h"
+
+#include <algorithm>
+
+#include "mapping/kernels/highway_targets.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "mapping/kernels/tile_scatter.cpp"
+#include <hwy/foreach_target.h>
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace efm::kernels::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Floats = hn::ScalableTag<float>;
+using Unsigned = hn::RebindToUnsigned<Floats>;
+using Signed = hn::RebindToSigned<Floats>;
+using FloatV = hn::Vec<Floats>;
+using UnsignedV = hn::Vec<Unsigned>;
+
+constexpr std::uint32_t kFractionMask = (1U << kFractionBits) - 1;
+constexpr std::uint32_t kSumMask = (1U << kSumBits) - 1;
+constexpr std::uint32_t kOneVote = 1U << kCountShift;
+constexpr std::uint32_t kProductMask = (kOneVote - 1) >> kProductShift;
+
+// A cell holds its votes' sums until their number sets the sign.
+static_assert(std::int64_t{kVotesPerCell} << kCountShift == std::int64_t{1} << 31);
+static_assert(kVotesPerCell * kFractionMask <= kSumMask);
+static_assert(kVotesPerCell * ((1U << kProductBits) - 1) <= kProductMask);
+// One vote's b ends within the lower 32 bits, where only a sum of many does not.
+static_assert(kSumBits + kFractionBits <= 32 && 2 * kSumBits == 32 + kProductShift);
+
+/// Adding 2^23 leaves a float's value, rounded, in its last bits.
+constexpr float kToBits = 8388608.0F;
+constexpr std::uint32_t kBitsOfZero = 0x4B000000U;
+
+// ---------------------------------------------------------------- gathering
+
+std::size_t gather(const CompactRay* bin, std::size_t count, const GatherRequest& request,
+                   const TileRays& rays) {
+  const Floats d;
+  const Unsigned du;
+  const Signed di;
+  const auto set = [d](float value) { return hn::Set(d, value); };
+  const FloatV scale = set(static_cast<float>(1 << kFractionBits));
+  std::size_t size = rays.size;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    UnsignedV place;
+    UnsignedV shift;
+    hn::LoadInterleaved2(du, reinterpret_cast<const std::uint32_t*>(bin + i), place, shift);
+    const auto right = hn::ConvertTo(d, hn::BitCast(di, hn::And(place, hn::Set(du, 0xFFFFU))));
+    const auto down = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(place)));
+    const FloatV x = hn::MulAdd(right, set(1.0F / 4096), set(request.corner_x));
+    const FloatV y = hn::MulAdd(down, set(1.0F / 4096), set(request.corner_y));
+    const auto own_x = hn::ShiftRight<16>(hn::BitCast(di, hn::ShiftLeft<16>(shift)));
+    const auto own_y = hn::ShiftRight<16>(hn::BitCast(di, shift));
+    const FloatV common_x =
+        hn::NegMulAdd(set(request.c), hn::Sub(x, set(request.cx)), set(request.a));
+    const FloatV common_y =
+        hn::NegMulAdd(set(request.c), hn::Sub(y, set(request.cy)), set(request.b));
+    const FloatV dx = hn::MulAdd(hn::ConvertTo(d, own_x), set(request.step_x), common_x);
+    const FloatV dy = hn::MulAdd(hn::ConvertTo(d, own_y), set(request.step_y), common_y);
+
+    const FloatV x0 = hn::MulAdd(set(request.to_first), dx, x);
+    const FloatV y0 = hn::MulAdd(set(request.to_first), dy, y);
+    const FloatV x1 = hn::MulAdd(set(request.to_last), dx, x);
+    const FloatV y1 = hn::MulAdd(set(request.to_last), dy, y);
+    const auto across = hn::And(hn::Ge(hn::Max(x0, x1), set(request.left)),
+                                hn::Lt(hn::Min(x0, x1), set(request.right)));
+    const auto along = hn::And(hn::Ge(hn::Max(y0, y1), set(request.top)),
+                               hn::Lt(hn::Min(y0, y1), set(request.bottom)));
+    const auto near = hn::And(hn::And(across, along), hn::FirstN(d, count - i));
+    // Whole vectors are stored, into the padding: compressing right into memory is slower.
+    const auto append = [&](FloatV values, float* to) {
+      hn::StoreU(hn::Compress(values, near), d, to + size);
+    };
+    append(hn::Mul(hn::Sub(x, set(request.origin_x)), scale), rays.x);
+    append(hn::Mul(hn::Sub(y, set(request.origin_y)), scale), rays.y);
+    append(hn::Mul(dx, scale), rays.dx);
+    append(hn::Mul(dy, scale), rays.dy);
+    size += hn::CountTrue(d, near);
+  }
+  return size;
+}
+
+// ---------------------------------------------------------------- voting
+
+/// The product of two fractions, where the upper half of a cell has it.
+HWY_INLINE UnsignedV productOf(UnsignedV a, UnsignedV b) {
+#if HWY_TARGET == HWY_SCALAR
+  return hn::ShiftLeft<kProductShift>(
+      hn::ShiftRight<2 * kFractionBits - kProductBits>(hn::Mul(a, b)));
+#else
+  // The upper half of a 16-bit product, with both moved up, is ab in 1/65,536.
+  const Unsigned d;
+  const hn::Repartition<std::uint16_t, Unsigned> d16;
+  constexpr int kUp = 16 - kFractionBits;
+  const UnsignedV product = hn::BitCast(d, hn::MulHigh(hn::BitCast(d16, hn::ShiftLeft<kUp>(a)),
+                                                       hn::BitCast(d16, hn::ShiftLeft<kUp>(b))));
+  return hn::And(hn::ShiftLeft<kProductShift + kProductBits - 16>(product),
+                 hn::Set(d, kProductMask << kProductShift));
+#endif
+}
+
+/// A batch of votes: written by vectors, read one by one. It stays in the first-level cache.
+struct VoteBatch {
+  static constexpr std::size_t kSize = 128;
+  HWY_ALIGN std::uint32_t index[kSize];
+  HWY_ALIGN std::uint64_t sums[kSize];
+};
+
+/// Stores 64-bit values from their halves. Where lanes are four or more the values of a vector come
+/// in another order: `laneOf` says which.
+HWY_INLINE void storeHalves(UnsignedV lower, UnsignedV upper, std::uint64_t* values) {
+#if HWY_TARGET == HWY_SCALAR
+  *values = hn::GetLane(lower) | static_cast<std::uint64_t>(hn::GetLane(upper)) << 32;
+#else
+  const Unsigned d;
+  const hn::Repartition<std::uint64_t, Unsigned> d64;
+  hn::Store(hn::BitCast(d64, hn::InterleaveLower(d, lower, upper)), d64, values);
+  hn::Store(hn::BitCast(d64, hn::InterleaveUpper(d, lower, upper)), d64, values + hn::Lanes(d64));
+#endif
+}
+
+/// The lane that the k-th stored value came from.
+HWY_INLINE std::size_t laneOf(std::size_t k, std::size_t lanes) {
+  if (lanes == 1) return 0;
+  const std::size_t half = lanes / 2;
+  const std::size_t in_half = k % half;
+  return in_half / 2 * 4 + in_half % 2 + (k < half ? 0 : 2);
+}
+
+/// Where a vector's rays meet the plane and how that is added to a cell.
+class VoteEncoder {
+ public:
+  VoteEncoder(const TileRays& rays, float to_plane, const CellWindow& window)
+      : rays_(rays),
+        to_plane_(hn::Set(Floats(), to_plane)),
+        left_(hn::Set(Unsigned(), bitsAt(window.left))),
+        top_(hn::Set(Unsigned(), bitsAt(window.top))),
+        width_(hn::Set(Unsigned(), window.columns << kFractionBits)),
+        height_(hn::Set(Unsigned(), window.rows << kFractionBits)),
+        first_(hn::Set(Unsigned(), window.first)) {}
+
+  HWY_INLINE void encode(std::size_t ray, std::uint32_t* index, std::uint64_t* sums) const {
+    const Unsigned du;
+    const UnsignedV x = fixedPoint(rays_.x + ray, rays_.dx + ray, left_);
+    const UnsignedV y = fixedPoint(rays_.y + ray, rays_.dy + ray, top_);
+    const auto inside = hn::And(hn::Lt(x, width_), hn::Lt(y, height_));
+    // What is outside adds nothing, to any cell of the tile.
+    const UnsignedV cell = hn::And(hn::Add(hn::ShiftLeft<6>(hn::ShiftRight<kFractionBits>(y)),
+                                           hn::ShiftRight<kFractionBits>(x)),
+                                   hn::Set(du, kTileCells * kTileCells - 1));
+    static_assert(kTileCells == 1 << 6);
+    hn::Store(hn::Add(cell, first_), du, index);
+    const UnsignedV fraction_mask = hn::Set(du, kFractionMask);
+    const UnsignedV a = hn::And(x, fraction_mask);
+    const UnsignedV b = hn::And(y, fraction_mask);
+    const UnsignedV lower = hn::Or(a, hn::ShiftLeft<kSumBits>(b));
+    const UnsignedV upper = hn::Or(productOf(a, b), hn::Set(du, kOneVote));
+    storeHalves(hn::IfThenElseZero(inside, lower), hn::IfThenElseZero(inside, upper), sums);
+  }
+
+ private:
+  static std::uint32_t bitsAt(std::int32_t cell) {
+    return kBitsOfZero + (static_cast<std::uint32_t>(cell) << kFractionBits);
+  }
+
+  /// A coordinate from the window's edge; outside to the left it is huge.
+  HWY_INLINE UnsignedV fixedPoint(const float* start, const float* shift, UnsignedV edge) const {
+    const Floats d;
+    const FloatV place = hn::MulAdd(to_plane_, hn::Load(d, shift), hn::Load(d, start));
+    return hn::Sub(hn::BitCast(Unsigned(), hn::Add(place, hn::Set(d, kToBits))), edge);
+  }
+
+  TileRays rays_;
+  FloatV to_plane_;
+  UnsignedV left_, top_, width_, height_, first_;
+};
+
+/// Adds a batch's votes to their cells.
+HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const MarkedCells& tile,
+                             FullCell* full) {
+  std::uint64_t* const cells = tile.cells;
+  std::uint8_t* const marks = tile.marks;
+  constexpr std::size_t kLanes = hn::MaxLanes(Floats());
+  for (std::size_t i = 0; i < count; i += kLanes) {
+#pragma GCC unroll 16
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const std::size_t vote = i + laneOf(k, kLanes);
+      const std::uint32_t index = batch.index[vote];
+      const std::uint64_t sums = batch.sums[i + k] + cells[index];
+      cells[index] = sums;
+      marks[index / kLineCells] = 1;
+      if (HWY_UNLIKELY(static_cast<std::int64_t>(sums) < 0)) {
+        *full++ = {index, sums};
+        cells[index] = 0;
+      }
+    }
+  }
+  return full;
+}
+
+FullCell* vote(const TileRays& rays, float to_plane, const CellWindow& window, FullCell* full) {
+  VoteBatch batch;
+  const VoteEncoder encoder(rays, to_plane, window);
+  const std::size_t lanes = hn::Lanes(Floats());
+  // In two steps: vectors first, then additions one by one, which would otherwise take the lanes
+  // from registers, at a higher cost.
+  for (std::size_t begin = 0; begin < rays.size; begin += VoteBatch::kSize) {
+    const std::size_t size = std::min(rays.size - begin, VoteBatch::kSize);
+    for (std::size_t i = 0; i < size; i += lanes) {
+      encoder.encode(begin + i, batch.index + i, batch.sums + i);
+    }
+    full = scatter(batch, size, window.tile, full);
+  }
+  return full;
+}
+
+constexpr TileFunctions kTile = {gather, vote};
+
+}  // namespace efm::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace efm::kernels {
+
+const TileFunctions& tileFunctions(VotingKernel kernel) {
+  static constexpr KernelTable<TileFunctions> kTable = {nullptr, EFM_VECTOR_KERNELS(kTile)};
+  return kernelIn(kTable, kernel);
+}
+
+}  // namespace efm::kernels
+#endif

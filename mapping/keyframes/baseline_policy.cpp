@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/keyframes/baseline_policy.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+constexpr std::size_t kMaxSeenPoints = 500;
+constexpr int kGridSide = 10;
+
+/// What a view sees at one depth, before a keyframe tells better: points spread over its image.
+std::vector<Eigen::Vector3d> pointsAcross(const ReferenceView& view, const Rigid3& T_world_ref,
+                                          double depth_m) {
+  std::vector<Eigen::Vector3d> points;
+  for (int j = 0; j < kGridSide; ++j) {
+    for (int i = 0; i < kGridSide; ++i) {
+      const double x = (i + 0.5) / kGridSide * (view.width - 1);
+      const double y = (j + 0.5) / kGridSide * (view.height - 1);
+      points.push_back(T_world_ref * view.pointAt(x, y, depth_m));
+    }
+  }
+  return points;
+}
+
+double shareInView(const std::vector<Eigen::Vector3d>& points_world, const Rigid3& T_world_ref,
+                   const ReferenceView& view) {
+  const Rigid3 T_ref_world = T_world_ref.inverse();
+  const auto in_view = [&](const Eigen::Vector3d& p_world) {
+    const Eigen::Vector3d p_ref = T_ref_world * p_world;
+    if (!(p_ref.z() > 0)) return false;
+    const Eigen::Vector2d pixel = view.project(p_ref);
+    return pixel.x() >= 0 && pixel.x() <= view.width - 1 && pixel.y() >= 0 &&
+           pixel.y() <= view.height - 1;
+  };
+  const auto count = std::count_if(points_world.begin(), points_world.end(), in_view);
+  return static_cast<double>(count) / static_cast<double>(points_world.size());
+}
+
+struct SeenPoints {
+  double mean_depth_m = 0;
+  std::vector<Eigen::Vector3d> points_world;  ///< Some of them, spread over the image.
+};
+
+SeenPoints seenIn(const KeyframeDepthMap& keyframe) {
+  std::vector<cv::Point> pixels;
+  cv::findNonZero(keyframe.map.depth > 0, pixels);
+  SeenPoints seen;
+  const std::size_t every = pixels.size() / kMaxSeenPoints + 1;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const double depth_m = keyframe.map.depth(pixels[i]);
+    seen.mean_depth_m += depth_m / static_cast<double>(pixels.size());
+    if (i % every != 0) continue;
+    seen.points_world.push_back(keyframe.T_world_ref *
+                                keyframe.view.pointAt(pixels[i].x, pixels[i].y, depth_m));
+  }
+  return seen;
+}
+
+}  // namespace
+
+BaselinePolicy::BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m)
+    : options_(options),
+      window_ns_(durationFromSeconds(options.window_s)),
+      stride_ns_(durationFromSeconds(options.stride_s)),
+      mean_depth_m_(depth_guess_m),
+      grown_ns_(stride_ns_) {}
+
+void BaselinePolicy::startAt(std::int64_t t_ns) {
+  next_ns_ = t_ns;
+  grown_ns_ = stride_ns_;
+}
+
+std::optional<Window> BaselinePolicy::current(const RecordingSoFar& recording) {
+  while (true) {
+    const auto t0_ns = recording.timeOfEvent(earliestStart(recording), 1);
+    if (!t0_ns) return std::nullopt;
+    const auto T_world_ref0 = recording.viewPoseAt(*t0_ns);
+    for (; T_world_ref0 && grown_ns_ <= window_ns_; grown_ns_ += stride_ns_) {
+      const std::int64_t t1_ns = *t0_ns + grown_ns_;
+      if (t1_ns > recording.completeNs()) return std::nullopt;
+      const auto T_world_ref1 = recording.viewPoseAt(t1_ns);
+      if (T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
+        return windowOf(*t0_ns, t1_ns, options_.reference);
+      }
+    }
+    startAt(*t0_ns + stride_ns_);
+  }
+}
+
+bool BaselinePolicy::isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,
+                              const ReferenceView& view) const {
+  const double baseline_m = (T_world_ref1.translation - T_world_ref0.translation).norm();
+  if (baseline_m >= options_.min_baseline_ratio * mean_depth_m_) return true;
+  const double share =
+      seen_world_.empty()
+          ? shareInView(pointsAcross(view, T_world_ref0, mean_depth_m_), T_world_ref1, view)
+          : shareInView(seen_world_, T_world_ref1, view);
+  return share < options_.min_visible_share;
+}
+
+std::int64_t BaselinePolicy::earliestStart(const RecordingSoFar& recording) const {
+  return next_ns_.value_or(recording.startNs());
+}
+
+void BaselinePolicy::advance(const Window& window, const KeyframeDepthMap* keyframe) {
+  startAt(window.t1_ns);
+  if (keyframe == nullptr) return;
+  SeenPoints seen = seenIn(*keyframe);
+  if (!seen.points_world.empty()) mean_depth_m_ = seen.mean_depth_m;
+  // Also where it saw nothing: points of an older one that are out of view now would end every
+  // window after one stride, too short to see anything again.
+  seen_world_ = std::move(seen.points_world);
+}
+
+}  // namespace efm

@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/keyframes/keyframe_policy.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/keyframes/baseline_policy.h"
+#include "mapping/options/named_choice.h"
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
+
+constexpr NamedChoice<KeyframePolicyKind> kPolicies[] = {
+    {KeyframePolicyKind::kPeriod, "period"},
+    {KeyframePolicyKind::kEvents, "events"},
+    {KeyframePolicyKind::kBaseline, "baseline"},
+};
+constexpr NamedChoice<ReferenceTime> kReferences[] = {
+    {ReferenceTime::kMiddle, "middle"},
+    {ReferenceTime::kEnd, "end"},
+};
+
+/// Window k starts at the recording's start + k strides.
+class PeriodPolicy : public KeyframePolicy {
+ public:
+  explicit PeriodPolicy(const KeyframePolicyOptions& options)
+      : window_ns_(durationFromSeconds(options.window_s)),
+        stride_ns_(durationFromSeconds(options.stride_s)),
+        reference_(options.reference) {}
+
+  std::optional<Window> current(const RecordingSoFar& recording) override {
+    const std::int64_t t0_ns = earliestStart(recording);
+    const Window window = windowOf(t0_ns, t0_ns + window_ns_, reference_);
+    if (recording.reachedNs() < window.t1_ns) return std::nullopt;
+    return window;
+  }
+  std::int64_t earliestStart(const RecordingSoFar& recording) const override {
+    return recording.startNs() + index_ * stride_ns_;
+  }
+  void advance(const Window&, const KeyframeDepthMap*) override { ++index_; }
+  std::uint64_t advancePast(const RecordingSoFar& recording, std::int64_t t_ns) override {
+    const std::int64_t since_first_end_ns = t_ns - recording.startNs() - window_ns_;
+    if (since_first_end_ns < 0) return 0;
+    const std::int64_t next = since_first_end_ns / stride_ns_ + 1;
+    if (next <= index_) return 0;
+    const auto passed = static_cast<std::uint64_t>(next - index_);
+    index_ = next;
+    return passed;
+  }
+
+ private:
+  std::int64_t window_ns_;
+  std::int64_t stride_ns_;
+  ReferenceTime reference_;
+  std::int64_t index_ = 0;
+};
+
+/// A window starts with the first event after the one before it and ends right after its last one;
+/// events of that same time belong to it too.
+class EventsPolicy : public KeyframePolicy {
+ public:
+  explicit EventsPolicy(const KeyframePolicyOptions& options)
+      : window_events_(options.window_events), reference_(options.reference) {}
+
+  std::optional<Window> current(const RecordingSoFar& recording) override {
+    const std::int64_t from_ns = earliestStart(recording);
+    const auto last_ns = recording.timeOfEvent(from_ns, window_events_);
+    if (!last_ns) return std::nullopt;
+    return windowOf(*recording.timeOfEvent(from_ns, 1), *last_ns + 1, reference_);
+  }
+  std::int64_t earliestStart(const RecordingSoFar& recording) const override {
+    return next_ns_.value_or(recording.startNs());
+  }
+  void advance(const Window& window, const KeyframeDepthMap*) override { next_ns_ = window.t1_ns; }
+  std::uint64_t advancePast(const RecordingSoFar&, std::int64_t) override { return 0; }
+
+ private:
+  std::int64_t window_events_;
+  ReferenceTime reference_;
+  std::optional<std::int64_t> next_ns_;
+};
+
+class SingleWindowPolicy : public KeyframePolicy {
+ public:
+  explicit SingleWindowPolicy(const Window& window) : window_(window) {}
+
+  std::optional<Window> current(const RecordingSoFar&) override { return window_; }
+  std::int64_t earliestStart(const RecordingSoFar&) const override {
+    return window_ ? window_->t0_ns : kEver;
+  }
+  std::int64_t earliestReference(const RecordingSoFar&) const override {
+    return window_ ? std::min(window_->t0_ns, window_->t_ref_ns) : kEver;
+  }
+  void advance(const Window&, const KeyframeDepthMap*) override { window_.reset(); }
+  std::uint64_t advancePast(const RecordingSoFar&, std::int64_t t_ns) override {
+    if (!window_ || window_->t1_ns > t_ns) return 0;
+    window_.reset();
+    return 1;
+  }
+
+ private:
+  std::optional<Window> window_;
+};
+
+}  // namespace
+
+std::string_view nameOf(KeyframePolicyKind policy) { return nameIn(kPolicies, policy); }
+std::string_view nameOf(ReferenceTime reference) { return nameIn(kReferences, reference); }
+KeyframePolicyKind keyframePolicyFromName(std::string_view name) {
+  return valueIn(kPolicies, name);
+}
+ReferenceTime referenceTimeFromName(std::string_view name) { return valueIn(kReferences, name); }
+
+Window windowOf(std::int64_t t0_ns, std::int64_t t1_ns, ReferenceTime reference) {
+  const bool middle = reference == ReferenceTime::kMiddle;
+  return {t0_ns, t1_ns, middle ? t0_ns + (t1_ns - t0_ns) / 2 : t1_ns};
+}
+
+void KeyframePolicyOptions::validate() const {
+  requireOption(window_s >= 1e-6 && window_s <= 1e6, "window_s", window_s, "1e-6 to 1e6");
+  requireOption(stride_s >= 1e-6 && stride_s <= 1e6, "stride_s", stride_s, "1e-6 to 1e6");
+  requireOption(policy != KeyframePolicyKind::kBaseline || stride_s <= window_s, "stride_s",
+                stride_s, "at most window_s with the policy 'baseline'");
+  requireOption(window_events >= 1, "window_events", window_events, "1 or above");
+  requireOption(min_baseline_ratio > 0 && min_baseline_ratio <= 10, "min_baseline_ratio",
+                min_baseline_ratio, "above 0, at most 10");
+  requireOption(min_visible_share >= 0 && min_visible_share <= 1, "min_visible_share",
+                min_visible_share, "0 to 1");
+}
+
+std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& options,
+                                                   double depth_guess_m) {
+  options.validate();
+  switch (options.policy) {
+    case KeyframePolicyKind::kPeriod:
+      return std::make_unique<PeriodPolicy>(options);
+    case KeyframePolicyKind::kEvents:
+      return std::make_unique<EventsPolicy>(options);
+    case KeyframePolicyKind::kBaseline:
+      return std::make_unique<BaselinePolicy>(options, depth_guess_m);
+  }
+  return nullptr;
+}
+
+std::unique_ptr<KeyframePolicy> makeSingleWindowPolicy(const Window& window) {
+  return std::make_unique<SingleWindowPolicy>(window);
+}
+
+}  // namespace efm

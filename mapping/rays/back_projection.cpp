@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/rays/back_projection.h"
+
+#include <cstdint>
+
+namespace efm {
+namespace {
+
+/// A ray of the reference view.
+struct ProjectedRay {
+  float x = 0;  ///< Where it meets the plane at infinity, pixels.
+  float y = 0;
+  float z = 0;  ///< Negative where it runs towards smaller z.
+};
+
+/// From a camera's rays to pixels on the reference view's plane at infinity. The principal point is
+/// added last, so that errors of rounding grow with the distance from it.
+///
+/// Floats: coordinates are at most 3e-4 pixels off at HD, which no vote shows, and four rays are
+/// computed at once on any x86-64 processor.
+class InfinityHomography {
+ public:
+  InfinityHomography(const Rigid3& T_ref_cam, const ReferenceView& view)
+      : cx_(static_cast<float>(view.cx)), cy_(static_cast<float>(view.cy)) {
+    const Eigen::Matrix3d R_ref_cam = T_ref_cam.rotation.toRotationMatrix();
+    const Eigen::Matrix3d H_ref_cam = Eigen::Vector3d(view.fx, view.fy, 1).asDiagonal() * R_ref_cam;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) H_ref_cam_[i][j] = static_cast<float>(H_ref_cam(i, j));
+    }
+  }
+
+  ProjectedRay operator()(float ray_x, float ray_y) const {
+    const auto row = [&](int i) {
+      return H_ref_cam_[i][0] * ray_x + H_ref_cam_[i][1] * ray_y + H_ref_cam_[i][2];
+    };
+    const float z = row(2);
+    const float inverse_z = 1.0F / z;
+    return {row(0) * inverse_z + cx_, row(1) * inverse_z + cy_, z};
+  }
+
+ private:
+  float H_ref_cam_[3][3];
+  float cx_;
+  float cy_;
+};
+
+/// Appends the rays of packets to a bundle.
+class BundleBuilder {
+ public:
+  BundleBuilder(EventSpan events, const UndistortionTable& undistortion, const ReferenceView& view,
+                RayBundle& bundle)
+      : events_(events), undistortion_(undistortion), view_(view), bundle_(bundle) {}
+
+  void append(const PosePacket& packet) {
+    const InfinityHomography project(packet.T_ref_cam, view_);
+    const std::size_t begin = bundle_.size();
+    lookUp(packet);
+    if (projectFrom(begin, project) == 0) {
+      close(packet, begin, true);
+      return;
+    }
+    // Rare: the camera looks sideways or back. By direction, each in the order of time.
+    resize(begin);
+    appendSome(packet, project, true);
+    appendSome(packet, project, false);
+  }
+
+ private:
+  const Eigen::Vector2f& rayOf(const Event& event) const {
+    return undistortion_
+        .rays()[std::size_t{event.y} * static_cast<std::size_t>(undistortion_.width()) + event.x];
+  }
+
+  void resize(std::size_t rays) {
+    bundle_.x_inf.resize(rays);
+    bundle_.y_inf.resize(rays);
+  }
+
+  /// Appends the rays of frame `cam`. Apart from projecting them: what looks up cannot be
+  /// vectorised.
+  void lookUp(const PosePacket& packet) {
+    const std::size_t first = bundle_.size();
+    const std::size_t count = packet.end - packet.begin;
+    resize(first + count);
+    float* x = bundle_.x_inf.data() + first;
+    float* y = bundle_.y_inf.data() + first;
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector2f& ray = rayOf(events_[packet.begin + i]);
+      x[i] = ray.x();
+      y[i] = ray.y();
+    }
+  }
+
+  /// Projects the rays from `begin` on in place. The homography is a copy, which writing to the
+  /// rays cannot change: it stays in registers. @return how many of them run backward.
+  std::uint32_t projectFrom(std::size_t begin, const InfinityHomography project) {
+    const std::size_t count = bundle_.size() - begin;
+    float* x = bundle_.x_inf.data() + begin;
+    float* y = bundle_.y_inf.data() + begin;
+    std::uint32_t backward = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const ProjectedRay ray = project(x[i], y[i]);
+      x[i] = ray.x;
+      y[i] = ray.y;
+      backward += ray.z < 0 ? 1 : 0;
+    }
+    return backward;
+  }
+
+  /// The packet's rays of one direction alone.
+  void appendSome(const PosePacket& packet, const InfinityHomography& project, bool forward) {
+    const std::size_t begin = bundle_.size();
+    for (std::size_t i = packet.begin; i < packet.end; ++i) {
+      const Eigen::Vector2f& ray_cam = rayOf(events_[i]);
+      const ProjectedRay ray = project(ray_cam.x(), ray_cam.y());
+      if ((ray.z < 0) == forward) continue;
+      bundle_.x_inf.push_back(ray.x);
+      bundle_.y_inf.push_back(ray.y);
+    }
+    close(packet, begin, forward);
+  }
+
+  void close(const PosePacket& packet, std::size_t begin, bool forward) {
+    if (bundle_.size() == begin) return;
+    bundle_.packets.push_back({begin, bundle_.size(), packet.T_ref_cam.translation, forward});
+  }
+
+  EventSpan events_;
+  const UndistortionTable& undistortion_;
+  ReferenceView view_;
+  RayBundle& bundle_;
+};
+
+}  // namespace
+
+RayBundle backProject(EventSpan events, const PosePackets& packets,
+                      const UndistortionTable& undistortion, const ReferenceView& view) {
+  std::size_t rays = 0;
+  for (const PosePacket& packet : packets.packets) rays += packet.end - packet.begin;
+  RayBundle bundle;
+  bundle.x_inf.reserve(rays);
+  bundle.y_inf.reserve(rays);
+  bundle.packets.reserve(packets.packets.size());
+  BundleBuilder builder(events, undistortion, view, bundle);
+  for (const PosePacket& packet : packets.packets) builder.append(packet);
+  return bundle;
+}
+
+PlaneTransfer transferToPlane(const RayPacket& packet, const ReferenceView& view, double depth_m) {
+  const Eigen::Vector3d& center_ref = packet.center_ref;
+  const double nearer = center_ref.z() / depth_m;  // C_z / Z
+  return {1.0 - nearer, (view.fx * center_ref.x() + view.cx * center_ref.z()) / depth_m,
+          (view.fy * center_ref.y() + view.cy * center_ref.z()) / depth_m,
+          packet.forward ? nearer < 1.0 : nearer > 1.0};
+}
+
+}  // namespace efm

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/cloud/keyframe_cloud.h"
+
+#include <stdexcept>
+
+namespace efm {
+namespace {
+
+void appendPoints(const DepthMap& map, const ReferenceView& view, std::vector<ViewPoint>& points) {
+  const cv::Size size(view.width, view.height);
+  if (map.depth.size() != size || map.confidence.size() != size) {
+    throw std::invalid_argument("the keyframe's images are not of its view's size");
+  }
+  for (int y = 0; y < view.height; ++y) {
+    const float* depth_row = map.depth[y];
+    const float* confidence_row = map.confidence[y];
+    for (int x = 0; x < view.width; ++x) {
+      if (!(depth_row[x] > 0) || !(confidence_row[x] > 0)) continue;
+      points.push_back({view.pointAt(x, y, depth_row[x]).cast<float>(), confidence_row[x]});
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe) {
+  std::vector<ViewPoint> points;
+  appendPoints(keyframe.map, keyframe.view, points);
+  return points;
+}
+
+std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe) {
+  std::vector<ViewPoint> points;
+  for (const CameraDepthMap& camera : keyframe.camera_maps) {
+    appendPoints(camera.map, keyframe.view, points);
+  }
+  return points;
+}
+
+std::vector<CloudPoint> placedInWorld(const std::vector<ViewPoint>& points,
+                                      const Rigid3& T_world_ref) {
+  std::vector<CloudPoint> placed;
+  placed.reserve(points.size());
+  for (const ViewPoint& point : points) {
+    placed.push_back({T_world_ref * point.p_ref.cast<double>(), point.confidence});
+  }
+  return placed;
+}
+
+std::vector<CloudPoint> keyframeCloud(const KeyframeDepthMap& keyframe) {
+  return placedInWorld(viewPoints(keyframe), keyframe.T_world_ref);
+}
+
+std::vector<CloudPoint> lateFusionCloud(const KeyframeDepthMap& keyframe) {
+  return placedInWorld(lateFusionPoints(keyframe), keyframe.T_world_ref);
+}
+
+}  // namespace efm

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/io/point_record.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include "mapping/options/quoted_text.h"
+
+namespace efm {
+namespace {
+
+/// The fields of interest; an intensity may be missing.
+constexpr std::array<std::string_view, 4> kNames = {"x", "y", "z", "intensity"};
+
+using Values = std::array<double, 4>;
+
+/// Where each of them is among the fields.
+using FieldPlaces = std::array<std::optional<std::size_t>, 4>;
+
+FieldPlaces findFields(const std::vector<RecordField>& fields) {
+  FieldPlaces places;
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    std::string known;
+    for (std::size_t at = 0; at < fields.size(); ++at) {
+      known += (known.empty() ? "" : ", ") + printable(fields[at].name);
+      if (fields[at].name != kNames[i]) continue;
+      const std::string called = "field " + std::string(kNames[i]);
+      if (places[i]) throw std::runtime_error(called + " is there twice: expected it once");
+      if (fields[at].count != 1) {
+        throw std::runtime_error(called + " has " + std::to_string(fields[at].count) +
+                                 " numbers: expected 1");
+      }
+      places[i] = at;
+    }
+    if (!places[i] && kNames[i] != "intensity") {
+      throw std::runtime_error("no field " + std::string(kNames[i]) +
+                               ": expected x, y and z among the fields (" + known + ")");
+    }
+  }
+  return places;
+}
+
+void append(PointCloudContent& content, const Values& values) {
+  const Eigen::Vector3d p_world(values[0], values[1], values[2]);
+  if (p_world.allFinite()) {
+    content.points.push_back({p_world, static_cast<float>(values[3])});
+  } else {
+    ++content.without_place;
+  }
+}
+
+template <typename Number>
+bool parseWhole(std::string_view word, double& value) {
+  Number number = 0;
+  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
+  value = static_cast<double>(number);
+  return error == std::errc() && stop == word.data() + word.size();
+}
+
+/// Rounds to the type of the field, as a binary file would have it.
+template <typename Real>
+bool parseReal(std::string_view word, double& value) {
+  Real number = 0;
+  const char* end = word.data() + word.size();
+  const auto [stop, error] = std::from_chars(word.data(), end, number);
+  if (stop != end) return false;
+  if (error == std::errc::result_out_of_range) {  // too large, or so small that it is zero
+    long double wide = 0;
+    if (std::from_chars(word.data(), end, wide).ec != std::errc() || std::abs(wide) > 1) {
+      return false;
+    }
+    number = static_cast<Real>(wide);
+  }
+  value = static_cast<double>(number);
+  return error == std::errc() || error == std::errc::result_out_of_range;
+}
+
+bool parseNumber(std::string_view word, NumberType type, double& value) {
+  switch (type) {
+    case NumberType::kFloat32:
+      return parseReal<float>(word, value);
+    case NumberType::kFloat64:
+      return parseReal<double>(word, value);
+    case NumberType::kUint8:
+    case NumberType::kUint16:
+    case NumberType::kUint32:
+    case NumberType::kUint64:
+      return parseWhole<std::uint64_t>(word, value);
+    default:
+      return parseWhole<std::int64_t>(word, value);
+  }
+}
+
+template <typename Number, typename Bits>
+double bitsAs(std::uint64_t bits) {
+  static_assert(sizeof(Number) == sizeof(Bits));
+  const auto same_size = static_cast<Bits>(bits);
+  Number number;
+  std::memcpy(&number, &same_size, sizeof(number));
+  return static_cast<double>(number);
+}
+
+double numberAt(const char* at, NumberType type, bool big_endian) {
+  const std::size_t size = sizeOf(type);
+  std::uint64_t bits = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    const auto byte = static_cast<unsigned char>(at[big_endian ? i : size - 1 - i]);
+    bits = bits << 8U | byte;
+  }
+  switch (type) {
+    case NumberType::kInt8:
+      return bitsAs<std::int8_t, std::uint8_t>(bits);
+    case NumberType::kInt16:
+      return bitsAs<std::int16_t, std::uint16_t>(bits);
+    case NumberType::kInt32:
+      return bitsAs<std::int32_t, std::uint32_t>(bits);
+    case NumberType::kInt64:
+      return bitsAs<std::int64_t, std::uint64_t>(bits);
+    case NumberType::kFloat32:
+      return bitsAs<float, std::uint32_t>(bits);
+    case NumberType::kFloat64:
+      return bitsAs<double, std::uint64_t>(bits);
+    default:
+      return static_cast<double>(bits);
+  }
+}
+
+}  // namespace
+
+std::size_t sizeOf(NumberType type) {
+  switch (type) {
+    case NumberType::kInt8:
+    case NumberType::kUint8:
+      return 1;
+    case NumberType::kInt16:
+    case NumberType::kUint16:
+      return 2;
+    case NumberType::kInt32:
+    case NumberType::kUint32:
+    case NumberType::kFloat32:
+      return 4;
+    default:
+      return 8;
+  }
+}
+
+std::size_t bytesOf(const std::vector<RecordField>& fields) {
+  std::size_t bytes = 0;
+  for (const RecordField& field : fields) bytes += field.count * sizeOf(field.type);
+  return bytes;
+}
+
+PointCloudContent readTextRecords(FileCursor& cursor, const std::vector<RecordField>& fields,
+                                  std::uint64_t count) {
+  const FieldPlaces places = findFields(fields);
+  std::size_t numbers = 0;
+  for (const RecordField& field : fields) numbers += field.count;
+
+  PointCloudContent content;
+  for (std::uint64_t i = 0; i < count;) {
+    const WordLine line =
+        wordLine(cursor, "point " + std::to_string(i + 1) + " of " + std::to_string(count));
+    if (line.words.empty()) continue;
+    if (line.words.size() != numbers) {
+      line.refuse("point " + std::to_string(i + 1) + " has " + std::to_string(line.words.size()) +
+                  " numbers: expected " + std::to_string(numbers));
+    }
+    Values values = {0, 0, 0, 1};
+    auto word = line.words.begin();
+    for (std::size_t at = 0; at < fields.size(); ++at) {
+      for (std::size_t n = 0; n < fields[at].count; ++n, ++word) {
+        double value = 0;
+        if (!parseNumber(*word, fields[at].type, value)) {
+          line.refuse(printable(fields[at].name) + " " + inQuotes(*word) +
+                      ": expected a number of the field's type");
+        }
+        for (std::size_t j = 0; j < places.size(); ++j) {
+          if (places[j] == at) values[j] = value;
+        }
+      }
+    }
+    append(content, values);
+    ++i;
+  }
+  return content;
+}
+
+PointCloudContent readBinaryRecords(FileCursor& cursor, const std::vector<RecordField>& fields,
+                                    std::uint64_t count, const RecordOrder& order) {
+  const FieldPlaces places = findFields(fields);
+  const std::size_t record_bytes = bytesOf(fields);
+  if (cursor.left() / record_bytes < count) {
+    cursor.refuse(std::to_string(cursor.left()) + " bytes are left: expected " +
+                  std::to_string(count) + " points of " + std::to_string(record_bytes) +
+                  " bytes: is the file cut short?");
+  }
+  const auto points = static_cast<std::size_t>(count);
+  const char* bytes = cursor.take(points * record_bytes).data();
+
+  PointCloudContent content;
+  content.points.reserve(points);
+  for (std::size_t i = 0; i < points; ++i) {
+    Values values = {0, 0, 0, 1};
+    std::size_t before = 0;  // bytes of a point in the fields before this one
+    for (std::size_t at = 0; at < fields.size(); ++at) {
+      const std::size_t size = fields[at].count * sizeOf(fields[at].type);
+      for (std::size_t j = 0; j < places.size(); ++j) {
+        if (places[j] != at) continue;
+        const std::size_t offset =
+            order.by_field ? points * before + i * size : i * record_bytes + before;
+        values[j] = numberAt(bytes + offset, fields[at].type, order.big_endian);
+      }
+      before += size;
+    }
+    append(content, values);
+  }
+  return content;
+}
+
+}  // namespace efm

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/io/text_scanner.h"
+
+#include <algorithm>
+#include <charconv>
+#include <stdexcept>
+
+#include "mapping/options/quoted_text.h"
+
+namespace efm {
+
+std::string_view FileCursor::line(std::string_view expected) {
+  const std::size_t end = rest_.find('\n');
+  if (end == std::string_view::npos) {
+    const std::string place = "line " + std::to_string(lines_ + 1) + ": ";
+    throw std::runtime_error(
+        place + (rest_.empty() ? "the file ends" : inQuotes(rest_) + ", then the file ends") +
+        ": expected " + std::string(expected) +
+        (rest_.empty() ? "" : " and the end of the line: is the file cut short?"));
+  }
+  ++lines_;
+  std::string_view line = take(end + 1);
+  line.remove_suffix(1);
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return line;
+}
+
+std::string_view FileCursor::take(std::size_t bytes) {
+  const std::string_view taken = rest_.substr(0, bytes);
+  rest_.remove_prefix(taken.size());
+  return taken;
+}
+
+void FileCursor::refuse(const std::string& why) const {
+  throw std::runtime_error("byte " + std::to_string(bytes_.size() - rest_.size()) + ": " + why);
+}
+
+void FileCursor::expectEnd() const {
+  if (rest_.find_first_not_of(" \t\r\n") == std::string_view::npos) return;
+  refuse(std::to_string(rest_.size()) + " more bytes: expected the end of the file");
+}
+
+void WordLine::refuse(const std::string& why) const {
+  throw std::runtime_error("line " + std::to_string(number) + ": " + why);
+}
+
+std::uint64_t WordLine::count(std::size_t word) const {
+  const std::string_view text = word < words.size() ? words[word] : std::string_view{};
+  std::uint64_t count = 0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), count);
+  if (text.empty() || stop != text.data() + text.size() || error != std::errc()) {
+    refuse(inQuotes(text) + ": expected a whole number from 0 on");
+  }
+  return count;
+}
+
+WordLine wordLine(FileCursor& cursor, std::string_view expected) {
+  constexpr std::string_view kBlanks = " \t";
+  const std::string_view text = cursor.line(expected);
+  WordLine line;
+  line.number = cursor.lineNumber();
+  for (std::size_t at = text.find_first_not_of(kBlanks); at != std::string_view::npos;
+       at = text.find_first_not_of(kBlanks, at)) {
+    const std::size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
+    line.words.push_back(text.substr(at, end - at));
+    at = end;
+  }
+  return line;
+}
+
+}  // namespace efm

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/metrics/precision_recall.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <stdexcept>
+
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+double shareOf(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// The smallest error of the estimates within the tolerance around a pixel with a truth, in
+/// metres; infinite where there is none.
+double nearestEstimate(const ComparedDepths& depths, cv::Point pixel, int reach) {
+  const double truth_m = depths.truth(pixel);
+  double nearest_m = std::numeric_limits<double>::infinity();
+  const int bottom = std::min(depths.estimate.rows - 1, pixel.y + reach);
+  const int right = std::min(depths.estimate.cols - 1, pixel.x + reach);
+  for (int y = std::max(0, pixel.y - reach); y <= bottom; ++y) {
+    for (int x = std::max(0, pixel.x - reach); x <= right; ++x) {
+      if (!depths.hasEstimate(y, x)) continue;
+      nearest_m = std::min(nearest_m, std::abs(depths.estimate(y, x) - truth_m));
+    }
+  }
+  return nearest_m;
+}
+
+}  // namespace
+
+double PrecisionRecall::precision(std::size_t step) const {
+  return shareOf(steps.at(step).correct_estimates, estimates);
+}
+
+double PrecisionRecall::recall(std::size_t step) const {
+  return shareOf(steps.at(step).found_truths, truths);
+}
+
+double PrecisionRecall::f1(std::size_t step) const {
+  const double p = precision(step);
+  const double r = recall(step);
+  return p + r > 0 ? 2 * p * r / (p + r) : 0;
+}
+
+void PrecisionRecall::add(const PrecisionRecall& other) {
+  const bool same =
+      std::equal(steps.begin(), steps.end(), other.steps.begin(), other.steps.end(),
+                 [](const Step& a, const Step& b) { return a.threshold_m == b.threshold_m; });
+  if (!same) throw std::invalid_argument("precision and recall of different thresholds");
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    steps[k].correct_estimates += other.steps[k].correct_estimates;
+    steps[k].found_truths += other.steps[k].found_truths;
+  }
+  estimates += other.estimates;
+  truths += other.truths;
+  estimates_without_truth += other.estimates_without_truth;
+}
+
+std::vector<double> usualDepthThresholds() {
+  return {0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1, 2, 5};
+}
+
+PrecisionRecall precisionRecall(const ComparedDepths& depths,
+                                const std::vector<double>& thresholds_m,
+                                const DepthPairingOptions& options) {
+  options.validate();
+  depths.validate();
+  PrecisionRecall counts;
+  for (const double threshold_m : thresholds_m) {
+    requireOption(threshold_m > 0, "threshold", threshold_m, "above 0 (metres)");
+    counts.steps.push_back({threshold_m, 0, 0});
+  }
+  for (int y = 0; y < depths.truth.rows; ++y) {
+    for (int x = 0; x < depths.truth.cols; ++x) {
+      if (depths.hasEstimate(y, x)) {
+        const double truth_m = bestTruth(depths, {x, y}, options);
+        ++(truth_m > 0 ? counts.estimates : counts.estimates_without_truth);
+        const double error_m = std::abs(depths.estimate(y, x) - truth_m);
+        for (PrecisionRecall::Step& step : counts.steps) {
+          if (truth_m > 0 && error_m <= step.threshold_m) ++step.correct_estimates;
+        }
+      }
+      if (depths.hasTruth(y, x, options)) {
+        ++counts.truths;
+        const double error_m = nearestEstimate(depths, {x, y}, options.tolerance_px);
+        for (PrecisionRecall::Step& step : counts.steps) {
+          if (error_m <= step.threshold_m) ++step.found_truths;
+        }
+      }
+    }
+  }
+  return counts;
+}
+
+}  // namespace efm

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/metrics/sample_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "mapping/options/option_check.h"
+
+namespace efm {
+
+SampleStatistics statisticsOf(const std::vector<double>& values) {
+  SampleStatistics statistics;
+  statistics.count = values.size();
+  if (values.empty()) return statistics;
+  const auto count = static_cast<double>(values.size());
+  double sum = 0;
+  double squares = 0;
+  for (const double value : values) {
+    sum += value;
+    squares += value * value;
+  }
+  statistics.mean = sum / count;
+  statistics.rms = std::sqrt(squares / count);
+  double differences = 0;
+  for (const double value : values) {
+    differences += (value - statistics.mean) * (value - statistics.mean);
+  }
+  statistics.deviation = std::sqrt(differences / count);
+  const auto [least, largest] = std::minmax_element(values.begin(), values.end());
+  statistics.least = *least;
+  statistics.largest = *largest;
+  statistics.median = medianOf(values);
+  return statistics;
+}
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+double quantileOf(std::vector<double> values, double share) {
+  requireOption(share > 0 && share <= 1, "share", share, "above 0 and at most 1");
+  if (values.empty()) return 0;
+  // The slack is for shares like 0.9, whose product with ten is a little over nine.
+  const double rank = std::ceil(share * static_cast<double>(values.size()) * (1 - 1e-12));
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(std::max(1.0, rank)) - 1;
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+}  // namespace efm

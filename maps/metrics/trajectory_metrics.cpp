@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/metrics/trajectory_metrics.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <stdexcept>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+/// Of the second largest spread of positions, against the largest (both squared): below it a line.
+constexpr double kLine = 1e-12;
+constexpr double kMaxSpacingError = 0.2;
+
+using Positions = Eigen::Matrix3Xd;
+
+void requireSpread(const Positions& positions, const char* whose) {
+  const Positions centred = positions.colwise() - positions.rowwise().mean();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(centred * centred.transpose());
+  const Eigen::Vector3d& spreads = svd.singularValues();
+  if (spreads[1] > kLine * spreads[0]) return;
+  throw std::invalid_argument(std::string("the ") + whose +
+                              " positions lie on a line: no rotation of least squares");
+}
+
+Rigid3 umeyama(const std::vector<PosePair>& pairs) {
+  if (pairs.size() < 3) {
+    throw std::invalid_argument(std::to_string(pairs.size()) +
+                                " pairs of poses: expected at least 3 to align by");
+  }
+  const auto count = static_cast<Eigen::Index>(pairs.size());
+  Positions estimated(3, count);
+  Positions truth(3, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const PosePair& pair = pairs[static_cast<std::size_t>(i)];
+    estimated.col(i) = pair.T_map_rig.translation;
+    truth.col(i) = pair.T_world_rig.translation;
+  }
+  requireSpread(estimated, "estimated");
+  requireSpread(truth, "true");
+  const Eigen::Matrix4d T_world_map = Eigen::umeyama(estimated, truth, false);
+  return {Eigen::Quaterniond(Eigen::Matrix3d(T_world_map.topLeftCorner<3, 3>())).normalized(),
+          T_world_map.topRightCorner<3, 1>()};
+}
+
+/// How far each pair lies along the trajectory, in the spacing's unit; never decreases.
+std::vector<double> placesAlong(const std::vector<PosePair>& pairs, RelativeSpacing::Unit unit) {
+  std::vector<double> places;
+  places.reserve(pairs.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (unit == RelativeSpacing::Unit::kFrames) {
+      places.push_back(static_cast<double>(i));
+    } else if (unit == RelativeSpacing::Unit::kSeconds) {
+      places.push_back(secondsBetween(pairs.front().t_ns, pairs[i].t_ns));
+    } else if (i == 0) {
+      places.push_back(0);
+    } else {
+      const Eigen::Vector3d step =
+          pairs[i].T_world_rig.translation - pairs[i - 1].T_world_rig.translation;
+      places.push_back(places.back() + step.norm());
+    }
+  }
+  return places;
+}
+
+/// The place nearest to `target` from place `first` on, off by less than `limit`.
+std::optional<std::size_t> nearestPlace(const std::vector<double>& places, std::size_t first,
+                                        double target, double limit) {
+  const auto begin = places.begin() + static_cast<std::ptrdiff_t>(first);
+  auto nearest = std::lower_bound(begin, places.end(), target);
+  if (nearest != begin &&
+      (nearest == places.end() || target - *(nearest - 1) <= *nearest - target)) {
+    // Equal places may stand before: the first of them.
+    nearest = std::lower_bound(begin, nearest, *(nearest - 1));
+  }
+  if (nearest == places.end() || !(std::abs(*nearest - target) < limit)) return std::nullopt;
+  return static_cast<std::size_t>(nearest - places.begin());
+}
+
+}  // namespace
+
+Rigid3 alignTrajectories(const std::vector<PosePair>& pairs, TrajectoryAlignment alignment) {
+  if (pairs.empty()) throw std::invalid_argument("no pairs of poses to align by");
+  switch (alignment) {
+    case TrajectoryAlignment::kSe3:
+      return umeyama(pairs);
+    case TrajectoryAlignment::kOrigin:
+      return pairs.front().T_world_rig * pairs.front().T_map_rig.inverse();
+    case TrajectoryAlignment::kNone:
+      break;
+  }
+  return {};
+}
+
+PoseErrors absoluteErrors(const std::vector<PosePair>& pairs, const Rigid3& T_world_map) {
+  PoseErrors errors;
+  for (const PosePair& pair : pairs) {
+    const Rigid3 T_world_aligned = T_world_map * pair.T_map_rig;
+    errors.translation_m.push_back(
+        (pair.T_world_rig.translation - T_world_aligned.translation).norm());
+    errors.rotation_rad.push_back(
+        pair.T_world_rig.rotation.angularDistance(T_world_aligned.rotation));
+  }
+  return errors;
+}
+
+PoseErrors relativeErrors(const std::vector<PosePair>& pairs, const RelativeSpacing& spacing) {
+  const bool frames = spacing.unit == RelativeSpacing::Unit::kFrames;
+  requireOption(spacing.amount > 0 && std::isfinite(spacing.amount) &&
+                    (!frames || std::floor(spacing.amount) == spacing.amount),
+                "spacing", spacing.amount, "above 0, of frames a whole number");
+  const std::vector<double> places = placesAlong(pairs, spacing.unit);
+  PoseErrors errors;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto j =
+        nearestPlace(places, i, places[i] + spacing.amount, kMaxSpacingError * spacing.amount);
+    if (!j || *j == i) continue;
+    const Rigid3 T_ti_tj = pairs[i].T_world_rig.inverse() * pairs[*j].T_world_rig;
+    const Rigid3 T_ei_ej = pairs[i].T_map_rig.inverse() * pairs[*j].T_map_rig;
+    const Rigid3 error = T_ti_tj.inverse() * T_ei_ej;
+    errors.translation_m.push_back(error.translation.norm());
+    errors.rotation_rad.push_back(error.rotation.angularDistance(Eigen::Quaterniond::Identity()));
+  }
+  return errors;
+}
+
+double trueLength(const std::vector<PosePair>& pairs) {
+  return pairs.empty() ? 0 : placesAlong(pairs, RelativeSpacing::Unit::kMetres).back();
+}
+
+}  // namespace efm

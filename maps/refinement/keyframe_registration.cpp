@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/keyframe_registration.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+/// From one round to the next.
+constexpr double kShrink = 0.65;
+/// Rounds with all points, once neighbours are as near as they must be.
+constexpr int kLastRounds = 2;
+/// Points that take part before that, and iterations: the next round changes the neighbours anyway.
+constexpr std::size_t kCoarsePoints = 300;
+constexpr int kCoarseIterations = 2;
+
+/// A keyframe's points beside the map's.
+struct Neighbours {
+  std::vector<PointPair> pairs;
+  std::vector<std::size_t> place;  ///< Of each pair's keyframe in the map.
+  std::size_t seen = 0;
+  std::size_t inliers = 0;
+};
+
+Eigen::Matrix3d sqrtInformationOf(const Eigen::Matrix3d& covariance) {
+  return covariance.llt().matrixL().solve(Eigen::Matrix3d::Identity());
+}
+
+class NeighbourSearch {
+ public:
+  NeighbourSearch(const RegistrationCloud& cloud, const std::vector<MapKeyframe>& map)
+      : cloud_(cloud), map_(map) {
+    for (const MapKeyframe& from : map) {
+      R_world_from_.push_back(from.T_world_ref.rotation.toRotationMatrix());
+    }
+  }
+
+  /// @param stride takes every so manieth point.
+  Neighbours find(const Rigid3& T_world_ref, double max_distance_px, std::size_t stride) const {
+    Neighbours found;
+    const Eigen::Matrix3d R_world_ref = T_world_ref.rotation.toRotationMatrix();
+    std::vector<Rigid3> T_from_ref;
+    for (const MapKeyframe& from : map_) {
+      T_from_ref.push_back(from.T_world_ref.inverse() * T_world_ref);
+    }
+    for (std::size_t i = 0; i < cloud_.numChosen(); i += stride) {
+      const RegistrationPoint& point = cloud_.points()[i];
+      const Eigen::Vector3d p_ref = point.p_ref.cast<double>();
+      const Eigen::Matrix3d own =
+          R_world_ref * point.covariance.cast<double>() * R_world_ref.transpose();
+      const std::size_t before = found.pairs.size();
+      bool seen = false;
+      for (std::size_t m = 0; m < map_.size(); ++m) {
+        const Eigen::Vector3d p_from = T_from_ref[m] * p_ref;
+        seen = seen || map_[m].cloud->sees(p_from);
+        const auto index = map_[m].cloud->nearest(p_from, max_distance_px);
+        if (!index) continue;
+        const RegistrationPoint& neighbour = map_[m].cloud->points()[*index];
+        const Eigen::Matrix3d covariance = own + R_world_from_[m] *
+                                                     neighbour.covariance.cast<double>() *
+                                                     R_world_from_[m].transpose();
+        found.pairs.push_back({map_[m].T_world_ref * neighbour.p_ref.cast<double>(), p_ref,
+                               sqrtInformationOf(covariance)});
+        found.place.push_back(m);
+      }
+      const bool inlier = found.pairs.size() > before;
+      if (seen || inlier) ++found.seen;
+      if (inlier) ++found.inliers;
+    }
+    return found;
+  }
+
+ private:
+  const RegistrationCloud& cloud_;
+  const std::vector<MapKeyframe>& map_;
+  std::vector<Eigen::Matrix3d> R_world_from_;
+};
+
+/// About how far the prior may misplace a point in the image.
+double uncertaintyPx(const RegistrationCloud& cloud, const PosePrior& prior) {
+  const Matrix6d covariance =
+      (prior.sqrt_information.transpose() * prior.sqrt_information).inverse();
+  const double sigma_m = std::sqrt(covariance.diagonal().head<3>().maxCoeff());
+  const double sigma_rad = std::sqrt(covariance.diagonal().tail<3>().maxCoeff());
+  return cloud.focalPx() * (sigma_rad + sigma_m * cloud.middleInverseDepth());
+}
+
+/// The normal equations of the pairs with one keyframe of the map.
+struct NormalEquations {
+  Matrix6d information = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+};
+
+Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+/// The factor whose error has these normal equations: |A d + b|^2 with A^T A the information and
+/// A^T b the gradient. Directions that the pairs leave open have rows of zeros.
+RelativePoseFactor factorOf(const NormalEquations& equations, const Rigid3& T_from_to) {
+  constexpr double kLeastShare = 1e-9;
+  RelativePoseFactor factor;
+  factor.T_from_to = T_from_to;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(equations.information);
+  const Vector6d roots = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Vector6d turned = eigen.eigenvectors().transpose() * equations.gradient;
+  factor.sqrt_information.setZero();
+  for (int i = 0; i < 6; ++i) {
+    if (roots[i] <= kLeastShare * roots.maxCoeff()) continue;
+    factor.sqrt_information.row(i) = roots[i] * eigen.eigenvectors().col(i).transpose();
+    factor.offset[i] = turned[i] / roots[i];
+  }
+  return factor;
+}
+
+void summarise(const Neighbours& found, const std::vector<MapKeyframe>& map, std::size_t number,
+               double robust_sigmas, Registration& registration) {
+  const Rigid3& T_world_ref = registration.T_world_ref;
+  const Eigen::Matrix3d R_world_ref = T_world_ref.rotation.toRotationMatrix();
+  std::vector<NormalEquations> equations(map.size());
+  std::vector<bool> shares(map.size());
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < found.pairs.size(); ++i) {
+    const PointPair& pair = found.pairs[i];
+    const Eigen::Vector3d error = pair.sqrt_information * (pair.p_map - T_world_ref * pair.p_ref);
+    Eigen::Matrix<double, 3, 6> jacobian;  // by a small motion in frame `ref`
+    jacobian.leftCols<3>() = -pair.sqrt_information * R_world_ref;
+    jacobian.rightCols<3>() = pair.sqrt_information * R_world_ref * crossMatrix(pair.p_ref);
+    const double weight = 1 / (1 + error.squaredNorm() / (robust_sigmas * robust_sigmas));
+    NormalEquations& sums = equations[found.place[i]];
+    sums.information += weight * jacobian.transpose() * jacobian;
+    sums.gradient += weight * jacobian.transpose() * error;
+    shares[found.place[i]] = true;
+    errors.push_back(error.norm());
+  }
+  for (std::size_t m = 0; m < map.size(); ++m) {
+    if (!shares[m]) continue;
+    RelativePoseFactor factor = factorOf(equations[m], map[m].T_world_ref.inverse() * T_world_ref);
+    factor.from = map[m].keyframe;
+    factor.to = number;
+    registration.factors.push_back(factor);
+  }
+  registration.seen = found.seen;
+  registration.inliers = found.inliers;
+  if (errors.empty()) return;
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  registration.median_error = *middle;
+}
+
+}  // namespace
+
+void KeyframeRegistrationOptions::validate() const {
+  requireOption(last_distance_px > 0 && last_distance_px <= 1e4, "last_distance_px",
+                last_distance_px, "above 0, at most 10000 (pixels)");
+  requireOption(first_distance_px >= last_distance_px && first_distance_px <= 1e4,
+                "first_distance_px", first_distance_px, "from last_distance_px to 10000 (pixels)");
+  alignment.validate();
+}
+
+double Registration::inlierRatio() const {
+  return seen > 0 ? static_cast<double>(inliers) / static_cast<double>(seen) : 0;
+}
+
+Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud,
+                              const std::vector<MapKeyframe>& map, const PosePrior& prior,
+                              const KeyframeRegistrationOptions& options) {
+  const NeighbourSearch search(cloud, map);
+  Registration registration;
+  Rigid3& T_world_ref = registration.T_world_ref;
+  T_world_ref = prior.T_map_ref;
+
+  AlignmentOptions coarse = options.alignment;
+  coarse.max_iterations = std::min(coarse.max_iterations, kCoarseIterations);
+  const std::size_t stride = std::max<std::size_t>(1, cloud.numChosen() / kCoarsePoints);
+  constexpr double kSigmas = 3;
+  double distance_px = std::min(kSigmas * uncertaintyPx(cloud, prior), options.first_distance_px);
+  for (; distance_px > options.last_distance_px; distance_px *= kShrink) {
+    const Neighbours found = search.find(T_world_ref, distance_px, stride);
+    T_world_ref = alignToMap(found.pairs, prior, T_world_ref, coarse);
+  }
+  for (int round = 0; round < kLastRounds; ++round) {
+    const Neighbours found = search.find(T_world_ref, options.last_distance_px, 1);
+    T_world_ref = alignToMap(found.pairs, prior, T_world_ref, options.alignment);
+  }
+
+  summarise(search.find(T_world_ref, options.last_distance_px, 1), map, number,
+            options.alignment.robust_sigmas, registration);
+  registration.from_prior =
+      (prior.sqrt_information * differenceOf(prior.T_map_ref.inverse() * T_world_ref)).norm();
+  return registration;
+}
+
+}  // namespace efm

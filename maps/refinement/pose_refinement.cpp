@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/pose_refinement.h"
+
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+// Ceres writes to stderr what is wrong with numbers that are none.
+bool isFinite(const Rigid3& pose) {
+  return pose.translation.allFinite() && pose.rotation.coeffs().allFinite();
+}
+
+bool isFinite(const PointPair& pair) {
+  return pair.p_map.allFinite() && pair.p_ref.allFinite() && pair.sqrt_information.allFinite();
+}
+
+bool isFinite(const RelativePoseFactor& factor) {
+  return isFinite(factor.T_from_to) && factor.sqrt_information.allFinite() &&
+         factor.offset.allFinite();
+}
+
+bool isFinite(const PoseGraph& graph) {
+  const auto finite = [](const auto& value) { return isFinite(value); };
+  return std::all_of(graph.T_world_node.begin(), graph.T_world_node.end(), finite) &&
+         std::all_of(graph.factors.begin(), graph.factors.end(), finite);
+}
+
+/// A pose as Ceres changes it: the quaternion (x, y, z, w), then the translation.
+constexpr int kPoseSize = 7;
+using PoseBlock = std::array<double, kPoseSize>;
+
+PoseBlock blockOf(const Rigid3& T_a_b) {
+  const Eigen::Vector4d q = T_a_b.rotation.coeffs();
+  const Eigen::Vector3d& t = T_a_b.translation;
+  return {q[0], q[1], q[2], q[3], t[0], t[1], t[2]};
+}
+
+Rigid3 rigidOf(const PoseBlock& block) {
+  return {Eigen::Quaterniond(block.data()).normalized(),
+          Eigen::Map<const Eigen::Vector3d>(block.data() + 4)};
+}
+
+// What follows is computed with numbers that carry their derivatives.
+template <typename T>
+using Vector3 = Eigen::Matrix<T, 3, 1>;
+template <typename T>
+using Vector6 = Eigen::Matrix<T, 6, 1>;
+
+template <typename T>
+struct Pose {
+  Eigen::Quaternion<T> rotation;
+  Vector3<T> translation;
+
+  explicit Pose(const T* block) : rotation(block), translation(block[4], block[5], block[6]) {}
+  explicit Pose(const Rigid3& T_a_b)
+      : rotation(T_a_b.rotation.cast<T>()), translation(T_a_b.translation.cast<T>()) {}
+};
+
+template <typename T>
+Vector3<T> rotationVectorOf(const Eigen::Quaternion<T>& rotation) {
+  const std::array<T, 4> scalar_first = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
+  Vector3<T> turn;
+  ceres::QuaternionToAngleAxis(scalar_first.data(), turn.data());
+  return turn;
+}
+
+/// differenceOf(T_from_to^-1 * T_world_from^-1 * T_world_to).
+template <typename T>
+Vector6<T> differenceBetween(const Rigid3& T_from_to, const Pose<T>& from, const Pose<T>& to) {
+  const Pose<T> expected(T_from_to);
+  const Eigen::Quaternion<T> R_from_world = from.rotation.conjugate();
+  const Eigen::Quaternion<T> R_to_from = expected.rotation.conjugate();
+  const Vector3<T> moved = R_from_world * (to.translation - from.translation);
+  Vector6<T> difference;
+  difference.template head<3>() = R_to_from * Vector3<T>(moved - expected.translation);
+  difference.template tail<3>() = rotationVectorOf<T>(R_to_from * (R_from_world * to.rotation));
+  return difference;
+}
+
+struct PairError {
+  PointPair pair;
+
+  template <typename T>
+  bool operator()(const T* block, T* error) const {
+    const Pose<T> pose(block);
+    const Vector3<T> p_ref = pair.p_ref.cast<T>();
+    const Vector3<T> apart = pair.p_map.cast<T>() - (pose.rotation * p_ref + pose.translation);
+    Eigen::Map<Vector3<T>> result(error);
+    result = pair.sqrt_information.cast<T>() * apart;
+    return true;
+  }
+};
+
+struct PriorError {
+  PosePrior prior;
+
+  template <typename T>
+  bool operator()(const T* block, T* error) const {
+    Eigen::Map<Vector6<T>> result(error);
+    result = prior.sqrt_information.cast<T>() *
+             differenceBetween(prior.T_map_ref, Pose<T>(Rigid3{}), Pose<T>(block));
+    return true;
+  }
+};
+
+struct FactorError {
+  RelativePoseFactor factor;
+
+  template <typename T>
+  bool operator()(const T* from, const T* to, T* error) const {
+    Eigen::Map<Vector6<T>> result(error);
+    result = factor.sqrt_information.cast<T>() *
+                 differenceBetween(factor.T_from_to, Pose<T>(from), Pose<T>(to)) +
+             factor.offset.cast<T>();
+    return true;
+  }
+};
+
+using PairCost = ceres::AutoDiffCostFunction<PairError, 3, kPoseSize>;
+using PriorCost = ceres::AutoDiffCostFunction<PriorError, 6, kPoseSize>;
+using FactorCost = ceres::AutoDiffCostFunction<FactorError, 6, kPoseSize, kPoseSize>;
+
+using PoseManifold =
+    ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
+
+PoseManifold poseManifold() {
+  return PoseManifold(ceres::EigenQuaternionManifold(), ceres::EuclideanManifold<3>());
+}
+
+/// The manifold's small motions are half a rotation vector about the world's axes, then a
+/// translation along them; ours are the translation, then the whole rotation vector. This takes
+/// derivatives by ours to derivatives by its, and covariances of its to ours.
+Matrix6d ownMotionFromManifold() {
+  Matrix6d own = Matrix6d::Zero();
+  own.topRightCorner<3, 3>().setIdentity();
+  own.bottomLeftCorner<3, 3>() = 2 * Eigen::Matrix3d::Identity();
+  return own;
+}
+
+template <int rows>
+using BlockJacobian = Eigen::Matrix<double, rows, kPoseSize, Eigen::RowMajor>;
+
+template <int rows>
+Eigen::Matrix<double, rows, 6> byOwnMotion(const BlockJacobian<rows>& jacobian,
+                                           const PoseBlock& block) {
+  Eigen::Matrix<double, kPoseSize, 6, Eigen::RowMajor> plus;
+  poseManifold().PlusJacobian(block.data(), plus.data());
+  return jacobian * plus * ownMotionFromManifold().inverse();
+}
+
+ceres::Problem::Options borrowing() {
+  ceres::Problem::Options options;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
+ceres::Solver::Options solverOptions(int max_iterations, ceres::LinearSolverType solver) {
+  ceres::Solver::Options options;
+  options.max_num_iterations = max_iterations;
+  options.linear_solver_type = solver;
+  options.num_threads = 1;
+  options.logging_type = ceres::SILENT;
+  // Steps are held against how large the numbers are: far from the world's origin any is small.
+  options.parameter_tolerance = 0;
+  return options;
+}
+
+/// A graph as Ceres has it. Neither copied nor moved: the problem points into it.
+class GraphProblem {
+ public:
+  GraphProblem(const PoseGraph& graph, double robust_sigmas)
+      : manifold_(poseManifold()), loss_(robust_sigmas), problem_(borrowing()) {
+    for (const Rigid3& pose : graph.T_world_node) blocks_.push_back(blockOf(pose));
+    for (const RelativePoseFactor& factor : graph.factors) {
+      if (graph.fixed[factor.from] && graph.fixed[factor.to]) continue;
+      problem_.AddResidualBlock(new FactorCost(new FactorError{factor}),
+                                factor.doubtful ? &loss_ : nullptr, blocks_[factor.from].data(),
+                                blocks_[factor.to].data());
+    }
+    for (std::size_t i = 0; i < blocks_.size(); ++i) {
+      if (!has(i)) continue;
+      problem_.SetManifold(blocks_[i].data(), &manifold_);
+      if (graph.fixed[i]) problem_.SetParameterBlockConstant(blocks_[i].data());
+    }
+  }
+  GraphProblem(const GraphProblem&) = delete;
+  GraphProblem& operator=(const GraphProblem&) = delete;
+
+  bool empty() const { return problem_.NumResidualBlocks() == 0; }
+  bool has(std::size_t node) const { return problem_.HasParameterBlock(blocks_[node].data()); }
+  const PoseBlock& block(std::size_t node) const { return blocks_[node]; }
+  ceres::Problem& problem() { return problem_; }
+
+ private:
+  std::vector<PoseBlock> blocks_;
+  PoseManifold manifold_;
+  ceres::CauchyLoss loss_;
+  ceres::Problem problem_;  // last: it points to the others
+};
+
+void requireSolver(double robust_sigmas, int max_iterations) {
+  requireOption(robust_sigmas > 0 && robust_sigmas <= 1e3, "robust_sigmas", robust_sigmas,
+                "above 0, at most 1000");
+  requireOption(max_iterations >= 1 && max_iterations <= 1000, "max_iterations", max_iterations,
+                "from 1 to 1000");
+}
+
+}  // namespace
+
+void AlignmentOptions::validate() const { requireSolver(robust_sigmas, max_iterations); }
+void PoseGraphOptions::validate() const { requireSolver(robust_sigmas, max_iterations); }
+
+Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
+                  const Rigid3& T_map_start, const AlignmentOptions& options) {
+  if (!std::all_of(pairs.begin(), pairs.end(), [](const auto& pair) { return isFinite(pair); })) {
+    return T_map_start;
+  }
+  PoseBlock pose = blockOf(T_map_start);
+  PoseManifold manifold = poseManifold();
+  ceres::CauchyLoss loss(options.robust_sigmas);
+  ceres::Problem problem(borrowing());
+  problem.AddParameterBlock(pose.data(), kPoseSize, &manifold);
+  for (const PointPair& pair : pairs) {
+    problem.AddResidualBlock(new PairCost(new PairError{pair}), &loss, pose.data());
+  }
+  problem.AddResidualBlock(new PriorCost(new PriorError{prior}), nullptr, pose.data());
+  ceres::Solver::Summary summary;
+  ceres::Solver::Options solver =
+      solverOptions(options.max_iterations, ceres::DENSE_NORMAL_CHOLESKY);
+  solver.function_tolerance = options.least_gain;
+  ceres::Solve(solver, &problem, &summary);
+  return summary.IsSolutionUsable() ? rigidOf(pose) : T_map_start;
+}
+
+double errorOf(const RelativePoseFactor& factor, const Rigid3& T_world_from,
+               const Rigid3& T_world_to) {
+  const Rigid3 T_from_to = T_world_from.inverse() * T_world_to;
+  return (factor.sqrt_information * differenceOf(factor.T_from_to.inverse() * T_from_to) +
+          factor.offset)
+      .norm();
+}
+
+MotionEstimate motionOf(const RelativePoseFactor& factor, double open_variance) {
+  const Matrix6d information = factor.sqrt_information.transpose() * factor.sqrt_information +
+                               1 / open_variance * Matrix6d::Identity();
+  MotionEstimate motion;
+  motion.covariance = information.inverse();
+  const Vector6d to_minimum =
+      -motion.covariance * (factor.sqrt_information.transpose() * factor.offset);
+  motion.T_from_to = factor.T_from_to * rigidFromDifference(to_minimum);
+  return motion;
+}
+
+void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph) {
+  if (!isFinite(graph)) return;
+  GraphProblem problem(graph, options.robust_sigmas);
+  if (problem.empty()) return;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solverOptions(options.max_iterations, ceres::SPARSE_NORMAL_CHOLESKY),
+               &problem.problem(), &summary);
+  if (!summary.IsSolutionUsable()) return;
+  for (std::size_t i = 0; i < graph.T_world_node.size(); ++i) {
+    if (!graph.fixed[i] && problem.has(i)) graph.T_world_node[i] = rigidOf(problem.block(i));
+  }
+}
+
+std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const PoseGraph& graph,
+                                       std::size_t node) {
+  if (!isFinite(graph)) return std::nullopt;
+  GraphProblem problem(graph, options.robust_sigmas);
+  if (graph.fixed[node] || !problem.has(node)) return std::nullopt;
+  ceres::Covariance::Options of_solver;
+  of_solver.num_threads = 1;
+  ceres::Covariance covariance(of_solver);
+  const double* block = problem.block(node).data();
+  const std::vector<std::pair<const double*, const double*>> wanted = {{block, block}};
+  if (!covariance.Compute(wanted, &problem.problem())) return std::nullopt;
+  Eigen::Matrix<double, 6, 6, Eigen::RowMajor> of_manifold;
+  covariance.GetCovarianceBlockInTangentSpace(block, block, of_manifold.data());
+  const Matrix6d own = ownMotionFromManifold();
+  return own * of_manifold * own.transpose();
+}
+
+Eigen::Matrix<double, 3, 6> pairJacobian(const PointPair& pair, const Rigid3& T_map_ref) {
+  const PairCost cost(new PairError{pair});
+  const PoseBlock block = blockOf(T_map_ref);
+  const double* parameters = block.data();
+  Eigen::Vector3d error;
+  BlockJacobian<3> by_block;
+  double* jacobian = by_block.data();
+  cost.Evaluate(&parameters, error.data(), &jacobian);
+  return byOwnMotion<3>(by_block, block);
+}
+
+Eigen::Matrix<double, 6, 12> factorJacobian(const RelativePoseFactor& factor,
+                                            const Rigid3& T_world_from, const Rigid3& T_world_to) {
+  const FactorCost cost(new FactorError{factor});
+  const PoseBlock from = blockOf(T_world_from);
+  const PoseBlock to = blockOf(T_world_to);
+  const std::array<const double*, 2> parameters = {from.data(), to.data()};
+  Vector6d error;
+  BlockJacobian<6> by_from;
+  BlockJacobian<6> by_to;
+  std::array<double*, 2> jacobians = {by_from.data(), by_to.data()};
+  cost.Evaluate(parameters.data(), error.data(), jacobians.data());
+  Eigen::Matrix<double, 6, 12> by_both;
+  by_both << byOwnMotion<6>(by_from, from), byOwnMotion<6>(by_to, to);
+  return by_both;
+}
+
+}  // namespace efm

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/window_graph.h"
+
+#include <cassert>
+
+namespace efm {
+
+WindowGraph::WindowGraph(const std::vector<RefinedKeyframe>& keyframes, std::size_t first_free)
+    : keyframes_(keyframes), first_free_(first_free), place_(keyframes.size()) {
+  assert(first_free > 0);
+}
+
+void WindowGraph::add(RelativePoseFactor factor) {
+  if (factor.from < first_free_ && factor.to < first_free_) return;
+  factor.from = ownNode(factor.from);
+  factor.to = ownNode(factor.to);
+  graph_.factors.push_back(factor);
+}
+
+void WindowGraph::addTracker(const TrackerErrors& errors) {
+  for (std::size_t i = first_free_ - 1; i < keyframes_.size(); ++i) {
+    const RefinedKeyframe& keyframe = keyframes_[i];
+    graph_.factors.push_back({trackedNode(i), ownNode(i), Rigid3{},
+                              sqrtInformation(errors.noiseCovariance(keyframe.noise))});
+    if (i + 1 == keyframes_.size()) break;
+    const RefinedKeyframe& next = keyframes_[i + 1];
+    const Matrix6d drift = errors.driftCovariance(next.way_m - keyframe.way_m);
+    graph_.factors.push_back({trackedNode(i), trackedNode(i + 1),
+                              keyframe.T_tracker_ref.inverse() * next.T_tracker_ref,
+                              sqrtInformation(drift)});
+  }
+}
+
+const Rigid3& WindowGraph::T_world_ref(std::size_t keyframe) const {
+  return graph_.T_world_node[place_[keyframe].value()];
+}
+
+const Rigid3& WindowGraph::T_world_tracked(std::size_t keyframe) const {
+  return graph_.T_world_node[place_[keyframe].value() + 1];
+}
+
+std::optional<Matrix6d> WindowGraph::trackedCovariance(const PoseGraphOptions& options,
+                                                       std::size_t keyframe) const {
+  return poseCovariance(options, graph_, place_[keyframe].value() + 1);
+}
+
+/// The keyframe's first node, made where it is not there.
+std::size_t WindowGraph::ownNode(std::size_t keyframe) {
+  std::optional<std::size_t>& place = place_[keyframe];
+  if (place) return *place;
+  place = graph_.T_world_node.size();
+  const bool stays = keyframe < first_free_;
+  graph_.T_world_node.push_back(keyframes_[keyframe].T_world_ref);
+  graph_.fixed.push_back(stays);
+  // The first keyframe stays where the tracker put it, noise and all: how much of that is noise
+  // shows later.
+  graph_.T_world_node.push_back(keyframes_[keyframe].T_world_tracked);
+  graph_.fixed.push_back(stays && keyframe > 0);
+  return *place;
+}
+
+}  // namespace efm

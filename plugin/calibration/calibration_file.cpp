@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/calibration/calibration_file.h"
+
+#include <charconv>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include "plugin/calibration/camchain.h"
+#include "plugin/formats/uzh_text.h"
+
+namespace efm {
+namespace {
+
+std::string inWords(const CameraSize& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels";
+}
+
+std::string camerasInWords(std::size_t count) {
+  return std::to_string(count) + (count == 1 ? " camera" : " cameras");
+}
+
+/// The first word that is not in a comment; empty where there is none.
+std::string firstWord(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::error_code ignored;
+  if (!stream || std::filesystem::is_directory(file, ignored)) {
+    throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  }
+  std::string word;
+  while (stream >> word && word.front() == '#') {
+    std::getline(stream, word);
+    word.clear();
+  }
+  return word;
+}
+
+bool isNumber(const std::string& word) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && end == word.data() + word.size();
+}
+
+}  // namespace
+
+RigCamera Calibration::camera(std::size_t index, const std::optional<CameraSize>& sensor) const {
+  const std::string name = "camera " + std::to_string(index);
+  if (index >= rig.cameras.size()) {
+    throw std::invalid_argument(file.string() + ": " + camerasInWords(rig.cameras.size()) +
+                                ", but the recording has " + name + ": expected one for each");
+  }
+  RigCamera camera = rig.cameras[index];
+  const CameraSize size = {camera.model.width, camera.model.height};
+  if (size.width == 0) {
+    if (!sensor) {
+      throw std::invalid_argument(file.string() +
+                                  ": no size of the sensor, and the recording does not say it: "
+                                  "expected a camera chain with resolution");
+    }
+    camera.model.width = sensor->width;
+    camera.model.height = sensor->height;
+  } else if (sensor && (sensor->width != size.width || sensor->height != size.height)) {
+    throw std::invalid_argument(file.string() + ": " + name + " has " + inWords(size) +
+                                ": expected " + inWords(*sensor) + ", as the recording has");
+  }
+  return camera;
+}
+
+void Calibration::requireCameras(std::size_t count) const {
+  if (rig.cameras.size() == count) return;
+  throw std::invalid_argument(file.string() + ": " + camerasInWords(rig.cameras.size()) +
+                              ": expected " + std::to_string(count) + ", as the recording has");
+}
+
+void Calibration::requireLike(const Rig& recorded) const {
+  for (std::size_t i = 0; i < recorded.cameras.size(); ++i) {
+    const CameraModel& model = recorded.cameras[i].model;
+    camera(i, CameraSize{model.width, model.height});
+  }
+  requireCameras(recorded.cameras.size());
+}
+
+Calibration readCalibration(const std::filesystem::path& file) {
+  const std::string word = firstWord(file);
+  if (!word.empty() && word.front() == '{') {
+    throw std::runtime_error(file.string() +
+                             ": JSON is not read yet: expected a camera chain as Kalibr has it, or "
+                             "nine numbers, fx fy cx cy k1 k2 p1 p2 k3");
+  }
+  Calibration calibration{file, {}};
+  if (isNumber(word)) {
+    CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
+    model.width = 0;
+    model.height = 0;
+    calibration.rig.cameras.push_back({model, {}, 0});
+  } else {
+    calibration.rig = readCamchain(file);
+  }
+  return calibration;
+}
+
+}  // namespace efm

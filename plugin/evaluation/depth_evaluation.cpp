@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/evaluation/depth_evaluation.h"
+
+#include <set>
+#include <stdexcept>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/evaluation/depth_file.h"
+#include "plugin/evaluation/depth_series.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kSameTimeNs = 1'000'000;
+
+/// Adds one map after the other, then sums up.
+class Comparison {
+ public:
+  explicit Comparison(const DepthEvaluationOptions& options) : options_(options) {
+    if (!options.mask.empty()) mask_ = readMaskFile(options.mask);
+  }
+
+  void add(const std::string& name, const fs::path& estimate, const fs::path& truth) {
+    const ComparedDepths depths{readDepthFile(estimate, options_.png_scale),
+                                readDepthFile(truth, options_.png_scale), mask_};
+    try {
+      depths.validate();
+    } catch (const std::invalid_argument& error) {
+      throw std::runtime_error(estimate.string() + " and " + truth.string() + ": " + error.what());
+    }
+    const std::vector<DepthPair> pairs = pairDepths(depths, options_.pairing);
+    const PrecisionRecall detection =
+        precisionRecall(depths, options_.thresholds_m, options_.pairing);
+    if (evaluation_.maps.empty()) {
+      evaluation_.detection = detection;
+    } else {
+      evaluation_.detection.add(detection);
+    }
+    evaluation_.maps.push_back(
+        {name, depthErrors(pairs, options_.focal_baseline), estimate, truth});
+    all_.insert(all_.end(), pairs.begin(), pairs.end());
+  }
+
+  /// Pairs two series by time.
+  void addSeries(const std::vector<TimedFile>& estimates, const std::vector<TimedFile>& truths) {
+    std::set<const TimedFile*> used;
+    for (const TimedFile& map : estimates) {
+      const TimedFile* match = nearestFile(truths, map.t_ns, kSameTimeNs);
+      if (match == nullptr) {
+        ++evaluation_.without_truth;
+        continue;
+      }
+      add(formatSeconds(map.t_ns), map.file, match->file);
+      used.insert(match);
+    }
+    evaluation_.without_estimate = truths.size() - used.size();
+  }
+
+  bool hasMaps() const { return !evaluation_.maps.empty(); }
+  bool hasPoints() const { return !all_.empty(); }
+
+  DepthEvaluation result() const {
+    DepthEvaluation evaluation = evaluation_;
+    std::vector<DepthErrors> errors;
+    for (const EvaluatedMap& map : evaluation.maps) errors.push_back(map.errors);
+    evaluation.mean = meanOfErrors(errors);
+    evaluation.all = depthErrors(all_, options_.focal_baseline);
+    return evaluation;
+  }
+
+ private:
+  const DepthEvaluationOptions& options_;
+  cv::Mat1b mask_;
+  DepthEvaluation evaluation_;
+  std::vector<DepthPair> all_;
+};
+
+}  // namespace
+
+DepthEvaluation evaluateDepth(const fs::path& estimated, const fs::path& truth,
+                              const DepthEvaluationOptions& options) {
+  options.pairing.validate();
+  for (const fs::path& path : {estimated, truth}) {
+    if (!fs::exists(path)) throw std::runtime_error("no such file: " + path.string());
+  }
+  // The folder of one depth map stands for its file, beside a file of truth.
+  const bool one_map = fs::exists(estimated / "depth.tiff") && !fs::is_directory(truth);
+  const fs::path estimate = one_map ? estimated / "depth.tiff" : estimated;
+  const bool folders = fs::is_directory(estimate);
+  if (folders && fs::exists(estimate / "depth.tiff")) {
+    throw std::runtime_error(estimate.string() +
+                             " holds one depth map without its time: expected a "
+                             "file of truth beside it, not the folder " +
+                             truth.string());
+  }
+  if (folders != fs::is_directory(truth)) {
+    throw std::runtime_error(estimate.string() + " and " + truth.string() +
+                             ": must be two files or two folders");
+  }
+
+  Comparison comparison(options);
+  if (folders) {
+    comparison.addSeries(depthSeries(estimate, DepthSeriesRole::kEstimate),
+                         depthSeries(truth, DepthSeriesRole::kTruth));
+    if (!comparison.hasMaps()) {
+      throw std::runtime_error("no truth in " + truth.string() +
+                               " lies within 1 ms of a depth map of " + estimate.string());
+    }
+  } else {
+    comparison.add(estimate.filename().string(), estimate, truth);
+  }
+  if (!comparison.hasPoints()) {
+    throw std::runtime_error("no pixel of " + estimate.string() +
+                             " has a depth where the truth has one" +
+                             (options.mask.empty() ? "" : " and the mask is not black"));
+  }
+  return comparison.result();
+}
+
+}  // namespace efm

@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/evaluation/depth_evaluation_text.h"
+
+#include <array>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <vector>
+
+#include "plugin/evaluation/text_table.h"
+
+namespace efm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A field of DepthErrors, as people and programs see it.
+struct Column {
+  const char* key;
+  const char* heading;
+  const char* unit;
+  std::optional<double> (*value)(const DepthErrors&);
+  double factor;  ///< In the table.
+  int decimals;   ///< In the table.
+  const char* help;
+};
+
+using E = DepthErrors;
+using V = std::optional<double>;
+
+constexpr std::array<Column, 13> kColumns = {{
+    {"mean_abs_m", "mean", "|dZ| m", [](const E& e) { return V(e.mean_abs_m); }, 1, 4,
+     "mean |Z - Z_true|, metres"},
+    {"median_abs_m", "median", "|dZ| m", [](const E& e) { return V(e.median_abs_m); }, 1, 4,
+     "median |Z - Z_true|, metres"},
+    {"median_inverse", "median", "|d1/Z| /m", [](const E& e) { return V(e.median_inverse); }, 1, 5,
+     "median |1/Z - 1/Z_true|, 1/m"},
+    {"bad_pix_5px", "bad-pix", "5px 5% %", [](const E& e) { return e.bad_pix_5px; }, 100, 2,
+     "share with a disparity error over 5 px and 5 %"},
+    {"bad_pix_3px", "bad-pix", "3px 5% %", [](const E& e) { return e.bad_pix_3px; }, 100, 2,
+     "share with a disparity error over 3 px and 5 % (KITTI)"},
+    {"silog", "SILog", "x100", [](const E& e) { return V(e.silog); }, 1, 3,
+     "100 (mean d^2 - (mean d)^2), d = ln Z - ln Z_true"},
+    {"aerrr", "AErrR", "%", [](const E& e) { return V(e.aerrr); }, 100, 2,
+     "mean |Z - Z_true| / Z_true"},
+    {"aerrr_by_estimate", "AErrR", "by est %", [](const E& e) { return V(e.aerrr_by_estimate); },
+     100, 2, "mean |Z - Z_true| / Z"},
+    {"log_rmse", "logRMSE", "x100", [](const E& e) { return V(e.log_rmse); }, 1, 3,
+     "100 sqrt(mean d^2)"},
+    {"delta_1", "d<1.25", "%", [](const E& e) { return V(e.delta[0]); }, 100, 2,
+     "share with max(Z/Z_true, Z_true/Z) under 1.25"},
+    {"delta_2", "<1.25^2", "%", [](const E& e) { return V(e.delta[1]); }, 100, 2,
+     "the same under 1.25^2"},
+    {"delta_3", "<1.25^3", "%", [](const E& e) { return V(e.delta[2]); }, 100, 2,
+     "the same under 1.25^3"},
+    {"beyond_tenth", "beyond", "10% %", [](const E& e) { return V(e.beyond_tenth); }, 100, 2,
+     "share with |Z - Z_true| over a tenth of Z_true"},
+}};
+
+std::vector<std::string> rowOf(const std::string& name, const DepthErrors& errors) {
+  std::vector<std::string> row = {name, std::to_string(errors.points)};
+  for (const Column& column : kColumns) {
+    const auto value = column.value(errors);
+    const bool there = errors.points > 0 && value;
+    row.push_back(there ? fixedText(column.factor * *value, column.decimals) : "-");
+  }
+  return row;
+}
+
+Json asJson(const DepthErrors& errors) {
+  Json json = {{"points", errors.points}};
+  if (errors.points == 0) return json;
+  for (const Column& column : kColumns) {
+    if (const auto value = column.value(errors)) json[column.key] = *value;
+  }
+  return json;
+}
+
+std::string detectionTable(const PrecisionRecall& detection) {
+  TextTable table;
+  table.add({"error up to m", "precision %", "recall %", "F1 %"});
+  for (std::size_t k = 0; k < detection.steps.size(); ++k) {
+    table.add({fixedText(detection.steps[k].threshold_m, 3),
+               fixedText(100 * detection.precision(k), 2), fixedText(100 * detection.recall(k), 2),
+               fixedText(100 * detection.f1(k), 2)});
+  }
+  return table.text() + std::to_string(detection.estimates) + " estimates beside a truth, " +
+         std::to_string(detection.estimates_without_truth) + " without, " +
+         std::to_string(detection.truths) + " pixels with a truth\n";
+}
+
+}  // namespace
+
+std::string evaluationTable(const DepthEvaluation& evaluation,
+                            const std::optional<StereoBase>& base) {
+  TextTable table;
+  std::vector<std::string> headings = {"map", "points"};
+  std::vector<std::string> units = {"", ""};
+  for (const Column& column : kColumns) {
+    headings.emplace_back(column.heading);
+    units.emplace_back(column.unit);
+  }
+  table.add(headings);
+  table.add(units);
+  for (const EvaluatedMap& map : evaluation.maps) table.add(rowOf(map.name, map.errors));
+  if (evaluation.maps.size() > 1) {
+    table.add(rowOf("mean of maps", evaluation.mean));
+    table.add(rowOf("all points", evaluation.all));
+  }
+  std::string text = table.text() + "\n" + detectionTable(evaluation.detection);
+  if (base) {
+    text += "bad-pix with focal length " + fixedText(base->focal_px, 2) + " px and baseline " +
+            fixedText(base->baseline_m, 4) + " m (" + base->source + ")\n";
+  } else if (!evaluation.all.bad_pix_5px) {
+    text += "no bad-pix: it needs a focal length and a baseline (--focal, --baseline)\n";
+  }
+  if (evaluation.without_truth > 0) {
+    text += std::to_string(evaluation.without_truth) + " depth maps have no truth within 1 ms\n";
+  }
+  if (evaluation.without_estimate > 0) {
+    text += std::to_string(evaluation.without_estimate) + " true maps have no estimate\n";
+  }
+  return text;
+}
+
+std::string evaluationJson(const DepthEvaluation& evaluation,
+                           const std::optional<StereoBase>& base) {
+  Json json;
+  json["maps"] = Json::array();
+  for (const EvaluatedMap& map : evaluation.maps) {
+    Json one = asJson(map.errors);
+    one["name"] = map.name;
+    json["maps"].push_back(one);
+  }
+  json["mean"] = asJson(evaluation.mean);
+  json["all"] = asJson(evaluation.all);
+  const PrecisionRecall& detection = evaluation.detection;
+  json["curve"] = Json::array();
+  for (std::size_t k = 0; k < detection.steps.size(); ++k) {
+    json["curve"].push_back({{"threshold_m", detection.steps[k].threshold_m},
+                             {"precision", detection.precision(k)},
+                             {"recall", detection.recall(k)},
+                             {"f1", detection.f1(k)}});
+  }
+  json["estimates"] = detection.estimates;
+  json["estimates_without_truth"] = detection.estimates_without_truth;
+  json["truths"] = detection.truths;
+  if (base) {
+    json["focal_px"] = base->focal_px;
+    json["baseline_m"] = base->baseline_m;
+  }
+  json["without_truth"] = evaluation.without_truth;
+  json["without_estimate"] = evaluation.without_estimate;
+  return json.dump(2) + "\n";
+}
+
+std::string depthEvaluationKeys() {
+  std::string text =
+      "Keys of --json (shares from 0 to 1):\n"
+      "  maps      a list: name, points, and these, of each map\n";
+  for (const Column& column : kColumns) {
+    std::string key = column.key;
+    key.resize(18, ' ');
+    text += "            " + key + column.help + "\n";
+  }
+  return text +
+         "            (none of these where points is 0; bad_pix_... only where focal length and\n"
+         "            baseline are known)\n"
+         "  mean      the same, mean over the maps; points is the sum\n"
+         "  all       the same over all points of all maps\n"
+         "  curve     a list: threshold_m, precision, recall, f1; over all maps\n"
+         "  estimates, estimates_without_truth, truths   pixels: precision and recall are shares "
+         "of\n"
+         "            the first and the last\n"
+         "  focal_px, baseline_m                         that bad-pix was reckoned with\n"
+         "  without_truth, without_estimate              maps that have no partner in time\n";
+}
+
+}  // namespace efm

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/evaluation/trajectory_evaluation.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/evaluation/file_in_folder.h"
+#include "plugin/evaluation/text_table.h"
+#include "tracking_stub/poses/poses_file.h"
+
+namespace efm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Unit = RelativeSpacing::Unit;
+
+constexpr double kDegrees = 180 / M_PI;
+
+std::string nameOf(TrajectoryAlignment alignment) {
+  switch (alignment) {
+    case TrajectoryAlignment::kSe3:
+      return "se3";
+    case TrajectoryAlignment::kOrigin:
+      return "origin";
+    case TrajectoryAlignment::kNone:
+      break;
+  }
+  return "none";
+}
+
+std::string nameOf(Unit unit) {
+  switch (unit) {
+    case Unit::kFrames:
+      return "frames";
+    case Unit::kMetres:
+      return "m";
+    case Unit::kSeconds:
+      break;
+  }
+  return "s";
+}
+
+/// rpg_trajectory_evaluation's shares of the length; Sturm's second; evo's frame.
+std::vector<RelativeSpacing> usualSpacings(double true_length_m) {
+  std::vector<RelativeSpacing> spacings = {{Unit::kFrames, 1}, {Unit::kSeconds, 1}};
+  if (!(true_length_m > 0)) return spacings;
+  for (const double share : {0.1, 0.2, 0.3, 0.4, 0.5}) {
+    spacings.push_back({Unit::kMetres, share * true_length_m});
+  }
+  return spacings;
+}
+
+Rigid3 aligned(const TrajectoryEvaluation& evaluation, const std::filesystem::path& estimate) {
+  try {
+    return alignTrajectories(evaluation.pairs, evaluation.alignment);
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(estimate.string() + ": cannot be aligned: " + error.what() +
+                             " (--align origin or none needs less)");
+  }
+}
+
+std::vector<std::string> rowOf(const std::string& name, const SampleStatistics& statistics,
+                               double factor) {
+  std::vector<std::string> row = {name, std::to_string(statistics.count)};
+  for (const double value : {statistics.rms, statistics.mean, statistics.median,
+                             statistics.deviation, statistics.least, statistics.largest}) {
+    row.push_back(statistics.count > 0 ? fixedText(factor * value, 4) : "-");
+  }
+  return row;
+}
+
+Json asJson(const SampleStatistics& statistics, double factor) {
+  return {{"rmse", factor * statistics.rms},      {"mean", factor * statistics.mean},
+          {"median", factor * statistics.median}, {"std", factor * statistics.deviation},
+          {"min", factor * statistics.least},     {"max", factor * statistics.largest}};
+}
+
+Json asJson(const EvaluatedSpacing& relative) {
+  Json json = {{"delta", relative.spacing.amount},
+               {"unit", nameOf(relative.spacing.unit)},
+               {"pairs", relative.translation_m.count}};
+  if (relative.translation_m.count == 0) return json;
+  json["translation_m"] = asJson(relative.translation_m, 1);
+  json["rotation_deg"] = asJson(relative.rotation_rad, kDegrees);
+  if (relative.spacing.unit == Unit::kMetres) {
+    json["translation_percent"] = 100 * relative.translation_m.mean / relative.spacing.amount;
+    json["rotation_deg_per_m"] = kDegrees * relative.rotation_rad.mean / relative.spacing.amount;
+  }
+  return json;
+}
+
+double durationOf(const TrajectoryEvaluation& evaluation) {
+  return secondsBetween(evaluation.pairs.front().t_ns, evaluation.pairs.back().t_ns);
+}
+
+}  // namespace
+
+TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
+                                        const std::filesystem::path& truth,
+                                        const TrajectoryEvaluationOptions& options) {
+  const auto estimate_file =
+      fileInFolder(estimated, {"trajectory.txt", "poses.txt", "groundtruth.txt"});
+  const auto truth_file = fileInFolder(truth, {"poses.txt", "groundtruth.txt"});
+  const std::vector<StampedPose> estimate = readPosesFile(estimate_file);
+  const std::vector<StampedPose> true_poses = readPosesFile(truth_file);
+
+  TrajectoryEvaluation evaluation;
+  evaluation.estimate_poses = estimate.size();
+  evaluation.truth_poses = true_poses.size();
+  evaluation.pairs = associatePoses(estimate, true_poses, options.max_difference_s);
+  if (evaluation.pairs.empty()) {
+    throw std::runtime_error("no pose of " + estimate_file.string() + " lies within " +
+                             fixedText(options.max_difference_s, 6) + " s of one of " +
+                             truth_file.string() + " (--max-diff)");
+  }
+  evaluation.alignment = options.alignment;
+  evaluation.T_world_map = aligned(evaluation, estimate_file);
+  evaluation.errors = absoluteErrors(evaluation.pairs, evaluation.T_world_map);
+  evaluation.true_length_m = trueLength(evaluation.pairs);
+  const auto spacings =
+      options.spacings.empty() ? usualSpacings(evaluation.true_length_m) : options.spacings;
+  for (const RelativeSpacing& spacing : spacings) {
+    const PoseErrors errors = relativeErrors(evaluation.pairs, spacing);
+    evaluation.relative.push_back(
+        {spacing, statisticsOf(errors.translation_m), statisticsOf(errors.rotation_rad)});
+  }
+  return evaluation;
+}
+
+std::string evaluationTable(const TrajectoryEvaluation& evaluation) {
+  TextTable table;
+  table.add({"", "pairs", "rmse", "mean", "median", "std", "min", "max"});
+  table.add(rowOf("absolute, m", statisticsOf(evaluation.errors.translation_m), 1));
+  table.add(rowOf("absolute, deg", statisticsOf(evaluation.errors.rotation_rad), kDegrees));
+  for (const EvaluatedSpacing& relative : evaluation.relative) {
+    const int decimals = relative.spacing.unit == Unit::kFrames ? 0 : 3;
+    const std::string over = "relative over " + fixedText(relative.spacing.amount, decimals) + " " +
+                             nameOf(relative.spacing.unit);
+    table.add(rowOf(over + ", m", relative.translation_m, 1));
+    table.add(rowOf(over + ", deg", relative.rotation_rad, kDegrees));
+  }
+  return table.text() + std::to_string(evaluation.pairs.size()) + " pairs of " +
+         std::to_string(evaluation.estimate_poses) + " estimated and " +
+         std::to_string(evaluation.truth_poses) + " true poses, over " +
+         fixedText(evaluation.true_length_m, 3) + " m and " + fixedText(durationOf(evaluation), 3) +
+         " s; alignment " + nameOf(evaluation.alignment) + "\n";
+}
+
+std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
+  const Rigid3& T_world_map = evaluation.T_world_map;
+  const Eigen::Quaterniond& q = T_world_map.rotation;
+  const Eigen::Vector3d& p = T_world_map.translation;
+  Json json;
+  json["pairs"] = evaluation.pairs.size();
+  json["estimate_poses"] = evaluation.estimate_poses;
+  json["truth_poses"] = evaluation.truth_poses;
+  json["length_m"] = evaluation.true_length_m;
+  json["duration_s"] = durationOf(evaluation);
+  json["alignment"] = nameOf(evaluation.alignment);
+  json["aligned_by"] = {{"translation_m", {p.x(), p.y(), p.z()}},
+                        {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+  json["ate"] = {{"translation_m", asJson(statisticsOf(evaluation.errors.translation_m), 1)},
+                 {"rotation_deg", asJson(statisticsOf(evaluation.errors.rotation_rad), kDegrees)}};
+  json["rpe"] = Json::array();
+  for (const EvaluatedSpacing& relative : evaluation.relative) {
+    json["rpe"].push_back(asJson(relative));
+  }
+  return json.dump(2) + "\n";
+}
+
+std::string trajectoryEvaluationKeys() {
+  return "Keys of --json (statistics: rmse, mean, median, std, min, max):\n"
+         "  pairs, estimate_poses, truth_poses   poses that were paired, and that there are\n"
+         "  length_m, duration_s                 of the true path through the pairs\n"
+         "  alignment, aligned_by                how, and the motion that lays the estimate over\n"
+         "                                       the truth: translation_m, quaternion_xyzw\n"
+         "  ate   absolute errors: translation_m, rotation_deg, statistics of each\n"
+         "  rpe   relative errors, a list: delta, unit (frames, s or m), pairs; where there are\n"
+         "        pairs, translation_m and rotation_deg, statistics of each; over metres also\n"
+         "        translation_percent and rotation_deg_per_m (the means over the length)\n";
+}
+
+}  // namespace efm

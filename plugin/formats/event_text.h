@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+
+/// The pixels of a sensor.
+struct CameraSize {
+  int width = 0;
+  int height = 0;
+};
+
+/// Events come in packets on a grid of this period: [k·10 ms, (k+1)·10 ms).
+inline constexpr std::int64_t kPacketPeriodNs = 10'000'000;
+
+/// Reads events from text, one `t x y p` a line: decimal seconds (exact), pixel, polarity 0 or 1.
+/// Blank lines, what follows a `#`, repeated blanks, tabs and CRLF do not matter.
+///
+/// The file is read as it is asked for: memory holds a block of text and the events of some 20 ms.
+/// What cannot be understood is a std::runtime_error that names file and line, the value and what
+/// was expected; it comes when the packets of the lines above it were given, and stays.
+class EventTextReader {
+ public:
+  /// @throws std::runtime_error where the file cannot be opened.
+  EventTextReader(std::filesystem::path file, CameraSize size);
+
+  /// The events of the next stretch of the grid that has any, in time order, those of equal time in
+  /// the file's order. Empty at the end.
+  /// @throws std::runtime_error where the file cannot be read on.
+  std::vector<Event> nextPacket();
+  /// The time of the event that the next packet begins with; nothing at the end. Where the file
+  /// cannot be read on it is that of the newest event, so that the error of `nextPacket` has its
+  /// place in time.
+  /// @throws std::runtime_error where no event came before that.
+  std::optional<std::int64_t> nextTime();
+
+  /// Events that came after a newer one.
+  std::uint64_t sortedEvents() const { return sorted_events_; }
+  std::uint64_t bytesRead() const { return bytes_read_; }
+  std::uint64_t bytesTotal() const { return bytes_total_; }
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  void readAhead();
+  bool packetIsComplete() const;
+  void readBlock();
+  void sortEvents();
+  void takeLines(const char* begin, const char* end);
+  const char* parsePlainLine(const char* text, Event& event) const;
+  std::optional<Event> parseLine(std::string_view line, bool unterminated) const;
+  void take(const Event& event);
+  std::string place() const;
+
+  std::filesystem::path file_;
+  CameraSize size_;
+  std::ifstream stream_;
+  std::uint64_t bytes_total_ = 0;
+  std::uint64_t bytes_read_ = 0;
+  bool ended_ = false;
+  std::exception_ptr error_;  // of the line that could not be taken
+
+  std::vector<char> block_;  // text; a whole number of lines is taken from it at a time
+  std::size_t carried_ = 0;  // bytes at its beginning that began a line
+  std::uint64_t line_ = 0;   // number of the line being taken
+
+  std::vector<Event> events_;  // sorted between calls; from first_ on not given
+  std::size_t first_ = 0;
+  std::int64_t newest_ns_ = -kEndOfTimeNs;
+  bool disordered_ = false;
+  std::uint64_t sorted_events_ = 0;
+};
+
+}  // namespace efm

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <deque>
+#include <filesystem>
+
+#include "plugin/formats/gz_stream.h"
+#include "plugin/mrpt/dead_reckoning.h"
+#include "plugin/recordings/recording.h"
+
+namespace efm {
+
+/// A rawlog, gzip-compressed or plain, read entry by entry: observations as they are, and those of
+/// sensory frames one after the other. The movements of actions are composed to poses, which come
+/// before the frame that follows (see DeadReckoning), one for each time: the last; other actions
+/// and comments are passed over.
+class RawlogRecording : public Recording {
+ public:
+  /// @throws std::runtime_error naming the file where it cannot be opened.
+  explicit RawlogRecording(std::filesystem::path file);
+
+  /// @throws std::runtime_error "stopped at entry N of FILE: reason" where the file is cut or
+  /// corrupt, or holds a class that is not known; entries count from 0, as in MRPT's programs, and
+  /// what came before was given.
+  mrpt::obs::CObservation::Ptr next() override;
+  std::string place() const override;
+  double progress() const override { return stream_.progress(); }
+
+ private:
+  void readEntry();
+  void takeActions(const mrpt::obs::CSensoryFrame& frame);
+  std::string whyStopped(const std::exception& error);
+
+  std::filesystem::path file_;
+  GzInputStream stream_;
+  std::uint64_t entries_ = 0;  // read so far
+  std::deque<mrpt::obs::CObservation::Ptr> pending_;
+  std::deque<mrpt::obs::CActionCollection::Ptr> actions_;  // until the frame after them is read
+  DeadReckoning reckoning_;
+};
+
+}  // namespace efm

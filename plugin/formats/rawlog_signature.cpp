@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/formats/rawlog_signature.h"
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "mapping/options/quoted_text.h"
+#include "plugin/formats/gz_stream.h"
+
+namespace efm {
+namespace {
+
+bool isOfAName(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+         c == ':' || c == '<' || c == '>' || c == ',';
+}
+
+/// MRPT writes an object as the length of its class's name, the name, and what is in it. The length
+/// is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the lowest first. Of a cut
+/// file there may be less than that.
+bool beginsAnObject(std::string_view bytes) {
+  constexpr std::size_t kShortestName = 3;
+  constexpr std::size_t kLongestName = 120;
+  constexpr unsigned kTopBit = 0x80;
+  const unsigned first = static_cast<unsigned char>(bytes.front());
+  const bool short_form = (first & kTopBit) != 0;
+  const std::size_t length = first & ~kTopBit;
+  if (length < kShortestName || length > kLongestName) return false;
+  bytes.remove_prefix(1);
+  if (!short_form) {
+    const std::string_view zeros = bytes.substr(0, 3);
+    if (!std::all_of(zeros.begin(), zeros.end(), [](char c) { return c == '\0'; })) return false;
+    bytes.remove_prefix(zeros.size());
+  }
+  const std::string_view name = bytes.substr(0, length);
+  return std::all_of(name.begin(), name.end(), isOfAName);
+}
+
+}  // namespace
+
+void requireRawlog(const std::filesystem::path& file) {
+  constexpr std::size_t kBytes = 128;
+  constexpr std::size_t kShown = 24;
+  GzInputStream stream(file);
+  std::string bytes(kBytes, '\0');
+  try {
+    bytes.resize(stream.Read(bytes.data(), bytes.size()));
+  } catch (const std::exception&) {
+    return;  // damaged; who reads it says how
+  }
+  if (!bytes.empty() && beginsAnObject(bytes)) return;
+  const std::string why =
+      bytes.empty() ? "it is empty" : "it begins with " + inQuotes(bytes.substr(0, kShown));
+  throw std::runtime_error(file.string() + ": not a rawlog (" + why +
+                           "): expected a rawlog, or the folder of a recording as text files");
+}
+
+}  // namespace efm

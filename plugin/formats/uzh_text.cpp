@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/formats/uzh_text.h"
+
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "mapping/options/quoted_text.h"
+#include "plugin/formats/merged_recording.h"
+#include "plugin/recordings/recording_with_poses.h"
+#include "tracking_stub/poses/poses_file.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr CameraSize kDavis240c = {240, 180};
+
+double parseNumber(const std::string& text, const std::string& place) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) {
+    return value;
+  }
+  throw std::runtime_error(place + inQuotes(text) + ": expected a finite number");
+}
+
+std::vector<double> readNumbers(const fs::path& file) {
+  std::ifstream stream(file);
+  std::vector<double> numbers;
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    std::istringstream fields(line.substr(0, line.find('#')));
+    const std::string place = file.string() + ":" + std::to_string(number) + ": ";
+    for (std::string field; fields >> field;) numbers.push_back(parseNumber(field, place));
+  }
+  if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  return numbers;
+}
+
+/// That of the first image of images.txt that exists.
+std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
+  std::ifstream list(folder / "images.txt");
+  std::string line;
+  while (std::getline(list, line)) {
+    std::istringstream fields(line);
+    std::string time;
+    std::string name;
+    if (!(fields >> time >> name) || time[0] == '#') continue;
+    const fs::path file = folder / name;
+    std::error_code ignored;
+    if (!fs::is_regular_file(file, ignored)) continue;
+    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+    if (image.empty()) {
+      throw std::runtime_error(file.string() +
+                               ": cannot be read as an image: expected one as large as the sensor");
+    }
+    return CameraSize{image.cols, image.rows};
+  }
+  return std::nullopt;
+}
+
+void requireFile(const fs::path& folder, const char* name, const char* what, const char* option) {
+  std::error_code ignored;
+  if (fs::exists(folder / name, ignored)) return;
+  throw std::runtime_error(folder.string() + ": no " + what + ": expected " + name + ", or " +
+                           option + " FILE");
+}
+
+/// The folder knows its sensor's size for certain only from an image.
+RigCamera givenCamera(const Calibration& calibration, const fs::path& folder) {
+  calibration.requireCameras(1);
+  const bool says_size = calibration.rig.cameras[0].model.width > 0;
+  const std::optional<CameraSize> size = sizeOfImages(folder);
+  return calibration.camera(0, size || says_size ? size : kDavis240c);
+}
+
+/// The folder's own camera where it has one: that another was given is then for who replaces it to
+/// count.
+RigCamera readCamera(const fs::path& folder, const GivenParts& given) {
+  std::optional<RigCamera> camera;
+  if (given.calibration != nullptr) camera = givenCamera(*given.calibration, folder);
+  std::error_code ignored;
+  if (camera && !fs::exists(folder / "calib.txt", ignored)) return *camera;
+  requireFile(folder, "calib.txt", "calibration", "--calibration");
+  const CameraSize size =
+      camera ? CameraSize{camera->model.width, camera->model.height} : uzhSensorSize(folder);
+  return {readUzhCalibration(folder / "calib.txt", size), {}, 0};
+}
+
+}  // namespace
+
+bool looksLikeUzhFolder(const fs::path& folder) {
+  std::error_code ignored;
+  return fs::is_regular_file(folder / "events.txt", ignored);
+}
+
+std::unique_ptr<Recording> openUzhFolder(const fs::path& folder, const GivenParts& given) {
+  Rig rig;
+  rig.cameras.push_back(readCamera(folder, given));
+  const CameraModel& model = rig.cameras[0].model;
+  std::vector<EventTextReader> readers;
+  readers.emplace_back(folder / "events.txt", CameraSize{model.width, model.height});
+  auto events = std::make_unique<MergedRecording>(std::move(rig), std::move(readers));
+  if (given.poses) return events;
+  requireFile(folder, "groundtruth.txt", "poses", "--poses");
+  return std::make_unique<RecordingWithPoses>(std::move(events),
+                                              readPosesFile(folder / "groundtruth.txt"));
+}
+
+CameraModel readUzhCalibration(const fs::path& file, CameraSize size) {
+  const std::vector<double> numbers = readNumbers(file);
+  if (numbers.size() != 9) {
+    throw std::runtime_error(file.string() + ": " + std::to_string(numbers.size()) +
+                             " numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3");
+  }
+  CameraModel model;
+  model.width = size.width;
+  model.height = size.height;
+  model.fx = numbers[0];
+  model.fy = numbers[1];
+  model.cx = numbers[2];
+  model.cy = numbers[3];
+  model.distortion = DistortionModel::kRadtan;
+  model.coefficients.assign(numbers.begin() + 4, numbers.end());
+  try {
+    model.validate();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
+  return model;
+}
+
+CameraSize uzhSensorSize(const fs::path& folder) {
+  return sizeOfImages(folder).value_or(kDavis240c);
+}
+
+}  // namespace efm

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/CEventFusionMap.h"
+
+#include <mrpt/img/color_maps.h>
+#include <mrpt/opengl/CPointCloudColoured.h>
+#include <mrpt/opengl/CSetOfObjects.h>
+#include <mrpt/poses/CPose3D.h>
+#include <mrpt/serialization/CArchive.h>
+
+#include <algorithm>
+#include <array>
+#include <ostream>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "maps/io/point_cloud_file.h"
+#include "plugin/mrpt/host_options.h"
+#include "plugin/mrpt/mrpt_pose.h"
+
+MAP_DEFINITION_REGISTER("efm::CEventFusionMap,eventFusionMap", efm::CEventFusionMap)
+
+IMPLEMENTS_SERIALIZABLE(CEventFusionMap, CMetricMap, efm)
+
+namespace efm {
+namespace {
+
+/// What MRPT itself reads for every map, from a section of its own.
+void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::string& section) {
+  constexpr std::array<std::string_view, 3> kKnown = {
+      "enableSaveAs3DObject", "enableObservationLikelihood", "enableObservationInsertion"};
+  std::vector<std::string> keys;
+  source.getAllKeys(section, keys);
+  for (const std::string& key : keys) {
+    if (std::find(kKnown.begin(), kKnown.end(), key) != kKnown.end()) continue;
+    throw std::invalid_argument(placeIn(source, section) + " " + key + ": unknown key");
+  }
+}
+
+/// Maps of version 0 did not know it: they stay what they were.
+void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
+                     ConsistencyOptions& options) {
+  options.consistency = Consistency::kNone;
+  if (version == 0) return;
+  std::string name;
+  in >> name >> options.consistency_tolerance >> options.consistency_cell_deg;
+  options.consistency = consistencyFromName(name);
+  options.max_contradictions = in.ReadAs<std::int32_t>();
+}
+
+}  // namespace
+
+using mrpt::maps::CPointsMapXYZI;
+using mrpt::maps::CSimplePointsMap;
+using mrpt::serialization::CArchive;
+
+// --- From an .ini ----------------------------------------------------------------------------
+
+CEventFusionMap::TMapDefinition::TMapDefinition() = default;
+
+void CEventFusionMap::TMapDefinition::loadFromConfigFile_map_specific(
+    const mrpt::config::CConfigFileBase& source, const std::string& prefix) {
+  EventFusionOptions start;
+  start.cloud = options;
+  OptionReader reader(start);
+  for (const std::string& section : sectionsBelow(source, prefix)) {
+    if (section == prefix + "_insertOpts") {
+      readHostSection(source, section, "map", reader);
+    } else if (section == prefix + "_creationOpts") {
+      checkGenericKeys(source, section);
+    } else {
+      throw std::invalid_argument(placeIn(source, section)
+                                      .append(" unknown section; known: ")
+                                      .append(prefix)
+                                      .append("_insertOpts, ")
+                                      .append(prefix)
+                                      .append("_creationOpts"));
+    }
+  }
+  options = reader.options().cloud;
+}
+
+void CEventFusionMap::TMapDefinition::dumpToTextStream_map_specific(std::ostream& out) const {
+  EventFusionOptions all;
+  all.cloud = options;
+  for (const NamedOption& option : listOptions(all)) {
+    if (option.section == "map") out << option.key << " = " << textOf(option.value) << "\n";
+  }
+}
+
+mrpt::maps::CMetricMap* CEventFusionMap::internal_CreateFromMapDefinition(
+    const mrpt::maps::TMetricMapInitializer& definition) {
+  // MRPT takes ownership of a plain pointer.
+  return new CEventFusionMap(dynamic_cast<const TMapDefinition&>(definition).options);
+}
+
+CEventFusionMap::CEventFusionMap(const GlobalCloudOptions& options) : cloud_(options) {}
+
+// --- In --------------------------------------------------------------------------------------
+
+void CEventFusionMap::insertKeyframe(const StoredKeyframe& keyframe) {
+  cloud_.insert(keyframes_.size(), worldPointsOf(keyframe), keyframe.T_world_ref);
+  keyframes_.push_back(keyframe);
+  simple_points_.reset();
+}
+
+void CEventFusionMap::moveKeyframe(std::size_t keyframe, const Rigid3& T_world_ref) {
+  StoredKeyframe& stored = keyframes_.at(keyframe);
+  const Rigid3 T_before_ref = std::exchange(stored.T_world_ref, T_world_ref);
+  cloud_.remove(keyframe);
+  try {
+    cloud_.insert(keyframe, worldPointsOf(stored), T_world_ref);
+  } catch (const std::invalid_argument&) {
+    stored.T_world_ref = T_before_ref;
+    cloud_.insert(keyframe, worldPointsOf(stored), T_before_ref);
+    throw;
+  }
+  simple_points_.reset();
+}
+
+bool CEventFusionMap::internal_insertObservation(
+    const mrpt::obs::CObservation& observation,
+    const std::optional<const mrpt::poses::CPose3D>& robot_pose) {
+  const Rigid3 T_world_rig = robot_pose ? rigidFrom(*robot_pose) : Rigid3{};
+  std::optional<StoredKeyframe> keyframe = keyframeFrom(observation, T_world_rig);
+  if (!keyframe) return false;
+  keyframe->points =
+      std::make_shared<CPointsMapXYZI>(*keyframe->points);  // the caller's may change
+  insertKeyframe(*keyframe);
+  return true;
+}
+
+void CEventFusionMap::internal_clear() {
+  keyframes_.clear();
+  cloud_ = GlobalCloud(cloud_.options());
+  simple_points_.reset();
+}
+
+bool CEventFusionMap::internal_canComputeObservationLikelihood(
+    const mrpt::obs::CObservation& /*observation*/) const {
+  return false;
+}
+
+double CEventFusionMap::internal_computeObservationLikelihood(
+    const mrpt::obs::CObservation& /*observation*/,
+    const mrpt::poses::CPose3D& /*taken_from*/) const {
+  return 0;
+}
+
+// --- Stored ----------------------------------------------------------------------------------
+
+std::uint8_t CEventFusionMap::serializeGetVersion() const { return 1; }
+
+void CEventFusionMap::serializeTo(CArchive& out) const {
+  const GlobalCloudOptions& options = cloud_.options();
+  out << genericMapParams << options.voxel_size_m;
+  out.WriteAs<std::int32_t>(options.min_keyframes);
+  out << options.outliers.outlier_radius_m;
+  out.WriteAs<std::int32_t>(options.outliers.outlier_min_neighbors);
+  out << std::string(nameOf(options.consistency.consistency))
+      << options.consistency.consistency_tolerance << options.consistency.consistency_cell_deg;
+  out.WriteAs<std::int32_t>(options.consistency.max_contradictions);
+  out.WriteAs<std::uint32_t>(keyframes_.size());
+  for (const StoredKeyframe& keyframe : keyframes_) {
+    // Not as a pose of MRPT's, which would give the last digit another value.
+    const Eigen::Vector3d& t = keyframe.T_world_ref.translation;
+    const Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
+    out << keyframe.t_ref_ns << t.x() << t.y() << t.z() << q.x() << q.y() << q.z() << q.w()
+        << *keyframe.points;
+  }
+}
+
+void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
+  if (version > 1) {
+    throw std::runtime_error("an event fusion map of version " + std::to_string(version) +
+                             ": this program reads versions 0 and 1");
+  }
+  GlobalCloudOptions options;
+  in >> genericMapParams >> options.voxel_size_m;
+  options.min_keyframes = in.ReadAs<std::int32_t>();
+  in >> options.outliers.outlier_radius_m;
+  options.outliers.outlier_min_neighbors = in.ReadAs<std::int32_t>();
+  readConsistency(in, version, options.consistency);
+  CEventFusionMap read(options);
+  const auto count = in.ReadAs<std::uint32_t>();
+  for (std::uint32_t i = 0; i < count; ++i) {
+    StoredKeyframe keyframe;
+    Eigen::Vector3d& t = keyframe.T_world_ref.translation;
+    Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
+    in >> keyframe.t_ref_ns >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
+    keyframe.points = CPointsMapXYZI::Create();
+    in >> *keyframe.points;
+    read.insertKeyframe(keyframe);
+  }
+  keyframes_ = std::move(read.keyframes_);
+  cloud_ = std::move(read.cloud_);
+  simple_points_.reset();
+}
+
+// --- Shown -----------------------------------------------------------------------------------
+
+bool CEventFusionMap::isEmpty() const {
+  return std::all_of(keyframes_.begin(), keyframes_.end(),
+                     [](const StoredKeyframe& keyframe) { return keyframe.points->empty(); });
+}
+
+std::string CEventFusionMap::asString() const {
+  std::size_t points = 0;
+  for (const StoredKeyframe& keyframe : keyframes_) points += keyframe.points->size();
+  return "event fusion map of " + std::to_string(cloud_.keyframes()) + " keyframes with " +
+         std::to_string(points) + " points in voxels of " +
+         textOf(OptionValue(cloud_.options().voxel_size_m)) + " m";
+}
+
+void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
+  if (!genericMapParams.enableSaveAs3DObject) return;
+  const std::vector<CloudPoint> points = cloud_.points();
+  // A few points are confident beyond all others: the scale ends where a twentieth is above it.
+  std::vector<float> sorted;
+  sorted.reserve(points.size());
+  for (const CloudPoint& point : points) sorted.push_back(point.confidence);
+  const std::size_t top = sorted.size() - sorted.size() / 20;
+  std::sort(sorted.begin(), sorted.end());
+  const float scale = sorted.empty() ? 1.0F : sorted[top > 0 ? top - 1 : 0];
+
+  auto drawn = mrpt::opengl::CPointCloudColoured::Create();
+  drawn->setPointSize(2);
+  drawn->reserve(points.size());
+  for (const CloudPoint& point : points) {
+    const Eigen::Vector3f p_world = point.p_world.cast<float>();
+    const mrpt::img::TColor colour =
+        mrpt::img::colormap(mrpt::img::cmJET, std::min(1.0F, point.confidence / scale));
+    drawn->insertPoint({p_world.x(), p_world.y(), p_world.z(), colour.R, colour.G, colour.B});
+  }
+  out.insert(drawn);
+}
+
+void CEventFusionMap::saveMetricMapRepresentationToFile(const std::string& prefix) const {
+  writePcd(prefix + ".pcd", cloud_.points());
+}
+
+const CSimplePointsMap* CEventFusionMap::getAsSimplePointsMap() const {
+  if (!simple_points_) {
+    simple_points_.emplace();
+    for (const CloudPoint& point : cloud_.points()) {
+      const Eigen::Vector3f p_world = point.p_world.cast<float>();
+      simple_points_->insertPointFast(p_world.x(), p_world.y(), p_world.z());
+    }
+    simple_points_->mark_as_modified();
+  }
+  return &*simple_points_;
+}
+
+}  // namespace efm

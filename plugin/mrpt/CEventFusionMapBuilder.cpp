@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
+
+#include <mrpt/maps/CPointsMapXYZI.h>
+#include <mrpt/maps/CSimpleMap.h>
+#include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/poses/CPose3DPDFGaussian.h>
+
+#include <exception>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "maps/io/atomic_file.h"
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/host_options.h"
+#include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
+#include "plugin/pictures/depth_picture.h"
+
+IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
+
+namespace efm {
+namespace {
+
+CameraPacket packetOf(const CObservationEvents& observation) {
+  CameraPacket packet;
+  packet.camera = observation.camera_index;
+  packet.calibration.model = observation.camera;
+  packet.calibration.T_rig_cam = rigidFrom(observation.camera_pose);
+  packet.events = observation.events;
+  packet.covered_until_ns = observation.covered_until_ns;
+  return packet;
+}
+
+/// What a step throws, if it does.
+template <typename Step>
+std::exception_ptr errorOf(Step step) {
+  try {
+    step();
+  } catch (...) {
+    return std::current_exception();
+  }
+  return nullptr;
+}
+
+/// One point map of the exported points: MRPT's points are float32.
+mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& points) {
+  auto map = mrpt::maps::CPointsMapXYZI::Create();
+  map->resize(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f p_world = points[i].p_world.cast<float>();
+    map->setPointFast(i, p_world.x(), p_world.y(), p_world.z());
+    map->setPointIntensity(i, points[i].confidence);
+  }
+  map->mark_as_modified();
+  return map;
+}
+
+/// Moves and adds keyframes of a map until they are these. @return whether anything had to be done.
+bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
+  bool changed = map.keyframes().size() < keyframes.size();
+  for (std::size_t i = 0; i < map.keyframes().size(); ++i) {
+    if (isSame(map.keyframes()[i].T_world_ref, keyframes[i].T_world_ref)) continue;
+    map.moveKeyframe(i, keyframes[i].T_world_ref);
+    changed = true;
+  }
+  for (std::size_t i = map.keyframes().size(); i < keyframes.size(); ++i) {
+    map.insertKeyframe(keyframes[i]);
+  }
+  return changed;
+}
+
+}  // namespace
+
+CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder_options) {
+  setLoggerName("CEventFusionMapBuilder");
+  restart(builder_options);
+}
+
+CEventFusionMapBuilder::~CEventFusionMapBuilder() = default;
+
+void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options) {
+  session_ = std::make_unique<MappingSession>(builder_options);
+  options_ = builder_options;
+  finished_ = false;
+  ignored_observations_ = 0;
+  reckoning_ = {};
+  keyframes_.clear();
+  newest_depth_ = {};
+  silent_cameras_.clear();
+  mapping_failed_ = false;
+  metric_map_.maps.clear();
+  event_map_.reset();
+}
+
+void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_options) {
+  builder_options.mapper.validate();
+  builder_options.cloud.validate();
+  builder_options.refinement.validate();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  restart(builder_options);
+}
+
+EventFusionOptions CEventFusionMapBuilder::usedOptions() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return options_;
+}
+
+void CEventFusionMapBuilder::setKeyframeTaker(KeyframeTaker taker) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  taker_ = std::move(taker);
+}
+
+void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sink_ = sink;
+}
+
+void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>& feed) {
+  std::exception_ptr error;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (finished_) throw std::logic_error("the builder was given an observation after its end");
+    error = errorOf([&] { feed(*session_); });
+  }
+  // What came before a refused observation is mapped all the same.
+  const std::exception_ptr mapping_error = errorOf([this] { mapDue(); });
+  if (!error) error = mapping_error;
+  if (error) std::rethrow_exception(error);
+}
+
+void CEventFusionMapBuilder::mapWhenAsked() const {
+  auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: see the declaration
+  bool failed = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    session_->completeEarly();
+    failed = mapping_failed_;
+  }
+  if (!failed) self->mapDue();  // a failure was said: now the map so far is asked for
+  const std::lock_guard<std::mutex> lock(mutex_);
+  settle();
+}
+
+/// Brings cloud and keyframes to where the refinement has them by now, under the lock: whatever is
+/// asked for next agrees.
+void CEventFusionMapBuilder::settle() const {
+  session_->settle();
+  const_cast<CEventFusionMapBuilder*>(this)->followRefinement();  // NOLINT: as in mapWhenAsked
+}
+
+/// The stored keyframes stand where those of the cloud do.
+void CEventFusionMapBuilder::followRefinement() {
+  const std::vector<Rigid3>& T_world_ref = session_->T_world_ref();
+  const std::size_t earlier = keyframes_.size() - T_world_ref.size();
+  for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
+    keyframes_[earlier + i].T_world_ref = T_world_ref[i];
+  }
+}
+
+void CEventFusionMapBuilder::mapDue() {
+  while (const std::optional<MadeKeyframe> made = mapNext()) handOut(*made);
+}
+
+std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapNext() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  // Within a taker or the log: whoever called it maps on.
+  if (handing_out_.count(std::this_thread::get_id()) != 0) return std::nullopt;
+  mapping_failed_ = true;
+  std::optional<KeyframeDepthMap> keyframe = session_->next(sink_);
+  mapping_failed_ = false;
+  if (keyframe) keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
+  followRefinement();
+  if (!keyframe) return std::nullopt;
+  newest_depth_ = keyframe->map.depth;
+  std::vector<std::string> warnings = warningsOfSilence(*keyframe);
+  return MadeKeyframe{std::move(*keyframe), taker_, std::move(warnings)};
+}
+
+void CEventFusionMapBuilder::handOut(const MadeKeyframe& made) {
+  const auto self = std::this_thread::get_id();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    handing_out_.insert(self);
+  }
+  const std::exception_ptr error = errorOf([&] {
+    for (const std::string& warning : made.warnings) MRPT_LOG_WARN(warning);
+    if (made.taker) made.taker(made.keyframe);
+  });
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    handing_out_.erase(self);
+  }
+  if (error) std::rethrow_exception(error);
+}
+
+/// Once per camera: `status` counts the rest.
+std::vector<std::string> CEventFusionMapBuilder::warningsOfSilence(
+    const KeyframeDepthMap& keyframe) {
+  std::vector<std::string> warnings;
+  for (const int camera : keyframe.silent_cameras) {
+    if (!silent_cameras_.insert(camera).second) continue;
+    warnings.push_back("camera " + std::to_string(camera) + " had no event for the keyframe at " +
+                       formatSeconds(keyframe.window.t_ref_ns) + " s");
+  }
+  return warnings;
+}
+
+void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
+  if (!observation) throw std::invalid_argument("the builder was given no observation (null)");
+  if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
+    advance([&](MappingSession& session) { session.addEvents(packetOf(*events)); });
+  } else if (const auto observed = poseIn(*observation)) {
+    advance([&](MappingSession& session) {
+      const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
+      session.addPose({observed->t_ns, observed->T_world_body * T_body_rig},
+                      *poseOriginOf(*observation), observed->noise);
+    });
+  } else {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++ignored_observations_;
+  }
+}
+
+void CEventFusionMapBuilder::finish() {
+  advance([this](MappingSession& session) {
+    finished_ = true;
+    session.finish();
+  });
+}
+
+SessionStatus CEventFusionMapBuilder::status() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return session_->status();
+}
+
+std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return ignored_observations_;
+}
+
+std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  settle();
+  return session_->cloud().points();
+}
+
+std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  settle();
+  return keyframePoses();
+}
+
+std::vector<StampedPose> CEventFusionMapBuilder::keyframePoses() const {
+  std::vector<StampedPose> poses;
+  for (const StoredKeyframe& keyframe : keyframes_) {
+    poses.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
+  }
+  return poses;
+}
+
+std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<StampedPose> poses = keyframePoses();
+  const std::vector<Rigid3>& T_tracker_ref = session_->T_tracker_ref();
+  const std::size_t earlier = poses.size() - T_tracker_ref.size();
+  for (std::size_t i = 0; i < T_tracker_ref.size(); ++i) {
+    poses[earlier + i].T_world_rig = T_tracker_ref[i];
+  }
+  return poses;
+}
+
+// --- mrpt::config::CLoadableOptions ----------------------------------------------------------
+
+void CEventFusionMapBuilder::loadFromConfigFile(const mrpt::config::CConfigFileBase& source,
+                                                const std::string& prefix) {
+  OptionReader reader(usedOptions());
+  readHostOptions(source, prefix, reader);
+  setOptions(reader.options());
+}
+
+void CEventFusionMapBuilder::saveToConfigFile(mrpt::config::CConfigFileBase& target,
+                                              const std::string& prefix) const {
+  writeHostOptions(usedOptions(), prefix, target);
+}
+
+// --- mrpt::slam::CMetricMapBuilder -----------------------------------------------------------
+
+void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_map,
+                                        const mrpt::poses::CPosePDF* /*x0*/) {
+  std::vector<StoredKeyframe> earlier = keyframesOf(initial_map);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  auto session = std::make_unique<MappingSession>(options_);
+  for (const StoredKeyframe& keyframe : earlier) {
+    session->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
+  }
+  restart(EventFusionOptions(options_));
+  session_ = std::move(session);
+  keyframes_ = std::move(earlier);
+}
+
+mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  auto estimate = mrpt::poses::CPose3DPDFGaussian::Create();
+  const std::optional<StampedPose>& newest = session_->newestPose();
+  if (!newest) return estimate;
+  const std::optional<RefinementState> refinement = session_->status().refinement;
+  if (!refinement) {
+    estimate->mean = mrptPoseFrom(newest->T_world_rig);
+    return estimate;
+  }
+  const Rigid3 T_world_rig = refinement->T_world_tracker * newest->T_world_rig;
+  return std::make_shared<mrpt::poses::CPose3DPDFGaussian>(
+      mrptPoseFrom(T_world_rig, covarianceAt(*refinement, T_world_rig)));
+}
+
+void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollection& action,
+                                                      mrpt::obs::CSensoryFrame& observations) {
+  mrpt::obs::CObservation::Ptr pose;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    pose = reckoning_.poseAfter(action, observations);
+  }
+  if (pose) processObservation(pose);
+  for (const mrpt::obs::CObservation::Ptr& observation : observations) {
+    processObservation(observation);
+  }
+}
+
+void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
+  mapWhenAsked();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  out_map.clear();
+  for (const StoredKeyframe& keyframe : keyframes_) insertInto(out_map, keyframe);
+}
+
+unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
+  mapWhenAsked();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return static_cast<unsigned int>(keyframes_.size());
+}
+
+const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
+  mapWhenAsked();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(options_.cloud);
+  const bool changed = bringUpToDate(*event_map_, keyframes_);
+  if (metric_map_.maps.empty() || changed) {
+    metric_map_.maps.clear();
+    metric_map_.maps.push_back(event_map_);
+    metric_map_.maps.push_back(pointsMapOf(event_map_->cloud().points()));
+  }
+  return &metric_map_;
+}
+
+void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
+                                                          bool /*format_emf_bmp*/) {
+  mapWhenAsked();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (newest_depth_.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
+  const cv::Mat3b picture = depthPicture(newest_depth_, options_.mapper.keyframe.planes);
+  writeWhole(file, [&](const std::filesystem::path& temporary) {
+    if (!cv::imwrite(temporary.string(), picture)) throw std::runtime_error("imwrite failed");
+  });
+}
+
+}  // namespace efm

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/CObservationEvents.h"
+
+#include <mrpt/serialization/CArchive.h>
+#include <mrpt/serialization/archiveFrom_std_vector.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <ostream>
+#include <stdexcept>
+#include <string>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/mrpt/event_drawing.h"
+#include "plugin/mrpt/event_encoding.h"
+
+IMPLEMENTS_SERIALIZABLE(CObservationEvents, CObservation, efm)
+
+namespace efm {
+namespace {
+
+using mrpt::serialization::CArchive;
+
+/// A packet larger than this is refused: MRPT's archives in memory count bytes in int.
+constexpr std::size_t kMaxContentBytes = std::size_t{1} << 30;
+
+std::uint32_t checksumOf(const std::vector<std::uint8_t>& bytes) {
+  return static_cast<std::uint32_t>(crc32_z(0, bytes.data(), bytes.size()));
+}
+
+void writeCamera(CArchive& out, const CameraModel& camera) {
+  out.WriteAs<std::int32_t>(camera.width);
+  out.WriteAs<std::int32_t>(camera.height);
+  out << camera.fx << camera.fy << camera.cx << camera.cy;
+  out << std::string(nameOf(camera.distortion)) << camera.coefficients;
+}
+
+CameraModel readCamera(CArchive& in) {
+  CameraModel camera;
+  camera.width = in.ReadAs<std::int32_t>();
+  camera.height = in.ReadAs<std::int32_t>();
+  in >> camera.fx >> camera.fy >> camera.cx >> camera.cy;
+  camera.distortion = distortionModelFromName(in.ReadAs<std::string>());
+  in >> camera.coefficients;
+  return camera;
+}
+
+/// Reads as many bytes as announced, but never reserves more than have really come.
+std::vector<std::uint8_t> readBytes(CArchive& in, std::size_t size) {
+  constexpr std::size_t kPiece = std::size_t{1} << 20;
+  std::vector<std::uint8_t> bytes;
+  while (bytes.size() < size) {
+    const std::size_t piece = std::min(kPiece, size - bytes.size());
+    bytes.resize(bytes.size() + piece);
+    // A short read is no error to MRPT.
+    if (in.ReadBuffer(bytes.data() + bytes.size() - piece, piece) != piece) {
+      throw std::runtime_error("it ends too early");
+    }
+  }
+  return bytes;
+}
+
+}  // namespace
+
+std::uint8_t CObservationEvents::serializeGetVersion() const { return 0; }
+
+void CObservationEvents::serializeTo(CArchive& out) const {
+  std::vector<std::uint8_t> content;
+  auto archive = mrpt::serialization::archiveFrom(content);
+  writeContent(archive);
+  if (content.size() > kMaxContentBytes) {
+    throw std::length_error("a packet of " + std::to_string(events.size()) +
+                            " events is too large: expected at most 1 GiB");
+  }
+  out.WriteAs<std::uint32_t>(content.size());
+  out << checksumOf(content);
+  out.WriteBuffer(content.data(), content.size());
+}
+
+void CObservationEvents::serializeFrom(CArchive& in, std::uint8_t version) {
+  if (version != 0) {
+    throw std::runtime_error("events of version " + std::to_string(version) +
+                             ": this program reads version 0");
+  }
+  try {
+    const auto size = in.ReadAs<std::uint32_t>();
+    const auto checksum = in.ReadAs<std::uint32_t>();
+    if (size > kMaxContentBytes) throw std::runtime_error("a size that cannot be");
+    const std::vector<std::uint8_t> content = readBytes(in, size);
+    if (checksumOf(content) != checksum) throw std::runtime_error("its checksum is wrong");
+    auto archive = mrpt::serialization::archiveFrom(content);
+    readContent(archive);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(std::string("a packet of events is damaged: ") + error.what());
+  }
+}
+
+void CObservationEvents::writeContent(CArchive& out) const {
+  out << sensorLabel << timestamp;
+  out.WriteAs<std::int32_t>(camera_index);
+  writeCamera(out, camera);
+  out << camera_pose << covered_until_ns.has_value() << covered_until_ns.value_or(0);
+  const std::vector<std::uint8_t> bytes = encodeEvents(events);
+  out.WriteAs<std::uint32_t>(events.size());
+  out << bytes;
+}
+
+void CObservationEvents::readContent(CArchive& in) {
+  in >> sensorLabel >> timestamp;
+  camera_index = in.ReadAs<std::int32_t>();
+  camera = readCamera(in);
+  bool covers = false;
+  std::int64_t until_ns = 0;
+  in >> camera_pose >> covers >> until_ns;
+  covered_until_ns = covers ? std::optional(until_ns) : std::nullopt;
+  const auto count = in.ReadAs<std::uint32_t>();
+  std::vector<std::uint8_t> bytes;
+  in >> bytes;
+  events = decodeEvents(bytes, count);
+}
+
+void CObservationEvents::getDescriptionAsText(std::ostream& stream) const {
+  mrpt::obs::CObservation::getDescriptionAsText(stream);
+  stream << "Events of camera " << camera_index << ": " << events.size() << "\n";
+  if (!events.empty()) {
+    std::size_t brighter = 0;
+    for (const Event& event : events) brighter += event.polarity ? 1 : 0;
+    stream << "From " << formatSeconds(events.front().t_ns) << " s to "
+           << formatSeconds(events.back().t_ns) << " s, " << brighter << " of them brighter\n";
+  }
+  if (covered_until_ns && *covered_until_ns < kEndOfTimeNs) {
+    stream << "Everything before " << formatSeconds(*covered_until_ns) << " s is here by now\n";
+  } else if (covered_until_ns) {
+    stream << "The last packet of its camera\n";
+  }
+  stream << "Sensor: " << camera.width << "x" << camera.height << " pixels, fx " << camera.fx
+         << " fy " << camera.fy << " cx " << camera.cx << " cy " << camera.cy << ", distortion "
+         << nameOf(camera.distortion);
+  for (const double coefficient : camera.coefficients) stream << " " << coefficient;
+  stream << "\nPose on the rig: " << camera_pose.asString() << "\n";
+}
+
+void CObservationEvents::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
+  drawEvents(*this, out);
+}
+
+std::string CObservationEvents::exportTxtHeader() const {
+  return "NUM_EVENTS [TIME_S X Y POLARITY] x NUM_EVENTS";
+}
+
+std::string CObservationEvents::exportTxtDataRow() const {
+  std::string row = std::to_string(events.size());
+  for (const Event& event : events) {
+    row += ' ' + formatSeconds(event.t_ns) + ' ' + std::to_string(event.x) + ' ' +
+           std::to_string(event.y) + (event.polarity ? " 1" : " 0");
+  }
+  return row;
+}
+
+}  // namespace efm

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/event_encoding.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+namespace efm {
+namespace {
+
+constexpr std::uint8_t kColumns = 1;
+constexpr std::int64_t kTicksNs[] = {1, 1000};
+constexpr std::size_t kHeaderSize = 10;  // encoding, tick, first time
+
+void putVarint(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
+  while (value >= 0x80) {
+    bytes.push_back(static_cast<std::uint8_t>(value | 0x80));
+    value >>= 7;
+  }
+  bytes.push_back(static_cast<std::uint8_t>(value));
+}
+
+/// Bytes in order, with an error instead of a read past the end.
+class ByteReader {
+ public:
+  explicit ByteReader(const std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
+
+  std::size_t left() const { return bytes_.size() - at_; }
+  std::uint8_t byte() { return *take(1); }
+  const std::uint8_t* take(std::size_t count) {
+    if (count > left()) throw std::runtime_error("encoded events end too early");
+    at_ += count;
+    return bytes_.data() + at_ - count;
+  }
+  std::uint64_t varint() {
+    std::uint64_t value = 0;
+    for (int shift = 0; shift < 64; shift += 7) {
+      const std::uint8_t next = byte();
+      value |= static_cast<std::uint64_t>(next & 0x7F) << shift;
+      if ((next & 0x80) == 0) return value;
+    }
+    throw std::runtime_error("encoded events: a time step is too large");
+  }
+
+ private:
+  const std::vector<std::uint8_t>& bytes_;
+  std::size_t at_ = 0;
+};
+
+/// Differences of times wrap around as unsigned numbers do: any two times have one.
+std::int64_t stepBetween(std::int64_t from_ns, std::int64_t to_ns) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(to_ns) -
+                                   static_cast<std::uint64_t>(from_ns));
+}
+bool allStepsAreWholeMicroseconds(const std::vector<Event>& events) {
+  const auto broken = [](const Event& before, const Event& event) {
+    return stepBetween(before.t_ns, event.t_ns) % kTicksNs[1] != 0;
+  };
+  return std::adjacent_find(events.begin(), events.end(), broken) == events.end();
+}
+std::int64_t advance(std::int64_t t_ns, std::int64_t steps, std::int64_t tick_ns) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(t_ns) +
+                                   static_cast<std::uint64_t>(steps) *
+                                       static_cast<std::uint64_t>(tick_ns));
+}
+
+/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...: small steps stay short, whatever their sign.
+std::uint64_t zigzag(std::int64_t value) {
+  return (static_cast<std::uint64_t>(value) << 1) ^ (value < 0 ? ~std::uint64_t{0} : 0);
+}
+std::int64_t unzigzag(std::uint64_t code) {
+  return static_cast<std::int64_t>((code >> 1) ^ (~(code & 1) + 1));
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encodeEvents(const std::vector<Event>& events) {
+  std::vector<std::uint8_t> bytes;
+  if (events.empty()) return bytes;
+  const std::size_t count = events.size();
+  bytes.reserve(kHeaderSize + 7 * count);
+  const std::uint8_t tick = allStepsAreWholeMicroseconds(events) ? 1 : 0;
+  bytes.push_back(kColumns);
+  bytes.push_back(tick);
+  const auto first = static_cast<std::uint64_t>(events.front().t_ns);
+  for (int shift = 0; shift < 64; shift += 8) {
+    bytes.push_back(static_cast<std::uint8_t>(first >> shift));
+  }
+  for (std::size_t i = 1; i < count; ++i) {
+    const std::int64_t step_ns = stepBetween(events[i - 1].t_ns, events[i].t_ns);
+    putVarint(bytes, zigzag(step_ns / kTicksNs[tick]));
+  }
+  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.x));
+  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.x >> 8));
+  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.y));
+  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.y >> 8));
+  for (std::size_t i = 0; i < count; i += 8) {
+    unsigned bits = 0;
+    for (std::size_t k = 0; k < 8 && i + k < count; ++k) {
+      bits |= static_cast<unsigned>(events[i + k].polarity) << k;
+    }
+    bytes.push_back(static_cast<std::uint8_t>(bits));
+  }
+  return bytes;
+}
+
+std::vector<Event> decodeEvents(const std::vector<std::uint8_t>& bytes, std::size_t count) {
+  ByteReader reader(bytes);
+  std::vector<Event> events;
+  if (count == 0 && bytes.empty()) return events;
+  if (const std::uint8_t encoding = reader.byte(); encoding != kColumns) {
+    throw std::runtime_error("encoded events: encoding " + std::to_string(encoding) +
+                             ", this program knows 1");
+  }
+  const std::uint8_t tick = reader.byte();
+  // Each event takes 4 bytes of coordinates at least.
+  if (tick > 1 || count == 0 || count > bytes.size() / 4) {
+    throw std::runtime_error("encoded events: a header that cannot be");
+  }
+  std::uint64_t first = 0;
+  for (int shift = 0; shift < 64; shift += 8) {
+    first |= static_cast<std::uint64_t>(reader.byte()) << shift;
+  }
+  events.resize(count);
+  events[0].t_ns = static_cast<std::int64_t>(first);
+  for (std::size_t i = 1; i < count; ++i) {
+    events[i].t_ns = advance(events[i - 1].t_ns, unzigzag(reader.varint()), kTicksNs[tick]);
+  }
+  const std::uint8_t* x_low = reader.take(count);
+  const std::uint8_t* x_high = reader.take(count);
+  const std::uint8_t* y_low = reader.take(count);
+  const std::uint8_t* y_high = reader.take(count);
+  const std::uint8_t* polarity = reader.take((count + 7) / 8);
+  if (reader.left() != 0) throw std::runtime_error("encoded events: more bytes than events");
+  for (std::size_t i = 0; i < count; ++i) {
+    events[i].x = static_cast<std::uint16_t>(x_low[i] | (x_high[i] << 8));
+    events[i].y = static_cast<std::uint16_t>(y_low[i] | (y_high[i] << 8));
+    events[i].polarity = ((polarity[i / 8] >> (i % 8)) & 1) != 0;
+  }
+  return events;
+}
+
+}  // namespace efm

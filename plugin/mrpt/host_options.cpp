@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/host_options.h"
+
+#include <mrpt/config/CConfigFile.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+#include <vector>
+
+namespace efm {
+namespace {
+
+/// Empty where the source is none.
+std::filesystem::path fileOf(const mrpt::config::CConfigFileBase& source) {
+  const auto* file = dynamic_cast<const mrpt::config::CConfigFile*>(&source);
+  return file ? file->getAssociatedFile() : std::string();
+}
+
+/// MRPT takes a missing file for an empty one.
+void requireFile(const mrpt::config::CConfigFileBase& source) {
+  const std::filesystem::path file = fileOf(source);
+  if (file.empty() || std::filesystem::exists(file)) return;
+  throw std::runtime_error("cannot read the option file " + file.string());
+}
+
+std::string nameOf(const mrpt::config::CConfigFileBase& source) {
+  const std::filesystem::path file = fileOf(source);
+  return file.empty() ? "options" : file.string();
+}
+
+}  // namespace
+
+std::string placeIn(const mrpt::config::CConfigFileBase& source, const std::string& section) {
+  return nameOf(source) + ", section " + section + ":";
+}
+
+std::vector<std::string> sectionsBelow(const mrpt::config::CConfigFileBase& source,
+                                       const std::string& prefix) {
+  std::vector<std::string> sections;
+  source.getAllSections(sections);
+  const std::string begin = prefix + "_";
+  const auto is_other = [&](const std::string& section) { return section.find(begin) != 0; };
+  sections.erase(std::remove_if(sections.begin(), sections.end(), is_other), sections.end());
+  return sections;
+}
+
+void readHostSection(const mrpt::config::CConfigFileBase& source, const std::string& host_section,
+                     std::string_view section, OptionReader& reader) {
+  std::vector<std::string> keys;
+  source.getAllKeys(host_section, keys);
+  OptionPlace place{placeIn(source, host_section), {}};
+  // Absolute, so that what is saved elsewhere names the same files.
+  const std::filesystem::path file = fileOf(source);
+  if (!file.empty()) place.folder = std::filesystem::absolute(file).parent_path();
+  for (const std::string& key : keys) {
+    reader.set(section, key, source.read_string(host_section, key, ""), place);
+  }
+}
+
+void readHostOptions(const mrpt::config::CConfigFileBase& source, const std::string& prefix,
+                     OptionReader& reader) {
+  requireFile(source);
+  if (!prefix.empty()) {
+    const std::vector<std::string> ours = sectionsBelow(source, prefix);
+    if (ours.empty()) {
+      throw std::invalid_argument(nameOf(source) + ": no section begins with " + prefix +
+                                  "_: expected sections such as [" + prefix + "_dsi]");
+    }
+    for (const std::string& section : ours) {
+      readHostSection(source, section, section.substr(prefix.size() + 1), reader);
+    }
+    return;
+  }
+  std::vector<std::string> sections;
+  source.getAllSections(sections);
+  for (const std::string& section : sections) {
+    if (isOptionSection(section)) readHostSection(source, section, section, reader);
+  }
+}
+
+void writeHostOptions(const EventFusionOptions& options, const std::string& prefix,
+                      mrpt::config::CConfigFileBase& target) {
+  const std::string begin = prefix.empty() ? "" : prefix + "_";
+  for (const NamedOption& option : listOptions(options)) {
+    target.write(begin + std::string(option.section), std::string(option.key),
+                 textOf(option.value));
+  }
+}
+
+}  // namespace efm

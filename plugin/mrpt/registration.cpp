@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/registration.h"
+
+#include <mrpt/rtti/CObject.h>
+
+#include "plugin/mrpt/CEventFusionMap.h"
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
+#include "plugin/mrpt/CObservationEvents.h"
+
+namespace efm {
+
+void registerClasses() {
+  // One line per class.
+  for (const mrpt::rtti::TRuntimeClassId* id : {
+           CLASS_ID(CObservationEvents),
+           CLASS_ID(CEventFusionMap),
+           CLASS_ID(CEventFusionMapBuilder),
+       }) {
+    if (!mrpt::rtti::findRegisteredClass(id->className, false)) mrpt::rtti::registerClass(id);
+  }
+}
+
+namespace {
+
+/// At load. Class ids are constants: the order in which files are initialised does not matter.
+const struct AtLoad {
+  AtLoad() { registerClasses(); }
+} kAtLoad;
+
+}  // namespace
+
+}  // namespace efm

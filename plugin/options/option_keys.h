@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "plugin/options/option_value.h"
+#include "plugin/session/event_fusion_options.h"
+
+namespace efm {
+
+/// One key: how it is read into its field and how the field is given back.
+struct OptionKey {
+  std::string_view section;
+  std::string_view key;
+  std::function<void(EventFusionOptions&, std::string_view)> read;
+  std::function<OptionValue(const EventFusionOptions&)> value;
+  bool is_path = false;
+};
+
+/// The table of all options: what is read, overridden and reported goes by it.
+const std::vector<OptionKey>& optionKeys();
+
+/// One option as the files name it.
+struct NamedOption {
+  std::string_view section;
+  std::string_view key;
+  OptionValue value;
+};
+
+/// All options, in the order of the table that files are read by, so that what is read, overridden
+/// and reported cannot differ.
+std::vector<NamedOption> listOptions(const EventFusionOptions& options);
+/// Whether an option file may have a section of this name.
+bool isOptionSection(std::string_view section);
+
+/// The keys of a section, or the sections, for whoever mistyped one.
+std::string knownOptionKeys(std::string_view section);
+std::string knownOptionSections();
+
+}  // namespace efm

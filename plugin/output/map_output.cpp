@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/output/map_output.h"
+
+#include <mrpt/maps/CSimpleMap.h>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "maps/io/atomic_file.h"
+#include "maps/io/point_cloud_file.h"
+#include "plugin/pictures/depth_picture.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+
+namespace efm {
+namespace {
+
+/// The images of one depth map, and that of a camera's events.
+constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
+                                                     "confidence.png"};
+constexpr std::string_view kEventImage = "events.png";
+constexpr std::array<std::string_view, 5> kMapFiles = {"map.pcd", "map.simplemap", "trajectory.txt",
+                                                       "trajectory_tracker.txt", "report.json"};
+constexpr std::array<std::string_view, 3> kDepthFiles = {"points.pcd", "dsi.npy", "report.json"};
+
+void makeFolder(const std::filesystem::path& folder) {
+  if (folder.empty()) throw std::runtime_error("'': expected the name of the folder to write");
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (!std::filesystem::is_directory(folder)) {
+    throw std::runtime_error("cannot make the folder " + folder.string() + ": " +
+                             (error ? error.message() : "a file of that name is there"));
+  }
+}
+
+/// Removes the files of these names; what else has such a name was not written here.
+template <std::size_t N>
+void removeFiles(const std::filesystem::path& folder,
+                 const std::array<std::string_view, N>& names) {
+  for (const std::string_view name : names) {
+    const std::filesystem::path file = folder / name;
+    if (std::filesystem::is_regular_file(std::filesystem::symlink_status(file))) {
+      std::filesystem::remove(file);
+    }
+  }
+}
+
+constexpr std::string_view kCameraFolder = "cam";  // and the camera's index
+
+std::string cameraFolder(int camera) { return std::string(kCameraFolder) + std::to_string(camera); }
+
+bool isCameraFolder(const std::filesystem::directory_entry& entry) {
+  const std::string name = entry.path().filename().string();
+  return name.size() > kCameraFolder.size() && name.rfind(kCameraFolder, 0) == 0 &&
+         name.find_first_not_of("0123456789", kCameraFolder.size()) == std::string::npos &&
+         std::filesystem::is_directory(entry.symlink_status());
+}
+
+/// Removes what is kept of a keyframe: its own images, and those of its single cameras.
+void removeImages(const std::filesystem::path& folder) {
+  removeFiles(folder, kImages);
+  std::vector<std::filesystem::path> cameras;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (isCameraFolder(entry)) cameras.push_back(entry.path());
+  }
+  for (const std::filesystem::path& camera : cameras) {
+    removeFiles(camera, kImages);
+    removeFiles(camera, std::array{kEventImage});
+    if (std::filesystem::is_empty(camera)) std::filesystem::remove(camera);
+  }
+}
+
+bool isKeyframeFolder(const std::filesystem::directory_entry& entry) {
+  const std::string name = entry.path().filename().string();
+  const std::optional<std::int64_t> t_ns = parseSeconds(name);
+  return t_ns && formatSeconds(*t_ns) == name &&
+         std::filesystem::is_directory(entry.symlink_status());
+}
+
+void removeKeyframes(const std::filesystem::path& keyframes) {
+  if (!std::filesystem::is_directory(keyframes)) return;
+  std::vector<std::filesystem::path> earlier;
+  for (const auto& entry : std::filesystem::directory_iterator(keyframes)) {
+    if (isKeyframeFolder(entry)) earlier.push_back(entry.path());
+  }
+  for (const std::filesystem::path& keyframe : earlier) {
+    removeImages(keyframe);
+    if (std::filesystem::is_empty(keyframe)) std::filesystem::remove(keyframe);
+  }
+}
+
+void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
+  writeWhole(path, [&](const std::filesystem::path& temporary) {
+    if (!cv::imwrite(temporary.string(), image)) throw std::runtime_error("imwrite failed");
+  });
+}
+
+/// @param write puts the content into the stream.
+template <typename Write>
+void writeText(const std::filesystem::path& path, Write write) {
+  writeWhole(path, [&](const std::filesystem::path& temporary) {
+    std::ofstream file(temporary, std::ios::binary);
+    write(file);
+    file.close();
+    if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
+  });
+}
+
+}  // namespace
+
+MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
+                     const DepthPlanesOptions& limits)
+    : folder_(std::move(folder)), kind_(kind), limits_(limits) {
+  makeFolder(folder_);
+}
+
+/// A map of five keyframes must not show two of an earlier map of seven.
+void MapOutput::removeEarlier() {
+  if (std::exchange(began_, true)) return;
+  if (kind_ == OutputKind::kMap) {
+    removeFiles(folder_, kMapFiles);
+    removeKeyframes(folder_ / "keyframes");
+  } else {
+    removeFiles(folder_, kDepthFiles);
+    removeImages(folder_);
+  }
+}
+
+void MapOutput::writeKeyframe(const KeyframeDepthMap& keyframe) {
+  removeEarlier();
+  const std::filesystem::path folder =
+      folder_ / "keyframes" / formatSeconds(keyframe.window.t_ref_ns);
+  makeFolder(folder);
+  writeImagesTo(folder, keyframe);
+}
+
+void MapOutput::writeImages(const KeyframeDepthMap& keyframe) {
+  removeEarlier();
+  writeImagesTo(folder_, keyframe);
+}
+
+void MapOutput::writeImagesTo(const std::filesystem::path& folder,
+                              const KeyframeDepthMap& keyframe) const {
+  writeMap(folder, keyframe.map);
+  for (const CameraDepthMap& camera : keyframe.camera_maps) {
+    const std::filesystem::path own = folder / cameraFolder(camera.camera);
+    makeFolder(own);
+    writeMap(own, camera.map);
+  }
+  for (const EventImage& image : keyframe.event_images) {
+    const std::filesystem::path own = folder / cameraFolder(image.camera);
+    makeFolder(own);
+    writeImage(own / kEventImage, eventPicture(image.counts));
+  }
+}
+
+void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) const {
+  writeImage(folder / "depth.tiff", map.depth);
+  writeImage(folder / "confidence.tiff", map.confidence);
+  writeImage(folder / "depth.png", depthPicture(map.depth, limits_));
+  writeImage(folder / "confidence.png", confidencePicture(map.confidence));
+}
+
+void MapOutput::writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses) {
+  removeEarlier();
+  writeText(folder_ / name, [&](std::ostream& stream) { writeTumTrajectory(stream, poses); });
+}
+
+void MapOutput::writeCloud(const std::string& name, const std::vector<CloudPoint>& points) {
+  removeEarlier();
+  writePcd(folder_ / name, points);
+}
+
+void MapOutput::writeSimplemap(const mrpt::maps::CSimpleMap& map) {
+  removeEarlier();
+  writeWhole(folder_ / "map.simplemap", [&](const std::filesystem::path& temporary) {
+    if (!map.saveToFile(temporary.string())) {
+      throw std::runtime_error("the file cannot be created or the disk is full");
+    }
+  });
+}
+
+void MapOutput::writeReport(const std::string& json) {
+  removeEarlier();
+  writeText(folder_ / "report.json", [&](std::ostream& stream) { stream << json; });
+}
+
+}  // namespace efm

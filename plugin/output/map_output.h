@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/trajectory.h"
+#include "mapping/keyframes/keyframe_mapper.h"
+#include "maps/cloud/cloud_point.h"
+
+namespace mrpt::maps {
+class CSimpleMap;
+}
+
+namespace efm {
+
+/// Whose files a folder receives; each kind replaces its own alone.
+enum class OutputKind {
+  kMap,    ///< map.pcd, map.simplemap, trajectory.txt, report.json, keyframes/<t_ref>/ with images
+  kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
+};
+
+/// The folder that a map is written to. Files appear under their names only when they are complete;
+/// where one cannot be written, an error names it (std::runtime_error).
+///
+///     map.pcd  map.simplemap  trajectory.txt  report.json
+///     trajectory_tracker.txt   where poses were refined
+///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
+///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   where the keyframe has them
+class MapOutput {
+ public:
+  /// Creates the folder. What an earlier run of the same kind left in it is removed right before
+  /// the first file is written, so that a run which cannot write anything costs nothing.
+  /// @param limits of depth, which the colours of depth.png run between.
+  /// @throws std::runtime_error where the folder cannot be made.
+  MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits);
+
+  /// Writes the keyframe's four images below keyframes/.
+  void writeKeyframe(const KeyframeDepthMap& keyframe);
+  /// Writes the four images straight into the folder: for a folder of one keyframe.
+  void writeImages(const KeyframeDepthMap& keyframe);
+  /// T_world_ref at t_ref of the keyframes, TUM format.
+  /// @param name "trajectory.txt" or "trajectory_tracker.txt".
+  void writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses);
+  /// @param name "map.pcd" or "points.pcd".
+  void writeCloud(const std::string& name, const std::vector<CloudPoint>& points);
+  /// Writes map.simplemap: the keyframes' clouds and poses, as MRPT has them.
+  void writeSimplemap(const mrpt::maps::CSimpleMap& map);
+  void writeReport(const std::string& json);
+
+  const std::filesystem::path& folder() const { return folder_; }
+
+ private:
+  void removeEarlier();
+  void writeImagesTo(const std::filesystem::path& folder, const KeyframeDepthMap& keyframe) const;
+  void writeMap(const std::filesystem::path& folder, const DepthMap& map) const;
+
+  std::filesystem::path folder_;
+  OutputKind kind_;
+  DepthPlanesOptions limits_;
+  bool began_ = false;  // something was written
+};
+
+}  // namespace efm

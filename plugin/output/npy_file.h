@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <mutex>
+
+#include "mapping/geometry/reference_view.h"
+#include "mapping/sweep/space_sweep.h"
+
+namespace efm {
+
+/// Writes the whole DSI to a NumPy file (.npy, format 1.0): float32, [plane][row][column]. Planes
+/// go to disk as they come: memory is that of one plane. The file appears under its name when
+/// `finish` is called; without it nothing stays.
+class NpyDsiFile : public DsiSink {
+ public:
+  /// @throws std::runtime_error naming the path where it cannot be created.
+  NpyDsiFile(const std::filesystem::path& path, int planes, const ReferenceView& view);
+  ~NpyDsiFile() override;
+
+  /// Thread-safe. Errors of the disk are kept for `finish`.
+  void takePlane(int plane, const float* values) override;
+  /// @throws std::runtime_error naming the path where it could not be written.
+  void finish();
+
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+  std::streamoff plane_bytes_;
+  std::streamoff header_bytes_ = 0;
+  std::mutex mutex_;  // of file_
+  std::ofstream file_;
+};
+
+}  // namespace efm

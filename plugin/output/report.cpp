@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/output/report.h"
+
+#include <sys/resource.h>
+
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "plugin/options/tracker_fault_keys.h"
+
+namespace efm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json asJson(const EventCounts& counts) {
+  return {{"read", counts.read},
+          {"used", counts.used},
+          {"without_pose", counts.without_pose},
+          {"outside_window", counts.outside_window},
+          {"dropped", counts.dropped},
+          {"filtered", counts.filtered}};
+}
+
+Json asJson(const StageSeconds& seconds) {
+  return {{"total", seconds.total}, {"read", seconds.read},     {"sweep", seconds.sweep},
+          {"depth", seconds.depth}, {"refine", seconds.refine}, {"map", seconds.map}};
+}
+
+Json asJson(const EventFusionOptions& options) {
+  Json json = Json::object();
+  for (const NamedOption& option : listOptions(options)) {
+    std::visit(
+        [&](const auto& value) {
+          json[std::string(option.section)][std::string(option.key)] = value;
+        },
+        option.value);
+  }
+  return json;
+}
+
+Json asJson(const TrackerFaults& faults) {
+  Json json = Json::object();
+  for (const auto& named : listTrackerFaults(faults)) {
+    std::visit([&](const auto& value) { json[named.first] = value; }, named.second);
+  }
+  return json;
+}
+
+Json asJson(const RefinementState& refinement) {
+  const RefinementCounts& counts = refinement.counts;
+  const TrackerErrors& tracker = refinement.tracker;
+  return {{"registered", counts.registered},
+          {"loop_checks", counts.loop_checks},
+          {"loops", counts.loops},
+          {"loops_dropped", counts.loops_dropped},
+          {"tracker",
+           {{"noise_m", tracker.noise_m},
+            {"noise_deg", tracker.noise_rad / kRadiansPerDegree},
+            {"drift", tracker.drift_m},
+            {"drift_deg_per_m", tracker.drift_rad / kRadiansPerDegree}}}};
+}
+
+Json asJson(const ReferenceView& view) {
+  return {{"width", view.width}, {"height", view.height}, {"fx", view.fx},
+          {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
+}
+
+std::uint64_t peakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
+}
+
+}  // namespace
+
+double votesPerSecond(const MapReport& report) {
+  if (!(report.seconds.sweep > 0)) return 0;
+  return static_cast<double>(report.counts.votes.total()) / report.seconds.sweep;
+}
+
+std::string reportJson(const MapReport& report) {
+  const MapperCounts& counts = report.counts;
+  const SpaceSweepOptions& sweep = report.options.mapper.keyframe.sweep;
+
+  Json events = asJson(counts.total());
+  events["cameras"] = Json::array();
+  for (const EventCounts& camera : counts.cameras) events["cameras"].push_back(asJson(camera));
+
+  Json json;
+  json["version"] = EFM_VERSION;
+  json["events"] = events;
+  json["event_uses"] = counts.event_uses;
+  json["votes"] = {{"cast", counts.votes.cast},
+                   {"outside_view", counts.votes.outside_view},
+                   {"behind_camera", counts.votes.behind_camera}};
+  json["keyframes"] = counts.keyframes;
+  json["keyframes_without_pose"] = counts.keyframes_without_pose;
+  json["windows_without_events"] = counts.windows_without_events;
+  json["silent"] = {{"keyframes", report.silent_keyframes},
+                    {"subintervals", counts.silent_subintervals}};
+  json["sorted_events"] = counts.sorted_events;
+  json["duplicate_poses"] = counts.duplicate_poses;
+  json["points"] = report.points;
+  json["seconds"] = asJson(report.seconds);
+  json["votes_per_second"] = votesPerSecond(report);
+  json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
+  json["threads"] = sweep.threadsOrCores();
+  json["peak_memory_bytes"] = peakMemoryBytes();
+  if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
+  if (report.view) json["reference_view"] = asJson(*report.view);
+  if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
+  if (report.refinement) json["refinement"] = asJson(*report.refinement);
+  if (report.faults.any()) json["perturbation"] = asJson(report.faults);
+  json["options"] = asJson(report.options);
+  return json.dump(2) + "\n";
+}
+
+}  // namespace efm

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/pictures/plot_axis.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace efm {
+namespace {
+
+constexpr double kMargin = 0.04;
+
+std::string shortText(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.6g", value);
+  return text.data();
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is not under `least`.
+double roundStep(double least) {
+  const double power = std::pow(10.0, std::floor(std::log10(least)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= least * (1 - 1e-9)) return factor * power;
+  }
+  return 10 * power;
+}
+
+std::vector<AxisTick> multiplesInside(const AxisRange& range, double step) {
+  const double slack = 1e-9 * step;
+  const double last = std::floor((range.to + slack) / step);
+  std::vector<AxisTick> ticks;
+  // The sum takes the sign from a zero.
+  for (double k = std::ceil((range.from - slack) / step) + 0.0; k <= last; ++k) {
+    ticks.push_back({k * step, shortText(k * step)});
+  }
+  return ticks;
+}
+
+std::vector<AxisTick> linearTicks(const AxisRange& range, int at_most) {
+  double step = roundStep((range.to - range.from) / (at_most + 1));
+  std::vector<AxisTick> ticks = multiplesInside(range, step);
+  while (ticks.size() > static_cast<std::size_t>(at_most)) {
+    step = roundStep(1.5 * step);
+    ticks = multiplesInside(range, step);
+  }
+  return ticks;
+}
+
+/// Powers of ten times each factor inside the range; every `stride`-th power.
+std::vector<AxisTick> powersInside(const AxisRange& range, const std::vector<double>& factors,
+                                   int stride) {
+  const int first = static_cast<int>(std::floor(std::log10(range.from)));
+  const int last = static_cast<int>(std::ceil(std::log10(range.to)));
+  std::vector<AxisTick> ticks;
+  for (int power = first; power <= last; power += stride) {
+    for (const double factor : factors) {
+      const double value = factor * std::pow(10.0, power);
+      if (value < range.from * (1 - 1e-9) || value > range.to * (1 + 1e-9)) continue;
+      ticks.push_back({value, shortText(value)});
+    }
+  }
+  return ticks;
+}
+
+std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int at_most) {
+  const auto room = static_cast<std::size_t>(at_most);
+  std::vector<AxisTick> ticks = powersInside(range, {1, 2, 5}, 1);
+  // Over so short a stretch the axis is nearly linear.
+  if (ticks.size() < 3) return linearTicks(range, at_most);
+  if (ticks.size() <= room + 2) return ticks;
+  for (int stride = 1; (ticks = powersInside(range, {1}, stride)).size() > room; ++stride) {
+  }
+  return ticks;
+}
+
+}  // namespace
+
+double AxisRange::shareAlong(double value) const {
+  if (scale == AxisScale::kLinear) return (value - from) / (to - from);
+  if (!(value > 0)) return std::numeric_limits<double>::quiet_NaN();
+  return std::log(value / from) / std::log(to / from);
+}
+
+AxisRange rangeAround(const std::vector<double>& values, AxisScale scale) {
+  const bool logarithmic = scale == AxisScale::kLogarithmic;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const double value : values) {
+    if (!std::isfinite(value) || (logarithmic && !(value > 0))) continue;
+    const double place = logarithmic ? std::log10(value) : value;
+    low = std::min(low, place);
+    high = std::max(high, place);
+  }
+  if (low > high) low = high = 0;
+  double margin = kMargin * (high - low);
+  if (!(margin > 1e-12 * std::abs(high))) margin = std::max(0.1, 0.1 * std::abs(high));
+  low -= margin;
+  high += margin;
+  if (logarithmic) return {std::pow(10.0, low), std::pow(10.0, high), scale};
+  return {low, high, scale};
+}
+
+std::vector<AxisTick> ticksOf(const AxisRange& range, int at_most) {
+  if (!(range.from < range.to)) return {};
+  return range.scale == AxisScale::kLinear ? linearTicks(range, at_most)
+                                           : logarithmicTicks(range, at_most);
+}
+
+}  // namespace efm

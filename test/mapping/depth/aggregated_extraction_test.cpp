@@ -1,0 +1,386 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/depth/aggregated_extraction.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <random>
+
+#include "test/mapping/depth/same_image.h"
+#include "test/mapping/dsi/chosen_dsi.h"
+#include "test/oracle/naive_aggregation.h"
+
+namespace efm {
+namespace {
+
+using test::ChosenDsi;
+
+DepthPlanes planesOf(int count) { return DepthPlanes({0.5, 5.0, count, PlaneSpacing::kInverse}); }
+
+DepthMap extract(const ChosenDsi& dsi, const DepthExtractionOptions& options = {}) {
+  return extractAggregated(dsi.swept(), planesOf(dsi.planes), options);
+}
+
+double ridge(double plane, double at, double sigma) {
+  return std::exp(-(plane - at) * (plane - at) / (2 * sigma * sigma));
+}
+
+/// Upright edges, twelve pixels apart: their columns, and whether one is there.
+bool isOnEdge(int x) { return x % 12 == 6; }
+
+/// What a pixel has of the edge that it is beside, or on.
+double acrossEdge(int x) {
+  const double off = x % 12 - 6;
+  return std::exp(-off * off / (2 * 0.7 * 0.7));
+}
+
+/// A plane of edges that all have the same ray.
+ChosenDsi edges(const cv::Size& size, int planes, const std::function<double(int plane)>& ray) {
+  ChosenDsi dsi(size, planes);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      dsi.setRay({x, y}, [&](int plane) { return acrossEdge(x) * ray(plane); });
+    }
+  }
+  return dsi;
+}
+
+ChosenDsi edgesAt(double position, double sigma = 2) {
+  return edges({60, 40}, 100, [=](int plane) { return 20 * ridge(plane, position, sigma); });
+}
+
+/// Edges whose depth differs from place to place, some of them wrong, and noise everywhere.
+ChosenDsi randomEdges(std::uint32_t seed, const cv::Size& size, int planes) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::normal_distribution<double> normal;
+  const double place = std::max(1.0, (planes - 1) / 99.0);
+  ChosenDsi dsi(size, planes);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const bool wrong = uniform(random) < 0.15;
+      const double right_at = (planes - 1) * (0.2 + 0.6 * (x / 12) / (1 + size.width / 12.0));
+      const double at = wrong ? (planes - 1) * uniform(random) : right_at + place * normal(random);
+      const double other = (planes - 1) * uniform(random);
+      const double height = (4 * acrossEdge(x) + 0.3) * (0.5 + uniform(random));
+      const double sigma = place * (1 + uniform(random));
+      dsi.setRay({x, y}, [&](int plane) {
+        return height * (ridge(plane, at, sigma) + 0.5 * uniform(random) * ridge(plane, other, 1) +
+                         0.02 * uniform(random));
+      });
+    }
+  }
+  return dsi;
+}
+
+TEST(AggregatedExtraction, OfRandomEdgesIsTheOracles) {
+  int kept = 0;
+  int differing = 0;
+  for (const int planes : {1, 2, 3, 40, 100, 250}) {
+    for (const int window : {3, 5, 11}) {
+      const cv::Size size(64, 37);
+      const ChosenDsi dsi = randomEdges(static_cast<std::uint32_t>(planes + window), size, planes);
+      const DepthPlanes depths = planesOf(planes);
+      DepthExtractionOptions options;
+      options.threshold_kernel = window;
+      options.min_quality = 0.03 * window;
+      const DepthMap found = extract(dsi, options);
+      const DepthMap exact = oracle::extractAggregated(dsi.values, size, depths, options);
+      EXPECT_TRUE(test::same(found.confidence, exact.confidence));
+      const int kept_before = kept;
+      for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width; ++x) {
+          const double depth = exact.depth(y, x);
+          kept += depth > 0 ? 1 : 0;
+          if ((found.depth(y, x) > 0) != (depth > 0)) {
+            ++differing;
+            continue;
+          }
+          if (depth == 0) continue;
+          const bool same_depth = planes == 1 || std::abs(depths.positionOf(found.depth(y, x)) -
+                                                          depths.positionOf(depth)) < 0.01;
+          const double variance = exact.variance(y, x);
+          const bool same_variance =
+              std::isinf(variance) ? std::isinf(found.variance(y, x))
+                                   : std::abs(found.variance(y, x) - variance) < 0.01 * variance;
+          differing += same_depth && same_variance ? 0 : 1;
+        }
+      }
+      EXPECT_GT(kept, kept_before + 40) << planes << " planes, window " << window;
+    }
+  }
+  // Where rounding decides whether a pixel is looked at, those around it may differ too.
+  EXPECT_LE(differing, kept / 1000) << "of " << kept;
+}
+
+TEST(AggregatedExtraction, ACleanPlaneOfEdgesHasItsDepthEverywhere) {
+  for (const double position : {10.0, 41.3, 56.5, 88.7}) {
+    const ChosenDsi dsi = edgesAt(position);
+    const DepthMap map = extract(dsi);
+    for (int y = 2; y < 38; ++y) {
+      for (int x = 2; x < 58; ++x) {
+        if (isOnEdge(x)) {
+          ASSERT_GT(map.depth(y, x), 0) << x << ", " << y;
+        }
+        if (map.depth(y, x) > 0) {
+          ASSERT_NEAR(planesOf(100).positionOf(map.depth(y, x)), position, 0.05);
+          ASSERT_GT(map.variance(y, x), 0);
+          ASSERT_TRUE(std::isfinite(map.variance(y, x)));
+        } else {
+          ASSERT_EQ(map.variance(y, x), 0);
+        }
+      }
+    }
+  }
+}
+
+TEST(AggregatedExtraction, AnEdgeAlongTheMotionIsRejectedBecauseItsRayIsFlat) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> noise(0, 0.01);
+  std::vector<double> flat(100);
+  for (double& value : flat) value = 1 + noise(random);
+  flat[50] = 1.011;  // where the peak happens to be
+  const auto ray = [&](int plane) { return 20 * flat[static_cast<std::size_t>(plane)]; };
+  EXPECT_EQ(cv::countNonZero(extract(edges({60, 40}, 100, ray)).depth), 0);
+}
+
+TEST(AggregatedExtraction, TwoPeaksAsHighAreRejectedAndOneOfThemAloneIsNot) {
+  const auto with = [](double second) {
+    return extract(edges({60, 40}, 100, [=](int plane) {
+      return ridge(plane, 30, 2) + second * ridge(plane, 60, 2);
+    }));
+  };
+  EXPECT_EQ(cv::countNonZero(with(1).depth), 0);
+  EXPECT_GT(cv::countNonZero(with(0.3).depth), 100);
+}
+
+TEST(AggregatedExtraction, AnIsolatedPixelIsRejectedAndTwoThatAgreeAreNot) {
+  ChosenDsi dsi({30, 30}, 50);
+  const auto ray = [](int plane) { return 10 * ridge(plane, 20, 2); };
+  dsi.setRay({15, 15}, ray);
+  EXPECT_EQ(cv::countNonZero(extract(dsi).depth), 0);
+  dsi.setRay({17, 15}, ray);
+  EXPECT_EQ(cv::countNonZero(extract(dsi).depth), 2);
+}
+
+TEST(AggregatedExtraction, DepthsAgreeWithinTwoAndAHalfPlacesWhichAreMorePlanesWhereThereAreMany) {
+  for (const int planes : {100, 496}) {
+    const double place = planes == 100 ? 1 : 5;
+    const auto kept_at = [&](double apart) {
+      ChosenDsi dsi({30, 30}, planes);
+      // Four pixels apart, so that neither moves the other's peak by much.
+      dsi.setRay({13, 15}, [&](int plane) { return 10 * ridge(plane, 20 * place, place); });
+      dsi.setRay({17, 15},
+                 [&](int plane) { return 10 * ridge(plane, (20 + apart) * place, place); });
+      return cv::countNonZero(extract(dsi).depth);
+    };
+    EXPECT_EQ(kept_at(2.4), 2) << planes;
+    EXPECT_EQ(kept_at(2.7), 0) << planes;
+  }
+}
+
+TEST(AggregatedExtraction, APixelThatDisagreesWithAllAroundItTakesTheirDepth) {
+  ChosenDsi dsi = edgesAt(30);
+  dsi.setRay({30, 20}, [](int plane) { return 20 * ridge(plane, 80, 2); });
+  const DepthMap map = extract(dsi);
+  EXPECT_GT(map.depth(20, 30), 0);
+  EXPECT_NEAR(map.depth(20, 30), map.depth(16, 30), 0.01 * map.depth(16, 30));
+}
+
+TEST(AggregatedExtraction, PeaksOnTheOutermostPlanesAreKeptOnlyWhereThereAreNoOthers) {
+  for (const int planes : {1, 2, 3, 4, 100, 500}) {
+    for (const int at : {0, planes - 1}) {
+      const DepthMap map =
+          extract(edges({60, 40}, planes, [=](int plane) { return 20 * ridge(plane, at, 1.5); }));
+      if (planes > 2) {
+        EXPECT_EQ(cv::countNonZero(map.depth), 0) << planes << " planes, at " << at;
+        continue;
+      }
+      EXPECT_GT(cv::countNonZero(map.depth), 100) << planes << " planes, at " << at;
+      EXPECT_FLOAT_EQ(map.depth(20, 30), static_cast<float>(planesOf(planes).depth(at)));
+      EXPECT_TRUE(std::isinf(map.variance(20, 30)));
+    }
+  }
+}
+
+TEST(AggregatedExtraction, TheVarianceGrowsWithTheWidthOfTheRidge) {
+  float previous = 0;
+  for (const double sigma : {1.0, 1.5, 2.0, 3.0, 4.0}) {
+    const float variance = extract(edgesAt(50, sigma)).variance(20, 30);
+    EXPECT_GT(variance, previous) << sigma;
+    EXPECT_TRUE(std::isfinite(variance));
+    previous = variance;
+  }
+}
+
+TEST(AggregatedExtraction, TheVarianceGrowsWithTheScatterAround) {
+  const auto variance = [](double scatter) {
+    ChosenDsi dsi({60, 40}, 100);
+    std::mt19937 random(2);
+    std::normal_distribution<double> normal;
+    for (int y = 0; y < 40; ++y) {
+      for (int x = 0; x < 60; ++x) {
+        const double at = 50 + scatter * normal(random);
+        dsi.setRay({x, y}, [&](int plane) { return 20 * acrossEdge(x) * ridge(plane, at, 2); });
+      }
+    }
+    const DepthMap map = extract(dsi);
+    return cv::mean(map.variance, map.depth > 0)[0];
+  };
+  EXPECT_GT(variance(0.5), 1.5 * variance(0));
+  EXPECT_GT(variance(1.0), 1.2 * variance(0.5));
+}
+
+TEST(AggregatedExtraction, TwiceTheVotesChangeNoBitOfDepthAndVariance) {
+  const ChosenDsi dsi = randomEdges(5, {64, 37}, 100);
+  ChosenDsi twice = dsi;
+  for (float& value : twice.values) value *= 2;
+  const DepthMap once = extract(dsi);
+  EXPECT_GT(cv::countNonZero(once.depth), 50);
+  EXPECT_TRUE(test::same(once.depth, extract(twice).depth));
+  EXPECT_TRUE(test::same(once.variance, extract(twice).variance));
+}
+
+TEST(AggregatedExtraction, AMirroredDsiGivesTheMirroredMap) {
+  const ChosenDsi dsi = randomEdges(6, {64, 37}, 100);
+  ChosenDsi mirrored = dsi;
+  for (int y = 0; y < 37; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      mirrored.setRay({x, y}, [&](int plane) { return dsi.at({63 - x, 36 - y}, plane); });
+    }
+  }
+  const DepthMap map = extract(dsi);
+  cv::Mat1f back;
+  cv::flip(extract(mirrored).depth, back, -1);
+  EXPECT_GT(cv::countNonZero(map.depth), 50);
+  EXPECT_LT(cv::norm(map.depth, back, cv::NORM_INF), 1e-3);
+}
+
+TEST(AggregatedExtraction, PlanesInReverseGiveTheReversedPositions) {
+  const ChosenDsi dsi = randomEdges(7, {64, 37}, 100);
+  ChosenDsi reversed = dsi;
+  for (int y = 0; y < 37; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      reversed.setRay({x, y}, [&](int plane) { return dsi.at({x, y}, 99 - plane); });
+    }
+  }
+  const DepthMap map = extract(dsi);
+  const DepthMap back = extract(reversed);
+  const DepthPlanes planes = planesOf(100);
+  int kept = 0;
+  int same = 0;
+  for (int y = 0; y < 37; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      if (map.depth(y, x) == 0 && back.depth(y, x) == 0) continue;
+      ++kept;
+      if (map.depth(y, x) == 0 || back.depth(y, x) == 0) continue;
+      // Of a weight of exactly one half the lower position is taken, which is the upper one here.
+      const double position = planes.positionOf(map.depth(y, x));
+      same += std::abs(99 - planes.positionOf(back.depth(y, x)) - position) < 0.01 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(kept, 50);
+  EXPECT_GE(same, kept * 98 / 100);
+}
+
+TEST(AggregatedExtraction, MoreQualityOrExcessKeepsFewer) {
+  const ChosenDsi dsi = randomEdges(8, {64, 37}, 100);
+  DepthExtractionOptions options;
+  options.min_quality = 0;
+  DepthMap looser = extract(dsi, options);
+  const int all = cv::countNonZero(looser.depth);
+  for (const double quality : {0.05, 0.1, 0.3, 1.0, 1e6}) {
+    options.min_quality = quality;
+    const DepthMap stricter = extract(dsi, options);
+    EXPECT_EQ(cv::countNonZero((stricter.depth > 0) & (looser.depth == 0)), 0) << quality;
+    EXPECT_LE(cv::countNonZero(stricter.depth), cv::countNonZero(looser.depth));
+    looser = stricter;
+  }
+  EXPECT_GT(all, 50);
+  EXPECT_EQ(cv::countNonZero(looser.depth), 0);
+  options = {};
+  options.min_excess = 1e6;
+  EXPECT_EQ(cv::countNonZero(extract(dsi, options).depth), 0);
+}
+
+TEST(AggregatedExtraction, DilationGrowsKeptPixelsIntoTheirFourNeighbours) {
+  const ChosenDsi dsi = randomEdges(9, {64, 37}, 100);
+  DepthExtractionOptions options;
+  const DepthMap kept = extract(dsi, options);
+  options.dilate = true;
+  const DepthMap grown = extract(dsi, options);
+  const cv::Rect inner(2, 2, 60, 33);
+  int filled = 0;
+  for (int y = 0; y < 37; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      std::optional<cv::Point> best;
+      for (const cv::Point& step : {cv::Point(0, -1), {-1, 0}, {1, 0}, {0, 1}}) {
+        const cv::Point beside = cv::Point(x, y) + step;
+        if (!inner.contains(beside) || kept.depth(beside) == 0) continue;
+        if (!best || kept.confidence(beside) > kept.confidence(*best)) best = beside;
+      }
+      if (kept.depth(y, x) > 0 || !best || !inner.contains({x, y})) {
+        ASSERT_EQ(grown.depth(y, x), kept.depth(y, x));
+        ASSERT_EQ(grown.confidence(y, x), kept.confidence(y, x));
+        continue;
+      }
+      ++filled;
+      ASSERT_EQ(grown.depth(y, x), kept.depth(*best));
+      ASSERT_EQ(grown.variance(y, x), kept.variance(*best));
+      ASSERT_EQ(grown.confidence(y, x), kept.confidence(*best));
+    }
+  }
+  EXPECT_GT(filled, 100);
+}
+
+TEST(AggregatedExtraction, TheFrameIsClear) {
+  for (const int shift : {0, 4, 5}) {  // edges on the border columns too
+    ChosenDsi dsi({30, 20}, 50);
+    for (int y = 0; y < 20; ++y) {
+      for (int x = 0; x < 30; ++x) {
+        dsi.setRay({x, y},
+                   [&](int plane) { return acrossEdge(x + shift) * 20 * ridge(plane, 20, 2); });
+      }
+    }
+    const DepthMap map = extract(dsi);
+    EXPECT_GT(cv::countNonZero(map.depth), 10);
+    EXPECT_EQ(cv::countNonZero(map.depth), cv::countNonZero(map.depth(cv::Rect(2, 2, 26, 16))));
+  }
+}
+
+TEST(AggregatedExtraction, OfAnEmptyDsiOrASmallViewIsEmpty) {
+  for (const cv::Size& size : {cv::Size(1, 1), {1, 7}, {3, 2}, {4, 4}, {16, 16}}) {
+    for (const int planes : {1, 2, 100}) {
+      const DepthMap empty = extract(ChosenDsi(size, planes));
+      EXPECT_EQ(empty.depth.size(), size);
+      EXPECT_EQ(cv::countNonZero(empty.depth), 0);
+      EXPECT_EQ(cv::countNonZero(empty.variance), 0);
+      const DepthMap voted = extract(randomEdges(10, size, planes));
+      if (size.width <= 4) {
+        EXPECT_EQ(cv::countNonZero(voted.depth), 0);
+      }
+    }
+  }
+}
+
+TEST(AggregatedExtraction, TheSmallestThresholdsFindEveryRay) {
+  // Confidences that are all alike stand out by rounding alone.
+  DepthExtractionOptions options;
+  options.min_excess = 1e-30;
+  options.min_quality = 0;
+  ChosenDsi dsi({200, 70}, 3);
+  for (int y = 0; y < 70; ++y) {
+    for (int x = 0; x < 200; ++x) {
+      dsi.setRay({x, y}, [&](int plane) { return plane == 1 ? 3.3 + 0.1 * x + 0.07 * y : 0.5; });
+    }
+  }
+  const DepthMap map = extract(dsi, options);
+  EXPECT_EQ(map.depth.size(), cv::Size(200, 70));
+}
+
+}  // namespace
+}  // namespace efm

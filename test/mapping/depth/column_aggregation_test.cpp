@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/depth/column_aggregation.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "mapping/depth/pixel_neighbours.h"
+#include "test/mapping/dsi/chosen_dsi.h"
+
+namespace efm {
+namespace {
+
+using test::ChosenDsi;
+
+double ridge(double plane, double at, double sigma) {
+  return std::exp(-(plane - at) * (plane - at) / (2 * sigma * sigma));
+}
+
+/// Ridges of several heights on every ray, and noise.
+ChosenDsi randomDsi(std::uint32_t seed, const cv::Size& size, int planes) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  ChosenDsi dsi(size, planes);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const double height = 5 + 10 * uniform(random);
+      const double at = (planes - 1) * uniform(random);
+      const double other = (planes - 1) * uniform(random);
+      dsi.setRay({x, y}, [&](int plane) {
+        return height * ridge(plane, at, 2.5) + 0.6 * height * ridge(plane, other, 1.5) +
+               0.3 * uniform(random);
+      });
+    }
+  }
+  return dsi;
+}
+
+cv::Mat1b randomMask(std::uint32_t seed, const cv::Size& size, int one_of) {
+  std::mt19937 random(seed);
+  cv::Mat1b mask = cv::Mat1b::zeros(size);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      if (random() % static_cast<unsigned>(one_of) == 0) mask(y, x) = 255;
+    }
+  }
+  return mask;
+}
+
+std::vector<AggregatedPeak> aggregate(const ChosenDsi& dsi, const cv::Mat1b& mask) {
+  const SweptDsi swept = dsi.swept();
+  return aggregateRays(KeptPixels(mask), swept.rays, swept.peaks.confidence.size());
+}
+
+/// The sum of the rays of the chosen pixels in 9x9, in double.
+std::vector<double> naiveSum(const ChosenDsi& dsi, const cv::Mat1b& mask, const cv::Point& pixel) {
+  std::vector<double> sum(static_cast<std::size_t>(dsi.planes));
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) {
+      const int dx = std::abs(x - pixel.x);
+      const int dy = std::abs(y - pixel.y);
+      if (mask(y, x) == 0 || dx > 4 || dy > 4) continue;
+      const double weight = std::exp(-(dx * dx + dy * dy) / (2 * 1.5 * 1.5));
+      for (int plane = 0; plane < dsi.planes; ++plane) {
+        sum[static_cast<std::size_t>(plane)] += weight * double{dsi.at({x, y}, plane)};
+      }
+    }
+  }
+  return sum;
+}
+
+/// Two peaks as high as each other, as far as rounding tells.
+bool isTie(const std::vector<double>& sum, double top) {
+  return std::count_if(sum.begin(), sum.end(),
+                       [&](double value) { return value > top * (1 - 1e-4); }) > 1;
+}
+
+void expectNaive(const ChosenDsi& dsi, const cv::Mat1b& mask) {
+  const std::vector<AggregatedPeak> peaks = aggregate(dsi, mask);
+  const KeptPixels chosen(mask);
+  ASSERT_EQ(peaks.size(), chosen.size());
+  const double place = std::max(1.0, (dsi.planes - 1) / 99.0);
+  int compared = 0;
+  chosen.forEach([&](std::size_t i, cv::Point pixel) {
+    const std::vector<double> sum = naiveSum(dsi, mask, pixel);
+    const auto best = static_cast<int>(std::max_element(sum.begin(), sum.end()) - sum.begin());
+    const double top = sum[static_cast<std::size_t>(best)];
+    if (isTie(sum, top)) return;
+    ++compared;
+    SCOPED_TRACE(testing::Message() << pixel << " of " << dsi.planes << " planes");
+    const bool at_end = best == 0 || best == dsi.planes - 1;
+    ASSERT_EQ(peaks[i].at_end, at_end);
+    for (std::size_t b = 0; b < peaks[i].beyond.size(); ++b) {
+      const double places = AggregatedPeak::kLeastBeside + static_cast<double>(b);
+      double second = 0;
+      for (int plane = 0; plane < dsi.planes; ++plane) {
+        if (std::abs(plane - best) <= std::lround(places * place)) continue;
+        second = std::max(second, sum[static_cast<std::size_t>(plane)]);
+      }
+      ASSERT_NEAR(peaks[i].beyond[b], second / top, 1e-4) << places << " places";
+    }
+    double position = best;
+    if (at_end) {
+      ASSERT_TRUE(std::isinf(peaks[i].width_sq));
+    } else {
+      const double before = sum[static_cast<std::size_t>(best - 1)];
+      const double after = sum[static_cast<std::size_t>(best + 1)];
+      const double curvature = 2 * top - before - after;
+      position += 0.5 * (after - before) / curvature;
+      ASSERT_NEAR(peaks[i].width_sq, top / curvature, 1e-3 * top / curvature * top / curvature);
+    }
+    ASSERT_NEAR(peaks[i].position, position, 5e-3);
+  });
+  EXPECT_GT(compared, static_cast<int>(chosen.size()) * 9 / 10);
+}
+
+TEST(RayAggregation, IsTheNaiveOneForFewAndManyPlanesAndAnyShareOfPixels) {
+  std::uint32_t seed = 0;
+  for (const int planes : {1, 2, 3, 8, 100, 150, 500}) {
+    for (const int one_of : {1, 3, 20}) {
+      const cv::Size size(31, 22);
+      ++seed;
+      expectNaive(randomDsi(seed, size, planes), randomMask(seed, size, one_of));
+    }
+  }
+}
+
+TEST(RayAggregation, OfViewsSmallerThanTheWindowIsTheNaiveOne) {
+  for (const cv::Size& size : {cv::Size(1, 1), {1, 9}, {5, 3}, {8, 8}}) {
+    expectNaive(randomDsi(7, size, 40), cv::Mat1b(size, 255));
+  }
+}
+
+TEST(RayAggregation, OfNoPixelsIsEmpty) {
+  EXPECT_TRUE(aggregate(randomDsi(8, {5, 5}, 10), cv::Mat1b::zeros(5, 5)).empty());
+  EXPECT_TRUE(aggregate(ChosenDsi({5, 5}, 10), cv::Mat1b::zeros(5, 5)).empty()) << "an empty DSI";
+}
+
+TEST(RayAggregation, ALoneRidgeIsFoundBetweenPlanesWithItsWidth) {
+  for (const double at : {20.0, 20.25, 20.5, 33.8}) {
+    ChosenDsi dsi({11, 11}, 100);
+    dsi.setRay({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
+    cv::Mat1b mask = cv::Mat1b::zeros(11, 11);
+    mask(5, 5) = 255;
+    const AggregatedPeak peak = aggregate(dsi, mask).at(0);
+    EXPECT_NEAR(peak.position, at, 0.02);
+    EXPECT_NEAR(peak.width_sq, 9, 1.0);
+    EXPECT_FALSE(peak.at_end);
+  }
+}
+
+TEST(RayAggregation, NeighboursMoveAWrongPeakToTheirs) {
+  ChosenDsi dsi({9, 9}, 60);
+  for (int y = 0; y < 9; ++y) {
+    for (int x = 0; x < 9; ++x) {
+      const bool wrong = x == 4 && y == 4;
+      dsi.setRay({x, y}, [&](int plane) {
+        return wrong ? 10 * ridge(plane, 50, 1.5) + 4 * ridge(plane, 20, 1.5)
+                     : 10 * ridge(plane, 20, 1.5);
+      });
+    }
+  }
+  const std::vector<AggregatedPeak> peaks = aggregate(dsi, cv::Mat1b(9, 9, 255));
+  EXPECT_NEAR(peaks[4 * 9 + 4].position, 20, 0.02);
+}
+
+TEST(RayAggregation, OnlyChosenPixelsAreSummed) {
+  ChosenDsi dsi({9, 9}, 60);
+  for (int y = 0; y < 9; ++y) {
+    for (int x = 0; x < 9; ++x) {
+      dsi.setRay({x, y}, [&](int plane) { return 50 * ridge(plane, 40, 1.5); });
+    }
+  }
+  dsi.setRay({4, 4}, [](int plane) { return ridge(plane, 10, 1.5); });
+  cv::Mat1b mask = cv::Mat1b::zeros(9, 9);
+  mask(4, 4) = 255;
+  EXPECT_NEAR(aggregate(dsi, mask).at(0).position, 10, 0.02);
+}
+
+TEST(RayAggregation, TwoEqualPeaksAreFullyAmbiguousAndOneIsNot) {
+  ChosenDsi dsi({1, 1}, 60);
+  const cv::Mat1b mask(1, 1, 255);
+  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1) + ridge(plane, 40, 1); });
+  EXPECT_NEAR(aggregate(dsi, mask).at(0).beyond.front(), 1, 1e-3);
+  EXPECT_EQ(aggregate(dsi, mask).at(0).position, 20) << "of equals the nearer";
+  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1); });
+  EXPECT_LT(aggregate(dsi, mask).at(0).beyond.front(), 0.01);
+}
+
+TEST(RayAggregation, PeaksOfTheFirstAndTheLastPlaneAreAtTheEnd) {
+  const cv::Mat1b mask(1, 1, 255);
+  for (const int planes : {1, 2, 3, 50}) {
+    for (const int at : {0, planes - 1}) {
+      ChosenDsi dsi({1, 1}, planes);
+      dsi.setRay({0, 0}, [&](int plane) { return 10 - 0.1 * std::abs(plane - at); });
+      const AggregatedPeak peak = aggregate(dsi, mask).at(0);
+      EXPECT_TRUE(peak.at_end);
+      EXPECT_EQ(peak.position, static_cast<float>(at));
+      EXPECT_TRUE(std::isinf(peak.width_sq));
+    }
+  }
+}
+
+TEST(RayAggregation, TwiceTheVotesChangeNoBit) {
+  const ChosenDsi dsi = randomDsi(11, {31, 22}, 100);
+  ChosenDsi twice = dsi;
+  for (float& value : twice.values) value *= 2;
+  const cv::Mat1b mask = randomMask(11, dsi.size, 3);
+  const std::vector<AggregatedPeak> once_found = aggregate(dsi, mask);
+  const std::vector<AggregatedPeak> twice_found = aggregate(twice, mask);
+  for (std::size_t i = 0; i < once_found.size(); ++i) {
+    ASSERT_EQ(once_found[i].position, twice_found[i].position);
+    ASSERT_EQ(once_found[i].width_sq, twice_found[i].width_sq);
+    ASSERT_EQ(once_found[i].beyond, twice_found[i].beyond);
+  }
+}
+
+TEST(RayAggregation, TheNumberOfThreadsChangesNoBit) {
+  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
+  const ChosenDsi dsi = randomDsi(12, {31, 22}, 100);
+  const cv::Mat1b mask = randomMask(12, dsi.size, 2);
+  const auto on = [&](int threads) {
+    tbb::task_arena arena(threads);
+    return arena.execute([&] { return aggregate(dsi, mask); });
+  };
+  const std::vector<AggregatedPeak> one = on(1);
+  const std::vector<AggregatedPeak> many = on(8);
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    ASSERT_EQ(one[i].position, many[i].position);
+    ASSERT_EQ(one[i].beyond, many[i].beyond);
+  }
+}
+
+TEST(PlanesOfOnePlace, IsOneUpToAHundredPlanesAndGrowsWithThem) {
+  for (const int planes : {1, 2, 50, 100}) EXPECT_EQ(planesOfOnePlace(planes), 1);
+  EXPECT_DOUBLE_EQ(planesOfOnePlace(199), 2);
+  EXPECT_DOUBLE_EQ(planesOfOnePlace(496), 5);
+}
+
+TEST(PixelNeighbours, AreTheKeptPixelsWithinFourRowByRow) {
+  const cv::Mat1b mask = randomMask(13, {40, 30}, 4);
+  const PixelNeighbours neighbours(KeptPixels(mask), mask.size());
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) {
+      std::vector<cv::Point> expected;
+      std::vector<std::size_t> indices;
+      KeptPixels(mask).forEach([&](std::size_t i, cv::Point at) {
+        if (std::abs(at.x - x) > 4 || std::abs(at.y - y) > 4) return;
+        expected.push_back(at - cv::Point(x, y));
+        indices.push_back(i);
+      });
+      std::size_t seen = 0;
+      neighbours.forEach({x, y}, [&](std::size_t i, cv::Point offset) {
+        ASSERT_LT(seen, expected.size());
+        ASSERT_EQ(offset, expected[seen]);
+        ASSERT_EQ(i, indices[seen]);
+        ++seen;
+      });
+      ASSERT_EQ(seen, expected.size());
+    }
+  }
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/depth/local_agreement.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+namespace efm {
+namespace {
+
+constexpr float kNear = 2.5F;
+
+/// Kept pixels with positions and weights.
+struct Depths {
+  cv::Mat1b mask;
+  cv::Mat1f positions;
+  cv::Mat1f weights;
+
+  explicit Depths(const cv::Size& size)
+      : mask(cv::Mat1b::zeros(size)), positions(size, 0.0F), weights(size, 1.0F) {}
+
+  void keep(const cv::Point& pixel, float position, float weight = 1) {
+    mask(pixel) = 255;
+    positions(pixel) = position;
+    weights(pixel) = weight;
+  }
+  std::vector<LocalAgreement> agreement() const {
+    const KeptPixels kept(mask);
+    std::vector<float> kept_positions;
+    std::vector<float> kept_weights;
+    kept.forEach([&](std::size_t, cv::Point at) {
+      kept_positions.push_back(positions(at));
+      kept_weights.push_back(weights(at));
+    });
+    return localAgreement(kept, mask.size(), kept_positions, kept_weights, kNear);
+  }
+  /// Of one kept pixel.
+  LocalAgreement at(const cv::Point& pixel) const {
+    LocalAgreement found;
+    const std::vector<LocalAgreement> all = agreement();
+    KeptPixels(mask).forEach([&](std::size_t i, cv::Point place) {
+      if (place == pixel) found = all[i];
+    });
+    return found;
+  }
+};
+
+Depths randomDepths(std::uint32_t seed, const cv::Size& size, int one_of) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> position(0, 20);
+  std::uniform_real_distribution<float> weight(0.15F, 3);
+  Depths depths(size);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      if (random() % static_cast<unsigned>(one_of) == 0) {
+        depths.keep({x, y}, position(random), weight(random));
+      }
+    }
+  }
+  return depths;
+}
+
+/// The three numbers from their definitions, in double.
+LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
+  std::vector<std::pair<double, double>> around;  // position, weight
+  double agreeing = 0;
+  double others = 0;
+  double total = 0;
+  for (int y = 0; y < depths.mask.rows; ++y) {
+    for (int x = 0; x < depths.mask.cols; ++x) {
+      const int dx = x - pixel.x;
+      const int dy = y - pixel.y;
+      if (depths.mask(y, x) == 0 || std::abs(dx) > 4 || std::abs(dy) > 4) continue;
+      const double position = depths.positions(y, x);
+      const double weight = depths.weights(y, x);
+      around.emplace_back(position, weight);
+      total += weight;
+      if (dx == 0 && dy == 0) continue;
+      const double of_share = weight * std::exp(-(dx * dx + dy * dy) / 8.0);
+      others += of_share;
+      if (std::abs(position - double{depths.positions(pixel)}) < double{kNear}) {
+        agreeing += of_share;
+      }
+    }
+  }
+  // The least of the positions that have half of the weight at or below them.
+  double median = INFINITY;
+  for (const auto& candidate : around) {
+    double at_or_below = 0;
+    for (const auto& [position, weight] : around) {
+      if (position <= candidate.first) at_or_below += weight;
+    }
+    if (at_or_below >= total / 2) median = std::min(median, candidate.first);
+  }
+  std::vector<double> distances;
+  for (const auto& [position, weight] : around) distances.push_back(std::abs(position - median));
+  std::sort(distances.begin(), distances.end());
+  return {static_cast<float>(median), static_cast<float>(distances[distances.size() / 2]),
+          static_cast<float>(others > 0 ? agreeing / others : 0)};
+}
+
+TEST(LocalAgreement, IsTheNaiveOneForDenseAndSparsePixels) {
+  for (const cv::Size& size : {cv::Size(40, 30), {9, 40}, {3, 3}, {1, 1}}) {
+    for (const int one_of : {1, 4, 30}) {
+      const Depths depths = randomDepths(static_cast<std::uint32_t>(one_of), size, one_of);
+      const std::vector<LocalAgreement> found = depths.agreement();
+      KeptPixels(depths.mask).forEach([&](std::size_t i, cv::Point at) {
+        const LocalAgreement exact = naive(depths, at);
+        SCOPED_TRACE(testing::Message() << at << " of " << size << ", one of " << one_of);
+        ASSERT_EQ(found[i].median, exact.median);
+        ASSERT_NEAR(found[i].spread, exact.spread, 1e-5);
+        ASSERT_NEAR(found[i].share, exact.share, 1e-5);
+      });
+    }
+  }
+}
+
+TEST(LocalAgreement, OfAPixelAloneIsItsOwnDepthAndNoShare) {
+  Depths depths({20, 20});
+  depths.keep({10, 10}, 33);
+  depths.keep({15, 10}, 50);  // five away: beyond the window
+  const LocalAgreement alone = depths.at({10, 10});
+  EXPECT_EQ(alone.median, 33);
+  EXPECT_EQ(alone.spread, 0);
+  EXPECT_EQ(alone.share, 0);
+}
+
+TEST(LocalAgreement, ThoseWithinNearAgreeAndTheMedianHasHalfTheWeight) {
+  Depths depths({20, 20});
+  depths.keep({10, 10}, 30, 1);
+  depths.keep({9, 10}, 32.4F, 1);   // within 2.5
+  depths.keep({11, 10}, 32.6F, 3);  // not
+  const LocalAgreement found = depths.at({10, 10});
+  EXPECT_NEAR(found.share, 0.25, 1e-6);
+  EXPECT_EQ(found.median, 32.6F) << "which has 3 of 5";
+  EXPECT_NEAR(found.spread, 0.2, 1e-5) << "of 0, 0.2 and 2.6";
+}
+
+TEST(LocalAgreement, OfTwoWithTheSameWeightTheMedianIsTheNearer) {
+  Depths depths({20, 20});
+  depths.keep({10, 10}, 40);
+  depths.keep({11, 10}, 30);
+  EXPECT_EQ(depths.at({10, 10}).median, 30);
+}
+
+TEST(LocalAgreement, OthersCountForTheShareMoreTheNearerTheyAre) {
+  Depths depths({20, 20});
+  depths.keep({10, 10}, 30);
+  depths.keep({11, 10}, 30);
+  depths.keep({6, 10}, 40);
+  const double near = std::exp(-1 / 8.0);
+  const double far = std::exp(-16 / 8.0);
+  EXPECT_NEAR(depths.at({10, 10}).share, near / (near + far), 1e-6);
+}
+
+TEST(LocalAgreement, WeightsInAnotherUnitChangeNothing) {
+  Depths depths = randomDepths(5, {40, 30}, 3);
+  const std::vector<LocalAgreement> before = depths.agreement();
+  depths.weights *= 4;
+  const std::vector<LocalAgreement> after = depths.agreement();
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    ASSERT_EQ(before[i].median, after[i].median);
+    ASSERT_EQ(before[i].spread, after[i].spread);
+    ASSERT_EQ(before[i].share, after[i].share);
+  }
+}
+
+TEST(LocalAgreement, TheNumberOfThreadsChangesNoBit) {
+  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
+  const Depths depths = randomDepths(6, {40, 30}, 2);
+  const auto on = [&](int threads) {
+    tbb::task_arena arena(threads);
+    return arena.execute([&] { return depths.agreement(); });
+  };
+  const std::vector<LocalAgreement> one = on(1);
+  const std::vector<LocalAgreement> many = on(8);
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    ASSERT_EQ(one[i].median, many[i].median);
+    ASSERT_EQ(one[i].share, many[i].share);
+  }
+}
+
+TEST(LocalAgreement, OfNoneIsEmpty) { EXPECT_TRUE(Depths({5, 5}).agreement().empty()); }
+
+}  // namespace
+}  // namespace efm

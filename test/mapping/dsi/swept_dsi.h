@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "mapping/sweep/space_sweep.h"
+#include "test/mapping/dsi/kept_dsi.h"
+
+namespace efm::test {
+
+/// What to sweep, and how.
+struct SweepCase {
+  ReferenceView view;
+  DepthPlanes planes;
+  std::vector<CameraRays> cameras;
+  FusionOptions fusion = {FusionRule::kArithmetic, FusionRule::kArithmetic,
+                          FusionOrder::kCamerasThenTime};
+  int groups = 1;
+  bool camera_peaks = true;
+  int ray_window = 0;
+};
+
+struct SweptDsi {
+  std::vector<float> dsi;
+  SweepResult result;
+};
+
+/// The whole DSI, and what was asked for beside it.
+inline SweptDsi sweep(const SweepCase& input, VotingKernel kernel, int threads = 1) {
+  SpaceSweepOptions options;
+  options.fusion = input.fusion;
+  options.kernel = kernel;
+  options.threads = threads;
+  KeptDsi dsi(input.planes, input.view);
+  SweepResult result =
+      SpaceSweep(options).run(input.cameras, input.view, input.planes,
+                              {input.camera_peaks, &dsi, input.groups, input.ray_window});
+  EXPECT_EQ(dsi.planesSeen(), static_cast<std::size_t>(input.planes.size()));
+  return {dsi.values, std::move(result)};
+}
+
+/// How one DSI differs from another.
+struct DsiDifference {
+  double mass = 0;          ///< Of the other.
+  double error_sum = 0;     ///< Of absolute differences.
+  double error = 0;         ///< The same as a share of the mass.
+  double signed_error = 0;  ///< Of the masses, as a share.
+};
+
+template <typename Reference>
+DsiDifference differenceOf(const std::vector<float>& values, const std::vector<Reference>& exact) {
+  DsiDifference difference;
+  EXPECT_EQ(values.size(), exact.size());
+  double sum = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    const double off = double{values[i]} - double{exact[i]};
+    difference.mass += double{exact[i]};
+    difference.error_sum += std::abs(off);
+    sum += off;
+  }
+  if (difference.mass > 0) {
+    difference.error = difference.error_sum / difference.mass;
+    difference.signed_error = sum / difference.mass;
+  }
+  return difference;
+}
+
+}  // namespace efm::test

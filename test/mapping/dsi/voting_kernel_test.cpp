@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/dsi/voting_kernel.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "mapping/sweep/space_sweep.h"
+
+namespace efm {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr VotingKernel kAll[] = {VotingKernel::kPlain,  VotingKernel::kBaseline,
+                                 VotingKernel::kSse4,   VotingKernel::kAvx2,
+                                 VotingKernel::kAvx512, VotingKernel::kNeon};
+
+TEST(VotingKernel, NamesGoBothWays) {
+  for (const VotingKernel kernel : kAll) EXPECT_EQ(votingKernelFromName(nameOf(kernel)), kernel);
+  EXPECT_THAT([] { votingKernelFromName("gpu"); },
+              ThrowsMessage<std::invalid_argument>(
+                  AllOf(HasSubstr("'gpu'"), HasSubstr("plain"), HasSubstr("avx512"))));
+}
+
+TEST(VotingKernel, PlainIsTheSlowestThatIsAvailableAndAVectorKernelTheFastest) {
+  EXPECT_EQ(availableKernels().front(), VotingKernel::kPlain);
+  EXPECT_EQ(availableKernels().back(), fastestKernel());
+  EXPECT_NE(fastestKernel(), VotingKernel::kPlain);
+  EXPECT_TRUE(std::is_sorted(availableKernels().begin(), availableKernels().end()));
+}
+
+TEST(VotingKernel, TheSweepTakesEveryAvailableKernelAndRefusesTheOthersByName) {
+  for (const VotingKernel kernel : kAll) {
+    SpaceSweepOptions options;
+    options.kernel = kernel;
+    if (isAvailable(kernel)) {
+      EXPECT_NO_THROW(options.validate()) << nameOf(kernel);
+      EXPECT_EQ(options.kernelOrFastest(), kernel);
+    } else {
+      EXPECT_THAT([&] { options.validate(); },
+                  ThrowsMessage<std::invalid_argument>(AllOf(
+                      HasSubstr("kernel = " + std::string(nameOf(kernel))), HasSubstr("plain, "),
+                      HasSubstr(std::string(nameOf(fastestKernel()))))));
+    }
+  }
+}
+
+TEST(VotingKernel, TheFastestRunsWhereNoneIsGiven) {
+  EXPECT_EQ(SpaceSweepOptions().kernelOrFastest(), fastestKernel());
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/events/hot_pixel_filter.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "test/mapping/keyframes/random_scene.h"
+
+namespace efm {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr std::int64_t kMs = 1'000'000;
+
+HotPixelOptions fewEvents() {
+  HotPixelOptions options;
+  options.ratio = 3;
+  options.period_s = 0.1;
+  options.min_events = 6;
+  return options;
+}
+
+Event eventAt(std::int64_t t_ns, int x, int y) {
+  return {t_ns, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), true};
+}
+
+/// The definition, from the whole past: events of the clock's period and the one before.
+std::vector<bool> naivelyHot(const std::vector<Event>& events, int width, int height,
+                             const HotPixelOptions& options) {
+  const double period_ns = options.period_s * 1e9;
+  const auto periodOf = [&](const Event& event) {
+    return std::floor(static_cast<double>(event.t_ns) / period_ns);
+  };
+  std::vector<bool> hot;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const auto count = [&](int x, int y) {
+      int n = 0;
+      for (std::size_t j = 0; j <= i; ++j) {
+        const bool recent = periodOf(events[i]) - periodOf(events[j]) <= 1;
+        if (recent && events[j].x == x && events[j].y == y) ++n;
+      }
+      return n;
+    };
+    const int own = count(events[i].x, events[i].y);
+    std::vector<int> around(2, 0);
+    for (int y = events[i].y - 1; y <= events[i].y + 1; ++y) {
+      for (int x = events[i].x - 1; x <= events[i].x + 1; ++x) {
+        if (x != events[i].x || y != events[i].y) around.push_back(count(x, y));
+      }
+    }
+    std::sort(around.begin(), around.end());
+    const bool on_border = events[i].x == 0 || events[i].y == 0 || events[i].x + 1 == width ||
+                           events[i].y + 1 == height;
+    hot.push_back(width > 1 && height > 1 && own >= options.min_events &&
+                  own > options.ratio * around[around.size() - (on_border ? 1 : 2)]);
+  }
+  return hot;
+}
+
+TEST(HotPixelFilter, APixelThatFiresAloneIsHotFromTheEventThatMakesItJudged) {
+  HotPixelFilter filter(20, 10, fewEvents());
+  for (int i = 1; i <= 40; ++i) {
+    EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3)), i >= 6) << i;
+  }
+}
+
+TEST(HotPixelFilter, APixelIsForgivenOnceItRests) {
+  HotPixelFilter filter(20, 10, fewEvents());
+  for (int i = 0; i < 40; ++i) filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3));
+  EXPECT_TRUE(filter.isHot(eventAt(1199 * kMs, 7, 3))) << "in the period after";
+  EXPECT_FALSE(filter.isHot(eventAt(1300 * kMs, 7, 3))) << "a whole period of one event later";
+}
+
+TEST(HotPixelFilter, NoPixelOfAnEdgeThatMovesIsHotHoweverStrongItIs) {
+  HotPixelFilter filter(20, 10, fewEvents());
+  for (int step = 0; step < 60; ++step) {
+    const int x = step % 20;  // to the right border, and again from the left
+    for (int burst = 0; burst < 30; ++burst) {
+      for (int y = 0; y < 10; ++y) {
+        EXPECT_FALSE(filter.isHot(eventAt(1000 * kMs + step * 10 * kMs, x, y))) << x << ", " << y;
+      }
+    }
+  }
+}
+
+TEST(HotPixelFilter, OfALineThatFlickersInPlaceOnlyTheEndsAre) {
+  HotPixelFilter filter(20, 10, fewEvents());
+  for (int burst = 1; burst <= 100; ++burst) {
+    for (int y = 2; y < 8; ++y) {
+      const bool hot = filter.isHot(eventAt(1000 * kMs + burst * kMs, 7, y));
+      EXPECT_EQ(hot, burst >= 6 && (y == 2 || y == 7)) << "row " << y;
+    }
+  }
+}
+
+TEST(HotPixelFilter, TwoHotPixelsSideBySideAreBothFound) {
+  HotPixelFilter filter(20, 10, fewEvents());
+  for (int i = 0; i < 40; ++i) {
+    const bool judged = i >= 5;
+    EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3)), judged);
+    EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, 8, 3)), judged);
+  }
+}
+
+TEST(HotPixelFilter, CornersAreJudgedByTheNeighboursTheyHave) {
+  for (const int x : {0, 19}) {
+    for (const int y : {0, 9}) {
+      HotPixelFilter filter(20, 10, fewEvents());
+      for (int i = 1; i <= 10; ++i) {
+        EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, x, y)), i >= 6);
+      }
+    }
+  }
+}
+
+TEST(HotPixelFilter, PixelsOfASensorOnePixelWideAreNeverHot) {
+  for (const auto& [width, height] : {std::pair(1, 1), std::pair(1, 8), std::pair(8, 1)}) {
+    HotPixelFilter filter(width, height, fewEvents());
+    for (int i = 0; i < 100; ++i) EXPECT_FALSE(filter.isHot(eventAt(i * kMs, 0, 0)));
+  }
+}
+
+TEST(HotPixelFilter, ManyMoreEventsThanFitACountAreStillHot) {
+  HotPixelOptions options = fewEvents();
+  options.period_s = 100;
+  HotPixelFilter filter(4, 4, options);
+  bool hot = false;
+  for (int i = 0; i < 200'000; ++i) hot = filter.isHot(eventAt(1000 * kMs + i, 1, 1));
+  EXPECT_TRUE(hot);
+}
+
+TEST(HotPixelFilter, DecidesAsTheWholePastDoes) {
+  int found = 0;
+  for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+    test::RandomScene random(seed);
+    CameraModel small = test::smallCamera();
+    small.width = seed == 1 ? 1 : 6;
+    small.height = 5;
+    // Before time 0 too; few pixels, so that busy ones stand beside each other.
+    std::vector<Event> events = random.events(small, 900, -300 * kMs, 900 * kMs);
+    for (Event& event : events) {
+      const double kind = random.uniform(0, 1);
+      if (kind < 0.4) event.x = event.y = 0;
+      if (kind > 0.4 && kind < 0.6 && small.width > 1) event.x = 3, event.y = 2;
+      if (kind > 0.6 && kind < 0.7 && small.width > 1) event.x = 4, event.y = 2;
+    }
+    HotPixelOptions options = fewEvents();
+    options.ratio = random.uniform(2, 6);
+    const std::vector<bool> expected = naivelyHot(events, small.width, small.height, options);
+    HotPixelFilter filter(small.width, small.height, options);
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      ASSERT_EQ(filter.isHot(events[i]), expected[i]) << "seed " << seed << ", event " << i;
+      if (expected[i]) ++found;
+    }
+  }
+  EXPECT_GT(found, 1000) << "both answers are there";
+}
+
+TEST(HotPixelOptions, ValuesOutOfRangeAreErrorsThatNameThem) {
+  const auto errorOf = [](auto change) {
+    HotPixelOptions options;
+    change(options);
+    return [options] { options.validate(); };
+  };
+  EXPECT_THAT(errorOf([](auto& o) { o.ratio = 1.9; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_ratio = 1.8999")));
+  EXPECT_THAT(errorOf([](auto& o) { o.period_s = 0; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_period_s = 0: must be")));
+  EXPECT_THAT(errorOf([](auto& o) { o.period_s = std::numeric_limits<double>::quiet_NaN(); }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_period_s = nan: must be")));
+  EXPECT_THAT(errorOf([](auto& o) { o.min_events = 1; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_min_events = 1: must be")));
+}
+
+}  // namespace
+}  // namespace efm

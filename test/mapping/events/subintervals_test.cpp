@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/events/subintervals.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+#include <set>
+#include <stdexcept>
+
+namespace efm {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr std::int64_t kNow_ns = 1'700'000'000'000'000'003;
+
+/// Events at these times, told apart by their pixel.
+std::vector<Event> eventsAt(const std::vector<std::int64_t>& times_ns) {
+  std::vector<Event> events;
+  for (const std::int64_t t_ns : times_ns) {
+    const auto i = static_cast<std::uint16_t>(events.size());
+    events.push_back({t_ns, i, 0, false});
+  }
+  return events;
+}
+
+SubintervalOptions into(int count, SubintervalSplit split) {
+  SubintervalOptions options;
+  options.count = count;
+  options.split = split;
+  return options;
+}
+
+std::vector<std::size_t> sizesOf(const std::vector<EventSpan>& parts) {
+  std::vector<std::size_t> sizes;
+  for (const EventSpan part : parts) sizes.push_back(part.size());
+  return sizes;
+}
+
+TEST(Subintervals, EveryEventIsInExactlyOnePartAndTheirOrderIsKept) {
+  std::mt19937 random(1);
+  for (int draw = 0; draw < 300; ++draw) {
+    const auto duration_ns = static_cast<std::int64_t>(1 + random() % 2000);
+    std::vector<std::int64_t> times_ns(random() % 60);
+    for (auto& t_ns : times_ns) {
+      t_ns = kNow_ns + static_cast<std::int64_t>(random()) % duration_ns;
+    }
+    std::sort(times_ns.begin(), times_ns.end());
+    const std::vector<Event> events = eventsAt(times_ns);
+    const int count = static_cast<int>(1 + random() % 70);
+    for (const SubintervalSplit split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
+      const auto parts = splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + duration_ns,
+                                               into(count, split));
+      ASSERT_EQ(parts.size(), static_cast<std::size_t>(count));
+      std::vector<Event> joined;
+      for (const EventSpan part : parts) joined.insert(joined.end(), part.begin(), part.end());
+      ASSERT_EQ(joined, events);
+    }
+  }
+}
+
+TEST(Subintervals, PartsOfEqualDurationEndWhereTheExactFractionIsRoundedDown) {
+  std::mt19937 random(2);
+  for (int draw = 0; draw < 300; ++draw) {
+    const auto duration_ns = static_cast<std::int64_t>(1 + random() % 500);
+    const int count = static_cast<int>(1 + random() % 20);
+    std::vector<std::int64_t> times_ns;  // one event in every nanosecond
+    for (std::int64_t t_ns = 0; t_ns < duration_ns; ++t_ns) times_ns.push_back(kNow_ns + t_ns);
+    const std::vector<Event> events = eventsAt(times_ns);
+    const auto parts = splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + duration_ns,
+                                             into(count, SubintervalSplit::kDuration));
+    for (int s = 0; s < count; ++s) {
+      const auto first = static_cast<std::size_t>(duration_ns * s / count);
+      const auto end = static_cast<std::size_t>(duration_ns * (s + 1) / count);
+      const EventSpan part = parts[static_cast<std::size_t>(s)];
+      ASSERT_EQ(part.begin() - events.data(), static_cast<std::ptrdiff_t>(first));
+      ASSERT_EQ(part.size(), end - first) << duration_ns << " ns into " << count;
+    }
+  }
+}
+
+TEST(Subintervals, AnEventOnABoundaryBelongsToThePartThatBeginsThere) {
+  const std::int64_t t0_ns = kNow_ns;
+  const std::int64_t t1_ns = kNow_ns + 400'000'000;
+  const std::int64_t boundary_ns = kNow_ns + 100'000'000;
+  const auto events = eventsAt({t0_ns, boundary_ns - 1, boundary_ns, boundary_ns + 1, t1_ns - 1});
+  const auto parts =
+      splitIntoSubintervals(EventSpan(events), t0_ns, t1_ns, into(4, SubintervalSplit::kDuration));
+  EXPECT_THAT(sizesOf(parts), ElementsAre(2, 2, 0, 1));
+}
+
+TEST(Subintervals, WindowsThatDoNotDivideLoseNothingAtTheirEnd) {
+  // 10 ns into 3: [0, 3), [3, 6), [6, 10).
+  const auto events = eventsAt({kNow_ns + 2, kNow_ns + 3, kNow_ns + 5, kNow_ns + 6, kNow_ns + 9});
+  const auto parts = splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + 10,
+                                           into(3, SubintervalSplit::kDuration));
+  EXPECT_THAT(sizesOf(parts), ElementsAre(1, 2, 2));
+}
+
+TEST(Subintervals, AWindowOfAHundredYearsDoesNotOverflow) {
+  const std::int64_t century_ns = 3'155'760'000'000'000'000;
+  const auto events = eventsAt({0, century_ns / 1000 * 999 - 1, century_ns / 1000 * 999});
+  const auto parts = splitIntoSubintervals(EventSpan(events), 0, century_ns,
+                                           into(1000, SubintervalSplit::kDuration));
+  EXPECT_EQ(parts[0].size(), 1U);
+  EXPECT_EQ(parts[998].size(), 1U);
+  EXPECT_EQ(parts[999].size(), 1U);
+}
+
+TEST(Subintervals, PartsOfEqualCountAreEqualToWithinOne) {
+  std::mt19937 random(3);
+  for (int draw = 0; draw < 300; ++draw) {
+    std::vector<std::int64_t> times_ns(random() % 200, kNow_ns);  // all at once
+    const std::vector<Event> events = eventsAt(times_ns);
+    const int count = static_cast<int>(1 + random() % 30);
+    const auto sizes = sizesOf(splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + 1,
+                                                     into(count, SubintervalSplit::kCount)));
+    const auto [least, most] = std::minmax_element(sizes.begin(), sizes.end());
+    ASSERT_LE(*most - *least, 1U) << events.size() << " into " << count;
+  }
+}
+
+TEST(Subintervals, FewerEventsThanPartsLeavePartsEmpty) {
+  const auto events = eventsAt({kNow_ns, kNow_ns + 1});
+  for (const SubintervalSplit split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
+    const auto parts =
+        splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + 2, into(8, split));
+    const auto sizes = sizesOf(parts);
+    EXPECT_EQ(std::count(sizes.begin(), sizes.end(), 1U), 2);
+    EXPECT_EQ(std::count(sizes.begin(), sizes.end(), 0U), 6);
+  }
+}
+
+TEST(Subintervals, NoEventsMakeEmptyParts) {
+  for (const SubintervalSplit split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
+    EXPECT_THAT(sizesOf(splitIntoSubintervals({}, kNow_ns, kNow_ns + 100, into(3, split))),
+                ElementsAre(0, 0, 0));
+  }
+}
+
+TEST(SubintervalShuffle, NoneLetsTheSameSubintervalsMeet) {
+  const auto slots = assignSubintervals(3, into(4, SubintervalSplit::kDuration));
+  ASSERT_EQ(slots.size(), 3U);
+  for (const auto& camera : slots) EXPECT_THAT(camera, ElementsAre(0, 1, 2, 3));
+}
+
+TEST(SubintervalShuffle, ShiftSpreadsTheCamerasOverTheWindow) {
+  SubintervalOptions options = into(4, SubintervalSplit::kDuration);
+  options.shuffle = SubintervalShuffle::kShift;
+  const auto two = assignSubintervals(2, options);
+  EXPECT_THAT(two[0], ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(two[1], ElementsAre(2, 3, 0, 1));
+  for (int count = 1; count <= 12; ++count) {
+    options.count = count;
+    for (int cameras = 1; cameras <= 15; ++cameras) {
+      const auto slots = assignSubintervals(cameras, options);
+      for (int c = 0; c < cameras; ++c) {
+        for (int s = 0; s < count; ++s) {
+          ASSERT_EQ(slots[static_cast<std::size_t>(c)][static_cast<std::size_t>(s)],
+                    (s + c * std::max(1, count / cameras)) % count)
+              << cameras << " cameras, " << count << " sub-intervals";
+        }
+      }
+    }
+  }
+}
+
+TEST(SubintervalShuffle, RandomIsAPermutationPerCameraThatTheSeedDecides) {
+  SubintervalOptions options = into(16, SubintervalSplit::kDuration);
+  options.shuffle = SubintervalShuffle::kRandom;
+  std::set<std::vector<int>> different;
+  for (std::uint32_t seed = 0; seed < 5; ++seed) {
+    options.shuffle_seed = seed;
+    const auto slots = assignSubintervals(3, options);
+    EXPECT_EQ(slots, assignSubintervals(3, options)) << "the same in every window";
+    for (std::vector<int> camera : slots) {
+      different.insert(camera);
+      std::sort(camera.begin(), camera.end());
+      for (int s = 0; s < 16; ++s) ASSERT_EQ(camera[static_cast<std::size_t>(s)], s);
+    }
+  }
+  // Two of 15 permutations of 16! = 2e13 are the same with a chance of 5e-12.
+  EXPECT_EQ(different.size(), 15U);
+}
+
+TEST(SubintervalShuffle, EveryPermutationComesAboutEquallyOften) {
+  SubintervalOptions options = into(3, SubintervalSplit::kDuration);
+  options.shuffle = SubintervalShuffle::kRandom;
+  std::map<std::vector<int>, int> seen;
+  for (const auto& camera : assignSubintervals(6000, options)) ++seen[camera];
+  ASSERT_EQ(seen.size(), 6U);
+  // 1000 each; five standard deviations of sqrt(6000 * 1/6 * 5/6) = 29.
+  for (const auto& [permutation, count] : seen) EXPECT_NEAR(count, 1000, 145);
+}
+
+TEST(Subintervals, OptionsAndNamesThatCannotBeAreNamed) {
+  EXPECT_THAT([] { into(0, SubintervalSplit::kCount).validate(); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("subintervals = 0")));
+  EXPECT_THAT([] { into(1001, SubintervalSplit::kCount).validate(); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("subintervals = 1001")));
+  for (const auto split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
+    EXPECT_EQ(subintervalSplitFromName(nameOf(split)), split);
+  }
+  for (const auto shuffle :
+       {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
+    EXPECT_EQ(subintervalShuffleFromName(nameOf(shuffle)), shuffle);
+  }
+  EXPECT_THAT([] { subintervalSplitFromName("size"); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("'size'")));
+  EXPECT_THAT([] { subintervalShuffleFromName("deal"); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("'deal'")));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/geometry/reference_view.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace efm {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr double kDegree = 3.14159265358979323846 / 180;
+
+/// Pixels that are not squares, a principal point that is not in the middle.
+const CameraModel kModel{120, 80, 95.0, 90.0, 62.3, 37.1, DistortionModel::kNone, {}};
+
+Eigen::Vector3d rayOf(const ReferenceView& view, double x, double y) {
+  return view.pointAt(x, y, 1.0);
+}
+
+ReferenceViewOptions sized(std::optional<int> width, std::optional<int> height) {
+  ReferenceViewOptions options;
+  options.width = width;
+  options.height = height;
+  return options;
+}
+
+void expectTheSameImageCorners(const ReferenceView& view) {
+  const ReferenceView own = ReferenceView::of(kModel);
+  for (const double across : {0.0, 0.3, 1.0}) {
+    for (const double down : {0.0, 0.7, 1.0}) {
+      // Pixels are squares around their centres: the image begins at -0.5.
+      const Eigen::Vector3d expected =
+          rayOf(own, across * own.width - 0.5, down * own.height - 0.5);
+      const Eigen::Vector3d ray = rayOf(view, across * view.width - 0.5, down * view.height - 0.5);
+      EXPECT_LT((ray - expected).norm(), 1e-12) << view.width << "x" << view.height;
+    }
+  }
+}
+
+TEST(ReferenceView, IsTheCamerasOwnWhereNothingIsAsked) {
+  const ReferenceView view = makeReferenceView(kModel, {});
+  EXPECT_EQ(view.width, 120);
+  EXPECT_EQ(view.height, 80);
+  EXPECT_EQ(view.fx, 95.0);
+  EXPECT_EQ(view.fy, 90.0);
+  EXPECT_EQ(view.cx, 62.3);
+  EXPECT_EQ(view.cy, 37.1);
+}
+
+TEST(ReferenceView, ASizeAloneKeepsWhatTheImageShows) {
+  for (const auto& options : {sized(240, std::nullopt), sized(std::nullopt, 40), sized(240, 160),
+                              sized(60, 80), sized(77, 13), sized(1, 1)}) {
+    expectTheSameImageCorners(makeReferenceView(kModel, options));
+  }
+}
+
+TEST(ReferenceView, TheSizeOfTheCameraItselfChangesNothing) {
+  const ReferenceView view = makeReferenceView(kModel, sized(120, 80));
+  EXPECT_DOUBLE_EQ(view.fx, 95.0);
+  EXPECT_DOUBLE_EQ(view.fy, 90.0);
+  EXPECT_DOUBLE_EQ(view.cx, 62.3);
+  EXPECT_DOUBLE_EQ(view.cy, 37.1);
+}
+
+TEST(ReferenceView, OneSideAloneKeepsTheShape) {
+  EXPECT_EQ(makeReferenceView(kModel, sized(240, std::nullopt)).height, 160);
+  EXPECT_EQ(makeReferenceView(kModel, sized(std::nullopt, 20)).width, 30);
+  EXPECT_EQ(makeReferenceView(kModel, sized(100, std::nullopt)).height, 67) << "66.7 rounded";
+  EXPECT_EQ(makeReferenceView(kModel, sized(1, std::nullopt)).height, 1) << "never none";
+}
+
+TEST(ReferenceView, TheFieldOfViewIsTheAngleBetweenTheRaysOfLeftAndRightEdge) {
+  for (const double fov_deg : {1.0, 60.0, 90.0, 170.0}) {
+    for (ReferenceViewOptions options : {sized({}, {}), sized(300, {}), sized(200, 200)}) {
+      options.fov_deg = fov_deg;
+      const ReferenceView view = makeReferenceView(kModel, options);
+      // In the row of the principal point, where rays lie in the plane of x and z.
+      const Eigen::Vector3d left = rayOf(view, -0.5, view.cy);
+      const Eigen::Vector3d right = rayOf(view, view.width - 0.5, view.cy);
+      const double angle = std::atan2(left.cross(right).norm(), left.dot(right));
+      EXPECT_NEAR(angle, fov_deg * kDegree, 1e-12);
+      EXPECT_NEAR(left.x(), -right.x(), 1e-9 * right.x()) << "the principal point in the middle";
+      EXPECT_DOUBLE_EQ(view.cy, 0.5 * (view.height - 1));
+      EXPECT_NEAR(view.fy / view.fx, 90.0 / 95.0, 1e-12) << "pixels as they were";
+    }
+  }
+}
+
+TEST(ReferenceView, NinetyDegreesHaveHalfTheWidthAsFocalLength) {
+  ReferenceViewOptions options = sized(200, 100);
+  options.fov_deg = 90;
+  EXPECT_NEAR(makeReferenceView(kModel, options).fx, 100, 1e-12);
+}
+
+TEST(ReferenceView, OptionsOutOfRangeAreNamed) {
+  const auto with = [](auto change) {
+    return [change] {
+      ReferenceViewOptions options;
+      change(options);
+      makeReferenceView(kModel, options);
+    };
+  };
+  using Options = ReferenceViewOptions;
+  EXPECT_THAT(with([](Options& o) { o.fov_deg = 180; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("fov_deg = 180")));
+  EXPECT_THAT(with([](Options& o) { o.fov_deg = 0; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("fov_deg = 0")));
+  EXPECT_THAT(with([](Options& o) { o.fov_deg = std::numeric_limits<double>::quiet_NaN(); }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("fov_deg")));
+  EXPECT_THAT(with([](Options& o) { o.width = 0; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("width = 0")));
+  EXPECT_THAT(with([](Options& o) { o.height = 65'536; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("height = 65536")));
+  EXPECT_THAT(with([](Options& o) { o.offset_m.y() = std::numeric_limits<double>::infinity(); }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("rv_offset_m")));
+}
+
+}  // namespace
+}  // namespace efm

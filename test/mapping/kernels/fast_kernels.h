@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "mapping/dsi/voting_kernel.h"
+
+namespace efm::test {
+
+/// What this processor runs beside the plain kernel, which is what they are held against.
+inline std::vector<VotingKernel> fastKernels() {
+  std::vector<VotingKernel> kernels;
+  for (const VotingKernel kernel : availableKernels()) {
+    if (kernel != VotingKernel::kPlain) kernels.push_back(kernel);
+  }
+  return kernels;
+}
+
+/// The name of a test's case, where kernels are its parameters.
+inline std::string nameOfKernel(const ::testing::TestParamInfo<VotingKernel>& test) {
+  return std::string(nameOf(test.param));
+}
+
+/// What a fast kernel may put into other voxels than the exact ones, as a share of the mass: a
+/// coordinate is rounded to 1/4096 px where the ray is sorted into bins and again where it votes,
+/// on average by 1/3 of that together, and a shift of d px in x and in y moves at most 4 d of a
+/// vote's weights; their product, cut to 1/32,768, moves 4 times half of that. 3.9e-4.
+inline constexpr double kFastErrorOverMass = 4.0 / 3 / 4096 + 4 * 0.5 / 32'768;
+
+/// The same of the plain kernel. Float coordinates of some 40 px are good to 4e-6 px, at which a
+/// vote moves.
+inline constexpr double kPlainErrorOverMass = 1e-4;
+
+/// The most that a fast kernel may be off, under any rule: those that multiply weigh the error of a
+/// small input by what the others are.
+inline constexpr double kMostErrorOverMass = 1e-3;
+
+inline double errorOverMassOf(VotingKernel kernel) {
+  return kernel == VotingKernel::kPlain ? kPlainErrorOverMass : kMostErrorOverMass;
+}
+
+}  // namespace efm::test

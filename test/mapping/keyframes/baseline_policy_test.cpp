@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/keyframes/baseline_policy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "test/mapping/keyframes/known_recording.h"
+
+namespace efm {
+namespace {
+
+using test::KnownRecording;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
+constexpr double kDepthGuess_m = 2;
+
+double secondsSinceStart(std::int64_t t_ns) { return 1e-9 * static_cast<double>(t_ns - kStart_ns); }
+
+Rigid3 turned(double angle_rad) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitY())),
+          Eigen::Vector3d::Zero()};
+}
+Rigid3 moved(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
+
+/// An event per millisecond for four seconds; a view of 53 degrees.
+KnownRecording recordingOf(std::function<std::optional<Rigid3>(std::int64_t)> T_world_ref) {
+  KnownRecording recording;
+  recording.start_ns = kStart_ns;
+  recording.complete_ns = kStart_ns + 4000 * kMs;
+  for (int i = 0; i < 4000; ++i) recording.events_ns.push_back(kStart_ns + i * kMs);
+  recording.T_world_ref_at = std::move(T_world_ref);
+  return recording;
+}
+
+KeyframePolicyOptions options(double window_s, double stride_s) {
+  KeyframePolicyOptions options;
+  options.policy = KeyframePolicyKind::kBaseline;
+  options.window_s = window_s;
+  options.stride_s = stride_s;
+  return options;
+}
+
+/// A keyframe at the origin that saw points at one depth all over its image.
+KeyframeDepthMap keyframeThatSaw(double depth_m) {
+  KeyframeDepthMap keyframe;
+  keyframe.view = KnownRecording().image;
+  keyframe.map.depth =
+      cv::Mat1f(keyframe.view.height, keyframe.view.width, static_cast<float>(depth_m));
+  return keyframe;
+}
+
+TEST(BaselinePolicy, AWindowEndsWithTheFirstStrideThatMovedFarEnough) {
+  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+  // 10 % of 2 m at 0.9 m/s: after 0.22 s.
+  const auto recording =
+      recordingOf([](std::int64_t t_ns) { return moved(0.9 * secondsSinceStart(t_ns)); });
+  const auto window = policy.current(recording);
+  ASSERT_TRUE(window);
+  EXPECT_EQ(window->t0_ns, kStart_ns);
+  EXPECT_EQ(window->t1_ns, kStart_ns + 250 * kMs);
+  EXPECT_EQ(window->t_ref_ns, kStart_ns + 125 * kMs);
+  EXPECT_EQ(policy.current(recording)->t1_ns, window->t1_ns) << "does not move on by itself";
+}
+
+TEST(BaselinePolicy, TheMeanDepthIsThatOfTheLastKeyframe) {
+  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+  const auto recording =
+      recordingOf([](std::int64_t t_ns) { return moved(0.9 * secondsSinceStart(t_ns)); });
+  const KeyframeDepthMap far_scene = keyframeThatSaw(6);
+  policy.advance(*policy.current(recording), &far_scene);
+  // 10 % of 6 m at 0.9 m/s: after 0.67 s.
+  const auto window = policy.current(recording);
+  EXPECT_EQ(window->t0_ns, kStart_ns + 250 * kMs);
+  EXPECT_EQ(window->t1_ns - window->t0_ns, 700 * kMs);
+  policy.advance(*window, nullptr);
+  EXPECT_EQ(policy.current(recording)->t1_ns - window->t1_ns, 700 * kMs)
+      << "a window without a keyframe changes nothing";
+}
+
+TEST(BaselinePolicy, TurningInPlaceEndsAWindowOnceTooLittleIsLeftInView) {
+  const auto recording =
+      recordingOf([](std::int64_t t_ns) { return turned(0.5 * secondsSinceStart(t_ns)); });
+  KeyframePolicyOptions turning = options(1.0, 0.02);
+  const KeyframeDepthMap seen = keyframeThatSaw(2);
+  for (const bool by_the_keyframe : {false, true}) {  // or by the guess
+    BaselinePolicy policy(turning, kDepthGuess_m);
+    if (by_the_keyframe) policy.advance({kStart_ns, kStart_ns, kStart_ns}, &seen);
+    const auto window = policy.current(recording);
+    ASSERT_TRUE(window);
+    // 30 of 100 columns have left after atan(0.495) - atan(0.195) = 0.267 rad, four of the guess's
+    // ten after atan(0.495) - atan(0.1485) = 0.312; a stride is 0.01. Corners leave a little
+    // before.
+    const double angle = 0.5 * secondsSinceStart(window->t1_ns);
+    EXPECT_GT(angle, 0.2);
+    EXPECT_LT(angle, by_the_keyframe ? 0.28 : 0.323);
+  }
+  turning.min_visible_share = 0;
+  EXPECT_FALSE(BaselinePolicy(turning, kDepthGuess_m).current(recording)) << "where it may all go";
+}
+
+TEST(BaselinePolicy, AScenePassesOutOfViewAlsoBehindTheCamera) {
+  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+  const KeyframeDepthMap seen = keyframeThatSaw(2);
+  policy.advance({kStart_ns, kStart_ns, kStart_ns}, &seen);
+  const auto recording = recordingOf([](std::int64_t) { return turned(3.1); });
+  ASSERT_TRUE(policy.current(recording));
+  EXPECT_EQ(policy.current(recording)->t1_ns, kStart_ns + 50 * kMs) << "one stride is enough";
+}
+
+TEST(BaselinePolicy, StandingStillAfterATurnMakesOneKeyframeNotOnePerStride) {
+  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+  const KeyframeDepthMap seen = keyframeThatSaw(2);
+  policy.advance({kStart_ns, kStart_ns, kStart_ns}, &seen);
+  // The camera has turned away from all that and stands still now: nothing to triangulate.
+  const auto recording = recordingOf([](std::int64_t) { return turned(3.1); });
+  const auto window = policy.current(recording);
+  ASSERT_TRUE(window);
+  const KeyframeDepthMap saw_nothing = keyframeThatSaw(0);
+  policy.advance(*window, &saw_nothing);
+  EXPECT_FALSE(policy.current(recording));
+  EXPECT_GT(policy.earliestStart(recording), kStart_ns + 2900 * kMs) << "its events are let go";
+}
+
+TEST(BaselinePolicy, WhereTheLongestWindowIsNotEnoughTheStartMovesOnByAStride) {
+  BaselinePolicy policy(options(0.5, 0.1), kDepthGuess_m);
+  // Still for a second, then 1 m/s: 0.2 m after 1.2 s.
+  const auto recording = recordingOf(
+      [](std::int64_t t_ns) { return moved(std::max(0.0, secondsSinceStart(t_ns) - 1)); });
+  const auto window = policy.current(recording);
+  ASSERT_TRUE(window);
+  EXPECT_EQ(window->t0_ns, kStart_ns + 700 * kMs)
+      << "the first start whose longest window gets there";
+  EXPECT_EQ(window->t1_ns, kStart_ns + 1200 * kMs);
+  EXPECT_EQ(policy.earliestStart(recording), window->t0_ns);
+}
+
+TEST(BaselinePolicy, WaitsWhileTheRecordingIsNotCompleteAndThenDecidesTheSame) {
+  auto recording =
+      recordingOf([](std::int64_t t_ns) { return moved(0.9 * secondsSinceStart(t_ns)); });
+  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+  for (int known_ms = 1; known_ms < 250; ++known_ms) {
+    recording.complete_ns = kStart_ns + known_ms * kMs;
+    ASSERT_FALSE(policy.current(recording)) << known_ms;
+    ASSERT_EQ(policy.earliestStart(recording), kStart_ns);
+  }
+  recording.complete_ns = kStart_ns + 250 * kMs;
+  ASSERT_TRUE(policy.current(recording));
+  EXPECT_EQ(policy.current(recording)->t1_ns, kStart_ns + 250 * kMs);
+}
+
+TEST(BaselinePolicy, GapsInThePosesAreGrownAcrossOrLeftBehind) {
+  // No pose before 0.32 s and none from 0.4 to 0.58 s.
+  const auto recording = recordingOf([](std::int64_t t_ns) -> std::optional<Rigid3> {
+    const double t_s = secondsSinceStart(t_ns);
+    if (t_s < 0.32 || (t_s >= 0.4 && t_s < 0.58)) return std::nullopt;
+    return moved(1.0 * t_s);
+  });
+  BaselinePolicy policy(options(0.5, 0.05), kDepthGuess_m);
+  const auto window = policy.current(recording);
+  ASSERT_TRUE(window);
+  EXPECT_EQ(window->t0_ns, kStart_ns + 350 * kMs) << "the first start with a pose";
+  EXPECT_EQ(window->t1_ns, kStart_ns + 600 * kMs) << "enough since 0.55 s, known since 0.58 s";
+  policy.advance(*window, nullptr);
+  EXPECT_EQ(policy.current(recording)->t0_ns, kStart_ns + 600 * kMs);
+}
+
+TEST(BaselinePolicy, StartsAtAnEventHoweverLongThereIsNone) {
+  auto recording = recordingOf([](std::int64_t t_ns) { return moved(secondsSinceStart(t_ns)); });
+  recording.events_ns = {kStart_ns + 3'500 * kMs, kStart_ns + 3'501 * kMs};
+  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+  EXPECT_EQ(policy.current(recording)->t0_ns, kStart_ns + 3'500 * kMs);
+  policy.advance(*policy.current(recording), nullptr);
+  EXPECT_FALSE(policy.current(recording)) << "no window is without events";
+}
+
+TEST(BaselinePolicy, TheReferenceMayStandAtTheEnd) {
+  KeyframePolicyOptions at_end = options(1.0, 0.05);
+  at_end.reference = ReferenceTime::kEnd;
+  BaselinePolicy policy(at_end, kDepthGuess_m);
+  const auto recording =
+      recordingOf([](std::int64_t t_ns) { return moved(secondsSinceStart(t_ns)); });
+  EXPECT_EQ(policy.current(recording)->t_ref_ns, policy.current(recording)->t1_ns);
+}
+
+TEST(BaselinePolicy, OptionsOutOfRangeAreNamed) {
+  const auto with = [](auto change) {
+    return [change] {
+      KeyframePolicyOptions wrong = options(0.2, 0.1);
+      change(wrong);
+      makeKeyframePolicy(wrong, kDepthGuess_m);
+    };
+  };
+  using Options = KeyframePolicyOptions;
+  EXPECT_THAT(with([](Options& o) { o.min_baseline_ratio = 0; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("min_baseline_ratio = 0")));
+  EXPECT_THAT(with([](Options& o) { o.min_visible_share = 1.5; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("min_visible_share = 1.5")));
+  EXPECT_THAT(with([](Options& o) { o.stride_s = 0.25; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("stride_s = 0.25")));
+  EXPECT_THAT(with([](Options& o) { o.window_events = 0; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("window_events = 0")));
+}
+
+}  // namespace
+}  // namespace efm

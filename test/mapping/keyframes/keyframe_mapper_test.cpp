@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/keyframes/keyframe_mapper.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <stdexcept>
+
+#include "test/mapping/depth/same_image.h"
+#include "test/mapping/keyframes/random_recording.h"
+
+namespace efm {
+namespace {
+
+using test::RandomScene;
+using test::same;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+using Recording = test::RandomRecording;
+
+KeyframeMapperOptions fewPlanes(int subintervals = 1) {
+  KeyframeMapperOptions options;
+  options.split = SplitFusionOptions::none();
+  options.extraction.extraction = ExtractionMethod::kPaper;
+  options.planes = {0.5, 4.0, 8, PlaneSpacing::kInverse};
+  options.subintervals.count = subintervals;
+  options.sweep.threads = 1;
+  return options;
+}
+
+KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras,
+                     const KeyframeMapperOptions& options) {
+  KeyframeMapper mapper(recording.rig, cameras, options);
+  const auto keyframe = mapper.map(Recording::kWindow, recording.spans(), recording.trajectory);
+  EXPECT_TRUE(keyframe);
+  return keyframe.value_or(KeyframeDepthMap());
+}
+
+void expectNear(const Rigid3& a, const Rigid3& b) {
+  EXPECT_LT((a.translation - b.translation).norm(), 1e-12);
+  EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-7);  // as good as acos is near 1
+}
+
+TEST(KeyframeMapper, TheReferenceStandsWhereItsCameraIsAtTheReferenceTime) {
+  const Recording recording(1, 3, 500);
+  for (int reference = 0; reference < 3; ++reference) {
+    KeyframeMapperOptions options = fewPlanes();
+    options.reference_camera = reference;
+    expectNear(map(recording, {0, 1}, options).T_world_ref,
+               *recording.trajectory.poseAt(Recording::kWindow.t_ref_ns) *
+                   recording.rig.cameras[static_cast<std::size_t>(reference)].T_rig_cam);
+  }
+}
+
+TEST(KeyframeMapper, TheOffsetIsAlongTheViewsOwnAxes) {
+  Rig rig;
+  // The rig looks along the world's x axis: its z is x, its x is -y.
+  Eigen::Matrix3d R_world_rig;
+  R_world_rig << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  rig.cameras.push_back({test::smallCamera(), {}, 0});
+  KeyframeMapperOptions options = fewPlanes();
+  options.view.offset_m = {0.1, 0.2, 0.3};
+  const KeyframeMapper mapper(rig, {0}, options);
+  const Rigid3 T_world_ref =
+      mapper.referencePose({Eigen::Quaterniond(R_world_rig), Eigen::Vector3d(7, 8, 9)});
+  EXPECT_LT((T_world_ref.translation - Eigen::Vector3d(7 + 0.3, 8 - 0.1, 9 - 0.2)).norm(), 1e-12);
+  EXPECT_LT((T_world_ref.rotation.toRotationMatrix() - R_world_rig).norm(), 1e-12);
+}
+
+TEST(KeyframeMapper, AnUnselectedReferenceGivesTheViewButNoneOfItsEvents) {
+  Recording recording(2, 3, 3000);
+  KeyframeMapperOptions options = fewPlanes(2);
+  options.reference_camera = 2;
+  options.camera_maps = true;
+  options.event_images = true;
+  const KeyframeDepthMap with_events = map(recording, {0, 1}, options);
+  recording.events[2].clear();
+  const KeyframeDepthMap without = map(recording, {0, 1}, options);
+  EXPECT_TRUE(same(with_events.map, without.map));
+  EXPECT_GT(cv::countNonZero(without.map.depth), 0);
+  EXPECT_THAT(with_events.events, ElementsAre(3000, 3000, 0));
+  EXPECT_THAT(with_events.silent_cameras, IsEmpty()) << "an unselected camera is not silent";
+  ASSERT_EQ(with_events.camera_maps.size(), 2U);
+  ASSERT_EQ(with_events.event_images.size(), 2U);
+  EXPECT_EQ(with_events.event_images[1].camera, 1);
+}
+
+TEST(KeyframeMapper, SingleCamerasMapsAreThoseOfARunWithThisCameraAlone) {
+  const Recording recording(3, 3, 4000);
+  for (const int subintervals : {1, 4}) {
+    KeyframeMapperOptions options = fewPlanes(subintervals);
+    options.reference_camera = 1;
+    const KeyframeDepthMap plain = map(recording, {0, 2}, options);
+    EXPECT_THAT(plain.camera_maps, IsEmpty());
+    options.camera_maps = true;
+    const KeyframeDepthMap all = map(recording, {0, 2}, options);
+    EXPECT_TRUE(same(all.map, plain.map)) << "beside the fused one, which stays";
+    ASSERT_EQ(all.camera_maps.size(), 2U);
+    EXPECT_EQ(all.camera_maps[0].camera, 0);
+    EXPECT_EQ(all.camera_maps[1].camera, 2);
+    for (const CameraDepthMap& camera : all.camera_maps) {
+      const KeyframeDepthMap alone = map(recording, {camera.camera}, options);
+      EXPECT_TRUE(same(camera.map, alone.map)) << camera.camera << " of " << subintervals;
+      EXPECT_TRUE(same(camera.map, alone.camera_maps.at(0).map));
+    }
+  }
+}
+
+TEST(KeyframeMapper, EventImagesCountEveryEventOfTheWindowWithAPoseOrWithout) {
+  Recording recording(4, 2, 3000);
+  Trajectory half;  // poses for the first half of the window alone
+  for (const StampedPose& pose : recording.trajectory.poses()) {
+    if (pose.t_ns <= Recording::kStart_ns + 60'000'000) half.add(pose);
+  }
+  recording.trajectory = half;
+  KeyframeMapperOptions options = fewPlanes();
+  EXPECT_THAT(map(recording, {0, 1}, options).event_images, IsEmpty());
+  options.event_images = true;
+  const KeyframeDepthMap keyframe = map(recording, {0, 1}, options);
+  EXPECT_GT(keyframe.without_pose, 0U);
+  EXPECT_EQ(keyframe.events[0] + keyframe.events[1] + keyframe.without_pose, 6000U);
+  ASSERT_EQ(keyframe.event_images.size(), 2U);
+  for (std::size_t c = 0; c < 2; ++c) {
+    const EventImage& image = keyframe.event_images[c];
+    EXPECT_EQ(image.camera, static_cast<int>(c));
+    cv::Mat_<cv::Vec2i> expected = cv::Mat_<cv::Vec2i>::zeros(36, 48);
+    for (const Event& event : recording.events[c]) {
+      expected(event.y, event.x)[event.polarity ? 1 : 0] += 1;
+    }
+    EXPECT_TRUE(same(image.counts, expected));
+    EXPECT_EQ(cv::sum(image.counts)[0] + cv::sum(image.counts)[1], 3000);
+  }
+}
+
+TEST(KeyframeMapper, EventImagesHaveTheSizeOfTheSensorNotOfTheView) {
+  const Recording recording(5, 1, 100);
+  KeyframeMapperOptions options = fewPlanes();
+  options.event_images = true;
+  options.view.width = 96;
+  const KeyframeDepthMap keyframe = map(recording, {0}, options);
+  EXPECT_EQ(keyframe.map.depth.size(), cv::Size(96, 72));
+  EXPECT_EQ(keyframe.event_images.at(0).counts.size(), cv::Size(48, 36));
+}
+
+TEST(KeyframeMapper, ASilentCameraThatIsExcludedMightAsWellNotBeThere) {
+  Recording recording(6, 3, 4000);
+  recording.events[1].clear();
+  for (const auto shuffle :
+       {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
+    KeyframeMapperOptions options = fewPlanes(4);
+    options.subintervals.shuffle = shuffle;
+    options.camera_maps = true;
+    const KeyframeDepthMap without = map(recording, {0, 2}, options);
+    options.exclude_silent = true;
+    const KeyframeDepthMap excluded = map(recording, {0, 1, 2}, options);
+    EXPECT_TRUE(same(excluded.map, without.map)) << nameOf(shuffle);
+    EXPECT_GT(cv::countNonZero(without.map.depth), 0);
+    EXPECT_THAT(excluded.silent_cameras, ElementsAre(1));
+    EXPECT_EQ(excluded.silent_subintervals, 0U) << "of the cameras that are not silent";
+    EXPECT_EQ(excluded.votes.total(), without.votes.total());
+    ASSERT_EQ(excluded.camera_maps.size(), 2U);
+    EXPECT_EQ(excluded.camera_maps[1].camera, 2);
+    EXPECT_TRUE(same(excluded.camera_maps[1].map, without.camera_maps[1].map));
+    EXPECT_TRUE(same(map(recording, {0, 2}, options).map, without.map))
+        << "where none is silent the option changes nothing";
+  }
+}
+
+TEST(KeyframeMapper, ASilentCameraThatIsNotExcludedSilencesTheHarmonicMean) {
+  Recording recording(7, 2, 3000);
+  recording.events[1].clear();
+  const KeyframeDepthMap keyframe = map(recording, {0, 1}, fewPlanes());
+  EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
+  EXPECT_EQ(keyframe.largest_confidence, 0);
+}
+
+TEST(KeyframeMapper, WithoutAPoseACameraIsAsSilentAsWithoutEvents) {
+  Recording recording(8, 2, 3000);
+  for (Event& event : recording.events[1]) event.t_ns = Recording::kStart_ns + 99'999'999;
+  Trajectory early;
+  for (const StampedPose& pose : recording.trajectory.poses()) {
+    if (pose.t_ns < Recording::kStart_ns + 90'000'000) early.add(pose);
+  }
+  recording.trajectory = early;
+  KeyframeMapperOptions options = fewPlanes(4);
+  options.exclude_silent = true;
+  const KeyframeDepthMap keyframe = map(recording, {0, 1}, options);
+  EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
+  EXPECT_GE(keyframe.without_pose, 3000U);
+  EXPECT_GT(keyframe.largest_confidence, 0);
+}
+
+TEST(KeyframeMapper, SilentSubintervalsAreCounted) {
+  Recording recording(9, 2, 3000);
+  // The second camera sees something in the first and the last of five sub-intervals alone.
+  auto& events = recording.events[1];
+  events.erase(std::remove_if(events.begin(), events.end(),
+                              [](const Event& event) {
+                                const std::int64_t since_ns = event.t_ns - Recording::kStart_ns;
+                                return since_ns >= 20'000'001 && since_ns < 80'000'005;
+                              }),
+               events.end());
+  const KeyframeDepthMap keyframe = map(recording, {0, 1}, fewPlanes(5));
+  EXPECT_THAT(keyframe.silent_cameras, IsEmpty());
+  EXPECT_EQ(keyframe.silent_subintervals, 3U);
+}
+
+TEST(KeyframeMapper, WhereAllCamerasAreSilentTheMapIsEmpty) {
+  Recording recording(10, 2, 10);
+  for (auto& events : recording.events) events.clear();
+  for (const bool exclude_silent : {false, true}) {
+    KeyframeMapperOptions options = fewPlanes(3);
+    options.exclude_silent = exclude_silent;
+    const KeyframeDepthMap keyframe = map(recording, {0, 1}, options);
+    EXPECT_EQ(cv::countNonZero(keyframe.map.depth), 0);
+    EXPECT_EQ(keyframe.map.depth.size(), cv::Size(48, 36));
+    EXPECT_THAT(keyframe.silent_cameras, ElementsAre(0, 1));
+    EXPECT_EQ(keyframe.votes.total(), 0U);
+  }
+}
+
+TEST(KeyframeMapper, WhatCannotBeIsNamed) {
+  const Recording recording(11, 2, 10);
+  KeyframeMapperOptions options = fewPlanes();
+  options.reference_camera = 2;
+  EXPECT_THAT(
+      [&] {
+        KeyframeMapper(recording.rig, {0, 1}, options);
+      },
+      ThrowsMessage<std::invalid_argument>(HasSubstr("reference_camera = 2")));
+  EXPECT_THAT(
+      [&] {
+        KeyframeMapper(recording.rig, {0, 5}, fewPlanes());
+      },
+      ThrowsMessage<std::invalid_argument>(HasSubstr("cameras = 5")));
+  EXPECT_THAT([&] { KeyframeMapper(recording.rig, {}, fewPlanes()); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("cameras")));
+  Rig broken = recording.rig;
+  broken.cameras[1].model.fx = 0;
+  options.reference_camera = 1;
+  EXPECT_THAT([&] { KeyframeMapper(broken, {0}, options); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("fx = 0")))
+      << "the reference camera's model matters although it is not selected";
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/keyframes/keyframe_policy.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "test/mapping/keyframes/known_recording.h"
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'007;
+
+using Recording = test::KnownRecording;
+
+constexpr double kDepthGuess_m = 2;
+
+Recording startingAt(std::int64_t start_ns) {
+  Recording recording;
+  recording.start_ns = start_ns;
+  return recording;
+}
+
+KeyframePolicyOptions period(double window_s, double stride_s,
+                             ReferenceTime reference = ReferenceTime::kMiddle) {
+  KeyframePolicyOptions options;
+  options.window_s = window_s;
+  options.stride_s = stride_s;
+  options.reference = reference;
+  return options;
+}
+
+TEST(KeyframePolicy, WindowKStartsKStridesAfterTheStart) {
+  const auto policy = makeKeyframePolicy(period(0.5, 0.2), kDepthGuess_m);
+  for (int k = 0; k < 5; ++k) {
+    const auto window = policy->current(startingAt(kStart_ns));
+    ASSERT_TRUE(window);
+    EXPECT_EQ(window->t0_ns, kStart_ns + k * 200'000'000);
+    EXPECT_EQ(window->t1_ns, window->t0_ns + 500'000'000);
+    EXPECT_EQ(window->t_ref_ns, window->t0_ns + 250'000'000);
+    policy->advance(*window, nullptr);
+  }
+}
+
+TEST(KeyframePolicy, ForwardLookingVehiclesReferToTheEnd) {
+  const auto policy = makeKeyframePolicy(period(0.5, 0.5, ReferenceTime::kEnd), kDepthGuess_m);
+  EXPECT_EQ(policy->current(startingAt(0))->t_ref_ns, 500'000'000);
+}
+
+TEST(KeyframePolicy, WindowsThatEndByATimeArePassedTogether) {
+  const auto policy = makeKeyframePolicy(period(0.5, 0.2), kDepthGuess_m);
+  EXPECT_EQ(policy->advancePast(startingAt(0), 499'999'999), 0U);
+  EXPECT_EQ(policy->advancePast(startingAt(0), 500'000'000), 1U);
+  EXPECT_EQ(policy->current(startingAt(0))->t0_ns, 200'000'000);
+  EXPECT_EQ(policy->advancePast(startingAt(0), 500'000'000), 0U) << "not twice";
+  EXPECT_EQ(policy->advancePast(startingAt(0), 1'000'000'000'000'000'000), 4'999'999'997U);
+  EXPECT_GT(policy->current(startingAt(0))->t1_ns, 1'000'000'000'000'000'000);
+}
+
+TEST(KeyframePolicy, ASingleWindowComesOnce) {
+  const auto policy = makeSingleWindowPolicy({10, 20, 15});
+  ASSERT_TRUE(policy->current(startingAt(kStart_ns)));
+  EXPECT_EQ(policy->current(startingAt(kStart_ns))->t0_ns, 10);
+  policy->advance({10, 20, 15}, nullptr);
+  EXPECT_FALSE(policy->current(startingAt(kStart_ns)));
+}
+
+TEST(KeyframePolicy, OptionsOutOfRangeAreNamed) {
+  KeyframePolicyOptions options;
+  options.window_s = 0;
+  EXPECT_THAT(
+      [&] { makeKeyframePolicy(options, kDepthGuess_m); },
+      ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr("window_s = 0")));
+  options = {};
+  options.stride_s = -1;
+  EXPECT_THAT(
+      [&] { makeKeyframePolicy(options, kDepthGuess_m); },
+      ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr("stride_s = -1")));
+}
+
+}  // namespace
+}  // namespace efm

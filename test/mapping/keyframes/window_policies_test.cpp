@@ -1,0 +1,317 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+
+#include "test/mapping/depth/same_image.h"
+#include "test/mapping/keyframes/played_recording.h"
+
+namespace efm {
+namespace {
+
+using test::LongRecording;
+using test::play;
+using test::Played;
+using test::playedOptions;
+using test::same;
+
+/// One of each policy, windows that overlap and windows that leave gaps among them.
+std::vector<FusionMapperOptions> allPolicies() {
+  std::vector<FusionMapperOptions> all(6, playedOptions());
+  all[0].keyframes.window_s = 0.11;
+  all[0].keyframes.stride_s = 0.04;
+  all[1].keyframes.window_s = 0.03;
+  all[1].keyframes.stride_s = 0.07;
+  all[1].keyframes.reference = ReferenceTime::kEnd;
+  all[2].keyframes.policy = KeyframePolicyKind::kEvents;
+  all[2].keyframes.window_events = 700;
+  all[3] = all[2];
+  all[3].keyframes.window_events = 1;
+  all[3].keyframes.reference = ReferenceTime::kEnd;
+  all[3].limits = {LongRecording::kStart_ns + 30'000'000, LongRecording::kStart_ns + 60'000'000};
+  all[4].keyframes.policy = KeyframePolicyKind::kBaseline;
+  all[4].keyframes.window_s = 0.12;
+  all[4].keyframes.stride_s = 0.01;
+  all[4].keyframes.min_baseline_ratio = 0.05;
+  all[5] = all[4];
+  all[5].limits.t0_ns = LongRecording::kStart_ns + 123'456'789;
+  all[5].limits.t1_ns = LongRecording::kStart_ns + 444'444'444;
+  return all;
+}
+
+std::string labelOf(const FusionMapperOptions& options, std::uint32_t seed) {
+  return std::string(nameOf(options.keyframes.policy)) + ", seed " + std::to_string(seed);
+}
+
+/// Hands the recording over whole and in three other ways. @return the keyframes.
+std::size_t expectTheSameHoweverCut(const LongRecording& recording,
+                                    const FusionMapperOptions& options, const std::string& label) {
+  const Played whole = play(recording, options, 0);
+  for (std::uint32_t cut = 1; cut <= 3; ++cut) {
+    const Played cut_up = play(recording, options, cut);
+    EXPECT_EQ(cut_up.keyframes.size(), whole.keyframes.size()) << label;
+    for (std::size_t k = 0; k < std::min(whole.keyframes.size(), cut_up.keyframes.size()); ++k) {
+      const KeyframeDepthMap& a = whole.keyframes[k];
+      const KeyframeDepthMap& b = cut_up.keyframes[k];
+      EXPECT_EQ(a.window.t0_ns, b.window.t0_ns) << label;
+      EXPECT_EQ(a.window.t1_ns, b.window.t1_ns) << label;
+      EXPECT_EQ(a.window.t_ref_ns, b.window.t_ref_ns) << label;
+      EXPECT_EQ(a.events, b.events) << label;
+      EXPECT_TRUE(same(a.map, b.map)) << label;
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      const EventCounts& a = whole.counts.cameras[c];
+      const EventCounts& b = cut_up.counts.cameras[c];
+      EXPECT_EQ(a.used, b.used) << label;
+      EXPECT_EQ(a.without_pose, b.without_pose) << label;
+      EXPECT_EQ(a.outside_window, b.outside_window) << label;
+      EXPECT_EQ(a.dropped, b.dropped) << label;
+    }
+    EXPECT_EQ(cut_up.counts.keyframes_without_pose, whole.counts.keyframes_without_pose) << label;
+    EXPECT_EQ(cut_up.counts.windows_without_events, whole.counts.windows_without_events) << label;
+  }
+  return whole.keyframes.size();
+}
+
+TEST(WindowPolicies, HowARecordingIsCutIntoPacketsNeverChangesTheResult) {
+  for (const FusionMapperOptions& options : allPolicies()) {
+    for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+      EXPECT_GE(expectTheSameHoweverCut(LongRecording(seed, 1.0), options, labelOf(options, seed)),
+                2U);
+    }
+  }
+}
+
+TEST(WindowPolicies, NorWhereEventsAreFewAndFarBetween) {
+  std::size_t keyframes = 0;
+  for (FusionMapperOptions options : allPolicies()) {
+    options.keyframes.window_events = 3;
+    for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+      // An event of each camera in 20 ms: poses and other cameras often end between two of them.
+      keyframes += expectTheSameHoweverCut(LongRecording(seed, 1.0, 30), options,
+                                           "few events, " + labelOf(options, seed));
+    }
+  }
+  EXPECT_GE(keyframes, 500U);
+}
+
+TEST(WindowPolicies, NorWhereCamerasStartLateAndPosesAreMissing) {
+  std::size_t keyframes = 0;
+  for (FusionMapperOptions options : allPolicies()) {
+    options.keyframes.window_events = 40;
+    for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+      // Camera 1 begins anywhere: often in the gap of the poses, after camera 0 has started.
+      LongRecording recording(seed, 1.0, 100);
+      std::vector<Event>& late = recording.events[1];
+      late.erase(late.begin(), late.begin() + static_cast<std::ptrdiff_t>(seed * 7 % 80));
+      keyframes +=
+          expectTheSameHoweverCut(recording, options, "late camera, " + labelOf(options, seed));
+    }
+  }
+  EXPECT_GE(keyframes, 500U);
+}
+
+TEST(WindowPolicies, EveryEventIsCountedForWhatBecameOfIt) {
+  std::uint64_t used = 0;
+  std::uint64_t without_pose = 0;
+  std::uint64_t outside = 0;
+  for (const FusionMapperOptions& options : allPolicies()) {
+    for (std::uint32_t seed = 1; seed <= 3; ++seed) {
+      const LongRecording recording(seed, 1.0);
+      const Trajectory trajectory = recording.trajectory();
+      const Played played = play(recording, options, seed + 10);
+      std::uint64_t uses = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        EventCounts expected;
+        for (const Event& event : recording.events[c]) {
+          const std::int64_t t_ns = recording.timeOf(c, event);
+          const bool has_pose = trajectory.poseAt(t_ns).has_value();
+          const auto windows = static_cast<std::uint64_t>(std::count_if(
+              played.keyframes.begin(), played.keyframes.end(), [&](const auto& keyframe) {
+                return t_ns >= keyframe.window.t0_ns && t_ns < keyframe.window.t1_ns;
+              }));
+          ++expected.read;
+          if (c == 2) {
+            ++expected.dropped;
+          } else if (!options.limits.hold(t_ns)) {
+            ++expected.outside_window;
+          } else if (!has_pose) {
+            ++expected.without_pose;
+          } else if (windows == 0) {
+            ++expected.outside_window;
+          } else {
+            ++expected.used;
+            uses += windows;
+          }
+        }
+        const EventCounts& counts = played.counts.cameras[c];
+        EXPECT_EQ(counts.read, expected.read);
+        EXPECT_EQ(counts.used, expected.used) << labelOf(options, seed) << ", camera " << c;
+        EXPECT_EQ(counts.without_pose, expected.without_pose) << labelOf(options, seed);
+        EXPECT_EQ(counts.outside_window, expected.outside_window) << labelOf(options, seed);
+        EXPECT_EQ(counts.dropped, expected.dropped) << labelOf(options, seed);
+        EXPECT_EQ(counts.read, counts.used + counts.without_pose + counts.outside_window +
+                                   counts.dropped + counts.filtered);
+      }
+      EXPECT_EQ(played.counts.event_uses, uses) << labelOf(options, seed);
+      EXPECT_EQ(played.counts.votes.total(), uses * 4) << "of four planes";
+      EXPECT_EQ(played.counts.keyframes, played.keyframes.size());
+      used += played.counts.total().used;
+      without_pose += played.counts.total().without_pose;
+      outside += played.counts.total().outside_window;
+    }
+  }
+  EXPECT_GT(std::min({used, without_pose, outside}), 1000U) << "there is some of everything";
+}
+
+/// Times of all events of the selected cameras from the first one with a pose on, in order.
+std::vector<std::int64_t> eventTimes(const LongRecording& recording) {
+  const Trajectory trajectory = recording.trajectory();
+  std::vector<std::int64_t> times;
+  for (std::size_t c = 0; c < 2; ++c) {
+    for (const Event& event : recording.events[c]) times.push_back(recording.timeOf(c, event));
+  }
+  std::sort(times.begin(), times.end());
+  const auto start = std::find_if(times.begin(), times.end(), [&](std::int64_t t_ns) {
+    return trajectory.poseAt(t_ns).has_value();
+  });
+  return {start, times.end()};
+}
+
+/// Those that have a pose at their reference time.
+std::vector<Window> mappable(const std::vector<Window>& windows, const Trajectory& trajectory) {
+  std::vector<Window> result;
+  for (const Window& window : windows) {
+    if (trajectory.poseAt(window.t_ref_ns)) result.push_back(window);
+  }
+  return result;
+}
+
+void expectWindows(const Played& played, const std::vector<Window>& windows) {
+  ASSERT_EQ(played.keyframes.size(), windows.size());
+  for (std::size_t k = 0; k < windows.size(); ++k) {
+    EXPECT_EQ(played.keyframes[k].window.t0_ns, windows[k].t0_ns) << k;
+    EXPECT_EQ(played.keyframes[k].window.t1_ns, windows[k].t1_ns) << k;
+    EXPECT_EQ(played.keyframes[k].window.t_ref_ns, windows[k].t_ref_ns) << k;
+  }
+}
+
+TEST(WindowPolicies, WindowsOfANumberOfEventsFollowEachOtherAndTheRestIsNotMapped) {
+  for (std::uint32_t seed = 1; seed <= 4; ++seed) {
+    const LongRecording recording(seed, 1.0);
+    const std::vector<std::int64_t> times = eventTimes(recording);
+    const std::int64_t last_pose_ns = recording.poses.back().t_ns;
+    for (const std::size_t count : {1U, 37U, 700U, 2000U}) {
+      FusionMapperOptions options = playedOptions();
+      options.keyframes.policy = KeyframePolicyKind::kEvents;
+      options.keyframes.window_events = static_cast<std::int64_t>(count);
+      std::vector<Window> windows;
+      auto first = times.begin();
+      while (times.end() - first >= static_cast<std::ptrdiff_t>(count)) {
+        const std::int64_t last_ns = *(first + static_cast<std::ptrdiff_t>(count) - 1);
+        if (last_ns >= last_pose_ns) break;  // the poses don't cover it
+        windows.push_back({*first, last_ns + 1, *first + (last_ns + 1 - *first) / 2});
+        first = std::upper_bound(first, times.end(), last_ns);  // equal times belong to it too
+      }
+      EXPECT_GE(windows.size(), 2U);
+      if (count == 1) windows.resize(10);  // each keyframe costs something
+      if (count == 1) options.limits.t1_ns = windows.back().t1_ns;
+      expectWindows(play(recording, options, seed), mappable(windows, recording.trajectory()));
+    }
+  }
+}
+
+double meanDepth(const cv::Mat1f& depth) { return cv::mean(depth, depth > 0)[0]; }
+
+TEST(WindowPolicies, WindowsOfABaselineAreTheShortestThatReachItsShareOfTheMeanDepth) {
+  std::size_t keyframes = 0;
+  std::size_t different_lengths = 0;
+  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+    const LongRecording recording(seed, seed % 2 == 0 ? 2.0 : 0.7);
+    const std::vector<std::int64_t> times = eventTimes(recording);
+    const Trajectory trajectory = recording.trajectory();
+    FusionMapperOptions options = playedOptions();
+    options.keyframes.policy = KeyframePolicyKind::kBaseline;
+    options.keyframes.window_s = 0.1;
+    options.keyframes.stride_s = 0.012;
+    options.keyframes.min_baseline_ratio = 0.04;
+    options.keyframes.min_visible_share = 0;
+    options.keyframe.reference_camera = 1;
+    const Played played = play(recording, options, seed);
+
+    const auto centre = [&](std::int64_t t_ns) -> std::optional<Eigen::Vector3d> {
+      const auto T_world_rig = trajectory.poseAt(t_ns);
+      if (!T_world_rig) return std::nullopt;
+      return (*T_world_rig * recording.rig.cameras[1].T_rig_cam).translation;
+    };
+    double mean_depth_m = 2 / (1 / 0.5 + 1 / 4.0);
+    std::vector<Window> windows;
+    std::int64_t from_ns = times.front();
+    bool over = false;
+    while (!over) {
+      const auto first = std::lower_bound(times.begin(), times.end(), from_ns);
+      if (first == times.end() || *first >= recording.poses.back().t_ns) break;
+      const std::int64_t t0_ns = *first;
+      from_ns = t0_ns + 12'000'000;
+      for (int strides = 1; strides <= 8 && centre(t0_ns); ++strides) {
+        const std::int64_t t1_ns = t0_ns + strides * std::int64_t{12'000'000};
+        over = t1_ns > recording.poses.back().t_ns;
+        if (over) break;
+        if (!centre(t1_ns) || (*centre(t1_ns) - *centre(t0_ns)).norm() < 0.04 * mean_depth_m) {
+          continue;
+        }
+        windows.push_back({t0_ns, t1_ns, t0_ns + (t1_ns - t0_ns) / 2});
+        from_ns = t1_ns;
+        if (t1_ns - t0_ns != windows.front().t1_ns - windows.front().t0_ns) ++different_lengths;
+        for (const KeyframeDepthMap& keyframe : played.keyframes) {
+          if (keyframe.window.t0_ns != t0_ns || cv::countNonZero(keyframe.map.depth) == 0) continue;
+          mean_depth_m = meanDepth(keyframe.map.depth);
+        }
+        break;
+      }
+    }
+    expectWindows(played, mappable(windows, trajectory));
+    keyframes += played.keyframes.size();
+  }
+  EXPECT_GE(keyframes, 20U);
+  EXPECT_GE(different_lengths, 5U);
+}
+
+TEST(WindowPolicies, StandingStillTakesNoMemoryAndMakesNoKeyframe) {
+  constexpr std::int64_t kMs = LongRecording::kMs;
+  FusionMapperOptions options = playedOptions();
+  options.cameras = {};
+  options.keyframes.policy = KeyframePolicyKind::kBaseline;
+  options.keyframes.window_s = 0.1;
+  options.keyframes.stride_s = 0.02;
+  FusionMapper mapper(options);
+  mapper.addCamera({test::smallCamera(), {}, 0});
+  test::RandomScene random(1);
+  for (int packet = 0; packet < 500; ++packet) {  // 5 s of 10 events per millisecond
+    const std::int64_t t_ns = LongRecording::kStart_ns + packet * 10 * kMs;
+    mapper.addPose({t_ns, {}});
+    mapper.addEvents(0, random.events(test::smallCamera(), 100, t_ns, 10 * kMs));
+    EXPECT_FALSE(mapper.next());
+    const EventCounts counts = mapper.counts().total();
+    // Held: the longest window, a stride, the delay that events may have and the last packet.
+    EXPECT_LE(counts.read - counts.outside_window, 10U * (100 + 20 + 10 + 10));
+    EXPECT_LE(mapper.trajectory().poses().size(), 2U * (14 + 2)) << "freed by the half";
+  }
+  // Then the camera moves: 1 m/s and a mean depth of 8/9 m make 10 % in 89 ms.
+  std::vector<KeyframeDepthMap> keyframes;
+  for (int packet = 500; packet < 540; ++packet) {
+    const std::int64_t t_ns = LongRecording::kStart_ns + packet * 10 * kMs;
+    mapper.addPose({t_ns, {Eigen::Quaterniond::Identity(), {0.01 * (packet - 500), 0, 0}}});
+    mapper.addEvents(0, random.events(test::smallCamera(), 100, t_ns, 10 * kMs));
+    while (auto keyframe = mapper.next()) keyframes.push_back(std::move(*keyframe));
+  }
+  ASSERT_FALSE(keyframes.empty());
+  EXPECT_EQ(keyframes[0].window.t1_ns - keyframes[0].window.t0_ns, 100 * kMs);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/motion/velocity_correction.h"
+
+#include <gtest/gtest.h>
+
+#include "test/mapping/keyframes/random_recording.h"
+
+namespace efm {
+namespace {
+
+using test::RandomRecording;
+
+constexpr std::int64_t kMs = 1'000'000;
+
+void expectNear(const Rigid3& a, const Rigid3& b, double tolerance) {
+  EXPECT_LT((a.translation - b.translation).norm(), tolerance);
+  EXPECT_LT((a.rotation.conjugate() * b.rotation).vec().norm(), tolerance);
+}
+
+TEST(VelocityCorrection, ADisplacementIsManySmallOnes) {
+  const VelocityCorrection correction{{0.3, -0.2, 0.5}, {-1.2, 0.4, 0.7}};
+  constexpr int kSteps = 1000;
+  Rigid3 T_rig_true;
+  for (int i = 0; i < kSteps; ++i) {
+    T_rig_true = T_rig_true * correction.displacement(0.8 / kSteps);
+  }
+  expectNear(correction.displacement(0.8), T_rig_true, 1e-10);
+  expectNear(correction.displacement(-0.8), T_rig_true.inverse(), 1e-10);
+}
+
+TEST(VelocityCorrection, SmallTurnsAreAsExactAsLargeOnes) {
+  const Eigen::Vector3d linear_m_s(1, 2, 3);
+  for (const double rate : {0.999e-4, 1.001e-4}) {  // either side of where the series ends
+    const Rigid3 T_rig_true = VelocityCorrection{linear_m_s, {rate, 0, 0}}.displacement(1);
+    EXPECT_NEAR(T_rig_true.rotation.x(), std::sin(rate / 2), 1e-18);
+    EXPECT_NEAR(T_rig_true.translation.y(), 2 - 3 * rate / 2, 1e-8);
+  }
+}
+
+TEST(VelocityCorrection, TheReferencePoseStays) {
+  const RandomRecording recording(1, 1, 10);
+  const Window window = RandomRecording::kWindow;
+  const Trajectory corrected =
+      correctedTrajectory(recording.trajectory, window, {{0.5, 0, 0.1}, {0, 2, 1}});
+  const Rigid3 before = recording.trajectory.poseAt(window.t_ref_ns).value();
+  const Rigid3 after = corrected.poseAt(window.t_ref_ns).value();
+  EXPECT_EQ(before.translation, after.translation);
+  expectNear(before, after, 1e-15);
+}
+
+TEST(VelocityCorrection, PosesMoveByTheDisplacementSinceTheReference) {
+  const RandomRecording recording(2, 1, 10);
+  const Window window = RandomRecording::kWindow;
+  const VelocityCorrection correction{{0.05, -0.03, 0.02}, {0.1, -0.05, 0.08}};
+  const Trajectory corrected = correctedTrajectory(recording.trajectory, window, correction);
+  for (std::int64_t t_ns = window.t0_ns; t_ns < window.t1_ns; t_ns += 3 * kMs) {
+    const double since_s = 1e-9 * static_cast<double>(t_ns - window.t_ref_ns);
+    // Between poses 5 ms apart, which turn by at most 0.01, the line is not quite the screw.
+    expectNear(corrected.poseAt(t_ns).value(),
+               recording.trajectory.poseAt(t_ns).value() * correction.displacement(since_s), 2e-6);
+  }
+}
+
+TEST(VelocityCorrection, WhatHasNoPoseGetsNone) {
+  Trajectory trajectory;
+  for (const std::int64_t ms : {0, 40, 60, 500, 520}) trajectory.add({ms * kMs, {}});
+  const Window window{30 * kMs, 510 * kMs, 50 * kMs};
+  const Trajectory corrected = correctedTrajectory(trajectory, window, {{1, 0, 0}, {0, 0, 0}});
+  for (std::int64_t ms = 30; ms < 510; ms += 5) {
+    EXPECT_EQ(trajectory.poseAt(ms * kMs).has_value(), corrected.poseAt(ms * kMs).has_value())
+        << ms << " ms";
+  }
+}
+
+}  // namespace
+}  // namespace efm

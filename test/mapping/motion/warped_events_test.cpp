@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/motion/warped_events.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "test/mapping/keyframes/random_recording.h"
+
+namespace efm {
+namespace {
+
+using test::RandomRecording;
+
+/// A recording, a camera of it, and depths in its reference view.
+struct Warping {
+  RandomRecording recording{5, 1, 400};
+  const RigCamera& camera = recording.rig.cameras.front();
+  UndistortionTable undistortion{camera.model};
+  ReferenceView view = ReferenceView::of(camera.model);
+  DepthPlanes planes{{0.5, 4.0, 40, PlaneSpacing::kInverse}};
+  Window window = RandomRecording::kWindow;
+  Rigid3 T_world_ref = recording.trajectory.poseAt(window.t_ref_ns).value() * camera.T_rig_cam;
+
+  std::vector<WarpedEvent> warp(const cv::Mat1f& depth, const Trajectory& trajectory,
+                                EventSpan events) const {
+    const NearestDepths depths(depth, 0.5);
+    return warpEvents(
+        events, 1, camera, undistortion, trajectory,
+        {T_world_ref.inverse(), view, inversePlanes(planes), &depths, window.t_ref_ns});
+  }
+
+  /// Where an event's ray meets a plane of the reference view, said plainly.
+  Eigen::Vector2d pixelAt(const Event& event, double depth_m, const Rigid3& T_world_rig) const {
+    const Rigid3 T_ref_cam = T_world_ref.inverse() * T_world_rig * camera.T_rig_cam;
+    const Eigen::Vector3d far_ref =
+        T_ref_cam * Eigen::Vector3d(undistortion.ray(event.x, event.y).homogeneous());
+    const Eigen::Vector3d ray_ref = far_ref - T_ref_cam.translation;
+    return view.project(T_ref_cam.translation +
+                        (depth_m - T_ref_cam.translation.z()) / ray_ref.z() * ray_ref);
+  }
+};
+
+cv::Mat1f flat(const ReferenceView& view, float depth_m) {
+  return cv::Mat1f(view.height, view.width, depth_m);
+}
+
+TEST(WarpedEvents, AnEventLiesWhereItsRayMeetsTheDepth) {
+  const Warping warping;
+  constexpr float kDepth_m = 1.25F;  // between two planes
+  int warped = 0;
+  for (const Event& event : warping.recording.events.front()) {
+    const std::vector<Event> one = {event};
+    const auto found =
+        warping.warp(flat(warping.view, kDepth_m), warping.recording.trajectory, one);
+    if (found.empty()) continue;
+    ++warped;
+    const Rigid3 T_world_rig = warping.recording.trajectory.poseAt(event.t_ns).value();
+    const Eigen::Vector2d expected = warping.pixelAt(event, kDepth_m, T_world_rig);
+    EXPECT_LT((found.front().pixel.cast<double>() - expected).norm(), 1e-4);
+  }
+  EXPECT_GT(warped, 200);
+}
+
+TEST(WarpedEvents, DerivativesAreThoseOfThePlainWarp) {
+  const Warping warping;
+  constexpr double kDepth_m = 1.25;
+  constexpr double kStep = 1e-4;
+  for (const Event& event : warping.recording.events.front()) {
+    const std::vector<Event> one = {event};
+    const auto found = warping.warp(flat(warping.view, static_cast<float>(kDepth_m)),
+                                    warping.recording.trajectory, one);
+    if (found.empty()) continue;
+    const Rigid3 T_world_rig = warping.recording.trajectory.poseAt(event.t_ns).value();
+    const double since_s = 1e-9 * static_cast<double>(event.t_ns - warping.window.t_ref_ns);
+    for (int i = 0; i < 6; ++i) {
+      const auto moved = [&](double by) {
+        VelocityCorrection correction;
+        (i < 3 ? correction.linear_m_s : correction.angular_rad_s)[i % 3] = by;
+        return warping.pixelAt(event, kDepth_m, T_world_rig * correction.displacement(since_s));
+      };
+      const Eigen::Vector2d numeric = (moved(kStep) - moved(-kStep)) / (2 * kStep);
+      EXPECT_LT((found.front().by_velocity.col(i).cast<double>() - numeric).norm(),
+                1e-4 * (1 + numeric.norm()))
+          << "by number " << i;
+    }
+    const Eigen::Vector2d numeric =
+        (warping.pixelAt(event, 1 / (1 / kDepth_m + kStep), T_world_rig) -
+         warping.pixelAt(event, 1 / (1 / kDepth_m - kStep), T_world_rig)) /
+        (2 * kStep);
+    EXPECT_LT((found.front().by_inverse_depth.cast<double>() - numeric).norm(),
+              1e-4 * (1 + numeric.norm()));
+  }
+}
+
+TEST(WarpedEvents, WhatSawNoDepthIsLeftOut) {
+  const Warping warping;
+  const auto& events = warping.recording.events.front();
+  EXPECT_TRUE(warping.warp(flat(warping.view, 0), warping.recording.trajectory, events).empty());
+  EXPECT_TRUE(warping.warp(flat(warping.view, 50), warping.recording.trajectory, events).empty())
+      << "beyond the planes";
+  EXPECT_TRUE(warping.warp(flat(warping.view, 1), Trajectory(), events).empty()) << "no pose";
+}
+
+}  // namespace
+}  // namespace efm

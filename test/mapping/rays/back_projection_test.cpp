@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/rays/back_projection.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "test/mapping/keyframes/random_scene.h"
+
+namespace efm {
+namespace {
+
+using test::RandomScene;
+
+std::vector<Event> onePerPixel(const CameraModel& model) {
+  std::vector<Event> events;
+  for (int y = 0; y < model.height; ++y) {
+    for (int x = 0; x < model.width; ++x) {
+      events.push_back({0, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), true});
+    }
+  }
+  return events;
+}
+
+TEST(BackProjection, TheTransferMeetsEveryPlaneWhereTheRayItselfDoes) {
+  const CameraModel model = test::smallCamera();
+  const UndistortionTable undistortion(model);
+  const ReferenceView view = ReferenceView::of(model);
+  const std::vector<Event> events = onePerPixel(model);
+  RandomScene random(1);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Rigid3 T_ref_cam = random.pose(0.4, 0.5);
+    const RayBundle rays =
+        backProject(events, {{{0, events.size(), T_ref_cam}}, 0}, undistortion, view);
+    ASSERT_EQ(rays.packets.size(), 1U);
+    for (const double depth_m : {0.5, 1.0, 5.0, 80.0}) {
+      const PlaneTransfer transfer = transferToPlane(rays.packets[0], view, depth_m);
+      EXPECT_TRUE(transfer.in_front);
+      for (std::size_t i = 0; i < events.size(); ++i) {
+        const Eigen::Vector3d direction =
+            T_ref_cam.rotation * undistortion.ray(events[i].x, events[i].y).homogeneous();
+        const double along = (depth_m - T_ref_cam.translation.z()) / direction.z();
+        const Eigen::Vector2d exact = view.project(T_ref_cam.translation + along * direction);
+        const Eigen::Vector2d transferred(transfer.scale * rays.x_inf[i] + transfer.offset_x,
+                                          transfer.scale * rays.y_inf[i] + transfer.offset_y);
+        // Coordinates on the plane at infinity are floats, and computed in them.
+        EXPECT_NEAR((transferred - exact).norm(), 0, 2e-6 * (10 + exact.norm()));
+      }
+    }
+  }
+}
+
+/// A camera of the largest sensors, at an angle to the reference view that keyframes rarely reach.
+struct HdCamera {
+  CameraModel model{1280,
+                    720,
+                    905.0,
+                    904.0,
+                    641.3,
+                    357.8,
+                    DistortionModel::kRadtan,
+                    {-0.09, 0.06, 0.0004, -0.0003}};
+  UndistortionTable undistortion{model};
+  ReferenceView view = ReferenceView::of(model);
+};
+
+TEST(BackProjection, FloatsAreOffByLessThanAThousandthOfAPixelAtHd) {
+  const HdCamera hd;
+  const std::vector<Event> events = onePerPixel(hd.model);
+  RandomScene random(2);
+  for (int trial = 0; trial < 4; ++trial) {
+    const Rigid3 T_ref_cam = random.pose(0.4, 0.3);
+    const RayBundle rays =
+        backProject(events, {{{0, events.size(), T_ref_cam}}, 0}, hd.undistortion, hd.view);
+    ASSERT_EQ(rays.size(), events.size());
+    double largest_px = 0;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const Eigen::Vector3d ray_cam = hd.undistortion.ray(events[i].x, events[i].y).homogeneous();
+      const Eigen::Vector2d exact = hd.view.project(T_ref_cam.rotation * ray_cam);
+      const bool in_view = exact.x() >= 0 && exact.x() < hd.view.width && exact.y() >= 0 &&
+                           exact.y() < hd.view.height;
+      if (!in_view) continue;
+      const Eigen::Vector2d computed(rays.x_inf[i], rays.y_inf[i]);
+      largest_px = std::max(largest_px, (computed - exact).norm());
+    }
+    // Six roundings of 2^-24 each, of numbers up to 1280: 5e-4 where they all add up. A thousandth
+    // is a twentieth of what sharing poses may cost.
+    EXPECT_LT(largest_px, 1e-3);
+    EXPECT_GT(largest_px, 1e-6) << "something was compared";
+  }
+}
+
+TEST(BackProjection, RaysParallelToThePlanesAreNotFinite) {
+  CameraModel model = test::smallCamera();
+  model.distortion = DistortionModel::kNone;
+  model.coefficients.clear();
+  model.cx = 20;  // this column looks along z exactly
+  // A half turn around (x + z): what looked along z looks along x.
+  const Rigid3 T_ref_cam{Eigen::Quaterniond(0, std::sqrt(0.5), 0, std::sqrt(0.5)),
+                         Eigen::Vector3d::Zero()};
+  const std::vector<Event> events = onePerPixel(model);
+  PosePackets packets{{{0, events.size(), T_ref_cam}}, 0};
+  packets.packets[0].T_ref_cam.rotation.normalize();
+  const RayBundle rays =
+      backProject(events, packets, UndistortionTable(model), ReferenceView::of(model));
+  EXPECT_EQ(rays.size(), events.size());
+  const auto far_away = [](float x) { return !(std::abs(x) < 1e6F); };
+  EXPECT_EQ(std::count_if(rays.x_inf.begin(), rays.x_inf.end(), far_away), model.height);
+}
+
+TEST(BackProjection, ACameraCentreOnAPlaneIsNoSpecialCaseForTheOthers) {
+  const CameraModel model = test::smallCamera();
+  const ReferenceView view = ReferenceView::of(model);
+  const RayPacket packet{0, 1, {0.1, 0.2, 1.0}, true};
+  const PlaneTransfer on_plane = transferToPlane(packet, view, 1.0);
+  EXPECT_FALSE(on_plane.in_front);
+  EXPECT_TRUE(transferToPlane(packet, view, 1.0 + 1e-9).in_front);
+  EXPECT_FALSE(transferToPlane(packet, view, 0.5).in_front);
+}
+
+TEST(BackProjection, ACameraThatLooksBackSeesThePlanesBehindIt) {
+  const CameraModel model = test::smallCamera();
+  const ReferenceView view = ReferenceView::of(model);
+  // 3 m ahead of the reference view, looking back at it.
+  const Rigid3 T_ref_cam{Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitY())),
+                         {0, 0, 3}};
+  const std::vector<Event> events = onePerPixel(model);
+  const RayBundle rays =
+      backProject(events, {{{0, events.size(), T_ref_cam}}, 0}, UndistortionTable(model), view);
+  ASSERT_EQ(rays.packets.size(), 1U);
+  EXPECT_FALSE(rays.packets[0].forward);
+  EXPECT_TRUE(transferToPlane(rays.packets[0], view, 1.0).in_front);
+  EXPECT_FALSE(transferToPlane(rays.packets[0], view, 4.0).in_front);
+}
+
+TEST(BackProjection, APacketThatLooksBothWaysIsSplit) {
+  const CameraModel model = test::smallCamera();
+  const ReferenceView view = ReferenceView::of(model);
+  const Rigid3 T_ref_cam{Eigen::Quaterniond(Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY())),
+                         {0, 0, 0}};
+  const std::vector<Event> events = onePerPixel(model);
+  const RayBundle rays =
+      backProject(events, {{{0, events.size(), T_ref_cam}}, 0}, UndistortionTable(model), view);
+  ASSERT_EQ(rays.packets.size(), 2U);
+  EXPECT_TRUE(rays.packets[0].forward);
+  EXPECT_FALSE(rays.packets[1].forward);
+  EXPECT_EQ(rays.packets[1].begin, rays.packets[0].end);
+  EXPECT_EQ(rays.packets[1].end, events.size());
+}
+
+TEST(BackProjection, EachDirectionOfASplitPacketIsInTheOrderOfItsEvents) {
+  const CameraModel model = test::smallCamera();
+  const UndistortionTable undistortion(model);
+  const ReferenceView view = ReferenceView::of(model);
+  RandomScene random(3);
+  for (int trial = 0; trial < 20; ++trial) {
+    const Rigid3 T_ref_cam = random.pose(0.4, M_PI);
+    const std::vector<Event> events = random.events(model, 500, 0, 1'000'000);
+    const RayBundle rays =
+        backProject(events, {{{0, events.size(), T_ref_cam}}, 0}, undistortion, view);
+    std::size_t next = 0;
+    for (const bool forward : {true, false}) {
+      for (const Event& event : events) {
+        const Eigen::Vector3d direction =
+            T_ref_cam.rotation * undistortion.ray(event.x, event.y).homogeneous();
+        if ((direction.z() < 0) == forward) continue;
+        const Eigen::Vector2d exact = view.project(direction);
+        ASSERT_LT(next, rays.size());
+        EXPECT_NEAR(rays.x_inf[next], exact.x(), 1e-6 * (10 + exact.squaredNorm()));
+        EXPECT_NEAR(rays.y_inf[next], exact.y(), 1e-6 * (10 + exact.squaredNorm()));
+        ++next;
+      }
+    }
+    EXPECT_EQ(next, rays.size());
+  }
+}
+
+TEST(BackProjection, EventsBetweenPacketsAreLeftOut) {
+  const CameraModel model = test::smallCamera();
+  const std::vector<Event> events = onePerPixel(model);
+  const RayBundle rays = backProject(events, {{{10, 20, {}}, {30, 35, {}}}, 15},
+                                     UndistortionTable(model), ReferenceView::of(model));
+  EXPECT_EQ(rays.size(), 15U);
+  ASSERT_EQ(rays.packets.size(), 2U);
+  EXPECT_EQ(rays.packets[1].begin, 10U);
+  EXPECT_EQ(rays.packets[1].end, 15U);
+}
+
+}  // namespace
+}  // namespace efm

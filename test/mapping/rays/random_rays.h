@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core/types.hpp>
+#include <random>
+#include <vector>
+
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/rays/back_projection.h"
+#include "test/mapping/rays/chosen_rays.h"
+
+namespace efm::test {
+
+/// Random input of a sweep, from one seed.
+class RandomRays {
+ public:
+  explicit RandomRays(std::uint32_t seed) : random_(seed) {}
+
+  double uniform(double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random_);
+  }
+  int integer(int from, int to) { return std::uniform_int_distribution<int>(from, to)(random_); }
+
+  /// A view of some 60 to 120 degrees.
+  ReferenceView view(const cv::Size& size) {
+    const double focal = std::max(size.width, size.height) * uniform(0.3, 0.9);
+    return {size.width,
+            size.height,
+            focal,
+            focal * uniform(0.95, 1.05),
+            size.width * uniform(0.4, 0.6),
+            size.height * uniform(0.4, 0.6)};
+  }
+
+  DepthPlanes planes() {
+    const double nearest = uniform(0.2, 2);
+    return DepthPlanes({nearest, nearest * uniform(1.1, 20), integer(1, 30),
+                        uniform(0, 1) < 0.5 ? PlaneSpacing::kInverse : PlaneSpacing::kLinear});
+  }
+
+  /// Rays of packets of up to 200, around the view on some plane; every eighth looks backward. Half
+  /// of the bundles come from centres close to the view's, in others they are between the planes
+  /// and behind them too.
+  RayBundle bundle(const ReferenceView& view, const DepthPlanes& planes, int rays) {
+    const double nearest = planes.depth(0);
+    const double farthest = planes.depth(planes.size() - 1);
+    const bool calm = uniform(0, 1) < 0.5;
+    const double reach = calm ? 0.3 * nearest : 1.5 * farthest;
+    RayBundle bundle;
+    while (rays > 0) {
+      const int count = std::min(rays, integer(1, 200));
+      rays -= count;
+      RaySource source;
+      source.center_ref = reach * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+      source.forward = calm || integer(0, 7) != 0;
+      source.depth_m = planes.depth(integer(0, planes.size() - 1));
+      appendPacket(source, view, points(view, count), bundle);
+    }
+    return bundle;
+  }
+
+  /// In the view and a tenth of it around.
+  std::vector<Eigen::Vector2d> points(const ReferenceView& view, int count) {
+    std::vector<Eigen::Vector2d> points;
+    for (int i = 0; i < count; ++i) {
+      points.emplace_back(uniform(-0.1, 1.1) * view.width, uniform(-0.1, 1.1) * view.height);
+    }
+    return points;
+  }
+
+ private:
+  std::mt19937 random_;
+};
+
+}  // namespace efm::test

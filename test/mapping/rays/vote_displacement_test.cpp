@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/rays/vote_displacement.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test/mapping/keyframes/random_scene.h"
+
+namespace efm {
+namespace {
+
+using test::RandomScene;
+
+constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
+constexpr double kNear_m = 0.5;
+constexpr double kFar_m = 5.0;
+
+TEST(VoteGrid, VotesAreWhereTheRaysOfTheSensorMeetThePlanes) {
+  const CameraModel model = test::smallCamera();
+  const UndistortionTable undistortion(model);
+  const ReferenceView view = ReferenceView::of(model);
+  const VoteGrid grid(undistortion, view, kNear_m, kFar_m);
+  RandomScene random(1);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Rigid3 T_ref_cam = random.pose(2, M_PI);
+    const GridVotes votes = grid.votesFrom(T_ref_cam);
+    for (std::size_t i = 0; i < GridVotes::kVotes; ++i) {
+      const double depth_m = i < GridVotes::kRays ? kNear_m : kFar_m;
+      const auto place = static_cast<int>(i % GridVotes::kRays);
+      const int x = (place % 3) * (model.width - 1) / 2;
+      const int y = (place / 3) * (model.height - 1) / 2;
+      const Eigen::Vector3d direction = T_ref_cam.rotation * undistortion.ray(x, y).homogeneous();
+      const double along = (depth_m - T_ref_cam.translation.z()) / direction.z();
+      EXPECT_EQ(votes.in_front[i], along > 0);
+      const Eigen::Vector2d exact = view.project(T_ref_cam.translation + along * direction);
+      EXPECT_NEAR(votes.x[i], exact.x(), 1e-9 * (10 + exact.squaredNorm()));
+      EXPECT_NEAR(votes.y[i], exact.y(), 1e-9 * (10 + exact.squaredNorm()));
+    }
+  }
+}
+
+/// Votes in front of the camera and near the view, the first of them at (x, y).
+GridVotes votesWithOneAt(double x, double y) {
+  GridVotes votes;
+  votes.in_front.fill(true);
+  votes.near_view.fill(true);
+  votes.x[0] = x;
+  votes.y[0] = y;
+  return votes;
+}
+
+/// A stretch of 100 us in which one vote moves 10 px along x, a little faster towards the end.
+std::optional<VoteMotion> accelerated(const std::array<GridVotes, 3>& votes) {
+  return VoteMotion::between(kStart_ns, kStart_ns + 100'000, {&votes[0], &votes[1], &votes[2]});
+}
+
+TEST(VoteMotion, IsExactAlongAParabola) {
+  // x(t) = 9.5 t + 0.5 t^2 with t from 0 to 1.
+  const auto x = [](double t) { return 9.5 * t + 0.5 * t * t; };
+  const auto motion =
+      accelerated({votesWithOneAt(x(0), 3), votesWithOneAt(x(0.5), 3), votesWithOneAt(x(1), 3)});
+  ASSERT_TRUE(motion.has_value());
+  EXPECT_TRUE(motion->isEven());
+  EXPECT_NEAR(motion->fromMiddle(), x(1) - x(0.5), 1e-12);
+  EXPECT_NEAR(motion->between(kStart_ns, kStart_ns + 100'000), 10, 1e-9);
+  EXPECT_NEAR(motion->between(kStart_ns + 20'000, kStart_ns + 30'000), x(0.3) - x(0.2), 1e-9);
+}
+
+TEST(VoteMotion, IsNotEvenWhereTheSpeedChangesMuch) {
+  const auto motion =
+      accelerated({votesWithOneAt(0, 0), votesWithOneAt(4, 0), votesWithOneAt(10, 0)});
+  ASSERT_TRUE(motion.has_value());
+  EXPECT_FALSE(motion->isEven());
+}
+
+TEST(VoteMotion, OfAVoteThatComesOrGoesIsUnknown) {
+  std::array<GridVotes, 3> votes{votesWithOneAt(0, 0), votesWithOneAt(5, 0), votesWithOneAt(10, 0)};
+  votes[2].in_front[7] = false;
+  EXPECT_FALSE(accelerated(votes).has_value());
+}
+
+TEST(VoteMotion, FarFromTheViewCountsOnlyWhereNothingIsNearer) {
+  std::array<GridVotes, 3> votes{votesWithOneAt(0, 0), votesWithOneAt(5, 0), votesWithOneAt(10, 0)};
+  for (GridVotes& at_one_time : votes) at_one_time.near_view[0] = false;
+  EXPECT_EQ(accelerated(votes)->fromMiddle(), 0);
+  for (GridVotes& at_one_time : votes) at_one_time.near_view.fill(false);
+  EXPECT_EQ(accelerated(votes)->fromMiddle(), 5);
+}
+
+}  // namespace
+}  // namespace efm

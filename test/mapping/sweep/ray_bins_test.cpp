@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/sweep/ray_bins.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "mapping/sweep/tile_accumulator.h"
+#include "mapping/sweep/view_tiles.h"
+#include "test/mapping/kernels/fast_kernels.h"
+#include "test/mapping/rays/chosen_rays.h"
+#include "test/mapping/rays/random_rays.h"
+
+namespace efm {
+namespace {
+
+using test::RandomRays;
+
+/// Where a ray is on the first and on the last plane of a group, exactly; NaN behind its camera.
+struct RayPath {
+  Eigen::Vector2d first;
+  Eigen::Vector2d last;
+};
+
+/// A coordinate is rounded to 1/4096 px on the home plane, from where its error may double; and as
+/// floats of up to 8192 px in four steps.
+constexpr double kRounding_px = 2.0 / 4096 + 4 * 0.5 / 1024;
+/// Rays this far from a tile need not be gathered; those farther must not be.
+constexpr double kNear_px = 0.05;
+
+Eigen::Vector2d placeOf(const RayBundle& rays, const RayPacket& packet, std::size_t ray,
+                        const ReferenceView& view, double depth_m) {
+  const PlaneTransfer to = transferToPlane(packet, view, depth_m);
+  if (!to.in_front) return Eigen::Vector2d::Constant(std::nan(""));
+  return {to.scale * double{rays.x_inf[ray]} + to.offset_x,
+          to.scale * double{rays.y_inf[ray]} + to.offset_y};
+}
+
+std::vector<RayPath> pathsOf(const RayBundle& rays, const ReferenceView& view,
+                             const PlaneGroup& group) {
+  std::vector<RayPath> paths;
+  for (const RayPacket& packet : rays.packets) {
+    for (std::size_t i = packet.begin; i < packet.end; ++i) {
+      paths.push_back({placeOf(rays, packet, i, view, group.first_depth_m),
+                       placeOf(rays, packet, i, view, group.last_depth_m)});
+    }
+  }
+  return paths;
+}
+
+/// Whether the straight path comes within a margin of the box around the cells: negative for those
+/// that certainly are inside on some plane. Along each axis by itself, as rays are gathered.
+bool passes(const RayPath& path, const cv::Rect& cells, double margin) {
+  const Eigen::Vector2d least = path.first.cwiseMin(path.last);
+  const Eigen::Vector2d most = path.first.cwiseMax(path.last);
+  return most.x() >= cells.x - margin && least.x() < cells.br().x + margin &&
+         most.y() >= cells.y - margin && least.y() < cells.br().y + margin;
+}
+
+/// Whether the ray is inside the cells at one of a hundred places between the two planes.
+bool votesIn(const RayPath& path, const cv::Rect& cells) {
+  for (int step = 0; step <= 100; ++step) {
+    const Eigen::Vector2d place = path.first + step * 0.01 * (path.last - path.first);
+    if (place.x() >= cells.x && place.x() < cells.br().x && place.y() >= cells.y &&
+        place.y() < cells.br().y) {
+      return true;
+    }
+  }
+  return false;
+}
+
+class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
+ protected:
+  /// What a tile finds of a bundle, each ray as its path.
+  std::vector<RayPath> gather(const std::vector<RayBins>& all, const TileVoter& voter,
+                              const PlaneGroup& group, const DepthPlanes& planes) const {
+    TileRays found;
+    for (const RayBins& bins : all) {
+      bins.gather(bins.reachIn(group), voter.cells(), voter.origin(), functions_, found);
+    }
+    const double to_first = 1 / group.first_depth_m - RayBins::middleOf(planes);
+    const double to_last = 1 / group.last_depth_m - RayBins::middleOf(planes);
+    const Eigen::Vector2d origin(voter.origin().x, voter.origin().y);
+    std::vector<RayPath> paths;
+    const kernels::TileRays rays = found.view();
+    for (std::size_t i = 0; i < rays.size; ++i) {
+      const Eigen::Vector2d home(rays.x[i], rays.y[i]);
+      const Eigen::Vector2d shift(rays.dx[i], rays.dy[i]);
+      paths.push_back({origin + (home + to_first * shift) / (1 << kernels::kFractionBits),
+                       origin + (home + to_last * shift) / (1 << kernels::kFractionBits)});
+    }
+    return paths;
+  }
+
+  /// Every ray that votes in some tile is found there, once, where it is; others are not.
+  void expectEveryRayOnce(const RayBundle& rays, const ReferenceView& view,
+                          const DepthPlanes& planes, int planes_per_group) const {
+    const std::vector<RayBins> all = RayBins::sort(rays, view, planes);
+    const bool on_all_planes =
+        std::all_of(all.begin(), all.end(), [](const RayBins& bins) { return bins.onAllPlanes(); });
+    if (!on_all_planes) planes_per_group = 1;
+    TileVoter voter(GetParam());
+    for (int begin = 0; begin < planes.size(); begin += planes_per_group) {
+      const int end = std::min(planes.size(), begin + planes_per_group);
+      const PlaneGroup group{begin, end, planes.depth(begin), planes.depth(end - 1)};
+      const std::vector<RayPath> paths = pathsOf(rays, view, group);
+      for (const cv::Rect& tile : tilesOf(view, TileVoter::kTilePixels)) {
+        voter.moveTo(tile, view);
+        SCOPED_TRACE(testing::Message() << "tile " << tile.x << ", " << tile.y << ", planes "
+                                        << begin << " to " << end - 1);
+        expectMatch(paths, gather(all, voter, group, planes), voter.cells());
+      }
+    }
+  }
+
+  static void expectMatch(const std::vector<RayPath>& paths, const std::vector<RayPath>& found,
+                          const cv::Rect& cells) {
+    std::vector<bool> taken(paths.size(), false);
+    for (const RayPath& ray : found) {
+      std::size_t match = 0;
+      while (match < paths.size() && (taken[match] || !isAt(ray, paths[match]))) ++match;
+      ASSERT_LT(match, paths.size()) << "found twice or nowhere: " << ray.first.transpose();
+      taken[match] = true;
+      ASSERT_TRUE(passes(paths[match], cells, kNear_px)) << ray.first.transpose();
+    }
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+      ASSERT_TRUE(taken[i] || !votesIn(paths[i], cells))
+          << "missed: " << paths[i].first.transpose() << " to " << paths[i].last.transpose();
+    }
+  }
+
+  static bool isAt(const RayPath& found, const RayPath& path) {
+    const double off = std::max((found.first - path.first).cwiseAbs().maxCoeff(),
+                                (found.last - path.last).cwiseAbs().maxCoeff());
+    return off <= kRounding_px;  // fails behind the camera
+  }
+
+  const kernels::TileFunctions& functions_ = kernels::tileFunctions(GetParam());
+};
+
+INSTANTIATE_TEST_SUITE_P(Kernels, RayBinsOn, ::testing::ValuesIn(test::fastKernels()),
+                         test::nameOfKernel);
+
+constexpr ReferenceView kView{150, 100, 90, 95, 70, 52};
+
+/// Rays of one packet at each centre, which fill the view on planes in turn.
+RayBundle raysFrom(const std::vector<RayPacket>& sources, const DepthPlanes& planes,
+                   RandomRays& random) {
+  RayBundle bundle;
+  int plane = 0;
+  for (const RayPacket& source : sources) {
+    for (int tries = 0; tries < planes.size(); ++tries, ++plane) {
+      const double depth_m = planes.depth(plane % planes.size());
+      if (!transferToPlane(source, kView, depth_m).in_front) continue;
+      test::appendPacket({source.center_ref, source.forward, depth_m}, kView,
+                         random.points(kView, 60), bundle);
+    }
+  }
+  return bundle;
+}
+
+TEST_P(RayBinsOn, ATileFindsEachRayThatItSeesOnceWhereCamerasAreBeforeAllPlanes) {
+  const DepthPlanes planes({0.5, 5, 12, PlaneSpacing::kInverse});
+  for (std::uint32_t seed = 1; seed <= 2; ++seed) {
+    RandomRays random(seed);
+    std::vector<RayPacket> sources;
+    for (int i = 0; i < 4; ++i) {
+      sources.push_back(
+          {0,
+           0,
+           {random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), random.uniform(-0.4, 0.4)},
+           true});
+    }
+    const RayBundle rays = raysFrom(sources, planes, random);
+    for (const int planes_per_group : {1, 5, 12}) {
+      expectEveryRayOnce(rays, kView, planes, planes_per_group);
+    }
+  }
+}
+
+TEST_P(RayBinsOn, ATileFindsEachRayThatItSeesOnceWhereCamerasAreBetweenPlanesAndBehindThem) {
+  const DepthPlanes planes({0.5, 5, 6, PlaneSpacing::kLinear});
+  RandomRays random(4);
+  const RayBundle rays = raysFrom({{0, 0, {0.1, 0, 0.95}, true},
+                                   {0, 0, {0.1, 0.2, 0.95}, false},
+                                   {0, 0, {-0.3, 0.1, 3.6}, true},
+                                   {0, 0, {-0.3, 0.1, 3.6}, false},
+                                   {0, 0, {0.2, 0.2, 9}, false},
+                                   {0, 0, {0, 0.2, -0.1}, true}},
+                                  planes, random);
+  expectEveryRayOnce(rays, kView, planes, 1);
+}
+
+TEST_P(RayBinsOn, ATileFindsEachRayThatItSeesOnceWhereRaysMoveFartherThanBinsReach) {
+  const DepthPlanes planes({0.5, 5, 5, PlaneSpacing::kInverse});
+  RandomRays random(5);
+  const RayBundle rays =
+      raysFrom({{0, 0, {26, 0, 0}, true}, {0, 0, {-30, 25, 0.2}, true}}, planes, random);
+  expectEveryRayOnce(rays, kView, planes, 1);
+}
+
+TEST(RayBins, NoRayInTheViewMovesFasterThanTheFastestShift) {
+  const DepthPlanes planes({0.5, 5, 10, PlaneSpacing::kInverse});
+  RandomRays random(6);
+  for (int i = 0; i < 50; ++i) {
+    const RayPacket source{
+        0, 0, {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 0.4)}, true};
+    const RayBundle rays = raysFrom({source}, planes, random);
+    for (const RayBins& bins : RayBins::sort(rays, kView, planes)) {
+      ASSERT_TRUE(bins.onAllPlanes());
+      const double range = 1 / planes.depth(0) - 1 / planes.depth(9);
+      for (const RayPath& path : pathsOf(rays, kView, {0, 10, planes.depth(0), planes.depth(9)})) {
+        if (!votesIn(path, {0, 0, kView.width, kView.height})) continue;
+        ASSERT_LE((path.first - path.last).cwiseAbs().maxCoeff(),
+                  bins.fastestShift() * range + 1e-3);
+      }
+    }
+  }
+}
+
+TEST(RayBins, RaysThatAreOnNoPlaneOrOutsideOnAllAreLeftOut) {
+  const DepthPlanes planes({0.5, 5, 10, PlaneSpacing::kInverse});
+  RayBundle behind;
+  test::appendPacket({{0, 0, 6}, true, 7}, kView, {{70, 50}}, behind);
+  EXPECT_TRUE(RayBins::sort(behind, kView, planes).empty());
+  EXPECT_TRUE(RayBins::sort(RayBundle(), kView, planes).empty());
+}
+
+}  // namespace
+}  // namespace efm

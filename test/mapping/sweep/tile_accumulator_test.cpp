@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/sweep/tile_accumulator.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "mapping/kernels/bilinear_vote.h"
+#include "mapping/sweep/view_tiles.h"
+#include "test/mapping/kernels/fast_kernels.h"
+
+namespace efm {
+namespace {
+
+using Points = std::vector<Eigen::Vector2d>;
+
+constexpr float kUnit = 1 << kernels::kFractionBits;
+constexpr double kLastFraction = 4095.0 / 4096;
+
+/// Three tiles by three, the last of which ends at the view's border.
+const ReferenceView kView{150, 130, 100, 100, 75, 65};
+
+struct TileVotes {
+  std::vector<float> density;
+  std::uint64_t votes = 0;
+};
+
+/// Where rays meet a plane, for a tile to vote there.
+TileRays raysAt(const Points& points, const cv::Point& origin) {
+  TileRays rays;
+  rays.reserve(points.size());
+  const kernels::TileRays to = rays.view();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    to.x[i] = static_cast<float>(points[i].x() - origin.x) * kUnit;
+    to.y[i] = static_cast<float>(points[i].y() - origin.y) * kUnit;
+    to.dx[i] = to.dy[i] = 0;
+  }
+  rays.resize(points.size());
+  rays.pad();
+  return rays;
+}
+
+TileVotes voteWith(TileVoter& voter, const cv::Rect& tile, const Points& points) {
+  voter.moveTo(tile, kView);
+  TileRays rays = raysAt(points, voter.origin());
+  TileVotes result{std::vector<float>(static_cast<std::size_t>(tile.area()), -1.0F), 0};
+  result.votes = voter.vote(rays, 0, result.density.data());
+  return result;
+}
+
+/// The whole view, tile by tile.
+TileVotes voteOnView(VotingKernel kernel, const Points& points) {
+  TileVoter voter(kernel);
+  TileVotes all{std::vector<float>(kView.pixels(), -1.0F), 0};
+  for (const cv::Rect& tile : tilesOf(kView, TileVoter::kTilePixels)) {
+    const TileVotes part = voteWith(voter, tile, points);
+    for (int y = 0; y < tile.height; ++y) {
+      std::copy_n(part.density.begin() + y * tile.width, tile.width,
+                  all.density.begin() + (tile.y + y) * kView.width + tile.x);
+    }
+    all.votes += part.votes;
+  }
+  return all;
+}
+
+/// The plain kernel's votes one by one, summed in doubles: many equal floats add up to another sum.
+struct ExactVotes {
+  std::vector<double> density;
+  std::uint64_t votes = 0;
+};
+
+ExactVotes votePlainly(const Points& points) {
+  ExactVotes all{std::vector<double>(kView.pixels(), 0.0), 0};
+  std::vector<float> plane(kView.pixels(), 0.0F);
+  for (const Eigen::Vector2d& point : points) {
+    const auto x = static_cast<float>(point.x());
+    const auto y = static_cast<float>(point.y());
+    if (kernels::votePlain({&x, &y}, {0, 1, 1, 0, 0}, {plane.data(), kView.width, kView.height}) ==
+        0) {
+      continue;
+    }
+    ++all.votes;
+    const auto corner = static_cast<std::size_t>(y) * 150 + static_cast<std::size_t>(x);
+    for (const std::size_t pixel : {corner, corner + 1, corner + 150, corner + 151}) {
+      all.density[pixel] += double{plane[pixel]};
+      plane[pixel] = 0;
+    }
+  }
+  return all;
+}
+
+/// @param per_vote how far a weight may be off.
+void expectPlainVotes(VotingKernel kernel, const Points& points, double per_vote) {
+  const TileVotes fast = voteOnView(kernel, points);
+  const ExactVotes plain = votePlainly(points);
+  EXPECT_EQ(fast.votes, plain.votes);
+  for (std::size_t i = 0; i < plain.density.size(); ++i) {
+    // A vote's float weights, and sums of full cells: one rounding for each of 64 votes at most.
+    const double rounding = 1.2e-7 * (1 + static_cast<double>(points.size()) / 64);
+    ASSERT_NEAR(fast.density[i], plain.density[i],
+                per_vote * static_cast<double>(points.size()) + rounding * (1 + plain.density[i]))
+        << "at " << i % 150 << ", " << i / 150 << ", first ray at " << points.front().transpose();
+  }
+}
+
+/// The products of fractions are cut to this.
+constexpr double kProductUnit = 1.0 / (1 << kernels::kProductBits);
+
+class TileVoterOn : public ::testing::TestWithParam<VotingKernel> {};
+
+INSTANTIATE_TEST_SUITE_P(Kernels, TileVoterOn, ::testing::ValuesIn(test::fastKernels()),
+                         test::nameOfKernel);
+
+TEST_P(TileVoterOn, AVoteIsSharedBilinearlyAmongFourPixels) {
+  const TileVotes votes = voteOnView(GetParam(), {{1.25, 0.5}});
+  EXPECT_EQ(votes.votes, 1U);
+  EXPECT_EQ(votes.density[1], 0.375F);
+  EXPECT_EQ(votes.density[2], 0.125F);
+  EXPECT_EQ(votes.density[151], 0.375F);
+  EXPECT_EQ(votes.density[152], 0.125F);
+  EXPECT_EQ(std::accumulate(votes.density.begin(), votes.density.end(), 0.0F), 1.0F);
+}
+
+TEST_P(TileVoterOn, ThousandsOfVotesInOneVoxelAreThePlainKernelsAndAllCounted) {
+  // Tiles begin at columns 50 and 100, and at rows 43 and 86.
+  for (const auto& corner : Points{{20, 20},
+                                   {0, 0},
+                                   {49, 42},
+                                   {50, 43},
+                                   {48, 41},
+                                   {49, 10},
+                                   {50, 10},
+                                   {10, 85},
+                                   {10, 86},
+                                   {148, 0},
+                                   {0, 128},
+                                   {148, 128}}) {
+    for (const auto& [fraction, product_fits] :
+         std::vector<std::pair<Eigen::Vector2d, bool>>{{{0, 0}, true},
+                                                       {{0.5, 0.5}, true},
+                                                       {{0.25, 0.75}, true},
+                                                       {{0, kLastFraction}, true},
+                                                       {{kLastFraction, 0}, true},
+                                                       {{1.0 / 4096, 1.0 / 4096}, false},
+                                                       {{0.3330078125, 0.7001953125}, false},
+                                                       {{kLastFraction, kLastFraction}, false}}) {
+      expectPlainVotes(GetParam(), Points(10'000, corner + fraction),
+                       product_fits ? 0 : kProductUnit);
+    }
+  }
+}
+
+TEST_P(TileVoterOn, ACellMayFillUpAtAnyVote) {
+  for (const std::size_t votes :
+       {1U, 62U, 63U, 64U, 65U, 127U, 128U, 129U, 191U, 192U, 255U, 256U, 257U, 4096U}) {
+    for (const double fraction : {0.0, 0.5, kLastFraction}) {
+      expectPlainVotes(GetParam(), Points(votes, {30 + fraction, 20 + fraction}), kProductUnit);
+    }
+  }
+}
+
+TEST_P(TileVoterOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
+  constexpr int kVotes = 65;
+  const cv::Rect tile(20, 20, TileVoter::kTilePixels, TileVoter::kTilePixels);
+  for (const double fraction : {0.0, 0.25, kLastFraction}) {
+    Points points;
+    for (int vote = 0; vote < kVotes; ++vote) {
+      for (int y = 0; y < kernels::kTileCells; ++y) {
+        for (int x = 0; x < kernels::kTileCells; ++x) {
+          points.emplace_back(19 + x + fraction, 19 + y + fraction);
+        }
+      }
+    }
+    TileVoter voter(GetParam());
+    const TileVotes votes = voteWith(voter, tile, points);
+    EXPECT_EQ(votes.votes, std::uint64_t{kVotes} * 63 * 63);
+    // The four weights around a pixel are those of one vote, whatever the fraction.
+    for (const float density : votes.density) ASSERT_NEAR(density, kVotes, 1e-4) << fraction;
+  }
+}
+
+TEST_P(TileVoterOn, RandomVotesAreThePlainKernelsToWithinTheirRounding) {
+  std::mt19937 random(1);
+  for (const std::size_t count : {1U, 15U, 16U, 17U, 300U, 20'000U}) {
+    std::uniform_int_distribution<int> x(-10 * 4096, 160 * 4096);
+    std::uniform_int_distribution<int> y(-10 * 4096, 140 * 4096);
+    Points points;
+    for (std::size_t i = 0; i < count; ++i) {
+      points.emplace_back(x(random) / 4096.0, y(random) / 4096.0);
+    }
+    const TileVotes fast = voteOnView(GetParam(), points);
+    const ExactVotes plain = votePlainly(points);
+    EXPECT_EQ(fast.votes, plain.votes);
+    for (std::size_t i = 0; i < plain.density.size(); ++i) {
+      // Some four votes around a pixel: a dozen at most.
+      ASSERT_NEAR(fast.density[i], plain.density[i], 12 * kProductUnit) << "of " << count;
+    }
+  }
+}
+
+TEST_P(TileVoterOn, ARayOnABorderOfTilesOrTheViewIsCountedOnceAndFallsWhereThePlainKernelsDoes) {
+  std::vector<double> columns;
+  for (const double border : {0.0, 49.0, 50.0, 99.0, 100.0, 148.0, 149.0}) {
+    for (const double off : {-1.0 / 4096, 0.0, 1.0 / 4096}) columns.push_back(border + off);
+  }
+  std::vector<double> rows;
+  for (const double border : {0.0, 42.0, 43.0, 85.0, 86.0, 128.0, 129.0}) {
+    for (const double off : {-1.0 / 4096, 0.0, 1.0 / 4096}) rows.push_back(border + off);
+  }
+  for (const double x : columns) {
+    for (const double y : rows) expectPlainVotes(GetParam(), {{x, y}}, kProductUnit);
+  }
+}
+
+TEST_P(TileVoterOn, ARayThatIsNowhereNearOrNoNumberVotesNowhere) {
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double wrong : {kNan, -kNan, kInfinity, -kInfinity, 1e30, -1e30, 1e6, -1e6, 2048.0,
+                             -2048.0, 1024.0, -1024.0, 4096.0, 1048576.0, -1048576.0}) {
+    for (const auto& point : Points{{wrong, 20}, {20, wrong}, {wrong, wrong}}) {
+      const TileVotes votes = voteOnView(GetParam(), Points(100, point));
+      EXPECT_EQ(votes.votes, 0U) << wrong;
+      EXPECT_EQ(std::accumulate(votes.density.begin(), votes.density.end(), 0.0F), 0) << wrong;
+    }
+  }
+}
+
+TEST_P(TileVoterOn, RaysMoveAlongTheirShiftToThePlane) {
+  TileVoter voter(GetParam());
+  const cv::Rect tile(0, 0, 50, 43);
+  voter.moveTo(tile, kView);
+  TileRays rays = raysAt({{10, 10}}, voter.origin());
+  rays.view().dx[0] = 4 * kUnit;
+  rays.view().dy[0] = -2 * kUnit;
+  std::vector<float> density(static_cast<std::size_t>(tile.area()), -1.0F);
+  for (const double to_plane : {-1.0, 0.0, 0.5, 4.0}) {
+    EXPECT_EQ(voter.vote(rays, to_plane, density.data()), 1U);
+    const int x = static_cast<int>(10 + 4 * to_plane);
+    const int y = static_cast<int>(10 - 2 * to_plane);
+    EXPECT_EQ(density[static_cast<std::size_t>(y * tile.width + x)], 1.0F) << to_plane;
+  }
+}
+
+TEST_P(TileVoterOn, NothingIsLeftOfEarlierTilesAndPlanes) {
+  TileVoter used(GetParam());
+  const cv::Rect large(0, 0, 63, 63);
+  for (const cv::Rect tile : {large, cv::Rect(100, 100, 1, 1), cv::Rect(149, 0, 1, 63),
+                              cv::Rect(60, 129, 17, 1), cv::Rect(148, 128, 2, 2), large}) {
+    Points full;  // of the tile and of its neighbours
+    for (int vote = 0; vote < 70; ++vote) {
+      for (int y = tile.y - 2; y <= tile.br().y + 2; ++y) {
+        for (int x = tile.x - 2; x <= tile.br().x + 2; ++x) full.emplace_back(x + 0.5, y + 0.5);
+      }
+    }
+    voteWith(used, tile, full);
+    const Points few = {
+        {1.0 * tile.x, 1.0 * tile.y}, {tile.x + 0.5, tile.y + 0.25}, {tile.x - 0.5, tile.y - 0.5}};
+    TileVoter unused(GetParam());
+    const TileVotes after = voteWith(used, tile, few);
+    const TileVotes alone = voteWith(unused, tile, few);
+    EXPECT_EQ(after.votes, alone.votes) << "tile " << tile.x << ", " << tile.y;
+    EXPECT_EQ(after.density, alone.density) << "tile " << tile.x << ", " << tile.y;
+  }
+}
+
+TEST(CellSums, UnpackingFindsEveryFieldOfAFullCell) {
+  const std::uint64_t most = kernels::kVotesPerCell;
+  const std::uint64_t a = most * 4095;
+  const std::uint64_t b = most * 4094;
+  const std::uint64_t ab = most * 32'767;
+  const kernels::CellSums sums = kernels::unpack(a | b << 18 | ab << 36 | most << 57);
+  EXPECT_EQ(sums.a, a);
+  EXPECT_EQ(sums.b, b);
+  EXPECT_EQ(sums.ab, ab);
+  EXPECT_EQ(sums.votes, most);
+}
+
+TEST(CellSums, NoFieldReachesIntoAnother) {
+  EXPECT_EQ(kernels::unpack((1U << 18) - 1).b, 0U);
+  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 18) - 1) << 18).a, 0U);
+  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 18) - 1) << 18).ab, 0U);
+  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 21) - 1) << 36).b, 0U);
+  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 21) - 1) << 36).votes, 0U);
+  EXPECT_EQ(kernels::unpack(std::uint64_t{127} << 57).ab, 0U);
+  EXPECT_EQ(kernels::unpack(std::uint64_t{127} << 57).votes, 127U);
+}
+
+}  // namespace
+}  // namespace efm

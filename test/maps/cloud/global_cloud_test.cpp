@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/cloud/global_cloud.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <random>
+#include <set>
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+
+using Keyframes = std::vector<std::vector<CloudPoint>>;
+
+std::vector<CloudPoint> randomPoints(std::mt19937& random, int count, double extent_m) {
+  std::uniform_real_distribution<double> coordinate(-extent_m, extent_m);
+  std::uniform_real_distribution<float> confidence(0.1F, 20.0F);
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < count; ++i) {
+    points.push_back(
+        {{coordinate(random), coordinate(random), coordinate(random)}, confidence(random)});
+  }
+  return points;
+}
+
+GlobalCloud cloudOf(const Keyframes& keyframes, const std::vector<std::size_t>& order,
+                    const GlobalCloudOptions& options) {
+  GlobalCloud cloud(options);
+  for (const std::size_t number : order) cloud.insert(number, keyframes[number]);
+  return cloud;
+}
+
+void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].p_world, b[i].p_world) << "point " << i;
+    EXPECT_EQ(a[i].confidence, b[i].confidence) << "point " << i;
+    EXPECT_EQ(a[i].support, b[i].support) << "point " << i;
+  }
+}
+
+TEST(GlobalCloud, MeanOfAVoxelIsWorkedOutByHand) {
+  GlobalCloud cloud({1.0, 1});
+  // Weights 1 and 3 at x = 0.2 and 0.6: mean (0.2 + 3 * 0.6) / 4 = 0.5; confidence (1 + 3) / 2 = 2.
+  cloud.insert(0, {{{0.2, 0.5, 0.5}, 1.0F}});
+  cloud.insert(1, {{{0.6, 0.5, 0.5}, 3.0F}, {{-0.5, 0.5, 0.5}, 1.0F}});
+
+  const std::vector<CloudPoint> points = cloud.points();
+
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_NEAR(points[0].p_world.x(), -0.5, 1e-15);
+  EXPECT_EQ(points[0].support, 1U);
+  EXPECT_NEAR(points[1].p_world.x(), 0.5, 1e-15);
+  EXPECT_NEAR(points[1].p_world.y(), 0.5, 1e-15);
+  EXPECT_FLOAT_EQ(points[1].confidence, 2.0F);
+  EXPECT_EQ(points[1].support, 2U);
+}
+
+TEST(GlobalCloud, SupportCountsKeyframesNotPoints) {
+  GlobalCloud cloud({1.0, 1});
+  cloud.insert(5, {{{0.1, 0, 0}, 1.0F}, {{0.2, 0, 0}, 1.0F}, {{0.3, 0, 0}, 1.0F}});
+
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_EQ(cloud.points()[0].support, 1U);
+}
+
+TEST(GlobalCloud, ExportKeepsWhatEnoughKeyframesSupport) {
+  GlobalCloud cloud({1.0, 2});
+  cloud.insert(0, {{{0.5, 0.5, 0.5}, 1.0F}, {{5.5, 0.5, 0.5}, 1.0F}});
+  cloud.insert(1, {{{0.5, 0.5, 0.5}, 1.0F}});
+
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_EQ(cloud.points()[0].p_world.x(), 0.5);
+  EXPECT_EQ(cloud.points(1).size(), 2U);
+  EXPECT_EQ(cloud.points(3).size(), 0U);
+  EXPECT_EQ(cloud.voxels(), 2U);
+}
+
+RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const double voxel_m = *rc::gen::element(0.05, 0.3, 1.0);
+  Keyframes keyframes;
+  GlobalCloud cloud({voxel_m, 1});
+  for (int k = 0; k < *rc::gen::inRange(1, 6); ++k) {
+    keyframes.push_back(randomPoints(random, *rc::gen::inRange(0, 200), 2.0));
+    cloud.insert(static_cast<std::uint64_t>(k), keyframes.back());
+  }
+
+  struct Mean {
+    double weight = 0, x = 0, y = 0, z = 0;
+    int count = 0;
+    std::set<std::size_t> keyframes;
+  };
+  std::map<std::array<long, 3>, Mean> means;
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    for (const CloudPoint& point : keyframes[k]) {
+      std::array<long, 3> index{};
+      for (std::size_t i = 0; i < 3; ++i) {
+        index[i] = std::lround(std::floor(point.p_world[static_cast<int>(i)] / voxel_m));
+      }
+      Mean& mean = means[index];
+      const double weight = point.confidence;
+      mean.weight += weight;
+      mean.x += weight * point.p_world.x();
+      mean.y += weight * point.p_world.y();
+      mean.z += weight * point.p_world.z();
+      ++mean.count;
+      mean.keyframes.insert(k);
+    }
+  }
+
+  const std::vector<CloudPoint> points = cloud.points();
+  RC_ASSERT(points.size() == means.size());
+  std::size_t i = 0;
+  for (const auto& [index, mean] : means) {  // sorted by index, as the export is
+    RC_ASSERT(std::abs(points[i].p_world.x() - mean.x / mean.weight) < 1e-12);
+    RC_ASSERT(std::abs(points[i].p_world.y() - mean.y / mean.weight) < 1e-12);
+    RC_ASSERT(std::abs(points[i].p_world.z() - mean.z / mean.weight) < 1e-12);
+    RC_ASSERT(std::abs(points[i].confidence - mean.weight / mean.count) < 1e-5);
+    RC_ASSERT(points[i].support == mean.keyframes.size());
+    ++i;
+  }
+}
+
+RC_GTEST_PROP(GlobalCloud, OrderOfInsertionDoesNotMatterBitForBit, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  Keyframes keyframes;
+  for (int k = 0; k < 6; ++k) keyframes.push_back(randomPoints(random, 100, 1.0));
+  std::vector<std::size_t> order(keyframes.size());
+  std::iota(order.begin(), order.end(), 0U);
+  const std::vector<CloudPoint> in_order = cloudOf(keyframes, order, {0.4, 1}).points();
+
+  std::shuffle(order.begin(), order.end(), random);
+  const std::vector<CloudPoint> shuffled = cloudOf(keyframes, order, {0.4, 1}).points();
+
+  expectSameBits(in_order, shuffled);
+}
+
+RC_GTEST_PROP(GlobalCloud, IsAsIfWhatWasRemovedHadNeverBeenThereBitForBit, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  std::uniform_int_distribution<std::uint64_t> number(0, 7);
+  std::uniform_int_distribution<int> count(0, 120);
+  GlobalCloud cloud({0.4, 1});
+  std::map<std::uint64_t, std::vector<CloudPoint>> inside;
+  for (int step = 0; step < 40; ++step) {
+    const std::uint64_t keyframe = number(random);
+    if (inside.count(keyframe) != 0) {
+      cloud.remove(keyframe);
+      inside.erase(keyframe);
+    } else {
+      inside[keyframe] = randomPoints(random, count(random), 1.0);
+      cloud.insert(keyframe, inside[keyframe]);
+    }
+
+    GlobalCloud fresh({0.4, 1});
+    for (const auto& [fresh_number, points] : inside) fresh.insert(fresh_number, points);
+    for (const int min_keyframes : {1, 2, 4}) {
+      expectSameBits(cloud.points(min_keyframes), fresh.points(min_keyframes));
+    }
+    RC_ASSERT(cloud.voxels() == fresh.voxels());
+    RC_ASSERT(cloud.keyframes() == inside.size());
+  }
+}
+
+RC_GTEST_PROP(GlobalCloud, RemovalAndReinsertionOfTheSamePointsChangeNoBit, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  Keyframes keyframes;
+  GlobalCloud cloud({0.4, 2});
+  for (std::uint64_t k = 0; k < 6; ++k) {
+    keyframes.push_back(randomPoints(random, 100, 1.0));
+    cloud.insert(k, keyframes.back());
+  }
+  const std::vector<CloudPoint> before = cloud.points();
+
+  const auto refined = static_cast<std::size_t>(*rc::gen::inRange(0, 6));
+  cloud.remove(refined);
+  cloud.insert(refined, keyframes[refined]);
+
+  expectSameBits(before, cloud.points());
+}
+
+TEST(GlobalCloud, SupportIsThatOfTheKeyframesThatRemain) {
+  GlobalCloud cloud({1.0, 2});
+  cloud.insert(0, {{{0.2, 0.5, 0.5}, 1.0F}});
+  cloud.insert(1, {{{0.6, 0.5, 0.5}, 1.0F}, {{5.5, 0.5, 0.5}, 1.0F}});
+  ASSERT_EQ(cloud.points().size(), 1U);
+
+  cloud.remove(0);
+  EXPECT_EQ(cloud.points().size(), 0U);
+  EXPECT_EQ(cloud.points(1).size(), 2U);
+  EXPECT_EQ(cloud.points(1)[0].support, 1U);
+
+  cloud.insert(0, {{{5.7, 0.5, 0.5}, 1.0F}});  // refined: it moved by five voxels
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_NEAR(cloud.points()[0].p_world.x(), 5.6, 1e-15);
+}
+
+TEST(GlobalCloud, IsEmptyWhenTheLastKeyframeLeaves) {
+  GlobalCloud cloud;
+  cloud.insert(4, {{{0, 0, 0}, 1.0F}});
+  cloud.remove(4);
+
+  EXPECT_EQ(cloud.voxels(), 0U);
+  EXPECT_EQ(cloud.keyframes(), 0U);
+  EXPECT_TRUE(cloud.points().empty());
+}
+
+TEST(GlobalCloud, AKeyframeThatIsNotInTheMapCannotBeRemoved) {
+  GlobalCloud cloud;
+  cloud.insert(4, {{{0, 0, 0}, 1.0F}});
+  try {
+    cloud.remove(3);
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("keyframe 3 is not in the map"));
+  }
+  cloud.remove(4);
+  EXPECT_THROW(cloud.remove(4), std::invalid_argument);
+}
+
+TEST(GlobalCloud, OutliersOfAKeyframeStayOutsideEvenWhereAnotherKeyframeHasPoints) {
+  GlobalCloudOptions options;
+  options.voxel_size_m = 1.0;
+  options.outliers = {0.5, 1};
+  GlobalCloud cloud(options);
+  cloud.insert(0, {{{0.5, 0, 0}, 1.0F}, {{0.6, 0, 0}, 1.0F}, {{5.5, 0, 0}, 1.0F}});
+  cloud.insert(1, {{{5.5, 0, 0}, 1.0F}, {{5.6, 0, 0}, 1.0F}, {{0.5, 0, 0}, 1.0F}});
+
+  const std::vector<CloudPoint> points = cloud.points();
+
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_NEAR(points[0].p_world.x(), 0.55, 1e-15);
+  EXPECT_EQ(points[0].support, 1U);
+  EXPECT_NEAR(points[1].p_world.x(), 5.55, 1e-15);
+  EXPECT_EQ(points[1].support, 1U);
+}
+
+TEST(GlobalCloud, MillimetreVoxelsAThousandKilometresFromTheOriginStayApart) {
+  const double far_m = 1e6;
+  GlobalCloud cloud({0.001, 1});
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < 1000; ++i)
+    points.push_back({{far_m + (i + 0.5) * 0.001, -far_m, far_m}, 1.0F});
+  cloud.insert(0, points);
+
+  const std::vector<CloudPoint> kept = cloud.points();
+
+  ASSERT_EQ(kept.size(), points.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    EXPECT_NEAR(kept[i].p_world.x(), points[i].p_world.x(), 1e-9);
+  }
+}
+
+TEST(GlobalCloud, PointsOutsideTheRangeOfIndicesAreRefused) {
+  GlobalCloud cloud({0.001, 1});
+
+  EXPECT_THROW(cloud.insert(0, {{{1e16, 0, 0}, 1.0F}}), std::invalid_argument);
+  EXPECT_THROW(cloud.insert(0, {{{0, -1e16, 0}, 1.0F}}), std::invalid_argument);
+  EXPECT_NO_THROW(cloud.insert(0, {{{9.2e15, -9.2e15, 0}, 1.0F}}));
+}
+
+TEST(GlobalCloud, ARefusedKeyframeLeavesNothingBehind) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  GlobalCloud cloud;
+
+  EXPECT_THROW(cloud.insert(3, {{{0, 0, 0}, 1.0F}, {{0, nan, 0}, 1.0F}}), std::invalid_argument);
+  EXPECT_THROW(cloud.insert(3, {{{0, 0, 0}, 1.0F}, {{0, 0, 0}, 0.0F}}), std::invalid_argument);
+
+  EXPECT_EQ(cloud.voxels(), 0U);
+  EXPECT_EQ(cloud.keyframes(), 0U);
+  EXPECT_NO_THROW(cloud.insert(3, {{{0, 0, 0}, 1.0F}}));
+}
+
+TEST(GlobalCloud, AKeyframeIsInsertedOnce) {
+  GlobalCloud cloud;
+  cloud.insert(7, {{{0, 0, 0}, 1.0F}});
+
+  EXPECT_THROW(cloud.insert(7, {}), std::invalid_argument);
+}
+
+TEST(GlobalCloudOptions, ValuesOutOfRangeAreNamed) {
+  GlobalCloudOptions options;
+  options.voxel_size_m = 0;
+  try {
+    options.validate();
+    FAIL() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("voxel_size_m = 0: must be"));
+  }
+  options = {};
+  options.min_keyframes = 0;
+  EXPECT_THROW(GlobalCloud{options}, std::invalid_argument);
+  options = {};
+  options.outliers.outlier_min_neighbors = 0;
+  EXPECT_THROW(GlobalCloud{options}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace efm

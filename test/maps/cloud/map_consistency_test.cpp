@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What keyframes say of each other's points, and what becomes of the map by it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include "maps/cloud/global_cloud.h"
+
+namespace efm {
+namespace {
+
+struct Seen {
+  std::vector<CloudPoint> points;
+  Rigid3 T_world_ref;
+};
+
+GlobalCloudOptions withConsistency(Consistency consistency) {
+  GlobalCloudOptions options;
+  options.voxel_size_m = 0.02;
+  options.consistency.consistency = consistency;
+  return options;
+}
+
+Rigid3 viewAt(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
+
+/// A wall at z = 3 m as a view sees it, each point off along its ray by a random share of its
+/// inverse depth, up to `noise`.
+std::vector<CloudPoint> wallSeenFrom(const Rigid3& T_world_ref, double noise,
+                                     std::mt19937& random) {
+  std::uniform_real_distribution<double> error(-noise, noise);
+  std::vector<CloudPoint> points;
+  for (int y = -30; y <= 30; ++y) {
+    for (int x = -30; x <= 30; ++x) {
+      const Eigen::Vector3d p_ref(0.03 * x, 0.03 * y, 3);
+      points.push_back({T_world_ref * (p_ref / (1 + error(random))), 1.0F});
+    }
+  }
+  return points;
+}
+
+/// Views side by side, each with a fiftieth of its points somewhere before the wall.
+std::vector<Seen> viewsWithOutliers(std::mt19937& random, int count) {
+  std::uniform_real_distribution<double> wrong(1.2, 2.2);
+  std::vector<Seen> views;
+  for (int k = 0; k < count; ++k) {
+    Seen seen{{}, viewAt(0.05 * k)};
+    seen.points = wallSeenFrom(seen.T_world_ref, 0.015, random);
+    for (std::size_t i = 0; i < seen.points.size(); i += 50) {
+      Eigen::Vector3d& p_world = seen.points[i].p_world;
+      const Eigen::Vector3d eye = seen.T_world_ref.translation;
+      p_world = eye + (p_world - eye) / wrong(random);
+    }
+    views.push_back(seen);
+  }
+  return views;
+}
+
+std::size_t outliersIn(const std::vector<CloudPoint>& points) {
+  return static_cast<std::size_t>(std::count_if(points.begin(), points.end(), [](const auto& p) {
+    return std::abs(p.p_world.z() - 3) > 0.3;
+  }));
+}
+
+void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].p_world, b[i].p_world) << "point " << i;
+    EXPECT_EQ(a[i].confidence, b[i].confidence) << "point " << i;
+    EXPECT_EQ(a[i].support, b[i].support) << "point " << i;
+  }
+}
+
+TEST(MapConsistency, PointsThatOthersLookThroughAreLeftOutAndTheWallIsNot) {
+  std::mt19937 random(1);
+  const std::vector<Seen> views = viewsWithOutliers(random, 5);
+  GlobalCloud plain(withConsistency(Consistency::kNone));
+  GlobalCloud support(withConsistency(Consistency::kSupport));
+  GlobalCloud visible(withConsistency(Consistency::kVisibility));
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    for (GlobalCloud* cloud : {&plain, &support, &visible}) {
+      cloud->insert(k, views[k].points, views[k].T_world_ref);
+    }
+  }
+  const std::size_t outliers = outliersIn(plain.points());
+  EXPECT_GT(outliers, 300U);
+  EXPECT_EQ(support.points().size(), plain.points().size());
+  EXPECT_LT(outliersIn(visible.points()), outliers / 10);
+  EXPECT_EQ(visible.points().size() - outliersIn(visible.points()),
+            plain.points().size() - outliers);
+  EXPECT_LT(outliersIn(support.points(2)), outliers / 10) << "nobody else saw them";
+  EXPECT_GT(support.points(2).size(), (plain.points().size() - outliers) * 99 / 100)
+      << "though the voxels of a point are rarely the same in two keyframes:";
+  EXPECT_LT(plain.points(3).size(), plain.points().size() / 2);
+}
+
+TEST(MapConsistency, SupportCountsThoseWhoSawThePointBesideThoseWhoHaveItInTheVoxel) {
+  std::mt19937 random(1);
+  GlobalCloud cloud(withConsistency(Consistency::kSupport));
+  cloud.insert(10, {{{0.21, 0.01, 2.93}, 1.0F}}, viewAt(0));
+  EXPECT_EQ(cloud.points()[0].support, 1U);
+  cloud.insert(11, wallSeenFrom(viewAt(0), 0, random), viewAt(0));
+  cloud.insert(18, wallSeenFrom(viewAt(0.1), 0, random), viewAt(0.1));
+  cloud.insert(19, wallSeenFrom(viewAt(0.1), 0, random), viewAt(0.1));
+  const std::vector<CloudPoint> points = cloud.points();
+  const auto lone = std::find_if(points.begin(), points.end(),
+                                 [](const auto& p) { return p.p_world.z() == 2.93; });
+  ASSERT_NE(lone, points.end());
+  EXPECT_EQ(lone->support, 3U) << "10, 11 and 18; 19 is out of reach";
+}
+
+TEST(MapConsistency, AKeyframeWithoutAPoseIsJudgedButDoesNotJudge) {
+  std::mt19937 random(1);
+  const std::vector<CloudPoint> stray = {{{0.01, 0.01, 1.5}, 1.0F}};
+  for (const bool posed : {false, true}) {
+    GlobalCloud cloud(withConsistency(Consistency::kVisibility));
+    cloud.insert(0, stray);
+    const auto pose = posed ? std::optional<Rigid3>(viewAt(0)) : std::nullopt;
+    cloud.insert(1, wallSeenFrom(viewAt(0), 0, random), pose);
+    EXPECT_EQ(outliersIn(cloud.points()), posed ? 0U : 1U);
+  }
+}
+
+TEST(MapConsistency, SoManyMayLookThroughAPointAsTheOptionSays) {
+  std::mt19937 random(1);
+  for (int allowed = 0; allowed <= 3; ++allowed) {
+    GlobalCloudOptions options = withConsistency(Consistency::kVisibility);
+    options.consistency.max_contradictions = allowed;
+    GlobalCloud cloud(options);
+    cloud.insert(0, {{{0.01, 0.01, 1.5}, 1.0F}}, viewAt(0));
+    for (std::uint64_t k = 1; k <= 2; ++k) {
+      cloud.insert(k, wallSeenFrom(viewAt(0), 0, random), viewAt(0));
+    }
+    EXPECT_EQ(outliersIn(cloud.points()), allowed >= 2 ? 1U : 0U) << allowed;
+  }
+}
+
+TEST(MapConsistency, PointsOnATrueSurfaceSeenFromManyPosesAreNeverLeftOut) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> shift(-0.5, 0.5);
+    std::uniform_real_distribution<double> turn(-0.2, 0.2);
+    GlobalCloud plain(withConsistency(Consistency::kNone));
+    GlobalCloud visible(withConsistency(Consistency::kVisibility));
+    for (std::uint64_t k = 0; k < 6; ++k) {
+      const Eigen::Vector3d axis(turn(random), turn(random), turn(random));
+      const Rigid3 T_world_ref{
+          Eigen::Quaterniond(Eigen::AngleAxisd(axis.norm(), axis.normalized())),
+          {shift(random), shift(random), shift(random)}};
+      // What stands before the wall hides it from some: a pole that is seen in full from
+      // everywhere.
+      std::vector<CloudPoint> points = wallSeenFrom(viewAt(0), 0.01, random);
+      for (int y = -100; y <= 100; ++y) points.push_back({{0.1, 0.01 * y, 1.5}, 1.0F});
+      const Eigen::Vector3d eye = T_world_ref.translation;
+      points.erase(
+          std::remove_if(points.begin(), points.end(),
+                         [&](const CloudPoint& point) {
+                           if (point.p_world.z() < 2) return false;
+                           const double share = (1.5 - eye.z()) / (point.p_world.z() - eye.z());
+                           const double x = eye.x() + share * (point.p_world.x() - eye.x());
+                           return std::abs(x - 0.1) < 0.05;
+                         }),
+          points.end());
+      plain.insert(k, points, T_world_ref);
+      visible.insert(k, points, T_world_ref);
+    }
+    EXPECT_EQ(visible.points().size(), plain.points().size()) << "seed " << seed;
+  }
+}
+
+TEST(MapConsistency, TheMapDependsOnWhatIsInItAloneBitForBit) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    std::mt19937 random(seed);
+    const std::vector<Seen> views = viewsWithOutliers(random, 12);
+    const auto insert = [&](GlobalCloud& cloud, std::size_t k) {
+      cloud.insert(3 * k, views[k].points, views[k].T_world_ref);  // some are out of reach
+    };
+    std::vector<std::size_t> order(views.size());
+    std::iota(order.begin(), order.end(), 0U);
+    GlobalCloud in_order(withConsistency(Consistency::kVisibility));
+    for (const std::size_t k : order) {
+      if (k % 4 != 1) insert(in_order, k);
+    }
+
+    std::shuffle(order.begin(), order.end(), random);
+    GlobalCloud other(withConsistency(Consistency::kVisibility));
+    for (const std::size_t k : order) insert(other, k);
+    std::shuffle(order.begin(), order.end(), random);
+    for (const std::size_t k : order) {
+      other.remove(3 * k);
+      if (k % 4 != 1) insert(other, k);  // a keyframe that is refined, or goes for good
+    }
+
+    expectSameBits(other.points(), in_order.points());
+    expectSameBits(other.points(3), in_order.points(3));
+  }
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/cloud/outlier_removal.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace efm {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// Points on the x axis, numbered by their confidence from 1 on.
+std::vector<CloudPoint> onALine(const std::vector<double>& xs) {
+  std::vector<CloudPoint> points;
+  points.reserve(xs.size());
+  for (const double x : xs) points.push_back({{x, 0, 0}, static_cast<float>(points.size() + 1)});
+  return points;
+}
+
+std::vector<float> numbers(const std::vector<CloudPoint>& points) {
+  std::vector<float> numbers;
+  numbers.reserve(points.size());
+  for (const CloudPoint& point : points) numbers.push_back(point.confidence);
+  return numbers;
+}
+
+/// Points on a lattice of eighths of a metre, which float has exactly, in a box around `middle`.
+std::vector<CloudPoint> latticePoints(std::mt19937& random, int count,
+                                      const Eigen::Vector3d& middle, int reach) {
+  std::uniform_int_distribution<int> eighths(-reach, reach);
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d offset(eighths(random), eighths(random), eighths(random));
+    points.push_back({middle + offset / 8, static_cast<float>(i + 1)});
+  }
+  return points;
+}
+
+std::vector<float> survivorsByBruteForce(const std::vector<CloudPoint>& points,
+                                         const OutlierRemovalOptions& options) {
+  std::vector<float> survivors;
+  for (const CloudPoint& point : points) {
+    // Itself is among those within the radius.
+    const auto within = std::count_if(points.begin(), points.end(), [&](const CloudPoint& other) {
+      return (other.p_world - point.p_world).norm() <= options.outlier_radius_m;
+    });
+    if (within - 1 >= options.outlier_min_neighbors) survivors.push_back(point.confidence);
+  }
+  return survivors;
+}
+
+TEST(RemoveOutliers, KeepsPointsWithEnoughOthersWithinTheRadius) {
+  const std::vector<CloudPoint> points = onALine({0, 10, 0.25, 0.5, 10.25, 1.5});
+
+  // Within 0.25 of 0: 0.25; of 0.25: 0 and 0.5; of 10: 10.25; of 1.5: none.
+  EXPECT_THAT(numbers(removeOutliers(points, {0.25, 1})), ElementsAre(1, 2, 3, 4, 5));
+  EXPECT_THAT(numbers(removeOutliers(points, {0.25, 2})), ElementsAre(3));
+  EXPECT_THAT(numbers(removeOutliers(points, {0.25, 3})), ElementsAre());
+  EXPECT_THAT(numbers(removeOutliers(points, {100, 5})), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_THAT(numbers(removeOutliers(points, {100, 6})), ElementsAre());
+}
+
+TEST(RemoveOutliers, PointsInOnePlaceAreNeighbors) {
+  EXPECT_EQ(removeOutliers(onALine({3, 3, 3, 7}), {1e-6, 2}).size(), 3U);
+}
+
+TEST(RemoveOutliers, RadiusZeroKeepsEverything) {
+  EXPECT_THAT(numbers(removeOutliers(onALine({0, 100, 1e6}), {})), ElementsAre(1, 2, 3));
+}
+
+TEST(RemoveOutliers, OfFewPointsIsDefined) {
+  EXPECT_TRUE(removeOutliers({}, {1, 1}).empty());
+  EXPECT_TRUE(removeOutliers(onALine({5}), {1, 1}).empty());
+  EXPECT_EQ(removeOutliers(onALine({5, 5}), {1, 1}).size(), 2U);
+}
+
+RC_GTEST_PROP(RemoveOutliers, KeepsWhatBruteForceKeepsAThousandKilometresFromTheOriginToo, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const auto middle = *rc::gen::element(0.0, 1e6);
+  const std::vector<CloudPoint> points = latticePoints(
+      random, *rc::gen::inRange(0, 400), {middle, -middle, middle}, *rc::gen::element(4, 16, 64));
+  OutlierRemovalOptions options;
+  options.outlier_radius_m = *rc::gen::element(0.125, 0.5, 1.0, 3.0);  // neighbours on the radius
+  options.outlier_min_neighbors = *rc::gen::inRange(1, 12);
+
+  RC_ASSERT(numbers(removeOutliers(points, options)) == survivorsByBruteForce(points, options));
+}
+
+TEST(RemoveOutliers, AStrayPointFarAwayDoesNotBlurTheOthers) {
+  // From the middle of the bounds, 5e8 m away, floats would be 32 m apart.
+  std::vector<CloudPoint> points = onALine({0, 0.01, 0.02, 0.03, 0.5, 1e9});
+
+  EXPECT_THAT(numbers(removeOutliers(points, {0.015, 1})), ElementsAre(1, 2, 3, 4));
+}
+
+TEST(RemoveOutliers, PointsThatAreNotFiniteAreRefused) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(removeOutliers(onALine({0, nan}), {1, 1}), std::invalid_argument);
+  EXPECT_THROW(removeOutliers(onALine({0, INFINITY}), {1, 1}), std::invalid_argument);
+  EXPECT_THROW(removeOutliers(onALine({0, 1e30}), {1, 1}), std::invalid_argument);
+}
+
+TEST(OutlierRemovalOptions, ValuesOutOfRangeAreNamed) {
+  const auto refusal = [](const OutlierRemovalOptions& options) -> std::string {
+    try {
+      options.validate();
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(refusal({-1, 3}), HasSubstr("outlier_radius_m = -1: must be"));
+  EXPECT_THAT(refusal({std::nan(""), 3}), HasSubstr("outlier_radius_m = nan: must be"));
+  EXPECT_THAT(refusal({0.1, 0}), HasSubstr("outlier_min_neighbors = 0: must be"));
+  EXPECT_EQ(refusal({}), "accepted");
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/cloud/visibility_grid.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+ConsistencyOptions options() {
+  ConsistencyOptions options;
+  options.consistency_tolerance = 0.05;
+  options.consistency_cell_deg = 1;
+  return options;
+}
+
+/// A wall at z = 2 m, x and y from -1 to 1 m: every half degree and denser.
+std::vector<CloudPoint> wall() {
+  std::vector<CloudPoint> points;
+  for (int y = -100; y <= 100; ++y) {
+    for (int x = -100; x <= 100; ++x) points.push_back({{0.01 * x, 0.01 * y, 2}, 1.0F});
+  }
+  return points;
+}
+
+TEST(KeyframeSight, SupportsWhatItSawAndLooksThroughWhatIsWellBeforeIt) {
+  const KeyframeSight sight(wall(), {}, options());
+  // The tolerance is 0.05 / 2 m = 0.025 / m: agreement from 1 / 0.525 to 1 / 0.475 m, looking
+  // through before 1 / 0.55 m.
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2}), Verdict::kSupports);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.91}), Verdict::kSupports);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2.10}), Verdict::kSupports);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.89}), Verdict::kNothing);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.83}), Verdict::kNothing) << "neither this nor that";
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.81}), Verdict::kLooksThrough);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0.3}), Verdict::kLooksThrough);
+}
+
+TEST(KeyframeSight, SaysNothingOfWhatTheWallHidesOrWhereItSawNothing) {
+  const KeyframeSight sight(wall(), {}, options());
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2.2}), Verdict::kNothing) << "behind the wall";
+  EXPECT_EQ(sight.verdictOn({1.2, 0, 1.5}), Verdict::kNothing) << "beside it";
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, -2}), Verdict::kNothing) << "behind the view";
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0}), Verdict::kNothing);
+  EXPECT_EQ(sight.verdictOn({1e12, 0.1, 1e-9}), Verdict::kNothing) << "far to the side";
+}
+
+TEST(KeyframeSight, ASingleCellBehindIsTooLittleToLookThroughAPoint) {
+  EXPECT_EQ(KeyframeSight({{{0, 0, 2}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
+            Verdict::kNothing);
+}
+
+TEST(KeyframeSight, AnEdgeBeforeTheWallIsSeenThoughTheWallIsInItsCellToo) {
+  std::vector<CloudPoint> points = wall();
+  points.push_back({{0.05, 0, 1}, 1.0F});
+  const KeyframeSight sight(points, {}, options());
+  EXPECT_EQ(sight.verdictOn({0.05, 0.01, 1}), Verdict::kSupports);
+  EXPECT_EQ(sight.verdictOn({0.10, 0, 2}), Verdict::kSupports) << "the wall in the same cell";
+  EXPECT_EQ(sight.verdictOn({0.06, 0, 1.5}), Verdict::kNothing) << "hidden by the edge";
+}
+
+TEST(KeyframeSight, OfNothingItSaysNothing) {
+  EXPECT_EQ(KeyframeSight({}, {}, options()).verdictOn({0, 0, 1}), Verdict::kNothing);
+  EXPECT_EQ(KeyframeSight({{{0, 0, -1}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
+            Verdict::kNothing);
+}
+
+RC_GTEST_PROP(KeyframeSight, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWorldsFrame, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  std::uniform_real_distribution<double> side(-1, 1);
+  std::uniform_real_distribution<double> depth(1, 5);
+  const auto draw = [&] {
+    const double z = depth(random);
+    return Eigen::Vector3d(side(random) * z, side(random) * z, z);
+  };
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < 2000; ++i) points.push_back({draw(), 1.0F});
+  std::vector<Eigen::Vector3d> asked;
+  for (int i = 0; i < 200; ++i) asked.push_back(draw());
+  const KeyframeSight sight(points, {}, options());
+
+  std::shuffle(points.begin(), points.end(), random);
+  const KeyframeSight shuffled(points, {}, options());
+  // Turned by right angles and shifted by whole metres: places stay in their cells.
+  const Rigid3 T_world_ref{Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {16, -8, 4}};
+  for (CloudPoint& point : points) point.p_world = T_world_ref * point.p_world;
+  const KeyframeSight moved(points, T_world_ref, options());
+  int differing = 0;
+  for (const Eigen::Vector3d& p : asked) {
+    RC_ASSERT(shuffled.verdictOn(p) == sight.verdictOn(p));
+    if (moved.verdictOn(T_world_ref * p) != sight.verdictOn(p)) ++differing;
+  }
+  RC_ASSERT(differing <= 1);  // rounding may move a point over a cell's border
+}
+
+RC_GTEST_PROP(KeyframeSight, DecidesAsLookingAtAllPointsDoes, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  std::uniform_real_distribution<double> side(-0.3, 0.3);
+  std::uniform_real_distribution<double> depth(1, 2);
+  const auto draw = [&] {
+    const double z = depth(random);
+    return Eigen::Vector3d(side(random) * z, side(random) * z, z);
+  };
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < *rc::gen::inRange(1, 200); ++i) points.push_back({draw(), 1.0F});
+  const KeyframeSight sight(points, {}, options());
+
+  std::vector<double> inverse;
+  for (const CloudPoint& point : points) inverse.push_back(1 / point.p_world.z());
+  std::sort(inverse.rbegin(), inverse.rend());
+  const double tolerance = 0.05 * inverse[inverse.size() / 20];
+  const auto cellOf = [](const Eigen::Vector3d& p) {
+    const double cell = M_PI / 180;
+    return Eigen::Vector2d(std::floor(p.x() / p.z() / cell), std::floor(p.y() / p.z() / cell));
+  };
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d asked = draw();
+    bool supports = false;
+    bool nearer = true;
+    int cells = 0;
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        double nearest = 0;
+        double farthest = 1e9;
+        for (const CloudPoint& point : points) {
+          if (cellOf(point.p_world) != cellOf(asked) + Eigen::Vector2d(dx, dy)) continue;
+          nearest = std::max(nearest, 1 / point.p_world.z());
+          farthest = std::min(farthest, 1 / point.p_world.z());
+        }
+        if (nearest == 0) continue;
+        ++cells;
+        const double own = 1 / asked.z();
+        supports = supports || std::abs(own - nearest) <= tolerance ||
+                   std::abs(own - farthest) <= tolerance;
+        nearer = nearer && own - nearest > 2 * tolerance;
+      }
+    }
+    const Verdict expected = supports               ? Verdict::kSupports
+                             : nearer && cells >= 2 ? Verdict::kLooksThrough
+                                                    : Verdict::kNothing;
+    RC_ASSERT(sight.verdictOn(asked) == expected);
+  }
+}
+
+TEST(ConsistencyOptions, ValuesOutOfRangeAreErrorsThatNameThem) {
+  const auto checked = [](auto change) {
+    ConsistencyOptions wrong;
+    change(wrong);
+    return [wrong] { wrong.validate(); };
+  };
+  EXPECT_THAT(checked([](auto& o) { o.consistency_tolerance = 0; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("consistency_tolerance = 0: must")));
+  EXPECT_THAT(
+      checked([](auto& o) { o.consistency_cell_deg = std::numeric_limits<double>::quiet_NaN(); }),
+      ThrowsMessage<std::invalid_argument>(HasSubstr("consistency_cell_deg = nan: must")));
+  EXPECT_THAT(checked([](auto& o) { o.max_contradictions = 17; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("max_contradictions = 17: must be")));
+  EXPECT_THAT([] { consistencyFromName("some"); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("none, support, visibility")));
+}
+
+}  // namespace
+}  // namespace efm

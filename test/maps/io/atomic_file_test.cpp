@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/io/atomic_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <string>
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class WholeFile : public ::testing::Test {
+ protected:
+  WholeFile()
+      : folder(fs::path(::testing::TempDir()) /
+               ("whole_file_" + std::to_string(getpid()) + "_" +
+                ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+  }
+  ~WholeFile() override {
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+  }
+
+  static void writeText(const fs::path& path, const std::string& text) {
+    writeWhole(path, [&](const fs::path& temporary) { std::ofstream(temporary) << text; });
+  }
+  static std::string contentOf(const fs::path& path) {
+    std::ifstream file(path);
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  }
+  static std::string errorOf(const fs::path& path) {
+    try {
+      writeText(path, "text");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  const fs::path folder;
+};
+
+TEST_F(WholeFile, ReplacesTheOneBefore) {
+  writeText(folder / "a.txt", "one");
+  writeText(folder / "a.txt", "two");
+  EXPECT_EQ(contentOf(folder / "a.txt"), "two");
+}
+
+TEST_F(WholeFile, WhatIsNoFileIsNotReplaced) {
+  EXPECT_THAT(errorOf(""), HasSubstr("'': expected the name of a file"));
+  EXPECT_THAT(errorOf(folder), HasSubstr("'" + folder.string() + "': it is a folder"));
+  EXPECT_THAT(errorOf(folder / "new/"), HasSubstr("it is a folder"));
+  ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(errorOf(folder / "pipe"), HasSubstr("not a regular file"));
+  EXPECT_THAT(errorOf("/dev/null"), HasSubstr("not a regular file"));
+}
+
+TEST_F(WholeFile, OfALinkWhatItLeadsToIsReplaced) {
+  fs::create_directory(folder / "real");
+  fs::create_symlink("real/a.txt", folder / "relative.txt");  // nothing there yet
+  fs::create_symlink(folder / "relative.txt", folder / "absolute.txt");
+  writeText(folder / "absolute.txt", "text");
+  EXPECT_EQ(contentOf(folder / "real" / "a.txt"), "text");
+  EXPECT_TRUE(fs::is_symlink(folder / "relative.txt"));
+  EXPECT_TRUE(fs::is_symlink(folder / "absolute.txt"));
+}
+
+TEST_F(WholeFile, LinksThatLeadToAFolderOrInACircleAreErrors) {
+  fs::create_symlink(folder, folder / "link");
+  EXPECT_THAT(errorOf(folder / "link"), HasSubstr("it is a folder"));
+  fs::create_symlink("b", folder / "a");
+  fs::create_symlink("a", folder / "b");
+  EXPECT_THAT(errorOf(folder / "a"), HasSubstr("too many symbolic links"));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,506 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/io/point_cloud_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <pcl/io/pcd_io.h>
+#include <pcl/io/ply_io.h>
+#include <pcl/point_types.h>
+
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <random>
+#include <sstream>
+
+#include "maps/io/atomic_file.h"
+#include "maps/io/pcd_file.h"
+#include "maps/io/ply_file.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+/// What we write: extension and encoding.
+struct Kind {
+  const char* name;
+  PointCloudEncoding encoding;
+};
+const std::vector<Kind> kKinds = {
+    {"binary.pcd", PointCloudEncoding::kBinary},
+    {"text.pcd", PointCloudEncoding::kAscii},
+    {"compressed.pcd", PointCloudEncoding::kCompressed},
+    {"binary.ply", PointCloudEncoding::kBinary},
+    {"text.ply", PointCloudEncoding::kAscii},
+};
+
+bool isPly(const std::filesystem::path& path) { return path.extension() == ".ply"; }
+
+class PointCloudFile : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = std::filesystem::temp_directory_path() / ("efm_" + name);
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::size_t filesInFolder() const {
+    std::size_t files = 0;
+    for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder_)) ++files;
+    return files;
+  }
+
+  std::filesystem::path fileOf(const std::string& name, const std::string& bytes) const {
+    std::ofstream(folder_ / name, std::ios::binary) << bytes;
+    return folder_ / name;
+  }
+
+  PointCloudContent contentOf(const std::string& name, const std::string& bytes) const {
+    return readPointCloud(fileOf(name, bytes));
+  }
+
+  /// The error without the path, which must be there.
+  std::string refusalOf(const std::filesystem::path& path) const {
+    try {
+      readPointCloud(path);
+    } catch (const std::runtime_error& error) {
+      const std::string start = "cannot read " + path.string() + ": ";
+      EXPECT_EQ(std::string(error.what()).substr(0, start.size()), start);
+      return std::string(error.what()).substr(start.size());
+    }
+    return "accepted";
+  }
+  std::string refusalOf(const std::string& name, const std::string& bytes) const {
+    return refusalOf(fileOf(name, bytes));
+  }
+
+  std::filesystem::path folder_;
+};
+
+std::string bytesOf(const std::filesystem::path& path) {
+  std::ostringstream bytes;
+  bytes << std::ifstream(path, std::ios::binary).rdbuf();
+  return bytes.str();
+}
+
+PointCloudContent parse(const std::filesystem::path& name, const std::string& bytes) {
+  return isPly(name) ? parsePly(bytes) : parsePcd(bytes);
+}
+
+/// The bytes of a number, in the order of this machine or the other.
+template <typename Number>
+std::string raw(Number number, bool swapped = false) {
+  std::string bytes(sizeof(number), '\0');
+  std::memcpy(bytes.data(), &number, sizeof(number));
+  return swapped ? std::string(bytes.rbegin(), bytes.rend()) : bytes;
+}
+
+std::string rawFloats(const std::vector<float>& numbers, bool swapped = false) {
+  std::string bytes;
+  for (const float number : numbers) bytes += raw(number, swapped);
+  return bytes;
+}
+
+/// Points of every magnitude that a float has, and of none at all.
+std::vector<CloudPoint> pointsOfAllMagnitudes(std::mt19937& random, std::size_t count) {
+  const auto any_float = [&random] {
+    float number = 0;
+    do {
+      const auto bits = static_cast<std::uint32_t>(random());
+      std::memcpy(&number, &bits, sizeof(number));
+    } while (!std::isfinite(number));
+    return number;
+  };
+  std::vector<CloudPoint> points = {{{0, -0.0, 1e-45}, 1e-38F}};
+  while (points.size() < count) {
+    points.push_back({{any_float(), any_float(), any_float()}, any_float()});
+  }
+  return points;
+}
+
+std::vector<CloudPoint> plainPoints() {
+  std::vector<CloudPoint> points;
+  points.reserve(1000);
+  for (int i = 0; i < 1000; ++i) points.push_back({{i * 0.1, -i / 3.0, 3.5}, i * 0.7F + 1});
+  return points;
+}
+
+pcl::PointCloud<pcl::PointXYZI> asPclCloud(const std::vector<CloudPoint>& points) {
+  pcl::PointCloud<pcl::PointXYZI> cloud;
+  for (const CloudPoint& point : points) {
+    pcl::PointXYZI p;
+    p.getVector3fMap() = point.p_world.cast<float>();
+    p.intensity = point.confidence;
+    cloud.push_back(p);
+  }
+  return cloud;
+}
+
+TEST_F(PointCloudFile, IsReadBackByPclAsItWas) {
+  const std::vector<CloudPoint> points = plainPoints();
+  for (const Kind& kind : kKinds) {
+    SCOPED_TRACE(kind.name);
+    const std::filesystem::path path = folder_ / kind.name;
+    writePointCloud(path, points, kind.encoding);
+
+    pcl::PointCloud<pcl::PointXYZI> cloud;
+    ASSERT_EQ(isPly(path) ? pcl::io::loadPLYFile(path.string(), cloud)
+                          : pcl::io::loadPCDFile(path.string(), cloud),
+              0);
+    ASSERT_EQ(cloud.size(), points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(cloud[i].x, static_cast<float>(points[i].p_world.x()));
+      EXPECT_EQ(cloud[i].y, static_cast<float>(points[i].p_world.y()));
+      EXPECT_EQ(cloud[i].z, static_cast<float>(points[i].p_world.z()));
+      EXPECT_EQ(cloud[i].intensity, points[i].confidence);
+    }
+  }
+  EXPECT_EQ(filesInFolder(), kKinds.size()) << "a temporary file stayed";
+}
+
+TEST_F(PointCloudFile, IsReadBackAsTheSameFloats) {
+  std::mt19937 random(1);
+  const std::vector<CloudPoint> points = pointsOfAllMagnitudes(random, 5000);
+  for (const Kind& kind : kKinds) {
+    SCOPED_TRACE(kind.name);
+    writePointCloud(folder_ / kind.name, points, kind.encoding);
+    const PointCloudContent content = readPointCloud(folder_ / kind.name);
+
+    EXPECT_EQ(content.without_place, 0U);
+    ASSERT_EQ(content.points.size(), points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      EXPECT_EQ(content.points[i].p_world, points[i].p_world.cast<float>().cast<double>());
+      EXPECT_EQ(content.points[i].confidence, points[i].confidence);
+      EXPECT_EQ(content.points[i].support, 1U);
+    }
+  }
+}
+
+TEST_F(PointCloudFile, ThatPclWroteIsReadAsItWas) {
+  const std::vector<CloudPoint> points = plainPoints();
+  const pcl::PointCloud<pcl::PointXYZI> cloud = asPclCloud(points);
+  const auto path = [this](const char* name) { return (folder_ / name).string(); };
+  ASSERT_EQ(pcl::PCDWriter().writeBinary(path("b.pcd"), cloud), 0);
+  ASSERT_EQ(pcl::PCDWriter().writeBinaryCompressed(path("c.pcd"), cloud), 0);
+  ASSERT_EQ(pcl::PCDWriter().writeASCII(path("a.pcd"), cloud, 9), 0);
+  ASSERT_EQ(pcl::PLYWriter().write(path("b.ply"), cloud, true, true), 0);
+  ASSERT_EQ(pcl::PLYWriter().write(path("a.ply"), cloud, false, true), 0);  // 8 digits
+
+  for (const char* name : {"b.pcd", "c.pcd", "a.pcd", "b.ply", "a.ply"}) {
+    SCOPED_TRACE(name);
+    const std::vector<CloudPoint> read = readPointCloud(path(name)).points;
+    ASSERT_EQ(read.size(), points.size());
+    const double relative = std::string(name) == "a.ply" ? 1e-7 : 0;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto written = static_cast<float>(points[i].p_world[axis]);
+        EXPECT_NEAR(read[i].p_world[axis], written, std::abs(written) * relative);
+      }
+      EXPECT_NEAR(read[i].confidence, points[i].confidence, points[i].confidence * relative);
+    }
+  }
+}
+
+TEST_F(PointCloudFile, OfNoPointsIsAFileOfNoPoints) {
+  for (const Kind& kind : kKinds) {
+    SCOPED_TRACE(kind.name);
+    const std::filesystem::path path = folder_ / kind.name;
+    writePointCloud(path, {}, kind.encoding);
+    EXPECT_TRUE(readPointCloud(path).points.empty());
+
+    pcl::PCLPointCloud2 cloud;
+    ASSERT_EQ(isPly(path) ? pcl::PLYReader().read(path.string(), cloud)
+                          : pcl::PCDReader().read(path.string(), cloud),
+              0);
+    EXPECT_EQ(cloud.width * cloud.height, 0U);
+    EXPECT_EQ(cloud.fields.size(), 4U);
+  }
+}
+
+// The cloud of a simulated recording: no intensity.
+TEST_F(PointCloudFile, OfPlacesAloneHasConfidenceOne) {
+  const PointCloudContent content =
+      contentOf("gt_cloud.ply",
+                "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty float x\n"
+                "property float y\nproperty float z\nend_header\n" +
+                    rawFloats({1, 2, 3, -4, 5.5F, 6}));
+
+  ASSERT_EQ(content.points.size(), 2U);
+  EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(-4, 5.5, 6));
+  EXPECT_EQ(content.points[1].confidence, 1.0F);
+}
+
+TEST_F(PointCloudFile, DoublesAreReadInFull) {
+  const double x = 1000000.123456789;
+  const std::string ply_fields =
+      " 1.0\nelement vertex 1\nproperty double x\nproperty float64 y\nproperty double z\n"
+      "end_header\n";
+  const std::string pcd =
+      "FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nPOINTS 1\nDATA ";
+  const std::string swapped = raw(x, true) + raw(2.0, true) + raw(3.0, true);
+  const std::string bytes = raw(x) + raw(2.0) + raw(3.0);
+  const std::string text = "1000000.123456789 2 3\n";
+  const std::vector<PointCloudContent> contents = {
+      contentOf("b.ply", "ply\nformat binary_big_endian" + ply_fields + swapped),
+      contentOf("l.ply", "ply\nformat binary_little_endian" + ply_fields + bytes),
+      contentOf("a.ply", "ply\nformat ascii" + ply_fields + text),
+      contentOf("b.pcd", pcd + "binary\n" + bytes),
+      contentOf("a.pcd", pcd + "ascii\n" + text),
+  };
+
+  for (const PointCloudContent& content : contents) {
+    ASSERT_EQ(content.points.size(), 1U);
+    EXPECT_EQ(content.points[0].p_world, Eigen::Vector3d(x, 2, 3));
+  }
+}
+
+TEST_F(PointCloudFile, OtherFieldsAndElementsAreIgnored) {
+  const std::string before = "element camera 2\nproperty uchar id\nproperty double f\n";
+  const std::string vertex =
+      "element vertex 2\nproperty uchar red\nproperty float z\nproperty short intensity\n"
+      "property float y\nproperty float x\n";
+  const std::string after = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  const PointCloudContent text = contentOf(
+      "a.ply", "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nobj_info x\r\n" + before + vertex +
+                   after + "1 0.5\n2 0.5\n255 3 -7 2 1\n\n0 6 8 5 4\r\n3 0 1 1\n");
+  const PointCloudContent binary = contentOf(
+      "b.ply", "ply\nformat binary_big_endian 1.0\n" + before + vertex + after +
+                   std::string(18, 'c') + "r" + raw(3.0F, true) + raw(std::int16_t{-7}, true) +
+                   rawFloats({2, 1}, true) + "r" + raw(6.0F, true) + raw(std::int16_t{8}, true) +
+                   rawFloats({5, 4}, true) + "faces");
+  // Points of four bytes of padding, x, a pair of shorts, y and z.
+  const PointCloudContent pcd =
+      contentOf("c.pcd",
+                "VERSION 0.7\nFIELDS _ x pair y z intensity\nSIZE 1 4 2 4 4 1\nTYPE U F U F F I\n"
+                "COUNT 4 1 2 1 1 1\nWIDTH 1\nHEIGHT 2\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\n"
+                "DATA binary\n" +
+                    ("____" + raw(1.0F)) + "pair" + rawFloats({2, 3}) + raw(std::int8_t{-7}) +
+                    ("____" + raw(4.0F)) + "pair" + rawFloats({5, 6}) + raw(std::int8_t{8}));
+
+  for (const PointCloudContent& content : {text, binary, pcd}) {
+    ASSERT_EQ(content.points.size(), 2U);
+    EXPECT_EQ(content.points[0].p_world, Eigen::Vector3d(1, 2, 3));
+    EXPECT_EQ(content.points[0].confidence, -7.0F);
+    EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(4, 5, 6));
+    EXPECT_EQ(content.points[1].confidence, 8.0F);
+  }
+}
+
+TEST_F(PointCloudFile, PointsWithoutAPlaceAreCounted) {
+  const PointCloudContent content =
+      contentOf("gaps.pcd",
+                "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 2\nPOINTS 4\nDATA ascii\n"
+                "nan nan nan\n1 2 3\n1 -inf 3\n4 5 1e-60\n");
+
+  EXPECT_EQ(content.without_place, 2U);
+  ASSERT_EQ(content.points.size(), 2U);
+  EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(4, 5, 0));
+}
+
+TEST_F(PointCloudFile, CutShortAnywhereIsAnError) {
+  const std::vector<CloudPoint> points = {
+      {{0.1, 2, 3}, 4.0F}, {{1, 1, 1}, 1.0F}, {{7, 8, 9}, 12.5F}};
+  for (const Kind& kind : kKinds) {
+    writePointCloud(folder_ / kind.name, points, kind.encoding);
+    const std::string bytes = bytesOf(folder_ / kind.name);
+    for (std::size_t length = 0; length < bytes.size(); ++length) {
+      EXPECT_THROW(parse(kind.name, bytes.substr(0, length)), std::runtime_error)
+          << kind.name << " after " << length << " of " << bytes.size() << " bytes";
+    }
+  }
+}
+
+TEST_F(PointCloudFile, DamagedAnywhereIsAnErrorOrAsManyPoints) {
+  std::mt19937 random(3);
+  const std::vector<CloudPoint> points = plainPoints();
+  for (const Kind& kind : kKinds) {
+    writePointCloud(folder_ / kind.name, {points.begin(), points.begin() + 40}, kind.encoding);
+    const std::string bytes = bytesOf(folder_ / kind.name);
+    for (int i = 0; i < 2000; ++i) {
+      std::string damaged = bytes;
+      damaged[random() % damaged.size()] = static_cast<char>(random());
+      try {
+        const PointCloudContent content = parse(kind.name, damaged);
+        EXPECT_EQ(content.points.size() + content.without_place, 40U);
+      } catch (const std::runtime_error&) {
+      }
+    }
+  }
+}
+
+TEST_F(PointCloudFile, ThatIsWrongSaysWhereAndWhatWasExpected) {
+  const std::string pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n";
+  const std::string ply = "ply\nformat ascii 1.0\nelement vertex 1\n";
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
+  struct Case {
+    const char* name;
+    std::string bytes;
+    std::vector<std::string> parts;
+  };
+  for (const Case& wrong : std::vector<Case>{
+           {"a.pcd", "", {"line 1: the file ends: expected a line of a PCD header"}},
+           {"b.pcd", "FIELDS x y", {"line 1: 'FIELDS x y', then the file ends"}},
+           {"c.pcd", "ply\n", {"line 1: 'ply': expected one of VERSION FIELDS"}},
+           {"d.pcd", pcd + "DATA ascii\n1 2 banana\n", {"line 8: z 'banana': expected a number"}},
+           {"e.pcd", pcd + "DATA ascii\n1 2\n", {"line 8: point 1 has 2 numbers: expected 3"}},
+           {"f.pcd", pcd + "DATA ascii\n1 2 3\n4 5 6\n", {"byte", "more bytes: expected the end"}},
+           {"g.pcd", pcd + "DATA ascii\n", {"line 8: the file ends: expected point 1 of 1"}},
+           {"h.pcd", pcd + "DATA ascii\n1 2 3", {"line 8: '1 2 3', then the file ends"}},
+           {"i.pcd", pcd + "DATA ascii\n1 2 1e39\n", {"line 8: z '1e39': expected a number"}},
+           {"j.pcd",
+            pcd + "DATA binary\n12345678901",
+            {"11 bytes are left: expected 1 points of 12"}},
+           {"k.pcd", pcd + "DATA binary\n1234567890123", {"1 more bytes: expected the end"}},
+           {"l.pcd", pcd + "DATA zip\n", {"line 7: DATA 'zip': expected ascii, binary or"}},
+           {"m.pcd",
+            "FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 0\nDATA ascii\n",
+            {"no field z: expected x, y and z among the fields (x, y)"}},
+           {"n.pcd",
+            "FIELDS x y z\nSIZE 4 4\nTYPE F F F\nPOINTS 0\nDATA ascii\n",
+            {"line 2: 2 values: expected 3, as many as FIELDS has"}},
+           {"o.pcd",
+            "FIELDS x y z\nSIZE 4 4 3\nTYPE F F F\nPOINTS 0\nDATA ascii\n",
+            {"line 3: TYPE 'F' of SIZE '3': expected I or U"}},
+           {"p.pcd",
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA ascii\n",
+            {"line 4: DATA ends the header: expected POINTS before it"}},
+           {"q.pcd",
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 3\nPOINTS 5\nDATA ascii\n",
+            {"line 6: POINTS 5: expected WIDTH x HEIGHT, 2 x 3"}},
+           {"r.pcd",
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS -1\nDATA ascii\n",
+            {"line 4: '-1': expected a whole number from 0 on"}},
+           {"s.pcd",
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 18446744073709551615\nDATA binary\n",
+            {"0 bytes are left: expected 18446744073709551615 points of 12 bytes"}},
+           {"t.pcd",
+            "FIELDS x y z x\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 0\nDATA ascii\n",
+            {"field x is there twice"}},
+           {"u.pcd", "FIELDS x y z\nFIELDS x y z\n", {"line 2: FIELDS again: expected it once"}},
+           {"v.pcd",
+            pcd + "DATA binary_compressed\n" + raw(12U) + raw(24U) + "123456789012",
+            {"24 bytes when decompressed: expected 1 points of 12 bytes"}},
+           {"w.pcd",
+            pcd + "DATA binary_compressed\n" + raw(12U) + raw(12U) +
+                "\377\377\377\377\377\377\377\377\377\377\377\377",
+            {"12 compressed bytes: expected 12 when decompressed: is the file damaged?"}},
+           {"a.ply", "PLY\n", {"line 1: not a PLY file: expected ply"}},
+           {"b.ply", "ply\nformat ascii 2.0\n", {"line 2: not a known format"}},
+           {"c.ply", ply + "property float\n", {"line 4: expected property TYPE NAME"}},
+           {"d.ply", ply + "property half x\n", {"line 4: type 'half': expected char"}},
+           {"e.ply", ply + "end_header\n", {"no field x"}},
+           {"f.ply",
+            ply + xyz + "property list uchar int l\nend_header\n1 2 3 0\n",
+            {"line 7: a list in element vertex"}},
+           {"g.ply", ply + xyz + "end_header\n1 2 x\n", {"line 8: z 'x': expected a number"}},
+           {"h.ply", ply + xyz, {"line 7: the file ends: expected a line of a PLY header"}},
+           {"i.ply",
+            "ply\nformat ascii 1.0\nend_header\n",
+            {"line 3: end_header without an element vertex"}},
+           {"j.ply", ply + xyz + "end\033[2J\n", {"line 7: 'end\\x1b[2J': expected comment"}},
+           {"k.ply",
+            "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar int l\n"
+            "element vertex 1\n" +
+                xyz + "end_header\n",
+            {"line 4: a list in element face: expected lists behind element vertex"}},
+           {"cloud.xyz", "1 2 3\n", {"extension '.xyz': expected .pcd or .ply"}},
+       }) {
+    const std::string refusal = refusalOf(wrong.name, wrong.bytes);
+    for (const std::string& part : wrong.parts) EXPECT_THAT(refusal, HasSubstr(part)) << wrong.name;
+  }
+}
+
+TEST_F(PointCloudFile, ThatIsNotThereOrNoFileIsAnError) {
+  std::filesystem::create_directories(folder_ / "folder.ply");
+
+  EXPECT_EQ(refusalOf(folder_ / "nowhere.pcd"), "there is no such file");
+  EXPECT_EQ(refusalOf(folder_ / "folder.ply"), "it is not a regular file");
+}
+
+TEST_F(PointCloudFile, OfAnUnknownFormatOrEncodingIsNotWritten) {
+  const auto refusal = [this](const char* name, PointCloudEncoding encoding) -> std::string {
+    try {
+      writePointCloud(folder_ / name, {{{1, 2, 3}, 1.0F}}, encoding);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  EXPECT_THAT(refusal("map.las", PointCloudEncoding::kBinary),
+              AllOf(HasSubstr("map.las"), HasSubstr("expected .pcd or .ply")));
+  EXPECT_THAT(refusal("map", PointCloudEncoding::kBinary), HasSubstr("expected .pcd or .ply"));
+  EXPECT_THAT(refusal("map.ply", PointCloudEncoding::kCompressed),
+              HasSubstr("compressed PLY: expected binary or ASCII"));
+  EXPECT_EQ(refusal("MAP.PLY", PointCloudEncoding::kAscii), "accepted");
+  EXPECT_EQ(filesInFolder(), 1U);
+}
+
+TEST_F(PointCloudFile, WithAPointThatAFloatCannotHoldIsNotWritten) {
+  for (const CloudPoint& point :
+       {CloudPoint{{1e39, 0, 0}, 1.0F}, CloudPoint{{0, std::nan(""), 0}, 1.0F},
+        CloudPoint{{0, 0, 0}, std::numeric_limits<float>::infinity()}}) {
+    for (const Kind& kind : kKinds) {
+      try {
+        writePointCloud(folder_ / kind.name, {{{1, 2, 3}, 1.0F}, point}, kind.encoding);
+        ADD_FAILURE() << "accepted";
+      } catch (const std::runtime_error& error) {
+        EXPECT_THAT(error.what(), AllOf(HasSubstr(kind.name), HasSubstr("point 1 ("),
+                                        HasSubstr("expected finite numbers")));
+      }
+    }
+  }
+  EXPECT_EQ(filesInFolder(), 0U);
+}
+
+TEST_F(PointCloudFile, ReplacesTheFileThatWasThere) {
+  writePcd(folder_ / "map.pcd", {{{1, 2, 3}, 1.0F}, {{1, 2, 3}, 1.0F}});
+  writePcd(folder_ / "map.pcd", {{{4, 5, 6}, 1.0F}});
+
+  pcl::PointCloud<pcl::PointXYZI> cloud;
+  ASSERT_EQ(pcl::io::loadPCDFile((folder_ / "map.pcd").string(), cloud), 0);
+  ASSERT_EQ(cloud.size(), 1U);
+  EXPECT_EQ(cloud[0].x, 4.0F);
+}
+
+TEST_F(PointCloudFile, ThatCannotBeWrittenIsAnErrorNamingThePath) {
+  const std::filesystem::path path = folder_ / "nowhere" / "map.pcd";
+  for (const std::vector<CloudPoint>& points :
+       {std::vector<CloudPoint>{}, std::vector<CloudPoint>{{{1, 2, 3}, 1.0F}}}) {
+    try {
+      writePcd(path, points);
+      ADD_FAILURE() << "no error with " << points.size() << " points";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(path.string()));
+    }
+  }
+}
+
+TEST_F(PointCloudFile, ThatCannotBeWrittenLeavesNoHalfFile) {
+  // A folder of that name: writing beside it works, renaming onto it does not.
+  std::filesystem::create_directories(folder_ / "map.pcd" / "inside");
+
+  EXPECT_THROW(writePcd(folder_ / "map.pcd", {{{1, 2, 3}, 1.0F}}), std::runtime_error);
+
+  EXPECT_EQ(filesInFolder(), 1U);
+  EXPECT_TRUE(std::filesystem::is_directory(folder_ / "map.pcd"));
+}
+
+TEST_F(PointCloudFile, OnAFullDeviceIsAnError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  for (const Kind& kind : kKinds) {
+    const std::filesystem::path path = folder_ / kind.name;
+    std::filesystem::create_symlink("/dev/full", temporaryName(path));
+
+    EXPECT_THROW(writePointCloud(path, {{{1, 2, 3}, 1.0F}}, kind.encoding), std::runtime_error);
+    EXPECT_FALSE(std::filesystem::exists(path));
+  }
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/metrics/cloud_metrics.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <limits>
+
+namespace efm {
+namespace {
+
+using Points = std::vector<CloudPoint>;
+
+Points pointsAt(const std::vector<Eigen::Vector3d>& positions) {
+  Points points;
+  for (const Eigen::Vector3d& p_world : positions) points.push_back({p_world, 1, 1});
+  return points;
+}
+
+Points drawPoints() {
+  const auto coordinate = rc::gen::inRange(-100, 101);
+  const auto drawn = *rc::gen::nonEmpty(rc::gen::container<std::vector<std::tuple<int, int, int>>>(
+      rc::gen::tuple(coordinate, coordinate, coordinate)));
+  std::vector<Eigen::Vector3d> positions;
+  for (const auto& [x, y, z] : drawn) positions.emplace_back(0.1 * x, 0.1 * y, 0.1 * z);
+  return pointsAt(positions);
+}
+
+TEST(CloudErrors, AreWorkedOutByHand) {
+  // On a line: the map at 0, 1 and 5, the truth at 0, 1.5, 2 and 2.5.
+  const Points map = pointsAt({{0, 0, 0}, {1, 0, 0}, {5, 0, 0}});
+  const Points truth = pointsAt({{0, 0, 0}, {1.5, 0, 0}, {2, 0, 0}, {2.5, 0, 0}});
+
+  const CloudErrors errors = cloudErrors(map, truth, {0.5, 1, 3});
+
+  // Map to truth 0, 0.5, 2.5; truth to map 0, 0.5, 1, 1.5.
+  EXPECT_DOUBLE_EQ(errors.accuracy.mean, 1);
+  EXPECT_DOUBLE_EQ(errors.accuracy.median, 0.5);
+  EXPECT_DOUBLE_EQ(errors.accuracy_90_m, 2.5);
+  EXPECT_DOUBLE_EQ(errors.gaps.mean, 0.75);
+  ASSERT_EQ(errors.steps.size(), 3U);
+  EXPECT_DOUBLE_EQ(errors.steps[0].within, 2.0 / 3);
+  EXPECT_DOUBLE_EQ(errors.steps[0].outliers, 1.0 / 3);
+  EXPECT_DOUBLE_EQ(errors.steps[0].completeness, 2.0 / 4);
+  EXPECT_DOUBLE_EQ(errors.steps[0].f1, 4.0 / 7);
+  EXPECT_DOUBLE_EQ(errors.steps[1].completeness, 3.0 / 4);
+  EXPECT_DOUBLE_EQ(errors.steps[2].outliers, 0);
+  EXPECT_DOUBLE_EQ(errors.steps[2].completeness, 1);
+}
+
+TEST(CloudErrors, CompletenessMayHaveATruthOfItsOwn) {
+  const Points map = pointsAt({{0, 0, 0}, {1, 0, 0}});
+  const CloudErrors errors = cloudErrors(map, pointsAt({{0, 0, 0}}), pointsAt({{1, 0, 0}}), {0.5});
+  EXPECT_EQ(errors.steps[0].within, 0.5);
+  EXPECT_EQ(errors.steps[0].completeness, 1);
+}
+
+TEST(CloudErrors, AreExactFarFromTheOrigin) {
+  const Eigen::Vector3d far(1e6, -2e6, 3e6);
+  const std::vector<double> distances =
+      nearestDistances(pointsAt({far}), pointsAt({far + Eigen::Vector3d(0.001, 0, 0)}));
+  EXPECT_NEAR(distances.at(0), 0.001, 1e-9);
+}
+
+TEST(CloudErrors, RefuseWhatCannotBeCompared) {
+  const Points one = pointsAt({{0, 0, 0}});
+  EXPECT_THROW(cloudErrors({}, one, {1}), std::invalid_argument);
+  EXPECT_THROW(cloudErrors(one, {}, {1}), std::invalid_argument);
+  EXPECT_THROW(cloudErrors(one, one, {0}), std::invalid_argument);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(cloudErrors(one, pointsAt({{0, nan, 0}}), {1}), std::invalid_argument);
+  EXPECT_THROW(cloudErrors(pointsAt({{nan, 0, 0}}), one, {1}), std::invalid_argument);
+}
+
+RC_GTEST_PROP(NearestDistances, AreThoseOfLookingAtAll, ()) {
+  const Points points = drawPoints();
+  const Points others = drawPoints();
+  const std::vector<double> distances = nearestDistances(points, others);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const CloudPoint& other : others) {
+      nearest = std::min(nearest, (points[i].p_world - other.p_world).norm());
+    }
+    RC_ASSERT(std::abs(distances[i] - nearest) < 1e-5);
+  }
+}
+
+RC_GTEST_PROP(CloudErrors, DoNotSeeWhereTheWorldLiesAndScaleWithIt, ()) {
+  const Points map = drawPoints();
+  const Points truth = drawPoints();
+  const Eigen::AngleAxisd turn(0.01 * *rc::gen::inRange(0, 300),
+                               Eigen::Vector3d(1, 2, 3).normalized());
+  const auto moved = [&](Points points) {
+    for (CloudPoint& point : points) {
+      point.p_world = 2 * (turn * point.p_world) + Eigen::Vector3d(10, 20, 30);
+    }
+    return points;
+  };
+  const CloudErrors a = cloudErrors(map, truth, {});
+  const CloudErrors b = cloudErrors(moved(map), moved(truth), {});
+  RC_ASSERT(std::abs(b.accuracy.mean - 2 * a.accuracy.mean) < 1e-4);
+  RC_ASSERT(std::abs(b.accuracy_90_m - 2 * a.accuracy_90_m) < 1e-4);
+  RC_ASSERT(std::abs(b.gaps.largest - 2 * a.gaps.largest) < 1e-4);
+}
+
+}  // namespace
+}  // namespace efm

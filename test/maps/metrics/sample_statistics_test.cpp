@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/metrics/sample_statistics.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+namespace efm {
+namespace {
+
+TEST(SampleStatistics, AreWorkedOutByHand) {
+  // Sum 10, squares 1 + 1 + 4 + 36 = 42; differences from 2.5: 1.5^2 * 2 + 0.5^2 + 3.5^2 = 17.
+  const SampleStatistics statistics = statisticsOf({1, 6, 2, 1});
+  EXPECT_EQ(statistics.count, 4U);
+  EXPECT_DOUBLE_EQ(statistics.mean, 2.5);
+  EXPECT_DOUBLE_EQ(statistics.median, 1.5);
+  EXPECT_DOUBLE_EQ(statistics.rms, std::sqrt(10.5));
+  EXPECT_DOUBLE_EQ(statistics.deviation, std::sqrt(17.0 / 4));
+  EXPECT_EQ(statistics.least, 1);
+  EXPECT_EQ(statistics.largest, 6);
+}
+
+TEST(SampleStatistics, OfNothingAreZero) {
+  EXPECT_EQ(statisticsOf({}).count, 0U);
+  EXPECT_EQ(statisticsOf({}).rms, 0);
+  EXPECT_EQ(quantileOf({}, 0.5), 0);
+}
+
+TEST(SampleStatistics, AQuantileIsTheSmallestValueThatTheShareDoesNotExceed) {
+  std::vector<double> values(10);
+  std::iota(values.rbegin(), values.rend(), 1.0);  // 10 … 1
+  EXPECT_EQ(quantileOf(values, 0.9), 9);
+  EXPECT_EQ(quantileOf(values, 0.91), 10);
+  EXPECT_EQ(quantileOf(values, 1), 10);
+  EXPECT_EQ(quantileOf(values, 1e-9), 1);
+  EXPECT_THROW(quantileOf(values, 0), std::invalid_argument);
+}
+
+RC_GTEST_PROP(SampleStatistics, SquareOfRmsIsSquareOfMeanPlusVariance, ()) {
+  const auto drawn = *rc::gen::nonEmpty(rc::gen::container<std::vector<double>>(
+      rc::gen::map(rc::gen::inRange(-1000, 1000), [](int v) { return 0.01 * v; })));
+  const SampleStatistics s = statisticsOf(drawn);
+  RC_ASSERT(std::abs(s.rms * s.rms - s.mean * s.mean - s.deviation * s.deviation) < 1e-9);
+  RC_ASSERT(s.least <= s.median);
+  RC_ASSERT(s.median <= s.largest);
+}
+
+}  // namespace
+}  // namespace efm

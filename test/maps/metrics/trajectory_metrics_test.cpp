@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/metrics/trajectory_metrics.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+
+namespace efm {
+namespace {
+
+using testing::DoubleNear;
+using testing::ElementsAre;
+using Unit = RelativeSpacing::Unit;
+
+Rigid3 at(double x, double y = 0, double z = 0, double yaw_rad = 0) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitZ())), {x, y, z}};
+}
+
+PosePair pair(double t_s, const Rigid3& T_map_rig, const Rigid3& T_world_rig) {
+  return {static_cast<std::int64_t>(std::llround(t_s * 1e9)), T_map_rig, T_world_rig};
+}
+
+double drawNumber(double limit) { return limit * 1e-3 * *rc::gen::inRange(-1000, 1001); }
+
+Rigid3 drawPose(double limit_m) {
+  const Eigen::Vector3d turn(drawNumber(1), drawNumber(1), drawNumber(1));
+  const double angle = turn.norm();
+  const Eigen::Vector3d axis = angle > 0 ? Eigen::Vector3d(turn / angle) : Eigen::Vector3d::UnitX();
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)),
+          {drawNumber(limit_m), drawNumber(limit_m), drawNumber(limit_m)}};
+}
+
+/// A bent path and an estimate that is off it.
+std::vector<PosePair> drawPairs() {
+  const int count = *rc::gen::inRange(4, 12);
+  std::vector<PosePair> pairs;
+  for (int i = 0; i < count; ++i) {
+    const Rigid3 T_world_rig = at(i, 0.3 * i * i, std::sin(i)) * drawPose(0.1);
+    pairs.push_back(pair(0.1 * i, T_world_rig * drawPose(0.2), T_world_rig));
+  }
+  return pairs;
+}
+
+void expectNear(const std::vector<double>& a, const std::vector<double>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_NEAR(a[i], b[i], 1e-9) << i;
+}
+
+TEST(AbsoluteErrors, AreWorkedOutByHand) {
+  const std::vector<PosePair> pairs = {pair(0, at(0, 0, 0), at(0, 3, 4)),
+                                       pair(1, at(1, 0, 0, 0.25), at(1, 0, 0))};
+  const PoseErrors errors = absoluteErrors(pairs, {});
+  EXPECT_THAT(errors.translation_m, ElementsAre(DoubleNear(5, 1e-15), 0));
+  EXPECT_THAT(errors.rotation_rad, ElementsAre(0, DoubleNear(0.25, 1e-15)));
+  EXPECT_DOUBLE_EQ(statisticsOf(errors.translation_m).rms, 5 / std::sqrt(2.0));
+}
+
+TEST(AbsoluteErrors, AlignmentOfThreePointsIsWorkedOutByHand) {
+  // The estimate is the truth turned by a quarter and moved.
+  const Rigid3 T_map_world = at(5, 6, 7, M_PI / 2);
+  std::vector<PosePair> pairs;
+  for (const Rigid3& T_world_rig : {at(0, 0), at(2, 0), at(0, 1)}) {
+    pairs.push_back(pair(pairs.size(), T_map_world * T_world_rig, T_world_rig));
+  }
+  const Rigid3 T_world_map = alignTrajectories(pairs, TrajectoryAlignment::kSe3);
+  const Rigid3 expected = T_map_world.inverse();
+  EXPECT_LT((T_world_map.translation - expected.translation).norm(), 1e-12);
+  EXPECT_LT(T_world_map.rotation.angularDistance(expected.rotation), 1e-12);
+}
+
+TEST(AbsoluteErrors, AlignmentNeverScales) {
+  // Twice as large: the middle stays, the corners are off by their distances from it.
+  std::vector<PosePair> pairs;
+  for (const auto& [x, y] : {std::pair{1, 1}, {-1, 1}, {-1, -1}, {1, -1}}) {
+    pairs.push_back(pair(pairs.size(), at(2 * x, 2 * y), at(x, y)));
+  }
+  const Rigid3 T_world_map = alignTrajectories(pairs, TrajectoryAlignment::kSe3);
+  for (const double error_m : absoluteErrors(pairs, T_world_map).translation_m) {
+    EXPECT_NEAR(error_m, std::sqrt(2.0), 1e-12);
+  }
+}
+
+TEST(AbsoluteErrors, AlignmentAtTheOriginMakesTheFirstPosesCoincide) {
+  const std::vector<PosePair> pairs = {pair(0, at(1, 2, 3, 1), at(0, 0, 0, 0.5)),
+                                       pair(1, at(1, 2, 3, 1) * at(1), at(0, 0, 0, 0.5) * at(2))};
+  const PoseErrors errors =
+      absoluteErrors(pairs, alignTrajectories(pairs, TrajectoryAlignment::kOrigin));
+  EXPECT_THAT(errors.translation_m, ElementsAre(DoubleNear(0, 1e-12), DoubleNear(1, 1e-12)));
+}
+
+TEST(AbsoluteErrors, WhatNoAlignmentIsFoundForIsRefused) {
+  const auto along = [](double slope) {
+    std::vector<PosePair> pairs;
+    for (int i = 0; i < 5; ++i) pairs.push_back(pair(i, at(i, i * i), at(i, slope * i, 0.1 * i)));
+    return pairs;
+  };
+  EXPECT_THROW(alignTrajectories(along(3), TrajectoryAlignment::kSe3), std::invalid_argument);
+  EXPECT_THROW(alignTrajectories({}, TrajectoryAlignment::kNone), std::invalid_argument);
+  EXPECT_THROW(
+      alignTrajectories({pair(0, at(0), at(0)), pair(1, at(1), at(1))}, TrajectoryAlignment::kSe3),
+      std::invalid_argument);
+}
+
+TEST(RelativeErrors, AreWorkedOutByHand) {
+  // The truth goes a metre per second; the estimate 1.1 m, and turns by 0.1 in its second step.
+  std::vector<PosePair> pairs;
+  Rigid3 T_map_rig;
+  for (int i = 0; i < 4; ++i) {
+    pairs.push_back(pair(i, T_map_rig, at(i)));
+    T_map_rig = T_map_rig * at(1.1, 0, 0, i == 1 ? 0.1 : 0);
+  }
+  const PoseErrors steps = relativeErrors(pairs, {Unit::kFrames, 1});
+  EXPECT_THAT(steps.translation_m,
+              ElementsAre(DoubleNear(0.1, 1e-12), DoubleNear(0.1, 1e-12), DoubleNear(0.1, 1e-12)));
+  EXPECT_THAT(steps.rotation_rad,
+              ElementsAre(DoubleNear(0, 1e-12), DoubleNear(0.1, 1e-12), DoubleNear(0, 1e-12)));
+
+  const PoseErrors two = relativeErrors(pairs, {Unit::kFrames, 2});
+  EXPECT_THAT(two.translation_m,
+              ElementsAre(DoubleNear(0.2, 1e-12),
+                          DoubleNear(std::hypot(1.1 + 1.1 * std::cos(0.1) - 2, 1.1 * std::sin(0.1)),
+                                     1e-12)));
+  expectNear(relativeErrors(pairs, {Unit::kMetres, 2}).translation_m, two.translation_m);
+  expectNear(relativeErrors(pairs, {Unit::kSeconds, 2}).translation_m, two.translation_m);
+}
+
+TEST(RelativeErrors, TakeTheNearestOtherEndWithinAFifth) {
+  std::vector<PosePair> pairs;
+  for (const double x : {0.0, 0.9, 1.15, 2.0, 2.0, 3.5}) pairs.push_back(pair(x, at(x), at(x)));
+  // From 0: 0.9. From 0.9: 2.0, the first. From 1.15: 2.0. From both 2.0: nothing near 3.
+  EXPECT_EQ(relativeErrors(pairs, {Unit::kMetres, 1}).translation_m.size(), 3U);
+  EXPECT_EQ(relativeErrors(pairs, {Unit::kSeconds, 1}).translation_m.size(), 3U);
+  EXPECT_DOUBLE_EQ(trueLength(pairs), 3.5);
+}
+
+TEST(RelativeErrors, OfATrajectoryThatIsTooShortAreNone) {
+  const std::vector<PosePair> pairs = {pair(0, at(0), at(0)), pair(1, at(1), at(1))};
+  for (const Unit unit : {Unit::kFrames, Unit::kMetres, Unit::kSeconds}) {
+    EXPECT_TRUE(relativeErrors(pairs, {unit, 10}).translation_m.empty());
+    EXPECT_TRUE(relativeErrors({}, {unit, 1}).translation_m.empty());
+  }
+  EXPECT_THROW(relativeErrors(pairs, {Unit::kFrames, 0.5}), std::invalid_argument);
+  EXPECT_THROW(relativeErrors(pairs, {Unit::kMetres, 0}), std::invalid_argument);
+}
+
+RC_GTEST_PROP(TrajectoryErrors, DoNotSeeWhereTheEstimateOrTheTruthLies, ()) {
+  const std::vector<PosePair> pairs = drawPairs();
+  const Rigid3 T_other_map = drawPose(100);
+  const Rigid3 T_other_world = drawPose(100);
+  std::vector<PosePair> moved = pairs;
+  for (PosePair& one : moved) {
+    one.T_map_rig = T_other_map * one.T_map_rig;
+    one.T_world_rig = T_other_world * one.T_world_rig;
+  }
+  const auto absolute = [](const std::vector<PosePair>& of) {
+    return absoluteErrors(of, alignTrajectories(of, TrajectoryAlignment::kSe3));
+  };
+  const PoseErrors a = absolute(pairs);
+  const PoseErrors b = absolute(moved);
+  const PoseErrors c = relativeErrors(pairs, {Unit::kMetres, 2});
+  const PoseErrors d = relativeErrors(moved, {Unit::kMetres, 2});
+  RC_ASSERT(c.translation_m.size() == d.translation_m.size());
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    RC_ASSERT(std::abs(a.translation_m[i] - b.translation_m[i]) < 1e-6);
+    RC_ASSERT(std::abs(a.rotation_rad[i] - b.rotation_rad[i]) < 1e-6);
+  }
+  for (std::size_t i = 0; i < c.translation_m.size(); ++i) {
+    RC_ASSERT(std::abs(c.translation_m[i] - d.translation_m[i]) < 1e-6);
+    RC_ASSERT(std::abs(c.rotation_rad[i] - d.rotation_rad[i]) < 1e-6);
+  }
+}
+
+RC_GTEST_PROP(TrajectoryErrors, NoMotionAlignsBetterThanThatOfLeastSquares, ()) {
+  const std::vector<PosePair> pairs = drawPairs();
+  const Rigid3 T_world_map = alignTrajectories(pairs, TrajectoryAlignment::kSe3);
+  const double best = statisticsOf(absoluteErrors(pairs, T_world_map).translation_m).rms;
+  const Rigid3 other = T_world_map * drawPose(0.5);
+  RC_ASSERT(best <= statisticsOf(absoluteErrors(pairs, other).translation_m).rms + 1e-12);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "mapping/keyframes/keyframe_depth_map.h"
+
+namespace efm::test {
+
+/// A straight edge in the world, metres.
+struct Edge {
+  Eigen::Vector3d a = Eigen::Vector3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+};
+using EdgeWorld = std::vector<Edge>;
+
+inline ReferenceView smallView() { return {160, 120, 130, 130, 79.5, 59.5}; }
+
+/// Edges of half a metre to one and a half, of any direction, all around the origin: 2 to 4 m away
+/// from the world's y axis.
+inline EdgeWorld edgesAround(int count, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  EdgeWorld world;
+  for (int i = 0; i < count; ++i) {
+    const double angle = M_PI * uniform(random);
+    const double away_m = 3 + uniform(random);
+    const Eigen::Vector3d middle(away_m * std::sin(angle), 1.2 * uniform(random),
+                                 away_m * std::cos(angle));
+    const Eigen::Vector3d direction(uniform(random), uniform(random), uniform(random));
+    const Eigen::Vector3d half = direction.normalized() * (0.5 + 0.25 * uniform(random));
+    world.push_back({middle - half, middle + half});
+  }
+  return world;
+}
+
+/// The world's y axis points down, as a view's does: so this one looks along z, turned by an angle.
+inline Rigid3 viewTurned(double yaw_rad, const Eigen::Vector3d& p_world) {
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitY())), p_world};
+}
+
+/// A keyframe without any points.
+inline KeyframeDepthMap emptyKeyframe(const ReferenceView& view) {
+  KeyframeDepthMap keyframe;
+  keyframe.view = view;
+  keyframe.map.depth = cv::Mat1f(view.height, view.width, 0.0F);
+  keyframe.map.confidence = cv::Mat1f(view.height, view.width, 0.0F);
+  keyframe.map.variance = cv::Mat1f(view.height, view.width, 0.0F);
+  return keyframe;
+}
+
+/// What a view sees of the edges: the nearest in each pixel, whose inverse depth errs by `sigma`
+/// (1/m), and nobody knows better than by that.
+inline KeyframeDepthMap seenFrom(const EdgeWorld& world, const Rigid3& T_world_ref, double sigma,
+                                 std::mt19937& random) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  keyframe.T_world_ref = T_world_ref;
+  const Rigid3 T_ref_world = T_world_ref.inverse();
+  for (const Edge& edge : world) {
+    const int steps = static_cast<int>((edge.b - edge.a).norm() / 0.004);
+    for (int i = 0; i <= steps; ++i) {
+      const Eigen::Vector3d p_ref =
+          T_ref_world * Eigen::Vector3d(edge.a + (edge.b - edge.a) * i / steps);
+      if (p_ref.z() < 0.2) continue;
+      const Eigen::Vector2d at = keyframe.view.project(p_ref);
+      const cv::Point pixel(static_cast<int>(std::lround(at.x())),
+                            static_cast<int>(std::lround(at.y())));
+      if (!cv::Rect({0, 0}, keyframe.map.depth.size()).contains(pixel)) continue;
+      float& depth = keyframe.map.depth(pixel);
+      if (depth == 0 || p_ref.z() < depth) depth = static_cast<float>(p_ref.z());
+    }
+  }
+  std::normal_distribution<double> error(0, sigma);
+  for (auto depth = keyframe.map.depth.begin(); depth != keyframe.map.depth.end(); ++depth) {
+    if (*depth == 0) continue;
+    *depth = static_cast<float>(1 / std::max(0.05, 1 / *depth + error(random)));
+    keyframe.map.variance(depth.pos()) = static_cast<float>(sigma * sigma);
+    keyframe.map.confidence(depth.pos()) = 1;
+  }
+  return keyframe;
+}
+
+/// What a good keyframe errs by: 1 cm at 2 m, 4 cm at 4 m.
+constexpr double kInverseDepthSigma = 0.0025;  // 1/m
+
+}  // namespace efm::test

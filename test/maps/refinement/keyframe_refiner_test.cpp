@@ -1,0 +1,543 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/keyframe_refiner.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "edge_world.h"
+#include "random_poses.h"
+
+namespace efm {
+namespace {
+
+using test::drawMotion;
+using test::EdgeWorld;
+using test::kInverseDepthSigma;
+using test::metresApart;
+using test::radiansApart;
+using test::sameBits;
+using test::viewTurned;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+using Poses = std::vector<Rigid3>;
+
+constexpr double kDeg = M_PI / 180;
+
+/// Fewer points than by default: as good here, and faster.
+RefinementOptions quick() {
+  RefinementOptions options;
+  options.points.max_points = 300;
+  options.points.max_map_points = 3000;
+  return options;
+}
+
+/// On a circle, looking outwards, a keyframe every `step_deg`; 7 cm apart at 5 deg.
+Poses circle(int count, double step_deg) {
+  Poses poses;
+  for (int i = 0; i < count; ++i) {
+    const double yaw = i * step_deg * kDeg;
+    poses.push_back(viewTurned(
+        yaw, 0.8 * Eigen::Vector3d(std::sin(yaw), 0.1 * std::sin(3 * yaw), std::cos(yaw))));
+  }
+  return poses;
+}
+
+/// What keyframes saw, wherever a tracker says that they were.
+std::vector<KeyframeDepthMap> seenAlong(const EdgeWorld& world, const Poses& truth,
+                                        std::mt19937& random) {
+  std::vector<KeyframeDepthMap> seen;
+  for (const Rigid3& T_world_ref : truth) {
+    seen.push_back(test::seenFrom(world, T_world_ref, kInverseDepthSigma, random));
+  }
+  return seen;
+}
+
+Poses noisy(const Poses& truth, double sigma_m, double sigma_rad, std::mt19937& random) {
+  Poses tracked;
+  for (const Rigid3& pose : truth) tracked.push_back(pose * drawMotion(sigma_m, sigma_rad, random));
+  return tracked;
+}
+
+/// Every metre of way adds so much.
+Poses drifting(const Poses& truth, double per_m, double rad_per_m, std::mt19937& random) {
+  Poses tracked = {truth.front()};
+  for (std::size_t i = 1; i < truth.size(); ++i) {
+    const Rigid3 motion = truth[i - 1].inverse() * truth[i];
+    const double root_way = std::sqrt(motion.translation.norm());
+    tracked.push_back(tracked.back() * motion *
+                      drawMotion(per_m * root_way, rad_per_m * root_way, random));
+  }
+  return tracked;
+}
+
+/// Refined by all keyframes.
+KeyframeRefiner refine(const std::vector<KeyframeDepthMap>& seen, const Poses& tracked,
+                       const RefinementOptions& options) {
+  KeyframeRefiner refiner(options);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    refiner.add(RegistrationCloud(seen[i], options.points), tracked[i]);
+  }
+  refiner.finish();
+  return refiner;
+}
+
+Poses posesOf(const KeyframeRefiner& refiner) {
+  Poses poses;
+  for (std::size_t i = 0; i < refiner.keyframes(); ++i) poses.push_back(refiner.T_world_ref(i));
+  return poses;
+}
+
+struct Errors {
+  double m = 0;
+  double rad = 0;
+};
+
+/// Root mean squares over all pairs of keyframes, of one as the other sees it. No alignment: over a
+/// short arc a single keyframe that is off turns what is aligned by its places.
+Errors errorsOf(const Poses& estimate, const Poses& truth) {
+  double squared_m = 0;
+  double squared_rad = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    for (std::size_t j = 0; j < truth.size(); ++j) {
+      const Rigid3 T_i_j = truth[i].inverse() * truth[j];
+      const Rigid3 estimated = estimate[i].inverse() * estimate[j];
+      squared_m += std::pow(metresApart(estimated, T_i_j), 2);
+      squared_rad += std::pow(radiansApart(estimated, T_i_j), 2);
+    }
+  }
+  const auto pairs = static_cast<double>(truth.size() * (truth.size() - 1));
+  return {std::sqrt(squared_m / pairs), std::sqrt(squared_rad / pairs)};
+}
+
+TEST(KeyframeRefiner, TakesMostOfATrackersNoiseAway) {
+  Errors before;
+  Errors after;
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    std::mt19937 random(seed);
+    const Poses truth = circle(16, 5);
+    const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
+    const Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+    const KeyframeRefiner refiner = refine(seen, tracked, quick());
+    EXPECT_GE(refiner.counts().registered, 14U) << seed;
+    const Errors by_tracker = errorsOf(tracked, truth);
+    const Errors refined = errorsOf(posesOf(refiner), truth);
+    before.m += by_tracker.m;
+    before.rad += by_tracker.rad;
+    after.m += refined.m;
+    after.rad += refined.rad;
+  }
+  EXPECT_LT(after.m, 0.35 * before.m);
+  EXPECT_LT(after.rad, 0.25 * before.rad);
+}
+
+TEST(KeyframeRefiner, LeavesExactPosesWhereTheyAre) {
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    std::mt19937 random(seed);
+    const Poses truth = circle(12, 5);
+    const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
+    const Poses refined = posesOf(refine(seen, truth, quick()));
+    const Errors errors = errorsOf(refined, truth);
+    EXPECT_LT(errors.m, 0.002) << seed;
+    EXPECT_LT(errors.rad, 0.05 * kDeg) << seed;
+  }
+}
+
+TEST(KeyframeRefiner, ALoopTakesTheDriftOutOfItsEnd) {
+  std::mt19937 random(1);
+  const Poses truth = circle(36, 11);  // 385 deg: the end sees the begin
+  const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
+  const Poses tracked = drifting(truth, 0.03, 1.5 * kDeg, random);
+  const Rigid3 end = truth.front().inverse() * truth.back();
+  const Rigid3 tracked_end = tracked.front().inverse() * tracked.back();
+  RefinementOptions options = quick();
+  options.tracker.drift_m = 0.03;
+  options.tracker.drift_rad = 1.5 * kDeg;
+  for (const bool loops : {true, false}) {
+    options.loop.loops = loops;
+    const KeyframeRefiner refiner = refine(seen, tracked, options);
+    const Rigid3 refined_end = refiner.T_world_ref(0).inverse() * refiner.T_world_ref(35);
+    if (!loops) {
+      EXPECT_EQ(refiner.counts().loop_checks, 0U);
+      EXPECT_GT(radiansApart(refined_end, end), 0.3 * kDeg) << "nobody would see that loops help";
+      continue;
+    }
+    EXPECT_GE(refiner.counts().loops, 1U);
+    EXPECT_LE(refiner.counts().loops_dropped, refiner.counts().loops);
+    EXPECT_LE(refiner.counts().loops, refiner.counts().loop_checks);
+    EXPECT_LT(metresApart(refined_end, end), 0.3 * metresApart(tracked_end, end));
+    EXPECT_LT(radiansApart(refined_end, end), 0.3 * kDeg) << "twice a registration's error";
+  }
+}
+
+/// One noisy walk in one world, for what holds of any.
+struct Walk {
+  std::mt19937 random{7};
+  Poses truth = circle(10, 5);
+  EdgeWorld world = test::edgesAround(250, random);
+  std::vector<KeyframeDepthMap> seen = seenAlong(world, truth, random);
+  Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+};
+
+TEST(KeyframeRefiner, TheFirstPoseStaysBitForBitAndItIsTheSameTwice) {
+  const Walk walk;
+  const Poses first = posesOf(refine(walk.seen, walk.tracked, quick()));
+  const Poses second = posesOf(refine(walk.seen, walk.tracked, quick()));
+  EXPECT_TRUE(sameBits(first[0], walk.tracked[0]));
+  for (std::size_t i = 0; i < first.size(); ++i) EXPECT_TRUE(sameBits(first[i], second[i])) << i;
+  EXPECT_FALSE(sameBits(first[5], walk.tracked[5]));
+}
+
+TEST(KeyframeRefiner, MovesWithTheWorldHoweverFar) {
+  const Walk walk;
+  const Poses near = posesOf(refine(walk.seen, walk.tracked, quick()));
+  const Rigid3 T_utm_world = viewTurned(0.7, {5e5, -30, 5e6});
+  Poses tracked = walk.tracked;
+  for (Rigid3& pose : tracked) pose = T_utm_world * pose;
+  const Poses far = posesOf(refine(walk.seen, tracked, quick()));
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    // Rounding may change a few neighbours: a part of the millimetres that are left.
+    EXPECT_LT(metresApart(T_utm_world.inverse() * far[i], near[i]), 5e-4) << i;
+    EXPECT_LT(radiansApart(T_utm_world.inverse() * far[i], near[i]), 0.02 * kDeg) << i;
+  }
+}
+
+TEST(KeyframeRefiner, ATrackerThatMisjudgesItselfIsNotMadeWorse) {
+  const Walk walk;
+  const Errors before = errorsOf(walk.tracked, walk.truth);
+  for (const double factor : {0.01, 100.0}) {
+    for (const bool adapt : {true, false}) {
+      RefinementOptions options = quick();
+      options.adapt_tracker = adapt;
+      options.tracker.noise_m *= factor;
+      options.tracker.noise_rad *= factor;
+      options.tracker.drift_m *= factor;
+      options.tracker.drift_rad *= factor;
+      const Errors after = errorsOf(posesOf(refine(walk.seen, walk.tracked, options)), walk.truth);
+      // One that says it is exact keeps its poses, but for how the way's errors are shared out.
+      EXPECT_LT(after.m, 1.1 * before.m) << factor << ", " << adapt;
+      EXPECT_LT(after.rad, 1.1 * before.rad) << factor << ", " << adapt;
+    }
+  }
+}
+
+TEST(KeyframeRefiner, KeyframesWithFewPointsDoNotSpoilTheOthers) {
+  for (const int count : {0, 5, 29}) {
+    Walk walk;
+    for (const std::size_t sparse : {0, 4, 5, 9}) {
+      int left = count;
+      for (float& depth : walk.seen[sparse].map.depth) {
+        if (depth > 0 && left-- <= 0) depth = 0;
+      }
+    }
+    const Poses refined = posesOf(refine(walk.seen, walk.tracked, quick()));
+    const Errors before = errorsOf(walk.tracked, walk.truth);
+    const Errors after = errorsOf(refined, walk.truth);
+    EXPECT_LT(after.m, before.m) << count;
+    EXPECT_LT(after.rad, before.rad) << count;
+    // The others are as good as without them.
+    const auto others = [](const Poses& poses) {
+      return Poses{poses[1], poses[2], poses[3], poses[6], poses[7], poses[8]};
+    };
+    const Errors others_before = errorsOf(others(walk.tracked), others(walk.truth));
+    const Errors others_after = errorsOf(others(refined), others(walk.truth));
+    EXPECT_LT(others_after.m, 0.5 * others_before.m) << count;
+    EXPECT_LT(others_after.rad, 0.5 * others_before.rad) << count;
+  }
+}
+
+TEST(KeyframeRefiner, WithoutAnyPointsTheTrackerStands) {
+  Walk walk;
+  for (KeyframeDepthMap& keyframe : walk.seen) keyframe.map.depth = 0;
+  const KeyframeRefiner refiner = refine(walk.seen, walk.tracked, quick());
+  for (std::size_t i = 0; i < walk.tracked.size(); ++i) {
+    EXPECT_LT(metresApart(refiner.T_world_ref(i), walk.tracked[i]), 1e-6) << i;
+    EXPECT_LT(radiansApart(refiner.T_world_ref(i), walk.tracked[i]), 1e-6) << i;
+  }
+  EXPECT_EQ(refiner.counts().registered, 0U);
+  EXPECT_LT(metresApart(refiner.T_world_tracker(), {}), 1e-6);
+}
+
+TEST(KeyframeRefiner, OfATrackerThatStandsStillTheNoiseIsLessened) {
+  std::mt19937 random(8);
+  const Poses truth(8, viewTurned(0, {0.1, 0, 0}));
+  const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
+  const Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+  const Poses refined = posesOf(refine(seen, tracked, quick()));
+  const auto spread = [](const Poses& poses) {
+    double sum = 0;
+    for (const Rigid3& pose : poses) sum += metresApart(pose, poses.front());
+    return sum;
+  };
+  EXPECT_LT(spread(refined), 0.5 * spread(tracked));
+  const Poses still = posesOf(refine(seen, truth, quick()));
+  for (const Rigid3& pose : still) EXPECT_LT(metresApart(pose, truth[0]), 0.003);
+}
+
+TEST(KeyframeRefiner, AWallOfParallelStripesMakesNothingWorse) {
+  EdgeWorld stripes;
+  for (int y = -4; y <= 4; ++y) stripes.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    std::mt19937 random(seed);
+    Poses truth;
+    for (int i = 0; i < 10; ++i) truth.push_back(viewTurned(0, {0.08 * i, 0, 0}));
+    const auto seen = seenAlong(stripes, truth, random);
+    const Poses tracked = noisy(truth, 0.01, 0.3 * kDeg, random);
+    const Poses refined = posesOf(refine(seen, tracked, quick()));
+    const Errors before = errorsOf(tracked, truth);
+    const Errors after = errorsOf(refined, truth);
+    EXPECT_LT(after.m, 1.1 * before.m) << seed;
+    EXPECT_LT(after.rad, 1.1 * before.rad) << seed;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      EXPECT_LT(std::abs(refined[i].translation.x() - tracked[i].translation.x()), 0.04)
+          << "nothing says where along them: " << i;
+    }
+  }
+}
+
+TEST(KeyframeRefiner, BeforeOneFacingWallItIsBetterThanTheTracker) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  EdgeWorld wall;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::Vector3d middle(3 * uniform(random), 1.2 * uniform(random), 3);
+    const double angle = M_PI * uniform(random);
+    const Eigen::Vector3d half = 0.4 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+    wall.push_back({middle - half, middle + half});
+  }
+  Poses truth;
+  for (int i = 0; i < 10; ++i) truth.push_back(viewTurned(0, {0.05 * i, 0, 0.03 * i}));
+  const auto seen = seenAlong(wall, truth, random);
+  const Poses tracked = noisy(truth, 0.01, 0.3 * kDeg, random);
+  const Errors before = errorsOf(tracked, truth);
+  const Errors after = errorsOf(posesOf(refine(seen, tracked, quick())), truth);
+  // Translation along the wall and rotation look nearly the same.
+  EXPECT_LT(after.m, 0.8 * before.m);
+  EXPECT_LT(after.rad, 0.6 * before.rad);
+}
+
+TEST(KeyframeRefiner, VariancesThatSayNothingMakeNothingWorse) {
+  for (const float variance : {0.0F, 1e-20F, 1e3F, 1e20F}) {
+    Walk walk;
+    for (KeyframeDepthMap& keyframe : walk.seen) keyframe.map.variance = variance;
+    const Errors before = errorsOf(walk.tracked, walk.truth);
+    const Errors after = errorsOf(posesOf(refine(walk.seen, walk.tracked, quick())), walk.truth);
+    EXPECT_LT(after.m, 1.1 * before.m) << variance;
+    EXPECT_LT(after.rad, 1.1 * before.rad) << variance;
+  }
+}
+
+TEST(KeyframeRefiner, AViewOfOnePixelLeavesTheTrackersPoses) {
+  KeyframeDepthMap pixel = test::emptyKeyframe({1, 1, 1, 1, 0, 0});
+  pixel.map.depth = 2;
+  pixel.map.variance = 1e-4F;
+  Poses tracked;
+  for (int i = 0; i < 12; ++i) tracked.push_back(viewTurned(0.01 * i, {0.1 * i, 0, 0}));
+  const Poses refined = posesOf(refine({12, pixel}, tracked, quick()));
+  for (std::size_t i = 0; i < tracked.size(); ++i) {
+    EXPECT_LT(metresApart(refined[i], tracked[i]), 1e-6) << i;
+  }
+}
+
+TEST(KeyframeRefiner, APoseThatIsNotFiniteIsRefusedAndChangesNothing) {
+  const Walk walk;
+  KeyframeRefiner plain(quick());
+  KeyframeRefiner disturbed(quick());
+  for (std::size_t i = 0; i < 6; ++i) {
+    plain.add(RegistrationCloud(walk.seen[i], quick().points), walk.tracked[i]);
+    for (const double strange :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      for (const bool rotation : {true, false}) {
+        Rigid3 pose = walk.tracked[i];
+        if (rotation) {
+          pose.rotation.x() = strange;
+        } else {
+          pose.translation.z() = strange;
+        }
+        EXPECT_THAT(
+            [&] { disturbed.add(RegistrationCloud(walk.seen[i], quick().points), pose); },
+            ThrowsMessage<std::invalid_argument>(HasSubstr("keyframe " + std::to_string(i))));
+      }
+    }
+    EXPECT_EQ(disturbed.keyframes(), i);
+    disturbed.add(RegistrationCloud(walk.seen[i], quick().points), walk.tracked[i]);
+  }
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_TRUE(sameBits(disturbed.T_world_ref(i), plain.T_world_ref(i))) << i;
+  }
+}
+
+TEST(KeyframeRefiner, SaysWhichKeyframesMoved) {
+  const Walk walk;
+  RefinementOptions options = quick();
+  options.window = 4;
+  options.loop.loops = false;
+  KeyframeRefiner refiner(options);
+  EXPECT_TRUE(refiner.takeMoved().empty());
+  Poses known;
+  for (std::size_t i = 0; i < walk.seen.size(); ++i) {
+    refiner.add(RegistrationCloud(walk.seen[i], options.points), walk.tracked[i]);
+    const std::vector<std::size_t> moved = refiner.takeMoved();
+    EXPECT_TRUE(refiner.takeMoved().empty());
+    EXPECT_TRUE(std::is_sorted(moved.begin(), moved.end()));
+    EXPECT_LE(moved.size(), 4U) << "the window";
+    ASSERT_FALSE(moved.empty());
+    EXPECT_EQ(moved.back(), i) << "the new one too";
+    known.resize(i + 1);
+    for (const std::size_t k : moved) known[k] = refiner.T_world_ref(k);
+    for (std::size_t k = 0; k <= i; ++k) {
+      EXPECT_TRUE(sameBits(known[k], refiner.T_world_ref(k))) << k << " moved unsaid at " << i;
+    }
+  }
+}
+
+TEST(KeyframeRefiner, LoopsThatAreNoneMoveNothing) {
+  for (unsigned seed = 1; seed <= 2; ++seed) {
+    std::mt19937 random(seed);
+    const Poses truth = circle(16, 7.5);
+    const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
+    const Poses tracked = noisy(truth, 0.005, 0.25 * kDeg, random);
+    const Poses without = posesOf(refine(seen, tracked, quick()));
+
+    KeyframeRefiner refiner(quick());
+    std::uint64_t proposed = 0;
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      refiner.add(RegistrationCloud(seen[i], quick().points), tracked[i]);
+      if (i < 10 || i % 3 != 0) continue;
+      // As if it were where one of 9 before was, 67 deg farther back: another place.
+      refiner.propose({i - 9, i, drawMotion(0.1, 3 * kDeg, random)});
+      ++proposed;
+    }
+    refiner.finish();
+    EXPECT_GE(refiner.counts().loop_checks, proposed);
+    double most_m = 0;
+    for (std::size_t i = 0; i < without.size(); ++i) {
+      most_m = std::max(most_m, metresApart(refiner.T_world_ref(i), without[i]));
+    }
+    EXPECT_LT(most_m, 0.02) << seed;
+  }
+}
+
+TEST(KeyframeRefiner, LoopsThatAreNoneMoveNothingThoughStripesCannotTellThem) {
+  EdgeWorld stripes;
+  for (int y = -4; y <= 4; ++y) stripes.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
+  std::mt19937 random(1);
+  Poses truth;
+  for (int i = 0; i < 20; ++i) truth.push_back(viewTurned(0, {0.1 * i, 0, 0}));
+  const auto seen = seenAlong(stripes, truth, random);
+  const Poses tracked = noisy(truth, 0.005, 0.25 * kDeg, random);
+  const Poses without = posesOf(refine(seen, tracked, quick()));
+  KeyframeRefiner refiner(quick());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    refiner.add(RegistrationCloud(seen[i], quick().points), tracked[i]);
+    if (i < 12 || i % 3 != 0) continue;
+    refiner.propose({i - 12, i, viewTurned(0, {1.1, 0, 0})});  // 10 cm less than it is
+  }
+  refiner.finish();
+  for (std::size_t i = 0; i < without.size(); ++i) {
+    EXPECT_LT(metresApart(refiner.T_world_ref(i), without[i]), 0.02) << i;
+  }
+}
+
+TEST(KeyframeRefiner, ProposalsOfKeyframesThatAreNotThereAreRefused) {
+  const Walk walk;
+  KeyframeRefiner refiner(quick());
+  EXPECT_THROW(refiner.propose({0, 1, {}}), std::invalid_argument);
+  for (std::size_t i = 0; i < 3; ++i) {
+    refiner.add(RegistrationCloud(walk.seen[i], quick().points), walk.tracked[i]);
+  }
+  EXPECT_THAT(
+      [&] {
+        refiner.propose({0, 3, {}});
+      },
+      ThrowsMessage<std::invalid_argument>(HasSubstr("= 3")));
+  EXPECT_THROW(refiner.propose({7, 2, {}}), std::invalid_argument);
+  EXPECT_THROW(refiner.propose({1, 1, {}}), std::invalid_argument);
+  EXPECT_EQ(refiner.counts().loop_checks, 0U);
+}
+
+TEST(KeyframeRefiner, CorrectsTheTrackersPosesOfNowAndKnowsHowWell) {
+  EXPECT_TRUE(sameBits(KeyframeRefiner(quick()).T_world_tracker(), Rigid3{}));
+  EXPECT_EQ(KeyframeRefiner(quick()).covariance(), quick().tracker.noiseCovariance());
+  double squared_sigmas = 0;
+  constexpr int kSeeds = 4;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    std::mt19937 random(seed);
+    const Poses truth = circle(9, 5);  // the window reaches back to the first
+    const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
+    Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+    tracked[0] = truth[0];
+    KeyframeRefiner refiner(quick());
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      refiner.add(RegistrationCloud(seen[i], quick().points), tracked[i]);
+    }
+    const Matrix6d& covariance = refiner.covariance();
+    EXPECT_TRUE(covariance.isApprox(covariance.transpose(), 1e-9));
+    ASSERT_EQ(covariance.llt().info(), Eigen::Success) << seed;
+    // The tracker's next pose, not a keyframe's: with noise of its own.
+    const Rigid3 now = truth.back() * viewTurned(0.02, {0.02, 0, 0});
+    const Rigid3 corrected =
+        refiner.T_world_tracker() * (now * drawMotion(0.01, 0.5 * kDeg, random));
+    Vector6d error;
+    error << corrected.translation - now.translation,
+        differenceOf({(corrected.rotation * now.rotation.conjugate()), {}}).tail<3>();
+    squared_sigmas += error.dot(covariance.ldlt().solve(error));
+  }
+  // Six numbers of four seeds: 24 if it knows exactly; 48 would be one of 400 draws.
+  EXPECT_LT(squared_sigmas, 48);
+  EXPECT_GT(squared_sigmas, 3);
+}
+
+TEST(KeyframeRefiner, WorksWithTheSmallestWindowAndMap) {
+  const Walk walk;
+  RefinementOptions options = quick();
+  options.window = 1;
+  options.map_keyframes = 1;
+  const Errors before = errorsOf(walk.tracked, walk.truth);
+  const Errors after = errorsOf(posesOf(refine(walk.seen, walk.tracked, options)), walk.truth);
+  EXPECT_LT(after.m, before.m);
+  EXPECT_LT(after.rad, before.rad);
+}
+
+TEST(KeyframeRefiner, AJumpOfTheTrackerAndBackIsForgotten) {
+  for (const double jump_m : {10.0, 1e8}) {
+    Walk walk;
+    walk.tracked[5].translation.x() += jump_m;
+    const Poses refined = posesOf(refine(walk.seen, walk.tracked, quick()));
+    for (std::size_t i = 0; i < refined.size(); ++i) {
+      ASSERT_TRUE(refined[i].translation.allFinite()) << i;
+      if (i == 5) continue;
+      const Rigid3 T_first_ref = walk.truth[0].inverse() * walk.truth[i];
+      const Rigid3 refined_first = refined[0].inverse() * refined[i];
+      // No worse than four of the tracker's standard deviations, of two poses.
+      EXPECT_LT(metresApart(refined_first, T_first_ref), 4 * std::sqrt(2) * 0.02)
+          << jump_m << ", " << i;
+    }
+  }
+}
+
+TEST(RefinementOptions, OutOfRangeAreRefusedByName) {
+  const auto refused = [](const RefinementOptions& options, const char* what) {
+    EXPECT_THAT([&] { KeyframeRefiner refiner(options); },
+                ThrowsMessage<std::invalid_argument>(HasSubstr(what)));
+  };
+  RefinementOptions options;
+  options.window = 0;
+  refused(options, "window = 0");
+  options = {};
+  options.map_keyframes = 0;
+  refused(options, "map_keyframes = 0");
+  options = {};
+  options.tracker.noise_m = -1;
+  refused(options, "tracker_noise_m = -1");
+  options = {};
+  options.loop.loop_checks = 101;
+  refused(options, "loop_checks = 101");
+}
+
+}  // namespace
+}  // namespace efm

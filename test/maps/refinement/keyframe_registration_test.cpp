@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/keyframe_registration.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "edge_world.h"
+#include "random_poses.h"
+
+namespace efm {
+namespace {
+
+using test::drawMotion;
+using test::drawPose;
+using test::EdgeWorld;
+using test::kInverseDepthSigma;
+using test::metresApart;
+using test::radiansApart;
+using test::seenFrom;
+using test::viewTurned;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr double kDeg = M_PI / 180;
+
+PosePrior priorOf(const Rigid3& T_map_ref, double sigma_m, double sigma_rad) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
+  return {T_map_ref, sqrtInformation(sigma.cwiseAbs2().asDiagonal())};
+}
+
+/// Two views of a world a step apart; the first is the map.
+struct Step {
+  Rigid3 T_world_map = viewTurned(0, {0, 0, 0});
+  Rigid3 T_world_ref = viewTurned(4 * kDeg, {0.15, 0.02, 0.05});
+  RegistrationCloud map;
+  RegistrationCloud cloud;
+
+  Step(const EdgeWorld& world, std::mt19937& random, double sigma = kInverseDepthSigma)
+      : map(seenFrom(world, T_world_map, sigma, random), {}),
+        cloud(seenFrom(world, T_world_ref, sigma, random), {}) {}
+
+  Registration from(const PosePrior& prior, const KeyframeRegistrationOptions& options = {}) const {
+    return registerKeyframe(1, cloud, {{0, &map, T_world_map}}, prior, options);
+  }
+};
+
+double errorOfAll(const Registration& registration, const std::vector<MapKeyframe>& map,
+                  const Rigid3& T_world_ref) {
+  double sum = 0;
+  for (const RelativePoseFactor& factor : registration.factors) {
+    sum += std::pow(errorOf(factor, map[factor.from].T_world_ref, T_world_ref), 2);
+  }
+  return sum;
+}
+
+TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByTwoCentimetresAndADegree) {
+  constexpr int kSeeds = 8;
+  double squared_m = 0;
+  double squared_rad = 0;
+  double squared_sigmas = 0;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    std::mt19937 random(seed);
+    const Step step(test::edgesAround(150, random), random);
+    const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
+    const Registration found = step.from(priorOf(prior, 0.02, 1 * kDeg));
+    squared_m += std::pow(metresApart(found.T_world_ref, step.T_world_ref), 2);
+    squared_rad += std::pow(radiansApart(found.T_world_ref, step.T_world_ref), 2);
+    EXPECT_GT(found.inlierRatio(), 0.6) << seed;
+    EXPECT_LE(found.inliers, found.seen) << seed;
+    EXPECT_LE(found.seen, step.cloud.numChosen()) << seed;
+    EXPECT_GT(found.from_prior, 0.5) << seed;
+    EXPECT_LT(found.median_error, 1) << seed;
+    ASSERT_EQ(found.factors.size(), 1U);
+    const RelativePoseFactor& factor = found.factors[0];
+    EXPECT_EQ(factor.from, 0U);
+    EXPECT_EQ(factor.to, 1U);
+    EXPECT_FALSE(factor.doubtful);
+    squared_sigmas += std::pow(errorOf(factor, step.T_world_map, step.T_world_ref), 2) -
+                      std::pow(errorOf(factor, step.T_world_map, found.T_world_ref), 2);
+  }
+  // Pixels of 0.44 deg, 1.3 cm wide at 3 m, and some 800 points, each of which says something
+  // across its edge alone: 6.6 mm and 0.15 deg, as rotation and translation go together.
+  EXPECT_LT(std::sqrt(squared_m / kSeeds), 0.009);
+  EXPECT_LT(std::sqrt(squared_rad / kSeeds), 0.2 * kDeg);
+  // Six directions: 6 where factors know what they err by, 48 for all. More than 75 (1 % of such
+  // draws) would be too sure.
+  EXPECT_LT(squared_sigmas, 75);
+  EXPECT_GT(squared_sigmas, 5);
+}
+
+TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByManyPixelsWhereItSaysSo) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    std::mt19937 random(seed);
+    const Step step(test::edgesAround(150, random), random);
+    const Rigid3 off = viewTurned(3 * kDeg, {0.06, -0.04, 0.03});  // 7 px and 2 px
+    const Registration found = step.from(priorOf(step.T_world_ref * off, 0.05, 2 * kDeg));
+    // Twice what one is off by with the prior above, which is surer.
+    EXPECT_LT(metresApart(found.T_world_ref, step.T_world_ref), 0.018) << seed;
+    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.4 * kDeg) << seed;
+  }
+}
+
+TEST(KeyframeRegistration, SeveralKeyframesGiveAFactorEach) {
+  std::mt19937 random(3);
+  const EdgeWorld world = test::edgesAround(150, random);
+  const Step step(world, random);
+  const Rigid3 T_world_other = viewTurned(-3 * kDeg, {-0.1, 0, 0});
+  const RegistrationCloud other(seenFrom(world, T_world_other, kInverseDepthSigma, random), {});
+  const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
+  const std::vector<MapKeyframe> map = {
+      {7, &step.map, step.T_world_map}, {3, &nothing, T_world_other}, {5, &other, T_world_other}};
+  const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
+  const Registration found =
+      registerKeyframe(9, step.cloud, map, priorOf(prior, 0.02, 1 * kDeg), {});
+  ASSERT_EQ(found.factors.size(), 2U);
+  EXPECT_EQ(found.factors[0].from, 7U);
+  EXPECT_EQ(found.factors[1].from, 5U);
+  for (const RelativePoseFactor& factor : found.factors) EXPECT_EQ(factor.to, 9U);
+  EXPECT_LT(metresApart(found.T_world_ref, step.T_world_ref), 0.006);
+}
+
+TEST(KeyframeRegistration, ItsFactorsAreLeastWhereItSaysTheKeyframeStands) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    std::mt19937 random(seed);
+    const Step step(test::edgesAround(150, random), random);
+    const std::vector<MapKeyframe> map = {{0, &step.map, step.T_world_map}};
+    const Rigid3 off = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
+    // A prior that says next to nothing: then the points alone say where.
+    const Registration found = step.from(priorOf(off, 0.5, 0.2));
+    const double least = errorOfAll(found, map, found.T_world_ref);
+    int larger = 0;
+    for (int i = 0; i < 200; ++i) {
+      const Rigid3 beside = found.T_world_ref * drawMotion(0.01, 0.3 * kDeg, random);
+      if (errorOfAll(found, map, beside) > least) ++larger;
+    }
+    EXPECT_EQ(larger, 200) << seed;
+    // The minimum itself: it may be off by what the last round still moved it.
+    const RelativePoseFactor& factor = found.factors[0];
+    const Vector6d minimum = -(factor.sqrt_information.transpose() * factor.sqrt_information +
+                               1e-6 * Matrix6d::Identity())
+                                  .ldlt()
+                                  .solve(factor.sqrt_information.transpose() * factor.offset);
+    EXPECT_LT(minimum.head<3>().norm(), 0.003) << seed;
+    EXPECT_LT(minimum.tail<3>().norm(), 0.1 * kDeg) << seed;
+  }
+}
+
+TEST(KeyframeRegistration, MovesWithTheWorld) {
+  for (const double far_m : {3.0, 5e6}) {
+    std::mt19937 random(5);
+    const Step step(test::edgesAround(150, random), random);
+    const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
+    const Registration found = step.from(priorOf(prior, 0.02, 1 * kDeg));
+    const Rigid3 T_other_world = drawPose(far_m, random);
+    const Registration other =
+        registerKeyframe(1, step.cloud, {{0, &step.map, T_other_world * step.T_world_map}},
+                         priorOf(T_other_world * prior, 0.02, 1 * kDeg), {});
+    // Rounding may give a point another neighbour, one of some 800.
+    const Rigid3 back = T_other_world.inverse() * other.T_world_ref;
+    EXPECT_LT(metresApart(back, found.T_world_ref), 1e-4) << far_m;
+    EXPECT_LT(radiansApart(back, found.T_world_ref), 1e-4) << far_m;
+    EXPECT_NEAR(other.inlierRatio(), found.inlierRatio(), 0.01) << far_m;
+  }
+}
+
+TEST(KeyframeRegistration, WithoutOverlapItIsThePriorAndSaysNothing) {
+  std::mt19937 random(6);
+  const Step step(test::edgesAround(150, random), random);
+  const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
+  const auto stays = [](const Registration& found, const Rigid3& prior, const char* why) {
+    EXPECT_LT(metresApart(found.T_world_ref, prior), 1e-12) << why;
+    EXPECT_LT(radiansApart(found.T_world_ref, prior), 1e-12) << why;
+    EXPECT_TRUE(found.factors.empty()) << why;
+    EXPECT_EQ(found.inliers, 0U) << why;
+    EXPECT_EQ(found.inlierRatio(), 0) << why;
+    EXPECT_EQ(found.median_error, 0) << why;
+    EXPECT_NEAR(found.from_prior, 0, 1e-9) << why;
+  };
+  const Rigid3 behind = viewTurned(M_PI, {0, 0, 0});
+  stays(step.from(priorOf(behind, 0.02, 0.02)), behind, "looks the other way");
+  const Rigid3 away = viewTurned(0, {50, 0, 0});
+  stays(step.from(priorOf(away, 0.02, 0.02)), away, "is elsewhere");
+  const PosePrior prior = priorOf(step.T_world_ref, 0.02, 0.02);
+  stays(registerKeyframe(1, nothing, {{0, &step.map, {}}}, prior, {}), step.T_world_ref,
+        "no points");
+  stays(registerKeyframe(1, step.cloud, {{0, &nothing, {}}}, prior, {}), step.T_world_ref,
+        "no points in the map");
+  stays(registerKeyframe(1, step.cloud, {}, prior, {}), step.T_world_ref, "no map");
+}
+
+/// Edges that all run along x, on one wall.
+EdgeWorld stripes() {
+  EdgeWorld world;
+  for (int y = -4; y <= 4; ++y) world.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
+  return world;
+}
+
+TEST(KeyframeRegistration, AlongStripesItStaysWithThePrior) {
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    std::mt19937 random(seed);
+    const Step step(stripes(), random);
+    const Rigid3 off = step.T_world_ref * drawMotion(0.02, 0, random);
+    const Registration found = step.from(priorOf(off, 0.02, 0.2 * kDeg));
+    // A point's nearest neighbour along a stripe is beside it, wherever it is: what holds x there
+    // is chance, and rotation about y within its prior (0.2 deg at 3 m: 1 cm).
+    const Eigen::Vector3d before = off.translation - step.T_world_ref.translation;
+    const Eigen::Vector3d after = found.T_world_ref.translation - step.T_world_ref.translation;
+    EXPECT_NEAR(after.x(), before.x(), 0.01) << seed;
+    EXPECT_LT(std::abs(after.y()), 0.006) << seed;
+  }
+}
+
+TEST(KeyframeRegistration, AFarWallHoldsNoTranslationAlongIt) {
+  // A grid 30 m away: translation and rotation look the same, and the prior decides between them.
+  EdgeWorld grid;
+  for (int i = -12; i <= 12; ++i) {
+    grid.push_back({{-25, 1.5 * i, 30}, {25, 1.5 * i, 30}});
+    grid.push_back({{1.5 * i, -25, 30}, {1.5 * i, 25, 30}});
+  }
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    std::mt19937 random(seed);
+    const Step step(grid, random);
+    const Rigid3 off = step.T_world_ref * drawMotion(0.02, 0.3 * kDeg, random);
+    const Registration found = step.from(priorOf(off, 0.02, 0.3 * kDeg));
+    const Vector6d moved = differenceOf(off.inverse() * found.T_world_ref);
+    EXPECT_LT(moved.head<3>().norm(), 0.015) << "0.1 deg would be 5 cm: " << seed;
+    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.22 * kDeg) << "half a pixel";
+  }
+}
+
+TEST(KeyframeRegistration, FewPointsAreNoReasonToLeaveThePriorFar) {
+  for (const int count : {1, 2, 5, 29}) {
+    std::mt19937 random(static_cast<unsigned>(count));
+    const EdgeWorld world = test::edgesAround(150, random);
+    Step step(world, random);
+    KeyframeDepthMap sparse = seenFrom(world, step.T_world_ref, kInverseDepthSigma, random);
+    int left = count;
+    for (float& depth : sparse.map.depth) {
+      if (depth > 0 && left-- <= 0) depth = 0;
+    }
+    step.cloud = RegistrationCloud(sparse, {});
+    ASSERT_EQ(step.cloud.numChosen(), static_cast<std::size_t>(count));
+    const Rigid3 prior = step.T_world_ref * drawMotion(0.005, 0.2 * kDeg, random);
+    const Registration found = step.from(priorOf(prior, 0.005, 0.2 * kDeg));
+    EXPECT_LT(found.from_prior, 5) << count;
+    EXPECT_TRUE(found.T_world_ref.translation.allFinite());
+    for (const RelativePoseFactor& factor : found.factors) {
+      EXPECT_TRUE(factor.sqrt_information.allFinite() && factor.offset.allFinite()) << count;
+    }
+  }
+}
+
+TEST(KeyframeRegistration, IsTheSameTwiceBitForBit) {
+  std::mt19937 random(8);
+  const Step step(test::edgesAround(150, random), random);
+  const PosePrior prior =
+      priorOf(step.T_world_ref * drawMotion(0.02, 1 * kDeg, random), 0.02, 1 * kDeg);
+  const Registration first = step.from(prior);
+  step.map.forgetTree();
+  const Registration second = step.from(prior);
+  EXPECT_TRUE(test::sameBits(first.T_world_ref, second.T_world_ref));
+  EXPECT_EQ(first.factors[0].sqrt_information, second.factors[0].sqrt_information);
+  EXPECT_EQ(first.factors[0].offset, second.factors[0].offset);
+}
+
+TEST(KeyframeRegistration, OptionsOutOfRangeAreRefusedByName) {
+  KeyframeRegistrationOptions options;
+  options.last_distance_px = 0;
+  EXPECT_THAT([&] { options.validate(); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("last_distance_px = 0")));
+  options = {};
+  options.first_distance_px = 1;
+  EXPECT_THAT([&] { options.validate(); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("first_distance_px = 1")));
+  options = {};
+  options.alignment.max_iterations = 0;
+  EXPECT_THROW(options.validate(), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/loop_closing.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "edge_world.h"
+#include "random_poses.h"
+
+namespace efm {
+namespace {
+
+using test::drawMotion;
+using test::EdgeWorld;
+using test::kInverseDepthSigma;
+using test::metresApart;
+using test::radiansApart;
+using test::seenFrom;
+using test::viewTurned;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr double kDeg = M_PI / 180;
+
+Matrix6d covarianceOf(double sigma_m, double sigma_rad) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+RegistrationCloud cloudFrom(const EdgeWorld& world, const Rigid3& T_world_ref,
+                            std::mt19937& random) {
+  return {seenFrom(world, T_world_ref, kInverseDepthSigma, random), {}};
+}
+
+std::optional<RelativePoseFactor> verify(const Rigid3& T_older_newer,
+                                         const RegistrationCloud& older,
+                                         const RegistrationCloud& newer, double sigma_m,
+                                         double sigma_rad) {
+  return verifyLoop({3, 8, T_older_newer}, older, newer, covarianceOf(sigma_m, sigma_rad), {}, {});
+}
+
+TEST(ViewOverlap, IsTheShareOfPointsInView) {
+  KeyframeDepthMap wall = test::emptyKeyframe(test::smallView());
+  const cv::Rect inside(2, 2, 156, 116);  // as depth is extracted
+  wall.map.depth(inside) = 2;
+  wall.map.variance(inside) = 1e-4;
+  const RegistrationCloud cloud(wall, {});
+  EXPECT_EQ(viewOverlap(cloud, cloud, {}), 1);
+  const double half_m = 80 * 2.0 / 130;  // half the image, 2 m away; points are the first of cells
+  EXPECT_NEAR(viewOverlap(cloud, cloud, viewTurned(0, {half_m, 0, 0})), 0.5, 0.07);
+  EXPECT_EQ(viewOverlap(cloud, cloud, viewTurned(0, {2.5 * half_m, 0, 0})), 0);
+  EXPECT_EQ(viewOverlap(cloud, cloud, viewTurned(M_PI, {0, 0, 0})), 0);
+}
+
+TEST(ViewOverlap, OfNothingOrWithNothingIsNone) {
+  std::mt19937 random(1);
+  const RegistrationCloud cloud = cloudFrom(test::edgesAround(100, random), {}, random);
+  const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
+  EXPECT_EQ(viewOverlap(nothing, cloud, {}), 0);
+  EXPECT_EQ(viewOverlap(cloud, nothing, {}), 0);
+}
+
+TEST(VerifyLoop, ConfirmsTheSamePlaceAndSaysWhere) {
+  int confirmed = 0;
+  constexpr int kSeeds = 10;
+  for (unsigned seed = 1; seed <= kSeeds; ++seed) {
+    std::mt19937 random(seed);
+    const EdgeWorld world = test::edgesAround(150, random);
+    const Rigid3 T_world_newer = viewTurned(5 * kDeg, {0.1, 0.02, -0.05});
+    const RegistrationCloud older = cloudFrom(world, {}, random);
+    const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
+    const Rigid3 expected = T_world_newer * drawMotion(0.05, 1 * kDeg, random);
+    const auto factor = verify(expected, older, newer, 0.05, 1 * kDeg);
+    if (!factor) continue;
+    ++confirmed;
+    EXPECT_EQ(factor->from, 3U);
+    EXPECT_EQ(factor->to, 8U);
+    EXPECT_TRUE(factor->doubtful);
+    EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.012) << seed;
+    EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 0.25 * kDeg) << seed;
+  }
+  EXPECT_GE(confirmed, 8);
+}
+
+TEST(VerifyLoop, NeverTakesOnePlaceForAnother) {
+  std::mt19937 random(1);
+  for (int draw = 0; draw < 30; ++draw) {
+    const RegistrationCloud older = cloudFrom(test::edgesAround(150, random), {}, random);
+    const RegistrationCloud newer = cloudFrom(test::edgesAround(150, random), {}, random);
+    EXPECT_FALSE(verify(drawMotion(0.1, 2 * kDeg, random), older, newer, 0.2, 4 * kDeg)) << draw;
+  }
+}
+
+TEST(VerifyLoop, NeverConfirmsAPlaceThatIsFarFromTheTruth) {
+  std::mt19937 random(2);
+  const EdgeWorld world = test::edgesAround(150, random);
+  int confirmed = 0;
+  for (int draw = 0; draw < 30; ++draw) {
+    const Rigid3 T_world_newer = viewTurned(0, {0, 0, 0}) * drawMotion(0.1, 5 * kDeg, random);
+    const RegistrationCloud older = cloudFrom(world, {}, random);
+    const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
+    const Rigid3 wrong = T_world_newer * drawMotion(0.3, 8 * kDeg, random);
+    const auto factor = verify(wrong, older, newer, 0.3, 8 * kDeg);
+    if (!factor) continue;
+    ++confirmed;  // found in spite of it: then where it is
+    EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.05) << draw;
+    EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 1 * kDeg) << draw;
+  }
+  EXPECT_LT(confirmed, 30);
+}
+
+/// Upright poles side by side, all alike.
+EdgeWorld poles(double period_m, double length_m) {
+  EdgeWorld world;
+  for (int i = -20; i <= 20; ++i) {
+    const double x_m = i * period_m;
+    world.push_back({{x_m, -length_m / 2, 3}, {x_m, length_m / 2, 3}});
+  }
+  return world;
+}
+
+TEST(VerifyLoop, ARowOfPolesShiftedByOneOfThemIsBeyondWhatItWasExpectedToBe) {
+  // Nothing tells one pole of the row from the next but where it was expected: a tracker that is
+  // sure to 2 cm keeps the row in its place. One that may be off by a pole cannot be told.
+  std::mt19937 random(3);
+  const EdgeWorld world = poles(0.3, 1);
+  const RegistrationCloud older = cloudFrom(world, {}, random);
+  const RegistrationCloud newer = cloudFrom(world, viewTurned(0, {0.05, 0, 0}), random);
+  const auto factor = verify(viewTurned(0, {0.05 + 0.3, 0, 0}), older, newer, 0.02, 0.3 * kDeg);
+  if (factor) {
+    EXPECT_NEAR(factor->T_from_to.translation.x(), 0.35, 0.02) << "where it was expected";
+  }
+  const auto near = verify(viewTurned(0, {0.06, 0, 0}), older, newer, 0.02, 0.3 * kDeg);
+  if (near) {
+    EXPECT_NEAR(near->T_from_to.translation.x(), 0.05, 0.02);
+  }
+}
+
+TEST(VerifyLoop, TwoKeyframesThatShareTheEndOfARowAreNotShifted) {
+  // With something beside the poles a shift leaves that without neighbours.
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    std::mt19937 random(seed);
+    EdgeWorld world = poles(0.3, 1);
+    for (const test::Edge& edge : test::edgesAround(100, random)) world.push_back(edge);
+    const RegistrationCloud older = cloudFrom(world, {}, random);
+    const Rigid3 T_world_newer = viewTurned(0, {0.05, 0, 0});
+    const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
+    const auto factor = verify(viewTurned(0, {0.35, 0, 0}), older, newer, 0.1, 1 * kDeg);
+    if (!factor) continue;
+    EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.05) << seed;
+  }
+}
+
+TEST(VerifyLoop, FewPointsAreChance) {
+  std::mt19937 random(5);
+  const EdgeWorld world = test::edgesAround(150, random);
+  const RegistrationCloud older = cloudFrom(world, {}, random);
+  KeyframeDepthMap sparse = seenFrom(world, {}, kInverseDepthSigma, random);
+  int left = 99;
+  for (float& depth : sparse.map.depth) {
+    if (depth > 0 && left-- <= 0) depth = 0;
+  }
+  EXPECT_FALSE(verify({}, older, RegistrationCloud(sparse, {}), 0.02, 0.5 * kDeg));
+  const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
+  EXPECT_FALSE(verify({}, older, nothing, 0.02, 0.5 * kDeg));
+  EXPECT_FALSE(verify({}, nothing, older, 0.02, 0.5 * kDeg));
+  EXPECT_FALSE(verify({}, nothing, nothing, 0.02, 0.5 * kDeg));
+}
+
+TEST(VerifyLoop, OptionsDecideHowSureItMustBe) {
+  std::mt19937 random(6);
+  const EdgeWorld world = test::edgesAround(150, random);
+  const RegistrationCloud older = cloudFrom(world, {}, random);
+  const RegistrationCloud newer = cloudFrom(world, viewTurned(2 * kDeg, {0.05, 0, 0}), random);
+  const LoopCandidate candidate{0, 1, viewTurned(2 * kDeg, {0.05, 0, 0})};
+  const Matrix6d covariance = covarianceOf(0.02, 0.5 * kDeg);
+  EXPECT_TRUE(verifyLoop(candidate, older, newer, covariance, {}, {}));
+  LoopOptions strict;
+  strict.loop_max_sigma_m = 1e-5;
+  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}));
+  strict = {};
+  strict.loop_max_sigma_rad = 1e-6;
+  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}));
+  strict = {};
+  strict.loop_min_inliers = 1;
+  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}));
+}
+
+TEST(LoopOptions, OutOfRangeAreRefusedByName) {
+  const auto refused = [](const LoopOptions& options, const char* what) {
+    EXPECT_THAT([&] { options.validate(); }, ThrowsMessage<std::invalid_argument>(HasSubstr(what)));
+  };
+  LoopOptions options;
+  options.loop_min_overlap = 0;
+  refused(options, "loop_min_overlap = 0");
+  options = {};
+  options.loop_min_inliers = 1.5;
+  refused(options, "loop_min_inliers = 1.5");
+  options = {};
+  options.loop_max_sigma_m = std::numeric_limits<double>::quiet_NaN();
+  refused(options, "loop_max_sigma_m = nan");
+  options = {};
+  options.loop_max_sigma_rad = 0;
+  refused(options, "loop_max_sigma_deg = 0");
+  options = {};
+  options.loop_checks = -1;
+  refused(options, "loop_checks = -1");
+}
+
+TEST(VerifyLoop, StripesThatDoNotSayWhereAlongThemAreNoLoop) {
+  EdgeWorld stripes;
+  for (int y = -4; y <= 4; ++y) stripes.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
+  std::mt19937 random(4);
+  const RegistrationCloud older = cloudFrom(stripes, {}, random);
+  const RegistrationCloud newer = cloudFrom(stripes, viewTurned(0, {0.2, 0, 0}), random);
+  const auto factor = verify({}, older, newer, 0.1, 1 * kDeg);
+  EXPECT_FALSE(factor && std::abs(factor->T_from_to.translation.x() - 0.2) > 0.05)
+      << "surely at " << factor->T_from_to.translation.transpose();
+}
+
+}  // namespace
+}  // namespace efm

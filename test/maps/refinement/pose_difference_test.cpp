@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/pose_difference.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+
+#include "random_poses.h"
+
+namespace efm {
+namespace {
+
+using test::drawMatrix;
+using test::drawPose;
+using test::drawVector;
+
+Vector6d turnOnly(const Eigen::Vector3d& turn) {
+  Vector6d difference = Vector6d::Zero();
+  difference.tail<3>() = turn;
+  return difference;
+}
+
+TEST(PoseDifference, IsWorkedOutByHand) {
+  // A quarter turn about z, and 1 m along x.
+  const Rigid3 T_a_b{Eigen::Quaterniond(std::sqrt(0.5), 0, 0, std::sqrt(0.5)), {1, 0, 0}};
+  Vector6d expected;
+  expected << 1, 0, 0, 0, 0, M_PI / 2;
+  EXPECT_LT((differenceOf(T_a_b) - expected).norm(), 1e-15);
+}
+
+TEST(PoseDifference, OfNothingIsZeroAndBackExactly) {
+  EXPECT_EQ(differenceOf(Rigid3{}), Vector6d::Zero());
+  EXPECT_TRUE(test::sameBits(rigidFromDifference(Vector6d::Zero()), Rigid3{}));
+}
+
+RC_GTEST_PROP(PoseDifference, OfAPoseGivesThePoseBack, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const Rigid3 T_a_b = drawPose(1e3, random);
+  const Rigid3 back = rigidFromDifference(differenceOf(T_a_b));
+  RC_ASSERT(back.translation == T_a_b.translation);
+  // As matrices: a quaternion and its negative are the same rotation.
+  RC_ASSERT((back.rotation.matrix() - T_a_b.rotation.matrix()).norm() < 1e-14);
+}
+
+RC_GTEST_PROP(PoseDifference, IsFoundAgainFromNoneToHalfATurn, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const Eigen::Vector3d axis = drawVector(1, random).normalized();
+  // An angle is as exact as the quaternion's numbers, however small: near pi it hangs on its
+  // scalar alone, so 1e-9 before that is as near as this is asked for.
+  for (const double angle : {1e-300, 1e-20, 1e-12, 1e-6, 1e-3, 1.0, M_PI - 1e-3, M_PI - 1e-9}) {
+    const Vector6d difference = turnOnly(angle * axis);
+    RC_ASSERT((differenceOf(rigidFromDifference(difference)) - difference).norm() <=
+              1e-15 + 1e-14 * angle);
+  }
+}
+
+RC_GTEST_PROP(PoseDifference, DoesNotHangOnTheSignOfAQuaternion, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const Rigid3 T_a_b = drawPose(1, random);
+  const Rigid3 negated{Eigen::Quaterniond(-T_a_b.rotation.coeffs()), T_a_b.translation};
+  RC_ASSERT((differenceOf(negated) - differenceOf(T_a_b)).norm() < 1e-14);
+  RC_ASSERT(differenceOf(negated).tail<3>().norm() <= M_PI + 1e-15);
+}
+
+TEST(PoseDifference, OfMoreThanHalfATurnIsTheShorterWayBack) {
+  const Vector6d difference = differenceOf(rigidFromDifference(turnOnly({0, 1.5 * M_PI, 0})));
+  EXPECT_LT((difference - turnOnly({0, -0.5 * M_PI, 0})).norm(), 1e-14);
+}
+
+TEST(SqrtInformation, OfADiagonalHoldsTheInverseStandardDeviations) {
+  Vector6d sigma;
+  sigma << 0.1, 0.2, 0.5, 1, 2, 4;
+  const Matrix6d expected = sigma.cwiseInverse().asDiagonal();
+  const Matrix6d sqrt_information = sqrtInformation(sigma.cwiseAbs2().asDiagonal());
+  EXPECT_LT((sqrt_information - expected).norm(), 1e-14);
+}
+
+RC_GTEST_PROP(SqrtInformation, MakesErrorsOfThatCovarianceToUnitOnes, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  Matrix6d factor = drawMatrix<6>(random);
+  factor.topRows<3>() *= 1e-2;  // as different as metres and radians may be
+  const Matrix6d covariance = factor * factor.transpose();
+  const Matrix6d unit = sqrtInformation(covariance);
+  RC_ASSERT((unit * covariance * unit.transpose() - Matrix6d::Identity()).norm() < 1e-10);
+}
+
+}  // namespace
+}  // namespace efm

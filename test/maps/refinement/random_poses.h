@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <random>
+
+#include "mapping/geometry/rigid3.h"
+#include "maps/refinement/pose_difference.h"
+
+namespace efm::test {
+
+/// Each component normal with this standard deviation.
+inline Eigen::Vector3d drawVector(double sigma, std::mt19937& random) {
+  std::normal_distribution<double> normal(0, sigma);
+  const double x = normal(random);
+  const double y = normal(random);
+  return {x, y, normal(random)};
+}
+
+/// A small motion: normal translation (metres) and rotation vector (radians).
+inline Rigid3 drawMotion(double sigma_m, double sigma_rad, std::mt19937& random) {
+  Vector6d difference;
+  difference.head<3>() = drawVector(sigma_m, random);
+  difference.tail<3>() = drawVector(sigma_rad, random);
+  return rigidFromDifference(difference);
+}
+
+/// Any rotation, all alike likely; normal translation.
+inline Rigid3 drawPose(double sigma_m, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  Eigen::Vector4d q;
+  for (double& component : q) component = normal(random);
+  return {Eigen::Quaterniond(q.normalized()), drawVector(sigma_m, random)};
+}
+
+/// A full matrix, no row or column of which dominates: never near singular.
+template <int size>
+Eigen::Matrix<double, size, size> drawMatrix(std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(-0.3, 0.3);
+  Eigen::Matrix<double, size, size> matrix;
+  for (double& component : matrix.reshaped()) component = uniform(random);
+  matrix.diagonal().array() += 2;
+  return matrix;
+}
+
+/// The small motion d of a pose as `poseCovariance` has it: translation along the world's axes,
+/// rotation about them.
+inline Rigid3 moved(const Rigid3& T_world_ref, const Vector6d& d) {
+  const Rigid3 turn = rigidFromDifference(d);
+  return {(turn.rotation * T_world_ref.rotation).normalized(),
+          T_world_ref.translation + d.head<3>()};
+}
+
+inline double metresApart(const Rigid3& a, const Rigid3& b) {
+  return (a.translation - b.translation).norm();
+}
+inline double radiansApart(const Rigid3& a, const Rigid3& b) {
+  return differenceOf(a.inverse() * b).tail<3>().norm();
+}
+inline bool sameBits(const Rigid3& a, const Rigid3& b) {
+  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
+}
+
+}  // namespace efm::test

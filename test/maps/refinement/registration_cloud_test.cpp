@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/registration_cloud.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "edge_world.h"
+
+namespace efm {
+namespace {
+
+using test::emptyKeyframe;
+using test::kInverseDepthSigma;
+using test::smallView;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+
+void put(KeyframeDepthMap& keyframe, int x, int y, float depth, float sigma) {
+  keyframe.map.depth(y, x) = depth;
+  keyframe.map.variance(y, x) = sigma * sigma;
+}
+
+/// A wall 2 m before the view.
+KeyframeDepthMap wall(float sigma) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  keyframe.map.depth = 2;
+  keyframe.map.variance = sigma * sigma;
+  return keyframe;
+}
+
+RegistrationCloudOptions few(int max_points, int max_map_points) {
+  RegistrationCloudOptions options;
+  options.max_points = max_points;
+  options.max_map_points = max_map_points;
+  return options;
+}
+
+/// Where a point came from.
+cv::Point pixelOf(const RegistrationPoint& point) {
+  const Eigen::Vector2d at = smallView().project(point.p_ref.cast<double>());
+  return {static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))};
+}
+
+TEST(RegistrationCloud, HoldsAsManyPointsAsAskedForAndNoMore) {
+  const KeyframeDepthMap keyframe = wall(0.01F);  // 19,200 points
+  for (const auto& [chosen, all] : {std::pair{10, 10}, {100, 350}, {2000, 6000}}) {
+    const RegistrationCloud cloud(keyframe, few(chosen, all));
+    EXPECT_EQ(cloud.numChosen(), static_cast<std::size_t>(chosen));
+    EXPECT_EQ(cloud.points().size(), static_cast<std::size_t>(all));
+  }
+  const RegistrationCloud everything(keyframe, few(100000, 1000000));
+  EXPECT_EQ(everything.numChosen(), 19200U);
+  EXPECT_EQ(everything.points().size(), 19200U);
+}
+
+TEST(RegistrationCloud, SpreadsItsPointsThoughOneCornerIsTheMostCertain) {
+  KeyframeDepthMap keyframe = wall(0.02F);
+  keyframe.map.variance(cv::Rect(0, 0, 80, 60)) = 1e-6F;
+  const RegistrationCloud cloud(keyframe, few(200, 400));
+  std::array<int, 4> of_quadrant{};
+  for (std::size_t i = 0; i < cloud.numChosen(); ++i) {
+    const cv::Point pixel = pixelOf(cloud.points()[i]);
+    ++of_quadrant[(pixel.x >= 80 ? 1 : 0) + (pixel.y >= 60 ? 2 : 0)];
+  }
+  // Cells for a quarter of the map's points: 100, so that each of 4 quadrants has some 25 of them,
+  // and what is over when each has given one goes to the most certain.
+  for (const int points : of_quadrant) EXPECT_GE(points, 20);
+}
+
+TEST(RegistrationCloud, TakesTheMostCertainPointsOfAPlace) {
+  KeyframeDepthMap keyframe = wall(0.02F);
+  for (int y = 0; y < 120; y += 4) {
+    for (int x = 0; x < 160; x += 4) put(keyframe, x, y, 2, 0.002F);  // 1200 of them
+  }
+  const RegistrationCloud cloud(keyframe, few(100, 400));
+  for (std::size_t i = 0; i < cloud.numChosen(); ++i) {
+    const cv::Point pixel = pixelOf(cloud.points()[i]);
+    EXPECT_EQ(pixel.x % 4, 0);
+    EXPECT_EQ(pixel.y % 4, 0);
+  }
+}
+
+TEST(RegistrationCloud, MeasuresCertaintyByDepthNotByItsInverse) {
+  // The same variance of inverse depth: 1 m is known to 2 mm, 4 m to 3.2 cm.
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  for (int x = 40; x < 60; ++x) put(keyframe, x, 50, x < 50 ? 4.0F : 1.0F, 0.002F);
+  const RegistrationCloud cloud(keyframe, few(10, 10));
+  // Cells are 40 px wide: 20 of these, all in one.
+  for (const RegistrationPoint& point : cloud.points()) EXPECT_EQ(point.p_ref.z(), 1.0F);
+}
+
+TEST(RegistrationCloud, AnEdgeIsLongAlongItselfAndItsDepthErrsAlongTheRay) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  keyframe.view.cy = 60;  // rays of row 60 lie in the plane y = 0
+  const float sigma = 0.004F;
+  for (int x = 10; x < 150; ++x) put(keyframe, x, 60, 2, sigma);
+  RegistrationCloudOptions options;
+  const RegistrationCloud cloud(keyframe, options);
+  int looked_at = 0;
+  for (const RegistrationPoint& point : cloud.points()) {
+    const double column = keyframe.view.project(point.p_ref.cast<double>()).x();
+    if (column < 13 || column > 146) continue;  // ends
+    ++looked_at;
+    // Seven pixels side by side have a variance of 4; of 2 m / 130 each. The place errs by half of
+    // one, the depth by 6 sigmas of 2 m times 2 m times sigma, along the ray.
+    const double pixel_m = 2.0 / 130;
+    Eigen::Matrix3d expected = std::pow(0.5 * pixel_m, 2) * Eigen::Matrix3d::Identity();
+    expected(0, 0) += 4 * pixel_m * pixel_m;
+    expected(0, 0) += std::pow(100 * pixel_m, 2);  // where along an edge is no measurement
+    const Eigen::Vector3d along = point.p_ref.cast<double>() * 6 * 2 * sigma;
+    expected += along * along.transpose();
+    EXPECT_LT((point.covariance.cast<double>() - expected).cwiseAbs().maxCoeff(), 1e-6)
+        << column;  // floats
+  }
+  EXPECT_EQ(looked_at, 134);
+}
+
+TEST(RegistrationCloud, AWallIsFlat) {
+  RegistrationCloudOptions options;
+  options.depth_sigmas = 1;
+  const RegistrationCloud cloud(wall(0.0005F), options);  // depth to 2 mm
+  const double pixel_m = 2.0 / 130;
+  for (const RegistrationPoint& point : cloud.points()) {
+    const cv::Point pixel = pixelOf(point);
+    if (!cv::Rect(3, 3, 154, 114).contains(pixel)) continue;  // its neighbourhood is cut
+    if (std::abs(pixel.x - 79.5) > 10 || std::abs(pixel.y - 59.5) > 10) continue;  // slanted rays
+    const Eigen::Vector3f variance = point.covariance.diagonal();
+    EXPECT_NEAR(variance.x(), 4.25 * pixel_m * pixel_m, 0.01 * variance.x());
+    EXPECT_NEAR(variance.y(), 4.25 * pixel_m * pixel_m, 0.01 * variance.y());
+    EXPECT_NEAR(variance.z(), 0.25 * pixel_m * pixel_m + 4e-6, 0.01 * variance.z());
+  }
+}
+
+TEST(RegistrationCloud, AnotherEdgeBehindIsNotPartOfANeighbourhood) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  for (int x = 10; x < 150; ++x) put(keyframe, x, 60, 2, 0.004F);
+  const RegistrationCloud alone(keyframe, {});
+  for (int x = 10; x < 150; ++x) put(keyframe, x, 61, 3, 0.004F);  // 1/6 farther: 42 sigmas
+  const RegistrationCloud both(keyframe, {});
+  std::size_t compared = 0;
+  for (const RegistrationPoint& point : alone.points()) {
+    for (const RegistrationPoint& other : both.points()) {
+      if (other.p_ref != point.p_ref) continue;
+      EXPECT_EQ(other.covariance, point.covariance);
+      ++compared;
+    }
+  }
+  EXPECT_EQ(compared, 140U);
+}
+
+RC_GTEST_PROP(RegistrationCloud, CovariancesArePositive, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const test::EdgeWorld world = test::edgesAround(60, random);
+  const RegistrationCloud cloud(test::seenFrom(world, {}, kInverseDepthSigma, random), {});
+  for (const RegistrationPoint& point : cloud.points()) {
+    const Eigen::Matrix3d covariance = point.covariance.cast<double>();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+    // A pixel's error in all directions: 0.5 px of 1/130 per metre of depth.
+    const double least = std::pow(0.5 * point.p_ref.z() / 130, 2);
+    RC_ASSERT(eigen.eigenvalues().minCoeff() >= 0.99 * least);
+    RC_ASSERT((covariance - covariance.transpose()).norm() == 0);
+  }
+}
+
+RC_GTEST_PROP(RegistrationCloud, FindsTheSameNeighbourAsLookingAtAll, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const test::EdgeWorld world = test::edgesAround(40, random);
+  const RegistrationCloud cloud(test::seenFrom(world, {}, kInverseDepthSigma, random), {});
+  const ReferenceView view = smallView();
+  const auto looks = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector2d pixel = view.project(p);
+    return Eigen::Vector3d(pixel.x(), pixel.y(), 1 / p.z() / kInverseDepthSigma);
+  };
+  std::uniform_real_distribution<double> column(-30, 190);
+  std::uniform_real_distribution<double> row(-30, 150);
+  std::uniform_real_distribution<double> depth(1.5, 5);
+  for (int i = 0; i < 100; ++i) {
+    const Eigen::Vector3d p_ref = view.pointAt(column(random), row(random), depth(random));
+    for (const double within_px : {2.0, 16.0}) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const RegistrationPoint& point : cloud.points()) {
+        least = std::min(least, (looks(point.p_ref.cast<double>()) - looks(p_ref)).norm());
+      }
+      const auto index = cloud.nearest(p_ref, within_px);
+      constexpr double kFloatPx = 1e-3;  // columns and inverse depths of some hundreds
+      if (least < within_px - kFloatPx) RC_ASSERT(index.has_value());
+      if (least > within_px + kFloatPx) RC_ASSERT(!index.has_value());
+      if (!index) continue;
+      const Eigen::Vector3d found = looks(cloud.points()[*index].p_ref.cast<double>());
+      RC_ASSERT((found - looks(p_ref)).norm() <= least + kFloatPx);
+    }
+  }
+}
+
+TEST(RegistrationCloud, FindsTheSameWithATreeThatWasForgotten) {
+  std::mt19937 random(1);
+  const RegistrationCloud cloud(
+      test::seenFrom(test::edgesAround(60, random), {}, kInverseDepthSigma, random), {});
+  std::vector<std::optional<std::size_t>> first;
+  for (const bool forgotten : {false, true}) {
+    if (forgotten) cloud.forgetTree();
+    for (std::size_t i = 0; i < 200; ++i) {
+      const Eigen::Vector3d p_ref = 1.01 * cloud.points()[i].p_ref.cast<double>();
+      if (!forgotten) first.push_back(cloud.nearest(p_ref, 5));
+      EXPECT_EQ(cloud.nearest(p_ref, 5), first[i]);
+    }
+  }
+  cloud.forgetTree();
+  cloud.forgetTree();
+}
+
+TEST(RegistrationCloud, NothingBehindOrBesideTheViewHasANeighbour) {
+  const RegistrationCloud cloud(wall(0.01F), {});
+  EXPECT_TRUE(cloud.nearest({0, 0, 2}, 2));
+  EXPECT_FALSE(cloud.nearest({0, 0, -2}, 1e4));
+  EXPECT_FALSE(cloud.nearest({0, 0, 0}, 1e4));
+  EXPECT_FALSE(cloud.nearest({1e9, 0, 1e-9}, 1e4));
+  EXPECT_FALSE(cloud.nearest({3, 0, 2}, 2)) << "115 px to the side";
+  EXPECT_TRUE(cloud.nearest({3, 0, 2}, 120));
+  EXPECT_FALSE(cloud.nearest({kNan, 0, 2}, 2));
+  EXPECT_FALSE(cloud.nearest({0, 0, kNan}, 2));
+  EXPECT_FALSE(cloud.nearest({0, 0, kInfinity}, 2));
+}
+
+TEST(RegistrationCloud, SeesWhatIsInTheViewBetweenItsNearestAndFarthestPoint) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  put(keyframe, 30, 30, 1, 0.01F);
+  put(keyframe, 50, 70, 4, 0.01F);
+  const RegistrationCloud cloud(keyframe, {});
+  EXPECT_TRUE(cloud.sees({0, 0, 2}));
+  EXPECT_TRUE(cloud.sees({0, 0, 1.001}));
+  EXPECT_TRUE(cloud.sees({0, 0, 3.999}));
+  // Three standard deviations of inverse depth, 0.03 1/m, beyond either.
+  EXPECT_TRUE(cloud.sees({0, 0, 1 / 1.029}));
+  EXPECT_FALSE(cloud.sees({0, 0, 1 / 1.031}));
+  EXPECT_TRUE(cloud.sees({0, 0, 1 / 0.221}));
+  EXPECT_FALSE(cloud.sees({0, 0, 1 / 0.219}));
+  EXPECT_FALSE(cloud.sees({0, 0, -2}));
+  // Half the view is 79.5 / 130 = 0.61 to the side, 59.5 / 130 = 0.46 up and down.
+  EXPECT_TRUE(cloud.sees({1.22, 0, 2}));
+  EXPECT_FALSE(cloud.sees({1.23, 0, 2}));
+  EXPECT_TRUE(cloud.sees({0, -0.91, 2}));
+  EXPECT_FALSE(cloud.sees({0, -0.92, 2}));
+  EXPECT_FALSE(cloud.sees({kNan, 0, 2}));
+  EXPECT_FALSE(cloud.sees({0, 0, kNan}));
+  EXPECT_DOUBLE_EQ(cloud.middleInverseDepth(), 0.625);
+}
+
+TEST(RegistrationCloud, PixelsWithoutADepthOrAVarianceArePassedOver) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  put(keyframe, 30, 30, 2, 0.01F);
+  put(keyframe, 31, 30, 2, kInfinity);
+  put(keyframe, 32, 30, 2, kNan);
+  put(keyframe, 33, 30, kNan, 0.01F);
+  put(keyframe, 34, 30, kInfinity, 0.01F);
+  put(keyframe, 35, 30, -2, 0.01F);
+  put(keyframe, 36, 30, 0, 0.01F);
+  keyframe.map.depth(30, 37) = 2;
+  keyframe.map.variance(30, 37) = -1;
+  const RegistrationCloud cloud(keyframe, {});
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_TRUE(cloud.points()[0].covariance.allFinite());
+}
+
+TEST(RegistrationCloud, AnInfiniteDepthBesideAPointDoesNotSpoilItsCovariance) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  for (int x = 20; x < 40; ++x) put(keyframe, x, 30, x % 2 == 0 ? 2 : kInfinity, 0.5F);
+  const RegistrationCloud cloud(keyframe, {});
+  EXPECT_EQ(cloud.points().size(), 10U);
+  for (const RegistrationPoint& point : cloud.points()) EXPECT_TRUE(point.covariance.allFinite());
+}
+
+TEST(RegistrationCloud, ADepthThatSaysNothingLeavesACovarianceThatFloatsHold) {
+  for (const float sigma : {1.0F, 31.0F, 1e4F}) {
+    KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+    for (int x = 3; x < 157; x += 7) put(keyframe, x, 5, 3, sigma);
+    const RegistrationCloud cloud(keyframe, {});
+    EXPECT_EQ(cloud.points().size(), 22U) << sigma;
+    for (const RegistrationPoint& point : cloud.points()) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(point.covariance.cast<double>());
+      // A thousandth of its length, squared; a float's rounding is a twentieth of that.
+      const double least = 1e-6 * eigen.eigenvalues().maxCoeff();
+      EXPECT_NEAR(eigen.eigenvalues().minCoeff(), least, 0.3 * least) << sigma;
+    }
+  }
+}
+
+TEST(RegistrationCloud, OfNothingIsEmptyAndSeesNothing) {
+  const RegistrationCloud cloud(emptyKeyframe(smallView()), {});
+  EXPECT_TRUE(cloud.points().empty());
+  EXPECT_EQ(cloud.numChosen(), 0U);
+  EXPECT_FALSE(cloud.sees({0, 0, 2}));
+  EXPECT_FALSE(cloud.nearest({0, 0, 2}, 100));
+  EXPECT_EQ(cloud.middleInverseDepth(), 0);
+  cloud.forgetTree();
+}
+
+TEST(RegistrationCloud, AViewOfOnePixelAndVariancesOfZeroAreTaken) {
+  KeyframeDepthMap keyframe = emptyKeyframe({1, 1, 1, 1, 0, 0});
+  put(keyframe, 0, 0, 2, 0);
+  const RegistrationCloud cloud(keyframe, {});
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_TRUE(cloud.points()[0].covariance.allFinite());
+  EXPECT_EQ(cloud.nearest({0, 0, 2}, 1), std::optional<std::size_t>(0));
+  EXPECT_TRUE(cloud.sees({0, 0, 2}));
+}
+
+TEST(RegistrationCloud, DepthsBeyondAnyRoomDoNotSpoilWhatIsInIt) {
+  for (const float strange : {1e-42F, 1e-30F, 1e-6F, 1e6F, 1e20F, 3e38F}) {
+    KeyframeDepthMap keyframe = wall(0.01F);
+    put(keyframe, 80, 60, strange, 0.01F);
+    put(keyframe, 5, 5, strange, 0.01F);
+    const RegistrationCloud cloud(keyframe, {});
+    for (const RegistrationPoint& point : cloud.points()) {
+      ASSERT_TRUE(point.p_ref.allFinite()) << strange;
+      ASSERT_TRUE(point.covariance.allFinite()) << strange;
+      const Eigen::LLT<Eigen::Matrix3d> llt(point.covariance.cast<double>());
+      ASSERT_EQ(llt.info(), Eigen::Success) << strange;
+    }
+    EXPECT_TRUE(cloud.nearest({0.3, 0.2, 2}, 5)) << strange;
+    EXPECT_TRUE(std::isfinite(cloud.middleInverseDepth())) << strange;
+  }
+}
+
+TEST(RegistrationCloud, OptionsOutOfRangeAreRefusedByName) {
+  const auto refused = [](const RegistrationCloudOptions& options, const char* what) {
+    EXPECT_THAT([&] { RegistrationCloud(emptyKeyframe(smallView()), options); },
+                ThrowsMessage<std::invalid_argument>(HasSubstr(what)));
+  };
+  refused(few(9, 100), "max_points = 9");
+  refused(few(100, 99), "max_map_points = 99");
+  RegistrationCloudOptions options;
+  options.pixel_sigma = 0;
+  refused(options, "pixel_sigma = 0");
+  options = {};
+  options.depth_sigmas = kNan;
+  refused(options, "depth_sigmas = nan");
+  options = {};
+  options.neighbourhood_px = 21;
+  refused(options, "neighbourhood_px = 21");
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "maps/refinement/tracker_errors.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+#include "random_poses.h"
+
+namespace efm {
+namespace {
+
+using test::drawVector;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr double kDeg = M_PI / 180;
+
+/// Motions of a tracker that errs by so much, against points that know them to 2 mm and 0.1 deg:
+/// drawn from the model itself.
+std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, double way_m,
+                                      std::mt19937& random) {
+  std::vector<MotionSample> samples;
+  for (int i = 0; i < count; ++i) {
+    MotionSample sample;
+    sample.way_m = way_m * (1 + i % 4);
+    Vector6d sigma;
+    sigma << Eigen::Vector3d::Constant(0.002), Eigen::Vector3d::Constant(0.1 * kDeg);
+    sample.covariance = sigma.cwiseAbs2().asDiagonal();
+    const Matrix6d all =
+        sample.covariance + 2 * truth.noiseCovariance() + truth.driftCovariance(sample.way_m);
+    Vector6d unit;
+    unit << drawVector(1, random), drawVector(1, random);
+    sample.difference = all.llt().matrixL() * unit;
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+TrackerErrors times(TrackerErrors errors, double factor) {
+  errors.noise_m *= factor;
+  errors.noise_rad *= factor;
+  errors.drift_m *= factor;
+  errors.drift_rad *= factor;
+  return errors;
+}
+
+/// What motions over a way err by: noise and drift can take each other's place where ways are
+/// alike.
+Eigen::Vector2d sigmasOver(double way_m, const TrackerErrors& errors) {
+  const Matrix6d covariance = 2 * errors.noiseCovariance() + errors.driftCovariance(way_m);
+  return {std::sqrt(covariance(0, 0)), std::sqrt(covariance(5, 5))};
+}
+
+bool same(const TrackerErrors& a, const TrackerErrors& b) {
+  return a.noise_m == b.noise_m && a.noise_rad == b.noise_rad && a.drift_m == b.drift_m &&
+         a.drift_rad == b.drift_rad;
+}
+
+TEST(TrackerErrors, CovariancesAreWorkedOutByHand) {
+  const TrackerErrors errors{0.03, 0.02, 0.01, 0.005};
+  Vector6d noise;
+  noise << Eigen::Vector3d::Constant(9e-4 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
+  EXPECT_LT((errors.noiseCovariance() - Matrix6d(noise.asDiagonal())).norm(), 1e-15);
+  Vector6d drift;  // a random walk: a quarter of a metre has half of a metre's standard deviation
+  drift << Eigen::Vector3d::Constant(2.5e-5 + 1e-8), Eigen::Vector3d::Constant(6.25e-6 + 1e-10);
+  EXPECT_LT((errors.driftCovariance(0.25) - Matrix6d(drift.asDiagonal())).norm(), 1e-15);
+  Vector6d far;  // always in one direction: 4 m have four times as much
+  far << Eigen::Vector3d::Constant(1.6e-3 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
+  EXPECT_LT((errors.driftCovariance(4) - Matrix6d(far.asDiagonal())).norm(), 1e-15);
+}
+
+TEST(TrackerErrors, CovariancesAreNeverSingular) {
+  const TrackerErrors exact{0, 0, 0, 0};
+  for (const Matrix6d& covariance :
+       {exact.noiseCovariance(), exact.driftCovariance(0), TrackerErrors().driftCovariance(0)}) {
+    EXPECT_EQ(covariance.llt().info(), Eigen::Success);
+    EXPECT_GT(covariance.diagonal().minCoeff(), 0);
+    EXPECT_TRUE(sqrtInformation(covariance).allFinite());
+  }
+}
+
+TEST(EstimateTrackerErrors, WithoutSamplesExpectsWhatItDid) {
+  const TrackerErrors expected{0.02, 0.01, 0.03, 0.002};
+  EXPECT_TRUE(same(estimateTrackerErrors({}, expected), expected));
+}
+
+TEST(EstimateTrackerErrors, FindsTheNoiseThatSamplesWereDrawnWith) {
+  for (const double factor : {0.2, 0.5, 1.0, 3.0, 10.0}) {
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      std::mt19937 random(seed);
+      TrackerErrors truth;
+      truth.noise_m *= factor;
+      truth.noise_rad *= factor;
+      const auto samples = drawSamples(truth, 100, 0.05, random);
+      const TrackerErrors found = estimateTrackerErrors(samples, {});
+      // 300 numbers tell a standard deviation to 4 %, and steps are of a factor of exp(0.25).
+      const Eigen::Vector2d ratio =
+          sigmasOver(0.1, found).cwiseQuotient(sigmasOver(0.1, truth)).array().log().abs();
+      EXPECT_LT(ratio.maxCoeff(), std::log(1.35)) << factor << ", " << seed;
+      EXPECT_NEAR(std::log(found.noise_m / truth.noise_m), 0, std::log(2)) << factor;
+      EXPECT_NEAR(std::log(found.noise_rad / truth.noise_rad), 0, std::log(2)) << factor;
+    }
+  }
+}
+
+TEST(EstimateTrackerErrors, FindsADriftThatIsLargerThanExpected) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    std::mt19937 random(seed);
+    TrackerErrors truth;
+    truth.drift_m *= 3;
+    truth.drift_rad *= 3;
+    const TrackerErrors found = estimateTrackerErrors(drawSamples(truth, 100, 2, random), {});
+    EXPECT_NEAR(std::log(found.drift_m / truth.drift_m), 0, std::log(1.7)) << seed;
+    EXPECT_NEAR(std::log(found.drift_rad / truth.drift_rad), 0, std::log(1.7)) << seed;
+  }
+}
+
+TEST(EstimateTrackerErrors, OfExactPosesFindsMuchLessNoiseAndKeepsSomeDrift) {
+  std::mt19937 random(1);
+  const auto samples = drawSamples({0, 0, 0, 0}, 100, 0.05, random);
+  const TrackerErrors expected;
+  const TrackerErrors found = estimateTrackerErrors(samples, expected);
+  // 2 mm and 0.1 deg are what the points themselves err by, over sqrt 2.
+  EXPECT_LT(found.noise_m, 0.0015);
+  EXPECT_LT(found.noise_rad, 0.08 * kDeg);
+  EXPECT_GT(found.drift_m, expected.drift_m / 8) << "within three times a factor of 2";
+  EXPECT_GT(found.drift_rad, expected.drift_rad / 8);
+}
+
+TEST(EstimateTrackerErrors, AFewSamplesChangeLittle) {
+  std::mt19937 random(2);
+  const TrackerErrors expected;
+  const auto samples = drawSamples(expected, 2, 0.05, random);
+  const TrackerErrors found = estimateTrackerErrors(samples, expected);
+  EXPECT_NEAR(std::log(found.noise_m / expected.noise_m), 0, std::log(3));
+  EXPECT_NEAR(std::log(found.noise_rad / expected.noise_rad), 0, std::log(3));
+}
+
+TEST(EstimateTrackerErrors, RegistrationsThatFailedDoNotBlowItUp) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    std::mt19937 random(seed);
+    const TrackerErrors truth;
+    auto samples = drawSamples(truth, 100, 0.05, random);
+    const TrackerErrors without = estimateTrackerErrors(samples, {});
+    for (int i = 0; i < 5; ++i) {  // 1 m and 60 deg off
+      samples[i * 20].difference << drawVector(1, random), drawVector(1, random);
+    }
+    const TrackerErrors found = estimateTrackerErrors(samples, {});
+    // As normal noise, five of a hundred at a metre would be 16 cm: sixteen times as much.
+    EXPECT_LT(found.noise_m, 2.2 * without.noise_m) << seed;
+    EXPECT_LT(found.noise_rad, 2.2 * without.noise_rad) << seed;
+  }
+}
+
+TEST(EstimateTrackerErrors, MoreErrorNeverLooksLikeLess) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    std::mt19937 random(seed);
+    auto samples = drawSamples({}, 60, 0.1, random);
+    Eigen::Vector2d last = Eigen::Vector2d::Zero();
+    for (int step = 0; step < 6; ++step) {
+      const Eigen::Vector2d sigmas = sigmasOver(0.25, estimateTrackerErrors(samples, {}));
+      EXPECT_GE(sigmas.x(), last.x()) << seed << ", " << step;
+      EXPECT_GE(sigmas.y(), last.y()) << seed << ", " << step;
+      last = sigmas;
+      for (MotionSample& sample : samples) sample.difference *= 2;
+    }
+    // 32 times as much by then, held back by what was expected.
+    EXPECT_GT((last.cwiseQuotient(sigmasOver(0.25, {}))).minCoeff(), 10) << seed;
+  }
+}
+
+TEST(EstimateTrackerErrors, ErrorsThatAreSaidToBeNoneStayNone) {
+  std::mt19937 random(3);
+  const auto samples = drawSamples(times({}, 3), 50, 0.1, random);
+  EXPECT_TRUE(same(estimateTrackerErrors(samples, {0, 0, 0, 0}), {0, 0, 0, 0}));
+}
+
+TEST(EstimateTrackerErrors, StaysFiniteWhateverTheSamplesAre) {
+  std::mt19937 random(4);
+  const TrackerErrors expected;
+  for (const double strange : {0.0, 1e12, 1e200, std::numeric_limits<double>::infinity(),
+                               std::numeric_limits<double>::quiet_NaN()}) {
+    auto samples = drawSamples(expected, 10, 0.1, random);
+    samples[3].difference.setConstant(strange);
+    samples[5].way_m = strange;
+    const TrackerErrors found = estimateTrackerErrors(samples, expected);
+    for (const double error : {found.noise_m, found.noise_rad, found.drift_m, found.drift_rad}) {
+      EXPECT_TRUE(std::isfinite(error) && error > 0) << strange;
+      EXPECT_LT(error, 1) << strange;
+    }
+  }
+}
+
+TEST(TrackerErrors, OutOfRangeAreRefusedByName) {
+  TrackerErrors errors;
+  errors.noise_m = -0.5;
+  EXPECT_THAT([&] { errors.validate(); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("tracker_noise_m = -0.5")));
+  errors = {};
+  errors.drift_rad = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT([&] { errors.validate(); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("tracker_drift_deg_per_m = nan")));
+  EXPECT_NO_THROW((TrackerErrors{0, 0, 0, 0}.validate()));
+}
+
+}  // namespace
+}  // namespace efm

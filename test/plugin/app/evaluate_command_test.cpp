@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `event-fusion evaluate` as a user runs it, on what `map` and `depth` wrote.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "maps/io/point_cloud_file.h"
+#include "test/plugin/app/map_command.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+
+namespace efm {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+/// A plane before two cameras that move along x: mapped to "out" or "one", with its truth.
+class EvaluateCommand : public MapCommand {
+ protected:
+  EvaluateCommand() { write(SyntheticRecording()); }
+
+  /// The truth of every keyframe of "out", as a dataset has it.
+  void writeTrueDepths() const {
+    std::filesystem::create_directories(folder() / "data" / "depth");
+    std::ofstream index(folder() / "data" / "depth" / "index.txt");
+    for (const StampedPose& pose : readTumTrajectory(folder() / "out" / "trajectory.txt")) {
+      index << formatSeconds(pose.t_ns) << " plane.tiff\n";
+    }
+    writePlane(folder() / "data" / "depth" / "plane.tiff");
+  }
+  void writePlane(const std::filesystem::path& file) const {
+    cv::imwrite(file.string(), cv::Mat1f(90, 120, static_cast<float>(SyntheticRecording::kDepthM)));
+  }
+  void writeTrueCloud() const {
+    std::vector<CloudPoint> points;
+    for (int x = -400; x <= 400; ++x) {
+      for (int y = -300; y <= 300; ++y) {
+        points.push_back({{0.02 * x, 0.02 * y, SyntheticRecording::kDepthM}, 1, 1});
+      }
+    }
+    writePointCloud(folder() / "data" / "gt_cloud.ply", points);
+  }
+  json jsonOf(const std::string& arguments) const {
+    const Result result = run(arguments + " --json");
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_THAT(result.err, IsEmpty());
+    return json::parse(result.out);
+  }
+  std::string refusal(const std::string& arguments) const {
+    const Result result = run(arguments);
+    EXPECT_NE(result.status, 0) << arguments;
+    EXPECT_THAT(result.out, IsEmpty());
+    return result.err;
+  }
+};
+
+TEST_F(EvaluateCommand, HoldsTheMapsOfARecordingAgainstItsFolder) {
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+  writeTrueDepths();
+
+  const Result table = run("evaluate depth out data --tolerance-px 1 --plot depth.png");
+  EXPECT_EQ(table.status, 0) << table.err;
+  EXPECT_THAT(table.out,
+              AllOf(HasSubstr("mean of maps"), HasSubstr("precision %"),
+                    HasSubstr("bad-pix with focal length 100.00 px and baseline 0.1000 m")));
+  EXPECT_GT(cv::imread((folder() / "depth.png").string()).rows, 400);
+
+  const json errors = jsonOf("evaluate depth out data");
+  EXPECT_EQ(errors["maps"].size(), 3U);
+  EXPECT_LT(errors["all"]["median_inverse"], 0.06);
+  EXPECT_GT(errors["all"]["delta_1"], 0.9);
+  EXPECT_EQ(errors["focal_px"], 100);
+  EXPECT_NEAR(errors["baseline_m"], 0.1, 1e-9);
+  EXPECT_EQ(errors["truths"], 3 * 90 * 120);
+  EXPECT_EQ(errors["without_truth"], 0);
+}
+
+TEST_F(EvaluateCommand, HoldsOneDepthMapAgainstAFile) {
+  ASSERT_EQ(run("depth rig.ini data --out one --t0 10.1 --t1 10.3").status, 0);
+  writePlane(folder() / "truth.tiff");
+
+  const json whole = jsonOf("evaluate depth one truth.tiff --thresholds 0.1,1 --focal 200");
+  EXPECT_EQ(whole["curve"].size(), 2U);
+  EXPECT_EQ(whole["focal_px"], 200) << "what is given goes before what is found";
+  EXPECT_GT(whole["all"]["points"], 50);
+  EXPECT_EQ(jsonOf("evaluate depth one/depth.tiff truth.tiff")["all"]["points"],
+            whole["all"]["points"]);
+
+  cv::Mat1b mask(90, 120, uchar{0});
+  mask.colRange(0, 60).setTo(255);
+  cv::imwrite((folder() / "mask.png").string(), mask);
+  const json half = jsonOf("evaluate depth one truth.tiff --mask mask.png");
+  EXPECT_LT(half["all"]["points"], whole["all"]["points"]);
+  EXPECT_EQ(half["truths"], 90 * 60);
+  EXPECT_THAT(refusal("evaluate depth one truth.tiff --max-depth 0.5"), HasSubstr("no pixel"));
+}
+
+TEST_F(EvaluateCommand, HoldsTheCloudAgainstTheSurfaces) {
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+  writeTrueCloud();
+  const json errors = jsonOf("evaluate map out data --distances 0.1,0.5");
+  EXPECT_LT(errors["accuracy"]["median_m"], 0.2);
+  ASSERT_EQ(errors["curve"].size(), 2U);
+  EXPECT_GT(errors["curve"][1]["within"], 0.9);
+  EXPECT_GT(errors["curve"][1]["completeness"], errors["curve"][0]["completeness"]);
+  const Result table =
+      run("evaluate map out/map.pcd data/gt_cloud.ply --to-find out/map.pcd --plot map.png");
+  EXPECT_EQ(table.status, 0) << table.err;
+  EXPECT_THAT(table.out, AllOf(HasSubstr("outliers %"), HasSubstr("100.00")));
+  EXPECT_FALSE(cv::imread((folder() / "map.png").string()).empty());
+}
+
+TEST_F(EvaluateCommand, HoldsTheKeyframesTrajectoryAgainstThePoses) {
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+  // The rig moves along a line: least squares cannot say how it is turned about that.
+  EXPECT_THAT(refusal("evaluate trajectory out data"),
+              AllOf(HasSubstr("positions lie on a line"), HasSubstr("--align origin")));
+  for (const char* alignment : {"none", "origin"}) {
+    const json errors = jsonOf(std::string("evaluate trajectory out data --align ") + alignment);
+    EXPECT_EQ(errors["pairs"], 3);
+    EXPECT_LT(errors["ate"]["translation_m"]["max"], 0.01);
+    EXPECT_EQ(errors["alignment"], alignment);
+  }
+  const json errors =
+      jsonOf("evaluate trajectory data data --align none --lengths 0.1,0.2 --frames 5");
+  EXPECT_EQ(errors["rpe"].size(), 3U);
+  const Result drawn = run("evaluate trajectory out data --align none --plot path.png");
+  EXPECT_EQ(drawn.status, 0) << drawn.err;
+  EXPECT_FALSE(cv::imread((folder() / "path.png").string()).empty());
+}
+
+TEST_F(EvaluateCommand, WhatIsWrongIsAnErrorOnOneLine) {
+  writePlane(folder() / "plane.tiff");
+  EXPECT_EQ(refusal("evaluate depth nowhere.tiff plane.tiff"),
+            "event-fusion: error: no such file: nowhere.tiff\n");
+  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --focal 100"),
+              HasSubstr("bad-pix needs both --focal and --baseline"));
+  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --focal -1"), HasSubstr("--focal"));
+  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --thresholds 0.1,0"),
+              HasSubstr("--thresholds"));
+  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --tolerance-px -1"),
+              HasSubstr("tolerance_px = -1"));
+  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --max-depth nan"),
+              HasSubstr("max_depth_m = nan"));
+  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --plot plot.jpg"),
+              HasSubstr("plot.jpg: expected a name that ends in .png"));
+  cv::imwrite((folder() / "mm.png").string(), cv::Mat_<std::uint16_t>(90, 120, std::uint16_t{9}));
+  EXPECT_THAT(refusal("evaluate depth mm.png plane.tiff"), HasSubstr("--scale"));
+  EXPECT_THAT(refusal("evaluate map plane.tiff plane.tiff"), HasSubstr("expected .pcd or .ply"));
+  EXPECT_THAT(refusal("evaluate trajectory data data --align sim3"), HasSubstr("--align"));
+  EXPECT_THAT(refusal("evaluate trajectory data data --max-diff -1"), HasSubstr("--max-diff"));
+  EXPECT_THAT(refusal("evaluate trajectory data data --frames 0.5 --align none"),
+              HasSubstr("0.5: must be above 0, of frames a whole number"));
+  EXPECT_NE(run("evaluate").status, 0);
+}
+
+TEST_F(EvaluateCommand, HelpHasTheKeysOfTheJson) {
+  for (const auto& [kind, key] : {std::pair{"depth", "aerrr_by_estimate"},
+                                  {"map", "completeness"},
+                                  {"trajectory", "translation_percent"}}) {
+    const Result help = run(std::string("evaluate ") + kind + " --help");
+    EXPECT_EQ(help.status, 0);
+    EXPECT_THAT(help.out, AllOf(HasSubstr("Keys of --json"), HasSubstr(key), HasSubstr("--plot")));
+  }
+}
+
+}  // namespace
+}  // namespace efm

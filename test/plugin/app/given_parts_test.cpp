@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `--poses`, `--calibration` and `--hand-eye`, and the same in the .ini, as a user gives them.
+
+#include <regex>
+
+#include "test/paths.h"
+#include "test/plugin/app/map_command.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace fs = std::filesystem;
+
+const fs::path kSharedData = EFM_SHARED_DATA;
+
+class GivenParts : public MapCommand {
+ protected:
+  GivenParts() { write(SyntheticRecording()); }
+
+  /// Takes a file out of the recording's folder, into the one around it.
+  void takeOut(const std::string& name) const {
+    fs::rename(folder() / "data" / name, folder() / name);
+  }
+  void writeText(const std::string& name, const std::string& text) const {
+    std::ofstream(folder() / name) << text;
+  }
+  std::string mapOf(const std::string& arguments) const {
+    const Result result = run("map rig.ini " + arguments + " --out out");
+    EXPECT_EQ(result.status, 0) << result.err;
+    return contentOf(folder() / "out" / "map.pcd");
+  }
+  std::string errorOf(const std::string& arguments) const {
+    const Result result = run(arguments);
+    EXPECT_NE(result.status, 0) << arguments;
+    return result.err;
+  }
+
+  /// The recording's poses as a tracker gives them whose body the rig is turned and moved on.
+  void writePosesOfTheBody() const {
+    writeText("hand_eye.yaml",
+              "T_body_rig: [[0, 0, 1, 0.4], [-1, 0, 0, 0.2], [0, -1, 0, -0.1], [0, 0, 0, 1]]\n");
+    Eigen::Matrix3d rotation;
+    rotation << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    const Rigid3 T_body_rig = {Eigen::Quaterniond(rotation), {0.4, 0.2, -0.1}};
+    std::vector<StampedPose> poses = SyntheticRecording().poses;
+    for (StampedPose& pose : poses) pose.T_world_rig = pose.T_world_rig * T_body_rig.inverse();
+    writeTumTrajectory(folder() / "body.txt", poses);
+  }
+
+  /// Positions of the keyframes' reference views in a map's folder.
+  std::vector<StampedPose> keyframesIn(const std::string& name) const {
+    return readTumTrajectory(folder() / name / "trajectory.txt");
+  }
+};
+
+TEST_F(GivenParts, PosesAndCalibrationBesideARecordingMakeTheSameMapAsInIt) {
+  const std::string map = mapOf("data");
+  takeOut("poses.txt");
+  EXPECT_EQ(mapOf("data --poses poses.txt"), map);
+  takeOut("camchain.yaml");
+  EXPECT_EQ(mapOf("data --poses poses.txt --calibration camchain.yaml"), map);
+  EXPECT_EQ(run("info data --poses poses.txt --calibration camchain.yaml").status, 0);
+  const std::string depth = "depth rig.ini data --out one --t0 10.1 --t1 10.3 ";
+  EXPECT_EQ(run(depth + "--poses poses.txt --calibration camchain.yaml").status, 0);
+}
+
+TEST_F(GivenParts, ARecordingWithoutThemIsAnErrorThatNamesTheOption) {
+  takeOut("poses.txt");
+  EXPECT_THAT(errorOf("map rig.ini data --out out"),
+              HasSubstr("data: no poses: expected poses.txt or groundtruth.txt, or --poses FILE"));
+  takeOut("camchain.yaml");
+  EXPECT_THAT(errorOf("info data --poses poses.txt"),
+              HasSubstr("data: no calibration: expected camchain.yaml, or --calibration FILE"));
+  EXPECT_THAT(errorOf("info data --poses nowhere.txt"), HasSubstr("nowhere.txt: cannot be opened"));
+}
+
+TEST_F(GivenParts, TheyReplaceWhatTheRecordingHas) {
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  const std::string map = mapOf("data");
+
+  std::vector<StampedPose> poses = SyntheticRecording().poses;
+  for (StampedPose& pose : poses) pose.T_world_rig.translation.y() += 5;
+  writeTumTrajectory(folder() / "moved.txt", poses);
+  Rig rig{SyntheticRecording().cameras};
+  for (RigCamera& camera : rig.cameras) camera.model.cx += 3;
+  writeText("other.yaml", formatCamchain(rig));
+  const std::string options = " --poses moved.txt --calibration other.yaml";
+
+  const std::string other = mapOf("data" + options);
+  EXPECT_NE(other, map);
+  EXPECT_NEAR(keyframesIn("out")[0].T_world_rig.translation.y(), 5, 1e-12);
+  EXPECT_EQ(mapOf("r.rawlog" + options), other) << "a rawlog's are replaced, too";
+  ASSERT_EQ(run("import r.rawlog --out other.rawlog" + options).status, 0);
+  EXPECT_EQ(mapOf("other.rawlog"), other) << "import writes what was given";
+}
+
+TEST_F(GivenParts, AHandEyeTransformTakesTheBodysPosesToTheRig) {
+  mapOf("data");
+  const auto expected = keyframesIn("out");
+  writePosesOfTheBody();
+
+  const std::string options = " --poses body.txt --hand-eye hand_eye.yaml";
+  const std::string map = mapOf("data" + options);
+  const auto keyframes = keyframesIn("out");
+  ASSERT_EQ(keyframes.size(), expected.size());
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    const Rigid3 T_ref_expected = keyframes[k].T_world_rig.inverse() * expected[k].T_world_rig;
+    EXPECT_LT(T_ref_expected.translation.norm(), 1e-9);
+    EXPECT_LT(T_ref_expected.rotation.vec().norm(), 1e-9);
+  }
+
+  ASSERT_EQ(run("import data --out r.rawlog" + options).status, 0);
+  EXPECT_EQ(mapOf("r.rawlog"), map) << "a rawlog remembers it";
+  EXPECT_EQ(mapOf("r.rawlog --hand-eye hand_eye.yaml"), map) << "given twice is given once";
+}
+
+TEST_F(GivenParts, TheOptionFileMaySayThemAndTheCommandLineWins) {
+  mapOf("data");
+  const auto expected = keyframesIn("out");
+  writePosesOfTheBody();
+  fs::create_directory(folder() / "rigs");
+  fs::rename(folder() / "hand_eye.yaml", folder() / "rigs" / "hand_eye.yaml");
+  takeOut("camchain.yaml");
+  fs::rename(folder() / "camchain.yaml", folder() / "rigs" / "camchain.yaml");
+  std::string options = contentOf(folder() / "rig.ini");
+  options = std::regex_replace(options, std::regex("calibration = *"), "calibration=camchain.yaml");
+  options = std::regex_replace(options, std::regex("hand_eye = *"), "hand_eye = hand_eye.yaml");
+  writeText("rigs/rig.ini", options);
+
+  const std::string map = "map rigs/rig.ini data --poses body.txt --out out";
+  ASSERT_EQ(run(map).status, 0) << run(map).err;
+  EXPECT_NEAR(
+      (keyframesIn("out")[0].T_world_rig.inverse() * expected[0].T_world_rig).translation.norm(), 0,
+      1e-9);
+  EXPECT_EQ(reportIn("out")["options"]["rig"]["hand_eye"], "rigs/hand_eye.yaml");
+
+  writeText("none.yaml", "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  ASSERT_EQ(run(map + " --hand-eye none.yaml").status, 0);
+  EXPECT_GT(
+      (keyframesIn("out")[0].T_world_rig.inverse() * expected[0].T_world_rig).translation.norm(),
+      0.1);
+  EXPECT_THAT(errorOf(map + " --set rig.calibration="), HasSubstr("data: no calibration"));
+}
+
+TEST_F(GivenParts, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  fs::copy_file(folder() / "data" / "camchain.yaml", folder() / "same.yaml");
+  Rig rig{SyntheticRecording().cameras};
+  rig.cameras[1].T_rig_cam.translation.y() += 0.001;
+  writeText("other.yaml", formatCamchain(rig));
+  for (const std::string recording : {"data", "r.rawlog"}) {
+    const std::string map = "map rig.ini " + recording + " --out out ";
+    EXPECT_EQ(run(map + "--set rig.calibration=same.yaml").err, "") << recording;
+    EXPECT_THAT(run(map + "--set rig.calibration=other.yaml").err,
+                HasSubstr("warning: other.yaml replaced another calibration, the recording's own; "
+                          "--set rig.calibration= keeps that"))
+        << recording;
+    EXPECT_EQ(run(map + "--calibration other.yaml").err, "") << recording << ": it was asked for";
+  }
+  takeOut("camchain.yaml");
+  EXPECT_EQ(run("map rig.ini data --out out --set rig.calibration=other.yaml").err, "")
+      << "there is no other";
+}
+
+TEST_F(GivenParts, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning) {
+  fs::create_directory(folder() / "uzh");
+  fs::rename(folder() / "data" / "cam0" / "events.txt", folder() / "uzh" / "events.txt");
+  fs::rename(folder() / "data" / "poses.txt", folder() / "uzh" / "groundtruth.txt");
+  writeText("uzh/calib.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
+  writeText("same.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
+  writeText("other.txt", "100 101 59.5 44.5 0 0 0 0 0\n");
+  const std::string map = "map rig.ini uzh --out out ";
+  const auto warning = HasSubstr("warning: other.txt replaced another calibration");
+  EXPECT_THAT(run(map + "--set rig.calibration=same.txt").err, Not(HasSubstr("replaced")));
+  EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, warning);
+  EXPECT_THAT(run(map + "--calibration other.txt").err, Not(HasSubstr("replaced")));
+  ASSERT_EQ(run("import uzh --out r.rawlog").status, 0);
+  EXPECT_THAT(run("map rig.ini r.rawlog --out out --set rig.calibration=other.txt").err, warning);
+  fs::remove(folder() / "uzh" / "calib.txt");
+  EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, Not(HasSubstr("replaced")));
+}
+
+TEST_F(GivenParts, OfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  const auto write_cameras = [&](const std::string& name, int count, int width) {
+    Rig rig{SyntheticRecording(0.1, count).cameras};
+    for (RigCamera& camera : rig.cameras) camera.model.width = width;
+    writeText(name, formatCamchain(rig));
+  };
+  write_cameras("one.yaml", 1, 120);
+  write_cameras("three.yaml", 3, 120);
+  write_cameras("large.yaml", 2, 640);
+  const std::string map = "map rig.ini --out out ";
+  EXPECT_THAT(errorOf(map + "data --calibration one.yaml"),
+              HasSubstr("one.yaml: 1 camera, but the recording has camera 1"));
+  EXPECT_THAT(errorOf(map + "data --calibration three.yaml"),
+              HasSubstr("three.yaml: 3 cameras: expected 2, as the recording has"));
+  EXPECT_THAT(errorOf(map + "r.rawlog --calibration one.yaml"),
+              HasSubstr("one.yaml: 1 camera, but the recording has camera 1"));
+  EXPECT_THAT(errorOf(map + "r.rawlog --calibration three.yaml"),
+              HasSubstr("three.yaml: 3 cameras: expected 2, as the recording has"));
+  EXPECT_THAT(errorOf("import r.rawlog --out x.rawlog --calibration three.yaml"),
+              HasSubstr("three.yaml: 3 cameras: expected 2, as the recording has"));
+  EXPECT_THAT(errorOf(map + "r.rawlog --calibration large.yaml"),
+              HasSubstr("large.yaml: camera 0 has 640x90 pixels: expected 120x90 pixels"));
+}
+
+TEST_F(GivenParts, TimeOffsetsMoveACamerasEventsToThePosesClock) {
+  SyntheticRecording recording;
+  write(recording);
+  const std::string map = mapOf("data");
+  for (Event& event : recording.events[1]) event.t_ns += 42'000'000;
+  write(recording);
+  EXPECT_NE(mapOf("data"), map);
+  EXPECT_EQ(mapOf("data --set rig.time_offsets_s=0,-0.042"), map);
+  EXPECT_THAT(errorOf("map rig.ini data --out out --set rig.time_offsets_s=0"),
+              HasSubstr("[rig] time_offsets_s (how many) = 1: must be one per camera"));
+  EXPECT_THAT(errorOf("map rig.ini data --out out --set rig.time_offsets_s=0,0,0"),
+              HasSubstr("[rig] time_offsets_s (how many) = 3: must be one per camera"));
+}
+
+// --- Real recordings -----------------------------------------------------------------------------
+
+TEST_F(GivenParts, SliderDepthWithItsPosesAndCalibrationBesideItGivesTheSameMap) {
+  const fs::path slider = kSharedData / "slider_depth";
+  if (!fs::exists(slider)) GTEST_SKIP() << slider << " is not there";
+  fs::create_directory(folder() / "bare");
+  for (const char* name : {"events.txt", "images.txt", "images"}) {
+    fs::create_symlink(fs::canonical(slider / name), folder() / "bare" / name);
+  }
+  const std::string config = EFM_SOURCE_DIR "/config/davis240c_slider.ini";
+  const std::string whole = "'" + slider.string() + "'";
+  const std::string poses = " --poses '" + (slider / "groundtruth.txt").string() + "'";
+  const std::string calibration = " --calibration '" + (slider / "calib.txt").string() + "'";
+
+  EXPECT_THAT(errorOf("map '" + config + "' bare --out out" + calibration),
+              HasSubstr("bare: no poses: expected groundtruth.txt, or --poses FILE"));
+  EXPECT_THAT(errorOf("map '" + config + "' bare --out out" + poses),
+              HasSubstr("bare: no calibration: expected calib.txt, or --calibration FILE"));
+  ASSERT_EQ(run("map '" + config + "' " + whole + " --out whole").status, 0);
+  ASSERT_EQ(run("map '" + config + "' bare --out bare_out" + poses + calibration).status, 0);
+  EXPECT_EQ(contentOf(folder() / "whole" / "map.pcd"),
+            contentOf(folder() / "bare_out" / "map.pcd"));
+}
+
+TEST_F(GivenParts, RealTrajectoriesArePoses) {
+  for (const char* name : {"rpg_eccv18_desk.txt", "mvsec_indoor_flying1.txt", "tumvie_desk2.txt",
+                           "dsec_zurich_city_04.txt"}) {
+    const fs::path trajectory = kSharedData / "trajectories" / name;
+    if (!fs::exists(trajectory)) GTEST_SKIP() << trajectory << " is not there";
+    const std::size_t poses = readTumTrajectory(trajectory).size();
+    const Result result = run("info data --poses '" + trajectory.string() + "'");
+    EXPECT_EQ(result.status, 0) << result.err;
+    EXPECT_THAT(result.out, HasSubstr(std::to_string(poses) + " poses from"));
+  }
+}
+
+}  // namespace
+}  // namespace efm

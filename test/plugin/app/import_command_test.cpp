@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `event-fusion simulate`, `import` and `info` as a user runs them, and MRPT's own program on what
+// they make.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <regex>
+
+#include "test/paths.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+const std::filesystem::path kSliderDepth = EFM_SHARED_DATA "/slider_depth";
+
+std::string contentOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+class ImportCommand : public TemporaryFolder {
+ protected:
+  struct Result {
+    int status = 0;
+    std::string out;
+    std::string err;
+  };
+
+  /// Runs a program inside the test's folder, without a terminal.
+  Result runProgram(const std::string& program, const std::string& arguments) const {
+    const std::string command = "cd '" + folder().string() + "' && '" + program + "' " + arguments +
+                                " </dev/null >stdout.txt 2>stderr.txt";
+    Result result;
+    result.status = std::system(command.c_str());
+    result.out = contentOf(folder() / "stdout.txt");
+    result.err = contentOf(folder() / "stderr.txt");
+    return result;
+  }
+  Result run(const std::string& arguments) const { return runProgram(EFM_EVENT_FUSION, arguments); }
+
+  void write(const std::string& file, const std::string& text) const {
+    const std::filesystem::path path = folder() / file;
+    std::filesystem::create_directories(path.parent_path());
+    std::ofstream(path, std::ios::binary) << text;
+  }
+
+  /// A recording in the UZH layout.
+  void writeSmallRecording() const {
+    write("small/events.txt", "0.010 1 2 1\n0.020 3 4 0\n0.030 5 6 1\n0.029 7 8 0\n0.050 1 1 1\n");
+    write("small/groundtruth.txt",
+          "0.015 0 0 0 0 0 0 1\n0.030 0 0 0 0 0 0 1\n0.045 0 0 0 0 0 0 1\n");
+    write("small/calib.txt", "200 200 120 90 0 0 0 0 0\n");
+  }
+};
+
+TEST_F(ImportCommand, TurnsARecordingIntoARawlogAndSaysWhatIsInIt) {
+  writeSmallRecording();
+  const Result result = run("import small --out s.rawlog");
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.err, IsEmpty());
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("cam0: 5 events"), HasSubstr("3 poses"),
+                    HasSubstr("1 events were out of order"), HasSubstr("bytes per event")));
+  EXPECT_TRUE(exists(folder() / "s.rawlog"));
+}
+
+TEST_F(ImportCommand, InfoSaysTheSameOfTheFolderAndOfItsRawlog) {
+  writeSmallRecording();
+  ASSERT_EQ(run("import small --out s.rawlog").status, 0);
+  const Result folder = run("info small");
+  const Result rawlog = run("info s.rawlog");
+  EXPECT_EQ(folder.status, 0);
+  EXPECT_THAT(folder.out,
+              AllOf(HasSubstr("cam0: 240x180 pixels, focal length 200 px, distortion radtan"),
+                    HasSubstr("5 events from 0.010000000 s to 0.050000000 s"),
+                    HasSubstr("3 poses from 0.015000000 s to 0.045000000 s"),
+                    HasSubstr("largest gap 0.015 s"),
+                    HasSubstr("1 events before the first pose, 1 after the last"),
+                    HasSubstr("1 events out of order")));
+  EXPECT_EQ(rawlog.status, 0);
+  // That events were sorted is known only of the text.
+  const std::size_t sorted = folder.out.find("1 events out of order");
+  EXPECT_EQ(rawlog.out, folder.out.substr(0, sorted));
+}
+
+TEST_F(ImportCommand, TakesAStretchOfTheRecording) {
+  writeSmallRecording();
+  const Result result = run("import small --out s.rawlog --t0 0.02 --t1 0.03");
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("cam0: 2 events"), HasSubstr("2 poses")));
+}
+
+TEST_F(ImportCommand, AStretchWithoutEventsIsAnErrorThatSaysWhereTheyAre) {
+  writeSmallRecording();
+  const char* const span = ": the recording has events from 0.010000000 s to 0.050000000 s\n";
+  // Around the middle one lie poses, but no event.
+  for (const char* times : {"--t0 7 --t1 8", "--t0 0.011 --t1 0.018", "--t0 7", "--t1 0.005"}) {
+    const Result result = run(std::string("import small --out s.rawlog ") + times);
+    EXPECT_NE(result.status, 0);
+    EXPECT_THAT(result.err, AllOf(StartsWith("event-fusion: error: no event "), EndsWith(span)));
+    EXPECT_FALSE(exists(folder() / "s.rawlog"));
+    EXPECT_FALSE(exists(folder() / "s.partial.rawlog"));
+  }
+  EXPECT_THAT(run("import small --out s.rawlog --t0 7 --t1 8").err,
+              HasSubstr("no event from --t0 7.000000000 s until --t1 8.000000000 s: "));
+}
+
+TEST_F(ImportCommand, ReadsTheRealSliderRecordingWhole) {
+  if (!exists(kSliderDepth)) GTEST_SKIP() << "no " << kSliderDepth;
+  const Result import = run("import '" + kSliderDepth.string() + "' --out s.rawlog");
+  EXPECT_EQ(import.status, 0) << import.err;
+  EXPECT_THAT(import.out, AllOf(HasSubstr("cam0: 50000 events"), HasSubstr("339 poses")));
+  const Result info = run("info s.rawlog");
+  EXPECT_THAT(info.out, AllOf(HasSubstr("cam0: 240x180 pixels"),
+                              HasSubstr("50000 events from 0.003811000 s to 0.174156000 s")));
+}
+
+TEST_F(ImportCommand, RawlogEditListsTheEventsWithTheirLabel) {
+  if (std::system("command -v rawlog-edit >/dev/null") != 0) GTEST_SKIP() << "no rawlog-edit";
+  writeSmallRecording();
+  ASSERT_EQ(run("import small --out s.rawlog").status, 0);
+  const Result with = runProgram("rawlog-edit", "-p '" EFM_PLUGIN "' --info -i s.rawlog");
+  EXPECT_EQ(with.status, 0);
+  EXPECT_THAT(with.out, HasSubstr("cam0, pose"));
+  EXPECT_THAT(with.out + with.err, Not(HasSubstr("not registered")));
+
+  const Result described = runProgram("rawlog-edit", "-p '" EFM_PLUGIN "' --describe -i s.rawlog");
+  EXPECT_EQ(described.status, 0);
+  EXPECT_THAT(described.out, HasSubstr("Events of camera 0: "));
+}
+
+// --- simulate ----------------------------------------------------------------------------------
+
+TEST_F(ImportCommand, ASimulatedRecordingBecomesARawlog) {
+  const Result simulated = run("simulate --preset desk_stereo --duration 0.05 --out desk");
+  ASSERT_EQ(simulated.status, 0) << simulated.err;
+  EXPECT_THAT(simulated.err, IsEmpty());
+  const Result info = run("info desk");
+  EXPECT_EQ(info.status, 0);
+  EXPECT_THAT(info.out, AllOf(HasSubstr("cam0: 346x260"), HasSubstr("cam1: 346x260"),
+                              HasSubstr("51 poses from 1.000000000 s to 1.050000000 s"),
+                              HasSubstr("0 events before the first pose, 0 after the last")));
+  EXPECT_EQ(run("import desk --out desk.rawlog").status, 0);
+
+  const Result again = run("simulate --preset desk_stereo --duration 0.05 --out desk");
+  EXPECT_NE(again.status, 0) << "a folder that is not empty was written over";
+  EXPECT_THAT(again.err, AllOf(StartsWith("event-fusion: error: "), HasSubstr("desk")));
+}
+
+// --- Bad input ---------------------------------------------------------------------------------
+
+TEST_F(ImportCommand, AMissingRecordingIsAnErrorOnOneLine) {
+  for (const char* command : {"import nowhere --out s.rawlog", "info nowhere"}) {
+    const Result result = run(command);
+    EXPECT_NE(result.status, 0) << command;
+    EXPECT_EQ(result.err, "event-fusion: error: nowhere: no such file or folder\n");
+  }
+  EXPECT_FALSE(exists(folder() / "s.rawlog"));
+}
+
+TEST_F(ImportCommand, AnEventOutsideTheSensorIsAnErrorThatNamesTheLineAndLeavesNoRawlog) {
+  writeSmallRecording();
+  write("small/events.txt", "0.010 1 2 1\n0.020 240 4 0\n");
+  const Result result = run("import small --out s.rawlog");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("events.txt:2: "), HasSubstr("240")));
+  EXPECT_FALSE(exists(folder() / "s.rawlog"));
+  EXPECT_FALSE(exists(folder() / "s.partial.rawlog"));
+}
+
+TEST_F(ImportCommand, InfoOfACutFolderSaysWhatCameBeforeAndFails) {
+  writeSmallRecording();
+  write("small/events.txt", "0.010 1 2 1\n0.020 3 4 0\n0.030 5");
+  const Result result = run("info small");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("2 events from 0.010000000 s to 0.020000000 s"),
+                                HasSubstr("3 poses from 0.015000000 s to 0.045000000 s")));
+  EXPECT_THAT(result.err, HasSubstr("small/events.txt:3: '0.030 5': expected t x y p, but the"));
+}
+
+TEST_F(ImportCommand, InfoOfACutRawlogSaysWhatCameBeforeAndFails) {
+  writeSmallRecording();
+  ASSERT_EQ(run("import small --out s.rawlog").status, 0);
+  const std::string bytes = contentOf(folder() / "s.rawlog");
+  write("s.rawlog", bytes.substr(0, bytes.size() - 4));
+  const Result result = run("info s.rawlog");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.out, HasSubstr("cam0: 240x180"));
+  EXPECT_TRUE(std::regex_search(
+      result.err,
+      std::regex("^event-fusion: error: stopped at entry [0-9]+ of s.rawlog: the file ends in "
+                 "the middle of its data\n$")))
+      << result.err;
+}
+
+TEST_F(ImportCommand, AFileThatIsNoRawlogIsAnErrorThatSaysWhatWasExpected) {
+  writeSmallRecording();
+  ASSERT_EQ(std::system(("gzip -k '" + (folder() / "small/events.txt").string() + "'").c_str()), 0);
+  write("empty.rawlog", "");
+  write("picture.png", "\x89PNG\r\n\x1a\n");
+  write("short", "\x97");
+  write("words.bin", std::string("\x05\0\0\0a b c", 9));
+  const std::string expected = ": expected a rawlog, or the folder of a recording as text files\n";
+  const std::pair<const char*, const char*> cases[] = {
+      {"small/events.txt", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
+      {"small/events.txt.gz", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
+      {"empty.rawlog", "it is empty"},
+      {"picture.png", "it begins with '\\x89PNG\\x0d\\x0a\\x1a\\x0a'"},
+      {"words.bin", "it begins with '\\x05\\x00\\x00\\x00a b c'"}};
+  for (const auto& [file, why] : cases) {
+    for (const char* format : {"", " --format rawlog"}) {
+      const Result result = run(std::string("info ") + file + format);
+      EXPECT_NE(result.status, 0) << file;
+      EXPECT_EQ(result.err, "event-fusion: error: " + std::string(file) + ": not a rawlog (" + why +
+                                ")" + expected);
+    }
+  }
+  EXPECT_THAT(run("info short").err, HasSubstr("stopped at entry 0 of short: the file ends in the"))
+      << "it may be cut";
+}
+
+TEST_F(ImportCommand, ARawlogThatCannotBeWrittenIsAnError) {
+  writeSmallRecording();
+  const Result result = run("import small --out nowhere/s.rawlog");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("nowhere/"));
+}
+
+TEST_F(ImportCommand, AnOutputThatIsNoFileIsAnErrorAndStays) {
+  writeSmallRecording();
+  std::filesystem::create_directory(folder() / "taken");
+  EXPECT_THAT(run("import small --out taken").err, HasSubstr("'taken': it is a folder"));
+  EXPECT_THAT(run("import small --out ''").err, HasSubstr("'': expected the name of a file"));
+  EXPECT_THAT(run("simulate --preset desk_stereo --out ''").err,
+              HasSubstr("'': expected the name of the folder"));
+  EXPECT_THAT(run("info small --format rawlog").err, HasSubstr("small: a folder: expected a file"));
+  EXPECT_TRUE(is_directory(folder() / "taken"));
+}
+
+TEST_F(ImportCommand, OutputThatNobodyReceivesIsAnError) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  writeSmallRecording();
+  for (const char* arguments :
+       {"info small", "import small --out s.rawlog", "--help", "--version"}) {
+    const std::string command = "cd '" + folder().string() + "' && '" EFM_EVENT_FUSION "' " +
+                                arguments + " >/dev/full 2>stderr.txt";
+    EXPECT_NE(std::system(command.c_str()), 0) << arguments;
+    EXPECT_THAT(contentOf(folder() / "stderr.txt"),
+                StartsWith("event-fusion: error: the output cannot be written"))
+        << arguments;
+  }
+}
+
+TEST_F(ImportCommand, WrongUsageIsAnErrorThatSaysWhatIsMissing) {
+  EXPECT_NE(run("").status, 0);
+  EXPECT_THAT(run("import small").err, HasSubstr("--out"));
+  EXPECT_THAT(run("info small --format tape").err, HasSubstr("tape"));
+  EXPECT_THAT(run("info small --t0 soon").err, HasSubstr("soon"));
+  EXPECT_NE(run("info small --t0 soon").status, 0);
+}
+
+TEST_F(ImportCommand, HelpAndVersionAreSuccesses) {
+  const Result help = run("--help");
+  EXPECT_EQ(help.status, 0);
+  EXPECT_THAT(help.out, AllOf(HasSubstr("simulate"), HasSubstr("import"), HasSubstr("info")));
+  const Result version = run("--version");
+  EXPECT_EQ(version.status, 0);
+  EXPECT_THAT(version.out, StartsWith("event-fusion 0."));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `event-fusion map` and `depth` as a user runs them.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "test/plugin/app/map_command.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+
+namespace efm {
+namespace {
+
+using nlohmann::json;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+TEST_F(MapCommand, WritesTheFilesOfTheContract) {
+  write(SyntheticRecording());
+
+  const Result result = run("map rig.ini data --out out");
+
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_THAT(result.err, IsEmpty()) << "quiet when not on a terminal";
+  EXPECT_THAT(result.out, AllOf(HasSubstr("3 keyframes"), HasSubstr("out")));
+  const auto files = filesIn("out");
+  EXPECT_EQ(files.size(), 4U + 3 * 4) << testing::PrintToString(files);
+  EXPECT_THAT(files,
+              testing::IsSupersetOf({"map.pcd", "map.simplemap", "report.json", "trajectory.txt"}));
+  const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
+  ASSERT_EQ(poses.size(), 3U);
+  for (const StampedPose& pose : poses) {
+    const auto keyframe = folder() / "out" / "keyframes" / formatSeconds(pose.t_ns);
+    EXPECT_TRUE(exists(keyframe / "depth.tiff")) << keyframe;
+    EXPECT_TRUE(exists(keyframe / "confidence.png")) << keyframe;
+  }
+}
+
+TEST_F(MapCommand, CountsOfTheReportAddUp) {
+  const SyntheticRecording recording;
+  write(recording);
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+
+  const json report = reportIn("out");
+  const json& events = report["events"];
+  EXPECT_EQ(events["read"], recording.totalEvents());
+  const auto sum = [](const json& counts) {
+    std::uint64_t total = 0;
+    for (const char* key : {"used", "without_pose", "outside_window", "dropped", "filtered"}) {
+      total += counts[key].get<std::uint64_t>();
+    }
+    return total;
+  };
+  EXPECT_EQ(events["read"], sum(events));
+  ASSERT_EQ(events["cameras"].size(), 2U);
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(events["cameras"][c]["read"], recording.events[c].size());
+    EXPECT_EQ(events["cameras"][c]["read"], sum(events["cameras"][c]));
+  }
+  const json& votes = report["votes"];
+  EXPECT_EQ(votes["cast"].get<std::uint64_t>() + votes["outside_view"].get<std::uint64_t>() +
+                votes["behind_camera"].get<std::uint64_t>(),
+            report["event_uses"].get<std::uint64_t>() * 30);
+  EXPECT_GT(report["event_uses"], events["used"]) << "windows overlap";
+  EXPECT_GT(report["votes_per_second"], 0);
+  EXPECT_GT(report["seconds"]["total"], report["seconds"]["sweep"]);
+  EXPECT_EQ(report["options"]["dsi"]["num_planes"], 30);
+  EXPECT_EQ(report["reference_view"]["fx"], 100);
+  EXPECT_NEAR(report["baseline_m"], 0.1, 1e-9);
+}
+
+TEST_F(MapCommand, ThreadsDoNotChangeAByteOfTheMap) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("map rig.ini data --out one --set performance.threads=1").status, 0);
+  ASSERT_EQ(run("map rig.ini data --out two --set performance.threads=2").status, 0);
+
+  const auto files = filesIn("one");
+  ASSERT_EQ(files, filesIn("two"));
+  for (const std::string& file : files) {
+    if (file == "report.json") continue;
+    EXPECT_EQ(contentOf(folder() / "one" / file), contentOf(folder() / "two" / file)) << file;
+  }
+}
+
+TEST_F(MapCommand, ARawlogGivesTheSameMapAsTheFolder) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  ASSERT_EQ(run("map rig.ini data --out one").status, 0);
+  ASSERT_EQ(run("map rig.ini r.rawlog --out two").status, 0);
+  EXPECT_EQ(contentOf(folder() / "one" / "map.pcd"), contentOf(folder() / "two" / "map.pcd"));
+}
+
+TEST_F(MapCommand, TimeLimitsAreHalfOpenAndInTheRecordingsClock) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("map rig.ini data --out out --t0 10.1 --t1 10.35").status, 0);
+  EXPECT_EQ(reportIn("out")["keyframes"], 1);
+}
+
+// --- Bad input -------------------------------------------------------------------------------
+
+TEST_F(MapCommand, MissingFilesAreErrorsThatNameThem) {
+  write(SyntheticRecording());
+  const Result no_config = run("map nowhere.ini data --out out");
+  EXPECT_NE(no_config.status, 0);
+  EXPECT_THAT(no_config.err, HasSubstr("nowhere.ini"));
+  const Result no_source = run("map rig.ini nowhere.rawlog --out out");
+  EXPECT_NE(no_source.status, 0);
+  EXPECT_THAT(no_source.err, HasSubstr("nowhere.rawlog"));
+  EXPECT_FALSE(exists(folder() / "out"));
+}
+
+TEST_F(MapCommand, WrongOptionsAreErrorsThatNameFileSectionKeyAndValue) {
+  write(SyntheticRecording());
+  std::ofstream(folder() / "wrong.ini") << "[dsi]\nplanes = 3\n";
+  Result result = run("map wrong.ini data --out out");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("wrong.ini:2: [dsi] planes: unknown key"));
+
+  std::ofstream(folder() / "wrong.ini") << "[dsi]\nnum_planes = 0\n";
+  result = run("map wrong.ini data --out out");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("wrong.ini:2: [dsi] num_planes = 0: must be"));
+
+  result = run("map rig.ini data --out out --set dsi.num_planes=many");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("[dsi] num_planes = many: must be a whole number"));
+}
+
+TEST_F(MapCommand, CamerasThatTheRecordingDoesNotHaveAreErrors) {
+  write(SyntheticRecording());
+  Result result = run("map rig.ini data --out out --set rig.cameras=0,5");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("cameras = 5: must be a camera of the recording: 0 to 1"));
+  result = run("map rig.ini data --out out --set dsi.reference_camera=2");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("reference_camera = 2: must be"));
+}
+
+TEST_F(MapCommand, EventsOutsideTheSensorAreAnError) {
+  SyntheticRecording recording;
+  recording.events[0].back().x = 120;
+  write(recording);
+  const Result result = run("map rig.ini data --out out");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("120"));
+}
+
+TEST_F(MapCommand, AWrongCountOfDistortionCoefficientsIsAnError) {
+  SyntheticRecording recording;
+  write(recording);
+  recording.cameras[1].model.distortion = DistortionModel::kRadtan;
+  recording.cameras[1].model.coefficients = {0.1, 0.2, 0.3};
+  Rig rig;
+  rig.cameras = recording.cameras;
+  std::ofstream(folder() / "data" / "camchain.yaml") << formatCamchain(rig);
+  const Result result = run("map rig.ini data --out out");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("coefficients"));
+}
+
+TEST_F(MapCommand, PosesThatMissTheEventsAreAnErrorThatSaysByHowMuch) {
+  SyntheticRecording recording;
+  for (StampedPose& pose : recording.poses) pose.t_ns += 100'000'000'000;
+  write(recording);
+
+  const Result result = run("map rig.ini data --out out");
+
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("they miss each other by 99.5"));
+  EXPECT_EQ(reportIn("out")["keyframes"], 0) << "the report is written all the same";
+  EXPECT_FALSE(exists(folder() / "out" / "map.pcd"));
+}
+
+TEST_F(MapCommand, ARecordingShorterThanAWindowIsAnErrorThatSaysSo) {
+  write(SyntheticRecording());
+  const Result result = run("map rig.ini data --out out --set keyframes.window_s=3");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("no window of 3.000000000 s"));
+  EXPECT_EQ(reportIn("out")["keyframes"], 0);
+}
+
+TEST_F(MapCommand, ATruncatedRawlogIsAnErrorAndTheMapSoFarIsWritten) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  const auto rawlog = folder() / "r.rawlog";
+  std::filesystem::resize_file(rawlog, std::filesystem::file_size(rawlog) * 7 / 10);
+
+  const Result result = run("map rig.ini r.rawlog --out out");
+
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("stopped at entry"), HasSubstr("of r.rawlog: "),
+                                HasSubstr("the file ends in the middle of its data\n")));
+  EXPECT_GE(reportIn("out")["keyframes"], 1);
+  EXPECT_TRUE(exists(folder() / "out" / "map.pcd"));
+  EXPECT_TRUE(exists(folder() / "out" / "trajectory.txt"));
+}
+
+TEST_F(MapCommand, ARunThatMakesNothingLeavesAnEarlierMapAsItWas) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+  const auto files = filesIn("out");
+  std::ofstream(folder() / "text.rawlog") << "no rawlog";
+  for (const char* arguments :
+       {"map nowhere.ini data", "map rig.ini nowhere", "map rig.ini text.rawlog",
+        "map rig.ini data --set dsi.num_planes=0", "map rig.ini data --set rig.cameras=0,5"}) {
+    EXPECT_NE(run(std::string(arguments) + " --out out").status, 0) << arguments;
+    EXPECT_EQ(filesIn("out"), files) << arguments;
+    EXPECT_EQ(reportIn("out")["keyframes"], 3) << arguments;
+  }
+}
+
+TEST_F(MapCommand, DepthLeavesAnEarlierMapInTheSameFolder) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+  const auto map_files = filesIn("out");
+  ASSERT_EQ(run("depth rig.ini data --out out --t0 10.1 --t1 10.3").status, 0);
+  EXPECT_THAT(filesIn("out"), testing::IsSupersetOf(map_files));
+}
+
+TEST_F(MapCommand, AnOutputThatCannotBeWrittenIsAnErrorThatNamesIt) {
+  write(SyntheticRecording());
+  std::ofstream(folder() / "out") << "a file";
+  const Result result = run("map rig.ini data --out out");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("out"));
+}
+
+TEST_F(MapCommand, ASilentCameraIsAWarning) {
+  SyntheticRecording recording;
+  recording.events[1].clear();
+  write(recording);
+  const Result result = run("map rig.ini data --out out");
+  EXPECT_THAT(result.err, HasSubstr("warning: camera 1 had no event in 3 of 3 keyframes"));
+}
+
+// --- depth -----------------------------------------------------------------------------------
+
+TEST_F(MapCommand, DepthWritesOneKeyframeStraightIntoTheFolder) {
+  write(SyntheticRecording());
+  const Result result = run("depth rig.ini data --out out --t0 10.1 --t1 10.3 --save-dsi");
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_THAT(filesIn("out"),
+              testing::ElementsAre("confidence.png", "confidence.tiff", "depth.png", "depth.tiff",
+                                   "dsi.npy", "points.pcd", "report.json"));
+  const cv::Mat depth =
+      cv::imread((folder() / "out" / "depth.tiff").string(), cv::IMREAD_UNCHANGED);
+  EXPECT_EQ(depth.type(), CV_32F);
+  EXPECT_EQ(reportIn("out")["points"], cv::countNonZero(depth));
+  EXPECT_EQ(reportIn("out")["keyframes"], 1);
+}
+
+TEST_F(MapCommand, TheSavedDsiHasItsMaximumWhereTheConfidenceSays) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("depth rig.ini data --out out --t0 10.1 --t1 10.3 --save-dsi").status, 0);
+  const cv::Mat1f confidence =
+      cv::imread((folder() / "out" / "confidence.tiff").string(), cv::IMREAD_UNCHANGED);
+  const std::string npy = contentOf(folder() / "out" / "dsi.npy");
+  const std::size_t pixels = confidence.total();
+  ASSERT_EQ(npy.size() % 64, pixels * 30 * sizeof(float) % 64);
+  const std::size_t header = npy.size() - pixels * 30 * sizeof(float);
+  std::vector<float> dsi(pixels * 30);
+  std::memcpy(dsi.data(), npy.data() + header, dsi.size() * sizeof(float));
+  for (std::size_t i = 0; i < pixels; ++i) {
+    float largest = 0;
+    for (std::size_t plane = 0; plane < 30; ++plane) {
+      largest = std::max(largest, dsi[plane * pixels + i]);
+    }
+    ASSERT_EQ(largest, reinterpret_cast<const float*>(confidence.data)[i]) << "pixel " << i;
+  }
+}
+
+TEST_F(MapCommand, DepthTakesTheReferenceTimeThatIsAskedFor) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("depth rig.ini data --out a --t0 10.1 --t1 10.3").status, 0);
+  ASSERT_EQ(run("depth rig.ini data --out b --t0 10.1 --t1 10.3 --ref-time 10.2").status, 0);
+  ASSERT_EQ(run("depth rig.ini data --out c --t0 10.1 --t1 10.3 --ref-time 10.3").status, 0);
+  EXPECT_EQ(contentOf(folder() / "a" / "depth.tiff"), contentOf(folder() / "b" / "depth.tiff"));
+  EXPECT_NE(contentOf(folder() / "a" / "depth.tiff"), contentOf(folder() / "c" / "depth.tiff"));
+}
+
+TEST_F(MapCommand, AWindowWithoutPosesOrTheWrongWayRoundIsAnError) {
+  write(SyntheticRecording());
+  const Result beside = run("depth rig.ini data --out out --t0 20 --t1 21");
+  EXPECT_NE(beside.status, 0);
+  EXPECT_THAT(beside.err, HasSubstr("no event in the window 20.000000000 to 21.000000000 s"));
+  const Result reversed = run("depth rig.ini data --out out --t0 10.3 --t1 10.1");
+  EXPECT_NE(reversed.status, 0);
+  EXPECT_THAT(reversed.err, HasSubstr("must end after it begins"));
+  const Result not_a_time = run("depth rig.ini data --out out --t0 soon --t1 10.1");
+  EXPECT_NE(not_a_time.status, 0);
+  EXPECT_THAT(not_a_time.err, HasSubstr("soon"));
+}
+
+TEST_F(MapCommand, TimesWhoseDifferencesWouldNotFitAreErrors) {
+  for (const char* times : {"--t0 -9e9 --t1 9e9", "--t0 1 --t1 4.7e9", "--t0 -4.7e9 --t1 1",
+                            "--t0 1 --t1 2 --ref-time 5e9"}) {
+    const Result result = run(std::string("depth rig.ini data --out out ") + times);
+    EXPECT_NE(result.status, 0);
+    EXPECT_THAT(result.err, HasSubstr("expected a time within 4.6e9 s of 0")) << times;
+  }
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Options of `event-fusion map` and `depth` that change what is written, as a user sets them.
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "maps/io/point_cloud_file.h"
+#include "test/plugin/app/map_command.h"
+
+namespace efm {
+namespace {
+
+using nlohmann::json;
+using testing::Contains;
+using testing::Each;
+using testing::HasSubstr;
+using testing::Not;
+
+class MapOptions : public MapCommand {
+ protected:
+  cv::Mat image(const std::filesystem::path& file) const {
+    return cv::imread((folder() / file).string(), cv::IMREAD_UNCHANGED);
+  }
+  std::size_t pointsIn(const std::filesystem::path& file) const {
+    return readPointCloud(folder() / file).points.size();
+  }
+};
+
+TEST_F(MapOptions, TheSequencesWhiteLevelIsFoundInAPassOfItsOwn) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("map rig.ini data --out out --set depth.max_confidence=sequence").status, 0);
+
+  const json report = reportIn("out");
+  EXPECT_EQ(report["options"]["depth"]["max_confidence"], "sequence");
+  std::vector<double> maxima;
+  for (const StampedPose& pose : readTumTrajectory(folder() / "out" / "trajectory.txt")) {
+    double largest = 0;
+    cv::minMaxLoc(image("out/keyframes/" + formatSeconds(pose.t_ns) + "/confidence.tiff"), nullptr,
+                  &largest);
+    maxima.push_back(largest);
+  }
+  // Of fewer than twenty keyframes the robust maximum is the plain one.
+  const double expected = *std::max_element(maxima.begin(), maxima.end());
+  EXPECT_EQ(report["sequence_maximum"], expected);
+
+  std::ostringstream number;
+  number.precision(17);
+  number << "depth.max_confidence=" << expected;
+  ASSERT_EQ(run("map rig.ini data --out fixed --set " + number.str()).status, 0);
+  EXPECT_EQ(contentOf(folder() / "out" / "map.pcd"), contentOf(folder() / "fixed" / "map.pcd"));
+}
+
+TEST_F(MapOptions, SingleCamerasKeepTheirOwnWhiteLevel) {
+  write(SyntheticRecording());
+  const std::string maps = "map rig.ini data --set output.camera_maps=true ";
+  ASSERT_EQ(run(maps + "--out own").status, 0);
+  ASSERT_EQ(run(maps + "--out all --set depth.max_confidence=sequence").status, 0);
+  for (const std::string& file : filesIn("own")) {
+    if (file.find("/cam") == std::string::npos) continue;
+    EXPECT_EQ(contentOf(folder() / "own" / file), contentOf(folder() / "all" / file)) << file;
+  }
+}
+
+TEST_F(MapOptions, OneKeyframeHasTheWhiteLevelOfTheWholeRecording) {
+  write(SyntheticRecording());
+  const std::string sequence = " --set depth.max_confidence=sequence";
+  ASSERT_EQ(run("map rig.ini data --out out" + sequence).status, 0);
+  ASSERT_EQ(run("depth rig.ini data --t0 10.1 --t1 10.4 --out one" + sequence).status, 0);
+  EXPECT_EQ(reportIn("one")["sequence_maximum"], reportIn("out")["sequence_maximum"]);
+}
+
+TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
+  write(SyntheticRecording());
+  // With slices of time a camera alone is fused across them.
+  const std::string map = "map rig.ini data --set fusion.time_slices=1 ";
+  ASSERT_EQ(
+      run(map + "--out out --set output.camera_maps=true --set output.event_images=true").status,
+      0);
+  ASSERT_EQ(run(map + "--out alone --set rig.cameras=1").status, 0);
+  const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
+  for (const StampedPose& pose : poses) {
+    const std::filesystem::path keyframe = "keyframes/" + formatSeconds(pose.t_ns);
+    const cv::Mat beside = image("out" / keyframe / "cam1" / "depth.tiff");
+    const cv::Mat alone = image("alone" / keyframe / "depth.tiff");
+    ASSERT_FALSE(beside.empty());
+    EXPECT_EQ(cv::norm(beside, alone, cv::NORM_INF), 0) << "the view is camera 0's in both";
+    EXPECT_FALSE(image("out" / keyframe / "cam0" / "events.png").empty());
+  }
+
+  // A run without them leaves none behind.
+  ASSERT_EQ(run("map rig.ini data --out out").status, 0);
+  EXPECT_THAT(filesIn("out"), Each(Not(HasSubstr("cam"))));
+}
+
+TEST_F(MapOptions, LateFusionPutsTheCloudsOfSingleCamerasTogether) {
+  write(SyntheticRecording());
+  const std::string depth =
+      "depth rig.ini data --t0 10.1 --t1 10.4 --set map.voxel_size_m=0.001 "
+      "--set fusion.time_slices=1 ";
+  ASSERT_EQ(run(depth + "--out both --set fusion.late=true").status, 0);
+  ASSERT_EQ(run(depth + "--out first --set rig.cameras=0").status, 0);
+  ASSERT_EQ(run(depth + "--out second --set rig.cameras=1").status, 0);
+  EXPECT_GT(pointsIn("first/points.pcd"), 0U);
+  EXPECT_EQ(pointsIn("both/points.pcd"),
+            pointsIn("first/points.pcd") + pointsIn("second/points.pcd"));
+}
+
+TEST_F(MapOptions, OutliersAreLeftOutOfTheCloudOfOneKeyframeToo) {
+  write(SyntheticRecording());
+  const std::string depth = "depth rig.ini data --t0 10.1 --t1 10.4 ";
+  ASSERT_EQ(run(depth + "--out all").status, 0);
+  ASSERT_EQ(run(depth + "--out some --set map.outlier_radius_m=0.02"
+                        " --set map.outlier_min_neighbors=4")
+                .status,
+            0);
+  EXPECT_LT(pointsIn("some/points.pcd"), pointsIn("all/points.pcd"));
+  EXPECT_EQ(reportIn("some")["points"], pointsIn("some/points.pcd"));
+}
+
+TEST_F(MapOptions, AFileThatCannotBeWrittenDoesNotTakeTheOthersAlong) {
+  write(SyntheticRecording());
+  std::filesystem::create_directories(folder() / "out" / "map.pcd" / "in the way");
+  const Result result = run("map rig.ini data --out out");
+  EXPECT_NE(result.status, 0);
+  EXPECT_THAT(result.err, HasSubstr("map.pcd"));
+  for (const char* file : {"map.simplemap", "trajectory.txt", "report.json"}) {
+    EXPECT_TRUE(exists(folder() / "out" / file)) << file;
+  }
+}
+
+TEST_F(MapOptions, SubintervalsOfEveryKindMapTheRecording) {
+  write(SyntheticRecording());
+  for (const std::string options :
+       {"--set fusion.order=time_then_cameras", "--set fusion.split=count",
+        "--set fusion.shuffle=shift", "--set fusion.shuffle=random",
+        "--set fusion.across_time=harmonic --set fusion.across_cameras=arithmetic"}) {
+    const Result result = run("map rig.ini data --out out --set fusion.subintervals=3 " + options);
+    EXPECT_EQ(result.status, 0) << options << "\n" << result.err;
+    EXPECT_GT(reportIn("out")["points"], 0) << options;
+  }
+}
+
+}  // namespace
+}  // namespace efm

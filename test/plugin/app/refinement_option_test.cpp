@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `event-fusion` with [refinement] enabled.
+
+#include "maps/metrics/trajectory_metrics.h"
+#include "test/plugin/app/map_command.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::Not;
+
+const std::string kRefined = " --set refinement.enabled=true";
+
+class RefinementOption : public MapCommand {
+ protected:
+  RefinementOption() { write(SyntheticRecording(1.3)); }
+
+  /// A keyframe each 0.1 s, from the recording in "data".
+  Result map(const std::string& arguments, const std::string& name) const {
+    const Result result =
+        run("map rig.ini data --set keyframes.window_s=0.1 " + arguments + " --out " + name);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return result;
+  }
+  std::vector<StampedPose> posesIn(const std::string& name, const std::string& file) const {
+    return readTumTrajectory(folder() / name / file);
+  }
+  std::string contentIn(const std::string& name, const std::string& file) const {
+    return contentOf(folder() / name / file);
+  }
+};
+
+/// Root mean square of the distances of neighbours from what they truly are.
+double errorOf(const std::vector<StampedPose>& poses, const std::vector<StampedPose>& truth) {
+  std::vector<PosePair> pairs;
+  EXPECT_EQ(poses.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    pairs.push_back({truth[i].t_ns, poses[i].T_world_rig, truth[i].T_world_rig});
+  }
+  double squares = 0;
+  const auto errors = relativeErrors(pairs, {RelativeSpacing::Unit::kFrames, 1}).translation_m;
+  for (const double error_m : errors) squares += error_m * error_m;
+  return std::sqrt(squares / static_cast<double>(errors.size()));
+}
+
+TEST_F(RefinementOption, WritesTheRefinedPosesAndTheTrackers) {
+  map("", "exact");
+  const auto truth = posesIn("exact", "trajectory.txt");
+  const std::string begin = formatSeconds(truth.front().t_ns - 50'000'000);
+  map("--perturb keyframe_noise_m=0.01,keyframe_noise_deg=0.3,keyframe_start_s=" + begin + kRefined,
+      "refined");
+
+  const auto tracker = posesIn("refined", "trajectory_tracker.txt");
+  const auto refined = posesIn("refined", "trajectory.txt");
+  ASSERT_EQ(tracker.size(), truth.size());
+  ASSERT_EQ(refined.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_EQ(refined[i].t_ns, tracker[i].t_ns);
+  EXPECT_GT(errorOf(tracker, truth), 0.01);
+  EXPECT_LT(errorOf(refined, truth), errorOf(tracker, truth));
+
+  const auto report = reportIn("refined");
+  EXPECT_GT(report["seconds"]["refine"], 0);
+  EXPECT_LE(report["seconds"]["refine"], report["seconds"]["total"]);
+  EXPECT_GT(report["refinement"]["registered"], truth.size() / 2);
+  EXPECT_LT(report["refinement"]["registered"], truth.size());
+  for (const char* key : {"loop_checks", "loops", "loops_dropped"}) {
+    EXPECT_TRUE(report["refinement"][key].is_number_unsigned()) << key;
+  }
+  for (const char* key : {"noise_m", "noise_deg", "drift", "drift_deg_per_m"}) {
+    EXPECT_GT(report["refinement"]["tracker"][key], 0) << key;
+  }
+  EXPECT_EQ(report["options"]["refinement"]["enabled"], true);
+  EXPECT_EQ(report["options"]["refinement"]["tracker_noise_deg"], 0.5);
+  EXPECT_EQ(report["options"]["refinement"]["loop_max_sigma_deg"], 0.5);
+}
+
+TEST_F(RefinementOption, IsTheSameEachTimeWhateverTheThreadsAndInTheBackground) {
+  const std::string wrong = "--perturb keyframe_noise_m=0.01,keyframe_s=0.1" + kRefined;
+  map(wrong, "once");
+  const auto expect_same = [&](const std::string& name) {
+    for (const char* file :
+         {"map.pcd", "map.simplemap", "trajectory.txt", "trajectory_tracker.txt"}) {
+      EXPECT_EQ(contentIn(name, file), contentIn("once", file)) << file;
+    }
+  };
+  map(wrong + " --set performance.threads=3", "again");
+  expect_same("again");
+  map(wrong + " --set refinement.background=true", "background");
+  expect_same("background");
+}
+
+TEST_F(RefinementOption, WithoutItThereIsNoTrajectoryOfTheTrackersBeside) {
+  map("", "out");
+  const std::string points = contentIn("out", "map.pcd");
+  EXPECT_THAT(filesIn("out"), Not(Contains("trajectory_tracker.txt")));
+  EXPECT_EQ(reportIn("out")["seconds"]["refine"], 0);
+  EXPECT_FALSE(reportIn("out").contains("refinement"));
+
+  map(kRefined, "out");
+  EXPECT_THAT(filesIn("out"), Contains("trajectory_tracker.txt"));
+  map("", "out");  // shorter, and the earlier run's is gone
+  EXPECT_THAT(filesIn("out"), Not(Contains("trajectory_tracker.txt")));
+  EXPECT_EQ(contentIn("out", "map.pcd"), points);
+}
+
+TEST_F(RefinementOption, AShorterRunReplacesTheTrajectoriesOfALongerOne) {
+  map(kRefined, "out");
+  const std::size_t before = posesIn("out", "trajectory_tracker.txt").size();
+  map(kRefined + " --t1 11", "out");
+  EXPECT_LT(posesIn("out", "trajectory_tracker.txt").size(), before);
+  EXPECT_EQ(posesIn("out", "trajectory_tracker.txt").size(),
+            posesIn("out", "trajectory.txt").size());
+}
+
+TEST_F(RefinementOption, OneKeyframeIsWhereTheTrackerPutsIt) {
+  const std::string depth = "depth rig.ini data --t0 10.2 --t1 10.4";
+  ASSERT_EQ(run(depth + " --out one").status, 0);
+  for (const char* background : {"false", "true"}) {
+    const Result refined =
+        run(depth + kRefined + " --set refinement.background=" + background + " --out refined");
+    ASSERT_EQ(refined.status, 0) << refined.err;
+    EXPECT_EQ(refined.err, "");
+    EXPECT_EQ(contentIn("refined", "points.pcd"), contentIn("one", "points.pcd"));
+    EXPECT_EQ(filesIn("refined"), filesIn("one"));
+  }
+}
+
+TEST_F(RefinementOption, TheSequencesWhiteLevelIsTheSame) {
+  const std::string sequence = " --set depth.max_confidence=sequence";
+  map(sequence, "out");
+  map(sequence + kRefined, "refined");
+  EXPECT_EQ(reportIn("refined")["sequence_maximum"], reportIn("out")["sequence_maximum"]);
+}
+
+TEST_F(RefinementOption, DegreesAreReportedAsTheyWereGiven) {
+  map("--t1 10.3 --set refinement.tracker_noise_deg=0.3 --set refinement.loop_max_sigma_deg=0.7 "
+      "--set refinement.tracker_drift_deg_per_m=1.1",
+      "out");
+  const auto options = reportIn("out")["options"]["refinement"];
+  EXPECT_EQ(options["tracker_noise_deg"], 0.3);
+  EXPECT_EQ(options["loop_max_sigma_deg"], 0.7);
+  EXPECT_EQ(options["tracker_drift_deg_per_m"], 1.1);
+}
+
+TEST_F(RefinementOption, WrongValuesAreErrorsThatNameSectionKeyAndValue) {
+  const auto error = [&](const std::string& option) {
+    const Result result = run("map rig.ini data --out none --set refinement." + option);
+    EXPECT_NE(result.status, 0);
+    return result.err;
+  };
+  EXPECT_THAT(error("window=0"), HasSubstr("[refinement] window = 0: must be from 1 to 1000"));
+  EXPECT_THAT(error("tracker_noise_deg=-2"),
+              HasSubstr("[refinement] tracker_noise_deg = -2: must be from 0 to 1000"));
+  EXPECT_THAT(error("windows=3"), AllOf(HasSubstr("windows"), HasSubstr("unknown key")));
+}
+
+TEST_F(RefinementOption, ARecordingOfOneKeyframeIsNoCaseOfItsOwn) {
+  const Result result = map("--t1 10.15" + kRefined, "out");
+  EXPECT_EQ(result.err, "");
+  EXPECT_EQ(contentIn("out", "trajectory.txt"), contentIn("out", "trajectory_tracker.txt"));
+  EXPECT_EQ(reportIn("out")["refinement"]["registered"], 0);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// `event-fusion simulate` on a trajectory with a calibration, as a user runs it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include "mapping/geometry/rig.h"
+#include "plugin/calibration/camchain.h"
+#include "test/paths.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+
+std::string contentOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return std::string(std::istreambuf_iterator<char>(file), {});
+}
+
+class SimulateCommand : public TemporaryFolder {
+ protected:
+  /// Runs the program inside the test's folder. @return its exit status was 0.
+  bool run(const std::string& arguments) const {
+    const std::string command = "cd '" + folder().string() +
+                                "' && '" EFM_EVENT_FUSION "' simulate " + arguments +
+                                " </dev/null >stdout.txt 2>stderr.txt";
+    return std::system(command.c_str()) == 0;
+  }
+  std::string errors() const { return contentOf(folder() / "stderr.txt"); }
+
+  /// Three small cameras in three orientations, and a second of walking ahead.
+  void writeRigAndTrajectory() const {
+    std::ofstream chain(folder() / "rig.yaml");
+    const char* const models[] = {
+        "radtan\n  distortion_coeffs: [-0.3, 0.1, 0.001, -0.002]",
+        "equidistant\n  distortion_coeffs: [-0.05, 0.01, -0.02, 0.005]\n"
+        "  T_cn_cnm1: [[0, -1, 0, 0.1], [1, 0, 0, 0.02], [0, 0, 1, 0], [0, 0, 0, 1]]",
+        "none\n  distortion_coeffs: []\n"
+        "  T_cn_cnm1: [[0.96, 0, 0.28, -0.1], [0, 1, 0, 0], [-0.28, 0, 0.96, 0.01], [0, 0, 0, 1]]"};
+    for (int i = 0; i < 3; ++i) {
+      chain << "cam" << i << ":\n  camera_model: pinhole\n  intrinsics: [50, 51, 31.5, 23]\n"
+            << "  resolution: [" << 64 - i << ", " << 48 + i
+            << "]\n  distortion_model: " << models[i] << "\n";
+    }
+    std::ofstream poses(folder() / "walk.txt");
+    for (int i = 0; i <= 100; ++i) poses << i * 0.01 << " 0 0 " << i * 0.008 << " 0 0 0 1\n";
+  }
+};
+
+TEST_F(SimulateCommand, WritesTheRigThatItWasGiven) {
+  writeRigAndTrajectory();
+  ASSERT_TRUE(
+      run("--scene room --trajectory walk.txt --calibration rig.yaml --start 0.2 "
+          "--duration 0.1 --noise-hz 20 --mismatch 0.05 --out sim"))
+      << errors();
+  const Rig given = readCamchain(folder() / "rig.yaml");
+  const Rig written = readCamchain(folder() / "sim/camchain.yaml");
+  ASSERT_EQ(written.cameras.size(), 3U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(written.cameras[i].model, given.cameras[i].model);
+    const Rigid3& T_rig_cam = given.cameras[i].T_rig_cam;
+    EXPECT_LT((written.cameras[i].T_rig_cam.translation - T_rig_cam.translation).norm(), 1e-12);
+    EXPECT_LT(written.cameras[i].T_rig_cam.rotation.angularDistance(T_rig_cam.rotation), 1e-7);
+    EXPECT_GT(contentOf(folder() / "sim" / ("cam" + std::to_string(i)) / "events.txt").size(), 0U);
+  }
+  EXPECT_THAT(contentOf(folder() / "sim/depth/index.txt"), HasSubstr("0.200000000"));
+}
+
+TEST_F(SimulateCommand, NoiseIsCountedByItsRate) {
+  writeRigAndTrajectory();
+  const std::string simulate =
+      "--scene room --trajectory walk.txt --calibration rig.yaml --duration 0.1 --threshold-on 5 "
+      "--threshold-off 5 --hot-hz 500 --hot-pixels 0.1 --out ";
+  ASSERT_TRUE(run(simulate + "sim")) << errors();
+  const std::string events = contentOf(folder() / "sim/cam0/events.txt");
+  const auto lines = static_cast<double>(std::count(events.begin(), events.end(), '\n'));
+  const double expected = 64 * 48 * 0.1 * 500 * 0.1;
+  // Hot pixels are drawn (their number's deviation is 17 of 307), and each fires 50 times.
+  EXPECT_NEAR(lines, expected, 0.25 * expected);
+}
+
+TEST_F(SimulateCommand, ErrorsNameTheFileOrTheOption) {
+  writeRigAndTrajectory();
+  const std::string on_walk = "--scene room --trajectory walk.txt --calibration rig.yaml ";
+  EXPECT_FALSE(run(on_walk + "--duration 3 --out sim"));
+  EXPECT_THAT(errors(), HasSubstr("walk.txt: duration_s = 3"));
+  EXPECT_FALSE(run("--scene room --trajectory none.txt --calibration rig.yaml --out sim"));
+  EXPECT_THAT(errors(), HasSubstr("none.txt"));
+  EXPECT_FALSE(run(on_walk + "--mismatch 2 --out sim"));
+  EXPECT_THAT(errors(), HasSubstr("mismatch = 2"));
+  EXPECT_FALSE(run("--out sim"));
+  EXPECT_THAT(errors(), HasSubstr("--preset"));
+  EXPECT_FALSE(run("--preset slider --scene room --out sim"));
+  EXPECT_FALSE(run("--scene room --trajectory walk.txt --out sim"));
+  EXPECT_FALSE(std::filesystem::exists(folder() / "sim"));
+}
+
+TEST_F(SimulateCommand, AValueOutOfRangeIsAnErrorThatNamesTheOptionAndItsUnit) {
+  const std::pair<const char*, const char*> cases[] = {
+      {"--duration -1", "--duration = -1: must be 0.001 to 600 (seconds)"},
+      {"--threshold-on 1e-3", "--threshold-on = 0.001: must be 0.01 or more (log intensity)"},
+      {"--threshold-off 0", "--threshold-off = 0: must be 0.01 or more (log intensity)"},
+      {"--threshold-off inf", "--threshold-off = inf: must be 0.01 or more (log intensity)"},
+      {"--mismatch 2", "--mismatch = 2: must be 0 to 0.5 (a share of the thresholds)"},
+      {"--refractory-us -1", "--refractory-us = -1: must be 0 to 1e6 (microseconds)"},
+      {"--refractory-us 1e300", "--refractory-us = "},
+      {"--refractory-us nan", "--refractory-us = nan"},
+      {"--noise-hz -1", "--noise-hz = -1: must be 0 to 1e5 (events per second and pixel)"},
+      {"--hot-pixels 2", "--hot-pixels = 2: must be 0 to 1 (a share of the pixels)"},
+      {"--hot-hz 1e6", "--hot-hz = 1000000: must be 0 to 1e5 (events per second and pixel)"},
+      {"--seed -1", "--seed"},
+      {"--seed 1.5", "--seed"}};
+  for (const auto& [option, expected] : cases) {
+    EXPECT_FALSE(run("--preset slider --out sim " + std::string(option))) << option;
+    EXPECT_THAT(errors(), HasSubstr(expected));
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder() / "sim"));
+  EXPECT_TRUE(run("--preset slider --duration 0.002 --seed 18446744073709551615 --out sim"))
+      << errors();
+}
+
+TEST_F(SimulateCommand, DrivesTheSharedRigsOnTheSharedTrajectories) {
+  const std::filesystem::path shared = EFM_SHARED_DATA;
+  if (!std::filesystem::exists(shared / "trajectories")) GTEST_SKIP() << shared << " is not there";
+  const std::string trajectories = (shared / "trajectories").string();
+  const std::string calibrations = (shared / "calibration").string();
+  ASSERT_TRUE(run("--scene room --trajectory '" + trajectories +
+                  "/mvsec_indoor_flying1.txt' --calibration '" + calibrations +
+                  "/mvsec/camchain.yaml' --duration 0.02 --out mvsec"))
+      << errors();
+  const Rig given = readCamchain(shared / "calibration/mvsec/camchain.yaml");
+  const Rig written = readCamchain(folder() / "mvsec/camchain.yaml");
+  ASSERT_EQ(written.cameras.size(), 2U);
+  EXPECT_EQ(written.cameras[1].model, given.cameras[1].model);
+  EXPECT_GT(contentOf(folder() / "mvsec/cam1/events.txt").size(), 1000U);
+}
+
+}  // namespace
+}  // namespace efm

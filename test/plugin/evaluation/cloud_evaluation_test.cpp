@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/evaluation/cloud_evaluation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "maps/io/point_cloud_file.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class EvaluateCloud : public TemporaryFolder {
+ protected:
+  /// Points along x.
+  std::filesystem::path cloud(const std::string& name, const std::vector<double>& places,
+                              PointCloudEncoding encoding = PointCloudEncoding::kBinary) const {
+    const auto path = folder() / name;
+    std::filesystem::create_directories(path.parent_path());
+    std::vector<CloudPoint> points;
+    for (const double x : places) points.push_back({{x, 0, 0}, 1, 1});
+    writePointCloud(path, points, encoding);
+    return path;
+  }
+  std::string errorOf(const std::filesystem::path& map, const std::filesystem::path& truth) const {
+    try {
+      evaluateCloud(map, truth, {});
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+};
+
+TEST_F(EvaluateCloud, ReadsEveryEncodingOfBothFormats) {
+  const auto truth = cloud("truth.ply", {0, 1, 2});
+  for (const auto& map :
+       {cloud("a.pcd", {0.25, 1}), cloud("b.pcd", {0.25, 1}, PointCloudEncoding::kAscii),
+        cloud("c.pcd", {0.25, 1}, PointCloudEncoding::kCompressed), cloud("d.ply", {0.25, 1}),
+        cloud("e.ply", {0.25, 1}, PointCloudEncoding::kAscii)}) {
+    const CloudEvaluation evaluation = evaluateCloud(map, truth, {{0.5}, {}});
+    EXPECT_EQ(evaluation.errors.accuracy.mean, 0.125) << map;
+    EXPECT_EQ(evaluation.errors.steps.at(0).completeness, 2.0 / 3) << map;
+  }
+}
+
+TEST_F(EvaluateCloud, FoldersStandForTheirClouds) {
+  cloud("out/map.pcd", {0, 1});
+  cloud("one/points.pcd", {0, 1});
+  cloud("data/gt_cloud.ply", {0, 3});
+  const auto edges = cloud("data/gt_edges.ply", {1});
+  for (const char* run : {"out", "one"}) {
+    const auto evaluation = evaluateCloud(folder() / run, folder() / "data", {{0.5}, edges});
+    EXPECT_EQ(evaluation.errors.steps.at(0).outliers, 0.5);
+    EXPECT_EQ(evaluation.errors.steps.at(0).completeness, 1) << "of what can be found";
+  }
+  EXPECT_THAT(errorOf(folder() / "data", folder() / "data"),
+              HasSubstr("data: a folder without map.pcd or points.pcd"));
+}
+
+TEST_F(EvaluateCloud, TheTableAndTheJsonSayTheSame) {
+  const auto evaluation =
+      evaluateCloud(cloud("a.pcd", {0, 0.5}), cloud("b.pcd", {0}), {{0.1, 1}, {}});
+  const auto json = nlohmann::json::parse(evaluationJson(evaluation));
+  EXPECT_EQ(json["accuracy"]["mean_m"], 0.25);
+  EXPECT_EQ(json["accuracy"]["share_90_m"], 0.5);
+  EXPECT_EQ(json["curve"][0]["outliers"], 0.5);
+  EXPECT_EQ(json["curve"][1]["f1"], 1);
+  EXPECT_THAT(evaluationTable(evaluation), AllOf(HasSubstr("0.2500"), HasSubstr("50.00")));
+  // Every key is in the help.
+  for (const auto& [key, value] : json.items()) EXPECT_THAT(cloudEvaluationKeys(), HasSubstr(key));
+  for (const auto& [key, value] : json["accuracy"].items()) {
+    EXPECT_THAT(cloudEvaluationKeys(), HasSubstr(key));
+  }
+  for (const auto& [key, value] : json["curve"][0].items()) {
+    EXPECT_THAT(cloudEvaluationKeys(), HasSubstr(key));
+  }
+}
+
+TEST_F(EvaluateCloud, PointsThatAreNotFiniteAreCounted) {
+  std::ofstream(folder() / "nan.pcd")
+      << "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
+         "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n0 0 0\nnan 0 0\n";
+  const auto evaluation = evaluateCloud(folder() / "nan.pcd", cloud("b.pcd", {1}), {});
+  EXPECT_EQ(evaluation.without_place, 1U);
+  EXPECT_EQ(evaluation.errors.accuracy.count, 1U);
+  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 points are not finite"));
+}
+
+TEST_F(EvaluateCloud, WhatCannotBeComparedIsAnErrorThatNamesIt) {
+  const auto one = cloud("one.pcd", {0});
+  EXPECT_THAT(errorOf(cloud("none.pcd", {}), one), HasSubstr("none.pcd: no points"));
+  EXPECT_THAT(errorOf(one, cloud("none.ply", {})), HasSubstr("none.ply: no points"));
+  EXPECT_THAT(errorOf(folder() / "nowhere.pcd", one), HasSubstr("nowhere.pcd"));
+  EXPECT_THAT(errorOf(folder() / "a.xyz", one), HasSubstr("'.xyz': expected .pcd or .ply"));
+  EXPECT_THROW(evaluateCloud(one, one, {{-1}, {}}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/evaluation/depth_series.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class DepthSeries : public TemporaryFolder {
+ protected:
+  void write(const std::string& file, const std::string& text = "") const {
+    std::filesystem::create_directories((folder() / file).parent_path());
+    std::ofstream(folder() / file) << text;
+  }
+  /// The files of a series, as paths inside the test's folder.
+  std::vector<std::string> filesOf(const std::string& name, DepthSeriesRole role) const {
+    std::vector<std::string> files;
+    for (const TimedFile& file : depthSeries(folder() / name, role)) {
+      files.push_back(file.file.lexically_relative(folder()).string());
+    }
+    return files;
+  }
+  std::string errorOf(const std::string& name) const {
+    try {
+      depthSeries(folder() / name, DepthSeriesRole::kTruth);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+};
+
+TEST_F(DepthSeries, AFolderThatHoldsBothKindsGivesEachRoleItsOwn) {
+  write("both/keyframes/10.5/depth.tiff");
+  write("both/keyframes/9.5/depth.tiff");
+  write("both/keyframes/notes/depth.tiff");
+  write("both/keyframes/11.5/confidence.tiff");
+  write("both/depth/index.txt", "# t file\n2 b.tiff\n1 a.tiff # the first\n\n");
+  EXPECT_THAT(filesOf("both", DepthSeriesRole::kEstimate),
+              ElementsAre("both/keyframes/9.5/depth.tiff", "both/keyframes/10.5/depth.tiff"));
+  EXPECT_THAT(filesOf("both", DepthSeriesRole::kTruth),
+              ElementsAre("both/depth/a.tiff", "both/depth/b.tiff"));
+}
+
+TEST_F(DepthSeries, EitherRoleTakesWhatThereIs) {
+  write("map/keyframes/1/depth.tiff");
+  write("data/depth/index.txt", "1 a.tiff\n");
+  EXPECT_THAT(filesOf("map", DepthSeriesRole::kTruth), ElementsAre("map/keyframes/1/depth.tiff"));
+  EXPECT_THAT(filesOf("map/keyframes", DepthSeriesRole::kTruth),
+              ElementsAre("map/keyframes/1/depth.tiff"));
+  EXPECT_THAT(filesOf("data", DepthSeriesRole::kEstimate), ElementsAre("data/depth/a.tiff"));
+  EXPECT_THAT(filesOf("data/depth", DepthSeriesRole::kEstimate), ElementsAre("data/depth/a.tiff"));
+}
+
+TEST_F(DepthSeries, TakesTheTimeFromTheNameWhereThereIsNoIndex) {
+  for (const char* file :
+       {"cam0_2.25.tiff", "1.5.pfm", "0.75.npy", "mask.png", "3.txt", "x_y.tif"}) {
+    write(std::string("named/") + file);
+  }
+  const auto series = depthSeries(folder() / "named", DepthSeriesRole::kEstimate);
+  ASSERT_EQ(series.size(), 3U);
+  EXPECT_EQ(series[0].t_ns, 750'000'000);
+  EXPECT_EQ(series[1].file.filename(), "1.5.pfm");
+  EXPECT_EQ(series[2].t_ns, 2'250'000'000);
+}
+
+TEST_F(DepthSeries, WhatIsNoSeriesIsAnErrorThatNamesIt) {
+  write("empty/notes.txt");
+  EXPECT_THAT(errorOf("empty"), HasSubstr("empty: expected keyframes/<t>/depth.tiff"));
+  write("bad/index.txt", "1 a.tiff\nsoon b.tiff\n");
+  EXPECT_THAT(errorOf("bad"), HasSubstr("index.txt:2: 'soon b.tiff': expected a time"));
+  write("none/index.txt", "# nothing\n");
+  EXPECT_THAT(errorOf("none"), HasSubstr("lists no depth maps"));
+}
+
+TEST_F(DepthSeries, TheNearestFileIsTheOneWithinTheLimit) {
+  const std::vector<TimedFile> series = {{100, "a"}, {200, "b"}, {300, "c"}};
+  const auto nearest = [&](std::int64_t t_ns) {
+    const TimedFile* file = nearestFile(series, t_ns, 50);
+    return file == nullptr ? std::string("none") : file->file.string();
+  };
+  EXPECT_EQ(nearest(49), "none");
+  EXPECT_EQ(nearest(50), "a") << "the limit belongs to it";
+  EXPECT_EQ(nearest(150), "a") << "the earlier of two";
+  EXPECT_EQ(nearest(151), "b");
+  EXPECT_EQ(nearest(350), "c");
+  EXPECT_EQ(nearest(351), "none");
+  EXPECT_EQ(nearestFile({}, 0, 50), nullptr);
+}
+
+}  // namespace
+}  // namespace efm

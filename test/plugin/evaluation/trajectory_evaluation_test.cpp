@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/evaluation/trajectory_evaluation.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "test/plugin/temporary_folder.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class EvaluateTrajectory : public TemporaryFolder {
+ protected:
+  /// A helix of a pose each tenth of a second, moved by `T_map_world`, the clock ahead.
+  std::filesystem::path helix(const std::string& name, const Rigid3& T_map_world = {},
+                              double ahead_s = 0) const {
+    std::vector<StampedPose> poses;
+    for (int i = 0; i < 40; ++i) {
+      const double angle = 0.2 * i;
+      const Rigid3 T_world_rig{
+          Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
+          {std::cos(angle), std::sin(angle), 0.1 * angle}};
+      poses.push_back(
+          {std::int64_t{100'000'000} * i + std::llround(ahead_s * 1e9), T_map_world * T_world_rig});
+    }
+    return write(name, poses);
+  }
+  std::filesystem::path write(const std::string& name,
+                              const std::vector<StampedPose>& poses) const {
+    std::filesystem::create_directories((folder() / name).parent_path());
+    writeTumTrajectory(folder() / name, poses);
+    return folder() / name;
+  }
+  std::string errorOf(const std::filesystem::path& estimate, const std::filesystem::path& truth,
+                      const TrajectoryEvaluationOptions& options = {}) const {
+    try {
+      evaluateTrajectory(estimate, truth, options);
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+
+  const Rigid3 T_map_world_{Eigen::Quaterniond(Eigen::AngleAxisd(1, Eigen::Vector3d(1, 2, 2) / 3)),
+                            {10, 20, 30}};
+};
+
+TEST_F(EvaluateTrajectory, WhereTheEstimatesWorldLiesDoesNotMatter) {
+  const auto evaluation =
+      evaluateTrajectory(helix("est.txt", T_map_world_, 0.004), helix("gt.txt"), {});
+  EXPECT_EQ(evaluation.pairs.size(), 40U);
+  EXPECT_LT(statisticsOf(evaluation.errors.translation_m).largest, 1e-9);
+  EXPECT_LT(statisticsOf(evaluation.errors.rotation_rad).largest, 1e-7);
+  ASSERT_EQ(evaluation.relative.size(), 7U);
+  for (const EvaluatedSpacing& relative : evaluation.relative) {
+    EXPECT_GT(relative.translation_m.count, 0U);
+    EXPECT_LT(relative.translation_m.largest, 1e-9);
+  }
+  const auto as_they_are = evaluateTrajectory(folder() / "est.txt", folder() / "gt.txt",
+                                              {0.01, TrajectoryAlignment::kNone, {}});
+  EXPECT_GT(statisticsOf(as_they_are.errors.translation_m).least, 10);
+}
+
+TEST_F(EvaluateTrajectory, FoldersStandForTheirTrajectories) {
+  helix("out/trajectory.txt");
+  helix("data/poses.txt");
+  helix("uzh/groundtruth.txt");
+  EXPECT_EQ(evaluateTrajectory(folder() / "out", folder() / "data", {}).pairs.size(), 40U);
+  EXPECT_EQ(evaluateTrajectory(folder() / "out", folder() / "uzh", {}).pairs.size(), 40U);
+  EXPECT_EQ(evaluateTrajectory(folder() / "uzh", folder() / "data", {}).pairs.size(), 40U);
+  EXPECT_THAT(errorOf(folder() / "data", folder() / "out"),
+              HasSubstr("out: a folder without poses.txt or groundtruth.txt"));
+}
+
+TEST_F(EvaluateTrajectory, TheTableAndTheJsonSayTheSame) {
+  const auto evaluation = evaluateTrajectory(
+      helix("est.txt", T_map_world_), helix("gt.txt"),
+      {0.01,
+       TrajectoryAlignment::kNone,
+       {{RelativeSpacing::Unit::kMetres, 1.0}, {RelativeSpacing::Unit::kMetres, 1000.0}}});
+  const auto json = nlohmann::json::parse(evaluationJson(evaluation));
+  EXPECT_EQ(json["pairs"], 40);
+  EXPECT_NEAR(json["ate"]["rotation_deg"]["mean"], 180 / M_PI, 1e-9);
+  EXPECT_EQ(json["rpe"][0]["unit"], "m");
+  EXPECT_GT(json["rpe"][0]["pairs"], 10);
+  EXPECT_TRUE(json["rpe"][0].contains("translation_percent"));
+  EXPECT_EQ(json["rpe"][1]["pairs"], 0);
+  EXPECT_FALSE(json["rpe"][1].contains("translation_m"));
+  EXPECT_THAT(evaluationTable(evaluation),
+              AllOf(HasSubstr("57.2958"), HasSubstr("relative over 1000.000 m, m"),
+                    HasSubstr("40 pairs of 40 estimated and 40 true poses")));
+  const std::string keys = trajectoryEvaluationKeys();
+  for (const auto& [key, value] : json.items()) EXPECT_THAT(keys, HasSubstr(key));
+  for (const auto& [key, value] : json["rpe"][0].items()) EXPECT_THAT(keys, HasSubstr(key));
+  for (const auto& [key, value] : json["ate"]["rotation_deg"].items()) {
+    EXPECT_THAT(keys, HasSubstr(key));
+  }
+}
+
+TEST_F(EvaluateTrajectory, WhatCannotBeComparedIsAnErrorThatNamesIt) {
+  const auto gt = helix("gt.txt");
+  EXPECT_THAT(errorOf(helix("late.txt", {}, 100), gt),
+              AllOf(HasSubstr("late.txt"), HasSubstr("within 0.010000 s"), HasSubstr("gt.txt")));
+  EXPECT_THAT(errorOf(write("few.txt", {{0, {}}, {100'000'000, {}}}), gt),
+              AllOf(HasSubstr("few.txt: cannot be aligned: 2 pairs"), HasSubstr("--align origin")));
+  EXPECT_THAT(errorOf(folder() / "nowhere.txt", gt), HasSubstr("nowhere.txt"));
+  std::ofstream(folder() / "bad.txt") << "0 0 0 0 0 0 0 1\n1 2 3\n";
+  EXPECT_THAT(errorOf(folder() / "bad.txt", gt), HasSubstr("bad.txt:2"));
+  std::ofstream(folder() / "empty.txt") << "# nothing\n";
+  EXPECT_THAT(errorOf(folder() / "empty.txt", gt), HasSubstr("empty.txt"));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/formats/dataset_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/obs/CObservationRobotPose.h>
+
+#include <string>
+
+#include "plugin/mrpt/CObservationEvents.h"
+#include "test/plugin/formats/files.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+class DatasetFolder : public TemporaryFolder {
+ protected:
+  DatasetFolder() {
+    std::string camchain;
+    for (const char* name : {"cam0", "cam1"}) {
+      camchain += std::string(name) +
+                  ":\n  camera_model: pinhole\n  intrinsics: [200, 200, 120, 90]\n"
+                  "  distortion_model: none\n  resolution: [240, 180]\n"
+                  "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+    }
+    write("camchain.yaml", camchain);
+    write("cam0/events.txt", "0.1 239 179 1\n");
+    write("cam1/events.txt", "0.2 0 0 0\n");
+    write("poses.txt", "0.3 1 2 3 0 0 0 1\n0.0 0 2 3 0 0 0 1\n");
+  }
+  void write(const std::string& name, const std::string& text) const {
+    writeFile(folder() / name, text);
+  }
+  void remove(const std::string& name) const { std::filesystem::remove(folder() / name); }
+
+  std::string errorOfOpening() const {
+    return errorOf([&] { openDatasetFolder(folder()); });
+  }
+};
+
+TEST_F(DatasetFolder, GivesEachCamerasEventsAndThePosesInOrder) {
+  EXPECT_TRUE(looksLikeDatasetFolder(folder()));
+  const auto recording = openDatasetFolder(folder());
+  std::string labels;
+  while (const auto observation = recording->next()) {
+    labels += observation->sensorLabel + " ";
+    const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
+    if (packet != nullptr && packet->camera_index == 1) {
+      EXPECT_NEAR(packet->camera_pose.x(), 0.1, 1e-15);
+    }
+  }
+  EXPECT_EQ(labels, "pose cam0 cam1 cam0 cam1 pose ");
+}
+
+TEST_F(DatasetFolder, TakesGroundtruthForPosesWhereThereIsNoPosesFile) {
+  std::filesystem::rename(folder() / "poses.txt", folder() / "groundtruth.txt");
+  EXPECT_EQ(openDatasetFolder(folder())->next()->sensorLabel, "pose");
+}
+
+TEST_F(DatasetFolder, OtherFilesDoNotMatter) {
+  write("cam7/events.txt", "nonsense\n");
+  write("notes.txt", "nonsense\n");
+  EXPECT_NO_THROW(openDatasetFolder(folder()));
+}
+
+TEST_F(DatasetFolder, IsKnownByItsCalibrationOrItsFirstCamera) {
+  remove("camchain.yaml");
+  EXPECT_TRUE(looksLikeDatasetFolder(folder()));
+  EXPECT_THAT(errorOfOpening(),
+              HasSubstr(": no calibration: expected camchain.yaml, or --calibration FILE"));
+  remove("cam0/events.txt");
+  EXPECT_FALSE(looksLikeDatasetFolder(folder()));
+  EXPECT_FALSE(looksLikeDatasetFolder(folder() / "poses.txt"));
+  EXPECT_FALSE(looksLikeDatasetFolder(folder() / "nowhere"));
+}
+
+TEST_F(DatasetFolder, ACameraWithoutAFileIsAnError) {
+  remove("cam1/events.txt");
+  EXPECT_THAT(errorOfOpening(), HasSubstr("cam1/events.txt: cannot be opened"));
+}
+
+TEST_F(DatasetFolder, WithoutPosesIsAnErrorThatSaysWhatIsLookedFor) {
+  write("poses.txt", "# none\n");
+  EXPECT_THAT(errorOfOpening(), HasSubstr("poses.txt: no poses"));
+  remove("poses.txt");
+  EXPECT_THAT(errorOfOpening(),
+              AllOf(StartsWith(folder().string()),
+                    HasSubstr("expected poses.txt or groundtruth.txt, or --poses FILE")));
+}
+
+TEST_F(DatasetFolder, ErrorsInsideAFileNameItAndTheLine) {
+  write("poses.txt", "0.3 1 2 3 0 0 0 1\n0.4 1 2 3\n");
+  EXPECT_THAT(errorOfOpening(), HasSubstr("poses.txt:2: "));
+  write("cam1/events.txt", "0.2 0 0 0\n0.3 240 0 0\n");
+  write("poses.txt", "0.3 1 2 3 0 0 0 1\n");
+  const auto recording = openDatasetFolder(folder());
+  EXPECT_THAT(errorOf([&] {
+                while (recording->next()) {
+                }
+              }),
+              AllOf(HasSubstr("cam1/events.txt:2: "), HasSubstr("'240'")));
+  write("cam1/events.txt", "0.3 240 0 0\n");
+  EXPECT_THAT(errorOfOpening(), AllOf(HasSubstr("cam1/events.txt:1: "), HasSubstr("'240'")));
+}
+
+}  // namespace
+}  // namespace efm

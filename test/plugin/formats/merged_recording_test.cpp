@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/formats/merged_recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/obs/CObservationRobotPose.h>
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/recordings/recording_with_poses.h"
+#include "test/plugin/formats/files.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr std::int64_t kMs = 1'000'000;
+
+/// What an observation is, in short: its label, its time in ms and, of events, how many.
+std::string shortly(const mrpt::obs::CObservation& observation) {
+  std::string text =
+      observation.sensorLabel + "@" + std::to_string(nanosecondsFrom(observation.timestamp) / kMs);
+  if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
+    text += ":" + std::to_string(packet->events.size());
+  }
+  return text;
+}
+
+std::vector<mrpt::obs::CObservation::Ptr> readAll(Recording& recording) {
+  std::vector<mrpt::obs::CObservation::Ptr> observations;
+  while (auto observation = recording.next()) observations.push_back(observation);
+  return observations;
+}
+
+std::vector<std::string> shortly(Recording& recording) {
+  std::vector<std::string> texts;
+  for (const auto& observation : readAll(recording)) texts.push_back(shortly(*observation));
+  return texts;
+}
+
+class MergedRecordingTest : public TemporaryFolder {
+ protected:
+  /// @param texts of each camera's events; camera n stands n metres to the right.
+  RecordingWithPoses open(const std::vector<std::string>& texts,
+                          std::vector<StampedPose> poses = {}) {
+    Rig rig;
+    std::vector<EventTextReader> readers;
+    for (std::size_t n = 0; n < texts.size(); ++n) {
+      RigCamera& camera = rig.cameras.emplace_back();
+      camera.model.width = 240;
+      camera.model.height = 180;
+      camera.model.fx = camera.model.fy = 200 + static_cast<double>(n);
+      camera.T_rig_cam.translation.x() = static_cast<double>(n);
+      const std::filesystem::path file = folder() / ("cam" + std::to_string(n)) / "events.txt";
+      writeFile(file, texts[n]);
+      readers.emplace_back(file, CameraSize{240, 180});
+    }
+    return RecordingWithPoses(std::make_unique<MergedRecording>(std::move(rig), std::move(readers)),
+                              std::move(poses));
+  }
+};
+
+StampedPose poseAt(std::int64_t t_ns) {
+  StampedPose pose;
+  pose.t_ns = t_ns;
+  pose.T_world_rig.translation = {static_cast<double>(t_ns), 2, 3};
+  return pose;
+}
+
+TEST_F(MergedRecordingTest, ComesInTheOrderOfTimePosesBeforePacketsThatBeginThenOrLater) {
+  RecordingWithPoses recording = open(
+      {"0.012 0 0 0\n0.018 0 0 0\n0.031 0 0 0\n", "0.015 0 0 0\n0.022 0 0 0\n"},
+      {poseAt(31 * kMs), poseAt(5 * kMs), poseAt(12 * kMs), poseAt(16 * kMs), poseAt(90 * kMs)});
+  EXPECT_THAT(shortly(recording),
+              ElementsAre("pose@5", "pose@12", "cam0@12:0", "cam1@12:0", "cam0@12:2", "cam1@15:1",
+                          "pose@16", "cam1@22:1", "pose@31", "cam0@31:1", "pose@90"));
+  EXPECT_EQ(recording.next(), nullptr);
+}
+
+TEST_F(MergedRecordingTest, APacketTellsItsCameraAndItsEvents) {
+  RecordingWithPoses recording = open({"0.1 1 2 0\n", "0.100000049 3 4 1\n"});
+  const auto observations = readAll(recording);
+  ASSERT_EQ(observations.size(), 4U);
+  const auto& packet = dynamic_cast<const CObservationEvents&>(*observations[3]);
+  EXPECT_EQ(packet.sensorLabel, "cam1");
+  EXPECT_EQ(packet.camera_index, 1);
+  EXPECT_EQ(packet.camera.fx, 201);
+  EXPECT_EQ(packet.camera_pose.x(), 1);
+  EXPECT_EQ(packet.events, (std::vector<Event>{{100'000'049, 3, 4, true}}));
+  EXPECT_EQ(nanosecondsFrom(packet.timestamp), 100'000'000);
+}
+
+TEST_F(MergedRecordingTest, APoseIsTheRigsInTheWorld) {
+  StampedPose pose = poseAt(1'700'000'000'123'456'789);
+  pose.T_world_rig = {Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {1, 2, 3}};
+  RecordingWithPoses recording = open({"1700000001 0 0 0\n"}, {pose});
+  const auto observation = recording.next();
+  const auto& robot = dynamic_cast<const mrpt::obs::CObservationRobotPose&>(*observation);
+  EXPECT_EQ(robot.sensorLabel, "pose");
+  EXPECT_EQ(nanosecondsFrom(robot.timestamp), 1'700'000'000'123'456'800);
+  const Rigid3 T_world_rig = rigidFrom(robot.pose.mean);
+  EXPECT_EQ(T_world_rig.translation, Eigen::Vector3d(1, 2, 3));
+  EXPECT_LT(T_world_rig.rotation.angularDistance(pose.T_world_rig.rotation), 1e-12);
+}
+
+TEST_F(MergedRecordingTest, APacketIsCoveredUntilItsCamerasNextEvent) {
+  RecordingWithPoses recording = open({"0.012 0 0 0\n0.018 0 0 0\n5 0 0 0\n", "0.015 0 0 0\n"});
+  std::vector<std::optional<std::int64_t>> covered;
+  for (const auto& observation : readAll(recording)) {
+    covered.push_back(dynamic_cast<const CObservationEvents&>(*observation).covered_until_ns);
+  }
+  EXPECT_THAT(covered, ElementsAre(12 * kMs, 15 * kMs,  // the empty ones
+                                   5000 * kMs,          // cam0, 10 to 20 ms
+                                   kEndOfTimeNs,        // cam1's last
+                                   std::nullopt));      // the recording's last
+}
+
+TEST_F(MergedRecordingTest, ACameraWithoutEventsIsKnownToBeSilentFromTheBeginning) {
+  RecordingWithPoses recording = open({"", "0.5 0 0 0\n0.6 0 0 0\n", "# nothing\n"});
+  const auto observations = readAll(recording);
+  std::vector<std::string> texts;
+  texts.reserve(observations.size());
+  for (const auto& observation : observations) texts.push_back(shortly(*observation));
+  EXPECT_THAT(texts,
+              ElementsAre("cam0@500:0", "cam1@500:0", "cam2@500:0", "cam1@500:1", "cam1@600:1"));
+  for (const std::size_t silent : {0, 2}) {
+    EXPECT_EQ(dynamic_cast<const CObservationEvents&>(*observations[silent]).covered_until_ns,
+              kEndOfTimeNs);
+  }
+}
+
+TEST_F(MergedRecordingTest, WithoutAnyEventIsAnErrorThatNamesTheFiles) {
+  EXPECT_THAT(errorOf([&] {
+                open({"", "\n"}, {poseAt(0)});
+              }),
+              AllOf(HasSubstr("cam0/events.txt, "), HasSubstr("cam1/events.txt: no events")));
+}
+
+TEST_F(MergedRecordingTest, ACameraWhoseFileBreaksOffIsAnErrorWhenItIsReached) {
+  std::string text;
+  for (int i = 0; i < 200'000; ++i) text += std::to_string(i / 1000) + ".5 1 2 0\n";
+  RecordingWithPoses recording = open({text + "900 1"});
+  EXPECT_NO_THROW(recording.next());
+  EXPECT_THAT(errorOf([&] { readAll(recording); }),
+              AllOf(HasSubstr("events.txt:200001: "), HasSubstr("the file ends")));
+}
+
+TEST_F(MergedRecordingTest, WhatWasSeenBeforeAFileBreaksOffIsGivenBeforeTheError) {
+  RecordingWithPoses recording = open({"0.012 0 0 0\n0.018 0 0 0\n0.019 0 0\n0.025 0 0 0\n",
+                                       "0.011 0 0 0\n0.015 0 0 0\n0.022 0 0 0\n"},
+                                      {poseAt(5 * kMs), poseAt(17 * kMs), poseAt(90 * kMs)});
+  std::vector<std::string> given;
+  const std::string error = errorOf([&] {
+    while (const auto observation = recording.next()) given.push_back(shortly(*observation));
+  });
+  EXPECT_THAT(error, HasSubstr("cam0/events.txt:3: '0.019 0 0'"));
+  EXPECT_THAT(given, ElementsAre("pose@5", "cam0@11:0", "cam1@11:0", "cam1@11:2", "cam0@12:2",
+                                 "pose@17", "pose@90"));
+}
+
+TEST_F(MergedRecordingTest, ProgressGoesFromTheBeginningToOne) {
+  std::string text;
+  for (int i = 0; i < 400'000; ++i) text += std::to_string(i / 1000) + ".5 1 2 0\n";  // 5 MB
+  RecordingWithPoses recording = open({text, "1 0 0 0\n"});
+  recording.next();
+  double before = recording.progress();
+  EXPECT_LT(before, 0.5);
+  while (recording.next()) {
+    EXPECT_GE(recording.progress(), before);
+    before = recording.progress();
+  }
+  EXPECT_EQ(recording.progress(), 1.0);
+}
+
+TEST_F(MergedRecordingTest, SortedEventsOfAllCamerasAreCounted) {
+  RecordingWithPoses recording =
+      open({"0.2 0 0 0\n0.199 0 0 0\n", "0.1 0 0 0\n0.099 0 0 0\n0.098 0 0 0\n"});
+  readAll(recording);
+  EXPECT_EQ(recording.counts().sorted_events, 3U);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,590 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/maps/CPointsMapXYZI.h>
+#include <mrpt/maps/CSimpleMap.h>
+#include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationOdometry.h>
+#include <mrpt/obs/CObservationPointCloud.h>
+#include <mrpt/obs/CObservationRobotPose.h>
+#include <mrpt/obs/CSensoryFrame.h>
+
+#include <atomic>
+#include <future>
+#include <thread>
+
+#include "test/plugin/mrpt/observations.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using mrpt::obs::CObservation;
+
+std::vector<CloudPoint> mapOf(const std::vector<CObservation::Ptr>& observations,
+                              const EventFusionOptions& options) {
+  CEventFusionMapBuilder builder(options);
+  for (const CObservation::Ptr& observation : observations) builder.processObservation(observation);
+  builder.finish();
+  return builder.points();
+}
+
+void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].p_world, b[i].p_world);
+    EXPECT_EQ(a[i].confidence, b[i].confidence);
+  }
+}
+
+TEST(CEventFusionMapBuilder, TurnsObservationsIntoAMapOfTheWorld) {
+  const auto points = mapOf(observationsOf(SyntheticRecording()), syntheticOptions());
+
+  ASSERT_GT(points.size(), 30U);
+  for (const CloudPoint& point : points) {
+    EXPECT_GE(point.p_world.z(), 1);
+    EXPECT_LE(point.p_world.z(), 5);
+  }
+}
+
+TEST(CEventFusionMapBuilder, IsMadeByName) {
+  const auto object = mrpt::rtti::classFactory("efm::CEventFusionMapBuilder");
+  ASSERT_TRUE(object);
+  EXPECT_TRUE(std::dynamic_pointer_cast<mrpt::slam::CMetricMapBuilder>(object));
+}
+
+TEST(CEventFusionMapBuilder, ThreadsOfTheSweepDoNotChangeTheMap) {
+  const auto observations = observationsOf(SyntheticRecording());
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.keyframe.sweep.threads = 1;
+  const auto one = mapOf(observations, options);
+  options.mapper.keyframe.sweep.threads = 2;
+  expectSameBits(one, mapOf(observations, options));
+}
+
+TEST(CEventFusionMapBuilder, KeyframesAreHandedOutOnceAndInOrder) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::vector<std::int64_t> times;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap& keyframe) {
+    times.push_back(keyframe.window.t_ref_ns);
+    EXPECT_GE(builder.status().counts.keyframes, times.size()) << "the taker may use the builder";
+  });
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  builder.finish();
+
+  EXPECT_EQ(times.size(), 3U);
+  EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+}
+
+TEST(CEventFusionMapBuilder, ASensorPoseOnTheRobotIsTakenOutOfThePose) {
+  // A tracker half a metre above the rig, turned by 90 degrees: the same map.
+  const SyntheticRecording recording;
+  auto observations = observationsOf(recording);
+  const mrpt::poses::CPose3D sensor_on_rig(0.1, -0.5, 0.2, 1.5, 0, 0);
+  for (const auto& observation : observations) {
+    auto pose = std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation);
+    if (!pose) continue;
+    pose->sensorPose = sensor_on_rig;
+    pose->pose.mean = pose->pose.mean + sensor_on_rig;
+  }
+
+  const auto expected = mapOf(observationsOf(recording), syntheticOptions());
+  const auto points = mapOf(observations, syntheticOptions());
+
+  ASSERT_EQ(points.size(), expected.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-6);
+  }
+}
+
+TEST(CEventFusionMapBuilder, OtherObservationsAreCountedAndIgnored) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.processObservation(mrpt::obs::CObservationComment::Create());
+  EXPECT_EQ(builder.ignoredObservations(), 1U);
+}
+
+TEST(CEventFusionMapBuilder, SensoryFramesGiveTheSameMap) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  mrpt::obs::CActionCollection action;
+  for (const auto& observation : observations) {
+    mrpt::obs::CSensoryFrame frame;
+    frame.insert(observation);
+    builder.processActionObservation(action, frame);
+  }
+  builder.finish();
+
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, GivesMrptItsMaps) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  const SyntheticRecording recording;
+  for (const auto& observation : observationsOf(recording)) builder.processObservation(observation);
+  builder.finish();
+
+  const auto* metric = builder.getCurrentlyBuiltMetricMap();
+  const auto event_map = metric->mapByClass<CEventFusionMap>();
+  ASSERT_TRUE(event_map);
+  expectSameBits(event_map->cloud().points(), builder.points());
+  const auto map = metric->mapByClass<mrpt::maps::CPointsMapXYZI>();
+  ASSERT_TRUE(map);
+  const auto points = builder.points();
+  ASSERT_EQ(map->size(), points.size());
+  float x = 0;
+  float y = 0;
+  float z = 0;
+  map->getPoint(3, x, y, z);
+  EXPECT_EQ(z, static_cast<float>(points[3].p_world.z()));
+  EXPECT_EQ(map->getPointIntensity(3), points[3].confidence);
+
+  mrpt::maps::CSimpleMap simple;
+  builder.getCurrentlyBuiltMap(simple);
+  EXPECT_EQ(simple.size(), builder.getCurrentlyBuiltMapSize());
+
+  mrpt::poses::CPose3D pose;
+  builder.getCurrentPoseEstimation()->getMean(pose);
+  EXPECT_NEAR(pose.x(), recording.poses.back().T_world_rig.translation.x(), 1e-12);
+}
+
+TEST(CEventFusionMapBuilder, StartsOver) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  builder.finish();
+  const auto first = builder.points();
+  EXPECT_THROW(builder.processObservation(observations[0]), std::logic_error) << "after its end";
+
+  builder.initialize();
+  EXPECT_TRUE(builder.points().empty());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  builder.finish();
+
+  expectSameBits(builder.points(), first);
+}
+
+TEST(CEventFusionMapBuilder, OptionsThatAreNotValidChangeNothing) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  EventFusionOptions wrong = syntheticOptions();
+  wrong.cloud.voxel_size_m = -1;
+  EXPECT_THROW(builder.setOptions(wrong), std::invalid_argument);
+  EXPECT_THROW(CEventFusionMapBuilder{wrong}, std::invalid_argument);
+}
+
+TEST(CEventFusionMapBuilder, ARefusedObservationLeavesTheMapSoFar) {
+  const SyntheticRecording recording;
+  auto observations = observationsOf(recording);
+  const auto whole = mapOf(observations, syntheticOptions());
+
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  EXPECT_THROW(builder.processObservation(packetOutsideTheSensor(recording)),
+               std::invalid_argument);
+  builder.finish();
+
+  expectSameBits(builder.points(), whole);
+}
+
+TEST(CEventFusionMapBuilder, NoObservationAtAllIsAnError) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  EXPECT_THROW(builder.processObservation(nullptr), std::invalid_argument);
+  EXPECT_EQ(builder.ignoredObservations(), 0U);
+}
+
+// --- What stays where mapping fails ------------------------------------------------------------
+
+/// Takes the planes of so many keyframes.
+class FullDisk : public DsiSink {
+ public:
+  explicit FullDisk(int keyframes)
+      : planes_(keyframes * syntheticOptions().mapper.keyframe.planes.num_planes) {}
+  void takePlane(int /*plane*/, const float* /*values*/) override {
+    if (planes_-- <= 0) throw std::runtime_error("the disk is full");
+  }
+
+ private:
+  std::atomic<int> planes_;
+};
+
+TEST(CEventFusionMapBuilder, KeyframesThatWereMadeBeforeMappingFailsStayAndAreHandedOut) {
+  FullDisk disk(2);
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setDsiSink(&disk);
+  std::size_t taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+
+  EXPECT_THROW(builder.finish(), std::runtime_error);
+
+  EXPECT_EQ(taken, 2U);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U) << "the error was said: now the map is asked";
+  EXPECT_EQ(builder.status().counts.keyframes, 2U);
+  const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
+  expectSameBits(event_map->cloud().points(), builder.points());
+  EXPECT_EQ(taken, 2U);
+}
+
+TEST(CEventFusionMapBuilder, ARefusalIsSaidThoughMappingFailsToo) {
+  const SyntheticRecording recording(1.2);
+  FullDisk disk(0);
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setDsiSink(&disk);
+  std::size_t failures = 0;
+  for (const auto& observation : observationsOf(recording)) {
+    try {
+      builder.processObservation(observation);
+    } catch (const std::runtime_error&) {
+      ++failures;
+    }
+  }
+  EXPECT_GT(failures, 0U);
+  EXPECT_THROW(builder.processObservation(packetOutsideTheSensor(recording)),
+               std::invalid_argument);
+
+  builder.setDsiSink(nullptr);
+  builder.finish();
+  expectSameBits(builder.points(), mapOf(observationsOf(recording), syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, ATakerThatThrowsDoesNotStopTheMap) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setKeyframeTaker([](const KeyframeDepthMap&) { throw std::runtime_error("no room"); });
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  EXPECT_THROW(builder.finish(), std::runtime_error);
+  builder.setKeyframeTaker(nullptr);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+}
+
+TEST(CEventFusionMapBuilder, EachKeyframeIsHandedOutBeforeTheNextIsMade) {
+  // Poses come last: all keyframes become due at once.
+  std::vector<CObservation::Ptr> poses;
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::size_t taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) {
+    ++taken;
+    EXPECT_EQ(builder.status().counts.keyframes, taken);
+    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), taken) << "the map up to this keyframe";
+  });
+  const auto observations = observationsOf(SyntheticRecording());
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, mrpt::obs::CObservationRobotPose)) {
+      poses.push_back(observation);
+    } else {
+      builder.processObservation(observation);
+    }
+  }
+  for (const auto& pose : poses) builder.processObservation(pose);
+  EXPECT_EQ(taken, 0U);
+  builder.finish();
+
+  EXPECT_EQ(taken, 3U);
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+// --- Threads -----------------------------------------------------------------------------------
+
+TEST(CEventFusionMapBuilder, SeveralThreadsMayFeed) {
+  // Poses before all and a packet of each camera, then a thread per camera.
+  const auto observations = observationsOf(SyntheticRecording(0.9));
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::atomic<std::size_t> taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, mrpt::obs::CObservationRobotPose)) {
+      builder.processObservation(observation);
+    }
+  }
+  std::vector<CObservation::Ptr> packets;
+  std::copy_if(observations.begin(), observations.end(), std::back_inserter(packets),
+               [](const auto& one) { return !IS_CLASS(*one, mrpt::obs::CObservationRobotPose); });
+  for (int i = 0; i < 2; ++i) builder.processObservation(packets[static_cast<std::size_t>(i)]);
+  packets.erase(packets.begin(), packets.begin() + 2);
+  std::vector<std::thread> feeders;
+  for (const std::string camera : {"cam0", "cam1"}) {
+    feeders.emplace_back([&, camera] {
+      for (const auto& packet : packets) {
+        if (packet->sensorLabel != camera) continue;
+        builder.processObservation(packet);
+        builder.getCurrentlyBuiltMapSize();
+      }
+    });
+  }
+  for (std::thread& feeder : feeders) feeder.join();
+  builder.finish();
+
+  EXPECT_EQ(taken, builder.getCurrentlyBuiltMapSize());
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, WhoReadsItsLogMayAskIt) {
+  SyntheticRecording recording;
+  recording.events[1].resize(1);
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.logging_enable_console_output = false;
+  std::size_t warnings = 0;
+  builder.logRegisterCallback([&](std::string_view message, auto&&...) {
+    ++warnings;
+    EXPECT_THAT(std::string(message), testing::HasSubstr("camera 1 had no event"));
+    // The first keyframe saw the one event. Another thread may ask, too, while this one waits.
+    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U);
+    const auto ask = [&] { return builder.status().counts.keyframes; };
+    EXPECT_EQ(std::async(std::launch::async, ask).get(), 2U);
+  });
+  for (const auto& observation : observationsOf(recording)) {
+    builder.processObservation(observation);
+  }
+  builder.finish();
+  EXPECT_EQ(warnings, 1U);
+}
+
+TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::thread feeder([&] {
+    for (const auto& observation : observations) builder.processObservation(observation);
+    builder.finish();
+  });
+  for (int i = 0; i < 50; ++i) {
+    builder.getCurrentPoseEstimation();
+    builder.points();
+    builder.status();
+    mrpt::maps::CSimpleMap map;
+    builder.getCurrentlyBuiltMap(map);
+  }
+  feeder.join();
+
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+// --- Asked by a program that cannot finish it --------------------------------------------------
+
+TEST(CEventFusionMapBuilder, AskedForTheMapMapsWhatIsCoveredOfAShortRecording) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  std::size_t taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  for (const auto& observation : observations) builder.processObservation(observation);
+  EXPECT_TRUE(builder.points().empty()) << "half a second, and nobody asked";
+
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+
+  EXPECT_EQ(taken, 3U);
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, AskedAfterEachObservationMakesTheSameMap) {
+  const auto observations = observationsOf(SyntheticRecording());
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) {
+    builder.processObservation(observation);
+    builder.getCurrentlyBuiltMapSize();
+  }
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+/// A drifting odometry from the beginning, and poses that begin 0.3 s later.
+std::vector<CObservation::Ptr> odometryThenPoses() {
+  std::vector<CObservation::Ptr> observations;
+  for (const auto& observation : observationsOf(SyntheticRecording(0.9))) {
+    const auto pose = std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation);
+    if (pose) {
+      auto odometry = mrpt::obs::CObservationOdometry::Create();
+      odometry->timestamp = pose->timestamp;
+      odometry->odometry = mrpt::poses::CPose2D(1.5 * pose->pose.mean.x(), 0, 0);
+      observations.push_back(odometry);
+      if (nanosecondsFrom(pose->timestamp) < SyntheticRecording::kStartNs + 300'000'000) continue;
+    }
+    observations.push_back(observation);
+  }
+  return observations;
+}
+
+TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotChooseTheSourceOfPoses) {
+  const auto observations = odometryThenPoses();
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) {
+    builder.processObservation(observation);
+    builder.getCurrentlyBuiltMapSize();
+  }
+  builder.finish();
+  EXPECT_EQ(builder.status().pose_source->kind, PoseKind::kPose);
+  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotRefuseTheSecondOfTwoLongPackets) {
+  // 200 ms of each camera, then the poses in them.
+  std::vector<CObservation::Ptr> observations;
+  std::vector<CObservation::Ptr> poses;
+  std::vector<CObservationEvents::Ptr> packets(2);
+  const SyntheticRecording recording(0.6);
+  const auto flush = [&] {
+    for (auto& packet : packets) observations.push_back(std::exchange(packet, nullptr));
+    observations.insert(observations.end(), poses.begin(), poses.end());
+    poses.clear();
+  };
+  for (const auto& observation : observationsOf(recording)) {
+    const auto part = std::dynamic_pointer_cast<CObservationEvents>(observation);
+    if (!part) {
+      poses.push_back(observation);
+      if (poses.size() == 20) flush();
+      continue;
+    }
+    auto& packet = packets[static_cast<std::size_t>(part->camera_index)];
+    if (!packet) packet = packetObservation(recording, part->camera_index);
+    packet->covered_until_ns = part->covered_until_ns;
+    packet->events.insert(packet->events.end(), part->events.begin(), part->events.end());
+  }
+  flush();
+  ASSERT_LT(observations.size(), 80U);
+
+  CEventFusionMapBuilder builder(syntheticOptions());
+  for (const auto& observation : observations) {
+    builder.processObservation(observation);
+    builder.getCurrentlyBuiltMapSize();
+  }
+  builder.finish();
+  expectSameBits(builder.points(), mapOf(observationsOf(recording), syntheticOptions()));
+}
+
+TEST(CEventFusionMapBuilder, AskedForAMapOfACameraThatIsNotThereSaysSo) {
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.keyframe.reference_camera = 2;
+  CEventFusionMapBuilder builder(options);
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  EXPECT_THROW(builder.getCurrentlyBuiltMetricMap(), std::invalid_argument);
+}
+
+TEST(CEventFusionMapBuilder, AskedBeforeItKnowsAnythingGivesAnEmptyMap) {
+  const CEventFusionMapBuilder builder(syntheticOptions());
+  const auto* metric = builder.getCurrentlyBuiltMetricMap();
+  ASSERT_EQ(metric->maps.size(), 2U);
+  EXPECT_TRUE(metric->isEmpty());
+}
+
+// --- Keyframes and their clouds ----------------------------------------------------------------
+
+/// The map of a whole recording, and what the builder stores of it.
+struct StoredMap {
+  explicit StoredMap(const std::vector<CObservation::Ptr>& observations,
+                     const EventFusionOptions& options = syntheticOptions()) {
+    CEventFusionMapBuilder builder(options);
+    for (const auto& observation : observations) builder.processObservation(observation);
+    builder.finish();
+    points = builder.points();
+    builder.getCurrentlyBuiltMap(keyframes);
+  }
+  std::vector<CloudPoint> points;
+  mrpt::maps::CSimpleMap keyframes;
+};
+
+TEST(CEventFusionMapBuilder, KeyframesOfTheSimplemapHoldTheirCloudsWhereTheyWereSeen) {
+  const StoredMap map(observationsOf(SyntheticRecording()));
+  ASSERT_EQ(map.keyframes.size(), 3U);
+  const auto [pose, frame] = map.keyframes.get(1);
+  EXPECT_NEAR(pose->getMeanVal().x(), 0.8 * 0.2, 0.01) << "the middle of 0.1 to 0.3 s";
+  ASSERT_EQ(frame->size(), 1U);
+  const auto seen = frame->getObservationByClass<mrpt::obs::CObservationPointCloud>();
+  ASSERT_TRUE(seen);
+  EXPECT_EQ(seen->sensorLabel, "keyframe");
+  EXPECT_NEAR(static_cast<double>(nanosecondsFrom(seen->timestamp) - SyntheticRecording::kStartNs),
+              0.2e9, 0.01e9);
+  EXPECT_EQ(seen->sensorPose, mrpt::poses::CPose3D());
+  EXPECT_GT(seen->pointcloud->size(), 30U);
+}
+
+TEST(CEventFusionMapBuilder, AMapOfSingleCamerasIsStoredAsItIs) {
+  EventFusionOptions options = syntheticOptions();
+  options.late_fusion = true;
+  const StoredMap map(observationsOf(SyntheticRecording()), options);
+  CEventFusionMap read(options.cloud);
+  read.loadFromSimpleMap(map.keyframes);
+  const auto points = read.cloud().points();
+  ASSERT_EQ(points.size(), map.points.size());
+  EXPECT_NE(points.size(), StoredMap(observationsOf(SyntheticRecording())).points.size());
+}
+
+TEST(CEventFusionMapBuilder, ContinuesAnEarlierMap) {
+  const StoredMap earlier(observationsOf(SyntheticRecording()));
+  const auto observations = observationsOf(SyntheticRecording(0.7));
+  const StoredMap later(observations);
+
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.initialize(earlier.keyframes);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+  EXPECT_EQ(builder.points().size(), earlier.points.size());
+  for (const auto& observation : observations) builder.processObservation(observation);
+  builder.finish();
+
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U + 5U);
+  GlobalCloud both(syntheticOptions().cloud);
+  for (const auto* map : {&earlier, &later}) {
+    for (const StoredKeyframe& keyframe : keyframesOf(map->keyframes)) {
+      both.insert(both.keyframes(), worldPointsOf(keyframe), keyframe.T_world_ref);
+    }
+  }
+  const auto points = builder.points();
+  const auto expected = both.points();
+  ASSERT_EQ(points.size(), expected.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-9);
+    EXPECT_EQ(points[i].support, expected[i].support);
+  }
+  const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
+  expectSameBits(event_map->cloud().points(), points);
+  builder.clear();
+  EXPECT_TRUE(builder.points().empty());
+}
+
+TEST(CEventFusionMapBuilder, AFrameThatIsNoKeyframeIsRefusedRatherThanForgotten) {
+  mrpt::maps::CSimpleMap map = StoredMap(observationsOf(SyntheticRecording())).keyframes;
+  map.insert(mrpt::poses::CPose3DPDFGaussian::Create(), mrpt::obs::CSensoryFrame::Create());
+  CEventFusionMapBuilder builder;
+  try {
+    builder.initialize(map);
+    FAIL() << "no error";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("frame 3 of the simplemap"));
+  }
+}
+
+class CEventFusionMapBuilderFile : public TemporaryFolder {};
+
+TEST_F(CEventFusionMapBuilderFile, ThereIsNoPictureBeforeTheFirstKeyframe) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  const std::string file = (folder() / "never.png").string();
+  EXPECT_THROW(builder.saveCurrentEstimationToImage(file), std::logic_error);
+}
+
+TEST_F(CEventFusionMapBuilderFile, SavesItsMapAndContinuesIt) {
+  const std::string file = (folder() / "saved.simplemap").string();
+  CEventFusionMapBuilder builder(syntheticOptions());
+  builder.setMinLoggingLevel(mrpt::system::LVL_ERROR);
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  builder.saveCurrentMapToFile(file);
+  const auto points = builder.points();
+
+  builder.loadCurrentMapFromFile(file);
+
+  const auto loaded = builder.points();
+  ASSERT_EQ(loaded.size(), points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_LT((loaded[i].p_world - points[i].p_world).norm(), 1e-9);
+    EXPECT_EQ(loaded[i].confidence, points[i].confidence);
+  }
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <mrpt/obs/CObservationRobotPose.h>
+
+#include <vector>
+
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/mrpt_time.h"
+#include "test/plugin/session/synthetic_recording.h"
+
+namespace efm {
+
+inline CObservationEvents::Ptr packetObservation(const SyntheticRecording& recording, int camera) {
+  const RigCamera& calibration = recording.cameras[static_cast<std::size_t>(camera)];
+  auto packet = CObservationEvents::Create();
+  packet->sensorLabel = "cam" + std::to_string(camera);
+  packet->camera_index = camera;
+  packet->camera = calibration.model;
+  packet->camera_pose = mrptPoseFrom(calibration.T_rig_cam);
+  return packet;
+}
+
+/// The recording as a rawlog has it: packets of 10 ms of each camera, then the pose at their end.
+inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(
+    const SyntheticRecording& recording) {
+  std::vector<mrpt::obs::CObservation::Ptr> observations;
+  std::vector<std::size_t> begin(recording.cameras.size(), 0);
+  for (const StampedPose& pose : recording.poses) {
+    for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
+      auto packet = packetObservation(recording, static_cast<int>(c));
+      packet->timestamp = mrptTimeFrom(pose.t_ns);
+      packet->covered_until_ns = pose.t_ns;
+      const std::vector<Event>& events = recording.events[c];
+      for (; begin[c] < events.size() && events[begin[c]].t_ns < pose.t_ns; ++begin[c]) {
+        packet->events.push_back(events[begin[c]]);
+      }
+      observations.push_back(packet);
+    }
+    auto robot = mrpt::obs::CObservationRobotPose::Create();
+    robot->timestamp = mrptTimeFrom(pose.t_ns);
+    robot->sensorLabel = "pose";
+    robot->pose.mean = mrptPoseFrom(pose.T_world_rig);
+    observations.push_back(robot);
+  }
+  return observations;
+}
+
+/// A packet of camera 0 after the recording's end, with an event beside the sensor.
+inline CObservationEvents::Ptr packetOutsideTheSensor(const SyntheticRecording& recording) {
+  auto packet = packetObservation(recording, 0);
+  const std::int64_t t_ns = recording.poses.back().t_ns + 1;
+  packet->timestamp = mrptTimeFrom(t_ns);
+  packet->events = {{t_ns, 120, 0, true}};
+  return packet;
+}
+
+}  // namespace efm

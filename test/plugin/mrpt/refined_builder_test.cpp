@@ -1,0 +1,418 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The map builder where poses are refined.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/maps/CSimpleMap.h>
+#include <mrpt/poses/CPose3DPDFGaussian.h>
+
+#include <Eigen/Eigenvalues>
+#include <atomic>
+#include <limits>
+#include <thread>
+
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
+#include "test/plugin/mrpt/observations.h"
+#include "test/plugin/recordings/shaken_recording.h"
+
+namespace efm {
+namespace {
+
+using mrpt::obs::CObservation;
+using mrpt::obs::CObservationRobotPose;
+using Observations = std::vector<CObservation::Ptr>;
+
+EventFusionOptions optionsOf(bool background) {
+  EventFusionOptions options = refinedOptions();
+  options.refinement.background = background;
+  return options;
+}
+
+Observations shakenObservations(double duration_s = 1.3) {
+  return observationsOf(shaken(SyntheticRecording(duration_s)));
+}
+
+void feed(CEventFusionMapBuilder& builder, const Observations& observations) {
+  for (const auto& observation : observations) builder.processObservation(observation);
+}
+
+void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].p_world, b[i].p_world);
+    EXPECT_EQ(a[i].confidence, b[i].confidence);
+    EXPECT_EQ(a[i].support, b[i].support);
+  }
+}
+
+void expectSamePoses(const std::vector<StampedPose>& a, const std::vector<StampedPose>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].t_ns, b[i].t_ns);
+    EXPECT_TRUE(isSame(a[i].T_world_rig, b[i].T_world_rig)) << "keyframe " << i;
+  }
+}
+
+/// All that can be asked of a builder's map once what is due is mapped, in two orders: asking
+/// changes nothing.
+void expectToAgree(CEventFusionMapBuilder& builder, bool points_first) {
+  builder.getCurrentlyBuiltMapSize();
+  std::vector<CloudPoint> points;
+  if (points_first) points = builder.points();
+  const std::vector<StampedPose> trajectory = builder.trajectory();
+  if (!points_first) points = builder.points();
+  expectSamePoses(builder.trajectory(), trajectory);
+  EXPECT_EQ(builder.trackerTrajectory().size(), trajectory.size());
+
+  mrpt::maps::CSimpleMap simplemap;
+  builder.getCurrentlyBuiltMap(simplemap);
+  ASSERT_EQ(simplemap.size(), trajectory.size());
+  GlobalCloud cloud(builder.usedOptions().cloud);
+  std::size_t number = 0;
+  for (const StoredKeyframe& keyframe : keyframesOf(simplemap)) {
+    const Rigid3& T_world_ref = trajectory[number].T_world_rig;
+    EXPECT_EQ(keyframe.T_world_ref.translation, T_world_ref.translation);
+    EXPECT_LT(keyframe.T_world_ref.rotation.angularDistance(T_world_ref.rotation), 1e-14);
+    // The simplemap's angles may round: the cloud is held against the exact pose.
+    const auto view_points = viewPointsOf(*keyframe.points);
+    cloud.insert(number++, placedInWorld(view_points, T_world_ref), T_world_ref);
+  }
+  expectSameBits(cloud.points(), points);
+  const auto* metric = builder.getCurrentlyBuiltMetricMap();
+  expectSameBits(metric->mapByClass<CEventFusionMap>()->cloud().points(), points);
+}
+
+TEST(RefinedBuilder, AllThatItIsAskedForAgreesAtAnyTime) {
+  const Observations observations = shakenObservations();
+  CEventFusionMapBuilder builder(optionsOf(false));
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    builder.processObservation(observations[i]);
+    if (i % 23 == 7) expectToAgree(builder, i % 2 == 0);
+  }
+  builder.finish();
+  expectToAgree(builder, true);
+  EXPECT_GE(builder.trajectory().size(), 10U);
+}
+
+TEST(RefinedBuilder, AllThatItIsAskedForAgreesWithinATaker) {
+  CEventFusionMapBuilder builder(optionsOf(false));
+  std::size_t taken = 0;
+  builder.setKeyframeTaker([&](const KeyframeDepthMap& keyframe) {
+    expectToAgree(builder, taken++ % 2 == 0);
+    const StampedPose newest = builder.trajectory().back();
+    EXPECT_EQ(newest.t_ns, keyframe.window.t_ref_ns);
+    EXPECT_TRUE(isSame(newest.T_world_rig, keyframe.T_world_ref));
+  });
+  feed(builder, shakenObservations());
+  builder.finish();
+  EXPECT_GE(taken, 10U);
+}
+
+TEST(RefinedBuilder, ToBeAskedDoesNotChangeTheMap) {
+  const Observations observations = shakenObservations();
+  CEventFusionMapBuilder undisturbed(optionsOf(false));
+  feed(undisturbed, observations);
+  undisturbed.finish();
+  CEventFusionMapBuilder asked(optionsOf(false));
+  for (const auto& observation : observations) {
+    asked.processObservation(observation);
+    asked.getCurrentlyBuiltMapSize();
+    asked.points();
+  }
+  asked.finish();
+  expectSamePoses(asked.trajectory(), undisturbed.trajectory());
+  expectSamePoses(asked.trackerTrajectory(), undisturbed.trackerTrajectory());
+  expectSameBits(asked.points(), undisturbed.points());
+}
+
+TEST(RefinedBuilder, AfterItsEndNothingChangesAnyMore) {
+  for (const bool background : {false, true}) {
+    CEventFusionMapBuilder builder(optionsOf(background));
+    feed(builder, shakenObservations());
+    builder.finish();
+    const auto points = builder.points();
+    const auto trajectory = builder.trajectory();
+    EXPECT_THROW(builder.finish(), std::logic_error);
+    expectToAgree(builder, false);
+    expectSameBits(builder.points(), points);
+    expectSamePoses(builder.trajectory(), trajectory);
+  }
+}
+
+TEST(RefinedBuilder, KeyframesOfAnEarlierMapStayAndAllAgree) {
+  const Observations observations = shakenObservations(0.9);
+  CEventFusionMapBuilder first(optionsOf(false));
+  feed(first, observations);
+  first.finish();
+  mrpt::maps::CSimpleMap earlier;
+  first.getCurrentlyBuiltMap(earlier);
+  const std::size_t count = earlier.size();
+
+  CEventFusionMapBuilder builder(optionsOf(false));
+  builder.initialize(earlier);
+  const auto before = builder.trajectory();
+  ASSERT_EQ(before.size(), count);
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    builder.processObservation(observations[i]);
+    if (i % 41 == 0) expectToAgree(builder, i % 2 == 0);
+  }
+  builder.finish();
+  expectToAgree(builder, true);
+  const auto trajectory = builder.trajectory();
+  const auto tracker = builder.trackerTrajectory();
+  ASSERT_EQ(trajectory.size(), 2 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    EXPECT_TRUE(isSame(trajectory[i].T_world_rig, before[i].T_world_rig));
+    EXPECT_TRUE(isSame(tracker[i].T_world_rig, before[i].T_world_rig));
+    EXPECT_TRUE(isSame(tracker[count + i].T_world_rig, first.trackerTrajectory()[i].T_world_rig));
+    EXPECT_TRUE(isSame(trajectory[count + i].T_world_rig, first.trajectory()[i].T_world_rig));
+  }
+}
+
+TEST(RefinedBuilder, WithoutRefinementBothTrajectoriesAreTheTrackers) {
+  EventFusionOptions options = optionsOf(false);
+  options.refinement.enabled = false;
+  CEventFusionMapBuilder builder(options);
+  feed(builder, shakenObservations(0.9));
+  builder.finish();
+  expectSamePoses(builder.trajectory(), builder.trackerTrajectory());
+}
+
+// --- The pose of now ---------------------------------------------------------------------------
+
+mrpt::poses::CPose3DPDFGaussian estimateOf(const CEventFusionMapBuilder& builder) {
+  const auto estimate = std::dynamic_pointer_cast<mrpt::poses::CPose3DPDFGaussian>(
+      builder.getCurrentPoseEstimation());
+  EXPECT_TRUE(estimate);
+  return *estimate;
+}
+
+TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersCorrected) {
+  const SyntheticRecording recording = shaken(SyntheticRecording(1.3));
+  CEventFusionMapBuilder builder(optionsOf(false));
+  EXPECT_TRUE(isSame(rigidFrom(estimateOf(builder).mean), Rigid3{}));
+  std::size_t pose = 0;
+  for (const auto& observation : observationsOf(recording)) {
+    builder.processObservation(observation);
+    if (!IS_CLASS(*observation, CObservationRobotPose)) continue;
+    const Rigid3& T_tracker_rig = recording.poses[pose++].T_world_rig;
+    const auto refinement = builder.status().refinement;
+    ASSERT_TRUE(refinement);
+    const Rigid3 T_world_rig = refinement->T_world_tracker * T_tracker_rig;
+    const auto estimate = estimateOf(builder);
+    EXPECT_LT((rigidFrom(estimate.mean).translation - T_world_rig.translation).norm(), 1e-9);
+    EXPECT_LT(rigidFrom(estimate.mean).rotation.angularDistance(T_world_rig.rotation), 1e-9);
+    if (builder.trajectory().size() < 2) continue;
+    const Eigen::Matrix<double, 6, 6> covariance = estimate.cov.asEigen();
+    EXPECT_LT((covariance - covariance.transpose()).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(covariance).eigenvalues()(0), 0);
+    EXPECT_LT(covariance.diagonal().maxCoeff(), 0.01);
+  }
+  EXPECT_GT(builder.status().refinement->T_world_tracker.translation.norm(), 1e-4);
+}
+
+TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersWithoutRefinement) {
+  EventFusionOptions options = optionsOf(false);
+  options.refinement.enabled = false;
+  CEventFusionMapBuilder builder(options);
+  const SyntheticRecording recording = shaken(SyntheticRecording(0.5));
+  feed(builder, observationsOf(recording));
+  const auto estimate = estimateOf(builder);
+  EXPECT_EQ(rigidFrom(estimate.mean).translation, recording.poses.back().T_world_rig.translation);
+  EXPECT_EQ(estimate.cov.asEigen().cwiseAbs().maxCoeff(), 0);
+}
+
+// --- What pose observations say of their noise -------------------------------------------------
+
+/// How far each keyframe moved where the poses of each other window state a covariance.
+std::vector<double> motionsWith(const mrpt::math::CMatrixDouble66& even,
+                                const mrpt::math::CMatrixDouble66& odd) {
+  EventFusionOptions options = optionsOf(false);
+  options.refinement.refiner.adapt_tracker = false;
+  options.refinement.refiner.tracker.drift_m = 0;
+  options.refinement.refiner.tracker.drift_rad = 0;
+  CEventFusionMapBuilder builder(options);
+  for (const auto& observation : shakenObservations()) {
+    if (const auto pose = std::dynamic_pointer_cast<CObservationRobotPose>(observation)) {
+      const auto window =
+          (nanosecondsFrom(pose->timestamp) - SyntheticRecording::kStartNs) / kShakenWindowNs;
+      pose->pose.cov = window % 2 == 0 ? even : odd;
+    }
+    builder.processObservation(observation);
+  }
+  builder.finish();
+  std::vector<double> motions;
+  const auto tracker = builder.trackerTrajectory();
+  const auto refined = builder.trajectory();
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    motions.push_back(
+        (refined[i].T_world_rig.translation - tracker[i].T_world_rig.translation).norm());
+  }
+  return motions;
+}
+
+mrpt::math::CMatrixDouble66 covarianceOf(double sigma_m, double sigma_rad) {
+  mrpt::math::CMatrixDouble66 covariance;
+  covariance.setZero();
+  for (int i = 0; i < 3; ++i) {
+    covariance(i, i) = sigma_m * sigma_m;
+    covariance(i + 3, i + 3) = sigma_rad * sigma_rad;
+  }
+  return covariance;
+}
+
+TEST(RefinedBuilder, CovariancesOfPosesSayWhichKeyframesMayMove) {
+  const auto motions = motionsWith(covarianceOf(1e-4, 1e-5), covarianceOf(0.05, 0.02));
+  double certain_m = 0;
+  double noisy_m = 0;
+  for (std::size_t k = 1; k < motions.size(); ++k) (k % 2 == 0 ? certain_m : noisy_m) += motions[k];
+  EXPECT_LT(certain_m, 0.2 * noisy_m);
+}
+
+TEST(RefinedBuilder, CovariancesThatAreNoneDoNotCount) {
+  const auto without = motionsWith(covarianceOf(0, 0), covarianceOf(0, 0));
+  auto not_a_number = covarianceOf(1, 1);
+  not_a_number(4, 4) = std::numeric_limits<double>::quiet_NaN();
+  auto infinite = covarianceOf(1, 1);
+  infinite(2, 2) = std::numeric_limits<double>::infinity();
+  auto negative = covarianceOf(1, 1);
+  negative(0, 0) = -5;
+  for (const auto& wrong : {not_a_number, infinite, negative}) {
+    EXPECT_EQ(motionsWith(wrong, covarianceOf(0, 0)), without);
+  }
+}
+
+TEST(RefinedBuilder, APoseThatIsNotFiniteIsRefusedByNameAndTheRestMapped) {
+  const Observations observations = shakenObservations(0.9);
+  CEventFusionMapBuilder expected(optionsOf(false));
+  feed(expected, observations);
+  expected.finish();
+  CEventFusionMapBuilder builder(optionsOf(false));
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    builder.processObservation(observations[i]);
+    if (i != 60) continue;
+    auto wrong = CObservationRobotPose::Create();
+    wrong->sensorLabel = "pose";
+    wrong->timestamp = observations[i]->timestamp + std::chrono::microseconds(1);
+    wrong->pose.mean.x(std::numeric_limits<double>::quiet_NaN());
+    try {
+      builder.processObservation(wrong);
+      ADD_FAILURE() << "no error";
+    } catch (const std::invalid_argument& error) {
+      EXPECT_THAT(error.what(), testing::HasSubstr("pose at 10.2"));
+    }
+  }
+  builder.finish();
+  expectSameBits(builder.points(), expected.points());
+}
+
+// --- In the background -------------------------------------------------------------------------
+
+TEST(RefinedBuilder, InTheBackgroundEndsInTheSameMap) {
+  const Observations observations = shakenObservations();
+  CEventFusionMapBuilder played(optionsOf(false));
+  feed(played, observations);
+  played.finish();
+  CEventFusionMapBuilder live(optionsOf(true));
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    live.processObservation(observations[i]);
+    if (i % 50 == 0) live.getCurrentlyBuiltMetricMap();
+  }
+  live.finish();
+  EXPECT_EQ(live.status().refinement->waiting, 0U);
+  expectToAgree(live, true);
+  expectSamePoses(live.trajectory(), played.trajectory());
+  expectSameBits(live.points(), played.points());
+}
+
+TEST(RefinedBuilder, InTheBackgroundMayEndOrStartOverWhileKeyframesWait) {
+  const Observations observations = shakenObservations();
+  for (int round = 0; round < 3; ++round) {
+    CEventFusionMapBuilder builder(optionsOf(true));
+    feed(builder, observations);
+    if (round == 1) builder.clear();
+    if (round == 2) builder.setOptions(optionsOf(false));
+    EXPECT_EQ(builder.trajectory().empty(), round > 0);
+  }
+}
+
+/// While one thread feeds, others ask for everything: no crash, and what each gets is whole.
+void askWhileItMaps(bool background) {
+  const Observations observations = shakenObservations();
+  CEventFusionMapBuilder builder(optionsOf(background));
+  std::atomic<bool> done = false;
+  std::vector<std::thread> askers;
+  askers.emplace_back([&] {
+    while (!done) {
+      const auto tracker = builder.trackerTrajectory();
+      for (std::size_t i = 1; i < tracker.size(); ++i) {
+        EXPECT_LT(tracker[i - 1].t_ns, tracker[i].t_ns);
+      }
+    }
+  });
+  askers.emplace_back([&] {
+    while (!done) {
+      mrpt::maps::CSimpleMap map;
+      builder.getCurrentlyBuiltMap(map);
+      EXPECT_EQ(keyframesOf(map).size(), map.size());
+    }
+  });
+  askers.emplace_back([&] {
+    while (!done) {
+      estimateOf(builder);
+      builder.points();
+      builder.status();
+      builder.getCurrentlyBuiltMetricMap();
+    }
+  });
+  feed(builder, observations);
+  builder.finish();
+  done = true;
+  for (std::thread& asker : askers) asker.join();
+
+  expectToAgree(builder, true);
+  CEventFusionMapBuilder alone(optionsOf(false));
+  feed(alone, observations);
+  alone.finish();
+  expectSamePoses(builder.trajectory(), alone.trajectory());
+  expectSameBits(builder.points(), alone.points());
+}
+
+TEST(RefinedBuilder, MayBeAskedFromOtherThreadsWhileItMaps) { askWhileItMaps(false); }
+TEST(RefinedBuilder, MayBeAskedFromOtherThreadsWhileItRefinesInTheBackground) {
+  askWhileItMaps(true);
+}
+
+TEST(RefinedBuilder, SeveralThreadsMayFeedWhileItRefinesInTheBackground) {
+  // No thread is ahead of the other by more than what the mapper waits for.
+  const Observations observations = shakenObservations(0.9);
+  CEventFusionMapBuilder builder(optionsOf(true));
+  Observations packets;
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, CObservationRobotPose)) {
+      builder.processObservation(observation);
+    } else {
+      packets.push_back(observation);
+    }
+  }
+  for (std::size_t i = 0; i < 2; ++i) builder.processObservation(packets[i]);
+  packets.erase(packets.begin(), packets.begin() + 2);
+  std::vector<std::thread> feeders;
+  for (const std::string camera : {"cam0", "cam1"}) {
+    feeders.emplace_back([&, camera] {
+      for (const auto& packet : packets) {
+        if (packet->sensorLabel == camera) builder.processObservation(packet);
+      }
+    });
+  }
+  for (std::thread& feeder : feeders) feeder.join();
+  builder.finish();
+  CEventFusionMapBuilder alone(optionsOf(false));
+  feed(alone, observations);
+  alone.finish();
+  expectSamePoses(builder.trajectory(), alone.trajectory());
+  expectSameBits(builder.points(), alone.points());
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/output/map_output.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/maps/CSimpleMap.h>
+
+#include <cstring>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "plugin/output/npy_file.h"
+#include "plugin/pictures/depth_picture.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::string contentOf(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+/// 4 x 3 pixels, one of which has a depth.
+KeyframeDepthMap smallKeyframe(std::int64_t t_ref_ns) {
+  KeyframeDepthMap keyframe;
+  keyframe.window = {t_ref_ns - 10, t_ref_ns + 10, t_ref_ns};
+  keyframe.view = {4, 3, 2.0, 2.0, 1.0, 1.0};
+  keyframe.T_world_ref.translation = {1, 2, 3};
+  keyframe.map.depth = cv::Mat1f::zeros(3, 4);
+  keyframe.map.confidence = cv::Mat1f::zeros(3, 4);
+  keyframe.map.depth(1, 2) = 1.2345678F;
+  keyframe.map.confidence(1, 2) = 17.5F;
+  return keyframe;
+}
+
+class MapOutputTest : public TemporaryFolder {};
+
+TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
+  MapOutput output(folder() / "out", OutputKind::kMap, {});
+  const KeyframeDepthMap small = smallKeyframe(1'700'000'000'123'456'789);
+  output.writeKeyframe(small);
+  output.writeTrajectory("trajectory.txt", {{small.window.t_ref_ns, small.T_world_ref}});
+
+  const auto keyframe = folder() / "out" / "keyframes" / "1700000000.123456789";
+  const cv::Mat depth = cv::imread((keyframe / "depth.tiff").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(depth.type(), CV_32F);
+  EXPECT_EQ(depth.at<float>(1, 2), 1.2345678F);
+  EXPECT_EQ(depth.at<float>(0, 0), 0.0F);
+  const cv::Mat confidence =
+      cv::imread((keyframe / "confidence.tiff").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(confidence.type(), CV_32F);
+  EXPECT_EQ(confidence.at<float>(1, 2), 17.5F);
+  EXPECT_EQ(cv::imread((keyframe / "depth.png").string()).size(), cv::Size(4, 3));
+  EXPECT_EQ(cv::imread((keyframe / "confidence.png").string()).size(), cv::Size(4, 3));
+  EXPECT_THAT(contentOf(folder() / "out" / "trajectory.txt"),
+              HasSubstr("1700000000.123456789 1 2 3 0 0 0 1\n"));
+}
+
+TEST_F(MapOutputTest, AnEarlierMapGoesWithTheFirstFileAndOtherFilesStay) {
+  {
+    MapOutput earlier(folder(), OutputKind::kMap, {});
+    earlier.writeKeyframe(smallKeyframe(1'000'000'000));
+    earlier.writeCloud("map.pcd", {});
+    earlier.writeSimplemap({});
+    earlier.writeReport("{}");
+  }
+  const auto keyframes = folder() / "keyframes";
+  std::ofstream(folder() / "notes.txt") << "mine";
+  std::ofstream(keyframes / "1.000000000" / "notes.txt") << "mine";
+  std::filesystem::create_directory(keyframes / "2");  // not as a time is written here
+  std::ofstream(keyframes / "2" / "depth.tiff") << "mine";
+  std::filesystem::create_directory(folder() / "elsewhere");
+  std::ofstream(folder() / "elsewhere" / "depth.tiff") << "mine";
+  std::filesystem::create_directory_symlink("../elsewhere", keyframes / "3.000000000");
+
+  MapOutput output(folder(), OutputKind::kMap, {});
+  EXPECT_TRUE(exists(folder() / "map.pcd")) << "nothing was written yet";
+  output.writeReport("{}");
+
+  EXPECT_FALSE(exists(folder() / "map.pcd"));
+  EXPECT_FALSE(exists(folder() / "map.simplemap"));
+  EXPECT_FALSE(exists(keyframes / "1.000000000" / "depth.tiff"));
+  EXPECT_TRUE(exists(keyframes / "1.000000000" / "notes.txt"));
+  EXPECT_TRUE(exists(folder() / "notes.txt"));
+  EXPECT_TRUE(exists(keyframes / "2" / "depth.tiff"));
+  EXPECT_TRUE(exists(folder() / "elsewhere" / "depth.tiff"));
+}
+
+TEST_F(MapOutputTest, EachKindLeavesTheFilesOfTheOther) {
+  MapOutput map(folder(), OutputKind::kMap, {});
+  map.writeKeyframe(smallKeyframe(1'000'000'000));
+  map.writeTrajectory("trajectory.txt", {});
+  map.writeCloud("map.pcd", {});
+  MapOutput depth(folder(), OutputKind::kDepth, {});
+  depth.writeImages(smallKeyframe(1'000'000'000));
+  depth.writeCloud("points.pcd", {});
+  std::ofstream(folder() / "dsi.npy") << "a DSI";
+  EXPECT_TRUE(exists(folder() / "map.pcd"));
+  EXPECT_TRUE(exists(folder() / "trajectory.txt"));
+  EXPECT_TRUE(exists(folder() / "keyframes" / "1.000000000" / "depth.tiff"));
+
+  MapOutput(folder(), OutputKind::kMap, {}).writeReport("{}");
+  EXPECT_FALSE(exists(folder() / "map.pcd"));
+  EXPECT_TRUE(exists(folder() / "depth.tiff"));
+  EXPECT_TRUE(exists(folder() / "points.pcd"));
+  EXPECT_TRUE(exists(folder() / "dsi.npy"));
+
+  MapOutput(folder(), OutputKind::kDepth, {}).writeReport("{}");
+  EXPECT_FALSE(exists(folder() / "depth.tiff"));
+  EXPECT_FALSE(exists(folder() / "points.pcd"));
+  EXPECT_FALSE(exists(folder() / "dsi.npy"));
+}
+
+TEST_F(MapOutputTest, AFolderThatCannotBeMadeIsAnErrorThatNamesIt) {
+  std::ofstream(folder() / "out") << "a file";
+  try {
+    MapOutput output(folder() / "out", OutputKind::kMap, {});
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr((folder() / "out").string()));
+  }
+}
+
+TEST_F(MapOutputTest, AFolderWithoutANameIsAnError) {
+  try {
+    MapOutput output("", OutputKind::kMap, {});
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("'': expected the name of the folder"));
+  }
+}
+
+TEST(DepthPicture, RunsFromRedNearToBlueFarOnWhite) {
+  const cv::Mat1f depth = (cv::Mat1f(1, 3) << 1, 4, 0);
+  const cv::Mat3b picture = depthPicture(depth, {1.0, 4.0, 10, PlaneSpacing::kInverse});
+  const cv::Vec3b near_bgr = picture(0, 0);
+  const cv::Vec3b far_bgr = picture(0, 1);
+  EXPECT_GT(near_bgr[2], 100);
+  EXPECT_EQ(near_bgr[0], 0);
+  EXPECT_GT(far_bgr[0], 100);
+  EXPECT_EQ(far_bgr[2], 0);
+  EXPECT_EQ(picture(0, 2), cv::Vec3b(255, 255, 255));
+}
+
+TEST(DepthPicture, MiddleOfInverseDepthIsGreen) {
+  // 1/1.6 is half way between 1/1 and 1/4.
+  const cv::Vec3b bgr = depthPicture((cv::Mat1f(1, 1) << 1.6F), {1.0, 4.0, 10})(0, 0);
+  EXPECT_GT(bgr[1], 200);
+}
+
+TEST(ConfidencePicture, IsBrightWhereSmallAndDarkWhereLarge) {
+  const cv::Mat1b picture = confidencePicture((cv::Mat1f(1, 3) << 0, 5, 10));
+  EXPECT_EQ(picture(0, 0), 255);
+  EXPECT_NEAR(picture(0, 1), 128, 1);
+  EXPECT_EQ(picture(0, 2), 0);
+  EXPECT_EQ(confidencePicture(cv::Mat1f::zeros(1, 1))(0, 0), 255);
+}
+
+class NpyFileTest : public TemporaryFolder {};
+
+TEST_F(NpyFileTest, HoldsPlanesRowsAndColumnsInThatOrder) {
+  const ReferenceView view{3, 2, 1, 1, 0, 0};
+  NpyDsiFile file(folder() / "dsi.npy", 2, view);
+  const std::vector<float> far = {6, 7, 8, 9, 10, 11};
+  const std::vector<float> near = {0, 1, 2, 3, 4, 5};
+  file.takePlane(1, far.data());
+  EXPECT_FALSE(exists(folder() / "dsi.npy")) << "not complete";
+  file.takePlane(0, near.data());
+  file.finish();
+
+  const std::string content = contentOf(folder() / "dsi.npy");
+  ASSERT_EQ(content.size() % 4, 0U);
+  const std::string header = content.substr(0, content.size() - 12 * sizeof(float));
+  EXPECT_EQ(header.substr(0, 8), std::string("\x93NUMPY\x01\x00", 8));
+  EXPECT_EQ(header.size() % 64, 0U);
+  EXPECT_EQ(static_cast<unsigned char>(header[8]) + 256 * static_cast<unsigned char>(header[9]),
+            static_cast<int>(header.size()) - 10);
+  EXPECT_THAT(header, HasSubstr("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 3), }"));
+  EXPECT_EQ(header.back(), '\n');
+  std::vector<float> values(12);
+  std::memcpy(values.data(), content.data() + header.size(), 12 * sizeof(float));
+  EXPECT_THAT(values, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
+}
+
+TEST_F(NpyFileTest, ThatIsNotFinishedLeavesNothing) {
+  { NpyDsiFile file(folder() / "dsi.npy", 1, {1, 1, 1, 1, 0, 0}); }
+  EXPECT_TRUE(std::filesystem::is_empty(folder()));
+  EXPECT_THROW(NpyDsiFile(folder() / "nowhere" / "dsi.npy", 1, {1, 1, 1, 1, 0, 0}),
+               std::runtime_error);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/pictures/plot_axis.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+
+namespace efm {
+namespace {
+
+using testing::ElementsAre;
+
+std::vector<std::string> textsOf(const AxisRange& range, int at_most) {
+  std::vector<std::string> texts;
+  for (const AxisTick& tick : ticksOf(range, at_most)) texts.push_back(tick.text);
+  return texts;
+}
+
+TEST(PlotAxis, TicksAreRoundNumbers) {
+  EXPECT_THAT(textsOf({0, 1}, 6), ElementsAre("0", "0.2", "0.4", "0.6", "0.8", "1"));
+  EXPECT_THAT(textsOf({0, 102}, 6), ElementsAre("0", "20", "40", "60", "80", "100"));
+  EXPECT_THAT(textsOf({-0.7, 2.3}, 5), ElementsAre("0", "1", "2"));
+  EXPECT_THAT(textsOf({12.3, 12.9}, 4), ElementsAre("12.4", "12.6", "12.8"));
+}
+
+TEST(PlotAxis, LogarithmicTicksArePowersOfTenAndWhatLiesBetweenWhereTheyAreFew) {
+  EXPECT_THAT(textsOf({0.01, 1, AxisScale::kLogarithmic}, 7),
+              ElementsAre("0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"));
+  EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 7),
+              ElementsAre("1", "10", "100", "1000", "10000", "100000", "1e+06"));
+  EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 4),
+              ElementsAre("1", "100", "10000", "1e+06"));
+}
+
+TEST(PlotAxis, AShortLogarithmicAxisHasTicksEvenlyApart) {
+  EXPECT_THAT(textsOf({0.7, 3.2, AxisScale::kLogarithmic}, 5),
+              ElementsAre("1", "1.5", "2", "2.5", "3"));
+}
+
+TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengths) {
+  const AxisRange range{1, 100, AxisScale::kLogarithmic};
+  EXPECT_DOUBLE_EQ(range.shareAlong(10), 0.5);
+  EXPECT_TRUE(std::isnan(range.shareAlong(0)));
+  EXPECT_TRUE(std::isnan(range.shareAlong(-1)));
+}
+
+TEST(PlotAxis, OfNothingOrOfOneValueIsStillARange) {
+  for (const AxisScale scale : {AxisScale::kLinear, AxisScale::kLogarithmic}) {
+    for (const std::vector<double>& values :
+         {std::vector<double>{}, std::vector<double>{5}, std::vector<double>{1e300, 1e300},
+          std::vector<double>{NAN, INFINITY}}) {
+      const AxisRange range = rangeAround(values, scale);
+      EXPECT_LT(range.from, range.to) << testing::PrintToString(values);
+    }
+  }
+}
+
+RC_GTEST_PROP(PlotAxis, HoldsAllValuesAndItsTicksLieInside, ()) {
+  const auto drawn = *rc::gen::nonEmpty<std::vector<int>>();
+  const double unit = std::pow(10.0, *rc::gen::inRange(-12, 12));
+  std::vector<double> values;
+  for (const int value : drawn) values.push_back(value * unit);
+  const AxisRange range = rangeAround(values, AxisScale::kLinear);
+  for (const double value : values) {
+    RC_ASSERT(range.shareAlong(value) > 0);
+    RC_ASSERT(range.shareAlong(value) < 1);
+  }
+  const auto ticks = ticksOf(range, 6);
+  RC_ASSERT(!ticks.empty());
+  RC_ASSERT(ticks.size() <= 6U);
+  for (const AxisTick& tick : ticks) {
+    RC_ASSERT(range.shareAlong(tick.value) > -1e-6);
+    RC_ASSERT(range.shareAlong(tick.value) < 1 + 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace efm

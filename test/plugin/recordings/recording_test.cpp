@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/obs/CObservationComment.h>
+
+#include <fstream>
+
+#include "plugin/mrpt/pose_observation.h"
+#include "plugin/recordings/time_cut.h"
+#include "test/plugin/mrpt/observations.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using mrpt::obs::CObservation;
+using mrpt::obs::CObservationRobotPose;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+// --- openRecording -----------------------------------------------------------------------------
+
+class OpenRecording : public TemporaryFolder {
+ protected:
+  static std::string errorOf(const std::vector<std::filesystem::path>& sources,
+                             const std::string& format = "auto") {
+    try {
+      openRecording({sources, format, {}, {}, {}, {}});
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+    return "no error";
+  }
+};
+
+TEST_F(OpenRecording, AMissingSourceIsNamed) {
+  EXPECT_THAT(errorOf({folder() / "nowhere"}), HasSubstr("nowhere: no such file or folder"));
+}
+
+TEST_F(OpenRecording, AFolderOfSomethingElseIsAnErrorThatSaysWhatWasLookedFor) {
+  std::ofstream(folder() / "notes.txt") << "nothing";
+  EXPECT_THAT(errorOf({folder()}), AllOf(HasSubstr("not a recording"), HasSubstr("camchain.yaml"),
+                                         HasSubstr("events.txt"), HasSubstr("calib.txt")));
+}
+
+TEST_F(OpenRecording, AnUnknownFormatIsNamed) {
+  EXPECT_THAT(errorOf({folder()}, "tape"), HasSubstr("'tape'"));
+}
+
+TEST_F(OpenRecording, TakesOneSource) {
+  EXPECT_THAT(errorOf({folder(), folder()}), HasSubstr("2 sources"));
+  EXPECT_THAT(errorOf({}), HasSubstr("0 sources"));
+}
+
+TEST_F(OpenRecording, FormatsBeginWithAuto) {
+  EXPECT_THAT(recordingFormats(), ElementsAre("auto", "rawlog", "folder", "uzh"));
+}
+
+// --- TimeCut -----------------------------------------------------------------------------------
+
+/// Plays observations that are there.
+class Playback : public Recording {
+ public:
+  explicit Playback(std::vector<CObservation::Ptr> observations)
+      : observations_(std::move(observations)) {}
+  CObservation::Ptr next() override {
+    return next_ < observations_.size() ? observations_[next_++] : nullptr;
+  }
+  std::string place() const override { return "here"; }
+  double progress() const override { return 0; }
+  std::size_t given() const { return next_; }
+
+ private:
+  std::vector<CObservation::Ptr> observations_;
+  std::size_t next_ = 0;
+};
+
+CObservation::Ptr pose(std::int64_t t_ns) {
+  auto observation = CObservationRobotPose::Create();
+  observation->timestamp = mrptTimeFrom(t_ns);
+  return observation;
+}
+
+CObservation::Ptr packet(int camera, std::int64_t begin_ns, std::int64_t covered_until_ns,
+                         const std::vector<std::int64_t>& times_ns) {
+  auto observation = CObservationEvents::Create();
+  observation->camera_index = camera;
+  observation->timestamp = mrptTimeFrom(begin_ns);
+  observation->covered_until_ns = covered_until_ns;
+  for (const std::int64_t t_ns : times_ns) observation->events.push_back({t_ns, 0, 0, true});
+  return observation;
+}
+
+/// "pose 100", "cam0 200 (210 250) 300": begin, events, until where it is covered.
+std::string describe(const CObservation& observation) {
+  const bool timed = observation.timestamp != INVALID_TIMESTAMP;
+  const std::string begin = timed ? std::to_string(nanosecondsFrom(observation.timestamp)) : "?";
+  const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
+  if (!events) return (poseOriginOf(observation) ? "pose " : "other ") + begin;
+  std::string text = "cam" + std::to_string(events->camera_index) + " " + begin + " (";
+  for (const Event& event : events->events) {
+    text += (text.back() == '(' ? "" : " ") + std::to_string(event.t_ns);
+  }
+  return text + ") " + std::to_string(*events->covered_until_ns);
+}
+
+std::vector<std::string> cut(const std::vector<CObservation::Ptr>& observations,
+                             std::optional<std::int64_t> t0_ns, std::optional<std::int64_t> t1_ns) {
+  const auto recording = cutTime(std::make_unique<Playback>(observations), t0_ns, t1_ns);
+  std::vector<std::string> given;
+  while (const auto observation = recording->next()) given.push_back(describe(*observation));
+  return given;
+}
+
+std::vector<CObservation::Ptr> threePackets() {
+  return {pose(100),  packet(0, 100, 1100, {100, 1000}),
+          pose(600),  packet(0, 1100, 2100, {1100, 2000}),
+          pose(1600), packet(0, 2100, 9900, {2100, 3000}),
+          pose(2600), pose(3600)};
+}
+
+TEST(TimeCut, WithoutLimitsIsTheWholeRecording) {
+  EXPECT_EQ(cut(threePackets(), std::nullopt, std::nullopt).size(), 8);
+}
+
+TEST(TimeCut, HasTheEventsFromT0ToBeforeT1AndAPoseOnEitherSide) {
+  EXPECT_THAT(cut(threePackets(), 1100, 2100),
+              ElementsAre("pose 600", "cam0 1100 (1100 2000) 2100", "pose 1600", "pose 2600"));
+  EXPECT_THAT(cut(threePackets(), 1101, 2001),
+              ElementsAre("pose 600", "cam0 2000 (2000) 2001", "pose 1600", "pose 2600"));
+}
+
+TEST(TimeCut, MayBeOpenAtOneEnd) {
+  EXPECT_THAT(cut(threePackets(), 2500, std::nullopt),
+              ElementsAre("pose 1600", "cam0 3000 (3000) 9900", "pose 2600", "pose 3600"));
+  EXPECT_THAT(cut(threePackets(), std::nullopt, 1000),
+              ElementsAre("pose 100", "cam0 100 (100) 1000", "pose 600", "pose 1600"));
+}
+
+TEST(TimeCut, KeepsTheNewsThatACameraIsSilent) {
+  EXPECT_THAT(cut({pose(0), packet(1, 100, 50'000, {}), packet(0, 100, 300, {200}), pose(200),
+                   packet(0, 1000, 2000, {1500}), pose(1600)},
+                  1200, 1550),
+              ElementsAre("pose 200", "cam1 1200 () 1550", "cam0 1500 (1500) 1550", "pose 1600"));
+}
+
+TEST(TimeCut, OfNothingIsEmpty) { EXPECT_THAT(cut(threePackets(), 10'000, 20'000), ElementsAre()); }
+
+/// Three packets of which none says when it begins, but all this.
+std::vector<CObservation::Ptr> threePacketsAt(const mrpt::Clock::time_point& time) {
+  std::vector<CObservation::Ptr> observations = threePackets();
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, CObservationEvents)) observation->timestamp = time;
+  }
+  return observations;
+}
+
+TEST(TimeCut, GoesByTheTimesOfEventsWhereAPacketHasNone) {
+  EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 1100, 2100),
+              ElementsAre("pose 600", "cam0 ? (1100 2000) 2100", "pose 1600", "pose 2600"));
+  EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 2500, std::nullopt),
+              ElementsAre("pose 1600", "cam0 ? (3000) 9900", "pose 2600", "pose 3600"));
+  // MRPT gives an observation the time at which it was made where nobody says another.
+  const auto now = mrptTimeFrom(1'700'000'000'000'000'000);
+  EXPECT_EQ(cut(threePacketsAt(now), 100, 3000).size(), 8U);
+}
+
+TEST(TimeCut, LetsOtherObservationsWithoutATimePass) {
+  auto comment = mrpt::obs::CObservationComment::Create();
+  comment->timestamp = INVALID_TIMESTAMP;
+  EXPECT_THAT(cut({pose(100), comment, packet(0, 100, 1100, {100}), pose(1600)}, 100, 1100),
+              ElementsAre("pose 100", "other ?", "cam0 100 (100) 1100", "pose 1600"));
+}
+
+TEST(TimeCut, APoseWithoutATimeIsAnErrorThatNamesItsSource) {
+  const CObservation::Ptr timeless = pose(0);
+  timeless->timestamp = INVALID_TIMESTAMP;
+  timeless->sensorLabel = "tracker";
+  try {
+    cut({timeless}, 100, 1100);
+    FAIL() << "no error";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("'tracker' has no time stamp"));
+  }
+}
+
+TEST(TimeCut, EndsOnceEachCameraHasPassedT1) {
+  // Camera 1's packets are longer, and come when they end.
+  EXPECT_THAT(cut({pose(0), packet(0, 100, 200, {100}), packet(0, 200, 300, {200}),
+                   packet(1, 100, 300, {150, 200, 250}), packet(0, 300, 400, {300}),
+                   packet(0, 400, 500, {400}), pose(500), packet(1, 300, 500, {310, 390}),
+                   packet(0, 500, 600, {500}), pose(700)},
+                  200, 350),
+              ElementsAre("pose 0", "cam0 200 (200) 300", "cam1 200 (200 250) 300",
+                          "cam0 300 (300) 350", "pose 500", "cam1 300 (310) 350"));
+}
+
+TEST(TimeCut, HasACameraThatFirstAppearsWhenAnotherHasPassedT1) {
+  EXPECT_THAT(cut({pose(0), packet(0, 100, 200, {100}), packet(0, 200, 300, {200}), pose(300),
+                   packet(1, 100, 300, {150, 250})},
+                  100, 200),
+              ElementsAre("pose 0", "cam0 100 (100) 200", "pose 300", "cam1 100 (150) 200"));
+}
+
+TEST(TimeCut, DoesNotWaitLongForACameraThatIsSilent) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  std::vector<CObservation::Ptr> observations = {pose(0), packet(1, 0, 1, {0})};
+  for (int i = 0; i < 100; ++i) {
+    observations.push_back(packet(0, i * kSecond / 4, i * kSecond / 4 + 1, {i * kSecond / 4}));
+    observations.push_back(pose(i * kSecond / 4));
+  }
+  auto playback = std::make_unique<Playback>(observations);
+  const Playback& played = *playback;
+  const auto recording = cutTime(std::move(playback), 0, kSecond);
+  std::size_t given = 0;
+  while (recording->next()) ++given;
+  EXPECT_EQ(given, 1U + 1U + 4U + 5U);
+  EXPECT_LT(played.given(), 2U + 2U * 10U) << "a second beyond t1 and no more";
+}
+
+TEST(TimeCut, MustEndAfterItBegins) {
+  EXPECT_THROW(cut(threePackets(), 1000, 1000), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/map_refinement.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "plugin/session/mapping_session.h"
+#include "test/plugin/recordings/shaken_recording.h"
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+
+/// Keyframes of a shaken recording, as the tracker has them.
+std::vector<KeyframeDepthMap> shakenKeyframes(double duration_s = 1.2) {
+  const SyntheticRecording recording = shaken(SyntheticRecording(duration_s));
+  EventFusionOptions options = refinedOptions();
+  options.refinement.enabled = false;
+  MappingSession session(options);
+  for (const StampedPose& pose : recording.poses) session.addPose(pose);
+  for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
+    session.addEvents(
+        {static_cast<int>(c), recording.cameras[c], recording.events[c], std::nullopt});
+  }
+  session.finish();
+  std::vector<KeyframeDepthMap> keyframes;
+  while (auto keyframe = session.next()) keyframes.push_back(std::move(*keyframe));
+  return keyframes;
+}
+
+MapRefinementOptions optionsOf(bool background) {
+  MapRefinementOptions options;
+  options.enabled = true;
+  options.background = background;
+  return options;
+}
+
+void addAll(MapRefinement& refinement, const std::vector<KeyframeDepthMap>& keyframes) {
+  for (const KeyframeDepthMap& keyframe : keyframes) refinement.add(keyframe, std::nullopt);
+}
+
+std::string errorOf(MapRefinement& refinement, const KeyframeDepthMap& keyframe) {
+  try {
+    refinement.add(keyframe, std::nullopt);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+void expectSamePoses(const std::map<std::size_t, Rigid3>& poses,
+                     const std::map<std::size_t, Rigid3>& expected) {
+  ASSERT_EQ(poses.size(), expected.size());
+  for (const auto& [number, T_world_ref] : expected) {
+    ASSERT_EQ(poses.count(number), 1U) << number;
+    EXPECT_TRUE(isSame(poses.at(number), T_world_ref)) << "keyframe " << number;
+  }
+}
+
+/// Those that were moved, by the refiner alone.
+std::map<std::size_t, Rigid3> refinedAlone(const std::vector<KeyframeDepthMap>& keyframes) {
+  const RefinementOptions options;
+  KeyframeRefiner refiner(options);
+  for (const KeyframeDepthMap& keyframe : keyframes) {
+    refiner.add(RegistrationCloud(keyframe, options.points), keyframe.T_world_ref);
+  }
+  refiner.finish();
+  std::map<std::size_t, Rigid3> moved;
+  for (const std::size_t number : refiner.takeMoved()) moved[number] = refiner.T_world_ref(number);
+  return moved;
+}
+
+class MapRefinementOfEitherKind : public testing::TestWithParam<bool> {};
+
+INSTANTIATE_TEST_SUITE_P(Background, MapRefinementOfEitherKind, testing::Bool());
+
+TEST_P(MapRefinementOfEitherKind, EndsWhereTheRefinerEnds) {
+  const auto keyframes = shakenKeyframes();
+  ASSERT_GE(keyframes.size(), 10U);
+  MapRefinement refinement(optionsOf(GetParam()));
+  addAll(refinement, keyframes);
+  refinement.finish();
+
+  expectSamePoses(refinement.takeMoved(), refinedAlone(keyframes));
+  const RefinementState state = refinement.state();
+  EXPECT_EQ(state.waiting, 0U);
+  EXPECT_GT(state.counts.registered, keyframes.size() / 2);
+  EXPECT_GT(state.seconds, 0);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(state.covariance).eigenvalues()(0), 0);
+}
+
+TEST_P(MapRefinementOfEitherKind, ToFinishAgainMovesNothing) {
+  MapRefinement refinement(optionsOf(GetParam()));
+  addAll(refinement, shakenKeyframes(0.7));
+  refinement.finish();
+  const auto moved = refinement.takeMoved();
+  refinement.finish();
+  for (const auto& [number, T_world_ref] : refinement.takeMoved()) {
+    EXPECT_LT((T_world_ref.translation - moved.at(number).translation).norm(), 1e-5) << number;
+  }
+}
+
+TEST_P(MapRefinementOfEitherKind, WhatWasMovedIsSaidOnce) {
+  MapRefinement refinement(optionsOf(GetParam()));
+  EXPECT_TRUE(refinement.takeMoved().empty());
+  addAll(refinement, shakenKeyframes(0.7));
+  refinement.finish();
+  EXPECT_FALSE(refinement.takeMoved().empty());
+  EXPECT_TRUE(refinement.takeMoved().empty());
+}
+
+TEST_P(MapRefinementOfEitherKind, WithoutKeyframesHasNothingToFinish) {
+  MapRefinement refinement(optionsOf(GetParam()));
+  refinement.finish();
+  EXPECT_TRUE(refinement.takeMoved().empty());
+  EXPECT_TRUE(isSame(refinement.state().T_world_tracker, Rigid3{}));
+}
+
+TEST_P(MapRefinementOfEitherKind, KeyframesWithoutPointsStayWithTheTracker) {
+  auto keyframes = shakenKeyframes(0.7);
+  for (KeyframeDepthMap& keyframe : keyframes) keyframe.map.depth.setTo(0);
+  MapRefinement refinement(optionsOf(GetParam()));
+  addAll(refinement, keyframes);
+  refinement.finish();
+  EXPECT_EQ(refinement.state().counts.registered, 0U);
+  for (const auto& [number, T_world_ref] : refinement.takeMoved()) {
+    EXPECT_LT((T_world_ref.translation - keyframes[number].T_world_ref.translation).norm(), 1e-6);
+  }
+}
+
+TEST(MapRefinement, KnowsThePoseOfAKeyframeThatItHasRefined) {
+  MapRefinement refinement(optionsOf(false));
+  for (const KeyframeDepthMap& keyframe : shakenKeyframes()) {
+    const Rigid3 T_world_ref = refinement.add(keyframe, std::nullopt);
+    const auto moved = refinement.takeMoved();
+    if (!moved.empty()) {
+      EXPECT_TRUE(isSame(T_world_ref, moved.rbegin()->second));
+    }
+  }
+}
+
+TEST(MapRefinement, InTheBackgroundDoesNotWaitForWhatIsRefined) {
+  const auto keyframes = shakenKeyframes();
+  MapRefinement refinement(optionsOf(true));
+  std::size_t most_waiting = 0;
+  for (int round = 0; round < 2; ++round) {
+    for (const KeyframeDepthMap& keyframe : keyframes) {
+      refinement.add(keyframe, std::nullopt);
+      most_waiting = std::max(most_waiting, refinement.state().waiting);
+    }
+  }
+  EXPECT_GT(most_waiting, 0U);
+  refinement.finish();
+  EXPECT_EQ(refinement.state().waiting, 0U);
+}
+
+TEST(MapRefinement, MayEndWhileKeyframesWait) {
+  const auto keyframes = shakenKeyframes(0.7);
+  for (int round = 0; round < 5; ++round) {
+    MapRefinement refinement(optionsOf(true));
+    for (int i = 0; i <= round; ++i) addAll(refinement, keyframes);
+  }
+}
+
+TEST(MapRefinement, APoseThatIsNotFiniteIsRefusedAndNothingIsTaken) {
+  auto keyframes = shakenKeyframes(0.7);
+  MapRefinement refinement(optionsOf(false));
+  MapRefinement expected(optionsOf(false));
+  addAll(refinement, keyframes);
+  addAll(expected, keyframes);
+
+  KeyframeDepthMap wrong = keyframes.front();
+  wrong.T_world_ref.translation.y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(errorOf(refinement, wrong), HasSubstr("its pose is not finite"));
+  refinement.finish();
+  expected.finish();
+  expectSamePoses(refinement.takeMoved(), expected.takeMoved());
+}
+
+TEST(MapRefinement, AnErrorInTheBackgroundIsSaidToWhoeverComesNext) {
+  auto keyframes = shakenKeyframes(0.7);
+  MapRefinement refinement(optionsOf(true));
+  addAll(refinement, keyframes);
+  KeyframeDepthMap wrong = keyframes.front();
+  wrong.T_world_ref.translation.y() = std::numeric_limits<double>::infinity();
+  refinement.add(wrong, std::nullopt);
+
+  EXPECT_THROW(refinement.finish(), std::invalid_argument);
+  EXPECT_THAT(errorOf(refinement, keyframes.front()), HasSubstr("its pose is not finite"));
+  EXPECT_FALSE(refinement.takeMoved().empty()) << "what was refined before";
+}
+
+TEST(MapRefinement, OptionsThatAreNotValidAreErrors) {
+  MapRefinementOptions options;
+  options.refiner.window = 0;
+  EXPECT_THROW(MapRefinement{options}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/timestamp.h"
+#include "mapping/geometry/trajectory.h"
+#include "plugin/options/option_file.h"
+
+namespace efm {
+
+/// Bright dots on the plane z = 2 m of the world, seen by a stereo rig that moves along x without
+/// turning: an event whenever a dot comes to another pixel. Small, exact and the same every time.
+struct SyntheticRecording {
+  static constexpr double kDepthM = 2.0;
+  static constexpr std::int64_t kStartNs = 10'000'000'000;  // a recording's clock is not 0 at first
+  static constexpr std::int64_t kStepNs = 1'000'000;
+
+  std::vector<RigCamera> cameras;
+  std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
+  std::vector<StampedPose> poses;          ///< Every 10 ms, from the start to the end.
+
+  /// Moves by 0.8 m/s for `duration_s`; camera 1 stands 0.1 m to the right of camera 0.
+  explicit SyntheticRecording(double duration_s = 0.5, int num_cameras = 2) {
+    for (int c = 0; c < num_cameras; ++c) {
+      RigCamera camera;
+      camera.model = {120, 90, 100.0, 100.0, 59.5, 44.5, DistortionModel::kNone, {}};
+      camera.T_rig_cam.translation = {0.1 * c, 0, 0};
+      cameras.push_back(camera);
+    }
+    const std::vector<Eigen::Vector3d> dots = randomDots();
+    const auto steps = static_cast<std::int64_t>(std::llround(duration_s * 1e9)) / kStepNs;
+    for (const RigCamera& camera : cameras) events.push_back(eventsOf(camera, dots, steps));
+    for (std::int64_t step = 0; step <= steps; step += 10) {
+      poses.push_back({kStartNs + step * kStepNs, poseAt(step)});
+    }
+  }
+
+  std::size_t totalEvents() const {
+    std::size_t total = 0;
+    for (const auto& one : events) total += one.size();
+    return total;
+  }
+
+ private:
+  static Rigid3 poseAt(std::int64_t step) {
+    Rigid3 T_world_rig;
+    T_world_rig.translation = {0.8 * static_cast<double>(step * kStepNs) * 1e-9, 0, 0};
+    return T_world_rig;
+  }
+
+  static std::vector<Eigen::Vector3d> randomDots() {
+    std::mt19937 random(7);
+    std::vector<Eigen::Vector3d> dots;
+    for (int i = 0; i < 60; ++i) {
+      const double x = -1.5 + 4.0 * (static_cast<double>(random()) / 4294967296.0);
+      const double y = -0.8 + 1.6 * (static_cast<double>(random()) / 4294967296.0);
+      dots.emplace_back(x, y, kDepthM);
+    }
+    return dots;
+  }
+
+  static std::vector<Event> eventsOf(const RigCamera& camera,
+                                     const std::vector<Eigen::Vector3d>& dots, std::int64_t steps) {
+    std::vector<Event> events;
+    std::vector<Eigen::Vector2i> last(dots.size(), {-1, -1});
+    for (std::int64_t step = 0; step <= steps; ++step) {
+      const Rigid3 T_cam_world = (poseAt(step) * camera.T_rig_cam).inverse();
+      for (std::size_t i = 0; i < dots.size(); ++i) {
+        const Eigen::Vector2d pixel = camera.model.project(T_cam_world * dots[i]);
+        const Eigen::Vector2i rounded = pixel.array().round().cast<int>();
+        if (rounded == last[i]) continue;
+        last[i] = rounded;
+        if (step == 0 || rounded.minCoeff() < 0 || rounded.x() >= camera.model.width ||
+            rounded.y() >= camera.model.height) {
+          continue;
+        }
+        events.push_back({kStartNs + step * kStepNs, static_cast<std::uint16_t>(rounded.x()),
+                          static_cast<std::uint16_t>(rounded.y()), step % 2 == 0});
+      }
+    }
+    return events;
+  }
+};
+
+/// Options that suit the synthetic recording: three keyframes in half a second.
+inline EventFusionOptions syntheticOptions() {
+  EventFusionOptions options;
+  options.mapper.keyframes.window_s = 0.2;
+  options.mapper.keyframes.stride_s = 0.1;
+  options.mapper.keyframe.planes = {1, 5, 30, PlaneSpacing::kInverse};
+  options.mapper.keyframe.extraction.threshold_c = 60;  // lone dots stand out far
+  return options;
+}
+
+}  // namespace efm

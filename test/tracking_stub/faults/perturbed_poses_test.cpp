@@ -1,0 +1,311 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/faults/perturbed_poses.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+#include "test/tracking_stub/poses/pose_lists.h"
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+std::vector<StampedPose> perturbed(const std::vector<StampedPose>& poses,
+                                   const PosePerturbationOptions& options) {
+  PerturbedPoses source(replay(poses), options);
+  return allOf(source);
+}
+
+/// Stretches of 0.105 s, so that some begin at poses and some between them.
+PosePerturbationOptions keyframeNoise() {
+  PosePerturbationOptions options;
+  options.keyframe.noise_m = 0.01;
+  options.keyframe.noise_rad = 0.01;
+  options.keyframe.length_ns = 105'000'000;
+  options.seed = 3;
+  return options;
+}
+
+double angleOf(const Eigen::Quaterniond& rotation) { return 2 * rotation.vec().norm(); }
+
+/// The mean squares of the errors' axes, positions in the world and small rotations in the rig.
+std::pair<double, double> meanSquares(const std::vector<StampedPose>& poses,
+                                      const std::vector<StampedPose>& truth) {
+  double position = 0;
+  double rotation = 0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Rigid3& T_world_rig = truth[i].T_world_rig;
+    position += (poses[i].T_world_rig.translation - T_world_rig.translation).squaredNorm() / 3;
+    const double angle = angleOf(T_world_rig.rotation.conjugate() * poses[i].T_world_rig.rotation);
+    rotation += angle * angle / 3;
+  }
+  const auto count = static_cast<double>(poses.size());
+  return {position / count, rotation / count};
+}
+
+TEST(PerturbedPoses, AreTheSameBitForBitByDefault) {
+  const auto poses = windingWay(500);
+  EXPECT_FALSE(PosePerturbationOptions().any());
+  EXPECT_TRUE(sameBits(perturbed(poses, {}), poses));
+}
+
+TEST(PerturbedPoses, AreTheSameForTheSameSeedAlone) {
+  const auto poses = windingWay(300);
+  PosePerturbationOptions options = keyframeNoise();
+  options.noise_m = 0.01;
+  options.noise_rad = 0.01;
+  options.drift = {0.01, 0.01};
+  const auto once = perturbed(poses, options);
+  EXPECT_TRUE(sameBits(perturbed(poses, options), once));
+  options.seed = 4;
+  EXPECT_FALSE(sameBits(perturbed(poses, options), once));
+}
+
+TEST(PerturbedPoses, NoisePerPoseHasTheDeviationAskedFor) {
+  const auto poses = windingWay(20'000);
+  PosePerturbationOptions options;
+  options.noise_m = 0.02;
+  options.noise_rad = 0.005;
+  const auto [position, rotation] = meanSquares(perturbed(poses, options), poses);
+  // Of 60000 draws the mean square has a relative deviation of sqrt(2 / 60000) = 0.6 %, its root of
+  // half that: five of them.
+  EXPECT_NEAR(std::sqrt(position), 0.02, 0.02 * 0.015);
+  EXPECT_NEAR(std::sqrt(rotation), 0.005, 0.005 * 0.015);
+}
+
+TEST(PerturbedPoses, NoiseOfNeighboursIsUnrelated) {
+  const auto poses = windingWay(20'000);
+  PosePerturbationOptions options;
+  options.noise_m = 1;
+  const auto noisy = perturbed(poses, options);
+  double product = 0;
+  for (std::size_t i = 1; i < noisy.size(); ++i) {
+    product +=
+        (noisy[i].T_world_rig.translation - poses[i].T_world_rig.translation)
+            .dot(noisy[i - 1].T_world_rig.translation - poses[i - 1].T_world_rig.translation);
+  }
+  // The mean of 60000 products of unit deviation: 1 / sqrt(60000) = 0.004, five of them.
+  EXPECT_NEAR(product / 60'000, 0, 0.02);
+}
+
+TEST(PerturbedPoses, KeepTheirNoiseWhenOthersAreLost) {
+  auto poses = windingWay(100);
+  PosePerturbationOptions options;
+  options.noise_m = 0.01;
+  const auto all = perturbed(poses, options);
+  poses.erase(poses.begin() + 20, poses.begin() + 30);
+  const auto fewer = perturbed(poses, options);
+  EXPECT_TRUE(sameBits(fewer[20].T_world_rig, all[30].T_world_rig));
+}
+
+TEST(PerturbedPoses, NoisePerKeyframeHasTheDeviationAskedFor) {
+  const auto poses = windingWay(100'000);
+  PosePerturbationOptions options = keyframeNoise();
+  options.keyframe.length_ns = 100'000'000;  // at every tenth pose, where errors are as drawn
+  std::map<std::int64_t, Rigid3> noisy;
+  for (const StampedPose& pose : perturbed(poses, options)) noisy[pose.t_ns] = pose.T_world_rig;
+  std::vector<StampedPose> first_poses;
+  std::vector<StampedPose> truth;
+  for (std::size_t i = 0; i < poses.size(); i += 10) {
+    truth.push_back(poses[i]);
+    first_poses.push_back({poses[i].t_ns, noisy.at(poses[i].t_ns)});
+  }
+  const auto [position, rotation] = meanSquares(first_poses, truth);
+  // 30000 draws: 0.4 % of the root, five of them. The turn acts about the position, in the world;
+  // what it is in the rig has the same length.
+  EXPECT_NEAR(std::sqrt(position), 0.01, 0.01 * 0.02);
+  EXPECT_NEAR(std::sqrt(rotation), 0.01, 0.01 * 0.02);
+}
+
+TEST(PerturbedPoses, AStretchMovesRigidlyAndJumpsWhereTheNextBegins) {
+  const auto poses = windingWay(300);
+  const PosePerturbationOptions options = keyframeNoise();
+  Trajectory truth;
+  for (const StampedPose& pose : poses) truth.add(pose);
+  Trajectory wrong;
+  for (const StampedPose& pose : perturbed(poses, options)) EXPECT_TRUE(wrong.add(pose));
+
+  const std::int64_t length_ns = *options.keyframe.length_ns;
+  std::vector<Rigid3> errors;  // T_wrong_world of each stretch
+  for (std::int64_t k = 0; kSecondNs + (k + 1) * length_ns <= poses.back().t_ns; ++k) {
+    const std::int64_t begin_ns = kSecondNs + k * length_ns;
+    const Rigid3 error = *wrong.poseAt(begin_ns) * truth.poseAt(begin_ns)->inverse();
+    errors.push_back(error);
+    for (const std::int64_t t_ns : {begin_ns + 1, begin_ns + 3'333'333, begin_ns + 50'000'000,
+                                    begin_ns + length_ns - 4'000'000, begin_ns + length_ns - 1}) {
+      const Rigid3 expected = error * *truth.poseAt(t_ns);
+      const Rigid3 T_expected_rig = expected.inverse() * *wrong.poseAt(t_ns);
+      EXPECT_LT(T_expected_rig.translation.norm(), 1e-12) << k << " " << t_ns - begin_ns;
+      EXPECT_LT(angleOf(T_expected_rig.rotation), 1e-12) << k << " " << t_ns - begin_ns;
+    }
+    // The rig itself is wrong by about what was drawn, wherever it is in the world.
+    EXPECT_LT((*wrong.poseAt(begin_ns)).translation.norm(),
+              truth.poseAt(begin_ns)->translation.norm() + 0.06);
+  }
+  ASSERT_GT(errors.size(), 25U);
+  for (std::size_t k = 1; k < errors.size(); ++k) {
+    EXPECT_GT(angleOf((errors[k - 1].inverse() * errors[k]).rotation), 1e-4) << k;
+  }
+}
+
+TEST(PerturbedPoses, OfAStretchDependOnItsNumberAlone) {
+  const auto poses = windingWay(300);
+  const auto errorAt = [&](std::size_t from, std::size_t index) {
+    PosePerturbationOptions options = keyframeNoise();
+    options.keyframe.noise_rad = 0;
+    options.keyframe.start_ns = kSecondNs - 7;
+    for (const StampedPose& pose :
+         perturbed({poses.begin() + static_cast<std::ptrdiff_t>(from), poses.end()}, options)) {
+      if (pose.t_ns == poses[index].t_ns) {
+        return Eigen::Vector3d(pose.T_world_rig.translation - poses[index].T_world_rig.translation);
+      }
+    }
+    return Eigen::Vector3d(Eigen::Vector3d::Zero());
+  };
+  EXPECT_GT(errorAt(0, 200).norm(), 1e-4);
+  EXPECT_LT((errorAt(0, 200) - errorAt(150, 200)).norm(), 1e-15);
+}
+
+TEST(PerturbedPoses, StretchesBeginOnTicks) {
+  PosePerturbationOptions options = keyframeNoise();
+  options.keyframe.length_ns = 33'333'333;
+  options.tick_ns = 100;
+  const auto noisy = perturbed(windingWay(200), options);
+  std::int64_t before_ns = 0;
+  for (const StampedPose& pose : noisy) {
+    EXPECT_EQ(pose.t_ns % 100, 0);
+    EXPECT_GT(pose.t_ns, before_ns);
+    before_ns = pose.t_ns;
+  }
+  EXPECT_EQ(noisy.size(), 200U + 59 * 2);
+}
+
+TEST(PerturbedPoses, AreNotPutInAcrossGaps) {
+  auto poses = windingWay(200);
+  poses.erase(poses.begin() + 50, poses.begin() + 100);
+  PosePerturbationOptions options = keyframeNoise();
+  options.keyframe.length_ns = 100'000'000;  // stretches begin at poses: one is put in at each
+  for (const StampedPose& pose : perturbed(poses, options)) {
+    EXPECT_TRUE(pose.t_ns <= poses[49].t_ns || pose.t_ns >= poses[50].t_ns);
+  }
+  EXPECT_EQ(perturbed(poses, options).size(), poses.size() + 4 + 9);
+}
+
+TEST(PerturbedPoses, DriftInProportionToTheWay) {
+  std::vector<StampedPose> straight;
+  for (int i = 0; i <= 1000; ++i)
+    straight.push_back({i * 1'000'000, {{1, 0, 0, 0}, {0.01 * i, 0, 0}}});
+  PosePerturbationOptions options;
+  options.drift.share = 0.02;
+  for (options.seed = 0; options.seed < 5; ++options.seed) {
+    const auto drifted = perturbed(straight, options);
+    EXPECT_TRUE(sameBits(drifted[0].T_world_rig, straight[0].T_world_rig));
+    for (const std::size_t i : {100U, 1000U}) {
+      const Rigid3& T_world_rig = straight[i].T_world_rig;
+      EXPECT_NEAR((drifted[i].T_world_rig.translation - T_world_rig.translation).norm(),
+                  0.02 * 0.01 * static_cast<double>(i), 1e-12);
+    }
+  }
+  options.drift = {0, 0.01};
+  for (options.seed = 0; options.seed < 5; ++options.seed) {
+    const Rigid3 T_world_rig = perturbed(straight, options).back().T_world_rig;
+    EXPECT_NEAR(angleOf(T_world_rig.rotation), 0.1, 0.1 * 0.1 / 24 * 0.1 + 1e-4);
+    // The way bends by half of the turn, less where it turns about its own direction.
+    EXPECT_LT((T_world_rig.translation - Eigen::Vector3d(10, 0, 0)).norm(), 0.5 * 0.1 * 10 + 0.01);
+    EXPECT_NEAR(T_world_rig.translation.norm(), 10, 0.01);
+  }
+}
+
+TEST(PerturbedPoses, OneOptionLeavesTheOthersDrawsAlone) {
+  const auto poses = windingWay(300);
+  PosePerturbationOptions noise;
+  noise.noise_m = 0.01;
+  noise.seed = 3;
+  PosePerturbationOptions keyframe = keyframeNoise();
+  keyframe.keyframe.noise_rad = 0;  // errors add up exactly
+  PosePerturbationOptions drift;
+  drift.drift.share = 0.01;
+  drift.seed = 3;
+  PosePerturbationOptions all = keyframe;
+  all.noise_m = noise.noise_m;
+  all.drift = drift.drift;
+  const auto at = [&](const PosePerturbationOptions& options) {
+    std::map<std::int64_t, Eigen::Vector3d> positions;
+    for (const StampedPose& pose : perturbed(poses, options)) {
+      positions[pose.t_ns] = pose.T_world_rig.translation;
+    }
+    return positions;
+  };
+  const auto of_noise = at(noise);
+  const auto of_keyframe = at(keyframe);
+  const auto of_drift = at(drift);
+  const auto of_all = at(all);
+  for (const StampedPose& pose : poses) {
+    const Eigen::Vector3d sum = of_noise.at(pose.t_ns) + of_keyframe.at(pose.t_ns) +
+                                of_drift.at(pose.t_ns) - 2 * pose.T_world_rig.translation;
+    EXPECT_LT((of_all.at(pose.t_ns) - sum).norm(), 1e-12);
+  }
+}
+
+TEST(PerturbedPoses, ArePolledOnWhereTheirSourceHalts) {
+  const auto poses = windingWay(100);
+  PosePerturbationOptions options = keyframeNoise();
+  PerturbedPoses halting(std::make_unique<HaltingSource>(poses), options);
+  EXPECT_TRUE(sameBits(polled(halting), perturbed(poses, options)));
+}
+
+TEST(PerturbedPoses, ThatAreNotFinitePassAndSpoilNoOther) {
+  auto poses = windingWay(100);
+  poses[40].T_world_rig.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  PosePerturbationOptions options = keyframeNoise();
+  options.drift = {0.01, 0.01};
+  const auto noisy = perturbed(poses, options);
+  EXPECT_EQ(std::count_if(
+                noisy.begin(), noisy.end(),
+                [](const StampedPose& pose) { return !pose.T_world_rig.translation.allFinite(); }),
+            1);
+}
+
+TEST(PerturbedPoses, RefuseWhatIsNotValid) {
+  EXPECT_THROW(PerturbedPoses(nullptr, {}), std::invalid_argument);
+  const auto refused = [](const PosePerturbationOptions& options) {
+    EXPECT_THROW(PerturbedPoses(replay({}), options), std::invalid_argument);
+  };
+  PosePerturbationOptions options;
+  options.noise_m = -1;
+  refused(options);
+  options = {};
+  options.noise_rad = std::numeric_limits<double>::quiet_NaN();
+  refused(options);
+  options = {};
+  options.keyframe.noise_m = 0.01;  // without a length
+  refused(options);
+  options.keyframe.length_ns = 1;
+  refused(options);
+  options = {};
+  options.drift.share = 2;
+  refused(options);
+  options = {};
+  options.tick_ns = 0;
+  refused(options);
+
+  class Backwards : public PoseSource {
+   public:
+    std::optional<StampedPose> next() override { return StampedPose{t_ns_--, {}}; }
+    bool ended() const override { return false; }
+
+   private:
+    std::int64_t t_ns_ = 10;
+  };
+  PerturbedPoses backwards(std::make_unique<Backwards>(), keyframeNoise());
+  EXPECT_TRUE(backwards.next());
+  EXPECT_THROW(backwards.next(), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace efm

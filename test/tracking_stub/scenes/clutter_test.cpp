@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/scenes/clutter.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace efm {
+namespace {
+
+TEST(Clutter, IsTheSameForTheSameSeedOnly) {
+  ClutterOptions options;
+  options.seed = 3;
+  const Texture a = paintClutter(options);
+  const Texture b = paintClutter(options);
+  options.seed = 4;
+  const Texture c = paintClutter(options);
+  double difference = 0;
+  for (double u = 0.05; u < 1; u += 0.1) {
+    EXPECT_EQ(a.sample(u, u, 0.002), b.sample(u, u, 0.002));
+    difference += std::abs(a.sample(u, u, 0.002) - c.sample(u, u, 0.002));
+  }
+  EXPECT_GT(difference, 0.1);
+}
+
+TEST(Clutter, HasEdgesOfAllOrientations) {
+  ClutterOptions options;
+  options.width_m = options.height_m = 2;
+  const Texture texture = paintClutter(options);
+  // Strength of the edges by the direction of their gradient, in bins of 22.5 degrees.
+  std::array<double, 8> strength{};
+  constexpr double kStep = 0.004;
+  for (double v = kStep; v < 2; v += kStep) {
+    for (double u = kStep; u < 2; u += kStep) {
+      const double here = texture.sample(u, v, 0.002);
+      const double gu = texture.sample(u + kStep, v, 0.002) - here;
+      const double gv = texture.sample(u, v + kStep, 0.002) - here;
+      if (std::hypot(gu, gv) < 0.1) continue;
+      const double turn = std::fmod(std::atan2(gv, gu) + M_PI, M_PI) / M_PI;
+      strength[std::min<std::size_t>(7, static_cast<std::size_t>(turn * 8))] += std::hypot(gu, gv);
+    }
+  }
+  const auto [weakest, strongest] = std::minmax_element(strength.begin(), strength.end());
+  EXPECT_GT(*weakest, 0.25 * *strongest);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/sensor/event_pixels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "tracking_stub/random/random_numbers.h"
+
+namespace efm {
+namespace {
+
+class OnePixel : public ::testing::Test {
+ protected:
+  OnePixel() : pixels(1, 1, EventPixelOptions{0.2, 0.2}) { pixels.start(level(1.0F)); }
+  static cv::Mat1f level(float log_intensity) { return cv::Mat1f(1, 1, log_intensity); }
+  std::vector<Event> step(const FrameStep& step, float from, float to) {
+    std::vector<Event> events;
+    pixels.fireRow(0, step, level(from), level(to), events);
+    return events;
+  }
+  EventPixels pixels;
+};
+
+TEST_F(OnePixel, FiresWheneverTheThresholdIsCrossedAtTheTimeOfCrossing) {
+  // From 1.0 to 1.5 in 10 ms: 1.2 is crossed after 4 ms, 1.4 after 8 ms.
+  const auto events = step({0, 10'000'000}, 1.0F, 1.5F);
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0], (Event{4'000'000, 0, 0, true}));
+  EXPECT_EQ(events[1], (Event{8'000'000, 0, 0, true}));
+}
+
+TEST_F(OnePixel, RemembersItsLastEventAcrossSteps) {
+  EXPECT_TRUE(step({0, 10'000'000}, 1.0F, 1.15F).empty());
+  // 1.2 is crossed a quarter of the way from 1.15 to 1.35.
+  const auto brighter = step({10'000'000, 20'000'000}, 1.15F, 1.35F);
+  ASSERT_EQ(brighter.size(), 1U);
+  EXPECT_EQ(brighter[0].t_ns, 12'500'000);
+  // Back to 1.0: one threshold below 1.2, reached at the very end.
+  const auto darker = step({20'000'000, 30'000'000}, 1.35F, 0.999F);
+  ASSERT_EQ(darker.size(), 1U);
+  EXPECT_FALSE(darker[0].polarity);
+  EXPECT_NEAR(static_cast<double>(darker[0].t_ns), 30'000'000, 50'000);
+}
+
+TEST_F(OnePixel, FiresContrastOverThresholdEvents) {
+  EXPECT_EQ(step({0, 1'000'000}, 1.0F, 2.01F).size(), 5U);
+}
+
+TEST_F(OnePixel, FiresAtOnceWhereItStartsAThresholdAwayAndNothingChanges) {
+  EventPixels running(1, 1, EventPixelOptions{0.2, 0.2});
+  running.start(level(1.0F));
+  std::vector<Event> events;
+  running.fireRow(0, {5'000, 10'000}, level(1.5F), level(1.5F), events);
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0].t_ns, 5'000);
+  EXPECT_EQ(events[1].t_ns, 5'000);
+}
+
+TEST_F(OnePixel, StampsWholeMicrosecondsAlsoOfALargeClock) {
+  const std::int64_t t0_ns = 1'700'000'000'123'456'789;
+  for (const Event& event : step({t0_ns, t0_ns + 777'777}, 1.0F, 3.0F)) {
+    EXPECT_EQ(event.t_ns % 1000, 0);
+    EXPECT_GE(event.t_ns, t0_ns - 500);
+    EXPECT_LE(event.t_ns, t0_ns + 777'777 + 500);
+  }
+}
+
+TEST_F(OnePixel, IsSilentWhileNothingChanges) {
+  EXPECT_TRUE(step({0, 1'000'000}, 1.0F, 1.0F).empty());
+}
+
+TEST(EventPixels, StartWithinTheThresholdOfWhatTheySee) {
+  const cv::Mat1f seen(40, 40, 3.0F);
+  EventPixels pixels(40, 40, EventPixelOptions{0.2, 0.2});
+  pixels.start(seen, 5);
+  std::vector<Event> still;
+  std::vector<Event> brighter;
+  for (int y = 0; y < 40; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, seen, still);
+  EXPECT_TRUE(still.empty());
+  // A change by half a threshold reaches the quarter of the pixels that were nearest to it.
+  const cv::Mat1f later(40, 40, 3.1F);
+  for (int y = 0; y < 40; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, later, brighter);
+  EXPECT_NEAR(static_cast<double>(brighter.size()), 400, 60);
+}
+
+TEST(EventPixels, HaveAThresholdEachForBrighterAndDarker) {
+  EventPixels pixels(1, 1, EventPixelOptions{0.1, 0.25});
+  const cv::Mat1f low(1, 1, 0.0F);
+  const cv::Mat1f high(1, 1, 1.01F);
+  pixels.start(low);
+  std::vector<Event> up;
+  std::vector<Event> down;
+  pixels.fireRow(0, {0, 1'000'000}, low, high, up);
+  pixels.fireRow(0, {1'000'000, 2'000'000}, high, low, down);
+  EXPECT_EQ(up.size(), 10U);
+  EXPECT_EQ(down.size(), 4U);
+}
+
+TEST(EventPixels, StartWithinTheirOwnThresholds) {
+  const cv::Mat1f seen(60, 60, 0.0F);
+  EventPixels pixels(60, 60, EventPixelOptions{0.1, 0.4});
+  pixels.start(seen, 5);
+  std::vector<Event> still;
+  std::vector<Event> brighter;
+  for (int y = 0; y < 60; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, seen, still);
+  EXPECT_TRUE(still.empty());
+  // Half of them wait for 0 to 0.1 more, evenly: 0.05 reaches a quarter of all.
+  const cv::Mat1f later(60, 60, 0.05F);
+  for (int y = 0; y < 60; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, later, brighter);
+  EXPECT_NEAR(static_cast<double>(brighter.size()), 900, 100);
+}
+
+TEST(EventPixels, MismatchScattersThresholdsFromPixelToPixel) {
+  EventPixelOptions options{0.1, 0.1};
+  options.mismatch = 0.1;
+  const cv::Mat1f low(60, 60, 0.0F);
+  const cv::Mat1f high(60, 60, 10.0F);
+  const auto counts_of = [&](std::uint64_t seed) {
+    EventPixels pixels(60, 60, options, seed);
+    pixels.start(low);
+    std::vector<Event> events;
+    for (int y = 0; y < 60; ++y) pixels.fireRow(y, {0, 1'000'000}, low, high, events);
+    std::vector<double> counts(3600, 0.0);
+    for (const Event& event : events) ++counts[static_cast<std::size_t>(event.y * 60 + event.x)];
+    return counts;
+  };
+  // A pixel fires 10 / threshold times: its threshold is 10 / count, to 1 %.
+  double sum = 0;
+  double squares = 0;
+  for (const double count : counts_of(3)) {
+    sum += 10 / count;
+    squares += 100 / count / count;
+  }
+  EXPECT_NEAR(sum / 3600, 0.1, 0.001);
+  EXPECT_NEAR(std::sqrt(squares / 3600 - sum * sum / 3600 / 3600), 0.01, 0.0005);
+  EXPECT_EQ(counts_of(3), counts_of(3));
+  EXPECT_NE(counts_of(3), counts_of(4));
+}
+
+TEST(EventPixels, AreBlindForTheRefractoryPeriodAndThenStartFromWhatTheySee) {
+  EventPixelOptions options{0.2, 0.2};
+  options.refractory_ns = 3'000'000;
+  EventPixels pixels(1, 1, options);
+  // 0.1 per millisecond: 0.2 is crossed at 2 ms; at 5 ms, blind until then, it sees 0.5; then 0.7
+  // at 7 ms, and 1.0 at 10 ms, which is the end of the first step; then 1.2 at 12 ms.
+  const auto at = [](float value) { return cv::Mat1f(1, 1, value); };
+  pixels.start(at(0));
+  std::vector<Event> events;
+  pixels.fireRow(0, {0, 4'000'000}, at(0), at(0.4F), events);
+  pixels.fireRow(0, {4'000'000, 10'000'000}, at(0.4F), at(1), events);
+  pixels.fireRow(0, {10'000'000, 14'000'000}, at(1), at(1.4F), events);
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_NEAR(static_cast<double>(events[0].t_ns), 2'000'000, 1'000);
+  EXPECT_NEAR(static_cast<double>(events[1].t_ns), 7'000'000, 1'000);
+  EXPECT_NEAR(static_cast<double>(events[2].t_ns), 12'000'000, 2'000);
+}
+
+TEST(EventPixels, NeverFireTwiceWithinTheRefractoryPeriod) {
+  EventPixelOptions options{0.05, 0.05};
+  options.refractory_ns = 700'000;
+  EventPixels pixels(1, 1, options);
+  RandomNumbers random(9);
+  cv::Mat1f before(1, 1, 0.0F);
+  pixels.start(before);
+  std::vector<Event> events;
+  for (std::int64_t t_ns = 0; t_ns < 300'000'000; t_ns += 300'000) {
+    const cv::Mat1f after(1, 1, static_cast<float>(random.uniform(-1, 1)));
+    pixels.fireRow(0, {t_ns, t_ns + 300'000}, before, after, events);
+    before = after;
+  }
+  ASSERT_GT(events.size(), 100U);
+  for (std::size_t i = 1; i < events.size(); ++i) {
+    EXPECT_GE(events[i].t_ns - events[i - 1].t_ns, options.refractory_ns - 1'000);
+  }
+}
+
+TEST(EventPixels, RefuseWhatIsOutOfRange) {
+  EventPixelOptions options;
+  options.mismatch = 0.6;
+  EXPECT_THROW(EventPixels(4, 4, options), std::invalid_argument);
+  options = {};
+  options.refractory_ns = -1;
+  EXPECT_THROW(EventPixels(4, 4, options), std::invalid_argument);
+}
+
+TEST(EventPixels, RefuseAThresholdThatIsNotPositive) {
+  EXPECT_THROW(EventPixels(4, 4, EventPixelOptions{0, 0.2}), std::invalid_argument);
+  EXPECT_THROW(EventPixels(4, 4, EventPixelOptions{0.2, std::nan("")}), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/truth/dataset_writer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstring>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include "mapping/geometry/reference_view.h"
+#include "test/tracking_stub/scenes/edge_scene.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+#include "tracking_stub/rendering/depth_rendering.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+std::string contentOf(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::ostringstream content;
+  content << stream.rdbuf();
+  return content.str();
+}
+
+std::set<std::string> namesIn(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename());
+  return names;
+}
+
+class DatasetWriterTest : public ::testing::Test {
+ protected:
+  DatasetWriterTest()
+      : place(fs::path(::testing::TempDir()) /
+              ("dataset_writer_" + std::to_string(getpid()) + "_" +
+               ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::remove_all(place);
+    fs::create_directories(place);
+    simulation.scene.addRectangle(test::facingWall(1, 4, 4), test::edgePaint(2.0, 1.0F, 0.01));
+    simulation.rig.cameras.assign(2, test::smallCamera());
+    simulation.rig.cameras[1].T_rig_cam.translation = {0.1, 0, 0};
+    simulation.motion = std::make_shared<test::StraightMotion>(Eigen::Vector3d(0.3, 0.02, 0.1));
+    simulation.start_ns = 1'000'000'000;
+    simulation.duration_ns = 100'000'000;
+    // The edge is in view at t = 1 s.
+    simulation.scene.addRectangle({{0.3, 1, 0.9}, {1, 0, 0}, {0, -1, 0}, 0.1, 2},
+                                  test::evenPaint(2));
+  }
+  ~DatasetWriterTest() override { fs::remove_all(place); }
+
+  fs::path place;
+  Simulation simulation;
+};
+
+TEST_F(DatasetWriterTest, WritesTheWholeFolderAndNothingBesideIt) {
+  const auto recordings = simulateEvents(simulation);
+  DatasetWriter(place / "desk/").write(simulation, recordings);
+  EXPECT_THAT(namesIn(place), ElementsAre("desk"));
+  const fs::path folder = place / "desk";
+  EXPECT_THAT(namesIn(folder), ElementsAre("cam0", "cam1", "camchain.yaml", "depth", "gt_cloud.ply",
+                                           "gt_edges.ply", "poses.txt"));
+  EXPECT_THAT(namesIn(folder / "depth"),
+              ElementsAre("cam0_1.000000000.tiff", "cam0_1.050000000.tiff", "cam0_1.100000000.tiff",
+                          "index.txt"));
+  EXPECT_EQ(contentOf(folder / "depth/index.txt"),
+            "1.000000000 cam0_1.000000000.tiff\n1.050000000 cam0_1.050000000.tiff\n"
+            "1.100000000 cam0_1.100000000.tiff\n");
+
+  const auto poses = readTumTrajectory(folder / "poses.txt");
+  ASSERT_EQ(poses.size(), 101U);
+  EXPECT_EQ(poses.back().T_world_rig.translation,
+            simulation.motion->poseAt(simulation.endNs()).translation);
+
+  const cv::Mat depth =
+      cv::imread((folder / "depth/cam0_1.050000000.tiff").string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(depth.type(), CV_32FC1);
+  const cv::Mat1f truth = renderDepth(simulation.scene, simulation.motion->poseAt(1'050'000'000),
+                                      ReferenceView::of(simulation.rig.cameras[0].model));
+  EXPECT_EQ(cv::norm(depth, truth, cv::NORM_INF), 0);
+}
+
+TEST_F(DatasetWriterTest, TruthCloudsLieOnTheSurfacesAndEdgesWhereEventsWere) {
+  const auto recordings = simulateEvents(simulation);
+  ASSERT_GT(recordings[0].events.size(), 100U);
+  DatasetWriter(place / "desk").write(simulation, recordings);
+  std::map<std::string, std::vector<Eigen::Vector3f>> clouds;
+  for (const std::string name : {"gt_cloud.ply", "gt_edges.ply"}) {
+    const std::string content = contentOf(place / "desk" / name);
+    const std::size_t begin = content.find("end_header\n") + 11;
+    EXPECT_THAT(content, HasSubstr("format binary_little_endian 1.0"));
+    clouds[name].resize((content.size() - begin) / 12);
+    EXPECT_THAT(content, HasSubstr("element vertex " + std::to_string(clouds[name].size()) + "\n"));
+    ASSERT_FALSE(clouds[name].empty());
+    std::memcpy(clouds[name].front().data(), content.data() + begin, clouds[name].size() * 12);
+  }
+  EXPECT_GT(clouds["gt_cloud.ply"].size(), 5000U);
+  EXPECT_GT(clouds["gt_edges.ply"].size(), 50U);
+  EXPECT_LT(clouds["gt_edges.ply"].size(), 0.2 * clouds["gt_cloud.ply"].size());
+  for (const Eigen::Vector3f& p : clouds["gt_cloud.ply"]) {
+    EXPECT_TRUE(p.z() == 1.0F || p.z() == 0.9F) << p.transpose();
+  }
+  for (const Eigen::Vector3f& p : clouds["gt_edges.ply"]) {
+    const float off = std::min({std::abs(p.x()), std::abs(p.x() - 0.3F), std::abs(p.x() - 0.4F)});
+    EXPECT_LT(off, 0.045F) << p.transpose();
+  }
+}
+
+TEST_F(DatasetWriterTest, RefusesAFolderThatHoldsSomething) {
+  fs::create_directories(place / "desk");
+  std::ofstream(place / "desk/precious.txt") << "x";
+  try {
+    DatasetWriter writer(place / "desk");
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr((place / "desk").string()));
+  }
+  EXPECT_THAT(namesIn(place), ElementsAre("desk"));
+}
+
+TEST_F(DatasetWriterTest, NamesThePlaceThatCannotBeWritten) {
+  std::ofstream(place / "file") << "x";
+  try {
+    DatasetWriter writer(place / "file/desk");
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr((place / "file").string()));
+  }
+}
+
+TEST_F(DatasetWriterTest, RefusesAFolderWithoutAName) {
+  try {
+    DatasetWriter writer("");
+    FAIL() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("'': expected the name of the folder"));
+  }
+}
+
+TEST_F(DatasetWriterTest, LeavesNothingBehindWhereItFails) {
+  {
+    DatasetWriter writer(place / "desk");
+    EXPECT_THAT(namesIn(place), ElementsAre(HasSubstr("unfinished")));
+    EXPECT_THROW(writer.write(simulation, {}), std::invalid_argument);
+  }
+  EXPECT_TRUE(namesIn(place).empty());
+}
+
+TEST_F(DatasetWriterTest, RefusesARigWhoseFrameIsNotCameraZero) {
+  simulation.rig.cameras[0].T_rig_cam.translation = {0, 0.1, 0};
+  DatasetWriter writer(place / "desk");
+  EXPECT_THROW(writer.write(simulation, std::vector<CameraRecording>(2)), std::invalid_argument);
+}
+
+TEST_F(DatasetWriterTest, EventsHaveNineDecimals) {
+  writeEvents(place / "events.txt",
+              {{1'000'004'000, 3, 65535, true}, {1'700'000'000'000'000'000, 0, 0, false}});
+  EXPECT_EQ(contentOf(place / "events.txt"), "1.000004000 3 65535 1\n1700000000.000000000 0 0 0\n");
+}
+
+TEST_F(DatasetWriterTest, TheCamchainIsKalibrs) {
+  Rig rig = simulation.rig;
+  rig.cameras[1].model.distortion = DistortionModel::kRadtan;
+  rig.cameras[1].model.coefficients = {-0.25, 0.5, 0, 0.125};
+  EXPECT_EQ(formatCamchain(rig),
+            "cam0:\n"
+            "  camera_model: pinhole\n"
+            "  distortion_coeffs: []\n"
+            "  distortion_model: none\n"
+            "  intrinsics: [50, 50, 31.5, 23.5]\n"
+            "  resolution: [64, 48]\n"
+            "cam1:\n"
+            "  T_cn_cnm1:\n"
+            "  - [1, 0, 0, -0.10000000000000001]\n"
+            "  - [0, 1, 0, 0]\n"
+            "  - [0, 0, 1, 0]\n"
+            "  - [0, 0, 0, 1]\n"
+            "  camera_model: pinhole\n"
+            "  distortion_coeffs: [-0.25, 0.5, 0, 0.125]\n"
+            "  distortion_model: radtan\n"
+            "  intrinsics: [50, 50, 31.5, 23.5]\n"
+            "  resolution: [64, 48]\n");
+}
+
+}  // namespace
+}  // namespace efm

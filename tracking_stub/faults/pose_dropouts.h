@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "tracking_stub/poses/pose_source.h"
+#include "tracking_stub/random/random_numbers.h"
+
+namespace efm {
+
+/// A stretch of time, [begin, end).
+struct TimeGap {
+  std::int64_t begin_ns = 0;
+  std::int64_t end_ns = 0;
+};
+
+struct PoseDropoutOptions {
+  double drop_probability = 0;  ///< Of each pose on its own, 0 to 1.
+  std::vector<TimeGap> gaps;    ///< No pose comes from these, in any order.
+  double random_gaps_hz = 0;    ///< Gaps that begin per second of tracking, at random; 0 or more.
+  double random_gap_s = 0.5;    ///< Length of such a gap, above 0.
+  std::uint64_t seed = 0;
+
+  /// Whether a pose may be lost.
+  bool any() const { return drop_probability > 0 || !gaps.empty() || random_gaps_hz > 0; }
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// A tracker that fails now and then: what another source gives, less what is lost.
+class PoseDropouts : public PoseSource {
+ public:
+  /// @throws std::invalid_argument where the options are not valid or there is no source.
+  PoseDropouts(std::unique_ptr<PoseSource> source, const PoseDropoutOptions& options);
+
+  std::optional<StampedPose> next() override;
+  bool ended() const override { return source_->ended(); }
+
+  /// How many poses were lost so far.
+  std::size_t dropped() const { return dropped_; }
+
+ private:
+  bool isLost(const StampedPose& pose);
+  bool isInRandomGap(std::int64_t t_ns);
+
+  std::unique_ptr<PoseSource> source_;
+  PoseDropoutOptions options_;
+  RandomNumbers single_;  // a stream of its own each, so that one option leaves the others' alone
+  RandomNumbers gap_;
+  std::optional<TimeGap> next_gap_;  // the random one that is on or comes next
+  std::size_t dropped_ = 0;
+};
+
+}  // namespace efm

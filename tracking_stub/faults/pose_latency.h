@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+
+#include "tracking_stub/poses/pose_source.h"
+
+namespace efm {
+
+/// A tracker that takes its time: each pose of another source comes once that one has given a pose
+/// so much newer, or has ended. Stamps stay true.
+class PoseLatency : public PoseSource {
+ public:
+  static constexpr std::int64_t kMaxNs = 10'000'000'000;
+
+  /// @param latency_ns 0 to 10 s.
+  /// @throws std::invalid_argument where the latency is not valid or there is no source.
+  PoseLatency(std::unique_ptr<PoseSource> source, std::int64_t latency_ns);
+
+  std::optional<StampedPose> next() override;
+  bool ended() const override { return held_.empty() && source_->ended(); }
+
+ private:
+  bool isDue() const;
+
+  std::unique_ptr<PoseSource> source_;
+  std::int64_t latency_ns_;
+  std::deque<StampedPose> held_;  // in order of time
+};
+
+}  // namespace efm

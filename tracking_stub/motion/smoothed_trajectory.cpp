@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/motion/smoothed_trajectory.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+using Poses = std::vector<StampedPose>;
+
+Poses inOrder(Poses poses) {
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
+  const auto same = [](const StampedPose& a, const StampedPose& b) { return a.t_ns == b.t_ns; };
+  poses.erase(std::unique(poses.begin(), poses.end(), same), poses.end());
+  requireOption(poses.size() >= 2, "poses", poses.size(), "at least 2 of different times");
+  return poses;
+}
+
+Rigid3 between(const StampedPose& a, const StampedPose& b, std::int64_t t_ns) {
+  return interpolate(a.T_world_rig, b.T_world_rig,
+                     secondsBetween(a.t_ns, t_ns) / secondsBetween(a.t_ns, b.t_ns));
+}
+
+/// How far each inner pose is off the line between its neighbours: metres, and radians.
+std::pair<std::vector<double>, std::vector<double>> deviations(const Poses& poses) {
+  std::vector<double> metres(poses.size(), 0.0);
+  std::vector<double> radians(poses.size(), 0.0);
+  for (std::size_t i = 1; i + 1 < poses.size(); ++i) {
+    const Rigid3& here = poses[i].T_world_rig;
+    const Rigid3 expected = between(poses[i - 1], poses[i + 1], poses[i].t_ns);
+    metres[i] = (here.translation - expected.translation).norm();
+    radians[i] = here.rotation.angularDistance(expected.rotation);
+  }
+  return {metres, radians};
+}
+
+/// Marks what stands out of a neighbourhood that it does not make: a jump also shows, by half, in
+/// the poses beside it.
+void markJumps(const std::vector<double>& deviation, std::vector<bool>& jumps) {
+  constexpr double kTimesUsual = 8;
+  std::vector<double> sorted = deviation;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double limit = kTimesUsual * *middle + 1e-9;
+  for (std::size_t i = 1; i + 1 < deviation.size(); ++i) {
+    if (deviation[i] > limit && deviation[i] >= deviation[i - 1] &&
+        deviation[i] > deviation[i + 1]) {
+      jumps[i] = true;
+    }
+  }
+}
+
+Poses withoutJumps(const Poses& poses) {
+  const auto [metres, radians] = deviations(poses);
+  std::vector<bool> jumps(poses.size(), false);
+  markJumps(metres, jumps);
+  markJumps(radians, jumps);
+  Poses kept;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    if (!jumps[i]) kept.push_back(poses[i]);
+  }
+  return kept;
+}
+
+void refuseGaps(const Poses& poses, double max_gap_s) {
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const double gap_s = secondsBetween(poses[i - 1].t_ns, poses[i].t_ns);
+    if (gap_s <= max_gap_s) continue;
+    throw std::invalid_argument("no pose for " + std::to_string(gap_s) + " s after t = " +
+                                formatSeconds(poses[i - 1].t_ns) + ": a gap of at most " +
+                                std::to_string(max_gap_s) + " s can be bridged");
+  }
+}
+
+double medianPeriod(const Poses& poses) {
+  std::vector<double> periods;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    periods.push_back(secondsBetween(poses[i - 1].t_ns, poses[i].t_ns));
+  }
+  const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
+  std::nth_element(periods.begin(), middle, periods.end());
+  return *middle;
+}
+
+Poses resampled(const Poses& poses, std::int64_t period_ns) {
+  Poses even;
+  std::size_t i = 0;
+  for (std::int64_t t_ns = poses.front().t_ns; t_ns <= poses.back().t_ns; t_ns += period_ns) {
+    while (i + 2 < poses.size() && poses[i + 1].t_ns <= t_ns) ++i;
+    even.push_back({t_ns, between(poses[i], poses[i + 1], t_ns)});
+  }
+  return even;
+}
+
+/// The right half of a sinc under a Hann window that reaches over two periods of the cutoff; the
+/// whole sums to 1.
+std::vector<double> lowPass(double cutoff_hz, double period_s) {
+  const double reach_s = 2 / cutoff_hz;
+  const int taps = static_cast<int>(std::floor(reach_s / period_s));
+  std::vector<double> weights = {1};
+  double sum = 1;
+  for (int k = 1; k <= taps; ++k) {
+    const double t_s = k * period_s;
+    const double x = 2 * kPi * cutoff_hz * t_s;
+    weights.push_back(std::sin(x) / x * 0.5 * (1 + std::cos(kPi * t_s / (reach_s + period_s))));
+    sum += 2 * weights.back();
+  }
+  for (double& weight : weights) weight /= sum;
+  return weights;
+}
+
+/// The pose at an index that may lie beyond an end: there the motion goes on as it came, turned
+/// around its last point, so that an end keeps its place, speed and rate.
+Rigid3 beyond(const Poses& poses, std::ptrdiff_t i) {
+  const auto last = static_cast<std::ptrdiff_t>(poses.size()) - 1;
+  const auto at = [&](std::ptrdiff_t k) -> const Rigid3& {
+    return poses[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))].T_world_rig;
+  };
+  if (i >= 0 && i <= last) return at(i);
+  const std::ptrdiff_t end = i < 0 ? 0 : last;
+  const Rigid3& mirrored = at(2 * end - i);
+  return {at(end).rotation * mirrored.rotation.conjugate() * at(end).rotation,
+          2 * at(end).translation - mirrored.translation};
+}
+
+Eigen::Vector3d logarithm(const Eigen::Quaterniond& rotation) {
+  const double sign = rotation.w() < 0 ? -1 : 1;  // the two signs are one rotation
+  const double sine = rotation.vec().norm();
+  if (sine < 1e-12) return 2 * sign * rotation.vec();
+  return sign * 2 * std::atan2(sine, sign * rotation.w()) / sine * rotation.vec();
+}
+
+Poses filtered(const Poses& poses, const std::vector<double>& weights) {
+  Poses smooth = poses;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    const Rigid3& here = poses[i].T_world_rig;
+    Eigen::Vector3d shift = Eigen::Vector3d::Zero();
+    Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+    for (std::size_t k = 1; k < weights.size(); ++k) {
+      for (const int side : {-1, 1}) {
+        const Rigid3 other =
+            beyond(poses, static_cast<std::ptrdiff_t>(i) + side * static_cast<std::ptrdiff_t>(k));
+        shift += weights[k] * (other.translation - here.translation);
+        turn += weights[k] * logarithm(here.rotation.conjugate() * other.rotation);
+      }
+    }
+    Rigid3& T_world_rig = smooth[i].T_world_rig;
+    T_world_rig.translation += shift;
+    const double angle = turn.norm();
+    if (angle > 0) {
+      T_world_rig.rotation =
+          (here.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle))).normalized();
+    }
+  }
+  return smooth;
+}
+
+}  // namespace
+
+void SmoothingOptions::validate() const {
+  requireOption(cutoff_hz > 0 && std::isfinite(cutoff_hz), "cutoff_hz", cutoff_hz, "above 0");
+  requireOption(period_ns > 0 && secondsBetween(0, period_ns) * cutoff_hz <= 0.25, "period_ns",
+                period_ns, "above 0 and at most a quarter of 1 / cutoff_hz");
+  requireOption(max_gap_s > 0, "max_gap_s", max_gap_s, "above 0");
+}
+
+std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses,
+                                          const SmoothingOptions& options) {
+  options.validate();
+  const Poses clean = withoutJumps(inOrder(poses));
+  refuseGaps(clean, options.max_gap_s);
+  const double cutoff_hz = std::min(options.cutoff_hz, 0.4 / medianPeriod(clean));
+  return filtered(resampled(clean, options.period_ns),
+                  lowPass(cutoff_hz, secondsBetween(0, options.period_ns)));
+}
+
+std::int64_t departureOf(const std::vector<StampedPose>& poses) {
+  constexpr double kLookS = 0.5;
+  requireOption(!poses.empty(), "poses", poses.size(), "at least 1");
+  struct Stretch {
+    std::int64_t begin_ns;
+    double duration_s, length_m;
+  };
+  std::vector<Stretch> stretches;
+  double length_m = 0;
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const double duration_s = secondsBetween(poses[begin].t_ns, poses[i].t_ns);
+    if (duration_s < kLookS) continue;
+    const double chord_m =
+        (poses[i].T_world_rig.translation - poses[begin].T_world_rig.translation).norm();
+    stretches.push_back({poses[begin].t_ns, duration_s, chord_m});
+    length_m += chord_m;
+    begin = i;
+  }
+  const double mean_speed = length_m / secondsBetween(poses.front().t_ns, poses[begin].t_ns);
+  for (const Stretch& stretch : stretches) {
+    if (stretch.length_m >= 0.5 * mean_speed * stretch.duration_s) return stretch.begin_ns;
+  }
+  return poses.front().t_ns;
+}
+
+SampledMotion::SampledMotion(std::vector<StampedPose> poses) : poses_(std::move(poses)) {
+  requireOption(poses_.size() >= 2, "poses", poses_.size(), "at least 2");
+  period_ns_ = poses_[1].t_ns - poses_[0].t_ns;
+  for (std::size_t i = 1; i < poses_.size(); ++i) {
+    const std::int64_t period_ns = poses_[i].t_ns - poses_[i - 1].t_ns;
+    requireOption(period_ns > 0 && period_ns == period_ns_, "time between poses", period_ns,
+                  "above 0 and always the same");
+  }
+}
+
+Rigid3 SampledMotion::poseAt(std::int64_t t_ns) const {
+  if (t_ns <= poses_.front().t_ns) return poses_.front().T_world_rig;
+  if (t_ns >= poses_.back().t_ns) return poses_.back().T_world_rig;
+  const auto i = static_cast<std::size_t>((t_ns - poses_.front().t_ns) / period_ns_);
+  return between(poses_[i], poses_[i + 1], t_ns);
+}
+
+}  // namespace efm

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/poses/tum_trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <iomanip>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/quoted_text.h"
+
+namespace efm {
+namespace {
+
+constexpr std::array<std::string_view, 8> kFieldNames = {"t",  "tx", "ty", "tz",
+                                                         "qx", "qy", "qz", "qw"};
+constexpr std::string_view kBlanks = " \t\r\v\f";
+constexpr double kMaxLengthError =
+    0.01;  // of a quaternion: two digits are enough to tell a mistake
+
+std::vector<std::string_view> splitFields(std::string_view line) {
+  line = line.substr(0, line.find('#'));
+  std::vector<std::string_view> fields;
+  for (std::size_t begin = line.find_first_not_of(kBlanks); begin != std::string_view::npos;) {
+    const std::size_t end = std::min(line.find_first_of(kBlanks, begin), line.size());
+    fields.push_back(line.substr(begin, end - begin));
+    begin = line.find_first_not_of(kBlanks, end);
+  }
+  return fields;
+}
+
+std::runtime_error fieldError(std::size_t field, std::string_view text, const char* expected) {
+  return std::runtime_error(std::string(kFieldNames[field]) + " = " + inQuotes(text) +
+                            ": expected " + expected);
+}
+
+double parseNumber(const std::vector<std::string_view>& fields, std::size_t field) {
+  const std::string_view text = fields[field];
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
+    throw fieldError(field, text, "a finite number");
+  }
+  return value;
+}
+
+std::runtime_error quaternionError(const std::vector<std::string_view>& fields, double norm) {
+  std::string values;
+  for (std::size_t field = 4; field < fields.size(); ++field) {
+    values += (values.empty() ? "" : " ") + std::string(fields[field]);
+  }
+  std::ostringstream text;
+  text << "qx qy qz qw = " << inQuotes(values) << ", of length " << norm
+       << ": expected a rotation, of length 1 within 1 %";
+  return std::runtime_error(text.str());
+}
+
+StampedPose parsePose(const std::vector<std::string_view>& fields) {
+  if (fields.size() != kFieldNames.size()) {
+    throw std::runtime_error(std::to_string(fields.size()) +
+                             " fields: expected 8, t tx ty tz qx qy qz qw");
+  }
+  const std::optional<std::int64_t> t_ns = parseSeconds(fields[0]);
+  if (!t_ns) throw fieldError(0, fields[0], "a time in decimal seconds");
+  if (*t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
+    throw fieldError(0, fields[0], "a time within 4.6e9 s of 0");
+  }
+  StampedPose pose;
+  pose.t_ns = *t_ns;
+  pose.T_world_rig.translation = {parseNumber(fields, 1), parseNumber(fields, 2),
+                                  parseNumber(fields, 3)};
+  const Eigen::Quaterniond rotation(parseNumber(fields, 7), parseNumber(fields, 4),
+                                    parseNumber(fields, 5), parseNumber(fields, 6));
+  const double norm = rotation.coeffs().stableNorm();
+  if (!(std::abs(norm - 1) <= kMaxLengthError)) throw quaternionError(fields, norm);
+  pose.T_world_rig.rotation.coeffs() = rotation.coeffs() / norm;
+  return pose;
+}
+
+}  // namespace
+
+std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  return readTumTrajectory(stream, file.string());
+}
+
+std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::string& name) {
+  std::vector<StampedPose> poses;
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const std::vector<std::string_view> fields = splitFields(line);
+    if (fields.empty()) continue;
+    try {
+      poses.push_back(parsePose(fields));
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(name + ":" + std::to_string(number) + ": " + error.what());
+    }
+  }
+  if (stream.bad()) throw std::runtime_error(name + ": cannot be read to its end");
+  return poses;
+}
+
+void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses) {
+  std::ofstream stream(file);
+  writeTumTrajectory(stream, poses);
+  stream.close();
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses) {
+  stream << "# t tx ty tz qx qy qz qw\n" << std::setprecision(17);
+  for (const StampedPose& pose : poses) {
+    const Eigen::Vector3d& p = pose.T_world_rig.translation;
+    const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
+    stream << formatSeconds(pose.t_ns) << ' ' << p.x() << ' ' << p.y() << ' ' << p.z() << ' '
+           << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+  }
+}
+
+}  // namespace efm

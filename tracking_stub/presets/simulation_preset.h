@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "tracking_stub/sensor/simulated_rig.h"
+
+namespace efm {
+
+struct SimulationOptions {
+  std::string preset = "desk_stereo";  ///< One of `simulationPresets`.
+  /// Seconds, 0.001 to 600; the preset's own where not given.
+  std::optional<double> duration_s;
+  /// Of everything random: the paintings on the surfaces and the pixels' first memory.
+  std::uint64_t seed = 1;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed values.
+  void validate() const;
+};
+
+/// The names of the presets.
+std::vector<std::string> simulationPresets();
+
+/// Scene, rig and motion of a preset.
+/// @throws std::invalid_argument where the options are not valid.
+Simulation makeSimulation(const SimulationOptions& options = {});
+
+}  // namespace efm

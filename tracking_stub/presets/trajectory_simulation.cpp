@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/presets/trajectory_simulation.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/named_choice.h"
+#include "mapping/options/option_check.h"
+#include "tracking_stub/motion/smoothed_trajectory.h"
+#include "tracking_stub/scenes/poles_scene.h"
+#include "tracking_stub/scenes/room_scene.h"
+#include "tracking_stub/scenes/street_scene.h"
+
+namespace efm {
+namespace {
+
+using Eigen::Vector3d;
+
+/// What a scene is built around.
+struct Way {
+  std::vector<Vector3d> places;  // of camera 0, frame `level`
+  Eigen::AlignedBox3d box;       // around them
+  Rigid3 T_world_level;          // y: where the camera looks on average; z: up
+  double focal_px = 0;           // of the sharpest camera
+  double half_view = 0;          // of the widest, to the side at a depth of 1 m
+  std::uint64_t seed = 0;
+};
+
+Eigen::Quaterniond levelFrame(const std::vector<Rigid3>& T_world_cams) {
+  Vector3d down = Vector3d::Zero();
+  Vector3d ahead = Vector3d::Zero();
+  for (const Rigid3& T_world_cam : T_world_cams) {
+    down += T_world_cam.rotation * Vector3d::UnitY();
+    ahead += T_world_cam.rotation * Vector3d::UnitZ();
+  }
+  // Cameras that look all around have no mean direction: then the first one's counts.
+  const auto n = static_cast<double>(T_world_cams.size());
+  if (down.norm() < 0.1 * n) down = T_world_cams.front().rotation * Vector3d::UnitY();
+  const Vector3d up = -down.normalized();
+  ahead -= ahead.dot(up) * up;
+  if (ahead.norm() < 0.1 * n) ahead = T_world_cams.front().rotation * Vector3d::UnitZ();
+  ahead -= ahead.dot(up) * up;
+  if (ahead.norm() < 1e-6) ahead = up.unitOrthogonal();
+  Eigen::Matrix3d R_world_level;
+  R_world_level.col(1) = ahead.normalized();
+  R_world_level.col(2) = up;
+  R_world_level.col(0) = R_world_level.col(1).cross(up);
+  return Eigen::Quaterniond(R_world_level);
+}
+
+Way wayOf(const Simulation& simulation) {
+  constexpr std::int64_t kLookNs = 50'000'000;
+  std::vector<Rigid3> T_world_cams;
+  for (std::int64_t t_ns = simulation.start_ns; t_ns < simulation.endNs(); t_ns += kLookNs) {
+    T_world_cams.push_back(simulation.motion->poseAt(t_ns));
+  }
+  T_world_cams.push_back(simulation.motion->poseAt(simulation.endNs()));
+  Way way;
+  way.T_world_level.rotation = levelFrame(T_world_cams);
+  const Rigid3 T_level_world = way.T_world_level.inverse();
+  for (const Rigid3& T_world_cam : T_world_cams) {
+    way.places.push_back(T_level_world * T_world_cam.translation);
+    way.box.extend(way.places.back());
+  }
+  for (const RigCamera& camera : simulation.rig.cameras) {
+    const CameraModel& model = camera.model;
+    way.focal_px = std::max({way.focal_px, model.fx, model.fy});
+    way.half_view = std::max(way.half_view, 0.5 * model.width / model.fx);
+  }
+  way.seed = simulation.seed;
+  return way;
+}
+
+/// Sets a scene down with its origin at a place of frame `level`.
+Scene setDown(Scene scene, const Way& way, const Vector3d& origin_level) {
+  Rigid3 T_level_scene;
+  T_level_scene.translation = origin_level;
+  scene.move(way.T_world_level * T_level_scene);
+  return scene;
+}
+
+Scene roomAround(const Way& way) {
+  constexpr double kBesideM = 1.9;
+  constexpr double kBelowM = 1.2;
+  constexpr double kAboveM = 1.4;
+  const Vector3d extent = way.box.sizes();
+  RoomOptions room;
+  room.size_m = {std::max(4.8, extent.x() + 2 * kBesideM), std::max(5.4, extent.y() + 2 * kBesideM),
+                 extent.z() + kBelowM + kAboveM};
+  room.nearest_m = kBesideM - room.furniture_depth_m;
+  room.focal_px = way.focal_px;
+  room.seed = way.seed;
+  Vector3d foot = way.box.center();
+  foot.z() = way.box.min().z() - kBelowM;
+  return setDown(makeRoom(room), way, foot);
+}
+
+Scene streetAlong(const Way& way) {
+  constexpr double kCameraHeightM = 1.6;
+  StreetOptions street;
+  for (const Vector3d& place : way.places) street.path.emplace_back(place.head<2>());
+  // One that stands still looks down the street.
+  if (way.box.sizes().head<2>().norm() < 1) {
+    street.path = {street.path.front(), street.path.front() + Eigen::Vector2d::UnitY()};
+  }
+  street.focal_px = way.focal_px;
+  street.seed = way.seed;
+  return setDown(makeStreet(street), way, {0, 0, way.box.min().z() - kCameraHeightM});
+}
+
+Scene polesBefore(const Way& way) {
+  PolesOptions poles;
+  poles.focal_px = way.focal_px;
+  poles.half_view = way.half_view;
+  poles.seed = way.seed;
+  Vector3d front = way.box.center();
+  front.y() = way.box.max().y();
+  return setDown(makePoles(poles), way, front);
+}
+
+using MakeScene = Scene (*)(const Way& way);
+
+constexpr NamedChoice<MakeScene> kScenes[] = {
+    {roomAround, "room"},
+    {streetAlong, "street"},
+    {polesBefore, "poles"},
+};
+
+/// The poses from a little before to a little after a stretch of time, as smoothing wants them.
+std::vector<StampedPose> posesAround(const std::vector<StampedPose>& poses, std::int64_t start_ns,
+                                     std::int64_t end_ns) {
+  constexpr std::int64_t kMarginNs = 2 * kNanosecondsPerSecond;
+  std::vector<StampedPose> some;
+  for (const StampedPose& pose : poses) {
+    if (pose.t_ns >= start_ns - kMarginNs && pose.t_ns <= end_ns + kMarginNs) some.push_back(pose);
+  }
+  return some;
+}
+
+}  // namespace
+
+void TrajectorySimulationOptions::validate() const {
+  try {
+    valueIn(kScenes, scene);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(std::string("scene: ") + error.what());
+  }
+  if (duration_s) {
+    requireOption(*duration_s >= 0.001 && *duration_s <= 600, "duration_s", *duration_s,
+                  "0.001 to 600");
+  }
+}
+
+std::vector<std::string> simulationScenes() {
+  std::vector<std::string> names;
+  for (const auto& scene : kScenes) names.emplace_back(scene.name);
+  return names;
+}
+
+Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
+                                    const std::vector<StampedPose>& measured, const Rig& rig) {
+  constexpr double kDurationS = 5;
+  options.validate();
+  requireOption(measured.size() >= 2, "poses", measured.size(), "at least 2");
+  std::vector<StampedPose> poses = measured;
+  std::stable_sort(poses.begin(), poses.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
+  const std::int64_t last_ns = poses.back().t_ns;
+
+  Simulation simulation;
+  simulation.rig = rig;
+  simulation.seed = options.seed;
+  simulation.start_ns = options.start_ns.value_or(departureOf(poses));
+  requireOption(simulation.start_ns >= poses.front().t_ns && simulation.start_ns < last_ns, "start",
+                formatSeconds(simulation.start_ns),
+                "within the trajectory, " + formatSeconds(poses.front().t_ns) + " to " +
+                    formatSeconds(last_ns));
+  const std::int64_t left_ns = last_ns - simulation.start_ns;
+  simulation.duration_ns = options.duration_s ? durationFromSeconds(*options.duration_s)
+                                              : std::min(durationFromSeconds(kDurationS), left_ns);
+  requireOption(simulation.duration_ns <= left_ns, "duration_s",
+                secondsBetween(0, simulation.duration_ns),
+                "at most the " + formatSeconds(left_ns) + " s that are left of the trajectory");
+  simulation.motion = std::make_shared<SampledMotion>(
+      smoothTrajectory(posesAround(poses, simulation.start_ns, simulation.endNs())));
+  if (options.scene == "street") {  // as drive_stereo
+    simulation.truth_cell_m = 0.05;
+    simulation.max_step_px = 1;
+  }
+  simulation.scene = valueIn(kScenes, options.scene)(wayOf(simulation));
+  return simulation;
+}
+
+}  // namespace efm

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "mapping/geometry/camera.h"
+#include "tracking_stub/rendering/scene_view.h"
+
+namespace efm {
+
+/// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and how it changes across the pixel.
+struct PixelRay {
+  Eigen::Vector2d ray;
+  Eigen::Vector2d per_x;  ///< Per pixel to the right.
+  Eigen::Vector2d per_y;  ///< Per pixel down.
+  double pitch = 0;       ///< Size of the pixel in units of the ray.
+
+  /// Of a place in the pixel: offsets from its centre, -0.5 to 0.5.
+  Eigen::Vector2d at(double dx, double dy) const { return ray + dx * per_x + dy * per_y; }
+};
+
+/// The viewing rays of all pixels of a camera, distortion included.
+class PixelRays {
+ public:
+  /// @throws std::invalid_argument where the model is not valid, or smaller than 2x2 pixels.
+  explicit PixelRays(const CameraModel& model);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  const PixelRay& operator()(int x, int y) const {
+    return rays_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+                 static_cast<std::size_t>(x)];
+  }
+  /// Holds all of every pixel's rays.
+  const RayBounds& bounds() const { return bounds_; }
+
+ private:
+  int width_;
+  int height_;
+  std::vector<PixelRay> rays_;  // row-major
+  RayBounds bounds_;
+};
+
+}  // namespace efm

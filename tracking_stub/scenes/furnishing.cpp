@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/scenes/furnishing.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace efm {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// Furnishes one wall, a piece after the other.
+class Furnisher {
+ public:
+  Furnisher(Scene& scene, const FurnishedWall& wall, Painting& painting, RandomNumbers& random)
+      : scene_(scene), wall_(wall), painting_(painting), random_(random) {}
+
+  void furnish() {
+    double x = wall_.depth_m + 0.1;  // the corner belongs to the neighbouring wall
+    while (true) {
+      const double width = random_.uniform(0.55, 1.1);
+      if (x + width > wall_.length_m - wall_.depth_m) return;
+      const double middle = x + 0.5 * width;
+      switch (random_.below(4)) {
+        case 0:
+          addCupboard(middle, width);
+          break;
+        case 1:
+          addTable(middle, width);
+          break;
+        case 2:
+          addShelf(middle, width);
+          break;
+        default:
+          addLamp(middle);
+          addPicture(middle, 0.8 * width);
+      }
+      x += width + random_.uniform(0.1, 0.35);
+    }
+  }
+
+ private:
+  void addBox(const Vector3d& foot_wall, const Vector3d& size_m, double yaw_deg, double feature_m) {
+    Rigid3 T_wall_box;
+    T_wall_box.rotation = Eigen::AngleAxisd(yaw_deg * kPi / 180, Vector3d::UnitZ());
+    T_wall_box.translation = foot_wall + Vector3d(0, 0, 0.5 * size_m.z());
+    scene_.addBox(wall_.T_world_wall * T_wall_box, size_m,
+                  painting_.clutter(wall_.nearest_m, feature_m));
+  }
+
+  void addPole(const Vector3d& foot_wall, double radius_m, double length_m) {
+    Rigid3 T_wall_pole;
+    T_wall_pole.translation = foot_wall + Vector3d(0, 0, 0.5 * length_m);
+    const auto tone = static_cast<float>(random_.uniform(0.4, 0.9));
+    scene_.addPole({wall_.T_world_wall * T_wall_pole, radius_m, length_m},
+                   painting_.rings(wall_.nearest_m, 0.12, tone, 0.6F));
+  }
+
+  void addCupboard(double x, double width_m) {
+    const double depth = random_.uniform(0.55, 0.75) * wall_.depth_m;
+    const double height = std::min(random_.uniform(1.4, 2.0), wall_.height_m - 0.3);
+    addBox({x, 0.5 * wall_.depth_m, 0}, {width_m, depth, height}, random_.uniform(-6, 6), 0.2);
+  }
+
+  void addTable(double x, double width_m) {
+    const double depth = 0.9 * wall_.depth_m;
+    const double height = random_.uniform(0.65, 0.8);
+    const double y = 0.5 * wall_.depth_m;
+    for (const double along : {-0.45, 0.45}) {
+      for (const double across : {-0.45, 0.45}) {
+        addPole({x + along * width_m, y + across * depth, 0}, 0.02, height);
+      }
+    }
+    addBox({x, y, height}, {width_m, depth, 0.04}, 0, 0.16);
+    addThings({x, y, height + 0.04}, width_m);
+    addPicture(x, 0.7 * width_m);
+  }
+
+  void addShelf(double x, double width_m) {
+    const double depth = 0.7 * wall_.depth_m;
+    const double height = random_.uniform(0.45, 1.0);
+    const double y = 0.5 * wall_.depth_m;
+    addBox({x, y, 0}, {width_m, depth, height}, 0, 0.18);
+    addThings({x, y, height}, width_m);
+    addPicture(x, 0.7 * width_m);
+  }
+
+  /// Small boxes side by side.
+  void addThings(const Vector3d& middle, double width_m) {
+    const int count = 2 + random_.below(2);
+    for (int i = 0; i < count; ++i) {
+      const double x = ((i + 0.5) / count - 0.5) * width_m;
+      const Vector3d size(random_.uniform(0.1, 0.2), random_.uniform(0.08, 0.2),
+                          random_.uniform(0.1, 0.35));
+      addBox(middle + Vector3d(x, random_.uniform(-0.05, 0.05), 0), size, random_.uniform(-35, 35),
+             0.09);
+    }
+  }
+
+  void addLamp(double x) {
+    const double y = 0.6 * wall_.depth_m;
+    const double height = std::min(random_.uniform(1.3, 1.6), wall_.height_m - 0.6);
+    addPole({x, y, 0}, 0.018, height);
+    addBox({x, y, height}, {0.24, 0.24, 0.22}, random_.uniform(-40, 40), 0.1);
+  }
+
+  void addPicture(double x, double width_m) {
+    const double height = std::min(random_.uniform(0.35, 0.6), 0.3 * wall_.height_m);
+    const double foot = random_.uniform(0.5, 0.6) * wall_.height_m;
+    addBox({x, 0.02, foot}, {width_m, 0.04, height}, 0, 0.14);
+  }
+
+  Scene& scene_;
+  const FurnishedWall& wall_;
+  Painting& painting_;
+  RandomNumbers& random_;
+};
+
+}  // namespace
+
+void addStandingBox(Scene& scene, const Vector3d& foot, const Vector3d& size_m, double yaw_deg,
+                    const Scene::Painter& paint) {
+  Rigid3 T_world_box;
+  T_world_box.rotation = Eigen::AngleAxisd(yaw_deg * kPi / 180, Vector3d::UnitZ());
+  T_world_box.translation = foot + Vector3d(0, 0, 0.5 * size_m.z());
+  scene.addBox(T_world_box, size_m, paint);
+}
+
+void addStandingPole(Scene& scene, const Vector3d& foot, double radius_m, double length_m,
+                     const Scene::Painter& paint) {
+  Rigid3 T_world_pole;
+  T_world_pole.translation = foot + Vector3d(0, 0, 0.5 * length_m);
+  scene.addPole({T_world_pole, radius_m, length_m}, paint);
+}
+
+void addPanels(Scene& scene, const Rectangle& rectangle, double max_side_m,
+               const Scene::Painter& paint) {
+  const int columns = std::max(1, static_cast<int>(std::ceil(rectangle.width_m / max_side_m)));
+  const int rows = std::max(1, static_cast<int>(std::ceil(rectangle.height_m / max_side_m)));
+  Rectangle panel = rectangle;
+  panel.width_m /= columns;
+  panel.height_m /= rows;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      panel.corner = rectangle.pointAt(column * panel.width_m, row * panel.height_m);
+      scene.addRectangle(panel, paint);
+    }
+  }
+}
+
+void furnishWall(Scene& scene, const FurnishedWall& wall, Painting& painting,
+                 RandomNumbers& random) {
+  Furnisher(scene, wall, painting, random).furnish();
+}
+
+}  // namespace efm

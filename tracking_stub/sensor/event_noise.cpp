@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/sensor/event_noise.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
+
+bool isRate(double hz) { return hz >= 0 && hz <= EventNoiseOptions::kMaxHz; }
+
+}  // namespace
+
+void EventNoiseOptions::validate() const {
+  requireOption(isRate(background_hz), "background_hz", background_hz, "0 to 1e5");
+  requireOption(hot_share >= 0 && hot_share <= 1, "hot_share", hot_share, "0 to 1");
+  requireOption(isRate(hot_hz), "hot_hz", hot_hz, "0 to 1e5");
+}
+
+EventNoise::EventNoise(int width, int height, const EventNoiseOptions& options, const Start& start)
+    : width_(static_cast<std::size_t>(width)) {
+  constexpr std::uint64_t kFirstStream = 1000;
+  options.validate();
+  if (options.background_hz == 0 && options.hot_share * options.hot_hz == 0) return;
+  const std::size_t count = width_ * static_cast<std::size_t>(height);
+  pixels_.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    Pixel pixel = {RandomNumbers(start.seed, kFirstStream + i), 0, start.t_ns};
+    const bool hot = pixel.random.uniform() < options.hot_share;
+    pixel.rate_hz = options.background_hz + (hot ? options.hot_hz : 0);
+    draw(pixel);
+    pixels_.push_back(pixel);
+  }
+}
+
+void EventNoise::draw(Pixel& pixel) {
+  constexpr double kLongestS = 1e9;  // longer than any recording, and sums of it fit 64 bits
+  const double wait_s =
+      pixel.rate_hz > 0 ? -std::log(1 - pixel.random.uniform()) / pixel.rate_hz : kLongestS;
+  pixel.next_ns += durationFromSeconds(std::min(wait_s, kLongestS));
+}
+
+void EventNoise::fireRow(int y, std::int64_t until_ns, std::vector<Event>& events) {
+  if (pixels_.empty()) return;
+  Pixel* row = pixels_.data() + static_cast<std::size_t>(y) * width_;
+  for (std::size_t x = 0; x < width_; ++x) {
+    Pixel& pixel = row[x];
+    while (true) {
+      // Rounded up to what sensors stamp, which must not lie beyond what was asked for.
+      const std::int64_t whole = pixel.next_ns / kNanosecondsPerMicrosecond;
+      const std::int64_t t_ns =
+          (whole + (whole * kNanosecondsPerMicrosecond < pixel.next_ns ? 1 : 0)) *
+          kNanosecondsPerMicrosecond;
+      if (t_ns > until_ns) break;
+      events.push_back({t_ns, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y),
+                        pixel.random.below(2) == 0});
+      draw(pixel);
+    }
+  }
+}
+
+}  // namespace efm

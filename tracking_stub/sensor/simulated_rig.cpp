@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/sensor/simulated_rig.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <tuple>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+#include "tracking_stub/rendering/frame_renderer.h"
+#include "tracking_stub/rendering/scene_view.h"
+
+namespace efm {
+namespace {
+
+/// The frame rate is chosen anew for each of these stretches of time.
+constexpr std::int64_t kStretchNs = 10'000'000;
+/// Pixels between the rays that the speed of the image is measured on.
+constexpr int kSpeedGridPx = 12;
+
+struct AttributedEvent {
+  Event event;
+  SurfacePoint source;
+};
+
+void validate(const Simulation& simulation) {
+  requireOption(simulation.motion != nullptr, "motion", "none", "given");
+  requireOption(simulation.duration_ns > 0, "duration_ns", simulation.duration_ns, "above 0");
+  simulation.pixels.validate();
+  simulation.noise.validate();
+  requireOption(simulation.max_step_px > 0, "max_step_px", simulation.max_step_px, "above 0");
+  for (const RigCamera& camera : simulation.rig.cameras) {
+    camera.model.validate();
+    requireOption(camera.time_offset_ns == 0, "time_offset_ns", camera.time_offset_ns,
+                  "0: simulated cameras are synchronised");
+  }
+}
+
+/// One camera of the rig on its way through the scene.
+class CameraRun {
+ public:
+  CameraRun(const Simulation& simulation, std::size_t camera)
+      : simulation_(simulation),
+        camera_(simulation.rig.cameras[camera]),
+        seed_(simulation.seed * 1024 + camera),
+        renderer_(camera_.model),
+        pixels_(camera_.model.width, camera_.model.height, simulation.pixels, seed_),
+        noise_(camera_.model.width, camera_.model.height, simulation.noise,
+               {seed_, simulation.start_ns}),
+        rows_(static_cast<std::size_t>(camera_.model.height)) {}
+
+  template <typename Progress>
+  CameraRecording record(const Progress& progress) {
+    std::int64_t t_ns = simulation_.start_ns;
+    renderer_.render(viewAt(t_ns), before_);
+    pixels_.start(before_.log_intensity, seed_);
+    while (t_ns < simulation_.endNs()) {
+      const std::int64_t stretch_ns = std::min(kStretchNs, simulation_.endNs() - t_ns);
+      const double motion_px =
+          std::max(imageSpeed(t_ns), imageSpeed(t_ns + stretch_ns)) * secondsBetween(0, stretch_ns);
+      const auto steps =
+          static_cast<std::int64_t>(std::max(1.0, std::ceil(motion_px / simulation_.max_step_px)));
+      for (std::int64_t i = 0; i < steps; ++i) {
+        advance({t_ns + stretch_ns * i / steps, t_ns + stretch_ns * (i + 1) / steps});
+      }
+      t_ns += stretch_ns;
+      progress(secondsBetween(simulation_.start_ns, t_ns) /
+               secondsBetween(0, simulation_.duration_ns));
+    }
+    return inOrderOfTime();
+  }
+
+ private:
+  SceneView viewAt(std::int64_t t_ns) const {
+    return renderer_.viewFrom(simulation_.scene, poseAt(t_ns));
+  }
+  Rigid3 poseAt(std::int64_t t_ns) const {
+    return simulation_.motion->poseAt(t_ns) * camera_.T_rig_cam;
+  }
+
+  /// The fastest motion in the undistorted image, pixels per second.
+  double imageSpeed(std::int64_t t_ns) const {
+    constexpr std::int64_t kApartNs = 500'000;
+    const Rigid3 T_world_cam = poseAt(t_ns);
+    const Rigid3 T_later_world = poseAt(t_ns + kApartNs).inverse();
+    const SceneView view = renderer_.viewFrom(simulation_.scene, T_world_cam);
+    double fastest_px = 0;
+    for (int y = 0; y < camera_.model.height; y += kSpeedGridPx) {
+      for (int x = 0; x < camera_.model.width; x += kSpeedGridPx) {
+        const PixelRay& pixel = renderer_.rays()(x, y);
+        const ViewHit hit = view.cast(pixel.ray);
+        if (hit.surface < 0) continue;
+        const Eigen::Vector3d p_cam = pixel.ray.homogeneous() / hit.inverse_depth;
+        const Eigen::Vector3d p_later = T_later_world * (T_world_cam * p_cam);
+        fastest_px = std::max(fastest_px, (p_later.hnormalized() - pixel.ray).norm() / pixel.pitch);
+      }
+    }
+    return fastest_px / secondsBetween(0, kApartNs);
+  }
+
+  void advance(const FrameStep& step) {
+    const SceneView view = viewAt(step.t1_ns);
+    renderer_.render(view, after_);
+    tbb::parallel_for(tbb::blocked_range<int>(0, camera_.model.height, 8),
+                      [&](const tbb::blocked_range<int>& range) {
+                        for (int y = range.begin(); y < range.end(); ++y) fireRow(y, step, view);
+                      });
+    std::swap(before_, after_);
+  }
+
+  void fireRow(int y, const FrameStep& step, const SceneView& view) {
+    std::vector<Event> fired;
+    pixels_.fireRow(y, step, before_.log_intensity, after_.log_intensity, fired);
+    for (const Event& event : fired) {
+      rows_[static_cast<std::size_t>(y)].push_back(
+          {event, renderer_.sourceOf(view, after_, event.x, y)});
+    }
+    fired.clear();
+    noise_.fireRow(y, step.t1_ns, fired);
+    for (const Event& event : fired) rows_[static_cast<std::size_t>(y)].push_back({event, {}});
+  }
+
+  CameraRecording inOrderOfTime() {
+    std::vector<AttributedEvent> all;
+    for (std::vector<AttributedEvent>& row : rows_) {
+      all.insert(all.end(), row.begin(), row.end());
+      row = {};
+    }
+    std::stable_sort(all.begin(), all.end(),
+                     [](const AttributedEvent& a, const AttributedEvent& b) {
+                       return std::tie(a.event.t_ns, a.event.y, a.event.x) <
+                              std::tie(b.event.t_ns, b.event.y, b.event.x);
+                     });
+    CameraRecording recording;
+    recording.events.reserve(all.size());
+    recording.sources.reserve(all.size());
+    for (const AttributedEvent& attributed : all) {
+      recording.events.push_back(attributed.event);
+      recording.sources.push_back(attributed.source);
+    }
+    return recording;
+  }
+
+  const Simulation& simulation_;
+  const RigCamera& camera_;
+  std::uint64_t seed_;
+  FrameRenderer renderer_;
+  EventPixels pixels_;
+  EventNoise noise_;
+  Frame before_;
+  Frame after_;
+  std::vector<std::vector<AttributedEvent>> rows_;
+};
+
+}  // namespace
+
+std::vector<CameraRecording> simulateEvents(const Simulation& simulation,
+                                            const SimulationRun& run) {
+  validate(simulation);
+  const int threads = run.threads.value_or(tbb::this_task_arena::max_concurrency());
+  requireOption(threads >= 1 && threads <= 1024, "threads", threads, "1 to 1024");
+  // More threads than oneTBB would give make it print a warning.
+  const auto available = static_cast<int>(
+      tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+  tbb::task_arena arena(std::min(threads, std::max(available, 1)));
+  const std::size_t cameras = simulation.rig.cameras.size();
+  std::vector<CameraRecording> recordings;
+  arena.execute([&] {
+    for (std::size_t camera = 0; camera < cameras; ++camera) {
+      recordings.push_back(CameraRun(simulation, camera).record([&](double share) {
+        if (run.progress) {
+          run.progress((static_cast<double>(camera) + share) / static_cast<double>(cameras));
+        }
+      }));
+    }
+  });
+  return recordings;
+}
+
+std::vector<StampedPose> samplePoses(const Simulation& simulation, std::int64_t period_ns) {
+  requireOption(period_ns > 0, "period_ns", period_ns, "above 0");
+  std::vector<StampedPose> poses;
+  for (std::int64_t t_ns = simulation.start_ns; t_ns < simulation.endNs(); t_ns += period_ns) {
+    poses.push_back({t_ns, simulation.motion->poseAt(t_ns)});
+  }
+  poses.push_back({simulation.endNs(), simulation.motion->poseAt(simulation.endNs())});
+  return poses;
+}
+
+}  // namespace efm

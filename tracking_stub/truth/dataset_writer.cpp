@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tracking_stub/truth/dataset_writer.h"
+
+#include <unistd.h>
+
+#include <charconv>
+#include <cstddef>
+#include <fstream>
+#include <iomanip>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/truth/truth_clouds.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t kDepthPeriodNs = 50'000'000;
+
+std::runtime_error cannotWrite(const fs::path& path) {
+  return std::runtime_error(path.string() + ": cannot be written");
+}
+
+void makeFolder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
+}
+
+void writeText(const fs::path& file, const std::string& text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
+  stream.close();
+  if (!stream) throw cannotWrite(file);
+}
+
+template <typename Number>
+void appendNumber(std::string& text, Number number) {
+  char digits[24];
+  const auto result = std::to_chars(digits, digits + sizeof(digits), number);
+  text.append(digits, result.ptr);
+}
+
+/// As formatSeconds, without its cost per event.
+void appendSeconds(std::string& text, std::int64_t t_ns) {
+  if (t_ns < 0) {
+    text += formatSeconds(t_ns);
+    return;
+  }
+  appendNumber(text, t_ns / kNanosecondsPerSecond);
+  char decimals[] = ".000000000";
+  for (std::int64_t rest = t_ns % kNanosecondsPerSecond, i = 9; rest > 0; rest /= 10, --i) {
+    decimals[i] = static_cast<char>('0' + rest % 10);
+  }
+  text.append(decimals, 10);
+}
+
+void writeTiff(const fs::path& file, const cv::Mat1f& image) {
+  bool written = false;
+  try {
+    written = cv::imwrite(file.string(), image);
+  } catch (const cv::Exception&) {
+    // Told below, with the path.
+  }
+  if (!written) throw cannotWrite(file);
+}
+
+/// The matrix of a transform, as YAML in Kalibr's layout.
+void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
+  const Eigen::Matrix3d rotation = T_a_b.rotation.toRotationMatrix();
+  for (int row = 0; row < 3; ++row) {
+    text << "  - [" << rotation(row, 0) << ", " << rotation(row, 1) << ", " << rotation(row, 2)
+         << ", " << T_a_b.translation[row] << "]\n";
+  }
+  text << "  - [0, 0, 0, 1]\n";
+}
+
+}  // namespace
+
+DatasetWriter::DatasetWriter(fs::path folder) : folder_(std::move(folder)) {
+  if (folder_.empty()) {
+    throw std::runtime_error("'': expected the name of the folder to write");
+  }
+  folder_ = fs::absolute(folder_).lexically_normal();
+  if (!folder_.has_filename()) folder_ = folder_.parent_path();  // a trailing slash
+  std::error_code error;
+  if (fs::exists(folder_, error) && !(fs::is_directory(folder_) && fs::is_empty(folder_))) {
+    throw std::runtime_error(folder_.string() + ": exists already and is not an empty folder");
+  }
+  makeFolder(folder_.parent_path());
+  const fs::path unfinished = folder_.parent_path() / ("." + folder_.filename().string() +
+                                                       ".unfinished-" + std::to_string(getpid()));
+  fs::remove_all(unfinished, error);  // of a process that was killed and had the same number
+  if (!fs::create_directory(unfinished, error)) {
+    throw std::runtime_error(unfinished.string() + ": cannot be made: " + error.message());
+  }
+  unfinished_ = unfinished;
+}
+
+DatasetWriter::~DatasetWriter() {
+  std::error_code ignored;
+  if (!unfinished_.empty()) fs::remove_all(unfinished_, ignored);
+}
+
+void DatasetWriter::write(const Simulation& simulation,
+                          const std::vector<CameraRecording>& recordings) {
+  const std::vector<RigCamera>& cameras = simulation.rig.cameras;
+  requireOption(!cameras.empty() && recordings.size() == cameras.size(), "recordings",
+                recordings.size(), "one per camera, at least one");
+  const Rigid3& T_rig_cam0 = cameras[0].T_rig_cam;
+  requireOption(T_rig_cam0.translation.isZero(0) && T_rig_cam0.rotation.vec().isZero(0),
+                "T_rig_cam of camera 0", T_rig_cam0.translation.transpose(),
+                "the identity: poses.txt holds T_world_cam0");
+
+  for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+    const fs::path camera_folder = unfinished_ / ("cam" + std::to_string(camera));
+    makeFolder(camera_folder);
+    writeEvents(camera_folder / "events.txt", recordings[camera].events);
+  }
+  writeText(unfinished_ / "camchain.yaml", formatCamchain(simulation.rig));
+  writeTumTrajectory(unfinished_ / "poses.txt", samplePoses(simulation));
+  writeDepthMaps(simulation);
+  const TruthClouds truth = makeTruthClouds(simulation, recordings);
+  writePly(unfinished_ / "gt_cloud.ply", truth.surfaces);
+  writePly(unfinished_ / "gt_edges.ply", truth.edges);
+
+  std::error_code error;
+  fs::rename(unfinished_, folder_, error);
+  if (error) throw std::runtime_error(folder_.string() + ": cannot be made: " + error.message());
+  unfinished_.clear();
+}
+
+void DatasetWriter::writeDepthMaps(const Simulation& simulation) const {
+  const fs::path depth_folder = unfinished_ / "depth";
+  makeFolder(depth_folder);
+  const ReferenceView view = ReferenceView::of(simulation.rig.cameras[0].model);
+  std::string index;
+  for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs();
+       t_ns += kDepthPeriodNs) {
+    const std::string name = "cam0_" + formatSeconds(t_ns) + ".tiff";
+    const fs::path file = depth_folder / name;
+    const Rigid3 T_world_cam0 = simulation.motion->poseAt(t_ns);
+    writeTiff(file, renderDepth(simulation.scene, T_world_cam0, view));
+    index += formatSeconds(t_ns) + " " + name + "\n";
+  }
+  writeText(depth_folder / "index.txt", index);
+}
+
+void writeEvents(const fs::path& file, const std::vector<Event>& events) {
+  std::ofstream stream(file, std::ios::binary);
+  constexpr std::size_t kFlushBytes = std::size_t{1} << 20;
+  std::string text;
+  for (const Event& event : events) {
+    appendSeconds(text, event.t_ns);
+    text += ' ';
+    appendNumber(text, event.x);
+    text += ' ';
+    appendNumber(text, event.y);
+    text += event.polarity ? " 1\n" : " 0\n";
+    if (text.size() >= kFlushBytes) {
+      stream.write(text.data(), static_cast<std::streamsize>(text.size()));
+      text.clear();
+    }
+  }
+  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
+  stream.close();
+  if (!stream) throw cannotWrite(file);
+}
+
+std::string formatCamchain(const Rig& rig) {
+  std::ostringstream text;
+  text << std::setprecision(17);
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    const CameraModel& model = rig.cameras[i].model;
+    text << "cam" << i << ":\n";
+    if (i > 0) {
+      text << "  T_cn_cnm1:\n";
+      appendMatrix(text, rig.cameras[i].T_rig_cam.inverse() * rig.cameras[i - 1].T_rig_cam);
+    }
+    text << "  camera_model: pinhole\n  distortion_coeffs: [";
+    for (std::size_t k = 0; k < model.coefficients.size(); ++k) {
+      text << (k > 0 ? ", " : "") << model.coefficients[k];
+    }
+    text << "]\n  distortion_model: " << nameOf(model.distortion) << "\n  intrinsics: [" << model.fx
+         << ", " << model.fy << ", " << model.cx << ", " << model.cy << "]\n  resolution: ["
+         << model.width << ", " << model.height << "]\n";
+  }
+  return text.str();
+}
+
+void writePly(const fs::path& file, const std::vector<Eigen::Vector3f>& points) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size()
+         << "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
+  stream.write(reinterpret_cast<const char*>(points.data()),
+               static_cast<std::streamsize>(points.size() * sizeof(Eigen::Vector3f)));
+  stream.close();
+  if (!stream) throw cannotWrite(file);
+}
+
+}  // namespace efm

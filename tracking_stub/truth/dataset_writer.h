@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/geometry/rig.h"
+#include "tracking_stub/sensor/simulated_rig.h"
+
+namespace efm {
+
+/// Writes a simulated recording as a dataset folder:
+///   camN/events.txt        `t x y p` a line
+///   camchain.yaml          calibration, as Kalibr writes it
+///   poses.txt              T_world_cam0 at 1 kHz, TUM
+///   depth/cam0_<t>.tiff    exact z-depth in camera 0's undistorted pinhole view, float32 metres,
+///                          every 50 ms from the recording's start
+///   depth/index.txt        `t file` a line; files relative to depth/
+///   gt_cloud.ply, gt_edges.ply   the truth clouds, frame `world`
+///
+/// Nothing half made is left behind: the files are collected in a temporary folder beside the
+/// wanted one, which takes its place when all is written and is removed otherwise.
+class DatasetWriter {
+ public:
+  /// Makes the temporary folder, so that a place that cannot be written is known before the
+  /// simulation runs.
+  /// @throws std::runtime_error naming the path where the folder exists and is not empty, or cannot
+  /// be made.
+  explicit DatasetWriter(std::filesystem::path folder);
+  ~DatasetWriter();
+  DatasetWriter(const DatasetWriter&) = delete;
+  DatasetWriter& operator=(const DatasetWriter&) = delete;
+
+  /// Once.
+  /// @param recordings of the simulation, per camera.
+  /// @throws std::invalid_argument where camera 0 is not the rig's frame; std::runtime_error naming
+  /// the path where something cannot be written.
+  void write(const Simulation& simulation, const std::vector<CameraRecording>& recordings);
+
+ private:
+  void writeDepthMaps(const Simulation& simulation) const;
+
+  std::filesystem::path folder_;
+  std::filesystem::path unfinished_;  // empty once it has become the folder
+};
+
+/// `t x y p` a line: seconds with nine decimals, polarity 0 or 1.
+/// @throws std::runtime_error naming the file.
+void writeEvents(const std::filesystem::path& file, const std::vector<Event>& events);
+
+/// The rig as a Kalibr camera chain: neighbours are connected by T_cn_cnm1.
+std::string formatCamchain(const Rig& rig);
+
+/// Binary little-endian PLY with vertices x y z, float.
+/// @throws std::runtime_error naming the file.
+void writePly(const std::filesystem::path& file, const std::vector<Eigen::Vector3f>& points);
+
+}  // namespace efm
