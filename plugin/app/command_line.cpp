@@ -16,8 +16,8 @@
 #include "plugin/app/info_command.h"
 #include "plugin/app/map_command.h"
 #include "plugin/app/simulate_command.h"
+#include "plugin/formats/open_recording.h"
 #include "plugin/options/tracker_fault_keys.h"
-#include "plugin/recordings/recording.h"
 #include "tracking_stub/presets/simulation_preset.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 

@@ -13,10 +13,10 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
+#include "plugin/formats/open_recording.h"
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/recording.h"
 #include "plugin/recordings/time_cut.h"
 
 namespace efm {

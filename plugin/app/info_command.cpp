@@ -12,9 +12,9 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
+#include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/recording.h"
 #include "plugin/recordings/time_cut.h"
 
 namespace efm {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "plugin/recordings/recording.h"
+#include "plugin/formats/open_recording.h"
 
 namespace efm {
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/recordings/recording.h"
+#include "plugin/formats/open_recording.h"
 
 namespace efm {
 

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
+#include "plugin/formats/open_recording.h"
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/recordings/recording.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
 

@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/recording.h"
+#include "plugin/recordings/time_cut.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <mrpt/obs/CObservationComment.h>
 
-#include <fstream>
-
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/time_cut.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -20,46 +17,6 @@ using mrpt::obs::CObservationRobotPose;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-// --- openRecording -----------------------------------------------------------------------------
-
-class OpenRecording : public TemporaryFolder {
- protected:
-  static std::string errorOf(const std::vector<std::filesystem::path>& sources,
-                             const std::string& format = "auto") {
-    try {
-      openRecording({sources, format, {}, {}, {}, {}});
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "no error";
-  }
-};
-
-TEST_F(OpenRecording, AMissingSourceIsNamed) {
-  EXPECT_THAT(errorOf({folder() / "nowhere"}), HasSubstr("nowhere: no such file or folder"));
-}
-
-TEST_F(OpenRecording, AFolderOfSomethingElseIsAnErrorThatSaysWhatWasLookedFor) {
-  std::ofstream(folder() / "notes.txt") << "nothing";
-  EXPECT_THAT(errorOf({folder()}), AllOf(HasSubstr("not a recording"), HasSubstr("camchain.yaml"),
-                                         HasSubstr("events.txt"), HasSubstr("calib.txt")));
-}
-
-TEST_F(OpenRecording, AnUnknownFormatIsNamed) {
-  EXPECT_THAT(errorOf({folder()}, "tape"), HasSubstr("'tape'"));
-}
-
-TEST_F(OpenRecording, TakesOneSource) {
-  EXPECT_THAT(errorOf({folder(), folder()}), HasSubstr("2 sources"));
-  EXPECT_THAT(errorOf({}), HasSubstr("0 sources"));
-}
-
-TEST_F(OpenRecording, FormatsBeginWithAuto) {
-  EXPECT_THAT(recordingFormats(), ElementsAre("auto", "rawlog", "folder", "uzh"));
-}
-
-// --- TimeCut -----------------------------------------------------------------------------------
 
 /// Plays observations that are there.
 class Playback : public Recording {

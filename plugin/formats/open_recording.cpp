@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/recording.h"
+#include "plugin/formats/open_recording.h"
 
 #include <algorithm>
 #include <stdexcept>
