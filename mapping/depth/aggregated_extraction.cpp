@@ -8,7 +8,8 @@
 
 #include "mapping/depth/column_aggregation.h"
 #include "mapping/depth/local_agreement.h"
-#include "mapping/depth/sparse_pixels.h"
+#include "mapping/depth/median.h"
+#include "mapping/depth/sparse_mask.h"
 
 namespace efm {
 namespace {
@@ -50,10 +51,8 @@ PeakScale scaleOf(const std::vector<AggregatedPeak>& peaks, int planes) {
   if (peaks.empty()) return scale;
   std::vector<float> widths_sq;
   for (const AggregatedPeak& peak : peaks) widths_sq.push_back(peak.width_sq);
-  const auto middle = widths_sq.begin() + static_cast<std::ptrdiff_t>(widths_sq.size() / 2);
-  std::nth_element(widths_sq.begin(), middle, widths_sq.end());
   const double places =
-      std::clamp(std::round(kWidthsOfPeak * std::sqrt(*middle) / scale.place),
+      std::clamp(std::round(kWidthsOfPeak * std::sqrt(upperMedian(widths_sq)) / scale.place),
                  double{AggregatedPeak::kLeastBeside}, double{AggregatedPeak::kMostBeside});
   scale.beside = static_cast<std::size_t>(places) - AggregatedPeak::kLeastBeside;
   return scale;
@@ -84,7 +83,7 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
                            const DepthExtractionOptions& options) {
   const cv::Mat1f& confidence = dsi.peaks.confidence;
   const cv::Mat1f excess = excessOf(confidence, options.threshold_kernel);
-  const KeptPixels looked_at(standOut(excess, options.min_excess));
+  const SparseMask looked_at(standOut(excess, options.min_excess));
   const std::vector<AggregatedPeak> peaks = aggregateRays(looked_at, dsi.rays, confidence.size());
 
   std::vector<float> positions(looked_at.size());
@@ -106,7 +105,7 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
     mask(at) = 255;
     found.push_back({around[i].median, varianceOf(peaks[i], around[i])});
   });
-  const KeptPixels kept(mask);
+  const SparseMask kept(mask);
   DepthMap map = depthMapOf(kept, found, confidence, planes);
   if (options.dilate) dilate(kept, mask, map);
   return map;

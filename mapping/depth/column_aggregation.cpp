@@ -8,10 +8,9 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <limits>
 
-#include "mapping/depth/depth_extraction.h"
-#include "mapping/depth/pixel_neighbours.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/depth/sparse_mask.h"
 
 namespace efm {
 namespace {
@@ -31,9 +30,7 @@ class PeakFinder {
     AggregatedPeak peak;
     peak.at_end = before < 0 || after < 0;
     peak.position = static_cast<float>(peakPosition(plane, before, *top, after));
-    const float curvature = 2 * *top - before - after;
-    peak.width_sq =
-        peak.at_end || !(curvature > 0) ? std::numeric_limits<float>::infinity() : *top / curvature;
+    peak.width_sq = peakWidthSquared(before, *top, after);
     // From far to near: each adds what lies between.
     float second = 0;
     int left = 0;
@@ -63,12 +60,12 @@ class PeakFinder {
 
 double planesOfOnePlace(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
 
-std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRays& rays,
+std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiRays& rays,
                                           cv::Size size) {
   const PixelNeighbours neighbours(chosen, size);
   const PeakFinder finder(rays.planes());
   std::vector<AggregatedPeak> peaks(chosen.size());
-  std::array<float, 2 * PixelNeighbours::kReach_px * PixelNeighbours::kReach_px + 1> weights{};
+  std::array<float, 2 * PixelNeighbours::kRadius_px * PixelNeighbours::kRadius_px + 1> weights{};
   for (std::size_t distance_sq = 0; distance_sq < weights.size(); ++distance_sq) {
     weights[distance_sq] = std::exp(-static_cast<float>(distance_sq) / (2 * kSigma_px * kSigma_px));
   }

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "mapping/depth/sparse_pixels.h"
+#include "mapping/depth/sparse_mask.h"
 #include "mapping/dsi/dsi_columns.h"
 
 namespace efm {
@@ -28,7 +28,7 @@ struct AggregatedPeak {
 /// peaks instead of sharpening them.
 /// @param chosen have rays (asserted). @param size of the view.
 /// @return one per chosen pixel. Runs on the threads of the task arena that it is called in.
-std::vector<AggregatedPeak> aggregateRays(const KeptPixels& chosen, const DsiRays& rays,
+std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiRays& rays,
                                           cv::Size size);
 
 /// Planes that count as one place, for a DSI of so many: with more planes than a hundred, the same

@@ -78,13 +78,4 @@ DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
                       const DepthExtractionOptions& options,
                       std::optional<double> sequence_maximum = std::nullopt);
 
-/// Position of the peak between planes, in planes: a parabola through the three values, at most
-/// half a plane from the peak. At the first and last plane the peak itself.
-double peakPosition(int plane, float before, float peak, float after);
-
-/// Variance of the peak's position, in planes^2: that of the Gaussian with the curvature of the
-/// same parabola, c / (2c - before - after), times a factor that makes it the variance of its
-/// errors. Infinite where there is no curvature.
-double peakVariance(float before, float peak, float after);
-
 }  // namespace efm

@@ -40,7 +40,7 @@ cv::Rect insideFrame(cv::Size size) {
           std::max(0, size.height - 2 * kFrame)};
 }
 
-DepthMap depthMapOf(const KeptPixels& kept, const std::vector<PlanePosition>& positions,
+DepthMap depthMapOf(const SparseMask& kept, const std::vector<PlanePosition>& positions,
                     const cv::Mat1f& confidence, const DepthPlanes& planes) {
   const cv::Size size = confidence.size();
   const cv::Rect inner = insideFrame(size);
@@ -58,7 +58,7 @@ DepthMap depthMapOf(const KeptPixels& kept, const std::vector<PlanePosition>& po
 }
 
 // In place: what is filled is not in the mask, and never copied from.
-void dilate(const KeptPixels& kept, const cv::Mat1b& mask, DepthMap& map) {
+void dilate(const SparseMask& kept, const cv::Mat1b& mask, DepthMap& map) {
   map.confidence = map.confidence.clone();  // it was the peaks'
   const cv::Rect inner = insideFrame(mask.size());
   kept.forEach([&](std::size_t, cv::Point at) {

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/depth/sparse_pixels.h"
+#include "mapping/depth/sparse_mask.h"
 #include "mapping/geometry/depth_planes.h"
 
 namespace efm {
@@ -31,13 +31,13 @@ cv::Rect insideFrame(cv::Size size);
 /// The depth map of the kept pixels inside the frame.
 /// @param positions one per kept pixel.
 /// @param confidence of the whole view; shared, not copied.
-DepthMap depthMapOf(const KeptPixels& kept, const std::vector<PlanePosition>& positions,
+DepthMap depthMapOf(const SparseMask& kept, const std::vector<PlanePosition>& positions,
                     const cv::Mat1f& confidence, const DepthPlanes& planes);
 
 /// Grows the depths by a pixel: gives each empty pixel that lies beside kept ones the depth,
 /// confidence and variance of the most confident of them (of equals the nearer depth), the frame
 /// left alone. The paper's morphological filter (MF).
 /// @param mask where pixels are kept.
-void dilate(const KeptPixels& kept, const cv::Mat1b& mask, DepthMap& map);
+void dilate(const SparseMask& kept, const cv::Mat1b& mask, DepthMap& map);
 
 }  // namespace efm

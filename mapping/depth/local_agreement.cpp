@@ -8,7 +8,8 @@
 #include <cmath>
 #include <utility>
 
-#include "mapping/depth/pixel_neighbours.h"
+#include "mapping/depth/median.h"
+#include "mapping/depth/sparse_mask.h"
 
 namespace efm {
 namespace {
@@ -35,14 +36,12 @@ float weightedMedian(std::vector<Weighted>& positions) {
 /// Median distance from a position. Reorders the positions.
 float medianDistance(std::vector<Weighted>& positions, float from) {
   for (auto& [position, weight] : positions) position = std::abs(position - from);
-  const auto middle = positions.begin() + static_cast<std::ptrdiff_t>(positions.size() / 2);
-  std::nth_element(positions.begin(), middle, positions.end());
-  return middle->first;
+  return upperMedian(positions).first;
 }
 
 }  // namespace
 
-std::vector<LocalAgreement> localAgreement(const KeptPixels& kept, cv::Size size,
+std::vector<LocalAgreement> localAgreement(const SparseMask& kept, cv::Size size,
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near) {
   const PixelNeighbours neighbours(kept, size);

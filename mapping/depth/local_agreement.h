@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/depth/sparse_pixels.h"
+#include "mapping/depth/sparse_mask.h"
 
 namespace efm {
 
@@ -19,7 +19,7 @@ struct LocalAgreement {
 /// @param positions of the kept pixels, in planes. @param weights above 0.
 /// @param near within so many planes counts as near.
 /// @return one per kept pixel. Runs on the threads of the task arena that it is called in.
-std::vector<LocalAgreement> localAgreement(const KeptPixels& kept, cv::Size size,
+std::vector<LocalAgreement> localAgreement(const SparseMask& kept, cv::Size size,
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near);
 

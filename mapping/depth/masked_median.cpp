@@ -101,7 +101,7 @@ struct RowWindow {
 };
 
 /// The windows around the pixels of row `y`, before the first of them.
-void startRow(const KeptPixels& kept, int y, int reach, std::vector<RowWindow>& rows) {
+void startRow(const SparseMask& kept, int y, int reach, std::vector<RowWindow>& rows) {
   rows.clear();
   const int last = std::min(kept.rows() - 1, y + reach);
   for (int j = std::max(0, y - reach); j <= last; ++j) {
@@ -113,7 +113,7 @@ void startRow(const KeptPixels& kept, int y, int reach, std::vector<RowWindow>& 
 
 }  // namespace
 
-std::vector<float> maskedMedian(const KeptPixels& kept, const std::vector<float>& values,
+std::vector<float> maskedMedian(const SparseMask& kept, const std::vector<float>& values,
                                 int window) {
   if (window == 1) return values;
   const int reach = window / 2;

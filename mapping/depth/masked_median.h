@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mapping/depth/sparse_pixels.h"
+#include "mapping/depth/sparse_mask.h"
 
 namespace efm {
 
@@ -14,7 +14,7 @@ namespace efm {
 /// kept; memory: 20 bytes per kept pixel while it runs.
 /// @param values one per kept pixel, not NaN.
 /// @param window side in pixels, odd.
-std::vector<float> maskedMedian(const KeptPixels& kept, const std::vector<float>& values,
+std::vector<float> maskedMedian(const SparseMask& kept, const std::vector<float>& values,
                                 int window);
 
 }  // namespace efm

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "mapping/depth/masked_median.h"
-#include "mapping/depth/sparse_pixels.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/depth/sparse_mask.h"
 
 namespace efm {
 namespace {
@@ -36,7 +37,7 @@ cv::Mat1b standOut(const cv::Mat1b& grey, const DepthExtractionOptions& options)
 }
 
 /// Positions of the kept peaks between planes.
-std::vector<float> positionsOf(const DsiPeaks& peaks, const KeptPixels& kept, bool subplane) {
+std::vector<float> positionsOf(const DsiPeaks& peaks, const SparseMask& kept, bool subplane) {
   std::vector<float> positions(kept.size());
   kept.forEach([&](std::size_t i, cv::Point at) {
     const int plane = peaks.plane(at);
@@ -55,7 +56,7 @@ DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
   options.validate();
   const double white = whiteOf(peaks.confidence, options.max_confidence, sequence_maximum);
   const cv::Mat1b mask = standOut(quantise(peaks.confidence, white), options);
-  const KeptPixels kept(mask);
+  const SparseMask kept(mask);
   const std::vector<float> positions = positionsOf(peaks, kept, options.subplane);
   const std::vector<float> medians = maskedMedian(kept, positions, options.median_size);
   std::vector<PlanePosition> found(kept.size());

@@ -3,15 +3,15 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
+
+#include "mapping/geometry/timestamp.h"
 
 namespace efm {
 
 BackgroundActivityFilter::BackgroundActivityFilter(int width, int height, std::int64_t support_ns)
     : support_ns_(support_ns),
       stride_(static_cast<std::size_t>(width) + 2),
-      newest_ns_(stride_ * (static_cast<std::size_t>(height) + 2),
-                 std::numeric_limits<std::int64_t>::min()) {}
+      newest_ns_(stride_ * (static_cast<std::size_t>(height) + 2), kMinTimeNs) {}
 
 bool BackgroundActivityFilter::isIsolated(const Event& event) {
   std::int64_t* pixel = newest_ns_.data() + (std::size_t{event.y} + 1) * stride_ + event.x + 1;

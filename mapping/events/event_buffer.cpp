@@ -4,13 +4,9 @@
 #include <algorithm>
 #include <utility>
 
+#include "mapping/geometry/timestamp.h"
+
 namespace efm {
-namespace {
-
-constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
-constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
-
-}  // namespace
 
 std::size_t EventBuffer::indexOf(std::int64_t t_ns) const {
   const auto first =
@@ -22,8 +18,8 @@ std::size_t EventBuffer::indexOf(std::int64_t t_ns) const {
 void EventBuffer::coverUntil(std::int64_t t_ns) { covered_ns = std::max(covered_ns, t_ns); }
 
 std::uint64_t EventBuffer::insert(const std::vector<Event>& added) {
-  std::int64_t newest = begin < events.size() ? events.back().t_ns : kNever;
-  std::int64_t earliest_late = kEver;
+  std::int64_t newest = begin < events.size() ? events.back().t_ns : kMinTimeNs;
+  std::int64_t earliest_late = kMaxTimeNs;
   std::uint64_t late = 0;
   for (const Event& event : added) {
     if (event.t_ns < newest) {

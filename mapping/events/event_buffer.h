@@ -3,11 +3,11 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <vector>
 
-#include "mapping/events/event_span.h"
+#include "mapping/events/event.h"
+#include "mapping/geometry/timestamp.h"
 
 namespace efm {
 
@@ -19,7 +19,7 @@ struct EventBuffer {
   std::size_t pose_cursor = 0;
   std::optional<std::int64_t> newest_ns;  ///< Of all events that were added.
   /// Everything before this time is here.
-  std::int64_t covered_ns = std::numeric_limits<std::int64_t>::min();
+  std::int64_t covered_ns = kMinTimeNs;
 
   /// Index of the first event at or after a time.
   std::size_t indexOf(std::int64_t t_ns) const;

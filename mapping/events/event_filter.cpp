@@ -8,7 +8,7 @@ namespace efm {
 
 void EventFilterOptions::validate() const {
   hot_pixel.validate();
-  // Shorter than a nanosecond is no time at all.
+  // Time has a resolution of a nanosecond.
   requireOption(
       background_activity_s == 0 || (background_activity_s >= 1e-9 && background_activity_s <= 10),
       "background_activity_s", background_activity_s, "0, or from 1e-9 to 10 (seconds)");
@@ -25,6 +25,20 @@ EventFilter::EventFilter(int width, int height, const EventFilterOptions& option
 bool EventFilter::keeps(const Event& event) {
   if (hot_pixels_ && hot_pixels_->isHot(event)) return false;
   return !background_activity_ || !background_activity_->isIsolated(event);
+}
+
+std::uint64_t FilteredEvents::release(std::int64_t until_ns, EventBuffer& buffer) {
+  const std::size_t end = waiting_.indexOf(until_ns);
+  const std::size_t released = end - waiting_.begin;
+  if (released == 0) return 0;
+  kept_.clear();
+  for (std::size_t i = waiting_.begin; i < end; ++i) {
+    if (filter_.keeps(waiting_.events[i])) kept_.push_back(waiting_.events[i]);
+  }
+  waiting_.begin = end;
+  waiting_.compact();
+  buffer.insert(kept_);
+  return released - kept_.size();
 }
 
 }  // namespace efm

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "mapping/events/background_activity_filter.h"
 #include "mapping/events/event.h"
+#include "mapping/events/event_buffer.h"
 #include "mapping/events/hot_pixel_filter.h"
 
 namespace efm {
 
-/// Which events never reach a window because nothing in the world caused them.
+/// Which events are noise: they reach no window.
 struct EventFilterOptions {
-  bool hot_pixels = true;  ///< Leave out events of pixels that fire all the time.
+  bool hot_pixels = true;  ///< Remove events of pixels that fire all the time.
   HotPixelOptions hot_pixel;
-  /// Leave out events without another in the eight pixels around them in so many seconds before.
-  /// 0 (off) to 10.
+  /// Remove an event if none of its eight neighbour pixels fired in this time before it. Seconds, 0
+  /// (off) to 10.
   double background_activity_s = 0;
 
   bool any() const { return hot_pixels || background_activity_s > 0; }
@@ -28,12 +32,31 @@ class EventFilter {
   /// @throws std::invalid_argument where the options are not valid.
   EventFilter(int width, int height, const EventFilterOptions& options);
 
-  /// Takes the next event of the camera, in time order; it lies inside the sensor.
+  /// @param event the next one of the camera, in time order, inside the sensor.
   bool keeps(const Event& event);
 
  private:
   std::optional<HotPixelFilter> hot_pixels_;
   std::optional<BackgroundActivityFilter> background_activity_;
+};
+
+/// Holds the events of one camera until no earlier event can arrive, then filters them. So the
+/// result depends neither on packets nor on the order in which late events arrive.
+class FilteredEvents {
+ public:
+  explicit FilteredEvents(EventFilter filter) : filter_(std::move(filter)) {}
+
+  /// @return the number of events that came after a newer one.
+  std::uint64_t insert(const std::vector<Event>& events) { return waiting_.insert(events); }
+  /// Filters the events before `until_ns` and inserts those that remain into `buffer`. No event
+  /// before `until_ns` may be inserted here afterwards.
+  /// @return the number of events that the filter removed.
+  std::uint64_t release(std::int64_t until_ns, EventBuffer& buffer);
+
+ private:
+  EventFilter filter_;
+  EventBuffer waiting_;
+  std::vector<Event> kept_;  // reused
 };
 
 }  // namespace efm

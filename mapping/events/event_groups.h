@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "mapping/events/event.h"
-#include "mapping/events/event_span.h"
 #include "mapping/sweep/space_sweep.h"
 
 namespace efm {

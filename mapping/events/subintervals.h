@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "mapping/events/event_span.h"
+#include "mapping/events/event.h"
 
 namespace efm {
 

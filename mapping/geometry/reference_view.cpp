@@ -6,14 +6,13 @@
 #include <cstdint>
 #include <string>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {
 
 constexpr int kMaxSide = 65535;
-constexpr double kPi = 3.14159265358979323846;
-
 void requireSide(const std::optional<int>& side, const char* key) {
   requireOption(!side || (*side >= 1 && *side <= kMaxSide), key, side.value_or(0), "1 to 65535");
 }

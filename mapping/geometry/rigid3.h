@@ -8,7 +8,7 @@ namespace efm {
 /// A rigid transform T_a_b of space: p_a = T_a_b * p_b = rotation * p_b + translation.
 /// Neighbouring letters match in every product: T_a_c = T_a_b * T_b_c.
 ///
-/// Invariant: `rotation` has unit norm; whoever fills it from outside normalises it.
+/// Invariant: `rotation` has unit norm; code that fills it from outside normalises it.
 struct Rigid3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();  ///< Metres.
@@ -31,11 +31,19 @@ inline bool isSame(const Rigid3& T_a_b, const Rigid3& other) {
          T_a_b.rotation.coeffs() == other.rotation.coeffs();
 }
 
-/// The pose at `fraction` in [0, 1] of the way from one pose to another: linear in position,
-/// slerp along the shorter arc in rotation.
+/// The pose at `fraction` in [0, 1] between two poses: linear in position, slerp along the shorter
+/// arc in rotation.
 inline Rigid3 interpolate(const Rigid3& T_a_b0, const Rigid3& T_a_b1, double fraction) {
   return {T_a_b0.rotation.slerp(fraction, T_a_b1.rotation),
           (1.0 - fraction) * T_a_b0.translation + fraction * T_a_b1.translation};
+}
+
+/// The rotation about the direction of a vector by its length in radians: the exponential map of
+/// SO(3).
+inline Eigen::Quaterniond rotationBy(const Eigen::Vector3d& rotation_vector) {
+  const double angle = rotation_vector.norm();
+  if (angle <= 0) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
 }
 
 }  // namespace efm

@@ -13,9 +13,12 @@ namespace efm {
 
 inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 
+inline constexpr std::int64_t kMaxTimeNs = std::numeric_limits<std::int64_t>::max();
+inline constexpr std::int64_t kMinTimeNs = std::numeric_limits<std::int64_t>::min();
+
 /// Later than any time in a recording (the year 2116), and its negative earlier; half the range, so
 /// that sums and differences of times stay inside it.
-inline constexpr std::int64_t kEndOfTimeNs = std::numeric_limits<std::int64_t>::max() / 2;
+inline constexpr std::int64_t kEndOfTimeNs = kMaxTimeNs / 2;
 
 /// Parses decimal seconds ("12", "-0.5", "1.5e-3", "1700000000.123456789") to nanoseconds without
 /// passing through a double. Digits past the ninth decimal are rounded to the nearest nanosecond.

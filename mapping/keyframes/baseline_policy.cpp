@@ -74,7 +74,7 @@ void BaselinePolicy::startAt(std::int64_t t_ns) {
   grown_ns_ = stride_ns_;
 }
 
-std::optional<Window> BaselinePolicy::current(const RecordingSoFar& recording) {
+std::optional<Window> BaselinePolicy::current(const RecordingProgress& recording) {
   while (true) {
     const auto t0_ns = recording.timeOfEvent(earliestStart(recording), 1);
     if (!t0_ns) return std::nullopt;
@@ -102,7 +102,7 @@ bool BaselinePolicy::isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_
   return share < options_.min_visible_share;
 }
 
-std::int64_t BaselinePolicy::earliestStart(const RecordingSoFar& recording) const {
+std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) const {
   return next_ns_.value_or(recording.startNs());
 }
 

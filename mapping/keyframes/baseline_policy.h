@@ -23,11 +23,11 @@ class BaselinePolicy : public KeyframePolicy {
  public:
   BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m);
 
-  std::optional<Window> current(const RecordingSoFar& recording) override;
-  std::int64_t earliestStart(const RecordingSoFar& recording) const override;
+  std::optional<Window> current(const RecordingProgress& recording) override;
+  std::int64_t earliestStart(const RecordingProgress& recording) const override;
   void advance(const Window& window, const KeyframeDepthMap* keyframe) override;
   /// No window is without events.
-  std::uint64_t advancePast(const RecordingSoFar&, std::int64_t) override { return 0; }
+  std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
 
  private:
   bool isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,

@@ -2,7 +2,6 @@
 #include "mapping/keyframes/fusion_mapper.h"
 
 #include <algorithm>
-#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <string>
@@ -17,8 +16,6 @@ namespace {
 constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
 /// How much later than a newer one a pose may come.
 constexpr std::int64_t kMaxPoseDelayNs = kNanosecondsPerSecond;
-constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
-constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::min();
 
 [[noreturn]] void refuse(const Event& event, int camera, const std::string& expected) {
   throw std::invalid_argument("camera " + std::to_string(camera) + ", event at " +
@@ -62,13 +59,29 @@ void FusionMapperOptions::validate() const {
   }
 }
 
+EventCounts& EventCounts::operator+=(const EventCounts& other) {
+  read += other.read;
+  used += other.used;
+  without_pose += other.without_pose;
+  outside_window += other.outside_window;
+  filtered += other.filtered;
+  dropped += other.dropped;
+  return *this;
+}
+
+EventCounts MapperCounts::total() const {
+  EventCounts sum;
+  for (const EventCounts& camera : cameras) sum += camera;
+  return sum;
+}
+
 /// What the mapper tells its policy, once the recording has started.
-class FusionMapper::SoFar : public RecordingSoFar {
+class FusionMapper::SoFar : public RecordingProgress {
  public:
   explicit SoFar(FusionMapper& mapper) : mapper_(mapper) {}
 
   std::int64_t startNs() const override { return *mapper_.start_ns_; }
-  std::int64_t reachedNs() const override { return mapper_.reached_ns_.value_or(kNever); }
+  std::int64_t reachedNs() const override { return mapper_.reached_ns_.value_or(kMinTimeNs); }
   std::int64_t completeNs() const override { return mapper_.completeNs(); }
 
   std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns, std::int64_t count) const override {
@@ -147,7 +160,7 @@ void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
   EventCounts& counts = counts_.cameras[index];
   if (events.empty()) return;
 
-  std::int64_t newest_ns = buffer.newest_ns.value_or(kNever + kMaxEventDelayNs);
+  std::int64_t newest_ns = buffer.newest_ns.value_or(kMinTimeNs + kMaxEventDelayNs);
   for (const Event& event : events) {
     requireValid(event, rig_camera.model, camera);
     const std::int64_t t_ns = event.t_ns + rig_camera.time_offset_ns;
@@ -195,9 +208,9 @@ void FusionMapper::finish() { finished_ = true; }
 
 /// The time before which nothing more is to come from a camera.
 std::int64_t FusionMapper::completeUntil(std::size_t camera) const {
-  if (finished_) return kEver;
+  if (finished_) return kMaxTimeNs;
   // From where packets begin: a long one of another camera says nothing of this one yet.
-  const std::int64_t silent_ns = begun_ns_ ? *begun_ns_ - kMaxCameraLagNs : kNever;
+  const std::int64_t silent_ns = begun_ns_ ? *begun_ns_ - kMaxCameraLagNs : kMinTimeNs;
   return std::max(buffers_[camera].covered_ns, silent_ns);
 }
 
@@ -217,7 +230,7 @@ bool FusionMapper::camerasCover(std::int64_t t_ns) const {
 
 /// All events of the selected cameras before this time are here, and poses reach it.
 std::int64_t FusionMapper::completeNs() const {
-  std::int64_t complete_ns = trajectory_.empty() ? kNever : trajectory_.poses().back().t_ns;
+  std::int64_t complete_ns = trajectory_.empty() ? kMinTimeNs : trajectory_.poses().back().t_ns;
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
     if (selected(static_cast<int>(c))) complete_ns = std::min(complete_ns, completeUntil(c));
   }
@@ -250,14 +263,14 @@ void FusionMapper::findStart() {
   for (EventBuffer& buffer : buffers_) {
     for (std::size_t i = buffer.begin; i < buffer.events.size(); ++i) {
       const std::int64_t t_ns = buffer.events[i].t_ns;
-      if (t_ns > newest_pose_ns || t_ns >= first_ns.value_or(kEver)) break;
+      if (t_ns > newest_pose_ns || t_ns >= first_ns.value_or(kMaxTimeNs)) break;
       if (!trajectory_.segmentAt(t_ns, buffer.pose_cursor)) continue;
       first_ns = t_ns;
       break;
     }
   }
   // A camera that lags may still bring an earlier one.
-  const std::int64_t forgotten_ns = std::min(completeNs(), first_ns.value_or(kEver));
+  const std::int64_t forgotten_ns = std::min(completeNs(), first_ns.value_or(kMaxTimeNs));
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
     EventBuffer& buffer = buffers_[c];
     const std::size_t end = buffer.indexOf(forgotten_ns);
@@ -273,7 +286,7 @@ void FusionMapper::passEmptyWindows() {
   if (!reached_ns_) return;
   const SoFar recording(*this);
   const std::int64_t from_ns = policy_->earliestStart(recording);
-  std::int64_t empty_until_ns = std::min(*reached_ns_, options_.limits.t1_ns.value_or(kEver));
+  std::int64_t empty_until_ns = std::min(*reached_ns_, options_.limits.t1_ns.value_or(kMaxTimeNs));
   for (std::size_t c = 0; c < buffers_.size(); ++c) {
     if (!selected(static_cast<int>(c))) continue;
     const EventBuffer& buffer = buffers_[c];
@@ -350,7 +363,7 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
     if (keyframe) return keyframe;
   }
   if (finished_) {
-    settleBefore(kEver);
+    settleBefore(kMaxTimeNs);
   } else if (start_ns_) {
     settleBefore(settledUntil());
   }

@@ -7,8 +7,8 @@
 
 #include "mapping/depth/depth_extraction.h"
 #include "mapping/depth/robust_maximum.h"
+#include "mapping/events/event.h"
 #include "mapping/events/event_groups.h"
-#include "mapping/events/event_span.h"
 #include "mapping/events/subintervals.h"
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/reference_view.h"

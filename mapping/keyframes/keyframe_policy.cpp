@@ -2,7 +2,6 @@
 #include "mapping/keyframes/keyframe_policy.h"
 
 #include <algorithm>
-#include <limits>
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/baseline_policy.h"
@@ -11,8 +10,6 @@
 
 namespace efm {
 namespace {
-
-constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
 
 constexpr NamedChoice<KeyframePolicyKind> kPolicies[] = {
     {KeyframePolicyKind::kPeriod, "period"},
@@ -32,17 +29,17 @@ class PeriodPolicy : public KeyframePolicy {
         stride_ns_(durationFromSeconds(options.stride_s)),
         reference_(options.reference) {}
 
-  std::optional<Window> current(const RecordingSoFar& recording) override {
+  std::optional<Window> current(const RecordingProgress& recording) override {
     const std::int64_t t0_ns = earliestStart(recording);
     const Window window = windowOf(t0_ns, t0_ns + window_ns_, reference_);
     if (recording.reachedNs() < window.t1_ns) return std::nullopt;
     return window;
   }
-  std::int64_t earliestStart(const RecordingSoFar& recording) const override {
+  std::int64_t earliestStart(const RecordingProgress& recording) const override {
     return recording.startNs() + index_ * stride_ns_;
   }
   void advance(const Window&, const KeyframeDepthMap*) override { ++index_; }
-  std::uint64_t advancePast(const RecordingSoFar& recording, std::int64_t t_ns) override {
+  std::uint64_t advancePast(const RecordingProgress& recording, std::int64_t t_ns) override {
     const std::int64_t since_first_end_ns = t_ns - recording.startNs() - window_ns_;
     if (since_first_end_ns < 0) return 0;
     const std::int64_t next = since_first_end_ns / stride_ns_ + 1;
@@ -66,17 +63,17 @@ class EventsPolicy : public KeyframePolicy {
   explicit EventsPolicy(const KeyframePolicyOptions& options)
       : window_events_(options.window_events), reference_(options.reference) {}
 
-  std::optional<Window> current(const RecordingSoFar& recording) override {
+  std::optional<Window> current(const RecordingProgress& recording) override {
     const std::int64_t from_ns = earliestStart(recording);
     const auto last_ns = recording.timeOfEvent(from_ns, window_events_);
     if (!last_ns) return std::nullopt;
     return windowOf(*recording.timeOfEvent(from_ns, 1), *last_ns + 1, reference_);
   }
-  std::int64_t earliestStart(const RecordingSoFar& recording) const override {
+  std::int64_t earliestStart(const RecordingProgress& recording) const override {
     return next_ns_.value_or(recording.startNs());
   }
   void advance(const Window& window, const KeyframeDepthMap*) override { next_ns_ = window.t1_ns; }
-  std::uint64_t advancePast(const RecordingSoFar&, std::int64_t) override { return 0; }
+  std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
 
  private:
   std::int64_t window_events_;
@@ -88,15 +85,15 @@ class SingleWindowPolicy : public KeyframePolicy {
  public:
   explicit SingleWindowPolicy(const Window& window) : window_(window) {}
 
-  std::optional<Window> current(const RecordingSoFar&) override { return window_; }
-  std::int64_t earliestStart(const RecordingSoFar&) const override {
-    return window_ ? window_->t0_ns : kEver;
+  std::optional<Window> current(const RecordingProgress&) override { return window_; }
+  std::int64_t earliestStart(const RecordingProgress&) const override {
+    return window_ ? window_->t0_ns : kMaxTimeNs;
   }
-  std::int64_t earliestReference(const RecordingSoFar&) const override {
-    return window_ ? std::min(window_->t0_ns, window_->t_ref_ns) : kEver;
+  std::int64_t earliestReference(const RecordingProgress&) const override {
+    return window_ ? std::min(window_->t0_ns, window_->t_ref_ns) : kMaxTimeNs;
   }
   void advance(const Window&, const KeyframeDepthMap*) override { window_.reset(); }
-  std::uint64_t advancePast(const RecordingSoFar&, std::int64_t t_ns) override {
+  std::uint64_t advancePast(const RecordingProgress&, std::int64_t t_ns) override {
     if (!window_ || window_->t1_ns > t_ns) return 0;
     window_.reset();
     return 1;

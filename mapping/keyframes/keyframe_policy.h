@@ -55,9 +55,9 @@ Window windowOf(std::int64_t t0_ns, std::int64_t t1_ns, ReferenceTime reference)
 
 /// What a policy may know of a recording: only what is complete, so that its choice does not depend
 /// on how far the recording happens to have been read.
-class RecordingSoFar {
+class RecordingProgress {
  public:
-  virtual ~RecordingSoFar() = default;
+  virtual ~RecordingProgress() = default;
   /// The first event with a pose.
   virtual std::int64_t startNs() const = 0;
   /// The newest event of any camera; the recording goes on until then at least.
@@ -79,10 +79,10 @@ class KeyframePolicy {
   virtual ~KeyframePolicy() = default;
   /// The next window, as soon as it is sure that the recording fills it; does not move on.
   /// @return nothing before that, and after the last one.
-  virtual std::optional<Window> current(const RecordingSoFar& recording) = 0;
+  virtual std::optional<Window> current(const RecordingProgress& recording) = 0;
   /// Events before this time, and poses before `earliestReference`, are in no window to come.
-  virtual std::int64_t earliestStart(const RecordingSoFar& recording) const = 0;
-  virtual std::int64_t earliestReference(const RecordingSoFar& recording) const {
+  virtual std::int64_t earliestStart(const RecordingProgress& recording) const = 0;
+  virtual std::int64_t earliestReference(const RecordingProgress& recording) const {
     return earliestStart(recording);
   }
   /// Moves on to the window after the current one, which became this keyframe, if it did.
@@ -90,7 +90,7 @@ class KeyframePolicy {
   /// Told that there are no events before `t_ns` that were not in a window: moves on past the
   /// windows that end by then, at a cost that does not depend on their number.
   /// @return how many there were.
-  virtual std::uint64_t advancePast(const RecordingSoFar& recording, std::int64_t t_ns) = 0;
+  virtual std::uint64_t advancePast(const RecordingProgress& recording, std::int64_t t_ns) = 0;
 };
 
 /// @param depth_guess_m the mean depth of the scene before a keyframe tells.

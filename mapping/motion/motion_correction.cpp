@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/motion/quasi_newton.h"
 #include "mapping/options/option_check.h"
 
@@ -26,7 +27,6 @@ VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& e
                                   const SharpestMotionInput& input,
                                   const MotionCorrectionOptions& options) {
   constexpr int kPatchPx = 24;
-  constexpr double kDegree = 0.017453292519943295;
   EventContrast contrast(events, input.view, kPatchPx);
   const std::vector<std::size_t>& in_patch = contrast.eventsInPatch();
   if (in_patch.empty()) return input.warped_with;
@@ -36,7 +36,7 @@ VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& e
   const auto patches = static_cast<Eigen::Index>(in_patch.size());
   Eigen::VectorXd sigmas(count);
   sigmas << Eigen::Vector3d::Constant(options.motion_sigma_m_s),
-      Eigen::Vector3d::Constant(kDegree * options.motion_sigma_deg_s),
+      Eigen::Vector3d::Constant(kRadiansPerDegree * options.motion_sigma_deg_s),
       Eigen::VectorXd::Constant(patches, input.sigma_inverse_depth);
   // A standard deviation costs half of this share of the contrast; of a patch, of the contrast that
   // its events have a part in. Small: they decide only where events do not.

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "mapping/events/event_span.h"
+#include "mapping/events/event.h"
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rig.h"

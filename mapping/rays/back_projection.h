@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "mapping/events/event_span.h"
+#include "mapping/events/event.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/undistortion.h"
 #include "mapping/rays/pose_packets.h"

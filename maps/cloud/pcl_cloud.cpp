@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "mapping/depth/median.h"
 #include "maps/cloud/point_text.h"
 
 namespace efm {
@@ -27,9 +28,7 @@ Eigen::Vector3d middleOf(const std::vector<CloudPoint>& points) {
   for (int axis = 0; axis < 3; ++axis) {
     std::transform(points.begin(), points.end(), values.begin(),
                    [axis](const CloudPoint& point) { return point.p_world[axis]; });
-    const auto half = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), half, values.end());
-    middle[axis] = *half;
+    middle[axis] = upperMedian(values);
   }
   return middle;
 }

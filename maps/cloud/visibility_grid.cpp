@@ -5,6 +5,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "mapping/geometry/angle.h"
+
 namespace efm {
 namespace {
 
@@ -33,7 +35,7 @@ std::int32_t cellOf(double offset, double cells_per_depth) {
 KeyframeSight::KeyframeSight(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref,
                              const ConsistencyOptions& options)
     : T_ref_world_(T_world_ref.inverse()),
-      cells_per_unit_(180 / (M_PI * options.consistency_cell_deg)) {
+      cells_per_unit_(180 / (kPi * options.consistency_cell_deg)) {
   std::vector<Seen> seen;
   seen.reserve(points.size());
   for (const CloudPoint& point : points) {

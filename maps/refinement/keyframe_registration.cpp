@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/depth/median.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
@@ -150,9 +151,7 @@ void summarise(const Neighbours& found, const std::vector<MapKeyframe>& map, std
   registration.seen = found.seen;
   registration.inliers = found.inliers;
   if (errors.empty()) return;
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
-  registration.median_error = *middle;
+  registration.median_error = upperMedian(errors);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {

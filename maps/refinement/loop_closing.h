@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "mapping/geometry/angle.h"
 #include "maps/refinement/keyframe_registration.h"
 #include "maps/refinement/tracker_errors.h"
 

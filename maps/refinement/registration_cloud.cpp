@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "mapping/depth/median.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
@@ -158,10 +159,8 @@ bool isUsable(const RegistrationPoint& point) {
 }
 
 float typicalSigma(std::vector<CertainPixel> pixels) {
-  const auto middle = pixels.begin() + static_cast<std::ptrdiff_t>(pixels.size() / 2);
-  std::nth_element(pixels.begin(), middle, pixels.end(),
-                   [](const CertainPixel& a, const CertainPixel& b) { return a.sigma < b.sigma; });
-  return middle->sigma;
+  const auto less = [](const CertainPixel& a, const CertainPixel& b) { return a.sigma < b.sigma; };
+  return upperMedian(pixels, less).sigma;
 }
 
 }  // namespace

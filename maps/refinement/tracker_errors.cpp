@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {

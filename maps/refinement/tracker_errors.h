@@ -3,11 +3,10 @@
 
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "maps/refinement/pose_difference.h"
 
 namespace efm {
-
-inline constexpr double kRadiansPerDegree = 3.14159265358979323846 / 180;
 
 /// What one pose errs by on its own: standard deviations on each axis, or how many times as large
 /// they are as those of others.

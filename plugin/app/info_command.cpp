@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <exception>
 #include <iostream>
-#include <limits>
 #include <map>
 #include <optional>
 #include <vector>
@@ -79,15 +78,13 @@ class Contents {
   }
 
  private:
-  static constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
-
   void addPacket(const CObservationEvents& packet) {
     CameraInfo& camera = cameras[packet.sensorLabel];
     camera.model = packet.camera;
     for (const Event& event : packet.events) camera.events.add(event.t_ns);
     if (poses.last_ns) {
-      events_before_poses += countEvents(packet.events, -kEver, *poses.first_ns);
-      events_after_poses += countEvents(packet.events, *poses.last_ns + 1, kEver);
+      events_before_poses += countEvents(packet.events, -kMaxTimeNs, *poses.first_ns);
+      events_after_poses += countEvents(packet.events, *poses.last_ns + 1, kMaxTimeNs);
     }
     camera.newest = packet.events;
   }
@@ -99,8 +96,9 @@ class Contents {
     if (*poses.last_ns == t_ns) events_after_poses = 0;
     for (const auto& [label, camera] : cameras) {
       if (first)
-        events_before_poses += camera.events.count - countEvents(camera.newest, t_ns, kEver);
-      if (*poses.last_ns == t_ns) events_after_poses += countEvents(camera.newest, t_ns + 1, kEver);
+        events_before_poses += camera.events.count - countEvents(camera.newest, t_ns, kMaxTimeNs);
+      if (*poses.last_ns == t_ns)
+        events_after_poses += countEvents(camera.newest, t_ns + 1, kMaxTimeNs);
     }
   }
 };

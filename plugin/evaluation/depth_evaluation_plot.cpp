@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/depth/median.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/depth_file.h"
@@ -57,12 +58,10 @@ ShownDepths shownDepths(const EvaluatedMap& map, const DepthEvaluationOptions& o
 const EvaluatedMap& typicalMap(const DepthEvaluation& evaluation) {
   std::vector<const EvaluatedMap*> maps;
   for (const EvaluatedMap& map : evaluation.maps) maps.push_back(&map);
-  const auto middle = maps.begin() + static_cast<std::ptrdiff_t>(maps.size() / 2);
-  std::nth_element(maps.begin(), middle, maps.end(),
-                   [](const EvaluatedMap* a, const EvaluatedMap* b) {
-                     return a->errors.points < b->errors.points;
-                   });
-  return **middle;
+  const auto fewer = [](const EvaluatedMap* a, const EvaluatedMap* b) {
+    return a->errors.points < b->errors.points;
+  };
+  return *upperMedian(maps, fewer);
 }
 
 /// The range that all but the outermost hundredths of the values lie in.

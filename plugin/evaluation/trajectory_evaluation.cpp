@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/evaluation/file_in_folder.h"
 #include "plugin/evaluation/text_table.h"
@@ -16,7 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using Unit = RelativeSpacing::Unit;
 
-constexpr double kDegrees = 180 / M_PI;
+constexpr double kDegrees = 180 / kPi;
 
 std::string nameOf(TrajectoryAlignment alignment) {
   switch (alignment) {

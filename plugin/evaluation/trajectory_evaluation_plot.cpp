@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/text_table.h"
@@ -80,7 +81,7 @@ cv::Mat3b evaluationPlot(const TrajectoryEvaluation& evaluation) {
       {topView(evaluation),
        oneBelowAnother(
            {overTime(evaluation, evaluation.errors.translation_m, 1, "position [m]"),
-            overTime(evaluation, evaluation.errors.rotation_rad, 180 / M_PI, "rotation [deg]")})});
+            overTime(evaluation, evaluation.errors.rotation_rad, 180 / kPi, "rotation [deg]")})});
 }
 
 }  // namespace efm

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "mapping/geometry/angle.h"
+
 namespace efm {
 namespace {
 

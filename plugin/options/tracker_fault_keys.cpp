@@ -6,6 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "maps/refinement/tracker_errors.h"

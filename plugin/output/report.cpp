@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <variant>
 
+#include "mapping/geometry/angle.h"
 #include "plugin/options/tracker_fault_keys.h"
 
 namespace efm {

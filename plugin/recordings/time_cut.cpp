@@ -2,7 +2,6 @@
 #include "plugin/recordings/time_cut.h"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
@@ -15,7 +14,6 @@ namespace {
 
 using mrpt::obs::CObservation;
 
-constexpr std::int64_t kEver = std::numeric_limits<std::int64_t>::max();
 /// How long after another camera's packets one may first come, or come on.
 constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
 
@@ -24,9 +22,9 @@ constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
 /// @return nothing where it has neither an event nor news.
 std::optional<std::int64_t> beginOf(const CObservationEvents& packet) {
   if (packet.events.empty() && !packet.covered_until_ns) return std::nullopt;
-  std::int64_t begin_ns = packet.covered_until_ns.value_or(kEver);
+  std::int64_t begin_ns = packet.covered_until_ns.value_or(kMaxTimeNs);
   if (!packet.events.empty()) begin_ns = std::min(begin_ns, packet.events.front().t_ns);
-  return std::min(begin_ns, nanosecondsIfKnown(packet.timestamp).value_or(kEver));
+  return std::min(begin_ns, nanosecondsIfKnown(packet.timestamp).value_or(kMaxTimeNs));
 }
 
 /// @return whether something is left: an event, or the news that there was none.
@@ -37,7 +35,7 @@ bool cutEvents(CObservationEvents& packet, std::int64_t begin_ns, std::int64_t t
     return event.t_ns < t0_ns || event.t_ns >= t1_ns;
   };
   events.erase(std::remove_if(events.begin(), events.end(), outside), events.end());
-  if (nanosecondsIfKnown(packet.timestamp).value_or(kEver) < t0_ns) {
+  if (nanosecondsIfKnown(packet.timestamp).value_or(kMaxTimeNs) < t0_ns) {
     packet.timestamp = mrptTimeFrom(events.empty() ? t0_ns : events[0].t_ns);
   }
   if (!packet.covered_until_ns) return !events.empty();
@@ -51,8 +49,8 @@ bool cutEvents(CObservationEvents& packet, std::int64_t begin_ns, std::int64_t t
 TimeCut::TimeCut(std::unique_ptr<Recording> recording, std::optional<std::int64_t> t0_ns,
                  std::optional<std::int64_t> t1_ns)
     : recording_(std::move(recording)),
-      t0_ns_(t0_ns.value_or(std::numeric_limits<std::int64_t>::min())),
-      t1_ns_(t1_ns.value_or(kEver)) {
+      t0_ns_(t0_ns.value_or(kMinTimeNs)),
+      t1_ns_(t1_ns.value_or(kMaxTimeNs)) {
   TimeLimits{t0_ns, t1_ns}.validate();
 }
 

@@ -3,12 +3,12 @@
 
 #include <cstdint>
 #include <deque>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/recording.h"
 #include "plugin/session/pose_source_selector.h"
@@ -53,8 +53,8 @@ class TimeCut : public Recording {
   std::map<PoseOrigin, PoseTrack> poses_;
   std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until it is given
   std::deque<mrpt::obs::CObservation::Ptr> ready_;
-  std::map<int, bool> passed_t1_;                                           // per camera
-  std::int64_t first_begin_ns_ = std::numeric_limits<std::int64_t>::max();  // of packets
+  std::map<int, bool> passed_t1_;             // per camera
+  std::int64_t first_begin_ns_ = kMaxTimeNs;  // of packets
   bool events_ended_ = false;
 };
 

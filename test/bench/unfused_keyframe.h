@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "mapping/depth/depth_extraction.h"
-#include "mapping/events/event_span.h"
+#include "mapping/events/event.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/reference_view.h"

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "mapping/depth/median.h"
+#include "mapping/geometry/angle.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/motion/velocity_correction.h"
 #include "test/integration/simulated_recording.h"
@@ -13,8 +15,6 @@
 
 namespace efm {
 namespace {
-
-constexpr double kDegree = 0.017453292519943295;
 
 class MotionCorrectionOnTheDesk : public ::testing::Test {
  protected:
@@ -55,9 +55,7 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
     for (const DepthPair& pair : recording_->pairs(keyframe)) {
       errors.push_back(std::abs(pair.estimate_m / pair.truth_m - 1));
     }
-    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::nth_element(errors.begin(), middle, errors.end());
-    return *middle;
+    return upperMedian(errors);
   }
 
   static test::SimulatedRecording* recording_;
@@ -67,7 +65,8 @@ test::SimulatedRecording* MotionCorrectionOnTheDesk::recording_ = nullptr;
 
 TEST_F(MotionCorrectionOnTheDesk, AWrongVelocityIsFoundAndDepthIsNearlyThatOfExactPoses) {
   const Eigen::Vector3d linear_m_s = 0.05 * Eigen::Vector3d(2, -1, 1).normalized();
-  const Eigen::Vector3d angular_rad_s = 5 * kDegree * Eigen::Vector3d(1, 2, -2).normalized();
+  const Eigen::Vector3d angular_rad_s =
+      5 * kRadiansPerDegree * Eigen::Vector3d(1, 2, -2).normalized();
   const double exact = error(map(truth(), false));
   for (const double sign : {1.0, -1.0}) {
     const Trajectory wrong =
@@ -77,7 +76,7 @@ TEST_F(MotionCorrectionOnTheDesk, AWrongVelocityIsFoundAndDepthIsNearlyThatOfExa
     // At the ends of the window, 0.1 s away, 0.1 degrees are half a pixel, which is what votes are
     // spread over. Sliding looks much like turning, but for how depths differ: half of it is found.
     EXPECT_LT((corrected.motion_correction->angular_rad_s - sign * angular_rad_s).norm(),
-              1.0 * kDegree);
+              1.0 * kRadiansPerDegree);
     EXPECT_LT((corrected.motion_correction->linear_m_s - sign * linear_m_s).norm(), 0.035);
     EXPECT_LT(error(corrected), 1.5 * exact);
     EXPECT_LT(error(corrected), 0.6 * error(map(wrong, false)));

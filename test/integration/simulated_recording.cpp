@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "mapping/depth/median.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "test/tracking_stub/truth/nearest_surface.h"
 #include "tracking_stub/rendering/depth_rendering.h"
@@ -48,9 +49,7 @@ double SimulatedRecording::medianDistanceToSurfaces(const std::vector<CloudPoint
     distances.push_back(nearestSurface(simulation_.scene, point.p_world).distance_m);
   }
   if (distances.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return upperMedian(distances);
 }
 
 double SimulatedRecording::shareBeyond(const std::vector<CloudPoint>& points,

@@ -6,6 +6,8 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "mapping/depth/peak_fit.h"
+
 namespace efm::oracle {
 namespace {
 

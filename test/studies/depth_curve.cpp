@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "mapping/depth/median.h"
 #include "mapping/geometry/depth_planes.h"
 #include "maps/metrics/depth_metrics.h"
 #include "test/studies/visible_edges.h"
@@ -121,9 +122,7 @@ PointQuality DepthJudge::judge(const std::vector<KeyframeDepthMap>& keyframes) {
   quality.within_sigma = share(tally.within_sigma, tally.inliers);
   quality.within_2_sigma = share(tally.within_2_sigma, tally.inliers);
   if (!tally.errors.empty()) {
-    const auto middle = tally.errors.begin() + static_cast<std::ptrdiff_t>(count / 2);
-    std::nth_element(tally.errors.begin(), middle, tally.errors.end());
-    quality.median = *middle;
+    quality.median = upperMedian(tally.errors);
   }
   return quality;
 }

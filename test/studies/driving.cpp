@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/pictures/depth_picture.h"
 #include "test/studies/error_figures.h"
@@ -145,7 +146,7 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
       "Poses are exact here; the paper's are a LiDAR's odometry at 10 Hz. The same windows "
       "with poses that sway around the true ones, on each axis by a sine of 2 cm and 0.1 "
       "degrees at about 1 Hz:");
-  constexpr PoseSway kSway{0.02, 0.1 * 3.14159265358979 / 180, 1};
+  constexpr PoseSway kSway{0.02, 0.1 * kRadiansPerDegree, 1};
   const auto swayed = compareMethods(withPoseSway(recording, kSway), windows, methods, options);
   section.table(errorTable(swayed, {false, true}));
   const DepthErrors& one = swayed[0].own;

@@ -6,12 +6,11 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/options/option_check.h"
 
 namespace efm::studies {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 EdgeKind kindOf(double direction, const EdgeKindOptions& options) {
   const double from_horizontal_deg = std::min(direction, kPi - direction) * 180 / kPi;

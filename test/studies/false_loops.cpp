@@ -5,7 +5,8 @@
 #include <cstddef>
 #include <optional>
 
-#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/studies/pose_refinement_run.h"
 #include "tracking_stub/random/random_vectors.h"
 
@@ -19,7 +20,7 @@ constexpr double kWrongM = 0.3;
 constexpr double kWrongRad = 15 * kRadiansPerDegree;
 
 Rigid3 errorOf(RandomNumbers& random, double length_m, double angle_rad) {
-  return {turnBy(angle_rad * randomDirection(random)), length_m * randomDirection(random)};
+  return {rotationBy(angle_rad * randomDirection(random)), length_m * randomDirection(random)};
 }
 
 /// Makes up loops that are none.

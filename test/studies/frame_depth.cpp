@@ -8,6 +8,8 @@
 #include <stdexcept>
 
 #include "mapping/depth/depth_extraction.h"
+#include "mapping/depth/median.h"
+#include "mapping/depth/peak_fit.h"
 #include "mapping/options/option_check.h"
 #include "test/studies/frame_sweep.h"
 
@@ -165,9 +167,7 @@ cv::Mat1f seenFrom(const ReferenceView& view, const Rigid3& T_world_ref, const P
   std::copy_if(smooth.begin(), smooth.end(), std::back_inserter(known),
                [](float z) { return z > 0; });
   if (known.empty()) throw std::runtime_error("the frames see nothing that the view sees");
-  std::nth_element(known.begin(), known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2),
-                   known.end());
-  const float middle = known[known.size() / 2];
+  const float middle = upperMedian(known);
   const Rigid3 T_cam_ref = frame.T_world_cam.inverse() * T_world_ref;
   cv::Mat2f source(view.height, view.width);
   for (int y = 0; y < view.height; ++y) {

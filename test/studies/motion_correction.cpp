@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/motion/velocity_correction.h"
 #include "plugin/pictures/curve_plot.h"
 #include "test/studies/error_figures.h"
@@ -19,8 +20,6 @@
 
 namespace efm::studies {
 namespace {
-
-constexpr double kDegree = 0.017453292519943295;
 
 struct Case {
   const char* preset;
@@ -43,7 +42,7 @@ std::vector<TrackerError> trackerErrors(bool quick) {
     errors.push_back({number + " cm/s, " + number + "°/s", velocity, std::nullopt});
   }
   errors.push_back({"sway of 1 cm, 0.1°", 0, kTrackerSway});
-  if (!quick) errors.push_back({"sway of 1 cm, 1°", 0, PoseSway{0.01, kDegree, 1}});
+  if (!quick) errors.push_back({"sway of 1 cm, 1°", 0, PoseSway{0.01, kRadiansPerDegree, 1}});
   return errors;
 }
 
@@ -99,7 +98,7 @@ void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
   outcome.corrected += keyframe.motion_correction ? 1 : 0;
   const VelocityCorrection found = keyframe.motion_correction.value_or(VelocityCorrection{});
   outcome.left_cm_s += 100 * (found.linear_m_s - wrong.linear_m_s).norm();
-  outcome.left_deg_s += (found.angular_rad_s - wrong.angular_rad_s).norm() / kDegree;
+  outcome.left_deg_s += (found.angular_rad_s - wrong.angular_rad_s).norm() / kRadiansPerDegree;
   const auto pairs = pairDepths(keyframe.map.depth, truthOf(recording, keyframe), studyPairing());
   for (const DepthPair& pair : pairs) {
     outcome.errors.push_back(std::abs(pair.estimate_m - pair.truth_m) / pair.truth_m);
@@ -114,7 +113,7 @@ void mapWindows(Outcomes& outcomes, const Recording& recording, const TrackerErr
   RandomNumbers random(recording.simulation.seed);
   for (const Window& window : windows) {
     const VelocityCorrection to_find{0.01 * error.velocity * direction(random),
-                                     kDegree * error.velocity * direction(random)};
+                                     kRadiansPerDegree * error.velocity * direction(random)};
     if (error.velocity > 0) {
       wrong.trajectory = correctedTrajectory(recording.trajectory, window,
                                              {-to_find.linear_m_s, -to_find.angular_rad_s});

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
 #include "plugin/pictures/curve_plot.h"
@@ -19,8 +20,6 @@
 
 namespace efm::studies {
 namespace {
-
-constexpr double kDegree = 0.017453292519943295;
 
 /// One kind of error, from none to much of it.
 struct ErrorKind {
@@ -48,14 +47,14 @@ std::vector<ErrorKind> errorKinds() {
   };
   const auto set_noise = [](PoseErrors& errors, double mm) {
     errors.noise_m = 1e-3 * mm;
-    errors.noise_rad = 0.05 * mm * kDegree;
+    errors.noise_rad = 0.05 * mm * kRadiansPerDegree;
   };
   const auto say_drift = [](double mm) {
     return formatNumber(mm, 0) + " mm/s, " + formatNumber(0.02 * mm, 2) + "°/s";
   };
   const auto set_drift = [](PoseErrors& errors, double mm) {
     errors.drift_m_s = 1e-3 * mm;
-    errors.drift_rad_s = 0.02 * mm * kDegree;
+    errors.drift_rad_s = 0.02 * mm * kRadiansPerDegree;
   };
   const auto say_late = [](double ms) { return formatNumber(ms, 0) + " ms"; };
   const auto nanoseconds = [](double ms) { return static_cast<std::int64_t>(ms * 1e6); };

@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_vectors.h"
 
@@ -22,14 +22,14 @@ Recording withPoseErrors(const Recording& recording, const PoseErrors& errors) {
   for (std::int64_t t_ns = start_ns; t_ns <= end_ns; t_ns += errors.period_ns) {
     const Rigid3 T_world_rig = motion.poseAt(t_ns);
     const double elapsed_s = secondsBetween(start_ns, t_ns);
-    const Eigen::Quaterniond turned = turnBy(errors.drift_rad_s * elapsed_s * every_axis);
+    const Eigen::Quaterniond turned = rotationBy(errors.drift_rad_s * elapsed_s * every_axis);
     drifted_m += turned * (T_world_rig.translation - true_m);
     true_m = T_world_rig.translation;
     StampedPose pose{t_ns + errors.late_ns, {}};
     pose.T_world_rig.translation = drifted_m + errors.drift_m_s * elapsed_s * every_axis +
                                    errors.noise_m * normalVector(random);
     pose.T_world_rig.rotation =
-        (turned * T_world_rig.rotation * turnBy(errors.noise_rad * normalVector(random)))
+        (turned * T_world_rig.rotation * rotationBy(errors.noise_rad * normalVector(random)))
             .normalized();
     wrong.trajectory.add(pose);
   }

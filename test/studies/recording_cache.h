@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "mapping/events/event.h"
-#include "mapping/events/event_span.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/trajectory.h"
 #include "tracking_stub/sensor/simulated_rig.h"

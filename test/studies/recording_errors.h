@@ -3,6 +3,7 @@
 
 #include <cstddef>
 
+#include "mapping/geometry/angle.h"
 #include "test/studies/recording_cache.h"
 #include "tracking_stub/sensor/event_noise.h"
 
@@ -17,7 +18,7 @@ struct PoseSway {
 };
 
 /// What an indoor tracker may err by: 1 cm and 0.1 degrees.
-inline constexpr PoseSway kTrackerSway{0.01, 0.1 * 3.14159265358979 / 180, 1};
+inline constexpr PoseSway kTrackerSway{0.01, 0.1 * kRadiansPerDegree, 1};
 
 /// The recording as a tracker with such errors would have it; the truth stays where it was.
 Recording withPoseSway(const Recording& recording, const PoseSway& sway);

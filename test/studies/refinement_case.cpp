@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
 #include "test/studies/pose_refinement_run.h"
 #include "test/studies/real_rigs.h"
 #include "test/studies/room_loop.h"

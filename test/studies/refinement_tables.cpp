@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "test/studies/refinement_tables.h"
 
+#include "mapping/geometry/angle.h"
 #include "maps/metrics/sample_statistics.h"
 #include "test/studies/error_figures.h"
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "test/studies/refinement_case.h"
 #include "test/studies/study_section.h"
 

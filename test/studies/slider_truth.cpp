@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "mapping/depth/median.h"
 #include "maps/metrics/depth_metrics.h"
 #include "test/studies/posed_frames.h"
 
@@ -41,9 +42,7 @@ double shareBeyond(const std::vector<double>& errors, double limit) {
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return upperMedian(values);
 }
 
 double share(int part, int whole) {

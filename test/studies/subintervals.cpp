@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/depth/median.h"
 #include "test/studies/error_figures.h"
 #include "test/studies/error_table.h"
 #include "test/studies/method_comparison.h"
@@ -67,9 +68,7 @@ double medianQuarterStepCm(const Recording& recording, const MethodResult& resul
     }
   }
   if (quarters.empty()) return 0;
-  const auto middle = quarters.begin() + static_cast<std::ptrdiff_t>(quarters.size() / 2);
-  std::nth_element(quarters.begin(), middle, quarters.end());
-  return *middle;
+  return upperMedian(quarters);
 }
 
 /// @param departure why trends depart: said once.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/faults/keyframe_noise.h"
 
-#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
 #include "tracking_stub/random/random_vectors.h"
@@ -53,7 +53,7 @@ std::int64_t KeyframeNoise::stretchAt(std::int64_t t_ns) const {
 Rigid3 KeyframeNoise::errorOf(std::int64_t stretch, const Eigen::Vector3d& rig_world) const {
   RandomNumbers random(seed_, static_cast<std::uint64_t>(stretch));
   const Eigen::Vector3d shift_world = options_.noise_m * normalVector(random);
-  const Eigen::Quaterniond turned = turnBy(options_.noise_rad * normalVector(random));
+  const Eigen::Quaterniond turned = rotationBy(options_.noise_rad * normalVector(random));
   return {turned, rig_world - turned * rig_world + shift_world};
 }
 

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
 #include "tracking_stub/random/random_vectors.h"
@@ -81,7 +81,7 @@ void PerturbedPoses::take(const StampedPose& pose) {
 Rigid3 PerturbedPoses::drawNoise(std::int64_t t_ns) const {
   RandomNumbers random(seedOf(Kind::kPose, options_.seed), static_cast<std::uint64_t>(t_ns));
   const Eigen::Vector3d shift_world = options_.noise_m * normalVector(random);
-  return {turnBy(options_.noise_rad * normalVector(random)), shift_world};
+  return {rotationBy(options_.noise_rad * normalVector(random)), shift_world};
 }
 
 /// Enters the stretch that a pose is in, and where one begins on the way there puts poses in.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/faults/pose_drift.h"
 
-#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/options/option_check.h"
 #include "tracking_stub/random/random_vectors.h"
 
@@ -30,7 +30,7 @@ Rigid3 PoseDrift::drifted(const Rigid3& T_world_rig) {
   const Eigen::Vector3d step_world = T_world_rig.translation - *true_world_;
   true_world_ = T_world_rig.translation;
   way_m_ += step_world.norm();
-  const Eigen::Quaterniond turned = turnBy(options_.rad_per_m * way_m_ * axis_world_);
+  const Eigen::Quaterniond turned = rotationBy(options_.rad_per_m * way_m_ * axis_world_);
   drifted_world_ += turned * step_world + options_.share * step_world.norm() * direction_world_;
   return {(turned * T_world_rig.rotation).normalized(), drifted_world_};
 }

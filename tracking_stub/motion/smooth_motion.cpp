@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
@@ -29,7 +29,7 @@ Rigid3 SmoothMotion::poseAt(std::int64_t t_ns) const {
   const double t_s = secondsBetween(options_.start_ns, t_ns);
   Rigid3 T_center_rig;
   T_center_rig.translation = valueAt(options_.translation, t_s) + options_.velocity * t_s;
-  T_center_rig.rotation = turnBy(valueAt(options_.rotation, t_s));
+  T_center_rig.rotation = rotationBy(valueAt(options_.rotation, t_s));
   return options_.T_world_center * T_center_rig;
 }
 

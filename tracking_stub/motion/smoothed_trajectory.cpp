@@ -7,13 +7,13 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/depth/median.h"
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 using Poses = std::vector<StampedPose>;
 
@@ -49,9 +49,7 @@ std::pair<std::vector<double>, std::vector<double>> deviations(const Poses& pose
 void markJumps(const std::vector<double>& deviation, std::vector<bool>& jumps) {
   constexpr double kTimesUsual = 8;
   std::vector<double> sorted = deviation;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  const double limit = kTimesUsual * *middle + 1e-9;
+  const double limit = kTimesUsual * upperMedian(sorted) + 1e-9;
   for (std::size_t i = 1; i + 1 < deviation.size(); ++i) {
     if (deviation[i] > limit && deviation[i] >= deviation[i - 1] &&
         deviation[i] > deviation[i + 1]) {
@@ -87,9 +85,7 @@ double medianPeriod(const Poses& poses) {
   for (std::size_t i = 1; i < poses.size(); ++i) {
     periods.push_back(secondsBetween(poses[i - 1].t_ns, poses[i].t_ns));
   }
-  const auto middle = periods.begin() + static_cast<std::ptrdiff_t>(periods.size() / 2);
-  std::nth_element(periods.begin(), middle, periods.end());
-  return *middle;
+  return upperMedian(periods);
 }
 
 Poses resampled(const Poses& poses, std::int64_t period_ns) {

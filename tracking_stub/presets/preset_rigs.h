@@ -3,13 +3,14 @@
 
 #include <Eigen/Geometry>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/rig.h"
 
 namespace efm {
 
 /// What presets put their rigs and motions together from.
 
-inline double radians(double deg) { return deg * 3.14159265358979323846 / 180; }
+inline double radians(double deg) { return deg * kPi / 180; }
 
 /// R_world_cam of a level camera (x right, y down, z forward) that looks along y in a world whose z
 /// is up.

@@ -6,12 +6,12 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 /// The painting is made this much finer than its texels and averaged: where an edge falls within a
 /// texel shows in the texel's value.
 constexpr int kOversampling = 4;

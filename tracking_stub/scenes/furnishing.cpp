@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/geometry/angle.h"
+
 namespace efm {
 namespace {
 
 using Eigen::Vector3d;
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Furnishes one wall, a piece after the other.
 class Furnisher {

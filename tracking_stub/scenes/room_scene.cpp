@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/options/option_check.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/scenes/furnishing.h"
@@ -14,7 +15,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kPanelM = 1.7;
 
 /// The four walls, seen from inside: where each begins at its left end, and its length.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
@@ -35,7 +36,6 @@ void Scene::addPole(const Pole& pole, const Painter& paint) {
   requireOption(pole.length_m > 0, "length_m", pole.length_m, "above 0");
   requireOption(pole.facets >= 4 && pole.facets % 2 == 0, "facets", pole.facets,
                 "even, at least 4");
-  constexpr double kPi = 3.14159265358979323846;
   const double half_angle = kPi / pole.facets;
   const double width = 2 * pole.radius_m * std::sin(half_angle);
   const double apothem = pole.radius_m * std::cos(half_angle);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/options/option_check.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/scenes/furnishing.h"
@@ -56,7 +57,7 @@ class MiddleLine {
     Vector2d beside(double left_m) const {
       return point + left_m * Vector2d(-ahead.y(), ahead.x());
     }
-    double yawDegrees() const { return std::atan2(ahead.y(), ahead.x()) * 180 / 3.14159265358979; }
+    double yawDegrees() const { return std::atan2(ahead.y(), ahead.x()) * 180 / kPi; }
   };
   Place at(double s_m) const {
     for (std::size_t i = 1; i < points_.size(); ++i) {

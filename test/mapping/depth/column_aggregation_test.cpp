@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "mapping/depth/pixel_neighbours.h"
+#include "mapping/depth/sparse_mask.h"
 #include "test/mapping/dsi/chosen_dsi.h"
 
 namespace efm {
@@ -54,7 +54,7 @@ cv::Mat1b randomMask(std::uint32_t seed, const cv::Size& size, int one_of) {
 
 std::vector<AggregatedPeak> aggregate(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   const SweptDsi swept = dsi.swept();
-  return aggregateRays(KeptPixels(mask), swept.rays, swept.peaks.confidence.size());
+  return aggregateRays(SparseMask(mask), swept.rays, swept.peaks.confidence.size());
 }
 
 /// The sum of the rays of the chosen pixels in 9x9, in double.
@@ -82,7 +82,7 @@ bool isTie(const std::vector<double>& sum, double top) {
 
 void expectNaive(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   const std::vector<AggregatedPeak> peaks = aggregate(dsi, mask);
-  const KeptPixels chosen(mask);
+  const SparseMask chosen(mask);
   ASSERT_EQ(peaks.size(), chosen.size());
   const double place = std::max(1.0, (dsi.planes - 1) / 99.0);
   int compared = 0;
@@ -244,12 +244,12 @@ TEST(PlanesOfOnePlace, IsOneUpToAHundredPlanesAndGrowsWithThem) {
 
 TEST(PixelNeighbours, AreTheKeptPixelsWithinFourRowByRow) {
   const cv::Mat1b mask = randomMask(13, {40, 30}, 4);
-  const PixelNeighbours neighbours(KeptPixels(mask), mask.size());
+  const PixelNeighbours neighbours(SparseMask(mask), mask.size());
   for (int y = 0; y < mask.rows; ++y) {
     for (int x = 0; x < mask.cols; ++x) {
       std::vector<cv::Point> expected;
       std::vector<std::size_t> indices;
-      KeptPixels(mask).forEach([&](std::size_t i, cv::Point at) {
+      SparseMask(mask).forEach([&](std::size_t i, cv::Point at) {
         if (std::abs(at.x - x) > 4 || std::abs(at.y - y) > 4) return;
         expected.push_back(at - cv::Point(x, y));
         indices.push_back(i);

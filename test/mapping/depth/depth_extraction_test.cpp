@@ -11,6 +11,8 @@
 #include <random>
 #include <stdexcept>
 
+#include "mapping/depth/peak_fit.h"
+
 namespace efm {
 namespace {
 

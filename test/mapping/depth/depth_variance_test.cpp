@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "mapping/depth/paper_extraction.h"
+#include "mapping/depth/peak_fit.h"
 
 namespace efm {
 namespace {

@@ -30,7 +30,7 @@ struct Depths {
     weights(pixel) = weight;
   }
   std::vector<LocalAgreement> agreement() const {
-    const KeptPixels kept(mask);
+    const SparseMask kept(mask);
     std::vector<float> kept_positions;
     std::vector<float> kept_weights;
     kept.forEach([&](std::size_t, cv::Point at) {
@@ -43,7 +43,7 @@ struct Depths {
   LocalAgreement at(const cv::Point& pixel) const {
     LocalAgreement found;
     const std::vector<LocalAgreement> all = agreement();
-    KeptPixels(mask).forEach([&](std::size_t i, cv::Point place) {
+    SparseMask(mask).forEach([&](std::size_t i, cv::Point place) {
       if (place == pixel) found = all[i];
     });
     return found;
@@ -109,7 +109,7 @@ TEST(LocalAgreement, IsTheNaiveOneForDenseAndSparsePixels) {
     for (const int one_of : {1, 4, 30}) {
       const Depths depths = randomDepths(static_cast<std::uint32_t>(one_of), size, one_of);
       const std::vector<LocalAgreement> found = depths.agreement();
-      KeptPixels(depths.mask).forEach([&](std::size_t i, cv::Point at) {
+      SparseMask(depths.mask).forEach([&](std::size_t i, cv::Point at) {
         const LocalAgreement exact = naive(depths, at);
         SCOPED_TRACE(testing::Message() << at << " of " << size << ", one of " << one_of);
         ASSERT_EQ(found[i].median, exact.median);

@@ -24,7 +24,7 @@ cv::Mat1b randomMask(int width, int height, double share, std::mt19937& random) 
 std::vector<float> naiveMedian(const cv::Mat1b& mask, const std::vector<float>& values,
                                int window) {
   cv::Mat1f image = cv::Mat1f::zeros(mask.size());
-  const KeptPixels kept(mask);
+  const SparseMask kept(mask);
   kept.forEach([&](std::size_t i, cv::Point at) { image(at) = values[i]; });
   std::vector<float> medians(values.size());
   kept.forEach([&](std::size_t i, cv::Point at) {
@@ -41,9 +41,9 @@ std::vector<float> naiveMedian(const cv::Mat1b& mask, const std::vector<float>& 
   return medians;
 }
 
-TEST(KeptPixels, AreThoseOfTheMaskInTheOrderOfTheImage) {
+TEST(SparseMask, AreThoseOfTheMaskInTheOrderOfTheImage) {
   const cv::Mat1b mask = (cv::Mat1b(3, 4) << 0, 1, 0, 255, 0, 0, 0, 0, 1, 0, 0, 1);
-  const KeptPixels kept(mask);
+  const SparseMask kept(mask);
   std::vector<cv::Point> pixels;
   kept.forEach([&](std::size_t i, cv::Point at) {
     EXPECT_EQ(i, pixels.size());
@@ -54,7 +54,7 @@ TEST(KeptPixels, AreThoseOfTheMaskInTheOrderOfTheImage) {
   EXPECT_EQ(kept.rowBegin(1), kept.rowBegin(2)) << "an empty row";
 }
 
-TEST(KeptPixels, OfAnEmptyImageAreNone) { EXPECT_EQ(KeptPixels(cv::Mat1b()).size(), 0U); }
+TEST(SparseMask, OfAnEmptyImageAreNone) { EXPECT_EQ(SparseMask(cv::Mat1b()).size(), 0U); }
 
 TEST(MaskedMedian, IsThatOfTheSortedWindow) {
   std::mt19937 random(1);
@@ -70,7 +70,7 @@ TEST(MaskedMedian, IsThatOfTheSortedWindow) {
       value = std::floor(std::uniform_real_distribution<float>(-spread, spread)(random)) / 2;
     }
     for (const int window : {1, 3, 5, 11, 31, 255}) {
-      EXPECT_EQ(maskedMedian(KeptPixels(mask), values, window), naiveMedian(mask, values, window))
+      EXPECT_EQ(maskedMedian(SparseMask(mask), values, window), naiveMedian(mask, values, window))
           << width << "x" << height << ", window " << window;
     }
   }
@@ -83,7 +83,7 @@ TEST(MaskedMedian, OfALargeWindowIsTheMedianOfAll) {
   for (float& value : values) value = std::uniform_real_distribution<float>(0, 99)(random);
   std::vector<float> sorted = values;
   std::sort(sorted.begin(), sorted.end());
-  for (const float median : maskedMedian(KeptPixels(mask), values, 255)) {
+  for (const float median : maskedMedian(SparseMask(mask), values, 255)) {
     ASSERT_EQ(median, sorted[(sorted.size() - 1) / 2]);
   }
 }

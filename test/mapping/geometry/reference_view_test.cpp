@@ -9,13 +9,13 @@
 #include <limits>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
+
 namespace efm {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
-
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 /// Pixels that are not squares, a principal point that is not in the middle.
 const CameraModel kModel{120, 80, 95.0, 90.0, 62.3, 37.1, DistortionModel::kNone, {}};
@@ -85,7 +85,7 @@ TEST(ReferenceView, TheFieldOfViewIsTheAngleBetweenTheRaysOfLeftAndRightEdge) {
       const Eigen::Vector3d left = rayOf(view, -0.5, view.cy);
       const Eigen::Vector3d right = rayOf(view, view.width - 0.5, view.cy);
       const double angle = std::atan2(left.cross(right).norm(), left.dot(right));
-      EXPECT_NEAR(angle, fov_deg * kDegree, 1e-12);
+      EXPECT_NEAR(angle, fov_deg * kRadiansPerDegree, 1e-12);
       EXPECT_NEAR(left.x(), -right.x(), 1e-9 * right.x()) << "the principal point in the middle";
       EXPECT_DOUBLE_EQ(view.cy, 0.5 * (view.height - 1));
       EXPECT_NEAR(view.fy / view.fx, 90.0 / 95.0, 1e-12) << "pixels as they were";

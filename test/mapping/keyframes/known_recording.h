@@ -4,19 +4,19 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/keyframe_policy.h"
 
 namespace efm::test {
 
 /// A recording of one camera that is known up to some time.
-class KnownRecording : public RecordingSoFar {
+class KnownRecording : public RecordingProgress {
  public:
   std::int64_t start_ns = 0;
-  std::int64_t complete_ns = std::numeric_limits<std::int64_t>::max() / 2;
+  std::int64_t complete_ns = kEndOfTimeNs;
   std::vector<std::int64_t> events_ns;  // in order
   std::function<std::optional<Rigid3>(std::int64_t)> T_world_ref_at;
   ReferenceView image{100, 80, 100, 100, 49.5, 39.5};

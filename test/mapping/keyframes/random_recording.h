@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mapping/events/event_span.h"
+#include "mapping/events/event.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"

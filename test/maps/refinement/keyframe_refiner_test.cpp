@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "edge_world.h"
+#include "mapping/geometry/angle.h"
 #include "random_poses.h"
 
 namespace efm {
@@ -26,8 +27,6 @@ using testing::HasSubstr;
 using testing::ThrowsMessage;
 using Poses = std::vector<Rigid3>;
 
-constexpr double kDeg = M_PI / 180;
-
 /// Fewer points than by default: as good here, and faster.
 RefinementOptions quick() {
   RefinementOptions options;
@@ -40,7 +39,7 @@ RefinementOptions quick() {
 Poses circle(int count, double step_deg) {
   Poses poses;
   for (int i = 0; i < count; ++i) {
-    const double yaw = i * step_deg * kDeg;
+    const double yaw = i * step_deg * kRadiansPerDegree;
     poses.push_back(viewTurned(
         yaw, 0.8 * Eigen::Vector3d(std::sin(yaw), 0.1 * std::sin(3 * yaw), std::cos(yaw))));
   }
@@ -121,7 +120,7 @@ TEST(KeyframeRefiner, TakesMostOfATrackersNoiseAway) {
     std::mt19937 random(seed);
     const Poses truth = circle(16, 5);
     const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
-    const Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+    const Poses tracked = noisy(truth, 0.01, 0.5 * kRadiansPerDegree, random);
     const KeyframeRefiner refiner = refine(seen, tracked, quick());
     EXPECT_GE(refiner.counts().registered, 14U) << seed;
     const Errors by_tracker = errorsOf(tracked, truth);
@@ -143,7 +142,7 @@ TEST(KeyframeRefiner, LeavesExactPosesWhereTheyAre) {
     const Poses refined = posesOf(refine(seen, truth, quick()));
     const Errors errors = errorsOf(refined, truth);
     EXPECT_LT(errors.m, 0.002) << seed;
-    EXPECT_LT(errors.rad, 0.05 * kDeg) << seed;
+    EXPECT_LT(errors.rad, 0.05 * kRadiansPerDegree) << seed;
   }
 }
 
@@ -151,26 +150,28 @@ TEST(KeyframeRefiner, ALoopTakesTheDriftOutOfItsEnd) {
   std::mt19937 random(1);
   const Poses truth = circle(36, 11);  // 385 deg: the end sees the begin
   const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
-  const Poses tracked = drifting(truth, 0.03, 1.5 * kDeg, random);
+  const Poses tracked = drifting(truth, 0.03, 1.5 * kRadiansPerDegree, random);
   const Rigid3 end = truth.front().inverse() * truth.back();
   const Rigid3 tracked_end = tracked.front().inverse() * tracked.back();
   RefinementOptions options = quick();
   options.tracker.drift_m = 0.03;
-  options.tracker.drift_rad = 1.5 * kDeg;
+  options.tracker.drift_rad = 1.5 * kRadiansPerDegree;
   for (const bool loops : {true, false}) {
     options.loop.loops = loops;
     const KeyframeRefiner refiner = refine(seen, tracked, options);
     const Rigid3 refined_end = refiner.T_world_ref(0).inverse() * refiner.T_world_ref(35);
     if (!loops) {
       EXPECT_EQ(refiner.counts().loop_checks, 0U);
-      EXPECT_GT(radiansApart(refined_end, end), 0.3 * kDeg) << "nobody would see that loops help";
+      EXPECT_GT(radiansApart(refined_end, end), 0.3 * kRadiansPerDegree)
+          << "nobody would see that loops help";
       continue;
     }
     EXPECT_GE(refiner.counts().loops, 1U);
     EXPECT_LE(refiner.counts().loops_dropped, refiner.counts().loops);
     EXPECT_LE(refiner.counts().loops, refiner.counts().loop_checks);
     EXPECT_LT(metresApart(refined_end, end), 0.3 * metresApart(tracked_end, end));
-    EXPECT_LT(radiansApart(refined_end, end), 0.3 * kDeg) << "twice a registration's error";
+    EXPECT_LT(radiansApart(refined_end, end), 0.3 * kRadiansPerDegree)
+        << "twice a registration's error";
   }
 }
 
@@ -180,7 +181,7 @@ struct Walk {
   Poses truth = circle(10, 5);
   EdgeWorld world = test::edgesAround(250, random);
   std::vector<KeyframeDepthMap> seen = seenAlong(world, truth, random);
-  Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+  Poses tracked = noisy(truth, 0.01, 0.5 * kRadiansPerDegree, random);
 };
 
 TEST(KeyframeRefiner, TheFirstPoseStaysBitForBitAndItIsTheSameTwice) {
@@ -202,7 +203,7 @@ TEST(KeyframeRefiner, MovesWithTheWorldHoweverFar) {
   for (std::size_t i = 0; i < near.size(); ++i) {
     // Rounding may change a few neighbours: a part of the millimetres that are left.
     EXPECT_LT(metresApart(T_utm_world.inverse() * far[i], near[i]), 5e-4) << i;
-    EXPECT_LT(radiansApart(T_utm_world.inverse() * far[i], near[i]), 0.02 * kDeg) << i;
+    EXPECT_LT(radiansApart(T_utm_world.inverse() * far[i], near[i]), 0.02 * kRadiansPerDegree) << i;
   }
 }
 
@@ -266,7 +267,7 @@ TEST(KeyframeRefiner, OfATrackerThatStandsStillTheNoiseIsLessened) {
   std::mt19937 random(8);
   const Poses truth(8, viewTurned(0, {0.1, 0, 0}));
   const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
-  const Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+  const Poses tracked = noisy(truth, 0.01, 0.5 * kRadiansPerDegree, random);
   const Poses refined = posesOf(refine(seen, tracked, quick()));
   const auto spread = [](const Poses& poses) {
     double sum = 0;
@@ -286,7 +287,7 @@ TEST(KeyframeRefiner, AWallOfParallelStripesMakesNothingWorse) {
     Poses truth;
     for (int i = 0; i < 10; ++i) truth.push_back(viewTurned(0, {0.08 * i, 0, 0}));
     const auto seen = seenAlong(stripes, truth, random);
-    const Poses tracked = noisy(truth, 0.01, 0.3 * kDeg, random);
+    const Poses tracked = noisy(truth, 0.01, 0.3 * kRadiansPerDegree, random);
     const Poses refined = posesOf(refine(seen, tracked, quick()));
     const Errors before = errorsOf(tracked, truth);
     const Errors after = errorsOf(refined, truth);
@@ -312,7 +313,7 @@ TEST(KeyframeRefiner, BeforeOneFacingWallItIsBetterThanTheTracker) {
   Poses truth;
   for (int i = 0; i < 10; ++i) truth.push_back(viewTurned(0, {0.05 * i, 0, 0.03 * i}));
   const auto seen = seenAlong(wall, truth, random);
-  const Poses tracked = noisy(truth, 0.01, 0.3 * kDeg, random);
+  const Poses tracked = noisy(truth, 0.01, 0.3 * kRadiansPerDegree, random);
   const Errors before = errorsOf(tracked, truth);
   const Errors after = errorsOf(posesOf(refine(seen, tracked, quick())), truth);
   // Translation along the wall and rotation look nearly the same.
@@ -400,7 +401,7 @@ TEST(KeyframeRefiner, LoopsThatAreNoneMoveNothing) {
     std::mt19937 random(seed);
     const Poses truth = circle(16, 7.5);
     const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
-    const Poses tracked = noisy(truth, 0.005, 0.25 * kDeg, random);
+    const Poses tracked = noisy(truth, 0.005, 0.25 * kRadiansPerDegree, random);
     const Poses without = posesOf(refine(seen, tracked, quick()));
 
     KeyframeRefiner refiner(quick());
@@ -409,7 +410,7 @@ TEST(KeyframeRefiner, LoopsThatAreNoneMoveNothing) {
       refiner.add(RegistrationCloud(seen[i], quick().points), tracked[i]);
       if (i < 10 || i % 3 != 0) continue;
       // As if it were where one of 9 before was, 67 deg farther back: another place.
-      refiner.propose({i - 9, i, drawMotion(0.1, 3 * kDeg, random)});
+      refiner.propose({i - 9, i, drawMotion(0.1, 3 * kRadiansPerDegree, random)});
       ++proposed;
     }
     refiner.finish();
@@ -429,7 +430,7 @@ TEST(KeyframeRefiner, LoopsThatAreNoneMoveNothingThoughStripesCannotTellThem) {
   Poses truth;
   for (int i = 0; i < 20; ++i) truth.push_back(viewTurned(0, {0.1 * i, 0, 0}));
   const auto seen = seenAlong(stripes, truth, random);
-  const Poses tracked = noisy(truth, 0.005, 0.25 * kDeg, random);
+  const Poses tracked = noisy(truth, 0.005, 0.25 * kRadiansPerDegree, random);
   const Poses without = posesOf(refine(seen, tracked, quick()));
   KeyframeRefiner refiner(quick());
   for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -469,7 +470,7 @@ TEST(KeyframeRefiner, CorrectsTheTrackersPosesOfNowAndKnowsHowWell) {
     std::mt19937 random(seed);
     const Poses truth = circle(9, 5);  // the window reaches back to the first
     const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
-    Poses tracked = noisy(truth, 0.01, 0.5 * kDeg, random);
+    Poses tracked = noisy(truth, 0.01, 0.5 * kRadiansPerDegree, random);
     tracked[0] = truth[0];
     KeyframeRefiner refiner(quick());
     for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -481,7 +482,7 @@ TEST(KeyframeRefiner, CorrectsTheTrackersPosesOfNowAndKnowsHowWell) {
     // The tracker's next pose, not a keyframe's: with noise of its own.
     const Rigid3 now = truth.back() * viewTurned(0.02, {0.02, 0, 0});
     const Rigid3 corrected =
-        refiner.T_world_tracker() * (now * drawMotion(0.01, 0.5 * kDeg, random));
+        refiner.T_world_tracker() * (now * drawMotion(0.01, 0.5 * kRadiansPerDegree, random));
     Vector6d error;
     error << corrected.translation - now.translation,
         differenceOf({(corrected.rotation * now.rotation.conjugate()), {}}).tail<3>();

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "edge_world.h"
+#include "mapping/geometry/angle.h"
 #include "random_poses.h"
 
 namespace efm {
@@ -24,8 +25,6 @@ using test::viewTurned;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-constexpr double kDeg = M_PI / 180;
-
 PosePrior priorOf(const Rigid3& T_map_ref, double sigma_m, double sigma_rad) {
   Vector6d sigma;
   sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
@@ -35,7 +34,7 @@ PosePrior priorOf(const Rigid3& T_map_ref, double sigma_m, double sigma_rad) {
 /// Two views of a world a step apart; the first is the map.
 struct Step {
   Rigid3 T_world_map = viewTurned(0, {0, 0, 0});
-  Rigid3 T_world_ref = viewTurned(4 * kDeg, {0.15, 0.02, 0.05});
+  Rigid3 T_world_ref = viewTurned(4 * kRadiansPerDegree, {0.15, 0.02, 0.05});
   RegistrationCloud map;
   RegistrationCloud cloud;
 
@@ -65,8 +64,8 @@ TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByTwoCentimetresAndADegre
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     std::mt19937 random(seed);
     const Step step(test::edgesAround(150, random), random);
-    const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
-    const Registration found = step.from(priorOf(prior, 0.02, 1 * kDeg));
+    const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random);
+    const Registration found = step.from(priorOf(prior, 0.02, 1 * kRadiansPerDegree));
     squared_m += std::pow(metresApart(found.T_world_ref, step.T_world_ref), 2);
     squared_rad += std::pow(radiansApart(found.T_world_ref, step.T_world_ref), 2);
     EXPECT_GT(found.inlierRatio(), 0.6) << seed;
@@ -85,7 +84,7 @@ TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByTwoCentimetresAndADegre
   // Pixels of 0.44 deg, 1.3 cm wide at 3 m, and some 800 points, each of which says something
   // across its edge alone: 6.6 mm and 0.15 deg, as rotation and translation go together.
   EXPECT_LT(std::sqrt(squared_m / kSeeds), 0.009);
-  EXPECT_LT(std::sqrt(squared_rad / kSeeds), 0.2 * kDeg);
+  EXPECT_LT(std::sqrt(squared_rad / kSeeds), 0.2 * kRadiansPerDegree);
   // Six directions: 6 where factors know what they err by, 48 for all. More than 75 (1 % of such
   // draws) would be too sure.
   EXPECT_LT(squared_sigmas, 75);
@@ -96,11 +95,12 @@ TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByManyPixelsWhereItSaysSo
   for (unsigned seed = 1; seed <= 4; ++seed) {
     std::mt19937 random(seed);
     const Step step(test::edgesAround(150, random), random);
-    const Rigid3 off = viewTurned(3 * kDeg, {0.06, -0.04, 0.03});  // 7 px and 2 px
-    const Registration found = step.from(priorOf(step.T_world_ref * off, 0.05, 2 * kDeg));
+    const Rigid3 off = viewTurned(3 * kRadiansPerDegree, {0.06, -0.04, 0.03});  // 7 px and 2 px
+    const Registration found =
+        step.from(priorOf(step.T_world_ref * off, 0.05, 2 * kRadiansPerDegree));
     // Twice what one is off by with the prior above, which is surer.
     EXPECT_LT(metresApart(found.T_world_ref, step.T_world_ref), 0.018) << seed;
-    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.4 * kDeg) << seed;
+    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.4 * kRadiansPerDegree) << seed;
   }
 }
 
@@ -108,14 +108,14 @@ TEST(KeyframeRegistration, SeveralKeyframesGiveAFactorEach) {
   std::mt19937 random(3);
   const EdgeWorld world = test::edgesAround(150, random);
   const Step step(world, random);
-  const Rigid3 T_world_other = viewTurned(-3 * kDeg, {-0.1, 0, 0});
+  const Rigid3 T_world_other = viewTurned(-3 * kRadiansPerDegree, {-0.1, 0, 0});
   const RegistrationCloud other(seenFrom(world, T_world_other, kInverseDepthSigma, random), {});
   const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
   const std::vector<MapKeyframe> map = {
       {7, &step.map, step.T_world_map}, {3, &nothing, T_world_other}, {5, &other, T_world_other}};
-  const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
+  const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random);
   const Registration found =
-      registerKeyframe(9, step.cloud, map, priorOf(prior, 0.02, 1 * kDeg), {});
+      registerKeyframe(9, step.cloud, map, priorOf(prior, 0.02, 1 * kRadiansPerDegree), {});
   ASSERT_EQ(found.factors.size(), 2U);
   EXPECT_EQ(found.factors[0].from, 7U);
   EXPECT_EQ(found.factors[1].from, 5U);
@@ -128,13 +128,13 @@ TEST(KeyframeRegistration, ItsFactorsAreLeastWhereItSaysTheKeyframeStands) {
     std::mt19937 random(seed);
     const Step step(test::edgesAround(150, random), random);
     const std::vector<MapKeyframe> map = {{0, &step.map, step.T_world_map}};
-    const Rigid3 off = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
+    const Rigid3 off = step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random);
     // A prior that says next to nothing: then the points alone say where.
     const Registration found = step.from(priorOf(off, 0.5, 0.2));
     const double least = errorOfAll(found, map, found.T_world_ref);
     int larger = 0;
     for (int i = 0; i < 200; ++i) {
-      const Rigid3 beside = found.T_world_ref * drawMotion(0.01, 0.3 * kDeg, random);
+      const Rigid3 beside = found.T_world_ref * drawMotion(0.01, 0.3 * kRadiansPerDegree, random);
       if (errorOfAll(found, map, beside) > least) ++larger;
     }
     EXPECT_EQ(larger, 200) << seed;
@@ -145,7 +145,7 @@ TEST(KeyframeRegistration, ItsFactorsAreLeastWhereItSaysTheKeyframeStands) {
                                   .ldlt()
                                   .solve(factor.sqrt_information.transpose() * factor.offset);
     EXPECT_LT(minimum.head<3>().norm(), 0.003) << seed;
-    EXPECT_LT(minimum.tail<3>().norm(), 0.1 * kDeg) << seed;
+    EXPECT_LT(minimum.tail<3>().norm(), 0.1 * kRadiansPerDegree) << seed;
   }
 }
 
@@ -153,12 +153,12 @@ TEST(KeyframeRegistration, MovesWithTheWorld) {
   for (const double far_m : {3.0, 5e6}) {
     std::mt19937 random(5);
     const Step step(test::edgesAround(150, random), random);
-    const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kDeg, random);
-    const Registration found = step.from(priorOf(prior, 0.02, 1 * kDeg));
+    const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random);
+    const Registration found = step.from(priorOf(prior, 0.02, 1 * kRadiansPerDegree));
     const Rigid3 T_other_world = drawPose(far_m, random);
     const Registration other =
         registerKeyframe(1, step.cloud, {{0, &step.map, T_other_world * step.T_world_map}},
-                         priorOf(T_other_world * prior, 0.02, 1 * kDeg), {});
+                         priorOf(T_other_world * prior, 0.02, 1 * kRadiansPerDegree), {});
     // Rounding may give a point another neighbour, one of some 800.
     const Rigid3 back = T_other_world.inverse() * other.T_world_ref;
     EXPECT_LT(metresApart(back, found.T_world_ref), 1e-4) << far_m;
@@ -204,7 +204,7 @@ TEST(KeyframeRegistration, AlongStripesItStaysWithThePrior) {
     std::mt19937 random(seed);
     const Step step(stripes(), random);
     const Rigid3 off = step.T_world_ref * drawMotion(0.02, 0, random);
-    const Registration found = step.from(priorOf(off, 0.02, 0.2 * kDeg));
+    const Registration found = step.from(priorOf(off, 0.02, 0.2 * kRadiansPerDegree));
     // A point's nearest neighbour along a stripe is beside it, wherever it is: what holds x there
     // is chance, and rotation about y within its prior (0.2 deg at 3 m: 1 cm).
     const Eigen::Vector3d before = off.translation - step.T_world_ref.translation;
@@ -224,11 +224,12 @@ TEST(KeyframeRegistration, AFarWallHoldsNoTranslationAlongIt) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
     std::mt19937 random(seed);
     const Step step(grid, random);
-    const Rigid3 off = step.T_world_ref * drawMotion(0.02, 0.3 * kDeg, random);
-    const Registration found = step.from(priorOf(off, 0.02, 0.3 * kDeg));
+    const Rigid3 off = step.T_world_ref * drawMotion(0.02, 0.3 * kRadiansPerDegree, random);
+    const Registration found = step.from(priorOf(off, 0.02, 0.3 * kRadiansPerDegree));
     const Vector6d moved = differenceOf(off.inverse() * found.T_world_ref);
     EXPECT_LT(moved.head<3>().norm(), 0.015) << "0.1 deg would be 5 cm: " << seed;
-    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.22 * kDeg) << "half a pixel";
+    EXPECT_LT(radiansApart(found.T_world_ref, step.T_world_ref), 0.22 * kRadiansPerDegree)
+        << "half a pixel";
   }
 }
 
@@ -244,8 +245,8 @@ TEST(KeyframeRegistration, FewPointsAreNoReasonToLeaveThePriorFar) {
     }
     step.cloud = RegistrationCloud(sparse, {});
     ASSERT_EQ(step.cloud.numChosen(), static_cast<std::size_t>(count));
-    const Rigid3 prior = step.T_world_ref * drawMotion(0.005, 0.2 * kDeg, random);
-    const Registration found = step.from(priorOf(prior, 0.005, 0.2 * kDeg));
+    const Rigid3 prior = step.T_world_ref * drawMotion(0.005, 0.2 * kRadiansPerDegree, random);
+    const Registration found = step.from(priorOf(prior, 0.005, 0.2 * kRadiansPerDegree));
     EXPECT_LT(found.from_prior, 5) << count;
     EXPECT_TRUE(found.T_world_ref.translation.allFinite());
     for (const RelativePoseFactor& factor : found.factors) {
@@ -258,7 +259,8 @@ TEST(KeyframeRegistration, IsTheSameTwiceBitForBit) {
   std::mt19937 random(8);
   const Step step(test::edgesAround(150, random), random);
   const PosePrior prior =
-      priorOf(step.T_world_ref * drawMotion(0.02, 1 * kDeg, random), 0.02, 1 * kDeg);
+      priorOf(step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random), 0.02,
+              1 * kRadiansPerDegree);
   const Registration first = step.from(prior);
   step.map.forgetTree();
   const Registration second = step.from(prior);

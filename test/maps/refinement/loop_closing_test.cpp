@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "edge_world.h"
+#include "mapping/geometry/angle.h"
 #include "random_poses.h"
 
 namespace efm {
@@ -23,8 +24,6 @@ using test::seenFrom;
 using test::viewTurned;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-constexpr double kDeg = M_PI / 180;
 
 Matrix6d covarianceOf(double sigma_m, double sigma_rad) {
   Vector6d sigma;
@@ -71,18 +70,18 @@ TEST(VerifyLoop, ConfirmsTheSamePlaceAndSaysWhere) {
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     std::mt19937 random(seed);
     const EdgeWorld world = test::edgesAround(150, random);
-    const Rigid3 T_world_newer = viewTurned(5 * kDeg, {0.1, 0.02, -0.05});
+    const Rigid3 T_world_newer = viewTurned(5 * kRadiansPerDegree, {0.1, 0.02, -0.05});
     const RegistrationCloud older = cloudFrom(world, {}, random);
     const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
-    const Rigid3 expected = T_world_newer * drawMotion(0.05, 1 * kDeg, random);
-    const auto factor = verify(expected, older, newer, 0.05, 1 * kDeg);
+    const Rigid3 expected = T_world_newer * drawMotion(0.05, 1 * kRadiansPerDegree, random);
+    const auto factor = verify(expected, older, newer, 0.05, 1 * kRadiansPerDegree);
     if (!factor) continue;
     ++confirmed;
     EXPECT_EQ(factor->from, 3U);
     EXPECT_EQ(factor->to, 8U);
     EXPECT_TRUE(factor->doubtful);
     EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.012) << seed;
-    EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 0.25 * kDeg) << seed;
+    EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 0.25 * kRadiansPerDegree) << seed;
   }
   EXPECT_GE(confirmed, 8);
 }
@@ -92,7 +91,9 @@ TEST(VerifyLoop, NeverTakesOnePlaceForAnother) {
   for (int draw = 0; draw < 30; ++draw) {
     const RegistrationCloud older = cloudFrom(test::edgesAround(150, random), {}, random);
     const RegistrationCloud newer = cloudFrom(test::edgesAround(150, random), {}, random);
-    EXPECT_FALSE(verify(drawMotion(0.1, 2 * kDeg, random), older, newer, 0.2, 4 * kDeg)) << draw;
+    EXPECT_FALSE(verify(drawMotion(0.1, 2 * kRadiansPerDegree, random), older, newer, 0.2,
+                        4 * kRadiansPerDegree))
+        << draw;
   }
 }
 
@@ -101,15 +102,16 @@ TEST(VerifyLoop, NeverConfirmsAPlaceThatIsFarFromTheTruth) {
   const EdgeWorld world = test::edgesAround(150, random);
   int confirmed = 0;
   for (int draw = 0; draw < 30; ++draw) {
-    const Rigid3 T_world_newer = viewTurned(0, {0, 0, 0}) * drawMotion(0.1, 5 * kDeg, random);
+    const Rigid3 T_world_newer =
+        viewTurned(0, {0, 0, 0}) * drawMotion(0.1, 5 * kRadiansPerDegree, random);
     const RegistrationCloud older = cloudFrom(world, {}, random);
     const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
-    const Rigid3 wrong = T_world_newer * drawMotion(0.3, 8 * kDeg, random);
-    const auto factor = verify(wrong, older, newer, 0.3, 8 * kDeg);
+    const Rigid3 wrong = T_world_newer * drawMotion(0.3, 8 * kRadiansPerDegree, random);
+    const auto factor = verify(wrong, older, newer, 0.3, 8 * kRadiansPerDegree);
     if (!factor) continue;
     ++confirmed;  // found in spite of it: then where it is
     EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.05) << draw;
-    EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 1 * kDeg) << draw;
+    EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 1 * kRadiansPerDegree) << draw;
   }
   EXPECT_LT(confirmed, 30);
 }
@@ -131,11 +133,13 @@ TEST(VerifyLoop, ARowOfPolesShiftedByOneOfThemIsBeyondWhatItWasExpectedToBe) {
   const EdgeWorld world = poles(0.3, 1);
   const RegistrationCloud older = cloudFrom(world, {}, random);
   const RegistrationCloud newer = cloudFrom(world, viewTurned(0, {0.05, 0, 0}), random);
-  const auto factor = verify(viewTurned(0, {0.05 + 0.3, 0, 0}), older, newer, 0.02, 0.3 * kDeg);
+  const auto factor =
+      verify(viewTurned(0, {0.05 + 0.3, 0, 0}), older, newer, 0.02, 0.3 * kRadiansPerDegree);
   if (factor) {
     EXPECT_NEAR(factor->T_from_to.translation.x(), 0.35, 0.02) << "where it was expected";
   }
-  const auto near = verify(viewTurned(0, {0.06, 0, 0}), older, newer, 0.02, 0.3 * kDeg);
+  const auto near =
+      verify(viewTurned(0, {0.06, 0, 0}), older, newer, 0.02, 0.3 * kRadiansPerDegree);
   if (near) {
     EXPECT_NEAR(near->T_from_to.translation.x(), 0.05, 0.02);
   }
@@ -150,7 +154,8 @@ TEST(VerifyLoop, TwoKeyframesThatShareTheEndOfARowAreNotShifted) {
     const RegistrationCloud older = cloudFrom(world, {}, random);
     const Rigid3 T_world_newer = viewTurned(0, {0.05, 0, 0});
     const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
-    const auto factor = verify(viewTurned(0, {0.35, 0, 0}), older, newer, 0.1, 1 * kDeg);
+    const auto factor =
+        verify(viewTurned(0, {0.35, 0, 0}), older, newer, 0.1, 1 * kRadiansPerDegree);
     if (!factor) continue;
     EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.05) << seed;
   }
@@ -165,20 +170,21 @@ TEST(VerifyLoop, FewPointsAreChance) {
   for (float& depth : sparse.map.depth) {
     if (depth > 0 && left-- <= 0) depth = 0;
   }
-  EXPECT_FALSE(verify({}, older, RegistrationCloud(sparse, {}), 0.02, 0.5 * kDeg));
+  EXPECT_FALSE(verify({}, older, RegistrationCloud(sparse, {}), 0.02, 0.5 * kRadiansPerDegree));
   const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
-  EXPECT_FALSE(verify({}, older, nothing, 0.02, 0.5 * kDeg));
-  EXPECT_FALSE(verify({}, nothing, older, 0.02, 0.5 * kDeg));
-  EXPECT_FALSE(verify({}, nothing, nothing, 0.02, 0.5 * kDeg));
+  EXPECT_FALSE(verify({}, older, nothing, 0.02, 0.5 * kRadiansPerDegree));
+  EXPECT_FALSE(verify({}, nothing, older, 0.02, 0.5 * kRadiansPerDegree));
+  EXPECT_FALSE(verify({}, nothing, nothing, 0.02, 0.5 * kRadiansPerDegree));
 }
 
 TEST(VerifyLoop, OptionsDecideHowSureItMustBe) {
   std::mt19937 random(6);
   const EdgeWorld world = test::edgesAround(150, random);
   const RegistrationCloud older = cloudFrom(world, {}, random);
-  const RegistrationCloud newer = cloudFrom(world, viewTurned(2 * kDeg, {0.05, 0, 0}), random);
-  const LoopCandidate candidate{0, 1, viewTurned(2 * kDeg, {0.05, 0, 0})};
-  const Matrix6d covariance = covarianceOf(0.02, 0.5 * kDeg);
+  const RegistrationCloud newer =
+      cloudFrom(world, viewTurned(2 * kRadiansPerDegree, {0.05, 0, 0}), random);
+  const LoopCandidate candidate{0, 1, viewTurned(2 * kRadiansPerDegree, {0.05, 0, 0})};
+  const Matrix6d covariance = covarianceOf(0.02, 0.5 * kRadiansPerDegree);
   EXPECT_TRUE(verifyLoop(candidate, older, newer, covariance, {}, {}));
   LoopOptions strict;
   strict.loop_max_sigma_m = 1e-5;
@@ -218,7 +224,7 @@ TEST(VerifyLoop, StripesThatDoNotSayWhereAlongThemAreNoLoop) {
   std::mt19937 random(4);
   const RegistrationCloud older = cloudFrom(stripes, {}, random);
   const RegistrationCloud newer = cloudFrom(stripes, viewTurned(0, {0.2, 0, 0}), random);
-  const auto factor = verify({}, older, newer, 0.1, 1 * kDeg);
+  const auto factor = verify({}, older, newer, 0.1, 1 * kRadiansPerDegree);
   EXPECT_FALSE(factor && std::abs(factor->T_from_to.translation.x() - 0.2) > 0.05)
       << "surely at " << factor->T_from_to.translation.transpose();
 }

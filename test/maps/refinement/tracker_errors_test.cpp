@@ -10,6 +10,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
 #include "random_poses.h"
 
 namespace efm {
@@ -18,8 +19,6 @@ namespace {
 using test::drawVector;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-constexpr double kDeg = M_PI / 180;
 
 /// Motions of a tracker that errs by so much, against points that know them to 2 mm and 0.1 deg:
 /// drawn from the model itself.
@@ -30,7 +29,7 @@ std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, dou
     MotionSample sample;
     sample.way_m = way_m * (1 + i % 4);
     Vector6d sigma;
-    sigma << Eigen::Vector3d::Constant(0.002), Eigen::Vector3d::Constant(0.1 * kDeg);
+    sigma << Eigen::Vector3d::Constant(0.002), Eigen::Vector3d::Constant(0.1 * kRadiansPerDegree);
     sample.covariance = sigma.cwiseAbs2().asDiagonal();
     const Matrix6d all =
         sample.covariance + 2 * truth.noiseCovariance() + truth.driftCovariance(sample.way_m);
@@ -128,7 +127,7 @@ TEST(EstimateTrackerErrors, OfExactPosesFindsMuchLessNoiseAndKeepsSomeDrift) {
   const TrackerErrors found = estimateTrackerErrors(samples, expected);
   // 2 mm and 0.1 deg are what the points themselves err by, over sqrt 2.
   EXPECT_LT(found.noise_m, 0.0015);
-  EXPECT_LT(found.noise_rad, 0.08 * kDeg);
+  EXPECT_LT(found.noise_rad, 0.08 * kRadiansPerDegree);
   EXPECT_GT(found.drift_m, expected.drift_m / 8) << "within three times a factor of 2";
   EXPECT_GT(found.drift_rad, expected.drift_rad / 8);
 }

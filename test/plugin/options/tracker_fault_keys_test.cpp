@@ -7,6 +7,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
+
 namespace efm {
 namespace {
 
@@ -44,7 +46,6 @@ const std::vector<std::string> kAll = {"noise_m=0.01",
 
 TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
   const TrackerFaults faults = faultsOf(kAll);
-  constexpr double kPi = 3.14159265358979323846;
   EXPECT_EQ(faults.perturbation.noise_m, 0.01);
   EXPECT_NEAR(faults.perturbation.noise_rad, 0.5 * kPi / 180, 1e-15);
   EXPECT_EQ(faults.perturbation.keyframe.noise_m, 2);

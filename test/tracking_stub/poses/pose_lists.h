@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "mapping/geometry/rotation_vector.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/tracking_stub/poses/tum_replay.h"
 #include "tracking_stub/poses/pose_source.h"
 
@@ -21,7 +21,7 @@ inline std::vector<StampedPose> windingWay(int count, std::int64_t first_ns = 1'
     const double t_s = 0.01 * static_cast<double>(i);
     Rigid3 T_world_rig;
     T_world_rig.translation = {0.5 * t_s, 0.1 * std::sin(3 * t_s), 0.05 * std::cos(5 * t_s)};
-    T_world_rig.rotation = turnBy({0.2 * std::sin(2 * t_s), 0.3 * t_s, 0.1 * std::cos(t_s)});
+    T_world_rig.rotation = rotationBy({0.2 * std::sin(2 * t_s), 0.3 * t_s, 0.1 * std::cos(t_s)});
     poses.push_back({first_ns + i * 10'000'000, T_world_rig});
   }
   return poses;
