@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "plugin/pictures/curve_plot.h"
-#include "test/studies/depth_curve.h"
-#include "test/studies/method_comparison.h"
+#include "test/studies/methods/depth_curve.h"
+#include "test/studies/methods/method_comparison.h"
 #include "test/studies/studies.h"
 #include "tracking_stub/presets/simulation_preset.h"
 

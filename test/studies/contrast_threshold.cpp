@@ -6,14 +6,14 @@
 
 #include "plugin/pictures/curve_plot.h"
 #include "plugin/pictures/depth_picture.h"
-#include "test/studies/error_figures.h"
-#include "test/studies/error_table.h"
-#include "test/studies/flying_room.h"
-#include "test/studies/method_comparison.h"
-#include "test/studies/outstanding_points.h"
-#include "test/studies/picture_grid.h"
-#include "test/studies/precision_curves.h"
-#include "test/studies/real_rigs.h"
+#include "test/studies/figures/picture_grid.h"
+#include "test/studies/methods/error_figures.h"
+#include "test/studies/methods/error_table.h"
+#include "test/studies/methods/method_comparison.h"
+#include "test/studies/methods/outstanding_points.h"
+#include "test/studies/methods/precision_curves.h"
+#include "test/studies/recordings/flying_room.h"
+#include "test/studies/recordings/real_rigs.h"
 #include "test/studies/studies.h"
 
 namespace efm::studies {

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "test/paths.h"
-#include "test/studies/real_rigs.h"
+#include "test/studies/recordings/real_rigs.h"
+#include "test/studies/report/study_report.h"
 #include "test/studies/studies.h"
-#include "test/studies/study_report.h"
 
 namespace {
 

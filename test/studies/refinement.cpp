@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "maps/metrics/sample_statistics.h"
-#include "test/studies/refinement_pictures.h"
-#include "test/studies/refinement_tables.h"
+#include "test/studies/refinement/refinement_pictures.h"
+#include "test/studies/refinement/refinement_tables.h"
 #include "test/studies/studies.h"
 
 namespace efm::studies {

@@ -17,8 +17,8 @@
 #include "test/bench/growth_fit.h"
 #include "test/bench/stage_clock.h"
 #include "test/bench/synthetic_window.h"
-#include "test/studies/error_figures.h"
-#include "test/studies/method_comparison.h"
+#include "test/studies/methods/error_figures.h"
+#include "test/studies/methods/method_comparison.h"
 #include "test/studies/studies.h"
 
 namespace efm::studies {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "test/studies/study_run.h"
-#include "test/studies/study_section.h"
+#include "test/studies/recordings/study_run.h"
+#include "test/studies/report/study_section.h"
 
 namespace efm::studies {
 

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "test/studies/frames/edge_kinds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "mapping/geometry/angle.h"
+#include "mapping/options/option_check.h"
+
+namespace efm::studies {
+namespace {
+
+EdgeKind kindOf(double direction, const EdgeKindOptions& options) {
+  const double from_horizontal_deg = std::min(direction, kPi - direction) * 180 / kPi;
+  if (from_horizontal_deg <= options.vertical_deg) return EdgeKind::kVertical;
+  if (90 - from_horizontal_deg <= options.horizontal_deg) return EdgeKind::kHorizontal;
+  return EdgeKind::kOblique;
+}
+
+}  // namespace
+
+void EdgeKindOptions::validate() const {
+  requireOption(blur_px > 0, "blur_px", blur_px, "above 0");
+  requireOption(min_gradient > 0, "min_gradient", min_gradient, "above 0");
+  requireOption(line_gradient >= min_gradient, "line_gradient", line_gradient,
+                "at least min_gradient");
+  requireOption(horizontal_deg > 0 && vertical_deg > 0 && horizontal_deg + vertical_deg <= 90,
+                "horizontal_deg + vertical_deg", horizontal_deg + vertical_deg,
+                "both above 0, and at most 90 together");
+}
+
+EdgeKind EdgeKinds::kindNear(int x, int y) const {
+  const cv::Rect around =
+      cv::Rect(x - 1, y - 1, 3, 3) & cv::Rect(0, 0, magnitude_.cols, magnitude_.rows);
+  cv::Point strongest;
+  cv::minMaxLoc(magnitude_(around), nullptr, nullptr, nullptr, &strongest);
+  return static_cast<EdgeKind>(kinds(around)(strongest));
+}
+
+EdgeKinds edgeKinds(const cv::Mat1f& grey, const EdgeKindOptions& options) {
+  options.validate();
+  cv::Mat1f smooth;
+  cv::GaussianBlur(grey, smooth, {0, 0}, options.blur_px, options.blur_px, cv::BORDER_REPLICATE);
+  // Sobel's weights sum to 8 grey values per pixel.
+  cv::Mat1f along_x;
+  cv::Mat1f along_y;
+  cv::Sobel(smooth, along_x, CV_32F, 1, 0, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
+  cv::Sobel(smooth, along_y, CV_32F, 0, 1, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
+
+  EdgeKinds edges;
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  edges.gradient_direction = cv::Mat1f(grey.size(), none);
+  edges.kinds = cv::Mat1b(grey.size(), static_cast<std::uint8_t>(EdgeKind::kNone));
+  cv::magnitude(along_x, along_y, edges.magnitude_);
+  for (int y = 0; y < grey.rows; ++y) {
+    for (int x = 0; x < grey.cols; ++x) {
+      if (static_cast<double>(edges.magnitude_(y, x)) < options.min_gradient) continue;
+      double direction = std::atan2(static_cast<double>(along_y(y, x)), along_x(y, x));
+      if (direction < 0) direction += kPi;
+      if (direction >= kPi) direction -= kPi;
+      edges.gradient_direction(y, x) = static_cast<float>(direction);
+      edges.kinds(y, x) = static_cast<std::uint8_t>(kindOf(direction, options));
+    }
+  }
+
+  // Canny takes gradients as 16-bit integers: hundredths of a grey value per pixel.
+  constexpr double kPerGrey = 100;
+  cv::Mat1s dx;
+  cv::Mat1s dy;
+  along_x.convertTo(dx, CV_16S, kPerGrey);
+  along_y.convertTo(dy, CV_16S, kPerGrey);
+  cv::Mat1b lines;
+  cv::Canny(dx, dy, lines, kPerGrey * options.min_gradient, kPerGrey * options.line_gradient, true);
+  edges.horizontal_lines = lines & (edges.kinds == static_cast<int>(EdgeKind::kHorizontal));
+  edges.vertical_lines = lines & (edges.kinds == static_cast<int>(EdgeKind::kVertical));
+  return edges;
+}
+
+}  // namespace efm::studies

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "test/studies/frames/slider_keyframe.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/keyframes/keyframe_policy.h"
+#include "plugin/formats/uzh_text.h"
+#include "tracking_stub/poses/poses_file.h"
+
+namespace efm::studies {
+
+SliderRecording readSlider(const std::filesystem::path& folder) {
+  SliderRecording recording;
+  const CameraSize size = uzhSensorSize(folder);
+  recording.rig.cameras.push_back({readUzhCalibration(folder / "calib.txt", size), {}, 0});
+  for (const StampedPose& pose : readPosesFile(folder / "groundtruth.txt")) {
+    recording.trajectory.add(pose);
+  }
+  const std::int64_t first_pose_ns = recording.trajectory.poses().front().t_ns;
+  EventTextReader reader(folder / "events.txt", size);
+  for (auto packet = reader.nextPacket(); !packet.empty(); packet = reader.nextPacket()) {
+    for (const Event& event : packet) {
+      if (event.t_ns >= first_pose_ns) recording.events.push_back(event);
+    }
+  }
+  if (recording.events.empty()) {
+    throw std::runtime_error((folder / "events.txt").string() + ": no event has a pose");
+  }
+  const std::int64_t t0_ns = recording.events.front().t_ns;
+  recording.window = windowOf(t0_ns, t0_ns + 150'000'000, ReferenceTime::kMiddle);
+  const auto after = [&](const Event& event) { return event.t_ns >= recording.window.t1_ns; };
+  recording.events.erase(std::find_if(recording.events.begin(), recording.events.end(), after),
+                         recording.events.end());
+  return recording;
+}
+
+KeyframeDepthMap sliderKeyframe(const SliderRecording& recording,
+                                const KeyframeMapperOptions& options) {
+  KeyframeMapper mapper(recording.rig, {0}, options);
+  auto keyframe = mapper.map(recording.window, {EventSpan(recording.events)}, recording.trajectory);
+  if (!keyframe) throw std::runtime_error("the slider has no pose in the middle of its window");
+  return std::move(*keyframe);
+}
+
+}  // namespace efm::studies

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "maps/metrics/precision_recall.h"
+#include "test/studies/methods/method_comparison.h"
+#include "test/studies/report/study_section.h"
+
+namespace efm::studies {
+
+/// Precision and recall of one thing among several.
+struct NamedPrecision {
+  std::string name;
+  PrecisionRecall counts;
+};
+
+/// Allowed errors of 1 cm to 1 m.
+std::vector<double> studyThresholds();
+
+/// Over all keyframes together, against every pixel of the truth.
+PrecisionRecall precisionOf(const Recording& recording,
+                            const std::vector<KeyframeDepthMap>& keyframes,
+                            const DepthPairingOptions& pairing);
+
+/// Precision, recall and F1 over the allowed error, side by side.
+cv::Mat3b drawPrecision(const std::vector<NamedPrecision>& all);
+
+/// At some allowed errors: precision, recall and F1 of each, percent.
+TextTable precisionTable(const std::vector<NamedPrecision>& all,
+                         const std::vector<double>& thresholds_m);
+
+/// The index of an allowed error.
+/// @throws std::logic_error where it is none of them.
+std::size_t stepOf(const PrecisionRecall& counts, double threshold_m);
+
+}  // namespace efm::studies

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "mapping/keyframes/keyframe_depth_map.h"
+#include "maps/cloud/cloud_point.h"
+#include "test/studies/refinement/wall_thickness.h"
+#include "tracking_stub/sensor/simulated_rig.h"
+
+namespace efm::studies {
+
+/// What keyframes' poses, and the map that they make, err by. All but the end-to-end error once the
+/// estimate is laid over the truth by the rigid motion of least squares over all positions.
+struct MapErrors {
+  double trajectory_m = 0;  ///< Root mean square.
+  double trajectory_rad = 0;
+  double map_m = 0;   ///< Median distance of the map's points to the nearest surface.
+  double rays_m = 0;  ///< Median distance of keyframes' points to where their own rays truly end.
+  /// Of the motion from the first keyframe to the last, without alignment.
+  double end_to_end_m = 0;
+  double end_to_end_rad = 0;
+  double thickness_m = 0;  ///< Of the walls.
+};
+
+/// The exact truth of a simulation, for maps of it.
+class MapTruth {
+ public:
+  explicit MapTruth(const Simulation& simulation);
+
+  /// @param keyframes their depth maps; their poses do not matter.
+  /// @param T_map_ref where they stand by the estimate.
+  /// @param points of the map that was made with these poses.
+  /// @throws std::invalid_argument where there are fewer than three keyframes.
+  MapErrors errorsOf(const std::vector<KeyframeDepthMap>& keyframes,
+                     const std::vector<Rigid3>& T_map_ref, const std::vector<CloudPoint>& points);
+
+  Rigid3 T_world_ref(const KeyframeDepthMap& keyframe) const;
+  const std::vector<Wall>& walls() const { return walls_; }
+
+ private:
+  const cv::Mat1f& depthOf(const KeyframeDepthMap& keyframe);
+  double medianOffRays(const std::vector<KeyframeDepthMap>& keyframes,
+                       const std::vector<Rigid3>& T_world_estimate);
+
+  const Simulation& simulation_;
+  std::vector<Wall> walls_;
+  std::map<std::int64_t, cv::Mat1f> depths_;  // by the keyframe's time: rendered once
+};
+
+}  // namespace efm::studies

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "maps/cloud/cloud_point.h"
+#include "maps/refinement/keyframe_refiner.h"
+#include "test/studies/recordings/study_run.h"
+#include "test/studies/refinement/false_loops.h"
+#include "test/studies/refinement/map_truth.h"
+#include "tracking_stub/sensor/simulated_rig.h"
+
+namespace efm::studies {
+
+/// A recording and how it is mapped.
+struct RefinementCase {
+  std::string name;
+  std::string file;  ///< In the cache.
+  std::function<Simulation()> simulation;
+  double min_depth_m;
+  double max_depth_m;
+  double window_s;
+  bool is_loop = false;  ///< Comes back to its first places after long.
+};
+
+/// The same keyframes at the tracker's poses and at refined ones.
+struct RefinementOutcome {
+  MapErrors without;
+  MapErrors with;
+};
+
+/// A map and its trajectory, to be drawn.
+struct RefinementDrawing {
+  std::vector<CloudPoint> tracker_map, refined_map;
+  std::vector<Rigid3> T_world_true, T_tracker_ref, T_world_ref;
+};
+
+/// Of one recording, by seed.
+struct RefinementResults {
+  std::vector<RefinementOutcome> noise, drift, exact, small_noise, noise_feared, noise_denied;
+  std::vector<FalseLoops> false_loops;
+  std::vector<double> seconds, processor_seconds;  ///< Of keyframes with a full window.
+  std::size_t keyframes = 0;
+  std::vector<RefinementCounts> loops;  ///< With drift.
+  RefinementDrawing drawing;            ///< Of the first seed's drift, where it is the loop.
+};
+
+using RefinementStudyResults = std::vector<std::pair<RefinementCase, RefinementResults>>;
+
+/// The recordings of the study; of a quick run one.
+std::vector<RefinementCase> casesOf(const StudyRun& run);
+
+/// Maps all recordings with trackers that err, side by side; then each is timed, with nothing
+/// beside it.
+/// @param all the results are put in.
+void mapAll(const StudyRun& run, RefinementStudyResults& all);
+
+}  // namespace efm::studies

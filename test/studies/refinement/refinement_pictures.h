@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "test/studies/refinement/refinement_case.h"
+#include "test/studies/report/study_section.h"
+
+namespace efm::studies {
+
+/// The map from above at the tracker's poses and at refined ones, and where its keyframes stand.
+void drawRefinement(const RefinementCase& what, const RefinementDrawing& drawing,
+                    StudySection& section);
+
+}  // namespace efm::studies
