@@ -124,7 +124,7 @@ void GlobalCloud::judge(Keyframe& judged, const Keyframe& by, unsigned bit) cons
   if (!by.sight) return;
   for (std::size_t i = 0; i < judged.voxels.size(); ++i) {
     const Verdict verdict = by.sight->verdictOn(positionOf(judged.voxels[i]));
-    if (verdict == Verdict::kNothing) continue;
+    if (verdict == Verdict::kUnknown) continue;
     Verdicts& verdicts = judged.verdicts[i];
     std::uint16_t& bits =
         verdict == Verdict::kSupports ? verdicts.supports : verdicts.looks_through;

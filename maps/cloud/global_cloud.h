@@ -40,7 +40,7 @@ struct GlobalCloudOptions {
 /// put there, and neither costs more in a larger map.
 ///
 /// A keyframe that is inserted with its pose is compared with those whose numbers are at most
-/// `kReach` from its own, each with the other's points (KeyframeSight). What they say is kept in
+/// `kReach` from its own, each with the other's points (VisibilityGrid). What they say is kept in
 /// two bits per voxel of a keyframe and other keyframe, set when the later of the two comes and
 /// cleared when one goes. By these bits keyframes support each other, and what others look through
 /// and none supports is left out.
@@ -119,9 +119,9 @@ class GlobalCloud {
     std::uint16_t looks_through = 0;
   };
   struct Keyframe {
-    std::vector<Sums> voxels;            // sorted
-    std::vector<Verdicts> verdicts;      // beside `voxels`; empty without consistency
-    std::optional<KeyframeSight> sight;  // with consistency, where the pose is known
+    std::vector<Sums> voxels;             // sorted
+    std::vector<Verdicts> verdicts;       // beside `voxels`; empty without consistency
+    std::optional<VisibilityGrid> sight;  // with consistency, where the pose is known
   };
 
   PlacedPoint place(const CloudPoint& point) const;

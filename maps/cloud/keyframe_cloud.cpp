@@ -37,7 +37,7 @@ std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe) {
   return points;
 }
 
-std::vector<CloudPoint> placedInWorld(const std::vector<ViewPoint>& points,
+std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
                                       const Rigid3& T_world_ref) {
   std::vector<CloudPoint> placed;
   placed.reserve(points.size());
@@ -48,11 +48,11 @@ std::vector<CloudPoint> placedInWorld(const std::vector<ViewPoint>& points,
 }
 
 std::vector<CloudPoint> keyframeCloud(const KeyframeDepthMap& keyframe) {
-  return placedInWorld(viewPoints(keyframe), keyframe.T_world_ref);
+  return pointsInWorld(viewPoints(keyframe), keyframe.T_world_ref);
 }
 
 std::vector<CloudPoint> lateFusionCloud(const KeyframeDepthMap& keyframe) {
-  return placedInWorld(lateFusionPoints(keyframe), keyframe.T_world_ref);
+  return pointsInWorld(lateFusionPoints(keyframe), keyframe.T_world_ref);
 }
 
 }  // namespace efm

@@ -29,7 +29,7 @@ std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe);
 std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe);
 
 /// The points in the world, p_world = T_world_ref * p_ref, each with a support of 1.
-std::vector<CloudPoint> placedInWorld(const std::vector<ViewPoint>& points,
+std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
                                       const Rigid3& T_world_ref);
 
 /// `viewPoints` and `lateFusionPoints` in the world.

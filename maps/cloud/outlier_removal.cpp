@@ -21,7 +21,7 @@ std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
   options.validate();
   if (options.outlier_radius_m == 0 || points.empty()) return points;
   pcl::RadiusOutlierRemoval<pcl::PointXYZ> filter;
-  filter.setInputCloud(pclCloudAround(middleOf(points), points));
+  filter.setInputCloud(pclCloudAround(medianPosition(points), points));
   filter.setRadiusSearch(options.outlier_radius_m);
   filter.setMinNeighborsInRadius(options.outlier_min_neighbors);
   pcl::Indices kept;

@@ -21,7 +21,7 @@ void requireFinite(const CloudPoint& point) {
 
 }  // namespace
 
-Eigen::Vector3d middleOf(const std::vector<CloudPoint>& points) {
+Eigen::Vector3d medianPosition(const std::vector<CloudPoint>& points) {
   for (const CloudPoint& point : points) requireFinite(point);
   Eigen::Vector3d middle;
   std::vector<double> values(points.size());

@@ -17,7 +17,7 @@ namespace efm {
 /// away does not carry it from where the points are.
 /// @param points at least one.
 /// @throws std::invalid_argument naming a point that is not finite.
-Eigen::Vector3d middleOf(const std::vector<CloudPoint>& points);
+Eigen::Vector3d medianPosition(const std::vector<CloudPoint>& points);
 
 /// The points as floats, seen from `middle`, in their order.
 /// @throws std::invalid_argument naming a point that is not finite or too far from the middle for

@@ -32,7 +32,7 @@ void RefinedCloud::insertFixed(const std::vector<CloudPoint>& points, const Rigi
 }
 
 void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_ref) {
-  cloud_.insert(fixed_ + T_world_ref_.size(), placedInWorld(points, T_world_ref), T_world_ref);
+  cloud_.insert(fixed_ + T_world_ref_.size(), pointsInWorld(points, T_world_ref), T_world_ref);
   T_world_ref_.push_back(T_world_ref);
   if (!movable_) return;
   const double radius_m = radiusOf(points);
@@ -44,7 +44,7 @@ void RefinedCloud::move(std::size_t keyframe, const Rigid3& T_world_ref) {
   pending_[keyframe] = T_world_ref;
 }
 
-void RefinedCloud::settle(double tolerance_m, std::size_t most) {
+void RefinedCloud::applyPending(double tolerance_m, std::size_t most) {
   std::size_t moved = 0;
   for (auto next = pending_.begin(); next != pending_.end() && moved < most;) {
     const auto [keyframe, T_world_ref] = *next;
@@ -66,7 +66,7 @@ void RefinedCloud::settle(double tolerance_m, std::size_t most) {
 void RefinedCloud::put(std::size_t keyframe, const Rigid3& T_world_ref) {
   const std::vector<ViewPoint>& points = kept_[keyframe].points;
   const auto insert = [&](const Rigid3& T_in_world) {
-    cloud_.insert(fixed_ + keyframe, placedInWorld(points, T_in_world), T_in_world);
+    cloud_.insert(fixed_ + keyframe, pointsInWorld(points, T_in_world), T_in_world);
   };
   cloud_.remove(fixed_ + keyframe);
   try {

@@ -28,13 +28,13 @@ class RefinedCloud {
   /// Puts the next keyframe into the cloud. @throws as `insertFixed`.
   void insert(std::vector<ViewPoint> points, const Rigid3& T_world_ref);
 
-  /// Where a keyframe of those inserted should stand from now on; `settle` puts it there.
+  /// Where a keyframe of those inserted should stand from now on; `applyPending` moves it.
   void move(std::size_t keyframe, const Rigid3& T_world_ref);
   /// Puts keyframes where they should stand whose points would otherwise be off by more than the
   /// tolerance, the oldest first, but no more than so many. Without tolerance all stand where they
   /// should, bit for bit.
   /// @throws std::invalid_argument as GlobalCloud::insert does: that keyframe stays where it was.
-  void settle(double tolerance_m, std::size_t most = std::numeric_limits<std::size_t>::max());
+  void applyPending(double tolerance_m, std::size_t most = std::numeric_limits<std::size_t>::max());
 
   const GlobalCloud& cloud() const { return cloud_; }
   /// Where the keyframes stand in the cloud, but for those of an earlier map.

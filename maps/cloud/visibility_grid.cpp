@@ -32,8 +32,8 @@ std::int32_t cellOf(double offset, double cells_per_depth) {
 
 }  // namespace
 
-KeyframeSight::KeyframeSight(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref,
-                             const ConsistencyOptions& options)
+VisibilityGrid::VisibilityGrid(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref,
+                               const ConsistencyOptions& options)
     : T_ref_world_(T_world_ref.inverse()),
       cells_per_unit_(180 / (kPi * options.consistency_cell_deg)) {
   std::vector<Seen> seen;
@@ -71,9 +71,9 @@ KeyframeSight::KeyframeSight(const std::vector<CloudPoint>& points, const Rigid3
   row_begin_.push_back(static_cast<std::uint32_t>(cells_.size()));
 }
 
-Verdict KeyframeSight::verdictOn(const Eigen::Vector3d& p_world) const {
+Verdict VisibilityGrid::verdictOn(const Eigen::Vector3d& p_world) const {
   const Eigen::Vector3d p_ref = T_ref_world_ * p_world;
-  if (row_begin_.empty() || !isBefore(p_ref)) return Verdict::kNothing;
+  if (row_begin_.empty() || !isBefore(p_ref)) return Verdict::kUnknown;
   const double inverse_depth = 1 / p_ref.z();
   const std::int32_t row = cellOf(p_ref.y(), cells_per_unit_ * inverse_depth) - first_row_;
   const std::int32_t column = cellOf(p_ref.x(), cells_per_unit_ * inverse_depth);
@@ -96,7 +96,7 @@ Verdict KeyframeSight::verdictOn(const Eigen::Vector3d& p_world) const {
       ++cells;
     }
   }
-  return cells >= 2 && nearer_than_all ? Verdict::kLooksThrough : Verdict::kNothing;
+  return cells >= 2 && nearer_than_all ? Verdict::kFreeSpaceViolation : Verdict::kUnknown;
 }
 
 }  // namespace efm

@@ -14,9 +14,9 @@ namespace efm {
 
 /// What a keyframe says of a point of another one.
 enum class Verdict {
-  kNothing,   ///< It saw nothing there, or something nearer that hides the point.
+  kUnknown,   ///< It saw nothing there, or something nearer that hides the point.
   kSupports,  ///< It has a point there too.
-  kLooksThrough,
+  kFreeSpaceViolation,
 };
 
 /// What a keyframe saw, kept so that points of other keyframes can be compared with it: the
@@ -24,11 +24,11 @@ enum class Verdict {
 /// `ref`). It is made of the keyframe's points and pose alone, so that a stored keyframe gives the
 /// same; which is why the tolerance comes from the depths, not from a variance of each. 12 bytes a
 /// cell.
-class KeyframeSight {
+class VisibilityGrid {
  public:
   /// @param points in the world; those that are not before the view's plane are passed over.
-  KeyframeSight(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref,
-                const ConsistencyOptions& options);
+  VisibilityGrid(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref,
+                 const ConsistencyOptions& options);
 
   /// Compares a point with its cell and the eight around it, in inverse depth: any depth within the
   /// tolerance supports it; where at least two cells were seen and the point is nearer than all of

@@ -35,8 +35,8 @@ std::filesystem::path temporaryName(const std::filesystem::path& path) {
   return temporary;
 }
 
-void writeWhole(const std::filesystem::path& path,
-                const std::function<void(const std::filesystem::path& temporary)>& write) {
+void writeAtomically(const std::filesystem::path& path,
+                     const std::function<void(const std::filesystem::path& temporary)>& write) {
   const std::filesystem::path file = replaceableFile(path);
   const std::filesystem::path temporary = temporaryName(file);
   try {
@@ -49,7 +49,7 @@ void writeWhole(const std::filesystem::path& path,
   }
 }
 
-std::string readWhole(const std::filesystem::path& path) {
+std::string readBytes(const std::filesystem::path& path) {
   if (!std::filesystem::exists(path)) throw std::runtime_error("there is no such file");
   if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("it is not a regular file");
   std::ifstream file(path, std::ios::binary | std::ios::ate);

@@ -22,12 +22,12 @@ std::filesystem::path temporaryName(const std::filesystem::path& path);
 /// @param write creates the file at the path it is given.
 /// @throws std::runtime_error naming `path` where it cannot be replaced, written or renamed; what
 /// `write` throws becomes part of the message, and no temporary file stays.
-void writeWhole(const std::filesystem::path& path,
-                const std::function<void(const std::filesystem::path& temporary)>& write);
+void writeAtomically(const std::filesystem::path& path,
+                     const std::function<void(const std::filesystem::path& temporary)>& write);
 
 /// All bytes of a file.
 /// @throws std::runtime_error saying why it cannot be read (there is none, it is no regular file,
 /// it ends before its end), without its name.
-std::string readWhole(const std::filesystem::path& path);
+std::string readBytes(const std::filesystem::path& path);
 
 }  // namespace efm

@@ -59,7 +59,7 @@ void writeCompressed(std::ostream& stream, const std::vector<PointRow>& rows) {
 /// The lines of a header by their keys.
 using HeaderLines = std::map<std::string, WordLine, std::less<>>;
 
-HeaderLines readHeaderLines(FileCursor& cursor) {
+HeaderLines readHeaderLines(TextScanner& cursor) {
   constexpr std::string_view kKeys =
       " VERSION FIELDS SIZE TYPE COUNT WIDTH HEIGHT VIEWPOINT POINTS DATA ";
   HeaderLines lines;
@@ -136,14 +136,14 @@ std::uint64_t pointsOf(const HeaderLines& lines) {
   return points;
 }
 
-std::uint64_t readNumber(FileCursor& cursor) {
+std::uint64_t readNumber(TextScanner& cursor) {
   std::uint64_t value = 0;
   const std::string_view bytes = cursor.take(4);
   for (std::size_t i = 4; i-- > 0;) value = value << 8U | static_cast<unsigned char>(bytes[i]);
   return value;
 }
 
-PointCloudContent readCompressed(FileCursor& cursor, std::vector<RecordField> fields,
+PointCloudContent readCompressed(TextScanner& cursor, std::vector<RecordField> fields,
                                  std::uint64_t points) {
   const auto is_padding = [](const RecordField& field) { return field.name == "_"; };
   fields.erase(std::remove_if(fields.begin(), fields.end(), is_padding),
@@ -164,7 +164,7 @@ PointCloudContent readCompressed(FileCursor& cursor, std::vector<RecordField> fi
                   std::to_string(plain_bytes) + ": is the file cut short?");
   }
   std::string plain(static_cast<std::size_t>(plain_bytes), '\0');
-  const FileCursor packed_place = cursor;
+  const TextScanner packed_place = cursor;
   const std::string_view packed = cursor.take(static_cast<std::size_t>(packed_bytes));
   if (!plain.empty() &&
       pcl::lzfDecompress(packed.data(), static_cast<unsigned int>(packed.size()), plain.data(),
@@ -172,7 +172,7 @@ PointCloudContent readCompressed(FileCursor& cursor, std::vector<RecordField> fi
     packed_place.refuse(std::to_string(packed_bytes) + " compressed bytes: expected " +
                         std::to_string(plain_bytes) + " when decompressed: is the file damaged?");
   }
-  FileCursor plain_cursor(plain);
+  TextScanner plain_cursor(plain);
   return readBinaryRecords(plain_cursor, fields, points, {false, true});
 }
 
@@ -194,7 +194,7 @@ void writePcdTo(std::ostream& stream, const std::vector<CloudPoint>& points,
 }
 
 PointCloudContent parsePcd(std::string_view bytes) {
-  FileCursor cursor(bytes);
+  TextScanner cursor(bytes);
   const HeaderLines lines = readHeaderLines(cursor);
   const std::vector<RecordField> fields = fieldsOf(lines);
   const std::uint64_t points = pointsOf(lines);

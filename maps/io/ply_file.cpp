@@ -72,7 +72,7 @@ void readProperty(const WordLine& line, std::vector<PlyElement>& elements) {
   element.fields.push_back({std::string(line.words[2]), numberType(line, line.words[1]), 1});
 }
 
-PlyHeader readHeader(FileCursor& cursor) {
+PlyHeader readHeader(TextScanner& cursor) {
   if (cursor.line("ply, as the first line of a PLY file") != "ply") {
     WordLine{1, {}}.refuse("not a PLY file: expected ply");
   }
@@ -97,7 +97,7 @@ PlyHeader readHeader(FileCursor& cursor) {
 }
 
 /// What stands before the vertices.
-void skip(FileCursor& cursor, const PlyElement& element, bool is_text) {
+void skip(TextScanner& cursor, const PlyElement& element, bool is_text) {
   if (is_text) {
     for (std::uint64_t i = 0; i < element.count; ++i) cursor.line("an element " + element.name);
     return;
@@ -136,7 +136,7 @@ void writePlyTo(std::ostream& stream, const std::vector<CloudPoint>& points,
 }
 
 PointCloudContent parsePly(std::string_view bytes) {
-  FileCursor cursor(bytes);
+  TextScanner cursor(bytes);
   const PlyHeader header = readHeader(cursor);
   const WordLine end_of_header{cursor.lineNumber(), {}};
   const bool is_text = header.format == "ascii";

@@ -42,14 +42,14 @@ void writeFile(const std::filesystem::path& path, Format format,
 
 void writePointCloud(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
                      PointCloudEncoding encoding) {
-  writeWhole(path, [&](const std::filesystem::path& temporary) {
+  writeAtomically(path, [&](const std::filesystem::path& temporary) {
     writeFile(temporary, formatOf(path), points, encoding);
   });
 }
 
 void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
               PointCloudEncoding encoding) {
-  writeWhole(path, [&](const std::filesystem::path& temporary) {
+  writeAtomically(path, [&](const std::filesystem::path& temporary) {
     writeFile(temporary, Format::kPcd, points, encoding);
   });
 }
@@ -57,7 +57,7 @@ void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& 
 PointCloudContent readPointCloud(const std::filesystem::path& path) {
   try {
     const Format format = formatOf(path);
-    const std::string bytes = readWhole(path);
+    const std::string bytes = readBytes(path);
     return format == Format::kPcd ? parsePcd(bytes) : parsePly(bytes);
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot read " + path.string() + ": " + error.what());

@@ -28,8 +28,8 @@ void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& 
               PointCloudEncoding encoding = PointCloudEncoding::kBinary);
 
 struct PointCloudContent {
-  std::vector<CloudPoint> points;   ///< In the order of the file.
-  std::uint64_t without_place = 0;  ///< Left out: a coordinate is not finite, as sensors mark gaps.
+  std::vector<CloudPoint> points;  ///< In the order of the file.
+  std::uint64_t non_finite = 0;    ///< Left out: a coordinate is not finite, as sensors mark gaps.
 };
 
 /// Reads a PCD file (ascii, binary, binary_compressed) or a PLY file (ascii, binary of either

@@ -51,7 +51,7 @@ void append(PointCloudContent& content, const Values& values) {
   if (p_world.allFinite()) {
     content.points.push_back({p_world, static_cast<float>(values[3])});
   } else {
-    ++content.without_place;
+    ++content.non_finite;
   }
 }
 
@@ -156,7 +156,7 @@ std::size_t bytesOf(const std::vector<RecordField>& fields) {
   return bytes;
 }
 
-PointCloudContent readTextRecords(FileCursor& cursor, const std::vector<RecordField>& fields,
+PointCloudContent readTextRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
                                   std::uint64_t count) {
   const FieldPlaces places = findFields(fields);
   std::size_t numbers = 0;
@@ -191,7 +191,7 @@ PointCloudContent readTextRecords(FileCursor& cursor, const std::vector<RecordFi
   return content;
 }
 
-PointCloudContent readBinaryRecords(FileCursor& cursor, const std::vector<RecordField>& fields,
+PointCloudContent readBinaryRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
                                     std::uint64_t count, const RecordOrder& order) {
   const FieldPlaces places = findFields(fields);
   const std::size_t record_bytes = bytesOf(fields);

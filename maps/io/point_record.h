@@ -47,9 +47,9 @@ std::size_t bytesOf(const std::vector<RecordField>& fields);
 /// `bytesOf` bytes. What stands behind them is left to the caller.
 /// @throws std::runtime_error naming the place where one is not as it should be or the file ends,
 /// or where no single field is called x, y or z.
-PointCloudContent readTextRecords(FileCursor& cursor, const std::vector<RecordField>& fields,
+PointCloudContent readTextRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
                                   std::uint64_t count);
-PointCloudContent readBinaryRecords(FileCursor& cursor, const std::vector<RecordField>& fields,
+PointCloudContent readBinaryRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
                                     std::uint64_t count, const RecordOrder& order);
 
 }  // namespace efm

@@ -9,7 +9,7 @@
 
 namespace efm {
 
-std::string_view FileCursor::line(std::string_view expected) {
+std::string_view TextScanner::line(std::string_view expected) {
   const std::size_t end = rest_.find('\n');
   if (end == std::string_view::npos) {
     const std::string place = "line " + std::to_string(lines_ + 1) + ": ";
@@ -25,17 +25,17 @@ std::string_view FileCursor::line(std::string_view expected) {
   return line;
 }
 
-std::string_view FileCursor::take(std::size_t bytes) {
+std::string_view TextScanner::take(std::size_t bytes) {
   const std::string_view taken = rest_.substr(0, bytes);
   rest_.remove_prefix(taken.size());
   return taken;
 }
 
-void FileCursor::refuse(const std::string& why) const {
+void TextScanner::refuse(const std::string& why) const {
   throw std::runtime_error("byte " + std::to_string(bytes_.size() - rest_.size()) + ": " + why);
 }
 
-void FileCursor::expectEnd() const {
+void TextScanner::expectEnd() const {
   if (rest_.find_first_not_of(" \t\r\n") == std::string_view::npos) return;
   refuse(std::to_string(rest_.size()) + " more bytes: expected the end of the file");
 }
@@ -54,7 +54,7 @@ std::uint64_t WordLine::count(std::size_t word) const {
   return count;
 }
 
-WordLine wordLine(FileCursor& cursor, std::string_view expected) {
+WordLine wordLine(TextScanner& cursor, std::string_view expected) {
   constexpr std::string_view kBlanks = " \t";
   const std::string_view text = cursor.line(expected);
   WordLine line;

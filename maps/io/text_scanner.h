@@ -10,9 +10,9 @@
 namespace efm {
 
 /// A file's bytes, read from front to back, that can say where something is wrong.
-class FileCursor {
+class TextScanner {
  public:
-  explicit FileCursor(std::string_view bytes) : bytes_(bytes), rest_(bytes) {}
+  explicit TextScanner(std::string_view bytes) : bytes_(bytes), rest_(bytes) {}
 
   /// The next line, without its end ("\n" or "\r\n").
   /// @param expected what it should hold: for the error.
@@ -49,7 +49,7 @@ struct WordLine {
   std::uint64_t count(std::size_t word) const;
 };
 
-/// The next line of the file, as `FileCursor::line` has it.
-WordLine wordLine(FileCursor& cursor, std::string_view expected);
+/// The next line of the file, as `TextScanner::line` has it.
+WordLine wordLine(TextScanner& cursor, std::string_view expected);
 
 }  // namespace efm

@@ -24,7 +24,7 @@ double shareWithin(const std::vector<double>& distances, double limit_m) {
 std::vector<double> nearestDistances(const std::vector<CloudPoint>& points,
                                      const std::vector<CloudPoint>& others) {
   if (others.empty()) throw std::invalid_argument("no point to measure distances to");
-  const Eigen::Vector3d middle = middleOf(others);
+  const Eigen::Vector3d middle = medianPosition(others);
   pcl::KdTreeFLANN<pcl::PointXYZ> tree;
   tree.setInputCloud(pclCloudAround(middle, others));
 
@@ -42,7 +42,7 @@ std::vector<double> nearestDistances(const std::vector<CloudPoint>& points,
   return distances;
 }
 
-std::vector<double> usualCloudDistances() {
+std::vector<double> defaultCloudDistances() {
   return {0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1};
 }
 
@@ -64,9 +64,9 @@ CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<Cl
 
   CloudErrors errors;
   errors.accuracy = statisticsOf(to_truth);
-  errors.accuracy_90_m = quantileOf(to_truth, 0.9);
-  errors.gaps = statisticsOf(to_map);
-  errors.gaps_90_m = quantileOf(to_map, 0.9);
+  errors.accuracy_p90_m = quantileOf(to_truth, 0.9);
+  errors.completeness_distance = statisticsOf(to_map);
+  errors.completeness_distance_p90_m = quantileOf(to_map, 0.9);
   for (const double distance_m : distances_m) {
     CloudErrors::Step step;
     step.distance_m = distance_m;

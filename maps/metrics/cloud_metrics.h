@@ -23,10 +23,11 @@ struct CloudErrors {
   /// Accuracy: distances from the map's points to the truth, metres.
   SampleStatistics accuracy;
   /// The distance that 90 % of the map's points lie within (Seitz et al., CVPR 2006, "accuracy").
-  double accuracy_90_m = 0;
+  double accuracy_p90_m = 0;
   /// Distances from the true points to the map, metres.
-  SampleStatistics gaps;
-  double gaps_90_m = 0;  ///< The distance that 90 % of the true points have the map within.
+  SampleStatistics completeness_distance;
+  double completeness_distance_p90_m =
+      0;  ///< The distance that 90 % of the true points have the map within.
 
   /// One distance d that the two are held against.
   struct Step {
@@ -41,7 +42,7 @@ struct CloudErrors {
 };
 
 /// Distances that suit rooms: 1 cm to 1 m.
-std::vector<double> usualCloudDistances();
+std::vector<double> defaultCloudDistances();
 
 /// @param distances_m above 0, in any order; kept in theirs.
 /// @throws std::invalid_argument where a cloud is empty, a point is not finite or a distance is not

@@ -62,7 +62,7 @@ void PrecisionRecall::add(const PrecisionRecall& other) {
   estimates_without_truth += other.estimates_without_truth;
 }
 
-std::vector<double> usualDepthThresholds() {
+std::vector<double> defaultDepthThresholds() {
   return {0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1, 2, 5};
 }
 

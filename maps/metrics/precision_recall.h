@@ -37,7 +37,7 @@ struct PrecisionRecall {
 };
 
 /// Thresholds that suit rooms and streets: 1 cm to 5 m, about even in the logarithm.
-std::vector<double> usualDepthThresholds();
+std::vector<double> defaultDepthThresholds();
 
 /// Counts |Z - Z_true| <= threshold. Estimates are held against the best truth within the
 /// tolerance, as `pairDepths` does; a truth is found by the nearest estimate (in depth) within the

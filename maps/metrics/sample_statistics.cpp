@@ -26,10 +26,10 @@ SampleStatistics statisticsOf(const std::vector<double>& values) {
   for (const double value : values) {
     differences += (value - statistics.mean) * (value - statistics.mean);
   }
-  statistics.deviation = std::sqrt(differences / count);
+  statistics.stddev = std::sqrt(differences / count);
   const auto [least, largest] = std::minmax_element(values.begin(), values.end());
-  statistics.least = *least;
-  statistics.largest = *largest;
+  statistics.min = *least;
+  statistics.max = *largest;
   statistics.median = medianOf(values);
   return statistics;
 }

@@ -12,9 +12,9 @@ struct SampleStatistics {
   double rms = 0;  ///< Root of the mean square.
   double mean = 0;
   double median = 0;
-  double deviation = 0;  ///< Root of the mean squared difference from the mean (over n, not n - 1).
-  double least = 0;
-  double largest = 0;
+  double stddev = 0;  ///< Root of the mean squared difference from the mean (over n, not n - 1).
+  double min = 0;
+  double max = 0;
 };
 
 SampleStatistics statisticsOf(const std::vector<double>& values);

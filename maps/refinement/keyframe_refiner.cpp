@@ -84,11 +84,11 @@ PoseNoise KeyframeRefiner::timesOthers(const std::optional<PoseNoise>& stated) c
           times(stated->noise_rad, options_.tracker.noise_rad)};
 }
 
-void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
+void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
                           const std::optional<PoseNoise>& stated) {
   const std::size_t number = keyframes_.size();
   const std::string name = "keyframe " + std::to_string(number);
-  if (!isUsable(T_tracker_ref)) {
+  if (!isUsable(T_odom_ref)) {
     throw std::invalid_argument(name + ": its pose is not finite, or farther than 1e9 m");
   }
   if (stated) {
@@ -97,16 +97,16 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
     requireOption(stated->noise_rad >= 0 && std::isfinite(stated->noise_rad), name + ": noise_rad",
                   stated->noise_rad, "0 or above");
   }
-  RefinedKeyframe keyframe{std::move(cloud), T_tracker_ref, T_tracker_ref, T_tracker_ref};
+  RefinedKeyframe keyframe{std::move(cloud), T_odom_ref, T_odom_ref, T_odom_ref};
   keyframe.noise = timesOthers(stated);
   keyframe.first_factor = factors_.size();
   if (number > 0) {
     // 1. Where the tracker says.
     const RefinedKeyframe& last = keyframes_.back();
-    const Rigid3 T_last_ref = last.T_tracker_ref.inverse() * T_tracker_ref;
-    keyframe.T_world_tracked = last.T_world_tracked * T_last_ref;
-    keyframe.T_world_ref = keyframe.T_world_tracked;
-    keyframe.way_m = last.way_m + T_last_ref.translation.norm();
+    const Rigid3 T_last_ref = last.T_odom_ref.inverse() * T_odom_ref;
+    keyframe.T_world_ref_denoised = last.T_world_ref_denoised * T_last_ref;
+    keyframe.T_world_ref = keyframe.T_world_ref_denoised;
+    keyframe.path_length_m = last.path_length_m + T_last_ref.translation.norm();
   }
   keyframes_.push_back(std::move(keyframe));
   if (number == 0) return;
@@ -115,7 +115,7 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
   const auto window = static_cast<std::size_t>(options_.window);
   takeCovariance(solveFrom(number + 1 > window ? number + 1 - window : 0, options_.graph));  // 3.
   closeLoops();                                                                              // 4.
-  if (number > window) keyframes_[number - window - 1].cloud.forgetTree();
+  if (number > window) keyframes_[number - window - 1].cloud.releaseTree();
 }
 
 double KeyframeRefiner::overlapOf(std::size_t newer, std::size_t older) const {
@@ -174,8 +174,9 @@ void KeyframeRefiner::registerNewest() {
     map.push_back({i, &keyframes_[i].cloud, keyframes_[i].T_world_ref});
   }
   const TrackerErrors errors = cautiousErrors();
-  const Matrix6d covariance = errors.noiseCovariance() + errors.noiseCovariance(newest.noise) +
-                              errors.driftCovariance(newest.way_m - keyframes_[number - 1].way_m);
+  const Matrix6d covariance =
+      errors.noiseCovariance() + errors.noiseCovariance(newest.noise) +
+      errors.driftCovariance(newest.path_length_m - keyframes_[number - 1].path_length_m);
   const Registration registration =
       registerKeyframe(number, newest.cloud, map, {newest.T_world_ref, sqrtInformation(covariance)},
                        options_.registration);
@@ -203,8 +204,8 @@ void KeyframeRefiner::learnFrom(const RelativePoseFactor& factor) {
   MotionSample sample;
   sample.covariance = motion.covariance;
   sample.difference =
-      differenceOf(motion.T_from_to.inverse() * (from.T_tracker_ref.inverse() * to.T_tracker_ref));
-  sample.way_m = to.way_m - from.way_m;
+      differenceOf(motion.T_from_to.inverse() * (from.T_odom_ref.inverse() * to.T_odom_ref));
+  sample.path_length_m = to.path_length_m - from.path_length_m;
   sample.from = from.noise;
   sample.to = to.noise;
   samples_.push_back(sample);
@@ -226,7 +227,7 @@ WindowGraph KeyframeRefiner::solveFrom(std::size_t first_free, const PoseGraphOp
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
     if (!window.has(i)) continue;
     RefinedKeyframe& keyframe = keyframes_[i];
-    keyframe.T_world_tracked = window.T_world_tracked(i);
+    keyframe.T_world_ref_denoised = window.T_world_ref_denoised(i);
     if (i < first_free) continue;
     keyframe.moved = keyframe.moved || !isSame(keyframe.T_world_ref, window.T_world_ref(i));
     keyframe.T_world_ref = window.T_world_ref(i);
@@ -239,7 +240,7 @@ void KeyframeRefiner::takeCovariance(const WindowGraph& window) {
   const std::size_t newest = keyframes_.size() - 1;
   // What cannot be computed is what the whole way adds.
   covariance_ = window.trackedCovariance(options_.graph, newest)
-                    .value_or(errors_.driftCovariance(keyframes_[newest].way_m)) +
+                    .value_or(errors_.driftCovariance(keyframes_[newest].path_length_m)) +
                 errors_.noiseCovariance(keyframes_[newest].noise);
 }
 
@@ -248,14 +249,14 @@ bool KeyframeRefiner::check(const LoopCandidate& candidate) {
   const RefinedKeyframe& newer = keyframes_[candidate.newer];
   ++counts_.loop_checks;
   const TrackerErrors errors = cautiousErrors();
-  const Matrix6d covariance = errors.noiseCovariance(older.noise) +
-                              errors.noiseCovariance(newer.noise) +
-                              errors.driftCovariance(std::abs(newer.way_m - older.way_m));
+  const Matrix6d covariance =
+      errors.noiseCovariance(older.noise) + errors.noiseCovariance(newer.noise) +
+      errors.driftCovariance(std::abs(newer.path_length_m - older.path_length_m));
   const std::optional<RelativePoseFactor> factor = verifyLoop(
       candidate, older.cloud, newer.cloud, covariance, options_.loop, options_.registration);
   for (const std::size_t keyframe : {candidate.older, candidate.newer}) {
     if (keyframe + static_cast<std::size_t>(options_.window) < keyframes_.size()) {
-      keyframes_[keyframe].cloud.forgetTree();
+      keyframes_[keyframe].cloud.releaseTree();
     }
   }
   if (!factor) return false;
@@ -298,8 +299,8 @@ void KeyframeRefiner::closeLoops() {
 std::vector<RelativePoseFactor*> KeyframeRefiner::contradicted(double sigmas) {
   std::vector<RelativePoseFactor*> loops;
   for (RelativePoseFactor& factor : factors_) {
-    if (factor.doubtful && errorOf(factor, keyframes_[factor.from].T_world_ref,
-                                   keyframes_[factor.to].T_world_ref) > sigmas) {
+    if (factor.robust && errorOf(factor, keyframes_[factor.from].T_world_ref,
+                                 keyframes_[factor.to].T_world_ref) > sigmas) {
       loops.push_back(&factor);
     }
   }
@@ -348,13 +349,13 @@ std::vector<std::size_t> KeyframeRefiner::takeMoved() {
   return moved;
 }
 
-Rigid3 KeyframeRefiner::T_world_tracker() const {
+Rigid3 KeyframeRefiner::T_world_odom() const {
   if (keyframes_.empty()) return {};
-  return keyframes_.back().T_world_tracked * keyframes_.back().T_tracker_ref.inverse();
+  return keyframes_.back().T_world_ref_denoised * keyframes_.back().T_odom_ref.inverse();
 }
 
-Rigid3 KeyframeRefiner::T_world_tracked() const {
-  return keyframes_.empty() ? Rigid3{} : keyframes_.back().T_world_tracked;
+Rigid3 KeyframeRefiner::T_world_ref_denoised() const {
+  return keyframes_.empty() ? Rigid3{} : keyframes_.back().T_world_ref_denoised;
 }
 
 }  // namespace efm

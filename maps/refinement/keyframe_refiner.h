@@ -68,7 +68,7 @@ class KeyframeRefiner {
   /// ones are.
   /// @throws std::invalid_argument where the pose is not finite or beyond a million kilometres, or
   /// what is stated is not finite or below 0: nothing is taken then.
-  void add(RegistrationCloud cloud, const Rigid3& T_tracker_ref,
+  void add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
            const std::optional<PoseNoise>& stated = std::nullopt);
   /// Checks a loop that somebody else suspects, and closes it where it holds.
   /// @return whether it does.
@@ -85,9 +85,9 @@ class KeyframeRefiner {
 
   /// What brings the tracker's poses of now to the world of the refined ones; the identity before
   /// the first keyframe.
-  Rigid3 T_world_tracker() const;
+  Rigid3 T_world_odom() const;
   /// Where the tracker would have put the newest keyframe without noise; the identity before one.
-  Rigid3 T_world_tracked() const;
+  Rigid3 T_world_ref_denoised() const;
   /// Of a pose of the tracker that is there, after that correction, as `poseCovariance` has it:
   /// against the oldest keyframes that the last window leaves in place. Before the second keyframe
   /// that of a pose's noise.

@@ -49,7 +49,7 @@ class NeighbourSearch {
     for (const MapKeyframe& from : map_) {
       T_from_ref.push_back(from.T_world_ref.inverse() * T_world_ref);
     }
-    for (std::size_t i = 0; i < cloud_.numChosen(); i += stride) {
+    for (std::size_t i = 0; i < cloud_.numQueryPoints(); i += stride) {
       const RegistrationPoint& point = cloud_.points()[i];
       const Eigen::Vector3d p_ref = point.p_ref.cast<double>();
       const Eigen::Matrix3d own =
@@ -178,7 +178,7 @@ Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud
 
   AlignmentOptions coarse = options.alignment;
   coarse.max_iterations = std::min(coarse.max_iterations, kCoarseIterations);
-  const std::size_t stride = std::max<std::size_t>(1, cloud.numChosen() / kCoarsePoints);
+  const std::size_t stride = std::max<std::size_t>(1, cloud.numQueryPoints() / kCoarsePoints);
   constexpr double kSigmas = 3;
   double distance_px = std::min(kSigmas * uncertaintyPx(cloud, prior), options.first_distance_px);
   for (; distance_px > options.last_distance_px; distance_px *= kShrink) {

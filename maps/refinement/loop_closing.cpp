@@ -87,7 +87,7 @@ double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in,
                    const Rigid3& T_in_of) {
   std::size_t looked_at = 0;
   std::size_t seen = 0;
-  for (std::size_t i = 0; i < of.numChosen(); i += kOverlapStride) {
+  for (std::size_t i = 0; i < of.numQueryPoints(); i += kOverlapStride) {
     ++looked_at;
     if (in.sees(T_in_of * of.points()[i].p_ref.cast<double>())) ++seen;
   }
@@ -115,7 +115,7 @@ std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
   RelativePoseFactor factor = withSystematicError(there.factors.front());
   factor.from = candidate.older;
   factor.to = candidate.newer;
-  factor.doubtful = true;
+  factor.robust = true;
   return factor;
 }
 

@@ -40,7 +40,7 @@ double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in, con
 /// Registers the candidate's keyframes with each other, both ways: a place that looks alike from
 /// there alone is none.
 /// @param covariance of T_older_newer.
-/// @return a doubtful factor; nothing where too few points have neighbours, their errors are too
+/// @return a robust factor; nothing where too few points have neighbours, their errors are too
 /// large, the result is not sure, far beyond what the covariance allows, or another one the other
 /// way.
 std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,

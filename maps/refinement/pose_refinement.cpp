@@ -184,7 +184,7 @@ class GraphProblem {
     for (const RelativePoseFactor& factor : graph.factors) {
       if (graph.fixed[factor.from] && graph.fixed[factor.to]) continue;
       problem_.AddResidualBlock(new FactorCost(new FactorError{factor}),
-                                factor.doubtful ? &loss_ : nullptr, blocks_[factor.from].data(),
+                                factor.robust ? &loss_ : nullptr, blocks_[factor.from].data(),
                                 blocks_[factor.to].data());
     }
     for (std::size_t i = 0; i < blocks_.size(); ++i) {
@@ -237,7 +237,7 @@ Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
   ceres::Solver::Summary summary;
   ceres::Solver::Options solver =
       solverOptions(options.max_iterations, ceres::DENSE_NORMAL_CHOLESKY);
-  solver.function_tolerance = options.least_gain;
+  solver.function_tolerance = options.min_gain;
   ceres::Solve(solver, &problem, &summary);
   return summary.IsSolutionUsable() ? rigidOf(pose) : T_map_start;
 }

@@ -36,7 +36,7 @@ struct AlignmentOptions {
   int max_iterations = 10;  ///< 1 to 1000.
   /// An iteration that takes away less than this share of the errors' squares is the last one.
   /// Range: 0 to 1.
-  double least_gain = 1e-8;
+  double min_gain = 1e-8;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
@@ -57,7 +57,7 @@ struct RelativePoseFactor {
   Matrix6d sqrt_information = Matrix6d::Identity();
   Vector6d offset = Vector6d::Zero();
   /// Whether it may be wrong altogether: then large errors count less (Cauchy's loss).
-  bool doubtful = false;
+  bool robust = false;
 };
 
 /// The length of a factor's error: standard deviations, where it has that many.
@@ -82,7 +82,7 @@ struct PoseGraph {
 };
 
 struct PoseGraphOptions {
-  double robust_sigmas = 3;  ///< Of doubtful factors; as above.
+  double robust_sigmas = 3;  ///< Of robust factors; as above.
   int max_iterations = 20;   ///< 1 to 1000.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.

@@ -251,6 +251,6 @@ std::optional<std::size_t> RegistrationCloud::nearest(const Eigen::Vector3d& p_r
   return static_cast<std::size_t>(index.front());
 }
 
-void RegistrationCloud::forgetTree() const { tree_.reset(); }
+void RegistrationCloud::releaseTree() const { tree_.reset(); }
 
 }  // namespace efm

@@ -49,9 +49,9 @@ class RegistrationCloud {
   RegistrationCloud(RegistrationCloud&&) noexcept;
   RegistrationCloud& operator=(RegistrationCloud&&) noexcept;
 
-  /// Those that others are registered with; the first `numChosen` are registered with others.
+  /// Those that others are registered with; the first `numQueryPoints` are registered with others.
   const std::vector<RegistrationPoint>& points() const { return points_; }
-  std::size_t numChosen() const { return num_chosen_; }
+  std::size_t numQueryPoints() const { return num_chosen_; }
   /// Focal length in pixels, and the middle of the inverse depths, 1/m.
   double focalPx() const { return view_.fx; }
   double middleInverseDepth() const { return 0.5 * (nearest_ + farthest_); }
@@ -65,7 +65,7 @@ class RegistrationCloud {
   std::optional<std::size_t> nearest(const Eigen::Vector3d& p_ref, double max_distance_px) const;
 
   /// The first search makes the tree; this gives its memory back. Not thread-safe either.
-  void forgetTree() const;
+  void releaseTree() const;
 
  private:
   struct Tree;

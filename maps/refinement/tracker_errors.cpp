@@ -44,7 +44,7 @@ double logLikelihood(const std::vector<MotionSample>& samples, const TrackerErro
   for (const MotionSample& sample : samples) {
     const Matrix6d covariance = sample.covariance + errors.noiseCovariance(sample.from) +
                                 errors.noiseCovariance(sample.to) +
-                                errors.driftCovariance(sample.way_m);
+                                errors.driftCovariance(sample.path_length_m);
     const Eigen::LLT<Matrix6d> llt(covariance);
     const double squared = llt.matrixL().solve(sample.difference).squaredNorm();
     sum -= llt.matrixLLT().diagonal().array().log().sum() +
@@ -78,9 +78,9 @@ Matrix6d TrackerErrors::noiseCovariance(const PoseNoise& times) const {
   return covarianceOf(sigma_m * sigma_m, sigma_rad * sigma_rad);
 }
 
-Matrix6d TrackerErrors::driftCovariance(double way_m) const {
+Matrix6d TrackerErrors::driftCovariance(double path_length_m) const {
   // A random walk on short ways; on long ones what goes on in one direction is more.
-  const double squared_way = way_m * std::max(way_m, 1.0);
+  const double squared_way = path_length_m * std::max(path_length_m, 1.0);
   return covarianceOf(drift_m * drift_m * squared_way, drift_rad * drift_rad * squared_way);
 }
 

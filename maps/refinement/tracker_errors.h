@@ -31,14 +31,14 @@ struct TrackerErrors {
   /// @param times how many times the noise of others it has.
   Matrix6d noiseCovariance(const PoseNoise& times = kCommonNoise) const;
   /// Of the motion without noise over a way in metres. Never singular.
-  Matrix6d driftCovariance(double way_m) const;
+  Matrix6d driftCovariance(double path_length_m) const;
 };
 
 /// The motion between two keyframes: the tracker's against the one by their points.
 struct MotionSample {
   Vector6d difference = Vector6d::Zero();
   Matrix6d covariance = Matrix6d::Identity();  ///< Of the motion by points. Not singular.
-  double way_m = 0;                            ///< Between the two.
+  double path_length_m = 0;                    ///< Between the two.
   PoseNoise from = kCommonNoise;               ///< How many times the noise of others they have.
   PoseNoise to = kCommonNoise;
 };

@@ -24,9 +24,9 @@ void WindowGraph::addTracker(const TrackerErrors& errors) {
                               sqrtInformation(errors.noiseCovariance(keyframe.noise))});
     if (i + 1 == keyframes_.size()) break;
     const RefinedKeyframe& next = keyframes_[i + 1];
-    const Matrix6d drift = errors.driftCovariance(next.way_m - keyframe.way_m);
+    const Matrix6d drift = errors.driftCovariance(next.path_length_m - keyframe.path_length_m);
     graph_.factors.push_back({trackedNode(i), trackedNode(i + 1),
-                              keyframe.T_tracker_ref.inverse() * next.T_tracker_ref,
+                              keyframe.T_odom_ref.inverse() * next.T_odom_ref,
                               sqrtInformation(drift)});
   }
 }
@@ -35,7 +35,7 @@ const Rigid3& WindowGraph::T_world_ref(std::size_t keyframe) const {
   return graph_.T_world_node[place_[keyframe].value()];
 }
 
-const Rigid3& WindowGraph::T_world_tracked(std::size_t keyframe) const {
+const Rigid3& WindowGraph::T_world_ref_denoised(std::size_t keyframe) const {
   return graph_.T_world_node[place_[keyframe].value() + 1];
 }
 
@@ -54,7 +54,7 @@ std::size_t WindowGraph::ownNode(std::size_t keyframe) {
   graph_.fixed.push_back(stays);
   // The first keyframe stays where the tracker put it, noise and all: how much of that is noise
   // shows later.
-  graph_.T_world_node.push_back(keyframes_[keyframe].T_world_tracked);
+  graph_.T_world_node.push_back(keyframes_[keyframe].T_world_ref_denoised);
   graph_.fixed.push_back(stays && keyframe > 0);
   return *place;
 }

@@ -32,8 +32,8 @@ class WindowGraph {
   bool has(std::size_t keyframe) const { return place_[keyframe].has_value(); }
   /// Its poses, where it is.
   const Rigid3& T_world_ref(std::size_t keyframe) const;
-  const Rigid3& T_world_tracked(std::size_t keyframe) const;
-  /// See `poseCovariance`: of T_world_tracked.
+  const Rigid3& T_world_ref_denoised(std::size_t keyframe) const;
+  /// See `poseCovariance`: of T_world_ref_denoised.
   std::optional<Matrix6d> trackedCovariance(const PoseGraphOptions& options,
                                             std::size_t keyframe) const;
 

@@ -30,7 +30,7 @@ std::vector<std::string> rowOf(const std::string& name, const SampleStatistics& 
           fixedText(statistics.median, 4),
           ninety,
           fixedText(statistics.rms, 4),
-          fixedText(statistics.largest, 4)};
+          fixedText(statistics.max, 4)};
 }
 
 Json asJson(const SampleStatistics& statistics) {
@@ -38,7 +38,7 @@ Json asJson(const SampleStatistics& statistics) {
           {"mean_m", statistics.mean},
           {"median_m", statistics.median},
           {"rms_m", statistics.rms},
-          {"max_m", statistics.largest}};
+          {"max_m", statistics.max}};
 }
 
 }  // namespace
@@ -49,12 +49,12 @@ CloudEvaluation evaluateCloud(const std::filesystem::path& estimated,
   const auto map = readPoints(fileInFolder(estimated, {"map.pcd", "points.pcd"}));
   const auto surfaces = readPoints(fileInFolder(truth, {"gt_cloud.ply"}));
   CloudEvaluation evaluation;
-  evaluation.without_place = map.without_place + surfaces.without_place;
+  evaluation.without_place = map.non_finite + surfaces.non_finite;
   if (options.to_find.empty()) {
     evaluation.errors = cloudErrors(map.points, surfaces.points, options.distances_m);
   } else {
     const auto to_find = readPoints(options.to_find);
-    evaluation.without_place += to_find.without_place;
+    evaluation.without_place += to_find.non_finite;
     evaluation.errors =
         cloudErrors(map.points, surfaces.points, to_find.points, options.distances_m);
   }
@@ -66,8 +66,9 @@ std::string evaluationTable(const CloudEvaluation& evaluation) {
   TextTable distances;
   distances.add({"distances in m", "points", "mean", "median", "90 %", "rms", "max"});
   distances.add(
-      rowOf("map to truth (accuracy)", errors.accuracy, fixedText(errors.accuracy_90_m, 4)));
-  distances.add(rowOf("truth to map (gaps)", errors.gaps, fixedText(errors.gaps_90_m, 4)));
+      rowOf("map to truth (accuracy)", errors.accuracy, fixedText(errors.accuracy_p90_m, 4)));
+  distances.add(rowOf("truth to map (gaps)", errors.completeness_distance,
+                      fixedText(errors.completeness_distance_p90_m, 4)));
   TextTable steps;
   steps.add({"distance m", "map within %", "outliers %", "completeness %", "F1 %"});
   for (const CloudErrors::Step& step : errors.steps) {
@@ -86,9 +87,9 @@ std::string evaluationJson(const CloudEvaluation& evaluation) {
   const CloudErrors& errors = evaluation.errors;
   Json json;
   json["accuracy"] = asJson(errors.accuracy);
-  json["accuracy"]["share_90_m"] = errors.accuracy_90_m;
-  json["gaps"] = asJson(errors.gaps);
-  json["gaps"]["share_90_m"] = errors.gaps_90_m;
+  json["accuracy"]["share_90_m"] = errors.accuracy_p90_m;
+  json["gaps"] = asJson(errors.completeness_distance);
+  json["gaps"]["share_90_m"] = errors.completeness_distance_p90_m;
   json["curve"] = Json::array();
   for (const CloudErrors::Step& step : errors.steps) {
     json["curve"].push_back({{"distance_m", step.distance_m},

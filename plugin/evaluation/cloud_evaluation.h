@@ -11,7 +11,7 @@
 namespace efm {
 
 struct CloudEvaluationOptions {
-  std::vector<double> distances_m = usualCloudDistances();  ///< Each above 0.
+  std::vector<double> distances_m = defaultCloudDistances();  ///< Each above 0.
   /// What of the truth completeness asks for, such as a dataset's gt_edges.ply; empty: all of it.
   std::filesystem::path to_find;
 };

@@ -18,7 +18,7 @@ struct DepthEvaluationOptions {
   std::optional<double> focal_baseline;
   std::optional<double> png_scale;  ///< Of 16-bit PNG, as `readDepthFile` has it.
   std::filesystem::path mask;       ///< Its pixels alone count; empty: all.
-  std::vector<double> thresholds_m = usualDepthThresholds();  ///< Of precision, recall and F1.
+  std::vector<double> thresholds_m = defaultDepthThresholds();  ///< Of precision, recall and F1.
 };
 
 /// The errors of one depth map.

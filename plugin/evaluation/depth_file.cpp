@@ -93,7 +93,7 @@ cv::Mat1f readDepthFile(const std::filesystem::path& file, std::optional<double>
     requireOption(*png_scale > 0 && std::isfinite(*png_scale), "scale", *png_scale, "above 0");
   }
   try {
-    return parseDepth(readWhole(file), png_scale);
+    return parseDepth(readBytes(file), png_scale);
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot read the depth map " + file.string() + ": " + error.what());
   }
@@ -101,7 +101,7 @@ cv::Mat1f readDepthFile(const std::filesystem::path& file, std::optional<double>
 
 cv::Mat1b readMaskFile(const std::filesystem::path& file) {
   try {
-    const std::string bytes = readWhole(file);
+    const std::string bytes = readBytes(file);
     if (bytes.empty()) throw std::runtime_error("it is empty");
     // Of colours the brightest; OpenCV's own grey would round a dark blue to black.
     cv::Mat channels = decoded(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);

@@ -41,7 +41,7 @@ bool looksLikePfm(std::string_view bytes) {
 }
 
 cv::Mat1f parsePfm(std::string_view bytes) {
-  FileCursor cursor(bytes);
+  TextScanner cursor(bytes);
   const WordLine kind = wordLine(cursor, "Pf");
   if (kind.words.size() != 1 || kind.words[0] != "Pf") {
     kind.refuse("expected Pf alone, a grey float map");

@@ -65,8 +65,8 @@ Rigid3 aligned(const TrajectoryEvaluation& evaluation, const std::filesystem::pa
 std::vector<std::string> rowOf(const std::string& name, const SampleStatistics& statistics,
                                double factor) {
   std::vector<std::string> row = {name, std::to_string(statistics.count)};
-  for (const double value : {statistics.rms, statistics.mean, statistics.median,
-                             statistics.deviation, statistics.least, statistics.largest}) {
+  for (const double value : {statistics.rms, statistics.mean, statistics.median, statistics.stddev,
+                             statistics.min, statistics.max}) {
     row.push_back(statistics.count > 0 ? fixedText(factor * value, 4) : "-");
   }
   return row;
@@ -74,8 +74,8 @@ std::vector<std::string> rowOf(const std::string& name, const SampleStatistics& 
 
 Json asJson(const SampleStatistics& statistics, double factor) {
   return {{"rmse", factor * statistics.rms},      {"mean", factor * statistics.mean},
-          {"median", factor * statistics.median}, {"std", factor * statistics.deviation},
-          {"min", factor * statistics.least},     {"max", factor * statistics.largest}};
+          {"median", factor * statistics.median}, {"std", factor * statistics.stddev},
+          {"min", factor * statistics.min},       {"max", factor * statistics.max}};
 }
 
 Json asJson(const EvaluatedSpacing& relative) {

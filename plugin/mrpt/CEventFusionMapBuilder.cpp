@@ -266,10 +266,10 @@ std::vector<StampedPose> CEventFusionMapBuilder::keyframePoses() const {
 std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<StampedPose> poses = keyframePoses();
-  const std::vector<Rigid3>& T_tracker_ref = session_->T_tracker_ref();
-  const std::size_t earlier = poses.size() - T_tracker_ref.size();
-  for (std::size_t i = 0; i < T_tracker_ref.size(); ++i) {
-    poses[earlier + i].T_world_rig = T_tracker_ref[i];
+  const std::vector<Rigid3>& T_odom_ref = session_->T_odom_ref();
+  const std::size_t earlier = poses.size() - T_odom_ref.size();
+  for (std::size_t i = 0; i < T_odom_ref.size(); ++i) {
+    poses[earlier + i].T_world_rig = T_odom_ref[i];
   }
   return poses;
 }
@@ -313,7 +313,7 @@ mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() 
     estimate->mean = mrptPoseFrom(newest->T_world_rig);
     return estimate;
   }
-  const Rigid3 T_world_rig = refinement->T_world_tracker * newest->T_world_rig;
+  const Rigid3 T_world_rig = refinement->T_world_odom * newest->T_world_rig;
   return std::make_shared<mrpt::poses::CPose3DPDFGaussian>(
       mrptPoseFrom(T_world_rig, covarianceAt(*refinement, T_world_rig)));
 }
@@ -363,7 +363,7 @@ void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& fil
   const std::lock_guard<std::mutex> lock(mutex_);
   if (newest_depth_.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(newest_depth_, options_.mapper.keyframe.planes);
-  writeWhole(file, [&](const std::filesystem::path& temporary) {
+  writeAtomically(file, [&](const std::filesystem::path& temporary) {
     if (!cv::imwrite(temporary.string(), picture)) throw std::runtime_error("imwrite failed");
   });
 }

@@ -44,7 +44,7 @@ std::vector<ViewPoint> viewPointsOf(const CPointsMapXYZI& cloud) {
 }
 
 std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe) {
-  return placedInWorld(viewPointsOf(*keyframe.points), keyframe.T_world_ref);
+  return pointsInWorld(viewPointsOf(*keyframe.points), keyframe.T_world_ref);
 }
 
 std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,

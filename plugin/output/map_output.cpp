@@ -98,7 +98,7 @@ void removeKeyframes(const std::filesystem::path& keyframes) {
 }
 
 void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
-  writeWhole(path, [&](const std::filesystem::path& temporary) {
+  writeAtomically(path, [&](const std::filesystem::path& temporary) {
     if (!cv::imwrite(temporary.string(), image)) throw std::runtime_error("imwrite failed");
   });
 }
@@ -106,7 +106,7 @@ void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
 /// @param write puts the content into the stream.
 template <typename Write>
 void writeText(const std::filesystem::path& path, Write write) {
-  writeWhole(path, [&](const std::filesystem::path& temporary) {
+  writeAtomically(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary);
     write(file);
     file.close();
@@ -181,7 +181,7 @@ void MapOutput::writeCloud(const std::string& name, const std::vector<CloudPoint
 
 void MapOutput::writeSimplemap(const mrpt::maps::CSimpleMap& map) {
   removeEarlier();
-  writeWhole(folder_ / "map.simplemap", [&](const std::filesystem::path& temporary) {
+  writeAtomically(folder_ / "map.simplemap", [&](const std::filesystem::path& temporary) {
     if (!map.saveToFile(temporary.string())) {
       throw std::runtime_error("the file cannot be created or the disk is full");
     }

@@ -12,7 +12,7 @@ void writePicture(const std::filesystem::path& file, const cv::Mat3b& picture) {
   if (file.extension() != ".png") {
     throw std::runtime_error(file.string() + ": expected a name that ends in .png");
   }
-  writeWhole(file, [&](const std::filesystem::path& temporary) {
+  writeAtomically(file, [&](const std::filesystem::path& temporary) {
     if (!cv::imwrite(temporary.string(), picture)) {
       throw std::runtime_error("the file cannot be created or the disk is full");
     }

@@ -14,7 +14,7 @@ constexpr std::size_t kMostWaiting = 50;
 }  // namespace
 
 Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig) {
-  const Eigen::Vector3d lever_m = T_world_rig.translation - state.T_world_tracked.translation;
+  const Eigen::Vector3d lever_m = T_world_rig.translation - state.T_world_ref_denoised.translation;
   Matrix6d by_motion = Matrix6d::Identity();  // a turn v moves the rig by v x lever
   by_motion.topRightCorner<3, 3>() << 0, lever_m.z(), -lever_m.y(),  //
       -lever_m.z(), 0, lever_m.x(),                                  //
@@ -51,7 +51,7 @@ Rigid3 MapRefinement::add(const KeyframeDepthMap& keyframe,
   if (waiting_.size() >= kMostWaiting) task.cloud = RegistrationCloud({}, options_.refiner.points);
   waiting_.push_back(std::move(task));
   changed_.notify_all();
-  return state_.T_world_tracker * keyframe.T_world_ref;
+  return state_.T_world_odom * keyframe.T_world_ref;
 }
 
 void MapRefinement::finish() {
@@ -86,7 +86,7 @@ void MapRefinement::refine(Task task) {
   double seconds = 0;
   {
     const SecondsScope scope(seconds);
-    refiner_.add(std::move(task.cloud), task.T_tracker_ref, task.stated);
+    refiner_.add(std::move(task.cloud), task.T_odom_ref, task.stated);
   }
   publish(seconds);
 }
@@ -97,8 +97,8 @@ void MapRefinement::publish(double seconds) {
   for (const std::size_t number : refiner_.takeMoved()) {
     moved_[number] = refiner_.T_world_ref(number);
   }
-  state_.T_world_tracker = refiner_.T_world_tracker();
-  state_.T_world_tracked = refiner_.T_world_tracked();
+  state_.T_world_odom = refiner_.T_world_odom();
+  state_.T_world_ref_denoised = refiner_.T_world_ref_denoised();
   state_.covariance = refiner_.covariance();
   state_.counts = refiner_.counts();
   state_.tracker = refiner_.trackerErrors();

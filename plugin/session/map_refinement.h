@@ -29,8 +29,8 @@ struct MapRefinementOptions {
 
 /// What a refinement knows by now.
 struct RefinementState {
-  Rigid3 T_world_tracker;  ///< Takes the tracker's newest poses to the refined world.
-  Rigid3 T_world_tracked;  ///< The newest keyframe's, less its noise.
+  Rigid3 T_world_odom;          ///< Takes the tracker's newest poses to the refined world.
+  Rigid3 T_world_ref_denoised;  ///< The newest keyframe's, less its noise.
   Matrix6d covariance = Matrix6d::Zero();  ///< Of a pose there; see KeyframeRefiner.
   RefinementCounts counts;
   TrackerErrors tracker;    ///< As they seem to be.
@@ -70,7 +70,7 @@ class MapRefinement {
  private:
   struct Task {
     RegistrationCloud cloud;
-    Rigid3 T_tracker_ref;
+    Rigid3 T_odom_ref;
     std::optional<PoseNoise> stated;
   };
 

@@ -263,17 +263,17 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
 
 /// Puts a keyframe into the cloud where it stands by now, and others where they stand then.
 void MappingSession::place(KeyframeDepthMap& keyframe) {
-  const Rigid3 T_tracker_ref = keyframe.T_world_ref;
+  const Rigid3 T_odom_ref = keyframe.T_world_ref;
   std::vector<ViewPoint> points = pointsOf(keyframe);
   if (refinement_) {
     // What the map refuses must not be refined either: both number keyframes alike.
-    const Rigid3 T_world_ref = refinement_->state().T_world_tracker * T_tracker_ref;
-    cloud_.cloud().requireInsertable(placedInWorld(points, T_world_ref));
+    const Rigid3 T_world_ref = refinement_->state().T_world_odom * T_odom_ref;
+    cloud_.cloud().requireInsertable(pointsInWorld(points, T_world_ref));
     keyframe.T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
   }
   const SecondsScope scope(status_.seconds.map);
   cloud_.insert(std::move(points), keyframe.T_world_ref);
-  T_tracker_ref_.push_back(T_tracker_ref);
+  T_odom_ref_.push_back(T_odom_ref);
   for (const int camera : keyframe.silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }
@@ -290,7 +290,7 @@ void MappingSession::follow(double tolerance_m) {
     cloud_.move(keyframe, T_world_ref);
   }
   const bool some = options_.refinement.background && tolerance_m > 0;
-  cloud_.settle(tolerance_m, some ? kMostWhenLive : std::numeric_limits<std::size_t>::max());
+  cloud_.applyPending(tolerance_m, some ? kMostWhenLive : std::numeric_limits<std::size_t>::max());
 }
 
 void MappingSession::settle() {

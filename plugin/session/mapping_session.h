@@ -103,7 +103,7 @@ class MappingSession {
   /// Where the keyframes of this session stand in the cloud, by their order; and where the tracker
   /// put them.
   const std::vector<Rigid3>& T_world_ref() const { return cloud_.T_world_ref(); }
-  const std::vector<Rigid3>& T_tracker_ref() const { return T_tracker_ref_; }
+  const std::vector<Rigid3>& T_odom_ref() const { return T_odom_ref_; }
   /// What the options say of the rig.
   const RigSetup& setup() const { return setup_; }
   /// Of those that are used, as the tracker has it.
@@ -132,7 +132,7 @@ class MappingSession {
   FusionMapper mapper_;
   RefinedCloud cloud_;
   std::unique_ptr<MapRefinement> refinement_;  // where poses are refined
-  std::vector<Rigid3> T_tracker_ref_;
+  std::vector<Rigid3> T_odom_ref_;
   // That poses of each source may have, by their time.
   std::map<PoseOrigin, std::map<std::int64_t, std::optional<PoseNoise>>> noises_;
   bool finished_ = false;

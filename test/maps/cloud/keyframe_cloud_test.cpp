@@ -45,7 +45,7 @@ TEST(KeyframeCloud, IsThePointsOfTheViewPlacedInTheWorld) {
   const std::vector<CloudPoint> points = keyframeCloud(keyframe);
 
   ASSERT_EQ(points.size(), 6U);
-  const std::vector<CloudPoint> placed = placedInWorld(seen, keyframe.T_world_ref);
+  const std::vector<CloudPoint> placed = pointsInWorld(seen, keyframe.T_world_ref);
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_EQ(points[i].p_world, placed[i].p_world) << "bit for bit";
     EXPECT_EQ(points[i].confidence, seen[i].confidence);

@@ -60,7 +60,7 @@ struct Placed {
   std::vector<CloudPoint> afresh(const GlobalCloudOptions& options) const {
     GlobalCloud cloud(options);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      cloud.insert(i, placedInWorld(points[i], T_world_ref[i]), T_world_ref[i]);
+      cloud.insert(i, pointsInWorld(points[i], T_world_ref[i]), T_world_ref[i]);
     }
     return cloud.points();
   }
@@ -88,7 +88,7 @@ TEST_P(RefinedCloudOf, KeyframesThatWereMovedStandAsIfTheyHadBeenPutThere) {
     placed.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
   }
   for (std::size_t i = 0; i < 12; ++i) cloud.move(i, placed.T_world_ref[i]);
-  cloud.settle(0);
+  cloud.applyPending(0);
   EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
 }
 
@@ -101,7 +101,7 @@ void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
   for (std::size_t i = 0; i < fixed; ++i) {
     placed.points.push_back(randomPoints(random, random() % 80));
     placed.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
-    cloud.insertFixed(placedInWorld(placed.points[i], placed.T_world_ref[i]),
+    cloud.insertFixed(pointsInWorld(placed.points[i], placed.T_world_ref[i]),
                       placed.T_world_ref[i]);
   }
   std::vector<Rigid3> asked = placed.T_world_ref;
@@ -119,7 +119,7 @@ void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
       asked[fixed + moved] = asked[fixed + moved] * randomPose(random, extent, extent);
       cloud.move(moved, asked[fixed + moved]);
     } else {
-      cloud.settle(random() % 2 == 0 ? 0 : 0.01, random() % 6);
+      cloud.applyPending(random() % 2 == 0 ? 0 : 0.01, random() % 6);
     }
     // The map is what it says it is, settled or not.
     for (std::size_t i = 0; i < placed.points.size() - fixed; ++i) {
@@ -127,7 +127,7 @@ void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
     }
     RC_ASSERT(sameBits(cloud.cloud().points(), placed.afresh(options)));
   }
-  cloud.settle(0);
+  cloud.applyPending(0);
   for (std::size_t i = fixed; i < asked.size(); ++i) {
     RC_ASSERT(isSame(cloud.T_world_ref()[i - fixed], asked[i]));
   }
@@ -154,13 +154,13 @@ TEST(RefinedCloud, WhatIsOffByLessThanToleratedStays) {
   cloud.move(0, T_shifted);
   cloud.move(1, T_turned);
 
-  cloud.settle(0.0045);
+  cloud.applyPending(0.0045);
   EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {}));
   EXPECT_TRUE(isSame(cloud.T_world_ref()[1], {}));
-  cloud.settle(0.0035);
+  cloud.applyPending(0.0035);
   EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {}));
   EXPECT_TRUE(isSame(cloud.T_world_ref()[1], T_turned));
-  cloud.settle(0.0025);
+  cloud.applyPending(0.0025);
   EXPECT_TRUE(isSame(cloud.T_world_ref()[0], T_shifted));
 }
 
@@ -173,7 +173,7 @@ TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
     T_nearest_ref.rotation.x() = std::nextafter(T_nearest_ref.rotation.x(), 2);
     cloud.insert({{{0, 0, 2}, 1}}, T_world_ref);
     cloud.move(cloud.T_world_ref().size() - 1, T_nearest_ref);
-    cloud.settle(0);
+    cloud.applyPending(0);
     EXPECT_TRUE(isSame(cloud.T_world_ref().back(), T_nearest_ref));
   }
 }
@@ -185,7 +185,7 @@ TEST(RefinedCloud, SmallMotionsAddUpUntilTheyAreNotTolerated) {
   for (int step = 1; step <= 10; ++step) {
     T_world_ref.translation.x() = 0.001 * step;
     cloud.move(0, T_world_ref);
-    cloud.settle(0.0045);
+    cloud.applyPending(0.0045);
     EXPECT_LE(std::abs(cloud.T_world_ref()[0].translation.x() - 0.001 * step), 0.0045);
   }
   EXPECT_GT(cloud.T_world_ref()[0].translation.x(), 0);
@@ -204,13 +204,13 @@ TEST(RefinedCloud, MovesTheOldestFirstAndNoMoreThanAsked) {
     }
     return numbers;
   };
-  cloud.settle(0.1, 0);
+  cloud.applyPending(0.1, 0);
   EXPECT_EQ(moved(), (std::vector<std::size_t>{}));
-  cloud.settle(0.1, 2);
+  cloud.applyPending(0.1, 2);
   EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2}));
-  cloud.settle(0.1, 1);
+  cloud.applyPending(0.1, 1);
   EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2, 3}));
-  cloud.settle(0.1);
+  cloud.applyPending(0.1);
   EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2, 3, 4}));
 }
 
@@ -228,13 +228,13 @@ TEST(RefinedCloud, WhatCannotBeMovedStaysWhereItWas) {
     Rigid3 T_world_ref;
     T_world_ref.translation = {too_far_m, 0, 0};
     cloud.move(1, T_world_ref);
-    EXPECT_THROW(cloud.settle(0), std::invalid_argument);
+    EXPECT_THROW(cloud.applyPending(0), std::invalid_argument);
     EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
-    EXPECT_NO_THROW(cloud.settle(0)) << "it is not tried again";
+    EXPECT_NO_THROW(cloud.applyPending(0)) << "it is not tried again";
   }
   placed.T_world_ref[1] = randomPose(random, 0.1, 0.1);
   cloud.move(1, placed.T_world_ref[1]);
-  cloud.settle(0);
+  cloud.applyPending(0);
   EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
 }
 
@@ -248,7 +248,7 @@ TEST(RefinedCloud, ThatNeverMovesIsAGlobalCloud) {
     placed.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
     cloud.insert(placed.points.back(), placed.T_world_ref.back());
   }
-  cloud.settle(0);
+  cloud.applyPending(0);
   EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
 }
 

@@ -33,49 +33,49 @@ std::vector<CloudPoint> wall() {
   return points;
 }
 
-TEST(KeyframeSight, SupportsWhatItSawAndLooksThroughWhatIsWellBeforeIt) {
-  const KeyframeSight sight(wall(), {}, options());
+TEST(VisibilityGrid, SupportsWhatItSawAndLooksThroughWhatIsWellBeforeIt) {
+  const VisibilityGrid sight(wall(), {}, options());
   // The tolerance is 0.05 / 2 m = 0.025 / m: agreement from 1 / 0.525 to 1 / 0.475 m, looking
   // through before 1 / 0.55 m.
   EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2}), Verdict::kSupports);
   EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.91}), Verdict::kSupports);
   EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2.10}), Verdict::kSupports);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.89}), Verdict::kNothing);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.83}), Verdict::kNothing) << "neither this nor that";
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.81}), Verdict::kLooksThrough);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0.3}), Verdict::kLooksThrough);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.89}), Verdict::kUnknown);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.83}), Verdict::kUnknown) << "neither this nor that";
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.81}), Verdict::kFreeSpaceViolation);
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0.3}), Verdict::kFreeSpaceViolation);
 }
 
-TEST(KeyframeSight, SaysNothingOfWhatTheWallHidesOrWhereItSawNothing) {
-  const KeyframeSight sight(wall(), {}, options());
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2.2}), Verdict::kNothing) << "behind the wall";
-  EXPECT_EQ(sight.verdictOn({1.2, 0, 1.5}), Verdict::kNothing) << "beside it";
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, -2}), Verdict::kNothing) << "behind the view";
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0}), Verdict::kNothing);
-  EXPECT_EQ(sight.verdictOn({1e12, 0.1, 1e-9}), Verdict::kNothing) << "far to the side";
+TEST(VisibilityGrid, SaysNothingOfWhatTheWallHidesOrWhereItSawNothing) {
+  const VisibilityGrid sight(wall(), {}, options());
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2.2}), Verdict::kUnknown) << "behind the wall";
+  EXPECT_EQ(sight.verdictOn({1.2, 0, 1.5}), Verdict::kUnknown) << "beside it";
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, -2}), Verdict::kUnknown) << "behind the view";
+  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0}), Verdict::kUnknown);
+  EXPECT_EQ(sight.verdictOn({1e12, 0.1, 1e-9}), Verdict::kUnknown) << "far to the side";
 }
 
-TEST(KeyframeSight, ASingleCellBehindIsTooLittleToLookThroughAPoint) {
-  EXPECT_EQ(KeyframeSight({{{0, 0, 2}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
-            Verdict::kNothing);
+TEST(VisibilityGrid, ASingleCellBehindIsTooLittleToLookThroughAPoint) {
+  EXPECT_EQ(VisibilityGrid({{{0, 0, 2}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
+            Verdict::kUnknown);
 }
 
-TEST(KeyframeSight, AnEdgeBeforeTheWallIsSeenThoughTheWallIsInItsCellToo) {
+TEST(VisibilityGrid, AnEdgeBeforeTheWallIsSeenThoughTheWallIsInItsCellToo) {
   std::vector<CloudPoint> points = wall();
   points.push_back({{0.05, 0, 1}, 1.0F});
-  const KeyframeSight sight(points, {}, options());
+  const VisibilityGrid sight(points, {}, options());
   EXPECT_EQ(sight.verdictOn({0.05, 0.01, 1}), Verdict::kSupports);
   EXPECT_EQ(sight.verdictOn({0.10, 0, 2}), Verdict::kSupports) << "the wall in the same cell";
-  EXPECT_EQ(sight.verdictOn({0.06, 0, 1.5}), Verdict::kNothing) << "hidden by the edge";
+  EXPECT_EQ(sight.verdictOn({0.06, 0, 1.5}), Verdict::kUnknown) << "hidden by the edge";
 }
 
-TEST(KeyframeSight, OfNothingItSaysNothing) {
-  EXPECT_EQ(KeyframeSight({}, {}, options()).verdictOn({0, 0, 1}), Verdict::kNothing);
-  EXPECT_EQ(KeyframeSight({{{0, 0, -1}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
-            Verdict::kNothing);
+TEST(VisibilityGrid, OfNothingItSaysNothing) {
+  EXPECT_EQ(VisibilityGrid({}, {}, options()).verdictOn({0, 0, 1}), Verdict::kUnknown);
+  EXPECT_EQ(VisibilityGrid({{{0, 0, -1}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
+            Verdict::kUnknown);
 }
 
-RC_GTEST_PROP(KeyframeSight, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWorldsFrame, ()) {
+RC_GTEST_PROP(VisibilityGrid, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWorldsFrame, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   std::uniform_real_distribution<double> side(-1, 1);
   std::uniform_real_distribution<double> depth(1, 5);
@@ -87,14 +87,14 @@ RC_GTEST_PROP(KeyframeSight, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWorl
   for (int i = 0; i < 2000; ++i) points.push_back({draw(), 1.0F});
   std::vector<Eigen::Vector3d> asked;
   for (int i = 0; i < 200; ++i) asked.push_back(draw());
-  const KeyframeSight sight(points, {}, options());
+  const VisibilityGrid sight(points, {}, options());
 
   std::shuffle(points.begin(), points.end(), random);
-  const KeyframeSight shuffled(points, {}, options());
+  const VisibilityGrid shuffled(points, {}, options());
   // Turned by right angles and shifted by whole metres: places stay in their cells.
   const Rigid3 T_world_ref{Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {16, -8, 4}};
   for (CloudPoint& point : points) point.p_world = T_world_ref * point.p_world;
-  const KeyframeSight moved(points, T_world_ref, options());
+  const VisibilityGrid moved(points, T_world_ref, options());
   int differing = 0;
   for (const Eigen::Vector3d& p : asked) {
     RC_ASSERT(shuffled.verdictOn(p) == sight.verdictOn(p));
@@ -103,7 +103,7 @@ RC_GTEST_PROP(KeyframeSight, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWorl
   RC_ASSERT(differing <= 1);  // rounding may move a point over a cell's border
 }
 
-RC_GTEST_PROP(KeyframeSight, DecidesAsLookingAtAllPointsDoes, ()) {
+RC_GTEST_PROP(VisibilityGrid, DecidesAsLookingAtAllPointsDoes, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   std::uniform_real_distribution<double> side(-0.3, 0.3);
   std::uniform_real_distribution<double> depth(1, 2);
@@ -113,7 +113,7 @@ RC_GTEST_PROP(KeyframeSight, DecidesAsLookingAtAllPointsDoes, ()) {
   };
   std::vector<CloudPoint> points;
   for (int i = 0; i < *rc::gen::inRange(1, 200); ++i) points.push_back({draw(), 1.0F});
-  const KeyframeSight sight(points, {}, options());
+  const VisibilityGrid sight(points, {}, options());
 
   std::vector<double> inverse;
   for (const CloudPoint& point : points) inverse.push_back(1 / point.p_world.z());
@@ -146,8 +146,8 @@ RC_GTEST_PROP(KeyframeSight, DecidesAsLookingAtAllPointsDoes, ()) {
       }
     }
     const Verdict expected = supports               ? Verdict::kSupports
-                             : nearer && cells >= 2 ? Verdict::kLooksThrough
-                                                    : Verdict::kNothing;
+                             : nearer && cells >= 2 ? Verdict::kFreeSpaceViolation
+                                                    : Verdict::kUnknown;
     RC_ASSERT(sight.verdictOn(asked) == expected);
   }
 }

@@ -32,7 +32,7 @@ class WholeFile : public ::testing::Test {
   }
 
   static void writeText(const fs::path& path, const std::string& text) {
-    writeWhole(path, [&](const fs::path& temporary) { std::ofstream(temporary) << text; });
+    writeAtomically(path, [&](const fs::path& temporary) { std::ofstream(temporary) << text; });
   }
   static std::string contentOf(const fs::path& path) {
     std::ifstream file(path);

@@ -172,7 +172,7 @@ TEST_F(PointCloudFile, IsReadBackAsTheSameFloats) {
     writePointCloud(folder_ / kind.name, points, kind.encoding);
     const PointCloudContent content = readPointCloud(folder_ / kind.name);
 
-    EXPECT_EQ(content.without_place, 0U);
+    EXPECT_EQ(content.non_finite, 0U);
     ASSERT_EQ(content.points.size(), points.size());
     for (std::size_t i = 0; i < points.size(); ++i) {
       EXPECT_EQ(content.points[i].p_world, points[i].p_world.cast<float>().cast<double>());
@@ -298,7 +298,7 @@ TEST_F(PointCloudFile, PointsWithoutAPlaceAreCounted) {
                 "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 2\nPOINTS 4\nDATA ascii\n"
                 "nan nan nan\n1 2 3\n1 -inf 3\n4 5 1e-60\n");
 
-  EXPECT_EQ(content.without_place, 2U);
+  EXPECT_EQ(content.non_finite, 2U);
   ASSERT_EQ(content.points.size(), 2U);
   EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(4, 5, 0));
 }
@@ -327,7 +327,7 @@ TEST_F(PointCloudFile, DamagedAnywhereIsAnErrorOrAsManyPoints) {
       damaged[random() % damaged.size()] = static_cast<char>(random());
       try {
         const PointCloudContent content = parse(kind.name, damaged);
-        EXPECT_EQ(content.points.size() + content.without_place, 40U);
+        EXPECT_EQ(content.points.size() + content.non_finite, 40U);
       } catch (const std::runtime_error&) {
       }
     }

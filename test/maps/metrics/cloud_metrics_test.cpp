@@ -39,8 +39,8 @@ TEST(CloudErrors, AreWorkedOutByHand) {
   // Map to truth 0, 0.5, 2.5; truth to map 0, 0.5, 1, 1.5.
   EXPECT_DOUBLE_EQ(errors.accuracy.mean, 1);
   EXPECT_DOUBLE_EQ(errors.accuracy.median, 0.5);
-  EXPECT_DOUBLE_EQ(errors.accuracy_90_m, 2.5);
-  EXPECT_DOUBLE_EQ(errors.gaps.mean, 0.75);
+  EXPECT_DOUBLE_EQ(errors.accuracy_p90_m, 2.5);
+  EXPECT_DOUBLE_EQ(errors.completeness_distance.mean, 0.75);
   ASSERT_EQ(errors.steps.size(), 3U);
   EXPECT_DOUBLE_EQ(errors.steps[0].within, 2.0 / 3);
   EXPECT_DOUBLE_EQ(errors.steps[0].outliers, 1.0 / 3);
@@ -102,8 +102,8 @@ RC_GTEST_PROP(CloudErrors, DoNotSeeWhereTheWorldLiesAndScaleWithIt, ()) {
   const CloudErrors a = cloudErrors(map, truth, {});
   const CloudErrors b = cloudErrors(moved(map), moved(truth), {});
   RC_ASSERT(std::abs(b.accuracy.mean - 2 * a.accuracy.mean) < 1e-4);
-  RC_ASSERT(std::abs(b.accuracy_90_m - 2 * a.accuracy_90_m) < 1e-4);
-  RC_ASSERT(std::abs(b.gaps.largest - 2 * a.gaps.largest) < 1e-4);
+  RC_ASSERT(std::abs(b.accuracy_p90_m - 2 * a.accuracy_p90_m) < 1e-4);
+  RC_ASSERT(std::abs(b.completeness_distance.max - 2 * a.completeness_distance.max) < 1e-4);
 }
 
 }  // namespace

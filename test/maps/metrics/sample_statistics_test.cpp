@@ -17,9 +17,9 @@ TEST(SampleStatistics, AreWorkedOutByHand) {
   EXPECT_DOUBLE_EQ(statistics.mean, 2.5);
   EXPECT_DOUBLE_EQ(statistics.median, 1.5);
   EXPECT_DOUBLE_EQ(statistics.rms, std::sqrt(10.5));
-  EXPECT_DOUBLE_EQ(statistics.deviation, std::sqrt(17.0 / 4));
-  EXPECT_EQ(statistics.least, 1);
-  EXPECT_EQ(statistics.largest, 6);
+  EXPECT_DOUBLE_EQ(statistics.stddev, std::sqrt(17.0 / 4));
+  EXPECT_EQ(statistics.min, 1);
+  EXPECT_EQ(statistics.max, 6);
 }
 
 TEST(SampleStatistics, OfNothingAreZero) {
@@ -42,9 +42,9 @@ RC_GTEST_PROP(SampleStatistics, SquareOfRmsIsSquareOfMeanPlusVariance, ()) {
   const auto drawn = *rc::gen::nonEmpty(rc::gen::container<std::vector<double>>(
       rc::gen::map(rc::gen::inRange(-1000, 1000), [](int v) { return 0.01 * v; })));
   const SampleStatistics s = statisticsOf(drawn);
-  RC_ASSERT(std::abs(s.rms * s.rms - s.mean * s.mean - s.deviation * s.deviation) < 1e-9);
-  RC_ASSERT(s.least <= s.median);
-  RC_ASSERT(s.median <= s.largest);
+  RC_ASSERT(std::abs(s.rms * s.rms - s.mean * s.mean - s.stddev * s.stddev) < 1e-9);
+  RC_ASSERT(s.min <= s.median);
+  RC_ASSERT(s.median <= s.max);
 }
 
 }  // namespace

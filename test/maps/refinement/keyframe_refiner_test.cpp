@@ -260,7 +260,7 @@ TEST(KeyframeRefiner, WithoutAnyPointsTheTrackerStands) {
     EXPECT_LT(radiansApart(refiner.T_world_ref(i), walk.tracked[i]), 1e-6) << i;
   }
   EXPECT_EQ(refiner.counts().registered, 0U);
-  EXPECT_LT(metresApart(refiner.T_world_tracker(), {}), 1e-6);
+  EXPECT_LT(metresApart(refiner.T_world_odom(), {}), 1e-6);
 }
 
 TEST(KeyframeRefiner, OfATrackerThatStandsStillTheNoiseIsLessened) {
@@ -462,7 +462,7 @@ TEST(KeyframeRefiner, ProposalsOfKeyframesThatAreNotThereAreRefused) {
 }
 
 TEST(KeyframeRefiner, CorrectsTheTrackersPosesOfNowAndKnowsHowWell) {
-  EXPECT_TRUE(sameBits(KeyframeRefiner(quick()).T_world_tracker(), Rigid3{}));
+  EXPECT_TRUE(sameBits(KeyframeRefiner(quick()).T_world_odom(), Rigid3{}));
   EXPECT_EQ(KeyframeRefiner(quick()).covariance(), quick().tracker.noiseCovariance());
   double squared_sigmas = 0;
   constexpr int kSeeds = 4;
@@ -482,7 +482,7 @@ TEST(KeyframeRefiner, CorrectsTheTrackersPosesOfNowAndKnowsHowWell) {
     // The tracker's next pose, not a keyframe's: with noise of its own.
     const Rigid3 now = truth.back() * viewTurned(0.02, {0.02, 0, 0});
     const Rigid3 corrected =
-        refiner.T_world_tracker() * (now * drawMotion(0.01, 0.5 * kRadiansPerDegree, random));
+        refiner.T_world_odom() * (now * drawMotion(0.01, 0.5 * kRadiansPerDegree, random));
     Vector6d error;
     error << corrected.translation - now.translation,
         differenceOf({(corrected.rotation * now.rotation.conjugate()), {}}).tail<3>();

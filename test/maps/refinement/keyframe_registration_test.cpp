@@ -70,14 +70,14 @@ TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByTwoCentimetresAndADegre
     squared_rad += std::pow(radiansApart(found.T_world_ref, step.T_world_ref), 2);
     EXPECT_GT(found.inlierRatio(), 0.6) << seed;
     EXPECT_LE(found.inliers, found.seen) << seed;
-    EXPECT_LE(found.seen, step.cloud.numChosen()) << seed;
+    EXPECT_LE(found.seen, step.cloud.numQueryPoints()) << seed;
     EXPECT_GT(found.from_prior, 0.5) << seed;
     EXPECT_LT(found.median_error, 1) << seed;
     ASSERT_EQ(found.factors.size(), 1U);
     const RelativePoseFactor& factor = found.factors[0];
     EXPECT_EQ(factor.from, 0U);
     EXPECT_EQ(factor.to, 1U);
-    EXPECT_FALSE(factor.doubtful);
+    EXPECT_FALSE(factor.robust);
     squared_sigmas += std::pow(errorOf(factor, step.T_world_map, step.T_world_ref), 2) -
                       std::pow(errorOf(factor, step.T_world_map, found.T_world_ref), 2);
   }
@@ -244,7 +244,7 @@ TEST(KeyframeRegistration, FewPointsAreNoReasonToLeaveThePriorFar) {
       if (depth > 0 && left-- <= 0) depth = 0;
     }
     step.cloud = RegistrationCloud(sparse, {});
-    ASSERT_EQ(step.cloud.numChosen(), static_cast<std::size_t>(count));
+    ASSERT_EQ(step.cloud.numQueryPoints(), static_cast<std::size_t>(count));
     const Rigid3 prior = step.T_world_ref * drawMotion(0.005, 0.2 * kRadiansPerDegree, random);
     const Registration found = step.from(priorOf(prior, 0.005, 0.2 * kRadiansPerDegree));
     EXPECT_LT(found.from_prior, 5) << count;
@@ -262,7 +262,7 @@ TEST(KeyframeRegistration, IsTheSameTwiceBitForBit) {
       priorOf(step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random), 0.02,
               1 * kRadiansPerDegree);
   const Registration first = step.from(prior);
-  step.map.forgetTree();
+  step.map.releaseTree();
   const Registration second = step.from(prior);
   EXPECT_TRUE(test::sameBits(first.T_world_ref, second.T_world_ref));
   EXPECT_EQ(first.factors[0].sqrt_information, second.factors[0].sqrt_information);

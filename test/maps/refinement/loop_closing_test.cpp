@@ -79,7 +79,7 @@ TEST(VerifyLoop, ConfirmsTheSamePlaceAndSaysWhere) {
     ++confirmed;
     EXPECT_EQ(factor->from, 3U);
     EXPECT_EQ(factor->to, 8U);
-    EXPECT_TRUE(factor->doubtful);
+    EXPECT_TRUE(factor->robust);
     EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.012) << seed;
     EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 0.25 * kRadiansPerDegree) << seed;
   }

@@ -346,17 +346,17 @@ TEST(SolvePoseGraph, AnOffsetMovesAFactorsMinimumByAsMuch) {
 
 TEST(SolvePoseGraph, ADoubtfulFactorThatIsWrongBendsNothing) {
   const PoseGraph exact = ring(20);
-  for (const bool doubtful : {true, false}) {
+  for (const bool robust : {true, false}) {
     PoseGraph graph = exact;
     RelativePoseFactor wrong = factorBetween(2, 12, Rigid3{}, 0.01, 0.01);  // 6 m off
-    wrong.doubtful = doubtful;
+    wrong.robust = robust;
     graph.factors.push_back(wrong);
     solvePoseGraph({}, graph);
     double most_m = 0;
     for (std::size_t i = 0; i < graph.T_world_node.size(); ++i) {
       most_m = std::max(most_m, metresApart(graph.T_world_node[i], exact.T_world_node[i]));
     }
-    if (doubtful) {
+    if (robust) {
       EXPECT_LT(most_m, 0.02);
     } else {
       EXPECT_GT(most_m, 0.1) << "nobody would see that doubt helps";
@@ -392,7 +392,7 @@ TEST(SolvePoseGraph, LeavesPosesWhereThereIsNothingToSolve) {
   for (int what = 0; what < 4; ++what) {
     PoseGraph not_a_number = graph;
     RelativePoseFactor& factor = not_a_number.factors[3];
-    factor.doubtful = what % 2 == 1;
+    factor.robust = what % 2 == 1;
     if (what == 0) factor.T_from_to.translation.x() = kNan;
     if (what == 1) factor.sqrt_information(0, 0) = kNan;
     if (what == 2) factor.offset[4] = std::numeric_limits<double>::infinity();

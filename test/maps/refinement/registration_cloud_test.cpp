@@ -56,11 +56,11 @@ TEST(RegistrationCloud, HoldsAsManyPointsAsAskedForAndNoMore) {
   const KeyframeDepthMap keyframe = wall(0.01F);  // 19,200 points
   for (const auto& [chosen, all] : {std::pair{10, 10}, {100, 350}, {2000, 6000}}) {
     const RegistrationCloud cloud(keyframe, few(chosen, all));
-    EXPECT_EQ(cloud.numChosen(), static_cast<std::size_t>(chosen));
+    EXPECT_EQ(cloud.numQueryPoints(), static_cast<std::size_t>(chosen));
     EXPECT_EQ(cloud.points().size(), static_cast<std::size_t>(all));
   }
   const RegistrationCloud everything(keyframe, few(100000, 1000000));
-  EXPECT_EQ(everything.numChosen(), 19200U);
+  EXPECT_EQ(everything.numQueryPoints(), 19200U);
   EXPECT_EQ(everything.points().size(), 19200U);
 }
 
@@ -69,7 +69,7 @@ TEST(RegistrationCloud, SpreadsItsPointsThoughOneCornerIsTheMostCertain) {
   keyframe.map.variance(cv::Rect(0, 0, 80, 60)) = 1e-6F;
   const RegistrationCloud cloud(keyframe, few(200, 400));
   std::array<int, 4> of_quadrant{};
-  for (std::size_t i = 0; i < cloud.numChosen(); ++i) {
+  for (std::size_t i = 0; i < cloud.numQueryPoints(); ++i) {
     const cv::Point pixel = pixelOf(cloud.points()[i]);
     ++of_quadrant[(pixel.x >= 80 ? 1 : 0) + (pixel.y >= 60 ? 2 : 0)];
   }
@@ -84,7 +84,7 @@ TEST(RegistrationCloud, TakesTheMostCertainPointsOfAPlace) {
     for (int x = 0; x < 160; x += 4) put(keyframe, x, y, 2, 0.002F);  // 1200 of them
   }
   const RegistrationCloud cloud(keyframe, few(100, 400));
-  for (std::size_t i = 0; i < cloud.numChosen(); ++i) {
+  for (std::size_t i = 0; i < cloud.numQueryPoints(); ++i) {
     const cv::Point pixel = pixelOf(cloud.points()[i]);
     EXPECT_EQ(pixel.x % 4, 0);
     EXPECT_EQ(pixel.y % 4, 0);
@@ -209,15 +209,15 @@ TEST(RegistrationCloud, FindsTheSameWithATreeThatWasForgotten) {
       test::seenFrom(test::edgesAround(60, random), {}, kInverseDepthSigma, random), {});
   std::vector<std::optional<std::size_t>> first;
   for (const bool forgotten : {false, true}) {
-    if (forgotten) cloud.forgetTree();
+    if (forgotten) cloud.releaseTree();
     for (std::size_t i = 0; i < 200; ++i) {
       const Eigen::Vector3d p_ref = 1.01 * cloud.points()[i].p_ref.cast<double>();
       if (!forgotten) first.push_back(cloud.nearest(p_ref, 5));
       EXPECT_EQ(cloud.nearest(p_ref, 5), first[i]);
     }
   }
-  cloud.forgetTree();
-  cloud.forgetTree();
+  cloud.releaseTree();
+  cloud.releaseTree();
 }
 
 TEST(RegistrationCloud, NothingBehindOrBesideTheViewHasANeighbour) {
@@ -299,11 +299,11 @@ TEST(RegistrationCloud, ADepthThatSaysNothingLeavesACovarianceThatFloatsHold) {
 TEST(RegistrationCloud, OfNothingIsEmptyAndSeesNothing) {
   const RegistrationCloud cloud(emptyKeyframe(smallView()), {});
   EXPECT_TRUE(cloud.points().empty());
-  EXPECT_EQ(cloud.numChosen(), 0U);
+  EXPECT_EQ(cloud.numQueryPoints(), 0U);
   EXPECT_FALSE(cloud.sees({0, 0, 2}));
   EXPECT_FALSE(cloud.nearest({0, 0, 2}, 100));
   EXPECT_EQ(cloud.middleInverseDepth(), 0);
-  cloud.forgetTree();
+  cloud.releaseTree();
 }
 
 TEST(RegistrationCloud, AViewOfOnePixelAndVariancesOfZeroAreTaken) {

@@ -22,17 +22,17 @@ using testing::ThrowsMessage;
 
 /// Motions of a tracker that errs by so much, against points that know them to 2 mm and 0.1 deg:
 /// drawn from the model itself.
-std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, double way_m,
+std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, double path_length_m,
                                       std::mt19937& random) {
   std::vector<MotionSample> samples;
   for (int i = 0; i < count; ++i) {
     MotionSample sample;
-    sample.way_m = way_m * (1 + i % 4);
+    sample.path_length_m = path_length_m * (1 + i % 4);
     Vector6d sigma;
     sigma << Eigen::Vector3d::Constant(0.002), Eigen::Vector3d::Constant(0.1 * kRadiansPerDegree);
     sample.covariance = sigma.cwiseAbs2().asDiagonal();
-    const Matrix6d all =
-        sample.covariance + 2 * truth.noiseCovariance() + truth.driftCovariance(sample.way_m);
+    const Matrix6d all = sample.covariance + 2 * truth.noiseCovariance() +
+                         truth.driftCovariance(sample.path_length_m);
     Vector6d unit;
     unit << drawVector(1, random), drawVector(1, random);
     sample.difference = all.llt().matrixL() * unit;
@@ -51,8 +51,8 @@ TrackerErrors times(TrackerErrors errors, double factor) {
 
 /// What motions over a way err by: noise and drift can take each other's place where ways are
 /// alike.
-Eigen::Vector2d sigmasOver(double way_m, const TrackerErrors& errors) {
-  const Matrix6d covariance = 2 * errors.noiseCovariance() + errors.driftCovariance(way_m);
+Eigen::Vector2d sigmasOver(double path_length_m, const TrackerErrors& errors) {
+  const Matrix6d covariance = 2 * errors.noiseCovariance() + errors.driftCovariance(path_length_m);
   return {std::sqrt(covariance(0, 0)), std::sqrt(covariance(5, 5))};
 }
 
@@ -187,7 +187,7 @@ TEST(EstimateTrackerErrors, StaysFiniteWhateverTheSamplesAre) {
                                std::numeric_limits<double>::quiet_NaN()}) {
     auto samples = drawSamples(expected, 10, 0.1, random);
     samples[3].difference.setConstant(strange);
-    samples[5].way_m = strange;
+    samples[5].path_length_m = strange;
     const TrackerErrors found = estimateTrackerErrors(samples, expected);
     for (const double error : {found.noise_m, found.noise_rad, found.drift_m, found.drift_rad}) {
       EXPECT_TRUE(std::isfinite(error) && error > 0) << strange;

@@ -154,10 +154,10 @@ TEST_F(DepthFile, HeadersOfNumpyThatMakeNoSenseAreErrors) {
 }
 
 TEST_F(DepthFile, FilesCutAnywhereAreErrorsAndNeverSmallerImages) {
-  const std::string tiff = readWhole(image("whole.tiff", cv::Mat1f(40, 30, 2.F)));
+  const std::string tiff = readBytes(image("whole.tiff", cv::Mat1f(40, 30, 2.F)));
   cv::Mat_<std::uint16_t> noise(40, 30);
   cv::randu(noise, 0, 65535);
-  const std::string png = readWhole(image("whole.png", noise));
+  const std::string png = readBytes(image("whole.png", noise));
   const std::string floats = bytesOf<float>({1, 2, 3, 4, 5, 6});
   for (const std::string& whole :
        {tiff, png, "Pf\n3 2\n-1.0\n" + floats, npy(dictionary_, floats)}) {

@@ -75,7 +75,7 @@ void expectToAgree(CEventFusionMapBuilder& builder, bool points_first) {
     EXPECT_LT(keyframe.T_world_ref.rotation.angularDistance(T_world_ref.rotation), 1e-14);
     // The simplemap's angles may round: the cloud is held against the exact pose.
     const auto view_points = viewPointsOf(*keyframe.points);
-    cloud.insert(number++, placedInWorld(view_points, T_world_ref), T_world_ref);
+    cloud.insert(number++, pointsInWorld(view_points, T_world_ref), T_world_ref);
   }
   expectSameBits(cloud.points(), points);
   const auto* metric = builder.getCurrentlyBuiltMetricMap();
@@ -195,10 +195,10 @@ TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersCorrected) {
   for (const auto& observation : observationsOf(recording)) {
     builder.processObservation(observation);
     if (!IS_CLASS(*observation, CObservationRobotPose)) continue;
-    const Rigid3& T_tracker_rig = recording.poses[pose++].T_world_rig;
+    const Rigid3& T_odom_rig = recording.poses[pose++].T_world_rig;
     const auto refinement = builder.status().refinement;
     ASSERT_TRUE(refinement);
-    const Rigid3 T_world_rig = refinement->T_world_tracker * T_tracker_rig;
+    const Rigid3 T_world_rig = refinement->T_world_odom * T_odom_rig;
     const auto estimate = estimateOf(builder);
     EXPECT_LT((rigidFrom(estimate.mean).translation - T_world_rig.translation).norm(), 1e-9);
     EXPECT_LT(rigidFrom(estimate.mean).rotation.angularDistance(T_world_rig.rotation), 1e-9);
@@ -208,7 +208,7 @@ TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersCorrected) {
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(covariance).eigenvalues()(0), 0);
     EXPECT_LT(covariance.diagonal().maxCoeff(), 0.01);
   }
-  EXPECT_GT(builder.status().refinement->T_world_tracker.translation.norm(), 1e-4);
+  EXPECT_GT(builder.status().refinement->T_world_odom.translation.norm(), 1e-4);
 }
 
 TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersWithoutRefinement) {

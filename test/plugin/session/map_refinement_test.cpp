@@ -119,7 +119,7 @@ TEST_P(MapRefinementOfEitherKind, WithoutKeyframesHasNothingToFinish) {
   MapRefinement refinement(optionsOf(GetParam()));
   refinement.finish();
   EXPECT_TRUE(refinement.takeMoved().empty());
-  EXPECT_TRUE(isSame(refinement.state().T_world_tracker, Rigid3{}));
+  EXPECT_TRUE(isSame(refinement.state().T_world_odom, Rigid3{}));
 }
 
 TEST_P(MapRefinementOfEitherKind, KeyframesWithoutPointsStayWithTheTracker) {

@@ -79,7 +79,7 @@ void expectSameMap(const MappingSession& session, const MappingSession& expected
   ASSERT_EQ(session.T_world_ref().size(), expected.T_world_ref().size());
   for (std::size_t i = 0; i < expected.T_world_ref().size(); ++i) {
     EXPECT_TRUE(isSame(session.T_world_ref()[i], expected.T_world_ref()[i])) << "keyframe " << i;
-    EXPECT_TRUE(isSame(session.T_tracker_ref()[i], expected.T_tracker_ref()[i]));
+    EXPECT_TRUE(isSame(session.T_odom_ref()[i], expected.T_odom_ref()[i]));
   }
   const auto points = session.cloud().points();
   const auto expected_points = expected.cloud().points();
@@ -107,8 +107,7 @@ double errorOf(const std::vector<Rigid3>& T_world_ref, const std::vector<Rigid3>
 
 /// How far a keyframe moved from where the tracker put it.
 double motionOf(const MappingSession& session, std::size_t keyframe) {
-  return (session.T_world_ref()[keyframe].translation -
-          session.T_tracker_ref()[keyframe].translation)
+  return (session.T_world_ref()[keyframe].translation - session.T_odom_ref()[keyframe].translation)
       .norm();
 }
 
@@ -125,10 +124,10 @@ TEST_P(RefinedSession, BringsKeyframesNearerToTheTruth) {
   MappingSession session(optionsOf(GetParam()));
   mapAll(session, shaken(recording));
 
-  const double tracker_m = errorOf(session.T_tracker_ref(), truth.T_world_ref());
+  const double tracker_m = errorOf(session.T_odom_ref(), truth.T_world_ref());
   EXPECT_GT(tracker_m, 0.01);
   EXPECT_LT(errorOf(session.T_world_ref(), truth.T_world_ref()), 0.75 * tracker_m);
-  EXPECT_TRUE(isSame(session.T_world_ref()[0], session.T_tracker_ref()[0]));
+  EXPECT_TRUE(isSame(session.T_world_ref()[0], session.T_odom_ref()[0]));
 }
 
 TEST_P(RefinedSession, EndsInTheSameMapHoweverTheRecordingWasCut) {
@@ -167,7 +166,7 @@ TEST(RefinedSessionMap, IsThatOfTheKeyframesWhereTheyStandAtAnyTime) {
     GlobalCloud afresh(options.cloud);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Rigid3& T_world_ref = session.T_world_ref()[i];
-      afresh.insert(i, placedInWorld(points[i], T_world_ref), T_world_ref);
+      afresh.insert(i, pointsInWorld(points[i], T_world_ref), T_world_ref);
     }
     EXPECT_EQ(session.cloud().points().size(), afresh.points().size());
   }
@@ -182,7 +181,7 @@ TEST(UnrefinedSession, LeavesKeyframesWhereTheTrackerPutThem) {
   GlobalCloud cloud(options.cloud);
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     EXPECT_TRUE(isSame(session.T_world_ref()[i], keyframes[i].T_world_ref));
-    EXPECT_TRUE(isSame(session.T_tracker_ref()[i], keyframes[i].T_world_ref));
+    EXPECT_TRUE(isSame(session.T_odom_ref()[i], keyframes[i].T_world_ref));
     cloud.insert(i, keyframeCloud(keyframes[i]), keyframes[i].T_world_ref);
   }
   const auto points = session.cloud().points();
@@ -310,7 +309,7 @@ TEST_P(RefinedSession, OfOneKeyframeLeavesItWhereItIs) {
   const SyntheticRecording recording(0.15);
   MappingSession session(optionsOf(GetParam()));
   EXPECT_EQ(mapAll(session, recording).size(), 1U);
-  EXPECT_TRUE(isSame(session.T_world_ref()[0], session.T_tracker_ref()[0]));
+  EXPECT_TRUE(isSame(session.T_world_ref()[0], session.T_odom_ref()[0]));
 }
 
 TEST_P(RefinedSession, OfNothingIsEmpty) {
@@ -338,7 +337,7 @@ TEST_P(RefinedSession, OfOneCameraIsFiniteAndNotWorseThanTheTracker) {
   mapAll(session, shaken(recording));
   expectFinite(session);
   EXPECT_LE(errorOf(session.T_world_ref(), truth.T_world_ref()),
-            1.02 * errorOf(session.T_tracker_ref(), truth.T_world_ref()));
+            1.02 * errorOf(session.T_odom_ref(), truth.T_world_ref()));
 }
 
 TEST_P(RefinedSession, OfACameraThatSeesNothingStaysWithTheTracker) {
@@ -424,7 +423,7 @@ TEST_P(RefinedSession, AKeyframeThatTheMapRefusesDoesNotShiftTheOthers) {
   }
   EXPECT_GT(refused, 0);
   EXPECT_EQ(session.T_world_ref().size(), keyframes.size());
-  EXPECT_EQ(session.T_tracker_ref().size(), keyframes.size());
+  EXPECT_EQ(session.T_odom_ref().size(), keyframes.size());
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     EXPECT_LT(motionOf(session, i), 1) << "keyframe " << i;
   }

@@ -34,7 +34,7 @@ std::int64_t firstEventNs(const Recording& recording) {
 /// Moves what the session has made to the run, at the tracker's poses.
 void takeDue(MappingSession& session, PoseRefinementRun& run) {
   while (std::optional<KeyframeDepthMap> keyframe = session.next()) {
-    keyframe->T_world_ref = session.T_tracker_ref().back();
+    keyframe->T_world_ref = session.T_odom_ref().back();
     run.keyframes.push_back(std::move(*keyframe));
   }
 }
@@ -72,7 +72,7 @@ PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOption
   if (run.keyframes.empty() || run.keyframes.front().window.t0_ns != first_window_ns) {
     throw std::logic_error("the first window does not begin at " + formatSeconds(first_window_ns));
   }
-  run.T_tracker_ref = session.T_tracker_ref();
+  run.T_odom_ref = session.T_odom_ref();
   run.T_world_ref = session.T_world_ref();
   run.refined_map = session.cloud().points();
   if (const auto state = session.status().refinement) run.counts = state->counts;
@@ -84,7 +84,7 @@ std::vector<CloudPoint> mapAt(const std::vector<KeyframeDepthMap>& keyframes,
                               const GlobalCloudOptions& options) {
   GlobalCloud cloud(options);
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
-    cloud.insert(i, placedInWorld(viewPoints(keyframes[i]), T_world_ref[i]), T_world_ref[i]);
+    cloud.insert(i, pointsInWorld(viewPoints(keyframes[i]), T_world_ref[i]), T_world_ref[i]);
   }
   return cloud.points();
 }

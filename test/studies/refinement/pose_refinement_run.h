@@ -18,7 +18,7 @@ namespace efm::studies {
 /// A recording mapped with a tracker that errs, its poses refined.
 struct PoseRefinementRun {
   std::vector<KeyframeDepthMap> keyframes;  ///< Where the tracker put them.
-  std::vector<Rigid3> T_tracker_ref;
+  std::vector<Rigid3> T_odom_ref;
   std::vector<Rigid3> T_world_ref;      ///< Refined, once nothing more came.
   std::vector<CloudPoint> refined_map;  ///< As the session exports it.
   RefinementCounts counts;

@@ -97,7 +97,7 @@ class RefinementCaseRun {
   }
 
   RefinementOutcome outcomeOf(const PoseRefinementRun& run) {
-    return {errorsAt(run, run.T_tracker_ref),
+    return {errorsAt(run, run.T_odom_ref),
             truth_.errorsOf(run.keyframes, run.T_world_ref, run.refined_map)};
   }
 
@@ -130,10 +130,10 @@ class RefinementCaseRun {
     results_.loops.push_back(run.counts);
     if (seed > 1 || !case_.is_loop) return;
     RefinementDrawing& drawing = results_.drawing;
-    drawing.tracker_map = mapAt(run.keyframes, run.T_tracker_ref, options_.cloud);
+    drawing.tracker_map = mapAt(run.keyframes, run.T_odom_ref, options_.cloud);
     drawing.refined_map = std::move(run.refined_map);
     drawing.T_world_true = truePoses(run);
-    drawing.T_tracker_ref = run.T_tracker_ref;
+    drawing.T_odom_ref = run.T_odom_ref;
     drawing.T_world_ref = run.T_world_ref;
   }
 

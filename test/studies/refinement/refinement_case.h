@@ -36,7 +36,7 @@ struct RefinementOutcome {
 /// A map and its trajectory, to be drawn.
 struct RefinementDrawing {
   std::vector<CloudPoint> tracker_map, refined_map;
-  std::vector<Rigid3> T_world_true, T_tracker_ref, T_world_ref;
+  std::vector<Rigid3> T_world_true, T_odom_ref, T_world_ref;
 };
 
 /// Of one recording, by seed.

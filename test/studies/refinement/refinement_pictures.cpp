@@ -47,7 +47,7 @@ cv::Mat3b drawWays(const RefinementDrawing& drawing) {
   plot.equal_units = true;
   plot.x.label = "x [m]";
   plot.y.label = "y [m]";
-  plot.curves = {wayOf("true", drawing.T_world_true), wayOf("tracker", drawing.T_tracker_ref),
+  plot.curves = {wayOf("true", drawing.T_world_true), wayOf("tracker", drawing.T_odom_ref),
                  wayOf("refined", drawing.T_world_ref)};
   return drawCurves(plot);
 }
@@ -69,7 +69,7 @@ cv::Mat3b drawDrift(const RefinementDrawing& drawing) {
     }
     plot.curves.push_back(curve);
   };
-  add("tracker", drawing.T_tracker_ref, 1);
+  add("tracker", drawing.T_odom_ref, 1);
   add("refined", drawing.T_world_ref, 2);
   return drawCurves(plot);
 }
