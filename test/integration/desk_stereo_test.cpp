@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The method end to end on the simulated desk, held against the naive oracle and the exact truth.
+// The method end to end on the simulated desk, compared with the exact truth.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,18 +10,14 @@
 #include "mapping/keyframes/fusion_mapper.h"
 #include "maps/metrics/depth_metrics.h"
 #include "test/integration/simulated_recording.h"
-#include "test/mapping/dsi/kept_dsi.h"
-#include "test/oracle/naive_mapper.h"
 
 namespace efm {
 namespace {
 
-constexpr std::int64_t kMs = 1'000'000;
-
 class DeskStereo : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    recording_ = new test::SimulatedRecording({"desk_stereo", std::nullopt, 1});
+    recording_ = new test::SimulatedRecording(test::SimulatedRecording::desk());
   }
   static void TearDownTestSuite() {
     delete recording_;
@@ -65,112 +61,6 @@ TEST_F(DeskStereo, EachCameraFiresAboutAMillionEvents) {
     EXPECT_GE(events.size(), 800'000U);
     EXPECT_LE(events.size(), 1'200'000U);
   }
-}
-
-/// 0.2 s of the recording, fused by the harmonic mean: by the mapper, and by the oracle with the
-/// poses of the same packets and with a pose per event.
-class DeskStereoDsi : public DeskStereo {
- protected:
-  struct Error {
-    double l1 = 0;              ///< Of the mass.
-    double same_peak = 0;       ///< Share of the pixels with votes.
-    double near_peak_kept = 0;  ///< Within one plane: share of the pixels with a depth.
-  };
-
-  void SetUp() override {
-    const std::int64_t t0_ns = recording_->simulation().start_ns + 900 * kMs;
-    options_ = paperOptions(0.2, 0.2);
-    options_.only_window = Window{t0_ns, t0_ns + 200 * kMs, t0_ns + 100 * kMs};
-    for (const StampedPose& pose : recording_->poses()) trajectory_.add(pose);
-    for (std::size_t c = 0; c < 2; ++c) {
-      const auto in_window = [&](const Event& event) {
-        return event.t_ns >= t0_ns && event.t_ns < t0_ns + 200 * kMs;
-      };
-      window_events_.emplace_back();
-      std::copy_if(recording_->events()[c].begin(), recording_->events()[c].end(),
-                   std::back_inserter(window_events_[c]), in_window);
-    }
-    KeyframeMapper keyframe_mapper(recording_->simulation().rig, {0, 1}, options_.keyframe);
-    dsi_ = std::make_unique<test::KeptDsi>(keyframe_mapper.planes(), keyframe_mapper.view());
-    keyframe_ =
-        *keyframe_mapper.map(*options_.only_window, {window_events_.begin(), window_events_.end()},
-                             trajectory_, dsi_.get());
-  }
-
-  oracle::Dsi oracleDsi(bool by_packet) const {
-    const DepthPlanes planes(options_.keyframe.planes);
-    std::vector<oracle::Dsi> densities;
-    for (std::size_t c = 0; c < 2; ++c) {
-      const RigCamera& camera = recording_->simulation().rig.cameras[c];
-      const UndistortionTable undistortion(camera.model);
-      const PacketGeometry geometry{keyframe_.T_world_ref.inverse(), keyframe_.view,
-                                    planes.depth(0), planes.depth(99)};
-      const auto posed =
-          by_packet
-              ? oracle::poseByPacket(
-                    window_events_[c],
-                    splitIntoPosePackets(window_events_[c], camera, undistortion, trajectory_,
-                                         geometry, options_.keyframe.packets))
-              : oracle::poseEach(window_events_[c], camera, trajectory_, keyframe_.T_world_ref);
-      densities.push_back(oracle::rayDensity(posed, undistortion, keyframe_.view, planes));
-    }
-    return oracle::fuse(FusionRule::kHarmonic, densities);
-  }
-
-  Error compareWith(const oracle::Dsi& exact) const {
-    double mass = 0;
-    double difference = 0;
-    oracle::Dsi ours(100, keyframe_.view);
-    for (std::size_t i = 0; i < exact.values.size(); ++i) {
-      ours.values[i] = dsi_->values[i];
-      mass += exact.values[i];
-      difference += std::abs(ours.values[i] - exact.values[i]);
-    }
-    const auto exact_planes = oracle::peakPlanes(exact);
-    const auto exact_values = oracle::peakValues(exact);
-    const auto our_planes = oracle::peakPlanes(ours);
-    double with_votes = 0;
-    double same = 0;
-    double kept = 0;
-    double near = 0;
-    for (std::size_t i = 0; i < exact_planes.size(); ++i) {
-      const int x = static_cast<int>(i) % keyframe_.view.width;
-      const int y = static_cast<int>(i) / keyframe_.view.width;
-      if (exact_values[i] > 0) {
-        ++with_votes;
-        same += exact_planes[i] == our_planes[i] ? 1 : 0;
-      }
-      if (keyframe_.map.depth(y, x) > 0) {
-        ++kept;
-        near += std::abs(exact_planes[i] - our_planes[i]) <= 1 ? 1 : 0;
-      }
-    }
-    return {difference / mass, same / with_votes, near / kept};
-  }
-
-  FusionMapperOptions options_;
-  Trajectory trajectory_;
-  std::vector<std::vector<Event>> window_events_;
-  KeyframeDepthMap keyframe_;
-  std::unique_ptr<test::KeptDsi> dsi_;
-};
-
-TEST_F(DeskStereoDsi, TheKernelIsExactUpToItsRounding) {
-  const Error error = compareWith(oracleDsi(true));
-  std::cout << "kernel error: L1 " << error.l1 << " of the mass, same peak plane "
-            << error.same_peak << "\n";
-  // Coordinates are rounded to 1/4096 px, twice: some 1e-4 of the mass. Peaks that move by it are
-  // ties of single votes.
-  EXPECT_LE(error.l1, 2e-4);
-  EXPECT_GE(error.same_peak, 0.995);
-}
-
-TEST_F(DeskStereoDsi, SharingPosesCostsNextToNothing) {
-  const Error error = compareWith(oracleDsi(false));
-  std::cout << "packet error: L1 " << error.l1 << " of the mass, peak within one plane on "
-            << error.near_peak_kept << " of the kept pixels\n";
-  EXPECT_LE(error.l1, 3e-3);
-  EXPECT_GE(error.near_peak_kept, 0.995);
 }
 
 TEST_F(DeskStereo, DepthIsGoodToAFractionOfAPlane) {

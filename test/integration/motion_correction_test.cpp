@@ -19,7 +19,7 @@ namespace {
 class MotionCorrectionOnTheDesk : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    recording_ = new test::SimulatedRecording({"desk_stereo", 0.2, 1});
+    recording_ = new test::SimulatedRecording(test::SimulatedRecording::desk());
   }
   static void TearDownTestSuite() {
     delete recording_;
@@ -27,10 +27,8 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
   }
 
   static Window window() {
-    const Simulation& simulation = recording_->simulation();
-    const std::int64_t start_ns = simulation.start_ns;
-    const std::int64_t end_ns = simulation.endNs();
-    return {start_ns, end_ns, start_ns + (end_ns - start_ns) / 2};
+    const std::int64_t start_ns = recording_->simulation().start_ns;
+    return {start_ns, start_ns + 200'000'000, start_ns + 100'000'000};
   }
 
   static Trajectory truth() {
@@ -45,8 +43,14 @@ class MotionCorrectionOnTheDesk : public ::testing::Test {
     options.motion.correct_motion = correct_motion;
     options.motion.motion_rounds = 3;
     KeyframeMapper mapper(recording_->simulation().rig, {0, 1}, options);
-    const auto& events = recording_->events();
-    return mapper.map(window(), {events[0], events[1]}, trajectory).value();
+    std::vector<EventSpan> events;
+    for (const std::vector<Event>& camera : recording_->events()) {
+      const auto end = std::find_if(camera.begin(), camera.end(), [](const Event& event) {
+        return event.t_ns >= window().t1_ns;
+      });
+      events.emplace_back(camera.data(), camera.data() + (end - camera.begin()));
+    }
+    return mapper.map(window(), events, trajectory).value();
   }
 
   /// Median of the relative depth errors.

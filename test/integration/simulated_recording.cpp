@@ -7,17 +7,35 @@
 
 #include "mapping/depth/median.h"
 #include "maps/cloud/keyframe_cloud.h"
+#include "plugin/formats/open_recording.h"
+#include "plugin/mrpt/CObservationEvents.h"
+#include "test/paths.h"
 #include "test/tracking_stub/truth/nearest_surface.h"
 #include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::test {
 
+SimulatedRecording::SimulatedRecording(Simulation simulation)
+    : simulation_(std::move(simulation)), poses_(samplePoses(simulation_)) {}
+
 SimulatedRecording::SimulatedRecording(const SimulationOptions& options)
-    : simulation_(makeSimulation(options)) {
+    : SimulatedRecording(makeSimulation(options)) {
   for (CameraRecording& recording : simulateEvents(simulation_)) {
     events_.push_back(std::move(recording.events));
   }
-  poses_ = samplePoses(simulation_);
+}
+
+SimulatedRecording SimulatedRecording::desk() {
+  SimulatedRecording desk(makeSimulation({"desk_stereo", std::nullopt, 1}));
+  desk.events_.resize(desk.simulation_.rig.cameras.size());
+  const auto recording = openRecording({{EFM_RECORDINGS "/desk_stereo"}});
+  while (const auto observation = recording->next()) {
+    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+    if (!packet) continue;
+    auto& events = desk.events_.at(static_cast<std::size_t>(packet->camera_index));
+    events.insert(events.end(), packet->events.begin(), packet->events.end());
+  }
+  return desk;
 }
 
 std::vector<KeyframeDepthMap> SimulatedRecording::map(const FusionMapperOptions& options) const {

@@ -15,6 +15,9 @@ namespace efm::test {
 class SimulatedRecording {
  public:
   explicit SimulatedRecording(const SimulationOptions& options);
+  /// desk_stereo with seed 1, simulated once for all tests (the fixture `recordings` of ctest).
+  /// @throws std::runtime_error where it has not been simulated.
+  static SimulatedRecording desk();
 
   const Simulation& simulation() const { return simulation_; }
   const std::vector<std::vector<Event>>& events() const { return events_; }  ///< Per camera.
@@ -33,6 +36,8 @@ class SimulatedRecording {
   double shareBeyond(const std::vector<CloudPoint>& points, double distance_m) const;
 
  private:
+  explicit SimulatedRecording(Simulation simulation);
+
   Simulation simulation_;
   std::vector<std::vector<Event>> events_;
   std::vector<StampedPose> poses_;
