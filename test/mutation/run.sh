@@ -93,12 +93,19 @@ first_failure() {
 
 # Replaces the text of a mutation in the copy, where it is there exactly once.
 mutate() {
-  local from="$root/${files[$1]}" old=${olds[$1]} content rest
-  [[ -e $from ]] || return 1
-  content=$(<"$from")
+  local file="$tree/${files[$1]}" old=${olds[$1]} content rest
+  [[ -e $file && -e $root/${files[$1]} ]] || return 1
+  content=$(<"$file")
   rest=${content#*"$old"}
   [[ $rest == "$content" || $rest == *"$old"* ]] && return 1
-  printf '%s\n' "${content%%"$old"*}${news[$1]}$rest" >"$tree/${files[$1]}"
+  cp "$file" "$tree/build/original"
+  printf '%s\n' "${content%%"$old"*}${news[$1]}$rest" >"$file"
+}
+
+restore() {
+  [[ -e $tree/build/original ]] || return 0
+  mv "$tree/build/original" "$tree/${files[$1]}"
+  touch "$tree/${files[$1]}"
 }
 
 read_mutations
@@ -142,7 +149,7 @@ for i in "${!names[@]}"; do
       noticed="**SURVIVED**"
     fi
   fi
-  [[ ! -e $root/${files[$i]} ]] || cp "$root/${files[$i]}" "$tree/${files[$i]}"
+  restore "$i"
   echo "| ${names[$i]} | $(dirname "${files[$i]}") | ${whats[$i]} | $noticed |"
 done
 echo

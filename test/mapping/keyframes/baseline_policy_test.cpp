@@ -107,6 +107,21 @@ TEST(BaselinePolicy, TurningInPlaceEndsAWindowOnceTooLittleIsLeftInView) {
   EXPECT_FALSE(BaselinePolicy(turning, kDepthGuess_m).current(recording)) << "where it may all go";
 }
 
+TEST(BaselinePolicy, StandingStillAllOfAWideOrATallViewStaysInIt) {
+  auto recording = recordingOf([](std::int64_t) { return Rigid3{}; });
+  for (const cv::Size size : {cv::Size(200, 40), cv::Size(40, 200)}) {
+    recording.image = {size.width, size.height, 100, 100, 0.5 * size.width, 0.5 * size.height};
+    KeyframeDepthMap seen;
+    seen.view = recording.image;
+    seen.map.depth = cv::Mat1f(size, 2.0F);
+    for (const bool by_the_keyframe : {false, true}) {  // or by the guess
+      BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
+      if (by_the_keyframe) policy.advance({kStart_ns, kStart_ns, kStart_ns}, &seen);
+      EXPECT_FALSE(policy.current(recording)) << size;
+    }
+  }
+}
+
 TEST(BaselinePolicy, AScenePassesOutOfViewAlsoBehindTheCamera) {
   BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
   const KeyframeDepthMap seen = keyframeThatSaw(2);

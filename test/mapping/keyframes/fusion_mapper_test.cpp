@@ -374,6 +374,21 @@ TEST(FusionMapper, EventsThatComeLaterThanThatAreAnError) {
   EXPECT_EQ(mapper.counts().total().read, 2U);
 }
 
+TEST(FusionMapper, OfTwoPosesWithOneTimeTheFirstStandsAndTheSecondIsCounted) {
+  FusionMapper mapper(options(0.1, 0.1));
+  mapper.addCamera(camera());
+  addPoses(mapper, kStart_ns, kStart_ns + 100 * kMs);
+  EXPECT_EQ(mapper.counts().duplicate_poses, 0U);
+  mapper.addPose({kStart_ns + 50 * kMs, shifted(7)});   // among the others
+  mapper.addPose({kStart_ns + 100 * kMs, shifted(7)});  // at their end
+  EXPECT_EQ(mapper.counts().duplicate_poses, 2U);
+  addSteadyPackets(mapper, 0, kStart_ns, kStart_ns + 100 * kMs);
+  mapper.finish();
+  const auto keyframe = mapper.next();
+  ASSERT_TRUE(keyframe);
+  EXPECT_EQ(keyframe->T_world_ref.translation.x(), shifted(0.05).translation.x());
+}
+
 TEST(FusionMapper, APoseFarBehindTheNewestIsAnErrorThatNamesBoth) {
   FusionMapper mapper(options(0.1, 0.1));
   mapper.addPose({kStart_ns + 5000 * kMs, shifted(0)});

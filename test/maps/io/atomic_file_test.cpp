@@ -56,6 +56,27 @@ TEST_F(WholeFile, ReplacesTheOneBefore) {
   EXPECT_EQ(contentOf(folder / "a.txt"), "two");
 }
 
+TEST_F(WholeFile, TheOneBeforeStandsUntilTheNewOneIsWhole) {
+  writeText(folder / "a.txt", "one");
+  writeWhole(folder / "a.txt", [&](const fs::path& temporary) {
+    std::ofstream(temporary) << "tw";
+    EXPECT_EQ(contentOf(folder / "a.txt"), "one");
+    std::ofstream(temporary) << "two";
+  });
+  EXPECT_EQ(contentOf(folder / "a.txt"), "two");
+}
+
+TEST_F(WholeFile, AWriteThatFailsLeavesTheOneBeforeAndNothingElse) {
+  writeText(folder / "a.txt", "one");
+  const auto fail_half_way = [](const fs::path& temporary) {
+    std::ofstream(temporary) << "tw";
+    throw std::runtime_error("the disk is full");
+  };
+  EXPECT_THROW(writeWhole(folder / "a.txt", fail_half_way), std::runtime_error);
+  EXPECT_EQ(contentOf(folder / "a.txt"), "one");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
+}
+
 TEST_F(WholeFile, WhatIsNoFileIsNotReplaced) {
   EXPECT_THAT(errorOf(""), HasSubstr("'': expected the name of a file"));
   EXPECT_THAT(errorOf(folder), HasSubstr("'" + folder.string() + "': it is a folder"));

@@ -12,7 +12,11 @@
 #include <mrpt/obs/CSensoryFrame.h>
 
 #include <atomic>
+#include <chrono>
+#include <functional>
 #include <future>
+#include <map>
+#include <string>
 #include <thread>
 
 #include "test/plugin/mrpt/observations.h"
@@ -363,6 +367,53 @@ TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
   feeder.join();
 
   expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+}
+
+/// Asks the builder from other threads while the sweep runs, which holds the lock.
+class AskingSink : public DsiSink {
+ public:
+  using Questions = std::map<std::string, std::function<void()>>;
+  explicit AskingSink(Questions questions) : questions_(std::move(questions)) {}
+
+  void takePlane(int /*plane*/, const float* /*values*/) override {
+    if (asked_.exchange(true)) return;
+    std::map<std::string, std::future<void>> answers;
+    for (const auto& [name, ask] : questions_) {
+      answers[name] = std::async(std::launch::async, ask);
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
+    for (auto& [name, answer] : answers) {
+      if (answer.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+        answered_in_between.push_back(name);
+      }
+    }
+    answers_ = std::move(answers);  // wait for the end of the sweep
+  }
+
+  std::vector<std::string> answered_in_between;
+
+ private:
+  Questions questions_;
+  std::atomic<bool> asked_ = false;
+  std::map<std::string, std::future<void>> answers_;
+};
+
+TEST(CEventFusionMapBuilder, NoQuestionIsAnsweredWhileAKeyframeIsMade) {
+  CEventFusionMapBuilder builder(syntheticOptions());
+  AskingSink sink({{"status", [&] { builder.status(); }},
+                   {"points", [&] { builder.points(); }},
+                   {"trajectory", [&] { builder.trajectory(); }},
+                   {"trackerTrajectory", [&] { builder.trackerTrajectory(); }},
+                   {"usedOptions", [&] { builder.usedOptions(); }},
+                   {"ignoredObservations", [&] { builder.ignoredObservations(); }},
+                   {"getCurrentPoseEstimation", [&] { builder.getCurrentPoseEstimation(); }},
+                   {"getCurrentlyBuiltMapSize", [&] { builder.getCurrentlyBuiltMapSize(); }}});
+  builder.setDsiSink(&sink);
+  for (const auto& observation : observationsOf(SyntheticRecording())) {
+    builder.processObservation(observation);
+  }
+  builder.finish();
+  EXPECT_THAT(sink.answered_in_between, testing::IsEmpty()) << "without the lock";
 }
 
 // --- Asked by a program that cannot finish it --------------------------------------------------

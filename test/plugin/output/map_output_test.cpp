@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <mrpt/maps/CSimpleMap.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <cstring>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
@@ -163,6 +165,16 @@ TEST(ConfidencePicture, IsBrightWhereSmallAndDarkWhereLarge) {
   EXPECT_EQ(confidencePicture(cv::Mat1f::zeros(1, 1))(0, 0), 255);
 }
 
+TEST(EventPicture, BrighterIsRedDarkerBlueAndStrongerDarker) {
+  cv::Mat_<cv::Vec2i> counts(1, 4);  // darker, brighter
+  counts << cv::Vec2i(0, 1), cv::Vec2i(1, 0), cv::Vec2i(0, 3), cv::Vec2i(0, 0);
+  const cv::Mat3b picture = eventPicture(counts);
+  EXPECT_EQ(picture(0, 0), cv::Vec3b(120, 120, 255));
+  EXPECT_EQ(picture(0, 1), cv::Vec3b(255, 120, 120));
+  EXPECT_EQ(picture(0, 2), cv::Vec3b(0, 0, 255));
+  EXPECT_EQ(picture(0, 3), cv::Vec3b(255, 255, 255));
+}
+
 class NpyFileTest : public TemporaryFolder {};
 
 TEST_F(NpyFileTest, HoldsPlanesRowsAndColumnsInThatOrder) {
@@ -194,6 +206,39 @@ TEST_F(NpyFileTest, ThatIsNotFinishedLeavesNothing) {
   EXPECT_TRUE(std::filesystem::is_empty(folder()));
   EXPECT_THROW(NpyDsiFile(folder() / "nowhere" / "dsi.npy", 1, {1, 1, 1, 1, 0, 0}),
                std::runtime_error);
+}
+
+/// As on a full disk: no file of this process grows beyond a size.
+class FileSizeLimit {
+ public:
+  explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limit{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FileSizeLimit() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  FileSizeLimit(const FileSizeLimit&) = delete;
+  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+ private:
+  rlimit before_{};
+  void (*handler_)(int);
+};
+
+TEST_F(NpyFileTest, ThatDoesNotFitTheDiskIsAnErrorAndLeavesNothing) {
+  for (const int side : {8, 400}) {  // written at the end, and at once
+    const FileSizeLimit limit(200);
+    const ReferenceView view{side, side, 1, 1, 0, 0};
+    const std::vector<float> plane(view.pixels(), 1.5F);
+    NpyDsiFile file(folder() / "dsi.npy", 1, view);
+    file.takePlane(0, plane.data());
+    EXPECT_THROW(file.finish(), std::runtime_error) << side;
+    EXPECT_FALSE(exists(folder() / "dsi.npy")) << side;
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder()));
 }
 
 }  // namespace

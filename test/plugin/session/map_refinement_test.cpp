@@ -6,6 +6,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <limits>
+#include <random>
 #include <stdexcept>
 #include <vector>
 
@@ -131,6 +132,30 @@ TEST_P(MapRefinementOfEitherKind, KeyframesWithoutPointsStayWithTheTracker) {
   EXPECT_EQ(refinement.state().counts.registered, 0U);
   for (const auto& [number, T_world_ref] : refinement.takeMoved()) {
     EXPECT_LT((T_world_ref.translation - keyframes[number].T_world_ref.translation).norm(), 1e-6);
+  }
+}
+
+TEST(CovarianceAt, ARotationMovesTheRigAcrossItsLever) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> number(-1, 1);
+  const auto draw = [&] { return Eigen::Vector3d(number(random), number(random), number(random)); };
+  for (int i = 0; i < 20; ++i) {
+    // One motion alone: a shift and a small rotation.
+    const Eigen::Vector3d shift = draw();
+    const Eigen::Vector3d rotation = draw();
+    const Eigen::Vector3d lever = 3 * draw();
+    RefinementState state;
+    state.T_world_tracked.translation = draw();
+    Vector6d motion;
+    motion << shift, rotation;
+    state.covariance = motion * motion.transpose();
+
+    const Rigid3 T_world_rig{{}, state.T_world_tracked.translation + lever};
+    Vector6d moved;
+    moved << shift + rotation.cross(lever), rotation;
+    const Matrix6d expected =
+        moved * moved.transpose() + state.tracker.driftCovariance(lever.norm());
+    EXPECT_LT((covarianceAt(state, T_world_rig) - expected).cwiseAbs().maxCoeff(), 1e-12);
   }
 }
 
