@@ -58,7 +58,7 @@ TEST_F(WholeFile, ReplacesTheOneBefore) {
 
 TEST_F(WholeFile, TheOneBeforeStandsUntilTheNewOneIsWhole) {
   writeText(folder / "a.txt", "one");
-  writeWhole(folder / "a.txt", [&](const fs::path& temporary) {
+  writeAtomically(folder / "a.txt", [&](const fs::path& temporary) {
     std::ofstream(temporary) << "tw";
     EXPECT_EQ(contentOf(folder / "a.txt"), "one");
     std::ofstream(temporary) << "two";
@@ -72,7 +72,7 @@ TEST_F(WholeFile, AWriteThatFailsLeavesTheOneBeforeAndNothingElse) {
     std::ofstream(temporary) << "tw";
     throw std::runtime_error("the disk is full");
   };
-  EXPECT_THROW(writeWhole(folder / "a.txt", fail_half_way), std::runtime_error);
+  EXPECT_THROW(writeAtomically(folder / "a.txt", fail_half_way), std::runtime_error);
   EXPECT_EQ(contentOf(folder / "a.txt"), "one");
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
 }

@@ -166,12 +166,13 @@ TEST(VerifyLoop, APlaceThatShowsThreeTimesAsMuchIsNotTheSameOne) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
     EdgeWorld world = test::edgesAround(100, random);
-    const Rigid3 T_world_newer = viewTurned(2 * kDeg, {0.05, 0, 0});
+    const Rigid3 T_world_newer = viewTurned(2 * kRadiansPerDegree, {0.05, 0, 0});
     const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
-    EXPECT_TRUE(verify(T_world_newer, cloudFrom(world, {}, random), newer, 0.02, 0.5 * kDeg));
+    EXPECT_TRUE(
+        verify(T_world_newer, cloudFrom(world, {}, random), newer, 0.02, 0.5 * kRadiansPerDegree));
     for (const test::Edge& edge : test::edgesAround(200, random)) world.push_back(edge);
     const RegistrationCloud older = cloudFrom(world, {}, random);
-    EXPECT_FALSE(verify(T_world_newer, older, newer, 0.02, 0.5 * kDeg)) << seed;
+    EXPECT_FALSE(verify(T_world_newer, older, newer, 0.02, 0.5 * kRadiansPerDegree)) << seed;
   }
 }
 

@@ -145,12 +145,12 @@ TEST(CovarianceAt, ARotationMovesTheRigAcrossItsLever) {
     const Eigen::Vector3d rotation = draw();
     const Eigen::Vector3d lever = 3 * draw();
     RefinementState state;
-    state.T_world_tracked.translation = draw();
+    state.T_world_ref_denoised.translation = draw();
     Vector6d motion;
     motion << shift, rotation;
     state.covariance = motion * motion.transpose();
 
-    const Rigid3 T_world_rig{{}, state.T_world_tracked.translation + lever};
+    const Rigid3 T_world_rig{{}, state.T_world_ref_denoised.translation + lever};
     Vector6d moved;
     moved << shift + rotation.cross(lever), rotation;
     const Matrix6d expected =
