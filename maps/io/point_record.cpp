@@ -106,6 +106,8 @@ double bitsAs(std::uint64_t bits) {
   return static_cast<double>(number);
 }
 
+}  // namespace
+
 double numberAt(const char* at, NumberType type, bool big_endian) {
   const std::size_t size = sizeOf(type);
   std::uint64_t bits = 0;
@@ -130,8 +132,6 @@ double numberAt(const char* at, NumberType type, bool big_endian) {
       return static_cast<double>(bits);
   }
 }
-
-}  // namespace
 
 std::size_t sizeOf(NumberType type) {
   switch (type) {

@@ -27,6 +27,10 @@ enum class NumberType {
 
 std::size_t sizeOf(NumberType type);
 
+/// Reads one number from its bytes.
+/// @param at `sizeOf(type)` bytes.
+double numberAt(const char* at, NumberType type, bool big_endian);
+
 /// One field of a point as a file has it: `count` numbers of one type.
 struct RecordField {
   std::string name;
