@@ -15,19 +15,19 @@ namespace efm {
 namespace {
 
 /// What is given, and what the folders say of the rest.
-std::optional<StereoBase> stereoBase(const EvaluateDepthArguments& arguments) {
+std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& arguments) {
   if (arguments.focal_px && arguments.baseline_m) {
-    return StereoBase{*arguments.focal_px, *arguments.baseline_m, "as given"};
+    return StereoBaseline{*arguments.focal_px, *arguments.baseline_m, "as given"};
   }
-  std::optional<StereoBase> base = findStereoBase(arguments.estimate, arguments.truth);
-  if (!base && (arguments.focal_px || arguments.baseline_m)) {
+  std::optional<StereoBaseline> stereo = findStereoBaseline(arguments.estimate, arguments.truth);
+  if (!stereo && (arguments.focal_px || arguments.baseline_m)) {
     throw std::invalid_argument("bad-pix needs both --focal and --baseline: neither " +
                                 arguments.estimate.string() + " nor " + arguments.truth.string() +
                                 " says the other");
   }
-  if (arguments.focal_px) base->focal_px = *arguments.focal_px;
-  if (arguments.baseline_m) base->baseline_m = *arguments.baseline_m;
-  return base;
+  if (arguments.focal_px) stereo->focal_px = *arguments.focal_px;
+  if (arguments.baseline_m) stereo->baseline_m = *arguments.baseline_m;
+  return stereo;
 }
 
 TrajectoryAlignment alignmentOf(const std::string& name) {
@@ -40,15 +40,15 @@ TrajectoryAlignment alignmentOf(const std::string& name) {
 }  // namespace
 
 int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
-  const std::optional<StereoBase> base = stereoBase(arguments);
+  const std::optional<StereoBaseline> stereo = stereoBaseline(arguments);
   DepthEvaluationOptions options = arguments.options;
-  if (base) options.focal_baseline = base->focalBaseline();
+  if (stereo) options.focal_baseline = stereo->focalBaseline();
   const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
   if (!arguments.output.plot.empty()) {
     writePicture(arguments.output.plot, evaluationPlot(evaluation, options));
   }
-  std::cout << (arguments.output.json ? evaluationJson(evaluation, base)
-                                      : evaluationTable(evaluation, base));
+  std::cout << (arguments.output.json ? evaluationJson(evaluation, stereo)
+                                      : evaluationTable(evaluation, stereo));
   return 0;
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/cloud_evaluation.h"
 
-#include <initializer_list>
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -22,23 +23,20 @@ PointCloudContent readPoints(const std::filesystem::path& file) {
   return content;
 }
 
-std::vector<std::string> rowOf(const std::string& name, const SampleStatistics& statistics,
-                               const std::string& ninety) {
-  return {name,
-          std::to_string(statistics.count),
-          fixedText(statistics.mean, 4),
-          fixedText(statistics.median, 4),
-          ninety,
-          fixedText(statistics.rms, 4),
-          fixedText(statistics.max, 4)};
+std::vector<std::string> distanceRow(const std::string& name, const SampleStatistics& statistics,
+                                     double p90_m) {
+  std::vector<std::string> row = {name, std::to_string(statistics.count)};
+  for (const double value :
+       {statistics.mean, statistics.median, p90_m, statistics.rms, statistics.max}) {
+    row.push_back(fixedText(value, 4));
+  }
+  return row;
 }
 
-Json asJson(const SampleStatistics& statistics) {
-  return {{"points", statistics.count},
-          {"mean_m", statistics.mean},
-          {"median_m", statistics.median},
-          {"rms_m", statistics.rms},
-          {"max_m", statistics.max}};
+Json distanceJson(const SampleStatistics& statistics, double p90_m) {
+  return {{"points", statistics.count},    {"mean_m", statistics.mean},
+          {"median_m", statistics.median}, {"rms_m", statistics.rms},
+          {"max_m", statistics.max},       {"p90_m", p90_m}};
 }
 
 }  // namespace
@@ -49,12 +47,12 @@ CloudEvaluation evaluateCloud(const std::filesystem::path& estimated,
   const auto map = readPoints(fileInFolder(estimated, {"map.pcd", "points.pcd"}));
   const auto surfaces = readPoints(fileInFolder(truth, {"gt_cloud.ply"}));
   CloudEvaluation evaluation;
-  evaluation.without_place = map.non_finite + surfaces.non_finite;
+  evaluation.non_finite = map.non_finite + surfaces.non_finite;
   if (options.to_find.empty()) {
     evaluation.errors = cloudErrors(map.points, surfaces.points, options.distances_m);
   } else {
     const auto to_find = readPoints(options.to_find);
-    evaluation.without_place += to_find.non_finite;
+    evaluation.non_finite += to_find.non_finite;
     evaluation.errors =
         cloudErrors(map.points, surfaces.points, to_find.points, options.distances_m);
   }
@@ -65,10 +63,9 @@ std::string evaluationTable(const CloudEvaluation& evaluation) {
   const CloudErrors& errors = evaluation.errors;
   TextTable distances;
   distances.add({"distances in m", "points", "mean", "median", "90 %", "rms", "max"});
-  distances.add(
-      rowOf("map to truth (accuracy)", errors.accuracy, fixedText(errors.accuracy_p90_m, 4)));
-  distances.add(rowOf("truth to map (gaps)", errors.completeness_distance,
-                      fixedText(errors.completeness_distance_p90_m, 4)));
+  distances.add(distanceRow("map to truth (accuracy)", errors.accuracy, errors.accuracy_p90_m));
+  distances.add(distanceRow("truth to map (completeness)", errors.completeness_distance,
+                            errors.completeness_distance_p90_m));
   TextTable steps;
   steps.add({"distance m", "map within %", "outliers %", "completeness %", "F1 %"});
   for (const CloudErrors::Step& step : errors.steps) {
@@ -77,8 +74,8 @@ std::string evaluationTable(const CloudEvaluation& evaluation) {
                fixedText(100 * step.f1, 2)});
   }
   std::string text = distances.text() + "\n" + steps.text();
-  if (evaluation.without_place > 0) {
-    text += std::to_string(evaluation.without_place) + " points are not finite and were left out\n";
+  if (evaluation.non_finite > 0) {
+    text += fmt::format("{} points are not finite and were left out\n", evaluation.non_finite);
   }
   return text;
 }
@@ -86,10 +83,9 @@ std::string evaluationTable(const CloudEvaluation& evaluation) {
 std::string evaluationJson(const CloudEvaluation& evaluation) {
   const CloudErrors& errors = evaluation.errors;
   Json json;
-  json["accuracy"] = asJson(errors.accuracy);
-  json["accuracy"]["share_90_m"] = errors.accuracy_p90_m;
-  json["gaps"] = asJson(errors.completeness_distance);
-  json["gaps"]["share_90_m"] = errors.completeness_distance_p90_m;
+  json["accuracy"] = distanceJson(errors.accuracy, errors.accuracy_p90_m);
+  json["completeness_distance"] =
+      distanceJson(errors.completeness_distance, errors.completeness_distance_p90_m);
   json["curve"] = Json::array();
   for (const CloudErrors::Step& step : errors.steps) {
     json["curve"].push_back({{"distance_m", step.distance_m},
@@ -98,22 +94,20 @@ std::string evaluationJson(const CloudEvaluation& evaluation) {
                              {"completeness", step.completeness},
                              {"f1", step.f1}});
   }
-  json["without_place"] = evaluation.without_place;
+  json["non_finite"] = evaluation.non_finite;
   return json.dump(2) + "\n";
 }
 
 std::string cloudEvaluationKeys() {
-  return "Keys of --json (shares from 0 to 1):\n"
-         "  accuracy  distances from the map's points to the nearest of the truth, metres: "
-         "points,\n"
-         "            mean_m, median_m, rms_m, max_m, share_90_m (90 % of the points lie within)\n"
-         "  gaps      the same from the true points to the nearest of the map\n"
-         "  curve     a list, of each distance: distance_m, within (share of the map's points at\n"
-         "            most so far from the truth), outliers (the rest), completeness (share of "
-         "the\n"
-         "            true points at most so far from the map), f1 (harmonic mean of within and\n"
-         "            completeness)\n"
-         "  without_place   points of the files that are not finite: left out\n";
+  return "Keys of --json (fractions from 0 to 1):\n"
+         "  accuracy  distances from each point of the map to the nearest true point: points,\n"
+         "            mean_m, median_m, rms_m, max_m, p90_m (90 % of the distances are smaller)\n"
+         "  completeness_distance   the same from each true point to the nearest point of the map\n"
+         "  curve     a list, one entry per distance: distance_m, within (fraction of the map's\n"
+         "            points within this distance of the truth), outliers (the rest),\n"
+         "            completeness (fraction of the true points within this distance of the\n"
+         "            map), f1 (harmonic mean of within and completeness)\n"
+         "  non_finite   points of the files that are not finite; they are left out\n";
 }
 
 }  // namespace efm

@@ -3,21 +3,11 @@
 
 #include <algorithm>
 #include <array>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "plugin/pictures/curve_plot.h"
 
 namespace efm {
-namespace {
-
-Curve curveOf(const std::string& label, std::vector<cv::Point2d> points) {
-  return {label, std::move(points), CurveStyle::kMarkedLine, std::nullopt};
-}
-
-}  // namespace
-
 cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation) {
   std::vector<CloudErrors::Step> steps = evaluation.errors.steps;
   std::sort(steps.begin(), steps.end(),
@@ -30,10 +20,11 @@ cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation) {
   }
   CurvePlot plot;
   plot.title = "map and truth";
-  plot.x = {"distance [m]", AxisScale::kLogarithmic, std::nullopt, std::nullopt};
-  plot.y = {"share within [%]", AxisScale::kLinear, 0, 102};
-  plot.curves = {curveOf("accuracy: map to truth", points[0]),
-                 curveOf("completeness: truth to map", points[1]), curveOf("F1", points[2])};
+  plot.x = {"distance [m]", AxisScale::kLogarithmic};
+  plot.y = {"within [%]", AxisScale::kLinear, 0, 102};
+  plot.curves = {{"accuracy: map to truth", points[0], CurveStyle::kMarkedLine},
+                 {"completeness: truth to map", points[1], CurveStyle::kMarkedLine},
+                 {"F1", points[2], CurveStyle::kMarkedLine}};
   return drawCurves(plot);
 }
 

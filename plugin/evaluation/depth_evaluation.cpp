@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/depth_evaluation.h"
 
+#include <fmt/format.h>
+
 #include <set>
 #include <stdexcept>
 
@@ -15,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::int64_t kSameTimeNs = 1'000'000;
 
-/// Adds one map after the other, then sums up.
+/// Compares one map after the other and collects the errors.
 class Comparison {
  public:
   explicit Comparison(const DepthEvaluationOptions& options) : options_(options) {
@@ -43,7 +45,7 @@ class Comparison {
     all_.insert(all_.end(), pairs.begin(), pairs.end());
   }
 
-  /// Pairs two series by time.
+  /// Compares each map with the truth nearest in time.
   void addSeries(const std::vector<TimedFile>& estimates, const std::vector<TimedFile>& truths) {
     std::set<const TimedFile*> used;
     for (const TimedFile& map : estimates) {
@@ -85,15 +87,15 @@ DepthEvaluation evaluateDepth(const fs::path& estimated, const fs::path& truth,
   for (const fs::path& path : {estimated, truth}) {
     if (!fs::exists(path)) throw std::runtime_error("no such file: " + path.string());
   }
-  // The folder of one depth map stands for its file, beside a file of truth.
+  // Compared with a file, the folder of one depth map counts as its file.
   const bool one_map = fs::exists(estimated / "depth.tiff") && !fs::is_directory(truth);
   const fs::path estimate = one_map ? estimated / "depth.tiff" : estimated;
   const bool folders = fs::is_directory(estimate);
   if (folders && fs::exists(estimate / "depth.tiff")) {
-    throw std::runtime_error(estimate.string() +
-                             " holds one depth map without its time: expected a "
-                             "file of truth beside it, not the folder " +
-                             truth.string());
+    throw std::runtime_error(
+        fmt::format("{} holds one depth map without its time: expected a file of truth beside it, "
+                    "not the folder {}",
+                    estimate.string(), truth.string()));
   }
   if (folders != fs::is_directory(truth)) {
     throw std::runtime_error(estimate.string() + " and " + truth.string() +
@@ -105,16 +107,16 @@ DepthEvaluation evaluateDepth(const fs::path& estimated, const fs::path& truth,
     comparison.addSeries(depthSeries(estimate, DepthSeriesRole::kEstimate),
                          depthSeries(truth, DepthSeriesRole::kTruth));
     if (!comparison.hasMaps()) {
-      throw std::runtime_error("no truth in " + truth.string() +
-                               " lies within 1 ms of a depth map of " + estimate.string());
+      throw std::runtime_error(fmt::format("no truth in {} lies within 1 ms of a depth map of {}",
+                                           truth.string(), estimate.string()));
     }
   } else {
     comparison.add(estimate.filename().string(), estimate, truth);
   }
   if (!comparison.hasPoints()) {
-    throw std::runtime_error("no pixel of " + estimate.string() +
-                             " has a depth where the truth has one" +
-                             (options.mask.empty() ? "" : " and the mask is not black"));
+    throw std::runtime_error(fmt::format("no pixel of {} has a depth where the truth has one{}",
+                                         estimate.string(),
+                                         options.mask.empty() ? "" : " and the mask is not black"));
   }
   return comparison.result();
 }

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/depth_evaluation_plot.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "mapping/depth/median.h"
@@ -27,7 +28,7 @@ struct ShownDepths {
   cv::Mat1f estimate;
   cv::Mat1f truth;
   cv::Mat1f error;
-  std::vector<double> depths_m;  ///< Of the truth, where it is seen.
+  std::vector<double> depths_m;  ///< Of the truth.
   std::vector<double> errors_m;
 };
 
@@ -64,7 +65,7 @@ const EvaluatedMap& typicalMap(const DepthEvaluation& evaluation) {
   return *upperMedian(maps, fewer);
 }
 
-/// The range that all but the outermost hundredths of the values lie in.
+/// The range from the 1st to the 99th percentile.
 AxisRange usualRange(const std::vector<double>& values, AxisScale scale) {
   if (values.empty()) return rangeAround({1}, scale);
   AxisRange range{quantileOf(values, 0.01), quantileOf(values, 0.99), scale};
@@ -75,17 +76,12 @@ AxisRange usualRange(const std::vector<double>& values, AxisScale scale) {
 cv::Mat3b depthImages(const EvaluatedMap& map, const DepthEvaluationOptions& options) {
   const ShownDepths shown = shownDepths(map, options);
   const AxisRange depths = usualRange(shown.depths_m, AxisScale::kLogarithmic);
-  double largest_m = quantileOf(shown.errors_m, shown.errors_m.empty() ? 1 : 0.95);
-  if (!(largest_m > 0)) largest_m = 0.01;
-  const std::string title =
-      "estimate " + map.name + ", " + std::to_string(map.errors.points) + " points";
+  double max_error_m = quantileOf(shown.errors_m, shown.errors_m.empty() ? 1 : 0.95);
+  if (!(max_error_m > 0)) max_error_m = 0.01;
+  const std::string title = fmt::format("estimate {}, {} points", map.name, map.errors.points);
   return sideBySide({drawValues({title, shown.estimate, depths, "m", true}),
                      drawValues({"truth", shown.truth, depths, "m", true}),
-                     drawValues({"absolute error", shown.error, {0, largest_m}, "m"})});
-}
-
-Curve curveOf(const std::string& label, std::vector<cv::Point2d> points) {
-  return {label, std::move(points), CurveStyle::kMarkedLine, std::nullopt};
+                     drawValues({"absolute error", shown.error, {0, max_error_m}, "m"})});
 }
 
 cv::Mat3b detectionPlot(const PrecisionRecall& detection) {
@@ -101,10 +97,11 @@ cv::Mat3b detectionPlot(const PrecisionRecall& detection) {
   }
   CurvePlot plot;
   plot.title = "precision, recall, F1";
-  plot.x = {"error threshold [m]", AxisScale::kLogarithmic, std::nullopt, std::nullopt};
-  plot.y = {"share [%]", AxisScale::kLinear, 0, 102};
-  plot.curves = {curveOf("precision", points[0]), curveOf("recall", points[1]),
-                 curveOf("F1", points[2])};
+  plot.x = {"error threshold [m]", AxisScale::kLogarithmic};
+  plot.y = {"fraction [%]", AxisScale::kLinear, 0, 102};
+  plot.curves = {{"precision", points[0], CurveStyle::kMarkedLine},
+                 {"recall", points[1], CurveStyle::kMarkedLine},
+                 {"F1", points[2], CurveStyle::kMarkedLine}};
   plot.size = {520, 380};
   return drawCurves(plot);
 }
@@ -125,7 +122,8 @@ cv::Mat3b errorsOverTime(const std::vector<EvaluatedMap>& maps) {
   plot.x.label = "time since the first [s]";
   plot.y.label = "error [m]";
   plot.y.from = 0;
-  plot.curves = {curveOf("mean", means), curveOf("median", medians)};
+  plot.curves = {{"mean", means, CurveStyle::kMarkedLine},
+                 {"median", medians, CurveStyle::kMarkedLine}};
   plot.size = {520, 380};
   return drawCurves(plot);
 }

@@ -7,9 +7,9 @@
 
 namespace efm {
 
-/// Estimate, truth and error of one map (of several that with the median number of points) side by
-/// side; below, precision, recall and F1 over the threshold and, of several maps, their errors over
-/// time. Reads the files of that map again.
+/// Draws estimate, truth and error of one map side by side: of several maps the one with the median
+/// number of points. Below: precision, recall and F1 over the threshold and, for several maps,
+/// their errors over time. Reads the files of the drawn map again.
 /// @throws std::runtime_error as `evaluateDepth` does.
 cv::Mat3b evaluationPlot(const DepthEvaluation& evaluation, const DepthEvaluationOptions& options);
 

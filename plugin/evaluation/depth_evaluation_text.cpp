@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/depth_evaluation_text.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cstddef>
 #include <nlohmann/json.hpp>
@@ -14,7 +16,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A field of DepthErrors, as people and programs see it.
+/// A field of DepthErrors in the table and in the JSON.
 struct Column {
   const char* key;
   const char* heading;
@@ -36,9 +38,9 @@ constexpr std::array<Column, 13> kColumns = {{
     {"median_inverse", "median", "|d1/Z| /m", [](const E& e) { return V(e.median_inverse); }, 1, 5,
      "median |1/Z - 1/Z_true|, 1/m"},
     {"bad_pix_5px", "bad-pix", "5px 5% %", [](const E& e) { return e.bad_pix_5px; }, 100, 2,
-     "share with a disparity error over 5 px and 5 %"},
+     "fraction with a disparity error over 5 px and 5 %"},
     {"bad_pix_3px", "bad-pix", "3px 5% %", [](const E& e) { return e.bad_pix_3px; }, 100, 2,
-     "share with a disparity error over 3 px and 5 % (KITTI)"},
+     "fraction with a disparity error over 3 px and 5 % (KITTI)"},
     {"silog", "SILog", "x100", [](const E& e) { return V(e.silog); }, 1, 3,
      "100 (mean d^2 - (mean d)^2), d = ln Z - ln Z_true"},
     {"aerrr", "AErrR", "%", [](const E& e) { return V(e.aerrr); }, 100, 2,
@@ -48,13 +50,13 @@ constexpr std::array<Column, 13> kColumns = {{
     {"log_rmse", "logRMSE", "x100", [](const E& e) { return V(e.log_rmse); }, 1, 3,
      "100 sqrt(mean d^2)"},
     {"delta_1", "d<1.25", "%", [](const E& e) { return V(e.delta[0]); }, 100, 2,
-     "share with max(Z/Z_true, Z_true/Z) under 1.25"},
+     "fraction with max(Z/Z_true, Z_true/Z) under 1.25"},
     {"delta_2", "<1.25^2", "%", [](const E& e) { return V(e.delta[1]); }, 100, 2,
      "the same under 1.25^2"},
     {"delta_3", "<1.25^3", "%", [](const E& e) { return V(e.delta[2]); }, 100, 2,
      "the same under 1.25^3"},
     {"beyond_tenth", "beyond", "10% %", [](const E& e) { return V(e.beyond_tenth); }, 100, 2,
-     "share with |Z - Z_true| over a tenth of Z_true"},
+     "fraction with |Z - Z_true| over a tenth of Z_true"},
 }};
 
 std::vector<std::string> rowOf(const std::string& name, const DepthErrors& errors) {
@@ -84,15 +86,15 @@ std::string detectionTable(const PrecisionRecall& detection) {
                fixedText(100 * detection.precision(k), 2), fixedText(100 * detection.recall(k), 2),
                fixedText(100 * detection.f1(k), 2)});
   }
-  return table.text() + std::to_string(detection.estimates) + " estimates beside a truth, " +
-         std::to_string(detection.estimates_without_truth) + " without, " +
-         std::to_string(detection.truths) + " pixels with a truth\n";
+  return table.text() +
+         fmt::format("{} estimates beside a truth, {} without, {} pixels with a truth\n",
+                     detection.estimates, detection.estimates_without_truth, detection.truths);
 }
 
 }  // namespace
 
 std::string evaluationTable(const DepthEvaluation& evaluation,
-                            const std::optional<StereoBase>& base) {
+                            const std::optional<StereoBaseline>& stereo) {
   TextTable table;
   std::vector<std::string> headings = {"map", "points"};
   std::vector<std::string> units = {"", ""};
@@ -108,23 +110,23 @@ std::string evaluationTable(const DepthEvaluation& evaluation,
     table.add(rowOf("all points", evaluation.all));
   }
   std::string text = table.text() + "\n" + detectionTable(evaluation.detection);
-  if (base) {
-    text += "bad-pix with focal length " + fixedText(base->focal_px, 2) + " px and baseline " +
-            fixedText(base->baseline_m, 4) + " m (" + base->source + ")\n";
+  if (stereo) {
+    text += fmt::format("bad-pix with focal length {:.2f} px and baseline {:.4f} m ({})\n",
+                        stereo->focal_px, stereo->baseline_m, stereo->source);
   } else if (!evaluation.all.bad_pix_5px) {
     text += "no bad-pix: it needs a focal length and a baseline (--focal, --baseline)\n";
   }
   if (evaluation.without_truth > 0) {
-    text += std::to_string(evaluation.without_truth) + " depth maps have no truth within 1 ms\n";
+    text += fmt::format("{} depth maps have no truth within 1 ms\n", evaluation.without_truth);
   }
   if (evaluation.without_estimate > 0) {
-    text += std::to_string(evaluation.without_estimate) + " true maps have no estimate\n";
+    text += fmt::format("{} true maps have no estimate\n", evaluation.without_estimate);
   }
   return text;
 }
 
 std::string evaluationJson(const DepthEvaluation& evaluation,
-                           const std::optional<StereoBase>& base) {
+                           const std::optional<StereoBaseline>& stereo) {
   Json json;
   json["maps"] = Json::array();
   for (const EvaluatedMap& map : evaluation.maps) {
@@ -145,9 +147,9 @@ std::string evaluationJson(const DepthEvaluation& evaluation,
   json["estimates"] = detection.estimates;
   json["estimates_without_truth"] = detection.estimates_without_truth;
   json["truths"] = detection.truths;
-  if (base) {
-    json["focal_px"] = base->focal_px;
-    json["baseline_m"] = base->baseline_m;
+  if (stereo) {
+    json["focal_px"] = stereo->focal_px;
+    json["baseline_m"] = stereo->baseline_m;
   }
   json["without_truth"] = evaluation.without_truth;
   json["without_estimate"] = evaluation.without_estimate;
@@ -156,24 +158,21 @@ std::string evaluationJson(const DepthEvaluation& evaluation,
 
 std::string depthEvaluationKeys() {
   std::string text =
-      "Keys of --json (shares from 0 to 1):\n"
-      "  maps      a list: name, points, and these, of each map\n";
+      "Keys of --json (fractions from 0 to 1):\n"
+      "  maps      a list, one entry per map: name, points and\n";
   for (const Column& column : kColumns) {
-    std::string key = column.key;
-    key.resize(18, ' ');
-    text += "            " + key + column.help + "\n";
+    text += fmt::format("            {:18}{}\n", column.key, column.help);
   }
   return text +
-         "            (none of these where points is 0; bad_pix_... only where focal length and\n"
-         "            baseline are known)\n"
-         "  mean      the same, mean over the maps; points is the sum\n"
-         "  all       the same over all points of all maps\n"
-         "  curve     a list: threshold_m, precision, recall, f1; over all maps\n"
-         "  estimates, estimates_without_truth, truths   pixels: precision and recall are shares "
-         "of\n"
-         "            the first and the last\n"
-         "  focal_px, baseline_m                         that bad-pix was reckoned with\n"
-         "  without_truth, without_estimate              maps that have no partner in time\n";
+         "            (left out if points is 0; bad_pix_... only with focal length and baseline)\n"
+         "  mean      mean over the maps; points is the sum\n"
+         "  all       over all points of all maps\n"
+         "  curve     a list, one entry per threshold: threshold_m, precision, recall, f1; over\n"
+         "            all maps\n"
+         "  estimates, estimates_without_truth, truths   numbers of pixels: precision is a\n"
+         "            fraction of estimates, recall a fraction of truths\n"
+         "  focal_px, baseline_m              of bad-pix\n"
+         "  without_truth, without_estimate   maps without a partner in time\n";
 }
 
 }  // namespace efm

@@ -8,16 +8,16 @@
 
 namespace efm {
 
-/// For people: a line per map, the mean of the maps and all points; then precision, recall and F1
-/// over the thresholds; then what was not compared, and how bad-pix was reckoned or why not.
+/// A table: a line per map, the mean of the maps and all points. Then precision, recall and F1 over
+/// the thresholds, the maps without partner, and the focal length and baseline of bad-pix.
 std::string evaluationTable(const DepthEvaluation& evaluation,
-                            const std::optional<StereoBase>& base = std::nullopt);
+                            const std::optional<StereoBaseline>& stereo = std::nullopt);
 
-/// For programs; its keys are in `depthEvaluationKeys`.
+/// `depthEvaluationKeys` describes the keys.
 std::string evaluationJson(const DepthEvaluation& evaluation,
-                           const std::optional<StereoBase>& base = std::nullopt);
+                           const std::optional<StereoBaseline>& stereo = std::nullopt);
 
-/// What the keys of the JSON mean, for the program's help.
+/// The keys of the JSON, for the program's help.
 std::string depthEvaluationKeys();
 
 }  // namespace efm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/depth_file.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -33,11 +35,10 @@ std::string kindOf(const cv::Mat& image) {
   constexpr const char* kDepths[] = {"8-bit",  "signed 8-bit", "16-bit", "signed 16-bit",
                                      "32-bit", "float32",      "float64"};
   const int depth = image.depth();
-  return std::string(depth < 7 ? kDepths[depth] : "unknown") + ", " +
-         std::to_string(image.channels()) + (image.channels() == 1 ? " channel" : " channels");
+  return fmt::format("{}, {} channel{}", depth < 7 ? kDepths[depth] : "unknown", image.channels(),
+                     image.channels() == 1 ? "" : "s");
 }
 
-/// By OpenCV, as it is stored.
 cv::Mat decoded(const std::string& bytes, int flags) {
   cv::Mat image;
   try {
@@ -103,7 +104,7 @@ cv::Mat1b readMaskFile(const std::filesystem::path& file) {
   try {
     const std::string bytes = readBytes(file);
     if (bytes.empty()) throw std::runtime_error("it is empty");
-    // Of colours the brightest; OpenCV's own grey would round a dark blue to black.
+    // The maximum of the colours: OpenCV's conversion to grey rounds a dark blue to black.
     cv::Mat channels = decoded(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
     cv::Mat1b mask(channels.size(), uchar{0});
     for (int c = 0; c < channels.channels(); ++c) {

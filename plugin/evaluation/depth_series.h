@@ -5,24 +5,32 @@
 #include <filesystem>
 #include <vector>
 
-#include "plugin/evaluation/timed_files.h"
-
 namespace efm {
 
-/// What a folder's depth maps are wanted for: it may hold both kinds.
+struct TimedFile {
+  std::int64_t t_ns = 0;
+  std::filesystem::path file;
+};
+
+/// Reads a list of files, in its order: a line is `t file`, with t in decimal seconds and the file
+/// relative to the list's folder. A # begins a comment.
+/// @throws std::runtime_error naming the list if it cannot be read, or the wrong line.
+std::vector<TimedFile> timedFilesIn(const std::filesystem::path& list);
+
+/// A folder may hold estimated and true depth maps; the role selects one of them.
 enum class DepthSeriesRole { kEstimate, kTruth };
 
-/// The depth maps of a folder, in the order of time. The first of these that it has:
-///   keyframes/<t>/depth.tiff or <t>/depth.tiff   what `map` writes
-///   depth/index.txt or index.txt                 a dataset's: `t file` a line, files beside it
-///   <t>.tiff, NAME_<t>.tiff                      or .tif, .pfm, .npy, .png
-/// with <t> in decimal seconds. For truth, the dataset's come first.
-/// @throws std::runtime_error naming the folder where it has none of these, or the line of an index
-/// that is not understood.
+/// The depth maps of a folder, in the order of time. They have the first of these forms that the
+/// folder has, with <t> in decimal seconds:
+///   keyframes/<t>/depth.tiff or <t>/depth.tiff   written by `map`
+///   depth/index.txt or index.txt                 a dataset's list, as `timedFilesIn` reads it
+///   <t>.tiff or NAME_<t>.tiff                    or .tif, .pfm, .npy, .png
+/// For truth, the dataset's list comes before the maps of `map`.
+/// @throws std::runtime_error naming the folder without depth maps or the wrong line of a list.
 std::vector<TimedFile> depthSeries(const std::filesystem::path& folder, DepthSeriesRole role);
 
-/// The file nearest in time to `t_ns`, of two as near the earlier; null where none is within
-/// `within_ns`.
+/// The file nearest in time to `t_ns`; of two equally near files the earlier. Null if none is
+/// within `within_ns`.
 /// @param series in the order of time.
 const TimedFile* nearestFile(const std::vector<TimedFile>& series, std::int64_t t_ns,
                              std::int64_t within_ns);

@@ -6,8 +6,8 @@
 
 namespace efm {
 
-/// A folder stands for the first of these files that it has; a path that is no folder for itself.
-/// @throws std::runtime_error naming the folder and the files where it has none of them.
+/// For a folder: the first of these files that it has. For another path: the path itself.
+/// @throws std::runtime_error naming the folder and the files if it has none of them.
 std::filesystem::path fileInFolder(const std::filesystem::path& path,
                                    std::initializer_list<const char*> names);
 

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/npy_image.h"
 
+#include <fmt/format.h>
+
 #include <charconv>
-#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "mapping/options/quoted_text.h"
-#include "plugin/evaluation/image_numbers.h"
+#include "maps/io/point_record.h"
 
 namespace efm {
 namespace {
@@ -25,7 +26,7 @@ std::string_view withoutBlanks(std::string_view text) {
   return text;
 }
 
-/// The dictionary, and where the data begin.
+/// The dictionary, and the first byte of the data.
 struct Header {
   std::string_view dictionary;
   std::size_t data_begin = 0;
@@ -36,7 +37,7 @@ Header headerOf(std::string_view bytes) {
   if (bytes.size() < kVersion + 4) throw wrong("the file ends inside it");
   const int version = static_cast<unsigned char>(bytes[kVersion]);
   if (version < 1 || version > 3) {
-    throw wrong("version " + std::to_string(version) + ": expected 1, 2 or 3");
+    throw wrong(fmt::format("version {}: expected 1, 2 or 3", version));
   }
   const std::size_t length_bytes = version == 1 ? 2 : 4;
   const std::size_t begin = kVersion + 2 + length_bytes;
@@ -49,7 +50,7 @@ Header headerOf(std::string_view bytes) {
   return {bytes.substr(begin, length), begin + length};
 }
 
-/// The text after 'key': in the dictionary.
+/// The text behind 'key': in the dictionary.
 std::string_view valueOf(std::string_view dictionary, const std::string& key) {
   const std::size_t name = dictionary.find("'" + key + "'");
   const std::size_t colon =
@@ -58,13 +59,16 @@ std::string_view valueOf(std::string_view dictionary, const std::string& key) {
   return withoutBlanks(dictionary.substr(colon + 1));
 }
 
+struct NumberLayout {
+  NumberType type = NumberType::kFloat32;
+  bool big_endian = false;
+};
+
 NumberLayout layoutOf(std::string_view descr) {
   const std::string_view type = descr.substr(0, 5);
-  for (const auto& [text, layout] : {std::pair{std::string_view("'<f4'"), NumberLayout{}},
-                                     {"'>f4'", {true, false}},
-                                     {"'<f8'", {false, true}},
-                                     {"'>f8'", {true, true}}}) {
-    if (type == text) return layout;
+  for (const bool big_endian : {false, true}) {
+    if (type == (big_endian ? "'>f4'" : "'<f4'")) return {NumberType::kFloat32, big_endian};
+    if (type == (big_endian ? "'>f8'" : "'<f8'")) return {NumberType::kFloat64, big_endian};
   }
   throw wrong("descr = " + inQuotes(descr.substr(0, descr.find(','))) +
               ": expected float32 or float64 ('<f4', '>f4', '<f8' or '>f8')");
@@ -112,19 +116,20 @@ cv::Mat1f parseNpy(std::string_view bytes) {
   const cv::Size size = sizeOf(valueOf(header.dictionary, "shape"));
 
   const std::string_view data = bytes.substr(header.data_begin);
-  const std::size_t pixels =
-      static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
-  if (data.size() != pixels * layout.bytes()) {
-    throw std::runtime_error(std::to_string(data.size()) +
-                             " bytes follow the array's header: "
-                             "expected " +
-                             std::to_string(pixels * layout.bytes()) + " for " +
-                             std::to_string(size.width) + "x" + std::to_string(size.height) +
-                             (layout.is_double ? " float64" : " float32"));
+  const std::size_t step = sizeOf(layout.type);
+  const std::size_t expected =
+      static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height) * step;
+  if (data.size() != expected) {
+    throw std::runtime_error(
+        fmt::format("{} bytes follow the array's header: expected {} for {}x{} float{}",
+                    data.size(), expected, size.width, size.height, 8 * step));
   }
   cv::Mat1f image(size);
-  std::size_t index = 0;
-  for (float& value : image) value = numberAt(data, index++, layout);
+  const char* at = data.data();
+  for (float& value : image) {
+    value = static_cast<float>(numberAt(at, layout.type, layout.big_endian));
+    at += step;
+  }
   return image;
 }
 

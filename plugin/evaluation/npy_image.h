@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <string_view>
 
 namespace efm {
 
-/// Whether a file begins as a NumPy array (.npy) does.
+/// The maximum width and height of a PFM or NumPy image. More means a damaged header.
+inline constexpr std::uint64_t kMaxImageSide = 65535;
+
+/// Whether these are the first bytes of a NumPy array (.npy).
 bool looksLikeNpy(std::string_view bytes);
 
 /// The image of a NumPy array (NEP 1; format 1.0 to 3.0): two dimensions, [row][column], float32 or
 /// float64 of either byte order, in C order. Doubles are rounded to float.
-/// @throws std::runtime_error naming what is wrong, the value and what was expected.
+/// @throws std::runtime_error naming the wrong part of the header, its value and the expected one.
 cv::Mat1f parseNpy(std::string_view bytes);
 
 }  // namespace efm

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/pfm_image.h"
 
+#include <fmt/format.h>
+
 #include <charconv>
 #include <cmath>
 #include <string>
 
 #include "mapping/options/quoted_text.h"
+#include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
-#include "plugin/evaluation/image_numbers.h"
+#include "plugin/evaluation/npy_image.h"
 
 namespace efm {
 namespace {
@@ -15,7 +18,7 @@ namespace {
 int side(const WordLine& line, std::size_t word) {
   const std::uint64_t pixels = line.count(word);
   if (pixels < 1 || pixels > kMaxImageSide) {
-    line.refuse(std::to_string(pixels) + " pixels: expected from 1 to 65535");
+    line.refuse(fmt::format("{} pixels: expected from 1 to 65535", pixels));
   }
   return static_cast<int>(pixels);
 }
@@ -50,20 +53,20 @@ cv::Mat1f parsePfm(std::string_view bytes) {
   if (sides.words.size() != 2) sides.refuse("expected width and height");
   const int width = side(sides, 0);
   const int height = side(sides, 1);
-  const NumberLayout layout{scaleOf(wordLine(cursor, "the scale")) > 0, false};
+  const bool big_endian = scaleOf(wordLine(cursor, "the scale")) > 0;
 
-  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  if (cursor.left() != pixels * layout.bytes()) {
-    cursor.refuse(std::to_string(cursor.left()) + " bytes follow: expected " +
-                  std::to_string(pixels * layout.bytes()) + " for " + std::to_string(width) + "x" +
-                  std::to_string(height) + " float32");
-  }
-  const std::string_view data = cursor.take(cursor.left());
   cv::Mat1f image(height, width);
-  std::size_t index = 0;
-  for (int y = height - 1; y >= 0; --y) {
-    for (int x = 0; x < width; ++x) image(y, x) = numberAt(data, index++, layout);
+  const std::size_t expected = image.total() * sizeof(float);
+  if (cursor.left() != expected) {
+    cursor.refuse(fmt::format("{} bytes follow: expected {} for {}x{} float32", cursor.left(),
+                              expected, width, height));
   }
+  const char* at = cursor.take(expected).data();
+  for (float& value : image) {
+    value = static_cast<float>(numberAt(at, NumberType::kFloat32, big_endian));
+    at += sizeof(float);
+  }
+  cv::flip(image, image, 0);
   return image;
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/text_table.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstddef>
-#include <iomanip>
-#include <sstream>
 
 namespace efm {
 
@@ -28,9 +28,7 @@ std::string TextTable::text() const {
 }
 
 std::string fixedText(double value, int decimals) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(decimals) << value;
-  return text.str();
+  return fmt::format("{:.{}f}", value, decimals);
 }
 
 }  // namespace efm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/evaluation/trajectory_evaluation.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -43,12 +45,13 @@ std::string nameOf(Unit unit) {
   return "s";
 }
 
-/// rpg_trajectory_evaluation's shares of the length; Sturm's second; evo's frame.
+/// One frame as in evo, one second as in Sturm et al. 2012, and the fractions of the length of
+/// rpg_trajectory_evaluation.
 std::vector<RelativeSpacing> usualSpacings(double true_length_m) {
   std::vector<RelativeSpacing> spacings = {{Unit::kFrames, 1}, {Unit::kSeconds, 1}};
   if (!(true_length_m > 0)) return spacings;
-  for (const double share : {0.1, 0.2, 0.3, 0.4, 0.5}) {
-    spacings.push_back({Unit::kMetres, share * true_length_m});
+  for (const double fraction : {0.1, 0.2, 0.3, 0.4, 0.5}) {
+    spacings.push_back({Unit::kMetres, fraction * true_length_m});
   }
   return spacings;
 }
@@ -57,8 +60,9 @@ Rigid3 aligned(const TrajectoryEvaluation& evaluation, const std::filesystem::pa
   try {
     return alignTrajectories(evaluation.pairs, evaluation.alignment);
   } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(estimate.string() + ": cannot be aligned: " + error.what() +
-                             " (--align origin or none needs less)");
+    throw std::runtime_error(
+        fmt::format("{}: cannot be aligned: {} (--align origin or none needs less)",
+                    estimate.string(), error.what()));
   }
 }
 
@@ -112,9 +116,9 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
   evaluation.truth_poses = true_poses.size();
   evaluation.pairs = associatePoses(estimate, true_poses, options.max_difference_s);
   if (evaluation.pairs.empty()) {
-    throw std::runtime_error("no pose of " + estimate_file.string() + " lies within " +
-                             fixedText(options.max_difference_s, 6) + " s of one of " +
-                             truth_file.string() + " (--max-diff)");
+    throw std::runtime_error(
+        fmt::format("no pose of {} lies within {:.6f} s of one of {} (--max-diff)",
+                    estimate_file.string(), options.max_difference_s, truth_file.string()));
   }
   evaluation.alignment = options.alignment;
   evaluation.T_world_map = aligned(evaluation, estimate_file);
@@ -136,17 +140,18 @@ std::string evaluationTable(const TrajectoryEvaluation& evaluation) {
   table.add(rowOf("absolute, m", statisticsOf(evaluation.errors.translation_m), 1));
   table.add(rowOf("absolute, deg", statisticsOf(evaluation.errors.rotation_rad), kDegrees));
   for (const EvaluatedSpacing& relative : evaluation.relative) {
-    const int decimals = relative.spacing.unit == Unit::kFrames ? 0 : 3;
-    const std::string over = "relative over " + fixedText(relative.spacing.amount, decimals) + " " +
-                             nameOf(relative.spacing.unit);
-    table.add(rowOf(over + ", m", relative.translation_m, 1));
-    table.add(rowOf(over + ", deg", relative.rotation_rad, kDegrees));
+    const std::string name =
+        fmt::format("relative over {:.{}f} {}", relative.spacing.amount,
+                    relative.spacing.unit == Unit::kFrames ? 0 : 3, nameOf(relative.spacing.unit));
+    table.add(rowOf(name + ", m", relative.translation_m, 1));
+    table.add(rowOf(name + ", deg", relative.rotation_rad, kDegrees));
   }
-  return table.text() + std::to_string(evaluation.pairs.size()) + " pairs of " +
-         std::to_string(evaluation.estimate_poses) + " estimated and " +
-         std::to_string(evaluation.truth_poses) + " true poses, over " +
-         fixedText(evaluation.true_length_m, 3) + " m and " + fixedText(durationOf(evaluation), 3) +
-         " s; alignment " + nameOf(evaluation.alignment) + "\n";
+  return table.text() +
+         fmt::format(
+             "{} pairs of {} estimated and {} true poses, over {:.3f} m and {:.3f} s; "
+             "alignment {}\n",
+             evaluation.pairs.size(), evaluation.estimate_poses, evaluation.truth_poses,
+             evaluation.true_length_m, durationOf(evaluation), nameOf(evaluation.alignment));
 }
 
 std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
@@ -173,14 +178,15 @@ std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
 
 std::string trajectoryEvaluationKeys() {
   return "Keys of --json (statistics: rmse, mean, median, std, min, max):\n"
-         "  pairs, estimate_poses, truth_poses   poses that were paired, and that there are\n"
+         "  pairs, estimate_poses, truth_poses   numbers of pairs and of poses in both files\n"
          "  length_m, duration_s                 of the true path through the pairs\n"
-         "  alignment, aligned_by                how, and the motion that lays the estimate over\n"
-         "                                       the truth: translation_m, quaternion_xyzw\n"
+         "  alignment, aligned_by                the kind of alignment, and its transform from\n"
+         "                                       the estimate to the truth: translation_m,\n"
+         "                                       quaternion_xyzw\n"
          "  ate   absolute errors: translation_m, rotation_deg, statistics of each\n"
-         "  rpe   relative errors, a list: delta, unit (frames, s or m), pairs; where there are\n"
+         "  rpe   relative errors, a list: delta, unit (frames, s or m), pairs; if there are\n"
          "        pairs, translation_m and rotation_deg, statistics of each; over metres also\n"
-         "        translation_percent and rotation_deg_per_m (the means over the length)\n";
+         "        translation_percent and rotation_deg_per_m (mean errors over the length)\n";
 }
 
 }  // namespace efm

@@ -12,15 +12,15 @@
 namespace efm {
 
 struct TrajectoryEvaluationOptions {
-  /// Poses further apart in time are no pair: 0.01 s as evo has it. From 0.
+  /// Maximum time between the two poses of a pair, from 0. Default: 0.01 s, as in evo.
   double max_difference_s = 0.01;
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
-  /// Of the relative errors; empty: one frame, a second, and 10 to 50 % of the true length, as
-  /// rpg_trajectory_evaluation has them.
+  /// Of the relative errors. Empty: one frame, one second, and 10 to 50 % of the true length, as in
+  /// rpg_trajectory_evaluation.
   std::vector<RelativeSpacing> spacings;
 };
 
-/// The relative errors over one spacing. No pair of poses may be so far apart.
+/// The relative errors over one spacing. The count is 0 if no pair of poses has this spacing.
 struct EvaluatedSpacing {
   RelativeSpacing spacing;
   SampleStatistics translation_m;
@@ -32,25 +32,24 @@ struct TrajectoryEvaluation {
   std::uint64_t truth_poses = 0;
   std::vector<PosePair> pairs;
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
-  Rigid3 T_world_map;        ///< Lays the estimate over the truth.
+  Rigid3 T_world_map;        ///< Aligns the estimate with the truth.
   PoseErrors errors;         ///< Absolute, of each pair.
   double true_length_m = 0;  ///< Of the path through the pairs.
   std::vector<EvaluatedSpacing> relative;
 };
 
-/// Holds a trajectory against the truth: TUM files, or the folder of a run (its trajectory.txt) or
+/// Compares a trajectory with the truth: TUM files, or the folder of a run (its trajectory.txt) or
 /// of a dataset (its poses.txt or groundtruth.txt).
-/// @throws std::runtime_error naming the file that cannot be read, and where no poses pair up or
-/// they cannot be aligned; std::invalid_argument where the options are not valid.
+/// @throws std::runtime_error naming the file if it cannot be read, if there is no pair of poses,
+/// or if the pairs cannot be aligned; std::invalid_argument if the options are not valid.
 TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
                                         const std::filesystem::path& truth,
                                         const TrajectoryEvaluationOptions& options);
 
-/// For people.
 std::string evaluationTable(const TrajectoryEvaluation& evaluation);
-/// For programs; its keys are in `trajectoryEvaluationKeys`.
+/// `trajectoryEvaluationKeys` describes the keys.
 std::string evaluationJson(const TrajectoryEvaluation& evaluation);
-/// What the keys of the JSON mean, for the program's help.
+/// The keys of the JSON, for the program's help.
 std::string trajectoryEvaluationKeys();
 
 }  // namespace efm

@@ -17,7 +17,7 @@
 namespace efm {
 namespace {
 
-/// The two axes that positions extend most along.
+/// The two axes of largest extent.
 std::pair<int, int> widestAxes(const std::vector<PosePair>& pairs) {
   Eigen::Vector3d low = pairs.front().T_world_rig.translation;
   Eigen::Vector3d high = low;
@@ -25,29 +25,29 @@ std::pair<int, int> widestAxes(const std::vector<PosePair>& pairs) {
     low = low.cwiseMin(pair.T_world_rig.translation);
     high = high.cwiseMax(pair.T_world_rig.translation);
   }
-  int least = 2;  // z where they are alike: from above
+  int narrowest = 2;  // z if extents are equal: the view from above
   for (const int axis : {1, 0}) {
-    if (high[axis] - low[axis] < high[least] - low[least]) least = axis;
+    if (high[axis] - low[axis] < high[narrowest] - low[narrowest]) narrowest = axis;
   }
-  return {least == 0 ? 1 : 0, least == 2 ? 1 : 2};
+  return {narrowest == 0 ? 1 : 0, narrowest == 2 ? 1 : 2};
 }
 
 cv::Mat3b topView(const TrajectoryEvaluation& evaluation) {
   constexpr std::array<const char*, 3> kLabels = {"x [m]", "y [m]", "z [m]"};
-  const auto [across, upwards] = widestAxes(evaluation.pairs);
-  const auto place = [a = across, u = upwards](const Eigen::Vector3d& p) {
-    return cv::Point2d(p[a], p[u]);
+  const auto [x_axis, y_axis] = widestAxes(evaluation.pairs);
+  const auto project = [x = x_axis, y = y_axis](const Eigen::Vector3d& p) {
+    return cv::Point2d(p[x], p[y]);
   };
   std::vector<cv::Point2d> truth;
   std::vector<cv::Point2d> estimate;
   for (const PosePair& pair : evaluation.pairs) {
-    truth.push_back(place(pair.T_world_rig.translation));
-    estimate.push_back(place(evaluation.T_world_map * pair.T_map_rig.translation));
+    truth.push_back(project(pair.T_world_rig.translation));
+    estimate.push_back(project(evaluation.T_world_map * pair.T_map_rig.translation));
   }
   CurvePlot plot;
   plot.title = "trajectories";
-  plot.x.label = kLabels[static_cast<std::size_t>(across)];
-  plot.y.label = kLabels[static_cast<std::size_t>(upwards)];
+  plot.x.label = kLabels[static_cast<std::size_t>(x_axis)];
+  plot.y.label = kLabels[static_cast<std::size_t>(y_axis)];
   plot.curves = {{"truth", truth, CurveStyle::kLine, curveColour(6)},
                  {"estimate, aligned", estimate, CurveStyle::kLine, curveColour(1)}};
   plot.equal_units = true;
@@ -69,7 +69,7 @@ cv::Mat3b overTime(const TrajectoryEvaluation& evaluation, const std::vector<dou
   plot.y.label = label;
   plot.y.from = 0;
   if (!(rmse > 0)) plot.y.to = 1;
-  plot.curves = {{"", points, CurveStyle::kLine, std::nullopt}};
+  plot.curves = {{"", points}};
   plot.size = {560, 256};
   return drawCurves(plot);
 }

@@ -7,8 +7,8 @@
 
 namespace efm {
 
-/// Both trajectories, the estimate aligned, seen along the axis that the truth extends least along
-/// (from above, where it is upright); beside them the absolute errors over time.
+/// Draws both trajectories, with the estimate aligned, and the absolute errors over time. The view
+/// is along the axis of the truth's smallest extent: from above if two are equal.
 cv::Mat3b evaluationPlot(const TrajectoryEvaluation& evaluation);
 
 }  // namespace efm

@@ -9,75 +9,71 @@
 #include <stdexcept>
 
 #include "plugin/pictures/plot_frame.h"
-#include "plugin/pictures/plot_text.h"
 
 namespace efm {
 namespace {
 
-constexpr int kGap = 6;          // pixels between things
-constexpr int kLegendLine = 18;  // pixels
-constexpr int kLegendStroke = 24;
+constexpr int kLegendLine = 18;    // pixels
+constexpr int kLegendStroke = 24;  // pixels
 constexpr int kSubpixelBits = 4;
 
-const cv::Scalar kGrid(225, 225, 225);
-const cv::Scalar kPaper = cv::Scalar::all(255);
-
-bool isPlace(const cv::Point2d& place) {
-  constexpr double kFarthest = 1e6;  // pixels: what a drawn line can take
-  return std::abs(place.x) < kFarthest && std::abs(place.y) < kFarthest;
+/// Not NaN, and within the range of cv::line.
+bool canBeDrawn(const cv::Point2d& pixel) {
+  constexpr double kMaxPixel = 1e6;
+  return std::abs(pixel.x) < kMaxPixel && std::abs(pixel.y) < kMaxPixel;
 }
 
-/// The stretches of a curve that nothing interrupts, in pixels of the picture.
-std::vector<std::vector<cv::Point2d>> stretchesOf(const Curve& curve, const PlotFrame& frame) {
-  std::vector<std::vector<cv::Point2d>> stretches(1);
+/// The uninterrupted lines of a curve, in pixels of the picture.
+std::vector<std::vector<cv::Point2d>> linesOf(const Curve& curve, const PlotFrame& frame) {
+  std::vector<std::vector<cv::Point2d>> lines(1);
   for (const cv::Point2d& point : curve.points) {
-    const cv::Point2d place = frame.place(point);
-    if (isPlace(place)) {
-      stretches.back().push_back(place);
-    } else if (!stretches.back().empty()) {
-      stretches.emplace_back();
+    const cv::Point2d pixel = frame.pixelOf(point);
+    if (canBeDrawn(pixel)) {
+      lines.back().push_back(pixel);
+    } else if (!lines.back().empty()) {
+      lines.emplace_back();
     }
   }
-  return stretches;
+  return lines;
 }
 
-cv::Point subpixel(const cv::Point2d& place) {
+cv::Point subpixel(const cv::Point2d& pixel) {
   constexpr double kOnes = 1 << kSubpixelBits;
-  return {cvRound(place.x * kOnes), cvRound(place.y * kOnes)};
+  return {cvRound(pixel.x * kOnes), cvRound(pixel.y * kOnes)};
 }
 
-/// @param picture the area of the frame alone, so that what lies beyond is cut off.
+/// @param picture the area of the frame: OpenCV cuts the curve at its edges.
 void drawCurve(cv::Mat3b& picture, const Curve& curve, const PlotFrame& frame,
                const cv::Scalar& colour) {
   const cv::Point2d corner = frame.area.tl();
-  for (const std::vector<cv::Point2d>& places : stretchesOf(curve, frame)) {
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      const cv::Point at = subpixel(places[k] - corner);
+  for (const std::vector<cv::Point2d>& pixels : linesOf(curve, frame)) {
+    for (std::size_t k = 0; k < pixels.size(); ++k) {
+      const cv::Point at = subpixel(pixels[k] - corner);
       if (k > 0 && curve.style != CurveStyle::kDots) {
-        cv::line(picture, subpixel(places[k - 1] - corner), at, colour, 2, cv::LINE_AA,
+        cv::line(picture, subpixel(pixels[k - 1] - corner), at, colour, 2, cv::LINE_AA,
                  kSubpixelBits);
       }
-      if (curve.style != CurveStyle::kLine || places.size() == 1) {
+      if (curve.style != CurveStyle::kLine || pixels.size() == 1) {
         cv::circle(picture, at, 3 << kSubpixelBits, colour, cv::FILLED, cv::LINE_AA, kSubpixelBits);
       }
     }
   }
 }
 
-/// How many places along the curves a rectangle and a gap around it would hide, between their
-/// points too.
+/// Counts the positions on the curves that a rectangle with a gap around it would hide: eight
+/// between two points.
 int hiddenBy(const cv::Rect& rectangle, const CurvePlot& plot, const PlotFrame& frame) {
   constexpr int kBetween = 8;
-  const cv::Rect box(rectangle.tl() - cv::Point(kGap, kGap),
-                     rectangle.size() + cv::Size(2 * kGap, 2 * kGap));
+  const cv::Rect box(rectangle.tl() - cv::Point(kPlotGap, kPlotGap),
+                     rectangle.size() + cv::Size(2 * kPlotGap, 2 * kPlotGap));
   int hidden = 0;
   for (const Curve& curve : plot.curves) {
-    for (const std::vector<cv::Point2d>& places : stretchesOf(curve, frame)) {
-      for (std::size_t k = 0; k < places.size(); ++k) {
-        const cv::Point2d& before = places[k > 0 ? k - 1 : 0];
+    for (const std::vector<cv::Point2d>& pixels : linesOf(curve, frame)) {
+      for (std::size_t k = 0; k < pixels.size(); ++k) {
+        const cv::Point2d& before = pixels[k > 0 ? k - 1 : 0];
         for (int part = 1; part <= kBetween; ++part) {
-          const double share = static_cast<double>(part) / kBetween;
-          const cv::Point2d at = before * (1 - share) + places[k] * share;
+          const double fraction = static_cast<double>(part) / kBetween;
+          const cv::Point2d at = before * (1 - fraction) + pixels[k] * fraction;
           if (box.contains(cv::Point(cvRound(at.x), cvRound(at.y)))) ++hidden;
         }
       }
@@ -86,27 +82,28 @@ int hiddenBy(const cv::Rect& rectangle, const CurvePlot& plot, const PlotFrame& 
   return hidden;
 }
 
-/// The corners and the middles of the sides, the upper right first.
-cv::Rect legendPlace(cv::Size size, const CurvePlot& plot, const PlotFrame& frame) {
-  const cv::Point low = frame.area.tl() + cv::Point(kGap, kGap);
-  const cv::Point high = frame.area.br() - cv::Point(size.width + kGap + 1, size.height + kGap + 1);
+/// Tries the corners, the upper right first, and the middles of the left and right sides.
+cv::Rect legendBox(cv::Size size, const CurvePlot& plot, const PlotFrame& frame) {
+  const cv::Point low = frame.area.tl() + cv::Point(kPlotGap, kPlotGap);
+  const cv::Point high =
+      frame.area.br() - cv::Point(size.width + kPlotGap + 1, size.height + kPlotGap + 1);
   const int middle = (low.y + high.y) / 2;
   cv::Rect best;
-  int fewest = std::numeric_limits<int>::max();
+  int min_hidden = std::numeric_limits<int>::max();
   for (const int y : {low.y, high.y, middle}) {
     for (const int x : {high.x, low.x}) {
       const cv::Rect box({x, y}, size);
       const int hidden = hiddenBy(box, plot, frame);
-      if (hidden >= fewest) continue;
-      fewest = hidden;
+      if (hidden >= min_hidden) continue;
+      min_hidden = hidden;
       best = box;
     }
   }
   return best;
 }
 
-cv::Vec3b colourOf(const CurvePlot& plot, std::size_t number) {
-  return plot.curves[number].colour.value_or(curveColour(number));
+cv::Vec3b colourOf(const CurvePlot& plot, std::size_t index) {
+  return plot.curves[index].colour.value_or(curveColour(index));
 }
 
 void drawLegend(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& frame) {
@@ -118,15 +115,15 @@ void drawLegend(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& fram
     ++lines;
   }
   if (lines == 0) return;
-  const cv::Size size(width + kLegendStroke + 3 * kGap, lines * kLegendLine + kGap);
-  const cv::Rect box = legendPlace(size, plot, frame);
-  cv::rectangle(picture, box, kPaper, cv::FILLED);
-  cv::rectangle(picture, box, kGrid);
-  int y = box.y + kGap / 2 + kLegendLine / 2;
+  const cv::Size size(width + kLegendStroke + 3 * kPlotGap, lines * kLegendLine + kPlotGap);
+  const cv::Rect box = legendBox(size, plot, frame);
+  cv::rectangle(picture, box, cv::Scalar::all(255), cv::FILLED);
+  cv::rectangle(picture, box, kPlotGrid);
+  int y = box.y + kPlotGap / 2 + kLegendLine / 2;
   for (std::size_t n = 0; n < plot.curves.size(); ++n) {
     const Curve& curve = plot.curves[n];
     if (curve.label.empty()) continue;
-    const int x = box.x + kGap;
+    const int x = box.x + kPlotGap;
     const cv::Scalar colour(colourOf(plot, n));
     if (curve.style != CurveStyle::kDots) {
       cv::line(picture, {x, y}, {x + kLegendStroke, y}, colour, 2, cv::LINE_AA);
@@ -134,14 +131,14 @@ void drawLegend(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& fram
     if (curve.style != CurveStyle::kLine) {
       cv::circle(picture, {x + kLegendStroke / 2, y}, 3, colour, cv::FILLED, cv::LINE_AA);
     }
-    writeText(picture, curve.label, {x + kLegendStroke + kGap, y + 4});
+    writeText(picture, curve.label, {x + kLegendStroke + kPlotGap, y + 4});
     y += kLegendLine;
   }
 }
 
 }  // namespace
 
-cv::Vec3b curveColour(std::size_t number) {
+cv::Vec3b curveColour(std::size_t index) {
   static constexpr std::array<std::array<unsigned char, 3>, 7> kRgb = {{{0, 114, 178},
                                                                         {213, 94, 0},
                                                                         {0, 158, 115},
@@ -149,7 +146,7 @@ cv::Vec3b curveColour(std::size_t number) {
                                                                         {230, 159, 0},
                                                                         {86, 180, 233},
                                                                         {60, 60, 60}}};
-  const auto& rgb = kRgb[number % kRgb.size()];
+  const auto& rgb = kRgb[index % kRgb.size()];
   return {rgb[2], rgb[1], rgb[0]};
 }
 

@@ -15,8 +15,8 @@ cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limit
   for (int y = 0; y < depth_m.rows; ++y) {
     for (int x = 0; x < depth_m.cols; ++x) {
       if (!(depth_m(y, x) > 0)) continue;
-      const double share = (1.0 / static_cast<double>(depth_m(y, x)) - far_inverse) / range;
-      nearness(y, x) = cv::saturate_cast<uchar>(255 * share);
+      const double fraction = (1.0 / static_cast<double>(depth_m(y, x)) - far_inverse) / range;
+      nearness(y, x) = cv::saturate_cast<uchar>(255 * fraction);
     }
   }
   cv::Mat3b picture;
@@ -26,24 +26,24 @@ cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limit
 }
 
 cv::Mat1b confidencePicture(const cv::Mat1f& confidence) {
-  double largest = 0;
-  cv::minMaxLoc(confidence, nullptr, &largest);
+  double maximum = 0;
+  cv::minMaxLoc(confidence, nullptr, &maximum);
   cv::Mat1b picture;
-  confidence.convertTo(picture, CV_8U, largest > 0 ? -255 / largest : 0, 255);
+  confidence.convertTo(picture, CV_8U, maximum > 0 ? -255 / maximum : 0, 255);
   return picture;
 }
 
 cv::Mat3b eventPicture(const cv::Mat_<cv::Vec2i>& counts) {
-  constexpr int kStrong = 3;  // events
+  constexpr int kFullColour = 3;  // events
   cv::Mat3b picture(counts.size(), cv::Vec3b(255, 255, 255));
   for (int y = 0; y < counts.rows; ++y) {
     for (int x = 0; x < counts.cols; ++x) {
-      const int darker = counts(y, x)[0];
-      const int brighter = counts(y, x)[1];
-      if (darker + brighter == 0) continue;
-      const int difference = std::clamp(brighter - darker, -kStrong, kStrong);
-      const auto rest = static_cast<std::uint8_t>(180 - 60 * std::abs(difference));
-      picture(y, x) = {rest, rest, rest};
+      const int off = counts(y, x)[0];
+      const int on = counts(y, x)[1];
+      if (off + on == 0) continue;
+      const int difference = std::clamp(on - off, -kFullColour, kFullColour);
+      const auto other = static_cast<std::uint8_t>(180 - 60 * std::abs(difference));
+      picture(y, x) = {other, other, other};
       if (difference > 0) picture(y, x)[2] = 255;
       if (difference < 0) picture(y, x)[0] = 255;
     }

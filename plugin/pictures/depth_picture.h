@@ -7,18 +7,18 @@
 
 namespace efm {
 
-/// A depth map for the eye: red = near to blue = far, even in inverse depth between the two limits;
-/// white where there is no depth (0).
+/// Colours of a depth map, linear in inverse depth: red at the near limit, blue at the far limit,
+/// white without depth (0).
 /// @return 8-bit BGR, of the map's size.
 cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits);
 
-/// A confidence map for the eye, negated as in Ghosh and Gallego 2022: white = none, black = the
+/// Grey levels of a confidence map, negated as in Ghosh and Gallego 2022: white is 0, black is the
 /// map's maximum.
 cv::Mat1b confidencePicture(const cv::Mat1f& confidence);
 
-/// Accumulated events for the eye: red where more became brighter than darker, blue where more
-/// became darker, grey where as many, white where there was none; strong colours from 3 events on.
-/// @param counts per pixel: darker, brighter.
+/// Colours of accumulated events: red if ON events are the majority, blue if OFF events are, grey
+/// if both are equal, white without events. The colour is full from a majority of 3.
+/// @param counts per pixel: OFF, ON.
 cv::Mat3b eventPicture(const cv::Mat_<cv::Vec2i>& counts);
 
 }  // namespace efm

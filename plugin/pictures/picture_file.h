@@ -6,9 +6,8 @@
 
 namespace efm {
 
-/// Writes a picture as PNG; appears under its name only when it is complete.
-/// @throws std::runtime_error naming the file where its extension is not .png or it cannot be
-/// written.
+/// Writes a picture as PNG. The file appears under its name only when it is complete.
+/// @throws std::runtime_error naming the file if its extension is not .png or it cannot be written.
 void writePicture(const std::filesystem::path& file, const cv::Mat3b& picture);
 
 }  // namespace efm

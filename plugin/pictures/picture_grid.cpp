@@ -6,46 +6,42 @@
 namespace efm {
 namespace {
 
-constexpr int kGap = 8;  // pixels
+const cv::Scalar kWhite = cv::Scalar::all(255);
+constexpr int kGap = 8;  // pixels between two pictures
 
-cv::Mat3b paper(int height, int width) {
-  return cv::Mat3b(height, width, cv::Vec3b(255, 255, 255));
+cv::Size largestSize(const std::vector<cv::Mat3b>& pictures) {
+  cv::Size size;
+  for (const cv::Mat3b& picture : pictures) {
+    size = {std::max(size.width, picture.cols), std::max(size.height, picture.rows)};
+  }
+  return size;
 }
-
-int gaps(std::size_t pictures) { return pictures > 1 ? kGap * static_cast<int>(pictures - 1) : 0; }
 
 }  // namespace
 
 cv::Mat3b sideBySide(const std::vector<cv::Mat3b>& pictures) {
-  int width = gaps(pictures.size());
-  int height = 0;
-  for (const cv::Mat3b& picture : pictures) {
-    width += picture.cols;
-    height = std::max(height, picture.rows);
+  const int height = largestSize(pictures).height;
+  std::vector<cv::Mat3b> padded(pictures.size());
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    cv::copyMakeBorder(pictures[i], padded[i], 0, height - pictures[i].rows, i > 0 ? kGap : 0, 0,
+                       cv::BORDER_CONSTANT, kWhite);
   }
-  cv::Mat3b all = paper(height, width);
-  int x = 0;
-  for (const cv::Mat3b& picture : pictures) {
-    picture.copyTo(all(cv::Rect({x, 0}, picture.size())));
-    x += picture.cols + kGap;
-  }
-  return all;
+  cv::Mat3b joined;
+  cv::hconcat(padded, joined);
+  return joined;
 }
 
 cv::Mat3b oneBelowAnother(const std::vector<cv::Mat3b>& pictures) {
-  int width = 0;
-  int height = gaps(pictures.size());
-  for (const cv::Mat3b& picture : pictures) {
-    width = std::max(width, picture.cols);
-    height += picture.rows;
+  const int width = largestSize(pictures).width;
+  std::vector<cv::Mat3b> padded(pictures.size());
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const int left = (width - pictures[i].cols) / 2;
+    cv::copyMakeBorder(pictures[i], padded[i], i > 0 ? kGap : 0, 0, left,
+                       width - pictures[i].cols - left, cv::BORDER_CONSTANT, kWhite);
   }
-  cv::Mat3b all = paper(height, width);
-  int y = 0;
-  for (const cv::Mat3b& picture : pictures) {
-    picture.copyTo(all(cv::Rect({(width - picture.cols) / 2, y}, picture.size())));
-    y += picture.rows + kGap;
-  }
-  return all;
+  cv::Mat3b joined;
+  cv::vconcat(padded, joined);
+  return joined;
 }
 
 }  // namespace efm

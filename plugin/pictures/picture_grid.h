@@ -6,9 +6,9 @@
 
 namespace efm {
 
-/// Pictures from left to right, their tops in line, on white.
+/// Joins pictures from left to right on white, with their tops in line.
 cv::Mat3b sideBySide(const std::vector<cv::Mat3b>& pictures);
-/// Pictures from top to bottom, each in the middle, on white.
+/// Joins pictures from top to bottom on white, each centred.
 cv::Mat3b oneBelowAnother(const std::vector<cv::Mat3b>& pictures);
 
 }  // namespace efm

@@ -18,11 +18,11 @@ std::string shortText(double value) {
   return text.data();
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not under `least`.
-double roundStep(double least) {
-  const double power = std::pow(10.0, std::floor(std::log10(least)));
+/// The smallest of 1, 2, 5 times a power of ten that is `min_step` or more.
+double roundStep(double min_step) {
+  const double power = std::pow(10.0, std::floor(std::log10(min_step)));
   for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * power >= least * (1 - 1e-9)) return factor * power;
+    if (factor * power >= min_step * (1 - 1e-9)) return factor * power;
   }
   return 10 * power;
 }
@@ -31,17 +31,17 @@ std::vector<AxisTick> multiplesInside(const AxisRange& range, double step) {
   const double slack = 1e-9 * step;
   const double last = std::floor((range.to + slack) / step);
   std::vector<AxisTick> ticks;
-  // The sum takes the sign from a zero.
+  // The sum makes 0 of -0.
   for (double k = std::ceil((range.from - slack) / step) + 0.0; k <= last; ++k) {
     ticks.push_back({k * step, shortText(k * step)});
   }
   return ticks;
 }
 
-std::vector<AxisTick> linearTicks(const AxisRange& range, int at_most) {
-  double step = roundStep((range.to - range.from) / (at_most + 1));
+std::vector<AxisTick> linearTicks(const AxisRange& range, int max_ticks) {
+  double step = roundStep((range.to - range.from) / (max_ticks + 1));
   std::vector<AxisTick> ticks = multiplesInside(range, step);
-  while (ticks.size() > static_cast<std::size_t>(at_most)) {
+  while (ticks.size() > static_cast<std::size_t>(max_ticks)) {
     step = roundStep(1.5 * step);
     ticks = multiplesInside(range, step);
   }
@@ -64,20 +64,20 @@ std::vector<AxisTick> powersInside(const AxisRange& range, const std::vector<dou
   return ticks;
 }
 
-std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int at_most) {
-  const auto room = static_cast<std::size_t>(at_most);
+std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int max_ticks) {
+  const auto max_size = static_cast<std::size_t>(max_ticks);
   std::vector<AxisTick> ticks = powersInside(range, {1, 2, 5}, 1);
-  // Over so short a stretch the axis is nearly linear.
-  if (ticks.size() < 3) return linearTicks(range, at_most);
-  if (ticks.size() <= room + 2) return ticks;
-  for (int stride = 1; (ticks = powersInside(range, {1}, stride)).size() > room; ++stride) {
+  // Over a short interval the axis is nearly linear.
+  if (ticks.size() < 3) return linearTicks(range, max_ticks);
+  if (ticks.size() <= max_size + 2) return ticks;
+  for (int stride = 1; (ticks = powersInside(range, {1}, stride)).size() > max_size; ++stride) {
   }
   return ticks;
 }
 
 }  // namespace
 
-double AxisRange::shareAlong(double value) const {
+double AxisRange::fractionAlong(double value) const {
   if (scale == AxisScale::kLinear) return (value - from) / (to - from);
   if (!(value > 0)) return std::numeric_limits<double>::quiet_NaN();
   return std::log(value / from) / std::log(to / from);
@@ -89,9 +89,9 @@ AxisRange rangeAround(const std::vector<double>& values, AxisScale scale) {
   double high = -low;
   for (const double value : values) {
     if (!std::isfinite(value) || (logarithmic && !(value > 0))) continue;
-    const double place = logarithmic ? std::log10(value) : value;
-    low = std::min(low, place);
-    high = std::max(high, place);
+    const double position = logarithmic ? std::log10(value) : value;
+    low = std::min(low, position);
+    high = std::max(high, position);
   }
   if (low > high) low = high = 0;
   double margin = kMargin * (high - low);
@@ -102,10 +102,10 @@ AxisRange rangeAround(const std::vector<double>& values, AxisScale scale) {
   return {low, high, scale};
 }
 
-std::vector<AxisTick> ticksOf(const AxisRange& range, int at_most) {
+std::vector<AxisTick> ticksOf(const AxisRange& range, int max_ticks) {
   if (!(range.from < range.to)) return {};
-  return range.scale == AxisScale::kLinear ? linearTicks(range, at_most)
-                                           : logarithmicTicks(range, at_most);
+  return range.scale == AxisScale::kLinear ? linearTicks(range, max_ticks)
+                                           : logarithmicTicks(range, max_ticks);
 }
 
 }  // namespace efm

@@ -8,23 +8,24 @@ namespace efm {
 
 enum class AxisScale {
   kLinear,
-  kLogarithmic,  ///< Values must be above 0; others have no place.
+  kLogarithmic,  ///< Shows values above 0 only.
 };
 
-/// What an axis spans. Invariant for those that `rangeAround` makes: from < to, both finite, and
-/// above 0 on a logarithmic axis.
+/// The interval of an axis. `rangeAround` ensures that both ends are finite, that from < to, and
+/// that both are above 0 on a logarithmic axis.
 struct AxisRange {
   double from = 0;
   double to = 1;
   AxisScale scale = AxisScale::kLinear;
 
-  /// How far along the axis a value lies: 0 at `from`, 1 at `to`, beyond them outside. NaN for what
-  /// has no place on the axis.
-  double shareAlong(double value) const;
+  /// The position of a value on the axis: 0 at `from`, 1 at `to`. NaN if a logarithmic axis cannot
+  /// show the value.
+  double fractionAlong(double value) const;
 };
 
-/// The range that holds all values that have a place on such an axis, with a margin of 4 % of its
-/// length on both sides; something sensible around 0 or 1 where there is no value or one alone.
+/// The range of all values that an axis of this scale can show, with a margin of 4 % of its length
+/// at both ends. Without a value: a range around 0, or around 1 on a logarithmic axis. With one
+/// value: a range around it.
 AxisRange rangeAround(const std::vector<double>& values, AxisScale scale);
 
 /// A mark on an axis.
@@ -33,10 +34,10 @@ struct AxisTick {
   std::string text;
 };
 
-/// Round values inside the range: 1, 2 or 5 times a power of ten apart; on a logarithmic axis the
-/// powers of ten, with 2 and 5 between them where they are few, or evenly apart where even so there
-/// are hardly any.
-/// @param at_most how many, at least 2; a logarithmic axis may need one or two more.
-std::vector<AxisTick> ticksOf(const AxisRange& range, int at_most);
+/// Round values inside the range. On a linear axis their spacing is 1, 2 or 5 times a power of ten.
+/// On a logarithmic axis they are the powers of ten; if these are few, also 2 and 5 times them; if
+/// even these are fewer than three, the ticks of a linear axis.
+/// @param max_ticks at least 2. A logarithmic axis may have one or two more.
+std::vector<AxisTick> ticksOf(const AxisRange& range, int max_ticks);
 
 }  // namespace efm

@@ -6,30 +6,31 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "plugin/pictures/plot_text.h"
+#include "plugin/pictures/plot_frame.h"
 
 namespace efm {
 namespace {
 
-constexpr int kTitleHeight = 24;  // pixels, as are all below
+// In pixels.
+constexpr int kTitleHeight = 24;
 constexpr int kBarHeight = 12;
 constexpr int kBarGap = 6;
 constexpr int kTickHeight = 18;
 
 int widthOf(const std::string& text) { return plotTextSize(text).width; }
 
-/// The colour of each share of the range; white where there is none.
-cv::Mat3b coloured(const cv::Mat1f& shares, bool red_first) {
-  cv::Mat1b levels(shares.size(), uchar{0});
-  cv::Mat1b none(shares.size(), uchar{0});
-  for (int y = 0; y < shares.rows; ++y) {
-    for (int x = 0; x < shares.cols; ++x) {
-      const float share = shares(y, x);
-      if (std::isnan(share)) {
+/// Colours of fractions of the range. NaN is white.
+cv::Mat3b coloured(const cv::Mat1f& fractions, bool red_first) {
+  cv::Mat1b levels(fractions.size(), uchar{0});
+  cv::Mat1b none(fractions.size(), uchar{0});
+  for (int y = 0; y < fractions.rows; ++y) {
+    for (int x = 0; x < fractions.cols; ++x) {
+      const float fraction = fractions(y, x);
+      if (std::isnan(fraction)) {
         none(y, x) = 255;
         continue;
       }
-      const float along = red_first ? 1 - share : share;
+      const float along = red_first ? 1 - fraction : fraction;
       levels(y, x) = cv::saturate_cast<uchar>(255 * std::clamp(along, 0.F, 1.F));
     }
   }
@@ -39,33 +40,34 @@ cv::Mat3b coloured(const cv::Mat1f& shares, bool red_first) {
   return picture;
 }
 
-cv::Mat1f sharesOf(const ValuePicture& picture) {
-  cv::Mat1f shares(picture.values.size());
-  std::transform(picture.values.begin(), picture.values.end(), shares.begin(),
-                 [&](float value) { return static_cast<float>(picture.range.shareAlong(value)); });
-  return shares;
+cv::Mat1f fractionsOf(const ValuePicture& picture) {
+  cv::Mat1f fractions(picture.values.size());
+  std::transform(picture.values.begin(), picture.values.end(), fractions.begin(), [&](float value) {
+    return static_cast<float>(picture.range.fractionAlong(value));
+  });
+  return fractions;
 }
 
 cv::Mat3b barOf(const ValuePicture& picture, int width) {
   cv::Mat3b bar(kBarGap + kBarHeight + kTickHeight, width, cv::Vec3b(255, 255, 255));
   const cv::Rect area(1, kBarGap, width - 2, kBarHeight);
-  cv::Mat1f shares(kBarHeight, area.width);
+  cv::Mat1f fractions(kBarHeight, area.width);
   for (int x = 0; x < area.width; ++x) {
-    shares.col(x).setTo(static_cast<float>(x) / static_cast<float>(area.width - 1));
+    fractions.col(x).setTo(static_cast<float>(x) / static_cast<float>(area.width - 1));
   }
-  coloured(shares, picture.red_first).copyTo(bar(area));
-  cv::rectangle(bar, area, plotInk());
+  coloured(fractions, picture.red_first).copyTo(bar(area));
+  cv::rectangle(bar, area, kPlotInk);
   const int baseline = bar.rows - 5;
-  int free_from = 0;
+  int next_free = 0;
   const int unit_from = width - widthOf(picture.unit) - 2;
   for (const AxisTick& tick : ticksOf(picture.range, std::max(3, width / 60))) {
-    const int x = area.x + cvRound(picture.range.shareAlong(tick.value) * (area.width - 1));
+    const int x = area.x + cvRound(picture.range.fractionAlong(tick.value) * (area.width - 1));
     const int from = x - widthOf(tick.text) / 2;
     const int to = from + widthOf(tick.text);
-    cv::line(bar, {x, area.br().y}, {x, area.br().y + 2}, plotInk());
-    if (from < free_from || to + 6 > unit_from) continue;
+    cv::line(bar, {x, area.br().y}, {x, area.br().y + 2}, kPlotInk);
+    if (from < next_free || to + 6 > unit_from) continue;
     writeText(bar, tick.text, {from, baseline});
-    free_from = to + 6;
+    next_free = to + 6;
   }
   writeText(bar, picture.unit, {unit_from, baseline});
   return bar;
@@ -77,7 +79,7 @@ cv::Mat3b drawValues(const ValuePicture& picture) {
   if (picture.values.empty()) {
     throw std::invalid_argument("the picture '" + picture.title + "' has no values");
   }
-  cv::Mat3b image = coloured(sharesOf(picture), picture.red_first);
+  cv::Mat3b image = coloured(fractionsOf(picture), picture.red_first);
   const int times = std::max(1, (picture.min_width + image.cols - 1) / image.cols);
   cv::resize(image, image, {}, times, times, cv::INTER_NEAREST);
   const cv::Mat3b bar = barOf(picture, image.cols);

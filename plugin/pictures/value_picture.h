@@ -8,18 +8,17 @@
 
 namespace efm {
 
-/// An image of values as colours, with a bar that says which colour means what.
+/// An image of values as colours, with a colour bar.
 struct ValuePicture {
   std::string title;
-  cv::Mat1f values;  ///< NaN: none, white.
-  AxisRange range;   ///< What the colours span; beyond its ends, the colour of the end.
-  std::string unit;  ///< At the bar.
-  /// From red over green to blue instead of from blue: as depth is shown, red near.
-  bool red_first = false;
-  int min_width = 320;  ///< Smaller images are enlarged by a whole number to at least this, pixels.
+  cv::Mat1f values;        ///< NaN (no value) is white.
+  AxisRange range;         ///< Of the colours. A value outside has the colour of the nearer end.
+  std::string unit;        ///< Written at the bar.
+  bool red_first = false;  ///< Red is the low end, as for depth. Otherwise blue is.
+  int min_width = 320;     ///< Pixels. A smaller image is enlarged by a whole number.
 };
 
-/// @throws std::invalid_argument where there are no values.
+/// @throws std::invalid_argument if there are no values.
 cv::Mat3b drawValues(const ValuePicture& picture);
 
 }  // namespace efm

@@ -19,12 +19,12 @@ using testing::HasSubstr;
 class EvaluateCloud : public TemporaryFolder {
  protected:
   /// Points along x.
-  std::filesystem::path cloud(const std::string& name, const std::vector<double>& places,
+  std::filesystem::path cloud(const std::string& name, const std::vector<double>& xs_m,
                               PointCloudEncoding encoding = PointCloudEncoding::kBinary) const {
     const auto path = folder() / name;
     std::filesystem::create_directories(path.parent_path());
     std::vector<CloudPoint> points;
-    for (const double x : places) points.push_back({{x, 0, 0}, 1, 1});
+    for (const double x : xs_m) points.push_back({{x, 0, 0}, 1, 1});
     writePointCloud(path, points, encoding);
     return path;
   }
@@ -69,7 +69,7 @@ TEST_F(EvaluateCloud, TheTableAndTheJsonSayTheSame) {
       evaluateCloud(cloud("a.pcd", {0, 0.5}), cloud("b.pcd", {0}), {{0.1, 1}, {}});
   const auto json = nlohmann::json::parse(evaluationJson(evaluation));
   EXPECT_EQ(json["accuracy"]["mean_m"], 0.25);
-  EXPECT_EQ(json["accuracy"]["share_90_m"], 0.5);
+  EXPECT_EQ(json["accuracy"]["p90_m"], 0.5);
   EXPECT_EQ(json["curve"][0]["outliers"], 0.5);
   EXPECT_EQ(json["curve"][1]["f1"], 1);
   EXPECT_THAT(evaluationTable(evaluation), AllOf(HasSubstr("0.2500"), HasSubstr("50.00")));
@@ -88,7 +88,7 @@ TEST_F(EvaluateCloud, PointsThatAreNotFiniteAreCounted) {
       << "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\n"
          "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA ascii\n0 0 0\nnan 0 0\n";
   const auto evaluation = evaluateCloud(folder() / "nan.pcd", cloud("b.pcd", {1}), {});
-  EXPECT_EQ(evaluation.without_place, 1U);
+  EXPECT_EQ(evaluation.non_finite, 1U);
   EXPECT_EQ(evaluation.errors.accuracy.count, 1U);
   EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 points are not finite"));
 }

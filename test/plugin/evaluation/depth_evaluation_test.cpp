@@ -105,7 +105,7 @@ TEST_F(EvaluateDepth, EveryKeyOfTheJsonIsInTheHelp) {
   options.focal_baseline = 40;
   const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), options);
   const auto json =
-      nlohmann::json::parse(evaluationJson(evaluation, StereoBase{400, 0.1, "as given"}));
+      nlohmann::json::parse(evaluationJson(evaluation, StereoBaseline{400, 0.1, "as given"}));
   for (const auto& part : {json, json["maps"][0], json["curve"][0]}) {
     for (const auto& [key, value] : part.items()) {
       EXPECT_THAT(depthEvaluationKeys(), HasSubstr(key));

@@ -13,7 +13,7 @@ namespace {
 
 using testing::HasSubstr;
 
-class StereoBaseSearch : public TemporaryFolder {
+class FindStereoBaseline : public TemporaryFolder {
  protected:
   void write(const std::string& file, const std::string& text = "") const {
     std::filesystem::create_directories((folder() / file).parent_path());
@@ -31,12 +31,12 @@ class StereoBaseSearch : public TemporaryFolder {
                             "[0, 0, 0, 1]]\n"
                       : ""));
   }
-  std::optional<StereoBase> find(const std::string& estimate, const std::string& truth) const {
-    return findStereoBase(folder() / estimate, folder() / truth);
+  std::optional<StereoBaseline> find(const std::string& estimate, const std::string& truth) const {
+    return findStereoBaseline(folder() / estimate, folder() / truth);
   }
 };
 
-TEST_F(StereoBaseSearch, TheRunsReportComesFirst) {
+TEST_F(FindStereoBaseline, TheRunsReportComesFirst) {
   writeReport(R"({"reference_view": {"fx": 200.5}, "baseline_m": 0.1})");
   writeCamchain(true);
   write("out/keyframes/1.5/depth.tiff");
@@ -49,7 +49,7 @@ TEST_F(StereoBaseSearch, TheRunsReportComesFirst) {
   }
 }
 
-TEST_F(StereoBaseSearch, ElseTheDatasetsCalibration) {
+TEST_F(FindStereoBaseline, ElseTheDatasetsCalibration) {
   writeCamchain(true);
   write("data/depth/a.tiff");
   // Reports that say nothing of it.
@@ -66,7 +66,7 @@ TEST_F(StereoBaseSearch, ElseTheDatasetsCalibration) {
   }
 }
 
-TEST_F(StereoBaseSearch, OneCameraOrNothingSaysNothing) {
+TEST_F(FindStereoBaseline, OneCameraOrNothingSaysNothing) {
   EXPECT_FALSE(find("out", "data"));
   writeCamchain(false);
   EXPECT_FALSE(find("out", "data"));

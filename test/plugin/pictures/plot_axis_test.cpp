@@ -12,9 +12,9 @@ namespace {
 
 using testing::ElementsAre;
 
-std::vector<std::string> textsOf(const AxisRange& range, int at_most) {
+std::vector<std::string> textsOf(const AxisRange& range, int max_ticks) {
   std::vector<std::string> texts;
-  for (const AxisTick& tick : ticksOf(range, at_most)) texts.push_back(tick.text);
+  for (const AxisTick& tick : ticksOf(range, max_ticks)) texts.push_back(tick.text);
   return texts;
 }
 
@@ -41,9 +41,9 @@ TEST(PlotAxis, AShortLogarithmicAxisHasTicksEvenlyApart) {
 
 TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengths) {
   const AxisRange range{1, 100, AxisScale::kLogarithmic};
-  EXPECT_DOUBLE_EQ(range.shareAlong(10), 0.5);
-  EXPECT_TRUE(std::isnan(range.shareAlong(0)));
-  EXPECT_TRUE(std::isnan(range.shareAlong(-1)));
+  EXPECT_DOUBLE_EQ(range.fractionAlong(10), 0.5);
+  EXPECT_TRUE(std::isnan(range.fractionAlong(0)));
+  EXPECT_TRUE(std::isnan(range.fractionAlong(-1)));
 }
 
 TEST(PlotAxis, OfNothingOrOfOneValueIsStillARange) {
@@ -64,15 +64,15 @@ RC_GTEST_PROP(PlotAxis, HoldsAllValuesAndItsTicksLieInside, ()) {
   for (const int value : drawn) values.push_back(value * unit);
   const AxisRange range = rangeAround(values, AxisScale::kLinear);
   for (const double value : values) {
-    RC_ASSERT(range.shareAlong(value) > 0);
-    RC_ASSERT(range.shareAlong(value) < 1);
+    RC_ASSERT(range.fractionAlong(value) > 0);
+    RC_ASSERT(range.fractionAlong(value) < 1);
   }
   const auto ticks = ticksOf(range, 6);
   RC_ASSERT(!ticks.empty());
   RC_ASSERT(ticks.size() <= 6U);
   for (const AxisTick& tick : ticks) {
-    RC_ASSERT(range.shareAlong(tick.value) > -1e-6);
-    RC_ASSERT(range.shareAlong(tick.value) < 1 + 1e-6);
+    RC_ASSERT(range.fractionAlong(tick.value) > -1e-6);
+    RC_ASSERT(range.fractionAlong(tick.value) < 1 + 1e-6);
   }
 }
 

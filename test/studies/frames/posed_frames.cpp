@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "mapping/geometry/trajectory.h"
-#include "plugin/evaluation/timed_files.h"
+#include "plugin/evaluation/depth_series.h"
 #include "plugin/formats/uzh_text.h"
 #include "tracking_stub/poses/poses_file.h"
 
