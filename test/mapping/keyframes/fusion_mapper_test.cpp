@@ -377,12 +377,12 @@ TEST(FusionMapper, EventsThatComeLaterThanThatAreAnError) {
 TEST(FusionMapper, OfTwoPosesWithOneTimeTheFirstStandsAndTheSecondIsCounted) {
   FusionMapper mapper(options(0.1, 0.1));
   mapper.addCamera(camera());
-  addPoses(mapper, kStart_ns, kStart_ns + 100 * kMs);
+  addPoses(mapper, kStart_ns, kStart_ns + 150 * kMs);
   EXPECT_EQ(mapper.counts().duplicate_poses, 0U);
   mapper.addPose({kStart_ns + 50 * kMs, shifted(7)});   // among the others
-  mapper.addPose({kStart_ns + 100 * kMs, shifted(7)});  // at their end
+  mapper.addPose({kStart_ns + 150 * kMs, shifted(7)});  // at their end
   EXPECT_EQ(mapper.counts().duplicate_poses, 2U);
-  addSteadyPackets(mapper, 0, kStart_ns, kStart_ns + 100 * kMs);
+  addSteadyPackets(mapper, 0, kStart_ns, kStart_ns + 150 * kMs);
   mapper.finish();
   const auto keyframe = mapper.next();
   ASSERT_TRUE(keyframe);
