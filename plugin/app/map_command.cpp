@@ -70,6 +70,13 @@ void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void(
   }
 }
 
+std::function<void(const std::filesystem::path&)> saverOf(const mrpt::maps::CSimpleMap& map) {
+  return [&map](const std::filesystem::path& file) {
+    if (map.saveToFile(file.string())) return;
+    throw std::runtime_error("the file cannot be created or the disk is full");
+  };
+}
+
 /// What `map` and `depth` end with: the report, then words to the user.
 int conclude(const MappingOutcome& outcome, MapOutput& output) {
   // A run that failed before its first keyframe leaves the results of an earlier one as they were.
@@ -126,7 +133,7 @@ int runMap(const MapArguments& arguments) {
     if (outcome.report.counts.keyframes > 0) {
       const SecondsScope map(outcome.report.seconds.map);
       writeAll(outcome, {[&] { output->writeCloud("map.pcd", outcome.points); },
-                         [&] { output->writeSimplemap(outcome.keyframes); },
+                         [&] { output->writeFile("map.simplemap", saverOf(outcome.keyframes)); },
                          [&] { output->writeTrajectory("trajectory.txt", outcome.trajectory); },
                          [&] {
                            if (!job.options.refinement.enabled) return;

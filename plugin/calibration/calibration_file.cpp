@@ -2,13 +2,16 @@
 #include "plugin/calibration/calibration_file.h"
 
 #include <charconv>
+#include <cmath>
 #include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <vector>
 
+#include "mapping/options/quoted_text.h"
 #include "plugin/calibration/camchain.h"
-#include "plugin/formats/uzh_text.h"
 
 namespace efm {
 namespace {
@@ -34,6 +37,28 @@ std::string firstWord(const std::filesystem::path& file) {
     word.clear();
   }
   return word;
+}
+
+double parseNumber(const std::string& text, const std::string& place) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) {
+    return value;
+  }
+  throw std::runtime_error(place + inQuotes(text) + ": expected a finite number");
+}
+
+std::vector<double> readNumbers(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::vector<double> numbers;
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    std::istringstream fields(line.substr(0, line.find('#')));
+    const std::string place = file.string() + ":" + std::to_string(number) + ": ";
+    for (std::string field; fields >> field;) numbers.push_back(parseNumber(field, place));
+  }
+  if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  return numbers;
 }
 
 bool isNumber(const std::string& word) {
@@ -98,6 +123,29 @@ Calibration readCalibration(const std::filesystem::path& file) {
     calibration.rig = readCamchain(file);
   }
   return calibration;
+}
+
+CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size) {
+  const std::vector<double> numbers = readNumbers(file);
+  if (numbers.size() != 9) {
+    throw std::runtime_error(file.string() + ": " + std::to_string(numbers.size()) +
+                             " numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3");
+  }
+  CameraModel model;
+  model.width = size.width;
+  model.height = size.height;
+  model.fx = numbers[0];
+  model.fy = numbers[1];
+  model.cx = numbers[2];
+  model.cy = numbers[3];
+  model.distortion = DistortionModel::kRadtan;
+  model.coefficients.assign(numbers.begin() + 4, numbers.end());
+  try {
+    model.validate();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
+  return model;
 }
 
 }  // namespace efm

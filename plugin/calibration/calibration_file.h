@@ -5,9 +5,14 @@
 #include <optional>
 
 #include "mapping/geometry/rig.h"
-#include "plugin/formats/event_text.h"
 
 namespace efm {
+
+/// The pixels of a sensor.
+struct CameraSize {
+  int width = 0;
+  int height = 0;
+};
 
 /// A rig's calibration from a file of its own.
 struct Calibration {
@@ -29,15 +34,14 @@ struct Calibration {
   void requireLike(const Rig& recorded) const;
 };
 
-/// What a folder of text files need not hold, because it was given beside it.
-struct GivenParts {
-  const Calibration* calibration = nullptr;  ///< Only where the folder has none; may be null.
-  bool poses = false;                        ///< They are put in later.
-};
-
 /// Reads a camera chain as `readCamchain` does, or nine numbers as `readUzhCalibration` does, which
 /// leave the sensor's size open.
 /// @throws std::runtime_error naming the file, the place, the value and what was expected.
 Calibration readCalibration(const std::filesystem::path& file);
+
+/// Reads the nine numbers fx fy cx cy k1 k2 p1 p2 k3, the UZH data sets' calib.txt: distortion is
+/// radtan with five coefficients, even where all are zero.
+/// @throws std::runtime_error naming the file, the value or the count, and what was expected.
+CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size);
 
 }  // namespace efm

@@ -47,7 +47,7 @@ Rig givenRig(const Calibration& calibration, const fs::path& folder) {
 
 /// The folder's own rig where it has one: that another was given is then for who replaces it to
 /// count.
-Rig readRig(const fs::path& folder, const GivenParts& given) {
+Rig readRig(const fs::path& folder, const RecordingOverrides& given) {
   const fs::path own = folder / "camchain.yaml";
   if (isFile(own)) {
     Rig rig = readCamchain(own);
@@ -65,7 +65,8 @@ bool looksLikeDatasetFolder(const fs::path& folder) {
   return isFile(folder / "camchain.yaml") || isFile(eventsOf(folder, 0));
 }
 
-std::unique_ptr<Recording> openDatasetFolder(const fs::path& folder, const GivenParts& given) {
+std::unique_ptr<Recording> openDatasetFolder(const fs::path& folder,
+                                             const RecordingOverrides& given) {
   Rig rig = readRig(folder, given);
   std::vector<EventTextReader> readers;
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {

@@ -23,6 +23,6 @@ bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 /// std::invalid_argument where a given calibration has more or fewer cameras or one of another
 /// size.
 std::unique_ptr<Recording> openDatasetFolder(const std::filesystem::path& folder,
-                                             const GivenParts& given = {});
+                                             const RecordingOverrides& given = {});
 
 }  // namespace efm

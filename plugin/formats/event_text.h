@@ -13,14 +13,9 @@
 
 #include "mapping/events/event.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/calibration/calibration_file.h"
 
 namespace efm {
-
-/// The pixels of a sensor.
-struct CameraSize {
-  int width = 0;
-  int height = 0;
-};
 
 /// Events come in packets on a grid of this period: [k·10 ms, (k+1)·10 ms).
 inline constexpr std::int64_t kPacketPeriodNs = 10'000'000;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/formats/uzh_text.h"
 
-#include <charconv>
-#include <cmath>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
@@ -13,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/options/quoted_text.h"
 #include "plugin/formats/merged_recording.h"
 #include "plugin/recordings/recording_with_poses.h"
 #include "tracking_stub/poses/poses_file.h"
@@ -24,28 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr CameraSize kDavis240c = {240, 180};
-
-double parseNumber(const std::string& text, const std::string& place) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) {
-    return value;
-  }
-  throw std::runtime_error(place + inQuotes(text) + ": expected a finite number");
-}
-
-std::vector<double> readNumbers(const fs::path& file) {
-  std::ifstream stream(file);
-  std::vector<double> numbers;
-  std::string line;
-  for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    std::istringstream fields(line.substr(0, line.find('#')));
-    const std::string place = file.string() + ":" + std::to_string(number) + ": ";
-    for (std::string field; fields >> field;) numbers.push_back(parseNumber(field, place));
-  }
-  if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be opened for reading");
-  return numbers;
-}
 
 /// That of the first image of images.txt that exists.
 std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
@@ -86,7 +61,7 @@ RigCamera givenCamera(const Calibration& calibration, const fs::path& folder) {
 
 /// The folder's own camera where it has one: that another was given is then for who replaces it to
 /// count.
-RigCamera readCamera(const fs::path& folder, const GivenParts& given) {
+RigCamera readCamera(const fs::path& folder, const RecordingOverrides& given) {
   std::optional<RigCamera> camera;
   if (given.calibration != nullptr) camera = givenCamera(*given.calibration, folder);
   std::error_code ignored;
@@ -104,7 +79,7 @@ bool looksLikeUzhFolder(const fs::path& folder) {
   return fs::is_regular_file(folder / "events.txt", ignored);
 }
 
-std::unique_ptr<Recording> openUzhFolder(const fs::path& folder, const GivenParts& given) {
+std::unique_ptr<Recording> openUzhFolder(const fs::path& folder, const RecordingOverrides& given) {
   Rig rig;
   rig.cameras.push_back(readCamera(folder, given));
   const CameraModel& model = rig.cameras[0].model;
@@ -115,29 +90,6 @@ std::unique_ptr<Recording> openUzhFolder(const fs::path& folder, const GivenPart
   requireFile(folder, "groundtruth.txt", "poses", "--poses");
   return std::make_unique<RecordingWithPoses>(std::move(events),
                                               readPosesFile(folder / "groundtruth.txt"));
-}
-
-CameraModel readUzhCalibration(const fs::path& file, CameraSize size) {
-  const std::vector<double> numbers = readNumbers(file);
-  if (numbers.size() != 9) {
-    throw std::runtime_error(file.string() + ": " + std::to_string(numbers.size()) +
-                             " numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3");
-  }
-  CameraModel model;
-  model.width = size.width;
-  model.height = size.height;
-  model.fx = numbers[0];
-  model.fy = numbers[1];
-  model.cx = numbers[2];
-  model.cy = numbers[3];
-  model.distortion = DistortionModel::kRadtan;
-  model.coefficients.assign(numbers.begin() + 4, numbers.end());
-  try {
-    model.validate();
-  } catch (const std::invalid_argument& error) {
-    throw std::runtime_error(file.string() + ": " + error.what());
-  }
-  return model;
 }
 
 CameraSize uzhSensorSize(const fs::path& folder) {

@@ -4,9 +4,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "mapping/geometry/camera.h"
 #include "plugin/calibration/calibration_file.h"
-#include "plugin/formats/event_text.h"
 #include "plugin/recordings/recording.h"
 
 namespace efm {
@@ -23,11 +21,7 @@ bool looksLikeUzhFolder(const std::filesystem::path& folder);
 /// @throws std::runtime_error naming the file (and line) that is missing or not understood;
 /// std::invalid_argument where a given calibration has more cameras or one of another size.
 std::unique_ptr<Recording> openUzhFolder(const std::filesystem::path& folder,
-                                         const GivenParts& given = {});
-
-/// Nine numbers; distortion is radtan with five coefficients, even where all are zero.
-/// @throws std::runtime_error naming the file, the value or the count, and what was expected.
-CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size);
+                                         const RecordingOverrides& given = {});
 
 /// That of the first image of images.txt that exists, or else 240x180: the DAVIS240C, which
 /// recorded the whole data set.

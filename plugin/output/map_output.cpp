@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/output/map_output.h"
 
-#include <mrpt/maps/CSimpleMap.h>
-
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -179,13 +177,10 @@ void MapOutput::writeCloud(const std::string& name, const std::vector<CloudPoint
   writePcd(folder_ / name, points);
 }
 
-void MapOutput::writeSimplemap(const mrpt::maps::CSimpleMap& map) {
+void MapOutput::writeFile(const std::string& name,
+                          const std::function<void(const std::filesystem::path&)>& write) {
   removeEarlier();
-  writeAtomically(folder_ / "map.simplemap", [&](const std::filesystem::path& temporary) {
-    if (!map.saveToFile(temporary.string())) {
-      throw std::runtime_error("the file cannot be created or the disk is full");
-    }
-  });
+  writeAtomically(folder_ / name, write);
 }
 
 void MapOutput::writeReport(const std::string& json) {

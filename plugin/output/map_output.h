@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -9,10 +10,6 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/cloud_point.h"
-
-namespace mrpt::maps {
-class CSimpleMap;
-}
 
 namespace efm {
 
@@ -46,8 +43,10 @@ class MapOutput {
   void writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses);
   /// @param name "map.pcd" or "points.pcd".
   void writeCloud(const std::string& name, const std::vector<CloudPoint>& points);
-  /// Writes map.simplemap: the keyframes' clouds and poses, as MRPT has them.
-  void writeSimplemap(const mrpt::maps::CSimpleMap& map);
+  /// @param name "map.simplemap".
+  /// @param write writes a file of the path that it is given, which gets its name afterwards.
+  void writeFile(const std::string& name,
+                 const std::function<void(const std::filesystem::path&)>& write);
   void writeReport(const std::string& json);
 
   const std::filesystem::path& folder() const { return folder_; }

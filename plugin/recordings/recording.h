@@ -8,6 +8,8 @@
 
 namespace efm {
 
+struct Calibration;
+
 /// What was odd about a recording, though it could be read.
 struct RecordingCounts {
   std::uint64_t sorted_events = 0;         ///< Came later than a newer one, by up to 10 ms.
@@ -32,6 +34,12 @@ class Recording {
   virtual double progress() const = 0;
 
   virtual RecordingCounts counts() const { return {}; }
+};
+
+/// What is given in place of a recording's own: a folder of text files need not hold it then.
+struct RecordingOverrides {
+  const Calibration* calibration = nullptr;  ///< Used where the folder has none; may be null.
+  bool poses = false;                        ///< They are put in later.
 };
 
 }  // namespace efm

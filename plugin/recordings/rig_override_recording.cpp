@@ -18,10 +18,10 @@ bool areNear(const Rigid3& T_a_b, const Rigid3& T_a_c) {
 
 }  // namespace
 
-RefittedRecording::RefittedRecording(std::unique_ptr<Recording> recording, RigSetup setup)
+RigOverrideRecording::RigOverrideRecording(std::unique_ptr<Recording> recording, RigSetup setup)
     : recording_(std::move(recording)), setup_(std::move(setup)) {}
 
-mrpt::obs::CObservation::Ptr RefittedRecording::next() {
+mrpt::obs::CObservation::Ptr RigOverrideRecording::next() {
   mrpt::obs::CObservation::Ptr observation = recording_->next();
   if (!observation) {
     if (setup_.calibration && !cameras_.empty())
@@ -35,7 +35,7 @@ mrpt::obs::CObservation::Ptr RefittedRecording::next() {
   return observation;
 }
 
-void RefittedRecording::recalibrate(CObservationEvents& packet) {
+void RigOverrideRecording::recalibrate(CObservationEvents& packet) {
   const RigCamera camera =
       setup_.calibration->camera(static_cast<std::size_t>(packet.camera_index),
                                  CameraSize{packet.camera.width, packet.camera.height});
@@ -46,7 +46,7 @@ void RefittedRecording::recalibrate(CObservationEvents& packet) {
   packet.camera_pose = mrptPoseFrom(camera.T_rig_cam);
 }
 
-RecordingCounts RefittedRecording::counts() const {
+RecordingCounts RigOverrideRecording::counts() const {
   RecordingCounts counts = recording_->counts();
   counts.recalibrated_cameras = recalibrated_.size();
   return counts;

@@ -13,9 +13,9 @@ namespace efm {
 
 /// A recording whose packets carry another calibration and whose poses say otherwise where the rig
 /// is on the tracked body.
-class RefittedRecording : public Recording {
+class RigOverrideRecording : public Recording {
  public:
-  RefittedRecording(std::unique_ptr<Recording> recording, RigSetup setup);
+  RigOverrideRecording(std::unique_ptr<Recording> recording, RigSetup setup);
 
   /// @throws std::invalid_argument where the calibration has no such camera or one of another size,
   /// or at the end where it has cameras that the recording does not have.

@@ -12,7 +12,7 @@
 #include "maps/cloud/global_cloud.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/refined_cloud.h"
-#include "plugin/options/option_file.h"
+#include "plugin/session/event_fusion_options.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/rig_setup.h"

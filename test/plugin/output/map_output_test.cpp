@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <mrpt/maps/CSimpleMap.h>
 #include <sys/resource.h>
 
 #include <csignal>
@@ -70,7 +69,7 @@ TEST_F(MapOutputTest, AnEarlierMapGoesWithTheFirstFileAndOtherFilesStay) {
     MapOutput earlier(folder(), OutputKind::kMap, {});
     earlier.writeKeyframe(smallKeyframe(1'000'000'000));
     earlier.writeCloud("map.pcd", {});
-    earlier.writeSimplemap({});
+    earlier.writeFile("map.simplemap", [](const auto& file) { std::ofstream(file) << "mine"; });
     earlier.writeReport("{}");
   }
   const auto keyframes = folder() / "keyframes";

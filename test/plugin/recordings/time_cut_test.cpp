@@ -7,16 +7,16 @@
 
 #include "plugin/mrpt/pose_observation.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
 
 using mrpt::obs::CObservation;
 using mrpt::obs::CObservationRobotPose;
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
+
+// --- TimeCut -----------------------------------------------------------------------------------
 
 /// Plays observations that are there.
 class Playback : public Recording {
