@@ -24,14 +24,14 @@ using Path = std::filesystem::path;
 struct Format {
   std::string name;
   bool (*looks_like)(const Path&);
-  std::unique_ptr<Recording> (*open)(const Path&, const GivenParts&);
+  std::unique_ptr<Recording> (*open)(const Path&, const RecordingOverrides&);
   std::string looks;  ///< What `looks_like` looks for.
 };
 
 const std::vector<Format>& formats() {
   static const std::vector<Format> all = {
       {"rawlog", [](const Path& source) { return std::filesystem::is_regular_file(source); },
-       [](const Path& source, const GivenParts&) -> std::unique_ptr<Recording> {
+       [](const Path& source, const RecordingOverrides&) -> std::unique_ptr<Recording> {
          requireRawlog(source);
          return std::make_unique<RawlogRecording>(source);
        },
@@ -45,7 +45,7 @@ const std::vector<Format>& formats() {
 }
 
 std::unique_ptr<Recording> openAs(const std::string& format, const Path& path,
-                                  const GivenParts& given) {
+                                  const RecordingOverrides& given) {
   std::string expected;
   for (const Format& known : formats()) {
     if (format == known.name || (format == "auto" && known.looks_like(path))) {
@@ -77,7 +77,8 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   std::vector<StampedPose> poses;
   if (!source.poses.empty()) poses = readPosesFile(source.poses);
 
-  const GivenParts given = {setup.calibration ? &*setup.calibration : nullptr, !poses.empty()};
+  const RecordingOverrides given = {setup.calibration ? &*setup.calibration : nullptr,
+                                    !poses.empty()};
   std::unique_ptr<Recording> recording = openAs(source.format, path, given);
   if (given.poses) {
     recording = std::make_unique<RecordingWithPoses>(std::move(recording), std::move(poses));
@@ -86,7 +87,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     recording = std::make_unique<PerturbedRecording>(std::move(recording), source.faults);
   }
   if (setup.calibration || setup.T_body_rig) {
-    recording = std::make_unique<RefittedRecording>(std::move(recording), setup);
+    recording = std::make_unique<RigOverrideRecording>(std::move(recording), setup);
   }
   return recording;
 }
