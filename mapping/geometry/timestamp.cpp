@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/geometry/timestamp.h"
 
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <stdexcept>
+
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
@@ -59,17 +60,14 @@ std::optional<DecimalDigits> splitDecimal(std::string_view text) {
     text.remove_prefix(1);
     if (!text.empty() && text.front() == '+') {
       text.remove_prefix(1);
-      if (!text.empty() && text.front() == '-') return std::nullopt;  // from_chars takes a minus
+      if (!text.empty() && text.front() == '-') return std::nullopt;  // parseNumber takes a minus
     }
-    const auto [end, error] =
-        std::from_chars(text.data(), text.data() + text.size(), digits.exponent);
-    if (error != std::errc() || digits.exponent < -1000 || digits.exponent > 1000) {
-      return std::nullopt;
-    }
-    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    const std::optional<int> exponent = parseNumber<int>(text);
+    if (!exponent || *exponent < -1000 || *exponent > 1000) return std::nullopt;
+    digits.exponent = *exponent;
+    text = {};
   }
-  if (!text.empty()) return std::nullopt;
-  return digits;
+  return text.empty() ? std::optional(digits) : std::nullopt;
 }
 
 }  // namespace

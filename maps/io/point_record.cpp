@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
@@ -57,10 +58,9 @@ void append(PointCloudContent& content, const Values& values) {
 
 template <typename Number>
 bool parseWhole(std::string_view word, double& value) {
-  Number number = 0;
-  const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), number);
-  value = static_cast<double>(number);
-  return error == std::errc() && stop == word.data() + word.size();
+  const std::optional<Number> number = parseNumber<Number>(word);
+  value = static_cast<double>(number.value_or(0));
+  return number.has_value();
 }
 
 /// Rounds to the type of the field, as a binary file would have it.
@@ -81,7 +81,7 @@ bool parseReal(std::string_view word, double& value) {
   return error == std::errc() || error == std::errc::result_out_of_range;
 }
 
-bool parseNumber(std::string_view word, NumberType type, double& value) {
+bool parseAs(NumberType type, std::string_view word, double& value) {
   switch (type) {
     case NumberType::kFloat32:
       return parseReal<float>(word, value);
@@ -176,7 +176,7 @@ PointCloudContent readTextRecords(TextScanner& cursor, const std::vector<RecordF
     for (std::size_t at = 0; at < fields.size(); ++at) {
       for (std::size_t n = 0; n < fields[at].count; ++n, ++word) {
         double value = 0;
-        if (!parseNumber(*word, fields[at].type, value)) {
+        if (!parseAs(fields[at].type, *word, value)) {
           line.refuse(printable(fields[at].name) + " " + inQuotes(*word) +
                       ": expected a number of the field's type");
         }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/text_scanner.h"
 
-#include <algorithm>
-#include <charconv>
+#include <optional>
 #include <stdexcept>
 
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 
@@ -46,26 +46,14 @@ void WordLine::refuse(const std::string& why) const {
 
 std::uint64_t WordLine::count(std::size_t word) const {
   const std::string_view text = word < words.size() ? words[word] : std::string_view{};
-  std::uint64_t count = 0;
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), count);
-  if (text.empty() || stop != text.data() + text.size() || error != std::errc()) {
-    refuse(inQuotes(text) + ": expected a whole number from 0 on");
-  }
-  return count;
+  const std::optional<std::uint64_t> count = parseNumber<std::uint64_t>(text);
+  if (!count) refuse(inQuotes(text) + ": expected a whole number from 0 on");
+  return *count;
 }
 
 WordLine wordLine(TextScanner& cursor, std::string_view expected) {
-  constexpr std::string_view kBlanks = " \t";
   const std::string_view text = cursor.line(expected);
-  WordLine line;
-  line.number = cursor.lineNumber();
-  for (std::size_t at = text.find_first_not_of(kBlanks); at != std::string_view::npos;
-       at = text.find_first_not_of(kBlanks, at)) {
-    const std::size_t end = std::min(text.find_first_of(kBlanks, at), text.size());
-    line.words.push_back(text.substr(at, end - at));
-    at = end;
-  }
-  return line;
+  return {cursor.lineNumber(), splitWords(text, " \t")};
 }
 
 }  // namespace efm

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/calibration/calibration_file.h"
 
-#include <charconv>
-#include <cmath>
 #include <fstream>
-#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 #include "plugin/calibration/camchain.h"
 
 namespace efm {
@@ -39,32 +38,23 @@ std::string firstWord(const std::filesystem::path& file) {
   return word;
 }
 
-double parseNumber(const std::string& text, const std::string& place) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) {
-    return value;
-  }
-  throw std::runtime_error(place + inQuotes(text) + ": expected a finite number");
-}
-
 std::vector<double> readNumbers(const std::filesystem::path& file) {
   std::ifstream stream(file);
   std::vector<double> numbers;
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    std::istringstream fields(line.substr(0, line.find('#')));
-    const std::string place = file.string() + ":" + std::to_string(number) + ": ";
-    for (std::string field; fields >> field;) numbers.push_back(parseNumber(field, place));
+    for (const std::string_view word :
+         splitWords(std::string_view(line).substr(0, line.find('#')))) {
+      const std::optional<double> value = parseFinite(word);
+      if (!value) {
+        throw std::runtime_error(file.string() + ":" + std::to_string(number) + ": " +
+                                 inQuotes(word) + ": expected a finite number");
+      }
+      numbers.push_back(*value);
+    }
   }
   if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be opened for reading");
   return numbers;
-}
-
-bool isNumber(const std::string& word) {
-  double value = 0;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size();
 }
 
 }  // namespace
@@ -114,7 +104,7 @@ Calibration readCalibration(const std::filesystem::path& file) {
                              "nine numbers, fx fy cx cy k1 k2 p1 p2 k3");
   }
   Calibration calibration{file, {}};
-  if (isNumber(word)) {
+  if (parseNumber<double>(word)) {
     CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
     model.width = 0;
     model.height = 0;

@@ -3,12 +3,14 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
+#include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 #include "maps/io/point_record.h"
 
 namespace efm {
@@ -87,10 +89,9 @@ cv::Size sizeOf(std::string_view shape) {
   while (!withoutBlanks(rest).empty()) {
     const std::size_t comma = rest.find(',');
     const std::string_view word = withoutBlanks(rest.substr(0, comma));
-    std::uint64_t value = 0;
-    const auto [last, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || last != word.data() + word.size()) throw refuse();
-    sides.push_back(value);
+    const std::optional<std::uint64_t> value = parseNumber<std::uint64_t>(word);
+    if (!value) throw refuse();
+    sides.push_back(*value);
     rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
   }
   if (sides.size() != 2) throw refuse();

@@ -3,11 +3,9 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
 #include <string>
 
-#include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 #include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
 #include "plugin/evaluation/npy_image.h"
@@ -25,12 +23,8 @@ int side(const WordLine& line, std::size_t word) {
 
 double scaleOf(const WordLine& line) {
   double scale = 0;
-  if (line.words.size() == 1) {
-    const std::string_view word = line.words[0];
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), scale);
-    if (error != std::errc() || end != word.data() + word.size()) scale = 0;
-  }
-  if (scale == 0 || !std::isfinite(scale)) {
+  if (line.words.size() == 1) scale = parseFinite(line.words[0]).value_or(0);
+  if (scale == 0) {
     line.refuse("expected one number, the scale, below 0 where the data are little endian");
   }
   return scale;

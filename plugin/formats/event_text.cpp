@@ -4,18 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <charconv>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
 
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
-constexpr std::string_view kBlanks = " \t\r\v\f";
 
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
 bool isBlank(char c) { return c == ' ' || c == '\t'; }
@@ -48,11 +47,9 @@ std::int64_t stretchEnd(std::int64_t t_ns) {
 }
 
 std::optional<std::uint16_t> parsePixel(std::string_view text, int side) {
-  int value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  if (value < 0 || value >= side) return std::nullopt;
-  return static_cast<std::uint16_t>(value);
+  const std::optional<int> value = parseNumber<int>(text);
+  if (!value || *value < 0 || *value >= side) return std::nullopt;
+  return static_cast<std::uint16_t>(*value);
 }
 
 }  // namespace
@@ -197,22 +194,15 @@ const char* EventTextReader::parsePlainLine(const char* text, Event& event) cons
 std::optional<Event> EventTextReader::parseLine(std::string_view line, bool unterminated) const {
   constexpr std::size_t kFields = 4;
   const std::string_view content = line.substr(0, line.find('#'));
-  std::array<std::string_view, kFields> fields;
-  std::size_t count = 0;
-  for (std::size_t begin = content.find_first_not_of(kBlanks); begin != std::string_view::npos;) {
-    const std::size_t end = std::min(content.find_first_of(kBlanks, begin), content.size());
-    if (count < kFields) fields[count] = content.substr(begin, end - begin);
-    ++count;
-    begin = content.find_first_not_of(kBlanks, end);
-  }
-  if (count == 0) return std::nullopt;
-  if (count < kFields && unterminated) {
+  const std::vector<std::string_view> fields = splitWords(content);
+  if (fields.empty()) return std::nullopt;
+  if (fields.size() < kFields && unterminated) {
     throw std::runtime_error(place() + inQuotes(content) +
                              ": expected t x y p, but the file ends within the line");
   }
-  if (count != kFields) {
+  if (fields.size() != kFields) {
     throw std::runtime_error(place() + inQuotes(content) + ": expected 4 fields, t x y p, not " +
-                             std::to_string(count));
+                             std::to_string(fields.size()));
   }
 
   const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {

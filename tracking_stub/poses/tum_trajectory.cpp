@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/poses/tum_trajectory.h"
 
-#include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <fstream>
@@ -15,40 +13,25 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
 
 constexpr std::array<std::string_view, 8> kFieldNames = {"t",  "tx", "ty", "tz",
                                                          "qx", "qy", "qz", "qw"};
-constexpr std::string_view kBlanks = " \t\r\v\f";
 constexpr double kMaxLengthError =
     0.01;  // of a quaternion: two digits are enough to tell a mistake
-
-std::vector<std::string_view> splitFields(std::string_view line) {
-  line = line.substr(0, line.find('#'));
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = line.find_first_not_of(kBlanks); begin != std::string_view::npos;) {
-    const std::size_t end = std::min(line.find_first_of(kBlanks, begin), line.size());
-    fields.push_back(line.substr(begin, end - begin));
-    begin = line.find_first_not_of(kBlanks, end);
-  }
-  return fields;
-}
 
 std::runtime_error fieldError(std::size_t field, std::string_view text, const char* expected) {
   return std::runtime_error(std::string(kFieldNames[field]) + " = " + inQuotes(text) +
                             ": expected " + expected);
 }
 
-double parseNumber(const std::vector<std::string_view>& fields, std::size_t field) {
-  const std::string_view text = fields[field];
-  double value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value)) {
-    throw fieldError(field, text, "a finite number");
-  }
-  return value;
+double numberIn(const std::vector<std::string_view>& fields, std::size_t field) {
+  const std::optional<double> value = parseFinite(fields[field]);
+  if (!value) throw fieldError(field, fields[field], "a finite number");
+  return *value;
 }
 
 std::runtime_error quaternionError(const std::vector<std::string_view>& fields, double norm) {
@@ -74,10 +57,9 @@ StampedPose parsePose(const std::vector<std::string_view>& fields) {
   }
   StampedPose pose;
   pose.t_ns = *t_ns;
-  pose.T_world_rig.translation = {parseNumber(fields, 1), parseNumber(fields, 2),
-                                  parseNumber(fields, 3)};
-  const Eigen::Quaterniond rotation(parseNumber(fields, 7), parseNumber(fields, 4),
-                                    parseNumber(fields, 5), parseNumber(fields, 6));
+  pose.T_world_rig.translation = {numberIn(fields, 1), numberIn(fields, 2), numberIn(fields, 3)};
+  const Eigen::Quaterniond rotation(numberIn(fields, 7), numberIn(fields, 4), numberIn(fields, 5),
+                                    numberIn(fields, 6));
   const double norm = rotation.coeffs().stableNorm();
   if (!(std::abs(norm - 1) <= kMaxLengthError)) throw quaternionError(fields, norm);
   pose.T_world_rig.rotation.coeffs() = rotation.coeffs() / norm;
@@ -96,7 +78,8 @@ std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::stri
   std::vector<StampedPose> poses;
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    const std::vector<std::string_view> fields = splitFields(line);
+    const std::vector<std::string_view> fields =
+        splitWords(std::string_view(line).substr(0, line.find('#')));
     if (fields.empty()) continue;
     try {
       poses.push_back(parsePose(fields));

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+namespace efm {
+
+/// Blanks within and at the end of a line.
+inline constexpr std::string_view kLineBlanks = " \t\r\v\f";
+
+/// The number that a text is from end to end; nothing where it is none or the type cannot hold it.
+/// Real numbers may be infinite or NaN.
+template <typename Number>
+std::optional<Number> parseNumber(std::string_view text) {
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return number;
+}
+
+/// The finite number that a text is from end to end.
+inline std::optional<double> parseFinite(std::string_view text) {
+  const std::optional<double> number = parseNumber<double>(text);
+  return number && std::isfinite(*number) ? number : std::nullopt;
+}
+
+/// The text without blanks at both ends.
+std::string_view trimmed(std::string_view text);
+
+/// The words of a text, which blanks separate. They are views of the text.
+std::vector<std::string_view> splitWords(std::string_view text,
+                                         std::string_view blanks = kLineBlanks);
+
+}  // namespace efm
