@@ -12,34 +12,34 @@
 
 namespace efm {
 
-/// Where an option of somebody else's file stands.
+/// Where options stand.
 struct OptionPlace {
-  std::string name;              ///< What errors begin with: "host.ini, section mapper_dsi:".
-  std::filesystem::path folder;  ///< What paths are relative to; empty: the working folder.
+  std::string name;              ///< Errors begin with it: "host.ini, section mapper_dsi:".
+  std::filesystem::path folder;  ///< Paths are relative to it; empty: the working folder.
 };
 
-/// Reads options from .ini files and from the command line, strictly: what is not understood is an
-/// error that names the file and line, the section, the key, the value and what was expected.
-/// (`mrpt::config::CConfigFile` reads "abc" as 0 and ignores unknown keys and missing files.)
+/// Reads options from .ini files and from the command line, strictly: an error names the file and
+/// line, the section, the key, the value and the expected kind. (`mrpt::config::CConfigFile` reads
+/// "abc" as 0 and ignores unknown keys and missing files.)
 ///
-/// Keys that are not given keep what they were. Comments start with ';', '#' or "//", at the start
-/// of a line or after a blank. Paths are relative to the file that says them; on the command line,
-/// to where that was typed.
+/// Keys that are not given keep their values. Comments start with ';', '#' or "//", at the start
+/// of a line or after a blank. Paths are relative to the folder of their file; on the command line,
+/// to the working folder.
 class OptionReader {
  public:
-  /// @param start what keys that are not given keep.
+  /// @param start the values of keys that are not given.
   explicit OptionReader(const EventFusionOptions& start = {}) : options_(start) {}
 
   /// @throws std::runtime_error where the file cannot be read; std::invalid_argument at an unknown
   /// section or key, a key given twice, or a value of the wrong kind.
   void readFile(const std::filesystem::path& path);
-  /// As `readFile`, of text that is called `name` in errors.
+  /// Reads text as `readFile` does; errors call it `name`.
   void readText(std::string_view text, const std::string& name);
   /// Overrides one option: "section.key=value". The last one counts.
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view assignment);
-  /// Sets one option that stands in a file of somebody else's, where its section has another name.
-  /// @param value up to a comment.
+  /// Sets one option of a host's file, in which its section has another name.
+  /// @param value the text behind the equals sign; a comment may follow the value.
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view section, std::string_view key, std::string_view value,
            const OptionPlace& place);
@@ -48,11 +48,11 @@ class OptionReader {
   EventFusionOptions options() const;
 
  private:
+  void readLines(std::string_view text, const OptionPlace& file);
   void assign(std::string_view section, std::string_view key, std::string_view value,
-              const std::string& place);
+              const OptionPlace& place);
 
   EventFusionOptions options_;
-  std::filesystem::path folder_;  // of the file being read, which paths in it are relative to
   std::map<std::pair<std::string, std::string>, std::string> places_;  // (section, key) -> where
 };
 

@@ -36,6 +36,10 @@ std::vector<NamedOption> listOptions(const EventFusionOptions& options);
 /// Whether an option file may have a section of this name.
 bool isOptionSection(std::string_view section);
 
+/// The error for a key that an earlier version had: its new name, or that it is gone. Empty for
+/// other keys.
+std::string_view formerOptionError(std::string_view section, std::string_view key);
+
 /// The keys of a section, or the sections, for whoever mistyped one.
 std::string knownOptionKeys(std::string_view section);
 std::string knownOptionSections();

@@ -10,36 +10,38 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
 
-template <typename Number>
-bool parsesWhole(std::string_view text, Number& number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc() && end == text.data() + text.size();
+/// @throws std::invalid_argument saying what is expected, where there is no value.
+template <typename Value>
+Value valueOr(const std::optional<Value>& value, const char* expected) {
+  if (!value) throw std::invalid_argument(expected);
+  return *value;
 }
 
-/// Items separated by commas, each read by `parses(text, item)`. @return whether each is one.
-template <typename Item, typename Parse>
-bool parsesList(std::string_view text, std::vector<Item>& items, const Parse& parses) {
-  items.clear();
+/// Items separated by commas, each read by `parse`; nothing where one is none.
+template <typename Parse>
+auto parseList(std::string_view text, const Parse& parse) {
+  using Item = typename decltype(parse(text))::value_type;
+  std::optional<std::vector<Item>> items(std::in_place);
   while (!text.empty()) {
     const std::size_t comma = text.find(',');
-    if (!parses(trimmed(text.substr(0, comma)), items.emplace_back()) || comma + 1 == text.size()) {
-      return false;
-    }
+    const std::optional<Item> item = parse(trimmed(text.substr(0, comma)));
+    if (!item || comma + 1 == text.size()) return std::optional<std::vector<Item>>();
+    items->push_back(*item);
     text = comma == std::string_view::npos ? std::string_view{} : text.substr(comma + 1);
   }
-  return true;
+  return items;
 }
 
-/// Seconds, exact to the nanosecond.
-bool parsesTime(std::string_view text, std::int64_t& t_ns) {
-  const std::optional<std::int64_t> parsed = parseSeconds(text);
-  if (!parsed || *parsed >= kEndOfTimeNs || *parsed <= -kEndOfTimeNs) return false;
-  t_ns = *parsed;
-  return true;
+/// Nanoseconds from seconds, exactly.
+std::optional<std::int64_t> parseTime(std::string_view text) {
+  const std::optional<std::int64_t> t_ns = parseSeconds(text);
+  const bool in_range = t_ns && *t_ns<kEndOfTimeNs&& * t_ns> - kEndOfTimeNs;
+  return in_range ? t_ns : std::nullopt;
 }
 
 /// Items separated by commas.
@@ -59,31 +61,17 @@ std::string shortestText(double number) {
 
 }  // namespace
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\n";
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
 void parseInto(std::string_view text, double& field) {
-  if (!parsesWhole(text, field) || !std::isfinite(field)) {
-    throw std::invalid_argument("must be a number");
-  }
+  field = valueOr(parseFinite(text), "must be a number");
 }
-
 void parseInto(std::string_view text, int& field) {
-  if (!parsesWhole(text, field)) throw std::invalid_argument("must be a whole number");
+  field = valueOr(parseNumber<int>(text), "must be a whole number");
 }
-
 void parseInto(std::string_view text, std::int64_t& field) {
-  if (!parsesWhole(text, field)) throw std::invalid_argument("must be a whole number");
+  field = valueOr(parseNumber<std::int64_t>(text), "must be a whole number");
 }
-
 void parseInto(std::string_view text, std::uint32_t& field) {
-  if (!parsesWhole(text, field)) {
-    throw std::invalid_argument("must be a whole number, 0 to 4294967295");
-  }
+  field = valueOr(parseNumber<std::uint32_t>(text), "must be a whole number, 0 to 4294967295");
 }
 
 void parseInto(std::string_view text, bool& field) {
@@ -95,68 +83,45 @@ void parseInto(std::string_view text, std::string& field) { field = text; }
 void parseInto(std::string_view text, std::filesystem::path& field) { field = text; }
 
 void parseInto(std::string_view text, std::vector<int>& field) {
-  if (!parsesList(text, field, parsesWhole<int>)) {
-    throw std::invalid_argument("must be whole numbers separated by commas, or nothing");
-  }
+  field = valueOr(parseList(text, parseNumber<int>),
+                  "must be whole numbers separated by commas, or nothing");
 }
 
 void parseInto(std::string_view text, Eigen::Vector3d& field) {
-  std::vector<double> items;
-  if (!parsesList(text, items, parsesWhole<double>) || items.size() != 3 ||
-      !std::all_of(items.begin(), items.end(), [](double item) { return std::isfinite(item); })) {
+  const auto items = parseList(text, parseFinite);
+  if (!items || items->size() != 3) {
     throw std::invalid_argument("must be three numbers separated by commas");
   }
-  field = {items[0], items[1], items[2]};
+  field = Eigen::Vector3d::Map(items->data());
 }
 
 void parseInto(std::string_view text, MaxConfidence& field) {
   if (text == "keyframe" || text == "sequence") {
     field = {text == "keyframe" ? WhiteLevel::kKeyframe : WhiteLevel::kSequence, 0};
-  } else if (double votes = 0; parsesWhole(text, votes) && std::isfinite(votes)) {
-    field = MaxConfidence::of(votes);
   } else {
-    throw std::invalid_argument("must be a number, keyframe or sequence");
+    field = MaxConfidence::of(valueOr(parseFinite(text), "must be a number, keyframe or sequence"));
   }
 }
 
 void parseInto(std::string_view text, std::vector<std::int64_t>& field) {
-  if (!parsesList(text, field, parsesTime)) {
-    throw std::invalid_argument(
-        "must be seconds within 4.6e9 of 0, separated by commas, or nothing");
-  }
+  field = valueOr(parseList(text, parseTime),
+                  "must be seconds within 4.6e9 of 0, separated by commas, or nothing");
 }
 
 // A name that is known is printable, and the error shows one that is not.
-void parseInto(std::string_view text, KeyframePolicyKind& field) {
-  field = keyframePolicyFromName(printable(text));
-}
-void parseInto(std::string_view text, ReferenceTime& field) {
-  field = referenceTimeFromName(printable(text));
-}
-void parseInto(std::string_view text, PlaneSpacing& field) {
-  field = planeSpacingFromName(printable(text));
-}
-void parseInto(std::string_view text, FusionRule& field) {
-  field = fusionRuleFromName(printable(text));
-}
-void parseInto(std::string_view text, FusionOrder& field) {
-  field = fusionOrderFromName(printable(text));
-}
-void parseInto(std::string_view text, SubintervalSplit& field) {
-  field = subintervalSplitFromName(printable(text));
-}
-void parseInto(std::string_view text, SubintervalShuffle& field) {
-  field = subintervalShuffleFromName(printable(text));
-}
-void parseInto(std::string_view text, ExtractionMethod& field) {
-  field = extractionMethodFromName(printable(text));
-}
-void parseInto(std::string_view text, VotingKernel& field) {
-  field = votingKernelFromName(printable(text));
-}
-void parseInto(std::string_view text, Consistency& field) {
-  field = consistencyFromName(printable(text));
-}
+#define EFM_PARSE_CHOICE(Choice, fromName) \
+  void parseInto(std::string_view text, Choice& field) { field = fromName(printable(text)); }
+EFM_PARSE_CHOICE(KeyframePolicyKind, keyframePolicyFromName)
+EFM_PARSE_CHOICE(ReferenceTime, referenceTimeFromName)
+EFM_PARSE_CHOICE(PlaneSpacing, planeSpacingFromName)
+EFM_PARSE_CHOICE(FusionRule, fusionRuleFromName)
+EFM_PARSE_CHOICE(FusionOrder, fusionOrderFromName)
+EFM_PARSE_CHOICE(SubintervalSplit, subintervalSplitFromName)
+EFM_PARSE_CHOICE(SubintervalShuffle, subintervalShuffleFromName)
+EFM_PARSE_CHOICE(ExtractionMethod, extractionMethodFromName)
+EFM_PARSE_CHOICE(VotingKernel, votingKernelFromName)
+EFM_PARSE_CHOICE(Consistency, consistencyFromName)
+#undef EFM_PARSE_CHOICE
 
 OptionValue valueOf(double field) { return field; }
 OptionValue valueOf(int field) { return std::int64_t{field}; }

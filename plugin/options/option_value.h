@@ -24,9 +24,6 @@ using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
 /// As a file has it: numbers with the fewest digits that read back the same.
 std::string textOf(const OptionValue& value);
 
-/// Without blanks at both ends.
-std::string_view trimmed(std::string_view text);
-
 /// Reads a field from the text of a file.
 /// @throws std::invalid_argument saying what was expected: "must be a number".
 void parseInto(std::string_view text, double& field);
