@@ -76,7 +76,7 @@ int runImport(const ImportArguments& arguments) {
       if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
         events[packet->sensorLabel] += packet->events.size();
         all_events += packet->events.size();
-      } else if (const auto source = poseOriginOf(*observation)) {
+      } else if (const auto source = poseSourceOf(*observation)) {
         ++poses;
         if (source->kind == PoseKind::kOdometry) ++odometry;
       } else {

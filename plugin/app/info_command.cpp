@@ -58,7 +58,7 @@ class Contents {
  public:
   std::uint64_t observations = 0;
   std::map<std::string, CameraInfo> cameras;  // by label
-  std::map<PoseOrigin, Stream> pose_sources;
+  std::map<PoseSourceId, Stream> pose_sources;
   Stream poses;                                 // of all sources
   std::uint64_t events_before_poses = 0;        // earlier than the first pose
   std::uint64_t events_after_poses = 0;         // later than the last pose
@@ -68,7 +68,7 @@ class Contents {
     ++observations;
     if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
       addPacket(*packet);
-    } else if (const auto source = poseOriginOf(observation)) {
+    } else if (const auto source = poseSourceOf(observation)) {
       const std::int64_t t_ns = poseIn(observation)->t_ns;
       pose_sources[*source].add(t_ns);
       addPose(t_ns);

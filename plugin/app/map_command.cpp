@@ -34,6 +34,7 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
   RecordingSource source = arguments.source;
   source.calibration = options.rig.calibration;
   source.hand_eye = options.rig.hand_eye;
+  source.override_rig = false;  // the builder's options do
   PosePerturbationOptions& perturbation = source.faults.perturbation;
   perturbation.max_pose_gap_s = options.mapper.trajectory.max_pose_gap_s;
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
@@ -50,9 +51,8 @@ void printSummary(const MapReport& report, const std::filesystem::path& folder) 
 }
 
 /// An option file that names a calibration must not replace a better one in silence.
-void warnOfRecalibration(const MappingArguments& arguments, const Recording& recording,
-                         MappingOutcome& outcome) {
-  if (recording.counts().recalibrated_cameras == 0) return;
+void warnOfRecalibration(const MappingArguments& arguments, MappingOutcome& outcome) {
+  if (outcome.recalibrated_cameras == 0) return;
   if (!arguments.source.calibration.empty()) return;  // it was asked for
   outcome.warnings.push_back(outcome.report.options.rig.calibration.string() +
                              " replaced another calibration, the recording's own; --set "
@@ -129,7 +129,7 @@ int runMap(const MapArguments& arguments) {
 
     outcome = runMapping(job, *recording);
     outcome.report.faults = source.faults;
-    warnOfRecalibration(arguments, *recording, outcome);
+    warnOfRecalibration(arguments, outcome);
     if (outcome.report.counts.keyframes > 0) {
       const SecondsScope map(outcome.report.seconds.map);
       writeAll(outcome, {[&] { output->writeCloud("map.pcd", outcome.points); },
@@ -179,7 +179,7 @@ int runDepth(const DepthArguments& arguments) {
 
     outcome = runMapping(job, *recording);
     outcome.report.faults = source.faults;
-    warnOfRecalibration(arguments, *recording, outcome);
+    warnOfRecalibration(arguments, outcome);
     outcome.report.points = points.size();
     if (outcome.report.counts.keyframes > 0) {
       writeAll(outcome, {[&] { output->writeCloud("points.pcd", points); },

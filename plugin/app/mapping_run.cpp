@@ -11,6 +11,7 @@
 #include "plugin/app/progress.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/session/no_keyframe.h"
 
 namespace efm {
 namespace {
@@ -181,6 +182,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   SessionStatus status = player.builder().status();
   status.counts.sorted_events += recording.counts().sorted_events;
   outcome.report.counts = status.counts;
+  outcome.recalibrated_cameras = status.recalibrated_cameras;
   outcome.report.silent_keyframes = status.silent_keyframes;
   outcome.report.options = job.options;
   describeView(status.rig, job.options.mapper, outcome.report);

@@ -13,7 +13,6 @@
 #include "plugin/options/option_file.h"
 #include "plugin/output/report.h"
 #include "plugin/recordings/recording.h"
-#include "plugin/session/mapping_session.h"
 
 namespace efm {
 
@@ -38,6 +37,7 @@ struct MappingOutcome {
   /// T_world_ref of the keyframes at t_ref: in the map, and by the tracker.
   std::vector<StampedPose> trajectory;
   std::vector<StampedPose> tracker_trajectory;
+  std::size_t recalibrated_cameras = 0;  ///< Their recorded calibrations differ from the options'.
   /// What was odd about the input, though it was mapped: one line each.
   std::vector<std::string> warnings;
   /// Why the recording was not read to its end or gave no keyframe.

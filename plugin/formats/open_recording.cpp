@@ -86,7 +86,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   if (source.faults.any()) {
     recording = std::make_unique<PerturbedRecording>(std::move(recording), source.faults);
   }
-  if (setup.calibration || setup.T_body_rig) {
+  if (source.override_rig && (setup.calibration || setup.T_body_rig)) {
     recording = std::make_unique<RigOverrideRecording>(std::move(recording), setup);
   }
   return recording;

@@ -20,6 +20,9 @@ struct RecordingSource {
   std::filesystem::path calibration;         ///< As `readCalibration` takes it; empty: as recorded.
   std::filesystem::path hand_eye;            ///< As `readHandEye` takes it; empty: as recorded.
   TrackerFaults faults;                      ///< Of its CObservationRobotPose; none by default.
+  bool override_rig =
+      true;  ///< Calibration and hand-eye go into the observations. Otherwise they only
+             ///< stand in for missing ones: a map builder's options replace them.
 };
 
 /// The formats that `openRecording` knows, "auto" first.

@@ -149,7 +149,7 @@ void CEventFusionMapBuilder::mapWhenAsked() const {
 /// Brings cloud and keyframes to where the refinement has them by now, under the lock: whatever is
 /// asked for next agrees.
 void CEventFusionMapBuilder::settle() const {
-  session_->settle();
+  session_->applyPending();
   const_cast<CEventFusionMapBuilder*>(this)->followRefinement();  // NOLINT: as in mapWhenAsked
 }
 
@@ -218,7 +218,7 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
     advance([&](MappingSession& session) {
       const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
       session.addPose({observed->t_ns, observed->T_world_body * T_body_rig},
-                      *poseOriginOf(*observation), observed->noise);
+                      *poseSourceOf(*observation), observed->noise);
     });
   } else {
     const std::lock_guard<std::mutex> lock(mutex_);

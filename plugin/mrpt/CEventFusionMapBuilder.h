@@ -75,9 +75,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void setDsiSink(DsiSink* sink);
 
   /// Takes events and poses (CObservationRobotPose, CObservationOdometry), the latter of one
-  /// source: see PoseChoice; other observations are counted and ignored. A CObservationRobotPose of
-  /// a sensor on the rig gives T_world_rig = T_world_sensor * inverse(T_rig_sensor), and with a
-  /// hand-eye transform in the options T_world_rig = T_world_sensor * T_body_rig.
+  /// source: see PoseSourceSelector; other observations are counted and ignored. A
+  /// CObservationRobotPose of a sensor on the rig gives T_world_rig = T_world_sensor *
+  /// inverse(T_rig_sensor), and with a hand-eye transform in the options T_world_rig =
+  /// T_world_sensor * T_body_rig.
   /// @throws std::invalid_argument where the observation is null or contradicts its sensor or those
   /// before it; std::logic_error after `finish`. What became due is mapped all the same; where that
   /// fails too, the first error counts. The keyframes before an error are in the map and were

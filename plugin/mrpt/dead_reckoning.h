@@ -8,7 +8,7 @@
 
 namespace efm {
 
-/// The label of poses that were composed from actions; see `poseOriginOf`.
+/// The label of poses that were composed from actions; see `poseSourceOf`.
 inline constexpr const char* kActionsLabel = "actions";
 
 /// Where the movements that actions tell of lead, from the identity on.

@@ -31,13 +31,13 @@ std::optional<PoseNoise> noiseOf(const mrpt::poses::CPose3DPDFGaussian& pose) {
 
 }  // namespace
 
-std::optional<PoseOrigin> poseOriginOf(const mrpt::obs::CObservation& observation) {
+std::optional<PoseSourceId> poseSourceOf(const mrpt::obs::CObservation& observation) {
   const std::string& label = observation.sensorLabel;
   if (dynamic_cast<const CObservationRobotPose*>(&observation) != nullptr) {
-    return PoseOrigin{label == kActionsLabel ? PoseKind::kActions : PoseKind::kPose, label};
+    return PoseSourceId{label == kActionsLabel ? PoseKind::kActions : PoseKind::kPose, label};
   }
   if (dynamic_cast<const CObservationOdometry*>(&observation) != nullptr) {
-    return PoseOrigin{PoseKind::kOdometry, label};
+    return PoseSourceId{PoseKind::kOdometry, label};
   }
   return std::nullopt;
 }

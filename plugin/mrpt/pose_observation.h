@@ -23,7 +23,7 @@ struct ObservedPose {
 
 /// Who says a pose: a CObservationRobotPose (one that is labelled "actions" was composed from them)
 /// or a CObservationOdometry. @return nothing where the observation is neither.
-std::optional<PoseOrigin> poseOriginOf(const mrpt::obs::CObservation& observation);
+std::optional<PoseSourceId> poseSourceOf(const mrpt::obs::CObservation& observation);
 
 /// What a pose's observation says: T_world_body is its pose, T_body_rig the inverse of its sensor's
 /// pose on the robot; odometry is a pose in the plane z = 0, of which velocities do not matter.

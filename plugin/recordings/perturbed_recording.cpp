@@ -127,7 +127,7 @@ void PerturbedRecording::readOne() {
 }
 
 void PerturbedRecording::take(const CObservation::Ptr& observation) {
-  const std::optional<PoseOrigin> origin = poseOriginOf(*observation);
+  const std::optional<PoseSourceId> origin = poseSourceOf(*observation);
   const bool perturbed = origin && origin->kind == PoseKind::kPose;
   const std::optional<std::int64_t> t_ns =
       perturbed ? poseIn(*observation)->t_ns : nanosecondsIfKnown(observation->timestamp);

@@ -54,7 +54,7 @@ class PerturbedRecording : public Recording {
   std::unique_ptr<Recording> recording_;
   TrackerFaults faults_;
   std::int64_t read_ahead_ns_ = 0;
-  std::map<PoseOrigin, std::unique_ptr<Tracker>> trackers_;
+  std::map<PoseSourceId, std::unique_ptr<Tracker>> trackers_;
   std::deque<Entry> ready_;
   std::optional<std::int64_t> newest_ns_;  // that was read
   bool ended_ = false;

@@ -12,8 +12,7 @@ struct Calibration;
 
 /// What was odd about a recording, though it could be read.
 struct RecordingCounts {
-  std::uint64_t sorted_events = 0;         ///< Came later than a newer one, by up to 10 ms.
-  std::uint64_t recalibrated_cameras = 0;  ///< Whose calibration differs from the one given for it.
+  std::uint64_t sorted_events = 0;  ///< Came later than a newer one, by up to 10 ms.
 };
 
 /// A recording as a stream of observations in the order of time: CObservationEvents and

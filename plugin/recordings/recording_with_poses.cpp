@@ -38,7 +38,7 @@ void RecordingWithPoses::readAhead() {
       error_ = std::current_exception();
     }
     ended_ = ahead_ == nullptr;
-    if (ahead_ && poseOriginOf(*ahead_)) ahead_ = nullptr;
+    if (ahead_ && poseSourceOf(*ahead_)) ahead_ = nullptr;
   }
 }
 

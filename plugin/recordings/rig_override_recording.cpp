@@ -7,16 +7,6 @@
 #include "plugin/mrpt/pose_observation.h"
 
 namespace efm {
-namespace {
-
-/// The same but for the rounding of MRPT's poses.
-bool areNear(const Rigid3& T_a_b, const Rigid3& T_a_c) {
-  constexpr double kRounding = 1e-9;
-  const Rigid3 T_b_c = T_a_b.inverse() * T_a_c;
-  return T_b_c.translation.norm() < kRounding && T_b_c.rotation.vec().norm() < kRounding;
-}
-
-}  // namespace
 
 RigOverrideRecording::RigOverrideRecording(std::unique_ptr<Recording> recording, RigSetup setup)
     : recording_(std::move(recording)), setup_(std::move(setup)) {}
@@ -28,28 +18,17 @@ mrpt::obs::CObservation::Ptr RigOverrideRecording::next() {
       setup_.calibration->requireCameras(cameras_.size());
   } else if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     cameras_.insert(packet->camera_index);
-    if (setup_.calibration) recalibrate(*packet);
-  } else if (setup_.T_body_rig && poseOriginOf(*observation)) {
+    if (setup_.calibration) {
+      const RigCamera camera =
+          setup_.calibration->camera(static_cast<std::size_t>(packet->camera_index),
+                                     CameraSize{packet->camera.width, packet->camera.height});
+      packet->camera = camera.model;
+      packet->camera_pose = mrptPoseFrom(camera.T_rig_cam);
+    }
+  } else if (setup_.T_body_rig && poseSourceOf(*observation)) {
     setBodyToRig(*observation, *setup_.T_body_rig);
   }
   return observation;
-}
-
-void RigOverrideRecording::recalibrate(CObservationEvents& packet) {
-  const RigCamera camera =
-      setup_.calibration->camera(static_cast<std::size_t>(packet.camera_index),
-                                 CameraSize{packet.camera.width, packet.camera.height});
-  if (packet.camera != camera.model || !areNear(rigidFrom(packet.camera_pose), camera.T_rig_cam)) {
-    recalibrated_.insert(packet.camera_index);
-  }
-  packet.camera = camera.model;
-  packet.camera_pose = mrptPoseFrom(camera.T_rig_cam);
-}
-
-RecordingCounts RigOverrideRecording::counts() const {
-  RecordingCounts counts = recording_->counts();
-  counts.recalibrated_cameras = recalibrated_.size();
-  return counts;
 }
 
 }  // namespace efm

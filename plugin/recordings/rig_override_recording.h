@@ -11,8 +11,8 @@
 
 namespace efm {
 
-/// A recording whose packets carry another calibration and whose poses say otherwise where the rig
-/// is on the tracked body.
+/// A recording with another calibration in its packets, and another hand-eye transform in its
+/// poses. For who writes or shows observations. A map builder has its own options for both.
 class RigOverrideRecording : public Recording {
  public:
   RigOverrideRecording(std::unique_ptr<Recording> recording, RigSetup setup);
@@ -22,15 +22,12 @@ class RigOverrideRecording : public Recording {
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return recording_->place(); }
   double progress() const override { return recording_->progress(); }
-  RecordingCounts counts() const override;
+  RecordingCounts counts() const override { return recording_->counts(); }
 
  private:
-  void recalibrate(CObservationEvents& packet);
-
   std::unique_ptr<Recording> recording_;
   RigSetup setup_;
-  std::set<int> cameras_;       // that were seen
-  std::set<int> recalibrated_;  // of them: whose own calibration is another
+  std::set<int> cameras_;  // seen so far
 };
 
 }  // namespace efm

@@ -73,7 +73,7 @@ bool TimeCut::readOne() {
     return something_left;
   }
   if (const auto pose = poseIn(*observation)) {
-    takePose(observation, poses_[*poseOriginOf(*observation)], pose->t_ns);
+    takePose(observation, poses_[*poseSourceOf(*observation)], pose->t_ns);
   } else if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     takePacket(packet);
   } else {

@@ -50,7 +50,7 @@ class TimeCut : public Recording {
   std::int64_t t0_ns_;
   std::int64_t t1_ns_;
   bool began_ = false;  // something from t0 on was read
-  std::map<PoseOrigin, PoseTrack> poses_;
+  std::map<PoseSourceId, PoseTrack> poses_;
   std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until it is given
   std::deque<mrpt::obs::CObservation::Ptr> ready_;
   std::map<int, bool> passed_t1_;             // per camera

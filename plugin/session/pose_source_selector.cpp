@@ -7,7 +7,7 @@
 
 namespace efm {
 
-std::string asText(const PoseOrigin& source) {
+std::string asText(const PoseSourceId& source) {
   switch (source.kind) {
     case PoseKind::kPose:
       return "poses " + inQuotes(source.label);
@@ -19,39 +19,40 @@ std::string asText(const PoseOrigin& source) {
   return "actions";
 }
 
-std::vector<StampedPose> PoseChoice::add(const PoseOrigin& source, const StampedPose& pose) {
-  const bool may_be_taken = label_.empty() || source.label == label_;
-  if (!chosen_ && may_be_taken) {
-    held_.push_back({source, pose});
-    const bool waits = label_.empty() && source.kind != PoseKind::kPose && !settled_;
-    return waits ? std::vector<StampedPose>{} : choose(source);
+std::vector<StampedPose> PoseSourceSelector::add(const PoseSourceId& source,
+                                                 const StampedPose& pose) {
+  const bool may_be_selected = label_.empty() || source.label == label_;
+  if (!selected_ && may_be_selected) {
+    waiting_.push_back({source, pose});
+    const bool better_may_come = label_.empty() && source.kind != PoseKind::kPose && waits_;
+    return better_may_come ? std::vector<StampedPose>{} : select(source);
   }
-  if (chosen_ && source == *chosen_) return {pose};
+  if (selected_ && source == *selected_) return {pose};
   ++unused_[source];
   return {};
 }
 
-std::vector<StampedPose> PoseChoice::settle() {
-  settled_ = true;
-  if (chosen_ || held_.empty()) return {};
-  const auto best = std::min_element(held_.begin(), held_.end(), [](const Held& a, const Held& b) {
-    return a.source.kind < b.source.kind;
-  });
-  return choose(PoseOrigin(best->source));
+std::vector<StampedPose> PoseSourceSelector::select() {
+  waits_ = false;
+  if (selected_ || waiting_.empty()) return {};
+  const auto best = std::min_element(
+      waiting_.begin(), waiting_.end(),
+      [](const WaitingPose& a, const WaitingPose& b) { return a.source.kind < b.source.kind; });
+  return select(PoseSourceId(best->source));
 }
 
-/// Gives what was held of a source and counts the rest.
-std::vector<StampedPose> PoseChoice::choose(const PoseOrigin& source) {
-  chosen_ = source;
+/// Returns the waiting poses of a source and counts the others.
+std::vector<StampedPose> PoseSourceSelector::select(const PoseSourceId& source) {
+  selected_ = source;
   std::vector<StampedPose> poses;
-  for (const Held& held : held_) {
-    if (held.source == source) {
-      poses.push_back(held.pose);
+  for (const WaitingPose& waiting : waiting_) {
+    if (waiting.source == source) {
+      poses.push_back(waiting.pose);
     } else {
-      ++unused_[held.source];
+      ++unused_[waiting.source];
     }
   }
-  held_.clear();
+  waiting_.clear();
   return poses;
 }
 

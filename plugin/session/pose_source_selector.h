@@ -13,61 +13,62 @@
 
 namespace efm {
 
-/// What says where the rig is; the first is the best.
+/// The kinds of pose sources, the best first.
 enum class PoseKind {
   kPose,      ///< Poses in the world.
   kOdometry,  ///< Wheels, in the plane: drifts.
   kActions,   ///< Movements, composed: drifts.
 };
 
-/// Who says it: a kind, and the label of its sensor.
-struct PoseOrigin {
+/// A source of poses: its kind, and the label of its sensor.
+struct PoseSourceId {
   PoseKind kind = PoseKind::kPose;
   std::string label;
 
-  friend bool operator<(const PoseOrigin& a, const PoseOrigin& b) {
+  friend bool operator<(const PoseSourceId& a, const PoseSourceId& b) {
     return std::tie(a.kind, a.label) < std::tie(b.kind, b.label);
   }
-  friend bool operator==(const PoseOrigin& a, const PoseOrigin& b) {
+  friend bool operator==(const PoseSourceId& a, const PoseSourceId& b) {
     return a.kind == b.kind && a.label == b.label;
   }
 };
 
 /// "odometry 'wheels'", for messages.
-std::string asText(const PoseOrigin& source);
+std::string asText(const PoseSourceId& source);
 
-/// Takes the poses of one source and counts those of the others: two sources have two worlds, or
-/// one of them is worse, and their mixture is none.
+/// Selects the poses of one source and counts those of others. The poses of two sources are never
+/// mixed: they have two worlds, or one of them is worse.
 ///
-/// The best kind wins, and of two of a kind the one that came first. Poses of the best kind choose
-/// their source at once; others are held until `settle`, as a better one may still come.
-class PoseChoice {
+/// The best kind wins, and of two sources of a kind the first one. A pose of the best kind selects
+/// its source at once. Poses of other kinds wait until `select`, because a better source may still
+/// come.
+class PoseSourceSelector {
  public:
-  /// @param label of the source to take; empty: the best.
-  explicit PoseChoice(std::string label) : label_(std::move(label)) {}
+  /// @param label the source's label; empty: the best source.
+  explicit PoseSourceSelector(std::string label) : label_(std::move(label)) {}
 
-  /// @return the poses that are to be used from now on, in the order they came.
-  std::vector<StampedPose> add(const PoseOrigin& source, const StampedPose& pose);
-  /// Ends the waiting for a better source. @return as `add`.
-  std::vector<StampedPose> settle();
+  /// @return the poses to use from now on, in the order they came.
+  std::vector<StampedPose> add(const PoseSourceId& source, const StampedPose& pose);
+  /// Selects the best source so far and waits no longer. @return as `add`.
+  std::vector<StampedPose> select();
 
-  const std::optional<PoseOrigin>& chosen() const { return chosen_; }
-  /// Poses of other sources.
-  const std::map<PoseOrigin, std::uint64_t>& unused() const { return unused_; }
+  const std::optional<PoseSourceId>& selected() const { return selected_; }
+  /// The number of poses of other sources.
+  const std::map<PoseSourceId, std::uint64_t>& unused() const { return unused_; }
 
  private:
-  struct Held {
-    PoseOrigin source;
+  struct WaitingPose {
+    PoseSourceId source;
     StampedPose pose;
   };
 
-  std::vector<StampedPose> choose(const PoseOrigin& source);
+  std::vector<StampedPose> select(const PoseSourceId& source);
 
   std::string label_;
-  std::optional<PoseOrigin> chosen_;
-  bool settled_ = false;
-  std::vector<Held> held_;
-  std::map<PoseOrigin, std::uint64_t> unused_;
+  std::optional<PoseSourceId> selected_;
+  bool waits_ = true;  // for a better source
+  std::vector<WaitingPose> waiting_;
+  std::map<PoseSourceId, std::uint64_t> unused_;
 };
 
 }  // namespace efm

@@ -40,7 +40,7 @@ TEST(DeadReckoning, ComposesMovementsInThePlane) {
   EXPECT_EQ(poseIn(reckoning.poseAfter(planarAction(1000, 2, 0, kQuarterTurn), {})).t_ns, 1000);
   const auto observation = reckoning.poseAfter(planarAction(2000, 3, 0, 0), {});
   EXPECT_EQ(observation->sensorLabel, "actions");
-  EXPECT_EQ(poseOriginOf(*observation)->kind, PoseKind::kActions);
+  EXPECT_EQ(poseSourceOf(*observation)->kind, PoseKind::kActions);
   const ObservedPose pose = poseIn(observation);
   EXPECT_EQ(pose.t_ns, 2000);
   EXPECT_LT((pose.T_world_body.translation - Eigen::Vector3d(2, 3, 0)).norm(), 1e-12);
@@ -86,7 +86,7 @@ TEST(PoseObservation, OdometryIsAPoseInThePlane) {
   odometry.timestamp = mrptTimeFrom(1000);
   odometry.odometry = mrpt::poses::CPose2D(1, 2, kQuarterTurn);
   odometry.hasVelocities = true;
-  EXPECT_EQ(poseOriginOf(odometry), (PoseOrigin{PoseKind::kOdometry, "wheels"}));
+  EXPECT_EQ(poseSourceOf(odometry), (PoseSourceId{PoseKind::kOdometry, "wheels"}));
   const ObservedPose pose = efm::poseIn(odometry).value();
   EXPECT_LT((pose.T_world_body * Eigen::Vector3d(1, 0, 5) - Eigen::Vector3d(1, 3, 5)).norm(),
             1e-12);

@@ -114,7 +114,7 @@ TEST(PerturbedRecording, PutsPosesInWhereTheyBelongInTime) {
   EXPECT_EQ(posesOf(all, "two").size(), 21U + 4 * 2 + 4);
   for (std::size_t i = 1; i < all.size(); ++i) {
     EXPECT_LE(timeOf(*all[i - 1]), timeOf(*all[i]));
-    const bool pose_after_packet = poseOriginOf(*all[i]) && !poseOriginOf(*all[i - 1]) &&
+    const bool pose_after_packet = poseSourceOf(*all[i]) && !poseSourceOf(*all[i - 1]) &&
                                    timeOf(*all[i - 1]) == timeOf(*all[i]);
     EXPECT_FALSE(pose_after_packet) << i;
   }
@@ -137,7 +137,7 @@ TEST(PerturbedRecording, MovesWhatIsStatedAndKeepsTheRest) {
   }
   std::size_t others = 0;
   for (const auto& observation : all) {
-    const auto origin = poseOriginOf(*observation);
+    const auto origin = poseSourceOf(*observation);
     others += !origin || origin->kind != PoseKind::kPose ? 1 : 0;
   }
   EXPECT_EQ(others, original.size() - 2 * 21) << "packets and odometry";

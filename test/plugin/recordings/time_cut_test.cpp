@@ -56,7 +56,7 @@ std::string describe(const CObservation& observation) {
   const bool timed = observation.timestamp != INVALID_TIMESTAMP;
   const std::string begin = timed ? std::to_string(nanosecondsFrom(observation.timestamp)) : "?";
   const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
-  if (!events) return (poseOriginOf(observation) ? "pose " : "other ") + begin;
+  if (!events) return (poseSourceOf(observation) ? "pose " : "other ") + begin;
   std::string text = "cam" + std::to_string(events->camera_index) + " " + begin + " (";
   for (const Event& event : events->events) {
     text += (text.back() == '(' ? "" : " ") + std::to_string(event.t_ns);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "maps/metrics/depth_metrics.h"
+#include "plugin/session/no_keyframe.h"
 #include "test/plugin/session/synthetic_recording.h"
 
 namespace efm {

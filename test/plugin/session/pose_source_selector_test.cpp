@@ -11,10 +11,10 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::Pair;
 
-const PoseOrigin kMocap = {PoseKind::kPose, "mocap"};
-const PoseOrigin kSlam = {PoseKind::kPose, "slam"};
-const PoseOrigin kWheels = {PoseKind::kOdometry, "wheels"};
-const PoseOrigin kActions = {PoseKind::kActions, "actions"};
+const PoseSourceId kMocap = {PoseKind::kPose, "mocap"};
+const PoseSourceId kSlam = {PoseKind::kPose, "slam"};
+const PoseSourceId kWheels = {PoseKind::kOdometry, "wheels"};
+const PoseSourceId kActions = {PoseKind::kActions, "actions"};
 
 std::vector<std::int64_t> timesOf(const std::vector<StampedPose>& poses) {
   std::vector<std::int64_t> times;
@@ -23,55 +23,55 @@ std::vector<std::int64_t> timesOf(const std::vector<StampedPose>& poses) {
   return times;
 }
 
-TEST(PoseChoice, OfTwoOfAKindTheOneThatComesFirstStands) {
-  PoseChoice choice("");
-  EXPECT_THAT(timesOf(choice.add(kMocap, {1, {}})), ElementsAre(1)) << "at once";
-  EXPECT_THAT(choice.add(kSlam, {2, {}}), IsEmpty());
-  EXPECT_THAT(timesOf(choice.add(kMocap, {3, {}})), ElementsAre(3));
-  EXPECT_EQ(choice.chosen(), kMocap);
-  EXPECT_THAT(choice.unused(), ElementsAre(Pair(kSlam, 1)));
+TEST(PoseSourceSelector, OfTwoOfAKindTheOneThatComesFirstStands) {
+  PoseSourceSelector selector("");
+  EXPECT_THAT(timesOf(selector.add(kMocap, {1, {}})), ElementsAre(1)) << "at once";
+  EXPECT_THAT(selector.add(kSlam, {2, {}}), IsEmpty());
+  EXPECT_THAT(timesOf(selector.add(kMocap, {3, {}})), ElementsAre(3));
+  EXPECT_EQ(selector.selected(), kMocap);
+  EXPECT_THAT(selector.unused(), ElementsAre(Pair(kSlam, 1)));
 }
 
-TEST(PoseChoice, ABetterKindThatComesLaterWinsWhileItIsWaitedFor) {
-  PoseChoice choice("");
-  EXPECT_THAT(choice.add(kActions, {1, {}}), IsEmpty());
-  EXPECT_THAT(choice.add(kWheels, {2, {}}), IsEmpty());
-  EXPECT_THAT(timesOf(choice.add(kMocap, {3, {}})), ElementsAre(3));
-  EXPECT_THAT(choice.settle(), IsEmpty());
-  EXPECT_THAT(choice.unused(), ElementsAre(Pair(kWheels, 1), Pair(kActions, 1)));
+TEST(PoseSourceSelector, ABetterKindThatComesLaterWinsWhileItIsWaitedFor) {
+  PoseSourceSelector selector("");
+  EXPECT_THAT(selector.add(kActions, {1, {}}), IsEmpty());
+  EXPECT_THAT(selector.add(kWheels, {2, {}}), IsEmpty());
+  EXPECT_THAT(timesOf(selector.add(kMocap, {3, {}})), ElementsAre(3));
+  EXPECT_THAT(selector.select(), IsEmpty());
+  EXPECT_THAT(selector.unused(), ElementsAre(Pair(kWheels, 1), Pair(kActions, 1)));
 }
 
-TEST(PoseChoice, WhatWasHeldOfTheBestComesOutInOrderOnceNothingBetterIsWaitedFor) {
-  PoseChoice choice("");
-  choice.add(kActions, {1, {}});
-  choice.add(kWheels, {2, {}});
-  choice.add(kWheels, {3, {}});
-  EXPECT_THAT(timesOf(choice.settle()), ElementsAre(2, 3));
-  EXPECT_EQ(choice.chosen(), kWheels);
-  EXPECT_THAT(timesOf(choice.add(kWheels, {4, {}})), ElementsAre(4));
-  EXPECT_THAT(choice.add(kMocap, {5, {}}), IsEmpty()) << "too late: a map has been begun";
-  EXPECT_THAT(choice.unused(), ElementsAre(Pair(kMocap, 1), Pair(kActions, 1)));
+TEST(PoseSourceSelector, WhatWasHeldOfTheBestComesOutInOrderOnceNothingBetterIsWaitedFor) {
+  PoseSourceSelector selector("");
+  selector.add(kActions, {1, {}});
+  selector.add(kWheels, {2, {}});
+  selector.add(kWheels, {3, {}});
+  EXPECT_THAT(timesOf(selector.select()), ElementsAre(2, 3));
+  EXPECT_EQ(selector.selected(), kWheels);
+  EXPECT_THAT(timesOf(selector.add(kWheels, {4, {}})), ElementsAre(4));
+  EXPECT_THAT(selector.add(kMocap, {5, {}}), IsEmpty()) << "too late: a map has been begun";
+  EXPECT_THAT(selector.unused(), ElementsAre(Pair(kMocap, 1), Pair(kActions, 1)));
 }
 
-TEST(PoseChoice, OnceSettledWithoutAnyTheNextOneIsTaken) {
-  PoseChoice choice("");
-  EXPECT_THAT(choice.settle(), IsEmpty());
-  EXPECT_THAT(timesOf(choice.add(kActions, {1, {}})), ElementsAre(1));
+TEST(PoseSourceSelector, OnceSettledWithoutAnyTheNextOneIsTaken) {
+  PoseSourceSelector selector("");
+  EXPECT_THAT(selector.select(), IsEmpty());
+  EXPECT_THAT(timesOf(selector.add(kActions, {1, {}})), ElementsAre(1));
 }
 
-TEST(PoseChoice, ALabelChoosesItsSourceWhateverElseThereIs) {
-  PoseChoice choice("wheels");
-  EXPECT_THAT(choice.add(kMocap, {1, {}}), IsEmpty());
-  EXPECT_THAT(timesOf(choice.add(kWheels, {2, {}})), ElementsAre(2));
-  EXPECT_THAT(choice.unused(), ElementsAre(Pair(kMocap, 1)));
+TEST(PoseSourceSelector, ALabelChoosesItsSourceWhateverElseThereIs) {
+  PoseSourceSelector selector("wheels");
+  EXPECT_THAT(selector.add(kMocap, {1, {}}), IsEmpty());
+  EXPECT_THAT(timesOf(selector.add(kWheels, {2, {}})), ElementsAre(2));
+  EXPECT_THAT(selector.unused(), ElementsAre(Pair(kMocap, 1)));
 }
 
-TEST(PoseChoice, ALabelThatNobodyHasTakesNothing) {
-  PoseChoice choice("gps");
-  choice.add(kMocap, {1, {}});
-  EXPECT_THAT(choice.settle(), IsEmpty());
-  EXPECT_FALSE(choice.chosen());
-  EXPECT_THAT(choice.unused(), ElementsAre(Pair(kMocap, 1)));
+TEST(PoseSourceSelector, ALabelThatNobodyHasTakesNothing) {
+  PoseSourceSelector selector("gps");
+  selector.add(kMocap, {1, {}});
+  EXPECT_THAT(selector.select(), IsEmpty());
+  EXPECT_FALSE(selector.selected());
+  EXPECT_THAT(selector.unused(), ElementsAre(Pair(kMocap, 1)));
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 using testing::HasSubstr;
 
-const PoseOrigin kTracker{PoseKind::kPose, "tracker"};
+const PoseSourceId kTracker{PoseKind::kPose, "tracker"};
 
 EventFusionOptions optionsOf(bool background) {
   EventFusionOptions options = refinedOptions();
@@ -149,7 +149,7 @@ TEST(RefinedSessionMap, IsTheSameWhenItIsSettledAtAnyTime) {
   addPoses(settled, recording.poses);
   addEvents(settled, recording);
   settled.finish();
-  while (settled.next()) settled.settle();
+  while (settled.next()) settled.applyPending();
   expectSameMap(settled, undisturbed);
 }
 
@@ -271,8 +271,8 @@ TEST(StatedNoise, OfPosesThatAreNotUsedDoesNotCount) {
   options.rig.pose_source = kTracker.label;
   MappingSession expected(options);
   mapAll(expected, recording);
-  for (const PoseOrigin& other :
-       {PoseOrigin{PoseKind::kPose, "other"}, PoseOrigin{PoseKind::kOdometry, "wheels"}}) {
+  for (const PoseSourceId& other :
+       {PoseSourceId{PoseKind::kPose, "other"}, PoseSourceId{PoseKind::kOdometry, "wheels"}}) {
     MappingSession session(options);
     for (const StampedPose& pose : recording.poses) {
       session.addPose(pose, other, PoseNoise{0.5, 0.5});

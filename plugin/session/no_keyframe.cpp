@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/no_keyframe.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+std::string asText(const TimeSpan& span) {
+  return fmt::format("{} to {} s", formatSeconds(span.first_ns), formatSeconds(span.last_ns));
+}
+
+/// What makes a window full, by the policy.
+std::string fullWindow(const KeyframePolicyOptions& options) {
+  const std::string duration = formatSeconds(durationFromSeconds(options.window_s));
+  switch (options.policy) {
+    case KeyframePolicyKind::kEvents:
+      return fmt::format("{} events (window_events)", options.window_events);
+    case KeyframePolicyKind::kBaseline:
+      return fmt::format(
+          "at most {} s (window_s) with motion enough (min_baseline_ratio, min_visible_share)",
+          duration);
+    case KeyframePolicyKind::kPeriod:
+      break;
+  }
+  return duration + " s (window_s)";
+}
+
+std::string whyNoPoses(const SessionStatus& status) {
+  std::string why = "the recording has no poses";
+  const char* before = " of the source that [rig] pose_source says, but of ";
+  for (const auto& [source, count] : status.other_poses) {
+    why += std::exchange(before, ", ") + asText(source);
+  }
+  return why;
+}
+
+}  // namespace
+
+std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
+  if (!status.events) return "the recording has no events";
+  if (!status.poses) return whyNoPoses(status);
+  const std::string spans = fmt::format("the events span {}, the poses {}", asText(*status.events),
+                                        asText(*status.poses));
+  const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);
+  const std::int64_t last_ns = std::min(status.events->last_ns, status.poses->last_ns);
+  if (first_ns > last_ns) {
+    return fmt::format("{}: they miss each other by {} s", spans,
+                       formatSeconds(first_ns - last_ns));
+  }
+  const EventCounts counts = status.counts.total();
+  if (counts.filtered > 0 && counts.used == 0 && counts.filtered + counts.dropped == counts.read) {
+    return fmt::format(
+        "the filters took all {} events of the selected cameras for noise: [filter] is too strict "
+        "for this recording",
+        counts.filtered);
+  }
+  const std::uint64_t without_pose = status.counts.keyframes_without_pose;
+  const bool saw_nothing = without_pose == 0 && status.counts.windows_without_events > 0;
+  if (options.only_window) {
+    const Window& window = *options.only_window;
+    const std::string interval = "the window " + asText({window.t0_ns, window.t1_ns});
+    if (saw_nothing) {
+      return fmt::format("the selected cameras have no event in {}; {}", interval, spans);
+    }
+    return fmt::format("there is no pose at the reference time {} s of {}; {}",
+                       formatSeconds(window.t_ref_ns), interval, spans);
+  }
+  if (saw_nothing) {
+    return "the selected cameras have no event in any window that was full: " + spans;
+  }
+  if (without_pose > 0) {
+    return fmt::format(
+        "{} windows were full, but had no pose at their reference times: poses are more than "
+        "max_pose_gap_s apart there",
+        without_pose);
+  }
+  return fmt::format("no window of {} was full: {}, {} s of them together",
+                     fullWindow(options.keyframes), spans, formatSeconds(last_ns - first_ns));
+}
+
+}  // namespace efm

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/rig_assembly.h"
+
+#include <fmt/format.h>
+
+#include <iterator>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+
+namespace efm {
+namespace {
+
+/// Equal but for the rounding of MRPT's poses.
+bool areNear(const Rigid3& T_a_b, const Rigid3& T_a_c) {
+  constexpr double kRounding = 1e-9;
+  const Rigid3 T_b_c = T_a_b.inverse() * T_a_c;
+  return T_b_c.translation.norm() < kRounding && T_b_c.rotation.vec().norm() < kRounding;
+}
+
+}  // namespace
+
+RigAssembly::RigAssembly(const EventFusionOptions& options)
+    : selected_cameras_(options.mapper.cameras),
+      reference_camera_(options.mapper.keyframe.reference_camera),
+      time_offsets_ns_(options.rig.time_offsets_ns),
+      setup_(readRigSetup(options.rig)) {}
+
+std::vector<CameraPacket> RigAssembly::add(CameraPacket packet, FusionMapper& mapper) {
+  if (packet.camera < 0) {
+    throw std::invalid_argument(fmt::format("camera {}: must be 0 or above", packet.camera));
+  }
+  applyOptions(packet);
+  std::vector<CameraPacket> ready;
+  if (packet.camera > num_cameras_) {
+    letWait(std::move(packet));
+    return ready;
+  }
+  const bool is_new = packet.camera == num_cameras_;
+  if (is_new) {
+    requireIncomplete(packet.camera);
+    addCamera(packet.calibration, mapper);
+  }
+  ready.push_back(std::move(packet));
+  if (!is_new) return ready;
+  // Cameras come before any of their packets: a packet may complete the rig.
+  for (auto next = waiting_.extract(num_cameras_); next; next = waiting_.extract(num_cameras_)) {
+    addCamera(next.mapped().front().calibration, mapper);
+    std::move(next.mapped().begin(), next.mapped().end(), std::back_inserter(ready));
+  }
+  return ready;
+}
+
+void RigAssembly::applyOptions(CameraPacket& packet) {
+  const auto camera = static_cast<std::size_t>(packet.camera);
+  RigCamera& recorded = packet.calibration;
+  if (setup_.calibration) {
+    const RigCamera given =
+        setup_.calibration->camera(camera, CameraSize{recorded.model.width, recorded.model.height});
+    if (given.model != recorded.model || !areNear(given.T_rig_cam, recorded.T_rig_cam)) {
+      recalibrated_.insert(packet.camera);
+    }
+    recorded = given;
+  }
+  if (time_offsets_ns_.empty()) return;
+  requireOption(camera < time_offsets_ns_.size(), "[rig] time_offsets_s (how many)",
+                time_offsets_ns_.size(),
+                fmt::format("one per camera, and there is camera {}", camera));
+  recorded.time_offset_ns = time_offsets_ns_[camera];
+}
+
+void RigAssembly::addCamera(const RigCamera& camera, FusionMapper& mapper) {
+  mapper.addCamera(camera);
+  ++num_cameras_;
+}
+
+void RigAssembly::letWait(CameraPacket packet) {
+  constexpr std::int64_t kMaxWaitNs = kNanosecondsPerSecond;
+  const int camera = packet.camera;
+  if (complete_ && waiting_.count(camera) != 0) refuseWithoutNext(camera);
+  requireIncomplete(camera);
+  packet.calibration.model.validate();
+  if (!packet.events.empty()) {
+    const std::int64_t begin_ns = packet.events.front().t_ns + packet.calibration.time_offset_ns;
+    if (!waiting_since_ns_) waiting_since_ns_ = begin_ns;
+    if (begin_ns - *waiting_since_ns_ > kMaxWaitNs) refuseWithoutNext(camera);
+  }
+  waiting_[camera].push_back(std::move(packet));
+}
+
+void RigAssembly::refuseWithoutNext(int camera) const {
+  throw std::invalid_argument(fmt::format(
+      "the recording has events of camera {} but none of camera {}", camera, num_cameras_));
+}
+
+void RigAssembly::requireIncomplete(int camera) const {
+  if (!complete_) return;
+  throw std::invalid_argument(fmt::format(
+      "camera {} first appears when the rig is complete: all cameras must be there within a second "
+      "of the first event, and before that where somebody asks for the map",
+      camera));
+}
+
+void RigAssembly::requireOptionsFit() const {
+  const auto count = static_cast<std::size_t>(num_cameras_);
+  const std::string expected = fmt::format("a camera of the recording: 0 to {}", num_cameras_ - 1);
+  for (const int camera : selected_cameras_) {
+    requireOption(camera < num_cameras_, "[rig] cameras", camera, expected);
+  }
+  if (count == 0) return;
+  requireOption(reference_camera_ < num_cameras_, "[dsi] reference_camera", reference_camera_,
+                expected);
+  if (setup_.calibration) setup_.calibration->requireCameras(count);
+  requireOption(time_offsets_ns_.empty() || time_offsets_ns_.size() == count,
+                "[rig] time_offsets_s (how many)", time_offsets_ns_.size(),
+                fmt::format("one per camera of the recording: {}", count));
+}
+
+void RigAssembly::requireNoneWaits() const {
+  if (!waiting_.empty()) refuseWithoutNext(waiting_.begin()->first);
+}
+
+}  // namespace efm

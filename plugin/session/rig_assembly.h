@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/keyframes/fusion_mapper.h"
+#include "plugin/session/event_fusion_options.h"
+#include "plugin/session/rig_setup.h"
+
+namespace efm {
+
+/// An interval of one camera's recording.
+struct CameraPacket {
+  int camera = 0;         ///< Index in the rig.
+  RigCamera calibration;  ///< The same in all packets of a camera; the options may replace it.
+  std::vector<Event> events;
+  /// All events of the camera before this time (its own clock) are in this packet or earlier ones.
+  std::optional<std::int64_t> covered_until_ns;
+};
+
+/// Puts the rig together as its cameras appear in any order: packets of a camera wait until all
+/// cameras of lower indices are there. Gives cameras the calibration and the time offset of the
+/// options.
+class RigAssembly {
+ public:
+  /// @throws std::runtime_error naming a file of the options that cannot be read.
+  explicit RigAssembly(const EventFusionOptions& options);
+
+  /// Adds the packet's camera to the mapper if it is the next one, and then each camera that waited
+  /// for it.
+  /// @return the packets of known cameras, in the order to feed them; none while this one waits.
+  /// @throws std::invalid_argument where the packet contradicts the options' calibration, the rig
+  /// is complete without its camera, or it has waited for a camera for more than a second of
+  /// events.
+  std::vector<CameraPacket> add(CameraPacket packet, FusionMapper& mapper);
+
+  /// @throws std::invalid_argument where the options name a camera that the rig does not have, or
+  /// its calibration or time offsets are of another number of cameras.
+  void requireOptionsFit() const;
+  /// From now on a new camera is an error.
+  void complete() { complete_ = true; }
+  bool isComplete() const { return complete_; }
+
+  bool anyCameraWaits() const { return !waiting_.empty(); }
+  /// @throws std::invalid_argument where a camera waits for one that never came.
+  void requireNoneWaits() const;
+
+  /// The files of the options.
+  const RigSetup& setup() const { return setup_; }
+  /// The number of cameras whose recorded calibration differs from the options'.
+  std::size_t recalibratedCameras() const { return recalibrated_.size(); }
+
+ private:
+  void applyOptions(CameraPacket& packet);
+  void addCamera(const RigCamera& camera, FusionMapper& mapper);
+  void letWait(CameraPacket packet);
+  [[noreturn]] void refuseWithoutNext(int camera) const;
+  void requireIncomplete(int camera) const;
+
+  std::vector<int> selected_cameras_;
+  int reference_camera_;
+  std::vector<std::int64_t> time_offsets_ns_;
+  RigSetup setup_;
+
+  int num_cameras_ = 0;
+  bool complete_ = false;
+  std::set<int> recalibrated_;
+  std::map<int, std::vector<CameraPacket>> waiting_;  // by camera
+  std::optional<std::int64_t> waiting_since_ns_;      // begin of their first event
+};
+
+}  // namespace efm
