@@ -10,7 +10,9 @@
 #include <set>
 #include <sstream>
 
+#include "mapping/geometry/angle.h"
 #include "test/paths.h"
+#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -29,25 +31,16 @@ EventFusionOptions optionsOf(std::string_view text) {
   return reader.options();
 }
 
-/// The message of the error that reading a text gives.
 std::string errorOf(std::string_view text) {
-  try {
-    optionsOf(text);
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return messageOf([&] { optionsOf(text); });
 }
 
 std::string errorOfSet(std::string_view assignment) {
-  try {
+  return messageOf([&] {
     OptionReader reader;
     reader.set(assignment);
     reader.options();
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  });
 }
 
 std::string listed(const EventFusionOptions& options) {
@@ -63,179 +56,123 @@ TEST(OptionReader, KeysThatAreNotGivenKeepTheirDefaults) {
   EXPECT_EQ(listed(optionsOf("")), listed(EventFusionOptions{}));
 }
 
-TEST(OptionReader, EveryKeyReachesItsField) {
-  const EventFusionOptions options = optionsOf(R"(
-[rig]
-calibration = a.yaml
-hand_eye = /b.yaml
-cameras = 0, 2
-time_offsets_s = 0, 0.001
-pose_source = wheels
-max_pose_gap_s = 0.5
-exclude_silent = true
-[filter]
-hot_pixels = false
-hot_pixel_ratio = 7.5
-hot_pixel_period_s = 2
-hot_pixel_min_events = 9
-background_activity_s = 0.02
-[keyframes]
-policy = baseline
-window_s = 0.25
-stride_s = 1e-1
-window_events = 5000000000
-min_baseline_ratio = 0.3
-min_visible_share = 0.25
-reference = end
-[dsi]
-min_depth_m = 1
-max_depth_m = 20
-num_planes = 64
-spacing = linear
-reference_camera = 2
-fov_deg = 100.5
-width = 800
-height = 1
-rv_offset_m = -0.5, 1e-3,2
-[fusion]
-across_cameras = geometric
-across_time = rms
-order = time_then_cameras
-subintervals = 8
-split = count
-shuffle = random
-shuffle_seed = 4294967295
-late = true
-[depth]
-extraction = paper
-threshold_kernel = 7
-threshold_c = -2.5
-max_confidence = 31.5
-median_size = 3
-dilate = true
-subplane = false
-[output]
-camera_maps = true
-event_images = true
-[map]
-voxel_size_m = 0.05
-min_keyframes = 3
-consistency = support
-consistency_tolerance = 0.2
-consistency_cell_deg = 1.5
-max_contradictions = 2
-[refinement]
-correct_motion = true
-motion_sigma_m_s = 0.02
-motion_sigma_deg_s = 3
-motion_rounds = 4
-enabled = true
-background = true
-window = 5
-map_keyframes = 2
-max_points = 100
-max_map_points = 300
-tracker_noise_m = 0.03
-tracker_noise_deg = 90
-tracker_drift = 0.04
-tracker_drift_deg_per_m = 180
-adapt_tracker = false
-robust_sigmas = 4
-first_distance_px = 8
-last_distance_px = 1.5
-loops = false
-loop_min_overlap = 0.6
-loop_min_inliers = 0.7
-loop_max_sigma_m = 0.08
-loop_max_sigma_deg = 45
-loop_checks = 9
-[performance]
-threads = 2
-kernel = plain
-packet_error_px = 0
-)");
+/// An assignment, and whether its field has the value.
+struct FieldCase {
+  const char* assignment;
+  bool (*holds)(const EventFusionOptions&);
+};
+#define EFM_ROW(assignment, field, value)                                    \
+  {                                                                          \
+    assignment, [](const EventFusionOptions& o) { return o.field == value; } \
+  }
+const FieldCase kFields[] = {
+    EFM_ROW("rig.calibration=a.yaml", rig.calibration, "a.yaml"),
+    EFM_ROW("rig.hand_eye=/b.yaml", rig.hand_eye, "/b.yaml"),
+    EFM_ROW("rig.cameras=0, 2", mapper.cameras, (std::vector<int>{0, 2})),
+    EFM_ROW("rig.time_offsets_s=0, 0.001", rig.time_offsets_ns,
+            (std::vector<std::int64_t>{0, 1'000'000})),
+    EFM_ROW("rig.pose_source=wheels", rig.pose_source, "wheels"),
+    EFM_ROW("rig.max_pose_gap_s=0.5", mapper.trajectory.max_pose_gap_s, 0.5),
+    EFM_ROW("rig.exclude_silent=true", mapper.keyframe.exclude_silent, true),
+    EFM_ROW("keyframes.policy=baseline", mapper.keyframes.policy, KeyframePolicyKind::kBaseline),
+    EFM_ROW("keyframes.window_s=0.25", mapper.keyframes.window_s, 0.25),
+    EFM_ROW("keyframes.stride_s=1e-1", mapper.keyframes.stride_s, 0.1),
+    EFM_ROW("keyframes.window_events=5000000000", mapper.keyframes.window_events, 5'000'000'000),
+    EFM_ROW("keyframes.min_baseline_ratio=0.3", mapper.keyframes.min_baseline_ratio, 0.3),
+    EFM_ROW("keyframes.min_visible_share=0.25", mapper.keyframes.min_visible_share, 0.25),
+    EFM_ROW("keyframes.reference=end", mapper.keyframes.reference, ReferenceTime::kEnd),
+    EFM_ROW("dsi.min_depth_m=1", mapper.keyframe.planes.min_depth_m, 1),
+    EFM_ROW("dsi.max_depth_m=20", mapper.keyframe.planes.max_depth_m, 20),
+    EFM_ROW("dsi.num_planes=64", mapper.keyframe.planes.num_planes, 64),
+    EFM_ROW("dsi.spacing=linear", mapper.keyframe.planes.spacing, PlaneSpacing::kLinear),
+    EFM_ROW("dsi.reference_camera=2", mapper.keyframe.reference_camera, 2),
+    EFM_ROW("dsi.fov_deg=100.5", mapper.keyframe.view.fov_deg, 100.5),
+    EFM_ROW("dsi.width=800", mapper.keyframe.view.width, 800),
+    EFM_ROW("dsi.height=1", mapper.keyframe.view.height, 1),
+    EFM_ROW("dsi.rv_offset_m=-0.5, 1e-3,2", mapper.keyframe.view.offset_m,
+            Eigen::Vector3d(-0.5, 1e-3, 2)),
+    EFM_ROW("fusion.across_cameras=geometric", mapper.keyframe.sweep.fusion.across_cameras,
+            FusionRule::kGeometric),
+    EFM_ROW("fusion.across_time=rms", mapper.keyframe.sweep.fusion.across_time, FusionRule::kRms),
+    EFM_ROW("fusion.order=time_then_cameras", mapper.keyframe.sweep.fusion.order,
+            FusionOrder::kTimeThenCameras),
+    EFM_ROW("fusion.subintervals=8", mapper.keyframe.subintervals.count, 8),
+    EFM_ROW("fusion.split=count", mapper.keyframe.subintervals.split, SubintervalSplit::kCount),
+    EFM_ROW("fusion.shuffle=random", mapper.keyframe.subintervals.shuffle,
+            SubintervalShuffle::kRandom),
+    EFM_ROW("fusion.shuffle_seed=4294967295", mapper.keyframe.subintervals.shuffle_seed,
+            4'294'967'295U),
+    EFM_ROW("fusion.split_polarity=false", mapper.keyframe.split.polarity, false),
+    EFM_ROW("fusion.time_slices=3", mapper.keyframe.split.time_slices, 3),
+    EFM_ROW("fusion.late=true", late_fusion, true),
+    EFM_ROW("depth.extraction=paper", mapper.keyframe.extraction.extraction,
+            ExtractionMethod::kPaper),
+    EFM_ROW("depth.threshold_kernel=7", mapper.keyframe.extraction.threshold_kernel, 7),
+    EFM_ROW("depth.min_excess=0.75", mapper.keyframe.extraction.min_excess, 0.75),
+    EFM_ROW("depth.min_quality=0.55", mapper.keyframe.extraction.min_quality, 0.55),
+    EFM_ROW("depth.threshold_c=-2.5", mapper.keyframe.extraction.threshold_c, -2.5),
+    EFM_ROW("depth.max_confidence=31.5", mapper.keyframe.extraction.max_confidence.fixed, 31.5),
+    EFM_ROW("depth.median_size=3", mapper.keyframe.extraction.median_size, 3),
+    EFM_ROW("depth.dilate=true", mapper.keyframe.extraction.dilate, true),
+    EFM_ROW("depth.subplane=false", mapper.keyframe.extraction.subplane, false),
+    EFM_ROW("map.voxel_size_m=0.05", cloud.voxel_size_m, 0.05),
+    EFM_ROW("map.min_keyframes=3", cloud.min_keyframes, 3),
+    EFM_ROW("map.outlier_radius_m=0.3", cloud.outliers.outlier_radius_m, 0.3),
+    EFM_ROW("map.outlier_min_neighbors=4", cloud.outliers.outlier_min_neighbors, 4),
+    EFM_ROW("map.consistency=support", cloud.consistency.consistency, Consistency::kSupport),
+    EFM_ROW("map.consistency_tolerance=0.2", cloud.consistency.consistency_tolerance, 0.2),
+    EFM_ROW("map.consistency_cell_deg=1.5", cloud.consistency.consistency_cell_deg, 1.5),
+    EFM_ROW("map.max_contradictions=2", cloud.consistency.max_contradictions, 2),
+    EFM_ROW("filter.hot_pixels=false", mapper.filter.hot_pixels, false),
+    EFM_ROW("filter.hot_pixel_ratio=7.5", mapper.filter.hot_pixel.ratio, 7.5),
+    EFM_ROW("filter.hot_pixel_period_s=2", mapper.filter.hot_pixel.period_s, 2),
+    EFM_ROW("filter.hot_pixel_min_events=9", mapper.filter.hot_pixel.min_events, 9),
+    EFM_ROW("filter.background_activity_s=0.02", mapper.filter.background_activity_s, 0.02),
+    EFM_ROW("refinement.enabled=true", refinement.enabled, true),
+    EFM_ROW("refinement.background=true", refinement.background, true),
+    EFM_ROW("refinement.window=5", refinement.refiner.window, 5),
+    EFM_ROW("refinement.map_keyframes=2", refinement.refiner.map_keyframes, 2),
+    EFM_ROW("refinement.max_points=100", refinement.refiner.points.max_points, 100),
+    EFM_ROW("refinement.max_map_points=300", refinement.refiner.points.max_map_points, 300),
+    EFM_ROW("refinement.tracker_noise_m=0.03", refinement.refiner.tracker.noise_m, 0.03),
+    EFM_ROW("refinement.tracker_noise_deg=90", refinement.refiner.tracker.noise_rad,
+            90 * kRadiansPerDegree),
+    EFM_ROW("refinement.tracker_drift=0.04", refinement.refiner.tracker.drift_m, 0.04),
+    EFM_ROW("refinement.tracker_drift_deg_per_m=180", refinement.refiner.tracker.drift_rad,
+            180 * kRadiansPerDegree),
+    EFM_ROW("refinement.adapt_tracker=false", refinement.refiner.adapt_tracker, false),
+    EFM_ROW("refinement.robust_sigmas=4", refinement.refiner.registration.alignment.robust_sigmas,
+            4),
+    EFM_ROW("refinement.first_distance_px=8", refinement.refiner.registration.first_distance_px, 8),
+    EFM_ROW("refinement.last_distance_px=1.5", refinement.refiner.registration.last_distance_px,
+            1.5),
+    EFM_ROW("refinement.loops=false", refinement.refiner.loop.loops, false),
+    EFM_ROW("refinement.loop_min_overlap=0.6", refinement.refiner.loop.loop_min_overlap, 0.6),
+    EFM_ROW("refinement.loop_min_inliers=0.7", refinement.refiner.loop.loop_min_inliers, 0.7),
+    EFM_ROW("refinement.loop_max_sigma_m=0.08", refinement.refiner.loop.loop_max_sigma_m, 0.08),
+    EFM_ROW("refinement.loop_max_sigma_deg=45", refinement.refiner.loop.loop_max_sigma_rad,
+            45 * kRadiansPerDegree),
+    EFM_ROW("refinement.loop_checks=9", refinement.refiner.loop.loop_checks, 9),
+    EFM_ROW("refinement.correct_motion=true", mapper.keyframe.motion.correct_motion, true),
+    EFM_ROW("refinement.motion_sigma_m_s=0.02", mapper.keyframe.motion.motion_sigma_m_s, 0.02),
+    EFM_ROW("refinement.motion_sigma_deg_s=3", mapper.keyframe.motion.motion_sigma_deg_s, 3),
+    EFM_ROW("refinement.motion_rounds=4", mapper.keyframe.motion.motion_rounds, 4),
+    EFM_ROW("output.camera_maps=true", mapper.keyframe.camera_maps, true),
+    EFM_ROW("output.event_images=true", mapper.keyframe.event_images, true),
+    EFM_ROW("performance.threads=2", mapper.keyframe.sweep.threads, 2),
+    EFM_ROW("performance.kernel=plain", mapper.keyframe.sweep.kernel, VotingKernel::kPlain),
+    EFM_ROW("performance.packet_error_px=0", mapper.keyframe.packets.packet_error_px, 0),
+};
+#undef EFM_ROW
 
-  const FusionMapperOptions& mapper = options.mapper;
-  EXPECT_EQ(options.rig.calibration, "a.yaml");
-  EXPECT_EQ(options.rig.hand_eye, "/b.yaml");
-  EXPECT_EQ(options.rig.time_offsets_ns, (std::vector<std::int64_t>{0, 1'000'000}));
-  EXPECT_EQ(options.rig.pose_source, "wheels");
-  EXPECT_EQ(mapper.cameras, (std::vector<int>{0, 2}));
-  EXPECT_EQ(mapper.trajectory.max_pose_gap_s, 0.5);
-  EXPECT_TRUE(mapper.keyframe.exclude_silent);
-  EXPECT_FALSE(mapper.filter.hot_pixels);
-  EXPECT_EQ(mapper.filter.hot_pixel.ratio, 7.5);
-  EXPECT_EQ(mapper.filter.hot_pixel.period_s, 2);
-  EXPECT_EQ(mapper.filter.hot_pixel.min_events, 9);
-  EXPECT_EQ(mapper.filter.background_activity_s, 0.02);
-  EXPECT_TRUE(mapper.keyframe.motion.correct_motion);
-  EXPECT_EQ(mapper.keyframe.motion.motion_sigma_m_s, 0.02);
-  EXPECT_EQ(mapper.keyframe.motion.motion_sigma_deg_s, 3);
-  EXPECT_EQ(mapper.keyframe.motion.motion_rounds, 4);
-  EXPECT_EQ(mapper.keyframes.policy, KeyframePolicyKind::kBaseline);
-  EXPECT_EQ(mapper.keyframes.window_events, 5'000'000'000);
-  EXPECT_EQ(mapper.keyframes.min_baseline_ratio, 0.3);
-  EXPECT_EQ(mapper.keyframes.min_visible_share, 0.25);
-  EXPECT_EQ(mapper.keyframes.window_s, 0.25);
-  EXPECT_EQ(mapper.keyframes.stride_s, 0.1);
-  EXPECT_EQ(mapper.keyframes.reference, ReferenceTime::kEnd);
-  EXPECT_EQ(mapper.keyframe.planes.min_depth_m, 1);
-  EXPECT_EQ(mapper.keyframe.planes.max_depth_m, 20);
-  EXPECT_EQ(mapper.keyframe.planes.num_planes, 64);
-  EXPECT_EQ(mapper.keyframe.planes.spacing, PlaneSpacing::kLinear);
-  EXPECT_EQ(mapper.keyframe.reference_camera, 2);
-  EXPECT_EQ(mapper.keyframe.view.fov_deg, 100.5);
-  EXPECT_EQ(mapper.keyframe.view.width, 800);
-  EXPECT_EQ(mapper.keyframe.view.height, 1);
-  EXPECT_EQ(mapper.keyframe.view.offset_m, Eigen::Vector3d(-0.5, 1e-3, 2));
-  EXPECT_EQ(mapper.keyframe.sweep.fusion.across_cameras, FusionRule::kGeometric);
-  EXPECT_EQ(mapper.keyframe.sweep.fusion.across_time, FusionRule::kRms);
-  EXPECT_EQ(mapper.keyframe.sweep.fusion.order, FusionOrder::kTimeThenCameras);
-  EXPECT_EQ(mapper.keyframe.subintervals.count, 8);
-  EXPECT_EQ(mapper.keyframe.subintervals.split, SubintervalSplit::kCount);
-  EXPECT_EQ(mapper.keyframe.subintervals.shuffle, SubintervalShuffle::kRandom);
-  EXPECT_EQ(mapper.keyframe.subintervals.shuffle_seed, 4'294'967'295U);
-  EXPECT_TRUE(options.late_fusion);
-  EXPECT_EQ(mapper.keyframe.extraction.extraction, ExtractionMethod::kPaper);
-  EXPECT_EQ(mapper.keyframe.extraction.threshold_kernel, 7);
-  EXPECT_EQ(mapper.keyframe.extraction.threshold_c, -2.5);
-  EXPECT_EQ(mapper.keyframe.extraction.max_confidence.level, WhiteLevel::kFixed);
-  EXPECT_EQ(mapper.keyframe.extraction.max_confidence.fixed, 31.5);
-  EXPECT_EQ(mapper.keyframe.extraction.median_size, 3);
-  EXPECT_TRUE(mapper.keyframe.extraction.dilate);
-  EXPECT_TRUE(mapper.keyframe.camera_maps);
-  EXPECT_TRUE(mapper.keyframe.event_images);
-  EXPECT_FALSE(mapper.keyframe.extraction.subplane);
-  EXPECT_EQ(options.cloud.voxel_size_m, 0.05);
-  EXPECT_EQ(options.cloud.min_keyframes, 3);
-  EXPECT_EQ(options.cloud.consistency.consistency, Consistency::kSupport);
-  EXPECT_EQ(options.cloud.consistency.consistency_tolerance, 0.2);
-  EXPECT_EQ(options.cloud.consistency.consistency_cell_deg, 1.5);
-  EXPECT_EQ(options.cloud.consistency.max_contradictions, 2);
-  EXPECT_TRUE(options.refinement.enabled);
-  EXPECT_TRUE(options.refinement.background);
-  const RefinementOptions& refiner = options.refinement.refiner;
-  EXPECT_EQ(refiner.window, 5);
-  EXPECT_EQ(refiner.map_keyframes, 2);
-  EXPECT_EQ(refiner.points.max_points, 100);
-  EXPECT_EQ(refiner.points.max_map_points, 300);
-  EXPECT_EQ(refiner.tracker.noise_m, 0.03);
-  EXPECT_DOUBLE_EQ(refiner.tracker.noise_rad, M_PI / 2);
-  EXPECT_EQ(refiner.tracker.drift_m, 0.04);
-  EXPECT_DOUBLE_EQ(refiner.tracker.drift_rad, M_PI);
-  EXPECT_FALSE(refiner.adapt_tracker);
-  EXPECT_EQ(refiner.registration.alignment.robust_sigmas, 4);
-  EXPECT_EQ(refiner.registration.first_distance_px, 8);
-  EXPECT_EQ(refiner.registration.last_distance_px, 1.5);
-  EXPECT_FALSE(refiner.loop.loops);
-  EXPECT_EQ(refiner.loop.loop_min_overlap, 0.6);
-  EXPECT_EQ(refiner.loop.loop_min_inliers, 0.7);
-  EXPECT_EQ(refiner.loop.loop_max_sigma_m, 0.08);
-  EXPECT_DOUBLE_EQ(refiner.loop.loop_max_sigma_rad, M_PI / 4);
-  EXPECT_EQ(refiner.loop.loop_checks, 9);
-  EXPECT_EQ(mapper.keyframe.sweep.threads, 2);
-  EXPECT_EQ(mapper.keyframe.sweep.kernel, VotingKernel::kPlain);
-  EXPECT_EQ(mapper.keyframe.packets.packet_error_px, 0);
+TEST(OptionReader, EveryKeyReachesItsField) {
+  OptionReader reader;
+  for (const FieldCase& row : kFields) {
+    EXPECT_FALSE(row.holds({})) << row.assignment << " is the default: it shows nothing";
+    reader.set(row.assignment);
+  }
+  for (const FieldCase& row : kFields) EXPECT_TRUE(row.holds(reader.options())) << row.assignment;
+  EXPECT_EQ(std::size(kFields), optionKeys().size());
 }
 
 TEST(OptionReader, WhatIsListedReadsBackTheSame) {
@@ -282,117 +219,134 @@ TEST(OptionReader, AByteOrderMarkAndLineEndsOfWindowsDoNotMatter) {
   EXPECT_TRUE(optionsOf("\xEF\xBB\xBF").mapper.cameras.empty());
 }
 
-TEST(OptionReader, UnknownSectionsAndKeysAreErrorsThatNameTheLine) {
-  EXPECT_THAT(errorOf("\n[dsii]\n"), AllOf(StartsWith("rig.ini:2: "), HasSubstr("[dsii]"),
-                                           HasSubstr("known: [rig], [keyframes], [dsi]")));
-  EXPECT_THAT(errorOf("[dsi]\nplanes = 3\n"),
-              AllOf(StartsWith("rig.ini:2: [dsi] planes: unknown key"), HasSubstr("num_planes")));
+/// A text, and how its error begins and what else it has.
+struct ErrorCase {
+  std::string text;
+  const char* begin;
+  const char* part = "";
+};
+
+void expectErrors(const std::vector<ErrorCase>& cases) {
+  for (const ErrorCase& row : cases) {
+    EXPECT_THAT(errorOf(row.text), AllOf(StartsWith(row.begin), HasSubstr(row.part))) << row.text;
+  }
 }
 
-TEST(OptionReader, LinesThatAreNeitherSectionNorKeyAreErrors) {
-  EXPECT_THAT(errorOf("num_planes = 3\n"), StartsWith("rig.ini:1: 'num_planes = 3': expected"));
-  EXPECT_THAT(errorOf("[dsi]\nnum_planes 3\n"), StartsWith("rig.ini:2: 'num_planes 3': expected"));
-  EXPECT_THAT(errorOf("[dsi\nnum_planes = 3\n"), StartsWith("rig.ini:1: '[dsi': expected"));
+TEST(OptionReader, LinesThatAreNotUnderstoodAreErrorsThatNameThem) {
+  expectErrors({
+      {"\n[dsii]\n", "rig.ini:2: unknown section [dsii]", "known: [rig], [keyframes], [dsi]"},
+      {"[dsi]\nplanes = 3\n", "rig.ini:2: [dsi] planes: unknown key", "num_planes"},
+      {"[refinement]\nenable = true\n", "rig.ini:2: [refinement] enable: unknown key",
+       "background"},
+      {"num_planes = 3\n", "rig.ini:1: 'num_planes = 3': expected [section] or, below a section"},
+      {"[dsi]\nnum_planes 3\n", "rig.ini:2: 'num_planes 3': expected"},
+      {"[dsi\nnum_planes = 3\n", "rig.ini:1: '[dsi': expected"},
+      {"[dsi]\nnum_planes = 3\n[rig]\n[dsi]\nnum_planes = 3\n",
+       "rig.ini:5: [dsi] num_planes: given twice, first in line 2"},
+  });
 }
 
-TEST(OptionReader, ValuesOfTheWrongKindAreErrorsThatSayWhatWasExpected) {
-  const auto error = [](const std::string& key_and_value) {
-    return errorOf("[dsi]\n" + key_and_value + "\n");
+TEST(OptionReader, FormerKeysAreErrorsThatSayWhatBecameOfThem) {
+  expectErrors({
+      {"[fusion]\nrevote = true\n", "rig.ini:2: [fusion] revote: was removed with re-voting"},
+      {"[fusion]\nrevote_power = 2\n", "rig.ini:2: [fusion] revote_power: was removed"},
+  });
+}
+
+TEST(OptionReader, ValuesOfTheWrongKindAreErrorsThatSayTheExpectedKind) {
+  const struct {
+    std::string section;
+    std::string key;
+    std::vector<std::string> values;
+    std::string expected;
+  } cases[] = {
+      {"dsi",
+       "num_planes",
+       {"abc", "1e3", "0x10", "100 planes", "99999999999", ""},
+       "must be a whole number"},
+      {"dsi", "min_depth_m", {"1,5", "1.5m", "nan", "inf"}, "must be a number"},
+      {"dsi", "spacing", {"cubic"}, "'cubic' is not one of: inverse, linear"},
+      {"dsi", "fov_deg", {"wide"}, "must be a number, or auto"},
+      {"dsi",
+       "rv_offset_m",
+       {"1", "1,2", "1,2,3,4", "1,2,", "1 2 3", "a,b,c", "", "0,inf,0"},
+       "must be three numbers separated by commas"},
+      {"depth", "subplane", {"yes", "1"}, "must be true or false"},
+      {"depth", "max_confidence", {"most"}, "must be a number, keyframe or sequence"},
+      {"fusion", "shuffle_seed", {"-1"}, "must be a whole number, 0 to 4294967295"},
+      {"fusion", "order", {"time"}, "'time' is not one of: cameras_then_time, time_then_cameras"},
+      {"performance", "threads", {"many"}, "must be a whole number, or auto"},
+      {"rig",
+       "cameras",
+       {"0,", ",1", "0,,1", "0 1", "a"},
+       "must be whole numbers separated by commas, or nothing"},
+      {"rig",
+       "time_offsets_s",
+       {"0,", "0 1", "a", "0,,1", "5e9", "nan"},
+       "must be seconds within 4.6e9 of 0, separated by commas, or nothing"},
   };
-  EXPECT_EQ(error("num_planes = abc"), "rig.ini:2: [dsi] num_planes = abc: must be a whole number");
-  EXPECT_THAT(error("num_planes = 1e3"), HasSubstr("must be a whole number"));
-  EXPECT_THAT(error("num_planes = 0x10"), HasSubstr("must be a whole number"));
-  EXPECT_THAT(error("num_planes = 100 planes"), HasSubstr("must be a whole number"));
-  EXPECT_THAT(error("num_planes = 99999999999"), HasSubstr("must be a whole number"));
-  EXPECT_THAT(error("num_planes ="), HasSubstr("must be a whole number"));
-  EXPECT_THAT(error("min_depth_m = 1,5"), HasSubstr("must be a number"));
-  EXPECT_THAT(error("min_depth_m = 1.5m"), HasSubstr("must be a number"));
-  EXPECT_THAT(error("min_depth_m = nan"), HasSubstr("must be a number"));
-  EXPECT_THAT(error("min_depth_m = inf"), HasSubstr("must be a number"));
-  EXPECT_THAT(error("spacing = cubic"), HasSubstr("'cubic' is not one of: inverse, linear"));
-  EXPECT_THAT(errorOf("[depth]\nsubplane = yes\n"), HasSubstr("must be true or false"));
-  EXPECT_THAT(errorOf("[depth]\nmax_confidence = most\n"),
-              HasSubstr("must be a number, keyframe or sequence"));
-  EXPECT_THAT(error("fov_deg = wide"), HasSubstr("must be a number, or auto"));
-  for (const std::string offset : {"1", "1,2", "1,2,3,4", "1,2,", "1 2 3", "a,b,c", ""}) {
-    EXPECT_THAT(error("rv_offset_m = " + offset), HasSubstr("three numbers separated by commas"))
-        << offset;
-  }
-  EXPECT_THAT(errorOf("[fusion]\nshuffle_seed = -1\n"), HasSubstr("0 to 4294967295"));
-  EXPECT_THAT(errorOf("[fusion]\norder = time\n"),
-              HasSubstr("'time' is not one of: cameras_then_time, time_then_cameras"));
-  EXPECT_THAT(errorOf("[performance]\nthreads = many\n"),
-              HasSubstr("must be a whole number, or auto"));
-  for (const std::string list : {"0,", ",1", "0,,1", "0 1", "a"}) {
-    EXPECT_THAT(errorOf("[rig]\ncameras = " + list + "\n"), HasSubstr("separated by commas"))
-        << list;
+  for (const auto& row : cases) {
+    for (const std::string& value : row.values) {
+      EXPECT_EQ(
+          errorOf("[" + row.section + "]\n" + row.key + " = " + value + "\n"),
+          "rig.ini:2: [" + row.section + "] " + row.key + " = " + value + ": " + row.expected);
+    }
   }
 }
 
-TEST(OptionReader, ValuesOutOfRangeAreErrorsThatNameSectionKeyValueAndRange) {
-  EXPECT_THAT(errorOf("[dsi]\n\nnum_planes = 0\n"),
-              StartsWith("rig.ini:3: [dsi] num_planes = 0: must be"));
-  EXPECT_THAT(errorOf("[map]\nvoxel_size_m = -1\n"),
-              StartsWith("rig.ini:2: [map] voxel_size_m = -1: must be"));
-  EXPECT_THAT(errorOf("[keyframes]\nwindow_s = 0\n"),
-              StartsWith("rig.ini:2: [keyframes] window_s = 0: must be"));
-  EXPECT_THAT(errorOf("[rig]\nmax_pose_gap_s = 0\n"),
-              StartsWith("rig.ini:2: [rig] max_pose_gap_s = 0: must be"));
-  EXPECT_THAT(errorOf("[depth]\nthreshold_kernel = 4\n"),
-              StartsWith("rig.ini:2: [depth] threshold_kernel = 4: must be"));
-  EXPECT_THAT(errorOf("[depth]\nmax_confidence = 0\n"),
-              StartsWith("rig.ini:2: [depth] max_confidence = 0: must be"));
-  EXPECT_THAT(errorOf("[dsi]\nfov_deg = 180\n"),
-              StartsWith("rig.ini:2: [dsi] fov_deg = 180: must be"));
-  EXPECT_THAT(errorOf("[dsi]\nheight = 0\n"), StartsWith("rig.ini:2: [dsi] height = 0: must be"));
+TEST(OptionReader, ValuesOutOfRangeAreErrorsInTheUnitsOfTheFile) {
+  // No processor has both.
+  const std::string missing = isAvailable(VotingKernel::kNeon) ? "avx2" : "neon";
+  const struct {
+    const char* section;
+    std::string option;
+    const char* range;
+  } cases[] = {
+      {"dsi", "num_planes = 0", ""},
+      {"dsi", "fov_deg = 180", "below 180"},
+      {"dsi", "height = 0", "1 to 65535"},
+      {"map", "voxel_size_m = -1", ""},
+      {"keyframes", "window_s = 0", ""},
+      {"keyframes", "window_events = 0", ""},
+      {"rig", "max_pose_gap_s = 0", ""},
+      {"depth", "threshold_kernel = 4", ""},
+      {"depth", "max_confidence = 0", ""},
+      {"fusion", "subintervals = 1001", ""},
+      {"performance", "threads = 0", ""},
+      {"performance", "kernel = " + missing, ": plain, "},
+      {"performance", "packet_error_px = 11", ""},
+      {"refinement", "window = 0", "from 1 to 1000"},
+      {"refinement", "window = 1001", "from 1 to 1000"},
+      {"refinement", "map_keyframes = 0", "from 1 to 100"},
+      {"refinement", "max_points = 9", "from 10 to 100000"},
+      {"refinement", "max_map_points = 1999", "from max_points to 1000000"},
+      {"refinement", "tracker_noise_m = -1", "from 0 to 1000"},
+      {"refinement", "tracker_noise_deg = -0.5", "from 0 to 1000"},
+      {"refinement", "tracker_noise_deg = 1001", "from 0 to 1000"},
+      {"refinement", "tracker_drift = 1001", "from 0 to 1000"},
+      {"refinement", "tracker_drift_deg_per_m = -2", "from 0 to 1000"},
+      {"refinement", "robust_sigmas = 0", "above 0"},
+      {"refinement", "first_distance_px = 1", "from last_distance_px"},
+      {"refinement", "last_distance_px = 0", "above 0"},
+      {"refinement", "loop_min_overlap = 0", "above 0"},
+      {"refinement", "loop_min_inliers = 1.5", "0 to 1"},
+      {"refinement", "loop_max_sigma_m = 0", "above 0"},
+      {"refinement", "loop_max_sigma_deg = -1", "above 0"},
+      {"refinement", "loop_checks = 101", "0 to 100"},
+  };
+  for (const auto& row : cases) {
+    const std::string section = "[" + std::string(row.section) + "]";
+    EXPECT_THAT(errorOf(section + "\n" + row.option + "\n"),
+                AllOf(StartsWith("rig.ini:2: " + section + " " + row.option + ": must be"),
+                      HasSubstr(row.range)));
+  }
   EXPECT_THAT(errorOf("[dsi]\nwidth = 65535\nheight = 65535\n"),
               AllOf(StartsWith("rig.ini:2: [dsi] width = 65535: must be at most"),
                     HasSubstr("height of 65535")));
-  EXPECT_THAT(errorOf("[dsi]\nrv_offset_m = 0,inf,0\n"), HasSubstr("three numbers"));
-  EXPECT_THAT(errorOf("[fusion]\nsubintervals = 1001\n"),
-              StartsWith("rig.ini:2: [fusion] subintervals = 1001: must be"));
-  EXPECT_THAT(errorOf("[keyframes]\nwindow_events = 0\n"),
-              StartsWith("rig.ini:2: [keyframes] window_events = 0: must be"));
-  EXPECT_THAT(errorOf("[performance]\nthreads = 0\n"),
-              StartsWith("rig.ini:2: [performance] threads = 0: must be"));
-  // No processor has both.
-  const std::string missing = isAvailable(VotingKernel::kNeon) ? "avx2" : "neon";
-  EXPECT_THAT(errorOf("[performance]\nkernel = " + missing + "\n"),
-              AllOf(StartsWith("rig.ini:2: [performance] kernel = " + missing + ": must be"),
-                    HasSubstr(": plain, ")));
-  EXPECT_THAT(errorOf("[performance]\npacket_error_px = 11\n"),
-              StartsWith("rig.ini:2: [performance] packet_error_px = 11: must be"));
-}
-
-TEST(OptionReader, ValuesOfTheRefinementOutOfRangeAreErrorsInTheUnitsOfTheFile) {
-  const std::vector<std::pair<std::string, std::string>> wrong = {
-      {"window = 0", "from 1 to 1000"},
-      {"window = 1001", "from 1 to 1000"},
-      {"map_keyframes = 0", "from 1 to 100"},
-      {"max_points = 9", "from 10 to 100000"},
-      {"max_map_points = 1999", "from max_points to 1000000"},
-      {"tracker_noise_m = -1", "from 0 to 1000"},
-      {"tracker_noise_deg = -0.5", "from 0 to 1000"},
-      {"tracker_noise_deg = 1001", "from 0 to 1000"},
-      {"tracker_drift = 1001", "from 0 to 1000"},
-      {"tracker_drift_deg_per_m = -2", "from 0 to 1000"},
-      {"robust_sigmas = 0", "above 0"},
-      {"first_distance_px = 1", "from last_distance_px"},
-      {"last_distance_px = 0", "above 0"},
-      {"loop_min_overlap = 0", "above 0"},
-      {"loop_min_inliers = 1.5", "0 to 1"},
-      {"loop_max_sigma_m = 0", "above 0"},
-      {"loop_max_sigma_deg = -1", "above 0"},
-      {"loop_checks = 101", "0 to 100"}};
-  for (const auto& [option, range] : wrong) {
-    EXPECT_THAT(
-        errorOf("[refinement]\n" + option + "\n"),
-        AllOf(StartsWith("rig.ini:2: [refinement] " + option + ": must be"), HasSubstr(range)));
-  }
-  EXPECT_THAT(errorOf("[refinement]\nenabled = 1\n"), HasSubstr("must be true or false"));
-  EXPECT_THAT(
-      errorOf("[refinement]\nenable = true\n"),
-      AllOf(HasSubstr("rig.ini:2: [refinement] enable: unknown key"), HasSubstr("background")));
+  // The far limit is not in the file: its default is 5.
+  EXPECT_THAT(errorOf("[dsi]\nmin_depth_m = 6\n"), AllOf(HasSubstr("[dsi]"), HasSubstr("must be")));
+  EXPECT_NO_THROW(
+      optionsOf("[refinement]\ntracker_noise_deg = 1000\ntracker_drift_deg_per_m = 1000\n"));
 }
 
 TEST(OptionReader, DegreesAreGivenBackAsTheyWereWritten) {
@@ -413,11 +367,6 @@ TEST(OptionReader, DegreesAreGivenBackAsTheyWereWritten) {
   }
 }
 
-TEST(OptionReader, TheLargestDegreesAreInRange) {
-  EXPECT_NO_THROW(
-      optionsOf("[refinement]\ntracker_noise_deg = 1000\ntracker_drift_deg_per_m = 1000\n"));
-}
-
 TEST(OptionReader, DegreesOfAnyNumberReadBackTheSame) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> exponent(-12, 0);
@@ -432,16 +381,6 @@ TEST(OptionReader, DegreesOfAnyNumberReadBackTheSame) {
     const double read = reader.options().refinement.refiner.tracker.noise_rad;
     EXPECT_NEAR(read / options.refinement.refiner.tracker.noise_rad, 1, 4e-16);
   }
-}
-
-TEST(OptionReader, LimitsThatContradictADefaultAreErrors) {
-  // The far limit is not in the file: its default is 5.
-  EXPECT_THAT(errorOf("[dsi]\nmin_depth_m = 6\n"), AllOf(HasSubstr("[dsi]"), HasSubstr("must be")));
-}
-
-TEST(OptionReader, AKeyGivenTwiceIsAnErrorThatNamesBothLines) {
-  EXPECT_EQ(errorOf("[dsi]\nnum_planes = 3\n[rig]\n[dsi]\nnum_planes = 3\n"),
-            "rig.ini:5: [dsi] num_planes: given twice, first in line 2");
 }
 
 TEST(OptionReader, SetOverridesTheFileAndTheLastOneCounts) {
@@ -461,34 +400,20 @@ TEST(OptionReader, LimitsMaySetEachOtherRightBeforeTheyAreChecked) {
   EXPECT_EQ(reader.options().mapper.keyframe.planes.min_depth_m, 6);
 }
 
-TEST(OptionReader, PathsAreRelativeToTheFileThatSaysThem) {
-  const auto folder = std::filesystem::temp_directory_path() /
-                      ("efm_option_paths_" + std::to_string(std::random_device()()));
-  std::filesystem::create_directories(folder);
-  std::ofstream(folder / "rig.ini") << "[rig]\ncalibration = rigs/a.yaml\nhand_eye = /b.yaml\n";
+class OptionReaderFile : public TemporaryFolder {};
+
+TEST_F(OptionReaderFile, PathsAreRelativeToTheFileThatSaysThem) {
+  std::ofstream(folder() / "rig.ini") << "[rig]\ncalibration = rigs/a.yaml\nhand_eye = /b.yaml\n";
   OptionReader reader;
-  reader.readFile(folder / "rig.ini");
-  EXPECT_EQ(reader.options().rig.calibration, folder / "rigs" / "a.yaml");
+  reader.readFile(folder() / "rig.ini");
+  EXPECT_EQ(reader.options().rig.calibration, folder() / "rigs" / "a.yaml");
   EXPECT_EQ(reader.options().rig.hand_eye, "/b.yaml");
+  reader.set("rig", "hand_eye", "c.yaml ; a comment", {"host.ini", "host"});
+  EXPECT_EQ(reader.options().rig.hand_eye, "host/c.yaml");
   reader.set("rig.calibration=c.yaml");
   EXPECT_EQ(reader.options().rig.calibration, "c.yaml") << "typed, not said by a file";
   reader.set("rig.calibration=");
   EXPECT_EQ(reader.options().rig.calibration, "") << "the recording's own";
-  std::filesystem::remove_all(folder);
-}
-
-class OptionReaderFile : public TemporaryFolder {};
-
-TEST_F(OptionReaderFile, AfterAnErrorPathsAreNotRelativeToTheFileThatHadIt) {
-  std::ofstream(folder() / "wrong.ini") << "[dsi]\nnum_planes = x\n";
-  OptionReader reader;
-  EXPECT_THROW(reader.readFile(folder() / "wrong.ini"), std::invalid_argument);
-  reader.set("rig.calibration=c.yaml");
-  EXPECT_EQ(reader.options().rig.calibration, "c.yaml");
-
-  EXPECT_THROW(reader.set("dsi", "num_planes", "x", {"host.ini", folder()}), std::invalid_argument);
-  reader.set("rig.calibration=d.yaml");
-  EXPECT_EQ(reader.options().rig.calibration, "d.yaml");
 }
 
 TEST(OptionReader, TimeOffsetsAreExactToTheNanosecond) {
@@ -498,10 +423,6 @@ TEST(OptionReader, TimeOffsetsAreExactToTheNanosecond) {
   EXPECT_EQ(offsets("0, -0.042, 1600000000.123456789"),
             (std::vector<std::int64_t>{0, -42'000'000, 1'600'000'000'123'456'789}));
   EXPECT_TRUE(offsets("").empty());
-  for (const std::string list : {"0,", "0 1", "a", "0,,1", "5e9", "nan"}) {
-    EXPECT_THAT(errorOf("[rig]\ntime_offsets_s = " + list + "\n"), HasSubstr("must be seconds"))
-        << list;
-  }
 }
 
 TEST(OptionReader, WrongSetsAreErrorsThatNameThem) {
@@ -533,12 +454,8 @@ TEST(OptionReader, ErrorsShowNothingThatATerminalWouldObey) {
 
 TEST(OptionReader, FilesThatCannotBeReadAreErrorsThatNameThem) {
   for (const std::string path : {"/nowhere/rig.ini", "/"}) {
-    try {
-      OptionReader().readFile(path);
-      ADD_FAILURE() << "no error for " << path;
-    } catch (const std::runtime_error& error) {
-      EXPECT_THAT(error.what(), HasSubstr(path));
-    }
+    EXPECT_EQ(messageOf([&] { OptionReader().readFile(path); }),
+              "cannot read the option file " + path);
   }
 }
 

@@ -9,25 +9,18 @@
 
 #include "mapping/geometry/angle.h"
 
+#include "mapping/geometry/angle.h"
+#include "test/plugin/message_of.h"
+
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 
 TrackerFaults faultsOf(const std::vector<std::string>& assignments) {
   TrackerFaults faults;
   for (const std::string& assignment : assignments) setTrackerFault(assignment, faults);
   return faults;
-}
-
-std::string errorOf(const std::string& assignment) {
-  try {
-    faultsOf({assignment});
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 const std::vector<std::string> kAll = {"noise_m=0.01",
@@ -47,13 +40,13 @@ const std::vector<std::string> kAll = {"noise_m=0.01",
 TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
   const TrackerFaults faults = faultsOf(kAll);
   EXPECT_EQ(faults.perturbation.noise_m, 0.01);
-  EXPECT_NEAR(faults.perturbation.noise_rad, 0.5 * kPi / 180, 1e-15);
+  EXPECT_NEAR(faults.perturbation.noise_rad, 0.5 * kRadiansPerDegree, 1e-15);
   EXPECT_EQ(faults.perturbation.keyframe.noise_m, 2);
-  EXPECT_NEAR(faults.perturbation.keyframe.noise_rad, kPi / 2, 1e-15);
+  EXPECT_NEAR(faults.perturbation.keyframe.noise_rad, 90 * kRadiansPerDegree, 1e-15);
   EXPECT_EQ(faults.perturbation.keyframe.length_ns, 200'000'000);
   EXPECT_EQ(faults.perturbation.keyframe.start_ns, 1'700'000'000'123'456'789) << "exact";
   EXPECT_EQ(faults.perturbation.drift.share, 0.01);
-  EXPECT_NEAR(faults.perturbation.drift.rad_per_m, 0.5 * kPi / 180, 1e-15);
+  EXPECT_NEAR(faults.perturbation.drift.rad_per_m, 0.5 * kRadiansPerDegree, 1e-15);
   EXPECT_EQ(faults.latency_ns, 300'000'000);
   EXPECT_EQ(faults.dropouts.drop_probability, 0.1);
   EXPECT_EQ(faults.dropouts.random_gaps_hz, 2);
@@ -75,18 +68,22 @@ TEST(TrackerFaultKeys, AreListedWithValuesThatReadBack) {
 }
 
 TEST(TrackerFaultKeys, ErrorsNameKeyValueAndWhatWasExpected) {
-  EXPECT_THAT(errorOf("wobble=1"),
-              AllOf(HasSubstr("unknown key 'wobble'"), HasSubstr("noise_m, noise_deg")));
-  EXPECT_THAT(errorOf("noise_m"), HasSubstr("'noise_m': expected key=value"));
-  EXPECT_THAT(errorOf("noise_m=much"), HasSubstr("noise_m = much: must be a number, 0 to 1000"));
-  EXPECT_THAT(errorOf("noise_deg=-1"), HasSubstr("noise_deg = -1: must be a number, 0 to 180"));
-  EXPECT_THAT(errorOf("drop=1.5"), HasSubstr("drop = 1.5: must be a number, 0 to 1 "));
-  EXPECT_THAT(errorOf("drift=nan"), HasSubstr("drift = nan"));
-  EXPECT_THAT(errorOf("latency_s=11"), HasSubstr("latency_s = 11: must be a number, 0 to 10"));
-  EXPECT_THAT(errorOf("keyframe_s=0"), HasSubstr("keyframe_s = 0: must be a number, 0.001"));
-  EXPECT_THAT(errorOf("keyframe_start_s=soon"), HasSubstr("must be a time in seconds"));
-  EXPECT_THAT(errorOf("seed=-2"), HasSubstr("seed = -2: must be a whole number from 0"));
-  EXPECT_THAT(errorOf("seed=1.5"), HasSubstr("seed = 1.5: must be a whole number from 0"));
+  const std::pair<const char*, const char*> cases[] = {
+      {"wobble=1", "unknown key 'wobble'; known: noise_m, noise_deg"},
+      {"noise_m", "'noise_m': expected key=value"},
+      {"noise_m=much", "noise_m = much: must be a number, 0 to 1000 (metres)"},
+      {"noise_deg=-1", "noise_deg = -1: must be a number, 0 to 180 (degrees)"},
+      {"drop=1.5", "drop = 1.5: must be a number, 0 to 1 "},
+      {"drift=nan", "drift = nan: must be a number"},
+      {"latency_s=11", "latency_s = 11: must be a number, 0 to 10"},
+      {"keyframe_s=0", "keyframe_s = 0: must be a number, 0.001"},
+      {"keyframe_start_s=soon", "must be a time in seconds"},
+      {"seed=-2", "seed = -2: must be a whole number from 0"},
+      {"seed=1.5", "seed = 1.5: must be a whole number from 0"},
+  };
+  for (const auto& [assignment, error] : cases) {
+    EXPECT_THAT(messageOf([text = assignment] { faultsOf({text}); }), HasSubstr(error));
+  }
 }
 
 TEST(TrackerFaultKeys, AskForTheLengthOfKeyframesWhereTheirNoiseIs) {

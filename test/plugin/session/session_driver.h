@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "plugin/session/mapping_session.h"
+#include "test/plugin/message_of.h"
+#include "test/plugin/session/synthetic_recording.h"
+
+namespace efm {
+
+/// All events of a camera in one packet.
+inline CameraPacket packetOf(const SyntheticRecording& recording, int camera) {
+  const auto index = static_cast<std::size_t>(camera);
+  return {camera, recording.cameras[index], recording.events[index], std::nullopt};
+}
+
+/// The events of a camera in [begin, end), seconds since the recording's start.
+inline CameraPacket pieceOf(const SyntheticRecording& recording, int camera, double begin_s,
+                            double end_s) {
+  CameraPacket packet = packetOf(recording, camera);
+  auto& events = packet.events;
+  const auto outside = [&](const Event& event) {
+    const double t_s = 1e-9 * static_cast<double>(event.t_ns - SyntheticRecording::kStartNs);
+    return t_s < begin_s || t_s >= end_s;
+  };
+  events.erase(std::remove_if(events.begin(), events.end(), outside), events.end());
+  return packet;
+}
+
+inline void addPoses(MappingSession& session, const SyntheticRecording& recording) {
+  for (const StampedPose& pose : recording.poses) session.addPose(pose);
+}
+
+inline void addEvents(MappingSession& session, const SyntheticRecording& recording) {
+  for (int c = 0; c < static_cast<int>(recording.cameras.size()); ++c) {
+    session.addEvents(packetOf(recording, c));
+  }
+}
+
+inline std::vector<KeyframeDepthMap> mapDue(MappingSession& session) {
+  std::vector<KeyframeDepthMap> keyframes;
+  while (auto keyframe = session.next()) keyframes.push_back(std::move(*keyframe));
+  return keyframes;
+}
+
+inline std::vector<KeyframeDepthMap> mapRest(MappingSession& session) {
+  session.finish();
+  return mapDue(session);
+}
+
+/// All poses, then the events of each camera in one packet.
+inline std::vector<KeyframeDepthMap> mapAll(MappingSession& session,
+                                            const SyntheticRecording& recording) {
+  addPoses(session, recording);
+  addEvents(session, recording);
+  return mapRest(session);
+}
+
+/// In packets of this length, the last camera's first; maps after each.
+inline void mapPiecewise(MappingSession& session, const SyntheticRecording& recording,
+                         int packet_ms) {
+  std::vector<std::size_t> begin(recording.cameras.size(), 0);
+  for (std::size_t p = 0; p < recording.poses.size(); ++p) {
+    session.addPose(recording.poses[p]);
+    const std::int64_t until_ns = recording.poses[p].t_ns;
+    const bool last = p + 1 == recording.poses.size();
+    const std::int64_t passed_ms = (until_ns - SyntheticRecording::kStartNs) / 1'000'000;
+    if (passed_ms % packet_ms != 0 && !last) continue;
+    for (std::size_t c = recording.cameras.size(); c-- > 0;) {
+      CameraPacket packet{static_cast<int>(c), recording.cameras[c], {}, std::nullopt};
+      if (!last) packet.covered_until_ns = until_ns;
+      const std::vector<Event>& events = recording.events[c];
+      for (; begin[c] < events.size() && (last || events[begin[c]].t_ns < until_ns); ++begin[c]) {
+        packet.events.push_back(events[begin[c]]);
+      }
+      session.addEvents(std::move(packet));
+    }
+    mapDue(session);
+  }
+  mapRest(session);
+}
+
+/// The same keyframes at the same poses, and the same points, bit for bit.
+inline void expectSameMap(const MappingSession& session, const MappingSession& expected) {
+  ASSERT_EQ(session.T_world_ref().size(), expected.T_world_ref().size());
+  for (std::size_t i = 0; i < expected.T_world_ref().size(); ++i) {
+    EXPECT_TRUE(isSame(session.T_world_ref()[i], expected.T_world_ref()[i])) << "keyframe " << i;
+    EXPECT_TRUE(isSame(session.T_odom_ref()[i], expected.T_odom_ref()[i])) << "keyframe " << i;
+  }
+  const auto points = session.cloud().points();
+  const auto expected_points = expected.cloud().points();
+  ASSERT_EQ(points.size(), expected_points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(points[i].p_world, expected_points[i].p_world);
+    EXPECT_EQ(points[i].confidence, expected_points[i].confidence);
+    EXPECT_EQ(points[i].support, expected_points[i].support);
+  }
+}
+
+}  // namespace efm
