@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/calibration/calibration_file.h"
 
+#include <fmt/format.h>
+
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -15,15 +17,11 @@
 namespace efm {
 namespace {
 
-std::string inWords(const CameraSize& size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height) + " pixels";
-}
-
 std::string camerasInWords(std::size_t count) {
-  return std::to_string(count) + (count == 1 ? " camera" : " cameras");
+  return fmt::format("{} camera{}", count, count == 1 ? "" : "s");
 }
 
-/// The first word that is not in a comment; empty where there is none.
+/// The first word outside comments; empty where there is none.
 std::string firstWord(const std::filesystem::path& file) {
   std::ifstream stream(file);
   std::error_code ignored;
@@ -47,8 +45,8 @@ std::vector<double> readNumbers(const std::filesystem::path& file) {
          splitWords(std::string_view(line).substr(0, line.find('#')))) {
       const std::optional<double> value = parseFinite(word);
       if (!value) {
-        throw std::runtime_error(file.string() + ":" + std::to_string(number) + ": " +
-                                 inQuotes(word) + ": expected a finite number");
+        throw std::runtime_error(fmt::format("{}:{}: {}: expected a finite number", file.string(),
+                                             number, inQuotes(word)));
       }
       numbers.push_back(*value);
     }
@@ -60,10 +58,10 @@ std::vector<double> readNumbers(const std::filesystem::path& file) {
 }  // namespace
 
 RigCamera Calibration::camera(std::size_t index, const std::optional<CameraSize>& sensor) const {
-  const std::string name = "camera " + std::to_string(index);
   if (index >= rig.cameras.size()) {
-    throw std::invalid_argument(file.string() + ": " + camerasInWords(rig.cameras.size()) +
-                                ", but the recording has " + name + ": expected one for each");
+    throw std::invalid_argument(
+        fmt::format("{}: {}, but the recording has camera {}: expected one for each", file.string(),
+                    camerasInWords(rig.cameras.size()), index));
   }
   RigCamera camera = rig.cameras[index];
   const CameraSize size = {camera.model.width, camera.model.height};
@@ -76,16 +74,18 @@ RigCamera Calibration::camera(std::size_t index, const std::optional<CameraSize>
     camera.model.width = sensor->width;
     camera.model.height = sensor->height;
   } else if (sensor && (sensor->width != size.width || sensor->height != size.height)) {
-    throw std::invalid_argument(file.string() + ": " + name + " has " + inWords(size) +
-                                ": expected " + inWords(*sensor) + ", as the recording has");
+    throw std::invalid_argument(
+        fmt::format("{}: camera {} has {}x{} pixels: expected {}x{} pixels, as the recording has",
+                    file.string(), index, size.width, size.height, sensor->width, sensor->height));
   }
   return camera;
 }
 
 void Calibration::requireCameras(std::size_t count) const {
   if (rig.cameras.size() == count) return;
-  throw std::invalid_argument(file.string() + ": " + camerasInWords(rig.cameras.size()) +
-                              ": expected " + std::to_string(count) + ", as the recording has");
+  throw std::invalid_argument(fmt::format("{}: {}: expected {}, as the recording has",
+                                          file.string(), camerasInWords(rig.cameras.size()),
+                                          count));
 }
 
 void Calibration::requireLike(const Rig& recorded) const {
@@ -118,8 +118,8 @@ Calibration readCalibration(const std::filesystem::path& file) {
 CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size) {
   const std::vector<double> numbers = readNumbers(file);
   if (numbers.size() != 9) {
-    throw std::runtime_error(file.string() + ": " + std::to_string(numbers.size()) +
-                             " numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3");
+    throw std::runtime_error(fmt::format("{}: {} numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3",
+                                         file.string(), numbers.size()));
   }
   CameraModel model;
   model.width = size.width;

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/calibration/camchain.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstddef>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -17,9 +18,7 @@ namespace {
 
 int sideOf(double value, const YamlEntry& entry) {
   if (std::floor(value) == value && value >= 1 && value <= 65535) return static_cast<int>(value);
-  std::ostringstream found;
-  found << value;
-  throw entry.failKey("resolution", found.str(), "whole numbers from 1 to 65535");
+  throw entry.failKey("resolution", fmt::format("{:g}", value), "whole numbers from 1 to 65535");
 }
 
 CameraModel readModel(const YamlEntry& entry) {
@@ -42,7 +41,7 @@ CameraModel readModel(const YamlEntry& entry) {
     throw entry.failKey("distortion_model", inQuotes(distortion), "radtan, equidistant or none");
   }
   if (model.distortion != DistortionModel::kNone || entry.has("distortion_coeffs")) {
-    model.coefficients = entry.numbers("distortion_coeffs", "a list of numbers");
+    model.coefficients = entry.numbers("distortion_coeffs", 0, "a list of numbers");
   }
   try {
     model.validate();
@@ -52,13 +51,13 @@ CameraModel readModel(const YamlEntry& entry) {
   return model;
 }
 
-/// The number N of a key "camN"; nothing else is a camera.
+/// Whether a key is "camN" with a number N.
 bool isCameraName(const std::string& name) {
   return name.size() > 3 && name.compare(0, 3, "cam") == 0 &&
          name.find_first_not_of("0123456789", 3) == std::string::npos;
 }
 
-/// How many cameras there are: cam0, cam1, … without gaps.
+/// The number of cameras: cam0, cam1, … without gaps.
 std::size_t countCameras(const std::string& file, const YAML::Node& root) {
   std::set<std::string> names;
   if (root.IsMap()) {
@@ -72,10 +71,11 @@ std::size_t countCameras(const std::string& file, const YAML::Node& root) {
     throw std::runtime_error(file + ": cam0 is missing: expected a camera chain as Kalibr has it");
   }
   std::size_t count = 0;
-  while (names.erase("cam" + std::to_string(count)) > 0) ++count;
+  while (names.erase(fmt::format("cam{}", count)) > 0) ++count;
   if (!names.empty()) {
-    throw std::runtime_error(file + ": " + *names.begin() + " without cam" + std::to_string(count) +
-                             ": expected cameras numbered from cam0 without gaps");
+    throw std::runtime_error(
+        fmt::format("{}: {} without cam{}: expected cameras numbered from cam0 without gaps", file,
+                    *names.begin(), count));
   }
   return count;
 }
@@ -87,7 +87,7 @@ Rig readCamchain(const std::filesystem::path& file) {
   const std::size_t count = countCameras(file.string(), root);
   Rig rig;
   for (std::size_t n = 0; n < count; ++n) {
-    const std::string name = "cam" + std::to_string(n);
+    const std::string name = fmt::format("cam{}", n);
     const YamlEntry entry(file.string(), name, root[name]);
     RigCamera camera;
     camera.model = readModel(entry);

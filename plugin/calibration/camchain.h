@@ -12,11 +12,11 @@ namespace efm {
 ///   camera_model       pinhole
 ///   intrinsics         [fx, fy, cx, cy]
 ///   distortion_model   radtan | equidistant | none
-///   distortion_coeffs  4 or 5 | 4 | 0 of them (may be left out for none)
+///   distortion_coeffs  4 or 5 | 4 | 0 numbers (optional for none)
 ///   resolution         [width, height]
 ///   T_cn_cnm1          4x4, for cameras after the first: from the camera before it to this one.
-/// The rig's frame is camera 0's. Other keys do not matter. Rotations may be off by 1e-3, as
-/// rounding leaves them; the nearest rotation is taken.
+/// The rig's frame is camera 0's. Other keys are ignored. Rotations may be off by 1e-3, because of
+/// rounding; the nearest rotation is taken.
 /// @throws std::runtime_error naming the file, the camera, the key, the value and what was
 /// expected.
 Rig readCamchain(const std::filesystem::path& file);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/calibration/yaml_entry.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
@@ -13,56 +15,43 @@
 namespace efm {
 namespace {
 
-constexpr double kMaxRotationError = 1e-3;
-
-std::string lineOf(const YAML::Mark& mark) {
-  return mark.is_null() ? "" : ":" + std::to_string(mark.line + 1);
-}
-
-std::string inWords(const YAML::Node& node) {
-  if (node.IsScalar()) return inQuotes(node.Scalar());
-  if (node.IsSequence()) return "a list";
-  return node.IsMap() ? "keys" : "nothing";
+std::string placeOf(const std::string& file, const YAML::Mark& mark) {
+  return mark.is_null() ? file : fmt::format("{}:{}", file, mark.line + 1);
 }
 
 }  // namespace
 
 YamlEntry::YamlEntry(std::string file, std::string name, const YAML::Node& node)
     : file_(std::move(file)), name_(std::move(name)), node_(node) {
-  if (!node_.IsMap()) throw fail(node_, "expected keys and values");
+  if (!node_.IsMap()) throw fail("expected keys and values");
 }
 
 std::string YamlEntry::text(const char* key) const {
   const YAML::Node value = find(key);
-  if (!value.IsScalar()) throw fail(value, std::string(key) + ": expected a word");
+  if (!value.IsScalar()) throw fail(value, fmt::format("{}: expected a word", key));
   return value.Scalar();
-}
-
-std::vector<double> YamlEntry::numbers(const char* key, const char* expected) const {
-  return numbersOf(find(key), key, expected);
 }
 
 std::vector<double> YamlEntry::numbers(const char* key, std::size_t count,
                                        const char* expected) const {
-  return numbersOf(find(key), key, count, expected);
+  return numbersIn(find(key), key, count, expected);
 }
 
 Rigid3 YamlEntry::transform(const char* key) const {
+  constexpr double kMaxRotationError = 1e-3;
   constexpr const char* kExpected = "4 rows of 4 numbers";
   const YAML::Node rows = find(key);
-  if (!rows.IsSequence() || rows.size() != 4) throw failKey(rows, key, kExpected);
+  if (!rows.IsSequence() || rows.size() != 4) throw failNode(rows, key, kExpected);
   Eigen::Matrix4d matrix;
   for (int row = 0; row < 4; ++row) {
-    const std::vector<double> values =
-        numbersOf(rows[static_cast<std::size_t>(row)], key, 4, kExpected);
-    matrix.row(row) = Eigen::RowVector4d::Map(values.data());
+    matrix.row(row) = Eigen::RowVector4d::Map(numbersIn(rows[row], key, 4, kExpected).data());
   }
 
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   const double error =
       (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(error <= kMaxRotationError)) {
-    throw failKey(key, "a matrix whose columns are off orthonormal by " + std::to_string(error),
+    throw failKey(key, fmt::format("a matrix whose columns are off orthonormal by {:f}", error),
                   "a rotation, to 0.001");
   }
   if (rotation.determinant() < 0) throw failKey(key, "a reflection", "a rotation");
@@ -76,47 +65,39 @@ Rigid3 YamlEntry::transform(const char* key) const {
 
 YAML::Node YamlEntry::find(const char* key) const {
   const YAML::Node value = node_[key];
-  if (!value) throw fail(node_, std::string(key) + " is missing");
+  if (!value) throw fail(fmt::format("{} is missing", key));
   return value;
 }
 
-std::vector<double> YamlEntry::numbersOf(const YAML::Node& list, const char* key,
+std::vector<double> YamlEntry::numbersIn(const YAML::Node& list, const char* key, std::size_t count,
                                          const char* expected) const {
-  if (!list.IsSequence()) throw failKey(list, key, expected);
+  if (!list.IsSequence()) throw failNode(list, key, expected);
   std::vector<double> values;
   for (const YAML::Node& item : list) {
-    double value = std::numeric_limits<double>::quiet_NaN();
-    if (!item.IsScalar() || !YAML::convert<double>::decode(item, value) || !std::isfinite(value)) {
-      throw failKey(item, key, "finite numbers");
-    }
-    values.push_back(value);
+    values.push_back(item.as<double>(std::numeric_limits<double>::quiet_NaN()));
+    if (!std::isfinite(values.back())) throw failNode(item, key, "finite numbers");
   }
-  return values;
+  if (count == 0 || values.size() == count) return values;
+  throw fail(list, fmt::format("{}: {} numbers: expected {}", key, values.size(), expected));
 }
 
-std::vector<double> YamlEntry::numbersOf(const YAML::Node& list, const char* key, std::size_t count,
-                                         const char* expected) const {
-  std::vector<double> values = numbersOf(list, key, expected);
-  if (values.size() == count) return values;
-  throw fail(list, std::string(key) + ": " + std::to_string(values.size()) + " numbers: expected " +
-                       expected);
+std::runtime_error YamlEntry::failKey(const char* key, std::string_view found,
+                                      std::string_view expected) const {
+  return fail(find(key), fmt::format("{} = {}: expected {}", key, found, expected));
 }
 
-std::runtime_error YamlEntry::failKey(const char* key, const std::string& found,
-                                      const std::string& expected) const {
-  return fail(find(key), std::string(key) + " = " + found + ": expected " + expected);
+std::runtime_error YamlEntry::failNode(const YAML::Node& node, const char* key,
+                                       std::string_view expected) const {
+  const std::string found = node.IsScalar()     ? inQuotes(node.Scalar())
+                            : node.IsSequence() ? "a list"
+                            : node.IsMap()      ? "keys"
+                                                : "nothing";
+  return fail(node, fmt::format("{} = {}: expected {}", key, found, expected));
 }
 
-std::runtime_error YamlEntry::fail(const std::string& what) const { return fail(node_, what); }
-
-std::runtime_error YamlEntry::failKey(const YAML::Node& node, const char* key,
-                                      const std::string& expected) const {
-  return fail(node, std::string(key) + " = " + inWords(node) + ": expected " + expected);
-}
-
-std::runtime_error YamlEntry::fail(const YAML::Node& node, const std::string& what) const {
-  return std::runtime_error(file_ + lineOf(node.Mark()) + ": " + name_ +
-                            (name_.empty() ? "" : ": ") + what);
+std::runtime_error YamlEntry::fail(const YAML::Node& node, std::string_view what) const {
+  return std::runtime_error(fmt::format("{}: {}{}{}", placeOf(file_, node.Mark()), name_,
+                                        name_.empty() ? "" : ": ", what));
 }
 
 YAML::Node loadYaml(const std::string& file) {
@@ -125,7 +106,7 @@ YAML::Node loadYaml(const std::string& file) {
   } catch (const YAML::BadFile&) {
     throw std::runtime_error(file + ": cannot be opened for reading");
   } catch (const YAML::Exception& error) {
-    throw std::runtime_error(file + lineOf(error.mark) + ": not YAML: " + error.msg);
+    throw std::runtime_error(fmt::format("{}: not YAML: {}", placeOf(file, error.mark), error.msg));
   }
 }
 
