@@ -44,8 +44,8 @@ OptionKey optionOrAuto(std::string_view section, std::string_view key, Field fie
           }};
 }
 
-/// Degrees with the fewest digits that are these radians: what was written, where that had no more
-/// than 15.
+/// The degrees with the fewest digits that are these radians: the written ones, if they had no more
+/// than 15 digits.
 double degreesThatReadAs(double angle_rad) {
   const double angle_deg = angle_rad / kRadiansPerDegree;
   for (const int decimals : {14, 15, 16}) {

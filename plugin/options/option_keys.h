@@ -11,7 +11,7 @@
 
 namespace efm {
 
-/// One key: how it is read into its field and how the field is given back.
+/// One key: the functions that read its field from text and return its value.
 struct OptionKey {
   std::string_view section;
   std::string_view key;
@@ -20,7 +20,7 @@ struct OptionKey {
   bool is_path = false;
 };
 
-/// The table of all options: what is read, overridden and reported goes by it.
+/// The table of all options. Reading, overriding and reporting use it alone, and so cannot differ.
 const std::vector<OptionKey>& optionKeys();
 
 /// One option as the files name it.
@@ -30,8 +30,7 @@ struct NamedOption {
   OptionValue value;
 };
 
-/// All options, in the order of the table that files are read by, so that what is read, overridden
-/// and reported cannot differ.
+/// All options, in the order of the table.
 std::vector<NamedOption> listOptions(const EventFusionOptions& options);
 /// Whether an option file may have a section of this name.
 bool isOptionSection(std::string_view section);
@@ -40,7 +39,7 @@ bool isOptionSection(std::string_view section);
 /// other keys.
 std::string_view formerOptionError(std::string_view section, std::string_view key);
 
-/// The keys of a section, or the sections, for whoever mistyped one.
+/// The keys of a section and the sections, for errors.
 std::string knownOptionKeys(std::string_view section);
 std::string knownOptionSections();
 

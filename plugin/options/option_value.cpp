@@ -108,7 +108,7 @@ void parseInto(std::string_view text, std::vector<std::int64_t>& field) {
                   "must be seconds within 4.6e9 of 0, separated by commas, or nothing");
 }
 
-// A name that is known is printable, and the error shows one that is not.
+// The error shows an unknown name; known names are printable.
 #define EFM_PARSE_CHOICE(Choice, fromName) \
   void parseInto(std::string_view text, Choice& field) { field = fromName(printable(text)); }
 EFM_PARSE_CHOICE(KeyframePolicyKind, keyframePolicyFromName)

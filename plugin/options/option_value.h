@@ -18,14 +18,14 @@
 
 namespace efm {
 
-/// An option's value, whatever its field is.
+/// An option's value, of any kind of field.
 using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
 
-/// As a file has it: numbers with the fewest digits that read back the same.
+/// The text for a file: numbers have the fewest digits that read back the same.
 std::string textOf(const OptionValue& value);
 
 /// Reads a field from the text of a file.
-/// @throws std::invalid_argument saying what was expected: "must be a number".
+/// @throws std::invalid_argument saying the expected kind: "must be a number".
 void parseInto(std::string_view text, double& field);
 void parseInto(std::string_view text, int& field);
 void parseInto(std::string_view text, std::int64_t& field);

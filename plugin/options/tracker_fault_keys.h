@@ -11,22 +11,22 @@
 
 namespace efm {
 
-/// A tracker's faults as text, in metres, degrees and seconds; what each key means is said where it
-/// is stored. `seed` is that of all draws.
+/// A tracker's faults as text, in metres, degrees and seconds; the fields of TrackerFaults say the
+/// meaning of each key. `seed` is the seed of all random draws.
 
-/// Sets what "key=value" says.
-/// @throws std::invalid_argument naming the key, its value and what was expected.
+/// Sets one fault from "key=value".
+/// @throws std::invalid_argument naming the key, its value and the expected kind and range.
 void setTrackerFault(std::string_view assignment, TrackerFaults& faults);
 
-/// All keys with their values, which read back the same but for the rounding of degrees; without
-/// those that are not given.
+/// All keys with their values, except keys without a value. Values read back the same, except for
+/// the rounding of degrees.
 std::vector<std::pair<std::string, OptionValue>> listTrackerFaults(const TrackerFaults& faults);
 
 /// "noise_m, noise_deg, ...".
 std::string knownTrackerFaults();
 
-/// For who cannot say how long a keyframe is.
-/// @throws std::invalid_argument where noise per keyframe is asked for, but not for how long.
+/// For commands without options for keyframes.
+/// @throws std::invalid_argument where there is noise per keyframe, but no length of a keyframe.
 void requireKeyframeLength(const TrackerFaults& faults);
 
 }  // namespace efm

@@ -21,7 +21,7 @@
 namespace efm {
 namespace {
 
-/// The images of one depth map, and that of a camera's events.
+/// The images of one depth map.
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
@@ -39,7 +39,7 @@ void makeFolder(const std::filesystem::path& folder) {
   }
 }
 
-/// Removes the files of these names; what else has such a name was not written here.
+/// Removes the regular files of these names; others were not written here.
 template <std::size_t N>
 void removeFiles(const std::filesystem::path& folder,
                  const std::array<std::string_view, N>& names) {
@@ -62,7 +62,7 @@ bool isCameraFolder(const std::filesystem::directory_entry& entry) {
          std::filesystem::is_directory(entry.symlink_status());
 }
 
-/// Removes what is kept of a keyframe: its own images, and those of its single cameras.
+/// Removes the images of a keyframe and of its single cameras.
 void removeImages(const std::filesystem::path& folder) {
   removeFiles(folder, kImages);
   std::vector<std::filesystem::path> cameras;

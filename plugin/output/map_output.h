@@ -13,24 +13,24 @@
 
 namespace efm {
 
-/// Whose files a folder receives; each kind replaces its own alone.
+/// The files of a folder. Each kind replaces its own files alone.
 enum class OutputKind {
   kMap,    ///< map.pcd, map.simplemap, trajectory.txt, report.json, keyframes/<t_ref>/ with images
   kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
 };
 
-/// The folder that a map is written to. Files appear under their names only when they are complete;
-/// where one cannot be written, an error names it (std::runtime_error).
+/// The folder that a map is written to. A file appears under its name when it is complete. A
+/// std::runtime_error names a file that cannot be written.
 ///
 ///     map.pcd  map.simplemap  trajectory.txt  report.json
 ///     trajectory_tracker.txt   where poses were refined
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
-///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   where the keyframe has them
+///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   by option
 class MapOutput {
  public:
-  /// Creates the folder. What an earlier run of the same kind left in it is removed right before
-  /// the first file is written, so that a run which cannot write anything costs nothing.
-  /// @param limits of depth, which the colours of depth.png run between.
+  /// Creates the folder. Right before the first file is written, the files of an earlier run of the
+  /// same kind are removed: a run that writes nothing leaves them.
+  /// @param limits the colours of depth.png run between its depths.
   /// @throws std::runtime_error where the folder cannot be made.
   MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits);
 
@@ -44,7 +44,7 @@ class MapOutput {
   /// @param name "map.pcd" or "points.pcd".
   void writeCloud(const std::string& name, const std::vector<CloudPoint>& points);
   /// @param name "map.simplemap".
-  /// @param write writes a file of the path that it is given, which gets its name afterwards.
+  /// @param write writes a file at the given path; the file is renamed afterwards.
   void writeFile(const std::string& name,
                  const std::function<void(const std::filesystem::path&)>& write);
   void writeReport(const std::string& json);
@@ -59,7 +59,7 @@ class MapOutput {
   std::filesystem::path folder_;
   OutputKind kind_;
   DepthPlanesOptions limits_;
-  bool began_ = false;  // something was written
+  bool began_ = false;  // a file was written
 };
 
 }  // namespace efm

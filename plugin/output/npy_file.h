@@ -11,9 +11,9 @@
 
 namespace efm {
 
-/// Writes the whole DSI to a NumPy file (.npy, format 1.0): float32, [plane][row][column]. Planes
-/// go to disk as they come: memory is that of one plane. The file appears under its name when
-/// `finish` is called; without it nothing stays.
+/// Writes the whole DSI to a NumPy file (.npy, format 1.0): float32, [plane][row][column]. Each
+/// plane goes to disk at once: memory is that of one plane. `finish` gives the file its name;
+/// without it no file stays.
 class NpyDsiFile : public DsiSink {
  public:
   /// @throws std::runtime_error naming the path where it cannot be created.

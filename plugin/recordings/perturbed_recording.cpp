@@ -18,7 +18,7 @@ namespace {
 using mrpt::obs::CObservation;
 using mrpt::obs::CObservationRobotPose;
 
-/// Gives the poses that were put into it.
+/// Returns the poses that it was fed.
 class FedPoses : public PoseSource {
  public:
   void feed(const StampedPose& pose) { poses_.push_back(pose); }
@@ -39,13 +39,13 @@ class FedPoses : public PoseSource {
 
 }  // namespace
 
-/// One source's poses on their way through the faults.
+/// Applies the faults to the poses of one source.
 class PerturbedRecording::Tracker {
  public:
   struct Output {
     CObservationRobotPose::Ptr pose;
     std::int64_t t_ns = 0;
-    bool put_in = false;  // before the one that was fed last
+    bool inserted = false;  // older than the pose that was fed last
   };
 
   explicit Tracker(const TrackerFaults& faults) : moves_(faults.perturbation.any()) {
@@ -63,9 +63,9 @@ class PerturbedRecording::Tracker {
   std::optional<Output> next() {
     const std::optional<StampedPose> pose = poses_->next();
     if (!pose) return std::nullopt;
-    const bool put_in = pose->t_ns < pending_.back().t_ns;
+    const bool inserted = pose->t_ns < pending_.back().t_ns;
     while (pending_.front().t_ns < pose->t_ns) pending_.pop_front();  // these were lost
-    // The pose after one that was put in is still to come.
+    // The pose behind an inserted one is still to come.
     Output output = pending_.front();
     if (output.t_ns == pose->t_ns) {
       pending_.pop_front();
@@ -73,7 +73,7 @@ class PerturbedRecording::Tracker {
       output = {CObservationRobotPose::Create(*output.pose), pose->t_ns};
       output.pose->timestamp = mrptTimeFrom(pose->t_ns);
     }
-    output.put_in = put_in;
+    output.inserted = inserted;
     if (moves_ && pose->T_world_rig.translation.allFinite()) {
       output.pose->pose.mean = mrptPoseFrom(pose->T_world_rig);
     }
@@ -83,7 +83,7 @@ class PerturbedRecording::Tracker {
  private:
   bool moves_;
   std::unique_ptr<PoseSource> poses_;
-  FedPoses* fed_;  // at the lower end of `poses_`, which owns it
+  FedPoses* fed_;  // owned by `poses_`, which reads from it
   std::deque<Output> pending_;
 };
 
@@ -100,7 +100,7 @@ PerturbedRecording::PerturbedRecording(std::unique_ptr<Recording> recording,
 PerturbedRecording::~PerturbedRecording() = default;
 
 CObservation::Ptr PerturbedRecording::next() {
-  while (!ended_ && (ready_.empty() || !isSettled(ready_.front()))) readOne();
+  while (!ended_ && (ready_.empty() || !isFinal(ready_.front()))) readOne();
   if (ready_.empty()) {
     if (error_) std::rethrow_exception(error_);
     return nullptr;
@@ -111,8 +111,8 @@ CObservation::Ptr PerturbedRecording::next() {
   return entry.observation;
 }
 
-/// Whether no pose can still be put in before it.
-bool PerturbedRecording::isSettled(const Entry& entry) const {
+/// Whether no pose can be inserted before it any more.
+bool PerturbedRecording::isFinal(const Entry& entry) const {
   return read_ahead_ns_ == 0 || !entry.t_ns || *newest_ns_ - *entry.t_ns > read_ahead_ns_;
 }
 
@@ -140,17 +140,17 @@ void PerturbedRecording::take(const CObservation::Ptr& observation) {
   if (!tracker) tracker = std::make_unique<Tracker>(faults_);
   tracker->feed(std::dynamic_pointer_cast<CObservationRobotPose>(observation), *t_ns);
   try {
-    takePoses(*tracker);
+    insertPoses(*tracker);
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(recording_->place() + ": " + error.what());
   }
 }
 
-/// What comes in time goes to its place in time, the rest behind what is there.
-void PerturbedRecording::takePoses(Tracker& tracker) {
+/// Inserts poses at their position in time; late poses go to the end.
+void PerturbedRecording::insertPoses(Tracker& tracker) {
   while (const auto output = tracker.next()) {
     auto place = ready_.end();
-    if (output->put_in && faults_.latency_ns == 0) {
+    if (output->inserted && faults_.latency_ns == 0) {
       place = std::find_if(ready_.begin(), ready_.end(), [&](const Entry& entry) {
         return entry.t_ns && *entry.t_ns >= output->t_ns;
       });
@@ -163,7 +163,7 @@ void PerturbedRecording::end() {
   ended_ = true;
   for (auto& [origin, tracker] : trackers_) {
     tracker->end();
-    takePoses(*tracker);
+    insertPoses(*tracker);
   }
 }
 

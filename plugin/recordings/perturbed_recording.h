@@ -15,23 +15,23 @@
 
 namespace efm {
 
-/// A recording whose trackers have faults: its CObservationRobotPose are lost, wrong and late as
-/// asked for, each source's with the same draws. Odometry, what movements of actions add up to, and
-/// all else stay as they are; so does what a pose's observation says beside the pose. Poses that
-/// mark a jump are copies with a stamp of their own, one of MRPT's ticks apart.
+/// A recording whose trackers have faults: its CObservationRobotPose are lost, wrong and late, each
+/// source's with the same random draws. Other observations stay as they are, odometry and the
+/// poses of actions too. Of a pose's observation the mean alone changes. A jump is marked by
+/// copies of a pose with times of their own, one of MRPT's ticks apart.
 ///
-/// Poses come before the packets that begin at their time or later, but for the latency: then each
-/// comes behind the pose that is so much newer. With noise per keyframe it reads ahead by as much
-/// as poses may be apart.
+/// Without latency, poses come before the packets that begin at their time or later. With latency,
+/// a pose comes behind the pose that is newer by the latency. With noise per keyframe, the
+/// recording is read ahead by the largest gap between poses.
 class PerturbedRecording : public Recording {
  public:
-  /// @param faults ticks are MRPT's, whatever they say.
+  /// @param faults their tick is replaced by MRPT's.
   /// @throws std::invalid_argument where the faults are not valid.
   PerturbedRecording(std::unique_ptr<Recording> recording, const TrackerFaults& faults);
   ~PerturbedRecording() override;
 
-  /// Where the recording cannot be read on, its error comes behind what was read before.
-  /// @throws std::invalid_argument where a pose has no time or one older than that before it.
+  /// Where the recording cannot be read on, its error comes after the observations before it.
+  /// @throws std::invalid_argument where a pose has no time, or is older than the pose before it.
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return place_; }
   double progress() const override { return recording_->progress(); }
@@ -47,18 +47,18 @@ class PerturbedRecording : public Recording {
 
   void readOne();
   void take(const mrpt::obs::CObservation::Ptr& observation);
-  void takePoses(Tracker& tracker);
+  void insertPoses(Tracker& tracker);
   void end();
-  bool isSettled(const Entry& entry) const;
+  bool isFinal(const Entry& entry) const;
 
   std::unique_ptr<Recording> recording_;
   TrackerFaults faults_;
   std::int64_t read_ahead_ns_ = 0;
   std::map<PoseSourceId, std::unique_ptr<Tracker>> trackers_;
   std::deque<Entry> ready_;
-  std::optional<std::int64_t> newest_ns_;  // that was read
+  std::optional<std::int64_t> newest_ns_;  // of the observations read
   bool ended_ = false;
-  std::exception_ptr error_;  // that ended it
+  std::exception_ptr error_;  // the error that ended the recording
   std::string place_ = "the recording";
 };
 

@@ -10,26 +10,26 @@ namespace efm {
 
 struct Calibration;
 
-/// What was odd about a recording, though it could be read.
+/// Oddities of a recording that could be read.
 struct RecordingCounts {
-  std::uint64_t sorted_events = 0;  ///< Came later than a newer one, by up to 10 ms.
+  std::uint64_t sorted_events = 0;  ///< Came up to 10 ms after a newer one.
 };
 
-/// A recording as a stream of observations in the order of time: CObservationEvents and
-/// CObservationRobotPose, and whatever else a rawlog holds. A pose comes before the packets that
-/// begin at its time or later. Memory does not grow with the length of the recording.
+/// A recording as a stream of observations in the order of time: CObservationEvents,
+/// CObservationRobotPose and the other observations of a rawlog. A pose comes before the packets
+/// that begin at its time or later. Memory does not grow with the length of the recording.
 class Recording {
  public:
   virtual ~Recording() = default;
 
-  /// @return nothing at the end.
-  /// @throws std::runtime_error naming file and place where it cannot be read on.
+  /// @return the next observation; null at the end.
+  /// @throws std::runtime_error naming the file and the position where it cannot be read on.
   virtual mrpt::obs::CObservation::Ptr next() = 0;
 
-  /// Where the observation that `next` gave last stands, for messages: "entry 12 of my.rawlog".
+  /// The position of the last observation that `next` returned: "entry 12 of my.rawlog".
   virtual std::string place() const = 0;
 
-  /// The share of the input that was read, 0 to 1.
+  /// The fraction of the input that was read, 0 to 1.
   virtual double progress() const = 0;
 
   virtual RecordingCounts counts() const { return {}; }

@@ -12,14 +12,14 @@
 
 namespace efm {
 
-/// A recording with poses of its own choice: those it has are left out, the given ones put in at
-/// their times, as CObservationRobotPose "pose".
+/// A recording with other poses: leaves out its own and inserts the given ones at their times, as
+/// CObservationRobotPose with the label "pose".
 class RecordingWithPoses : public Recording {
  public:
-  /// @param poses T_world_body, in any order; those of equal time keep theirs.
+  /// @param poses T_world_body, in any order; poses of equal time keep their order.
   RecordingWithPoses(std::unique_ptr<Recording> recording, std::vector<StampedPose> poses);
 
-  /// Where the recording cannot be read on, its error comes when the poses were given.
+  /// Where the recording cannot be read on, its error comes after all poses.
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return place_; }
   double progress() const override { return recording_->progress(); }
@@ -31,9 +31,9 @@ class RecordingWithPoses : public Recording {
   std::unique_ptr<Recording> recording_;
   std::vector<StampedPose> poses_;  // in time order
   std::size_t next_pose_ = 0;
-  mrpt::obs::CObservation::Ptr ahead_;  // the recording's next one, where it was read already
+  mrpt::obs::CObservation::Ptr ahead_;  // the recording's next observation, if read
   bool ended_ = false;
-  std::exception_ptr error_;  // that ended it
+  std::exception_ptr error_;  // the error that ended the recording
   std::string place_ = "the recording";
 };
 

@@ -11,14 +11,14 @@
 
 namespace efm {
 
-/// A recording with another calibration in its packets, and another hand-eye transform in its
-/// poses. For who writes or shows observations. A map builder has its own options for both.
+/// A recording with another calibration in its packets and another hand-eye transform in its poses.
+/// For commands that write or show observations; a map builder has options for both.
 class RigOverrideRecording : public Recording {
  public:
   RigOverrideRecording(std::unique_ptr<Recording> recording, RigSetup setup);
 
-  /// @throws std::invalid_argument where the calibration has no such camera or one of another size,
-  /// or at the end where it has cameras that the recording does not have.
+  /// @throws std::invalid_argument where the calibration lacks a camera or has another size of it;
+  /// at the end where it has more cameras than the recording.
   mrpt::obs::CObservation::Ptr next() override;
   std::string place() const override { return recording_->place(); }
   double progress() const override { return recording_->progress(); }

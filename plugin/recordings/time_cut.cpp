@@ -14,12 +14,12 @@ namespace {
 
 using mrpt::obs::CObservation;
 
-/// How long after another camera's packets one may first come, or come on.
+/// A camera's packets come at most this long after those of another camera.
 constexpr std::int64_t kMaxCameraLagNs = kNanosecondsPerSecond;
 
-/// Where a packet begins: the earliest of what it says. Its own time may be missing, or that of its
-/// making, which MRPT gives where nobody says another.
-/// @return nothing where it has neither an event nor news.
+/// The begin of a packet: the earliest of its times. Its own time may be missing, or be the time at
+/// which the object was made: MRPT's default.
+/// @return nothing where it has neither an event nor a covered time.
 std::optional<std::int64_t> beginOf(const CObservationEvents& packet) {
   if (packet.events.empty() && !packet.covered_until_ns) return std::nullopt;
   std::int64_t begin_ns = packet.covered_until_ns.value_or(kMaxTimeNs);
@@ -27,7 +27,7 @@ std::optional<std::int64_t> beginOf(const CObservationEvents& packet) {
   return std::min(begin_ns, nanosecondsIfKnown(packet.timestamp).value_or(kMaxTimeNs));
 }
 
-/// @return whether something is left: an event, or the news that there was none.
+/// @return whether the packet still says something: it has an event, or covers a time.
 bool cutEvents(CObservationEvents& packet, std::int64_t begin_ns, std::int64_t t0_ns,
                std::int64_t t1_ns) {
   auto& events = packet.events;
@@ -69,15 +69,15 @@ bool TimeCut::readOne() {
       events_ended_ && posesEnded() ? nullptr : recording_->next();
   if (!observation) {
     const bool something_left = !began_ && !across_.empty();
-    give(nullptr);
+    deliver(nullptr);
     return something_left;
   }
   if (const auto pose = poseIn(*observation)) {
-    takePose(observation, poses_[*poseSourceOf(*observation)], pose->t_ns);
+    addPose(observation, poses_[*poseSourceOf(*observation)], pose->t_ns);
   } else if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
-    takePacket(packet);
+    addPacket(packet);
   } else {
-    takeOther(observation);
+    addOther(observation);
   }
   return true;
 }
@@ -87,18 +87,18 @@ bool TimeCut::posesEnded() const {
                                         [](const auto& entry) { return entry.second.ended; });
 }
 
-void TimeCut::takePose(const CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns) {
+void TimeCut::addPose(const CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns) {
   if (t_ns < t0_ns_ && !began_) {
     track.before = pose;
   } else if (t_ns < t1_ns_ || !std::exchange(track.ended, true)) {
-    // One before t0 may come behind what is after it, where the tracker is late. The first one
-    // after the cut is the last one needed.
-    give(pose);
+    // A late tracker's pose from before t0 may come after t0's observations. The first pose from t1
+    // on is the last one needed.
+    deliver(pose);
   }
 }
 
-/// Events end when every camera has passed t1, and all have had the time to appear; at the latest
-/// when one is far beyond it: then the others are silent.
+/// Events end when every camera has passed t1 and all have had time to appear; at the latest when
+/// one camera is far beyond t1: then the others are silent.
 void TimeCut::noteProgress(int camera, std::int64_t begin_ns, std::int64_t covered_until_ns) {
   bool& passed = passed_t1_[camera];
   passed = passed || begin_ns >= t1_ns_ || covered_until_ns >= t1_ns_;
@@ -110,7 +110,7 @@ void TimeCut::noteProgress(int camera, std::int64_t begin_ns, std::int64_t cover
   if ((all_passed && all_there) || far_beyond) events_ended_ = true;
 }
 
-void TimeCut::takePacket(const CObservationEvents::Ptr& packet) {
+void TimeCut::addPacket(const CObservationEvents::Ptr& packet) {
   const std::optional<std::int64_t> begin_ns = beginOf(*packet);
   if (!begin_ns) return;
   noteProgress(packet->camera_index, *begin_ns, packet->covered_until_ns.value_or(*begin_ns));
@@ -118,17 +118,17 @@ void TimeCut::takePacket(const CObservationEvents::Ptr& packet) {
   if (*begin_ns < t0_ns_ && !began_) {
     across_.push_back(packet);
   } else {
-    give(packet);
+    deliver(packet);
   }
 }
 
-void TimeCut::takeOther(const CObservation::Ptr& observation) {
+void TimeCut::addOther(const CObservation::Ptr& observation) {
   const std::optional<std::int64_t> t_ns = nanosecondsIfKnown(observation->timestamp);
-  if (!t_ns || (*t_ns >= t0_ns_ && *t_ns < t1_ns_)) give(observation);
+  if (!t_ns || (*t_ns >= t0_ns_ && *t_ns < t1_ns_)) deliver(observation);
 }
 
-/// What lies across t0 goes before everything from t0 on, and the pose before it goes first.
-void TimeCut::give(const CObservation::Ptr& observation) {
+/// Before the first observation from t0 on come the packets across t0, and before these the poses.
+void TimeCut::deliver(const CObservation::Ptr& observation) {
   if (!std::exchange(began_, true)) {
     std::vector<CObservation::Ptr> before;
     for (auto& [source, track] : poses_) {

@@ -15,13 +15,13 @@
 
 namespace efm {
 
-/// A stretch of a recording, [t0, t1): the events in it, and the poses in it with the nearest one
-/// of each source before and after, so that every event has a pose on both sides that had. Packets
-/// without a time go by their events', other observations without one pass. Reads on until each
-/// camera has passed t1, whose packets may come when they end, but no more than a second.
+/// An interval [t0, t1) of a recording: its events, its poses, and of each source the nearest pose
+/// before and after, so that events keep poses on both sides. A packet without a time has the time
+/// of its first event; other observations without a time pass. Reads on until each camera has
+/// passed t1, because packets may come as late as they end, but at most for a second.
 class TimeCut : public Recording {
  public:
-  /// @param t0_ns, t1_ns no limit where not given.
+  /// @param t0_ns, t1_ns nothing: no limit.
   /// @throws std::invalid_argument where t1 is not after t0.
   TimeCut(std::unique_ptr<Recording> recording, std::optional<std::int64_t> t0_ns,
           std::optional<std::int64_t> t1_ns);
@@ -34,31 +34,31 @@ class TimeCut : public Recording {
 
  private:
   struct PoseTrack {
-    mrpt::obs::CObservation::Ptr before;  // the newest before t0, until it is given
-    bool ended = false;                   // the one after t1 was given
+    mrpt::obs::CObservation::Ptr before;  // the newest before t0, until delivered
+    bool ended = false;                   // the first one from t1 on was delivered
   };
 
   bool readOne();
   bool posesEnded() const;
-  void takePose(const mrpt::obs::CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns);
+  void addPose(const mrpt::obs::CObservation::Ptr& pose, PoseTrack& track, std::int64_t t_ns);
   void noteProgress(int camera, std::int64_t begin_ns, std::int64_t covered_until_ns);
-  void takePacket(const CObservationEvents::Ptr& packet);
-  void takeOther(const mrpt::obs::CObservation::Ptr& observation);
-  void give(const mrpt::obs::CObservation::Ptr& observation);
+  void addPacket(const CObservationEvents::Ptr& packet);
+  void addOther(const mrpt::obs::CObservation::Ptr& observation);
+  void deliver(const mrpt::obs::CObservation::Ptr& observation);
 
   std::unique_ptr<Recording> recording_;
   std::int64_t t0_ns_;
   std::int64_t t1_ns_;
-  bool began_ = false;  // something from t0 on was read
+  bool began_ = false;  // an observation from t0 on was read
   std::map<PoseSourceId, PoseTrack> poses_;
-  std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until it is given
+  std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until delivered
   std::deque<mrpt::obs::CObservation::Ptr> ready_;
   std::map<int, bool> passed_t1_;             // per camera
   std::int64_t first_begin_ns_ = kMaxTimeNs;  // of packets
   bool events_ended_ = false;
 };
 
-/// The recording itself where no limit is given.
+/// The recording itself where there is no limit.
 /// @throws std::invalid_argument as TimeCut does.
 std::unique_ptr<Recording> cutTime(std::unique_ptr<Recording> recording,
                                    std::optional<std::int64_t> t0_ns,

@@ -8,10 +8,10 @@
 
 namespace efm {
 
-/// Everything that an option file says.
+/// All options of an option file.
 struct EventFusionOptions {
   FusionMapperOptions mapper;
-  /// The cloud of a keyframe is those of its single cameras, concatenated: the naive baseline
+  /// The cloud of a keyframe is the clouds of its single cameras, concatenated: the naive baseline
   /// (Ghosh and Gallego 2022, Sec. 3.1). Depth maps stay fused.
   bool late_fusion = false;
   GlobalCloudOptions cloud;

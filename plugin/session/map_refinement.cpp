@@ -8,14 +8,14 @@
 namespace efm {
 namespace {
 
-/// Keyframes that may wait with their points.
-constexpr std::size_t kMostWaiting = 50;
+/// More waiting keyframes lose their points.
+constexpr std::size_t kMaxWaiting = 50;
 
 }  // namespace
 
 Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig) {
   const Eigen::Vector3d lever_m = T_world_rig.translation - state.T_world_ref_denoised.translation;
-  Matrix6d by_motion = Matrix6d::Identity();  // a turn v moves the rig by v x lever
+  Matrix6d by_motion = Matrix6d::Identity();  // a rotation r moves the rig by r x lever
   by_motion.topRightCorner<3, 3>() << 0, lever_m.z(), -lever_m.y(),  //
       -lever_m.z(), 0, lever_m.x(),                                  //
       lever_m.y(), -lever_m.x(), 0;
@@ -48,7 +48,7 @@ Rigid3 MapRefinement::add(const KeyframeDepthMap& keyframe,
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   if (error_) std::rethrow_exception(error_);
-  if (waiting_.size() >= kMostWaiting) task.cloud = RegistrationCloud({}, options_.refiner.points);
+  if (waiting_.size() >= kMaxWaiting) task.cloud = RegistrationCloud({}, options_.refiner.points);
   waiting_.push_back(std::move(task));
   changed_.notify_all();
   return state_.T_world_odom * keyframe.T_world_ref;
@@ -61,7 +61,7 @@ void MapRefinement::finish() {
         lock, [this] { return error_ || !options_.background || (waiting_.empty() && !busy_); });
     if (error_) std::rethrow_exception(error_);
   }
-  // The thread has nothing to do: the refiner is ours.
+  // The thread is idle: the refiner may be used here.
   double seconds = 0;
   {
     const SecondsScope scope(seconds);
@@ -91,7 +91,7 @@ void MapRefinement::refine(Task task) {
   publish(seconds);
 }
 
-/// Makes what the refiner has done known to the other thread.
+/// Copies the refiner's results for the other thread.
 void MapRefinement::publish(double seconds) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const std::size_t number : refiner_.takeMoved()) {

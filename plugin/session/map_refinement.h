@@ -17,9 +17,8 @@ namespace efm {
 
 struct MapRefinementOptions {
   bool enabled = false;
-  /// Refine beside the mapping, in a thread of its own, as fast as that goes: for live operation.
-  /// Otherwise each keyframe is refined before the next one is made, and the same recording gives
-  /// the same map.
+  /// Refine in a thread of its own while the mapping goes on: for live operation. Otherwise each
+  /// keyframe is refined before the next one is made, and the same recording gives the same map.
   bool background = false;
   RefinementOptions refiner;
 
@@ -27,43 +26,43 @@ struct MapRefinementOptions {
   void validate() const { refiner.validate(); }
 };
 
-/// What a refinement knows by now.
+/// The state of a refinement so far.
 struct RefinementState {
   Rigid3 T_world_odom;          ///< Takes the tracker's newest poses to the refined world.
-  Rigid3 T_world_ref_denoised;  ///< The newest keyframe's, less its noise.
-  Matrix6d covariance = Matrix6d::Zero();  ///< Of a pose there; see KeyframeRefiner.
+  Rigid3 T_world_ref_denoised;  ///< The newest keyframe's, without its noise.
+  Matrix6d covariance = Matrix6d::Zero();  ///< Of a pose there: see KeyframeRefiner.
   RefinementCounts counts;
-  TrackerErrors tracker;    ///< As they seem to be.
-  std::size_t waiting = 0;  ///< Keyframes that are not refined yet.
-  double seconds = 0;       ///< Spent on it.
+  TrackerErrors tracker;    ///< As estimated.
+  std::size_t waiting = 0;  ///< Keyframes not refined yet.
+  double seconds = 0;       ///< Time spent refining.
 };
 
-/// The covariance of a pose of the tracker after the correction: that of the newest keyframe,
-/// turned about it with a lever, and what the way from there adds. As `poseCovariance` has it.
+/// The covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the newest
+/// keyframe's covariance, whose rotation moves the rig across its lever, plus the drift over the
+/// path from the keyframe.
 Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig);
 
-/// Refines keyframes as they are made, beside the mapping where that is asked for. For one thread,
-/// which it never lets wait but in `add` without a background, and in `finish`. Where the
-/// background falls 50 keyframes behind, the next ones are given no points: the tracker's motion
-/// stands there.
+/// Refines keyframes one after the other, by option in a background thread. For use by one thread,
+/// which waits in `finish` only, and in `add` without the background thread. Where that is 50
+/// keyframes behind, the next keyframes lose their points: they keep the tracker's motion.
 class MapRefinement {
  public:
   /// @throws std::invalid_argument where the options are not valid.
   explicit MapRefinement(const MapRefinementOptions& options);
-  /// Leaves what is waiting unrefined.
+  /// Leaves waiting keyframes unrefined.
   ~MapRefinement();
   MapRefinement(const MapRefinement&) = delete;
   MapRefinement& operator=(const MapRefinement&) = delete;
 
-  /// Takes the next keyframe; their numbers count from 0.
-  /// @param stated what the tracker says of its pose.
-  /// @return T_world_ref as far as it is known now.
-  /// @throws what refining an earlier keyframe in the background threw.
+  /// Adds the next keyframe; keyframes are numbered from 0.
+  /// @param stated the noise that the tracker states for its pose.
+  /// @return T_world_ref as known now.
+  /// @throws the error of an earlier keyframe in the background.
   Rigid3 add(const KeyframeDepthMap& keyframe, const std::optional<PoseNoise>& stated);
-  /// Waits for all of them and solves them together. @throws as `add`.
+  /// Waits for all keyframes and solves them together. @throws as `add`.
   void finish();
 
-  /// T_world_ref of the keyframes that were moved since this was asked last, by their numbers.
+  /// T_world_ref of the keyframes that moved since the last call, by their numbers.
   std::map<std::size_t, Rigid3> takeMoved();
   RefinementState state() const;
 
@@ -79,9 +78,9 @@ class MapRefinement {
   void runInBackground();
 
   MapRefinementOptions options_;
-  KeyframeRefiner refiner_;  // of the thread while there is one
+  KeyframeRefiner refiner_;  // used by the thread while there is one
 
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
   std::deque<Task> waiting_;
   bool busy_ = false;

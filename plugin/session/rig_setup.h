@@ -11,21 +11,21 @@
 
 namespace efm {
 
-/// What is said of the rig beside the recording, in place of what that says itself.
+/// Options of the rig, in place of the recording's own.
 struct RigOptions {
   std::filesystem::path calibration;          ///< Empty: from the recording.
   std::filesystem::path hand_eye;             ///< Empty: from the recording.
   std::vector<std::int64_t> time_offsets_ns;  ///< One per camera; empty: none.
-  std::string pose_source;                    ///< The label of its sensor; empty: the best.
+  std::string pose_source;  ///< The label of the source's sensor; empty: the best source.
 };
 
-/// The same, with its files read. Applying it twice is as good as once: it replaces.
+/// The content of the files that RigOptions name.
 struct RigSetup {
   std::optional<Calibration> calibration;
   std::optional<Rigid3> T_body_rig;  ///< From the tracked body to the rig.
 };
 
-/// @throws std::runtime_error naming a file that cannot be read or is not understood.
+/// @throws std::runtime_error naming a file that cannot be read or understood.
 RigSetup readRigSetup(const RigOptions& options);
 
 }  // namespace efm

@@ -7,9 +7,9 @@
 
 namespace efm {
 
-/// Seconds of a run, by what they were spent on.
+/// Seconds of a run, by stage.
 struct StageSeconds {
-  double total = 0;   ///< From beginning to end, everything.
+  double total = 0;   ///< The whole run.
   double read = 0;    ///< Reading the recording.
   double sweep = 0;   ///< Packets, back-projection, votes and fusion.
   double depth = 0;   ///< Extraction of depth maps.
@@ -32,7 +32,7 @@ class SecondsScope {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-/// Measures the mapping's stages, which never look at a clock themselves.
+/// Measures the stages of the mapping.
 class StageTimer : public StageHook {
  public:
   explicit StageTimer(StageSeconds& seconds) : seconds_(seconds) {}
