@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "test/plugin/formats/files.h"
+#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -13,7 +14,6 @@ namespace {
 using testing::AllOf;
 using testing::EndsWith;
 using testing::HasSubstr;
-using testing::StartsWith;
 
 constexpr const char* kCamchain =
     "%YAML:1.0\n---\n"
@@ -32,15 +32,6 @@ class CalibrationFile : public TemporaryFolder {
   std::string errorOfText(const std::string& text) const {
     return errorOf([&] { read(text); });
   }
-  template <typename Call>
-  static std::string refusalOf(Call call) {
-    try {
-      call();
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "no error";
-  }
 };
 
 TEST_F(CalibrationFile, MayBeACameraChainWhateverItsName) {
@@ -58,18 +49,18 @@ TEST_F(CalibrationFile, MayBeNineNumbersOfACameraWhoseSizeTheRecordingKnows) {
   EXPECT_EQ(model.coefficients[0], 0.1);
   EXPECT_EQ(model.width, 240);
   EXPECT_EQ(model.height, 180);
-  EXPECT_THAT(refusalOf([&] { calibration.camera(0, std::nullopt); }),
+  EXPECT_THAT(messageOf([&] { calibration.camera(0, std::nullopt); }),
               HasSubstr("given.txt: no size of the sensor"));
 }
 
 TEST_F(CalibrationFile, OfOtherCamerasIsAnErrorThatNamesItAndBothCounts) {
   const Calibration calibration = read(kCamchain);
-  EXPECT_THAT(refusalOf([&] { calibration.camera(2, std::nullopt); }),
+  EXPECT_THAT(messageOf([&] { calibration.camera(2, std::nullopt); }),
               EndsWith("given.txt: 2 cameras, but the recording has camera 2: expected one for "
                        "each"));
-  EXPECT_THAT(refusalOf([&] { calibration.requireCameras(3); }),
+  EXPECT_THAT(messageOf([&] { calibration.requireCameras(3); }),
               EndsWith("given.txt: 2 cameras: expected 3, as the recording has"));
-  EXPECT_THAT(refusalOf([&] {
+  EXPECT_THAT(messageOf([&] {
                 calibration.camera(1, CameraSize{640, 480});
               }),
               EndsWith("given.txt: camera 1 has 240x180 pixels: expected 640x480 pixels, as the "

@@ -6,7 +6,9 @@
 #include <mrpt/obs/CObservationComment.h>
 
 #include "plugin/mrpt/pose_observation.h"
+#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
+#include "test/plugin/recordings/listed_recording.h"
 
 namespace efm {
 namespace {
@@ -15,25 +17,6 @@ using mrpt::obs::CObservation;
 using mrpt::obs::CObservationRobotPose;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-// --- TimeCut -----------------------------------------------------------------------------------
-
-/// Plays observations that are there.
-class Playback : public Recording {
- public:
-  explicit Playback(std::vector<CObservation::Ptr> observations)
-      : observations_(std::move(observations)) {}
-  CObservation::Ptr next() override {
-    return next_ < observations_.size() ? observations_[next_++] : nullptr;
-  }
-  std::string place() const override { return "here"; }
-  double progress() const override { return 0; }
-  std::size_t given() const { return next_; }
-
- private:
-  std::vector<CObservation::Ptr> observations_;
-  std::size_t next_ = 0;
-};
 
 CObservation::Ptr pose(std::int64_t t_ns) {
   auto observation = CObservationRobotPose::Create();
@@ -66,7 +49,7 @@ std::string describe(const CObservation& observation) {
 
 std::vector<std::string> cut(const std::vector<CObservation::Ptr>& observations,
                              std::optional<std::int64_t> t0_ns, std::optional<std::int64_t> t1_ns) {
-  const auto recording = cutTime(std::make_unique<Playback>(observations), t0_ns, t1_ns);
+  const auto recording = cutTime(std::make_unique<ListedRecording>(observations), t0_ns, t1_ns);
   std::vector<std::string> given;
   while (const auto observation = recording->next()) given.push_back(describe(*observation));
   return given;
@@ -136,12 +119,8 @@ TEST(TimeCut, APoseWithoutATimeIsAnErrorThatNamesItsSource) {
   const CObservation::Ptr timeless = pose(0);
   timeless->timestamp = INVALID_TIMESTAMP;
   timeless->sensorLabel = "tracker";
-  try {
-    cut({timeless}, 100, 1100);
-    FAIL() << "no error";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("'tracker' has no time stamp"));
-  }
+  EXPECT_THAT(messageOf([&] { cut({timeless}, 100, 1100); }),
+              HasSubstr("'tracker' has no time stamp"));
 }
 
 TEST(TimeCut, EndsOnceEachCameraHasPassedT1) {
@@ -169,13 +148,13 @@ TEST(TimeCut, DoesNotWaitLongForACameraThatIsSilent) {
     observations.push_back(packet(0, i * kSecond / 4, i * kSecond / 4 + 1, {i * kSecond / 4}));
     observations.push_back(pose(i * kSecond / 4));
   }
-  auto playback = std::make_unique<Playback>(observations);
-  const Playback& played = *playback;
+  auto playback = std::make_unique<ListedRecording>(observations);
+  const ListedRecording& played = *playback;
   const auto recording = cutTime(std::move(playback), 0, kSecond);
   std::size_t given = 0;
   while (recording->next()) ++given;
   EXPECT_EQ(given, 1U + 1U + 4U + 5U);
-  EXPECT_LT(played.given(), 2U + 2U * 10U) << "a second beyond t1 and no more";
+  EXPECT_LT(played.read(), 2U + 2U * 10U) << "a second beyond t1 and no more";
 }
 
 TEST(TimeCut, MustEndAfterItBegins) {
