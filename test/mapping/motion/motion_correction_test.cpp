@@ -5,11 +5,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <mutex>
 #include <stdexcept>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_recording.h"
@@ -196,6 +198,40 @@ TEST(MotionCorrection, WithoutEventsTheCorrectionIsThatOfTheInput) {
   const VelocityCorrection found = sharpestMotion({{}, {}}, input, {});
   EXPECT_EQ(found.linear_m_s, input.warped_with.linear_m_s);
   EXPECT_EQ(found.angular_rad_s, input.warped_with.angular_rad_s);
+}
+
+TEST(MotionCorrection, SigmasAreInMetresAndDegreesPerSecond) {
+  // Edges that a wrong velocity along one axis blurs by up to 4 px, as both cameras see them.
+  const auto blurred_by = [](int axis, float velocity) {
+    std::vector<WarpedEvent> events;
+    for (int i = 0; i < 400; ++i) {
+      const float since = static_cast<float>(i % 20) / 10 - 1;
+      WarpedEvent event;
+      event.by_velocity.setZero();
+      event.by_velocity(0, axis) = 4 * since / velocity;
+      event.by_inverse_depth.setZero();
+      event.pixel = {10.3F + 12 * static_cast<float>(i / 100) - 4 * since,
+                     4.4F + static_cast<float>(i / 20 % 5)};
+      events.push_back(event);
+    }
+    return std::vector<std::vector<WarpedEvent>>{events, events};
+  };
+  const SharpestMotionInput input{cv::Size(60, 14), 0.01, {}};
+  constexpr float kVelocity = 0.1F;  // m/s and rad/s
+  const auto found = [&](double sigma_m_s, double sigma_rad_s, int axis) {
+    MotionCorrectionOptions options;
+    options.motion_sigma_m_s = sigma_m_s;
+    options.motion_sigma_deg_s = sigma_rad_s / kRadiansPerDegree;
+    const auto motion = sharpestMotion(blurred_by(axis, kVelocity), input, options);
+    return axis < 3 ? motion.linear_m_s[axis] : motion.angular_rad_s[axis - 3];
+  };
+  EXPECT_NEAR(found(0.1, 0.1, 0), 0.1, 0.02);
+  EXPECT_NEAR(found(0.1, 0.1, 4), 0.1, 0.02);
+  // A thousandth holds the velocity back, a twentieth does not.
+  EXPECT_LT(std::abs(found(1e-4, 0.1, 0)), 0.03);
+  EXPECT_LT(std::abs(found(0.1, 1e-4, 4)), 0.03);
+  EXPECT_GT(found(0.005, 0.1, 0), 0.06);
+  EXPECT_GT(found(0.1, 0.005, 4), 0.06);
 }
 
 TEST(MotionCorrection, WhereCamerasDoNotMeetTheCorrectionIsThatOfTheInput) {
