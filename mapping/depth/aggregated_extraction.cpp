@@ -84,7 +84,7 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
   const cv::Mat1f& confidence = dsi.peaks.confidence;
   const cv::Mat1f excess = excessOf(confidence, options.threshold_kernel);
   const SparseMask looked_at(standOut(excess, options.min_excess));
-  const std::vector<AggregatedPeak> peaks = aggregateRays(looked_at, dsi.rays, confidence.size());
+  const std::vector<AggregatedPeak> peaks = aggregateRays(looked_at, dsi.columns, confidence.size());
 
   std::vector<float> positions(looked_at.size());
   std::vector<float> weights(looked_at.size());

@@ -60,7 +60,7 @@ class PeakFinder {
 
 double planesOfOnePlace(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
 
-std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiRays& rays,
+std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiColumns& rays,
                                           cv::Size size) {
   const PixelNeighbours neighbours(chosen, size);
   const PeakFinder finder(rays.planes());

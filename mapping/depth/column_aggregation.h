@@ -28,7 +28,7 @@ struct AggregatedPeak {
 /// peaks instead of sharpening them.
 /// @param chosen have rays (asserted). @param size of the view.
 /// @return one per chosen pixel. Runs on the threads of the task arena that it is called in.
-std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiRays& rays,
+std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiColumns& rays,
                                           cv::Size size);
 
 /// Planes that count as one place, for a DSI of so many: with more planes than a hundred, the same

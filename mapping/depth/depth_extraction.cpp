@@ -37,7 +37,7 @@ void DepthExtractionOptions::validate() const {
                 median_size, "odd, 1 to 255");
 }
 
-bool keepsRays(ExtractionMethod method) { return method == ExtractionMethod::kAggregated; }
+bool keepsColumns(ExtractionMethod method) { return method == ExtractionMethod::kAggregated; }
 
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
                       const DepthExtractionOptions& options,

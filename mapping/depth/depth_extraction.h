@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "mapping/depth/depth_map.h"
-#include "mapping/dsi/swept_dsi.h"
+#include "mapping/dsi/dsi_columns.h"
 #include "mapping/geometry/depth_planes.h"
 
 namespace efm {
@@ -16,8 +16,8 @@ enum class ExtractionMethod {
   kAggregated,  ///< Depth from the rays of neighbouring pixels together, kept where they agree.
 };
 
-/// Whether the method looks at whole rays, not at their peaks alone: `SweptDsi::rays`.
-bool keepsRays(ExtractionMethod method);
+/// Whether the method looks at whole rays, not at their peaks alone: `SweptDsi::columns`.
+bool keepsColumns(ExtractionMethod method);
 
 std::string_view nameOf(ExtractionMethod method);
 /// @throws std::invalid_argument naming the value and what is known.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/dsi/dsi_peaks.h"
 
-#include <algorithm>
 #include <cassert>
 
 #include "mapping/kernels/peaks.h"
@@ -26,34 +25,10 @@ RunningPeaks::RunningPeaks(std::size_t pixels, VotingKernel kernel)
       plane_(pixels, -1),
       previous_(pixels, kNoValue) {}
 
-void RunningPeaks::take(int plane, const PlaneValues& values) {
+void RunningPeaks::add(int plane, const PlaneValues& values) {
   assert(values.size() == best_.size());
-  if (first_.empty()) {
-    first_ = values;
-    first_plane_ = plane;
-  }
-  functions_->take({best_.data(), plane_.data(), before_.data(), after_.data(), previous_.data()},
-                   plane, values.data(), values.size());
-}
-
-void RunningPeaks::append(const RunningPeaks& next) {
-  for (std::size_t i = 0; i < best_.size(); ++i) {
-    if (next.best_[i] > best_[i]) {
-      best_[i] = next.best_[i];
-      before_[i] = next.plane_[i] == next.first_plane_ ? previous_[i] : next.before_[i];
-      after_[i] = next.after_[i];
-      plane_[i] = next.plane_[i];
-    } else if (plane_[i] == next.first_plane_ - 1) {
-      after_[i] = next.first_[i];
-    }
-  }
-  previous_ = next.previous_;
-}
-
-DsiPeaks RunningPeaks::images(const ReferenceView& view) const {
-  DsiPeaks images = unwrittenPeaks(view);
-  writeTo(images, {0, 0, view.width, view.height});
-  return images;
+  functions_->add({best_.data(), plane_.data(), before_.data(), after_.data(), previous_.data()},
+                  plane, values.data(), values.size());
 }
 
 void RunningPeaks::writeTo(DsiPeaks& images, const cv::Rect& tile) const {

@@ -20,25 +20,6 @@ constexpr NamedChoice<FusionRule> kRules[] = {
     {FusionRule::kMax, "max"},
 };
 
-/// The rule's arithmetic: the only place that chooses between rules.
-const kernels::FusionSteps& stepsOf(FusionRule rule, const kernels::FusionFunctions& functions) {
-  switch (rule) {
-    case FusionRule::kMin:
-      return functions.min;
-    case FusionRule::kHarmonic:
-      return functions.harmonic;
-    case FusionRule::kGeometric:
-      return functions.geometric;
-    case FusionRule::kArithmetic:
-      return functions.arithmetic;
-    case FusionRule::kRms:
-      return functions.rms;
-    case FusionRule::kMax:
-      return functions.max;
-  }
-  throw std::logic_error("a fusion rule has no arithmetic");
-}
-
 }  // namespace
 
 std::string_view nameOf(FusionRule rule) { return nameIn(kRules, rule); }
@@ -58,41 +39,53 @@ const std::vector<FusionRule>& allFusionRules() {
   return rules;
 }
 
-FusionAccumulator::FusionAccumulator(FusionRule rule, std::size_t voxels, VotingKernel kernel)
-    : steps_(&stepsOf(rule, kernels::fusionFunctions(kernel))), values_(voxels) {}
-
-void FusionAccumulator::begin(int inputs) {
-  inputs_ = inputs;
-  folded_ = 0;
+const kernels::FusionSteps& stepsOf(FusionRule rule) {
+  const kernels::FusionFunctions& functions = kernels::fusionFunctions();
+  switch (rule) {
+    case FusionRule::kMin:
+      return functions.min;
+    case FusionRule::kHarmonic:
+      return functions.harmonic;
+    case FusionRule::kGeometric:
+      return functions.geometric;
+    case FusionRule::kArithmetic:
+      return functions.arithmetic;
+    case FusionRule::kRms:
+      return functions.rms;
+    case FusionRule::kMax:
+      return functions.max;
+  }
+  throw std::logic_error("a fusion rule has no arithmetic");
 }
 
-void FusionAccumulator::fold(const float* values) {
-  assert(folded_ < inputs_);
-  const bool first = folded_++ == 0;
+FusionAccumulator::FusionAccumulator(FusionRule rule, int inputs, std::size_t voxels)
+    : steps_(&stepsOf(rule)), inputs_(inputs), mean_(voxels) {
+  assert(inputs >= 1);
+}
+
+PlaneValues& FusionAccumulator::next() {
+  if (inputs_ <= 2 && isFirst()) return mean_;
+  next_.resize(mean_.size());
+  return next_;
+}
+
+void FusionAccumulator::add(const PlaneValues& values) {
+  assert(values.size() == mean_.size());
+  const bool first = isFirst();
+  if (first) added_ = 0;
+  ++added_;
   if (inputs_ <= 2) {
     // One input is its own mean, and two have a mean without a sum in between.
     if (!first) {
-      steps_->pair(values_.data(), values, values_.size());
-    } else if (values != values_.data()) {
-      std::copy_n(values, values_.size(), values_.begin());
+      steps_->pair(mean_.data(), values.data(), mean_.size());
+    } else if (&values != &mean_) {
+      std::copy(values.begin(), values.end(), mean_.begin());
     }
     return;
   }
-  if (first) std::fill(values_.begin(), values_.end(), steps_->start);
-  steps_->fold(values_.data(), values, values_.size());
-}
-
-void FusionAccumulator::finish() {
-  assert(folded_ == inputs_);
-  if (inputs_ == 0) std::fill(values_.begin(), values_.end(), 0.0F);
-  if (inputs_ > 2) {
-    steps_->finish(values_.data(), static_cast<float>(inputs_), values_.size());
-  }
-}
-
-void FusionAccumulator::addPair(const float* second, const kernels::PixelBlocks& blocks,
-                                PlaneValues& sum) const {
-  steps_->addPair(sum.data(), values_.data(), second, blocks);
+  if (first) std::fill(mean_.begin(), mean_.end(), steps_->start);
+  steps_->fold(mean_.data(), values.data(), mean_.size());
+  if (isComplete()) steps_->finish(mean_.data(), static_cast<float>(inputs_), mean_.size());
 }
 
 }  // namespace efm

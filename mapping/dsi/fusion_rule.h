@@ -6,13 +6,11 @@
 #include <vector>
 
 #include "mapping/dsi/plane_values.h"
-#include "mapping/dsi/voting_kernel.h"
 
 namespace efm {
 
 namespace kernels {
 struct FusionSteps;
-struct PixelBlocks;
 }  // namespace kernels
 
 /// How the ray densities of several DSIs become one, voxel by voxel (Ghosh and Gallego 2022,
@@ -28,37 +26,35 @@ FusionRule fusionRuleFromName(std::string_view name);
 bool isAndLike(FusionRule rule);
 /// All rules, in their order.
 const std::vector<FusionRule>& allFusionRules();
+/// The rule's arithmetic.
+const kernels::FusionSteps& stepsOf(FusionRule rule);
 
-/// A running mean of planes under one rule: all six rules fold, so that one plane of memory serves
-/// any number of inputs. Inputs are ray densities, not negative; zero in any input makes the
-/// AND-like rules (min, harmonic, geometric) zero. One input is its own mean, bit for bit.
-///
-/// Use: `begin`, `fold` per input, `finish`; then `values` holds the mean.
+/// The mean of planes under one rule. Inputs are added one by one, so that one plane of memory
+/// serves any number of them. Inputs are ray densities, not negative. One input is its own mean,
+/// bit for bit.
 class FusionAccumulator {
  public:
-  /// @param kernel an available one.
-  FusionAccumulator(FusionRule rule, std::size_t voxels, VotingKernel kernel = fastestKernel());
+  /// @param inputs of each mean; at least 1.
+  FusionAccumulator(FusionRule rule, int inputs, std::size_t voxels);
 
-  /// @param inputs how many will be folded. With none the mean is zero.
-  void begin(int inputs);
-  /// @param values as many as there are voxels, or `values` itself: see `place`.
-  void fold(const float* values);
-  void finish();
-
-  /// Adds the mean of two inputs to a sum, in some blocks of a tile: the first input lies in
-  /// `place`.
-  void addPair(const float* second, const kernels::PixelBlocks& blocks, PlaneValues& sum) const;
-
-  const PlaneValues& values() const { return values_; }
-
-  /// Where the first of two inputs may be written before it is folded, which saves a copy.
-  PlaneValues& place() { return values_; }
+  /// A plane for the next input. It saves a copy where that input becomes the mean's first value.
+  PlaneValues& next();
+  /// Adds an input. The first one after a complete mean begins the next mean.
+  /// @param values a plane of voxels, or `next()`.
+  void add(const PlaneValues& values);
+  /// Whether all inputs of the mean are added.
+  bool isComplete() const { return added_ == inputs_; }
+  /// The complete mean.
+  const PlaneValues& mean() const { return mean_; }
 
  private:
+  bool isFirst() const { return added_ == 0 || isComplete(); }
+
   const kernels::FusionSteps* steps_;
-  int inputs_ = 0;
-  int folded_ = 0;
-  PlaneValues values_;
+  int inputs_;
+  int added_ = 0;
+  PlaneValues mean_;
+  PlaneValues next_;
 };
 
 }  // namespace efm

@@ -2,13 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <string_view>
 #include <vector>
 
 #include "mapping/dsi/fusion_rule.h"
 #include "mapping/dsi/plane_values.h"
-#include "mapping/sweep/tile_votes.h"
 
 namespace efm {
 
@@ -30,63 +28,62 @@ struct FusionOptions {
   FusionOrder order = FusionOrder::kCamerasThenTime;
 };
 
-/// What a plane is fused of.
+/// The numbers of inputs of a plane.
 struct FusionInputs {
   int cameras = 1;  ///< At least 1.
   int slots = 1;    ///< Per camera and group, at least 1.
-  int groups = 1;   ///< Fused each by itself, then summed; at least 1.
+  int groups = 1;   ///< Each is fused by itself; the fused groups are summed. At least 1.
 };
 
-/// Fuses one plane of the DSIs of all cameras and sub-intervals, in groups where there are several:
-/// the sum of what the groups give. Holds a plane for the votes, one for each axis and one for the
-/// sum, whatever the number of cameras, sub-intervals and groups. An axis with one input is left
+/// One input of a plane: a camera in a slot of the time axis. The slots of group g begin at
+/// g * `FusionInputs::slots`.
+struct CameraSlot {
+  int camera = 0;
+  int slot = 0;
+};
+
+/// Fuses one plane of the DSIs of all cameras, sub-intervals and groups. Holds two planes for each
+/// axis and one for the sum of groups, for any number of inputs. An axis with one input is left
 /// out, bit for bit.
+///
+/// Use: `begin`; then, for each of `inputs`, write it to `next` and `add` it; then `fused`.
 class PlaneFusion {
  public:
-  /// Fills the plane with the ray density of one camera in one slot of the time axis; those of
-  /// group g begin at g * slots.
-  using Vote = std::function<void(int camera, int slot, PlaneValues& votes)>;
-  /// The same on a tile, where votes may wait until it is known which densities matter.
-  using TileVote = std::function<void(int camera, int slot, TileDensity& density)>;
-
-  /// What else is kept of a plane.
+  /// What else is fused.
   enum class Keep {
     kFusedOnly,
-    kCameras,  ///< Also each camera alone, fused across time: a plane of memory per camera.
+    kCameras,  ///< Also each camera alone, across time: a plane of memory per camera.
   };
 
-  /// @param voxels of a plane or of a part of it: each is fused by itself.
-  /// @param kernel an available one.
+  /// @param voxels of a plane or of a tile of it.
   PlaneFusion(const FusionOptions& options, const FusionInputs& inputs, std::size_t voxels,
-              Keep keep = Keep::kFusedOnly, VotingKernel kernel = fastestKernel());
+              Keep keep = Keep::kFusedOnly);
 
-  /// Asks for every input once. @return the fused plane, until the next call.
-  const PlaneValues& fuse(const Vote& vote);
-  /// The same bits. Two cameras under an AND-like rule are fused only where both have votes.
-  const PlaneValues& fuse(const TileVote& vote);
-
-  /// A camera's own plane after `fuse`, where cameras are kept.
+  /// All inputs, in the order in which they are added.
+  const std::vector<CameraSlot>& inputs() const { return inputs_; }
+  /// Begins a plane.
+  void begin();
+  /// Where the ray density of the next input is written.
+  PlaneValues& next() { return inner_.next(); }
+  void add(const CameraSlot& input);
+  /// The fused plane, after the last input.
+  const PlaneValues& fused() const { return groups_ == 1 ? groupMean().mean() : sum_; }
+  /// A camera's own plane, where cameras are kept.
   const PlaneValues& ofCamera(int camera) const {
     const auto c = static_cast<std::size_t>(camera);
-    return groups_ == 1 ? cameras_[c].values() : camera_sums_[c];
+    return groups_ == 1 ? cameras_[c].mean() : camera_sums_[c];
   }
 
  private:
-  const PlaneValues& fuseInner(int group, int outer, const Vote& vote);
-  const PlaneValues& fuseGroup(int group, const Vote& vote);
-  void addPairOfGroup(int group, const TileVote& vote);
+  const FusionAccumulator& groupMean() const { return outer_count_ == 1 ? inner_ : outer_; }
 
-  bool cameras_first_;
-  int slots_;
   int groups_;
-  int inner_count_;
   int outer_count_;
-  PlaneValues votes_;
+  std::vector<CameraSlot> inputs_;
   FusionAccumulator inner_;
   FusionAccumulator outer_;
-  std::vector<FusionAccumulator> cameras_;
-  bool pairs_;       // whether a group is a pair, zero where either is
-  PlaneValues sum_;  // of several groups, or of pairs
+  PlaneValues sum_;                         // of several groups
+  std::vector<FusionAccumulator> cameras_;  // where they are kept
   std::vector<PlaneValues> camera_sums_;
 };
 

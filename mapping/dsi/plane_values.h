@@ -10,8 +10,8 @@
 
 namespace efm {
 
-/// What the pixels of a plane, or of a tile of it, have of something: row-major. Begins on a cache
-/// line, so that vectors do not straddle two.
+/// One value per pixel of a plane or of a tile of it, row-major. Begins on a cache line, so that
+/// no vector lies in two lines.
 template <typename Value>
 using PixelValues = std::vector<Value, tbb::cache_aligned_allocator<Value>>;
 using PlaneValues = PixelValues<float>;

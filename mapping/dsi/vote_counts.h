@@ -5,7 +5,7 @@
 
 namespace efm {
 
-/// What became of the votes: one vote is one used event on one plane, so that
+/// Counts of votes. One vote is one used event on one plane:
 /// cast + outside_view + behind_camera = events x planes.
 struct VoteCounts {
   std::uint64_t cast = 0;

@@ -10,11 +10,11 @@ namespace efm {
 
 /// "plain", "baseline", "sse4", "avx2", "avx512", "neon".
 std::string_view nameOf(VotingKernel kernel);
-/// Any kernel that has a name, also one that this processor lacks.
+/// Accepts kernels that this processor lacks.
 /// @throws std::invalid_argument naming the value and what is known.
 VotingKernel votingKernelFromName(std::string_view name);
 
-/// What this build has and this processor can run: plain first, the fastest last.
+/// The kernels that this build has and this processor can run: plain first, the fastest last.
 const std::vector<VotingKernel>& availableKernels();
 bool isAvailable(VotingKernel kernel);
 VotingKernel fastestKernel();

@@ -2,9 +2,7 @@
 #include "mapping/events/event_groups.h"
 
 #include <algorithm>
-#include <cassert>
 #include <iterator>
-#include <utility>
 
 #include "mapping/options/option_check.h"
 
@@ -13,17 +11,6 @@ namespace {
 
 constexpr int kMaxTimeSlices = 1000;
 
-/// One camera's rays with the sub-intervals of each group in the order of their slots.
-CameraRays inSlots(CameraRays rays, const std::vector<int>& slots) {
-  CameraRays arranged;
-  for (std::size_t group = 0; group < rays.size(); group += slots.size()) {
-    for (const int part : slots) {
-      arranged.push_back(std::move(rays[group + static_cast<std::size_t>(part)]));
-    }
-  }
-  return arranged;
-}
-
 }  // namespace
 
 void SplitFusionOptions::validate() const {
@@ -31,36 +18,55 @@ void SplitFusionOptions::validate() const {
                 "1 to 1000");
 }
 
-std::vector<Event> eventsOfPolarity(EventSpan events, bool polarity) {
-  std::vector<Event> chosen;
-  chosen.reserve(events.size());
-  std::copy_if(events.begin(), events.end(), std::back_inserter(chosen),
-               [&](const Event& event) { return event.polarity == polarity; });
-  return chosen;
+EventSpan EventPart::select(std::vector<Event>& buffer) const {
+  if (!polarity) return all;
+  buffer.clear();
+  std::copy_if(all.begin(), all.end(), std::back_inserter(buffer),
+               [this](const Event& event) { return event.polarity == *polarity; });
+  return buffer;
 }
 
-SplitRays arrangeGroups(std::vector<CameraRays> cameras, int slices,
-                        const std::vector<std::vector<int>>& slots) {
-  assert(!cameras.empty() && slots.size() == cameras.size());
-  SplitRays split;
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    split.inputs.push_back(inSlots(std::move(cameras[c]), slots[c]));
-  }
-  const auto groups_of = [&](const CameraRays& rays) {
-    return static_cast<int>(rays.size() / slots.front().size());
-  };
-  split.groups = groups_of(split.inputs.front());
-  if (split.inputs.size() > 1 || slices == 1) return split;
+EventGroups::EventGroups(const SplitFusionOptions& split, const SubintervalOptions& subintervals)
+    : split_(split), subintervals_(subintervals) {}
 
-  // A single camera: its slices stand for cameras.
-  CameraRays rays = std::move(split.inputs.front());
-  split.inputs.assign(static_cast<std::size_t>(slices), {});
-  const std::size_t parts_of_slice = rays.size() / split.inputs.size();
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    split.inputs[i / parts_of_slice].push_back(std::move(rays[i]));
+std::size_t EventGroups::subintervals() const {
+  return static_cast<std::size_t>(split_.time_slices) *
+         static_cast<std::size_t>(subintervals_.count);
+}
+
+std::vector<EventPart> EventGroups::partsOf(EventSpan events, const Window& window) const {
+  SubintervalOptions all = subintervals_;
+  all.count *= split_.time_slices;
+  const std::vector<EventSpan> spans =
+      splitIntoSubintervals(events, window.t0_ns, window.t1_ns, all);
+  const auto count = static_cast<std::size_t>(subintervals_.count);
+  std::vector<EventPart> parts;
+  for (std::size_t first = 0; first < spans.size(); first += count) {
+    for (int polarity = 0; polarity < split_.polarities(); ++polarity) {
+      for (std::size_t s = first; s < first + count; ++s) {
+        parts.push_back({spans[s], std::nullopt, s});
+        if (split_.polarity) parts.back().polarity = polarity == 1;
+      }
+    }
   }
-  split.groups = groups_of(split.inputs.front());
-  return split;
+  return parts;
+}
+
+FusionLayout EventGroups::layoutOf(int cameras) const {
+  const std::vector<std::vector<int>> slots = assignSubintervals(cameras, subintervals_);
+  const int groups = split_.time_slices * split_.polarities();  // of a camera
+  FusionLayout layout;
+  layout.groups = cameras == 1 ? split_.polarities() : groups;
+  for (std::size_t camera = 0; camera < slots.size(); ++camera) {
+    for (int group = 0; group < groups; ++group) {
+      if (group % layout.groups == 0) layout.inputs.emplace_back();
+      for (const int subinterval : slots[camera]) {
+        layout.inputs.back().push_back(
+            {camera, static_cast<std::size_t>(group * subintervals_.count + subinterval)});
+      }
+    }
+  }
+  return layout;
 }
 
 }  // namespace efm

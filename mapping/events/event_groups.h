@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "mapping/events/event.h"
-#include "mapping/sweep/space_sweep.h"
+#include "mapping/events/subintervals.h"
+#include "mapping/events/window.h"
 
 namespace efm {
 
-/// Split fusion: the events of a window are divided into groups by polarity and by time, each group
+/// Split fusion: the events of a window are divided into groups by polarity and by time. Each group
 /// is fused across cameras by itself, and the fused DSIs of all groups are summed. A wrong
-/// intersection then needs rays of one polarity and one time from all cameras; a right one loses
-/// little, because an edge fires the same polarity in all of them at the same time. The harmonic
-/// mean of sums is at least the sum of harmonic means, and equal where cameras agree: confidences
-/// keep their scale.
+/// intersection then needs rays of one polarity and one time from all cameras. A true edge loses
+/// little: it fires the same polarity in all cameras at the same time. The harmonic mean of sums is
+/// at least the sum of harmonic means, and equal where cameras agree: confidences keep their scale.
 struct SplitFusionOptions {
   /// All events in one group: the paper's fusion.
   static SplitFusionOptions none() { return {false, 1}; }
 
   bool polarity = true;  ///< A group per polarity.
-  /// Groups in time, 1 to 1000. Where a single camera is fused, its slices take the place of
-  /// cameras: the rule across cameras fuses them, and only polarities are summed. More than 2 gain
-  /// nothing in windows of 0.2 and 0.5 s, cost time, and lose weak edges of a single camera.
+  /// Groups in time, 1 to 1000. A single camera's slices are fused by the rule across cameras, as
+  /// if each were a camera; then only polarities are summed. More than 2 slices gain nothing in
+  /// windows of 0.2 and 0.5 s, cost time, and lose weak edges of a single camera.
   int time_slices = 2;
 
   int polarities() const { return polarity ? 2 : 1; }
@@ -29,20 +31,45 @@ struct SplitFusionOptions {
   void validate() const;
 };
 
-/// The events of one polarity, in their order.
-std::vector<Event> eventsOfPolarity(EventSpan events, bool polarity);
+/// A part of one camera's events: one sub-interval of one slice, and one polarity where polarities
+/// are apart.
+struct EventPart {
+  EventSpan all;                 ///< The sub-interval's events.
+  std::optional<bool> polarity;  ///< The part's own; both where not given.
+  std::size_t subinterval = 0;   ///< Index among the sub-intervals of all slices.
 
-/// What the sweep fuses: inputs in the place of cameras, and how many groups their slots make.
-struct SplitRays {
-  std::vector<CameraRays> inputs;
+  /// The part's events in their order.
+  /// @param buffer holds the events of one polarity.
+  EventSpan select(std::vector<Event>& buffer) const;
+};
+
+/// How the parts of all cameras meet in the fusion.
+struct FusionLayout {
+  struct Source {
+    std::size_t camera = 0;
+    std::size_t part = 0;
+  };
+  /// [input][group * slots + slot]. Each camera is an input; each slice of a single camera is one.
+  std::vector<std::vector<Source>> inputs;
   int groups = 1;
 };
 
-/// Arranges the rays of each camera for the sweep.
-/// @param cameras rays[slice][polarity][sub-interval], flat in this order; at least one camera.
-/// @param slices of time, in each camera.
-/// @param slots which of its sub-intervals each camera puts into each slot: [camera][slot].
-SplitRays arrangeGroups(std::vector<CameraRays> cameras, int slices,
-                        const std::vector<std::vector<int>>& slots);
+/// Divides the events of a window into the parts that are fused. No other class knows the order of
+/// a camera's parts: [slice][polarity][sub-interval].
+class EventGroups {
+ public:
+  EventGroups(const SplitFusionOptions& split, const SubintervalOptions& subintervals);
+
+  /// One camera's events of the window, in parts.
+  std::vector<EventPart> partsOf(EventSpan events, const Window& window) const;
+  /// The number of sub-intervals of all slices.
+  std::size_t subintervals() const;
+  /// @param cameras the number of cameras that are fused; at least 1.
+  FusionLayout layoutOf(int cameras) const;
+
+ private:
+  SplitFusionOptions split_;
+  SubintervalOptions subintervals_;  // of a slice
+};
 
 }  // namespace efm

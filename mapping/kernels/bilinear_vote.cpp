@@ -3,8 +3,8 @@
 
 namespace efm::kernels {
 
-std::uint64_t votePlain(const RayArrays& rays, const RayTransfer& transfer,
-                        const VotePlane& plane) {
+std::uint64_t voteBilinear(const RayArrays& rays, const RayTransfer& transfer,
+                           const VotePlane& plane) {
   const auto right = static_cast<float>(plane.width - 1);
   const auto bottom = static_cast<float>(plane.height - 1);
   const std::ptrdiff_t stride = plane.width;

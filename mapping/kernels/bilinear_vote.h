@@ -31,6 +31,7 @@ struct RayTransfer {
 /// Adds one bilinear vote per ray to the plane, where all four neighbouring pixels lie inside it:
 /// 0 <= x < width - 1 and 0 <= y < height - 1. The plain scalar kernel: the specification.
 /// @return the number of votes cast.
-std::uint64_t votePlain(const RayArrays& rays, const RayTransfer& transfer, const VotePlane& plane);
+std::uint64_t voteBilinear(const RayArrays& rays, const RayTransfer& transfer,
+                           const VotePlane& plane);
 
 }  // namespace efm::kernels

@@ -2,227 +2,112 @@
 #include "mapping/kernels/fusion.h"
 
 #include <algorithm>
-#include <cstddef>
+#include <cmath>
 #include <limits>
 
-#include "mapping/kernels/highway_targets.h"
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "mapping/kernels/fusion.cpp"
-#include <hwy/foreach_target.h>
-
-#include <hwy/contrib/math/math-inl.h>
-#include <hwy/highway.h>
-
-HWY_BEFORE_NAMESPACE();
-namespace efm::kernels::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
+namespace efm::kernels {
+namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kSmallest = std::numeric_limits<float>::min();
 
-// The rules as in fusion_plain.cpp, on vectors V of the lanes that the tag D names.
+// A rule is the start of a sum and three small functions: `fold` adds an input to the sum, `finish`
+// turns the sum of n inputs into their mean, and `pair` is the mean of two. Zeros need no branch in
+// the first two: IEEE arithmetic carries 1/0 and log 0 to a mean of zero.
 
+/// Ghosh and Gallego 2022, Eq. 10.
 struct Min {
   static constexpr float kStart = kInfinity;
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V fold(D, V sum, V value) {
-    return hn::Min(sum, value);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V finish(D, V sum, V) {
-    return sum;
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V pair(D, V a, V b) {
-    return hn::Min(a, b);
-  }
+  static float fold(float sum, float value) { return std::min(sum, value); }
+  static float finish(float sum, float) { return sum; }
+  static float pair(float a, float b) { return std::min(a, b); }
 };
 
+/// Ghosh and Gallego 2022, Eq. 8.
 struct Harmonic {
   static constexpr float kStart = 0;
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V fold(D d, V sum, V value) {
-    return hn::Add(sum, hn::Div(hn::Set(d, 1.0F), value));
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V finish(D, V sum, V inputs) {
-    return hn::Div(inputs, sum);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V pair(D d, V a, V b) {
-    const V low = hn::Min(a, b);
-    const V high = hn::Max(a, b);
-    const V sum = hn::Max(hn::Add(low, high), hn::Set(d, kSmallest));
-    return hn::Mul(hn::Add(low, low), hn::Div(high, sum));
+  static float fold(float sum, float value) { return sum + 1.0F / value; }
+  static float finish(float sum, float inputs) { return inputs / sum; }
+  /// 2ab / (a + b) with one division, without a product that could leave the range of floats and
+  /// without a branch for 0/0.
+  static float pair(float a, float b) {
+    const float low = std::min(a, b);
+    const float high = std::max(a, b);
+    return 2 * low * (high / std::max(low + high, kSmallest));
   }
 };
 
+/// Ghosh and Gallego 2022, Eq. 7.
 struct Geometric {
   static constexpr float kStart = 0;
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V fold(D d, V sum, V value) {
-    // Highway's logarithm knows numbers above zero only.
-    const V log =
-        hn::IfThenElse(hn::Gt(value, hn::Zero(d)), hn::Log(d, value), hn::Set(d, -kInfinity));
-    return hn::Add(sum, log);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V finish(D d, V sum, V inputs) {
-    const V mean = hn::Exp(d, hn::Div(sum, inputs));
-    return hn::IfThenElseZero(hn::Gt(sum, hn::Set(d, -kInfinity)), mean);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V pair(D, V a, V b) {
-    return hn::Mul(hn::Sqrt(a), hn::Sqrt(b));
-  }
+  static float fold(float sum, float value) { return sum + std::log(value); }
+  static float finish(float sum, float inputs) { return std::exp(sum / inputs); }
+  static float pair(float a, float b) { return std::sqrt(a) * std::sqrt(b); }
 };
 
+/// Ghosh and Gallego 2022, Eq. 6.
 struct Arithmetic {
   static constexpr float kStart = 0;
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V fold(D, V sum, V value) {
-    return hn::Add(sum, value);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V finish(D, V sum, V inputs) {
-    return hn::Div(sum, inputs);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V pair(D d, V a, V b) {
-    return hn::Mul(hn::Add(a, b), hn::Set(d, 0.5F));
-  }
+  static float fold(float sum, float value) { return sum + value; }
+  static float finish(float sum, float inputs) { return sum / inputs; }
+  static float pair(float a, float b) { return (a + b) / 2; }
 };
 
+/// Ghosh and Gallego 2022, Eq. 9.
 struct Rms {
   static constexpr float kStart = 0;
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V fold(D, V sum, V value) {
-    return hn::MulAdd(value, value, sum);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V finish(D, V sum, V inputs) {
-    return hn::Sqrt(hn::Div(sum, inputs));
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V pair(D d, V a, V b) {
-    return hn::Sqrt(hn::Mul(hn::MulAdd(a, a, hn::Mul(b, b)), hn::Set(d, 0.5F)));
-  }
+  static float fold(float sum, float value) { return sum + value * value; }
+  static float finish(float sum, float inputs) { return std::sqrt(sum / inputs); }
+  static float pair(float a, float b) { return std::sqrt((a * a + b * b) / 2); }
 };
 
+/// Ghosh and Gallego 2022, Eq. 11.
 struct Max {
   static constexpr float kStart = 0;
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V fold(D, V sum, V value) {
-    return hn::Max(sum, value);
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V finish(D, V sum, V) {
-    return sum;
-  }
-  template <class D, class V = hn::Vec<D>>
-  static HWY_INLINE V pair(D, V a, V b) {
-    return hn::Max(a, b);
-  }
+  static float fold(float sum, float value) { return std::max(sum, value); }
+  static float finish(float sum, float) { return sum; }
+  static float pair(float a, float b) { return std::max(a, b); }
 };
 
-// Full vectors first, then the rest in vectors of one lane.
-using Wide = hn::ScalableTag<float>;
-using One = hn::CappedTag<float, 1>;
-
-template <class Rule, class D>
-HWY_INLINE std::size_t foldBy(D d, std::size_t i, std::size_t n, float* sum, const float* values) {
-  for (; i + hn::Lanes(d) <= n; i += hn::Lanes(d)) {
-    hn::StoreU(Rule::fold(d, hn::LoadU(d, sum + i), hn::LoadU(d, values + i)), d, sum + i);
-  }
-  return i;
-}
-
-template <class Rule>
+template <typename Rule>
 void fold(float* sum, const float* values, std::size_t n) {
-  const std::size_t done = foldBy<Rule>(Wide(), 0, n, sum, values);
-  foldBy<Rule>(One(), done, n, sum, values);
+  for (std::size_t i = 0; i < n; ++i) sum[i] = Rule::fold(sum[i], values[i]);
 }
 
-template <class Rule, class D>
-HWY_INLINE std::size_t finishBy(D d, std::size_t i, std::size_t n, float* sum, float inputs) {
-  for (; i + hn::Lanes(d) <= n; i += hn::Lanes(d)) {
-    hn::StoreU(Rule::finish(d, hn::LoadU(d, sum + i), hn::Set(d, inputs)), d, sum + i);
-  }
-  return i;
-}
-
-template <class Rule>
+template <typename Rule>
 void finish(float* sum, float inputs, std::size_t n) {
-  const std::size_t done = finishBy<Rule>(Wide(), 0, n, sum, inputs);
-  finishBy<Rule>(One(), done, n, sum, inputs);
+  for (std::size_t i = 0; i < n; ++i) sum[i] = Rule::finish(sum[i], inputs);
 }
 
-template <class Rule, class D>
-HWY_INLINE std::size_t pairBy(D d, std::size_t i, std::size_t n, float* values,
-                              const float* others) {
-  for (; i + hn::Lanes(d) <= n; i += hn::Lanes(d)) {
-    hn::StoreU(Rule::pair(d, hn::LoadU(d, values + i), hn::LoadU(d, others + i)), d, values + i);
-  }
-  return i;
-}
-
-template <class Rule>
+template <typename Rule>
 void pair(float* values, const float* others, std::size_t n) {
-  const std::size_t done = pairBy<Rule>(Wide(), 0, n, values, others);
-  pairBy<Rule>(One(), done, n, values, others);
+  for (std::size_t i = 0; i < n; ++i) values[i] = Rule::pair(values[i], others[i]);
 }
 
-/// @param within which lanes to add to.
-template <class Rule, class D>
-HWY_INLINE void addPairAt(D d, hn::Mask<D> within, float* sum, const float* values,
-                          const float* others) {
-  const auto mean = Rule::pair(d, hn::LoadU(d, values), hn::LoadU(d, others));
-  const auto before = hn::LoadU(d, sum);
-  hn::StoreU(hn::IfThenElse(within, hn::Add(before, mean), before), d, sum);
-}
-
-template <class Rule>
+template <typename Rule>
 void addPair(float* sum, const float* values, const float* others, const PixelBlocks& blocks) {
-  const auto end = static_cast<std::size_t>(blocks.width * blocks.height);
-  const auto width = static_cast<std::size_t>(blocks.width);
   for (std::size_t block = 0; block < blocks.size; ++block) {
-    const std::size_t first = blocks.blocks[block] % kBlocksInRow * kBlockPixels;
-    const std::size_t row = blocks.blocks[block] / kBlocksInRow * width;
-    const std::size_t last = std::min(first + kBlockPixels, width);
-    const Wide wide;
-    const One one;
-    for (std::size_t x = first; x < last; x += hn::Lanes(wide)) {
-      std::size_t i = row + x;
-      if (i + hn::Lanes(wide) <= end) {
-        addPairAt<Rule>(wide, hn::FirstN(wide, last - x), sum + i, values + i, others + i);
-      } else {
-        for (; i < row + last; ++i) {
-          addPairAt<Rule>(one, hn::FirstN(one, 1), sum + i, values + i, others + i);
-        }
-      }
+    const auto row = static_cast<int>(blocks.blocks[block]) / kBlocksInRow;
+    const auto first = static_cast<int>(blocks.blocks[block]) % kBlocksInRow * kBlockPixels;
+    for (int x = first; x < std::min(first + kBlockPixels, blocks.width); ++x) {
+      const auto i = static_cast<std::size_t>(row * blocks.width + x);
+      sum[i] += Rule::pair(values[i], others[i]);
     }
   }
 }
 
-template <class Rule>
+template <typename Rule>
 constexpr FusionSteps steps() {
   return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>, addPair<Rule>};
 }
 
-constexpr FusionFunctions kFusion = {steps<Min>(),        steps<Harmonic>(), steps<Geometric>(),
-                                     steps<Arithmetic>(), steps<Rms>(),      steps<Max>()};
+}  // namespace
 
-}  // namespace efm::kernels::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
-namespace efm::kernels {
-
-const FusionFunctions& fusionFunctions(VotingKernel kernel) {
-  static const KernelTable<FusionFunctions> kTable = EFM_KERNEL_TABLE(plainFusion(), kFusion);
-  return kernelIn(kTable, kernel);
+const FusionFunctions& fusionFunctions() {
+  static constexpr FusionFunctions kFunctions = {steps<Min>(),       steps<Harmonic>(),
+                                                 steps<Geometric>(), steps<Arithmetic>(),
+                                                 steps<Rms>(),       steps<Max>()};
+  return kFunctions;
 }
 
 }  // namespace efm::kernels
-#endif

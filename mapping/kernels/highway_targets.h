@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-// The instruction sets that kernels are compiled for, and how a kernel file hands out what it
-// compiled. A kernel file `x.cpp` is written once and compiled once per instruction set:
+// The instruction sets that kernels are compiled for, and the table of a kernel's functions. A
+// kernel file `x.cpp` is written once and compiled once per instruction set:
 //
 //   #include "mapping/kernels/x.h"                // struct XFunctions { ... pointers ... };
 //   #include "mapping/kernels/highway_targets.h"  // before anything of Highway
@@ -30,7 +30,7 @@
 //   #endif
 //
 // The kernel is an argument, not Highway's global choice, so that tests and threads can run several
-// side by side. Highway's baseline may have vectors of one lane: use only what it offers there.
+// side by side. Highway's baseline may have vectors of one lane: use only functions that exist there.
 
 #ifdef HIGHWAY_HWY_DETECT_TARGETS_H_
 #error "include highway_targets.h before anything of Highway"

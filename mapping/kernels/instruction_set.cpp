@@ -24,7 +24,7 @@ constexpr Target kTargets[] = {
 }  // namespace
 
 std::vector<VotingKernel> runnableKernels() {
-  // What the compiler may use everywhere runs, whatever Highway's own build detects.
+  // The compiler's own baseline always runs, even where Highway's build did not detect it.
   const std::int64_t runnable = (HWY_SUPPORTED_TARGETS | HWY_STATIC_TARGET) & HWY_TARGETS;
   std::vector<VotingKernel> kernels = {VotingKernel::kPlain};
   for (const Target& target : kTargets) {

@@ -5,11 +5,11 @@
 
 namespace efm {
 
-/// What the inner loops are made of: plain scalar code, the specification, or vectors of one
-/// instruction set. From slow to fast within an architecture.
+/// The code of the inner loops: plain scalar code, the specification, or vectors of one instruction
+/// set. From slow to fast within an architecture.
 enum class VotingKernel {
   kPlain,
-  kBaseline,  ///< Vectors as any processor of the architecture has them.
+  kBaseline,  ///< Vectors that any processor of the architecture has.
   kSse4,
   kAvx2,    ///< With FMA, BMI2 and F16C.
   kAvx512,  ///< F, BW, CD, DQ and VL.
@@ -20,7 +20,7 @@ enum class VotingKernel {
 
 namespace efm::kernels {
 
-/// What this build has and this processor can run, in the order of `VotingKernel`.
+/// The kernels that this build has and this processor can run, in the order of `VotingKernel`.
 std::vector<VotingKernel> runnableKernels();
 
 }  // namespace efm::kernels

@@ -25,8 +25,8 @@ HWY_INLINE void storeWhere(D d, M where, hn::Vec<D> value, hn::TFromD<D>* to) {
 
 /// Pixels [i, n) by whole vectors of the tag's lanes. @return the first pixel left.
 template <class D>
-HWY_INLINE std::size_t takeBy(D d, std::size_t i, std::size_t n, const PeakArrays& peaks,
-                              std::int32_t plane, const float* values) {
+HWY_INLINE std::size_t addBy(D d, std::size_t i, std::size_t n, const PeakArrays& peaks,
+                             std::int32_t plane, const float* values) {
   const hn::RebindToSigned<D> d_plane;
   const auto none = hn::Set(d, -1.0F);
   const auto this_plane = hn::Set(d_plane, plane);
@@ -47,21 +47,43 @@ HWY_INLINE std::size_t takeBy(D d, std::size_t i, std::size_t n, const PeakArray
 }
 
 // Full vectors first, then the rest in vectors of one lane.
-void take(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
-  const std::size_t done = takeBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
-  takeBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
+void add(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
+  const std::size_t done = addBy(hn::ScalableTag<float>(), 0, n, peaks, plane, values);
+  addBy(hn::CappedTag<float, 1>(), done, n, peaks, plane, values);
 }
 
-constexpr PeakFunctions kPeaks = {take};
+constexpr PeakFunctions kPeaks = {add};
 
 }  // namespace efm::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace efm::kernels {
+namespace {
+
+constexpr float kNoValue = -1;
+
+void addPlain(const PeakArrays& peaks, std::int32_t plane, const float* values, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const float value = values[i];
+    if (value > peaks.best[i]) {
+      peaks.best[i] = value;
+      peaks.before[i] = peaks.previous[i];
+      peaks.after[i] = kNoValue;
+      peaks.plane[i] = plane;
+    } else if (peaks.plane[i] == plane - 1) {
+      peaks.after[i] = value;
+    }
+    peaks.previous[i] = value;
+  }
+}
+
+constexpr PeakFunctions kPlainPeaks = {addPlain};
+
+}  // namespace
 
 const PeakFunctions& peakFunctions(VotingKernel kernel) {
-  static const KernelTable<PeakFunctions> kTable = EFM_KERNEL_TABLE(plainPeaks(), kPeaks);
+  static constexpr KernelTable<PeakFunctions> kTable = EFM_KERNEL_TABLE(kPlainPeaks, kPeaks);
   return kernelIn(kTable, kernel);
 }
 

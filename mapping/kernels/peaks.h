@@ -14,21 +14,16 @@ struct PeakArrays {
   std::int32_t* plane = nullptr;  ///< Its plane.
   float* before = nullptr;        ///< The value one plane before it; -1 where there was none.
   float* after = nullptr;         ///< The value one plane after it; -1 where there was none.
-  float* previous = nullptr;      ///< The value of the plane taken last.
+  float* previous = nullptr;      ///< The value of the plane added last.
 };
-
-/// Takes in the n values of the plane that follows the last.
-using TakePlane = void(const PeakArrays& peaks, std::int32_t plane, const float* values,
-                       std::size_t n);
 
 struct PeakFunctions {
-  TakePlane* take = nullptr;
+  /// Adds the n values of the plane that follows the last one.
+  void (*add)(const PeakArrays& peaks, std::int32_t plane, const float* values,
+              std::size_t n) = nullptr;
 };
 
-/// The plain scalar function: the specification. Vectors give the same bits.
-const PeakFunctions& plainPeaks();
-
-/// @param kernel one of `runnableKernels`.
+/// @param kernel one of `runnableKernels`. All of them give the bits of the plain one.
 const PeakFunctions& peakFunctions(VotingKernel kernel);
 
 }  // namespace efm::kernels

@@ -33,8 +33,8 @@ constexpr std::uint32_t kProductMask = (1U << kCountShift) - (1U << kProductShif
 
 // ---------------------------------------------------------------- a row of cells
 
-/// As many cells as a vector has lanes, by halves. All that is taken from them is in 1/32,768, and
-/// differences of them, modulo 2^32.
+/// A cell per lane of a vector, by halves. Sums are read from them in units of 1/32,768, and
+/// differences of sums are modulo 2^32.
 struct CellHalves {
   UnsignedV lower, upper;
 };
@@ -57,7 +57,7 @@ HWY_INLINE UnsignedV votesOf(const CellHalves& cells) {
                  hn::Set(Unsigned(), (2 * kVotesPerCell - 1) << kProductBits));
 }
 
-/// The sums of a of some cells less those of others.
+/// The sums of a of some cells minus those of others.
 HWY_INLINE UnsignedV differenceOfA(const CellHalves& cells, const CellHalves& others) {
   const UnsignedV mask = hn::Set(Unsigned(), kSumMask);
   return hn::ShiftLeft<kUp>(hn::Sub(hn::And(cells.lower, mask), hn::And(others.lower, mask)));
@@ -85,11 +85,11 @@ struct RowOfCells {
   explicit HWY_INLINE RowOfCells(const std::uint64_t* cells)
       : west(halvesOf(cells)), east(halvesOf(cells + 1)) {}
 
-  /// What they give to the pixels below them.
+  /// Their votes for the pixels below them.
   HWY_INLINE UnsignedV toBelow() const {
     return hn::Sub(sumsOfB(east), differenceOfAB(east, west));
   }
-  /// What they give to the pixels above them.
+  /// Their votes for the pixels above them.
   HWY_INLINE UnsignedV toAbove() const {
     return hn::Sub(hn::Add(votesOf(east), differenceOfA(west, east)), toBelow());
   }
@@ -98,12 +98,12 @@ struct RowOfCells {
 HWY_INLINE FloatV densityOf(UnsignedV from_above, UnsignedV from_below) {
   const Floats d;
   const Signed di;
-  // Rounded products can leave less than nothing.
+  // Rounded products can leave a negative sum.
   const auto sum = hn::Max(hn::BitCast(di, hn::Add(from_above, from_below)), hn::Zero(di));
   return hn::Mul(hn::ConvertTo(d, sum), hn::Set(d, 1.0F / (1 << kProductBits)));
 }
 
-/// Stores a whole vector, or what of it lies before the end.
+/// Stores a whole vector, or its lanes before the end.
 HWY_INLINE void storeBefore(const float* end, FloatV value, float* values) {
   const Floats d;
   const auto lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
@@ -132,11 +132,11 @@ HWY_INLINE std::uint64_t sumOfLanes(D d, V values) {
 
 // ---------------------------------------------------------------- all pixels
 
-std::uint64_t foldAll(const MarkedCells& marked, int width, int height, float* values) {
-  std::uint64_t* cells = marked.cells;
+std::uint64_t resolveAll(const CellBuffer& buffer, int width, int height, float* values) {
+  std::uint64_t* cells = buffer.cells;
   const Unsigned du;
   const int lanes = static_cast<int>(hn::Lanes(du));
-  // What the row of cells above adds to a pixel row.
+  // The votes of the row of cells above a pixel row.
   HWY_ALIGN std::uint32_t from_above[kTileCells];
   const float* end = values + static_cast<std::ptrdiff_t>(width) * height;
   for (int x = 0; x < width; x += lanes) {
@@ -152,56 +152,56 @@ std::uint64_t foldAll(const MarkedCells& marked, int width, int height, float* v
       const auto within = hn::FirstN(du, static_cast<std::size_t>(width - x));
       votes =
           hn::Add(votes, hn::IfThenElseZero(within, hn::ShiftRight<kCountShift>(below.east.upper)));
-      // What is written beyond this row is written again.
+      // The next row overwrites values beyond this row.
       storeBefore(end, densityOf(hn::Load(du, from_above + x), below.toAbove()), pixels + x);
       hn::Store(below.toBelow(), du, from_above + x);
     }
     clearRow(left);
   }
-  std::fill_n(marked.marks, kMarks, std::uint8_t{0});
+  std::fill_n(buffer.dirty, kDirtyFlags, std::uint8_t{0});
   return sumOfLanes(du, votes);
 }
 
 // ---------------------------------------------------------------- some pixels
 
-/// Lists the places of numbers that are not zero. Reads, and writes past the last place, as many as
-/// a vector has lanes. @return how many there are.
+/// Lists the positions of numbers that are not zero. Reads and writes up to a vector past the last.
+/// @return their number.
 template <typename Number>
 HWY_INLINE std::size_t listNonZero(const Number* numbers, std::size_t count,
-                                   std::uint32_t* places) {
+                                   std::uint32_t* positions) {
   const Unsigned d;
   const hn::Rebind<Number, Unsigned> d_narrow;
-  // Highway's own numbers of lanes are written one by one.
+  // A load is faster than Highway's Iota, which writes lanes one by one.
   HWY_ALIGN static constexpr std::uint32_t kLanes[] = {0, 1, 2,  3,  4,  5,  6,  7,
                                                        8, 9, 10, 11, 12, 13, 14, 15};
   static_assert(std::size(kLanes) >= hn::MaxLanes(Unsigned()));
-  UnsignedV place = hn::Load(d, kLanes);
+  UnsignedV position = hn::Load(d, kLanes);
   const UnsignedV lanes = hn::Set(d, static_cast<std::uint32_t>(hn::Lanes(d)));
   std::size_t size = 0;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const UnsignedV number = hn::PromoteTo(d, hn::LoadU(d_narrow, numbers + i));
     const auto there = hn::And(hn::Ne(number, hn::Zero(d)), hn::FirstN(d, count - i));
-    hn::StoreU(hn::Compress(place, there), d, places + size);
+    hn::StoreU(hn::Compress(position, there), d, positions + size);
     size += hn::CountTrue(d, there);
-    place = hn::Add(place, lanes);
+    position = hn::Add(position, lanes);
   }
   return size;
 }
 
-std::uint64_t find(const MarkedCells& marked, TilePixels& pixels, MarkedLines& lines) {
+std::uint64_t findOccupied(const CellBuffer& buffer, TilePixels& pixels, DirtyLines& lines) {
   constexpr std::size_t kLinesInRow = kTileCells / kLineCells;
   const auto rows_of_cells = static_cast<std::size_t>(pixels.height) + 1;
-  lines.size = listNonZero(marked.marks, kMarks, lines.lines);
+  lines.size = listNonZero(buffer.dirty, kDirtyFlags, lines.lines);
 
   const Cells d;
-  std::uint8_t occupied_in_line[kMarks] = {};  // bit x for a line's cell x
+  std::uint8_t occupied_in_line[kDirtyFlags] = {};  // bit x for a line's cell x
   auto votes = hn::Zero(d);
   auto votes_of_first_row = votes;
   for (std::size_t i = 0; i < lines.size; ++i) {
     const std::size_t line = lines.lines[i];
     std::uint32_t occupied = 0;
     for (std::size_t x = 0; x < kLineCells; x += hn::Lanes(d)) {
-      const auto cells = hn::Load(d, marked.cells + kLineCells * line + x);
+      const auto cells = hn::Load(d, buffer.cells + kLineCells * line + x);
       std::uint8_t bits[8] = {};
       hn::StoreMaskBits(d, hn::Ne(cells, hn::Zero(d)), bits);
       occupied |= std::uint32_t{bits[0]} << x;
@@ -217,7 +217,7 @@ std::uint64_t find(const MarkedCells& marked, TilePixels& pixels, MarkedLines& l
 
   std::uint64_t votes_of_first_column = 0;
   for (std::size_t y = 1; y < rows_of_cells; ++y) {
-    votes_of_first_column += marked.cells[kTileCells * y] >> (32 + kCountShift);
+    votes_of_first_column += buffer.cells[kTileCells * y] >> (32 + kCountShift);
   }
   const std::uint64_t in_tile = (std::uint64_t{1} << pixels.width) - 1;
   for (int y = 0; y < pixels.height; ++y) {
@@ -237,7 +237,7 @@ void listBlocks(const TilePixels& pixels, PixelBlocks& blocks) {
                             blocks.blocks);
 }
 
-void foldSome(const std::uint64_t* cells, const PixelBlocks& blocks, float* values) {
+void resolveBlocks(const std::uint64_t* cells, const PixelBlocks& blocks, float* values) {
   const float* end = values + static_cast<std::ptrdiff_t>(blocks.width) * blocks.height;
   for (std::size_t i = 0; i < blocks.size; ++i) {
     const auto row = static_cast<std::ptrdiff_t>(blocks.blocks[i] / kBlocksInRow);
@@ -245,7 +245,7 @@ void foldSome(const std::uint64_t* cells, const PixelBlocks& blocks, float* valu
     const std::uint64_t* above = cells + row * kTileCells + first;
     float* block = values + row * blocks.width + first;
     for (std::size_t x = 0; x < kBlockPixels; x += hn::Lanes(Unsigned())) {
-      // What is written beyond the row belongs to later blocks, or to none.
+      // Values beyond the row belong to later blocks or to none.
       storeBefore(
           end,
           densityOf(RowOfCells(above + x).toBelow(), RowOfCells(above + kTileCells + x).toAbove()),
@@ -254,16 +254,16 @@ void foldSome(const std::uint64_t* cells, const PixelBlocks& blocks, float* valu
   }
 }
 
-void clear(const MarkedCells& marked, const MarkedLines& lines) {
+void clear(const CellBuffer& buffer, const DirtyLines& lines) {
   const Cells d;
   for (std::size_t i = 0; i < lines.size; ++i) {
-    std::uint64_t* line = marked.cells + std::size_t{kLineCells} * lines.lines[i];
+    std::uint64_t* line = buffer.cells + std::size_t{kLineCells} * lines.lines[i];
     for (std::size_t x = 0; x < kLineCells; x += hn::Lanes(d)) hn::Store(hn::Zero(d), d, line + x);
   }
-  std::fill_n(marked.marks, kMarks, std::uint8_t{0});
+  std::fill_n(buffer.dirty, kDirtyFlags, std::uint8_t{0});
 }
 
-constexpr FoldFunctions kFold = {foldAll, find, listBlocks, foldSome, clear};
+constexpr ResolveFunctions kResolve = {resolveAll, findOccupied, listBlocks, resolveBlocks, clear};
 
 }  // namespace efm::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -271,8 +271,8 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace efm::kernels {
 
-const FoldFunctions& foldFunctions(VotingKernel kernel) {
-  static constexpr KernelTable<FoldFunctions> kTable = {nullptr, EFM_VECTOR_KERNELS(kFold)};
+const ResolveFunctions& resolveFunctions(VotingKernel kernel) {
+  static constexpr KernelTable<ResolveFunctions> kTable = {nullptr, EFM_VECTOR_KERNELS(kResolve)};
   return kernelIn(kTable, kernel);
 }
 

@@ -40,7 +40,7 @@ constexpr std::uint32_t kBitsOfZero = 0x4B000000U;
 // ---------------------------------------------------------------- gathering
 
 std::size_t gather(const CompactRay* bin, std::size_t count, const GatherRequest& request,
-                   const TileRays& rays) {
+                   const MovingRays& rays) {
   const Floats d;
   const Unsigned du;
   const Signed di;
@@ -48,11 +48,11 @@ std::size_t gather(const CompactRay* bin, std::size_t count, const GatherRequest
   const FloatV scale = set(static_cast<float>(1 << kFractionBits));
   std::size_t size = rays.size;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    UnsignedV place;
+    UnsignedV position;
     UnsignedV shift;
-    hn::LoadInterleaved2(du, reinterpret_cast<const std::uint32_t*>(bin + i), place, shift);
-    const auto right = hn::ConvertTo(d, hn::BitCast(di, hn::And(place, hn::Set(du, 0xFFFFU))));
-    const auto down = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(place)));
+    hn::LoadInterleaved2(du, reinterpret_cast<const std::uint32_t*>(bin + i), position, shift);
+    const auto right = hn::ConvertTo(d, hn::BitCast(di, hn::And(position, hn::Set(du, 0xFFFFU))));
+    const auto down = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(position)));
     const FloatV x = hn::MulAdd(right, set(1.0F / 4096), set(request.corner_x));
     const FloatV y = hn::MulAdd(down, set(1.0F / 4096), set(request.corner_y));
     const auto own_x = hn::ShiftRight<16>(hn::BitCast(di, hn::ShiftLeft<16>(shift)));
@@ -105,15 +105,16 @@ HWY_INLINE UnsignedV productOf(UnsignedV a, UnsignedV b) {
 #endif
 }
 
-/// A batch of votes: written by vectors, read one by one. It stays in the first-level cache.
+/// A batch of votes: vectors write it, and it is read one by one. It stays in the first-level
+/// cache.
 struct VoteBatch {
   static constexpr std::size_t kSize = 128;
   HWY_ALIGN std::uint32_t index[kSize];
   HWY_ALIGN std::uint64_t sums[kSize];
 };
 
-/// Stores 64-bit values from their halves. Where lanes are four or more the values of a vector come
-/// in another order: `laneOf` says which.
+/// Stores 64-bit values from their halves. A vector of four or more lanes changes their order:
+/// `laneOf` gives it.
 HWY_INLINE void storeHalves(UnsignedV lower, UnsignedV upper, std::uint64_t* values) {
 #if HWY_TARGET == HWY_SCALAR
   *values = hn::GetLane(lower) | static_cast<std::uint64_t>(hn::GetLane(upper)) << 32;
@@ -133,10 +134,10 @@ HWY_INLINE std::size_t laneOf(std::size_t k, std::size_t lanes) {
   return in_half / 2 * 4 + in_half % 2 + (k < half ? 0 : 2);
 }
 
-/// Where a vector's rays meet the plane and how that is added to a cell.
+/// Encodes the votes of a vector of rays: the index of a cell and the numbers to add to it.
 class VoteEncoder {
  public:
-  VoteEncoder(const TileRays& rays, float to_plane, const CellWindow& window)
+  VoteEncoder(const MovingRays& rays, float to_plane, const CellWindow& window)
       : rays_(rays),
         to_plane_(hn::Set(Floats(), to_plane)),
         left_(hn::Set(Unsigned(), bitsAt(window.left))),
@@ -150,7 +151,7 @@ class VoteEncoder {
     const UnsignedV x = fixedPoint(rays_.x + ray, rays_.dx + ray, left_);
     const UnsignedV y = fixedPoint(rays_.y + ray, rays_.dy + ray, top_);
     const auto inside = hn::And(hn::Lt(x, width_), hn::Lt(y, height_));
-    // What is outside adds nothing, to any cell of the tile.
+    // A ray outside adds zero to a cell of the tile.
     const UnsignedV cell = hn::And(hn::Add(hn::ShiftLeft<6>(hn::ShiftRight<kFractionBits>(y)),
                                            hn::ShiftRight<kFractionBits>(x)),
                                    hn::Set(du, kTileCells * kTileCells - 1));
@@ -169,23 +170,23 @@ class VoteEncoder {
     return kBitsOfZero + (static_cast<std::uint32_t>(cell) << kFractionBits);
   }
 
-  /// A coordinate from the window's edge; outside to the left it is huge.
+  /// A coordinate from the window's edge. Left of the edge it wraps around and is huge.
   HWY_INLINE UnsignedV fixedPoint(const float* start, const float* shift, UnsignedV edge) const {
     const Floats d;
-    const FloatV place = hn::MulAdd(to_plane_, hn::Load(d, shift), hn::Load(d, start));
-    return hn::Sub(hn::BitCast(Unsigned(), hn::Add(place, hn::Set(d, kToBits))), edge);
+    const FloatV position = hn::MulAdd(to_plane_, hn::Load(d, shift), hn::Load(d, start));
+    return hn::Sub(hn::BitCast(Unsigned(), hn::Add(position, hn::Set(d, kToBits))), edge);
   }
 
-  TileRays rays_;
+  MovingRays rays_;
   FloatV to_plane_;
   UnsignedV left_, top_, width_, height_, first_;
 };
 
 /// Adds a batch's votes to their cells.
-HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const MarkedCells& tile,
+HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const CellBuffer& tile,
                              FullCell* full) {
   std::uint64_t* const cells = tile.cells;
-  std::uint8_t* const marks = tile.marks;
+  std::uint8_t* const dirty = tile.dirty;
   constexpr std::size_t kLanes = hn::MaxLanes(Floats());
   for (std::size_t i = 0; i < count; i += kLanes) {
 #pragma GCC unroll 16
@@ -194,7 +195,7 @@ HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const Ma
       const std::uint32_t index = batch.index[vote];
       const std::uint64_t sums = batch.sums[i + k] + cells[index];
       cells[index] = sums;
-      marks[index / kLineCells] = 1;
+      dirty[index / kLineCells] = 1;
       if (HWY_UNLIKELY(static_cast<std::int64_t>(sums) < 0)) {
         *full++ = {index, sums};
         cells[index] = 0;
@@ -204,12 +205,12 @@ HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const Ma
   return full;
 }
 
-FullCell* vote(const TileRays& rays, float to_plane, const CellWindow& window, FullCell* full) {
+FullCell* vote(const MovingRays& rays, float to_plane, const CellWindow& window, FullCell* full) {
   VoteBatch batch;
   const VoteEncoder encoder(rays, to_plane, window);
   const std::size_t lanes = hn::Lanes(Floats());
-  // In two steps: vectors first, then additions one by one, which would otherwise take the lanes
-  // from registers, at a higher cost.
+  // In two steps: vectors write a batch to memory, then votes are added one by one. In one loop the
+  // compiler extracts lanes from registers, which costs more.
   for (std::size_t begin = 0; begin < rays.size; begin += VoteBatch::kSize) {
     const std::size_t size = std::min(rays.size - begin, VoteBatch::kSize);
     for (std::size_t i = 0; i < size; i += lanes) {

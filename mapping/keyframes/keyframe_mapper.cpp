@@ -75,7 +75,7 @@ KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
       selected_(std::move(selected)),
       options_(options),
       planes_(options.planes),
-      sweep_(options.sweep) {
+      groups_(options.split, options.subintervals) {
   options_.validate();
   if (selected_.empty()) throw std::invalid_argument("cameras: at least one must take part");
   requireCamera(rig_, options_.reference_camera, "reference_camera");
@@ -217,41 +217,22 @@ KeyframeMapper::CameraInput KeyframeMapper::backProjectCamera(
     const PacketGeometry& geometry) const {
   const UndistortionTable& undistortion = undistortion_[selected];
   CameraInput input{selected_[selected], {}};
-  const auto add = [&](EventSpan part) {
+  std::vector<std::size_t> voting(groups_.subintervals());
+  std::vector<Event> of_polarity;
+  for (const EventPart& part : groups_.partsOf(events, window)) {
+    const EventSpan span = part.select(of_polarity);
     const PosePackets packets =
-        splitIntoPosePackets(part, rig_.cameras[static_cast<std::size_t>(input.camera)],
+        splitIntoPosePackets(span, rig_.cameras[static_cast<std::size_t>(input.camera)],
                              undistortion, trajectory, geometry, options_.packets);
     const RayBundle& rays =
-        input.rays.emplace_back(backProject(part, packets, undistortion, view_));
+        input.rays.emplace_back(backProject(span, packets, undistortion, view_));
     input.without_pose += packets.without_pose;
     input.events += rays.size();
-    return rays.size();
-  };
-  for (const std::vector<EventSpan>& slice : slicesOf(events, window)) {
-    std::vector<std::size_t> voting(slice.size());  // by sub-interval, of both polarities
-    for (int polarity = 0; polarity < options_.split.polarities(); ++polarity) {
-      for (std::size_t s = 0; s < slice.size(); ++s) {
-        voting[s] += options_.split.polarity ? add(eventsOfPolarity(slice[s], polarity == 1))
-                                             : add(slice[s]);
-      }
-    }
-    input.silent_subintervals +=
-        static_cast<std::uint64_t>(std::count(voting.begin(), voting.end(), 0U));
+    voting[part.subinterval] += rays.size();
   }
+  input.silent_subintervals =
+      static_cast<std::uint64_t>(std::count(voting.begin(), voting.end(), 0U));
   return input;
-}
-
-std::vector<std::vector<EventSpan>> KeyframeMapper::slicesOf(EventSpan events,
-                                                             const Window& window) const {
-  SubintervalOptions all = options_.subintervals;
-  all.count *= options_.split.time_slices;
-  const std::vector<EventSpan> parts =
-      splitIntoSubintervals(events, window.t0_ns, window.t1_ns, all);
-  std::vector<std::vector<EventSpan>> slices;
-  for (auto part = parts.begin(); part != parts.end(); part += options_.subintervals.count) {
-    slices.emplace_back(part, part + options_.subintervals.count);
-  }
-  return slices;
 }
 
 /// Counts what became of a camera's events.
@@ -277,22 +258,23 @@ void KeyframeMapper::fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageH
                                 }),
                  inputs.end());
   }
+  const FusionLayout layout = groups_.layoutOf(static_cast<int>(inputs.size()));
   std::vector<CameraRays> rays;
-  for (CameraInput& input : inputs) rays.push_back(std::move(input.rays));
-  SplitRays split =
-      arrangeGroups(std::move(rays), options_.split.time_slices,
-                    assignSubintervals(static_cast<int>(inputs.size()), options_.subintervals));
+  for (const auto& slots : layout.inputs) {
+    CameraRays& input = rays.emplace_back();
+    for (const auto& slot : slots) input.push_back(std::move(inputs[slot.camera].rays[slot.part]));
+  }
 
   // 4. Vote and fuse, plane by plane.
-  const bool cameras_apart = split.inputs.size() == inputs.size();  // not slices of a single one
+  const bool cameras_apart = rays.size() == inputs.size();  // not slices of a single one
   const bool camera_peaks = options_.camera_maps && cameras_apart;
-  const int ray_window =
-      keepsRays(options_.extraction.extraction) ? options_.extraction.threshold_kernel : 0;
+  const int column_window =
+      keepsColumns(options_.extraction.extraction) ? options_.extraction.threshold_kernel : 0;
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
-    const SweepRequest request{camera_peaks, sink, split.groups, ray_window};
-    swept = sweep_.run(std::move(split.inputs), view_, planes_, request);
+    const SweepRequest request{camera_peaks, sink, layout.groups, column_window};
+    swept = sweepSpace(std::move(rays), {view_, planes_}, options_.sweep, request);
   }
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
 

@@ -73,7 +73,7 @@ class KeyframeMapper {
   /// One camera's events on their way to the sweep.
   struct CameraInput {
     int camera = 0;
-    CameraRays rays;  // by time slice, polarity and sub-interval
+    CameraRays rays;  // by part of `EventGroups`
     std::uint64_t events = 0;
     std::uint64_t without_pose = 0;
     std::uint64_t silent_subintervals = 0;
@@ -96,7 +96,6 @@ class KeyframeMapper {
                                                   const KeyframeDepthMap& keyframe) const;
   CameraInput backProjectCamera(std::size_t selected, EventSpan events, const Window& window,
                                 const Trajectory& trajectory, const PacketGeometry& geometry) const;
-  std::vector<std::vector<EventSpan>> slicesOf(EventSpan events, const Window& window) const;
   static void count(const CameraInput& input, KeyframeDepthMap& keyframe);
   void fuse(std::vector<CameraInput> inputs, DsiSink* sink, StageHook* stages,
             KeyframeDepthMap& keyframe) const;
@@ -106,7 +105,7 @@ class KeyframeMapper {
   KeyframeMapperOptions options_;
   DepthPlanes planes_;
   ReferenceView view_;
-  SpaceSweep sweep_;
+  EventGroups groups_;
   std::vector<UndistortionTable> undistortion_;  // per selected camera
   RobustMaximum sequence_maximum_;
 };

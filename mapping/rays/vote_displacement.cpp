@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/rays/back_projection.h"
+#include "mapping/geometry/plane_transfer.h"
 
 namespace efm {
 namespace {

@@ -7,11 +7,9 @@
 
 namespace efm {
 
-/// The sweep of rays as the plain kernel runs it, the specification: whole planes, groups of them
-/// on several threads. Memory: O(threads * width * height), whatever the number of planes, cameras
-/// and sub-intervals.
-SweepResult sweepPlanes(const std::vector<CameraRays>& rays, const ReferenceView& view,
-                        const DepthPlanes& planes, const SpaceSweepOptions& options,
-                        const SweepRequest& request);
+/// The sweep with the plain kernel, the specification: whole planes, one per thread at a time.
+/// Memory: O(threads * width * height), for any number of planes, cameras and sub-intervals.
+SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const DsiGrid& grid,
+                        const SpaceSweepOptions& options, const SweepRequest& request);
 
 }  // namespace efm

@@ -7,23 +7,22 @@
 namespace efm {
 namespace {
 
-/// How far rays may move within a group of planes. Farther, and more of a tile's rays lie outside
-/// it on some planes; less far, and rays are looked up more often.
-constexpr double kGroupShift_px = 10;
-/// Where hardly anything moves: whoever wants to see planes as a whole gets so many at a time.
-constexpr int kMostPlanesInGroup = 20;
+/// How far rays may move within a group of planes. With a longer way, a tile gathers more rays that
+/// are outside it on some planes; with a shorter one it gathers more often.
+constexpr double kMaxGroupShift_px = 10;
+/// A limit where rays hardly move: a sink gets this number of planes at a time.
+constexpr int kMaxGroupPlanes = 20;
 
-/// Events times planes on which the camera looks the other way.
-std::uint64_t countBehind(const RayBundle& rays, const ReferenceView& view,
-                          const DepthPlanes& planes) {
+/// Votes on planes behind the camera.
+std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
   const auto in_front = [&](const RayPacket& packet, int plane) {
-    return transferToPlane(packet, view, planes.depth(plane)).in_front;
+    return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
   };
   std::uint64_t behind = 0;
   for (const RayPacket& packet : rays.packets) {
-    // Before the camera on both outermost planes is before it on all between them.
-    if (in_front(packet, 0) && in_front(packet, planes.size() - 1)) continue;
-    for (int plane = 0; plane < planes.size(); ++plane) {
+    // With both outermost planes in front of the camera, all between them are.
+    if (in_front(packet, 0) && in_front(packet, grid.planes.size() - 1)) continue;
+    for (int plane = 0; plane < grid.planes.size(); ++plane) {
       if (!in_front(packet, plane)) behind += packet.end - packet.begin;
     }
   }
@@ -32,46 +31,43 @@ std::uint64_t countBehind(const RayBundle& rays, const ReferenceView& view,
 
 }  // namespace
 
-BinnedRays::BinnedRays(std::vector<CameraRays> cameras, const ReferenceView& view,
-                       const DepthPlanes& planes)
-    : planes_(planes),
-      home_(RayBins::middleOf(planes)),
-      slots_(static_cast<int>(cameras.front().size())) {
+RayIndex::RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingKernel kernel)
+    : functions_(kernels::tileFunctions(kernel)), planes_(grid.planes) {
   for (CameraRays& camera : cameras) {
     VoteCounts& votes = not_cast_.emplace_back();
     for (RayBundle& slot : camera) {
       const RayBundle rays = std::move(slot);
-      const std::uint64_t behind = countBehind(rays, view, planes);
+      const std::uint64_t behind = countBehind(rays, grid);
       votes.behind_camera += behind;
-      votes.outside_view += rays.size() * static_cast<std::uint64_t>(planes.size()) - behind;
-      bins_.push_back(RayBins::sort(rays, view, planes));
+      votes.outside_view += rays.size() * static_cast<std::uint64_t>(planes_.size()) - behind;
+      bins_.push_back(RayBins::sort(rays, grid));
     }
   }
   groups_ = groupPlanes();
   for (const PlaneGroup& group : groups_) {
-    auto& reach = reach_.emplace_back();
+    auto& footprints = footprints_.emplace_back();
     for (const auto& input : bins_) {
-      auto& of_input = reach.emplace_back();
-      for (const RayBins& bins : input) of_input.push_back(bins.reachIn(group));
+      auto& of_input = footprints.emplace_back();
+      for (const RayBins& bins : input) of_input.push_back(bins.footprintIn(group));
     }
   }
 }
 
-std::vector<PlaneGroup> BinnedRays::groupPlanes() const {
-  double fastest = 0;
+std::vector<PlaneGroup> RayIndex::groupPlanes() const {
+  double max_shift = 0;
   bool on_all_planes = true;
   for (const auto& input : bins_) {
     for (const RayBins& bins : input) {
       on_all_planes = on_all_planes && bins.onAllPlanes();
-      if (bins.onAllPlanes()) fastest = std::max(fastest, bins.fastestShift());
+      if (bins.onAllPlanes()) max_shift = std::max(max_shift, bins.maxShift());
     }
   }
   std::vector<PlaneGroup> groups;
   for (int begin = 0; begin < planes_.size(); begin = groups.back().end) {
     const double first = 1 / planes_.depth(begin);
     int end = begin + 1;
-    while (on_all_planes && end < planes_.size() && end - begin < kMostPlanesInGroup &&
-           (first - 1 / planes_.depth(end)) * fastest <= kGroupShift_px) {
+    while (on_all_planes && end < planes_.size() && end - begin < kMaxGroupPlanes &&
+           (first - 1 / planes_.depth(end)) * max_shift <= kMaxGroupShift_px) {
       ++end;
     }
     groups.push_back({begin, end, planes_.depth(begin), planes_.depth(end - 1)});
@@ -79,16 +75,17 @@ std::vector<PlaneGroup> BinnedRays::groupPlanes() const {
   return groups;
 }
 
-void BinnedRays::gather(std::size_t group, std::size_t input, const TileVoter& voter,
-                        TileRays& rays) const {
+void RayIndex::gather(std::size_t group, std::size_t input, const TileCells& tile,
+                      TileRays& rays) const {
   rays.clear();
   for (std::size_t i = 0; i < bins_[input].size(); ++i) {
-    bins_[input][i].gather(reach_[group][input][i], voter.cells(), voter.origin(),
-                           voter.functions(), rays);
+    bins_[input][i].gather(footprints_[group][input][i], tile, functions_, rays);
   }
   rays.pad();
 }
 
-double BinnedRays::fromHome(int plane) const { return 1 / planes_.depth(plane) - home_; }
+double RayIndex::fromAnchor(int plane) const {
+  return 1 / planes_.depth(plane) - RayBins::middleAnchor(planes_);
+}
 
 }  // namespace efm

@@ -4,52 +4,50 @@
 #include <cstddef>
 #include <vector>
 
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/dsi/vote_counts.h"
-#include "mapping/sweep/plane_group.h"
+#include "mapping/dsi/voting_kernel.h"
+#include "mapping/rays/back_projection.h"
 #include "mapping/sweep/ray_bins.h"
-#include "mapping/sweep/space_sweep.h"
-#include "mapping/sweep/tile_accumulator.h"
 #include "mapping/sweep/tile_rays.h"
 
 namespace efm {
 
-/// The rays of all cameras and slots of time, in bins, and the groups of planes in which a tile
-/// looks them up.
-class BinnedRays {
+/// The rays of all inputs in bins, where a tile finds its rays for a group of planes. An input is a
+/// camera in a slot of the time axis.
+class RayIndex {
  public:
-  /// @param cameras given up piece by piece: each bundle's memory goes when it lies in bins.
-  BinnedRays(std::vector<CameraRays> cameras, const ReferenceView& view, const DepthPlanes& planes);
+  /// @param cameras consumed: each bundle is freed when it lies in bins.
+  /// @param kernel one of `runnableKernels`, but not the plain one.
+  RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingKernel kernel);
 
-  /// Groups in which no ray moves far, from the nearest plane to the farthest; of one plane, where
-  /// there are rays that are not on all planes.
+  /// Groups of planes in which no ray moves far, from the nearest plane to the farthest. Each has
+  /// one plane where some rays are not on all planes.
   const std::vector<PlaneGroup>& groups() const { return groups_; }
 
+  /// Input (camera, slot) has the index camera * slots + slot.
   std::size_t inputs() const { return bins_.size(); }
-  std::size_t inputOf(int camera, int slot) const {
-    return static_cast<std::size_t>(camera * slots_ + slot);
-  }
-  /// The rays of an input that the voter's tile may see in a group, by its index. Thread-safe.
-  void gather(std::size_t group, std::size_t input, const TileVoter& voter, TileRays& rays) const;
-  /// How far the planes of a group are from the home of gathered rays, 1/m.
-  double fromHome(int plane) const;
+  /// Replaces `rays` by those of an input that the tile may see in a group. Thread-safe.
+  void gather(std::size_t group, std::size_t input, const TileCells& tile, TileRays& rays) const;
+  /// From the anchor plane of gathered rays to a plane, 1/m.
+  double fromAnchor(int plane) const;
 
-  /// Gives the rays' memory back; the counts stay.
+  /// Frees the rays; the counts stay.
   void release() {
     bins_ = {};
-    reach_ = {};
+    footprints_ = {};
   }
-  /// Per camera, what the votes come to if none is cast.
+  /// Per camera: the counts if no vote is cast.
   const std::vector<VoteCounts>& notCast() const { return not_cast_; }
 
  private:
   std::vector<PlaneGroup> groupPlanes() const;
 
-  const DepthPlanes& planes_;
-  double home_;  // inverse depth of the home plane
-  int slots_;
-  std::vector<std::vector<RayBins>> bins_;  // by camera and slot
+  const kernels::TileFunctions& functions_;
+  DepthPlanes planes_;
+  std::vector<std::vector<RayBins>> bins_;  // by input
   std::vector<PlaneGroup> groups_;
-  std::vector<std::vector<std::vector<RayBins::GroupReach>>> reach_;  // by group, beside bins_
+  std::vector<std::vector<std::vector<RayBins::Footprint>>> footprints_;  // of bins_, by group
   std::vector<VoteCounts> not_cast_;
 };
 

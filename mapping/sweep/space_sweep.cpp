@@ -34,7 +34,7 @@ void SpaceSweepOptions::validate() const {
 }
 
 int SpaceSweepOptions::threadsOrCores() const {
-  // What the host of this process allows is the limit, also for what was asked for.
+  // The host of this process limits the number of threads, also a requested one.
   const auto allowed = static_cast<int>(
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   return std::max(1, std::min(threads.value_or(allowed), allowed));
@@ -48,15 +48,12 @@ FusionInputs fusionInputs(const std::vector<CameraRays>& cameras, int groups) {
   return {static_cast<int>(cameras.size()), slots / groups, groups};
 }
 
-SpaceSweep::SpaceSweep(const SpaceSweepOptions& options) : options_(options) {
-  options_.validate();
-}
-
-SweepResult SpaceSweep::run(std::vector<CameraRays> cameras, const ReferenceView& view,
-                            const DepthPlanes& planes, const SweepRequest& request) const {
-  return options_.kernelOrFastest() == VotingKernel::kPlain
-             ? sweepPlanes(cameras, view, planes, options_, request)
-             : sweepTiles(std::move(cameras), view, planes, options_, request);
+SweepResult sweepSpace(std::vector<CameraRays> cameras, const DsiGrid& grid,
+                       const SpaceSweepOptions& options, const SweepRequest& request) {
+  options.validate();
+  return options.kernelOrFastest() == VotingKernel::kPlain
+             ? sweepPlanes(cameras, grid, options, request)
+             : sweepTiles(std::move(cameras), grid, options, request);
 }
 
 }  // namespace efm

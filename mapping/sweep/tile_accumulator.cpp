@@ -8,81 +8,70 @@ namespace efm {
 namespace {
 
 constexpr int kStride = kernels::kTileCells;
-/// Up to so many rays per pixel it pays to look for empty cells.
-constexpr double kMostSparse = 1;
-
-int roundDown(int value, int unit) { return value / unit * unit; }
+/// Up to this number of rays per pixel it pays to skip empty cells.
+constexpr double kMaxSparseRays = 1;
 
 }  // namespace
 
-TileVoter::TileVoter(VotingKernel kernel)
-    : functions_(kernels::tileFunctions(kernel)), votes_{TileVotes(kernel), TileVotes(kernel)} {}
+TileAccumulator::TileAccumulator(VotingKernel kernel)
+    : scatter_(kernels::tileFunctions(kernel)),
+      resolve_(kernels::resolveFunctions(kernel)),
+      // Vectors read past the last row. A ray outside the view adds zero to a cell up to a tile
+      // from the first cell inside.
+      cells_(static_cast<std::size_t>((kStride + 2) * kStride), 0),
+      dirty_(kernels::kDirtyFlags + kernels::kRayPadding, 0) {}
 
-void TileVoter::moveTo(const cv::Rect& tile, const ReferenceView& view) {
-  assert(tile.width <= kTilePixels && tile.height <= kTilePixels);
+void TileAccumulator::moveTo(const TileCells& tile) {
+  assert(!pending_);
   tile_ = tile;
-  // A pixel has cells on its left and above it; the view has none beyond its last pixels.
-  const cv::Rect all(tile.x - 1, tile.y - 1, tile.width + 1, tile.height + 1);
-  inside_ = all & cv::Rect(0, 0, view.width - 1, view.height - 1);
-  if (inside_.empty()) inside_ = {};
-  first_inside_ =
-      inside_.empty()
-          ? 0
-          : static_cast<std::uint32_t>((inside_.y - all.y) * kStride + inside_.x - all.x);
 }
 
-cv::Point TileVoter::origin() const {
-  return {roundDown(inside_.x, kernels::kSharedOrigin),
-          roundDown(inside_.y, kernels::kSharedOrigin)};
-}
-
-const kernels::FullCell* TileVoter::cast(TileRays& rays, double to_plane, TileVotes& votes) {
-  full_.resize(std::max(full_.size(), rays.size() / kernels::kVotesPerCell + 1));
-  if (rays.size() == 0 || inside_.empty()) return full_.data();
-  const cv::Point corner = inside_.tl() - origin();
-  return functions_.vote(
-      rays.view(), static_cast<float>(to_plane),
-      {votes.cells(), first_inside_, corner.x, corner.y, static_cast<std::uint32_t>(inside_.width),
-       static_cast<std::uint32_t>(inside_.height)},
-      full_.data());
-}
-
-std::uint64_t TileVoter::vote(TileRays& rays, double to_plane, float* density) {
-  TileDensity all{density};
-  return vote(rays, to_plane, all);
-}
-
-std::uint64_t TileVoter::vote(TileRays& rays, double to_plane, TileDensity& density) {
-  TileVotes& votes = votes_[votes_[0].waiting() ? 1 : 0];
-  assert(!votes.waiting());
-  const kernels::FullCell* full_end = cast(rays, to_plane, votes);
-  const bool sparse = static_cast<double>(rays.size()) <= kMostSparse * tile_.area();
-  if (density.may_wait && sparse && full_end == full_.data()) {
-    density.waiting = &votes;
-    return votes.find(tile_.size());
+void TileAccumulator::vote(TileRays& rays, double from_anchor) {
+  assert(!pending_);
+  pending_ = true;
+  full_cells_ = 0;
+  if (rays.size() > 0 && !tile_.in_view.empty()) {
+    full_.resize(std::max(full_.size(), rays.size() / kernels::kVotesPerCell + 1));
+    const cv::Point first = tile_.in_view.tl() - tile_.all.tl();
+    const cv::Point corner = tile_.in_view.tl() - tile_.origin;
+    const kernels::CellWindow window{buffer(),
+                                     static_cast<std::uint32_t>(first.y * kStride + first.x),
+                                     corner.x,
+                                     corner.y,
+                                     static_cast<std::uint32_t>(tile_.in_view.width),
+                                     static_cast<std::uint32_t>(tile_.in_view.height)};
+    const kernels::FullCell* end =
+        scatter_.vote(rays.view(), static_cast<float>(from_anchor), window, full_.data());
+    full_cells_ = static_cast<std::size_t>(end - full_.data());
   }
-  const std::uint64_t folded = votes.foldAll(tile_.size(), density.values);
-  return folded + addFullCells(full_end, density.values);
+  sparse_ =
+      full_cells_ == 0 && static_cast<double>(rays.size()) <= kMaxSparseRays * tile_.tile.area();
 }
 
-/// The four weights of a full cell's votes, from their sums of 1, a, b and ab.
-std::uint64_t TileVoter::addFullCells(const kernels::FullCell* end, float* density) const {
+std::uint64_t TileAccumulator::resolve(float* density) {
+  pending_ = false;
+  const std::uint64_t votes = resolve_.all(buffer(), tile_.tile.width, tile_.tile.height, density);
+  return votes + addFullCells(density);
+}
+
+/// Adds the four weights of each full cell's votes, from their sums of 1, a, b and ab.
+std::uint64_t TileAccumulator::addFullCells(float* density) const {
   constexpr float kFraction = 1.0F / (1 << kernels::kFractionBits);
   constexpr float kProduct = 1.0F / (1 << kernels::kProductBits);
+  const cv::Rect& tile = tile_.tile;
   std::uint64_t votes = 0;
-  for (const kernels::FullCell* cell = full_.data(); cell != end; ++cell) {
-    const kernels::CellSums sums = kernels::unpack(cell->sums);
+  for (std::size_t i = 0; i < full_cells_; ++i) {
+    const kernels::CellSums sums = kernels::unpack(full_[i].sums);
     const float a = kFraction * static_cast<float>(sums.a);
     const float b = kFraction * static_cast<float>(sums.b);
     const float ab = kProduct * static_cast<float>(sums.ab);
     const auto number = static_cast<float>(sums.votes);
-    const std::uint32_t place = cell->index;
     // Of the pixel to the lower right.
-    const int x = static_cast<int>(place) % kStride;
-    const int y = static_cast<int>(place) / kStride;
+    const int x = static_cast<int>(full_[i].index) % kStride;
+    const int y = static_cast<int>(full_[i].index) / kStride;
     const auto add = [&](int column, int row, float weight) {
-      if (column < 0 || row < 0 || column >= tile_.width || row >= tile_.height) return;
-      density[row * tile_.width + column] += std::max(weight, 0.0F);
+      if (column < 0 || row < 0 || column >= tile.width || row >= tile.height) return;
+      density[row * tile.width + column] += std::max(weight, 0.0F);
     };
     add(x - 1, y - 1, number - a - b + ab);
     add(x, y - 1, a - ab);
@@ -91,6 +80,26 @@ std::uint64_t TileVoter::addFullCells(const kernels::FullCell* end, float* densi
     if (x >= 1 && y >= 1) votes += sums.votes;
   }
   return votes;
+}
+
+std::uint64_t TileAccumulator::findOccupied() {
+  assert(pending_ && sparse_);
+  occupied_.width = tile_.tile.width;
+  occupied_.height = tile_.tile.height;
+  return resolve_.findOccupied(buffer(), occupied_, dirty_lines_);
+}
+
+kernels::PixelBlocks TileAccumulator::blocksOf(const kernels::TilePixels& pixels) const {
+  kernels::PixelBlocks blocks;
+  resolve_.listBlocks(pixels, blocks);
+  return blocks;
+}
+
+void TileAccumulator::resolveBlocks(const kernels::PixelBlocks& blocks, float* density) {
+  assert(pending_ && sparse_);
+  pending_ = false;
+  resolve_.blocks(cells_.data(), blocks, density);
+  resolve_.clear(buffer(), dirty_lines_);
 }
 
 }  // namespace efm

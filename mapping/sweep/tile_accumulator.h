@@ -1,55 +1,65 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <opencv2/core/types.hpp>
 #include <vector>
 
+#include "mapping/dsi/plane_values.h"
 #include "mapping/dsi/voting_kernel.h"
-#include "mapping/geometry/reference_view.h"
+#include "mapping/kernels/tile_resolve.h"
 #include "mapping/kernels/tile_scatter.h"
 #include "mapping/sweep/tile_rays.h"
-#include "mapping/sweep/tile_votes.h"
 
 namespace efm {
 
-/// Votes on one tile of the view, plane by plane. One per thread.
-class TileVoter {
+/// Sums the votes of one input on one tile of a plane in cells (`kernels/tile_scatter.h`) and
+/// resolves them into ray densities: of all pixels, or of some blocks.
+///
+/// Use: `vote`; then `resolve`, or, where `isSparse`, `findOccupied` and `resolveBlocks`.
+class TileAccumulator {
  public:
   /// @param kernel one of `runnableKernels`, but not the plain one.
-  explicit TileVoter(VotingKernel kernel);
+  explicit TileAccumulator(VotingKernel kernel);
 
-  /// Turns to a tile of at most `kTilePixels` on a side.
-  void moveTo(const cv::Rect& tile, const ReferenceView& view);
-  static constexpr int kTilePixels = kernels::kTileCells - 1;
+  /// Moves to a tile. No votes are pending (asserted).
+  void moveTo(const TileCells& tile);
 
-  /// The cells that the tile's pixels get votes from, by their upper left pixels.
-  const cv::Rect& cells() const { return inside_; }
-  const kernels::TileFunctions& functions() const { return functions_; }
-  /// What coordinates of rays count from, for `RayBins::gather`.
-  cv::Point origin() const;
+  /// Votes with the tile's rays on one plane.
+  /// @param rays padded. @param from_anchor from the rays' anchor plane to this one, 1/m.
+  void vote(TileRays& rays, double from_anchor);
+  /// Whether the votes are so few that it pays to skip empty cells.
+  bool isSparse() const { return sparse_; }
 
-  /// The ray density on one plane.
-  /// @param rays padded. @param to_plane from the rays' home plane, 1/m.
+  /// Resolves all pixels; no vote is left.
   /// @param density one value per pixel of the tile, row-major.
-  /// @return the votes of the cells whose upper left pixel lies in the tile: over all tiles, those
-  /// of all cells.
-  std::uint64_t vote(TileRays& rays, double to_plane, float* density);
-  /// The same; votes of few rays wait where they may.
-  std::uint64_t vote(TileRays& rays, double to_plane, TileDensity& density);
+  /// @return the votes of the cells whose upper left pixel lies in the tile. Their sum over all
+  /// tiles is the number of votes in the view.
+  std::uint64_t resolve(float* density);
+
+  /// Finds the pixels that have votes. @return the number of votes as above.
+  std::uint64_t findOccupied();
+  const kernels::TilePixels& occupied() const { return occupied_; }
+  /// The blocks that hold any of some pixels.
+  kernels::PixelBlocks blocksOf(const kernels::TilePixels& pixels) const;
+  /// Resolves the pixels of some blocks, after `findOccupied`; no vote is left.
+  void resolveBlocks(const kernels::PixelBlocks& blocks, float* density);
 
  private:
-  /// Casts the votes. @return one past the last full cell.
-  const kernels::FullCell* cast(TileRays& rays, double to_plane, TileVotes& votes);
-  std::uint64_t addFullCells(const kernels::FullCell* end, float* density) const;
+  kernels::CellBuffer buffer() { return {cells_.data(), dirty_.data()}; }
+  std::uint64_t addFullCells(float* density) const;
 
-  const kernels::TileFunctions& functions_;
-  std::array<TileVotes, 2> votes_;  // one of them may wait while another input votes
+  const kernels::TileFunctions& scatter_;
+  const kernels::ResolveFunctions& resolve_;
+  PixelValues<std::uint64_t> cells_;
+  PixelValues<std::uint8_t> dirty_;
   std::vector<kernels::FullCell> full_;
-  cv::Rect tile_;
-  cv::Rect inside_;                 // the tile's cells that are inside the view
-  std::uint32_t first_inside_ = 0;  // which cell of the tile is the first of them
+  std::size_t full_cells_ = 0;
+  bool sparse_ = false;
+  bool pending_ = false;  // votes that are not resolved
+  kernels::TilePixels occupied_;
+  kernels::DirtyLines dirty_lines_;
+  TileCells tile_;
 };
 
 }  // namespace efm

@@ -8,58 +8,65 @@
 #include <vector>
 
 #include "mapping/dsi/dsi_columns.h"
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/dsi/dsi_peaks.h"
 #include "mapping/dsi/plane_values.h"
-#include "mapping/dsi/swept_dsi.h"
 #include "mapping/dsi/voting_kernel.h"
 
 namespace efm {
 
-/// What is found on one tile of the view at a time, of the fused DSI or of one camera's.
-class TileFinds {
+/// The peaks and columns of one DSI on all tiles: the fused one, or one camera's.
+class ViewPeaks {
  public:
-  /// @param largest how many pixels a tile has at most.
-  TileFinds(int planes, int ray_window, std::size_t largest)
-      : planes_(planes),
-        ray_window_(ray_window),
-        volume_(ray_window > 0 ? planes : 0, ray_window > 0 ? largest : 0) {}
+  ViewPeaks(const DsiGrid& grid, int column_window, std::size_t tiles)
+      : planes_(grid.planes.size()),
+        column_window_(column_window),
+        peaks_(unwrittenPeaks(grid.view)),
+        columns_(tiles) {}
+
+  /// The whole view, when every tile is written. Its columns are moved out.
+  SweptDsi sweptDsi() {
+    if (column_window_ == 0) return {peaks_, {}};
+    return {peaks_, DsiColumns(peaks_.confidence.size(), planes_, std::move(columns_))};
+  }
+
+ private:
+  friend class TilePeaks;
+
+  int planes_;
+  int column_window_;
+  DsiPeaks peaks_;
+  std::vector<DsiColumns::Tile> columns_;  // by tile
+};
+
+/// The peaks and columns of one DSI on one tile at a time.
+class TilePeaks {
+ public:
+  /// @param max_pixels of a tile.
+  TilePeaks(int planes, int column_window, std::size_t max_pixels)
+      : volume_(column_window > 0 ? planes : 0, column_window > 0 ? max_pixels : 0) {}
 
   void moveTo(const cv::Rect& tile, VotingKernel kernel) {
     tile_ = tile;
     peaks_.emplace(static_cast<std::size_t>(tile.area()), kernel);
   }
   /// Planes in increasing order, without a gap.
-  void take(int plane, const PlaneValues& values) {
-    peaks_->take(plane, values);
-    if (ray_window_ > 0) volume_.take(plane, values);
+  void add(int plane, const PlaneValues& values) {
+    peaks_->add(plane, values);
+    if (!volume_.empty()) volume_.setPlane(plane, values);
   }
-  /// Writes into places of the tile's own.
-  void writeTo(DsiPeaks& peaks, DsiRays::Tile& rays) const {
-    peaks_->writeTo(peaks, tile_);
-    if (ray_window_ > 0) {
-      rays = DsiRays::pick(tile_, peaks.confidence(tile_), volume_, planes_, ray_window_);
-    }
+  /// Writes the tile to its position in the view. Several threads may write different tiles.
+  void writeTo(ViewPeaks& view, std::size_t tile) const {
+    peaks_->writeTo(view.peaks_, tile_);
+    if (volume_.empty()) return;
+    view.columns_[tile] = DsiColumns::select(tile_, view.peaks_.confidence(tile_), volume_,
+                                             view.planes_, view.column_window_);
   }
 
  private:
-  int planes_;
-  int ray_window_;
   cv::Rect tile_;
   std::optional<RunningPeaks> peaks_;
   TileVolume volume_;
-};
-
-/// What is found on all tiles.
-struct Found {
-  DsiPeaks peaks;
-  std::vector<DsiRays::Tile> rays;  // by tile
-
-  Found(const ReferenceView& view, std::size_t tiles) : peaks(unwrittenPeaks(view)), rays(tiles) {}
-  /// @param with_rays that rays were asked for: without them there is nothing to find them by.
-  SweptDsi whole(int planes, bool with_rays) {
-    if (!with_rays) return {peaks, {}};
-    return {peaks, DsiRays(peaks.confidence.size(), planes, std::move(rays))};
-  }
 };
 
 }  // namespace efm

@@ -2,28 +2,45 @@
 #pragma once
 
 #include <cstddef>
+#include <opencv2/core/types.hpp>
 
 #include "mapping/dsi/plane_values.h"
+#include "mapping/geometry/reference_view.h"
 #include "mapping/kernels/tile_scatter.h"
 
 namespace efm {
 
-/// The rays that one tile sees of one `RayBins` in a group of planes. Keeps its memory.
+/// The cells that the pixels of a tile get votes from. A cell lies between four pixels and has the
+/// coordinates of its upper left one.
+struct TileCells {
+  /// Pixels on a side of a tile at most.
+  static constexpr int kMaxPixels = kernels::kTileCells - 1;
+
+  TileCells() = default;
+  TileCells(const cv::Rect& tile, const ReferenceView& view);
+
+  cv::Rect tile;     ///< Pixels.
+  cv::Rect all;      ///< Also cells outside the view, which a pixel at its border has.
+  cv::Rect in_view;  ///< Those of `all` that are inside the view.
+  cv::Point origin;  ///< Of the coordinates of the tile's rays, pixels.
+};
+
+/// The rays that one tile sees of one input in a group of planes. Keeps its memory.
 class TileRays {
  public:
   void clear() { size_ = 0; }
   std::size_t size() const { return size_; }
 
-  /// Makes room for more rays, which a kernel may write behind those that are there.
+  /// Makes room for more rays, which a kernel may write after the existing ones.
   void reserve(std::size_t more);
-  /// Takes what a kernel wrote.
+  /// Sets the number of rays after a kernel wrote some.
   void resize(std::size_t size) { size_ = size; }
-  /// Takes a ray that does not move, into room that is there.
+  /// Adds a ray that does not move, into reserved room.
   void add(float x, float y);
   /// Fills up the last vector with rays that no tile sees.
   void pad();
 
-  kernels::TileRays view() { return {x_.data(), y_.data(), dx_.data(), dy_.data(), size_}; }
+  kernels::MovingRays view() { return {x_.data(), y_.data(), dx_.data(), dy_.data(), size_}; }
 
  private:
   PlaneValues x_, y_, dx_, dy_;

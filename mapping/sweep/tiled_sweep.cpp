@@ -7,43 +7,51 @@
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "mapping/sweep/plane_group.h"
 #include "mapping/sweep/ray_index.h"
-#include "mapping/sweep/tile_accumulator.h"
+#include "mapping/sweep/tile_fusion.h"
 #include "mapping/sweep/tile_peaks.h"
 #include "mapping/sweep/tile_rays.h"
-#include "mapping/sweep/view_tiles.h"
 
 namespace efm {
 namespace {
 
-/// What one thread needs, kept from tile to tile.
-struct Workplace {
-  TileVoter voter;
-  std::vector<TileRays> rays;        // by camera and slot
-  std::vector<std::uint64_t> votes;  // by camera
-  TileFinds fused;
-  std::vector<TileFinds> cameras;  // where they are asked for
+/// The first pixels of the parts of a side, and its end.
+std::vector<int> cut(int side, int max_pixels) {
+  const int parts = (side + max_pixels - 1) / max_pixels;
+  std::vector<int> cuts;
+  for (int i = 0; i <= parts; ++i) {
+    cuts.push_back(static_cast<int>(std::int64_t{side} * i / parts));
+  }
+  return cuts;
+}
+
+/// The buffers of one thread, reused from tile to tile.
+struct Scratch {
+  std::vector<TileRays> rays;  // by input
+  TileFusion fusion;
+  TilePeaks fused;
+  std::vector<TilePeaks> cameras;  // where asked for
 };
 
-/// The whole DSI, where somebody wants to see it.
+/// The whole DSI for a sink.
 class WholePlanes {
  public:
-  WholePlanes(DsiSink* sink, const ReferenceView& view, int planes) : sink_(sink) {
-    planes_.resize(sink == nullptr ? 0 : static_cast<std::size_t>(planes));
-    for (cv::Mat1f& plane : planes_) plane.create(view.height, view.width);
+  WholePlanes(DsiSink* sink, const DsiGrid& grid) : sink_(sink) {
+    planes_.resize(sink == nullptr ? 0 : static_cast<std::size_t>(grid.planes.size()));
+    for (cv::Mat1f& plane : planes_) plane.create(grid.view.height, grid.view.width);
   }
 
-  /// Several threads may give different tiles at once.
-  void take(int plane, const cv::Rect& tile, const PlaneValues& values) {
+  /// Several threads may write different tiles.
+  void write(int plane, const cv::Rect& tile, const PlaneValues& values) {
     if (sink_ != nullptr) writeTo(planes_[static_cast<std::size_t>(plane)](tile), values);
   }
-  void give() {
+  void deliver() {
     for (std::size_t plane = 0; plane < planes_.size(); ++plane) {
-      sink_->takePlane(static_cast<int>(plane), planes_[plane][0]);
+      sink_->addPlane(static_cast<int>(plane), planes_[plane][0]);
     }
   }
 
@@ -54,20 +62,20 @@ class WholePlanes {
 
 class TiledSweep {
  public:
-  TiledSweep(std::vector<CameraRays> cameras, const ReferenceView& view, const DepthPlanes& planes,
-             const SpaceSweepOptions& options, const SweepRequest& request)
-      : view_(view),
-        planes_(planes.size()),
+  TiledSweep(std::vector<CameraRays> cameras, const DsiGrid& grid, const SpaceSweepOptions& options,
+             const SweepRequest& request)
+      : grid_(grid),
         options_(options),
         request_(request),
         kernel_(options.kernelOrFastest()),
-        cameras_(static_cast<int>(cameras.size())),
         inputs_(fusionInputs(cameras, request.groups)),
-        tiles_(tilesOf(view, TileVoter::kTilePixels)),
-        rays_(std::move(cameras), view, planes),
-        whole_planes_(request.sink, view, planes_),
-        fused_(view, tiles_.size()) {
-    for (std::size_t c = 0; c < seenAlone(); ++c) alone_.emplace_back(view, tiles_.size());
+        tiles_(tilesOf(grid.view, TileCells::kMaxPixels)),
+        rays_(std::move(cameras), grid, kernel_),
+        whole_planes_(request.sink, grid),
+        fused_(grid, request.column_window, tiles_.size()) {
+    for (int c = 0; request.camera_peaks && c < inputs_.cameras; ++c) {
+      cameras_.emplace_back(grid, request.column_window, tiles_.size());
+    }
   }
 
   /// On the threads of the task arena that it is called in.
@@ -75,102 +83,98 @@ class TiledSweep {
     tbb::parallel_for(
         tbb::blocked_range<std::size_t>(0, tiles_.size()),
         [&](const tbb::blocked_range<std::size_t>& range) {
-          Workplace& workplace = workplaces_.local();
-          for (std::size_t t = range.begin(); t < range.end(); ++t) sweepTile(t, workplace);
+          Scratch& scratch = scratches_.local();
+          for (std::size_t t = range.begin(); t < range.end(); ++t) sweepTile(t, scratch);
         },
         tbb::simple_partitioner());
     rays_.release();
-    whole_planes_.give();
+    whole_planes_.deliver();
     return result();
   }
 
  private:
-  /// The number of cameras whose own DSIs are asked for.
-  std::size_t seenAlone() const {
-    return request_.camera_peaks ? static_cast<std::size_t>(cameras_) : 0;
-  }
-
-  Workplace newWorkplace() const {
-    const TileFinds finds(planes_, request_.ray_window,
-                          TileVoter::kTilePixels * TileVoter::kTilePixels);
-    return {TileVoter(kernel_), std::vector<TileRays>(rays_.inputs()),
-            std::vector<std::uint64_t>(static_cast<std::size_t>(cameras_)), finds,
-            std::vector<TileFinds>(seenAlone(), finds)};
+  Scratch newScratch() const {
+    const TilePeaks peaks(grid_.planes.size(), request_.column_window,
+                          TileCells::kMaxPixels * TileCells::kMaxPixels);
+    const auto keep =
+        request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
+    return {std::vector<TileRays>(rays_.inputs()),
+            TileFusion(options_.fusion, inputs_, keep, kernel_), peaks,
+            std::vector<TilePeaks>(cameras_.size(), peaks)};
   }
 
   /// All planes on one tile.
-  void sweepTile(std::size_t t, Workplace& workplace) {
-    const cv::Rect& tile = tiles_[t];
-    workplace.voter.moveTo(tile, view_);
-    workplace.fused.moveTo(tile, kernel_);
-    for (TileFinds& camera : workplace.cameras) camera.moveTo(tile, kernel_);
-    PlaneFusion fusion(
-        options_.fusion, inputs_, static_cast<std::size_t>(tile.area()),
-        request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly,
-        kernel_);
+  void sweepTile(std::size_t t, Scratch& scratch) {
+    const TileCells tile(tiles_[t], grid_.view);
+    scratch.fusion.moveTo(tile);
+    scratch.fused.moveTo(tile.tile, kernel_);
+    for (TilePeaks& camera : scratch.cameras) camera.moveTo(tile.tile, kernel_);
     for (std::size_t group = 0; group < rays_.groups().size(); ++group) {
-      for (std::size_t i = 0; i < rays_.inputs(); ++i) {
-        rays_.gather(group, i, workplace.voter, workplace.rays[i]);
+      for (std::size_t input = 0; input < rays_.inputs(); ++input) {
+        rays_.gather(group, input, tile, scratch.rays[input]);
       }
       const PlaneGroup& planes = rays_.groups()[group];
       for (int plane = planes.begin; plane < planes.end; ++plane) {
-        sweepPlane(plane, tile, fusion, workplace);
+        sweepPlane(plane, tile.tile, scratch);
       }
     }
-    workplace.fused.writeTo(fused_.peaks, fused_.rays[t]);
-    for (std::size_t c = 0; c < alone_.size(); ++c) {
-      workplace.cameras[c].writeTo(alone_[c].peaks, alone_[c].rays[t]);
-    }
+    scratch.fused.writeTo(fused_, t);
+    for (std::size_t c = 0; c < cameras_.size(); ++c) scratch.cameras[c].writeTo(cameras_[c], t);
   }
 
-  void sweepPlane(int plane, const cv::Rect& tile, PlaneFusion& fusion, Workplace& workplace) {
-    const PlaneValues& fused = fusion.fuse([&](int camera, int slot, TileDensity& density) {
-      workplace.votes[static_cast<std::size_t>(camera)] += workplace.voter.vote(
-          workplace.rays[rays_.inputOf(camera, slot)], rays_.fromHome(plane), density);
-    });
-    workplace.fused.take(plane, fused);
-    for (std::size_t c = 0; c < workplace.cameras.size(); ++c) {
-      workplace.cameras[c].take(plane, fusion.ofCamera(static_cast<int>(c)));
+  void sweepPlane(int plane, const cv::Rect& tile, Scratch& scratch) {
+    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, rays_.fromAnchor(plane));
+    scratch.fused.add(plane, fused);
+    for (std::size_t c = 0; c < scratch.cameras.size(); ++c) {
+      scratch.cameras[c].add(plane, scratch.fusion.ofCamera(static_cast<int>(c)));
     }
-    whole_planes_.take(plane, tile, fused);
+    whole_planes_.write(plane, tile, fused);
   }
 
   SweepResult result() {
-    SweepResult result{fused_.whole(planes_, request_.ray_window > 0), {}, rays_.notCast()};
-    for (Found& camera : alone_)
-      result.cameras.push_back(camera.whole(planes_, request_.ray_window > 0));
-    for (const Workplace& workplace : workplaces_) {
-      for (std::size_t c = 0; c < workplace.votes.size(); ++c) {
-        result.votes[c].cast += workplace.votes[c];
-        result.votes[c].outside_view -= workplace.votes[c];
+    SweepResult result{fused_.sweptDsi(), {}, rays_.notCast()};
+    for (ViewPeaks& camera : cameras_) result.cameras.push_back(camera.sweptDsi());
+    for (const Scratch& scratch : scratches_) {
+      for (std::size_t c = 0; c < result.votes.size(); ++c) {
+        result.votes[c].cast += scratch.fusion.votes()[c];
+        result.votes[c].outside_view -= scratch.fusion.votes()[c];
       }
     }
     return result;
   }
 
-  ReferenceView view_;
-  int planes_;
+  DsiGrid grid_;
   SpaceSweepOptions options_;
   SweepRequest request_;
   VotingKernel kernel_;
-  int cameras_;
   FusionInputs inputs_;
   std::vector<cv::Rect> tiles_;
-  BinnedRays rays_;
+  RayIndex rays_;
   WholePlanes whole_planes_;
-  Found fused_;
-  std::vector<Found> alone_;  // by camera, where asked for
-  tbb::enumerable_thread_specific<Workplace> workplaces_{[this] { return newWorkplace(); }};
+  ViewPeaks fused_;
+  std::vector<ViewPeaks> cameras_;  // where asked for
+  tbb::enumerable_thread_specific<Scratch> scratches_{[this] { return newScratch(); }};
 };
 
 }  // namespace
 
-SweepResult sweepTiles(std::vector<CameraRays> cameras, const ReferenceView& view,
-                       const DepthPlanes& planes, const SpaceSweepOptions& options,
-                       const SweepRequest& request) {
+std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels) {
+  const std::vector<int> columns = cut(view.width, max_pixels);
+  const std::vector<int> rows = cut(view.height, max_pixels);
+  std::vector<cv::Rect> tiles;
+  for (std::size_t r = 0; r + 1 < rows.size(); ++r) {
+    for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
+      tiles.emplace_back(cv::Point(columns[c], rows[r]), cv::Point(columns[c + 1], rows[r + 1]));
+    }
+  }
+  return tiles;
+}
+
+SweepResult sweepTiles(std::vector<CameraRays> cameras, const DsiGrid& grid,
+                       const SpaceSweepOptions& options, const SweepRequest& request) {
   tbb::task_arena arena(options.threadsOrCores());
   return arena.execute(
-      [&] { return TiledSweep(std::move(cameras), view, planes, options, request).run(); });
+      [&] { return TiledSweep(std::move(cameras), grid, options, request).run(); });
 }
 
 }  // namespace efm

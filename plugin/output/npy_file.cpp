@@ -46,7 +46,7 @@ NpyDsiFile::~NpyDsiFile() {
   std::filesystem::remove(temporary_, ignored);
 }
 
-void NpyDsiFile::takePlane(int plane, const float* values) {
+void NpyDsiFile::addPlane(int plane, const float* values) {
   const std::lock_guard<std::mutex> lock(mutex_);
   file_.seekp(header_bytes_ + plane * plane_bytes_);
   file_.write(reinterpret_cast<const char*>(values), plane_bytes_);

@@ -21,7 +21,7 @@ class NpyDsiFile : public DsiSink {
   ~NpyDsiFile() override;
 
   /// Thread-safe. Errors of the disk are kept for `finish`.
-  void takePlane(int plane, const float* values) override;
+  void addPlane(int plane, const float* values) override;
   /// @throws std::runtime_error naming the path where it could not be written.
   void finish();
 

@@ -10,7 +10,7 @@ void benchExtraction(BenchSession& session) {
   for (const SensorSize& sensor : session.plan().sensors) {
     const SweepInput input =
         makeSweepInput(makeSyntheticWindow(sensor.window(2)), session.plan().planes);
-    const DsiPeaks peaks = SpaceSweep().run(input.cameras, input.view, input.planes).fused.peaks;
+    const DsiPeaks peaks = sweepSpace(input.cameras, {input.view, input.planes}).fused.peaks;
     session.add({"extraction", sensor.name(), ""}, [&](benchmark::State& state) {
       for (auto _ : state) benchmark::DoNotOptimize(extractAsPaper(peaks, input.planes, {}));
       state.counters["pixels/s"] = benchmark::Counter(

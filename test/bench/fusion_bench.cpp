@@ -29,30 +29,28 @@ void countVoxels(benchmark::State& state, std::size_t voxels) {
 }
 
 /// The mean of two inputs.
-void fuseTwo(benchmark::State& state, FusionRule rule, VotingKernel kernel, std::size_t voxels) {
+void fuseTwo(benchmark::State& state, FusionRule rule, std::size_t voxels) {
   const PlaneValues first = densities(voxels, 1);
   const PlaneValues second = densities(voxels, 2);
-  FusionAccumulator accumulator(rule, voxels, kernel);
+  FusionAccumulator accumulator(rule, 2, voxels);
   for (auto _ : state) {
-    accumulator.begin(2);
-    accumulator.fold(first.data());
-    accumulator.fold(second.data());
-    accumulator.finish();
-    benchmark::DoNotOptimize(accumulator.values().data());
+    accumulator.add(first);
+    accumulator.add(second);
+    benchmark::DoNotOptimize(accumulator.mean().data());
     benchmark::ClobberMemory();
   }
   countVoxels(state, voxels);
 }
 
 /// All planes of a DSI.
-void takePeaks(benchmark::State& state, int planes, VotingKernel kernel, std::size_t voxels) {
+void addPeaks(benchmark::State& state, int planes, VotingKernel kernel, std::size_t voxels) {
   constexpr unsigned kDifferent = 7;  // planes; more would not fit the cache that the sweep's do
   std::vector<PlaneValues> values;
   for (unsigned i = 0; i < kDifferent; ++i) values.push_back(densities(voxels, i));
   for (auto _ : state) {
     RunningPeaks peaks(voxels, kernel);
     for (int plane = 0; plane < planes; ++plane) {
-      peaks.take(plane, values[static_cast<unsigned>(plane) % kDifferent]);
+      peaks.add(plane, values[static_cast<unsigned>(plane) % kDifferent]);
     }
     benchmark::DoNotOptimize(peaks);
   }
@@ -65,15 +63,14 @@ void benchFusion(BenchSession& session) {
   const SensorSize& sensor = session.plan().sensors.front();
   const std::size_t voxels =
       static_cast<std::size_t>(sensor.width) * static_cast<std::size_t>(sensor.height);
+  for (const FusionRule rule : allFusionRules()) {
+    session.add({"fusion", sensor.name() + "/" + std::string(nameOf(rule)), "plain"},
+                [=](benchmark::State& state) { fuseTwo(state, rule, voxels); });
+  }
   for (const VotingKernel kernel : availableKernels()) {
-    const std::string kernel_name(nameOf(kernel));
-    for (const FusionRule rule : allFusionRules()) {
-      session.add({"fusion", sensor.name() + "/" + std::string(nameOf(rule)), kernel_name},
-                  [=](benchmark::State& state) { fuseTwo(state, rule, kernel, voxels); });
-    }
-    session.add({"fusion", sensor.name() + "/peaks", kernel_name},
+    session.add({"fusion", sensor.name() + "/peaks", std::string(nameOf(kernel))},
                 [=, planes = session.plan().planes](benchmark::State& state) {
-                  takePeaks(state, planes, kernel, voxels);
+                  addPeaks(state, planes, kernel, voxels);
                 });
   }
   session.run();

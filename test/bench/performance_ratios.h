@@ -8,7 +8,7 @@
 namespace efm::bench {
 
 /// Stand in the place of a kernel: what the others are held against.
-inline constexpr const char* kYardstick = "yardstick";  ///< votePlain on one plane, nothing else.
+inline constexpr const char* kYardstick = "yardstick";  ///< voteBilinear on one plane, nothing else.
 inline constexpr const char* kUnfused = "unfused";      ///< A keyframe over whole volumes.
 
 // Groups that are held against one another.

@@ -7,9 +7,9 @@
 #include "mapping/geometry/undistortion.h"
 #include "test/bench/sweep_input.h"
 #include "test/bench/synthetic_window.h"
-#include "test/mapping/dsi/swept_dsi.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/keyframes/random_scene.h"
+#include "test/mapping/sweep/sweep_case.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {
@@ -98,7 +98,7 @@ class SweepAccuracyOn : public ::testing::TestWithParam<VotingKernel> {
   static void expectExact(const Keyframe& keyframe, FusionRule rule) {
     test::SweepCase input = keyframe.input;
     input.fusion.across_cameras = rule;
-    const test::SweptDsi swept = sweep(input, GetParam(), 2);
+    const test::SweepOutput swept = sweep(input, GetParam(), 2);
     const oracle::Dsi exact = oracle::fuse(rule, keyframe.exact);
     const test::DsiDifference difference = test::differenceOf(swept.dsi, exact.values);
     const double equal_peaks = equalPeaks(swept.result, exact);

@@ -62,7 +62,7 @@ void UnfusedKeyframe::vote(const RayBundle& rays, Volume& volume) const {
     for (const RayPacket& packet : rays.packets) {
       const PlaneTransfer transfer = transferToPlane(packet, view_, planes_.depth(plane));
       if (!transfer.in_front) continue;
-      kernels::votePlain(
+      kernels::voteBilinear(
           {rays.x_inf.data(), rays.y_inf.data()},
           {packet.begin, packet.end, static_cast<float>(transfer.scale),
            static_cast<float>(transfer.offset_x), static_cast<float>(transfer.offset_y)},

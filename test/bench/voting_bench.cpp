@@ -11,7 +11,7 @@
 #include "mapping/sweep/space_sweep.h"
 #include "mapping/sweep/tile_accumulator.h"
 #include "mapping/sweep/tile_rays.h"
-#include "mapping/sweep/view_tiles.h"
+#include "mapping/sweep/tiled_sweep.h"
 #include "test/bench/benches.h"
 #include "test/bench/performance_ratios.h"
 #include "test/bench/sweep_input.h"
@@ -31,7 +31,7 @@ void countVotes(benchmark::State& state, const SweepInput& input) {
   state.counters["packets"] = static_cast<double>(raysOf(input).packets.size());
 }
 
-/// What every ratio is against: the plain kernel on one plane that is cleared for each depth. Where
+/// The base of every ratio: the plain kernel on one plane that is cleared for each depth. Where
 /// the rays go is computed beforehand.
 void voteYardstick(benchmark::State& state, const SweepInput& input) {
   const RayBundle& rays = raysOf(input);
@@ -51,8 +51,8 @@ void voteYardstick(benchmark::State& state, const SweepInput& input) {
       std::fill(votes.begin(), votes.end(), 0.0F);
       for (const kernels::RayTransfer& transfer : of_plane) {
         benchmark::DoNotOptimize(
-            kernels::votePlain({rays.x_inf.data(), rays.y_inf.data()}, transfer,
-                               {votes.data(), input.view.width, input.view.height}));
+            kernels::voteBilinear({rays.x_inf.data(), rays.y_inf.data()}, transfer,
+                                  {votes.data(), input.view.width, input.view.height}));
       }
       benchmark::ClobberMemory();
     }
@@ -63,19 +63,21 @@ void voteYardstick(benchmark::State& state, const SweepInput& input) {
 /// Votes as the fast kernels cast them, up to the ray density of every plane. As for the yardstick,
 /// where the rays go is there beforehand: they lie in bins.
 void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
-  const BinnedRays rays(input.cameras, input.view, input.planes);
-  TileVoter voter(kernel);
+  const RayIndex rays(input.cameras, {input.view, input.planes}, kernel);
+  TileAccumulator accumulator(kernel);
   TileRays gathered;
-  std::vector<float> density(TileVoter::kTilePixels * TileVoter::kTilePixels);
-  const std::vector<cv::Rect> tiles = tilesOf(input.view, TileVoter::kTilePixels);
+  std::vector<float> density(TileCells::kMaxPixels * TileCells::kMaxPixels);
+  const std::vector<cv::Rect> tiles = tilesOf(input.view, TileCells::kMaxPixels);
   for (auto _ : state) {
     for (std::size_t g = 0; g < rays.groups().size(); ++g) {
       const PlaneGroup& group = rays.groups()[g];
       for (const cv::Rect& tile : tiles) {
-        voter.moveTo(tile, input.view);
-        rays.gather(g, 0, voter, gathered);
+        const TileCells cells(tile, input.view);
+        accumulator.moveTo(cells);
+        rays.gather(g, 0, cells, gathered);
         for (int plane = group.begin; plane < group.end; ++plane) {
-          benchmark::DoNotOptimize(voter.vote(gathered, rays.fromHome(plane), density.data()));
+          accumulator.vote(gathered, rays.fromAnchor(plane));
+          benchmark::DoNotOptimize(accumulator.resolve(density.data()));
           benchmark::ClobberMemory();
         }
       }
@@ -88,12 +90,11 @@ void sweep(benchmark::State& state, const SweepInput& input, VotingKernel kernel
   SpaceSweepOptions options;
   options.threads = 1;
   options.kernel = kernel;
-  const SpaceSweep space_sweep(options);
   for (auto _ : state) {
     state.PauseTiming();
-    std::vector<CameraRays> cameras = input.cameras;  // the sweep takes them over
+    std::vector<CameraRays> cameras = input.cameras;  // the sweep consumes them
     state.ResumeTiming();
-    benchmark::DoNotOptimize(space_sweep.run(std::move(cameras), input.view, input.planes));
+    benchmark::DoNotOptimize(sweepSpace(std::move(cameras), {input.view, input.planes}, options));
   }
   countVotes(state, input);
 }

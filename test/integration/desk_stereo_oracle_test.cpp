@@ -9,7 +9,7 @@
 
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/integration/simulated_recording.h"
-#include "test/mapping/dsi/kept_dsi.h"
+#include "test/mapping/dsi/whole_dsi.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {
@@ -42,7 +42,7 @@ class DeskStereoDsi : public ::testing::Test {
                    std::back_inserter(window_events_[c]), in_window);
     }
     KeyframeMapper mapper(recording().simulation().rig, {0, 1}, options_);
-    dsi_ = std::make_unique<test::KeptDsi>(mapper.planes(), mapper.view());
+    dsi_ = std::make_unique<test::WholeDsi>(mapper.planes(), mapper.view());
     keyframe_ =
         *mapper.map({t0_ns, t0_ns + 200 * kMs, t0_ns + 100 * kMs},
                     {window_events_.begin(), window_events_.end()}, trajectory_, dsi_.get());
@@ -107,7 +107,7 @@ class DeskStereoDsi : public ::testing::Test {
   Trajectory trajectory_;
   std::vector<std::vector<Event>> window_events_;
   KeyframeDepthMap keyframe_;
-  std::unique_ptr<test::KeptDsi> dsi_;
+  std::unique_ptr<test::WholeDsi> dsi_;
 };
 
 TEST_F(DeskStereoDsi, TheKernelIsExactUpToItsRounding) {

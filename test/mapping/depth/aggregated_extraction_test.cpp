@@ -43,7 +43,7 @@ ChosenDsi edges(const cv::Size& size, int planes, const std::function<double(int
   ChosenDsi dsi(size, planes);
   for (int y = 0; y < size.height; ++y) {
     for (int x = 0; x < size.width; ++x) {
-      dsi.setRay({x, y}, [&](int plane) { return acrossEdge(x) * ray(plane); });
+      dsi.setColumn({x, y}, [&](int plane) { return acrossEdge(x) * ray(plane); });
     }
   }
   return dsi;
@@ -68,7 +68,7 @@ ChosenDsi randomEdges(std::uint32_t seed, const cv::Size& size, int planes) {
       const double other = (planes - 1) * uniform(random);
       const double height = (4 * acrossEdge(x) + 0.3) * (0.5 + uniform(random));
       const double sigma = place * (1 + uniform(random));
-      dsi.setRay({x, y}, [&](int plane) {
+      dsi.setColumn({x, y}, [&](int plane) {
         return height * (ridge(plane, at, sigma) + 0.5 * uniform(random) * ridge(plane, other, 1) +
                          0.02 * uniform(random));
       });
@@ -161,9 +161,9 @@ TEST(AggregatedExtraction, TwoPeaksAsHighAreRejectedAndOneOfThemAloneIsNot) {
 TEST(AggregatedExtraction, AnIsolatedPixelIsRejectedAndTwoThatAgreeAreNot) {
   ChosenDsi dsi({30, 30}, 50);
   const auto ray = [](int plane) { return 10 * ridge(plane, 20, 2); };
-  dsi.setRay({15, 15}, ray);
+  dsi.setColumn({15, 15}, ray);
   EXPECT_EQ(cv::countNonZero(extract(dsi).depth), 0);
-  dsi.setRay({17, 15}, ray);
+  dsi.setColumn({17, 15}, ray);
   EXPECT_EQ(cv::countNonZero(extract(dsi).depth), 2);
 }
 
@@ -173,9 +173,9 @@ TEST(AggregatedExtraction, DepthsAgreeWithinTwoAndAHalfPlacesWhichAreMorePlanesW
     const auto kept_at = [&](double apart) {
       ChosenDsi dsi({30, 30}, planes);
       // Four pixels apart, so that neither moves the other's peak by much.
-      dsi.setRay({13, 15}, [&](int plane) { return 10 * ridge(plane, 20 * place, place); });
-      dsi.setRay({17, 15},
-                 [&](int plane) { return 10 * ridge(plane, (20 + apart) * place, place); });
+      dsi.setColumn({13, 15}, [&](int plane) { return 10 * ridge(plane, 20 * place, place); });
+      dsi.setColumn({17, 15},
+                    [&](int plane) { return 10 * ridge(plane, (20 + apart) * place, place); });
       return cv::countNonZero(extract(dsi).depth);
     };
     EXPECT_EQ(kept_at(2.4), 2) << planes;
@@ -185,7 +185,7 @@ TEST(AggregatedExtraction, DepthsAgreeWithinTwoAndAHalfPlacesWhichAreMorePlanesW
 
 TEST(AggregatedExtraction, APixelThatDisagreesWithAllAroundItTakesTheirDepth) {
   ChosenDsi dsi = edgesAt(30);
-  dsi.setRay({30, 20}, [](int plane) { return 20 * ridge(plane, 80, 2); });
+  dsi.setColumn({30, 20}, [](int plane) { return 20 * ridge(plane, 80, 2); });
   const DepthMap map = extract(dsi);
   EXPECT_GT(map.depth(20, 30), 0);
   EXPECT_NEAR(map.depth(20, 30), map.depth(16, 30), 0.01 * map.depth(16, 30));
@@ -225,7 +225,7 @@ TEST(AggregatedExtraction, TheVarianceGrowsWithTheScatterAround) {
     for (int y = 0; y < 40; ++y) {
       for (int x = 0; x < 60; ++x) {
         const double at = 50 + scatter * normal(random);
-        dsi.setRay({x, y}, [&](int plane) { return 20 * acrossEdge(x) * ridge(plane, at, 2); });
+        dsi.setColumn({x, y}, [&](int plane) { return 20 * acrossEdge(x) * ridge(plane, at, 2); });
       }
     }
     const DepthMap map = extract(dsi);
@@ -250,7 +250,7 @@ TEST(AggregatedExtraction, AMirroredDsiGivesTheMirroredMap) {
   ChosenDsi mirrored = dsi;
   for (int y = 0; y < 37; ++y) {
     for (int x = 0; x < 64; ++x) {
-      mirrored.setRay({x, y}, [&](int plane) { return dsi.at({63 - x, 36 - y}, plane); });
+      mirrored.setColumn({x, y}, [&](int plane) { return dsi.at({63 - x, 36 - y}, plane); });
     }
   }
   const DepthMap map = extract(dsi);
@@ -265,7 +265,7 @@ TEST(AggregatedExtraction, PlanesInReverseGiveTheReversedPositions) {
   ChosenDsi reversed = dsi;
   for (int y = 0; y < 37; ++y) {
     for (int x = 0; x < 64; ++x) {
-      reversed.setRay({x, y}, [&](int plane) { return dsi.at({x, y}, 99 - plane); });
+      reversed.setColumn({x, y}, [&](int plane) { return dsi.at({x, y}, 99 - plane); });
     }
   }
   const DepthMap map = extract(dsi);
@@ -342,8 +342,8 @@ TEST(AggregatedExtraction, TheFrameIsClear) {
     ChosenDsi dsi({30, 20}, 50);
     for (int y = 0; y < 20; ++y) {
       for (int x = 0; x < 30; ++x) {
-        dsi.setRay({x, y},
-                   [&](int plane) { return acrossEdge(x + shift) * 20 * ridge(plane, 20, 2); });
+        dsi.setColumn({x, y},
+                      [&](int plane) { return acrossEdge(x + shift) * 20 * ridge(plane, 20, 2); });
       }
     }
     const DepthMap map = extract(dsi);
@@ -375,7 +375,7 @@ TEST(AggregatedExtraction, TheSmallestThresholdsFindEveryRay) {
   ChosenDsi dsi({200, 70}, 3);
   for (int y = 0; y < 70; ++y) {
     for (int x = 0; x < 200; ++x) {
-      dsi.setRay({x, y}, [&](int plane) { return plane == 1 ? 3.3 + 0.1 * x + 0.07 * y : 0.5; });
+      dsi.setColumn({x, y}, [&](int plane) { return plane == 1 ? 3.3 + 0.1 * x + 0.07 * y : 0.5; });
     }
   }
   const DepthMap map = extract(dsi, options);

@@ -32,7 +32,7 @@ ChosenDsi randomDsi(std::uint32_t seed, const cv::Size& size, int planes) {
       const double height = 5 + 10 * uniform(random);
       const double at = (planes - 1) * uniform(random);
       const double other = (planes - 1) * uniform(random);
-      dsi.setRay({x, y}, [&](int plane) {
+      dsi.setColumn({x, y}, [&](int plane) {
         return height * ridge(plane, at, 2.5) + 0.6 * height * ridge(plane, other, 1.5) +
                0.3 * uniform(random);
       });
@@ -54,7 +54,7 @@ cv::Mat1b randomMask(std::uint32_t seed, const cv::Size& size, int one_of) {
 
 std::vector<AggregatedPeak> aggregate(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   const SweptDsi swept = dsi.swept();
-  return aggregateRays(SparseMask(mask), swept.rays, swept.peaks.confidence.size());
+  return aggregateRays(SparseMask(mask), swept.columns, swept.peaks.confidence.size());
 }
 
 /// The sum of the rays of the chosen pixels in 9x9, in double.
@@ -144,7 +144,7 @@ TEST(RayAggregation, OfNoPixelsIsEmpty) {
 TEST(RayAggregation, ALoneRidgeIsFoundBetweenPlanesWithItsWidth) {
   for (const double at : {20.0, 20.25, 20.5, 33.8}) {
     ChosenDsi dsi({11, 11}, 100);
-    dsi.setRay({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
+    dsi.setColumn({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
     cv::Mat1b mask = cv::Mat1b::zeros(11, 11);
     mask(5, 5) = 255;
     const AggregatedPeak peak = aggregate(dsi, mask).at(0);
@@ -159,7 +159,7 @@ TEST(RayAggregation, NeighboursMoveAWrongPeakToTheirs) {
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x) {
       const bool wrong = x == 4 && y == 4;
-      dsi.setRay({x, y}, [&](int plane) {
+      dsi.setColumn({x, y}, [&](int plane) {
         return wrong ? 10 * ridge(plane, 50, 1.5) + 4 * ridge(plane, 20, 1.5)
                      : 10 * ridge(plane, 20, 1.5);
       });
@@ -173,10 +173,10 @@ TEST(RayAggregation, OnlyChosenPixelsAreSummed) {
   ChosenDsi dsi({9, 9}, 60);
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x) {
-      dsi.setRay({x, y}, [&](int plane) { return 50 * ridge(plane, 40, 1.5); });
+      dsi.setColumn({x, y}, [&](int plane) { return 50 * ridge(plane, 40, 1.5); });
     }
   }
-  dsi.setRay({4, 4}, [](int plane) { return ridge(plane, 10, 1.5); });
+  dsi.setColumn({4, 4}, [](int plane) { return ridge(plane, 10, 1.5); });
   cv::Mat1b mask = cv::Mat1b::zeros(9, 9);
   mask(4, 4) = 255;
   EXPECT_NEAR(aggregate(dsi, mask).at(0).position, 10, 0.02);
@@ -185,10 +185,10 @@ TEST(RayAggregation, OnlyChosenPixelsAreSummed) {
 TEST(RayAggregation, TwoEqualPeaksAreFullyAmbiguousAndOneIsNot) {
   ChosenDsi dsi({1, 1}, 60);
   const cv::Mat1b mask(1, 1, 255);
-  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1) + ridge(plane, 40, 1); });
+  dsi.setColumn({0, 0}, [](int plane) { return ridge(plane, 20, 1) + ridge(plane, 40, 1); });
   EXPECT_NEAR(aggregate(dsi, mask).at(0).beyond.front(), 1, 1e-3);
   EXPECT_EQ(aggregate(dsi, mask).at(0).position, 20) << "of equals the nearer";
-  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1); });
+  dsi.setColumn({0, 0}, [](int plane) { return ridge(plane, 20, 1); });
   EXPECT_LT(aggregate(dsi, mask).at(0).beyond.front(), 0.01);
 }
 
@@ -197,7 +197,7 @@ TEST(RayAggregation, PeaksOfTheFirstAndTheLastPlaneAreAtTheEnd) {
   for (const int planes : {1, 2, 3, 50}) {
     for (const int at : {0, planes - 1}) {
       ChosenDsi dsi({1, 1}, planes);
-      dsi.setRay({0, 0}, [&](int plane) { return 10 - 0.1 * std::abs(plane - at); });
+      dsi.setColumn({0, 0}, [&](int plane) { return 10 - 0.1 * std::abs(plane - at); });
       const AggregatedPeak peak = aggregate(dsi, mask).at(0);
       EXPECT_TRUE(peak.at_end);
       EXPECT_EQ(peak.position, static_cast<float>(at));

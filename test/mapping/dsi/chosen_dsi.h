@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "mapping/dsi/dsi_columns.h"
-#include "mapping/dsi/swept_dsi.h"
 #include "mapping/geometry/reference_view.h"
 
 namespace efm::test {
@@ -30,14 +29,14 @@ struct ChosenDsi {
   float at(const cv::Point& pixel, int plane) const {
     return values[static_cast<std::size_t>((plane * size.height + pixel.y) * size.width + pixel.x)];
   }
-  /// Writes the whole ray of a pixel.
-  void setRay(const cv::Point& pixel, const std::function<double(int plane)>& value) {
+  /// Writes the column of a pixel.
+  void setColumn(const cv::Point& pixel, const std::function<double(int plane)>& value) {
     for (int plane = 0; plane < planes; ++plane) {
       at(pixel, plane) = static_cast<float>(value(plane));
     }
   }
 
-  /// Its peaks, found one by one, and the rays of all pixels that have any value.
+  /// Its peaks, found one by one, and the columns of all pixels that have any value.
   SweptDsi swept() const {
     constexpr int kWindowBeyondAllTiles = 1001;
     DsiPeaks peaks{cv::Mat1f::zeros(size), cv::Mat1i::zeros(size), cv::Mat1f(size, -1.0F),
@@ -52,7 +51,7 @@ struct ChosenDsi {
           if (at(pixel, plane) > at(pixel, peaks.plane(pixel))) peaks.plane(pixel) = plane;
         }
       }
-      volume.take(plane, of_plane);
+      volume.setPlane(plane, of_plane);
     }
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {
@@ -63,9 +62,9 @@ struct ChosenDsi {
         if (plane < planes - 1) peaks.after(pixel) = at(pixel, plane + 1);
       }
     }
-    std::vector<DsiRays::Tile> all = {
-        DsiRays::pick({{0, 0}, size}, peaks.confidence, volume, planes, kWindowBeyondAllTiles)};
-    return {std::move(peaks), DsiRays(size, planes, std::move(all))};
+    std::vector<DsiColumns::Tile> all = {DsiColumns::select({{0, 0}, size}, peaks.confidence,
+                                                            volume, planes, kWindowBeyondAllTiles)};
+    return {std::move(peaks), DsiColumns(size, planes, std::move(all))};
   }
 };
 

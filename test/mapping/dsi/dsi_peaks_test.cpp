@@ -25,7 +25,7 @@ Planes randomPlanes(std::mt19937& random, int planes, std::size_t pixels) {
   return values;
 }
 
-/// The peaks by looking at the whole of each ray.
+/// The peaks of whole columns.
 DsiPeaks peaksOf(const Planes& planes, const ReferenceView& view) {
   DsiPeaks peaks = unwrittenPeaks(view);
   const std::size_t last = planes.size() - 1;
@@ -55,29 +55,16 @@ class RunningPeaksOn : public ::testing::TestWithParam<VotingKernel> {};
 INSTANTIATE_TEST_SUITE_P(Kernels, RunningPeaksOn, ::testing::ValuesIn(availableKernels()),
                          [](const auto& test) { return std::string(nameOf(test.param)); });
 
-TEST_P(RunningPeaksOn, AreTheFirstLargestValueOfEachRayAndItsNeighbours) {
+TEST_P(RunningPeaksOn, AreTheFirstLargestValueOfEachPixelAndItsNeighbours) {
   std::mt19937 random(1);
   for (int width = 1; width <= 70; ++width) {
     const ReferenceView view = viewOf(width, 1);
     const Planes planes = randomPlanes(random, 12, view.pixels());
     RunningPeaks peaks(view.pixels(), GetParam());
-    for (std::size_t p = 0; p < planes.size(); ++p) peaks.take(static_cast<int>(p), planes[p]);
-    EXPECT_TRUE(test::same(peaks.images(view), peaksOf(planes, view))) << width << " pixels";
-  }
-}
-
-TEST_P(RunningPeaksOn, GroupsThatFollowEachOtherJoinToTheWhole) {
-  std::mt19937 random(2);
-  const ReferenceView view = viewOf(53, 1);
-  const Planes planes = randomPlanes(random, 12, view.pixels());
-  for (std::size_t split = 1; split < planes.size(); ++split) {
-    RunningPeaks near(view.pixels(), GetParam());
-    RunningPeaks far(view.pixels(), GetParam());
-    for (std::size_t p = 0; p < planes.size(); ++p) {
-      (p < split ? near : far).take(static_cast<int>(p), planes[p]);
-    }
-    near.append(far);
-    EXPECT_TRUE(test::same(near.images(view), peaksOf(planes, view))) << split;
+    for (std::size_t p = 0; p < planes.size(); ++p) peaks.add(static_cast<int>(p), planes[p]);
+    DsiPeaks images = unwrittenPeaks(view);
+    peaks.writeTo(images, {0, 0, width, 1});
+    EXPECT_TRUE(test::same(images, peaksOf(planes, view))) << width << " pixels";
   }
 }
 
@@ -97,7 +84,7 @@ TEST_P(RunningPeaksOn, TilesFillTheView) {
           const auto begin = planes[p].begin() + row * view.width + tile.x;
           values.insert(values.end(), begin, begin + tile.width);
         }
-        peaks.take(static_cast<int>(p), values);
+        peaks.add(static_cast<int>(p), values);
       }
       peaks.writeTo(images, tile);
     }
@@ -113,9 +100,8 @@ TEST_P(RunningPeaksOn, TheKernelTouchesNoPixelsButItsOwn) {
     std::vector<std::int32_t> plane(n + kAround, 0);
     const std::vector<float> values(n + kAround, 2.0F);
     kernels::peakFunctions(GetParam())
-        .take(
-            {floats[0].data(), plane.data(), floats[1].data(), floats[2].data(), floats[3].data()},
-            1, values.data(), n);
+        .add({floats[0].data(), plane.data(), floats[1].data(), floats[2].data(), floats[3].data()},
+             1, values.data(), n);
     for (std::size_t i = 0; i < n + kAround; ++i) {
       const bool own = i < n;
       ASSERT_EQ(plane[i], own ? 1 : 0) << n;

@@ -19,7 +19,7 @@ struct Votes {
 /// One ray at (x, y) on a plane of 4 x 3 pixels.
 Votes voteAt(float x, float y) {
   Votes result{std::vector<float>(12, 0.0F), 0};
-  result.cast = votePlain({&x, &y}, {0, 1, 1, 0, 0}, {result.plane.data(), 4, 3});
+  result.cast = voteBilinear({&x, &y}, {0, 1, 1, 0, 0}, {result.plane.data(), 4, 3});
   return result;
 }
 
@@ -62,7 +62,7 @@ TEST(VotePlain, TheTransferScalesThenShiftsTheRaysOfItsRangeAlone) {
   const std::vector<float> x = {9, 1, 2, 9};
   const std::vector<float> y = {9, 1, 1, 9};
   std::vector<float> plane(12, 0.0F);
-  EXPECT_EQ(votePlain({x.data(), y.data()}, {1, 3, 0.5F, 0.5F, 0.5F}, {plane.data(), 4, 3}), 2U);
+  EXPECT_EQ(voteBilinear({x.data(), y.data()}, {1, 3, 0.5F, 0.5F, 0.5F}, {plane.data(), 4, 3}), 2U);
   EXPECT_EQ(plane[1 * 4 + 1], 1.5F);  // (1, 1) and half of (1.5, 1)
   EXPECT_EQ(plane[1 * 4 + 2], 0.5F);
 }
@@ -70,7 +70,7 @@ TEST(VotePlain, TheTransferScalesThenShiftsTheRaysOfItsRangeAlone) {
 TEST(VotePlain, ThousandsOfVotesInOneVoxelStayExact) {
   const std::vector<float> x(100'000, 1.0F);
   std::vector<float> plane(12, 0.0F);
-  votePlain({x.data(), x.data()}, {0, x.size(), 1, 0, 0}, {plane.data(), 4, 3});
+  voteBilinear({x.data(), x.data()}, {0, x.size(), 1, 0, 0}, {plane.data(), 4, 3});
   EXPECT_EQ(plane[1 * 4 + 1], 100'000.0F);
 }
 

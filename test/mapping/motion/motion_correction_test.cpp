@@ -67,7 +67,7 @@ class PlaneCounter : public DsiSink {
  public:
   std::vector<int> times = std::vector<int>(60);
   double sum = 0;
-  void takePlane(int plane, const float* values) override {
+  void addPlane(int plane, const float* values) override {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++times.at(static_cast<std::size_t>(plane));
     sum += values[MovingEdges::kWidth * MovingEdges::kHeight / 2];

@@ -12,21 +12,21 @@ namespace {
 
 using test::RandomScene;
 
-constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
-constexpr double kNear_m = 0.5;
-constexpr double kFar_m = 5.0;
+constexpr std::int64_t kGridStart_ns = 1'700'000'000'000'000'000;
+constexpr double kNearPlane_m = 0.5;
+constexpr double kFarPlane_m = 5.0;
 
 TEST(VoteGrid, VotesAreWhereTheRaysOfTheSensorMeetThePlanes) {
   const CameraModel model = test::smallCamera();
   const UndistortionTable undistortion(model);
   const ReferenceView view = ReferenceView::of(model);
-  const VoteGrid grid(undistortion, view, kNear_m, kFar_m);
+  const VoteGrid grid(undistortion, view, kNearPlane_m, kFarPlane_m);
   RandomScene random(1);
   for (int trial = 0; trial < 50; ++trial) {
     const Rigid3 T_ref_cam = random.pose(2, M_PI);
     const GridVotes votes = grid.votesFrom(T_ref_cam);
     for (std::size_t i = 0; i < GridVotes::kVotes; ++i) {
-      const double depth_m = i < GridVotes::kRays ? kNear_m : kFar_m;
+      const double depth_m = i < GridVotes::kRays ? kNearPlane_m : kFarPlane_m;
       const auto place = static_cast<int>(i % GridVotes::kRays);
       const int x = (place % 3) * (model.width - 1) / 2;
       const int y = (place / 3) * (model.height - 1) / 2;
@@ -52,7 +52,8 @@ GridVotes votesWithOneAt(double x, double y) {
 
 /// A stretch of 100 us in which one vote moves 10 px along x, a little faster towards the end.
 std::optional<VoteMotion> accelerated(const std::array<GridVotes, 3>& votes) {
-  return VoteMotion::between(kStart_ns, kStart_ns + 100'000, {&votes[0], &votes[1], &votes[2]});
+  return VoteMotion::between(kGridStart_ns, kGridStart_ns + 100'000,
+                             {&votes[0], &votes[1], &votes[2]});
 }
 
 TEST(VoteMotion, IsExactAlongAParabola) {
@@ -63,8 +64,9 @@ TEST(VoteMotion, IsExactAlongAParabola) {
   ASSERT_TRUE(motion.has_value());
   EXPECT_TRUE(motion->isEven());
   EXPECT_NEAR(motion->fromMiddle(), x(1) - x(0.5), 1e-12);
-  EXPECT_NEAR(motion->between(kStart_ns, kStart_ns + 100'000), 10, 1e-9);
-  EXPECT_NEAR(motion->between(kStart_ns + 20'000, kStart_ns + 30'000), x(0.3) - x(0.2), 1e-9);
+  EXPECT_NEAR(motion->between(kGridStart_ns, kGridStart_ns + 100'000), 10, 1e-9);
+  EXPECT_NEAR(motion->between(kGridStart_ns + 20'000, kGridStart_ns + 30'000), x(0.3) - x(0.2),
+              1e-9);
 }
 
 TEST(VoteMotion, IsNotEvenWhereTheSpeedChangesMuch) {

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "test/mapping/dsi/swept_dsi.h"
 #include "test/mapping/kernels/exact_votes.h"
 #include "test/mapping/kernels/fast_kernels.h"
+#include "test/mapping/sweep/sweep_case.h"
 
 namespace efm::test {
 
@@ -18,8 +18,8 @@ inline void expectThePlainSweep(const SweepCase& input, VotingKernel kernel) {
   // Of few votes some may all be rounded far: a shift of 1/4096 px in x and in y.
   constexpr double kFewVotes = 1000;
   constexpr double kMostPerVote = 4.0 / 4096 + 4.0 / 32'768;
-  const SweptDsi fast = sweep(input, kernel, 2);
-  const SweptDsi plain = sweep(input, VotingKernel::kPlain, 2);
+  const SweepOutput fast = sweep(input, kernel, 2);
+  const SweepOutput plain = sweep(input, VotingKernel::kPlain, 2);
   double at_border = 0;
   double float_shift_px = 0;
   double cast = 0;

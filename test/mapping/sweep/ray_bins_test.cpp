@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
-#include "mapping/sweep/tile_accumulator.h"
-#include "mapping/sweep/view_tiles.h"
+#include "mapping/sweep/tiled_sweep.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/rays/chosen_rays.h"
 #include "test/mapping/rays/random_rays.h"
@@ -18,19 +18,19 @@ namespace {
 
 using test::RandomRays;
 
-/// Where a ray is on the first and on the last plane of a group, exactly; NaN behind its camera.
+/// The exact pixels of a ray on the first and the last plane of a group; NaN behind its camera.
 struct RayPath {
   Eigen::Vector2d first;
   Eigen::Vector2d last;
 };
 
-/// A coordinate is rounded to 1/4096 px on the home plane, from where its error may double; and as
-/// floats of up to 8192 px in four steps.
+/// A coordinate is rounded to 1/4096 px on the anchor plane, from which its error may double; and
+/// as floats of up to 8192 px in four steps.
 constexpr double kRounding_px = 2.0 / 4096 + 4 * 0.5 / 1024;
 /// Rays this far from a tile need not be gathered; those farther must not be.
 constexpr double kNear_px = 0.05;
 
-Eigen::Vector2d placeOf(const RayBundle& rays, const RayPacket& packet, std::size_t ray,
+Eigen::Vector2d pixelOn(const RayBundle& rays, const RayPacket& packet, std::size_t ray,
                         const ReferenceView& view, double depth_m) {
   const PlaneTransfer to = transferToPlane(packet, view, depth_m);
   if (!to.in_front) return Eigen::Vector2d::Constant(std::nan(""));
@@ -43,8 +43,8 @@ std::vector<RayPath> pathsOf(const RayBundle& rays, const ReferenceView& view,
   std::vector<RayPath> paths;
   for (const RayPacket& packet : rays.packets) {
     for (std::size_t i = packet.begin; i < packet.end; ++i) {
-      paths.push_back({placeOf(rays, packet, i, view, group.first_depth_m),
-                       placeOf(rays, packet, i, view, group.last_depth_m)});
+      paths.push_back({pixelOn(rays, packet, i, view, group.first_depth_m),
+                       pixelOn(rays, packet, i, view, group.last_depth_m)});
     }
   }
   return paths;
@@ -53,18 +53,18 @@ std::vector<RayPath> pathsOf(const RayBundle& rays, const ReferenceView& view,
 /// Whether the straight path comes within a margin of the box around the cells: negative for those
 /// that certainly are inside on some plane. Along each axis by itself, as rays are gathered.
 bool passes(const RayPath& path, const cv::Rect& cells, double margin) {
-  const Eigen::Vector2d least = path.first.cwiseMin(path.last);
-  const Eigen::Vector2d most = path.first.cwiseMax(path.last);
-  return most.x() >= cells.x - margin && least.x() < cells.br().x + margin &&
-         most.y() >= cells.y - margin && least.y() < cells.br().y + margin;
+  const Eigen::Vector2d min = path.first.cwiseMin(path.last);
+  const Eigen::Vector2d max = path.first.cwiseMax(path.last);
+  return max.x() >= cells.x - margin && min.x() < cells.br().x + margin &&
+         max.y() >= cells.y - margin && min.y() < cells.br().y + margin;
 }
 
-/// Whether the ray is inside the cells at one of a hundred places between the two planes.
+/// Whether the ray is inside the cells at one of a hundred positions between the two planes.
 bool votesIn(const RayPath& path, const cv::Rect& cells) {
   for (int step = 0; step <= 100; ++step) {
-    const Eigen::Vector2d place = path.first + step * 0.01 * (path.last - path.first);
-    if (place.x() >= cells.x && place.x() < cells.br().x && place.y() >= cells.y &&
-        place.y() < cells.br().y) {
+    const Eigen::Vector2d pixel = path.first + step * 0.01 * (path.last - path.first);
+    if (pixel.x() >= cells.x && pixel.x() < cells.br().x && pixel.y() >= cells.y &&
+        pixel.y() < cells.br().y) {
       return true;
     }
   }
@@ -73,23 +73,23 @@ bool votesIn(const RayPath& path, const cv::Rect& cells) {
 
 class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
  protected:
-  /// What a tile finds of a bundle, each ray as its path.
-  std::vector<RayPath> gather(const std::vector<RayBins>& all, const TileVoter& voter,
+  /// The rays of a bundle that a tile gathers, each as its path.
+  std::vector<RayPath> gather(const std::vector<RayBins>& all, const TileCells& tile,
                               const PlaneGroup& group, const DepthPlanes& planes) const {
     TileRays found;
     for (const RayBins& bins : all) {
-      bins.gather(bins.reachIn(group), voter.cells(), voter.origin(), functions_, found);
+      bins.gather(bins.footprintIn(group), tile, functions_, found);
     }
-    const double to_first = 1 / group.first_depth_m - RayBins::middleOf(planes);
-    const double to_last = 1 / group.last_depth_m - RayBins::middleOf(planes);
-    const Eigen::Vector2d origin(voter.origin().x, voter.origin().y);
+    const double to_first = 1 / group.first_depth_m - RayBins::middleAnchor(planes);
+    const double to_last = 1 / group.last_depth_m - RayBins::middleAnchor(planes);
+    const Eigen::Vector2d origin(tile.origin.x, tile.origin.y);
     std::vector<RayPath> paths;
-    const kernels::TileRays rays = found.view();
+    const kernels::MovingRays rays = found.view();
     for (std::size_t i = 0; i < rays.size; ++i) {
-      const Eigen::Vector2d home(rays.x[i], rays.y[i]);
+      const Eigen::Vector2d anchor(rays.x[i], rays.y[i]);
       const Eigen::Vector2d shift(rays.dx[i], rays.dy[i]);
-      paths.push_back({origin + (home + to_first * shift) / (1 << kernels::kFractionBits),
-                       origin + (home + to_last * shift) / (1 << kernels::kFractionBits)});
+      paths.push_back({origin + (anchor + to_first * shift) / (1 << kernels::kFractionBits),
+                       origin + (anchor + to_last * shift) / (1 << kernels::kFractionBits)});
     }
     return paths;
   }
@@ -97,20 +97,19 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
   /// Every ray that votes in some tile is found there, once, where it is; others are not.
   void expectEveryRayOnce(const RayBundle& rays, const ReferenceView& view,
                           const DepthPlanes& planes, int planes_per_group) const {
-    const std::vector<RayBins> all = RayBins::sort(rays, view, planes);
+    const std::vector<RayBins> all = RayBins::sort(rays, {view, planes});
     const bool on_all_planes =
         std::all_of(all.begin(), all.end(), [](const RayBins& bins) { return bins.onAllPlanes(); });
     if (!on_all_planes) planes_per_group = 1;
-    TileVoter voter(GetParam());
     for (int begin = 0; begin < planes.size(); begin += planes_per_group) {
       const int end = std::min(planes.size(), begin + planes_per_group);
       const PlaneGroup group{begin, end, planes.depth(begin), planes.depth(end - 1)};
       const std::vector<RayPath> paths = pathsOf(rays, view, group);
-      for (const cv::Rect& tile : tilesOf(view, TileVoter::kTilePixels)) {
-        voter.moveTo(tile, view);
+      for (const cv::Rect& tile : tilesOf(view, TileCells::kMaxPixels)) {
+        const TileCells cells(tile, view);
         SCOPED_TRACE(testing::Message() << "tile " << tile.x << ", " << tile.y << ", planes "
                                         << begin << " to " << end - 1);
-        expectMatch(paths, gather(all, voter, group, planes), voter.cells());
+        expectMatch(paths, gather(all, cells, group, planes), cells.in_view);
       }
     }
   }
@@ -201,20 +200,19 @@ TEST_P(RayBinsOn, ATileFindsEachRayThatItSeesOnceWhereRaysMoveFartherThanBinsRea
   expectEveryRayOnce(rays, kView, planes, 1);
 }
 
-TEST(RayBins, NoRayInTheViewMovesFasterThanTheFastestShift) {
+TEST(RayBins, NoRayInTheViewMovesFasterThanTheMaxShift) {
   const DepthPlanes planes({0.5, 5, 10, PlaneSpacing::kInverse});
   RandomRays random(6);
   for (int i = 0; i < 50; ++i) {
     const RayPacket source{
         0, 0, {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 0.4)}, true};
     const RayBundle rays = raysFrom({source}, planes, random);
-    for (const RayBins& bins : RayBins::sort(rays, kView, planes)) {
+    for (const RayBins& bins : RayBins::sort(rays, {kView, planes})) {
       ASSERT_TRUE(bins.onAllPlanes());
       const double range = 1 / planes.depth(0) - 1 / planes.depth(9);
       for (const RayPath& path : pathsOf(rays, kView, {0, 10, planes.depth(0), planes.depth(9)})) {
         if (!votesIn(path, {0, 0, kView.width, kView.height})) continue;
-        ASSERT_LE((path.first - path.last).cwiseAbs().maxCoeff(),
-                  bins.fastestShift() * range + 1e-3);
+        ASSERT_LE((path.first - path.last).cwiseAbs().maxCoeff(), bins.maxShift() * range + 1e-3);
       }
     }
   }
@@ -224,8 +222,39 @@ TEST(RayBins, RaysThatAreOnNoPlaneOrOutsideOnAllAreLeftOut) {
   const DepthPlanes planes({0.5, 5, 10, PlaneSpacing::kInverse});
   RayBundle behind;
   test::appendPacket({{0, 0, 6}, true, 7}, kView, {{70, 50}}, behind);
-  EXPECT_TRUE(RayBins::sort(behind, kView, planes).empty());
-  EXPECT_TRUE(RayBins::sort(RayBundle(), kView, planes).empty());
+  EXPECT_TRUE(RayBins::sort(behind, {kView, planes}).empty());
+  EXPECT_TRUE(RayBins::sort(RayBundle(), {kView, planes}).empty());
+}
+
+TEST(TileRays, GrowingKeepsRaysAndPaddingIsNotCountedAndLiesOutsideEveryTile) {
+  TileRays rays;
+  std::size_t size = 0;
+  for (const std::size_t more : {1U, 7U, 0U, 500U, 3U, 20'000U}) {
+    rays.reserve(more);
+    for (std::size_t i = 0; i < more; ++i, ++size) {
+      const auto value = static_cast<float>(size);
+      rays.add(value, value + 0.25F);
+      rays.view().dx[size] = value + 0.5F;
+      rays.view().dy[size] = value + 0.75F;
+    }
+    rays.pad();
+    ASSERT_EQ(rays.size(), size);
+    const kernels::MovingRays view = rays.view();
+    for (std::size_t i = 0; i < size; ++i) {
+      const auto value = static_cast<float>(i);
+      ASSERT_EQ(view.x[i], value);
+      ASSERT_EQ(view.y[i], value + 0.25F);
+      ASSERT_EQ(view.dx[i], value + 0.5F);
+      ASSERT_EQ(view.dy[i], value + 0.75F);
+    }
+    for (std::size_t i = size; i < size + kernels::kRayPadding; ++i) {
+      ASSERT_TRUE(view.x[i] < 0 && view.y[i] < 0 && view.dx[i] == 0 && view.dy[i] == 0);
+    }
+    // Where a vector of any instruction set may begin.
+    for (const float* values : {view.x, view.y, view.dx, view.dy}) {
+      ASSERT_EQ(reinterpret_cast<std::uintptr_t>(values) % 64, 0U);
+    }
+  }
 }
 
 }  // namespace

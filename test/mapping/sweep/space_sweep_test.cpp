@@ -1,163 +1,386 @@
 // SPDX-License-Identifier: BSD-3-Clause
+// From events to the DSI against the oracle, and the results beside the DSI.
 #include "mapping/sweep/space_sweep.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <tbb/global_control.h>
 
-#include <cmath>
+#include <algorithm>
 #include <opencv2/core.hpp>
+#include <vector>
 
+#include "mapping/events/event_groups.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/depth/same_image.h"
-#include "test/mapping/dsi/kept_dsi.h"
+#include "test/mapping/dsi/whole_dsi.h"
 #include "test/mapping/kernels/fast_kernels.h"
-#include "test/mapping/keyframes/random_scene.h"
+#include "test/mapping/keyframes/random_recording.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {
 namespace {
 
-using test::KeptDsi;
-using test::RandomScene;
+using test::errorOverMass;
 using test::same;
+using test::WholeDsi;
+using Recording = test::RandomRecording;
 
-constexpr std::int64_t kStart_ns = 0;
+constexpr Window kWindow = Recording::kWindow;
 
-/// Cameras around the origin that see random events.
-struct Input {
-  ReferenceView view = ReferenceView::of(test::smallCamera());
-  DepthPlanes planes;
-  std::vector<RayBundle> rays;
-  std::vector<oracle::Dsi> densities;  // the oracle's, in the same poses
-  std::vector<VoteCounts> counts;
-};
-
-Input makeInput(std::uint32_t seed, int cameras, int planes, std::size_t events_per_camera) {
-  RandomScene random(seed);
-  Input input;
-  input.planes = DepthPlanes({0.4, 4.0, planes, PlaneSpacing::kInverse});
-  const Trajectory trajectory = random.motion(kStart_ns, 0.1, 3.0, 4.0);
-  for (int c = 0; c < cameras; ++c) {
-    const RigCamera camera{test::smallCamera(), random.pose(0.2, 0.3), 0};
-    const UndistortionTable undistortion(camera.model);
-    const auto events = random.events(camera.model, events_per_camera, kStart_ns, 100'000'000);
-    const PacketGeometry geometry{{}, input.view, 0.4, 4.0};
-    const PosePackets packets =
-        splitIntoPosePackets(events, camera, undistortion, trajectory, geometry, {0.02});
-    input.rays.push_back(backProject(events, packets, undistortion, input.view));
-    VoteCounts counts;
-    input.densities.push_back(oracle::rayDensity(oracle::poseByPacket(events, packets),
-                                                 undistortion, input.view, input.planes, &counts));
-    input.counts.push_back(counts);
-  }
-  return input;
+/// Every event with a pose of its own, so that only rounding differs.
+KeyframeMapperOptions exactOptions(const SplitFusionOptions& split, int subintervals) {
+  KeyframeMapperOptions options;
+  options.split = split;
+  options.extraction.extraction = ExtractionMethod::kPaper;  // only the DSI matters
+  options.planes = {0.5, 4.0, 2, PlaneSpacing::kInverse};
+  options.view.width = 24;  // a quarter of the pixels, so that each has votes in every group
+  options.packets.packet_error_px = 0;
+  options.subintervals.count = subintervals;
+  options.sweep.threads = 1;
+  return options;
 }
 
-class SpaceSweepOn : public ::testing::TestWithParam<VotingKernel> {
- protected:
-  static SweepResult sweep(const Input& input, FusionRule rule, int threads,
-                           DsiSink* sink = nullptr) {
-    SpaceSweepOptions options;
-    options.fusion.across_cameras = rule;
-    options.threads = threads;
-    options.kernel = GetParam();
-    std::vector<CameraRays> rays;
-    for (const RayBundle& camera : input.rays) rays.push_back({camera});
-    return SpaceSweep(options).run(rays, input.view, input.planes, {false, sink});
+std::vector<float> dsiOf(const Recording& recording, const KeyframeMapperOptions& options,
+                         const Window& window = kWindow) {
+  KeyframeMapper mapper(recording.rig, recording.cameras(), options);
+  WholeDsi dsi(mapper.planes(), mapper.view());
+  EXPECT_TRUE(mapper.map(window, recording.spans(), recording.trajectory, &dsi));
+  return dsi.values;
+}
+
+/// The oracle's ray densities, [camera][sub-interval of the window][polarity]. Without a split by
+/// polarity all events have polarity 0.
+using Parts = std::vector<std::vector<std::vector<oracle::Dsi>>>;
+
+Parts exactParts(const Recording& recording, const KeyframeMapperOptions& options) {
+  const KeyframeMapper mapper(recording.rig, recording.cameras(), options);
+  const Rigid3 T_world_ref = mapper.referencePose(*recording.trajectory.poseAt(kWindow.t_ref_ns));
+  const int count = options.subintervals.count * options.split.time_slices;
+  Parts parts;
+  for (std::size_t c = 0; c < recording.events.size(); ++c) {
+    const RigCamera& camera = recording.rig.cameras[c];
+    const UndistortionTable undistortion(camera.model);
+    auto& of_camera = parts.emplace_back();
+    for (const auto& events : oracle::splitEvents(recording.events[c], kWindow.t0_ns, kWindow.t1_ns,
+                                                  count, options.subintervals.split)) {
+      std::vector<std::vector<Event>> by_polarity(options.split.polarity ? 2 : 1);
+      for (const Event& event : events) {
+        by_polarity[options.split.polarity && event.polarity ? 1 : 0].push_back(event);
+      }
+      auto& of_part = of_camera.emplace_back();
+      for (const auto& group : by_polarity) {
+        of_part.push_back(
+            oracle::rayDensity(oracle::poseEach(group, camera, recording.trajectory, T_world_ref),
+                               undistortion, mapper.view(), mapper.planes()));
+      }
+    }
   }
-};
+  return parts;
+}
+
+/// The sum over slices and polarities of the fused cameras and sub-intervals. Of a single camera:
+/// the sum over polarities of the fused slices and sub-intervals.
+oracle::Dsi exactDsi(const Parts& parts, const KeyframeMapperOptions& options) {
+  const auto subintervals = static_cast<std::size_t>(options.subintervals.count);
+  const std::size_t slices = parts[0].size() / subintervals;
+  const auto slots = assignSubintervals(static_cast<int>(parts.size()), options.subintervals);
+  const auto input = [&](std::size_t camera, std::size_t slice, std::size_t polarity) {
+    std::vector<oracle::Dsi> by_slot;
+    for (const int part : slots[camera]) {
+      by_slot.push_back(
+          parts[camera][slice * subintervals + static_cast<std::size_t>(part)][polarity]);
+    }
+    return by_slot;
+  };
+  oracle::Dsi sum = parts[0][0][0];
+  std::fill(sum.values.begin(), sum.values.end(), 0.0);
+  const auto addFused = [&](const std::vector<std::vector<oracle::Dsi>>& inputs) {
+    const oracle::Dsi fused = oracle::fuse(options.sweep.fusion, inputs);
+    for (std::size_t i = 0; i < sum.values.size(); ++i) sum.values[i] += fused.values[i];
+  };
+  for (std::size_t polarity = 0; polarity < parts[0][0].size(); ++polarity) {
+    std::vector<std::vector<oracle::Dsi>> inputs;
+    for (std::size_t slice = 0; slice < slices; ++slice) {
+      for (std::size_t c = 0; c < parts.size(); ++c) inputs.push_back(input(c, slice, polarity));
+      if (parts.size() == 1 && slice + 1 < slices) continue;
+      addFused(inputs);
+      inputs.clear();
+    }
+  }
+  return sum;
+}
+
+class SpaceSweepOn : public ::testing::TestWithParam<VotingKernel> {};
 
 INSTANTIATE_TEST_SUITE_P(Kernels, SpaceSweepOn, ::testing::ValuesIn(availableKernels()),
                          test::nameOfKernel);
 
-TEST_P(SpaceSweepOn, TheDsiIsTheOraclesForEveryRuleAndOneToThreeCameras) {
+TEST_P(SpaceSweepOn, FromEventsTheDsiIsTheOraclesForAllRulesOrdersAndSplits) {
+  const struct {
+    SplitFusionOptions split;
+    int subintervals;
+    std::vector<FusionRule> across_time;
+  } cases[] = {{SplitFusionOptions::none(), 1, {FusionRule::kArithmetic}},
+               {SplitFusionOptions::none(), 3, allFusionRules()},
+               {{true, 2}, 1, {FusionRule::kRms}},
+               {{true, 2}, 2, {FusionRule::kRms}},
+               {{false, 3}, 2, {FusionRule::kRms}},
+               {{true, 1}, 2, {FusionRule::kRms}}};
   for (int cameras = 1; cameras <= 3; ++cameras) {
-    const Input input = makeInput(7, cameras, 11, 4000);
-    for (const FusionRule rule : allFusionRules()) {
-      KeptDsi dsi(input.planes, input.view);
-      sweep(input, rule, 2, &dsi);
-      EXPECT_EQ(dsi.planesSeen(), 11U);
-      const oracle::Dsi exact = oracle::fuse(rule, input.densities);
-      EXPECT_LE(test::errorOverMass(dsi.values, exact), test::errorOverMassOf(GetParam()))
-          << nameOf(rule) << " of " << cameras;
-    }
-  }
-}
-
-TEST_P(SpaceSweepOn, VotesAreCountedAsTheOracleCountsThem) {
-  const Input input = makeInput(8, 2, 9, 3000);
-  const SweepResult result = sweep(input, FusionRule::kHarmonic, 2);
-  ASSERT_EQ(result.votes.size(), 2U);
-  for (std::size_t c = 0; c < 2; ++c) {
-    EXPECT_EQ(result.votes[c].total(), input.rays[c].size() * 9);
-    EXPECT_EQ(result.votes[c].behind_camera, input.counts[c].behind_camera);
-    // A vote within 1/4096 px of the border may fall on either side of it: of 27,000 votes over
-    // 48 x 36 px, some 27,000 * 2 * (1/48 + 1/36) / 4096 = 0.6.
-    EXPECT_NEAR(static_cast<double>(result.votes[c].cast),
-                static_cast<double>(input.counts[c].cast), 3);
-  }
-}
-
-TEST_P(SpaceSweepOn, ThePeakAndItsNeighboursAreThoseOfTheVolume) {
-  for (const int planes : {1, 2, 3, 17}) {
-    for (const int threads : {1, 2, 5}) {
-      const Input input = makeInput(9, 2, planes, 3000);
-      KeptDsi dsi(input.planes, input.view);
-      const DsiPeaks peaks = sweep(input, FusionRule::kArithmetic, threads, &dsi).fused.peaks;
-      const auto value = [&](int plane, int x, int y) {
-        if (plane < 0 || plane >= planes) return -1.0F;
-        return dsi
-            .values[(static_cast<std::size_t>(plane) * 36 + static_cast<std::size_t>(y)) * 48 +
-                    static_cast<std::size_t>(x)];
-      };
-      for (int y = 0; y < 36; ++y) {
-        for (int x = 0; x < 48; ++x) {
-          int best = 0;
-          for (int plane = 1; plane < planes; ++plane) {
-            if (value(plane, x, y) > value(best, x, y)) best = plane;
+    const Recording recording(40 + static_cast<std::uint32_t>(cameras), cameras, 4000);
+    for (const auto& c : cases) {
+      KeyframeMapperOptions options = exactOptions(c.split, c.subintervals);
+      options.sweep.kernel = GetParam();
+      const Parts parts = exactParts(recording, options);
+      for (const FusionRule across_cameras : allFusionRules()) {
+        for (const FusionRule across_time : c.across_time) {
+          for (const auto order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
+            options.sweep.fusion = {across_cameras, across_time, order};
+            EXPECT_LE(errorOverMass(dsiOf(recording, options), exactDsi(parts, options)),
+                      test::errorOverMassOf(GetParam()))
+                << cameras << " cameras " << nameOf(across_cameras) << ", " << nameOf(across_time)
+                << ", " << nameOf(order) << ", polarities " << c.split.polarities() << ", slices "
+                << c.split.time_slices << " of " << c.subintervals;
           }
-          ASSERT_EQ(peaks.plane(y, x), best) << x << ", " << y << " of " << planes;
-          ASSERT_EQ(peaks.confidence(y, x), value(best, x, y));
-          ASSERT_EQ(peaks.before(y, x), value(best - 1, x, y));
-          ASSERT_EQ(peaks.after(y, x), value(best + 1, x, y));
         }
       }
     }
   }
 }
 
-TEST_P(SpaceSweepOn, TheNumberOfThreadsNeverChangesTheResult) {
-  const Input input = makeInput(10, 3, 50, 3000);
-  for (const FusionRule rule : allFusionRules()) {
-    const SweepResult one = sweep(input, rule, 1);
-    for (const int threads : {2, 3, 16, 64}) {
-      const SweepResult many = sweep(input, rule, threads);
-      EXPECT_TRUE(same(one.fused.peaks.confidence, many.fused.peaks.confidence)) << threads;
-      EXPECT_TRUE(same(one.fused.peaks.plane, many.fused.peaks.plane)) << threads;
-      EXPECT_TRUE(same(one.fused.peaks.before, many.fused.peaks.before)) << threads;
-      EXPECT_TRUE(same(one.fused.peaks.after, many.fused.peaks.after)) << threads;
+TEST_P(SpaceSweepOn, EveryShuffleAndCountOfSubintervalsIsTheOracles) {
+  const Recording recording(51, 3, 8000);
+  for (const SplitFusionOptions& split : {SplitFusionOptions::none(), {true, 2}}) {
+    for (const auto by : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
+      KeyframeMapperOptions options = exactOptions(split, 4);
+      options.sweep.kernel = GetParam();
+      options.subintervals.split = by;
+      const Parts parts = exactParts(recording, options);
+      std::vector<std::vector<float>> dsis;
+      for (const auto shuffle :
+           {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
+        options.subintervals.shuffle = shuffle;
+        dsis.push_back(dsiOf(recording, options));
+        EXPECT_LE(errorOverMass(dsis.back(), exactDsi(parts, options)),
+                  test::errorOverMassOf(GetParam()))
+            << nameOf(by) << ", " << nameOf(shuffle);
+      }
+      EXPECT_NE(dsis[0], dsis[1]) << "a shift lets other sub-intervals meet";
     }
   }
 }
 
-TEST_P(SpaceSweepOn, WithoutEventsEveryPeakIsZeroAtTheNearestPlane) {
-  Input input = makeInput(11, 2, 5, 100);
-  input.rays = {RayBundle(), RayBundle()};
-  const DsiPeaks peaks = sweep(input, FusionRule::kHarmonic, 2).fused.peaks;
-  EXPECT_EQ(cv::countNonZero(peaks.confidence), 0);
-  EXPECT_EQ(cv::countNonZero(peaks.plane), 0);
+/// The events of one polarity in a slice of time.
+Recording partOf(Recording recording, const Window& slice, bool polarity) {
+  for (auto& events : recording.events) {
+    events.erase(std::remove_if(events.begin(), events.end(),
+                                [&](const Event& event) {
+                                  return event.polarity != polarity || event.t_ns < slice.t0_ns ||
+                                         event.t_ns >= slice.t1_ns;
+                                }),
+                 events.end());
+  }
+  return recording;
 }
 
-TEST_P(SpaceSweepOn, ASilentCameraSilencesTheAndLikeRules) {
-  Input input = makeInput(12, 2, 5, 1000);
-  input.rays[1] = RayBundle();
-  EXPECT_EQ(cv::countNonZero(sweep(input, FusionRule::kHarmonic, 1).fused.peaks.confidence), 0);
-  EXPECT_GT(cv::countNonZero(sweep(input, FusionRule::kArithmetic, 1).fused.peaks.confidence), 0);
+TEST(SpaceSweep, TheDsiIsTheSumOfThoseOfItsGroupsMappedAlone) {
+  const Recording recording(52, 2, 4000);
+  const std::int64_t middle_ns = kWindow.t0_ns + Recording::kDuration_ns / 2;
+  KeyframeMapperOptions options = exactOptions({true, 2}, 2);
+  options.sweep.kernel = VotingKernel::kPlain;  // which casts each vote by itself
+  const std::vector<float> split = dsiOf(recording, options);
+  options.split = SplitFusionOptions::none();
+  std::vector<float> sum(split.size());
+  for (const Window& slice : {Window{kWindow.t0_ns, middle_ns, kWindow.t_ref_ns},
+                              Window{middle_ns, kWindow.t1_ns, kWindow.t_ref_ns}}) {
+    for (const bool polarity : {false, true}) {
+      const std::vector<float> alone = dsiOf(partOf(recording, slice, polarity), options, slice);
+      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += alone[i];
+    }
+  }
+  EXPECT_GT(*std::max_element(sum.begin(), sum.end()), 0);
+  EXPECT_EQ(split, sum);
+}
+
+TEST(SpaceSweep, ArithmeticAcrossTimeThenHarmonicAcrossCamerasIsAlgorithmOne) {
+  const Recording recording(32, 2, 5000);
+  KeyframeMapperOptions options = exactOptions(SplitFusionOptions::none(), 1);
+  options.sweep.kernel = VotingKernel::kPlain;  // which rounds the votes alike in both
+  const std::vector<float> whole = dsiOf(recording, options);
+  for (const int count : {2, 3, 8}) {
+    options.subintervals.count = count;
+    options.sweep.fusion = {FusionRule::kHarmonic, FusionRule::kArithmetic,
+                            FusionOrder::kTimeThenCameras};
+    const std::vector<float> parts = dsiOf(recording, options);
+    ASSERT_EQ(parts.size(), whole.size());
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      // Means, not sums: 1/N_s of it. Votes of some 20 events per voxel, summed in another order.
+      ASSERT_NEAR(static_cast<double>(parts[i]) * count, whole[i], 1e-5 * whole[i] + 1e-9);
+    }
+  }
+}
+
+// ---------------------------------------------------------------- results beside the DSI
+
+/// Rays of all cameras and sub-intervals, as the keyframe mapper makes them, and the oracle's
+/// counts of their votes.
+struct SweepRays {
+  ReferenceView view = ReferenceView::of(test::smallCamera());
+  DepthPlanes planes;
+  std::vector<CameraRays> cameras;
+  std::vector<VoteCounts> counts;
+};
+
+SweepRays raysOf(const Recording& recording, int planes, int subinterval_count) {
+  SweepRays rays;
+  rays.planes = DepthPlanes({0.5, 4.0, planes, PlaneSpacing::kInverse});
+  SubintervalOptions subintervals;
+  subintervals.count = subinterval_count;
+  for (std::size_t c = 0; c < recording.events.size(); ++c) {
+    const RigCamera& camera = recording.rig.cameras[c];
+    const UndistortionTable undistortion(camera.model);
+    const PacketGeometry geometry{{}, rays.view, 0.5, 4.0};
+    auto& of_camera = rays.cameras.emplace_back();
+    VoteCounts& counts = rays.counts.emplace_back();
+    for (const EventSpan part : splitIntoSubintervals(EventSpan(recording.events[c]), kWindow.t0_ns,
+                                                      kWindow.t1_ns, subintervals)) {
+      const PosePackets packets =
+          splitIntoPosePackets(part, camera, undistortion, recording.trajectory, geometry, {0.02});
+      of_camera.push_back(backProject(part, packets, undistortion, rays.view));
+      VoteCounts of_part;
+      oracle::rayDensity(
+          oracle::poseByPacket(std::vector<Event>(part.begin(), part.end()), packets), undistortion,
+          rays.view, rays.planes, &of_part);
+      counts += of_part;
+    }
+  }
+  return rays;
+}
+
+SweepResult sweepRays(const SweepRays& rays, const SpaceSweepOptions& options,
+                      const SweepRequest& request = {}) {
+  return sweepSpace(rays.cameras, {rays.view, rays.planes}, options, request);
+}
+
+TEST_P(SpaceSweepOn, VotesAreCountedAsTheOracleCountsThem) {
+  const SweepRays rays = raysOf(Recording(8, 2, 3000), 9, 1);
+  SpaceSweepOptions options;
+  options.kernel = GetParam();
+  const SweepResult result = sweepRays(rays, options);
+  ASSERT_EQ(result.votes.size(), 2U);
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(result.votes[c].total(), rays.cameras[c][0].size() * 9);
+    EXPECT_EQ(result.votes[c].behind_camera, rays.counts[c].behind_camera);
+    // A vote within 1/4096 px of the border may fall on either side of it: of 27,000 votes over
+    // 48 x 36 px, some 27,000 * 2 * (1/48 + 1/36) / 4096 = 0.6.
+    EXPECT_NEAR(static_cast<double>(result.votes[c].cast), static_cast<double>(rays.counts[c].cast),
+                3);
+  }
+}
+
+TEST_P(SpaceSweepOn, ThePeakAndItsNeighboursAreThoseOfTheDsi) {
+  for (const int planes : {1, 2, 3, 17}) {
+    const SweepRays rays = raysOf(Recording(9, 2, 3000), planes, 1);
+    SpaceSweepOptions options;
+    options.kernel = GetParam();
+    options.threads = 2;
+    WholeDsi dsi(rays.planes, rays.view);
+    const DsiPeaks peaks = sweepRays(rays, options, {false, &dsi}).fused.peaks;
+    ASSERT_TRUE(dsi.isComplete());
+    for (int y = 0; y < rays.view.height; ++y) {
+      for (int x = 0; x < rays.view.width; ++x) {
+        const auto value = [&](int plane) {
+          if (plane < 0 || plane >= planes) return -1.0F;
+          return dsi.values[static_cast<std::size_t>(
+              (plane * rays.view.height + y) * rays.view.width + x)];
+        };
+        int best = 0;
+        for (int plane = 1; plane < planes; ++plane) {
+          if (value(plane) > value(best)) best = plane;
+        }
+        ASSERT_EQ(peaks.plane(y, x), best) << x << ", " << y << " of " << planes;
+        ASSERT_EQ(peaks.confidence(y, x), value(best));
+        ASSERT_EQ(peaks.before(y, x), value(best - 1));
+        ASSERT_EQ(peaks.after(y, x), value(best + 1));
+      }
+    }
+  }
+}
+
+TEST_P(SpaceSweepOn, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
+  const tbb::global_control as_if_sixteen_cores(tbb::global_control::max_allowed_parallelism, 16);
+  const Recording recording(33, 3, 3000);
+  for (const int planes : {1, 2, 31, 40}) {
+    const SweepRays rays = raysOf(recording, planes, 4);
+    for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
+      SpaceSweepOptions options;
+      options.fusion.order = order;
+      options.kernel = GetParam();
+      options.threads = 1;
+      const SweepResult one = sweepRays(rays, options, {true});
+      ASSERT_EQ(one.cameras.size(), 3U);
+      for (const int threads : {2, 3, 16}) {
+        options.threads = threads;
+        EXPECT_EQ(options.threadsOrCores(), threads);
+        const SweepResult many = sweepRays(rays, options, {true});
+        EXPECT_TRUE(same(one.fused.peaks, many.fused.peaks)) << planes << " planes, " << threads;
+        for (std::size_t c = 0; c < 3; ++c) {
+          EXPECT_TRUE(same(one.cameras[c].peaks, many.cameras[c].peaks))
+              << "camera " << c << ", " << planes << " planes, " << threads << " threads";
+          EXPECT_EQ(one.votes[c].total(), many.votes[c].total());
+          EXPECT_EQ(one.votes[c].cast, many.votes[c].cast);
+        }
+      }
+    }
+  }
+}
+
+TEST(SpaceSweep, ACamerasPeaksAreThoseOfItsOwnSweep) {
+  const Recording recording(34, 3, 3000);
+  for (const int count : {1, 4}) {
+    const SweepRays rays = raysOf(recording, 20, count);
+    for (const FusionRule across_time : allFusionRules()) {
+      SpaceSweepOptions options;
+      options.fusion.across_time = across_time;
+      const SweepResult all = sweepRays(rays, options, {true});
+      for (std::size_t c = 0; c < rays.cameras.size(); ++c) {
+        SweepRays own = rays;
+        own.cameras = {rays.cameras[c]};
+        EXPECT_TRUE(same(all.cameras[c].peaks, sweepRays(own, options).fused.peaks))
+            << "camera " << c << ", " << count;
+      }
+    }
+  }
+}
+
+TEST_P(SpaceSweepOn, ASilentCameraOrSubintervalSilencesTheAndLikeRules) {
+  const auto votedPixels = [](const SweepRays& rays, const FusionOptions& fusion) {
+    SpaceSweepOptions options;
+    options.kernel = GetParam();
+    options.fusion = fusion;
+    const DsiPeaks peaks = sweepRays(rays, options).fused.peaks;
+    if (cv::countNonZero(peaks.confidence) == 0) {
+      EXPECT_EQ(cv::countNonZero(peaks.plane), 0) << "the nearest plane";
+    }
+    return cv::countNonZero(peaks.confidence);
+  };
+  const FusionRule h = FusionRule::kHarmonic;
+  const FusionRule a = FusionRule::kArithmetic;
+  SweepRays rays = raysOf(Recording(35, 2, 4000), 5, 2);
+  rays.cameras[1][0] = RayBundle();
+  EXPECT_EQ(votedPixels(rays, {h, h, FusionOrder::kCamerasThenTime}), 0);
+  EXPECT_EQ(votedPixels(rays, {h, h, FusionOrder::kTimeThenCameras}), 0);
+  EXPECT_GT(votedPixels(rays, {h, a, FusionOrder::kCamerasThenTime}), 0);
+  rays.cameras[1][1] = RayBundle();
+  EXPECT_EQ(votedPixels(rays, {h, a}), 0);
+  EXPECT_GT(votedPixels(rays, {a, a}), 0);
 }
 
 TEST(SpaceSweep, ThreadsOutOfRangeAreNamed) {
   SpaceSweepOptions options;
   options.threads = 0;
-  EXPECT_THAT([&] { SpaceSweep sweep(options); },
+  EXPECT_THAT([&] { sweepSpace({{RayBundle()}}, DsiGrid(), options); },
               ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr("threads = 0")));
 }
 

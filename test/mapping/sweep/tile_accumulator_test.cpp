@@ -10,57 +10,41 @@
 #include <vector>
 
 #include "mapping/kernels/bilinear_vote.h"
-#include "mapping/sweep/view_tiles.h"
+#include "mapping/sweep/tiled_sweep.h"
 #include "test/mapping/kernels/fast_kernels.h"
+#include "test/mapping/sweep/rays_at.h"
 
 namespace efm {
 namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-constexpr float kUnit = 1 << kernels::kFractionBits;
 constexpr double kLastFraction = 4095.0 / 4096;
-
-/// Three tiles by three, the last of which ends at the view's border.
-const ReferenceView kView{150, 130, 100, 100, 75, 65};
 
 struct TileVotes {
   std::vector<float> density;
   std::uint64_t votes = 0;
 };
 
-/// Where rays meet a plane, for a tile to vote there.
-TileRays raysAt(const Points& points, const cv::Point& origin) {
-  TileRays rays;
-  rays.reserve(points.size());
-  const kernels::TileRays to = rays.view();
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    to.x[i] = static_cast<float>(points[i].x() - origin.x) * kUnit;
-    to.y[i] = static_cast<float>(points[i].y() - origin.y) * kUnit;
-    to.dx[i] = to.dy[i] = 0;
-  }
-  rays.resize(points.size());
-  rays.pad();
-  return rays;
-}
-
-TileVotes voteWith(TileVoter& voter, const cv::Rect& tile, const Points& points) {
-  voter.moveTo(tile, kView);
-  TileRays rays = raysAt(points, voter.origin());
+TileVotes voteWith(TileAccumulator& accumulator, const cv::Rect& tile, const Points& points) {
+  const TileCells cells(tile, test::kTiledView);
+  accumulator.moveTo(cells);
+  TileRays rays = test::raysAt(points, cells.origin);
   TileVotes result{std::vector<float>(static_cast<std::size_t>(tile.area()), -1.0F), 0};
-  result.votes = voter.vote(rays, 0, result.density.data());
+  accumulator.vote(rays, 0);
+  result.votes = accumulator.resolve(result.density.data());
   return result;
 }
 
 /// The whole view, tile by tile.
 TileVotes voteOnView(VotingKernel kernel, const Points& points) {
-  TileVoter voter(kernel);
-  TileVotes all{std::vector<float>(kView.pixels(), -1.0F), 0};
-  for (const cv::Rect& tile : tilesOf(kView, TileVoter::kTilePixels)) {
-    const TileVotes part = voteWith(voter, tile, points);
+  TileAccumulator accumulator(kernel);
+  TileVotes all{std::vector<float>(test::kTiledView.pixels(), -1.0F), 0};
+  for (const cv::Rect& tile : tilesOf(test::kTiledView, TileCells::kMaxPixels)) {
+    const TileVotes part = voteWith(accumulator, tile, points);
     for (int y = 0; y < tile.height; ++y) {
       std::copy_n(part.density.begin() + y * tile.width, tile.width,
-                  all.density.begin() + (tile.y + y) * kView.width + tile.x);
+                  all.density.begin() + (tile.y + y) * test::kTiledView.width + tile.x);
     }
     all.votes += part.votes;
   }
@@ -68,18 +52,19 @@ TileVotes voteOnView(VotingKernel kernel, const Points& points) {
 }
 
 /// The plain kernel's votes one by one, summed in doubles: many equal floats add up to another sum.
-struct ExactVotes {
+struct VotesOneByOne {
   std::vector<double> density;
   std::uint64_t votes = 0;
 };
 
-ExactVotes votePlainly(const Points& points) {
-  ExactVotes all{std::vector<double>(kView.pixels(), 0.0), 0};
-  std::vector<float> plane(kView.pixels(), 0.0F);
+VotesOneByOne voteOneByOne(const Points& points) {
+  VotesOneByOne all{std::vector<double>(test::kTiledView.pixels(), 0.0), 0};
+  std::vector<float> plane(test::kTiledView.pixels(), 0.0F);
   for (const Eigen::Vector2d& point : points) {
     const auto x = static_cast<float>(point.x());
     const auto y = static_cast<float>(point.y());
-    if (kernels::votePlain({&x, &y}, {0, 1, 1, 0, 0}, {plane.data(), kView.width, kView.height}) ==
+    if (kernels::voteBilinear({&x, &y}, {0, 1, 1, 0, 0},
+                              {plane.data(), test::kTiledView.width, test::kTiledView.height}) ==
         0) {
       continue;
     }
@@ -96,7 +81,7 @@ ExactVotes votePlainly(const Points& points) {
 /// @param per_vote how far a weight may be off.
 void expectPlainVotes(VotingKernel kernel, const Points& points, double per_vote) {
   const TileVotes fast = voteOnView(kernel, points);
-  const ExactVotes plain = votePlainly(points);
+  const VotesOneByOne plain = voteOneByOne(points);
   EXPECT_EQ(fast.votes, plain.votes);
   for (std::size_t i = 0; i < plain.density.size(); ++i) {
     // A vote's float weights, and sums of full cells: one rounding for each of 64 votes at most.
@@ -110,12 +95,12 @@ void expectPlainVotes(VotingKernel kernel, const Points& points, double per_vote
 /// The products of fractions are cut to this.
 constexpr double kProductUnit = 1.0 / (1 << kernels::kProductBits);
 
-class TileVoterOn : public ::testing::TestWithParam<VotingKernel> {};
+class TileAccumulatorOn : public ::testing::TestWithParam<VotingKernel> {};
 
-INSTANTIATE_TEST_SUITE_P(Kernels, TileVoterOn, ::testing::ValuesIn(test::fastKernels()),
+INSTANTIATE_TEST_SUITE_P(Kernels, TileAccumulatorOn, ::testing::ValuesIn(test::fastKernels()),
                          test::nameOfKernel);
 
-TEST_P(TileVoterOn, AVoteIsSharedBilinearlyAmongFourPixels) {
+TEST_P(TileAccumulatorOn, AVoteIsSharedBilinearlyAmongFourPixels) {
   const TileVotes votes = voteOnView(GetParam(), {{1.25, 0.5}});
   EXPECT_EQ(votes.votes, 1U);
   EXPECT_EQ(votes.density[1], 0.375F);
@@ -125,7 +110,7 @@ TEST_P(TileVoterOn, AVoteIsSharedBilinearlyAmongFourPixels) {
   EXPECT_EQ(std::accumulate(votes.density.begin(), votes.density.end(), 0.0F), 1.0F);
 }
 
-TEST_P(TileVoterOn, ThousandsOfVotesInOneVoxelAreThePlainKernelsAndAllCounted) {
+TEST_P(TileAccumulatorOn, ThousandsOfVotesInOneVoxelAreThePlainKernelsAndAllCounted) {
   // Tiles begin at columns 50 and 100, and at rows 43 and 86.
   for (const auto& corner : Points{{20, 20},
                                    {0, 0},
@@ -154,7 +139,7 @@ TEST_P(TileVoterOn, ThousandsOfVotesInOneVoxelAreThePlainKernelsAndAllCounted) {
   }
 }
 
-TEST_P(TileVoterOn, ACellMayFillUpAtAnyVote) {
+TEST_P(TileAccumulatorOn, ACellMayFillUpAtAnyVote) {
   for (const std::size_t votes :
        {1U, 62U, 63U, 64U, 65U, 127U, 128U, 129U, 191U, 192U, 255U, 256U, 257U, 4096U}) {
     for (const double fraction : {0.0, 0.5, kLastFraction}) {
@@ -163,9 +148,9 @@ TEST_P(TileVoterOn, ACellMayFillUpAtAnyVote) {
   }
 }
 
-TEST_P(TileVoterOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
+TEST_P(TileAccumulatorOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
   constexpr int kVotes = 65;
-  const cv::Rect tile(20, 20, TileVoter::kTilePixels, TileVoter::kTilePixels);
+  const cv::Rect tile(20, 20, TileCells::kMaxPixels, TileCells::kMaxPixels);
   for (const double fraction : {0.0, 0.25, kLastFraction}) {
     Points points;
     for (int vote = 0; vote < kVotes; ++vote) {
@@ -175,15 +160,15 @@ TEST_P(TileVoterOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
         }
       }
     }
-    TileVoter voter(GetParam());
-    const TileVotes votes = voteWith(voter, tile, points);
+    TileAccumulator accumulator(GetParam());
+    const TileVotes votes = voteWith(accumulator, tile, points);
     EXPECT_EQ(votes.votes, std::uint64_t{kVotes} * 63 * 63);
     // The four weights around a pixel are those of one vote, whatever the fraction.
     for (const float density : votes.density) ASSERT_NEAR(density, kVotes, 1e-4) << fraction;
   }
 }
 
-TEST_P(TileVoterOn, RandomVotesAreThePlainKernelsToWithinTheirRounding) {
+TEST_P(TileAccumulatorOn, RandomVotesAreThePlainKernelsToWithinTheirRounding) {
   std::mt19937 random(1);
   for (const std::size_t count : {1U, 15U, 16U, 17U, 300U, 20'000U}) {
     std::uniform_int_distribution<int> x(-10 * 4096, 160 * 4096);
@@ -193,7 +178,7 @@ TEST_P(TileVoterOn, RandomVotesAreThePlainKernelsToWithinTheirRounding) {
       points.emplace_back(x(random) / 4096.0, y(random) / 4096.0);
     }
     const TileVotes fast = voteOnView(GetParam(), points);
-    const ExactVotes plain = votePlainly(points);
+    const VotesOneByOne plain = voteOneByOne(points);
     EXPECT_EQ(fast.votes, plain.votes);
     for (std::size_t i = 0; i < plain.density.size(); ++i) {
       // Some four votes around a pixel: a dozen at most.
@@ -202,7 +187,8 @@ TEST_P(TileVoterOn, RandomVotesAreThePlainKernelsToWithinTheirRounding) {
   }
 }
 
-TEST_P(TileVoterOn, ARayOnABorderOfTilesOrTheViewIsCountedOnceAndFallsWhereThePlainKernelsDoes) {
+TEST_P(TileAccumulatorOn,
+       ARayOnABorderOfTilesOrTheViewIsCountedOnceAndFallsWhereThePlainKernelsDoes) {
   std::vector<double> columns;
   for (const double border : {0.0, 49.0, 50.0, 99.0, 100.0, 148.0, 149.0}) {
     for (const double off : {-1.0 / 4096, 0.0, 1.0 / 4096}) columns.push_back(border + off);
@@ -216,7 +202,7 @@ TEST_P(TileVoterOn, ARayOnABorderOfTilesOrTheViewIsCountedOnceAndFallsWhereThePl
   }
 }
 
-TEST_P(TileVoterOn, ARayThatIsNowhereNearOrNoNumberVotesNowhere) {
+TEST_P(TileAccumulatorOn, ARayThatIsNowhereNearOrNoNumberVotesNowhere) {
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   for (const double wrong : {kNan, -kNan, kInfinity, -kInfinity, 1e30, -1e30, 1e6, -1e6, 2048.0,
@@ -229,24 +215,25 @@ TEST_P(TileVoterOn, ARayThatIsNowhereNearOrNoNumberVotesNowhere) {
   }
 }
 
-TEST_P(TileVoterOn, RaysMoveAlongTheirShiftToThePlane) {
-  TileVoter voter(GetParam());
-  const cv::Rect tile(0, 0, 50, 43);
-  voter.moveTo(tile, kView);
-  TileRays rays = raysAt({{10, 10}}, voter.origin());
-  rays.view().dx[0] = 4 * kUnit;
-  rays.view().dy[0] = -2 * kUnit;
-  std::vector<float> density(static_cast<std::size_t>(tile.area()), -1.0F);
+TEST_P(TileAccumulatorOn, RaysMoveAlongTheirShiftToThePlane) {
+  TileAccumulator accumulator(GetParam());
+  const TileCells cells({0, 0, 50, 43}, test::kTiledView);
+  accumulator.moveTo(cells);
+  TileRays rays = test::raysAt({{10, 10}}, cells.origin);
+  rays.view().dx[0] = 4 * test::kTileUnit;
+  rays.view().dy[0] = -2 * test::kTileUnit;
+  std::vector<float> density(static_cast<std::size_t>(cells.tile.area()), -1.0F);
   for (const double to_plane : {-1.0, 0.0, 0.5, 4.0}) {
-    EXPECT_EQ(voter.vote(rays, to_plane, density.data()), 1U);
+    accumulator.vote(rays, to_plane);
+    EXPECT_EQ(accumulator.resolve(density.data()), 1U);
     const int x = static_cast<int>(10 + 4 * to_plane);
     const int y = static_cast<int>(10 - 2 * to_plane);
-    EXPECT_EQ(density[static_cast<std::size_t>(y * tile.width + x)], 1.0F) << to_plane;
+    EXPECT_EQ(density[static_cast<std::size_t>(y * 50 + x)], 1.0F) << to_plane;
   }
 }
 
-TEST_P(TileVoterOn, NothingIsLeftOfEarlierTilesAndPlanes) {
-  TileVoter used(GetParam());
+TEST_P(TileAccumulatorOn, NothingIsLeftOfEarlierTilesAndPlanes) {
+  TileAccumulator used(GetParam());
   const cv::Rect large(0, 0, 63, 63);
   for (const cv::Rect tile : {large, cv::Rect(100, 100, 1, 1), cv::Rect(149, 0, 1, 63),
                               cv::Rect(60, 129, 17, 1), cv::Rect(148, 128, 2, 2), large}) {
@@ -259,7 +246,7 @@ TEST_P(TileVoterOn, NothingIsLeftOfEarlierTilesAndPlanes) {
     voteWith(used, tile, full);
     const Points few = {
         {1.0 * tile.x, 1.0 * tile.y}, {tile.x + 0.5, tile.y + 0.25}, {tile.x - 0.5, tile.y - 0.5}};
-    TileVoter unused(GetParam());
+    TileAccumulator unused(GetParam());
     const TileVotes after = voteWith(used, tile, few);
     const TileVotes alone = voteWith(unused, tile, few);
     EXPECT_EQ(after.votes, alone.votes) << "tile " << tile.x << ", " << tile.y;
@@ -267,26 +254,21 @@ TEST_P(TileVoterOn, NothingIsLeftOfEarlierTilesAndPlanes) {
   }
 }
 
-TEST(CellSums, UnpackingFindsEveryFieldOfAFullCell) {
-  const std::uint64_t most = kernels::kVotesPerCell;
-  const std::uint64_t a = most * 4095;
-  const std::uint64_t b = most * 4094;
-  const std::uint64_t ab = most * 32'767;
-  const kernels::CellSums sums = kernels::unpack(a | b << 18 | ab << 36 | most << 57);
-  EXPECT_EQ(sums.a, a);
-  EXPECT_EQ(sums.b, b);
-  EXPECT_EQ(sums.ab, ab);
-  EXPECT_EQ(sums.votes, most);
-}
-
-TEST(CellSums, NoFieldReachesIntoAnother) {
-  EXPECT_EQ(kernels::unpack((1U << 18) - 1).b, 0U);
-  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 18) - 1) << 18).a, 0U);
-  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 18) - 1) << 18).ab, 0U);
-  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 21) - 1) << 36).b, 0U);
-  EXPECT_EQ(kernels::unpack(((std::uint64_t{1} << 21) - 1) << 36).votes, 0U);
-  EXPECT_EQ(kernels::unpack(std::uint64_t{127} << 57).ab, 0U);
-  EXPECT_EQ(kernels::unpack(std::uint64_t{127} << 57).votes, 127U);
+TEST(CellSums, UnpackingFindsEveryFieldOfAFullCellAndNoBitOfAnother) {
+  const std::uint64_t max = kernels::kVotesPerCell;
+  const std::uint64_t a = max * 4095;
+  const std::uint64_t b = max * 4094;
+  const std::uint64_t ab = max * 32'767;
+  const auto fields = [](std::uint64_t cell) {
+    const kernels::CellSums sums = kernels::unpack(cell);
+    return std::vector<std::uint64_t>{sums.a, sums.b, sums.ab, sums.votes};
+  };
+  using Fields = std::vector<std::uint64_t>;
+  EXPECT_EQ(fields(a | b << 18 | ab << 36 | max << 57), (Fields{a, b, ab, max}));
+  EXPECT_EQ(fields((1U << 18) - 1), (Fields{(1U << 18) - 1, 0, 0, 0}));
+  EXPECT_EQ(fields(((std::uint64_t{1} << 18) - 1) << 18), (Fields{0, (1U << 18) - 1, 0, 0}));
+  EXPECT_EQ(fields(((std::uint64_t{1} << 21) - 1) << 36), (Fields{0, 0, (1U << 21) - 1, 0}));
+  EXPECT_EQ(fields(std::uint64_t{127} << 57), (Fields{0, 0, 0, 127}));
 }
 
 }  // namespace

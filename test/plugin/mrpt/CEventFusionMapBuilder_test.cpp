@@ -207,7 +207,7 @@ class FullDisk : public DsiSink {
  public:
   explicit FullDisk(int keyframes)
       : planes_(keyframes * syntheticOptions().mapper.keyframe.planes.num_planes) {}
-  void takePlane(int /*plane*/, const float* /*values*/) override {
+  void addPlane(int /*plane*/, const float* /*values*/) override {
     if (planes_-- <= 0) throw std::runtime_error("the disk is full");
   }
 
@@ -375,7 +375,7 @@ class AskingSink : public DsiSink {
   using Questions = std::map<std::string, std::function<void()>>;
   explicit AskingSink(Questions questions) : questions_(std::move(questions)) {}
 
-  void takePlane(int /*plane*/, const float* /*values*/) override {
+  void addPlane(int /*plane*/, const float* /*values*/) override {
     if (asked_.exchange(true)) return;
     std::map<std::string, std::future<void>> answers;
     for (const auto& [name, ask] : questions_) {

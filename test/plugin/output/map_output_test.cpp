@@ -171,9 +171,9 @@ TEST_F(NpyFileTest, HoldsPlanesRowsAndColumnsInThatOrder) {
   NpyDsiFile file(folder() / "dsi.npy", 2, view);
   const std::vector<float> far = {6, 7, 8, 9, 10, 11};
   const std::vector<float> near = {0, 1, 2, 3, 4, 5};
-  file.takePlane(1, far.data());
+  file.addPlane(1, far.data());
   EXPECT_FALSE(exists(folder() / "dsi.npy")) << "not complete";
-  file.takePlane(0, near.data());
+  file.addPlane(0, near.data());
   file.finish();
 
   const std::string content = contentOf(folder() / "dsi.npy");
@@ -223,7 +223,7 @@ TEST_F(NpyFileTest, ThatDoesNotFitTheDiskIsAnErrorAndLeavesNothing) {
     const ReferenceView view{side, side, 1, 1, 0, 0};
     const std::vector<float> plane(view.pixels(), 1.5F);
     NpyDsiFile file(folder() / "dsi.npy", 1, view);
-    file.takePlane(0, plane.data());
+    file.addPlane(0, plane.data());
     EXPECT_THROW(file.finish(), std::runtime_error) << side;
     EXPECT_FALSE(exists(folder() / "dsi.npy")) << side;
   }

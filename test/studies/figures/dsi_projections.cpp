@@ -10,7 +10,7 @@ DsiProjections::DsiProjections(const DepthPlanes& planes, const ReferenceView& v
       top_(planes.size(), view.width, 0.0F),
       side_(view.height, planes.size(), 0.0F) {}
 
-void DsiProjections::takePlane(int plane, const float* values) {
+void DsiProjections::addPlane(int plane, const float* values) {
   const cv::Mat1f slice(front_.rows, front_.cols, const_cast<float*>(values));
   cv::Mat1f row;
   cv::Mat1f column;

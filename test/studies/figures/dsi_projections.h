@@ -17,7 +17,7 @@ class DsiProjections : public DsiSink {
  public:
   DsiProjections(const DepthPlanes& planes, const ReferenceView& view);
 
-  void takePlane(int plane, const float* values) override;
+  void addPlane(int plane, const float* values) override;
 
   const cv::Mat1f& front() const { return front_; }  ///< Width x height.
   const cv::Mat1f& top() const { return top_; }      ///< Width x planes.

@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "mapping/sweep/space_sweep.h"
-#include "test/mapping/dsi/kept_dsi.h"
+#include "test/mapping/dsi/whole_dsi.h"
 
 namespace efm::test {
 
-/// What to sweep, and how.
+/// The input and the options of a sweep.
 struct SweepCase {
   ReferenceView view;
   DepthPlanes planes;
@@ -20,25 +20,23 @@ struct SweepCase {
                           FusionOrder::kCamerasThenTime};
   int groups = 1;
   bool camera_peaks = true;
-  int ray_window = 0;
+  int column_window = 0;
 };
 
-struct SweptDsi {
+struct SweepOutput {
   std::vector<float> dsi;
   SweepResult result;
 };
 
-/// The whole DSI, and what was asked for beside it.
-inline SweptDsi sweep(const SweepCase& input, VotingKernel kernel, int threads = 1) {
+inline SweepOutput sweep(const SweepCase& input, VotingKernel kernel, int threads = 1) {
   SpaceSweepOptions options;
   options.fusion = input.fusion;
   options.kernel = kernel;
   options.threads = threads;
-  KeptDsi dsi(input.planes, input.view);
-  SweepResult result =
-      SpaceSweep(options).run(input.cameras, input.view, input.planes,
-                              {input.camera_peaks, &dsi, input.groups, input.ray_window});
-  EXPECT_EQ(dsi.planesSeen(), static_cast<std::size_t>(input.planes.size()));
+  WholeDsi dsi(input.planes, input.view);
+  SweepResult result = sweepSpace(input.cameras, {input.view, input.planes}, options,
+                                  {input.camera_peaks, &dsi, input.groups, input.column_window});
+  EXPECT_TRUE(dsi.isComplete());
   return {dsi.values, std::move(result)};
 }
 
@@ -46,8 +44,8 @@ inline SweptDsi sweep(const SweepCase& input, VotingKernel kernel, int threads =
 struct DsiDifference {
   double mass = 0;          ///< Of the other.
   double error_sum = 0;     ///< Of absolute differences.
-  double error = 0;         ///< The same as a share of the mass.
-  double signed_error = 0;  ///< Of the masses, as a share.
+  double error = 0;         ///< The same as a fraction of the mass.
+  double signed_error = 0;  ///< Of the masses, as a fraction.
 };
 
 template <typename Reference>

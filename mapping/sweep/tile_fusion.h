@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "mapping/dsi/plane_fusion.h"
+#include "mapping/sweep/tile_accumulator.h"
+
+namespace efm {
+
+/// Votes and fuses all inputs of one tile, plane by plane.
+///
+/// Two cameras under an AND-like rule, with one slot each, have a shortcut with the same bits:
+/// their mean is zero where one of them has no vote, so that only the other blocks are resolved
+/// and fused.
+class TileFusion {
+ public:
+  /// @param kernel one of `runnableKernels`, but not the plain one.
+  TileFusion(const FusionOptions& options, const FusionInputs& inputs, PlaneFusion::Keep keep,
+             VotingKernel kernel);
+
+  void moveTo(const TileCells& tile);
+  /// The fused plane, until the next call.
+  /// @param rays the tile's, padded: input (camera, slot) at camera * slots * groups + slot.
+  /// @param from_anchor from the rays' anchor plane to this one, 1/m.
+  const PlaneValues& fuse(std::vector<TileRays>& rays, double from_anchor);
+  /// A camera's own plane after `fuse`, where cameras are kept.
+  const PlaneValues& ofCamera(int camera) const { return planes_->ofCamera(camera); }
+  /// The votes of each camera on all tiles and planes so far.
+  const std::vector<std::uint64_t>& votes() const { return votes_; }
+
+ private:
+  const PlaneValues& fuseOccupied(std::vector<TileRays>& rays, double from_anchor);
+  void addPair(TileRays& first_rays, TileRays& second_rays, double from_anchor);
+
+  FusionOptions options_;
+  FusionInputs inputs_;
+  PlaneFusion::Keep keep_;
+  bool pairs_;  // whether the shortcut applies
+  // The second one serves the shortcut.
+  std::array<TileAccumulator, 2> accumulators_;
+  std::optional<PlaneFusion> planes_;
+  kernels::TilePixels all_pixels_;
+  PlaneValues first_, second_, sum_;  // of the shortcut
+  std::vector<std::uint64_t> votes_;
+};
+
+}  // namespace efm

@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The fast kernels against the plain one: cameras anywhere, few and many planes and rays, views of
+// any size, and every bound that a size is derived from.
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "mapping/sweep/tile_rays.h"
+#include "mapping/sweep/tiled_sweep.h"
+#include "test/mapping/depth/same_image.h"
+#include "test/mapping/kernels/fast_kernels.h"
+#include "test/mapping/rays/chosen_rays.h"
+#include "test/mapping/rays/random_rays.h"
+#include "test/mapping/sweep/plain_sweep.h"
+
+namespace efm {
+namespace {
+
+using Centers = std::vector<Eigen::Vector3d>;
+using Points = std::vector<Eigen::Vector2d>;
+
+class FastSweepOn : public ::testing::TestWithParam<VotingKernel> {
+ protected:
+  static constexpr ReferenceView kView{150, 100, 90, 95, 70, 52};
+
+  static DepthPlanes inverse(double nearest_m, double farthest_m, int count) {
+    return DepthPlanes({nearest_m, farthest_m, count, PlaneSpacing::kInverse});
+  }
+  static DepthPlanes linear(double nearest_m, double farthest_m, int count) {
+    return DepthPlanes({nearest_m, farthest_m, count, PlaneSpacing::kLinear});
+  }
+  static const std::vector<DepthPlanes>& somePlanes() {
+    static const std::vector<DepthPlanes> kPlanes = {inverse(0.5, 4, 9), linear(0.5, 4, 9),
+                                                     inverse(0.5, 4, 2), inverse(0.5, 4, 1)};
+    return kPlanes;
+  }
+
+  /// For each centre and each plane in front of it: rays that fill the view on that plane.
+  RayBundle raysFrom(const Centers& centers, bool forward, const DepthPlanes& planes,
+                     const ReferenceView& view = kView, int rays = 300) {
+    RayBundle bundle;
+    for (const Eigen::Vector3d& center_ref : centers) {
+      for (int plane = 0; plane < planes.size(); ++plane) {
+        const double depth_m = planes.depth(plane);
+        if (forward ? center_ref.z() >= depth_m : center_ref.z() <= depth_m) continue;
+        test::appendPacket({center_ref, forward, depth_m}, view, random_.points(view, rays),
+                           bundle);
+      }
+    }
+    return bundle;
+  }
+  /// Packets of a camera that moves along a line.
+  RayBundle walk(const DepthPlanes& planes, const Eigen::Vector3d& step, int packets, int rays,
+                 const ReferenceView& view = kView) {
+    RayBundle bundle;
+    for (int packet = 0; packet < packets; ++packet) {
+      test::appendPacket({packet * step, true, planes.depth(packet % planes.size())}, view,
+                         random_.points(view, rays), bundle);
+    }
+    return bundle;
+  }
+  static test::SweepCase caseOf(const DepthPlanes& planes, const RayBundle& rays,
+                                const ReferenceView& view = kView) {
+    return {view, planes, {{rays}}};
+  }
+  static void expectPlain(const DepthPlanes& planes, const RayBundle& rays,
+                          const ReferenceView& view = kView) {
+    test::expectThePlainSweep(caseOf(planes, rays, view), GetParam());
+  }
+
+  test::RandomRays random_{1};
+};
+
+INSTANTIATE_TEST_SUITE_P(Kernels, FastSweepOn, ::testing::ValuesIn(test::fastKernels()),
+                         test::nameOfKernel);
+
+// ---------------------------------------------------------------- cameras anywhere
+
+TEST_P(FastSweepOn, CamerasBeforeBetweenAndBehindPlanesAreThePlainKernels) {
+  for (const DepthPlanes& planes : somePlanes()) {
+    std::vector<double> forward = {0.0, 0.2, -0.3, -20.0, 0.6, 1.1, 3.7};
+    for (int plane = 0; plane < planes.size(); ++plane) {
+      for (const double before_m : {1e-2, 1e-4}) forward.push_back(planes.depth(plane) - before_m);
+    }
+    std::vector<double> backward = {0.6, 1.1, 3.7, 4.5, 9.0};
+    for (const double behind_m : {1e-2, 1e-3, 1e-4}) {
+      backward.push_back(planes.depth(planes.size() - 1) + behind_m);
+    }
+    for (const bool looks_forward : {true, false}) {
+      for (const double z : looks_forward ? forward : backward) {
+        SCOPED_TRACE(testing::Message() << "at " << z << (looks_forward ? " forward" : " backward")
+                                        << ", " << planes.size() << " planes");
+        expectPlain(planes, raysFrom({{0.1, -0.05, z}}, looks_forward, planes));
+      }
+    }
+  }
+}
+
+TEST_P(FastSweepOn, CamerasOnAPlaneAreBehindItAsInThePlainKernel) {
+  // Depths whose inverse is rounded, so that a centre's depth times it is not 1.
+  for (const double farthest : {4.0, 49.0, 4.9, 9.8}) {
+    for (const int count : {1, 2, 9}) {
+      const DepthPlanes planes = linear(0.49, farthest, count);
+      for (int plane = 0; plane < count; ++plane) {
+        for (const bool forward : {true, false}) {
+          SCOPED_TRACE(testing::Message() << "on plane " << plane << " of " << count << " to "
+                                          << farthest << (forward ? " forward" : " backward"));
+          // The pixel that all rays would meet is inside the view.
+          const Eigen::Vector3d center(0.01, 0.02, planes.depth(plane));
+          RayBundle rays = raysFrom({center}, forward, planes);
+          test::appendPacket({center, forward, 0.3}, kView, random_.points(kView, 100), rays);
+          expectPlain(planes, rays);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(FastSweepOn, CamerasOfAllKindsInOneBundleAreThePlainKernels) {
+  const Centers centers = {{0, 0, 0},       {0.1, 0, 0.3},  {-0.2, 0.1, 1.1},
+                           {0.3, -0.3, -2}, {0.1, 0.1, 3},  {0, 0.2, 0.499},
+                           {0, 0, 1e-7},    {-3, 2, -0.25}, {40, 0, 0}};
+  for (const DepthPlanes& planes : somePlanes()) {
+    test::SweepCase input = caseOf(planes, raysFrom(centers, true, planes));
+    input.cameras.push_back({raysFrom(centers, false, planes)});
+    test::expectThePlainSweep(input, GetParam());
+  }
+}
+
+TEST_P(FastSweepOn, RaysParallelToThePlanesVoteNowhereAndAreOutside) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const std::vector<float> values = {kNan,   -kNan, kInfinity, -kInfinity, 1e30F, -1e30F, 3e38F,
+                                     -3e38F, 1e20F, 1e10F,     -1e10F,     1e7F,  -1e7F,  70.5F};
+  for (const DepthPlanes& planes : somePlanes()) {
+    for (const double z : {0.0, 0.2, -0.3, 1.1, 0.4999}) {
+      RayBundle rays;
+      for (const float x : values) {
+        for (const float y : values) {
+          rays.x_inf.push_back(x);
+          rays.y_inf.push_back(y);
+        }
+      }
+      rays.packets.push_back({0, rays.size(), {0.1, 0.05, z}, true});
+      SCOPED_TRACE(testing::Message() << "from " << z << ", " << planes.size() << " planes");
+      expectPlain(planes, rays);
+    }
+  }
+}
+
+// ---------------------------------------------------------------- few and many
+
+TEST_P(FastSweepOn, FewAndManyPlanesAndPacketsAreThePlainKernels) {
+  const Eigen::Vector3d step(0.01, 0.002, 0.003);
+  const struct {
+    const char* name;
+    DepthPlanes planes;
+    Eigen::Vector3d step;
+    int packets;
+    int rays;
+  } cases[] = {
+      {"one plane", inverse(0.5, 5, 1), step, 30, 200},
+      {"500 planes", inverse(0.5, 5, 500), step, 10, 60},
+      {"2 planes at equal distances", linear(0.3, 30, 2), step, 40, 50},
+      {"40 planes at equal distances", linear(0.3, 30, 40), step, 40, 50},
+      {"nearly equal planes", inverse(1, 1 + 1e-9, 20), step, 30, 100},
+      {"100,000 packets of one ray", inverse(0.5, 5, 3), {2e-6, 1e-6, -1e-6}, 100'000, 1},
+      {"intervals of motion with bins of their own",
+       inverse(0.5, 5, 4),
+       {0.02, -0.01, 0.001},
+       300,
+       60},
+      // A ray moves by less than 1 px between all planes, and by 200 px from each to the next.
+      {"all planes in one group", inverse(0.5, 5, 10), {1e-5, 0, 0}, 10, 300},
+      {"a group for each plane", inverse(0.5, 5, 10), {12, 0, 0}, 2, 300},
+  };
+  for (const auto& c : cases) {
+    SCOPED_TRACE(c.name);
+    expectPlain(c.planes, walk(c.planes, c.step, c.packets, c.rays));
+  }
+}
+
+TEST_P(FastSweepOn, EmptyPacketsChangeNothingAndEmptyBundlesLeaveTheDsiEmpty) {
+  const DepthPlanes planes = inverse(0.5, 5, 4);
+  const RayBundle rays = walk(planes, {0.01, 0, 0}, 5, 100);
+  RayBundle with_empty = rays;
+  with_empty.packets.clear();
+  for (const RayPacket& packet : rays.packets) {
+    with_empty.packets.push_back({packet.begin, packet.begin, {9, 9, 9}, true});
+    with_empty.packets.push_back(packet);
+    with_empty.packets.push_back({packet.end, packet.end, {0, 0, 2}, false});
+  }
+  const test::SweepOutput a = sweep(caseOf(planes, rays), GetParam());
+  const test::SweepOutput b = sweep(caseOf(planes, with_empty), GetParam());
+  EXPECT_EQ(a.result.votes[0].cast, b.result.votes[0].cast);
+  EXPECT_LE(test::differenceOf(b.dsi, a.dsi).error, test::kFastErrorOverMass);
+  RayBundle empty_packet;
+  empty_packet.packets.push_back({});
+  for (const RayBundle& nothing : {RayBundle(), empty_packet}) {
+    const test::SweepOutput swept = sweep(caseOf(planes, nothing), GetParam());
+    EXPECT_EQ(swept.dsi, std::vector<float>(4 * kView.pixels(), 0.0F));
+    EXPECT_EQ(swept.result.votes[0].total(), 0U);
+  }
+}
+
+TEST_P(FastSweepOn, ThousandsOfRaysInOneVoxelAreAllCountedAndKeepTheirPosition) {
+  const DepthPlanes planes = inverse(0.5, 5, 2);
+  // A vote is rounded to 1/4096 px twice; the rays are equal, so that all are off alike.
+  constexpr double kOff = 2.0 / 4096 + 1.0 / 32'768;
+  for (const Eigen::Vector2d& point : Points{{20, 20},
+                                             {49.5, 33.5},
+                                             {0, 0},
+                                             {148.999, 98.999},
+                                             {50 - 1.0 / 4096, 33 + 4095.0 / 4096}}) {
+    const test::SweepCase input = caseOf(planes, test::raysFromOrigin(Points(10'000, point)));
+    const test::ExactVotes exact = test::voteExactly(input.cameras[0][0], kView, planes);
+    const test::SweepOutput fast = sweep(input, GetParam());
+    EXPECT_EQ(fast.result.votes[0].cast, 20'000U) << point.transpose();
+    for (std::size_t i = 0; i < exact.dsi.size(); ++i) {
+      ASSERT_NEAR(double{fast.dsi[i]}, exact.dsi[i], kOff * 10'000) << point.transpose();
+    }
+  }
+}
+
+// ---------------------------------------------------------------- bounds
+
+TEST_P(FastSweepOn, ParallaxOfHundredsOfPixelsAtHdIsThePlainKernels) {
+  const ReferenceView view{1280, 720, 836, 836, 639.5, 359.5};
+  const DepthPlanes planes = inverse(0.3, 10, 2);
+  // 0.5 m aside are 1350 px between the planes; some fly 2.5 m aside and 1 m back.
+  for (const Eigen::Vector3d& side : Centers{{-0.5, 0.4, 0.05}, {2.5, -2, -1}, {0.1, 0.1, 0.299}}) {
+    SCOPED_TRACE(testing::Message() << "to " << side.transpose());
+    expectPlain(planes, walk(planes, side / 59, 60, 150, view), view);
+  }
+}
+
+TEST_P(FastSweepOn, MarginsUpToAndBeyondTheRoomForCompactRaysAreThePlainKernels) {
+  const ReferenceView view{200, 150, 150, 150, 100, 75};
+  const DepthPlanes planes = inverse(0.5, 5, 12);
+  // From the middle a ray moves by 150 C_x (2 - 0.2) / 2 px to the outermost planes: 2048 with
+  // C_x = 15.17.
+  for (const Eigen::Vector3d& center : Centers{{15.1, 0, 0},
+                                               {15.16, 0, 0},
+                                               {15.17, 0, 0},
+                                               {15.18, 0, 0},
+                                               {-15.18, 0, 0},
+                                               {0, 15.1, 0},
+                                               {0, -15.2, 0},
+                                               {0, 0, 0.475},
+                                               {0, 0, 0.49},
+                                               {300, 0, 0},
+                                               {15, 15, -1}}) {
+    SCOPED_TRACE(testing::Message() << "from " << center.transpose());
+    expectPlain(planes, raysFrom({center}, true, planes, view), view);
+  }
+}
+
+/// The first cells of the parts of a side, the last cells before them, and the side's ends.
+std::vector<double> bordersOf(int side) {
+  std::vector<double> borders = {0, 1.0 * (side - 1)};
+  for (const cv::Rect& tile : tilesOf({side, 1, 1, 1, 0, 0}, TileCells::kMaxPixels)) {
+    for (const int cell : {tile.x - 1, tile.x}) {
+      if (cell > 0) borders.push_back(cell);
+    }
+  }
+  return borders;
+}
+
+TEST_P(FastSweepOn, RaysOnEveryBorderOfTilesAndTheViewAreCountedOnce) {
+  const ReferenceView view{150, 130, 100, 100, 75, 65};
+  const DepthPlanes planes = inverse(0.5, 5, 3);
+  Points inside;
+  Points all;
+  for (const double border_x : bordersOf(150)) {
+    for (const double border_y : bordersOf(130)) {
+      for (const double off_x : {-1e-3, 0.0, 1e-3}) {
+        for (const double off_y : {-1e-3, 0.0, 1e-3}) {
+          const Eigen::Vector2d point(border_x + off_x, border_y + off_y);
+          all.push_back(point);
+          if (point.minCoeff() >= 0 && point.x() < 149 && point.y() < 129) inside.push_back(point);
+        }
+      }
+    }
+  }
+  const auto fast = sweep(caseOf(planes, test::raysFromOrigin(all), view), GetParam());
+  EXPECT_EQ(fast.result.votes[0].cast, 3 * inside.size());
+  EXPECT_EQ(fast.result.votes[0].total(), 3 * all.size());
+  // Each of the rays alone is one vote, or none.
+  for (const Eigen::Vector2d& point : all) {
+    const auto one = sweep(caseOf(planes, test::raysFromOrigin({point}), view), GetParam());
+    double mass = 0;
+    for (const float value : one.dsi) mass += double{value};
+    ASSERT_NEAR(mass, static_cast<double>(one.result.votes[0].cast), 1e-5) << point.transpose();
+  }
+}
+
+TEST_P(FastSweepOn, RaysThatCrossBordersOfTilesFromPlaneToPlaneAreNeverLost) {
+  // As many steps across each border of two tiles as there are fractions of a pixel.
+  const ReferenceView view{100, 100, 80, 80, 50, 50};
+  const DepthPlanes planes = inverse(0.5, 5, 400);
+  for (const Eigen::Vector3d& center : Centers{{0.01, 0.02, 0}, {0, 0, -0.4}, {-0.3, 0.01, 0.1}}) {
+    RayBundle rays;
+    Points points;
+    for (int i = 0; i < 40; ++i) points.emplace_back(47.3 + 0.11 * i, 52.1 - 0.13 * i);
+    test::appendPacket({center, true, planes.depth(200)}, view, points, rays);
+    expectPlain(planes, rays, view);
+  }
+}
+
+TEST_P(FastSweepOn, WideAndHighViewsAreThePlainKernels) {
+  // Coordinates count from multiples of 1984 px: of no, one and several tiles.
+  const DepthPlanes planes = inverse(0.5, 5, 4);
+  for (const cv::Size& size : {cv::Size(1023, 8), cv::Size(1026, 9), cv::Size(2050, 7),
+                               cv::Size(4100, 6), cv::Size(10'000, 8), cv::Size(5, 9000)}) {
+    const ReferenceView view{size.width, size.height,      700,
+                             700,        0.5 * size.width, 0.5 * size.height};
+    const Centers centers = {{0, 0, 0}, {0.05, 0.003, 0}, {0, 0, 0.1}, {3, 0, -0.1}, {-8, 0.01, 0}};
+    SCOPED_TRACE(testing::Message() << size);
+    expectPlain(planes, raysFrom(centers, true, planes, view, 1000), view);
+  }
+}
+
+TEST_P(FastSweepOn, VotesWhereTheOriginOfCoordinatesChangesHaveTheirWeights) {
+  // Every ray stays in the view, near the first pixel of a tile whose origin is not its
+  // neighbour's. Both tiles round alike but for the last bit: some votes on the border count twice
+  // or not at all.
+  const ReferenceView view{2100, 3, 500, 500, 1050, 1};
+  const std::vector<cv::Rect> tiles = tilesOf(view, TileCells::kMaxPixels);
+  const auto border = std::find_if(tiles.begin(), tiles.end(), [&](const cv::Rect& tile) {
+    return TileCells(tile, view).origin.x > 0;
+  });
+  ASSERT_NE(border, tiles.end());
+  const DepthPlanes planes = inverse(0.5, 5, 50);
+  Points points;
+  for (int i = 0; i < 2000; ++i) points.emplace_back(border->x + random_.uniform(-0.1, 0.1), 1.3);
+  RayBundle rays;
+  test::appendPacket({{1e-4, 0, 0}, true, planes.depth(25)}, view, points, rays);
+  const test::SweepOutput swept = sweep(caseOf(planes, rays, view), GetParam());
+  EXPECT_NEAR(static_cast<double>(swept.result.votes[0].cast), 2000 * 50, 100);
+  const test::ExactVotes exact = test::voteExactly(rays, view, planes);
+  EXPECT_LE(std::abs(test::differenceOf(swept.dsi, exact.dsi).signed_error), 1e-5);
+}
+
+// ---------------------------------------------------------------- random rigs, any view
+
+/// Where tiles of 63 pixels end, and vectors of up to 16.
+const std::vector<cv::Size> kOddSizes = {{1, 1},   {2, 2},    {1, 50},   {50, 1},    {2, 64},
+                                         {17, 16}, {63, 63},  {64, 64},  {65, 127},  {126, 126},
+                                         {127, 3}, {128, 62}, {190, 33}, {200, 130}, {63, 190}};
+
+test::SweepCase randomCase(test::RandomRays& random, const cv::Size& size,
+                           const DepthPlanes& planes, const FusionInputs& inputs, int max_rays) {
+  test::SweepCase input{random.view(size), planes, {}};
+  input.groups = inputs.groups;
+  for (int camera = 0; camera < inputs.cameras; ++camera) {
+    CameraRays& of_camera = input.cameras.emplace_back();
+    for (int slot = 0; slot < inputs.slots * inputs.groups; ++slot) {
+      of_camera.push_back(random.bundle(input.view, planes, random.integer(0, max_rays)));
+    }
+  }
+  return input;
+}
+
+TEST_P(FastSweepOn, RandomRigsPlanesGroupsAndViewsAreThePlainKernels) {
+  for (std::uint32_t seed = 1; seed <= 40; ++seed) {
+    test::RandomRays random(seed);
+    const FusionInputs inputs{random.integer(1, 4), random.integer(1, 3), random.integer(1, 3)};
+    const cv::Size size = seed <= kOddSizes.size()
+                              ? kOddSizes[seed - 1]
+                              : cv::Size(random.integer(2, 200), random.integer(2, 150));
+    test::SweepCase input = randomCase(random, size, random.planes(), inputs, 3000);
+    input.camera_peaks = seed % 2 == 0;
+    SCOPED_TRACE(testing::Message()
+                 << "seed " << seed << ", " << size << ", " << inputs.cameras << " cameras, "
+                 << inputs.slots << " slots, " << inputs.groups << " groups");
+    test::expectThePlainSweep(input, GetParam());
+  }
+}
+
+/// Two cameras in one slot have a shortcut, where nothing else is asked for.
+TEST_P(FastSweepOn, NeitherThreadsNorRequestsChangeABitOfTheFusedDsiPeaksAndCounts) {
+  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
+  for (const cv::Size& size : {cv::Size(1, 1), {50, 1}, {64, 64}, {65, 127}, {130, 70}}) {
+    for (const FusionRule rule :
+         {FusionRule::kHarmonic, FusionRule::kGeometric, FusionRule::kArithmetic}) {
+      for (const FusionInputs inputs : {FusionInputs{2, 1, 1}, {2, 1, 4}, {3, 1, 2}, {2, 2, 2}}) {
+        SCOPED_TRACE(testing::Message() << size << ", " << nameOf(rule) << ", " << inputs.cameras
+                                        << " cameras, " << inputs.groups << " groups");
+        test::RandomRays random(80);
+        test::SweepCase input = randomCase(random, size, inverse(0.5, 5, 9), inputs, 2500);
+        input.fusion.across_cameras = rule;
+        input.camera_peaks = false;
+        const test::SweepOutput alone = sweep(input, GetParam(), 1);
+        SpaceSweepOptions options;
+        options.fusion = input.fusion;
+        options.kernel = GetParam();
+        SweepRequest least;
+        least.groups = inputs.groups;
+        EXPECT_TRUE(test::same(
+            alone.result.fused.peaks,
+            sweepSpace(input.cameras, {input.view, input.planes}, options, least).fused.peaks));
+        input.camera_peaks = true;
+        input.column_window = 5;
+        for (const int threads : {1, 2, 8}) {
+          const test::SweepOutput with_all = sweep(input, GetParam(), threads);
+          EXPECT_EQ(alone.dsi, with_all.dsi) << threads;
+          EXPECT_TRUE(test::same(alone.result.fused.peaks, with_all.result.fused.peaks)) << threads;
+          for (std::size_t c = 0; c < input.cameras.size(); ++c) {
+            EXPECT_EQ(alone.result.votes[c].cast, with_all.result.votes[c].cast);
+            EXPECT_EQ(alone.result.votes[c].outside_view, with_all.result.votes[c].outside_view);
+            EXPECT_EQ(alone.result.votes[c].behind_camera, with_all.result.votes[c].behind_camera);
+          }
+        }
+      }
+    }
+  }
+}
+
+// ---------------------------------------------------------------- tiles of the view
+
+TEST(ViewTiles, EveryPixelLiesInOneTileOfNearlyTheSameSize) {
+  constexpr int kMax = TileCells::kMaxPixels;
+  for (const int width : {1, 2, 62, 63, 64, 65, 126, 127, 346, 1280, 65'535}) {
+    for (const int height : {1, 50, 63, 64, 127}) {
+      if (width > 2000 && height > 1) continue;
+      SCOPED_TRACE(testing::Message() << width << " x " << height);
+      cv::Mat1i tiles_of(height, width, 0);
+      const std::vector<cv::Rect> tiles = tilesOf({width, height, 1, 1, 0, 0}, kMax);
+      EXPECT_EQ(static_cast<int>(tiles.size()),
+                ((width + kMax - 1) / kMax) * ((height + kMax - 1) / kMax));
+      for (const cv::Rect& tile : tiles) {
+        ASSERT_EQ(tile & cv::Rect(0, 0, width, height), tile);
+        ASSERT_LE(std::abs(tile.width - tiles.front().width), 1);
+        ASSERT_LE(std::abs(tile.height - tiles.front().height), 1);
+        ASSERT_TRUE(tile.width <= kMax && tile.height <= kMax);
+        tiles_of(tile) += 1;
+      }
+      EXPECT_EQ(cv::countNonZero(tiles_of != 1), 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace efm
