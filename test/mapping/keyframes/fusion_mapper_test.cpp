@@ -364,6 +364,16 @@ TEST(FusionMapper, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
   expectCountsToAddUp(shuffled.counts(), 4);
 }
 
+TEST(FusionMapper, EventsOfOneTimeAreNotLate) {
+  FusionMapper mapper(options(0.1, 0.1));
+  mapper.addCamera(camera());
+  mapper.addEvents(0, {eventAt(kStart_ns), eventAt(kStart_ns), eventAt(kStart_ns + 1)});
+  mapper.addEvents(0, {eventAt(kStart_ns + 1)});
+  EXPECT_EQ(mapper.counts().sorted_events, 0U);
+  mapper.addEvents(0, {eventAt(kStart_ns), eventAt(kStart_ns + 1)});
+  EXPECT_EQ(mapper.counts().sorted_events, 1U);
+}
+
 TEST(FusionMapper, EventsThatComeLaterThanThatAreAnError) {
   FusionMapper mapper(options(0.1, 0.1));
   mapper.addCamera(camera());

@@ -112,6 +112,16 @@ TEST(MapConsistency, SupportCountsThoseWhoSawThePointBesideThoseWhoHaveItInTheVo
   EXPECT_EQ(lone->support, 3U) << "10, 11 and 18; 19 is out of reach";
 }
 
+TEST(MapConsistency, AKeyframeThatHasAPointAndSawTheOthersSupportsItOnce) {
+  const std::vector<CloudPoint> point = {{{0.21, 0.01, 2.93}, 1.0F}};
+  GlobalCloud cloud(withConsistency(Consistency::kSupport));
+  for (std::uint64_t keyframe = 0; keyframe < 3; ++keyframe) {
+    cloud.insert(keyframe, point, viewAt(0));
+    ASSERT_EQ(cloud.points().size(), 1U);
+    EXPECT_EQ(cloud.points()[0].support, keyframe + 1);
+  }
+}
+
 TEST(MapConsistency, AKeyframeWithoutAPoseIsJudgedButDoesNotJudge) {
   std::mt19937 random(1);
   const std::vector<CloudPoint> stray = {{{0.01, 0.01, 1.5}, 1.0F}};
@@ -135,6 +145,20 @@ TEST(MapConsistency, SoManyMayLookThroughAPointAsTheOptionSays) {
       cloud.insert(k, wallSeenFrom(viewAt(0), 0, random), viewAt(0));
     }
     EXPECT_EQ(outliersIn(cloud.points()), allowed >= 2 ? 1U : 0U) << allowed;
+  }
+}
+
+TEST(MapConsistency, APointThatASecondKeyframeSawStaysThoughOthersLookThroughIt) {
+  std::mt19937 random(1);
+  GlobalCloudOptions options = withConsistency(Consistency::kVisibility);
+  options.consistency.max_contradictions = 0;
+  const std::vector<CloudPoint> stray = {{{0.01, 0.01, 1.5}, 1.0F}};
+  for (const bool seen_twice : {false, true}) {
+    GlobalCloud cloud(options);
+    cloud.insert(0, stray, viewAt(0));
+    if (seen_twice) cloud.insert(1, stray, viewAt(0));
+    cloud.insert(2, wallSeenFrom(viewAt(0), 0, random), viewAt(0));
+    EXPECT_EQ(outliersIn(cloud.points()), seen_twice ? 1U : 0U);
   }
 }
 

@@ -7,6 +7,7 @@
 #include <mrpt/obs/CActionRobotMovement3D.h>
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CObservationOdometry.h>
+#include <mrpt/obs/CObservationRobotPose.h>
 
 #include <stdexcept>
 
@@ -92,6 +93,32 @@ TEST(PoseObservation, OdometryIsAPoseInThePlane) {
             1e-12);
   odometry.timestamp = INVALID_TIMESTAMP;
   EXPECT_THROW(efm::poseIn(odometry), std::invalid_argument);
+}
+
+TEST(PoseObservation, ItsNoiseIsTheMeanOverTheAxesAsAStandardDeviation) {
+  mrpt::obs::CObservationRobotPose robot;
+  robot.timestamp = mrptTimeFrom(1000);
+  EXPECT_FALSE(efm::poseIn(robot)->noise) << "no covariance";
+  robot.pose.cov(0, 0) = 1e-4;
+  robot.pose.cov(1, 1) = 3e-4;
+  robot.pose.cov(2, 2) = 8e-4;
+  robot.pose.cov(3, 3) = robot.pose.cov(4, 4) = robot.pose.cov(5, 5) = 9e-6;
+  const auto noise = efm::poseIn(robot)->noise;
+  ASSERT_TRUE(noise);
+  EXPECT_NEAR(noise->noise_m, 0.02, 1e-12);
+  EXPECT_NEAR(noise->noise_rad, 0.003, 1e-12);
+}
+
+TEST(PoseObservation, GivesBackThePoseAndTheRigOnTheBody) {
+  const Rigid3 T_world_body{Eigen::Quaterniond(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitX())),
+                            {1, 2, 3}};
+  const Rigid3 T_body_rig{Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())),
+                          {0.1, -0.2, 0.3}};
+  const ObservedPose pose = poseIn(poseObservation({1000, T_world_body, T_body_rig}, "pose"));
+  EXPECT_EQ(pose.t_ns, 1000);
+  const Eigen::Vector3d point(4, 5, 6);
+  EXPECT_LT((pose.T_world_body * point - T_world_body * point).norm(), 1e-12);
+  EXPECT_LT((pose.T_body_rig * point - T_body_rig * point).norm(), 1e-12);
 }
 
 }  // namespace

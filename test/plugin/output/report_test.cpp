@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace efm {
@@ -57,6 +58,59 @@ TEST(Report, TotalsAreTheSumsOfTheCameras) {
   EXPECT_EQ(events["filtered"], 1);
   EXPECT_EQ(events["cameras"][0]["read"], 10);
   EXPECT_EQ(events["cameras"][1]["used"], 5);
+}
+
+TEST(Report, EveryCountStandsUnderItsOwnKey) {
+  MapReport report = smallReport();
+  MapperCounts& counts = report.counts;
+  counts.cameras.assign(1, {});
+  counts.cameras[0].read = 45;
+  counts.cameras[0].used = 11;
+  counts.cameras[0].without_pose = 7;
+  counts.cameras[0].outside_window = 8;
+  counts.cameras[0].dropped = 9;
+  counts.cameras[0].filtered = 10;
+  counts.keyframes_without_pose = 12;
+  counts.windows_without_events = 13;
+  counts.silent_subintervals = 14;
+  counts.sorted_events = 15;
+  counts.duplicate_poses = 16;
+  report.silent_keyframes = {0, 17};
+  const json written = json::parse(reportJson(report));
+  const json events = {{"read", 45},          {"used", 11},   {"without_pose", 7},
+                       {"outside_window", 8}, {"dropped", 9}, {"filtered", 10}};
+  EXPECT_EQ(written["events"]["cameras"], json::array({events}));
+  const json votes = {{"cast", 1500}, {"outside_view", 400}, {"behind_camera", 100}};
+  EXPECT_EQ(written["votes"], votes);
+  const json seconds = {{"total", 9.0}, {"read", 1.0},   {"sweep", 4.0},
+                        {"depth", 2.0}, {"refine", 0.0}, {"map", 1.5}};
+  EXPECT_EQ(written["seconds"], seconds);
+  EXPECT_EQ(written["event_uses"], 20);
+  EXPECT_EQ(written["keyframes"], 2);
+  EXPECT_EQ(written["keyframes_without_pose"], 12);
+  EXPECT_EQ(written["windows_without_events"], 13);
+  EXPECT_EQ(written["silent"]["subintervals"], 14);
+  EXPECT_EQ(written["silent"]["keyframes"], json::array({0, 17}));
+  EXPECT_EQ(written["sorted_events"], 15);
+  EXPECT_EQ(written["duplicate_poses"], 16);
+  EXPECT_EQ(written["points"], 7);
+}
+
+TEST(Report, ErrorsOfTheTrackerAreInMetresAndDegrees) {
+  MapReport report = smallReport();
+  EXPECT_FALSE(json::parse(reportJson(report)).contains("refinement"));
+  report.refinement.emplace();
+  report.refinement->counts = {1, 2, 3, 4};
+  report.refinement->tracker = {0.5, M_PI / 180, 0.25, 2 * M_PI / 180};
+  const json written = json::parse(reportJson(report))["refinement"];
+  EXPECT_EQ(written["registered"], 1);
+  EXPECT_EQ(written["loop_checks"], 2);
+  EXPECT_EQ(written["loops"], 3);
+  EXPECT_EQ(written["loops_dropped"], 4);
+  EXPECT_EQ(written["tracker"]["noise_m"], 0.5);
+  EXPECT_NEAR(written["tracker"]["noise_deg"], 1, 1e-12);
+  EXPECT_EQ(written["tracker"]["drift"], 0.25);
+  EXPECT_NEAR(written["tracker"]["drift_deg_per_m"], 2, 1e-12);
 }
 
 TEST(Report, VotesPerSecondAreThoseOfTheSweep) {
