@@ -8,16 +8,17 @@ namespace {
 
 /// A ray of the reference view.
 struct ProjectedRay {
-  float x = 0;  ///< Where it meets the plane at infinity, pixels.
+  float x = 0;  ///< Pixel on the plane at infinity.
   float y = 0;
   float z = 0;  ///< Negative where it runs towards smaller z.
 };
 
-/// From a camera's rays to pixels on the reference view's plane at infinity. The principal point is
-/// added last, so that errors of rounding grow with the distance from it.
+/// Maps a camera's rays to pixels on the reference view's plane at infinity: the homography of
+/// Ghosh and Gallego 2022, Eq. 4, with Z at infinity. The principal point is added last, so that
+/// errors of rounding grow with the distance from it.
 ///
-/// Floats: coordinates are at most 3e-4 pixels off at HD, which no vote shows, and four rays are
-/// computed at once on any x86-64 processor.
+/// In floats, coordinates are at most 3e-4 pixels off at HD, and any x86-64 processor computes four
+/// rays at once.
 class InfinityHomography {
  public:
   InfinityHomography(const Rigid3& T_ref_cam, const ReferenceView& view)
@@ -59,10 +60,10 @@ class BundleBuilder {
       close(packet, begin, true);
       return;
     }
-    // Rare: the camera looks sideways or back. By direction, each in the order of time.
+    // Rare: the camera looks sideways or back. Forward rays come first, then backward ones.
     resize(begin);
-    appendSome(packet, project, true);
-    appendSome(packet, project, false);
+    appendDirection(packet, project, true);
+    appendDirection(packet, project, false);
   }
 
  private:
@@ -76,8 +77,7 @@ class BundleBuilder {
     bundle_.y_inf.resize(rays);
   }
 
-  /// Appends the rays of frame `cam`. Apart from projecting them: what looks up cannot be
-  /// vectorised.
+  /// Appends the rays in frame `cam`. A separate loop, because table look-ups have no vectors.
   void lookUp(const PosePacket& packet) {
     const std::size_t first = bundle_.size();
     const std::size_t count = packet.end - packet.begin;
@@ -91,8 +91,8 @@ class BundleBuilder {
     }
   }
 
-  /// Projects the rays from `begin` on in place. The homography is a copy, which writing to the
-  /// rays cannot change: it stays in registers. @return how many of them run backward.
+  /// Projects the rays from `begin` on in place. The homography is a copy that stays in registers.
+  /// @return the number of backward rays.
   std::uint32_t projectFrom(std::size_t begin, const InfinityHomography project) {
     const std::size_t count = bundle_.size() - begin;
     float* x = bundle_.x_inf.data() + begin;
@@ -107,8 +107,7 @@ class BundleBuilder {
     return backward;
   }
 
-  /// The packet's rays of one direction alone.
-  void appendSome(const PosePacket& packet, const InfinityHomography& project, bool forward) {
+  void appendDirection(const PosePacket& packet, const InfinityHomography& project, bool forward) {
     const std::size_t begin = bundle_.size();
     for (std::size_t i = packet.begin; i < packet.end; ++i) {
       const Eigen::Vector2f& ray_cam = rayOf(events_[i]);

@@ -12,13 +12,12 @@
 
 namespace efm {
 
-/// One camera's events carried into the reference view as rays: each by the pixel where it meets
-/// the plane at infinity, from which every other plane is a scale and an offset away.
+/// One camera's events as rays of the reference view: each by its pixel on the plane at infinity,
+/// from which a scale and an offset lead to any other plane (`transferToPlane`).
 ///
-/// This is the two-step transfer of Rebecq et al. (IJCV 2018, Eq. 15) with the plane at infinity
-/// for Z0, the one choice of Z0 that no camera centre can lie on: x(Z) = (1 - C_z/Z) x_inf + (f C_x
-/// + c C_z) / Z in pixels. Rays parallel to the planes get non-finite coordinates and are never
-/// inside a view.
+/// This is the first step of the transfer of Rebecq et al. (IJCV 2018, Eq. 15) with the plane at
+/// infinity for Z0: no camera centre can lie on it. Rays parallel to the planes get non-finite
+/// coordinates and are never inside a view.
 struct RayBundle {
   std::vector<float> x_inf;  ///< Pixels of the reference view.
   std::vector<float> y_inf;
@@ -31,7 +30,7 @@ struct RayBundle {
 /// the same number of slots.
 using CameraRays = std::vector<RayBundle>;
 
-/// Carries the events of the packets into the reference view; events between packets are left out.
+/// Back-projects the events of the packets. Events between packets are left out.
 RayBundle backProject(EventSpan events, const PosePackets& packets,
                       const UndistortionTable& undistortion, const ReferenceView& view);
 

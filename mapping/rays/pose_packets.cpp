@@ -11,25 +11,26 @@
 namespace efm {
 namespace {
 
-/// The events of one camera during one segment of the trajectory, into packets.
+/// Splits the events of one camera during one segment of the trajectory into packets.
 class PacketSplitter {
  public:
   PacketSplitter(EventSpan events, const CameraMotion& camera, const VoteGrid& grid,
                  double error_px, std::vector<PosePacket>& packets)
       : events_(events), camera_(camera), grid_(grid), error_px_(error_px), packets_(packets) {}
 
-  /// Splits events [begin, end) at the middle of their time until each part is good enough. Once
-  /// votes are seen to move evenly, how far they move in any part follows from their speed.
+  /// Splits events [begin, end) at the middle of their time until the error of each part is within
+  /// the bound. Where votes move evenly, the error of smaller parts follows from their speed.
   void split(std::size_t begin, std::size_t end) const {
-    const Span span = spanOf(begin, end);
+    const TimeSpan span = spanOf(begin, end);
     if (span.first_ns == span.last_ns) return append(begin, end, camera_.poseAt(span.first_ns));
     const Rigid3 T_ref_cam = camera_.poseAt(span.middle_ns);
-    const std::optional<VoteMotion> motion = measure(span, T_ref_cam);
-    if (motion && motion->fromMiddle() <= error_px_) return append(begin, end, T_ref_cam);
+    const std::optional<VoteDisplacement> displacement = measure(span, T_ref_cam);
+    if (displacement && displacement->fromMiddle() <= error_px_)
+      return append(begin, end, T_ref_cam);
     const std::size_t second_half = firstAfter(span.middle_ns, begin, end);
-    if (motion && motion->isEven()) {
-      splitBySpeed(*motion, begin, second_half);
-      splitBySpeed(*motion, second_half, end);
+    if (displacement && displacement->isEven()) {
+      splitBySpeed(*displacement, begin, second_half);
+      splitBySpeed(*displacement, second_half, end);
     } else {
       split(begin, second_half);
       split(second_half, end);
@@ -37,14 +38,14 @@ class PacketSplitter {
   }
 
  private:
-  /// When some events happened.
-  struct Span {
+  /// The times of a part's events.
+  struct TimeSpan {
     std::int64_t first_ns;
     std::int64_t middle_ns;
     std::int64_t last_ns;
   };
 
-  Span spanOf(std::size_t begin, std::size_t end) const {
+  TimeSpan spanOf(std::size_t begin, std::size_t end) const {
     const std::int64_t first_ns = events_[begin].t_ns;
     const std::int64_t last_ns = events_[end - 1].t_ns;
     return {first_ns, first_ns + (last_ns - first_ns) / 2, last_ns};
@@ -57,23 +58,24 @@ class PacketSplitter {
     return static_cast<std::size_t>(first - events_.begin());
   }
 
-  std::optional<VoteMotion> measure(const Span& span, const Rigid3& T_ref_cam) const {
+  std::optional<VoteDisplacement> measure(const TimeSpan& span, const Rigid3& T_ref_cam) const {
     const GridVotes first = grid_.votesFrom(camera_.poseAt(span.first_ns));
     const GridVotes middle = grid_.votesFrom(T_ref_cam);
     const GridVotes last = grid_.votesFrom(camera_.poseAt(span.last_ns));
-    return VoteMotion::between(span.first_ns, span.last_ns, {&first, &middle, &last});
+    return VoteDisplacement::measure(span.first_ns, span.last_ns, {&first, &middle, &last});
   }
 
-  void splitBySpeed(const VoteMotion& motion, std::size_t begin, std::size_t end) const {
-    const Span span = spanOf(begin, end);
+  void splitBySpeed(const VoteDisplacement& displacement, std::size_t begin,
+                    std::size_t end) const {
+    const TimeSpan span = spanOf(begin, end);
     if (span.first_ns == span.last_ns ||
-        (motion.between(span.first_ns, span.middle_ns) <= error_px_ &&
-         motion.between(span.middle_ns, span.last_ns) <= error_px_)) {
+        (displacement.between(span.first_ns, span.middle_ns) <= error_px_ &&
+         displacement.between(span.middle_ns, span.last_ns) <= error_px_)) {
       return append(begin, end, camera_.poseAt(span.middle_ns));
     }
     const std::size_t second_half = firstAfter(span.middle_ns, begin, end);
-    splitBySpeed(motion, begin, second_half);
-    splitBySpeed(motion, second_half, end);
+    splitBySpeed(displacement, begin, second_half);
+    splitBySpeed(displacement, second_half, end);
   }
 
   void append(std::size_t begin, std::size_t end, const Rigid3& T_ref_cam) const {
@@ -87,8 +89,8 @@ class PacketSplitter {
   std::vector<PosePacket>& packets_;
 };
 
-/// One past the last event that shares a segment with event `begin`. At its end a segment gives way
-/// to the next one, except where the poses end.
+/// One past the last event in the segment of event `begin`. An event at the segment's end is in the
+/// next segment; at the last pose it is in the last one.
 std::size_t endOfSegment(EventSpan events, std::size_t begin, const TrajectorySegment& segment) {
   const std::int64_t end_ns = std::max(segment.last.t_ns, events[begin].t_ns + 1);
   const Event* end =

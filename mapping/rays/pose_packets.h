@@ -15,9 +15,9 @@
 namespace efm {
 
 struct PosePacketsOptions {
-  /// How far sharing a pose may move an event's vote, in pixels of the reference view. 0 gives
-  /// every event its own pose. Range: 0 to 10. The default keeps the L1 error of the DSI near 2e-3
-  /// of its mass.
+  /// The largest error of an event's vote by sharing a pose, in pixels of the reference view. 0
+  /// gives every event its own pose. Range: 0 to 10. The default keeps the L1 error of the DSI near
+  /// 2e-3 of its mass.
   double packet_error_px = 0.02;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
@@ -37,7 +37,7 @@ struct PosePackets {
   std::uint64_t without_pose = 0;
 };
 
-/// What a packet's error is measured against.
+/// The reference view and the depth range that a packet's error is measured on.
 struct PacketGeometry {
   Rigid3 T_ref_world;
   ReferenceView view;
@@ -46,15 +46,15 @@ struct PacketGeometry {
 };
 
 /// Splits events (time order, already shifted by the camera's time offset) into packets. A packet
-/// ends where its pose, taken at the middle of its time, would misplace a vote by more than the
-/// bound; no event is dropped because a packet is not full.
+/// has the pose at the middle of its time; it ends where that pose would misplace a vote by more
+/// than the bound. No event is dropped because a packet is not full.
 ///
-/// The error is measured on a grid of viewing rays over the whole sensor, at both ends of the
-/// packet, on the nearest and on the farthest plane: a camera that turns around a near point moves
-/// nothing there and everything behind it. Within a stretch of even motion it follows from how fast
-/// votes move there, to a percent and rather too large. Packets do not cross a recorded pose, so
-/// that the motion within one is a single smooth piece and its ends are its extremes. Rays that end
-/// far outside the view are left out where others do not.
+/// The error is measured on a grid of rays over the whole sensor, at both ends of the packet, on
+/// the nearest and the farthest plane: a camera that turns around a near point moves votes only on
+/// the planes behind it. In an interval of even motion the error follows from the speed of votes;
+/// it is exact to a percent and rather too large. A packet does not cross a recorded pose: the
+/// motion within it is one smooth piece, with its extremes at the ends. Rays far outside the view
+/// count only where no ray is near it.
 PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,

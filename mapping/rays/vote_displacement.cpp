@@ -12,15 +12,15 @@ namespace {
 constexpr std::size_t kGridSide = 3;
 static_assert(kGridSide * kGridSide == GridVotes::kRays);
 
-/// A change of speed by this share makes parabolas wrong by a percent.
+/// With a change of speed by this fraction, parabolas err by a percent.
 constexpr double kEvenChange = 0.1;
 
 bool isNear(const ReferenceView& view, double x, double y) {
   return x >= -view.width && x <= 2 * view.width && y >= -view.height && y <= 2 * view.height;
 }
 
-/// Squares of the largest steps of some votes, in pixels per half of the stretch.
-struct LargestSteps {
+/// Squares of the largest steps of votes, in pixels per half of the interval.
+struct MaxSteps {
   double first = 0;   ///< From the start to the middle.
   double second = 0;  ///< From the middle to the end.
   double start = 0;   ///< The speed at the start and at the end.
@@ -28,7 +28,7 @@ struct LargestSteps {
   double change = 0;  ///< From the first to the second half.
   bool any = false;
 
-  void take(const Eigen::Vector2d& first_half, const Eigen::Vector2d& second_half) {
+  void add(const Eigen::Vector2d& first_half, const Eigen::Vector2d& second_half) {
     const Eigen::Vector2d half_change = 0.5 * (second_half - first_half);
     first = std::max(first, first_half.squaredNorm());
     second = std::max(second, second_half.squaredNorm());
@@ -75,31 +75,33 @@ GridVotes VoteGrid::votesFrom(const Rigid3& T_ref_cam) const {
   return votes;
 }
 
-std::optional<VoteMotion> VoteMotion::between(std::int64_t start_ns, std::int64_t end_ns,
-                                              const std::array<const GridVotes*, 3>& votes) {
+std::optional<VoteDisplacement> VoteDisplacement::measure(
+    std::int64_t start_ns, std::int64_t end_ns, const std::array<const GridVotes*, 3>& votes) {
   const auto& [start, middle, end] = votes;
-  LargestSteps near_view;
-  LargestSteps anywhere;
+  MaxSteps near_view;
+  MaxSteps anywhere;
   for (std::size_t i = 0; i < GridVotes::kVotes; ++i) {
     const bool in_front = middle->in_front[i];
     if (start->in_front[i] != in_front || end->in_front[i] != in_front) return std::nullopt;
     if (!in_front) continue;
     const Eigen::Vector2d first(middle->x[i] - start->x[i], middle->y[i] - start->y[i]);
     const Eigen::Vector2d second(end->x[i] - middle->x[i], end->y[i] - middle->y[i]);
-    anywhere.take(first, second);
+    anywhere.add(first, second);
     if (start->near_view[i] || middle->near_view[i] || end->near_view[i]) {
-      near_view.take(first, second);
+      near_view.add(first, second);
     }
   }
-  const LargestSteps& steps = near_view.any ? near_view : anywhere;
+  const MaxSteps& steps = near_view.any ? near_view : anywhere;
   const double half_ns = 0.5 * static_cast<double>(end_ns - start_ns);
-  VoteMotion motion;
-  motion.start_ns_ = start_ns;
-  motion.start_speed_ = std::sqrt(steps.start) / half_ns;
-  motion.acceleration_ = (std::sqrt(steps.end) / half_ns - motion.start_speed_) / (2 * half_ns);
-  motion.from_middle_px_ = std::sqrt(std::max(steps.first, steps.second));
-  motion.even_ = steps.change <= kEvenChange * kEvenChange * std::max(steps.first, steps.second);
-  return motion;
+  VoteDisplacement displacement;
+  displacement.start_ns_ = start_ns;
+  displacement.start_speed_ = std::sqrt(steps.start) / half_ns;
+  displacement.acceleration_ =
+      (std::sqrt(steps.end) / half_ns - displacement.start_speed_) / (2 * half_ns);
+  displacement.from_middle_px_ = std::sqrt(std::max(steps.first, steps.second));
+  displacement.even_ =
+      steps.change <= kEvenChange * kEvenChange * std::max(steps.first, steps.second);
+  return displacement;
 }
 
 }  // namespace efm

@@ -14,8 +14,8 @@
 
 namespace efm {
 
-/// Where the rays of a grid over the sensor, corners included, meet the nearest and the farthest
-/// plane: pixels of the reference view.
+/// The pixels of the reference view where the rays of a grid over the sensor, corners included,
+/// meet the nearest and the farthest plane.
 struct GridVotes {
   static constexpr std::size_t kRays = 9;
   static constexpr std::size_t kVotes = 2 * kRays;
@@ -39,22 +39,24 @@ class VoteGrid {
   std::array<double, 2> depths_m_;
 };
 
-/// How far votes move while the camera does, from where they are at the start, in the middle and at
-/// the end of a stretch of time: along parabolas through the three. What counts is the vote that
-/// moves most, of those near the view where there are any.
-class VoteMotion {
+/// How far votes move with the camera in an interval of time: along parabolas through their pixels
+/// at its start, middle and end. The vote that moves most counts. Votes far from the view count
+/// only where no vote is near it.
+class VoteDisplacement {
  public:
+  /// @param votes at the start, in the middle and at the end.
   /// @return nothing where a vote comes or goes between the three times.
-  static std::optional<VoteMotion> between(std::int64_t start_ns, std::int64_t end_ns,
-                                           const std::array<const GridVotes*, 3>& votes);
+  static std::optional<VoteDisplacement> measure(std::int64_t start_ns, std::int64_t end_ns,
+                                                 const std::array<const GridVotes*, 3>& votes);
 
-  /// Pixels between the middle and the start or the end, whichever is farther.
+  /// Pixels from the middle to the start or the end, whichever is farther.
   double fromMiddle() const { return from_middle_px_; }
-  /// So even that three times say how the votes move at all others: what parabolas leave out is
-  /// about the square of how much the speed changes.
+  /// Whether the speed changes so little that the parabolas hold at all times: their error is about
+  /// the square of the relative change.
   bool isEven() const { return even_; }
-  /// The most that votes move between two times of the stretch, pixels. The fastest vote's speed
-  /// is convex in time along parabolas: what is interpolated between the ends is never too small.
+  /// A bound of the displacement between two times of the interval, pixels. Along parabolas the
+  /// speed of the fastest vote is convex in time: interpolated between the ends it is never too
+  /// small.
   double between(std::int64_t t0_ns, std::int64_t t1_ns) const {
     const double middle_ns =
         0.5 * (static_cast<double>(t0_ns - start_ns_) + static_cast<double>(t1_ns - start_ns_));

@@ -124,7 +124,7 @@ std::size_t packetsMeasuredOneByOne(const Recording& recording, double error_px,
   const GridVotes first = votes_at(first_ns);
   const GridVotes middle = votes_at(middle_ns);
   const GridVotes last = votes_at(last_ns);
-  const auto motion = VoteMotion::between(first_ns, last_ns, {&first, &middle, &last});
+  const auto motion = VoteDisplacement::measure(first_ns, last_ns, {&first, &middle, &last});
   if (motion && motion->fromMiddle() <= error_px) return 1;
   std::size_t half = begin;
   while (recording.events[half].t_ns <= middle_ns) ++half;

@@ -27,9 +27,9 @@ TEST(VoteGrid, VotesAreWhereTheRaysOfTheSensorMeetThePlanes) {
     const GridVotes votes = grid.votesFrom(T_ref_cam);
     for (std::size_t i = 0; i < GridVotes::kVotes; ++i) {
       const double depth_m = i < GridVotes::kRays ? kNearPlane_m : kFarPlane_m;
-      const auto place = static_cast<int>(i % GridVotes::kRays);
-      const int x = (place % 3) * (model.width - 1) / 2;
-      const int y = (place / 3) * (model.height - 1) / 2;
+      const auto position = static_cast<int>(i % GridVotes::kRays);
+      const int x = (position % 3) * (model.width - 1) / 2;
+      const int y = (position / 3) * (model.height - 1) / 2;
       const Eigen::Vector3d direction = T_ref_cam.rotation * undistortion.ray(x, y).homogeneous();
       const double along = (depth_m - T_ref_cam.translation.z()) / direction.z();
       EXPECT_EQ(votes.in_front[i], along > 0);
@@ -50,13 +50,13 @@ GridVotes votesWithOneAt(double x, double y) {
   return votes;
 }
 
-/// A stretch of 100 us in which one vote moves 10 px along x, a little faster towards the end.
-std::optional<VoteMotion> accelerated(const std::array<GridVotes, 3>& votes) {
-  return VoteMotion::between(kGridStart_ns, kGridStart_ns + 100'000,
-                             {&votes[0], &votes[1], &votes[2]});
+/// An interval of 100 us in which one vote moves 10 px along x, a little faster towards the end.
+std::optional<VoteDisplacement> accelerated(const std::array<GridVotes, 3>& votes) {
+  return VoteDisplacement::measure(kGridStart_ns, kGridStart_ns + 100'000,
+                                   {&votes[0], &votes[1], &votes[2]});
 }
 
-TEST(VoteMotion, IsExactAlongAParabola) {
+TEST(VoteDisplacement, IsExactAlongAParabola) {
   // x(t) = 9.5 t + 0.5 t^2 with t from 0 to 1.
   const auto x = [](double t) { return 9.5 * t + 0.5 * t * t; };
   const auto motion =
@@ -69,20 +69,20 @@ TEST(VoteMotion, IsExactAlongAParabola) {
               1e-9);
 }
 
-TEST(VoteMotion, IsNotEvenWhereTheSpeedChangesMuch) {
+TEST(VoteDisplacement, IsNotEvenWhereTheSpeedChangesMuch) {
   const auto motion =
       accelerated({votesWithOneAt(0, 0), votesWithOneAt(4, 0), votesWithOneAt(10, 0)});
   ASSERT_TRUE(motion.has_value());
   EXPECT_FALSE(motion->isEven());
 }
 
-TEST(VoteMotion, OfAVoteThatComesOrGoesIsUnknown) {
+TEST(VoteDisplacement, OfAVoteThatComesOrGoesIsUnknown) {
   std::array<GridVotes, 3> votes{votesWithOneAt(0, 0), votesWithOneAt(5, 0), votesWithOneAt(10, 0)};
   votes[2].in_front[7] = false;
   EXPECT_FALSE(accelerated(votes).has_value());
 }
 
-TEST(VoteMotion, FarFromTheViewCountsOnlyWhereNothingIsNearer) {
+TEST(VoteDisplacement, FarFromTheViewCountsOnlyWhereNothingIsNearer) {
   std::array<GridVotes, 3> votes{votesWithOneAt(0, 0), votesWithOneAt(5, 0), votesWithOneAt(10, 0)};
   for (GridVotes& at_one_time : votes) at_one_time.near_view[0] = false;
   EXPECT_EQ(accelerated(votes)->fromMiddle(), 0);
