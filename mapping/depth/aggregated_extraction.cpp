@@ -14,14 +14,14 @@
 namespace efm {
 namespace {
 
-constexpr double kNear = 2.5;          ///< Places within which depths agree.
-constexpr double kMedianNear = 10;     ///< Places by which a depth may differ from the median.
-constexpr double kSteepness = 1.25;    ///< Power of how much the peak stands above the second.
-constexpr double kWidthsOfPeak = 1.6;  ///< On each side, of the median width of a keyframe's peaks.
+// A step is a hundredth of the depth range (`planesPerStep`).
+constexpr double kAgreementSteps = 2.5;  ///< Depths within this distance agree.
+constexpr double kMedianSteps = 10;      ///< Distance from the median that divides quality by e.
+constexpr double kSteepness = 1.25;      ///< Power of the peak's height above the second peak.
+constexpr double kPeakWidths = 1.6;      ///< Half size of a peak, in median widths of all peaks.
 
-/// By how much each pixel exceeds its surroundings, as a share of the mean confidence of those that
-/// have any.
-cv::Mat1f excessOf(const cv::Mat1f& confidence, int window) {
+/// Confidence minus its Gaussian mean, over the mean confidence of the pixels that have any.
+cv::Mat1f localContrast(const cv::Mat1f& confidence, int window) {
   cv::Mat1f surroundings;
   cv::GaussianBlur(confidence, surroundings, {window, window}, 0, 0, cv::BORDER_REPLICATE);
   const double mean = cv::mean(confidence, confidence > 0)[0];
@@ -29,52 +29,53 @@ cv::Mat1f excessOf(const cv::Mat1f& confidence, int window) {
   return (confidence - surroundings) / mean;
 }
 
-/// Pixels worth looking at.
-cv::Mat1b standOut(const cv::Mat1f& excess, double min_excess) {
-  cv::Mat1b mask = cv::Mat1b::zeros(excess.size());
-  const cv::Rect inner = insideFrame(excess.size());
+cv::Mat1b aboveContrast(const cv::Mat1f& contrast, double min_contrast) {
+  cv::Mat1b mask = cv::Mat1b::zeros(contrast.size());
+  const cv::Rect inner = insideFrame(contrast.size());
   if (inner.empty()) return mask;
-  cv::compare(excess(inner), min_excess, mask(inner), cv::CMP_GT);
+  cv::compare(contrast(inner), min_contrast, mask(inner), cv::CMP_GT);
   return mask;
 }
 
-/// What the peaks of a keyframe are measured by. With a short baseline they are wide, and what is
-/// beside one is not a second.
+/// The scale of the peaks of a keyframe: with a short baseline they are wide.
 struct PeakScale {
-  double place = 1;        ///< Planes that count as one place.
-  std::size_t beside = 0;  ///< Of `AggregatedPeak::beyond`: what is not beside the peak.
+  double step_planes = 1;  ///< Planes per step.
+  std::size_t second =
+      0;  ///< Index into `AggregatedPeak::second_peak`: outside of the peak itself.
 };
 
 PeakScale scaleOf(const std::vector<AggregatedPeak>& peaks, int planes) {
   PeakScale scale;
-  scale.place = planesOfOnePlace(planes);
+  scale.step_planes = planesPerStep(planes);
   if (peaks.empty()) return scale;
   std::vector<float> widths_sq;
   for (const AggregatedPeak& peak : peaks) widths_sq.push_back(peak.width_sq);
-  const double places =
-      std::clamp(std::round(kWidthsOfPeak * std::sqrt(upperMedian(widths_sq)) / scale.place),
-                 double{AggregatedPeak::kLeastBeside}, double{AggregatedPeak::kMostBeside});
-  scale.beside = static_cast<std::size_t>(places) - AggregatedPeak::kLeastBeside;
+  const double steps =
+      std::clamp(std::round(kPeakWidths * std::sqrt(upperMedian(widths_sq)) / scale.step_planes),
+                 double{AggregatedPeak::kMinSteps}, double{AggregatedPeak::kMaxSteps});
+  scale.second = static_cast<std::size_t>(steps) - AggregatedPeak::kMinSteps;
   return scale;
 }
 
-/// What is left of a pixel's excess.
-double qualityOf(double excess, const AggregatedPeak& peak, const LocalAgreement& around,
+/// Local contrast, lowered for ambiguous peaks and disagreeing neighbours.
+double qualityOf(double contrast, const AggregatedPeak& peak, const LocalAgreement& around,
                  const PeakScale& scale) {
-  const double unambiguous = std::pow(std::max(0.0, 1.0 - peak.beyond[scale.beside]), kSteepness);
+  const double unambiguous =
+      std::pow(std::max(0.0, 1.0 - peak.second_peak[scale.second]), kSteepness);
   const double off_median = std::abs(peak.position - around.median);
-  return excess * unambiguous * std::exp(-off_median / (kMedianNear * scale.place)) * around.share;
+  return contrast * unambiguous * std::exp(-off_median / (kMedianSteps * scale.step_planes)) *
+         around.agreeing_fraction;
 }
 
-/// Variance of a position, planes^2: a wide peak in scattered surroundings is uncertain, and none
-/// is surer than a tenth of a plane. Fitted to the errors of the simulated presets up to VGA: on
-/// new seeds of these 54 to 82 % lie within one standard deviation and 83 to 94 % within two.
+/// Variance of a position, planes^2. It grows with the width of the peak and with the spread of the
+/// depths around; its minimum is about a tenth of a plane, squared. Fitted to the errors of the
+/// simulated presets up to VGA: on new seeds of these, 54 to 82 % of the depths lie within one
+/// standard deviation of the truth and 83 to 94 % within two.
 double varianceOf(const AggregatedPeak& peak, const LocalAgreement& around) {
-  constexpr double kLeastSigma = 0.09;
-  constexpr double kOfWidthAndSpread = 0.0143;
-  constexpr double kLeastSpread = 0.03;
-  return kLeastSigma * kLeastSigma +
-         kOfWidthAndSpread * peak.width_sq * (around.spread + kLeastSpread);
+  constexpr double kMinSigma = 0.09;
+  constexpr double kWidthTimesSpread = 0.0143;
+  constexpr double kMinSpread = 0.03;
+  return kMinSigma * kMinSigma + kWidthTimesSpread * peak.width_sq * (around.spread + kMinSpread);
 }
 
 }  // namespace
@@ -82,32 +83,34 @@ double varianceOf(const AggregatedPeak& peak, const LocalAgreement& around) {
 DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
                            const DepthExtractionOptions& options) {
   const cv::Mat1f& confidence = dsi.peaks.confidence;
-  const cv::Mat1f excess = excessOf(confidence, options.threshold_kernel);
-  const SparseMask looked_at(standOut(excess, options.min_excess));
-  const std::vector<AggregatedPeak> peaks = aggregateRays(looked_at, dsi.columns, confidence.size());
+  const cv::Mat1f contrast = localContrast(confidence, options.threshold_kernel);
+  const SparseMask candidates(aboveContrast(contrast, options.min_local_contrast));
+  const std::vector<AggregatedPeak> peaks =
+      aggregateColumns(candidates, dsi.columns, confidence.size());
 
-  std::vector<float> positions(looked_at.size());
-  std::vector<float> weights(looked_at.size());
-  looked_at.forEach([&](std::size_t i, cv::Point at) {
+  std::vector<float> positions(candidates.size());
+  std::vector<float> weights(candidates.size());
+  candidates.forEach([&](std::size_t i, cv::Point at) {
     positions[i] = peaks[i].position;
-    weights[i] = excess(at);
+    weights[i] = contrast(at);
   });
   const PeakScale scale = scaleOf(peaks, planes.size());
-  const std::vector<LocalAgreement> around = localAgreement(
-      looked_at, confidence.size(), positions, weights, static_cast<float>(kNear * scale.place));
+  const std::vector<LocalAgreement> around =
+      localAgreement(candidates, confidence.size(), positions, weights,
+                     static_cast<float>(kAgreementSteps * scale.step_planes));
 
   const bool has_inner_planes = planes.size() > 2;
   cv::Mat1b mask = cv::Mat1b::zeros(confidence.size());
   std::vector<PlanePosition> found;
-  looked_at.forEach([&](std::size_t i, cv::Point at) {
+  candidates.forEach([&](std::size_t i, cv::Point at) {
     if (has_inner_planes && peaks[i].at_end) return;
     if (!(qualityOf(weights[i], peaks[i], around[i], scale) > options.min_quality)) return;
     mask(at) = 255;
     found.push_back({around[i].median, varianceOf(peaks[i], around[i])});
   });
-  const SparseMask kept(mask);
-  DepthMap map = depthMapOf(kept, found, confidence, planes);
-  if (options.dilate) dilate(kept, mask, map);
+  const SparseMask sparse(mask);
+  DepthMap map = depthMapOf(sparse, found, confidence, planes);
+  if (options.dilate) dilate(sparse, mask, map);
   return map;
 }
 

@@ -5,19 +5,19 @@
 
 namespace efm {
 
-/// `ExtractionMethod::kAggregated`. The paper takes any peak that stands out from its neighbours in
-/// the image, however flat it is along the ray and whatever its neighbours say. Here:
-/// 1. Look at the pixels whose confidence exceeds its Gaussian surroundings by `min_excess`.
-/// 2. Sum the rays of those around each (`aggregateRays`); the peak of the sum is its depth.
-/// 3. Take the median of the depths in 9x9 pixels, weighted by the excess.
-/// 4. Quality: the excess, less where the summed ray has a second peak nearly as high or is flat
-/// (an
-///    edge along the motion has no depth), where the median differs, and where few of the
-///    neighbours agree. Keep where it is above `min_quality`.
-/// 5. Variance from the width of the peak and the scatter of depths around the pixel.
-/// Peaks on the first and the last plane are not kept where there are planes between: what lies
-/// beyond the planes peaks there.
-/// @param dsi with rays, picked in a window of `threshold_kernel`.
+/// `ExtractionMethod::kAggregated`. The paper takes every peak with enough contrast in the image,
+/// even if the peak is flat along the ray or its neighbours disagree. Here:
+/// 1. Select the pixels whose local contrast is above `min_local_contrast`. Local contrast:
+///    confidence minus its Gaussian mean in a window, over the mean confidence of the keyframe.
+/// 2. Sum the DSI columns around each (`aggregateColumns`); the peak of the sum is its depth.
+/// 3. Take the median of the depths in 9x9 pixels, weighted by local contrast.
+/// 4. Quality: the local contrast, lowered where the summed column has a second peak nearly as high
+///    or is flat (an edge along the motion has no depth), where the depth differs from the median,
+///    and where few neighbours agree. Keep the pixel if it is above `min_quality`.
+/// 5. Variance from the width of the peak and the spread of the depths around the pixel.
+/// Peaks on the first and the last plane are not kept if there are planes between them: points
+/// beyond the planes peak there.
+/// @param dsi with columns, selected in a window of `threshold_kernel`.
 DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
                            const DepthExtractionOptions& options);
 

@@ -17,10 +17,10 @@ namespace {
 
 constexpr float kSigma_px = 1.5F;
 
-/// Finds the peak of a sum of rays.
+/// Finds the peak of a sum of columns.
 class PeakFinder {
  public:
-  explicit PeakFinder(int planes) : planes_(planes), place_(planesOfOnePlace(planes)) {}
+  explicit PeakFinder(int planes) : planes_(planes), step_planes_(planesPerStep(planes)) {}
 
   AggregatedPeak find(const std::vector<float>& sum) const {
     const auto top = std::max_element(sum.begin(), sum.end());
@@ -31,54 +31,54 @@ class PeakFinder {
     peak.at_end = before < 0 || after < 0;
     peak.position = static_cast<float>(peakPosition(plane, before, *top, after));
     peak.width_sq = peakWidthSquared(before, *top, after);
-    // From far to near: each adds what lies between.
+    // From the largest distance to the smallest: each step adds the planes between.
     float second = 0;
     int left = 0;
     int right = planes_;
-    for (std::size_t i = peak.beyond.size(); i-- > 0;) {
-      const double places = AggregatedPeak::kLeastBeside + static_cast<double>(i);
-      const auto beside = static_cast<int>(std::lround(places * place_));
-      second = std::max(
-          {second, largest(sum, left, plane - beside), largest(sum, plane + beside + 1, right)});
-      left = std::max(left, plane - beside);
-      right = std::min(right, plane + beside + 1);
-      peak.beyond[i] = *top > 0 ? second / *top : 1;
+    for (std::size_t i = peak.second_peak.size(); i-- > 0;) {
+      const double steps = AggregatedPeak::kMinSteps + static_cast<double>(i);
+      const auto distance = static_cast<int>(std::lround(steps * step_planes_));
+      second = std::max({second, maximumOf(sum, left, plane - distance),
+                         maximumOf(sum, plane + distance + 1, right)});
+      left = std::max(left, plane - distance);
+      right = std::min(right, plane + distance + 1);
+      peak.second_peak[i] = *top > 0 ? second / *top : 1;
     }
     return peak;
   }
 
  private:
-  static float largest(const std::vector<float>& sum, int begin, int end) {
+  static float maximumOf(const std::vector<float>& sum, int begin, int end) {
     return begin >= end ? 0 : *std::max_element(sum.begin() + begin, sum.begin() + end);
   }
 
   int planes_;
-  double place_;
+  double step_planes_;
 };
 
 }  // namespace
 
-double planesOfOnePlace(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
+double planesPerStep(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
 
-std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiColumns& rays,
-                                          cv::Size size) {
-  const PixelNeighbours neighbours(chosen, size);
-  const PeakFinder finder(rays.planes());
-  std::vector<AggregatedPeak> peaks(chosen.size());
+std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
+                                             const DsiColumns& columns, cv::Size size) {
+  const PixelNeighbours neighbours(candidates, size);
+  const PeakFinder finder(columns.planes());
+  std::vector<AggregatedPeak> peaks(candidates.size());
   std::array<float, 2 * PixelNeighbours::kRadius_px * PixelNeighbours::kRadius_px + 1> weights{};
   for (std::size_t distance_sq = 0; distance_sq < weights.size(); ++distance_sq) {
     weights[distance_sq] = std::exp(-static_cast<float>(distance_sq) / (2 * kSigma_px * kSigma_px));
   }
-  tbb::parallel_for(tbb::blocked_range<int>(0, chosen.rows()), [&](const auto& rows) {
-    std::vector<float> sum(static_cast<std::size_t>(rays.planes()));
+  tbb::parallel_for(tbb::blocked_range<int>(0, candidates.rows()), [&](const auto& rows) {
+    std::vector<float> sum(static_cast<std::size_t>(columns.planes()));
     for (int y = rows.begin(); y < rows.end(); ++y) {
-      for (std::size_t i = chosen.rowBegin(y); i < chosen.rowBegin(y + 1); ++i) {
-        const cv::Point pixel(chosen.column(i), y);
-        assert(rays.has(pixel));
+      for (std::size_t i = candidates.rowBegin(y); i < candidates.rowBegin(y + 1); ++i) {
+        const cv::Point pixel(candidates.column(i), y);
+        assert(columns.has(pixel));
         std::fill(sum.begin(), sum.end(), 0.0F);
         neighbours.forEach(pixel, [&](std::size_t, cv::Point offset) {
-          rays.addTo(sum.data(), pixel + offset,
-                     weights[static_cast<std::size_t>(offset.dot(offset))]);
+          columns.addTo(sum.data(), pixel + offset,
+                        weights[static_cast<std::size_t>(offset.dot(offset))]);
         });
         peaks[i] = finder.find(sum);
       }

@@ -9,30 +9,27 @@
 
 namespace efm {
 
-/// What the rays around a pixel say together.
+/// The peak of the summed DSI columns around a pixel.
 struct AggregatedPeak {
-  float position = 0;  ///< Of the largest sum, between planes.
-  float width_sq = 0;  ///< c / (2c - before - after) there, planes^2; infinite where flat or at an
-                       ///< end.
-  /// The largest sum more than so many places from the peak, as a share of it: by
-  /// `kLeastBeside` places and by each more, to `kMostBeside`. 0 to 1.
-  static constexpr int kLeastBeside = 3;
-  static constexpr int kMostBeside = 12;
-  std::array<float, kMostBeside - kLeastBeside + 1> beyond{};
+  float position = 0;  ///< Between planes.
+  float width_sq = 0;  ///< `peakWidthSquared`.
+  /// The maximum of the sum at a distance from the peak, as a fraction of the peak: element i for
+  /// more than kMinSteps + i steps. 0 to 1.
+  static constexpr int kMinSteps = 3;
+  static constexpr int kMaxSteps = 12;
+  std::array<float, kMaxSteps - kMinSteps + 1> second_peak{};
   bool at_end = false;  ///< The peak lies on the first or the last plane.
 };
 
-/// Sums the rays of the chosen pixels around each chosen pixel, weighted by a Gaussian of the
-/// distance, and finds the peak of the sum and a parabola through it and its neighbours. Only
-/// pixels that stand out are summed: the DSI between edges is noise, and smoothing it all moves
-/// peaks instead of sharpening them.
-/// @param chosen have rays (asserted). @param size of the view.
-/// @return one per chosen pixel. Runs on the threads of the task arena that it is called in.
-std::vector<AggregatedPeak> aggregateRays(const SparseMask& chosen, const DsiColumns& rays,
-                                          cv::Size size);
+/// For each pixel of a mask, sums the DSI columns of the mask's pixels in 9x9 pixels around,
+/// weighted by a Gaussian of the distance, and finds the peak of the sum. Columns of other pixels
+/// are not summed: between edges the DSI is noise, which would move the peaks.
+/// @param candidates pixels with columns (asserted). @param size of the view.
+/// @return one per pixel. Runs on the threads of the task arena that it is called in.
+std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
+                                             const DsiColumns& columns, cv::Size size);
 
-/// Planes that count as one place, for a DSI of so many: with more planes than a hundred, the same
-/// ridge spans more of them.
-double planesOfOnePlace(int planes);
+/// Planes per step: 1 up to a hundred planes, more beyond, where a ridge spans more planes.
+double planesPerStep(int planes);
 
 }  // namespace efm

@@ -29,15 +29,15 @@ void DepthExtractionOptions::validate() const {
   requireOption(max_confidence.level != WhiteLevel::kFixed ||
                     (std::isfinite(max_confidence.fixed) && max_confidence.fixed > 0),
                 "max_confidence", max_confidence.fixed, "finite and above 0");
-  requireOption(min_excess > 0 && std::isfinite(min_excess), "min_excess", min_excess,
-                "finite and above 0");
+  requireOption(min_local_contrast > 0 && std::isfinite(min_local_contrast), "min_local_contrast",
+                min_local_contrast, "finite and above 0");
   requireOption(min_quality >= 0 && std::isfinite(min_quality), "min_quality", min_quality,
                 "finite, 0 or above");
   requireOption(median_size >= 1 && median_size <= 255 && median_size % 2 == 1, "median_size",
                 median_size, "odd, 1 to 255");
 }
 
-bool keepsColumns(ExtractionMethod method) { return method == ExtractionMethod::kAggregated; }
+bool usesColumns(ExtractionMethod method) { return method == ExtractionMethod::kAggregated; }
 
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
                       const DepthExtractionOptions& options,

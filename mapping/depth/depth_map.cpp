@@ -11,19 +11,19 @@ namespace {
 
 constexpr int kFrame = 2;  ///< Pixels cleared at each side of the image.
 
-constexpr std::array<std::array<int, 2>, 4> kBeside{{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
+constexpr std::array<std::array<int, 2>, 4> kAdjacent{{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
 
-/// Whether the pixel at `a` is the better one to copy from.
+/// Whether an empty pixel copies from `a` rather than from `b`.
 bool outranks(const DepthMap& map, cv::Point a, cv::Point b) {
   if (map.confidence(a) != map.confidence(b)) return map.confidence(a) > map.confidence(b);
   return map.depth(a) < map.depth(b);
 }
 
-/// Gives an empty pixel what the best of the kept ones beside it has.
-void fillFromBeside(const cv::Mat1b& mask, cv::Point here, DepthMap& map) {
+/// Copies the best adjacent pixel of the mask into an empty one.
+void fillFromAdjacent(const cv::Mat1b& mask, cv::Point here, DepthMap& map) {
   const cv::Rect inner = insideFrame(mask.size());
   std::optional<cv::Point> best;
-  for (const auto& [dx, dy] : kBeside) {
+  for (const auto& [dx, dy] : kAdjacent) {
     const cv::Point there = here + cv::Point(dx, dy);
     if (!inner.contains(there) || mask(there) == 0) continue;
     if (!best || outranks(map, there, *best)) best = there;
@@ -40,33 +40,34 @@ cv::Rect insideFrame(cv::Size size) {
           std::max(0, size.height - 2 * kFrame)};
 }
 
-DepthMap depthMapOf(const SparseMask& kept, const std::vector<PlanePosition>& positions,
+DepthMap depthMapOf(const SparseMask& mask, const std::vector<PlanePosition>& positions,
                     const cv::Mat1f& confidence, const DepthPlanes& planes) {
   const cv::Size size = confidence.size();
   const cv::Rect inner = insideFrame(size);
   DepthMap result{cv::Mat1f::zeros(size), confidence, cv::Mat1f::zeros(size)};
-  kept.forEach([&](std::size_t i, cv::Point at) {
+  mask.forEach([&](std::size_t i, cv::Point at) {
     if (!inner.contains(at)) return;
     const auto [position, variance] = positions[i];
     const double step = planes.inverseDepthStepAt(position);
     result.depth(at) = static_cast<float>(planes.depthAt(position));
-    // A single plane has no step: 0 times infinite would be nothing at all.
+    // The step of a single plane is 0, and 0 times infinite is not a number.
     result.variance(at) =
         static_cast<float>(std::isinf(variance) ? variance : step * step * variance);
   });
   return result;
 }
 
-// In place: what is filled is not in the mask, and never copied from.
-void dilate(const SparseMask& kept, const cv::Mat1b& mask, DepthMap& map) {
-  map.confidence = map.confidence.clone();  // it was the peaks'
+// In place: filled pixels are not in the mask, so none is copied from.
+void dilate(const SparseMask& sparse, const cv::Mat1b& mask, DepthMap& map) {
+  map.confidence = map.confidence.clone();  // it is shared with the DSI's peaks
   const cv::Rect inner = insideFrame(mask.size());
-  kept.forEach([&](std::size_t, cv::Point at) {
+  sparse.forEach([&](std::size_t, cv::Point at) {
     if (!inner.contains(at)) return;
-    for (const auto& [dx, dy] : kBeside) {
-      const cv::Point beside = at + cv::Point(dx, dy);
-      const bool empty = inner.contains(beside) && mask(beside) == 0 && map.depth(beside) == 0;
-      if (empty) fillFromBeside(mask, beside, map);
+    for (const auto& [dx, dy] : kAdjacent) {
+      const cv::Point adjacent = at + cv::Point(dx, dy);
+      const bool empty =
+          inner.contains(adjacent) && mask(adjacent) == 0 && map.depth(adjacent) == 0;
+      if (empty) fillFromAdjacent(mask, adjacent, map);
     }
   });
 }

@@ -14,13 +14,13 @@
 namespace efm {
 namespace {
 
-/// Of the distance at which others count for the share.
-constexpr float kShareSigma_px = 2;
+/// Of the weight of other pixels by their distance.
+constexpr float kDistanceSigma_px = 2;
 
 /// A position and its weight.
 using Weighted = std::pair<float, float>;
 
-/// The least position that has half of the weight at or below it. Reorders the positions.
+/// The smallest position with at least half of the weight at or below it. Reorders the positions.
 float weightedMedian(std::vector<Weighted>& positions) {
   std::sort(positions.begin(), positions.end());
   double total = 0;
@@ -41,30 +41,30 @@ float medianDistance(std::vector<Weighted>& positions, float from) {
 
 }  // namespace
 
-std::vector<LocalAgreement> localAgreement(const SparseMask& kept, cv::Size size,
+std::vector<LocalAgreement> localAgreement(const SparseMask& mask, cv::Size size,
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near) {
-  const PixelNeighbours neighbours(kept, size);
-  std::vector<LocalAgreement> agreement(kept.size());
-  tbb::parallel_for(tbb::blocked_range<int>(0, kept.rows()), [&](const auto& rows) {
+  const PixelNeighbours neighbours(mask, size);
+  std::vector<LocalAgreement> agreement(mask.size());
+  tbb::parallel_for(tbb::blocked_range<int>(0, mask.rows()), [&](const auto& rows) {
     std::vector<Weighted> around;
     for (int y = rows.begin(); y < rows.end(); ++y) {
-      for (std::size_t i = kept.rowBegin(y); i < kept.rowBegin(y + 1); ++i) {
+      for (std::size_t i = mask.rowBegin(y); i < mask.rowBegin(y + 1); ++i) {
         around.clear();
         float agreeing = 0;
         float others = 0;
-        neighbours.forEach({kept.column(i), y}, [&](std::size_t j, cv::Point offset) {
+        neighbours.forEach({mask.column(i), y}, [&](std::size_t j, cv::Point offset) {
           around.emplace_back(positions[j], weights[j]);
           if (i == j) return;
           const auto distance_sq = static_cast<float>(offset.dot(offset));
           const float weight =
-              weights[j] * std::exp(-distance_sq / (2 * kShareSigma_px * kShareSigma_px));
+              weights[j] * std::exp(-distance_sq / (2 * kDistanceSigma_px * kDistanceSigma_px));
           others += weight;
           if (std::abs(positions[j] - positions[i]) < near) agreeing += weight;
         });
         agreement[i].median = weightedMedian(around);
         agreement[i].spread = medianDistance(around, agreement[i].median);
-        agreement[i].share = others > 0 ? agreeing / others : 0;
+        agreement[i].agreeing_fraction = others > 0 ? agreeing / others : 0;
       }
     }
   });

@@ -8,18 +8,19 @@
 
 namespace efm {
 
-/// How a pixel's depth stands among those around it, in 9x9 pixels.
+/// A pixel's depth compared with the depths around it, in 9x9 pixels.
 struct LocalAgreement {
-  float median = 0;  ///< Of the positions around it, its own included, weighted; planes.
-  float spread = 0;  ///< Median distance of these from their median, planes.
-  /// Share of the others that are near its own position, weighted, those close by more: 0 to 1.
-  float share = 0;
+  float median = 0;  ///< Weighted median of the positions, its own included; planes.
+  float spread = 0;  ///< Median distance of the positions from `median`; planes.
+  /// Weighted fraction of the other pixels with a position near its own, 0 to 1. The weight falls
+  /// with the distance in the image.
+  float agreeing_fraction = 0;
 };
 
-/// @param positions of the kept pixels, in planes. @param weights above 0.
-/// @param near within so many planes counts as near.
-/// @return one per kept pixel. Runs on the threads of the task arena that it is called in.
-std::vector<LocalAgreement> localAgreement(const SparseMask& kept, cv::Size size,
+/// @param positions of the mask's pixels, in planes. @param weights above 0.
+/// @param near positions closer than this agree, planes.
+/// @return one per pixel of the mask. Runs on the threads of the task arena that it is called in.
+std::vector<LocalAgreement> localAgreement(const SparseMask& mask, cv::Size size,
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near);
 

@@ -7,14 +7,15 @@
 
 namespace efm {
 
-/// For each kept pixel the lower median of the values of the kept pixels in the window around it,
-/// itself included: of n values in order the one at (n - 1) / 2.
+/// For each pixel of the mask, the lower median of the values in the window around it, itself
+/// included: of n values in order, the one with index (n - 1) / 2. Pixels outside the mask have no
+/// value.
 ///
-/// Cost: per pixel the window's side, not its area, and next to nothing for pixels that are not
-/// kept; memory: 20 bytes per kept pixel while it runs.
-/// @param values one per kept pixel, not NaN.
+/// Cost: per pixel of the mask, the side of the window, not its area. Memory: 20 bytes per pixel of
+/// the mask, temporarily.
+/// @param values one per pixel of the mask, not NaN.
 /// @param window side in pixels, odd.
-std::vector<float> maskedMedian(const SparseMask& kept, const std::vector<float>& values,
+std::vector<float> maskedMedian(const SparseMask& mask, const std::vector<float>& values,
                                 int window);
 
 }  // namespace efm

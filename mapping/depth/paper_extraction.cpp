@@ -16,9 +16,9 @@ double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
                std::optional<double> sequence_maximum) {
   if (option.level == WhiteLevel::kFixed) return option.fixed;
   if (option.level == WhiteLevel::kSequence && sequence_maximum) return *sequence_maximum;
-  double largest = 0;
-  cv::minMaxLoc(confidence, nullptr, &largest);
-  return largest;
+  double maximum = 0;
+  cv::minMaxLoc(confidence, nullptr, &maximum);
+  return maximum;
 }
 
 /// Grey values of the confidence: 255 at `white`.
@@ -28,18 +28,18 @@ cv::Mat1b quantise(const cv::Mat1f& confidence, double white) {
   return grey;
 }
 
-/// Adaptive Gaussian thresholding: non-zero where a pixel stands out from its surroundings.
-cv::Mat1b standOut(const cv::Mat1b& grey, const DepthExtractionOptions& options) {
+/// Adaptive Gaussian thresholding: non-zero where a pixel is above its surroundings by more than C.
+cv::Mat1b adaptiveThreshold(const cv::Mat1b& grey, const DepthExtractionOptions& options) {
   cv::Mat1b mask;
   cv::adaptiveThreshold(grey, mask, 1, cv::ADAPTIVE_THRESH_GAUSSIAN_C, cv::THRESH_BINARY,
                         options.threshold_kernel, -options.threshold_c);
   return mask;
 }
 
-/// Positions of the kept peaks between planes.
-std::vector<float> positionsOf(const DsiPeaks& peaks, const SparseMask& kept, bool subplane) {
-  std::vector<float> positions(kept.size());
-  kept.forEach([&](std::size_t i, cv::Point at) {
+/// Positions of the peaks between planes.
+std::vector<float> positionsOf(const DsiPeaks& peaks, const SparseMask& mask, bool subplane) {
+  std::vector<float> positions(mask.size());
+  mask.forEach([&](std::size_t i, cv::Point at) {
     const int plane = peaks.plane(at);
     positions[i] = static_cast<float>(
         subplane ? peakPosition(plane, peaks.before(at), peaks.confidence(at), peaks.after(at))
@@ -55,16 +55,16 @@ DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
                         std::optional<double> sequence_maximum) {
   options.validate();
   const double white = whiteOf(peaks.confidence, options.max_confidence, sequence_maximum);
-  const cv::Mat1b mask = standOut(quantise(peaks.confidence, white), options);
-  const SparseMask kept(mask);
-  const std::vector<float> positions = positionsOf(peaks, kept, options.subplane);
-  const std::vector<float> medians = maskedMedian(kept, positions, options.median_size);
-  std::vector<PlanePosition> found(kept.size());
-  kept.forEach([&](std::size_t i, cv::Point at) {
+  const cv::Mat1b mask = adaptiveThreshold(quantise(peaks.confidence, white), options);
+  const SparseMask sparse(mask);
+  const std::vector<float> positions = positionsOf(peaks, sparse, options.subplane);
+  const std::vector<float> medians = maskedMedian(sparse, positions, options.median_size);
+  std::vector<PlanePosition> found(sparse.size());
+  sparse.forEach([&](std::size_t i, cv::Point at) {
     found[i] = {medians[i], peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at))};
   });
-  DepthMap map = depthMapOf(kept, found, peaks.confidence, planes);
-  if (options.dilate) dilate(kept, mask, map);
+  DepthMap map = depthMapOf(sparse, found, peaks.confidence, planes);
+  if (options.dilate) dilate(sparse, mask, map);
   return map;
 }
 

@@ -6,8 +6,8 @@
 
 namespace efm {
 
-/// The maximum of a sequence that a few outliers don't move: its 95th percentile (nearest rank),
-/// which is the plain maximum of fewer than twenty values.
+/// A maximum that is robust to a few outliers: the 95th percentile (nearest rank). Of fewer than
+/// twenty values it is the maximum itself.
 class RobustMaximum {
  public:
   /// @param value finite. Cost: linear in the number of values, 8 bytes each.

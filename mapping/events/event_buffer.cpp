@@ -15,8 +15,6 @@ std::size_t EventBuffer::indexOf(std::int64_t t_ns) const {
   return static_cast<std::size_t>(first - events.begin());
 }
 
-void EventBuffer::coverUntil(std::int64_t t_ns) { covered_ns = std::max(covered_ns, t_ns); }
-
 std::uint64_t EventBuffer::insert(const std::vector<Event>& added) {
   std::int64_t newest = begin < events.size() ? events.back().t_ns : kMinTimeNs;
   std::int64_t earliest_late = kMaxTimeNs;
@@ -28,20 +26,12 @@ std::uint64_t EventBuffer::insert(const std::vector<Event>& added) {
     }
     newest = std::max(newest, event.t_ns);
   }
+  // Times are whole: the first event later than the earliest late one. The old events are sorted.
+  const std::size_t first_unsorted = late > 0 ? indexOf(earliest_late + 1) : 0;
   events.insert(events.end(), added.begin(), added.end());
   used.resize(events.size(), 0);
-  if (late > 0) sortFrom(indexOfUnsorted(earliest_late, events.size() - added.size()));
+  if (late > 0) sortFrom(first_unsorted);
   return late;
-}
-
-/// The first event before `end`, up to which events are sorted, that is later than a time; or
-/// `end`.
-std::size_t EventBuffer::indexOfUnsorted(std::int64_t t_ns, std::size_t end) const {
-  const auto first =
-      std::upper_bound(events.begin() + static_cast<std::ptrdiff_t>(begin),
-                       events.begin() + static_cast<std::ptrdiff_t>(end), t_ns,
-                       [](std::int64_t time, const Event& event) { return time < event.t_ns; });
-  return static_cast<std::size_t>(first - events.begin());
 }
 
 void EventBuffer::sortFrom(std::size_t index) {

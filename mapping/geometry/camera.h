@@ -7,7 +7,7 @@
 
 namespace efm {
 
-/// How a lens bends the pinhole image. The coefficients are OpenCV's, in OpenCV's order.
+/// Distortion of the lens. Coefficients are OpenCV's, in OpenCV's order.
 enum class DistortionModel {
   kNone,         ///< No coefficients.
   kRadtan,       ///< Brown-Conrady: k1 k2 p1 p2 [k3], 4 or 5 coefficients.
@@ -16,7 +16,7 @@ enum class DistortionModel {
 
 /// "none", "radtan" or "equidistant": Kalibr's names.
 std::string_view nameOf(DistortionModel model);
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 DistortionModel distortionModelFromName(std::string_view name);
 
 /// Intrinsic calibration of one camera: frame `cam` has x right, y down, z forward; integer pixel

@@ -31,11 +31,11 @@ CameraMotion::CameraMotion(const TrajectorySegment& segment, const Rigid3& T_ref
 
 Rigid3 CameraMotion::poseAt(std::int64_t t_ns) const {
   const double fraction = per_ns_ * static_cast<double>(t_ns - first_ns_);
-  const bool turns = sine_ > 0;
-  const double share0 = turns ? std::sin((1 - fraction) * angle_) / sine_ : 1 - fraction;
-  const double share1 = turns ? std::sin(fraction * angle_) / sine_ : fraction;
+  const bool rotates = sine_ > 0;
+  const double weight0 = rotates ? std::sin((1 - fraction) * angle_) / sine_ : 1 - fraction;
+  const double weight1 = rotates ? std::sin(fraction * angle_) / sine_ : fraction;
   Rigid3 T_ref_cam;
-  T_ref_cam.rotation.coeffs() = share0 * R_ref_cam0_.coeffs() + share1 * R_ref_cam1_.coeffs();
+  T_ref_cam.rotation.coeffs() = weight0 * R_ref_cam0_.coeffs() + weight1 * R_ref_cam1_.coeffs();
   T_ref_cam.rotation.normalize();
   T_ref_cam.translation = rig0_ref_ + fraction * step_ref_ + T_ref_cam.rotation * lever_cam_;
   return T_ref_cam;

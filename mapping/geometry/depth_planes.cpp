@@ -15,7 +15,7 @@ constexpr NamedChoice<PlaneSpacing> kSpacings[] = {
     {PlaneSpacing::kLinear, "linear"},
 };
 
-/// The quantity that is uniform over the planes, and back: both maps are their own inverse.
+/// Depth to the quantity that is uniform over the planes, and back: the map is its own inverse.
 double uniformOf(PlaneSpacing spacing, double depth_m) {
   return spacing == PlaneSpacing::kInverse ? 1.0 / depth_m : depth_m;
 }

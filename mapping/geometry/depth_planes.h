@@ -12,7 +12,7 @@ enum class PlaneSpacing {
 };
 
 std::string_view nameOf(PlaneSpacing spacing);
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 PlaneSpacing planeSpacingFromName(std::string_view name);
 
 struct DepthPlanesOptions {
@@ -35,15 +35,14 @@ class DepthPlanes {
   int size() const { return static_cast<int>(depths_.size()); }
   /// Depth of a plane in metres.
   double depth(int plane) const { return depths_[static_cast<std::size_t>(plane)]; }
-  /// Depth at a position between planes (0 = the nearest plane, size() - 1 = the farthest).
+  /// Depth at a position between planes: 0 is the nearest plane, size() - 1 the farthest.
   double depthAt(double position) const;
-  /// Position of a depth between the planes: the inverse of `depthAt`, not limited to the range.
+  /// Position of a depth between planes: the inverse of `depthAt`, also outside the range.
   double positionOf(double depth_m) const;
-  /// Distance of two neighbouring planes in inverse depth (1/m) at the near limit: everywhere the
-  /// same with inverse spacing. 0 with one plane.
+  /// Distance of the two nearest planes in inverse depth, 1/m. Inverse spacing has the same
+  /// distance everywhere. 0 with one plane.
   double inverseDepthStep() const;
-  /// That distance around a position between planes, which changes with it with linear spacing.
-  /// @param position 0 to size() - 1.
+  /// Distance of neighbouring planes around a position, 1/m. @param position 0 to size() - 1.
   double inverseDepthStepAt(double position) const;
 
  private:

@@ -17,14 +17,14 @@ void requireSide(const std::optional<int>& side, const char* key) {
   requireOption(!side || (*side >= 1 && *side <= kMaxSide), key, side.value_or(0), "1 to 65535");
 }
 
-/// A view of more pixels is a mistake that would end without memory.
+/// More pixels are a mistake that would exhaust the memory.
 void requirePixels(std::int64_t width, std::int64_t height) {
   constexpr std::int64_t kMaxPixels = std::int64_t{1} << 26;
   requireOption(width * height <= kMaxPixels, "width", width,
                 "at most 67108864 pixels together with the height of " + std::to_string(height));
 }
 
-/// A side of the image that follows from the other one.
+/// One side of the image, given the other, with the camera's aspect ratio.
 int sideInProportion(int other, int own_of_camera, int other_of_camera) {
   const double side = static_cast<double>(other) * own_of_camera / other_of_camera;
   return std::clamp(static_cast<int>(std::lround(side)), 1, kMaxSide);
@@ -56,7 +56,7 @@ ReferenceView makeReferenceView(const CameraModel& model, const ReferenceViewOpt
   }
   requirePixels(view.width, view.height);
   if (options.fov_deg) {
-    // Pixels are squares around their centres: the image reaches from -0.5 to width - 0.5.
+    // Pixels are squares around their centres: the image extends from -0.5 to width - 0.5.
     view.fx = 0.5 * view.width / std::tan(0.5 * *options.fov_deg * kPi / 180.0);
     view.fy = view.fx * model.fy / model.fx;
     view.cx = 0.5 * (view.width - 1);

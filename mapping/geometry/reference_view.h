@@ -9,14 +9,14 @@
 
 namespace efm {
 
-/// The undistorted pinhole view that a keyframe's DSI and depth map live in: frame `ref`, x right,
-/// y down, z forward. Images of it are row-major, width x height; integers are pixel centres.
+/// The undistorted pinhole view of a keyframe's DSI and depth map. Frame `ref`: x right, y down, z
+/// forward. Images are row-major, width x height; integer coordinates are pixel centres.
 struct ReferenceView {
   int width = 0;
   int height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0;  ///< Pixels.
 
-  /// The view of a camera without its distortion: the same size and intrinsics.
+  /// A camera's view without distortion: the same size and intrinsics.
   static ReferenceView of(const CameraModel& model) {
     return {model.width, model.height, model.fx, model.fy, model.cx, model.cy};
   }
@@ -35,11 +35,11 @@ struct ReferenceView {
 };
 
 struct ReferenceViewOptions {
-  /// Horizontal field of view in degrees, above 0 and below 180, with square or not square pixels
-  /// as the camera's and the principal point in the middle; the camera's own view where not given.
+  /// Horizontal field of view in degrees, above 0 and below 180. Pixels keep the camera's aspect
+  /// ratio, the principal point is the image's centre. Not given: the camera's own intrinsics.
   std::optional<double> fov_deg;
-  /// Size in pixels, 1 to 65,535, and at most 2^26 pixels together. Not given: the camera's; one
-  /// alone keeps the shape of its image.
+  /// Size in pixels, 1 to 65,535 each, at most 2^26 pixels in all. Not given: the camera's. If only
+  /// one is given, the other follows by the camera's aspect ratio.
   std::optional<int> width;
   std::optional<int> height;
   /// Shift along the view's own axes (x right, y down, z forward), metres.
@@ -49,8 +49,8 @@ struct ReferenceViewOptions {
   void validate() const;
 };
 
-/// The view of a camera without its distortion, with the field of view and size of the options. A
-/// size alone keeps the camera's field of view: the same image at another resolution.
+/// A camera's view without distortion, with the field of view and size of the options. A size
+/// without a field of view keeps the camera's: the same image at another resolution.
 /// @throws std::invalid_argument where the options are not valid.
 ReferenceView makeReferenceView(const CameraModel& model, const ReferenceViewOptions& options);
 

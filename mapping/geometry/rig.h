@@ -16,7 +16,7 @@ struct RigCamera {
   std::int64_t time_offset_ns = 0;  ///< Added to the camera's stamps: t = t_event + offset.
 };
 
-/// Any number of calibrated cameras, rigidly attached and synchronised.
+/// Calibrated and synchronised cameras, rigidly attached to each other.
 struct Rig {
   std::vector<RigCamera> cameras;
 };

@@ -9,30 +9,31 @@
 
 namespace efm {
 
-/// Time is integer nanoseconds everywhere: a double holds today's Unix time only to about 240 ns.
+/// Time is integer nanoseconds everywhere: a double resolves today's Unix time to about 240 ns
+/// only.
 
 inline constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
 
 inline constexpr std::int64_t kMaxTimeNs = std::numeric_limits<std::int64_t>::max();
 inline constexpr std::int64_t kMinTimeNs = std::numeric_limits<std::int64_t>::min();
 
-/// Later than any time in a recording (the year 2116), and its negative earlier; half the range, so
-/// that sums and differences of times stay inside it.
+/// Times of recordings lie within [-kEndOfTimeNs, kEndOfTimeNs] (the year 2116). Half the range, so
+/// that sums and differences of times do not overflow.
 inline constexpr std::int64_t kEndOfTimeNs = kMaxTimeNs / 2;
 
 /// Parses decimal seconds ("12", "-0.5", "1.5e-3", "1700000000.123456789") to nanoseconds without
 /// passing through a double. Digits past the ninth decimal are rounded to the nearest nanosecond.
-/// @return nothing where the text is not a number from end to end, or does not fit 64 bits.
+/// @return nothing where the text is not a number from end to end or does not fit 64 bits.
 std::optional<std::int64_t> parseSeconds(std::string_view text);
 
 /// Decimal seconds with nine decimals ("%.9f"), exact.
 std::string formatSeconds(std::int64_t t_ns);
 
-/// Nearest nanosecond of a duration in seconds. For durations, not for absolute times.
+/// A duration in seconds, rounded to nanoseconds. Not for absolute times.
 /// @throws std::invalid_argument where it is not finite or does not fit 64 bits.
 std::int64_t durationFromSeconds(double duration_s);
 
-/// A difference of two times, in seconds.
+/// to - from, in seconds.
 inline double secondsBetween(std::int64_t from_ns, std::int64_t to_ns) {
   return static_cast<double>(to_ns - from_ns) * 1e-9;
 }

@@ -11,23 +11,23 @@
 
 namespace efm {
 
-/// Where the rig was at one instant.
+/// The rig's pose at one time.
 struct StampedPose {
   std::int64_t t_ns = 0;
   Rigid3 T_world_rig;
 };
 
 struct TrajectoryOptions {
-  /// Two neighbouring poses further apart than this say nothing about the time between them.
-  /// Range: above 0. Real recordings have gaps up to 0.13 s that are still well interpolated.
+  /// Between two neighbouring poses with a longer gap there is no pose. Above 0. Real recordings
+  /// have gaps up to 0.13 s that interpolation still bridges well.
   double max_pose_gap_s = 0.25;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// A stretch of time in which the motion is one linear (and one slerp) piece. Both ends belong to
-/// it; where a single pose stands alone they coincide.
+/// Two neighbouring poses and the closed interval between them; both are the same pose where a pose
+/// has a gap after it.
 struct TrajectorySegment {
   StampedPose first;
   StampedPose last;
@@ -36,32 +36,32 @@ struct TrajectorySegment {
   Rigid3 poseAt(std::int64_t t_ns) const;
 };
 
-/// The rig's motion: poses in time order, linear in position and slerp in rotation between them.
+/// The rig's motion: poses in time order; between them, linear in position and slerp in rotation.
 /// Never extrapolates. Not thread-safe while poses are added; queries are const.
 class Trajectory {
  public:
   explicit Trajectory(const TrajectoryOptions& options = {});
 
-  /// Takes a pose, in any order of time; cost is constant for the newest. Of two poses with the
-  /// same time the first stands. @return false where the pose was such a duplicate.
-  /// @throws std::invalid_argument where the pose is not finite, its rotation has no length, or its
-  /// time lies beyond kEndOfTimeNs.
+  /// Adds a pose at any time; cost is constant for the newest. Of two poses at the same time the
+  /// first one stays. @return false for such a duplicate.
+  /// @throws std::invalid_argument where the pose is not finite, its quaternion has no length, or
+  /// its time lies beyond kEndOfTimeNs.
   bool add(const StampedPose& pose);
 
-  /// May forget what is not needed for times from `t_ns` on; cost is constant on average.
+  /// May remove poses that times from `t_ns` on do not need; cost is constant on average.
   void forgetBefore(std::int64_t t_ns);
 
-  /// T_world_rig, or nothing outside the recorded times and inside a gap. A time that a pose was
-  /// recorded at has that pose, whatever surrounds it.
+  /// T_world_rig; nothing outside the recorded times and inside a gap. At a recorded time always
+  /// the recorded pose.
   std::optional<Rigid3> poseAt(std::int64_t t_ns) const;
 
-  /// The segment that holds `t_ns`; at a recorded time the one that begins there, if there is one.
-  /// `cursor` is any number at first and then what the previous call left: neighbouring queries
-  /// cost no search.
+  /// The segment that contains `t_ns`; at a recorded time the one that begins there, if there is
+  /// one.
+  /// @param cursor any number at first; then its value after the previous call, so that nearby
+  /// queries need no search.
   std::optional<TrajectorySegment> segmentAt(std::int64_t t_ns, std::size_t& cursor) const;
 
-  /// The poses that matter from one time to another, each put where `T_world_moved` says; gaps stay
-  /// gaps.
+  /// The poses that [from, to] needs, each replaced by its `T_world_moved`; gaps stay gaps.
   Trajectory moved(std::int64_t from_ns, std::int64_t to_ns,
                    const std::function<Rigid3(const StampedPose&)>& T_world_moved) const;
 

@@ -7,7 +7,7 @@
 namespace efm {
 namespace {
 
-/// OpenCV's default of 5 iterations leaves errors of tenths of a pixel in the corners.
+/// OpenCV's default of 5 iterations leaves errors of some tenths of a pixel in the corners.
 constexpr int kIterations = 50;
 constexpr double kEpsilon = 1e-12;
 

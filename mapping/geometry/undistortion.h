@@ -12,12 +12,12 @@ namespace efm {
 /// (X/Z, Y/Z) of the rays through the centres of the raw pixels of row `y`, frame `cam`.
 std::vector<Eigen::Vector2d> viewingRays(const CameraModel& model, int y);
 
-/// The viewing ray of every pixel of one camera, computed once through OpenCV's iterative
-/// undistortion and looked up per event.
+/// The viewing ray of every pixel of one camera: computed once by OpenCV's iterative undistortion,
+/// then looked up per event.
 ///
-/// Kept as floats: looking up costs a random access to memory per event, and half the table is half
-/// the caches. A ray is rounded by at most 2^-25 of itself, 2e-5 pixels at the corner of an HD
-/// image.
+/// Stored as floats: a look-up is a random access to memory, and the smaller table fits the caches
+/// better. The relative rounding error of a ray is at most 2^-25: 2e-5 pixels at the corner of an
+/// HD image.
 class UndistortionTable {
  public:
   /// Cost: one undistortion per pixel; memory: 8 bytes per pixel.
@@ -32,7 +32,7 @@ class UndistortionTable {
     const auto row = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
     return rays_[row + static_cast<std::size_t>(x)].cast<double>();
   }
-  /// The same of all pixels, row-major: pixel (x, y) has element y * width() + x.
+  /// The rays of all pixels, row-major: pixel (x, y) has element y * width() + x.
   const Eigen::Vector2f* rays() const { return rays_.data(); }
 
  private:

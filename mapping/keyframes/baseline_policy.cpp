@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t kMaxSeenPoints = 500;
 constexpr int kGridSide = 10;
 
-/// What a view sees at one depth, before a keyframe tells better: points spread over its image.
+/// A grid of points over the image of a view, all at one depth.
 std::vector<Eigen::Vector3d> pointsAcross(const ReferenceView& view, const Rigid3& T_world_ref,
                                           double depth_m) {
   std::vector<Eigen::Vector3d> points;
@@ -26,8 +26,8 @@ std::vector<Eigen::Vector3d> pointsAcross(const ReferenceView& view, const Rigid
   return points;
 }
 
-double shareInView(const std::vector<Eigen::Vector3d>& points_world, const Rigid3& T_world_ref,
-                   const ReferenceView& view) {
+double visibleFraction(const std::vector<Eigen::Vector3d>& points_world, const Rigid3& T_world_ref,
+                       const ReferenceView& view) {
   const Rigid3 T_ref_world = T_world_ref.inverse();
   const auto in_view = [&](const Eigen::Vector3d& p_world) {
     const Eigen::Vector3d p_ref = T_ref_world * p_world;
@@ -42,10 +42,10 @@ double shareInView(const std::vector<Eigen::Vector3d>& points_world, const Rigid
 
 struct SeenPoints {
   double mean_depth_m = 0;
-  std::vector<Eigen::Vector3d> points_world;  ///< Some of them, spread over the image.
+  std::vector<Eigen::Vector3d> points_world;  ///< At most 500 or so, spread over the image.
 };
 
-SeenPoints seenIn(const KeyframeDepthMap& keyframe) {
+SeenPoints pointsOf(const KeyframeDepthMap& keyframe) {
   std::vector<cv::Point> pixels;
   cv::findNonZero(keyframe.map.depth > 0, pixels);
   SeenPoints seen;
@@ -67,11 +67,11 @@ BaselinePolicy::BaselinePolicy(const KeyframePolicyOptions& options, double dept
       window_ns_(durationFromSeconds(options.window_s)),
       stride_ns_(durationFromSeconds(options.stride_s)),
       mean_depth_m_(depth_guess_m),
-      grown_ns_(stride_ns_) {}
+      duration_ns_(stride_ns_) {}
 
 void BaselinePolicy::startAt(std::int64_t t_ns) {
   next_ns_ = t_ns;
-  grown_ns_ = stride_ns_;
+  duration_ns_ = stride_ns_;
 }
 
 std::optional<Window> BaselinePolicy::current(const RecordingProgress& recording) {
@@ -79,8 +79,8 @@ std::optional<Window> BaselinePolicy::current(const RecordingProgress& recording
     const auto t0_ns = recording.timeOfEvent(earliestStart(recording), 1);
     if (!t0_ns) return std::nullopt;
     const auto T_world_ref0 = recording.viewPoseAt(*t0_ns);
-    for (; T_world_ref0 && grown_ns_ <= window_ns_; grown_ns_ += stride_ns_) {
-      const std::int64_t t1_ns = *t0_ns + grown_ns_;
+    for (; T_world_ref0 && duration_ns_ <= window_ns_; duration_ns_ += stride_ns_) {
+      const std::int64_t t1_ns = *t0_ns + duration_ns_;
       if (t1_ns > recording.completeNs()) return std::nullopt;
       const auto T_world_ref1 = recording.viewPoseAt(t1_ns);
       if (T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
@@ -95,11 +95,11 @@ bool BaselinePolicy::isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_
                               const ReferenceView& view) const {
   const double baseline_m = (T_world_ref1.translation - T_world_ref0.translation).norm();
   if (baseline_m >= options_.min_baseline_ratio * mean_depth_m_) return true;
-  const double share =
+  const double fraction =
       seen_world_.empty()
-          ? shareInView(pointsAcross(view, T_world_ref0, mean_depth_m_), T_world_ref1, view)
-          : shareInView(seen_world_, T_world_ref1, view);
-  return share < options_.min_visible_share;
+          ? visibleFraction(pointsAcross(view, T_world_ref0, mean_depth_m_), T_world_ref1, view)
+          : visibleFraction(seen_world_, T_world_ref1, view);
+  return fraction < options_.min_visible_fraction;
 }
 
 std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) const {
@@ -109,10 +109,10 @@ std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) c
 void BaselinePolicy::advance(const Window& window, const KeyframeDepthMap* keyframe) {
   startAt(window.t1_ns);
   if (keyframe == nullptr) return;
-  SeenPoints seen = seenIn(*keyframe);
+  SeenPoints seen = pointsOf(*keyframe);
   if (!seen.points_world.empty()) mean_depth_m_ = seen.mean_depth_m;
-  // Also where it saw nothing: points of an older one that are out of view now would end every
-  // window after one stride, too short to see anything again.
+  // Also if the keyframe has no points: points of an older one, out of view by now, would end every
+  // window after one stride, too early for new points.
   seen_world_ = std::move(seen.points_world);
 }
 

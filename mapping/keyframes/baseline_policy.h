@@ -10,15 +10,16 @@
 
 namespace efm {
 
-/// A window starts with the first event after the one before it and grows, stride by stride, until
-/// the reference camera has moved far enough from where it was at the window's start, compared with
-/// the scene's mean depth, or has turned away from what it saw: the last keyframe's points, and
-/// where there are none a view full of points at the mean depth, at first a guess. So a keyframe
-/// has the parallax that depth needs, however fast or slow the motion (Rebecq et al., IJCV 2018,
-/// Sec. 7).
+/// A window starts with the first event after the previous window and grows, stride by stride,
+/// until one of two conditions holds:
+/// - the reference camera has moved by a fraction of the scene's mean depth since the window's
+/// start;
+/// - too few points of the last keyframe are in view. Without such points, a grid of points at the
+///   mean depth takes their part.
+/// So a keyframe has enough parallax at any speed (Rebecq et al., IJCV 2018, Sec. 7).
 ///
-/// Where the longest window is not enough the start moves on by a stride: events of standing still
-/// are in no window.
+/// If the longest window is not enough, its start moves on by a stride: the events of a camera at
+/// rest are in no window.
 class BaselinePolicy : public KeyframePolicy {
  public:
   BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m);
@@ -26,7 +27,7 @@ class BaselinePolicy : public KeyframePolicy {
   std::optional<Window> current(const RecordingProgress& recording) override;
   std::int64_t earliestStart(const RecordingProgress& recording) const override;
   void advance(const Window& window, const KeyframeDepthMap* keyframe) override;
-  /// No window is without events.
+  /// Every window has events: none is skipped.
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
 
  private:
@@ -39,8 +40,8 @@ class BaselinePolicy : public KeyframePolicy {
   std::int64_t stride_ns_;
   double mean_depth_m_;
   std::vector<Eigen::Vector3d> seen_world_;  // points of the last keyframe
-  std::optional<std::int64_t> next_ns_;      // no window begins before
-  std::int64_t grown_ns_;                    // the duration to try next
+  std::optional<std::int64_t> next_ns_;      // earliest start of the next window
+  std::int64_t duration_ns_;                 // the next candidate
 };
 
 }  // namespace efm

@@ -15,39 +15,38 @@
 
 namespace efm {
 
-/// What one camera alone would have seen of a keyframe, in the keyframe's view.
+/// A keyframe's depth map from one camera alone, in the keyframe's view.
 struct CameraDepthMap {
   int camera = 0;  ///< Index in the rig.
   DepthMap map;
 };
 
-/// One camera's events of a window, counted where they fired: of the size of its sensor.
+/// One camera's events of a window, counted per pixel of its sensor.
 struct EventImage {
   int camera = 0;              ///< Index in the rig.
-  cv::Mat_<cv::Vec2i> counts;  ///< Per raw pixel: events that became darker, brighter.
+  cv::Mat_<cv::Vec2i> counts;  ///< Per raw pixel: negative, positive events.
 };
 
-/// What one window of events became.
+/// The depth map of one window of events.
 struct KeyframeDepthMap {
   Window window;
   Rigid3 T_world_ref;  ///< Pose of the reference view.
   ReferenceView view;
   DepthMap map;
-  double largest_confidence = 0;  ///< Of all pixels, kept or not.
-  /// By which the tracker's motion in the window was corrected; none where it stood as it was.
+  double max_confidence = 0;  ///< Over all pixels, with depth or without.
+  /// Of the tracker's motion in the window, if there was one.
   std::optional<VelocityCorrection> motion_correction;
 
   /// Events that voted, per camera of the rig (0: not selected).
   std::vector<std::uint64_t> events;
   std::uint64_t without_pose = 0;   ///< Events of the window that had no pose.
   VoteCounts votes;                 ///< Summed over cameras.
-  std::vector<int> silent_cameras;  ///< Selected, but without an event to vote.
-  /// Sub-intervals (of all slices of time) without an event to vote, summed over the cameras that
-  /// are not silent.
+  std::vector<int> silent_cameras;  ///< Selected cameras without an event that voted.
+  /// Sub-intervals (of all time slices) without an event that voted, summed over the other cameras.
   std::uint64_t silent_subintervals = 0;
 
-  std::vector<CameraDepthMap> camera_maps;  ///< Of the cameras that were fused, where asked for.
-  std::vector<EventImage> event_images;     ///< Of the selected cameras, where asked for.
+  std::vector<CameraDepthMap> camera_maps;  ///< Of the fused cameras, if the options ask for them.
+  std::vector<EventImage> event_images;     ///< Of the selected cameras, if asked for.
 };
 
 }  // namespace efm

@@ -56,8 +56,8 @@ class PeriodPolicy : public KeyframePolicy {
   std::int64_t index_ = 0;
 };
 
-/// A window starts with the first event after the one before it and ends right after its last one;
-/// events of that same time belong to it too.
+/// A window starts with the first event after the previous window, and ends right after its last
+/// event: further events of the same time belong to it too.
 class EventsPolicy : public KeyframePolicy {
  public:
   explicit EventsPolicy(const KeyframePolicyOptions& options)
@@ -125,8 +125,8 @@ void KeyframePolicyOptions::validate() const {
   requireOption(window_events >= 1, "window_events", window_events, "1 or above");
   requireOption(min_baseline_ratio > 0 && min_baseline_ratio <= 10, "min_baseline_ratio",
                 min_baseline_ratio, "above 0, at most 10");
-  requireOption(min_visible_share >= 0 && min_visible_share <= 1, "min_visible_share",
-                min_visible_share, "0 to 1");
+  requireOption(min_visible_fraction >= 0 && min_visible_fraction <= 1, "min_visible_fraction",
+                min_visible_fraction, "0 to 1");
 }
 
 std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& options,

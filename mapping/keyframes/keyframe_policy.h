@@ -14,61 +14,63 @@ namespace efm {
 
 enum class KeyframePolicyKind {
   kPeriod,    ///< A window of fixed duration at every stride.
-  kEvents,    ///< Windows of a number of events, one after the other.
-  kBaseline,  ///< Windows that last until the camera has moved enough.
+  kEvents,    ///< Consecutive windows with a fixed number of events.
+  kBaseline,  ///< Consecutive windows that end once the camera has moved enough.
 };
 
-/// Where in its window the reference view stands.
+/// The time of the reference view within its window.
 enum class ReferenceTime {
   kMiddle,
-  kEnd,  ///< For vehicles that look where they go.
+  kEnd,  ///< For forward-looking vehicles.
 };
 
 std::string_view nameOf(KeyframePolicyKind policy);
 std::string_view nameOf(ReferenceTime reference);
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 KeyframePolicyKind keyframePolicyFromName(std::string_view name);
 ReferenceTime referenceTimeFromName(std::string_view name);
 
 struct KeyframePolicyOptions {
   KeyframePolicyKind policy = KeyframePolicyKind::kPeriod;
-  /// Duration of a window, at least 1e-6; with `kBaseline` the longest one.
+  /// Duration of a window, at least 1e-6; with `kBaseline` the maximum.
   double window_s = 0.2;
-  /// At least 1e-6. `kPeriod`: from one window's start to the next, shorter than a window: overlap.
-  /// `kBaseline`: the steps in which a window grows, at most `window_s`.
+  /// At least 1e-6. `kPeriod`: from the start of one window to the start of the next; windows
+  /// overlap if it is shorter than `window_s`. `kBaseline`: the step by which a window grows, at
+  /// most `window_s`.
   double stride_s = 0.2;
-  /// `kEvents`: events of all selected cameras together in a window, at least 1.
+  /// `kEvents`: events in a window, of all selected cameras together, at least 1.
   std::int64_t window_events = 400'000;
-  /// `kBaseline`: a window ends once the reference camera has moved this share of the scene's mean
-  /// depth. Above 0, at most 10. EMVS (Rebecq et al., IJCV 2018, Sec. 7) takes 0.15 to 0.4.
+  /// `kBaseline`: a window ends once the reference camera has moved this fraction of the scene's
+  /// mean depth. Above 0, at most 10. EMVS (Rebecq et al., IJCV 2018, Sec. 7) uses 0.15 to 0.4.
   double min_baseline_ratio = 0.1;
-  /// `kBaseline`: or once less than this share of what it saw is still in view. 0 to 1.
-  double min_visible_share = 0.7;
+  /// `kBaseline`: a window ends also once a smaller fraction of the last keyframe's points is in
+  /// view. 0 to 1.
+  double min_visible_fraction = 0.7;
   ReferenceTime reference = ReferenceTime::kMiddle;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// The window [t0, t1) with its reference time.
+/// The window [t0, t1) and its reference time.
 Window windowOf(std::int64_t t0_ns, std::int64_t t1_ns, ReferenceTime reference);
 
-/// What a policy may know of a recording: only what is complete, so that its choice does not depend
-/// on how far the recording happens to have been read.
+/// The part of a recording that has arrived, for a policy. Queries about events and poses consider
+/// complete data only, so that the choice of windows does not depend on the reading position.
 class RecordingProgress {
  public:
   virtual ~RecordingProgress() = default;
   /// The first event with a pose.
   virtual std::int64_t startNs() const = 0;
-  /// The newest event of any camera; the recording goes on until then at least.
+  /// The newest event of any camera: the recording lasts at least until then.
   virtual std::int64_t reachedNs() const = 0;
   /// All events of the selected cameras before this time are here, and poses reach it.
   virtual std::int64_t completeNs() const = 0;
   /// Time of the `count`-th event (from 1) at or after `from_ns`, of the selected cameras together;
-  /// nothing where so many are not complete.
+  /// nothing while fewer events are complete.
   virtual std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns,
                                                   std::int64_t count) const = 0;
-  /// T_world_ref: where the reference view would stand at a time, or nothing.
+  /// T_world_ref of a reference view at a time; nothing where there is no pose.
   virtual std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const = 0;
   virtual const ReferenceView& view() const = 0;
 };
@@ -77,27 +79,28 @@ class RecordingProgress {
 class KeyframePolicy {
  public:
   virtual ~KeyframePolicy() = default;
-  /// The next window, as soon as it is sure that the recording fills it; does not move on.
-  /// @return nothing before that, and after the last one.
+  /// The current window, as soon as the recording certainly fills it.
+  /// @return nothing before that, and after the last window.
   virtual std::optional<Window> current(const RecordingProgress& recording) = 0;
-  /// Events before this time, and poses before `earliestReference`, are in no window to come.
+  /// No later window needs events before this time, or poses before `earliestReference`.
   virtual std::int64_t earliestStart(const RecordingProgress& recording) const = 0;
   virtual std::int64_t earliestReference(const RecordingProgress& recording) const {
     return earliestStart(recording);
   }
-  /// Moves on to the window after the current one, which became this keyframe, if it did.
+  /// Moves on to the next window.
+  /// @param keyframe of the current window; null if there is none.
   virtual void advance(const Window& window, const KeyframeDepthMap* keyframe) = 0;
-  /// Told that there are no events before `t_ns` that were not in a window: moves on past the
-  /// windows that end by then, at a cost that does not depend on their number.
-  /// @return how many there were.
+  /// Skips the windows that end by `t_ns`: they have no events. Cost does not depend on their
+  /// number.
+  /// @return the number of skipped windows.
   virtual std::uint64_t advancePast(const RecordingProgress& recording, std::int64_t t_ns) = 0;
 };
 
-/// @param depth_guess_m the mean depth of the scene before a keyframe tells.
+/// @param depth_guess_m mean depth of the scene before the first keyframe.
 /// @throws std::invalid_argument where the options are not valid.
 std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& options,
                                                    double depth_guess_m);
-/// One window and no other, wherever the recording starts, whether the recording fills it or not.
+/// This window alone, whether the recording fills it or not.
 std::unique_ptr<KeyframePolicy> makeSingleWindowPolicy(const Window& window);
 
 }  // namespace efm

@@ -10,17 +10,17 @@
 namespace efm {
 namespace {
 
-/// The harmonic mean of the images, squared and summed over all pixels; each image becomes the
-/// derivative by its own values.
+/// The sum of the squares of the images' harmonic mean. Replaces each image by the derivative by
+/// its values.
 double fuse(std::vector<cv::Mat1f>& images) {
-  constexpr float kNothing = 1e-6F;  // of an event: where a camera has less, the mean is 0
+  constexpr float kMinValue = 1e-6F;  // events; the mean is 0 where a camera has fewer
   const auto cameras = static_cast<float>(images.size());
   double contrast = 0;
   for (int y = 0; y < images.front().rows; ++y) {
     for (int x = 0; x < images.front().cols; ++x) {
-      float least = images.front()(y, x);
-      for (const cv::Mat1f& image : images) least = std::min(least, image(y, x));
-      if (least < kNothing) {
+      float minimum = images.front()(y, x);
+      for (const cv::Mat1f& image : images) minimum = std::min(minimum, image(y, x));
+      if (minimum < kMinValue) {
         for (cv::Mat1f& image : images) image(y, x) = 0;
         continue;
       }
@@ -43,8 +43,8 @@ double fuse(std::vector<cv::Mat1f>& images) {
 struct EventContrast::Cell {
   int x = 0;
   int y = 0;
-  float right = 0;  // share of the right two
-  float below = 0;  // share of the lower two
+  float right = 0;  // weight of the right two
+  float below = 0;  // weight of the lower two
   bool inside = false;
 };
 
@@ -55,9 +55,9 @@ EventContrast::EventContrast(const std::vector<std::vector<WarpedEvent>>& events
   const int rows = (view.height - 1) / patch_px + 1;
   const auto patches = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   std::vector<int> variable_of(patches, -1);
-  for (const auto& some : events) {
+  for (const auto& of_camera : events) {
     std::vector<int>& patch_of = patches_.emplace_back();
-    for (const WarpedEvent& event : some) {
+    for (const WarpedEvent& event : of_camera) {
       const auto column =
           std::clamp(static_cast<int>(event.pixel.x()), 0, view.width - 1) / patch_px;
       const auto row = std::clamp(static_cast<int>(event.pixel.y()), 0, view.height - 1) / patch_px;
@@ -109,19 +109,19 @@ cv::Mat1f EventContrast::imageOf(std::size_t camera, const Change& change) const
 cv::Mat1f EventContrast::smoothed(const cv::Mat1f& image) const {
   cv::Mat1f result;
   const int side = 2 * static_cast<int>(std::ceil(3 * blur_px_)) + 1;
-  // Zeros around, so that smoothing is its own transpose: the gradient needs that.
+  // A border of zeros makes smoothing its own transpose: the gradient needs that.
   cv::GaussianBlur(image, result, cv::Size(side, side), blur_px_, blur_px_, cv::BORDER_CONSTANT);
   return result;
 }
 
 Eigen::VectorXd EventContrast::gradientOf(std::size_t camera, const Change& change,
-                                          const cv::Mat1f& slope) const {
+                                          const cv::Mat1f& by_pixel_value) const {
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(variables());
   for (std::size_t i = 0; i < events_[camera].size(); ++i) {
     const Cell cell = cellOf(camera, i, change);
     if (!cell.inside) continue;
-    const float* upper = slope[cell.y] + cell.x;
-    const float* lower = slope[cell.y + 1] + cell.x;
+    const float* upper = by_pixel_value[cell.y] + cell.x;
+    const float* lower = by_pixel_value[cell.y + 1] + cell.x;
     const Eigen::RowVector2f by_pixel(
         (1 - cell.below) * (upper[1] - upper[0]) + cell.below * (lower[1] - lower[0]),
         (1 - cell.right) * (lower[0] - upper[0]) + cell.right * (lower[1] - upper[1]));
@@ -144,7 +144,7 @@ double EventContrast::at(const Eigen::VectorXd& change, Eigen::VectorXd& gradien
     gradients[camera] = gradientOf(camera, narrow, smoothed(images[camera]));
   });
   gradient = Eigen::VectorXd::Zero(variables());
-  for (const Eigen::VectorXd& some : gradients) gradient += some;
+  for (const Eigen::VectorXd& of_camera : gradients) gradient += of_camera;
   return contrast;
 }
 

@@ -1,15 +1,47 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/motion/motion_correction.h"
 
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numeric>
 
 #include "mapping/geometry/angle.h"
+#include "mapping/motion/nearest_depths.h"
 #include "mapping/motion/quasi_newton.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
+namespace {
+
+/// The events of each camera where the view has depth, at most `max_events` in all. Cameras without
+/// such an event are left out: the harmonic mean over cameras would be 0 everywhere.
+std::vector<std::vector<WarpedEvent>> warpToDepth(const WindowInput& input,
+                                                  const Trajectory& motion, const cv::Mat1f& depth,
+                                                  int max_events) {
+  constexpr double kRadiusPx = 4;  // a blurred keyframe's depths are off by that much in the image
+  std::vector<std::vector<WarpedEvent>> warped(input.cameras.size());
+  const NearestDepths depths(depth, kRadiusPx);
+  if (depths.empty()) return warped;
+  std::size_t count = 0;
+  for (const CameraEvents& camera : input.cameras) count += camera.events.size();
+  const auto max_count = static_cast<std::size_t>(max_events);
+  const std::size_t every = std::max<std::size_t>(1, (count + max_count - 1) / max_count);
+  const WarpTarget target{input.T_world_ref.inverse(), input.view, inversePlanes(input.planes),
+                          &depths, input.window.t_ref_ns};
+  tbb::parallel_for(std::size_t{0}, input.cameras.size(), [&](std::size_t i) {
+    warped[i] = warpEvents(input.cameras[i], every, motion, target);
+  });
+  warped.erase(std::remove_if(warped.begin(), warped.end(),
+                              [](const auto& events) { return events.empty(); }),
+               warped.end());
+  return warped;
+}
+
+}  // namespace
 
 void MotionCorrectionOptions::validate() const {
   requireOption(motion_sigma_m_s > 0 && motion_sigma_m_s <= 10, "motion_sigma_m_s",
@@ -23,13 +55,22 @@ void MotionCorrectionOptions::validate() const {
   requireOption(min_gain >= 0 && min_gain <= 1, "min_gain", min_gain, "0 to 1");
 }
 
-VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& events,
-                                  const SharpestMotionInput& input,
+VelocityCorrection findCorrection(const WindowInput& input, const Trajectory& motion,
+                                  const cv::Mat1f& depth, const VelocityCorrection& current,
                                   const MotionCorrectionOptions& options) {
+  constexpr double kSigmaPlanes = 2;  // of depths found along a wrong motion
+  const ContrastSearch search{depth.size(), kSigmaPlanes * input.planes.inverseDepthStep(),
+                              current};
+  return maximizeContrast(warpToDepth(input, motion, depth, options.max_events), search, options);
+}
+
+VelocityCorrection maximizeContrast(const std::vector<std::vector<WarpedEvent>>& events,
+                                    const ContrastSearch& search,
+                                    const MotionCorrectionOptions& options) {
   constexpr int kPatchPx = 24;
-  EventContrast contrast(events, input.view, kPatchPx);
+  EventContrast contrast(events, search.view, kPatchPx);
   const std::vector<std::size_t>& in_patch = contrast.eventsInPatch();
-  if (in_patch.empty()) return input.warped_with;
+  if (in_patch.empty()) return search.current;
 
   // Variables in units of their standard deviations: all have about the same scale.
   const Eigen::Index count = contrast.variables();
@@ -37,38 +78,39 @@ VelocityCorrection sharpestMotion(const std::vector<std::vector<WarpedEvent>>& e
   Eigen::VectorXd sigmas(count);
   sigmas << Eigen::Vector3d::Constant(options.motion_sigma_m_s),
       Eigen::Vector3d::Constant(kRadiansPerDegree * options.motion_sigma_deg_s),
-      Eigen::VectorXd::Constant(patches, input.sigma_inverse_depth);
-  // A standard deviation costs half of this share of the contrast; of a patch, of the contrast that
-  // its events have a part in. Small: they decide only where events do not.
+      Eigen::VectorXd::Constant(patches, search.sigma_inverse_depth);
+  // One standard deviation of a velocity costs half of this fraction of the contrast; one of a
+  // patch's depth, half of this fraction of the contrast of the patch's own events. Small: the
+  // priors decide only where events do not.
   constexpr double kVelocityPrior = 1e-3;
   constexpr double kDepthPrior = 5e-3;
   Eigen::VectorXd prior(count);
   prior.head<6>().setConstant(kVelocityPrior);
-  const auto events_in_all =
+  const auto all_events =
       static_cast<double>(std::accumulate(in_patch.begin(), in_patch.end(), std::size_t{0}));
   for (Eigen::Index i = 0; i < patches; ++i) {
     prior[6 + i] =
-        kDepthPrior * static_cast<double>(in_patch[static_cast<std::size_t>(i)]) / events_in_all;
+        kDepthPrior * static_cast<double>(in_patch[static_cast<std::size_t>(i)]) / all_events;
   }
 
-  Eigen::VectorXd warped_with = Eigen::VectorXd::Zero(count);
-  warped_with.head<6>() << input.warped_with.linear_m_s, input.warped_with.angular_rad_s;
-  const auto cost = [&](const Eigen::VectorXd& at, Eigen::VectorXd& slope) {
-    const double value = contrast.at(sigmas.cwiseProduct(at) - warped_with, slope);
+  Eigen::VectorXd current = Eigen::VectorXd::Zero(count);
+  current.head<6>() << search.current.linear_m_s, search.current.angular_rad_s;
+  const auto cost = [&](const Eigen::VectorXd& at, Eigen::VectorXd& gradient) {
+    const double value = contrast.at(sigmas.cwiseProduct(at) - current, gradient);
     if (!(value > 0)) return std::numeric_limits<double>::infinity();
-    slope = prior.cwiseProduct(at) - sigmas.cwiseProduct(slope) / value;
+    gradient = prior.cwiseProduct(at) - sigmas.cwiseProduct(gradient) / value;
     return 0.5 * prior.dot(at.cwiseAbs2()) - std::log(value);
   };
-  QuasiNewtonOptions search;
-  search.max_evaluations = 25;
-  Eigen::VectorXd place = Eigen::VectorXd::Zero(count);
-  place.head<6>() = warped_with.head<6>().cwiseQuotient(sigmas.head<6>());
-  // Smooth images lead from afar, sharp ones to the place.
+  QuasiNewtonOptions descent;
+  descent.max_evaluations = 25;
+  Eigen::VectorXd position = Eigen::VectorXd::Zero(count);
+  position.head<6>() = current.head<6>().cwiseQuotient(sigmas.head<6>());
+  // Smooth images have a wide basin of convergence, sharp ones an exact minimum.
   for (const double blur_px : {2.0, 1.0}) {
     contrast.setBlur(blur_px);
-    place = minimise(cost, place, search);
+    position = minimise(cost, position, descent);
   }
-  const Eigen::VectorXd found = sigmas.cwiseProduct(place);
+  const Eigen::VectorXd found = sigmas.cwiseProduct(position);
   return {found.head<3>(), found.segment<3>(3)};
 }
 

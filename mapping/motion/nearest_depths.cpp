@@ -11,7 +11,7 @@ NearestDepths::NearestDepths(const cv::Mat1f& depth, double radius_px)
       inverse_(cv::Mat1f::zeros(depth.size())),
       distance_(cv::Mat1f::zeros(depth.size())) {
   if (empty_) return;
-  cv::Mat1i nearest;  // label of the pixel with a depth that is nearest
+  cv::Mat1i nearest;  // label of the nearest pixel that has a depth
   cv::distanceTransform(depth == 0, distance_, nearest, cv::DIST_L2, cv::DIST_MASK_5,
                         cv::DIST_LABEL_PIXEL);
   std::vector<float> inverse_of(depth.total() + 1);

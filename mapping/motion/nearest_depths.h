@@ -5,17 +5,17 @@
 
 namespace efm {
 
-/// A semi-dense depth map spread over the surroundings of its pixels: which depth is near, and how
-/// far its pixel is.
+/// A semi-dense depth map spread over the pixels around: the depth of the nearest pixel that has
+/// one, and the distance to that pixel.
 class NearestDepths {
  public:
   /// @param depth 0 where there is none.
-  /// @param radius_px how far a depth reaches.
+  /// @param radius_px to which distance a depth is spread.
   NearestDepths(const cv::Mat1f& depth, double radius_px);
 
   /// No pixel has a depth.
   bool empty() const { return empty_; }
-  /// Inverse depth (1/m) of the nearest pixel that has one; 0 where none is within the radius.
+  /// Inverse depth (1/m) of the nearest pixel with a depth; 0 where none is within the radius.
   float inverseDepth(cv::Point pixel) const { return inverse_(pixel); }
   float distancePx(cv::Point pixel) const { return distance_(pixel); }
 

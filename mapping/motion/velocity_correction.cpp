@@ -9,9 +9,9 @@
 namespace efm {
 
 Rigid3 VelocityCorrection::displacement(double since_s) const {
-  const Eigen::Vector3d turn = since_s * angular_rad_s;
-  const Eigen::Vector3d way = since_s * linear_m_s;
-  const double angle = turn.norm();
+  const Eigen::Vector3d rotation = since_s * angular_rad_s;
+  const Eigen::Vector3d path = since_s * linear_m_s;
+  const double angle = rotation.norm();
   constexpr double kSmallAngle = 1e-4;  // below it the series is exact to rounding
   const double square = angle * angle;
   const bool small = angle < kSmallAngle;
@@ -21,9 +21,10 @@ Rigid3 VelocityCorrection::displacement(double since_s) const {
   Rigid3 T_rig_true;
   const double half = small ? 0.5 - square / 48 : std::sin(angle / 2) / angle;
   T_rig_true.rotation.w() = std::cos(angle / 2);
-  T_rig_true.rotation.vec() = half * turn;
+  T_rig_true.rotation.vec() = half * rotation;
   T_rig_true.rotation.normalize();
-  T_rig_true.translation = sine * way + cosine * turn.cross(way) + rest * turn.dot(way) * turn;
+  T_rig_true.translation =
+      sine * path + cosine * rotation.cross(path) + rest * rotation.dot(path) * rotation;
   return T_rig_true;
 }
 
@@ -35,7 +36,7 @@ Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& windo
     const double since_s = secondsBetween(window.t_ref_ns, pose.t_ns);
     return pose.T_world_rig * correction.displacement(since_s);
   });
-  // Halfway between two moved poses lies, to the second order, not where the tracker was.
+  // Between two moved poses, interpolation misses the tracker's pose by a term of second order.
   corrected.add({window.t_ref_ns, trajectory.poseAt(window.t_ref_ns).value()});
   return corrected;
 }

@@ -27,11 +27,11 @@ class EventRays {
     const std::optional<double> depth_m = depthAlong(center_ref, ray_ref);
     if (!depth_m) return std::nullopt;
 
-    const double reach = (*depth_m - center_ref.z()) / ray_ref.z();
-    const Eigen::Vector3d p_ref = center_ref + reach * ray_ref;
-    const Eigen::Vector3d p_rig = T_rig_cam_.translation + reach * ray_rig;
+    const double length = (*depth_m - center_ref.z()) / ray_ref.z();
+    const Eigen::Vector3d p_ref = center_ref + length * ray_ref;
+    const Eigen::Vector3d p_rig = T_rig_cam_.translation + length * ray_rig;
     const ReferenceView& view = target_.view;
-    // A point fixed to the rig moves by v + w x p_rig; then along the moved ray, back to the plane.
+    // A point fixed to the rig moves by v + w x p_rig; the moved ray then meets the plane again.
     Eigen::Matrix<double, 2, 3> pixel_by_point;
     pixel_by_point << view.fx, 0, -view.fx * ray_ref.x() / ray_ref.z(), 0, view.fy,
         -view.fy * ray_ref.y() / ray_ref.z();
@@ -55,26 +55,25 @@ class EventRays {
     return cross;
   }
 
-  /// Of the planes whose depth is that of a pixel near the ray, to half a plane, the one where such
-  /// a pixel is nearest.
+  /// Depth at which the ray is nearest to a pixel of the same depth, to half a plane.
   std::optional<double> depthAlong(const Eigen::Vector3d& center_ref,
                                    const Eigen::Vector3d& ray_ref) const {
-    // In inverse depth a ray's pixel moves evenly.
+    // The pixel of a ray is linear in inverse depth.
     const ReferenceView& view = target_.view;
     const double right = ray_ref.x() / ray_ref.z();
     const double down = ray_ref.y() / ray_ref.z();
     const auto x_inf = static_cast<float>(view.fx * right + view.cx);
     const auto y_inf = static_cast<float>(view.fy * down + view.cy);
-    const auto x_slope = static_cast<float>(view.fx * (center_ref.x() - center_ref.z() * right));
-    const auto y_slope = static_cast<float>(view.fy * (center_ref.y() - center_ref.z() * down));
+    const auto x_gradient = static_cast<float>(view.fx * (center_ref.x() - center_ref.z() * right));
+    const auto y_gradient = static_cast<float>(view.fy * (center_ref.y() - center_ref.z() * down));
     const auto width = static_cast<float>(view.width);
     const auto height = static_cast<float>(view.height);
     float nearest_px = std::numeric_limits<float>::infinity();
     std::optional<double> found_m;
     for (const InversePlane& plane : target_.planes) {
       if ((1 / plane.inverse_depth - center_ref.z()) * ray_ref.z() <= 0) continue;
-      const float x = x_inf + plane.inverse_depth * x_slope + 0.5F;
-      const float y = y_inf + plane.inverse_depth * y_slope + 0.5F;
+      const float x = x_inf + plane.inverse_depth * x_gradient + 0.5F;
+      const float y = y_inf + plane.inverse_depth * y_gradient + 0.5F;
       if (!(x >= 0 && x < width && y >= 0 && y < height)) continue;
       const cv::Point pixel(static_cast<int>(x), static_cast<int>(y));
       const float inverse_depth = target_.depths->inverseDepth(pixel);
@@ -105,9 +104,9 @@ std::vector<InversePlane> inversePlanes(const DepthPlanes& planes) {
   return result;
 }
 
-std::vector<WarpedEvent> warpEvents(EventSpan events, std::size_t every, const RigCamera& camera,
-                                    const UndistortionTable& undistortion,
+std::vector<WarpedEvent> warpEvents(const CameraEvents& camera, std::size_t every,
                                     const Trajectory& trajectory, const WarpTarget& target) {
+  const EventSpan events = camera.events;
   std::vector<WarpedEvent> warped;
   warped.reserve(events.size() / every + 1);
   std::size_t cursor = 0;
@@ -116,9 +115,9 @@ std::vector<WarpedEvent> warpEvents(EventSpan events, std::size_t every, const R
     const auto segment = trajectory.segmentAt(event.t_ns, cursor);
     if (!segment) continue;
     const Rigid3 T_ref_rig = target.T_ref_world * segment->poseAt(event.t_ns);
-    const EventRays rays(T_ref_rig, camera.T_rig_cam, target);
-    const auto found =
-        rays.warp(undistortion.ray(event.x, event.y), secondsBetween(target.t_ref_ns, event.t_ns));
+    const EventRays rays(T_ref_rig, camera.calibration->T_rig_cam, target);
+    const auto found = rays.warp(camera.undistortion->ray(event.x, event.y),
+                                 secondsBetween(target.t_ref_ns, event.t_ns));
     if (found) warped.push_back(*found);
   }
   return warped;

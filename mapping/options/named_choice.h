@@ -7,14 +7,14 @@
 
 namespace efm {
 
-/// One enumerator and the name that files and people use for it.
+/// One enumerator and its name in option files and messages.
 template <typename Enum>
 struct NamedChoice {
   Enum value;
   std::string_view name;
 };
 
-/// The name of an enumerator. `table` names every one.
+/// The name of an enumerator. `table` has all of them.
 template <typename Enum, std::size_t N>
 std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
   for (const auto& choice : table) {
@@ -24,7 +24,7 @@ std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
 }
 
 /// The enumerator with a name.
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 template <typename Enum, std::size_t N>
 Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
   std::string known;

@@ -7,8 +7,8 @@
 
 namespace efm {
 
-/// Refuses an option whose value breaks its range. Written so that NaN is refused too: pass the
-/// condition that must hold.
+/// Refuses an option whose value is out of range.
+/// @param holds the condition of a valid value, so that NaN is refused too.
 /// @throws std::invalid_argument "key = value: must be expected".
 template <typename Value>
 void requireOption(bool holds, std::string_view key, const Value& value,

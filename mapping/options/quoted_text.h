@@ -7,13 +7,13 @@
 
 namespace efm {
 
-/// Text of a file as an error may show it: whatever the file holds, a terminal shows it on one line
-/// and obeys none of it.
+/// Text of a file for an error message: one line, without control characters for the terminal.
 
-/// At most `max_characters`, "…" where that cuts; what is not printable ASCII becomes \xNN.
+/// The first `max_characters`, followed by "…" where there are more. Characters other than
+/// printable ASCII become \xNN.
 std::string printable(std::string_view text, std::size_t max_characters = 40);
 
-/// The same, of at most 40 characters, between single quotes.
+/// `printable` with its default length, between single quotes.
 std::string inQuotes(std::string_view text);
 
 }  // namespace efm

@@ -212,7 +212,7 @@ std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recordi
   MappingJob job;
   job.options = options;
   job.take_keyframe = [&](const KeyframeDepthMap& keyframe) {
-    maximum.take(keyframe.largest_confidence);
+    maximum.take(keyframe.max_confidence);
   };
   StageSeconds ignored;
   Player(job, recording, ignored).play();

@@ -93,7 +93,7 @@ const std::vector<OptionKey>& optionKeys() {
       option("keyframes", "stride_s", FIELD(mapper.keyframes.stride_s)),
       option("keyframes", "window_events", FIELD(mapper.keyframes.window_events)),
       option("keyframes", "min_baseline_ratio", FIELD(mapper.keyframes.min_baseline_ratio)),
-      option("keyframes", "min_visible_share", FIELD(mapper.keyframes.min_visible_share)),
+      option("keyframes", "min_visible_fraction", FIELD(mapper.keyframes.min_visible_fraction)),
       option("keyframes", "reference", FIELD(mapper.keyframes.reference)),
 
       option("dsi", "min_depth_m", KEYFRAME(planes.min_depth_m)),
@@ -119,7 +119,7 @@ const std::vector<OptionKey>& optionKeys() {
 
       option("depth", "extraction", KEYFRAME(extraction.extraction)),
       option("depth", "threshold_kernel", KEYFRAME(extraction.threshold_kernel)),
-      option("depth", "min_excess", KEYFRAME(extraction.min_excess)),
+      option("depth", "min_local_contrast", KEYFRAME(extraction.min_local_contrast)),
       option("depth", "min_quality", KEYFRAME(extraction.min_quality)),
       option("depth", "threshold_c", KEYFRAME(extraction.threshold_c)),
       option("depth", "max_confidence", KEYFRAME(extraction.max_confidence)),

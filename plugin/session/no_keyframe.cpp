@@ -24,7 +24,7 @@ std::string fullWindow(const KeyframePolicyOptions& options) {
       return fmt::format("{} events (window_events)", options.window_events);
     case KeyframePolicyKind::kBaseline:
       return fmt::format(
-          "at most {} s (window_s) with motion enough (min_baseline_ratio, min_visible_share)",
+          "at most {} s (window_s) with motion enough (min_baseline_ratio, min_visible_fraction)",
           duration);
     case KeyframePolicyKind::kPeriod:
       break;

@@ -116,7 +116,7 @@ class NaiveAggregation {
       if (in_frame) return;
       const double around = surroundings(confidence, pixel, options.threshold_kernel);
       const double excess = (double{confidence(pixel)} - around) / mean;
-      if (excess <= options.min_excess) return;
+      if (excess <= options.min_local_contrast) return;
       seen_.push_back(pixel);
       pixels_.emplace_back().excess = excess;
     });

@@ -166,7 +166,7 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
         {named(threshold), mapWindows(recording, windows, flyingRoomStereo()), {}, {}, {}});
     Method one_white = flyingRoomStereo();
     one_white.options.extraction.max_confidence =
-        MaxConfidence::of(stereo.front().keyframes.front().largest_confidence);
+        MaxConfidence::of(stereo.front().keyframes.front().max_confidence);
     why.one_white.push_back(
         {named(threshold), mapWindows(recording, windows, one_white), {}, {}, {}});
   }

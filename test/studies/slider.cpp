@@ -76,7 +76,7 @@ std::vector<DepthExtractionOptions> thresholdsOf(const DepthExtractionOptions& o
   for (double quality = 1; quality > 0.002; quality *= 0.97) {
     thresholds.push_back(options);
     // Whoever wants more points looks at more.
-    thresholds.back().min_excess *= std::clamp(quality / options.min_quality, 0.3, 1.0);
+    thresholds.back().min_local_contrast *= std::clamp(quality / options.min_quality, 0.3, 1.0);
     thresholds.back().min_quality = quality;
   }
   return thresholds;

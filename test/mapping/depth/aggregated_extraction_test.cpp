@@ -303,7 +303,7 @@ TEST(AggregatedExtraction, MoreQualityOrExcessKeepsFewer) {
   EXPECT_GT(all, 50);
   EXPECT_EQ(cv::countNonZero(looser.depth), 0);
   options = {};
-  options.min_excess = 1e6;
+  options.min_local_contrast = 1e6;
   EXPECT_EQ(cv::countNonZero(extract(dsi, options).depth), 0);
 }
 
@@ -370,7 +370,7 @@ TEST(AggregatedExtraction, OfAnEmptyDsiOrASmallViewIsEmpty) {
 TEST(AggregatedExtraction, TheSmallestThresholdsFindEveryRay) {
   // Confidences that are all alike stand out by rounding alone.
   DepthExtractionOptions options;
-  options.min_excess = 1e-30;
+  options.min_local_contrast = 1e-30;
   options.min_quality = 0;
   ChosenDsi dsi({200, 70}, 3);
   for (int y = 0; y < 70; ++y) {

@@ -32,7 +32,7 @@ ChosenDsi randomDsi(std::uint32_t seed, const cv::Size& size, int planes) {
       const double height = 5 + 10 * uniform(random);
       const double at = (planes - 1) * uniform(random);
       const double other = (planes - 1) * uniform(random);
-      dsi.setColumn({x, y}, [&](int plane) {
+      dsi.setRay({x, y}, [&](int plane) {
         return height * ridge(plane, at, 2.5) + 0.6 * height * ridge(plane, other, 1.5) +
                0.3 * uniform(random);
       });
@@ -54,7 +54,7 @@ cv::Mat1b randomMask(std::uint32_t seed, const cv::Size& size, int one_of) {
 
 std::vector<AggregatedPeak> aggregate(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   const SweptDsi swept = dsi.swept();
-  return aggregateRays(SparseMask(mask), swept.columns, swept.peaks.confidence.size());
+  return aggregateColumns(SparseMask(mask), swept.columns, swept.peaks.confidence.size());
 }
 
 /// The sum of the rays of the chosen pixels in 9x9, in double.
@@ -95,14 +95,14 @@ void expectNaive(const ChosenDsi& dsi, const cv::Mat1b& mask) {
     SCOPED_TRACE(testing::Message() << pixel << " of " << dsi.planes << " planes");
     const bool at_end = best == 0 || best == dsi.planes - 1;
     ASSERT_EQ(peaks[i].at_end, at_end);
-    for (std::size_t b = 0; b < peaks[i].beyond.size(); ++b) {
-      const double places = AggregatedPeak::kLeastBeside + static_cast<double>(b);
+    for (std::size_t b = 0; b < peaks[i].second_peak.size(); ++b) {
+      const double places = AggregatedPeak::kMinSteps + static_cast<double>(b);
       double second = 0;
       for (int plane = 0; plane < dsi.planes; ++plane) {
         if (std::abs(plane - best) <= std::lround(places * place)) continue;
         second = std::max(second, sum[static_cast<std::size_t>(plane)]);
       }
-      ASSERT_NEAR(peaks[i].beyond[b], second / top, 1e-4) << places << " places";
+      ASSERT_NEAR(peaks[i].second_peak[b], second / top, 1e-4) << places << " places";
     }
     double position = best;
     if (at_end) {
@@ -144,7 +144,7 @@ TEST(RayAggregation, OfNoPixelsIsEmpty) {
 TEST(RayAggregation, ALoneRidgeIsFoundBetweenPlanesWithItsWidth) {
   for (const double at : {20.0, 20.25, 20.5, 33.8}) {
     ChosenDsi dsi({11, 11}, 100);
-    dsi.setColumn({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
+    dsi.setRay({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
     cv::Mat1b mask = cv::Mat1b::zeros(11, 11);
     mask(5, 5) = 255;
     const AggregatedPeak peak = aggregate(dsi, mask).at(0);
@@ -159,7 +159,7 @@ TEST(RayAggregation, NeighboursMoveAWrongPeakToTheirs) {
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x) {
       const bool wrong = x == 4 && y == 4;
-      dsi.setColumn({x, y}, [&](int plane) {
+      dsi.setRay({x, y}, [&](int plane) {
         return wrong ? 10 * ridge(plane, 50, 1.5) + 4 * ridge(plane, 20, 1.5)
                      : 10 * ridge(plane, 20, 1.5);
       });
@@ -173,10 +173,10 @@ TEST(RayAggregation, OnlyChosenPixelsAreSummed) {
   ChosenDsi dsi({9, 9}, 60);
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x) {
-      dsi.setColumn({x, y}, [&](int plane) { return 50 * ridge(plane, 40, 1.5); });
+      dsi.setRay({x, y}, [&](int plane) { return 50 * ridge(plane, 40, 1.5); });
     }
   }
-  dsi.setColumn({4, 4}, [](int plane) { return ridge(plane, 10, 1.5); });
+  dsi.setRay({4, 4}, [](int plane) { return ridge(plane, 10, 1.5); });
   cv::Mat1b mask = cv::Mat1b::zeros(9, 9);
   mask(4, 4) = 255;
   EXPECT_NEAR(aggregate(dsi, mask).at(0).position, 10, 0.02);
@@ -185,11 +185,11 @@ TEST(RayAggregation, OnlyChosenPixelsAreSummed) {
 TEST(RayAggregation, TwoEqualPeaksAreFullyAmbiguousAndOneIsNot) {
   ChosenDsi dsi({1, 1}, 60);
   const cv::Mat1b mask(1, 1, 255);
-  dsi.setColumn({0, 0}, [](int plane) { return ridge(plane, 20, 1) + ridge(plane, 40, 1); });
-  EXPECT_NEAR(aggregate(dsi, mask).at(0).beyond.front(), 1, 1e-3);
+  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1) + ridge(plane, 40, 1); });
+  EXPECT_NEAR(aggregate(dsi, mask).at(0).second_peak.front(), 1, 1e-3);
   EXPECT_EQ(aggregate(dsi, mask).at(0).position, 20) << "of equals the nearer";
-  dsi.setColumn({0, 0}, [](int plane) { return ridge(plane, 20, 1); });
-  EXPECT_LT(aggregate(dsi, mask).at(0).beyond.front(), 0.01);
+  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1); });
+  EXPECT_LT(aggregate(dsi, mask).at(0).second_peak.front(), 0.01);
 }
 
 TEST(RayAggregation, PeaksOfTheFirstAndTheLastPlaneAreAtTheEnd) {
@@ -197,7 +197,7 @@ TEST(RayAggregation, PeaksOfTheFirstAndTheLastPlaneAreAtTheEnd) {
   for (const int planes : {1, 2, 3, 50}) {
     for (const int at : {0, planes - 1}) {
       ChosenDsi dsi({1, 1}, planes);
-      dsi.setColumn({0, 0}, [&](int plane) { return 10 - 0.1 * std::abs(plane - at); });
+      dsi.setRay({0, 0}, [&](int plane) { return 10 - 0.1 * std::abs(plane - at); });
       const AggregatedPeak peak = aggregate(dsi, mask).at(0);
       EXPECT_TRUE(peak.at_end);
       EXPECT_EQ(peak.position, static_cast<float>(at));
@@ -216,7 +216,7 @@ TEST(RayAggregation, TwiceTheVotesChangeNoBit) {
   for (std::size_t i = 0; i < once_found.size(); ++i) {
     ASSERT_EQ(once_found[i].position, twice_found[i].position);
     ASSERT_EQ(once_found[i].width_sq, twice_found[i].width_sq);
-    ASSERT_EQ(once_found[i].beyond, twice_found[i].beyond);
+    ASSERT_EQ(once_found[i].second_peak, twice_found[i].second_peak);
   }
 }
 
@@ -232,14 +232,14 @@ TEST(RayAggregation, TheNumberOfThreadsChangesNoBit) {
   const std::vector<AggregatedPeak> many = on(8);
   for (std::size_t i = 0; i < one.size(); ++i) {
     ASSERT_EQ(one[i].position, many[i].position);
-    ASSERT_EQ(one[i].beyond, many[i].beyond);
+    ASSERT_EQ(one[i].second_peak, many[i].second_peak);
   }
 }
 
 TEST(PlanesOfOnePlace, IsOneUpToAHundredPlanesAndGrowsWithThem) {
-  for (const int planes : {1, 2, 50, 100}) EXPECT_EQ(planesOfOnePlace(planes), 1);
-  EXPECT_DOUBLE_EQ(planesOfOnePlace(199), 2);
-  EXPECT_DOUBLE_EQ(planesOfOnePlace(496), 5);
+  for (const int planes : {1, 2, 50, 100}) EXPECT_EQ(planesPerStep(planes), 1);
+  EXPECT_DOUBLE_EQ(planesPerStep(199), 2);
+  EXPECT_DOUBLE_EQ(planesPerStep(496), 5);
 }
 
 TEST(PixelNeighbours, AreTheKeptPixelsWithinFourRowByRow) {

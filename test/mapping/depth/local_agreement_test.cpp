@@ -114,7 +114,7 @@ TEST(LocalAgreement, IsTheNaiveOneForDenseAndSparsePixels) {
         SCOPED_TRACE(testing::Message() << at << " of " << size << ", one of " << one_of);
         ASSERT_EQ(found[i].median, exact.median);
         ASSERT_NEAR(found[i].spread, exact.spread, 1e-5);
-        ASSERT_NEAR(found[i].share, exact.share, 1e-5);
+        ASSERT_NEAR(found[i].agreeing_fraction, exact.agreeing_fraction, 1e-5);
       });
     }
   }
@@ -127,7 +127,7 @@ TEST(LocalAgreement, OfAPixelAloneIsItsOwnDepthAndNoShare) {
   const LocalAgreement alone = depths.at({10, 10});
   EXPECT_EQ(alone.median, 33);
   EXPECT_EQ(alone.spread, 0);
-  EXPECT_EQ(alone.share, 0);
+  EXPECT_EQ(alone.agreeing_fraction, 0);
 }
 
 TEST(LocalAgreement, ThoseWithinNearAgreeAndTheMedianHasHalfTheWeight) {
@@ -136,7 +136,7 @@ TEST(LocalAgreement, ThoseWithinNearAgreeAndTheMedianHasHalfTheWeight) {
   depths.keep({9, 10}, 32.4F, 1);   // within 2.5
   depths.keep({11, 10}, 32.6F, 3);  // not
   const LocalAgreement found = depths.at({10, 10});
-  EXPECT_NEAR(found.share, 0.25, 1e-6);
+  EXPECT_NEAR(found.agreeing_fraction, 0.25, 1e-6);
   EXPECT_EQ(found.median, 32.6F) << "which has 3 of 5";
   EXPECT_NEAR(found.spread, 0.2, 1e-5) << "of 0, 0.2 and 2.6";
 }
@@ -155,7 +155,7 @@ TEST(LocalAgreement, OthersCountForTheShareMoreTheNearerTheyAre) {
   depths.keep({6, 10}, 40);
   const double near = std::exp(-1 / 8.0);
   const double far = std::exp(-16 / 8.0);
-  EXPECT_NEAR(depths.at({10, 10}).share, near / (near + far), 1e-6);
+  EXPECT_NEAR(depths.at({10, 10}).agreeing_fraction, near / (near + far), 1e-6);
 }
 
 TEST(LocalAgreement, WeightsInAnotherUnitChangeNothing) {
@@ -166,7 +166,7 @@ TEST(LocalAgreement, WeightsInAnotherUnitChangeNothing) {
   for (std::size_t i = 0; i < before.size(); ++i) {
     ASSERT_EQ(before[i].median, after[i].median);
     ASSERT_EQ(before[i].spread, after[i].spread);
-    ASSERT_EQ(before[i].share, after[i].share);
+    ASSERT_EQ(before[i].agreeing_fraction, after[i].agreeing_fraction);
   }
 }
 
@@ -181,7 +181,7 @@ TEST(LocalAgreement, TheNumberOfThreadsChangesNoBit) {
   const std::vector<LocalAgreement> many = on(8);
   for (std::size_t i = 0; i < one.size(); ++i) {
     ASSERT_EQ(one[i].median, many[i].median);
-    ASSERT_EQ(one[i].share, many[i].share);
+    ASSERT_EQ(one[i].agreeing_fraction, many[i].agreeing_fraction);
   }
 }
 

@@ -74,7 +74,7 @@ TEST(RobustMaximum, OfTheKeyframesSoFarIsTheWhiteLevelOfTheSequence) {
   for (const KeyframeDepthMap& keyframe : played.keyframes) {
     double largest = 0;
     cv::minMaxLoc(keyframe.map.confidence, nullptr, &largest);
-    EXPECT_EQ(keyframe.largest_confidence, largest);
+    EXPECT_EQ(keyframe.max_confidence, largest);
     maximum.take(largest);
     const cv::Mat1b kept = keyframe.map.depth > 0;
     EXPECT_EQ(cv::countNonZero(kept != keptWith(keyframe.map.confidence, *maximum.value())), 0);

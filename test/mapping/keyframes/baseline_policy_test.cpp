@@ -103,7 +103,7 @@ TEST(BaselinePolicy, TurningInPlaceEndsAWindowOnceTooLittleIsLeftInView) {
     EXPECT_GT(angle, 0.2);
     EXPECT_LT(angle, by_the_keyframe ? 0.28 : 0.323);
   }
-  turning.min_visible_share = 0;
+  turning.min_visible_fraction = 0;
   EXPECT_FALSE(BaselinePolicy(turning, kDepthGuess_m).current(recording)) << "where it may all go";
 }
 
@@ -217,8 +217,8 @@ TEST(BaselinePolicy, OptionsOutOfRangeAreNamed) {
   using Options = KeyframePolicyOptions;
   EXPECT_THAT(with([](Options& o) { o.min_baseline_ratio = 0; }),
               ThrowsMessage<std::invalid_argument>(HasSubstr("min_baseline_ratio = 0")));
-  EXPECT_THAT(with([](Options& o) { o.min_visible_share = 1.5; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("min_visible_share = 1.5")));
+  EXPECT_THAT(with([](Options& o) { o.min_visible_fraction = 1.5; }),
+              ThrowsMessage<std::invalid_argument>(HasSubstr("min_visible_fraction = 1.5")));
   EXPECT_THAT(with([](Options& o) { o.stride_s = 0.25; }),
               ThrowsMessage<std::invalid_argument>(HasSubstr("stride_s = 0.25")));
   EXPECT_THAT(with([](Options& o) { o.window_events = 0; }),

@@ -200,7 +200,7 @@ TEST(EdgeCase, ACameraWithoutEventsMakesAndLikeRulesZeroUnlessItIsExcluded) {
       EXPECT_THAT(keyframes[0].silent_cameras, ::testing::ElementsAre(1));
       const bool and_like = rule == FusionRule::kMin || rule == FusionRule::kHarmonic ||
                             rule == FusionRule::kGeometric;
-      EXPECT_EQ(keyframes[0].largest_confidence == 0, and_like && !exclude) << nameOf(rule);
+      EXPECT_EQ(keyframes[0].max_confidence == 0, and_like && !exclude) << nameOf(rule);
     }
   }
 }

@@ -154,7 +154,7 @@ TEST(KeyframeDefaults, ASilentCameraIsNamedAndSilencesTheMap) {
   recording.events[1].clear();
   const KeyframeDepthMap keyframe = map(recording, defaults());
   EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
-  EXPECT_EQ(keyframe.largest_confidence, 0);
+  EXPECT_EQ(keyframe.max_confidence, 0);
   EXPECT_EQ(cv::countNonZero(keyframe.map.depth), 0);
   EXPECT_EQ(keyframe.silent_subintervals, 0U) << "of the cameras that are not silent";
 }

@@ -175,7 +175,7 @@ TEST(KeyframeMapper, ASilentCameraThatIsNotExcludedSilencesTheHarmonicMean) {
   recording.events[1].clear();
   const KeyframeDepthMap keyframe = map(recording, {0, 1}, fewPlanes());
   EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
-  EXPECT_EQ(keyframe.largest_confidence, 0);
+  EXPECT_EQ(keyframe.max_confidence, 0);
 }
 
 TEST(KeyframeMapper, WithoutAPoseACameraIsAsSilentAsWithoutEvents) {
@@ -191,7 +191,7 @@ TEST(KeyframeMapper, WithoutAPoseACameraIsAsSilentAsWithoutEvents) {
   const KeyframeDepthMap keyframe = map(recording, {0, 1}, options);
   EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
   EXPECT_GE(keyframe.without_pose, 3000U);
-  EXPECT_GT(keyframe.largest_confidence, 0);
+  EXPECT_GT(keyframe.max_confidence, 0);
 }
 
 TEST(KeyframeMapper, SilentSubintervalsAreCounted) {

@@ -137,7 +137,7 @@ TEST(WindowPolicies, EveryEventIsCountedForWhatBecameOfIt) {
           ++expected.read;
           if (c == 2) {
             ++expected.dropped;
-          } else if (!options.limits.hold(t_ns)) {
+          } else if (!options.limits.contain(t_ns)) {
             ++expected.outside_window;
           } else if (!has_pose) {
             ++expected.without_pose;
@@ -239,7 +239,7 @@ TEST(WindowPolicies, WindowsOfABaselineAreTheShortestThatReachItsShareOfTheMeanD
     options.keyframes.window_s = 0.1;
     options.keyframes.stride_s = 0.012;
     options.keyframes.min_baseline_ratio = 0.04;
-    options.keyframes.min_visible_share = 0;
+    options.keyframes.min_visible_fraction = 0;
     options.keyframe.reference_camera = 1;
     const Played played = play(recording, options, seed);
 

@@ -7,7 +7,7 @@
 
 #include "test/mapping/keyframes/random_scene.h"
 
-namespace efm {
+namespace efm::event_contrast_test {
 namespace {
 
 constexpr int kPatchPx = 16;
@@ -91,4 +91,4 @@ TEST(EventContrast, OnlyPatchesWithEventsAreVariables) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::event_contrast_test

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <functional>
 #include <mutex>
-#include <stdexcept>
 #include <vector>
 
 #include "mapping/geometry/angle.h"
@@ -16,15 +15,14 @@
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_recording.h"
 #include "test/mapping/motion/moving_edges.h"
+#include "test/mapping/options/refused_option.h"
 
-namespace efm {
+namespace efm::motion_correction_test {
 namespace {
 
 using test::MovingEdges;
 using test::RandomRecording;
 using test::same;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 KeyframeMapperOptions options(bool correct_motion, int threads = 1) {
   KeyframeMapperOptions options;
@@ -57,7 +55,7 @@ void expectSame(const KeyframeDepthMap& a, const KeyframeDepthMap& b) {
   EXPECT_EQ(a.events, b.events);
   EXPECT_EQ(a.votes.total(), b.votes.total());
   EXPECT_EQ(a.votes.cast, b.votes.cast);
-  EXPECT_EQ(a.largest_confidence, b.largest_confidence);
+  EXPECT_EQ(a.max_confidence, b.max_confidence);
   EXPECT_EQ(a.T_world_ref.translation, b.T_world_ref.translation);
   EXPECT_EQ(a.T_world_ref.rotation.coeffs(), b.T_world_ref.rotation.coeffs());
 }
@@ -194,10 +192,10 @@ TEST(MotionCorrection, ACameraThatSeesNothingAndASinglePlaneDoNoHarm) {
 }
 
 TEST(MotionCorrection, WithoutEventsTheCorrectionIsThatOfTheInput) {
-  SharpestMotionInput input{cv::Size(20, 10), 0.01, {{1, 2, 3}, {4, 5, 6}}};
-  const VelocityCorrection found = sharpestMotion({{}, {}}, input, {});
-  EXPECT_EQ(found.linear_m_s, input.warped_with.linear_m_s);
-  EXPECT_EQ(found.angular_rad_s, input.warped_with.angular_rad_s);
+  ContrastSearch search{cv::Size(20, 10), 0.01, {{1, 2, 3}, {4, 5, 6}}};
+  const VelocityCorrection found = maximizeContrast({{}, {}}, search, {});
+  EXPECT_EQ(found.linear_m_s, search.current.linear_m_s);
+  EXPECT_EQ(found.angular_rad_s, search.current.angular_rad_s);
 }
 
 TEST(MotionCorrection, SigmasAreInMetresAndDegreesPerSecond) {
@@ -216,13 +214,13 @@ TEST(MotionCorrection, SigmasAreInMetresAndDegreesPerSecond) {
     }
     return std::vector<std::vector<WarpedEvent>>{events, events};
   };
-  const SharpestMotionInput input{cv::Size(60, 14), 0.01, {}};
+  const ContrastSearch search{cv::Size(60, 14), 0.01, {}};
   constexpr float kVelocity = 0.1F;  // m/s and rad/s
   const auto found = [&](double sigma_m_s, double sigma_rad_s, int axis) {
     MotionCorrectionOptions options;
     options.motion_sigma_m_s = sigma_m_s;
     options.motion_sigma_deg_s = sigma_rad_s / kRadiansPerDegree;
-    const auto motion = sharpestMotion(blurred_by(axis, kVelocity), input, options);
+    const auto motion = maximizeContrast(blurred_by(axis, kVelocity), search, options);
     return axis < 3 ? motion.linear_m_s[axis] : motion.angular_rad_s[axis - 3];
   };
   EXPECT_NEAR(found(0.1, 0.1, 0), 0.1, 0.02);
@@ -241,27 +239,24 @@ TEST(MotionCorrection, WhereCamerasDoNotMeetTheCorrectionIsThatOfTheInput) {
   event.pixel = {10, 10};
   WarpedEvent other = event;
   other.pixel = {50, 10};
-  SharpestMotionInput input{cv::Size(60, 20), 0.01, {{1, 2, 3}, {4, 5, 6}}};
-  const VelocityCorrection found = sharpestMotion({{event}, {other}}, input, {});
-  EXPECT_LT((found.linear_m_s - input.warped_with.linear_m_s).norm(), 1e-12);
-  EXPECT_LT((found.angular_rad_s - input.warped_with.angular_rad_s).norm(), 1e-12);
+  ContrastSearch search{cv::Size(60, 20), 0.01, {{1, 2, 3}, {4, 5, 6}}};
+  const VelocityCorrection found = maximizeContrast({{event}, {other}}, search, {});
+  EXPECT_LT((found.linear_m_s - search.current.linear_m_s).norm(), 1e-12);
+  EXPECT_LT((found.angular_rad_s - search.current.angular_rad_s).norm(), 1e-12);
 }
 
-TEST(MotionCorrection, WhatCannotBeIsNamed) {
-  const auto refused = [](const char* message,
-                          const std::function<void(MotionCorrectionOptions&)>& set) {
-    MotionCorrectionOptions options;
-    set(options);
-    EXPECT_THAT([&] { options.validate(); },
-                ThrowsMessage<std::invalid_argument>(HasSubstr(message)));
-  };
-  refused("motion_sigma_m_s = 0", [](auto& o) { o.motion_sigma_m_s = 0; });
-  refused("motion_sigma_deg_s = -1", [](auto& o) { o.motion_sigma_deg_s = -1; });
-  refused("motion_rounds = 0", [](auto& o) { o.motion_rounds = 0; });
-  refused("max_events = 10", [](auto& o) { o.max_events = 10; });
-  refused("min_gain = 2", [](auto& o) { o.min_gain = 2; });
+TEST(MotionCorrection, InvalidOptionsAreNamed) {
+  test::expectRefused<MotionCorrectionOptions>("motion_sigma_m_s = 0",
+                                               [](auto& o) { o.motion_sigma_m_s = 0; });
+  test::expectRefused<MotionCorrectionOptions>("motion_sigma_deg_s = -1",
+                                               [](auto& o) { o.motion_sigma_deg_s = -1; });
+  test::expectRefused<MotionCorrectionOptions>("motion_rounds = 0",
+                                               [](auto& o) { o.motion_rounds = 0; });
+  test::expectRefused<MotionCorrectionOptions>("max_events = 10",
+                                               [](auto& o) { o.max_events = 10; });
+  test::expectRefused<MotionCorrectionOptions>("min_gain = 2", [](auto& o) { o.min_gain = 2; });
   EXPECT_NO_THROW(MotionCorrectionOptions().validate());
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::motion_correction_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace efm {
+namespace efm::nearest_depths_test {
 namespace {
 
 TEST(NearestDepths, EachPixelHasTheDepthOfTheNearestWithinTheRadius) {
@@ -29,4 +29,4 @@ TEST(NearestDepths, WithoutADepthThereIsNone) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::nearest_depths_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace efm {
+namespace efm::quasi_newton_test {
 namespace {
 
 TEST(QuasiNewton, FindsTheBottomOfRosenbrocksValley) {
@@ -48,4 +48,4 @@ TEST(QuasiNewton, StaysWhereNothingSlopes) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::quasi_newton_test

@@ -5,7 +5,7 @@
 
 #include "test/mapping/keyframes/random_recording.h"
 
-namespace efm {
+namespace efm::velocity_correction_test {
 namespace {
 
 using test::RandomRecording;
@@ -73,4 +73,4 @@ TEST(VelocityCorrection, WhatHasNoPoseGetsNone) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::velocity_correction_test

@@ -8,7 +8,7 @@
 
 #include "test/mapping/keyframes/random_recording.h"
 
-namespace efm {
+namespace efm::warped_events_test {
 namespace {
 
 using test::RandomRecording;
@@ -27,7 +27,7 @@ struct Warping {
                                 EventSpan events) const {
     const NearestDepths depths(depth, 0.5);
     return warpEvents(
-        events, 1, camera, undistortion, trajectory,
+        {0, &camera, &undistortion, events}, 1, trajectory,
         {T_world_ref.inverse(), view, inversePlanes(planes), &depths, window.t_ref_ns});
   }
 
@@ -104,4 +104,4 @@ TEST(WarpedEvents, WhatSawNoDepthIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::warped_events_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace efm {
+namespace efm::quoted_text_test {
 namespace {
 
 TEST(QuotedText, PlainTextStaysAsItIs) {
@@ -25,4 +25,4 @@ TEST(QuotedText, LongTextIsCutAfterFortyCharacters) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::quoted_text_test

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace efm {
+namespace efm::text_parsing_test {
 namespace {
 
 using testing::ElementsAre;
@@ -47,4 +47,4 @@ TEST(Trimmed, HasNoBlankAtEitherEnd) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::text_parsing_test

@@ -79,7 +79,7 @@ const FieldCase kFields[] = {
     EFM_ROW("keyframes.stride_s=1e-1", mapper.keyframes.stride_s, 0.1),
     EFM_ROW("keyframes.window_events=5000000000", mapper.keyframes.window_events, 5'000'000'000),
     EFM_ROW("keyframes.min_baseline_ratio=0.3", mapper.keyframes.min_baseline_ratio, 0.3),
-    EFM_ROW("keyframes.min_visible_share=0.25", mapper.keyframes.min_visible_share, 0.25),
+    EFM_ROW("keyframes.min_visible_fraction=0.25", mapper.keyframes.min_visible_fraction, 0.25),
     EFM_ROW("keyframes.reference=end", mapper.keyframes.reference, ReferenceTime::kEnd),
     EFM_ROW("dsi.min_depth_m=1", mapper.keyframe.planes.min_depth_m, 1),
     EFM_ROW("dsi.max_depth_m=20", mapper.keyframe.planes.max_depth_m, 20),
@@ -108,7 +108,7 @@ const FieldCase kFields[] = {
     EFM_ROW("depth.extraction=paper", mapper.keyframe.extraction.extraction,
             ExtractionMethod::kPaper),
     EFM_ROW("depth.threshold_kernel=7", mapper.keyframe.extraction.threshold_kernel, 7),
-    EFM_ROW("depth.min_excess=0.75", mapper.keyframe.extraction.min_excess, 0.75),
+    EFM_ROW("depth.min_local_contrast=0.75", mapper.keyframe.extraction.min_local_contrast, 0.75),
     EFM_ROW("depth.min_quality=0.55", mapper.keyframe.extraction.min_quality, 0.55),
     EFM_ROW("depth.threshold_c=-2.5", mapper.keyframe.extraction.threshold_c, -2.5),
     EFM_ROW("depth.max_confidence=31.5", mapper.keyframe.extraction.max_confidence.fixed, 31.5),
@@ -250,6 +250,10 @@ TEST(OptionReader, FormerKeysAreErrorsThatSayWhatBecameOfThem) {
   expectErrors({
       {"[fusion]\nrevote = true\n", "rig.ini:2: [fusion] revote: was removed with re-voting"},
       {"[fusion]\nrevote_power = 2\n", "rig.ini:2: [fusion] revote_power: was removed"},
+      {"[keyframes]\nmin_visible_share = 1\n",
+       "rig.ini:2: [keyframes] min_visible_share: is called min_visible_fraction now"},
+      {"[depth]\nmin_excess = 1\n",
+       "rig.ini:2: [depth] min_excess: is called min_local_contrast now"},
   });
 }
 

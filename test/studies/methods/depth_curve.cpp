@@ -48,7 +48,7 @@ void setThreshold(double threshold, DepthExtractionOptions& extraction) {
     return;
   }
   // Whoever wants more points looks at more.
-  extraction.min_excess *= std::clamp(threshold / extraction.min_quality, 0.3, 1.0);
+  extraction.min_local_contrast *= std::clamp(threshold / extraction.min_quality, 0.3, 1.0);
   extraction.min_quality = threshold;
 }
 

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/events/event_buffer.h"
+#include "mapping/events/event_filter.h"
+#include "mapping/events/window.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/timestamp.h"
+#include "mapping/geometry/trajectory.h"
+
+namespace efm {
+
+/// What became of one camera's events. Distinct events: read = used + all others.
+struct EventCounts {
+  std::uint64_t read = 0;
+  std::uint64_t used = 0;            ///< Voted in at least one keyframe.
+  std::uint64_t without_pose = 0;    ///< Not used: the trajectory has no pose at this time.
+  std::uint64_t outside_window = 0;  ///< Not used: in no window that was mapped.
+  std::uint64_t dropped = 0;   ///< Came after their window was closed, or of an unselected camera.
+  std::uint64_t filtered = 0;  ///< Removed as noise, with a pose or without.
+
+  EventCounts& operator+=(const EventCounts& other);
+};
+
+/// One camera's events from their arrival to their release: checks, filters and buffers them, and
+/// counts what becomes of each. Times are on the trajectory's clock: the camera's offset is added.
+class CameraStream {
+ public:
+  /// @param selected whether the camera's events take part.
+  CameraStream(int index, const RigCamera& camera, bool selected, const EventFilterOptions& filter);
+
+  /// @throws std::invalid_argument where an event lies outside the sensor, or comes more than 10 ms
+  /// after a newer one.
+  void requireValid(const std::vector<Event>& events) const;
+  /// Takes valid events. Drops those before `released_ns`, and counts those outside the limits.
+  /// @return the number of events that came after a newer one.
+  std::uint64_t add(const std::vector<Event>& events, const TimeLimits& limits,
+                    std::int64_t released_ns);
+  /// All events before `t_ns` (the camera's own clock) have been added.
+  void coverUntil(std::int64_t t_ns);
+  /// Moves events before a time through the filter into the buffer; no earlier event will come.
+  void filterUntil(std::int64_t t_ns);
+
+  bool selected() const { return selected_; }
+  std::int64_t onTrajectoryClock(std::int64_t t_ns) const { return t_ns + time_offset_ns_; }
+  std::optional<std::int64_t> newestNs() const { return newest_ns_; }
+  /// All events before this time have been added.
+  std::int64_t coveredNs() const { return covered_ns_; }
+  const EventCounts& counts() const { return counts_; }
+
+  EventSpan between(std::int64_t t0_ns, std::int64_t t1_ns) const {
+    return buffer_.between(t0_ns, t1_ns);
+  }
+  /// The number of buffered events before a time.
+  std::size_t countBefore(std::int64_t t_ns) const { return buffer_.indexOf(t_ns) - buffer_.begin; }
+  /// Time of the first buffered event at or after a time.
+  std::optional<std::int64_t> firstFrom(std::int64_t t_ns) const;
+  /// Time of the first buffered event before `until_ns` with a pose.
+  std::optional<std::int64_t> firstWithPose(const Trajectory& trajectory, std::int64_t until_ns);
+  /// Marks the window's events that have a pose as used.
+  void markUsed(const Window& window, const Trajectory& trajectory);
+  /// Counts and releases the events before a time.
+  void release(std::int64_t until_ns, const Trajectory& trajectory);
+
+ private:
+  int index_;
+  int width_;
+  int height_;
+  std::int64_t time_offset_ns_;
+  bool selected_;
+  std::optional<FilteredEvents> filter_;
+  EventBuffer buffer_;
+  std::size_t pose_cursor_ = 0;
+  std::optional<std::int64_t> newest_ns_;
+  std::int64_t covered_ns_ = kMinTimeNs;
+  EventCounts counts_;
+};
+
+}  // namespace efm

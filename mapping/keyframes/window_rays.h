@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+#include "mapping/events/event_groups.h"
+#include "mapping/events/window_input.h"
+#include "mapping/geometry/trajectory.h"
+#include "mapping/rays/back_projection.h"
+#include "mapping/rays/pose_packets.h"
+
+namespace efm {
+
+/// The rays of one camera's events of a window, and counts of its events.
+struct WindowRays {
+  int camera = 0;                         ///< Index in the rig.
+  CameraRays rays;                        ///< By part of `EventGroups`.
+  std::uint64_t events = 0;               ///< With a ray.
+  std::uint64_t without_pose = 0;         ///< Without a ray.
+  std::uint64_t silent_subintervals = 0;  ///< Of all slices, without a ray.
+};
+
+/// Back-projects one camera's events along a trajectory, part by part (Ghosh and Gallego 2022,
+/// Algorithm 2, line 3).
+/// @param camera one of the input's cameras.
+WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
+                  const Trajectory& trajectory, const EventGroups& groups,
+                  const PosePacketsOptions& packets);
+
+}  // namespace efm
