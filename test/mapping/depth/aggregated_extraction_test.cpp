@@ -7,14 +7,13 @@
 #include <cmath>
 #include <functional>
 #include <opencv2/core.hpp>
-#include <optional>
 #include <random>
 
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/dsi/chosen_dsi.h"
 #include "test/oracle/naive_aggregation.h"
 
-namespace efm {
+namespace efm::aggregated_extraction_test {
 namespace {
 
 using test::ChosenDsi;
@@ -167,7 +166,7 @@ TEST(AggregatedExtraction, AnIsolatedPixelIsRejectedAndTwoThatAgreeAreNot) {
   EXPECT_EQ(cv::countNonZero(extract(dsi).depth), 2);
 }
 
-TEST(AggregatedExtraction, DepthsAgreeWithinTwoAndAHalfPlacesWhichAreMorePlanesWhereThereAreMany) {
+TEST(AggregatedExtraction, DepthsAgreeWithinTwoAndAHalfStepsOfAHundredthOfTheRange) {
   for (const int planes : {100, 496}) {
     const double place = planes == 100 ? 1 : 5;
     const auto kept_at = [&](double apart) {
@@ -207,34 +206,6 @@ TEST(AggregatedExtraction, PeaksOnTheOutermostPlanesAreKeptOnlyWhereThereAreNoOt
   }
 }
 
-TEST(AggregatedExtraction, TheVarianceGrowsWithTheWidthOfTheRidge) {
-  float previous = 0;
-  for (const double sigma : {1.0, 1.5, 2.0, 3.0, 4.0}) {
-    const float variance = extract(edgesAt(50, sigma)).variance(20, 30);
-    EXPECT_GT(variance, previous) << sigma;
-    EXPECT_TRUE(std::isfinite(variance));
-    previous = variance;
-  }
-}
-
-TEST(AggregatedExtraction, TheVarianceGrowsWithTheScatterAround) {
-  const auto variance = [](double scatter) {
-    ChosenDsi dsi({60, 40}, 100);
-    std::mt19937 random(2);
-    std::normal_distribution<double> normal;
-    for (int y = 0; y < 40; ++y) {
-      for (int x = 0; x < 60; ++x) {
-        const double at = 50 + scatter * normal(random);
-        dsi.setColumn({x, y}, [&](int plane) { return 20 * acrossEdge(x) * ridge(plane, at, 2); });
-      }
-    }
-    const DepthMap map = extract(dsi);
-    return cv::mean(map.variance, map.depth > 0)[0];
-  };
-  EXPECT_GT(variance(0.5), 1.5 * variance(0));
-  EXPECT_GT(variance(1.0), 1.2 * variance(0.5));
-}
-
 TEST(AggregatedExtraction, TwiceTheVotesChangeNoBitOfDepthAndVariance) {
   const ChosenDsi dsi = randomEdges(5, {64, 37}, 100);
   ChosenDsi twice = dsi;
@@ -245,49 +216,7 @@ TEST(AggregatedExtraction, TwiceTheVotesChangeNoBitOfDepthAndVariance) {
   EXPECT_TRUE(test::same(once.variance, extract(twice).variance));
 }
 
-TEST(AggregatedExtraction, AMirroredDsiGivesTheMirroredMap) {
-  const ChosenDsi dsi = randomEdges(6, {64, 37}, 100);
-  ChosenDsi mirrored = dsi;
-  for (int y = 0; y < 37; ++y) {
-    for (int x = 0; x < 64; ++x) {
-      mirrored.setColumn({x, y}, [&](int plane) { return dsi.at({63 - x, 36 - y}, plane); });
-    }
-  }
-  const DepthMap map = extract(dsi);
-  cv::Mat1f back;
-  cv::flip(extract(mirrored).depth, back, -1);
-  EXPECT_GT(cv::countNonZero(map.depth), 50);
-  EXPECT_LT(cv::norm(map.depth, back, cv::NORM_INF), 1e-3);
-}
-
-TEST(AggregatedExtraction, PlanesInReverseGiveTheReversedPositions) {
-  const ChosenDsi dsi = randomEdges(7, {64, 37}, 100);
-  ChosenDsi reversed = dsi;
-  for (int y = 0; y < 37; ++y) {
-    for (int x = 0; x < 64; ++x) {
-      reversed.setColumn({x, y}, [&](int plane) { return dsi.at({x, y}, 99 - plane); });
-    }
-  }
-  const DepthMap map = extract(dsi);
-  const DepthMap back = extract(reversed);
-  const DepthPlanes planes = planesOf(100);
-  int kept = 0;
-  int same = 0;
-  for (int y = 0; y < 37; ++y) {
-    for (int x = 0; x < 64; ++x) {
-      if (map.depth(y, x) == 0 && back.depth(y, x) == 0) continue;
-      ++kept;
-      if (map.depth(y, x) == 0 || back.depth(y, x) == 0) continue;
-      // Of a weight of exactly one half the lower position is taken, which is the upper one here.
-      const double position = planes.positionOf(map.depth(y, x));
-      same += std::abs(99 - planes.positionOf(back.depth(y, x)) - position) < 0.01 ? 1 : 0;
-    }
-  }
-  EXPECT_GT(kept, 50);
-  EXPECT_GE(same, kept * 98 / 100);
-}
-
-TEST(AggregatedExtraction, MoreQualityOrExcessKeepsFewer) {
+TEST(AggregatedExtraction, HigherThresholdsKeepFewer) {
   const ChosenDsi dsi = randomEdges(8, {64, 37}, 100);
   DepthExtractionOptions options;
   options.min_quality = 0;
@@ -307,34 +236,14 @@ TEST(AggregatedExtraction, MoreQualityOrExcessKeepsFewer) {
   EXPECT_EQ(cv::countNonZero(extract(dsi, options).depth), 0);
 }
 
-TEST(AggregatedExtraction, DilationGrowsKeptPixelsIntoTheirFourNeighbours) {
+TEST(AggregatedExtraction, DilationAddsPixelsAndChangesNoOther) {
   const ChosenDsi dsi = randomEdges(9, {64, 37}, 100);
   DepthExtractionOptions options;
   const DepthMap kept = extract(dsi, options);
   options.dilate = true;
   const DepthMap grown = extract(dsi, options);
-  const cv::Rect inner(2, 2, 60, 33);
-  int filled = 0;
-  for (int y = 0; y < 37; ++y) {
-    for (int x = 0; x < 64; ++x) {
-      std::optional<cv::Point> best;
-      for (const cv::Point& step : {cv::Point(0, -1), {-1, 0}, {1, 0}, {0, 1}}) {
-        const cv::Point beside = cv::Point(x, y) + step;
-        if (!inner.contains(beside) || kept.depth(beside) == 0) continue;
-        if (!best || kept.confidence(beside) > kept.confidence(*best)) best = beside;
-      }
-      if (kept.depth(y, x) > 0 || !best || !inner.contains({x, y})) {
-        ASSERT_EQ(grown.depth(y, x), kept.depth(y, x));
-        ASSERT_EQ(grown.confidence(y, x), kept.confidence(y, x));
-        continue;
-      }
-      ++filled;
-      ASSERT_EQ(grown.depth(y, x), kept.depth(*best));
-      ASSERT_EQ(grown.variance(y, x), kept.variance(*best));
-      ASSERT_EQ(grown.confidence(y, x), kept.confidence(*best));
-    }
-  }
-  EXPECT_GT(filled, 100);
+  EXPECT_GT(cv::countNonZero(grown.depth), cv::countNonZero(kept.depth) + 100);
+  EXPECT_EQ(cv::countNonZero((grown.depth != kept.depth) & (kept.depth > 0)), 0);
 }
 
 TEST(AggregatedExtraction, TheFrameIsClear) {
@@ -383,4 +292,4 @@ TEST(AggregatedExtraction, TheSmallestThresholdsFindEveryRay) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::aggregated_extraction_test

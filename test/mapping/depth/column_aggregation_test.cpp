@@ -2,8 +2,6 @@
 #include "mapping/depth/column_aggregation.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,7 +11,7 @@
 #include "mapping/depth/sparse_mask.h"
 #include "test/mapping/dsi/chosen_dsi.h"
 
-namespace efm {
+namespace efm::column_aggregation_test {
 namespace {
 
 using test::ChosenDsi;
@@ -32,7 +30,7 @@ ChosenDsi randomDsi(std::uint32_t seed, const cv::Size& size, int planes) {
       const double height = 5 + 10 * uniform(random);
       const double at = (planes - 1) * uniform(random);
       const double other = (planes - 1) * uniform(random);
-      dsi.setRay({x, y}, [&](int plane) {
+      dsi.setColumn({x, y}, [&](int plane) {
         return height * ridge(plane, at, 2.5) + 0.6 * height * ridge(plane, other, 1.5) +
                0.3 * uniform(random);
       });
@@ -119,7 +117,7 @@ void expectNaive(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   EXPECT_GT(compared, static_cast<int>(chosen.size()) * 9 / 10);
 }
 
-TEST(RayAggregation, IsTheNaiveOneForFewAndManyPlanesAndAnyShareOfPixels) {
+TEST(ColumnAggregation, IsTheNaiveOneForFewAndManyPlanesAndAnyFractionOfPixels) {
   std::uint32_t seed = 0;
   for (const int planes : {1, 2, 3, 8, 100, 150, 500}) {
     for (const int one_of : {1, 3, 20}) {
@@ -130,21 +128,16 @@ TEST(RayAggregation, IsTheNaiveOneForFewAndManyPlanesAndAnyShareOfPixels) {
   }
 }
 
-TEST(RayAggregation, OfViewsSmallerThanTheWindowIsTheNaiveOne) {
+TEST(ColumnAggregation, OfViewsSmallerThanTheWindowIsTheNaiveOne) {
   for (const cv::Size& size : {cv::Size(1, 1), {1, 9}, {5, 3}, {8, 8}}) {
     expectNaive(randomDsi(7, size, 40), cv::Mat1b(size, 255));
   }
 }
 
-TEST(RayAggregation, OfNoPixelsIsEmpty) {
-  EXPECT_TRUE(aggregate(randomDsi(8, {5, 5}, 10), cv::Mat1b::zeros(5, 5)).empty());
-  EXPECT_TRUE(aggregate(ChosenDsi({5, 5}, 10), cv::Mat1b::zeros(5, 5)).empty()) << "an empty DSI";
-}
-
-TEST(RayAggregation, ALoneRidgeIsFoundBetweenPlanesWithItsWidth) {
+TEST(ColumnAggregation, ALoneRidgeIsFoundBetweenPlanesWithItsWidth) {
   for (const double at : {20.0, 20.25, 20.5, 33.8}) {
     ChosenDsi dsi({11, 11}, 100);
-    dsi.setRay({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
+    dsi.setColumn({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
     cv::Mat1b mask = cv::Mat1b::zeros(11, 11);
     mask(5, 5) = 255;
     const AggregatedPeak peak = aggregate(dsi, mask).at(0);
@@ -154,12 +147,12 @@ TEST(RayAggregation, ALoneRidgeIsFoundBetweenPlanesWithItsWidth) {
   }
 }
 
-TEST(RayAggregation, NeighboursMoveAWrongPeakToTheirs) {
+TEST(ColumnAggregation, NeighboursMoveAWrongPeakToTheirs) {
   ChosenDsi dsi({9, 9}, 60);
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x) {
       const bool wrong = x == 4 && y == 4;
-      dsi.setRay({x, y}, [&](int plane) {
+      dsi.setColumn({x, y}, [&](int plane) {
         return wrong ? 10 * ridge(plane, 50, 1.5) + 4 * ridge(plane, 20, 1.5)
                      : 10 * ridge(plane, 20, 1.5);
       });
@@ -169,35 +162,35 @@ TEST(RayAggregation, NeighboursMoveAWrongPeakToTheirs) {
   EXPECT_NEAR(peaks[4 * 9 + 4].position, 20, 0.02);
 }
 
-TEST(RayAggregation, OnlyChosenPixelsAreSummed) {
+TEST(ColumnAggregation, OnlyChosenPixelsAreSummed) {
   ChosenDsi dsi({9, 9}, 60);
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x) {
-      dsi.setRay({x, y}, [&](int plane) { return 50 * ridge(plane, 40, 1.5); });
+      dsi.setColumn({x, y}, [&](int plane) { return 50 * ridge(plane, 40, 1.5); });
     }
   }
-  dsi.setRay({4, 4}, [](int plane) { return ridge(plane, 10, 1.5); });
+  dsi.setColumn({4, 4}, [](int plane) { return ridge(plane, 10, 1.5); });
   cv::Mat1b mask = cv::Mat1b::zeros(9, 9);
   mask(4, 4) = 255;
   EXPECT_NEAR(aggregate(dsi, mask).at(0).position, 10, 0.02);
 }
 
-TEST(RayAggregation, TwoEqualPeaksAreFullyAmbiguousAndOneIsNot) {
+TEST(ColumnAggregation, TwoEqualPeaksAreFullyAmbiguousAndOneIsNot) {
   ChosenDsi dsi({1, 1}, 60);
   const cv::Mat1b mask(1, 1, 255);
-  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1) + ridge(plane, 40, 1); });
+  dsi.setColumn({0, 0}, [](int plane) { return ridge(plane, 20, 1) + ridge(plane, 40, 1); });
   EXPECT_NEAR(aggregate(dsi, mask).at(0).second_peak.front(), 1, 1e-3);
   EXPECT_EQ(aggregate(dsi, mask).at(0).position, 20) << "of equals the nearer";
-  dsi.setRay({0, 0}, [](int plane) { return ridge(plane, 20, 1); });
+  dsi.setColumn({0, 0}, [](int plane) { return ridge(plane, 20, 1); });
   EXPECT_LT(aggregate(dsi, mask).at(0).second_peak.front(), 0.01);
 }
 
-TEST(RayAggregation, PeaksOfTheFirstAndTheLastPlaneAreAtTheEnd) {
+TEST(ColumnAggregation, PeaksOfTheFirstAndTheLastPlaneAreAtTheEnd) {
   const cv::Mat1b mask(1, 1, 255);
   for (const int planes : {1, 2, 3, 50}) {
     for (const int at : {0, planes - 1}) {
       ChosenDsi dsi({1, 1}, planes);
-      dsi.setRay({0, 0}, [&](int plane) { return 10 - 0.1 * std::abs(plane - at); });
+      dsi.setColumn({0, 0}, [&](int plane) { return 10 - 0.1 * std::abs(plane - at); });
       const AggregatedPeak peak = aggregate(dsi, mask).at(0);
       EXPECT_TRUE(peak.at_end);
       EXPECT_EQ(peak.position, static_cast<float>(at));
@@ -206,43 +199,13 @@ TEST(RayAggregation, PeaksOfTheFirstAndTheLastPlaneAreAtTheEnd) {
   }
 }
 
-TEST(RayAggregation, TwiceTheVotesChangeNoBit) {
-  const ChosenDsi dsi = randomDsi(11, {31, 22}, 100);
-  ChosenDsi twice = dsi;
-  for (float& value : twice.values) value *= 2;
-  const cv::Mat1b mask = randomMask(11, dsi.size, 3);
-  const std::vector<AggregatedPeak> once_found = aggregate(dsi, mask);
-  const std::vector<AggregatedPeak> twice_found = aggregate(twice, mask);
-  for (std::size_t i = 0; i < once_found.size(); ++i) {
-    ASSERT_EQ(once_found[i].position, twice_found[i].position);
-    ASSERT_EQ(once_found[i].width_sq, twice_found[i].width_sq);
-    ASSERT_EQ(once_found[i].second_peak, twice_found[i].second_peak);
-  }
-}
-
-TEST(RayAggregation, TheNumberOfThreadsChangesNoBit) {
-  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
-  const ChosenDsi dsi = randomDsi(12, {31, 22}, 100);
-  const cv::Mat1b mask = randomMask(12, dsi.size, 2);
-  const auto on = [&](int threads) {
-    tbb::task_arena arena(threads);
-    return arena.execute([&] { return aggregate(dsi, mask); });
-  };
-  const std::vector<AggregatedPeak> one = on(1);
-  const std::vector<AggregatedPeak> many = on(8);
-  for (std::size_t i = 0; i < one.size(); ++i) {
-    ASSERT_EQ(one[i].position, many[i].position);
-    ASSERT_EQ(one[i].second_peak, many[i].second_peak);
-  }
-}
-
-TEST(PlanesOfOnePlace, IsOneUpToAHundredPlanesAndGrowsWithThem) {
+TEST(PlanesPerStep, IsOneUpToAHundredPlanesAndGrowsWithThem) {
   for (const int planes : {1, 2, 50, 100}) EXPECT_EQ(planesPerStep(planes), 1);
   EXPECT_DOUBLE_EQ(planesPerStep(199), 2);
   EXPECT_DOUBLE_EQ(planesPerStep(496), 5);
 }
 
-TEST(PixelNeighbours, AreTheKeptPixelsWithinFourRowByRow) {
+TEST(PixelNeighbours, AreTheMasksPixelsWithinFourRowByRow) {
   const cv::Mat1b mask = randomMask(13, {40, 30}, 4);
   const PixelNeighbours neighbours(SparseMask(mask), mask.size());
   for (int y = 0; y < mask.rows; ++y) {
@@ -267,4 +230,4 @@ TEST(PixelNeighbours, AreTheKeptPixelsWithinFourRowByRow) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::column_aggregation_test

@@ -2,15 +2,13 @@
 #include "mapping/depth/local_agreement.h"
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
 #include <random>
 #include <vector>
 
-namespace efm {
+namespace efm::local_agreement_test {
 namespace {
 
 constexpr float kNear = 2.5F;
@@ -43,8 +41,8 @@ struct Depths {
   LocalAgreement at(const cv::Point& pixel) const {
     LocalAgreement found;
     const std::vector<LocalAgreement> all = agreement();
-    SparseMask(mask).forEach([&](std::size_t i, cv::Point place) {
-      if (place == pixel) found = all[i];
+    SparseMask(mask).forEach([&](std::size_t i, cv::Point position) {
+      if (position == pixel) found = all[i];
     });
     return found;
   }
@@ -81,10 +79,10 @@ LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
       around.emplace_back(position, weight);
       total += weight;
       if (dx == 0 && dy == 0) continue;
-      const double of_share = weight * std::exp(-(dx * dx + dy * dy) / 8.0);
-      others += of_share;
+      const double distance_weight = weight * std::exp(-(dx * dx + dy * dy) / 8.0);
+      others += distance_weight;
       if (std::abs(position - double{depths.positions(pixel)}) < double{kNear}) {
-        agreeing += of_share;
+        agreeing += distance_weight;
       }
     }
   }
@@ -120,7 +118,7 @@ TEST(LocalAgreement, IsTheNaiveOneForDenseAndSparsePixels) {
   }
 }
 
-TEST(LocalAgreement, OfAPixelAloneIsItsOwnDepthAndNoShare) {
+TEST(LocalAgreement, OfASinglePixelIsItsOwnDepthAndNoFraction) {
   Depths depths({20, 20});
   depths.keep({10, 10}, 33);
   depths.keep({15, 10}, 50);  // five away: beyond the window
@@ -148,7 +146,7 @@ TEST(LocalAgreement, OfTwoWithTheSameWeightTheMedianIsTheNearer) {
   EXPECT_EQ(depths.at({10, 10}).median, 30);
 }
 
-TEST(LocalAgreement, OthersCountForTheShareMoreTheNearerTheyAre) {
+TEST(LocalAgreement, NearerPixelsHaveMoreWeightInTheFraction) {
   Depths depths({20, 20});
   depths.keep({10, 10}, 30);
   depths.keep({11, 10}, 30);
@@ -158,34 +156,5 @@ TEST(LocalAgreement, OthersCountForTheShareMoreTheNearerTheyAre) {
   EXPECT_NEAR(depths.at({10, 10}).agreeing_fraction, near / (near + far), 1e-6);
 }
 
-TEST(LocalAgreement, WeightsInAnotherUnitChangeNothing) {
-  Depths depths = randomDepths(5, {40, 30}, 3);
-  const std::vector<LocalAgreement> before = depths.agreement();
-  depths.weights *= 4;
-  const std::vector<LocalAgreement> after = depths.agreement();
-  for (std::size_t i = 0; i < before.size(); ++i) {
-    ASSERT_EQ(before[i].median, after[i].median);
-    ASSERT_EQ(before[i].spread, after[i].spread);
-    ASSERT_EQ(before[i].agreeing_fraction, after[i].agreeing_fraction);
-  }
-}
-
-TEST(LocalAgreement, TheNumberOfThreadsChangesNoBit) {
-  const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
-  const Depths depths = randomDepths(6, {40, 30}, 2);
-  const auto on = [&](int threads) {
-    tbb::task_arena arena(threads);
-    return arena.execute([&] { return depths.agreement(); });
-  };
-  const std::vector<LocalAgreement> one = on(1);
-  const std::vector<LocalAgreement> many = on(8);
-  for (std::size_t i = 0; i < one.size(); ++i) {
-    ASSERT_EQ(one[i].median, many[i].median);
-    ASSERT_EQ(one[i].agreeing_fraction, many[i].agreeing_fraction);
-  }
-}
-
-TEST(LocalAgreement, OfNoneIsEmpty) { EXPECT_TRUE(Depths({5, 5}).agreement().empty()); }
-
 }  // namespace
-}  // namespace efm
+}  // namespace efm::local_agreement_test

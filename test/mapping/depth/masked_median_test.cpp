@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <random>
 
-namespace efm {
+namespace efm::masked_median_test {
 namespace {
 
 cv::Mat1b randomMask(int width, int height, double share, std::mt19937& random) {
@@ -89,4 +89,4 @@ TEST(MaskedMedian, OfALargeWindowIsTheMedianOfAll) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::masked_median_test

@@ -11,7 +11,7 @@
 
 #include "test/mapping/keyframes/played_recording.h"
 
-namespace efm {
+namespace efm::robust_maximum_test {
 namespace {
 
 TEST(RobustMaximum, IsNothingBeforeTheFirstValue) { EXPECT_FALSE(RobustMaximum().value()); }
@@ -84,4 +84,4 @@ TEST(RobustMaximum, OfTheKeyframesSoFarIsTheWhiteLevelOfTheSequence) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::robust_maximum_test

@@ -9,7 +9,7 @@
 
 #include "test/mapping/keyframes/random_scene.h"
 
-namespace efm {
+namespace efm::background_activity_filter_test {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -34,23 +34,6 @@ TEST(BackgroundActivityFilter, SupportLastsAsLongAsAskedFor) {
   filter.isIsolated(eventAt(100 * kMs, 4, 4));
   EXPECT_FALSE(filter.isIsolated(eventAt(105 * kMs, 5, 4)));
   EXPECT_TRUE(filter.isIsolated(eventAt(110 * kMs + 1, 4, 4)));
-}
-
-TEST(BackgroundActivityFilter, APixelDoesNotSupportItself) {
-  BackgroundActivityFilter filter(9, 9, 5 * kMs);
-  for (int i = 0; i < 100; ++i) EXPECT_TRUE(filter.isIsolated(eventAt(i * kMs, 4, 4)));
-}
-
-TEST(BackgroundActivityFilter, RowsDoNotSupportEachOtherAcrossTheBorder) {
-  BackgroundActivityFilter filter(9, 9, 5 * kMs);
-  filter.isIsolated(eventAt(100 * kMs, 8, 3));
-  EXPECT_TRUE(filter.isIsolated(eventAt(100 * kMs, 0, 4)));
-  EXPECT_FALSE(filter.isIsolated(eventAt(100 * kMs, 0, 5))) << "(0, 4) supports it";
-}
-
-TEST(BackgroundActivityFilter, OnASensorOfOnePixelEveryEventIsIsolated) {
-  BackgroundActivityFilter filter(1, 1, 5 * kMs);
-  for (int i = 0; i < 10; ++i) EXPECT_TRUE(filter.isIsolated(eventAt(i, 0, 0)));
 }
 
 TEST(BackgroundActivityFilter, DecidesAsTheWholePastDoes) {
@@ -79,4 +62,4 @@ TEST(BackgroundActivityFilter, DecidesAsTheWholePastDoes) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::background_activity_filter_test

@@ -1,24 +1,21 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/events/event_filter.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdint>
-#include <stdexcept>
 #include <vector>
 
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/played_recording.h"
+#include "test/mapping/options/refused_option.h"
 
-namespace efm {
+namespace efm::event_filter_test {
 namespace {
 
 using test::LongRecording;
 using test::Played;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -79,13 +76,13 @@ TEST(EventFilter, SwitchedOffItKeepsEverything) {
   for (int i = 0; i < 1000; ++i) EXPECT_TRUE(filter.keeps({i * kMs, 7, 7, true}));
 }
 
-TEST(EventFilter, ATimeThatIsNoneIsAnErrorThatNamesIt) {
-  for (const double wrong : {-1.0, 1e-12, 10.5}) {
-    EventFilterOptions options;
-    options.background_activity_s = wrong;
-    EXPECT_THAT([&] { options.validate(); },
-                ThrowsMessage<std::invalid_argument>(HasSubstr("background_activity_s = ")));
-  }
+TEST(EventFilter, InvalidTimesAreNamed) {
+  test::expectRefused<EventFilterOptions>("background_activity_s = -1",
+                                          [](auto& o) { o.background_activity_s = -1; });
+  test::expectRefused<EventFilterOptions>("background_activity_s = ",
+                                          [](auto& o) { o.background_activity_s = 1e-12; });
+  test::expectRefused<EventFilterOptions>("background_activity_s = 10.5",
+                                          [](auto& o) { o.background_activity_s = 10.5; });
 }
 
 TEST(FilteredMapping, WhatTheFilterLeavesOutIsCountedAndTheRestIsMapped) {
@@ -123,33 +120,6 @@ TEST(FilteredMapping, WhatTheFilterLeavesOutIsCountedAndTheRestIsMapped) {
     }
     EXPECT_EQ(filtered.counts.total().used, expected.counts.total().used);
     EXPECT_EQ(filtered.counts.total().without_pose, expected.counts.total().without_pose);
-  }
-}
-
-TEST(FilteredMapping, HowARecordingIsCutIntoPacketsNeverChangesTheResult) {
-  for (std::uint32_t seed = 1; seed <= 5; ++seed) {
-    const LongRecording recording = recordingWithHotPixels(seed);
-    for (const KeyframePolicyKind policy :
-         {KeyframePolicyKind::kPeriod, KeyframePolicyKind::kEvents}) {
-      FusionMapperOptions options = filteredOptions();
-      options.keyframes.policy = policy;
-      options.keyframes.window_events = 600;
-      const Played whole = test::play(recording, options, 0);
-      for (std::uint32_t cut = 1; cut <= 3; ++cut) {
-        const Played cut_up = test::play(recording, options, cut);
-        ASSERT_EQ(cut_up.keyframes.size(), whole.keyframes.size());
-        for (std::size_t k = 0; k < whole.keyframes.size(); ++k) {
-          EXPECT_EQ(cut_up.keyframes[k].window.t1_ns, whole.keyframes[k].window.t1_ns);
-          EXPECT_TRUE(test::same(cut_up.keyframes[k].map, whole.keyframes[k].map));
-        }
-        for (std::size_t c = 0; c < 3; ++c) {
-          EXPECT_EQ(cut_up.counts.cameras[c].filtered, whole.counts.cameras[c].filtered);
-          EXPECT_EQ(cut_up.counts.cameras[c].used, whole.counts.cameras[c].used);
-          EXPECT_EQ(cut_up.counts.cameras[c].without_pose, whole.counts.cameras[c].without_pose);
-        }
-        EXPECT_EQ(cut_up.counts.sorted_events, whole.counts.sorted_events);
-      }
-    }
   }
 }
 
@@ -210,4 +180,4 @@ TEST(FilteredMapping, CamerasOfOnePixelAndCamerasWithoutEventsAreNoErrors) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::event_filter_test

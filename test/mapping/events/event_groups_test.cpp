@@ -11,13 +11,13 @@
 
 #include "test/mapping/keyframes/random_scene.h"
 
-namespace efm {
+namespace efm::event_groups_test {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-constexpr Window kWindow{0, 1000, 500};
+constexpr Window kWindow{0, 1200, 600};  // every number of sub-intervals below divides it
 
 /// How a window is divided.
 struct Division {
@@ -46,7 +46,7 @@ void forEachDivision(const Check& check) {
 
 TEST(EventGroups, EachEventOfAWindowIsInThePartOfItsSubintervalAndPolarity) {
   test::RandomScene random(3);
-  const std::vector<Event> events = random.events(test::smallCamera(), 500, 0, 1000);
+  const std::vector<Event> events = random.events(test::smallCamera(), 500, 0, kWindow.t1_ns);
   forEachDivision([&](const Division& division) {
     const EventGroups groups(division.split, division.subintervals);
     const std::int64_t intervals = division.split.time_slices * division.subintervals.count;
@@ -59,8 +59,8 @@ TEST(EventGroups, EachEventOfAWindowIsInThePartOfItsSubintervalAndPolarity) {
       seen += selected.size();
       for (std::size_t i = 0; i < selected.size(); ++i) {
         const auto subinterval = static_cast<std::int64_t>(part.subinterval);
-        ASSERT_GE(selected[i].t_ns * intervals, 1000 * subinterval);
-        ASSERT_LT(selected[i].t_ns * intervals, 1000 * (subinterval + 1));
+        ASSERT_GE(selected[i].t_ns * intervals, kWindow.t1_ns * subinterval);
+        ASSERT_LT(selected[i].t_ns * intervals, kWindow.t1_ns * (subinterval + 1));
         ASSERT_EQ(selected[i].polarity, part.polarity.value_or(selected[i].polarity));
         ASSERT_LE(selected[i > 0 ? i - 1 : 0].t_ns, selected[i].t_ns) << "in their order";
       }
@@ -125,4 +125,4 @@ TEST(SplitFusionOptions, SlicesOutOfRangeAreNamed) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::event_groups_test

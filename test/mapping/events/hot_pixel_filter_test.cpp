@@ -1,24 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/events/hot_pixel_filter.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <limits>
-#include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include "test/mapping/keyframes/random_scene.h"
+#include "test/mapping/options/refused_option.h"
 
-namespace efm {
+namespace efm::hot_pixel_filter_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kMs = 1'000'000;
 
@@ -103,33 +97,6 @@ TEST(HotPixelFilter, OfALineThatFlickersInPlaceOnlyTheEndsAre) {
   }
 }
 
-TEST(HotPixelFilter, TwoHotPixelsSideBySideAreBothFound) {
-  HotPixelFilter filter(20, 10, fewEvents());
-  for (int i = 0; i < 40; ++i) {
-    const bool judged = i >= 5;
-    EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3)), judged);
-    EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, 8, 3)), judged);
-  }
-}
-
-TEST(HotPixelFilter, CornersAreJudgedByTheNeighboursTheyHave) {
-  for (const int x : {0, 19}) {
-    for (const int y : {0, 9}) {
-      HotPixelFilter filter(20, 10, fewEvents());
-      for (int i = 1; i <= 10; ++i) {
-        EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, x, y)), i >= 6);
-      }
-    }
-  }
-}
-
-TEST(HotPixelFilter, PixelsOfASensorOnePixelWideAreNeverHot) {
-  for (const auto& [width, height] : {std::pair(1, 1), std::pair(1, 8), std::pair(8, 1)}) {
-    HotPixelFilter filter(width, height, fewEvents());
-    for (int i = 0; i < 100; ++i) EXPECT_FALSE(filter.isHot(eventAt(i * kMs, 0, 0)));
-  }
-}
-
 TEST(HotPixelFilter, ManyMoreEventsThanFitACountAreStillHot) {
   HotPixelOptions options = fewEvents();
   options.period_s = 100;
@@ -167,20 +134,14 @@ TEST(HotPixelFilter, DecidesAsTheWholePastDoes) {
 }
 
 TEST(HotPixelOptions, ValuesOutOfRangeAreErrorsThatNameThem) {
-  const auto errorOf = [](auto change) {
-    HotPixelOptions options;
-    change(options);
-    return [options] { options.validate(); };
-  };
-  EXPECT_THAT(errorOf([](auto& o) { o.ratio = 1.9; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_ratio = 1.8999")));
-  EXPECT_THAT(errorOf([](auto& o) { o.period_s = 0; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_period_s = 0: must be")));
-  EXPECT_THAT(errorOf([](auto& o) { o.period_s = std::numeric_limits<double>::quiet_NaN(); }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_period_s = nan: must be")));
-  EXPECT_THAT(errorOf([](auto& o) { o.min_events = 1; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("hot_pixel_min_events = 1: must be")));
+  test::expectRefused<HotPixelOptions>("hot_pixel_ratio = 1.8999", [](auto& o) { o.ratio = 1.9; });
+  test::expectRefused<HotPixelOptions>("hot_pixel_period_s = 0: must be",
+                                       [](auto& o) { o.period_s = 0; });
+  test::expectRefused<HotPixelOptions>("hot_pixel_period_s = nan: must be",
+                                       [](auto& o) { o.period_s = std::nan(""); });
+  test::expectRefused<HotPixelOptions>("hot_pixel_min_events = 1: must be",
+                                       [](auto& o) { o.min_events = 1; });
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::hot_pixel_filter_test

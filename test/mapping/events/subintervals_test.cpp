@@ -10,7 +10,7 @@
 #include <set>
 #include <stdexcept>
 
-namespace efm {
+namespace efm::subintervals_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -94,14 +94,6 @@ TEST(Subintervals, AnEventOnABoundaryBelongsToThePartThatBeginsThere) {
   EXPECT_THAT(sizesOf(parts), ElementsAre(2, 2, 0, 1));
 }
 
-TEST(Subintervals, WindowsThatDoNotDivideLoseNothingAtTheirEnd) {
-  // 10 ns into 3: [0, 3), [3, 6), [6, 10).
-  const auto events = eventsAt({kNow_ns + 2, kNow_ns + 3, kNow_ns + 5, kNow_ns + 6, kNow_ns + 9});
-  const auto parts = splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + 10,
-                                           into(3, SubintervalSplit::kDuration));
-  EXPECT_THAT(sizesOf(parts), ElementsAre(1, 2, 2));
-}
-
 TEST(Subintervals, AWindowOfAHundredYearsDoesNotOverflow) {
   const std::int64_t century_ns = 3'155'760'000'000'000'000;
   const auto events = eventsAt({0, century_ns / 1000 * 999 - 1, century_ns / 1000 * 999});
@@ -133,13 +125,6 @@ TEST(Subintervals, FewerEventsThanPartsLeavePartsEmpty) {
     const auto sizes = sizesOf(parts);
     EXPECT_EQ(std::count(sizes.begin(), sizes.end(), 1U), 2);
     EXPECT_EQ(std::count(sizes.begin(), sizes.end(), 0U), 6);
-  }
-}
-
-TEST(Subintervals, NoEventsMakeEmptyParts) {
-  for (const SubintervalSplit split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
-    EXPECT_THAT(sizesOf(splitIntoSubintervals({}, kNow_ns, kNow_ns + 100, into(3, split))),
-                ElementsAre(0, 0, 0));
   }
 }
 
@@ -217,4 +202,4 @@ TEST(Subintervals, OptionsAndNamesThatCannotBeAreNamed) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::subintervals_test

@@ -7,7 +7,7 @@
 
 #include "test/mapping/keyframes/random_scene.h"
 
-namespace efm {
+namespace efm::camera_motion_test {
 namespace {
 
 using test::RandomScene;
@@ -63,4 +63,4 @@ TEST(CameraMotion, OfASinglePoseIsThatPose) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::camera_motion_test

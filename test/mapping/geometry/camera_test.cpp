@@ -10,7 +10,7 @@
 
 #include "mapping/geometry/undistortion.h"
 
-namespace efm {
+namespace efm::camera_test {
 namespace {
 
 using ::testing::AllOf;
@@ -85,4 +85,4 @@ TEST(Camera, EveryFieldOutOfRangeIsNamed) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::camera_test

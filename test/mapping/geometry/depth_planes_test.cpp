@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace efm {
+namespace efm::depth_planes_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -65,5 +65,12 @@ TEST(DepthPlanes, OptionsOutOfRangeAreNamed) {
               ThrowsMessage<std::invalid_argument>(HasSubstr("min_depth_m = nan")));
 }
 
+TEST(DepthPlanes, StepsOfInverseSpacingAreTheSameEverywhere) {
+  const DepthPlanes planes({0.5, 5.0, 100, PlaneSpacing::kInverse});
+  for (const double position : {0.0, 0.2, 0.5, 41.7, 98.9, 99.0}) {
+    EXPECT_NEAR(planes.inverseDepthStepAt(position), planes.inverseDepthStep(), 1e-12) << position;
+  }
+}
+
 }  // namespace
-}  // namespace efm
+}  // namespace efm::depth_planes_test

@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace efm {
+namespace efm::timestamp_test {
 namespace {
 
 using ::testing::Eq;
@@ -70,4 +70,4 @@ TEST(Timestamp, DurationsMustFit) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::timestamp_test

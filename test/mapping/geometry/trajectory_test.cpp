@@ -9,7 +9,7 @@
 #include <set>
 #include <stdexcept>
 
-namespace efm {
+namespace efm::trajectory_test {
 namespace {
 
 StampedPose at(std::int64_t t_ns, double x, double yaw_rad = 0) {
@@ -112,4 +112,4 @@ RC_GTEST_PROP(Trajectory, TheCursorNeverChangesTheAnswer, (const std::set<std::u
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::trajectory_test

@@ -1,23 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/keyframes/baseline_policy.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 #include "test/mapping/keyframes/known_recording.h"
 
-namespace efm {
+namespace efm::baseline_policy_test {
 namespace {
 
 using test::KnownRecording;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
@@ -206,24 +202,5 @@ TEST(BaselinePolicy, TheReferenceMayStandAtTheEnd) {
   EXPECT_EQ(policy.current(recording)->t_ref_ns, policy.current(recording)->t1_ns);
 }
 
-TEST(BaselinePolicy, OptionsOutOfRangeAreNamed) {
-  const auto with = [](auto change) {
-    return [change] {
-      KeyframePolicyOptions wrong = options(0.2, 0.1);
-      change(wrong);
-      makeKeyframePolicy(wrong, kDepthGuess_m);
-    };
-  };
-  using Options = KeyframePolicyOptions;
-  EXPECT_THAT(with([](Options& o) { o.min_baseline_ratio = 0; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("min_baseline_ratio = 0")));
-  EXPECT_THAT(with([](Options& o) { o.min_visible_fraction = 1.5; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("min_visible_fraction = 1.5")));
-  EXPECT_THAT(with([](Options& o) { o.stride_s = 0.25; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("stride_s = 0.25")));
-  EXPECT_THAT(with([](Options& o) { o.window_events = 0; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("window_events = 0")));
-}
-
 }  // namespace
-}  // namespace efm
+}  // namespace efm::baseline_policy_test

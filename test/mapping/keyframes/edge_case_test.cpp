@@ -11,7 +11,7 @@
 #include "mapping/keyframes/fusion_mapper.h"
 #include "test/mapping/keyframes/random_scene.h"
 
-namespace efm {
+namespace efm::edge_case_test {
 namespace {
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -206,4 +206,4 @@ TEST(EdgeCase, ACameraWithoutEventsMakesAndLikeRulesZeroUnlessItIsExcluded) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::edge_case_test

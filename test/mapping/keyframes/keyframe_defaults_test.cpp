@@ -16,7 +16,7 @@
 #include "test/mapping/keyframes/random_recording.h"
 #include "test/mapping/motion/moving_edges.h"
 
-namespace efm {
+namespace efm::keyframe_defaults_test {
 namespace {
 
 using test::MovingEdges;
@@ -283,4 +283,4 @@ TEST(KeyframeDefaults, SmallViewsGiveMapsOfTheirSize) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::keyframe_defaults_test

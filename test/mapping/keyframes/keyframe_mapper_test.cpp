@@ -11,7 +11,7 @@
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_recording.h"
 
-namespace efm {
+namespace efm::keyframe_mapper_test {
 namespace {
 
 using test::RandomScene;
@@ -170,14 +170,6 @@ TEST(KeyframeMapper, ASilentCameraThatIsExcludedMightAsWellNotBeThere) {
   }
 }
 
-TEST(KeyframeMapper, ASilentCameraThatIsNotExcludedSilencesTheHarmonicMean) {
-  Recording recording(7, 2, 3000);
-  recording.events[1].clear();
-  const KeyframeDepthMap keyframe = map(recording, {0, 1}, fewPlanes());
-  EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
-  EXPECT_EQ(keyframe.max_confidence, 0);
-}
-
 TEST(KeyframeMapper, WithoutAPoseACameraIsAsSilentAsWithoutEvents) {
   Recording recording(8, 2, 3000);
   for (Event& event : recording.events[1]) event.t_ns = Recording::kStart_ns + 99'999'999;
@@ -192,35 +184,6 @@ TEST(KeyframeMapper, WithoutAPoseACameraIsAsSilentAsWithoutEvents) {
   EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
   EXPECT_GE(keyframe.without_pose, 3000U);
   EXPECT_GT(keyframe.max_confidence, 0);
-}
-
-TEST(KeyframeMapper, SilentSubintervalsAreCounted) {
-  Recording recording(9, 2, 3000);
-  // The second camera sees something in the first and the last of five sub-intervals alone.
-  auto& events = recording.events[1];
-  events.erase(std::remove_if(events.begin(), events.end(),
-                              [](const Event& event) {
-                                const std::int64_t since_ns = event.t_ns - Recording::kStart_ns;
-                                return since_ns >= 20'000'001 && since_ns < 80'000'005;
-                              }),
-               events.end());
-  const KeyframeDepthMap keyframe = map(recording, {0, 1}, fewPlanes(5));
-  EXPECT_THAT(keyframe.silent_cameras, IsEmpty());
-  EXPECT_EQ(keyframe.silent_subintervals, 3U);
-}
-
-TEST(KeyframeMapper, WhereAllCamerasAreSilentTheMapIsEmpty) {
-  Recording recording(10, 2, 10);
-  for (auto& events : recording.events) events.clear();
-  for (const bool exclude_silent : {false, true}) {
-    KeyframeMapperOptions options = fewPlanes(3);
-    options.exclude_silent = exclude_silent;
-    const KeyframeDepthMap keyframe = map(recording, {0, 1}, options);
-    EXPECT_EQ(cv::countNonZero(keyframe.map.depth), 0);
-    EXPECT_EQ(keyframe.map.depth.size(), cv::Size(48, 36));
-    EXPECT_THAT(keyframe.silent_cameras, ElementsAre(0, 1));
-    EXPECT_EQ(keyframe.votes.total(), 0U);
-  }
 }
 
 TEST(KeyframeMapper, WhatCannotBeIsNamed) {
@@ -248,4 +211,4 @@ TEST(KeyframeMapper, WhatCannotBeIsNamed) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::keyframe_mapper_test

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/keyframes/keyframe_policy.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
 #include "test/mapping/keyframes/known_recording.h"
+#include "test/mapping/options/refused_option.h"
 
-namespace efm {
+namespace efm::keyframe_policy_test {
 namespace {
 
 constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'007;
@@ -68,17 +68,21 @@ TEST(KeyframePolicy, ASingleWindowComesOnce) {
 }
 
 TEST(KeyframePolicy, OptionsOutOfRangeAreNamed) {
-  KeyframePolicyOptions options;
-  options.window_s = 0;
-  EXPECT_THAT(
-      [&] { makeKeyframePolicy(options, kDepthGuess_m); },
-      ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr("window_s = 0")));
-  options = {};
-  options.stride_s = -1;
-  EXPECT_THAT(
-      [&] { makeKeyframePolicy(options, kDepthGuess_m); },
-      ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr("stride_s = -1")));
+  test::expectRefused<KeyframePolicyOptions>("window_s = 0", [](auto& o) { o.window_s = 0; });
+  test::expectRefused<KeyframePolicyOptions>("stride_s = -1", [](auto& o) { o.stride_s = -1; });
+  test::expectRefused<KeyframePolicyOptions>("min_baseline_ratio = 0",
+                                             [](auto& o) { o.min_baseline_ratio = 0; });
+  test::expectRefused<KeyframePolicyOptions>("min_visible_fraction = 1.5",
+                                             [](auto& o) { o.min_visible_fraction = 1.5; });
+  test::expectRefused<KeyframePolicyOptions>("window_events = 0",
+                                             [](auto& o) { o.window_events = 0; });
+  KeyframePolicyOptions baseline;
+  baseline.policy = KeyframePolicyKind::kBaseline;
+  test::expectRefused(
+      "stride_s = 0.25", [](auto& o) { o.stride_s = 0.25; }, baseline);
+  baseline.stride_s = 0.25;
+  EXPECT_THROW(makeKeyframePolicy(baseline, kDepthGuess_m), std::invalid_argument);
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::keyframe_policy_test

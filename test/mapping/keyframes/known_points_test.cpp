@@ -13,7 +13,7 @@
 #include "mapping/keyframes/keyframe_policy.h"
 #include "test/mapping/keyframes/random_scene.h"
 
-namespace efm {
+namespace efm::known_points_test {
 namespace {
 
 constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
@@ -211,4 +211,4 @@ TEST(KnownPoints, AreNotFartherOffThanTheVarianceSays) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::known_points_test

@@ -10,7 +10,7 @@
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/played_recording.h"
 
-namespace efm {
+namespace efm::window_policies_test {
 namespace {
 
 using test::LongRecording;
@@ -70,6 +70,7 @@ std::size_t expectTheSameHoweverCut(const LongRecording& recording,
       EXPECT_EQ(a.without_pose, b.without_pose) << label;
       EXPECT_EQ(a.outside_window, b.outside_window) << label;
       EXPECT_EQ(a.dropped, b.dropped) << label;
+      EXPECT_EQ(a.filtered, b.filtered) << label;
     }
     EXPECT_EQ(cut_up.counts.keyframes_without_pose, whole.counts.keyframes_without_pose) << label;
     EXPECT_EQ(cut_up.counts.windows_without_events, whole.counts.windows_without_events) << label;
@@ -78,7 +79,14 @@ std::size_t expectTheSameHoweverCut(const LongRecording& recording,
 }
 
 TEST(WindowPolicies, HowARecordingIsCutIntoPacketsNeverChangesTheResult) {
-  for (const FusionMapperOptions& options : allPolicies()) {
+  std::vector<FusionMapperOptions> all = allPolicies();
+  for (const std::size_t filtered : {0, 2}) {
+    all.push_back(all[filtered]);
+    all.back().filter.hot_pixel.ratio = 2;  // so strict that many random events are filtered
+    all.back().filter.hot_pixel.min_events = 4;
+    all.back().filter.background_activity_s = 0.02;
+  }
+  for (const FusionMapperOptions& options : all) {
     for (std::uint32_t seed = 1; seed <= 3; ++seed) {
       EXPECT_GE(expectTheSameHoweverCut(LongRecording(seed, 1.0), options, labelOf(options, seed)),
                 2U);
@@ -314,4 +322,4 @@ TEST(WindowPolicies, StandingStillTakesNoMemoryAndMakesNoKeyframe) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::window_policies_test

@@ -10,7 +10,7 @@
 #include "test/mapping/depth/same_image.h"
 #include "test/oracle/naive_depth.h"
 
-namespace efm {
+namespace efm::paper_extraction_oracle_test {
 namespace {
 
 constexpr int kPlanes = 60;
@@ -122,4 +122,4 @@ TEST(DepthExtractionOracle, AKeyframeOfRidgesGivesTheSame) {
 }
 
 }  // namespace
-}  // namespace efm
+}  // namespace efm::paper_extraction_oracle_test
