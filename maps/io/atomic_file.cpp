@@ -7,7 +7,9 @@
 #include <system_error>
 
 namespace efm {
+namespace {
 
+/// The path itself, or the file at the end of its symbolic links.
 std::filesystem::path replaceableFile(const std::filesystem::path& path) {
   constexpr int kMaxLinks = 40;  // as Linux has it
   const auto refuse = [&](const std::string& why) {
@@ -29,22 +31,25 @@ std::filesystem::path replaceableFile(const std::filesystem::path& path) {
   return file;
 }
 
-std::filesystem::path temporaryName(const std::filesystem::path& path) {
-  std::filesystem::path temporary = path;
-  temporary.replace_filename(path.stem().string() + ".partial" + path.extension().string());
-  return temporary;
+}  // namespace
+
+AtomicFile::AtomicFile(const std::filesystem::path& path)
+    : path_(replaceableFile(path)), temporary_(path_) {
+  temporary_.replace_filename(path_.stem().string() + ".partial" + path_.extension().string());
+}
+
+AtomicFile::~AtomicFile() {
+  std::error_code ignored;
+  std::filesystem::remove(temporary_, ignored);
 }
 
 void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write) {
-  const std::filesystem::path file = replaceableFile(path);
-  const std::filesystem::path temporary = temporaryName(file);
+  const AtomicFile file(path);
   try {
-    write(temporary);
-    std::filesystem::rename(temporary, file);
+    write(file.temporary());
+    file.replace();
   } catch (const std::exception& error) {
-    std::error_code ignored;
-    std::filesystem::remove(temporary, ignored);
     throw std::runtime_error("cannot write " + path.string() + ": " + error.what());
   }
 }

@@ -7,21 +7,35 @@
 
 namespace efm {
 
-/// The file that is replaced when one is written to `path`: the path itself, or where it leads as a
-/// symbolic link. It need not exist.
-/// @throws std::runtime_error naming `path` where it names no file or is there and is something
-/// else, a folder or a device: replacing that would destroy it.
-std::filesystem::path replaceableFile(const std::filesystem::path& path);
+/// A file under a temporary name until it is complete: whoever looks sees the whole file, the
+/// earlier one, or none. A symbolic link stays, and the file at its end is replaced.
+class AtomicFile {
+ public:
+  /// @throws std::runtime_error naming `path` where it names no file, or is a folder or a device:
+  /// replacing that would destroy it.
+  explicit AtomicFile(const std::filesystem::path& path);
+  /// Removes the temporary file, if it is there.
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
 
-/// The name of a file while it is being written: beside it, with the same extension
-/// ("map.partial.pcd" for "map.pcd").
-std::filesystem::path temporaryName(const std::filesystem::path& path);
+  /// The file to replace; it need not exist.
+  const std::filesystem::path& path() const { return path_; }
+  /// The file to write, adjacent to it and with the same extension: "map.partial.pcd" for
+  /// "map.pcd".
+  const std::filesystem::path& temporary() const { return temporary_; }
+  /// Renames the complete temporary file. @throws std::filesystem::filesystem_error.
+  void replace() const { std::filesystem::rename(temporary_, path_); }
 
-/// Writes a file under its temporary name and renames it once it is complete: whoever looks sees
-/// the whole file, the one before, or none. Replaces `replaceableFile(path)`.
+ private:
+  std::filesystem::path path_;
+  std::filesystem::path temporary_;
+};
+
+/// Writes an AtomicFile.
 /// @param write creates the file at the path it is given.
-/// @throws std::runtime_error naming `path` where it cannot be replaced, written or renamed; what
-/// `write` throws becomes part of the message, and no temporary file stays.
+/// @throws std::runtime_error naming `path` where it cannot be replaced, written or renamed; the
+/// message of an exception of `write` becomes part of it.
 void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write);
 

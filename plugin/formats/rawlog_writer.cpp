@@ -4,41 +4,32 @@
 #include <mrpt/serialization/CArchive.h>
 
 #include <stdexcept>
-#include <system_error>
 
-#include "maps/io/atomic_file.h"
 #include "plugin/formats/gz_stream.h"
 
 namespace efm {
 
 RawlogWriter::RawlogWriter(const std::filesystem::path& file)
-    : file_(replaceableFile(file)),
-      temporary_(temporaryName(file_)),
-      stream_(std::make_unique<GzOutputStream>(temporary_)) {}
+    : file_(file), stream_(std::make_unique<GzOutputStream>(file_.temporary())) {}
 
-RawlogWriter::~RawlogWriter() {
-  if (!stream_) return;
-  stream_.reset();
-  std::error_code ignored;  // nothing more can be done here
-  std::filesystem::remove(temporary_, ignored);
-}
+RawlogWriter::~RawlogWriter() = default;
 
 void RawlogWriter::write(const mrpt::obs::CObservation& observation) {
   try {
     auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(*stream_);
     archive << observation;
   } catch (const std::exception& error) {
-    throw std::runtime_error(file_.string() + ": cannot be written: " + error.what());
+    throw std::runtime_error(file_.path().string() + ": cannot be written: " + error.what());
   }
 }
 
 void RawlogWriter::close() {
   try {
     stream_->close();
-    std::filesystem::rename(temporary_, file_);
+    file_.replace();
     stream_.reset();
   } catch (const std::exception& error) {
-    throw std::runtime_error(file_.string() + ": " + error.what());
+    throw std::runtime_error(file_.path().string() + ": " + error.what());
   }
 }
 

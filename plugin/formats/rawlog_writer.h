@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <memory>
 
+#include "maps/io/atomic_file.h"
+
 namespace efm {
 
 class GzOutputStream;
@@ -14,21 +16,18 @@ class GzOutputStream;
 /// only once it is complete.
 class RawlogWriter {
  public:
-  /// @param file what is there is replaced in the end, where `replaceableFile` allows it.
+  /// @param file an earlier file of this name is replaced: see AtomicFile.
   /// @throws std::runtime_error naming the file where it cannot be made or replaced.
   explicit RawlogWriter(const std::filesystem::path& file);
   /// Without `close` nothing is left behind.
   ~RawlogWriter();
-  RawlogWriter(const RawlogWriter&) = delete;
-  RawlogWriter& operator=(const RawlogWriter&) = delete;
 
   /// @throws std::runtime_error naming the file where it cannot be written.
   void write(const mrpt::obs::CObservation& observation);
   void close();
 
  private:
-  std::filesystem::path file_;
-  std::filesystem::path temporary_;
+  AtomicFile file_;
   std::unique_ptr<GzOutputStream> stream_;
 };
 

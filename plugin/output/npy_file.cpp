@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/output/npy_file.h"
 
+#include <fmt/format.h>
+
 #include <stdexcept>
 #include <string>
-#include <system_error>
-
-#include "maps/io/atomic_file.h"
 
 namespace efm {
 namespace {
@@ -13,9 +12,9 @@ namespace {
 /// Magic, version 1.0, length, and a dictionary padded so that the data begins at a multiple of 64
 /// bytes (NEP 1).
 std::string npyHeader(int planes, const ReferenceView& view) {
-  std::string dictionary = "{'descr': '<f4', 'fortran_order': False, 'shape': (" +
-                           std::to_string(planes) + ", " + std::to_string(view.height) + ", " +
-                           std::to_string(view.width) + "), }";
+  std::string dictionary =
+      fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}, {}), }}", planes,
+                  view.height, view.width);
   constexpr std::size_t kPrefix = 10;
   const std::size_t padding = 63 - (kPrefix + dictionary.size()) % 64;
   dictionary += std::string(padding, ' ') + "\n";
@@ -31,19 +30,13 @@ std::string npyHeader(int planes, const ReferenceView& view) {
 }  // namespace
 
 NpyDsiFile::NpyDsiFile(const std::filesystem::path& path, int planes, const ReferenceView& view)
-    : path_(replaceableFile(path)),
-      temporary_(temporaryName(path_)),
+    : target_(path),
       plane_bytes_(static_cast<std::streamoff>(view.pixels() * sizeof(float))),
-      file_(temporary_, std::ios::binary | std::ios::trunc) {
+      file_(target_.temporary(), std::ios::binary | std::ios::trunc) {
   const std::string header = npyHeader(planes, view);
   header_bytes_ = static_cast<std::streamoff>(header.size());
   file_.write(header.data(), header_bytes_);
-  if (!file_) throw std::runtime_error("cannot write " + path_.string());
-}
-
-NpyDsiFile::~NpyDsiFile() {
-  std::error_code ignored;
-  std::filesystem::remove(temporary_, ignored);
+  if (!file_) throw std::runtime_error("cannot write " + target_.path().string());
 }
 
 void NpyDsiFile::addPlane(int plane, const float* values) {
@@ -55,9 +48,9 @@ void NpyDsiFile::addPlane(int plane, const float* values) {
 void NpyDsiFile::finish() {
   file_.close();
   if (!file_) {
-    throw std::runtime_error("cannot write " + path_.string() + ": the disk may be full");
+    throw std::runtime_error("cannot write " + target_.path().string() + ": the disk may be full");
   }
-  std::filesystem::rename(temporary_, path_);
+  target_.replace();
 }
 
 }  // namespace efm

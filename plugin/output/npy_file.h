@@ -8,6 +8,7 @@
 
 #include "mapping/geometry/reference_view.h"
 #include "mapping/sweep/space_sweep.h"
+#include "maps/io/atomic_file.h"
 
 namespace efm {
 
@@ -18,7 +19,6 @@ class NpyDsiFile : public DsiSink {
  public:
   /// @throws std::runtime_error naming the path where it cannot be created.
   NpyDsiFile(const std::filesystem::path& path, int planes, const ReferenceView& view);
-  ~NpyDsiFile() override;
 
   /// Thread-safe. Errors of the disk are kept for `finish`.
   void addPlane(int plane, const float* values) override;
@@ -26,8 +26,7 @@ class NpyDsiFile : public DsiSink {
   void finish();
 
  private:
-  std::filesystem::path path_;
-  std::filesystem::path temporary_;
+  AtomicFile target_;
   std::streamoff plane_bytes_;
   std::streamoff header_bytes_ = 0;
   std::mutex mutex_;  // of file_

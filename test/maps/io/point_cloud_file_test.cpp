@@ -495,7 +495,8 @@ TEST_F(PointCloudFile, OnAFullDeviceIsAnError) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   for (const Kind& kind : kKinds) {
     const std::filesystem::path path = folder_ / kind.name;
-    std::filesystem::create_symlink("/dev/full", temporaryName(path));
+    const std::filesystem::path temporary = AtomicFile(path).temporary();
+    std::filesystem::create_symlink("/dev/full", temporary);
 
     EXPECT_THROW(writePointCloud(path, {{{1, 2, 3}, 1.0F}}, kind.encoding), std::runtime_error);
     EXPECT_FALSE(std::filesystem::exists(path));
