@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/options/tracker_fault_keys.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <functional>
 #include <optional>
@@ -9,7 +11,7 @@
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
-#include "maps/refinement/tracker_errors.h"
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
@@ -20,109 +22,99 @@ struct FaultKey {
   std::function<std::optional<OptionValue>(const TrackerFaults&)> value;
 };
 
-/// What a number on the command line may be.
+/// The range of a number.
 struct Range {
-  double least;
-  double most;
-  std::string expected;
+  double min;
+  double max;
+  const char* expected;
 };
 
 double numberIn(std::string_view text, const Range& range) {
-  double number = 0;
-  const std::string expected = "must be a number, " + range.expected;
-  try {
-    parseInto(text, number);
-  } catch (const std::invalid_argument&) {
-    throw std::invalid_argument(expected);
-  }
-  if (!(number >= range.least && number <= range.most)) throw std::invalid_argument(expected);
-  return number;
+  const std::optional<double> number = parseFinite(text);
+  if (number && *number >= range.min && *number <= range.max) return *number;
+  throw std::invalid_argument(fmt::format("must be a number, {}", range.expected));
 }
 
-/// @param scale the field's unit in those of the command line: radians per degree.
+/// A number; the field has `unit` of its units for 1 on the command line.
 template <typename Field>
-FaultKey number(std::string_view key, const Range& range, Field field, double scale = 1) {
+FaultKey number(std::string_view key, const Range& range, Field field, double unit = 1) {
   return {key,
           [=](TrackerFaults& faults, std::string_view text) {
-            field(faults) = scale * numberIn(text, range);
+            field(faults) = unit * numberIn(text, range);
           },
-          [=](const TrackerFaults& faults) { return valueOf(field(faults) / scale); }};
+          [=](const TrackerFaults& faults) { return valueOf(field(faults) / unit); }};
+}
+
+/// Seconds; the field has nanoseconds, or is empty.
+template <typename Field>
+FaultKey seconds(std::string_view key, const Range& range, Field field) {
+  return {key,
+          [=](TrackerFaults& faults, std::string_view text) {
+            field(faults) = durationFromSeconds(numberIn(text, range));
+          },
+          [=](const TrackerFaults& faults) -> std::optional<OptionValue> {
+            const std::optional<std::int64_t> duration_ns = field(faults);
+            if (!duration_ns) return std::nullopt;
+            return valueOf(secondsBetween(0, *duration_ns));
+          }};
+}
+
+FaultKey keyframeStart() {
+  return {"keyframe_start_s",
+          [](TrackerFaults& faults, std::string_view text) {
+            const std::optional<std::int64_t> t_ns = parseSeconds(text);
+            if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
+              throw std::invalid_argument("must be a time in seconds, within 4.6e9 s of 0");
+            }
+            faults.perturbation.keyframe.start_ns = t_ns;
+          },
+          [](const TrackerFaults& faults) -> std::optional<OptionValue> {
+            const auto& start_ns = faults.perturbation.keyframe.start_ns;
+            if (!start_ns) return std::nullopt;
+            return OptionValue(formatSeconds(*start_ns));  // exact
+          }};
+}
+
+FaultKey seed() {
+  return {"seed",
+          [](TrackerFaults& faults, std::string_view text) {
+            const std::optional<std::int64_t> seed = parseNumber<std::int64_t>(text);
+            if (!seed || *seed < 0) throw std::invalid_argument("must be a whole number from 0");
+            faults.perturbation.seed = faults.dropouts.seed = static_cast<std::uint64_t>(*seed);
+          },
+          [](const TrackerFaults& faults) {
+            return valueOf(static_cast<std::int64_t>(faults.perturbation.seed));
+          }};
 }
 
 std::vector<FaultKey> makeKeys() {
-  using std::string_view_literals::operator""sv;
   const Range metres = {0, 1000, "0 to 1000 (metres)"};
   const Range degrees = {0, 180, "0 to 180 (degrees)"};
+  const Range gradient = {0, 1, "0 to 1 (metres per metre)"};
+  const Range rotation = {0, 500, "0 to 500 (degrees per metre)"};
+  const Range latency = {0, 10, "0 to 10 (seconds)"};
+  const Range duration = {0.001, 1e6, "0.001 to 1e6 (seconds)"};
+  const Range probability = {0, 1, "0 to 1 (the probability of each pose)"};
+  const Range rate = {0, 1000, "0 to 1000 (gaps per second)"};
+#define FAULT(path) \
+  [](auto& faults) -> auto& { return faults.path; }
   return {
-      number(
-          "noise_m"sv, metres, [](auto& f) -> auto& { return f.perturbation.noise_m; }),
-      number(
-          "noise_deg"sv, degrees, [](auto& f) -> auto& { return f.perturbation.noise_rad; },
-          kRadiansPerDegree),
-      number(
-          "keyframe_noise_m"sv, metres,
-          [](auto& f) -> auto& { return f.perturbation.keyframe.noise_m; }),
-      number(
-          "keyframe_noise_deg"sv, degrees,
-          [](auto& f) -> auto& { return f.perturbation.keyframe.noise_rad; }, kRadiansPerDegree),
-      {"keyframe_s"sv,
-       [](TrackerFaults& faults, std::string_view text) {
-         faults.perturbation.keyframe.length_ns =
-             durationFromSeconds(numberIn(text, {0.001, 1e6, "0.001 to 1e6 (seconds)"}));
-       },
-       [](const TrackerFaults& faults) -> std::optional<OptionValue> {
-         const auto& length_ns = faults.perturbation.keyframe.length_ns;
-         if (!length_ns) return std::nullopt;
-         return valueOf(secondsBetween(0, *length_ns));
-       }},
-      {"keyframe_start_s"sv,
-       [](TrackerFaults& faults, std::string_view text) {
-         const std::optional<std::int64_t> t_ns = parseSeconds(text);
-         if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
-           throw std::invalid_argument("must be a time in seconds, within 4.6e9 s of 0");
-         }
-         faults.perturbation.keyframe.start_ns = t_ns;
-       },
-       [](const TrackerFaults& faults) -> std::optional<OptionValue> {
-         const auto& start_ns = faults.perturbation.keyframe.start_ns;
-         if (!start_ns) return std::nullopt;
-         return OptionValue(formatSeconds(*start_ns));  // exact
-       }},
-      number(
-          "drift"sv, {0, 1, "0 to 1 (metres per metre)"},
-          [](auto& f) -> auto& { return f.perturbation.drift.share; }),
-      number(
-          "drift_deg_per_m"sv, {0, 500, "0 to 500 (degrees per metre)"},
-          [](auto& f) -> auto& { return f.perturbation.drift.rad_per_m; }, kRadiansPerDegree),
-      {"latency_s"sv,
-       [](TrackerFaults& faults, std::string_view text) {
-         faults.latency_ns = durationFromSeconds(numberIn(text, {0, 10, "0 to 10 (seconds)"}));
-       },
-       [](const TrackerFaults& faults) { return valueOf(secondsBetween(0, faults.latency_ns)); }},
-      number(
-          "drop"sv, {0, 1, "0 to 1 (the probability of each pose)"},
-          [](auto& f) -> auto& { return f.dropouts.drop_probability; }),
-      number(
-          "gaps_hz"sv, {0, 1000, "0 to 1000 (gaps per second)"},
-          [](auto& f) -> auto& { return f.dropouts.random_gaps_hz; }),
-      number(
-          "gap_s"sv, {0.001, 1e6, "0.001 to 1e6 (seconds)"},
-          [](auto& f) -> auto& { return f.dropouts.random_gap_s; }),
-      {"seed"sv,
-       [](TrackerFaults& faults, std::string_view text) {
-         std::int64_t seed = 0;
-         try {
-           parseInto(text, seed);
-         } catch (const std::invalid_argument&) {
-           seed = -1;
-         }
-         if (seed < 0) throw std::invalid_argument("must be a whole number from 0");
-         faults.perturbation.seed = faults.dropouts.seed = static_cast<std::uint64_t>(seed);
-       },
-       [](const TrackerFaults& faults) {
-         return valueOf(static_cast<std::int64_t>(faults.perturbation.seed));
-       }},
+      number("noise_m", metres, FAULT(perturbation.noise_m)),
+      number("noise_deg", degrees, FAULT(perturbation.noise_rad), kRadiansPerDegree),
+      number("keyframe_noise_m", metres, FAULT(perturbation.keyframe.noise_m)),
+      number("keyframe_noise_deg", degrees, FAULT(perturbation.keyframe.noise_rad),
+             kRadiansPerDegree),
+      seconds("keyframe_s", duration, FAULT(perturbation.keyframe.length_ns)),
+      keyframeStart(),
+      number("drift", gradient, FAULT(perturbation.drift.share)),
+      number("drift_deg_per_m", rotation, FAULT(perturbation.drift.rad_per_m), kRadiansPerDegree),
+      seconds("latency_s", latency, FAULT(latency_ns)),
+      number("drop", probability, FAULT(dropouts.drop_probability)),
+      number("gaps_hz", rate, FAULT(dropouts.random_gaps_hz)),
+      number("gap_s", duration, FAULT(dropouts.random_gap_s)),
+      seed(),
   };
+#undef FAULT
 }
 
 const std::vector<FaultKey>& keys() {
@@ -135,21 +127,21 @@ const std::vector<FaultKey>& keys() {
 void setTrackerFault(std::string_view assignment, TrackerFaults& faults) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string_view::npos) {
-    throw std::invalid_argument(inQuotes(assignment) +
-                                ": expected key=value; known keys: " + knownTrackerFaults());
+    throw std::invalid_argument(fmt::format("{}: expected key=value; known keys: {}",
+                                            inQuotes(assignment), knownTrackerFaults()));
   }
   const std::string_view key = trimmed(assignment.substr(0, equals));
   const std::string_view value = trimmed(assignment.substr(equals + 1));
   const auto entry = std::find_if(keys().begin(), keys().end(),
                                   [&](const FaultKey& known) { return known.key == key; });
   if (entry == keys().end()) {
-    throw std::invalid_argument(printable(assignment) + ": unknown key " + inQuotes(key) +
-                                "; known: " + knownTrackerFaults());
+    throw std::invalid_argument(fmt::format("{}: unknown key {}; known: {}", printable(assignment),
+                                            inQuotes(key), knownTrackerFaults()));
   }
   try {
     entry->read(faults, value);
   } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(std::string(key) + " = " + printable(value) + ": " + error.what());
+    throw std::invalid_argument(fmt::format("{} = {}: {}", key, printable(value), error.what()));
   }
 }
 
