@@ -68,7 +68,7 @@ class Player {
     try {
       builder_.processObservation(observation);
     } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(recording_.place() + ": " + error.what());
+      throw std::invalid_argument(recording_.position() + ": " + error.what());
     }
     return true;
   }

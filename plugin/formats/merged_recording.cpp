@@ -28,7 +28,7 @@ MergedRecording::MergedRecording(Rig rig, std::vector<EventTextReader> readers)
 mrpt::obs::CObservation::Ptr MergedRecording::next() {
   const std::optional<std::size_t> camera = nextCamera();
   if (!camera) return nullptr;
-  place_ = readers_[*camera].file().string();
+  position_ = readers_[*camera].file().string();
   const std::int64_t t_ns = *readers_[*camera].nextTime();
   if (announced_ < readers_.size()) return packetOf(announced_++, t_ns, {});
   return packetOf(*camera, t_ns, readers_[*camera].nextPacket());

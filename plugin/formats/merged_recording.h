@@ -28,7 +28,7 @@ class MergedRecording : public Recording {
   MergedRecording(Rig rig, std::vector<EventTextReader> readers);
 
   mrpt::obs::CObservation::Ptr next() override;
-  std::string place() const override { return place_; }
+  std::string position() const override { return position_; }
   double progress() const override;
   RecordingCounts counts() const override;
 
@@ -39,7 +39,7 @@ class MergedRecording : public Recording {
 
   Rig rig_;
   std::vector<EventTextReader> readers_;  // per camera
-  std::string place_ = "the recording";
+  std::string position_ = "the recording";
   std::size_t announced_ = 0;  // cameras whose empty packet was given
 };
 

@@ -131,7 +131,7 @@ mrpt::obs::CObservation::Ptr RawlogRecording::next() {
   return observation;
 }
 
-std::string RawlogRecording::place() const {
+std::string RawlogRecording::position() const {
   return "entry " + std::to_string(entries_ == 0 ? 0 : entries_ - 1) + " of " + file_.string();
 }
 

@@ -23,7 +23,7 @@ class RawlogRecording : public Recording {
   /// corrupt, or holds a class that is not known; entries count from 0, as in MRPT's programs, and
   /// what came before was given.
   mrpt::obs::CObservation::Ptr next() override;
-  std::string place() const override;
+  std::string position() const override;
   double progress() const override { return stream_.progress(); }
 
  private:

@@ -49,12 +49,12 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
                      std::string_view section, OptionReader& reader) {
   std::vector<std::string> keys;
   source.getAllKeys(host_section, keys);
-  OptionPlace place{placeIn(source, host_section), {}};
+  OptionOrigin origin{placeIn(source, host_section), {}};
   // Absolute, so that what is saved elsewhere names the same files.
   const std::filesystem::path file = fileOf(source);
-  if (!file.empty()) place.folder = std::filesystem::absolute(file).parent_path();
+  if (!file.empty()) origin.folder = std::filesystem::absolute(file).parent_path();
   for (const std::string& key : keys) {
-    reader.set(section, key, source.read_string(host_section, key, ""), place);
+    reader.set(section, key, source.read_string(host_section, key, ""), origin);
   }
 }
 

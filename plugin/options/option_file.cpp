@@ -15,9 +15,9 @@
 namespace efm {
 namespace {
 
-/// Where an option stands: "rig.ini:3: [dsi]".
-std::string placeOf(std::string_view origin, std::string_view section) {
-  return fmt::format("{}: [{}]", origin, section);
+/// The origin of an option: "rig.ini:3: [dsi]".
+std::string originOf(std::string_view line, std::string_view section) {
+  return fmt::format("{}: [{}]", line, section);
 }
 
 template <typename... Values>
@@ -25,9 +25,9 @@ template <typename... Values>
   throw std::invalid_argument(fmt::format(format, std::forward<Values>(values)...));
 }
 
-void requireSection(std::string_view place, std::string_view section) {
+void requireSection(std::string_view origin, std::string_view section) {
   if (isOptionSection(section)) return;
-  refuse("{}: unknown section [{}]; known: {}", place, printable(section), knownOptionSections());
+  refuse("{}: unknown section [{}]; known: {}", origin, printable(section), knownOptionSections());
 }
 
 bool startsComment(std::string_view text) {
@@ -60,7 +60,7 @@ void OptionReader::readText(std::string_view text, const std::string& name) {
   readLines(text, {name, {}});
 }
 
-void OptionReader::readLines(std::string_view text, const OptionPlace& file) {
+void OptionReader::readLines(std::string_view text, const OptionOrigin& file) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // some editors begin files with it
   if (text.substr(0, kByteOrderMark.size()) == kByteOrderMark) {
     text.remove_prefix(kByteOrderMark.size());
@@ -71,25 +71,25 @@ void OptionReader::readLines(std::string_view text, const OptionPlace& file) {
     const std::size_t end = text.find('\n');
     const std::string_view line = trimmed(withoutComment(text.substr(0, end)));
     text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 1);
-    const std::string origin = fmt::format("{}:{}", file.name, number);
+    const std::string here = fmt::format("{}:{}", file.name, number);
     if (line.empty()) continue;
 
     if (line.front() == '[' && line.back() == ']') {
       section = trimmed(line.substr(1, line.size() - 2));
-      requireSection(origin, section);
+      requireSection(here, section);
       continue;
     }
     const std::size_t equals = line.find('=');
     if (equals == std::string_view::npos || section.empty()) {
-      refuse("{}: {}: expected [section] or, below a section, key = value", origin, inQuotes(line));
+      refuse("{}: {}: expected [section] or, below a section, key = value", here, inQuotes(line));
     }
     const std::string key(trimmed(line.substr(0, equals)));
     const auto [first, is_new] = lines.emplace(std::make_pair(section, key), number);
     if (!is_new) {
-      refuse("{} {}: given twice, first in line {}", placeOf(origin, section), printable(key),
+      refuse("{} {}: given twice, first in line {}", originOf(here, section), printable(key),
              first->second);
     }
-    assign(section, key, trimmed(line.substr(equals + 1)), {placeOf(origin, section), file.folder});
+    assign(section, key, trimmed(line.substr(equals + 1)), {originOf(here, section), file.folder});
   }
 }
 
@@ -102,35 +102,35 @@ void OptionReader::set(std::string_view assignment) {
   const std::string_view section = trimmed(assignment.substr(0, dot));
   requireSection("--set " + printable(assignment), section);
   assign(section, trimmed(assignment.substr(dot + 1, equals - dot - 1)),
-         trimmed(assignment.substr(equals + 1)), {placeOf("--set", section), {}});
+         trimmed(assignment.substr(equals + 1)), {originOf("--set", section), {}});
 }
 
 void OptionReader::set(std::string_view section, std::string_view key, std::string_view value,
-                       const OptionPlace& place) {
+                       const OptionOrigin& origin) {
   if (!isOptionSection(section)) {
-    refuse("{} unknown section; known: {}", place.name, knownOptionSections());
+    refuse("{} unknown section; known: {}", origin.name, knownOptionSections());
   }
-  assign(section, key, trimmed(withoutComment(value)), place);
+  assign(section, key, trimmed(withoutComment(value)), origin);
 }
 
 void OptionReader::assign(std::string_view section, std::string_view key, std::string_view value,
-                          const OptionPlace& place) {
+                          const OptionOrigin& origin) {
   const auto& keys = optionKeys();
   const auto entry = std::find_if(keys.begin(), keys.end(), [&](const OptionKey& candidate) {
     return candidate.section == section && candidate.key == key;
   });
   if (entry == keys.end()) {
     const std::string_view former = formerOptionError(section, key);
-    if (!former.empty()) refuse("{} {}: {}", place.name, key, former);
-    refuse("{} {}: unknown key; known: {}", place.name, printable(key), knownOptionKeys(section));
+    if (!former.empty()) refuse("{} {}: {}", origin.name, key, former);
+    refuse("{} {}: unknown key; known: {}", origin.name, printable(key), knownOptionKeys(section));
   }
   try {
-    const std::filesystem::path path = place.folder / value;
+    const std::filesystem::path path = origin.folder / value;
     entry->read(options_, entry->is_path && !value.empty() ? path.native() : value);
   } catch (const std::invalid_argument& error) {
-    refuse("{} {} = {}: {}", place.name, printable(key), printable(value), error.what());
+    refuse("{} {} = {}: {}", origin.name, printable(key), printable(value), error.what());
   }
-  places_[{std::string(section), std::string(key)}] = place.name;
+  origins_[{std::string(section), std::string(key)}] = origin.name;
 }
 
 EventFusionOptions OptionReader::options() const {
@@ -144,8 +144,9 @@ EventFusionOptions OptionReader::options() const {
     const std::string key = message.substr(0, message.find(" = "));
     for (const OptionKey& entry : optionKeys()) {
       if (entry.key != key) continue;
-      const auto place = places_.find({std::string(entry.section), key});
-      refuse("{} {}", place == places_.end() ? placeOf("default", entry.section) : place->second,
+      const auto origin = origins_.find({std::string(entry.section), key});
+      refuse("{} {}",
+             origin == origins_.end() ? originOf("default", entry.section) : origin->second,
              message);
     }
     throw;

@@ -12,8 +12,8 @@
 
 namespace efm {
 
-/// Where options stand.
-struct OptionPlace {
+/// The origin of options: a file.
+struct OptionOrigin {
   std::string name;              ///< Errors begin with it: "host.ini, section mapper_dsi:".
   std::filesystem::path folder;  ///< Paths are relative to it; empty: the working folder.
 };
@@ -42,18 +42,18 @@ class OptionReader {
   /// @param value the text behind the equals sign; a comment may follow the value.
   /// @throws std::invalid_argument as `readFile` does.
   void set(std::string_view section, std::string_view key, std::string_view value,
-           const OptionPlace& place);
+           const OptionOrigin& origin);
 
   /// @throws std::invalid_argument where a value is out of range.
   EventFusionOptions options() const;
 
  private:
-  void readLines(std::string_view text, const OptionPlace& file);
+  void readLines(std::string_view text, const OptionOrigin& file);
   void assign(std::string_view section, std::string_view key, std::string_view value,
-              const OptionPlace& place);
+              const OptionOrigin& origin);
 
   EventFusionOptions options_;
-  std::map<std::pair<std::string, std::string>, std::string> places_;  // (section, key) -> where
+  std::map<std::pair<std::string, std::string>, std::string> origins_;  // of (section, key)
 };
 
 }  // namespace efm

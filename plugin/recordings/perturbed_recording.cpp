@@ -107,7 +107,7 @@ CObservation::Ptr PerturbedRecording::next() {
   }
   Entry entry = std::move(ready_.front());
   ready_.pop_front();
-  place_ = std::move(entry.place);
+  position_ = std::move(entry.position);
   return entry.observation;
 }
 
@@ -133,7 +133,7 @@ void PerturbedRecording::take(const CObservation::Ptr& observation) {
       perturbed ? poseIn(*observation)->t_ns : nanosecondsIfKnown(observation->timestamp);
   if (t_ns) newest_ns_ = std::max(newest_ns_.value_or(*t_ns), *t_ns);
   if (!perturbed) {
-    ready_.push_back({observation, t_ns, recording_->place()});
+    ready_.push_back({observation, t_ns, recording_->position()});
     return;
   }
   auto& tracker = trackers_[*origin];
@@ -142,20 +142,20 @@ void PerturbedRecording::take(const CObservation::Ptr& observation) {
   try {
     insertPoses(*tracker);
   } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(recording_->place() + ": " + error.what());
+    throw std::invalid_argument(recording_->position() + ": " + error.what());
   }
 }
 
 /// Inserts poses at their position in time; late poses go to the end.
 void PerturbedRecording::insertPoses(Tracker& tracker) {
   while (const auto output = tracker.next()) {
-    auto place = ready_.end();
+    auto position = ready_.end();
     if (output->inserted && faults_.latency_ns == 0) {
-      place = std::find_if(ready_.begin(), ready_.end(), [&](const Entry& entry) {
+      position = std::find_if(ready_.begin(), ready_.end(), [&](const Entry& entry) {
         return entry.t_ns && *entry.t_ns >= output->t_ns;
       });
     }
-    ready_.insert(place, {output->pose, output->t_ns, recording_->place()});
+    ready_.insert(position, {output->pose, output->t_ns, recording_->position()});
   }
 }
 

@@ -33,7 +33,7 @@ class PerturbedRecording : public Recording {
   /// Where the recording cannot be read on, its error comes after the observations before it.
   /// @throws std::invalid_argument where a pose has no time, or is older than the pose before it.
   mrpt::obs::CObservation::Ptr next() override;
-  std::string place() const override { return place_; }
+  std::string position() const override { return position_; }
   double progress() const override { return recording_->progress(); }
   RecordingCounts counts() const override { return recording_->counts(); }
 
@@ -42,7 +42,7 @@ class PerturbedRecording : public Recording {
   struct Entry {
     mrpt::obs::CObservation::Ptr observation;
     std::optional<std::int64_t> t_ns;
-    std::string place;
+    std::string position;
   };
 
   void readOne();
@@ -59,7 +59,7 @@ class PerturbedRecording : public Recording {
   std::optional<std::int64_t> newest_ns_;  // of the observations read
   bool ended_ = false;
   std::exception_ptr error_;  // the error that ended the recording
-  std::string place_ = "the recording";
+  std::string position_ = "the recording";
 };
 
 }  // namespace efm

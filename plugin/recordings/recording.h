@@ -27,7 +27,7 @@ class Recording {
   virtual mrpt::obs::CObservation::Ptr next() = 0;
 
   /// The position of the last observation that `next` returned: "entry 12 of my.rawlog".
-  virtual std::string place() const = 0;
+  virtual std::string position() const = 0;
 
   /// The fraction of the input that was read, 0 to 1.
   virtual double progress() const = 0;
@@ -35,7 +35,7 @@ class Recording {
   virtual RecordingCounts counts() const { return {}; }
 };
 
-/// What is given in place of a recording's own: a folder of text files need not hold it then.
+/// Replacements for parts of a recording, which a folder of text files may lack then.
 struct RecordingOverrides {
   const Calibration* calibration = nullptr;  ///< Used where the folder has none; may be null.
   bool poses = false;                        ///< They are put in later.

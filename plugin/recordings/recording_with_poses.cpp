@@ -20,13 +20,13 @@ mrpt::obs::CObservation::Ptr RecordingWithPoses::next() {
   readAhead();
   const bool poses_left = next_pose_ < poses_.size();
   if (poses_left && (ended_ || mrptTimeFrom(poses_[next_pose_].t_ns) <= ahead_->timestamp)) {
-    place_ = "the poses";
+    position_ = "the poses";
     const StampedPose& pose = poses_[next_pose_++];
     return poseObservation({pose.t_ns, pose.T_world_rig, {}}, "pose");
   }
   if (error_) std::rethrow_exception(error_);
   if (ended_) return nullptr;
-  place_ = recording_->place();
+  position_ = recording_->position();
   return std::exchange(ahead_, nullptr);
 }
 

@@ -21,7 +21,7 @@ class RecordingWithPoses : public Recording {
 
   /// Where the recording cannot be read on, its error comes after all poses.
   mrpt::obs::CObservation::Ptr next() override;
-  std::string place() const override { return place_; }
+  std::string position() const override { return position_; }
   double progress() const override { return recording_->progress(); }
   RecordingCounts counts() const override { return recording_->counts(); }
 
@@ -34,7 +34,7 @@ class RecordingWithPoses : public Recording {
   mrpt::obs::CObservation::Ptr ahead_;  // the recording's next observation, if read
   bool ended_ = false;
   std::exception_ptr error_;  // the error that ended the recording
-  std::string place_ = "the recording";
+  std::string position_ = "the recording";
 };
 
 }  // namespace efm

@@ -20,7 +20,7 @@ class RigOverrideRecording : public Recording {
   /// @throws std::invalid_argument where the calibration lacks a camera or has another size of it;
   /// at the end where it has more cameras than the recording.
   mrpt::obs::CObservation::Ptr next() override;
-  std::string place() const override { return recording_->place(); }
+  std::string position() const override { return recording_->position(); }
   double progress() const override { return recording_->progress(); }
   RecordingCounts counts() const override { return recording_->counts(); }
 

@@ -28,7 +28,7 @@ class TimeCut : public Recording {
 
   /// @throws std::invalid_argument where a pose has no time.
   mrpt::obs::CObservation::Ptr next() override;
-  std::string place() const override { return recording_->place(); }
+  std::string position() const override { return recording_->position(); }
   double progress() const override { return recording_->progress(); }
   RecordingCounts counts() const override { return recording_->counts(); }
 

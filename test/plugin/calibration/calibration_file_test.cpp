@@ -34,7 +34,7 @@ class CalibrationFile : public TemporaryFolder {
   }
 };
 
-TEST_F(CalibrationFile, MayBeACameraChainWhateverItsName) {
+TEST_F(CalibrationFile, MayBeACameraChainOfAnyName) {
   const Calibration calibration = read(kCamchain);
   const RigCamera camera = calibration.camera(1, CameraSize{240, 180});
   EXPECT_EQ(camera.model.fx, 300);
@@ -42,7 +42,7 @@ TEST_F(CalibrationFile, MayBeACameraChainWhateverItsName) {
   EXPECT_EQ(calibration.camera(0, std::nullopt).model.width, 240);
 }
 
-TEST_F(CalibrationFile, MayBeNineNumbersOfACameraWhoseSizeTheRecordingKnows) {
+TEST_F(CalibrationFile, MayBeNineNumbersWhereTheRecordingKnowsTheSize) {
   const Calibration calibration = read("# fx fy\n200 201 120 90 0.1 0 0 0 0\n");
   const CameraModel model = calibration.camera(0, CameraSize{240, 180}).model;
   EXPECT_EQ(model.fy, 201);
@@ -53,7 +53,7 @@ TEST_F(CalibrationFile, MayBeNineNumbersOfACameraWhoseSizeTheRecordingKnows) {
               HasSubstr("given.txt: no size of the sensor"));
 }
 
-TEST_F(CalibrationFile, OfOtherCamerasIsAnErrorThatNamesItAndBothCounts) {
+TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
   const Calibration calibration = read(kCamchain);
   EXPECT_THAT(messageOf([&] { calibration.camera(2, std::nullopt); }),
               EndsWith("given.txt: 2 cameras, but the recording has camera 2: expected one for "
@@ -68,7 +68,7 @@ TEST_F(CalibrationFile, OfOtherCamerasIsAnErrorThatNamesItAndBothCounts) {
   EXPECT_NO_THROW(calibration.requireCameras(2));
 }
 
-TEST_F(CalibrationFile, ThatIsNotUnderstoodIsAnErrorThatNamesItAndSaysWhatIsRead) {
+TEST_F(CalibrationFile, AnErrorNamesTheFileAndTheExpectedFormats) {
   EXPECT_THAT(errorOfText("{\"value0\": {}}\n"),
               AllOf(HasSubstr("given.txt: JSON"), HasSubstr("expected a camera chain")));
   EXPECT_THAT(errorOfText(""), HasSubstr("given.txt: cam0 is missing: expected a camera chain"));

@@ -92,7 +92,7 @@ TEST_F(Camchain, EachTransformStartsAtTheCameraBefore) {
   EXPECT_LT((T_cam2_rig * p_rig - T_cam1_rig * (T_cam1_rig * p_rig)).norm(), 1e-12);
 }
 
-TEST_F(Camchain, WhatTheDatasetWriterWritesIsReadBack) {
+TEST_F(Camchain, ReadsTheDatasetWritersFilesBack) {
   const Rig rig = read(kCam0 + kCam1 + replaced(kCam1, "cam1", "cam2"));
   const Rig again = read(formatCamchain(rig));
   ASSERT_EQ(again.cameras.size(), rig.cameras.size());
@@ -109,12 +109,12 @@ TEST_F(Camchain, DistortionNoneNeedsNoCoefficients) {
   EXPECT_TRUE(rig.cameras[1].model.coefficients.empty());
 }
 
-TEST_F(Camchain, ARoundedRotationIsTakenAndMadeExact) {
+TEST_F(Camchain, MakesARoundedRotationExact) {
   const Rig rig = read(replaced(kCam0 + kCam1, "- [0, -1, 0, 0.1]", "- [0.0004, -0.9997, 0, 0.1]"));
   EXPECT_NEAR(rig.cameras[1].T_rig_cam.rotation.norm(), 1, 1e-15);
 }
 
-TEST_F(Camchain, ThatIsNoCameraChainIsAnErrorThatNamesTheFile) {
+TEST_F(Camchain, AnErrorNamesTheFile) {
   EXPECT_EQ(messageOf([&] { readCamchain(file()); }),
             file().string() + ": cannot be opened for reading");
   EXPECT_THAT(errorOfText("cam0:\n  intrinsics: [1, 2\n"),
@@ -127,7 +127,7 @@ TEST_F(Camchain, ThatIsNoCameraChainIsAnErrorThatNamesTheFile) {
   EXPECT_THAT(errorOfText("cam0: 5\n"), HasSubstr("cam0: expected keys"));
 }
 
-TEST_F(Camchain, AMissingKeyIsAnErrorThatNamesTheCamera) {
+TEST_F(Camchain, AnErrorNamesTheCameraOfAMissingKey) {
   const std::string cam1 = replaced(replaced(kCam1, "model: none", "model: radtan"),
                                     "distortion_coeffs: []", "distortion_coeffs: [0, 0, 0, 0]");
   for (const std::string key : {"camera_model", "intrinsics", "distortion_model",
@@ -138,7 +138,7 @@ TEST_F(Camchain, AMissingKeyIsAnErrorThatNamesTheCamera) {
   }
 }
 
-TEST_F(Camchain, AWrongValueIsAnErrorThatNamesFileLineCameraAndKey) {
+TEST_F(Camchain, AnErrorNamesFileLineCameraAndKeyOfAWrongValue) {
   const struct {
     const char* from;
     const char* to;

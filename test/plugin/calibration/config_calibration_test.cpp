@@ -71,7 +71,7 @@ TEST(ConfigCalibration, EqualsTheCameraChainsOfTheDataSets) {
   }
 }
 
-TEST(ConfigCalibration, DsecsIsThatOfItsEventCameras) {
+TEST(ConfigCalibration, DsecEqualsTheDataSetsEventCameras) {
   const fs::path file = kOriginals / "dsec/zurich_city_04_a_calibration/cam_to_cam.yaml";
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not there";
   const YAML::Node original = YAML::LoadFile(file.string());
@@ -96,7 +96,7 @@ TEST(ConfigCalibration, DsecsIsThatOfItsEventCameras) {
   expectNear(rig.cameras[1].T_rig_cam, T_cam3_cam0);
 }
 
-TEST(ConfigCalibration, TumViesAreThoseOfItsEventCameras) {
+TEST(ConfigCalibration, TumVieEqualsTheDataSetsEventCameras) {
   for (const auto& [ours, original] : {std::pair("tumvie_a.yaml", "camera-calibrationA.json"),
                                        std::pair("tumvie_b.yaml", "camera-calibrationB.json")}) {
     const fs::path file = kOriginals / "tum-vie" / original;

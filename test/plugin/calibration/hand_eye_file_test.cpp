@@ -33,7 +33,7 @@ TEST_F(HandEyeFile, GivesTheTransformFromTheRigToTheBody) {
             1e-12);
 }
 
-TEST_F(HandEyeFile, ThatIsNotUnderstoodIsAnErrorThatNamesTheFileTheLineAndTheKey) {
+TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
   for (const char* text : {"", "5\n", "T_rig_body: 1\n", "0 0 0 0 0 0 1\n"}) {
     EXPECT_THAT(errorOfText(text),
                 AllOf(HasSubstr("hand_eye.yaml: T_body_rig is missing: expected YAML"),

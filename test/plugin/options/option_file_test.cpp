@@ -175,7 +175,7 @@ TEST(OptionReader, EveryKeyReachesItsField) {
   EXPECT_EQ(std::size(kFields), optionKeys().size());
 }
 
-TEST(OptionReader, WhatIsListedReadsBackTheSame) {
+TEST(OptionReader, ListedOptionsReadBackTheSame) {
   EventFusionOptions options;
   options.rig.hand_eye = "rigs/b.yaml";
   options.rig.time_offsets_ns = {-1, 1'600'000'000'000'000'001};
@@ -232,7 +232,7 @@ void expectErrors(const std::vector<ErrorCase>& cases) {
   }
 }
 
-TEST(OptionReader, LinesThatAreNotUnderstoodAreErrorsThatNameThem) {
+TEST(OptionReader, AnErrorNamesTheLine) {
   expectErrors({
       {"\n[dsii]\n", "rig.ini:2: unknown section [dsii]", "known: [rig], [keyframes], [dsi]"},
       {"[dsi]\nplanes = 3\n", "rig.ini:2: [dsi] planes: unknown key", "num_planes"},
@@ -246,7 +246,7 @@ TEST(OptionReader, LinesThatAreNotUnderstoodAreErrorsThatNameThem) {
   });
 }
 
-TEST(OptionReader, FormerKeysAreErrorsThatSayWhatBecameOfThem) {
+TEST(OptionReader, AnErrorSaysTheNewNameOfAFormerKey) {
   expectErrors({
       {"[fusion]\nrevote = true\n", "rig.ini:2: [fusion] revote: was removed with re-voting"},
       {"[fusion]\nrevote_power = 2\n", "rig.ini:2: [fusion] revote_power: was removed"},
@@ -257,7 +257,7 @@ TEST(OptionReader, FormerKeysAreErrorsThatSayWhatBecameOfThem) {
   });
 }
 
-TEST(OptionReader, ValuesOfTheWrongKindAreErrorsThatSayTheExpectedKind) {
+TEST(OptionReader, AnErrorSaysTheExpectedKindOfAValue) {
   const struct {
     std::string section;
     std::string key;
@@ -298,7 +298,7 @@ TEST(OptionReader, ValuesOfTheWrongKindAreErrorsThatSayTheExpectedKind) {
   }
 }
 
-TEST(OptionReader, ValuesOutOfRangeAreErrorsInTheUnitsOfTheFile) {
+TEST(OptionReader, AnErrorSaysTheRangeOfAValueInTheUnitsOfTheFile) {
   // No processor has both.
   const std::string missing = isAvailable(VotingKernel::kNeon) ? "avx2" : "neon";
   const struct {
@@ -353,7 +353,7 @@ TEST(OptionReader, ValuesOutOfRangeAreErrorsInTheUnitsOfTheFile) {
       optionsOf("[refinement]\ntracker_noise_deg = 1000\ntracker_drift_deg_per_m = 1000\n"));
 }
 
-TEST(OptionReader, DegreesAreGivenBackAsTheyWereWritten) {
+TEST(OptionReader, DegreesAreListedAsWritten) {
   for (const char* key : {"tracker_noise_deg", "tracker_drift_deg_per_m", "loop_max_sigma_deg"}) {
     const auto value_of = [&](const EventFusionOptions& options) -> std::string {
       for (const NamedOption& option : listOptions(options)) {
@@ -387,7 +387,7 @@ TEST(OptionReader, DegreesOfAnyNumberReadBackTheSame) {
   }
 }
 
-TEST(OptionReader, SetOverridesTheFileAndTheLastOneCounts) {
+TEST(OptionReader, TheLastSetOverridesTheFile) {
   OptionReader reader;
   reader.readText("[dsi]\nnum_planes = 3\n", "rig.ini");
   reader.set("dsi.num_planes=4");
@@ -396,7 +396,7 @@ TEST(OptionReader, SetOverridesTheFileAndTheLastOneCounts) {
   EXPECT_EQ(reader.options().mapper.keyframe.planes.num_planes, 5);
 }
 
-TEST(OptionReader, LimitsMaySetEachOtherRightBeforeTheyAreChecked) {
+TEST(OptionReader, LimitsAreCheckedTogether) {
   OptionReader reader;
   reader.set("dsi.min_depth_m=6");
   reader.set("dsi.max_depth_m=10");
@@ -406,7 +406,7 @@ TEST(OptionReader, LimitsMaySetEachOtherRightBeforeTheyAreChecked) {
 
 class OptionReaderFile : public TemporaryFolder {};
 
-TEST_F(OptionReaderFile, PathsAreRelativeToTheFileThatSaysThem) {
+TEST_F(OptionReaderFile, PathsAreRelativeToTheirFile) {
   std::ofstream(folder() / "rig.ini") << "[rig]\ncalibration = rigs/a.yaml\nhand_eye = /b.yaml\n";
   OptionReader reader;
   reader.readFile(folder() / "rig.ini");
@@ -429,7 +429,7 @@ TEST(OptionReader, TimeOffsetsAreExactToTheNanosecond) {
   EXPECT_TRUE(offsets("").empty());
 }
 
-TEST(OptionReader, WrongSetsAreErrorsThatNameThem) {
+TEST(OptionReader, AnErrorNamesAWrongSet) {
   EXPECT_THAT(errorOfSet("dsi.num_planes"), StartsWith("--set dsi.num_planes: expected"));
   EXPECT_THAT(errorOfSet("num_planes=3"), StartsWith("--set num_planes=3: expected"));
   EXPECT_THAT(errorOfSet("dsii.num_planes=3"), HasSubstr("unknown section [dsii]"));
@@ -438,7 +438,7 @@ TEST(OptionReader, WrongSetsAreErrorsThatNameThem) {
   EXPECT_THAT(errorOfSet("dsi.num_planes=0"), StartsWith("--set: [dsi] num_planes = 0: must be"));
 }
 
-TEST(OptionReader, ErrorsShowNothingThatATerminalWouldObey) {
+TEST(OptionReader, ErrorsHoldNoControlCharacters) {
   const std::string wild = "\x1b[2J" + std::string(10'000, 'x');
   for (const std::string& text :
        {wild + "\n", "[" + wild + "]\n", "[dsi]\n" + wild + " = 1\n", "[dsi]\nspacing = " + wild,
@@ -456,7 +456,7 @@ TEST(OptionReader, ErrorsShowNothingThatATerminalWouldObey) {
   }
 }
 
-TEST(OptionReader, FilesThatCannotBeReadAreErrorsThatNameThem) {
+TEST(OptionReader, AnErrorNamesAnUnreadableFile) {
   for (const std::string path : {"/nowhere/rig.ini", "/"}) {
     EXPECT_EQ(messageOf([&] { OptionReader().readFile(path); }),
               "cannot read the option file " + path);

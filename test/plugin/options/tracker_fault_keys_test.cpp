@@ -86,7 +86,7 @@ TEST(TrackerFaultKeys, ErrorsNameKeyValueAndWhatWasExpected) {
   }
 }
 
-TEST(TrackerFaultKeys, AskForTheLengthOfKeyframesWhereTheirNoiseIs) {
+TEST(TrackerFaultKeys, RequireTheLengthOfKeyframesWithNoise) {
   EXPECT_NO_THROW(requireKeyframeLength(faultsOf({"noise_m=1"})));
   EXPECT_NO_THROW(requireKeyframeLength(faultsOf({"keyframe_noise_m=1", "keyframe_s=1"})));
   EXPECT_THROW(requireKeyframeLength(faultsOf({"keyframe_noise_m=1"})), std::invalid_argument);

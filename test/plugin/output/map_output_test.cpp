@@ -65,7 +65,7 @@ TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
               HasSubstr("1700000000.123456789 1 2 3 0 0 0 1\n"));
 }
 
-TEST_F(MapOutputTest, AnEarlierMapGoesWithTheFirstFileAndOtherFilesStay) {
+TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
   {
     MapOutput earlier(folder(), OutputKind::kMap, {});
     earlier.writeKeyframe(smallKeyframe(1'000'000'000));
@@ -120,7 +120,7 @@ TEST_F(MapOutputTest, EachKindLeavesTheFilesOfTheOther) {
   EXPECT_FALSE(exists(folder() / "dsi.npy"));
 }
 
-TEST_F(MapOutputTest, AFolderThatCannotBeMadeIsAnErrorThatNamesIt) {
+TEST_F(MapOutputTest, AnErrorNamesAFolderThatCannotBeMade) {
   std::ofstream(folder() / "out") << "a file";
   EXPECT_THAT(messageOf([&] { MapOutput(folder() / "out", OutputKind::kMap, {}); }),
               HasSubstr((folder() / "out").string()));
@@ -190,7 +190,7 @@ TEST_F(NpyFileTest, HoldsPlanesRowsAndColumnsInThatOrder) {
   EXPECT_THAT(values, ElementsAre(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11));
 }
 
-TEST_F(NpyFileTest, ThatIsNotFinishedLeavesNothing) {
+TEST_F(NpyFileTest, LeavesNothingWithoutFinish) {
   { NpyDsiFile file(folder() / "dsi.npy", 1, {1, 1, 1, 1, 0, 0}); }
   EXPECT_TRUE(std::filesystem::is_empty(folder()));
   EXPECT_THROW(NpyDsiFile(folder() / "nowhere" / "dsi.npy", 1, {1, 1, 1, 1, 0, 0}),

@@ -39,7 +39,7 @@ TEST(Report, HasEveryKeyOfTheContract) {
   }
 }
 
-TEST(Report, SaysThatPosesWerePerturbedWhereTheyWere) {
+TEST(Report, ListsThePerturbationOfPoses) {
   MapReport report = smallReport();
   EXPECT_FALSE(json::parse(reportJson(report)).contains("perturbation"));
   report.faults.latency_ns = 200'000'000;
@@ -60,7 +60,7 @@ TEST(Report, TotalsAreTheSumsOfTheCameras) {
   EXPECT_EQ(events["cameras"][1]["used"], 5);
 }
 
-TEST(Report, EveryCountStandsUnderItsOwnKey) {
+TEST(Report, EveryCountHasItsOwnKey) {
   MapReport report = smallReport();
   MapperCounts& counts = report.counts;
   counts.cameras.assign(1, {});
@@ -113,14 +113,14 @@ TEST(Report, ErrorsOfTheTrackerAreInMetresAndDegrees) {
   EXPECT_NEAR(written["tracker"]["drift_deg_per_m"], 2, 1e-12);
 }
 
-TEST(Report, VotesPerSecondAreThoseOfTheSweep) {
+TEST(Report, VotesPerSecondAreOverTheSweepsSeconds) {
   const json report = json::parse(reportJson(smallReport()));
   EXPECT_EQ(report["votes"]["cast"], 1500);
   EXPECT_DOUBLE_EQ(report["votes_per_second"], 500);  // (1500 + 400 + 100) / 4
   EXPECT_EQ(votesPerSecond({}), 0);
 }
 
-TEST(Report, OptionsAreThoseThatFilesKnowWithTheirTypes) {
+TEST(Report, OptionsHaveTheKeysOfFilesAndTheirTypes) {
   const MapReport report = smallReport();
   const json options = json::parse(reportJson(report))["options"];
   std::size_t keys = 0;

@@ -22,7 +22,7 @@ class ListedRecording : public Recording {
     if (breaks_) throw std::runtime_error("the tape is torn");
     return nullptr;
   }
-  std::string place() const override { return "entry " + std::to_string(next_); }
+  std::string position() const override { return "entry " + std::to_string(next_); }
   double progress() const override { return 0; }
   /// The number of observations read so far.
   std::size_t read() const { return next_; }

@@ -91,7 +91,7 @@ const CObservationRobotPose& robotPose(const CObservation::Ptr& observation) {
   return dynamic_cast<const CObservationRobotPose&>(*observation);
 }
 
-TEST(PerturbedRecording, PutsPosesInWhereTheyBelongInTime) {
+TEST(PerturbedRecording, InsertsPosesInTheOrderOfTime) {
   const Observations all = perturbed(keyframeNoise());
   // Seven stretches begin after the first, of which those at 100, 200, 300, 400 ms have a pose.
   EXPECT_EQ(posesOf(all, "one").size(), 21U + 4 * 2 + 4);
@@ -104,7 +104,7 @@ TEST(PerturbedRecording, PutsPosesInWhereTheyBelongInTime) {
   }
 }
 
-TEST(PerturbedRecording, MovesWhatIsStatedAndKeepsTheRest) {
+TEST(PerturbedRecording, MovesPosesAndKeepsAllElse) {
   TrackerFaults faults = keyframeNoise();
   faults.perturbation.noise_m = 0.01;
   const Observations original = twoTrackers();
@@ -127,7 +127,7 @@ TEST(PerturbedRecording, MovesWhatIsStatedAndKeepsTheRest) {
   EXPECT_EQ(others, original.size() - 2 * 21) << "packets and odometry";
 }
 
-TEST(PerturbedRecording, OfNoMovementLeavesPosesAloneBitForBit) {
+TEST(PerturbedRecording, KeepsPosesBitForBitWithoutNoise) {
   TrackerFaults faults;
   faults.latency_ns = 30 * kMs;
   faults.dropouts.drop_probability = 0.3;
@@ -136,7 +136,7 @@ TEST(PerturbedRecording, OfNoMovementLeavesPosesAloneBitForBit) {
   }
 }
 
-TEST(PerturbedRecording, ComesLateButWhole) {
+TEST(PerturbedRecording, DelaysPosesAndLosesNone) {
   TrackerFaults faults;
   faults.latency_ns = 100 * kMs;
   const Observations all = perturbed(faults);
@@ -169,7 +169,7 @@ TEST(PerturbedRecording, LatePosesBeforeACutAreNotLost) {
   EXPECT_TRUE(nearest_before);
 }
 
-TEST(PerturbedRecording, GivesWhatWasReadBeforeTheErrorThatEndsIt) {
+TEST(PerturbedRecording, ReturnsTheObservationsBeforeAnError) {
   TrackerFaults faults = keyframeNoise();
   for (const std::int64_t latency_ns : {0 * kMs, 100 * kMs}) {
     faults.latency_ns = latency_ns;
@@ -183,7 +183,7 @@ TEST(PerturbedRecording, GivesWhatWasReadBeforeTheErrorThatEndsIt) {
   }
 }
 
-TEST(PerturbedRecording, RefusesPosesOutOfOrderAndNamesTheEntry) {
+TEST(PerturbedRecording, AnErrorNamesTheEntryOfAPoseOutOfOrder) {
   PerturbedRecording recording(
       std::make_unique<ListedRecording>(Observations{poseAt(kStartNs), poseAt(kStartNs - kMs)}),
       keyframeNoise());

@@ -66,7 +66,7 @@ TEST(TimeCut, WithoutLimitsIsTheWholeRecording) {
   EXPECT_EQ(cut(threePackets(), std::nullopt, std::nullopt).size(), 8);
 }
 
-TEST(TimeCut, HasTheEventsFromT0ToBeforeT1AndAPoseOnEitherSide) {
+TEST(TimeCut, HasTheEventsOfTheIntervalAndAPoseOnEitherSide) {
   EXPECT_THAT(cut(threePackets(), 1100, 2100),
               ElementsAre("pose 600", "cam0 1100 (1100 2000) 2100", "pose 1600", "pose 2600"));
   EXPECT_THAT(cut(threePackets(), 1101, 2001),
@@ -80,7 +80,7 @@ TEST(TimeCut, MayBeOpenAtOneEnd) {
               ElementsAre("pose 100", "cam0 100 (100) 1000", "pose 600", "pose 1600"));
 }
 
-TEST(TimeCut, KeepsTheNewsThatACameraIsSilent) {
+TEST(TimeCut, KeepsPacketsThatSayACameraIsSilent) {
   EXPECT_THAT(cut({pose(0), packet(1, 100, 50'000, {}), packet(0, 100, 300, {200}), pose(200),
                    packet(0, 1000, 2000, {1500}), pose(1600)},
                   1200, 1550),
@@ -98,7 +98,7 @@ std::vector<CObservation::Ptr> threePacketsAt(const mrpt::Clock::time_point& tim
   return observations;
 }
 
-TEST(TimeCut, GoesByTheTimesOfEventsWhereAPacketHasNone) {
+TEST(TimeCut, UsesTheTimesOfEventsWhereAPacketHasNone) {
   EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 1100, 2100),
               ElementsAre("pose 600", "cam0 ? (1100 2000) 2100", "pose 1600", "pose 2600"));
   EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 2500, std::nullopt),
@@ -115,7 +115,7 @@ TEST(TimeCut, LetsOtherObservationsWithoutATimePass) {
               ElementsAre("pose 100", "other ?", "cam0 100 (100) 1100", "pose 1600"));
 }
 
-TEST(TimeCut, APoseWithoutATimeIsAnErrorThatNamesItsSource) {
+TEST(TimeCut, AnErrorNamesTheSourceOfAPoseWithoutATime) {
   const CObservation::Ptr timeless = pose(0);
   timeless->timestamp = INVALID_TIMESTAMP;
   timeless->sensorLabel = "tracker";
@@ -134,14 +134,14 @@ TEST(TimeCut, EndsOnceEachCameraHasPassedT1) {
                           "cam0 300 (300) 350", "pose 500", "cam1 300 (310) 350"));
 }
 
-TEST(TimeCut, HasACameraThatFirstAppearsWhenAnotherHasPassedT1) {
+TEST(TimeCut, IncludesACameraThatFirstAppearsAfterAnotherPassedT1) {
   EXPECT_THAT(cut({pose(0), packet(0, 100, 200, {100}), packet(0, 200, 300, {200}), pose(300),
                    packet(1, 100, 300, {150, 250})},
                   100, 200),
               ElementsAre("pose 0", "cam0 100 (100) 200", "pose 300", "cam1 100 (150) 200"));
 }
 
-TEST(TimeCut, DoesNotWaitLongForACameraThatIsSilent) {
+TEST(TimeCut, WaitsASecondForASilentCamera) {
   constexpr std::int64_t kSecond = 1'000'000'000;
   std::vector<CObservation::Ptr> observations = {pose(0), packet(1, 0, 1, {0})};
   for (int i = 0; i < 100; ++i) {

@@ -59,11 +59,11 @@ std::map<std::size_t, Rigid3> refinedAlone(const std::vector<KeyframeDepthMap>& 
   return moved;
 }
 
-class MapRefinementOfEitherKind : public testing::TestWithParam<bool> {};
+class MapRefinementInEitherMode : public testing::TestWithParam<bool> {};
 
-INSTANTIATE_TEST_SUITE_P(Background, MapRefinementOfEitherKind, testing::Bool());
+INSTANTIATE_TEST_SUITE_P(Background, MapRefinementInEitherMode, testing::Bool());
 
-TEST_P(MapRefinementOfEitherKind, EndsWhereTheRefinerEnds) {
+TEST_P(MapRefinementInEitherMode, EndsAtTheRefinersPoses) {
   const auto keyframes = shakenKeyframes();
   ASSERT_GE(keyframes.size(), 10U);
   MapRefinement refinement(refinementOptions(GetParam()));
@@ -78,7 +78,7 @@ TEST_P(MapRefinementOfEitherKind, EndsWhereTheRefinerEnds) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(state.covariance).eigenvalues()(0), 0);
 }
 
-TEST_P(MapRefinementOfEitherKind, ToFinishAgainMovesNothing) {
+TEST_P(MapRefinementInEitherMode, MovesNothingWhenFinishedAgain) {
   MapRefinement refinement(refinementOptions(GetParam()));
   addAll(refinement, shakenKeyframes(0.7));
   refinement.finish();
@@ -91,14 +91,14 @@ TEST_P(MapRefinementOfEitherKind, ToFinishAgainMovesNothing) {
   }
 }
 
-TEST_P(MapRefinementOfEitherKind, WithoutKeyframesHasNothingToFinish) {
+TEST_P(MapRefinementInEitherMode, FinishesWithoutKeyframes) {
   MapRefinement refinement(refinementOptions(GetParam()));
   refinement.finish();
   EXPECT_TRUE(refinement.takeMoved().empty());
   EXPECT_TRUE(isSame(refinement.state().T_world_odom, Rigid3{}));
 }
 
-TEST_P(MapRefinementOfEitherKind, KeyframesWithoutPointsStayWithTheTracker) {
+TEST_P(MapRefinementInEitherMode, KeyframesWithoutPointsStayWithTheTracker) {
   auto keyframes = shakenKeyframes(0.7);
   for (KeyframeDepthMap& keyframe : keyframes) keyframe.map.depth.setTo(0);
   MapRefinement refinement(refinementOptions(GetParam()));
@@ -145,7 +145,7 @@ TEST(MapRefinement, KnowsThePoseOfAKeyframeThatItHasRefined) {
   }
 }
 
-TEST(MapRefinement, InTheBackgroundDoesNotWaitForWhatIsRefined) {
+TEST(MapRefinement, DoesNotWaitForTheBackground) {
   const auto keyframes = shakenKeyframes();
   MapRefinement refinement(refinementOptions(true));
   std::size_t most_waiting = 0;
@@ -168,7 +168,7 @@ TEST(MapRefinement, MayEndWhileKeyframesWait) {
   }
 }
 
-TEST(MapRefinement, APoseThatIsNotFiniteIsRefusedAndNothingIsTaken) {
+TEST(MapRefinement, APoseThatIsNotFiniteChangesNothing) {
   auto keyframes = shakenKeyframes(0.7);
   MapRefinement refinement(refinementOptions(false));
   MapRefinement expected(refinementOptions(false));
@@ -184,7 +184,7 @@ TEST(MapRefinement, APoseThatIsNotFiniteIsRefusedAndNothingIsTaken) {
   expectSamePoses(refinement.takeMoved(), expected.takeMoved());
 }
 
-TEST(MapRefinement, AnErrorInTheBackgroundIsSaidToWhoeverComesNext) {
+TEST(MapRefinement, AnErrorInTheBackgroundReachesEachLaterCall) {
   auto keyframes = shakenKeyframes(0.7);
   MapRefinement refinement(refinementOptions(true));
   addAll(refinement, keyframes);

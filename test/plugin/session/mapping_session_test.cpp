@@ -54,7 +54,7 @@ TEST(MappingSession, CountsOfOverlappingWindowsAddUp) {
   EXPECT_GT(status.counts.total().outside_window, 0U) << "the last window is not full";
 }
 
-TEST(MappingSession, EventsOutsideTheTimeLimitsCountAsOutsideAnyWindow) {
+TEST(MappingSession, EventsOutsideTheTimeLimitsAreInNoWindow) {
   const SyntheticRecording recording;
   const std::int64_t start_ns = SyntheticRecording::kStartNs;
   EventFusionOptions options = syntheticOptions();
@@ -68,7 +68,7 @@ TEST(MappingSession, EventsOutsideTheTimeLimitsCountAsOutsideAnyWindow) {
   expectCountsAddUp(session.status(), recording.totalEvents(), 30);
 }
 
-TEST(MappingSession, PosesOfTheSameTimeAreCountedAndTheFirstStands) {
+TEST(MappingSession, OfPosesOfTheSameTimeTheFirstCounts) {
   const SyntheticRecording recording;
   MappingSession expected(syntheticOptions());
   mapAll(expected, recording);
@@ -94,7 +94,7 @@ TEST(MappingSession, CamerasThatSeeNothingAreCounted) {
   EXPECT_THAT(session.status().silent_keyframes, testing::ElementsAre(0, keyframes.size()));
 }
 
-TEST(MappingSession, OptionsThatNameACameraWhichIsNotThereAreErrors) {
+TEST(MappingSession, AnOptionWithAMissingCameraIsAnError) {
   const SyntheticRecording recording;
   EventFusionOptions cameras = syntheticOptions();
   cameras.mapper.cameras = {1, 7};
@@ -108,7 +108,7 @@ TEST(MappingSession, OptionsThatNameACameraWhichIsNotThereAreErrors) {
             "[dsi] reference_camera = 5: must be a camera of the recording: 0 to 1");
 }
 
-TEST(MappingSession, ACameraWithoutThoseBeforeItIsAnError) {
+TEST(MappingSession, ACameraWithoutTheOneBeforeItIsAnError) {
   MappingSession session(syntheticOptions());
   session.addEvents(packetOf(SyntheticRecording(), 1));
   EXPECT_EQ(messageOf([&] { session.finish(); }),
@@ -116,7 +116,7 @@ TEST(MappingSession, ACameraWithoutThoseBeforeItIsAnError) {
   EXPECT_FALSE(session.next());
 }
 
-TEST(MappingSession, ACameraThatWaitsForOneThatNeverComesIsAnErrorAfterASecond) {
+TEST(MappingSession, ACameraWaitsForAMissingOneForASecond) {
   const SyntheticRecording recording(1.5, 3);
   for (const bool zero_is_there : {false, true}) {
     MappingSession session(syntheticOptions());
@@ -138,7 +138,7 @@ TEST(MappingSession, ACameraThatWaitsForOneThatNeverComesIsAnErrorAfterASecond) 
   }
 }
 
-TEST(MappingSession, CamerasThatComeInAnyOrderMakeTheSameMap) {
+TEST(MappingSession, CamerasInAnyOrderMakeTheSameMap) {
   const SyntheticRecording recording(0.5, 3);
   MappingSession expected(syntheticOptions());
   mapAll(expected, recording);
@@ -157,7 +157,7 @@ TEST(MappingSession, CamerasThatComeInAnyOrderMakeTheSameMap) {
   expectSameMap(session, expected);
 }
 
-TEST(MappingSession, APacketThatWaitedAndIsRefusedTakesNoOtherWithIt) {
+TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
   const SyntheticRecording recording;
   MappingSession session(syntheticOptions());
   CameraPacket outside = pieceOf(recording, 1, 0, 0.1);
@@ -225,7 +225,7 @@ class CalibratedSession : public TemporaryFolder {
   }
 };
 
-TEST_F(CalibratedSession, ReplacesThatOfThePacketsAndCountsCamerasWithAnother) {
+TEST_F(CalibratedSession, UsesTheOptionsCalibrationAndCountsDifferentCameras) {
   const SyntheticRecording recording;
   std::vector<RigCamera> cameras = recording.cameras;
   MappingSession same(optionsOf(cameras));
@@ -244,7 +244,7 @@ TEST_F(CalibratedSession, ReplacesThatOfThePacketsAndCountsCamerasWithAnother) {
   EXPECT_EQ(both.status().rig.cameras[0].model.cx, recording.cameras[0].model.cx + 1);
 }
 
-TEST_F(CalibratedSession, OfAnotherNumberOfCamerasIsAnError) {
+TEST_F(CalibratedSession, AnotherNumberOfCamerasIsAnError) {
   const SyntheticRecording recording;
   std::vector<RigCamera> cameras = recording.cameras;
   cameras.push_back(cameras[1]);

@@ -18,7 +18,7 @@ std::string why(const SyntheticRecording& recording, const EventFusionOptions& o
   return whyNoKeyframe(session.status(), options.mapper);
 }
 
-TEST(WhyNoKeyframe, SaysByHowMuchPosesAndEventsMissEachOther) {
+TEST(WhyNoKeyframe, SaysTheGapBetweenPosesAndEvents) {
   SyntheticRecording recording(0.4, 1);
   recording.events[0].resize(1);
   recording.events[0][0].t_ns = 10'100'000'000;
@@ -41,7 +41,7 @@ TEST(WhyNoKeyframe, SaysThatTheFiltersLeftNothing) {
                         " events of the selected cameras for noise"));
 }
 
-TEST(WhyNoKeyframe, SaysWhatIsMissingAltogether) {
+TEST(WhyNoKeyframe, SaysThatEventsOrPosesAreMissing) {
   SyntheticRecording recording;
   recording.poses.clear();
   EXPECT_EQ(why(recording, syntheticOptions()), "the recording has no poses");
@@ -57,7 +57,7 @@ TEST(WhyNoKeyframe, SaysThatTheRecordingIsShorterThanAWindow) {
                     HasSubstr("the poses 10.000000000 to 10.500000000 s")));
 }
 
-TEST(WhyNoKeyframe, SaysThatWindowsHadNoPoseWhereTheyNeedOne) {
+TEST(WhyNoKeyframe, SaysThatWindowsHadNoPoseAtTheirReferenceTime) {
   SyntheticRecording recording;
   EventFusionOptions options = syntheticOptions();
   std::vector<StampedPose>& poses = recording.poses;  // the tracker is lost for 0.4 s

@@ -23,7 +23,7 @@ std::vector<std::int64_t> timesOf(const std::vector<StampedPose>& poses) {
   return times;
 }
 
-TEST(PoseSourceSelector, OfTwoOfAKindTheOneThatComesFirstStands) {
+TEST(PoseSourceSelector, SelectsTheFirstOfTwoSourcesOfAKind) {
   PoseSourceSelector selector("");
   EXPECT_THAT(timesOf(selector.add(kMocap, {1, {}})), ElementsAre(1)) << "at once";
   EXPECT_THAT(selector.add(kSlam, {2, {}}), IsEmpty());
@@ -32,7 +32,7 @@ TEST(PoseSourceSelector, OfTwoOfAKindTheOneThatComesFirstStands) {
   EXPECT_THAT(selector.unused(), ElementsAre(Pair(kSlam, 1)));
 }
 
-TEST(PoseSourceSelector, ABetterKindThatComesLaterWinsWhileItIsWaitedFor) {
+TEST(PoseSourceSelector, WaitsForABetterKind) {
   PoseSourceSelector selector("");
   EXPECT_THAT(selector.add(kActions, {1, {}}), IsEmpty());
   EXPECT_THAT(selector.add(kWheels, {2, {}}), IsEmpty());
@@ -41,7 +41,7 @@ TEST(PoseSourceSelector, ABetterKindThatComesLaterWinsWhileItIsWaitedFor) {
   EXPECT_THAT(selector.unused(), ElementsAre(Pair(kWheels, 1), Pair(kActions, 1)));
 }
 
-TEST(PoseSourceSelector, WhatWasHeldOfTheBestComesOutInOrderOnceNothingBetterIsWaitedFor) {
+TEST(PoseSourceSelector, ReturnsTheWaitingPosesOfTheBestSourceInOrder) {
   PoseSourceSelector selector("");
   selector.add(kActions, {1, {}});
   selector.add(kWheels, {2, {}});
@@ -53,20 +53,20 @@ TEST(PoseSourceSelector, WhatWasHeldOfTheBestComesOutInOrderOnceNothingBetterIsW
   EXPECT_THAT(selector.unused(), ElementsAre(Pair(kMocap, 1), Pair(kActions, 1)));
 }
 
-TEST(PoseSourceSelector, OnceSettledWithoutAnyTheNextOneIsTaken) {
+TEST(PoseSourceSelector, SelectsTheNextSourceWhereNoneCameInTime) {
   PoseSourceSelector selector("");
   EXPECT_THAT(selector.select(), IsEmpty());
   EXPECT_THAT(timesOf(selector.add(kActions, {1, {}})), ElementsAre(1));
 }
 
-TEST(PoseSourceSelector, ALabelChoosesItsSourceWhateverElseThereIs) {
+TEST(PoseSourceSelector, SelectsTheSourceOfALabel) {
   PoseSourceSelector selector("wheels");
   EXPECT_THAT(selector.add(kMocap, {1, {}}), IsEmpty());
   EXPECT_THAT(timesOf(selector.add(kWheels, {2, {}})), ElementsAre(2));
   EXPECT_THAT(selector.unused(), ElementsAre(Pair(kMocap, 1)));
 }
 
-TEST(PoseSourceSelector, ALabelThatNobodyHasTakesNothing) {
+TEST(PoseSourceSelector, SelectsNoSourceForAnUnknownLabel) {
   PoseSourceSelector selector("gps");
   selector.add(kMocap, {1, {}});
   EXPECT_THAT(selector.select(), IsEmpty());

@@ -65,7 +65,7 @@ TEST_P(RefinedSession, BringsKeyframesNearerToTheTruth) {
   EXPECT_TRUE(isSame(session.T_world_ref()[0], session.T_odom_ref()[0]));
 }
 
-TEST(Session, EndsInTheSameMapHoweverTheRecordingIsCut) {
+TEST(Session, MakesTheSameMapFromPacketsOfAnyLength) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   for (const bool refined : {false, true}) {
     MappingSession at_once(refined ? optionsOf(false) : unrefinedOptions());
@@ -78,7 +78,7 @@ TEST(Session, EndsInTheSameMapHoweverTheRecordingIsCut) {
   }
 }
 
-TEST(RefinedSessionMap, IsThatOfTheKeyframesWhereTheyStandAtAnyTime) {
+TEST(RefinedSessionMap, EqualsTheKeyframesAtTheirPosesAtAnyTime) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   const EventFusionOptions options = optionsOf(false);
   MappingSession undisturbed(options);
@@ -102,7 +102,7 @@ TEST(RefinedSessionMap, IsThatOfTheKeyframesWhereTheyStandAtAnyTime) {
   expectSameMap(session, undisturbed);
 }
 
-TEST(UnrefinedSession, LeavesKeyframesWhereTheTrackerPutThem) {
+TEST(UnrefinedSession, KeepsTheTrackersPoses) {
   MappingSession session(unrefinedOptions());
   const auto keyframes = mapAll(session, shaken(SyntheticRecording(1.2)));
   GlobalCloud cloud(unrefinedOptions().cloud);
@@ -121,7 +121,7 @@ TEST(UnrefinedSession, LeavesKeyframesWhereTheTrackerPutThem) {
   EXPECT_EQ(session.status().seconds.refine, 0);
 }
 
-TEST_P(RefinedSession, SaysWhatItDid) {
+TEST_P(RefinedSession, CountsItsWork) {
   MappingSession session(optionsOf(GetParam()));
   const auto keyframes = mapAll(session, shaken(SyntheticRecording(1.2)));
   const SessionStatus status = session.status();
@@ -159,7 +159,7 @@ std::unique_ptr<MappingSession> mapWithNoise(const SyntheticRecording& recording
 constexpr std::size_t kPosesOfAWindow = 10;
 using Noise = std::optional<PoseNoise>;
 
-TEST(StatedNoise, KeyframesThatAreSaidToBeNoisyMoveAndThoseThatAreNotStay) {
+TEST(StatedNoise, NoisyKeyframesMoveAndOthersStay) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   const auto session = mapWithNoise(recording, [](std::size_t i) {
     return i / kPosesOfAWindow % 2 == 0 ? Noise({1e-4, 1e-5}) : Noise({0.05, 0.02});
@@ -172,7 +172,7 @@ TEST(StatedNoise, KeyframesThatAreSaidToBeNoisyMoveAndThoseThatAreNotStay) {
   EXPECT_LT(certain_m, 0.2 * noisy_m);
 }
 
-TEST(StatedNoise, OfAPoseWithTheTimeOfAnEarlierOneDoesNotCount) {
+TEST(StatedNoise, OfASecondPoseOfTheSameTimeIsIgnored) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   const auto expected = mapWithNoise(recording, [](std::size_t) { return Noise({1e-4, 1e-5}); });
   MappingSession session(noiseOptions());
@@ -185,14 +185,14 @@ TEST(StatedNoise, OfAPoseWithTheTimeOfAnEarlierOneDoesNotCount) {
   expectSameMap(session, *expected);
 }
 
-TEST(StatedNoise, HoldsForItsPoseAloneAndNotForLaterOnesThatSayNothing) {
+TEST(StatedNoise, HoldsForItsPoseAlone) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   const auto none = [](std::size_t) { return Noise(); };
   const auto first = [](std::size_t i) { return i == 0 ? Noise({0.5, 0.5}) : Noise(); };
   expectSameMap(*mapWithNoise(recording, first), *mapWithNoise(recording, none));
 }
 
-TEST(StatedNoise, OfPosesThatAreNotUsedDoesNotCount) {
+TEST(StatedNoise, OfPosesOfOtherSourcesIsIgnored) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.2));
   EventFusionOptions options = optionsOf(false);
   MappingSession expected(options);
@@ -243,7 +243,7 @@ struct PoorCase {
   double max_motion_m;
 };
 
-TEST_P(RefinedSession, OfLittleUseLeavesPosesNearTheTracker) {
+TEST_P(RefinedSession, KeepsPosesNearTheTrackerInPoorRecordings) {
   const PoorCase cases[] = {
       {"no events", 0.15, [](SyntheticRecording& r) { r.events.assign(2, {}); }, 0, 0},
       {"one keyframe", 0.15, [](SyntheticRecording&) {}, 1, 0},
@@ -278,7 +278,7 @@ TEST_P(RefinedSession, OfLittleUseLeavesPosesNearTheTracker) {
   }
 }
 
-TEST_P(RefinedSession, OfOneCameraIsFiniteAndNotWorseThanTheTracker) {
+TEST_P(RefinedSession, WithOneCameraIsNotWorseThanTheTracker) {
   const SyntheticRecording recording(1.2, 1);
   MappingSession truth(unrefinedOptions());
   mapAll(truth, recording);
