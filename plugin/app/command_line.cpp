@@ -2,6 +2,7 @@
 #include "plugin/app/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -10,7 +11,6 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
-#include "plugin/app/chosen_command.h"
 #include "plugin/app/evaluate_arguments.h"
 #include "plugin/app/import_command.h"
 #include "plugin/app/info_command.h"
@@ -36,28 +36,30 @@ template <typename Arguments>
 void addSource(CLI::App& command, Arguments& arguments) {
   command
       .add_option("SOURCE", arguments.source.files,
-                  "The recording: a rawlog, or a folder with text files (camchain.yaml, "
-                  "cam0/events.txt, poses.txt; or the UZH layout events.txt, groundtruth.txt, "
+                  "The recording: a rawlog, or a folder of text files (camchain.yaml, "
+                  "cam0/events.txt, poses.txt; or the UZH layout: events.txt, groundtruth.txt, "
                   "calib.txt)")
       ->required();
   command
       .add_option("--format", arguments.source.format,
-                  "How the recording is stored (auto: look at it)")
+                  "The format of the recording (auto: detected)")
       ->check(CLI::IsMember(recordingFormats()))
       ->capture_default_str();
   command
-      .add_option("--poses", arguments.source.poses,
-                  "Poses in place of the recording's: t tx ty tz qx qy qz qw, the rig in the world")
+      .add_option(
+          "--poses", arguments.source.poses,
+          "Poses that replace the recording's: t tx ty tz qx qy qz qw, of the rig in the world")
       ->type_name("TUM.txt");
   command
-      .add_option("--calibration", arguments.source.calibration,
-                  "Calibration in place of the recording's: a Kalibr camera chain (YAML), or fx fy "
-                  "cx cy k1 k2 p1 p2 k3 of one camera")
+      .add_option(
+          "--calibration", arguments.source.calibration,
+          "Calibration that replaces the recording's: a Kalibr camera chain (YAML), or fx fy "
+          "cx cy k1 k2 p1 p2 k3 of one camera")
       ->type_name("FILE");
   command
       .add_option("--hand-eye", arguments.source.hand_eye,
-                  "Where the rig is on the tracked body: YAML with T_body_rig, 4x4; the poses are "
-                  "then the body's")
+                  "Pose of the rig on the tracked body: YAML with T_body_rig, 4x4; the poses are "
+                  "then those of the body")
       ->type_name("FILE");
   command
       .add_option_function<std::vector<std::string>>(
@@ -65,13 +67,13 @@ void addSource(CLI::App& command, Arguments& arguments) {
           [&arguments](const std::vector<std::string>& assignments) {
             setFaults(assignments, arguments.source.faults);
           },
-          "Faults for the tracker, seeded: " + knownTrackerFaults() + "; may be repeated")
+          "Simulated faults of the tracker: " + knownTrackerFaults() + "; may be repeated")
       ->type_name("KEY=VALUE[,KEY=VALUE...]")
       ->delimiter(',')
       ->allow_extra_args(false);
 }
 
-/// A command that has no options to say how long a keyframe is.
+/// For a command without an option file, which has the length of a keyframe.
 template <typename Arguments>
 void requireKeyframeLengthOf(CLI::App& command, const std::shared_ptr<Arguments>& arguments) {
   command.parse_complete_callback([arguments] {
@@ -83,7 +85,7 @@ void requireKeyframeLengthOf(CLI::App& command, const std::shared_ptr<Arguments>
   });
 }
 
-/// A time in seconds of the recording's own clock, exact to the nanosecond.
+/// Sets a time from seconds of the recording's own clock, exact to the nanosecond.
 void setTime(const std::string& text, const std::string& name, std::int64_t& t_ns) {
   const std::optional<std::int64_t> parsed = parseSeconds(text);
   if (!parsed) {
@@ -121,10 +123,10 @@ void addTimeLimits(CLI::App& command, Arguments& arguments) {
 void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
   command
       .add_option("CONFIG", arguments.config,
-                  "The options: an .ini file, see config/default.ini for all keys")
+                  "The option file (.ini); config/default.ini has all keys")
       ->required();
   addSource(command, arguments);
-  command.add_option("--out", arguments.out, "Folder for the results; made where missing")
+  command.add_option("--out", arguments.out, "Folder for the results; created if missing")
       ->required()
       ->type_name("DIR");
   command
@@ -137,30 +139,29 @@ void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
 void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
   constexpr const char* kGroup = "Pixels (ideal by default)";
   command
-      .add_option(
-          "--threshold-on", arguments.threshold_on,
-          "Log intensity by which a pixel gets brighter per event; the preset's own, or 0.3")
+      .add_option("--threshold-on", arguments.threshold_on,
+                  "Increase of log intensity per ON event; by default the preset's, or 0.3")
       ->group(kGroup);
   command
       .add_option("--threshold-off", arguments.threshold_off,
-                  "Log intensity by which a pixel gets darker per event; the preset's own, or 0.3")
+                  "Decrease of log intensity per OFF event; by default the preset's, or 0.3")
       ->group(kGroup);
   command
       .add_option("--mismatch", arguments.mismatch,
-                  "Standard deviation of the pixels' thresholds, as a share of them, 0 to 0.5")
+                  "Standard deviation of the pixels' thresholds, as a fraction of them, 0 to 0.5")
       ->capture_default_str()
       ->group(kGroup);
   command
       .add_option("--refractory-us", arguments.refractory_us,
-                  "Microseconds for which a pixel sees nothing after an event")
+                  "Dead time of a pixel after an event, in microseconds")
       ->capture_default_str()
       ->group(kGroup);
   command
       .add_option("--noise-hz", arguments.noise.background_hz,
-                  "Events per second and pixel that nothing caused")
+                  "Background noise: events per second and pixel")
       ->capture_default_str()
       ->group(kGroup);
-  command.add_option("--hot-pixels", arguments.noise.hot_share, "Share of hot pixels, 0 to 1")
+  command.add_option("--hot-pixels", arguments.noise.hot_share, "Fraction of hot pixels, 0 to 1")
       ->capture_default_str()
       ->group(kGroup);
   command.add_option("--hot-hz", arguments.noise.hot_hz, "Events per second of a hot pixel")
@@ -171,21 +172,21 @@ void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
 void addSimulate(CLI::App& app, Run& run) {
   CLI::App& command = *app.add_subcommand(
       "simulate",
-      "Make a recording with exact ground truth, as a dataset folder: a preset, or a scene around "
-      "a trajectory seen by a calibrated rig");
-  auto arguments = onCommand(command, run, runSimulate);
+      "Simulate a recording with exact ground truth, as a dataset folder: a preset, or a scene "
+      "around a trajectory, seen by a calibrated rig");
+  auto arguments = argumentsOf(command, run, runSimulate);
   CLI::Option* preset = command.add_option("--preset", arguments->preset, "Scene, rig and motion")
                             ->check(CLI::IsMember(simulationPresets()));
   CLI::Option* scene = command
                            .add_option("--scene", arguments->scene,
-                                       "Built around the trajectory, upright as the cameras are")
+                                       "A scene around the trajectory; upwards is the cameras' -y")
                            ->check(CLI::IsMember(simulationScenes()))
                            ->excludes(preset);
   CLI::Option* trajectory =
       command
           .add_option("--trajectory", arguments->trajectory,
-                      "Poses of camera 0 (z forward), TUM format; smoothed, cut above 10 Hz, they "
-                      "are the truth")
+                      "Poses of camera 0 (z forward), TUM format; the truth is this trajectory, "
+                      "low-pass filtered at 10 Hz")
           ->type_name("TUM.txt");
   CLI::Option* calibration =
       command.add_option("--calibration", arguments->calibration, "The rig, as Kalibr writes it")
@@ -194,19 +195,21 @@ void addSimulate(CLI::App& app, Run& run) {
   calibration->needs(scene);
   scene->needs(trajectory)->needs(calibration);
   addTime(command, "--start", arguments->start_ns,
-          "Where to begin on the trajectory, in its clock; by default where it gets under way: "
-          "first moves, for half a second, at half its mean speed or more")
+          "Start time on the trajectory, in its clock; by default the first half second with at "
+          "least half the mean speed")
       ->needs(scene);
   command
-      .add_option("--duration", arguments->duration_s,
-                  "Length of the recording; the preset's own by default, on a trajectory 5 or what "
-                  "is left of it")
+      .add_option(
+          "--duration", arguments->duration_s,
+          "Duration of the recording; by default the preset's; on a trajectory 5, or less if "
+          "it ends earlier")
       ->type_name("SECONDS");
-  command.add_option("--seed", arguments->seed, "Of everything random, a whole number from 0")
+  command
+      .add_option("--seed", arguments->seed, "Seed of all random numbers, a whole number from 0")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   addPixelOptions(command, *arguments);
-  command.add_option("--out", arguments->out, "The folder to write; must not exist or be empty")
+  command.add_option("--out", arguments->out, "The folder to write: a new or an empty one")
       ->required()
       ->type_name("DIR");
   command.parse_complete_callback([preset, scene] {
@@ -219,7 +222,7 @@ void addSimulate(CLI::App& app, Run& run) {
 void addImport(CLI::App& app, Run& run) {
   CLI::App& command =
       *app.add_subcommand("import", "Turn a recording into a rawlog, MRPT's format");
-  auto arguments = onCommand(command, run, runImport);
+  auto arguments = argumentsOf(command, run, runImport);
   addSource(command, *arguments);
   command.add_option("--out", arguments->out, "The rawlog to write")
       ->required()
@@ -231,27 +234,27 @@ void addImport(CLI::App& app, Run& run) {
 void addMap(CLI::App& app, Run& run) {
   CLI::App& command = *app.add_subcommand(
       "map", "Map a whole recording: keyframe depth maps and one point cloud, map.pcd");
-  auto arguments = onCommand(command, run, runMap);
+  auto arguments = argumentsOf(command, run, runMap);
   addMappingArguments(command, *arguments);
   addTimeLimits(command, *arguments);
 }
 
 void addDepth(CLI::App& app, Run& run) {
   CLI::App& command =
-      *app.add_subcommand("depth", "Make the depth map of one stretch of a recording");
-  auto arguments = onCommand(command, run, runDepth);
+      *app.add_subcommand("depth", "Make the depth map of one time window of a recording");
+  auto arguments = argumentsOf(command, run, runDepth);
   addMappingArguments(command, *arguments);
-  addTime(command, "--t0", arguments->t0_ns, "Where the stretch begins")->required();
-  addTime(command, "--t1", arguments->t1_ns, "Where it ends; not part of it")->required();
+  addTime(command, "--t0", arguments->t0_ns, "Start of the window")->required();
+  addTime(command, "--t1", arguments->t1_ns, "End of the window, not part of it")->required();
   addTime(command, "--ref-time", arguments->t_ref_ns,
-          "Time of the reference view; the middle of the stretch by default");
+          "Time of the reference view; by default the middle of the window");
   command.add_flag("--save-dsi", arguments->save_dsi,
                    "Also write the whole DSI, dsi.npy (float32, [plane][row][column])");
 }
 
 void addInfo(CLI::App& app, Run& run) {
-  CLI::App& command = *app.add_subcommand("info", "Say what a recording holds");
-  auto arguments = onCommand(command, run, runInfo);
+  CLI::App& command = *app.add_subcommand("info", "Print the contents of a recording");
+  auto arguments = argumentsOf(command, run, runInfo);
   addSource(command, *arguments);
   addTimeLimits(command, *arguments);
   requireKeyframeLengthOf(command, arguments);
@@ -259,11 +262,28 @@ void addInfo(CLI::App& app, Run& run) {
 
 }  // namespace
 
-void addCommands(CLI::App& app, Run& run) {
+std::function<int()> parseCommandLine(int argc, char** argv) {
+  CLI::App app(
+      "Maps with event cameras: events and poses in, semi-dense depth maps and one global point "
+      "cloud out.\n\n"
+      "From a recording to a map:\n"
+      "  event-fusion simulate --preset desk_stereo --out desk\n"
+      "  event-fusion import desk --out desk.rawlog\n"
+      "  event-fusion map config/simulated_stereo.ini desk.rawlog --out out\n",
+      "event-fusion");
+  app.set_version_flag("--version", std::string("event-fusion ") + EFM_VERSION);
+  app.set_help_all_flag("--help-all", "Print the help of every command and exit");
   app.require_subcommand(1);
+  Run run;
   for (const auto add : {addSimulate, addImport, addMap, addDepth, addEvaluate, addInfo}) {
     add(app, run);
   }
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return [status = app.exit(error)] { return status; };  // also prints help and version
+  }
+  return run;
 }
 
 }  // namespace efm

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <CLI/App.hpp>
 #include <functional>
 
 namespace efm {
 
-/// Adds every command to the program, with its options and its help; the one that is chosen on the
-/// command line sets `run`, which gives the process's exit status.
-void addCommands(CLI::App& app, std::function<int()>& run);
+/// Parses the command line. Prints the help, the version, or the error of a wrong command line.
+/// @return runs the chosen command, if there is one, and returns the process's exit status.
+std::function<int()> parseCommandLine(int argc, char** argv);
 
 }  // namespace efm

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/evaluate_command.h"
 
+#include <fmt/format.h>
+
 #include <iostream>
 #include <stdexcept>
+#include <utility>
 
 #include "plugin/evaluation/cloud_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_plot.h"
@@ -14,16 +17,16 @@
 namespace efm {
 namespace {
 
-/// What is given, and what the folders say of the rest.
+/// The given focal length and baseline; a missing one comes from the folders.
 std::optional<StereoBaseline> stereoBaseline(const EvaluateDepthArguments& arguments) {
   if (arguments.focal_px && arguments.baseline_m) {
     return StereoBaseline{*arguments.focal_px, *arguments.baseline_m, "as given"};
   }
   std::optional<StereoBaseline> stereo = findStereoBaseline(arguments.estimate, arguments.truth);
   if (!stereo && (arguments.focal_px || arguments.baseline_m)) {
-    throw std::invalid_argument("bad-pix needs both --focal and --baseline: neither " +
-                                arguments.estimate.string() + " nor " + arguments.truth.string() +
-                                " says the other");
+    throw std::invalid_argument(
+        fmt::format("bad-pix needs both --focal and --baseline: neither {} nor {} says the other",
+                    arguments.estimate.string(), arguments.truth.string()));
   }
   if (arguments.focal_px) stereo->focal_px = *arguments.focal_px;
   if (arguments.baseline_m) stereo->baseline_m = *arguments.baseline_m;
@@ -37,6 +40,15 @@ TrajectoryAlignment alignmentOf(const std::string& name) {
   throw std::invalid_argument("--align " + name + ": expected se3, origin or none");
 }
 
+/// Writes the plot, if asked for, and prints the errors.
+template <typename Plot>
+int finish(const EvaluationOutput& output, const std::string& table, const std::string& json,
+           Plot plot) {
+  if (!output.plot.empty()) writePicture(output.plot, plot());
+  std::cout << (output.json ? json : table);
+  return 0;
+}
+
 }  // namespace
 
 int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
@@ -44,40 +56,31 @@ int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
   DepthEvaluationOptions options = arguments.options;
   if (stereo) options.focal_baseline = stereo->focalBaseline();
   const DepthEvaluation evaluation = evaluateDepth(arguments.estimate, arguments.truth, options);
-  if (!arguments.output.plot.empty()) {
-    writePicture(arguments.output.plot, evaluationPlot(evaluation, options));
-  }
-  std::cout << (arguments.output.json ? evaluationJson(evaluation, stereo)
-                                      : evaluationTable(evaluation, stereo));
-  return 0;
+  return finish(arguments.output, evaluationTable(evaluation, stereo),
+                evaluationJson(evaluation, stereo),
+                [&] { return evaluationPlot(evaluation, options); });
 }
 
 int runEvaluateMap(const EvaluateMapArguments& arguments) {
   const CloudEvaluation evaluation =
       evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
-  if (!arguments.output.plot.empty())
-    writePicture(arguments.output.plot, evaluationPlot(evaluation));
-  std::cout << (arguments.output.json ? evaluationJson(evaluation) : evaluationTable(evaluation));
-  return 0;
+  return finish(arguments.output, evaluationTable(evaluation), evaluationJson(evaluation),
+                [&] { return evaluationPlot(evaluation); });
 }
 
 int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
   using Unit = RelativeSpacing::Unit;
   TrajectoryEvaluationOptions options = arguments.options;
   options.alignment = alignmentOf(arguments.alignment);
-  for (const double frames : arguments.frames) options.spacings.push_back({Unit::kFrames, frames});
-  for (const double delta_s : arguments.deltas_s) {
-    options.spacings.push_back({Unit::kSeconds, delta_s});
-  }
-  for (const double length_m : arguments.lengths_m) {
-    options.spacings.push_back({Unit::kMetres, length_m});
+  for (const auto& [unit, amounts] : {std::pair{Unit::kFrames, &arguments.frames},
+                                      {Unit::kSeconds, &arguments.deltas_s},
+                                      {Unit::kMetres, &arguments.lengths_m}}) {
+    for (const double amount : *amounts) options.spacings.push_back({unit, amount});
   }
   const TrajectoryEvaluation evaluation =
       evaluateTrajectory(arguments.estimate, arguments.truth, options);
-  if (!arguments.output.plot.empty())
-    writePicture(arguments.output.plot, evaluationPlot(evaluation));
-  std::cout << (arguments.output.json ? evaluationJson(evaluation) : evaluationTable(evaluation));
-  return 0;
+  return finish(arguments.output, evaluationTable(evaluation), evaluationJson(evaluation),
+                [&] { return evaluationPlot(evaluation); });
 }
 
 }  // namespace efm

@@ -14,7 +14,7 @@ namespace efm {
 
 struct EvaluationOutput {
   bool json = false;
-  std::filesystem::path plot;  ///< Empty: none.
+  std::filesystem::path plot;  ///< Empty: no plot.
 };
 
 struct EvaluateDepthArguments {
@@ -44,10 +44,9 @@ struct EvaluateTrajectoryArguments {
   EvaluationOutput output;
 };
 
-/// `event-fusion evaluate …`: print the errors of results against the truth, and draw them where
-/// asked for.
+/// `event-fusion evaluate …`: prints the errors of results and draws them if asked for.
 /// @return the process's exit status.
-/// @throws std::exception where something cannot be compared or written.
+/// @throws std::exception if something cannot be compared or written.
 int runEvaluateDepth(const EvaluateDepthArguments& arguments);
 int runEvaluateMap(const EvaluateMapArguments& arguments);
 int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments);

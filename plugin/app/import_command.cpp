@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/import_command.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -20,15 +22,14 @@
 #include "plugin/recordings/time_cut.h"
 
 namespace efm {
-
 namespace {
 
-/// The stretch that was asked for, as an error repeats it.
-std::string askedFor(const ImportArguments& arguments) {
+/// The time limits, for an error.
+std::string limitsText(const ImportArguments& arguments) {
   std::string text;
-  if (arguments.t0_ns) text += "from --t0 " + formatSeconds(*arguments.t0_ns) + " s";
+  if (arguments.t0_ns) text += fmt::format("from --t0 {} s", formatSeconds(*arguments.t0_ns));
   if (arguments.t0_ns && arguments.t1_ns) text += " ";
-  if (arguments.t1_ns) text += "until --t1 " + formatSeconds(*arguments.t1_ns) + " s";
+  if (arguments.t1_ns) text += fmt::format("until --t1 {} s", formatSeconds(*arguments.t1_ns));
   return text;
 }
 
@@ -47,15 +48,15 @@ std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(const ImportArgum
   return span_ns;
 }
 
-/// A mistyped limit must not give a rawlog without the events that are there.
-/// @throws std::runtime_error that says where the events are.
-void refuseStretchWithoutEvents(const ImportArguments& arguments) {
+/// Refuses time limits without events: they may be mistyped.
+/// @throws std::runtime_error naming the times of the recording's events.
+void refuseLimitsWithoutEvents(const ImportArguments& arguments) {
   if (!arguments.t0_ns && !arguments.t1_ns) return;
   const auto span_ns = eventSpan(arguments);
-  if (!span_ns) return;  // it never had any, but may hold other things
-  throw std::runtime_error("no event " + askedFor(arguments) + ": the recording has events from " +
-                           formatSeconds(span_ns->first) + " s to " +
-                           formatSeconds(span_ns->second) + " s");
+  if (!span_ns) return;  // a recording without events may have other observations
+  throw std::runtime_error(fmt::format("no event {}: the recording has events from {} s to {} s",
+                                       limitsText(arguments), formatSeconds(span_ns->first),
+                                       formatSeconds(span_ns->second)));
 }
 
 }  // namespace
@@ -82,30 +83,27 @@ int runImport(const ImportArguments& arguments) {
       } else {
         ++others;
       }
-      progress.showShare("importing", recording->progress());
+      progress.showFraction("importing", recording->progress());
     }
-    if (all_events == 0) refuseStretchWithoutEvents(arguments);
+    if (all_events == 0) refuseLimitsWithoutEvents(arguments);
     if (all_events + poses + others == 0) {
-      throw std::runtime_error("the recording holds nothing " + askedFor(arguments));
+      throw std::runtime_error("the recording holds nothing " + limitsText(arguments));
     }
     writer.close();
   }
-  for (const auto& [label, count] : events) {
-    std::printf("%s: %llu events\n", label.c_str(), static_cast<unsigned long long>(count));
-  }
-  if (others > 0) {
-    std::printf("%llu other observations\n", static_cast<unsigned long long>(others));
-  }
-  std::printf("%llu poses; %llu events were out of order and sorted\n",
-              static_cast<unsigned long long>(poses),
-              static_cast<unsigned long long>(recording->counts().sorted_events));
+  for (const auto& [label, count] : events) fmt::print("{}: {} events\n", label, count);
+  if (others > 0) fmt::print("{} other observations\n", others);
+  fmt::print("{} poses; {} events were out of order and sorted\n", poses,
+             recording->counts().sorted_events);
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
-    std::cerr << "event-fusion: warning: odometry (" << odometry
-              << " observations) cannot hold the hand-eye transform: give it to map as well\n";
+    std::cerr << fmt::format(
+        "event-fusion: warning: odometry ({} observations) cannot hold the hand-eye transform: "
+        "give it to map as well\n",
+        odometry);
   }
   const auto bytes = static_cast<double>(std::filesystem::file_size(arguments.out));
-  std::printf("written to %s, %.1f MB, %.2f bytes per event\n", arguments.out.c_str(), bytes * 1e-6,
-              all_events == 0 ? 0.0 : bytes / static_cast<double>(all_events));
+  fmt::print("written to {}, {:.1f} MB, {:.2f} bytes per event\n", arguments.out.string(),
+             bytes * 1e-6, all_events == 0 ? 0.0 : bytes / static_cast<double>(all_events));
   return 0;
 }
 

@@ -16,10 +16,10 @@ struct ImportArguments {
   std::filesystem::path out;
 };
 
-/// `event-fusion import`: turns a recording into a rawlog.
+/// `event-fusion import`: writes a recording as a rawlog.
 /// @return the process's exit status.
-/// @throws std::exception where the recording cannot be read to its end or the rawlog not written:
-/// then there is none.
+/// @throws std::exception if the recording cannot be read to its end or the rawlog cannot be
+/// written. Then there is no rawlog.
 int runImport(const ImportArguments& arguments);
 
 }  // namespace efm

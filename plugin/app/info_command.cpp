@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/info_command.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <exception>
-#include <iostream>
 #include <map>
 #include <optional>
 #include <vector>
@@ -19,19 +20,19 @@
 namespace efm {
 namespace {
 
-/// Times of a stream of things, in the order of the recording.
+/// Times of events or poses, in the order of the recording.
 struct Stream {
   std::uint64_t count = 0;
   std::optional<std::int64_t> first_ns;
   std::optional<std::int64_t> last_ns;
-  std::int64_t largest_gap_ns = 0;
-  std::int64_t largest_gap_at_ns = 0;  ///< Where it begins.
+  std::int64_t max_gap_ns = 0;
+  std::int64_t max_gap_start_ns = 0;
 
   void add(std::int64_t t_ns) {
     ++count;
-    if (last_ns && t_ns - *last_ns > largest_gap_ns) {
-      largest_gap_ns = t_ns - *last_ns;
-      largest_gap_at_ns = *last_ns;
+    if (last_ns && t_ns - *last_ns > max_gap_ns) {
+      max_gap_ns = t_ns - *last_ns;
+      max_gap_start_ns = *last_ns;
     }
     first_ns = std::min(first_ns.value_or(t_ns), t_ns);
     last_ns = std::max(last_ns.value_or(t_ns), t_ns);
@@ -43,7 +44,7 @@ struct Stream {
 struct CameraInfo {
   CameraModel model;
   Stream events;
-  std::vector<Event> newest;  // the last packet: a pose may come that lies within it
+  std::vector<Event> newest;  // the last packet: the next pose may lie within it
 };
 
 std::uint64_t countEvents(const std::vector<Event>& events, std::int64_t from_ns,
@@ -53,7 +54,7 @@ std::uint64_t countEvents(const std::vector<Event>& events, std::int64_t from_ns
       [&](const Event& event) { return event.t_ns >= from_ns && event.t_ns < until_ns; }));
 }
 
-/// What a recording holds, gathered observation by observation.
+/// The contents of a recording.
 class Contents {
  public:
   std::uint64_t observations = 0;
@@ -89,54 +90,54 @@ class Contents {
     camera.newest = packet.events;
   }
 
-  /// In the order of time a pose can only lie within the last packet of each camera.
+  /// The recording is in the order of time: a new pose can lie only within the last packet of each
+  /// camera.
   void addPose(std::int64_t t_ns) {
     const bool first = poses.count == 0;
     poses.add(t_ns);
     if (*poses.last_ns == t_ns) events_after_poses = 0;
     for (const auto& [label, camera] : cameras) {
-      if (first)
-        events_before_poses += camera.events.count - countEvents(camera.newest, t_ns, kMaxTimeNs);
-      if (*poses.last_ns == t_ns)
+      const std::uint64_t not_before = countEvents(camera.newest, t_ns, kMaxTimeNs);
+      if (first) events_before_poses += camera.events.count - not_before;
+      if (*poses.last_ns == t_ns) {
         events_after_poses += countEvents(camera.newest, t_ns + 1, kMaxTimeNs);
+      }
     }
   }
 };
 
 void printStream(const Stream& stream, const char* what) {
-  std::cout << stream.count << " " << what;
+  fmt::print("{} {}", stream.count, what);
   if (stream.first_ns) {
-    std::cout << " from " << formatSeconds(*stream.first_ns) << " s to "
-              << formatSeconds(*stream.last_ns) << " s (" << stream.seconds() << " s, "
-              << stream.rate() << " per second)";
+    fmt::print(" from {} s to {} s ({:g} s, {:g} per second)", formatSeconds(*stream.first_ns),
+               formatSeconds(*stream.last_ns), stream.seconds(), stream.rate());
   }
-  std::cout << "\n";
+  fmt::print("\n");
 }
 
 void print(const Contents& contents, const RecordingCounts& counts) {
-  std::cout << contents.observations << " observations\n";
+  fmt::print("{} observations\n", contents.observations);
   for (const auto& [label, camera] : contents.cameras) {
-    std::cout << label << ": " << camera.model.width << "x" << camera.model.height
-              << " pixels, focal length " << camera.model.fx << " px, distortion "
-              << nameOf(camera.model.distortion) << "\n  ";
+    fmt::print("{}: {}x{} pixels, focal length {:g} px, distortion {}\n  ", label,
+               camera.model.width, camera.model.height, camera.model.fx,
+               nameOf(camera.model.distortion));
     printStream(camera.events, "events");
   }
   for (const auto& [source, poses] : contents.pose_sources) {
-    std::cout << asText(source) << ":\n  ";
+    fmt::print("{}:\n  ", asText(source));
     printStream(poses, "poses");
     if (poses.count > 1) {
-      std::cout << "  largest gap " << 1e-9 * static_cast<double>(poses.largest_gap_ns)
-                << " s, after " << formatSeconds(poses.largest_gap_at_ns) << " s\n";
+      fmt::print("  largest gap {:g} s, after {} s\n", 1e-9 * static_cast<double>(poses.max_gap_ns),
+                 formatSeconds(poses.max_gap_start_ns));
     }
   }
-  if (contents.pose_sources.empty()) std::cout << "0 poses\n";
-  std::cout << "  " << contents.events_before_poses << " events before the first pose, "
-            << contents.events_after_poses << " after the last\n";
-  for (const auto& [name, count] : contents.others) {
-    std::cout << name << ": " << count << " observations\n";
-  }
+  if (contents.pose_sources.empty()) fmt::print("0 poses\n");
+  fmt::print("  {} events before the first pose, {} after the last\n", contents.events_before_poses,
+             contents.events_after_poses);
+  for (const auto& [name, count] : contents.others)
+    fmt::print("{}: {} observations\n", name, count);
   if (counts.sorted_events > 0) {
-    std::cout << counts.sorted_events << " events out of order by up to 10 ms\n";
+    fmt::print("{} events out of order by up to 10 ms\n", counts.sorted_events);
   }
 }
 
@@ -144,7 +145,7 @@ void print(const Contents& contents, const RecordingCounts& counts) {
 
 int runInfo(const InfoArguments& arguments) {
   RecordingSource source = arguments.source;
-  source.faults.latency_ns = 0;  // stamps are what counts
+  source.faults.latency_ns = 0;  // latency changes no time stamp
   const std::unique_ptr<Recording> recording =
       cutTime(openRecording(source), arguments.t0_ns, arguments.t1_ns);
   Contents contents;
@@ -154,7 +155,7 @@ int runInfo(const InfoArguments& arguments) {
     try {
       while (const auto observation = recording->next()) {
         contents.add(*observation);
-        progress.showShare("reading", recording->progress());
+        progress.showFraction("reading", recording->progress());
       }
     } catch (const std::exception&) {
       stopped = std::current_exception();

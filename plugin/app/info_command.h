@@ -15,10 +15,10 @@ struct InfoArguments {
   std::optional<std::int64_t> t1_ns;
 };
 
-/// `event-fusion info`: reads a recording and says what is in it.
+/// `event-fusion info`: prints the contents of a recording.
 /// @return the process's exit status.
-/// @throws std::exception where the recording cannot be read to its end; what was found by then has
-/// been printed.
+/// @throws std::exception if the recording cannot be read to its end. The contents before the error
+/// have been printed.
 int runInfo(const InfoArguments& arguments);
 
 }  // namespace efm

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/map_command.h"
 
-#include <cstdio>
+#include <fmt/format.h>
+
 #include <functional>
 #include <initializer_list>
 #include <iostream>
@@ -23,13 +24,13 @@ EventFusionOptions optionsOf(const MappingArguments& arguments) {
   for (const std::string& assignment : arguments.sets) reader.set(assignment);
   EventFusionOptions options = reader.options();
   if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
-  if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // there are no others
+  if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // the only source
   if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
   return options;
 }
 
-/// The recording with what the options say of its rig, and of keyframes to a tracker whose noise is
-/// constant in each.
+/// The recording with the options' calibration and hand-eye transform, and with their stride for
+/// tracker noise that is constant over a keyframe.
 RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOptions& options) {
   RecordingSource source = arguments.source;
   source.calibration = options.rig.calibration;
@@ -44,22 +45,21 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
 }
 
 void printSummary(const MapReport& report, const std::filesystem::path& folder) {
-  std::printf("%llu keyframes, %llu points, %.1f million votes/s; written to %s\n",
-              static_cast<unsigned long long>(report.counts.keyframes),
-              static_cast<unsigned long long>(report.points), votesPerSecond(report) * 1e-6,
-              folder.c_str());
+  fmt::print("{} keyframes, {} points, {:.1f} million votes/s; written to {}\n",
+             report.counts.keyframes, report.points, votesPerSecond(report) * 1e-6,
+             folder.string());
 }
 
-/// An option file that names a calibration must not replace a better one in silence.
+/// Warns if the option file replaced the recording's own calibration, which may be the better one.
 void warnOfRecalibration(const MappingArguments& arguments, MappingOutcome& outcome) {
   if (outcome.recalibrated_cameras == 0) return;
-  if (!arguments.source.calibration.empty()) return;  // it was asked for
+  if (!arguments.source.calibration.empty()) return;  // --calibration is intended
   outcome.warnings.push_back(outcome.report.options.rig.calibration.string() +
                              " replaced another calibration, the recording's own; --set "
                              "rig.calibration= keeps that");
 }
 
-/// Writes each file, also where one before it could not be: the first error is the outcome's.
+/// Writes all files, even if one fails. The outcome has the first error.
 void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void()>> files) {
   for (const auto& write : files) {
     try {
@@ -77,9 +77,9 @@ std::function<void(const std::filesystem::path&)> saverOf(const mrpt::maps::CSim
   };
 }
 
-/// What `map` and `depth` end with: the report, then words to the user.
+/// Writes the report; prints warnings, summary and error. @return the exit status.
 int conclude(const MappingOutcome& outcome, MapOutput& output) {
-  // A run that failed before its first keyframe leaves the results of an earlier one as they were.
+  // A run without a keyframe leaves the results of an earlier run as they are.
   const bool made_nothing = outcome.error && outcome.report.counts.keyframes == 0;
   if (!made_nothing || !std::filesystem::exists(output.folder() / "report.json")) {
     output.writeReport(reportJson(outcome.report));
@@ -99,97 +99,96 @@ Window windowOf(const DepthArguments& arguments, ReferenceTime reference) {
   return window;
 }
 
-/// The first pass over the whole recording, where the options ask for its maximum.
+/// The first pass over the recording, for max_confidence = sequence.
 std::optional<double> sequenceMaximumOf(const RecordingSource& source, EventFusionOptions options) {
   if (options.mapper.keyframe.extraction.max_confidence.level != WhiteLevel::kSequence) {
     return std::nullopt;
   }
   options.mapper.only_window.reset();
-  options.refinement.enabled = false;  // moves no confidence
+  options.refinement.enabled = false;  // changes no confidence
   return sequenceMaximum(options, *openRecording(source));
+}
+
+/// Runs a job and writes its results.
+/// @param kind of the output folder.
+/// @param take receives each keyframe.
+/// @param write writes the results after the last keyframe, if there is one.
+int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
+           const std::function<void(MapOutput&, const KeyframeDepthMap&)>& take,
+           const std::function<void(MapOutput&, MappingOutcome&)>& write) {
+  StageSeconds clock;
+  MappingOutcome outcome;
+  std::optional<MapOutput> output;
+  {
+    const SecondsScope total(clock.total);
+    const RecordingSource source = sourceOf(arguments, job.options);
+    job.sequence_maximum = sequenceMaximumOf(source, job.options);
+    const std::unique_ptr<Recording> recording = openRecording(source);
+    output.emplace(arguments.out, kind, job.options.mapper.keyframe.planes);
+    job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { take(*output, keyframe); };
+    outcome = runMapping(job, *recording);
+    outcome.report.faults = source.faults;
+    warnOfRecalibration(arguments, outcome);
+    if (outcome.report.counts.keyframes > 0) write(*output, outcome);
+  }
+  outcome.report.seconds.total = clock.total;
+  return conclude(outcome, *output);
 }
 
 }  // namespace
 
 int runMap(const MapArguments& arguments) {
-  StageSeconds clock;
-  MappingOutcome outcome;
-  std::optional<MapOutput> output;
-  {
-    const SecondsScope total(clock.total);
-    MappingJob job;
-    job.options = optionsOf(arguments);
-    job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
-    job.options.mapper.limits.validate();
-    const RecordingSource source = sourceOf(arguments, job.options);
-    job.sequence_maximum = sequenceMaximumOf(source, job.options);
-    const std::unique_ptr<Recording> recording = openRecording(source);
-    output.emplace(arguments.out, OutputKind::kMap, job.options.mapper.keyframe.planes);
-    job.take_keyframe = [&](const KeyframeDepthMap& keyframe) { output->writeKeyframe(keyframe); };
-
-    outcome = runMapping(job, *recording);
-    outcome.report.faults = source.faults;
-    warnOfRecalibration(arguments, outcome);
-    if (outcome.report.counts.keyframes > 0) {
-      const SecondsScope map(outcome.report.seconds.map);
-      writeAll(outcome, {[&] { output->writeCloud("map.pcd", outcome.points); },
-                         [&] { output->writeFile("map.simplemap", saverOf(outcome.keyframes)); },
-                         [&] { output->writeTrajectory("trajectory.txt", outcome.trajectory); },
-                         [&] {
-                           if (!job.options.refinement.enabled) return;
-                           output->writeTrajectory("trajectory_tracker.txt",
-                                                   outcome.tracker_trajectory);
-                         }});
-    }
-  }
-  outcome.report.seconds.total = clock.total;
-  return conclude(outcome, *output);
+  MappingJob job;
+  job.options = optionsOf(arguments);
+  job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
+  job.options.mapper.limits.validate();
+  const bool refined = job.options.refinement.enabled;
+  const auto take = [](MapOutput& output, const KeyframeDepthMap& keyframe) {
+    output.writeKeyframe(keyframe);
+  };
+  const auto write = [refined](MapOutput& output, MappingOutcome& outcome) {
+    const SecondsScope map(outcome.report.seconds.map);
+    writeAll(outcome, {[&] { output.writeCloud("map.pcd", outcome.points); },
+                       [&] { output.writeFile("map.simplemap", saverOf(outcome.keyframes)); },
+                       [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },
+                       [&] {
+                         if (!refined) return;
+                         output.writeTrajectory("trajectory_tracker.txt",
+                                                outcome.tracker_trajectory);
+                       }});
+  };
+  return runJob(arguments, job, OutputKind::kMap, take, write);
 }
 
 int runDepth(const DepthArguments& arguments) {
-  StageSeconds clock;
-  MappingOutcome outcome;
-  std::optional<MapOutput> output;
-  {
-    const SecondsScope total(clock.total);
-    MappingJob job;
-    job.options = optionsOf(arguments);
-    job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
-    job.options.mapper.validate();
-    const RecordingSource source = sourceOf(arguments, job.options);
-    job.sequence_maximum = sequenceMaximumOf(source, job.options);
-    const std::unique_ptr<Recording> recording = openRecording(source);
-    output.emplace(arguments.out, OutputKind::kDepth, job.options.mapper.keyframe.planes);
-
-    std::vector<CloudPoint> points;
-    job.take_keyframe = [&](const KeyframeDepthMap& keyframe) {
-      output->writeImages(keyframe);
-      const std::vector<CloudPoint> cloud =
-          job.options.late_fusion ? lateFusionCloud(keyframe) : keyframeCloud(keyframe);
-      points = removeOutliers(cloud, job.options.cloud.outliers);
+  MappingJob job;
+  job.options = optionsOf(arguments);
+  job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
+  job.options.mapper.validate();
+  const EventFusionOptions options = job.options;
+  std::unique_ptr<NpyDsiFile> dsi;
+  if (arguments.save_dsi) {
+    job.make_dsi_sink = [&](const ReferenceView& view) {
+      dsi = std::make_unique<NpyDsiFile>(arguments.out / "dsi.npy",
+                                         options.mapper.keyframe.planes.num_planes, view);
+      return dsi.get();
     };
-    std::unique_ptr<NpyDsiFile> dsi;
-    if (arguments.save_dsi) {
-      job.make_dsi_sink = [&](const ReferenceView& view) {
-        dsi = std::make_unique<NpyDsiFile>(arguments.out / "dsi.npy",
-                                           job.options.mapper.keyframe.planes.num_planes, view);
-        return dsi.get();
-      };
-    }
-
-    outcome = runMapping(job, *recording);
-    outcome.report.faults = source.faults;
-    warnOfRecalibration(arguments, outcome);
-    outcome.report.points = points.size();
-    if (outcome.report.counts.keyframes > 0) {
-      writeAll(outcome, {[&] { output->writeCloud("points.pcd", points); },
-                         [&] {
-                           if (dsi) dsi->finish();
-                         }});
-    }
   }
-  outcome.report.seconds.total = clock.total;
-  return conclude(outcome, *output);
+  std::vector<CloudPoint> points;
+  const auto take = [&](MapOutput& output, const KeyframeDepthMap& keyframe) {
+    output.writeImages(keyframe);
+    points =
+        removeOutliers(options.late_fusion ? lateFusionCloud(keyframe) : keyframeCloud(keyframe),
+                       options.cloud.outliers);
+  };
+  const auto write = [&](MapOutput& output, MappingOutcome& outcome) {
+    outcome.report.points = points.size();
+    writeAll(outcome, {[&] { output.writeCloud("points.pcd", points); },
+                       [&] {
+                         if (dsi) dsi->finish();
+                       }});
+  };
+  return runJob(arguments, job, OutputKind::kDepth, take, write);
 }
 
 }  // namespace efm

@@ -11,7 +11,7 @@
 
 namespace efm {
 
-/// What `map` and `depth` have in common on the command line.
+/// The common arguments of `map` and `depth`.
 struct MappingArguments {
   std::filesystem::path config;
   RecordingSource source;
@@ -27,17 +27,18 @@ struct MapArguments : MappingArguments {
 struct DepthArguments : MappingArguments {
   std::int64_t t0_ns = 0;
   std::int64_t t1_ns = 0;
-  std::optional<std::int64_t> t_ref_ns;  ///< The middle of the window (or its end, by the options).
+  std::optional<std::int64_t> t_ref_ns;  ///< Default: middle or end of the window, by the options.
   bool save_dsi = false;
 };
 
-/// `event-fusion map`: plays a recording and writes the map's folder; a summary goes to stdout,
-/// warnings and what went wrong to stderr.
-/// @return the process's exit status: 0 only where the whole recording became a map.
-/// @throws std::exception where the options or the recording cannot be read, or a file not written.
+/// `event-fusion map`: plays a recording and writes the map's folder. Prints a summary to stdout,
+/// warnings and errors to stderr.
+/// @return the process's exit status: 0 only if the whole recording is mapped.
+/// @throws std::exception if the options or the recording cannot be read, or a file cannot be
+/// written.
 int runMap(const MapArguments& arguments);
 
-/// `event-fusion depth`: one keyframe of a chosen window.
+/// `event-fusion depth`: maps one window.
 int runDepth(const DepthArguments& arguments);
 
 }  // namespace efm

@@ -3,9 +3,9 @@
 
 #include <mrpt/obs/CObservation.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
-#include <cstdio>
 
 #include "mapping/depth/robust_maximum.h"
 #include "plugin/app/progress.h"
@@ -16,7 +16,7 @@
 namespace efm {
 namespace {
 
-/// The loop over a recording: reads, feeds the builder, hands keyframes over.
+/// The loop over a recording: reads, feeds the builder, delivers keyframes.
 class Player {
  public:
   Player(const MappingJob& job, Recording& recording, StageSeconds& seconds)
@@ -24,30 +24,30 @@ class Player {
     EventFusionOptions options = job.options;
     options.mapper.keyframe.sequence_maximum = job.sequence_maximum;
     builder_.setOptions(options);
-    builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // its warnings come in one, at the end
+    builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // warningsOf summarises its warnings
     builder_.setKeyframeTaker(
-        [this](const KeyframeDepthMap& keyframe) { made_.push_back(keyframe); });
+        [this](const KeyframeDepthMap& keyframe) { pending_.push_back(keyframe); });
   }
 
-  /// @return what stopped it before the recording's end, if anything did.
+  /// @return the error that stopped it before the recording's end, if there was one.
   std::optional<std::string> play() {
     std::optional<std::string> error;
     for (bool more = true; more;) {
-      more = tried([this] { return playOne(); }, error);
-      handOver();
+      more = attempt([this] { return playOne(); }, error);
+      deliver();
       if (progress_.due()) showProgress();
     }
-    tried([this] { return builder_.finish(), false; }, error);
-    handOver();
+    attempt([this] { return builder_.finish(), false; }, error);
+    deliver();
     return error;
   }
 
   const CEventFusionMapBuilder& builder() const { return builder_; }
 
  private:
-  /// Runs a step of reading; its error, the first one, ends the loop.
+  /// Runs a step. @return false if it throws. `error` keeps the first message.
   template <typename Step>
-  static bool tried(Step step, std::optional<std::string>& error) {
+  static bool attempt(Step step, std::optional<std::string>& error) {
     try {
       return step();
     } catch (const std::exception& caught) {
@@ -73,7 +73,7 @@ class Player {
     return true;
   }
 
-  /// The size of the DSI's planes is known once the reference camera is.
+  /// The first packet of the reference camera tells the size of the DSI's planes.
   void offerDsiSink(const mrpt::obs::CObservation& observation) {
     if (sink_offered_ || !job_.make_dsi_sink) return;
     const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
@@ -83,24 +83,22 @@ class Player {
         job_.make_dsi_sink(makeReferenceView(events->camera, job_.options.mapper.keyframe.view)));
   }
 
-  /// Outside the steps of reading: an error of writing must not be taken for one of reading.
-  void handOver() {
-    for (const KeyframeDepthMap& keyframe : made_) job_.take_keyframe(keyframe);
-    made_.clear();
+  /// Not a part of a step: an error of writing must not count as an error of reading.
+  void deliver() {
+    for (const KeyframeDepthMap& keyframe : pending_) job_.on_keyframe(keyframe);
+    pending_.clear();
   }
 
   void showProgress() {
-    std::array<char, 64> line{};
-    std::snprintf(line.data(), line.size(), "%3.0f %%, %llu keyframes", 100 * recording_.progress(),
-                  static_cast<unsigned long long>(builder_.status().counts.keyframes));
-    progress_.show(line.data());
+    progress_.show(fmt::format("{:3.0f} %, {} keyframes", 100 * recording_.progress(),
+                               builder_.status().counts.keyframes));
   }
 
   const MappingJob& job_;
   Recording& recording_;
   StageSeconds& seconds_;
   CEventFusionMapBuilder builder_;
-  std::vector<KeyframeDepthMap> made_;
+  std::vector<KeyframeDepthMap> pending_;
   bool sink_offered_ = false;
   Progress progress_;
 };
@@ -108,52 +106,51 @@ class Player {
 std::vector<std::string> warningsOf(const SessionStatus& status, bool exclude_silent) {
   std::vector<std::string> warnings;
   if (status.counts.sorted_events > 0) {
-    warnings.push_back(std::to_string(status.counts.sorted_events) +
-                       " events came later than newer ones and were sorted");
+    warnings.push_back(fmt::format("{} events came later than newer ones and were sorted",
+                                   status.counts.sorted_events));
   }
   for (std::size_t c = 0; c < status.silent_keyframes.size(); ++c) {
     if (status.silent_keyframes[c] == 0) continue;
-    warnings.push_back(
-        "camera " + std::to_string(c) + " had no event in " +
-        std::to_string(status.silent_keyframes[c]) + " of " +
-        std::to_string(status.counts.keyframes) + " keyframes: " +
-        (exclude_silent
-             ? "the others were fused without it"
-             : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
-               "([rig] exclude_silent leaves silent cameras out)"));
+    warnings.push_back(fmt::format(
+        "camera {} had no event in {} of {} keyframes: {}", c, status.silent_keyframes[c],
+        status.counts.keyframes,
+        exclude_silent ? "the others were fused without it"
+                       : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
+                         "([rig] exclude_silent leaves silent cameras out)"));
   }
   if (status.counts.silent_subintervals > 0) {
-    warnings.push_back(std::to_string(status.counts.silent_subintervals) +
-                       " sub-intervals of a camera had no event: rules that ask all of them (min, "
-                       "harmonic, geometric) find nothing where one is empty");
+    warnings.push_back(
+        fmt::format("{} sub-intervals of a camera had no event: rules that ask all of them (min, "
+                    "harmonic, geometric) find nothing where one is empty",
+                    status.counts.silent_subintervals));
   }
   for (const auto& [source, count] : status.other_poses) {
-    if (!status.pose_source) break;  // then there is no keyframe, which is said elsewhere
-    warnings.push_back(std::to_string(count) + " poses were not used: " + asText(source) +
-                       ", beside " + asText(*status.pose_source));
+    if (!status.pose_source) break;  // no keyframe: the error says so
+    warnings.push_back(fmt::format("{} poses were not used: {}, beside {}", count, asText(source),
+                                   asText(*status.pose_source)));
   }
   if (status.counts.duplicate_poses > 0) {
-    warnings.push_back(std::to_string(status.counts.duplicate_poses) +
-                       " poses had the time of an earlier one and were left out");
+    warnings.push_back(fmt::format("{} poses had the time of an earlier one and were left out",
+                                   status.counts.duplicate_poses));
   }
   if (status.refinement && status.refinement->counts.registered + 1 < status.counts.keyframes) {
-    warnings.push_back(
-        std::to_string(status.counts.keyframes - 1 - status.refinement->counts.registered) +
-        " of " + std::to_string(status.counts.keyframes) +
-        " keyframes found no place by their points: the tracker's motion stands there");
+    warnings.push_back(fmt::format(
+        "{} of {} keyframes found no place by their points: the tracker's motion stands there",
+        status.counts.keyframes - 1 - status.refinement->counts.registered,
+        status.counts.keyframes));
   }
   if (status.counts.keyframes > 0 && status.counts.keyframes_without_pose > 0) {
-    warnings.push_back(std::to_string(status.counts.keyframes_without_pose) +
-                       " windows were left out: no pose at their reference time");
+    warnings.push_back(fmt::format("{} windows were left out: no pose at their reference time",
+                                   status.counts.keyframes_without_pose));
   }
   if (status.counts.keyframes > 0 && status.counts.windows_without_events > 0) {
-    warnings.push_back(std::to_string(status.counts.windows_without_events) +
-                       " windows were left out: the selected cameras saw nothing");
+    warnings.push_back(fmt::format("{} windows were left out: the selected cameras saw nothing",
+                                   status.counts.windows_without_events));
   }
   return warnings;
 }
 
-/// What turns the keyframes' depths into disparities.
+/// Reports the reference view and the shortest baseline, for disparities.
 void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport& report) {
   const auto reference = static_cast<std::size_t>(options.keyframe.reference_camera);
   if (reference >= rig.cameras.size()) return;
@@ -211,8 +208,13 @@ std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recordi
   RobustMaximum maximum;
   MappingJob job;
   job.options = options;
+<<<<<<< HEAD
   job.take_keyframe = [&](const KeyframeDepthMap& keyframe) {
     maximum.take(keyframe.max_confidence);
+=======
+  job.on_keyframe = [&](const KeyframeDepthMap& keyframe) {
+    maximum.take(keyframe.largest_confidence);
+>>>>>>> f97b144 (wip-app)
   };
   StageSeconds ignored;
   Player(job, recording, ignored).play();

@@ -16,44 +16,44 @@
 
 namespace efm {
 
-/// How to map a recording, and who receives what is made on the way.
+/// How to map a recording.
 struct MappingJob {
   EventFusionOptions options;
-  /// What `max_confidence = sequence` stands for; the running maximum where not given.
+  /// The value of `max_confidence = sequence`. Default: the running maximum.
   std::optional<double> sequence_maximum;
 
   /// Receives each keyframe, in order.
-  std::function<void(const KeyframeDepthMap&)> take_keyframe;
-  /// Asked once, when the reference camera is known, for a receiver of the DSI's planes. May be
-  /// empty.
+  std::function<void(const KeyframeDepthMap&)> on_keyframe;
+  /// Makes the receiver of the DSI's planes. Called once, as soon as the reference camera is known.
+  /// May be empty.
   std::function<DsiSink*(const ReferenceView&)> make_dsi_sink;
 };
 
-/// What a run made.
+/// The results of a run.
 struct MappingOutcome {
   MapReport report;  ///< Without the total of seconds.
   std::vector<CloudPoint> points;
   mrpt::maps::CSimpleMap keyframes;  ///< Their clouds and poses.
-  /// T_world_ref of the keyframes at t_ref: in the map, and by the tracker.
+  /// T_world_ref of the keyframes at t_ref: in the map, and of the tracker.
   std::vector<StampedPose> trajectory;
   std::vector<StampedPose> tracker_trajectory;
   std::size_t recalibrated_cameras = 0;  ///< Their recorded calibrations differ from the options'.
-  /// What was odd about the input, though it was mapped: one line each.
-  std::vector<std::string> warnings;
-  /// Why the recording was not read to its end or gave no keyframe.
+  std::vector<std::string> warnings;     ///< About the input, one line each.
+  /// Why the recording was not read to its end or has no keyframe.
   std::optional<std::string> error;
 };
 
-/// Plays a recording through a map builder, with progress on stderr where that is a terminal. Where
-/// reading stops with an error, what came before is mapped to its end.
-/// @throws std::invalid_argument where the options are not valid; what `take_keyframe` and
-/// `make_dsi_sink` throw.
+/// Plays a recording through a map builder, with progress on stderr if it is a terminal. If reading
+/// stops with an error, the data before it are mapped.
+/// @throws std::invalid_argument if the options are not valid; the exceptions of `on_keyframe` and
+/// `make_dsi_sink`.
 MappingOutcome runMapping(const MappingJob& job, Recording& recording);
 
-/// The first of two passes: plays a recording for the robust maximum of its keyframes' confidences
-/// alone. Costs as much as mapping it. Nothing where there is no keyframe; what is wrong with the
-/// recording is left for `runMapping` to say.
-/// @throws std::invalid_argument where the options are not valid.
+/// The first of two passes: computes the robust maximum of the keyframes' confidences. Costs as
+/// much as mapping the recording. An error of the recording ends it; `runMapping` reports the
+/// error.
+/// @return nothing if there is no keyframe.
+/// @throws std::invalid_argument if the options are not valid.
 std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recording& recording);
 
 }  // namespace efm

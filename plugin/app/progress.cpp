@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/progress.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <iostream>
@@ -29,8 +30,8 @@ void Progress::show(const std::string& line) {
   next_ = std::chrono::steady_clock::now() + kPeriod;
 }
 
-void Progress::showShare(const std::string& doing, double share) {
-  if (due()) show(doing + ": " + std::to_string(static_cast<int>(100 * share)) + " %");
+void Progress::showFraction(const std::string& activity, double fraction) {
+  if (due()) show(fmt::format("{}: {} %", activity, static_cast<int>(100 * fraction)));
 }
 
 }  // namespace efm

@@ -6,20 +6,20 @@
 
 namespace efm {
 
-/// One line on stderr that says how far a command is: on a terminal only, a few times a second.
+/// One line on stderr with the progress of a command: on a terminal only, five times a second.
 class Progress {
  public:
   Progress();
-  /// Takes the line away.
+  /// Removes the line.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// Whether a line would be shown now.
+  /// Whether it is time for a new line.
   bool due() const;
   void show(const std::string& line);
-  /// "doing: 42 %", where a line is due. @param share 0 to 1.
-  void showShare(const std::string& doing, double share);
+  /// Shows "activity: 42 %" if a line is due. @param fraction 0 to 1.
+  void showFraction(const std::string& activity, double fraction);
 
  private:
   bool terminal_;

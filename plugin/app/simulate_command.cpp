@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/simulate_command.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
-#include <cstdio>
 #include <stdexcept>
 #include <vector>
 
@@ -30,7 +31,8 @@ void requireRate(const char* option, double hz) {
                 "0 to 1e5 (events per second and pixel)");
 }
 
-/// What the simulator checks, too, but by the names and in the units of the command line.
+/// The simulator checks these ranges, too. Here the errors have the names and units of the command
+/// line.
 void requireRanges(const SimulateArguments& arguments) {
   if (arguments.duration_s) {
     requireOption(*arguments.duration_s >= 0.001 && *arguments.duration_s <= 600, "--duration",
@@ -94,15 +96,15 @@ int runSimulate(const SimulateArguments& arguments) {
   {
     Progress progress;
     SimulationRun run;
-    run.progress = [&progress](double share) { progress.showShare("simulating", share); };
+    run.progress = [&progress](double fraction) { progress.showFraction("simulating", fraction); };
     recordings = simulateEvents(simulation, run);
     progress.show("writing");
     writer.write(simulation, recordings);
   }
   for (std::size_t c = 0; c < recordings.size(); ++c) {
-    std::printf("cam%zu: %zu events\n", c, recordings[c].events.size());
+    fmt::print("cam{}: {} events\n", c, recordings[c].events.size());
   }
-  std::printf("written to %s\n", arguments.out.c_str());
+  fmt::print("written to {}\n", arguments.out.string());
   return 0;
 }
 

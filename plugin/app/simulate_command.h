@@ -11,14 +11,14 @@
 namespace efm {
 
 struct SimulateArguments {
-  std::string preset;  ///< Empty: scene, trajectory and calibration count.
+  std::string preset;  ///< Empty: `scene`, `trajectory` and `calibration` are used.
   std::string scene;
   std::filesystem::path trajectory;   ///< TUM, T_world_cam0.
   std::filesystem::path calibration;  ///< Kalibr camera chain.
   std::optional<std::int64_t> start_ns;
   std::optional<double> duration_s;
   std::uint64_t seed = 1;
-  // The preset's pixels, or ideal ones, where not given.
+  // Default: the preset's pixels, or ideal ones.
   std::optional<double> threshold_on;
   std::optional<double> threshold_off;
   double mismatch = 0;
@@ -27,9 +27,10 @@ struct SimulateArguments {
   std::filesystem::path out;
 };
 
-/// `event-fusion simulate`: makes a recording with exact truth and writes it as a dataset folder.
+/// `event-fusion simulate`: simulates a recording with exact truth and writes it as a dataset
+/// folder.
 /// @return the process's exit status.
-/// @throws std::exception where the arguments are not valid or something cannot be written.
+/// @throws std::exception if the arguments are not valid or something cannot be written.
 int runSimulate(const SimulateArguments& arguments);
 
 }  // namespace efm
