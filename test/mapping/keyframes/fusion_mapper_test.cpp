@@ -268,8 +268,7 @@ TEST(FusionMapper, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
 }
 
 TEST(FusionMapper, EventsOfOneTimeAreNotLate) {
-  FusionMapper mapper(options(0.1, 0.1));
-  mapper.addCamera(camera());
+  Mapper mapper;
   mapper.addEvents(0, {eventAt(kStart_ns), eventAt(kStart_ns), eventAt(kStart_ns + 1)});
   mapper.addEvents(0, {eventAt(kStart_ns + 1)});
   EXPECT_EQ(mapper.counts().sorted_events, 0U);
