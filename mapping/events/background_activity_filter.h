@@ -9,18 +9,18 @@
 
 namespace efm {
 
-/// Finds events that nothing around them supports: an edge fires in neighbouring pixels within a
-/// short time, the noise of a pixel comes alone (Delbruck, "Frame-free dynamic digital vision",
-/// Proc. Intl. Symp. on Secure-Life Electronics, 2008). The first event of an edge that reaches a
-/// quiet part of the image is lost with it.
+/// Finds isolated events. An edge fires in neighbouring pixels within a short time; noise of a
+/// pixel comes alone (Delbruck, "Frame-free dynamic digital vision", Proc. Intl. Symp. on
+/// Secure-Life Electronics, 2008). The first event of an edge in a quiet part of the image is
+/// isolated, too.
 class BackgroundActivityFilter {
  public:
-  /// @param support_ns how long before an event one of its eight neighbours must have fired. Above
-  /// 0; a pixel of the image in motion takes about 1 / (pixels per second).
+  /// @param support_ns an event is isolated if none of its eight neighbours fired in this time
+  /// before it. Above 0; an edge crosses a pixel in about 1 / (pixels per second).
   BackgroundActivityFilter(int width, int height, std::int64_t support_ns);
 
-  /// Takes the next event of the camera, in time order; it lies inside the sensor. Whether isolated
-  /// or not, it supports those after it. Constant cost: at most eight times are read, one written.
+  /// @param event the next one of the camera, in time order, inside the sensor. It supports later
+  /// ones, isolated or not. Constant cost.
   bool isIsolated(const Event& event);
 
  private:

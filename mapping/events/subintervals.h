@@ -9,27 +9,27 @@
 
 namespace efm {
 
-/// What the sub-intervals of a window have in common.
+/// The quantity that is equal in the sub-intervals of a window.
 enum class SubintervalSplit {
-  kDuration,  ///< They last equally long.
-  kCount,     ///< They hold equally many of a camera's events, to within one.
+  kDuration,  ///< Their duration.
+  kCount,     ///< The number of a camera's events in them, to within one.
 };
 
-/// Which sub-intervals of the cameras meet in one slot of the fusion.
+/// Which sub-intervals of the cameras are fused with each other, in one slot.
 enum class SubintervalShuffle {
   kNone,    ///< The same ones: simultaneous events.
-  kShift,   ///< Each camera's are rotated by its own offset.
-  kRandom,  ///< Each camera's are permuted at random.
+  kShift,   ///< Those of each camera are rotated by its own offset.
+  kRandom,  ///< Those of each camera are permuted at random.
 };
 
 std::string_view nameOf(SubintervalSplit split);
 std::string_view nameOf(SubintervalShuffle shuffle);
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 SubintervalSplit subintervalSplitFromName(std::string_view name);
 SubintervalShuffle subintervalShuffleFromName(std::string_view name);
 
-/// A window is divided into sub-intervals, each with a DSI of its own per camera (Ghosh and Gallego
-/// 2022, Algorithm 2, line 3).
+/// The sub-intervals of a window; each has a DSI per camera (Ghosh and Gallego 2022, Algorithm 2,
+/// line 3).
 struct SubintervalOptions {
   int count = 1;  ///< N_s, 1 to 1000; the paper finds 2 to 8 useful. 1: no fusion across time.
   SubintervalSplit split = SubintervalSplit::kDuration;
@@ -40,14 +40,14 @@ struct SubintervalOptions {
   void validate() const;
 };
 
-/// One camera's events of the window [t0, t1) by sub-interval: consecutive, half open, all events
-/// in one of them. With `kCount` events of one time may fall to two sub-intervals.
+/// Divides one camera's events of the window [t0, t1) into consecutive, half-open sub-intervals.
+/// With `kCount`, events of the same time may be in two sub-intervals.
 std::vector<EventSpan> splitIntoSubintervals(EventSpan events, std::int64_t t0_ns,
                                              std::int64_t t1_ns, const SubintervalOptions& options);
 
-/// Which of its sub-intervals each camera puts into each slot: indices [camera][slot]. `kShift`:
-/// (slot + camera * max(1, N_s / cameras)) mod N_s, so that cameras are as far apart in time as
-/// they can be. The same for every window.
+/// The sub-interval of each camera in each slot: indices [camera][slot]. `kShift`: (slot + camera *
+/// max(1, N_s / cameras)) mod N_s, which keeps the cameras as far apart in time as possible. The
+/// same for every window.
 std::vector<std::vector<int>> assignSubintervals(int cameras, const SubintervalOptions& options);
 
 }  // namespace efm

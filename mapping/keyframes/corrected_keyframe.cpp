@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/keyframes/corrected_keyframe.h"
 
+#include <optional>
 #include <utility>
 
 namespace efm {
@@ -13,26 +14,29 @@ double sharpnessOf(const KeyframeDepthMap& keyframe) {
 
 }  // namespace
 
-KeyframeDepthMap mapCorrected(const WindowInput& input, const Trajectory& tracked,
-                              const MapAlong& map_along, const MotionCorrectionOptions& options,
-                              StageHook* stages) {
-  KeyframeDepthMap keyframe = map_along(tracked);
-  Trajectory motion = tracked;
+KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along) {
+  const MotionCorrectionOptions& options = window.options;
+  KeyframeDepthMap keyframe = map_along(window.tracked, nullptr);
+  Trajectory motion = window.tracked;
   for (int round = 0; round < options.motion_rounds; ++round) {
     const VelocityCorrection current = keyframe.motion_correction.value_or(VelocityCorrection{});
     VelocityCorrection correction;
     {
-      const StageScope scope(stages, Stage::kSweep);
-      correction = findCorrection(input, motion, keyframe.map.depth, current, options);
+      const StageScope scope(window.stages, Stage::kSweep);
+      correction = findCorrection(window.input, motion, keyframe.map.depth, current, options);
     }
-    Trajectory corrected = correctedTrajectory(tracked, input.window, correction);
-    KeyframeDepthMap sharper = map_along(corrected);
+    Trajectory corrected = correctedTrajectory(window.tracked, window.input.window, correction);
+    KeyframeDepthMap sharper = map_along(corrected, nullptr);
     const double min_gain = keyframe.motion_correction ? 0 : options.min_gain;
     if (!(sharpnessOf(sharper) > (1 + min_gain) * sharpnessOf(keyframe))) break;
     motion = std::move(corrected);
     keyframe = std::move(sharper);
     keyframe.motion_correction = correction;
   }
+  if (window.sink == nullptr) return keyframe;
+  const std::optional<VelocityCorrection> correction = keyframe.motion_correction;
+  keyframe = map_along(motion, window.sink);
+  keyframe.motion_correction = correction;
   return keyframe;
 }
 

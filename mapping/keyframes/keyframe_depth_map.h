@@ -9,6 +9,7 @@
 #include "mapping/depth/depth_extraction.h"
 #include "mapping/dsi/vote_counts.h"
 #include "mapping/events/window.h"
+#include "mapping/events/window_input.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/motion/velocity_correction.h"
@@ -26,6 +27,8 @@ struct EventImage {
   int camera = 0;              ///< Index in the rig.
   cv::Mat_<cv::Vec2i> counts;  ///< Per raw pixel: negative, positive events.
 };
+
+EventImage eventImageOf(const CameraEvents& camera);
 
 /// The depth map of one window of events.
 struct KeyframeDepthMap {

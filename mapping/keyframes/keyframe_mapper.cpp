@@ -22,15 +22,6 @@ void requireCamera(const Rig& rig, int camera, const char* key) {
                 "a camera of the recording: 0 to " + std::to_string(count - 1));
 }
 
-EventImage eventImage(const CameraEvents& camera) {
-  const CameraModel& model = camera.calibration->model;
-  EventImage image{camera.camera, cv::Mat_<cv::Vec2i>::zeros(model.height, model.width)};
-  for (const Event& event : camera.events) {
-    ++image.counts(event.y, event.x)[event.polarity ? 1 : 0];
-  }
-  return image;
-}
-
 double maximumOf(const cv::Mat1f& confidence) {
   double maximum = 0;
   cv::minMaxLoc(confidence, nullptr, &maximum);
@@ -90,12 +81,18 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   const WindowInput input{window, cameras, view_, planes_, referencePose(*T_world_rig)};
   // 3-5. From events to depth.
   tbb::task_arena arena(options_.sweep.threadsOrCores());
-  KeyframeDepthMap keyframe =
-      arena.execute([&] { return mapWindow(input, trajectory, sink, stages); });
+  const auto map_along = [&](const Trajectory& motion, DsiSink* dsi) {
+    return mapAlong(input, motion, dsi, stages);
+  };
+  KeyframeDepthMap keyframe = arena.execute([&] {
+    if (!options_.motion.correct_motion) return map_along(trajectory, sink);
+    return mapCorrected({input, trajectory, options_.motion, sink, stages}, map_along);
+  });
 
   sequence_maximum_.take(keyframe.max_confidence);
   if (options_.event_images) {
-    for (const CameraEvents& camera : cameras) keyframe.event_images.push_back(eventImage(camera));
+    for (const CameraEvents& camera : cameras)
+      keyframe.event_images.push_back(eventImageOf(camera));
   }
   return keyframe;
 }
@@ -110,35 +107,20 @@ std::vector<CameraEvents> KeyframeMapper::selectedEvents(
   return cameras;
 }
 
-/// Along the tracker's motion, or along the corrected one.
-KeyframeDepthMap KeyframeMapper::mapWindow(const WindowInput& input, const Trajectory& trajectory,
-                                           DsiSink* sink, StageHook* stages) const {
-  if (!options_.motion.correct_motion) return mapAlong(input, trajectory, sink, stages);
-  const auto map_along = [&](const Trajectory& motion) {
-    return mapAlong(input, motion, nullptr, stages);
-  };
-  KeyframeDepthMap corrected = mapCorrected(input, trajectory, map_along, options_.motion, stages);
-  if (sink == nullptr) return corrected;
-  const auto correction = corrected.motion_correction;
-  KeyframeDepthMap keyframe = mapAlong(
-      input, correction ? correctedTrajectory(trajectory, input.window, *correction) : trajectory,
-      sink, stages);
-  keyframe.motion_correction = correction;
-  return keyframe;
-}
-
 KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajectory& motion,
                                           DsiSink* sink, StageHook* stages) const {
   KeyframeDepthMap keyframe;
   keyframe.window = input.window;
   keyframe.T_world_ref = input.T_world_ref;
   keyframe.view = view_;
+  keyframe.events.resize(rig_.cameras.size());
   std::vector<WindowRays> cameras;
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
     cameras = backProject(input, motion);  // 3.
     countEvents(cameras, keyframe);
+    if (options_.exclude_silent) removeSilent(cameras);
     swept = fuse(cameras, sink);  // 4.
   }
   const StageScope scope(stages, Stage::kDepth);
@@ -156,34 +138,10 @@ std::vector<WindowRays> KeyframeMapper::backProject(const WindowInput& input,
   return cameras;
 }
 
-/// Counts what became of the events, and removes silent cameras if the options say so.
-void KeyframeMapper::countEvents(std::vector<WindowRays>& cameras,
-                                 KeyframeDepthMap& keyframe) const {
-  keyframe.events.resize(rig_.cameras.size());
-  for (const WindowRays& camera : cameras) {
-    keyframe.events[static_cast<std::size_t>(camera.camera)] = camera.events;
-    keyframe.without_pose += camera.without_pose;
-    if (camera.events == 0) {
-      keyframe.silent_cameras.push_back(camera.camera);
-    } else {
-      keyframe.silent_subintervals += camera.silent_subintervals;
-    }
-  }
-  const bool all_silent = keyframe.silent_cameras.size() == cameras.size();
-  if (!options_.exclude_silent || all_silent) return;
-  cameras.erase(std::remove_if(cameras.begin(), cameras.end(),
-                               [](const WindowRays& camera) { return camera.events == 0; }),
-                cameras.end());
-}
-
 /// 4. Votes, and fuses the DSIs across cameras and time, plane by plane. Consumes the rays.
 SweepResult KeyframeMapper::fuse(std::vector<WindowRays>& cameras, DsiSink* sink) const {
   const FusionLayout layout = groups_.layoutOf(static_cast<int>(cameras.size()));
-  std::vector<CameraRays> rays;
-  for (const auto& slots : layout.inputs) {
-    CameraRays& input = rays.emplace_back();
-    for (const auto& slot : slots) input.push_back(std::move(cameras[slot.camera].rays[slot.part]));
-  }
+  std::vector<CameraRays> rays = inputsOf(cameras, layout);
   SweepRequest request;
   request.camera_peaks = options_.camera_maps && rays.size() == cameras.size();
   request.sink = sink;

@@ -66,12 +66,9 @@ class KeyframeMapper {
 
  private:
   std::vector<CameraEvents> selectedEvents(const std::vector<EventSpan>& events) const;
-  KeyframeDepthMap mapWindow(const WindowInput& input, const Trajectory& trajectory, DsiSink* sink,
-                             StageHook* stages) const;
   KeyframeDepthMap mapAlong(const WindowInput& input, const Trajectory& motion, DsiSink* sink,
                             StageHook* stages) const;
   std::vector<WindowRays> backProject(const WindowInput& input, const Trajectory& motion) const;
-  void countEvents(std::vector<WindowRays>& cameras, KeyframeDepthMap& keyframe) const;
   SweepResult fuse(std::vector<WindowRays>& cameras, DsiSink* sink) const;
   void extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
                KeyframeDepthMap& keyframe) const;

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <vector>
+#include <utility>
 
 namespace efm {
 
@@ -30,6 +30,33 @@ WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
   result.silent_subintervals =
       static_cast<std::uint64_t>(std::count(rays_in.begin(), rays_in.end(), std::size_t{0}));
   return result;
+}
+
+void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyframe) {
+  for (const WindowRays& camera : cameras) {
+    keyframe.events[static_cast<std::size_t>(camera.camera)] = camera.events;
+    keyframe.without_pose += camera.without_pose;
+    if (camera.events == 0) {
+      keyframe.silent_cameras.push_back(camera.camera);
+    } else {
+      keyframe.silent_subintervals += camera.silent_subintervals;
+    }
+  }
+}
+
+void removeSilent(std::vector<WindowRays>& cameras) {
+  const auto silent = [](const WindowRays& camera) { return camera.events == 0; };
+  if (std::all_of(cameras.begin(), cameras.end(), silent)) return;
+  cameras.erase(std::remove_if(cameras.begin(), cameras.end(), silent), cameras.end());
+}
+
+std::vector<CameraRays> inputsOf(std::vector<WindowRays>& cameras, const FusionLayout& layout) {
+  std::vector<CameraRays> inputs;
+  for (const auto& slots : layout.inputs) {
+    CameraRays& input = inputs.emplace_back();
+    for (const auto& slot : slots) input.push_back(std::move(cameras[slot.camera].rays[slot.part]));
+  }
+  return inputs;
 }
 
 }  // namespace efm

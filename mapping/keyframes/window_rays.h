@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "mapping/events/event_groups.h"
 #include "mapping/events/window_input.h"
 #include "mapping/geometry/trajectory.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/rays/back_projection.h"
 #include "mapping/rays/pose_packets.h"
 
@@ -26,5 +28,12 @@ struct WindowRays {
 WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
                   const Trajectory& trajectory, const EventGroups& groups,
                   const PosePacketsOptions& packets);
+
+/// Counts the events of all cameras of a keyframe.
+void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyframe);
+/// Removes the cameras without rays, unless no camera has any.
+void removeSilent(std::vector<WindowRays>& cameras);
+/// The inputs of the fusion; consumes the cameras' rays.
+std::vector<CameraRays> inputsOf(std::vector<WindowRays>& cameras, const FusionLayout& layout);
 
 }  // namespace efm
