@@ -208,13 +208,8 @@ std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recordi
   RobustMaximum maximum;
   MappingJob job;
   job.options = options;
-<<<<<<< HEAD
-  job.take_keyframe = [&](const KeyframeDepthMap& keyframe) {
-    maximum.take(keyframe.max_confidence);
-=======
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe) {
-    maximum.take(keyframe.largest_confidence);
->>>>>>> f97b144 (wip-app)
+    maximum.take(keyframe.max_confidence);
   };
   StageSeconds ignored;
   Player(job, recording, ignored).play();
