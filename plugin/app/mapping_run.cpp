@@ -25,7 +25,7 @@ class Player {
     options.mapper.keyframe.sequence_maximum = job.sequence_maximum;
     builder_.setOptions(options);
     builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // warningsOf summarises its warnings
-    builder_.setKeyframeTaker(
+    builder_.setKeyframeCallback(
         [this](const KeyframeDepthMap& keyframe) { pending_.push_back(keyframe); });
   }
 
