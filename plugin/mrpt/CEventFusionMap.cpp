@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/CEventFusionMap.h"
 
+#include <fmt/format.h>
 #include <mrpt/img/color_maps.h>
 #include <mrpt/opengl/CPointCloudColoured.h>
 #include <mrpt/opengl/CSetOfObjects.h>
@@ -25,7 +26,7 @@ IMPLEMENTS_SERIALIZABLE(CEventFusionMap, CMetricMap, efm)
 namespace efm {
 namespace {
 
-/// What MRPT itself reads for every map, from a section of its own.
+/// MRPT reads these keys for every map, from a section of its own.
 void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::string& section) {
   constexpr std::array<std::string_view, 3> kKnown = {
       "enableSaveAs3DObject", "enableObservationLikelihood", "enableObservationInsertion"};
@@ -37,7 +38,7 @@ void checkGenericKeys(const mrpt::config::CConfigFileBase& source, const std::st
   }
 }
 
-/// Maps of version 0 did not know it: they stay what they were.
+/// Maps of version 0 had no consistency check.
 void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
                      ConsistencyOptions& options) {
   options.consistency = Consistency::kNone;
@@ -69,12 +70,9 @@ void CEventFusionMap::TMapDefinition::loadFromConfigFile_map_specific(
     } else if (section == prefix + "_creationOpts") {
       checkGenericKeys(source, section);
     } else {
-      throw std::invalid_argument(placeIn(source, section)
-                                      .append(" unknown section; known: ")
-                                      .append(prefix)
-                                      .append("_insertOpts, ")
-                                      .append(prefix)
-                                      .append("_creationOpts"));
+      throw std::invalid_argument(
+          fmt::format("{} unknown section; known: {}_insertOpts, {}_creationOpts",
+                      placeIn(source, section), prefix, prefix));
     }
   }
   options = reader.options().cloud;
@@ -96,7 +94,7 @@ mrpt::maps::CMetricMap* CEventFusionMap::internal_CreateFromMapDefinition(
 
 CEventFusionMap::CEventFusionMap(const GlobalCloudOptions& options) : cloud_(options) {}
 
-// --- In --------------------------------------------------------------------------------------
+// --- Inserting -------------------------------------------------------------------------------
 
 void CEventFusionMap::insertKeyframe(const StoredKeyframe& keyframe) {
   cloud_.insert(keyframes_.size(), worldPointsOf(keyframe), keyframe.T_world_ref);
@@ -124,8 +122,8 @@ bool CEventFusionMap::internal_insertObservation(
   const Rigid3 T_world_rig = robot_pose ? rigidFrom(*robot_pose) : Rigid3{};
   std::optional<StoredKeyframe> keyframe = keyframeFrom(observation, T_world_rig);
   if (!keyframe) return false;
-  keyframe->points =
-      std::make_shared<CPointsMapXYZI>(*keyframe->points);  // the caller's may change
+  // A copy: the caller may change its cloud.
+  keyframe->points = std::make_shared<CPointsMapXYZI>(*keyframe->points);
   insertKeyframe(*keyframe);
   return true;
 }
@@ -147,7 +145,7 @@ double CEventFusionMap::internal_computeObservationLikelihood(
   return 0;
 }
 
-// --- Stored ----------------------------------------------------------------------------------
+// --- Storing ---------------------------------------------------------------------------------
 
 std::uint8_t CEventFusionMap::serializeGetVersion() const { return 1; }
 
@@ -162,7 +160,7 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
   out.WriteAs<std::int32_t>(options.consistency.max_contradictions);
   out.WriteAs<std::uint32_t>(keyframes_.size());
   for (const StoredKeyframe& keyframe : keyframes_) {
-    // Not as a pose of MRPT's, which would give the last digit another value.
+    // Not as a pose of MRPT: its conversion changes the last digit.
     const Eigen::Vector3d& t = keyframe.T_world_ref.translation;
     const Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
     out << keyframe.t_ref_ns << t.x() << t.y() << t.z() << q.x() << q.y() << q.z() << q.w()
@@ -172,8 +170,8 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
 
 void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
   if (version > 1) {
-    throw std::runtime_error("an event fusion map of version " + std::to_string(version) +
-                             ": this program reads versions 0 and 1");
+    throw std::runtime_error(fmt::format(
+        "an event fusion map of version {}: this program reads versions 0 and 1", version));
   }
   GlobalCloudOptions options;
   in >> genericMapParams >> options.voxel_size_m;
@@ -197,7 +195,7 @@ void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
   simple_points_.reset();
 }
 
-// --- Shown -----------------------------------------------------------------------------------
+// --- Showing ---------------------------------------------------------------------------------
 
 bool CEventFusionMap::isEmpty() const {
   return std::all_of(keyframes_.begin(), keyframes_.end(),
@@ -207,21 +205,21 @@ bool CEventFusionMap::isEmpty() const {
 std::string CEventFusionMap::asString() const {
   std::size_t points = 0;
   for (const StoredKeyframe& keyframe : keyframes_) points += keyframe.points->size();
-  return "event fusion map of " + std::to_string(cloud_.keyframes()) + " keyframes with " +
-         std::to_string(points) + " points in voxels of " +
-         textOf(OptionValue(cloud_.options().voxel_size_m)) + " m";
+  return fmt::format("event fusion map of {} keyframes with {} points in voxels of {} m",
+                     cloud_.keyframes(), points,
+                     textOf(OptionValue(cloud_.options().voxel_size_m)));
 }
 
 void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
   if (!genericMapParams.enableSaveAs3DObject) return;
   const std::vector<CloudPoint> points = cloud_.points();
-  // A few points are confident beyond all others: the scale ends where a twentieth is above it.
+  // The colour scale ends at the 95th percentile: a few points have far larger confidences.
   std::vector<float> sorted;
   sorted.reserve(points.size());
   for (const CloudPoint& point : points) sorted.push_back(point.confidence);
-  const std::size_t top = sorted.size() - sorted.size() / 20;
+  const std::size_t below = sorted.size() - sorted.size() / 20;
   std::sort(sorted.begin(), sorted.end());
-  const float scale = sorted.empty() ? 1.0F : sorted[top > 0 ? top - 1 : 0];
+  const float scale = sorted.empty() ? 1.0F : sorted[below > 0 ? below - 1 : 0];
 
   auto drawn = mrpt::opengl::CPointCloudColoured::Create();
   drawn->setPointSize(2);

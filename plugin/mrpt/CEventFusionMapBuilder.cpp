@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 
+#include <fmt/format.h>
 #include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationComment.h>
@@ -36,7 +37,7 @@ CameraPacket packetOf(const CObservationEvents& observation) {
   return packet;
 }
 
-/// What a step throws, if it does.
+/// The exception of a step; null if it throws none.
 template <typename Step>
 std::exception_ptr errorOf(Step step) {
   try {
@@ -47,7 +48,7 @@ std::exception_ptr errorOf(Step step) {
   return nullptr;
 }
 
-/// One point map of the exported points: MRPT's points are float32.
+/// The exported points as float32, as MRPT has points.
 mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& points) {
   auto map = mrpt::maps::CPointsMapXYZI::Create();
   map->resize(points.size());
@@ -60,7 +61,7 @@ mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& point
   return map;
 }
 
-/// Moves and adds keyframes of a map until they are these. @return whether anything had to be done.
+/// Moves and inserts keyframes of a map until they equal `keyframes`. @return whether it changed.
 bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
   bool changed = map.keyframes().size() < keyframes.size();
   for (std::size_t i = 0; i < map.keyframes().size(); ++i) {
@@ -110,9 +111,9 @@ EventFusionOptions CEventFusionMapBuilder::usedOptions() const {
   return options_;
 }
 
-void CEventFusionMapBuilder::setKeyframeTaker(KeyframeTaker taker) {
+void CEventFusionMapBuilder::setKeyframeCallback(KeyframeCallback callback) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  taker_ = std::move(taker);
+  callback_ = std::move(callback);
 }
 
 void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
@@ -127,13 +128,13 @@ void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>&
     if (finished_) throw std::logic_error("the builder was given an observation after its end");
     error = errorOf([&] { feed(*session_); });
   }
-  // What came before a refused observation is mapped all the same.
-  const std::exception_ptr mapping_error = errorOf([this] { mapDue(); });
+  // A refused observation does not stop the mapping of earlier ones.
+  const std::exception_ptr mapping_error = errorOf([this] { mapComplete(); });
   if (!error) error = mapping_error;
   if (error) std::rethrow_exception(error);
 }
 
-void CEventFusionMapBuilder::mapWhenAsked() const {
+void CEventFusionMapBuilder::mapForQuery() const {
   auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: see the declaration
   bool failed = false;
   {
@@ -141,19 +142,18 @@ void CEventFusionMapBuilder::mapWhenAsked() const {
     session_->completeEarly();
     failed = mapping_failed_;
   }
-  if (!failed) self->mapDue();  // a failure was said: now the map so far is asked for
+  if (!failed) self->mapComplete();  // otherwise the feeding caller got the error
   const std::lock_guard<std::mutex> lock(mutex_);
-  settle();
+  applyPending();
 }
 
-/// Brings cloud and keyframes to where the refinement has them by now, under the lock: whatever is
-/// asked for next agrees.
-void CEventFusionMapBuilder::settle() const {
+/// Moves cloud and keyframes to their refined poses, under the lock, so that all queries agree.
+void CEventFusionMapBuilder::applyPending() const {
   session_->applyPending();
-  const_cast<CEventFusionMapBuilder*>(this)->followRefinement();  // NOLINT: as in mapWhenAsked
+  const_cast<CEventFusionMapBuilder*>(this)->followRefinement();  // NOLINT: as in mapForQuery
 }
 
-/// The stored keyframes stand where those of the cloud do.
+/// Gives the stored keyframes the poses of the cloud's keyframes.
 void CEventFusionMapBuilder::followRefinement() {
   const std::vector<Rigid3>& T_world_ref = session_->T_world_ref();
   const std::size_t earlier = keyframes_.size() - T_world_ref.size();
@@ -162,14 +162,14 @@ void CEventFusionMapBuilder::followRefinement() {
   }
 }
 
-void CEventFusionMapBuilder::mapDue() {
-  while (const std::optional<MadeKeyframe> made = mapNext()) handOut(*made);
+void CEventFusionMapBuilder::mapComplete() {
+  while (const std::optional<MadeKeyframe> made = mapNext()) deliver(*made);
 }
 
 std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapNext() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  // Within a taker or the log: whoever called it maps on.
-  if (handing_out_.count(std::this_thread::get_id()) != 0) return std::nullopt;
+  // Within a callback: the caller of the callback goes on mapping.
+  if (delivering_.count(std::this_thread::get_id()) != 0) return std::nullopt;
   mapping_failed_ = true;
   std::optional<KeyframeDepthMap> keyframe = session_->next(sink_);
   mapping_failed_ = false;
@@ -178,34 +178,34 @@ std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapN
   if (!keyframe) return std::nullopt;
   newest_depth_ = keyframe->map.depth;
   std::vector<std::string> warnings = warningsOfSilence(*keyframe);
-  return MadeKeyframe{std::move(*keyframe), taker_, std::move(warnings)};
+  return MadeKeyframe{std::move(*keyframe), callback_, std::move(warnings)};
 }
 
-void CEventFusionMapBuilder::handOut(const MadeKeyframe& made) {
+void CEventFusionMapBuilder::deliver(const MadeKeyframe& made) {
   const auto self = std::this_thread::get_id();
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    handing_out_.insert(self);
+    delivering_.insert(self);
   }
   const std::exception_ptr error = errorOf([&] {
     for (const std::string& warning : made.warnings) MRPT_LOG_WARN(warning);
-    if (made.taker) made.taker(made.keyframe);
+    if (made.callback) made.callback(made.keyframe);
   });
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    handing_out_.erase(self);
+    delivering_.erase(self);
   }
   if (error) std::rethrow_exception(error);
 }
 
-/// Once per camera: `status` counts the rest.
+/// One warning per camera. `status` counts the silent keyframes.
 std::vector<std::string> CEventFusionMapBuilder::warningsOfSilence(
     const KeyframeDepthMap& keyframe) {
   std::vector<std::string> warnings;
   for (const int camera : keyframe.silent_cameras) {
     if (!silent_cameras_.insert(camera).second) continue;
-    warnings.push_back("camera " + std::to_string(camera) + " had no event for the keyframe at " +
-                       formatSeconds(keyframe.window.t_ref_ns) + " s");
+    warnings.push_back(fmt::format("camera {} had no event for the keyframe at {} s", camera,
+                                   formatSeconds(keyframe.window.t_ref_ns)));
   }
   return warnings;
 }
@@ -245,13 +245,13 @@ std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
 
 std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  settle();
+  applyPending();
   return session_->cloud().points();
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  settle();
+  applyPending();
   return keyframePoses();
 }
 
@@ -332,20 +332,20 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
 }
 
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
-  mapWhenAsked();
+  mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   out_map.clear();
   for (const StoredKeyframe& keyframe : keyframes_) insertInto(out_map, keyframe);
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
-  mapWhenAsked();
+  mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   return static_cast<unsigned int>(keyframes_.size());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
-  mapWhenAsked();
+  mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(options_.cloud);
   const bool changed = bringUpToDate(*event_map_, keyframes_);
@@ -359,7 +359,7 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
-  mapWhenAsked();
+  mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (newest_depth_.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(newest_depth_, options_.mapper.keyframe.planes);

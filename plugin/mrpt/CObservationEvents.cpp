@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/CObservationEvents.h"
 
+#include <fmt/format.h>
 #include <mrpt/serialization/CArchive.h>
 #include <mrpt/serialization/archiveFrom_std_vector.h>
 #include <zlib.h>
@@ -21,7 +22,7 @@ namespace {
 
 using mrpt::serialization::CArchive;
 
-/// A packet larger than this is refused: MRPT's archives in memory count bytes in int.
+/// The maximum size of a packet: MRPT's archives in memory count bytes in int.
 constexpr std::size_t kMaxContentBytes = std::size_t{1} << 30;
 
 std::uint32_t checksumOf(const std::vector<std::uint8_t>& bytes) {
@@ -45,14 +46,14 @@ CameraModel readCamera(CArchive& in) {
   return camera;
 }
 
-/// Reads as many bytes as announced, but never reserves more than have really come.
+/// Reads `size` bytes in pieces: a wrong size must not reserve all memory.
 std::vector<std::uint8_t> readBytes(CArchive& in, std::size_t size) {
   constexpr std::size_t kPiece = std::size_t{1} << 20;
   std::vector<std::uint8_t> bytes;
   while (bytes.size() < size) {
     const std::size_t piece = std::min(kPiece, size - bytes.size());
     bytes.resize(bytes.size() + piece);
-    // A short read is no error to MRPT.
+    // MRPT does not treat a short read as an error.
     if (in.ReadBuffer(bytes.data() + bytes.size() - piece, piece) != piece) {
       throw std::runtime_error("it ends too early");
     }
@@ -69,8 +70,8 @@ void CObservationEvents::serializeTo(CArchive& out) const {
   auto archive = mrpt::serialization::archiveFrom(content);
   writeContent(archive);
   if (content.size() > kMaxContentBytes) {
-    throw std::length_error("a packet of " + std::to_string(events.size()) +
-                            " events is too large: expected at most 1 GiB");
+    throw std::length_error(
+        fmt::format("a packet of {} events is too large: expected at most 1 GiB", events.size()));
   }
   out.WriteAs<std::uint32_t>(content.size());
   out << checksumOf(content);
@@ -79,8 +80,8 @@ void CObservationEvents::serializeTo(CArchive& out) const {
 
 void CObservationEvents::serializeFrom(CArchive& in, std::uint8_t version) {
   if (version != 0) {
-    throw std::runtime_error("events of version " + std::to_string(version) +
-                             ": this program reads version 0");
+    throw std::runtime_error(
+        fmt::format("events of version {}: this program reads version 0", version));
   }
   try {
     const auto size = in.ReadAs<std::uint32_t>();
@@ -151,8 +152,8 @@ std::string CObservationEvents::exportTxtHeader() const {
 std::string CObservationEvents::exportTxtDataRow() const {
   std::string row = std::to_string(events.size());
   for (const Event& event : events) {
-    row += ' ' + formatSeconds(event.t_ns) + ' ' + std::to_string(event.x) + ' ' +
-           std::to_string(event.y) + (event.polarity ? " 1" : " 0");
+    row += fmt::format(" {} {} {} {}", formatSeconds(event.t_ns), event.x, event.y,
+                       event.polarity ? 1 : 0);
   }
   return row;
 }

@@ -13,39 +13,38 @@
 #include "mapping/events/event.h"
 #include "mapping/geometry/camera.h"
 
-// Visualizable's destructor is not virtual; nobody deletes an observation as one.
+// Visualizable's destructor is not virtual. Nobody deletes an observation through it.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wnon-virtual-dtor"
 
 namespace efm {
 
-/// A packet of events of one camera of the rig, with that camera's calibration and pose, so that a
-/// rawlog needs nothing beside it. By convention `sensorLabel` is "cam0", "cam1", …
+/// A packet of events of one camera of the rig, with the camera's calibration and pose: a rawlog
+/// needs no calibration file. By convention `sensorLabel` is "cam0", "cam1", …
 ///
-/// Event times are integer nanoseconds of the recording's own clock, exact; `timestamp` is the
-/// packet's first time rounded to MRPT's tick. Stored at about 3 bytes per event, under a checksum:
-/// a packet that was damaged is an error when it is read, not other events.
+/// Event times are exact, in integer nanoseconds of the recording's own clock. `timestamp` is the
+/// packet's first time, rounded to MRPT's tick. A stored packet has about 3 bytes per event and a
+/// checksum: reading a damaged packet is an error.
 class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::Visualizable {
   DEFINE_SERIALIZABLE(CObservationEvents, efm)
 
  public:
   int camera_index = 0;              ///< In the rig, 0 to 65,535.
-  CameraModel camera;                ///< Calibration: the same in all packets of a camera.
+  CameraModel camera;                ///< Calibration, the same in all packets of a camera.
   mrpt::poses::CPose3D camera_pose;  ///< T_rig_cam (MRPT's robot is the rig).
   std::vector<Event> events;         ///< In time order.
-  /// Where given, everything that the camera saw before this time is in this packet or was in one
-  /// before it: so an empty packet says that there was nothing.
+  /// All events of the camera before this time are in this packet or in earlier ones. So an empty
+  /// packet with this time says that there was no event.
   std::optional<std::int64_t> covered_until_ns;
 
   void getSensorPose(mrpt::poses::CPose3D& out_pose) const override { out_pose = camera_pose; }
   void setSensorPose(const mrpt::poses::CPose3D& pose) override { camera_pose = pose; }
   void getDescriptionAsText(std::ostream& stream) const override;
-  /// As plugin/event_drawing.h says; what RawLogViewer shows in its 3D tab.
+  /// RawLogViewer's 3D view of the packet: see plugin/mrpt/event_drawing.h.
   void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;
 
   /// For `rawlog-edit --export-txt`, which writes a line per packet: the number of events, then
-  /// four columns per event: its time in seconds of the recording's clock, x, y and polarity (0 or
-  /// 1).
+  /// four columns per event: time in seconds of the recording's clock, x, y, polarity (0 or 1).
   bool exportTxtSupported() const override { return true; }
   std::string exportTxtHeader() const override;
   std::string exportTxtDataRow() const override;

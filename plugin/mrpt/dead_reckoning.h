@@ -8,17 +8,18 @@
 
 namespace efm {
 
-/// The label of poses that were composed from actions; see `poseSourceOf`.
+/// The label of poses that are composed from actions; see `poseSourceOf`.
 inline constexpr const char* kActionsLabel = "actions";
 
-/// Where the movements that actions tell of lead, from the identity on.
+/// Composes the movements of actions to a pose, starting at the identity.
 class DeadReckoning {
  public:
-  /// Adds the first movement of the action, CActionRobotMovement2D or 3D: the mean of its change of
-  /// pose. Other actions do not matter.
-  /// @param frame what was seen after the movement, whose time counts where that has none.
-  /// @return the pose after it, CObservationRobotPose "actions"; null where nothing moved.
-  /// @throws std::invalid_argument where neither has a time.
+  /// Adds the mean pose change of the first CActionRobotMovement2D or 3D. Other actions have no
+  /// effect.
+  /// @param frame the observations after the movement. Its time is used if the movement has none.
+  /// @return the pose after the movement, a CObservationRobotPose labelled "actions"; null without
+  /// a movement.
+  /// @throws std::invalid_argument if neither has a time.
   mrpt::obs::CObservation::Ptr poseAfter(const mrpt::obs::CActionCollection& action,
                                          const mrpt::obs::CSensoryFrame& frame);
 

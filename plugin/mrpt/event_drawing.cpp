@@ -16,14 +16,14 @@ namespace {
 
 using mrpt::math::TPoint3D;
 
-/// Where a pixel lies on the drawn image plane, in the camera's frame.
+/// The position of a pixel on the drawn image plane, in the camera's frame.
 TPoint3D onImagePlane(const CameraModel& camera, double x, double y) {
   return {(x - camera.cx) / camera.fx * kDrawnPlaneM, (y - camera.cy) / camera.fy * kDrawnPlaneM,
           kDrawnPlaneM};
 }
 
-mrpt::opengl::CRenderizable::Ptr pyramidOf(const CameraModel& camera) {
-  const double right = camera.width - 0.5;  // pixels are centred on whole numbers
+mrpt::opengl::CRenderizable::Ptr frustumOf(const CameraModel& camera) {
+  const double right = camera.width - 0.5;  // integer coordinates are pixel centres
   const double bottom = camera.height - 0.5;
   const std::array<TPoint3D, 4> corners = {
       onImagePlane(camera, -0.5, -0.5), onImagePlane(camera, right, -0.5),
@@ -60,7 +60,7 @@ void drawEvents(const CObservationEvents& packet, mrpt::opengl::CSetOfObjects& o
   auto camera = mrpt::opengl::CSetOfObjects::Create();
   camera->setPose(packet.camera_pose);
   camera->insert(mrpt::opengl::stock_objects::CornerXYZSimple(0.5F, 2.0F));
-  camera->insert(pyramidOf(packet.camera));
+  camera->insert(frustumOf(packet.camera));
   camera->insert(pointsOf(packet));
   out.insert(camera);
 }

@@ -11,14 +11,14 @@ namespace efm {
 
 class CObservationEvents;
 
-/// A packet with more events is drawn with this many, evenly spaced in it.
+/// The maximum number of drawn events of a packet. Of more events, an even selection is drawn.
 inline constexpr std::size_t kMaxDrawnEvents = 50'000;
-/// Where the image plane is drawn. A viewer for vehicles shows some twenty metres at first.
+/// The distance of the drawn image plane, for a viewer whose first view spans some twenty metres.
 inline constexpr double kDrawnPlaneM = 3;
 
-/// Draws a packet where its camera stands on the rig: the axes of the camera, its pyramid of view
-/// up to the image plane at z = kDrawnPlaneM, and there a point for each event, red where it became
-/// brighter and blue where it became darker. The image is the sensor's own: it is not undistorted.
+/// Draws a packet at its camera's pose on the rig: the axes of the camera, its view frustum up to
+/// the image plane at z = kDrawnPlaneM, and a point on this plane for each event: ON red, OFF blue.
+/// The image is not undistorted.
 void drawEvents(const CObservationEvents& packet, mrpt::opengl::CSetOfObjects& out);
 
 }  // namespace efm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/event_encoding.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <string>
@@ -20,7 +22,7 @@ void putVarint(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
   bytes.push_back(static_cast<std::uint8_t>(value));
 }
 
-/// Bytes in order, with an error instead of a read past the end.
+/// Reads bytes in order. A read past the end is an error.
 class ByteReader {
  public:
   explicit ByteReader(const std::vector<std::uint8_t>& bytes) : bytes_(bytes) {}
@@ -47,7 +49,7 @@ class ByteReader {
   std::size_t at_ = 0;
 };
 
-/// Differences of times wrap around as unsigned numbers do: any two times have one.
+/// Time differences wrap around as unsigned numbers do, so any two times have a difference.
 std::int64_t stepBetween(std::int64_t from_ns, std::int64_t to_ns) {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(to_ns) -
                                    static_cast<std::uint64_t>(from_ns));
@@ -64,7 +66,7 @@ std::int64_t advance(std::int64_t t_ns, std::int64_t steps, std::int64_t tick_ns
                                        static_cast<std::uint64_t>(tick_ns));
 }
 
-/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...: small steps stay short, whatever their sign.
+/// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...: small steps of both signs have few bytes.
 std::uint64_t zigzag(std::int64_t value) {
   return (static_cast<std::uint64_t>(value) << 1) ^ (value < 0 ? ~std::uint64_t{0} : 0);
 }
@@ -109,8 +111,8 @@ std::vector<Event> decodeEvents(const std::vector<std::uint8_t>& bytes, std::siz
   std::vector<Event> events;
   if (count == 0 && bytes.empty()) return events;
   if (const std::uint8_t encoding = reader.byte(); encoding != kColumns) {
-    throw std::runtime_error("encoded events: encoding " + std::to_string(encoding) +
-                             ", this program knows 1");
+    throw std::runtime_error(
+        fmt::format("encoded events: encoding {}, this program knows 1", encoding));
   }
   const std::uint8_t tick = reader.byte();
   // Each event takes 4 bytes of coordinates at least.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/host_options.h"
 
+#include <fmt/format.h>
 #include <mrpt/config/CConfigFile.h>
 
 #include <algorithm>
@@ -11,13 +12,13 @@
 namespace efm {
 namespace {
 
-/// Empty where the source is none.
+/// Empty if the source is no file.
 std::filesystem::path fileOf(const mrpt::config::CConfigFileBase& source) {
   const auto* file = dynamic_cast<const mrpt::config::CConfigFile*>(&source);
   return file ? file->getAssociatedFile() : std::string();
 }
 
-/// MRPT takes a missing file for an empty one.
+/// MRPT treats a missing file as an empty one.
 void requireFile(const mrpt::config::CConfigFileBase& source) {
   const std::filesystem::path file = fileOf(source);
   if (file.empty() || std::filesystem::exists(file)) return;
@@ -50,7 +51,7 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
   std::vector<std::string> keys;
   source.getAllKeys(host_section, keys);
   OptionOrigin origin{placeIn(source, host_section), {}};
-  // Absolute, so that what is saved elsewhere names the same files.
+  // Absolute, so that options saved to another folder name the same files.
   const std::filesystem::path file = fileOf(source);
   if (!file.empty()) origin.folder = std::filesystem::absolute(file).parent_path();
   for (const std::string& key : keys) {
@@ -64,8 +65,9 @@ void readHostOptions(const mrpt::config::CConfigFileBase& source, const std::str
   if (!prefix.empty()) {
     const std::vector<std::string> ours = sectionsBelow(source, prefix);
     if (ours.empty()) {
-      throw std::invalid_argument(nameOf(source) + ": no section begins with " + prefix +
-                                  "_: expected sections such as [" + prefix + "_dsi]");
+      throw std::invalid_argument(
+          fmt::format("{}: no section begins with {}_: expected sections such as [{}_dsi]",
+                      nameOf(source), prefix, prefix));
     }
     for (const std::string& section : ours) {
       readHostSection(source, section, section.substr(prefix.size() + 1), reader);

@@ -9,8 +9,8 @@
 namespace efm {
 
 Rigid3 rigidFrom(const mrpt::poses::CPose3D& pose) {
-  // From the matrix: getAsQuaternion goes through the angles, which near a pitch of 90 degrees
-  // loses up to half of the digits.
+  // From the matrix: getAsQuaternion uses the angles and loses up to half of the digits near a
+  // pitch of 90 degrees.
   const Eigen::Matrix3d rotation = pose.getRotationMatrix().asEigen();
   return {Eigen::Quaterniond(rotation).normalized(), {pose.x(), pose.y(), pose.z()}};
 }

@@ -11,14 +11,14 @@ class CPose3DPDFGaussian;
 
 namespace efm {
 
-/// MRPT keeps a pose as a rotation matrix beside angles, and stores it as a quaternion: both ways
-/// are exact to some 1e-15, at any rotation.
+/// Converts to and from MRPT's poses, exact to about 1e-15 at any rotation: through MRPT's rotation
+/// matrix and quaternion, not through its angles.
 Rigid3 rigidFrom(const mrpt::poses::CPose3D& pose);
 mrpt::poses::CPose3D mrptPoseFrom(const Rigid3& T_a_b);
 
-/// A pose with the covariance of a small motion of it: a translation along the axes of a, then a
-/// rotation vector about them, as `poseCovariance` gives it. MRPT's is that of x, y, z, yaw, pitch
-/// and roll.
+/// A pose with covariance. MRPT's covariance is of x, y, z, yaw, pitch and roll.
+/// @param covariance of a small motion of the pose: a translation along the axes of a, then a
+/// rotation vector about them, as `poseCovariance` returns it.
 mrpt::poses::CPose3DPDFGaussian mrptPoseFrom(const Rigid3& T_a_b, const Matrix6d& covariance);
 
 }  // namespace efm

@@ -10,11 +10,11 @@
 
 namespace efm {
 
-/// MRPT's clock counts ticks of 100 ns since 1601; the recording's clock is taken for Unix time.
+/// MRPT's clock counts ticks of 100 ns since 1601. The recording's clock counts as Unix time.
 inline constexpr std::int64_t kMrptTickNs = 100;
 inline constexpr std::int64_t kMrptTicksAtUnixEpoch = 116'444'736'000'000'000;
 
-/// The tick nearest to a time: at most 50 ns away.
+/// The nearest tick, at most 50 ns away.
 inline mrpt::Clock::time_point mrptTimeFrom(std::int64_t t_ns) {
   std::int64_t ticks = t_ns / kMrptTickNs;
   const std::int64_t rest_ns = t_ns % kMrptTickNs;
@@ -23,8 +23,8 @@ inline mrpt::Clock::time_point mrptTimeFrom(std::int64_t t_ns) {
   return mrpt::Clock::time_point(mrpt::Clock::duration(ticks + kMrptTicksAtUnixEpoch));
 }
 
-/// Exact. @return nothing where there is no time (INVALID_TIMESTAMP, 0 ticks), or one that
-/// nanoseconds do not reach: before 1677 or after 2262.
+/// Exact. @return nothing for INVALID_TIMESTAMP (0 ticks) and outside the range of nanoseconds:
+/// before 1677 or after 2262.
 inline std::optional<std::int64_t> nanosecondsIfKnown(const mrpt::Clock::time_point& time) {
   constexpr std::int64_t kMaxTicks = std::numeric_limits<std::int64_t>::max() / kMrptTickNs;
   const std::int64_t ticks = time.time_since_epoch().count();
@@ -34,7 +34,7 @@ inline std::optional<std::int64_t> nanosecondsIfKnown(const mrpt::Clock::time_po
   return (ticks - kMrptTicksAtUnixEpoch) * kMrptTickNs;
 }
 
-/// Exact. @throws std::invalid_argument where `nanosecondsIfKnown` gives nothing.
+/// Exact. @throws std::invalid_argument if `nanosecondsIfKnown` returns nothing.
 inline std::int64_t nanosecondsFrom(const mrpt::Clock::time_point& time) {
   const std::optional<std::int64_t> t_ns = nanosecondsIfKnown(time);
   if (!t_ns) throw std::invalid_argument("a time stamp is missing or not between 1678 and 2261");

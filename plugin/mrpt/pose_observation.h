@@ -11,30 +11,30 @@
 
 namespace efm {
 
-/// A pose as an observation brings it.
+/// The pose of an observation.
 struct ObservedPose {
   std::int64_t t_ns = 0;
-  Rigid3 T_world_body;  ///< Of what was tracked.
-  Rigid3 T_body_rig;    ///< As the observation says; the identity where it does not.
-  /// What the tracker says of its noise: the size of its covariance, not its shape. None where that
-  /// is zero or no covariance.
+  Rigid3 T_world_body;  ///< Of the tracked body.
+  Rigid3 T_body_rig;    ///< The identity if the observation does not have it.
+  /// The mean standard deviations of the tracker's covariance. None if the covariance is zero or
+  /// not valid.
   std::optional<PoseNoise> noise = std::nullopt;
 };
 
-/// Who says a pose: a CObservationRobotPose (one that is labelled "actions" was composed from them)
-/// or a CObservationOdometry. @return nothing where the observation is neither.
+/// The source of a pose: a CObservationRobotPose (with the label "actions": composed from actions)
+/// or a CObservationOdometry. @return nothing for other observations.
 std::optional<PoseSourceId> poseSourceOf(const mrpt::obs::CObservation& observation);
 
-/// What a pose's observation says: T_world_body is its pose, T_body_rig the inverse of its sensor's
-/// pose on the robot; odometry is a pose in the plane z = 0, of which velocities do not matter.
-/// @return nothing where it is none. @throws std::invalid_argument where it has no time.
+/// The pose of an observation: T_world_body is its pose, T_body_rig the inverse of its sensor's
+/// pose on the robot. Odometry is a pose in the plane z = 0.
+/// @return nothing for other observations. @throws std::invalid_argument if it has no time.
 std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation);
 
-/// As a CObservationRobotPose. MRPT rounds its time to 100 ns: at 300 px/s, 1.5e-5 px.
+/// Makes a CObservationRobotPose. MRPT rounds its time to 100 ns: 1.5e-5 px at 300 px/s.
 mrpt::obs::CObservation::Ptr poseObservation(const ObservedPose& pose, const std::string& label);
 
-/// Says where the rig is on the tracked body, in place of what a pose's observation says.
-/// CObservationOdometry cannot hold it and stays as it is.
+/// Replaces the pose of the rig on the tracked body. CObservationOdometry has none and stays as it
+/// is.
 void setBodyToRig(mrpt::obs::CObservation& pose, const Rigid3& T_body_rig);
 
 }  // namespace efm

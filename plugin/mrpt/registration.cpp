@@ -22,7 +22,7 @@ void registerClasses() {
 
 namespace {
 
-/// At load. Class ids are constants: the order in which files are initialised does not matter.
+/// Registers at load. Class ids are constants, so the order of static initialisation has no effect.
 const struct AtLoad {
   AtLoad() { registerClasses(); }
 } kAtLoad;

@@ -3,9 +3,9 @@
 
 namespace efm {
 
-/// Makes the project's MRPT classes known, so that they can be read from rawlogs and made by name.
-/// Loading the library does it too; a program that is linked to it calls this once, so that the
-/// linker does not leave the library out. May be called again.
+/// Registers the project's MRPT classes, so that MRPT reads them from rawlogs and makes them by
+/// name. Loading the library does this, too. A program that links the library calls it once, so
+/// that the linker keeps the library. Further calls have no effect.
 void registerClasses();
 
 }  // namespace efm

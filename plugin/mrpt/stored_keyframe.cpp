@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/stored_keyframe.h"
 
+#include <fmt/format.h>
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
 
@@ -51,7 +52,7 @@ std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observ
                                            const Rigid3& T_world_rig) {
   const auto* seen = dynamic_cast<const CObservationPointCloud*>(&observation);
   if (!seen) return std::nullopt;
-  seen->load();  // its points may lie in a file beside
+  seen->load();  // its points may be in an external file
   const auto cloud = std::dynamic_pointer_cast<CPointsMapXYZI>(seen->pointcloud);
   if (!cloud) return std::nullopt;
   const std::int64_t t_ns =
@@ -81,8 +82,10 @@ std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map) {
       if (auto keyframe = keyframeFrom(*observation, T_world_rig)) keyframes.push_back(*keyframe);
     }
     if (keyframes.size() == before) {
-      throw std::invalid_argument("frame " + std::to_string(index) + " of the simplemap holds no " +
-                                  "point cloud with intensities: it is no keyframe of a map");
+      throw std::invalid_argument(
+          fmt::format("frame {} of the simplemap holds no point cloud with intensities: it is no "
+                      "keyframe of a map",
+                      index));
     }
     ++index;
   }

@@ -15,35 +15,35 @@
 
 namespace efm {
 
-/// What stays of a keyframe: its points as its reference view sees them, float, and where the view
-/// stood. 16 bytes a point. Put into the world it gives the points of the map again, bit for bit.
+/// The points of a keyframe in its reference view, and the pose of the view. 16 bytes a point.
+/// Transformed to the world, they are the points of the map again, bit for bit.
 struct StoredKeyframe {
   std::int64_t t_ref_ns = 0;
   Rigid3 T_world_ref;
-  /// Frame `ref`, intensity = confidence; never null, shared by whoever shows it, never changed.
+  /// In frame `ref`, float, intensity = confidence. Never null; shared and never changed.
   mrpt::maps::CPointsMapXYZI::Ptr points;
 };
 
-/// @param points the keyframe's, as they went into the map.
+/// @param points the keyframe's points in the map.
 StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
                               const std::vector<ViewPoint>& points);
 
-/// The points of a cloud that weigh something. MRPT's clouds may hold points of intensity 0.
+/// The points of a cloud with a confidence. (MRPT's clouds may have points of intensity 0.)
 std::vector<ViewPoint> viewPointsOf(const mrpt::maps::CPointsMapXYZI& cloud);
 /// p_world = T_world_ref * p_ref.
 std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe);
 
-/// A cloud of MRPT's own with positions and intensities, seen from the robot at a pose.
-/// @return nothing where it is no such observation.
+/// A keyframe from an observation of a point cloud with intensities.
+/// @return nothing for other observations.
 std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,
                                            const Rigid3& T_world_rig);
 
-/// Adds the keyframe to a simplemap as classes of MRPT's own, so that any MRPT program reads it:
-/// the view's pose in the world without covariance, and a frame with one CObservationPointCloud,
-/// labelled "keyframe", at t_ref (rounded to MRPT's tick), whose sensor stands at that pose.
+/// Adds the keyframe to a simplemap in MRPT's own classes, for any MRPT program: the view's pose in
+/// the world without covariance, and a frame with one CObservationPointCloud. Its label is
+/// "keyframe", its time t_ref (rounded to MRPT's tick), its sensor pose the identity.
 void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe);
-/// The keyframes of a simplemap: a frame may hold several.
-/// @throws std::invalid_argument naming the first frame without any.
+/// The keyframes of a simplemap. A frame may have several.
+/// @throws std::invalid_argument naming the first frame without a keyframe.
 std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map);
 
 }  // namespace efm

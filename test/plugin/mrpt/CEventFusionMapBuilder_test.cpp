@@ -35,14 +35,6 @@ std::vector<CloudPoint> mapOf(const std::vector<CObservation::Ptr>& observations
   return builder.points();
 }
 
-void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].p_world, b[i].p_world);
-    EXPECT_EQ(a[i].confidence, b[i].confidence);
-  }
-}
-
 TEST(CEventFusionMapBuilder, TurnsObservationsIntoAMapOfTheWorld) {
   const auto points = mapOf(observationsOf(SyntheticRecording()), syntheticOptions());
 
@@ -71,7 +63,7 @@ TEST(CEventFusionMapBuilder, ThreadsOfTheSweepDoNotChangeTheMap) {
 TEST(CEventFusionMapBuilder, KeyframesAreHandedOutOnceAndInOrder) {
   CEventFusionMapBuilder builder(syntheticOptions());
   std::vector<std::int64_t> times;
-  builder.setKeyframeTaker([&](const KeyframeDepthMap& keyframe) {
+  builder.setKeyframeCallback([&](const KeyframeDepthMap& keyframe) {
     times.push_back(keyframe.window.t_ref_ns);
     EXPECT_GE(builder.status().counts.keyframes, times.size()) << "the taker may use the builder";
   });
@@ -220,7 +212,7 @@ TEST(CEventFusionMapBuilder, KeyframesThatWereMadeBeforeMappingFailsStayAndAreHa
   CEventFusionMapBuilder builder(syntheticOptions());
   builder.setDsiSink(&disk);
   std::size_t taken = 0;
-  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++taken; });
   for (const auto& observation : observationsOf(SyntheticRecording())) {
     builder.processObservation(observation);
   }
@@ -259,12 +251,12 @@ TEST(CEventFusionMapBuilder, ARefusalIsSaidThoughMappingFailsToo) {
 
 TEST(CEventFusionMapBuilder, ATakerThatThrowsDoesNotStopTheMap) {
   CEventFusionMapBuilder builder(syntheticOptions());
-  builder.setKeyframeTaker([](const KeyframeDepthMap&) { throw std::runtime_error("no room"); });
+  builder.setKeyframeCallback([](const KeyframeDepthMap&) { throw std::runtime_error("no room"); });
   for (const auto& observation : observationsOf(SyntheticRecording())) {
     builder.processObservation(observation);
   }
   EXPECT_THROW(builder.finish(), std::runtime_error);
-  builder.setKeyframeTaker(nullptr);
+  builder.setKeyframeCallback(nullptr);
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
 }
 
@@ -273,7 +265,7 @@ TEST(CEventFusionMapBuilder, EachKeyframeIsHandedOutBeforeTheNextIsMade) {
   std::vector<CObservation::Ptr> poses;
   CEventFusionMapBuilder builder(syntheticOptions());
   std::size_t taken = 0;
-  builder.setKeyframeTaker([&](const KeyframeDepthMap&) {
+  builder.setKeyframeCallback([&](const KeyframeDepthMap&) {
     ++taken;
     EXPECT_EQ(builder.status().counts.keyframes, taken);
     EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), taken) << "the map up to this keyframe";
@@ -301,7 +293,7 @@ TEST(CEventFusionMapBuilder, SeveralThreadsMayFeed) {
   const auto observations = observationsOf(SyntheticRecording(0.9));
   CEventFusionMapBuilder builder(syntheticOptions());
   std::atomic<std::size_t> taken = 0;
-  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++taken; });
   for (const auto& observation : observations) {
     if (IS_CLASS(*observation, mrpt::obs::CObservationRobotPose)) {
       builder.processObservation(observation);
@@ -422,7 +414,7 @@ TEST(CEventFusionMapBuilder, AskedForTheMapMapsWhatIsCoveredOfAShortRecording) {
   const auto observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(syntheticOptions());
   std::size_t taken = 0;
-  builder.setKeyframeTaker([&](const KeyframeDepthMap&) { ++taken; });
+  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++taken; });
   for (const auto& observation : observations) builder.processObservation(observation);
   EXPECT_TRUE(builder.points().empty()) << "half a second, and nobody asked";
 

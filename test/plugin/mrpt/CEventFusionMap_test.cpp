@@ -16,6 +16,7 @@
 
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/registration.h"
+#include "test/plugin/mrpt/observations.h"
 #include "test/plugin/programs/pcd_points.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -62,14 +63,7 @@ CEventFusionMap mapOf(unsigned keyframes, const GlobalCloudOptions& options = bi
 }
 
 void expectSamePoints(const CEventFusionMap& a, const CEventFusionMap& b) {
-  const std::vector<CloudPoint> points_a = a.cloud().points();
-  const std::vector<CloudPoint> points_b = b.cloud().points();
-  ASSERT_EQ(points_a.size(), points_b.size());
-  for (std::size_t i = 0; i < points_a.size(); ++i) {
-    EXPECT_EQ(points_a[i].p_world, points_b[i].p_world);
-    EXPECT_EQ(points_a[i].confidence, points_b[i].confidence);
-    EXPECT_EQ(points_a[i].support, points_b[i].support);
-  }
+  expectSameBits(a.cloud().points(), b.cloud().points());
 }
 
 template <typename Object>

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <gtest/gtest.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 
 #include <vector>
 
+#include "maps/cloud/cloud_point.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
@@ -45,6 +47,15 @@ inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(
     observations.push_back(robot);
   }
   return observations;
+}
+
+inline void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].p_world, b[i].p_world);
+    EXPECT_EQ(a[i].confidence, b[i].confidence);
+    EXPECT_EQ(a[i].support, b[i].support);
+  }
 }
 
 /// A packet of camera 0 after the recording's end, with an event beside the sensor.

@@ -36,15 +36,6 @@ void feed(CEventFusionMapBuilder& builder, const Observations& observations) {
   for (const auto& observation : observations) builder.processObservation(observation);
 }
 
-void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].p_world, b[i].p_world);
-    EXPECT_EQ(a[i].confidence, b[i].confidence);
-    EXPECT_EQ(a[i].support, b[i].support);
-  }
-}
-
 void expectSamePoses(const std::vector<StampedPose>& a, const std::vector<StampedPose>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -97,7 +88,7 @@ TEST(RefinedBuilder, AllThatItIsAskedForAgreesAtAnyTime) {
 TEST(RefinedBuilder, AllThatItIsAskedForAgreesWithinATaker) {
   CEventFusionMapBuilder builder(optionsOf(false));
   std::size_t taken = 0;
-  builder.setKeyframeTaker([&](const KeyframeDepthMap& keyframe) {
+  builder.setKeyframeCallback([&](const KeyframeDepthMap& keyframe) {
     expectToAgree(builder, taken++ % 2 == 0);
     const StampedPose newest = builder.trajectory().back();
     EXPECT_EQ(newest.t_ns, keyframe.window.t_ref_ns);
