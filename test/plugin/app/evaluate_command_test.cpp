@@ -31,7 +31,7 @@ class EvaluateCommand : public MapCommand {
   void writeTrueDepths() const {
     std::filesystem::create_directories(folder() / "data" / "depth");
     std::ofstream index(folder() / "data" / "depth" / "index.txt");
-    for (const StampedPose& pose : readTumTrajectory(folder() / "out" / "trajectory.txt")) {
+    for (const StampedPose& pose : posesIn("out")) {
       index << formatSeconds(pose.t_ns) << " plane.tiff\n";
     }
     writePlane(folder() / "data" / "depth" / "plane.tiff");
@@ -54,15 +54,9 @@ class EvaluateCommand : public MapCommand {
     EXPECT_THAT(result.err, IsEmpty());
     return json::parse(result.out);
   }
-  std::string refusal(const std::string& arguments) const {
-    const Result result = run(arguments);
-    EXPECT_NE(result.status, 0) << arguments;
-    EXPECT_THAT(result.out, IsEmpty());
-    return result.err;
-  }
 };
 
-TEST_F(EvaluateCommand, HoldsTheMapsOfARecordingAgainstItsFolder) {
+TEST_F(EvaluateCommand, ComparesTheMapsOfARecordingWithItsFolder) {
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
   writeTrueDepths();
 
@@ -71,7 +65,7 @@ TEST_F(EvaluateCommand, HoldsTheMapsOfARecordingAgainstItsFolder) {
   EXPECT_THAT(table.out,
               AllOf(HasSubstr("mean of maps"), HasSubstr("precision %"),
                     HasSubstr("bad-pix with focal length 100.00 px and baseline 0.1000 m")));
-  EXPECT_GT(cv::imread((folder() / "depth.png").string()).rows, 400);
+  EXPECT_GT(image("depth.png").rows, 400);
 
   const json errors = jsonOf("evaluate depth out data");
   EXPECT_EQ(errors["maps"].size(), 3U);
@@ -83,7 +77,7 @@ TEST_F(EvaluateCommand, HoldsTheMapsOfARecordingAgainstItsFolder) {
   EXPECT_EQ(errors["without_truth"], 0);
 }
 
-TEST_F(EvaluateCommand, HoldsOneDepthMapAgainstAFile) {
+TEST_F(EvaluateCommand, ComparesOneDepthMapWithAFile) {
   ASSERT_EQ(run("depth rig.ini data --out one --t0 10.1 --t1 10.3").status, 0);
   writePlane(folder() / "truth.tiff");
 
@@ -100,10 +94,10 @@ TEST_F(EvaluateCommand, HoldsOneDepthMapAgainstAFile) {
   const json half = jsonOf("evaluate depth one truth.tiff --mask mask.png");
   EXPECT_LT(half["all"]["points"], whole["all"]["points"]);
   EXPECT_EQ(half["truths"], 90 * 60);
-  EXPECT_THAT(refusal("evaluate depth one truth.tiff --max-depth 0.5"), HasSubstr("no pixel"));
+  EXPECT_THAT(errorOf("evaluate depth one truth.tiff --max-depth 0.5"), HasSubstr("no pixel"));
 }
 
-TEST_F(EvaluateCommand, HoldsTheCloudAgainstTheSurfaces) {
+TEST_F(EvaluateCommand, ComparesTheCloudWithTheSurfaces) {
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
   writeTrueCloud();
   const json errors = jsonOf("evaluate map out data --distances 0.1,0.5");
@@ -115,13 +109,13 @@ TEST_F(EvaluateCommand, HoldsTheCloudAgainstTheSurfaces) {
       run("evaluate map out/map.pcd data/gt_cloud.ply --to-find out/map.pcd --plot map.png");
   EXPECT_EQ(table.status, 0) << table.err;
   EXPECT_THAT(table.out, AllOf(HasSubstr("outliers %"), HasSubstr("100.00")));
-  EXPECT_FALSE(cv::imread((folder() / "map.png").string()).empty());
+  EXPECT_FALSE(image("map.png").empty());
 }
 
-TEST_F(EvaluateCommand, HoldsTheKeyframesTrajectoryAgainstThePoses) {
+TEST_F(EvaluateCommand, ComparesTheKeyframesTrajectoryWithThePoses) {
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
   // The rig moves along a line: least squares cannot say how it is turned about that.
-  EXPECT_THAT(refusal("evaluate trajectory out data"),
+  EXPECT_THAT(errorOf("evaluate trajectory out data"),
               AllOf(HasSubstr("positions lie on a line"), HasSubstr("--align origin")));
   for (const char* alignment : {"none", "origin"}) {
     const json errors = jsonOf(std::string("evaluate trajectory out data --align ") + alignment);
@@ -134,30 +128,30 @@ TEST_F(EvaluateCommand, HoldsTheKeyframesTrajectoryAgainstThePoses) {
   EXPECT_EQ(errors["rpe"].size(), 3U);
   const Result drawn = run("evaluate trajectory out data --align none --plot path.png");
   EXPECT_EQ(drawn.status, 0) << drawn.err;
-  EXPECT_FALSE(cv::imread((folder() / "path.png").string()).empty());
+  EXPECT_FALSE(image("path.png").empty());
 }
 
 TEST_F(EvaluateCommand, WhatIsWrongIsAnErrorOnOneLine) {
   writePlane(folder() / "plane.tiff");
-  EXPECT_EQ(refusal("evaluate depth nowhere.tiff plane.tiff"),
+  EXPECT_EQ(errorOf("evaluate depth nowhere.tiff plane.tiff"),
             "event-fusion: error: no such file: nowhere.tiff\n");
-  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --focal 100"),
+  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --focal 100"),
               HasSubstr("bad-pix needs both --focal and --baseline"));
-  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --focal -1"), HasSubstr("--focal"));
-  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --thresholds 0.1,0"),
+  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --focal -1"), HasSubstr("--focal"));
+  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --thresholds 0.1,0"),
               HasSubstr("--thresholds"));
-  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --tolerance-px -1"),
+  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --tolerance-px -1"),
               HasSubstr("tolerance_px = -1"));
-  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --max-depth nan"),
+  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --max-depth nan"),
               HasSubstr("max_depth_m = nan"));
-  EXPECT_THAT(refusal("evaluate depth plane.tiff plane.tiff --plot plot.jpg"),
+  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --plot plot.jpg"),
               HasSubstr("plot.jpg: expected a name that ends in .png"));
   cv::imwrite((folder() / "mm.png").string(), cv::Mat_<std::uint16_t>(90, 120, std::uint16_t{9}));
-  EXPECT_THAT(refusal("evaluate depth mm.png plane.tiff"), HasSubstr("--scale"));
-  EXPECT_THAT(refusal("evaluate map plane.tiff plane.tiff"), HasSubstr("expected .pcd or .ply"));
-  EXPECT_THAT(refusal("evaluate trajectory data data --align sim3"), HasSubstr("--align"));
-  EXPECT_THAT(refusal("evaluate trajectory data data --max-diff -1"), HasSubstr("--max-diff"));
-  EXPECT_THAT(refusal("evaluate trajectory data data --frames 0.5 --align none"),
+  EXPECT_THAT(errorOf("evaluate depth mm.png plane.tiff"), HasSubstr("--scale"));
+  EXPECT_THAT(errorOf("evaluate map plane.tiff plane.tiff"), HasSubstr("expected .pcd or .ply"));
+  EXPECT_THAT(errorOf("evaluate trajectory data data --align sim3"), HasSubstr("--align"));
+  EXPECT_THAT(errorOf("evaluate trajectory data data --max-diff -1"), HasSubstr("--max-diff"));
+  EXPECT_THAT(errorOf("evaluate trajectory data data --frames 0.5 --align none"),
               HasSubstr("0.5: must be above 0, of frames a whole number"));
   EXPECT_NE(run("evaluate").status, 0);
 }

@@ -25,35 +25,17 @@ class GivenParts : public MapCommand {
   void takeOut(const std::string& name) const {
     fs::rename(folder() / "data" / name, folder() / name);
   }
-  void writeText(const std::string& name, const std::string& text) const {
-    std::ofstream(folder() / name) << text;
-  }
-  std::string mapOf(const std::string& arguments) const {
-    const Result result = run("map rig.ini " + arguments + " --out out");
-    EXPECT_EQ(result.status, 0) << result.err;
-    return contentOf(folder() / "out" / "map.pcd");
-  }
-  std::string errorOf(const std::string& arguments) const {
-    const Result result = run(arguments);
-    EXPECT_NE(result.status, 0) << arguments;
-    return result.err;
-  }
 
   /// The recording's poses as a tracker gives them whose body the rig is turned and moved on.
   void writePosesOfTheBody() const {
-    writeText("hand_eye.yaml",
-              "T_body_rig: [[0, 0, 1, 0.4], [-1, 0, 0, 0.2], [0, -1, 0, -0.1], [0, 0, 0, 1]]\n");
+    write("hand_eye.yaml",
+          "T_body_rig: [[0, 0, 1, 0.4], [-1, 0, 0, 0.2], [0, -1, 0, -0.1], [0, 0, 0, 1]]\n");
     Eigen::Matrix3d rotation;
     rotation << 0, 0, 1, -1, 0, 0, 0, -1, 0;
     const Rigid3 T_body_rig = {Eigen::Quaterniond(rotation), {0.4, 0.2, -0.1}};
     std::vector<StampedPose> poses = SyntheticRecording().poses;
     for (StampedPose& pose : poses) pose.T_world_rig = pose.T_world_rig * T_body_rig.inverse();
     writeTumTrajectory(folder() / "body.txt", poses);
-  }
-
-  /// Positions of the keyframes' reference views in a map's folder.
-  std::vector<StampedPose> keyframesIn(const std::string& name) const {
-    return readTumTrajectory(folder() / name / "trajectory.txt");
   }
 };
 
@@ -87,12 +69,12 @@ TEST_F(GivenParts, TheyReplaceWhatTheRecordingHas) {
   writeTumTrajectory(folder() / "moved.txt", poses);
   Rig rig{SyntheticRecording().cameras};
   for (RigCamera& camera : rig.cameras) camera.model.cx += 3;
-  writeText("other.yaml", formatCamchain(rig));
+  write("other.yaml", formatCamchain(rig));
   const std::string options = " --poses moved.txt --calibration other.yaml";
 
   const std::string other = mapOf("data" + options);
   EXPECT_NE(other, map);
-  EXPECT_NEAR(keyframesIn("out")[0].T_world_rig.translation.y(), 5, 1e-12);
+  EXPECT_NEAR(posesIn("out")[0].T_world_rig.translation.y(), 5, 1e-12);
   EXPECT_EQ(mapOf("r.rawlog" + options), other) << "a rawlog's are replaced, too";
   ASSERT_EQ(run("import r.rawlog --out other.rawlog" + options).status, 0);
   EXPECT_EQ(mapOf("other.rawlog"), other) << "import writes what was given";
@@ -100,12 +82,12 @@ TEST_F(GivenParts, TheyReplaceWhatTheRecordingHas) {
 
 TEST_F(GivenParts, AHandEyeTransformTakesTheBodysPosesToTheRig) {
   mapOf("data");
-  const auto expected = keyframesIn("out");
+  const auto expected = posesIn("out");
   writePosesOfTheBody();
 
   const std::string options = " --poses body.txt --hand-eye hand_eye.yaml";
   const std::string map = mapOf("data" + options);
-  const auto keyframes = keyframesIn("out");
+  const auto keyframes = posesIn("out");
   ASSERT_EQ(keyframes.size(), expected.size());
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
     const Rigid3 T_ref_expected = keyframes[k].T_world_rig.inverse() * expected[k].T_world_rig;
@@ -120,29 +102,28 @@ TEST_F(GivenParts, AHandEyeTransformTakesTheBodysPosesToTheRig) {
 
 TEST_F(GivenParts, TheOptionFileMaySayThemAndTheCommandLineWins) {
   mapOf("data");
-  const auto expected = keyframesIn("out");
+  const auto expected = posesIn("out");
   writePosesOfTheBody();
   fs::create_directory(folder() / "rigs");
   fs::rename(folder() / "hand_eye.yaml", folder() / "rigs" / "hand_eye.yaml");
   takeOut("camchain.yaml");
   fs::rename(folder() / "camchain.yaml", folder() / "rigs" / "camchain.yaml");
-  std::string options = contentOf(folder() / "rig.ini");
+  std::string options = contentOf("rig.ini");
   options = std::regex_replace(options, std::regex("calibration = *"), "calibration=camchain.yaml");
   options = std::regex_replace(options, std::regex("hand_eye = *"), "hand_eye = hand_eye.yaml");
-  writeText("rigs/rig.ini", options);
+  write("rigs/rig.ini", options);
 
   const std::string map = "map rigs/rig.ini data --poses body.txt --out out";
   ASSERT_EQ(run(map).status, 0) << run(map).err;
   EXPECT_NEAR(
-      (keyframesIn("out")[0].T_world_rig.inverse() * expected[0].T_world_rig).translation.norm(), 0,
+      (posesIn("out")[0].T_world_rig.inverse() * expected[0].T_world_rig).translation.norm(), 0,
       1e-9);
   EXPECT_EQ(reportIn("out")["options"]["rig"]["hand_eye"], "rigs/hand_eye.yaml");
 
-  writeText("none.yaml", "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  write("none.yaml", "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
   ASSERT_EQ(run(map + " --hand-eye none.yaml").status, 0);
-  EXPECT_GT(
-      (keyframesIn("out")[0].T_world_rig.inverse() * expected[0].T_world_rig).translation.norm(),
-      0.1);
+  EXPECT_GT((posesIn("out")[0].T_world_rig.inverse() * expected[0].T_world_rig).translation.norm(),
+            0.1);
   EXPECT_THAT(errorOf(map + " --set rig.calibration="), HasSubstr("data: no calibration"));
 }
 
@@ -151,7 +132,7 @@ TEST_F(GivenParts, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
   fs::copy_file(folder() / "data" / "camchain.yaml", folder() / "same.yaml");
   Rig rig{SyntheticRecording().cameras};
   rig.cameras[1].T_rig_cam.translation.y() += 0.001;
-  writeText("other.yaml", formatCamchain(rig));
+  write("other.yaml", formatCamchain(rig));
   for (const std::string recording : {"data", "r.rawlog"}) {
     const std::string map = "map rig.ini " + recording + " --out out ";
     EXPECT_EQ(run(map + "--set rig.calibration=same.yaml").err, "") << recording;
@@ -170,9 +151,9 @@ TEST_F(GivenParts, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning) {
   fs::create_directory(folder() / "uzh");
   fs::rename(folder() / "data" / "cam0" / "events.txt", folder() / "uzh" / "events.txt");
   fs::rename(folder() / "data" / "poses.txt", folder() / "uzh" / "groundtruth.txt");
-  writeText("uzh/calib.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
-  writeText("same.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
-  writeText("other.txt", "100 101 59.5 44.5 0 0 0 0 0\n");
+  write("uzh/calib.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
+  write("same.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
+  write("other.txt", "100 101 59.5 44.5 0 0 0 0 0\n");
   const std::string map = "map rig.ini uzh --out out ";
   const auto warning = HasSubstr("warning: other.txt replaced another calibration");
   EXPECT_THAT(run(map + "--set rig.calibration=same.txt").err, Not(HasSubstr("replaced")));
@@ -189,7 +170,7 @@ TEST_F(GivenParts, OfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
   const auto write_cameras = [&](const std::string& name, int count, int width) {
     Rig rig{SyntheticRecording(0.1, count).cameras};
     for (RigCamera& camera : rig.cameras) camera.model.width = width;
-    writeText(name, formatCamchain(rig));
+    write(name, formatCamchain(rig));
   };
   write_cameras("one.yaml", 1, 120);
   write_cameras("three.yaml", 3, 120);
@@ -243,8 +224,7 @@ TEST_F(GivenParts, SliderDepthWithItsPosesAndCalibrationBesideItGivesTheSameMap)
               HasSubstr("bare: no calibration: expected calib.txt, or --calibration FILE"));
   ASSERT_EQ(run("map '" + config + "' " + whole + " --out whole").status, 0);
   ASSERT_EQ(run("map '" + config + "' bare --out bare_out" + poses + calibration).status, 0);
-  EXPECT_EQ(contentOf(folder() / "whole" / "map.pcd"),
-            contentOf(folder() / "bare_out" / "map.pcd"));
+  EXPECT_EQ(contentOf("whole/map.pcd"), contentOf("bare_out/map.pcd"));
 }
 
 TEST_F(GivenParts, RealTrajectoriesArePoses) {

@@ -6,12 +6,9 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <regex>
 
-#include "test/paths.h"
-#include "test/plugin/temporary_folder.h"
+#include "test/plugin/program_test.h"
 
 namespace efm {
 namespace {
@@ -25,37 +22,8 @@ using testing::StartsWith;
 
 const std::filesystem::path kSliderDepth = EFM_SHARED_DATA "/slider_depth";
 
-std::string contentOf(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
-class ImportCommand : public TemporaryFolder {
+class ImportCommand : public ProgramTest {
  protected:
-  struct Result {
-    int status = 0;
-    std::string out;
-    std::string err;
-  };
-
-  /// Runs a program inside the test's folder, without a terminal.
-  Result runProgram(const std::string& program, const std::string& arguments) const {
-    const std::string command = "cd '" + folder().string() + "' && '" + program + "' " + arguments +
-                                " </dev/null >stdout.txt 2>stderr.txt";
-    Result result;
-    result.status = std::system(command.c_str());
-    result.out = contentOf(folder() / "stdout.txt");
-    result.err = contentOf(folder() / "stderr.txt");
-    return result;
-  }
-  Result run(const std::string& arguments) const { return runProgram(EFM_EVENT_FUSION, arguments); }
-
-  void write(const std::string& file, const std::string& text) const {
-    const std::filesystem::path path = folder() / file;
-    std::filesystem::create_directories(path.parent_path());
-    std::ofstream(path, std::ios::binary) << text;
-  }
-
   /// A recording in the UZH layout.
   void writeSmallRecording() const {
     write("small/events.txt", "0.010 1 2 1\n0.020 3 4 0\n0.030 5 6 1\n0.029 7 8 0\n0.050 1 1 1\n");
@@ -128,15 +96,15 @@ TEST_F(ImportCommand, ReadsTheRealSliderRecordingWhole) {
 }
 
 TEST_F(ImportCommand, RawlogEditListsTheEventsWithTheirLabel) {
-  if (std::system("command -v rawlog-edit >/dev/null") != 0) GTEST_SKIP() << "no rawlog-edit";
+  if (!isInstalled("rawlog-edit")) GTEST_SKIP() << "no rawlog-edit";
   writeSmallRecording();
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);
-  const Result with = runProgram("rawlog-edit", "-p '" EFM_PLUGIN "' --info -i s.rawlog");
+  const Result with = shell("rawlog-edit -p '" EFM_PLUGIN "' --info -i s.rawlog");
   EXPECT_EQ(with.status, 0);
   EXPECT_THAT(with.out, HasSubstr("cam0, pose"));
   EXPECT_THAT(with.out + with.err, Not(HasSubstr("not registered")));
 
-  const Result described = runProgram("rawlog-edit", "-p '" EFM_PLUGIN "' --describe -i s.rawlog");
+  const Result described = shell("rawlog-edit -p '" EFM_PLUGIN "' --describe -i s.rawlog");
   EXPECT_EQ(described.status, 0);
   EXPECT_THAT(described.out, HasSubstr("Events of camera 0: "));
 }
@@ -193,7 +161,7 @@ TEST_F(ImportCommand, InfoOfACutFolderSaysWhatCameBeforeAndFails) {
 TEST_F(ImportCommand, InfoOfACutRawlogSaysWhatCameBeforeAndFails) {
   writeSmallRecording();
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);
-  const std::string bytes = contentOf(folder() / "s.rawlog");
+  const std::string bytes = contentOf("s.rawlog");
   write("s.rawlog", bytes.substr(0, bytes.size() - 4));
   const Result result = run("info s.rawlog");
   EXPECT_NE(result.status, 0);
@@ -257,7 +225,7 @@ TEST_F(ImportCommand, OutputThatNobodyReceivesIsAnError) {
     const std::string command = "cd '" + folder().string() + "' && '" EFM_EVENT_FUSION "' " +
                                 arguments + " >/dev/full 2>stderr.txt";
     EXPECT_NE(std::system(command.c_str()), 0) << arguments;
-    EXPECT_THAT(contentOf(folder() / "stderr.txt"),
+    EXPECT_THAT(contentOf("stderr.txt"),
                 StartsWith("event-fusion: error: the output cannot be written"))
         << arguments;
   }

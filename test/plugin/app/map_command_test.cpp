@@ -94,7 +94,7 @@ TEST_F(MapCommand, ARawlogGivesTheSameMapAsTheFolder) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   ASSERT_EQ(run("map rig.ini data --out one").status, 0);
   ASSERT_EQ(run("map rig.ini r.rawlog --out two").status, 0);
-  EXPECT_EQ(contentOf(folder() / "one" / "map.pcd"), contentOf(folder() / "two" / "map.pcd"));
+  EXPECT_EQ(contentOf("one/map.pcd"), contentOf("two/map.pcd"));
 }
 
 TEST_F(MapCommand, TimeLimitsAreHalfOpenAndInTheRecordingsClock) {
@@ -261,7 +261,7 @@ TEST_F(MapCommand, TheSavedDsiHasItsMaximumWhereTheConfidenceSays) {
   ASSERT_EQ(run("depth rig.ini data --out out --t0 10.1 --t1 10.3 --save-dsi").status, 0);
   const cv::Mat1f confidence =
       cv::imread((folder() / "out" / "confidence.tiff").string(), cv::IMREAD_UNCHANGED);
-  const std::string npy = contentOf(folder() / "out" / "dsi.npy");
+  const std::string npy = contentOf("out/dsi.npy");
   const std::size_t pixels = confidence.total();
   ASSERT_EQ(npy.size() % 64, pixels * 30 * sizeof(float) % 64);
   const std::size_t header = npy.size() - pixels * 30 * sizeof(float);
@@ -281,8 +281,8 @@ TEST_F(MapCommand, DepthTakesTheReferenceTimeThatIsAskedFor) {
   ASSERT_EQ(run("depth rig.ini data --out a --t0 10.1 --t1 10.3").status, 0);
   ASSERT_EQ(run("depth rig.ini data --out b --t0 10.1 --t1 10.3 --ref-time 10.2").status, 0);
   ASSERT_EQ(run("depth rig.ini data --out c --t0 10.1 --t1 10.3 --ref-time 10.3").status, 0);
-  EXPECT_EQ(contentOf(folder() / "a" / "depth.tiff"), contentOf(folder() / "b" / "depth.tiff"));
-  EXPECT_NE(contentOf(folder() / "a" / "depth.tiff"), contentOf(folder() / "c" / "depth.tiff"));
+  EXPECT_EQ(contentOf("a/depth.tiff"), contentOf("b/depth.tiff"));
+  EXPECT_NE(contentOf("a/depth.tiff"), contentOf("c/depth.tiff"));
 }
 
 TEST_F(MapCommand, AWindowWithoutPosesOrTheWrongWayRoundIsAnError) {

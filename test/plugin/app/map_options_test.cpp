@@ -18,9 +18,6 @@ using testing::Not;
 
 class MapOptions : public MapCommand {
  protected:
-  cv::Mat image(const std::filesystem::path& file) const {
-    return cv::imread((folder() / file).string(), cv::IMREAD_UNCHANGED);
-  }
   std::size_t pointsIn(const std::filesystem::path& file) const {
     return readPointCloud(folder() / file).points.size();
   }
@@ -33,7 +30,7 @@ TEST_F(MapOptions, TheSequencesWhiteLevelIsFoundInAPassOfItsOwn) {
   const json report = reportIn("out");
   EXPECT_EQ(report["options"]["depth"]["max_confidence"], "sequence");
   std::vector<double> maxima;
-  for (const StampedPose& pose : readTumTrajectory(folder() / "out" / "trajectory.txt")) {
+  for (const StampedPose& pose : posesIn("out")) {
     double largest = 0;
     cv::minMaxLoc(image("out/keyframes/" + formatSeconds(pose.t_ns) + "/confidence.tiff"), nullptr,
                   &largest);
@@ -47,7 +44,7 @@ TEST_F(MapOptions, TheSequencesWhiteLevelIsFoundInAPassOfItsOwn) {
   number.precision(17);
   number << "depth.max_confidence=" << expected;
   ASSERT_EQ(run("map rig.ini data --out fixed --set " + number.str()).status, 0);
-  EXPECT_EQ(contentOf(folder() / "out" / "map.pcd"), contentOf(folder() / "fixed" / "map.pcd"));
+  EXPECT_EQ(contentOf("out/map.pcd"), contentOf("fixed/map.pcd"));
 }
 
 TEST_F(MapOptions, SingleCamerasKeepTheirOwnWhiteLevel) {
@@ -77,7 +74,7 @@ TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
       run(map + "--out out --set output.camera_maps=true --set output.event_images=true").status,
       0);
   ASSERT_EQ(run(map + "--out alone --set rig.cameras=1").status, 0);
-  const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
+  const auto poses = posesIn("out");
   for (const StampedPose& pose : poses) {
     const std::filesystem::path keyframe = "keyframes/" + formatSeconds(pose.t_ns);
     const cv::Mat beside = image("out" / keyframe / "cam1" / "depth.tiff");

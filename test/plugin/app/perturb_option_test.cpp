@@ -15,22 +15,8 @@ class PerturbOption : public MapCommand {
  protected:
   PerturbOption() { write(SyntheticRecording()); }
 
-  std::string errorOf(const std::string& arguments) const {
-    const Result result = run(arguments);
-    EXPECT_NE(result.status, 0) << arguments;
-    return result.err;
-  }
-  std::string mapOf(const std::string& arguments, const std::string& name = "out") const {
-    const Result result = run("map rig.ini " + arguments + " --out " + name);
-    EXPECT_EQ(result.status, 0) << result.err;
-    return contentOf(folder() / name / "map.pcd");
-  }
-  std::vector<StampedPose> keyframesIn(const std::string& name) const {
-    return readTumTrajectory(folder() / name / "trajectory.txt");
-  }
   cv::Mat depthOf(const std::string& name, const StampedPose& keyframe) const {
-    const auto file = folder() / name / "keyframes" / formatSeconds(keyframe.t_ns) / "depth.tiff";
-    return cv::imread(file.string(), cv::IMREAD_UNCHANGED);
+    return image(name + "/keyframes/" + formatSeconds(keyframe.t_ns) + "/depth.tiff");
   }
 };
 
@@ -44,8 +30,7 @@ TEST_F(PerturbOption, OfLatencyAloneMakesTheSameMap) {
   const std::string map = mapOf("data");
   for (const char* latency_s : {"0.2", "0.7"}) {
     EXPECT_EQ(mapOf(std::string("data --perturb latency_s=") + latency_s, "late"), map);
-    EXPECT_EQ(contentOf(folder() / "late" / "trajectory.txt"),
-              contentOf(folder() / "out" / "trajectory.txt"));
+    EXPECT_EQ(contentOf("late/trajectory.txt"), contentOf("out/trajectory.txt"));
   }
 }
 
@@ -66,13 +51,13 @@ TEST_F(PerturbOption, IsInTheReportAsItWasUsed) {
 TEST_F(PerturbOption, NoiseThatIsConstantInEachWindowLeavesDepthMapsAsTheyAre) {
   const std::string windows = "data --set keyframes.window_s=0.1 --set depth.threshold_c=30";
   mapOf(windows);
-  const auto exact = keyframesIn("out");
+  const auto exact = posesIn("out");
   ASSERT_GE(exact.size(), 3U);
   const std::int64_t begin_ns = exact[0].t_ns - 50'000'000;
   mapOf(windows + " --perturb keyframe_noise_m=0.05,keyframe_noise_deg=2,keyframe_start_s=" +
             formatSeconds(begin_ns),
         "wrong");
-  const auto wrong = keyframesIn("wrong");
+  const auto wrong = posesIn("wrong");
   ASSERT_EQ(wrong.size(), exact.size());
   for (std::size_t k = 0; k < exact.size(); ++k) {
     const Rigid3 T_exact_wrong = exact[k].T_world_rig.inverse() * wrong[k].T_world_rig;

@@ -5,36 +5,27 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include "mapping/geometry/rig.h"
 #include "plugin/calibration/camchain.h"
-#include "test/paths.h"
-#include "test/plugin/temporary_folder.h"
+#include "test/plugin/program_test.h"
 
 namespace efm {
 namespace {
 
 using testing::HasSubstr;
 
-std::string contentOf(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return std::string(std::istreambuf_iterator<char>(file), {});
-}
-
-class SimulateCommand : public TemporaryFolder {
+class SimulateCommand : public ProgramTest {
  protected:
-  /// Runs the program inside the test's folder. @return its exit status was 0.
-  bool run(const std::string& arguments) const {
-    const std::string command = "cd '" + folder().string() +
-                                "' && '" EFM_EVENT_FUSION "' simulate " + arguments +
-                                " </dev/null >stdout.txt 2>stderr.txt";
-    return std::system(command.c_str()) == 0;
+  std::string simulateError(const std::string& arguments) const {
+    return errorOf("simulate " + arguments);
   }
-  std::string errors() const { return contentOf(folder() / "stderr.txt"); }
+  void simulate(const std::string& arguments) const {
+    const Result result = run("simulate " + arguments);
+    EXPECT_EQ(result.status, 0) << arguments << "\n" << result.err;
+  }
 
   /// Three small cameras in three orientations, and a second of walking ahead.
   void writeRigAndTrajectory() const {
@@ -57,10 +48,9 @@ class SimulateCommand : public TemporaryFolder {
 
 TEST_F(SimulateCommand, WritesTheRigThatItWasGiven) {
   writeRigAndTrajectory();
-  ASSERT_TRUE(
-      run("--scene room --trajectory walk.txt --calibration rig.yaml --start 0.2 "
-          "--duration 0.1 --noise-hz 20 --mismatch 0.05 --out sim"))
-      << errors();
+  simulate(
+      "--scene room --trajectory walk.txt --calibration rig.yaml --start 0.2 --duration 0.1 "
+      "--noise-hz 20 --mismatch 0.05 --out sim");
   const Rig given = readCamchain(folder() / "rig.yaml");
   const Rig written = readCamchain(folder() / "sim/camchain.yaml");
   ASSERT_EQ(written.cameras.size(), 3U);
@@ -69,18 +59,17 @@ TEST_F(SimulateCommand, WritesTheRigThatItWasGiven) {
     const Rigid3& T_rig_cam = given.cameras[i].T_rig_cam;
     EXPECT_LT((written.cameras[i].T_rig_cam.translation - T_rig_cam.translation).norm(), 1e-12);
     EXPECT_LT(written.cameras[i].T_rig_cam.rotation.angularDistance(T_rig_cam.rotation), 1e-7);
-    EXPECT_GT(contentOf(folder() / "sim" / ("cam" + std::to_string(i)) / "events.txt").size(), 0U);
+    EXPECT_GT(contentOf("sim/cam" + std::to_string(i) + "/events.txt").size(), 0U);
   }
-  EXPECT_THAT(contentOf(folder() / "sim/depth/index.txt"), HasSubstr("0.200000000"));
+  EXPECT_THAT(contentOf("sim/depth/index.txt"), HasSubstr("0.200000000"));
 }
 
 TEST_F(SimulateCommand, NoiseIsCountedByItsRate) {
   writeRigAndTrajectory();
-  const std::string simulate =
+  simulate(
       "--scene room --trajectory walk.txt --calibration rig.yaml --duration 0.1 --threshold-on 5 "
-      "--threshold-off 5 --hot-hz 500 --hot-pixels 0.1 --out ";
-  ASSERT_TRUE(run(simulate + "sim")) << errors();
-  const std::string events = contentOf(folder() / "sim/cam0/events.txt");
+      "--threshold-off 5 --hot-hz 500 --hot-pixels 0.1 --out sim");
+  const std::string events = contentOf("sim/cam0/events.txt");
   const auto lines = static_cast<double>(std::count(events.begin(), events.end(), '\n'));
   const double expected = 64 * 48 * 0.1 * 500 * 0.1;
   // Hot pixels are drawn (their number's deviation is 17 of 307), and each fires 50 times.
@@ -90,17 +79,15 @@ TEST_F(SimulateCommand, NoiseIsCountedByItsRate) {
 TEST_F(SimulateCommand, ErrorsNameTheFileOrTheOption) {
   writeRigAndTrajectory();
   const std::string on_walk = "--scene room --trajectory walk.txt --calibration rig.yaml ";
-  EXPECT_FALSE(run(on_walk + "--duration 3 --out sim"));
-  EXPECT_THAT(errors(), HasSubstr("walk.txt: duration_s = 3"));
-  EXPECT_FALSE(run("--scene room --trajectory none.txt --calibration rig.yaml --out sim"));
-  EXPECT_THAT(errors(), HasSubstr("none.txt"));
-  EXPECT_FALSE(run(on_walk + "--mismatch 2 --out sim"));
-  EXPECT_THAT(errors(), HasSubstr("mismatch = 2"));
-  EXPECT_FALSE(run("--out sim"));
-  EXPECT_THAT(errors(), HasSubstr("--preset"));
-  EXPECT_FALSE(run("--preset slider --scene room --out sim"));
-  EXPECT_FALSE(run("--scene room --trajectory walk.txt --out sim"));
-  EXPECT_FALSE(std::filesystem::exists(folder() / "sim"));
+  EXPECT_THAT(simulateError(on_walk + "--duration 3 --out sim"),
+              HasSubstr("walk.txt: duration_s = 3"));
+  EXPECT_THAT(simulateError("--scene room --trajectory none.txt --calibration rig.yaml --out sim"),
+              HasSubstr("none.txt"));
+  EXPECT_THAT(simulateError(on_walk + "--mismatch 2 --out sim"), HasSubstr("mismatch = 2"));
+  EXPECT_THAT(simulateError("--out sim"), HasSubstr("--preset"));
+  simulateError("--preset slider --scene room --out sim");
+  simulateError("--scene room --trajectory walk.txt --out sim");
+  EXPECT_FALSE(exists(folder() / "sim"));
 }
 
 TEST_F(SimulateCommand, AValueOutOfRangeIsAnErrorThatNamesTheOptionAndItsUnit) {
@@ -119,12 +106,18 @@ TEST_F(SimulateCommand, AValueOutOfRangeIsAnErrorThatNamesTheOptionAndItsUnit) {
       {"--seed -1", "--seed"},
       {"--seed 1.5", "--seed"}};
   for (const auto& [option, expected] : cases) {
-    EXPECT_FALSE(run("--preset slider --out sim " + std::string(option))) << option;
-    EXPECT_THAT(errors(), HasSubstr(expected));
+    EXPECT_THAT(simulateError("--preset slider --out sim " + std::string(option)),
+                HasSubstr(expected))
+        << option;
   }
-  EXPECT_FALSE(std::filesystem::exists(folder() / "sim"));
-  EXPECT_TRUE(run("--preset slider --duration 0.002 --seed 18446744073709551615 --out sim"))
-      << errors();
+  EXPECT_FALSE(exists(folder() / "sim"));
+}
+
+TEST_F(SimulateCommand, TakesTheLargestSeed) {
+  writeRigAndTrajectory();
+  simulate(
+      "--scene room --trajectory walk.txt --calibration rig.yaml --duration 0.002 "
+      "--seed 18446744073709551615 --out sim");
 }
 
 TEST_F(SimulateCommand, DrivesTheSharedRigsOnTheSharedTrajectories) {
@@ -132,15 +125,14 @@ TEST_F(SimulateCommand, DrivesTheSharedRigsOnTheSharedTrajectories) {
   if (!std::filesystem::exists(shared / "trajectories")) GTEST_SKIP() << shared << " is not there";
   const std::string trajectories = (shared / "trajectories").string();
   const std::string calibrations = (shared / "calibration").string();
-  ASSERT_TRUE(run("--scene room --trajectory '" + trajectories +
-                  "/mvsec_indoor_flying1.txt' --calibration '" + calibrations +
-                  "/mvsec/camchain.yaml' --duration 0.02 --out mvsec"))
-      << errors();
+  simulate("--scene room --trajectory '" + trajectories +
+           "/mvsec_indoor_flying1.txt' --calibration '" + calibrations +
+           "/mvsec/camchain.yaml' --duration 0.02 --out mvsec");
   const Rig given = readCamchain(shared / "calibration/mvsec/camchain.yaml");
   const Rig written = readCamchain(folder() / "mvsec/camchain.yaml");
   ASSERT_EQ(written.cameras.size(), 2U);
   EXPECT_EQ(written.cameras[1].model, given.cameras[1].model);
-  EXPECT_GT(contentOf(folder() / "mvsec/cam1/events.txt").size(), 1000U);
+  EXPECT_GT(contentOf("mvsec/cam1/events.txt").size(), 1000U);
 }
 
 }  // namespace

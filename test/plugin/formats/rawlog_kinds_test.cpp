@@ -102,7 +102,7 @@ class RawlogKinds : public MapCommand {
 
   /// The points of a binary PCD file with the fields x y z intensity.
   std::vector<Eigen::Vector4f> pointsOfMap() const {
-    const std::string pcd = contentOf(folder() / "out" / "map.pcd");
+    const std::string pcd = contentOf("out/map.pcd");
     const std::string last_of_header = "DATA binary\n";
     const std::size_t begin = pcd.find(last_of_header) + last_of_header.size();
     std::vector<Eigen::Vector4f> points((pcd.size() - begin) / sizeof(Eigen::Vector4f));
@@ -131,16 +131,16 @@ TEST_F(RawlogKinds, BothGiveTheSameMapToTheBit) {
   save(observationsOnly(Says::kPoses), "observations.rawlog");
   save(pairs(Says::kPoses), "pairs.rawlog");
   mapOf("observations.rawlog");
-  const std::string map = contentOf(folder() / "out" / "map.pcd");
+  const std::string map = contentOf("out/map.pcd");
   mapOf("pairs.rawlog");
-  EXPECT_EQ(contentOf(folder() / "out" / "map.pcd"), map);
+  EXPECT_EQ(contentOf("out/map.pcd"), map);
 
   const std::string limits = "--t0 10.1 --t1 10.35";
   mapOf("observations.rawlog", limits);
-  const std::string part = contentOf(folder() / "out" / "map.pcd");
+  const std::string part = contentOf("out/map.pcd");
   EXPECT_NE(part, map);
   mapOf("pairs.rawlog", limits);
-  EXPECT_EQ(contentOf(folder() / "out" / "map.pcd"), part);
+  EXPECT_EQ(contentOf("out/map.pcd"), part);
 }
 
 TEST_F(RawlogKinds, OdometryAndMovementsGiveTheMapThatPosesGive) {
@@ -222,8 +222,7 @@ TEST_F(RawlogKinds, OfSeveralSourcesOneIsUsedAndTheOthersAreCounted) {
 
   const auto slipped = mapOf("both.rawlog", "--set rig.pose_source=wheels");
   ASSERT_FALSE(slipped.empty());
-  EXPECT_GT(readTumTrajectory(folder() / "out" / "trajectory.txt")[0].T_world_rig.translation.x(),
-            0.1);
+  EXPECT_GT(posesIn("out")[0].T_world_rig.translation.x(), 0.1);
   writeTumTrajectory(folder() / "given.txt", recording.poses);
   expectNear(mapOf("both.rawlog", "--poses given.txt --set rig.pose_source=wheels"), map);
   EXPECT_THAT(run("map rig.ini both.rawlog --out out --set rig.pose_source=gps").err,
@@ -236,8 +235,7 @@ TEST_F(RawlogKinds, AHandEyeTransformIsTakenForOdometryToo) {
       << "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
   save(observationsOnly(Says::kOdometry), "odometry.rawlog");
   mapOf("odometry.rawlog", "--hand-eye up.yaml");
-  EXPECT_NEAR(readTumTrajectory(folder() / "out" / "trajectory.txt")[0].T_world_rig.translation.y(),
-              7, 1e-9);
+  EXPECT_NEAR(posesIn("out")[0].T_world_rig.translation.y(), 7, 1e-9);
   const Result result = run("import odometry.rawlog --out r.rawlog --hand-eye up.yaml");
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.err, HasSubstr("cannot hold the hand-eye transform: give it to map as well"));

@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "test/paths.h"
+#include "test/plugin/program_test.h"
 #include "test/plugin/programs/pcd_points.h"
-#include "test/plugin/programs/program_test.h"
 
 namespace efm {
 namespace {
@@ -19,7 +19,8 @@ using testing::HasSubstr;
 class MrptHost : public ProgramTest {
  protected:
   Result host(const std::string& prefix) const {
-    return run("'" EFM_MRPT_HOST "' '" EFM_PLUGIN "' host.ini '" + prefix + "' data.rawlog saved");
+    return shell("'" EFM_MRPT_HOST "' '" EFM_PLUGIN "' host.ini '" + prefix +
+                 "' data.rawlog saved");
   }
 
   void expectTheMapOfEventFusion() const {
@@ -39,12 +40,12 @@ class MrptHost : public ProgramTest {
 
 TEST_F(MrptHost, MapsARecordingShorterThanASecond) {
   importRecording(SyntheticRecording());
-  map(syntheticOptions());
-  write("host.ini", "[camera]\nfps = abc\n" + optionText(syntheticOptions(), "mapper_"));
+  mapOf("data.rawlog");
+  write("host.ini", "[camera]\nfps = abc\n" + optionText("mapper_"));
 
   const Result result = host("mapper");
 
-  ASSERT_EQ(result.status, 0) << result.out;
+  ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr("3 keyframes"), HasSubstr("event fusion map")));
   EXPECT_GT(file_size(folder() / "saved.simplemap"), 1000U);
   expectTheMapOfEventFusion();
@@ -52,12 +53,12 @@ TEST_F(MrptHost, MapsARecordingShorterThanASecond) {
 
 TEST_F(MrptHost, MapsAllOfALongerRecording) {
   importRecording(SyntheticRecording(1.5));
-  map(syntheticOptions());
-  write("host.ini", optionText(syntheticOptions()));
+  mapOf("data.rawlog");
+  write("host.ini", optionText());
 
   const Result result = host("");
 
-  ASSERT_EQ(result.status, 0) << result.out;
+  ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("13 keyframes"));
   expectTheMapOfEventFusion();
 }
@@ -65,10 +66,10 @@ TEST_F(MrptHost, MapsAllOfALongerRecording) {
 TEST_F(MrptHost, IsToldWhatIsWrongInItsFile) {
   importRecording(SyntheticRecording());
   write("host.ini", "[mapper_dsi]\nnum_planes = abc\n");
-  EXPECT_THAT(host("mapper").out,
+  EXPECT_THAT(host("mapper").err,
               HasSubstr("host.ini, section mapper_dsi: num_planes = abc: must be"));
   write("host.ini", "[mapper_dsy]\nnum_planes = 100\n");
-  EXPECT_THAT(host("mapper").out, HasSubstr("host.ini, section mapper_dsy: unknown section"));
+  EXPECT_THAT(host("mapper").err, HasSubstr("host.ini, section mapper_dsy: unknown section"));
 }
 
 }  // namespace

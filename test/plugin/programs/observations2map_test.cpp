@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "test/plugin/program_test.h"
 #include "test/plugin/programs/pcd_points.h"
-#include "test/plugin/programs/program_test.h"
 
 namespace efm {
 namespace {
@@ -17,7 +17,7 @@ class Observations2map : public ProgramTest {
   void SetUp() override {
     if (!isInstalled("observations2map")) GTEST_SKIP() << "observations2map is not installed";
     importRecording(SyntheticRecording());
-    map(syntheticOptions());
+    mapOf("data.rawlog");
   }
 
   Result build(const std::string& insert_options) const {
@@ -25,13 +25,14 @@ class Observations2map : public ProgramTest {
           "[MappingApplication]\neventFusionMap_count = 1\n"
           "[MappingApplication_eventFusionMap_00_insertOpts]\n" +
               insert_options);
-    return runWithPlugin("observations2map map.ini out/map.simplemap built");
+    return shell("env LD_PRELOAD='" EFM_PLUGIN
+                 "' observations2map map.ini out/map.simplemap built");
   }
 };
 
 TEST_F(Observations2map, BuildsTheMapThatEventFusionWrote) {
   const Result result = build("voxel_size_m = 0.01\n");
-  ASSERT_EQ(result.status, 0) << result.out;
+  ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("3 observations"));
 
   const auto expected = pointsOfPcd(folder() / "out" / "map.pcd");
@@ -51,7 +52,7 @@ TEST_F(Observations2map, TakesOptionsAndRefusesWrongOnes) {
 
   const Result refused = build("voxel_size_m = abc\n");
   EXPECT_NE(refused.status, 0);
-  EXPECT_THAT(refused.out,
+  EXPECT_THAT(refused.out + refused.err,
               HasSubstr("map.ini, section MappingApplication_eventFusionMap_00_insertOpts: "
                         "voxel_size_m = abc: must be a number"));
 }

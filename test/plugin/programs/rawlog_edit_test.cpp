@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "test/paths.h"
-#include "test/plugin/programs/program_test.h"
+#include "test/plugin/program_test.h"
 
 namespace efm {
 namespace {
@@ -26,10 +26,7 @@ class RawlogEdit : public ProgramTest {
   }
 
   Result edit(const std::string& arguments) const {
-    return run("rawlog-edit -p '" EFM_PLUGIN "' -i data.rawlog " + arguments);
-  }
-  Result infoOf(const std::string& file) const {
-    return run("'" EFM_EVENT_FUSION "' info " + file);
+    return shell("rawlog-edit -p '" EFM_PLUGIN "' -i data.rawlog " + arguments);
   }
 
   SyntheticRecording recording_;
@@ -53,7 +50,7 @@ TEST_F(RawlogEdit, DescribeSaysWhatIsInAPacket) {
 
 TEST_F(RawlogEdit, ExportedTextHoldsEveryEventOfACamera) {
   const Result result = edit("--export-txt");
-  ASSERT_EQ(result.status, 0) << result.out;
+  ASSERT_EQ(result.status, 0) << result.err;
 
   for (int camera = 0; camera < 2; ++camera) {
     const std::vector<Event>& events = recording_.events[static_cast<std::size_t>(camera)];
@@ -86,23 +83,23 @@ TEST_F(RawlogEdit, ExportedTextHoldsEveryEventOfACamera) {
 
 TEST_F(RawlogEdit, CutLeavesAStretchThatIsReadAgain) {
   ASSERT_EQ(edit("--cut --from-time 10.1 --to-time 10.3 -o cut.rawlog").status, 0);
-  const Result result = infoOf("cut.rawlog");
-  ASSERT_EQ(result.status, 0) << result.out;
+  const Result result = run("info cut.rawlog");
+  ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr("21 poses from 10.100000000 s to 10.300000000 s"),
                                 HasSubstr("cam0: 120x90"), HasSubstr("cam1: 120x90")));
 }
 
 TEST_F(RawlogEdit, KeepLabelLeavesOneCameraAndThePoses) {
   ASSERT_EQ(edit("--keep-label cam0,pose -o kept.rawlog").status, 0);
-  const Result result = infoOf("kept.rawlog");
-  ASSERT_EQ(result.status, 0) << result.out;
+  const Result result = run("info kept.rawlog");
+  ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, AllOf(HasSubstr(std::to_string(recording_.events[0].size()) + " events"),
                                 HasSubstr("51 poses"), Not(HasSubstr("cam1"))));
 }
 
 TEST_F(RawlogEdit, WithoutThePluginSaysThatTheClassIsUnknown) {
-  const Result result = run("rawlog-edit -i data.rawlog --info");
-  EXPECT_THAT(result.out, HasSubstr("efm::CObservationEvents"));
+  const Result result = shell("rawlog-edit -i data.rawlog --info");
+  EXPECT_THAT(result.out + result.err, HasSubstr("efm::CObservationEvents"));
 }
 
 }  // namespace

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+#include <vector>
+
+#include "plugin/options/option_file.h"
+#include "test/paths.h"
+#include "test/plugin/formats/dataset_of.h"
+#include "test/plugin/session/synthetic_recording.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+
+/// Tests that run programs in the test's folder, without a terminal. File names are relative to the
+/// folder.
+class ProgramTest : public TemporaryFolder {
+ protected:
+  struct Result {
+    int status = 0;
+    std::string out;
+    std::string err;
+  };
+
+  /// Runs a command of the shell.
+  Result shell(const std::string& command) const {
+    const int status = std::system(
+        ("cd '" + folder().string() + "' && " + command + " </dev/null >stdout.txt 2>stderr.txt")
+            .c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf("stdout.txt"),
+            contentOf("stderr.txt")};
+  }
+  /// Runs event-fusion.
+  Result run(const std::string& arguments) const {
+    return shell("'" EFM_EVENT_FUSION "' " + arguments);
+  }
+  /// Runs event-fusion, which must fail. @return its message.
+  std::string errorOf(const std::string& arguments) const {
+    const Result result = run(arguments);
+    EXPECT_NE(result.status, 0) << arguments;
+    return result.err;
+  }
+  static bool isInstalled(const std::string& program) {
+    return std::system(("command -v " + program + " >/dev/null").c_str()) == 0;
+  }
+
+  std::string contentOf(const std::filesystem::path& file) const {
+    std::ifstream stream(folder() / file, std::ios::binary);
+    EXPECT_TRUE(stream) << file;
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  }
+  void write(const std::filesystem::path& file, const std::string& text) const {
+    std::filesystem::create_directories((folder() / file).parent_path());
+    std::ofstream(folder() / file, std::ios::binary) << text;
+  }
+  /// All files in a folder, sorted.
+  std::vector<std::string> filesIn(const std::string& name) const {
+    std::vector<std::string> files;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder() / name)) {
+      if (entry.is_directory()) continue;
+      files.push_back(entry.path().lexically_relative(folder() / name).string());
+    }
+    std::sort(files.begin(), files.end());
+    return files;
+  }
+
+  /// Writes the recording as a dataset folder "data" and `syntheticOptions` as "rig.ini".
+  void write(const SyntheticRecording& recording) const {
+    writeDataset(recording, folder() / "data");
+    write("rig.ini", optionText());
+  }
+  /// `syntheticOptions` as an option file with a prefix before the names of sections.
+  static std::string optionText(const std::string& prefix = "") {
+    std::string text;
+    std::string section;
+    for (const NamedOption& option : listOptions(syntheticOptions())) {
+      if (option.section != section) text += "[" + prefix + std::string(option.section) + "]\n";
+      section = option.section;
+      text += std::string(option.key) + " = " + textOf(option.value) + "\n";
+    }
+    return text;
+  }
+  /// Imports the recording as "data.rawlog".
+  void importRecording(const SyntheticRecording& recording) const {
+    write(recording);
+    const Result result = run("import data --out data.rawlog");
+    ASSERT_EQ(result.status, 0) << result.err;
+  }
+  /// Maps "data" or another recording with "rig.ini" to the folder `out`. @return map.pcd.
+  std::string mapOf(const std::string& arguments, const std::string& out = "out") const {
+    const Result result = run("map rig.ini " + arguments + " --out " + out);
+    EXPECT_EQ(result.status, 0) << result.err;
+    return contentOf(out + "/map.pcd");
+  }
+};
+
+}  // namespace efm
