@@ -31,25 +31,26 @@ struct SplitFusionOptions {
   void validate() const;
 };
 
-/// A part of one camera's events: one sub-interval of one slice, and one polarity where polarities
-/// are apart.
+/// A part of one camera's events: one sub-interval of one slice, and of one polarity if the options
+/// divide by polarity.
 struct EventPart {
   EventSpan all;                 ///< The sub-interval's events.
-  std::optional<bool> polarity;  ///< The part's own; both where not given.
+  std::optional<bool> polarity;  ///< Of the part's events; not given: both polarities.
   std::size_t subinterval = 0;   ///< Index among the sub-intervals of all slices.
 
-  /// The part's events in their order.
-  /// @param buffer holds the events of one polarity.
+  /// The part's events in their order: a view of `all`, or, with a polarity, of `buffer`.
+  /// @param buffer receives the events of the polarity; the view is valid until it changes.
   EventSpan select(std::vector<Event>& buffer) const;
 };
 
-/// How the parts of all cameras meet in the fusion.
+/// Which parts of the cameras are fused with each other.
 struct FusionLayout {
   struct Source {
     std::size_t camera = 0;
     std::size_t part = 0;
   };
-  /// [input][group * slots + slot]. Each camera is an input; each slice of a single camera is one.
+  /// [input][group * slots + slot], where the slots are the sub-intervals of a group. An input is
+  /// a camera; with a single camera, an input is one of its time slices.
   std::vector<std::vector<Source>> inputs;
   int groups = 1;
 };

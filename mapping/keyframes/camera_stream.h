@@ -38,13 +38,15 @@ class CameraStream {
   /// @throws std::invalid_argument where an event lies outside the sensor, or comes more than 10 ms
   /// after a newer one.
   void requireValid(const std::vector<Event>& events) const;
-  /// Takes valid events. Drops those before `released_ns`, and counts those outside the limits.
+  /// Adds valid events to the filter, or to the buffer if there is no filter. Events before
+  /// `released_ns` and outside the limits are counted, and not added.
   /// @return the number of events that came after a newer one.
   std::uint64_t add(const std::vector<Event>& events, const TimeLimits& limits,
                     std::int64_t released_ns);
   /// All events before `t_ns` (the camera's own clock) have been added.
   void coverUntil(std::int64_t t_ns);
-  /// Moves events before a time through the filter into the buffer; no earlier event will come.
+  /// Filters the events before a time and moves the others to the buffer. No event before this time
+  /// may be added afterwards.
   void filterUntil(std::int64_t t_ns);
 
   bool selected() const { return selected_; }

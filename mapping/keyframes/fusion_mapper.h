@@ -73,10 +73,10 @@ class FusionMapper : private RecordingProgress {
   void addEvents(int camera, const std::vector<Event>& events);
   /// Says that all of a camera's events before `t_ns` (its own clock) have been added, so that a
   /// camera without events does not delay the others. Without this call, a camera's events are
-  /// complete until 10 ms before its newest one, and a camera without events for a second is
-  /// silent: it delays nobody. The second ends where the newest packet of any camera begins.
+  /// complete until 10 ms before its newest one. A camera is silent if it has no event in the last
+  /// second before the newest packet of any camera begins. A silent camera does not delay others.
   void coverUntil(int camera, std::int64_t t_ns);
-  /// No more data will come: windows that are not full stay so.
+  /// No more data will come. Windows that are not full are not mapped.
   void finish() { finished_ = true; }
 
   /// Maps the next window that is covered, if there is one. Costs the keyframe's whole work.

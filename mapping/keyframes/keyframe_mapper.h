@@ -24,14 +24,14 @@ struct KeyframeMapperOptions {
   int reference_camera = 0;
   ReferenceViewOptions view;
   SubintervalOptions subintervals;
-  SplitFusionOptions split;  ///< Groups of events; each has its own sub-intervals.
-  /// Leave selected cameras without an event that votes out of the fusion. Otherwise a silent
-  /// camera makes AND-like rules zero everywhere.
+  SplitFusionOptions split;  ///< Groups of events; each is divided into the sub-intervals.
+  /// Exclude a silent camera (none of its events votes) from the fusion. Otherwise it makes
+  /// AND-like rules zero everywhere.
   bool exclude_silent = false;
   PosePacketsOptions packets;
   SpaceSweepOptions sweep;
   DepthExtractionOptions extraction;
-  MotionCorrectionOptions motion;  ///< Of the poses within a window.
+  MotionCorrectionOptions motion;  ///< Correction of the motion within a window.
   /// The value of `WhiteLevel::kSequence`, if an earlier pass over the recording found it. Not
   /// given: the robust maximum of the keyframes so far.
   std::optional<double> sequence_maximum;
@@ -44,7 +44,7 @@ struct KeyframeMapperOptions {
 
 /// The method: the events and poses of one window in, one semi-dense depth map out (Ghosh and
 /// Gallego 2022, Algorithm 2 for any number of cameras; with one sub-interval Algorithm 1).
-/// Keeps nothing from one window to the next but the running maximum of confidences.
+/// From one window to the next it keeps only the running maximum of confidences.
 class KeyframeMapper {
  public:
   /// @param selected indices of the rig's cameras whose events take part.

@@ -16,10 +16,10 @@ namespace efm {
 /// The rays of one camera's events of a window, and counts of its events.
 struct WindowRays {
   int camera = 0;                         ///< Index in the rig.
-  CameraRays rays;                        ///< By part of `EventGroups`.
+  CameraRays rays;                        ///< One bundle per part of `EventGroups`.
   std::uint64_t events = 0;               ///< With a ray.
   std::uint64_t without_pose = 0;         ///< Without a ray.
-  std::uint64_t silent_subintervals = 0;  ///< Of all slices, without a ray.
+  std::uint64_t silent_subintervals = 0;  ///< Sub-intervals (of all slices) without a ray.
 };
 
 /// Back-projects one camera's events along a trajectory, part by part (Ghosh and Gallego 2022,

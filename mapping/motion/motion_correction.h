@@ -17,7 +17,7 @@ namespace efm {
 /// interpret DSIs as these images).
 ///
 /// Needs several cameras: a single camera explains a wrong motion as well by wrong depths. For
-/// trackers with an error within a window; exact poses gain nothing.
+/// trackers with an error within a window; it does not improve exact poses.
 struct MotionCorrectionOptions {
   bool correct_motion = false;
   /// Standard deviations of the tracker's velocity error on each axis; they hold the correction
@@ -42,7 +42,7 @@ struct MotionCorrectionOptions {
 /// motion. Runs on the threads of the task arena that it is called in.
 /// @param motion the tracker's, corrected by `current`.
 /// @param depth of the view, found along `motion`; 0: none.
-/// @return `current` where the events do not tell.
+/// @return `current` where the events do not determine a correction.
 VelocityCorrection findCorrection(const WindowInput& input, const Trajectory& motion,
                                   const cv::Mat1f& depth, const VelocityCorrection& current,
                                   const MotionCorrectionOptions& options);

@@ -14,8 +14,8 @@ namespace efm {
 /// Blanks within and at the end of a line.
 inline constexpr std::string_view kLineBlanks = " \t\r\v\f";
 
-/// The number that a text is from end to end; nothing where it is none or the type cannot hold it.
-/// Real numbers may be infinite or NaN.
+/// Parses the whole text as a number. Real numbers may be infinite or NaN.
+/// @return nothing if the text is no number, or the type cannot hold it.
 template <typename Number>
 std::optional<Number> parseNumber(std::string_view text) {
   Number number{};
@@ -24,7 +24,7 @@ std::optional<Number> parseNumber(std::string_view text) {
   return number;
 }
 
-/// The finite number that a text is from end to end.
+/// Parses the whole text as a finite number.
 inline std::optional<double> parseFinite(std::string_view text) {
   const std::optional<double> number = parseNumber<double>(text);
   return number && std::isfinite(*number) ? number : std::nullopt;

@@ -26,8 +26,8 @@ struct RayBundle {
   std::size_t size() const { return x_inf.size(); }
 };
 
-/// One camera's rays by slot of the time axis: one bundle without temporal fusion. All cameras have
-/// the same number of slots.
+/// One camera's rays, one bundle per slot: a slot is a sub-interval of one group of events
+/// (`EventGroups`). All cameras of a sweep have the same number of slots.
 using CameraRays = std::vector<RayBundle>;
 
 /// Back-projects the events of the packets. Events between packets are left out.

@@ -15,9 +15,9 @@
 namespace efm {
 
 struct PosePacketsOptions {
-  /// The largest error of an event's vote by sharing a pose, in pixels of the reference view. 0
-  /// gives every event its own pose. Range: 0 to 10. The default keeps the L1 error of the DSI near
-  /// 2e-3 of its mass.
+  /// The maximum error of a vote because its event shares a pose, in pixels of the reference view.
+  /// 0 gives every event its own pose. Range: 0 to 10. The default keeps the L1 error of the DSI
+  /// near 2e-3 of its mass.
   double packet_error_px = 0.02;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
@@ -50,11 +50,11 @@ struct PacketGeometry {
 /// than the bound. No event is dropped because a packet is not full.
 ///
 /// The error is measured on a grid of rays over the whole sensor, at both ends of the packet, on
-/// the nearest and the farthest plane: a camera that turns around a near point moves votes only on
-/// the planes behind it. In an interval of even motion the error follows from the speed of votes;
-/// it is exact to a percent and rather too large. A packet does not cross a recorded pose: the
-/// motion within it is one smooth piece, with its extremes at the ends. Rays far outside the view
-/// count only where no ray is near it.
+/// the nearest and the farthest plane: a camera that rotates around a near point moves votes only
+/// on the planes behind it. In an interval of even motion the error is computed from the speed of
+/// the votes; this is exact to one percent, and more often too large than too small. A packet does
+/// not cross a recorded pose: the motion within it is one smooth piece, with its extremes at the
+/// ends. Rays far outside the view count only if no ray is near the view.
 PosePackets splitIntoPosePackets(EventSpan events, const RigCamera& camera,
                                  const UndistortionTable& undistortion,
                                  const Trajectory& trajectory, const PacketGeometry& geometry,

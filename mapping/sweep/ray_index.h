@@ -13,8 +13,8 @@
 
 namespace efm {
 
-/// The rays of all inputs in bins, where a tile finds its rays for a group of planes. An input is a
-/// camera in a slot of the time axis.
+/// The rays of all inputs in bins, where a tile finds its rays for a group of planes. An input is
+/// one slot of one camera (`CameraRays`): the rays of one group of events in one sub-interval.
 class RayIndex {
  public:
   /// @param cameras consumed: each bundle is freed when it lies in bins.
@@ -25,7 +25,8 @@ class RayIndex {
   /// one plane where some rays are not on all planes.
   const std::vector<PlaneGroup>& groups() const { return groups_; }
 
-  /// Input (camera, slot) has the index camera * slots + slot.
+  /// Input (camera, slot) has the index camera * slots + slot, with the slots of all groups of
+  /// events.
   std::size_t inputs() const { return bins_.size(); }
   /// Replaces `rays` by those of an input that the tile may see in a group. Thread-safe.
   void gather(std::size_t group, std::size_t input, const TileCells& tile, TileRays& rays) const;
