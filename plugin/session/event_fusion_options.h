@@ -12,7 +12,7 @@ namespace efm {
 struct EventFusionOptions {
   FusionMapperOptions mapper;
   /// The cloud of a keyframe is the clouds of its single cameras, concatenated: the naive baseline
-  /// (Ghosh and Gallego 2022, Sec. 3.1). Depth maps stay fused.
+  /// (Ghosh and Gallego 2022, Sec. 3.3.1). Depth maps stay fused.
   bool late_fusion = false;
   GlobalCloudOptions cloud;
   MapRefinementOptions refinement;

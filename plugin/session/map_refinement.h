@@ -38,13 +38,14 @@ struct RefinementState {
 };
 
 /// The covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the newest
-/// keyframe's covariance, whose rotation moves the rig across its lever, plus the drift over the
-/// path from the keyframe.
+/// keyframe's covariance, moved to the rig along the lever arm between both, plus the drift over
+/// the distance from the keyframe.
 Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig);
 
-/// Refines keyframes one after the other, by option in a background thread. For use by one thread,
-/// which waits in `finish` only, and in `add` without the background thread. Where that is 50
-/// keyframes behind, the next keyframes lose their points: they keep the tracker's motion.
+/// Refines keyframes one after the other, by option in a background thread. One thread calls it.
+/// `finish` waits for the refinement; `add` waits only without the background thread. If the
+/// background thread is 50 keyframes behind, the next keyframes are added without their points:
+/// they keep the tracker's motion.
 class MapRefinement {
  public:
   /// @throws std::invalid_argument where the options are not valid.

@@ -42,7 +42,7 @@ class RigAssembly {
   std::vector<CameraPacket> add(CameraPacket packet, FusionMapper& mapper);
 
   /// @throws std::invalid_argument where the options name a camera that the rig does not have, or
-  /// its calibration or time offsets are of another number of cameras.
+  /// its calibration or time offsets have another number of cameras.
   void requireOptionsFit() const;
   /// From now on a new camera is an error.
   void complete() { complete_ = true; }

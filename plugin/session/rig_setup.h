@@ -22,7 +22,7 @@ struct RigOptions {
 /// The content of the files that RigOptions name.
 struct RigSetup {
   std::optional<Calibration> calibration;
-  std::optional<Rigid3> T_body_rig;  ///< From the tracked body to the rig.
+  std::optional<Rigid3> T_body_rig;  ///< Pose of the rig on the tracked body.
 };
 
 /// @throws std::runtime_error naming a file that cannot be read or understood.
