@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # PCL gives variables, not targets: wrapped here once, as efm::pcl.
 
-find_package(PCL 1.12 REQUIRED COMPONENTS common filters io kdtree)
+# Without its component io, which needs VTK and Qt.
+find_package(PCL 1.12 REQUIRED COMPONENTS common filters kdtree)
 
 add_library(efm_pcl INTERFACE)
 add_library(efm::pcl ALIAS efm_pcl)
 target_include_directories(efm_pcl SYSTEM INTERFACE ${PCL_INCLUDE_DIRS})
 target_compile_definitions(efm_pcl INTERFACE ${PCL_DEFINITIONS})
 target_link_libraries(efm_pcl INTERFACE
-  ${PCL_COMMON_LIBRARIES} ${PCL_FILTERS_LIBRARIES} ${PCL_IO_LIBRARIES}
-  ${PCL_KDTREE_LIBRARIES})
+  ${PCL_COMMON_LIBRARIES} ${PCL_FILTERS_LIBRARIES} ${PCL_KDTREE_LIBRARIES})

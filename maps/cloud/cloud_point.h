@@ -3,14 +3,20 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <string>
 
 namespace efm {
 
-/// A point of a map. Double, because maps may lie far from the world's origin.
+/// A point of a map. Double, because maps may lie far from the origin of the world.
 struct CloudPoint {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< Metres, frame `world`.
   float confidence = 0;                               ///< Fused ray density at the point, above 0.
   std::uint32_t support = 1;                          ///< Number of keyframes that saw it.
 };
+
+/// For messages, with all digits: "(1, 2.5, -3)".
+std::string positionText(const CloudPoint& point);
+/// For messages, with all digits: "(1, 2.5, -3) with confidence 7".
+std::string pointText(const CloudPoint& point);
 
 }  // namespace efm

@@ -4,39 +4,34 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
-#include <sstream>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
 
 #include "mapping/options/option_check.h"
-#include "maps/cloud/point_text.h"
 
 namespace efm {
 namespace {
 
 [[noreturn]] void refusePoint(const CloudPoint& point, const std::string& why) {
-  std::ostringstream message;
-  message.precision(17);
-  message << pointText(point) << " with confidence " << point.confidence << ": " << why;
-  throw std::invalid_argument(message.str());
+  throw std::invalid_argument("point " + pointText(point) + ": " + why);
 }
 
-constexpr unsigned kReachBits = GlobalCloud::kReach;
+/// Bits for the keyframes with lower numbers; as many for those with higher ones.
+constexpr unsigned kLowerBits = GlobalCloud::kMaxNumberDifference;
 
-/// The bit that stands for a keyframe in what is kept of another's voxels: the numbers below that
-/// one's, from the lowest, then those above.
-unsigned bitOf(std::uint64_t judge, std::uint64_t judged) {
-  return judge < judged ? kReachBits - static_cast<unsigned>(judged - judge)
-                        : kReachBits - 1 + static_cast<unsigned>(judge - judged);
+/// The bit of keyframe `by` in the verdicts of keyframe `checked`. Ascending with the number.
+unsigned bitOf(std::uint64_t by, std::uint64_t checked) {
+  return by < checked ? kLowerBits - static_cast<unsigned>(checked - by)
+                      : kLowerBits - 1 + static_cast<unsigned>(by - checked);
 }
 
-/// The keyframes that the bits of one's voxel stand for.
-void appendNumbers(unsigned bits, std::uint64_t judged, std::vector<std::uint64_t>& numbers) {
-  for (unsigned bit = 0; bit < 2 * kReachBits; ++bit) {
+/// Appends the numbers of the keyframes whose bits are set in the verdicts of keyframe `checked`.
+void appendNumbers(unsigned bits, std::uint64_t checked, std::vector<std::uint64_t>& numbers) {
+  for (unsigned bit = 0; bit < 2 * kLowerBits; ++bit) {
     if ((bits >> bit & 1U) == 0) continue;
-    numbers.push_back(bit < kReachBits ? judged - (kReachBits - bit)
-                                       : judged + (bit - kReachBits + 1));
+    numbers.push_back(bit < kLowerBits ? checked - (kLowerBits - bit)
+                                       : checked + (bit - kLowerBits + 1));
   }
 }
 
@@ -54,7 +49,7 @@ bool GlobalCloud::VoxelIndex::operator<(const VoxelIndex& o) const {
   return std::tie(x, y, z) < std::tie(o.x, o.y, o.z);
 }
 
-void GlobalCloud::Sums::add(const PlacedPoint& point) {
+void GlobalCloud::Sums::add(const VoxelPoint& point) {
   ++count;
   weight += point.weight;
   weighted_offset += point.weight * point.offset;
@@ -81,27 +76,27 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
   const bool consistent = options_.consistency.consistency != Consistency::kNone;
   if (consistent) inserted.verdicts.resize(inserted.voxels.size());
   if (consistent && T_world_ref) {
-    inserted.sight.emplace(inliers, *T_world_ref, options_.consistency);
+    inserted.grid.emplace(inliers, *T_world_ref, options_.consistency);
   }
   keyframes_.emplace(keyframe, std::move(inserted));
-  if (consistent) compareWithOthers(keyframe);
+  if (consistent) checkMutually(keyframe);
 }
 
 void GlobalCloud::requireInsertable(const std::vector<CloudPoint>& points) const {
-  for (const CloudPoint& point : points) place(point);
+  for (const CloudPoint& point : points) voxelPointOf(point);
 }
 
-/// One sum per voxel, sorted.
+/// The sums of each voxel, sorted.
 std::vector<GlobalCloud::Sums> GlobalCloud::voxelsOf(const std::vector<CloudPoint>& points) const {
-  std::vector<PlacedPoint> placed;
-  placed.reserve(points.size());
-  for (const CloudPoint& point : points) placed.push_back(place(point));
-  // Stable: within a voxel, points are summed in the order in which they came.
-  std::stable_sort(placed.begin(), placed.end(),
-                   [](const PlacedPoint& a, const PlacedPoint& b) { return a.index < b.index; });
+  std::vector<VoxelPoint> located;
+  located.reserve(points.size());
+  for (const CloudPoint& point : points) located.push_back(voxelPointOf(point));
+  // Stable: the points of a voxel are summed in their given order.
+  std::stable_sort(located.begin(), located.end(),
+                   [](const VoxelPoint& a, const VoxelPoint& b) { return a.index < b.index; });
 
   std::vector<Sums> voxels;
-  for (const PlacedPoint& point : placed) {
+  for (const VoxelPoint& point : located) {
     if (voxels.empty() || !(voxels.back().index == point.index)) voxels.push_back({point.index});
     voxels.back().add(point);
   }
@@ -109,34 +104,35 @@ std::vector<GlobalCloud::Sums> GlobalCloud::voxelsOf(const std::vector<CloudPoin
   return voxels;
 }
 
-/// visit(number, keyframe) for those that a keyframe of this number is compared with.
+/// Calls visit(number, keyframe) for the keyframes with a number near this one.
 template <typename Visit>
-void GlobalCloud::visitWithinReach(std::uint64_t number, const Visit& visit) {
-  constexpr std::uint64_t kFar = kReach;
-  auto other = keyframes_.lower_bound(number < kFar ? 0 : number - kFar);
+void GlobalCloud::visitNeighbors(std::uint64_t number, const Visit& visit) {
+  constexpr std::uint64_t kMax = kMaxNumberDifference;
+  auto other = keyframes_.lower_bound(number < kMax ? 0 : number - kMax);
   for (; other != keyframes_.end(); ++other) {
-    if (other->first > number && other->first - number > kFar) break;
+    if (other->first > number && other->first - number > kMax) break;
     if (other->first != number) visit(other->first, other->second);
   }
 }
 
-void GlobalCloud::judge(Keyframe& judged, const Keyframe& by, unsigned bit) const {
-  if (!by.sight) return;
-  for (std::size_t i = 0; i < judged.voxels.size(); ++i) {
-    const Verdict verdict = by.sight->verdictOn(positionOf(judged.voxels[i]));
+/// Sets the bit in the verdicts of `checked`, wherever `by` supports or contradicts a voxel.
+void GlobalCloud::check(Keyframe& checked, const Keyframe& by, unsigned bit) const {
+  if (!by.grid) return;
+  for (std::size_t i = 0; i < checked.voxels.size(); ++i) {
+    const Verdict verdict = by.grid->verdictOn(positionOf(checked.voxels[i]));
     if (verdict == Verdict::kUnknown) continue;
-    Verdicts& verdicts = judged.verdicts[i];
+    Verdicts& verdicts = checked.verdicts[i];
     std::uint16_t& bits =
-        verdict == Verdict::kSupports ? verdicts.supports : verdicts.looks_through;
+        verdict == Verdict::kSupports ? verdicts.supports : verdicts.free_space_violations;
     bits = static_cast<std::uint16_t>(bits | 1U << bit);
   }
 }
 
-void GlobalCloud::compareWithOthers(std::uint64_t number) {
+void GlobalCloud::checkMutually(std::uint64_t number) {
   Keyframe& keyframe = keyframes_.at(number);
-  visitWithinReach(number, [&](std::uint64_t other, Keyframe& within_reach) {
-    judge(keyframe, within_reach, bitOf(other, number));
-    judge(within_reach, keyframe, bitOf(number, other));
+  visitNeighbors(number, [&](std::uint64_t other, Keyframe& neighbor) {
+    check(keyframe, neighbor, bitOf(other, number));
+    check(neighbor, keyframe, bitOf(number, other));
   });
 }
 
@@ -144,25 +140,26 @@ void GlobalCloud::remove(std::uint64_t keyframe) {
   if (keyframes_.erase(keyframe) == 0) {
     throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is not in the map");
   }
-  visitWithinReach(keyframe, [&](std::uint64_t other, Keyframe& within_reach) {
+  visitNeighbors(keyframe, [&](std::uint64_t other, Keyframe& neighbor) {
     const unsigned bits_left = ~(1U << bitOf(keyframe, other));
-    for (Verdicts& verdicts : within_reach.verdicts) {
+    for (Verdicts& verdicts : neighbor.verdicts) {
       verdicts.supports = static_cast<std::uint16_t>(verdicts.supports & bits_left);
-      verdicts.looks_through = static_cast<std::uint16_t>(verdicts.looks_through & bits_left);
+      verdicts.free_space_violations =
+          static_cast<std::uint16_t>(verdicts.free_space_violations & bits_left);
     }
   });
 }
 
-bool GlobalCloud::leftOut(const Keyframe& keyframe, std::size_t voxel) const {
+bool GlobalCloud::isExcluded(const Keyframe& keyframe, std::size_t voxel) const {
   if (options_.consistency.consistency != Consistency::kVisibility) return false;
   const Verdicts& verdicts = keyframe.verdicts[voxel];
-  const auto looks_through = std::bitset<16>(verdicts.looks_through).count();
+  const auto violations = std::bitset<16>(verdicts.free_space_violations).count();
   return verdicts.supports == 0 &&
-         looks_through > static_cast<std::size_t>(options_.consistency.max_contradictions);
+         violations > static_cast<std::size_t>(options_.consistency.max_contradictions);
 }
 
-/// Merges the keyframes' sorted voxels: visit(total, support), in the order of voxels. Within a
-/// voxel, keyframes are summed in the order of their numbers.
+/// Merges the sorted voxels of all keyframes, and calls visit(total, support) for each voxel in
+/// order. The keyframes of a voxel are summed in the order of their numbers.
 template <typename Visit>
 void GlobalCloud::visitVoxels(const Visit& visit) const {
   struct Run {
@@ -190,7 +187,7 @@ void GlobalCloud::visitVoxels(const Visit& visit) const {
     while (!runs.empty() && runs.front().index() == total.index) {
       std::pop_heap(runs.begin(), runs.end(), comes_later);
       Run& run = runs.back();
-      if (!leftOut(*run.keyframe, run.next)) {
+      if (!isExcluded(*run.keyframe, run.next)) {
         total.add(run.keyframe->voxels[run.next]);
         supporting.push_back(run.number);
         if (!run.keyframe->verdicts.empty()) {
@@ -224,7 +221,7 @@ std::size_t GlobalCloud::voxels() const {
   return count;
 }
 
-GlobalCloud::PlacedPoint GlobalCloud::place(const CloudPoint& point) const {
+GlobalCloud::VoxelPoint GlobalCloud::voxelPointOf(const CloudPoint& point) const {
   if (!point.p_world.allFinite()) refusePoint(point, "the position is not finite");
   if (!(point.confidence > 0) || !std::isfinite(point.confidence)) {
     refusePoint(point, "the confidence must be finite and above 0");

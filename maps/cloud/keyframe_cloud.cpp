@@ -39,12 +39,12 @@ std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe) {
 
 std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
                                       const Rigid3& T_world_ref) {
-  std::vector<CloudPoint> placed;
-  placed.reserve(points.size());
+  std::vector<CloudPoint> in_world;
+  in_world.reserve(points.size());
   for (const ViewPoint& point : points) {
-    placed.push_back({T_world_ref * point.p_ref.cast<double>(), point.confidence});
+    in_world.push_back({T_world_ref * point.p_ref.cast<double>(), point.confidence});
   }
-  return placed;
+  return in_world;
 }
 
 std::vector<CloudPoint> keyframeCloud(const KeyframeDepthMap& keyframe) {

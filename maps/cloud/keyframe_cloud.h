@@ -10,25 +10,25 @@
 
 namespace efm {
 
-/// A point of a keyframe as its reference view sees it. Float, as the depth map is: what is stored
-/// of a keyframe is exactly what went into the map, wherever in the world that is.
+/// A point of a keyframe in its reference view. Float like the depth map, so a stored keyframe has
+/// exactly the points of the map, anywhere in the world.
 struct ViewPoint {
   Eigen::Vector3f p_ref = Eigen::Vector3f::Zero();  ///< Metres, frame `ref`.
   float confidence = 0;                             ///< Fused ray density at the point, above 0.
 };
 
-/// The points of a keyframe, p_ref = Z * K^-1 (x, y, 1)^T: one for every pixel that has a depth and
-/// a confidence above 0, in the order of the image's rows.
-/// @throws std::invalid_argument where the two images differ in size from the view.
+/// The points of a keyframe, p_ref = Z * K^-1 (x, y, 1)^T: one for each pixel with a depth and a
+/// confidence above 0, row by row.
+/// @throws std::invalid_argument where an image does not have the size of the view.
 std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe);
 
-/// The points of the keyframe's single cameras, one camera after the other: late fusion, the naive
-/// baseline that fusing DSIs is compared with (Ghosh and Gallego 2022, Sec. 3.1). Empty where the
-/// keyframe has no maps of single cameras.
+/// The points of the single cameras of a keyframe, one camera after the other: late fusion, the
+/// baseline for fused DSIs (Ghosh and Gallego 2022, Sec. 3.1). Empty where the keyframe has no maps
+/// of single cameras.
 /// @throws std::invalid_argument as `viewPoints` does.
 std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe);
 
-/// The points in the world, p_world = T_world_ref * p_ref, each with a support of 1.
+/// p_world = T_world_ref * p_ref, each with a support of 1.
 std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
                                       const Rigid3& T_world_ref);
 

@@ -5,31 +5,29 @@
 
 namespace efm {
 
-/// What keyframes say of each other's points.
+/// How keyframes check each other's points.
 enum class Consistency {
-  kNone,        ///< Nothing: only points in the same voxel support each other.
-  kSupport,     ///< A keyframe that sees a point where another one has it supports it.
-  kVisibility,  ///< And what others look through, and none supports, is left out.
+  kNone,        ///< No check: only points in the same voxel support each other.
+  kSupport,     ///< A keyframe supports a point of another one where it has a point, too.
+  kVisibility,  ///< As kSupport; free-space violations without support are excluded.
 };
 
 std::string_view nameOf(Consistency consistency);
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 Consistency consistencyFromName(std::string_view name);
 
 struct ConsistencyOptions {
-  /// The depth of an edge is found in each keyframe anew, from other events: where it is right they
-  /// agree, where it is wrong they seldom do.
+  /// Keyframes measure depth from different events. Their correct depths agree, wrong ones seldom
+  /// do.
   Consistency consistency = Consistency::kVisibility;
-  /// Up to which difference in inverse depth two keyframes mean the same point, as a share of the
-  /// largest inverse depth that they see; over twice as much one looks through the other's. Range:
-  /// 0.001 to 1. Errors of depth are equal in inverse depth, as the planes are: a plane of a
-  /// hundred is 0.01.
+  /// The maximum difference in inverse depth between a point and its support, as a fraction of the
+  /// maximum inverse depth in view. Twice the tolerance in front of all points in view is a
+  /// free-space violation. Range: 0.001 to 1. One of 100 depth planes is 0.01.
   double consistency_tolerance = 0.03;
-  /// Side of the cells in which a keyframe remembers what it saw, as an angle. Range: 0.01 to 10. A
-  /// point is compared with its cell and the eight around it: wide enough for errors of poses.
+  /// Side of the cells of the visibility grid, as an angle. Range: 0.01 to 10. A point is compared
+  /// with its cell and the eight adjacent ones, which must cover the errors of the poses.
   double consistency_cell_deg = 0.5;
-  /// A point that no other keyframe supports is left out where more than so many look through it.
-  /// Range: 0 to 16.
+  /// A point without support is excluded where it has more free-space violations. Range: 0 to 16.
   int max_contradictions = 0;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/cloud/outlier_removal.h"
 
-#include <pcl/filters/radius_outlier_removal.h>
-#include <pcl/point_types.h>
-
 #include "mapping/options/option_check.h"
-#include "maps/cloud/pcl_cloud.h"
+#include "maps/cloud/point_search.h"
 
 namespace efm {
 
@@ -20,16 +17,12 @@ std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
                                        const OutlierRemovalOptions& options) {
   options.validate();
   if (options.outlier_radius_m == 0 || points.empty()) return points;
-  pcl::RadiusOutlierRemoval<pcl::PointXYZ> filter;
-  filter.setInputCloud(pclCloudAround(medianPosition(points), points));
-  filter.setRadiusSearch(options.outlier_radius_m);
-  filter.setMinNeighborsInRadius(options.outlier_min_neighbors);
-  pcl::Indices kept;
-  filter.filter(kept);  // ascending
-
+  const auto offsets = offsetsFrom(medianPosition(points), points);
   std::vector<CloudPoint> inliers;
-  inliers.reserve(kept.size());
-  for (const pcl::index_t index : kept) inliers.push_back(points[static_cast<std::size_t>(index)]);
+  for (const std::size_t index :
+       indicesWithNeighbors(offsets, options.outlier_radius_m, options.outlier_min_neighbors)) {
+    inliers.push_back(points[index]);
+  }
   return inliers;
 }
 

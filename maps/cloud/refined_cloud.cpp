@@ -17,8 +17,8 @@ double radiusOf(const std::vector<ViewPoint>& points) {
   return radius_m;
 }
 
-/// How far a motion moves points within a radius, at most.
-double largestMotion(const Rigid3& from, const Rigid3& to, double radius_m) {
+/// The maximum distance by which a motion moves a point within a radius.
+double maxMotion(const Rigid3& from, const Rigid3& to, double radius_m) {
   return (from.translation - to.translation).norm() +
          radius_m * from.rotation.angularDistance(to.rotation);
 }
@@ -44,16 +44,16 @@ void RefinedCloud::move(std::size_t keyframe, const Rigid3& T_world_ref) {
   pending_[keyframe] = T_world_ref;
 }
 
-void RefinedCloud::applyPending(double tolerance_m, std::size_t most) {
+void RefinedCloud::applyPending(double tolerance_m, std::size_t max_count) {
   std::size_t moved = 0;
-  for (auto next = pending_.begin(); next != pending_.end() && moved < most;) {
+  for (auto next = pending_.begin(); next != pending_.end() && moved < max_count;) {
     const auto [keyframe, T_world_ref] = *next;
     const Rigid3& T_before_ref = T_world_ref_[keyframe];
     const bool stays = isSame(T_before_ref, T_world_ref);
-    // A motion in the last digits has a length of 0.
+    // A motion of the last digits may have a length of 0.
     if (!stays && tolerance_m > 0 &&
-        largestMotion(T_before_ref, T_world_ref, kept_[keyframe].radius_m) <= tolerance_m) {
-      ++next;  // until it is farther, or nothing is tolerated
+        maxMotion(T_before_ref, T_world_ref, kept_[keyframe].radius_m) <= tolerance_m) {
+      ++next;  // it stays pending
       continue;
     }
     next = pending_.erase(next);

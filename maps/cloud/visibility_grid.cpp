@@ -10,20 +10,20 @@
 namespace efm {
 namespace {
 
-/// Farther to the side than this times its depth a point is in no view.
-constexpr double kWidest = 20;  // 87 degrees
-/// The nearest depth is that of all but so many points: a stray one must not set the tolerance.
-constexpr std::size_t kOneOf = 20;
+/// The maximum of |x| / z and |y| / z in a view.
+constexpr double kMaxTangent = 20;  // 87 degrees
+/// One of 20 points may be nearer than the depth that sets the tolerance: it may be an outlier.
+constexpr std::size_t kOneNearerOf = 20;
 
-struct Seen {
+struct GridPoint {
   std::int32_t row;
   std::int32_t column;
   double inverse_depth;
 };
 
-bool isBefore(const Eigen::Vector3d& p_ref) {
-  return p_ref.z() > 0 && std::abs(p_ref.x()) < kWidest * p_ref.z() &&
-         std::abs(p_ref.y()) < kWidest * p_ref.z();
+bool isInFront(const Eigen::Vector3d& p_ref) {
+  return p_ref.z() > 0 && std::abs(p_ref.x()) < kMaxTangent * p_ref.z() &&
+         std::abs(p_ref.y()) < kMaxTangent * p_ref.z();
 }
 
 std::int32_t cellOf(double offset, double cells_per_depth) {
@@ -36,23 +36,24 @@ VisibilityGrid::VisibilityGrid(const std::vector<CloudPoint>& points, const Rigi
                                const ConsistencyOptions& options)
     : T_ref_world_(T_world_ref.inverse()),
       cells_per_unit_(180 / (kPi * options.consistency_cell_deg)) {
-  std::vector<Seen> seen;
+  std::vector<GridPoint> seen;
   seen.reserve(points.size());
   for (const CloudPoint& point : points) {
     const Eigen::Vector3d p_ref = T_ref_world_ * point.p_world;
-    if (!isBefore(p_ref)) continue;
+    if (!isInFront(p_ref)) continue;
     const double inverse_depth = 1 / p_ref.z();
     seen.push_back({cellOf(p_ref.y(), cells_per_unit_ * inverse_depth),
                     cellOf(p_ref.x(), cells_per_unit_ * inverse_depth), inverse_depth});
   }
   if (seen.empty()) return;
 
-  const auto nearest = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / kOneOf);
-  std::nth_element(seen.begin(), nearest, seen.end(),
-                   [](const Seen& a, const Seen& b) { return a.inverse_depth > b.inverse_depth; });
+  const auto nearest = seen.begin() + static_cast<std::ptrdiff_t>(seen.size() / kOneNearerOf);
+  std::nth_element(seen.begin(), nearest, seen.end(), [](const GridPoint& a, const GridPoint& b) {
+    return a.inverse_depth > b.inverse_depth;
+  });
   tolerance_ = options.consistency_tolerance * nearest->inverse_depth;
 
-  std::sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) {
+  std::sort(seen.begin(), seen.end(), [](const GridPoint& a, const GridPoint& b) {
     if (a.row != b.row) return a.row < b.row;
     if (a.column != b.column) return a.column < b.column;
     return a.inverse_depth < b.inverse_depth;
@@ -73,7 +74,7 @@ VisibilityGrid::VisibilityGrid(const std::vector<CloudPoint>& points, const Rigi
 
 Verdict VisibilityGrid::verdictOn(const Eigen::Vector3d& p_world) const {
   const Eigen::Vector3d p_ref = T_ref_world_ * p_world;
-  if (row_begin_.empty() || !isBefore(p_ref)) return Verdict::kUnknown;
+  if (row_begin_.empty() || !isInFront(p_ref)) return Verdict::kUnknown;
   const double inverse_depth = 1 / p_ref.z();
   const std::int32_t row = cellOf(p_ref.y(), cells_per_unit_ * inverse_depth) - first_row_;
   const std::int32_t column = cellOf(p_ref.x(), cells_per_unit_ * inverse_depth);

@@ -12,27 +12,26 @@
 
 namespace efm {
 
-/// What a keyframe says of a point of another one.
+/// What a keyframe finds about a point of another one.
 enum class Verdict {
-  kUnknown,   ///< It saw nothing there, or something nearer that hides the point.
-  kSupports,  ///< It has a point there too.
-  kFreeSpaceViolation,
+  kUnknown,             ///< It has no points there, or nearer ones that hide the point.
+  kSupports,            ///< It has a point there, too.
+  kFreeSpaceViolation,  ///< Its own points are all well behind: the space of the point is free.
 };
 
-/// What a keyframe saw, kept so that points of other keyframes can be compared with it: the
-/// nearest and the farthest of its points in each cell of its view (in x / z and y / z of frame
-/// `ref`). It is made of the keyframe's points and pose alone, so that a stored keyframe gives the
-/// same; which is why the tolerance comes from the depths, not from a variance of each. 12 bytes a
-/// cell.
+/// The visible points of a keyframe, to check the points of other keyframes: the minimum and the
+/// maximum depth in each cell of a grid over its view (x / z and y / z of frame `ref`). It is built
+/// from the points and the pose alone, so a stored keyframe gives the same grid. Therefore the
+/// tolerance depends on the depths, not on a variance per point. 12 bytes a cell.
 class VisibilityGrid {
  public:
-  /// @param points in the world; those that are not before the view's plane are passed over.
+  /// @param points in the world; points behind the view are ignored.
   VisibilityGrid(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref,
                  const ConsistencyOptions& options);
 
-  /// Compares a point with its cell and the eight around it, in inverse depth: any depth within the
-  /// tolerance supports it; where at least two cells were seen and the point is nearer than all of
-  /// them by more than twice the tolerance, the keyframe looks through it.
+  /// Compares the inverse depth of a point with its cell and the eight adjacent ones. A depth
+  /// within the tolerance supports the point. The point violates free space where at least two
+  /// cells have depths and it is nearer than all of them by more than twice the tolerance.
   Verdict verdictOn(const Eigen::Vector3d& p_world) const;
 
  private:
@@ -46,7 +45,7 @@ class VisibilityGrid {
   double cells_per_unit_ = 1;
   double tolerance_ = 0;  // 1/m
   std::int32_t first_row_ = 0;
-  std::vector<std::uint32_t> row_begin_;  // one more than rows; none where nothing was seen
+  std::vector<std::uint32_t> row_begin_;  // one more than rows; empty without points
   std::vector<Cell> cells_;               // by row, then column
 };
 

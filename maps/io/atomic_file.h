@@ -7,22 +7,22 @@
 
 namespace efm {
 
-/// A file under a temporary name until it is complete: whoever looks sees the whole file, the
-/// earlier one, or none. A symbolic link stays, and the file at its end is replaced.
+/// A file that appears under its name when it is complete. Until then it has a temporary name in
+/// the same folder. A reader sees the complete file, the previous one, or none. A symbolic link
+/// stays, and its target is replaced.
 class AtomicFile {
  public:
-  /// @throws std::runtime_error naming `path` where it names no file, or is a folder or a device:
-  /// replacing that would destroy it.
+  /// @throws std::runtime_error naming `path` where it is no file name, or a folder or a device has
+  /// that name.
   explicit AtomicFile(const std::filesystem::path& path);
-  /// Removes the temporary file, if it is there.
+  /// Removes the temporary file.
   ~AtomicFile();
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// The file to replace; it need not exist.
+  /// The file that `replace` creates or replaces.
   const std::filesystem::path& path() const { return path_; }
-  /// The file to write, adjacent to it and with the same extension: "map.partial.pcd" for
-  /// "map.pcd".
+  /// The file to write: "map.partial.pcd" for "map.pcd".
   const std::filesystem::path& temporary() const { return temporary_; }
   /// Renames the complete temporary file. @throws std::filesystem::filesystem_error.
   void replace() const { std::filesystem::rename(temporary_, path_); }
@@ -32,16 +32,16 @@ class AtomicFile {
   std::filesystem::path temporary_;
 };
 
-/// Writes an AtomicFile.
-/// @param write creates the file at the path it is given.
-/// @throws std::runtime_error naming `path` where it cannot be replaced, written or renamed; the
-/// message of an exception of `write` becomes part of it.
+/// Writes a file by an AtomicFile.
+/// @param write creates the file at the path that it receives.
+/// @throws std::runtime_error naming `path` where the file cannot be written or renamed. The
+/// message includes that of `write`.
 void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write);
 
 /// All bytes of a file.
-/// @throws std::runtime_error saying why it cannot be read (there is none, it is no regular file,
-/// it ends before its end), without its name.
+/// @throws std::runtime_error where the file does not exist, is not regular, or cannot be read to
+/// its end. The message does not name the file.
 std::string readBytes(const std::filesystem::path& path);
 
 }  // namespace efm

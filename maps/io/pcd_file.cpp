@@ -1,70 +1,42 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/pcd_file.h"
 
-#include <pcl/io/lzf.h>
+#include <liblzf/lzf.h>
 
 #include <algorithm>
-#include <limits>
+#include <array>
+#include <cmath>
+#include <cstring>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
 #include "mapping/options/quoted_text.h"
 #include "maps/io/point_record.h"
-#include "maps/io/point_row.h"
 #include "maps/io/text_scanner.h"
 
 namespace efm {
 namespace {
 
-// --- Writing ---------------------------------------------------------------------------------
-
-std::string_view nameInFile(PointCloudEncoding encoding) {
-  if (encoding == PointCloudEncoding::kAscii) return "ascii";
-  return encoding == PointCloudEncoding::kBinary ? "binary" : "binary_compressed";
+void writeLittleEndian(std::ostream& stream, float value) {
+  std::uint32_t bits = 0;
+  static_assert(sizeof(bits) == sizeof(value));
+  std::memcpy(&bits, &value, sizeof(bits));
+  const std::array<char, 4> bytes = {
+      static_cast<char>(bits & 0xFFU), static_cast<char>(bits >> 8U & 0xFFU),
+      static_cast<char>(bits >> 16U & 0xFFU), static_cast<char>(bits >> 24U)};
+  stream.write(bytes.data(), bytes.size());
 }
-
-void writeNumber(std::ostream& stream, std::uint32_t value) {
-  for (unsigned shift = 0; shift < 32; shift += 8) {
-    stream.put(static_cast<char>(value >> shift & 0xFFU));
-  }
-}
-
-/// All x, then all y, z and intensities: neighbours resemble each other.
-void writeCompressed(std::ostream& stream, const std::vector<PointRow>& rows) {
-  std::ostringstream by_field;
-  for (std::size_t field = 0; field < PointRow().size(); ++field) {
-    for (const PointRow& row : rows) writeBinary(by_field, row[field]);
-  }
-  const std::string plain = by_field.str();
-  std::string packed(plain.size() + plain.size() / 16 + 64, '\0');  // LZF's worst: 4 % more
-  if (packed.size() > std::numeric_limits<std::uint32_t>::max()) {
-    throw std::runtime_error(std::to_string(rows.size()) +
-                             " points: expected fewer, a compressed file has 32-bit sizes");
-  }
-  unsigned int packed_bytes = 0;
-  if (!plain.empty()) {
-    packed_bytes = pcl::lzfCompress(plain.data(), static_cast<unsigned int>(plain.size()),
-                                    packed.data(), static_cast<unsigned int>(packed.size()));
-    if (packed_bytes == 0) throw std::runtime_error("the points cannot be compressed");
-  }
-  writeNumber(stream, packed_bytes);
-  writeNumber(stream, static_cast<std::uint32_t>(plain.size()));
-  stream.write(packed.data(), static_cast<std::streamsize>(packed_bytes));
-}
-
-// --- Reading ---------------------------------------------------------------------------------
 
 /// The lines of a header by their keys.
 using HeaderLines = std::map<std::string, WordLine, std::less<>>;
 
-HeaderLines readHeaderLines(TextScanner& cursor) {
+HeaderLines readHeaderLines(TextScanner& scanner) {
   constexpr std::string_view kKeys =
       " VERSION FIELDS SIZE TYPE COUNT WIDTH HEIGHT VIEWPOINT POINTS DATA ";
   HeaderLines lines;
   while (lines.count("DATA") == 0) {
-    const WordLine line = wordLine(cursor, "a line of a PCD header, up to DATA");
+    const WordLine line = wordLine(scanner, "a line of a PCD header, up to DATA");
     if (line.words.empty() || line.words[0].front() == '#') continue;
     const std::string key(line.words[0] == "COLUMNS" ? "FIELDS" : line.words[0]);
     if (kKeys.find(" " + key + " ") == std::string_view::npos) {
@@ -136,66 +108,69 @@ std::uint64_t pointsOf(const HeaderLines& lines) {
   return points;
 }
 
-std::uint64_t readNumber(TextScanner& cursor) {
+std::uint64_t readNumber(TextScanner& scanner) {
   std::uint64_t value = 0;
-  const std::string_view bytes = cursor.take(4);
+  const std::string_view bytes = scanner.take(4);
   for (std::size_t i = 4; i-- > 0;) value = value << 8U | static_cast<unsigned char>(bytes[i]);
   return value;
 }
 
-PointCloudContent readCompressed(TextScanner& cursor, std::vector<RecordField> fields,
+PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> fields,
                                  std::uint64_t points) {
   const auto is_padding = [](const RecordField& field) { return field.name == "_"; };
   fields.erase(std::remove_if(fields.begin(), fields.end(), is_padding),
-               fields.end());  // not there
+               fields.end());  // a compressed file does not hold it
 
-  if (cursor.left() < 8) cursor.refuse("expected the sizes of the compressed points, 8 bytes");
-  const std::uint64_t packed_bytes = readNumber(cursor);
-  const std::uint64_t plain_bytes = readNumber(cursor);
+  if (scanner.left() < 8) scanner.refuse("expected the sizes of the compressed points, 8 bytes");
+  const std::uint64_t packed_bytes = readNumber(scanner);
+  const std::uint64_t plain_bytes = readNumber(scanner);
   const std::size_t record_bytes = std::max<std::size_t>(bytesOf(fields), 1);
   if (plain_bytes % record_bytes != 0 || plain_bytes / record_bytes != points) {
-    cursor.refuse(std::to_string(plain_bytes) + " bytes when decompressed: expected " +
-                  std::to_string(points) + " points of " + std::to_string(record_bytes) + " bytes");
+    scanner.refuse(std::to_string(plain_bytes) + " bytes when decompressed: expected " +
+                   std::to_string(points) + " points of " + std::to_string(record_bytes) +
+                   " bytes");
   }
-  constexpr std::uint64_t kBestRatio = 88;  // of LZF: 3 bytes stand for 264 at most
-  if (cursor.left() < packed_bytes || plain_bytes > packed_bytes * kBestRatio) {
-    cursor.refuse(std::to_string(cursor.left()) + " bytes are left: expected " +
-                  std::to_string(packed_bytes) + " that decompress to " +
-                  std::to_string(plain_bytes) + ": is the file cut short?");
+  constexpr std::uint64_t kMaxRatio = 88;  // of LZF: 3 bytes hold 264 at most
+  if (scanner.left() < packed_bytes || plain_bytes > packed_bytes * kMaxRatio) {
+    scanner.refuse(std::to_string(scanner.left()) + " bytes are left: expected " +
+                   std::to_string(packed_bytes) + " that decompress to " +
+                   std::to_string(plain_bytes) + ": is the file cut short?");
   }
   std::string plain(static_cast<std::size_t>(plain_bytes), '\0');
-  const TextScanner packed_place = cursor;
-  const std::string_view packed = cursor.take(static_cast<std::size_t>(packed_bytes));
+  const TextScanner packed_start = scanner;
+  const std::string_view packed = scanner.take(static_cast<std::size_t>(packed_bytes));
   if (!plain.empty() &&
-      pcl::lzfDecompress(packed.data(), static_cast<unsigned int>(packed.size()), plain.data(),
-                         static_cast<unsigned int>(plain.size())) != plain.size()) {
-    packed_place.refuse(std::to_string(packed_bytes) + " compressed bytes: expected " +
+      lzf_decompress(packed.data(), static_cast<unsigned int>(packed.size()), plain.data(),
+                     static_cast<unsigned int>(plain.size())) != plain.size()) {
+    packed_start.refuse(std::to_string(packed_bytes) + " compressed bytes: expected " +
                         std::to_string(plain_bytes) + " when decompressed: is the file damaged?");
   }
-  TextScanner plain_cursor(plain);
-  return readBinaryRecords(plain_cursor, fields, points, {false, true});
+  TextScanner plain_scanner(plain);
+  return readBinaryRecords(plain_scanner, fields, points, {false, true});
 }
 
 }  // namespace
 
-void writePcdTo(std::ostream& stream, const std::vector<CloudPoint>& points,
-                PointCloudEncoding encoding) {
-  const std::vector<PointRow> rows = pointRows(points);
+void writePcdTo(std::ostream& stream, const std::vector<CloudPoint>& points) {
   stream << "# .PCD v0.7 - Point Cloud Data file format\n"
             "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
             "WIDTH "
-         << rows.size() << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << rows.size()
-         << "\nDATA " << nameInFile(encoding) << '\n';
-  if (encoding == PointCloudEncoding::kAscii) return writeText(stream, rows);
-  if (encoding == PointCloudEncoding::kCompressed) return writeCompressed(stream, rows);
-  for (const PointRow& row : rows) {
-    for (const float value : row) writeBinary(stream, value);
+         << points.size() << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << points.size()
+         << "\nDATA binary\n";
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f p_world = points[i].p_world.cast<float>();
+    if (!p_world.allFinite() || !std::isfinite(points[i].confidence)) {
+      throw std::runtime_error("point " + std::to_string(i) + " " + pointText(points[i]) +
+                               ": expected finite numbers within a float's range");
+    }
+    for (const float value : p_world) writeLittleEndian(stream, value);
+    writeLittleEndian(stream, points[i].confidence);
   }
 }
 
 PointCloudContent parsePcd(std::string_view bytes) {
-  TextScanner cursor(bytes);
-  const HeaderLines lines = readHeaderLines(cursor);
+  TextScanner scanner(bytes);
+  const HeaderLines lines = readHeaderLines(scanner);
   const std::vector<RecordField> fields = fieldsOf(lines);
   const std::uint64_t points = pointsOf(lines);
   const WordLine& data = lines.at("DATA");
@@ -203,15 +178,15 @@ PointCloudContent parsePcd(std::string_view bytes) {
 
   PointCloudContent content;
   if (encoding == "ascii") {
-    content = readTextRecords(cursor, fields, points);
+    content = readTextRecords(scanner, fields, points);
   } else if (encoding == "binary") {
-    content = readBinaryRecords(cursor, fields, points, {});
+    content = readBinaryRecords(scanner, fields, points, {});
   } else if (encoding == "binary_compressed") {
-    content = readCompressed(cursor, fields, points);
+    content = readCompressed(scanner, fields, points);
   } else {
     data.refuse("DATA " + inQuotes(encoding) + ": expected ascii, binary or binary_compressed");
   }
-  cursor.expectEnd();
+  scanner.expectEnd();
   return content;
 }
 

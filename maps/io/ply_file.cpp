@@ -8,7 +8,6 @@
 
 #include "mapping/options/quoted_text.h"
 #include "maps/io/point_record.h"
-#include "maps/io/point_row.h"
 #include "maps/io/text_scanner.h"
 
 namespace efm {
@@ -18,7 +17,7 @@ struct PlyElement {
   std::string name;
   std::uint64_t count = 0;
   std::vector<RecordField> fields;
-  std::size_t list_line = 0;  ///< Where it has a property of varying length; 0: it has none.
+  std::size_t list_line = 0;  ///< Number of the line with a list property; 0 without one.
 };
 
 struct PlyHeader {
@@ -72,13 +71,13 @@ void readProperty(const WordLine& line, std::vector<PlyElement>& elements) {
   element.fields.push_back({std::string(line.words[2]), numberType(line, line.words[1]), 1});
 }
 
-PlyHeader readHeader(TextScanner& cursor) {
-  if (cursor.line("ply, as the first line of a PLY file") != "ply") {
+PlyHeader readHeader(TextScanner& scanner) {
+  if (scanner.line("ply, as the first line of a PLY file") != "ply") {
     WordLine{1, {}}.refuse("not a PLY file: expected ply");
   }
   PlyHeader header;
   while (true) {
-    const WordLine line = wordLine(cursor, "a line of a PLY header, up to end_header");
+    const WordLine line = wordLine(scanner, "a line of a PLY header, up to end_header");
     const std::string_view key = line.words.empty() ? std::string_view{} : line.words[0];
     if (key == "comment" || key == "obj_info") continue;
     if (header.format.empty()) {
@@ -96,10 +95,10 @@ PlyHeader readHeader(TextScanner& cursor) {
   }
 }
 
-/// What stands before the vertices.
-void skip(TextScanner& cursor, const PlyElement& element, bool is_text) {
+/// Skips an element before the vertices.
+void skip(TextScanner& scanner, const PlyElement& element, bool is_text) {
   if (is_text) {
-    for (std::uint64_t i = 0; i < element.count; ++i) cursor.line("an element " + element.name);
+    for (std::uint64_t i = 0; i < element.count; ++i) scanner.line("an element " + element.name);
     return;
   }
   if (element.list_line != 0 && element.count != 0) {
@@ -108,37 +107,20 @@ void skip(TextScanner& cursor, const PlyElement& element, bool is_text) {
   }
   const std::size_t bytes = bytesOf(element.fields);
   if (bytes == 0) return;
-  if (cursor.left() / bytes < element.count) {
-    cursor.refuse(std::to_string(cursor.left()) + " bytes are left: expected " +
-                  std::to_string(element.count) + " elements " + printable(element.name) + " of " +
-                  std::to_string(bytes) + " bytes: is the file cut short?");
+  if (scanner.left() / bytes < element.count) {
+    scanner.refuse(std::to_string(scanner.left()) + " bytes are left: expected " +
+                   std::to_string(element.count) + " elements " + printable(element.name) + " of " +
+                   std::to_string(bytes) + " bytes: is the file cut short?");
   }
-  cursor.take(static_cast<std::size_t>(element.count) * bytes);
+  scanner.take(static_cast<std::size_t>(element.count) * bytes);
 }
 
 }  // namespace
 
-void writePlyTo(std::ostream& stream, const std::vector<CloudPoint>& points,
-                PointCloudEncoding encoding) {
-  if (encoding == PointCloudEncoding::kCompressed) {
-    throw std::runtime_error("compressed PLY: expected binary or ASCII, PLY knows no other");
-  }
-  const bool is_text = encoding == PointCloudEncoding::kAscii;
-  const std::vector<PointRow> rows = pointRows(points);
-  stream << "ply\nformat " << (is_text ? "ascii" : "binary_little_endian")
-         << " 1.0\nelement vertex " << rows.size()
-         << "\nproperty float x\nproperty float y\nproperty float z\nproperty float intensity\n"
-            "end_header\n";
-  if (is_text) return writeText(stream, rows);
-  for (const PointRow& row : rows) {
-    for (const float value : row) writeBinary(stream, value);
-  }
-}
-
 PointCloudContent parsePly(std::string_view bytes) {
-  TextScanner cursor(bytes);
-  const PlyHeader header = readHeader(cursor);
-  const WordLine end_of_header{cursor.lineNumber(), {}};
+  TextScanner scanner(bytes);
+  const PlyHeader header = readHeader(scanner);
+  const WordLine end_of_header{scanner.lineNumber(), {}};
   const bool is_text = header.format == "ascii";
   const auto vertex =
       std::find_if(header.elements.begin(), header.elements.end(),
@@ -150,15 +132,15 @@ PointCloudContent parsePly(std::string_view bytes) {
     WordLine{vertex->list_line, {}}.refuse("a list in element vertex: expected single numbers");
   }
   for (auto before = header.elements.begin(); before != vertex; ++before) {
-    skip(cursor, *before, is_text);
+    skip(scanner, *before, is_text);
   }
   PointCloudContent content =
-      is_text ? readTextRecords(cursor, vertex->fields, vertex->count)
-              : readBinaryRecords(cursor, vertex->fields, vertex->count,
+      is_text ? readTextRecords(scanner, vertex->fields, vertex->count)
+              : readBinaryRecords(scanner, vertex->fields, vertex->count,
                                   {header.format == "binary_big_endian", false});
   const bool is_last = std::all_of(vertex + 1, header.elements.end(),
                                    [](const PlyElement& element) { return element.count == 0; });
-  if (is_last) cursor.expectEnd();
+  if (is_last) scanner.expectEnd();
   return content;
 }
 

@@ -16,35 +16,35 @@
 namespace efm {
 namespace {
 
-/// The fields of interest; an intensity may be missing.
+/// The fields of a point. The intensity is optional.
 constexpr std::array<std::string_view, 4> kNames = {"x", "y", "z", "intensity"};
 
 using Values = std::array<double, 4>;
 
-/// Where each of them is among the fields.
-using FieldPlaces = std::array<std::optional<std::size_t>, 4>;
+/// The index of each of them among the fields of the file.
+using FieldIndices = std::array<std::optional<std::size_t>, 4>;
 
-FieldPlaces findFields(const std::vector<RecordField>& fields) {
-  FieldPlaces places;
+FieldIndices findFields(const std::vector<RecordField>& fields) {
+  FieldIndices indices;
   for (std::size_t i = 0; i < kNames.size(); ++i) {
     std::string known;
     for (std::size_t at = 0; at < fields.size(); ++at) {
       known += (known.empty() ? "" : ", ") + printable(fields[at].name);
       if (fields[at].name != kNames[i]) continue;
       const std::string called = "field " + std::string(kNames[i]);
-      if (places[i]) throw std::runtime_error(called + " is there twice: expected it once");
+      if (indices[i]) throw std::runtime_error(called + " is there twice: expected it once");
       if (fields[at].count != 1) {
         throw std::runtime_error(called + " has " + std::to_string(fields[at].count) +
                                  " numbers: expected 1");
       }
-      places[i] = at;
+      indices[i] = at;
     }
-    if (!places[i] && kNames[i] != "intensity") {
+    if (!indices[i] && kNames[i] != "intensity") {
       throw std::runtime_error("no field " + std::string(kNames[i]) +
                                ": expected x, y and z among the fields (" + known + ")");
     }
   }
-  return places;
+  return indices;
 }
 
 void append(PointCloudContent& content, const Values& values) {
@@ -63,7 +63,7 @@ bool parseWhole(std::string_view word, double& value) {
   return number.has_value();
 }
 
-/// Rounds to the type of the field, as a binary file would have it.
+/// Rounds to the type of the field, as a binary file does.
 template <typename Real>
 bool parseReal(std::string_view word, double& value) {
   Real number = 0;
@@ -156,16 +156,16 @@ std::size_t bytesOf(const std::vector<RecordField>& fields) {
   return bytes;
 }
 
-PointCloudContent readTextRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
+PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
                                   std::uint64_t count) {
-  const FieldPlaces places = findFields(fields);
+  const FieldIndices indices = findFields(fields);
   std::size_t numbers = 0;
   for (const RecordField& field : fields) numbers += field.count;
 
   PointCloudContent content;
   for (std::uint64_t i = 0; i < count;) {
     const WordLine line =
-        wordLine(cursor, "point " + std::to_string(i + 1) + " of " + std::to_string(count));
+        wordLine(scanner, "point " + std::to_string(i + 1) + " of " + std::to_string(count));
     if (line.words.empty()) continue;
     if (line.words.size() != numbers) {
       line.refuse("point " + std::to_string(i + 1) + " has " + std::to_string(line.words.size()) +
@@ -180,8 +180,8 @@ PointCloudContent readTextRecords(TextScanner& cursor, const std::vector<RecordF
           line.refuse(printable(fields[at].name) + " " + inQuotes(*word) +
                       ": expected a number of the field's type");
         }
-        for (std::size_t j = 0; j < places.size(); ++j) {
-          if (places[j] == at) values[j] = value;
+        for (std::size_t j = 0; j < indices.size(); ++j) {
+          if (indices[j] == at) values[j] = value;
         }
       }
     }
@@ -191,17 +191,17 @@ PointCloudContent readTextRecords(TextScanner& cursor, const std::vector<RecordF
   return content;
 }
 
-PointCloudContent readBinaryRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
+PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
                                     std::uint64_t count, const RecordOrder& order) {
-  const FieldPlaces places = findFields(fields);
+  const FieldIndices indices = findFields(fields);
   const std::size_t record_bytes = bytesOf(fields);
-  if (cursor.left() / record_bytes < count) {
-    cursor.refuse(std::to_string(cursor.left()) + " bytes are left: expected " +
-                  std::to_string(count) + " points of " + std::to_string(record_bytes) +
-                  " bytes: is the file cut short?");
+  if (scanner.left() / record_bytes < count) {
+    scanner.refuse(std::to_string(scanner.left()) + " bytes are left: expected " +
+                   std::to_string(count) + " points of " + std::to_string(record_bytes) +
+                   " bytes: is the file cut short?");
   }
   const auto points = static_cast<std::size_t>(count);
-  const char* bytes = cursor.take(points * record_bytes).data();
+  const char* bytes = scanner.take(points * record_bytes).data();
 
   PointCloudContent content;
   content.points.reserve(points);
@@ -210,8 +210,8 @@ PointCloudContent readBinaryRecords(TextScanner& cursor, const std::vector<Recor
     std::size_t before = 0;  // bytes of a point in the fields before this one
     for (std::size_t at = 0; at < fields.size(); ++at) {
       const std::size_t size = fields[at].count * sizeOf(fields[at].type);
-      for (std::size_t j = 0; j < places.size(); ++j) {
-        if (places[j] != at) continue;
+      for (std::size_t j = 0; j < indices.size(); ++j) {
+        if (indices[j] != at) continue;
         const std::size_t offset =
             order.by_field ? points * before + i * size : i * record_bytes + before;
         values[j] = numberAt(bytes + offset, fields[at].type, order.big_endian);

@@ -11,7 +11,7 @@
 
 namespace efm {
 
-/// The numbers that PCD and PLY files are made of.
+/// The number types of PCD and PLY files.
 enum class NumberType {
   kInt8,
   kUint8,
@@ -31,14 +31,14 @@ std::size_t sizeOf(NumberType type);
 /// @param at `sizeOf(type)` bytes.
 double numberAt(const char* at, NumberType type, bool big_endian);
 
-/// One field of a point as a file has it: `count` numbers of one type.
+/// One field of a point in a file: `count` numbers of one type.
 struct RecordField {
   std::string name;
   NumberType type = NumberType::kFloat32;
   std::size_t count = 1;
 };
 
-/// How the bytes of points are ordered.
+/// The order of the bytes of points.
 struct RecordOrder {
   bool big_endian = false;
   bool by_field = false;  ///< The first field of all points, then the next; else point by point.
@@ -47,13 +47,13 @@ struct RecordOrder {
 /// Bytes of one point.
 std::size_t bytesOf(const std::vector<RecordField>& fields);
 
-/// The points that a header promises: `count` lines of numbers, blank lines aside, or `count` times
-/// `bytesOf` bytes. What stands behind them is left to the caller.
-/// @throws std::runtime_error naming the place where one is not as it should be or the file ends,
-/// or where no single field is called x, y or z.
-PointCloudContent readTextRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
+/// Reads `count` points: lines of numbers, blank lines aside, or records of `bytesOf(fields)`
+/// bytes. The rest of the file is left to the caller.
+/// @throws std::runtime_error naming the line or byte where a point is malformed or the file ends,
+/// or where a field x, y or z is missing, is there twice, or has more than one number.
+PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
                                   std::uint64_t count);
-PointCloudContent readBinaryRecords(TextScanner& cursor, const std::vector<RecordField>& fields,
+PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
                                     std::uint64_t count, const RecordOrder& order);
 
 }  // namespace efm

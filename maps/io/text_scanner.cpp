@@ -51,9 +51,9 @@ std::uint64_t WordLine::count(std::size_t word) const {
   return *count;
 }
 
-WordLine wordLine(TextScanner& cursor, std::string_view expected) {
-  const std::string_view text = cursor.line(expected);
-  return {cursor.lineNumber(), splitWords(text, " \t")};
+WordLine wordLine(TextScanner& scanner, std::string_view expected) {
+  const std::string_view text = scanner.line(expected);
+  return {scanner.lineNumber(), splitWords(text, " \t")};
 }
 
 }  // namespace efm

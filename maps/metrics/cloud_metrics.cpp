@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/metrics/cloud_metrics.h"
 
-#include <pcl/kdtree/kdtree_flann.h>
-#include <pcl/point_types.h>
-
 #include <algorithm>
 #include <stdexcept>
 
 #include "mapping/options/option_check.h"
-#include "maps/cloud/pcl_cloud.h"
+#include "maps/cloud/point_search.h"
 
 namespace efm {
 namespace {
 
-double shareWithin(const std::vector<double>& distances, double limit_m) {
+double fractionWithin(const std::vector<double>& distances, double limit_m) {
   const auto count = std::count_if(distances.begin(), distances.end(),
                                    [&](double distance) { return distance <= limit_m; });
   return static_cast<double>(count) / static_cast<double>(distances.size());
@@ -24,19 +21,14 @@ double shareWithin(const std::vector<double>& distances, double limit_m) {
 std::vector<double> nearestDistances(const std::vector<CloudPoint>& points,
                                      const std::vector<CloudPoint>& others) {
   if (others.empty()) throw std::invalid_argument("no point to measure distances to");
-  const Eigen::Vector3d middle = medianPosition(others);
-  pcl::KdTreeFLANN<pcl::PointXYZ> tree;
-  tree.setInputCloud(pclCloudAround(middle, others));
-
+  const Eigen::Vector3d origin = medianPosition(others);
+  const PointTree tree(offsetsFrom(origin, others));
+  const std::vector<Eigen::Vector3f> queries = offsetsFrom(origin, points);
   std::vector<double> distances;
   distances.reserve(points.size());
-  pcl::Indices nearest(1);
-  std::vector<float> squared(1);
-  const auto queries = pclCloudAround(middle, points);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    tree.nearestKSearch((*queries)[i], 1, nearest, squared);
-    // The search's own distance is a float's.
-    const CloudPoint& other = others[static_cast<std::size_t>(nearest[0])];
+    // In double: the distance of the search is a float.
+    const CloudPoint& other = others[tree.nearest(queries[i]).index];
     distances.push_back((points[i].p_world - other.p_world).norm());
   }
   return distances;
@@ -70,9 +62,9 @@ CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<Cl
   for (const double distance_m : distances_m) {
     CloudErrors::Step step;
     step.distance_m = distance_m;
-    step.within = shareWithin(to_truth, distance_m);
+    step.within = fractionWithin(to_truth, distance_m);
     step.outliers = 1 - step.within;
-    step.completeness = shareWithin(to_map, distance_m);
+    step.completeness = fractionWithin(to_map, distance_m);
     const double sum = step.within + step.completeness;
     step.f1 = sum > 0 ? 2 * step.within * step.completeness / sum : 0;
     errors.steps.push_back(step);

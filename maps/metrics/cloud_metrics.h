@@ -10,46 +10,45 @@
 
 namespace efm {
 
-/// The distance from each point to the nearest of others, in metres and in the points' order.
-/// Cost: a k-d tree over the others, a search for each point.
-/// @param others at least one.
-/// @throws std::invalid_argument where there is no other point, or one is not finite.
+/// The distance of each point to the nearest of the others, metres, in the order of the points.
+/// Cost: a k-d tree over the others, and a search per point.
+/// @throws std::invalid_argument where there are no others, or a point is not finite.
 std::vector<double> nearestDistances(const std::vector<CloudPoint>& points,
                                      const std::vector<CloudPoint>& others);
 
-/// How a map and the true surfaces, sampled as a cloud, differ. Its points can be no nearer to the
-/// truth than the truth is dense.
+/// The errors of a map against the true surfaces, sampled as a cloud. The spacing of the true
+/// points limits the accuracy that can be measured.
 struct CloudErrors {
-  /// Accuracy: distances from the map's points to the truth, metres.
+  /// Distances from the points of the map to the truth, metres.
   SampleStatistics accuracy;
-  /// The distance that 90 % of the map's points lie within (Seitz et al., CVPR 2006, "accuracy").
+  /// 90 % of the points of the map are within this distance (Seitz et al., CVPR 2006, "accuracy").
   double accuracy_p90_m = 0;
   /// Distances from the true points to the map, metres.
   SampleStatistics completeness_distance;
-  double completeness_distance_p90_m =
-      0;  ///< The distance that 90 % of the true points have the map within.
+  double completeness_distance_p90_m = 0;  ///< 90 % of the true points are within it.
 
-  /// One distance d that the two are held against.
+  /// The results at one distance d.
   struct Step {
     double distance_m = 0;
-    double within = 0;        ///< Share of the map's points at most d from the truth: precision.
-    double outliers = 0;      ///< Share of the map's points farther than d from the truth.
-    double completeness = 0;  ///< Share of the true points at most d from the map (Seitz et al.).
+    double within = 0;        ///< Fraction of the map at most d from the truth: precision.
+    double outliers = 0;      ///< Fraction of the map farther than d from the truth.
+    double completeness = 0;  ///< Fraction of the truth at most d from the map (Seitz et al.).
     double f1 = 0;            ///< Harmonic mean of `within` and `completeness` (Knapitsch et al.,
-                              ///< SIGGRAPH 2017, "F-score"); 0 where both are.
+                              ///< SIGGRAPH 2017, "F-score"); 0 where both are 0.
   };
   std::vector<Step> steps;
 };
 
-/// Distances that suit rooms: 1 cm to 1 m.
+/// 1 cm to 1 m, for rooms.
 std::vector<double> defaultCloudDistances();
 
-/// @param distances_m above 0, in any order; kept in theirs.
+/// @param distances_m above 0, in any order; the steps have the same order.
 /// @throws std::invalid_argument where a cloud is empty, a point is not finite or a distance is not
 /// above 0.
 CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
                         const std::vector<double>& distances_m);
-/// The same with a truth of its own for completeness: `to_find`, what of the surfaces can be found.
+/// The same with another truth for completeness: `to_find`, the part of the surfaces that the
+/// method can find.
 CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
                         const std::vector<CloudPoint>& to_find,
                         const std::vector<double>& distances_m);

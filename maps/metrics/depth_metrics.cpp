@@ -14,9 +14,9 @@ namespace {
 
 constexpr double kDeltaBase = 1.25;
 
-/// Share of the pairs that are so.
+/// Fraction of the pairs that meet a condition.
 template <typename Condition>
-double shareOf(const std::vector<DepthPair>& pairs, Condition condition) {
+double fractionWith(const std::vector<DepthPair>& pairs, Condition condition) {
   if (pairs.empty()) return 0;
   const auto count = std::count_if(pairs.begin(), pairs.end(), condition);
   return static_cast<double>(count) / static_cast<double>(pairs.size());
@@ -43,9 +43,9 @@ double logarithmicError(const DepthPair& pair) {
   return std::log(pair.estimate_m) - std::log(pair.truth_m);
 }
 
-/// Share of the pairs whose disparity is off by more than `limit_px` and 5 %.
-double badShare(const std::vector<DepthPair>& pairs, double focal_baseline, double limit_px) {
-  return shareOf(pairs, [&](const DepthPair& pair) {
+/// Fraction of the pairs with a disparity error over `limit_px` and over 5 %.
+double badPixels(const std::vector<DepthPair>& pairs, double focal_baseline, double limit_px) {
+  return fractionWith(pairs, [&](const DepthPair& pair) {
     const double truth_px = focal_baseline / pair.truth_m;
     const double error_px = std::abs(focal_baseline / pair.estimate_m - truth_px);
     return error_px > limit_px && error_px > 0.05 * truth_px;
@@ -64,11 +64,11 @@ DepthErrors depthErrors(const std::vector<DepthPair>& pairs, std::optional<doubl
   });
   if (focal_baseline) {
     requireOption(*focal_baseline > 0, "focal_baseline", *focal_baseline, "above 0");
-    errors.bad_pix_5px = badShare(pairs, *focal_baseline, 5);
-    errors.bad_pix_3px = badShare(pairs, *focal_baseline, 3);
+    errors.bad_pix_5px = badPixels(pairs, *focal_baseline, 5);
+    errors.bad_pix_3px = badPixels(pairs, *focal_baseline, 3);
   }
 
-  // About its mean, d has no large squares that cancel.
+  // Differences from the mean: no large squares cancel.
   const double mean_d = meanOf(pairs, logarithmicError);
   const double variance_d = meanOf(pairs, [mean_d](const DepthPair& pair) {
     return (logarithmicError(pair) - mean_d) * (logarithmicError(pair) - mean_d);
@@ -81,11 +81,11 @@ DepthErrors depthErrors(const std::vector<DepthPair>& pairs, std::optional<doubl
       meanOf(pairs, [](const DepthPair& pair) { return absoluteError(pair) / pair.estimate_m; });
   for (std::size_t k = 0; k < errors.delta.size(); ++k) {
     const double limit = std::pow(kDeltaBase, static_cast<double>(k + 1));
-    errors.delta[k] = shareOf(pairs, [limit](const DepthPair& pair) {
+    errors.delta[k] = fractionWith(pairs, [limit](const DepthPair& pair) {
       return std::max(pair.estimate_m / pair.truth_m, pair.truth_m / pair.estimate_m) < limit;
     });
   }
-  errors.beyond_tenth = shareOf(
+  errors.beyond_tenth = fractionWith(
       pairs, [](const DepthPair& pair) { return absoluteError(pair) > 0.1 * pair.truth_m; });
   return errors;
 }
@@ -105,7 +105,7 @@ DepthErrors meanOfErrors(const std::vector<DepthErrors>& maps) {
   const auto average = [&](double DepthErrors::*field) {
     mean.*field = mean_over([field](const DepthErrors& map) { return map.*field; });
   };
-  const auto average_if_all_have = [&](std::optional<double> DepthErrors::*field) {
+  const auto average_where_all_have = [&](std::optional<double> DepthErrors::*field) {
     const bool all = std::all_of(given.begin(), given.end(),
                                  [&](const DepthErrors& map) { return (map.*field).has_value(); });
     if (all) mean.*field = mean_over([&](const DepthErrors& map) { return *(map.*field); });
@@ -114,8 +114,8 @@ DepthErrors meanOfErrors(const std::vector<DepthErrors>& maps) {
   average(&DepthErrors::mean_abs_m);
   average(&DepthErrors::median_abs_m);
   average(&DepthErrors::median_inverse);
-  average_if_all_have(&DepthErrors::bad_pix_5px);
-  average_if_all_have(&DepthErrors::bad_pix_3px);
+  average_where_all_have(&DepthErrors::bad_pix_5px);
+  average_where_all_have(&DepthErrors::bad_pix_3px);
   average(&DepthErrors::silog);
   average(&DepthErrors::aerrr);
   average(&DepthErrors::aerrr_by_estimate);

@@ -38,11 +38,11 @@ double bestTruth(const ComparedDepths& depths, cv::Point pixel,
   const double estimate_m = depths.estimate(pixel);
   double best_m = 0;
   double best_error = std::numeric_limits<double>::infinity();
-  const int reach = options.tolerance_px;
-  const int bottom = std::min(depths.truth.rows - 1, pixel.y + reach);
-  const int right = std::min(depths.truth.cols - 1, pixel.x + reach);
-  for (int y = std::max(0, pixel.y - reach); y <= bottom; ++y) {
-    for (int x = std::max(0, pixel.x - reach); x <= right; ++x) {
+  const int tolerance = options.tolerance_px;
+  const int bottom = std::min(depths.truth.rows - 1, pixel.y + tolerance);
+  const int right = std::min(depths.truth.cols - 1, pixel.x + tolerance);
+  for (int y = std::max(0, pixel.y - tolerance); y <= bottom; ++y) {
+    for (int x = std::max(0, pixel.x - tolerance); x <= right; ++x) {
       if (!depths.hasTruth(y, x, options)) continue;
       const double candidate_m = depths.truth(y, x);
       const double error = std::abs(1 / estimate_m - 1 / candidate_m);

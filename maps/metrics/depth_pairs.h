@@ -8,31 +8,32 @@
 
 namespace efm {
 
-/// One pixel where an estimate and a truth stand side by side, z-depths in metres.
+/// The estimate and the truth of a pixel, z-depths in metres.
 struct DepthPair {
   double estimate_m = 0;
   double truth_m = 0;
 };
 
 struct DepthPairingOptions {
-  /// The truth of a pixel is the best within so many columns and rows: the one nearest in inverse
-  /// depth. 1 forgives silhouettes, where an edge may fall on the far background. Range: 0 to 100.
+  /// The truth of a pixel is the one nearest in inverse depth within this number of columns and
+  /// rows. 1 tolerates silhouettes, where an edge pixel may fall on the far background. Range: 0 to
+  /// 100.
   int tolerance_px = 0;
-  /// Truth farther than this counts as none. Above 0.
+  /// Farther truths are ignored. Above 0.
   double max_depth_m = std::numeric_limits<double>::infinity();
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// Whether a pixel of a depth map (metres) has a value: 0, negative, infinite and NaN are none.
+/// Whether a pixel of a depth map (metres) has a depth: finite and above 0.
 inline bool isDepth(float depth_m) { return std::isfinite(depth_m) && depth_m > 0; }
 
-/// A depth map and its truth, of the same size; metres.
+/// A depth map and its truth, of the same size, metres.
 struct ComparedDepths {
   cv::Mat1f estimate;
   cv::Mat1f truth;
-  cv::Mat1b mask;  ///< Pixels of both maps that count: not 0. Empty: all.
+  cv::Mat1b mask;  ///< Pixels that are evaluated: not 0. Empty: all.
 
   bool counts(int y, int x) const { return mask.empty() || mask(y, x) != 0; }
   bool hasEstimate(int y, int x) const { return counts(y, x) && isDepth(estimate(y, x)); }
@@ -43,11 +44,11 @@ struct ComparedDepths {
   void validate() const;
 };
 
-/// The truth that an estimate at a pixel is held against, in metres; 0 where there is none within
+/// The truth that the estimate at a pixel is compared with, metres; 0 where there is none within
 /// the tolerance.
 double bestTruth(const ComparedDepths& depths, cv::Point pixel, const DepthPairingOptions& options);
 
-/// The pairs of all pixels where both maps have a depth, in the order of the image's rows.
+/// The pairs of all pixels where both maps have a depth, row by row.
 /// @throws std::invalid_argument where the maps differ in size or the options are not valid.
 std::vector<DepthPair> pairDepths(const ComparedDepths& depths,
                                   const DepthPairingOptions& options = {});

@@ -12,34 +12,34 @@
 namespace efm {
 namespace {
 
-double shareOf(std::uint64_t part, std::uint64_t whole) {
+double fractionOf(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// The smallest error of the estimates within the tolerance around a pixel with a truth, in
-/// metres; infinite where there is none.
-double nearestEstimate(const ComparedDepths& depths, cv::Point pixel, int reach) {
+/// The minimum error of the estimates within the tolerance around a pixel with a truth, metres;
+/// infinite without estimates.
+double minError(const ComparedDepths& depths, cv::Point pixel, int tolerance) {
   const double truth_m = depths.truth(pixel);
-  double nearest_m = std::numeric_limits<double>::infinity();
-  const int bottom = std::min(depths.estimate.rows - 1, pixel.y + reach);
-  const int right = std::min(depths.estimate.cols - 1, pixel.x + reach);
-  for (int y = std::max(0, pixel.y - reach); y <= bottom; ++y) {
-    for (int x = std::max(0, pixel.x - reach); x <= right; ++x) {
+  double min_m = std::numeric_limits<double>::infinity();
+  const int bottom = std::min(depths.estimate.rows - 1, pixel.y + tolerance);
+  const int right = std::min(depths.estimate.cols - 1, pixel.x + tolerance);
+  for (int y = std::max(0, pixel.y - tolerance); y <= bottom; ++y) {
+    for (int x = std::max(0, pixel.x - tolerance); x <= right; ++x) {
       if (!depths.hasEstimate(y, x)) continue;
-      nearest_m = std::min(nearest_m, std::abs(depths.estimate(y, x) - truth_m));
+      min_m = std::min(min_m, std::abs(depths.estimate(y, x) - truth_m));
     }
   }
-  return nearest_m;
+  return min_m;
 }
 
 }  // namespace
 
 double PrecisionRecall::precision(std::size_t step) const {
-  return shareOf(steps.at(step).correct_estimates, estimates);
+  return fractionOf(steps.at(step).correct_estimates, estimates);
 }
 
 double PrecisionRecall::recall(std::size_t step) const {
-  return shareOf(steps.at(step).found_truths, truths);
+  return fractionOf(steps.at(step).found_truths, truths);
 }
 
 double PrecisionRecall::f1(std::size_t step) const {
@@ -88,7 +88,7 @@ PrecisionRecall precisionRecall(const ComparedDepths& depths,
       }
       if (depths.hasTruth(y, x, options)) {
         ++counts.truths;
-        const double error_m = nearestEstimate(depths, {x, y}, options.tolerance_px);
+        const double error_m = minError(depths, {x, y}, options.tolerance_px);
         for (PrecisionRecall::Step& step : counts.steps) {
           if (error_m <= step.threshold_m) ++step.found_truths;
         }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "mapping/depth/median.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
@@ -27,29 +28,29 @@ SampleStatistics statisticsOf(const std::vector<double>& values) {
     differences += (value - statistics.mean) * (value - statistics.mean);
   }
   statistics.stddev = std::sqrt(differences / count);
-  const auto [least, largest] = std::minmax_element(values.begin(), values.end());
-  statistics.min = *least;
-  statistics.max = *largest;
+  const auto [min, max] = std::minmax_element(values.begin(), values.end());
+  statistics.min = *min;
+  statistics.max = *max;
   statistics.median = medianOf(values);
   return statistics;
 }
 
 double medianOf(std::vector<double> values) {
   if (values.empty()) return 0;
+  const double upper = upperMedian(values);
+  if (values.size() % 2 == 1) return upper;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  if (values.size() % 2 == 1) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+  return 0.5 * (upper + *std::max_element(values.begin(), middle));
 }
 
-double quantileOf(std::vector<double> values, double share) {
-  requireOption(share > 0 && share <= 1, "share", share, "above 0 and at most 1");
+double quantileOf(std::vector<double> values, double fraction) {
+  requireOption(fraction > 0 && fraction <= 1, "fraction", fraction, "above 0 and at most 1");
   if (values.empty()) return 0;
-  // The slack is for shares like 0.9, whose product with ten is a little over nine.
-  const double rank = std::ceil(share * static_cast<double>(values.size()) * (1 - 1e-12));
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(std::max(1.0, rank)) - 1;
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
+  // The slack is for fractions like 0.9, whose product with 10 is a little above 9.
+  const double rank = std::ceil(fraction * static_cast<double>(values.size()) * (1 - 1e-12));
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(std::max(1.0, rank)) - 1;
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
 }
 
 }  // namespace efm

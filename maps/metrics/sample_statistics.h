@@ -6,7 +6,7 @@
 
 namespace efm {
 
-/// What a list of numbers is like. All are 0 where there is none.
+/// All are 0 for an empty list.
 struct SampleStatistics {
   std::uint64_t count = 0;
   double rms = 0;  ///< Root of the mean square.
@@ -19,11 +19,12 @@ struct SampleStatistics {
 
 SampleStatistics statisticsOf(const std::vector<double>& values);
 
-/// The value in the middle; of an even number the mean of the two in the middle; 0 of none.
+/// The middle value, or the mean of the two middle values; 0 for an empty list.
 double medianOf(std::vector<double> values);
 
-/// The smallest of the values that at least this share of them does not exceed; 0 of none.
-/// @param share above 0, at most 1.
-double quantileOf(std::vector<double> values, double share);
+/// The smallest value that is at least as large as this fraction of the values; 0 for an empty
+/// list.
+/// @param fraction above 0, at most 1.
+double quantileOf(std::vector<double> values, double fraction);
 
 }  // namespace efm

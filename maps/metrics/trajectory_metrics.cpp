@@ -15,8 +15,10 @@
 namespace efm {
 namespace {
 
-/// Of the second largest spread of positions, against the largest (both squared): below it a line.
-constexpr double kLine = 1e-12;
+/// Positions lie on a line where the ratio of their second to their first singular value is
+/// smaller.
+constexpr double kMaxLineRatio = 1e-12;
+/// Maximum error of a spacing, as a fraction of it.
 constexpr double kMaxSpacingError = 0.2;
 
 using Positions = Eigen::Matrix3Xd;
@@ -25,7 +27,7 @@ void requireSpread(const Positions& positions, const char* whose) {
   const Positions centred = positions.colwise() - positions.rowwise().mean();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(centred * centred.transpose());
   const Eigen::Vector3d& spreads = svd.singularValues();
-  if (spreads[1] > kLine * spreads[0]) return;
+  if (spreads[1] > kMaxLineRatio * spreads[0]) return;
   throw std::invalid_argument(std::string("the ") + whose +
                               " positions lie on a line: no rotation of least squares");
 }
@@ -50,38 +52,38 @@ Rigid3 umeyama(const std::vector<PosePair>& pairs) {
           T_world_map.topRightCorner<3, 1>()};
 }
 
-/// How far each pair lies along the trajectory, in the spacing's unit; never decreases.
-std::vector<double> placesAlong(const std::vector<PosePair>& pairs, RelativeSpacing::Unit unit) {
-  std::vector<double> places;
-  places.reserve(pairs.size());
+/// The position of each pair along the trajectory, in the unit of the spacing. Never decreases.
+std::vector<double> positionsAlong(const std::vector<PosePair>& pairs, RelativeSpacing::Unit unit) {
+  std::vector<double> positions;
+  positions.reserve(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (unit == RelativeSpacing::Unit::kFrames) {
-      places.push_back(static_cast<double>(i));
+      positions.push_back(static_cast<double>(i));
     } else if (unit == RelativeSpacing::Unit::kSeconds) {
-      places.push_back(secondsBetween(pairs.front().t_ns, pairs[i].t_ns));
+      positions.push_back(secondsBetween(pairs.front().t_ns, pairs[i].t_ns));
     } else if (i == 0) {
-      places.push_back(0);
+      positions.push_back(0);
     } else {
       const Eigen::Vector3d step =
           pairs[i].T_world_rig.translation - pairs[i - 1].T_world_rig.translation;
-      places.push_back(places.back() + step.norm());
+      positions.push_back(positions.back() + step.norm());
     }
   }
-  return places;
+  return positions;
 }
 
-/// The place nearest to `target` from place `first` on, off by less than `limit`.
-std::optional<std::size_t> nearestPlace(const std::vector<double>& places, std::size_t first,
+/// The index, from `first` on, of the position nearest to `target`, off by less than `limit`.
+std::optional<std::size_t> nearestIndex(const std::vector<double>& positions, std::size_t first,
                                         double target, double limit) {
-  const auto begin = places.begin() + static_cast<std::ptrdiff_t>(first);
-  auto nearest = std::lower_bound(begin, places.end(), target);
+  const auto begin = positions.begin() + static_cast<std::ptrdiff_t>(first);
+  auto nearest = std::lower_bound(begin, positions.end(), target);
   if (nearest != begin &&
-      (nearest == places.end() || target - *(nearest - 1) <= *nearest - target)) {
-    // Equal places may stand before: the first of them.
+      (nearest == positions.end() || target - *(nearest - 1) <= *nearest - target)) {
+    // The first of equal positions.
     nearest = std::lower_bound(begin, nearest, *(nearest - 1));
   }
-  if (nearest == places.end() || !(std::abs(*nearest - target) < limit)) return std::nullopt;
-  return static_cast<std::size_t>(nearest - places.begin());
+  if (nearest == positions.end() || !(std::abs(*nearest - target) < limit)) return std::nullopt;
+  return static_cast<std::size_t>(nearest - positions.begin());
 }
 
 }  // namespace
@@ -116,11 +118,11 @@ PoseErrors relativeErrors(const std::vector<PosePair>& pairs, const RelativeSpac
   requireOption(spacing.amount > 0 && std::isfinite(spacing.amount) &&
                     (!frames || std::floor(spacing.amount) == spacing.amount),
                 "spacing", spacing.amount, "above 0, of frames a whole number");
-  const std::vector<double> places = placesAlong(pairs, spacing.unit);
+  const std::vector<double> positions = positionsAlong(pairs, spacing.unit);
   PoseErrors errors;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const auto j =
-        nearestPlace(places, i, places[i] + spacing.amount, kMaxSpacingError * spacing.amount);
+    const auto j = nearestIndex(positions, i, positions[i] + spacing.amount,
+                                kMaxSpacingError * spacing.amount);
     if (!j || *j == i) continue;
     const Rigid3 T_ti_tj = pairs[i].T_world_rig.inverse() * pairs[*j].T_world_rig;
     const Rigid3 T_ei_ej = pairs[i].T_map_rig.inverse() * pairs[*j].T_map_rig;
@@ -132,7 +134,7 @@ PoseErrors relativeErrors(const std::vector<PosePair>& pairs, const RelativeSpac
 }
 
 double trueLength(const std::vector<PosePair>& pairs) {
-  return pairs.empty() ? 0 : placesAlong(pairs, RelativeSpacing::Unit::kMetres).back();
+  return pairs.empty() ? 0 : positionsAlong(pairs, RelativeSpacing::Unit::kMetres).back();
 }
 
 }  // namespace efm

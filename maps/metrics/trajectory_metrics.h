@@ -8,49 +8,49 @@
 
 namespace efm {
 
-/// How an estimated trajectory is laid over the true one before absolute errors are taken.
+/// How an estimated trajectory is aligned with the true one before its absolute errors are taken.
 enum class TrajectoryAlignment {
-  kSe3,     ///< The rotation and translation of least squares over all positions; no scale.
+  kSe3,     ///< Least squares over all positions: rotation and translation, no scale.
   kOrigin,  ///< The first poses coincide.
-  kNone,    ///< As they are.
+  kNone,    ///< Not aligned.
 };
 
-/// T_world_map, which lays the estimate over the truth. SE(3) is that of Umeyama (PAMI 1991) with
-/// scale 1, as evo and rpg_trajectory_evaluation (Zhang and Scaramuzza, IROS 2018, Sec. III) use.
-/// @throws std::invalid_argument where there is no pair, or, for SE(3), fewer than three or all
-/// positions on a line: a turn about that line changes nothing.
+/// T_world_map, which aligns the estimate with the truth. SE(3) is the method of Umeyama (PAMI
+/// 1991) with scale 1, as in evo and rpg_trajectory_evaluation (Zhang and Scaramuzza, IROS 2018,
+/// Sec. III).
+/// @throws std::invalid_argument without pairs; for SE(3) with fewer than three pairs, or where all
+/// positions lie on a line: the rotation about that line is not determined.
 Rigid3 alignTrajectories(const std::vector<PosePair>& pairs, TrajectoryAlignment alignment);
 
-/// An error per pair, in their order.
+/// One error per pair, in the order of the pairs.
 struct PoseErrors {
   std::vector<double> translation_m;
   std::vector<double> rotation_rad;  ///< The angle of the rotation between the two, 0 to pi.
 };
 
-/// Absolute trajectory error: |p_truth - p_estimate| and the angle between the rotations, the
-/// estimate laid over the truth by T_world_map. Their root mean squares are "ATE" (Sturm et al.,
+/// Absolute trajectory error: |p_truth - p_estimate| and the angle between the rotations, with the
+/// estimate aligned by T_world_map. Their root mean squares are the "ATE" (Sturm et al.,
 /// IROS 2012; Zhang and Scaramuzza, IROS 2018; evo's `evo_ape` with translation_part and
 /// angle_rad).
 PoseErrors absoluteErrors(const std::vector<PosePair>& pairs, const Rigid3& T_world_map);
 
-/// How far apart the two poses of a relative error are.
+/// The distance between the two poses of a relative error.
 struct RelativeSpacing {
   enum class Unit {
-    kFrames,   ///< So many pairs on: `evo_rpe --delta_unit f --all_pairs`.
-    kMetres,   ///< So far along the true path: sub-trajectories as Geiger et al., CVPR 2012.
-    kSeconds,  ///< So long: Sturm et al., IROS 2012.
+    kFrames,   ///< Number of pairs: `evo_rpe --delta_unit f --all_pairs`.
+    kMetres,   ///< True path length: sub-trajectories as in Geiger et al., CVPR 2012.
+    kSeconds,  ///< Duration: Sturm et al., IROS 2012.
   };
   Unit unit = Unit::kFrames;
-  double amount = 1;  ///< Above 0; of frames a whole number.
+  double amount = 1;  ///< Above 0; a whole number of frames.
 };
 
-/// Relative pose error: of every pair that has another so far on, the motion between the two is
-/// held against the true one, E = (T_truth_i^-1 T_truth_j)^-1 (T_est_i^-1 T_est_j) (Sturm et al.,
-/// IROS 2012, Eq. 1); its translation's length and its rotation's angle are the errors. No
-/// alignment has a part in it. Of metres and seconds, the other end is the pair nearest to so far
-/// on (the first of equals), off by less than a fifth of the spacing, as rpg_trajectory_evaluation
-/// has it.
-/// @throws std::invalid_argument where the spacing is not as said.
+/// Relative pose error: the motion from each pair i to the pair j at the given spacing is compared
+/// with the true motion, E = (T_truth_i^-1 T_truth_j)^-1 (T_est_i^-1 T_est_j) (Sturm et al., IROS
+/// 2012, Eq. 1). The errors are the length of its translation and the angle of its rotation. They
+/// do not depend on an alignment. In metres and seconds, j is the pair nearest to the spacing (the
+/// first of several), off by less than a fifth of it, as in rpg_trajectory_evaluation.
+/// @throws std::invalid_argument where the spacing is out of its range.
 PoseErrors relativeErrors(const std::vector<PosePair>& pairs, const RelativeSpacing& spacing);
 
 /// The length of the path through the true positions, metres.

@@ -10,14 +10,17 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <random>
 #include <set>
+
+#include "test/maps/cloud/cloud_points.h"
+#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
 
 using testing::HasSubstr;
+using testing::ThrowsMessage;
 
 using Keyframes = std::vector<std::vector<CloudPoint>>;
 
@@ -30,22 +33,6 @@ std::vector<CloudPoint> randomPoints(std::mt19937& random, int count, double ext
         {{coordinate(random), coordinate(random), coordinate(random)}, confidence(random)});
   }
   return points;
-}
-
-GlobalCloud cloudOf(const Keyframes& keyframes, const std::vector<std::size_t>& order,
-                    const GlobalCloudOptions& options) {
-  GlobalCloud cloud(options);
-  for (const std::size_t number : order) cloud.insert(number, keyframes[number]);
-  return cloud;
-}
-
-void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].p_world, b[i].p_world) << "point " << i;
-    EXPECT_EQ(a[i].confidence, b[i].confidence) << "point " << i;
-    EXPECT_EQ(a[i].support, b[i].support) << "point " << i;
-  }
 }
 
 TEST(GlobalCloud, MeanOfAVoxelIsWorkedOutByHand) {
@@ -73,7 +60,7 @@ TEST(GlobalCloud, SupportCountsKeyframesNotPoints) {
   EXPECT_EQ(cloud.points()[0].support, 1U);
 }
 
-TEST(GlobalCloud, ExportKeepsWhatEnoughKeyframesSupport) {
+TEST(GlobalCloud, ExportsPointsWithEnoughSupport) {
   GlobalCloud cloud({1.0, 2});
   cloud.insert(0, {{{0.5, 0.5, 0.5}, 1.0F}, {{5.5, 0.5, 0.5}, 1.0F}});
   cloud.insert(1, {{{0.5, 0.5, 0.5}, 1.0F}});
@@ -131,21 +118,7 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
   }
 }
 
-RC_GTEST_PROP(GlobalCloud, OrderOfInsertionDoesNotMatterBitForBit, ()) {
-  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
-  Keyframes keyframes;
-  for (int k = 0; k < 6; ++k) keyframes.push_back(randomPoints(random, 100, 1.0));
-  std::vector<std::size_t> order(keyframes.size());
-  std::iota(order.begin(), order.end(), 0U);
-  const std::vector<CloudPoint> in_order = cloudOf(keyframes, order, {0.4, 1}).points();
-
-  std::shuffle(order.begin(), order.end(), random);
-  const std::vector<CloudPoint> shuffled = cloudOf(keyframes, order, {0.4, 1}).points();
-
-  expectSameBits(in_order, shuffled);
-}
-
-RC_GTEST_PROP(GlobalCloud, IsAsIfWhatWasRemovedHadNeverBeenThereBitForBit, ()) {
+RC_GTEST_PROP(GlobalCloud, DependsOnItsKeyframesAloneBitForBit, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   std::uniform_int_distribution<std::uint64_t> number(0, 7);
   std::uniform_int_distribution<int> count(0, 120);
@@ -164,28 +137,11 @@ RC_GTEST_PROP(GlobalCloud, IsAsIfWhatWasRemovedHadNeverBeenThereBitForBit, ()) {
     GlobalCloud fresh({0.4, 1});
     for (const auto& [fresh_number, points] : inside) fresh.insert(fresh_number, points);
     for (const int min_keyframes : {1, 2, 4}) {
-      expectSameBits(cloud.points(min_keyframes), fresh.points(min_keyframes));
+      RC_ASSERT(test::sameBits(cloud.points(min_keyframes), fresh.points(min_keyframes)));
     }
     RC_ASSERT(cloud.voxels() == fresh.voxels());
     RC_ASSERT(cloud.keyframes() == inside.size());
   }
-}
-
-RC_GTEST_PROP(GlobalCloud, RemovalAndReinsertionOfTheSamePointsChangeNoBit, ()) {
-  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
-  Keyframes keyframes;
-  GlobalCloud cloud({0.4, 2});
-  for (std::uint64_t k = 0; k < 6; ++k) {
-    keyframes.push_back(randomPoints(random, 100, 1.0));
-    cloud.insert(k, keyframes.back());
-  }
-  const std::vector<CloudPoint> before = cloud.points();
-
-  const auto refined = static_cast<std::size_t>(*rc::gen::inRange(0, 6));
-  cloud.remove(refined);
-  cloud.insert(refined, keyframes[refined]);
-
-  expectSameBits(before, cloud.points());
 }
 
 TEST(GlobalCloud, SupportIsThatOfTheKeyframesThatRemain) {
@@ -202,29 +158,6 @@ TEST(GlobalCloud, SupportIsThatOfTheKeyframesThatRemain) {
   cloud.insert(0, {{{5.7, 0.5, 0.5}, 1.0F}});  // refined: it moved by five voxels
   ASSERT_EQ(cloud.points().size(), 1U);
   EXPECT_NEAR(cloud.points()[0].p_world.x(), 5.6, 1e-15);
-}
-
-TEST(GlobalCloud, IsEmptyWhenTheLastKeyframeLeaves) {
-  GlobalCloud cloud;
-  cloud.insert(4, {{{0, 0, 0}, 1.0F}});
-  cloud.remove(4);
-
-  EXPECT_EQ(cloud.voxels(), 0U);
-  EXPECT_EQ(cloud.keyframes(), 0U);
-  EXPECT_TRUE(cloud.points().empty());
-}
-
-TEST(GlobalCloud, AKeyframeThatIsNotInTheMapCannotBeRemoved) {
-  GlobalCloud cloud;
-  cloud.insert(4, {{{0, 0, 0}, 1.0F}});
-  try {
-    cloud.remove(3);
-    FAIL() << "accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("keyframe 3 is not in the map"));
-  }
-  cloud.remove(4);
-  EXPECT_THROW(cloud.remove(4), std::invalid_argument);
 }
 
 TEST(GlobalCloud, OutliersOfAKeyframeStayOutsideEvenWhereAnotherKeyframeHasPoints) {
@@ -280,27 +213,24 @@ TEST(GlobalCloud, ARefusedKeyframeLeavesNothingBehind) {
   EXPECT_NO_THROW(cloud.insert(3, {{{0, 0, 0}, 1.0F}}));
 }
 
-TEST(GlobalCloud, AKeyframeIsInsertedOnce) {
+TEST(GlobalCloud, NumbersAreUniqueAndKnown) {
   GlobalCloud cloud;
-  cloud.insert(7, {{{0, 0, 0}, 1.0F}});
-
-  EXPECT_THROW(cloud.insert(7, {}), std::invalid_argument);
+  cloud.insert(4, {{{0, 0, 0}, 1.0F}});
+  EXPECT_THAT([&] { cloud.remove(3); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("keyframe 3 is not in the map")));
+  EXPECT_THAT([&] { cloud.insert(4, {}); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("keyframe 4 is in the map already")));
+  cloud.remove(4);
+  EXPECT_THROW(cloud.remove(4), std::invalid_argument);
+  EXPECT_EQ(cloud.keyframes(), 0U);
 }
 
-TEST(GlobalCloudOptions, ValuesOutOfRangeAreNamed) {
+TEST(GlobalCloudOptions, ValuesOutOfRangeAreRefusedByName) {
+  test::expectRefused(&GlobalCloudOptions::voxel_size_m, 0, "voxel_size_m = 0: must be");
+  test::expectRefused(&GlobalCloudOptions::min_keyframes, 0, "min_keyframes = 0");
+  test::expectRefused(&GlobalCloudOptions::outliers, {0, 0}, "outlier_min_neighbors = 0");
   GlobalCloudOptions options;
-  options.voxel_size_m = 0;
-  try {
-    options.validate();
-    FAIL() << "accepted";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("voxel_size_m = 0: must be"));
-  }
-  options = {};
   options.min_keyframes = 0;
-  EXPECT_THROW(GlobalCloud{options}, std::invalid_argument);
-  options = {};
-  options.outliers.outlier_min_neighbors = 0;
   EXPECT_THROW(GlobalCloud{options}, std::invalid_argument);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What keyframes say of each other's points, and what becomes of the map by it.
+// Keyframes check each other's points.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,11 +9,12 @@
 #include <random>
 
 #include "maps/cloud/global_cloud.h"
+#include "test/maps/cloud/cloud_points.h"
 
 namespace efm {
 namespace {
 
-struct Seen {
+struct View {
   std::vector<CloudPoint> points;
   Rigid3 T_world_ref;
 };
@@ -27,7 +28,7 @@ GlobalCloudOptions withConsistency(Consistency consistency) {
 
 Rigid3 viewAt(double x_m) { return {Eigen::Quaterniond::Identity(), {x_m, 0, 0}}; }
 
-/// A wall at z = 3 m as a view sees it, each point off along its ray by a random share of its
+/// The view of a wall at z = 3 m. Each point is off along its ray by a random fraction of its
 /// inverse depth, up to `noise`.
 std::vector<CloudPoint> wallSeenFrom(const Rigid3& T_world_ref, double noise,
                                      std::mt19937& random) {
@@ -42,12 +43,12 @@ std::vector<CloudPoint> wallSeenFrom(const Rigid3& T_world_ref, double noise,
   return points;
 }
 
-/// Views side by side, each with a fiftieth of its points somewhere before the wall.
-std::vector<Seen> viewsWithOutliers(std::mt19937& random, int count) {
+/// Adjacent views. One of 50 points lies in front of the wall.
+std::vector<View> viewsWithOutliers(std::mt19937& random, int count) {
   std::uniform_real_distribution<double> wrong(1.2, 2.2);
-  std::vector<Seen> views;
+  std::vector<View> views;
   for (int k = 0; k < count; ++k) {
-    Seen seen{{}, viewAt(0.05 * k)};
+    View seen{{}, viewAt(0.05 * k)};
     seen.points = wallSeenFrom(seen.T_world_ref, 0.015, random);
     for (std::size_t i = 0; i < seen.points.size(); i += 50) {
       Eigen::Vector3d& p_world = seen.points[i].p_world;
@@ -65,18 +66,9 @@ std::size_t outliersIn(const std::vector<CloudPoint>& points) {
   }));
 }
 
-void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].p_world, b[i].p_world) << "point " << i;
-    EXPECT_EQ(a[i].confidence, b[i].confidence) << "point " << i;
-    EXPECT_EQ(a[i].support, b[i].support) << "point " << i;
-  }
-}
-
-TEST(MapConsistency, PointsThatOthersLookThroughAreLeftOutAndTheWallIsNot) {
+TEST(MapConsistency, FreeSpaceViolationsAreExcludedAndTheWallIsNot) {
   std::mt19937 random(1);
-  const std::vector<Seen> views = viewsWithOutliers(random, 5);
+  const std::vector<View> views = viewsWithOutliers(random, 5);
   GlobalCloud plain(withConsistency(Consistency::kNone));
   GlobalCloud support(withConsistency(Consistency::kSupport));
   GlobalCloud visible(withConsistency(Consistency::kVisibility));
@@ -91,13 +83,13 @@ TEST(MapConsistency, PointsThatOthersLookThroughAreLeftOutAndTheWallIsNot) {
   EXPECT_LT(outliersIn(visible.points()), outliers / 10);
   EXPECT_EQ(visible.points().size() - outliersIn(visible.points()),
             plain.points().size() - outliers);
-  EXPECT_LT(outliersIn(support.points(2)), outliers / 10) << "nobody else saw them";
+  EXPECT_LT(outliersIn(support.points(2)), outliers / 10) << "without support";
   EXPECT_GT(support.points(2).size(), (plain.points().size() - outliers) * 99 / 100)
       << "though the voxels of a point are rarely the same in two keyframes:";
   EXPECT_LT(plain.points(3).size(), plain.points().size() / 2);
 }
 
-TEST(MapConsistency, SupportCountsThoseWhoSawThePointBesideThoseWhoHaveItInTheVoxel) {
+TEST(MapConsistency, SupportCountsKeyframesWithAPointInTheVoxelOrNearIt) {
   std::mt19937 random(1);
   GlobalCloud cloud(withConsistency(Consistency::kSupport));
   cloud.insert(10, {{{0.21, 0.01, 2.93}, 1.0F}}, viewAt(0));
@@ -109,10 +101,10 @@ TEST(MapConsistency, SupportCountsThoseWhoSawThePointBesideThoseWhoHaveItInTheVo
   const auto lone = std::find_if(points.begin(), points.end(),
                                  [](const auto& p) { return p.p_world.z() == 2.93; });
   ASSERT_NE(lone, points.end());
-  EXPECT_EQ(lone->support, 3U) << "10, 11 and 18; 19 is out of reach";
+  EXPECT_EQ(lone->support, 3U) << "10, 11 and 18; 19 is too far from 10";
 }
 
-TEST(MapConsistency, AKeyframeThatHasAPointAndSawTheOthersSupportsItOnce) {
+TEST(MapConsistency, AKeyframeWithAPointSupportsItOnce) {
   const std::vector<CloudPoint> point = {{{0.21, 0.01, 2.93}, 1.0F}};
   GlobalCloud cloud(withConsistency(Consistency::kSupport));
   for (std::uint64_t keyframe = 0; keyframe < 3; ++keyframe) {
@@ -122,7 +114,7 @@ TEST(MapConsistency, AKeyframeThatHasAPointAndSawTheOthersSupportsItOnce) {
   }
 }
 
-TEST(MapConsistency, AKeyframeWithoutAPoseIsJudgedButDoesNotJudge) {
+TEST(MapConsistency, AKeyframeWithoutAPoseIsCheckedAndChecksNoOther) {
   std::mt19937 random(1);
   const std::vector<CloudPoint> stray = {{{0.01, 0.01, 1.5}, 1.0F}};
   for (const bool posed : {false, true}) {
@@ -134,7 +126,7 @@ TEST(MapConsistency, AKeyframeWithoutAPoseIsJudgedButDoesNotJudge) {
   }
 }
 
-TEST(MapConsistency, SoManyMayLookThroughAPointAsTheOptionSays) {
+TEST(MapConsistency, APointMayHaveAsManyViolationsAsTheOptionAllows) {
   std::mt19937 random(1);
   for (int allowed = 0; allowed <= 3; ++allowed) {
     GlobalCloudOptions options = withConsistency(Consistency::kVisibility);
@@ -148,7 +140,7 @@ TEST(MapConsistency, SoManyMayLookThroughAPointAsTheOptionSays) {
   }
 }
 
-TEST(MapConsistency, APointThatASecondKeyframeSawStaysThoughOthersLookThroughIt) {
+TEST(MapConsistency, APointWithSupportStaysInSpiteOfViolations) {
   std::mt19937 random(1);
   GlobalCloudOptions options = withConsistency(Consistency::kVisibility);
   options.consistency.max_contradictions = 0;
@@ -162,7 +154,7 @@ TEST(MapConsistency, APointThatASecondKeyframeSawStaysThoughOthersLookThroughIt)
   }
 }
 
-TEST(MapConsistency, PointsOnATrueSurfaceSeenFromManyPosesAreNeverLeftOut) {
+TEST(MapConsistency, PointsOnATrueSurfaceAreNeverExcluded) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> shift(-0.5, 0.5);
@@ -174,8 +166,7 @@ TEST(MapConsistency, PointsOnATrueSurfaceSeenFromManyPosesAreNeverLeftOut) {
       const Rigid3 T_world_ref{
           Eigen::Quaterniond(Eigen::AngleAxisd(axis.norm(), axis.normalized())),
           {shift(random), shift(random), shift(random)}};
-      // What stands before the wall hides it from some: a pole that is seen in full from
-      // everywhere.
+      // A pole hides a part of the wall.
       std::vector<CloudPoint> points = wallSeenFrom(viewAt(0), 0.01, random);
       for (int y = -100; y <= 100; ++y) points.push_back({{0.1, 0.01 * y, 1.5}, 1.0F});
       const Eigen::Vector3d eye = T_world_ref.translation;
@@ -195,12 +186,12 @@ TEST(MapConsistency, PointsOnATrueSurfaceSeenFromManyPosesAreNeverLeftOut) {
   }
 }
 
-TEST(MapConsistency, TheMapDependsOnWhatIsInItAloneBitForBit) {
+TEST(MapConsistency, TheMapDependsOnItsKeyframesAloneBitForBit) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
-    const std::vector<Seen> views = viewsWithOutliers(random, 12);
+    const std::vector<View> views = viewsWithOutliers(random, 12);
     const auto insert = [&](GlobalCloud& cloud, std::size_t k) {
-      cloud.insert(3 * k, views[k].points, views[k].T_world_ref);  // some are out of reach
+      cloud.insert(3 * k, views[k].points, views[k].T_world_ref);  // some are not checked
     };
     std::vector<std::size_t> order(views.size());
     std::iota(order.begin(), order.end(), 0U);
@@ -218,8 +209,8 @@ TEST(MapConsistency, TheMapDependsOnWhatIsInItAloneBitForBit) {
       if (k % 4 != 1) insert(other, k);  // a keyframe that is refined, or goes for good
     }
 
-    expectSameBits(other.points(), in_order.points());
-    expectSameBits(other.points(3), in_order.points(3));
+    EXPECT_TRUE(test::sameBits(other.points(), in_order.points()));
+    EXPECT_TRUE(test::sameBits(other.points(3), in_order.points(3)));
   }
 }
 

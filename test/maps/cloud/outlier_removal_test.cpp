@@ -10,11 +10,12 @@
 #include <limits>
 #include <random>
 
+#include "test/maps/refusals.h"
+
 namespace efm {
 namespace {
 
 using testing::ElementsAre;
-using testing::HasSubstr;
 
 /// Points on the x axis, numbered by their confidence from 1 on.
 std::vector<CloudPoint> onALine(const std::vector<double>& xs) {
@@ -33,8 +34,8 @@ std::vector<float> numbers(const std::vector<CloudPoint>& points) {
 
 /// Points on a lattice of eighths of a metre, which float has exactly, in a box around `middle`.
 std::vector<CloudPoint> latticePoints(std::mt19937& random, int count,
-                                      const Eigen::Vector3d& middle, int reach) {
-  std::uniform_int_distribution<int> eighths(-reach, reach);
+                                      const Eigen::Vector3d& middle, int radius) {
+  std::uniform_int_distribution<int> eighths(-radius, radius);
   std::vector<CloudPoint> points;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d offset(eighths(random), eighths(random), eighths(random));
@@ -67,7 +68,7 @@ TEST(RemoveOutliers, KeepsPointsWithEnoughOthersWithinTheRadius) {
   EXPECT_THAT(numbers(removeOutliers(points, {100, 6})), ElementsAre());
 }
 
-TEST(RemoveOutliers, PointsInOnePlaceAreNeighbors) {
+TEST(RemoveOutliers, PointsAtOnePositionAreNeighbors) {
   EXPECT_EQ(removeOutliers(onALine({3, 3, 3, 7}), {1e-6, 2}).size(), 3U);
 }
 
@@ -81,7 +82,7 @@ TEST(RemoveOutliers, OfFewPointsIsDefined) {
   EXPECT_EQ(removeOutliers(onALine({5, 5}), {1, 1}).size(), 2U);
 }
 
-RC_GTEST_PROP(RemoveOutliers, KeepsWhatBruteForceKeepsAThousandKilometresFromTheOriginToo, ()) {
+RC_GTEST_PROP(RemoveOutliers, KeepsWhatBruteForceKeepsAtAnyDistanceFromTheOrigin, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   const auto middle = *rc::gen::element(0.0, 1e6);
   const std::vector<CloudPoint> points = latticePoints(
@@ -93,7 +94,7 @@ RC_GTEST_PROP(RemoveOutliers, KeepsWhatBruteForceKeepsAThousandKilometresFromThe
   RC_ASSERT(numbers(removeOutliers(points, options)) == survivorsByBruteForce(points, options));
 }
 
-TEST(RemoveOutliers, AStrayPointFarAwayDoesNotBlurTheOthers) {
+TEST(RemoveOutliers, AFarOutlierDoesNotReduceThePrecisionOfTheOthers) {
   // From the middle of the bounds, 5e8 m away, floats would be 32 m apart.
   std::vector<CloudPoint> points = onALine({0, 0.01, 0.02, 0.03, 0.5, 1e9});
 
@@ -107,19 +108,11 @@ TEST(RemoveOutliers, PointsThatAreNotFiniteAreRefused) {
   EXPECT_THROW(removeOutliers(onALine({0, 1e30}), {1, 1}), std::invalid_argument);
 }
 
-TEST(OutlierRemovalOptions, ValuesOutOfRangeAreNamed) {
-  const auto refusal = [](const OutlierRemovalOptions& options) -> std::string {
-    try {
-      options.validate();
-    } catch (const std::invalid_argument& error) {
-      return error.what();
-    }
-    return "accepted";
-  };
-  EXPECT_THAT(refusal({-1, 3}), HasSubstr("outlier_radius_m = -1: must be"));
-  EXPECT_THAT(refusal({std::nan(""), 3}), HasSubstr("outlier_radius_m = nan: must be"));
-  EXPECT_THAT(refusal({0.1, 0}), HasSubstr("outlier_min_neighbors = 0: must be"));
-  EXPECT_EQ(refusal({}), "accepted");
+TEST(OutlierRemovalOptions, ValuesOutOfRangeAreRefusedByName) {
+  using Options = OutlierRemovalOptions;
+  test::expectRefused(&Options::outlier_radius_m, -1, "outlier_radius_m = -1: must be");
+  test::expectRefused(&Options::outlier_radius_m, std::nan(""), "outlier_radius_m = nan: must be");
+  test::expectRefused(&Options::outlier_min_neighbors, 0, "outlier_min_neighbors = 0: must be");
 }
 
 }  // namespace

@@ -9,31 +9,33 @@
 #include <random>
 #include <stdexcept>
 
+#include "test/maps/cloud/cloud_points.h"
+
 namespace efm {
 namespace {
 
 Rigid3 randomPose(std::mt19937& random, double extent_m, double extent_rad) {
-  std::uniform_real_distribution<double> share(-1, 1);
+  std::uniform_real_distribution<double> uniform(-1, 1);
   const auto draw = [&] {
-    const double x = share(random);
-    const double y = share(random);
-    return Eigen::Vector3d(x, y, share(random));
+    const double x = uniform(random);
+    const double y = uniform(random);
+    return Eigen::Vector3d(x, y, uniform(random));
   };
-  const Eigen::Vector3d turn = extent_rad * draw();
+  const Eigen::Vector3d rotation = extent_rad * draw();
   Rigid3 T_world_ref;
-  T_world_ref.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized());
+  T_world_ref.rotation = Eigen::AngleAxisd(rotation.norm(), rotation.normalized());
   T_world_ref.translation = extent_m * draw();
   return T_world_ref;
 }
 
-/// Points before a view, on a surface that all views from near the origin share.
+/// Points in front of a view, on a surface that all views share.
 std::vector<ViewPoint> randomPoints(std::mt19937& random, std::size_t count) {
-  std::uniform_real_distribution<float> share(-1, 1);
+  std::uniform_real_distribution<float> uniform(-1, 1);
   std::vector<ViewPoint> points;
   while (points.size() < count) {
-    const float x = share(random);
-    const float y = share(random);
-    points.push_back({{x, y, 2 + 0.2F * share(random)}, 1 + share(random) / 2});
+    const float x = uniform(random);
+    const float y = uniform(random);
+    points.push_back({{x, y, 2 + 0.2F * uniform(random)}, 1 + uniform(random) / 2});
   }
   return points;
 }
@@ -45,19 +47,12 @@ GlobalCloudOptions optionsOf(Consistency consistency) {
   return options;
 }
 
-bool sameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  return a.size() == b.size() &&
-         std::equal(a.begin(), a.end(), b.begin(), [](const CloudPoint& p, const CloudPoint& q) {
-           return p.p_world == q.p_world && p.confidence == q.confidence && p.support == q.support;
-         });
-}
-
-/// What stands in a map, by and by put into another one, which then is as if nothing ever moved.
-struct Placed {
+/// Keyframes, and a new map of them.
+struct PosedKeyframes {
   std::vector<std::vector<ViewPoint>> points;
   std::vector<Rigid3> T_world_ref;
 
-  std::vector<CloudPoint> afresh(const GlobalCloudOptions& options) const {
+  std::vector<CloudPoint> pointsOf(const GlobalCloudOptions& options) const {
     GlobalCloud cloud(options);
     for (std::size_t i = 0; i < points.size(); ++i) {
       cloud.insert(i, pointsInWorld(points[i], T_world_ref[i]), T_world_ref[i]);
@@ -66,53 +61,27 @@ struct Placed {
   }
 };
 
-class RefinedCloudOf : public testing::TestWithParam<Consistency> {};
-
-INSTANTIATE_TEST_SUITE_P(EachConsistency, RefinedCloudOf,
-                         testing::Values(Consistency::kNone, Consistency::kSupport,
-                                         Consistency::kVisibility),
-                         [](const auto& at) {
-                           return at.param == Consistency::kNone      ? "None"
-                                  : at.param == Consistency::kSupport ? "Support"
-                                                                      : "Visibility";
-                         });
-
-TEST_P(RefinedCloudOf, KeyframesThatWereMovedStandAsIfTheyHadBeenPutThere) {
-  std::mt19937 random(1);
-  const GlobalCloudOptions options = optionsOf(GetParam());
-  RefinedCloud cloud(options, true);
-  Placed placed;
-  for (int i = 0; i < 12; ++i) {
-    placed.points.push_back(randomPoints(random, 200));
-    cloud.insert(placed.points.back(), randomPose(random, 0.2, 0.1));
-    placed.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
-  }
-  for (std::size_t i = 0; i < 12; ++i) cloud.move(i, placed.T_world_ref[i]);
-  cloud.applyPending(0);
-  EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
-}
-
-/// Keyframes of an earlier map, new ones, motions and settlings in any order.
+/// Keyframes of an earlier map, new ones, motions and `applyPending` in any order.
 void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
   std::mt19937 random(seed);
   RefinedCloud cloud(options, true);
-  Placed placed;
+  PosedKeyframes keyframes;
   const std::size_t fixed = random() % 4;
   for (std::size_t i = 0; i < fixed; ++i) {
-    placed.points.push_back(randomPoints(random, random() % 80));
-    placed.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
-    cloud.insertFixed(pointsInWorld(placed.points[i], placed.T_world_ref[i]),
-                      placed.T_world_ref[i]);
+    keyframes.points.push_back(randomPoints(random, random() % 80));
+    keyframes.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
+    cloud.insertFixed(pointsInWorld(keyframes.points[i], keyframes.T_world_ref[i]),
+                      keyframes.T_world_ref[i]);
   }
-  std::vector<Rigid3> asked = placed.T_world_ref;
+  std::vector<Rigid3> asked = keyframes.T_world_ref;
   for (int step = 0; step < 40; ++step) {
-    const std::size_t count = placed.points.size() - fixed;
+    const std::size_t count = keyframes.points.size() - fixed;
     const unsigned what = random() % 4;
     if (what == 0 || count == 0) {
-      placed.points.push_back(randomPoints(random, random() % 80));
-      placed.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
-      asked.push_back(placed.T_world_ref.back());
-      cloud.insert(placed.points.back(), placed.T_world_ref.back());
+      keyframes.points.push_back(randomPoints(random, random() % 80));
+      keyframes.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
+      asked.push_back(keyframes.T_world_ref.back());
+      cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
     } else if (what < 3) {
       const std::size_t moved = random() % count;
       const double extent = std::pow(10.0, -static_cast<double>(random() % 5));
@@ -121,45 +90,45 @@ void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
     } else {
       cloud.applyPending(random() % 2 == 0 ? 0 : 0.01, random() % 6);
     }
-    // The map is what it says it is, settled or not.
-    for (std::size_t i = 0; i < placed.points.size() - fixed; ++i) {
-      placed.T_world_ref[fixed + i] = cloud.T_world_ref()[i];
+    // The map has the poses that it states, pending or not.
+    for (std::size_t i = 0; i < keyframes.points.size() - fixed; ++i) {
+      keyframes.T_world_ref[fixed + i] = cloud.T_world_ref()[i];
     }
-    RC_ASSERT(sameBits(cloud.cloud().points(), placed.afresh(options)));
+    RC_ASSERT(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
   }
   cloud.applyPending(0);
   for (std::size_t i = fixed; i < asked.size(); ++i) {
     RC_ASSERT(isSame(cloud.T_world_ref()[i - fixed], asked[i]));
   }
-  placed.T_world_ref = asked;
-  RC_ASSERT(sameBits(cloud.cloud().points(), placed.afresh(options)));
+  keyframes.T_world_ref = asked;
+  RC_ASSERT(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
 }
 
-RC_GTEST_PROP(RefinedCloud, IsWhatAFreshMapOfTheSameKeyframesIs, ()) {
+RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
   checkAnyOrder(optionsOf(Consistency::kNone), *rc::gen::arbitrary<unsigned>());
 }
 
-RC_GTEST_PROP(RefinedCloud, IsWhatAFreshMapIsWhereKeyframesJudgeEachOther, ()) {
+RC_GTEST_PROP(RefinedCloud, IsANewMapWhereKeyframesCheckEachOther, ()) {
   checkAnyOrder(optionsOf(Consistency::kVisibility), *rc::gen::arbitrary<unsigned>());
 }
 
-TEST(RefinedCloud, WhatIsOffByLessThanToleratedStays) {
+TEST(RefinedCloud, AKeyframeWithinTheToleranceStays) {
   std::mt19937 random(2);
   RefinedCloud cloud(optionsOf(Consistency::kNone), true);
   for (int i = 0; i < 2; ++i) cloud.insert({{{0, 0, 2}, 1}, {{0, 0, 4}, 1}}, {});
   Rigid3 T_shifted;
   T_shifted.translation = {0.003, 0, 0};
-  Rigid3 T_turned;  // 4 m away: 0.004 m
-  T_turned.rotation = Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitY());
+  Rigid3 T_rotated;  // 4 m away: 0.004 m
+  T_rotated.rotation = Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitY());
   cloud.move(0, T_shifted);
-  cloud.move(1, T_turned);
+  cloud.move(1, T_rotated);
 
   cloud.applyPending(0.0045);
   EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {}));
   EXPECT_TRUE(isSame(cloud.T_world_ref()[1], {}));
   cloud.applyPending(0.0035);
   EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {}));
-  EXPECT_TRUE(isSame(cloud.T_world_ref()[1], T_turned));
+  EXPECT_TRUE(isSame(cloud.T_world_ref()[1], T_rotated));
   cloud.applyPending(0.0025);
   EXPECT_TRUE(isSame(cloud.T_world_ref()[0], T_shifted));
 }
@@ -178,7 +147,7 @@ TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
   }
 }
 
-TEST(RefinedCloud, SmallMotionsAddUpUntilTheyAreNotTolerated) {
+TEST(RefinedCloud, SmallMotionsAddUpToTheTolerance) {
   RefinedCloud cloud(optionsOf(Consistency::kNone), true);
   cloud.insert({{{0, 0, 2}, 1}}, {});
   Rigid3 T_world_ref;
@@ -191,7 +160,7 @@ TEST(RefinedCloud, SmallMotionsAddUpUntilTheyAreNotTolerated) {
   EXPECT_GT(cloud.T_world_ref()[0].translation.x(), 0);
 }
 
-TEST(RefinedCloud, MovesTheOldestFirstAndNoMoreThanAsked) {
+TEST(RefinedCloud, MovesTheOldestFirstUpToTheMaximum) {
   RefinedCloud cloud(optionsOf(Consistency::kNone), true);
   Rigid3 T_world_ref;
   T_world_ref.translation = {1, 0, 0};
@@ -214,42 +183,28 @@ TEST(RefinedCloud, MovesTheOldestFirstAndNoMoreThanAsked) {
   EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2, 3, 4}));
 }
 
-TEST(RefinedCloud, WhatCannotBeMovedStaysWhereItWas) {
+TEST(RefinedCloud, AKeyframeThatCannotBeMovedKeepsItsPose) {
   std::mt19937 random(3);
   const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
   RefinedCloud cloud(options, true);
-  Placed placed;
+  PosedKeyframes keyframes;
   for (int i = 0; i < 3; ++i) {
-    placed.points.push_back(randomPoints(random, 50));
-    placed.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
-    cloud.insert(placed.points.back(), placed.T_world_ref.back());
+    keyframes.points.push_back(randomPoints(random, 50));
+    keyframes.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
+    cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
   }
   for (const double too_far_m : {1e30, std::numeric_limits<double>::quiet_NaN()}) {
     Rigid3 T_world_ref;
     T_world_ref.translation = {too_far_m, 0, 0};
     cloud.move(1, T_world_ref);
     EXPECT_THROW(cloud.applyPending(0), std::invalid_argument);
-    EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
+    EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
     EXPECT_NO_THROW(cloud.applyPending(0)) << "it is not tried again";
   }
-  placed.T_world_ref[1] = randomPose(random, 0.1, 0.1);
-  cloud.move(1, placed.T_world_ref[1]);
+  keyframes.T_world_ref[1] = randomPose(random, 0.1, 0.1);
+  cloud.move(1, keyframes.T_world_ref[1]);
   cloud.applyPending(0);
-  EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
-}
-
-TEST(RefinedCloud, ThatNeverMovesIsAGlobalCloud) {
-  std::mt19937 random(4);
-  const GlobalCloudOptions options = optionsOf(Consistency::kSupport);
-  RefinedCloud cloud(options, false);
-  Placed placed;
-  for (int i = 0; i < 4; ++i) {
-    placed.points.push_back(randomPoints(random, 50));
-    placed.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
-    cloud.insert(placed.points.back(), placed.T_world_ref.back());
-  }
-  cloud.applyPending(0);
-  EXPECT_TRUE(sameBits(cloud.cloud().points(), placed.afresh(options)));
+  EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
 }
 
 }  // namespace

@@ -7,9 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <stdexcept>
+
+#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
@@ -33,49 +34,49 @@ std::vector<CloudPoint> wall() {
   return points;
 }
 
-TEST(VisibilityGrid, SupportsWhatItSawAndLooksThroughWhatIsWellBeforeIt) {
-  const VisibilityGrid sight(wall(), {}, options());
-  // The tolerance is 0.05 / 2 m = 0.025 / m: agreement from 1 / 0.525 to 1 / 0.475 m, looking
-  // through before 1 / 0.55 m.
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2}), Verdict::kSupports);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.91}), Verdict::kSupports);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2.10}), Verdict::kSupports);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.89}), Verdict::kUnknown);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.83}), Verdict::kUnknown) << "neither this nor that";
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 1.81}), Verdict::kFreeSpaceViolation);
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0.3}), Verdict::kFreeSpaceViolation);
+TEST(VisibilityGrid, SupportsPointsOnTheWallAndPointsInFrontViolateFreeSpace) {
+  const VisibilityGrid grid(wall(), {}, options());
+  // The tolerance is 0.05 / 2 m = 0.025 / m: support from 1 / 0.525 to 1 / 0.475 m, a violation in
+  // front of 1 / 0.55 m.
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 2}), Verdict::kSupports);
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.91}), Verdict::kSupports);
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 2.10}), Verdict::kSupports);
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.89}), Verdict::kUnknown);
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.83}), Verdict::kUnknown) << "neither";
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.81}), Verdict::kFreeSpaceViolation);
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 0.3}), Verdict::kFreeSpaceViolation);
 }
 
-TEST(VisibilityGrid, SaysNothingOfWhatTheWallHidesOrWhereItSawNothing) {
-  const VisibilityGrid sight(wall(), {}, options());
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 2.2}), Verdict::kUnknown) << "behind the wall";
-  EXPECT_EQ(sight.verdictOn({1.2, 0, 1.5}), Verdict::kUnknown) << "beside it";
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, -2}), Verdict::kUnknown) << "behind the view";
-  EXPECT_EQ(sight.verdictOn({0.1, 0.1, 0}), Verdict::kUnknown);
-  EXPECT_EQ(sight.verdictOn({1e12, 0.1, 1e-9}), Verdict::kUnknown) << "far to the side";
+TEST(VisibilityGrid, HiddenAndUnseenPointsAreUnknown) {
+  const VisibilityGrid grid(wall(), {}, options());
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 2.2}), Verdict::kUnknown) << "behind the wall";
+  EXPECT_EQ(grid.verdictOn({1.2, 0, 1.5}), Verdict::kUnknown) << "outside of it";
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, -2}), Verdict::kUnknown) << "behind the view";
+  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 0}), Verdict::kUnknown);
+  EXPECT_EQ(grid.verdictOn({1e12, 0.1, 1e-9}), Verdict::kUnknown) << "far to the side";
 }
 
-TEST(VisibilityGrid, ASingleCellBehindIsTooLittleToLookThroughAPoint) {
+TEST(VisibilityGrid, ASingleCellBehindIsNoFreeSpace) {
   EXPECT_EQ(VisibilityGrid({{{0, 0, 2}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
             Verdict::kUnknown);
 }
 
-TEST(VisibilityGrid, AnEdgeBeforeTheWallIsSeenThoughTheWallIsInItsCellToo) {
+TEST(VisibilityGrid, AnEdgeInFrontOfTheWallIsSupportedInTheSameCell) {
   std::vector<CloudPoint> points = wall();
   points.push_back({{0.05, 0, 1}, 1.0F});
-  const VisibilityGrid sight(points, {}, options());
-  EXPECT_EQ(sight.verdictOn({0.05, 0.01, 1}), Verdict::kSupports);
-  EXPECT_EQ(sight.verdictOn({0.10, 0, 2}), Verdict::kSupports) << "the wall in the same cell";
-  EXPECT_EQ(sight.verdictOn({0.06, 0, 1.5}), Verdict::kUnknown) << "hidden by the edge";
+  const VisibilityGrid grid(points, {}, options());
+  EXPECT_EQ(grid.verdictOn({0.05, 0.01, 1}), Verdict::kSupports);
+  EXPECT_EQ(grid.verdictOn({0.10, 0, 2}), Verdict::kSupports) << "the wall in the same cell";
+  EXPECT_EQ(grid.verdictOn({0.06, 0, 1.5}), Verdict::kUnknown) << "hidden by the edge";
 }
 
-TEST(VisibilityGrid, OfNothingItSaysNothing) {
+TEST(VisibilityGrid, WithoutPointsAllIsUnknown) {
   EXPECT_EQ(VisibilityGrid({}, {}, options()).verdictOn({0, 0, 1}), Verdict::kUnknown);
   EXPECT_EQ(VisibilityGrid({{{0, 0, -1}, 1.0F}}, {}, options()).verdictOn({0, 0, 1}),
             Verdict::kUnknown);
 }
 
-RC_GTEST_PROP(VisibilityGrid, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWorldsFrame, ()) {
+RC_GTEST_PROP(VisibilityGrid, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWorld, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   std::uniform_real_distribution<double> side(-1, 1);
   std::uniform_real_distribution<double> depth(1, 5);
@@ -87,23 +88,23 @@ RC_GTEST_PROP(VisibilityGrid, VerdictsDependNeitherOnTheOrderOfPointsNorOnTheWor
   for (int i = 0; i < 2000; ++i) points.push_back({draw(), 1.0F});
   std::vector<Eigen::Vector3d> asked;
   for (int i = 0; i < 200; ++i) asked.push_back(draw());
-  const VisibilityGrid sight(points, {}, options());
+  const VisibilityGrid grid(points, {}, options());
 
   std::shuffle(points.begin(), points.end(), random);
   const VisibilityGrid shuffled(points, {}, options());
-  // Turned by right angles and shifted by whole metres: places stay in their cells.
+  // Rotated by right angles and moved by whole metres: points stay in their cells.
   const Rigid3 T_world_ref{Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {16, -8, 4}};
   for (CloudPoint& point : points) point.p_world = T_world_ref * point.p_world;
   const VisibilityGrid moved(points, T_world_ref, options());
   int differing = 0;
   for (const Eigen::Vector3d& p : asked) {
-    RC_ASSERT(shuffled.verdictOn(p) == sight.verdictOn(p));
-    if (moved.verdictOn(T_world_ref * p) != sight.verdictOn(p)) ++differing;
+    RC_ASSERT(shuffled.verdictOn(p) == grid.verdictOn(p));
+    if (moved.verdictOn(T_world_ref * p) != grid.verdictOn(p)) ++differing;
   }
   RC_ASSERT(differing <= 1);  // rounding may move a point over a cell's border
 }
 
-RC_GTEST_PROP(VisibilityGrid, DecidesAsLookingAtAllPointsDoes, ()) {
+RC_GTEST_PROP(VisibilityGrid, DecidesLikeBruteForce, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   std::uniform_real_distribution<double> side(-0.3, 0.3);
   std::uniform_real_distribution<double> depth(1, 2);
@@ -113,7 +114,7 @@ RC_GTEST_PROP(VisibilityGrid, DecidesAsLookingAtAllPointsDoes, ()) {
   };
   std::vector<CloudPoint> points;
   for (int i = 0; i < *rc::gen::inRange(1, 200); ++i) points.push_back({draw(), 1.0F});
-  const VisibilityGrid sight(points, {}, options());
+  const VisibilityGrid grid(points, {}, options());
 
   std::vector<double> inverse;
   for (const CloudPoint& point : points) inverse.push_back(1 / point.p_world.z());
@@ -148,23 +149,15 @@ RC_GTEST_PROP(VisibilityGrid, DecidesAsLookingAtAllPointsDoes, ()) {
     const Verdict expected = supports               ? Verdict::kSupports
                              : nearer && cells >= 2 ? Verdict::kFreeSpaceViolation
                                                     : Verdict::kUnknown;
-    RC_ASSERT(sight.verdictOn(asked) == expected);
+    RC_ASSERT(grid.verdictOn(asked) == expected);
   }
 }
 
-TEST(ConsistencyOptions, ValuesOutOfRangeAreErrorsThatNameThem) {
-  const auto checked = [](auto change) {
-    ConsistencyOptions wrong;
-    change(wrong);
-    return [wrong] { wrong.validate(); };
-  };
-  EXPECT_THAT(checked([](auto& o) { o.consistency_tolerance = 0; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("consistency_tolerance = 0: must")));
-  EXPECT_THAT(
-      checked([](auto& o) { o.consistency_cell_deg = std::numeric_limits<double>::quiet_NaN(); }),
-      ThrowsMessage<std::invalid_argument>(HasSubstr("consistency_cell_deg = nan: must")));
-  EXPECT_THAT(checked([](auto& o) { o.max_contradictions = 17; }),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("max_contradictions = 17: must be")));
+TEST(ConsistencyOptions, ValuesOutOfRangeAreRefusedByName) {
+  using Options = ConsistencyOptions;
+  test::expectRefused(&Options::consistency_tolerance, 0, "consistency_tolerance = 0: must");
+  test::expectRefused(&Options::consistency_cell_deg, std::nan(""), "consistency_cell_deg = nan");
+  test::expectRefused(&Options::max_contradictions, 17, "max_contradictions = 17: must be");
   EXPECT_THAT([] { consistencyFromName("some"); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("none, support, visibility")));
 }

@@ -17,16 +17,16 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-class WholeFile : public ::testing::Test {
+class AtomicFileTest : public ::testing::Test {
  protected:
-  WholeFile()
+  AtomicFileTest()
       : folder(fs::path(::testing::TempDir()) /
-               ("whole_file_" + std::to_string(getpid()) + "_" +
+               ("atomic_file_" + std::to_string(getpid()) + "_" +
                 ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
     fs::remove_all(folder);
     fs::create_directories(folder);
   }
-  ~WholeFile() override {
+  ~AtomicFileTest() override {
     std::error_code ignored;
     fs::remove_all(folder, ignored);
   }
@@ -50,13 +50,7 @@ class WholeFile : public ::testing::Test {
   const fs::path folder;
 };
 
-TEST_F(WholeFile, ReplacesTheOneBefore) {
-  writeText(folder / "a.txt", "one");
-  writeText(folder / "a.txt", "two");
-  EXPECT_EQ(contentOf(folder / "a.txt"), "two");
-}
-
-TEST_F(WholeFile, TheOneBeforeStandsUntilTheNewOneIsWhole) {
+TEST_F(AtomicFileTest, TheOneBeforeStandsUntilTheNewOneIsWhole) {
   writeText(folder / "a.txt", "one");
   writeAtomically(folder / "a.txt", [&](const fs::path& temporary) {
     std::ofstream(temporary) << "tw";
@@ -66,7 +60,7 @@ TEST_F(WholeFile, TheOneBeforeStandsUntilTheNewOneIsWhole) {
   EXPECT_EQ(contentOf(folder / "a.txt"), "two");
 }
 
-TEST_F(WholeFile, AWriteThatFailsLeavesTheOneBeforeAndNothingElse) {
+TEST_F(AtomicFileTest, AWriteThatFailsLeavesTheOneBeforeAndNothingElse) {
   writeText(folder / "a.txt", "one");
   const auto fail_half_way = [](const fs::path& temporary) {
     std::ofstream(temporary) << "tw";
@@ -77,7 +71,15 @@ TEST_F(WholeFile, AWriteThatFailsLeavesTheOneBeforeAndNothingElse) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
 }
 
-TEST_F(WholeFile, WhatIsNoFileIsNotReplaced) {
+TEST_F(AtomicFileTest, WithoutReplaceItLeavesNothing) {
+  {
+    const AtomicFile file(folder / "a.txt");
+    std::ofstream(file.temporary()) << "half";
+  }
+  EXPECT_TRUE(fs::is_empty(folder));
+}
+
+TEST_F(AtomicFileTest, FoldersAndDevicesAreNotReplaced) {
   EXPECT_THAT(errorOf(""), HasSubstr("'': expected the name of a file"));
   EXPECT_THAT(errorOf(folder), HasSubstr("'" + folder.string() + "': it is a folder"));
   EXPECT_THAT(errorOf(folder / "new/"), HasSubstr("it is a folder"));
@@ -86,7 +88,7 @@ TEST_F(WholeFile, WhatIsNoFileIsNotReplaced) {
   EXPECT_THAT(errorOf("/dev/null"), HasSubstr("not a regular file"));
 }
 
-TEST_F(WholeFile, OfALinkWhatItLeadsToIsReplaced) {
+TEST_F(AtomicFileTest, TheTargetOfALinkIsReplacedAndTheLinkStays) {
   fs::create_directory(folder / "real");
   fs::create_symlink("real/a.txt", folder / "relative.txt");  // nothing there yet
   fs::create_symlink(folder / "relative.txt", folder / "absolute.txt");
@@ -96,7 +98,7 @@ TEST_F(WholeFile, OfALinkWhatItLeadsToIsReplaced) {
   EXPECT_TRUE(fs::is_symlink(folder / "absolute.txt"));
 }
 
-TEST_F(WholeFile, LinksThatLeadToAFolderOrInACircleAreErrors) {
+TEST_F(AtomicFileTest, LinksThatLeadToAFolderOrInACircleAreErrors) {
   fs::create_symlink(folder, folder / "link");
   EXPECT_THAT(errorOf(folder / "link"), HasSubstr("it is a folder"));
   fs::create_symlink("b", folder / "a");

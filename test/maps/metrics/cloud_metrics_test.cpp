@@ -51,7 +51,7 @@ TEST(CloudErrors, AreWorkedOutByHand) {
   EXPECT_DOUBLE_EQ(errors.steps[2].completeness, 1);
 }
 
-TEST(CloudErrors, CompletenessMayHaveATruthOfItsOwn) {
+TEST(CloudErrors, CompletenessMayHaveAnotherTruth) {
   const Points map = pointsAt({{0, 0, 0}, {1, 0, 0}});
   const CloudErrors errors = cloudErrors(map, pointsAt({{0, 0, 0}}), pointsAt({{1, 0, 0}}), {0.5});
   EXPECT_EQ(errors.steps[0].within, 0.5);
@@ -65,7 +65,7 @@ TEST(CloudErrors, AreExactFarFromTheOrigin) {
   EXPECT_NEAR(distances.at(0), 0.001, 1e-9);
 }
 
-TEST(CloudErrors, RefuseWhatCannotBeCompared) {
+TEST(CloudErrors, RefuseEmptyCloudsAndInvalidPoints) {
   const Points one = pointsAt({{0, 0, 0}});
   EXPECT_THROW(cloudErrors({}, one, {1}), std::invalid_argument);
   EXPECT_THROW(cloudErrors(one, {}, {1}), std::invalid_argument);
@@ -75,7 +75,7 @@ TEST(CloudErrors, RefuseWhatCannotBeCompared) {
   EXPECT_THROW(cloudErrors(pointsAt({{nan, 0, 0}}), one, {1}), std::invalid_argument);
 }
 
-RC_GTEST_PROP(NearestDistances, AreThoseOfLookingAtAll, ()) {
+RC_GTEST_PROP(NearestDistances, AreThoseOfBruteForce, ()) {
   const Points points = drawPoints();
   const Points others = drawPoints();
   const std::vector<double> distances = nearestDistances(points, others);
@@ -88,14 +88,14 @@ RC_GTEST_PROP(NearestDistances, AreThoseOfLookingAtAll, ()) {
   }
 }
 
-RC_GTEST_PROP(CloudErrors, DoNotSeeWhereTheWorldLiesAndScaleWithIt, ()) {
+RC_GTEST_PROP(CloudErrors, AreInvariantToMotionAndScaleWithTheClouds, ()) {
   const Points map = drawPoints();
   const Points truth = drawPoints();
-  const Eigen::AngleAxisd turn(0.01 * *rc::gen::inRange(0, 300),
-                               Eigen::Vector3d(1, 2, 3).normalized());
+  const Eigen::AngleAxisd rotation(0.01 * *rc::gen::inRange(0, 300),
+                                   Eigen::Vector3d(1, 2, 3).normalized());
   const auto moved = [&](Points points) {
     for (CloudPoint& point : points) {
-      point.p_world = 2 * (turn * point.p_world) + Eigen::Vector3d(10, 20, 30);
+      point.p_world = 2 * (rotation * point.p_world) + Eigen::Vector3d(10, 20, 30);
     }
     return points;
   };

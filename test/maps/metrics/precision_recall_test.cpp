@@ -48,11 +48,11 @@ TEST(PrecisionRecall, CountsOnlyTruthInsideMaskAndDepth) {
   const PrecisionRecall counts = precisionRecall(depths, {0.1}, {0, 10.0});
   EXPECT_EQ(counts.truths, 2U);
   EXPECT_EQ(counts.estimates, 2U);
-  EXPECT_EQ(counts.estimates_without_truth, 1U) << "beyond the greatest depth";
+  EXPECT_EQ(counts.estimates_without_truth, 1U) << "beyond the maximum depth";
   EXPECT_EQ(counts.precision(0), 0.5);
 }
 
-TEST(PrecisionRecall, OfNothingAreZero) {
+TEST(PrecisionRecall, WithoutPixelsAreZero) {
   const ComparedDepths depths{cv::Mat1f::zeros(2, 2), cv::Mat1f::zeros(2, 2), {}};
   const PrecisionRecall counts = precisionRecall(depths, {1});
   EXPECT_EQ(counts.precision(0), 0);
@@ -60,7 +60,7 @@ TEST(PrecisionRecall, OfNothingAreZero) {
   EXPECT_EQ(counts.f1(0), 0);
 }
 
-TEST(PrecisionRecall, RefusesWhatMakesNoSense) {
+TEST(PrecisionRecall, RefusesInvalidThresholdsAndSizes) {
   const ComparedDepths depths{cv::Mat1f::ones(2, 2), cv::Mat1f::ones(2, 2), {}};
   EXPECT_THROW(precisionRecall(depths, {0.1, 0}), std::invalid_argument);
   EXPECT_THROW(precisionRecall({cv::Mat1f::ones(2, 3), cv::Mat1f::ones(2, 2), {}}, {1}),
@@ -93,7 +93,7 @@ RC_GTEST_PROP(PrecisionRecall, GrowWithTheThresholdAndAddUpOverMaps, ()) {
     RC_ASSERT(sum.f1(k) <= std::max(sum.precision(k), sum.recall(k)) + 1e-12);
   }
   if (tolerance_px == 0) {
-    // Side by side without tolerance, maps do the same as one after the other.
+    // Without tolerance, adjacent maps give the same as two maps.
     ComparedDepths both;
     cv::hconcat(a.estimate, b.estimate, both.estimate);
     cv::hconcat(a.truth, b.truth, both.truth);

@@ -22,13 +22,13 @@ TEST(SampleStatistics, AreWorkedOutByHand) {
   EXPECT_EQ(statistics.max, 6);
 }
 
-TEST(SampleStatistics, OfNothingAreZero) {
+TEST(SampleStatistics, WithoutValuesAreZero) {
   EXPECT_EQ(statisticsOf({}).count, 0U);
   EXPECT_EQ(statisticsOf({}).rms, 0);
   EXPECT_EQ(quantileOf({}, 0.5), 0);
 }
 
-TEST(SampleStatistics, AQuantileIsTheSmallestValueThatTheShareDoesNotExceed) {
+TEST(SampleStatistics, AQuantileIsTheSmallestValueAboveItsFraction) {
   std::vector<double> values(10);
   std::iota(values.rbegin(), values.rend(), 1.0);  // 10 … 1
   EXPECT_EQ(quantileOf(values, 0.9), 9);

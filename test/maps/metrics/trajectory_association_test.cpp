@@ -10,7 +10,7 @@ namespace {
 using testing::ElementsAre;
 using testing::Pair;
 
-/// Poses at these milliseconds, which their x says too.
+/// Poses at these milliseconds; x is the time, too.
 std::vector<StampedPose> posesAt(const std::vector<int>& times_ms) {
   std::vector<StampedPose> poses;
   for (const int t_ms : times_ms) {
@@ -19,7 +19,7 @@ std::vector<StampedPose> posesAt(const std::vector<int>& times_ms) {
   return poses;
 }
 
-/// Which estimate went with which truth.
+/// The times of the paired estimates and truths.
 std::vector<std::pair<double, double>> paired(const std::vector<int>& estimate_ms,
                                               const std::vector<int>& truth_ms,
                                               double max_difference_s) {
@@ -32,20 +32,20 @@ std::vector<std::pair<double, double>> paired(const std::vector<int>& estimate_m
   return pairs;
 }
 
-TEST(AssociatePoses, EachOfTheShorterGoesWithTheNearestInTime) {
+TEST(AssociatePoses, EachPoseOfTheShorterIsPairedWithTheNearestInTime) {
   EXPECT_THAT(paired({12, 48}, {0, 10, 20, 30, 40, 50}, 0.01),
               ElementsAre(Pair(12, 10), Pair(48, 50)));
   EXPECT_THAT(paired({0, 10, 20, 30, 40, 50}, {12, 48}, 0.01),
               ElementsAre(Pair(10, 12), Pair(50, 48)));
 }
 
-TEST(AssociatePoses, TheLimitBelongsToItAndBeyondThereIsNoPair) {
+TEST(AssociatePoses, TheLimitIsIncludedAndBeyondThereIsNoPair) {
   EXPECT_THAT(paired({110, 200}, {100, 211, 300}, 0.010), ElementsAre(Pair(110, 100)));
   EXPECT_TRUE(paired({1}, {}, 1).empty());
   EXPECT_TRUE(paired({}, {}, 1).empty());
 }
 
-TEST(AssociatePoses, OfTwoAsNearTheEarlierIsTaken) {
+TEST(AssociatePoses, OfTwoAtTheSameDistanceTheEarlierIsTaken) {
   EXPECT_THAT(paired({15}, {10, 20}, 0.01), ElementsAre(Pair(15, 10)));
 }
 
@@ -53,7 +53,7 @@ TEST(AssociatePoses, TakesPosesInAnyOrder) {
   EXPECT_THAT(paired({40, 10}, {41, 11, 77}, 0.01), ElementsAre(Pair(10, 11), Pair(40, 41)));
 }
 
-TEST(AssociatePoses, RefusesALimitThatIsNone) {
+TEST(AssociatePoses, RefusesAnInvalidLimit) {
   EXPECT_THROW(associatePoses({}, {}, -1), std::invalid_argument);
   EXPECT_THROW(associatePoses({}, {}, std::numeric_limits<double>::quiet_NaN()),
                std::invalid_argument);

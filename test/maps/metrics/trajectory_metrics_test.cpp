@@ -25,9 +25,10 @@ PosePair pair(double t_s, const Rigid3& T_map_rig, const Rigid3& T_world_rig) {
 double drawNumber(double limit) { return limit * 1e-3 * *rc::gen::inRange(-1000, 1001); }
 
 Rigid3 drawPose(double limit_m) {
-  const Eigen::Vector3d turn(drawNumber(1), drawNumber(1), drawNumber(1));
-  const double angle = turn.norm();
-  const Eigen::Vector3d axis = angle > 0 ? Eigen::Vector3d(turn / angle) : Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d rotation(drawNumber(1), drawNumber(1), drawNumber(1));
+  const double angle = rotation.norm();
+  const Eigen::Vector3d axis =
+      angle > 0 ? Eigen::Vector3d(rotation / angle) : Eigen::Vector3d::UnitX();
   return {Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)),
           {drawNumber(limit_m), drawNumber(limit_m), drawNumber(limit_m)}};
 }
@@ -58,7 +59,7 @@ TEST(AbsoluteErrors, AreWorkedOutByHand) {
 }
 
 TEST(AbsoluteErrors, AlignmentOfThreePointsIsWorkedOutByHand) {
-  // The estimate is the truth turned by a quarter and moved.
+  // The estimate is the truth, rotated by 90 deg and moved.
   const Rigid3 T_map_world = at(5, 6, 7, M_PI / 2);
   std::vector<PosePair> pairs;
   for (const Rigid3& T_world_rig : {at(0, 0), at(2, 0), at(0, 1)}) {
@@ -90,10 +91,11 @@ TEST(AbsoluteErrors, AlignmentAtTheOriginMakesTheFirstPosesCoincide) {
   EXPECT_THAT(errors.translation_m, ElementsAre(DoubleNear(0, 1e-12), DoubleNear(1, 1e-12)));
 }
 
-TEST(AbsoluteErrors, WhatNoAlignmentIsFoundForIsRefused) {
-  const auto along = [](double slope) {
+TEST(AbsoluteErrors, TooFewPairsOrPositionsOnALineAreRefused) {
+  const auto along = [](double gradient) {
     std::vector<PosePair> pairs;
-    for (int i = 0; i < 5; ++i) pairs.push_back(pair(i, at(i, i * i), at(i, slope * i, 0.1 * i)));
+    for (int i = 0; i < 5; ++i)
+      pairs.push_back(pair(i, at(i, i * i), at(i, gradient * i, 0.1 * i)));
     return pairs;
   };
   EXPECT_THROW(alignTrajectories(along(3), TrajectoryAlignment::kSe3), std::invalid_argument);
@@ -135,7 +137,7 @@ TEST(RelativeErrors, TakeTheNearestOtherEndWithinAFifth) {
   EXPECT_DOUBLE_EQ(trueLength(pairs), 3.5);
 }
 
-TEST(RelativeErrors, OfATrajectoryThatIsTooShortAreNone) {
+TEST(RelativeErrors, OfATooShortTrajectoryAreNone) {
   const std::vector<PosePair> pairs = {pair(0, at(0), at(0)), pair(1, at(1), at(1))};
   for (const Unit unit : {Unit::kFrames, Unit::kMetres, Unit::kSeconds}) {
     EXPECT_TRUE(relativeErrors(pairs, {unit, 10}).translation_m.empty());
@@ -145,7 +147,7 @@ TEST(RelativeErrors, OfATrajectoryThatIsTooShortAreNone) {
   EXPECT_THROW(relativeErrors(pairs, {Unit::kMetres, 0}), std::invalid_argument);
 }
 
-RC_GTEST_PROP(TrajectoryErrors, DoNotSeeWhereTheEstimateOrTheTruthLies, ()) {
+RC_GTEST_PROP(TrajectoryErrors, AreInvariantToMotionsOfTheEstimateAndTheTruth, ()) {
   const std::vector<PosePair> pairs = drawPairs();
   const Rigid3 T_other_map = drawPose(100);
   const Rigid3 T_other_world = drawPose(100);
@@ -172,7 +174,7 @@ RC_GTEST_PROP(TrajectoryErrors, DoNotSeeWhereTheEstimateOrTheTruthLies, ()) {
   }
 }
 
-RC_GTEST_PROP(TrajectoryErrors, NoMotionAlignsBetterThanThatOfLeastSquares, ()) {
+RC_GTEST_PROP(TrajectoryErrors, TheAlignmentHasTheMinimumError, ()) {
   const std::vector<PosePair> pairs = drawPairs();
   const Rigid3 T_world_map = alignTrajectories(pairs, TrajectoryAlignment::kSe3);
   const double best = statisticsOf(absoluteErrors(pairs, T_world_map).translation_m).rms;

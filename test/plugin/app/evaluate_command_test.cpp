@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "maps/io/point_cloud_file.h"
 #include "test/plugin/app/map_command.h"
 #include "tracking_stub/poses/tum_trajectory.h"
+#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 namespace {
@@ -40,13 +40,14 @@ class EvaluateCommand : public MapCommand {
     cv::imwrite(file.string(), cv::Mat1f(90, 120, static_cast<float>(SyntheticRecording::kDepthM)));
   }
   void writeTrueCloud() const {
-    std::vector<CloudPoint> points;
+    std::vector<Eigen::Vector3f> points;
     for (int x = -400; x <= 400; ++x) {
       for (int y = -300; y <= 300; ++y) {
-        points.push_back({{0.02 * x, 0.02 * y, SyntheticRecording::kDepthM}, 1, 1});
+        points.push_back(
+            Eigen::Vector3d(0.02 * x, 0.02 * y, SyntheticRecording::kDepthM).cast<float>());
       }
     }
-    writePointCloud(folder() / "data" / "gt_cloud.ply", points);
+    writePly(folder() / "data" / "gt_cloud.ply", points);
   }
   json jsonOf(const std::string& arguments) const {
     const Result result = run(arguments + " --json");

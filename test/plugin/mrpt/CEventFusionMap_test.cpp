@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/CEventFusionMap.h"
+#include "maps/io/point_cloud_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +18,6 @@
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/registration.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/programs/pcd_points.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -288,11 +288,11 @@ class CEventFusionMapFile : public TemporaryFolder {};
 TEST_F(CEventFusionMapFile, IsAPcdFile) {
   const CEventFusionMap map = mapOf(2);
   map.saveMetricMapRepresentationToFile((folder() / "saved").string());
-  const auto cloud = pointsOfPcd((folder() / "saved.pcd").string());
+  const auto cloud = readPointCloud(folder() / "saved.pcd").points;
   const auto points = map.cloud().points();
   ASSERT_EQ(cloud.size(), points.size());
-  EXPECT_EQ(cloud[1].x, static_cast<float>(points[1].p_world.x()));
-  EXPECT_EQ(cloud[1].intensity, points[1].confidence);
+  EXPECT_EQ(cloud[1].p_world.x(), static_cast<float>(points[1].p_world.x()));
+  EXPECT_EQ(cloud[1].confidence, points[1].confidence);
 }
 
 }  // namespace

@@ -6,9 +6,9 @@
 
 #include <sstream>
 
+#include "maps/io/point_cloud_file.h"
 #include "test/paths.h"
 #include "test/plugin/program_test.h"
-#include "test/plugin/programs/pcd_points.h"
 
 namespace efm {
 namespace {
@@ -24,15 +24,15 @@ class MrptHost : public ProgramTest {
   }
 
   void expectTheMapOfEventFusion() const {
-    const auto expected = pointsOfPcd(folder() / "out" / "map.pcd");
+    const auto expected = readPointCloud(folder() / "out" / "map.pcd").points;
     std::istringstream text(contentOf("saved.txt"));
     std::size_t count = 0;
     for (float x = 0, y = 0, z = 0, confidence = 0; text >> x >> y >> z >> confidence; ++count) {
       ASSERT_LT(count, expected.size());
-      EXPECT_NEAR(x, expected[count].x, 1e-5);
-      EXPECT_NEAR(y, expected[count].y, 1e-5);
-      EXPECT_NEAR(z, expected[count].z, 1e-5);
-      EXPECT_NEAR(confidence, expected[count].intensity, 1e-5 * expected[count].intensity);
+      EXPECT_NEAR(x, expected[count].p_world.x(), 1e-5);
+      EXPECT_NEAR(y, expected[count].p_world.y(), 1e-5);
+      EXPECT_NEAR(z, expected[count].p_world.z(), 1e-5);
+      EXPECT_NEAR(confidence, expected[count].confidence, 1e-5 * expected[count].confidence);
     }
     EXPECT_EQ(count, expected.size());
   }

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "maps/io/point_cloud_file.h"
 #include "test/plugin/program_test.h"
-#include "test/plugin/programs/pcd_points.h"
 
 namespace efm {
 namespace {
@@ -35,20 +35,20 @@ TEST_F(Observations2map, BuildsTheMapThatEventFusionWrote) {
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("3 observations"));
 
-  const auto expected = pointsOfPcd(folder() / "out" / "map.pcd");
-  const auto built = pointsOfPcd(folder() / "built_efm__CEventFusionMap_00.pcd");
+  const auto expected = readPointCloud(folder() / "out" / "map.pcd").points;
+  const auto built = readPointCloud(folder() / "built_efm__CEventFusionMap_00.pcd").points;
   ASSERT_GT(expected.size(), 30U);
   ASSERT_EQ(built.size(), expected.size());
   for (std::size_t i = 0; i < built.size(); ++i) {
-    EXPECT_LT((built[i].getVector3fMap() - expected[i].getVector3fMap()).norm(), 1e-6);
-    EXPECT_EQ(built[i].intensity, expected[i].intensity);
+    EXPECT_LT((built[i].p_world - expected[i].p_world).norm(), 1e-6);
+    EXPECT_EQ(built[i].confidence, expected[i].confidence);
   }
 }
 
 TEST_F(Observations2map, TakesOptionsAndRefusesWrongOnes) {
   EXPECT_EQ(build("voxel_size_m = 0.5\n").status, 0);
-  EXPECT_LT(pointsOfPcd(folder() / "built_efm__CEventFusionMap_00.pcd").size(),
-            pointsOfPcd(folder() / "out" / "map.pcd").size());
+  EXPECT_LT(readPointCloud(folder() / "built_efm__CEventFusionMap_00.pcd").points.size(),
+            readPointCloud(folder() / "out" / "map.pcd").points.size());
 
   const Result refused = build("voxel_size_m = abc\n");
   EXPECT_NE(refused.status, 0);
