@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/refinement/keyframe_registration.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -12,24 +10,25 @@
 namespace efm {
 namespace {
 
-/// From one round to the next.
+/// Ratio of the maximum distances of consecutive rounds.
 constexpr double kShrink = 0.65;
-/// Rounds with all points, once neighbours are as near as they must be.
+/// Rounds with all points and the last distance.
 constexpr int kLastRounds = 2;
-/// Points that take part before that, and iterations: the next round changes the neighbours anyway.
+/// Points and iterations of the earlier rounds, whose neighbours are preliminary.
 constexpr std::size_t kCoarsePoints = 300;
 constexpr int kCoarseIterations = 2;
 
-/// A keyframe's points beside the map's.
+/// The points of a keyframe with their neighbours in the map.
 struct Neighbours {
   std::vector<PointPair> pairs;
-  std::vector<std::size_t> place;  ///< Of each pair's keyframe in the map.
-  std::size_t seen = 0;
+  std::vector<std::size_t> map_index;  ///< Of the keyframe of each pair.
+  std::size_t visible = 0;
   std::size_t inliers = 0;
 };
 
-Eigen::Matrix3d sqrtInformationOf(const Eigen::Matrix3d& covariance) {
-  return covariance.llt().matrixL().solve(Eigen::Matrix3d::Identity());
+/// R * covariance * R^T.
+Eigen::Matrix3d rotatedCovariance(const Eigen::Matrix3d& R, const Eigen::Matrix3f& covariance) {
+  return R * covariance.cast<double>() * R.transpose();
 }
 
 class NeighbourSearch {
@@ -41,7 +40,7 @@ class NeighbourSearch {
     }
   }
 
-  /// @param stride takes every so manieth point.
+  /// @param stride uses each stride-th point only.
   Neighbours find(const Rigid3& T_world_ref, double max_distance_px, std::size_t stride) const {
     Neighbours found;
     const Eigen::Matrix3d R_world_ref = T_world_ref.rotation.toRotationMatrix();
@@ -52,25 +51,23 @@ class NeighbourSearch {
     for (std::size_t i = 0; i < cloud_.numQueryPoints(); i += stride) {
       const RegistrationPoint& point = cloud_.points()[i];
       const Eigen::Vector3d p_ref = point.p_ref.cast<double>();
-      const Eigen::Matrix3d own =
-          R_world_ref * point.covariance.cast<double>() * R_world_ref.transpose();
+      const Eigen::Matrix3d own = rotatedCovariance(R_world_ref, point.covariance);
       const std::size_t before = found.pairs.size();
-      bool seen = false;
+      bool visible = false;
       for (std::size_t m = 0; m < map_.size(); ++m) {
         const Eigen::Vector3d p_from = T_from_ref[m] * p_ref;
-        seen = seen || map_[m].cloud->sees(p_from);
+        visible = visible || map_[m].cloud->isInView(p_from);
         const auto index = map_[m].cloud->nearest(p_from, max_distance_px);
         if (!index) continue;
         const RegistrationPoint& neighbour = map_[m].cloud->points()[*index];
-        const Eigen::Matrix3d covariance = own + R_world_from_[m] *
-                                                     neighbour.covariance.cast<double>() *
-                                                     R_world_from_[m].transpose();
+        const Eigen::Matrix3d covariance =
+            own + rotatedCovariance(R_world_from_[m], neighbour.covariance);
         found.pairs.push_back({map_[m].T_world_ref * neighbour.p_ref.cast<double>(), p_ref,
-                               sqrtInformationOf(covariance)});
-        found.place.push_back(m);
+                               sqrtInformation(covariance)});
+        found.map_index.push_back(m);
       }
       const bool inlier = found.pairs.size() > before;
-      if (seen || inlier) ++found.seen;
+      if (visible || inlier) ++found.visible;
       if (inlier) ++found.inliers;
     }
     return found;
@@ -82,12 +79,12 @@ class NeighbourSearch {
   std::vector<Eigen::Matrix3d> R_world_from_;
 };
 
-/// About how far the prior may misplace a point in the image.
+/// The approximate uncertainty of a point in the image, by the prior.
 double uncertaintyPx(const RegistrationCloud& cloud, const PosePrior& prior) {
-  const Matrix6d covariance =
-      (prior.sqrt_information.transpose() * prior.sqrt_information).inverse();
-  const double sigma_m = std::sqrt(covariance.diagonal().head<3>().maxCoeff());
-  const double sigma_rad = std::sqrt(covariance.diagonal().tail<3>().maxCoeff());
+  const Vector6d variances =
+      inverseOf(prior.sqrt_information.transpose() * prior.sqrt_information).diagonal();
+  const double sigma_m = std::sqrt(variances.head<3>().maxCoeff());
+  const double sigma_rad = std::sqrt(variances.tail<3>().maxCoeff());
   return cloud.focalPx() * (sigma_rad + sigma_m * cloud.middleInverseDepth());
 }
 
@@ -103,52 +100,53 @@ Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
   return matrix;
 }
 
-/// The factor whose error has these normal equations: |A d + b|^2 with A^T A the information and
-/// A^T b the gradient. Directions that the pairs leave open have rows of zeros.
+/// The factor with the error |A d + b|^2, where A^T A is the information and A^T b the gradient.
+/// Directions that the pairs leave open have rows of zeros.
 RelativePoseFactor factorOf(const NormalEquations& equations, const Rigid3& T_from_to) {
-  constexpr double kLeastShare = 1e-9;
+  constexpr double kMinRatio = 1e-9;
   RelativePoseFactor factor;
   factor.T_from_to = T_from_to;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(equations.information);
-  const Vector6d roots = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
-  const Vector6d turned = eigen.eigenvectors().transpose() * equations.gradient;
+  const EigenDecomposition eigen = eigenDecomposition(equations.information);
+  const Vector6d roots = eigen.values.cwiseMax(0).cwiseSqrt();
+  const Vector6d gradient = eigen.vectors.transpose() * equations.gradient;
   factor.sqrt_information.setZero();
   for (int i = 0; i < 6; ++i) {
-    if (roots[i] <= kLeastShare * roots.maxCoeff()) continue;
-    factor.sqrt_information.row(i) = roots[i] * eigen.eigenvectors().col(i).transpose();
-    factor.offset[i] = turned[i] / roots[i];
+    if (roots[i] <= kMinRatio * roots.maxCoeff()) continue;
+    factor.sqrt_information.row(i) = roots[i] * eigen.vectors.col(i).transpose();
+    factor.offset[i] = gradient[i] / roots[i];
   }
   return factor;
 }
 
-void summarise(const Neighbours& found, const std::vector<MapKeyframe>& map, std::size_t number,
+void summarize(const Neighbours& found, const std::vector<MapKeyframe>& map, std::size_t number,
                double robust_sigmas, Registration& registration) {
   const Rigid3& T_world_ref = registration.T_world_ref;
   const Eigen::Matrix3d R_world_ref = T_world_ref.rotation.toRotationMatrix();
   std::vector<NormalEquations> equations(map.size());
-  std::vector<bool> shares(map.size());
+  std::vector<bool> has_pairs(map.size());
   std::vector<double> errors;
   for (std::size_t i = 0; i < found.pairs.size(); ++i) {
     const PointPair& pair = found.pairs[i];
     const Eigen::Vector3d error = pair.sqrt_information * (pair.p_map - T_world_ref * pair.p_ref);
-    Eigen::Matrix<double, 3, 6> jacobian;  // by a small motion in frame `ref`
-    jacobian.leftCols<3>() = -pair.sqrt_information * R_world_ref;
-    jacobian.rightCols<3>() = pair.sqrt_information * R_world_ref * crossMatrix(pair.p_ref);
+    const Eigen::Matrix3d by_ref = pair.sqrt_information * R_world_ref;
+    Eigen::Matrix<double, 3, 6> jacobian;  // with respect to a small motion in frame `ref`
+    jacobian.leftCols<3>() = -by_ref;
+    jacobian.rightCols<3>() = by_ref * crossMatrix(pair.p_ref);
     const double weight = 1 / (1 + error.squaredNorm() / (robust_sigmas * robust_sigmas));
-    NormalEquations& sums = equations[found.place[i]];
+    NormalEquations& sums = equations[found.map_index[i]];
     sums.information += weight * jacobian.transpose() * jacobian;
     sums.gradient += weight * jacobian.transpose() * error;
-    shares[found.place[i]] = true;
+    has_pairs[found.map_index[i]] = true;
     errors.push_back(error.norm());
   }
   for (std::size_t m = 0; m < map.size(); ++m) {
-    if (!shares[m]) continue;
+    if (!has_pairs[m]) continue;
     RelativePoseFactor factor = factorOf(equations[m], map[m].T_world_ref.inverse() * T_world_ref);
     factor.from = map[m].keyframe;
     factor.to = number;
     registration.factors.push_back(factor);
   }
-  registration.seen = found.seen;
+  registration.visible = found.visible;
   registration.inliers = found.inliers;
   if (errors.empty()) return;
   registration.median_error = upperMedian(errors);
@@ -165,7 +163,7 @@ void KeyframeRegistrationOptions::validate() const {
 }
 
 double Registration::inlierRatio() const {
-  return seen > 0 ? static_cast<double>(inliers) / static_cast<double>(seen) : 0;
+  return visible > 0 ? static_cast<double>(inliers) / static_cast<double>(visible) : 0;
 }
 
 Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud,
@@ -190,7 +188,7 @@ Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud
     T_world_ref = alignToMap(found.pairs, prior, T_world_ref, options.alignment);
   }
 
-  summarise(search.find(T_world_ref, options.last_distance_px, 1), map, number,
+  summarize(search.find(T_world_ref, options.last_distance_px, 1), map, number,
             options.alignment.robust_sigmas, registration);
   registration.from_prior =
       (prior.sqrt_information * differenceOf(prior.T_map_ref.inverse() * T_world_ref)).norm();

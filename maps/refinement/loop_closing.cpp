@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/refinement/loop_closing.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "mapping/geometry/angle.h"
@@ -11,32 +9,29 @@
 namespace efm {
 namespace {
 
-/// Every so manieth point says enough of an overlap.
+/// One of 10 points is enough to measure an overlap.
 constexpr std::size_t kOverlapStride = 10;
-/// Fewer are chance.
-constexpr std::size_t kLeastInliers = 100;
-/// Pairs of the same place differ by their noise; of places that are not the same, by as much as
-/// neighbours may.
-constexpr double kLargestMedianError = 1.0;
-/// From where the candidate was expected, in standard deviations: 1 in 10^5 loops is farther.
-constexpr double kFarthestFromPrior = 5.5;
-/// How much farther than others a loop's neighbours may be at first: drift adds up along it.
-constexpr double kFartherNeighbours = 3;
-/// What a loop's pose errs by beyond its pairs' noise: depths that are wrong alike, edges that look
-/// elsewhere from there.
+/// Fewer pairs may match by chance.
+constexpr std::size_t kMinLoopPairs = 100;
+/// In standard deviations. Pairs of the same place differ by their noise; pairs of different places
+/// by up to the maximum distance of neighbours.
+constexpr double kMaxMedianError = 1.0;
+/// In standard deviations from the candidate: 1 of 10^5 correct loops is farther.
+constexpr double kMaxLoopPriorSigmas = 5.5;
+/// Factor of the first distance of neighbours, because drift adds up along a loop.
+constexpr double kFirstDistanceFactor = 3;
+/// Systematic errors of the pose of a loop, beyond the noise of its pairs: common errors of depths,
+/// and edges that depend on the viewpoint.
 constexpr double kSystematicM = 0.005;
 constexpr double kSystematicRad = 0.1 * kRadiansPerDegree;
-/// Of directions that a registration leaves open: nobody would call that sure.
+/// Of directions that a registration leaves open: far above each limit.
 constexpr double kOpenVariance = 1e6;
-/// Two registrations of the same points agree within so many of the largest standard deviations.
+/// Maximum difference between the two registrations, as a multiple of the maximum sigmas.
 constexpr double kBothWaysSigmas = 1.5;
 
-double largestSigma(const Eigen::Matrix3d& covariance) {
-  return std::sqrt(
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues().maxCoeff());
-}
+double maxSigma(const Eigen::Matrix3d& covariance) { return std::sqrt(maxEigenvalue(covariance)); }
 
-/// The same factor, as sure as a loop can be.
+/// The factor with the systematic errors added to its covariance.
 RelativePoseFactor withSystematicError(RelativePoseFactor factor) {
   MotionEstimate motion = motionOf(factor, kOpenVariance);
   motion.covariance.diagonal().head<3>().array() += kSystematicM * kSystematicM;
@@ -47,26 +42,26 @@ RelativePoseFactor withSystematicError(RelativePoseFactor factor) {
   return factor;
 }
 
-bool isSure(const RelativePoseFactor& factor, const LoopOptions& options) {
+bool isCertain(const RelativePoseFactor& factor, const LoopOptions& options) {
   const Matrix6d covariance = motionOf(factor, kOpenVariance).covariance;
-  return largestSigma(covariance.topLeftCorner<3, 3>()) <= options.loop_max_sigma_m &&
-         largestSigma(covariance.bottomRightCorner<3, 3>()) <= options.loop_max_sigma_rad;
+  return maxSigma(covariance.topLeftCorner<3, 3>()) <= options.loop_max_sigma_m &&
+         maxSigma(covariance.bottomRightCorner<3, 3>()) <= options.loop_max_sigma_rad;
 }
 
-/// Registers one keyframe with another that stands at the origin.
-Registration registerBeside(const RegistrationCloud& cloud, const RegistrationCloud& other,
-                            const Rigid3& T_other_ref, const Matrix6d& covariance,
-                            const KeyframeRegistrationOptions& options) {
+/// Registers one keyframe with another one, whose frame is the world.
+Registration registerWith(const RegistrationCloud& cloud, const RegistrationCloud& other,
+                          const Rigid3& T_other_ref, const Matrix6d& covariance,
+                          const KeyframeRegistrationOptions& options) {
   return registerKeyframe(1, cloud, {{0, &other, Rigid3{}}},
                           {T_other_ref, sqrtInformation(covariance)}, options);
 }
 
-bool holds(const Registration& registration, const LoopOptions& options) {
-  return !registration.factors.empty() && registration.inliers >= kLeastInliers &&
+bool isPlausible(const Registration& registration, const LoopOptions& options) {
+  return !registration.factors.empty() && registration.inliers >= kMinLoopPairs &&
          registration.inlierRatio() >= options.loop_min_inliers &&
-         registration.median_error <= kLargestMedianError &&
-         registration.from_prior <= kFarthestFromPrior &&
-         isSure(registration.factors.front(), options);
+         registration.median_error <= kMaxMedianError &&
+         registration.from_prior <= kMaxLoopPriorSigmas &&
+         isCertain(registration.factors.front(), options);
 }
 
 }  // namespace
@@ -85,13 +80,13 @@ void LoopOptions::validate() const {
 
 double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in,
                    const Rigid3& T_in_of) {
-  std::size_t looked_at = 0;
-  std::size_t seen = 0;
+  std::size_t checked = 0;
+  std::size_t in_view = 0;
   for (std::size_t i = 0; i < of.numQueryPoints(); i += kOverlapStride) {
-    ++looked_at;
-    if (in.sees(T_in_of * of.points()[i].p_ref.cast<double>())) ++seen;
+    ++checked;
+    if (in.isInView(T_in_of * of.points()[i].p_ref.cast<double>())) ++in_view;
   }
-  return looked_at > 0 ? static_cast<double>(seen) / static_cast<double>(looked_at) : 0;
+  return checked > 0 ? static_cast<double>(in_view) / static_cast<double>(checked) : 0;
 }
 
 std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
@@ -100,16 +95,15 @@ std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
                                              const Matrix6d& covariance, const LoopOptions& options,
                                              const KeyframeRegistrationOptions& registration) {
   KeyframeRegistrationOptions wider = registration;
-  wider.first_distance_px *= kFartherNeighbours;
-  const Registration there =
-      registerBeside(newer, older, candidate.T_older_newer, covariance, wider);
-  if (!holds(there, options)) return std::nullopt;
+  wider.first_distance_px *= kFirstDistanceFactor;
+  const Registration there = registerWith(newer, older, candidate.T_older_newer, covariance, wider);
+  if (!isPlausible(there, options)) return std::nullopt;
   const Registration back =
-      registerBeside(older, newer, there.T_world_ref.inverse(), covariance, registration);
-  if (!holds(back, options)) return std::nullopt;
-  const Vector6d apart = differenceOf(there.T_world_ref * back.T_world_ref);
-  if (apart.head<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_m ||
-      apart.tail<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_rad) {
+      registerWith(older, newer, there.T_world_ref.inverse(), covariance, registration);
+  if (!isPlausible(back, options)) return std::nullopt;
+  const Vector6d difference = differenceOf(there.T_world_ref * back.T_world_ref);
+  if (difference.head<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_m ||
+      difference.tail<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_rad) {
     return std::nullopt;
   }
   RelativePoseFactor factor = withSystematicError(there.factors.front());

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/refinement/pose_refinement.h"
 
-#include <ceres/ceres.h>
+#include <ceres/autodiff_cost_function.h>
+#include <ceres/covariance.h>
+#include <ceres/loss_function.h>
+#include <ceres/manifold.h>
+#include <ceres/problem.h>
+#include <ceres/product_manifold.h>
 #include <ceres/rotation.h>
+#include <ceres/solver.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -14,7 +20,7 @@
 namespace efm {
 namespace {
 
-// Ceres writes to stderr what is wrong with numbers that are none.
+// Checked before solving: Ceres prints messages about numbers that are not finite.
 bool isFinite(const Rigid3& pose) {
   return pose.translation.allFinite() && pose.rotation.coeffs().allFinite();
 }
@@ -34,7 +40,7 @@ bool isFinite(const PoseGraph& graph) {
          std::all_of(graph.factors.begin(), graph.factors.end(), finite);
 }
 
-/// A pose as Ceres changes it: the quaternion (x, y, z, w), then the translation.
+/// The parameters of a pose: the quaternion (x, y, z, w), then the translation.
 constexpr int kPoseSize = 7;
 using PoseBlock = std::array<double, kPoseSize>;
 
@@ -49,7 +55,7 @@ Rigid3 rigidOf(const PoseBlock& block) {
           Eigen::Map<const Eigen::Vector3d>(block.data() + 4)};
 }
 
-// What follows is computed with numbers that carry their derivatives.
+// T is double, or a number with its derivatives.
 template <typename T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
 template <typename T>
@@ -61,27 +67,24 @@ struct Pose {
   Vector3<T> translation;
 
   explicit Pose(const T* block) : rotation(block), translation(block[4], block[5], block[6]) {}
-  explicit Pose(const Rigid3& T_a_b)
-      : rotation(T_a_b.rotation.cast<T>()), translation(T_a_b.translation.cast<T>()) {}
 };
 
 template <typename T>
 Vector3<T> rotationVectorOf(const Eigen::Quaternion<T>& rotation) {
   const std::array<T, 4> scalar_first = {rotation.w(), rotation.x(), rotation.y(), rotation.z()};
-  Vector3<T> turn;
-  ceres::QuaternionToAngleAxis(scalar_first.data(), turn.data());
-  return turn;
+  Vector3<T> rotation_vector;
+  ceres::QuaternionToAngleAxis(scalar_first.data(), rotation_vector.data());
+  return rotation_vector;
 }
 
 /// differenceOf(T_from_to^-1 * T_world_from^-1 * T_world_to).
 template <typename T>
 Vector6<T> differenceBetween(const Rigid3& T_from_to, const Pose<T>& from, const Pose<T>& to) {
-  const Pose<T> expected(T_from_to);
   const Eigen::Quaternion<T> R_from_world = from.rotation.conjugate();
-  const Eigen::Quaternion<T> R_to_from = expected.rotation.conjugate();
-  const Vector3<T> moved = R_from_world * (to.translation - from.translation);
+  const Eigen::Quaternion<T> R_to_from = T_from_to.rotation.cast<T>().conjugate();
+  const Vector3<T> p_from = R_from_world * (to.translation - from.translation);
   Vector6<T> difference;
-  difference.template head<3>() = R_to_from * Vector3<T>(moved - expected.translation);
+  difference.template head<3>() = R_to_from * Vector3<T>(p_from - T_from_to.translation.cast<T>());
   difference.template tail<3>() = rotationVectorOf<T>(R_to_from * (R_from_world * to.rotation));
   return difference;
 }
@@ -93,21 +96,9 @@ struct PairError {
   bool operator()(const T* block, T* error) const {
     const Pose<T> pose(block);
     const Vector3<T> p_ref = pair.p_ref.cast<T>();
-    const Vector3<T> apart = pair.p_map.cast<T>() - (pose.rotation * p_ref + pose.translation);
+    const Vector3<T> distance = pair.p_map.cast<T>() - (pose.rotation * p_ref + pose.translation);
     Eigen::Map<Vector3<T>> result(error);
-    result = pair.sqrt_information.cast<T>() * apart;
-    return true;
-  }
-};
-
-struct PriorError {
-  PosePrior prior;
-
-  template <typename T>
-  bool operator()(const T* block, T* error) const {
-    Eigen::Map<Vector6<T>> result(error);
-    result = prior.sqrt_information.cast<T>() *
-             differenceBetween(prior.T_map_ref, Pose<T>(Rigid3{}), Pose<T>(block));
+    result = pair.sqrt_information.cast<T>() * distance;
     return true;
   }
 };
@@ -126,7 +117,6 @@ struct FactorError {
 };
 
 using PairCost = ceres::AutoDiffCostFunction<PairError, 3, kPoseSize>;
-using PriorCost = ceres::AutoDiffCostFunction<PriorError, 6, kPoseSize>;
 using FactorCost = ceres::AutoDiffCostFunction<FactorError, 6, kPoseSize, kPoseSize>;
 
 using PoseManifold =
@@ -136,25 +126,14 @@ PoseManifold poseManifold() {
   return PoseManifold(ceres::EigenQuaternionManifold(), ceres::EuclideanManifold<3>());
 }
 
-/// The manifold's small motions are half a rotation vector about the world's axes, then a
-/// translation along them; ours are the translation, then the whole rotation vector. This takes
-/// derivatives by ours to derivatives by its, and covariances of its to ours.
+/// Takes small motions on the manifold to ours. The manifold has half a rotation vector about the
+/// axes of the world, then a translation along them. Ours are the translation, then the whole
+/// rotation vector.
 Matrix6d ownMotionFromManifold() {
   Matrix6d own = Matrix6d::Zero();
   own.topRightCorner<3, 3>().setIdentity();
   own.bottomLeftCorner<3, 3>() = 2 * Eigen::Matrix3d::Identity();
   return own;
-}
-
-template <int rows>
-using BlockJacobian = Eigen::Matrix<double, rows, kPoseSize, Eigen::RowMajor>;
-
-template <int rows>
-Eigen::Matrix<double, rows, 6> byOwnMotion(const BlockJacobian<rows>& jacobian,
-                                           const PoseBlock& block) {
-  Eigen::Matrix<double, kPoseSize, 6, Eigen::RowMajor> plus;
-  poseManifold().PlusJacobian(block.data(), plus.data());
-  return jacobian * plus * ownMotionFromManifold().inverse();
 }
 
 ceres::Problem::Options borrowing() {
@@ -170,12 +149,12 @@ ceres::Solver::Options solverOptions(int max_iterations, ceres::LinearSolverType
   options.linear_solver_type = solver;
   options.num_threads = 1;
   options.logging_type = ceres::SILENT;
-  // Steps are held against how large the numbers are: far from the world's origin any is small.
+  // This tolerance is relative to the parameters: far from the origin it would stop too early.
   options.parameter_tolerance = 0;
   return options;
 }
 
-/// A graph as Ceres has it. Neither copied nor moved: the problem points into it.
+/// A graph as a problem of Ceres. Not copied: the problem points into it.
 class GraphProblem {
  public:
   GraphProblem(const PoseGraph& graph, double robust_sigmas)
@@ -205,7 +184,7 @@ class GraphProblem {
   std::vector<PoseBlock> blocks_;
   PoseManifold manifold_;
   ceres::CauchyLoss loss_;
-  ceres::Problem problem_;  // last: it points to the others
+  ceres::Problem problem_;  // last, because it points to the others
 };
 
 void requireSolver(double robust_sigmas, int max_iterations) {
@@ -233,7 +212,12 @@ Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
   for (const PointPair& pair : pairs) {
     problem.AddResidualBlock(new PairCost(new PairError{pair}), &loss, pose.data());
   }
-  problem.AddResidualBlock(new PriorCost(new PriorError{prior}), nullptr, pose.data());
+  // The prior is a factor between the fixed origin of the map and the pose.
+  PoseBlock origin = blockOf(Rigid3{});
+  const RelativePoseFactor factor{0, 1, prior.T_map_ref, prior.sqrt_information};
+  problem.AddResidualBlock(new FactorCost(new FactorError{factor}), nullptr, origin.data(),
+                           pose.data());
+  problem.SetParameterBlockConstant(origin.data());
   ceres::Solver::Summary summary;
   ceres::Solver::Options solver =
       solverOptions(options.max_iterations, ceres::DENSE_NORMAL_CHOLESKY);
@@ -254,7 +238,7 @@ MotionEstimate motionOf(const RelativePoseFactor& factor, double open_variance) 
   const Matrix6d information = factor.sqrt_information.transpose() * factor.sqrt_information +
                                1 / open_variance * Matrix6d::Identity();
   MotionEstimate motion;
-  motion.covariance = information.inverse();
+  motion.covariance = inverseOf(information);
   const Vector6d to_minimum =
       -motion.covariance * (factor.sqrt_information.transpose() * factor.offset);
   motion.T_from_to = factor.T_from_to * rigidFromDifference(to_minimum);
@@ -283,39 +267,12 @@ std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const Po
   of_solver.num_threads = 1;
   ceres::Covariance covariance(of_solver);
   const double* block = problem.block(node).data();
-  const std::vector<std::pair<const double*, const double*>> wanted = {{block, block}};
-  if (!covariance.Compute(wanted, &problem.problem())) return std::nullopt;
+  const std::vector<std::pair<const double*, const double*>> blocks = {{block, block}};
+  if (!covariance.Compute(blocks, &problem.problem())) return std::nullopt;
   Eigen::Matrix<double, 6, 6, Eigen::RowMajor> of_manifold;
   covariance.GetCovarianceBlockInTangentSpace(block, block, of_manifold.data());
   const Matrix6d own = ownMotionFromManifold();
   return own * of_manifold * own.transpose();
-}
-
-Eigen::Matrix<double, 3, 6> pairJacobian(const PointPair& pair, const Rigid3& T_map_ref) {
-  const PairCost cost(new PairError{pair});
-  const PoseBlock block = blockOf(T_map_ref);
-  const double* parameters = block.data();
-  Eigen::Vector3d error;
-  BlockJacobian<3> by_block;
-  double* jacobian = by_block.data();
-  cost.Evaluate(&parameters, error.data(), &jacobian);
-  return byOwnMotion<3>(by_block, block);
-}
-
-Eigen::Matrix<double, 6, 12> factorJacobian(const RelativePoseFactor& factor,
-                                            const Rigid3& T_world_from, const Rigid3& T_world_to) {
-  const FactorCost cost(new FactorError{factor});
-  const PoseBlock from = blockOf(T_world_from);
-  const PoseBlock to = blockOf(T_world_to);
-  const std::array<const double*, 2> parameters = {from.data(), to.data()};
-  Vector6d error;
-  BlockJacobian<6> by_from;
-  BlockJacobian<6> by_to;
-  std::array<double*, 2> jacobians = {by_from.data(), by_to.data()};
-  cost.Evaluate(parameters.data(), error.data(), jacobians.data());
-  Eigen::Matrix<double, 6, 12> by_both;
-  by_both << byOwnMotion<6>(by_from, from), byOwnMotion<6>(by_to, to);
-  return by_both;
 }
 
 }  // namespace efm

@@ -11,10 +11,10 @@
 
 namespace efm {
 
-// Everything that Ceres solves. Poses change on the manifold of their rotations and translations,
-// Jacobians are automatic, one thread: the same result wherever it runs.
+// All uses of Ceres. Poses change on the manifold of rotations and translations, Jacobians are
+// automatic, and one thread solves: results do not depend on the machine.
 
-/// A point of the map and one of a keyframe that are taken to be the same. Its error is
+/// A point of the map and the same point of a keyframe. Its error is
 /// sqrt_information * (p_map - T_map_ref * p_ref).
 struct PointPair {
   Eigen::Vector3d p_map = Eigen::Vector3d::Zero();                 ///< Metres, frame `map`.
@@ -22,7 +22,7 @@ struct PointPair {
   Eigen::Matrix3d sqrt_information = Eigen::Matrix3d::Identity();  ///< 1/m, frame `map`.
 };
 
-/// Where a pose is expected. The error is
+/// The expected pose. The error is
 /// sqrt_information * differenceOf(prior.T_map_ref^-1 * T_map_ref).
 struct PosePrior {
   Rigid3 T_map_ref;
@@ -30,51 +30,53 @@ struct PosePrior {
 };
 
 struct AlignmentOptions {
-  /// Errors of a pair in standard deviations beyond which it counts less and less (Cauchy's loss).
-  /// Range: above 0, at most 1000.
+  /// Beyond this error, in standard deviations, the weight of a pair falls (Cauchy's loss). Range:
+  /// above 0, at most 1000.
   double robust_sigmas = 3;
   int max_iterations = 10;  ///< 1 to 1000.
-  /// An iteration that takes away less than this share of the errors' squares is the last one.
-  /// Range: 0 to 1.
+  /// The last iteration reduces the sum of squared errors by less than this fraction. Range: 0
+  /// to 1.
   double min_gain = 1e-8;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// The pose that brings a keyframe's points onto those of the map: where all errors together are
-/// least, found by Levenberg and Marquardt's method from a pose near by. What the pairs leave open
-/// stays with the prior. Where that cannot be computed the start is the result.
+/// The pose that aligns the points of a keyframe with those of the map: the minimum of the sum of
+/// squared errors of all pairs and the prior near the start (Levenberg-Marquardt). The prior
+/// determines the directions that the pairs leave open. The result is the start where the minimum
+/// cannot be computed.
 Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
                   const Rigid3& T_map_start, const AlignmentOptions& options);
 
-/// Something that is known of two poses by each other. The error is
+/// A measurement of one pose relative to another. The error is
 /// sqrt_information * differenceOf(T_from_to^-1 * T_world_from^-1 * T_world_to) + offset.
 struct RelativePoseFactor {
-  std::size_t from = 0;  ///< Number of the pose; not that of `to`.
+  std::size_t from = 0;  ///< Number of the pose; differs from `to`.
   std::size_t to = 0;
   Rigid3 T_from_to;
   Matrix6d sqrt_information = Matrix6d::Identity();
   Vector6d offset = Vector6d::Zero();
-  /// Whether it may be wrong altogether: then large errors count less (Cauchy's loss).
+  /// Whether the measurement may be an outlier. Then large errors have less weight (Cauchy's loss).
   bool robust = false;
 };
 
-/// The length of a factor's error: standard deviations, where it has that many.
+/// The norm of the error of a factor, in standard deviations.
 double errorOf(const RelativePoseFactor& factor, const Rigid3& T_world_from,
                const Rigid3& T_world_to);
 
-/// A motion between two poses, and of its `differenceOf` the covariance.
+/// A motion between two poses, and the covariance of its `differenceOf`.
 struct MotionEstimate {
   Rigid3 T_from_to;
   Matrix6d covariance = Matrix6d::Identity();
 };
 
-/// Where a factor's error is least.
-/// @param open_variance of what the factor leaves open, m^2 and rad^2: above 0.
+/// The minimum of the error of a factor.
+/// @param open_variance variance of the directions that the factor leaves open, m^2 and rad^2,
+/// above 0.
 MotionEstimate motionOf(const RelativePoseFactor& factor, double open_variance);
 
-/// Poses, and what is known of them by each other.
+/// Poses, and the factors between them.
 struct PoseGraph {
   std::vector<Rigid3> T_world_node;
   std::vector<bool> fixed;  ///< One per pose.
@@ -82,29 +84,21 @@ struct PoseGraph {
 };
 
 struct PoseGraphOptions {
-  double robust_sigmas = 3;  ///< Of robust factors; as above.
+  double robust_sigmas = 3;  ///< For robust factors, as in AlignmentOptions.
   int max_iterations = 20;   ///< 1 to 1000.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// Moves the poses that are not fixed to where the factors' errors together are least. Where that
-/// cannot be computed the poses stay.
+/// Moves the poses that are not fixed to the minimum of the sum of squared errors. They stay where
+/// the minimum cannot be computed.
 void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph);
 
-/// Covariance of a pose that is not fixed, given those that are: of a small motion of it, the
-/// translation along the world's axes in metres, then a rotation vector about them in radians.
-/// @return nothing where the factors leave it open.
+/// The covariance of a pose that is not fixed, given the fixed poses: of its translation along the
+/// axes of the world in metres, then of a rotation vector about them in radians.
+/// @return nothing where the pose is fixed, or the factors leave it open.
 std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const PoseGraph& graph,
                                        std::size_t node);
-
-/// How a pair's error changes with small motions of the pose, as `poseCovariance` has them: what
-/// the solver goes by.
-Eigen::Matrix<double, 3, 6> pairJacobian(const PointPair& pair, const Rigid3& T_map_ref);
-
-/// The same of a factor: by the motion of `from`, then by that of `to`.
-Eigen::Matrix<double, 6, 12> factorJacobian(const RelativePoseFactor& factor,
-                                            const Rigid3& T_world_from, const Rigid3& T_world_to);
 
 }  // namespace efm

@@ -9,16 +9,16 @@
 
 namespace efm {
 
-/// What is kept of a keyframe whose pose is refined.
+/// A keyframe with a refined pose.
 struct RefinedKeyframe {
   RegistrationCloud cloud;
-  Rigid3 T_odom_ref;               ///< As the tracker has it; its world may drift.
-  Rigid3 T_world_ref;              ///< As it is by now.
-  Rigid3 T_world_ref_denoised;     ///< Where the tracker would have put it without noise.
-  double path_length_m = 0;        ///< From the first keyframe to here, by the tracker.
-  PoseNoise noise = kCommonNoise;  ///< How many times the noise of others its pose has.
-  std::size_t first_factor = 0;    ///< Of all factors: none before it has this keyframe.
-  bool moved = true;               ///< Since somebody asked.
+  Rigid3 T_odom_ref;             ///< By the tracker; its world may drift.
+  Rigid3 T_world_ref;            ///< Refined.
+  Rigid3 T_world_ref_denoised;   ///< The pose of the tracker without noise, in the refined world.
+  double path_length_m = 0;      ///< From the first keyframe, by the tracker.
+  NoiseScale noise_scale = {};   ///< Of its pose by the tracker.
+  std::size_t first_factor = 0;  ///< No factor before this index has the keyframe.
+  bool moved = true;             ///< Since `takeMoved`.
 };
 
 }  // namespace efm

@@ -11,39 +11,37 @@
 
 namespace efm {
 
-/// The pose graph of the keyframes from one on, and of those before that factors tie them to. Each
-/// keyframe has two poses in it: its own, and the one that the tracker would have given without
-/// noise. Between each two of the latter lies the tracker's motion, which may drift; beside each
-/// stands the former, which noise took from it. So poses that jitter average out over the whole
-/// window, and those that drift follow what the points say.
+/// The pose graph of the keyframes from `first_free` on, and of the earlier ones that factors
+/// connect with them. Each keyframe has two poses: T_world_ref and T_world_ref_denoised. The motion
+/// of the tracker, with its drift, connects consecutive denoised poses. The noise connects the two
+/// poses of a keyframe. So noise averages out over the window, and drift follows the points.
 class WindowGraph {
  public:
-  /// @param first_free the keyframes before it stay where they are. At least 1.
+  /// @param first_free the keyframes before it are fixed. At least 1.
   /// @param keyframes must outlive the graph.
   WindowGraph(const std::vector<RefinedKeyframe>& keyframes, std::size_t first_free);
 
-  /// A factor between keyframes; left out where both stay.
+  /// Adds a factor between keyframes, unless both are fixed.
   void add(RelativePoseFactor factor);
-  /// What the tracker says.
+  /// Adds the factors of the tracker: its motions and its noise.
   void addTracker(const TrackerErrors& errors);
   void solve(const PoseGraphOptions& options) { solvePoseGraph(options, graph_); }
 
-  /// Whether the keyframe is in the graph.
-  bool has(std::size_t keyframe) const { return place_[keyframe].has_value(); }
-  /// Its poses, where it is.
+  bool has(std::size_t keyframe) const { return node_[keyframe].has_value(); }
+  /// The poses of a keyframe in the graph.
   const Rigid3& T_world_ref(std::size_t keyframe) const;
   const Rigid3& T_world_ref_denoised(std::size_t keyframe) const;
-  /// See `poseCovariance`: of T_world_ref_denoised.
-  std::optional<Matrix6d> trackedCovariance(const PoseGraphOptions& options,
-                                            std::size_t keyframe) const;
+  /// `poseCovariance` of T_world_ref_denoised.
+  std::optional<Matrix6d> denoisedCovariance(const PoseGraphOptions& options,
+                                             std::size_t keyframe) const;
 
  private:
-  std::size_t ownNode(std::size_t keyframe);
-  std::size_t trackedNode(std::size_t keyframe) { return ownNode(keyframe) + 1; }
+  std::size_t refNode(std::size_t keyframe);
+  std::size_t denoisedNode(std::size_t keyframe) { return refNode(keyframe) + 1; }
 
   const std::vector<RefinedKeyframe>& keyframes_;
   std::size_t first_free_;
-  std::vector<std::optional<std::size_t>> place_;  // of each keyframe's first node
+  std::vector<std::optional<std::size_t>> node_;  // of T_world_ref; the denoised one is next
   PoseGraph graph_;
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mapping/keyframes/keyframe_depth_map.h"
+#include "maps/refinement/registration_cloud.h"
 
 namespace efm::test {
 
@@ -20,8 +21,7 @@ using EdgeWorld = std::vector<Edge>;
 
 inline ReferenceView smallView() { return {160, 120, 130, 130, 79.5, 59.5}; }
 
-/// Edges of half a metre to one and a half, of any direction, all around the origin: 2 to 4 m away
-/// from the world's y axis.
+/// Edges of 0.5 to 1.5 m with any direction, 2 to 4 m around the y axis of the world.
 inline EdgeWorld edgesAround(int count, std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
   EdgeWorld world;
@@ -37,7 +37,14 @@ inline EdgeWorld edgesAround(int count, std::mt19937& random) {
   return world;
 }
 
-/// The world's y axis points down, as a view's does: so this one looks along z, turned by an angle.
+/// Edges along x on one wall.
+inline EdgeWorld stripes() {
+  EdgeWorld world;
+  for (int y = -4; y <= 4; ++y) world.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
+  return world;
+}
+
+/// A view along z, rotated by a yaw angle. The y axes of the world and the view point down.
 inline Rigid3 viewTurned(double yaw_rad, const Eigen::Vector3d& p_world) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitY())), p_world};
 }
@@ -52,8 +59,8 @@ inline KeyframeDepthMap emptyKeyframe(const ReferenceView& view) {
   return keyframe;
 }
 
-/// What a view sees of the edges: the nearest in each pixel, whose inverse depth errs by `sigma`
-/// (1/m), and nobody knows better than by that.
+/// The nearest edge in each pixel of a view. Inverse depths have the error `sigma` (1/m), and state
+/// it as their variance.
 inline KeyframeDepthMap seenFrom(const EdgeWorld& world, const Rigid3& T_world_ref, double sigma,
                                  std::mt19937& random) {
   KeyframeDepthMap keyframe = emptyKeyframe(smallView());
@@ -83,7 +90,19 @@ inline KeyframeDepthMap seenFrom(const EdgeWorld& world, const Rigid3& T_world_r
   return keyframe;
 }
 
-/// What a good keyframe errs by: 1 cm at 2 m, 4 cm at 4 m.
+/// The error of a good keyframe: 1 cm at 2 m, 4 cm at 4 m.
 constexpr double kInverseDepthSigma = 0.0025;  // 1/m
+
+/// Keeps the first depths of a keyframe only.
+inline void keepFirst(int count, KeyframeDepthMap& keyframe) {
+  for (float& depth : keyframe.map.depth) {
+    if (depth > 0 && count-- <= 0) depth = 0;
+  }
+}
+
+inline RegistrationCloud cloudFrom(const EdgeWorld& world, const Rigid3& T_world_ref,
+                                   std::mt19937& random) {
+  return {seenFrom(world, T_world_ref, kInverseDepthSigma, random), {}};
+}
 
 }  // namespace efm::test

@@ -15,14 +15,14 @@ using test::drawMatrix;
 using test::drawPose;
 using test::drawVector;
 
-Vector6d turnOnly(const Eigen::Vector3d& turn) {
+Vector6d rotationOnly(const Eigen::Vector3d& rotation) {
   Vector6d difference = Vector6d::Zero();
-  difference.tail<3>() = turn;
+  difference.tail<3>() = rotation;
   return difference;
 }
 
 TEST(PoseDifference, IsWorkedOutByHand) {
-  // A quarter turn about z, and 1 m along x.
+  // 90 deg about z, and 1 m along x.
   const Rigid3 T_a_b{Eigen::Quaterniond(std::sqrt(0.5), 0, 0, std::sqrt(0.5)), {1, 0, 0}};
   Vector6d expected;
   expected << 1, 0, 0, 0, 0, M_PI / 2;
@@ -43,19 +43,18 @@ RC_GTEST_PROP(PoseDifference, OfAPoseGivesThePoseBack, ()) {
   RC_ASSERT((back.rotation.matrix() - T_a_b.rotation.matrix()).norm() < 1e-14);
 }
 
-RC_GTEST_PROP(PoseDifference, IsFoundAgainFromNoneToHalfATurn, ()) {
+RC_GTEST_PROP(PoseDifference, IsFoundAgainUpToHalfARotation, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   const Eigen::Vector3d axis = drawVector(1, random).normalized();
-  // An angle is as exact as the quaternion's numbers, however small: near pi it hangs on its
-  // scalar alone, so 1e-9 before that is as near as this is asked for.
+  // Near pi the angle depends on the scalar of the quaternion alone: 1e-9 is the limit.
   for (const double angle : {1e-300, 1e-20, 1e-12, 1e-6, 1e-3, 1.0, M_PI - 1e-3, M_PI - 1e-9}) {
-    const Vector6d difference = turnOnly(angle * axis);
+    const Vector6d difference = rotationOnly(angle * axis);
     RC_ASSERT((differenceOf(rigidFromDifference(difference)) - difference).norm() <=
               1e-15 + 1e-14 * angle);
   }
 }
 
-RC_GTEST_PROP(PoseDifference, DoesNotHangOnTheSignOfAQuaternion, ()) {
+RC_GTEST_PROP(PoseDifference, DoesNotDependOnTheSignOfAQuaternion, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   const Rigid3 T_a_b = drawPose(1, random);
   const Rigid3 negated{Eigen::Quaterniond(-T_a_b.rotation.coeffs()), T_a_b.translation};
@@ -63,26 +62,38 @@ RC_GTEST_PROP(PoseDifference, DoesNotHangOnTheSignOfAQuaternion, ()) {
   RC_ASSERT(differenceOf(negated).tail<3>().norm() <= M_PI + 1e-15);
 }
 
-TEST(PoseDifference, OfMoreThanHalfATurnIsTheShorterWayBack) {
-  const Vector6d difference = differenceOf(rigidFromDifference(turnOnly({0, 1.5 * M_PI, 0})));
-  EXPECT_LT((difference - turnOnly({0, -0.5 * M_PI, 0})).norm(), 1e-14);
+TEST(PoseDifference, OfMoreThanHalfARotationIsTheShorterOne) {
+  const Vector6d difference = differenceOf(rigidFromDifference(rotationOnly({0, 1.5 * M_PI, 0})));
+  EXPECT_LT((difference - rotationOnly({0, -0.5 * M_PI, 0})).norm(), 1e-14);
 }
 
 TEST(SqrtInformation, OfADiagonalHoldsTheInverseStandardDeviations) {
   Vector6d sigma;
   sigma << 0.1, 0.2, 0.5, 1, 2, 4;
   const Matrix6d expected = sigma.cwiseInverse().asDiagonal();
-  const Matrix6d sqrt_information = sqrtInformation(sigma.cwiseAbs2().asDiagonal());
+  const Matrix6d sqrt_information = sqrtInformation(Matrix6d(sigma.cwiseAbs2().asDiagonal()));
   EXPECT_LT((sqrt_information - expected).norm(), 1e-14);
 }
 
-RC_GTEST_PROP(SqrtInformation, MakesErrorsOfThatCovarianceToUnitOnes, ()) {
+RC_GTEST_PROP(SqrtInformation, ScalesErrorsToUnitCovariance, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   Matrix6d factor = drawMatrix<6>(random);
-  factor.topRows<3>() *= 1e-2;  // as different as metres and radians may be
+  factor.topRows<3>() *= 1e-2;  // metres and radians may differ
   const Matrix6d covariance = factor * factor.transpose();
   const Matrix6d unit = sqrtInformation(covariance);
   RC_ASSERT((unit * covariance * unit.transpose() - Matrix6d::Identity()).norm() < 1e-10);
+}
+
+RC_GTEST_PROP(SqrtInformation, OfThreeDimensionsScalesErrorsToUnitCovariance, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const Eigen::Matrix3d factor = drawMatrix<3>(random);
+  const Eigen::Matrix3d covariance = factor * factor.transpose();
+  const Eigen::Matrix3d unit = sqrtInformation(covariance);
+  RC_ASSERT((unit * covariance * unit.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-12);
+  RC_ASSERT(isPositiveDefinite(covariance));
+  RC_ASSERT(!isPositiveDefinite(-covariance));
+  RC_ASSERT(!isPositiveDefinite(covariance -
+                                2 * maxEigenvalue(covariance) * Eigen::Matrix3d::Identity()));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "random_poses.h"
+#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
@@ -20,10 +21,9 @@ using test::drawPose;
 using test::drawVector;
 using test::metresApart;
 using test::moved;
+using test::priorOf;
 using test::radiansApart;
 using test::sameBits;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
@@ -51,10 +51,6 @@ RelativePoseFactor factorBetween(std::size_t from, std::size_t to, const Rigid3&
   sqrt_information << Eigen::Vector3d::Constant(1 / sigma_m),
       Eigen::Vector3d::Constant(1 / sigma_rad);
   return {from, to, T_from_to, sqrt_information.asDiagonal()};
-}
-
-PosePrior priorOf(const Rigid3& T_map_ref, double sigma_m, double sigma_rad) {
-  return {T_map_ref, factorBetween(0, 1, {}, sigma_m, sigma_rad).sqrt_information};
 }
 
 /// Points of a keyframe and of the map that are the same but for noise.
@@ -113,63 +109,12 @@ double mostApart(const std::vector<Rigid3>& a, const std::vector<Rigid3>& b) {
   return most;
 }
 
-RC_GTEST_PROP(PoseJacobians, OfAPairAreTheNumericOnes, ()) {
-  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
-  for (const double far_m : {1.0, 1e6}) {
-    const Rigid3 T_map_ref = drawPose(far_m, random);
-    PointPair pair;
-    pair.p_ref = drawVector(3, random);
-    pair.p_map = T_map_ref * pair.p_ref + drawVector(0.1, random);
-    pair.sqrt_information = 10 * drawMatrix<3>(random);
-    const auto error = [&](const Rigid3& T_a_b) -> Eigen::VectorXd {
-      return pair.sqrt_information * (pair.p_map - T_a_b * pair.p_ref);
-    };
-    // At 1e6 m a place is known to 1e-10 m: over steps of 1e-4 that is 1e-6, times 20 / m.
-    const auto numeric = byMotions(error, T_map_ref, 1e-4);
-    RC_ASSERT((pairJacobian(pair, T_map_ref) - numeric).cwiseAbs().maxCoeff() < 1e-4);
-  }
-}
-
-RC_GTEST_PROP(PoseJacobians, OfAFactorAreTheNumericOnes, ()) {
-  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
-  // How far the two rotations are from those that the factor says: none, little, near pi.
-  for (const double angle : {0.0, 1e-8, 0.1, 2.0, M_PI - 0.01}) {
-    const Rigid3 T_world_from = drawPose(5, random);
-    RelativePoseFactor factor{0, 1, drawPose(2, random), drawMatrix<6>(random)};
-    factor.offset << drawVector(1, random), drawVector(1, random);
-    const Eigen::Vector3d axis = drawVector(1, random).normalized();
-    const Rigid3 off{Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)), drawVector(0.3, random)};
-    const Rigid3 T_world_to = T_world_from * factor.T_from_to * off;
-    Eigen::MatrixXd numeric(6, 12);
-    numeric << byMotions(
-        [&](const Rigid3& T_a_b) { return errorVector(factor, T_a_b, T_world_to); }, T_world_from,
-        1e-5),
-        byMotions([&](const Rigid3& T_a_b) { return errorVector(factor, T_world_from, T_a_b); },
-                  T_world_to, 1e-5);
-    RC_ASSERT((factorJacobian(factor, T_world_from, T_world_to) - numeric).cwiseAbs().maxCoeff() <
-              1e-6);
-  }
-}
-
-TEST(PoseJacobians, OfAFactorAreTheNumericOnesFarFromTheOrigin) {
-  std::mt19937 random(2);
-  const Rigid3 T_world_from = drawPose(1e6, random);
-  const RelativePoseFactor factor{0, 1, drawPose(2, random), drawMatrix<6>(random)};
-  const Rigid3 T_world_to = T_world_from * factor.T_from_to * drawMotion(0.1, 0.1, random);
-  const auto numeric =
-      byMotions([&](const Rigid3& T_a_b) { return errorVector(factor, T_a_b, T_world_to); },
-                T_world_from, 1e-4);
-  const Eigen::Matrix<double, 6, 6> automatic =
-      factorJacobian(factor, T_world_from, T_world_to).leftCols<6>();
-  EXPECT_LT((automatic - numeric).cwiseAbs().maxCoeff(), 1e-4);  // 1e-10 m over 1e-4, as above
-}
-
 RC_GTEST_PROP(AlignToMap, FindsThePoseOfExactPairs, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   const Rigid3 T_map_ref = drawPose(3, random);
   const std::vector<PointPair> pairs = drawPairs(T_map_ref, 50, 0, random);
   const Rigid3 start = T_map_ref * drawMotion(0.02, 0.01, random);
-  // A prior of 1 m and 1 rad against 50 pairs of 1 cm: its share of the 4 cm is 1e-4 / 50.
+  // A prior of 1 m and 1 rad against 50 pairs of 1 cm keeps 1e-4 / 50 of the 4 cm.
   const Rigid3 found = alignToMap(pairs, priorOf(start, 1, 1), start, patient());
   RC_ASSERT(metresApart(found, T_map_ref) < 1e-5);
   RC_ASSERT(radiansApart(found, T_map_ref) < 1e-5);
@@ -202,11 +147,11 @@ TEST(AlignToMap, WeighsPairsAndPriorByTheirInformation) {
 }
 
 /// Solving ends where the sum of squares, 0.25 here, changes by less than 1e-6 of it: 5e-4 of the
-/// prior's standard deviations, 0.1 m and 0.05 rad.
-constexpr double kWhereItStops = 5e-5;
+/// standard deviations of the prior, 0.1 m and 0.05 rad.
+constexpr double kSolvedTo = 5e-5;
 
-/// How far from the prior a keyframe ends whose pairs hold its points along some directions only;
-/// the map is farther by 5 cm.
+/// The motion from the prior by pairs that constrain the points along some directions only. The map
+/// is 5 cm farther along z.
 Vector6d alignedAlong(const std::vector<Eigen::Vector3d>& p_ref, const Eigen::Vector3d& held,
                       const Rigid3& T_map_ref) {
   std::vector<PointPair> pairs;
@@ -222,65 +167,50 @@ Vector6d alignedAlong(const std::vector<Eigen::Vector3d>& p_ref, const Eigen::Ve
                       alignToMap(pairs, priorOf(T_map_ref, 0.1, 0.05), T_map_ref, options));
 }
 
-TEST(AlignToMap, OnOnePlaneTheDirectionsInItStayWithThePrior) {
-  std::mt19937 random(3);
-  const Rigid3 prior = drawPose(2, random);
-  std::vector<Eigen::Vector3d> p_ref;
+TEST(AlignToMap, DirectionsThatAPlaneOrALineLeavesOpenStayWithThePrior) {
+  std::vector<Eigen::Vector3d> plane;
   for (int x = -4; x <= 4; ++x) {
-    for (int y = -4; y <= 4; ++y) p_ref.emplace_back(0.2 * x, 0.2 * y, 2);
+    for (int y = -4; y <= 4; ++y) plane.emplace_back(0.2 * x, 0.2 * y, 2);
   }
-  const Vector6d difference = alignedAlong(p_ref, {0, 0, 1}, prior);
-  EXPECT_NEAR(difference[2], 0.05, 1e-4) << "81 pairs of 1 cm against 10 cm";
-  for (const int open : {0, 1, 5}) EXPECT_NEAR(difference[open], 0, kWhereItStops) << open;
+  std::vector<Eigen::Vector3d> line;
+  for (int x = -40; x <= 40; ++x) line.emplace_back(0.02 * x, 0, 2);
+  struct Case {
+    std::vector<Eigen::Vector3d> p_ref;
+    Eigen::Vector3d held;
+    std::vector<int> open;
+  };
+  std::mt19937 random(3);
+  for (const Case& shape :
+       {Case{plane, {0, 0, 1}, {0, 1, 5}}, Case{line, {0, 1, 1}, {0, 1, 3, 4, 5}}}) {
+    const Vector6d difference = alignedAlong(shape.p_ref, shape.held, drawPose(2, random));
+    EXPECT_NEAR(difference[2], 0.05, 1e-4) << "81 pairs of 1 cm against 10 cm";
+    for (const int open : shape.open) EXPECT_NEAR(difference[open], 0, kSolvedTo) << open;
+  }
 }
 
-TEST(AlignToMap, OnOneLineTheDirectionsAlongItStayWithThePrior) {
-  std::mt19937 random(4);
-  const Rigid3 prior = drawPose(2, random);
-  std::vector<Eigen::Vector3d> p_ref;
-  for (int x = -40; x <= 40; ++x) p_ref.emplace_back(0.02 * x, 0, 2);
-  const Vector6d difference = alignedAlong(p_ref, {0, 1, 1}, prior);
-  EXPECT_NEAR(difference[2], 0.05, 1e-4);
-  for (const int open : {0, 1, 3, 4, 5}) EXPECT_NEAR(difference[open], 0, kWhereItStops) << open;
-}
-
-TEST(AlignToMap, IsNotBentByAThirdOfThePairsBeingWrong) {
+TEST(AlignToMap, OutliersOfAThirdOfThePairsHaveLittleWeight) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
     const Rigid3 T_map_ref = drawPose(3, random);
     std::vector<PointPair> pairs = drawPairs(T_map_ref, 200, 0.01, random);
-    const Eigen::Vector3d aside(0.3, 0.2, -0.1);  // all to one side: they do not average out
+    const Eigen::Vector3d aside(0.3, 0.2, -0.1);  // to one side: no average
     for (int i = 0; i < 60; ++i) pairs[i].p_map += aside;
     const Rigid3 start = T_map_ref * drawMotion(0.02, 0.01, random);
     const Rigid3 found = alignToMap(pairs, priorOf(start, 0.05, 0.02), start, patient());
-    // 140 pairs of 1 cm at 3 m: some 2 mm, as rotation and translation go together; what is wrong,
-    // 37 sigmas off, still pulls with 1/12 of a pair's largest weight.
+    // 140 pairs of 1 cm at 3 m: about 2 mm, because rotation and translation are correlated.
+    // Outliers at 37 sigmas still have 1/12 of the maximum weight of a pair.
     EXPECT_LT(metresApart(found, T_map_ref), 0.008) << seed;
     EXPECT_LT(radiansApart(found, T_map_ref), 0.004) << seed;
     AlignmentOptions trusting = patient();
     trusting.robust_sigmas = 1e6;
-    const Rigid3 bent = alignToMap(pairs, priorOf(start, 0.05, 0.02), start, trusting);
-    EXPECT_GT((bent * Eigen::Vector3d(0, 0, 3) - T_map_ref * Eigen::Vector3d(0, 0, 3)).norm(), 0.05)
-        << "they would: " << seed;
+    const Rigid3 pulled = alignToMap(pairs, priorOf(start, 0.05, 0.02), start, trusting);
+    EXPECT_GT((pulled * Eigen::Vector3d(0, 0, 3) - T_map_ref * Eigen::Vector3d(0, 0, 3)).norm(),
+              0.05)
+        << "without the loss: " << seed;
   }
 }
 
-TEST(AlignToMap, DoesNotDependOnWhereTheWorldBegins) {
-  std::mt19937 random(5);
-  const Rigid3 T_map_ref = drawPose(3, random);
-  std::vector<PointPair> pairs = drawPairs(T_map_ref, 100, 0.01, random);
-  Rigid3 start = T_map_ref * drawMotion(0.02, 0.01, random);
-  const Rigid3 found = alignToMap(pairs, priorOf(start, 0.05, 0.02), start, patient());
-  const Eigen::Vector3d far_m(1e6, -2e6, 5e5);
-  for (PointPair& pair : pairs) pair.p_map += far_m;
-  start.translation += far_m;
-  const Rigid3 found_far = alignToMap(pairs, priorOf(start, 0.05, 0.02), start, patient());
-  // Ceres stops at changes of 1e-8 of the size of what it solves for: 2 cm of 2e6 m.
-  EXPECT_LT((found_far.translation - far_m - found.translation).norm(), 1e-5);
-  EXPECT_LT(radiansApart(found_far, found), 1e-5);
-}
-
-TEST(AlignToMap, StaysAtItsStartWhereAPairIsNotANumber) {
+TEST(AlignToMap, StaysAtItsStartWhereAPairIsNotFinite) {
   std::mt19937 random(6);
   const Rigid3 start = drawPose(3, random);
   for (int what = 0; what < 3; ++what) {
@@ -316,24 +246,6 @@ TEST(SolvePoseGraph, FixedPosesStayBitForBit) {
   EXPECT_GT(metresApart(graph.T_world_node[3], before[3]), 0.01) << "others move";
 }
 
-RC_GTEST_PROP(SolvePoseGraph, MovesWithTheWorld, ()) {
-  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
-  PoseGraph graph = ring(8);
-  for (RelativePoseFactor& factor : graph.factors) {
-    factor.T_from_to = factor.T_from_to * drawMotion(0.02, 0.02, random);  // they disagree
-  }
-  const Rigid3 T_other_world = drawPose(10, random);
-  PoseGraph other = graph;
-  for (Rigid3& pose : other.T_world_node) pose = T_other_world * pose;
-  PoseGraphOptions options;
-  options.max_iterations = 100;
-  solvePoseGraph(options, graph);
-  solvePoseGraph(options, other);
-  for (Rigid3& pose : graph.T_world_node) pose = T_other_world * pose;
-  // Where it stops: costs that change by less than 1e-6 of them, the square of poses' 1e-3.
-  RC_ASSERT(mostApart(graph.T_world_node, other.T_world_node) < 1e-4);
-}
-
 TEST(SolvePoseGraph, AnOffsetMovesAFactorsMinimumByAsMuch) {
   // error = 100 d + 2: least where d = -2 cm along the first axis.
   PoseGraph graph{{Rigid3{}, Rigid3{}}, {true, false}, {factorBetween(0, 1, {}, 0.01, 0.01)}};
@@ -344,7 +256,7 @@ TEST(SolvePoseGraph, AnOffsetMovesAFactorsMinimumByAsMuch) {
   EXPECT_NEAR(errorOf(graph.factors[0], Rigid3{}, Rigid3{}), 2, 1e-12);
 }
 
-TEST(SolvePoseGraph, ADoubtfulFactorThatIsWrongBendsNothing) {
+TEST(SolvePoseGraph, AWrongRobustFactorMovesNothing) {
   const PoseGraph exact = ring(20);
   for (const bool robust : {true, false}) {
     PoseGraph graph = exact;
@@ -359,12 +271,12 @@ TEST(SolvePoseGraph, ADoubtfulFactorThatIsWrongBendsNothing) {
     if (robust) {
       EXPECT_LT(most_m, 0.02);
     } else {
-      EXPECT_GT(most_m, 0.1) << "nobody would see that doubt helps";
+      EXPECT_GT(most_m, 0.1) << "without the loss";
     }
   }
 }
 
-TEST(SolvePoseGraph, LeavesPosesWhereThereIsNothingToSolve) {
+TEST(SolvePoseGraph, WithoutAnythingToSolvePosesStay) {
   PoseGraph empty;
   solvePoseGraph({}, empty);
   EXPECT_TRUE(empty.T_world_node.empty());
@@ -399,20 +311,6 @@ TEST(SolvePoseGraph, LeavesPosesWhereThereIsNothingToSolve) {
     if (what == 3) factor.T_from_to.rotation.coeffs().setConstant(kNan);
     unmoved(not_a_number, "not a number");
   }
-}
-
-TEST(SolvePoseGraph, WithoutAFixedPoseStaysAboutWhereItWas) {
-  std::mt19937 random(8);
-  PoseGraph graph = ring(6);
-  graph.fixed[0] = false;
-  perturbFree(graph, 0.02, 0.02, random);
-  const std::vector<Rigid3> before = graph.T_world_node;
-  solvePoseGraph({}, graph);
-  for (const RelativePoseFactor& factor : graph.factors) {
-    EXPECT_LT(errorOf(factor, graph.T_world_node[factor.from], graph.T_world_node[factor.to]),
-              1e-3);
-  }
-  EXPECT_LT(mostApart(graph.T_world_node, before), 0.3) << "a few times what was perturbed";
 }
 
 RC_GTEST_PROP(PoseCovariance, IsTheInverseOfTheNumericInformation, ()) {
@@ -463,26 +361,14 @@ TEST(PoseCovariance, IsNothingWhereFactorsLeaveThePoseOpen) {
   EXPECT_TRUE(poseCovariance(PoseGraphOptions(), pair, 1));
   pair.factors[0].sqrt_information(0, 0) = 0;
   EXPECT_FALSE(poseCovariance(PoseGraphOptions(), pair, 1)) << "one direction is open";
-}
-
-TEST(PoseCovariance, IsNothingOfWhatIsNotANumber) {
-  PoseGraph graph = ring(4);
   graph.factors[1].sqrt_information(2, 2) = kNan;
-  EXPECT_FALSE(poseCovariance(PoseGraphOptions(), graph, 1));
+  EXPECT_FALSE(poseCovariance(PoseGraphOptions(), graph, 1)) << "not finite";
 }
 
-TEST(AlignmentOptions, OutOfRangeAreRefusedByName) {
-  AlignmentOptions alignment;
-  alignment.robust_sigmas = 0;
-  EXPECT_THAT([&] { alignment.validate(); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("robust_sigmas = 0")));
-  PoseGraphOptions graph;
-  graph.max_iterations = 0;
-  EXPECT_THAT([&] { graph.validate(); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("max_iterations = 0")));
-  graph = {};
-  graph.robust_sigmas = kNan;
-  EXPECT_THROW(graph.validate(), std::invalid_argument);
+TEST(AlignmentOptions, ValuesOutOfRangeAreRefusedByName) {
+  test::expectRefused(&AlignmentOptions::robust_sigmas, 0, "robust_sigmas = 0");
+  test::expectRefused(&PoseGraphOptions::max_iterations, 0, "max_iterations = 0");
+  test::expectRefused(&PoseGraphOptions::robust_sigmas, kNan, "robust_sigmas = nan");
 }
 
 }  // namespace

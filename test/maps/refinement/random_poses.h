@@ -6,6 +6,7 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/pose_difference.h"
+#include "maps/refinement/pose_refinement.h"
 
 namespace efm::test {
 
@@ -25,7 +26,7 @@ inline Rigid3 drawMotion(double sigma_m, double sigma_rad, std::mt19937& random)
   return rigidFromDifference(difference);
 }
 
-/// Any rotation, all alike likely; normal translation.
+/// A uniform rotation and a normal translation.
 inline Rigid3 drawPose(double sigma_m, std::mt19937& random) {
   std::normal_distribution<double> normal;
   Eigen::Vector4d q;
@@ -33,7 +34,7 @@ inline Rigid3 drawPose(double sigma_m, std::mt19937& random) {
   return {Eigen::Quaterniond(q.normalized()), drawVector(sigma_m, random)};
 }
 
-/// A full matrix, no row or column of which dominates: never near singular.
+/// A full matrix that is never near singular.
 template <int size>
 Eigen::Matrix<double, size, size> drawMatrix(std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-0.3, 0.3);
@@ -43,11 +44,11 @@ Eigen::Matrix<double, size, size> drawMatrix(std::mt19937& random) {
   return matrix;
 }
 
-/// The small motion d of a pose as `poseCovariance` has it: translation along the world's axes,
+/// Moves a pose by d as in `poseCovariance`: a translation along the axes of the world, and a
 /// rotation about them.
 inline Rigid3 moved(const Rigid3& T_world_ref, const Vector6d& d) {
-  const Rigid3 turn = rigidFromDifference(d);
-  return {(turn.rotation * T_world_ref.rotation).normalized(),
+  const Rigid3 motion = rigidFromDifference(d);
+  return {(motion.rotation * T_world_ref.rotation).normalized(),
           T_world_ref.translation + d.head<3>()};
 }
 
@@ -59,6 +60,17 @@ inline double radiansApart(const Rigid3& a, const Rigid3& b) {
 }
 inline bool sameBits(const Rigid3& a, const Rigid3& b) {
   return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
+}
+
+/// The diagonal covariance of a pose.
+inline Matrix6d covarianceOf(double sigma_m, double sigma_rad) {
+  Vector6d sigma;
+  sigma << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+inline PosePrior priorOf(const Rigid3& T_map_ref, double sigma_m, double sigma_rad) {
+  return {T_map_ref, sqrtInformation(covarianceOf(sigma_m, sigma_rad))};
 }
 
 }  // namespace efm::test

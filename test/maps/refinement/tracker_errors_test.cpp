@@ -12,25 +12,21 @@
 
 #include "mapping/geometry/angle.h"
 #include "random_poses.h"
+#include "test/maps/refusals.h"
 
 namespace efm {
 namespace {
 
 using test::drawVector;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
 
-/// Motions of a tracker that errs by so much, against points that know them to 2 mm and 0.1 deg:
-/// drawn from the model itself.
+/// Samples from the model: a tracker with these errors, and points with 2 mm and 0.1 deg.
 std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, double path_length_m,
                                       std::mt19937& random) {
   std::vector<MotionSample> samples;
   for (int i = 0; i < count; ++i) {
     MotionSample sample;
     sample.path_length_m = path_length_m * (1 + i % 4);
-    Vector6d sigma;
-    sigma << Eigen::Vector3d::Constant(0.002), Eigen::Vector3d::Constant(0.1 * kRadiansPerDegree);
-    sample.covariance = sigma.cwiseAbs2().asDiagonal();
+    sample.covariance = test::covarianceOf(0.002, 0.1 * kRadiansPerDegree);
     const Matrix6d all = sample.covariance + 2 * truth.noiseCovariance() +
                          truth.driftCovariance(sample.path_length_m);
     Vector6d unit;
@@ -49,8 +45,7 @@ TrackerErrors times(TrackerErrors errors, double factor) {
   return errors;
 }
 
-/// What motions over a way err by: noise and drift can take each other's place where ways are
-/// alike.
+/// The errors of motions along a path. On paths of similar length noise and drift look the same.
 Eigen::Vector2d sigmasOver(double path_length_m, const TrackerErrors& errors) {
   const Matrix6d covariance = 2 * errors.noiseCovariance() + errors.driftCovariance(path_length_m);
   return {std::sqrt(covariance(0, 0)), std::sqrt(covariance(5, 5))};
@@ -84,7 +79,7 @@ TEST(TrackerErrors, CovariancesAreNeverSingular) {
   }
 }
 
-TEST(EstimateTrackerErrors, WithoutSamplesExpectsWhatItDid) {
+TEST(EstimateTrackerErrors, WithoutSamplesIsAsExpected) {
   const TrackerErrors expected{0.02, 0.01, 0.03, 0.002};
   EXPECT_TRUE(same(estimateTrackerErrors({}, expected), expected));
 }
@@ -120,12 +115,12 @@ TEST(EstimateTrackerErrors, FindsADriftThatIsLargerThanExpected) {
   }
 }
 
-TEST(EstimateTrackerErrors, OfExactPosesFindsMuchLessNoiseAndKeepsSomeDrift) {
+TEST(EstimateTrackerErrors, ExactPosesReduceTheNoiseAndKeepSomeDrift) {
   std::mt19937 random(1);
   const auto samples = drawSamples({0, 0, 0, 0}, 100, 0.05, random);
   const TrackerErrors expected;
   const TrackerErrors found = estimateTrackerErrors(samples, expected);
-  // 2 mm and 0.1 deg are what the points themselves err by, over sqrt 2.
+  // The errors of the points are 2 mm and 0.1 deg.
   EXPECT_LT(found.noise_m, 0.0015);
   EXPECT_LT(found.noise_rad, 0.08 * kRadiansPerDegree);
   EXPECT_GT(found.drift_m, expected.drift_m / 8) << "within three times a factor of 2";
@@ -141,7 +136,7 @@ TEST(EstimateTrackerErrors, AFewSamplesChangeLittle) {
   EXPECT_NEAR(std::log(found.noise_rad / expected.noise_rad), 0, std::log(3));
 }
 
-TEST(EstimateTrackerErrors, RegistrationsThatFailedDoNotBlowItUp) {
+TEST(EstimateTrackerErrors, FailedRegistrationsHaveLittleWeight) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
     const TrackerErrors truth;
@@ -157,7 +152,7 @@ TEST(EstimateTrackerErrors, RegistrationsThatFailedDoNotBlowItUp) {
   }
 }
 
-TEST(EstimateTrackerErrors, MoreErrorNeverLooksLikeLess) {
+TEST(EstimateTrackerErrors, LargerDifferencesNeverReduceTheErrors) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
     auto samples = drawSamples({}, 60, 0.1, random);
@@ -169,12 +164,12 @@ TEST(EstimateTrackerErrors, MoreErrorNeverLooksLikeLess) {
       last = sigmas;
       for (MotionSample& sample : samples) sample.difference *= 2;
     }
-    // 32 times as much by then, held back by what was expected.
+    // 32 times as much by then, limited by the prior.
     EXPECT_GT((last.cwiseQuotient(sigmasOver(0.25, {}))).minCoeff(), 10) << seed;
   }
 }
 
-TEST(EstimateTrackerErrors, ErrorsThatAreSaidToBeNoneStayNone) {
+TEST(EstimateTrackerErrors, ExpectedErrorsOfZeroStayZero) {
   std::mt19937 random(3);
   const auto samples = drawSamples(times({}, 3), 50, 0.1, random);
   EXPECT_TRUE(same(estimateTrackerErrors(samples, {0, 0, 0, 0}), {0, 0, 0, 0}));
@@ -196,15 +191,10 @@ TEST(EstimateTrackerErrors, StaysFiniteWhateverTheSamplesAre) {
   }
 }
 
-TEST(TrackerErrors, OutOfRangeAreRefusedByName) {
-  TrackerErrors errors;
-  errors.noise_m = -0.5;
-  EXPECT_THAT([&] { errors.validate(); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("tracker_noise_m = -0.5")));
-  errors = {};
-  errors.drift_rad = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT([&] { errors.validate(); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("tracker_drift_deg_per_m = nan")));
+TEST(TrackerErrors, ValuesOutOfRangeAreRefusedByName) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  test::expectRefused(&TrackerErrors::noise_m, -0.5, "tracker_noise_m = -0.5");
+  test::expectRefused(&TrackerErrors::drift_rad, nan, "tracker_drift_deg_per_m = nan");
   EXPECT_NO_THROW((TrackerErrors{0, 0, 0, 0}.validate()));
 }
 

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "maps/refinement/pose_refinement.h"
+#include "maps/refinement/refined_keyframe.h"
+#include "maps/refinement/tracker_model.h"
+#include "maps/refinement/window_graph.h"
+
+namespace efm {
+
+/// All keyframes, and the factors between them.
+struct KeyframeGraph {
+  std::vector<RefinedKeyframe> keyframes;
+  /// From registrations and loops. Ascending by `to`, except for proposed loops.
+  std::vector<RelativePoseFactor> factors;
+  TrackerModel tracker;
+
+  std::size_t newest() const { return keyframes.size() - 1; }
+
+  /// The given keyframes with the most points of the newest keyframe in view: at most `count`, the
+  /// largest overlap first.
+  std::vector<std::size_t> bestOverlaps(const std::vector<std::size_t>& candidates,
+                                        double min_overlap, int count) const;
+  /// The keyframes with numbers below `end` whose centres of view are nearest to that of the newest
+  /// keyframe: a bounded number, the nearest first.
+  std::vector<std::size_t> nearestViews(std::size_t end) const;
+
+  /// Solves the poses of the keyframes from `first_free` on, except the first keyframe.
+  WindowGraph solveFrom(std::size_t first_free, const PoseGraphOptions& options);
+};
+
+}  // namespace efm
