@@ -13,15 +13,15 @@ namespace efm {
 ///   camchain.yaml     the rig
 ///   camN/events.txt   t x y p, for each camera of the rig; a silent camera's may be empty
 ///   poses.txt         or else groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0
-/// Other files do not matter.
+/// Other files are ignored.
 
-/// Whether it is a folder with a camchain.yaml or a cam0/events.txt; what else is missing is for
-/// `openDatasetFolder` to say.
+/// Whether it is a folder with a camchain.yaml or a cam0/events.txt. `openDatasetFolder` reports
+/// other missing files.
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 
-/// @throws std::runtime_error naming the file (and line) that is missing or not understood;
-/// std::invalid_argument where a given calibration has more or fewer cameras or one of another
-/// size.
+/// @throws std::runtime_error naming the file that is missing, or the file and line with an error;
+/// std::invalid_argument if a given calibration has another number of cameras or a camera of
+/// another size.
 std::unique_ptr<Recording> openDatasetFolder(const std::filesystem::path& folder,
                                              const RecordingOverrides& given = {});
 

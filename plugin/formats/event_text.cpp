@@ -24,7 +24,7 @@ struct Digits {
   std::ptrdiff_t count;
 };
 
-/// Moves `text` behind the digits that it begins with.
+/// Moves `text` past its leading digits.
 Digits takeDigits(const char*& text) {
   const char* const begin = text;
   std::uint64_t value = 0;
@@ -32,14 +32,14 @@ Digits takeDigits(const char*& text) {
   return {value, text - begin};
 }
 
-/// Moves `text` behind the blanks that it begins with. @return whether there were any.
+/// Moves `text` past its leading blanks. @return whether there were any.
 bool takeBlanks(const char*& text) {
   const bool any = isBlank(*text);
   while (isBlank(*text)) ++text;
   return any;
 }
 
-/// The end of the grid's stretch that holds a time.
+/// The end of the grid's interval that contains a time.
 std::int64_t stretchEnd(std::int64_t t_ns) {
   std::int64_t rest_ns = t_ns % kPacketPeriodNs;
   if (rest_ns < 0) rest_ns += kPacketPeriodNs;
@@ -106,7 +106,7 @@ void EventTextReader::sortEvents() {
   disordered_ = false;
 }
 
-/// No event of the first packet's stretch can come any more.
+/// Whether no further event of the first packet's interval can come.
 bool EventTextReader::packetIsComplete() const {
   return first_ < events_.size() &&
          newest_ns_ - kMaxEventDelayNs >= stretchEnd(events_[first_].t_ns);
@@ -153,8 +153,8 @@ void EventTextReader::takeLines(const char* begin, const char* end) {
   }
 }
 
-/// The fast way for a line without anything unusual; all of it stops at the newline at the latest.
-/// @return the next line, or null where `parseLine` is to judge.
+/// The fast path, for a line in the plainest form. It never reads past the newline.
+/// @return the next line; null for any other line, which `parseLine` must parse.
 const char* EventTextReader::parsePlainLine(const char* text, Event& event) const {
   constexpr std::array<std::uint64_t, 10> kNanosecondsOfDigits = {
       1'000'000'000, 100'000'000, 10'000'000, 1'000'000, 100'000, 10'000, 1'000, 100, 10, 1};

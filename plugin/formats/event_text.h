@@ -21,24 +21,24 @@ namespace efm {
 inline constexpr std::int64_t kPacketPeriodNs = 10'000'000;
 
 /// Reads events from text, one `t x y p` a line: decimal seconds (exact), pixel, polarity 0 or 1.
-/// Blank lines, what follows a `#`, repeated blanks, tabs and CRLF do not matter.
+/// Blank lines and comments, which begin with `#`, are ignored; repeated blanks, tabs and CRLF are
+/// allowed.
 ///
-/// The file is read as it is asked for: memory holds a block of text and the events of some 20 ms.
-/// What cannot be understood is a std::runtime_error that names file and line, the value and what
-/// was expected; it comes when the packets of the lines above it were given, and stays.
+/// The file is read packet by packet: memory holds a block of text and the events of some 20 ms. An
+/// error is a std::runtime_error that names file and line, the value and what was expected. It
+/// comes after the packets of the lines above it, and again with each further call.
 class EventTextReader {
  public:
   /// @throws std::runtime_error where the file cannot be opened.
   EventTextReader(std::filesystem::path file, CameraSize size);
 
-  /// The events of the next stretch of the grid that has any, in time order, those of equal time in
-  /// the file's order. Empty at the end.
-  /// @throws std::runtime_error where the file cannot be read on.
+  /// The events of the next interval of the grid with events, in time order; events of equal time
+  /// are in the order of the file. Empty at the end.
+  /// @throws std::runtime_error at an error of the file.
   std::vector<Event> nextPacket();
-  /// The time of the event that the next packet begins with; nothing at the end. Where the file
-  /// cannot be read on it is that of the newest event, so that the error of `nextPacket` has its
-  /// place in time.
-  /// @throws std::runtime_error where no event came before that.
+  /// The time of the first event of the next packet; nothing at the end. At an error of the file it
+  /// is the time of the newest event, so that the error of `nextPacket` has a position in time.
+  /// @throws std::runtime_error at an error before the first event.
   std::optional<std::int64_t> nextTime();
 
   /// Events that came after a newer one.
@@ -64,13 +64,13 @@ class EventTextReader {
   std::uint64_t bytes_total_ = 0;
   std::uint64_t bytes_read_ = 0;
   bool ended_ = false;
-  std::exception_ptr error_;  // of the line that could not be taken
+  std::exception_ptr error_;  // of the line with an error
 
-  std::vector<char> block_;  // text; a whole number of lines is taken from it at a time
-  std::size_t carried_ = 0;  // bytes at its beginning that began a line
-  std::uint64_t line_ = 0;   // number of the line being taken
+  std::vector<char> block_;  // text, of which whole lines are parsed
+  std::size_t carried_ = 0;  // bytes of an incomplete line at its beginning
+  std::uint64_t line_ = 0;   // number of the current line
 
-  std::vector<Event> events_;  // sorted between calls; from first_ on not given
+  std::vector<Event> events_;  // sorted between calls; those from first_ on are not returned yet
   std::size_t first_ = 0;
   std::int64_t newest_ns_ = -kEndOfTimeNs;
   bool disordered_ = false;

@@ -12,8 +12,8 @@
 
 namespace efm {
 
-/// A gzip file, or a plain one, as an MRPT stream to read from. Tells a file that ends from one
-/// that was cut, which mrpt::io::CFileGZInputStream does not.
+/// A gzip file, or a plain one, as an MRPT stream to read from. It detects a file that was cut;
+/// mrpt::io::CFileGZInputStream does not.
 class GzInputStream : public mrpt::io::CStream {
  public:
   /// @throws std::runtime_error naming the file where it cannot be opened.
@@ -22,13 +22,13 @@ class GzInputStream : public mrpt::io::CStream {
   GzInputStream(const GzInputStream&) = delete;
   GzInputStream& operator=(const GzInputStream&) = delete;
 
-  /// Whether all has been read.
-  /// @throws std::runtime_error where the file is cut or its compression is broken.
+  /// Whether the whole file has been read.
+  /// @throws std::runtime_error if the file is cut or its compression is damaged.
   bool atEnd();
-  /// The share of the file that was read, 0 to 1.
+  /// The fraction of the file that was read, 0 to 1.
   double progress() const;
 
-  /// @return fewer bytes than asked for at the end only.
+  /// @return the number of bytes read; fewer than requested only at the end.
   /// @throws std::runtime_error as `atEnd`.
   std::size_t Read(void* buffer, std::size_t count) override;
   std::size_t Write(const void* buffer, std::size_t count) override;     ///< Throws: read only.
@@ -50,17 +50,17 @@ class GzInputStream : public mrpt::io::CStream {
 /// A gzip file as an MRPT stream to write to, at MRPT's own compression level, 1.
 class GzOutputStream : public mrpt::io::CStream {
  public:
-  /// @throws std::runtime_error naming the file where it cannot be made.
+  /// @throws std::runtime_error naming the file if it cannot be created.
   explicit GzOutputStream(const std::filesystem::path& file);
   ~GzOutputStream() override;
   GzOutputStream(const GzOutputStream&) = delete;
   GzOutputStream& operator=(const GzOutputStream&) = delete;
 
-  /// Completes the file. @throws std::runtime_error where not all could be written.
+  /// Completes the file. @throws std::runtime_error if a part could not be written.
   void close();
 
   std::size_t Read(void* buffer, std::size_t count) override;  ///< Throws: write only.
-  /// @throws std::runtime_error where not all could be written.
+  /// @throws std::runtime_error if a part could not be written.
   std::size_t Write(const void* buffer, std::size_t count) override;
   std::uint64_t Seek(std::int64_t offset, TSeekOrigin origin) override;  ///< Throws: forward only.
   std::uint64_t getTotalBytesCount() const override { return position_; }

@@ -15,16 +15,16 @@ namespace efm {
 
 /// One event file per camera of a rig, as observations in the order of time.
 ///
-/// When the first events come, an empty packet of each camera goes before them, so that the whole
-/// rig is known. Then a packet holds what its camera saw in a stretch of 10 ms. A packet is covered
-/// until its camera's next event, a camera's last one for good (`kEndOfTimeNs`): nobody waits for a
-/// camera that sees nothing, and one without any event is known to be silent from the beginning.
-/// The last packet of all is not covered: the recording ends there, it does not go on in silence.
-/// Where a file cannot be read on, the error comes when all that was seen before was given.
+/// An empty packet of each camera comes before the first events, so that the whole rig is known.
+/// Every other packet holds the events of one camera in an interval of 10 ms. A packet is covered
+/// until the camera's next event; the last packet of a camera is covered for all time
+/// (`kEndOfTimeNs`). So the mapping does not wait for a silent camera. The last packet of the
+/// recording does not say what it covers, because the recording ends there. If a file cannot be
+/// read any further, the error comes after the packets before it.
 class MergedRecording : public Recording {
  public:
   /// @param readers one per camera of the rig.
-  /// @throws std::runtime_error where no camera has an event, and as the readers do.
+  /// @throws std::runtime_error if no camera has an event, and the errors of the readers.
   MergedRecording(Rig rig, std::vector<EventTextReader> readers);
 
   mrpt::obs::CObservation::Ptr next() override;
@@ -40,7 +40,7 @@ class MergedRecording : public Recording {
   Rig rig_;
   std::vector<EventTextReader> readers_;  // per camera
   std::string position_ = "the recording";
-  std::size_t announced_ = 0;  // cameras whose empty packet was given
+  std::size_t announced_ = 0;  // cameras whose empty packet was returned
 };
 
 }  // namespace efm

@@ -20,12 +20,12 @@ namespace {
 
 using Path = std::filesystem::path;
 
-/// One way of storing a recording. The table below is the only place that knows them all.
+/// A format of recordings. The table below has all of them.
 struct Format {
   std::string name;
   bool (*looks_like)(const Path&);
   std::unique_ptr<Recording> (*open)(const Path&, const RecordingOverrides&);
-  std::string looks;  ///< What `looks_like` looks for.
+  std::string looks;  ///< The content that `looks_like` detects, for errors.
 };
 
 const std::vector<Format>& formats() {

@@ -18,18 +18,18 @@
 namespace efm {
 namespace {
 
-/// Takes away the text up to and with a word, if it is there.
+/// Removes the text up to the end of a word, if the text contains it.
 void dropThrough(std::string_view& text, std::string_view last) {
   const auto at = text.rfind(last);
   if (at != std::string_view::npos) text.remove_prefix(at + last.size());
 }
 
-/// What an error says without MRPT's decoration. Each object around the one that failed adds
+/// The message of an error without MRPT's decoration. Each object around the one that failed adds
 ///
 ///     ==== MRPT exception ====
 ///     Message:  Exception while parsing typed object '…' from …
 ///     Original exception:
-///     <the same of what is inside, or what went wrong>
+///     <the same of the inner object, or the cause>
 ///     Location: <source file, line, function>
 ///     Call stack backtrace: …
 std::string reasonOf(const std::exception& error) {
@@ -39,7 +39,7 @@ std::string reasonOf(const std::exception& error) {
   dropThrough(text, "Original exception:");
   text = text.substr(0, text.find("\nLocation:"));
 
-  std::string reason;  // an error that was caught on the way may stand before MRPT's heading
+  std::string reason;  // the error of an inner object may come before MRPT's heading
   const auto heading = text.find(kHeading);
   if (heading != std::string_view::npos) {
     reason = text.substr(0, heading);
@@ -83,8 +83,8 @@ void RawlogRecording::readEntry() {
                            "': expected observations, sensory frames and actions");
 }
 
-/// Turns the actions so far into poses, at the frame's time where they have none. Of several poses
-/// of one time the last one, to which all movements led, is where the frame was seen.
+/// Turns the actions so far into poses, at the frame's time if they have none. Of several poses of
+/// one time only the last is kept: it includes all movements.
 void RawlogRecording::takeActions(const mrpt::obs::CSensoryFrame& frame) {
   mrpt::obs::CObservation::Ptr newest;
   while (!actions_.empty()) {
@@ -98,7 +98,8 @@ void RawlogRecording::takeActions(const mrpt::obs::CSensoryFrame& frame) {
   }
 }
 
-/// MRPT takes whatever a stream throws before an object's name for the end of the file.
+/// The reason of an error. If a stream throws before an object's name, MRPT reports the end of the
+/// file instead.
 std::string RawlogRecording::whyStopped(const std::exception& error) {
   std::string reason = reasonOf(error);
   if (reason.find("EOF") == std::string::npos) return reason;

@@ -10,18 +10,18 @@
 
 namespace efm {
 
-/// A rawlog, gzip-compressed or plain, read entry by entry: observations as they are, and those of
-/// sensory frames one after the other. The movements of actions are composed to poses, which come
-/// before the frame that follows (see DeadReckoning), one for each time: the last; other actions
-/// and comments are passed over.
+/// A rawlog, gzip-compressed or plain, read entry by entry: observations, and the observations of
+/// sensory frames one after the other. The movements of actions are composed to poses (see
+/// DeadReckoning). They come before the frame that follows the actions; of several poses of one
+/// time the last. Other actions and comments are skipped.
 class RawlogRecording : public Recording {
  public:
   /// @throws std::runtime_error naming the file where it cannot be opened.
   explicit RawlogRecording(std::filesystem::path file);
 
-  /// @throws std::runtime_error "stopped at entry N of FILE: reason" where the file is cut or
-  /// corrupt, or holds a class that is not known; entries count from 0, as in MRPT's programs, and
-  /// what came before was given.
+  /// @throws std::runtime_error "stopped at entry N of FILE: reason" if the file is cut or corrupt,
+  /// or has an unknown class. Entries count from 0, as in MRPT's programs. The error comes after
+  /// the observations before it.
   mrpt::obs::CObservation::Ptr next() override;
   std::string position() const override;
   double progress() const override { return stream_.progress(); }

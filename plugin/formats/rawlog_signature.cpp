@@ -18,9 +18,9 @@ bool isOfAName(char c) {
          c == ':' || c == '<' || c == '>' || c == ',';
 }
 
-/// MRPT writes an object as the length of its class's name, the name, and what is in it. The length
-/// is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the lowest first. Of a cut
-/// file there may be less than that.
+/// MRPT writes an object as the length of its class's name, the name, and its content. The length
+/// is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the lowest first. A cut file
+/// may be shorter.
 bool beginsAnObject(std::string_view bytes) {
   constexpr std::size_t kShortestName = 3;
   constexpr std::size_t kLongestName = 120;
@@ -49,7 +49,7 @@ void requireRawlog(const std::filesystem::path& file) {
   try {
     bytes.resize(stream.Read(bytes.data(), bytes.size()));
   } catch (const std::exception&) {
-    return;  // damaged; who reads it says how
+    return;  // damaged: the reader reports it
   }
   if (!bytes.empty() && beginsAnObject(bytes)) return;
   const std::string why =

@@ -5,10 +5,10 @@
 
 namespace efm {
 
-/// Whether a file can be a rawlog, by its first bytes, compressed or not: it begins with the name
-/// of an object's class, as MRPT writes it. One that was cut or damaged later can, too.
-/// @throws std::runtime_error naming the file, how it begins and what was expected; where it cannot
-/// be opened.
+/// Checks the first bytes of a file, compressed or not: a rawlog begins with the name of an
+/// object's class. Damage after that is not detected here.
+/// @throws std::runtime_error naming the file, its first bytes and what was expected; or if the
+/// file cannot be opened.
 void requireRawlog(const std::filesystem::path& file);
 
 }  // namespace efm

@@ -12,17 +12,17 @@ namespace efm {
 
 class GzOutputStream;
 
-/// Writes observations as a rawlog that MRPT's own programs read. The file appears under its name
-/// only once it is complete.
+/// Writes observations as a rawlog that MRPT's own programs read. The file gets its name when it is
+/// complete.
 class RawlogWriter {
  public:
   /// @param file an earlier file of this name is replaced: see AtomicFile.
-  /// @throws std::runtime_error naming the file where it cannot be made or replaced.
+  /// @throws std::runtime_error naming the file if it cannot be created or replaced.
   explicit RawlogWriter(const std::filesystem::path& file);
-  /// Without `close` nothing is left behind.
+  /// Without `close`, no file is left.
   ~RawlogWriter();
 
-  /// @throws std::runtime_error naming the file where it cannot be written.
+  /// @throws std::runtime_error naming the file if it cannot be written.
   void write(const mrpt::obs::CObservation& observation);
   void close();
 

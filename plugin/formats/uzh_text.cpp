@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr CameraSize kDavis240c = {240, 180};
 
-/// That of the first image of images.txt that exists.
+/// The size of the first image of images.txt that exists.
 std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
   std::ifstream list(folder / "images.txt");
   std::string line;
@@ -51,7 +51,7 @@ void requireFile(const fs::path& folder, const char* name, const char* what, con
                            option + " FILE");
 }
 
-/// The folder knows its sensor's size for certain only from an image.
+/// A given camera. Only an image of the folder shows the sensor's size for certain.
 RigCamera givenCamera(const Calibration& calibration, const fs::path& folder) {
   calibration.requireCameras(1);
   const bool says_size = calibration.rig.cameras[0].model.width > 0;
@@ -59,8 +59,8 @@ RigCamera givenCamera(const Calibration& calibration, const fs::path& folder) {
   return calibration.camera(0, size || says_size ? size : kDavis240c);
 }
 
-/// The folder's own camera where it has one: that another was given is then for who replaces it to
-/// count.
+/// The folder's own camera if it has one, even if another was given: RigOverrideRecording or the
+/// map builder replaces it later.
 RigCamera readCamera(const fs::path& folder, const RecordingOverrides& given) {
   std::optional<RigCamera> camera;
   if (given.calibration != nullptr) camera = givenCamera(*given.calibration, folder);

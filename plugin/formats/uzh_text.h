@@ -15,17 +15,17 @@ namespace efm {
 ///   calib.txt         fx fy cx cy k1 k2 p1 p2 k3
 ///   images.txt        t file, optional; an image tells the sensor's size.
 
-/// Whether it is a folder with an events.txt; what else is missing is for `openUzhFolder` to say.
+/// Whether it is a folder with an events.txt. `openUzhFolder` reports other missing files.
 bool looksLikeUzhFolder(const std::filesystem::path& folder);
 
-/// @throws std::runtime_error naming the file (and line) that is missing or not understood;
-/// std::invalid_argument where a given calibration has more cameras or one of another size.
+/// @throws std::runtime_error naming the file that is missing, or the file and line with an error;
+/// std::invalid_argument if a given calibration has more cameras or a camera of another size.
 std::unique_ptr<Recording> openUzhFolder(const std::filesystem::path& folder,
                                          const RecordingOverrides& given = {});
 
-/// That of the first image of images.txt that exists, or else 240x180: the DAVIS240C, which
-/// recorded the whole data set.
-/// @throws std::runtime_error where that image cannot be read.
+/// The size of the first image of images.txt that exists. Without an image it is 240x180: the whole
+/// data set was recorded with a DAVIS240C.
+/// @throws std::runtime_error if the image cannot be read.
 CameraSize uzhSensorSize(const std::filesystem::path& folder);
 
 }  // namespace efm
