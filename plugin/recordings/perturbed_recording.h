@@ -30,7 +30,7 @@ class PerturbedRecording : public Recording {
   PerturbedRecording(std::unique_ptr<Recording> recording, const TrackerFaults& faults);
   ~PerturbedRecording() override;
 
-  /// Where the recording cannot be read on, its error comes after the observations before it.
+  /// An error of the recording comes after the observations before it.
   /// @throws std::invalid_argument where a pose has no time, or is older than the pose before it.
   mrpt::obs::CObservation::Ptr next() override;
   std::string position() const override { return position_; }

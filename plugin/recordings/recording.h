@@ -23,7 +23,7 @@ class Recording {
   virtual ~Recording() = default;
 
   /// @return the next observation; null at the end.
-  /// @throws std::runtime_error naming the file and the position where it cannot be read on.
+  /// @throws std::runtime_error naming the file and the position of an error.
   virtual mrpt::obs::CObservation::Ptr next() = 0;
 
   /// The position of the last observation that `next` returned: "entry 12 of my.rawlog".
@@ -38,7 +38,7 @@ class Recording {
 /// Replacements for parts of a recording, which a folder of text files may lack then.
 struct RecordingOverrides {
   const Calibration* calibration = nullptr;  ///< Used where the folder has none; may be null.
-  bool poses = false;                        ///< They are put in later.
+  bool poses = false;                        ///< Poses are inserted later.
 };
 
 }  // namespace efm

@@ -19,7 +19,7 @@ class RecordingWithPoses : public Recording {
   /// @param poses T_world_body, in any order; poses of equal time keep their order.
   RecordingWithPoses(std::unique_ptr<Recording> recording, std::vector<StampedPose> poses);
 
-  /// Where the recording cannot be read on, its error comes after all poses.
+  /// An error of the recording comes after all poses.
   mrpt::obs::CObservation::Ptr next() override;
   std::string position() const override { return position_; }
   double progress() const override { return recording_->progress(); }

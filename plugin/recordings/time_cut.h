@@ -17,8 +17,8 @@ namespace efm {
 
 /// An interval [t0, t1) of a recording: its events, its poses, and of each source the nearest pose
 /// before and after, so that events keep poses on both sides. A packet without a time has the time
-/// of its first event; other observations without a time pass. Reads on until each camera has
-/// passed t1, because packets may come as late as they end, but at most for a second.
+/// of its first event; other observations without a time pass. At t1 it reads further until each
+/// camera has passed t1, but at most for a second: a packet may come only when it ends.
 class TimeCut : public Recording {
  public:
   /// @param t0_ns, t1_ns nothing: no limit.

@@ -17,7 +17,7 @@ namespace {
 
 /// A new camera may appear within this time of the recording's first event.
 constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
-/// The same where somebody asks for the map.
+/// The same limit if the map is requested.
 constexpr std::int64_t kRigCompletesEarlyNs = kNanosecondsPerSecond / 10;
 
 bool sameCalibration(const RigCamera& a, const RigCamera& b) {
