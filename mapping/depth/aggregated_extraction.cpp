@@ -17,7 +17,7 @@ namespace {
 // A step is a hundredth of the depth range (`planesPerStep`).
 constexpr double kAgreementSteps = 2.5;  ///< Depths within this distance agree.
 constexpr double kMedianSteps = 10;      ///< Distance from the median that divides quality by e.
-constexpr double kSteepness = 1.25;      ///< Power of the peak's height above the second peak.
+constexpr double kSteepness = 1.25;      ///< Exponent of 1 - second peak / peak.
 constexpr double kPeakWidths = 1.6;      ///< Half size of a peak, in median widths of all peaks.
 
 /// Confidence minus its Gaussian mean, over the mean confidence of the pixels that have any.
@@ -41,7 +41,7 @@ cv::Mat1b aboveContrast(const cv::Mat1f& contrast, double min_contrast) {
 struct PeakScale {
   double step_planes = 1;  ///< Planes per step.
   std::size_t second =
-      0;  ///< Index into `AggregatedPeak::second_peak`: outside of the peak itself.
+      0;  ///< Index into `AggregatedPeak::second_peak`: the distance where the peak ends.
 };
 
 PeakScale scaleOf(const std::vector<AggregatedPeak>& peaks, int planes) {

@@ -29,7 +29,7 @@ struct AggregatedPeak {
 std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
                                              const DsiColumns& columns, cv::Size size);
 
-/// Planes per step: 1 up to a hundred planes, more beyond, where a ridge spans more planes.
+/// Planes per step: a step is a hundredth of the depth range, but at least one plane.
 double planesPerStep(int planes);
 
 }  // namespace efm

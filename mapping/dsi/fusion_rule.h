@@ -20,7 +20,7 @@ enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax };
 
 /// "min", "harmonic", "geometric", "arithmetic", "rms", "max".
 std::string_view nameOf(FusionRule rule);
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 FusionRule fusionRuleFromName(std::string_view name);
 /// Whether zero in any input makes the mean zero.
 bool isAndLike(FusionRule rule);

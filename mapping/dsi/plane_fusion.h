@@ -15,7 +15,7 @@ enum class FusionOrder { kCamerasThenTime, kTimeThenCameras };
 
 /// "cameras_then_time", "time_then_cameras".
 std::string_view nameOf(FusionOrder order);
-/// @throws std::invalid_argument naming the value and what is known.
+/// @throws std::invalid_argument naming the value and the known names.
 FusionOrder fusionOrderFromName(std::string_view name);
 
 /// How the DSIs of several cameras and sub-intervals become one (Ghosh and Gallego 2022, Sec. 3.4
@@ -49,7 +49,7 @@ struct CameraSlot {
 /// Use: `begin`; then, for each of `inputs`, write it to `next` and `add` it; then `fused`.
 class PlaneFusion {
  public:
-  /// What else is fused.
+  /// Which planes are fused.
   enum class Keep {
     kFusedOnly,
     kCameras,  ///< Also each camera alone, across time: a plane of memory per camera.
@@ -63,7 +63,7 @@ class PlaneFusion {
   const std::vector<CameraSlot>& inputs() const { return inputs_; }
   /// Begins a plane.
   void begin();
-  /// Where the ray density of the next input is written.
+  /// The buffer for the ray density of the next input.
   PlaneValues& next() { return inner_.next(); }
   void add(const CameraSlot& input);
   /// The fused plane, after the last input.

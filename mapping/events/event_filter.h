@@ -13,7 +13,7 @@
 
 namespace efm {
 
-/// Which events are noise: they reach no window.
+/// The filters that remove noise before events get into a window.
 struct EventFilterOptions {
   bool hot_pixels = true;  ///< Remove events of pixels that fire all the time.
   HotPixelOptions hot_pixel;

@@ -91,7 +91,7 @@ struct MovingRays {
 inline constexpr int kLineCells = 8;
 inline constexpr int kDirtyFlags = kTileCells * (kTileCells + 2) / kLineCells;
 
-/// A tile's cells in rows of kTileCells, with two rows more than votes reach.
+/// A tile's cells in rows of kTileCells, with two rows more than votes need.
 struct CellBuffer {
   std::uint64_t* cells = nullptr;
   /// Not zero for each line that may have votes: kDirtyFlags of them and kRayPadding.

@@ -13,9 +13,9 @@ namespace efm {
 /// A window starts with the first event after the previous window and grows, stride by stride,
 /// until one of two conditions holds:
 /// - the reference camera has moved by a fraction of the scene's mean depth since the window's
-/// start;
+///   start;
 /// - too few points of the last keyframe are in view. Without such points, a grid of points at the
-///   mean depth takes their part.
+///   mean depth replaces them.
 /// So a keyframe has enough parallax at any speed (Rebecq et al., IJCV 2018, Sec. 7).
 ///
 /// If the longest window is not enough, its start moves on by a stride: the events of a camera at

@@ -26,7 +26,8 @@ struct MotionCorrectionOptions {
   double motion_sigma_m_s = 0.05;
   double motion_sigma_deg_s = 5;
   /// Rounds of estimating depth and velocity, each from the other; a round takes two to three times
-  /// as long as the keyframe without. 1 to 10. The second round finds most of the remaining error.
+  /// as long as a keyframe without correction. 1 to 10. The second round finds most of the
+  /// remaining error.
   int motion_rounds = 2;
   /// Events that are warped, of all cameras together: more take longer. 100 to 10,000,000.
   int max_events = 20000;
