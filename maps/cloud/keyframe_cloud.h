@@ -23,8 +23,8 @@ struct ViewPoint {
 std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe);
 
 /// The points of the single cameras of a keyframe, one camera after the other: late fusion, the
-/// baseline for fused DSIs (Ghosh and Gallego 2022, Sec. 3.1). Empty where the keyframe has no maps
-/// of single cameras.
+/// baseline for fused DSIs (Ghosh and Gallego 2022, Sec. 3.3.1). Empty where the keyframe has no
+/// maps of single cameras.
 /// @throws std::invalid_argument as `viewPoints` does.
 std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe);
 

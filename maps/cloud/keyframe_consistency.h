@@ -21,8 +21,9 @@ struct ConsistencyOptions {
   /// do.
   Consistency consistency = Consistency::kVisibility;
   /// The maximum difference in inverse depth between a point and its support, as a fraction of the
-  /// maximum inverse depth in view. Twice the tolerance in front of all points in view is a
-  /// free-space violation. Range: 0.001 to 1. One of 100 depth planes is 0.01.
+  /// maximum inverse depth in view. A point that is nearer than all points around it by more than
+  /// twice the tolerance is a free-space violation. Range: 0.001 to 1. One of 100 depth planes is
+  /// 0.01.
   double consistency_tolerance = 0.03;
   /// Side of the cells of the visibility grid, as an angle. Range: 0.01 to 10. A point is compared
   /// with its cell and the eight adjacent ones, which must cover the errors of the poses.

@@ -22,8 +22,8 @@ SampleStatistics statisticsOf(const std::vector<double>& values);
 /// The middle value, or the mean of the two middle values; 0 for an empty list.
 double medianOf(std::vector<double> values);
 
-/// The smallest value that is at least as large as this fraction of the values; 0 for an empty
-/// list.
+/// The quantile: the smallest value of the list with at least this fraction of the list at or below
+/// it; 0 for an empty list.
 /// @param fraction above 0, at most 1.
 double quantileOf(std::vector<double> values, double fraction);
 

@@ -16,10 +16,10 @@ struct PosePair {
 };
 
 /// Pairs poses by time like evo (Grupp, "evo: Python package for the evaluation of odometry and
-/// SLAM", 2017). Each pose of the trajectory with fewer poses (or of the estimate) is paired with
-/// the pose of the other trajectory that is nearest in time; of two at the same distance, the
-/// earlier one. Poses more than `max_difference_s` apart are not paired. The input need not be
-/// sorted; the result is.
+/// SLAM", 2017). Each pose of the shorter trajectory (of the estimate, if both have as many poses)
+/// is paired with the pose of the other trajectory that is nearest in time; of two at the same
+/// distance, the earlier one. Poses more than `max_difference_s` apart are not paired. The input
+/// need not be sorted; the result is.
 /// @throws std::invalid_argument where `max_difference_s` is negative or not finite.
 std::vector<PosePair> associatePoses(std::vector<StampedPose> estimate,
                                      std::vector<StampedPose> truth, double max_difference_s);

@@ -28,7 +28,7 @@ struct RefinementCounts {
 /// 4. A loop back to an earlier keyframe is verified by registration. Then all keyframes since that
 ///    one are solved (LoopCloser).
 /// The first keyframe keeps its pose by the tracker. Without a plausible registration the motion of
-/// the tracker stands.
+/// the tracker is kept.
 ///
 /// Deterministic. Cost of a keyframe: registrations of a bounded number of points, one window, and
 /// loops in proportion to their length, spread over the keyframes. Memory: 48 bytes a point. Not
