@@ -11,7 +11,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/evaluation/file_in_folder.h"
 #include "plugin/evaluation/text_table.h"
-#include "tracking_stub/poses/poses_file.h"
+#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

@@ -10,7 +10,7 @@
 #include "plugin/calibration/camchain.h"
 #include "plugin/formats/merged_recording.h"
 #include "plugin/recordings/recording_with_poses.h"
-#include "tracking_stub/poses/poses_file.h"
+#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

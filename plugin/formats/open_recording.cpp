@@ -13,7 +13,7 @@
 #include "plugin/recordings/recording_with_poses.h"
 #include "plugin/recordings/rig_override_recording.h"
 #include "plugin/session/rig_setup.h"
-#include "tracking_stub/poses/poses_file.h"
+#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

@@ -106,7 +106,7 @@ std::vector<FaultKey> makeKeys() {
              kRadiansPerDegree),
       seconds("keyframe_s", duration, FAULT(perturbation.keyframe.length_ns)),
       keyframeStart(),
-      number("drift", gradient, FAULT(perturbation.drift.share)),
+      number("drift", gradient, FAULT(perturbation.drift.fraction)),
       number("drift_deg_per_m", rotation, FAULT(perturbation.drift.rad_per_m), kRadiansPerDegree),
       seconds("latency_s", latency, FAULT(latency_ns)),
       number("drop", probability, FAULT(dropouts.drop_probability)),

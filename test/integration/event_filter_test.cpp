@@ -23,7 +23,7 @@ Simulation makeRig(bool hot) {
   options.duration_s = 0.5;
   Simulation simulation = makeSimulation(options);
   if (hot) {
-    simulation.noise.hot_share = 0.001;
+    simulation.noise.hot_fraction = 0.001;
     simulation.noise.hot_hz = 1000;
   }
   return simulation;

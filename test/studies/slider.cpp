@@ -16,7 +16,7 @@
 #include "test/studies/methods/outstanding_points.h"
 #include "test/studies/recordings/real_rigs.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/presets/slider.h"
+#include "tracking_stub/presets/presets.h"
 #include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::studies {

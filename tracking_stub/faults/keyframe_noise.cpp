@@ -4,7 +4,7 @@
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
-#include "tracking_stub/random/random_vectors.h"
+#include "tracking_stub/random/random_numbers.h"
 
 namespace efm {
 namespace {
@@ -41,20 +41,20 @@ KeyframeNoise::KeyframeNoise(const KeyframeNoiseOptions& options, const Clock& c
   requireOption(tick_ns_ >= 1 && tick_ns_ < kMinLengthNs, "tick_ns", tick_ns_, "1 to 999999");
 }
 
-std::int64_t KeyframeNoise::beginNs(std::int64_t stretch) const {
-  return floorDivide(start_ns_ + stretch * *options_.length_ns, tick_ns_) * tick_ns_;
+std::int64_t KeyframeNoise::beginNs(std::int64_t interval) const {
+  return floorDivide(start_ns_ + interval * *options_.length_ns, tick_ns_) * tick_ns_;
 }
 
-std::int64_t KeyframeNoise::stretchAt(std::int64_t t_ns) const {
-  const std::int64_t stretch = floorDivide(t_ns - start_ns_, *options_.length_ns);
-  return t_ns >= beginNs(stretch + 1) ? stretch + 1 : stretch;  // beginnings are rounded down
+std::int64_t KeyframeNoise::intervalAt(std::int64_t t_ns) const {
+  const std::int64_t interval = floorDivide(t_ns - start_ns_, *options_.length_ns);
+  return t_ns >= beginNs(interval + 1) ? interval + 1 : interval;  // beginnings are rounded down
 }
 
-Rigid3 KeyframeNoise::errorOf(std::int64_t stretch, const Eigen::Vector3d& rig_world) const {
-  RandomNumbers random(seed_, static_cast<std::uint64_t>(stretch));
+Rigid3 KeyframeNoise::errorOf(std::int64_t interval, const Eigen::Vector3d& rig_world) const {
+  RandomNumbers random(seed_, static_cast<std::uint64_t>(interval));
   const Eigen::Vector3d shift_world = options_.noise_m * normalVector(random);
-  const Eigen::Quaterniond turned = rotationBy(options_.noise_rad * normalVector(random));
-  return {turned, rig_world - turned * rig_world + shift_world};
+  const Eigen::Quaterniond rotation = rotationBy(options_.noise_rad * normalVector(random));
+  return {rotation, rig_world - rotation * rig_world + shift_world};
 }
 
 }  // namespace efm

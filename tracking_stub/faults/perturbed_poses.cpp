@@ -7,12 +7,12 @@
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
-#include "tracking_stub/random/random_vectors.h"
+#include "tracking_stub/random/random_numbers.h"
 
 namespace efm {
 namespace {
 
-/// Each kind of error has a seed of its own, so that one option leaves the others' draws alone.
+/// Each kind of error has its own seed: one option does not change the random numbers of another.
 enum class Kind { kPose = 0x706f, kKeyframe, kDrift };
 
 std::uint64_t seedOf(Kind kind, std::uint64_t seed) {
@@ -53,15 +53,15 @@ std::optional<StampedPose> PerturbedPoses::next() {
   if (ready_.empty()) {
     const std::optional<StampedPose> pose = source_->next();
     if (!pose) return std::nullopt;
-    take(*pose);
+    perturb(*pose);
   }
   const StampedPose pose = ready_.front();
   ready_.pop_front();
   return pose;
 }
 
-/// Makes one pose ready, and those that are put in before it.
-void PerturbedPoses::take(const StampedPose& pose) {
+/// Appends a pose, and the poses that are inserted before it.
+void PerturbedPoses::perturb(const StampedPose& pose) {
   if (!isUsable(pose)) {
     ready_.push_back(pose);
     return;
@@ -73,8 +73,8 @@ void PerturbedPoses::take(const StampedPose& pose) {
   }
   NoisyPose noisy = {pose.t_ns, pose.T_world_rig, drawNoise(pose.t_ns)};
   if (options_.drift.any()) noisy.T_world_rig = drift_.drifted(pose.T_world_rig);
-  if (options_.keyframe.any()) passJumps(noisy);
-  give(noisy);
+  if (options_.keyframe.any()) insertJumps(noisy);
+  append(noisy);
   before_ = noisy;
 }
 
@@ -84,17 +84,17 @@ Rigid3 PerturbedPoses::drawNoise(std::int64_t t_ns) const {
   return {rotationBy(options_.noise_rad * normalVector(random)), shift_world};
 }
 
-/// Enters the stretch that a pose is in, and where one begins on the way there puts poses in.
-void PerturbedPoses::passJumps(const NoisyPose& pose) {
+/// Enters the interval of a pose. Inserts poses at each interval that begins before the pose.
+void PerturbedPoses::insertJumps(const NoisyPose& pose) {
   if (!keyframe_noise_) {
     keyframe_noise_.emplace(options_.keyframe, KeyframeNoise::Clock{pose.t_ns, options_.tick_ns},
                             seedOf(Kind::kKeyframe, options_.seed));
   }
-  const std::int64_t last = keyframe_noise_->stretchAt(pose.t_ns);
+  const std::int64_t last = keyframe_noise_->intervalAt(pose.t_ns);
   const bool gap =
       !before_ || pose.t_ns - before_->t_ns > durationFromSeconds(options_.max_pose_gap_s);
   if (gap) {
-    if (!before_ || last != stretch_) enterStretch(last, pose);
+    if (!before_ || last != interval_) enterInterval(last, pose);
     return;
   }
   const auto between = [&](std::int64_t t_ns) {
@@ -103,23 +103,23 @@ void PerturbedPoses::passJumps(const NoisyPose& pose) {
     return NoisyPose{t_ns, interpolate(before_->T_world_rig, pose.T_world_rig, fraction),
                      interpolate(before_->noise, pose.noise, fraction)};
   };
-  while (stretch_ < last) {
-    const std::int64_t begin_ns = keyframe_noise_->beginNs(stretch_ + 1);
-    if (begin_ns - options_.tick_ns > before_->t_ns) give(between(begin_ns - options_.tick_ns));
-    const bool put_in = begin_ns < pose.t_ns;
-    const NoisyPose first = put_in ? between(begin_ns) : pose;
-    enterStretch(stretch_ + 1, first);
-    if (put_in) give(first);
+  while (interval_ < last) {
+    const std::int64_t begin_ns = keyframe_noise_->beginNs(interval_ + 1);
+    if (begin_ns - options_.tick_ns > before_->t_ns) append(between(begin_ns - options_.tick_ns));
+    const bool inserted = begin_ns < pose.t_ns;
+    const NoisyPose first = inserted ? between(begin_ns) : pose;
+    enterInterval(interval_ + 1, first);
+    if (inserted) append(first);
   }
 }
 
-/// @param pose the first one there.
-void PerturbedPoses::enterStretch(std::int64_t stretch, const NoisyPose& pose) {
-  stretch_ = stretch;
-  error_ = keyframe_noise_->errorOf(stretch, pose.T_world_rig.translation);
+/// @param pose the first pose of the interval.
+void PerturbedPoses::enterInterval(std::int64_t interval, const NoisyPose& pose) {
+  interval_ = interval;
+  error_ = keyframe_noise_->errorOf(interval, pose.T_world_rig.translation);
 }
 
-void PerturbedPoses::give(const NoisyPose& pose) {
+void PerturbedPoses::append(const NoisyPose& pose) {
   Rigid3 T_world_rig = pose.T_world_rig;
   if (options_.keyframe.any()) T_world_rig = error_ * T_world_rig;
   if (options_.noise_m > 0) T_world_rig.translation += pose.noise.translation;

@@ -13,33 +13,34 @@
 
 namespace efm {
 
-/// What may be wrong with a tracker's poses. The default is nothing.
+/// Errors of a tracker's poses. The default is none.
 struct PosePerturbationOptions {
-  double noise_m = 0;    ///< Of each pose on its own, standard deviation on each axis; 0 to 1e3.
-  double noise_rad = 0;  ///< The same of its rotation, 0 to 3.2.
+  /// Independent noise of each pose: standard deviation on each axis.
+  double noise_m = 0;    ///< Of the position, 0 to 1e3.
+  double noise_rad = 0;  ///< Of the rotation, 0 to 3.2.
   KeyframeNoiseOptions keyframe;
   PoseDriftOptions drift;
-  /// Across longer gaps poses are not interpolated. As TrajectoryOptions has it.
+  /// Poses are not interpolated across longer gaps. See TrajectoryOptions.
   double max_pose_gap_s = TrajectoryOptions().max_pose_gap_s;
-  std::int64_t tick_ns = 1;  ///< What stamps are multiples of, 1 to 999999.
+  std::int64_t tick_ns = 1;  ///< Stamps are multiples of it, 1 to 999999.
   std::uint64_t seed = 0;
 
-  /// Whether a pose would change.
-  bool any() const;
+  bool any() const;  ///< Whether any error is enabled.
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// A tracker that errs: another source's poses after drift, then noise per keyframe, then noise per
-/// pose, whose draws do not depend on each other. Noise per pose is drawn by stamp, so that a pose
-/// keeps its own when others are lost; positions err in the world, rotations about the rig's axes.
+/// A tracker with errors. Drift, noise per keyframe and noise per pose are added to another
+/// source's poses, in this order. Each has its own random numbers. Noise per pose is drawn by
+/// stamp: a pose keeps its noise when other poses are lost. The noise of a position is in the world
+/// frame, that of a rotation about the rig's axes.
 ///
-/// Noise per keyframe moves all of a stretch rigidly: depth maps of a window inside it stay as they
-/// are. Where one begins, two poses are put in that lie on the way from the pose before to the one
-/// after, one a tick before the jump and one behind it, so that interpolation keeps it out of both
-/// stretches.
+/// Noise per keyframe moves all poses of an interval rigidly. The depth map of a window inside the
+/// interval does not change. Where an interval begins, two interpolated poses are inserted: one a
+/// tick before the jump and one after it. So interpolation does not carry the jump into an
+/// interval.
 ///
-/// A pose that is not finite, or has a time beyond kEndOfTimeNs, passes as it is.
+/// A pose that is not finite, or has a time beyond kEndOfTimeNs, is returned unchanged.
 class PerturbedPoses : public PoseSource {
  public:
   /// @throws std::invalid_argument where the options are not valid or there is no source.
@@ -50,26 +51,26 @@ class PerturbedPoses : public PoseSource {
   bool ended() const override { return ready_.empty() && source_->ended(); }
 
  private:
-  /// A pose before noise, and the noise that it will have.
+  /// A pose without noise, and its noise.
   struct NoisyPose {
     std::int64_t t_ns = 0;
     Rigid3 T_world_rig;
     Rigid3 noise;
   };
 
-  void take(const StampedPose& pose);
+  void perturb(const StampedPose& pose);
   Rigid3 drawNoise(std::int64_t t_ns) const;
-  void passJumps(const NoisyPose& pose);
-  void enterStretch(std::int64_t stretch, const NoisyPose& pose);
-  void give(const NoisyPose& pose);
+  void insertJumps(const NoisyPose& pose);
+  void enterInterval(std::int64_t interval, const NoisyPose& pose);
+  void append(const NoisyPose& pose);
 
   std::unique_ptr<PoseSource> source_;
   PosePerturbationOptions options_;
   PoseDrift drift_;
-  std::optional<KeyframeNoise> keyframe_noise_;  // from the first pose on, where asked for
-  std::optional<NoisyPose> before_;
-  std::int64_t stretch_ = 0;  // the one that the pose before is in
-  Rigid3 error_;              // there
+  std::optional<KeyframeNoise> keyframe_noise_;  // made at the first pose
+  std::optional<NoisyPose> before_;              // the previous pose
+  std::int64_t interval_ = 0;                    // of the previous pose
+  Rigid3 error_;                                 // of that interval
   std::deque<StampedPose> ready_;
 };
 

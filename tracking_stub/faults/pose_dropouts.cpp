@@ -40,7 +40,7 @@ std::optional<StampedPose> PoseDropouts::next() {
 }
 
 bool PoseDropouts::isLost(const StampedPose& pose) {
-  // Drawn for every pose, lost or not: a gap more does not change which others are lost.
+  // Drawn for every pose, lost or not: a further gap does not change the loss of other poses.
   const bool alone = single_.uniform() < options_.drop_probability;
   const bool in_gap = std::any_of(
       options_.gaps.begin(), options_.gaps.end(),
@@ -51,9 +51,9 @@ bool PoseDropouts::isLost(const StampedPose& pose) {
 bool PoseDropouts::isInRandomGap(std::int64_t t_ns) {
   if (options_.random_gaps_hz == 0) return false;
   const auto gap_after = [this](std::int64_t from_ns) {
-    constexpr double kLongestS = 1e9;  // longer than any recording, and sums of it fit 64 bits
+    constexpr double kMaxWaitS = 1e9;  // longer than any recording; sums fit 64 bits
     const double wait_s = -std::log(1 - gap_.uniform()) / options_.random_gaps_hz;
-    const std::int64_t begin_ns = from_ns + durationFromSeconds(std::min(wait_s, kLongestS));
+    const std::int64_t begin_ns = from_ns + durationFromSeconds(std::min(wait_s, kMaxWaitS));
     return TimeGap{begin_ns, begin_ns + durationFromSeconds(options_.random_gap_s)};
   };
   if (!next_gap_) next_gap_ = gap_after(t_ns);

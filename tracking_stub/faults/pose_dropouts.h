@@ -11,26 +11,25 @@
 
 namespace efm {
 
-/// A stretch of time, [begin, end).
+/// A time interval [begin, end).
 struct TimeGap {
   std::int64_t begin_ns = 0;
   std::int64_t end_ns = 0;
 };
 
 struct PoseDropoutOptions {
-  double drop_probability = 0;  ///< Of each pose on its own, 0 to 1.
-  std::vector<TimeGap> gaps;    ///< No pose comes from these, in any order.
-  double random_gaps_hz = 0;    ///< Gaps that begin per second of tracking, at random; 0 or more.
-  double random_gap_s = 0.5;    ///< Length of such a gap, above 0.
+  double drop_probability = 0;  ///< Of each pose, 0 to 1.
+  std::vector<TimeGap> gaps;    ///< All poses in these are lost. In any order.
+  double random_gaps_hz = 0;    ///< Random gaps per second of tracking, 0 or more.
+  double random_gap_s = 0.5;    ///< Length of a random gap, above 0.
   std::uint64_t seed = 0;
 
-  /// Whether a pose may be lost.
   bool any() const { return drop_probability > 0 || !gaps.empty() || random_gaps_hz > 0; }
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// A tracker that fails now and then: what another source gives, less what is lost.
+/// A tracker that fails at times: another source without the lost poses.
 class PoseDropouts : public PoseSource {
  public:
   /// @throws std::invalid_argument where the options are not valid or there is no source.
@@ -39,7 +38,7 @@ class PoseDropouts : public PoseSource {
   std::optional<StampedPose> next() override;
   bool ended() const override { return source_->ended(); }
 
-  /// How many poses were lost so far.
+  /// Number of lost poses.
   std::size_t dropped() const { return dropped_; }
 
  private:
@@ -48,9 +47,9 @@ class PoseDropouts : public PoseSource {
 
   std::unique_ptr<PoseSource> source_;
   PoseDropoutOptions options_;
-  RandomNumbers single_;  // a stream of its own each, so that one option leaves the others' alone
+  RandomNumbers single_;  // each kind has its own stream: one option does not change the other
   RandomNumbers gap_;
-  std::optional<TimeGap> next_gap_;  // the random one that is on or comes next
+  std::optional<TimeGap> next_gap_;  // the current or the next random gap
   std::size_t dropped_ = 0;
 };
 

@@ -9,8 +9,8 @@
 
 namespace efm {
 
-/// A tracker that takes its time: each pose of another source comes once that one has given a pose
-/// so much newer, or has ended. Stamps stay true.
+/// A tracker with latency. A pose of another source is returned when that source has returned a
+/// pose that is newer by the latency, or has ended. Stamps do not change.
 class PoseLatency : public PoseSource {
  public:
   static constexpr std::int64_t kMaxNs = 10'000'000'000;

@@ -10,20 +10,19 @@
 
 namespace efm {
 
-/// All that may be wrong with a tracker. The default is nothing.
+/// All faults of a tracker. The default is none.
 struct TrackerFaults {
   PosePerturbationOptions perturbation;
   PoseDropoutOptions dropouts;
   std::int64_t latency_ns = 0;  ///< 0 to 1e10, see PoseLatency.
 
-  /// Whether anything would change.
-  bool any() const;
+  bool any() const;  ///< Whether any fault is enabled.
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
-/// A source's poses as a tracker with such faults would give them: what is lost is lost first, so
-/// that a pose that marks a jump never is; then poses are perturbed, then they come late.
+/// A source with faults. Poses are lost first, so the poses at a jump are never lost; then they are
+/// perturbed, then delayed.
 /// @throws std::invalid_argument where the faults are not valid or there is no source.
 std::unique_ptr<PoseSource> withFaults(std::unique_ptr<PoseSource> source,
                                        const TrackerFaults& faults);

@@ -7,7 +7,7 @@
 
 namespace efm {
 
-/// A motion known at every instant, not only where it was sampled.
+/// A motion that is known at every time.
 class Motion {
  public:
   virtual ~Motion() = default;

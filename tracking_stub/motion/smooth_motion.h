@@ -18,14 +18,14 @@ struct Sine {
 
 struct SmoothMotionOptions {
   std::int64_t start_ns = 0;                           ///< t = 0 of the sines.
-  Rigid3 T_world_center;                               ///< The pose that the rig moves around.
+  Rigid3 T_world_center;                               ///< The rig moves around this pose.
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< Along the axes of `center`, m/s.
   std::array<std::vector<Sine>, 3> translation;        ///< Along the axes of `center`, metres.
   std::array<std::vector<Sine>, 3> rotation;           ///< A rotation vector in `center`, radians.
 };
 
-/// Hand-held motion: in each of the six degrees of freedom a sum of sines, on top of a constant
-/// velocity.
+/// Hand-held motion: a constant velocity and, in each of the six degrees of freedom, a sum of
+/// sines.
 class SmoothMotion : public Motion {
  public:
   explicit SmoothMotion(const SmoothMotionOptions& options) : options_(options) {}

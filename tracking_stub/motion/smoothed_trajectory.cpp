@@ -31,8 +31,8 @@ Rigid3 between(const StampedPose& a, const StampedPose& b, std::int64_t t_ns) {
                      secondsBetween(a.t_ns, t_ns) / secondsBetween(a.t_ns, b.t_ns));
 }
 
-/// How far each inner pose is off the line between its neighbours: metres, and radians.
-std::pair<std::vector<double>, std::vector<double>> deviations(const Poses& poses) {
+/// Distance of each inner pose from the line between its neighbours, in metres and in radians.
+std::pair<std::vector<double>, std::vector<double>> distancesToLine(const Poses& poses) {
   std::vector<double> metres(poses.size(), 0.0);
   std::vector<double> radians(poses.size(), 0.0);
   for (std::size_t i = 1; i + 1 < poses.size(); ++i) {
@@ -44,22 +44,21 @@ std::pair<std::vector<double>, std::vector<double>> deviations(const Poses& pose
   return {metres, radians};
 }
 
-/// Marks what stands out of a neighbourhood that it does not make: a jump also shows, by half, in
-/// the poses beside it.
-void markJumps(const std::vector<double>& deviation, std::vector<bool>& jumps) {
-  constexpr double kTimesUsual = 8;
-  std::vector<double> sorted = deviation;
-  const double limit = kTimesUsual * upperMedian(sorted) + 1e-9;
-  for (std::size_t i = 1; i + 1 < deviation.size(); ++i) {
-    if (deviation[i] > limit && deviation[i] >= deviation[i - 1] &&
-        deviation[i] > deviation[i + 1]) {
+/// Marks local maxima above the limit only: half of a jump also appears in the adjacent poses.
+void markJumps(const std::vector<double>& distances, std::vector<bool>& jumps) {
+  constexpr double kTimesMedian = 8;
+  std::vector<double> reordered = distances;
+  const double limit = kTimesMedian * upperMedian(reordered) + 1e-9;
+  for (std::size_t i = 1; i + 1 < distances.size(); ++i) {
+    if (distances[i] > limit && distances[i] >= distances[i - 1] &&
+        distances[i] > distances[i + 1]) {
       jumps[i] = true;
     }
   }
 }
 
 Poses withoutJumps(const Poses& poses) {
-  const auto [metres, radians] = deviations(poses);
+  const auto [metres, radians] = distancesToLine(poses);
   std::vector<bool> jumps(poses.size(), false);
   markJumps(metres, jumps);
   markJumps(radians, jumps);
@@ -98,26 +97,27 @@ Poses resampled(const Poses& poses, std::int64_t period_ns) {
   return even;
 }
 
-/// The right half of a sinc under a Hann window that reaches over two periods of the cutoff; the
-/// whole sums to 1.
+/// The right half of a sinc under a Hann window. The half width of the window is two periods of the
+/// cutoff. The sum over both halves is 1.
 std::vector<double> lowPass(double cutoff_hz, double period_s) {
-  const double reach_s = 2 / cutoff_hz;
-  const int taps = static_cast<int>(std::floor(reach_s / period_s));
+  const double half_width_s = 2 / cutoff_hz;
+  const int taps = static_cast<int>(std::floor(half_width_s / period_s));
   std::vector<double> weights = {1};
   double sum = 1;
   for (int k = 1; k <= taps; ++k) {
     const double t_s = k * period_s;
     const double x = 2 * kPi * cutoff_hz * t_s;
-    weights.push_back(std::sin(x) / x * 0.5 * (1 + std::cos(kPi * t_s / (reach_s + period_s))));
+    weights.push_back(std::sin(x) / x * 0.5 *
+                      (1 + std::cos(kPi * t_s / (half_width_s + period_s))));
     sum += 2 * weights.back();
   }
   for (double& weight : weights) weight /= sum;
   return weights;
 }
 
-/// The pose at an index that may lie beyond an end: there the motion goes on as it came, turned
-/// around its last point, so that an end keeps its place, speed and rate.
-Rigid3 beyond(const Poses& poses, std::ptrdiff_t i) {
+/// The pose at an index, also beyond an end. There the motion is mirrored at the end's point, so
+/// the end keeps its position, speed and rate of rotation.
+Rigid3 extended(const Poses& poses, std::ptrdiff_t i) {
   const auto last = static_cast<std::ptrdiff_t>(poses.size()) - 1;
   const auto at = [&](std::ptrdiff_t k) -> const Rigid3& {
     return poses[static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k, 0, last))].T_world_rig;
@@ -130,7 +130,7 @@ Rigid3 beyond(const Poses& poses, std::ptrdiff_t i) {
 }
 
 Eigen::Vector3d logarithm(const Eigen::Quaterniond& rotation) {
-  const double sign = rotation.w() < 0 ? -1 : 1;  // the two signs are one rotation
+  const double sign = rotation.w() < 0 ? -1 : 1;  // q and -q are the same rotation
   const double sine = rotation.vec().norm();
   if (sine < 1e-12) return 2 * sign * rotation.vec();
   return sign * 2 * std::atan2(sine, sign * rotation.w()) / sine * rotation.vec();
@@ -141,21 +141,22 @@ Poses filtered(const Poses& poses, const std::vector<double>& weights) {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Rigid3& here = poses[i].T_world_rig;
     Eigen::Vector3d shift = Eigen::Vector3d::Zero();
-    Eigen::Vector3d turn = Eigen::Vector3d::Zero();
+    Eigen::Vector3d rotation_vector = Eigen::Vector3d::Zero();
     for (std::size_t k = 1; k < weights.size(); ++k) {
       for (const int side : {-1, 1}) {
         const Rigid3 other =
-            beyond(poses, static_cast<std::ptrdiff_t>(i) + side * static_cast<std::ptrdiff_t>(k));
+            extended(poses, static_cast<std::ptrdiff_t>(i) + side * static_cast<std::ptrdiff_t>(k));
         shift += weights[k] * (other.translation - here.translation);
-        turn += weights[k] * logarithm(here.rotation.conjugate() * other.rotation);
+        rotation_vector += weights[k] * logarithm(here.rotation.conjugate() * other.rotation);
       }
     }
     Rigid3& T_world_rig = smooth[i].T_world_rig;
     T_world_rig.translation += shift;
-    const double angle = turn.norm();
+    const double angle = rotation_vector.norm();
     if (angle > 0) {
       T_world_rig.rotation =
-          (here.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle))).normalized();
+          (here.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle)))
+              .normalized();
     }
   }
   return smooth;
@@ -180,28 +181,28 @@ std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses,
                   lowPass(cutoff_hz, secondsBetween(0, options.period_ns)));
 }
 
-std::int64_t departureOf(const std::vector<StampedPose>& poses) {
-  constexpr double kLookS = 0.5;
+std::int64_t startOfMotion(const std::vector<StampedPose>& poses) {
+  constexpr double kSegmentS = 0.5;
   requireOption(!poses.empty(), "poses", poses.size(), "at least 1");
-  struct Stretch {
+  struct Segment {
     std::int64_t begin_ns;
     double duration_s, length_m;
   };
-  std::vector<Stretch> stretches;
+  std::vector<Segment> segments;
   double length_m = 0;
   std::size_t begin = 0;
   for (std::size_t i = 1; i < poses.size(); ++i) {
     const double duration_s = secondsBetween(poses[begin].t_ns, poses[i].t_ns);
-    if (duration_s < kLookS) continue;
+    if (duration_s < kSegmentS) continue;
     const double chord_m =
         (poses[i].T_world_rig.translation - poses[begin].T_world_rig.translation).norm();
-    stretches.push_back({poses[begin].t_ns, duration_s, chord_m});
+    segments.push_back({poses[begin].t_ns, duration_s, chord_m});
     length_m += chord_m;
     begin = i;
   }
   const double mean_speed = length_m / secondsBetween(poses.front().t_ns, poses[begin].t_ns);
-  for (const Stretch& stretch : stretches) {
-    if (stretch.length_m >= 0.5 * mean_speed * stretch.duration_s) return stretch.begin_ns;
+  for (const Segment& segment : segments) {
+    if (segment.length_m >= 0.5 * mean_speed * segment.duration_s) return segment.begin_ns;
   }
   return poses.front().t_ns;
 }

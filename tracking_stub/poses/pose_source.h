@@ -7,16 +7,16 @@
 
 namespace efm {
 
-/// Where poses come from: what a real tracker implements. Called from one thread.
+/// A source of poses. A real tracker implements it. Called from one thread.
 class PoseSource {
  public:
   virtual ~PoseSource() = default;
 
-  /// The next pose in order of time. @return nothing when there is none for now: poll again, unless
-  /// `ended`.
+  /// The next pose in order of time.
+  /// @return nothing when no pose is available now. Poll again, unless `ended`.
   virtual std::optional<StampedPose> next() = 0;
 
-  /// True once no pose will ever come again.
+  /// Whether no more poses will come.
   virtual bool ended() const = 0;
 };
 

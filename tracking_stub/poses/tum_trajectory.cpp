@@ -20,8 +20,7 @@ namespace {
 
 constexpr std::array<std::string_view, 8> kFieldNames = {"t",  "tx", "ty", "tz",
                                                          "qx", "qy", "qz", "qw"};
-constexpr double kMaxLengthError =
-    0.01;  // of a quaternion: two digits are enough to tell a mistake
+constexpr double kMaxLengthError = 0.01;  // of a quaternion; files have few digits
 
 std::runtime_error fieldError(std::size_t field, std::string_view text, const char* expected) {
   return std::runtime_error(std::string(kFieldNames[field]) + " = " + inQuotes(text) +
@@ -89,6 +88,13 @@ std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::stri
   }
   if (stream.bad()) throw std::runtime_error(name + ": cannot be read to its end");
   return poses;
+}
+
+std::vector<StampedPose> readPosesFile(const std::filesystem::path& file) {
+  std::vector<StampedPose> poses = readTumTrajectory(file);
+  if (!poses.empty()) return poses;
+  throw std::runtime_error(file.string() +
+                           ": no poses: expected at least one line t tx ty tz qx qy qz qw");
 }
 
 void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses) {

@@ -11,19 +11,24 @@
 
 namespace efm {
 
-/// Trajectories as text, the format of the TUM RGB-D benchmark: one pose `t tx ty tz qx qy qz qw` a
-/// line, metres and decimal seconds; blank lines and what follows a `#` do not count.
+/// Trajectories in the text format of the TUM RGB-D benchmark: a line `t tx ty tz qx qy qz qw` for
+/// each pose, in metres and decimal seconds. Blank lines and comments after `#` are skipped.
 
-/// The poses in the order of the file, times exact. Quaternions are normalised, which takes away
-/// the rounding of few digits: one whose length is off 1 by more than 1 % is an error.
-/// @throws std::runtime_error naming file and line, the value and what was expected.
+/// Reads the poses T_world_rig in the order of the file. Times are exact. Quaternions are
+/// normalised, because files have few digits. A length that differs from 1 by more than 1 % is an
+/// error.
+/// @throws std::runtime_error naming file, line, value and the expected value.
 std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file);
-/// @param name what errors call the stream.
+/// @param name of the stream, for errors.
 std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::string& name);
 
-/// Nine decimals for times and 17 significant digits for the rest, so that reading gives back what
-/// was written, up to the rounding of the normalisation.
-/// @throws std::runtime_error naming the file where it cannot be written.
+/// The same for the poses of a recording: at least one.
+/// @throws std::runtime_error naming the file that has no pose.
+std::vector<StampedPose> readPosesFile(const std::filesystem::path& file);
+
+/// Writes times with nine decimals and other numbers with 17 significant digits: the file is read
+/// back exactly, up to the rounding of the normalisation.
+/// @throws std::runtime_error naming the file that cannot be written.
 void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses);
 void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses);
 

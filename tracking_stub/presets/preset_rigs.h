@@ -2,13 +2,19 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/rig.h"
+#include "mapping/geometry/timestamp.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm {
 
-/// What presets put their rigs and motions together from.
+/// Parts of presets: rigs and motions.
+
+/// The start of every preset.
+inline constexpr std::int64_t kPresetStartNs = kNanosecondsPerSecond;
 
 inline double radians(double deg) { return deg * kPi / 180; }
 
@@ -31,13 +37,25 @@ inline CameraModel makePinhole(int width, int height, double focal_px) {
   return model;
 }
 
-/// Two alike, the second `baseline_m` to the right of the first, which is the rig's frame.
+/// Two equal cameras, the second `baseline_m` to the right of the first. The rig's frame is the
+/// first.
 inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
   Rig rig;
   rig.cameras.resize(2);
   rig.cameras[0].model = rig.cameras[1].model = model;
   rig.cameras[1].T_rig_cam.translation = {baseline_m, 0, 0};
   return rig;
+}
+
+/// A preset without scene, rig and motion.
+/// @param threshold contrast threshold of both polarities.
+inline Simulation emptyPreset(double duration_s, double threshold, std::uint64_t seed) {
+  Simulation simulation;
+  simulation.start_ns = kPresetStartNs;
+  simulation.duration_ns = durationFromSeconds(duration_s);
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = threshold;
+  simulation.seed = seed;
+  return simulation;
 }
 
 }  // namespace efm

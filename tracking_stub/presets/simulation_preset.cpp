@@ -6,13 +6,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/named_choice.h"
 #include "mapping/options/option_check.h"
-#include "tracking_stub/presets/desk_stereo.h"
-#include "tracking_stub/presets/drive_stereo.h"
-#include "tracking_stub/presets/hd_stereo.h"
-#include "tracking_stub/presets/poles_stereo.h"
-#include "tracking_stub/presets/room_stereo.h"
-#include "tracking_stub/presets/slider.h"
-#include "tracking_stub/presets/trinocular.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm {
 namespace {

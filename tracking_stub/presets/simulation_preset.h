@@ -12,16 +12,15 @@ namespace efm {
 
 struct SimulationOptions {
   std::string preset = "desk_stereo";  ///< One of `simulationPresets`.
-  /// Seconds, 0.001 to 600; the preset's own where not given.
+  /// Seconds, 0.001 to 600. Default: the preset's duration.
   std::optional<double> duration_s;
-  /// Of everything random: the paintings on the surfaces and the pixels' first memory.
+  /// Seed of everything random: the paintings and the initial memory of the pixels.
   std::uint64_t seed = 1;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed values.
   void validate() const;
 };
 
-/// The names of the presets.
 std::vector<std::string> simulationPresets();
 
 /// Scene, rig and motion of a preset.

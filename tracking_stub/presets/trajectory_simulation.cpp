@@ -21,13 +21,13 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// What a scene is built around.
-struct Way {
-  std::vector<Vector3d> places;  // of camera 0, frame `level`
-  Eigen::AlignedBox3d box;       // around them
-  Rigid3 T_world_level;          // y: where the camera looks on average; z: up
-  double focal_px = 0;           // of the sharpest camera
-  double half_view = 0;          // of the widest, to the side at a depth of 1 m
+/// The path of camera 0. The scene is built around it.
+struct CameraPath {
+  std::vector<Vector3d> positions;  // frame `level`
+  Eigen::AlignedBox3d box;          // around the positions
+  Rigid3 T_world_level;             // y: the mean viewing direction; z: up
+  double focal_px = 0;              // of the camera with the longest focal length
+  double half_view = 0;             // of the widest camera, to the side at a depth of 1 m
   std::uint64_t seed = 0;
 };
 
@@ -38,7 +38,7 @@ Eigen::Quaterniond levelFrame(const std::vector<Rigid3>& T_world_cams) {
     down += T_world_cam.rotation * Vector3d::UnitY();
     ahead += T_world_cam.rotation * Vector3d::UnitZ();
   }
-  // Cameras that look all around have no mean direction: then the first one's counts.
+  // A camera that looks in all directions has no mean direction: its first direction counts.
   const auto n = static_cast<double>(T_world_cams.size());
   if (down.norm() < 0.1 * n) down = T_world_cams.front().rotation * Vector3d::UnitY();
   const Vector3d up = -down.normalized();
@@ -53,77 +53,77 @@ Eigen::Quaterniond levelFrame(const std::vector<Rigid3>& T_world_cams) {
   return Eigen::Quaterniond(R_world_level);
 }
 
-Way wayOf(const Simulation& simulation) {
-  constexpr std::int64_t kLookNs = 50'000'000;
+CameraPath pathOf(const Simulation& simulation) {
+  constexpr std::int64_t kSampleNs = 50'000'000;
   std::vector<Rigid3> T_world_cams;
-  for (std::int64_t t_ns = simulation.start_ns; t_ns < simulation.endNs(); t_ns += kLookNs) {
+  for (std::int64_t t_ns = simulation.start_ns; t_ns < simulation.endNs(); t_ns += kSampleNs) {
     T_world_cams.push_back(simulation.motion->poseAt(t_ns));
   }
   T_world_cams.push_back(simulation.motion->poseAt(simulation.endNs()));
-  Way way;
-  way.T_world_level.rotation = levelFrame(T_world_cams);
-  const Rigid3 T_level_world = way.T_world_level.inverse();
+  CameraPath path;
+  path.T_world_level.rotation = levelFrame(T_world_cams);
+  const Rigid3 T_level_world = path.T_world_level.inverse();
   for (const Rigid3& T_world_cam : T_world_cams) {
-    way.places.push_back(T_level_world * T_world_cam.translation);
-    way.box.extend(way.places.back());
+    path.positions.push_back(T_level_world * T_world_cam.translation);
+    path.box.extend(path.positions.back());
   }
   for (const RigCamera& camera : simulation.rig.cameras) {
     const CameraModel& model = camera.model;
-    way.focal_px = std::max({way.focal_px, model.fx, model.fy});
-    way.half_view = std::max(way.half_view, 0.5 * model.width / model.fx);
+    path.focal_px = std::max({path.focal_px, model.fx, model.fy});
+    path.half_view = std::max(path.half_view, 0.5 * model.width / model.fx);
   }
-  way.seed = simulation.seed;
-  return way;
+  path.seed = simulation.seed;
+  return path;
 }
 
-/// Sets a scene down with its origin at a place of frame `level`.
-Scene setDown(Scene scene, const Way& way, const Vector3d& origin_level) {
+/// Moves a scene: its origin goes to a position in frame `level`.
+Scene movedTo(Scene scene, const CameraPath& path, const Vector3d& origin_level) {
   Rigid3 T_level_scene;
   T_level_scene.translation = origin_level;
-  scene.move(way.T_world_level * T_level_scene);
+  scene.move(path.T_world_level * T_level_scene);
   return scene;
 }
 
-Scene roomAround(const Way& way) {
-  constexpr double kBesideM = 1.9;
+Scene roomAround(const CameraPath& path) {
+  constexpr double kSideM = 1.9;
   constexpr double kBelowM = 1.2;
   constexpr double kAboveM = 1.4;
-  const Vector3d extent = way.box.sizes();
+  const Vector3d extent = path.box.sizes();
   RoomOptions room;
-  room.size_m = {std::max(4.8, extent.x() + 2 * kBesideM), std::max(5.4, extent.y() + 2 * kBesideM),
+  room.size_m = {std::max(4.8, extent.x() + 2 * kSideM), std::max(5.4, extent.y() + 2 * kSideM),
                  extent.z() + kBelowM + kAboveM};
-  room.nearest_m = kBesideM - room.furniture_depth_m;
-  room.focal_px = way.focal_px;
-  room.seed = way.seed;
-  Vector3d foot = way.box.center();
-  foot.z() = way.box.min().z() - kBelowM;
-  return setDown(makeRoom(room), way, foot);
+  room.nearest_m = kSideM - room.furniture_depth_m;
+  room.focal_px = path.focal_px;
+  room.seed = path.seed;
+  Vector3d foot = path.box.center();
+  foot.z() = path.box.min().z() - kBelowM;
+  return movedTo(makeRoom(room), path, foot);
 }
 
-Scene streetAlong(const Way& way) {
+Scene streetAlong(const CameraPath& path) {
   constexpr double kCameraHeightM = 1.6;
   StreetOptions street;
-  for (const Vector3d& place : way.places) street.path.emplace_back(place.head<2>());
-  // One that stands still looks down the street.
-  if (way.box.sizes().head<2>().norm() < 1) {
+  for (const Vector3d& position : path.positions) street.path.emplace_back(position.head<2>());
+  // A camera at rest looks down the street.
+  if (path.box.sizes().head<2>().norm() < 1) {
     street.path = {street.path.front(), street.path.front() + Eigen::Vector2d::UnitY()};
   }
-  street.focal_px = way.focal_px;
-  street.seed = way.seed;
-  return setDown(makeStreet(street), way, {0, 0, way.box.min().z() - kCameraHeightM});
+  street.focal_px = path.focal_px;
+  street.seed = path.seed;
+  return movedTo(makeStreet(street), path, {0, 0, path.box.min().z() - kCameraHeightM});
 }
 
-Scene polesBefore(const Way& way) {
+Scene polesBefore(const CameraPath& path) {
   PolesOptions poles;
-  poles.focal_px = way.focal_px;
-  poles.half_view = way.half_view;
-  poles.seed = way.seed;
-  Vector3d front = way.box.center();
-  front.y() = way.box.max().y();
-  return setDown(makePoles(poles), way, front);
+  poles.focal_px = path.focal_px;
+  poles.half_view = path.half_view;
+  poles.seed = path.seed;
+  Vector3d front = path.box.center();
+  front.y() = path.box.max().y();
+  return movedTo(makePoles(poles), path, front);
 }
 
-using MakeScene = Scene (*)(const Way& way);
+using MakeScene = Scene (*)(const CameraPath& path);
 
 constexpr NamedChoice<MakeScene> kScenes[] = {
     {roomAround, "room"},
@@ -131,7 +131,7 @@ constexpr NamedChoice<MakeScene> kScenes[] = {
     {polesBefore, "poles"},
 };
 
-/// The poses from a little before to a little after a stretch of time, as smoothing wants them.
+/// The poses of a time interval and of 2 s before and after it, for smoothing.
 std::vector<StampedPose> posesAround(const std::vector<StampedPose>& poses, std::int64_t start_ns,
                                      std::int64_t end_ns) {
   constexpr std::int64_t kMarginNs = 2 * kNanosecondsPerSecond;
@@ -175,7 +175,7 @@ Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
   Simulation simulation;
   simulation.rig = rig;
   simulation.seed = options.seed;
-  simulation.start_ns = options.start_ns.value_or(departureOf(poses));
+  simulation.start_ns = options.start_ns.value_or(startOfMotion(poses));
   requireOption(simulation.start_ns >= poses.front().t_ns && simulation.start_ns < last_ns, "start",
                 formatSeconds(simulation.start_ns),
                 "within the trajectory, " + formatSeconds(poses.front().t_ns) + " to " +
@@ -188,11 +188,11 @@ Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                 "at most the " + formatSeconds(left_ns) + " s that are left of the trajectory");
   simulation.motion = std::make_shared<SampledMotion>(
       smoothTrajectory(posesAround(poses, simulation.start_ns, simulation.endNs())));
-  if (options.scene == "street") {  // as drive_stereo
+  if (options.scene == "street") {  // like drive_stereo
     simulation.truth_cell_m = 0.05;
     simulation.max_step_px = 1;
   }
-  simulation.scene = valueIn(kScenes, options.scene)(wayOf(simulation));
+  simulation.scene = valueIn(kScenes, options.scene)(pathOf(simulation));
   return simulation;
 }
 

@@ -14,30 +14,28 @@ namespace efm {
 
 struct TrajectorySimulationOptions {
   /// One of `simulationScenes`:
-  ///   room    a furnished room around the way, its walls 1.9 m from it or more;
-  ///   street  along the way, for vehicles: see makeStreet;
-  ///   poles   thin poles before a wall, where the camera looks on average.
+  ///   room    a furnished room; its walls are at least 1.9 m from the path;
+  ///   street  a street along the path, for vehicles: see makeStreet;
+  ///   poles   thin poles before a wall, in the mean viewing direction.
   std::string scene = "room";
-  /// Where to begin, in the trajectory's clock; where it gets under way (`departureOf`) if not
-  /// given.
+  /// Start time in the trajectory's clock. Default: `startOfMotion`.
   std::optional<std::int64_t> start_ns;
-  /// Seconds, 0.001 to 600; 5, or what is left of the trajectory, where not given. A longer
-  /// trajectory is cut.
+  /// Seconds, 0.001 to 600. Default: 5, or less where the trajectory ends earlier.
   std::optional<double> duration_s;
-  std::uint64_t seed = 1;  ///< Of everything random.
+  std::uint64_t seed = 1;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed values.
   void validate() const;
 };
 
-/// The names of the scenes that fit themselves around a trajectory.
+/// The names of the scenes that can be built around a trajectory.
 std::vector<std::string> simulationScenes();
 
-/// Drives a rig along a measured trajectory, smoothed (see `smoothTrajectory`): the smoothed one is
-/// the truth. The scene is built around the stretch that is simulated, upright as the cameras are
-/// on average: their mean y axis is down.
+/// Moves a rig along a measured trajectory. The trajectory is smoothed (see `smoothTrajectory`),
+/// and the smoothed trajectory is the truth. The scene is built around the simulated part of the
+/// path. Its vertical is the mean y axis of the cameras.
 /// @param poses T_world_cam0, where camera 0 is the rig's frame.
-/// @throws std::invalid_argument where the options are not valid, or not those of the trajectory.
+/// @throws std::invalid_argument where the options are not valid or do not fit the trajectory.
 Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                                     const std::vector<StampedPose>& poses, const Rig& rig);
 

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
 
 namespace efm {
 
-/// Seeded random numbers that are the same on every platform, which the distributions of <random>
-/// do not promise (SplitMix64: Steele, Lea and Flood, OOPSLA 2014).
+/// Seeded random numbers. They are the same on every platform; the distributions of <random> are
+/// not (SplitMix64: Steele, Lea and Flood, OOPSLA 2014).
 class RandomNumbers {
  public:
-  /// @param stream numbers of different streams of one seed are unrelated.
+  /// @param stream the streams of a seed are independent.
   explicit RandomNumbers(std::uint64_t seed, std::uint64_t stream = 0)
       : state_(mix(seed) ^ mix(~stream)) {}
 
@@ -20,8 +21,8 @@ class RandomNumbers {
   double uniform(double from, double to) { return from + (to - from) * uniform(); }
   /// Uniform in {0, ..., count - 1}.
   int below(int count) { return static_cast<int>(uniform() * count); }
-  /// Normal, of mean 0 and standard deviation 1 (Box and Muller, Ann. Math. Statist. 1958). Takes
-  /// two of `next`.
+  /// Normal, with mean 0 and standard deviation 1 (Box and Muller, Ann. Math. Statist. 1958). Uses
+  /// two numbers of `next`.
   double normal() {
     constexpr double kTwoPi = 6.283185307179586;
     const double radius = std::sqrt(-2 * std::log(1 - uniform()));
@@ -38,5 +39,17 @@ class RandomNumbers {
 
   std::uint64_t state_;
 };
+
+/// Normal on each axis, with standard deviation 1.
+inline Eigen::Vector3d normalVector(RandomNumbers& random) {
+  Eigen::Vector3d values;
+  for (int axis = 0; axis < 3; ++axis) values[axis] = random.normal();
+  return values;
+}
+
+/// Uniform on the unit sphere.
+inline Eigen::Vector3d randomDirection(RandomNumbers& random) {
+  return normalVector(random).normalized();
+}
 
 }  // namespace efm

@@ -9,8 +9,8 @@
 
 namespace efm {
 
-/// The exact depth map of a scene: z-depth in metres along the ray through each pixel's centre;
-/// 0 where it meets nothing.
+/// The exact depth map of a scene: z-depth in metres on the ray through each pixel's centre. 0
+/// where the ray hits nothing.
 cv::Mat1f renderDepth(const Scene& scene, const Rigid3& T_world_cam, const ReferenceView& view);
 
 }  // namespace efm

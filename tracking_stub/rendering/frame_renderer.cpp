@@ -13,8 +13,8 @@ namespace {
 constexpr int kRowsPerTask = 8;
 constexpr int kSamples = 16;
 
-/// Hammersley's points: no two share a row or column, so that an edge of any orientation covers a
-/// pixel in equal steps of 1/16.
+/// Hammersley's points. No two have the same row or column: an edge of any orientation covers a
+/// pixel in steps of 1/16.
 std::array<Eigen::Vector2d, kSamples> makeSampleOffsets() {
   std::array<Eigen::Vector2d, kSamples> offsets;
   for (int i = 0; i < kSamples; ++i) {
@@ -97,7 +97,7 @@ SurfacePoint FrameRenderer::sourceOf(const SceneView& view, const Frame& frame, 
       nearest_ray = ray;
     }
   }
-  return view.placeOf(nearest, nearest_ray);
+  return view.surfacePointOf(nearest, nearest_ray);
 }
 
 }  // namespace efm

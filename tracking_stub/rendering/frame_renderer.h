@@ -11,15 +11,14 @@
 
 namespace efm {
 
-/// What a camera's pixels see at one instant.
+/// The image of a camera at one time.
 struct Frame {
   cv::Mat1f log_intensity;
-  cv::Mat1i surface;  ///< At the pixel's centre; -1 where nothing.
+  cv::Mat1i surface;  ///< Index at the pixel's centre; -1 where there is none.
 };
 
-/// Renders a scene through a camera. Within a surface the texture's own blur keeps the image free
-/// of aliasing; a pixel whose neighbourhood holds another surface averages over its area, so that a
-/// silhouette sweeps smoothly across it.
+/// Renders a scene through a camera without aliasing. Within a surface the texture is blurred. At a
+/// silhouette, where an adjacent pixel has another surface, a pixel averages over its area.
 class FrameRenderer {
  public:
   /// @throws std::invalid_argument where the model is not valid.
@@ -27,17 +26,17 @@ class FrameRenderer {
 
   const PixelRays& rays() const { return rays_; }
 
-  /// A view for `render` and `sourceOf`.
+  /// The view for `render` and `sourceOf`.
   SceneView viewFrom(const Scene& scene, const Rigid3& T_world_cam) const {
     return SceneView(scene, T_world_cam, rays_.bounds());
   }
 
-  /// Uses the threads of the caller's oneTBB arena; the result does not depend on them.
-  /// @param frame reused where it has the size already.
+  /// Uses the threads of the caller's oneTBB arena. The result does not depend on them.
+  /// @param frame reused where it has the right size.
   void render(const SceneView& view, Frame& frame) const;
 
-  /// What a change of brightness at a pixel came from: the place at its centre, and on a silhouette
-  /// the nearest place within the pixel, for the edge belongs to the surface in front.
+  /// The surface point that causes a change of brightness at a pixel: the point at its centre. On a
+  /// silhouette it is the nearest point within the pixel, because the edge is on the front surface.
   SurfacePoint sourceOf(const SceneView& view, const Frame& frame, int x, int y) const;
 
  private:

@@ -13,7 +13,7 @@ PixelRays::PixelRays(const CameraModel& model) : width_(model.width), height_(mo
   requireOption(width_ >= 2, "width", width_, "at least 2 pixels to be simulated");
   requireOption(height_ >= 2, "height", height_, "at least 2 pixels to be simulated");
   model.validate();
-  // Not the table that the mapping looks events up in: its floats would be errors of the truth.
+  // The mapping's undistortion table has floats: their rounding would be an error of the truth.
   std::vector<std::vector<Eigen::Vector2d>> table;
   for (int y = 0; y < height_; ++y) table.push_back(viewingRays(model, y));
   const auto at = [&](int x, int y) -> const Eigen::Vector2d& {
@@ -33,9 +33,9 @@ PixelRays::PixelRays(const CameraModel& model) : width_(model.width), height_(mo
       pixel.per_y = (at(x, down) - at(x, up)) / (down - up);
       pixel.pitch = std::sqrt(0.5 * (pixel.per_x.squaredNorm() + pixel.per_y.squaredNorm()));
       rays_.push_back(pixel);
-      const Eigen::Vector2d reach = 0.5 * (pixel.per_x.cwiseAbs() + pixel.per_y.cwiseAbs());
-      bounds_.min = bounds_.min.cwiseMin(pixel.ray - reach);
-      bounds_.max = bounds_.max.cwiseMax(pixel.ray + reach);
+      const Eigen::Vector2d half_pixel = 0.5 * (pixel.per_x.cwiseAbs() + pixel.per_y.cwiseAbs());
+      bounds_.min = bounds_.min.cwiseMin(pixel.ray - half_pixel);
+      bounds_.max = bounds_.max.cwiseMax(pixel.ray + half_pixel);
     }
   }
 }

@@ -10,21 +10,21 @@
 
 namespace efm {
 
-/// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and how it changes across the pixel.
+/// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and its change across the pixel.
 struct PixelRay {
   Eigen::Vector2d ray;
   Eigen::Vector2d per_x;  ///< Per pixel to the right.
   Eigen::Vector2d per_y;  ///< Per pixel down.
   double pitch = 0;       ///< Size of the pixel in units of the ray.
 
-  /// Of a place in the pixel: offsets from its centre, -0.5 to 0.5.
+  /// The ray of a point in the pixel. The offsets from the centre are -0.5 to 0.5.
   Eigen::Vector2d at(double dx, double dy) const { return ray + dx * per_x + dy * per_y; }
 };
 
-/// The viewing rays of all pixels of a camera, distortion included.
+/// The viewing rays of all pixels of a camera, with distortion.
 class PixelRays {
  public:
-  /// @throws std::invalid_argument where the model is not valid, or smaller than 2x2 pixels.
+  /// @throws std::invalid_argument where the model is not valid or has fewer than 2x2 pixels.
   explicit PixelRays(const CameraModel& model);
 
   int width() const { return width_; }
@@ -33,7 +33,7 @@ class PixelRays {
     return rays_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
                  static_cast<std::size_t>(x)];
   }
-  /// Holds all of every pixel's rays.
+  /// Bounds of all rays of all pixels.
   const RayBounds& bounds() const { return bounds_; }
 
  private:

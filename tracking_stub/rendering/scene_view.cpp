@@ -20,7 +20,7 @@ double at(const Eigen::Vector3d& linear, const Eigen::Vector2d& ray) {
   return linear.x() * ray.x() + linear.y() * ray.y() + linear.z();
 }
 
-/// The largest value of a linear function on a tile.
+/// The max of a linear function on a tile.
 double maximum(const Eigen::Vector3d& linear, const Eigen::Vector2d& center,
                const Eigen::Vector2d& half_size) {
   return at(linear, center) + std::abs(linear.x()) * half_size.x() +
@@ -39,7 +39,7 @@ SceneView::SceneView(const Scene& scene, const Rigid3& T_world_cam, const RayBou
     const Rectangle& r = scene.rectangle(surface);
     const Eigen::Vector3d center_from_corner = T_world_cam.translation - r.corner;
     const double height = r.normal().dot(center_from_corner);
-    if (!(height > 0)) continue;  // seen from behind
+    if (!(height > 0)) continue;  // visible from behind only
     Facet facet;
     facet.surface = surface;
     facet.inverse_depth = R_cam_world * r.normal() / -height;
@@ -59,7 +59,7 @@ SceneView::SceneView(const Scene& scene, const Rigid3& T_world_cam, const RayBou
     for (int column = 0; column < kTileColumns; ++column) {
       const Eigen::Vector2d center =
           bounds.min + tile_size.cwiseProduct(Eigen::Vector2d(column + 0.5, row + 0.5));
-      // A little larger than it is: rounding must not send a ray to a tile that lacks its surface.
+      // Slightly enlarged: with rounding errors, too, the tile of a ray must list its surface.
       fillTile(center, 0.5001 * tile_size, tiles_[tileIndex(column, row)]);
     }
   }
@@ -95,7 +95,7 @@ const std::vector<SceneView::Candidate>& SceneView::tileOf(const Eigen::Vector2d
 ViewHit SceneView::cast(const Eigen::Vector2d& ray) const {
   ViewHit hit;
   for (const Candidate& candidate : tileOf(ray)) {
-    if (candidate.max_inverse_depth <= hit.inverse_depth) break;  // so are all that follow
+    if (candidate.max_inverse_depth <= hit.inverse_depth) break;  // all others are farther
     const Facet& f = facets_[static_cast<std::size_t>(candidate.facet)];
     const double inverse_depth = at(f.inverse_depth, ray);
     if (inverse_depth <= hit.inverse_depth) continue;
@@ -108,7 +108,7 @@ ViewHit SceneView::cast(const Eigen::Vector2d& ray) const {
   return hit;
 }
 
-SurfacePoint SceneView::placeOf(const ViewHit& hit, const Eigen::Vector2d& ray) const {
+SurfacePoint SceneView::surfacePointOf(const ViewHit& hit, const Eigen::Vector2d& ray) const {
   if (hit.surface < 0) return {};
   const Facet& f =
       facets_[static_cast<std::size_t>(facet_of_[static_cast<std::size_t>(hit.surface)])];
@@ -124,8 +124,8 @@ float SceneView::logIntensity(const ViewHit& hit, const Eigen::Vector2d& ray,
   const double depth = 1 / hit.inverse_depth;
   const double u = at(f.u_over_depth, ray) * depth;
   const double v = at(f.v_over_depth, ray) * depth;
-  // How far the place moves with the ray: the derivative of a quotient of linear functions. An
-  // oblique pixel is long in one direction; the blur is the root mean square of the two.
+  // The derivative of the surface point by the ray. An oblique pixel is long in one direction: the
+  // blur is the root mean square of both directions.
   const Eigen::Vector2d du = (f.u_over_depth - u * f.inverse_depth).head<2>() * depth;
   const Eigen::Vector2d dv = (f.v_over_depth - v * f.inverse_depth).head<2>() * depth;
   const double metres_per_ray = std::sqrt(0.5 * (du.squaredNorm() + dv.squaredNorm()));

@@ -9,24 +9,24 @@
 
 namespace efm {
 
-/// The viewing rays (X/Z, Y/Z) that will be cast, frame `cam`.
+/// Bounds of the viewing rays (X/Z, Y/Z), frame `cam`.
 struct RayBounds {
   Eigen::Vector2d min = {-1, -1};
   Eigen::Vector2d max = {1, 1};
 };
 
-/// What a camera ray met: the surface and its inverse z-depth (1/m), -1 and 0 where nothing.
+/// The surface that a camera ray hits, and its inverse z-depth (1/m). -1 and 0 where there is none.
 struct ViewHit {
   int surface = -1;
   double inverse_depth = 0;
 };
 
-/// A scene as seen from one pose, for casting every pixel's ray.
+/// A scene seen from one pose, for casting the rays of all pixels.
 ///
-/// On a plane the inverse depth and the plane's coordinates over depth are linear in the ray
-/// (X/Z, Y/Z), so a rectangle is three linear functions and a hit needs no division. The rays
-/// within the bounds are sorted into tiles; a tile knows the surfaces that can be seen in it,
-/// nearest first. Rays beyond the bounds are slower, not wrong. Queries are thread-safe.
+/// On a plane, the inverse depth and the plane's coordinates over depth are linear in the ray
+/// (X/Z, Y/Z). So a rectangle is three linear functions, and a hit needs no division. The bounds
+/// are divided into tiles. A tile lists the surfaces that are visible in it, nearest first. Rays
+/// outside of the bounds are slower. Queries are thread-safe.
 class SceneView {
  public:
   /// @param scene outlives the view.
@@ -35,11 +35,11 @@ class SceneView {
   /// The first surface on the ray (X/Z, Y/Z).
   ViewHit cast(const Eigen::Vector2d& ray) const;
 
-  /// The place of a hit of this ray.
-  SurfacePoint placeOf(const ViewHit& hit, const Eigen::Vector2d& ray) const;
+  /// The surface point of a hit of this ray.
+  SurfacePoint surfacePointOf(const ViewHit& hit, const Eigen::Vector2d& ray) const;
 
-  /// Log intensity of a hit of this ray, blurred with a standard deviation of half a pixel;
-  /// 0 where nothing was met.
+  /// Log intensity of a hit of this ray, blurred with a standard deviation of half a pixel. 0 where
+  /// the ray hits nothing.
   /// @param pixel_pitch size of a pixel in units of the ray: about 1/f.
   float logIntensity(const ViewHit& hit, const Eigen::Vector2d& ray, double pixel_pitch) const;
 
@@ -64,9 +64,10 @@ class SceneView {
   const Scene* scene_;
   RayBounds bounds_;
   Eigen::Vector2d tiles_per_ray_;
-  std::vector<Facet> facets_;                  // those that face the camera
-  std::vector<int> facet_of_;                  // per surface; -1
-  std::vector<std::vector<Candidate>> tiles_;  // row-major; the last one serves all other rays
+  std::vector<Facet> facets_;  // the visible sides only
+  std::vector<int> facet_of_;  // per surface; -1
+  std::vector<std::vector<Candidate>>
+      tiles_;  // row-major; the last one is for rays outside of the bounds
 };
 
 }  // namespace efm

@@ -12,8 +12,8 @@
 namespace efm {
 namespace {
 
-/// The painting is made this much finer than its texels and averaged: where an edge falls within a
-/// texel shows in the texel's value.
+/// The canvas is finer than the texels by this factor. The average over a texel tells the position
+/// of an edge within it.
 constexpr int kOversampling = 4;
 
 using Polygon = std::vector<cv::Point2d>;
@@ -32,15 +32,15 @@ Polygon rotatedBlock(double width, double height, double offset, double angle) {
 
 Polygon convexPolygon(int corners, double radius, RandomNumbers& random) {
   Polygon polygon;
-  const double turn = random.uniform(0, 2 * kPi);
+  const double first_angle = random.uniform(0, 2 * kPi);
   for (int i = 0; i < corners; ++i) {
-    const double angle = turn + 2 * kPi * (i + random.uniform(-0.25, 0.25)) / corners;
+    const double angle = first_angle + 2 * kPi * (i + random.uniform(-0.25, 0.25)) / corners;
     polygon.emplace_back(radius * std::cos(angle), radius * std::sin(angle));
   }
   return polygon;
 }
 
-/// A shape around the origin: of one piece, or three parallel bars.
+/// A shape around the origin: one polygon or three parallel bars.
 std::vector<Polygon> drawShape(double size, RandomNumbers& random) {
   const double angle = random.uniform(0, kPi);
   switch (random.below(4)) {

@@ -12,7 +12,15 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Furnishes one wall, a piece after the other.
+/// The pose of an upright object on the ground. Its origin is in its middle.
+Rigid3 standingPose(const Vector3d& foot, double height_m, double yaw_deg = 0) {
+  Rigid3 T_ground_object;
+  T_ground_object.rotation = Eigen::AngleAxisd(yaw_deg * kPi / 180, Vector3d::UnitZ());
+  T_ground_object.translation = foot + Vector3d(0, 0, 0.5 * height_m);
+  return T_ground_object;
+}
+
+/// Furnishes one wall from left to right.
 class Furnisher {
  public:
   Furnisher(Scene& scene, const FurnishedWall& wall, Painting& painting, RandomNumbers& random)
@@ -44,16 +52,13 @@ class Furnisher {
 
  private:
   void addBox(const Vector3d& foot_wall, const Vector3d& size_m, double yaw_deg, double feature_m) {
-    Rigid3 T_wall_box;
-    T_wall_box.rotation = Eigen::AngleAxisd(yaw_deg * kPi / 180, Vector3d::UnitZ());
-    T_wall_box.translation = foot_wall + Vector3d(0, 0, 0.5 * size_m.z());
+    const Rigid3 T_wall_box = standingPose(foot_wall, size_m.z(), yaw_deg);
     scene_.addBox(wall_.T_world_wall * T_wall_box, size_m,
                   painting_.clutter(wall_.nearest_m, feature_m));
   }
 
   void addPole(const Vector3d& foot_wall, double radius_m, double length_m) {
-    Rigid3 T_wall_pole;
-    T_wall_pole.translation = foot_wall + Vector3d(0, 0, 0.5 * length_m);
+    const Rigid3 T_wall_pole = standingPose(foot_wall, length_m);
     const auto tone = static_cast<float>(random_.uniform(0.4, 0.9));
     scene_.addPole({wall_.T_world_wall * T_wall_pole, radius_m, length_m},
                    painting_.rings(wall_.nearest_m, 0.12, tone, 0.6F));
@@ -75,7 +80,7 @@ class Furnisher {
       }
     }
     addBox({x, y, height}, {width_m, depth, 0.04}, 0, 0.16);
-    addThings({x, y, height + 0.04}, width_m);
+    addObjects({x, y, height + 0.04}, width_m);
     addPicture(x, 0.7 * width_m);
   }
 
@@ -84,12 +89,12 @@ class Furnisher {
     const double height = random_.uniform(0.45, 1.0);
     const double y = 0.5 * wall_.depth_m;
     addBox({x, y, 0}, {width_m, depth, height}, 0, 0.18);
-    addThings({x, y, height}, width_m);
+    addObjects({x, y, height}, width_m);
     addPicture(x, 0.7 * width_m);
   }
 
-  /// Small boxes side by side.
-  void addThings(const Vector3d& middle, double width_m) {
+  /// Adds a row of small boxes.
+  void addObjects(const Vector3d& middle, double width_m) {
     const int count = 2 + random_.below(2);
     for (int i = 0; i < count; ++i) {
       const double x = ((i + 0.5) / count - 0.5) * width_m;
@@ -123,17 +128,12 @@ class Furnisher {
 
 void addStandingBox(Scene& scene, const Vector3d& foot, const Vector3d& size_m, double yaw_deg,
                     const Scene::Painter& paint) {
-  Rigid3 T_world_box;
-  T_world_box.rotation = Eigen::AngleAxisd(yaw_deg * kPi / 180, Vector3d::UnitZ());
-  T_world_box.translation = foot + Vector3d(0, 0, 0.5 * size_m.z());
-  scene.addBox(T_world_box, size_m, paint);
+  scene.addBox(standingPose(foot, size_m.z(), yaw_deg), size_m, paint);
 }
 
 void addStandingPole(Scene& scene, const Vector3d& foot, double radius_m, double length_m,
                      const Scene::Painter& paint) {
-  Rigid3 T_world_pole;
-  T_world_pole.translation = foot + Vector3d(0, 0, 0.5 * length_m);
-  scene.addPole({T_world_pole, radius_m, length_m}, paint);
+  scene.addPole({standingPose(foot, length_m), radius_m, length_m}, paint);
 }
 
 void addPanels(Scene& scene, const Rectangle& rectangle, double max_side_m,

@@ -9,31 +9,31 @@
 
 namespace efm {
 
-/// What rooms and streets are put together from. Frame `world`: z up.
+/// Parts of rooms and streets. Frame `world`: z up.
 
-/// A box that stands on a ground, turned around the vertical.
+/// Adds a box on the ground, rotated about the vertical.
 void addStandingBox(Scene& scene, const Eigen::Vector3d& foot, const Eigen::Vector3d& size_m,
                     double yaw_deg, const Scene::Painter& paint);
 
-/// A pole that stands on a ground, upright.
+/// Adds an upright pole on the ground.
 void addStandingPole(Scene& scene, const Eigen::Vector3d& foot, double radius_m, double length_m,
                      const Scene::Painter& paint);
 
-/// A rectangle in equal parts of at most `max_side_m`, each painted on its own: as panels or
-/// posters, and so that no single painting grows beyond memory.
+/// Adds a rectangle in equal panels with sides of at most `max_side_m`. Each panel has its own
+/// painting, which limits the memory of a painting.
 void addPanels(Scene& scene, const Rectangle& rectangle, double max_side_m,
                const Scene::Painter& paint);
 
-/// A wall of a room with room for furniture before it: x along the wall, y into the room, z up.
+/// A wall of a room with space for furniture before it: x along the wall, y into the room, z up.
 struct FurnishedWall {
-  Rigid3 T_world_wall;  ///< Origin: on the floor, at the end of the wall that is left from inside.
+  Rigid3 T_world_wall;  ///< Origin: on the floor, at the left end of the wall, seen from inside.
   double length_m = 5;
   double height_m = 2.6;
-  double depth_m = 0.6;  ///< Nothing stands out farther into the room. At least 0.4.
-  double nearest_m = 1;  ///< The nearest that the furniture is seen from.
+  double depth_m = 0.6;  ///< Max depth of the furniture, at least 0.4.
+  double nearest_m = 1;  ///< The shortest distance of the furniture to a camera.
 };
 
-/// Cupboards, tables, shelves with things on them, lamps and pictures along a wall; at random.
+/// Adds random furniture along a wall: cupboards, tables, shelves with objects, lamps and pictures.
 void furnishWall(Scene& scene, const FurnishedWall& wall, Painting& painting,
                  RandomNumbers& random);
 

@@ -9,27 +9,27 @@ namespace efm {
 
 struct PaintingOptions {
   std::uint64_t seed = 0;
-  double focal_px = 226;   ///< Of the sharpest camera that will look: a pixel sees depth / focal.
+  double focal_px = 226;   ///< Longest focal length of the cameras: a pixel covers depth / focal.
   double coverage = 0.28;  ///< Of clutter: shapes per feature x feature.
-  /// No texel is smaller, metres: large surfaces stay affordable, at the price of softer edges
-  /// where they are seen from nearer than 2 x texel x focal.
+  /// Min size of a texel, metres. It limits the memory of large surfaces. Edges are softer where
+  /// the distance is below 2 x texel x focal.
   double min_texel_m = 0;
 };
 
-/// Paints a scene's surfaces one after the other, each its own way: the n-th surface painted looks
-/// the same for the same seed. The painters that it hands out must not outlive it.
+/// Paints the surfaces of a scene, each with its own seed: the n-th surface depends on n and the
+/// seed only. The painters that it returns must not outlive it.
 class Painting {
  public:
   explicit Painting(const PaintingOptions& options)
       : options_(options), seed_(options.seed * 1000) {}
 
-  /// Clutter, see there.
-  /// @param nearest_m the nearest that the surface is seen from: makes the texel.
-  /// @param feature_m size of the shapes on it.
+  /// Paints clutter (see clutter.h).
+  /// @param nearest_m the shortest distance to a camera. It sets the texel.
+  /// @param feature_m size of the shapes.
   Scene::Painter clutter(double nearest_m, double feature_m, double contrast = 0.9);
 
-  /// Rings around a pole: bands across its length, in two tones. All of its facets look the same.
-  /// @param tone log intensity of the first band; the second is darker by `contrast`.
+  /// Paints rings around a pole, in two tones. All facets are equal.
+  /// @param tone log intensity of the first ring; the second is darker by `contrast`.
   Scene::Painter rings(double nearest_m, double band_m, float tone, float contrast) const;
 
  private:

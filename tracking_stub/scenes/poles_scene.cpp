@@ -16,10 +16,7 @@ Scene makePoles(const PolesOptions& options) {
   requireOption(options.farthest_m > options.nearest_m, "farthest_m", options.farthest_m,
                 "above nearest_m");
   requireOption(options.wall_m > options.farthest_m, "wall_m", options.wall_m, "above farthest_m");
-  PaintingOptions painting_options;
-  painting_options.seed = options.seed;
-  painting_options.focal_px = options.focal_px;
-  Painting painting(painting_options);
+  Painting painting(PaintingOptions{options.seed, options.focal_px});
   RandomNumbers random(options.seed, 1);
   Scene scene;
   const double half_wall = 1.6 * options.half_view * options.wall_m + 0.5;
@@ -31,13 +28,14 @@ Scene makePoles(const PolesOptions& options) {
              2 * half_wall},
             1.5, painting.clutter(options.wall_m - 0.3, 0.1 * options.wall_m));
   for (int i = 0; i < options.poles; ++i) {
-    // Inverse depths evenly spread; to the side in turn, so that no two stand in one line of sight.
-    const double share = (i + random.uniform(0.2, 0.8)) / options.poles;
-    const double depth = 1 / ((1 - share) / options.nearest_m + share / options.farthest_m);
-    const double place = (i * 5 % options.poles + random.uniform(0.2, 0.8)) / options.poles;
+    // Even in inverse depth. Neighbours in depth are far apart to the side, so that no pole hides
+    // another.
+    const double fraction = (i + random.uniform(0.2, 0.8)) / options.poles;
+    const double depth = 1 / ((1 - fraction) / options.nearest_m + fraction / options.farthest_m);
+    const double side = (i * 5 % options.poles + random.uniform(0.2, 0.8)) / options.poles;
     Rigid3 T_world_pole;
-    T_world_pole.translation = {(2 * place - 1) * 0.9 * options.half_view * depth, depth, 0};
-    // In the plane of its depth: the pole leans to the side and keeps its distance.
+    T_world_pole.translation = {(2 * side - 1) * 0.9 * options.half_view * depth, depth, 0};
+    // The pole leans to the side: its depth is constant.
     T_world_pole.rotation = Eigen::AngleAxisd(random.uniform(-0.45, 0.45), Vector3d::UnitY());
     // 3 to 6 pixels wide.
     const double radius = random.uniform(1.5, 3) * depth / options.focal_px;

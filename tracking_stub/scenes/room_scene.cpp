@@ -15,18 +15,18 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kPanelM = 1.7;
+constexpr double kRoomPanelM = 1.7;
 
-/// The four walls, seen from inside: where each begins at its left end, and its length.
+/// One of the four walls. Its origin is at the left end, seen from inside.
 FurnishedWall wallOf(const RoomOptions& options, int side) {
   const bool along_x = side % 2 == 0;
   const double length = along_x ? options.size_m.x() : options.size_m.y();
   const double distance = 0.5 * (along_x ? options.size_m.y() : options.size_m.x());
-  // Wall 0 is at y = -width/2: x along it is the room's x, and y into the room the room's y.
-  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.5 * kPi * side, Vector3d::UnitZ()));
+  // Wall 0 is at y = -width/2. Its axes are the axes of the room.
+  const Eigen::Quaterniond R_world_wall(Eigen::AngleAxisd(0.5 * kPi * side, Vector3d::UnitZ()));
   FurnishedWall wall;
-  wall.T_world_wall.rotation = turn;
-  wall.T_world_wall.translation = turn * Vector3d(-0.5 * length, -distance, 0);
+  wall.T_world_wall.rotation = R_world_wall;
+  wall.T_world_wall.translation = R_world_wall * Vector3d(-0.5 * length, -distance, 0);
   wall.length_m = length;
   wall.height_m = options.size_m.z();
   wall.depth_m = options.furniture_depth_m;
@@ -38,10 +38,10 @@ void addFloorAndCeiling(Scene& scene, const RoomOptions& options, Painting& pain
   const Vector3d x = Vector3d::UnitX();
   const Vector3d y = Vector3d::UnitY();
   const Vector3d half = 0.5 * options.size_m;
-  addPanels(scene, {{-half.x(), -half.y(), 0}, x, y, 2 * half.x(), 2 * half.y()}, kPanelM,
+  addPanels(scene, {{-half.x(), -half.y(), 0}, x, y, 2 * half.x(), 2 * half.y()}, kRoomPanelM,
             painting.clutter(options.nearest_m, 0.24));
   addPanels(scene, {{-half.x(), -half.y(), 2 * half.z()}, y, x, 2 * half.y(), 2 * half.x()},
-            kPanelM, painting.clutter(options.nearest_m, 0.36));
+            kRoomPanelM, painting.clutter(options.nearest_m, 0.36));
 }
 
 }  // namespace
@@ -49,21 +49,19 @@ void addFloorAndCeiling(Scene& scene, const RoomOptions& options, Painting& pain
 Scene makeRoom(const RoomOptions& options) {
   requireOption(options.size_m.x() >= 3 && options.size_m.y() >= 3 && options.size_m.z() >= 2,
                 "room", options.size_m.transpose(), "at least 3 x 3 x 2 m");
-  PaintingOptions painting_options;
-  painting_options.seed = options.seed;
-  painting_options.focal_px = options.focal_px;
-  Painting painting(painting_options);
+  Painting painting(PaintingOptions{options.seed, options.focal_px});
   RandomNumbers random(options.seed, 1);
   Scene scene;
   addFloorAndCeiling(scene, options, painting);
   for (int side = 0; side < 4; ++side) {
     const FurnishedWall wall = wallOf(options, side);
     const Eigen::Quaterniond& R_world_wall = wall.T_world_wall.rotation;
-    // z x x is the wall's y: into the room.
+    // The normal z x x is the wall's y: into the room.
     addPanels(scene,
               {wall.T_world_wall.translation, R_world_wall * Vector3d::UnitZ(),
                R_world_wall * Vector3d::UnitX(), wall.height_m, wall.length_m},
-              kPanelM, painting.clutter(options.nearest_m + 0.5 * options.furniture_depth_m, 0.32));
+              kRoomPanelM,
+              painting.clutter(options.nearest_m + 0.5 * options.furniture_depth_m, 0.32));
     furnishWall(scene, wall, painting, random);
   }
   return scene;

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <optional>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
@@ -12,7 +11,7 @@
 namespace efm {
 
 /// A flat rectangle: the points corner + u axis_u + v axis_v, 0 <= u <= width, 0 <= v <= height,
-/// frame `world`, metres. Seen only from the side that its normal, axis_u x axis_v, points to.
+/// frame `world`, metres. Visible only from the side of its normal, axis_u x axis_v.
 ///
 /// Invariant: the axes are orthogonal and of unit length.
 struct Rectangle {
@@ -28,24 +27,17 @@ struct Rectangle {
   }
 };
 
-/// A place on one of a scene's surfaces.
+/// A point on a surface of a scene.
 struct SurfacePoint {
-  int surface = -1;  ///< Index; -1 where a ray met nothing.
+  int surface = -1;  ///< Index; -1 where a ray hits nothing.
   float u_m = 0;
   float v_m = 0;
 };
 
-/// Where a ray first met a surface.
-struct RayHit {
-  double distance_m = 0;  ///< Along the ray.
-  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();
-  SurfacePoint place;
-};
-
-/// An upright prism that stands for a thin pole, a lamp post or the leg of a table.
+/// A prism: a thin pole, a lamp post or the leg of a table.
 struct Pole {
-  Rigid3 T_world_pole;     ///< Frame `pole`: origin in its middle, z along it.
-  double radius_m = 0.02;  ///< Of the corners, above 0.
+  Rigid3 T_world_pole;     ///< Frame `pole`: origin in the middle, z along the pole.
+  double radius_m = 0.02;  ///< Distance of the corners from the axis, above 0.
   double length_m = 1;
   int facets = 8;  ///< Even, at least 4.
 };
@@ -53,21 +45,20 @@ struct Pole {
 /// Textured rectangles in the world.
 class Scene {
  public:
-  /// Paints a surface of a size (width, height in metres).
+  /// Makes the texture of a surface.
   using Painter = std::function<Texture(double width_m, double height_m)>;
 
   /// @return the index of the surface.
   int addRectangle(const Rectangle& rectangle, const Painter& paint);
-  /// Six rectangles, seen from outside; frame `box` has its origin at the centre of the box.
+  /// Adds six rectangles, visible from outside. The origin of frame `box` is the centre of the box.
   void addBox(const Rigid3& T_world_box, const Eigen::Vector3d& size_m, const Painter& paint);
 
-  /// As many rectangles as it has facets, with u around the pole and v along it, and at both ends
-  /// half as many that overlap: rectangles between opposite facets, which together are the regular
-  /// polygon. Each is painted, so paint alike what lies in one place.
+  /// Adds a rectangle per facet, with u around the pole and v along it. Each end is the union of
+  /// rectangles between opposite facets. They overlap, so `paint` must paint them all equally.
   /// @throws std::invalid_argument where the pole is not valid.
   void addPole(const Pole& pole, const Painter& paint);
 
-  /// Moves all there is: what was at p is at T_world_old * p.
+  /// Moves all surfaces: a point at p goes to T_world_old * p.
   void move(const Rigid3& T_world_old);
 
   int size() const { return static_cast<int>(rectangles_.size()); }
@@ -75,14 +66,9 @@ class Scene {
     return rectangles_[static_cast<std::size_t>(surface)];
   }
   const Texture& texture(int surface) const { return textures_[static_cast<std::size_t>(surface)]; }
-  Eigen::Vector3d pointAt(const SurfacePoint& place) const {
-    return rectangle(place.surface).pointAt(place.u_m, place.v_m);
+  Eigen::Vector3d pointAt(const SurfacePoint& point) const {
+    return rectangle(point.surface).pointAt(point.u_m, point.v_m);
   }
-
-  /// The first surface that a ray from `origin` meets. The plain specification of what SceneView
-  /// finds faster.
-  /// @param direction frame `world`, any length above 0.
-  std::optional<RayHit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
  private:
   std::vector<Rectangle> rectangles_;

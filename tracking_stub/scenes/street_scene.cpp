@@ -18,13 +18,13 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kBehindM = 6;  // the street begins so far before the path
-constexpr double kPanelM = 5;
-constexpr double kClearanceM = 3;  // from the path to anything beside it
+constexpr double kBehindM = 6;  // from the start of the street to the path
+constexpr double kStreetPanelM = 5;
+constexpr double kClearanceM = 3;  // from the path to the nearest object
 constexpr double kFacadeM = 7;     // from the middle of the road to the houses
 constexpr double kNearestM = 4;
 
-/// The path, extended straight at both ends, by the length along it.
+/// The path with straight extensions at both ends. Positions are lengths along it.
 class MiddleLine {
  public:
   explicit MiddleLine(const StreetOptions& options) {
@@ -35,13 +35,15 @@ class MiddleLine {
                   "of at least two points a quarter of a metre apart");
     path_points_ = points_;
     const std::size_t last = points_.size() - 1;
-    const std::size_t before = last > 8 ? last - 8 : 0;  // what the last steps head for
+    const std::size_t before = last > 8 ? last - 8 : 0;  // for the direction of the last steps
     const Vector2d first_step = (points_[std::min<std::size_t>(8, last)] - points_[0]).normalized();
     const Vector2d last_step = (points_[last] - points_[before]).normalized();
-    double driven = 0;
-    for (std::size_t i = 1; i < points_.size(); ++i) driven += (points_[i] - points_[i - 1]).norm();
+    double path_length = 0;
+    for (std::size_t i = 1; i < points_.size(); ++i)
+      path_length += (points_[i] - points_[i - 1]).norm();
     points_.push_back(points_.back() +
-                      std::max(options.ahead_m, options.reach_m - driven) * last_step);
+                      std::max(options.min_ahead_m, options.min_length_m - path_length) *
+                          last_step);
     points_.insert(points_.begin(), points_.front() - kBehindM * first_step);
     for (std::size_t i = 1; i < points_.size(); ++i) {
       length_ += (points_[i] - points_[i - 1]).norm();
@@ -51,15 +53,15 @@ class MiddleLine {
   double length() const { return length_; }
   const std::vector<Vector2d>& points() const { return points_; }
 
-  struct Place {
+  struct Station {
     Vector2d point;
     Vector2d ahead;  // of unit length
-    Vector2d beside(double left_m) const {
+    Vector2d leftBy(double left_m) const {
       return point + left_m * Vector2d(-ahead.y(), ahead.x());
     }
     double yawDegrees() const { return std::atan2(ahead.y(), ahead.x()) * 180 / kPi; }
   };
-  Place at(double s_m) const {
+  Station at(double s_m) const {
     for (std::size_t i = 1; i < points_.size(); ++i) {
       const Vector2d step = points_[i] - points_[i - 1];
       if (s_m <= step.norm() || i + 1 == points_.size()) {
@@ -70,11 +72,12 @@ class MiddleLine {
     return {points_.front(), Vector2d::UnitX()};
   }
 
-  /// From where something drives; the extensions do not count.
+  /// The distance to the path without its extensions.
   double distanceToPath(const Vector2d& point) const {
     double nearest = (point - path_points_.front()).norm();
-    for (const Vector2d& driven : path_points_)
-      nearest = std::min(nearest, (point - driven).norm());
+    for (const Vector2d& path_point : path_points_) {
+      nearest = std::min(nearest, (point - path_point).norm());
+    }
     return nearest;
   }
 
@@ -117,32 +120,33 @@ class StreetBuilder {
     addPanels(
         scene_,
         {{corner.x(), corner.y(), 0}, Vector3d::UnitX(), Vector3d::UnitY(), size.x(), size.y()},
-        kPanelM, painting_.clutter(kNearestM, 0.9, 0.7));
+        kStreetPanelM, painting_.clutter(kNearestM, 0.9, 0.7));
   }
 
   bool isFree(const Vector2d& middle, double radius_m) const {
     return line_.distanceToPath(middle) > radius_m + kClearanceM;
   }
 
-  /// Three sides and no roof: the rest is never seen.
-  void addHouse(const MiddleLine::Place& place, double left_m, const Vector3d& size_m) {
-    const double turn = left_m == 0 ? 0 : (left_m > 0 ? 1 : -1);
-    const Vector2d across(-place.ahead.y(), place.ahead.x());
-    // Into the house, and along its front so that (along, up, front) turns outwards.
-    const Vector2d inwards = left_m == 0 ? place.ahead : Vector2d(turn * across);
+  /// Three sides without a roof: the others are never visible.
+  void addHouse(const MiddleLine::Station& station, double left_m, const Vector3d& size_m) {
+    const double side = left_m == 0 ? 0 : (left_m > 0 ? 1 : -1);
+    const Vector2d across(-station.ahead.y(), station.ahead.x());
+    // `along` x up is `front`: the normal points out of the house.
+    const Vector2d inwards = left_m == 0 ? station.ahead : Vector2d(side * across);
     const Vector3d front(-inwards.x(), -inwards.y(), 0);
     const Vector3d along = Vector3d::UnitZ().cross(front);
-    const Vector2d middle = place.beside(left_m);
+    const Vector2d middle = station.leftBy(left_m);
     const Vector3d foot(middle.x(), middle.y(), 0);
     const Vector3d left_end = foot - 0.5 * size_m.y() * along;
     const Vector3d right_end = foot + 0.5 * size_m.y() * along;
     const Scene::Painter paint = painting_.clutter(kFacadeM, 1.0);
-    addPanels(scene_, {left_end, along, Vector3d::UnitZ(), size_m.y(), size_m.z()}, kPanelM, paint);
+    addPanels(scene_, {left_end, along, Vector3d::UnitZ(), size_m.y(), size_m.z()}, kStreetPanelM,
+              paint);
     addPanels(scene_,
               {left_end - size_m.x() * front, front, Vector3d::UnitZ(), size_m.x(), size_m.z()},
-              2 * kPanelM, paint);
-    addPanels(scene_, {right_end, -front, Vector3d::UnitZ(), size_m.x(), size_m.z()}, 2 * kPanelM,
-              paint);
+              2 * kStreetPanelM, paint);
+    addPanels(scene_, {right_end, -front, Vector3d::UnitZ(), size_m.x(), size_m.z()},
+              2 * kStreetPanelM, paint);
   }
 
   void addHouses(double side) {
@@ -150,10 +154,10 @@ class StreetBuilder {
     while (s < line_.length()) {
       const double width = random_.uniform(6, 10);
       const double set_back = random_.uniform(0, 1.5);
-      const MiddleLine::Place place = line_.at(s + 0.5 * width);
+      const MiddleLine::Station station = line_.at(s + 0.5 * width);
       const double left = side * (kFacadeM + set_back);
-      if (isFree(place.beside(left + side * 2.5), 2.5)) {
-        addHouse(place, left, {5, width, random_.uniform(5, 11)});
+      if (isFree(station.leftBy(left + side * 2.5), 2.5)) {
+        addHouse(station, left, {5, width, random_.uniform(5, 11)});
       }
       s += width + random_.uniform(0, 1.2);
     }
@@ -162,50 +166,50 @@ class StreetBuilder {
   void addRoadside(double side) {
     double s = random_.uniform(0, 4);
     while (s < line_.length() - 3) {
-      const MiddleLine::Place place = line_.at(s);
+      const MiddleLine::Station station = line_.at(s);
       switch (random_.below(3)) {
         case 0:
-          addLampPost(place, side);
+          addLampPost(station, side);
           s += random_.uniform(2, 4);
           break;
         case 1:
-          addCar(place, side);
+          addCar(station, side);
           s += random_.uniform(5, 7);
           break;
         default:
-          addBin(place, side);
+          addBin(station, side);
           s += random_.uniform(1.5, 3);
       }
     }
   }
 
-  void addLampPost(const MiddleLine::Place& place, double side) {
-    const Vector2d at = place.beside(side * random_.uniform(3.6, 4.2));
+  void addLampPost(const MiddleLine::Station& station, double side) {
+    const Vector2d at = station.leftBy(side * random_.uniform(3.6, 4.2));
     const double length = random_.uniform(3.5, 5.5);
     const auto tone = static_cast<float>(random_.uniform(-0.9, 0.9));
     if (!isFree(at, 0.1)) return;
     addStandingPole(scene_, {at.x(), at.y(), 0}, random_.uniform(0.06, 0.1), length,
                     painting_.rings(kNearestM, 0.5, tone, tone > 0 ? 0.6F : -0.6F));
-    addStandingBox(scene_, {at.x(), at.y(), length}, {0.7, 0.4, 0.5}, place.yawDegrees(),
+    addStandingBox(scene_, {at.x(), at.y(), length}, {0.7, 0.4, 0.5}, station.yawDegrees(),
                    painting_.clutter(kNearestM, 0.3));
   }
 
-  void addCar(const MiddleLine::Place& place, double side) {
-    const Vector2d at = place.beside(side * 5);
+  void addCar(const MiddleLine::Station& station, double side) {
+    const Vector2d at = station.leftBy(side * 5);
     if (!isFree(at, 1.0)) return;
-    const double yaw = place.yawDegrees();
+    const double yaw = station.yawDegrees();
     addStandingBox(scene_, {at.x(), at.y(), 0.25}, {4.2, 1.7, 0.65}, yaw,
                    painting_.clutter(kNearestM, 0.5));
     addStandingBox(scene_, {at.x(), at.y(), 0.9}, {2.3, 1.5, 0.55}, yaw,
                    painting_.clutter(kNearestM, 0.5));
   }
 
-  void addBin(const MiddleLine::Place& place, double side) {
-    const Vector2d at = place.beside(side * random_.uniform(4, 5.5));
+  void addBin(const MiddleLine::Station& station, double side) {
+    const Vector2d at = station.leftBy(side * random_.uniform(4, 5.5));
     if (!isFree(at, 0.6)) return;
     const double width = random_.uniform(0.6, 1.1);
     addStandingBox(scene_, {at.x(), at.y(), 0}, {width, 0.8 * width, random_.uniform(0.8, 1.5)},
-                   place.yawDegrees() + random_.uniform(-20, 20),
+                   station.yawDegrees() + random_.uniform(-20, 20),
                    painting_.clutter(kNearestM, 0.35));
   }
 

@@ -10,18 +10,19 @@
 namespace efm {
 
 struct StreetOptions {
-  /// Where the vehicle drives: points in order, at least two that differ, metres apart or less.
+  /// The path of the vehicle: points in order, at least two different ones, at most metres apart.
   /// Frame `world`: z up, the road is at z = 0.
   std::vector<Eigen::Vector2d> path;
-  double reach_m = 50;    ///< The street is closed by a house so far from the path's beginning,
-  double ahead_m = 25;    ///< but at least so far from its end.
-  double focal_px = 550;  ///< Of the sharpest camera that will look.
+  double min_length_m =
+      50;  ///< Min length from the first point of the path to the house at the end.
+  double min_ahead_m = 25;  ///< Min length from the last point of the path to that house.
+  double focal_px = 550;    ///< Longest focal length of the cameras.
   std::uint64_t seed = 0;
 };
 
-/// A street along a path: a road with markings and patches, houses at both sides, a house across
-/// its end, and at the roadside lamp posts, parked cars and bins, other ones for every seed.
-/// Nothing stands within 3 m of the path. Above the houses is nothing: the sky.
+/// A street along a path: a painted road, houses at both sides, a house across its end, and random
+/// lamp posts, parked cars and bins at the roadside. Nothing is within 3 m of the path. There are
+/// no surfaces above the houses: the sky.
 Scene makeStreet(const StreetOptions& options);
 
 }  // namespace efm

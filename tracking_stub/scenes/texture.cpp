@@ -17,11 +17,11 @@ Texture::Texture(const cv::Mat1f& log_intensity, double texel_m) {
   cv::GaussianBlur(log_intensity, image, {}, 1.0, 1.0, cv::BORDER_REPLICATE);
   levels_.push_back({image, static_cast<float>(1.0 / texel_m)});
   while (std::min(image.cols, image.rows) > 3) {
-    // The next level's texel, and blur, is twice as wide: a variance of 4 texels of this level, of
-    // which 1 is there and 1/4 comes from averaging 2x2 texels.
+    // The next level's texel and blur are twice as wide: a variance of 4 in texels of this level.
+    // This level has 1 of it, and averaging 2x2 texels adds 1/4.
     cv::Mat1f blurred;
     cv::GaussianBlur(image, blurred, {}, std::sqrt(2.75), std::sqrt(2.75), cv::BORDER_REPLICATE);
-    // An odd last row or column goes into a texel of its own, so that texels stay aligned.
+    // An odd last row or column gets its own texel, so that texels stay aligned.
     cv::copyMakeBorder(blurred, blurred, 0, blurred.rows % 2, 0, blurred.cols % 2,
                        cv::BORDER_REPLICATE);
     cv::Mat1f next;
@@ -32,8 +32,8 @@ Texture::Texture(const cv::Mat1f& log_intensity, double texel_m) {
 }
 
 float Texture::sample(double u_m, double v_m, double sigma_m) const {
-  // log2 of the blur in texels: exponent and mantissa are its piecewise linear approximation, which
-  // is continuous, and exact at the levels.
+  // Exponent and mantissa approximate log2 of the blur in texels: piecewise linear, continuous, and
+  // exact at the levels.
   int exponent = 0;
   const double mantissa = std::frexp(sigma_m * levels_.front().texels_per_m, &exponent);
   const int fine = exponent - 1;

@@ -6,17 +6,16 @@
 
 namespace efm {
 
-/// Log intensity painted on a plane, sampled without aliasing: a pyramid of the painting under ever
-/// wider Gaussian blurs, in which a sample interpolates trilinearly. The blur stands for lens and
-/// pixel; it acts on log intensity, so that an edge keeps its place whatever lies on its two sides.
+/// Log intensity painted on a plane, sampled without aliasing: a pyramid of Gaussian blurs with
+/// trilinear interpolation. The blur models lens and pixel. It acts on log intensity: the position
+/// of an edge does not depend on the intensities of its two sides.
 class Texture {
  public:
   /// @param log_intensity the painting; texel (i, j) covers [i, i+1) x [j, j+1) times `texel_m`.
   Texture(const cv::Mat1f& log_intensity, double texel_m);
 
-  /// Log intensity at (u, v) metres from the painting's corner, blurred with a Gaussian of standard
-  /// deviation `sigma_m` (at least that of the finest level, one texel). Beyond the painting its
-  /// border goes on.
+  /// Log intensity at (u, v) metres from the painting's corner, under a Gaussian blur of standard
+  /// deviation `sigma_m` (at least one texel). The border is repeated outside of the painting.
   float sample(double u_m, double v_m, double sigma_m) const;
 
  private:

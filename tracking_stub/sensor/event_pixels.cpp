@@ -12,10 +12,9 @@
 namespace efm {
 namespace {
 
-constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
-
 std::int64_t roundToMicroseconds(std::int64_t base_ns, double offset_ns) {
-  // Only the part below a microsecond goes through a double.
+  // Only the part below a microsecond is a double.
+  constexpr std::int64_t kNanosecondsPerMicrosecond = 1000;
   const std::int64_t whole = base_ns / kNanosecondsPerMicrosecond;
   const auto rest_ns = static_cast<double>(base_ns - whole * kNanosecondsPerMicrosecond);
   return (whole + std::llround((rest_ns + offset_ns) / kNanosecondsPerMicrosecond)) *
@@ -41,14 +40,13 @@ EventPixels::EventPixels(int width, int height, const EventPixelOptions& options
       refractory_ns_(options.refractory_ns),
       last_(height, width, 0.0F) {
   constexpr std::uint64_t kMismatchStream = 1;
-  constexpr double kSmallestFactor = 0.2;
+  constexpr double kMinFactor = 0.2;
   options.validate();
   if (options.mismatch > 0) {
     factor_.create(height, width);
     RandomNumbers random(seed, kMismatchStream);
     for (float& factor : factor_) {
-      factor =
-          static_cast<float>(std::max(kSmallestFactor, 1 + options.mismatch * random.normal()));
+      factor = static_cast<float>(std::max(kMinFactor, 1 + options.mismatch * random.normal()));
     }
   }
   if (refractory_ns_ > 0) blind_until_.assign(last_.total(), -kEndOfTimeNs);
@@ -61,9 +59,9 @@ void EventPixels::start(const cv::Mat1f& log_intensity, std::uint64_t seed) {
   RandomNumbers random(seed);
   for (int y = 0; y < last_.rows; ++y) {
     for (int x = 0; x < last_.cols; ++x) {
-      const auto share = static_cast<float>(random.uniform(-1, 1));
-      // What lies below the pixel's memory waits for the threshold to get brighter.
-      last_(y, x) += thresholdAt(y, x, share < 0) * share;
+      const auto offset = static_cast<float>(random.uniform(-1, 1));
+      // A memory below the current intensity is within the threshold of an on event.
+      last_(y, x) += thresholdAt(y, x, offset < 0) * offset;
     }
   }
 }
@@ -79,8 +77,9 @@ void EventPixels::fireRow(int y, const FrameStep& step, const cv::Mat1f& before,
                            : blind_until_.data() + static_cast<std::ptrdiff_t>(y) * last_.cols;
   for (int x = 0; x < last_.cols; ++x) {
     const double change = static_cast<double>(to[x]) - from[x];
-    double earliest = 0;  // share of the step from which on the pixel sees
-    // A pixel that was blind starts from what it sees then. False where that is not in this step.
+    double earliest = 0;  // the pixel sees from this fraction of the step
+    // Whether the pixel sees within this step. After a blind time its memory is the current
+    // intensity.
     const auto sees = [&] {
       if (blind_until == nullptr || blind_until[x] <= step.t0_ns) return true;
       if (blind_until[x] >= step.t1_ns) return false;
@@ -97,9 +96,9 @@ void EventPixels::fireRow(int y, const FrameStep& step, const cv::Mat1f& before,
       const float threshold = thresholdAt(y, x, brighter);
       if (!(std::abs(to[x] - last[x]) >= threshold)) break;
       last[x] += brighter ? threshold : -threshold;
-      // A pixel that started just a threshold away fires at once, also where nothing changes.
+      // A pixel whose memory starts a threshold away fires at once, also without a change.
       const double fraction = change == 0 ? 0.0 : (static_cast<double>(last[x]) - from[x]) / change;
-      // A start within rounding of a threshold may lie a hair outside of the step.
+      // By rounding, such a pixel may cross the threshold slightly outside of the step.
       const double offset_ns = std::clamp(fraction, earliest, 1.0) * duration_ns;
       const std::int64_t t_ns = roundToMicroseconds(step.t0_ns, offset_ns);
       events.push_back(

@@ -20,9 +20,9 @@
 namespace efm {
 namespace {
 
-/// The frame rate is chosen anew for each of these stretches of time.
-constexpr std::int64_t kStretchNs = 10'000'000;
-/// Pixels between the rays that the speed of the image is measured on.
+/// The frame rate is set for each interval of this length.
+constexpr std::int64_t kIntervalNs = 10'000'000;
+/// Pixels between the rays that measure the speed of the image.
 constexpr int kSpeedGridPx = 12;
 
 struct AttributedEvent {
@@ -43,7 +43,7 @@ void validate(const Simulation& simulation) {
   }
 }
 
-/// One camera of the rig on its way through the scene.
+/// Records one camera of the rig.
 class CameraRun {
  public:
   CameraRun(const Simulation& simulation, std::size_t camera)
@@ -62,15 +62,15 @@ class CameraRun {
     renderer_.render(viewAt(t_ns), before_);
     pixels_.start(before_.log_intensity, seed_);
     while (t_ns < simulation_.endNs()) {
-      const std::int64_t stretch_ns = std::min(kStretchNs, simulation_.endNs() - t_ns);
-      const double motion_px =
-          std::max(imageSpeed(t_ns), imageSpeed(t_ns + stretch_ns)) * secondsBetween(0, stretch_ns);
+      const std::int64_t interval_ns = std::min(kIntervalNs, simulation_.endNs() - t_ns);
+      const double motion_px = std::max(imageSpeed(t_ns), imageSpeed(t_ns + interval_ns)) *
+                               secondsBetween(0, interval_ns);
       const auto steps =
           static_cast<std::int64_t>(std::max(1.0, std::ceil(motion_px / simulation_.max_step_px)));
       for (std::int64_t i = 0; i < steps; ++i) {
-        advance({t_ns + stretch_ns * i / steps, t_ns + stretch_ns * (i + 1) / steps});
+        advance({t_ns + interval_ns * i / steps, t_ns + interval_ns * (i + 1) / steps});
       }
-      t_ns += stretch_ns;
+      t_ns += interval_ns;
       progress(secondsBetween(simulation_.start_ns, t_ns) /
                secondsBetween(0, simulation_.duration_ns));
     }
@@ -85,13 +85,13 @@ class CameraRun {
     return simulation_.motion->poseAt(t_ns) * camera_.T_rig_cam;
   }
 
-  /// The fastest motion in the undistorted image, pixels per second.
+  /// The max speed in the undistorted image, pixels per second.
   double imageSpeed(std::int64_t t_ns) const {
-    constexpr std::int64_t kApartNs = 500'000;
+    constexpr std::int64_t kStepNs = 500'000;
     const Rigid3 T_world_cam = poseAt(t_ns);
-    const Rigid3 T_later_world = poseAt(t_ns + kApartNs).inverse();
+    const Rigid3 T_later_world = poseAt(t_ns + kStepNs).inverse();
     const SceneView view = renderer_.viewFrom(simulation_.scene, T_world_cam);
-    double fastest_px = 0;
+    double max_px = 0;
     for (int y = 0; y < camera_.model.height; y += kSpeedGridPx) {
       for (int x = 0; x < camera_.model.width; x += kSpeedGridPx) {
         const PixelRay& pixel = renderer_.rays()(x, y);
@@ -99,10 +99,10 @@ class CameraRun {
         if (hit.surface < 0) continue;
         const Eigen::Vector3d p_cam = pixel.ray.homogeneous() / hit.inverse_depth;
         const Eigen::Vector3d p_later = T_later_world * (T_world_cam * p_cam);
-        fastest_px = std::max(fastest_px, (p_later.hnormalized() - pixel.ray).norm() / pixel.pitch);
+        max_px = std::max(max_px, (p_later.hnormalized() - pixel.ray).norm() / pixel.pitch);
       }
     }
-    return fastest_px / secondsBetween(0, kApartNs);
+    return max_px / secondsBetween(0, kStepNs);
   }
 
   void advance(const FrameStep& step) {
@@ -166,7 +166,7 @@ std::vector<CameraRecording> simulateEvents(const Simulation& simulation,
   validate(simulation);
   const int threads = run.threads.value_or(tbb::this_task_arena::max_concurrency());
   requireOption(threads >= 1 && threads <= 1024, "threads", threads, "1 to 1024");
-  // More threads than oneTBB would give make it print a warning.
+  // oneTBB prints a warning when more threads than available are requested.
   const auto available = static_cast<int>(
       tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
   tbb::task_arena arena(std::min(threads, std::max(available, 1)));
@@ -174,9 +174,9 @@ std::vector<CameraRecording> simulateEvents(const Simulation& simulation,
   std::vector<CameraRecording> recordings;
   arena.execute([&] {
     for (std::size_t camera = 0; camera < cameras; ++camera) {
-      recordings.push_back(CameraRun(simulation, camera).record([&](double share) {
+      recordings.push_back(CameraRun(simulation, camera).record([&](double fraction) {
         if (run.progress) {
-          run.progress((static_cast<double>(camera) + share) / static_cast<double>(cameras));
+          run.progress((static_cast<double>(camera) + fraction) / static_cast<double>(cameras));
         }
       }));
     }

@@ -17,46 +17,46 @@
 
 namespace efm {
 
-/// Everything that a simulated recording follows from.
+/// All inputs of a simulated recording.
 struct Simulation {
   Scene scene;
-  Rig rig;  ///< Synchronised: time offsets are 0. The dataset folder wants camera 0 for its frame.
+  Rig rig;  ///< Time offsets are 0. In a dataset folder the rig's frame is camera 0.
   std::shared_ptr<const Motion> motion;
-  std::int64_t start_ns = 0;     ///< Of the recording, in its own clock.
+  std::int64_t start_ns = 0;     ///< In the clock of the recording.
   std::int64_t duration_ns = 0;  ///< Above 0.
   EventPixelOptions pixels;
   EventNoiseOptions noise;
-  /// Largest motion in the image from one frame to the next, in pixels, above 0. Within it log
-  /// intensity is taken to change linearly: under a blur of half a pixel that misplaces an edge by
-  /// 0.02 pixels at most.
+  /// Max motion in the image between two frames, in pixels, above 0. Between frames log intensity
+  /// changes linearly: with a blur of half a pixel, the default misplaces an edge by at most 0.02
+  /// pixels.
   double max_step_px = 0.35;
-  /// Of the pixels' memory when the recording starts, their mismatch and their noise.
+  /// Seed of the pixels' initial memory, mismatch and noise.
   std::uint64_t seed = 0;
-  double truth_cell_m = 0.01;  ///< Of the truth clouds: one point per cell of the surfaces.
+  double truth_cell_m = 0.01;  ///< The truth clouds have a point per cell of a surface.
 
   std::int64_t endNs() const { return start_ns + duration_ns; }
 };
 
-/// One camera's events and, for each, the place that its pixel saw; none for noise.
+/// The events of a camera and, for each, the surface point that its pixel saw; none for noise.
 struct CameraRecording {
   std::vector<Event> events;  ///< By time, then row, then column; start <= t <= end.
   std::vector<SurfacePoint> sources;
 };
 
 struct SimulationRun {
-  std::optional<int> threads;  ///< 1 to 1024; as many as there are cores where not given.
-  /// Told the share of the work that is done, 0 to 1, now and then, from the caller's thread.
+  std::optional<int> threads;  ///< 1 to 1024. Default: the number of cores.
+  /// Called at times with the completed fraction, 0 to 1, in the caller's thread.
   std::function<void(double)> progress;
 };
 
-/// Drives the rig through the scene: per camera in the order of the rig. The same simulation gives
-/// the same events, whatever the number of threads.
+/// Moves the rig through the scene and returns a recording per camera. The events do not depend on
+/// the number of threads.
 /// @throws std::invalid_argument where the simulation or the number of threads is not valid.
 std::vector<CameraRecording> simulateEvents(const Simulation& simulation,
                                             const SimulationRun& run = {});
 
-/// The true motion, sampled from start to end, both included, at a fixed period: dense enough that
-/// interpolation between the samples is exact to far below 0.01 pixels for a hand-held motion.
+/// The true motion, sampled from start to end, inclusive. With the default period, interpolation of
+/// a hand-held motion is exact to far below 0.01 pixels.
 std::vector<StampedPose> samplePoses(const Simulation& simulation,
                                      std::int64_t period_ns = 1'000'000);
 

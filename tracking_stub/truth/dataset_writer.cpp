@@ -51,7 +51,7 @@ void appendNumber(std::string& text, Number number) {
   text.append(digits, result.ptr);
 }
 
-/// As formatSeconds, without its cost per event.
+/// Like formatSeconds, but fast enough for each event.
 void appendSeconds(std::string& text, std::int64_t t_ns) {
   if (t_ns < 0) {
     text += formatSeconds(t_ns);
@@ -70,12 +70,12 @@ void writeTiff(const fs::path& file, const cv::Mat1f& image) {
   try {
     written = cv::imwrite(file.string(), image);
   } catch (const cv::Exception&) {
-    // Told below, with the path.
+    // Reported below, with the path.
   }
   if (!written) throw cannotWrite(file);
 }
 
-/// The matrix of a transform, as YAML in Kalibr's layout.
+/// Appends the matrix of a transform as YAML, in Kalibr's layout.
 void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
   const Eigen::Matrix3d rotation = T_a_b.rotation.toRotationMatrix();
   for (int row = 0; row < 3; ++row) {
@@ -100,7 +100,7 @@ DatasetWriter::DatasetWriter(fs::path folder) : folder_(std::move(folder)) {
   makeFolder(folder_.parent_path());
   const fs::path unfinished = folder_.parent_path() / ("." + folder_.filename().string() +
                                                        ".unfinished-" + std::to_string(getpid()));
-  fs::remove_all(unfinished, error);  // of a process that was killed and had the same number
+  fs::remove_all(unfinished, error);  // of a killed process with the same id
   if (!fs::create_directory(unfinished, error)) {
     throw std::runtime_error(unfinished.string() + ": cannot be made: " + error.message());
   }

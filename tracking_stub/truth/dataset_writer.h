@@ -12,20 +12,19 @@
 namespace efm {
 
 /// Writes a simulated recording as a dataset folder:
-///   camN/events.txt        `t x y p` a line
-///   camchain.yaml          calibration, as Kalibr writes it
+///   camN/events.txt        a line `t x y p` per event
+///   camchain.yaml          calibration in Kalibr's format
 ///   poses.txt              T_world_cam0 at 1 kHz, TUM
 ///   depth/cam0_<t>.tiff    exact z-depth in camera 0's undistorted pinhole view, float32 metres,
 ///                          every 50 ms from the recording's start
-///   depth/index.txt        `t file` a line; files relative to depth/
+///   depth/index.txt        a line `t file` per depth map, relative to depth/
 ///   gt_cloud.ply, gt_edges.ply   the truth clouds, frame `world`
 ///
-/// Nothing half made is left behind: the files are collected in a temporary folder beside the
-/// wanted one, which takes its place when all is written and is removed otherwise.
+/// The files are written to a temporary folder in the same parent folder. It is renamed when all
+/// files are written, and removed after an error.
 class DatasetWriter {
  public:
-  /// Makes the temporary folder, so that a place that cannot be written is known before the
-  /// simulation runs.
+  /// Makes the temporary folder: an error is known before the simulation runs.
   /// @throws std::runtime_error naming the path where the folder exists and is not empty, or cannot
   /// be made.
   explicit DatasetWriter(std::filesystem::path folder);
@@ -33,8 +32,8 @@ class DatasetWriter {
   DatasetWriter(const DatasetWriter&) = delete;
   DatasetWriter& operator=(const DatasetWriter&) = delete;
 
-  /// Once.
-  /// @param recordings of the simulation, per camera.
+  /// Call it once.
+  /// @param recordings of the simulation, one per camera.
   /// @throws std::invalid_argument where camera 0 is not the rig's frame; std::runtime_error naming
   /// the path where something cannot be written.
   void write(const Simulation& simulation, const std::vector<CameraRecording>& recordings);
@@ -43,17 +42,17 @@ class DatasetWriter {
   void writeDepthMaps(const Simulation& simulation) const;
 
   std::filesystem::path folder_;
-  std::filesystem::path unfinished_;  // empty once it has become the folder
+  std::filesystem::path unfinished_;  // empty after it was renamed
 };
 
-/// `t x y p` a line: seconds with nine decimals, polarity 0 or 1.
+/// Writes a line `t x y p` per event: seconds with nine decimals, polarity 0 or 1.
 /// @throws std::runtime_error naming the file.
 void writeEvents(const std::filesystem::path& file, const std::vector<Event>& events);
 
-/// The rig as a Kalibr camera chain: neighbours are connected by T_cn_cnm1.
+/// The rig as a Kalibr camera chain.
 std::string formatCamchain(const Rig& rig);
 
-/// Binary little-endian PLY with vertices x y z, float.
+/// Writes a binary little-endian PLY file with float vertices x y z.
 /// @throws std::runtime_error naming the file.
 void writePly(const std::filesystem::path& file, const std::vector<Eigen::Vector3f>& points);
 

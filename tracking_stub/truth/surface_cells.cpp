@@ -14,7 +14,7 @@ int cellsAlong(double length_m, double cell_m) {
   return std::max(1, static_cast<int>(std::lround(length_m / cell_m)));
 }
 
-/// The last cell holds its far border too.
+/// The last cell contains its far border.
 int cellOf(double position_m, double length_m, int cells) {
   return std::clamp(static_cast<int>(position_m / length_m * cells), 0, cells - 1);
 }
@@ -34,17 +34,17 @@ SurfaceCells::SurfaceCells(const Scene& scene, double cell_m) : scene_(&scene) {
   }
 }
 
-void SurfaceCells::add(const SurfacePoint& place) {
-  if (place.surface < 0) return;
-  const Rectangle& r = scene_->rectangle(place.surface);
-  Grid& grid = grids_[static_cast<std::size_t>(place.surface)];
-  const int column = cellOf(place.u_m, r.width_m, grid.columns);
-  const int row = cellOf(place.v_m, r.height_m, grid.rows);
+void SurfaceCells::add(const SurfacePoint& point) {
+  if (point.surface < 0) return;
+  const Rectangle& r = scene_->rectangle(point.surface);
+  Grid& grid = grids_[static_cast<std::size_t>(point.surface)];
+  const int column = cellOf(point.u_m, r.width_m, grid.columns);
+  const int row = cellOf(point.v_m, r.height_m, grid.rows);
   ++grid.counts[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid.columns) +
                 static_cast<std::size_t>(column)];
 }
 
-std::vector<Eigen::Vector3f> SurfaceCells::centers(std::uint32_t at_least) const {
+std::vector<Eigen::Vector3f> SurfaceCells::centers(std::uint32_t min_count) const {
   std::vector<Eigen::Vector3f> centers;
   for (int surface = 0; surface < scene_->size(); ++surface) {
     const Rectangle& r = scene_->rectangle(surface);
@@ -52,7 +52,7 @@ std::vector<Eigen::Vector3f> SurfaceCells::centers(std::uint32_t at_least) const
     auto count = grid.counts.begin();
     for (int row = 0; row < grid.rows; ++row) {
       for (int column = 0; column < grid.columns; ++column) {
-        if (*count++ < at_least) continue;
+        if (*count++ < min_count) continue;
         const Eigen::Vector3d center = r.pointAt((column + 0.5) * r.width_m / grid.columns,
                                                  (row + 0.5) * r.height_m / grid.rows);
         centers.push_back(center.cast<float>());

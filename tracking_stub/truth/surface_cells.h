@@ -9,18 +9,18 @@
 
 namespace efm {
 
-/// Counts on a fine grid over every surface of a scene.
+/// Counters on a fine grid over every surface of a scene.
 class SurfaceCells {
  public:
   /// @param scene outlives the cells.
-  /// @param cell_m wanted side of a cell; each surface takes the nearest that divides its sides.
+  /// @param cell_m side of a cell. Each surface rounds it to a divisor of its sides.
   SurfaceCells(const Scene& scene, double cell_m);
 
-  /// Adds one to the place's cell; a place on no surface does not count.
-  void add(const SurfacePoint& place);
+  /// Adds one to the cell of a point. A point without a surface is ignored.
+  void add(const SurfacePoint& point);
 
-  /// Centres of the cells that were counted at least so often, frame `world`.
-  std::vector<Eigen::Vector3f> centers(std::uint32_t at_least) const;
+  /// Centres of the cells with at least this count, frame `world`.
+  std::vector<Eigen::Vector3f> centers(std::uint32_t min_count) const;
 
  private:
   struct Grid {

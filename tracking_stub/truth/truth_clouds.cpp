@@ -10,17 +10,17 @@
 namespace efm {
 namespace {
 
-constexpr std::uint32_t kEventsOfAnEdge = 3;
-/// A far pixel sees less than every cell at once; the motion between looks fills the gaps.
-constexpr std::int64_t kLookPeriodNs = 20'000'000;
+constexpr std::uint32_t kMinEvents = 3;
+/// The rays of one view miss some cells. The views of the moving camera together see them.
+constexpr std::int64_t kViewPeriodNs = 20'000'000;
 
-void addWhatIsSeen(const Scene& scene, const PixelRays& rays, const Rigid3& T_world_cam,
-                   SurfaceCells& seen) {
+void addVisibleCells(const Scene& scene, const PixelRays& rays, const Rigid3& T_world_cam,
+                     SurfaceCells& seen) {
   const SceneView view(scene, T_world_cam, rays.bounds());
   for (int y = 0; y < rays.height(); ++y) {
     for (int x = 0; x < rays.width(); ++x) {
       const Eigen::Vector2d& ray = rays(x, y).ray;
-      seen.add(view.placeOf(view.cast(ray), ray));
+      seen.add(view.surfacePointOf(view.cast(ray), ray));
     }
   }
 }
@@ -34,9 +34,9 @@ TruthClouds makeTruthClouds(const Simulation& simulation,
   for (const RigCamera& camera : simulation.rig.cameras) {
     const PixelRays rays(camera.model);
     for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs();
-         t_ns += kLookPeriodNs) {
-      addWhatIsSeen(simulation.scene, rays, simulation.motion->poseAt(t_ns) * camera.T_rig_cam,
-                    seen);
+         t_ns += kViewPeriodNs) {
+      addVisibleCells(simulation.scene, rays, simulation.motion->poseAt(t_ns) * camera.T_rig_cam,
+                      seen);
     }
   }
   for (const CameraRecording& recording : recordings) {
@@ -45,7 +45,7 @@ TruthClouds makeTruthClouds(const Simulation& simulation,
       fired.add(source);
     }
   }
-  return {seen.centers(1), fired.centers(kEventsOfAnEdge)};
+  return {seen.centers(1), fired.centers(kMinEvents)};
 }
 
 }  // namespace efm

@@ -8,15 +8,15 @@
 
 namespace efm {
 
-/// What a map of a simulated recording is compared with: points on the true surfaces, one per cell
-/// of about `Simulation::truth_cell_m`, frame `world`.
+/// The truth for maps of a simulated recording: a point per cell of about
+/// `Simulation::truth_cell_m` on the true surfaces, frame `world`.
 struct TruthClouds {
-  std::vector<Eigen::Vector3f> surfaces;  ///< Every cell that a camera's pixel saw.
-  /// Those that fired at least 3 events: what a semi-dense map can be asked to find.
+  std::vector<Eigen::Vector3f> surfaces;  ///< All cells that a pixel saw.
+  /// The cells with at least 3 events: a semi-dense map should contain them.
   std::vector<Eigen::Vector3f> edges;
 };
 
-/// @param recordings of this simulation, per camera.
+/// @param recordings of this simulation, one per camera.
 TruthClouds makeTruthClouds(const Simulation& simulation,
                             const std::vector<CameraRecording>& recordings);
 

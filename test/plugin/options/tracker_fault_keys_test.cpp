@@ -45,7 +45,7 @@ TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
   EXPECT_NEAR(faults.perturbation.keyframe.noise_rad, 90 * kRadiansPerDegree, 1e-15);
   EXPECT_EQ(faults.perturbation.keyframe.length_ns, 200'000'000);
   EXPECT_EQ(faults.perturbation.keyframe.start_ns, 1'700'000'000'123'456'789) << "exact";
-  EXPECT_EQ(faults.perturbation.drift.share, 0.01);
+  EXPECT_EQ(faults.perturbation.drift.fraction, 0.01);
   EXPECT_NEAR(faults.perturbation.drift.rad_per_m, 0.5 * kRadiansPerDegree, 1e-15);
   EXPECT_EQ(faults.latency_ns, 300'000'000);
   EXPECT_EQ(faults.dropouts.drop_probability, 0.1);

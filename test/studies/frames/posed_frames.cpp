@@ -12,7 +12,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "plugin/evaluation/depth_series.h"
 #include "plugin/formats/uzh_text.h"
-#include "tracking_stub/poses/poses_file.h"
+#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm::studies {
 namespace {

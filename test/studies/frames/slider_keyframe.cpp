@@ -7,7 +7,7 @@
 
 #include "mapping/keyframes/keyframe_policy.h"
 #include "plugin/formats/uzh_text.h"
-#include "tracking_stub/poses/poses_file.h"
+#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm::studies {
 

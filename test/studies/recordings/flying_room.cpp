@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/presets/hd_stereo.h"
 #include "tracking_stub/presets/preset_rigs.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/random/random_vectors.h"
+#include "tracking_stub/random/random_numbers.h"
 
 namespace efm::studies {
 

@@ -215,7 +215,7 @@ std::uint64_t fingerprintOf(const Simulation& simulation) {
   print.add(simulation.pixels.mismatch);
   print.add(simulation.pixels.refractory_ns);
   print.add(simulation.noise.background_hz);
-  print.add(simulation.noise.hot_share);
+  print.add(simulation.noise.hot_fraction);
   print.add(simulation.noise.hot_hz);
   print.add(simulation.max_step_px);
   print.add(simulation.seed);

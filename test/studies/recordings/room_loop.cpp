@@ -7,7 +7,7 @@
 #include "tracking_stub/motion/loop_motion.h"
 #include "tracking_stub/motion/smooth_motion.h"
 #include "tracking_stub/presets/preset_rigs.h"
-#include "tracking_stub/presets/room_stereo.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {
 namespace {

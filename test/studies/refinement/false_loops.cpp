@@ -8,7 +8,7 @@
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/rigid3.h"
 #include "test/studies/refinement/pose_refinement_run.h"
-#include "tracking_stub/random/random_vectors.h"
+#include "tracking_stub/random/random_numbers.h"
 
 namespace efm::studies {
 namespace {

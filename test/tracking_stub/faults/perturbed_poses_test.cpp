@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include <algorithm>
 #include <limits>
 #include <map>
@@ -21,7 +23,7 @@ std::vector<StampedPose> perturbed(const std::vector<StampedPose>& poses,
   return allOf(source);
 }
 
-/// Stretches of 0.105 s, so that some begin at poses and some between them.
+/// Intervals of 0.105 s: some begin at poses, some between poses.
 PosePerturbationOptions keyframeNoise() {
   PosePerturbationOptions options;
   options.keyframe.noise_m = 0.01;
@@ -33,7 +35,8 @@ PosePerturbationOptions keyframeNoise() {
 
 double angleOf(const Eigen::Quaterniond& rotation) { return 2 * rotation.vec().norm(); }
 
-/// The mean squares of the errors' axes, positions in the world and small rotations in the rig.
+/// The mean squares of the errors per axis: positions in the world frame, rotations in the rig
+/// frame.
 std::pair<double, double> meanSquares(const std::vector<StampedPose>& poses,
                                       const std::vector<StampedPose>& truth) {
   double position = 0;
@@ -54,7 +57,7 @@ TEST(PerturbedPoses, AreTheSameBitForBitByDefault) {
   EXPECT_TRUE(sameBits(perturbed(poses, {}), poses));
 }
 
-TEST(PerturbedPoses, AreTheSameForTheSameSeedAlone) {
+TEST(PerturbedPoses, AreTheSameForTheSameSeedOnly) {
   const auto poses = windingWay(300);
   PosePerturbationOptions options = keyframeNoise();
   options.noise_m = 0.01;
@@ -66,19 +69,19 @@ TEST(PerturbedPoses, AreTheSameForTheSameSeedAlone) {
   EXPECT_FALSE(sameBits(perturbed(poses, options), once));
 }
 
-TEST(PerturbedPoses, NoisePerPoseHasTheDeviationAskedFor) {
+TEST(PerturbedPoses, NoisePerPoseHasTheRequestedStddev) {
   const auto poses = windingWay(20'000);
   PosePerturbationOptions options;
   options.noise_m = 0.02;
   options.noise_rad = 0.005;
   const auto [position, rotation] = meanSquares(perturbed(poses, options), poses);
-  // Of 60000 draws the mean square has a relative deviation of sqrt(2 / 60000) = 0.6 %, its root of
-  // half that: five of them.
+  // The relative stddev of the mean square of 60000 draws is sqrt(2 / 60000) = 0.6 %; that of its
+  // root is half of it. The tolerance is five of these.
   EXPECT_NEAR(std::sqrt(position), 0.02, 0.02 * 0.015);
   EXPECT_NEAR(std::sqrt(rotation), 0.005, 0.005 * 0.015);
 }
 
-TEST(PerturbedPoses, NoiseOfNeighboursIsUnrelated) {
+TEST(PerturbedPoses, NoiseOfNeighboursIsUncorrelated) {
   const auto poses = windingWay(20'000);
   PosePerturbationOptions options;
   options.noise_m = 1;
@@ -89,7 +92,8 @@ TEST(PerturbedPoses, NoiseOfNeighboursIsUnrelated) {
         (noisy[i].T_world_rig.translation - poses[i].T_world_rig.translation)
             .dot(noisy[i - 1].T_world_rig.translation - poses[i - 1].T_world_rig.translation);
   }
-  // The mean of 60000 products of unit deviation: 1 / sqrt(60000) = 0.004, five of them.
+  // The stddev of the mean of 60000 products is 1 / sqrt(60000) = 0.004. The tolerance is five of
+  // it.
   EXPECT_NEAR(product / 60'000, 0, 0.02);
 }
 
@@ -103,10 +107,10 @@ TEST(PerturbedPoses, KeepTheirNoiseWhenOthersAreLost) {
   EXPECT_TRUE(sameBits(fewer[20].T_world_rig, all[30].T_world_rig));
 }
 
-TEST(PerturbedPoses, NoisePerKeyframeHasTheDeviationAskedFor) {
+TEST(PerturbedPoses, NoisePerKeyframeHasTheRequestedStddev) {
   const auto poses = windingWay(100'000);
   PosePerturbationOptions options = keyframeNoise();
-  options.keyframe.length_ns = 100'000'000;  // at every tenth pose, where errors are as drawn
+  options.keyframe.length_ns = 100'000'000;  // begins at every tenth pose
   std::map<std::int64_t, Rigid3> noisy;
   for (const StampedPose& pose : perturbed(poses, options)) noisy[pose.t_ns] = pose.T_world_rig;
   std::vector<StampedPose> first_poses;
@@ -116,13 +120,13 @@ TEST(PerturbedPoses, NoisePerKeyframeHasTheDeviationAskedFor) {
     first_poses.push_back({poses[i].t_ns, noisy.at(poses[i].t_ns)});
   }
   const auto [position, rotation] = meanSquares(first_poses, truth);
-  // 30000 draws: 0.4 % of the root, five of them. The turn acts about the position, in the world;
-  // what it is in the rig has the same length.
+  // 30000 draws: the stddev of the root is 0.4 %. The tolerance is five of it. The rotation is in
+  // the world frame; its angle in the rig frame is the same.
   EXPECT_NEAR(std::sqrt(position), 0.01, 0.01 * 0.02);
   EXPECT_NEAR(std::sqrt(rotation), 0.01, 0.01 * 0.02);
 }
 
-TEST(PerturbedPoses, AStretchMovesRigidlyAndJumpsWhereTheNextBegins) {
+TEST(PerturbedPoses, AnIntervalMovesRigidlyAndJumpsAtTheNextInterval) {
   const auto poses = windingWay(300);
   const PosePerturbationOptions options = keyframeNoise();
   Trajectory truth;
@@ -131,7 +135,7 @@ TEST(PerturbedPoses, AStretchMovesRigidlyAndJumpsWhereTheNextBegins) {
   for (const StampedPose& pose : perturbed(poses, options)) EXPECT_TRUE(wrong.add(pose));
 
   const std::int64_t length_ns = *options.keyframe.length_ns;
-  std::vector<Rigid3> errors;  // T_wrong_world of each stretch
+  std::vector<Rigid3> errors;  // T_wrong_world of each interval
   for (std::int64_t k = 0; kSecondNs + (k + 1) * length_ns <= poses.back().t_ns; ++k) {
     const std::int64_t begin_ns = kSecondNs + k * length_ns;
     const Rigid3 error = *wrong.poseAt(begin_ns) * truth.poseAt(begin_ns)->inverse();
@@ -143,7 +147,7 @@ TEST(PerturbedPoses, AStretchMovesRigidlyAndJumpsWhereTheNextBegins) {
       EXPECT_LT(T_expected_rig.translation.norm(), 1e-12) << k << " " << t_ns - begin_ns;
       EXPECT_LT(angleOf(T_expected_rig.rotation), 1e-12) << k << " " << t_ns - begin_ns;
     }
-    // The rig itself is wrong by about what was drawn, wherever it is in the world.
+    // The error at the rig does not grow with its distance from the origin.
     EXPECT_LT((*wrong.poseAt(begin_ns)).translation.norm(),
               truth.poseAt(begin_ns)->translation.norm() + 0.06);
   }
@@ -153,7 +157,7 @@ TEST(PerturbedPoses, AStretchMovesRigidlyAndJumpsWhereTheNextBegins) {
   }
 }
 
-TEST(PerturbedPoses, OfAStretchDependOnItsNumberAlone) {
+TEST(PerturbedPoses, OfAnIntervalDependOnItsNumberOnly) {
   const auto poses = windingWay(300);
   const auto errorAt = [&](std::size_t from, std::size_t index) {
     PosePerturbationOptions options = keyframeNoise();
@@ -171,7 +175,7 @@ TEST(PerturbedPoses, OfAStretchDependOnItsNumberAlone) {
   EXPECT_LT((errorAt(0, 200) - errorAt(150, 200)).norm(), 1e-15);
 }
 
-TEST(PerturbedPoses, StretchesBeginOnTicks) {
+TEST(PerturbedPoses, IntervalsBeginOnTicks) {
   PosePerturbationOptions options = keyframeNoise();
   options.keyframe.length_ns = 33'333'333;
   options.tick_ns = 100;
@@ -185,23 +189,24 @@ TEST(PerturbedPoses, StretchesBeginOnTicks) {
   EXPECT_EQ(noisy.size(), 200U + 59 * 2);
 }
 
-TEST(PerturbedPoses, AreNotPutInAcrossGaps) {
+TEST(PerturbedPoses, AreNotInsertedAcrossGaps) {
   auto poses = windingWay(200);
   poses.erase(poses.begin() + 50, poses.begin() + 100);
   PosePerturbationOptions options = keyframeNoise();
-  options.keyframe.length_ns = 100'000'000;  // stretches begin at poses: one is put in at each
+  options.keyframe.length_ns =
+      100'000'000;  // intervals begin at poses: one pose is inserted at each
   for (const StampedPose& pose : perturbed(poses, options)) {
     EXPECT_TRUE(pose.t_ns <= poses[49].t_ns || pose.t_ns >= poses[50].t_ns);
   }
   EXPECT_EQ(perturbed(poses, options).size(), poses.size() + 4 + 9);
 }
 
-TEST(PerturbedPoses, DriftInProportionToTheWay) {
+TEST(PerturbedPoses, DriftInProportionToThePathLength) {
   std::vector<StampedPose> straight;
   for (int i = 0; i <= 1000; ++i)
     straight.push_back({i * 1'000'000, {{1, 0, 0, 0}, {0.01 * i, 0, 0}}});
   PosePerturbationOptions options;
-  options.drift.share = 0.02;
+  options.drift.fraction = 0.02;
   for (options.seed = 0; options.seed < 5; ++options.seed) {
     const auto drifted = perturbed(straight, options);
     EXPECT_TRUE(sameBits(drifted[0].T_world_rig, straight[0].T_world_rig));
@@ -215,13 +220,13 @@ TEST(PerturbedPoses, DriftInProportionToTheWay) {
   for (options.seed = 0; options.seed < 5; ++options.seed) {
     const Rigid3 T_world_rig = perturbed(straight, options).back().T_world_rig;
     EXPECT_NEAR(angleOf(T_world_rig.rotation), 0.1, 0.1 * 0.1 / 24 * 0.1 + 1e-4);
-    // The way bends by half of the turn, less where it turns about its own direction.
+    // The path bends by half of the rotation, or less where the axis is along the path.
     EXPECT_LT((T_world_rig.translation - Eigen::Vector3d(10, 0, 0)).norm(), 0.5 * 0.1 * 10 + 0.01);
     EXPECT_NEAR(T_world_rig.translation.norm(), 10, 0.01);
   }
 }
 
-TEST(PerturbedPoses, OneOptionLeavesTheOthersDrawsAlone) {
+TEST(PerturbedPoses, OneOptionDoesNotChangeTheRandomNumbersOfAnother) {
   const auto poses = windingWay(300);
   PosePerturbationOptions noise;
   noise.noise_m = 0.01;
@@ -229,7 +234,7 @@ TEST(PerturbedPoses, OneOptionLeavesTheOthersDrawsAlone) {
   PosePerturbationOptions keyframe = keyframeNoise();
   keyframe.keyframe.noise_rad = 0;  // errors add up exactly
   PosePerturbationOptions drift;
-  drift.drift.share = 0.01;
+  drift.drift.fraction = 0.01;
   drift.seed = 3;
   PosePerturbationOptions all = keyframe;
   all.noise_m = noise.noise_m;
@@ -252,14 +257,14 @@ TEST(PerturbedPoses, OneOptionLeavesTheOthersDrawsAlone) {
   }
 }
 
-TEST(PerturbedPoses, ArePolledOnWhereTheirSourceHalts) {
+TEST(PerturbedPoses, AreReturnedWhenTheSourceHasAPauseBetweenPoses) {
   const auto poses = windingWay(100);
   PosePerturbationOptions options = keyframeNoise();
   PerturbedPoses halting(std::make_unique<HaltingSource>(poses), options);
   EXPECT_TRUE(sameBits(polled(halting), perturbed(poses, options)));
 }
 
-TEST(PerturbedPoses, ThatAreNotFinitePassAndSpoilNoOther) {
+TEST(PerturbedPoses, ThatAreNotFiniteDoNotChangeOthers) {
   auto poses = windingWay(100);
   poses[40].T_world_rig.translation.x() = std::numeric_limits<double>::quiet_NaN();
   PosePerturbationOptions options = keyframeNoise();
@@ -271,29 +276,23 @@ TEST(PerturbedPoses, ThatAreNotFinitePassAndSpoilNoOther) {
             1);
 }
 
-TEST(PerturbedPoses, RefuseWhatIsNotValid) {
+TEST(PerturbedPoses, RefuseInvalidOptions) {
   EXPECT_THROW(PerturbedPoses(nullptr, {}), std::invalid_argument);
-  const auto refused = [](const PosePerturbationOptions& options) {
+  const std::function<void(PosePerturbationOptions&)> mistakes[] = {
+      [](auto& o) { o.noise_m = -1; },
+      [](auto& o) { o.noise_rad = std::numeric_limits<double>::quiet_NaN(); },
+      [](auto& o) { o.keyframe.noise_m = 0.01; },  // without a length
+      [](auto& o) { o.keyframe.length_ns = 1; },
+      [](auto& o) { o.drift.fraction = 2; },
+      [](auto& o) { o.tick_ns = 0; }};
+  for (const auto& makeMistake : mistakes) {
+    PosePerturbationOptions options;
+    makeMistake(options);
     EXPECT_THROW(PerturbedPoses(replay({}), options), std::invalid_argument);
-  };
-  PosePerturbationOptions options;
-  options.noise_m = -1;
-  refused(options);
-  options = {};
-  options.noise_rad = std::numeric_limits<double>::quiet_NaN();
-  refused(options);
-  options = {};
-  options.keyframe.noise_m = 0.01;  // without a length
-  refused(options);
-  options.keyframe.length_ns = 1;
-  refused(options);
-  options = {};
-  options.drift.share = 2;
-  refused(options);
-  options = {};
-  options.tick_ns = 0;
-  refused(options);
+  }
+}
 
+TEST(PerturbedPoses, RefusePosesThatAreNotInTimeOrder) {
   class Backwards : public PoseSource {
    public:
     std::optional<StampedPose> next() override { return StampedPose{t_ns_--, {}}; }

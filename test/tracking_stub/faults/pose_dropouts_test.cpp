@@ -28,20 +28,20 @@ std::set<std::int64_t> timesFrom(PoseSource& source) {
   return times;
 }
 
-TEST(PoseDropouts, LeaveTheSourceAloneByDefault) {
+TEST(PoseDropouts, AreNoneByDefault) {
   PoseDropouts source(tracker(), {});
   EXPECT_FALSE(source.ended());
   EXPECT_EQ(timesFrom(source).size(), 10'000U);
   EXPECT_EQ(source.dropped(), 0U);
 }
 
-TEST(PoseDropouts, LoseTheirShareOfSinglePoses) {
+TEST(PoseDropouts, LoseSinglePosesWithTheirProbability) {
   PoseDropoutOptions options;
   options.drop_probability = 0.2;
   options.seed = 4;
   PoseDropouts source(tracker(), options);
   const auto times = timesFrom(source);
-  // Binomial: 2000 expected, standard deviation 40.
+  // Binomial: 2000 expected, stddev 40.
   EXPECT_NEAR(static_cast<double>(source.dropped()), 2'000, 160);
   EXPECT_EQ(times.size() + source.dropped(), 10'000U);
   PoseDropouts again(tracker(), options);
@@ -51,7 +51,7 @@ TEST(PoseDropouts, LoseTheirShareOfSinglePoses) {
   EXPECT_NE(timesFrom(other), times);
 }
 
-TEST(PoseDropouts, LoseAllOfAGapItsBeginIncludedItsEndNot) {
+TEST(PoseDropouts, LoseAllPosesOfAGapWithItsBeginAndWithoutItsEnd) {
   PoseDropoutOptions options;
   options.gaps = {{500 * kMillisecondNs, 700 * kMillisecondNs}, {0, 10 * kMillisecondNs}};
   PoseDropouts source(tracker(), options);
@@ -64,7 +64,7 @@ TEST(PoseDropouts, LoseAllOfAGapItsBeginIncludedItsEndNot) {
   EXPECT_EQ(times.count(700 * kMillisecondNs), 1U);
 }
 
-TEST(PoseDropouts, AGapDoesNotChangeWhichSinglePosesAreLost) {
+TEST(PoseDropouts, AGapDoesNotChangeTheLossOfSinglePoses) {
   PoseDropoutOptions options;
   options.drop_probability = 0.3;
   PoseDropouts without(tracker(), options);
@@ -86,24 +86,20 @@ TEST(PoseDropouts, RandomGapsHaveTheirLengthAndRate) {
   for (auto later = std::next(times.begin()); later != times.end(); ++later) {
     const std::int64_t apart_ns = *later - *std::prev(later);
     if (apart_ns == 10 * kMillisecondNs) continue;
-    EXPECT_GE(apart_ns, 300 * kMillisecondNs);  // two may follow each other at once
+    EXPECT_GE(apart_ns, 300 * kMillisecondNs);  // two gaps may touch
     ++gaps;
   }
-  // One every 2.3 s: 43 in 100 s, give or take 7.
+  // One every 2.3 s: 43 in 100 s, with a stddev of 7.
   EXPECT_NEAR(gaps, 43, 20);
 }
 
-TEST(PoseDropouts, RefuseWhatIsNotValid) {
+TEST(PoseDropouts, RefuseInvalidOptions) {
   EXPECT_THROW(PoseDropouts(nullptr, {}), std::invalid_argument);
-  PoseDropoutOptions options;
-  options.drop_probability = 1.1;
-  EXPECT_THROW(PoseDropouts(tracker(), options), std::invalid_argument);
-  options = {};
-  options.gaps = {{5, 5}};
-  EXPECT_THROW(PoseDropouts(tracker(), options), std::invalid_argument);
-  options = {};
-  options.random_gap_s = 0;
-  EXPECT_THROW(PoseDropouts(tracker(), options), std::invalid_argument);
+  const PoseDropoutOptions mistakes[] = {
+      {1.1, {}, 0, 0.5, 0}, {0, {{5, 5}}, 0, 0.5, 0}, {0, {}, -1, 0.5, 0}, {0, {}, 0, 0, 0}};
+  for (const PoseDropoutOptions& options : mistakes) {
+    EXPECT_THROW(PoseDropouts(tracker(), options), std::invalid_argument);
+  }
 }
 
 }  // namespace

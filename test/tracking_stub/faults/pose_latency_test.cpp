@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include <stdexcept>
 
 #include "test/tracking_stub/poses/pose_lists.h"
@@ -10,21 +12,17 @@
 namespace efm {
 namespace {
 
-/// Gives a pose when it is told to.
+/// Returns a pose once when the test has set it.
 class Tracker : public PoseSource {
  public:
   std::optional<StampedPose> pose;
   bool has_ended = false;
 
-  std::optional<StampedPose> next() override {
-    const std::optional<StampedPose> given = pose;
-    pose.reset();
-    return given;
-  }
+  std::optional<StampedPose> next() override { return std::exchange(pose, std::nullopt); }
   bool ended() const override { return has_ended && !pose; }
 };
 
-TEST(PoseLatency, GivesAPoseOnceOneIsSoMuchNewer) {
+TEST(PoseLatency, ReturnsAPoseWhenAnotherIsNewerByTheLatency) {
   auto tracker = std::make_unique<Tracker>();
   Tracker& now = *tracker;
   PoseLatency late(std::move(tracker), 25);
@@ -46,7 +44,7 @@ TEST(PoseLatency, GivesAPoseOnceOneIsSoMuchNewer) {
   EXPECT_FALSE(late.next());
 }
 
-TEST(PoseLatency, GivesEveryPoseAsItWas) {
+TEST(PoseLatency, ReturnsEveryPoseUnchanged) {
   const auto poses = windingWay(200);
   for (const std::int64_t latency_ns : {0L, 1L, 200'000'000L, 10'000'000'000L}) {
     PoseLatency late(replay(poses), latency_ns);
@@ -56,7 +54,7 @@ TEST(PoseLatency, GivesEveryPoseAsItWas) {
   }
 }
 
-TEST(PoseLatency, RefusesWhatIsNotValid) {
+TEST(PoseLatency, RefusesAnInvalidLatency) {
   EXPECT_THROW(PoseLatency(nullptr, 0), std::invalid_argument);
   EXPECT_THROW(PoseLatency(replay({}), -1), std::invalid_argument);
   EXPECT_THROW(PoseLatency(replay({}), 10'000'000'001), std::invalid_argument);

@@ -33,7 +33,7 @@ TEST(TrackerFaults, AreNoneByDefault) {
   EXPECT_TRUE(sameBits(withFaults(poses, TrackerFaults()), poses));
 }
 
-TEST(TrackerFaults, OfOneKindLeaveTheOthersAlone) {
+TEST(TrackerFaults, OfOneKindDoNotChangeOthers) {
   const auto poses = windingWay(500);
   TrackerFaults faults = everyFault();
   std::map<std::int64_t, Rigid3> all;
@@ -43,20 +43,20 @@ TEST(TrackerFaults, OfOneKindLeaveTheOthersAlone) {
   faults.dropouts = {};
   std::size_t kept = 0;
   for (const StampedPose& pose : withFaults(poses, faults)) {
-    // Lost, or put in where a stretch begins: in place of a pose that was lost, maybe.
+    // The pose was lost, or inserted where an interval begins.
     const bool begins = (pose.t_ns - 1'000'000'000) % 105'000'000 == 0;
     if (all.count(pose.t_ns) == 0 || pose.t_ns % 10'000'000 != 0 || begins) continue;
     ++kept;
     EXPECT_LT((all[pose.t_ns].translation - pose.T_world_rig.translation).norm(), 1e-15);
   }
-  EXPECT_NEAR(static_cast<double>(kept), 0.8 * 476, 50);  // binomial: 9 is its deviation
+  EXPECT_NEAR(static_cast<double>(kept), 0.8 * 476, 50);  // binomial: the stddev is 9
 
   faults = {};
   faults.dropouts = everyFault().dropouts;
   for (const StampedPose& pose : withFaults(poses, faults)) EXPECT_EQ(all.count(pose.t_ns), 1U);
 }
 
-TEST(TrackerFaults, NeverLoseAPoseThatMarksAJump) {
+TEST(TrackerFaults, NeverLoseThePosesAtAJump) {
   TrackerFaults faults = everyFault();
   faults.dropouts.drop_probability = 0.5;
   faults.perturbation.max_pose_gap_s = 10;
@@ -71,7 +71,7 @@ TEST(TrackerFaults, NeverLoseAPoseThatMarksAJump) {
   }
 }
 
-TEST(TrackerFaults, RefuseWhatIsNotValid) {
+TEST(TrackerFaults, RefuseInvalidFaults) {
   EXPECT_THROW(efm::withFaults(nullptr, {}), std::invalid_argument);
   TrackerFaults faults;
   faults.latency_ns = -1;

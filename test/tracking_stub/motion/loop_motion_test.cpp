@@ -26,7 +26,7 @@ TEST(LoopMotion, LooksOutwardsAndLevelFromAnEllipse) {
   const Rigid3 T_world_begin = loop.poseAt(1'000'000'000);
   EXPECT_LT((T_world_begin * Eigen::Vector3d(0, 0, 1) - Eigen::Vector3d(3, 0, 1.5)).norm(), 1e-12);
   EXPECT_LT((T_world_begin * Eigen::Vector3d(0, 1, 0) - Eigen::Vector3d(2, 0, 0.5)).norm(), 1e-12);
-  // A quarter later, on the +y axis; what is to the camera's right is then at +x.
+  // A quarter later it is on the +y axis, and +x is to the right of the camera.
   const Rigid3 T_world_quarter = loop.poseAt(2'000'000'000);
   EXPECT_LT((T_world_quarter * Eigen::Vector3d(0, 0, 1) - Eigen::Vector3d(0, 2, 1.5)).norm(),
             1e-12);
@@ -50,7 +50,7 @@ TEST(LoopMotion, SwaysInTheFrameOfTheCamera) {
   EXPECT_NEAR(LoopMotion(options).poseAt(options.start_ns).translation.x(), 2.25, 1e-12);
 }
 
-TEST(LoopMotion, RefusesAPeriodThatIsNotPositive) {
+TEST(LoopMotion, RefusesAPeriodOfZero) {
   LoopMotionOptions options;
   options.period_s = 0;
   EXPECT_THROW(LoopMotion{options}, std::invalid_argument);

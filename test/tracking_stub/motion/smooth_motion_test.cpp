@@ -30,7 +30,7 @@ TEST(SmoothMotion, TravelsAlongTheAxesOfItsCenter) {
   EXPECT_LT((T_world_rig.translation - Eigen::Vector3d(0, 1, 0.2)).norm(), 1e-12);
 }
 
-TEST(SmoothMotion, StandsAtItsCenterWithoutSines) {
+TEST(SmoothMotion, RestsAtItsCenterWithoutSines) {
   SmoothMotionOptions options;
   options.T_world_center.translation = {1, 2, 3};
   const Rigid3 T_world_rig = SmoothMotion(options).poseAt(123);

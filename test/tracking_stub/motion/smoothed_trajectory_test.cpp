@@ -38,8 +38,8 @@ Rigid3 handHeld(double t_s) {
   return T_world_rig;
 }
 
-/// The worst distance and angle between a trajectory and a curve, its first and last 0.25 s apart.
-std::pair<double, double> worst(const std::vector<StampedPose>& poses, const Curve& curve) {
+/// The max distance and angle between a trajectory and a curve, without the first and last 0.25 s.
+std::pair<double, double> maxError(const std::vector<StampedPose>& poses, const Curve& curve) {
   double metres = 0;
   double radians = 0;
   for (const StampedPose& pose : poses) {
@@ -56,13 +56,13 @@ TEST(SmoothTrajectory, KeepsAMotionOfAFewHertz) {
   const auto smooth = smoothTrajectory(sampled(handHeld, 100, 4));
   ASSERT_EQ(smooth.size(), 801U);
   EXPECT_EQ(smooth[1].t_ns - smooth[0].t_ns, 5'000'000);
-  const auto [metres, radians] = worst(smooth, handHeld);
-  // Linear interpolation between samples 10 ms apart is off by a h^2 / 8 = 5e-5 at most.
+  const auto [metres, radians] = maxError(smooth, handHeld);
+  // The error of linear interpolation over 10 ms is a h^2 / 8 = 5e-5 at most.
   EXPECT_LT(metres, 2e-4);
   EXPECT_LT(radians, 2e-4);
 }
 
-TEST(SmoothTrajectory, CutsWhatIsFasterThanTenHertz) {
+TEST(SmoothTrajectory, CutsFrequenciesAboveTenHertz) {
   const Curve shaken = [](double t_s) {
     Rigid3 T_world_rig = handHeld(t_s);
     T_world_rig.translation.x() += 0.01 * std::sin(2 * M_PI * 20 * t_s);
@@ -71,12 +71,12 @@ TEST(SmoothTrajectory, CutsWhatIsFasterThanTenHertz) {
         Eigen::AngleAxisd(0.02 * std::sin(2 * M_PI * 20 * t_s), Vector3d::UnitZ());
     return T_world_rig;
   };
-  const auto [metres, radians] = worst(smoothTrajectory(sampled(shaken, 200, 4)), handHeld);
+  const auto [metres, radians] = maxError(smoothTrajectory(sampled(shaken, 200, 4)), handHeld);
   EXPECT_LT(metres, 0.03 * 0.01);
   EXPECT_LT(radians, 0.03 * 0.02);
 }
 
-TEST(SmoothTrajectory, LeavesOutSinglePosesThatJump) {
+TEST(SmoothTrajectory, RemovesSinglePosesThatJump) {
   auto poses = sampled(handHeld, 100, 4);
   RandomNumbers random(5);
   for (StampedPose& pose : poses) {  // noise of a tenth of a millimetre, as trackers have
@@ -87,20 +87,20 @@ TEST(SmoothTrajectory, LeavesOutSinglePosesThatJump) {
     poses[i].T_world_rig.rotation =
         poses[i].T_world_rig.rotation * Eigen::AngleAxisd(0.1, Vector3d::UnitY());
   }
-  const auto [metres, radians] = worst(smoothTrajectory(poses), handHeld);
+  const auto [metres, radians] = maxError(smoothTrajectory(poses), handHeld);
   EXPECT_LT(metres, 1e-3);
   EXPECT_LT(radians, 2e-3);
 }
 
-TEST(SmoothTrajectory, BridgesGapsAndTakesEitherSignOfAQuaternion) {
+TEST(SmoothTrajectory, InterpolatesAcrossGapsAndAcceptsBothSignsOfAQuaternion) {
   auto poses = sampled(handHeld, 100, 4);
   poses.erase(poses.begin() + 200, poses.begin() + 213);  // 0.13 s
   for (std::size_t i = 0; i < poses.size(); i += 3) {
     poses[i].T_world_rig.rotation.coeffs() *= -1;
   }
   std::reverse(poses.begin(), poses.end());
-  const auto [metres, radians] = worst(smoothTrajectory(poses), handHeld);
-  // A straight bridge over 0.13 s is off by a T^2 / 8, where a = 5.4 m/s2 and 6.4 rad/s2.
+  const auto [metres, radians] = maxError(smoothTrajectory(poses), handHeld);
+  // The error of linear interpolation over 0.13 s is a T^2 / 8 with a = 5.4 m/s2 and 6.4 rad/s2.
   EXPECT_LT(metres, 0.013);
   EXPECT_LT(radians, 0.016);
 }
@@ -113,8 +113,8 @@ TEST(SmoothTrajectory, OdometryOfTenHertzHasNoCorners) {
     return T_world_rig;
   };
   const auto smooth = smoothTrajectory(sampled(drive, 10, 8));
-  EXPECT_LT(worst(smooth, drive).first, 0.01);
-  // 0.3 rad/s at 6 m/s: 1.8 m/s2. Corners of straight pieces of 0.1 s would be 36 m/s2 in 5 ms.
+  EXPECT_LT(maxError(smooth, drive).first, 0.01);
+  // 0.3 rad/s at 6 m/s: 1.8 m/s2. Corners of straight lines of 0.1 s would be 36 m/s2 in 5 ms.
   for (std::size_t i = 101; i + 100 < smooth.size(); ++i) {
     const Vector3d bend = smooth[i + 1].T_world_rig.translation -
                           2 * smooth[i].T_world_rig.translation +
@@ -123,7 +123,7 @@ TEST(SmoothTrajectory, OdometryOfTenHertzHasNoCorners) {
   }
 }
 
-TEST(SmoothTrajectory, KeepsPlaceAndSpeedAtItsEnds) {
+TEST(SmoothTrajectory, KeepsPositionAndSpeedAtItsEnds) {
   const Curve straight = [](double t_s) {
     Rigid3 T_world_rig;
     T_world_rig.translation = {0.5 * t_s, 0, 1};
@@ -137,7 +137,7 @@ TEST(SmoothTrajectory, KeepsPlaceAndSpeedAtItsEnds) {
   }
 }
 
-TEST(SmoothTrajectory, RefusesWhatItCannotBridge) {
+TEST(SmoothTrajectory, RefusesLongGapsAndInvalidOptions) {
   auto poses = sampled(handHeld, 100, 4);
   poses.erase(poses.begin() + 100, poses.begin() + 250);
   try {
@@ -154,22 +154,22 @@ TEST(SmoothTrajectory, RefusesWhatItCannotBridge) {
   EXPECT_THROW(smoothTrajectory(poses, options), std::invalid_argument);
 }
 
-TEST(Departure, IsWhereHalfTheMeanSpeedIsReached) {
+TEST(StartOfMotion, IsTheTimeWithHalfTheMeanSpeed) {
   const Curve late = [](double t_s) {
     Rigid3 T_world_rig;
     T_world_rig.translation.x() = t_s < 3 ? 0.01 * std::sin(7 * t_s) : 0.4 * (t_s - 3);
     return T_world_rig;
   };
-  const double departure_s =
-      static_cast<double>(departureOf(sampled(late, 100, 10)) - kStartNs) * 1e-9;
-  EXPECT_GE(departure_s, 2.5);
-  EXPECT_LE(departure_s, 3.1);
+  const double start_s =
+      static_cast<double>(startOfMotion(sampled(late, 100, 10)) - kStartNs) * 1e-9;
+  EXPECT_GE(start_s, 2.5);
+  EXPECT_LE(start_s, 3.1);
   const Curve still = [](double) { return Rigid3(); };
-  EXPECT_EQ(departureOf(sampled(still, 100, 10)), kStartNs);
-  EXPECT_EQ(departureOf(sampled(late, 100, 0.1)), kStartNs);
+  EXPECT_EQ(startOfMotion(sampled(still, 100, 10)), kStartNs);
+  EXPECT_EQ(startOfMotion(sampled(late, 100, 0.1)), kStartNs);
 }
 
-TEST(SampledMotion, InterpolatesBetweenItsPosesAndRestsBeyondThem) {
+TEST(SampledMotion, InterpolatesBetweenItsPosesAndRestsBeforeAndAfterThem) {
   const auto poses = sampled(handHeld, 200, 1);
   const SampledMotion motion(poses);
   EXPECT_EQ(motion.poseAt(poses[7].t_ns).translation, poses[7].T_world_rig.translation);

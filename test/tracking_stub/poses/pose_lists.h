@@ -14,7 +14,7 @@
 
 namespace efm {
 
-/// A rig that goes to the right at 0.5 m/s, bobs and turns, seen every 10 ms.
+/// A rig that moves to the right at 0.5 m/s, bobs and rotates. A pose every 10 ms.
 inline std::vector<StampedPose> windingWay(int count, std::int64_t first_ns = 1'000'000'000) {
   std::vector<StampedPose> poses;
   for (std::int64_t i = 0; i < count; ++i) {
@@ -50,16 +50,16 @@ inline bool sameBits(const std::vector<StampedPose>& a, const std::vector<Stampe
   return true;
 }
 
-/// A tracker that has nothing every other time it is asked, and ends some asking after its last.
+/// A tracker without a pose at every second call. It ends a call after its last pose.
 class HaltingSource : public PoseSource {
  public:
   explicit HaltingSource(const std::vector<StampedPose>& poses)
       : poses_(poses.begin(), poses.end()) {}
 
   std::optional<StampedPose> next() override {
-    ++asked_;
-    if (asked_ % 2 != 0 || poses_.empty()) {
-      if (poses_.empty() && asked_ % 2 != 0) ended_ = true;
+    ++calls_;
+    if (calls_ % 2 != 0 || poses_.empty()) {
+      if (poses_.empty() && calls_ % 2 != 0) ended_ = true;
       return std::nullopt;
     }
     const StampedPose pose = poses_.front();
@@ -70,14 +70,14 @@ class HaltingSource : public PoseSource {
 
  private:
   std::deque<StampedPose> poses_;
-  int asked_ = 0;
+  int calls_ = 0;
   bool ended_ = false;
 };
 
-/// Asks on until the source ends, as its users must.
+/// Polls until the source ends.
 inline std::vector<StampedPose> polled(PoseSource& source) {
   std::vector<StampedPose> poses;
-  for (int asked = 0; !source.ended() && asked < 100'000; ++asked) {
+  for (int calls = 0; !source.ended() && calls < 100'000; ++calls) {
     if (const auto pose = source.next()) poses.push_back(*pose);
   }
   EXPECT_TRUE(source.ended());

@@ -10,10 +10,10 @@
 
 namespace efm {
 
-/// Stands in for a tracker: plays recorded poses in order of time.
+/// Replays recorded poses in order of time, like a tracker.
 class TumReplay : public PoseSource {
  public:
-  /// @param poses in any order; those of equal time keep theirs.
+  /// @param poses in any order. Poses of equal time keep their order.
   explicit TumReplay(std::vector<StampedPose> poses);
   /// @throws std::runtime_error as `readTumTrajectory` does.
   explicit TumReplay(const std::filesystem::path& file);

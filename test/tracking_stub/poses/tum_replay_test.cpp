@@ -8,7 +8,7 @@
 namespace efm {
 namespace {
 
-TEST(TumReplay, GivesPosesInOrderOfTimeAndThenEnds) {
+TEST(TumReplay, ReturnsPosesInOrderOfTimeAndThenEnds) {
   TumReplay replay({{30, {}}, {10, {}}, {20, {}}});
   EXPECT_FALSE(replay.ended());
   EXPECT_EQ(replay.next()->t_ns, 10);

@@ -38,7 +38,7 @@ TEST(SimulationPreset, AnUnknownNameIsAnErrorThatListsTheKnownOnes) {
   EXPECT_THROW(makeSimulation(options), std::invalid_argument);
 }
 
-TEST(SimulationPreset, TheDurationIsCheckedAndTaken) {
+TEST(SimulationPreset, TheDurationIsCheckedAndUsed) {
   SimulationOptions options;
   for (const double bad : {0.0, -1.0, 601.0, std::nan("")}) {
     options.duration_s = bad;

@@ -10,11 +10,11 @@
 #include <stdexcept>
 
 #include "test/paths.h"
+#include "test/tracking_stub/presets/visible_depths.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
+#include "test/tracking_stub/scenes/ray_cast.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/presets/preset_rigs.h"
-#include "tracking_stub/rendering/pixel_rays.h"
-#include "tracking_stub/rendering/scene_view.h"
 
 namespace efm {
 namespace {
@@ -55,40 +55,11 @@ std::string errorOf(const TrajectorySimulationOptions& options) {
   return "no error";
 }
 
-/// The z-depths of a camera's pixels over the recording.
-struct Depths {
-  double nearest = std::numeric_limits<double>::infinity();
-  double farthest = 0;
-  double missed = 0;  // share
+test::VisibleDepths depthsOf(const Simulation& simulation) {
+  return test::visibleDepths(simulation, simulation.rig.cameras[0]);
+}
 
-  explicit Depths(const Simulation& simulation) {
-    int rays_cast = 0;
-    int rays_missed = 0;
-    for (const RigCamera& camera : simulation.rig.cameras) {
-      const PixelRays rays(camera.model);
-      for (int i = 0; i <= 10; ++i) {
-        const std::int64_t t_ns = simulation.start_ns + simulation.duration_ns * i / 10;
-        const SceneView view(simulation.scene, simulation.motion->poseAt(t_ns) * camera.T_rig_cam,
-                             rays.bounds());
-        for (int y = 0; y < rays.height(); y += 5) {
-          for (int x = 0; x < rays.width(); x += 5) {
-            const ViewHit hit = view.cast(rays(x, y).ray);
-            ++rays_cast;
-            if (hit.surface < 0) {
-              ++rays_missed;
-              continue;
-            }
-            nearest = std::min(nearest, 1 / hit.inverse_depth);
-            farthest = std::max(farthest, 1 / hit.inverse_depth);
-          }
-        }
-      }
-    }
-    missed = static_cast<double>(rays_missed) / rays_cast;
-  }
-};
-
-TEST(TrajectorySimulation, BeginsWhereTheTrajectoryGetsUnderWayAndIsCut) {
+TEST(TrajectorySimulation, BeginsAtTheStartOfMotionAndLastsFiveSeconds) {
   TrajectorySimulationOptions options;
   const Simulation simulation = makeTrajectorySimulation(options, walk(), smallRig());
   EXPECT_NEAR(static_cast<double>(simulation.start_ns - kStartNs) * 1e-9, 1.75, 0.5);
@@ -103,49 +74,50 @@ TEST(TrajectorySimulation, BeginsWhereTheTrajectoryGetsUnderWayAndIsCut) {
             1e-6);
 }
 
-TEST(TrajectorySimulation, ARoomHoldsTheWayAndStandsUprightByTheCameras) {
+TEST(TrajectorySimulation, ARoomContainsThePathAndIsUprightForTheCameras) {
   const Simulation simulation = makeTrajectorySimulation({}, walk(), smallRig());
   // Down is +z: the floor is 1.2 m below, the ceiling above.
   const Vector3d middle =
       simulation.motion->poseAt(simulation.start_ns + 1'000'000'000).translation;
-  const auto floor = simulation.scene.cast(middle, {0, 0, 1});
+  const auto floor = castRay(simulation.scene, middle, {0, 0, 1});
   ASSERT_TRUE(floor.has_value());
   EXPECT_NEAR(floor->distance_m, 1.2, 1e-6);
-  EXPECT_TRUE(simulation.scene.cast(middle, {0, 0, -1}).has_value());
-  const Depths depths(simulation);
+  EXPECT_TRUE(castRay(simulation.scene, middle, {0, 0, -1}).has_value());
+  const test::VisibleDepths depths = depthsOf(simulation);
   EXPECT_GE(depths.nearest, 0.7);
   EXPECT_LE(depths.farthest, 9);
-  EXPECT_EQ(depths.missed, 0);
+  EXPECT_EQ(depths.sky, 0);
 }
 
-TEST(TrajectorySimulation, AStreetRunsAlongTheWay) {
+TEST(TrajectorySimulation, AStreetFollowsThePath) {
   TrajectorySimulationOptions options;
   options.scene = "street";
   const Simulation simulation = makeTrajectorySimulation(options, walk(), smallRig());
   const Vector3d begin = simulation.motion->poseAt(simulation.start_ns).translation;
-  const auto road = simulation.scene.cast(begin, {0, 0, 1});
+  const auto road = castRay(simulation.scene, begin, {0, 0, 1});
   ASSERT_TRUE(road.has_value());
   EXPECT_NEAR(road->distance_m, 1.6, 1e-6);
-  const auto end = simulation.scene.cast(begin - Vector3d(0, 0, 0.5), {1, 0, 0});
+  const auto end = castRay(simulation.scene, begin - Vector3d(0, 0, 0.5), {1, 0, 0});
   ASSERT_TRUE(end.has_value());
   EXPECT_NEAR(end->distance_m, 50, 0.5);
-  const Depths depths(simulation);
+  const test::VisibleDepths depths = depthsOf(simulation);
   EXPECT_GE(depths.nearest, 2.5);
   EXPECT_LE(depths.farthest, 51);
-  EXPECT_LT(depths.missed, 0.4);
+  EXPECT_LT(depths.sky, 0.4);
 }
 
 TEST(TrajectorySimulation, PolesStandBeforeTheCamera) {
   TrajectorySimulationOptions options;
   options.scene = "poles";
   options.duration_s = 0.5;
-  const Depths depths(makeTrajectorySimulation(options, walk(), smallRig()));
+  const test::VisibleDepths depths =
+      depthsOf(makeTrajectorySimulation(options, walk(), smallRig()));
   EXPECT_GE(depths.nearest, 0.8);
   EXPECT_LE(depths.farthest, 5.2);
-  EXPECT_EQ(depths.missed, 0);
+  EXPECT_EQ(depths.sky, 0);
 }
 
-TEST(TrajectorySimulation, ErrorsNameWhatIsWrongAndWhatIsAllowed) {
+TEST(TrajectorySimulation, ErrorsNameTheOptionAndItsRange) {
   TrajectorySimulationOptions options;
   options.scene = "attic";
   EXPECT_THAT(errorOf(options), AllOf(HasSubstr("scene"), HasSubstr("'attic'"), HasSubstr("room")));
@@ -158,15 +130,15 @@ TEST(TrajectorySimulation, ErrorsNameWhatIsWrongAndWhatIsAllowed) {
   EXPECT_THROW(makeTrajectorySimulation({}, {}, smallRig()), std::invalid_argument);
 }
 
-/// A measured trajectory, the scene for it, and the fastest that anything of its kind moves.
-struct Recording {
+/// A measured trajectory, its scene, and the max speed and acceleration of such carriers.
+struct Measured {
   const char* file;
   const char* scene;
   double max_speed;         // m/s
   double max_acceleration;  // m/s2
 };
 
-class MeasuredTrajectory : public ::testing::TestWithParam<Recording> {};
+class MeasuredTrajectory : public ::testing::TestWithParam<Measured> {};
 
 TEST_P(MeasuredTrajectory, BecomesAMotionAsSmoothAsItsCarrier) {
   const std::filesystem::path file =
@@ -189,16 +161,16 @@ TEST_P(MeasuredTrajectory, BecomesAMotionAsSmoothAsItsCarrier) {
     length += step.norm();
   }
   EXPECT_GT(length, 0.5);
-  const Depths depths(simulation);
+  const test::VisibleDepths depths = depthsOf(simulation);
   EXPECT_GE(depths.nearest, 0.5);
-  EXPECT_LT(depths.missed, 0.4);
+  EXPECT_LT(depths.sky, 0.4);
 }
 
 INSTANTIATE_TEST_SUITE_P(Shared, MeasuredTrajectory,
-                         ::testing::Values(Recording{"mvsec_indoor_flying1.txt", "room", 1.5, 30},
-                                           Recording{"dsec_zurich_city_04.txt", "street", 8, 10},
-                                           Recording{"rpg_eccv18_desk.txt", "room", 0.8, 12},
-                                           Recording{"tumvie_desk2.txt", "room", 0.8, 12}),
+                         ::testing::Values(Measured{"mvsec_indoor_flying1.txt", "room", 1.5, 30},
+                                           Measured{"dsec_zurich_city_04.txt", "street", 8, 10},
+                                           Measured{"rpg_eccv18_desk.txt", "room", 0.8, 12},
+                                           Measured{"tumvie_desk2.txt", "room", 0.8, 12}),
                          [](const auto& recording) {
                            const std::string file = recording.param.file;
                            return file.substr(0, file.find('.'));

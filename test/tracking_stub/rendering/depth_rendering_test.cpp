@@ -47,9 +47,9 @@ TEST(DepthRendering, AgreesBetweenViews) {
       const int xb = static_cast<int>(std::lround(pixel.x()));
       const int yb = static_cast<int>(std::lround(pixel.y()));
       if (xb < 0 || yb < 0 || xb >= view.width || yb >= view.height) continue;
-      // In the other view the surface is there (up to the rounding to a pixel), or hidden.
-      const bool is_there = std::abs(depth_b(yb, xb) / p_b.z() - 1) < 0.02;
-      (is_there ? same : hidden) += 1;
+      // The other view sees the same surface, within the rounding to a pixel, or it is hidden.
+      const bool is_same = std::abs(depth_b(yb, xb) / p_b.z() - 1) < 0.02;
+      (is_same ? same : hidden) += 1;
     }
   }
   EXPECT_GT(same, 70'000);

@@ -10,7 +10,7 @@
 namespace efm {
 namespace {
 
-TEST(PixelRays, OffsetsFromTheCentreProjectToThatPlaceInTheDistortedPixel) {
+TEST(PixelRays, OffsetsFromTheCentreProjectToTheSameOffsetsInTheDistortedPixel) {
   CameraModel model = test::smallCamera().model;
   model.distortion = DistortionModel::kRadtan;
   model.coefficients = {-0.3, 0.1, 0.001, -0.002};
@@ -22,7 +22,7 @@ TEST(PixelRays, OffsetsFromTheCentreProjectToThatPlaceInTheDistortedPixel) {
   }
 }
 
-TEST(PixelRays, HaveBoundsThatHoldEveryPixelsArea) {
+TEST(PixelRays, HaveBoundsAroundThePixelsAreas) {
   const PixelRays rays(test::smallCamera().model);
   EXPECT_NEAR(rays.bounds().min.x(), -32.0 / 50, 1e-12);
   EXPECT_NEAR(rays.bounds().max.y(), 24.0 / 50, 1e-12);

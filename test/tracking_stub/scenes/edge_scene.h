@@ -8,13 +8,13 @@
 
 namespace efm::test {
 
-/// All of a surface has one log intensity.
+/// A surface of one log intensity.
 inline Scene::Painter evenPaint(float log_intensity) {
   return [log_intensity](double, double) { return Texture(cv::Mat1f(8, 8, log_intensity), 0.1); };
 }
 
-/// Dark (0) where u is below `edge_u_m`, and brighter by `contrast` beyond: an edge along v. The
-/// edge must lie on a texel's border.
+/// An edge along v: log intensity 0 where u is below `edge_u_m`, and `contrast` elsewhere. The edge
+/// must be on a texel's border.
 inline Scene::Painter edgePaint(double edge_u_m, float contrast, double texel_m) {
   return [=](double width_m, double height_m) {
     cv::Mat1f painting(static_cast<int>(std::lround(height_m / texel_m)),
@@ -24,8 +24,8 @@ inline Scene::Painter edgePaint(double edge_u_m, float contrast, double texel_m)
   };
 }
 
-/// A wall parallel to the image of a camera at the origin, `depth_m` before it, that fills the
-/// view: u is x + width/2 and v is height/2 - y, frame `world` (x right, y down, z forward).
+/// A wall at the z-depth `depth_m` of a camera at the origin: u is x + width/2 and v is height/2 -
+/// y, frame `world` (x right, y down, z forward).
 inline Rectangle facingWall(double depth_m, double width_m, double height_m) {
   return {{-width_m / 2, height_m / 2, depth_m},
           Eigen::Vector3d::UnitX(),

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "test/tracking_stub/scenes/edge_scene.h"
+#include "test/tracking_stub/scenes/ray_cast.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/rendering/scene_view.h"
 
@@ -17,27 +18,27 @@ Eigen::Vector3d randomVector(RandomNumbers& random, double size) {
   return {random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size)};
 }
 
-TEST(Scene, ARayMeetsAPlaneWhereGeometrySays) {
+TEST(Scene, ARayHitsAPlaneAtTheComputedPoint) {
   Scene scene;
   // The plane z = 2 - x: from the origin towards (1, 0, 1) the hit is at (1, 0, 1).
   const double r = std::sqrt(0.5);
   scene.addRectangle({{2, -1, 0}, {-r, 0, r}, {0, 1, 0}, 4, 2}, test::evenPaint(0));
-  const auto hit = scene.cast({0, 0, 0}, {3, 0, 3});
+  const auto hit = castRay(scene, {0, 0, 0}, {3, 0, 3});
   ASSERT_TRUE(hit.has_value());
   EXPECT_NEAR(hit->distance_m, std::sqrt(2.0), 1e-15);
   EXPECT_LT((hit->p_world - Eigen::Vector3d(1, 0, 1)).norm(), 1e-15);
-  EXPECT_FLOAT_EQ(hit->place.v_m, 1);
-  EXPECT_FLOAT_EQ(hit->place.u_m, static_cast<float>(std::sqrt(2.0)));
+  EXPECT_FLOAT_EQ(hit->point.v_m, 1);
+  EXPECT_FLOAT_EQ(hit->point.u_m, static_cast<float>(std::sqrt(2.0)));
 }
 
 TEST(Scene, ARectangleEndsAtItsBordersAndHasOneSide) {
   Scene scene;
   scene.addRectangle(test::facingWall(2, 1, 1), test::evenPaint(0));
-  EXPECT_TRUE(scene.cast({0, 0, 0}, {0.249, 0.249, 1}).has_value());
-  EXPECT_FALSE(scene.cast({0, 0, 0}, {0.251, 0, 1}).has_value());
-  EXPECT_FALSE(scene.cast({0, 0, 0}, {0, -0.251, 1}).has_value());
-  EXPECT_FALSE(scene.cast({0, 0, 4}, {0, 0, -1}).has_value());  // from behind
-  EXPECT_FALSE(scene.cast({0, 0, 0}, {0, 0, -1}).has_value());  // looking away
+  EXPECT_TRUE(castRay(scene, {0, 0, 0}, {0.249, 0.249, 1}).has_value());
+  EXPECT_FALSE(castRay(scene, {0, 0, 0}, {0.251, 0, 1}).has_value());
+  EXPECT_FALSE(castRay(scene, {0, 0, 0}, {0, -0.251, 1}).has_value());
+  EXPECT_FALSE(castRay(scene, {0, 0, 4}, {0, 0, -1}).has_value());  // from behind
+  EXPECT_FALSE(castRay(scene, {0, 0, 0}, {0, 0, -1}).has_value());  // looking away
 }
 
 TEST(Scene, ABoxShowsItsNearestFaceFromEverySide) {
@@ -48,7 +49,7 @@ TEST(Scene, ABoxShowsItsNearestFaceFromEverySide) {
   for (int axis = 0; axis < 3; ++axis) {
     for (const double side : {-1.0, 1.0}) {
       const Eigen::Vector3d away = side * Eigen::Vector3d::Unit(axis);
-      const auto hit = scene.cast(T_world_box.translation + 5 * away, -away);
+      const auto hit = castRay(scene, T_world_box.translation + 5 * away, -away);
       ASSERT_TRUE(hit.has_value());
       EXPECT_NEAR(hit->distance_m, 5 - 0.1 * (axis + 1), 1e-12);
     }
@@ -69,41 +70,41 @@ TEST(Scene, APoleIsARegularPrismFromEverySide) {
     const Eigen::Vector3d out_pole(std::cos(angle), std::sin(angle), 0);
     const Eigen::Vector3d on_axis_pole(0, 0, random.uniform(-0.999, 0.999));
     const Eigen::Vector3d out_world = T_world_pole.rotation * out_pole;
-    const auto side = scene.cast(T_world_pole * on_axis_pole + 5 * out_world, -out_world);
+    const auto side = castRay(scene, T_world_pole * on_axis_pole + 5 * out_world, -out_world);
     ASSERT_TRUE(side.has_value());
     EXPECT_GE(5 - side->distance_m, apothem - 1e-9);
     EXPECT_LE(5 - side->distance_m, 0.1 + 1e-9);
-    // Along: an end is closed wherever it is inside the polygon.
+    // Along: an end is closed everywhere inside the polygon.
     const Eigen::Vector3d inside_pole = random.uniform(0, 0.999 * apothem) * out_pole;
     const double end = random.below(2) == 0 ? -1 : 1;
     const Eigen::Vector3d along_world = T_world_pole.rotation * Eigen::Vector3d(0, 0, end);
-    const auto cap = scene.cast(T_world_pole * inside_pole + 5 * along_world, -along_world);
+    const auto cap = castRay(scene, T_world_pole * inside_pole + 5 * along_world, -along_world);
     ASSERT_TRUE(cap.has_value());
     EXPECT_NEAR(cap->distance_m, 4, 1e-9);
   }
 }
 
-TEST(Scene, RefusesAPoleThatIsNone) {
+TEST(Scene, RefusesAnInvalidPole) {
   Scene scene;
   EXPECT_THROW(scene.addPole({{}, 0, 1, 8}, test::evenPaint(0)), std::invalid_argument);
   EXPECT_THROW(scene.addPole({{}, 0.1, 0, 8}, test::evenPaint(0)), std::invalid_argument);
   EXPECT_THROW(scene.addPole({{}, 0.1, 1, 7}, test::evenPaint(0)), std::invalid_argument);
 }
 
-TEST(Scene, MovesAllThereIs) {
+TEST(Scene, MovesAllSurfaces) {
   Scene scene;
   scene.addRectangle(test::facingWall(2, 1, 1), test::evenPaint(0));
   Rigid3 T_world_old;
   T_world_old.rotation = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitY());  // z becomes x
   T_world_old.translation = {0, 0.3, 0};
   scene.move(T_world_old);
-  const auto hit = scene.cast({0, 0.3, 0}, {1, 0, 0});
+  const auto hit = castRay(scene, {0, 0.3, 0}, {1, 0, 0});
   ASSERT_TRUE(hit.has_value());
   EXPECT_NEAR(hit->distance_m, 2, 1e-12);
-  EXPECT_NEAR(hit->place.u_m, 0.5, 1e-6);
+  EXPECT_NEAR(hit->point.u_m, 0.5, 1e-6);
 }
 
-TEST(SceneView, FindsWhatThePlainRayCastFinds) {
+TEST(SceneView, FindsTheHitsOfThePlainRayCast) {
   RandomNumbers random(7);
   int hits = 0;
   for (int trial = 0; trial < 20; ++trial) {
@@ -122,18 +123,19 @@ TEST(SceneView, FindsWhatThePlainRayCastFinds) {
         Eigen::AngleAxisd(random.uniform(0, 3), randomVector(random, 1).normalized());
     const SceneView view(scene, T_world_cam, {{-0.8, -0.6}, {0.8, 0.6}});
     for (int i = 0; i < 2000; ++i) {
-      // Some of them beyond the bounds.
+      // Some rays are outside of the bounds.
       const Eigen::Vector2d ray(random.uniform(-1, 1), random.uniform(-1, 1));
       const Eigen::Vector3d direction_cam = ray.homogeneous();
-      const auto plain = scene.cast(T_world_cam.translation, T_world_cam.rotation * direction_cam);
+      const auto plain =
+          castRay(scene, T_world_cam.translation, T_world_cam.rotation * direction_cam);
       const ViewHit fast = view.cast(ray);
-      ASSERT_EQ(fast.surface, plain ? plain->place.surface : -1) << ray.transpose();
+      ASSERT_EQ(fast.surface, plain ? plain->point.surface : -1) << ray.transpose();
       if (!plain) continue;
       ++hits;
       EXPECT_NEAR(direction_cam.norm() / fast.inverse_depth, plain->distance_m, 1e-9);
-      const SurfacePoint place = view.placeOf(fast, ray);
-      EXPECT_NEAR(place.u_m, plain->place.u_m, 1e-5);
-      EXPECT_NEAR(place.v_m, plain->place.v_m, 1e-5);
+      const SurfacePoint point = view.surfacePointOf(fast, ray);
+      EXPECT_NEAR(point.u_m, plain->point.u_m, 1e-5);
+      EXPECT_NEAR(point.v_m, plain->point.v_m, 1e-5);
     }
   }
   EXPECT_GT(hits, 2000);

@@ -21,7 +21,7 @@ double blurredStep(double distance, double sigma) {
   return 0.5 * (1 + std::erf(distance / sigma / std::sqrt(2.0)));
 }
 
-TEST(Texture, ShowsAnEdgeUnderTheBlurThatIsAskedFor) {
+TEST(Texture, ShowsAnEdgeUnderTheRequestedBlur) {
   const Texture edge = makeEdge(0.01);
   // Whole levels of the pyramid: 1, 2, 4 and 8 texels.
   for (const double sigma : {0.01, 0.02, 0.04, 0.08}) {
@@ -32,14 +32,14 @@ TEST(Texture, ShowsAnEdgeUnderTheBlurThatIsAskedFor) {
   }
 }
 
-TEST(Texture, KeepsAnEdgeInItsPlaceUnderEveryBlur) {
+TEST(Texture, KeepsThePositionOfAnEdgeUnderEveryBlur) {
   const Texture edge = makeEdge(0.01);
   for (double sigma = 0.005; sigma < 0.2; sigma *= 1.1) {
     EXPECT_NEAR(edge.sample(1, 1, sigma), 0.5, 0.01) << "sigma " << sigma;
   }
 }
 
-TEST(Texture, ChangesSmoothlyWithPlaceAndBlur) {
+TEST(Texture, ChangesSmoothlyWithPositionAndBlur) {
   const Texture edge = makeEdge(0.01);
   for (double u = 0.8; u < 1.2; u += 0.0005) {
     EXPECT_NEAR(edge.sample(u, 1, 0.017), edge.sample(u + 0.0005, 1, 0.017), 0.02);
@@ -49,7 +49,7 @@ TEST(Texture, ChangesSmoothlyWithPlaceAndBlur) {
   }
 }
 
-TEST(Texture, GoesOnBeyondItsBorder) {
+TEST(Texture, RepeatsItsBorder) {
   const Texture edge = makeEdge(0.01);
   EXPECT_EQ(edge.sample(-5, -5, 0.01), 0.0F);
   EXPECT_EQ(edge.sample(50, 50, 0.01), 1.0F);

@@ -23,7 +23,7 @@ TEST(EventNoise, EveryPixelFiresAtTheBackgroundRateWithHalfOfEachPolarity) {
   options.background_hz = 5;
   EventNoise noise(40, 30, options, {1, kSecondNs});
   const auto events = fireAll(noise, 30, 3 * kSecondNs);
-  // 12000 expected; a Poisson number's standard deviation is its root, 110.
+  // 12000 expected. The stddev of a Poisson number is its root, 110.
   EXPECT_NEAR(static_cast<double>(events.size()), 12'000, 450);
   int on = 0;
   std::map<std::pair<int, int>, int> per_pixel;
@@ -41,9 +41,9 @@ TEST(EventNoise, EveryPixelFiresAtTheBackgroundRateWithHalfOfEachPolarity) {
   EXPECT_NEAR(squares / 1200, 10, 1.7);
 }
 
-TEST(EventNoise, ASteadyShareOfThePixelsIsHot) {
+TEST(EventNoise, AFixedFractionOfThePixelsIsHot) {
   EventNoiseOptions options;
-  options.hot_share = 0.05;
+  options.hot_fraction = 0.05;
   options.hot_hz = 200;
   EventNoise noise(100, 80, options, {1, 0});
   std::map<std::pair<int, int>, int> per_pixel;
@@ -52,7 +52,7 @@ TEST(EventNoise, ASteadyShareOfThePixelsIsHot) {
   for (const auto& [pixel, count] : per_pixel) EXPECT_NEAR(count, 200, 75);
 }
 
-TEST(EventNoise, DoesNotDependOnWhenItIsAsked) {
+TEST(EventNoise, DoesNotDependOnTheTimesOfTheCalls) {
   EventNoiseOptions options;
   options.background_hz = 300;
   EventNoise at_once(1, 1, options, {7, 0});
@@ -76,17 +76,13 @@ TEST(EventNoise, IsSilentByDefault) {
   EXPECT_TRUE(fireAll(noise, 10, 1000 * kSecondNs).empty());
 }
 
-TEST(EventNoise, RefusesRatesAndSharesOutOfRange) {
+TEST(EventNoise, RefusesRatesAndFractionsOutOfRange) {
   for (const double bad : {-1.0, 1e6, std::nan("")}) {
-    EventNoiseOptions options;
-    options.background_hz = bad;
-    EXPECT_THROW(EventNoise(2, 2, options, {}), std::invalid_argument);
-    options = {};
-    options.hot_hz = bad;
-    EXPECT_THROW(EventNoise(2, 2, options, {}), std::invalid_argument);
-    options = {};
-    options.hot_share = bad;
-    EXPECT_THROW(EventNoise(2, 2, options, {}), std::invalid_argument);
+    for (const EventNoiseOptions& options :
+         {EventNoiseOptions{bad, 0, 1000}, EventNoiseOptions{0, bad, 1000},
+          EventNoiseOptions{0, 0, bad}}) {
+      EXPECT_THROW(EventNoise(2, 2, options, {}), std::invalid_argument);
+    }
   }
 }
 

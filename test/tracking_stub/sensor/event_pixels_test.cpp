@@ -23,7 +23,7 @@ class OnePixel : public ::testing::Test {
   EventPixels pixels;
 };
 
-TEST_F(OnePixel, FiresWheneverTheThresholdIsCrossedAtTheTimeOfCrossing) {
+TEST_F(OnePixel, FiresAtTheTimeWhenTheThresholdIsCrossed) {
   // From 1.0 to 1.5 in 10 ms: 1.2 is crossed after 4 ms, 1.4 after 8 ms.
   const auto events = step({0, 10'000'000}, 1.0F, 1.5F);
   ASSERT_EQ(events.size(), 2U);
@@ -33,7 +33,7 @@ TEST_F(OnePixel, FiresWheneverTheThresholdIsCrossedAtTheTimeOfCrossing) {
 
 TEST_F(OnePixel, RemembersItsLastEventAcrossSteps) {
   EXPECT_TRUE(step({0, 10'000'000}, 1.0F, 1.15F).empty());
-  // 1.2 is crossed a quarter of the way from 1.15 to 1.35.
+  // The step from 1.15 to 1.35 crosses 1.2 after a quarter of its time.
   const auto brighter = step({10'000'000, 20'000'000}, 1.15F, 1.35F);
   ASSERT_EQ(brighter.size(), 1U);
   EXPECT_EQ(brighter[0].t_ns, 12'500'000);
@@ -48,7 +48,7 @@ TEST_F(OnePixel, FiresContrastOverThresholdEvents) {
   EXPECT_EQ(step({0, 1'000'000}, 1.0F, 2.01F).size(), 5U);
 }
 
-TEST_F(OnePixel, FiresAtOnceWhereItStartsAThresholdAwayAndNothingChanges) {
+TEST_F(OnePixel, FiresAtOnceWhenItStartsAThresholdAwayWithoutAChange) {
   EventPixels running(1, 1, EventPixelOptions{0.2, 0.2});
   running.start(level(1.0F));
   std::vector<Event> events;
@@ -67,22 +67,30 @@ TEST_F(OnePixel, StampsWholeMicrosecondsAlsoOfALargeClock) {
   }
 }
 
-TEST_F(OnePixel, IsSilentWhileNothingChanges) {
-  EXPECT_TRUE(step({0, 1'000'000}, 1.0F, 1.0F).empty());
+TEST_F(OnePixel, IsSilentWithoutAChange) { EXPECT_TRUE(step({0, 1'000'000}, 1.0F, 1.0F).empty()); }
+
+std::vector<Event> fireAll(EventPixels& pixels, const cv::Mat1f& from, const cv::Mat1f& to) {
+  std::vector<Event> events;
+  for (int y = 0; y < from.rows; ++y) pixels.fireRow(y, {0, 1'000'000}, from, to, events);
+  return events;
 }
 
-TEST(EventPixels, StartWithinTheThresholdOfWhatTheySee) {
-  const cv::Mat1f seen(40, 40, 3.0F);
-  EventPixels pixels(40, 40, EventPixelOptions{0.2, 0.2});
-  pixels.start(seen, 5);
-  std::vector<Event> still;
-  std::vector<Event> brighter;
-  for (int y = 0; y < 40; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, seen, still);
-  EXPECT_TRUE(still.empty());
-  // A change by half a threshold reaches the quarter of the pixels that were nearest to it.
-  const cv::Mat1f later(40, 40, 3.1F);
-  for (int y = 0; y < 40; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, later, brighter);
-  EXPECT_NEAR(static_cast<double>(brighter.size()), 400, 60);
+TEST(EventPixels, StartWithinTheirThresholdsOfTheCurrentIntensity) {
+  struct Row {
+    EventPixelOptions thresholds;
+    float change;
+    double fired, tolerance;  // of 3600 pixels
+  };
+  // A change by half a threshold fires a quarter of the pixels. With thresholds of 0.1 and 0.4,
+  // half of the pixels wait for 0 to 0.1: a change by 0.05 fires a quarter, too.
+  for (const Row& row : {Row{{0.2, 0.2}, 0.1F, 900, 100}, Row{{0.1, 0.4}, 0.05F, 900, 100}}) {
+    const cv::Mat1f seen(60, 60, 3.0F);
+    EventPixels pixels(60, 60, row.thresholds);
+    pixels.start(seen, 5);
+    EXPECT_TRUE(fireAll(pixels, seen, seen).empty());
+    const auto fired = fireAll(pixels, seen, cv::Mat1f(60, 60, 3.0F + row.change));
+    EXPECT_NEAR(static_cast<double>(fired.size()), row.fired, row.tolerance);
+  }
 }
 
 TEST(EventPixels, HaveAThresholdEachForBrighterAndDarker) {
@@ -98,20 +106,6 @@ TEST(EventPixels, HaveAThresholdEachForBrighterAndDarker) {
   EXPECT_EQ(down.size(), 4U);
 }
 
-TEST(EventPixels, StartWithinTheirOwnThresholds) {
-  const cv::Mat1f seen(60, 60, 0.0F);
-  EventPixels pixels(60, 60, EventPixelOptions{0.1, 0.4});
-  pixels.start(seen, 5);
-  std::vector<Event> still;
-  std::vector<Event> brighter;
-  for (int y = 0; y < 60; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, seen, still);
-  EXPECT_TRUE(still.empty());
-  // Half of them wait for 0 to 0.1 more, evenly: 0.05 reaches a quarter of all.
-  const cv::Mat1f later(60, 60, 0.05F);
-  for (int y = 0; y < 60; ++y) pixels.fireRow(y, {0, 1'000'000}, seen, later, brighter);
-  EXPECT_NEAR(static_cast<double>(brighter.size()), 900, 100);
-}
-
 TEST(EventPixels, MismatchScattersThresholdsFromPixelToPixel) {
   EventPixelOptions options{0.1, 0.1};
   options.mismatch = 0.1;
@@ -120,10 +114,9 @@ TEST(EventPixels, MismatchScattersThresholdsFromPixelToPixel) {
   const auto counts_of = [&](std::uint64_t seed) {
     EventPixels pixels(60, 60, options, seed);
     pixels.start(low);
-    std::vector<Event> events;
-    for (int y = 0; y < 60; ++y) pixels.fireRow(y, {0, 1'000'000}, low, high, events);
     std::vector<double> counts(3600, 0.0);
-    for (const Event& event : events) ++counts[static_cast<std::size_t>(event.y * 60 + event.x)];
+    for (const Event& event : fireAll(pixels, low, high))
+      ++counts[static_cast<std::size_t>(event.y * 60 + event.x)];
     return counts;
   };
   // A pixel fires 10 / threshold times: its threshold is 10 / count, to 1 %.
@@ -139,12 +132,12 @@ TEST(EventPixels, MismatchScattersThresholdsFromPixelToPixel) {
   EXPECT_NE(counts_of(3), counts_of(4));
 }
 
-TEST(EventPixels, AreBlindForTheRefractoryPeriodAndThenStartFromWhatTheySee) {
+TEST(EventPixels, AreBlindForTheRefractoryPeriodAndThenRememberTheCurrentIntensity) {
   EventPixelOptions options{0.2, 0.2};
   options.refractory_ns = 3'000'000;
   EventPixels pixels(1, 1, options);
-  // 0.1 per millisecond: 0.2 is crossed at 2 ms; at 5 ms, blind until then, it sees 0.5; then 0.7
-  // at 7 ms, and 1.0 at 10 ms, which is the end of the first step; then 1.2 at 12 ms.
+  // The change is 0.1 per millisecond. 0.2 is crossed at 2 ms, and the pixel is blind until 5 ms.
+  // From 0.5 it crosses 0.7 at 7 ms and is blind until 10 ms. From 1.0 it crosses 1.2 at 12 ms.
   const auto at = [](float value) { return cv::Mat1f(1, 1, value); };
   pixels.start(at(0));
   std::vector<Event> events;
@@ -176,18 +169,12 @@ TEST(EventPixels, NeverFireTwiceWithinTheRefractoryPeriod) {
   }
 }
 
-TEST(EventPixels, RefuseWhatIsOutOfRange) {
-  EventPixelOptions options;
-  options.mismatch = 0.6;
-  EXPECT_THROW(EventPixels(4, 4, options), std::invalid_argument);
-  options = {};
-  options.refractory_ns = -1;
-  EXPECT_THROW(EventPixels(4, 4, options), std::invalid_argument);
-}
-
-TEST(EventPixels, RefuseAThresholdThatIsNotPositive) {
-  EXPECT_THROW(EventPixels(4, 4, EventPixelOptions{0, 0.2}), std::invalid_argument);
-  EXPECT_THROW(EventPixels(4, 4, EventPixelOptions{0.2, std::nan("")}), std::invalid_argument);
+TEST(EventPixels, RefuseOptionsOutOfRange) {
+  for (const EventPixelOptions& options :
+       {EventPixelOptions{0, 0.2}, EventPixelOptions{0.2, std::nan("")},
+        EventPixelOptions{0.2, 0.2, 0.6}, EventPixelOptions{0.2, 0.2, 0, -1}}) {
+    EXPECT_THROW(EventPixels(4, 4, options), std::invalid_argument);
+  }
 }
 
 }  // namespace

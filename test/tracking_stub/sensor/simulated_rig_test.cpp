@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -34,7 +36,7 @@ Simulation passingEdge() {
   return simulation;
 }
 
-TEST(SimulatedRig, AMovingEdgeFiresWhereAndWhenItPasses) {
+TEST(SimulatedRig, AMovingEdgeFiresAtItsPositionAndTime) {
   const Simulation simulation = passingEdge();
   const auto recordings = simulateEvents(simulation);
   ASSERT_EQ(recordings.size(), 1U);
@@ -44,20 +46,20 @@ TEST(SimulatedRig, AMovingEdgeFiresWhereAndWhenItPasses) {
   for (const Event& event : recordings[0].events) {
     const double edge_x =
         model.cx - model.fx * kSpeed / kDepth * (static_cast<double>(event.t_ns) * 1e-9);
-    // Under a blur of half a pixel the edge is felt up to two pixels away.
+    // With a blur of half a pixel, the edge has an effect up to two pixels away.
     EXPECT_NEAR(event.x, edge_x, 2.5);
-    EXPECT_TRUE(event.polarity);  // the bright side comes
+    EXPECT_TRUE(event.polarity);  // the bright side enters
     sum_px += event.x - edge_x;
   }
-  // On average it is where it is, but for the lag of pixels that fire a threshold late.
+  // The mean is the edge, except for the lag of a threshold.
   EXPECT_NEAR(sum_px / static_cast<double>(recordings[0].events.size()), 0, 0.1);
 }
 
-TEST(SimulatedRig, TheBrightnessAtTheTimeOfAnEventIsAThresholdFurther) {
+TEST(SimulatedRig, TheBrightnessBetweenTwoEventsChangesByTheThreshold) {
   const Simulation simulation = passingEdge();
   const auto events = simulateEvents(simulation)[0].events;
   const CameraModel& model = simulation.rig.cameras[0].model;
-  // What theory sees in a pixel: the edge under a Gaussian of half a pixel.
+  // The edge under a Gaussian blur of half a pixel.
   const auto brightness = [&](const Event& event) {
     const double edge_x =
         model.cx - model.fx * kSpeed / kDepth * (static_cast<double>(event.t_ns) * 1e-9);
@@ -77,14 +79,14 @@ TEST(SimulatedRig, TheBrightnessAtTheTimeOfAnEventIsAThresholdFurther) {
   EXPECT_GT(compared, 1000);
 }
 
-TEST(SimulatedRig, EveryPixelThatTheEdgePassesFiresContrastOverThreshold) {
+TEST(SimulatedRig, EveryPixelOnThePathOfTheEdgeFiresContrastOverThreshold) {
   const Simulation simulation = passingEdge();
   std::map<int, int> per_column;
   const auto recordings = simulateEvents(simulation);
   for (const Event& event : recordings[0].events) ++per_column[event.x];
-  // From t = -1 s to 1 s the edge passes the columns 46.5 to 16.5; well within them each pixel sees
-  // the whole contrast. What is left of it below a threshold fires nothing: half a threshold on
-  // average, as the memory at the start is random.
+  // From t = -1 s to 1 s the edge passes the columns 46.5 to 16.5. Well within them each pixel sees
+  // the whole contrast. The remainder below a threshold fires no event. Its mean is half a
+  // threshold, because the memory at the start is random.
   for (int x = 20; x <= 43; ++x) {
     const double mean = per_column[x] / 48.0;
     EXPECT_NEAR(mean, kContrast / kThreshold - 0.5, 0.35) << "column " << x;
@@ -93,7 +95,7 @@ TEST(SimulatedRig, EveryPixelThatTheEdgePassesFiresContrastOverThreshold) {
   EXPECT_EQ(per_column.count(55), 0U);
 }
 
-TEST(SimulatedRig, EventsComeFromThePlaceThatFired) {
+TEST(SimulatedRig, SourcesOfEventsLieOnTheEdge) {
   const Simulation simulation = passingEdge();
   const auto recording = simulateEvents(simulation)[0];
   ASSERT_EQ(recording.sources.size(), recording.events.size());
@@ -106,7 +108,7 @@ TEST(SimulatedRig, ASilhouetteBelongsToTheSurfaceInFrontAndIsPreciseToAPixel) {
   Simulation simulation = passingEdge();
   simulation.scene = Scene();
   simulation.scene.addRectangle(test::facingWall(3, 20, 20), test::evenPaint(0));
-  // A card with its left border at x = 0, much brighter, 1 m away.
+  // A much brighter card 1 m away. Its left border is at x = 0.
   simulation.scene.addRectangle({{0, 1, 1}, {1, 0, 0}, {0, -1, 0}, 2, 2},
                                 test::evenPaint(kContrast));
   const auto recording = simulateEvents(simulation)[0];
@@ -151,7 +153,7 @@ TEST(SimulatedRig, TheSameSeedGivesTheSameEventsWithAnyNumberOfThreads) {
   EXPECT_NE(simulateEvents(desk)[1].events, events[0]);
 }
 
-TEST(SimulatedRig, NoiseComesOnTopAndFromNoPlace) {
+TEST(SimulatedRig, NoiseIsAddedAndHasNoSource) {
   Simulation simulation = passingEdge();
   const auto ideal = simulateEvents(simulation)[0];
   simulation.noise.background_hz = 1;
@@ -166,7 +168,7 @@ TEST(SimulatedRig, NoiseComesOnTopAndFromNoPlace) {
               5 * std::sqrt(expected));
 }
 
-TEST(SimulatedRig, APassingEdgeIsWhereTheLensBendsIt) {
+TEST(SimulatedRig, AnEdgeFiresOnItsDistortedImage) {
   for (const DistortionModel distortion :
        {DistortionModel::kRadtan, DistortionModel::kEquidistant}) {
     Simulation simulation = passingEdge();
@@ -175,13 +177,13 @@ TEST(SimulatedRig, APassingEdgeIsWhereTheLensBendsIt) {
     camera.model.coefficients = distortion == DistortionModel::kRadtan
                                     ? std::vector<double>{-0.3, 0.1, 0.002, -0.003}
                                     : std::vector<double>{-0.05, 0.01, -0.02, 0.005};
-    // A camera upright on the rig, beside its origin.
+    // A rotated camera, not at the origin of the rig.
     camera.T_rig_cam.rotation = Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitZ()) *
                                 Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitX());
     camera.T_rig_cam.translation = {0.05, -0.1, 0.02};
     const auto recording = simulateEvents(simulation)[0];
     ASSERT_GT(recording.events.size(), 1000U);
-    double off_px = 0;
+    double sum_px = 0;
     std::size_t compared = 0;
     for (std::size_t i = 0; i < recording.events.size(); i += 7, ++compared) {
       const Event& event = recording.events[i];
@@ -195,33 +197,33 @@ TEST(SimulatedRig, APassingEdgeIsWhereTheLensBendsIt) {
         nearest_px = std::min(
             nearest_px, (camera.model.project(p_cam) - Eigen::Vector2d(event.x, event.y)).norm());
       }
-      // The blur is felt two pixels away; a pixel that starts a hair from its threshold feels more.
+      // The blur has an effect two pixels away, and more where a pixel starts close to its
+      // threshold.
       ASSERT_LT(nearest_px, 5);
-      off_px += nearest_px;
+      sum_px += nearest_px;
     }
-    EXPECT_LT(off_px / static_cast<double>(compared), 0.8);
+    EXPECT_LT(sum_px / static_cast<double>(compared), 0.8);
   }
 }
 
-TEST(SimulatedRig, ReportsItsProgressUpToTheEnd) {
+TEST(SimulatedRig, ReportsItsProgressToTheEnd) {
   SimulationRun run;
-  std::vector<double> shares;
-  run.progress = [&shares](double share) { shares.push_back(share); };
+  std::vector<double> fractions;
+  run.progress = [&fractions](double fraction) { fractions.push_back(fraction); };
   simulateEvents(passingEdge(), run);
-  EXPECT_TRUE(std::is_sorted(shares.begin(), shares.end()));
-  EXPECT_DOUBLE_EQ(shares.back(), 1);
+  EXPECT_TRUE(std::is_sorted(fractions.begin(), fractions.end()));
+  EXPECT_DOUBLE_EQ(fractions.back(), 1);
 }
 
-TEST(SimulatedRig, RefusesWhatItCannotSimulate) {
-  Simulation simulation = passingEdge();
-  simulation.rig.cameras[0].time_offset_ns = 5;
-  EXPECT_THROW(simulateEvents(simulation), std::invalid_argument);
-  simulation = passingEdge();
-  simulation.motion = nullptr;
-  EXPECT_THROW(simulateEvents(simulation), std::invalid_argument);
-  simulation = passingEdge();
-  simulation.duration_ns = 0;
-  EXPECT_THROW(simulateEvents(simulation), std::invalid_argument);
+TEST(SimulatedRig, RefusesInvalidSimulations) {
+  const std::function<void(Simulation&)> mistakes[] = {
+      [](Simulation& s) { s.rig.cameras[0].time_offset_ns = 5; },
+      [](Simulation& s) { s.motion = nullptr; }, [](Simulation& s) { s.duration_ns = 0; }};
+  for (const auto& makeMistake : mistakes) {
+    Simulation simulation = passingEdge();
+    makeMistake(simulation);
+    EXPECT_THROW(simulateEvents(simulation), std::invalid_argument);
+  }
   SimulationRun run;
   run.threads = 0;
   EXPECT_THROW(simulateEvents(passingEdge(), run), std::invalid_argument);

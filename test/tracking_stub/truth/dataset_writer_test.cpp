@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstring>
 #include <fstream>
@@ -13,6 +12,7 @@
 #include <stdexcept>
 
 #include "mapping/geometry/reference_view.h"
+#include "test/plugin/temporary_folder.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/rendering/depth_rendering.h"
@@ -37,14 +37,9 @@ std::set<std::string> namesIn(const fs::path& folder) {
   return names;
 }
 
-class DatasetWriterTest : public ::testing::Test {
+class DatasetWriterTest : public TemporaryFolder {
  protected:
-  DatasetWriterTest()
-      : place(fs::path(::testing::TempDir()) /
-              ("dataset_writer_" + std::to_string(getpid()) + "_" +
-               ::testing::UnitTest::GetInstance()->current_test_info()->name())) {
-    fs::remove_all(place);
-    fs::create_directories(place);
+  DatasetWriterTest() {
     simulation.scene.addRectangle(test::facingWall(1, 4, 4), test::edgePaint(2.0, 1.0F, 0.01));
     simulation.rig.cameras.assign(2, test::smallCamera());
     simulation.rig.cameras[1].T_rig_cam.translation = {0.1, 0, 0};
@@ -55,46 +50,43 @@ class DatasetWriterTest : public ::testing::Test {
     simulation.scene.addRectangle({{0.3, 1, 0.9}, {1, 0, 0}, {0, -1, 0}, 0.1, 2},
                                   test::evenPaint(2));
   }
-  ~DatasetWriterTest() override { fs::remove_all(place); }
 
-  fs::path place;
   Simulation simulation;
 };
 
-TEST_F(DatasetWriterTest, WritesTheWholeFolderAndNothingBesideIt) {
+TEST_F(DatasetWriterTest, WritesAllFilesAndNothingElse) {
   const auto recordings = simulateEvents(simulation);
-  DatasetWriter(place / "desk/").write(simulation, recordings);
-  EXPECT_THAT(namesIn(place), ElementsAre("desk"));
-  const fs::path folder = place / "desk";
-  EXPECT_THAT(namesIn(folder), ElementsAre("cam0", "cam1", "camchain.yaml", "depth", "gt_cloud.ply",
-                                           "gt_edges.ply", "poses.txt"));
-  EXPECT_THAT(namesIn(folder / "depth"),
-              ElementsAre("cam0_1.000000000.tiff", "cam0_1.050000000.tiff", "cam0_1.100000000.tiff",
-                          "index.txt"));
-  EXPECT_EQ(contentOf(folder / "depth/index.txt"),
+  DatasetWriter(folder() / "desk/").write(simulation, recordings);
+  EXPECT_THAT(namesIn(folder()), ElementsAre("desk"));
+  const fs::path desk = folder() / "desk";
+  EXPECT_THAT(namesIn(desk), ElementsAre("cam0", "cam1", "camchain.yaml", "depth", "gt_cloud.ply",
+                                         "gt_edges.ply", "poses.txt"));
+  EXPECT_THAT(namesIn(desk / "depth"), ElementsAre("cam0_1.000000000.tiff", "cam0_1.050000000.tiff",
+                                                   "cam0_1.100000000.tiff", "index.txt"));
+  EXPECT_EQ(contentOf(desk / "depth/index.txt"),
             "1.000000000 cam0_1.000000000.tiff\n1.050000000 cam0_1.050000000.tiff\n"
             "1.100000000 cam0_1.100000000.tiff\n");
 
-  const auto poses = readTumTrajectory(folder / "poses.txt");
+  const auto poses = readTumTrajectory(desk / "poses.txt");
   ASSERT_EQ(poses.size(), 101U);
   EXPECT_EQ(poses.back().T_world_rig.translation,
             simulation.motion->poseAt(simulation.endNs()).translation);
 
   const cv::Mat depth =
-      cv::imread((folder / "depth/cam0_1.050000000.tiff").string(), cv::IMREAD_UNCHANGED);
+      cv::imread((desk / "depth/cam0_1.050000000.tiff").string(), cv::IMREAD_UNCHANGED);
   ASSERT_EQ(depth.type(), CV_32FC1);
   const cv::Mat1f truth = renderDepth(simulation.scene, simulation.motion->poseAt(1'050'000'000),
                                       ReferenceView::of(simulation.rig.cameras[0].model));
   EXPECT_EQ(cv::norm(depth, truth, cv::NORM_INF), 0);
 }
 
-TEST_F(DatasetWriterTest, TruthCloudsLieOnTheSurfacesAndEdgesWhereEventsWere) {
+TEST_F(DatasetWriterTest, TruthCloudsLieOnSurfacesAndOnEdgesWithEvents) {
   const auto recordings = simulateEvents(simulation);
   ASSERT_GT(recordings[0].events.size(), 100U);
-  DatasetWriter(place / "desk").write(simulation, recordings);
+  DatasetWriter(folder() / "desk").write(simulation, recordings);
   std::map<std::string, std::vector<Eigen::Vector3f>> clouds;
   for (const std::string name : {"gt_cloud.ply", "gt_edges.ply"}) {
-    const std::string content = contentOf(place / "desk" / name);
+    const std::string content = contentOf(folder() / "desk" / name);
     const std::size_t begin = content.find("end_header\n") + 11;
     EXPECT_THAT(content, HasSubstr("format binary_little_endian 1.0"));
     clouds[name].resize((content.size() - begin) / 12);
@@ -114,59 +106,48 @@ TEST_F(DatasetWriterTest, TruthCloudsLieOnTheSurfacesAndEdgesWhereEventsWere) {
   }
 }
 
-TEST_F(DatasetWriterTest, RefusesAFolderThatHoldsSomething) {
-  fs::create_directories(place / "desk");
-  std::ofstream(place / "desk/precious.txt") << "x";
-  try {
-    DatasetWriter writer(place / "desk");
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr((place / "desk").string()));
+TEST_F(DatasetWriterTest, NamesTheFolderThatItCannotMake) {
+  fs::create_directories(folder() / "desk");
+  std::ofstream(folder() / "desk/precious.txt") << "x";
+  std::ofstream(folder() / "file") << "x";
+  const std::pair<fs::path, std::string> rows[] = {
+      {folder() / "desk", (folder() / "desk").string()},
+      {folder() / "file/desk", (folder() / "file").string()},
+      {"", "'': expected the name of the folder"}};
+  for (const auto& [path, expected] : rows) {
+    try {
+      DatasetWriter writer(path);
+      ADD_FAILURE() << path << ": no error";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(expected));
+    }
   }
-  EXPECT_THAT(namesIn(place), ElementsAre("desk"));
+  EXPECT_THAT(namesIn(folder()), ElementsAre("desk", "file"));
 }
 
-TEST_F(DatasetWriterTest, NamesThePlaceThatCannotBeWritten) {
-  std::ofstream(place / "file") << "x";
-  try {
-    DatasetWriter writer(place / "file/desk");
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr((place / "file").string()));
-  }
-}
-
-TEST_F(DatasetWriterTest, RefusesAFolderWithoutAName) {
-  try {
-    DatasetWriter writer("");
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("'': expected the name of the folder"));
-  }
-}
-
-TEST_F(DatasetWriterTest, LeavesNothingBehindWhereItFails) {
+TEST_F(DatasetWriterTest, RemovesTheTemporaryFolderAfterAnError) {
   {
-    DatasetWriter writer(place / "desk");
-    EXPECT_THAT(namesIn(place), ElementsAre(HasSubstr("unfinished")));
+    DatasetWriter writer(folder() / "desk");
+    EXPECT_THAT(namesIn(folder()), ElementsAre(HasSubstr("unfinished")));
     EXPECT_THROW(writer.write(simulation, {}), std::invalid_argument);
   }
-  EXPECT_TRUE(namesIn(place).empty());
+  EXPECT_TRUE(namesIn(folder()).empty());
 }
 
 TEST_F(DatasetWriterTest, RefusesARigWhoseFrameIsNotCameraZero) {
   simulation.rig.cameras[0].T_rig_cam.translation = {0, 0.1, 0};
-  DatasetWriter writer(place / "desk");
+  DatasetWriter writer(folder() / "desk");
   EXPECT_THROW(writer.write(simulation, std::vector<CameraRecording>(2)), std::invalid_argument);
 }
 
 TEST_F(DatasetWriterTest, EventsHaveNineDecimals) {
-  writeEvents(place / "events.txt",
+  writeEvents(folder() / "events.txt",
               {{1'000'004'000, 3, 65535, true}, {1'700'000'000'000'000'000, 0, 0, false}});
-  EXPECT_EQ(contentOf(place / "events.txt"), "1.000004000 3 65535 1\n1700000000.000000000 0 0 0\n");
+  EXPECT_EQ(contentOf(folder() / "events.txt"),
+            "1.000004000 3 65535 1\n1700000000.000000000 0 0 0\n");
 }
 
-TEST_F(DatasetWriterTest, TheCamchainIsKalibrs) {
+TEST_F(DatasetWriterTest, TheCamchainHasKalibrsFormat) {
   Rig rig = simulation.rig;
   rig.cameras[1].model.distortion = DistortionModel::kRadtan;
   rig.cameras[1].model.coefficients = {-0.25, 0.5, 0, 0.125};

@@ -12,7 +12,7 @@ NearestSurface nearestSurface(const Scene& scene, const Eigen::Vector3d& p_world
   for (int surface = 0; surface < scene.size(); ++surface) {
     const Rectangle& rectangle = scene.rectangle(surface);
     const Eigen::Vector3d from_corner = p_world - rectangle.corner;
-    // No point of a rectangle is nearer than its plane: most are ruled out by that.
+    // A rectangle is never nearer than its plane: most are skipped.
     if (std::abs(from_corner.dot(rectangle.normal())) >= nearest.distance_m) continue;
     const double u = std::clamp(from_corner.dot(rectangle.axis_u), 0.0, rectangle.width_m);
     const double v = std::clamp(from_corner.dot(rectangle.axis_v), 0.0, rectangle.height_m);

@@ -18,7 +18,7 @@ Scene makeCorner() {
   return scene;
 }
 
-TEST(NearestSurface, IsTheOneWhoseNearestPointIsNearest) {
+TEST(NearestSurface, HasTheNearestPoint) {
   const Scene scene = makeCorner();
   const NearestSurface floor = nearestSurface(scene, {3, 1, 0.5});
   EXPECT_EQ(floor.surface, 0);
@@ -28,16 +28,16 @@ TEST(NearestSurface, IsTheOneWhoseNearestPointIsNearest) {
   EXPECT_DOUBLE_EQ(wall.distance_m, 0.25);
 }
 
-TEST(NearestSurface, IsAsNearFromBehind) {
+TEST(NearestSurface, HasTheSameDistanceFromBehind) {
   EXPECT_DOUBLE_EQ(nearestSurface(makeCorner(), {1, 1, -0.5}).distance_m, 0.5);
 }
 
 TEST(NearestSurface, EndsAtItsBorders) {
-  // Beside the floor's corner at the origin, by 3 and 4 m.
+  // 3 and 4 m from the floor's corner at the origin.
   EXPECT_DOUBLE_EQ(nearestSurface(makeCorner(), {-3, -4, 0}).distance_m, 5);
 }
 
-TEST(NearestSurface, OfNothingIsNone) {
+TEST(NearestSurface, OfAnEmptySceneIsNone) {
   const NearestSurface nearest = nearestSurface(Scene(), {0, 0, 0});
   EXPECT_EQ(nearest.surface, -1);
   EXPECT_TRUE(std::isinf(nearest.distance_m));

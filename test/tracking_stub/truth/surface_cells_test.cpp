@@ -8,7 +8,7 @@
 namespace efm {
 namespace {
 
-TEST(SurfaceCells, GiveTheCentresOfTheCellsCountedOftenEnough) {
+TEST(SurfaceCells, ReturnTheCentresOfTheCellsWithTheMinCount) {
   Scene scene;
   scene.addRectangle({{1, 2, 3}, {1, 0, 0}, {0, 1, 0}, 0.10, 0.05}, test::evenPaint(0));
   SurfaceCells cells(scene, 0.01);
