@@ -13,11 +13,16 @@
 
 namespace efm::bench {
 
-/// What one benchmark measures.
+/// Sets a rate: `count` of each iteration, per second.
+inline void countRate(benchmark::State& state, const char* name, double count) {
+  state.counters[name] = benchmark::Counter(count, benchmark::Counter::kIsIterationInvariantRate);
+}
+
+/// The case that a benchmark measures.
 struct BenchCase {
   std::string group;
   std::string name;
-  std::string kernel;  ///< Empty where none runs.
+  std::string kernel;  ///< Empty without a kernel.
   int threads = 1;
 };
 
@@ -27,18 +32,18 @@ struct NamedCase {
   BenchCase what;
 };
 
-/// Runs benchmarks in batches whose members are compared with each other: their repetitions take
-/// turns, so that what else the machine does meets all of them alike. Keeps the
-/// medians, in the order in which the cases were added.
+/// Runs benchmarks in batches. The members of a batch are compared: their repetitions take turns,
+/// so other load of the machine affects all of them equally. Keeps the medians, in the order of
+/// `add`.
 class BenchSession {
  public:
   explicit BenchSession(BenchPlan plan) : plan_(std::move(plan)) {}
 
   const BenchPlan& plan() const { return plan_; }
 
-  /// Adds to the batch. Its counters become quantities of the case.
+  /// Adds a benchmark to the batch. Its counters become quantities of the case.
   void add(const BenchCase& what, const std::function<void(benchmark::State&)>& benchmark);
-  /// Runs the batch and prints a line for each case. What the benchmarks refer to may go after it.
+  /// Runs the batch and prints a line for each case. The benchmarks are not called after it.
   void run();
 
   const std::vector<PerformanceRow>& rows() const { return rows_; }

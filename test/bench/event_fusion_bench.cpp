@@ -16,6 +16,7 @@
 #include "test/bench/machine.h"
 #include "test/bench/performance_ratios.h"
 #include "test/bench/performance_table.h"
+#include "test/bench/program_arguments.h"
 
 namespace {
 
@@ -38,40 +39,7 @@ constexpr Group kGroups[] = {
     {"extraction", benchExtraction}, {"global_cloud", benchGlobalCloud}, {"reading", benchReading},
     {"growth", benchGrowth}};
 
-struct Arguments {
-  bool quick = false;
-  fs::path out;
-  std::string commit = "unknown";
-  std::vector<std::string> groups;  // empty: all
-  std::vector<std::string> of_benchmark;
-};
-
-Arguments readArguments(const std::vector<std::string>& words) {
-  Arguments arguments;
-  for (auto word = words.begin(); word != words.end(); ++word) {
-    const auto value = [&] {
-      if (word + 1 == words.end()) throw std::invalid_argument(*word + ": expected a value");
-      return *++word;
-    };
-    const auto is_it = [&](const Group& group) { return *word == group.name; };
-    if (*word == "--quick") {
-      arguments.quick = true;
-    } else if (*word == "--out") {
-      arguments.out = value();
-    } else if (*word == "--commit") {
-      arguments.commit = value();
-    } else if (word->rfind("--benchmark_", 0) == 0) {
-      arguments.of_benchmark.push_back(*word);
-    } else if (std::any_of(std::begin(kGroups), std::end(kGroups), is_it)) {
-      arguments.groups.push_back(*word);
-    } else {
-      throw std::invalid_argument(*word + " is not known\n" + kUsage);
-    }
-  }
-  return arguments;
-}
-
-/// Members of a batch take turns unless told otherwise.
+/// The members of a batch run in turns, unless an option changes this.
 void initializeBenchmark(std::string program, std::vector<std::string> words) {
   words.insert(words.begin(), "--benchmark_enable_random_interleaving=true");
   words.insert(words.begin(), std::move(program));
@@ -84,7 +52,7 @@ void initializeBenchmark(std::string program, std::vector<std::string> words) {
   }
 }
 
-/// A folder that is there as long as this object.
+/// A folder that exists as long as this object.
 class ScratchFolder {
  public:
   ScratchFolder()
@@ -113,10 +81,11 @@ void writeFile(const fs::path& file, Write write, const std::vector<PerformanceR
   std::cout << "written to " << file.string() << '\n';
 }
 
-void run(const Arguments& arguments) {
-  if (!arguments.out.empty()) fs::create_directories(arguments.out);
+void run(const ProgramArguments& arguments) {
+  const fs::path out = arguments.value("--out");
+  if (!out.empty()) fs::create_directories(out);
   Conditions conditions = describeMachine();
-  conditions.emplace_back("commit", arguments.commit);
+  conditions.emplace_back("commit", arguments.value("--commit", "unknown"));
   conditions.emplace_back("load before", loadAverage());
 
   const ScratchFolder scratch;
@@ -124,11 +93,7 @@ void run(const Arguments& arguments) {
   plan.scratch = scratch.path();
   BenchSession session(plan);
   for (const Group& group : kGroups) {
-    const auto& asked = arguments.groups;
-    if (!asked.empty() && std::find(asked.begin(), asked.end(), group.name) == asked.end()) {
-      continue;
-    }
-    group.run(session);
+    if (arguments.includes(group.name)) group.run(session);
   }
   conditions.emplace_back("load after", loadAverage());
 
@@ -144,18 +109,23 @@ void run(const Arguments& arguments) {
                 << quantity.value << '\n';
     }
   }
-  if (arguments.out.empty()) return;
-  writeFile(arguments.out / "performance.csv", writeCsv, rows, conditions);
-  writeFile(arguments.out / "performance.md", writeMarkdown, rows, conditions);
+  if (out.empty()) return;
+  writeFile(out / "performance.csv", writeCsv, rows, conditions);
+  writeFile(out / "performance.md", writeMarkdown, rows, conditions);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
-    const Arguments arguments = readArguments({argv + 1, argv + argc});
-    initializeBenchmark(argv[0], arguments.of_benchmark);
-    run(arguments);
+    ArgumentRules rules{{"--out", "--commit"}, {}, kUsage};
+    for (const Group& group : kGroups) rules.names.emplace_back(group.name);
+    std::vector<std::string> words(argv + 1, argv + argc);
+    const auto ours = std::stable_partition(words.begin(), words.end(), [](const auto& word) {
+      return word.rfind("--benchmark_", 0) != 0;
+    });
+    initializeBenchmark(argv[0], {ours, words.end()});
+    run(readArguments({words.begin(), ours}, rules));
     return 0;
   } catch (const std::exception& error) {
     std::cerr << "event_fusion_bench: " << error.what() << '\n';

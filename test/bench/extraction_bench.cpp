@@ -13,8 +13,7 @@ void benchExtraction(BenchSession& session) {
     const DsiPeaks peaks = sweepSpace(input.cameras, {input.view, input.planes}).fused.peaks;
     session.add({"extraction", sensor.name(), ""}, [&](benchmark::State& state) {
       for (auto _ : state) benchmark::DoNotOptimize(extractAsPaper(peaks, input.planes, {}));
-      state.counters["pixels/s"] = benchmark::Counter(
-          static_cast<double>(input.view.pixels()), benchmark::Counter::kIsIterationInvariantRate);
+      countRate(state, "pixels/s", static_cast<double>(input.view.pixels()));
     });
     session.run();
   }

@@ -24,8 +24,7 @@ PlaneValues densities(std::size_t voxels, unsigned seed) {
 }
 
 void countVoxels(benchmark::State& state, std::size_t voxels) {
-  state.counters["voxels/s"] = benchmark::Counter(static_cast<double>(voxels),
-                                                  benchmark::Counter::kIsIterationInvariantRate);
+  countRate(state, "voxels/s", static_cast<double>(voxels));
 }
 
 /// The mean of two inputs.

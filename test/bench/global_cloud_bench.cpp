@@ -60,8 +60,7 @@ void benchGlobalCloud(BenchSession& session) {
         map->remove(kInsertedKeyframe);
         state.ResumeTiming();
       }
-      state.counters["points/s"] = benchmark::Counter(
-          static_cast<double>(cloud.size()), benchmark::Counter::kIsIterationInvariantRate);
+      countRate(state, "points/s", static_cast<double>(cloud.size()));
     });
   }
   session.run();

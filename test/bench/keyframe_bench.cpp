@@ -51,10 +51,8 @@ void countEvents(benchmark::State& state, const SyntheticWindow& made) {
   double events = 0;
   for (const auto& of_camera : made.events) events += static_cast<double>(of_camera.size());
   const double votes = events * made.options.planes.num_planes;
-  state.counters["events/s"] =
-      benchmark::Counter(events, benchmark::Counter::kIsIterationInvariantRate);
-  state.counters["votes/s"] =
-      benchmark::Counter(votes, benchmark::Counter::kIsIterationInvariantRate);
+  countRate(state, "events/s", events);
+  countRate(state, "votes/s", votes);
 }
 
 /// The memory above the events, then the time.

@@ -79,8 +79,7 @@ void readAll(benchmark::State& state, const fs::path& path) {
       if (packet != nullptr) events += packet->events.size();
     }
   }
-  state.counters["events/s"] = benchmark::Counter(static_cast<double>(events),
-                                                  benchmark::Counter::kIsIterationInvariantRate);
+  countRate(state, "events/s", static_cast<double>(events));
 }
 
 }  // namespace

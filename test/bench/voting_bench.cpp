@@ -24,10 +24,8 @@ const RayBundle& raysOf(const SweepInput& input) { return input.cameras.front().
 void countVotes(benchmark::State& state, const SweepInput& input) {
   const auto events = static_cast<double>(raysOf(input).size());
   const double votes = events * input.planes.size();
-  state.counters["events/s"] =
-      benchmark::Counter(events, benchmark::Counter::kIsIterationInvariantRate);
-  state.counters["votes/s"] =
-      benchmark::Counter(votes, benchmark::Counter::kIsIterationInvariantRate);
+  countRate(state, "events/s", events);
+  countRate(state, "votes/s", votes);
   state.counters["packets"] = static_cast<double>(raysOf(input).packets.size());
 }
 

@@ -17,8 +17,6 @@
 namespace efm::studies {
 namespace {
 
-constexpr const char* kOneCamera = "one camera (EMVS)";
-constexpr const char* kHcAt = "H_c∘A_t (Alg. 1)";
 constexpr const char* kDilated = "H_c∘A_t + MF";
 constexpr const char* kHcHt = "H_c∘H_t";
 constexpr const char* kHtAc = "H_t∘A_c";
@@ -37,15 +35,12 @@ Method fused(const char* name, FusionOrder order, FusionRule across_cameras,
   return method;
 }
 
-std::vector<Method> algorithms();
 std::vector<Method> algorithms() {
   constexpr auto kH = FusionRule::kHarmonic;
   constexpr auto kA = FusionRule::kArithmetic;
   constexpr auto kCamerasFirst = FusionOrder::kCamerasThenTime;
   constexpr auto kTimeFirst = FusionOrder::kTimeThenCameras;
-  Method one_camera{kOneCamera, paperOptions(1, 6.5)};
-  one_camera.cameras = {0};
-  const Method alg_1 = fused(kHcAt, kTimeFirst, kH, kA);
+  const Method alg_1 = fused(kAlg1, kTimeFirst, kH, kA);
   Method dilated = alg_1;
   dilated.name = kDilated;
   dilated.options.extraction.dilate = true;
@@ -55,7 +50,7 @@ std::vector<Method> algorithms() {
   shuffled.options.subintervals.shuffle = SubintervalShuffle::kShift;
   Method late{kLate, paperOptions(1, 6.5)};
   late.late = true;
-  return {one_camera,
+  return {oneCamera(1, 6.5),
           alg_1,
           dilated,
           fused(kHcHt, kCamerasFirst, kH, kH),
@@ -111,24 +106,21 @@ class Judge {
     const double mean = meanCm(own(method));
     const double other_mean = meanCm(own(other));
     section_.trend(claim, mean <= times * other_mean,
-                   formatNumber(mean, 2) + " against " + formatNumber(other_mean, 2) +
-                       " cm; on common pixels " + formatNumber(meanCm(common(method)), 2) +
-                       " against " + formatNumber(meanCm(common(other)), 2),
+                   against(mean, other_mean, 2) + " cm; on common pixels " +
+                       against(meanCm(common(method)), meanCm(common(other)), 2),
                    departure);
   }
   void morePoints(const std::string& claim, const char* method, const char* other,
                   const std::string& departure = "") {
-    section_.trend(claim, own(method).points > own(other).points,
-                   formatNumber(thousandPoints(own(method)), 1) + " against " +
-                       formatNumber(thousandPoints(own(other)), 1) + " thousand",
-                   departure);
+    section_.trend(
+        claim, own(method).points > own(other).points,
+        against(thousandPoints(own(method)), thousandPoints(own(other)), 1) + " thousand",
+        departure);
   }
   void moreBadPixels(const std::string& claim, const char* method, const char* other,
                      const std::string& departure = "") {
     section_.trend(claim, badPercent(own(method)) > badPercent(own(other)),
-                   formatNumber(badPercent(own(method)), 2) + " against " +
-                       formatNumber(badPercent(own(other)), 2) + " %",
-                   departure);
+                   against(badPercent(own(method)), badPercent(own(other)), 2) + " %", departure);
   }
   const DepthErrors& own(const char* method) const { return resultOf(results_, method).own; }
   const DepthErrors& common(const char* method) const { return resultOf(results_, method).common; }
@@ -143,26 +135,25 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
   judge.atMost(
       "two cameras are far better than one: Alg. 1 has at most 0.7 of its mean error "
       "(paper: 0.59)",
-      kHcAt, kOneCamera, 0.7);
+      kAlg1, kOneCamera, 0.7);
   section.trend("and at most half of its bad pixels (paper: 0.35)",
-                badPercent(judge.own(kHcAt)) <= 0.5 * badPercent(judge.own(kOneCamera)),
-                formatNumber(badPercent(judge.own(kHcAt)), 2) + " against " +
-                    formatNumber(badPercent(judge.own(kOneCamera)), 2) + " %");
-  judge.morePoints("one camera keeps more points than Alg. 1", kOneCamera, kHcAt,
+                badPercent(judge.own(kAlg1)) <= 0.5 * badPercent(judge.own(kOneCamera)),
+                against(badPercent(judge.own(kAlg1)), badPercent(judge.own(kOneCamera)), 2) + " %");
+  judge.morePoints("one camera keeps more points than Alg. 1", kOneCamera, kAlg1,
                    "Noise and errors of calibration move the ratio towards the paper's; see "
                    "below.");
   section.trend("MF multiplies the points by three or more (paper: 3.7)",
-                judge.own(kDilated).points >= 3 * judge.own(kHcAt).points,
+                judge.own(kDilated).points >= 3 * judge.own(kAlg1).points,
                 formatNumber(thousandPoints(judge.own(kDilated)), 1) + " from " +
-                    formatNumber(thousandPoints(judge.own(kHcAt)), 1) + " thousand");
-  judge.atMost("at little cost: at most 1.1 times the mean error (paper: 1.03)", kDilated, kHcAt,
+                    formatNumber(thousandPoints(judge.own(kAlg1)), 1) + " thousand");
+  judge.atMost("at little cost: at most 1.1 times the mean error (paper: 1.03)", kDilated, kAlg1,
                1.1,
                "Errors are smaller here than in the paper, and what MF adds is not; see below.");
   judge.atMost(
       "A_c∘A_t is nearly as good as Alg. 1 with so much data: at most 1.1 times its mean "
       "error (paper: 1.02)",
-      kAcAt, kHcAt, 1.1);
-  judge.atMost("and not better: Alg. 1 has the smaller mean error", kHcAt, kAcAt, 1);
+      kAcAt, kAlg1, 1.1);
+  judge.atMost("and not better: Alg. 1 has the smaller mean error", kAlg1, kAcAt, 1);
   for (const char* method : {kHcHt, kAcHt}) {
     judge.moreBadPixels(
         std::string("harmonic across time makes more bad pixels than A_t∘H_c: ") + method, method,
@@ -175,26 +166,26 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
         std::string("harmonic across time costs accuracy: A_t∘H_c is better than ") + method, kAtHc,
         method, 1);
     judge.morePoints(std::string("and wins points: ") + method + " keeps more than Alg. 1", method,
-                     kHcAt);
+                     kAlg1);
   }
   judge.atMost(
       "A_t∘H_c is nearly as good as Alg. 1: at most 1.1 times its mean error (paper: "
       "1.04)",
-      kAtHc, kHcAt, 1.1);
-  judge.morePoints("and keeps more points", kAtHc, kHcAt);
+      kAtHc, kAlg1, 1.1);
+  judge.morePoints("and keeps more points", kAtHc, kAlg1);
   judge.atMost("shuffling costs little: at most 1.2 times the mean error of A_t∘H_c (paper: 1.08)",
                kShuffled, kAtHc, 1.2);
   judge.atMost("but it costs something", kAtHc, kShuffled, 1);
   judge.atMost(
       "late fusion is worse than fusing DSIs (the paper says so in Sec. 3.3.1, without "
       "figures)",
-      kHcAt, kLate, 1);
+      kAlg1, kLate, 1);
 }
 
 void addPictures(const std::vector<MethodResult>& results, const Recording& recording,
                  StudySection& section) {
   const DepthPlanesOptions planes = paperOptions(1, 6.5).planes;
-  const std::size_t window = richestWindow(resultOf(results, kHcAt));
+  const std::size_t window = richestWindow(resultOf(results, kAlg1));
   const auto depth = [&](const char* method) {
     return boldDepthPicture(resultOf(results, method).keyframes[window].map.depth, planes);
   };
@@ -202,7 +193,7 @@ void addPictures(const std::vector<MethodResult>& results, const Recording& reco
   PictureGrid upper;
   upper.width_px = 300;
   upper.columns = {"one camera", "Hc o At (Alg. 1)", "At o Hc", "Ac o At"};
-  upper.pictures = {{depth(kOneCamera), depth(kHcAt), depth(kAtHc), depth(kAcAt)}};
+  upper.pictures = {{depth(kOneCamera), depth(kAlg1), depth(kAtHc), depth(kAcAt)}};
   PictureGrid lower;
   lower.width_px = 300;
   lower.columns = {"late fusion", "Hc o Ht", "At o Hc + shuffling", "truth"};
@@ -231,8 +222,7 @@ double meanCmOfTrueCopies(const Recording& recording, const MethodResult& result
           ++i;
         }
       }
-      const auto some = pairDepths(copied, truth, studyPairing());
-      copies.insert(copies.end(), some.begin(), some.end());
+      appendPairs(copied, truth, copies);
     }
   }
   return meanCm(depthErrors(copies));
@@ -240,7 +230,7 @@ double meanCmOfTrueCopies(const Recording& recording, const MethodResult& result
 
 /// Who keeps more, one camera or Alg. 1, as the recording comes nearer to a real one.
 void countPoints(const Recording& recording, const std::vector<Window>& windows,
-                 const ComparisonOptions& options, StudySection& section) {
+                 StudySection& section) {
   const EventNoiseOptions weak{1, 0, 1000};
   const EventNoiseOptions strong{5, 0, 1000};
   const std::pair<const char*, Recording> conditions[] = {
@@ -258,8 +248,7 @@ void countPoints(const Recording& recording, const std::vector<Window>& windows,
   double exact = 0;
   double last = 0;
   for (const auto& [name, changed] : conditions) {
-    const auto results =
-        compareMethods(changed, windows, {algorithms()[0], algorithms()[1]}, options);
+    const auto results = compareMethods(changed, windows, {algorithms()[0], algorithms()[1]});
     const DepthErrors& one = results[0].own;
     const DepthErrors& two = results[1].own;
     last = thousandPoints(one) / thousandPoints(two);
@@ -275,14 +264,12 @@ void countPoints(const Recording& recording, const std::vector<Window>& windows,
   section.trend(
       "with errors of all kinds together, one camera keeps more, compared with Alg. 1, "
       "than with exact data",
-      last > exact,
-      formatNumber(last, 2) + " against " + formatNumber(exact, 2) + " times as many");
+      last > exact, against(last, exact, 2) + " times as many");
 }
 
 /// What the simulation lacks of the paper's recordings, put back.
 void findReasons(const Recording& recording, const std::vector<Window>& windows,
-                 const ComparisonOptions& options, const std::vector<MethodResult>& clean,
-                 StudySection& section) {
+                 const std::vector<MethodResult>& clean, StudySection& section) {
   section.heading("What makes the difference");
   section.text(
       "Poses, calibration and events are exact here, and are not in the paper. The same "
@@ -292,7 +279,7 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
   for (const Method& method : algorithms()) {
     if (method.name != kDilated && method.name != kLate) some.push_back(method);
   }
-  const auto swayed = compareMethods(withPoseSway(recording, kTrackerSway), windows, some, options);
+  const auto swayed = compareMethods(withPoseSway(recording, kTrackerSway), windows, some);
   section.table(errorTable(swayed));
   Judge with_sway(swayed, section);
   with_sway.moreBadPixels("with poses that sway, H_c∘H_t makes more bad pixels than A_t∘H_c", kHcHt,
@@ -302,11 +289,11 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
   with_sway.atMost("A_t∘H_c has at most 0.95 of the mean error of H_c∘H_t (paper: 0.89)", kAtHc,
                    kHcHt, 0.95);
 
-  countPoints(recording, windows, options, section);
+  countPoints(recording, windows, section);
   section.item(
       "MF: if every point of Alg. 1 had its true depth, what MF copies from it would still "
       "be off by " +
-      formatNumber(meanCmOfTrueCopies(recording, resultOf(clean, kHcAt)), 2) +
+      formatNumber(meanCmOfTrueCopies(recording, resultOf(clean, kAlg1)), 2) +
       " cm on average: it puts the edge of a thing two pixels into what lies behind.");
 }
 
@@ -314,8 +301,6 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
 
 void studyAlgorithms(const StudyRun& run, StudySection& section) {
   const Recording recording = roomRecording(run);
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
   section.text(
       "The paper (Table 3) compares one camera with every order of fusing two across cameras and "
       "time, two sub-intervals, in windows of 1 s of MVSEC's three indoor flights, and with "
@@ -331,35 +316,33 @@ void studyAlgorithms(const StudyRun& run, StudySection& section) {
 
   section.heading("Windows of 1 s");
   const auto windows = recording.windows(run.pick(1.0, 0.1), run.pick(10, 1));
-  double events = 0;
-  for (const Window& window : windows) events += static_cast<double>(recording.eventsIn(window));
   section.text(std::to_string(windows.size()) + " windows, " +
-               formatNumber(1e-3 * events / static_cast<double>(windows.size()), 0) +
+               formatNumber(1e-3 * recording.meanEventsIn(windows), 0) +
                " thousand events of both cameras each.");
-  const auto in_a_second = compareMethods(recording, windows, algorithms(), options);
+  const auto in_a_second = compareMethods(recording, windows, algorithms());
   section.table(errorTable(in_a_second));
   addPictures(in_a_second, recording, section);
   judge(in_a_second, section);
 
   section.heading("Windows of 0.2 s");
   const auto in_less = compareMethods(
-      recording, recording.windows(run.pick(0.2, 0.05), run.pick(25, 1)), algorithms(), options);
+      recording, recording.windows(run.pick(0.2, 0.05), run.pick(25, 1)), algorithms());
   section.table(errorTable(in_less));
   const auto gap = [](const std::vector<MethodResult>& results) {
-    return meanCm(resultOf(results, kAcAt).own) / meanCm(resultOf(results, kHcAt).own);
+    return meanCm(resultOf(results, kAcAt).own) / meanCm(resultOf(results, kAlg1).own);
   };
   section.trend("with less data the harmonic mean gains on the arithmetic (paper, Sec. 4.3.2)",
                 gap(in_less) > gap(in_a_second),
                 "mean error of A_c∘A_t over that of Alg. 1: " + formatNumber(gap(in_less), 3) +
                     " in 0.2 s, " + formatNumber(gap(in_a_second), 3) + " in 1 s");
   const DepthErrors& twice = resultOf(in_less, kHcHt).own;
-  const DepthErrors& once = resultOf(in_less, kHcAt).own;
+  const DepthErrors& once = resultOf(in_less, kAlg1).own;
   section.item(
       "In windows so short fusion across time pays more than in those of 1 s: H_c∘H_t has " +
       formatNumber(meanCm(twice), 1) + " cm and " + formatNumber(badPercent(twice), 1) +
       " % bad pixels, Alg. 1 " + formatNumber(meanCm(once), 1) + " cm and " +
       formatNumber(badPercent(once), 1) + " %.");
-  findReasons(recording, windows, options, in_a_second, section);
+  findReasons(recording, windows, in_a_second, section);
 }
 
 }  // namespace efm::studies

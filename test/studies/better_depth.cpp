@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "plugin/pictures/curve_plot.h"
+#include "test/studies/figures/picture_grid.h"
 #include "test/studies/methods/depth_curve.h"
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/studies.h"
@@ -44,25 +45,13 @@ std::vector<Case> allCases(bool quick) {
   return cases;
 }
 
-constexpr const char* kPaper = "(a) the paper";
-
 std::vector<Method> methodsFor(const Scene3d& scene) {
   KeyframeMapperOptions options = paperOptions(scene.min_depth_m, scene.max_depth_m);
   options.extraction.max_confidence.level = WhiteLevel::kKeyframe;
-  const Method paper{kPaper, options, scene.cameras};
-  Method subplane = paper;
-  subplane.name = "(a) between planes";
-  subplane.options.extraction.subplane = true;
-  Method split = subplane;
-  split.name = "split fusion";
-  split.options.split = SplitFusionOptions();
-  Method aggregated = paper;
-  aggregated.name = "aggregation";
-  aggregated.options.extraction = DepthExtractionOptions();
-  Method both = aggregated;
-  both.name = "both (default)";
-  both.options.split = SplitFusionOptions();
-  return {paper, subplane, split, aggregated, both};
+  std::vector<Method> methods = betterDepthMethods({"(a) the paper", options, scene.cameras});
+  methods[1].name = "(a) between planes";
+  methods[4].name = "both (default)";
+  return methods;
 }
 
 /// One case with all methods.
@@ -120,6 +109,12 @@ TextTable equalNumbers(const std::vector<CaseResult>& results) {
   return table;
 }
 
+double bestF1(const CaseResult& result) {
+  double best = 0;
+  for (const PointQuality& step : result.curves.back().steps) best = std::max(best, step.f1());
+  return best;
+}
+
 /// The shipped thresholds against the best of each case, and variances against errors.
 TextTable asShipped(const std::vector<CaseResult>& results) {
   TextTable table;
@@ -127,8 +122,7 @@ TextTable asShipped(const std::vector<CaseResult>& results) {
                 "F1 [%]", "best F1 [%]", "within σ [%]",    "within 2 σ [%]"};
   for (const CaseResult& result : results) {
     const PointQuality& quality = result.as_shipped;
-    double best = 0;
-    for (const PointQuality& step : result.curves.back().steps) best = std::max(best, step.f1());
+    const double best = bestF1(result);
     table.rows.push_back({result.name, formatNumber(quality.points, 0),
                           percent(quality.beyond_10, 2), percent(quality.recall),
                           percent(quality.f1()), percent(best), percent(quality.within_sigma),
@@ -156,16 +150,13 @@ cv::Mat drawCurvesOf(const CaseResult& result) {
 }
 
 cv::Mat sheetOf(const std::vector<CaseResult>& results) {
-  std::vector<cv::Mat> rows;
+  PictureGrid grid;
+  grid.width_px = 480;
   for (std::size_t i = 0; i < results.size(); i += 2) {
-    cv::Mat left = drawCurvesOf(results[i]);
-    cv::Mat right(left.size(), left.type(), cv::Scalar::all(255));
-    if (i + 1 < results.size()) right = drawCurvesOf(results[i + 1]);
-    cv::hconcat(left, right, rows.emplace_back());
+    grid.pictures.push_back({drawCurvesOf(results[i]),
+                             i + 1 < results.size() ? drawCurvesOf(results[i + 1]) : cv::Mat()});
   }
-  cv::Mat sheet;
-  cv::vconcat(rows, sheet);
-  return sheet;
+  return drawGrid(grid);
 }
 
 /// The largest value over the cases of what a curve has at the paper's number of points.
@@ -207,8 +198,7 @@ void judgeAll(const std::vector<CaseResult>& results, StudySection& section) {
   double least_f1 = 1;
   double least_sigma = 1, most_sigma = 0, least_2_sigma = 1;
   for (const CaseResult& result : results) {
-    double best = 0;
-    for (const PointQuality& step : result.curves.back().steps) best = std::max(best, step.f1());
+    const double best = bestF1(result);
     least_f1 = std::min(least_f1, result.as_shipped.f1() / best);
     least_sigma = std::min(least_sigma, result.as_shipped.within_sigma);
     most_sigma = std::max(most_sigma, result.as_shipped.within_sigma);

@@ -19,34 +19,7 @@
 namespace efm::studies {
 namespace {
 
-/// What one contrast threshold gives.
-struct Sensitivity {
-  double threshold = 0;
-  double million_events = 0;  ///< In a window.
-};
-
 std::string named(double threshold) { return "θ = " + formatNumber(threshold, 2); }
-
-cv::Mat3b errorCurves(const std::vector<Sensitivity>& levels, const std::vector<MethodResult>& mono,
-                      const std::vector<MethodResult>& stereo) {
-  CurvePlot plot;
-  plot.title = "Depth error by contrast threshold";
-  plot.x = {"contrast threshold", AxisScale::kLogarithmic, {}, {}};
-  plot.y = {"error [cm], own pixels", AxisScale::kLinear, 0, {}};
-  const auto add = [&](const std::string& name, const std::vector<MethodResult>& of,
-                       ErrorFigure figure) {
-    Curve curve{name, {}, CurveStyle::kMarkedLine, {}};
-    for (std::size_t i = 0; i < levels.size(); ++i) {
-      curve.points.emplace_back(levels[i].threshold, figure(of[i].own));
-    }
-    plot.curves.push_back(curve);
-  };
-  add("one camera, mean", mono, meanCm);
-  add("one camera, median", mono, medianCm);
-  add("two cameras, mean", stereo, meanCm);
-  add("two cameras, median", stereo, medianCm);
-  return drawCurves(plot);
-}
 
 constexpr int kStrongest = 2500;  // points in a window
 
@@ -55,8 +28,7 @@ DepthErrors strongestErrors(const Recording& recording, const MethodResult& resu
   for (const KeyframeDepthMap& keyframe : result.keyframes) {
     const DepthMap& map = keyframe.map;
     const cv::Mat1f strongest = only(map.depth, mostOutstanding(map, map.depth > 0, kStrongest));
-    const auto some = pairDepths(strongest, truthOf(recording, keyframe), studyPairing());
-    pairs.insert(pairs.end(), some.begin(), some.end());
+    appendPairs(strongest, truthOf(recording, keyframe), pairs);
   }
   return depthErrors(pairs);
 }
@@ -68,21 +40,6 @@ struct Explanation {
   std::vector<NamedPrecision> one_white_precision;
   std::vector<double> strongest_median_cm;  ///< Of the `kStrongest` most outstanding points.
 };
-
-std::vector<double> recallOf(const std::vector<NamedPrecision>& precision) {
-  std::vector<double> found;
-  for (const NamedPrecision& one : precision) {
-    found.push_back(100 * one.counts.recall(stepOf(one.counts, 0.12)));
-  }
-  return found;
-}
-
-bool falls(const std::vector<double>& values, double tolerance = 0) {
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    if (values[i] > values[i - 1] + tolerance) return false;
-  }
-  return true;
-}
 
 void judge(const std::vector<MethodResult>& stereo, const std::vector<NamedPrecision>& precision,
            const Explanation& why, StudySection& section) {
@@ -103,11 +60,10 @@ void judge(const std::vector<MethodResult>& stereo, const std::vector<NamedPreci
       "the mean error is larger at high thresholds: that at the highest exceeds that at "
       "the lowest",
       means.back() > means.front(), listed(means) + " cm");
-  const auto [least, most] = std::minmax_element(medians.begin(), medians.end());
   section.trend(
       "the median error stays fairly constant: the largest is at most 1.5 times the "
       "smallest",
-      *most <= 1.5 * *least, listed(medians, 2) + " cm",
+      maxOf(medians) <= 1.5 * minOf(medians), listed(medians, 2) + " cm",
       "It does on common pixels: " + listed(eachOf(stereo, &MethodResult::common, medianCm), 2) +
           " cm, and for the " + std::to_string(kStrongest) +
           " points of a window that stand out most: " + listed(why.strongest_median_cm, 2) +
@@ -115,27 +71,19 @@ void judge(const std::vector<MethodResult>& stereo, const std::vector<NamedPreci
           "relative threshold lets points of a single crossing of rays through.");
   section.trend(
       "the mean varies more than the median: it is outliers that come",
-      *std::max_element(means.begin(), means.end()) /
-              *std::min_element(means.begin(), means.end()) >
-          *most / *least,
+      maxOf(means) / minOf(means) > maxOf(medians) / minOf(medians),
       "largest over smallest: " +
-          formatNumber(*std::max_element(means.begin(), means.end()) /
-                           *std::min_element(means.begin(), means.end()),
-                       2) +
-          " against " + formatNumber(*most / *least, 2),
+          against(maxOf(means) / minOf(means), maxOf(medians) / minOf(medians), 2),
       "The points of single crossings are so many that they reach the median; see above.");
-  std::vector<double> precise;
-  for (const NamedPrecision& one : precision) {
-    precise.push_back(100 * one.counts.precision(stepOf(one.counts, 0.12)));
-  }
+  const std::vector<double> precise = precisionAt(precision, 0.12);
   section.trend(
       "low thresholds give better precision: it falls as they grow, or rises by half a "
       "percent at most",
       falls(precise, 0.5), listed(precise) + " % within 12 cm");
-  const std::vector<double> found = recallOf(precision);
+  const std::vector<double> found = recallAt(precision, 0.12);
   section.trend("and better recall", falls(found), listed(found) + " % within 12 cm",
                 "As with the number of points: no fewer pixels are chosen.");
-  const std::vector<double> absolute_found = recallOf(why.one_white_precision);
+  const std::vector<double> absolute_found = recallAt(why.one_white_precision, 0.12);
   section.trend("with one white level for all, recall falls", falls(absolute_found),
                 listed(absolute_found) + " % within 12 cm");
 }
@@ -147,7 +95,7 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
   if (run.quick) room = withWidth(room, 80);
   std::vector<double> thresholds = {0.05, 0.1, 0.2, 0.4, 0.8};
   if (run.quick) thresholds = {0.2, 0.4};
-  std::vector<Sensitivity> levels;
+  std::vector<double> events;  // millions in a window
   std::vector<MethodResult> mono;
   std::vector<MethodResult> stereo;
   Explanation why;
@@ -157,30 +105,22 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
     recording = run.recordings->make("room_theta" + formatNumber(threshold, 2),
                                      withThreshold(room, threshold));
     windows = recording.windows(run.pick(0.2, 0.05), run.pick(2, 1));
-    double events = 0;
-    for (const Window& window : windows) events += static_cast<double>(recording.eventsIn(window));
-    levels.push_back({threshold, 1e-6 * events / static_cast<double>(windows.size())});
-    mono.push_back(
-        {named(threshold), mapWindows(recording, windows, flyingRoomMono()), {}, {}, {}});
-    stereo.push_back(
-        {named(threshold), mapWindows(recording, windows, flyingRoomStereo()), {}, {}, {}});
+    events.push_back(1e-6 * recording.meanEventsIn(windows));
+    const std::string name = named(threshold);
+    mono.push_back(mapMethod(recording, windows, flyingRoomMono(), name));
+    stereo.push_back(mapMethod(recording, windows, flyingRoomStereo(), name));
     Method one_white = flyingRoomStereo();
     one_white.options.extraction.max_confidence =
         MaxConfidence::of(stereo.front().keyframes.front().max_confidence);
-    why.one_white.push_back(
-        {named(threshold), mapWindows(recording, windows, one_white), {}, {}, {}});
+    why.one_white.push_back(mapMethod(recording, windows, one_white, name));
   }
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
   for (std::vector<MethodResult>* results : {&mono, &stereo, &why.one_white}) {
-    scoreMethods(recording, options, *results);
+    scoreMethods(recording, *results);
   }
   for (const MethodResult& result : stereo) {
     why.strongest_median_cm.push_back(medianCm(strongestErrors(recording, result)));
   }
 
-  std::vector<double> events;
-  for (const Sensitivity& level : levels) events.push_back(level.million_events);
   section.text(
       "The paper (Sec. 4.10) simulates flying_room with ESIM at five contrast "
       "thresholds. Here: the room, the rig and the windows of study 5 at 640x480, contrast "
@@ -191,12 +131,15 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
   section.table(errorTable(mono, {true, false}));
   section.text(flyingRoomStereo().name + ":");
   section.table(errorTable(stereo, {true, false}));
-  section.picture("contrast_threshold_errors.png", errorCurves(levels, mono, stereo),
+  section.picture("contrast_threshold_errors.png",
+                  errorCurves("Depth error by contrast threshold",
+                              {"contrast threshold", AxisScale::kLogarithmic, {}, {}}, thresholds,
+                              mono, stereo),
                   "Mean and median error by contrast threshold");
 
   std::vector<NamedPrecision> precision;
   for (std::size_t i = 0; i < stereo.size(); ++i) {
-    precision.push_back({"theta " + formatNumber(levels[i].threshold, 2),
+    precision.push_back({"theta " + formatNumber(thresholds[i], 2),
                          precisionOf(recording, stereo[i].keyframes, studyPairing())});
   }
   for (const MethodResult& result : why.one_white) {
@@ -208,15 +151,10 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
   section.picture("contrast_threshold_precision.png", drawPrecision(precision),
                   "Precision, recall and F1 over the allowed error, by contrast threshold");
 
-  PictureGrid grid;
-  grid.rows = {"depth", "confidence"};
-  grid.pictures.resize(2);
-  grid.width_px = 320;
+  PictureGrid grid = depthAndConfidenceGrid(320);
   for (std::size_t i = 0; i < stereo.size(); ++i) {
-    grid.columns.push_back(precision[i].name);
-    const DepthMap& map = stereo[i].keyframes.front().map;
-    grid.pictures[0].push_back(boldDepthPicture(map.depth, flyingRoomStereo().options.planes));
-    grid.pictures[1].push_back(confidencePicture(map.confidence));
+    addColumn(precision[i].name, stereo[i].keyframes.front().map, flyingRoomStereo().options.planes,
+              grid);
   }
   section.picture("contrast_threshold.png", drawGrid(grid),
                   "Two cameras: depth (red 1 m to blue 4 m) and confidence at each threshold");

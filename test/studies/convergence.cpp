@@ -19,7 +19,6 @@
 namespace efm::studies {
 namespace {
 
-constexpr const char* kOneCamera = "one camera (EMVS)";
 constexpr const char* kOneAcross = "one camera, H_t";
 constexpr const char* kStereo = "two cameras, H_c∘A_t (Alg. 1)";
 constexpr const char* kStereoHalves = "two cameras, A_t∘H_c, N_s = 2";
@@ -63,11 +62,7 @@ Window around(const Recording& recording, double duration_s) {
 cv::Mat3b projectionsOf(const Recording& recording, const Window& window, const Method& method) {
   KeyframeMapper mapper(recording.simulation.rig, method.cameras, method.options);
   DsiProjections projections(mapper.planes(), mapper.view());
-  std::vector<EventSpan> events;
-  for (std::size_t c = 0; c < recording.events.size(); ++c) {
-    events.push_back(recording.eventsOf(c, window));
-  }
-  mapper.map(window, events, recording.trajectory, &projections);
+  mapper.map(window, recording.eventsOf(window), recording.trajectory, &projections);
   return projections.picture();
 }
 
@@ -99,12 +94,9 @@ void showProjections(const StudyRun& run, const Recording& recording, StudySecti
 std::vector<std::vector<MethodResult>> errorsOver(const Recording& recording,
                                                   const std::vector<double>& durations_s,
                                                   const std::vector<Method>& methods, int windows) {
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
   std::vector<std::vector<MethodResult>> results;
   for (const double duration_s : durations_s) {
-    results.push_back(
-        compareMethods(recording, recording.windows(duration_s, windows), methods, options));
+    results.push_back(compareMethods(recording, recording.windows(duration_s, windows), methods));
   }
   return results;
 }
@@ -118,11 +110,9 @@ cv::Mat3b curvesOf(const std::string& title, const std::vector<double>& duration
   plot.x = {"window [s]", AxisScale::kLogarithmic, {}, {}};
   plot.y = {"mean error [cm], own pixels", AxisScale::kLogarithmic, {}, {}};
   for (std::size_t m = 0; m < results.front().size(); ++m) {
-    Curve curve{labels[m], {}, CurveStyle::kMarkedLine, {}};
-    for (std::size_t d = 0; d < durations_s.size(); ++d) {
-      curve.points.emplace_back(durations_s[d], meanCm(results[d][m].own));
-    }
-    plot.curves.push_back(curve);
+    std::vector<double> means;
+    for (const auto& of_duration : results) means.push_back(meanCm(of_duration[m].own));
+    plot.curves.push_back(markedCurve(labels[m], durations_s, means));
   }
   return drawCurves(plot);
 }

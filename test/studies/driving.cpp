@@ -22,8 +22,6 @@ namespace {
 constexpr double kNearM = 4;
 constexpr double kFarM = 50;
 
-constexpr const char* kOneCamera = "one camera (EMVS)";
-constexpr const char* kHcAt = "H_c∘A_t (Alg. 1)";
 constexpr const char* kDilated = "H_c∘A_t + MF";
 
 /// Table 5 of the paper.
@@ -96,7 +94,7 @@ double eventsMiddleOverAround(const Recording& recording) {
 void judge(const Recording& recording, const std::vector<MethodResult>& results,
            StudySection& section) {
   const MethodResult& one = resultOf(results, kOneCamera);
-  const MethodResult& two = resultOf(results, kHcAt);
+  const MethodResult& two = resultOf(results, kAlg1);
   const MethodResult& dilated = resultOf(results, kDilated);
   const auto times = [](double value, double than) { return formatNumber(value / than, 2); };
   section.trend("one camera's mean error is 1.5 times Alg. 1's or more (paper: 1.7)",
@@ -111,8 +109,7 @@ void judge(const Recording& recording, const std::vector<MethodResult>& results,
                 "As above.");
   section.trend("one camera has more bad pixels (paper: 13.7 against 10.8 %)",
                 badPercent(one.own) > badPercent(two.own),
-                formatNumber(badPercent(one.own), 2) + " against " +
-                    formatNumber(badPercent(two.own), 2) + " %");
+                against(badPercent(one.own), badPercent(two.own), 2) + " %");
   section.trend("MF multiplies the points by about three (2.5 to 4; paper: 3.1)",
                 dilated.own.points >= 2.5 * static_cast<double>(two.own.points) &&
                     dilated.own.points <= 4 * static_cast<double>(two.own.points),
@@ -139,7 +136,7 @@ void judge(const Recording& recording, const std::vector<MethodResult>& results,
 
 /// The paper's poses are a LiDAR's odometry at 10 Hz; here they are exact.
 void findReasons(const Recording& recording, const std::vector<Window>& windows,
-                 const std::vector<Method>& methods, const ComparisonOptions& options,
+                 const std::vector<Method>& methods, const DepthPairingOptions& pairing,
                  StudySection& section) {
   section.heading("What makes the difference");
   section.text(
@@ -147,7 +144,7 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
       "with poses that sway around the true ones, on each axis by a sine of 2 cm and 0.1 "
       "degrees at about 1 Hz:");
   constexpr PoseSway kSway{0.02, 0.1 * kRadiansPerDegree, 1};
-  const auto swayed = compareMethods(withPoseSway(recording, kSway), windows, methods, options);
+  const auto swayed = compareMethods(withPoseSway(recording, kSway), windows, methods, pairing);
   section.table(errorTable(swayed, {false, true}));
   const DepthErrors& one = swayed[0].own;
   const DepthErrors& two = swayed[1].own;
@@ -167,18 +164,14 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
 void studyDriving(const StudyRun& run, StudySection& section) {
   const Recording recording =
       run.recordings->make("dsec_street", dsecInStreet(run, run.pick(2.0, 0.05)));
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
-  options.pairing.max_depth_m = kFarM;
-  Method one{kOneCamera, paperOptions(kNearM, kFarM)};
-  one.cameras = {0};
-  const Method two{kHcAt, paperOptions(kNearM, kFarM)};
+  DepthPairingOptions pairing = studyPairing();
+  pairing.max_depth_m = kFarM;
+  const Method one = oneCamera(kNearM, kFarM);
+  const Method two{kAlg1, paperOptions(kNearM, kFarM)};
   Method dilated = two;
   dilated.name = kDilated;
   dilated.options.extraction.dilate = true;
   const auto windows = recording.windows(run.pick(0.2, 0.05), run.pick(10, 1));
-  double events = 0;
-  for (const Window& window : windows) events += static_cast<double>(recording.eventsIn(window));
 
   section.text(
       "The paper (Sec. 4.5, Table 5, Fig. 12) maps 35 s of DSEC's zurich_city_04_a in "
@@ -191,33 +184,27 @@ void studyDriving(const StudyRun& run, StudySection& section) {
       formatNumber(secondsBetween(0, recording.simulation.duration_ns), 1) +
       " s from where the car gets under way) through a simulated street; " +
       std::to_string(windows.size()) + " windows of 0.2 s, " +
-      formatNumber(1e-6 * events / static_cast<double>(windows.size()), 2) +
+      formatNumber(1e-6 * recording.meanEventsIn(windows), 2) +
       " million events of both cameras each; planes from 4 to 50 m, truth up to 50 m.");
-  const auto results = compareMethods(recording, windows, {one, two, dilated}, options);
+  const auto results = compareMethods(recording, windows, {one, two, dilated}, pairing);
   section.table(errorTable(results, {false, true}));
 
-  PictureGrid grid;
-  grid.rows = {"depth", "confidence"};
-  grid.columns = {"one camera", "two cameras", "with MF", "truth"};
-  grid.pictures.resize(2);
-  grid.width_px = 360;
+  PictureGrid grid = depthAndConfidenceGrid(360);
   const std::size_t shown = windows.size() / 2;
-  for (const MethodResult& result : results) {
-    const DepthMap& map = result.keyframes[shown].map;
-    grid.pictures[0].push_back(&result == &results.back()
-                                   ? depthPicture(map.depth, two.options.planes)
-                                   : boldDepthPicture(map.depth, two.options.planes));
-    grid.pictures[1].push_back(confidencePicture(map.confidence));
-  }
-  grid.pictures[0].push_back(
-      depthPicture(truthOf(recording, results[0].keyframes[shown]), two.options.planes));
+  const DepthPlanesOptions& limits = two.options.planes;
+  addColumn("one camera", results[0].keyframes[shown].map, limits, grid);
+  addColumn("two cameras", results[1].keyframes[shown].map, limits, grid);
+  addColumn("with MF", results[2].keyframes[shown].map, limits, grid);
+  grid.pictures[0].back() = depthPicture(results[2].keyframes[shown].map.depth, limits);
+  grid.columns.emplace_back("truth");
+  grid.pictures[0].push_back(depthPicture(truthOf(recording, results[0].keyframes[shown]), limits));
   grid.pictures[1].emplace_back();
   section.picture(
       "driving.png", drawGrid(grid),
       "A window of 0.2 s: depth (red 4 m to blue 50 m; without MF drawn 3 pixels wide) and "
       "confidence");
   judge(recording, results, section);
-  findReasons(recording, windows, {one, two, dilated}, options, section);
+  findReasons(recording, windows, {one, two, dilated}, pairing, section);
 }
 
 }  // namespace efm::studies

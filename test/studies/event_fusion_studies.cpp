@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <filesystem>
@@ -8,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "test/bench/program_arguments.h"
 #include "test/paths.h"
 #include "test/studies/recordings/real_rigs.h"
 #include "test/studies/report/study_report.h"
@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace efm::studies;  // NOLINT(google-build-using-namespace)
 
-constexpr int kSkipped = 77;  // as ctest wants it
+constexpr int kSkipped = 77;  // ctest's status of a skipped test
 
 struct Study {
   const char* name;
@@ -49,63 +49,21 @@ constexpr const char* kUsage =
     "Runs the studies (all where none is named) and writes DIR/studies.md and DIR/studies/*.png.\n"
     "Simulated events are kept in the cache. Names:";
 
-std::string usage() {
-  std::string text = kUsage;
-  for (const Study& study : kStudies) text += std::string(" ") + study.name;
-  return text;
-}
-
-struct Arguments {
-  bool quick = false;
-  fs::path out;
-  fs::path cache;
-  fs::path data = EFM_SHARED_DATA;
-  std::vector<std::string> names;  // empty: all
-
-  bool asksFor(const Study& study) const {
-    return names.empty() || std::find(names.begin(), names.end(), study.name) != names.end();
-  }
-};
-
-Arguments readArguments(const std::vector<std::string>& words) {
-  Arguments arguments;
-  for (auto word = words.begin(); word != words.end(); ++word) {
-    const auto value = [&] {
-      if (word + 1 == words.end()) throw std::invalid_argument(*word + ": expected a value");
-      return *++word;
-    };
-    const auto is_it = [&](const Study& study) { return *word == study.name; };
-    if (*word == "--quick") {
-      arguments.quick = true;
-    } else if (*word == "--out") {
-      arguments.out = value();
-    } else if (*word == "--cache") {
-      arguments.cache = value();
-    } else if (*word == "--data") {
-      arguments.data = value();
-    } else if (std::any_of(std::begin(kStudies), std::end(kStudies), is_it)) {
-      arguments.names.push_back(*word);
-    } else {
-      throw std::invalid_argument(*word + " is not known\n" + usage());
-    }
-  }
-  if (arguments.out.empty() || arguments.cache.empty()) throw std::invalid_argument(usage());
-  return arguments;
-}
-
-/// @return how many studies lacked their data.
-int runStudies(const Arguments& arguments) {
-  const fs::path pictures = arguments.out / "studies";
+/// @return the number of studies without their data.
+int runStudies(const efm::bench::ProgramArguments& arguments) {
+  const fs::path out = arguments.value("--out");
+  const fs::path pictures = out / "studies";
   fs::create_directories(pictures);
-  RecordingCache recordings(arguments.cache);
-  const StudyRun run{arguments.quick, arguments.data, pictures, &recordings};
-  StudyReport report(arguments.out / "studies.md");
+  RecordingCache recordings(arguments.value("--cache"));
+  const StudyRun run{arguments.quick, arguments.value("--data", EFM_SHARED_DATA), pictures,
+                     &recordings};
+  StudyReport report(out / "studies.md");
   std::vector<std::string> order;
   for (const Study& study : kStudies) order.emplace_back(study.name);
 
-  int lacking = 0;
+  int skipped = 0;
   for (const Study& study : kStudies) {
-    if (!arguments.asksFor(study)) continue;
+    if (!arguments.includes(study.name)) continue;
     std::cout << study.title << std::endl;
     const auto began = std::chrono::steady_clock::now();
     StudySection section(study.title, pictures);
@@ -113,7 +71,7 @@ int runStudies(const Arguments& arguments) {
       study.run(run, section);
     } catch (const MissingData& error) {
       std::cout << "  skipped: " << error.what() << '\n';
-      ++lacking;
+      ++skipped;
       continue;
     }
     if (section.markdown().empty()) throw std::logic_error(std::string(study.name) + ": is empty");
@@ -122,14 +80,23 @@ int runStudies(const Arguments& arguments) {
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
     std::cout << "  took " << took.count() << " s" << std::endl;
   }
-  return lacking;
+  return skipped;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
-    return runStudies(readArguments({argv + 1, argv + argc})) > 0 ? kSkipped : 0;
+    efm::bench::ArgumentRules rules{{"--out", "--cache", "--data"}, {}, kUsage};
+    for (const Study& study : kStudies) {
+      rules.names.emplace_back(study.name);
+      rules.usage += std::string(" ") + study.name;
+    }
+    const auto arguments = efm::bench::readArguments({argv + 1, argv + argc}, rules);
+    if (arguments.value("--out").empty() || arguments.value("--cache").empty()) {
+      throw std::invalid_argument(rules.usage);
+    }
+    return runStudies(arguments) > 0 ? kSkipped : 0;
   } catch (const std::exception& error) {
     std::cerr << "event_fusion_studies: " << error.what() << '\n';
     return 1;

@@ -101,8 +101,7 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
 }
 
 /// How much the functions differ, by how much data there is.
-void byWindow(const StudyRun& run, const Recording& recording, const ComparisonOptions& options,
-              StudySection& section) {
+void byWindow(const StudyRun& run, const Recording& recording, StudySection& section) {
   std::vector<double> durations_s = {0.05, 0.1, 0.2, 0.5, 1};
   if (run.quick) durations_s = {0.05, 0.1};
   const std::vector<Method> methods = oneOfEachRule();
@@ -116,7 +115,7 @@ void byWindow(const StudyRun& run, const Recording& recording, const ComparisonO
   std::vector<double> ratios;
   for (const double duration_s : durations_s) {
     const auto results =
-        compareMethods(recording, recording.windows(duration_s, run.pick(10, 2)), methods, options);
+        compareMethods(recording, recording.windows(duration_s, run.pick(10, 2)), methods);
     for (std::size_t m = 0; m < results.size(); ++m) {
       plot.curves[m].points.emplace_back(duration_s, badPercent(results[m].own));
     }
@@ -135,10 +134,8 @@ void byWindow(const StudyRun& run, const Recording& recording, const ComparisonO
 void studyFusionFunctions(const StudyRun& run, StudySection& section) {
   const Recording recording = roomRecording(run);
   const auto windows = recording.windows(0.1, run.pick(40, 2));
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
   const std::vector<Method> methods = oneOfEachRule();
-  const auto results = compareMethods(recording, windows, methods, options);
+  const auto results = compareMethods(recording, windows, methods);
 
   section.text(
       "The paper (Sec. 4.2, Table 2, Fig. 7) fuses the two cameras' DSIs with six "
@@ -153,21 +150,16 @@ void studyFusionFunctions(const StudyRun& run, StudySection& section) {
                "to 6.5 m.");
   section.table(errorTable(results, {true, false}));
 
-  PictureGrid grid;
-  grid.rows = {"depth", "confidence"};
-  grid.pictures.resize(2);
-  grid.width_px = 300;
+  PictureGrid grid = depthAndConfidenceGrid(300);
   for (const MethodResult& result : results) {
-    grid.columns.push_back(result.name);
-    const DepthMap& map = result.keyframes[windows.size() / 2].map;
-    grid.pictures[0].push_back(boldDepthPicture(map.depth, methods.front().options.planes));
-    grid.pictures[1].push_back(confidencePicture(map.confidence));
+    addColumn(result.name, result.keyframes[windows.size() / 2].map, methods.front().options.planes,
+              grid);
   }
   section.picture("fusion_functions.png", drawGrid(grid),
                   "One window: depth (red near, blue far) and confidence (dark high) of each "
                   "fusion function");
   judge(results, section);
-  byWindow(run, recording, options, section);
+  byWindow(run, recording, section);
 }
 
 }  // namespace efm::studies

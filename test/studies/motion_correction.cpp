@@ -88,10 +88,7 @@ void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
   KeyframeMapper mapper(recording.simulation.rig, {0, 1}, options);
   const auto began = std::chrono::steady_clock::now();
   const KeyframeDepthMap keyframe =
-      mapper
-          .map(window, {recording.eventsOf(0, window), recording.eventsOf(1, window)},
-               recording.trajectory)
-          .value();
+      mapper.map(window, recording.eventsOf(window), recording.trajectory).value();
   outcome.seconds +=
       std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   ++outcome.keyframes;
@@ -172,14 +169,15 @@ cv::Mat3b draw(const Case& what, const std::vector<TrackerError>& errors,
   plot.size = {560, 420};
   plot.x = {"velocity that is wrong [cm/s and degrees/s]", AxisScale::kLinear, 0, {}};
   plot.y = {"median error [%]", AxisScale::kLinear, 0, {}};
-  Curve as_is{"poses as they are", {}, CurveStyle::kMarkedLine, {}};
-  Curve corrected{"corrected", {}, CurveStyle::kMarkedLine, {}};
+  std::vector<double> velocities, as_is, corrected;
   for (std::size_t i = 0; i < errors.size(); ++i) {
     if (errors[i].sway) continue;
-    as_is.points.emplace_back(errors[i].velocity, 100 * all[i].as_is.median());
-    corrected.points.emplace_back(errors[i].velocity, 100 * all[i].corrected.median());
+    velocities.push_back(errors[i].velocity);
+    as_is.push_back(100 * all[i].as_is.median());
+    corrected.push_back(100 * all[i].corrected.median());
   }
-  plot.curves = {as_is, corrected};
+  plot.curves = {markedCurve("poses as they are", velocities, as_is),
+                 markedCurve("corrected", velocities, corrected)};
   return drawCurves(plot);
 }
 
@@ -200,15 +198,14 @@ void judge(const Case& what, const std::vector<TrackerError>& errors,
     over_exact.push_back(all[i].corrected.median() / exact);
   }
   section.trend(where + "the correction takes away half of the median error, or more",
-                *std::max_element(share.begin(), share.end()) <= 0.5,
+                maxOf(share) <= 0.5,
                 listed(share, 2) + " times that of the poses as they are; " +
                     listed(over_exact, 2) + " times that of exact ones",
                 "the smallest errors harm depth less than that");
   section.trend(where +
                     "the correction takes away half of what wrong poses add to the median "
                     "error, or more",
-                *std::max_element(harm.begin(), harm.end()) <= 0.5,
-                listed(harm, 2) + " of it are left");
+                maxOf(harm) <= 0.5, listed(harm, 2) + " of it are left");
 }
 
 }  // namespace

@@ -13,8 +13,8 @@
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/error_table.h"
 #include "test/studies/methods/method_comparison.h"
-#include "test/studies/recordings/pose_errors.h"
 #include "test/studies/recordings/real_rigs.h"
+#include "test/studies/recordings/recording_errors.h"
 #include "test/studies/studies.h"
 #include "tracking_stub/rendering/depth_rendering.h"
 
@@ -89,42 +89,31 @@ double meanSpeed(const Recording& recording) {
   return way_m / secondsBetween(poses.front().t_ns, poses.back().t_ns);
 }
 
-Method oneCamera() {
-  Method method{"one camera (EMVS)", paperOptions(1, 6.5)};
-  method.cameras = {0};
-  return method;
-}
-
 Method twoCameras() { return {"two cameras (Alg. 1)", paperOptions(1, 6.5)}; }
 
 DepthErrors errorsInWorld(const Recording& recording,
-                          const std::vector<KeyframeDepthMap>& keyframes,
-                          const ComparisonOptions& options) {
+                          const std::vector<KeyframeDepthMap>& keyframes) {
   std::vector<DepthPair> pairs;
   for (const KeyframeDepthMap& keyframe : keyframes) {
     const cv::Mat1f truth =
         renderDepth(recording.simulation.scene, keyframe.T_world_ref, keyframe.view);
-    const auto some = pairDepths(keyframe.map.depth, truth, options.pairing);
-    pairs.insert(pairs.end(), some.begin(), some.end());
+    appendPairs(keyframe.map.depth, truth, pairs);
   }
-  return depthErrors(pairs, options.focal_baseline);
+  return depthErrors(pairs);
 }
 
 ErrorResults mapWith(const ErrorKind& kind, const Recording& recording,
-                     const std::vector<Window>& windows, const ComparisonOptions& options) {
+                     const std::vector<Window>& windows) {
   ErrorResults results;
   for (const double level : kind.levels) {
     const Recording wrong = level > 0 ? kind.make(recording, level) : recording;
-    const auto take = [&](const Method& method, std::vector<MethodResult>& into) {
-      into.push_back(
-          {level > 0 ? kind.say(level) : "exact", mapWindows(wrong, windows, method), {}, {}, {}});
-    };
-    take(oneCamera(), results.mono);
-    take(twoCameras(), results.stereo);
-    results.in_world.push_back(errorsInWorld(recording, results.stereo.back().keyframes, options));
+    const std::string name = level > 0 ? kind.say(level) : "exact";
+    results.mono.push_back(mapMethod(wrong, windows, oneCamera(1, 6.5), name));
+    results.stereo.push_back(mapMethod(wrong, windows, twoCameras(), name));
+    results.in_world.push_back(errorsInWorld(recording, results.stereo.back().keyframes));
   }
-  scoreMethods(recording, options, results.mono);
-  scoreMethods(recording, options, results.stereo);
+  scoreMethods(recording, results.mono);
+  scoreMethods(recording, results.stereo);
   return results;
 }
 
@@ -134,23 +123,16 @@ cv::Mat3b drawGrowth(const ErrorKind& kind, const ErrorResults& results) {
   plot.size = {560, 420};
   plot.x = {kind.unit, AxisScale::kLinear, 0, {}};
   plot.y = {"median error [cm]", AxisScale::kLinear, 0, {}};
-  const auto add = [&](const char* name, const std::vector<DepthErrors>& errors) {
-    Curve curve{name, {}, CurveStyle::kMarkedLine, {}};
-    for (std::size_t i = 0; i < errors.size(); ++i) {
-      curve.points.emplace_back(kind.levels[i], medianCm(errors[i]));
-    }
-    plot.curves.push_back(curve);
+  const auto add = [&](const char* name, const std::vector<double>& medians) {
+    plot.curves.push_back(markedCurve(name, kind.levels, medians));
   };
-  const auto of = [](const std::vector<MethodResult>& all, DepthErrors MethodResult::*pixels) {
-    std::vector<DepthErrors> errors;
-    for (const MethodResult& result : all) errors.push_back(result.*pixels);
-    return errors;
-  };
-  add("one camera", of(results.mono, &MethodResult::own));
-  add("one camera, common", of(results.mono, &MethodResult::common));
-  add("two cameras", of(results.stereo, &MethodResult::own));
-  add("two cameras, common", of(results.stereo, &MethodResult::common));
-  add("two cameras, in the world", results.in_world);
+  add("one camera", eachOf(results.mono, &MethodResult::own, medianCm));
+  add("one camera, common", eachOf(results.mono, &MethodResult::common, medianCm));
+  add("two cameras", eachOf(results.stereo, &MethodResult::own, medianCm));
+  add("two cameras, common", eachOf(results.stereo, &MethodResult::common, medianCm));
+  std::vector<double> in_world;
+  for (const DepthErrors& errors : results.in_world) in_world.push_back(medianCm(errors));
+  add("two cameras, in the world", in_world);
   return drawCurves(plot);
 }
 
@@ -158,7 +140,7 @@ void tables(const ErrorKind& kind, const ErrorResults& results, StudySection& se
   section.text(twoCameras().name + ":");
   section.table(errorTable(results.stereo));
   if (kind.of_second_camera) return;
-  section.text(oneCamera().name + ":");
+  section.text(std::string(kOneCamera) + ":");
   section.table(errorTable(results.mono));
 }
 
@@ -194,9 +176,8 @@ void judge(const std::vector<ErrorKind>& kinds, const std::vector<ErrorResults>&
   const std::vector<double> apart = timesExact(all[3].stereo, own);
   section.trend("cameras that disagree about the time do more harm than poses that are late",
                 apart.back() > late.back(),
-                formatNumber(apart.back(), 2) + " against " + formatNumber(late.back(), 2) +
-                    " times the median error at " + formatNumber(kinds[3].levels.back(), 0) +
-                    " ms");
+                against(apart.back(), late.back(), 2) + " times the median error at " +
+                    formatNumber(kinds[3].levels.back(), 0) + " ms");
 }
 
 }  // namespace
@@ -204,8 +185,6 @@ void judge(const std::vector<ErrorKind>& kinds, const std::vector<ErrorResults>&
 void studyPoseAccuracy(const StudyRun& run, StudySection& section) {
   const Recording recording = roomRecording(run);
   const auto windows = recording.windows(run.pick(0.5, 0.1), run.pick(8, 1));
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
   std::vector<ErrorKind> kinds = errorKinds();
   if (run.quick) {
     for (ErrorKind& kind : kinds) kind.levels.resize(2);
@@ -227,7 +206,7 @@ void studyPoseAccuracy(const StudyRun& run, StudySection& section) {
   std::vector<ErrorResults> all;
   std::vector<cv::Mat> plots;
   for (const ErrorKind& kind : kinds) {
-    all.push_back(mapWith(kind, recording, windows, options));
+    all.push_back(mapWith(kind, recording, windows));
     section.heading(kind.title);
     tables(kind, all.back(), section);
     plots.push_back(drawGrowth(kind, all.back()));

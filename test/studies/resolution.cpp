@@ -27,7 +27,6 @@ namespace {
 
 /// One resolution.
 struct Sensor {
-  int width_px = 0;
   std::string name;
   Recording recording;
   std::vector<Window> windows;
@@ -39,78 +38,15 @@ struct ByResolution {
   std::vector<MethodResult> results;
 };
 
-/// Which cells of a coarser image hold a point.
-cv::Mat1b cellsOf(const cv::Mat1f& depth_m, cv::Size cells) {
-  cv::Mat1b occupied(cells, 0);
-  for (int y = 0; y < depth_m.rows; ++y) {
-    for (int x = 0; x < depth_m.cols; ++x) {
-      if (depth_m(y, x) > 0) {
-        occupied(y * cells.height / depth_m.rows, x * cells.width / depth_m.cols) = 255;
-      }
-    }
-  }
-  return occupied;
-}
-
-/// Own pixels; those in cells (pixels of the coarsest sensor) that hold a point at every
-/// resolution; and as many as the coarsest has.
-void score(const std::vector<Sensor>& sensors, std::vector<MethodResult>& results) {
-  std::vector<std::vector<DepthPair>> own(results.size());
-  std::vector<std::vector<DepthPair>> common(results.size());
-  std::vector<std::vector<DepthPair>> equal(results.size());
-  const auto append = [](std::vector<DepthPair>& all, const cv::Mat1f& depth_m,
-                         const cv::Mat1f& truth) {
-    const auto pairs = pairDepths(depth_m, truth, studyPairing());
-    all.insert(all.end(), pairs.begin(), pairs.end());
-  };
-  for (std::size_t w = 0; w < results.front().keyframes.size(); ++w) {
-    const cv::Size cells = results.front().keyframes[w].map.depth.size();
-    cv::Mat1b shared(cells, 255);
-    int fewest = std::numeric_limits<int>::max();
-    for (const MethodResult& result : results) {
-      const cv::Mat1f& depth_m = result.keyframes[w].map.depth;
-      shared &= cellsOf(depth_m, cells);
-      fewest = std::min(fewest, cv::countNonZero(depth_m > 0));
-    }
-    for (std::size_t r = 0; r < results.size(); ++r) {
-      const KeyframeDepthMap& keyframe = results[r].keyframes[w];
-      const cv::Mat1f& depth_m = keyframe.map.depth;
-      const cv::Mat1f truth = truthOf(sensors[r].recording, keyframe);
-      cv::Mat1b in_cells;
-      cv::resize(shared, in_cells, depth_m.size(), 0, 0, cv::INTER_NEAREST);
-      append(own[r], depth_m, truth);
-      append(common[r], only(depth_m, in_cells), truth);
-      append(equal[r], only(depth_m, mostOutstanding(keyframe.map, depth_m > 0, fewest)), truth);
-    }
-  }
-  for (std::size_t r = 0; r < results.size(); ++r) {
-    const double focal_baseline = focalBaselineOf(sensors[r].recording.simulation.rig);
-    results[r].own = depthErrors(own[r], focal_baseline);
-    results[r].common = depthErrors(common[r], focal_baseline);
-    results[r].equal = depthErrors(equal[r], focal_baseline);
-  }
-}
-
 ByResolution mapAll(const std::vector<Sensor>& sensors, const Method& method) {
   ByResolution all{method.name, {}};
+  std::vector<const Recording*> recordings;
   for (const Sensor& sensor : sensors) {
-    all.results.push_back(
-        {sensor.name, mapWindows(sensor.recording, sensor.windows, method), {}, {}, {}});
+    all.results.push_back(mapMethod(sensor.recording, sensor.windows, method, sensor.name));
+    recordings.push_back(&sensor.recording);
   }
-  score(sensors, all.results);
+  scoreMethods(recordings, all.results);
   return all;
-}
-
-double eventsOf(const Sensor& sensor) {
-  double events = 0;
-  for (const Window& window : sensor.windows) {
-    events += static_cast<double>(sensor.recording.eventsIn(window));
-  }
-  return events / static_cast<double>(sensor.windows.size());
-}
-
-bool falls(const std::vector<double>& values) {
-  return std::is_sorted(values.rbegin(), values.rend());
 }
 
 /// The pixels of a keyframe, by the kind of the edge that they lie on.
@@ -186,12 +122,8 @@ void byEdges(const Sensor& sensor, StudySection& section) {
     for (std::size_t w = 0; w < one.size(); ++w) {
       const cv::Mat1b chosen = (one[w].map.depth > 0) & (two[w].map.depth > 0) & chosenIn(one[w]);
       const cv::Mat1f truth = truthOf(recording, one[w]);
-      const auto add = [&](const KeyframeDepthMap& keyframe, std::vector<DepthPair>& all) {
-        const auto some = pairDepths(only(keyframe.map.depth, chosen), truth, studyPairing());
-        all.insert(all.end(), some.begin(), some.end());
-      };
-      add(one[w], pairs_one);
-      add(two[w], pairs_two);
+      appendPairs(only(one[w].map.depth, chosen), truth, pairs_one);
+      appendPairs(only(two[w].map.depth, chosen), truth, pairs_two);
     }
     table.rows.push_back(comparedRow(name, depthErrors(pairs_one), depthErrors(pairs_two)));
   };
@@ -220,7 +152,7 @@ void byWindow(const StudyRun& run, const Sensor& sensor, StudySection& section) 
   for (const double window_s : run.pick(std::vector{0.05, 0.1, 0.2, 0.4}, std::vector{0.05})) {
     const auto windows = sensor.recording.windows(window_s, window_s < 0.4 ? 2 : 1);
     const auto results =
-        compareMethods(sensor.recording, windows, {flyingRoomMono(), flyingRoomStereo()}, {});
+        compareMethods(sensor.recording, windows, {flyingRoomMono(), flyingRoomStereo()});
     table.rows.push_back(
         comparedRow(formatNumber(window_s, 2) + " s", results[0].common, results[1].common));
   }
@@ -248,19 +180,15 @@ void judge(const ByResolution& mono, const ByResolution& stereo,
     ratios.push_back(meanCm(stereo.results[r].own) / meanCm(mono.results[r].own));
   }
   section.trend(
-      "a second camera almost halves the mean error (at most 0.65 of it)",
-      *std::max_element(ratios.begin(), ratios.end()) <= 0.65, listed(ratios, 2) + " times",
+      "a second camera almost halves the mean error (at most 0.65 of it)", maxOf(ratios) <= 0.65,
+      listed(ratios, 2) + " times",
       "The median error does: " + listed(median_ratios, 2) +
           " times. Means are ruled by few points that are far off; the tables below say "
           "which. The second camera tells nothing of edges along its baseline, and the "
           "points that something in front hides from it have no crossing of rays but "
           "wrong ones: they are few, and their error is several times that of one camera.");
-  std::vector<double> precise;
-  std::vector<double> found;
-  for (const NamedPrecision& one : precision) {
-    precise.push_back(100 * one.counts.precision(stepOf(one.counts, 0.04)));
-    found.push_back(100 * one.counts.recall(one.counts.steps.size() - 1));
-  }
+  const std::vector<double> precise = precisionAt(precision, 0.04);
+  const std::vector<double> found = recallAt(precision, 1);
   section.trend("precision grows with resolution (paper: up to 97 % within 4 cm)", grows(precise),
                 listed(precise) + " % within 4 cm");
   section.trend(
@@ -269,35 +197,16 @@ void judge(const ByResolution& mono, const ByResolution& stereo,
       falls(found), listed(found) + " % within 1 m");
 }
 
-cv::Mat3b errorCurves(const std::vector<Sensor>& sensors, const ByResolution& mono,
-                      const ByResolution& stereo) {
-  CurvePlot plot;
-  plot.title = "Depth error by resolution";
-  plot.x = {"width [px]", AxisScale::kLinear, 0, {}};
-  plot.y = {"error [cm], own pixels", AxisScale::kLinear, 0, {}};
-  const auto add = [&](const std::string& name, const ByResolution& of, ErrorFigure figure) {
-    Curve curve{name, {}, CurveStyle::kMarkedLine, {}};
-    for (std::size_t r = 0; r < sensors.size(); ++r) {
-      curve.points.emplace_back(sensors[r].width_px, figure(of.results[r].own));
-    }
-    plot.curves.push_back(curve);
-  };
-  add("one camera, mean", mono, meanCm);
-  add("one camera, median", mono, medianCm);
-  add("two cameras, mean", stereo, meanCm);
-  add("two cameras, median", stereo, medianCm);
-  return drawCurves(plot);
-}
-
 }  // namespace
 
 void studyResolution(const StudyRun& run, StudySection& section) {
   const Simulation room = flyingRoom(run.pick(0.4, 0.05));
   std::vector<Sensor> sensors;
+  std::vector<double> widths_px;
   for (const int width_px : run.pick(std::vector{320, 640, 1280}, std::vector{80, 160})) {
     const std::string name = std::to_string(width_px) + "x" + std::to_string(width_px * 3 / 4);
-    Sensor sensor{
-        width_px, name, run.recordings->make("room_" + name, withWidth(room, width_px)), {}};
+    widths_px.push_back(width_px);
+    Sensor sensor{name, run.recordings->make("room_" + name, withWidth(room, width_px)), {}};
     sensor.windows = sensor.recording.windows(run.pick(0.2, 0.05), run.pick(2, 1));
     sensors.push_back(std::move(sensor));
   }
@@ -306,7 +215,8 @@ void studyResolution(const StudyRun& run, StudySection& section) {
 
   std::string events;
   for (const Sensor& sensor : sensors) {
-    events += (events.empty() ? "" : ", ") + formatNumber(1e-6 * eventsOf(sensor), 2);
+    events += (events.empty() ? "" : ", ") +
+              formatNumber(1e-6 * sensor.recording.meanEventsIn(sensor.windows), 2);
   }
   section.text(
       "The paper (Sec. 4.7) simulates its scene flying_room with ESIM at three "
@@ -321,8 +231,11 @@ void studyResolution(const StudyRun& run, StudySection& section) {
     section.text(one->method + ":");
     section.table(errorTable(one->results, {true, false}));
   }
-  section.picture("resolution_errors.png", errorCurves(sensors, mono, stereo),
-                  "Mean and median error by resolution");
+  section.picture(
+      "resolution_errors.png",
+      errorCurves("Depth error by resolution", {"width [px]", AxisScale::kLinear, 0, {}}, widths_px,
+                  mono.results, stereo.results),
+      "Mean and median error by resolution");
 
   std::vector<NamedPrecision> precision;
   for (std::size_t r = 0; r < sensors.size(); ++r) {
@@ -335,16 +248,10 @@ void studyResolution(const StudyRun& run, StudySection& section) {
   section.picture("resolution_precision.png", drawPrecision(precision),
                   "Precision, recall and F1 over the allowed error, by resolution");
 
-  PictureGrid grid;
-  grid.rows = {"depth", "confidence"};
-  grid.pictures.resize(2);
-  grid.width_px = 400;
+  PictureGrid grid = depthAndConfidenceGrid(400);
   const DepthPlanesOptions limits = flyingRoomStereo().options.planes;
   for (const MethodResult& result : stereo.results) {
-    grid.columns.push_back(result.name);
-    const DepthMap& map = result.keyframes.front().map;
-    grid.pictures[0].push_back(boldDepthPicture(map.depth, limits));
-    grid.pictures[1].push_back(confidencePicture(map.confidence));
+    addColumn(result.name, result.keyframes.front().map, limits, grid);
   }
   grid.columns.emplace_back("truth");
   grid.pictures[0].push_back(

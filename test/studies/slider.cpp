@@ -12,6 +12,7 @@
 #include "test/studies/frames/rendered_frames.h"
 #include "test/studies/frames/slider_keyframe.h"
 #include "test/studies/frames/slider_truth.h"
+#include "test/studies/methods/depth_curve.h"
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/methods/outstanding_points.h"
 #include "test/studies/recordings/real_rigs.h"
@@ -23,9 +24,6 @@ namespace efm::studies {
 namespace {
 
 constexpr int kPoints = 2500;
-constexpr const char* kPaper = "EMVS (the paper)";
-constexpr const char* kBoth = "split fusion and aggregation (default)";
-
 std::string percent(double share) { return formatNumber(100 * share, 1); }
 
 KeyframeMapperOptions options() {
@@ -34,26 +32,15 @@ KeyframeMapperOptions options() {
   return paper;
 }
 
-/// One camera, one way or another.
+/// One camera.
 std::vector<Method> methods() {
-  const Method paper{kPaper, options(), {0}};
-  Method subplane = paper;
-  subplane.name = "between planes";
-  subplane.options.extraction.subplane = true;
-  Method slices = subplane;
+  std::vector<Method> methods = betterDepthMethods({"EMVS (the paper)", options(), {0}});
+  Method slices = methods[1];
   slices.name = "H_t of 4 slices, between planes";
   slices.options.subintervals = {4, SubintervalSplit::kCount, SubintervalShuffle::kNone, 1};
   slices.options.sweep.fusion.across_time = FusionRule::kHarmonic;
-  Method split = subplane;
-  split.name = "split fusion";
-  split.options.split = SplitFusionOptions();
-  Method aggregated = paper;
-  aggregated.name = "aggregation";
-  aggregated.options.extraction = DepthExtractionOptions();
-  Method both = aggregated;
-  both.name = kBoth;
-  both.options.split = SplitFusionOptions();
-  return {paper, subplane, slices, split, aggregated, both};
+  methods.insert(methods.begin() + 2, slices);
+  return methods;
 }
 
 /// A method's map with its own threshold and with the number of points that all are compared at.
@@ -63,21 +50,13 @@ struct SliderResult {
   cv::Mat1f equal_m;
 };
 
-/// Thresholds from strict to loose.
-std::vector<DepthExtractionOptions> thresholdsOf(const DepthExtractionOptions& options) {
-  std::vector<DepthExtractionOptions> thresholds;
-  if (options.extraction == ExtractionMethod::kPaper) {
-    for (int c = 20; c >= 0; --c) {
-      thresholds.push_back(options);
-      thresholds.back().threshold_c = c;
-    }
-    return thresholds;
-  }
-  for (double quality = 1; quality > 0.002; quality *= 0.97) {
-    thresholds.push_back(options);
-    // Whoever wants more points looks at more.
-    thresholds.back().min_local_contrast *= std::clamp(quality / options.min_quality, 0.3, 1.0);
-    thresholds.back().min_quality = quality;
+/// From strict to loose.
+std::vector<double> thresholdsOf(ExtractionMethod method) {
+  std::vector<double> thresholds;
+  if (method == ExtractionMethod::kPaper) {
+    for (int c = 20; c >= 0; --c) thresholds.push_back(c);
+  } else {
+    for (double quality = 1; quality > 0.002; quality *= 0.97) thresholds.push_back(quality);
   }
   return thresholds;
 }
@@ -88,8 +67,9 @@ SliderResult mapSlider(const SliderRecording& recording, Method method, int poin
   result.name = method.name;
   result.own = sliderKeyframe(recording, method.options).map;
   DepthMap enough;
-  for (const DepthExtractionOptions& thresholds : thresholdsOf(method.options.extraction)) {
-    method.options.extraction = thresholds;
+  const DepthExtractionOptions own = method.options.extraction;
+  for (const double threshold : thresholdsOf(own.extraction)) {
+    method.options.extraction = withThreshold(own, threshold);
     enough = sliderKeyframe(recording, method.options).map;
     if (cv::countNonZero(enough.depth > 0) >= points) break;
   }

@@ -27,9 +27,8 @@ Method stereo(int subintervals) {
   return method;
 }
 
-Method oneCamera(int subintervals) {
-  Method method{subintervals == 1 ? "without fusion (EMVS)" : "H_t", paperOptions(1, 6.5)};
-  method.cameras = {0};
+Method mono(int subintervals) {
+  Method method = oneCamera(1, 6.5, subintervals == 1 ? "without fusion (EMVS)" : "H_t");
   method.options.subintervals.count = subintervals;
   method.options.sweep.fusion.across_time = FusionRule::kHarmonic;
   return method;
@@ -107,8 +106,7 @@ void judgeNumbers(const std::vector<MethodResult>& results, std::string departur
           formatNumber(100 * by_time, 1) + " % from there to N_s = 8");
 }
 
-void numberOfSubintervals(const StudyRun& run, const Recording& recording,
-                          const ComparisonOptions& options, StudySection& section) {
+void numberOfSubintervals(const StudyRun& run, const Recording& recording, StudySection& section) {
   section.heading("Number of sub-intervals");
   section.text(
       "The paper's Table 4: A_t∘H_c, windows of 1 s, MVSEC's three indoor flights. Cited:");
@@ -116,11 +114,10 @@ void numberOfSubintervals(const StudyRun& run, const Recording& recording,
   section.text(
       "Here: the recording of study 1, the windows of study 2. N_s = 1 is Alg. 1. Windows "
       "of 1 s:");
-  Method alone{"one camera (EMVS)", paperOptions(1, 6.5)};
-  alone.cameras = {0};
-  const std::vector<Method> methods = {alone, stereo(1), stereo(2), stereo(4), stereo(8)};
+  const std::vector<Method> methods = {oneCamera(1, 6.5), stereo(1), stereo(2), stereo(4),
+                                       stereo(8)};
   const auto seconds = recording.windows(run.pick(1.0, 0.1), run.pick(10, 1));
-  const auto in_a_second = compareMethods(recording, seconds, methods, options);
+  const auto in_a_second = compareMethods(recording, seconds, methods);
   section.table(errorTable(in_a_second));
   const double floor_cm = medianQuarterStepCm(recording, resultOf(in_a_second, "N_s = 2"));
   judgeNumbers(in_a_second,
@@ -133,20 +130,17 @@ void numberOfSubintervals(const StudyRun& run, const Recording& recording,
   section.text(
       "The same with poses that sway around the true ones, on each axis by a sine of 1 cm "
       "and 0.1 degrees at about 1 Hz:");
-  const auto swayed =
-      compareMethods(withPoseSway(recording, kTrackerSway), seconds, methods, options);
+  const auto swayed = compareMethods(withPoseSway(recording, kTrackerSway), seconds, methods);
   section.table(errorTable(swayed));
   judgeNumbers(swayed, "", section);
 
   section.text("Windows of 0.2 s, exact poses:");
   const auto shorter = recording.windows(run.pick(0.2, 0.05), run.pick(25, 1));
-  const auto in_less = compareMethods(recording, shorter, methods, options);
+  const auto in_less = compareMethods(recording, shorter, methods);
   section.table(errorTable(in_less));
-  double events = 0;
-  for (const Window& window : shorter) events += static_cast<double>(recording.eventsIn(window));
   judgeNumbers(in_less,
                "Eight sub-intervals are too many for such windows: each holds " +
-                   formatNumber(1e-3 * events / 8 / static_cast<double>(shorter.size()), 1) +
+                   formatNumber(1e-3 * recording.meanEventsIn(shorter) / 8, 1) +
                    " thousand events of both cameras, and where one camera saw none in a "
                    "sub-interval the harmonic mean is zero. (The paper's hold some 70 thousand.)",
                section);
@@ -158,18 +152,14 @@ std::vector<MethodResult> partsAndWhole(const Recording& recording,
                                         const Method& whole) {
   std::vector<MethodResult> results;
   for (int i = 0; i < kParts; ++i) {
-    results.push_back({"sub-interval " + std::to_string(i + 1),
-                       mapWindows(recording, partsOf(windows, i), of_part),
-                       {},
-                       {},
-                       {}});
+    results.push_back(mapMethod(recording, partsOf(windows, i), of_part,
+                                "sub-interval " + std::to_string(i + 1)));
   }
-  results.push_back({"fused", mapWindows(recording, windows, whole), {}, {}, {}});
+  results.push_back(mapMethod(recording, windows, whole, "fused"));
   return results;
 }
 
-void singleSubintervals(const StudyRun& run, const Recording& recording,
-                        const ComparisonOptions& options, StudySection& section) {
+void singleSubintervals(const StudyRun& run, const Recording& recording, StudySection& section) {
   section.heading("Single sub-intervals and all of them fused");
   section.text(
       "The paper's Fig. 10: the depth maps of four sub-intervals of one window are noisy, "
@@ -178,13 +168,13 @@ void singleSubintervals(const StudyRun& run, const Recording& recording,
       "H_t), below two (fused: A_t∘H_c).");
   const auto windows = recording.windows(run.pick(0.4, 0.1), run.pick(12, 1));
   const Method stereo_part = stereo(1);
-  auto mono = partsAndWhole(recording, windows, oneCamera(1), oneCamera(kParts));
+  auto one = partsAndWhole(recording, windows, mono(1), mono(kParts));
   auto both = partsAndWhole(recording, windows, stereo_part, stereo(kParts));
   PictureGrid grid;
   grid.rows = {"one camera", "two cameras"};
   grid.width_px = 300;
-  for (auto* results : {&mono, &both}) {
-    scoreMethods(recording, options, *results);
+  for (auto* results : {&one, &both}) {
+    scoreMethods(recording, *results);
     grid.pictures.emplace_back();
     grid.columns.clear();
     const std::size_t shown = richestWindow(both.back());
@@ -197,27 +187,26 @@ void singleSubintervals(const StudyRun& run, const Recording& recording,
   section.picture("subintervals.png", drawGrid(grid),
                   "Depth maps of four sub-intervals of a window of 0.4 s, and of the window fused");
   section.text("One camera:");
-  section.table(errorTable(mono));
+  section.table(errorTable(one));
   section.text("Two cameras:");
   section.table(errorTable(both));
-  for (const auto& [name, results] : {std::pair{"one camera", &mono}, {"two cameras", &both}}) {
+  for (const auto& [name, results] : {std::pair{"one camera", &one}, {"two cameras", &both}}) {
     std::vector<double> bad;
     for (int i = 0; i < kParts; ++i) {
       bad.push_back(badPercent((*results)[static_cast<std::size_t>(i)].own));
     }
     const double fused = badPercent(results->back().own);
     section.trend(std::string("the fused map is cleaner than that of any sub-interval, ") + name,
-                  fused < *std::min_element(bad.begin(), bad.end()),
+                  fused < minOf(bad),
                   "bad-pix " + formatNumber(fused, 2) + " against " + listed(bad, 2) + " %");
   }
   section.trend("the fused map of two cameras has fewer outliers than that of one",
-                badPercent(both.back().own) < badPercent(mono.back().own),
+                badPercent(both.back().own) < badPercent(one.back().own),
                 "bad-pix " + formatNumber(badPercent(both.back().own), 2) + " against " +
-                    formatNumber(badPercent(mono.back().own), 2) + " %");
+                    formatNumber(badPercent(one.back().own), 2) + " %");
 }
 
-void oneCameraAcrossTime(const StudyRun& run, const Recording& recording,
-                         const ComparisonOptions& options, StudySection& section) {
+void oneCameraAcrossTime(const StudyRun& run, const Recording& recording, StudySection& section) {
   section.heading("One camera fused across time");
   section.text(
       "The paper (Sec. 4.4.2, Fig. 9) fuses four sub-intervals of one camera by the "
@@ -228,7 +217,7 @@ void oneCameraAcrossTime(const StudyRun& run, const Recording& recording,
   for (const double duration_s : durations_s) {
     const auto results = compareMethods(
         recording, recording.windows(duration_s, run.pick(duration_s < 1 ? 25 : 10, 1)),
-        {oneCamera(1), oneCamera(kParts)}, options);
+        {mono(1), mono(kParts)});
     section.text("Windows of " + formatNumber(duration_s, 1) + " s:");
     section.table(errorTable(results, {true, false}));
     const DepthErrors& without = results[0].own;
@@ -250,11 +239,9 @@ void oneCameraAcrossTime(const StudyRun& run, const Recording& recording,
 
 void studySubintervals(const StudyRun& run, StudySection& section) {
   const Recording recording = roomRecording(run);
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
-  numberOfSubintervals(run, recording, options, section);
-  singleSubintervals(run, recording, options, section);
-  oneCameraAcrossTime(run, recording, options, section);
+  numberOfSubintervals(run, recording, section);
+  singleSubintervals(run, recording, section);
+  oneCameraAcrossTime(run, recording, section);
 }
 
 }  // namespace efm::studies

@@ -22,14 +22,14 @@ Method fused(const char* name, const std::vector<int>& cameras) {
 }
 
 /// Errors where all cameras see, whatever each method chose there.
-std::vector<MethodResult> whereAllSee(const Recording& recording, const ComparisonOptions& options,
+std::vector<MethodResult> whereAllSee(const Recording& recording,
                                       std::vector<MethodResult> results) {
   for (std::size_t w = 0; w < results.front().keyframes.size(); ++w) {
     cv::Mat1b seen(results.front().keyframes[w].map.depth.size(), 255);
     for (const MethodResult& alone : results) seen &= alone.keyframes[w].map.confidence > 0;
     for (MethodResult& result : results) result.keyframes[w].map.depth.setTo(0, ~seen);
   }
-  scoreMethods(recording, options, results);
+  scoreMethods(recording, results);
   return results;
 }
 
@@ -63,13 +63,11 @@ void judge(const std::vector<MethodResult>& results, const std::vector<MethodRes
   const std::vector<double> two_beyond = {beyond(resultOf(results, "0 and 1").own),
                                           beyond(resultOf(results, "0 and 2").own),
                                           beyond(resultOf(results, "1 and 2").own)};
-  const double least_one = *std::min_element(one_beyond.begin(), one_beyond.end());
-  const double least_two = *std::min_element(two_beyond.begin(), two_beyond.end());
   section.trend("the fused map suppresses the outliers of the single cameras' maps",
-                beyond(three.own) < 0.5 * least_one,
+                beyond(three.own) < 0.5 * minOf(one_beyond),
                 "beyond 10 %: " + formatNumber(beyond(three.own), 2) + " % against " +
                     listed(one_beyond, 2) + " %");
-  section.trend("three cameras have fewer than any two", beyond(three.own) < least_two,
+  section.trend("three cameras have fewer than any two", beyond(three.own) < minOf(two_beyond),
                 formatNumber(beyond(three.own), 2) + " % against " + listed(two_beyond, 2) + " %");
   std::vector<double> medians;
   for (const char* name : {"0 and 1", "0 and 2", "1 and 2", "three"}) {
@@ -105,9 +103,7 @@ void studyThreeCameras(const StudyRun& run, StudySection& section) {
                                        fused("camera 2", {2}),   fused("0 and 1", {0, 1}),
                                        fused("0 and 2", {0, 2}), fused("1 and 2", {1, 2}),
                                        fused("three", {0, 1, 2})};
-  ComparisonOptions options;
-  options.focal_baseline = focalBaselineOf(recording.simulation.rig);
-  const auto results = compareMethods(recording, windows, methods, options);
+  const auto results = compareMethods(recording, windows, methods);
   section.text(
       "The paper (Sec. 4.8) fuses the three cameras of EVIMO2's rig and looks at the "
       "maps. "
@@ -117,7 +113,7 @@ void studyThreeCameras(const StudyRun& run, StudySection& section) {
       " windows of 0.2 s, planes from 0.8 to 4.5 m, the harmonic mean of any number of cameras, "
       "always in the view of camera 0. Bad-pix is by the baseline of cameras 0 and 1.");
   section.table(errorTable(results, {true, false}));
-  const auto within = whereAllSee(recording, options, results);
+  const auto within = whereAllSee(recording, results);
   section.text(
       "The same where all three cameras, and each alone, have confidence: outside, a third camera "
       "leaves nothing.");
@@ -129,15 +125,10 @@ void studyThreeCameras(const StudyRun& run, StudySection& section) {
   }
   section.picture("three_cameras_precision.png", drawPrecision(precision),
                   "Precision, recall and F1 over the allowed error, by the cameras fused");
-  PictureGrid grid;
-  grid.rows = {"depth", "confidence"};
-  grid.pictures.resize(2);
-  grid.width_px = 320;
+  PictureGrid grid = depthAndConfidenceGrid(320);
   for (const char* name : {"camera 0", "camera 1", "camera 2", "0 and 1", "three"}) {
-    grid.columns.emplace_back(name);
-    const DepthMap& map = resultOf(results, name).keyframes.front().map;
-    grid.pictures[0].push_back(boldDepthPicture(map.depth, methods.front().options.planes));
-    grid.pictures[1].push_back(confidencePicture(map.confidence));
+    addColumn(name, resultOf(results, name).keyframes.front().map, methods.front().options.planes,
+              grid);
   }
   section.picture("three_cameras.png", drawGrid(grid),
                   "Depth (red 0.8 m to blue 4.5 m) and confidence, all in the view of camera 0");

@@ -19,9 +19,6 @@ class DsiProjections : public DsiSink {
 
   void addPlane(int plane, const float* values) override;
 
-  const cv::Mat1f& front() const { return front_; }  ///< Width x height.
-  const cv::Mat1f& top() const { return top_; }      ///< Width x planes.
-  const cv::Mat1f& side() const { return side_; }    ///< Planes x height.
   /// The three as one picture, front above left, top below it, side to its right: blue (none) to
   /// yellow (the largest value of all).
   cv::Mat3b picture() const;

@@ -28,7 +28,7 @@ cv::Mat3b fitted(const cv::Mat& picture, int width_px) {
   return scaled;
 }
 
-/// Text in the middle of a strip.
+/// A strip with text in its middle.
 cv::Mat3b label(const std::string& text, int length_px) {
   constexpr double kScale = 0.42;
   cv::Mat3b strip(kLabelPx, length_px, cv::Vec3b(255, 255, 255));
@@ -39,7 +39,51 @@ cv::Mat3b label(const std::string& text, int length_px) {
   return strip;
 }
 
+/// The picture in the upper left corner of a white sheet.
+cv::Mat3b padded(const cv::Mat3b& picture, cv::Size size) {
+  cv::Mat3b sheet(size, cv::Vec3b(255, 255, 255));
+  if (!picture.empty()) picture.copyTo(sheet(cv::Rect({0, 0}, picture.size())));
+  return sheet;
+}
+
 }  // namespace
+
+cv::Mat3b drawGrid(const PictureGrid& grid) {
+  const std::size_t columns = grid.pictures.empty() ? 0 : grid.pictures.front().size();
+  const int cell_width = grid.width_px + kGapPx;
+  std::vector<cv::Mat> sheet;
+  const auto addRow = [&](const std::vector<cv::Mat3b>& cells, const cv::Mat3b& name, int height) {
+    std::vector<cv::Mat> row;
+    if (!grid.rows.empty()) row.push_back(padded(name, {kLabelPx, height}));
+    for (const cv::Mat3b& cell : cells) row.push_back(padded(cell, {cell_width, height}));
+    cv::hconcat(row, sheet.emplace_back());
+  };
+  if (!grid.columns.empty()) {
+    std::vector<cv::Mat3b> labels;
+    for (const std::string& column : grid.columns) labels.push_back(label(column, grid.width_px));
+    labels.resize(columns);
+    addRow(labels, {}, kLabelPx);
+  }
+  for (std::size_t r = 0; r < grid.pictures.size(); ++r) {
+    if (grid.pictures[r].size() != columns) {
+      throw std::invalid_argument("a row of pictures is not complete");
+    }
+    std::vector<cv::Mat3b> cells;
+    int height = 1;
+    for (const cv::Mat& picture : grid.pictures[r]) {
+      cells.push_back(picture.empty() ? cv::Mat3b() : fitted(picture, grid.width_px));
+      height = std::max(height, cells.back().rows);
+    }
+    cv::Mat3b upright;
+    if (r < grid.rows.size()) {
+      cv::rotate(label(grid.rows[r], height), upright, cv::ROTATE_90_COUNTERCLOCKWISE);
+    }
+    addRow(cells, upright, height + kGapPx);
+  }
+  cv::Mat3b picture;
+  cv::vconcat(sheet, picture);
+  return picture;
+}
 
 cv::Mat3b boldDepthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits) {
   cv::Mat1f bold;
@@ -48,46 +92,15 @@ cv::Mat3b boldDepthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& l
   return depthPicture(bold, limits);
 }
 
-cv::Mat3b drawGrid(const PictureGrid& grid) {
-  const std::size_t columns = grid.pictures.empty() ? 0 : grid.pictures.front().size();
-  const int left = grid.rows.empty() ? 0 : kLabelPx;
-  const int top = grid.columns.empty() ? 0 : kLabelPx;
-  std::vector<std::vector<cv::Mat3b>> cells;
-  std::vector<int> heights;
-  for (const std::vector<cv::Mat>& row : grid.pictures) {
-    if (row.size() != columns) throw std::invalid_argument("a row of pictures is not complete");
-    cells.emplace_back();
-    heights.push_back(1);
-    for (const cv::Mat& picture : row) {
-      cells.back().push_back(picture.empty() ? cv::Mat3b() : fitted(picture, grid.width_px));
-      heights.back() = std::max(heights.back(), cells.back().back().rows);
-    }
-  }
-  int height = top;
-  for (const int of_row : heights) height += of_row + kGapPx;
-  const int width = left + static_cast<int>(columns) * (grid.width_px + kGapPx);
-  cv::Mat3b sheet(height, width, cv::Vec3b(255, 255, 255));
-  const auto x_of = [&](std::size_t c) {
-    return left + static_cast<int>(c) * (grid.width_px + kGapPx);
-  };
-  for (std::size_t c = 0; c < std::min(columns, grid.columns.size()); ++c) {
-    label(grid.columns[c], grid.width_px)
-        .copyTo(sheet(cv::Rect(x_of(c), 0, grid.width_px, kLabelPx)));
-  }
-  int y = top;
-  for (std::size_t r = 0; r < cells.size(); ++r) {
-    if (r < grid.rows.size()) {
-      cv::Mat3b upright;
-      cv::rotate(label(grid.rows[r], heights[r]), upright, cv::ROTATE_90_COUNTERCLOCKWISE);
-      upright.copyTo(sheet(cv::Rect(0, y, kLabelPx, heights[r])));
-    }
-    for (std::size_t c = 0; c < columns; ++c) {
-      const cv::Mat3b& cell = cells[r][c];
-      if (!cell.empty()) cell.copyTo(sheet(cv::Rect(x_of(c), y, cell.cols, cell.rows)));
-    }
-    y += heights[r] + kGapPx;
-  }
-  return sheet;
+PictureGrid depthAndConfidenceGrid(int width_px) {
+  return {{}, {"depth", "confidence"}, {{}, {}}, width_px};
+}
+
+void addColumn(const std::string& name, const DepthMap& map, const DepthPlanesOptions& limits,
+               PictureGrid& grid) {
+  grid.columns.push_back(name);
+  grid.pictures[0].push_back(boldDepthPicture(map.depth, limits));
+  grid.pictures[1].push_back(confidencePicture(map.confidence));
 }
 
 }  // namespace efm::studies

@@ -5,23 +5,29 @@
 #include <string>
 #include <vector>
 
+#include "mapping/depth/depth_map.h"
 #include "mapping/geometry/depth_planes.h"
 
 namespace efm::studies {
 
-/// Pictures side by side, with labels: rows of equally many. Text is ASCII.
+/// Pictures in rows of equal length, with labels. Text is ASCII.
 struct PictureGrid {
-  std::vector<std::string> columns;            ///< Above each column; may be empty.
-  std::vector<std::string> rows;               ///< Left of each row, upright; may be empty.
-  std::vector<std::vector<cv::Mat>> pictures;  ///< [row][column]; grey or BGR; empty: left white.
-  int width_px = 240;  ///< Of each picture; smaller ones are enlarged without smoothing.
+  std::vector<std::string> columns;            ///< Labels above the columns; may be empty.
+  std::vector<std::string> rows;               ///< Upright labels left of the rows; may be empty.
+  std::vector<std::vector<cv::Mat>> pictures;  ///< [row][column]; grey, BGR, or empty for white.
+  int width_px = 240;  ///< Of each picture. Smaller ones are enlarged without smoothing.
 };
 
-/// A depth map for the eye as `depthPicture` makes it, each point 3 pixels wide: thin edges stay
-/// visible on a page.
+/// @throws std::invalid_argument where the rows have different lengths.
+cv::Mat3b drawGrid(const PictureGrid& grid);
+
+/// `depthPicture` with points 3 pixels wide: thin edges stay visible on a page.
 cv::Mat3b boldDepthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits);
 
-/// @throws std::invalid_argument where the rows are not equally long.
-cv::Mat3b drawGrid(const PictureGrid& grid);
+/// A grid with a row of depth maps and a row of confidence maps, without columns.
+PictureGrid depthAndConfidenceGrid(int width_px);
+/// Adds a column to it.
+void addColumn(const std::string& name, const DepthMap& map, const DepthPlanesOptions& limits,
+               PictureGrid& grid);
 
 }  // namespace efm::studies

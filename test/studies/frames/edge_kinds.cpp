@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "mapping/geometry/angle.h"
@@ -20,6 +19,17 @@ EdgeKind kindOf(double direction, const EdgeKindOptions& options) {
 }
 
 }  // namespace
+
+ImageGradient imageGradient(const cv::Mat1f& grey, double blur_px) {
+  cv::Mat1f smooth;
+  cv::GaussianBlur(grey, smooth, {0, 0}, blur_px, blur_px, cv::BORDER_REPLICATE);
+  ImageGradient gradient;
+  // The weights of Sobel sum to 8 grey values per pixel.
+  cv::Sobel(smooth, gradient.x, CV_32F, 1, 0, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
+  cv::Sobel(smooth, gradient.y, CV_32F, 0, 1, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
+  cv::magnitude(gradient.x, gradient.y, gradient.magnitude);
+  return gradient;
+}
 
 void EdgeKindOptions::validate() const {
   requireOption(blur_px > 0, "blur_px", blur_px, "above 0");
@@ -41,26 +51,16 @@ EdgeKind EdgeKinds::kindNear(int x, int y) const {
 
 EdgeKinds edgeKinds(const cv::Mat1f& grey, const EdgeKindOptions& options) {
   options.validate();
-  cv::Mat1f smooth;
-  cv::GaussianBlur(grey, smooth, {0, 0}, options.blur_px, options.blur_px, cv::BORDER_REPLICATE);
-  // Sobel's weights sum to 8 grey values per pixel.
-  cv::Mat1f along_x;
-  cv::Mat1f along_y;
-  cv::Sobel(smooth, along_x, CV_32F, 1, 0, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
-  cv::Sobel(smooth, along_y, CV_32F, 0, 1, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
-
+  const ImageGradient gradient = imageGradient(grey, options.blur_px);
   EdgeKinds edges;
-  const float none = std::numeric_limits<float>::quiet_NaN();
-  edges.gradient_direction = cv::Mat1f(grey.size(), none);
   edges.kinds = cv::Mat1b(grey.size(), static_cast<std::uint8_t>(EdgeKind::kNone));
-  cv::magnitude(along_x, along_y, edges.magnitude_);
+  edges.magnitude_ = gradient.magnitude;
   for (int y = 0; y < grey.rows; ++y) {
     for (int x = 0; x < grey.cols; ++x) {
       if (static_cast<double>(edges.magnitude_(y, x)) < options.min_gradient) continue;
-      double direction = std::atan2(static_cast<double>(along_y(y, x)), along_x(y, x));
+      double direction = std::atan2(static_cast<double>(gradient.y(y, x)), gradient.x(y, x));
       if (direction < 0) direction += kPi;
       if (direction >= kPi) direction -= kPi;
-      edges.gradient_direction(y, x) = static_cast<float>(direction);
       edges.kinds(y, x) = static_cast<std::uint8_t>(kindOf(direction, options));
     }
   }
@@ -69,8 +69,8 @@ EdgeKinds edgeKinds(const cv::Mat1f& grey, const EdgeKindOptions& options) {
   constexpr double kPerGrey = 100;
   cv::Mat1s dx;
   cv::Mat1s dy;
-  along_x.convertTo(dx, CV_16S, kPerGrey);
-  along_y.convertTo(dy, CV_16S, kPerGrey);
+  gradient.x.convertTo(dx, CV_16S, kPerGrey);
+  gradient.y.convertTo(dy, CV_16S, kPerGrey);
   cv::Mat1b lines;
   cv::Canny(dx, dy, lines, kPerGrey * options.min_gradient, kPerGrey * options.line_gradient, true);
   edges.horizontal_lines = lines & (edges.kinds == static_cast<int>(EdgeKind::kHorizontal));

@@ -6,6 +6,12 @@
 
 namespace efm::studies {
 
+/// The gradient of an image under a Gaussian blur, in grey values per pixel.
+struct ImageGradient {
+  cv::Mat1f x, y, magnitude;
+};
+ImageGradient imageGradient(const cv::Mat1f& grey, double blur_px);
+
 enum class EdgeKind : std::uint8_t {
   kNone,        ///< No edge.
   kHorizontal,  ///< The grey values' gradient is within 15 degrees of vertical.
@@ -26,8 +32,7 @@ struct EdgeKindOptions {
 
 /// Where an image has edges, and how they run.
 struct EdgeKinds {
-  cv::Mat1f gradient_direction;  ///< From the x axis, [0, pi) radians; NaN under `min_gradient`.
-  cv::Mat1b kinds;               ///< EdgeKind of every pixel with a direction.
+  cv::Mat1b kinds;  ///< EdgeKind of every pixel.
   /// The thin lines among them (Canny): 255 at edge pixels of the kind, else 0.
   cv::Mat1b horizontal_lines;
   cv::Mat1b vertical_lines;

@@ -11,6 +11,7 @@
 #include "mapping/depth/median.h"
 #include "mapping/depth/peak_fit.h"
 #include "mapping/options/option_check.h"
+#include "test/studies/frames/edge_kinds.h"
 #include "test/studies/frames/frame_sweep.h"
 
 namespace efm::studies {
@@ -101,14 +102,7 @@ FrameDepth depthOf(const FrameSweep& frames, const FrameDepthOptions& options) {
 
 /// 255 on edges, in the key frame as the view sees it; 0 on even ground, beside strong edges too.
 cv::Mat1b onEdges(const cv::Mat1f& grey, const FrameDepthOptions& options) {
-  cv::Mat1f smooth;
-  cv::GaussianBlur(grey, smooth, {0, 0}, 1, 1, cv::BORDER_REPLICATE);
-  cv::Mat1f along_x;
-  cv::Mat1f along_y;
-  cv::Sobel(smooth, along_x, CV_32F, 1, 0, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
-  cv::Sobel(smooth, along_y, CV_32F, 0, 1, 3, 1.0 / 8, 0, cv::BORDER_REPLICATE);
-  cv::Mat1f magnitude;
-  cv::magnitude(along_x, along_y, magnitude);
+  const cv::Mat1f magnitude = imageGradient(grey, 1).magnitude;
   const int side = 2 * options.shadow_px + 1;
   cv::Mat1f strongest;
   cv::dilate(magnitude, strongest, cv::Mat1b(side, side, 1));

@@ -42,17 +42,18 @@ std::vector<double> thresholdsOf(ExtractionMethod method) {
   return {0.9, 0.6, 0.4, 0.25, 0.16, 0.1, 0.06, 0.03, 0.012, 0.004};
 }
 
-void setThreshold(double threshold, DepthExtractionOptions& extraction) {
+}  // namespace
+
+DepthExtractionOptions withThreshold(DepthExtractionOptions extraction, double threshold) {
   if (extraction.extraction == ExtractionMethod::kPaper) {
     extraction.threshold_c = threshold;
-    return;
+  } else {
+    // More points need more candidates.
+    extraction.min_local_contrast *= std::clamp(threshold / extraction.min_quality, 0.3, 1.0);
+    extraction.min_quality = threshold;
   }
-  // Whoever wants more points looks at more.
-  extraction.min_local_contrast *= std::clamp(threshold / extraction.min_quality, 0.3, 1.0);
-  extraction.min_quality = threshold;
+  return extraction;
 }
-
-}  // namespace
 
 double PointQuality::f1() const {
   const double precision = 1 - beyond_10;
@@ -132,7 +133,7 @@ DepthCurve depthCurve(const Recording& recording, const std::vector<Window>& win
   DepthCurve curve{method.name, {}};
   for (const double threshold : thresholdsOf(method.options.extraction.extraction)) {
     Method with = method;
-    setThreshold(threshold, with.options.extraction);
+    with.options.extraction = withThreshold(method.options.extraction, threshold);
     curve.steps.push_back(judge.judge(mapWindows(recording, windows, with)));
   }
   return curve;

@@ -57,6 +57,10 @@ class DepthJudge {
   double step_;                           // of inverse depth, 1/m
 };
 
+/// The extraction with another threshold: `threshold_c` of `kPaper`, `min_quality` of
+/// `kAggregated`.
+DepthExtractionOptions withThreshold(DepthExtractionOptions extraction, double threshold);
+
 /// Over the thresholds of its extraction: `threshold_c` of `kPaper`, `min_quality` of
 /// `kAggregated`.
 DepthCurve depthCurve(const Recording& recording, const std::vector<Window>& windows,

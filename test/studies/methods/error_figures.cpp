@@ -38,4 +38,44 @@ bool grows(const std::vector<double>& values) {
   return std::is_sorted(values.begin(), values.end());
 }
 
+bool falls(const std::vector<double>& values, double tolerance) {
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    if (values[i] > values[i - 1] + tolerance) return false;
+  }
+  return true;
+}
+
+double minOf(const std::vector<double>& values) {
+  return *std::min_element(values.begin(), values.end());
+}
+double maxOf(const std::vector<double>& values) {
+  return *std::max_element(values.begin(), values.end());
+}
+
+std::string against(double value, double other, int decimals) {
+  return formatNumber(value, decimals) + " against " + formatNumber(other, decimals);
+}
+
+Curve markedCurve(const std::string& label, const std::vector<double>& x,
+                  const std::vector<double>& y) {
+  Curve curve{label, {}, CurveStyle::kMarkedLine, {}};
+  for (std::size_t i = 0; i < x.size(); ++i) curve.points.emplace_back(x[i], y[i]);
+  return curve;
+}
+
+cv::Mat3b errorCurves(const std::string& title, const PlotAxis& axis,
+                      const std::vector<double>& sizes, const std::vector<MethodResult>& mono,
+                      const std::vector<MethodResult>& stereo) {
+  const auto own = &MethodResult::own;
+  CurvePlot plot;
+  plot.title = title;
+  plot.x = axis;
+  plot.y = {"error [cm], own pixels", AxisScale::kLinear, 0, {}};
+  plot.curves = {markedCurve("one camera, mean", sizes, eachOf(mono, own, meanCm)),
+                 markedCurve("one camera, median", sizes, eachOf(mono, own, medianCm)),
+                 markedCurve("two cameras, mean", sizes, eachOf(stereo, own, meanCm)),
+                 markedCurve("two cameras, median", sizes, eachOf(stereo, own, medianCm))};
+  return drawCurves(plot);
+}
+
 }  // namespace efm::studies

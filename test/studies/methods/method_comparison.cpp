@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <opencv2/imgproc.hpp>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -13,20 +15,12 @@
 namespace efm::studies {
 namespace {
 
-std::vector<EventSpan> eventsOf(const Recording& recording, const Window& window) {
-  std::vector<EventSpan> spans;
-  for (std::size_t c = 0; c < recording.events.size(); ++c) {
-    spans.push_back(recording.eventsOf(c, window));
-  }
-  return spans;
-}
-
 std::vector<KeyframeDepthMap> mapOnce(const Recording& recording,
                                       const std::vector<Window>& windows, const Method& method) {
   KeyframeMapper mapper(recording.simulation.rig, method.cameras, method.options);
   std::vector<KeyframeDepthMap> keyframes;
   for (const Window& window : windows) {
-    auto keyframe = mapper.map(window, eventsOf(recording, window), recording.trajectory);
+    auto keyframe = mapper.map(window, recording.eventsOf(window), recording.trajectory);
     if (!keyframe) throw std::logic_error(method.name + ": a window has no pose");
     keyframes.push_back(std::move(*keyframe));
   }
@@ -58,8 +52,24 @@ std::vector<KeyframeDepthMap> mapLate(const Recording& recording,
   return merged;
 }
 
-void append(std::vector<DepthPair>& all, const std::vector<DepthPair>& some) {
-  all.insert(all.end(), some.begin(), some.end());
+/// The cells of a coarser image that contain a point.
+cv::Mat1b cellsOf(const cv::Mat1f& depth_m, cv::Size cells) {
+  cv::Mat1b occupied(cells, 0);
+  for (int y = 0; y < depth_m.rows; ++y) {
+    for (int x = 0; x < depth_m.cols; ++x) {
+      if (depth_m(y, x) > 0) {
+        occupied(y * cells.height / depth_m.rows, x * cells.width / depth_m.cols) = 255;
+      }
+    }
+  }
+  return occupied;
+}
+
+/// Focal length in pixels times baseline in metres of the first two cameras, for bad-pix.
+std::optional<double> focalBaselineOf(const Rig& rig) {
+  if (rig.cameras.size() < 2) return std::nullopt;
+  const Rigid3 T_cam0_cam1 = rig.cameras[0].T_rig_cam.inverse() * rig.cameras[1].T_rig_cam;
+  return rig.cameras[0].model.fx * T_cam0_cam1.translation.norm();
 }
 
 }  // namespace
@@ -96,13 +106,31 @@ std::vector<KeyframeDepthMap> mapWindows(const Recording& recording,
   return mapOnce(recording, windows, again);
 }
 
-cv::Mat1f truthOf(const Recording& recording, const KeyframeDepthMap& keyframe,
-                  int reference_camera) {
+Method oneCamera(double min_depth_m, double max_depth_m, const std::string& name) {
+  return {name, paperOptions(min_depth_m, max_depth_m), {0}};
+}
+
+std::vector<Method> betterDepthMethods(const Method& paper) {
+  Method subplane = paper;
+  subplane.name = "between planes";
+  subplane.options.extraction.subplane = true;
+  Method split = subplane;
+  split.name = "split fusion";
+  split.options.split = SplitFusionOptions();
+  Method aggregated = paper;
+  aggregated.name = "aggregation";
+  aggregated.options.extraction = DepthExtractionOptions();
+  Method both = aggregated;
+  both.name = "split fusion and aggregation (default)";
+  both.options.split = SplitFusionOptions();
+  return {paper, subplane, split, aggregated, both};
+}
+
+cv::Mat1f truthOf(const Recording& recording, const KeyframeDepthMap& keyframe) {
   const Simulation& simulation = recording.simulation;
-  const auto camera = static_cast<std::size_t>(reference_camera);
   return renderDepth(simulation.scene,
                      simulation.motion->poseAt(keyframe.window.t_ref_ns) *
-                         simulation.rig.cameras.at(camera).T_rig_cam,
+                         simulation.rig.cameras.front().T_rig_cam,
                      keyframe.view);
 }
 
@@ -112,46 +140,67 @@ DepthPairingOptions studyPairing() {
   return pairing;
 }
 
-void scoreMethods(const Recording& recording, const ComparisonOptions& options,
-                  std::vector<MethodResult>& results) {
+void appendPairs(const cv::Mat1f& depth_m, const cv::Mat1f& truth_m, std::vector<DepthPair>& pairs,
+                 const DepthPairingOptions& pairing) {
+  const std::vector<DepthPair> some = pairDepths(depth_m, truth_m, pairing);
+  pairs.insert(pairs.end(), some.begin(), some.end());
+}
+
+MethodResult mapMethod(const Recording& recording, const std::vector<Window>& windows,
+                       const Method& method, const std::string& name) {
+  return {name, mapWindows(recording, windows, method), {}, {}, {}};
+}
+
+void scoreMethods(const std::vector<const Recording*>& recordings,
+                  std::vector<MethodResult>& results, const DepthPairingOptions& pairing) {
   struct Pairs {
     std::vector<DepthPair> own, common, equal;
   };
   std::vector<Pairs> pairs(results.size());
   for (std::size_t w = 0; w < results.front().keyframes.size(); ++w) {
-    const cv::Mat1f truth =
-        truthOf(recording, results.front().keyframes[w], options.reference_camera);
-    cv::Mat1b common(truth.size(), 255);
+    const cv::Size cells = results.front().keyframes[w].map.depth.size();
+    cv::Mat1b common_cells(cells, 255);
     int fewest = std::numeric_limits<int>::max();
     for (const MethodResult& result : results) {
-      const cv::Mat1b chosen = result.keyframes.at(w).map.depth > 0;
-      common &= chosen;
-      fewest = std::min(fewest, cv::countNonZero(chosen));
+      const cv::Mat1f& depth_m = result.keyframes.at(w).map.depth;
+      common_cells &= cellsOf(depth_m, cells);
+      fewest = std::min(fewest, cv::countNonZero(depth_m > 0));
     }
+    cv::Mat1f truth;
     for (std::size_t m = 0; m < results.size(); ++m) {
-      const DepthMap& map = results[m].keyframes[w].map;
-      const cv::Mat1b equal = mostOutstanding(map, map.depth > 0, fewest);
-      append(pairs[m].own, pairDepths(map.depth, truth, options.pairing));
-      append(pairs[m].common, pairDepths(only(map.depth, common), truth, options.pairing));
-      append(pairs[m].equal, pairDepths(only(map.depth, equal), truth, options.pairing));
+      const KeyframeDepthMap& keyframe = results[m].keyframes[w];
+      const cv::Mat1f& depth_m = keyframe.map.depth;
+      if (m == 0 || recordings[m] != recordings[m - 1]) truth = truthOf(*recordings[m], keyframe);
+      cv::Mat1b common;
+      cv::resize(common_cells, common, depth_m.size(), 0, 0, cv::INTER_NEAREST);
+      appendPairs(depth_m, truth, pairs[m].own, pairing);
+      appendPairs(only(depth_m, common), truth, pairs[m].common, pairing);
+      appendPairs(only(depth_m, mostOutstanding(keyframe.map, depth_m > 0, fewest)), truth,
+                  pairs[m].equal, pairing);
     }
   }
   for (std::size_t m = 0; m < results.size(); ++m) {
-    results[m].own = depthErrors(pairs[m].own, options.focal_baseline);
-    results[m].common = depthErrors(pairs[m].common, options.focal_baseline);
-    results[m].equal = depthErrors(pairs[m].equal, options.focal_baseline);
+    const std::optional<double> focal_baseline = focalBaselineOf(recordings[m]->simulation.rig);
+    results[m].own = depthErrors(pairs[m].own, focal_baseline);
+    results[m].common = depthErrors(pairs[m].common, focal_baseline);
+    results[m].equal = depthErrors(pairs[m].equal, focal_baseline);
   }
+}
+
+void scoreMethods(const Recording& recording, std::vector<MethodResult>& results,
+                  const DepthPairingOptions& pairing) {
+  scoreMethods(std::vector<const Recording*>(results.size(), &recording), results, pairing);
 }
 
 std::vector<MethodResult> compareMethods(const Recording& recording,
                                          const std::vector<Window>& windows,
                                          const std::vector<Method>& methods,
-                                         const ComparisonOptions& options) {
+                                         const DepthPairingOptions& pairing) {
   std::vector<MethodResult> results;
   for (const Method& method : methods) {
-    results.push_back({method.name, mapWindows(recording, windows, method), {}, {}, {}});
+    results.push_back(mapMethod(recording, windows, method, method.name));
   }
-  scoreMethods(recording, options, results);
+  scoreMethods(recording, results, pairing);
   return results;
 }
 

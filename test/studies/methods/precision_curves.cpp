@@ -9,9 +9,10 @@
 namespace efm::studies {
 namespace {
 
-using Share = double (PrecisionRecall::*)(std::size_t) const;
+using Fraction = double (PrecisionRecall::*)(std::size_t) const;
 
-cv::Mat3b drawShare(const std::vector<NamedPrecision>& all, const char* title, Share share) {
+cv::Mat3b drawFraction(const std::vector<NamedPrecision>& all, const char* title,
+                       Fraction fraction) {
   CurvePlot plot;
   plot.title = title;
   plot.size = {480, 400};
@@ -20,11 +21,20 @@ cv::Mat3b drawShare(const std::vector<NamedPrecision>& all, const char* title, S
   for (const NamedPrecision& one : all) {
     Curve curve{one.name, {}, CurveStyle::kMarkedLine, {}};
     for (std::size_t i = 0; i < one.counts.steps.size(); ++i) {
-      curve.points.emplace_back(one.counts.steps[i].threshold_m, 100 * (one.counts.*share)(i));
+      curve.points.emplace_back(one.counts.steps[i].threshold_m, 100 * (one.counts.*fraction)(i));
     }
     plot.curves.push_back(curve);
   }
   return drawCurves(plot);
+}
+
+std::vector<double> percentAt(const std::vector<NamedPrecision>& all, double threshold_m,
+                              Fraction fraction) {
+  std::vector<double> percents;
+  for (const NamedPrecision& one : all) {
+    percents.push_back(100 * (one.counts.*fraction)(stepOf(one.counts, threshold_m)));
+  }
+  return percents;
 }
 
 }  // namespace
@@ -46,9 +56,9 @@ PrecisionRecall precisionOf(const Recording& recording,
 
 cv::Mat3b drawPrecision(const std::vector<NamedPrecision>& all) {
   cv::Mat3b picture;
-  cv::hconcat(std::vector<cv::Mat>{drawShare(all, "Precision", &PrecisionRecall::precision),
-                                   drawShare(all, "Recall", &PrecisionRecall::recall),
-                                   drawShare(all, "F1", &PrecisionRecall::f1)},
+  cv::hconcat(std::vector<cv::Mat>{drawFraction(all, "Precision", &PrecisionRecall::precision),
+                                   drawFraction(all, "Recall", &PrecisionRecall::recall),
+                                   drawFraction(all, "F1", &PrecisionRecall::f1)},
               picture);
   return picture;
 }
@@ -65,15 +75,24 @@ TextTable precisionTable(const std::vector<NamedPrecision>& all,
   }
   for (const NamedPrecision& one : all) {
     std::vector<std::string> row = {one.name};
-    for (const Share share :
+    for (const Fraction fraction :
          {&PrecisionRecall::precision, &PrecisionRecall::recall, &PrecisionRecall::f1}) {
       for (const double threshold_m : thresholds_m) {
-        row.push_back(formatNumber(100 * (one.counts.*share)(stepOf(one.counts, threshold_m)), 1));
+        row.push_back(
+            formatNumber(100 * (one.counts.*fraction)(stepOf(one.counts, threshold_m)), 1));
       }
     }
     table.rows.push_back(row);
   }
   return table;
+}
+
+std::vector<double> precisionAt(const std::vector<NamedPrecision>& all, double threshold_m) {
+  return percentAt(all, threshold_m, &PrecisionRecall::precision);
+}
+
+std::vector<double> recallAt(const std::vector<NamedPrecision>& all, double threshold_m) {
+  return percentAt(all, threshold_m, &PrecisionRecall::recall);
 }
 
 std::size_t stepOf(const PrecisionRecall& counts, double threshold_m) {

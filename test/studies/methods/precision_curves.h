@@ -32,6 +32,10 @@ cv::Mat3b drawPrecision(const std::vector<NamedPrecision>& all);
 TextTable precisionTable(const std::vector<NamedPrecision>& all,
                          const std::vector<double>& thresholds_m);
 
+/// Of each, in percent, at an allowed error.
+std::vector<double> precisionAt(const std::vector<NamedPrecision>& all, double threshold_m);
+std::vector<double> recallAt(const std::vector<NamedPrecision>& all, double threshold_m);
+
 /// The index of an allowed error.
 /// @throws std::logic_error where it is none of them.
 std::size_t stepOf(const PrecisionRecall& counts, double threshold_m);

@@ -38,10 +38,6 @@ Simulation withThreshold(Simulation simulation, double threshold) {
 
 Method flyingRoomStereo() { return {"two cameras (Alg. 1)", paperOptions(kNearM, kFarM)}; }
 
-Method flyingRoomMono() {
-  Method method{"one camera (EMVS)", paperOptions(kNearM, kFarM)};
-  method.cameras = {0};
-  return method;
-}
+Method flyingRoomMono() { return oneCamera(kNearM, kFarM); }
 
 }  // namespace efm::studies

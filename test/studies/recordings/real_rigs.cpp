@@ -42,9 +42,4 @@ Simulation dsecInStreet(const StudyRun& run, double duration_s) {
   return simulate(run, "dsec", "dsec_zurich_city_04.txt", options);
 }
 
-double focalBaselineOf(const Rig& rig) {
-  const Rigid3 T_cam0_cam1 = rig.cameras.at(0).T_rig_cam.inverse() * rig.cameras.at(1).T_rig_cam;
-  return rig.cameras.at(0).model.fx * T_cam0_cam1.translation.norm();
-}
-
 }  // namespace efm::studies

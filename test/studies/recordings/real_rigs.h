@@ -26,7 +26,4 @@ Recording roomRecording(const StudyRun& run);
 /// @throws MissingData naming the file that is not there.
 Simulation dsecInStreet(const StudyRun& run, double duration_s);
 
-/// Focal length in pixels times baseline in metres of the first two cameras: bad-pix wants it.
-double focalBaselineOf(const Rig& rig);
-
 }  // namespace efm::studies

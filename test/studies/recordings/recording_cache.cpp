@@ -194,10 +194,18 @@ EventSpan Recording::eventsOf(std::size_t camera, const Window& window) const {
                              static_cast<std::size_t>(last - all.begin()));
 }
 
-std::uint64_t Recording::eventsIn(const Window& window) const {
-  std::uint64_t count = 0;
-  for (std::size_t c = 0; c < events.size(); ++c) count += eventsOf(c, window).size();
-  return count;
+std::vector<EventSpan> Recording::eventsOf(const Window& window) const {
+  std::vector<EventSpan> spans;
+  for (std::size_t c = 0; c < events.size(); ++c) spans.push_back(eventsOf(c, window));
+  return spans;
+}
+
+double Recording::meanEventsIn(const std::vector<Window>& windows) const {
+  std::size_t count = 0;
+  for (const Window& window : windows) {
+    for (const EventSpan& span : eventsOf(window)) count += span.size();
+  }
+  return static_cast<double>(count) / static_cast<double>(windows.size());
 }
 
 std::uint64_t fingerprintOf(const Simulation& simulation) {

@@ -29,8 +29,10 @@ struct Recording {
   std::vector<Window> windows(double window_s, int count) const;
   /// A camera's events in a window.
   EventSpan eventsOf(std::size_t camera, const Window& window) const;
-  /// How many events of all cameras are in a window.
-  std::uint64_t eventsIn(const Window& window) const;
+  /// The events of all cameras in a window.
+  std::vector<EventSpan> eventsOf(const Window& window) const;
+  /// Mean number of events of all cameras in a window.
+  double meanEventsIn(const std::vector<Window>& windows) const;
 };
 
 /// Identifies what a simulation makes: cameras, motion, surfaces and what is painted on them,

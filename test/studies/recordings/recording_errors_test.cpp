@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "test/studies/recordings/pose_errors.h"
+#include "test/studies/recordings/recording_errors.h"
 
 #include <gtest/gtest.h>
 
