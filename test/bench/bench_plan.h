@@ -11,7 +11,7 @@
 
 namespace efm::bench {
 
-/// A sensor and what it sees in one window.
+/// A sensor and its number of events in a window.
 struct SensorSize {
   int width = 0;
   int height = 0;
@@ -21,19 +21,19 @@ struct SensorSize {
   SyntheticWindowOptions window(int cameras) const;
 };
 
-/// How large a run is.
+/// The size of a run.
 struct BenchPlan {
   std::vector<SensorSize> sensors;  ///< The smallest first.
   int planes = 100;
-  std::vector<std::uint64_t> map_points;  ///< Sizes of the global cloud that is inserted into.
-  int growth_steps = 5;                   ///< Sizes of each thing that a keyframe grows with.
-  bool once = false;  ///< Each case runs a single time; otherwise the median of `repetitions`.
+  std::vector<std::uint64_t> map_points;  ///< Numbers of points of the global clouds.
+  int growth_steps = 5;                   ///< Number of sizes per growth.
+  bool once = false;  ///< Run each case once; else the median of `repetitions` counts.
   int repetitions = 5;
-  std::filesystem::path scratch;  ///< A folder for files that are written to be read.
+  std::filesystem::path scratch;  ///< Folder for temporary files.
 
-  /// What the figures of the project are measured with. Some minutes.
+  /// For the figures of the project. Takes some minutes.
   static BenchPlan full();
-  /// Shows that everything runs; its times mean nothing. Seconds.
+  /// Tests that everything runs. Its times mean nothing. Takes seconds.
   static BenchPlan quick();
 };
 

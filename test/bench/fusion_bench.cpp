@@ -14,7 +14,7 @@
 namespace efm::bench {
 namespace {
 
-/// A plane of ray densities; as in a real one half of the voxels are empty.
+/// A plane of ray densities. Half of the voxels are empty, as in a real plane.
 PlaneValues densities(std::size_t voxels, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> votes(-20, 20);
@@ -43,7 +43,7 @@ void fuseTwo(benchmark::State& state, FusionRule rule, std::size_t voxels) {
 
 /// All planes of a DSI.
 void addPeaks(benchmark::State& state, int planes, VotingKernel kernel, std::size_t voxels) {
-  constexpr unsigned kDifferent = 7;  // planes; more would not fit the cache that the sweep's do
+  constexpr unsigned kDifferent = 7;  // planes; more would not fit into the cache
   std::vector<PlaneValues> values;
   for (unsigned i = 0; i < kDifferent; ++i) values.push_back(densities(voxels, i));
   for (auto _ : state) {

@@ -14,7 +14,7 @@
 namespace efm::bench {
 namespace {
 
-constexpr std::uint64_t kInsertedKeyframe = 1'000'000;  // a number that the map does not have
+constexpr std::uint64_t kInsertedKeyframe = 1'000'000;  // an unused number
 
 std::vector<CloudPoint> cloudOf(const SyntheticWindow& made, int planes) {
   KeyframeMapperOptions options = made.options;
@@ -25,7 +25,7 @@ std::vector<CloudPoint> cloudOf(const SyntheticWindow& made, int planes) {
   return keyframe ? keyframeCloud(*keyframe) : std::vector<CloudPoint>();
 }
 
-/// Points all over a hall, in keyframes of a hundred thousand.
+/// Random points in a hall, in keyframes of a hundred thousand.
 GlobalCloud hallOf(std::uint64_t points) {
   constexpr std::uint64_t kPerKeyframe = 100'000;
   std::mt19937 random(1);
@@ -49,7 +49,7 @@ GlobalCloud hallOf(std::uint64_t points) {
 void benchGlobalCloud(BenchSession& session) {
   const SyntheticWindow made = makeSyntheticWindow(session.plan().sensors.front().window(2));
   const std::vector<CloudPoint> cloud = cloudOf(made, session.plan().planes);
-  std::vector<GlobalCloud> maps;  // all at once: what is compared takes turns
+  std::vector<GlobalCloud> maps;  // all in memory: compared cases take turns
   for (const std::uint64_t points : session.plan().map_points) maps.push_back(hallOf(points));
   for (std::size_t i = 0; i < maps.size(); ++i) {
     const std::string name = "into " + std::to_string(session.plan().map_points[i]) + " points";

@@ -14,15 +14,15 @@
 namespace efm::bench {
 namespace {
 
-/// A keyframe whose size can be changed in one way at a time.
+/// A keyframe with one changed size.
 struct GrownKeyframe {
   SyntheticWindowOptions window;
   int planes = 0;
   int subintervals = 1;
-  double size = 0;  // of what was changed
+  double size = 0;  // the changed size
 };
 
-/// Something that a keyframe's time grows with.
+/// A size of a keyframe.
 struct Growth {
   std::string name;
   /// Makes the keyframe 2^step times as large. @return its size.

@@ -6,8 +6,8 @@
 namespace efm::bench {
 
 /// The exponent k of time = a * size^k: the slope of the least-squares line through the logarithms.
-/// @param sizes, times equally many, above 0; at least two different sizes.
-/// @throws std::invalid_argument where they are not.
+/// @param sizes, times of equal number, above 0, with at least two different sizes.
+/// @throws std::invalid_argument for other sizes and times.
 double fittedExponent(const std::vector<double>& sizes, const std::vector<double>& times);
 
 }  // namespace efm::bench

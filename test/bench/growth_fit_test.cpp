@@ -19,12 +19,12 @@ TEST(GrowthFit, TimeThatDoesNotChangeHasExponentZero) {
 }
 
 /// Logarithms of the sizes 0, 1, 2 and of the times 0, 1, 1 (base e): slope 1/2.
-TEST(GrowthFit, BetweenTheTimesItIsTheLeastSquaresLine) {
+TEST(GrowthFit, TheExponentIsTheSlopeOfTheLeastSquaresLine) {
   const double e = std::exp(1.0);
   EXPECT_NEAR(fittedExponent({1, e, e * e}, {1, e, e}), 0.5, 1e-12);
 }
 
-RC_GTEST_PROP(GrowthFit, NeitherTheUnitOfTimeNorThatOfSizeMatters, ()) {
+RC_GTEST_PROP(GrowthFit, DoesNotDependOnTheUnits, ()) {
   const double exponent = 0.01 * *rc::gen::inRange(-300, 300);
   const double factor = std::exp(0.1 * *rc::gen::inRange(-100, 100));
   const double unit = std::exp(0.1 * *rc::gen::inRange(-100, 100));
@@ -37,7 +37,7 @@ RC_GTEST_PROP(GrowthFit, NeitherTheUnitOfTimeNorThatOfSizeMatters, ()) {
   RC_ASSERT(std::abs(fittedExponent(sizes, times) - exponent) < 1e-9);
 }
 
-TEST(GrowthFit, WhatHasNoExponentIsRefused) {
+TEST(GrowthFit, RefusesSamplesWithoutAnExponent) {
   EXPECT_THROW(fittedExponent({}, {}), std::invalid_argument);
   EXPECT_THROW(fittedExponent({2, 2}, {1, 3}), std::invalid_argument);
   EXPECT_THROW(fittedExponent({1, 2}, {1}), std::invalid_argument);

@@ -19,7 +19,7 @@ namespace {
 
 /// Makes the keyframe of a window once.
 using KeyframeRun = std::function<void(StageHook*)>;
-/// Makes what makes keyframes: its own time is not the keyframe's, its memory is.
+/// Prepares a run. Its memory counts as the keyframe's, its time does not.
 using Preparation = std::function<KeyframeRun()>;
 
 std::vector<EventSpan> spansOf(const SyntheticWindow& made) {
@@ -55,7 +55,7 @@ void countEvents(benchmark::State& state, const SyntheticWindow& made) {
   countRate(state, "votes/s", votes);
 }
 
-/// The memory above the events, then the time.
+/// Measures the memory without the events, then the time.
 void addKeyframe(BenchSession& session, const BenchCase& what, const SyntheticWindow& made,
                  const Preparation& prepare) {
   const std::optional<double> peak_mb = peakMemory_mb([&] { prepare()(nullptr); });
@@ -89,7 +89,7 @@ void benchKeyframes(BenchSession& session) {
                     made, fused(made, kernel, threads));
       }
     }
-    // What is shipped: events in groups, depth from neighbouring rays.
+    // The defaults: events in groups, depth from neighbouring rays.
     SyntheticWindow grouped = made;
     grouped.options.split = SplitFusionOptions();
     SyntheticWindow shipped = grouped;

@@ -8,7 +8,7 @@
 namespace efm::bench {
 namespace {
 
-/// The processor's name as Linux tells it, under "model name" or, elsewhere than on x86, not.
+/// The "model name" of the processor in Linux; "unknown" where there is none.
 std::string processorName() {
   std::ifstream cpuinfo("/proc/cpuinfo");
   for (std::string line; std::getline(cpuinfo, line);) {

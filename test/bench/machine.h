@@ -7,13 +7,13 @@
 
 namespace efm::bench {
 
-/// What a run was measured on and with: pairs of a name and a text.
+/// The conditions of a run: pairs of a name and a text.
 using Conditions = std::vector<std::pair<std::string, std::string>>;
 
 /// The processor with its cores and caches, the compiler and its flags.
 Conditions describeMachine();
 
-/// The processes that ran or wanted to, on average over the last minute.
+/// Mean number of running or waiting processes over the last minute.
 std::string loadAverage();
 
 }  // namespace efm::bench

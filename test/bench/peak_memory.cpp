@@ -21,8 +21,9 @@ std::optional<double> statusLine_mb(const std::string& key) {
   return std::nullopt;
 }
 
-/// @return whether the peak is now what is held at present.
-bool forgetPeak() {
+/// Resets the peak to the current memory.
+/// @return whether it worked.
+bool resetPeak() {
   std::ofstream file("/proc/self/clear_refs");
   file << "5" << std::flush;
   return file.good();
@@ -31,8 +32,8 @@ bool forgetPeak() {
 }  // namespace
 
 std::optional<double> peakMemory_mb(const std::function<void()>& work) {
-  malloc_trim(0);  // what was freed before and is kept would hide what is taken now
-  if (!forgetPeak()) return std::nullopt;
+  malloc_trim(0);  // kept free memory would hide new memory
+  if (!resetPeak()) return std::nullopt;
   const std::optional<double> before_mb = statusLine_mb("VmRSS");
   work();
   const std::optional<double> peak_mb = statusLine_mb("VmHWM");

@@ -11,7 +11,7 @@
 namespace efm::bench {
 namespace {
 
-/// That of the same group, name and threads with another kernel, or with other threads.
+/// The quantity of the row with the same group, name, kernel and threads.
 std::optional<double> quantityOf(const std::vector<PerformanceRow>& rows, PerformanceRow like,
                                  const char* quantity) {
   for (const PerformanceRow& row : rows) {
@@ -23,7 +23,7 @@ std::optional<double> quantityOf(const std::vector<PerformanceRow>& rows, Perfor
   return std::nullopt;
 }
 
-struct Sizes {
+struct GrowthSamples {
   std::vector<double> sizes;
   std::vector<double> times_ms;
 };
@@ -51,12 +51,12 @@ void addRatios(std::vector<PerformanceRow>& rows) {
 }
 
 void addExponents(std::vector<PerformanceRow>& rows) {
-  std::map<std::pair<std::string, std::string>, Sizes> grown;  // by what it is and kernel
+  std::map<std::pair<std::string, std::string>, GrowthSamples> grown;  // by growth and kernel
   for (const PerformanceRow& row : rows) {
     const auto size = row.find("size");
     const auto time_ms = row.find("cpu_ms");
     if (!size || !time_ms) continue;
-    Sizes& sizes = grown[{row.name.substr(0, row.name.find('/')), row.kernel}];
+    GrowthSamples& sizes = grown[{row.name.substr(0, row.name.find('/')), row.kernel}];
     sizes.sizes.push_back(*size);
     sizes.times_ms.push_back(*time_ms);
   }

@@ -7,22 +7,23 @@
 
 namespace efm::bench {
 
-/// Stand in the place of a kernel: what the others are held against.
-inline constexpr const char* kYardstick = "yardstick";  ///< voteBilinear on one plane, nothing else.
-inline constexpr const char* kUnfused = "unfused";      ///< A keyframe over whole volumes.
+/// References for the ratios, in the column of the kernel.
+inline constexpr const char* kYardstick =
+    "yardstick";                                    ///< voteBilinear on one plane, nothing else.
+inline constexpr const char* kUnfused = "unfused";  ///< A keyframe over whole volumes.
 
-// Groups that are held against one another.
+// Groups that are compared.
 inline constexpr const char* kVoting = "voting";                    ///< Up to ray densities.
 inline constexpr const char* kOneCameraSweep = "one-camera sweep";  ///< With binning and peaks.
 
-/// Adds to the rows what follows from several of them, how many times as fast each is:
-///   times_yardstick   as the yardstick at the same size, by CPU time;
-///   times_unfused     as the unfused keyframe at the same size, by CPU time, with one thread;
-///   times_one_thread  as itself with one thread, by real time.
+/// Adds the speed of each row relative to a reference:
+///   times_yardstick   to the yardstick at the same size, by CPU time;
+///   times_unfused     to the unfused keyframe at the same size, by CPU time, with one thread;
+///   times_one_thread  to the same case with one thread, by real time.
 void addRatios(std::vector<PerformanceRow>& rows);
 
-/// Adds a row "growth" for each thing that a keyframe grows with and each kernel: the exponent that
-/// fits the rows with a quantity "size" and that name before the slash.
+/// Adds a row "growth" for each growth and kernel: the fitted exponent of the rows with a quantity
+/// "size" and the same name before the slash.
 void addExponents(std::vector<PerformanceRow>& rows);
 
 }  // namespace efm::bench

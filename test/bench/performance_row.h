@@ -8,17 +8,17 @@
 
 namespace efm::bench {
 
-/// A measured or derived number; its name says the unit: "cpu_ms", "votes/s", "times_plain".
+/// A measured or derived number. Its name contains the unit: "cpu_ms", "votes/s", "times_plain".
 struct Quantity {
   std::string name;
   double value = 0;
 };
 
-/// What was measured of one case.
+/// The results of a case.
 struct PerformanceRow {
-  std::string group;   ///< What is measured: "voting", "keyframe", …
-  std::string name;    ///< Its size or variant: "346x260".
-  std::string kernel;  ///< Empty where none runs.
+  std::string group;   ///< "voting", "keyframe", …
+  std::string name;    ///< Size or variant: "346x260".
+  std::string kernel;  ///< Empty without a kernel.
   int threads = 1;
   std::vector<Quantity> quantities;
 

@@ -10,7 +10,7 @@
 namespace efm::bench {
 namespace {
 
-/// The names of all quantities in the order in which they first come.
+/// The names of all quantities, in order of their first use.
 std::vector<std::string> columnsOf(const std::vector<PerformanceRow>& rows) {
   std::vector<std::string> columns;
   for (const PerformanceRow& row : rows) {
@@ -29,7 +29,7 @@ std::string printed(const char* format, double value) {
   return text.data();
 }
 
-/// Four digits, and millions and billions by their letters.
+/// Four digits, with M for millions and G for billions.
 std::string readable(double value) {
   constexpr double kMillion = 1e6;
   constexpr double kBillion = 1e9;
@@ -39,7 +39,7 @@ std::string readable(double value) {
   return printed("%.4g", value);
 }
 
-/// A field as RFC 4180 has it.
+/// A field in the format of RFC 4180.
 std::string csvField(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string quoted = "\"";

@@ -9,13 +9,12 @@
 
 namespace efm::bench {
 
-/// One line per row: what it is, then a column for every quantity that any row has, empty where
-/// this one has not, then the conditions, the same in every line: so that tables of several runs
-/// can be put together.
+/// One line per row: its case, a column for every quantity (empty without a value), and the
+/// conditions. The conditions are in every line, so tables of several runs can be joined.
 void writeCsv(std::ostream& out, const std::vector<PerformanceRow>& rows,
               const Conditions& conditions);
 
-/// The same for reading: the conditions once, then a table per group with the columns that it has.
+/// The same for readers: the conditions once, and a table per group with its own columns.
 void writeMarkdown(std::ostream& out, const std::vector<PerformanceRow>& rows,
                    const Conditions& conditions);
 

@@ -42,7 +42,7 @@ TEST(PerformanceTable, MarkdownHasATablePerGroupWithItsOwnColumns) {
   EXPECT_THAT(markdown.str(), HasSubstr("| text |  | 2 | 2 M |\n"));
 }
 
-TEST(PerformanceRatios, AKernelIsHeldAgainstTheYardstickOfItsSize) {
+TEST(PerformanceRatios, AKernelIsComparedWithTheYardstickOfItsSize) {
   std::vector<PerformanceRow> rows = {timed("voting", "small", kYardstick, 1, 12, 50),
                                       timed("voting", "large", kYardstick, 1, 90, 91),
                                       timed("voting", "small", "plain", 1, 4, 60)};
@@ -62,7 +62,7 @@ TEST(PerformanceRatios, ThreadsAreComparedByRealTimeAndKeyframesByCpuTime) {
   EXPECT_THAT(rows[2].find("times_one_thread"), Optional(1.5));
 }
 
-TEST(PerformanceRatios, SizesOfOneThingAndKernelGiveAnExponent) {
+TEST(PerformanceRatios, SizesOfAGrowthAndKernelGiveAnExponent) {
   std::vector<PerformanceRow> rows;
   for (const double size : {10.0, 20.0, 40.0}) {
     rows.push_back({"growth",

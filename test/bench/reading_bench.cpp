@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Gives the events times as a sensor does: irregular, about one a microsecond.
+/// Sets irregular times like a sensor's, about one event per microsecond.
 void makeIrregular(std::vector<Event>& events, std::int64_t tick_ns) {
   std::mt19937_64 random(1);
   const auto end_tick = static_cast<std::int64_t>(events.size()) * 1000 / tick_ns;
@@ -56,7 +56,7 @@ void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
   }
 }
 
-/// What `import` makes of that folder.
+/// Imports that folder.
 void writeRawlog(const fs::path& file, const fs::path& folder) {
   RecordingSource source;
   source.files = {folder};
@@ -85,7 +85,7 @@ void readAll(benchmark::State& state, const fs::path& path) {
 }  // namespace
 
 void benchReading(BenchSession& session) {
-  // 240x180 is the size of a UZH folder without images.
+  // The sensor of a UZH folder without images has 240x180 pixels.
   SyntheticWindowOptions options = session.plan().sensors.back().window(1);
   options.width = 240;
   options.height = 180;
@@ -97,7 +97,7 @@ void benchReading(BenchSession& session) {
   for (const auto& [unit, tick_ns] : {std::pair("us", 1000), std::pair("ns", 1)}) {
     makeIrregular(made.events.front(), tick_ns);
     writeTextFolder(scratch / unit, made);
-    const std::string rawlog = std::string("rawlog of ") + unit;  // fewer or more bytes an event
+    const std::string rawlog = std::string("rawlog of ") + unit;  // the bytes per event differ
     writeRawlog(scratch / rawlog, scratch / unit);
     add(rawlog.c_str(), scratch / rawlog);
   }

@@ -17,8 +17,8 @@ inline double processCpu_ms() {
          kMsPerNanosecond * static_cast<double>(now.tv_nsec);
 }
 
-/// Adds up the CPU time of the stages of keyframes. A keyframe enters the sweep's stage twice: for
-/// pose packets and back-projection, which is called its warp here, and for votes and fusion.
+/// Adds up the CPU time of the stages of keyframes. A keyframe enters the stage of the sweep twice:
+/// for pose packets and back-projection (`warp_ms`), and for votes and fusion.
 class StageClock : public StageHook {
  public:
   double warp_ms = 0;

@@ -19,17 +19,17 @@ using bench::SweepInput;
 using bench::SyntheticWindow;
 using bench::SyntheticWindowOptions;
 
-// What every kernel must keep to, against the oracle with the same packets.
-constexpr double kMostError = 1e-3;         // of the mass
-constexpr double kMostSignedError = 1e-5;   // of the mass
-constexpr double kLeastEqualPeaks = 0.995;  // of the pixels with votes
-// The least of two cameras often is a single vote, which moves so little from plane to plane that
-// rounding decides between them: the planes differ by less than 2e-3 of a vote there.
-constexpr double kLeastEqualPeaksOfMin = 0.99;
+// Limits of every kernel, compared with the oracle with the same packets.
+constexpr double kMaxError = 1e-3;        // of the mass
+constexpr double kMaxSignedError = 1e-5;  // of the mass
+constexpr double kMinEqualPeaks = 0.995;  // of the pixels with votes
+// The min of two cameras is often a single vote. It changes little between planes, by less than
+// 2e-3 of a vote: rounding decides.
+constexpr double kMinEqualPeaksOfMin = 0.99;
 
 constexpr int kPlanes = 50;
 
-/// One stereo keyframe, for the sweep and by the oracle.
+/// A stereo keyframe: the input of the sweep, and the DSIs of the oracle.
 struct Keyframe {
   test::SweepCase input;
   std::vector<oracle::Dsi> exact;  // per camera
@@ -61,7 +61,7 @@ const Keyframe& edges() {
   return kKeyframe;
 }
 
-/// The same rig and motion with events all over the sensor: no peak stands out.
+/// The same rig and motion with random events: there are no clear peaks.
 const Keyframe& noise() {
   static const Keyframe kKeyframe = [] {
     const SyntheticWindowOptions options = halfSize();
@@ -76,7 +76,7 @@ const Keyframe& noise() {
   return kKeyframe;
 }
 
-/// The share of pixels with votes whose peak lies on the exact plane.
+/// The fraction of pixels with votes whose peak is on the exact plane.
 double equalPeaks(const SweepResult& result, const oracle::Dsi& exact) {
   const std::vector<int> planes = oracle::peakPlanes(exact);
   const std::vector<double> values = oracle::peakValues(exact);
@@ -102,9 +102,9 @@ class SweepAccuracyOn : public ::testing::TestWithParam<VotingKernel> {
     const oracle::Dsi exact = oracle::fuse(rule, keyframe.exact);
     const test::DsiDifference difference = test::differenceOf(swept.dsi, exact.values);
     const double equal_peaks = equalPeaks(swept.result, exact);
-    EXPECT_LE(difference.error, kMostError) << nameOf(rule);
-    EXPECT_LE(std::abs(difference.signed_error), kMostSignedError) << nameOf(rule);
-    EXPECT_GE(equal_peaks, rule == FusionRule::kMin ? kLeastEqualPeaksOfMin : kLeastEqualPeaks)
+    EXPECT_LE(difference.error, kMaxError) << nameOf(rule);
+    EXPECT_LE(std::abs(difference.signed_error), kMaxSignedError) << nameOf(rule);
+    EXPECT_GE(equal_peaks, rule == FusionRule::kMin ? kMinEqualPeaksOfMin : kMinEqualPeaks)
         << nameOf(rule);
   }
 };

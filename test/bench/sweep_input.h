@@ -11,7 +11,7 @@
 
 namespace efm::bench {
 
-/// What a sweep takes: events as rays, ready to vote.
+/// The input of a sweep: events as rays.
 struct SweepInput {
   ReferenceView view;
   DepthPlanes planes;

@@ -13,15 +13,15 @@ constexpr std::int64_t kStart_ns = 1'000'000'000;
 constexpr std::int64_t kPoseStep_ns = 5'000'000;
 constexpr double kBaseline_m = 0.1;
 constexpr int kEdges = 400;
-constexpr double kNoiseShare = 0.1;
+constexpr double kNoiseFraction = 0.1;
 
 struct Edge {
   Eigen::Vector3d from;
   Eigen::Vector3d to;
 };
 
-/// The field of view of a DAVIS346, at any size. Without distortion: it costs nothing once the
-/// table of rays is made, and much here.
+/// The field of view of a DAVIS346, at any size. Without distortion, because it would slow down
+/// this function only.
 CameraModel cameraOf(int width, int height) {
   const double scale = width / 346.0;
   return {width,
@@ -43,13 +43,13 @@ Rig rigOf(const SyntheticWindowOptions& options) {
   return rig;
 }
 
-/// Half a metre per second to and fro, with a hand's turning.
+/// Half a metre per second to and fro, with small rotations.
 Rigid3 poseAt(double t_s) {
   const Eigen::Vector3d position(0.08 * std::sin(7 * t_s), 0.05 * std::sin(9 * t_s + 1),
                                  0.04 * std::sin(6 * t_s + 2));
-  const Eigen::Vector3d turn(0.03 * std::sin(8 * t_s), 0.04 * std::sin(5 * t_s),
-                             0.03 * std::sin(6 * t_s + 1));
-  return {Eigen::Quaterniond(Eigen::AngleAxisd(turn.norm(), turn.normalized())), position};
+  const Eigen::Vector3d rotation(0.03 * std::sin(8 * t_s), 0.04 * std::sin(5 * t_s),
+                                 0.03 * std::sin(6 * t_s + 1));
+  return {Eigen::Quaterniond(Eigen::AngleAxisd(rotation.norm(), rotation.normalized())), position};
 }
 
 Trajectory trajectoryOver(double duration_s) {
@@ -83,11 +83,11 @@ class EventMaker {
 
   /// An event of a random point of a random edge, or noise.
   Event event(std::int64_t t_ns, const Rigid3& T_cam_world) {
-    if (share_(random_) >= kNoiseShare) {
-      constexpr int kTries = 20;  // what lies outside the image is drawn again
+    if (uniform_(random_) >= kNoiseFraction) {
+      constexpr int kTries = 20;  // points outside of the image are drawn again
       for (int i = 0; i < kTries; ++i) {
         const auto& edge = edges_[random_() % edges_.size()];
-        const double along = share_(random_);
+        const double along = uniform_(random_);
         const Eigen::Vector3d point = T_cam_world * ((1 - along) * edge.from + along * edge.to);
         if (point.z() < 0.1) continue;
         const Eigen::Vector2d pixel = pinhole_.project(point).array().round();
@@ -108,7 +108,7 @@ class EventMaker {
   ReferenceView pinhole_;
   const std::vector<Edge>& edges_;
   std::mt19937& random_;
-  std::uniform_real_distribution<double> share_{0, 1};
+  std::uniform_real_distribution<double> uniform_{0, 1};
 };
 
 }  // namespace

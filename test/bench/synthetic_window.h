@@ -21,10 +21,9 @@ struct SyntheticWindowOptions {
   unsigned seed = 1;
 };
 
-/// The events of one window of a hand-held rig that looks at straight edges 1 to 6 m away through
-/// a lens with distortion; every tenth event is noise. Made directly from the edges, without
-/// images: millions of events in less than a second, in the places and the order that real ones
-/// have.
+/// The events of a window of a hand-held rig that looks at straight edges 1 to 6 m away. Every
+/// tenth event is noise. They are made from the edges without images: millions of events in less
+/// than a second, with positions and times like real events.
 struct SyntheticWindow {
   Rig rig;
   Trajectory trajectory;

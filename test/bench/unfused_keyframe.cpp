@@ -73,7 +73,7 @@ void UnfusedKeyframe::vote(const RayBundle& rays, Volume& volume) const {
 
 /// The harmonic mean of n values, n / (1/a + 1/b + …), is 0 where one of them is.
 void UnfusedKeyframe::fuse() {
-  copies_ = volumes_;  // the research code hands its volumes over by value
+  copies_ = volumes_;  // the research code passes its volumes by value
   const auto inputs = static_cast<float>(copies_.size());
   for (std::size_t v = 0; v < fused_.size(); ++v) {
     float inverse = 0;

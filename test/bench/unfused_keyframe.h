@@ -17,16 +17,15 @@
 
 namespace efm::bench {
 
-/// A keyframe in the shape of the published research code of this method, what the fused sweep is
-/// measured against: each camera votes into a volume of its own with the plain kernel; a fusion
-/// call copies the volumes and takes their harmonic mean; the peaks are looked for in the fused
-/// volume. Packets, rays and the extraction of depth are the mapper's. One thread, no
-/// sub-intervals.
+/// A keyframe in the way of the published research code of this method, the reference for the fused
+/// sweep. Each camera votes into its own volume with the plain kernel. The fusion copies the
+/// volumes and computes their harmonic mean. The peaks are searched in the fused volume. Packets,
+/// rays and depth extraction are the mapper's. One thread, no sub-intervals.
 ///
-/// Its volumes are held from one keyframe to the next, so that it pays for their memory once.
+/// The volumes are kept from one keyframe to the next, so their memory is allocated once.
 class UnfusedKeyframe {
  public:
-  /// All cameras of the rig take part.
+  /// All cameras of the rig are used.
   UnfusedKeyframe(const Rig& rig, const KeyframeMapperOptions& options);
 
   /// @return nothing where the reference time has no pose.
@@ -46,7 +45,7 @@ class UnfusedKeyframe {
   ReferenceView view_;
   std::vector<UndistortionTable> undistortion_;  // per camera
   std::vector<Volume> volumes_;                  // per camera
-  std::vector<Volume> copies_;                   // what the fusion works on
+  std::vector<Volume> copies_;                   // the input of the fusion
   Volume fused_;
 };
 

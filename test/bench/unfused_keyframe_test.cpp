@@ -11,8 +11,8 @@
 namespace efm::bench {
 namespace {
 
-/// What the two are timed for must be the same work.
-TEST(UnfusedKeyframe, FindsTheDepthsThatTheMapperFinds) {
+/// The two timed programs must do the same work.
+TEST(UnfusedKeyframe, FindsTheDepthsOfTheMapper) {
   SyntheticWindowOptions size;
   size.width = 173;
   size.height = 130;
@@ -24,19 +24,19 @@ TEST(UnfusedKeyframe, FindsTheDepthsThatTheMapperFinds) {
   KeyframeMapper mapper(made.rig, {0, 1}, made.options);
   const auto fused = mapper.map(made.window, events, made.trajectory);
   UnfusedKeyframe reference(made.rig, made.options);
-  reference.map(made.window, events, made.trajectory);  // what a keyframe leaves must not matter
+  reference.map(made.window, events, made.trajectory);  // a previous keyframe must not matter
   const auto unfused = reference.map(made.window, events, made.trajectory);
 
   ASSERT_TRUE(fused && unfused);
   const int found = cv::countNonZero(fused->map.depth > 0);
   ASSERT_GT(found, 500);
-  // The order of additions differs, so that a value at the threshold may fall to the other side.
+  // The order of additions differs: values at the threshold may differ.
   const cv::Mat1b differ = cv::abs(fused->map.depth - unfused->depth) > 1e-3;
   EXPECT_LE(cv::countNonZero(differ), found / 500);
   EXPECT_LT(cv::norm(fused->map.confidence, unfused->confidence, cv::NORM_INF), 1e-3);
 }
 
-TEST(UnfusedKeyframe, HasNoMapWhereTheReferenceTimeHasNoPose) {
+TEST(UnfusedKeyframe, HasNoMapWithoutAPoseAtTheReferenceTime) {
   const SyntheticWindow made = makeSyntheticWindow({40, 30, 100, 2, 0.1, 1});
   UnfusedKeyframe reference(made.rig, made.options);
   Window window = made.window;

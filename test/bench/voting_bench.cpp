@@ -29,8 +29,8 @@ void countVotes(benchmark::State& state, const SweepInput& input) {
   state.counters["packets"] = static_cast<double>(raysOf(input).packets.size());
 }
 
-/// The base of every ratio: the plain kernel on one plane that is cleared for each depth. Where
-/// the rays go is computed beforehand.
+/// The reference of the ratios: the plain kernel on one plane that is cleared for each depth. The
+/// transfers of the rays are computed before.
 void voteYardstick(benchmark::State& state, const SweepInput& input) {
   const RayBundle& rays = raysOf(input);
   std::vector<std::vector<kernels::RayTransfer>> transfers;  // per plane
@@ -58,8 +58,8 @@ void voteYardstick(benchmark::State& state, const SweepInput& input) {
   countVotes(state, input);
 }
 
-/// Votes as the fast kernels cast them, up to the ray density of every plane. As for the yardstick,
-/// where the rays go is there beforehand: they lie in bins.
+/// Votes of the fast kernels, up to the ray density of every plane. As for the yardstick, the rays
+/// are prepared before: they are in bins.
 void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel kernel) {
   const RayIndex rays(input.cameras, {input.view, input.planes}, kernel);
   TileAccumulator accumulator(kernel);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Sec. 4.3 and 4.4.3: the algorithms that fusing across cameras and across
-// time make, and what others reach.
+// Ghosh and Gallego 2022, Sec. 4.3 and 4.4.3: the algorithms of fusion across cameras and time, and
+// algorithms of others.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -26,7 +26,7 @@ constexpr const char* kAtHc = "A_t∘H_c";
 constexpr const char* kShuffled = "A_t∘H_c + shuffling";
 constexpr const char* kLate = "late fusion";
 
-/// S_2∘S_1: S_1 is applied first. With two sub-intervals.
+/// S_2∘S_1 with two sub-intervals. S_1 is applied first.
 Method fused(const char* name, FusionOrder order, FusionRule across_cameras,
              FusionRule across_time) {
   Method method{name, paperOptions(1, 6.5)};
@@ -94,13 +94,13 @@ TextTable published() {
             "97.76", "99.13", "1.24"}}};
 }
 
-/// Judges what the paper says of windows of 1 s.
+/// Judges the paper's claims about windows of 1 s.
 class Judge {
  public:
   Judge(const std::vector<MethodResult>& results, StudySection& section)
       : results_(results), section_(section) {}
 
-  /// The mean error of one method is that of another times at most so much.
+  /// The mean error of a method is at most `times` that of another.
   void atMost(const std::string& claim, const char* method, const char* other, double times,
               const std::string& departure = "") {
     const double mean = meanCm(own(method));
@@ -203,8 +203,7 @@ void addPictures(const std::vector<MethodResult>& results, const Recording& reco
   section.picture("algorithms.png", both, "Depth maps of one window of 1 s (red near, blue far)");
 }
 
-/// The mean error of what MF copies from a method's points, if each of them had the true depth that
-/// it is held against.
+/// The mean error of the points that MF would copy from a method's points with their true depths.
 double meanCmOfTrueCopies(const Recording& recording, const MethodResult& result) {
   std::vector<DepthPair> copies;
   for (const KeyframeDepthMap& keyframe : result.keyframes) {
@@ -228,7 +227,7 @@ double meanCmOfTrueCopies(const Recording& recording, const MethodResult& result
   return meanCm(depthErrors(copies));
 }
 
-/// Who keeps more, one camera or Alg. 1, as the recording comes nearer to a real one.
+/// Numbers of points of one camera and of Alg. 1, with errors of real recordings.
 void countPoints(const Recording& recording, const std::vector<Window>& windows,
                  StudySection& section) {
   const EventNoiseOptions weak{1, 0, 1000};
@@ -237,11 +236,11 @@ void countPoints(const Recording& recording, const std::vector<Window>& windows,
       {"exact", recording},
       {"noise of 1 Hz in every pixel", withNoise(recording, weak)},
       {"noise of 5 Hz", withNoise(recording, strong)},
-      {"right camera calibrated 2 mrad off", withTurnedCamera(recording, 1, 0.002)},
-      {"right camera calibrated 5 mrad off", withTurnedCamera(recording, 1, 0.005)},
+      {"right camera calibrated 2 mrad off", withRotatedCamera(recording, 1, 0.002)},
+      {"right camera calibrated 5 mrad off", withRotatedCamera(recording, 1, 0.005)},
       {"poses that sway", withPoseSway(recording, kTrackerSway)},
       {"5 Hz, 2 mrad and sway",
-       withPoseSway(withTurnedCamera(withNoise(recording, strong), 1, 0.002), kTrackerSway)}};
+       withPoseSway(withRotatedCamera(withNoise(recording, strong), 1, 0.002), kTrackerSway)}};
   TextTable table{{"recording", "one camera [thousand]", "Alg. 1 [thousand]", "ratio",
                    "mean error, one camera [cm]", "Alg. 1 [cm]"},
                   {}};
@@ -267,7 +266,7 @@ void countPoints(const Recording& recording, const std::vector<Window>& windows,
       last > exact, against(last, exact, 2) + " times as many");
 }
 
-/// What the simulation lacks of the paper's recordings, put back.
+/// Adds errors of real recordings to the simulation.
 void findReasons(const Recording& recording, const std::vector<Window>& windows,
                  const std::vector<MethodResult>& clean, StudySection& section) {
   section.heading("What makes the difference");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Depth better than the paper's: split fusion and aggregation, on scenes that nothing was tuned on.
+// Split fusion and aggregation compared with the paper, on scenes that were not used for tuning.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -16,7 +16,7 @@
 namespace efm::studies {
 namespace {
 
-/// A preset with the depths it has to offer.
+/// A preset and its depths.
 struct Scene3d {
   std::string preset;
   double min_depth_m = 0;
@@ -57,7 +57,7 @@ std::vector<Method> methodsFor(const Scene3d& scene) {
 /// One case with all methods.
 struct CaseResult {
   std::string name;
-  std::vector<DepthCurve> curves;  // beside the methods
+  std::vector<DepthCurve> curves;  // of each method
   double points = 0;               // of the paper with its own threshold
   PointQuality as_shipped;
 };
@@ -77,8 +77,8 @@ CaseResult runCase(const StudyRun& run, const Case& what) {
   for (const Method& method : methods) {
     result.curves.push_back(depthCurve(recording, windows, method, judge));
   }
-  result.points = asItIs(recording, windows, methods.front(), judge).points;
-  result.as_shipped = asItIs(recording, windows, methods.back(), judge);
+  result.points = qualityOf(recording, windows, methods.front(), judge).points;
+  result.as_shipped = qualityOf(recording, windows, methods.back(), judge);
   return result;
 }
 
@@ -88,7 +88,7 @@ std::string ratio(double value, double to) {
   return to > 0 ? formatNumber(value / to, 2) : std::string("-");
 }
 
-/// Each method at the paper's own number of points.
+/// Each method at the paper's number of points.
 TextTable equalNumbers(const std::vector<CaseResult>& results) {
   TextTable table;
   table.head = {"case",      "points",     "method", "beyond 10 % [%]",
@@ -115,7 +115,7 @@ double bestF1(const CaseResult& result) {
   return best;
 }
 
-/// The shipped thresholds against the best of each case, and variances against errors.
+/// The default thresholds compared with the best of each case, and variances compared with errors.
 TextTable asShipped(const std::vector<CaseResult>& results) {
   TextTable table;
   table.head = {"case",   "points",      "beyond 10 % [%]", "recall [%]",
@@ -159,7 +159,7 @@ cv::Mat sheetOf(const std::vector<CaseResult>& results) {
   return drawGrid(grid);
 }
 
-/// The largest value over the cases of what a curve has at the paper's number of points.
+/// The max of a figure over the cases.
 template <typename Figure>
 double worst(const std::vector<CaseResult>& results, Figure figure) {
   double most = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Sec. 4.10: events of more and less sensitive sensors.
+// Ghosh and Gallego 2022, Sec. 4.10: sensors with different contrast thresholds.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -33,7 +33,7 @@ DepthErrors strongestErrors(const Recording& recording, const MethodResult& resu
   return depthErrors(pairs);
 }
 
-/// What shows why trends depart.
+/// Results that explain departures.
 struct Explanation {
   /// With the white level of the lowest threshold for all.
   std::vector<MethodResult> one_white;
@@ -99,7 +99,7 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
   std::vector<MethodResult> mono;
   std::vector<MethodResult> stereo;
   Explanation why;
-  Recording recording;  // the last one: the truth is the same in all
+  Recording recording;  // the last recording: the truth is the same in all
   std::vector<Window> windows;
   for (const double threshold : thresholds) {
     recording = run.recordings->make("room_theta" + formatNumber(threshold, 2),

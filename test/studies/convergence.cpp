@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Sec. 3.3.2 (Fig. 4) and 4.4.2 (Fig. 9): how the DSI becomes clear as
-// events come in.
+// Ghosh and Gallego 2022, Sec. 3.3.2 (Fig. 4) and 4.4.2 (Fig. 9): the DSI becomes clear with more
+// events.
 #include <Eigen/Geometry>
 #include <string>
 #include <utility>
@@ -39,7 +39,7 @@ std::vector<Method> methodsOver(double min_depth_m, double max_depth_m) {
           {kStereoHalves, halves}};
 }
 
-/// The preset slider with a second camera beside the first: the paper's rig on a linear slider.
+/// The preset slider with a second camera: the paper's rig on a linear slider.
 Simulation stereoSlider(const StudyRun& run) {
   constexpr double kBaselineM = 0.1;
   SimulationOptions options;
@@ -52,7 +52,7 @@ Simulation stereoSlider(const StudyRun& run) {
   return simulation;
 }
 
-/// Windows of a duration around the middle of the recording.
+/// A window around the middle of the recording.
 Window around(const Recording& recording, double duration_s) {
   const Simulation& simulation = recording.simulation;
   const Window middle = recording.windows(duration_s, 3)[1];

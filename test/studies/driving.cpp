@@ -38,31 +38,30 @@ TextTable published() {
             "95.07", "3.83"}}};
 }
 
-/// Kept pixels in the middle of the image (half its width and height) over those around it, per
-/// pixel.
+/// Points per pixel in the middle of the image (half its width and height) over those around it.
 double pointsMiddleOverAround(const std::vector<KeyframeDepthMap>& keyframes) {
   double middle = 0;
   double all = 0;
   for (const KeyframeDepthMap& keyframe : keyframes) {
-    const cv::Mat1b kept = keyframe.map.depth > 0;
-    const cv::Rect inner(kept.cols / 4, kept.rows / 4, kept.cols / 2, kept.rows / 2);
-    middle += cv::countNonZero(kept(inner));
-    all += cv::countNonZero(kept);
+    const cv::Mat1b points = keyframe.map.depth > 0;
+    const cv::Rect inner(points.cols / 4, points.rows / 4, points.cols / 2, points.rows / 2);
+    middle += cv::countNonZero(points(inner));
+    all += cv::countNonZero(points);
   }
   return middle / ((all - middle) / 3);
 }
 
-/// Mean speed of the image in its middle over that around it, where something is seen.
+/// Mean speed of the image in its middle over that around it.
 double speedMiddleOverAround(const Recording& recording,
                              const std::vector<KeyframeDepthMap>& keyframes) {
-  constexpr std::int64_t kApartNs = 1'000'000;
+  constexpr std::int64_t kStepNs = 1'000'000;
   const Simulation& simulation = recording.simulation;
   double sum[2] = {0, 0};
   double count[2] = {0, 0};
   for (const KeyframeDepthMap& keyframe : keyframes) {
     const ReferenceView& view = keyframe.view;
     const std::int64_t t_ns = keyframe.window.t_ref_ns;
-    const Rigid3 T_later_now = simulation.motion->poseAt(t_ns + kApartNs).inverse() *
+    const Rigid3 T_later_now = simulation.motion->poseAt(t_ns + kStepNs).inverse() *
                                simulation.motion->poseAt(t_ns);  // the rig is camera 0
     const cv::Mat1f truth = truthOf(recording, keyframe);
     for (int y = 0; y < view.height; y += 4) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Sec. 4.2: which function fuses the DSIs of two cameras best.
+// Ghosh and Gallego 2022, Sec. 4.2: the functions that fuse the DSIs of two cameras.
 #include <string>
 #include <vector>
 
@@ -37,7 +37,7 @@ TextTable published() {
            {"max", "109.30", "75.44", "41.31", "9.25"}}};
 }
 
-/// The share of the pixels whose confidence is at least a tenth of the map's largest.
+/// The fraction of pixels with a confidence of at least a tenth of the map's max.
 double spreadOf(const DepthMap& map) {
   double largest = 0;
   cv::minMaxLoc(map.confidence, nullptr, &largest);
@@ -100,7 +100,7 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
       spreads, " % of the pixels");
 }
 
-/// How much the functions differ, by how much data there is.
+/// The differences between the functions by the amount of data.
 void byWindow(const StudyRun& run, const Recording& recording, StudySection& section) {
   std::vector<double> durations_s = {0.05, 0.1, 0.2, 0.5, 1};
   if (run.quick) durations_s = {0.05, 0.1};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A tracker that is wrong within the window, and what the correction of its motion gives back.
+// Motion corrected within the window of a keyframe, with errors of the tracker.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
@@ -28,10 +28,10 @@ struct Case {
   double window_s;
 };
 
-/// What is wrong with the tracker.
+/// An error of the tracker.
 struct TrackerError {
   std::string name;
-  double velocity = 0;  ///< Of a constant velocity: cm/s and degrees per second.
+  double velocity = 0;  ///< Error of a constant velocity: cm/s and degrees per second.
   std::optional<PoseSway> sway;
 };
 
@@ -54,13 +54,13 @@ Eigen::Vector3d direction(RandomNumbers& random) {
   }
 }
 
-/// The keyframes along poses as they are, or corrected.
+/// The results of keyframes with one kind of poses.
 struct Outcome {
   std::vector<double> errors;  ///< |estimate - truth| / truth of all points.
   double seconds = 0;
   int keyframes = 0;
   int corrected = 0;
-  double left_deg_s = 0;  ///< Summed: of the velocity that is still wrong.
+  double left_deg_s = 0;  ///< Sum of the remaining velocity errors.
   double left_cm_s = 0;
 
   double median() const {
@@ -75,14 +75,14 @@ struct Outcome {
   }
 };
 
-/// All seeds of a case with one kind of error.
+/// The results of all seeds of a case with one kind of error.
 struct Outcomes {
   Outcome as_is;
   Outcome corrected;
 };
 
-/// Maps a window along its motion and takes down how well.
-/// @param wrong the velocity that must be found, where it is one.
+/// Maps a window and adds the result to the outcome.
+/// @param wrong the velocity error that the correction should find.
 void mapInto(Outcome& outcome, const Recording& recording, const Window& window,
              const KeyframeMapperOptions& options, const VelocityCorrection& wrong) {
   KeyframeMapper mapper(recording.simulation.rig, {0, 1}, options);
@@ -191,7 +191,7 @@ void judge(const Case& what, const std::vector<TrackerError>& errors,
                     std::to_string(all.front().corrected.keyframes) + " keyframes were touched");
   std::vector<double> share;
   std::vector<double> over_exact;
-  std::vector<double> harm;  // left of what wrong poses add
+  std::vector<double> harm;  // remaining fraction of the added error
   for (std::size_t i = 1; i < errors.size(); ++i) {
     share.push_back(all[i].corrected.median() / all[i].as_is.median());
     harm.push_back((all[i].corrected.median() - exact) / (all[i].as_is.median() - exact));

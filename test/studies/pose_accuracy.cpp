@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// How depth suffers from poses and clocks that are wrong (Ghosh and Gallego 2022, Sec. 4.6, meets
-// such poses in TUM-VIE).
+// Depth with wrong poses and clocks (such poses are in TUM-VIE: Ghosh and Gallego 2022, Sec. 4.6).
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -21,14 +20,14 @@
 namespace efm::studies {
 namespace {
 
-/// One kind of error, from none to much of it.
+/// A kind of error and its levels.
 struct ErrorKind {
   std::string title;
   std::string unit;            ///< Of the levels.
   std::vector<double> levels;  ///< The first is 0.
   std::function<std::string(double)> say;
   std::function<Recording(const Recording&, double)> make;
-  bool of_second_camera = false;  ///< One camera alone does not suffer.
+  bool of_second_camera = false;  ///< One camera alone is not affected.
 };
 
 ErrorKind poseKind(const std::string& title, const std::string& unit,
@@ -74,19 +73,19 @@ std::vector<ErrorKind> errorKinds() {
 struct ErrorResults {
   std::vector<MethodResult> mono;
   std::vector<MethodResult> stereo;
-  /// Of the stereo maps where their own poses put them: an error of the reference pose alone does
-  /// not count.
+  /// Of the stereo maps at their own poses: an error of the reference pose alone does not count.
   std::vector<DepthErrors> in_world;
 };
 
-/// Of the rig, m/s.
+/// Mean speed of the rig, m/s.
 double meanSpeed(const Recording& recording) {
-  double way_m = 0;
+  double path_length_m = 0;
   const std::vector<StampedPose>& poses = recording.trajectory.poses();
   for (std::size_t i = 1; i < poses.size(); ++i) {
-    way_m += (poses[i].T_world_rig.translation - poses[i - 1].T_world_rig.translation).norm();
+    path_length_m +=
+        (poses[i].T_world_rig.translation - poses[i - 1].T_world_rig.translation).norm();
   }
-  return way_m / secondsBetween(poses.front().t_ns, poses.back().t_ns);
+  return path_length_m / secondsBetween(poses.front().t_ns, poses.back().t_ns);
 }
 
 Method twoCameras() { return {"two cameras (Alg. 1)", paperOptions(1, 6.5)}; }
@@ -144,7 +143,7 @@ void tables(const ErrorKind& kind, const ErrorResults& results, StudySection& se
   section.table(errorTable(results.mono));
 }
 
-/// How many times the median error of exact poses, level by level.
+/// The median error relative to exact poses, by level.
 std::vector<double> timesExact(const std::vector<MethodResult>& results,
                                DepthErrors MethodResult::*pixels) {
   std::vector<double> times = eachOf(results, pixels, medianCm);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A tracker that drifts and errs, and what refining its keyframes' poses gives back.
+// Poses of keyframes refined, with drift and noise of the tracker.
 #include <algorithm>
 #include <string>
 #include <tuple>
@@ -64,7 +64,7 @@ void judgeDrift(const RefinementStudyResults& all, StudySection& section) {
         " With exact poses the walls are " + formatNumber(100 * exact_m, 2) + " cm thick.";
     for (const auto& [name, figure, most, departure] :
          {std::tuple{"end-to-end error", kEnd, 0.3, loops_lost},
-          std::tuple{"end-to-end turn", kEndTurn, 0.3, loops_lost},
+          std::tuple{"end-to-end turn", kEndRotation, 0.3, loops_lost},
           std::tuple{"walls' thickness", kWalls, 0.5, loops_lost + walls_too}}) {
       section.trend(what.name + ": with drift the " + name + " is at most " +
                         formatNumber(most, 1) + " times as large",

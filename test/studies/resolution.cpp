@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Sec. 4.7: the same scene seen by sensors of more and fewer pixels.
+// Ghosh and Gallego 2022, Sec. 4.7: the same scene with sensors of different resolutions.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -49,7 +49,7 @@ ByResolution mapAll(const std::vector<Sensor>& sensors, const Method& method) {
   return all;
 }
 
-/// The pixels of a keyframe, by the kind of the edge that they lie on.
+/// The kind of edge at each pixel of a keyframe.
 cv::Mat1b edgeKindsSeen(const Recording& recording, const KeyframeDepthMap& keyframe) {
   const Simulation& simulation = recording.simulation;
   const StampedPose pose{0, simulation.motion->poseAt(keyframe.window.t_ref_ns)};
@@ -63,7 +63,7 @@ cv::Mat1b edgeKindsSeen(const Recording& recording, const KeyframeDepthMap& keyf
   return kinds;
 }
 
-/// Where the second camera sees what the view sees, within a pixel, at the reference time.
+/// Pixels whose points the second camera sees, within a pixel, at the reference time.
 cv::Mat1b seenBySecond(const Recording& recording, const KeyframeDepthMap& keyframe) {
   const Simulation& simulation = recording.simulation;
   const RigCamera& second = simulation.rig.cameras.at(1);
@@ -75,18 +75,18 @@ cv::Mat1b seenBySecond(const Recording& recording, const KeyframeDepthMap& keyfr
   cv::Mat1b seen(here.size(), 0);
   for (int y = 0; y < here.rows; ++y) {
     for (int x = 0; x < here.cols; ++x) {
-      // An edge belongs to what is in front.
+      // An edge is on the front surface.
       double depth_m = here(y, x);
-      for (const int beside : {std::max(0, x - 1), std::min(here.cols - 1, x + 1)}) {
-        depth_m = std::min(depth_m, static_cast<double>(here(y, beside)));
+      for (const int neighbour : {std::max(0, x - 1), std::min(here.cols - 1, x + 1)}) {
+        depth_m = std::min(depth_m, static_cast<double>(here(y, neighbour)));
       }
       const Eigen::Vector3d p_second = T_second_ref * keyframe.view.pointAt(x, y, depth_m);
       const Eigen::Vector2d pixel = view.project(p_second);
       const int column = static_cast<int>(std::lround(pixel.x()));
       const int row = static_cast<int>(std::lround(pixel.y()));
-      for (int beside = column - 1; beside <= column + 1; ++beside) {
-        if (beside < 0 || beside >= there.cols || row < 0 || row >= there.rows) continue;
-        const double ratio = static_cast<double>(there(row, beside)) / p_second.z();
+      for (int neighbour = column - 1; neighbour <= column + 1; ++neighbour) {
+        if (neighbour < 0 || neighbour >= there.cols || row < 0 || row >= there.rows) continue;
+        const double ratio = static_cast<double>(there(row, neighbour)) / p_second.z();
         if (std::abs(ratio - 1) < 0.02) seen(y, x) = 255;
       }
     }
@@ -106,7 +106,7 @@ std::vector<std::string> comparedRow(const std::string& name, const DepthErrors&
           formatNumber(medianCm(two) / medianCm(one), 2)};
 }
 
-/// One camera and two on common pixels, by how edges run.
+/// One camera and two on common pixels, by kind of edge.
 void byEdges(const Sensor& sensor, StudySection& section) {
   const Recording& recording = sensor.recording;
   const auto one = mapWindows(recording, sensor.windows, flyingRoomMono());
@@ -144,7 +144,7 @@ void byEdges(const Sensor& sensor, StudySection& section) {
   section.table(table);
 }
 
-/// One camera and two on common pixels, by how much data there is.
+/// One camera and two on common pixels, by amount of data.
 void byWindow(const StudyRun& run, const Sensor& sensor, StudySection& section) {
   TextTable table;
   table.head = {"window",         "points [thousand]",    "one: mean [cm]", "one: beyond 10 % [%]",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Ghosh and Gallego 2022, Secs. 3.7 and 4.9: what a keyframe costs, by step, and the formulas of
+// Ghosh and Gallego 2022, Secs. 3.7 and 4.9: the time of a keyframe by step, and the formulas of
 // its complexity.
 #include <Eigen/Dense>
 #include <algorithm>
@@ -24,7 +24,7 @@
 namespace efm::studies {
 namespace {
 
-/// The sizes that the paper's formulas have.
+/// The sizes in the paper's formulas.
 struct Sizes {
   double events = 235'000;  ///< N_e, of each camera.
   int cameras = 2;          ///< N_c.
@@ -37,7 +37,7 @@ struct Sizes {
   double pixels() const { return static_cast<double>(width) * height; }
 };
 
-/// Milliseconds of one thread: the fastest of several runs, which others disturbed least.
+/// Milliseconds of one thread: the fastest of several runs.
 struct Times {
   double warp_ms = std::numeric_limits<double>::infinity();   ///< Packets and back-projection.
   double sweep_ms = std::numeric_limits<double>::infinity();  ///< Votes, fusion and peaks.
@@ -85,12 +85,12 @@ std::array<double, kTerms> termsOf(const Sizes& sizes) {
 }
 
 struct Sample {
-  std::string varied;  ///< The size that differs from the paper's; empty for the paper's.
+  std::string varied;  ///< The changed size; empty for the paper's sizes.
   Sizes sizes;
   Times times;
 };
 
-/// Nanoseconds per unit of each term, and how far the formula is off at worst.
+/// Nanoseconds per unit of each term, and the max relative error of the formula.
 struct Fit {
   std::array<double, kTerms> ns{};
   double worst = 0;
@@ -102,7 +102,7 @@ struct Fit {
   double ms(const Sizes& sizes) const { return ms(sizes, 0) + ms(sizes, 1) + ms(sizes, 2); }
 };
 
-/// Least squares of relative deviations; a term that would cost less than nothing is left out.
+/// Least squares of relative errors. Terms with negative costs are removed.
 Fit fit(const std::vector<Sample>& samples) {
   std::vector<int> used = {0, 1, 2};
   Fit best;
@@ -134,7 +134,7 @@ Fit fit(const std::vector<Sample>& samples) {
   return best;
 }
 
-/// One size at a time, from the paper's.
+/// Measures the paper's sizes, and each size changed alone.
 std::vector<Sample> measureAll(const StudyRun& run) {
   std::vector<Sample> samples;
   const auto add = [&](const char* varied, auto change) {
@@ -183,7 +183,7 @@ struct Exponents {
   double of_formula = 0;
 };
 
-/// Of the time over one size, the others being the paper's.
+/// The exponent of the time over one size; the other sizes are the paper's.
 Exponents exponentsOver(const std::vector<Sample>& samples, const Fit& formula,
                         const std::string& varied) {
   std::vector<double> sizes;
@@ -240,7 +240,7 @@ TextTable stepsOf(const std::vector<Sample>& samples, const Fit& formula) {
   return table;
 }
 
-/// Processes that ran or wanted to, over the last minute: what disturbs the clock.
+/// Mean number of running or waiting processes over the last minute.
 double loadAverage() {
   double load = 0;
   return getloadavg(&load, 1) == 1 ? load : 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The real slider (Mueggler et al., IJRR 2017): depth of its events against depth of its frames.
+// The real slider (Mueggler et al., IJRR 2017): depth from its events compared with depth from its
+// frames.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -43,7 +44,7 @@ std::vector<Method> methods() {
   return methods;
 }
 
-/// A method's map with its own threshold and with the number of points that all are compared at.
+/// A method's map with its own threshold, and with the same number of points for all methods.
 struct SliderResult {
   std::string name;
   DepthMap own;
@@ -61,7 +62,8 @@ std::vector<double> thresholdsOf(ExtractionMethod method) {
   return thresholds;
 }
 
-/// With the strictest threshold that keeps as many; of these the most outstanding.
+/// The map for `points` uses the strictest threshold with enough points, and of these the points
+/// with the highest local contrast.
 SliderResult mapSlider(const SliderRecording& recording, Method method, int points) {
   SliderResult result;
   result.name = method.name;
@@ -115,7 +117,7 @@ void scoreTable(const std::vector<SliderResult>& results, const SliderTruth& tru
   section.table(table);
 }
 
-/// The sweep over frames of the simulated slider, where the depth is known.
+/// The plane sweep over frames of the simulated slider, whose depth is known.
 void frameTruthOnItsOwn(const FrameDepthOptions& options, StudySection& section) {
   const Simulation simulation = makeSlider(3);
   const CameraModel& camera = simulation.rig.cameras[0].model;

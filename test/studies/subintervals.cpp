@@ -34,7 +34,7 @@ Method mono(int subintervals) {
   return method;
 }
 
-/// Part `i` of each window, seen from where the whole window is.
+/// Part `i` of each window, in the reference view of the whole window.
 std::vector<Window> partsOf(const std::vector<Window>& windows, int i) {
   std::vector<Window> parts;
   for (const Window& window : windows) {
@@ -55,8 +55,8 @@ TextTable published() {
        {"8", "19.80", "9.27", "1.56", "1.84", "7.63", "13.31", "94.99", "97.90", "99.19", "1.20"}}};
 }
 
-/// The median error of a method's points if each had the plane nearest to its truth: errors are
-/// spread evenly over half a step to both sides then.
+/// The median error of a method's points with the best planes. Errors are then uniform within half
+/// a step to both sides.
 double medianQuarterStepCm(const Recording& recording, const MethodResult& result) {
   const double step = DepthPlanes(paperOptions(1, 6.5).planes).inverseDepthStep();
   std::vector<double> quarters;
@@ -70,7 +70,7 @@ double medianQuarterStepCm(const Recording& recording, const MethodResult& resul
   return upperMedian(quarters);
 }
 
-/// @param departure why trends depart: said once.
+/// @param departure the reason of a departure, printed once.
 void judgeNumbers(const std::vector<MethodResult>& results, std::string departure,
                   StudySection& section) {
   const auto judged = [&](const std::string& claim, bool agrees, const std::string& figures) {
@@ -146,7 +146,7 @@ void numberOfSubintervals(const StudyRun& run, const Recording& recording, Study
                section);
 }
 
-/// Maps of the parts of a window and of the whole, by one method.
+/// Maps of the parts of each window and of the whole window.
 std::vector<MethodResult> partsAndWhole(const Recording& recording,
                                         const std::vector<Window>& windows, const Method& of_part,
                                         const Method& whole) {

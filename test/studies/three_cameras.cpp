@@ -21,7 +21,7 @@ Method fused(const char* name, const std::vector<int>& cameras) {
   return {name, paperOptions(0.8, 4.5), cameras};
 }
 
-/// Errors where all cameras see, whatever each method chose there.
+/// Errors at the pixels that all cameras see.
 std::vector<MethodResult> whereAllSee(const Recording& recording,
                                       std::vector<MethodResult> results) {
   for (std::size_t w = 0; w < results.front().keyframes.size(); ++w) {
@@ -41,7 +41,7 @@ double votesOf(const MethodResult& result) {
   return votes / static_cast<double>(result.keyframes.size());
 }
 
-/// Share of the view where the map has confidence.
+/// Fraction of the view with confidence.
 double sharedView(const MethodResult& result) {
   double pixels = 0;
   double all = 0;

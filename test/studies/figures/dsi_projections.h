@@ -10,17 +10,17 @@
 
 namespace efm::studies {
 
-/// The largest values of a DSI along each of its three axes (Ghosh and Gallego 2022, Fig. 2): what
-/// is seen of it from the front, from above and from the side. Plane 0, the nearest, is the lowest
-/// row of the view from above and the first column of the view from the side.
+/// The max values of a DSI along each of its three axes (Ghosh and Gallego 2022, Fig. 2): the views
+/// from the front, from above and from the side. Plane 0, the nearest, is the lowest row of the
+/// view from above and the first column of the view from the side.
 class DsiProjections : public DsiSink {
  public:
   DsiProjections(const DepthPlanes& planes, const ReferenceView& view);
 
   void addPlane(int plane, const float* values) override;
 
-  /// The three as one picture, front above left, top below it, side to its right: blue (none) to
-  /// yellow (the largest value of all).
+  /// The three views in one picture: front in the upper left, top below it, side to its right. Blue
+  /// is 0, yellow is the max.
   cv::Mat3b picture() const;
 
  private:

@@ -46,9 +46,10 @@ TopView viewOfAll(const std::vector<Wall>& walls, double pixel_m) {
 
 cv::Mat3b drawTopView(const std::vector<CloudPoint>& points, const std::vector<Wall>& walls,
                       const TopView& view) {
-  // Where points lie as densely as on a wall that is seen well: 3.5 in a square centimetre.
-  constexpr double kDarkFrom = 3.5e4;
-  const auto dark_from = static_cast<float>(std::max(1.0, kDarkFrom * view.pixel_m * view.pixel_m));
+  // The density of a well visible wall: 3.5 points in a square centimetre.
+  constexpr double kDarkDensity = 3.5e4;
+  const auto dark_count =
+      static_cast<float>(std::max(1.0, kDarkDensity * view.pixel_m * view.pixel_m));
   cv::Mat1f count(sizeOf(view), 0.0F);
   cv::Mat1f height(sizeOf(view), 0.0F);
   const cv::Rect inside({0, 0}, sizeOf(view));
@@ -69,7 +70,7 @@ cv::Mat3b drawTopView(const std::vector<CloudPoint>& points, const std::vector<W
   for (int y = 0; y < picture.rows; ++y) {
     for (int x = 0; x < picture.cols; ++x) {
       if (count(y, x) == 0) continue;
-      const float ink = std::min(1.0F, count(y, x) / dark_from);
+      const float ink = std::min(1.0F, count(y, x) / dark_count);
       for (int c = 0; c < 3; ++c) {
         picture(y, x)[c] =
             cv::saturate_cast<uchar>((1 - ink) * static_cast<float>(picture(y, x)[c]) +

@@ -10,21 +10,21 @@
 
 namespace efm::studies {
 
-/// What is drawn of a map seen from above, x to the right and y up; world: z up.
+/// The part of a map in a view from above: x to the right, y up. World: z up.
 struct TopView {
-  Eigen::Vector2d low_m = Eigen::Vector2d::Zero();   ///< The corner at the lower left.
-  Eigen::Vector2d high_m = Eigen::Vector2d::Ones();  ///< The corner at the upper right.
+  Eigen::Vector2d low_m = Eigen::Vector2d::Zero();   ///< Lower left corner.
+  Eigen::Vector2d high_m = Eigen::Vector2d::Ones();  ///< Upper right corner.
   double pixel_m = 0.01;
-  /// Heights between which points are drawn: without the floor and the ceiling, which hide all.
+  /// Range of heights. Floor and ceiling are excluded, because they hide everything else.
   double min_height_m = 0.15;
   double max_height_m = 2.6;
 };
 
-/// All of a room and a little around it.
+/// A view of a whole room with a margin.
 TopView viewOfAll(const std::vector<Wall>& walls, double pixel_m);
 
-/// A map's points, blue low and red high, the more of them the darker; the room's upright walls as
-/// grey lines where they truly are.
+/// Draws a map's points, blue low and red high, darker where there are more, and the true upright
+/// walls as grey lines.
 cv::Mat3b drawTopView(const std::vector<CloudPoint>& points, const std::vector<Wall>& walls,
                       const TopView& view);
 

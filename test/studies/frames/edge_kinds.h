@@ -16,13 +16,13 @@ enum class EdgeKind : std::uint8_t {
   kNone,        ///< No edge.
   kHorizontal,  ///< The grey values' gradient is within 15 degrees of vertical.
   kVertical,    ///< The gradient is within 30 degrees of horizontal.
-  kOblique,     ///< An edge, but neither.
+  kOblique,     ///< Another edge.
 };
 
 struct EdgeKindOptions {
-  double blur_px = 1.0;        ///< Standard deviation of the Gaussian whose gradient is taken.
-  double min_gradient = 1.5;   ///< Grey values per pixel from which on a pixel is near an edge.
-  double line_gradient = 3.0;  ///< The same for a line of edge pixels to begin.
+  double blur_px = 1.0;        ///< Standard deviation of the Gaussian blur.
+  double min_gradient = 1.5;   ///< Min gradient of an edge, grey values per pixel.
+  double line_gradient = 3.0;  ///< Min gradient at the start of a line of edge pixels.
   double horizontal_deg = 15;  ///< See EdgeKind.
   double vertical_deg = 30;
 
@@ -30,10 +30,10 @@ struct EdgeKindOptions {
   void validate() const;
 };
 
-/// Where an image has edges, and how they run.
+/// The edges of an image and their directions.
 struct EdgeKinds {
   cv::Mat1b kinds;  ///< EdgeKind of every pixel.
-  /// The thin lines among them (Canny): 255 at edge pixels of the kind, else 0.
+  /// Thin lines of edge pixels (Canny): 255 at pixels of the kind, else 0.
   cv::Mat1b horizontal_lines;
   cv::Mat1b vertical_lines;
 
@@ -45,7 +45,7 @@ struct EdgeKinds {
   cv::Mat1f magnitude_;
 };
 
-/// @param grey of any scale; the thresholds are in its units.
+/// @param grey any scale; the thresholds have its unit.
 /// @throws std::invalid_argument where the options are not valid.
 EdgeKinds edgeKinds(const cv::Mat1f& grey, const EdgeKindOptions& options = {});
 

@@ -17,7 +17,7 @@
 namespace efm::studies {
 namespace {
 
-FrameSweepOptions choiceOf(const FrameDepthOptions& options) {
+FrameSweepOptions sweepOptionsOf(const FrameDepthOptions& options) {
   return {options.min_baseline_m, options.max_baseline_m, options.max_frames,
           options.window_sigmas_px};
 }
@@ -41,7 +41,7 @@ std::vector<ScoreVolume> sweep(const FrameSweep& frames, const DepthPlanes& plan
   return volumes;
 }
 
-/// One pixel's best plane in one size of the window.
+/// The best plane of a pixel for one size of the window.
 struct Peak {
   int plane = 0;
   float score = -1;
@@ -66,7 +66,7 @@ Peak peakAt(const ScoreVolume& volume, const DepthPlanes& planes, cv::Point pixe
                    peak.plane < last ? at(peak.plane + 1) : peak.score);
   const bool inside = peak.plane > 0 && peak.plane < last;
   peak.depth_m = planes.depthAt(inside ? position : peak.plane);
-  if (!inside) return peak;  // the depth may lie beyond: no margin
+  if (!inside) return peak;  // the depth may be outside of the planes: no margin
   float rival = -1;
   for (int plane = 0; plane < planes.size(); ++plane) {
     if (std::abs(planes.depth(plane) / peak.depth_m - 1) > separation) {
@@ -100,16 +100,16 @@ FrameDepth depthOf(const FrameSweep& frames, const FrameDepthOptions& options) {
   return result;
 }
 
-/// 255 on edges, in the key frame as the view sees it; 0 on even ground, beside strong edges too.
+/// 255 on edges of the key frame; 0 on even areas, also next to strong edges.
 cv::Mat1b onEdges(const cv::Mat1f& grey, const FrameDepthOptions& options) {
   const cv::Mat1f magnitude = imageGradient(grey, 1).magnitude;
   const int side = 2 * options.shadow_px + 1;
   cv::Mat1f strongest;
   cv::dilate(magnitude, strongest, cv::Mat1b(side, side, 1));
-  return (magnitude >= options.min_gradient) & (magnitude >= options.ridge_share * strongest);
+  return (magnitude >= options.min_gradient) & (magnitude >= options.ridge_fraction * strongest);
 }
 
-/// Fills gaps between two pixels of about the same depth, linearly in inverse depth.
+/// Interpolates between two pixels of about the same depth, linearly in inverse depth.
 void fillGaps(const cv::Mat1f& sure, cv::Point step, const FrameDepthOptions& options,
               cv::Mat1f& depth) {
   const cv::Rect image(0, 0, sure.cols, sure.rows);
@@ -128,14 +128,14 @@ void fillGaps(const cv::Mat1f& sure, cv::Point step, const FrameDepthOptions& op
       const double end = 1 / static_cast<double>(sure(to));
       if (std::abs(begin / end - 1) > options.separation) continue;
       for (int k = 1; k < length; ++k) {
-        const double share = static_cast<double>(k) / length;
-        depth(from + k * step) = static_cast<float>(1 / (begin + share * (end - begin)));
+        const double fraction = static_cast<double>(k) / length;
+        depth(from + k * step) = static_cast<float>(1 / (begin + fraction * (end - begin)));
       }
     }
   }
 }
 
-/// Whether a second view finds the same depth where it sees the point, within a pixel.
+/// Whether the depth of the second view agrees at the point, within a pixel.
 bool agrees(const Eigen::Vector3d& p_second, const ReferenceView& view, const cv::Mat1f& depth,
             double max_disagreement) {
   const Eigen::Vector2d pixel = view.project(p_second);
@@ -150,8 +150,8 @@ bool agrees(const Eigen::Vector3d& p_second, const ReferenceView& view, const cv
   return false;
 }
 
-/// A frame as the view sees it, given the view's depth; where there is none, as if it lay at the
-/// median depth. For a frame a few millimetres away the depth hardly matters.
+/// A frame warped to the view with the view's depth, or with the median depth where there is none.
+/// At a distance of a few millimetres the depth hardly matters.
 cv::Mat1f seenFrom(const ReferenceView& view, const Rigid3& T_world_ref, const PosedFrames& frames,
                    std::size_t key, const cv::Mat1f& depth_m) {
   const PosedFrame& frame = frames.frames[key];
@@ -177,7 +177,7 @@ cv::Mat1f seenFrom(const ReferenceView& view, const Rigid3& T_world_ref, const P
   return seen;
 }
 
-/// The frame whose distance from the view is nearest to the one asked for.
+/// The frame whose distance from the view is closest to `distance_m`.
 std::size_t frameAtDistance(const PosedFrames& sequence, const Rigid3& T_world_ref,
                             double distance_m) {
   const auto miss = [&](const PosedFrame& frame) {
@@ -203,7 +203,8 @@ void FrameDepthOptions::validate() const {
   for (const double sigma_px : window_sigmas_px) {
     requireOption(sigma_px > 0 && sigma_px <= 50, "window_sigmas_px", sigma_px, "above 0, to 50");
   }
-  requireOption(ridge_share >= 0 && ridge_share <= 1, "ridge_share", ridge_share, "from 0 to 1");
+  requireOption(ridge_fraction >= 0 && ridge_fraction <= 1, "ridge_fraction", ridge_fraction,
+                "from 0 to 1");
   requireOption(shadow_px >= 0 && shadow_px <= 50, "shadow_px", shadow_px, "from 0 to 50");
   requireOption(max_gap_px >= 0, "max_gap_px", max_gap_px, "0 or above");
   requireOption(separation > 0 && separation < 1, "separation", separation, "between 0 and 1");
@@ -215,12 +216,12 @@ FrameDepth frameDepth(const PosedFrames& sequence, std::size_t key, const Refere
                       const Rigid3& T_world_ref, const FrameDepthOptions& options) {
   options.validate();
   FrameDepth result =
-      depthOf(FrameSweep(sequence, key, view, T_world_ref, choiceOf(options)), options);
+      depthOf(FrameSweep(sequence, key, view, T_world_ref, sweepOptionsOf(options)), options);
 
   const std::size_t second = frameAtDistance(sequence, T_world_ref, options.check_baseline_m);
   const Rigid3& T_world_second = sequence.frames[second].T_world_cam;
   const FrameDepth checked =
-      depthOf(FrameSweep(sequence, second, view, T_world_second, choiceOf(options)), options);
+      depthOf(FrameSweep(sequence, second, view, T_world_second, sweepOptionsOf(options)), options);
   const Rigid3 T_second_ref = T_world_second.inverse() * T_world_ref;
   for (int y = 0; y < view.height; ++y) {
     for (int x = 0; x < view.width; ++x) {

@@ -9,9 +9,9 @@
 namespace efm::studies {
 namespace {
 
-/// Keeps windows without contrast from correlating by chance, squared grey values.
+/// Prevents random correlation of windows without contrast. Squared grey values.
 constexpr double kNoiseVariance = 1.0;
-/// The correlation of a frame that does not see all of the window.
+/// The correlation of a frame that sees a part of the window only.
 constexpr float kUnseen = -2.0F;
 
 cv::Mat1f blurred(const cv::Mat1f& image, double sigma_px) {
@@ -20,7 +20,7 @@ cv::Mat1f blurred(const cv::Mat1f& image, double sigma_px) {
   return result;
 }
 
-/// K of a view.
+/// The matrix K of a view.
 Eigen::Matrix3d intrinsicsOf(const ReferenceView& view) {
   Eigen::Matrix3d intrinsics = Eigen::Matrix3d::Identity();
   intrinsics.diagonal().head<2>() << view.fx, view.fy;
@@ -28,8 +28,8 @@ Eigen::Matrix3d intrinsicsOf(const ReferenceView& view) {
   return intrinsics;
 }
 
-/// Of the plane at a depth of frame `ref`: p_cam = R p_ref + t = (R + t n^T / d) p_ref with
-/// n = (0, 0, 1).
+/// The homography of the plane at a depth of frame `ref`: p_cam = R p_ref + t = (R + t n^T / d)
+/// p_ref with n = (0, 0, 1).
 Eigen::Matrix3d homographyOver(double depth_m, const Rigid3& T_cam_ref) {
   Eigen::Matrix3d H_cam_ref = T_cam_ref.rotation.toRotationMatrix();
   H_cam_ref.col(2) += T_cam_ref.translation / depth_m;
@@ -58,9 +58,9 @@ FrameSweep::FrameSweep(const PosedFrames& sequence, std::size_t key, const Refer
   for (std::size_t i = 0; i < sequence.frames.size(); ++i) {
     const double baseline_m =
         (sequence.frames[i].T_world_cam.translation - T_world_ref.translation).norm();
-    const bool in_reach =
+    const bool in_range =
         baseline_m >= options.min_baseline_m && baseline_m <= options.max_baseline_m;
-    if (i != key && in_reach) usable.push_back(i);
+    if (i != key && in_range) usable.push_back(i);
   }
   const auto wanted = static_cast<std::size_t>(options.max_frames);
   const std::size_t count = std::min(wanted, usable.size());

@@ -19,31 +19,31 @@ struct FrameSweepOptions {
   std::vector<double> window_sigmas_px = {1.5};
 };
 
-/// The frames around one view, and how well they fit together over a depth plane (Collins, CVPR
-/// 1996). Queries are thread-safe.
+/// The frames around a view and their correlation over a depth plane (Collins, CVPR 1996). Queries
+/// are thread-safe.
 class FrameSweep {
  public:
-  /// Fewer frames than this say nothing of a pixel.
+  /// Min number of frames that see a pixel.
   static constexpr int kMinFrames = 2;
 
   /// @param sequence outlives the sweep.
-  /// @param key index of the frame that the others are held against.
+  /// @param key index of the frame that the others are compared with.
   FrameSweep(const PosedFrames& sequence, std::size_t key, const ReferenceView& view,
              const Rigid3& T_world_ref, const FrameSweepOptions& options);
 
   const ReferenceView& view() const { return view_; }
 
-  /// Correlation (ZNCC) with the key frame if all lay at this depth, for each size of the window:
-  /// per pixel the mean of the better half of the frames, -1 where fewer than two look.
+  /// Correlation (ZNCC) with the key frame for a plane at this depth, for each size of the window:
+  /// per pixel the mean of the better half of the frames; -1 where fewer than two see it.
   std::vector<cv::Mat1f> scoresAt(double depth_m) const;
 
  private:
-  /// A frame, and where windows around its pixels lie in what its lens saw.
+  /// A frame and the masks of the windows that are inside of the raw image.
   struct Source {
     const PosedFrame* frame = nullptr;
     std::vector<cv::Mat1b> seen;  // per size of the window
   };
-  /// A frame as the view would see it if everything lay on one plane.
+  /// A frame warped to the view over one plane.
   struct WarpedFrame {
     cv::Mat1f image;
     std::vector<cv::Mat1b> seen;  // per size of the window: 255 where all of it is seen, else 0

@@ -13,37 +13,37 @@
 
 namespace efm::studies {
 
-/// An ordinary image, undistorted, and where it was taken.
+/// An undistorted image and the pose of its camera.
 struct PosedFrame {
   std::int64_t t_ns = 0;
   Rigid3 T_world_cam;
-  cv::Mat1f image;  ///< Grey values, of any scale.
-  cv::Mat1b seen;   ///< 255 where the lens saw, else 0.
+  cv::Mat1f image;  ///< Grey values of any scale.
+  cv::Mat1b seen;   ///< 255 at pixels inside of the raw image, else 0.
 };
 
-/// What one camera saw on its way, by time; all images in one pinhole.
+/// The images of one camera, in order of time and in one pinhole view.
 struct PosedFrames {
   ReferenceView view;
   std::vector<PosedFrame> frames;
 
-  /// Index of the frame whose time is nearest. There is at least one.
+  /// Index of the frame with the nearest time. There must be at least one frame.
   std::size_t nearestTo(std::int64_t t_ns) const;
 };
 
-/// Makes images of a lens what `ReferenceView::of(camera)` sees, by cubic interpolation.
+/// Undistorts images to `ReferenceView::of(camera)` by cubic interpolation.
 class FrameUndistortion {
  public:
   explicit FrameUndistortion(const CameraModel& camera);
 
-  /// Without its time and pose.
+  /// Without time and pose.
   PosedFrame operator()(const cv::Mat1f& raw) const;
 
  private:
   cv::Mat2f source_;  // per pixel of the view: the raw pixel
 };
 
-/// The frames of a folder in the UZH layout (images.txt: `t file` a line) that have a pose.
-/// @throws std::runtime_error naming the file (and line) that is missing or not understood.
+/// The frames with a pose of a folder in the UZH layout (images.txt: a line `t file` per image).
+/// @throws std::runtime_error naming the missing or invalid file (and line).
 PosedFrames readUzhFrames(const std::filesystem::path& folder);
 
 }  // namespace efm::studies

@@ -13,11 +13,11 @@ namespace efm::studies {
 
 struct RenderedFramesOptions {
   double grey = 45;       ///< Grey value where log intensity is 0.
-  double noise_grey = 0;  ///< Standard deviation of the noise; values are then rounded, too.
+  double noise_grey = 0;  ///< Standard deviation of the noise. With noise, values are rounded.
   std::uint64_t seed = 1;
 };
 
-/// What an ordinary camera on a simulated rig would record, undistorted.
+/// The undistorted frames of an ordinary camera on a simulated rig.
 /// @param poses T_world_cam.
 PosedFrames renderedFrames(const Scene& scene, const CameraModel& camera,
                            const std::vector<StampedPose>& poses,

@@ -10,20 +10,20 @@
 
 namespace efm::studies {
 
-/// The events of `slider_depth` with a pose and the true poses.
+/// The events of `slider_depth` with a pose, and the true poses.
 struct SliderRecording {
   Rig rig;
   std::vector<Event> events;
   Trajectory trajectory;
-  /// 0.15 s from the first event with a pose, as config/davis240c_slider.ini has it: 4.7 cm of
-  /// travel; the reference view in the middle.
+  /// 0.15 s from the first event with a pose, as in config/davis240c_slider.ini: 4.7 cm of travel.
+  /// The reference view is in the middle.
   Window window;
 };
 
-/// @throws std::runtime_error naming the file that is missing or not understood.
+/// @throws std::runtime_error naming the missing or invalid file.
 SliderRecording readSlider(const std::filesystem::path& folder);
 
-/// The depth map of the window. Planes and the like are the options'.
+/// The depth map of the window.
 /// @throws std::invalid_argument where the options are not valid.
 KeyframeDepthMap sliderKeyframe(const SliderRecording& recording,
                                 const KeyframeMapperOptions& options);

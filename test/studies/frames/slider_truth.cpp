@@ -13,7 +13,7 @@
 namespace efm::studies {
 namespace {
 
-/// Only the pixels of one kind.
+/// The pixels of one kind.
 cv::Mat1f ofKind(const cv::Mat1f& depth_m, const EdgeKinds& edges, EdgeKind kind) {
   cv::Mat1f some(depth_m.size(), 0.0F);
   for (int y = 0; y < depth_m.rows; ++y) {
@@ -34,7 +34,7 @@ std::vector<double> relativeErrors(const cv::Mat1f& depth_m, const cv::Mat1f& tr
   return errors;
 }
 
-double shareBeyond(const std::vector<double>& errors, double limit) {
+double fractionBeyond(const std::vector<double>& errors, double limit) {
   const auto beyond =
       std::count_if(errors.begin(), errors.end(), [&](double error) { return error > limit; });
   return errors.empty() ? 0 : static_cast<double>(beyond) / static_cast<double>(errors.size());
@@ -45,7 +45,7 @@ double median(std::vector<double> values) {
   return upperMedian(values);
 }
 
-double share(int part, int whole) {
+double fraction(int part, int whole) {
   return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0;
 }
 
@@ -75,12 +75,12 @@ SliderScore scoreOnSlider(const cv::Mat1f& depth_m, const SliderTruth& truth) {
   score.points = static_cast<std::uint64_t>(cv::countNonZero(points));
   score.with_truth = errors.size();
   score.median_error = median(errors);
-  score.beyond_10 = shareBeyond(errors, 0.1);
-  score.vertical_beyond_10 = shareBeyond(relativeErrors(on_vertical, truth_m), 0.1);
-  score.horizontal_beyond_10 = shareBeyond(relativeErrors(on_horizontal, truth_m), 0.1);
-  score.on_horizontal = share(cv::countNonZero(on_horizontal), cv::countNonZero(points));
-  score.vertical_covered = share(cv::countNonZero(truth.edges.vertical_lines & near_point),
-                                 cv::countNonZero(truth.edges.vertical_lines));
+  score.beyond_10 = fractionBeyond(errors, 0.1);
+  score.vertical_beyond_10 = fractionBeyond(relativeErrors(on_vertical, truth_m), 0.1);
+  score.horizontal_beyond_10 = fractionBeyond(relativeErrors(on_horizontal, truth_m), 0.1);
+  score.on_horizontal = fraction(cv::countNonZero(on_horizontal), cv::countNonZero(points));
+  score.vertical_covered = fraction(cv::countNonZero(truth.edges.vertical_lines & near_point),
+                                    cv::countNonZero(truth.edges.vertical_lines));
   return score;
 }
 

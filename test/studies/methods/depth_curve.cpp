@@ -14,9 +14,9 @@ namespace efm::studies {
 namespace {
 
 constexpr double kWrong = 0.1;       ///< Relative depth error of a wrong point.
-constexpr double kInlierPlanes = 5;  ///< Of points that a variance is asked to tell.
+constexpr double kInlierPlanes = 5;  ///< Variances are judged for points within this distance.
 
-/// Counts over all keyframes.
+/// Counters over all keyframes.
 struct Tally {
   std::vector<double> errors;
   double wrong = 0, beyond_plane = 0;
@@ -24,7 +24,7 @@ struct Tally {
   double inliers = 0, within_sigma = 0, within_2_sigma = 0;
 };
 
-double share(double part, double whole) { return whole > 0 ? part / whole : 0; }
+double fraction(double part, double whole) { return whole > 0 ? part / whole : 0; }
 
 PointQuality mix(const PointQuality& a, const PointQuality& b, double of_b) {
   const auto between = [of_b](double x, double y) { return (1 - of_b) * x + of_b * y; };
@@ -57,7 +57,7 @@ DepthExtractionOptions withThreshold(DepthExtractionOptions extraction, double t
 
 double PointQuality::f1() const {
   const double precision = 1 - beyond_10;
-  return share(2 * precision * recall, precision + recall);
+  return fraction(2 * precision * recall, precision + recall);
 }
 
 PointQuality DepthCurve::at(double points) const {
@@ -65,7 +65,7 @@ PointQuality DepthCurve::at(double points) const {
   for (std::size_t i = 1; i < steps.size(); ++i) {
     if (points > steps[i].points) continue;
     const double gap = steps[i].points - steps[i - 1].points;
-    return mix(steps[i - 1], steps[i], share(points - steps[i - 1].points, gap));
+    return mix(steps[i - 1], steps[i], fraction(points - steps[i - 1].points, gap));
   }
   return steps.back();
 }
@@ -117,11 +117,11 @@ PointQuality DepthJudge::judge(const std::vector<KeyframeDepthMap>& keyframes) {
   PointQuality quality;
   const auto count = static_cast<double>(tally.errors.size());
   quality.points = count;
-  quality.beyond_10 = share(tally.wrong, count);
-  quality.beyond_plane = share(tally.beyond_plane, count);
-  quality.recall = share(tally.edges_found, tally.edges);
-  quality.within_sigma = share(tally.within_sigma, tally.inliers);
-  quality.within_2_sigma = share(tally.within_2_sigma, tally.inliers);
+  quality.beyond_10 = fraction(tally.wrong, count);
+  quality.beyond_plane = fraction(tally.beyond_plane, count);
+  quality.recall = fraction(tally.edges_found, tally.edges);
+  quality.within_sigma = fraction(tally.within_sigma, tally.inliers);
+  quality.within_2_sigma = fraction(tally.within_2_sigma, tally.inliers);
   if (!tally.errors.empty()) {
     quality.median = upperMedian(tally.errors);
   }
@@ -139,8 +139,8 @@ DepthCurve depthCurve(const Recording& recording, const std::vector<Window>& win
   return curve;
 }
 
-PointQuality asItIs(const Recording& recording, const std::vector<Window>& windows,
-                    const Method& method, DepthJudge& judge) {
+PointQuality qualityOf(const Recording& recording, const std::vector<Window>& windows,
+                       const Method& method, DepthJudge& judge) {
   return judge.judge(mapWindows(recording, windows, method));
 }
 

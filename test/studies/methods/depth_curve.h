@@ -11,37 +11,37 @@
 
 namespace efm::studies {
 
-/// How good some points are. Shares are 0 to 1; the truth is the best within a pixel.
+/// The quality of points. Fractions are 0 to 1. The truth is the best within a pixel.
 struct PointQuality {
   double points = 0;
-  double beyond_10 = 0;       ///< Share with a depth error over 10 %.
-  double median = 0;          ///< Median |Z - Z_true| / Z_true.
-  double beyond_plane = 0;    ///< Share more than a plane step from the truth.
-  double recall = 0;          ///< Share of the visible edges with a right point within a pixel.
-  double within_sigma = 0;    ///< Of the points within five plane steps: within one
-  double within_2_sigma = 0;  ///< and two standard deviations of the truth.
+  double beyond_10 = 0;     ///< Fraction with a depth error over 10 %.
+  double median = 0;        ///< Median |Z - Z_true| / Z_true.
+  double beyond_plane = 0;  ///< Fraction more than a plane step from the truth.
+  double recall = 0;        ///< Fraction of the visible edges with a right point within a pixel.
+  /// Fractions of the points within five plane steps that are within one and within two standard
+  /// deviations of the truth.
+  double within_sigma = 0;
+  double within_2_sigma = 0;
 
-  double f1() const;  ///< Of precision, the share within 10 %, and recall.
+  double f1() const;  ///< Of recall and precision, the fraction within 10 %.
 };
 
-/// A method's keyframes of some windows with one threshold after the other, from few points to
-/// many.
+/// The quality of a method for a series of thresholds, from few points to many.
 struct DepthCurve {
   std::string name;
   std::vector<PointQuality> steps;
 
-  /// At a number of points, between two steps; of the nearest end where there are not so many.
+  /// Interpolated at a number of points; the nearest end outside of the curve.
   PointQuality at(double points) const;
 };
 
-/// What the methods' depth maps of a recording's windows are held against.
+/// Judges depth maps of a recording by its truth.
 class DepthJudge {
  public:
-  /// @param planes whose step is the unit.
+  /// @param planes their step is the unit of `beyond_plane`.
   DepthJudge(const Recording& recording, const DepthPlanesOptions& planes);
 
-  /// @param keyframes of one view, whatever their methods: the truth of a reference time is made
-  /// once.
+  /// @param keyframes of one view and any method. The truth of a reference time is computed once.
   PointQuality judge(const std::vector<KeyframeDepthMap>& keyframes);
 
  private:
@@ -61,13 +61,12 @@ class DepthJudge {
 /// `kAggregated`.
 DepthExtractionOptions withThreshold(DepthExtractionOptions extraction, double threshold);
 
-/// Over the thresholds of its extraction: `threshold_c` of `kPaper`, `min_quality` of
-/// `kAggregated`.
+/// The curve over the thresholds of the method's extraction.
 DepthCurve depthCurve(const Recording& recording, const std::vector<Window>& windows,
                       const Method& method, DepthJudge& judge);
 
-/// With the method's own threshold.
-PointQuality asItIs(const Recording& recording, const std::vector<Window>& windows,
-                    const Method& method, DepthJudge& judge);
+/// The quality with the method's own threshold.
+PointQuality qualityOf(const Recording& recording, const std::vector<Window>& windows,
+                       const Method& method, DepthJudge& judge);
 
 }  // namespace efm::studies

@@ -9,8 +9,8 @@
 namespace efm::studies {
 
 struct ErrorTableOptions {
-  bool equal_numbers = false;  ///< A third row per method.
-  bool in_metres = false;      ///< Absolute errors; in centimetres where not.
+  bool equal_numbers = false;  ///< Adds a third row per method.
+  bool in_metres = false;      ///< Absolute errors in metres, else in centimetres.
 };
 
 /// The paper's ten columns, two or three rows per method.

@@ -7,13 +7,12 @@
 
 namespace efm::studies {
 
-/// Of some pixels of a map those that stand out most from their surroundings (confidence less its
-/// 5x5 Gaussian mean), so many of them or a few more where they stand out alike; all of them where
-/// they are fewer.
-/// @param among 0: not one of them.
+/// The `count` pixels with the highest local contrast: confidence minus its 5x5 Gaussian mean. More
+/// pixels where contrasts are equal; all pixels where there are fewer.
+/// @param among 0 excludes a pixel.
 cv::Mat1b mostOutstanding(const DepthMap& map, const cv::Mat1b& among, int count);
 
-/// The depths of a map at some pixels, 0 elsewhere.
+/// The depths at the pixels of a mask; 0 elsewhere.
 cv::Mat1f only(const cv::Mat1f& depth, const cv::Mat1b& mask);
 
 }  // namespace efm::studies

@@ -11,7 +11,7 @@
 
 namespace efm::studies {
 
-/// Precision and recall of one thing among several.
+/// Precision and recall with a name.
 struct NamedPrecision {
   std::string name;
   PrecisionRecall counts;
@@ -20,15 +20,15 @@ struct NamedPrecision {
 /// Allowed errors of 1 cm to 1 m.
 std::vector<double> studyThresholds();
 
-/// Over all keyframes together, against every pixel of the truth.
+/// Over all keyframes together, compared with every pixel of the truth.
 PrecisionRecall precisionOf(const Recording& recording,
                             const std::vector<KeyframeDepthMap>& keyframes,
                             const DepthPairingOptions& pairing);
 
-/// Precision, recall and F1 over the allowed error, side by side.
+/// Plots of precision, recall and F1 over the allowed error.
 cv::Mat3b drawPrecision(const std::vector<NamedPrecision>& all);
 
-/// At some allowed errors: precision, recall and F1 of each, percent.
+/// Precision, recall and F1 of each at some allowed errors, percent.
 TextTable precisionTable(const std::vector<NamedPrecision>& all,
                          const std::vector<double>& thresholds_m);
 
@@ -37,7 +37,7 @@ std::vector<double> precisionAt(const std::vector<NamedPrecision>& all, double t
 std::vector<double> recallAt(const std::vector<NamedPrecision>& all, double threshold_m);
 
 /// The index of an allowed error.
-/// @throws std::logic_error where it is none of them.
+/// @throws std::logic_error for another error.
 std::size_t stepOf(const PrecisionRecall& counts, double threshold_m);
 
 }  // namespace efm::studies

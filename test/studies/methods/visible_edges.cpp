@@ -10,9 +10,9 @@ namespace efm::studies {
 namespace {
 
 constexpr int kEventsPerCamera = 3;
-constexpr double kSameDepth = 0.03;  ///< Share within which two depths are of one surface.
+constexpr double kSameDepth = 0.03;  ///< Max relative difference of depths of one surface.
 
-/// The pixel that shows a place.
+/// The pixel that shows a point.
 std::optional<cv::Point> pixelOf(const Eigen::Vector3d& p_ref, const ReferenceView& view,
                                  const cv::Mat1f& truth_m) {
   if (!(p_ref.z() > 0)) return std::nullopt;

@@ -8,9 +8,9 @@
 
 namespace efm::studies {
 
-/// Where a keyframe could have points: pixels of its view that show what fired in its window, at
-/// least once in each camera and on average three times. What was hidden from the view does not
-/// count.
+/// The pixels of a keyframe's view that could have points: their surface points fired in the
+/// window, at least once in each camera and three times on average. Points hidden from the view do
+/// not count.
 /// @param truth_m true z-depth of the view.
 cv::Mat1b visibleEdges(const Recording& recording, const KeyframeDepthMap& keyframe,
                        const cv::Mat1f& truth_m);

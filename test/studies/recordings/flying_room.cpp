@@ -24,7 +24,7 @@ Simulation flyingRoom(double duration_s) {
 Simulation withWidth(Simulation simulation, int width_px) {
   const int height_px = width_px * 3 / 4;
   CameraModel model = makePinhole(width_px, height_px, 0.625 * width_px);
-  // The image reaches from -0.5 to width - 0.5: the same field of view at every size.
+  // The image is from -0.5 to width - 0.5: the field of view is the same at every size.
   model.cx = 0.5 * (width_px - 1);
   model.cy = 0.5 * (height_px - 1);
   simulation.rig = makeStereoRig(model, 0.20);

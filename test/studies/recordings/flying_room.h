@@ -7,16 +7,15 @@
 
 namespace efm::studies {
 
-/// What the paper simulates with ESIM in its scene flying_room (Secs. 4.7 and 4.10), here in the
-/// room of the preset hd_stereo: two cameras without distortion, 0.20 m apart, 77 degrees wide and
-/// 4:3 at any resolution.
+/// The paper simulates its scene flying_room with ESIM (Secs. 4.7 and 4.10). Here it is the room of
+/// the preset hd_stereo: two cameras without distortion, 0.20 m apart, 77 degrees wide, 4:3.
 
 /// @param duration_s from t = 1 s.
 Simulation flyingRoom(double duration_s);
 
-/// The same with cameras of another resolution: same scene, way and field of view.
+/// The same scene, motion and field of view with cameras of another resolution.
 Simulation withWidth(Simulation simulation, int width_px);
-/// The same with another contrast threshold of both signs.
+/// The same with another contrast threshold of both polarities.
 Simulation withThreshold(Simulation simulation, double threshold);
 
 /// Alg. 1 and one camera over the depths of the room.

@@ -8,22 +8,22 @@
 
 namespace efm::studies {
 
-/// The folder of real calibrations and trajectories lacks a file.
+/// A file of the real calibrations and trajectories is missing.
 class MissingData : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// MVSEC's two DAVIS346 on the smoothed trajectory of indoor_flying1, from where it gets under way,
+/// MVSEC's two DAVIS346 on the smoothed trajectory of indoor_flying1, from its start of motion,
 /// through a furnished room.
-/// @throws MissingData naming the file that is not there.
+/// @throws MissingData naming the missing file.
 Simulation mvsecInRoom(const StudyRun& run, double duration_s);
 
-/// The recording of it that most studies share: 10 s, or a moment where the run is quick.
+/// Its recording for most studies: 10 s, or 0.2 s in a quick run.
 Recording roomRecording(const StudyRun& run);
 
 /// DSEC's two Prophesee Gen3 on the smoothed trajectory of zurich_city_04, through a street.
-/// @throws MissingData naming the file that is not there.
+/// @throws MissingData naming the missing file.
 Simulation dsecInStreet(const StudyRun& run, double duration_s);
 
 }  // namespace efm::studies

@@ -73,7 +73,7 @@ void addScene(const Simulation& simulation, Fingerprint& print) {
     print.add(rectangle.width_m);
     print.add(rectangle.height_m);
   }
-  // What is painted on them, as the first camera first sees it.
+  // The textures, in the first image of the first camera.
   const RigCamera& camera = simulation.rig.cameras.front();
   const FrameRenderer renderer(camera.model);
   const Rigid3 T_world_cam = simulation.motion->poseAt(simulation.start_ns) * camera.T_rig_cam;
@@ -82,7 +82,7 @@ void addScene(const Simulation& simulation, Fingerprint& print) {
   print.addImage(frame.log_intensity);
 }
 
-/// Numbers and arrays of plain values, one after the other.
+/// Reads numbers and arrays of plain values.
 class RecordingReader {
  public:
   explicit RecordingReader(const fs::path& file) : file_(file), stream_(file, std::ios::binary) {
@@ -109,7 +109,7 @@ class RecordingReader {
   std::ifstream stream_;
 };
 
-/// The file has its name once it is whole.
+/// The file gets its name when it is complete.
 class RecordingWriter {
  public:
   explicit RecordingWriter(const fs::path& file)
@@ -159,17 +159,16 @@ void write(const fs::path& file, const Recording& recording) {
   writer.finish();
 }
 
-std::vector<Eigen::Vector3f> placesOf(const std::vector<SurfacePoint>& sources,
+std::vector<Eigen::Vector3f> pointsOf(const std::vector<SurfacePoint>& sources,
                                       const Scene& scene) {
-  std::vector<Eigen::Vector3f> places;
-  places.reserve(sources.size());
-  const Eigen::Vector3f nowhere =
-      Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(sources.size());
+  const Eigen::Vector3f none = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   for (const SurfacePoint& source : sources) {
-    places.push_back(nowhere);
-    if (source.surface >= 0) places.back() = scene.pointAt(source).cast<float>();
+    points.push_back(none);
+    if (source.surface >= 0) points.back() = scene.pointAt(source).cast<float>();
   }
-  return places;
+  return points;
 }
 
 }  // namespace
@@ -209,10 +208,10 @@ double Recording::meanEventsIn(const std::vector<Window>& windows) const {
 }
 
 std::uint64_t fingerprintOf(const Simulation& simulation) {
-  constexpr std::int64_t kLookNs = 20'000'000;
+  constexpr std::int64_t kSampleNs = 20'000'000;
   Fingerprint print;
   for (const RigCamera& camera : simulation.rig.cameras) addCamera(camera, print);
-  for (std::int64_t t_ns = simulation.start_ns; t_ns < simulation.endNs(); t_ns += kLookNs) {
+  for (std::int64_t t_ns = simulation.start_ns; t_ns < simulation.endNs(); t_ns += kSampleNs) {
     print.addPose(simulation.motion->poseAt(t_ns));
   }
   addScene(simulation, print);
@@ -250,7 +249,7 @@ Recording RecordingCache::make(const std::string& name, const Simulation& simula
   std::cout << "  simulating " << name << std::flush;
   const auto began = std::chrono::steady_clock::now();
   for (CameraRecording& camera : simulateEvents(simulation)) {
-    recording.sources.push_back(placesOf(camera.sources, simulation.scene));
+    recording.sources.push_back(pointsOf(camera.sources, simulation.scene));
     recording.events.push_back(std::move(camera.events));
   }
   write(file, recording);

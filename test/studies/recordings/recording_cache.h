@@ -15,17 +15,16 @@
 
 namespace efm::studies {
 
-/// A simulation with its events and poses, to be mapped in several ways and held against its truth.
+/// A simulation with its events and poses. Several methods map it, and its truth judges them.
 struct Recording {
   Simulation simulation;
   std::vector<std::vector<Event>> events;  ///< Per camera, in time order.
-  /// For each event the place that its pixel saw, frame `world`, metres; NaN for noise.
+  /// For each event the point that its pixel saw, frame `world`, metres; NaN for noise.
   std::vector<std::vector<Eigen::Vector3f>> sources;
   Trajectory trajectory;  ///< The true poses, every millisecond.
 
-  /// `count` windows of equal duration spread evenly over the recording, the first at its start and
-  /// the last at its end, each with its reference view in the middle; they overlap where there is
-  /// no room.
+  /// `count` windows of equal duration, evenly spread from the start to the end of the recording.
+  /// They may overlap. The reference time is in the middle of a window.
   std::vector<Window> windows(double window_s, int count) const;
   /// A camera's events in a window.
   EventSpan eventsOf(std::size_t camera, const Window& window) const;
@@ -35,19 +34,19 @@ struct Recording {
   double meanEventsIn(const std::vector<Window>& windows) const;
 };
 
-/// Identifies what a simulation makes: cameras, motion, surfaces and what is painted on them,
-/// pixels, noise, seed and duration.
+/// A hash of the inputs of a simulation: cameras, motion, surfaces and their textures, pixels,
+/// noise, seed and duration.
 std::uint64_t fingerprintOf(const Simulation& simulation);
 
-/// Simulated events on disk, so that they are simulated once. A file is known by the fingerprint of
-/// its simulation: whatever a study changes of it makes another file. What a change of the
-/// simulator itself does is not seen: remove the folder then.
+/// Simulated events on disk: they are simulated once. The name of a file contains the fingerprint
+/// of its simulation, so a changed simulation gets another file. Remove the folder after a change
+/// of the simulator itself.
 class RecordingCache {
  public:
-  /// @param folder made where it is not there.
+  /// @param folder made if it does not exist.
   explicit RecordingCache(std::filesystem::path folder);
 
-  /// @param name what the file and the progress on the console are called.
+  /// @param name for the file and the progress on the console.
   /// @throws std::runtime_error naming the file that cannot be read or written.
   Recording make(const std::string& name, const Simulation& simulation) const;
 

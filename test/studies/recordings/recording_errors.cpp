@@ -14,9 +14,9 @@
 namespace efm::studies {
 namespace {
 
-Eigen::Vector3d sines(double turns, const Eigen::Vector3d& rates, double phase) {
+Eigen::Vector3d sines(double cycles, const Eigen::Vector3d& rates, double phase) {
   Eigen::Vector3d values;
-  for (int i = 0; i < 3; ++i) values[i] = std::sin(2 * kPi * turns * rates[i] + phase + i);
+  for (int i = 0; i < 3; ++i) values[i] = std::sin(2 * kPi * cycles * rates[i] + phase + i);
   return values;
 }
 
@@ -28,13 +28,13 @@ Recording withPoseSway(const Recording& recording, const PoseSway& sway) {
   Recording swayed = recording;
   swayed.trajectory = Trajectory();
   for (StampedPose pose : recording.trajectory.poses()) {
-    const double turns =
+    const double cycles =
         sway.frequency_hz * secondsBetween(recording.simulation.start_ns, pose.t_ns);
-    pose.T_world_rig.translation += sway.amplitude_m * sines(turns, {1, 1.3, 0.8}, 0);
-    const Eigen::Vector3d turn = sway.amplitude_rad * sines(turns, {0.9, 1.1, 1}, 0.5);
-    if (turn.norm() > 0) {
+    pose.T_world_rig.translation += sway.amplitude_m * sines(cycles, {1, 1.3, 0.8}, 0);
+    const Eigen::Vector3d rotation = sway.amplitude_rad * sines(cycles, {0.9, 1.1, 1}, 0.5);
+    if (rotation.norm() > 0) {
       pose.T_world_rig.rotation =
-          (pose.T_world_rig.rotation * Eigen::AngleAxisd(turn.norm(), turn.normalized()))
+          (pose.T_world_rig.rotation * Eigen::AngleAxisd(rotation.norm(), rotation.normalized()))
               .normalized();
     }
     swayed.trajectory.add(pose);
@@ -55,14 +55,14 @@ Recording withPoseErrors(const Recording& recording, const PoseErrors& errors) {
   for (std::int64_t t_ns = start_ns; t_ns <= end_ns; t_ns += errors.period_ns) {
     const Rigid3 T_world_rig = motion.poseAt(t_ns);
     const double elapsed_s = secondsBetween(start_ns, t_ns);
-    const Eigen::Quaterniond turned = rotationBy(errors.drift_rad_s * elapsed_s * every_axis);
-    drifted_m += turned * (T_world_rig.translation - true_m);
+    const Eigen::Quaterniond drift = rotationBy(errors.drift_rad_s * elapsed_s * every_axis);
+    drifted_m += drift * (T_world_rig.translation - true_m);
     true_m = T_world_rig.translation;
     StampedPose pose{t_ns + errors.late_ns, {}};
     pose.T_world_rig.translation = drifted_m + errors.drift_m_s * elapsed_s * every_axis +
                                    errors.noise_m * normalVector(random);
     pose.T_world_rig.rotation =
-        (turned * T_world_rig.rotation * rotationBy(errors.noise_rad * normalVector(random)))
+        (drift * T_world_rig.rotation * rotationBy(errors.noise_rad * normalVector(random)))
             .normalized();
     wrong.trajectory.add(pose);
   }
@@ -75,12 +75,12 @@ Recording withLateCamera(const Recording& recording, std::size_t camera, std::in
   return wrong;
 }
 
-Recording withTurnedCamera(const Recording& recording, std::size_t camera, double turn_rad) {
-  Recording turned = recording;
-  Rigid3& T_rig_cam = turned.simulation.rig.cameras.at(camera).T_rig_cam;
+Recording withRotatedCamera(const Recording& recording, std::size_t camera, double angle_rad) {
+  Recording wrong = recording;
+  Rigid3& T_rig_cam = wrong.simulation.rig.cameras.at(camera).T_rig_cam;
   T_rig_cam.rotation =
-      (T_rig_cam.rotation * Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitY())).normalized();
-  return turned;
+      (T_rig_cam.rotation * Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitY())).normalized();
+  return wrong;
 }
 
 Recording withNoise(const Recording& recording, const EventNoiseOptions& noise) {

@@ -10,7 +10,7 @@
 
 namespace efm::studies {
 
-/// How far a tracker's poses sway around the true ones: on each axis a sine of its own phase and
+/// Sway of a tracker's poses around the true poses: on each axis a sine with its own phase and
 /// about the same frequency.
 struct PoseSway {
   double amplitude_m = 0;
@@ -18,39 +18,39 @@ struct PoseSway {
   double frequency_hz = 1;
 };
 
-/// What an indoor tracker may err by: 1 cm and 0.1 degrees.
+/// A possible error of an indoor tracker: 1 cm and 0.1 degrees.
 inline constexpr PoseSway kTrackerSway{0.01, 0.1 * kRadiansPerDegree, 1};
 
-/// The recording as a tracker with such errors would have it; the truth stays where it was.
+/// The recording with swaying poses. The truth does not change.
 Recording withPoseSway(const Recording& recording, const PoseSway& sway);
 
-/// What may be wrong with a tracker's poses. The truth stays where it was.
+/// Errors of a tracker's poses. The truth does not change.
 struct PoseErrors {
-  /// The tracker's rate; between its poses the mapper interpolates.
+  /// Period of the poses. The mapper interpolates between them.
   std::int64_t period_ns = 10'000'000;
-  /// Of every pose on its own: standard deviation on each axis.
+  /// Independent noise of every pose: standard deviation on each axis.
   double noise_m = 0;
   double noise_rad = 0;
-  /// As odometry drifts: it adds up what it saw of the way along a heading that turns away at a
-  /// constant rate about each axis of the world, and runs away at a constant speed along each.
+  /// Drift of odometry: the heading rotates at a constant rate about each axis of the world, and
+  /// the position moves at a constant speed along each axis.
   double drift_m_s = 0;
   double drift_rad_s = 0;
-  /// The poses' stamps are so much late.
+  /// Delay of the poses' stamps.
   std::int64_t late_ns = 0;
   std::uint64_t seed = 1;
 };
 
-/// The recording as such a tracker would have it.
+/// The recording with pose errors.
 Recording withPoseErrors(const Recording& recording, const PoseErrors& errors);
 
-/// The recording with the stamps of one camera's events late.
+/// The recording with delayed stamps of one camera's events.
 Recording withLateCamera(const Recording& recording, std::size_t camera, std::int64_t late_ns);
 
-/// The recording with a calibration that has one camera turned about its vertical axis.
-Recording withTurnedCamera(const Recording& recording, std::size_t camera, double turn_rad);
+/// The recording with a calibration error: one camera is rotated about its vertical axis.
+Recording withRotatedCamera(const Recording& recording, std::size_t camera, double angle_rad);
 
-/// The recording with noise among its events: what the simulator would have made of the same
-/// simulation with this noise, because noise leaves the pixels' memory alone.
+/// The recording with noise events. The simulator would make the same events with this noise,
+/// because noise does not change the pixels' memory.
 Recording withNoise(const Recording& recording, const EventNoiseOptions& noise);
 
 }  // namespace efm::studies

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPeriodS = 20;
 
-/// Not in step with the loop: the second time the rig comes by, it comes by elsewhere.
+/// Its periods do not fit the loop: the second loop has other positions than the first.
 std::shared_ptr<const Motion> sway(std::int64_t start_ns) {
   SmoothMotionOptions options;
   options.start_ns = start_ns;
@@ -29,7 +29,7 @@ std::shared_ptr<const Motion> sway(std::int64_t start_ns) {
 
 }  // namespace
 
-Simulation roundTheRoom(double duration_s) {
+Simulation roomLoop(double duration_s) {
   Simulation simulation = makeRoomStereo(1);
   LoopMotionOptions loop;
   loop.start_ns = simulation.start_ns;

@@ -5,8 +5,8 @@
 
 namespace efm::studies {
 
-/// The rig of the preset room_stereo on a longer way around the same room: an ellipse of 3.6 x 2.2
-/// m in 20 s, by hand. What lasts longer than that sees its first places again.
-Simulation roundTheRoom(double duration_s);
+/// The rig of the preset room_stereo on a longer loop in the same room: a hand-held ellipse of 3.6
+/// x 2.2 m in 20 s. After 20 s it returns to its first positions.
+Simulation roomLoop(double duration_s);
 
 }  // namespace efm::studies

@@ -7,14 +7,14 @@
 
 namespace efm::studies {
 
-/// What every study is given.
+/// The input of every study.
 struct StudyRun {
-  bool quick = false;              ///< Tiny: shows that everything runs, its numbers mean nothing.
+  bool quick = false;              ///< Tiny: tests that the study runs. Its numbers mean nothing.
   std::filesystem::path data;      ///< Real calibrations and trajectories.
-  std::filesystem::path pictures;  ///< Where pictures go.
+  std::filesystem::path pictures;  ///< Folder of the pictures.
   RecordingCache* recordings = nullptr;
 
-  /// The one of two settings that this run wants.
+  /// The setting for this run.
   template <typename Value>
   Value pick(Value in_full, Value in_quick) const {
     return quick ? in_quick : in_full;

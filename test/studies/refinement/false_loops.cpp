@@ -13,9 +13,9 @@
 namespace efm::studies {
 namespace {
 
-constexpr double kShare = 0.3;
-constexpr double kAnotherPlace = 0.05;
-constexpr double kSamePlace = 0.3;
+constexpr double kProbability = 0.3;
+constexpr double kMaxOverlapOfOther = 0.05;
+constexpr double kMinOverlapOfSame = 0.3;
 constexpr double kWrongM = 0.3;
 constexpr double kWrongRad = 15 * kRadiansPerDegree;
 
@@ -23,7 +23,7 @@ Rigid3 errorOf(RandomNumbers& random, double length_m, double angle_rad) {
   return {rotationBy(angle_rad * randomDirection(random)), length_m * randomDirection(random)};
 }
 
-/// Makes up loops that are none.
+/// Makes false loops.
 class LoopForger {
  public:
   LoopForger(const std::vector<KeyframeDepthMap>& keyframes, const std::vector<Rigid3>& T_world_ref,
@@ -34,9 +34,9 @@ class LoopForger {
     }
   }
 
-  /// For this keyframe and an older one; often nothing.
+  /// A false loop of this keyframe and an older one; often none.
   std::optional<LoopCandidate> next(std::size_t newer) {
-    if (newer == 0 || random_.uniform() >= kShare) return std::nullopt;
+    if (newer == 0 || random_.uniform() >= kProbability) return std::nullopt;
     const bool another_place = next_is_another_place_;
     next_is_another_place_ = !next_is_another_place_;
     if (auto loop = forge(newer, another_place)) return loop;
@@ -49,15 +49,16 @@ class LoopForger {
     for (std::size_t older = 0; older < newer; ++older) {
       const double overlap = viewOverlap(clouds_[newer], clouds_[older],
                                          T_world_ref_[older].inverse() * T_world_ref_[newer]);
-      if (another_place ? overlap < kAnotherPlace : overlap >= kSamePlace) fitting.push_back(older);
+      if (another_place ? overlap < kMaxOverlapOfOther : overlap >= kMinOverlapOfSame)
+        fitting.push_back(older);
     }
     if (fitting.empty()) return std::nullopt;
     const std::size_t older =
         fitting[static_cast<std::size_t>(random_.below(static_cast<int>(fitting.size())))];
-    return LoopCandidate{older, newer, another_place ? claimBeside() : claimWrong(older, newer)};
+    return LoopCandidate{older, newer, another_place ? claimNearby() : claimWrong(older, newer)};
   }
 
-  Rigid3 claimBeside() {
+  Rigid3 claimNearby() {
     return errorOf(random_, random_.uniform(0, kWrongM), random_.uniform(0, kWrongRad));
   }
 

@@ -13,7 +13,7 @@ namespace efm::studies {
 MapTruth::MapTruth(const Simulation& simulation)
     : simulation_(simulation), walls_(wallsOf(simulation.scene)) {}
 
-/// The reference view is the first camera's, without an offset: as the default options have it.
+/// The reference view is the first camera's, without an offset, as in the default options.
 Rigid3 MapTruth::T_world_ref(const KeyframeDepthMap& keyframe) const {
   return simulation_.motion->poseAt(keyframe.window.t_ref_ns) *
          simulation_.rig.cameras.front().T_rig_cam;

@@ -13,27 +13,28 @@
 
 namespace efm::studies {
 
-/// What keyframes' poses, and the map that they make, err by. All but the end-to-end error once the
-/// estimate is laid over the truth by the rigid motion of least squares over all positions.
+/// Errors of the poses of keyframes and of their map. Before all but the end-to-end errors are
+/// computed, the estimate is aligned with the truth: a rigid motion, least squares of the
+/// positions.
 struct MapErrors {
   double trajectory_m = 0;  ///< Root mean square.
   double trajectory_rad = 0;
   double map_m = 0;   ///< Median distance of the map's points to the nearest surface.
-  double rays_m = 0;  ///< Median distance of keyframes' points to where their own rays truly end.
-  /// Of the motion from the first keyframe to the last, without alignment.
+  double rays_m = 0;  ///< Median distance of a keyframe's points to the true ends of their rays.
+  /// Of the relative pose of the first and the last keyframe, without alignment.
   double end_to_end_m = 0;
   double end_to_end_rad = 0;
   double thickness_m = 0;  ///< Of the walls.
 };
 
-/// The exact truth of a simulation, for maps of it.
+/// The exact truth of a simulation, for its maps.
 class MapTruth {
  public:
   explicit MapTruth(const Simulation& simulation);
 
-  /// @param keyframes their depth maps; their poses do not matter.
-  /// @param T_map_ref where they stand by the estimate.
-  /// @param points of the map that was made with these poses.
+  /// @param keyframes their depth maps count, their poses do not.
+  /// @param T_map_ref estimated poses of the keyframes.
+  /// @param points of the map with these poses.
   /// @throws std::invalid_argument where there are fewer than three keyframes.
   MapErrors errorsOf(const std::vector<KeyframeDepthMap>& keyframes,
                      const std::vector<Rigid3>& T_map_ref, const std::vector<CloudPoint>& points);

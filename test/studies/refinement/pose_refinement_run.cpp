@@ -22,7 +22,7 @@ namespace {
 constexpr std::int64_t kPacketNs = 50'000'000;
 constexpr std::int64_t kPosePeriodNs = 5'000'000;
 
-/// Windows begin at the first event that has a pose: poses begin with the recording.
+/// Windows begin at the first event with a pose. Poses begin with the recording.
 std::int64_t firstEventNs(const Recording& recording) {
   std::int64_t first_ns = recording.simulation.endNs();
   for (const std::vector<Event>& events : recording.events) {
@@ -31,7 +31,7 @@ std::int64_t firstEventNs(const Recording& recording) {
   return first_ns;
 }
 
-/// Moves what the session has made to the run, at the tracker's poses.
+/// Moves the finished keyframes to the run, with the tracker's poses.
 void takeDue(MappingSession& session, PoseRefinementRun& run) {
   while (std::optional<KeyframeDepthMap> keyframe = session.next()) {
     keyframe->T_world_ref = session.T_odom_ref().back();

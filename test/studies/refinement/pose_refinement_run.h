@@ -15,18 +15,18 @@
 
 namespace efm::studies {
 
-/// A recording mapped with a tracker that errs, its poses refined.
+/// A recording mapped with tracker errors and with refined poses.
 struct PoseRefinementRun {
-  std::vector<KeyframeDepthMap> keyframes;  ///< Where the tracker put them.
+  std::vector<KeyframeDepthMap> keyframes;  ///< With the tracker's poses.
   std::vector<Rigid3> T_odom_ref;
-  std::vector<Rigid3> T_world_ref;      ///< Refined, once nothing more came.
-  std::vector<CloudPoint> refined_map;  ///< As the session exports it.
+  std::vector<Rigid3> T_world_ref;      ///< Refined, at the end.
+  std::vector<CloudPoint> refined_map;  ///< Exported by the session.
   RefinementCounts counts;
 };
 
-/// Plays the recording into a MappingSession as it would come in: events in packets of 50 ms, and
-/// the true poses at 200 Hz with the faults. Noise per keyframe begins where the first window does.
-/// @throws std::logic_error where the session's windows begin elsewhere.
+/// Plays the recording into a MappingSession: events in packets of 50 ms, and the true poses at 200
+/// Hz with the faults. Noise per keyframe begins at the first window.
+/// @throws std::logic_error where the session's windows begin at another time.
 PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOptions& options,
                              TrackerFaults faults);
 
@@ -35,18 +35,18 @@ std::vector<CloudPoint> mapAt(const std::vector<KeyframeDepthMap>& keyframes,
                               const std::vector<Rigid3>& T_world_ref,
                               const GlobalCloudOptions& options);
 
-/// What a refiner made of keyframes.
+/// The result of refining keyframes.
 struct RefinerRun {
-  std::vector<Rigid3> T_world_ref;  ///< Once nothing more came.
-  /// Of each keyframe: its points chosen, added, loops looked for; real time, and that of the
-  /// processor, which others that use the machine do not add to.
+  std::vector<Rigid3> T_world_ref;  ///< At the end.
+  /// Time of each keyframe: choice of points, registration and search for loops. Real time, and
+  /// time of the processor, which does not depend on other load of the machine.
   std::vector<double> seconds;
   std::vector<double> processor_seconds;
   RefinementCounts counts;
 };
 
-/// Refines the keyframes once more, alone.
-/// @param after called with each keyframe's number once it is added; may propose loops.
+/// Refines the keyframes again without a session.
+/// @param after called with the number of each added keyframe. It may propose loops.
 RefinerRun refineKeyframes(
     const std::vector<KeyframeDepthMap>& keyframes, const RefinementOptions& options,
     const std::function<void(KeyframeRefiner&, std::size_t)>& after = nullptr);

@@ -38,10 +38,10 @@ TrackerFaults driftOf(double share, double deg_per_m, std::uint64_t seed) {
   faults.perturbation.seed = seed;
   return faults;
 }
-/// Of what is not asked of five.
+/// Seeds of the smaller experiments.
 constexpr std::uint64_t kFewSeeds = 2;
 
-/// Everything that is done with one recording. Several of them may be mapped at the same time.
+/// All experiments with one recording. Several recordings may be mapped in parallel.
 class RefinementCaseRun {
  public:
   RefinementCaseRun(const StudyRun& run, const RefinementCase& what)
@@ -62,8 +62,7 @@ class RefinementCaseRun {
     }
   }
 
-  /// How long refining the noisy keyframes takes, one after the other; of those that have a full
-  /// window before them.
+  /// Measures the time to refine the noisy keyframes. Keyframes without a full window are excluded.
   void time() {
     const RefinementOptions& options = options_.refinement.refiner;
     for (const PoseRefinementRun& run : noisy_) {
@@ -116,7 +115,7 @@ class RefinementCaseRun {
     noisy_.push_back(std::move(run));
   }
 
-  /// Refined by somebody who takes the tracker's noise for so many times what it is.
+  /// Refined with options that scale the tracker's noise by a factor.
   MapErrors errorsExpecting(double times, const PoseRefinementRun& run) {
     RefinementOptions wrong = options_.refinement.refiner;
     wrong.tracker.noise_m *= times;
@@ -163,7 +162,7 @@ std::vector<RefinementCase> casesOf(const StudyRun& run) {
     return makeSimulation(options);
   };
   return {{"room_stereo", "room_stereo", room, 0.9, 7, 0.3},
-          {"loop", "room_loop", [] { return roundTheRoom(24); }, 0.9, 7, 0.6, true},
+          {"loop", "room_loop", [] { return roomLoop(24); }, 0.9, 7, 0.6, true},
           {"MVSEC", "mvsec_room_20s", [&run] { return mvsecInRoom(run, 20); }, 1, 6.5, 1}};
 }
 void mapAll(const StudyRun& run, RefinementStudyResults& all) {

@@ -16,47 +16,47 @@
 
 namespace efm::studies {
 
-/// A recording and how it is mapped.
+/// A recording and its mapping options.
 struct RefinementCase {
   std::string name;
-  std::string file;  ///< In the cache.
+  std::string file;  ///< Name in the cache.
   std::function<Simulation()> simulation;
   double min_depth_m;
   double max_depth_m;
   double window_s;
-  bool is_loop = false;  ///< Comes back to its first places after long.
+  bool is_loop = false;  ///< Returns to its first positions at the end.
 };
 
-/// The same keyframes at the tracker's poses and at refined ones.
+/// The errors of the same keyframes at the tracker's poses and at refined poses.
 struct RefinementOutcome {
   MapErrors without;
   MapErrors with;
 };
 
-/// A map and its trajectory, to be drawn.
+/// Maps and trajectories for the pictures.
 struct RefinementDrawing {
   std::vector<CloudPoint> tracker_map, refined_map;
   std::vector<Rigid3> T_world_true, T_odom_ref, T_world_ref;
 };
 
-/// Of one recording, by seed.
+/// The results of a recording, by seed.
 struct RefinementResults {
   std::vector<RefinementOutcome> noise, drift, exact, small_noise, noise_feared, noise_denied;
   std::vector<FalseLoops> false_loops;
   std::vector<double> seconds, processor_seconds;  ///< Of keyframes with a full window.
   std::size_t keyframes = 0;
   std::vector<RefinementCounts> loops;  ///< With drift.
-  RefinementDrawing drawing;            ///< Of the first seed's drift, where it is the loop.
+  RefinementDrawing drawing;            ///< Of the loop with drift, seed 1.
 };
 
 using RefinementStudyResults = std::vector<std::pair<RefinementCase, RefinementResults>>;
 
-/// The recordings of the study; of a quick run one.
+/// The recordings of the study; one in a quick run.
 std::vector<RefinementCase> casesOf(const StudyRun& run);
 
-/// Maps all recordings with trackers that err, side by side; then each is timed, with nothing
-/// beside it.
-/// @param all the results are put in.
+/// Maps all recordings with tracker errors, in parallel. Then measures the time of each, one after
+/// the other.
+/// @param all gets the results.
 void mapAll(const StudyRun& run, RefinementStudyResults& all);
 
 }  // namespace efm::studies

@@ -12,7 +12,7 @@
 namespace efm::studies {
 namespace {
 
-Curve wayOf(const std::string& label, const std::vector<Rigid3>& T_world_ref) {
+Curve pathOf(const std::string& label, const std::vector<Rigid3>& T_world_ref) {
   Curve curve{label, {}, CurveStyle::kMarkedLine, {}};
   for (const Rigid3& pose : T_world_ref) {
     curve.points.emplace_back(pose.translation.x(), pose.translation.y());
@@ -20,8 +20,8 @@ Curve wayOf(const std::string& label, const std::vector<Rigid3>& T_world_ref) {
   return curve;
 }
 
-/// The maps at the tracker's poses and at refined ones: whole, and the corner that is seen at the
-/// beginning and at the end.
+/// The maps at the tracker's poses and at refined poses: the whole map, and the corner that is seen
+/// at the beginning and at the end.
 cv::Mat3b drawMaps(const RefinementDrawing& drawing, const std::vector<Wall>& walls) {
   constexpr int kWidthPx = 620;
   TopView all = viewOfAll(walls, 0.01);
@@ -40,19 +40,19 @@ cv::Mat3b drawMaps(const RefinementDrawing& drawing, const std::vector<Wall>& wa
   return drawGrid(grid);
 }
 
-cv::Mat3b drawWays(const RefinementDrawing& drawing) {
+cv::Mat3b drawPaths(const RefinementDrawing& drawing) {
   CurvePlot plot;
   plot.title = "keyframes from above";
   plot.size = {700, 480};
   plot.equal_units = true;
   plot.x.label = "x [m]";
   plot.y.label = "y [m]";
-  plot.curves = {wayOf("true", drawing.T_world_true), wayOf("tracker", drawing.T_odom_ref),
-                 wayOf("refined", drawing.T_world_ref)};
+  plot.curves = {pathOf("true", drawing.T_world_true), pathOf("tracker", drawing.T_odom_ref),
+                 pathOf("refined", drawing.T_world_ref)};
   return drawCurves(plot);
 }
 
-/// How far from the truth each keyframe stands.
+/// The distance of each keyframe from the truth.
 cv::Mat3b drawDrift(const RefinementDrawing& drawing) {
   CurvePlot plot;
   plot.title = "distance from the truth";
@@ -81,7 +81,7 @@ void drawRefinement(const RefinementCase& what, const RefinementDrawing& drawing
   section.picture("refinement_map.png", drawMaps(drawing, wallsOf(what.simulation().scene)),
                   "The loop's map from above, with drift (seed 1), where the first poses coincide; "
                   "blue low, red high; grey lines: the true walls");
-  section.picture("refinement_trajectory.png", sideBySide({drawWays(drawing), drawDrift(drawing)}),
+  section.picture("refinement_trajectory.png", sideBySide({drawPaths(drawing), drawDrift(drawing)}),
                   "The same keyframes: where they stand, and how far from where they should");
 }
 }  // namespace efm::studies

@@ -6,7 +6,8 @@
 
 namespace efm::studies {
 
-/// The map from above at the tracker's poses and at refined ones, and where its keyframes stand.
+/// Draws the map from above at the tracker's poses and at refined poses, and the positions of the
+/// keyframes.
 void drawRefinement(const RefinementCase& what, const RefinementDrawing& drawing,
                     StudySection& section);
 

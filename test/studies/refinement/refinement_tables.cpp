@@ -8,7 +8,8 @@
 namespace efm::studies {
 namespace {
 
-const std::vector<Figure> kFigures = {kTrajectory, kTurns, kMap, kRays, kEnd, kEndTurn, kWalls};
+const std::vector<Figure> kFigures = {kTrajectory, kRotation,    kMap,  kRays,
+                                      kEnd,        kEndRotation, kWalls};
 std::vector<std::string> tableHead(const std::string& second) {
   std::vector<std::string> head = {"recording", second};
   for (const Figure& figure : kFigures) head.push_back(figure.head);
@@ -106,8 +107,8 @@ void timeTable(const RefinementStudyResults& all, StudySection& section) {
   for (const auto& [what, results] : all) {
     std::vector<std::string> row = {what.name, std::to_string(results.seconds.size())};
     for (const auto* seconds : {&results.seconds, &results.processor_seconds}) {
-      for (const double share : {0.5, 0.9, 1.0}) {
-        row.push_back(formatNumber(1e3 * quantileOf(*seconds, share), 1));
+      for (const double quantile : {0.5, 0.9, 1.0}) {
+        row.push_back(formatNumber(1e3 * quantileOf(*seconds, quantile), 1));
       }
     }
     table.rows.push_back(row);

@@ -9,8 +9,8 @@
 namespace efm::studies {
 namespace {
 
-constexpr double kBeforeM = 0.01;  // how far the scene may stand out behind a wall
-constexpr double kReachM = 0.3;
+constexpr double kMaxBehindM = 0.01;  // of surfaces behind a wall
+constexpr double kMaxDistanceM = 0.3;
 constexpr double kBorderM = 0.3;
 
 std::vector<Eigen::Vector3d> cornersOf(const Rectangle& rectangle) {
@@ -23,10 +23,10 @@ double heightAbove(const Rectangle& plane, const Eigen::Vector3d& p_world) {
   return plane.normal().dot(p_world - plane.corner);
 }
 
-bool isBeforeAll(const Rectangle& plane, const Scene& scene) {
+bool isBehindAll(const Rectangle& plane, const Scene& scene) {
   for (int surface = 0; surface < scene.size(); ++surface) {
     for (const Eigen::Vector3d& corner : cornersOf(scene.rectangle(surface))) {
-      if (heightAbove(plane, corner) < -kBeforeM) return false;
+      if (heightAbove(plane, corner) < -kMaxBehindM) return false;
     }
   }
   return true;
@@ -38,7 +38,7 @@ bool isSamePlane(const Rectangle& a, const Rectangle& b) {
   return a.normal().dot(b.normal()) > kSameDirection && std::abs(heightAbove(a, b.corner)) < kSameM;
 }
 
-/// Makes the rectangle reach around another one in its plane.
+/// Extends the rectangle around another one in its plane.
 void extend(Rectangle& whole, const Rectangle& panel) {
   double u0 = 0, u1 = whole.width_m, v0 = 0, v1 = whole.height_m;
   for (const Eigen::Vector3d& corner : cornersOf(panel)) {
@@ -73,7 +73,7 @@ std::vector<Wall> wallsOf(const Scene& scene) {
     if (same != walls.end()) {
       extend(same->whole, rectangle);
       same->surfaces.push_back(surface);
-    } else if (isBeforeAll(rectangle, scene)) {
+    } else if (isBehindAll(rectangle, scene)) {
       walls.push_back({rectangle, {surface}});
     }
   }
@@ -83,7 +83,7 @@ std::vector<Wall> wallsOf(const Scene& scene) {
 WallThickness thicknessOf(const Wall& wall, const std::vector<NearPoint>& points) {
   std::vector<double> heights_m;
   for (const NearPoint& point : points) {
-    if (point.nearest.distance_m > kReachM || !isInside(wall.whole, point.p_world)) continue;
+    if (point.nearest.distance_m > kMaxDistanceM || !isInside(wall.whole, point.p_world)) continue;
     if (std::find(wall.surfaces.begin(), wall.surfaces.end(), point.nearest.surface) !=
         wall.surfaces.end()) {
       heights_m.push_back(heightAbove(wall.whole, point.p_world));

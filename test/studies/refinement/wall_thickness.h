@@ -12,31 +12,32 @@ namespace efm::studies {
 
 /// A wall, the floor or the ceiling of a room.
 struct Wall {
-  Rectangle whole;            ///< Around all of its panels; normal into the room.
-  std::vector<int> surfaces;  ///< The scene's, of its plane.
+  Rectangle whole;            ///< Around all panels. The normal points into the room.
+  std::vector<int> surfaces;  ///< The surfaces of the scene in its plane.
 };
 
-/// The planes that the scene lies before, to within 1 cm: those around a room, not the faces of
-/// what stands in it, which have the room's walls behind them.
+/// The planes of the scene with no surface behind them, within 1 cm: the walls of a room. Faces of
+/// furniture have a wall behind them.
 std::vector<Wall> wallsOf(const Scene& scene);
 
-/// A point of a map and the surface that it is nearest to.
+/// A point of a map and its nearest surface.
 struct NearPoint {
   Eigen::Vector3d p_world;
   NearestSurface nearest;
 };
 
-/// How widely the points that belong to a wall are spread across it.
+/// The spread of the points of a wall across it.
 struct WallThickness {
-  double thickness_m = 0;  ///< Half of what lies between the 16th and 84th percentile; 0 of none.
+  double thickness_m =
+      0;  ///< Half of the distance between the 16th and 84th percentile; 0 without points.
   std::size_t points = 0;
 };
 
-/// Of the points that are nearest to the wall, at most 0.3 m from it and at least as far inside its
-/// borders: as a standard deviation, but for what is far off. A wall that stands twice is thick.
+/// The thickness by the points that are nearest to the wall, at most 0.3 m from it and at least 0.3
+/// m inside its borders: a robust standard deviation. A doubled wall is thick.
 WallThickness thicknessOf(const Wall& wall, const std::vector<NearPoint>& points);
 
-/// Mean of all walls, weighted by their points.
+/// Mean of all walls, weighted by points.
 WallThickness meanThickness(const std::vector<Wall>& walls, const std::vector<NearPoint>& points);
 
 }  // namespace efm::studies

@@ -14,23 +14,23 @@ struct TextTable {
   std::vector<std::vector<std::string>> rows;  ///< As long as the head.
 };
 
-/// What a study says: Markdown, collected part by part, and pictures, written at once.
+/// The text of a study in Markdown. Pictures are written at once.
 class StudySection {
  public:
-  /// @param pictures the folder of pictures; they are linked as `studies/<file>`.
+  /// @param pictures folder of the pictures. Links are `studies/<file>`.
   StudySection(std::string title, std::filesystem::path pictures);
 
   /// Paragraphs; lines are wrapped.
   void text(const std::string& paragraph);
   void item(const std::string& text);
   void heading(const std::string& text);
-  /// @throws std::logic_error where a row is not as long as the head.
+  /// @throws std::logic_error where a row and the head have different lengths.
   void table(const TextTable& table);
   /// @param file name without a folder, ending in .png.
   /// @throws std::runtime_error naming the file that cannot be written.
   void picture(const std::string& file, const cv::Mat& picture, const std::string& caption);
-  /// One of the paper's trends and whether the numbers show it.
-  /// @param departure why, said only where they do not.
+  /// A trend of the paper, and whether the numbers agree.
+  /// @param departure the reason, printed only where they do not agree.
   void trend(const std::string& claim, bool agrees, const std::string& figures,
              const std::string& departure = "");
 
@@ -47,7 +47,7 @@ class StudySection {
   bool in_list_ = false;
 };
 
-/// A number with so many decimals.
+/// A number with fixed decimals.
 std::string formatNumber(double value, int decimals);
 
 }  // namespace efm::studies
