@@ -146,9 +146,9 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
                 judge.own(kDilated).points >= 3 * judge.own(kAlg1).points,
                 formatNumber(thousandPoints(judge.own(kDilated)), 1) + " from " +
                     formatNumber(thousandPoints(judge.own(kAlg1)), 1) + " thousand");
-  judge.atMost("at little cost: at most 1.1 times the mean error (paper: 1.03)", kDilated, kAlg1,
-               1.1,
-               "Errors are smaller here than in the paper, and what MF adds is not; see below.");
+  judge.atMost(
+      "at little cost: at most 1.1 times the mean error (paper: 1.03)", kDilated, kAlg1, 1.1,
+      "Errors are smaller here than in the paper, but the errors that MF adds are not; see below.");
   judge.atMost(
       "A_c∘A_t is nearly as good as Alg. 1 with so much data: at most 1.1 times its mean "
       "error (paper: 1.02)",
@@ -158,8 +158,8 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
     judge.moreBadPixels(
         std::string("harmonic across time makes more bad pixels than A_t∘H_c: ") + method, method,
         kAtHc,
-        "With exact poses it removes outliers and harms nothing; with poses that "
-        "sway it does harm; see below.");
+        "With exact poses it removes outliers and does no harm. With swaying poses it does harm; "
+        "see below.");
   }
   for (const char* method : {kHcHt, kHtAc, kAcHt}) {
     judge.atMost(
@@ -176,10 +176,8 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
   judge.atMost("shuffling costs little: at most 1.2 times the mean error of A_t∘H_c (paper: 1.08)",
                kShuffled, kAtHc, 1.2);
   judge.atMost("but it costs something", kAtHc, kShuffled, 1);
-  judge.atMost(
-      "late fusion is worse than fusing DSIs (the paper says so in Sec. 3.3.1, without "
-      "figures)",
-      kAlg1, kLate, 1);
+  judge.atMost("late fusion is worse than the fusion of DSIs (paper: Sec. 3.3.1, without figures)",
+               kAlg1, kLate, 1);
 }
 
 void addPictures(const std::vector<MethodResult>& results, const Recording& recording,
@@ -257,12 +255,12 @@ void countPoints(const Recording& recording, const std::vector<Window>& windows,
                           formatNumber(meanCm(one), 1), formatNumber(meanCm(two), 1)});
   }
   section.text(
-      "How many points one camera keeps and how many Alg. 1 (the paper: 1.27 and 0.81 "
-      "million, a ratio of 1.57; on flying1 1.26):");
+      "Numbers of points of one camera and of Alg. 1 (paper: 1.27 and 0.81 million, a ratio of "
+      "1.57; on flying1 1.26):");
   section.table(table);
   section.trend(
-      "with errors of all kinds together, one camera keeps more, compared with Alg. 1, "
-      "than with exact data",
+      "with all kinds of errors together, the ratio of one camera to Alg. 1 is higher than with "
+      "exact data",
       last > exact, against(last, exact, 2) + " times as many");
 }
 
@@ -271,9 +269,9 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
                  const std::vector<MethodResult>& clean, StudySection& section) {
   section.heading("What makes the difference");
   section.text(
-      "Poses, calibration and events are exact here, and are not in the paper. The same "
-      "windows of 1 s with poses that sway around the true ones, on each axis by a sine "
-      "of 1 cm and 0.1 degrees at about 1 Hz:");
+      "Poses, calibration and events are exact here. In the paper they are not. The next table has "
+      "the same windows of 1 s with swaying poses: on each axis a sine of 1 cm and 0.1 degrees at "
+      "about 1 Hz around the true poses:");
   std::vector<Method> some;
   for (const Method& method : algorithms()) {
     if (method.name != kDilated && method.name != kLate) some.push_back(method);
@@ -281,7 +279,7 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
   const auto swayed = compareMethods(withPoseSway(recording, kTrackerSway), windows, some);
   section.table(errorTable(swayed));
   Judge with_sway(swayed, section);
-  with_sway.moreBadPixels("with poses that sway, H_c∘H_t makes more bad pixels than A_t∘H_c", kHcHt,
+  with_sway.moreBadPixels("with swaying poses, H_c∘H_t makes more bad pixels than A_t∘H_c", kHcHt,
                           kAtHc);
   with_sway.moreBadPixels("so does A_c∘H_t", kAcHt, kAtHc);
   with_sway.moreBadPixels("and shuffling", kShuffled, kAtHc);
@@ -290,10 +288,10 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
 
   countPoints(recording, windows, section);
   section.item(
-      "MF: if every point of Alg. 1 had its true depth, what MF copies from it would still "
-      "be off by " +
+      "MF: even if every point of Alg. 1 had its true depth, the points that MF copies would have "
+      "an error of " +
       formatNumber(meanCmOfTrueCopies(recording, resultOf(clean, kAlg1)), 2) +
-      " cm on average: it puts the edge of a thing two pixels into what lies behind.");
+      " cm on average: MF extends the edge of an object two pixels into the background.");
 }
 
 }  // namespace
@@ -301,17 +299,17 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
 void studyAlgorithms(const StudyRun& run, StudySection& section) {
   const Recording recording = roomRecording(run);
   section.text(
-      "The paper (Table 3) compares one camera with every order of fusing two across cameras and "
-      "time, two sub-intervals, in windows of 1 s of MVSEC's three indoor flights, and with "
-      "others' methods. Its figures, cited, on real events; ESVO, SGM and GTS are not made again "
-      "here:");
+      "The paper (Table 3) compares one camera, every order of fusion of two cameras across "
+      "cameras and time with two sub-intervals, and methods of others. It uses windows of 1 s of "
+      "MVSEC's three indoor flights. The table cites its figures on real events. ESVO, SGM and GTS "
+      "are not repeated here:");
   section.table(published());
   section.text(
       "Here: the recording of study 1, planes from 1 to 6.5 m. S_2∘S_1 applies S_1 first. H_c∘A_t "
-      "sums a camera's events over time: it is Alg. 1. MF grows the mask by its four neighbours. "
-      "Shuffling gives each camera's first half to the other's second. Late fusion maps each "
-      "camera alone in the same view and puts the two depth maps together, where both have a "
-      "depth the more confident one's.");
+      "sums a camera's events over time: it is Alg. 1. MF dilates the mask by four neighbours. "
+      "Shuffling fuses the first half of one camera with the second half of the other. Late fusion "
+      "maps each camera alone in the same view and merges the two depth maps: the more confident "
+      "depth counts.");
 
   section.heading("Windows of 1 s");
   const auto windows = recording.windows(run.pick(1.0, 0.1), run.pick(10, 1));
@@ -337,7 +335,7 @@ void studyAlgorithms(const StudyRun& run, StudySection& section) {
   const DepthErrors& twice = resultOf(in_less, kHcHt).own;
   const DepthErrors& once = resultOf(in_less, kAlg1).own;
   section.item(
-      "In windows so short fusion across time pays more than in those of 1 s: H_c∘H_t has " +
+      "In these short windows fusion across time gains more than in windows of 1 s: H_c∘H_t has " +
       formatNumber(meanCm(twice), 1) + " cm and " + formatNumber(badPercent(twice), 1) +
       " % bad pixels, Alg. 1 " + formatNumber(meanCm(once), 1) + " cm and " +
       formatNumber(badPercent(once), 1) + " %.");

@@ -50,15 +50,13 @@ void judge(const std::vector<MethodResult>& stereo, const std::vector<NamedPreci
   section.trend(
       "fewer points are recovered as the threshold grows", falls(points),
       listed(points) + " thousand",
-      "The extraction's threshold is relative to the largest confidence, which falls with "
-      "the number of events as all confidences do: as many pixels stand out, though of "
-      "fewer votes.");
+      "The threshold of the extraction is relative to the max confidence. All confidences fall "
+      "with the number of events: as many pixels pass the threshold, with fewer votes.");
   const std::vector<double> absolute = eachOf(why.one_white, own, thousandPoints);
   section.trend("with the white level of the lowest threshold for all, they are fewer",
                 falls(absolute), listed(absolute) + " thousand");
   section.trend(
-      "the mean error is larger at high thresholds: that at the highest exceeds that at "
-      "the lowest",
+      "the mean error is larger at high thresholds: at the highest it is above that at the lowest",
       means.back() > means.front(), listed(means) + " cm");
   section.trend(
       "the median error stays fairly constant: the largest is at most 1.5 times the "
@@ -66,15 +64,15 @@ void judge(const std::vector<MethodResult>& stereo, const std::vector<NamedPreci
       maxOf(medians) <= 1.5 * minOf(medians), listed(medians, 2) + " cm",
       "It does on common pixels: " + listed(eachOf(stereo, &MethodResult::common, medianCm), 2) +
           " cm, and for the " + std::to_string(kStrongest) +
-          " points of a window that stand out most: " + listed(why.strongest_median_cm, 2) +
-          " cm. At high thresholds the largest confidence is of a few votes, and the "
-          "relative threshold lets points of a single crossing of rays through.");
-  section.trend(
-      "the mean varies more than the median: it is outliers that come",
-      maxOf(means) / minOf(means) > maxOf(medians) / minOf(medians),
-      "largest over smallest: " +
-          against(maxOf(means) / minOf(means), maxOf(medians) / minOf(medians), 2),
-      "The points of single crossings are so many that they reach the median; see above.");
+          " points of a window with the highest local contrast: " +
+          listed(why.strongest_median_cm, 2) +
+          " cm. At high thresholds the max confidence is a few votes, and points at a single "
+          "crossing of rays pass the relative threshold.");
+  section.trend("the mean varies more than the median: there are more outliers",
+                maxOf(means) / minOf(means) > maxOf(medians) / minOf(medians),
+                "largest over smallest: " +
+                    against(maxOf(means) / minOf(means), maxOf(medians) / minOf(medians), 2),
+                "The many points at single crossings change the median, too; see above.");
   const std::vector<double> precise = precisionAt(precision, 0.12);
   section.trend(
       "low thresholds give better precision: it falls as they grow, or rises by half a "
@@ -82,7 +80,7 @@ void judge(const std::vector<MethodResult>& stereo, const std::vector<NamedPreci
       falls(precise, 0.5), listed(precise) + " % within 12 cm");
   const std::vector<double> found = recallAt(precision, 0.12);
   section.trend("and better recall", falls(found), listed(found) + " % within 12 cm",
-                "As with the number of points: no fewer pixels are chosen.");
+                "The reason is the number of points: it does not fall.");
   const std::vector<double> absolute_found = recallAt(why.one_white_precision, 0.12);
   section.trend("with one white level for all, recall falls", falls(absolute_found),
                 listed(absolute_found) + " % within 12 cm");
@@ -146,7 +144,7 @@ void studyContrastThreshold(const StudyRun& run, StudySection& section) {
     why.one_white_precision.push_back(
         {result.name, precisionOf(recording, result.keyframes, studyPairing())});
   }
-  section.text("Precision, recall and F1 of two cameras, against every pixel of the truth:");
+  section.text("Precision, recall and F1 of two cameras, compared with every pixel of the truth:");
   section.table(precisionTable(precision, {0.04, 0.12}));
   section.picture("contrast_threshold_precision.png", drawPrecision(precision),
                   "Precision, recall and F1 over the allowed error, by contrast threshold");

@@ -84,10 +84,9 @@ void showProjections(const StudyRun& run, const Recording& recording, StudySecti
           projectionsOf(recording, around(recording, duration_s), method));
     }
   }
-  section.picture(
-      "convergence_dsi.png", drawGrid(grid),
-      "The DSI's largest values along its axes, from the front, from above (near below) "
-      "and from the side (near left), by the length of the window");
+  section.picture("convergence_dsi.png", drawGrid(grid),
+                  "The max values of the DSI along its axes, from the front, from above (near "
+                  "below) and from the side (near left), by the length of the window");
 }
 
 /// Errors by the length of the window.
@@ -170,15 +169,15 @@ void judge(const std::string& where, const std::vector<double>& durations_s,
   check("on common pixels, too", kStereo, kOneCamera, &MethodResult::common);
   check("fusion across time makes one camera converge faster", kOneAcross, kOneCamera,
         &MethodResult::own,
-        "It keeps other points; on common pixels it has " +
+        "It keeps other points. On common pixels it has " +
             listed(series(kOneAcross, &MethodResult::common)) + " against " +
             listed(series(kOneCamera, &MethodResult::common)) + " cm, at equal numbers " +
             listed(series(kOneAcross, &MethodResult::equal)) + " against " +
             listed(series(kOneCamera, &MethodResult::equal)) + ".");
   check("fusion across time makes two cameras converge faster, N_s = 4", kStereoAcross, kStereo,
         &MethodResult::own,
-        "In the shortest window a sub-interval of 12.5 ms holds too few events; two sub-intervals "
-        "gain.");
+        "In the shortest window a sub-interval of 12.5 ms has too few events. Two sub-intervals "
+        "are better.");
   check("and N_s = 2", kStereoHalves, kStereo, &MethodResult::own);
   check("a second camera does more than fusion across time, on common pixels", kStereo, kOneAcross,
         &MethodResult::common);
@@ -188,14 +187,13 @@ void judge(const std::string& where, const std::vector<double>& durations_s,
 
 void studyConvergence(const StudyRun& run, StudySection& section) {
   section.text(
-      "The paper (Sec. 3.3.2, Fig. 4; Sec. 4.4.2, Fig. 9) shows projections of the DSI of a "
-      "plane with rocks, seen from a linear slider, as the window grows: with two cameras "
-      "the structure comes out of the rays earlier than with one, and fusion across time "
-      "brings it out earlier, too.");
+      "The paper (Sec. 3.3.2, Fig. 4; Sec. 4.4.2, Fig. 9) shows projections of the DSI of a plane "
+      "with rocks, seen from a linear slider, for growing windows. With two cameras the structure "
+      "is visible earlier than with one. With fusion across time it is visible earlier, too.");
   section.text(
-      "Here: the preset `slider` (240x180, 0.32 m/s sideways, boards and boxes at 0.5 to "
-      "2.4 m) with a second camera 0.10 m beside the first; planes from 0.47 to 2.4 m; "
-      "windows around the same view. Each picture has its own scale of colours.");
+      "Here: the preset `slider` (240x180, 0.32 m/s sideways, boards and boxes at 0.5 to 2.4 m) "
+      "with a second camera 0.10 m to the right of the first; planes from 0.47 to 2.4 m; windows "
+      "around the same view. Each picture has its own scale of colours.");
   const Recording slider = run.recordings->make("stereo_slider", stereoSlider(run));
   showProjections(run, slider, section);
 

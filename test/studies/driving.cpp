@@ -113,10 +113,11 @@ void judge(const Recording& recording, const std::vector<MethodResult>& results,
                 dilated.own.points >= 2.5 * static_cast<double>(two.own.points) &&
                     dilated.own.points <= 4 * static_cast<double>(two.own.points),
                 times(thousandPoints(dilated.own), thousandPoints(two.own)));
-  section.trend("for little accuracy: at most 1.15 times the mean error (paper: 1.07)",
-                dilated.own.mean_abs_m <= 1.15 * two.own.mean_abs_m,
-                times(dilated.own.mean_abs_m, two.own.mean_abs_m) + " times",
-                "Errors are smaller with exact poses, and what MF adds to them is not; see below.");
+  section.trend(
+      "for little accuracy: at most 1.15 times the mean error (paper: 1.07)",
+      dilated.own.mean_abs_m <= 1.15 * two.own.mean_abs_m,
+      times(dilated.own.mean_abs_m, two.own.mean_abs_m) + " times",
+      "Errors are smaller with exact poses, but the errors that MF adds are not; see below.");
   const double events = eventsMiddleOverAround(recording);
   const double speed = speedMiddleOverAround(recording, two.keyframes);
   const double points = pointsMiddleOverAround(two.keyframes);
@@ -126,9 +127,8 @@ void judge(const Recording& recording, const std::vector<MethodResult>& results,
       events < 0.9,
       formatNumber(events, 2) + " times as many per pixel; the image moves " +
           formatNumber(speed, 2) + " times as fast there",
-      "An edge makes fewer events there, but the simulated street has the more edges: it "
-      "ends at a house painted as densely as the near ones, while sky and road lie "
-      "around it.");
+      "An edge makes fewer events there, but the simulated street has more edges there: it ends at "
+      "a house that is painted as densely as the near houses. Around it are sky and road.");
   section.trend("and fewer points", points < 0.9,
                 formatNumber(points, 2) + " times as many per pixel", "For the same reason.");
 }
@@ -139,15 +139,15 @@ void findReasons(const Recording& recording, const std::vector<Window>& windows,
                  StudySection& section) {
   section.heading("What makes the difference");
   section.text(
-      "Poses are exact here; the paper's are a LiDAR's odometry at 10 Hz. The same windows "
-      "with poses that sway around the true ones, on each axis by a sine of 2 cm and 0.1 "
-      "degrees at about 1 Hz:");
+      "Poses are exact here. In the paper they are LiDAR odometry at 10 Hz. The next table has the "
+      "same windows with swaying poses: on each axis a sine of 2 cm and 0.1 degrees at about 1 Hz "
+      "around the true poses:");
   constexpr PoseSway kSway{0.02, 0.1 * kRadiansPerDegree, 1};
   const auto swayed = compareMethods(withPoseSway(recording, kSway), windows, methods, pairing);
   section.table(errorTable(swayed, {false, true}));
   const DepthErrors& one = swayed[0].own;
   const DepthErrors& two = swayed[1].own;
-  section.trend("with poses that sway, one camera's mean error is 1.5 times Alg. 1's or more",
+  section.trend("with swaying poses, one camera's mean error is 1.5 times Alg. 1's or more",
                 one.mean_abs_m >= 1.5 * two.mean_abs_m,
                 formatNumber(one.mean_abs_m / two.mean_abs_m, 2) + " times");
   section.trend("and its median error twice or more", one.median_abs_m >= 2 * two.median_abs_m,
@@ -173,17 +173,16 @@ void studyDriving(const StudyRun& run, StudySection& section) {
   const auto windows = recording.windows(run.pick(0.2, 0.05), run.pick(10, 1));
 
   section.text(
-      "The paper (Sec. 4.5, Table 5, Fig. 12) maps 35 s of DSEC's zurich_city_04_a in "
-      "windows of 0.2 s, some 3.5 million events each, and counts truth up to 50 m. Its "
-      "figures, cited, on real events; ESVO is not made again here:");
+      "The paper (Sec. 4.5, Table 5, Fig. 12) maps 35 s of DSEC's zurich_city_04_a in windows of "
+      "0.2 s with about 3.5 million events each. It uses truth up to 50 m. The table cites its "
+      "figures on real events. ESVO is not repeated here:");
   section.table(published());
   section.text(
       "Here: DSEC's real calibration (two 640x480, baseline 0.60 m) on the smoothed "
       "trajectory of zurich_city_04 (" +
       formatNumber(secondsBetween(0, recording.simulation.duration_ns), 1) +
-      " s from where the car gets under way) through a simulated street; " +
-      std::to_string(windows.size()) + " windows of 0.2 s, " +
-      formatNumber(1e-6 * recording.meanEventsIn(windows), 2) +
+      " s from the start of motion) through a simulated street; " + std::to_string(windows.size()) +
+      " windows of 0.2 s, " + formatNumber(1e-6 * recording.meanEventsIn(windows), 2) +
       " million events of both cameras each; planes from 4 to 50 m, truth up to 50 m.");
   const auto results = compareMethods(recording, windows, {one, two, dilated}, pairing);
   section.table(errorTable(results, {false, true}));

@@ -55,10 +55,8 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
         eachOf(results, own, meanCm), " cm");
   check("so does the median error", eachOf(results, own, medianCm), " cm");
   check("so does bad-pix", eachOf(results, own, badPercent), " %");
-  check(
-      "bad-pix grows on common pixels, too: it is not only that the later functions choose other "
-      "pixels",
-      eachOf(results, &MethodResult::common, badPercent), " %");
+  check("bad-pix grows on common pixels, too: other pixels are not the only reason",
+        eachOf(results, &MethodResult::common, badPercent), " %");
   check("and at equal numbers", eachOf(results, &MethodResult::equal, badPercent), " %");
 
   const DepthErrors& min = resultOf(results, "min").own;
@@ -95,8 +93,8 @@ void judge(const std::vector<MethodResult>& results, StudySection& section) {
     spreads.push_back(100 * sum / static_cast<double>(result.keyframes.size()));
   }
   check(
-      "confidence maps are the sharper the nearer to min: fewer pixels have a tenth of the "
-      "map's maximum",
+      "confidence maps are sharper for functions closer to min: fewer pixels have a tenth of the "
+      "map's max",
       spreads, " % of the pixels");
 }
 
@@ -123,10 +121,10 @@ void byWindow(const StudyRun& run, const Recording& recording, StudySection& sec
                      badPercent(resultOf(results, "harmonic").own));
   }
   section.trend("the less data, the more the functions differ", ratios.front() > ratios.back(),
-                "bad-pix of the arithmetic mean less that of the harmonic: " + listed(ratios) +
-                    " % for windows of " + listed(durations_s, 2) + " s");
+                "bad-pix of the arithmetic mean minus that of the harmonic mean: " +
+                    listed(ratios) + " % for windows of " + listed(durations_s, 2) + " s");
   section.picture("fusion_functions_windows.png", drawCurves(plot),
-                  "Share of bad pixels of each fusion function by the length of the window");
+                  "Fraction of bad pixels of each fusion function by the length of the window");
 }
 
 }  // namespace
@@ -138,16 +136,15 @@ void studyFusionFunctions(const StudyRun& run, StudySection& section) {
   const auto results = compareMethods(recording, windows, methods);
 
   section.text(
-      "The paper (Sec. 4.2, Table 2, Fig. 7) fuses the two cameras' DSIs with six "
-      "functions on MVSEC's indoor flights, in windows of 0.1 s, in which differences are "
-      "largest. Its figures for flying1, on real events:");
+      "The paper (Sec. 4.2, Table 2, Fig. 7) fuses the two cameras' DSIs with six functions on "
+      "MVSEC's indoor flights, in windows of 0.1 s: there the differences are largest. The table "
+      "cites its figures for flying1, on real events:");
   section.table(published());
   section.text("Here: MVSEC's real calibration on the smoothed trajectory of flying1 (" +
                formatNumber(secondsBetween(0, recording.simulation.duration_ns), 0) +
-               " s from where the drone gets under way) through a simulated room; " +
+               " s from the start of motion) through a simulated room; " +
                std::to_string(windows.size()) +
-               " windows of 0.1 s spread over it; planes from 1 "
-               "to 6.5 m.");
+               " windows of 0.1 s, evenly spread; planes from 1 to 6.5 m.");
   section.table(errorTable(results, {true, false}));
 
   PictureGrid grid = depthAndConfidenceGrid(300);

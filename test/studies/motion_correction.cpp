@@ -167,7 +167,7 @@ cv::Mat3b draw(const Case& what, const std::vector<TrackerError>& errors,
   CurvePlot plot;
   plot.title = what.preset;
   plot.size = {560, 420};
-  plot.x = {"velocity that is wrong [cm/s and degrees/s]", AxisScale::kLinear, 0, {}};
+  plot.x = {"velocity error [cm/s and degrees/s]", AxisScale::kLinear, 0, {}};
   plot.y = {"median error [%]", AxisScale::kLinear, 0, {}};
   std::vector<double> velocities, as_is, corrected;
   for (std::size_t i = 0; i < errors.size(); ++i) {
@@ -185,7 +185,7 @@ void judge(const Case& what, const std::vector<TrackerError>& errors,
            const std::vector<Outcomes>& all, StudySection& section) {
   const double exact = all.front().as_is.median();
   const std::string where = std::string(what.preset) + ": ";
-  section.trend(where + "exact poses lose nothing",
+  section.trend(where + "exact poses do not become worse",
                 all.front().corrected.median() <= exact && all.front().corrected.corrected == 0,
                 std::to_string(all.front().corrected.corrected) + " of " +
                     std::to_string(all.front().corrected.keyframes) + " keyframes were touched");
@@ -197,15 +197,14 @@ void judge(const Case& what, const std::vector<TrackerError>& errors,
     harm.push_back((all[i].corrected.median() - exact) / (all[i].as_is.median() - exact));
     over_exact.push_back(all[i].corrected.median() / exact);
   }
-  section.trend(where + "the correction takes away half of the median error, or more",
+  section.trend(where + "the correction removes at least half of the median error",
                 maxOf(share) <= 0.5,
-                listed(share, 2) + " times that of the poses as they are; " +
-                    listed(over_exact, 2) + " times that of exact ones",
-                "the smallest errors harm depth less than that");
-  section.trend(where +
-                    "the correction takes away half of what wrong poses add to the median "
-                    "error, or more",
-                maxOf(harm) <= 0.5, listed(harm, 2) + " of it are left");
+                listed(share, 2) + " times that of the uncorrected poses; " +
+                    listed(over_exact, 2) + " times that of exact poses",
+                "the smallest pose errors add less than that to the depth error");
+  section.trend(
+      where + "the correction removes at least half of the median error that wrong poses add",
+      maxOf(harm) <= 0.5, listed(harm, 2) + " of it remain");
 }
 
 }  // namespace
@@ -215,15 +214,15 @@ void studyMotionCorrection(const StudyRun& run, StudySection& section) {
   if (!run.quick) cases.push_back({"room_stereo", 1, 6.5, 0.3});
   const MotionCorrectionOptions defaults;
   section.text(
-      "The paper sees its fused DSI as a measure of how well refocused events meet (Sec. 3.4.2), "
-      "and leaves poses as they are. Here the motion within a window is corrected by the constant "
-      "velocity that makes the events meet best (`[refinement] correct_motion`, " +
+      "The paper uses its fused DSI as a measure of refocused events (Sec. 3.4.2) and does not "
+      "change poses. Here a constant velocity corrects the motion within a window: it maximizes "
+      "the contrast of the events (`[refinement] correct_motion`, " +
       std::to_string(defaults.motion_rounds) +
-      " rounds): the pose at the reference time stays. The tracker is wrong by a velocity of its "
-      "own direction in each window, or sways about the truth once a second. Three windows each "
-      "(0.2 s of `desk_stereo`, 0.3 s of `room_stereo`) of seeds 1 to 3, all points together; two "
-      "cameras, the default depth. *Left*: the velocity that is still wrong, mean of its lengths "
-      "in cm/s and °/s; *time*: seconds per keyframe, on this machine.");
+      " rounds). The pose at the reference time does not change. The tracker has a velocity error "
+      "with a random direction in each window, or sways around the truth once a second. Three "
+      "windows each (0.2 s of `desk_stereo`, 0.3 s of `room_stereo`) of seeds 1 to 3, all points "
+      "together; two cameras, the default depth. *Left*: the mean remaining velocity error in cm/s "
+      "and °/s; *time*: seconds per keyframe, on this machine.");
   const std::vector<TrackerError> errors = trackerErrors(run.quick);
   TextTable table;
   table.head = {"recording", "tracker",    "poses",           "corrected", "left [cm/s, °/s]",
@@ -238,7 +237,7 @@ void studyMotionCorrection(const StudyRun& run, StudySection& section) {
   section.table(table);
   cv::Mat picture;
   cv::hconcat(plots, picture);
-  section.picture("motion_correction.png", picture, "Median error over the velocity that is wrong");
+  section.picture("motion_correction.png", picture, "Median error over the velocity error");
   for (std::size_t i = 0; i < cases.size(); ++i) judge(cases[i], errors, all[i], section);
 }
 

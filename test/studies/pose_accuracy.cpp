@@ -167,13 +167,13 @@ void judge(const std::vector<ErrorKind>& kinds, const std::vector<ErrorResults>&
   }
   const std::vector<double> drift = timesExact(all[1].stereo, own);
   const std::size_t small = std::min<std::size_t>(2, drift.size() - 1);
-  section.trend("good odometry serves as well as exact poses in windows of 0.5 s: with " +
+  section.trend("good odometry is as good as exact poses in windows of 0.5 s: with " +
                     kinds[1].say(kinds[1].levels[small]) +
                     " the median error is at most 1.1 times as large",
                 drift[small] <= 1.1, formatNumber(drift[small], 2) + " times");
   const std::vector<double> late = timesExact(all[2].stereo, own);
   const std::vector<double> apart = timesExact(all[3].stereo, own);
-  section.trend("cameras that disagree about the time do more harm than poses that are late",
+  section.trend("a delay between cameras does more harm than delayed poses",
                 apart.back() > late.back(),
                 against(apart.back(), late.back(), 2) + " times the median error at " +
                     formatNumber(kinds[3].levels.back(), 0) + " ms");
@@ -189,19 +189,17 @@ void studyPoseAccuracy(const StudyRun& run, StudySection& section) {
     for (ErrorKind& kind : kinds) kind.levels.resize(2);
   }
   section.text(
-      "The paper has no such experiment; it finds (Sec. 4.6, TUM-VIE) that poses of "
-      "visual-inertial odometry serve as well as motion capture for intervals of 0.5 s, and "
-      "that the method needs accurate poses (its limitations). Here: the recording of study 1, " +
+      "The paper has no such experiment. It finds (Sec. 4.6, TUM-VIE) that visual-inertial "
+      "odometry is as good as motion capture for intervals of 0.5 s, and that the method needs "
+      "accurate poses (its limitations). Here: the recording of study 1, " +
       std::to_string(windows.size()) +
-      " windows of 0.5 s, planes from 1 to 6.5 m; poses at 100 Hz with noise, normal and of its "
-      "own on each axis of every pose; as odometry that drifts gives them, with a heading that "
-      "turns away "
-      "about each axis and a position that runs away along each (the drone flies at " +
+      " windows of 0.5 s, planes from 1 to 6.5 m. The poses at 100 Hz have independent normal "
+      "noise on each axis; or drift, with a heading that rotates about each axis and a position "
+      "that moves along each axis (the drone flies at " +
       formatNumber(meanSpeed(recording), 2) +
-      " m/s); with stamps that are "
-      "late; and exact poses with a second camera whose stamps are "
-      "late. Errors are against the truth at the true reference pose; *in the world*: against the "
-      "truth seen from where the poses say the view stands, as a map of the world is made.");
+      " m/s); or delayed stamps. Or poses are exact and the stamps of the second camera are "
+      "delayed. Errors are relative to the truth at the true reference pose; *in the world*: to "
+      "the truth at the wrong reference pose, as in a map of the world.");
   std::vector<ErrorResults> all;
   std::vector<cv::Mat> plots;
   for (const ErrorKind& kind : kinds) {

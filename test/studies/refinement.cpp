@@ -23,24 +23,25 @@ void introduce(const RefinementStudyResults& all, StudySection& section) {
         formatNumber(what.min_depth_m, 1) + " to " + formatNumber(what.max_depth_m, 1) + " m";
   }
   section.text(
-      "The paper leaves poses as they are. With `[refinement] enabled = true` keyframes are "
-      "registered with each other and their poses solved together, and the map follows. Three "
-      "recordings: the preset `room_stereo`; a *loop* around the same room that comes back to "
-      "its first place after 20 s of 24; MVSEC's rig on its real trajectory, smoothed, for 20 s in "
+      "The paper does not change poses. With `[refinement] enabled = true` keyframes are "
+      "registered with each other, their poses are solved together, and the map is corrected. "
+      "Three recordings: the preset `room_stereo`; a *loop* in the same room that returns to its "
+      "first position after 20 s of 24; MVSEC's rig on its real trajectory, smoothed, for 20 s in "
       "a simulated room (" +
       recordings +
-      "). Events and poses at 200 Hz go through the pipeline with its default options but the "
-      "depth range and the windows.");
+      "). The pipeline gets events and poses at 200 Hz. Only the depth range and the windows "
+      "differ from the default options.");
   section.text(
       "Each cell: the error of the same keyframes at the tracker's poses → at the refined ones "
       "(the ratio). *Trajectory*: root mean square of the keyframes' errors; *map*: median "
       "distance of the exported points to the nearest surface; *rays*: median distance of "
-      "keyframes' points to where their own rays truly end; *walls*: half of what lies between the "
-      "16th and the 84th percentile of the distances from a wall, the floor or the ceiling, of "
-      "points nearest to it, up to 0.3 m before or behind and as far inside its borders; mean of "
-      "all, weighted by points. All these after the trajectory is laid over the true one by a "
-      "rigid motion, and the map with it. *End to end*: the motion from the first keyframe to the "
-      "last against the true one. Means are of the errors, and their ratio.");
+      "keyframes' points to the true ends of their rays; *walls*: thickness of walls, floor and "
+      "ceiling, which is half of the distance between the 16th and the 84th percentile of the "
+      "distances from a wall, of points that are nearest to it, at most 0.3 m from it and at least "
+      "0.3 m inside its borders; mean of all walls, weighted by points. Before these, a rigid "
+      "motion aligns the trajectory and the map with the truth. *End to end*: the relative pose of "
+      "the first and the last keyframe compared with the true one. Means are of the errors, with "
+      "the ratio of the means.");
 }
 void judgeNoise(const RefinementStudyResults& all, StudySection& section) {
   for (const auto& [what, results] : all) {
@@ -54,9 +55,8 @@ void judgeNoise(const RefinementStudyResults& all, StudySection& section) {
 
 void judgeDrift(const RefinementStudyResults& all, StudySection& section) {
   const std::string loops_lost =
-      "Within its windows drift bends the depth maps themselves, which no pose of a keyframe "
-      "mends, "
-      "and registrations then show half of it.";
+      "Drift within a window distorts the depth map itself. No keyframe pose can correct this, and "
+      "registrations then show half of the drift.";
   for (const auto& [what, results] : all) {
     if (!what.is_loop) continue;
     const double exact_m = meanOf(results.exact, &RefinementOutcome::without, kWalls);
@@ -91,9 +91,9 @@ void judgeRest(const RefinementStudyResults& all, StudySection& section) {
     const double processor_ms = 1e3 * quantileOf(results.processor_seconds, 0.5);
     section.trend(
         what.name + ": a keyframe takes at most 100 ms", quantileOf(results.seconds, 0.5) <= 0.1,
-        formatNumber(1e3 * quantileOf(results.seconds, 0.5), 1) + " ms, median, by the clock; " +
+        formatNumber(1e3 * quantileOf(results.seconds, 0.5), 1) + " ms, median, real time; " +
             formatNumber(processor_ms, 1) + " ms of the processor",
-        processor_ms <= 100 ? "By the clock it waits for others that use the processors."
+        processor_ms <= 100 ? "Real time includes waiting for other processes."
                             : "Even the processor takes longer.");
   }
 }
@@ -107,36 +107,33 @@ void studyRefinement(const StudyRun& run, StudySection& section) {
   introduce(all, section);
   section.heading("Noise");
   section.text(
-      "Noise of 1 cm and 0.5° on each axis, drawn for each window and constant within it.");
+      "Noise of 1 cm and 0.5° on each axis, random for each window and constant within it.");
   seedTable(all, &RefinementResults::noise, section);
   section.heading("Drift");
-  section.text(
-      "A position that runs away by 1 % of the way and a heading that turns by 0.5° per metre of "
-      "it.");
+  section.text("The position drifts by 1 % of the path length, and the heading by 0.5° per metre.");
   seedTable(all, &RefinementResults::drift, section);
   sayLoops(all, section);
   for (const auto& [what, results] : all) {
     if (what.is_loop) drawRefinement(what, results.drawing, section);
   }
-  section.heading("Exact poses, a good tracker, and options that are wrong");
+  section.heading("Exact poses, a good tracker, and wrong options");
   section.text(
-      "Where there is noise: means of seeds 1 and 2. *Said to be*: `[refinement]` expects that "
-      "much "
-      "noise of a tracker with 1 cm and 0.5°.");
+      "With noise: means of seeds 1 and 2. *Said to be*: the noise that `[refinement]` expects of "
+      "a tracker with 1 cm and 0.5°.");
   otherTable(all, section);
   section.heading("False loops");
   section.text(
-      "The noise of above, and after 30 % of the keyframes one candidate that is false: by turns "
-      "another place said to be the same one, or the same place with a relative pose that is wrong "
-      "by 0.3 to 1 m, 15 to 45°, or both. True loops are looked for as ever. *Accepted*: by the "
-      "registration that verifies it, from which on it is a factor of the graph; *moved*: the "
-      "farthest that any pose ends from where it ends without them.");
+      "The same noise, and a false loop candidate after 30 % of the keyframes. The two kinds "
+      "alternate: two different places claimed to be one place, or one place with a relative pose "
+      "that is wrong by 0.3 to 1 m, by 15 to 45°, or by both. True loops are searched, too. "
+      "*Accepted*: the registration confirms the candidate, and it becomes a factor of the graph; "
+      "*moved*: the max distance between the final poses with and without false loops.");
   loopTable(all, section);
   section.heading("Time");
   section.text(
-      "Of a keyframe of 346x260 with a full window (K = 10) and noise: its points chosen, "
-      "registered, the window solved, loops looked for and closed; one thread. The machine is "
-      "shared with others: what the processor took for it is given beside the clock's time.");
+      "Time of a keyframe of 346x260 with a full window (K = 10) and noise: choice of points, "
+      "registration, solution of the window, search for loops and their closing; one thread. Other "
+      "processes use the machine, so the table has real time and processor time.");
   timeTable(all, section);
   judgeNoise(all, section);
   judgeDrift(all, section);

@@ -179,21 +179,19 @@ void judge(const ByResolution& mono, const ByResolution& stereo,
     median_ratios.push_back(medianCm(stereo.results[r].own) / medianCm(mono.results[r].own));
     ratios.push_back(meanCm(stereo.results[r].own) / meanCm(mono.results[r].own));
   }
-  section.trend(
-      "a second camera almost halves the mean error (at most 0.65 of it)", maxOf(ratios) <= 0.65,
-      listed(ratios, 2) + " times",
-      "The median error does: " + listed(median_ratios, 2) +
-          " times. Means are ruled by few points that are far off; the tables below say "
-          "which. The second camera tells nothing of edges along its baseline, and the "
-          "points that something in front hides from it have no crossing of rays but "
-          "wrong ones: they are few, and their error is several times that of one camera.");
+  section.trend("a second camera almost halves the mean error (at most 0.65 of it)",
+                maxOf(ratios) <= 0.65, listed(ratios, 2) + " times",
+                "The median error does: " + listed(median_ratios, 2) +
+                    " times. Few points with large errors dominate the mean; see the tables below. "
+                    "The second camera does not help for edges along its baseline. Points that are "
+                    "hidden from it have wrong crossings of rays only: they are few, and their "
+                    "error is several times that of one camera.");
   const std::vector<double> precise = precisionAt(precision, 0.04);
   const std::vector<double> found = recallAt(precision, 1);
   section.trend("precision grows with resolution (paper: up to 97 % within 4 cm)", grows(precise),
                 listed(precise) + " % within 4 cm");
   section.trend(
-      "recall falls: a coarse sensor finds a larger share of the scene (paper: 6 % "
-      "against 2 %)",
+      "recall falls: a coarse sensor finds a larger fraction of the scene (paper: 6 % against 2 %)",
       falls(found), listed(found) + " % within 1 m");
 }
 
@@ -223,10 +221,9 @@ void studyResolution(const StudyRun& run, StudySection& section) {
       "resolutions with the same field of view, 0.25, 2.25 and 14.3 million events. Here: a "
       "furnished room, two cameras 0.20 m apart, 77° wide, contrast threshold 0.2; " +
       std::to_string(sensors.front().windows.size()) + " windows of 0.2 s with " + events +
-      " million events each; planes from 1 to 4 m. Masks of different resolutions have no pixels "
-      "in common: *common* are here the points in those cells, of the size of a pixel of the "
-      "coarsest sensor, that hold a point at every resolution; *equal*: as many points as the "
-      "coarsest has.");
+      " million events each; planes from 1 to 4 m. Different resolutions have no common pixels. "
+      "Here *common* are the points in cells with a point at every resolution; a cell is a pixel "
+      "of the coarsest sensor. *equal*: as many points as the coarsest sensor has.");
   for (const ByResolution* one : {&mono, &stereo}) {
     section.text(one->method + ":");
     section.table(errorTable(one->results, {true, false}));
@@ -243,7 +240,7 @@ void studyResolution(const StudyRun& run, StudySection& section) {
         {sensors[r].name,
          precisionOf(sensors[r].recording, stereo.results[r].keyframes, studyPairing())});
   }
-  section.text("Precision, recall and F1 of two cameras, against every pixel of the truth:");
+  section.text("Precision, recall and F1 of two cameras, compared with every pixel of the truth:");
   section.table(precisionTable(precision, {0.02, 0.04, 0.12}));
   section.picture("resolution_precision.png", drawPrecision(precision),
                   "Precision, recall and F1 over the allowed error, by resolution");
@@ -262,8 +259,8 @@ void studyResolution(const StudyRun& run, StudySection& section) {
   judge(mono, stereo, precision, section);
   section.heading("Why a second camera does not halve the mean");
   section.text("One camera and two at " + sensors[1].name +
-               ", on common pixels, by how edges run and by what the second camera sees at the "
-               "reference time (*times*: two over one):");
+               ", on common pixels, by direction of the edge and by visibility for the second "
+               "camera at the reference time (*times*: two over one):");
   byEdges(sensors[1], section);
   section.text("And by the length of the window:");
   byWindow(run, sensors[1], section);

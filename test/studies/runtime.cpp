@@ -247,10 +247,10 @@ double loadAverage() {
 }
 
 void judge(const std::vector<Sample>& samples, const Fit& formula, StudySection& section) {
-  section.trend("the formula fits all sizes: it is off by at most a quarter", formula.worst <= 0.25,
+  section.trend("the formula fits all sizes: its max error is a quarter", formula.worst <= 0.25,
                 formatNumber(100 * formula.worst, 0) + " % at worst",
-                "Sorting events into tiles, caches that hold a small keyframe and not a large one, "
-                "and passes that are shared are not in the formula.");
+                "The formula does not include the sorting of events into tiles, caches that fit a "
+                "small keyframe only, and shared passes.");
   const double one = sampleOf(samples, 1, 1).times.sweepMs();
   const double two = sampleOf(samples, 2, 1).times.sweepMs();
   section.trend("two cameras take twice the time of one (1.8 to 2.3; paper: 2.2 for the creation)",
@@ -262,7 +262,7 @@ void judge(const std::vector<Sample>& samples, const Fit& formula, StudySection&
                   std::abs(exponents.measured - exponents.of_formula) <= 0.15,
                   formatNumber(exponents.measured, 2) + ", the formula's " +
                       formatNumber(exponents.of_formula, 2),
-                  "What is done once per keyframe, and caches, are not in the formula.");
+                  "The formula does not include caches and the work per keyframe.");
   }
   const auto more = [&](int parts) { return sampleOf(samples, 2, parts).times.sweepMs() - two; };
   section.trend(
@@ -281,9 +281,10 @@ void judge(const std::vector<Sample>& samples, const Fit& formula, StudySection&
                                      sampleOf(samples, 2, 2).times.depth_ms};
   const double least = *std::min_element(depth.begin(), depth.end());
   const double most = *std::max_element(depth.begin(), depth.end());
-  section.trend("the threshold takes as long for all algorithms (within a half of the fastest)",
-                most <= 1.5 * least, listed(depth, 2) + " ms",
-                "The median's time grows with the pixels that are kept.");
+  section.trend(
+      "the threshold takes equally long for all algorithms (at most 1.5 times the fastest)",
+      most <= 1.5 * least, listed(depth, 2) + " ms",
+      "The time of the median grows with the number of points.");
 }
 
 void byRule(const StudyRun& run, StudySection& section) {
@@ -302,7 +303,7 @@ void byRule(const StudyRun& run, StudySection& section) {
       "the fusion functions take about the same (the slowest at most 1.25 times the "
       "fastest)",
       most <= 1.25 * least, formatNumber(most / least, 2) + " times",
-      "Votes are so cheap here that a root per voxel counts.");
+      "Votes are cheap here: a root per voxel is not negligible.");
 }
 
 void byKernel(const StudyRun& run, StudySection& section) {
@@ -321,8 +322,8 @@ void byKernel(const StudyRun& run, StudySection& section) {
                 formatNumber(exponent, 2) + "; " + listed(times, 2) +
                     " ms for windows of 5, 9, 15 "
                     "and 25 pixels' side",
-                "A Gaussian window is two passes of its side, not one of its area, and the median "
-                "does not depend on it: the formula is an upper bound.");
+                "A Gaussian window has two passes over its side, not one over its area, and the "
+                "median does not depend on it. The formula is an upper bound.");
 }
 
 }  // namespace
@@ -337,12 +338,12 @@ void studyRuntime(const StudyRun& run, StudySection& section) {
   const std::vector<Sample> samples = measureAll(run);
   const Fit formula = fit(samples);
   section.text(
-      "Here no volume is held: votes, fusion and the search for the maximum of a tile on a "
-      "plane are one step (docs/performance.md). So the steps are told apart by the "
-      "formula: its first three terms, fitted to the times of keyframes of many sizes, "
-      "one changed at a time. The synthetic window of the benchmarks, process CPU time of "
-      "one thread, the fastest of several runs, kernel " +
-      std::string(nameOf(fastestKernel())) + "; load average of the machine meanwhile " +
+      "Here there is no volume: votes, fusion and the search for the max of a tile on a plane are "
+      "one step (docs/performance.md). So the formula separates the steps. Its first three terms "
+      "are fitted to the times of keyframes of many sizes; one size is changed at a time. The "
+      "synthetic window of the benchmarks, process CPU time of one thread, the fastest of several "
+      "runs, kernel " +
+      std::string(nameOf(fastestKernel())) + "; load average of the machine " +
       formatNumber(loadAverage(), 1) + ".");
   section.table(tableOf(samples, formula));
   section.text("The fit: " + formatNumber(formula.ns[0], 3) + " ns a vote (N_c N_e N_Z), " +
@@ -352,7 +353,7 @@ void studyRuntime(const StudyRun& run, StudySection& section) {
                "sizes:");
   section.table(stepsOf(samples, formula));
   CurvePlot plot;
-  plot.title = "The formula and the clock";
+  plot.title = "Formula and measurement";
   plot.x = {"measured [ms]", AxisScale::kLogarithmic, {}, {}};
   plot.y = {"formula [ms]", AxisScale::kLogarithmic, {}, {}};
   plot.curves = {{"keyframes", {}, CurveStyle::kDots, {}}, {"equal", {}, CurveStyle::kLine, {}}};
@@ -365,7 +366,7 @@ void studyRuntime(const StudyRun& run, StudySection& section) {
   }
   plot.curves[1].points = {{least, least}, {most, most}};
   section.picture("runtime.png", drawCurves(plot),
-                  "Time of votes, fusion and arg max by the fitted formula, against that measured");
+                  "Time of votes, fusion and arg max: fitted formula over measurement");
   judge(samples, formula, section);
   byKernel(run, section);
   section.text("By fusion function, at the paper's sizes:");

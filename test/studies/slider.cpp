@@ -107,7 +107,7 @@ void scoreTable(const std::vector<SliderResult>& results, const SliderTruth& tru
                 "beyond 10 % [%]",
                 "vertical [%]",
                 "horizontal [%]",
-                "share on horizontal edges [%]",
+                "on horizontal edges [%]",
                 "vertical edges covered [%]"};
   for (const SliderResult& result : results) {
     table.rows.push_back(scoreRow(result.name, "own", result.own.depth, truth));
@@ -138,13 +138,12 @@ void frameTruthOnItsOwn(const FrameDepthOptions& options, StudySection& section)
   const SliderScore all = scoreOnSlider(depth.depth, exact);
   const SliderScore lines = scoreOnSlider(only(depth.depth, exact.edges.vertical_lines), exact);
   section.text(
-      "What the frames' depth is worth: the same sweep over frames of the simulated slider (as "
-      "many "
-      "per metre, noise of 1.2 grey values), held against its exact depth within a pixel. " +
+      "Accuracy of the depth from frames: the same sweep over frames of the simulated slider (as "
+      "many per metre, noise of 1.2 grey values), compared with its exact depth within a pixel. " +
       std::to_string(all.points) + " pixels have a depth: median error " +
       formatNumber(100 * all.median_error, 2) + " %, " + percent(all.beyond_10) +
-      " % of them beyond 10 % (the outlines of things in front, up to two pixels wider than "
-      "they are); on the lines of vertical edges " +
+      " % of them beyond 10 % (the outlines of objects in front, which are up to two pixels too "
+      "wide); on the lines of vertical edges " +
       formatNumber(100 * lines.median_error, 2) + " % and " + percent(lines.beyond_10) + " %.");
 }
 
@@ -191,9 +190,9 @@ void judgeSlider(const std::vector<SliderResult>& results, const SliderTruth& tr
       "beyond 10 %",
       beyond <= 0.2, formatNumber(beyond, 2));
   section.trend("and at most 0.4 of its median error", median <= 0.4, formatNumber(median, 2));
-  section.trend("The share of points on horizontal edges falls to at most 0.45 of the paper's",
+  section.trend("The fraction of points on horizontal edges is at most 0.45 of the paper's",
                 horizontal <= 0.45, formatNumber(horizontal, 2));
-  section.trend("The share of vertical edges that are covered does not fall",
+  section.trend("The fraction of covered vertical edges does not fall",
                 ours.vertical_covered >= paper.vertical_covered,
                 percent(paper.vertical_covered) + " to " + percent(ours.vertical_covered) + " %");
 }
@@ -223,40 +222,39 @@ void studySlider(const StudyRun& run, StudySection& section) {
                                         keyframe.window.t_ref_ns, frame_options);
 
   section.text(
-      "`slider_depth` of the Event Camera Dataset (Mueggler et al., IJRR 2017), real: a DAVIS240C "
-      "on a linear slider; a window of 0.15 s from the first pose on, " +
+      "`slider_depth` of the Event Camera Dataset (Mueggler et al., IJRR 2017), a real recording: "
+      "a DAVIS240C on a linear slider; a window of 0.15 s from the first pose, " +
       std::to_string(recording.events.size()) +
       " events, 4.7 cm of travel; planes from 0.47 to 2.4 m, confidence normalised by the map's "
-      "own "
-      "maximum. There is no true depth, so it is made from the recording's own frames, which see "
-      "the scene from up to 0.3 m away: a plane sweep with the true poses (" +
+      "max. The recording has no true depth. So the truth is computed from its frames, with "
+      "baselines of up to 0.3 m: a plane sweep with the true poses (" +
       std::to_string(frame_options.planes.num_planes) + " planes, " +
       std::to_string(frame_options.max_frames) +
       " frames; correlation in Gaussian windows of 1.5, then 3.5 pixels; the better half of the "
       "frames; a peak of at least " +
-      formatNumber(frame_options.min_score, 2) + " that stands out by " +
+      formatNumber(frame_options.min_score, 2) + " that is higher by " +
       formatNumber(frame_options.min_margin, 2) +
-      " from every depth more than 5 % away, and again from a second view). It is kept on edges, "
-      "and between two points of one depth at most " +
+      " than at every depth more than 5 % away, and the same from a second view). The truth has "
+      "pixels on edges, and pixels between two points of one depth that are at most " +
       std::to_string(frame_options.max_gap_px) + " pixels apart.");
   section.text(
-      "An edge is horizontal where the grey values' gradient is within 15° of vertical, vertical "
-      "where it is within 30° of horizontal; a point is on the strongest edge within a pixel of "
-      "it. " +
+      "An edge is horizontal if the gradient of the grey values is within 15° of vertical. It is "
+      "vertical if the gradient is within 30° of horizontal. A point belongs to the strongest edge "
+      "within a pixel. " +
       percent(shareWithTruth(truth.edges.vertical_lines, truth.frames.depth)) + " % of the " +
       std::to_string(cv::countNonZero(truth.edges.vertical_lines)) +
       " pixels on the lines of vertical edges have a depth, and " +
       percent(shareWithTruth(truth.edges.horizontal_lines, truth.frames.depth)) + " % of the " +
       std::to_string(cv::countNonZero(truth.edges.horizontal_lines)) +
-      " on those of horizontal ones: the slider moves along these, and only texture beside them "
-      "tells their depth.");
+      " on those of horizontal edges: the slider moves along these, and only the texture next to "
+      "them has a depth.");
   frameTruthOnItsOwn(frame_options, section);
   section.text(
-      "Errors are shares of the depth, the truth the best within a pixel, of the points that have "
-      "one. *equal*: " +
+      "Errors are relative to the depth, with the best truth within a pixel. Points without a "
+      "truth are excluded. *equal*: " +
       std::to_string(kPoints) +
-      " points, those that stand out most with the strictest threshold that keeps as many. "
-      "*common*: those of them that all methods chose.");
+      " points with the highest local contrast, from the strictest threshold with enough points. "
+      "*common*: the pixels of these that all methods have.");
   scoreTable(results, truth, section);
   judgeSlider(results, truth, section);
 

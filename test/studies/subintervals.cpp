@@ -120,16 +120,16 @@ void numberOfSubintervals(const StudyRun& run, const Recording& recording, Study
   const auto in_a_second = compareMethods(recording, seconds, methods);
   section.table(errorTable(in_a_second));
   const double floor_cm = medianQuarterStepCm(recording, resultOf(in_a_second, "N_s = 2"));
-  judgeNumbers(in_a_second,
-               "With exact poses little is left to gain: the median error would be " +
-                   formatNumber(floor_cm, 2) +
-                   " cm if each point had the plane nearest to its truth. With poses that sway, "
-                   "below, there is.",
-               section);
+  judgeNumbers(
+      in_a_second,
+      "With exact poses there is little to gain: the median error would be " +
+          formatNumber(floor_cm, 2) +
+          " cm if each point had the best plane. With swaying poses, below, there is more to gain.",
+      section);
 
   section.text(
-      "The same with poses that sway around the true ones, on each axis by a sine of 1 cm "
-      "and 0.1 degrees at about 1 Hz:");
+      "The same with swaying poses: on each axis a sine of 1 cm and 0.1 degrees at about 1 Hz "
+      "around the true poses:");
   const auto swayed = compareMethods(withPoseSway(recording, kTrackerSway), seconds, methods);
   section.table(errorTable(swayed));
   judgeNumbers(swayed, "", section);
@@ -138,12 +138,13 @@ void numberOfSubintervals(const StudyRun& run, const Recording& recording, Study
   const auto shorter = recording.windows(run.pick(0.2, 0.05), run.pick(25, 1));
   const auto in_less = compareMethods(recording, shorter, methods);
   section.table(errorTable(in_less));
-  judgeNumbers(in_less,
-               "Eight sub-intervals are too many for such windows: each holds " +
-                   formatNumber(1e-3 * recording.meanEventsIn(shorter) / 8, 1) +
-                   " thousand events of both cameras, and where one camera saw none in a "
-                   "sub-interval the harmonic mean is zero. (The paper's hold some 70 thousand.)",
-               section);
+  judgeNumbers(
+      in_less,
+      "Eight sub-intervals are too many for such windows: each holds " +
+          formatNumber(1e-3 * recording.meanEventsIn(shorter) / 8, 1) +
+          " thousand events of both cameras. Where a camera has no event in a sub-interval, the "
+          "harmonic mean is zero. (The paper's sub-intervals have about 70 thousand events.)",
+      section);
 }
 
 /// Maps of the parts of each window and of the whole window.
@@ -162,10 +163,9 @@ std::vector<MethodResult> partsAndWhole(const Recording& recording,
 void singleSubintervals(const StudyRun& run, const Recording& recording, StudySection& section) {
   section.heading("Single sub-intervals and all of them fused");
   section.text(
-      "The paper's Fig. 10: the depth maps of four sub-intervals of one window are noisy, "
-      "that of all four fused is clean. Here: windows of 0.4 s, four sub-intervals; each "
-      "map of a sub-interval has the window's reference view. Above one camera (fused: "
-      "H_t), below two (fused: A_t∘H_c).");
+      "The paper's Fig. 10: the depth maps of four sub-intervals of a window are noisy; the fused "
+      "map is clean. Here: windows of 0.4 s with four sub-intervals. All maps have the reference "
+      "view of the window. Above: one camera (fused: H_t); below: two cameras (fused: A_t∘H_c).");
   const auto windows = recording.windows(run.pick(0.4, 0.1), run.pick(12, 1));
   const Method stereo_part = stereo(1);
   auto one = partsAndWhole(recording, windows, mono(1), mono(kParts));
@@ -209,9 +209,8 @@ void singleSubintervals(const StudyRun& run, const Recording& recording, StudySe
 void oneCameraAcrossTime(const StudyRun& run, const Recording& recording, StudySection& section) {
   section.heading("One camera fused across time");
   section.text(
-      "The paper (Sec. 4.4.2, Fig. 9) fuses four sub-intervals of one camera by the "
-      "harmonic mean: a light improvement, most of all where there is little data. "
-      "DSI projections are in study 9.");
+      "The paper (Sec. 4.4.2, Fig. 9) fuses four sub-intervals of one camera by the harmonic mean: "
+      "a light improvement, mainly with little data. DSI projections are in study 9.");
   std::vector<double> durations_s = {0.1, 0.2, 1};
   if (run.quick) durations_s = {0.1};
   for (const double duration_s : durations_s) {
@@ -229,7 +228,7 @@ void oneCameraAcrossTime(const StudyRun& run, const Recording& recording, StudyS
                       formatNumber(meanCm(without), 1) + " cm, bad-pix " +
                       formatNumber(badPercent(with), 1) + " against " +
                       formatNumber(badPercent(without), 1) + " %",
-                  "It keeps more points; at equal numbers its mean error is " +
+                  "It keeps more points. At equal numbers its mean error is " +
                       formatNumber(meanCm(results[1].equal), 1) + " against " +
                       formatNumber(meanCm(results[0].equal), 1) + " cm.");
   }

@@ -85,7 +85,7 @@ void judge(const std::vector<MethodResult>& results, const std::vector<MethodRes
   const double sum = votesOf(resultOf(results, "camera 0")) +
                      votesOf(resultOf(results, "camera 1")) +
                      votesOf(resultOf(results, "camera 2"));
-  section.trend("cameras are not handled by pairs: votes are the sum of the cameras'",
+  section.trend("cameras are not processed in pairs: the votes are the sum of the cameras' votes",
                 votesOf(three) == sum,
                 formatNumber(1e-6 * votesOf(three), 1) + " million a window, " +
                     formatNumber(1e-6 * sum, 1) + " million");
@@ -105,18 +105,17 @@ void studyThreeCameras(const StudyRun& run, StudySection& section) {
                                        fused("three", {0, 1, 2})};
   const auto results = compareMethods(recording, windows, methods);
   section.text(
-      "The paper (Sec. 4.8) fuses the three cameras of EVIMO2's rig and looks at the "
-      "maps. "
-      "Here, with exact truth: the preset `trinocular`, three fisheyes of 640x480, one of them in "
-      "portrait, that look up to 6° apart, in a furnished room; " +
+      "The paper (Sec. 4.8) fuses the three cameras of EVIMO2's rig and shows the maps. Here, with "
+      "exact truth: the preset `trinocular` with three fisheyes of 640x480 in a furnished room. "
+      "One is upright, and their directions differ by up to 6°; " +
       std::to_string(windows.size()) +
-      " windows of 0.2 s, planes from 0.8 to 4.5 m, the harmonic mean of any number of cameras, "
-      "always in the view of camera 0. Bad-pix is by the baseline of cameras 0 and 1.");
+      " windows of 0.2 s, planes from 0.8 to 4.5 m, the harmonic mean of all cameras, the view of "
+      "camera 0. Bad-pix uses the baseline of cameras 0 and 1.");
   section.table(errorTable(results, {true, false}));
   const auto within = whereAllSee(recording, results);
   section.text(
-      "The same where all three cameras, and each alone, have confidence: outside, a third camera "
-      "leaves nothing.");
+      "The same at the pixels where every combination of cameras has confidence. Outside of these "
+      "the three cameras together have none.");
   section.table(errorTable(within, {true, false}));
 
   std::vector<NamedPrecision> precision;
@@ -131,7 +130,7 @@ void studyThreeCameras(const StudyRun& run, StudySection& section) {
               grid);
   }
   section.picture("three_cameras.png", drawGrid(grid),
-                  "Depth (red 0.8 m to blue 4.5 m) and confidence, all in the view of camera 0");
+                  "Depth (red 0.8 m to blue 4.5 m) and confidence in the view of camera 0");
   judge(results, within, section);
 }
 

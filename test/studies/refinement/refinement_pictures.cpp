@@ -82,6 +82,6 @@ void drawRefinement(const RefinementCase& what, const RefinementDrawing& drawing
                   "The loop's map from above, with drift (seed 1), where the first poses coincide; "
                   "blue low, red high; grey lines: the true walls");
   section.picture("refinement_trajectory.png", sideBySide({drawPaths(drawing), drawDrift(drawing)}),
-                  "The same keyframes: where they stand, and how far from where they should");
+                  "The same keyframes: their positions, and their distances from the truth");
 }
 }  // namespace efm::studies

@@ -93,10 +93,9 @@ void sayLoops(const RefinementStudyResults& all, StudySection& section) {
       counts += (counts.empty() ? "" : ", ") + std::to_string(seed.loops) + " of " +
                 std::to_string(seed.loop_checks) + " (" + std::to_string(seed.loops_dropped) + ")";
     }
-    section.item(what.name +
-                 ": candidates of loops that held (and of these, were taken out again), "
-                 "by seed: " +
-                 counts + ".");
+    section.item(
+        what.name +
+        ": accepted candidates of loops (and of these, removed again), by seed: " + counts + ".");
   }
 }
 
