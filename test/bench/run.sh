@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Runs the benchmarks and writes DIR/performance.csv and DIR/performance.md. Builds nothing.
 #   run.sh [--quick] [--build DIR] [--out DIR] [GROUP ...] [--benchmark_...]
-# --quick     each case once and small: shows that everything runs, its times mean nothing
-# --build     the build folder; build/release where not given
-# --out       build/bench where not given
+# --quick     each case once and small: tests that everything runs. Its times mean nothing
+# --build     the build folder. Default: build/release
+# --out       Default: build/bench
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 build=$root/build/release

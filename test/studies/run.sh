@@ -2,11 +2,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Runs the studies and writes docs/studies.md and docs/studies/*.png.
 #   run.sh [--quick] [--build DIR] [--out DIR] [--cache DIR] [NAME ...]
-# --quick   tiny, into a folder that is removed: shows that every study runs through
-# --build   the build folder; build/release where not given, and then built
-# --out     docs where not given
-# --cache   simulated events; build/studies_cache where not given
-# NAME      studies; all of them where not given
+# --quick   tiny, into a temporary folder: tests that every study runs
+# --build   the build folder. Default: build/release, which is then built
+# --out     Default: docs
+# --cache   simulated events. Default: build/studies_cache
+# NAME      studies. Default: all
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../.." && pwd)
 build=
