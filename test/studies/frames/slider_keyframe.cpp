@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mapping/keyframes/keyframe_policy.h"
+#include "plugin/formats/event_text.h"
 #include "plugin/formats/uzh_text.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
