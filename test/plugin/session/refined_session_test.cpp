@@ -88,15 +88,19 @@ TEST(RefinedSessionMap, EqualsTheKeyframesAtTheirPosesAtAnyTime) {
   addEvents(session, recording);
   session.finish();
   std::vector<std::vector<ViewPoint>> points;
-  while (const auto keyframe = session.next()) {
-    points.push_back(session.pointsOf(*keyframe));
-    session.applyPending();
+  const auto expect_cloud_of_keyframes = [&] {
     GlobalCloud afresh(options.cloud);
     for (std::size_t i = 0; i < points.size(); ++i) {
       const Rigid3& T_world_ref = session.T_world_ref()[i];
       afresh.insert(i, pointsInWorld(points[i], T_world_ref), T_world_ref);
     }
     EXPECT_EQ(session.cloud().points().size(), afresh.points().size());
+  };
+  while (const auto keyframe = session.next()) {
+    points.push_back(session.pointsOf(*keyframe));
+    expect_cloud_of_keyframes();
+    session.applyPending();
+    expect_cloud_of_keyframes();
   }
   EXPECT_GE(points.size(), 10U);
   expectSameMap(session, undisturbed);
