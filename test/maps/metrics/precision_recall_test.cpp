@@ -84,7 +84,13 @@ RC_GTEST_PROP(PrecisionRecall, GrowWithTheThresholdAndAddUpOverMaps, ()) {
   const ComparedDepths b{drawMap(4, 5), drawMap(4, 5), {}};
   const PrecisionRecall of_a = precisionRecall(a, thresholds, {tolerance_px});
   PrecisionRecall sum = of_a;
-  sum.add(precisionRecall(b, thresholds, {tolerance_px}));
+  const PrecisionRecall of_b = precisionRecall(b, thresholds, {tolerance_px});
+  sum.add(of_b);
+
+  RC_ASSERT(sum.estimates == of_a.estimates + of_b.estimates);
+  RC_ASSERT(sum.truths == of_a.truths + of_b.truths);
+  RC_ASSERT(sum.estimates_without_truth ==
+            of_a.estimates_without_truth + of_b.estimates_without_truth);
 
   RC_ASSERT(of_a.estimates == pairDepths(a, {tolerance_px}).size());
   for (std::size_t k = 1; k < thresholds.size(); ++k) {

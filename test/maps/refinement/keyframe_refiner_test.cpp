@@ -454,6 +454,8 @@ TEST(KeyframeRefiner, CorrectsCurrentPosesOfTheTrackerAndStatesTheirCovariance) 
     const Matrix6d& covariance = refiner.covariance();
     EXPECT_TRUE(covariance.isApprox(covariance.transpose(), 1e-9));
     ASSERT_EQ(covariance.llt().info(), Eigen::Success) << seed;
+    EXPECT_LT(metresApart(refiner.T_world_odom() * tracked.back(), refiner.T_world_ref_denoised()),
+              1e-9);
     // The next pose of the tracker, between keyframes, with its own noise.
     const Rigid3 now = truth.back() * viewTurned(0.02, {0.02, 0, 0});
     const Rigid3 corrected =

@@ -226,6 +226,36 @@ TEST(PerturbedPoses, DriftInProportionToThePathLength) {
   }
 }
 
+TEST(PerturbedPoses, RotationNoiseIsAboutTheRigsAxes) {
+  auto poses = windingWay(50);
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(1.2, Eigen::Vector3d(1, 2, 3).normalized()));
+  PosePerturbationOptions options;
+  options.noise_rad = 0.1;
+  const auto noisy = perturbed(poses, options);
+  for (StampedPose& pose : poses) pose.T_world_rig.rotation = turn * pose.T_world_rig.rotation;
+  const auto noisy_turned = perturbed(poses, options);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_LT(
+        noisy_turned[i].T_world_rig.rotation.angularDistance(turn * noisy[i].T_world_rig.rotation),
+        1e-7);
+  }
+}
+
+TEST(PerturbedPoses, AHeadingThatDriftsBendsThePath) {
+  std::vector<StampedPose> straight;
+  for (int i = 0; i <= 100; ++i) {
+    straight.push_back({i * 1'000'000, {{1, 0, 0, 0}, {0.1 * i, 0, 0}}});
+  }
+  PosePerturbationOptions options;
+  options.drift.rad_per_m = 0.05;
+  const auto drifted = perturbed(straight, options);
+  for (std::size_t i = 1; i < drifted.size(); ++i) {
+    const Rigid3& T_world_rig = drifted[i].T_world_rig;
+    const Eigen::Vector3d step = T_world_rig.translation - drifted[i - 1].T_world_rig.translation;
+    EXPECT_LT((step - T_world_rig.rotation * Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-12);
+  }
+}
+
 TEST(PerturbedPoses, OneOptionDoesNotChangeTheRandomNumbersOfAnother) {
   const auto poses = windingWay(300);
   PosePerturbationOptions noise;
