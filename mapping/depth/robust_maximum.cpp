@@ -5,7 +5,7 @@
 
 namespace efm {
 
-void RobustMaximum::take(double value) {
+void RobustMaximum::add(double value) {
   values_.insert(std::upper_bound(values_.begin(), values_.end(), value), value);
 }
 

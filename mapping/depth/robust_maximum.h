@@ -11,7 +11,7 @@ namespace efm {
 class RobustMaximum {
  public:
   /// @param value finite. Cost: linear in the number of values, 8 bytes each.
-  void take(double value);
+  void add(double value);
   /// Nothing before the first value.
   std::optional<double> value() const;
 

@@ -24,7 +24,7 @@ constexpr NamedChoice<SubintervalShuffle> kShuffles[] = {
     {SubintervalShuffle::kRandom, "random"},
 };
 
-/// Fisher and Yates. Written out because the standard leaves open what std::shuffle draws.
+/// Fisher and Yates. std::shuffle may draw differently with another standard library.
 void shuffleWith(std::mt19937& random, std::vector<int>& items) {
   for (std::size_t left = items.size(); left > 1; --left) {
     std::swap(items[left - 1], items[random() % left]);

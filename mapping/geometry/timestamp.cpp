@@ -23,8 +23,8 @@ bool appendDigit(std::int64_t& value, int digit) {
   return true;
 }
 
-/// The digits of a decimal number without its point, and where the point stands: 0.d1 d2 d3 … times
-/// ten to the power of `point`.
+/// The digits of a decimal number without its point, and the position of the point: 0.d1 d2 d3 …
+/// times ten to the power of `point`.
 struct DecimalDigits {
   std::string_view integer;
   std::string_view fraction;

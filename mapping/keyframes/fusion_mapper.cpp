@@ -146,8 +146,8 @@ void FusionMapper::skipEmptyWindows() {
   counts_.windows_without_events += policy_->advancePast(*this, empty_until_ns);
 }
 
-/// Whether all events and poses of a window are here. A window that was asked for by itself is
-/// mapped at the end in any case.
+/// Whether all events and poses of a window are here. `only_window` is mapped at the end in any
+/// case.
 bool FusionMapper::isCovered(const Window& window) const {
   if (options_.only_window) {
     if (finished_) return true;

@@ -89,7 +89,7 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
     return mapCorrected({input, trajectory, options_.motion, sink, stages}, map_along);
   });
 
-  sequence_maximum_.take(keyframe.max_confidence);
+  sequence_maximum_.add(keyframe.max_confidence);
   if (options_.event_images) {
     for (const CameraEvents& camera : cameras)
       keyframe.event_images.push_back(eventImageOf(camera));
@@ -157,7 +157,7 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
   for (const VoteCounts& votes : swept.votes) keyframe.votes += votes;
   keyframe.max_confidence = maximumOf(swept.fused.peaks.confidence);
   RobustMaximum running_maximum = sequence_maximum_;
-  running_maximum.take(keyframe.max_confidence);
+  running_maximum.add(keyframe.max_confidence);
   const auto sequence_maximum =
       options_.sequence_maximum ? options_.sequence_maximum : running_maximum.value();
   keyframe.map = extractDepth(swept.fused, planes_, options_.extraction, sequence_maximum);

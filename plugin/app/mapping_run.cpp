@@ -208,9 +208,7 @@ std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recordi
   RobustMaximum maximum;
   MappingJob job;
   job.options = options;
-  job.on_keyframe = [&](const KeyframeDepthMap& keyframe) {
-    maximum.take(keyframe.max_confidence);
-  };
+  job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { maximum.add(keyframe.max_confidence); };
   StageSeconds ignored;
   Player(job, recording, ignored).play();
   return maximum.value();

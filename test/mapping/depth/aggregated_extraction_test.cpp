@@ -31,7 +31,7 @@ double ridge(double plane, double at, double sigma) {
 /// Upright edges, twelve pixels apart: their columns, and whether one is there.
 bool isOnEdge(int x) { return x % 12 == 6; }
 
-/// What a pixel has of the edge that it is beside, or on.
+/// Fraction of the votes of the nearest edge in a column of pixels.
 double acrossEdge(int x) {
   const double off = x % 12 - 6;
   return std::exp(-off * off / (2 * 0.7 * 0.7));
@@ -52,7 +52,7 @@ ChosenDsi edgesAt(double position, double sigma = 2) {
   return edges({60, 40}, 100, [=](int plane) { return 20 * ridge(plane, position, sigma); });
 }
 
-/// Edges whose depth differs from place to place, some of them wrong, and noise everywhere.
+/// Edges with different depths, some of them wrong, and noise everywhere.
 ChosenDsi randomEdges(std::uint32_t seed, const cv::Size& size, int planes) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
@@ -76,7 +76,7 @@ ChosenDsi randomEdges(std::uint32_t seed, const cv::Size& size, int planes) {
   return dsi;
 }
 
-TEST(AggregatedExtraction, OfRandomEdgesIsTheOracles) {
+TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
   int kept = 0;
   int differing = 0;
   for (const int planes : {1, 2, 3, 40, 100, 250}) {
@@ -137,7 +137,7 @@ TEST(AggregatedExtraction, ACleanPlaneOfEdgesHasItsDepthEverywhere) {
   }
 }
 
-TEST(AggregatedExtraction, AnEdgeAlongTheMotionIsRejectedBecauseItsRayIsFlat) {
+TEST(AggregatedExtraction, AnEdgeAlongTheMotionIsRejectedBecauseItsColumnIsFlat) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> noise(0, 0.01);
   std::vector<double> flat(100);
@@ -147,7 +147,7 @@ TEST(AggregatedExtraction, AnEdgeAlongTheMotionIsRejectedBecauseItsRayIsFlat) {
   EXPECT_EQ(cv::countNonZero(extract(edges({60, 40}, 100, ray)).depth), 0);
 }
 
-TEST(AggregatedExtraction, TwoPeaksAsHighAreRejectedAndOneOfThemAloneIsNot) {
+TEST(AggregatedExtraction, TwoEqualPeaksAreRejectedAndASinglePeakIsNot) {
   const auto with = [](double second) {
     return extract(edges({60, 40}, 100, [=](int plane) {
       return ridge(plane, 30, 2) + second * ridge(plane, 60, 2);
@@ -190,7 +190,7 @@ TEST(AggregatedExtraction, APixelThatDisagreesWithAllAroundItTakesTheirDepth) {
   EXPECT_NEAR(map.depth(20, 30), map.depth(16, 30), 0.01 * map.depth(16, 30));
 }
 
-TEST(AggregatedExtraction, PeaksOnTheOutermostPlanesAreKeptOnlyWhereThereAreNoOthers) {
+TEST(AggregatedExtraction, PeaksOnTheFirstAndLastPlaneAreKeptOnlyWithoutInnerPlanes) {
   for (const int planes : {1, 2, 3, 4, 100, 500}) {
     for (const int at : {0, planes - 1}) {
       const DepthMap map =
@@ -261,7 +261,7 @@ TEST(AggregatedExtraction, TheFrameIsClear) {
   }
 }
 
-TEST(AggregatedExtraction, OfAnEmptyDsiOrASmallViewIsEmpty) {
+TEST(AggregatedExtraction, AnEmptyDsiOrASmallViewGivesAnEmptyMap) {
   for (const cv::Size& size : {cv::Size(1, 1), {1, 7}, {3, 2}, {4, 4}, {16, 16}}) {
     for (const int planes : {1, 2, 100}) {
       const DepthMap empty = extract(ChosenDsi(size, planes));
@@ -276,7 +276,7 @@ TEST(AggregatedExtraction, OfAnEmptyDsiOrASmallViewIsEmpty) {
   }
 }
 
-TEST(AggregatedExtraction, TheSmallestThresholdsFindEveryRay) {
+TEST(AggregatedExtraction, TheSmallestThresholdsFindEveryColumn) {
   // Confidences that are all alike stand out by rounding alone.
   DepthExtractionOptions options;
   options.min_local_contrast = 1e-30;

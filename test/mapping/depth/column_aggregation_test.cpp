@@ -72,7 +72,7 @@ std::vector<double> naiveSum(const ChosenDsi& dsi, const cv::Mat1b& mask, const 
   return sum;
 }
 
-/// Two peaks as high as each other, as far as rounding tells.
+/// Two peaks of the same height up to rounding.
 bool isTie(const std::vector<double>& sum, double top) {
   return std::count_if(sum.begin(), sum.end(),
                        [&](double value) { return value > top * (1 - 1e-4); }) > 1;
@@ -117,7 +117,7 @@ void expectNaive(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   EXPECT_GT(compared, static_cast<int>(chosen.size()) * 9 / 10);
 }
 
-TEST(ColumnAggregation, IsTheNaiveOneForFewAndManyPlanesAndAnyFractionOfPixels) {
+TEST(ColumnAggregation, EqualsTheNaiveSumForAnyNumberOfPlanesAndPixels) {
   std::uint32_t seed = 0;
   for (const int planes : {1, 2, 3, 8, 100, 150, 500}) {
     for (const int one_of : {1, 3, 20}) {
@@ -128,13 +128,13 @@ TEST(ColumnAggregation, IsTheNaiveOneForFewAndManyPlanesAndAnyFractionOfPixels) 
   }
 }
 
-TEST(ColumnAggregation, OfViewsSmallerThanTheWindowIsTheNaiveOne) {
+TEST(ColumnAggregation, EqualsTheNaiveSumOnViewsSmallerThanTheWindow) {
   for (const cv::Size& size : {cv::Size(1, 1), {1, 9}, {5, 3}, {8, 8}}) {
     expectNaive(randomDsi(7, size, 40), cv::Mat1b(size, 255));
   }
 }
 
-TEST(ColumnAggregation, ALoneRidgeIsFoundBetweenPlanesWithItsWidth) {
+TEST(ColumnAggregation, ASingleRidgeIsFoundBetweenPlanesWithItsWidth) {
   for (const double at : {20.0, 20.25, 20.5, 33.8}) {
     ChosenDsi dsi({11, 11}, 100);
     dsi.setColumn({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
@@ -162,7 +162,7 @@ TEST(ColumnAggregation, NeighboursMoveAWrongPeakToTheirs) {
   EXPECT_NEAR(peaks[4 * 9 + 4].position, 20, 0.02);
 }
 
-TEST(ColumnAggregation, OnlyChosenPixelsAreSummed) {
+TEST(ColumnAggregation, OnlyPixelsOfTheMaskAreSummed) {
   ChosenDsi dsi({9, 9}, 60);
   for (int y = 0; y < 9; ++y) {
     for (int x = 0; x < 9; ++x) {

@@ -86,7 +86,7 @@ LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
       }
     }
   }
-  // The least of the positions that have half of the weight at or below them.
+  // The smallest position with half of the weight at or below it.
   double median = INFINITY;
   for (const auto& candidate : around) {
     double at_or_below = 0;
@@ -102,7 +102,7 @@ LocalAgreement naive(const Depths& depths, const cv::Point& pixel) {
           static_cast<float>(others > 0 ? agreeing / others : 0)};
 }
 
-TEST(LocalAgreement, IsTheNaiveOneForDenseAndSparsePixels) {
+TEST(LocalAgreement, EqualsTheNaiveOneOnDenseAndSparsePixels) {
   for (const cv::Size& size : {cv::Size(40, 30), {9, 40}, {3, 3}, {1, 1}}) {
     for (const int one_of : {1, 4, 30}) {
       const Depths depths = randomDepths(static_cast<std::uint32_t>(one_of), size, one_of);
@@ -128,7 +128,7 @@ TEST(LocalAgreement, OfASinglePixelIsItsOwnDepthAndNoFraction) {
   EXPECT_EQ(alone.agreeing_fraction, 0);
 }
 
-TEST(LocalAgreement, ThoseWithinNearAgreeAndTheMedianHasHalfTheWeight) {
+TEST(LocalAgreement, NearPositionsAgreeAndTheMedianHasHalfTheWeight) {
   Depths depths({20, 20});
   depths.keep({10, 10}, 30, 1);
   depths.keep({9, 10}, 32.4F, 1);   // within 2.5
@@ -139,7 +139,7 @@ TEST(LocalAgreement, ThoseWithinNearAgreeAndTheMedianHasHalfTheWeight) {
   EXPECT_NEAR(found.spread, 0.2, 1e-5) << "of 0, 0.2 and 2.6";
 }
 
-TEST(LocalAgreement, OfTwoWithTheSameWeightTheMedianIsTheNearer) {
+TEST(LocalAgreement, OfTwoEqualWeightsTheMedianIsTheNearerDepth) {
   Depths depths({20, 20});
   depths.keep({10, 10}, 40);
   depths.keep({11, 10}, 30);

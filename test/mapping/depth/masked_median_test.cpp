@@ -41,7 +41,7 @@ std::vector<float> naiveMedian(const cv::Mat1b& mask, const std::vector<float>& 
   return medians;
 }
 
-TEST(SparseMask, AreThoseOfTheMaskInTheOrderOfTheImage) {
+TEST(SparseMask, HasThePixelsOfTheMaskRowByRow) {
   const cv::Mat1b mask = (cv::Mat1b(3, 4) << 0, 1, 0, 255, 0, 0, 0, 0, 1, 0, 0, 1);
   const SparseMask kept(mask);
   std::vector<cv::Point> pixels;
@@ -54,9 +54,9 @@ TEST(SparseMask, AreThoseOfTheMaskInTheOrderOfTheImage) {
   EXPECT_EQ(kept.rowBegin(1), kept.rowBegin(2)) << "an empty row";
 }
 
-TEST(SparseMask, OfAnEmptyImageAreNone) { EXPECT_EQ(SparseMask(cv::Mat1b()).size(), 0U); }
+TEST(SparseMask, OfAnEmptyImageIsEmpty) { EXPECT_EQ(SparseMask(cv::Mat1b()).size(), 0U); }
 
-TEST(MaskedMedian, IsThatOfTheSortedWindow) {
+TEST(MaskedMedian, EqualsTheMedianOfTheSortedWindow) {
   std::mt19937 random(1);
   for (int trial = 0; trial < 60; ++trial) {
     const int width = 1 + static_cast<int>(random() % 40);

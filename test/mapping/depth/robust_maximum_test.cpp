@@ -16,18 +16,18 @@ namespace {
 
 TEST(RobustMaximum, IsNothingBeforeTheFirstValue) { EXPECT_FALSE(RobustMaximum().value()); }
 
-TEST(RobustMaximum, IsThePlainMaximumOfFewerThanTwentyValues) {
+TEST(RobustMaximum, IsTheMaximumOfFewerThanTwentyValues) {
   RobustMaximum maximum;
   for (int i = 1; i <= 19; ++i) {
-    maximum.take(i % 2 == 0 ? i : -i);
+    maximum.add(i % 2 == 0 ? i : -i);
     EXPECT_EQ(*maximum.value(), i == 1 ? -1 : i / 2 * 2);
   }
 }
 
 TEST(RobustMaximum, OneOutlierInTwentyDoesNotMoveIt) {
   RobustMaximum maximum;
-  maximum.take(1e9);
-  for (int i = 1; i <= 19; ++i) maximum.take(i);
+  maximum.add(1e9);
+  for (int i = 1; i <= 19; ++i) maximum.add(i);
   EXPECT_EQ(*maximum.value(), 19);
 }
 
@@ -37,7 +37,7 @@ TEST(RobustMaximum, IsTheSmallestValueThatNinetyFivePercentDoNotExceed) {
   std::vector<double> values;
   for (int n = 1; n <= 300; ++n) {
     const double value = static_cast<double>(random() % 100);  // many of them equal
-    maximum.take(value);
+    maximum.add(value);
     values.push_back(value);
     std::vector<double> sorted = values;
     std::sort(sorted.begin(), sorted.end());
@@ -75,7 +75,7 @@ TEST(RobustMaximum, OfTheKeyframesSoFarIsTheWhiteLevelOfTheSequence) {
     double largest = 0;
     cv::minMaxLoc(keyframe.map.confidence, nullptr, &largest);
     EXPECT_EQ(keyframe.max_confidence, largest);
-    maximum.take(largest);
+    maximum.add(largest);
     const cv::Mat1b kept = keyframe.map.depth > 0;
     EXPECT_EQ(cv::countNonZero(kept != keptWith(keyframe.map.confidence, *maximum.value())), 0);
     if (cv::countNonZero(kept != keptWith(keyframe.map.confidence, largest)) > 0) ++unlike_its_own;

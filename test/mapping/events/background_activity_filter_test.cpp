@@ -29,14 +29,14 @@ TEST(BackgroundActivityFilter, EachOfTheEightNeighboursSupportsAnEventAndNoOther
   }
 }
 
-TEST(BackgroundActivityFilter, SupportLastsAsLongAsAskedFor) {
+TEST(BackgroundActivityFilter, SupportLastsForTheGivenTime) {
   BackgroundActivityFilter filter(9, 9, 5 * kMs);
   filter.isIsolated(eventAt(100 * kMs, 4, 4));
   EXPECT_FALSE(filter.isIsolated(eventAt(105 * kMs, 5, 4)));
   EXPECT_TRUE(filter.isIsolated(eventAt(110 * kMs + 1, 4, 4)));
 }
 
-TEST(BackgroundActivityFilter, DecidesAsTheWholePastDoes) {
+TEST(BackgroundActivityFilter, EqualsTheDefinitionOverTheWholePast) {
   int isolated = 0;
   int supported = 0;
   for (std::uint32_t seed = 1; seed <= 10; ++seed) {

@@ -68,7 +68,7 @@ TEST(EventFilter, AnEventOfAHotPixelSupportsNoOther) {
   EXPECT_TRUE(filter.keeps({1042 * kMs, 9, 7, true}));
 }
 
-TEST(EventFilter, SwitchedOffItKeepsEverything) {
+TEST(EventFilter, KeepsEverythingWhenSwitchedOff) {
   EventFilterOptions off;
   off.hot_pixels = false;
   EXPECT_FALSE(off.any());
@@ -85,7 +85,7 @@ TEST(EventFilter, InvalidTimesAreNamed) {
                                           [](auto& o) { o.background_activity_s = 10.5; });
 }
 
-TEST(FilteredMapping, WhatTheFilterLeavesOutIsCountedAndTheRestIsMapped) {
+TEST(FilteredMapping, RemovedEventsAreCountedAndTheOthersAreMapped) {
   for (std::uint32_t seed = 1; seed <= 3; ++seed) {
     const LongRecording recording = recordingWithHotPixels(seed);
     const Played filtered = test::play(recording, filteredOptions(), 0);
@@ -123,7 +123,7 @@ TEST(FilteredMapping, WhatTheFilterLeavesOutIsCountedAndTheRestIsMapped) {
   }
 }
 
-TEST(FilteredMapping, LateEventsAreFilteredInTheirPlace) {
+TEST(FilteredMapping, LateEventsAreFilteredInTimeOrder) {
   LongRecording recording = recordingWithHotPixels(4);
   for (std::vector<Event>& events : recording.events) {
     // Each at a time of its own, so that there is one right order.
@@ -133,7 +133,7 @@ TEST(FilteredMapping, LateEventsAreFilteredInTheirPlace) {
   }
   const Played in_order = test::play(recording, filteredOptions(), 0);
   for (std::vector<Event>& events : recording.events) {
-    // Blocks of some 5 ms the other way round.
+    // Blocks of some 5 ms in reverse.
     for (std::size_t i = 0; i + 20 <= events.size(); i += 20) {
       const auto first = events.begin() + static_cast<std::ptrdiff_t>(i);
       std::reverse(first, first + 20);

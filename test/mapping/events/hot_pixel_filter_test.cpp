@@ -61,21 +61,21 @@ std::vector<bool> naivelyHot(const std::vector<Event>& events, int width, int he
   return hot;
 }
 
-TEST(HotPixelFilter, APixelThatFiresAloneIsHotFromTheEventThatMakesItJudged) {
+TEST(HotPixelFilter, APixelThatFiresAloneIsHotFromMinEventsOn) {
   HotPixelFilter filter(20, 10, fewEvents());
   for (int i = 1; i <= 40; ++i) {
     EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3)), i >= 6) << i;
   }
 }
 
-TEST(HotPixelFilter, APixelIsForgivenOnceItRests) {
+TEST(HotPixelFilter, APixelIsNotHotAfterAQuietPeriod) {
   HotPixelFilter filter(20, 10, fewEvents());
   for (int i = 0; i < 40; ++i) filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3));
   EXPECT_TRUE(filter.isHot(eventAt(1199 * kMs, 7, 3))) << "in the period after";
   EXPECT_FALSE(filter.isHot(eventAt(1300 * kMs, 7, 3))) << "a whole period of one event later";
 }
 
-TEST(HotPixelFilter, NoPixelOfAnEdgeThatMovesIsHotHoweverStrongItIs) {
+TEST(HotPixelFilter, NoPixelOfAMovingEdgeIsHot) {
   HotPixelFilter filter(20, 10, fewEvents());
   for (int step = 0; step < 60; ++step) {
     const int x = step % 20;  // to the right border, and again from the left
@@ -87,7 +87,7 @@ TEST(HotPixelFilter, NoPixelOfAnEdgeThatMovesIsHotHoweverStrongItIs) {
   }
 }
 
-TEST(HotPixelFilter, OfALineThatFlickersInPlaceOnlyTheEndsAre) {
+TEST(HotPixelFilter, OnlyTheEndsOfAFlickeringLineAreHot) {
   HotPixelFilter filter(20, 10, fewEvents());
   for (int burst = 1; burst <= 100; ++burst) {
     for (int y = 2; y < 8; ++y) {
@@ -106,14 +106,14 @@ TEST(HotPixelFilter, ManyMoreEventsThanFitACountAreStillHot) {
   EXPECT_TRUE(hot);
 }
 
-TEST(HotPixelFilter, DecidesAsTheWholePastDoes) {
+TEST(HotPixelFilter, EqualsTheDefinitionOverTheWholePast) {
   int found = 0;
   for (std::uint32_t seed = 1; seed <= 20; ++seed) {
     test::RandomScene random(seed);
     CameraModel small = test::smallCamera();
     small.width = seed == 1 ? 1 : 6;
     small.height = 5;
-    // Before time 0 too; few pixels, so that busy ones stand beside each other.
+    // Also before time 0; few pixels, so that busy ones are adjacent.
     std::vector<Event> events = random.events(small, 900, -300 * kMs, 900 * kMs);
     for (Event& event : events) {
       const double kind = random.uniform(0, 1);
@@ -133,7 +133,7 @@ TEST(HotPixelFilter, DecidesAsTheWholePastDoes) {
   EXPECT_GT(found, 1000) << "both answers are there";
 }
 
-TEST(HotPixelOptions, ValuesOutOfRangeAreErrorsThatNameThem) {
+TEST(HotPixelOptions, InvalidValuesAreNamed) {
   test::expectRefused<HotPixelOptions>("hot_pixel_ratio = 1.8999", [](auto& o) { o.ratio = 1.9; });
   test::expectRefused<HotPixelOptions>("hot_pixel_period_s = 0: must be",
                                        [](auto& o) { o.period_s = 0; });

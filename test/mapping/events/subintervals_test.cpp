@@ -19,7 +19,7 @@ using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kNow_ns = 1'700'000'000'000'000'003;
 
-/// Events at these times, told apart by their pixel.
+/// Events at these times, each with its own pixel.
 std::vector<Event> eventsAt(const std::vector<std::int64_t>& times_ns) {
   std::vector<Event> events;
   for (const std::int64_t t_ns : times_ns) {
@@ -128,7 +128,7 @@ TEST(Subintervals, FewerEventsThanPartsLeavePartsEmpty) {
   }
 }
 
-TEST(SubintervalShuffle, NoneLetsTheSameSubintervalsMeet) {
+TEST(SubintervalShuffle, NoneFusesTheSameSubintervals) {
   const auto slots = assignSubintervals(3, into(4, SubintervalSplit::kDuration));
   ASSERT_EQ(slots.size(), 3U);
   for (const auto& camera : slots) EXPECT_THAT(camera, ElementsAre(0, 1, 2, 3));
@@ -183,7 +183,7 @@ TEST(SubintervalShuffle, EveryPermutationComesAboutEquallyOften) {
   for (const auto& [permutation, count] : seen) EXPECT_NEAR(count, 1000, 145);
 }
 
-TEST(Subintervals, OptionsAndNamesThatCannotBeAreNamed) {
+TEST(Subintervals, InvalidOptionsAndNamesAreNamed) {
   EXPECT_THAT([] { into(0, SubintervalSplit::kCount).validate(); },
               ThrowsMessage<std::invalid_argument>(HasSubstr("subintervals = 0")));
   EXPECT_THAT([] { into(1001, SubintervalSplit::kCount).validate(); },

@@ -15,7 +15,7 @@ using test::RandomScene;
 constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
 constexpr std::int64_t kLength_ns = 10'000'000;
 
-/// The largest difference to what the transforms say one by one, metres and 1.
+/// The maximum difference to the product of the transforms, metres and 1.
 double differenceToChain(const TrajectorySegment& segment, const Rigid3& T_ref_world,
                          const Rigid3& T_rig_cam) {
   const CameraMotion motion(segment, T_ref_world, T_rig_cam);
@@ -47,7 +47,7 @@ TEST(CameraMotion, IsTheProductOfTheTransforms) {
   }
 }
 
-TEST(CameraMotion, TurnsAlongTheShorterArcWhateverTheSignsOfTheQuaternions) {
+TEST(CameraMotion, RotatesAlongTheShorterArcForAnySignsOfTheQuaternions) {
   RandomScene random(2);
   const Rigid3 T_world_rig = random.pose(1, 1);
   TrajectorySegment segment{{kStart_ns, T_world_rig},

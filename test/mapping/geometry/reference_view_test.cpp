@@ -39,7 +39,7 @@ void expectTheSameImageCorners(const ReferenceView& view) {
   }
 }
 
-TEST(ReferenceView, IsTheCamerasOwnWhereNothingIsAsked) {
+TEST(ReferenceView, IsTheCamerasOwnByDefault) {
   const ReferenceView view = makeReferenceView(kModel, {});
   EXPECT_EQ(view.width, 120);
   EXPECT_EQ(view.height, 80);
@@ -49,7 +49,7 @@ TEST(ReferenceView, IsTheCamerasOwnWhereNothingIsAsked) {
   EXPECT_EQ(view.cy, 37.1);
 }
 
-TEST(ReferenceView, ASizeAloneKeepsWhatTheImageShows) {
+TEST(ReferenceView, ASizeAloneKeepsTheFieldOfView) {
   for (const auto& options : {sized(240, std::nullopt), sized(std::nullopt, 40), sized(240, 160),
                               sized(60, 80), sized(120, 80), sized(77, 13), sized(1, 1)}) {
     expectTheSameImageCorners(makeReferenceView(kModel, options));

@@ -36,14 +36,14 @@ TEST(Timestamp, DigitsBelowANanosecondAreRounded) {
   EXPECT_THAT(parseSeconds("0.9999999999"), Optional(Eq(1'000'000'000)));
 }
 
-TEST(Timestamp, WhatIsNotANumberIsRefused) {
+TEST(Timestamp, TextThatIsNotANumberIsRefused) {
   for (const char* text : {"", "-", ".", "abc", "1,5", "0x10", "1.5s", "1 ", " 1", "1e", "nan",
                            "inf", "1.2.3", "--1", "1e99999", "1e+-5", "1e-+5", "1e-2147483648"}) {
     EXPECT_EQ(parseSeconds(text), std::nullopt) << "'" << text << "'";
   }
 }
 
-TEST(Timestamp, WhatDoesNotFitIsRefused) {
+TEST(Timestamp, NumbersThatDoNotFitAreRefused) {
   EXPECT_THAT(parseSeconds("9223372036.854775807"),
               Optional(Eq(std::numeric_limits<std::int64_t>::max())));
   EXPECT_EQ(parseSeconds("9223372036.854775808"), std::nullopt);

@@ -31,7 +31,7 @@ TEST(Trajectory, PositionIsLinearAndRotationSlerpsBetweenPoses) {
   EXPECT_NEAR(Eigen::AngleAxisd(T_world_rig->rotation).angle(), 0.3, 1e-12);
 }
 
-TEST(Trajectory, RotationTakesTheShorterArcWhateverTheSignOfTheQuaternion) {
+TEST(Trajectory, RotationTakesTheShorterArcForAnySignOfTheQuaternion) {
   StampedPose flipped = at(100, 0, 0.4);
   flipped.T_world_rig.rotation.coeffs() *= -1;
   const auto T_world_rig = trajectoryOf({at(0, 0, 0.2), flipped}).poseAt(50);
@@ -59,14 +59,14 @@ TEST(Trajectory, AGapHasNoPoseButItsEndsDo) {
   EXPECT_EQ(trajectory.poseAt(250'000'000)->translation.x(), 1);
 }
 
-TEST(Trajectory, OnePoseAloneHoldsAtItsOwnTime) {
+TEST(Trajectory, ASinglePoseHoldsAtItsOwnTimeOnly) {
   const Trajectory trajectory = trajectoryOf({at(1'700'000'000'000'000'001, 4)});
   EXPECT_FALSE(trajectory.poseAt(1'700'000'000'000'000'000));
   ASSERT_TRUE(trajectory.poseAt(1'700'000'000'000'000'001));
   EXPECT_FALSE(trajectory.poseAt(1'700'000'000'000'000'002));
 }
 
-TEST(Trajectory, OfTwoPosesWithTheSameTimeTheFirstStands) {
+TEST(Trajectory, OfTwoPosesAtTheSameTimeTheFirstStays) {
   Trajectory trajectory;
   EXPECT_TRUE(trajectory.add(at(5, 1)));
   EXPECT_FALSE(trajectory.add(at(5, 2)));
@@ -78,7 +78,7 @@ TEST(Trajectory, PosesMayComeInAnyOrder) {
   EXPECT_NEAR(trajectory.poseAt(15)->translation.x(), 1.5, 1e-12);
 }
 
-TEST(Trajectory, WhatIsNotAPoseIsRefused) {
+TEST(Trajectory, InvalidPosesAreRefused) {
   Trajectory trajectory;
   EXPECT_THROW(trajectory.add(at(0, std::numeric_limits<double>::quiet_NaN())),
                std::invalid_argument);

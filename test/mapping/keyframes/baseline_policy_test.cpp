@@ -82,7 +82,7 @@ TEST(BaselinePolicy, TheMeanDepthIsThatOfTheLastKeyframe) {
       << "a window without a keyframe changes nothing";
 }
 
-TEST(BaselinePolicy, TurningInPlaceEndsAWindowOnceTooLittleIsLeftInView) {
+TEST(BaselinePolicy, RotationEndsAWindowOnceTooFewPointsAreInView) {
   const auto recording =
       recordingOf([](std::int64_t t_ns) { return turned(0.5 * secondsSinceStart(t_ns)); });
   KeyframePolicyOptions turning = options(1.0, 0.02);
@@ -127,11 +127,11 @@ TEST(BaselinePolicy, AScenePassesOutOfViewAlsoBehindTheCamera) {
   EXPECT_EQ(policy.current(recording)->t1_ns, kStart_ns + 50 * kMs) << "one stride is enough";
 }
 
-TEST(BaselinePolicy, StandingStillAfterATurnMakesOneKeyframeNotOnePerStride) {
+TEST(BaselinePolicy, RestAfterARotationMakesOneKeyframeNotOnePerStride) {
   BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
   const KeyframeDepthMap seen = keyframeThatSaw(2);
   policy.advance({kStart_ns, kStart_ns, kStart_ns}, &seen);
-  // The camera has turned away from all that and stands still now: nothing to triangulate.
+  // The camera looks away from these points and is at rest: there is nothing to triangulate.
   const auto recording = recordingOf([](std::int64_t) { return turned(3.1); });
   const auto window = policy.current(recording);
   ASSERT_TRUE(window);
@@ -141,7 +141,7 @@ TEST(BaselinePolicy, StandingStillAfterATurnMakesOneKeyframeNotOnePerStride) {
   EXPECT_GT(policy.earliestStart(recording), kStart_ns + 2900 * kMs) << "its events are let go";
 }
 
-TEST(BaselinePolicy, WhereTheLongestWindowIsNotEnoughTheStartMovesOnByAStride) {
+TEST(BaselinePolicy, IfTheLongestWindowIsNotEnoughTheStartMovesOnByAStride) {
   BaselinePolicy policy(options(0.5, 0.1), kDepthGuess_m);
   // Still for a second, then 1 m/s: 0.2 m after 1.2 s.
   const auto recording = recordingOf(
@@ -168,7 +168,7 @@ TEST(BaselinePolicy, WaitsWhileTheRecordingIsNotCompleteAndThenDecidesTheSame) {
   EXPECT_EQ(policy.current(recording)->t1_ns, kStart_ns + 250 * kMs);
 }
 
-TEST(BaselinePolicy, GapsInThePosesAreGrownAcrossOrLeftBehind) {
+TEST(BaselinePolicy, WindowsGrowAcrossGapsInThePosesOrStartAfterThem) {
   // No pose before 0.32 s and none from 0.4 to 0.58 s.
   const auto recording = recordingOf([](std::int64_t t_ns) -> std::optional<Rigid3> {
     const double t_s = secondsSinceStart(t_ns);
@@ -184,7 +184,7 @@ TEST(BaselinePolicy, GapsInThePosesAreGrownAcrossOrLeftBehind) {
   EXPECT_EQ(policy.current(recording)->t0_ns, kStart_ns + 600 * kMs);
 }
 
-TEST(BaselinePolicy, StartsAtAnEventHoweverLongThereIsNone) {
+TEST(BaselinePolicy, StartsAtTheNextEventAfterAnyGap) {
   auto recording = recordingOf([](std::int64_t t_ns) { return moved(secondsSinceStart(t_ns)); });
   recording.events_ns = {kStart_ns + 3'500 * kMs, kStart_ns + 3'501 * kMs};
   BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);

@@ -77,13 +77,13 @@ TEST(EdgeCase, AnEventAtT1IsOutsideAndOneANanosecondBeforeInside) {
   EXPECT_EQ(mapper.counts().total().outside_window, 2U);
 }
 
-TEST(EdgeCase, APoseAtAnEventServesItWhateverSurroundsThem) {
+TEST(EdgeCase, APoseAtTheTimeOfAnEventServesItBetweenGaps) {
   FusionMapperOptions single = options();
   single.trajectory.max_pose_gap_s = 0.02;
   single.only_window = Window{kStart_ns, kStart_ns + 100 * kMs, kStart_ns + 50 * kMs};
   FusionMapper mapper(single);
   mapper.addCamera({test::smallCamera(), {}, 0});
-  // The pose in the middle stands alone between two gaps.
+  // The pose in the middle lies between two gaps.
   for (const int ms : {0, 50, 100}) mapper.addPose({kStart_ns + ms * kMs, {}});
   mapper.addEvents(0, {eventAt(kStart_ns), eventAt(kStart_ns + 50 * kMs - 1),
                        eventAt(kStart_ns + 50 * kMs), eventAt(kStart_ns + 50 * kMs + 1)});
@@ -96,7 +96,7 @@ TEST(EdgeCase, APoseAtAnEventServesItWhateverSurroundsThem) {
   EXPECT_EQ(mapper.counts().total().used, 2U);
 }
 
-TEST(EdgeCase, OnePoseAloneMakesNoWindowExceptTheOneThatWasAskedFor) {
+TEST(EdgeCase, ASinglePoseMakesNoWindowExceptTheOnlyWindow) {
   for (const bool asked_for : {false, true}) {
     for (const auto policy : {KeyframePolicyKind::kPeriod, KeyframePolicyKind::kEvents,
                               KeyframePolicyKind::kBaseline}) {

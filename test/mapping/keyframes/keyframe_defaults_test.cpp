@@ -159,7 +159,7 @@ TEST(KeyframeDefaults, ASilentCameraIsNamedAndSilencesTheMap) {
   EXPECT_EQ(keyframe.silent_subintervals, 0U) << "of the cameras that are not silent";
 }
 
-TEST(KeyframeDefaults, WhereOneCameraIsLeftItsSlicesStandForCameras) {
+TEST(KeyframeDefaults, TheSlicesOfASingleRemainingCameraAreFusedLikeCameras) {
   MovingEdges recording(2);
   recording.events[1].clear();
   KeyframeMapperOptions options = defaults();

@@ -45,7 +45,7 @@ void expectNear(const Rigid3& a, const Rigid3& b) {
   EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-7);  // as good as acos is near 1
 }
 
-TEST(KeyframeMapper, TheReferenceStandsWhereItsCameraIsAtTheReferenceTime) {
+TEST(KeyframeMapper, TheReferenceViewIsAtItsCameraAtTheReferenceTime) {
   const Recording recording(1, 3, 500);
   for (int reference = 0; reference < 3; ++reference) {
     KeyframeMapperOptions options = fewPlanes();
@@ -146,7 +146,7 @@ TEST(KeyframeMapper, EventImagesHaveTheSizeOfTheSensorNotOfTheView) {
   EXPECT_EQ(keyframe.event_images.at(0).counts.size(), cv::Size(48, 36));
 }
 
-TEST(KeyframeMapper, ASilentCameraThatIsExcludedMightAsWellNotBeThere) {
+TEST(KeyframeMapper, AnExcludedSilentCameraChangesNothing) {
   Recording recording(6, 3, 4000);
   recording.events[1].clear();
   for (const auto shuffle :
@@ -186,7 +186,7 @@ TEST(KeyframeMapper, WithoutAPoseACameraIsAsSilentAsWithoutEvents) {
   EXPECT_GT(keyframe.max_confidence, 0);
 }
 
-TEST(KeyframeMapper, WhatCannotBeIsNamed) {
+TEST(KeyframeMapper, InvalidOptionsAreNamed) {
   const Recording recording(11, 2, 10);
   KeyframeMapperOptions options = fewPlanes();
   options.reference_camera = 2;

@@ -49,7 +49,7 @@ TEST(KeyframePolicy, ForwardLookingVehiclesReferToTheEnd) {
   EXPECT_EQ(policy->current(startingAt(0))->t_ref_ns, 500'000'000);
 }
 
-TEST(KeyframePolicy, WindowsThatEndByATimeArePassedTogether) {
+TEST(KeyframePolicy, WindowsBeforeATimeAreSkippedTogether) {
   const auto policy = makeKeyframePolicy(period(0.5, 0.2), kDepthGuess_m);
   EXPECT_EQ(policy->advancePast(startingAt(0), 499'999'999), 0U);
   EXPECT_EQ(policy->advancePast(startingAt(0), 500'000'000), 1U);

@@ -152,7 +152,7 @@ struct Found {
   KeyframeDepthMap keyframe;
 };
 
-/// Where the reference view stands and what it sees is worked out here, beside the mapper.
+/// The reference view and its pose are computed here, independent of the mapper.
 Found mapPoints(const ViewCase& view_case) {
   const MovingRig moving;
   KeyframeMapperOptions options;
@@ -183,7 +183,7 @@ Found mapPoints(const ViewCase& view_case) {
   return found;
 }
 
-TEST(KnownPoints, AreFoundWhereTheyAreWhateverTheReferenceView) {
+TEST(KnownPoints, AreFoundInAnyReferenceView) {
   for (const ViewCase& view_case : viewCases()) {
     const Found found = mapPoints(view_case);
     EXPECT_GE(found.points.size(), 15U) << view_case.name;
@@ -195,7 +195,7 @@ TEST(KnownPoints, AreFoundWhereTheyAreWhateverTheReferenceView) {
   }
 }
 
-TEST(KnownPoints, AreNotFartherOffThanTheVarianceSays) {
+TEST(KnownPoints, HaveErrorsWithinTheirVariance) {
   double squared_errors = 0;
   double variances = 0;
   const Found found = mapPoints(viewCases().front());

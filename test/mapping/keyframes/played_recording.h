@@ -15,7 +15,7 @@
 
 namespace efm::test {
 
-/// What a mapper made of a recording.
+/// The output of a mapper for a recording.
 struct Played {
   std::vector<KeyframeDepthMap> keyframes;
   MapperCounts counts;
@@ -75,8 +75,8 @@ inline FusionMapperOptions playedOptions() {
   return options;
 }
 
-/// Hands a recording to a mapper in packets of random sizes and in a random order; seed 0 hands it
-/// over whole. Its duration is below the second that lets a camera pass for silent.
+/// Gives a recording to a mapper in packets of random sizes and in random order; with seed 0 as a
+/// whole. Its duration is below the second that lets a camera pass for silent.
 inline Played play(const LongRecording& recording, const FusionMapperOptions& options,
                    std::uint32_t cut_seed) {
   Played played;

@@ -21,22 +21,23 @@ class RandomScene {
     return std::uniform_real_distribution<double>(from, to)(random_);
   }
 
-  /// A pose at most `reach_m` from the origin, turned by at most `angle_rad`.
-  Rigid3 pose(double reach_m, double angle_rad) {
+  /// A pose at most `distance_m` from the origin on each axis, rotated by at most `angle_rad`.
+  Rigid3 pose(double distance_m, double angle_rad) {
     const Eigen::Vector3d axis(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
     return {
         Eigen::Quaterniond(Eigen::AngleAxisd(uniform(-angle_rad, angle_rad), axis.normalized())),
-        Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)) * reach_m};
+        Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)) * distance_m};
   }
 
   /// Hand-held motion: a pose every 5 ms, metres and radians per second as given.
-  Trajectory motion(std::int64_t t0_ns, double duration_s, double speed_m_s, double turn_rad_s) {
+  Trajectory motion(std::int64_t t0_ns, double duration_s, double speed_m_s,
+                    double rotation_rad_s) {
     constexpr double kStep_s = 0.005;
     Trajectory trajectory;
     Rigid3 T_world_rig = pose(0.1, 0.1);
     for (int i = 0; i * kStep_s <= duration_s + kStep_s; ++i) {
       trajectory.add({t0_ns + i * 5'000'000, T_world_rig});
-      T_world_rig = T_world_rig * pose(speed_m_s * kStep_s, turn_rad_s * kStep_s);
+      T_world_rig = T_world_rig * pose(speed_m_s * kStep_s, rotation_rad_s * kStep_s);
     }
     return trajectory;
   }

@@ -47,7 +47,7 @@ std::string labelOf(const FusionMapperOptions& options, std::uint32_t seed) {
   return std::string(nameOf(options.keyframes.policy)) + ", seed " + std::to_string(seed);
 }
 
-/// Hands the recording over whole and in three other ways. @return the keyframes.
+/// Plays the recording as a whole and in three other ways. @return the number of keyframes.
 std::size_t expectTheSameHoweverCut(const LongRecording& recording,
                                     const FusionMapperOptions& options, const std::string& label) {
   const Played whole = play(recording, options, 0);
@@ -78,7 +78,7 @@ std::size_t expectTheSameHoweverCut(const LongRecording& recording,
   return whole.keyframes.size();
 }
 
-TEST(WindowPolicies, HowARecordingIsCutIntoPacketsNeverChangesTheResult) {
+TEST(WindowPolicies, TheResultDoesNotDependOnThePackets) {
   std::vector<FusionMapperOptions> all = allPolicies();
   for (const std::size_t filtered : {0, 2}) {
     all.push_back(all[filtered]);
@@ -94,7 +94,7 @@ TEST(WindowPolicies, HowARecordingIsCutIntoPacketsNeverChangesTheResult) {
   }
 }
 
-TEST(WindowPolicies, NorWhereEventsAreFewAndFarBetween) {
+TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithFewEvents) {
   std::size_t keyframes = 0;
   for (FusionMapperOptions options : allPolicies()) {
     options.keyframes.window_events = 3;
@@ -107,7 +107,7 @@ TEST(WindowPolicies, NorWhereEventsAreFewAndFarBetween) {
   EXPECT_GE(keyframes, 500U);
 }
 
-TEST(WindowPolicies, NorWhereCamerasStartLateAndPosesAreMissing) {
+TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithLateCamerasAndMissingPoses) {
   std::size_t keyframes = 0;
   for (FusionMapperOptions options : allPolicies()) {
     options.keyframes.window_events = 40;
@@ -123,7 +123,7 @@ TEST(WindowPolicies, NorWhereCamerasStartLateAndPosesAreMissing) {
   EXPECT_GE(keyframes, 500U);
 }
 
-TEST(WindowPolicies, EveryEventIsCountedForWhatBecameOfIt) {
+TEST(WindowPolicies, EveryEventIsCountedOnce) {
   std::uint64_t used = 0;
   std::uint64_t without_pose = 0;
   std::uint64_t outside = 0;
@@ -208,7 +208,7 @@ void expectWindows(const Played& played, const std::vector<Window>& windows) {
   }
 }
 
-TEST(WindowPolicies, WindowsOfANumberOfEventsFollowEachOtherAndTheRestIsNotMapped) {
+TEST(WindowPolicies, WindowsOfAFixedNumberOfEventsFollowEachOther) {
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
     const LongRecording recording(seed, 1.0);
     const std::vector<std::int64_t> times = eventTimes(recording);
@@ -235,7 +235,7 @@ TEST(WindowPolicies, WindowsOfANumberOfEventsFollowEachOtherAndTheRestIsNotMappe
 
 double meanDepth(const cv::Mat1f& depth) { return cv::mean(depth, depth > 0)[0]; }
 
-TEST(WindowPolicies, WindowsOfABaselineAreTheShortestThatReachItsShareOfTheMeanDepth) {
+TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
   std::size_t keyframes = 0;
   std::size_t different_lengths = 0;
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
@@ -289,7 +289,7 @@ TEST(WindowPolicies, WindowsOfABaselineAreTheShortestThatReachItsShareOfTheMeanD
   EXPECT_GE(different_lengths, 5U);
 }
 
-TEST(WindowPolicies, StandingStillTakesNoMemoryAndMakesNoKeyframe) {
+TEST(WindowPolicies, ARigAtRestTakesNoMemoryAndMakesNoKeyframe) {
   constexpr std::int64_t kMs = LongRecording::kMs;
   FusionMapperOptions options = playedOptions();
   options.cameras = {};

@@ -54,7 +54,7 @@ TEST(EventContrast, TheGradientIsTheNumericOne) {
   }
 }
 
-TEST(EventContrast, EventsInOnePlaceAreSharperThanEventsApart) {
+TEST(EventContrast, EventsInOnePositionAreSharperThanSeparateOnes) {
   auto together = randomEvents(8, 2, 100);
   for (auto& some : together) {
     for (WarpedEvent& event : some) event.pixel = {30, 20};

@@ -130,8 +130,9 @@ TEST(MotionCorrection, TheSinkSeesTheFinalSweepAlone) {
   EXPECT_DOUBLE_EQ(counted.sum, expected.sum);
 }
 
-/// What leaves nothing to correct: the keyframe is that without a correction, bit for bit.
-TEST(MotionCorrection, WithoutAnythingToSeeTheKeyframeStays) {
+/// Recordings without information about the motion: the keyframe is the uncorrected one, bit for
+/// bit.
+TEST(MotionCorrection, WithoutInformationTheKeyframeStays) {
   struct Case {
     const char* what;
     std::function<void(RandomRecording&)> change;
@@ -180,7 +181,7 @@ TEST(MotionCorrection, ARigAtRestDoesNoHarm) {
   }
 }
 
-TEST(MotionCorrection, ACameraThatSeesNothingAndASinglePlaneDoNoHarm) {
+TEST(MotionCorrection, ASilentCameraAndASinglePlaneDoNoHarm) {
   MovingEdges recording = blurred(2);
   KeyframeMapperOptions one_plane = options(true);
   one_plane.planes.num_planes = 1;

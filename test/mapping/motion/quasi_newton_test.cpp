@@ -39,7 +39,7 @@ TEST(QuasiNewton, IsNeverWorseThanItsStartAndKeepsItsBound) {
   }
 }
 
-TEST(QuasiNewton, StaysWhereNothingSlopes) {
+TEST(QuasiNewton, StaysOnAFlatFunction) {
   const auto flat = [](const Eigen::VectorXd& at, Eigen::VectorXd& slope) {
     slope = Eigen::VectorXd::Zero(at.size());
     return 1.0;

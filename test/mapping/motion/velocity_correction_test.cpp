@@ -28,7 +28,7 @@ TEST(VelocityCorrection, ADisplacementIsManySmallOnes) {
   expectNear(correction.displacement(-0.8), T_rig_true.inverse(), 1e-10);
 }
 
-TEST(VelocityCorrection, SmallTurnsAreAsExactAsLargeOnes) {
+TEST(VelocityCorrection, SmallRotationsAreAsExactAsLargeOnes) {
   const Eigen::Vector3d linear_m_s(1, 2, 3);
   for (const double rate : {0.999e-4, 1.001e-4}) {  // either side of where the series ends
     const Rigid3 T_rig_true = VelocityCorrection{linear_m_s, {rate, 0, 0}}.displacement(1);
@@ -55,13 +55,13 @@ TEST(VelocityCorrection, PosesMoveByTheDisplacementSinceTheReference) {
   const Trajectory corrected = correctedTrajectory(recording.trajectory, window, correction);
   for (std::int64_t t_ns = window.t0_ns; t_ns < window.t1_ns; t_ns += 3 * kMs) {
     const double since_s = 1e-9 * static_cast<double>(t_ns - window.t_ref_ns);
-    // Between poses 5 ms apart, which turn by at most 0.01, the line is not quite the screw.
+    // Between poses 5 ms apart, rotated by at most 0.01, the line differs a little from the screw.
     expectNear(corrected.poseAt(t_ns).value(),
                recording.trajectory.poseAt(t_ns).value() * correction.displacement(since_s), 2e-6);
   }
 }
 
-TEST(VelocityCorrection, WhatHasNoPoseGetsNone) {
+TEST(VelocityCorrection, TimesWithoutAPoseGetNone) {
   Trajectory trajectory;
   for (const std::int64_t ms : {0, 40, 60, 500, 520}) trajectory.add({ms * kMs, {}});
   const Window window{30 * kMs, 510 * kMs, 50 * kMs};

@@ -31,7 +31,7 @@ struct Warping {
         {T_world_ref.inverse(), view, inversePlanes(planes), &depths, window.t_ref_ns});
   }
 
-  /// Where an event's ray meets a plane of the reference view, said plainly.
+  /// The point where an event's ray meets a plane of the reference view.
   Eigen::Vector2d pixelAt(const Event& event, double depth_m, const Rigid3& T_world_rig) const {
     const Rigid3 T_ref_cam = T_world_ref.inverse() * T_world_rig * camera.T_rig_cam;
     const Eigen::Vector3d far_ref =
@@ -94,7 +94,7 @@ TEST(WarpedEvents, DerivativesAreThoseOfThePlainWarp) {
   }
 }
 
-TEST(WarpedEvents, WhatSawNoDepthIsLeftOut) {
+TEST(WarpedEvents, EventsWithoutDepthAreLeftOut) {
   const Warping warping;
   const auto& events = warping.recording.events.front();
   EXPECT_TRUE(warping.warp(flat(warping.view, 0), warping.recording.trajectory, events).empty());

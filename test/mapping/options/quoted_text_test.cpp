@@ -12,7 +12,7 @@ TEST(QuotedText, PlainTextStaysAsItIs) {
   EXPECT_EQ(inQuotes(""), "''");
 }
 
-TEST(QuotedText, WhatATerminalObeysIsWrittenInHexadecimal) {
+TEST(QuotedText, ControlCharactersAreWrittenInHexadecimal) {
   EXPECT_EQ(inQuotes("a\x1b[2Jb\r\n\t\x7f"), R"('a\x1b[2Jb\x0d\x0a\x09\x7f')");
   EXPECT_EQ(inQuotes("\xc2\x9b"), R"('\xc2\x9b')") << "the control characters beyond ASCII";
   EXPECT_EQ(inQuotes(std::string_view("\0", 1)), R"('\x00')");

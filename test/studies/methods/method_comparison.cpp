@@ -100,7 +100,7 @@ std::vector<KeyframeDepthMap> mapWindows(const Recording& recording,
   std::vector<KeyframeDepthMap> keyframes = mapOnce(recording, windows, method);
   if (method.options.extraction.max_confidence.level != WhiteLevel::kSequence) return keyframes;
   RobustMaximum maximum;
-  for (const KeyframeDepthMap& keyframe : keyframes) maximum.take(keyframe.max_confidence);
+  for (const KeyframeDepthMap& keyframe : keyframes) maximum.add(keyframe.max_confidence);
   Method again = method;
   again.options.sequence_maximum = maximum.value();
   return mapOnce(recording, windows, again);
