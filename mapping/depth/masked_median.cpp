@@ -2,72 +2,36 @@
 #include "mapping/depth/masked_median.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
-#include <cstring>
+#include <numeric>
 
 namespace efm {
 namespace {
 
-struct IndexedKey {
-  std::uint32_t key = 0;
-  std::uint32_t index = 0;
-};
-
-/// Unsigned numbers in the order of the floats.
-std::uint32_t keyOf(float value) {
-  static_assert(sizeof(float) == sizeof(std::uint32_t));
-  constexpr std::uint32_t kSign = 0x80000000U;
-  std::uint32_t bits = 0;
-  std::memcpy(&bits, &value, sizeof(bits));
-  return (bits & kSign) != 0 ? ~bits : bits | kSign;
-}
-
-/// Sorts by one digit of the key; equals keep their order.
-void sortByDigit(const std::vector<IndexedKey>& from, int shift, std::vector<IndexedKey>& to) {
-  constexpr std::uint32_t kDigits = 2048;
-  std::array<std::uint32_t, kDigits + 1> next{};
-  const auto digit = [&](const IndexedKey& item) { return (item.key >> shift) % kDigits; };
-  for (const IndexedKey& item : from) ++next[digit(item) + 1];
-  for (std::uint32_t d = 0; d < kDigits; ++d) next[d + 1] += next[d];
-  for (const IndexedKey& item : from) to[next[digit(item)]++] = item;
-}
-
-/// The indices of the values in increasing order. Radix sort takes a fifth of the time of
-/// std::sort.
+/// The indices of the values in increasing order.
 std::vector<std::uint32_t> inOrder(const std::vector<float>& values) {
-  std::vector<IndexedKey> items(values.size());
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    items[i] = {keyOf(values[i]), static_cast<std::uint32_t>(i)};
-  }
-  std::vector<IndexedKey> sorted(values.size());
-  for (const int shift : {0, 11, 22}) {
-    sortByDigit(items, shift, sorted);
-    items.swap(sorted);
-  }
   std::vector<std::uint32_t> order(values.size());
-  for (std::size_t i = 0; i < values.size(); ++i) order[i] = items[i].index;
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return values[a] < values[b]; });
   return order;
 }
 
-/// A set of ranks below a limit with fast access to its k-th element: counts of single ranks, of 16
-/// and of 256 consecutive ranks. A search starts where the last one ended, because neighbouring
-/// windows have similar medians.
+/// A set of ranks below a limit with fast access to its k-th element: single ranks, and counts of
+/// 256 consecutive ones. A search starts where the last one ended, because neighbouring windows
+/// have similar medians.
 class RankSet {
  public:
-  explicit RankSet(std::size_t limit)
-      : ones_((limit / 256 + 1) * 256), by_16_((limit / 256 + 1) * 16), by_256_(limit / 256 + 1) {}
+  explicit RankSet(std::size_t limit) : ranks_((limit / 256 + 1) * 256), by_256_(limit / 256 + 1) {}
 
   void add(std::uint32_t rank) {
-    ++ones_[rank];
-    ++by_16_[rank / 16];
+    ranks_[rank] = 1;
     ++by_256_[rank / 256];
     below_ += rank / 256 < here_ ? 1 : 0;
     ++size_;
   }
   void remove(std::uint32_t rank) {
-    --ones_[rank];
-    --by_16_[rank / 16];
+    ranks_[rank] = 0;
     --by_256_[rank / 256];
     below_ -= rank / 256 < here_ ? 1 : 0;
     --size_;
@@ -78,17 +42,13 @@ class RankSet {
   std::size_t at(std::size_t k) {
     while (below_ > k) below_ -= by_256_[--here_];
     while (below_ + by_256_[here_] <= k) below_ += by_256_[here_++];
-    std::size_t left = k - below_;
-    std::size_t position = here_ * 16;
-    while (by_16_[position] <= left) left -= by_16_[position++];
-    position *= 16;
-    while (ones_[position] <= left) left -= ones_[position++];
-    return position;
+    std::size_t rank = here_ * 256;
+    for (std::size_t left = k - below_; ranks_[rank] <= left; ++rank) left -= ranks_[rank];
+    return rank;
   }
 
  private:
-  std::vector<std::uint8_t> ones_;
-  std::vector<std::uint8_t> by_16_;
+  std::vector<std::uint8_t> ranks_;  // 1: in the set
   std::vector<std::uint16_t> by_256_;
   std::size_t size_ = 0;
   std::size_t here_ = 0;   // index into by_256_

@@ -11,7 +11,7 @@ namespace efm {
 /// included: of n values in order, the one with index (n - 1) / 2. Pixels outside the mask have no
 /// value.
 ///
-/// Cost: per pixel of the mask, the side of the window, not its area. Memory: 20 bytes per pixel of
+/// Cost: per pixel of the mask, the side of the window, not its area. Memory: 10 bytes per pixel of
 /// the mask, temporarily.
 /// @param values one per pixel of the mask, not NaN.
 /// @param window side in pixels, odd.

@@ -50,13 +50,6 @@ double DepthPlanes::depthAt(double position) const {
   return uniformOf(options_.spacing, first_u + (last_u - first_u) * (position / last));
 }
 
-double DepthPlanes::positionOf(double depth_m) const {
-  const double first_u = uniformOf(options_.spacing, options_.min_depth_m);
-  const double last_u = uniformOf(options_.spacing, options_.max_depth_m);
-  const double u = uniformOf(options_.spacing, depth_m);
-  return (u - first_u) / (last_u - first_u) * (options_.num_planes - 1);
-}
-
 double DepthPlanes::inverseDepthStepAt(double position) const {
   if (size() < 2) return 0.0;
   const double before = std::max(0.0, position - 0.5);

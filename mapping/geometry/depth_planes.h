@@ -37,8 +37,6 @@ class DepthPlanes {
   double depth(int plane) const { return depths_[static_cast<std::size_t>(plane)]; }
   /// Depth at a position between planes: 0 is the nearest plane, size() - 1 the farthest.
   double depthAt(double position) const;
-  /// Position of a depth between planes: the inverse of `depthAt`, also outside the range.
-  double positionOf(double depth_m) const;
   /// Distance of the two nearest planes in inverse depth, 1/m. Inverse spacing has the same
   /// distance everywhere. 0 with one plane.
   double inverseDepthStep() const;

@@ -11,6 +11,7 @@
 
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/dsi/chosen_dsi.h"
+#include "test/mapping/geometry/plane_position.h"
 #include "test/oracle/naive_aggregation.h"
 
 namespace efm::aggregated_extraction_test {
@@ -100,8 +101,9 @@ TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
             continue;
           }
           if (depth == 0) continue;
-          const bool same_depth = planes == 1 || std::abs(depths.positionOf(found.depth(y, x)) -
-                                                          depths.positionOf(depth)) < 0.01;
+          const bool same_depth =
+              planes == 1 || std::abs(test::planePosition(depths, found.depth(y, x)) -
+                                      test::planePosition(depths, depth)) < 0.01;
           const double variance = exact.variance(y, x);
           const bool same_variance =
               std::isinf(variance) ? std::isinf(found.variance(y, x))
@@ -126,7 +128,7 @@ TEST(AggregatedExtraction, ACleanPlaneOfEdgesHasItsDepthEverywhere) {
           ASSERT_GT(map.depth(y, x), 0) << x << ", " << y;
         }
         if (map.depth(y, x) > 0) {
-          ASSERT_NEAR(planesOf(100).positionOf(map.depth(y, x)), position, 0.05);
+          ASSERT_NEAR(test::planePosition(planesOf(100), map.depth(y, x)), position, 0.05);
           ASSERT_GT(map.variance(y, x), 0);
           ASSERT_TRUE(std::isfinite(map.variance(y, x)));
         } else {

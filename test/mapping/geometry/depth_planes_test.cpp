@@ -7,6 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "test/mapping/geometry/plane_position.h"
+
 namespace efm::depth_planes_test {
 namespace {
 
@@ -38,12 +40,12 @@ TEST(DepthPlanes, LinearSpacingIsUniformInDepth) {
   for (int i = 0; i < 5; ++i) EXPECT_NEAR(planes.depth(i), 1.0 + 0.5 * i, 1e-15) << i;
 }
 
-TEST(DepthPlanes, PositionsBetweenPlanesGoBothWays) {
-  for (const PlaneSpacing spacing : {PlaneSpacing::kInverse, PlaneSpacing::kLinear}) {
-    const DepthPlanes planes({0.5, 5.0, 100, spacing});
-    for (const double position : {0.0, 0.25, 17.5, 98.9, 99.0}) {
-      EXPECT_NEAR(planes.positionOf(planes.depthAt(position)), position, 1e-10);
-    }
+TEST(DepthPlanes, PositionsBetweenPlanesAreUniformLikeThePlanes) {
+  const DepthPlanes inverse({0.5, 5.0, 100, PlaneSpacing::kInverse});
+  const DepthPlanes linear({0.5, 5.0, 100, PlaneSpacing::kLinear});
+  for (const double position : {0.0, 0.25, 17.5, 98.9, 99.0}) {
+    EXPECT_NEAR(test::planePosition(inverse, inverse.depthAt(position)), position, 1e-10);
+    EXPECT_NEAR(linear.depthAt(position), 0.5 + 4.5 * position / 99, 1e-12);
   }
 }
 

@@ -12,6 +12,7 @@
 
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/depth/same_image.h"
+#include "test/mapping/geometry/plane_position.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/keyframes/random_recording.h"
 #include "test/mapping/motion/moving_edges.h"
@@ -60,7 +61,9 @@ struct Agreement {
         if (da == 0 && db == 0) continue;
         ++kept;
         if (da == 0 || db == 0) continue;
-        same += std::abs(planes.positionOf(da) - planes.positionOf(db)) < 0.1 ? 1 : 0;
+        same += std::abs(test::planePosition(planes, da) - test::planePosition(planes, db)) < 0.1
+                    ? 1
+                    : 0;
       }
     }
   }
