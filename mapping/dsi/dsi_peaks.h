@@ -27,7 +27,7 @@ struct DsiPeaks {
 DsiPeaks unwrittenPeaks(const ReferenceView& view);
 
 /// The peak of each pixel of a tile over the planes added so far: the argmax of the DSI (Ghosh and
-/// Gallego 2022, Algorithm 1, line 5), and the values beside it.
+/// Gallego 2022, Algorithm 1, line 5), and the values one plane before and after it.
 class RunningPeaks {
  public:
   /// @param kernel an available one; every kernel gives the same bits.

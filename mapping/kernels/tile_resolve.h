@@ -49,7 +49,7 @@ struct ResolveFunctions {
 
   // Where most cells are empty, four steps that skip them are faster. Values have the same bits.
 
-  /// Finds the pixels beside a cell with votes. @param pixels width and height are given.
+  /// Finds the pixels adjacent to a cell with votes. @param pixels width and height are given.
   /// @return the votes as above.
   std::uint64_t (*findOccupied)(const CellBuffer& cells, TilePixels& pixels,
                                 DirtyLines& lines) = nullptr;

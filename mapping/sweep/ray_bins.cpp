@@ -266,11 +266,11 @@ void RayBins::storeWide(const RayBundle& rays) {
 }
 
 double RayBins::maxShift() const {
-  const auto largest = [](const Range& range) {
+  const auto max_abs = [](const Range& range) {
     return std::max(std::abs(range.min), std::abs(range.max));
   };
   const auto along = [&](const Axis& axis) {
-    return largest(axis.at_center) + largest(c_) * largest(axis.fromPrincipal());
+    return max_abs(axis.at_center) + max_abs(c_) * max_abs(axis.fromPrincipal());
   };
   return std::max(along(columns_), along(rows_));
 }

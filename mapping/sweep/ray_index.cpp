@@ -7,8 +7,8 @@
 namespace efm {
 namespace {
 
-/// How far rays may move within a group of planes. With a longer way, a tile gathers more rays that
-/// are outside it on some planes; with a shorter one it gathers more often.
+/// The largest shift of a ray within a group of planes. With a larger one, a tile gathers more rays
+/// that are outside it on some planes; with a smaller one, it gathers more often.
 constexpr double kMaxGroupShift_px = 10;
 /// A limit where rays hardly move: a sink gets this number of planes at a time.
 constexpr int kMaxGroupPlanes = 20;

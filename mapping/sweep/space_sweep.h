@@ -57,8 +57,8 @@ struct SweepResult {
 
 /// Sweeps the depth planes through space (Ghosh and Gallego 2022, Algorithm 2, lines 3 and 4): on
 /// each plane it votes for every camera and sub-interval, fuses the votes, and updates the peak of
-/// every pixel. It stores no volume. Memory beside the rays is O(width * height), for any number of
-/// planes and sub-intervals; `camera_peaks` multiply it by the cameras, the plain kernel by the
+/// every pixel. It stores no volume. Memory besides the rays is O(width * height), for any number
+/// of planes and sub-intervals; `camera_peaks` multiply it by the cameras, the plain kernel by the
 /// threads. Columns add two bytes per plane of a selected pixel, a sink adds four per voxel. The
 /// order of planes and threads never changes the result.
 /// @param cameras the rays of each camera that is fused, at least one; consumed.

@@ -15,7 +15,7 @@ std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels);
 /// The sweep with the fast kernels, tile by tile. A tile is a small rectangle of the view: its
 /// votes on one plane, their fusion and the running peaks stay in the first two levels of cache,
 /// and no plane exists as a whole. Planes come in groups; a tile gathers its rays once per group.
-/// Memory beside the rays: O(width * height), for any number of planes, cameras, sub-intervals and
+/// Memory besides the rays: O(width * height), for any number of planes, cameras, sub-intervals and
 /// threads.
 ///
 /// Tiles share nothing, and a tile's votes have an order: the result has the same bits for any

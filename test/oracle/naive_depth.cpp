@@ -18,9 +18,9 @@ double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
                std::optional<double> sequence_maximum) {
   if (option.level == WhiteLevel::kFixed) return option.fixed;
   if (option.level == WhiteLevel::kSequence && sequence_maximum) return *sequence_maximum;
-  double largest = 0;
-  cv::minMaxLoc(confidence, nullptr, &largest);
-  return largest;
+  double max = 0;
+  cv::minMaxLoc(confidence, nullptr, &max);
+  return max;
 }
 
 /// Grey values of the confidence: 255 at `white`.
@@ -54,17 +54,17 @@ cv::Mat1f positionsOf(const DsiPeaks& peaks, const cv::Mat1b& mask, bool subplan
   return positions;
 }
 
-/// Replaces each kept position by the lower median of the kept ones in the window around it.
+/// Replaces each position by the lower median of the positions in the window around it.
 cv::Mat1f maskedMedian(const cv::Mat1f& positions, const cv::Mat1b& mask, int window) {
-  const int reach = window / 2;
+  const int radius = window / 2;
   cv::Mat1f medians = cv::Mat1f::zeros(mask.size());
   std::vector<float> around;
   for (int y = 0; y < mask.rows; ++y) {
     for (int x = 0; x < mask.cols; ++x) {
       if (mask(y, x) == 0) continue;
       around.clear();
-      for (int j = std::max(0, y - reach); j <= std::min(mask.rows - 1, y + reach); ++j) {
-        for (int i = std::max(0, x - reach); i <= std::min(mask.cols - 1, x + reach); ++i) {
+      for (int j = std::max(0, y - radius); j <= std::min(mask.rows - 1, y + radius); ++j) {
+        for (int i = std::max(0, x - radius); i <= std::min(mask.cols - 1, x + radius); ++i) {
           if (mask(j, i) != 0) around.push_back(positions(j, i));
         }
       }
@@ -84,12 +84,12 @@ cv::Rect insideFrame(cv::Size size) {
 
 void clearFrame(cv::Mat1b& mask) {
   const cv::Rect inner = insideFrame(mask.size());
-  cv::Mat1b kept = cv::Mat1b::zeros(mask.size());
-  if (!inner.empty()) mask(inner).copyTo(kept(inner));
-  mask = kept;
+  cv::Mat1b inside = cv::Mat1b::zeros(mask.size());
+  if (!inner.empty()) mask(inner).copyTo(inside(inner));
+  mask = inside;
 }
 
-/// The depth map of the kept pixels.
+/// The depth map of the mask's pixels.
 DepthMap depthsAt(const cv::Mat1b& mask, const cv::Mat1f& positions, const DsiPeaks& peaks,
                   const DepthPlanes& planes) {
   DepthMap result{cv::Mat1f::zeros(mask.size()), peaks.confidence, cv::Mat1f::zeros(mask.size())};
@@ -115,7 +115,7 @@ bool outranks(const DepthMap& map, cv::Point a, cv::Point b) {
   return map.depth(a) < map.depth(b);
 }
 
-/// Grows the depths into empty pixels that a kept pixel lies beside.
+/// Copies depths into empty pixels that are adjacent to a pixel with a depth.
 DepthMap dilated(const DepthMap& map) {
   DepthMap grown{map.depth.clone(), map.confidence.clone(), map.variance.clone()};
   const cv::Rect inner = insideFrame(map.depth.size());

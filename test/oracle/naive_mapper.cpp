@@ -142,8 +142,10 @@ std::vector<std::vector<Event>> splitEvents(const std::vector<Event>& events, st
       const bool by_count = split == SubintervalSplit::kCount;
       const std::int64_t whole =
           by_count ? static_cast<std::int64_t>(events.size()) : t1_ns - t0_ns;
-      const std::int64_t place = by_count ? static_cast<std::int64_t>(i) : events[i].t_ns - t0_ns;
-      if (whole * s / count <= place && place < whole * (s + 1) / count) part.push_back(events[i]);
+      const std::int64_t position =
+          by_count ? static_cast<std::int64_t>(i) : events[i].t_ns - t0_ns;
+      if (whole * s / count <= position && position < whole * (s + 1) / count)
+        part.push_back(events[i]);
     }
   }
   return parts;

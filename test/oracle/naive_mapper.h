@@ -19,9 +19,9 @@
 
 namespace efm::oracle {
 
-/// The method written down as simply as possible and in double precision: every event is a ray in
-/// space, met with every plane by itself; every DSI is a whole volume. What the fast code is held
-/// against, and never used for anything else.
+/// The method, written as simply as possible and in double precision: every event is a ray in space
+/// and meets every plane by itself; every DSI is a whole volume. Tests compare the fast code with
+/// it.
 
 /// A whole DSI: [plane][row][column].
 struct Dsi {
@@ -41,7 +41,7 @@ struct PosedEvent {
   Rigid3 T_ref_cam;
 };
 
-/// Each event with the pose of its own time; those without one are left out.
+/// Each event with the pose of its own time. Events without a pose are left out.
 std::vector<PosedEvent> poseEach(const std::vector<Event>& events, const RigCamera& camera,
                                  const Trajectory& trajectory, const Rigid3& T_world_ref);
 /// Each event with the pose of its packet.

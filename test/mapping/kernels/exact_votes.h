@@ -13,7 +13,7 @@
 
 namespace efm::test {
 
-/// The votes of rays in double precision, and what floats can make of them.
+/// The votes of rays in double precision, and bounds for the errors of floats.
 struct ExactVotes {
   std::vector<double> dsi;  ///< [plane][row][column]
   VoteCounts counts;
@@ -23,7 +23,7 @@ struct ExactVotes {
   double float_shift_px = 0;
 };
 
-/// @param unit_px what coordinates are rounded to besides: 1/4096 px in the fast kernels.
+/// @param unit_px coordinates are also rounded to this: 1/4096 px in the fast kernels.
 inline ExactVotes voteExactly(const RayBundle& rays, const ReferenceView& view,
                               const DepthPlanes& planes, double unit_px = 1.0 / 4096) {
   // One of a product, one of a sum, and as many on the plane where rays are binned.

@@ -10,7 +10,7 @@
 
 namespace efm::test {
 
-/// What this processor runs beside the plain kernel, which is what they are held against.
+/// The kernels of this processor without the plain one, with which they are compared.
 inline std::vector<VotingKernel> fastKernels() {
   std::vector<VotingKernel> kernels;
   for (const VotingKernel kernel : availableKernels()) {
@@ -24,7 +24,7 @@ inline std::string nameOfKernel(const ::testing::TestParamInfo<VotingKernel>& te
   return std::string(nameOf(test.param));
 }
 
-/// What a fast kernel may put into other voxels than the exact ones, as a share of the mass: a
+/// The mass that a fast kernel may put into wrong voxels, as a fraction of all mass: a
 /// coordinate is rounded to 1/4096 px where the ray is sorted into bins and again where it votes,
 /// on average by 1/3 of that together, and a shift of d px in x and in y moves at most 4 d of a
 /// vote's weights; their product, cut to 1/32,768, moves 4 times half of that. 3.9e-4.
@@ -35,7 +35,7 @@ inline constexpr double kFastErrorOverMass = 4.0 / 3 / 4096 + 4 * 0.5 / 32'768;
 inline constexpr double kPlainErrorOverMass = 1e-4;
 
 /// The most that a fast kernel may be off, under any rule: those that multiply weigh the error of a
-/// small input by what the others are.
+/// small input by the other inputs.
 inline constexpr double kMostErrorOverMass = 1e-3;
 
 inline double errorOverMassOf(VotingKernel kernel) {

@@ -30,9 +30,9 @@ constexpr Rule kRules[] = {
     {"max", &FusionFunctions::max},
 };
 
-/// From 10^least to 10^most, some zero and some subnormal.
-std::vector<float> randomValues(std::mt19937& random, std::size_t n, double least, double most) {
-  std::uniform_real_distribution<double> exponent(least, most);
+/// From 10^min to 10^max, some zero and some subnormal.
+std::vector<float> randomValues(std::mt19937& random, std::size_t n, double min, double max) {
+  std::uniform_real_distribution<double> exponent(min, max);
   std::vector<float> values(n);
   for (float& value : values) {
     const auto kind = random() % 8;

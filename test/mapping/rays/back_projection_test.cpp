@@ -52,7 +52,7 @@ TEST(BackProjection, TheTransferMeetsEveryPlaneWhereTheRayItselfDoes) {
   }
 }
 
-/// A camera of the largest sensors, at an angle to the reference view that keyframes rarely reach.
+/// A camera with a sensor of 1280 x 720 pixels.
 struct HdCamera {
   CameraModel model{1280,
                     720,
@@ -86,7 +86,7 @@ TEST(BackProjection, FloatsAreOffByLessThanAThousandthOfAPixelAtHd) {
       largest_px = std::max(largest_px, (computed - exact).norm());
     }
     // Six roundings of 2^-24 each, of numbers up to 1280: 5e-4 where they all add up. A thousandth
-    // is a twentieth of what sharing poses may cost.
+    // is a twentieth of the error that sharing poses may cause.
     EXPECT_LT(largest_px, 1e-3);
     EXPECT_GT(largest_px, 1e-6) << "something was compared";
   }
@@ -97,7 +97,7 @@ TEST(BackProjection, RaysParallelToThePlanesAreNotFinite) {
   model.distortion = DistortionModel::kNone;
   model.coefficients.clear();
   model.cx = 20;  // this column looks along z exactly
-  // A half turn around (x + z): what looked along z looks along x.
+  // Half a rotation around (x + z) maps the z axis to the x axis.
   const Rigid3 T_ref_cam{Eigen::Quaterniond(0, std::sqrt(0.5), 0, std::sqrt(0.5)),
                          Eigen::Vector3d::Zero()};
   const std::vector<Event> events = onePerPixel(model);

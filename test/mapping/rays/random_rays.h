@@ -47,13 +47,13 @@ class RandomRays {
     const double nearest = planes.depth(0);
     const double farthest = planes.depth(planes.size() - 1);
     const bool calm = uniform(0, 1) < 0.5;
-    const double reach = calm ? 0.3 * nearest : 1.5 * farthest;
+    const double radius = calm ? 0.3 * nearest : 1.5 * farthest;
     RayBundle bundle;
     while (rays > 0) {
       const int count = std::min(rays, integer(1, 200));
       rays -= count;
       RaySource source;
-      source.center_ref = reach * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+      source.center_ref = radius * Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
       source.forward = calm || integer(0, 7) != 0;
       source.depth_m = planes.depth(integer(0, planes.size() - 1));
       appendPacket(source, view, points(view, count), bundle);

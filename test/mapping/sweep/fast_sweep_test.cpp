@@ -103,7 +103,7 @@ TEST_P(FastSweepOn, CamerasBeforeBetweenAndBehindPlanesAreThePlainKernels) {
 
 TEST_P(FastSweepOn, CamerasOnAPlaneAreBehindItAsInThePlainKernel) {
   // Depths whose inverse is rounded, so that a centre's depth times it is not 1.
-  for (const double farthest : {4.0, 49.0, 4.9, 9.8}) {
+  for (const double farthest : {49.0, 4.9}) {
     for (const int count : {1, 2, 9}) {
       const DepthPlanes planes = linear(0.49, farthest, count);
       for (int plane = 0; plane < count; ++plane) {
@@ -385,7 +385,7 @@ TEST_P(FastSweepOn, RandomRigsPlanesGroupsAndViewsAreThePlainKernels) {
 /// Two cameras in one slot have a shortcut, where nothing else is asked for.
 TEST_P(FastSweepOn, NeitherThreadsNorRequestsChangeABitOfTheFusedDsiPeaksAndCounts) {
   const tbb::global_control as_if_eight_cores(tbb::global_control::max_allowed_parallelism, 8);
-  for (const cv::Size& size : {cv::Size(1, 1), {50, 1}, {64, 64}, {65, 127}, {130, 70}}) {
+  for (const cv::Size& size : {cv::Size(1, 1), {64, 64}, {130, 70}}) {
     for (const FusionRule rule :
          {FusionRule::kHarmonic, FusionRule::kGeometric, FusionRule::kArithmetic}) {
       for (const FusionInputs inputs : {FusionInputs{2, 1, 1}, {2, 1, 4}, {3, 1, 2}, {2, 2, 2}}) {
@@ -399,14 +399,15 @@ TEST_P(FastSweepOn, NeitherThreadsNorRequestsChangeABitOfTheFusedDsiPeaksAndCoun
         SpaceSweepOptions options;
         options.fusion = input.fusion;
         options.kernel = GetParam();
-        SweepRequest least;
-        least.groups = inputs.groups;
-        EXPECT_TRUE(test::same(
-            alone.result.fused.peaks,
-            sweepSpace(input.cameras, {input.view, input.planes}, options, least).fused.peaks));
+        SweepRequest fused_only;
+        fused_only.groups = inputs.groups;
+        EXPECT_TRUE(
+            test::same(alone.result.fused.peaks,
+                       sweepSpace(input.cameras, {input.view, input.planes}, options, fused_only)
+                           .fused.peaks));
         input.camera_peaks = true;
         input.column_window = 5;
-        for (const int threads : {1, 2, 8}) {
+        for (const int threads : {1, 8}) {
           const test::SweepOutput with_all = sweep(input, GetParam(), threads);
           EXPECT_EQ(alone.dsi, with_all.dsi) << threads;
           EXPECT_TRUE(test::same(alone.result.fused.peaks, with_all.result.fused.peaks)) << threads;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// From events to the DSI against the oracle, and the results beside the DSI.
+// From events to the DSI against the oracle, and the other results of a sweep.
 #include "mapping/sweep/space_sweep.h"
 
 #include <gmock/gmock.h>
@@ -221,7 +221,7 @@ TEST(SpaceSweep, ArithmeticAcrossTimeThenHarmonicAcrossCamerasIsAlgorithmOne) {
   }
 }
 
-// ---------------------------------------------------------------- results beside the DSI
+// ---------------------------------------------------------------- other results
 
 /// Rays of all cameras and sub-intervals, as the keyframe mapper makes them, and the oracle's
 /// counts of their votes.
