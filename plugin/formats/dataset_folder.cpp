@@ -45,8 +45,8 @@ Rig givenRig(const Calibration& calibration, const fs::path& folder) {
   return rig;
 }
 
-/// The folder's own rig if it has one, even if another was given: RigOverrideRecording or the map
-/// builder replaces it later.
+/// The folder's own rig if it has one. Then the caller replaces it by a given one and counts the
+/// difference.
 Rig readRig(const fs::path& folder, const RecordingOverrides& given) {
   const fs::path own = folder / "camchain.yaml";
   if (isFile(own)) {

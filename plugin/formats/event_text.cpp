@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/formats/event_text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -24,7 +26,7 @@ struct Digits {
   std::ptrdiff_t count;
 };
 
-/// Moves `text` past its leading digits.
+/// Reads digits and moves `text` behind them.
 Digits takeDigits(const char*& text) {
   const char* const begin = text;
   std::uint64_t value = 0;
@@ -32,15 +34,15 @@ Digits takeDigits(const char*& text) {
   return {value, text - begin};
 }
 
-/// Moves `text` past its leading blanks. @return whether there were any.
+/// Moves `text` behind blanks. @return whether there were any.
 bool takeBlanks(const char*& text) {
   const bool any = isBlank(*text);
   while (isBlank(*text)) ++text;
   return any;
 }
 
-/// The end of the grid's interval that contains a time.
-std::int64_t stretchEnd(std::int64_t t_ns) {
+/// The end of the grid's period that contains a time.
+std::int64_t periodEnd(std::int64_t t_ns) {
   std::int64_t rest_ns = t_ns % kPacketPeriodNs;
   if (rest_ns < 0) rest_ns += kPacketPeriodNs;
   return t_ns - rest_ns + kPacketPeriodNs;
@@ -73,7 +75,7 @@ std::vector<Event> EventTextReader::nextPacket() {
   const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first_);
   const auto end = std::partition_point(
       begin, events_.end(),
-      [end_ns = stretchEnd(begin->t_ns)](const Event& event) { return event.t_ns < end_ns; });
+      [end_ns = periodEnd(begin->t_ns)](const Event& event) { return event.t_ns < end_ns; });
   first_ = static_cast<std::size_t>(end - events_.begin());
   return {begin, end};
 }
@@ -93,7 +95,7 @@ void EventTextReader::readAhead() {
     try {
       readBlock();
     } catch (const std::runtime_error&) {
-      error_ = std::current_exception();  // the good lines above it come first
+      error_ = std::current_exception();  // thrown after the events above it
     }
     sortEvents();
   }
@@ -106,10 +108,10 @@ void EventTextReader::sortEvents() {
   disordered_ = false;
 }
 
-/// Whether no further event of the first packet's interval can come.
+/// Whether no further event can belong to the first packet.
 bool EventTextReader::packetIsComplete() const {
   return first_ < events_.size() &&
-         newest_ns_ - kMaxEventDelayNs >= stretchEnd(events_[first_].t_ns);
+         newest_ns_ - kMaxEventDelayNs >= periodEnd(events_[first_].t_ns);
 }
 
 void EventTextReader::readBlock() {
@@ -130,8 +132,8 @@ void EventTextReader::readBlock() {
     if (const auto event = parseLine(text.substr(whole), true)) take(*event);
   } else if (carried_ == kBlockBytes) {
     ++line_;
-    throw std::runtime_error(place() + inQuotes(text) + ": expected t x y p, not a line of over " +
-                             std::to_string(kBlockBytes) + " bytes");
+    throw std::runtime_error(fmt::format("{}{}: expected t x y p, not a line of over {} bytes",
+                                         place(), inQuotes(text), kBlockBytes));
   }
   std::copy(text.begin() + static_cast<std::ptrdiff_t>(whole), text.end(), block_.begin());
 }
@@ -153,8 +155,8 @@ void EventTextReader::takeLines(const char* begin, const char* end) {
   }
 }
 
-/// The fast path, for a line in the plainest form. It never reads past the newline.
-/// @return the next line; null for any other line, which `parseLine` must parse.
+/// The fast path for a plain line. Each step stops at the newline at the latest.
+/// @return the next line; null if `parseLine` must parse this line.
 const char* EventTextReader::parsePlainLine(const char* text, Event& event) const {
   constexpr std::array<std::uint64_t, 10> kNanosecondsOfDigits = {
       1'000'000'000, 100'000'000, 10'000'000, 1'000'000, 100'000, 10'000, 1'000, 100, 10, 1};
@@ -197,23 +199,24 @@ std::optional<Event> EventTextReader::parseLine(std::string_view line, bool unte
   const std::vector<std::string_view> fields = splitWords(content);
   if (fields.empty()) return std::nullopt;
   if (fields.size() < kFields && unterminated) {
-    throw std::runtime_error(place() + inQuotes(content) +
-                             ": expected t x y p, but the file ends within the line");
+    throw std::runtime_error(fmt::format(
+        "{}{}: expected t x y p, but the file ends within the line", place(), inQuotes(content)));
   }
   if (fields.size() != kFields) {
-    throw std::runtime_error(place() + inQuotes(content) + ": expected 4 fields, t x y p, not " +
-                             std::to_string(fields.size()));
+    throw std::runtime_error(fmt::format("{}{}: expected 4 fields, t x y p, not {}", place(),
+                                         inQuotes(content), fields.size()));
   }
 
   const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {
-    return std::runtime_error(place() + name + " = " + inQuotes(value) + ": expected " + expected);
+    return std::runtime_error(
+        fmt::format("{}{} = {}: expected {}", place(), name, inQuotes(value), expected));
   };
   const auto side_of = [&](const char* name, std::string_view value, int side) {
     const std::optional<std::uint16_t> pixel = parsePixel(value, side);
     if (pixel) return *pixel;
     throw fail(name, value,
-               "a whole number from 0 to " + std::to_string(side - 1) + " (the sensor has " +
-                   std::to_string(size_.width) + "x" + std::to_string(size_.height) + " pixels)");
+               fmt::format("a whole number from 0 to {} (the sensor has {}x{} pixels)", side - 1,
+                           size_.width, size_.height));
   };
   const std::optional<std::int64_t> t_ns = parseSeconds(fields[0]);
   if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
@@ -235,15 +238,13 @@ void EventTextReader::take(const Event& event) {
     disordered_ = true;
     ++sorted_events_;
   } else {
-    throw std::runtime_error(place() + "t = '" + formatSeconds(event.t_ns) +
-                             "': expected events in time order, at most 10 ms before the newest (" +
-                             formatSeconds(newest_ns_) + ")");
+    throw std::runtime_error(fmt::format(
+        "{}t = '{}': expected events in time order, at most 10 ms before the newest ({})", place(),
+        formatSeconds(event.t_ns), formatSeconds(newest_ns_)));
   }
   events_.push_back(event);
 }
 
-std::string EventTextReader::place() const {
-  return file_.string() + ":" + std::to_string(line_) + ": ";
-}
+std::string EventTextReader::place() const { return fmt::format("{}:{}: ", file_.string(), line_); }
 
 }  // namespace efm

@@ -22,28 +22,14 @@ std::string reasonOf(gzFile file) {
   if (code == Z_BUF_ERROR) return "the file ends in the middle of its data";
   if (code == Z_ERRNO) return std::strerror(errno);
   if (message == nullptr || *message == '\0') return "unknown error";
-  const std::string text = message;  // "<path>: <what>", and who shows it names the file
+  const std::string text = message;  // "<path>: <reason>"; the caller names the file
   const auto colon = text.rfind(": ");
   return colon == std::string::npos ? text : text.substr(colon + 2);
 }
 
 }  // namespace
 
-struct GzInputStream::File {
-  gzFile handle = nullptr;
-  ~File() {
-    if (handle != nullptr) gzclose_r(handle);
-  }
-};
-
-struct GzOutputStream::File {
-  gzFile handle = nullptr;
-  ~File() {
-    if (handle != nullptr) gzclose_w(handle);
-  }
-};
-
-GzInputStream::GzInputStream(const std::filesystem::path& file) : file_(std::make_unique<File>()) {
+GzInputStream::GzInputStream(const std::filesystem::path& file) : file_(nullptr, gzclose_r) {
   const std::filesystem::file_status status = std::filesystem::status(file);
   if (!std::filesystem::is_regular_file(status)) {
     const char* const what = std::filesystem::is_directory(status) ? "a folder: expected a file"
@@ -52,29 +38,27 @@ GzInputStream::GzInputStream(const std::filesystem::path& file) : file_(std::mak
     throw std::runtime_error(file.string() + ": " + what);
   }
   file_size_ = std::filesystem::file_size(file);
-  file_->handle = gzopen(file.c_str(), "rb");
-  if (file_->handle == nullptr) {
+  file_.reset(gzopen(file.c_str(), "rb"));
+  if (!file_) {
     throw std::runtime_error(file.string() + ": cannot be opened: " + std::strerror(errno));
   }
-  gzbuffer(file_->handle, kBufferSize);
+  gzbuffer(file_.get(), kBufferSize);
 }
-
-GzInputStream::~GzInputStream() = default;
 
 void GzInputStream::fill() {
   if (at_ < buffer_.size()) return;
   buffer_.resize(kBufferSize);
   at_ = 0;
-  const int count = gzread(file_->handle, buffer_.data(), static_cast<unsigned>(kBufferSize));
+  const int count = gzread(file_.get(), buffer_.data(), static_cast<unsigned>(kBufferSize));
   if (count < 0) {
     buffer_.clear();
-    throw std::runtime_error(reasonOf(file_->handle));
+    throw std::runtime_error(reasonOf(file_.get()));
   }
   buffer_.resize(static_cast<std::size_t>(count));
   if (count > 0) return;
   int code = Z_OK;
-  gzerror(file_->handle, &code);  // a cut file gives what it has, then nothing and this code
-  if (code != Z_OK) throw std::runtime_error(reasonOf(file_->handle));
+  gzerror(file_.get(), &code);  // a truncated file ends with 0 bytes and this code
+  if (code != Z_OK) throw std::runtime_error(reasonOf(file_.get()));
 }
 
 bool GzInputStream::atEnd() {
@@ -83,7 +67,7 @@ bool GzInputStream::atEnd() {
 }
 
 double GzInputStream::progress() const {
-  const auto offset = static_cast<double>(gzoffset(file_->handle));
+  const auto offset = static_cast<double>(gzoffset(file_.get()));
   return file_size_ == 0 ? 1.0 : std::clamp(offset / static_cast<double>(file_size_), 0.0, 1.0);
 }
 
@@ -105,23 +89,20 @@ std::uint64_t GzInputStream::Seek(std::int64_t, TSeekOrigin) { refuse("a stream 
 std::uint64_t GzInputStream::getTotalBytesCount() const { refuse("a stream has no known size"); }
 
 GzOutputStream::GzOutputStream(const std::filesystem::path& file)
-    : file_(std::make_unique<File>()) {
-  file_->handle = gzopen(file.c_str(), "wb1");
-  if (file_->handle == nullptr) {
+    : file_(gzopen(file.c_str(), "wb1"), gzclose_w) {
+  if (!file_) {
     throw std::runtime_error(file.string() + ": cannot be made: " + std::strerror(errno));
   }
-  gzbuffer(file_->handle, kBufferSize);
+  gzbuffer(file_.get(), kBufferSize);
 }
-
-GzOutputStream::~GzOutputStream() = default;
 
 std::size_t GzOutputStream::Write(const void* buffer, std::size_t count) {
   const auto* from = static_cast<const std::uint8_t*>(buffer);
   constexpr std::size_t kMost = std::numeric_limits<int>::max();
   for (std::size_t done = 0; done < count;) {
     const std::size_t piece = std::min(kMost, count - done);
-    const int written = gzwrite(file_->handle, from + done, static_cast<unsigned>(piece));
-    if (written <= 0) throw std::runtime_error(reasonOf(file_->handle));
+    const int written = gzwrite(file_.get(), from + done, static_cast<unsigned>(piece));
+    if (written <= 0) throw std::runtime_error(reasonOf(file_.get()));
     done += static_cast<std::size_t>(written);
   }
   position_ += count;
@@ -129,8 +110,7 @@ std::size_t GzOutputStream::Write(const void* buffer, std::size_t count) {
 }
 
 void GzOutputStream::close() {
-  gzFile handle = file_->handle;
-  file_->handle = nullptr;
+  gzFile handle = file_.release();
   if (handle != nullptr && gzclose_w(handle) != Z_OK) {
     throw std::runtime_error(std::string("cannot be completed: ") + std::strerror(errno));
   }

@@ -10,25 +10,25 @@
 #include <string>
 #include <vector>
 
+struct gzFile_s;  // of zlib
+
 namespace efm {
 
-/// A gzip file, or a plain one, as an MRPT stream to read from. It detects a file that was cut;
-/// mrpt::io::CFileGZInputStream does not.
+using GzFile = std::unique_ptr<gzFile_s, int (*)(gzFile_s*)>;
+
+/// A gzip file or a plain file as an MRPT stream for reading. A truncated file is an error, which
+/// mrpt::io::CFileGZInputStream does not notice.
 class GzInputStream : public mrpt::io::CStream {
  public:
-  /// @throws std::runtime_error naming the file where it cannot be opened.
+  /// @throws std::runtime_error naming the file if it cannot be opened.
   explicit GzInputStream(const std::filesystem::path& file);
-  ~GzInputStream() override;
-  GzInputStream(const GzInputStream&) = delete;
-  GzInputStream& operator=(const GzInputStream&) = delete;
 
-  /// Whether the whole file has been read.
-  /// @throws std::runtime_error if the file is cut or its compression is damaged.
+  /// @throws std::runtime_error if the file is truncated or its compression is damaged.
   bool atEnd();
-  /// The fraction of the file that was read, 0 to 1.
+  /// The fraction of the file that has been read, 0 to 1.
   double progress() const;
 
-  /// @return the number of bytes read; fewer than requested only at the end.
+  /// @return less than `count` only at the end.
   /// @throws std::runtime_error as `atEnd`.
   std::size_t Read(void* buffer, std::size_t count) override;
   std::size_t Write(const void* buffer, std::size_t count) override;     ///< Throws: read only.
@@ -39,36 +39,31 @@ class GzInputStream : public mrpt::io::CStream {
  private:
   void fill();
 
-  struct File;
-  std::unique_ptr<File> file_;
+  GzFile file_;
   std::uint64_t file_size_ = 0;
   std::uint64_t position_ = 0;
   std::vector<std::uint8_t> buffer_;
   std::size_t at_ = 0;  // in the buffer
 };
 
-/// A gzip file as an MRPT stream to write to, at MRPT's own compression level, 1.
+/// A gzip file as an MRPT stream for writing, with MRPT's compression level, 1.
 class GzOutputStream : public mrpt::io::CStream {
  public:
   /// @throws std::runtime_error naming the file if it cannot be created.
   explicit GzOutputStream(const std::filesystem::path& file);
-  ~GzOutputStream() override;
-  GzOutputStream(const GzOutputStream&) = delete;
-  GzOutputStream& operator=(const GzOutputStream&) = delete;
 
-  /// Completes the file. @throws std::runtime_error if a part could not be written.
+  /// Completes the file. @throws std::runtime_error if not all bytes could be written.
   void close();
 
   std::size_t Read(void* buffer, std::size_t count) override;  ///< Throws: write only.
-  /// @throws std::runtime_error if a part could not be written.
+  /// @throws std::runtime_error if not all bytes could be written.
   std::size_t Write(const void* buffer, std::size_t count) override;
   std::uint64_t Seek(std::int64_t offset, TSeekOrigin origin) override;  ///< Throws: forward only.
   std::uint64_t getTotalBytesCount() const override { return position_; }
   std::uint64_t getPosition() const override { return position_; }
 
  private:
-  struct File;
-  std::unique_ptr<File> file_;
+  GzFile file_;
   std::uint64_t position_ = 0;
 };
 

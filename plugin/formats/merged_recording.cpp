@@ -34,7 +34,7 @@ mrpt::obs::CObservation::Ptr MergedRecording::next() {
   return packetOf(*camera, t_ns, readers_[*camera].nextPacket());
 }
 
-/// The camera whose next packet begins first, and of several the first one.
+/// The camera with the earliest next packet; of several the first one.
 std::optional<std::size_t> MergedRecording::nextCamera() {
   std::optional<std::size_t> first;
   std::int64_t first_ns = kEndOfTimeNs;

@@ -15,16 +15,15 @@ namespace efm {
 
 /// One event file per camera of a rig, as observations in the order of time.
 ///
-/// An empty packet of each camera comes before the first events, so that the whole rig is known.
-/// Every other packet holds the events of one camera in an interval of 10 ms. A packet is covered
-/// until the camera's next event; the last packet of a camera is covered for all time
-/// (`kEndOfTimeNs`). So the mapping does not wait for a silent camera. The last packet of the
-/// recording does not say what it covers, because the recording ends there. If a file cannot be
-/// read any further, the error comes after the packets before it.
+/// The first packets are empty, one per camera: they tell the whole rig. Each further packet has
+/// the events of one camera in 10 ms. A packet covers its camera until the camera's next event, and
+/// the camera's last packet covers it for ever (`kEndOfTimeNs`): nobody waits for a silent camera.
+/// The very last packet has no such time: there the recording ends. If a file has a wrong line, all
+/// events before it come before the error.
 class MergedRecording : public Recording {
  public:
   /// @param readers one per camera of the rig.
-  /// @throws std::runtime_error if no camera has an event, and the errors of the readers.
+  /// @throws std::runtime_error if no camera has an event; the readers' errors.
   MergedRecording(Rig rig, std::vector<EventTextReader> readers);
 
   mrpt::obs::CObservation::Ptr next() override;
@@ -40,7 +39,7 @@ class MergedRecording : public Recording {
   Rig rig_;
   std::vector<EventTextReader> readers_;  // per camera
   std::string position_ = "the recording";
-  std::size_t announced_ = 0;  // cameras whose empty packet was returned
+  std::size_t announced_ = 0;  // number of empty packets so far
 };
 
 }  // namespace efm

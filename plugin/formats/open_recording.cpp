@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/formats/open_recording.h"
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <stdexcept>
 #include <utility>
 
@@ -20,12 +21,12 @@ namespace {
 
 using Path = std::filesystem::path;
 
-/// A format of recordings. The table below has all of them.
+/// A format of recordings. A new format is a row of the table below.
 struct Format {
   std::string name;
   bool (*looks_like)(const Path&);
   std::unique_ptr<Recording> (*open)(const Path&, const RecordingOverrides&);
-  std::string looks;  ///< The content that `looks_like` detects, for errors.
+  std::string description;  ///< For errors.
 };
 
 const std::vector<Format>& formats() {
@@ -51,7 +52,7 @@ std::unique_ptr<Recording> openAs(const std::string& format, const Path& path,
     if (format == known.name || (format == "auto" && known.looks_like(path))) {
       return known.open(path, given);
     }
-    expected += (expected.empty() ? "" : ", ") + known.looks;
+    expected += (expected.empty() ? "" : ", ") + known.description;
   }
   if (format != "auto") throw std::runtime_error("'" + format + "' is not a known format");
   throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
@@ -67,7 +68,7 @@ std::vector<std::string> recordingFormats() {
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   if (source.files.size() != 1) {
-    throw std::runtime_error(std::to_string(source.files.size()) + " sources: expected one");
+    throw std::runtime_error(fmt::format("{} sources: expected one", source.files.size()));
   }
   const Path& path = source.files.front();
   if (!std::filesystem::exists(path)) {

@@ -11,26 +11,26 @@
 
 namespace efm {
 
-/// The files of a recording, and replacements for its parts. A recording may lack a part that has a
-/// replacement.
+/// A recording, and files that replace its poses, calibration or hand-eye transform. The recording
+/// needs none of its own then.
 struct RecordingSource {
-  std::vector<std::filesystem::path> files;  ///< One path: a file or a folder, by the format.
-  std::string format = "auto";               ///< One of `recordingFormats`; "auto" detects it.
-  std::filesystem::path poses;               ///< TUM, T_world_body; empty: the recording's.
-  std::filesystem::path calibration;         ///< As `readCalibration` takes it; empty: as recorded.
-  std::filesystem::path hand_eye;            ///< As `readHandEye` takes it; empty: as recorded.
-  TrackerFaults faults;                      ///< Of its CObservationRobotPose; none by default.
-  bool override_rig =
-      true;  ///< Write calibration and hand-eye into the observations. False: use them only
-             ///< where they are missing, because the map builder's options replace them.
+  std::vector<std::filesystem::path> files;  ///< One file or folder.
+  std::string format = "auto";               ///< One of `recordingFormats`. "auto": detected.
+  std::filesystem::path poses;               ///< TUM, T_world_body. Empty: the recording's.
+  std::filesystem::path calibration;         ///< See `readCalibration`. Empty: the recording's.
+  std::filesystem::path hand_eye;            ///< See `readHandEye`. Empty: the recording's.
+  TrackerFaults faults;                      ///< Of the poses (CObservationRobotPose).
+  /// Calibration and hand-eye transform replace those of the observations. Otherwise they are used
+  /// only if the recording has none, and a map builder's options replace the others.
+  bool override_rig = true;
 };
 
-/// The formats that `openRecording` knows, "auto" first.
+/// The names of all formats, "auto" first.
 std::vector<std::string> recordingFormats();
 
 /// Opens a recording: a rawlog, a dataset folder (camchain.yaml, camN/events.txt, poses.txt) or a
 /// folder in the UZH text layout (events.txt, groundtruth.txt, calib.txt).
-/// @throws std::runtime_error naming the missing or wrong file, and what was expected;
+/// @throws std::runtime_error naming the missing or wrong file and the expected ones;
 /// std::invalid_argument if the calibration is of other cameras or the faults are not valid.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 

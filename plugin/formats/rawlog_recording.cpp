@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/formats/rawlog_recording.h"
 
+#include <fmt/format.h>
 #include <mrpt/obs/CActionCollection.h>
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CSensoryFrame.h>
@@ -18,18 +19,18 @@
 namespace efm {
 namespace {
 
-/// Removes the text up to the end of a word, if the text contains it.
+/// Removes the text up to the end of the last occurrence of a word.
 void dropThrough(std::string_view& text, std::string_view last) {
   const auto at = text.rfind(last);
   if (at != std::string_view::npos) text.remove_prefix(at + last.size());
 }
 
-/// The message of an error without MRPT's decoration. Each object around the one that failed adds
+/// The reason of an error without MRPT's decoration. Each object around the damaged one adds
 ///
 ///     ==== MRPT exception ====
 ///     Message:  Exception while parsing typed object '…' from …
 ///     Original exception:
-///     <the same of the inner object, or the cause>
+///     <the same of the inner object, or the reason>
 ///     Location: <source file, line, function>
 ///     Call stack backtrace: …
 std::string reasonOf(const std::exception& error) {
@@ -39,7 +40,7 @@ std::string reasonOf(const std::exception& error) {
   dropThrough(text, "Original exception:");
   text = text.substr(0, text.find("\nLocation:"));
 
-  std::string reason;  // the error of an inner object may come before MRPT's heading
+  std::string reason;  // the message of an inner error may come before MRPT's heading
   const auto heading = text.find(kHeading);
   if (heading != std::string_view::npos) {
     reason = text.substr(0, heading);
@@ -83,8 +84,8 @@ void RawlogRecording::readEntry() {
                            "': expected observations, sensory frames and actions");
 }
 
-/// Turns the actions so far into poses, at the frame's time if they have none. Of several poses of
-/// one time only the last is kept: it includes all movements.
+/// Composes the actions so far to poses, with the frame's time if they have none. Of several poses
+/// of one time, only the last has all movements before the frame.
 void RawlogRecording::takeActions(const mrpt::obs::CSensoryFrame& frame) {
   mrpt::obs::CObservation::Ptr newest;
   while (!actions_.empty()) {
@@ -98,13 +99,12 @@ void RawlogRecording::takeActions(const mrpt::obs::CSensoryFrame& frame) {
   }
 }
 
-/// The reason of an error. If a stream throws before an object's name, MRPT reports the end of the
-/// file instead.
+/// MRPT treats every exception of a stream before an object's name as the end of the file.
 std::string RawlogRecording::whyStopped(const std::exception& error) {
   std::string reason = reasonOf(error);
   if (reason.find("EOF") == std::string::npos) return reason;
   try {
-    stream_.atEnd();  // throws again what it threw
+    stream_.atEnd();  // throws the same exception again
   } catch (const std::exception& cause) {
     return reasonOf(cause);
   }
@@ -122,8 +122,8 @@ mrpt::obs::CObservation::Ptr RawlogRecording::next() {
       }
       readEntry();
     } catch (const std::exception& error) {
-      throw std::runtime_error("stopped at entry " + std::to_string(entries_) + " of " +
-                               file_.string() + ": " + whyStopped(error));
+      throw std::runtime_error(fmt::format("stopped at entry {} of {}: {}", entries_,
+                                           file_.string(), whyStopped(error)));
     }
     ++entries_;
   }

@@ -10,18 +10,18 @@
 
 namespace efm {
 
-/// A rawlog, gzip-compressed or plain, read entry by entry: observations, and the observations of
-/// sensory frames one after the other. The movements of actions are composed to poses (see
-/// DeadReckoning). They come before the frame that follows the actions; of several poses of one
-/// time the last. Other actions and comments are skipped.
+/// A rawlog, gzip-compressed or plain, read entry by entry. Its observations, also those in sensory
+/// frames, come one by one. The movements of actions are composed to poses (see DeadReckoning),
+/// which come before the next frame; of several poses with the same time only the last. Other
+/// actions and comments are ignored.
 class RawlogRecording : public Recording {
  public:
-  /// @throws std::runtime_error naming the file where it cannot be opened.
+  /// @throws std::runtime_error naming the file if it cannot be opened.
   explicit RawlogRecording(std::filesystem::path file);
 
-  /// @throws std::runtime_error "stopped at entry N of FILE: reason" if the file is cut or corrupt,
-  /// or has an unknown class. Entries count from 0, as in MRPT's programs. The error comes after
-  /// the observations before it.
+  /// @throws std::runtime_error "stopped at entry N of FILE: reason" if the file is truncated or
+  /// damaged, or has an unknown class. Entries count from 0, as in MRPT's programs. All entries
+  /// before N have been returned.
   mrpt::obs::CObservation::Ptr next() override;
   std::string position() const override;
   double progress() const override { return stream_.progress(); }
@@ -35,7 +35,7 @@ class RawlogRecording : public Recording {
   GzInputStream stream_;
   std::uint64_t entries_ = 0;  // read so far
   std::deque<mrpt::obs::CObservation::Ptr> pending_;
-  std::deque<mrpt::obs::CActionCollection::Ptr> actions_;  // until the frame after them is read
+  std::deque<mrpt::obs::CActionCollection::Ptr> actions_;  // before the next frame
   DeadReckoning reckoning_;
 };
 

@@ -13,14 +13,14 @@
 namespace efm {
 namespace {
 
-bool isOfAName(char c) {
+bool isNameCharacter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
          c == ':' || c == '<' || c == '>' || c == ',';
 }
 
-/// MRPT writes an object as the length of its class's name, the name, and its content. The length
-/// is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the lowest first. A cut file
-/// may be shorter.
+/// Whether these are the first bytes of an object: the length of its class's name, the name, the
+/// content. The length is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the
+/// lowest first. A truncated file may have fewer bytes.
 bool beginsAnObject(std::string_view bytes) {
   constexpr std::size_t kShortestName = 3;
   constexpr std::size_t kLongestName = 120;
@@ -36,7 +36,7 @@ bool beginsAnObject(std::string_view bytes) {
     bytes.remove_prefix(zeros.size());
   }
   const std::string_view name = bytes.substr(0, length);
-  return std::all_of(name.begin(), name.end(), isOfAName);
+  return std::all_of(name.begin(), name.end(), isNameCharacter);
 }
 
 }  // namespace

@@ -5,10 +5,10 @@
 
 namespace efm {
 
-/// Checks the first bytes of a file, compressed or not: a rawlog begins with the name of an
-/// object's class. Damage after that is not detected here.
-/// @throws std::runtime_error naming the file, its first bytes and what was expected; or if the
-/// file cannot be opened.
+/// Checks the first bytes of a rawlog, compressed or not: the name of an object's class, as MRPT
+/// writes it. Does not check for later damage.
+/// @throws std::runtime_error naming the file, its first bytes and the expected kind of file, or if
+/// it cannot be opened.
 void requireRawlog(const std::filesystem::path& file);
 
 }  // namespace efm

@@ -19,7 +19,7 @@ class RawlogWriter {
   /// @param file an earlier file of this name is replaced: see AtomicFile.
   /// @throws std::runtime_error naming the file if it cannot be created or replaced.
   explicit RawlogWriter(const std::filesystem::path& file);
-  /// Without `close`, no file is left.
+  /// Without `close`, there is no file.
   ~RawlogWriter();
 
   /// @throws std::runtime_error naming the file if it cannot be written.

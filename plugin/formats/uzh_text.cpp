@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/formats/uzh_text.h"
 
+#include <fmt/format.h>
+
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
@@ -22,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr CameraSize kDavis240c = {240, 180};
 
-/// The size of the first image of images.txt that exists.
+/// The size of the first existing image of images.txt.
 std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
   std::ifstream list(folder / "images.txt");
   std::string line;
@@ -47,20 +49,20 @@ std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
 void requireFile(const fs::path& folder, const char* name, const char* what, const char* option) {
   std::error_code ignored;
   if (fs::exists(folder / name, ignored)) return;
-  throw std::runtime_error(folder.string() + ": no " + what + ": expected " + name + ", or " +
-                           option + " FILE");
+  throw std::runtime_error(
+      fmt::format("{}: no {}: expected {}, or {} FILE", folder.string(), what, name, option));
 }
 
-/// A given camera. Only an image of the folder shows the sensor's size for certain.
+/// Only an image tells the size of the folder's sensor.
 RigCamera givenCamera(const Calibration& calibration, const fs::path& folder) {
   calibration.requireCameras(1);
-  const bool says_size = calibration.rig.cameras[0].model.width > 0;
+  const bool has_size = calibration.rig.cameras[0].model.width > 0;
   const std::optional<CameraSize> size = sizeOfImages(folder);
-  return calibration.camera(0, size || says_size ? size : kDavis240c);
+  return calibration.camera(0, size || has_size ? size : kDavis240c);
 }
 
-/// The folder's own camera if it has one, even if another was given: RigOverrideRecording or the
-/// map builder replaces it later.
+/// The folder's own camera if it has one. Then the caller replaces it by a given one and counts the
+/// difference.
 RigCamera readCamera(const fs::path& folder, const RecordingOverrides& given) {
   std::optional<RigCamera> camera;
   if (given.calibration != nullptr) camera = givenCamera(*given.calibration, folder);
