@@ -1,44 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <exception>
-#include <functional>
-#include <iostream>
-#include <new>
-#include <string>
+#include "plugin/app/program.h"
 
-#include "plugin/app/command_line.h"
-#include "plugin/mrpt/registration.h"
-
-namespace {
-
-int fail(const std::string& message) {
-  std::cerr << "event-fusion: error: " << message << "\n";
-  return 1;
-}
-
-/// Flushes stdout. @return the status, or a failure if stdout cannot be written.
-int finished(int status) {
-  errno = 0;
-  std::cout.flush();
-  const bool flushed = std::fflush(stdout) == 0;
-  if (flushed && std::cout && std::ferror(stdout) == 0) return status;
-  // errno is 0 if an earlier flush failed.
-  return fail("the output cannot be written" +
-              (errno != 0 ? std::string(": ") + std::strerror(errno) : std::string()));
-}
-
-}  // namespace
-
-int main(int argc, char** argv) {
-  try {
-    const std::function<int()> run = efm::parseCommandLine(argc, argv);
-    efm::registerClasses();
-    return finished(run());
-  } catch (const std::bad_alloc&) {
-    return fail("out of memory");
-  } catch (const std::exception& error) {
-    return fail(error.what());
-  }
-}
+int main(int argc, char** argv) { return efm::runProgram(argc, argv); }

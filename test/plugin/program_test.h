@@ -32,14 +32,17 @@ class ProgramTest : public TemporaryFolder {
 
   /// Runs a command of the shell.
   Result shell(const std::string& command) const {
-    const int status = std::system(
+    return resultOf(std::system(
         ("cd '" + folder().string() + "' && " + command + " </dev/null >stdout.txt 2>stderr.txt")
-            .c_str());
+            .c_str()));
+  }
+  /// @param status as waitpid has it.
+  Result resultOf(int status) const {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, contentOf("stdout.txt"),
             contentOf("stderr.txt")};
   }
-  /// Runs event-fusion.
-  Result run(const std::string& arguments) const {
+  /// Runs event-fusion. Arguments are quoted as for a shell.
+  virtual Result run(const std::string& arguments) const {
     return shell("'" EFM_EVENT_FUSION "' " + arguments);
   }
   /// Runs event-fusion, which must fail. @return its message.

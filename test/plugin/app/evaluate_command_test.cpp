@@ -9,7 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "test/plugin/app/map_command.h"
+#include "maps/io/point_cloud_file.h"
+#include "test/plugin/app/app_test.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/truth/dataset_writer.h"
 
@@ -23,7 +24,7 @@ using testing::IsEmpty;
 using testing::Not;
 
 /// A plane before two cameras that move along x: mapped to "out" or "one", with its truth.
-class EvaluateCommand : public MapCommand {
+class EvaluateCommand : public AppTest {
  protected:
   EvaluateCommand() { write(SyntheticRecording()); }
 
@@ -132,7 +133,7 @@ TEST_F(EvaluateCommand, ComparesTheKeyframesTrajectoryWithThePoses) {
   EXPECT_FALSE(image("path.png").empty());
 }
 
-TEST_F(EvaluateCommand, WhatIsWrongIsAnErrorOnOneLine) {
+TEST_F(EvaluateCommand, WrongInputsAreErrors) {
   writePlane(folder() / "plane.tiff");
   EXPECT_EQ(errorOf("evaluate depth nowhere.tiff plane.tiff"),
             "event-fusion: error: no such file: nowhere.tiff\n");

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `event-fusion simulate`, `import` and `info` as a user runs them, and MRPT's own program on what
-// they make.
+// `event-fusion simulate`, `import` and `info`.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +7,7 @@
 #include <cstdlib>
 #include <regex>
 
-#include "test/plugin/program_test.h"
+#include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
@@ -22,7 +21,7 @@ using testing::StartsWith;
 
 const std::filesystem::path kSliderDepth = EFM_SHARED_DATA "/slider_depth";
 
-class ImportCommand : public ProgramTest {
+class ImportCommand : public AppTest {
  protected:
   /// A recording in the UZH layout.
   void writeSmallRecording() const {
@@ -33,7 +32,7 @@ class ImportCommand : public ProgramTest {
   }
 };
 
-TEST_F(ImportCommand, TurnsARecordingIntoARawlogAndSaysWhatIsInIt) {
+TEST_F(ImportCommand, WritesARawlogAndPrintsItsContents) {
   writeSmallRecording();
   const Result result = run("import small --out s.rawlog");
   EXPECT_EQ(result.status, 0);
@@ -44,7 +43,7 @@ TEST_F(ImportCommand, TurnsARecordingIntoARawlogAndSaysWhatIsInIt) {
   EXPECT_TRUE(exists(folder() / "s.rawlog"));
 }
 
-TEST_F(ImportCommand, InfoSaysTheSameOfTheFolderAndOfItsRawlog) {
+TEST_F(ImportCommand, InfoIsTheSameForAFolderAndItsRawlog) {
   writeSmallRecording();
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);
   const Result folder = run("info small");
@@ -63,14 +62,14 @@ TEST_F(ImportCommand, InfoSaysTheSameOfTheFolderAndOfItsRawlog) {
   EXPECT_EQ(rawlog.out, folder.out.substr(0, sorted));
 }
 
-TEST_F(ImportCommand, TakesAStretchOfTheRecording) {
+TEST_F(ImportCommand, ImportsAnIntervalOfTheRecording) {
   writeSmallRecording();
   const Result result = run("import small --out s.rawlog --t0 0.02 --t1 0.03");
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.out, AllOf(HasSubstr("cam0: 2 events"), HasSubstr("2 poses")));
 }
 
-TEST_F(ImportCommand, AStretchWithoutEventsIsAnErrorThatSaysWhereTheyAre) {
+TEST_F(ImportCommand, AnIntervalWithoutEventsIsAnErrorWithTheTimesOfTheEvents) {
   writeSmallRecording();
   const char* const span = ": the recording has events from 0.010000000 s to 0.050000000 s\n";
   // Around the middle one lie poses, but no event.
@@ -85,7 +84,7 @@ TEST_F(ImportCommand, AStretchWithoutEventsIsAnErrorThatSaysWhereTheyAre) {
               HasSubstr("no event from --t0 7.000000000 s until --t1 8.000000000 s: "));
 }
 
-TEST_F(ImportCommand, ReadsTheRealSliderRecordingWhole) {
+TEST_F(ImportCommand, ReadsTheRealSliderRecordingCompletely) {
   if (!exists(kSliderDepth)) GTEST_SKIP() << "no " << kSliderDepth;
   const Result import = run("import '" + kSliderDepth.string() + "' --out s.rawlog");
   EXPECT_EQ(import.status, 0) << import.err;
@@ -93,20 +92,6 @@ TEST_F(ImportCommand, ReadsTheRealSliderRecordingWhole) {
   const Result info = run("info s.rawlog");
   EXPECT_THAT(info.out, AllOf(HasSubstr("cam0: 240x180 pixels"),
                               HasSubstr("50000 events from 0.003811000 s to 0.174156000 s")));
-}
-
-TEST_F(ImportCommand, RawlogEditListsTheEventsWithTheirLabel) {
-  if (!isInstalled("rawlog-edit")) GTEST_SKIP() << "no rawlog-edit";
-  writeSmallRecording();
-  ASSERT_EQ(run("import small --out s.rawlog").status, 0);
-  const Result with = shell("rawlog-edit -p '" EFM_PLUGIN "' --info -i s.rawlog");
-  EXPECT_EQ(with.status, 0);
-  EXPECT_THAT(with.out, HasSubstr("cam0, pose"));
-  EXPECT_THAT(with.out + with.err, Not(HasSubstr("not registered")));
-
-  const Result described = shell("rawlog-edit -p '" EFM_PLUGIN "' --describe -i s.rawlog");
-  EXPECT_EQ(described.status, 0);
-  EXPECT_THAT(described.out, HasSubstr("Events of camera 0: "));
 }
 
 // --- simulate ----------------------------------------------------------------------------------
@@ -148,7 +133,7 @@ TEST_F(ImportCommand, AnEventOutsideTheSensorIsAnErrorThatNamesTheLineAndLeavesN
   EXPECT_FALSE(exists(folder() / "s.partial.rawlog"));
 }
 
-TEST_F(ImportCommand, InfoOfACutFolderSaysWhatCameBeforeAndFails) {
+TEST_F(ImportCommand, InfoOfATruncatedFolderPrintsTheContentsBeforeTheErrorAndFails) {
   writeSmallRecording();
   write("small/events.txt", "0.010 1 2 1\n0.020 3 4 0\n0.030 5");
   const Result result = run("info small");
@@ -158,7 +143,7 @@ TEST_F(ImportCommand, InfoOfACutFolderSaysWhatCameBeforeAndFails) {
   EXPECT_THAT(result.err, HasSubstr("small/events.txt:3: '0.030 5': expected t x y p, but the"));
 }
 
-TEST_F(ImportCommand, InfoOfACutRawlogSaysWhatCameBeforeAndFails) {
+TEST_F(ImportCommand, InfoOfATruncatedRawlogPrintsTheContentsBeforeTheErrorAndFails) {
   writeSmallRecording();
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);
   const std::string bytes = contentOf("s.rawlog");
@@ -173,7 +158,7 @@ TEST_F(ImportCommand, InfoOfACutRawlogSaysWhatCameBeforeAndFails) {
       << result.err;
 }
 
-TEST_F(ImportCommand, AFileThatIsNoRawlogIsAnErrorThatSaysWhatWasExpected) {
+TEST_F(ImportCommand, AFileOfAnotherKindIsAnErrorThatNamesTheExpectedKind) {
   writeSmallRecording();
   ASSERT_EQ(std::system(("gzip -k '" + (folder() / "small/events.txt").string() + "'").c_str()), 0);
   write("empty.rawlog", "");
@@ -206,7 +191,7 @@ TEST_F(ImportCommand, ARawlogThatCannotBeWrittenIsAnError) {
   EXPECT_THAT(result.err, HasSubstr("nowhere/"));
 }
 
-TEST_F(ImportCommand, AnOutputThatIsNoFileIsAnErrorAndStays) {
+TEST_F(ImportCommand, AnOutputThatIsAFolderIsAnErrorAndStays) {
   writeSmallRecording();
   std::filesystem::create_directory(folder() / "taken");
   EXPECT_THAT(run("import small --out taken").err, HasSubstr("'taken': it is a folder"));
@@ -217,7 +202,7 @@ TEST_F(ImportCommand, AnOutputThatIsNoFileIsAnErrorAndStays) {
   EXPECT_TRUE(is_directory(folder() / "taken"));
 }
 
-TEST_F(ImportCommand, OutputThatNobodyReceivesIsAnError) {
+TEST_F(ImportCommand, OutputThatCannotBeWrittenIsAnError) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   writeSmallRecording();
   for (const char* arguments :
@@ -231,7 +216,7 @@ TEST_F(ImportCommand, OutputThatNobodyReceivesIsAnError) {
   }
 }
 
-TEST_F(ImportCommand, WrongUsageIsAnErrorThatSaysWhatIsMissing) {
+TEST_F(ImportCommand, WrongUsageIsAnErrorThatNamesTheOption) {
   EXPECT_NE(run("").status, 0);
   EXPECT_THAT(run("import small").err, HasSubstr("--out"));
   EXPECT_THAT(run("info small --format tape").err, HasSubstr("tape"));
@@ -239,7 +224,7 @@ TEST_F(ImportCommand, WrongUsageIsAnErrorThatSaysWhatIsMissing) {
   EXPECT_NE(run("info small --t0 soon").status, 0);
 }
 
-TEST_F(ImportCommand, HelpAndVersionAreSuccesses) {
+TEST_F(ImportCommand, HelpAndVersionSucceed) {
   const Result help = run("--help");
   EXPECT_EQ(help.status, 0);
   EXPECT_THAT(help.out, AllOf(HasSubstr("simulate"), HasSubstr("import"), HasSubstr("info")));

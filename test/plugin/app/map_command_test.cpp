@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "test/plugin/app/map_command.h"
+#include "test/plugin/app/app_test.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
@@ -21,6 +21,8 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
+
+class MapCommand : public AppTest {};
 
 TEST_F(MapCommand, WritesTheFilesOfTheContract) {
   write(SyntheticRecording());
@@ -133,7 +135,7 @@ TEST_F(MapCommand, WrongOptionsAreErrorsThatNameFileSectionKeyAndValue) {
   EXPECT_THAT(result.err, HasSubstr("[dsi] num_planes = many: must be a whole number"));
 }
 
-TEST_F(MapCommand, CamerasThatTheRecordingDoesNotHaveAreErrors) {
+TEST_F(MapCommand, MissingCamerasAreErrors) {
   write(SyntheticRecording());
   Result result = run("map rig.ini data --out out --set rig.cameras=0,5");
   EXPECT_NE(result.status, 0);
@@ -186,7 +188,7 @@ TEST_F(MapCommand, ARecordingShorterThanAWindowIsAnErrorThatSaysSo) {
   EXPECT_EQ(reportIn("out")["keyframes"], 0);
 }
 
-TEST_F(MapCommand, ATruncatedRawlogIsAnErrorAndTheMapSoFarIsWritten) {
+TEST_F(MapCommand, ATruncatedRawlogIsAnErrorAfterTheMapSoFar) {
   write(SyntheticRecording());
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   const auto rawlog = folder() / "r.rawlog";
@@ -202,7 +204,7 @@ TEST_F(MapCommand, ATruncatedRawlogIsAnErrorAndTheMapSoFarIsWritten) {
   EXPECT_TRUE(exists(folder() / "out" / "trajectory.txt"));
 }
 
-TEST_F(MapCommand, ARunThatMakesNothingLeavesAnEarlierMapAsItWas) {
+TEST_F(MapCommand, ARunWithoutKeyframesKeepsTheEarlierMap) {
   write(SyntheticRecording());
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
   const auto files = filesIn("out");
@@ -216,7 +218,7 @@ TEST_F(MapCommand, ARunThatMakesNothingLeavesAnEarlierMapAsItWas) {
   }
 }
 
-TEST_F(MapCommand, DepthLeavesAnEarlierMapInTheSameFolder) {
+TEST_F(MapCommand, DepthKeepsTheEarlierMapInTheFolder) {
   write(SyntheticRecording());
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
   const auto map_files = filesIn("out");
@@ -256,7 +258,7 @@ TEST_F(MapCommand, DepthWritesOneKeyframeStraightIntoTheFolder) {
   EXPECT_EQ(reportIn("out")["keyframes"], 1);
 }
 
-TEST_F(MapCommand, TheSavedDsiHasItsMaximumWhereTheConfidenceSays) {
+TEST_F(MapCommand, TheMaximaOfTheSavedDsiAreTheConfidences) {
   write(SyntheticRecording());
   ASSERT_EQ(run("depth rig.ini data --out out --t0 10.1 --t1 10.3 --save-dsi").status, 0);
   const cv::Mat1f confidence =
@@ -276,7 +278,7 @@ TEST_F(MapCommand, TheSavedDsiHasItsMaximumWhereTheConfidenceSays) {
   }
 }
 
-TEST_F(MapCommand, DepthTakesTheReferenceTimeThatIsAskedFor) {
+TEST_F(MapCommand, DepthUsesTheGivenReferenceTime) {
   write(SyntheticRecording());
   ASSERT_EQ(run("depth rig.ini data --out a --t0 10.1 --t1 10.3").status, 0);
   ASSERT_EQ(run("depth rig.ini data --out b --t0 10.1 --t1 10.3 --ref-time 10.2").status, 0);
@@ -285,7 +287,7 @@ TEST_F(MapCommand, DepthTakesTheReferenceTimeThatIsAskedFor) {
   EXPECT_NE(contentOf("a/depth.tiff"), contentOf("c/depth.tiff"));
 }
 
-TEST_F(MapCommand, AWindowWithoutPosesOrTheWrongWayRoundIsAnError) {
+TEST_F(MapCommand, AWindowWithoutPosesAndAReversedWindowAreErrors) {
   write(SyntheticRecording());
   const Result beside = run("depth rig.ini data --out out --t0 20 --t1 21");
   EXPECT_NE(beside.status, 0);
@@ -298,7 +300,7 @@ TEST_F(MapCommand, AWindowWithoutPosesOrTheWrongWayRoundIsAnError) {
   EXPECT_THAT(not_a_time.err, HasSubstr("soon"));
 }
 
-TEST_F(MapCommand, TimesWhoseDifferencesWouldNotFitAreErrors) {
+TEST_F(MapCommand, TimesOutOfRangeAreErrors) {
   for (const char* times : {"--t0 -9e9 --t1 9e9", "--t0 1 --t1 4.7e9", "--t0 -4.7e9 --t1 1",
                             "--t0 1 --t1 2 --ref-time 5e9"}) {
     const Result result = run(std::string("depth rig.ini data --out out ") + times);

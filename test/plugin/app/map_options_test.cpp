@@ -5,7 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "maps/io/point_cloud_file.h"
-#include "test/plugin/app/map_command.h"
+#include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
@@ -16,14 +16,14 @@ using testing::Each;
 using testing::HasSubstr;
 using testing::Not;
 
-class MapOptions : public MapCommand {
+class MapOptions : public AppTest {
  protected:
   std::size_t pointsIn(const std::filesystem::path& file) const {
     return readPointCloud(folder() / file).points.size();
   }
 };
 
-TEST_F(MapOptions, TheSequencesWhiteLevelIsFoundInAPassOfItsOwn) {
+TEST_F(MapOptions, TheSequencesWhiteLevelIsComputedInAFirstPass) {
   write(SyntheticRecording());
   ASSERT_EQ(run("map rig.ini data --out out --set depth.max_confidence=sequence").status, 0);
 
@@ -66,7 +66,7 @@ TEST_F(MapOptions, OneKeyframeHasTheWhiteLevelOfTheWholeRecording) {
   EXPECT_EQ(reportIn("one")["sequence_maximum"], reportIn("out")["sequence_maximum"]);
 }
 
-TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
+TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenToo) {
   write(SyntheticRecording());
   // With slices of time a camera alone is fused across them.
   const std::string map = "map rig.ini data --set fusion.time_slices=1 ";
@@ -89,7 +89,7 @@ TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenBesideTheFusedMap) {
   EXPECT_THAT(filesIn("out"), Each(Not(HasSubstr("cam"))));
 }
 
-TEST_F(MapOptions, LateFusionPutsTheCloudsOfSingleCamerasTogether) {
+TEST_F(MapOptions, LateFusionJoinsTheCloudsOfSingleCameras) {
   write(SyntheticRecording());
   const std::string depth =
       "depth rig.ini data --t0 10.1 --t1 10.4 --set map.voxel_size_m=0.001 "
@@ -102,7 +102,7 @@ TEST_F(MapOptions, LateFusionPutsTheCloudsOfSingleCamerasTogether) {
             pointsIn("first/points.pcd") + pointsIn("second/points.pcd"));
 }
 
-TEST_F(MapOptions, OutliersAreLeftOutOfTheCloudOfOneKeyframeToo) {
+TEST_F(MapOptions, OutliersAreRemovedFromTheCloudOfOneKeyframeToo) {
   write(SyntheticRecording());
   const std::string depth = "depth rig.ini data --t0 10.1 --t1 10.4 ";
   ASSERT_EQ(run(depth + "--out all").status, 0);
@@ -114,7 +114,7 @@ TEST_F(MapOptions, OutliersAreLeftOutOfTheCloudOfOneKeyframeToo) {
   EXPECT_EQ(reportIn("some")["points"], pointsIn("some/points.pcd"));
 }
 
-TEST_F(MapOptions, AFileThatCannotBeWrittenDoesNotTakeTheOthersAlong) {
+TEST_F(MapOptions, OtherFilesAreWrittenIfOneCannotBeWritten) {
   write(SyntheticRecording());
   std::filesystem::create_directories(folder() / "out" / "map.pcd" / "in the way");
   const Result result = run("map rig.ini data --out out");

@@ -3,7 +3,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "test/plugin/app/map_command.h"
+#include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-class PerturbOption : public MapCommand {
+class PerturbOption : public AppTest {
  protected:
   PerturbOption() { write(SyntheticRecording()); }
 
@@ -20,13 +20,13 @@ class PerturbOption : public MapCommand {
   }
 };
 
-TEST_F(PerturbOption, OfNothingChangesNothing) {
+TEST_F(PerturbOption, WithZeroFaultsChangesNothing) {
   const std::string map = mapOf("data");
   EXPECT_EQ(mapOf("data --perturb noise_m=0,drop=0,seed=3", "zero"), map);
   EXPECT_FALSE(reportIn("zero").contains("perturbation"));
 }
 
-TEST_F(PerturbOption, OfLatencyAloneMakesTheSameMap) {
+TEST_F(PerturbOption, WithLatencyOnlyMakesTheSameMap) {
   const std::string map = mapOf("data");
   for (const char* latency_s : {"0.2", "0.7"}) {
     EXPECT_EQ(mapOf(std::string("data --perturb latency_s=") + latency_s, "late"), map);
@@ -34,7 +34,7 @@ TEST_F(PerturbOption, OfLatencyAloneMakesTheSameMap) {
   }
 }
 
-TEST_F(PerturbOption, IsInTheReportAsItWasUsed) {
+TEST_F(PerturbOption, IsInTheReport) {
   const std::string map = mapOf("data");
   EXPECT_FALSE(reportIn("out").contains("perturbation"));
   const std::string other =
@@ -48,7 +48,7 @@ TEST_F(PerturbOption, IsInTheReportAsItWasUsed) {
   EXPECT_EQ(perturbation["drop"], 0);
 }
 
-TEST_F(PerturbOption, NoiseThatIsConstantInEachWindowLeavesDepthMapsAsTheyAre) {
+TEST_F(PerturbOption, NoiseThatIsConstantInEachWindowDoesNotChangeDepthMaps) {
   const std::string windows = "data --set keyframes.window_s=0.1 --set depth.threshold_c=30";
   mapOf(windows);
   const auto exact = posesIn("out");
@@ -85,7 +85,7 @@ TEST_F(PerturbOption, NoiseThatIsConstantInEachWindowLeavesDepthMapsAsTheyAre) {
   }
 }
 
-TEST_F(PerturbOption, IsBakedIntoARawlogByImport) {
+TEST_F(PerturbOption, IsWrittenToARawlogByImport) {
   const std::string perturb =
       " --perturb keyframe_noise_m=0.02,keyframe_s=0.07,noise_m=0.001,drift=0.01";
   const std::string map = mapOf("data" + perturb);
@@ -102,7 +102,7 @@ TEST_F(PerturbOption, WorksForOneKeyframe) {
   EXPECT_EQ(reportIn("one")["perturbation"]["noise_m"], 0.01);
 }
 
-TEST_F(PerturbOption, ErrorsNameKeyValueAndWhatWasExpected) {
+TEST_F(PerturbOption, ErrorsNameKeyValueAndExpectedValue) {
   const std::string map = "map rig.ini data --out out --perturb ";
   EXPECT_THAT(errorOf(map + "wobble=1"),
               AllOf(HasSubstr("--perturb"), HasSubstr("unknown key 'wobble'; known: noise_m")));

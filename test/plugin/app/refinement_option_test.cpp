@@ -2,7 +2,7 @@
 // `event-fusion` with [refinement] enabled.
 
 #include "maps/metrics/trajectory_metrics.h"
-#include "test/plugin/app/map_command.h"
+#include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
@@ -14,7 +14,7 @@ using testing::Not;
 
 const std::string kRefined = " --set refinement.enabled=true";
 
-class RefinementOption : public MapCommand {
+class RefinementOption : public AppTest {
  protected:
   RefinementOption() { write(SyntheticRecording(1.3)); }
 
@@ -71,7 +71,7 @@ TEST_F(RefinementOption, WritesTheRefinedPosesAndTheTrackers) {
   EXPECT_EQ(report["options"]["refinement"]["loop_max_sigma_deg"], 0.5);
 }
 
-TEST_F(RefinementOption, IsTheSameEachTimeWhateverTheThreadsAndInTheBackground) {
+TEST_F(RefinementOption, IsTheSameForAnyThreadsAndInTheBackground) {
   const std::string wrong = "--perturb keyframe_noise_m=0.01,keyframe_s=0.1" + kRefined;
   map(wrong, "once");
   const auto expect_same = [&](const std::string& name) {
@@ -86,7 +86,7 @@ TEST_F(RefinementOption, IsTheSameEachTimeWhateverTheThreadsAndInTheBackground) 
   expect_same("background");
 }
 
-TEST_F(RefinementOption, WithoutItThereIsNoTrajectoryOfTheTrackersBeside) {
+TEST_F(RefinementOption, WithoutRefinementThereIsNoTrajectoryOfTheTracker) {
   map("", "out");
   const std::string points = contentOf("out/map.pcd");
   EXPECT_THAT(filesIn("out"), Not(Contains("trajectory_tracker.txt")));
@@ -108,7 +108,7 @@ TEST_F(RefinementOption, AShorterRunReplacesTheTrajectoriesOfALongerOne) {
   EXPECT_EQ(posesIn("out", "trajectory_tracker.txt").size(), posesIn("out").size());
 }
 
-TEST_F(RefinementOption, OneKeyframeIsWhereTheTrackerPutsIt) {
+TEST_F(RefinementOption, OneKeyframeHasTheTrackersPose) {
   const std::string depth = "depth rig.ini data --t0 10.2 --t1 10.4";
   ASSERT_EQ(run(depth + " --out one").status, 0);
   for (const char* background : {"false", "true"}) {
@@ -128,7 +128,7 @@ TEST_F(RefinementOption, TheSequencesWhiteLevelIsTheSame) {
   EXPECT_EQ(reportIn("refined")["sequence_maximum"], reportIn("out")["sequence_maximum"]);
 }
 
-TEST_F(RefinementOption, DegreesAreReportedAsTheyWereGiven) {
+TEST_F(RefinementOption, DegreesAreReportedAsGiven) {
   map("--t1 10.3 --set refinement.tracker_noise_deg=0.3 --set refinement.loop_max_sigma_deg=0.7 "
       "--set refinement.tracker_drift_deg_per_m=1.1",
       "out");
@@ -148,7 +148,7 @@ TEST_F(RefinementOption, WrongValuesAreErrorsThatNameSectionKeyAndValue) {
   EXPECT_THAT(error("windows=3"), AllOf(HasSubstr("windows"), HasSubstr("unknown key")));
 }
 
-TEST_F(RefinementOption, ARecordingOfOneKeyframeIsNoCaseOfItsOwn) {
+TEST_F(RefinementOption, ARecordingMayHaveOneKeyframe) {
   const Result result = map("--t1 10.15" + kRefined, "out");
   EXPECT_EQ(result.err, "");
   EXPECT_EQ(contentOf("out/trajectory.txt"), contentOf("out/trajectory_tracker.txt"));

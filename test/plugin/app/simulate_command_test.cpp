@@ -10,14 +10,14 @@
 
 #include "mapping/geometry/rig.h"
 #include "plugin/calibration/camchain.h"
-#include "test/plugin/program_test.h"
+#include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
 
 using testing::HasSubstr;
 
-class SimulateCommand : public ProgramTest {
+class SimulateCommand : public AppTest {
  protected:
   std::string simulateError(const std::string& arguments) const {
     return errorOf("simulate " + arguments);
@@ -46,7 +46,7 @@ class SimulateCommand : public ProgramTest {
   }
 };
 
-TEST_F(SimulateCommand, WritesTheRigThatItWasGiven) {
+TEST_F(SimulateCommand, WritesTheGivenRig) {
   writeRigAndTrajectory();
   simulate(
       "--scene room --trajectory walk.txt --calibration rig.yaml --start 0.2 --duration 0.1 "
@@ -64,7 +64,7 @@ TEST_F(SimulateCommand, WritesTheRigThatItWasGiven) {
   EXPECT_THAT(contentOf("sim/depth/index.txt"), HasSubstr("0.200000000"));
 }
 
-TEST_F(SimulateCommand, NoiseIsCountedByItsRate) {
+TEST_F(SimulateCommand, NoiseHasItsRate) {
   writeRigAndTrajectory();
   simulate(
       "--scene room --trajectory walk.txt --calibration rig.yaml --duration 0.1 --threshold-on 5 "
@@ -120,7 +120,7 @@ TEST_F(SimulateCommand, TakesTheLargestSeed) {
       "--seed 18446744073709551615 --out sim");
 }
 
-TEST_F(SimulateCommand, DrivesTheSharedRigsOnTheSharedTrajectories) {
+TEST_F(SimulateCommand, SimulatesRealRigsOnRealTrajectories) {
   const std::filesystem::path shared = EFM_SHARED_DATA;
   if (!std::filesystem::exists(shared / "trajectories")) GTEST_SKIP() << shared << " is not there";
   const std::string trajectories = (shared / "trajectories").string();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Rawlogs of both kinds that MRPT wrote, through the program and through the builder.
 
+#include <gmock/gmock.h>
 #include <mrpt/io/CFileGZInputStream.h>
 #include <mrpt/obs/CActionRobotMovement2D.h>
 #include <mrpt/obs/CActionRobotMovement3D.h>
@@ -12,8 +13,8 @@
 
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/registration.h"
-#include "test/plugin/app/map_command.h"
 #include "test/plugin/mrpt/observations.h"
+#include "test/plugin/program_test.h"
 
 namespace efm {
 namespace {
@@ -28,7 +29,7 @@ using testing::HasSubstr;
 /// How a rawlog says where the rig is.
 enum class Says { kPoses, kOdometry, kMovements2d, kMovements3d };
 
-class RawlogKinds : public MapCommand {
+class RawlogKinds : public ProgramTest {
  protected:
   RawlogKinds() {
     registerClasses();
@@ -160,13 +161,13 @@ TEST_F(RawlogKinds, OdometryAndMovementsGiveTheMapThatPosesGive) {
               HasSubstr("odometry 'wheels':\n  21 poses from 10.0"));
 }
 
-TEST_F(RawlogKinds, MovementsWithoutATimeTakeThatOfTheirFrame) {
+TEST_F(RawlogKinds, MovementsWithoutATimeHaveTheTimeOfTheirFrame) {
   save(pairs(Says::kPoses), "poses.rawlog");
   save(pairs(Says::kMovements2d, false), "movements.rawlog");
   expectNear(mapOf("movements.rawlog"), mapOf("poses.rawlog"));
 }
 
-TEST_F(RawlogKinds, TheBuilderTakesBothFromARawlogAsMrptGivesThem) {
+TEST_F(RawlogKinds, TheBuilderMapsBothAsMrptReadsThem) {
   save(observationsOnly(Says::kPoses), "observations.rawlog");
   save(pairs(Says::kMovements3d), "pairs.rawlog");
   std::vector<std::vector<Eigen::Vector4f>> maps;
@@ -222,7 +223,7 @@ TEST_F(RawlogKinds, OfSeveralSourcesOneIsUsedAndTheOthersAreCounted) {
 
   const auto slipped = mapOf("both.rawlog", "--set rig.pose_source=wheels");
   ASSERT_FALSE(slipped.empty());
-  EXPECT_GT(posesIn("out")[0].T_world_rig.translation.x(), 0.1);
+  EXPECT_GT(readTumTrajectory(folder() / "out/trajectory.txt")[0].T_world_rig.translation.x(), 0.1);
   writeTumTrajectory(folder() / "given.txt", recording.poses);
   expectNear(mapOf("both.rawlog", "--poses given.txt --set rig.pose_source=wheels"), map);
   EXPECT_THAT(run("map rig.ini both.rawlog --out out --set rig.pose_source=gps").err,
@@ -230,12 +231,13 @@ TEST_F(RawlogKinds, OfSeveralSourcesOneIsUsedAndTheOthersAreCounted) {
                         "of poses 'pose', odometry 'wheels'"));
 }
 
-TEST_F(RawlogKinds, AHandEyeTransformIsTakenForOdometryToo) {
+TEST_F(RawlogKinds, AHandEyeTransformAppliesToOdometryToo) {
   std::ofstream(folder() / "up.yaml")
       << "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
   save(observationsOnly(Says::kOdometry), "odometry.rawlog");
   mapOf("odometry.rawlog", "--hand-eye up.yaml");
-  EXPECT_NEAR(posesIn("out")[0].T_world_rig.translation.y(), 7, 1e-9);
+  EXPECT_NEAR(readTumTrajectory(folder() / "out/trajectory.txt")[0].T_world_rig.translation.y(), 7,
+              1e-9);
   const Result result = run("import odometry.rawlog --out r.rawlog --hand-eye up.yaml");
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.err, HasSubstr("cannot hold the hand-eye transform: give it to map as well"));

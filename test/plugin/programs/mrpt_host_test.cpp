@@ -63,7 +63,7 @@ TEST_F(MrptHost, MapsAllOfALongerRecording) {
   expectTheMapOfEventFusion();
 }
 
-TEST_F(MrptHost, IsToldWhatIsWrongInItsFile) {
+TEST_F(MrptHost, ErrorsNameTheWrongSectionKeyAndValue) {
   importRecording(SyntheticRecording());
   write("host.ini", "[mapper_dsi]\nnum_planes = abc\n");
   EXPECT_THAT(host("mapper").err,

@@ -40,7 +40,7 @@ TEST_F(RawlogEdit, InfoCountsOurObservations) {
                                 Not(HasSubstr("not registered"))));
 }
 
-TEST_F(RawlogEdit, DescribeSaysWhatIsInAPacket) {
+TEST_F(RawlogEdit, DescribePrintsTheContentsOfAPacket) {
   const Result result = edit("--describe");
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.out, AllOf(HasSubstr("ClassName: efm::CObservationEvents"),
@@ -48,7 +48,7 @@ TEST_F(RawlogEdit, DescribeSaysWhatIsInAPacket) {
                                 HasSubstr("Sensor: 120x90 pixels, fx 100 fy 100")));
 }
 
-TEST_F(RawlogEdit, ExportedTextHoldsEveryEventOfACamera) {
+TEST_F(RawlogEdit, ExportedTextHasEveryEventOfACamera) {
   const Result result = edit("--export-txt");
   ASSERT_EQ(result.status, 0) << result.err;
 
@@ -81,7 +81,7 @@ TEST_F(RawlogEdit, ExportedTextHoldsEveryEventOfACamera) {
   }
 }
 
-TEST_F(RawlogEdit, CutLeavesAStretchThatIsReadAgain) {
+TEST_F(RawlogEdit, ACutRawlogIsReadAgain) {
   ASSERT_EQ(edit("--cut --from-time 10.1 --to-time 10.3 -o cut.rawlog").status, 0);
   const Result result = run("info cut.rawlog");
   ASSERT_EQ(result.status, 0) << result.err;
@@ -89,7 +89,7 @@ TEST_F(RawlogEdit, CutLeavesAStretchThatIsReadAgain) {
                                 HasSubstr("cam0: 120x90"), HasSubstr("cam1: 120x90")));
 }
 
-TEST_F(RawlogEdit, KeepLabelLeavesOneCameraAndThePoses) {
+TEST_F(RawlogEdit, KeepLabelKeepsOneCameraAndThePoses) {
   ASSERT_EQ(edit("--keep-label cam0,pose -o kept.rawlog").status, 0);
   const Result result = run("info kept.rawlog");
   ASSERT_EQ(result.status, 0) << result.err;
@@ -97,7 +97,7 @@ TEST_F(RawlogEdit, KeepLabelLeavesOneCameraAndThePoses) {
                                 HasSubstr("51 poses"), Not(HasSubstr("cam1"))));
 }
 
-TEST_F(RawlogEdit, WithoutThePluginSaysThatTheClassIsUnknown) {
+TEST_F(RawlogEdit, WithoutThePluginTheClassIsUnknown) {
   const Result result = shell("rawlog-edit -i data.rawlog --info");
   EXPECT_THAT(result.out + result.err, HasSubstr("efm::CObservationEvents"));
 }

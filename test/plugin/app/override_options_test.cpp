@@ -4,7 +4,7 @@
 #include <regex>
 
 #include "test/paths.h"
-#include "test/plugin/app/map_command.h"
+#include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
@@ -17,9 +17,9 @@ namespace fs = std::filesystem;
 
 const fs::path kSharedData = EFM_SHARED_DATA;
 
-class GivenParts : public MapCommand {
+class OverrideOptions : public AppTest {
  protected:
-  GivenParts() { write(SyntheticRecording()); }
+  OverrideOptions() { write(SyntheticRecording()); }
 
   /// Takes a file out of the recording's folder, into the one around it.
   void takeOut(const std::string& name) const {
@@ -39,7 +39,7 @@ class GivenParts : public MapCommand {
   }
 };
 
-TEST_F(GivenParts, PosesAndCalibrationBesideARecordingMakeTheSameMapAsInIt) {
+TEST_F(OverrideOptions, ExternalPosesAndCalibrationMakeTheSameMap) {
   const std::string map = mapOf("data");
   takeOut("poses.txt");
   EXPECT_EQ(mapOf("data --poses poses.txt"), map);
@@ -50,7 +50,7 @@ TEST_F(GivenParts, PosesAndCalibrationBesideARecordingMakeTheSameMapAsInIt) {
   EXPECT_EQ(run(depth + "--poses poses.txt --calibration camchain.yaml").status, 0);
 }
 
-TEST_F(GivenParts, ARecordingWithoutThemIsAnErrorThatNamesTheOption) {
+TEST_F(OverrideOptions, AMissingPartIsAnErrorThatNamesTheOption) {
   takeOut("poses.txt");
   EXPECT_THAT(errorOf("map rig.ini data --out out"),
               HasSubstr("data: no poses: expected poses.txt or groundtruth.txt, or --poses FILE"));
@@ -60,7 +60,7 @@ TEST_F(GivenParts, ARecordingWithoutThemIsAnErrorThatNamesTheOption) {
   EXPECT_THAT(errorOf("info data --poses nowhere.txt"), HasSubstr("nowhere.txt: cannot be opened"));
 }
 
-TEST_F(GivenParts, TheyReplaceWhatTheRecordingHas) {
+TEST_F(OverrideOptions, TheyReplaceThePartsOfTheRecording) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   const std::string map = mapOf("data");
 
@@ -80,7 +80,7 @@ TEST_F(GivenParts, TheyReplaceWhatTheRecordingHas) {
   EXPECT_EQ(mapOf("other.rawlog"), other) << "import writes what was given";
 }
 
-TEST_F(GivenParts, AHandEyeTransformTakesTheBodysPosesToTheRig) {
+TEST_F(OverrideOptions, AHandEyeTransformMakesPosesOfTheRigFromPosesOfTheBody) {
   mapOf("data");
   const auto expected = posesIn("out");
   writePosesOfTheBody();
@@ -100,7 +100,7 @@ TEST_F(GivenParts, AHandEyeTransformTakesTheBodysPosesToTheRig) {
   EXPECT_EQ(mapOf("r.rawlog --hand-eye hand_eye.yaml"), map) << "given twice is given once";
 }
 
-TEST_F(GivenParts, TheOptionFileMaySayThemAndTheCommandLineWins) {
+TEST_F(OverrideOptions, TheCommandLineOverridesTheOptionFile) {
   mapOf("data");
   const auto expected = posesIn("out");
   writePosesOfTheBody();
@@ -127,7 +127,7 @@ TEST_F(GivenParts, TheOptionFileMaySayThemAndTheCommandLineWins) {
   EXPECT_THAT(errorOf(map + " --set rig.calibration="), HasSubstr("data: no calibration"));
 }
 
-TEST_F(GivenParts, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
+TEST_F(OverrideOptions, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   fs::copy_file(folder() / "data" / "camchain.yaml", folder() / "same.yaml");
   Rig rig{SyntheticRecording().cameras};
@@ -147,7 +147,7 @@ TEST_F(GivenParts, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
       << "there is no other";
 }
 
-TEST_F(GivenParts, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning) {
+TEST_F(OverrideOptions, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning) {
   fs::create_directory(folder() / "uzh");
   fs::rename(folder() / "data" / "cam0" / "events.txt", folder() / "uzh" / "events.txt");
   fs::rename(folder() / "data" / "poses.txt", folder() / "uzh" / "groundtruth.txt");
@@ -165,7 +165,7 @@ TEST_F(GivenParts, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning) {
   EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, Not(HasSubstr("replaced")));
 }
 
-TEST_F(GivenParts, OfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
+TEST_F(OverrideOptions, CalibrationsOfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   const auto write_cameras = [&](const std::string& name, int count, int width) {
     Rig rig{SyntheticRecording(0.1, count).cameras};
@@ -190,7 +190,7 @@ TEST_F(GivenParts, OfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
               HasSubstr("large.yaml: camera 0 has 640x90 pixels: expected 120x90 pixels"));
 }
 
-TEST_F(GivenParts, TimeOffsetsMoveACamerasEventsToThePosesClock) {
+TEST_F(OverrideOptions, TimeOffsetsMoveACamerasEventsToThePosesClock) {
   SyntheticRecording recording;
   write(recording);
   const std::string map = mapOf("data");
@@ -206,7 +206,7 @@ TEST_F(GivenParts, TimeOffsetsMoveACamerasEventsToThePosesClock) {
 
 // --- Real recordings -----------------------------------------------------------------------------
 
-TEST_F(GivenParts, SliderDepthWithItsPosesAndCalibrationBesideItGivesTheSameMap) {
+TEST_F(OverrideOptions, SliderDepthWithExternalPosesAndCalibrationMakesTheSameMap) {
   const fs::path slider = kSharedData / "slider_depth";
   if (!fs::exists(slider)) GTEST_SKIP() << slider << " is not there";
   fs::create_directory(folder() / "bare");
@@ -227,7 +227,7 @@ TEST_F(GivenParts, SliderDepthWithItsPosesAndCalibrationBesideItGivesTheSameMap)
   EXPECT_EQ(contentOf("whole/map.pcd"), contentOf("bare_out/map.pcd"));
 }
 
-TEST_F(GivenParts, RealTrajectoriesArePoses) {
+TEST_F(OverrideOptions, RealTrajectoriesArePoses) {
   for (const char* name : {"rpg_eccv18_desk.txt", "mvsec_indoor_flying1.txt", "tumvie_desk2.txt",
                            "dsec_zurich_city_04.txt"}) {
     const fs::path trajectory = kSharedData / "trajectories" / name;
