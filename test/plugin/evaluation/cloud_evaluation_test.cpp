@@ -55,7 +55,7 @@ TEST_F(EvaluateCloud, ReadsBothFormats) {
   }
 }
 
-TEST_F(EvaluateCloud, FoldersStandForTheirClouds) {
+TEST_F(EvaluateCloud, ReadsTheCloudsOfFolders) {
   cloud("out/map.pcd", {0, 1});
   cloud("one/points.pcd", {0, 1});
   cloud("data/gt_cloud.ply", {0, 3});
@@ -98,7 +98,7 @@ TEST_F(EvaluateCloud, PointsThatAreNotFiniteAreCounted) {
   EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 points are not finite"));
 }
 
-TEST_F(EvaluateCloud, WhatCannotBeComparedIsAnErrorThatNamesIt) {
+TEST_F(EvaluateCloud, AWrongInputIsAnErrorThatNamesIt) {
   const auto one = cloud("one.pcd", {0});
   EXPECT_THAT(errorOf(cloud("none.pcd", {}), one), HasSubstr("none.pcd: no points"));
   EXPECT_THAT(errorOf(one, cloud("none.ply", {})), HasSubstr("none.ply: no points"));

@@ -70,7 +70,7 @@ TEST_F(EvaluateDepth, PairsFoldersByTimeAndAveragesMaps) {
   EXPECT_EQ(evaluateDepth(folder() / "out/keyframes", folder() / "data/depth", {}).maps.size(), 2U);
 }
 
-TEST_F(EvaluateDepth, TakesAllPixelsOfAllMapsTogetherForPrecisionAndRecall) {
+TEST_F(EvaluateDepth, PrecisionAndRecallAreOverAllPixelsOfAllMaps) {
   tiff("out/1/depth.tiff", 2);
   tiff("out/2/depth.tiff", 3);
   tiff("data/a.tiff", 2.5);
@@ -125,7 +125,7 @@ TEST_F(EvaluateDepth, BadPixelsNeedFocalLengthTimesBaseline) {
   EXPECT_FALSE(nlohmann::json::parse(evaluationJson(without))["all"].contains("bad_pix_5px"));
 }
 
-TEST_F(EvaluateDepth, AMapWithoutPointsIsNotAPerfectOne) {
+TEST_F(EvaluateDepth, AMapWithoutPointsIsNotPartOfTheMean) {
   tiff("out/keyframes/1.000000000/depth.tiff", 2);
   tiff("out/keyframes/2.000000000/depth.tiff", 0);
   tiff("data/depth/a.tiff", 3);
@@ -137,7 +137,7 @@ TEST_F(EvaluateDepth, AMapWithoutPointsIsNotAPerfectOne) {
   EXPECT_THAT(errorOf(tiff("none.tiff", 0), tiff("b.tiff", 3)), HasSubstr("no pixel"));
 }
 
-TEST_F(EvaluateDepth, WhatCannotBeComparedIsAnErrorThatNamesIt) {
+TEST_F(EvaluateDepth, AWrongInputIsAnErrorThatNamesIt) {
   const auto a = tiff("a.tiff", 2);
   EXPECT_THAT(errorOf(folder() / "nowhere.tiff", a), HasSubstr("nowhere.tiff"));
   EXPECT_THAT(errorOf(folder(), a), HasSubstr("two files or two folders"));

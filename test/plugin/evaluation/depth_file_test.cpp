@@ -104,13 +104,13 @@ TEST_F(DepthFile, ReadsPngOf16BitsByItsScaleInEitherSense) {
   EXPECT_THROW(readDepthFile(file, -1), std::invalid_argument);
 }
 
-TEST_F(DepthFile, LooksAtWhatIsInsideAndNotAtTheName) {
+TEST_F(DepthFile, DetectsTheFormatByTheContent) {
   const auto file = image("a.tiff", one_to_six_);
   std::filesystem::rename(file, folder() / "a.depth");
   expectOneToSix(readDepthFile(folder() / "a.depth"));
 }
 
-TEST_F(DepthFile, WrongKindsAreErrorsThatSayWhatTheyAre) {
+TEST_F(DepthFile, WrongKindsOfImagesAreErrorsThatNameTheKind) {
   EXPECT_THAT(errorOf(image("a.png", cv::Mat1b(2, 3, uchar{1})), 1000),
               AllOf(HasSubstr("a.png"), HasSubstr("8-bit, 1 channel")));
   EXPECT_THAT(errorOf(image("b.tiff", cv::Mat1b(2, 3, uchar{1}))), HasSubstr("float32"));
@@ -123,7 +123,7 @@ TEST_F(DepthFile, WrongKindsAreErrorsThatSayWhatTheyAre) {
   EXPECT_THAT(errorOf(folder() / "none.tiff"), HasSubstr("no such file"));
 }
 
-TEST_F(DepthFile, HeadersOfPfmThatMakeNoSenseAreErrorsThatNameTheLine) {
+TEST_F(DepthFile, WrongHeadersOfPfmAreErrorsThatNameTheLine) {
   const auto refused = [&](const std::string& text) { return errorOf(write("a.pfm", text)); };
   EXPECT_THAT(refused("Pf\n3\n-1\n"), HasSubstr("line 2"));
   EXPECT_THAT(refused("Pf\n0 2\n-1\n"), HasSubstr("line 2"));
@@ -134,7 +134,7 @@ TEST_F(DepthFile, HeadersOfPfmThatMakeNoSenseAreErrorsThatNameTheLine) {
   EXPECT_THAT(refused("Pf\n1 1\n-1\n12345"), HasSubstr("expected 4"));
 }
 
-TEST_F(DepthFile, HeadersOfNumpyThatMakeNoSenseAreErrors) {
+TEST_F(DepthFile, WrongHeadersOfNumpyAreErrors) {
   const auto refused = [&](const std::string& dictionary) {
     return errorOf(write("a.npy", npy(dictionary, bytesOf<float>({1, 2, 3, 4, 5, 6}))));
   };
@@ -153,7 +153,7 @@ TEST_F(DepthFile, HeadersOfNumpyThatMakeNoSenseAreErrors) {
   EXPECT_THAT(errorOf(write("a.npy", npy(dictionary_, "", 9))), HasSubstr("version 9"));
 }
 
-TEST_F(DepthFile, FilesCutAnywhereAreErrorsAndNeverSmallerImages) {
+TEST_F(DepthFile, TruncatedFilesAreErrors) {
   const std::string tiff = readBytes(image("whole.tiff", cv::Mat1f(40, 30, 2.F)));
   cv::Mat_<std::uint16_t> noise(40, 30);
   cv::randu(noise, 0, 65535);
@@ -170,7 +170,7 @@ TEST_F(DepthFile, FilesCutAnywhereAreErrorsAndNeverSmallerImages) {
   }
 }
 
-TEST_F(DepthFile, AMaskIsWhatIsNotBlack) {
+TEST_F(DepthFile, AMaskSelectsPixelsThatAreNotBlack) {
   const cv::Mat3b colours =
       (cv::Mat3b(1, 3) << cv::Vec3b(1, 0, 0), cv::Vec3b(0, 0, 0), cv::Vec3b(255, 255, 255));
   for (const auto& file :

@@ -38,7 +38,7 @@ class DepthSeries : public TemporaryFolder {
   }
 };
 
-TEST_F(DepthSeries, AFolderThatHoldsBothKindsGivesEachRoleItsOwn) {
+TEST_F(DepthSeries, AFolderWithBothKindsReturnsTheMapsOfTheRole) {
   write("both/keyframes/10.5/depth.tiff");
   write("both/keyframes/9.5/depth.tiff");
   write("both/keyframes/notes/depth.tiff");
@@ -50,7 +50,7 @@ TEST_F(DepthSeries, AFolderThatHoldsBothKindsGivesEachRoleItsOwn) {
               ElementsAre("both/depth/a.tiff", "both/depth/b.tiff"));
 }
 
-TEST_F(DepthSeries, EitherRoleTakesWhatThereIs) {
+TEST_F(DepthSeries, EachRoleReadsTheOnlyKindOfAFolder) {
   write("map/keyframes/1/depth.tiff");
   write("data/depth/index.txt", "1 a.tiff\n");
   EXPECT_THAT(filesOf("map", DepthSeriesRole::kTruth), ElementsAre("map/keyframes/1/depth.tiff"));
@@ -60,7 +60,7 @@ TEST_F(DepthSeries, EitherRoleTakesWhatThereIs) {
   EXPECT_THAT(filesOf("data/depth", DepthSeriesRole::kEstimate), ElementsAre("data/depth/a.tiff"));
 }
 
-TEST_F(DepthSeries, TakesTheTimeFromTheNameWhereThereIsNoIndex) {
+TEST_F(DepthSeries, ReadsTheTimeFromTheNameWithoutAnIndex) {
   for (const char* file :
        {"cam0_2.25.tiff", "1.5.pfm", "0.75.npy", "mask.png", "3.txt", "x_y.tif"}) {
     write(std::string("named/") + file);
@@ -72,7 +72,7 @@ TEST_F(DepthSeries, TakesTheTimeFromTheNameWhereThereIsNoIndex) {
   EXPECT_EQ(series[2].t_ns, 2'250'000'000);
 }
 
-TEST_F(DepthSeries, WhatIsNoSeriesIsAnErrorThatNamesIt) {
+TEST_F(DepthSeries, AFolderWithoutASeriesIsAnErrorThatNamesIt) {
   write("empty/notes.txt");
   EXPECT_THAT(errorOf("empty"), HasSubstr("empty: expected keyframes/<t>/depth.tiff"));
   write("bad/index.txt", "1 a.tiff\nsoon b.tiff\n");

@@ -22,7 +22,7 @@ using testing::HasSubstr;
 
 const cv::Vec3b kWhite(255, 255, 255);
 
-TEST(PictureGrid, PutsPicturesOnWhiteWithoutChangingThem) {
+TEST(PictureGrid, JoinsPicturesOnWhiteWithoutChangingThem) {
   const cv::Mat3b red(10, 20, cv::Vec3b(0, 0, 255));
   const cv::Mat3b blue(30, 5, cv::Vec3b(255, 0, 0));
   const cv::Mat3b row = sideBySide({red, blue});
@@ -37,7 +37,7 @@ TEST(PictureGrid, PutsPicturesOnWhiteWithoutChangingThem) {
   EXPECT_TRUE(sideBySide({}).empty());
 }
 
-TEST(ValuePicture, ShowsLowAndHighValuesInTheColoursOfTheBarsEndsAndNoneWhite) {
+TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
   ValuePicture picture;
   picture.values = (cv::Mat1f(1, 3) << 1, NAN, 3);
   picture.range = {1, 3};
@@ -55,7 +55,7 @@ TEST(ValuePicture, ShowsLowAndHighValuesInTheColoursOfTheBarsEndsAndNoneWhite) {
   EXPECT_THROW(drawValues({}), std::invalid_argument);
 }
 
-TEST(TextTable, ColumnsAreAsWideAsTheyNeed) {
+TEST(TextTable, ColumnsFitTheirCells) {
   TextTable table;
   table.add({"a", "long"});
   table.add({"wide", "1", "x"});
@@ -79,12 +79,12 @@ TEST_F(EvaluationPlot, OfDepthShowsThreeImagesAboveTheCurves) {
   EXPECT_GT(plot.rows, 600);
 }
 
-TEST_F(EvaluationPlot, OfDepthWithoutErrorIsAPictureToo) {
+TEST_F(EvaluationPlot, OfDepthWithoutErrorIsDrawn) {
   const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 2), {});
   EXPECT_FALSE(evaluationPlot(evaluation, {}).empty());
 }
 
-TEST_F(EvaluationPlot, OfATrajectoryWithoutErrorIsAPictureToo) {
+TEST_F(EvaluationPlot, OfATrajectoryWithoutErrorIsDrawn) {
   TrajectoryEvaluation evaluation;
   evaluation.pairs = {{0, {}, {}}};
   evaluation.errors = {{0}, {0}};
@@ -99,7 +99,7 @@ TEST_F(EvaluationPlot, OfACloudDrawsItsDistancesInOrder) {
   EXPECT_EQ(cv::norm(evaluationPlot(evaluation), evaluationPlot(sorted)), 0);
 }
 
-TEST_F(EvaluationPlot, IsWrittenAsPngAlone) {
+TEST_F(EvaluationPlot, IsWrittenAsPngOnly) {
   const cv::Mat3b picture(3, 4, kWhite);
   writePicture(folder() / "a.png", picture);
   EXPECT_EQ(cv::imread((folder() / "a.png").string()).size(), picture.size());

@@ -49,7 +49,7 @@ TEST_F(FindStereoBaseline, TheRunsReportComesFirst) {
   }
 }
 
-TEST_F(FindStereoBaseline, ElseTheDatasetsCalibration) {
+TEST_F(FindStereoBaseline, TheDatasetsCalibrationIsTheSecond) {
   writeCamchain(true);
   write("data/depth/a.tiff");
   // Reports that say nothing of it.
@@ -66,7 +66,7 @@ TEST_F(FindStereoBaseline, ElseTheDatasetsCalibration) {
   }
 }
 
-TEST_F(FindStereoBaseline, OneCameraOrNothingSaysNothing) {
+TEST_F(FindStereoBaseline, OneCameraHasNoBaseline) {
   EXPECT_FALSE(find("out", "data"));
   writeCamchain(false);
   EXPECT_FALSE(find("out", "data"));

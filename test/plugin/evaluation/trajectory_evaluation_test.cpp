@@ -53,7 +53,7 @@ class EvaluateTrajectory : public TemporaryFolder {
                             {10, 20, 30}};
 };
 
-TEST_F(EvaluateTrajectory, WhereTheEstimatesWorldLiesDoesNotMatter) {
+TEST_F(EvaluateTrajectory, IsIndependentOfTheEstimatesWorld) {
   const auto evaluation =
       evaluateTrajectory(helix("est.txt", T_map_world_, 0.004), helix("gt.txt"), {});
   EXPECT_EQ(evaluation.pairs.size(), 40U);
@@ -69,7 +69,7 @@ TEST_F(EvaluateTrajectory, WhereTheEstimatesWorldLiesDoesNotMatter) {
   EXPECT_GT(statisticsOf(as_they_are.errors.translation_m).min, 10);
 }
 
-TEST_F(EvaluateTrajectory, FoldersStandForTheirTrajectories) {
+TEST_F(EvaluateTrajectory, ReadsTheTrajectoriesOfFolders) {
   helix("out/trajectory.txt");
   helix("data/poses.txt");
   helix("uzh/groundtruth.txt");
@@ -105,7 +105,7 @@ TEST_F(EvaluateTrajectory, TheTableAndTheJsonSayTheSame) {
   }
 }
 
-TEST_F(EvaluateTrajectory, WhatCannotBeComparedIsAnErrorThatNamesIt) {
+TEST_F(EvaluateTrajectory, AWrongInputIsAnErrorThatNamesIt) {
   const auto gt = helix("gt.txt");
   EXPECT_THAT(errorOf(helix("late.txt", {}, 100), gt),
               AllOf(HasSubstr("late.txt"), HasSubstr("within 0.010000 s"), HasSubstr("gt.txt")));

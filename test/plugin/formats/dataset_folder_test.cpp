@@ -43,7 +43,7 @@ class DatasetFolder : public TemporaryFolder {
   }
 };
 
-TEST_F(DatasetFolder, GivesEachCamerasEventsAndThePosesInOrder) {
+TEST_F(DatasetFolder, ReturnsEventsOfEachCameraAndPosesInOrder) {
   EXPECT_TRUE(looksLikeDatasetFolder(folder()));
   const auto recording = openDatasetFolder(folder());
   std::string labels;
@@ -57,18 +57,18 @@ TEST_F(DatasetFolder, GivesEachCamerasEventsAndThePosesInOrder) {
   EXPECT_EQ(labels, "pose cam0 cam1 cam0 cam1 pose ");
 }
 
-TEST_F(DatasetFolder, TakesGroundtruthForPosesWhereThereIsNoPosesFile) {
+TEST_F(DatasetFolder, ReadsGroundtruthWithoutAPosesFile) {
   std::filesystem::rename(folder() / "poses.txt", folder() / "groundtruth.txt");
   EXPECT_EQ(openDatasetFolder(folder())->next()->sensorLabel, "pose");
 }
 
-TEST_F(DatasetFolder, OtherFilesDoNotMatter) {
+TEST_F(DatasetFolder, OtherFilesAreIgnored) {
   write("cam7/events.txt", "nonsense\n");
   write("notes.txt", "nonsense\n");
   EXPECT_NO_THROW(openDatasetFolder(folder()));
 }
 
-TEST_F(DatasetFolder, IsKnownByItsCalibrationOrItsFirstCamera) {
+TEST_F(DatasetFolder, IsDetectedByItsCalibrationOrItsFirstCamera) {
   remove("camchain.yaml");
   EXPECT_TRUE(looksLikeDatasetFolder(folder()));
   EXPECT_THAT(errorOfOpening(),
@@ -84,7 +84,7 @@ TEST_F(DatasetFolder, ACameraWithoutAFileIsAnError) {
   EXPECT_THAT(errorOfOpening(), HasSubstr("cam1/events.txt: cannot be opened"));
 }
 
-TEST_F(DatasetFolder, WithoutPosesIsAnErrorThatSaysWhatIsLookedFor) {
+TEST_F(DatasetFolder, WithoutPosesIsAnErrorThatNamesTheExpectedFiles) {
   write("poses.txt", "# none\n");
   EXPECT_THAT(errorOfOpening(), HasSubstr("poses.txt: no poses"));
   remove("poses.txt");
@@ -93,7 +93,7 @@ TEST_F(DatasetFolder, WithoutPosesIsAnErrorThatSaysWhatIsLookedFor) {
                     HasSubstr("expected poses.txt or groundtruth.txt, or --poses FILE")));
 }
 
-TEST_F(DatasetFolder, ErrorsInsideAFileNameItAndTheLine) {
+TEST_F(DatasetFolder, ErrorsInAFileNameItAndTheLine) {
   write("poses.txt", "0.3 1 2 3 0 0 0 1\n0.4 1 2 3\n");
   EXPECT_THAT(errorOfOpening(), HasSubstr("poses.txt:2: "));
   write("cam1/events.txt", "0.2 0 0 0\n0.3 240 0 0\n");

@@ -85,7 +85,7 @@ TEST_F(EventText, TimesMayHaveAnyNumberOfDecimalsASignOrAnExponent) {
                           Event{1'500'000'000}, Event{2'000'000'000}));
 }
 
-TEST_F(EventText, BlanksCommentsAndLineEndsDoNotMatter) {
+TEST_F(EventText, BlanksCommentsAndLineEndsAreIgnored) {
   EXPECT_THAT(read("# t x y p\r\n\r\n\n  0.1\t1  2\t 0 \r\n0.2 3 4 1\r\n0.3 5 6 0 # dust\n \t\n"),
               ElementsAre(Event{100'000'000, 1, 2, false}, Event{200'000'000, 3, 4, true},
                           Event{300'000'000, 5, 6, false}));
@@ -96,54 +96,47 @@ TEST_F(EventText, TheLastLineNeedsNoNewline) {
               ElementsAre(Event{100'000'000, 1, 2, false}, Event{200'000'000, 3, 4, true}));
 }
 
-TEST_F(EventText, OfAnEmptyFileIsNoEvents) {
+TEST_F(EventText, AnEmptyFileHasNoEvents) {
   EXPECT_THAT(read(""), IsEmpty());
   EXPECT_THAT(read("# nothing\n\n"), IsEmpty());
 }
 
-TEST_F(EventText, ALastLineThatIsCutIsAnError) {
-  EXPECT_THAT(errorOfText("0.1 1 2 0\n0.2 3 4"),
-              AllOf(StartsWith(line(2)), HasSubstr("'0.2 3 4'"), HasSubstr("expected t x y p"),
-                    HasSubstr("the file ends within the line")));
-  EXPECT_THAT(errorOfText("0."), AllOf(StartsWith(line(1)), HasSubstr("the file ends")));
-}
-
-TEST_F(EventText, AWrongNumberOfFieldsIsAnError) {
-  EXPECT_THAT(
-      errorOfText("0.1 1 2 0\n\n0.2 3 1\n"),
-      AllOf(StartsWith(line(3)), HasSubstr("'0.2 3 1': expected 4 fields"), HasSubstr("not 3")));
-  EXPECT_THAT(errorOfText("0.1 1 2 0 7\n"),
-              AllOf(StartsWith(line(1)), HasSubstr("expected 4 fields"), HasSubstr("not 5")));
-}
-
-TEST_F(EventText, WhatIsNoNumberIsAnErrorThatShowsIt) {
-  EXPECT_THAT(errorOfText("0.1 1 2 0\nabc 1 2 0\n"),
-              AllOf(StartsWith(line(2)), HasSubstr("t = 'abc': expected a time")));
-  EXPECT_THAT(errorOfText("0.1s 1 2 0\n"), HasSubstr("t = '0.1s': expected a time"));
-  EXPECT_THAT(errorOfText("nan 1 2 0\n"), HasSubstr("t = 'nan': expected a time"));
-  EXPECT_THAT(errorOfText("99999999999 1 2 0\n"), HasSubstr("t = '99999999999': expected a time"));
-  EXPECT_THAT(errorOfText("0.1 1.5 2 0\n"), HasSubstr("x = '1.5': expected a whole number"));
-  EXPECT_THAT(errorOfText("0.1 1 0x2 0\n"), HasSubstr("y = '0x2': expected a whole number"));
-}
-
-TEST_F(EventText, AnEventOutsideTheSensorIsAnErrorThatSaysItsSize) {
-  EXPECT_THAT(read("0.1 239 179 0\n"), ElementsAre(Event{100'000'000, 239, 179, false}));
-  EXPECT_THAT(errorOfText("0.1 1 2 0\n0.1 240 2 0\n"),
-              AllOf(StartsWith(line(2)), HasSubstr("x = '240': expected"), HasSubstr("0 to 239"),
-                    HasSubstr("240x180")));
-  EXPECT_THAT(errorOfText("0.1 1 180 0\n"),
-              AllOf(HasSubstr("y = '180': expected"), HasSubstr("0 to 179"), HasSubstr("240x180")));
-  EXPECT_THAT(errorOfText("0.1 -1 0 0\n"), HasSubstr("x = '-1': expected"));
-  EXPECT_THAT(errorOfText("0.1 65536 0 0\n"), HasSubstr("x = '65536': expected"));
-  EXPECT_THAT(errorOfText("0.1 4294967296 0 0\n"), HasSubstr("x = '4294967296': expected"));
-}
-
-TEST_F(EventText, APolarityIsZeroOrOne) {
-  for (const char* polarity : {"2", "-1", "01", "10", "true"}) {
-    EXPECT_THAT(errorOfText(std::string("0.1 1 2 ") + polarity + "\n"),
-                AllOf(StartsWith(line(1)), HasSubstr("p = '" + std::string(polarity) + "'"),
-                      HasSubstr("expected polarity 0 or 1")));
+TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
+  struct Case {
+    const char* text;
+    int line;
+    std::vector<std::string> parts;
+  };
+  const Case cases[] = {
+      {"0.1 1 2 0\n0.2 3 4", 2, {"'0.2 3 4'", "expected t x y p", "the file ends within the line"}},
+      {"0.", 1, {"the file ends"}},
+      {"0.1 1 2 0\n\n0.2 3 1\n", 3, {"'0.2 3 1': expected 4 fields", "not 3"}},
+      {"0.1 1 2 0 7\n", 1, {"expected 4 fields", "not 5"}},
+      {"0.1 1 2 0\nabc 1 2 0\n", 2, {"t = 'abc': expected a time"}},
+      {"0.1s 1 2 0\n", 1, {"t = '0.1s': expected a time"}},
+      {"nan 1 2 0\n", 1, {"t = 'nan': expected a time"}},
+      {"99999999999 1 2 0\n", 1, {"t = '99999999999': expected a time"}},
+      {"0.1 1.5 2 0\n", 1, {"x = '1.5': expected a whole number"}},
+      {"0.1 1 0x2 0\n", 1, {"y = '0x2': expected a whole number"}},
+      {"0.1 1 2 0\n0.1 240 2 0\n", 2, {"x = '240': expected", "0 to 239", "240x180"}},
+      {"0.1 1 180 0\n", 1, {"y = '180': expected", "0 to 179", "240x180"}},
+      {"0.1 -1 0 0\n", 1, {"x = '-1': expected"}},
+      {"0.1 65536 0 0\n", 1, {"x = '65536': expected"}},
+      {"0.1 4294967296 0 0\n", 1, {"x = '4294967296': expected"}},
+      {"0.1 1 2 2\n", 1, {"p = '2'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 -1\n", 1, {"p = '-1'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 01\n", 1, {"p = '01'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 10\n", 1, {"p = '10'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 true\n", 1, {"p = 'true'", "expected polarity 0 or 1"}},
+      {"0.020 1 0 0\n0.009999999 2 0 0\n",
+       2,
+       {"t = '0.009999999': expected", "at most 10 ms", "0.020000000"}}};
+  for (const Case& wrong : cases) {
+    const std::string error = errorOfText(wrong.text);
+    EXPECT_THAT(error, StartsWith(line(wrong.line)));
+    for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
   }
+  EXPECT_THAT(read("0.1 239 179 0\n"), ElementsAre(Event{100'000'000, 239, 179, false}));
 }
 
 TEST_F(EventText, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
@@ -155,13 +148,7 @@ TEST_F(EventText, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
   EXPECT_EQ(reader.sortedEvents(), 2U);
 }
 
-TEST_F(EventText, AnEventThatIsLaterThanThatIsAnErrorThatNamesThePlace) {
-  EXPECT_THAT(errorOfText("0.020 1 0 0\n0.009999999 2 0 0\n"),
-              AllOf(StartsWith(line(2)), HasSubstr("t = '0.009999999': expected"),
-                    HasSubstr("at most 10 ms"), HasSubstr("0.020000000")));
-}
-
-TEST_F(EventText, PacketsAreStretchesOfTheTenMillisecondGridThatHaveEvents) {
+TEST_F(EventText, PacketsAreThePeriodsOfTheGridWithEvents) {
   writeFile(file(), "-0.001 0 0 0\n0 1 0 0\n0.009999999 2 0 0\n0.01 3 0 0\n7.123 4 0 0\n");
   EventTextReader reader(file(), kSize);
   EXPECT_EQ(reader.nextTime(), -1'000'000);
@@ -176,7 +163,7 @@ TEST_F(EventText, PacketsAreStretchesOfTheTenMillisecondGridThatHaveEvents) {
   EXPECT_THAT(reader.nextPacket(), IsEmpty());
 }
 
-TEST_F(EventText, OfManyBlocksIsReadWholeAndAsItIsAskedFor) {
+TEST_F(EventText, ManyBlocksAreReadCompletelyAndOnDemand) {
   std::vector<Event> events;
   events.reserve(300'000);
   for (int i = 0; i < 300'000; ++i) {
@@ -196,7 +183,7 @@ TEST_F(EventText, OfManyBlocksIsReadWholeAndAsItIsAskedFor) {
   EXPECT_EQ(reader.bytesRead(), reader.bytesTotal());
 }
 
-TEST_F(EventText, LateEventsAreSortedAcrossBlocksThoseOfEqualTimeInTheFilesOrder) {
+TEST_F(EventText, LateEventsAreSortedAcrossBlocksAndStably) {
   std::vector<Event> events;
   events.reserve(200'000);
   std::mt19937 random(1);
@@ -220,7 +207,7 @@ TEST_F(EventText, AnErrorBehindManyBlocksNamesItsLine) {
               AllOf(StartsWith(line(150'001)), HasSubstr("'340'")));
 }
 
-TEST_F(EventText, WhatIsAboveALineThatIsAnErrorIsGivenBefore) {
+TEST_F(EventText, EventsAboveAWrongLineComeBeforeTheError) {
   std::vector<Event> events;
   for (std::int64_t i = 0; i < 5000; ++i) {  // 5 s; disorder that is sorted, too
     const std::int64_t late_ms = i % 7 == 0 ? 3 : 0;
@@ -246,13 +233,13 @@ TEST_F(EventText, WhatIsAboveALineThatIsAnErrorIsGivenBefore) {
   }
 }
 
-TEST_F(EventText, ABinaryFileIsAnErrorThatATerminalSurvives) {
+TEST_F(EventText, TheErrorOfABinaryFileHasNoControlCharacters) {
   EXPECT_THAT(errorOfText(std::string(3 << 20, '\x1b')),
               AllOf(StartsWith(line(1)), HasSubstr("\\x1b\\x1b"), HasSubstr("1048576 bytes"),
                     testing::Not(HasSubstr("\x1b"))));
 }
 
-TEST_F(EventText, AFileThatIsMissingIsNamed) {
+TEST_F(EventText, AMissingFileIsNamed) {
   EXPECT_THAT(errorOf([&] { EventTextReader(file(), kSize); }),
               AllOf(StartsWith(file().string()), HasSubstr("cannot be opened")));
   EXPECT_THAT(errorOf([&] { EventTextReader(folder(), kSize); }),
@@ -265,7 +252,7 @@ std::filesystem::path propertyFile() {
          ("efm_event_text_" + std::to_string(getpid()) + ".txt");
 }
 
-RC_GTEST_PROP(EventTextProperty, WhatIsWrittenIsReadBackInTimeOrder, ()) {
+RC_GTEST_PROP(EventTextProperty, WrittenEventsAreReadBackInTimeOrder, ()) {
   std::int64_t t_ns = *rc::gen::inRange<std::int64_t>(-1'000'000'000, 1'800'000'000'000'000'000);
   std::vector<Event> events;
   const int count = *rc::gen::inRange(1, 200);

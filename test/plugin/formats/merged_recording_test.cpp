@@ -76,7 +76,7 @@ StampedPose poseAt(std::int64_t t_ns) {
   return pose;
 }
 
-TEST_F(MergedRecordingTest, ComesInTheOrderOfTimePosesBeforePacketsThatBeginThenOrLater) {
+TEST_F(MergedRecordingTest, IsInTheOrderOfTimeWithPosesBeforePacketsOfTheSameTime) {
   RecordingWithPoses recording = open(
       {"0.012 0 0 0\n0.018 0 0 0\n0.031 0 0 0\n", "0.015 0 0 0\n0.022 0 0 0\n"},
       {poseAt(31 * kMs), poseAt(5 * kMs), poseAt(12 * kMs), poseAt(16 * kMs), poseAt(90 * kMs)});
@@ -86,7 +86,7 @@ TEST_F(MergedRecordingTest, ComesInTheOrderOfTimePosesBeforePacketsThatBeginThen
   EXPECT_EQ(recording.next(), nullptr);
 }
 
-TEST_F(MergedRecordingTest, APacketTellsItsCameraAndItsEvents) {
+TEST_F(MergedRecordingTest, APacketHasItsCameraAndItsEvents) {
   RecordingWithPoses recording = open({"0.1 1 2 0\n", "0.100000049 3 4 1\n"});
   const auto observations = readAll(recording);
   ASSERT_EQ(observations.size(), 4U);
@@ -124,7 +124,7 @@ TEST_F(MergedRecordingTest, APacketIsCoveredUntilItsCamerasNextEvent) {
                                    std::nullopt));      // the recording's last
 }
 
-TEST_F(MergedRecordingTest, ACameraWithoutEventsIsKnownToBeSilentFromTheBeginning) {
+TEST_F(MergedRecordingTest, ACameraWithoutEventsIsSilentFromTheBeginning) {
   RecordingWithPoses recording = open({"", "0.5 0 0 0\n0.6 0 0 0\n", "# nothing\n"});
   const auto observations = readAll(recording);
   std::vector<std::string> texts;
@@ -145,7 +145,7 @@ TEST_F(MergedRecordingTest, WithoutAnyEventIsAnErrorThatNamesTheFiles) {
               AllOf(HasSubstr("cam0/events.txt, "), HasSubstr("cam1/events.txt: no events")));
 }
 
-TEST_F(MergedRecordingTest, ACameraWhoseFileBreaksOffIsAnErrorWhenItIsReached) {
+TEST_F(MergedRecordingTest, ATruncatedFileIsAnErrorAtItsEnd) {
   std::string text;
   for (int i = 0; i < 200'000; ++i) text += std::to_string(i / 1000) + ".5 1 2 0\n";
   RecordingWithPoses recording = open({text + "900 1"});
@@ -154,7 +154,7 @@ TEST_F(MergedRecordingTest, ACameraWhoseFileBreaksOffIsAnErrorWhenItIsReached) {
               AllOf(HasSubstr("events.txt:200001: "), HasSubstr("the file ends")));
 }
 
-TEST_F(MergedRecordingTest, WhatWasSeenBeforeAFileBreaksOffIsGivenBeforeTheError) {
+TEST_F(MergedRecordingTest, EventsBeforeAWrongLineComeBeforeTheError) {
   RecordingWithPoses recording = open({"0.012 0 0 0\n0.018 0 0 0\n0.019 0 0\n0.025 0 0 0\n",
                                        "0.011 0 0 0\n0.015 0 0 0\n0.022 0 0 0\n"},
                                       {poseAt(5 * kMs), poseAt(17 * kMs), poseAt(90 * kMs)});

@@ -32,7 +32,7 @@ TEST_F(OpenRecording, AMissingSourceIsNamed) {
   EXPECT_THAT(errorOf({folder() / "nowhere"}), HasSubstr("nowhere: no such file or folder"));
 }
 
-TEST_F(OpenRecording, AFolderOfSomethingElseIsAnErrorThatSaysWhatWasLookedFor) {
+TEST_F(OpenRecording, AnotherFolderIsAnErrorThatNamesTheExpectedFiles) {
   std::ofstream(folder() / "notes.txt") << "nothing";
   EXPECT_THAT(errorOf({folder()}), AllOf(HasSubstr("not a recording"), HasSubstr("camchain.yaml"),
                                          HasSubstr("events.txt"), HasSubstr("calib.txt")));

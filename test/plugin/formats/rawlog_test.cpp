@@ -110,7 +110,7 @@ class Rawlog : public TemporaryFolder {
   const Observations recorded = observationsOf(SyntheticRecording(0.2));
 };
 
-TEST_F(Rawlog, GivesBackWhatWasWritten) {
+TEST_F(Rawlog, ReadsBackTheWrittenObservations) {
   write(recorded);
   const Delivery delivery = read(file());
   EXPECT_EQ(delivery.error, "");
@@ -155,7 +155,7 @@ TEST_F(Rawlog, MayBeStoredWithoutCompression) {
   EXPECT_EQ(cut.observations.size(), recorded.size() - 1);
 }
 
-TEST_F(Rawlog, ObservationsOfFramesComeOneByOneAndActionsNotAtAll) {
+TEST_F(Rawlog, ObservationsOfFramesComeOneByOneWithoutActions) {
   mrpt::obs::CSensoryFrame frame;
   frame.insert(recorded[0]);
   frame.insert(recorded[1]);
@@ -167,7 +167,7 @@ TEST_F(Rawlog, ObservationsOfFramesComeOneByOneAndActionsNotAtAll) {
   expectSame(*delivery.observations[3], *recorded[1]);
 }
 
-TEST_F(Rawlog, OfMovementsInARowWithoutATimeTheLastPoseIsThatOfTheirFrame) {
+TEST_F(Rawlog, OfMovementsWithoutATimeTheLastPoseIsThatOfTheFrame) {
   mrpt::obs::CActionRobotMovement2D movement;
   movement.timestamp = INVALID_TIMESTAMP;
   movement.computeFromOdometry(mrpt::poses::CPose2D(1, 0, 0), {});
@@ -198,7 +198,7 @@ TEST_F(Rawlog, OtherObservationsPassThrough) {
 
 // --- Damage ------------------------------------------------------------------------------------
 
-TEST_F(Rawlog, CutAnywhereIsAnErrorThatNamesTheEntryAndGivesWhatCameBefore) {
+TEST_F(Rawlog, TruncatedAnywhereIsAnErrorThatNamesTheEntryAfterAllEntriesBeforeIt) {
   write(recorded);
   const std::string bytes = contentOf(file());
   std::size_t most = 0;
@@ -218,7 +218,7 @@ TEST_F(Rawlog, CutAnywhereIsAnErrorThatNamesTheEntryAndGivesWhatCameBefore) {
   EXPECT_GT(most, recorded.size() / 2);
 }
 
-TEST_F(Rawlog, CutWithinItsLastBytesIsAnErrorThoughEveryEntryIsThere) {
+TEST_F(Rawlog, TruncatedInItsLastBytesIsAnErrorAfterAllEntries) {
   write(recorded);
   const std::string bytes = contentOf(file());
   for (std::size_t missing = 1; missing <= 8; ++missing) {  // gzip's checksum and size
@@ -229,7 +229,7 @@ TEST_F(Rawlog, CutWithinItsLastBytesIsAnErrorThoughEveryEntryIsThere) {
   }
 }
 
-TEST_F(Rawlog, AByteThatChangedIsAnErrorAndWhatCameBeforeIsRight) {
+TEST_F(Rawlog, AChangedByteIsAnErrorAfterCorrectEntries) {
   write(recorded);
   const std::string bytes = contentOf(file());
   for (std::size_t at = 20; at < bytes.size(); at += 1 + bytes.size() / 40) {
@@ -242,7 +242,7 @@ TEST_F(Rawlog, AByteThatChangedIsAnErrorAndWhatCameBeforeIsRight) {
   }
 }
 
-TEST_F(Rawlog, APacketWithAByteThatChangedIsAnErrorThatSaysSo) {
+TEST_F(Rawlog, APacketWithAChangedByteIsAnErrorThatSaysSo) {
   CObservationEvents packet;
   packet.camera = SyntheticRecording().cameras[0].model;
   packet.events = SyntheticRecording().events[0];
@@ -259,18 +259,18 @@ TEST_F(Rawlog, AnEmptyFileIsAnError) {
   EXPECT_THAT(read(file()).error, HasSubstr("the file is empty"));
 }
 
-TEST_F(Rawlog, AFileThatIsNoneIsAnError) {
+TEST_F(Rawlog, ATextFileIsAnError) {
   writeBytes("0.1 2 3 1\n0.2 2 3 1\n");
   EXPECT_THAT(read(file()).error, AllOf(StartsWith("stopped at entry 0 of"), isPlain()));
 }
 
-TEST_F(Rawlog, WhatIsNoFileIsAnErrorThatSaysWhatItIs) {
+TEST_F(Rawlog, AFolderAndADeviceAreErrorsThatSaySo) {
   EXPECT_THAT(read(folder()).error, EndsWith(": a folder: expected a file"));
   EXPECT_THAT(read("/dev/null").error, EndsWith(": not a regular file"));
   EXPECT_THAT(read(folder() / "nowhere").error, EndsWith(": no such file"));
 }
 
-TEST_F(Rawlog, AClassThatIsNotKnownIsAnErrorThatNamesIt) {
+TEST_F(Rawlog, AnUnknownClassIsAnErrorThatNamesIt) {
   // An entry begins with the length of its class's name, with the top bit set.
   const std::string name = "CObservationOfTheFuture";
   writeBytes(std::string(1, static_cast<char>(0x80 | name.size())) + name + std::string(1, '\0'));
@@ -278,13 +278,13 @@ TEST_F(Rawlog, AClassThatIsNotKnownIsAnErrorThatNamesIt) {
                                         HasSubstr("CObservationOfTheFuture"), isPlain()));
 }
 
-TEST_F(Rawlog, AClassNameThatATerminalWouldObeyIsNotShownAsItIs) {
+TEST_F(Rawlog, ControlCharactersOfAClassNameAreEscaped) {
   const std::string name = "C\x1b[2J";
   writeBytes(std::string(1, static_cast<char>(0x80 | name.size())) + name + std::string(1, '\0'));
   EXPECT_THAT(read(file()).error, AllOf(HasSubstr("C\\x1b[2J"), Not(HasSubstr("\x1b"))));
 }
 
-TEST_F(Rawlog, AnErrorStaysOne) {
+TEST_F(Rawlog, AnErrorIsThrownAgain) {
   write(recorded);
   const std::string bytes = contentOf(file());
   writeBytes(bytes.substr(0, bytes.size() / 2));
@@ -299,7 +299,7 @@ TEST_F(Rawlog, AnErrorStaysOne) {
 
 // --- Writing -----------------------------------------------------------------------------------
 
-TEST_F(Rawlog, AppearsWhenItIsComplete) {
+TEST_F(Rawlog, AppearsOnlyWhenComplete) {
   {
     RawlogWriter writer(file());
     writer.write(*recorded[0]);
@@ -308,7 +308,7 @@ TEST_F(Rawlog, AppearsWhenItIsComplete) {
   EXPECT_TRUE(std::filesystem::is_empty(folder())) << "something stayed of the one not closed";
 }
 
-TEST_F(Rawlog, ThatCannotBeWrittenIsAnErrorThatNamesIt) {
+TEST_F(Rawlog, AFileThatCannotBeWrittenIsNamed) {
   try {
     RawlogWriter writer(folder() / "nowhere" / "r.rawlog");
     FAIL() << "no error";
@@ -317,7 +317,7 @@ TEST_F(Rawlog, ThatCannotBeWrittenIsAnErrorThatNamesIt) {
   }
 }
 
-TEST_F(Rawlog, IsNotWrittenOverWhatIsNoFile) {
+TEST_F(Rawlog, ReplacesFilesOnly) {
   const auto error_of = [](const std::filesystem::path& path) -> std::string {
     try {
       RawlogWriter writer(path);
@@ -333,7 +333,7 @@ TEST_F(Rawlog, IsNotWrittenOverWhatIsNoFile) {
   EXPECT_TRUE(std::filesystem::is_fifo(folder() / "pipe"));
 }
 
-TEST_F(Rawlog, ThroughALinkReplacesTheFileThatItLeadsTo) {
+TEST_F(Rawlog, ReplacesTheTargetOfALink) {
   std::filesystem::create_directory(folder() / "real");
   std::ofstream(folder() / "real" / "one.rawlog") << "an earlier one";
   std::filesystem::create_symlink("real/one.rawlog", file());

@@ -42,7 +42,7 @@ class UzhText : public TemporaryFolder {
   }
 };
 
-TEST_F(UzhText, CalibrationIsRadtanEvenWhereAllCoefficientsAreZero) {
+TEST_F(UzhText, CalibrationIsRadtanEvenIfAllCoefficientsAreZero) {
   const CameraModel model = readUzhCalibration(folder() / "calib.txt", {240, 180});
   EXPECT_EQ(model.fx, 200);
   EXPECT_EQ(model.fy, 201);
@@ -52,7 +52,7 @@ TEST_F(UzhText, CalibrationIsRadtanEvenWhereAllCoefficientsAreZero) {
   EXPECT_THAT(model.coefficients, ElementsAre(0, 0, 0, 0, 0));
 }
 
-TEST_F(UzhText, ACalibrationOfAnotherLengthIsAnErrorThatSaysHowMany) {
+TEST_F(UzhText, AWrongCountOfNumbersIsAnErrorThatNamesTheCount) {
   write("calib.txt", "200 201 120 90 0 0 0 0\n");
   EXPECT_THAT(errorOfOpening(),
               AllOf(HasSubstr("calib.txt: 8 numbers: expected 9"), HasSubstr("k1 k2 p1 p2 k3")));
@@ -62,7 +62,7 @@ TEST_F(UzhText, ACalibrationOfAnotherLengthIsAnErrorThatSaysHowMany) {
   EXPECT_THAT(errorOfOpening(), HasSubstr("calib.txt: 0 numbers: expected 9"));
 }
 
-TEST_F(UzhText, ACalibrationThatIsNotNumbersInRangeIsAnError) {
+TEST_F(UzhText, WrongNumbersOfACalibrationAreErrors) {
   write("calib.txt", "200 201 120 90\nk1 0 0 0 0\n");
   EXPECT_THAT(errorOfOpening(), HasSubstr("calib.txt:2: 'k1': expected a finite number"));
   write("calib.txt", "\x1b[2J 201 120 90\n");
@@ -71,13 +71,13 @@ TEST_F(UzhText, ACalibrationThatIsNotNumbersInRangeIsAnError) {
   EXPECT_THAT(errorOfOpening(), AllOf(HasSubstr("calib.txt: fx = 0"), HasSubstr("above 0")));
 }
 
-TEST_F(UzhText, TheSensorIsADavis240WhereThereIsNoImage) {
+TEST_F(UzhText, TheSensorIsADavis240WithoutImages) {
   EXPECT_EQ(sizeFound(), "240x180");
   write("images.txt", "0.0 images/frame_0.png\n");
   EXPECT_EQ(sizeFound(), "240x180");
 }
 
-TEST_F(UzhText, TheFirstImageThatIsThereTellsTheSensorsSize) {
+TEST_F(UzhText, TheSensorHasTheSizeOfTheFirstExistingImage) {
   write("images.txt", "# t file\n0.0 images/frame_0.png\n0.1 images/frame_1.png\n");
   std::filesystem::create_directories(folder() / "images");
   cv::imwrite((folder() / "images" / "frame_1.png").string(), cv::Mat::zeros(260, 346, CV_8UC1));

@@ -28,15 +28,14 @@ namespace {
 using mrpt::obs::CObservation;
 
 std::vector<CloudPoint> mapOf(const std::vector<CObservation::Ptr>& observations,
-                              const EventFusionOptions& options) {
+                              const EventFusionOptions& options = syntheticOptions()) {
   CEventFusionMapBuilder builder(options);
-  for (const CObservation::Ptr& observation : observations) builder.processObservation(observation);
-  builder.finish();
+  play(builder, observations);
   return builder.points();
 }
 
 TEST(CEventFusionMapBuilder, TurnsObservationsIntoAMapOfTheWorld) {
-  const auto points = mapOf(observationsOf(SyntheticRecording()), syntheticOptions());
+  const auto points = mapOf(observationsOf(SyntheticRecording()));
 
   ASSERT_GT(points.size(), 30U);
   for (const CloudPoint& point : points) {
@@ -60,24 +59,21 @@ TEST(CEventFusionMapBuilder, ThreadsOfTheSweepDoNotChangeTheMap) {
   expectSameBits(one, mapOf(observations, options));
 }
 
-TEST(CEventFusionMapBuilder, KeyframesAreHandedOutOnceAndInOrder) {
+TEST(CEventFusionMapBuilder, KeyframesAreDeliveredOnceAndInOrder) {
   CEventFusionMapBuilder builder(syntheticOptions());
   std::vector<std::int64_t> times;
   builder.setKeyframeCallback([&](const KeyframeDepthMap& keyframe) {
     times.push_back(keyframe.window.t_ref_ns);
-    EXPECT_GE(builder.status().counts.keyframes, times.size()) << "the taker may use the builder";
+    EXPECT_GE(builder.status().counts.keyframes, times.size()) << "the callback may use the builder";
   });
-  for (const auto& observation : observationsOf(SyntheticRecording())) {
-    builder.processObservation(observation);
-  }
-  builder.finish();
+  play(builder, observationsOf(SyntheticRecording()));
 
   EXPECT_EQ(times.size(), 3U);
   EXPECT_TRUE(std::is_sorted(times.begin(), times.end()));
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
 }
 
-TEST(CEventFusionMapBuilder, ASensorPoseOnTheRobotIsTakenOutOfThePose) {
+TEST(CEventFusionMapBuilder, ThePoseOfTheSensorOnTheRigIsRemoved) {
   // A tracker half a metre above the rig, turned by 90 degrees: the same map.
   const SyntheticRecording recording;
   auto observations = observationsOf(recording);
@@ -89,8 +85,8 @@ TEST(CEventFusionMapBuilder, ASensorPoseOnTheRobotIsTakenOutOfThePose) {
     pose->pose.mean = pose->pose.mean + sensor_on_rig;
   }
 
-  const auto expected = mapOf(observationsOf(recording), syntheticOptions());
-  const auto points = mapOf(observations, syntheticOptions());
+  const auto expected = mapOf(observationsOf(recording));
+  const auto points = mapOf(observations);
 
   ASSERT_EQ(points.size(), expected.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -115,14 +111,13 @@ TEST(CEventFusionMapBuilder, SensoryFramesGiveTheSameMap) {
   }
   builder.finish();
 
-  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+  expectSameBits(builder.points(), mapOf(observations));
 }
 
-TEST(CEventFusionMapBuilder, GivesMrptItsMaps) {
+TEST(CEventFusionMapBuilder, ReturnsMrptsMaps) {
   CEventFusionMapBuilder builder(syntheticOptions());
   const SyntheticRecording recording;
-  for (const auto& observation : observationsOf(recording)) builder.processObservation(observation);
-  builder.finish();
+  play(builder, observationsOf(recording));
 
   const auto* metric = builder.getCurrentlyBuiltMetricMap();
   const auto event_map = metric->mapByClass<CEventFusionMap>();
@@ -151,20 +146,18 @@ TEST(CEventFusionMapBuilder, GivesMrptItsMaps) {
 TEST(CEventFusionMapBuilder, StartsOver) {
   const auto observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(syntheticOptions());
-  for (const auto& observation : observations) builder.processObservation(observation);
-  builder.finish();
+  play(builder, observations);
   const auto first = builder.points();
   EXPECT_THROW(builder.processObservation(observations[0]), std::logic_error) << "after its end";
 
   builder.initialize();
   EXPECT_TRUE(builder.points().empty());
-  for (const auto& observation : observations) builder.processObservation(observation);
-  builder.finish();
+  play(builder, observations);
 
   expectSameBits(builder.points(), first);
 }
 
-TEST(CEventFusionMapBuilder, OptionsThatAreNotValidChangeNothing) {
+TEST(CEventFusionMapBuilder, InvalidOptionsChangeNothing) {
   CEventFusionMapBuilder builder(syntheticOptions());
   EventFusionOptions wrong = syntheticOptions();
   wrong.cloud.voxel_size_m = -1;
@@ -172,13 +165,13 @@ TEST(CEventFusionMapBuilder, OptionsThatAreNotValidChangeNothing) {
   EXPECT_THROW(CEventFusionMapBuilder{wrong}, std::invalid_argument);
 }
 
-TEST(CEventFusionMapBuilder, ARefusedObservationLeavesTheMapSoFar) {
+TEST(CEventFusionMapBuilder, ARefusedObservationDoesNotChangeTheMap) {
   const SyntheticRecording recording;
   auto observations = observationsOf(recording);
-  const auto whole = mapOf(observations, syntheticOptions());
+  const auto whole = mapOf(observations);
 
   CEventFusionMapBuilder builder(syntheticOptions());
-  for (const auto& observation : observations) builder.processObservation(observation);
+  feed(builder, observations);
   EXPECT_THROW(builder.processObservation(packetOutsideTheSensor(recording)),
                std::invalid_argument);
   builder.finish();
@@ -186,7 +179,7 @@ TEST(CEventFusionMapBuilder, ARefusedObservationLeavesTheMapSoFar) {
   expectSameBits(builder.points(), whole);
 }
 
-TEST(CEventFusionMapBuilder, NoObservationAtAllIsAnError) {
+TEST(CEventFusionMapBuilder, ANullObservationIsAnError) {
   CEventFusionMapBuilder builder(syntheticOptions());
   EXPECT_THROW(builder.processObservation(nullptr), std::invalid_argument);
   EXPECT_EQ(builder.ignoredObservations(), 0U);
@@ -207,27 +200,25 @@ class FullDisk : public DsiSink {
   std::atomic<int> planes_;
 };
 
-TEST(CEventFusionMapBuilder, KeyframesThatWereMadeBeforeMappingFailsStayAndAreHandedOut) {
+TEST(CEventFusionMapBuilder, KeyframesBeforeAFailureStayAndAreDelivered) {
   FullDisk disk(2);
   CEventFusionMapBuilder builder(syntheticOptions());
   builder.setDsiSink(&disk);
-  std::size_t taken = 0;
-  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++taken; });
-  for (const auto& observation : observationsOf(SyntheticRecording())) {
-    builder.processObservation(observation);
-  }
+  std::size_t delivered = 0;
+  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++delivered; });
+  feed(builder, observationsOf(SyntheticRecording()));
 
   EXPECT_THROW(builder.finish(), std::runtime_error);
 
-  EXPECT_EQ(taken, 2U);
+  EXPECT_EQ(delivered, 2U);
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U) << "the error was said: now the map is asked";
   EXPECT_EQ(builder.status().counts.keyframes, 2U);
   const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
   expectSameBits(event_map->cloud().points(), builder.points());
-  EXPECT_EQ(taken, 2U);
+  EXPECT_EQ(delivered, 2U);
 }
 
-TEST(CEventFusionMapBuilder, ARefusalIsSaidThoughMappingFailsToo) {
+TEST(CEventFusionMapBuilder, OfARefusalAndAFailureTheRefusalIsThrown) {
   const SyntheticRecording recording(1.2);
   FullDisk disk(0);
   CEventFusionMapBuilder builder(syntheticOptions());
@@ -246,29 +237,27 @@ TEST(CEventFusionMapBuilder, ARefusalIsSaidThoughMappingFailsToo) {
 
   builder.setDsiSink(nullptr);
   builder.finish();
-  expectSameBits(builder.points(), mapOf(observationsOf(recording), syntheticOptions()));
+  expectSameBits(builder.points(), mapOf(observationsOf(recording)));
 }
 
-TEST(CEventFusionMapBuilder, ATakerThatThrowsDoesNotStopTheMap) {
+TEST(CEventFusionMapBuilder, ACallbackThatThrowsDoesNotStopTheMap) {
   CEventFusionMapBuilder builder(syntheticOptions());
   builder.setKeyframeCallback([](const KeyframeDepthMap&) { throw std::runtime_error("no room"); });
-  for (const auto& observation : observationsOf(SyntheticRecording())) {
-    builder.processObservation(observation);
-  }
+  feed(builder, observationsOf(SyntheticRecording()));
   EXPECT_THROW(builder.finish(), std::runtime_error);
   builder.setKeyframeCallback(nullptr);
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
 }
 
-TEST(CEventFusionMapBuilder, EachKeyframeIsHandedOutBeforeTheNextIsMade) {
+TEST(CEventFusionMapBuilder, EachKeyframeIsDeliveredBeforeTheNextIsMade) {
   // Poses come last: all keyframes become due at once.
   std::vector<CObservation::Ptr> poses;
   CEventFusionMapBuilder builder(syntheticOptions());
-  std::size_t taken = 0;
+  std::size_t delivered = 0;
   builder.setKeyframeCallback([&](const KeyframeDepthMap&) {
-    ++taken;
-    EXPECT_EQ(builder.status().counts.keyframes, taken);
-    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), taken) << "the map up to this keyframe";
+    ++delivered;
+    EXPECT_EQ(builder.status().counts.keyframes, delivered);
+    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), delivered) << "the map up to this keyframe";
   });
   const auto observations = observationsOf(SyntheticRecording());
   for (const auto& observation : observations) {
@@ -278,50 +267,17 @@ TEST(CEventFusionMapBuilder, EachKeyframeIsHandedOutBeforeTheNextIsMade) {
       builder.processObservation(observation);
     }
   }
-  for (const auto& pose : poses) builder.processObservation(pose);
-  EXPECT_EQ(taken, 0U);
+  feed(builder, poses);
+  EXPECT_EQ(delivered, 0U);
   builder.finish();
 
-  EXPECT_EQ(taken, 3U);
-  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+  EXPECT_EQ(delivered, 3U);
+  expectSameBits(builder.points(), mapOf(observations));
 }
 
 // --- Threads -----------------------------------------------------------------------------------
 
-TEST(CEventFusionMapBuilder, SeveralThreadsMayFeed) {
-  // Poses before all and a packet of each camera, then a thread per camera.
-  const auto observations = observationsOf(SyntheticRecording(0.9));
-  CEventFusionMapBuilder builder(syntheticOptions());
-  std::atomic<std::size_t> taken = 0;
-  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++taken; });
-  for (const auto& observation : observations) {
-    if (IS_CLASS(*observation, mrpt::obs::CObservationRobotPose)) {
-      builder.processObservation(observation);
-    }
-  }
-  std::vector<CObservation::Ptr> packets;
-  std::copy_if(observations.begin(), observations.end(), std::back_inserter(packets),
-               [](const auto& one) { return !IS_CLASS(*one, mrpt::obs::CObservationRobotPose); });
-  for (int i = 0; i < 2; ++i) builder.processObservation(packets[static_cast<std::size_t>(i)]);
-  packets.erase(packets.begin(), packets.begin() + 2);
-  std::vector<std::thread> feeders;
-  for (const std::string camera : {"cam0", "cam1"}) {
-    feeders.emplace_back([&, camera] {
-      for (const auto& packet : packets) {
-        if (packet->sensorLabel != camera) continue;
-        builder.processObservation(packet);
-        builder.getCurrentlyBuiltMapSize();
-      }
-    });
-  }
-  for (std::thread& feeder : feeders) feeder.join();
-  builder.finish();
-
-  EXPECT_EQ(taken, builder.getCurrentlyBuiltMapSize());
-  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
-}
-
-TEST(CEventFusionMapBuilder, WhoReadsItsLogMayAskIt) {
+TEST(CEventFusionMapBuilder, ACallbackOfTheLogMayQueryTheBuilder) {
   SyntheticRecording recording;
   recording.events[1].resize(1);
   CEventFusionMapBuilder builder(syntheticOptions());
@@ -335,42 +291,20 @@ TEST(CEventFusionMapBuilder, WhoReadsItsLogMayAskIt) {
     const auto ask = [&] { return builder.status().counts.keyframes; };
     EXPECT_EQ(std::async(std::launch::async, ask).get(), 2U);
   });
-  for (const auto& observation : observationsOf(recording)) {
-    builder.processObservation(observation);
-  }
-  builder.finish();
+  play(builder, observationsOf(recording));
   EXPECT_EQ(warnings, 1U);
 }
 
-TEST(CEventFusionMapBuilder, MayBeAskedFromOtherThreadsWhileItMaps) {
-  const auto observations = observationsOf(SyntheticRecording());
-  CEventFusionMapBuilder builder(syntheticOptions());
-  std::thread feeder([&] {
-    for (const auto& observation : observations) builder.processObservation(observation);
-    builder.finish();
-  });
-  for (int i = 0; i < 50; ++i) {
-    builder.getCurrentPoseEstimation();
-    builder.points();
-    builder.status();
-    mrpt::maps::CSimpleMap map;
-    builder.getCurrentlyBuiltMap(map);
-  }
-  feeder.join();
-
-  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
-}
-
 /// Asks the builder from other threads while the sweep runs, which holds the lock.
-class AskingSink : public DsiSink {
+class QueryingSink : public DsiSink {
  public:
-  using Questions = std::map<std::string, std::function<void()>>;
-  explicit AskingSink(Questions questions) : questions_(std::move(questions)) {}
+  using Queries = std::map<std::string, std::function<void()>>;
+  explicit QueryingSink(Queries questions) : queries_(std::move(questions)) {}
 
   void addPlane(int /*plane*/, const float* /*values*/) override {
     if (asked_.exchange(true)) return;
     std::map<std::string, std::future<void>> answers;
-    for (const auto& [name, ask] : questions_) {
+    for (const auto& [name, ask] : queries_) {
       answers[name] = std::async(std::launch::async, ask);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(150));
@@ -385,14 +319,14 @@ class AskingSink : public DsiSink {
   std::vector<std::string> answered_in_between;
 
  private:
-  Questions questions_;
+  Queries queries_;
   std::atomic<bool> asked_ = false;
   std::map<std::string, std::future<void>> answers_;
 };
 
-TEST(CEventFusionMapBuilder, NoQuestionIsAnsweredWhileAKeyframeIsMade) {
+TEST(CEventFusionMapBuilder, NoQueryIsAnsweredWhileAKeyframeIsMade) {
   CEventFusionMapBuilder builder(syntheticOptions());
-  AskingSink sink({{"status", [&] { builder.status(); }},
+  QueryingSink sink({{"status", [&] { builder.status(); }},
                    {"points", [&] { builder.points(); }},
                    {"trajectory", [&] { builder.trajectory(); }},
                    {"trackerTrajectory", [&] { builder.trackerTrajectory(); }},
@@ -401,37 +335,34 @@ TEST(CEventFusionMapBuilder, NoQuestionIsAnsweredWhileAKeyframeIsMade) {
                    {"getCurrentPoseEstimation", [&] { builder.getCurrentPoseEstimation(); }},
                    {"getCurrentlyBuiltMapSize", [&] { builder.getCurrentlyBuiltMapSize(); }}});
   builder.setDsiSink(&sink);
-  for (const auto& observation : observationsOf(SyntheticRecording())) {
-    builder.processObservation(observation);
-  }
-  builder.finish();
+  play(builder, observationsOf(SyntheticRecording()));
   EXPECT_THAT(sink.answered_in_between, testing::IsEmpty()) << "without the lock";
 }
 
 // --- Asked by a program that cannot finish it --------------------------------------------------
 
-TEST(CEventFusionMapBuilder, AskedForTheMapMapsWhatIsCoveredOfAShortRecording) {
+TEST(CEventFusionMapBuilder, AQueryMapsTheCoveredWindowsOfAShortRecording) {
   const auto observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(syntheticOptions());
-  std::size_t taken = 0;
-  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++taken; });
-  for (const auto& observation : observations) builder.processObservation(observation);
+  std::size_t delivered = 0;
+  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++delivered; });
+  feed(builder, observations);
   EXPECT_TRUE(builder.points().empty()) << "half a second, and nobody asked";
 
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
 
-  EXPECT_EQ(taken, 3U);
-  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+  EXPECT_EQ(delivered, 3U);
+  expectSameBits(builder.points(), mapOf(observations));
 }
 
-TEST(CEventFusionMapBuilder, AskedAfterEachObservationMakesTheSameMap) {
+TEST(CEventFusionMapBuilder, QueriesAfterEachObservationDoNotChangeTheMap) {
   const auto observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(syntheticOptions());
   for (const auto& observation : observations) {
     builder.processObservation(observation);
     builder.getCurrentlyBuiltMapSize();
   }
-  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+  expectSameBits(builder.points(), mapOf(observations));
 }
 
 /// A drifting odometry from the beginning, and poses that begin 0.3 s later.
@@ -451,7 +382,7 @@ std::vector<CObservation::Ptr> odometryThenPoses() {
   return observations;
 }
 
-TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotChooseTheSourceOfPoses) {
+TEST(CEventFusionMapBuilder, AnEarlyQueryDoesNotSelectThePoseSource) {
   const auto observations = odometryThenPoses();
   CEventFusionMapBuilder builder(syntheticOptions());
   for (const auto& observation : observations) {
@@ -460,10 +391,10 @@ TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotChooseTheSourceOfPoses) {
   }
   builder.finish();
   EXPECT_EQ(builder.status().pose_source->kind, PoseKind::kPose);
-  expectSameBits(builder.points(), mapOf(observations, syntheticOptions()));
+  expectSameBits(builder.points(), mapOf(observations));
 }
 
-TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotRefuseTheSecondOfTwoLongPackets) {
+TEST(CEventFusionMapBuilder, AnEarlyQueryDoesNotRefuseTheSecondOfTwoLongPackets) {
   // 200 ms of each camera, then the poses in them.
   std::vector<CObservation::Ptr> observations;
   std::vector<CObservation::Ptr> poses;
@@ -495,20 +426,18 @@ TEST(CEventFusionMapBuilder, ToBeAskedEarlyDoesNotRefuseTheSecondOfTwoLongPacket
     builder.getCurrentlyBuiltMapSize();
   }
   builder.finish();
-  expectSameBits(builder.points(), mapOf(observationsOf(recording), syntheticOptions()));
+  expectSameBits(builder.points(), mapOf(observationsOf(recording)));
 }
 
-TEST(CEventFusionMapBuilder, AskedForAMapOfACameraThatIsNotThereSaysSo) {
+TEST(CEventFusionMapBuilder, AQueryForAMissingCameraIsAnError) {
   EventFusionOptions options = syntheticOptions();
   options.mapper.keyframe.reference_camera = 2;
   CEventFusionMapBuilder builder(options);
-  for (const auto& observation : observationsOf(SyntheticRecording())) {
-    builder.processObservation(observation);
-  }
+  feed(builder, observationsOf(SyntheticRecording()));
   EXPECT_THROW(builder.getCurrentlyBuiltMetricMap(), std::invalid_argument);
 }
 
-TEST(CEventFusionMapBuilder, AskedBeforeItKnowsAnythingGivesAnEmptyMap) {
+TEST(CEventFusionMapBuilder, AQueryBeforeAnyObservationReturnsAnEmptyMap) {
   const CEventFusionMapBuilder builder(syntheticOptions());
   const auto* metric = builder.getCurrentlyBuiltMetricMap();
   ASSERT_EQ(metric->maps.size(), 2U);
@@ -522,8 +451,7 @@ struct StoredMap {
   explicit StoredMap(const std::vector<CObservation::Ptr>& observations,
                      const EventFusionOptions& options = syntheticOptions()) {
     CEventFusionMapBuilder builder(options);
-    for (const auto& observation : observations) builder.processObservation(observation);
-    builder.finish();
+    play(builder, observations);
     points = builder.points();
     builder.getCurrentlyBuiltMap(keyframes);
   }
@@ -531,7 +459,7 @@ struct StoredMap {
   mrpt::maps::CSimpleMap keyframes;
 };
 
-TEST(CEventFusionMapBuilder, KeyframesOfTheSimplemapHoldTheirCloudsWhereTheyWereSeen) {
+TEST(CEventFusionMapBuilder, KeyframesOfTheSimplemapHaveTheirCloudsAtTheirPoses) {
   const StoredMap map(observationsOf(SyntheticRecording()));
   ASSERT_EQ(map.keyframes.size(), 3U);
   const auto [pose, frame] = map.keyframes.get(1);
@@ -546,7 +474,7 @@ TEST(CEventFusionMapBuilder, KeyframesOfTheSimplemapHoldTheirCloudsWhereTheyWere
   EXPECT_GT(seen->pointcloud->size(), 30U);
 }
 
-TEST(CEventFusionMapBuilder, AMapOfSingleCamerasIsStoredAsItIs) {
+TEST(CEventFusionMapBuilder, AMapOfSingleCamerasIsStored) {
   EventFusionOptions options = syntheticOptions();
   options.late_fusion = true;
   const StoredMap map(observationsOf(SyntheticRecording()), options);
@@ -566,8 +494,7 @@ TEST(CEventFusionMapBuilder, ContinuesAnEarlierMap) {
   builder.initialize(earlier.keyframes);
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
   EXPECT_EQ(builder.points().size(), earlier.points.size());
-  for (const auto& observation : observations) builder.processObservation(observation);
-  builder.finish();
+  play(builder, observations);
 
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U + 5U);
   GlobalCloud both(syntheticOptions().cloud);
@@ -589,7 +516,7 @@ TEST(CEventFusionMapBuilder, ContinuesAnEarlierMap) {
   EXPECT_TRUE(builder.points().empty());
 }
 
-TEST(CEventFusionMapBuilder, AFrameThatIsNoKeyframeIsRefusedRatherThanForgotten) {
+TEST(CEventFusionMapBuilder, AFrameWithoutAKeyframeIsAnError) {
   mrpt::maps::CSimpleMap map = StoredMap(observationsOf(SyntheticRecording())).keyframes;
   map.insert(mrpt::poses::CPose3DPDFGaussian::Create(), mrpt::obs::CSensoryFrame::Create());
   CEventFusionMapBuilder builder;
@@ -613,9 +540,7 @@ TEST_F(CEventFusionMapBuilderFile, SavesItsMapAndContinuesIt) {
   const std::string file = (folder() / "saved.simplemap").string();
   CEventFusionMapBuilder builder(syntheticOptions());
   builder.setMinLoggingLevel(mrpt::system::LVL_ERROR);
-  for (const auto& observation : observationsOf(SyntheticRecording())) {
-    builder.processObservation(observation);
-  }
+  feed(builder, observationsOf(SyntheticRecording()));
   builder.saveCurrentMapToFile(file);
   const auto points = builder.points();
 

@@ -123,7 +123,7 @@ TEST(CEventFusionMap, IsMadeByTheMapFactoryWithItsOptions) {
   EXPECT_TRUE(first->isEmpty());
 }
 
-TEST(CEventFusionMap, OptionsThatAreWrongAreErrorsThatNameThem) {
+TEST(CEventFusionMap, WrongOptionsAreErrorsThatNameThem) {
   const std::string section = "maps_eventFusionMap_00_insertOpts";
   const auto with = [&](const std::string& line) {
     return errorOfMaking("[" + section + "]\n" + line + "\n");
@@ -138,7 +138,7 @@ TEST(CEventFusionMap, OptionsThatAreWrongAreErrorsThatNameThem) {
               HasSubstr("maps_eventFusionMap_00_creationOpts: voxel_size_m: unknown key"));
 }
 
-TEST(CEventFusionMap, TakesCloudsWithIntensitiesWhereTheRobotSawThem) {
+TEST(CEventFusionMap, InsertsCloudsWithIntensitiesAtTheRobotsPose) {
   const StoredKeyframe keyframe = randomKeyframe(1);
   CEventFusionMap expected;
   expected.insertKeyframe(keyframe);
@@ -159,7 +159,7 @@ TEST(CEventFusionMap, TakesCloudsWithIntensitiesWhereTheRobotSawThem) {
   }
 }
 
-TEST(CEventFusionMap, IsNotChangedWithACloudThatItTook) {
+TEST(CEventFusionMap, DoesNotChangeWithTheCallersCloud) {
   const StoredKeyframe keyframe = randomKeyframe(1);
   CEventFusionMap map;
   map.insertObservation(observationOf(keyframe));
@@ -167,7 +167,7 @@ TEST(CEventFusionMap, IsNotChangedWithACloudThatItTook) {
   EXPECT_NE(map.keyframes()[0].points->getPointIntensity(0), 7);
 }
 
-TEST(CEventFusionMap, LeavesOtherObservationsAlone) {
+TEST(CEventFusionMap, IgnoresOtherObservations) {
   CEventFusionMap map;
   EXPECT_FALSE(map.insertObservation(mrpt::obs::CObservationComment()));
   CObservationPointCloud no_intensities;
@@ -179,7 +179,7 @@ TEST(CEventFusionMap, LeavesOtherObservationsAlone) {
   EXPECT_FALSE(map.canComputeObservationLikelihood(mrpt::obs::CObservationComment()));
 }
 
-TEST(CEventFusionMap, RefusesAPointThatIsNoneAndStaysAsItWas) {
+TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChange) {
   CEventFusionMap map = mapOf(2);
   const CEventFusionMap before = map;
   const StoredKeyframe wrong = randomKeyframe(5);
@@ -189,7 +189,7 @@ TEST(CEventFusionMap, RefusesAPointThatIsNoneAndStaysAsItWas) {
   EXPECT_EQ(map.keyframes().size(), 2U);
 }
 
-TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAndGoesOnLikeIt) {
+TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAlsoAfterMoreKeyframes) {
   // No option is the default, and each decides which points there are.
   GlobalCloudOptions options = bigVoxels();
   options.voxel_size_m = 2;
@@ -228,7 +228,7 @@ TEST(CEventFusionMap, GoesThroughAnArchiveInsideAMultiMetricMap) {
   expectSamePoints(*read->mapByClass<CEventFusionMap>(), *map);
 }
 
-TEST(CEventFusionMap, DamagedBytesAreAnErrorAndLeaveTheMap) {
+TEST(CEventFusionMap, DamagedBytesAreAnError) {
   const std::vector<std::uint8_t> bytes = bytesOf(mapOf(2));
   for (const std::size_t kept : {bytes.size() / 3, bytes.size() / 2, bytes.size() - 20}) {
     std::vector<std::uint8_t> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(kept));
@@ -236,7 +236,7 @@ TEST(CEventFusionMap, DamagedBytesAreAnErrorAndLeaveTheMap) {
   }
 }
 
-TEST(CEventFusionMap, CopiesGoTheirOwnWay) {
+TEST(CEventFusionMap, CopiesAreIndependent) {
   CEventFusionMap map = mapOf(2);
   const CEventFusionMap copy = map;
   map.clear();
@@ -271,21 +271,21 @@ TEST(CEventFusionMap, IsDrawnWithAPointForEachOfItsPoints) {
   EXPECT_EQ(CEventFusionMap().getVisualization()->size(), 1U) << "an empty cloud";
 }
 
-TEST(CEventFusionMap, GivesItsPointsAsMrptsSimplestMap) {
+TEST(CEventFusionMap, ReturnsItsPointsAsMrptsSimplestMap) {
   CEventFusionMap map = mapOf(1);
   EXPECT_EQ(map.getAsSimplePointsMap()->size(), map.cloud().points().size());
   map.insertKeyframe(randomKeyframe(4));
   EXPECT_EQ(map.getAsSimplePointsMap()->size(), map.cloud().points().size()) << "after it grew";
 }
 
-TEST(CEventFusionMap, SaysWhatItHolds) {
+TEST(CEventFusionMap, IsDescribedByKeyframesAndVoxelSize) {
   EXPECT_THAT(mapOf(3).asString(), HasSubstr("3 keyframes"));
   EXPECT_THAT(mapOf(3).asString(), HasSubstr("0.25 m"));
 }
 
 class CEventFusionMapFile : public TemporaryFolder {};
 
-TEST_F(CEventFusionMapFile, IsAPcdFile) {
+TEST_F(CEventFusionMapFile, IsSavedAsAPcdFile) {
   const CEventFusionMap map = mapOf(2);
   map.saveMetricMapRepresentationToFile((folder() / "saved").string());
   const auto cloud = readPointCloud(folder() / "saved.pcd").points;

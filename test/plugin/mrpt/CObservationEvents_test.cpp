@@ -75,18 +75,18 @@ void expectSame(const CObservationEvents& a, const CObservationEvents& b) {
   EXPECT_LT(apart.rotation.vec().norm(), 1e-14);
 }
 
-TEST(CObservationEvents, ComesBackFromAnArchiveAsItWas) {
+TEST(CObservationEvents, IsTheSameAfterAnArchive) {
   const CObservationEvents packet = examplePacket();
   expectSame(*packetFrom(bytesOf(packet)), packet);
 }
 
-TEST(CObservationEvents, ComesBackWithoutEventsCalibrationOrCoverage) {
+TEST(CObservationEvents, WithoutEventsCalibrationOrCoverageIsTheSameAfterAnArchive) {
   CObservationEvents packet;
   packet.timestamp = mrptTimeFrom(0);
   expectSame(*packetFrom(bytesOf(packet)), packet);
 }
 
-TEST(CObservationEvents, ComesBackInTheOrderThatItsEventsHad) {
+TEST(CObservationEvents, KeepsTheOrderOfItsEventsInAnArchive) {
   CObservationEvents packet = examplePacket();
   std::swap(packet.events[3], packet.events[70]);
   expectSame(*packetFrom(bytesOf(packet)), packet);
@@ -108,13 +108,13 @@ rc::Gen<std::vector<Event>> someEvents() {
                             rc::gen::set(&Event::y), rc::gen::set(&Event::polarity)));
 }
 
-RC_GTEST_PROP(CObservationEvents, AnyEventsComeBackFromAnArchive, ()) {
+RC_GTEST_PROP(CObservationEvents, AnyEventsAreTheSameAfterAnArchive, ()) {
   CObservationEvents packet = examplePacket();
   packet.events = *someEvents();
   RC_ASSERT(packetFrom(bytesOf(packet))->events == packet.events);
 }
 
-RC_GTEST_PROP(EventEncoding, AnyEventsComeBack, ()) {
+RC_GTEST_PROP(EventEncoding, AnyEventsAreTheSameAfterEncoding, ()) {
   const std::vector<Event> events = *someEvents();
   RC_ASSERT(decodeEvents(encodeEvents(events), events.size()) == events);
 }
@@ -131,7 +131,7 @@ RC_GTEST_PROP(EventEncoding, AnyBytesAreEventsOrAnError, ()) {
   }
 }
 
-TEST(EventEncoding, OfWholeMicrosecondsInOrderTakesAByteForAShortStep) {
+TEST(EventEncoding, AShortStepOfWholeMicrosecondsTakesAByte) {
   std::vector<Event> events;
   events.reserve(80);
   for (int i = 0; i < 80; ++i) events.push_back({kTodayNs + 63'000 * i, 0, 0, false});
@@ -141,7 +141,7 @@ TEST(EventEncoding, OfWholeMicrosecondsInOrderTakesAByteForAShortStep) {
 
 // --- Damage ------------------------------------------------------------------------------------
 
-TEST(CObservationEvents, AnyByteThatChangedIsAnErrorOrChangesNothing) {
+TEST(CObservationEvents, AnyChangedByteIsAnErrorOrChangesNothing) {
   const CObservationEvents packet = examplePacket();
   const Bytes bytes = bytesOf(packet);
   int errors = 0;
@@ -160,7 +160,7 @@ TEST(CObservationEvents, AnyByteThatChangedIsAnErrorOrChangesNothing) {
   EXPECT_EQ(errors, static_cast<int>(bytes.size() - std::string("efm").size()));
 }
 
-TEST(CObservationEvents, CutAnywhereIsAnError) {
+TEST(CObservationEvents, TruncatedAnywhereIsAnError) {
   const Bytes bytes = bytesOf(examplePacket());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     EXPECT_NE(errorOfReading(Bytes(bytes.begin(), bytes.begin() + static_cast<long>(size))),
@@ -172,13 +172,13 @@ TEST(CObservationEvents, CutAnywhereIsAnError) {
 /// Where the content's size stands: behind the length of the class's name, the name, the version.
 constexpr std::size_t kSizeAt = 1 + sizeof("efm::CObservationEvents") - 1 + 1;
 
-TEST(CObservationEvents, DamageSaysWhatIsDamaged) {
+TEST(CObservationEvents, DamageIsAnErrorThatNamesThePacket) {
   Bytes bytes = bytesOf(examplePacket());
   bytes[bytes.size() / 2] ^= 1;
   EXPECT_THAT(errorOfReading(bytes), HasSubstr("a packet of events is damaged: its checksum"));
 }
 
-TEST(CObservationEvents, ASizeThatIsNotThereAsksForNoMemory) {
+TEST(CObservationEvents, AWrongSizeReservesNoMemory) {
   Bytes bytes = bytesOf(examplePacket());
   bytes[kSizeAt + 3] = 0x3f;  // about 1 GB
   EXPECT_THAT(errorOfReading(bytes), HasSubstr("a packet of events is damaged"));
@@ -186,7 +186,7 @@ TEST(CObservationEvents, ASizeThatIsNotThereAsksForNoMemory) {
   EXPECT_THAT(errorOfReading(bytes), HasSubstr("a size that cannot be"));
 }
 
-TEST(CObservationEvents, AVersionOfTheFutureIsAnErrorThatNamesIt) {
+TEST(CObservationEvents, AnUnknownVersionIsAnErrorThatNamesIt) {
   Bytes bytes = bytesOf(examplePacket());
   bytes[kSizeAt - 1] = 7;
   EXPECT_THAT(errorOfReading(bytes), HasSubstr("version 7"));
@@ -205,7 +205,7 @@ TEST(CObservationEvents, IsDescribedByEventsTimesAndCamera) {
   EXPECT_THAT(text.str(), HasSubstr("Everything before 1700000000.133456789 s is here by now"));
 }
 
-TEST(CObservationEvents, ThatIsEmptyIsDescribedToo) {
+TEST(CObservationEvents, IsDescribedWithoutEvents) {
   CObservationEvents packet;
   packet.covered_until_ns = kEndOfTimeNs;
   std::ostringstream text;
@@ -213,7 +213,7 @@ TEST(CObservationEvents, ThatIsEmptyIsDescribedToo) {
   EXPECT_THAT(text.str(), HasSubstr("Events of camera 0: 0\nThe last packet of its camera\n"));
 }
 
-TEST(CObservationEvents, IsExportedAsALineOfItsEvents) {
+TEST(CObservationEvents, IsExportedAsALineWithItsEvents) {
   CObservationEvents packet;
   EXPECT_TRUE(packet.exportTxtSupported());
   EXPECT_EQ(packet.exportTxtDataRow(), "0");
@@ -222,7 +222,7 @@ TEST(CObservationEvents, IsExportedAsALineOfItsEvents) {
   EXPECT_THAT(packet.exportTxtHeader(), HasSubstr("TIME_S X Y POLARITY"));
 }
 
-TEST(CObservationEvents, GivesTheCamerasPoseAsItsSensors) {
+TEST(CObservationEvents, HasTheCamerasPoseAsItsSensorPose) {
   CObservationEvents packet;
   packet.setSensorPose(mrpt::poses::CPose3D(1, 2, 3, 0, 0, 0));
   mrpt::poses::CPose3D pose;

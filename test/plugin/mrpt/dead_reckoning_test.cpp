@@ -60,7 +60,7 @@ TEST(DeadReckoning, ComposesMovementsInSpace) {
   EXPECT_LT((pose.T_world_body.translation - Eigen::Vector3d(0, -2, 2)).norm(), 1e-12);
 }
 
-TEST(DeadReckoning, AMovementWithoutATimeHasItsFrames) {
+TEST(DeadReckoning, AMovementWithoutATimeHasTheTimeOfItsFrame) {
   CSensoryFrame frame;
   frame.insert(mrpt::obs::CObservationComment::Create());
   frame.getObservationByIndex(0)->timestamp = INVALID_TIMESTAMP;
@@ -77,7 +77,7 @@ TEST(DeadReckoning, AMovementWithoutATimeHasItsFrames) {
   EXPECT_EQ(poseIn(DeadReckoning().poseAfter(action, frame)).t_ns, 5000);
 }
 
-TEST(DeadReckoning, ActionsWithoutMovementSayNothing) {
+TEST(DeadReckoning, ActionsWithoutMovementGiveNoPose) {
   EXPECT_EQ(DeadReckoning().poseAfter(CActionCollection(), {}), nullptr);
 }
 
@@ -95,7 +95,7 @@ TEST(PoseObservation, OdometryIsAPoseInThePlane) {
   EXPECT_THROW(efm::poseIn(odometry), std::invalid_argument);
 }
 
-TEST(PoseObservation, ItsNoiseIsTheMeanOverTheAxesAsAStandardDeviation) {
+TEST(PoseObservation, ItsNoiseIsTheStandardDeviationOverTheAxes) {
   mrpt::obs::CObservationRobotPose robot;
   robot.timestamp = mrptTimeFrom(1000);
   EXPECT_FALSE(efm::poseIn(robot)->noise) << "no covariance";
@@ -109,7 +109,7 @@ TEST(PoseObservation, ItsNoiseIsTheMeanOverTheAxesAsAStandardDeviation) {
   EXPECT_NEAR(noise->noise_rad, 0.003, 1e-12);
 }
 
-TEST(PoseObservation, GivesBackThePoseAndTheRigOnTheBody) {
+TEST(PoseObservation, ReturnsThePoseAndTheRigOnTheBody) {
   const Rigid3 T_world_body{Eigen::Quaterniond(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitX())),
                             {1, 2, 3}};
   const Rigid3 T_body_rig{Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ())),

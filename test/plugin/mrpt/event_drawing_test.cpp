@@ -47,7 +47,7 @@ TEST(EventDrawing, AnEventIsAPointOnTheImagePlaneInTheColourOfItsPolarity) {
   EXPECT_GT(points->getPointColor(1).B, 200);
 }
 
-TEST(EventDrawing, StandsWhereTheCameraStandsOnTheRig) {
+TEST(EventDrawing, IsDrawnAtTheCamerasPoseOnTheRig) {
   CObservationEvents packet = twoLines();
   packet.camera_pose = mrpt::poses::CPose3D(1, 2, 3, 0.1, 0.2, 0.3);
   const auto camera = packet.getVisualization()->getByClass<CSetOfObjects>();
@@ -55,7 +55,7 @@ TEST(EventDrawing, StandsWhereTheCameraStandsOnTheRig) {
   EXPECT_NEAR(camera->getPose().yaw, 0.1, 1e-6);
 }
 
-TEST(EventDrawing, ALargePacketIsDrawnWithAFewOfItsEventsFromAllOfIt) {
+TEST(EventDrawing, OfALargePacketAnEvenSelectionOfEventsIsDrawn) {
   CObservationEvents packet = twoLines();
   packet.events.assign(3 * kMaxDrawnEvents, {0, 10, 10, true});
   packet.events.back() = packet.events[packet.events.size() - 3] = {0, 20, 20, false};
@@ -64,7 +64,7 @@ TEST(EventDrawing, ALargePacketIsDrawnWithAFewOfItsEventsFromAllOfIt) {
   EXPECT_GT(points->getPointColor(points->size() - 1).B, 200) << "reaches to its end";
 }
 
-TEST(EventDrawing, AnEmptyPacketShowsItsCamera) {
+TEST(EventDrawing, OfAnEmptyPacketTheCameraIsDrawn) {
   CObservationEvents packet = twoLines();
   packet.events.clear();
   EXPECT_EQ(pointsOf(packet)->size(), 0U);
@@ -86,7 +86,7 @@ mrpt::img::CImage rendered(const CObservationEvents& packet) {
   return image;
 }
 
-TEST(EventDrawing, BrighterIsRedOnTheLeftAndDarkerBlueOnTheRightOfThePicture) {
+TEST(EventDrawing, OnEventsAreRedOnTheLeftAndOffEventsBlueOnTheRight) {
   std::optional<mrpt::img::CImage> image;
   try {
     image = rendered(twoLines());

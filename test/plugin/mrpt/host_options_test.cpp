@@ -43,7 +43,7 @@ std::string listed(const EventFusionOptions& options) {
   return list;
 }
 
-TEST(HostOptions, SectionsStandUnderThePrefixAndOthersAreTheHosts) {
+TEST(HostOptions, SectionsHaveThePrefixAndOtherSectionsAreIgnored) {
   const std::string text =
       "[dsi]\nmax_depth_m = not ours\n[camera]\nfps = x\n"
       "[front_dsi]\nmax_depth_m = 9 ; a comment\n[front_map]\nvoxel_size_m = 0.5 // another\n";
@@ -52,7 +52,7 @@ TEST(HostOptions, SectionsStandUnderThePrefixAndOthersAreTheHosts) {
   EXPECT_EQ(options.cloud.voxel_size_m, 0.5);
 }
 
-TEST(HostOptions, TheRefinementStandsUnderThePrefixToo) {
+TEST(HostOptions, TheRefinementHasThePrefixToo) {
   const EventFusionOptions options =
       optionsOf("[front_refinement]\nenabled = true\ntracker_noise_deg = 90\n", "front");
   EXPECT_TRUE(options.refinement.enabled);
@@ -69,7 +69,7 @@ TEST(HostOptions, WithoutPrefixTheSectionsHaveTheirOwnNames) {
   EXPECT_EQ(options.mapper.keyframe.planes.max_depth_m, 9);
 }
 
-TEST(HostOptions, WhatIsNotUnderstoodIsAnErrorThatNamesItsPlace) {
+TEST(HostOptions, WrongSectionsKeysAndValuesAreErrorsThatNameThem) {
   EXPECT_EQ(errorOf("[a_dsi]\nnum_planes = ten\n", "a"),
             "options, section a_dsi: num_planes = ten: must be a whole number");
   EXPECT_THAT(errorOf("[a_dsi]\nplanes = 10\n", "a"),
@@ -95,7 +95,7 @@ TEST_F(HostOptionsFile, ErrorsNameTheFile) {
   }
 }
 
-TEST_F(HostOptionsFile, PathsAreRelativeToIt) {
+TEST_F(HostOptionsFile, PathsAreRelativeToTheFile) {
   const std::string file = (folder() / "host.ini").string();
   std::ofstream(file) << "[a_rig]\ncalibration = rig/cams.yaml\n";
   OptionReader reader;
@@ -110,7 +110,7 @@ TEST_F(HostOptionsFile, AMissingFileIsAnError) {
                std::runtime_error);
 }
 
-TEST(HostOptions, OfABuilderAreKeptWhereAKeyIsNotGivenOrWrong) {
+TEST(HostOptions, ABuilderKeepsItsOptionsForMissingAndWrongKeys) {
   CEventFusionMapBuilder builder(syntheticOptions());
   builder.loadFromConfigFile(CConfigFileMemory(std::string("[a_map]\nvoxel_size_m = 0.5\n")), "a");
   EventFusionOptions expected = syntheticOptions();
@@ -123,7 +123,7 @@ TEST(HostOptions, OfABuilderAreKeptWhereAKeyIsNotGivenOrWrong) {
   EXPECT_EQ(listed(builder.usedOptions()), listed(expected));
 }
 
-TEST(HostOptions, WhatABuilderSavesReadsBackTheSame) {
+TEST(HostOptions, SavedOptionsOfABuilderReadBackTheSame) {
   for (const std::string prefix : {"", "front"}) {
     CConfigFileMemory file;
     CEventFusionMapBuilder(syntheticOptions()).saveToConfigFile(file, prefix);
@@ -133,7 +133,7 @@ TEST(HostOptions, WhatABuilderSavesReadsBackTheSame) {
   }
 }
 
-TEST(HostOptions, ABuilderDumpsAllOfThem) {
+TEST(HostOptions, ABuilderDumpsAllOptions) {
   std::ostringstream text;
   CEventFusionMapBuilder(syntheticOptions()).dumpToTextStream(text);
   for (const NamedOption& option : listOptions(syntheticOptions())) {

@@ -45,7 +45,7 @@ RC_GTEST_PROP(MrptTime, IsExactForWholeTicksAndAtMostHalfATickAwayOtherwise, ())
   RC_ASSERT(nanosecondsFrom(mrptTimeFrom(back_ns)) == back_ns);
 }
 
-TEST(MrptTime, OneThatIsMissingOrBeyondTheRangeIsAnError) {
+TEST(MrptTime, AMissingTimeAndATimeOutOfRangeAreErrors) {
   EXPECT_THROW(nanosecondsFrom(INVALID_TIMESTAMP), std::invalid_argument);
   const auto now = mrptTimeFrom(1'700'000'000'000'000'000);
   const std::chrono::hours three_hundred_years(300 * 365 * 24);
@@ -79,7 +79,7 @@ Rigid3 randomPose(std::mt19937& random, double from_vertical) {
 
 class MrptPose : public testing::TestWithParam<double> {};
 
-TEST_P(MrptPose, IsTheSameThereAndBackAndThroughAnArchive) {
+TEST_P(MrptPose, IsTheSameAfterARoundTripAndAfterAnArchive) {
   std::mt19937 random(1);
   for (int i = 0; i < 1000; ++i) {
     const Rigid3 T_a_b = randomPose(random, GetParam());
@@ -105,7 +105,7 @@ INSTANTIATE_TEST_SUITE_P(FromVertical, MrptPose, testing::Values(0, 1e-3, 1e-6, 
                                             std::to_string(std::lround(-std::log10(at.param)));
                          });
 
-TEST(MrptPoseOf, APointGoesWhereOursSendsIt) {
+TEST(MrptPoseOf, TransformsAPointAsOurPoseDoes) {
   Rigid3 T_a_b;
   T_a_b.translation = {1, 2, 3};
   T_a_b.rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, -1).normalized());

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "maps/cloud/cloud_point.h"
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
@@ -24,7 +25,7 @@ inline CObservationEvents::Ptr packetObservation(const SyntheticRecording& recor
   return packet;
 }
 
-/// The recording as a rawlog has it: packets of 10 ms of each camera, then the pose at their end.
+/// The recording as in a rawlog: packets of 10 ms of each camera, then the pose at their end.
 inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(
     const SyntheticRecording& recording) {
   std::vector<mrpt::obs::CObservation::Ptr> observations;
@@ -58,7 +59,18 @@ inline void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<C
   }
 }
 
-/// A packet of camera 0 after the recording's end, with an event beside the sensor.
+inline void feed(CEventFusionMapBuilder& builder,
+                 const std::vector<mrpt::obs::CObservation::Ptr>& observations) {
+  for (const auto& observation : observations) builder.processObservation(observation);
+}
+/// Feeds a whole recording.
+inline void play(CEventFusionMapBuilder& builder,
+                 const std::vector<mrpt::obs::CObservation::Ptr>& observations) {
+  feed(builder, observations);
+  builder.finish();
+}
+
+/// A packet of camera 0 after the recording's end, with an event outside the sensor.
 inline CObservationEvents::Ptr packetOutsideTheSensor(const SyntheticRecording& recording) {
   auto packet = packetObservation(recording, 0);
   const std::int64_t t_ns = recording.poses.back().t_ns + 1;

@@ -32,10 +32,6 @@ Observations shakenObservations(double duration_s = 1.3) {
   return observationsOf(shaken(SyntheticRecording(duration_s)));
 }
 
-void feed(CEventFusionMapBuilder& builder, const Observations& observations) {
-  for (const auto& observation : observations) builder.processObservation(observation);
-}
-
 void expectSamePoses(const std::vector<StampedPose>& a, const std::vector<StampedPose>& b) {
   ASSERT_EQ(a.size(), b.size());
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -73,7 +69,7 @@ void expectToAgree(CEventFusionMapBuilder& builder, bool points_first) {
   expectSameBits(metric->mapByClass<CEventFusionMap>()->cloud().points(), points);
 }
 
-TEST(RefinedBuilder, AllThatItIsAskedForAgreesAtAnyTime) {
+TEST(RefinedBuilder, AllQueriesAgreeAtAnyTime) {
   const Observations observations = shakenObservations();
   CEventFusionMapBuilder builder(optionsOf(false));
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -85,7 +81,7 @@ TEST(RefinedBuilder, AllThatItIsAskedForAgreesAtAnyTime) {
   EXPECT_GE(builder.trajectory().size(), 10U);
 }
 
-TEST(RefinedBuilder, AllThatItIsAskedForAgreesWithinATaker) {
+TEST(RefinedBuilder, AllQueriesAgreeWithinACallback) {
   CEventFusionMapBuilder builder(optionsOf(false));
   std::size_t taken = 0;
   builder.setKeyframeCallback([&](const KeyframeDepthMap& keyframe) {
@@ -94,16 +90,14 @@ TEST(RefinedBuilder, AllThatItIsAskedForAgreesWithinATaker) {
     EXPECT_EQ(newest.t_ns, keyframe.window.t_ref_ns);
     EXPECT_TRUE(isSame(newest.T_world_rig, keyframe.T_world_ref));
   });
-  feed(builder, shakenObservations());
-  builder.finish();
+  play(builder, shakenObservations());
   EXPECT_GE(taken, 10U);
 }
 
-TEST(RefinedBuilder, ToBeAskedDoesNotChangeTheMap) {
+TEST(RefinedBuilder, QueriesDoNotChangeTheMap) {
   const Observations observations = shakenObservations();
   CEventFusionMapBuilder undisturbed(optionsOf(false));
-  feed(undisturbed, observations);
-  undisturbed.finish();
+  play(undisturbed, observations);
   CEventFusionMapBuilder asked(optionsOf(false));
   for (const auto& observation : observations) {
     asked.processObservation(observation);
@@ -116,11 +110,10 @@ TEST(RefinedBuilder, ToBeAskedDoesNotChangeTheMap) {
   expectSameBits(asked.points(), undisturbed.points());
 }
 
-TEST(RefinedBuilder, AfterItsEndNothingChangesAnyMore) {
+TEST(RefinedBuilder, NothingChangesAfterTheEnd) {
   for (const bool background : {false, true}) {
     CEventFusionMapBuilder builder(optionsOf(background));
-    feed(builder, shakenObservations());
-    builder.finish();
+    play(builder, shakenObservations());
     const auto points = builder.points();
     const auto trajectory = builder.trajectory();
     EXPECT_THROW(builder.finish(), std::logic_error);
@@ -133,8 +126,7 @@ TEST(RefinedBuilder, AfterItsEndNothingChangesAnyMore) {
 TEST(RefinedBuilder, KeyframesOfAnEarlierMapStayAndAllAgree) {
   const Observations observations = shakenObservations(0.9);
   CEventFusionMapBuilder first(optionsOf(false));
-  feed(first, observations);
-  first.finish();
+  play(first, observations);
   mrpt::maps::CSimpleMap earlier;
   first.getCurrentlyBuiltMap(earlier);
   const std::size_t count = earlier.size();
@@ -164,8 +156,7 @@ TEST(RefinedBuilder, WithoutRefinementBothTrajectoriesAreTheTrackers) {
   EventFusionOptions options = optionsOf(false);
   options.refinement.enabled = false;
   CEventFusionMapBuilder builder(options);
-  feed(builder, shakenObservations(0.9));
-  builder.finish();
+  play(builder, shakenObservations(0.9));
   expectSamePoses(builder.trajectory(), builder.trackerTrajectory());
 }
 
@@ -178,7 +169,7 @@ mrpt::poses::CPose3DPDFGaussian estimateOf(const CEventFusionMapBuilder& builder
   return *estimate;
 }
 
-TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersCorrected) {
+TEST(RefinedBuilder, TheCurrentPoseIsTheTrackersCorrected) {
   const SyntheticRecording recording = shaken(SyntheticRecording(1.3));
   CEventFusionMapBuilder builder(optionsOf(false));
   EXPECT_TRUE(isSame(rigidFrom(estimateOf(builder).mean), Rigid3{}));
@@ -202,7 +193,7 @@ TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersCorrected) {
   EXPECT_GT(builder.status().refinement->T_world_odom.translation.norm(), 1e-4);
 }
 
-TEST(RefinedBuilder, ThePoseOfNowIsTheTrackersWithoutRefinement) {
+TEST(RefinedBuilder, TheCurrentPoseIsTheTrackersWithoutRefinement) {
   EventFusionOptions options = optionsOf(false);
   options.refinement.enabled = false;
   CEventFusionMapBuilder builder(options);
@@ -252,7 +243,7 @@ mrpt::math::CMatrixDouble66 covarianceOf(double sigma_m, double sigma_rad) {
   return covariance;
 }
 
-TEST(RefinedBuilder, CovariancesOfPosesSayWhichKeyframesMayMove) {
+TEST(RefinedBuilder, CovariancesOfPosesLimitTheMotionOfKeyframes) {
   const auto motions = motionsWith(covarianceOf(1e-4, 1e-5), covarianceOf(0.05, 0.02));
   double certain_m = 0;
   double noisy_m = 0;
@@ -260,7 +251,7 @@ TEST(RefinedBuilder, CovariancesOfPosesSayWhichKeyframesMayMove) {
   EXPECT_LT(certain_m, 0.2 * noisy_m);
 }
 
-TEST(RefinedBuilder, CovariancesThatAreNoneDoNotCount) {
+TEST(RefinedBuilder, InvalidCovariancesAreIgnored) {
   const auto without = motionsWith(covarianceOf(0, 0), covarianceOf(0, 0));
   auto not_a_number = covarianceOf(1, 1);
   not_a_number(4, 4) = std::numeric_limits<double>::quiet_NaN();
@@ -273,11 +264,10 @@ TEST(RefinedBuilder, CovariancesThatAreNoneDoNotCount) {
   }
 }
 
-TEST(RefinedBuilder, APoseThatIsNotFiniteIsRefusedByNameAndTheRestMapped) {
+TEST(RefinedBuilder, APoseThatIsNotFiniteIsAnErrorAndTheRestIsMapped) {
   const Observations observations = shakenObservations(0.9);
   CEventFusionMapBuilder expected(optionsOf(false));
-  feed(expected, observations);
-  expected.finish();
+  play(expected, observations);
   CEventFusionMapBuilder builder(optionsOf(false));
   for (std::size_t i = 0; i < observations.size(); ++i) {
     builder.processObservation(observations[i]);
@@ -302,8 +292,7 @@ TEST(RefinedBuilder, APoseThatIsNotFiniteIsRefusedByNameAndTheRestMapped) {
 TEST(RefinedBuilder, InTheBackgroundEndsInTheSameMap) {
   const Observations observations = shakenObservations();
   CEventFusionMapBuilder played(optionsOf(false));
-  feed(played, observations);
-  played.finish();
+  play(played, observations);
   CEventFusionMapBuilder live(optionsOf(true));
   for (std::size_t i = 0; i < observations.size(); ++i) {
     live.processObservation(observations[i]);
@@ -356,53 +345,59 @@ void askWhileItMaps(bool background) {
       builder.getCurrentlyBuiltMetricMap();
     }
   });
-  feed(builder, observations);
-  builder.finish();
+  play(builder, observations);
   done = true;
   for (std::thread& asker : askers) asker.join();
 
   expectToAgree(builder, true);
   CEventFusionMapBuilder alone(optionsOf(false));
-  feed(alone, observations);
-  alone.finish();
+  play(alone, observations);
   expectSamePoses(builder.trajectory(), alone.trajectory());
   expectSameBits(builder.points(), alone.points());
 }
 
-TEST(RefinedBuilder, MayBeAskedFromOtherThreadsWhileItMaps) { askWhileItMaps(false); }
-TEST(RefinedBuilder, MayBeAskedFromOtherThreadsWhileItRefinesInTheBackground) {
-  askWhileItMaps(true);
-}
+TEST(RefinedBuilder, OtherThreadsMayQueryWhileItMaps) { askWhileItMaps(false); }
+TEST(RefinedBuilder, OtherThreadsMayQueryWhileItRefinesInTheBackground) { askWhileItMaps(true); }
 
-TEST(RefinedBuilder, SeveralThreadsMayFeedWhileItRefinesInTheBackground) {
-  // No thread is ahead of the other by more than what the mapper waits for.
+TEST(RefinedBuilder, SeveralThreadsMayFeedWithAndWithoutRefinement) {
+  // Poses before all and a packet of each camera, then a thread per camera. No thread is ahead of
+  // the other by more than the mapper waits.
   const Observations observations = shakenObservations(0.9);
-  CEventFusionMapBuilder builder(optionsOf(true));
-  Observations packets;
-  for (const auto& observation : observations) {
-    if (IS_CLASS(*observation, CObservationRobotPose)) {
-      builder.processObservation(observation);
-    } else {
-      packets.push_back(observation);
-    }
-  }
-  for (std::size_t i = 0; i < 2; ++i) builder.processObservation(packets[i]);
-  packets.erase(packets.begin(), packets.begin() + 2);
-  std::vector<std::thread> feeders;
-  for (const std::string camera : {"cam0", "cam1"}) {
-    feeders.emplace_back([&, camera] {
-      for (const auto& packet : packets) {
-        if (packet->sensorLabel == camera) builder.processObservation(packet);
+  for (const bool refined : {false, true}) {
+    EventFusionOptions options = optionsOf(true);
+    options.refinement.enabled = refined;
+    CEventFusionMapBuilder builder(options);
+    std::atomic<std::size_t> delivered = 0;
+    builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++delivered; });
+    Observations packets;
+    for (const auto& observation : observations) {
+      if (IS_CLASS(*observation, CObservationRobotPose)) {
+        builder.processObservation(observation);
+      } else {
+        packets.push_back(observation);
       }
-    });
+    }
+    for (std::size_t i = 0; i < 2; ++i) builder.processObservation(packets[i]);
+    packets.erase(packets.begin(), packets.begin() + 2);
+    std::vector<std::thread> feeders;
+    for (const std::string camera : {"cam0", "cam1"}) {
+      feeders.emplace_back([&, camera] {
+        for (const auto& packet : packets) {
+          if (packet->sensorLabel != camera) continue;
+          builder.processObservation(packet);
+          builder.getCurrentlyBuiltMapSize();
+        }
+      });
+    }
+    for (std::thread& feeder : feeders) feeder.join();
+    builder.finish();
+    EXPECT_EQ(delivered, builder.getCurrentlyBuiltMapSize());
+    options.refinement.background = false;
+    CEventFusionMapBuilder alone(options);
+    play(alone, observations);
+    expectSamePoses(builder.trajectory(), alone.trajectory());
+    expectSameBits(builder.points(), alone.points());
   }
-  for (std::thread& feeder : feeders) feeder.join();
-  builder.finish();
-  CEventFusionMapBuilder alone(optionsOf(false));
-  feed(alone, observations);
-  alone.finish();
-  expectSamePoses(builder.trajectory(), alone.trajectory());
-  expectSameBits(builder.points(), alone.points());
 }
 
 }  // namespace

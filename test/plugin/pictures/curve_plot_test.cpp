@@ -34,7 +34,7 @@ cv::Rect boundsOf(const cv::Mat3b& picture, const cv::Vec3b& colour) {
   return bounds;
 }
 
-TEST(CurvePlot, PutsAPointWhereItsValuesAreOnTheAxes) {
+TEST(CurvePlot, DrawsAPointAtItsValuesOnTheAxes) {
   const auto place = [](const cv::Point2d& point) {
     const cv::Rect dot = boundsOf(drawCurves(plotOf({"", {point}, CurveStyle::kDots, kRed})), kRed);
     return cv::Point2d(dot.x + 0.5 * dot.width, dot.y + 0.5 * dot.height);
@@ -60,7 +60,7 @@ TEST(CurvePlot, ANanInterruptsTheLine) {
   EXPECT_NE(inTheMiddle(std::nan("")), kRed);
 }
 
-TEST(CurvePlot, CutsOffWhatLiesBeyondTheAxes) {
+TEST(CurvePlot, CutsCurvesAtTheAxes) {
   const cv::Mat3b inside = drawCurves(plotOf({"", {{0, 0}, {1, 1}}, CurveStyle::kLine, kRed}));
   const cv::Mat3b beyond = drawCurves(plotOf({"", {{-5, -5}, {5, 5}}, CurveStyle::kLine, kRed}));
   const cv::Rect area = boundsOf(inside, kRed);
@@ -70,7 +70,7 @@ TEST(CurvePlot, CutsOffWhatLiesBeyondTheAxes) {
   EXPECT_NO_THROW(drawCurves(plotOf({"", {{0, INFINITY}, {1, 1e300}}, CurveStyle::kLine, kRed})));
 }
 
-TEST(CurvePlot, ALegendStandsWhereItHidesNoCurve) {
+TEST(CurvePlot, ALegendHidesNoCurve) {
   // A curve through the upper right corner, where legends are put first.
   Curve curve = {
       "a curve", {{0.6, 0.9}, {0.8, 0.9}, {0.95, 0.9}, {0.95, 0.6}}, CurveStyle::kMarkedLine, kRed};
@@ -94,12 +94,12 @@ TEST(CurvePlot, EqualUnitsShowASquareAsASquare) {
   EXPECT_NEAR(square.width, square.height, 2);
 }
 
-TEST(CurvePlot, OfNothingIsAnEmptyFrame) {
+TEST(CurvePlot, WithoutCurvesIsAnEmptyFrame) {
   const cv::Mat3b picture = drawCurves({});
   EXPECT_EQ(picture.size(), cv::Size(640, 480));
 }
 
-TEST(CurvePlot, WhatCannotBeDrawnIsAnErrorThatNamesIt) {
+TEST(CurvePlot, AWrongPlotIsAnErrorThatNamesIt) {
   const auto errorOf = [](const CurvePlot& plot) -> std::string {
     try {
       drawCurves(plot);
@@ -120,7 +120,7 @@ TEST(CurvePlot, WhatCannotBeDrawnIsAnErrorThatNamesIt) {
   EXPECT_THAT(errorOf(plot), HasSubstr("100x100 pixels"));
 }
 
-TEST(CurvePlot, ColoursAreToldApart) {
+TEST(CurvePlot, ColoursAreDistinct) {
   for (std::size_t a = 0; a < 7; ++a) {
     for (std::size_t b = 0; b < a; ++b) EXPECT_GT(cv::norm(curveColour(a), curveColour(b)), 60);
   }

@@ -25,7 +25,7 @@ TEST(PlotAxis, TicksAreRoundNumbers) {
   EXPECT_THAT(textsOf({12.3, 12.9}, 4), ElementsAre("12.4", "12.6", "12.8"));
 }
 
-TEST(PlotAxis, LogarithmicTicksArePowersOfTenAndWhatLiesBetweenWhereTheyAreFew) {
+TEST(PlotAxis, LogarithmicTicksArePowersOfTenAndValuesBetweenThem) {
   EXPECT_THAT(textsOf({0.01, 1, AxisScale::kLogarithmic}, 7),
               ElementsAre("0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"));
   EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 7),
@@ -46,7 +46,7 @@ TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengths) {
   EXPECT_TRUE(std::isnan(range.fractionAlong(-1)));
 }
 
-TEST(PlotAxis, OfNothingOrOfOneValueIsStillARange) {
+TEST(PlotAxis, HasARangeForNoValueAndForOneValue) {
   for (const AxisScale scale : {AxisScale::kLinear, AxisScale::kLogarithmic}) {
     for (const std::vector<double>& values :
          {std::vector<double>{}, std::vector<double>{5}, std::vector<double>{1e300, 1e300},
@@ -57,7 +57,7 @@ TEST(PlotAxis, OfNothingOrOfOneValueIsStillARange) {
   }
 }
 
-RC_GTEST_PROP(PlotAxis, HoldsAllValuesAndItsTicksLieInside, ()) {
+RC_GTEST_PROP(PlotAxis, ContainsAllValuesAndItsTicks, ()) {
   const auto drawn = *rc::gen::nonEmpty<std::vector<int>>();
   const double unit = std::pow(10.0, *rc::gen::inRange(-12, 12));
   std::vector<double> values;
