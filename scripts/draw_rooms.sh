@@ -17,6 +17,7 @@ graph() {
         if (folder == "") { if (from[1] != to[1]) arrow[from[1] " -> " to[1]] = 1 }
         else if (from[1] == folder) {
           name[from[2]] = 1
+          if (to[1] == folder) name[to[2]] = 1
           if (to[1] == folder && to[2] != from[2])
             arrow["\"" folder "/" from[2] "\" -> \"" folder "/" to[2] "\""] = 1
         }
