@@ -18,29 +18,29 @@ namespace {
 using mrpt::obs::CObservation;
 using mrpt::obs::CObservationRobotPose;
 
-/// Returns the poses that it was fed.
-class FedPoses : public PoseSource {
- public:
-  void feed(const StampedPose& pose) { poses_.push_back(pose); }
-  void end() { no_more_ = true; }
-
-  std::optional<StampedPose> next() override {
-    if (poses_.empty()) return std::nullopt;
-    const StampedPose pose = poses_.front();
-    poses_.pop_front();
-    return pose;
-  }
-  bool ended() const override { return no_more_ && poses_.empty(); }
-
- private:
-  std::deque<StampedPose> poses_;
-  bool no_more_ = false;
-};
-
 }  // namespace
 
 /// Applies the faults to the poses of one source.
 class PerturbedRecording::Tracker {
+  /// Returns the poses that it was fed.
+  class FedPoses : public PoseSource {
+   public:
+    void feed(const StampedPose& pose) { poses_.push_back(pose); }
+    void end() { no_more_ = true; }
+
+    std::optional<StampedPose> next() override {
+      if (poses_.empty()) return std::nullopt;
+      const StampedPose pose = poses_.front();
+      poses_.pop_front();
+      return pose;
+    }
+    bool ended() const override { return no_more_ && poses_.empty(); }
+
+   private:
+    std::deque<StampedPose> poses_;
+    bool no_more_ = false;
+  };
+
  public:
   struct Output {
     CObservationRobotPose::Ptr pose;
