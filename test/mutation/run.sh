@@ -13,14 +13,12 @@ log="$tree/build/mutation.log"
 at_least=""
 seconds=600
 list=false
-unity=ON
 chosen=()
 while (($# > 0)); do
   case $1 in
     --at-least) at_least=$2; shift 2 ;;
     --timeout) seconds=$2; shift 2 ;;
     --list) list=true; shift ;;
-    --unity) unity=$2; shift 2 ;;
     -*) echo "run.sh: unknown option $1" >&2; exit 2 ;;
     *) chosen+=("$1"); shift ;;
   esac
@@ -114,7 +112,7 @@ if $list; then
   exit 0
 fi
 copy_tree
-cmake --preset release -S "$tree" -DCMAKE_UNITY_BUILD="$unity" \
+cmake --preset release -S "$tree" \
   -DEFM_SHARED_DATA="${EFM_SHARED_DATA:-$root/../shared/data}" >"$log" 2>&1 ||
   { cat "$log" >&2; exit 2; }
 
