@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `event-fusion evaluate` as a user runs it, on what `map` and `depth` wrote.
+// `event-fusion evaluate` on results of `map` and `depth`.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Options of `event-fusion map` and `depth` that change what is written, as a user sets them.
+// Options of `event-fusion map` and `depth` that change the output.
 
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>

@@ -27,7 +27,7 @@ class RefinementOption : public AppTest {
   }
 };
 
-/// Root mean square of the distances of neighbours from what they truly are.
+/// Root mean square of the relative errors between neighbours.
 double relativeError(const std::vector<StampedPose>& poses, const std::vector<StampedPose>& truth) {
   std::vector<PosePair> pairs;
   EXPECT_EQ(poses.size(), truth.size());

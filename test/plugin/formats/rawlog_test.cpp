@@ -31,7 +31,7 @@ using testing::Not;
 using testing::StartsWith;
 using Observations = std::vector<CObservation::Ptr>;
 
-/// What came, and the error that ended it, if one did.
+/// The observations of a recording and its error, if there is one.
 struct Delivery {
   Observations observations;
   std::string error;
@@ -67,7 +67,7 @@ std::string contentOf(const std::filesystem::path& path) {
   return std::string(std::istreambuf_iterator<char>(file), {});
 }
 
-/// One line for a user, without what MRPT puts around it for programmers.
+/// One line without MRPT's decoration.
 testing::Matcher<std::string> isPlain() {
   return AllOf(Not(HasSubstr("xception")), Not(HasSubstr("Location")), Not(HasSubstr("Message")),
                Not(HasSubstr("\n")), Not(EndsWith("unreadable")));
@@ -89,7 +89,7 @@ class Rawlog : public TemporaryFolder {
     std::ofstream(file(), std::ios::binary | std::ios::trunc) << bytes;
   }
 
-  /// What is stored, without the compression.
+  /// The uncompressed content.
   std::string plainContent() const {
     GzInputStream stream(file());
     std::string plain;

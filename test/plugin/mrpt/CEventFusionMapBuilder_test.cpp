@@ -64,7 +64,8 @@ TEST(CEventFusionMapBuilder, KeyframesAreDeliveredOnceAndInOrder) {
   std::vector<std::int64_t> times;
   builder.setKeyframeCallback([&](const KeyframeDepthMap& keyframe) {
     times.push_back(keyframe.window.t_ref_ns);
-    EXPECT_GE(builder.status().counts.keyframes, times.size()) << "the callback may use the builder";
+    EXPECT_GE(builder.status().counts.keyframes, times.size())
+        << "the callback may use the builder";
   });
   play(builder, observationsOf(SyntheticRecording()));
 
@@ -88,10 +89,7 @@ TEST(CEventFusionMapBuilder, ThePoseOfTheSensorOnTheRigIsRemoved) {
   const auto expected = mapOf(observationsOf(recording));
   const auto points = mapOf(observations);
 
-  ASSERT_EQ(points.size(), expected.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-6);
-  }
+  expectNear(points, expected, 1e-6);
 }
 
 TEST(CEventFusionMapBuilder, OtherObservationsAreCountedAndIgnored) {
@@ -185,9 +183,9 @@ TEST(CEventFusionMapBuilder, ANullObservationIsAnError) {
   EXPECT_EQ(builder.ignoredObservations(), 0U);
 }
 
-// --- What stays where mapping fails ------------------------------------------------------------
+// --- Failures of mapping -----------------------------------------------------------------------
 
-/// Takes the planes of so many keyframes.
+/// Takes the planes of a number of keyframes, then fails.
 class FullDisk : public DsiSink {
  public:
   explicit FullDisk(int keyframes)
@@ -211,7 +209,7 @@ TEST(CEventFusionMapBuilder, KeyframesBeforeAFailureStayAndAreDelivered) {
   EXPECT_THROW(builder.finish(), std::runtime_error);
 
   EXPECT_EQ(delivered, 2U);
-  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U) << "the error was said: now the map is asked";
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U) << "a query after the error";
   EXPECT_EQ(builder.status().counts.keyframes, 2U);
   const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
   expectSameBits(event_map->cloud().points(), builder.points());
@@ -327,19 +325,19 @@ class QueryingSink : public DsiSink {
 TEST(CEventFusionMapBuilder, NoQueryIsAnsweredWhileAKeyframeIsMade) {
   CEventFusionMapBuilder builder(syntheticOptions());
   QueryingSink sink({{"status", [&] { builder.status(); }},
-                   {"points", [&] { builder.points(); }},
-                   {"trajectory", [&] { builder.trajectory(); }},
-                   {"trackerTrajectory", [&] { builder.trackerTrajectory(); }},
-                   {"usedOptions", [&] { builder.usedOptions(); }},
-                   {"ignoredObservations", [&] { builder.ignoredObservations(); }},
-                   {"getCurrentPoseEstimation", [&] { builder.getCurrentPoseEstimation(); }},
-                   {"getCurrentlyBuiltMapSize", [&] { builder.getCurrentlyBuiltMapSize(); }}});
+                     {"points", [&] { builder.points(); }},
+                     {"trajectory", [&] { builder.trajectory(); }},
+                     {"trackerTrajectory", [&] { builder.trackerTrajectory(); }},
+                     {"usedOptions", [&] { builder.usedOptions(); }},
+                     {"ignoredObservations", [&] { builder.ignoredObservations(); }},
+                     {"getCurrentPoseEstimation", [&] { builder.getCurrentPoseEstimation(); }},
+                     {"getCurrentlyBuiltMapSize", [&] { builder.getCurrentlyBuiltMapSize(); }}});
   builder.setDsiSink(&sink);
   play(builder, observationsOf(SyntheticRecording()));
   EXPECT_THAT(sink.answered_in_between, testing::IsEmpty()) << "without the lock";
 }
 
-// --- Asked by a program that cannot finish it --------------------------------------------------
+// --- Queries without finish --------------------------------------------------------------------
 
 TEST(CEventFusionMapBuilder, AQueryMapsTheCoveredWindowsOfAShortRecording) {
   const auto observations = observationsOf(SyntheticRecording());
@@ -347,7 +345,7 @@ TEST(CEventFusionMapBuilder, AQueryMapsTheCoveredWindowsOfAShortRecording) {
   std::size_t delivered = 0;
   builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++delivered; });
   feed(builder, observations);
-  EXPECT_TRUE(builder.points().empty()) << "half a second, and nobody asked";
+  EXPECT_TRUE(builder.points().empty()) << "half a second, without a query";
 
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
 
@@ -446,7 +444,7 @@ TEST(CEventFusionMapBuilder, AQueryBeforeAnyObservationReturnsAnEmptyMap) {
 
 // --- Keyframes and their clouds ----------------------------------------------------------------
 
-/// The map of a whole recording, and what the builder stores of it.
+/// The map of a whole recording: its points and its simplemap.
 struct StoredMap {
   explicit StoredMap(const std::vector<CObservation::Ptr>& observations,
                      const EventFusionOptions& options = syntheticOptions()) {
@@ -505,11 +503,7 @@ TEST(CEventFusionMapBuilder, ContinuesAnEarlierMap) {
   }
   const auto points = builder.points();
   const auto expected = both.points();
-  ASSERT_EQ(points.size(), expected.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-9);
-    EXPECT_EQ(points[i].support, expected[i].support);
-  }
+  expectNear(points, expected, 1e-9);
   const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
   expectSameBits(event_map->cloud().points(), points);
   builder.clear();

@@ -254,11 +254,7 @@ TEST(CEventFusionMap, IsFilledFromASimplemap) {
 
   const auto points = map.cloud().points();
   const auto expected = mapOf(3).cloud().points();
-  ASSERT_EQ(points.size(), expected.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-12);
-    EXPECT_EQ(points[i].support, expected[i].support);
-  }
+  expectNear(points, expected, 1e-12);
 }
 
 TEST(CEventFusionMap, IsDrawnWithAPointForEachOfItsPoints) {

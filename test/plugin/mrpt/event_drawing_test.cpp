@@ -71,7 +71,7 @@ TEST(EventDrawing, OfAnEmptyPacketTheCameraIsDrawn) {
   EXPECT_GE(packet.getVisualization()->getByClass<CSetOfObjects>()->size(), 3U);
 }
 
-/// The scene from the camera's own place, looking along its axis.
+/// The scene as the camera sees it.
 mrpt::img::CImage rendered(const CObservationEvents& packet) {
   mrpt::opengl::COpenGLScene scene;
   scene.insert(packet.getVisualization());

@@ -62,8 +62,9 @@ double angleBetween(const Rigid3& a, const Rigid3& b) {
   return 2 * (a.rotation.conjugate() * b.rotation).vec().norm();
 }
 
-/// Random rotations, or such with a pitch that is `from_vertical` times a normal number off 90
-/// degrees, where MRPT's angles are singular.
+/// A random pose.
+/// @param from_vertical if not 0, the standard deviation of the pitch from 90 degrees, where MRPT's
+/// angles are singular.
 Rigid3 randomPose(std::mt19937& random, double from_vertical) {
   std::normal_distribution<double> normal;
   const auto draw = [&] { return normal(random); };

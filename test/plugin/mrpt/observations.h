@@ -59,6 +59,16 @@ inline void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<C
   }
 }
 
+/// The same points up to a distance, with the same support.
+inline void expectNear(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b,
+                       double tolerance_m) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    EXPECT_LT((a[i].p_world - b[i].p_world).norm(), tolerance_m);
+    EXPECT_EQ(a[i].support, b[i].support);
+  }
+}
+
 inline void feed(CEventFusionMapBuilder& builder,
                  const std::vector<mrpt::obs::CObservation::Ptr>& observations) {
   for (const auto& observation : observations) builder.processObservation(observation);

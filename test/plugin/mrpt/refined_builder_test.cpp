@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The map builder where poses are refined.
+// The map builder with refinement of poses.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -40,9 +40,8 @@ void expectSamePoses(const std::vector<StampedPose>& a, const std::vector<Stampe
   }
 }
 
-/// All that can be asked of a builder's map once what is due is mapped, in two orders: asking
-/// changes nothing.
-void expectToAgree(CEventFusionMapBuilder& builder, bool points_first) {
+/// Compares the results of all queries, in two orders.
+void expectQueriesToAgree(CEventFusionMapBuilder& builder, bool points_first) {
   builder.getCurrentlyBuiltMapSize();
   std::vector<CloudPoint> points;
   if (points_first) points = builder.points();
@@ -60,7 +59,7 @@ void expectToAgree(CEventFusionMapBuilder& builder, bool points_first) {
     const Rigid3& T_world_ref = trajectory[number].T_world_rig;
     EXPECT_EQ(keyframe.T_world_ref.translation, T_world_ref.translation);
     EXPECT_LT(keyframe.T_world_ref.rotation.angularDistance(T_world_ref.rotation), 1e-14);
-    // The simplemap's angles may round: the cloud is held against the exact pose.
+    // The simplemap's angles may round: the cloud is compared at the exact pose.
     const auto view_points = viewPointsOf(*keyframe.points);
     cloud.insert(number++, pointsInWorld(view_points, T_world_ref), T_world_ref);
   }
@@ -74,10 +73,10 @@ TEST(RefinedBuilder, AllQueriesAgreeAtAnyTime) {
   CEventFusionMapBuilder builder(optionsOf(false));
   for (std::size_t i = 0; i < observations.size(); ++i) {
     builder.processObservation(observations[i]);
-    if (i % 23 == 7) expectToAgree(builder, i % 2 == 0);
+    if (i % 23 == 7) expectQueriesToAgree(builder, i % 2 == 0);
   }
   builder.finish();
-  expectToAgree(builder, true);
+  expectQueriesToAgree(builder, true);
   EXPECT_GE(builder.trajectory().size(), 10U);
 }
 
@@ -85,7 +84,7 @@ TEST(RefinedBuilder, AllQueriesAgreeWithinACallback) {
   CEventFusionMapBuilder builder(optionsOf(false));
   std::size_t taken = 0;
   builder.setKeyframeCallback([&](const KeyframeDepthMap& keyframe) {
-    expectToAgree(builder, taken++ % 2 == 0);
+    expectQueriesToAgree(builder, taken++ % 2 == 0);
     const StampedPose newest = builder.trajectory().back();
     EXPECT_EQ(newest.t_ns, keyframe.window.t_ref_ns);
     EXPECT_TRUE(isSame(newest.T_world_rig, keyframe.T_world_ref));
@@ -117,7 +116,7 @@ TEST(RefinedBuilder, NothingChangesAfterTheEnd) {
     const auto points = builder.points();
     const auto trajectory = builder.trajectory();
     EXPECT_THROW(builder.finish(), std::logic_error);
-    expectToAgree(builder, false);
+    expectQueriesToAgree(builder, false);
     expectSameBits(builder.points(), points);
     expectSamePoses(builder.trajectory(), trajectory);
   }
@@ -137,10 +136,10 @@ TEST(RefinedBuilder, KeyframesOfAnEarlierMapStayAndAllAgree) {
   ASSERT_EQ(before.size(), count);
   for (std::size_t i = 0; i < observations.size(); ++i) {
     builder.processObservation(observations[i]);
-    if (i % 41 == 0) expectToAgree(builder, i % 2 == 0);
+    if (i % 41 == 0) expectQueriesToAgree(builder, i % 2 == 0);
   }
   builder.finish();
-  expectToAgree(builder, true);
+  expectQueriesToAgree(builder, true);
   const auto trajectory = builder.trajectory();
   const auto tracker = builder.trackerTrajectory();
   ASSERT_EQ(trajectory.size(), 2 * count);
@@ -160,7 +159,7 @@ TEST(RefinedBuilder, WithoutRefinementBothTrajectoriesAreTheTrackers) {
   expectSamePoses(builder.trajectory(), builder.trackerTrajectory());
 }
 
-// --- The pose of now ---------------------------------------------------------------------------
+// --- The current pose --------------------------------------------------------------------------
 
 mrpt::poses::CPose3DPDFGaussian estimateOf(const CEventFusionMapBuilder& builder) {
   const auto estimate = std::dynamic_pointer_cast<mrpt::poses::CPose3DPDFGaussian>(
@@ -204,9 +203,10 @@ TEST(RefinedBuilder, TheCurrentPoseIsTheTrackersWithoutRefinement) {
   EXPECT_EQ(estimate.cov.asEigen().cwiseAbs().maxCoeff(), 0);
 }
 
-// --- What pose observations say of their noise -------------------------------------------------
+// --- Covariances of pose observations ----------------------------------------------------------
 
-/// How far each keyframe moved where the poses of each other window state a covariance.
+/// The distances between tracker and refined poses. Poses of even and odd windows have different
+/// covariances.
 std::vector<double> motionsWith(const mrpt::math::CMatrixDouble66& even,
                                 const mrpt::math::CMatrixDouble66& odd) {
   EventFusionOptions options = optionsOf(false);
@@ -300,7 +300,7 @@ TEST(RefinedBuilder, InTheBackgroundEndsInTheSameMap) {
   }
   live.finish();
   EXPECT_EQ(live.status().refinement->waiting, 0U);
-  expectToAgree(live, true);
+  expectQueriesToAgree(live, true);
   expectSamePoses(live.trajectory(), played.trajectory());
   expectSameBits(live.points(), played.points());
 }
@@ -316,13 +316,13 @@ TEST(RefinedBuilder, InTheBackgroundMayEndOrStartOverWhileKeyframesWait) {
   }
 }
 
-/// While one thread feeds, others ask for everything: no crash, and what each gets is whole.
-void askWhileItMaps(bool background) {
+/// One thread feeds while others query: every result must be complete.
+void queryWhileItMaps(bool background) {
   const Observations observations = shakenObservations();
   CEventFusionMapBuilder builder(optionsOf(background));
   std::atomic<bool> done = false;
-  std::vector<std::thread> askers;
-  askers.emplace_back([&] {
+  std::vector<std::thread> queriers;
+  queriers.emplace_back([&] {
     while (!done) {
       const auto tracker = builder.trackerTrajectory();
       for (std::size_t i = 1; i < tracker.size(); ++i) {
@@ -330,14 +330,14 @@ void askWhileItMaps(bool background) {
       }
     }
   });
-  askers.emplace_back([&] {
+  queriers.emplace_back([&] {
     while (!done) {
       mrpt::maps::CSimpleMap map;
       builder.getCurrentlyBuiltMap(map);
       EXPECT_EQ(keyframesOf(map).size(), map.size());
     }
   });
-  askers.emplace_back([&] {
+  queriers.emplace_back([&] {
     while (!done) {
       estimateOf(builder);
       builder.points();
@@ -347,17 +347,17 @@ void askWhileItMaps(bool background) {
   });
   play(builder, observations);
   done = true;
-  for (std::thread& asker : askers) asker.join();
+  for (std::thread& querier : queriers) querier.join();
 
-  expectToAgree(builder, true);
+  expectQueriesToAgree(builder, true);
   CEventFusionMapBuilder alone(optionsOf(false));
   play(alone, observations);
   expectSamePoses(builder.trajectory(), alone.trajectory());
   expectSameBits(builder.points(), alone.points());
 }
 
-TEST(RefinedBuilder, OtherThreadsMayQueryWhileItMaps) { askWhileItMaps(false); }
-TEST(RefinedBuilder, OtherThreadsMayQueryWhileItRefinesInTheBackground) { askWhileItMaps(true); }
+TEST(RefinedBuilder, OtherThreadsMayQueryWhileItMaps) { queryWhileItMaps(false); }
+TEST(RefinedBuilder, OtherThreadsMayQueryWhileItRefinesInTheBackground) { queryWhileItMaps(true); }
 
 TEST(RefinedBuilder, SeveralThreadsMayFeedWithAndWithoutRefinement) {
   // Poses before all and a packet of each camera, then a thread per camera. No thread is ahead of
