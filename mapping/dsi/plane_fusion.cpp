@@ -22,10 +22,10 @@ bool camerasFirst(const FusionOptions& options) {
 std::vector<CameraSlot> inputsInOrder(const FusionInputs& inputs, bool cameras_first) {
   std::vector<CameraSlot> all;
   for (int group = 0; group < inputs.groups; ++group) {
-    const int begin = group * inputs.slots;
-    for (int i = 0; i < inputs.cameras * inputs.slots; ++i) {
+    const int begin = group * inputs.slots_per_group;
+    for (int i = 0; i < inputs.cameras * inputs.slots_per_group; ++i) {
       all.push_back(cameras_first ? CameraSlot{i % inputs.cameras, begin + i / inputs.cameras}
-                                  : CameraSlot{i / inputs.slots, begin + i % inputs.slots});
+                                  : CameraSlot{i / inputs.slots_per_group, begin + i % inputs.slots_per_group});
     }
   }
   return all;
@@ -43,17 +43,17 @@ FusionOrder fusionOrderFromName(std::string_view name) { return valueIn(kOrders,
 PlaneFusion::PlaneFusion(const FusionOptions& options, const FusionInputs& inputs,
                          std::size_t voxels, Keep keep)
     : groups_(inputs.groups),
-      outer_count_(camerasFirst(options) ? inputs.slots : inputs.cameras),
+      outer_count_(camerasFirst(options) ? inputs.slots_per_group : inputs.cameras),
       inputs_(inputsInOrder(inputs, camerasFirst(options))),
       inner_(camerasFirst(options) ? options.across_cameras : options.across_time,
-             camerasFirst(options) ? inputs.cameras : inputs.slots, voxels),
+             camerasFirst(options) ? inputs.cameras : inputs.slots_per_group, voxels),
       outer_(camerasFirst(options) ? options.across_time : options.across_cameras, outer_count_,
              outer_count_ > 1 ? voxels : 0),
       sum_(groups_ > 1 ? voxels : 0) {
-  assert(inputs.cameras >= 1 && inputs.slots >= 1 && inputs.groups >= 1);
+  assert(inputs.cameras >= 1 && inputs.slots_per_group >= 1 && inputs.groups >= 1);
   if (keep == Keep::kFusedOnly) return;
   const auto cameras = static_cast<std::size_t>(inputs.cameras);
-  cameras_.assign(cameras, FusionAccumulator(options.across_time, inputs.slots, voxels));
+  cameras_.assign(cameras, FusionAccumulator(options.across_time, inputs.slots_per_group, voxels));
   camera_sums_.assign(cameras, PlaneValues(sum_.size()));
 }
 

@@ -20,7 +20,7 @@ std::string_view nameOf(VotingKernel kernel) { return nameIn(kKernels, kernel); 
 VotingKernel votingKernelFromName(std::string_view name) { return valueIn(kKernels, name); }
 
 const std::vector<VotingKernel>& availableKernels() {
-  static const std::vector<VotingKernel> kernels = kernels::runnableKernels();
+  static const std::vector<VotingKernel> kernels = kernels::availableKernels();
   return kernels;
 }
 

@@ -88,7 +88,7 @@ namespace efm::kernels {
 template <typename Functions>
 using KernelTable = std::array<const Functions*, 6>;
 
-/// @param kernel one of `runnableKernels`.
+/// @param kernel one of `availableKernels`.
 template <typename Functions>
 const Functions& kernelIn(const KernelTable<Functions>& table, VotingKernel kernel) {
   const Functions* functions = table[static_cast<std::size_t>(kernel)];

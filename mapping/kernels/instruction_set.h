@@ -21,6 +21,6 @@ enum class VotingKernel {
 namespace efm::kernels {
 
 /// The kernels that this build has and this processor can run, in the order of `VotingKernel`.
-std::vector<VotingKernel> runnableKernels();
+std::vector<VotingKernel> availableKernels();
 
 }  // namespace efm::kernels

@@ -23,7 +23,7 @@ struct PeakFunctions {
               std::size_t n) = nullptr;
 };
 
-/// @param kernel one of `runnableKernels`. All of them give the bits of the plain one.
+/// @param kernel one of `availableKernels`. All of them give the bits of the plain one.
 const PeakFunctions& peakFunctions(VotingKernel kernel);
 
 }  // namespace efm::kernels

@@ -61,7 +61,7 @@ struct ResolveFunctions {
   void (*clear)(const CellBuffer& cells, const DirtyLines& lines) = nullptr;
 };
 
-/// @param kernel one of `runnableKernels`, but not the plain one, which needs no tiles.
+/// @param kernel one of `availableKernels`, but not the plain one, which needs no tiles.
 const ResolveFunctions& resolveFunctions(VotingKernel kernel);
 
 }  // namespace efm::kernels

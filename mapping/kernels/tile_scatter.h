@@ -124,7 +124,7 @@ struct TileFunctions {
                     FullCell* full) = nullptr;
 };
 
-/// @param kernel one of `runnableKernels`, but not the plain one, which needs no tiles.
+/// @param kernel one of `availableKernels`, but not the plain one, which needs no tiles.
 const TileFunctions& tileFunctions(VotingKernel kernel);
 
 }  // namespace efm::kernels

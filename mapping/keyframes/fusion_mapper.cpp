@@ -27,7 +27,7 @@ double depthGuess(const DepthPlanesOptions& planes) {
 
 void FusionMapperOptions::validate() const {
   trajectory.validate();
-  keyframes.validate();
+  policy.validate();
   keyframe.validate();
   limits.validate();
   filter.validate();
@@ -53,7 +53,7 @@ FusionMapper::FusionMapper(const FusionMapperOptions& options)
   options_.validate();
   policy_ = options_.only_window
                 ? makeSingleWindowPolicy(*options_.only_window)
-                : makeKeyframePolicy(options_.keyframes, depthGuess(options_.keyframe.planes));
+                : makeKeyframePolicy(options_.policy, depthGuess(options_.keyframe.planes));
 }
 
 int FusionMapper::addCamera(const RigCamera& camera) {

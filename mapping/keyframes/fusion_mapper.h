@@ -22,8 +22,8 @@ namespace efm {
 
 struct FusionMapperOptions {
   TrajectoryOptions trajectory;
-  KeyframePolicyOptions keyframes;
-  /// If given, this window is the only keyframe, and `keyframes` is not used.
+  KeyframePolicyOptions policy;
+  /// If given, this window is the only keyframe, and `policy` is not used.
   std::optional<Window> only_window;
   KeyframeMapperOptions keyframe;
   std::vector<int> cameras;  ///< Indices of the cameras that take part, each once; empty: all.

@@ -118,7 +118,7 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   SweepResult swept;
   {
     const StageScope scope(stages, Stage::kSweep);
-    cameras = backProject(input, motion);  // 3.
+    cameras = raysOfCameras(input, motion);  // 3.
     countEvents(cameras, keyframe);
     if (options_.exclude_silent) removeSilent(cameras);
     swept = fuse(cameras, sink);  // 4.
@@ -129,7 +129,7 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
 }
 
 /// 3. Divides the window into sub-intervals and back-projects their events, cameras in parallel.
-std::vector<WindowRays> KeyframeMapper::backProject(const WindowInput& input,
+std::vector<WindowRays> KeyframeMapper::raysOfCameras(const WindowInput& input,
                                                     const Trajectory& motion) const {
   std::vector<WindowRays> cameras(input.cameras.size());
   tbb::parallel_for(std::size_t{0}, cameras.size(), [&](std::size_t i) {

@@ -68,7 +68,7 @@ class KeyframeMapper {
   std::vector<CameraEvents> selectedEvents(const std::vector<EventSpan>& events) const;
   KeyframeDepthMap mapAlong(const WindowInput& input, const Trajectory& motion, DsiSink* sink,
                             StageHook* stages) const;
-  std::vector<WindowRays> backProject(const WindowInput& input, const Trajectory& motion) const;
+  std::vector<WindowRays> raysOfCameras(const WindowInput& input, const Trajectory& motion) const;
   SweepResult fuse(std::vector<WindowRays>& cameras, DsiSink* sink) const;
   void extract(const SweepResult& swept, const std::vector<WindowRays>& cameras,
                KeyframeDepthMap& keyframe) const;

@@ -275,7 +275,7 @@ double RayBins::maxShift() const {
   return std::max(along(columns_), along(rows_));
 }
 
-RayBins::Footprint RayBins::footprintIn(const PlaneGroup& group) const {
+RayBins::Footprint RayBins::footprintIn(const PlaneRange& group) const {
   Footprint footprint;
   footprint.group_ = group;
   footprint.columns_ = footprintAlong(columns_, group);
@@ -288,7 +288,7 @@ RayBins::Footprint RayBins::footprintIn(const PlaneGroup& group) const {
 }
 
 std::vector<RayBins::Range> RayBins::footprintAlong(const Axis& axis,
-                                                    const PlaneGroup& group) const {
+                                                    const PlaneRange& group) const {
   const auto rangeOf = [](std::initializer_list<double> values) {
     const auto [min, max] = std::minmax(values);
     return Range{min, max};

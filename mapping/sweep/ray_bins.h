@@ -13,7 +13,7 @@
 namespace efm {
 
 /// Consecutive depth planes.
-struct PlaneGroup {
+struct PlaneRange {
   int begin = 0;
   int end = 0;               ///< One past the last.
   double first_depth_m = 0;  ///< Of plane `begin`.
@@ -53,7 +53,7 @@ class RayBins {
 
   class Footprint;
   /// Prepares for a group of planes: one plane, where rays are not on all of them.
-  Footprint footprintIn(const PlaneGroup& group) const;
+  Footprint footprintIn(const PlaneRange& group) const;
   /// Appends the rays that may fall into the tile's cells on planes of the group. Thread-safe.
   void gather(const Footprint& footprint, const TileCells& tile,
               const kernels::TileFunctions& functions, TileRays& rays) const;
@@ -106,7 +106,7 @@ class RayBins {
   void countRays(const RayBundle& rays);
   void storeCompact(const RayBundle& rays);
   void storeWide(const RayBundle& rays);
-  std::vector<Range> footprintAlong(const Axis& axis, const PlaneGroup& group) const;
+  std::vector<Range> footprintAlong(const Axis& axis, const PlaneRange& group) const;
   void gatherWide(const Footprint& footprint, std::size_t bin,
                   const kernels::GatherRequest& request, TileRays& rays) const;
 
@@ -127,7 +127,7 @@ class RayBins::Footprint {
  private:
   friend class RayBins;
 
-  PlaneGroup group_;
+  PlaneRange group_;
   std::vector<Range> columns_;  // by bin, pixels
   std::vector<Range> rows_;
   std::vector<PlaneTransfer> transfers_;  // of packets of wide rays, to the group's one plane

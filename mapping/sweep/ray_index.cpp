@@ -10,7 +10,7 @@ namespace {
 /// The largest shift of a ray within a group of planes. With a larger one, a tile gathers more rays
 /// that are outside it on some planes; with a smaller one, it gathers more often.
 constexpr double kMaxGroupShift_px = 10;
-/// A limit where rays hardly move: a sink gets this number of planes at a time.
+/// A limit where rays hardly move.
 constexpr int kMaxGroupPlanes = 20;
 
 /// Votes on planes behind the camera.
@@ -43,8 +43,8 @@ RayIndex::RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingK
       bins_.push_back(RayBins::sort(rays, grid));
     }
   }
-  groups_ = groupPlanes();
-  for (const PlaneGroup& group : groups_) {
+  groups_ = dividePlanes();
+  for (const PlaneRange& group : groups_) {
     auto& footprints = footprints_.emplace_back();
     for (const auto& input : bins_) {
       auto& of_input = footprints.emplace_back();
@@ -53,7 +53,7 @@ RayIndex::RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingK
   }
 }
 
-std::vector<PlaneGroup> RayIndex::groupPlanes() const {
+std::vector<PlaneRange> RayIndex::dividePlanes() const {
   double max_shift = 0;
   bool on_all_planes = true;
   for (const auto& input : bins_) {
@@ -62,7 +62,7 @@ std::vector<PlaneGroup> RayIndex::groupPlanes() const {
       if (bins.onAllPlanes()) max_shift = std::max(max_shift, bins.maxShift());
     }
   }
-  std::vector<PlaneGroup> groups;
+  std::vector<PlaneRange> groups;
   for (int begin = 0; begin < planes_.size(); begin = groups.back().end) {
     const double first = 1 / planes_.depth(begin);
     int end = begin + 1;

@@ -18,12 +18,12 @@ namespace efm {
 class RayIndex {
  public:
   /// @param cameras consumed: each bundle is freed when it lies in bins.
-  /// @param kernel one of `runnableKernels`, but not the plain one.
+  /// @param kernel one of `availableKernels`, but not the plain one.
   RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingKernel kernel);
 
   /// Groups of planes in which no ray moves far, from the nearest plane to the farthest. Each has
   /// one plane where some rays are not on all planes.
-  const std::vector<PlaneGroup>& groups() const { return groups_; }
+  const std::vector<PlaneRange>& groups() const { return groups_; }
 
   /// Input (camera, slot) has the index camera * slots + slot, with the slots of all groups of
   /// events.
@@ -42,12 +42,12 @@ class RayIndex {
   const std::vector<VoteCounts>& notCast() const { return not_cast_; }
 
  private:
-  std::vector<PlaneGroup> groupPlanes() const;
+  std::vector<PlaneRange> dividePlanes() const;
 
   const kernels::TileFunctions& functions_;
   DepthPlanes planes_;
   std::vector<std::vector<RayBins>> bins_;  // by input
-  std::vector<PlaneGroup> groups_;
+  std::vector<PlaneRange> groups_;
   std::vector<std::vector<std::vector<RayBins::Footprint>>> footprints_;  // of bins_, by group
   std::vector<VoteCounts> not_cast_;
 };

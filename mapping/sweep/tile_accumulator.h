@@ -19,7 +19,7 @@ namespace efm {
 /// Use: `vote`; then `resolve`, or, where `isSparse`, `findOccupied` and `resolveBlocks`.
 class TileAccumulator {
  public:
-  /// @param kernel one of `runnableKernels`, but not the plain one.
+  /// @param kernel one of `availableKernels`, but not the plain one.
   explicit TileAccumulator(VotingKernel kernel);
 
   /// Moves to a tile. No votes are pending (asserted).

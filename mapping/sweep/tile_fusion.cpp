@@ -12,7 +12,7 @@ TileFusion::TileFusion(const FusionOptions& options, const FusionInputs& inputs,
     : options_(options),
       inputs_(inputs),
       keep_(keep),
-      pairs_(keep == PlaneFusion::Keep::kFusedOnly && inputs.cameras == 2 && inputs.slots == 1 &&
+      pairs_(keep == PlaneFusion::Keep::kFusedOnly && inputs.cameras == 2 && inputs.slots_per_group == 1 &&
              isAndLike(options.across_cameras)),
       accumulators_{TileAccumulator(kernel), TileAccumulator(kernel)},
       votes_(static_cast<std::size_t>(inputs.cameras)) {}
@@ -36,7 +36,7 @@ const PlaneValues& TileFusion::fuse(std::vector<TileRays>& rays, double from_anc
   for (const CameraSlot& input : planes_->inputs()) {
     TileAccumulator& accumulator = accumulators_[0];
     accumulator.vote(
-        rays[static_cast<std::size_t>(input.camera * inputs_.slots * inputs_.groups + input.slot)],
+        rays[static_cast<std::size_t>(input.camera * inputs_.slots_per_group * inputs_.groups + input.slot)],
         from_anchor);
     votes_[static_cast<std::size_t>(input.camera)] += accumulator.resolve(planes_->next().data());
     planes_->add(input);

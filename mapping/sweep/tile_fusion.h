@@ -18,7 +18,7 @@ namespace efm {
 /// and fused.
 class TileFusion {
  public:
-  /// @param kernel one of `runnableKernels`, but not the plain one.
+  /// @param kernel one of `availableKernels`, but not the plain one.
   TileFusion(const FusionOptions& options, const FusionInputs& inputs, PlaneFusion::Keep keep,
              VotingKernel kernel);
 

@@ -113,7 +113,7 @@ class TiledSweep {
       for (std::size_t input = 0; input < rays_.inputs(); ++input) {
         rays_.gather(group, input, tile, scratch.rays[input]);
       }
-      const PlaneGroup& planes = rays_.groups()[group];
+      const PlaneRange& planes = rays_.groups()[group];
       for (int plane = planes.begin; plane < planes.end; ++plane) {
         sweepPlane(plane, tile.tile, scratch);
       }

@@ -39,7 +39,7 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
   PosePerturbationOptions& perturbation = source.faults.perturbation;
   perturbation.max_pose_gap_s = options.mapper.trajectory.max_pose_gap_s;
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
-    perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.keyframes.stride_s);
+    perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.policy.stride_s);
   }
   return source;
 }
@@ -163,7 +163,7 @@ int runMap(const MapArguments& arguments) {
 int runDepth(const DepthArguments& arguments) {
   MappingJob job;
   job.options = optionsOf(arguments);
-  job.options.mapper.only_window = windowOf(arguments, job.options.mapper.keyframes.reference);
+  job.options.mapper.only_window = windowOf(arguments, job.options.mapper.policy.reference);
   job.options.mapper.validate();
   const EventFusionOptions options = job.options;
   std::unique_ptr<NpyDsiFile> dsi;

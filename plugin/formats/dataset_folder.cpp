@@ -74,7 +74,7 @@ std::unique_ptr<Recording> openDatasetFolder(const fs::path& folder,
     readers.emplace_back(eventsOf(folder, camera), CameraSize{model.width, model.height});
   }
   auto events = std::make_unique<MergedRecording>(std::move(rig), std::move(readers));
-  if (given.poses) return events;
+  if (given.has_poses) return events;
   return std::make_unique<RecordingWithPoses>(std::move(events), readPoses(folder));
 }
 

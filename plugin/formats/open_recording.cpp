@@ -81,7 +81,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   const RecordingOverrides given = {setup.calibration ? &*setup.calibration : nullptr,
                                     !poses.empty()};
   std::unique_ptr<Recording> recording = openAs(source.format, path, given);
-  if (given.poses) {
+  if (given.has_poses) {
     recording = std::make_unique<RecordingWithPoses>(std::move(recording), std::move(poses));
   }
   if (source.faults.any()) {

@@ -88,7 +88,7 @@ std::unique_ptr<Recording> openUzhFolder(const fs::path& folder, const Recording
   std::vector<EventTextReader> readers;
   readers.emplace_back(folder / "events.txt", CameraSize{model.width, model.height});
   auto events = std::make_unique<MergedRecording>(std::move(rig), std::move(readers));
-  if (given.poses) return events;
+  if (given.has_poses) return events;
   requireFile(folder, "groundtruth.txt", "poses", "--poses");
   return std::make_unique<RecordingWithPoses>(std::move(events),
                                               readPosesFile(folder / "groundtruth.txt"));

@@ -40,7 +40,7 @@ auto parseList(std::string_view text, const Parse& parse) {
 /// Nanoseconds from seconds, exactly.
 std::optional<std::int64_t> parseTime(std::string_view text) {
   const std::optional<std::int64_t> t_ns = parseSeconds(text);
-  const bool in_range = t_ns && *t_ns<kEndOfTimeNs&& * t_ns> - kEndOfTimeNs;
+  const bool in_range = t_ns && -kEndOfTimeNs < *t_ns && *t_ns < kEndOfTimeNs;
   return in_range ? t_ns : std::nullopt;
 }
 

@@ -38,7 +38,7 @@ class Recording {
 /// Replacements for parts of a recording, which a folder of text files may lack then.
 struct RecordingOverrides {
   const Calibration* calibration = nullptr;  ///< Used where the folder has none; may be null.
-  bool poses = false;                        ///< Poses are inserted later.
+  bool has_poses = false;                    ///< Poses are inserted later.
 };
 
 }  // namespace efm

@@ -82,7 +82,7 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
         without_pose);
   }
   return fmt::format("no window of {} was full: {}, {} s of them together",
-                     fullWindow(options.keyframes), spans, formatSeconds(last_ns - first_ns));
+                     fullWindow(options.policy), spans, formatSeconds(last_ns - first_ns));
 }
 
 }  // namespace efm

@@ -68,7 +68,7 @@ void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel ke
   const std::vector<cv::Rect> tiles = tilesOf(input.view, TileCells::kMaxPixels);
   for (auto _ : state) {
     for (std::size_t g = 0; g < rays.groups().size(); ++g) {
-      const PlaneGroup& group = rays.groups()[g];
+      const PlaneRange& group = rays.groups()[g];
       for (const cv::Rect& tile : tiles) {
         const TileCells cells(tile, input.view);
         accumulator.moveTo(cells);

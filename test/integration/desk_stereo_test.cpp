@@ -26,8 +26,8 @@ class DeskStereo : public ::testing::Test {
 
   static FusionMapperOptions options(double window_s, double stride_s) {
     FusionMapperOptions options;
-    options.keyframes.window_s = window_s;
-    options.keyframes.stride_s = stride_s;
+    options.policy.window_s = window_s;
+    options.policy.stride_s = stride_s;
     options.keyframe.planes = {0.55, 5.0, 100, PlaneSpacing::kInverse};
     return options;
   }

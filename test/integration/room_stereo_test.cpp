@@ -15,8 +15,8 @@ TEST(RoomStereo, TheMapLiesOnTheTrueSurfaces) {
   simulation.duration_s = 1.6;  // of 8 s around the room; the whole takes five times as long
   const test::SimulatedRecording room(simulation);
   FusionMapperOptions options;
-  options.keyframes.window_s = 0.3;
-  options.keyframes.stride_s = 0.3;
+  options.policy.window_s = 0.3;
+  options.policy.stride_s = 0.3;
   options.keyframe.planes = {0.9, 7.0, 100, PlaneSpacing::kInverse};
 
   const auto keyframes = room.map(options);

@@ -64,8 +64,8 @@ TEST(RobustMaximum, OfTheKeyframesSoFarIsTheWhiteLevelOfTheSequence) {
   const test::LongRecording recording(1, 1.0);
   FusionMapperOptions options = test::playedOptions();
   options.keyframe.extraction.extraction = ExtractionMethod::kPaper;
-  options.keyframes.window_s = 0.05;
-  options.keyframes.stride_s = 0.015;
+  options.policy.window_s = 0.05;
+  options.policy.stride_s = 0.015;
   options.keyframe.extraction.max_confidence.level = WhiteLevel::kSequence;
   const test::Played played = test::play(recording, options, 0);
   EXPECT_GE(played.keyframes.size(), 22U) << "more than the nineteen that are a plain maximum";

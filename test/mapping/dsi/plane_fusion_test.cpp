@@ -30,16 +30,16 @@ struct Densities {
 
   /// One group by itself.
   Densities group(int g) const {
-    Densities alone{{inputs.cameras, inputs.slots, 1}, {}};
+    Densities alone{{inputs.cameras, inputs.slots_per_group, 1}, {}};
     for (const auto& camera : values) {
-      alone.values.emplace_back(camera.begin() + g * inputs.slots,
-                                camera.begin() + (g + 1) * inputs.slots);
+      alone.values.emplace_back(camera.begin() + g * inputs.slots_per_group,
+                                camera.begin() + (g + 1) * inputs.slots_per_group);
     }
     return alone;
   }
   /// One camera by itself.
   Densities camera(int c) const {
-    return {{1, inputs.slots, inputs.groups}, {values[static_cast<std::size_t>(c)]}};
+    return {{1, inputs.slots_per_group, inputs.groups}, {values[static_cast<std::size_t>(c)]}};
   }
 };
 
@@ -49,7 +49,7 @@ Densities randomDensities(std::mt19937& random, const FusionInputs& inputs) {
   Densities densities{inputs, {}};
   for (int camera = 0; camera < inputs.cameras; ++camera) {
     auto& of_camera = densities.values.emplace_back();
-    for (int slot = 0; slot < inputs.slots * inputs.groups; ++slot) {
+    for (int slot = 0; slot < inputs.slots_per_group * inputs.groups; ++slot) {
       PlaneValues& values = of_camera.emplace_back(kVoxels);
       for (float& value : values) {
         value = random() % 8 == 0 ? 0.0F : static_cast<float>(std::pow(10.0, exponent(random)));

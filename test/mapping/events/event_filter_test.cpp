@@ -32,8 +32,8 @@ EventFilterOptions strictFilter() {
 
 FusionMapperOptions filteredOptions() {
   FusionMapperOptions options = test::playedOptions();
-  options.keyframes.window_s = 0.11;
-  options.keyframes.stride_s = 0.07;
+  options.policy.window_s = 0.11;
+  options.policy.stride_s = 0.07;
   options.filter = strictFilter();
   return options;
 }

@@ -21,8 +21,8 @@ FusionMapperOptions options(int planes = 4) {
   FusionMapperOptions options;
   options.keyframe.split = SplitFusionOptions::none();
   options.keyframe.extraction.extraction = ExtractionMethod::kPaper;
-  options.keyframes.window_s = 0.1;
-  options.keyframes.stride_s = 0.1;
+  options.policy.window_s = 0.1;
+  options.policy.stride_s = 0.1;
   options.keyframe.planes = {0.5, 4.0, planes, PlaneSpacing::kInverse};
   options.keyframe.sweep.threads = 1;
   return options;
@@ -101,8 +101,8 @@ TEST(EdgeCase, ASinglePoseMakesNoWindowExceptTheOnlyWindow) {
     for (const auto policy : {KeyframePolicyKind::kPeriod, KeyframePolicyKind::kEvents,
                               KeyframePolicyKind::kBaseline}) {
       FusionMapperOptions one_pose = options();
-      one_pose.keyframes.policy = policy;
-      one_pose.keyframes.window_events = 1;
+      one_pose.policy.policy = policy;
+      one_pose.policy.window_events = 1;
       const std::int64_t t_ns = kStart_ns + 50 * kMs;
       if (asked_for) one_pose.only_window = Window{kStart_ns, kStart_ns + 100 * kMs, t_ns};
       FusionMapper mapper(one_pose);

@@ -28,8 +28,8 @@ std::int64_t at(std::int64_t ms) { return kStart_ns + ms * kMs; }
 
 FusionMapperOptions period(double window_s = 0.1, double stride_s = 0.1) {
   FusionMapperOptions options;
-  options.keyframes.window_s = window_s;
-  options.keyframes.stride_s = stride_s;
+  options.policy.window_s = window_s;
+  options.policy.stride_s = stride_s;
   options.keyframe.planes.num_planes = kPlanes;
   options.keyframe.sweep.threads = 1;
   options.filter.hot_pixels = false;  // most of these recordings are a single pixel's

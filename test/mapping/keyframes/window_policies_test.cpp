@@ -22,21 +22,21 @@ using test::same;
 /// One of each policy, windows that overlap and windows that leave gaps among them.
 std::vector<FusionMapperOptions> allPolicies() {
   std::vector<FusionMapperOptions> all(6, playedOptions());
-  all[0].keyframes.window_s = 0.11;
-  all[0].keyframes.stride_s = 0.04;
-  all[1].keyframes.window_s = 0.03;
-  all[1].keyframes.stride_s = 0.07;
-  all[1].keyframes.reference = ReferenceTime::kEnd;
-  all[2].keyframes.policy = KeyframePolicyKind::kEvents;
-  all[2].keyframes.window_events = 700;
+  all[0].policy.window_s = 0.11;
+  all[0].policy.stride_s = 0.04;
+  all[1].policy.window_s = 0.03;
+  all[1].policy.stride_s = 0.07;
+  all[1].policy.reference = ReferenceTime::kEnd;
+  all[2].policy.policy = KeyframePolicyKind::kEvents;
+  all[2].policy.window_events = 700;
   all[3] = all[2];
-  all[3].keyframes.window_events = 1;
-  all[3].keyframes.reference = ReferenceTime::kEnd;
+  all[3].policy.window_events = 1;
+  all[3].policy.reference = ReferenceTime::kEnd;
   all[3].limits = {LongRecording::kStart_ns + 30'000'000, LongRecording::kStart_ns + 60'000'000};
-  all[4].keyframes.policy = KeyframePolicyKind::kBaseline;
-  all[4].keyframes.window_s = 0.12;
-  all[4].keyframes.stride_s = 0.01;
-  all[4].keyframes.min_baseline_ratio = 0.05;
+  all[4].policy.policy = KeyframePolicyKind::kBaseline;
+  all[4].policy.window_s = 0.12;
+  all[4].policy.stride_s = 0.01;
+  all[4].policy.min_baseline_ratio = 0.05;
   all[5] = all[4];
   all[5].limits.t0_ns = LongRecording::kStart_ns + 123'456'789;
   all[5].limits.t1_ns = LongRecording::kStart_ns + 444'444'444;
@@ -44,7 +44,7 @@ std::vector<FusionMapperOptions> allPolicies() {
 }
 
 std::string labelOf(const FusionMapperOptions& options, std::uint32_t seed) {
-  return std::string(nameOf(options.keyframes.policy)) + ", seed " + std::to_string(seed);
+  return std::string(nameOf(options.policy.policy)) + ", seed " + std::to_string(seed);
 }
 
 /// Plays the recording as a whole and in three other ways. @return the number of keyframes.
@@ -97,7 +97,7 @@ TEST(WindowPolicies, TheResultDoesNotDependOnThePackets) {
 TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithFewEvents) {
   std::size_t keyframes = 0;
   for (FusionMapperOptions options : allPolicies()) {
-    options.keyframes.window_events = 3;
+    options.policy.window_events = 3;
     for (std::uint32_t seed = 1; seed <= 20; ++seed) {
       // An event of each camera in 20 ms: poses and other cameras often end between two of them.
       keyframes += expectTheSameHoweverCut(LongRecording(seed, 1.0, 30), options,
@@ -110,7 +110,7 @@ TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithFewEvents) {
 TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithLateCamerasAndMissingPoses) {
   std::size_t keyframes = 0;
   for (FusionMapperOptions options : allPolicies()) {
-    options.keyframes.window_events = 40;
+    options.policy.window_events = 40;
     for (std::uint32_t seed = 1; seed <= 60; ++seed) {
       // Camera 1 begins anywhere: often in the gap of the poses, after camera 0 has started.
       LongRecording recording(seed, 1.0, 100);
@@ -215,8 +215,8 @@ TEST(WindowPolicies, WindowsOfAFixedNumberOfEventsFollowEachOther) {
     const std::int64_t last_pose_ns = recording.poses.back().t_ns;
     for (const std::size_t count : {1U, 37U, 700U, 2000U}) {
       FusionMapperOptions options = playedOptions();
-      options.keyframes.policy = KeyframePolicyKind::kEvents;
-      options.keyframes.window_events = static_cast<std::int64_t>(count);
+      options.policy.policy = KeyframePolicyKind::kEvents;
+      options.policy.window_events = static_cast<std::int64_t>(count);
       std::vector<Window> windows;
       auto first = times.begin();
       while (times.end() - first >= static_cast<std::ptrdiff_t>(count)) {
@@ -243,11 +243,11 @@ TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
     const std::vector<std::int64_t> times = eventTimes(recording);
     const Trajectory trajectory = recording.trajectory();
     FusionMapperOptions options = playedOptions();
-    options.keyframes.policy = KeyframePolicyKind::kBaseline;
-    options.keyframes.window_s = 0.1;
-    options.keyframes.stride_s = 0.012;
-    options.keyframes.min_baseline_ratio = 0.04;
-    options.keyframes.min_visible_fraction = 0;
+    options.policy.policy = KeyframePolicyKind::kBaseline;
+    options.policy.window_s = 0.1;
+    options.policy.stride_s = 0.012;
+    options.policy.min_baseline_ratio = 0.04;
+    options.policy.min_visible_fraction = 0;
     options.keyframe.reference_camera = 1;
     const Played played = play(recording, options, seed);
 
@@ -293,9 +293,9 @@ TEST(WindowPolicies, ARigAtRestTakesNoMemoryAndMakesNoKeyframe) {
   constexpr std::int64_t kMs = LongRecording::kMs;
   FusionMapperOptions options = playedOptions();
   options.cameras = {};
-  options.keyframes.policy = KeyframePolicyKind::kBaseline;
-  options.keyframes.window_s = 0.1;
-  options.keyframes.stride_s = 0.02;
+  options.policy.policy = KeyframePolicyKind::kBaseline;
+  options.policy.window_s = 0.1;
+  options.policy.stride_s = 0.02;
   FusionMapper mapper(options);
   mapper.addCamera({test::smallCamera(), {}, 0});
   test::RandomScene random(1);

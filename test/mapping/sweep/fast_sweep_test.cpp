@@ -359,7 +359,7 @@ test::SweepCase randomCase(test::RandomRays& random, const cv::Size& size,
   input.groups = inputs.groups;
   for (int camera = 0; camera < inputs.cameras; ++camera) {
     CameraRays& of_camera = input.cameras.emplace_back();
-    for (int slot = 0; slot < inputs.slots * inputs.groups; ++slot) {
+    for (int slot = 0; slot < inputs.slots_per_group * inputs.groups; ++slot) {
       of_camera.push_back(random.bundle(input.view, planes, random.integer(0, max_rays)));
     }
   }
@@ -377,7 +377,7 @@ TEST_P(FastSweepOn, RandomRigsPlanesGroupsAndViewsAreThePlainKernels) {
     input.camera_peaks = seed % 2 == 0;
     SCOPED_TRACE(testing::Message()
                  << "seed " << seed << ", " << size << ", " << inputs.cameras << " cameras, "
-                 << inputs.slots << " slots, " << inputs.groups << " groups");
+                 << inputs.slots_per_group << " slots, " << inputs.groups << " groups");
     test::expectThePlainSweep(input, GetParam());
   }
 }

@@ -39,7 +39,7 @@ Eigen::Vector2d pixelOn(const RayBundle& rays, const RayPacket& packet, std::siz
 }
 
 std::vector<RayPath> pathsOf(const RayBundle& rays, const ReferenceView& view,
-                             const PlaneGroup& group) {
+                             const PlaneRange& group) {
   std::vector<RayPath> paths;
   for (const RayPacket& packet : rays.packets) {
     for (std::size_t i = packet.begin; i < packet.end; ++i) {
@@ -75,7 +75,7 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
  protected:
   /// The rays of a bundle that a tile gathers, each as its path.
   std::vector<RayPath> gather(const std::vector<RayBins>& all, const TileCells& tile,
-                              const PlaneGroup& group, const DepthPlanes& planes) const {
+                              const PlaneRange& group, const DepthPlanes& planes) const {
     TileRays found;
     for (const RayBins& bins : all) {
       bins.gather(bins.footprintIn(group), tile, functions_, found);
@@ -103,7 +103,7 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
     if (!on_all_planes) planes_per_group = 1;
     for (int begin = 0; begin < planes.size(); begin += planes_per_group) {
       const int end = std::min(planes.size(), begin + planes_per_group);
-      const PlaneGroup group{begin, end, planes.depth(begin), planes.depth(end - 1)};
+      const PlaneRange group{begin, end, planes.depth(begin), planes.depth(end - 1)};
       const std::vector<RayPath> paths = pathsOf(rays, view, group);
       for (const cv::Rect& tile : tilesOf(view, TileCells::kMaxPixels)) {
         const TileCells cells(tile, view);

@@ -98,7 +98,7 @@ PlaneValues fusePlainly(VotingKernel kernel, const TileCells& cells, std::vector
   PlaneFusion fusion(options, inputs, static_cast<std::size_t>(cells.tile.area()));
   fusion.begin();
   for (const CameraSlot& input : fusion.inputs()) {
-    const auto slots = static_cast<std::size_t>(inputs.slots * inputs.groups);
+    const auto slots = static_cast<std::size_t>(inputs.slots_per_group * inputs.groups);
     const auto camera = static_cast<std::size_t>(input.camera);
     accumulator.vote(rays[camera * slots + static_cast<std::size_t>(input.slot)], 0);
     votes[camera] += accumulator.resolve(fusion.next().data());
@@ -123,7 +123,7 @@ TEST_P(TileFusionOn, HasTheBitsOfPlaneFusionAlsoWherePairsAreFusedOnlyWhereBothH
           fusion.moveTo(cells);
           keeping.moveTo(cells);
           std::vector<TileRays> rays;
-          for (int i = 0; i < inputs.cameras * inputs.slots * inputs.groups; ++i) {
+          for (int i = 0; i < inputs.cameras * inputs.slots_per_group * inputs.groups; ++i) {
             rays.push_back(clusteredRays(random, cells, kCounts[random() % 6]));
           }
           for (int plane = 0; plane < 2; ++plane) {

@@ -42,8 +42,8 @@ inline SyntheticRecording shaken(SyntheticRecording recording, const Shake& shak
 /// Options that suit it: a keyframe in each window, whose poses are refined.
 inline EventFusionOptions refinedOptions() {
   EventFusionOptions options = syntheticOptions();
-  options.mapper.keyframes.window_s = 0.1;
-  options.mapper.keyframes.stride_s = 0.1;
+  options.mapper.policy.window_s = 0.1;
+  options.mapper.policy.stride_s = 0.1;
   options.cloud.voxel_size_m = 0.02;
   options.refinement.enabled = true;
   return options;

@@ -51,7 +51,7 @@ TEST(WhyNoKeyframe, SaysThatEventsOrPosesAreMissing) {
 
 TEST(WhyNoKeyframe, SaysThatTheRecordingIsShorterThanAWindow) {
   EventFusionOptions options = syntheticOptions();
-  options.mapper.keyframes.window_s = 2;
+  options.mapper.policy.window_s = 2;
   EXPECT_THAT(why(SyntheticRecording(), options),
               AllOf(HasSubstr("no window of 2.000000000 s (window_s) was full"),
                     HasSubstr("the poses 10.000000000 to 10.500000000 s")));

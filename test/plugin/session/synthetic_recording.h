@@ -92,8 +92,8 @@ struct SyntheticRecording {
 /// Options that suit the synthetic recording: three keyframes in half a second.
 inline EventFusionOptions syntheticOptions() {
   EventFusionOptions options;
-  options.mapper.keyframes.window_s = 0.2;
-  options.mapper.keyframes.stride_s = 0.1;
+  options.mapper.policy.window_s = 0.2;
+  options.mapper.policy.stride_s = 0.1;
   options.mapper.keyframe.planes = {1, 5, 30, PlaneSpacing::kInverse};
   options.mapper.keyframe.extraction.threshold_c = 60;  // lone dots stand out far
   return options;

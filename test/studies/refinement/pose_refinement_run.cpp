@@ -46,7 +46,7 @@ PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOption
   const Simulation& simulation = recording.simulation;
   const std::int64_t first_window_ns = firstEventNs(recording);
   faults.perturbation.keyframe.start_ns = first_window_ns;
-  faults.perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.keyframes.window_s);
+  faults.perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.policy.window_s);
   const std::unique_ptr<PoseSource> tracker =
       withFaults(std::make_unique<TumReplay>(samplePoses(simulation, kPosePeriodNs)), faults);
 

@@ -19,7 +19,7 @@ EventFusionOptions optionsOf(const RefinementCase& what) {
   EventFusionOptions options;
   options.mapper.keyframe.planes.min_depth_m = what.min_depth_m;
   options.mapper.keyframe.planes.max_depth_m = what.max_depth_m;
-  options.mapper.keyframes.window_s = options.mapper.keyframes.stride_s = what.window_s;
+  options.mapper.policy.window_s = options.mapper.policy.stride_s = what.window_s;
   options.refinement.enabled = true;
   return options;
 }
