@@ -25,7 +25,8 @@ std::vector<CameraSlot> inputsInOrder(const FusionInputs& inputs, bool cameras_f
     const int begin = group * inputs.slots_per_group;
     for (int i = 0; i < inputs.cameras * inputs.slots_per_group; ++i) {
       all.push_back(cameras_first ? CameraSlot{i % inputs.cameras, begin + i / inputs.cameras}
-                                  : CameraSlot{i / inputs.slots_per_group, begin + i % inputs.slots_per_group});
+                                  : CameraSlot{i / inputs.slots_per_group,
+                                               begin + i % inputs.slots_per_group});
     }
   }
   return all;

@@ -30,9 +30,9 @@ struct FusionOptions {
 
 /// The numbers of inputs of a plane.
 struct FusionInputs {
-  int cameras = 1;  ///< At least 1.
+  int cameras = 1;          ///< At least 1.
   int slots_per_group = 1;  ///< Of each camera; at least 1.
-  int groups = 1;   ///< Each is fused by itself; the fused groups are summed. At least 1.
+  int groups = 1;           ///< Each is fused by itself; the fused groups are summed. At least 1.
 };
 
 /// One input of a plane: a camera in a slot of the time axis. The slots of group g begin at

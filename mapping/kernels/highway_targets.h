@@ -30,7 +30,8 @@
 //   #endif
 //
 // The kernel is an argument, not Highway's global choice, so that tests and threads can run several
-// side by side. Highway's baseline may have vectors of one lane: use only functions that exist there.
+// side by side. Highway's baseline may have vectors of one lane: use only functions that exist
+// there.
 
 #ifdef HIGHWAY_HWY_DETECT_TARGETS_H_
 #error "include highway_targets.h before anything of Highway"

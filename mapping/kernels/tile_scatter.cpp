@@ -17,7 +17,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::ScalableTag<float>;
 using Unsigned = hn::RebindToUnsigned<Floats>;
-using Signed = hn::RebindToSigned<Floats>;
 using FloatV = hn::Vec<Floats>;
 using UnsignedV = hn::Vec<Unsigned>;
 
@@ -39,31 +38,19 @@ constexpr std::uint32_t kBitsOfZero = 0x4B000000U;
 
 // ---------------------------------------------------------------- gathering
 
-std::size_t gather(const CompactRay* bin, std::size_t count, const GatherRequest& request,
+std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest& request,
                    const MovingRays& rays) {
   const Floats d;
-  const Unsigned du;
-  const Signed di;
   const auto set = [d](float value) { return hn::Set(d, value); };
   const FloatV scale = set(static_cast<float>(1 << kFractionBits));
+  const FloatV shift_scale = hn::Mul(scale, set(request.moving));
   std::size_t size = rays.size;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    UnsignedV position;
-    UnsignedV shift;
-    hn::LoadInterleaved2(du, reinterpret_cast<const std::uint32_t*>(bin + i), position, shift);
-    const auto right = hn::ConvertTo(d, hn::BitCast(di, hn::And(position, hn::Set(du, 0xFFFFU))));
-    const auto down = hn::ConvertTo(d, hn::BitCast(di, hn::ShiftRight<16>(position)));
-    const FloatV x = hn::MulAdd(right, set(1.0F / 4096), set(request.corner_x));
-    const FloatV y = hn::MulAdd(down, set(1.0F / 4096), set(request.corner_y));
-    const auto own_x = hn::ShiftRight<16>(hn::BitCast(di, hn::ShiftLeft<16>(shift)));
-    const auto own_y = hn::ShiftRight<16>(hn::BitCast(di, shift));
-    const FloatV common_x =
-        hn::NegMulAdd(set(request.c), hn::Sub(x, set(request.cx)), set(request.a));
-    const FloatV common_y =
-        hn::NegMulAdd(set(request.c), hn::Sub(y, set(request.cy)), set(request.b));
-    const FloatV dx = hn::MulAdd(hn::ConvertTo(d, own_x), set(request.step_x), common_x);
-    const FloatV dy = hn::MulAdd(hn::ConvertTo(d, own_y), set(request.step_y), common_y);
-
+    FloatV x;
+    FloatV y;
+    FloatV dx;
+    FloatV dy;
+    hn::LoadInterleaved4(d, &bin[i].x, x, y, dx, dy);
     const FloatV x0 = hn::MulAdd(set(request.to_first), dx, x);
     const FloatV y0 = hn::MulAdd(set(request.to_first), dy, y);
     const FloatV x1 = hn::MulAdd(set(request.to_last), dx, x);
@@ -77,10 +64,10 @@ std::size_t gather(const CompactRay* bin, std::size_t count, const GatherRequest
     const auto append = [&](FloatV values, float* to) {
       hn::StoreU(hn::Compress(values, near), d, to + size);
     };
-    append(hn::Mul(hn::Sub(x, set(request.origin_x)), scale), rays.x);
-    append(hn::Mul(hn::Sub(y, set(request.origin_y)), scale), rays.y);
-    append(hn::Mul(dx, scale), rays.dx);
-    append(hn::Mul(dy, scale), rays.dy);
+    append(hn::Mul(hn::Sub(x0, set(request.origin_x)), scale), rays.x);
+    append(hn::Mul(hn::Sub(y0, set(request.origin_y)), scale), rays.y);
+    append(hn::Mul(dx, shift_scale), rays.dx);
+    append(hn::Mul(dy, shift_scale), rays.dy);
     size += hn::CountTrue(d, near);
   }
   return size;

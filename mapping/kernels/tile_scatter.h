@@ -54,31 +54,23 @@ static_assert((kSharedOrigin + kTileCells) << kFractionBits <= 1 << 23);
 /// Vectors may read and write this number of elements past the end of a tile's rays.
 inline constexpr std::size_t kRayPadding = 64;
 
-/// A ray of a bin: its pixel on the anchor plane, in 1/4096 px from the bin's corner, and the
-/// difference of its shift from the common shift of all bins, in their unit.
-struct CompactRay {
-  std::uint16_t x;
-  std::uint16_t y;
-  std::int16_t dx;
-  std::int16_t dy;
+/// A ray of a bin: its pixel on an anchor plane, and its shift in pixels per unit of inverse depth.
+struct BinnedRay {
+  float x, y;
+  float dx, dy;
 };
 
-/// The rays of a bin that a tile needs. A ray that meets the anchor plane at (u, v) from the
-/// principal point moves by (a - c u + step_x dx, b - c v + step_y dy) pixels per unit of inverse
-/// depth.
+/// The rays of bins that a tile needs.
 struct GatherRequest {
-  float corner_x = 0, corner_y = 0;  ///< The bin's corner, pixels of the view.
-  float cx = 0, cy = 0;              ///< The view's principal point.
-  float a = 0, b = 0, c = 0;
-  float step_x = 0, step_y = 0;
   float to_first = 0, to_last = 0;  ///< From the anchor plane to the group's first and last, 1/m.
+  float moving = 1;                 ///< 1; or 0 on a single plane, where rays stand still.
   float left = 0, right = 0, top = 0, bottom = 0;  ///< The tile's cells, pixels.
   float origin_x = 0, origin_y = 0;                ///< Of the gathered coordinates, pixels.
 };
 
-/// Rays that a tile may see in a group of planes, as four arrays: their pixels on the anchor plane
-/// and their shifts per inverse depth, in 1/4096 px. Neither depends on the group or the tile, so
-/// a ray's vote has the same bits in every one.
+/// Rays that a tile may see in a group of planes, as four arrays: their pixels on the group's first
+/// plane and their shifts per inverse depth, in 1/4096 px. Neither depends on the tile, so a ray's
+/// vote has the same bits in every one.
 struct MovingRays {
   float* x = nullptr;
   float* y = nullptr;
@@ -113,11 +105,12 @@ struct FullCell {
 };
 
 struct TileFunctions {
-  /// Appends the rays of a bin that come near the tile between the two planes.
+  /// Appends the rays of bins that come near the tile between the two planes.
+  /// @param bin followed by room for a vector of rays.
   /// @param rays with room for `count` more and the padding. @return their new number.
-  std::size_t (*gather)(const CompactRay* bin, std::size_t count, const GatherRequest& request,
+  std::size_t (*gather)(const BinnedRay* bin, std::size_t count, const GatherRequest& request,
                         const MovingRays& rays) = nullptr;
-  /// Votes where the rays meet the plane that is `to_plane` (1/m) from the anchor plane.
+  /// Votes where the rays meet the plane that is `to_plane` (1/m) from the plane of their pixels.
   /// @param full receives full cells; has room for one of every kVotesPerCell rays. @return one
   /// past the last one.
   FullCell* (*vote)(const MovingRays& rays, float to_plane, const CellWindow& window,

@@ -130,7 +130,7 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
 
 /// 3. Divides the window into sub-intervals and back-projects their events, cameras in parallel.
 std::vector<WindowRays> KeyframeMapper::raysOfCameras(const WindowInput& input,
-                                                    const Trajectory& motion) const {
+                                                      const Trajectory& motion) const {
   std::vector<WindowRays> cameras(input.cameras.size());
   tbb::parallel_for(std::size_t{0}, cameras.size(), [&](std::size_t i) {
     cameras[i] = raysOf(input.cameras[i], input, motion, groups_, options_.packets);

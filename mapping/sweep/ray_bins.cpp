@@ -4,376 +4,279 @@
 #include <tbb/parallel_for_each.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <iterator>
 #include <limits>
+#include <map>
 #include <numeric>
-#include <optional>
+#include <tuple>
 #include <utility>
 
 namespace efm {
 namespace {
 
-/// Side of a bin. Smaller bins are more, larger bins have more rays that a tile does not see.
+/// Side of a bin, and the distance that packets of one `RayBins` may be apart. Smaller bins are
+/// more, larger bins have more rays that a tile does not see.
 constexpr double kBin_px = 16;
-/// The largest difference of a compact ray from the common shift, in units.
-constexpr double kMaxOwnShift = 32'000;
-/// The widest margin of bins around the view where rays are compact.
-constexpr double kMaxMargin_px = 2048;
+/// Of a bin on average. Fewer rays do not fill vectors.
+constexpr double kRaysPerBin = 8;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-bool isInFront(const RayPacket& packet, const DsiGrid& grid, int plane) {
-  return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
+/// The planes in front of a packet's camera; empty where all are behind it.
+PlaneRange planesInFront(const RayPacket& packet, const DsiGrid& grid) {
+  const int count = grid.planes.size();
+  const auto in_front = [&](int plane) {
+    return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
+  };
+  // Forward rays leave their camera for the farther planes, backward rays for the nearer ones.
+  int begin = 0;
+  int end = count;
+  while (begin < end) {
+    const int middle = (begin + end) / 2;
+    in_front(middle) == packet.forward ? end = middle : begin = middle + 1;
+  }
+  const int from = packet.forward ? begin : 0;
+  const int until = packet.forward ? count : begin;
+  return from < until ? PlaneRange(grid.planes, from, until) : PlaneRange();
 }
 
-/// How far from the view a ray that is inside it on some plane can meet the anchor plane, in
-/// pixels. From its pixel u on a plane it moves by (f C_x - C_z u) / (1 - C_z/Z) per unit of
-/// inverse depth; the maximum lies at the ends of the ranges of planes and u.
-double marginOf(const RayPacket& packet, const DsiGrid& grid, double anchor) {
-  const ReferenceView& view = grid.view;
-  const double cz = packet.center_ref.z();
-  double margin = 0;
-  for (const int plane : {0, grid.planes.size() - 1}) {
-    const double at = 1 / grid.planes.depth(plane);
-    if (!isInFront(packet, grid, plane)) return kInfinity;
-    const double step = std::abs((at - anchor) / (1 - cz * at));
-    const auto extend = [&](double shift_at_center, double u) {
-      margin = std::max(margin, step * std::abs(shift_at_center - cz * u));
-    };
-    for (const double x : {0, view.width}) extend(view.fx * packet.center_ref.x(), x - view.cx);
-    for (const double y : {0, view.height}) extend(view.fy * packet.center_ref.y(), y - view.cy);
-  }
-  return margin;
+/// A packet's transfer to one end of the planes.
+Eigen::Array3d transferAt(const RayPacket& packet, const ReferenceView& view,
+                          double inverse_depth) {
+  const PlaneTransfer to = transferToPlane(packet, view, 1 / inverse_depth);
+  return {to.scale, to.offset_x + (to.scale - 1) * view.cx, to.offset_y + (to.scale - 1) * view.cy};
 }
 
-/// The kind of a packet's rays; none where all planes are behind the camera.
-std::optional<RayBins::Kind> kindOf(const RayPacket& packet, const DsiGrid& grid) {
-  const bool near = isInFront(packet, grid, 0);
-  const bool far = isInFront(packet, grid, grid.planes.size() - 1);
-  if (near && far && marginOf(packet, grid, RayBins::middleAnchor(grid.planes)) <= kMaxMargin_px) {
-    return RayBins::Kind::kAllPlanes;
-  }
-  if (far && packet.forward) return RayBins::Kind::kFarPlanes;
-  if (near && !packet.forward) return RayBins::Kind::kNearPlanes;
-  return std::nullopt;
-}
+/// How far apart packets move the same ray, over the planes. Rays lie up to half a view from the
+/// principal point.
+class Spread {
+ public:
+  explicit Spread(const ReferenceView& view) : view_(view) {}
 
-double anchorOf(RayBins::Kind kind, const DepthPlanes& planes) {
-  switch (kind) {
-    case RayBins::Kind::kAllPlanes:
-      return RayBins::middleAnchor(planes);
-    case RayBins::Kind::kFarPlanes:
-      return 1 / planes.depth(planes.size() - 1);
-    case RayBins::Kind::kNearPlanes:
-      return 1 / planes.depth(0);
+  void add(const RayPacket& packet, const PlaneRange& planes) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Eigen::Array3d transfer =
+          transferAt(packet, view_, i == 0 ? planes.first : planes.last);
+      min_[i] = min_[i].min(transfer);
+      max_[i] = max_[i].max(transfer);
+    }
   }
-  return 0;
-}
+  double pixels() const {
+    double spread = 0;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const Eigen::Array3d width = max_[i] - min_[i];
+      spread = std::max({spread, width[1] + 0.5 * width[0] * view_.width,
+                         width[2] + 0.5 * width[0] * view_.height});
+    }
+    return spread;
+  }
+
+ private:
+  ReferenceView view_;
+  Eigen::Array3d min_[2] = {Eigen::Array3d::Constant(kInfinity), min_[0]};
+  Eigen::Array3d max_[2] = {Eigen::Array3d::Constant(-kInfinity), max_[0]};
+};
 
 }  // namespace
 
-void RayBins::Range::extend(double value) {
-  min = std::min(min, value);
-  max = std::max(max, value);
-}
-
-double RayBins::middleAnchor(const DepthPlanes& planes) {
-  return 0.5 * (1 / planes.depth(0) + 1 / planes.depth(planes.size() - 1));
-}
-
-RayBins::Shift RayBins::shiftFrom(const RayPacket& packet, const ReferenceView& view,
-                                  double anchor) {
-  const Eigen::Vector3d& center = packet.center_ref;
-  const double scale = 1 - center.z() * anchor;
-  return {view.fx * center.x() / scale, view.fy * center.y() / scale, center.z() / scale};
-}
-
-/// The end of an interval of time in which the camera moves so little that the rays of a bin stay
-/// together on all planes, to within its side. Their differences from the common shift are small
-/// then, and the unit of these is fine.
-RayBins::PacketIterator RayBins::endOfSlowMotion(PacketIterator packet, PacketIterator end,
-                                                 const DsiGrid& grid) {
-  const DepthPlanes& planes = grid.planes;
-  const double anchor = middleAnchor(planes);
-  const double half_range = 0.5 * (1 / planes.depth(0) - 1 / planes.depth(planes.size() - 1));
-  Range a{kInfinity, -kInfinity};
-  Range b = a;
-  Range c = a;
-  double margin = 0;
-  for (; packet != end; ++packet) {
-    const Shift shift = shiftFrom(*packet, grid.view, anchor);
-    a.extend(shift.a);
-    b.extend(shift.b);
-    c.extend(shift.c);
-    margin = std::max(margin, marginOf(*packet, grid, anchor));
-    const double along_x = a.width() + c.width() * (grid.view.width + margin);
-    const double along_y = b.width() + c.width() * (grid.view.height + margin);
-    if (std::max(along_x, along_y) * half_range > kBin_px) break;  // never at the first
-  }
-  return packet;
+RayBins::Axis::Axis(const Range& pixels, float side) : begin(pixels.min), bins_per_pixel(1 / side) {
+  constexpr Range kEmpty{std::numeric_limits<float>::infinity(),
+                         -std::numeric_limits<float>::infinity()};
+  on_anchor.assign(static_cast<std::size_t>((pixels.max - pixels.min) / side) + 1, kEmpty);
+  on_other = on_anchor;
+  last_bin = static_cast<float>(bins() - 1);
 }
 
 std::vector<RayBins> RayBins::sort(const RayBundle& rays, const DsiGrid& grid) {
-  constexpr Kind kKinds[] = {Kind::kAllPlanes, Kind::kFarPlanes, Kind::kNearPlanes};
-  std::array<std::vector<RayPacket>, std::size(kKinds)> packets;
+  using Planes = std::tuple<bool, int, int>;
+  std::map<Planes, std::vector<RayPacket>> in_front;  // of the same planes
   for (const RayPacket& packet : rays.packets) {
-    const auto kind = kindOf(packet, grid);
-    if (kind) packets[static_cast<std::size_t>(*kind)].push_back(packet);
+    const PlaneRange planes = planesInFront(packet, grid);
+    if (packet.begin == packet.end || planes.begin == planes.end) continue;
+    in_front[{packet.forward, planes.begin, planes.end}].push_back(packet);
   }
+  const double min_rays =
+      kRaysPerBin * static_cast<double>(grid.view.pixels()) / (kBin_px * kBin_px);
   std::vector<RayBins> all;
-  for (const Kind kind : kKinds) {
-    const std::vector<RayPacket>& of_kind = packets[static_cast<std::size_t>(kind)];
-    for (auto begin = of_kind.begin(); begin != of_kind.end();) {
-      const auto end =
-          kind == Kind::kAllPlanes ? endOfSlowMotion(begin, of_kind.end(), grid) : of_kind.end();
-      all.push_back(RayBins(kind, std::vector<RayPacket>(begin, end), grid));
-      begin = end;
+  for (const auto& [key, packets] : in_front) {
+    const auto& [forward, begin, end] = key;
+    const PlaneRange planes(grid.planes, begin, end);
+    for (auto packet = packets.begin(); packet != packets.end();) {
+      const auto first = packet;
+      Spread spread(grid.view);
+      std::size_t count = 0;
+      do {
+        spread.add(*packet, planes);
+        count += packet->end - packet->begin;
+        ++packet;
+      } while (packet != packets.end() &&
+               (static_cast<double>(count) < min_rays || spread.pixels() <= kBin_px));
+      all.push_back(RayBins(planes, forward, {first, packet}, grid.view));
     }
   }
-  tbb::parallel_for_each(all, [&rays](RayBins& bins) {
-    bins.countRays(rays);
-    bins.onAllPlanes() ? bins.storeCompact(rays) : bins.storeWide(rays);
-  });
+  tbb::parallel_for_each(all, [&rays](RayBins& bins) { bins.store(rays); });
   return all;
 }
 
-RayBins::RayBins(Kind kind, std::vector<RayPacket> packets, const DsiGrid& grid)
-    : kind_(kind),
-      view_(grid.view),
-      anchor_(anchorOf(kind, grid.planes)),
-      packets_(std::move(packets)) {
-  columns_.principal = view_.cx;
-  columns_.pixels = view_.width;
-  rows_.principal = view_.cy;
-  rows_.pixels = view_.height;
-  c_ = columns_.at_center = rows_.at_center = {kInfinity, -kInfinity};
+RayBins::RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> packets,
+                 const ReferenceView& view)
+    : planes_(planes), forward_(forward), packets_(std::move(packets)), view_(view) {
+  double scale_first = 0;
+  double scale_last = 0;
+  std::size_t count = 0;
   for (const RayPacket& packet : packets_) {
-    const Shift shift = shiftOf(packet);
-    columns_.at_center.extend(shift.a);
-    rows_.at_center.extend(shift.b);
-    c_.extend(shift.c);
+    scale_first += std::abs(transferAt(packet, view, planes.first)[0]);
+    scale_last += std::abs(transferAt(packet, view, planes.last)[0]);
+    count += packet.end - packet.begin;
   }
-  spanBins(grid);
+  anchor_ = scale_first <= scale_last ? planes.first : planes.last;
+  other_ = scale_first <= scale_last ? planes.last : planes.first;
+  const Range x = pixelsOnAnchor(1, view.width, view.cx);
+  const Range y = pixelsOnAnchor(2, view.height, view.cy);
+  const double area = double{x.max - x.min} * double{y.max - y.min};
+  const auto side = static_cast<float>(
+      std::max(kBin_px, std::sqrt(area * kRaysPerBin / static_cast<double>(count))));
+  columns_ = Axis(x, side);
+  rows_ = Axis(y, side);
 }
 
-RayBins::Shift RayBins::shiftOf(const RayPacket& packet) const {
-  return shiftFrom(packet, view_, anchor_);
-}
-
-RayBins::Range RayBins::Axis::fromPrincipal() const {
-  return {begin - principal, begin + bins * kBin_px - principal};
-}
-
-/// Lays bins over the view and a margin. The margin holds all compact rays. Of wide rays, the
-/// outermost bins also hold those beyond it.
-void RayBins::spanBins(const DsiGrid& grid) {
-  double margin = kMaxMargin_px;
-  if (onAllPlanes()) {
-    margin = 0;
-    for (const RayPacket& packet : packets_) {
-      margin = std::max(margin, marginOf(packet, grid, anchor_));
+/// The pixels on the anchor plane of rays that are inside the view there or at the other end.
+RayBins::Range RayBins::pixelsOnAnchor(Eigen::Index axis, int pixels, double principal) const {
+  Range range{0, static_cast<float>(pixels)};
+  for (const RayPacket& packet : packets_) {
+    const Eigen::Array3d anchor = transferAt(packet, view_, anchor_);
+    const Eigen::Array3d other = transferAt(packet, view_, other_);
+    for (const double pixel : {0.0, 1.0 * pixels}) {
+      const double u_inf = (pixel - principal - other[axis]) / other[0];
+      range.extend(static_cast<float>(principal + anchor[0] * u_inf + anchor[axis]));
     }
   }
-  const double border = kBin_px * std::ceil((margin + 1) / kBin_px);
-  for (Axis* axis : {&columns_, &rows_}) {
-    axis->begin = -border;
-    axis->bins = static_cast<int>(std::ceil((axis->pixels + 2 * border) / kBin_px));
-    // Two shifts at the same pixel differ most where |u| is largest.
-    const Range u = axis->fromPrincipal();
-    const double max_difference = 0.5 * axis->at_center.width() +
-                                  0.5 * c_.width() * std::max(std::abs(u.min), std::abs(u.max));
-    axis->step = max_difference / kMaxOwnShift;
-  }
+  return range;
 }
 
-/// Visits the rays packet by packet. visit(packet) returns the function that visits a ray of the
-/// packet: f(bin, column, row, index), with the ray's position in columns and rows of bins.
+/// Visits the rays that cross the view, packet by packet: visit(ray, column, row, x, y), with the
+/// bin and the pixel at the other end of the planes.
 template <typename Visit>
-void RayBins::forEachRay(const RayBundle& rays, const Visit& visit) const {
-  const auto columns = static_cast<float>(columns_.bins);
-  const auto rows = static_cast<float>(rows_.bins);
+void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
+  struct Transfer {
+    Transfer(const RayPacket& packet, const ReferenceView& view, double inverse_depth) {
+      const PlaneTransfer to = transferToPlane(packet, view, 1 / inverse_depth);
+      scale = static_cast<float>(to.scale);
+      x = static_cast<float>(to.offset_x);
+      y = static_cast<float>(to.offset_y);
+    }
+    float scale, x, y;
+  };
+  const auto crosses = [](float a, float b, int pixels) {
+    constexpr float kRounding_px = 0.01F;
+    return std::isfinite(a) && std::isfinite(b) && std::max(a, b) >= -kRounding_px &&
+           std::min(a, b) <= static_cast<float>(pixels - 1) + kRounding_px;
+  };
   for (const RayPacket& packet : packets_) {
-    const PlaneTransfer to_anchor = transferToPlane(packet, view_, 1 / anchor_);
-    const auto scale = static_cast<float>(to_anchor.scale / kBin_px);
-    const auto offset_x = static_cast<float>((to_anchor.offset_x - columns_.begin) / kBin_px);
-    const auto offset_y = static_cast<float>((to_anchor.offset_y - rows_.begin) / kBin_px);
-    const auto visit_ray = visit(packet);
+    const Transfer anchor(packet, view_, anchor_);
+    const Transfer other(packet, view_, other_);
+    const Eigen::Vector3d& center = packet.center_ref;
+    const auto c = static_cast<float>(center.z());
+    const auto a = static_cast<float>(view_.fx * center.x() + view_.cx * center.z());
+    const auto b = static_cast<float>(view_.fy * center.y() + view_.cy * center.z());
     for (std::size_t i = packet.begin; i < packet.end; ++i) {
-      float column = scale * rays.x_inf[i] + offset_x;
-      float row = scale * rays.y_inf[i] + offset_y;
-      if (!(column >= 0 && column < columns && row >= 0 && row < rows)) {
-        if (onAllPlanes() || !std::isfinite(column) || !std::isfinite(row)) continue;
-        column = std::clamp(column, 0.0F, columns - 1);
-        row = std::clamp(row, 0.0F, rows - 1);
-      }
-      visit_ray(binAt(static_cast<int>(column), static_cast<int>(row)), column, row, i);
+      const float x_inf = bundle.x_inf[i];
+      const float y_inf = bundle.y_inf[i];
+      const float x = anchor.scale * x_inf + anchor.x;
+      const float y = anchor.scale * y_inf + anchor.y;
+      const float x_other = other.scale * x_inf + other.x;
+      const float y_other = other.scale * y_inf + other.y;
+      if (!crosses(x, x_other, view_.width) || !crosses(y, y_other, view_.height)) continue;
+      visit(kernels::BinnedRay{x, y, a - c * x_inf, b - c * y_inf}, columns_.binOf(x),
+            rows_.binOf(y), x_other, y_other);
     }
   }
 }
 
-void RayBins::countRays(const RayBundle& rays) {
-  begin_.assign(binAt(0, rows_.bins) + 1, 0);
-  forEachRay(rays, [this](const RayPacket&) {
-    return [this](std::size_t bin, float, float, std::size_t) { ++begin_[bin + 1]; };
+void RayBins::store(const RayBundle& bundle) {
+  const auto bin_at = [this](int column, int row) {
+    return static_cast<std::size_t>(row * columns_.bins() + column);
+  };
+  begin_.assign(bin_at(0, rows_.bins()) + 1, 0);
+  forEachRay(bundle, [&](const kernels::BinnedRay& ray, int column, int row, float x, float y) {
+    ++begin_[bin_at(column, row) + 1];
+    columns_.on_anchor[static_cast<std::size_t>(column)].extend(ray.x);
+    columns_.on_other[static_cast<std::size_t>(column)].extend(x);
+    rows_.on_anchor[static_cast<std::size_t>(row)].extend(ray.y);
+    rows_.on_other[static_cast<std::size_t>(row)].extend(y);
   });
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
-}
-
-void RayBins::storeCompact(const RayBundle& rays) {
-  const auto within_bin = [](float position) {
-    return static_cast<std::uint16_t>((position - static_cast<float>(static_cast<int>(position))) *
-                                      65536.0F);
-  };
-  // A ray's difference from the common shift in units, linear in its position.
-  struct OwnShift {
-    float at_zero = 0;
-    float gradient = 0;
-    std::int16_t operator()(float position) const {
-      constexpr float kToNearest = 32768.5F;  // makes numbers positive before they are rounded
-      return static_cast<std::int16_t>(
-          static_cast<int>(at_zero + gradient * position + kToNearest) - 32768);
-    }
-  };
-  const auto own_shift = [this](const Axis& axis, double at_center, double c) {
-    if (axis.step == 0) return OwnShift();
-    const double gradient = (c_.middle() - c) / axis.step;
-    const double center = (at_center - axis.at_center.middle()) / axis.step;
-    return OwnShift{static_cast<float>(center + gradient * (axis.begin - axis.principal)),
-                    static_cast<float>(gradient * kBin_px)};
-  };
-  std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
-  compact_.resize(begin_.back() + kernels::kRayPadding);
-  forEachRay(rays, [&](const RayPacket& packet) {
-    const Shift shift = shiftOf(packet);
-    return [&, dx = own_shift(columns_, shift.a, shift.c), dy = own_shift(rows_, shift.b, shift.c)](
-               std::size_t bin, float column, float row, std::size_t) {
-      compact_[next[bin]++] = {within_bin(column), within_bin(row), dx(column), dy(row)};
-    };
+  std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
+  rays_.resize(begin_.back() + kernels::kRayPadding);
+  forEachRay(bundle, [&](const kernels::BinnedRay& ray, int column, int row, float, float) {
+    rays_[next[bin_at(column, row)]++] = ray;
   });
+  packets_ = {};
 }
 
-void RayBins::storeWide(const RayBundle& rays) {
-  std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
-  wide_.resize(begin_.back());
-  forEachRay(rays, [&](const RayPacket& packet) {
-    const auto index = static_cast<std::uint32_t>(&packet - packets_.data());
-    return [&, index](std::size_t bin, float, float, std::size_t ray) {
-      wide_[next[bin]++] = {rays.x_inf[ray], rays.y_inf[ray], index};
-    };
-  });
-}
-
-double RayBins::maxShift() const {
-  const auto max_abs = [](const Range& range) {
-    return std::max(std::abs(range.min), std::abs(range.max));
-  };
-  const auto along = [&](const Axis& axis) {
-    return max_abs(axis.at_center) + max_abs(c_) * max_abs(axis.fromPrincipal());
-  };
-  return std::max(along(columns_), along(rows_));
-}
-
-RayBins::Footprint RayBins::footprintIn(const PlaneRange& group) const {
+RayBins::Footprint RayBins::footprintOn(const PlaneRange& planes) const {
   Footprint footprint;
-  footprint.group_ = group;
-  footprint.columns_ = footprintAlong(columns_, group);
-  footprint.rows_ = footprintAlong(rows_, group);
-  if (onAllPlanes()) return footprint;
-  for (const RayPacket& packet : packets_) {
-    footprint.transfers_.push_back(transferToPlane(packet, view_, group.first_depth_m));
-  }
+  footprint.planes_ = planes;
+  footprint.columns_ = sideOf(columns_, planes);
+  footprint.rows_ = sideOf(rows_, planes);
   return footprint;
 }
 
-std::vector<RayBins::Range> RayBins::footprintAlong(const Axis& axis,
-                                                    const PlaneRange& group) const {
-  const auto rangeOf = [](std::initializer_list<double> values) {
-    const auto [min, max] = std::minmax(values);
-    return Range{min, max};
+/// Rays run straight: between two planes, a bin's pixels are at most the mean of those on the two.
+RayBins::Footprint::Side RayBins::sideOf(const Axis& axis, const PlaneRange& planes) const {
+  const auto pixelsAt = [&](std::size_t bin, double inverse_depth) {
+    const Range& anchor = axis.on_anchor[bin];
+    const Range& other = axis.on_other[bin];
+    if (anchor.min > anchor.max || other_ == anchor_) return anchor;
+    const auto t = static_cast<float>((inverse_depth - anchor_) / (other_ - anchor_));
+    return Range{anchor.min + t * (other.min - anchor.min),
+                 anchor.max + t * (other.max - anchor.max)};
   };
-  const double to_first = 1 / group.first_depth_m - anchor_;
-  const double to_last = 1 / group.last_depth_m - anchor_;
-  std::vector<Range> footprint(static_cast<std::size_t>(axis.bins));
-  for (int bin = 0; bin < axis.bins; ++bin) {
-    const double begin = axis.begin + bin * kBin_px;
-    const double u0 = begin - axis.principal;
-    const double u1 = u0 + kBin_px;
-    const Range cu = rangeOf({c_.min * u0, c_.min * u1, c_.max * u0, c_.max * u1});
-    const Range shift{axis.at_center.min - cu.max, axis.at_center.max - cu.min};
-    const Range moved = rangeOf(
-        {to_first * shift.min, to_first * shift.max, to_last * shift.min, to_last * shift.max});
-    const bool open = !onAllPlanes() && (bin == 0 || bin == axis.bins - 1);
-    footprint[static_cast<std::size_t>(bin)] =
-        open ? Range{-kInfinity, kInfinity} : Range{begin + moved.min, begin + kBin_px + moved.max};
+  Footprint::Side side;
+  for (std::size_t bin = 0; bin < axis.on_anchor.size(); ++bin) {
+    const Range first = pixelsAt(bin, planes.first);
+    const Range last = pixelsAt(bin, planes.last);
+    side.min_from.push_back(std::min(first.min, last.min));
+    side.max_until.push_back(std::max(first.max, last.max));
   }
-  return footprint;
+  for (std::size_t bin = 1; bin < side.max_until.size(); ++bin) {
+    side.max_until[bin] = std::max(side.max_until[bin], side.max_until[bin - 1]);
+    const std::size_t back = side.min_from.size() - 1 - bin;
+    side.min_from[back] = std::min(side.min_from[back], side.min_from[back + 1]);
+  }
+  return side;
+}
+
+std::pair<std::size_t, std::size_t> RayBins::Footprint::Side::binsIn(float min, float max) const {
+  const auto begin = std::lower_bound(max_until.begin(), max_until.end(), min) - max_until.begin();
+  const auto end = std::upper_bound(min_from.begin(), min_from.end(), max) - min_from.begin();
+  return {static_cast<std::size_t>(begin), static_cast<std::size_t>(std::max(begin, end))};
 }
 
 void RayBins::gather(const Footprint& footprint, const TileCells& tile,
-                     const kernels::TileFunctions& functions, TileRays& rays) const {
-  constexpr double kRounding_px = 0.01;  // coordinates are rounded to 1/4096 px later
-  constexpr double kHalfUnit_px = 0.5 / 4096;
+                     const kernels::TileFunctions& functions, bool moving, TileRays& rays) const {
+  constexpr double kRounding_px = 0.01;
   const cv::Rect& cells = tile.in_view;
   const auto narrow = [](double value) { return static_cast<float>(value); };
   kernels::GatherRequest request;
-  request.cx = narrow(view_.cx);
-  request.cy = narrow(view_.cy);
-  request.a = narrow(columns_.at_center.middle());
-  request.b = narrow(rows_.at_center.middle());
-  request.c = narrow(c_.middle());
-  request.step_x = narrow(columns_.step);
-  request.step_y = narrow(rows_.step);
-  request.to_first = narrow(1 / footprint.group_.first_depth_m - anchor_);
-  request.to_last = narrow(1 / footprint.group_.last_depth_m - anchor_);
+  request.to_first = narrow(footprint.planes_.first - anchor_);
+  request.to_last = narrow(footprint.planes_.last - anchor_);
+  request.moving = moving ? 1.0F : 0.0F;
   request.left = narrow(cells.x - kRounding_px);
   request.right = narrow(cells.x + cells.width + kRounding_px);
   request.top = narrow(cells.y - kRounding_px);
   request.bottom = narrow(cells.y + cells.height + kRounding_px);
   request.origin_x = narrow(tile.origin.x);
   request.origin_y = narrow(tile.origin.y);
-
-  const auto touches = [](const Range& bin, float min, float max) {
-    return bin.max >= min && bin.min <= max;
-  };
-  for (int row = 0; row < rows_.bins; ++row) {
-    if (!touches(footprint.rows_[static_cast<std::size_t>(row)], request.top, request.bottom))
-      continue;
-    request.corner_y = narrow(rows_.begin + row * kBin_px + kHalfUnit_px);
-    for (int column = 0; column < columns_.bins; ++column) {
-      const Range& bin_columns = footprint.columns_[static_cast<std::size_t>(column)];
-      if (!touches(bin_columns, request.left, request.right)) continue;
-      request.corner_x = narrow(columns_.begin + column * kBin_px + kHalfUnit_px);
-      const std::size_t bin = binAt(column, row);
-      const std::size_t count = begin_[bin + 1] - begin_[bin];
-      if (count == 0) continue;
-      rays.reserve(count);
-      if (onAllPlanes()) {
-        rays.resize(functions.gather(compact_.data() + begin_[bin], count, request, rays.view()));
-      } else {
-        gatherWide(footprint, bin, request, rays);
-      }
-    }
-  }
-}
-
-/// Gathers rays that need not be on all planes, by their pixel on the group's one plane, which the
-/// plain kernel computes alike.
-void RayBins::gatherWide(const Footprint& footprint, std::size_t bin,
-                         const kernels::GatherRequest& request, TileRays& rays) const {
-  constexpr auto kScale = static_cast<float>(1 << kernels::kFractionBits);
-  for (std::size_t i = begin_[bin]; i < begin_[bin + 1]; ++i) {
-    const WideRay& ray = wide_[i];
-    const PlaneTransfer& transfer = footprint.transfers_[ray.packet];
-    if (!transfer.in_front) continue;
-    const float x =
-        static_cast<float>(transfer.scale) * ray.x_inf + static_cast<float>(transfer.offset_x);
-    const float y =
-        static_cast<float>(transfer.scale) * ray.y_inf + static_cast<float>(transfer.offset_y);
-    if (x >= request.left && x < request.right && y >= request.top && y < request.bottom) {
-      rays.add((x - request.origin_x) * kScale, (y - request.origin_y) * kScale);
-    }
+  const auto [first_column, end_column] = footprint.columns_.binsIn(request.left, request.right);
+  const auto [first_row, end_row] = footprint.rows_.binsIn(request.top, request.bottom);
+  for (std::size_t row = first_row; row < end_row; ++row) {
+    const std::size_t bin = row * columns_.on_anchor.size();
+    const std::uint32_t begin = begin_[bin + first_column];
+    const std::size_t count = begin_[bin + end_column] - begin;
+    if (count == 0) continue;
+    rays.reserve(count);
+    rays.resize(functions.gather(rays_.data() + begin, count, request, rays.view()));
   }
 }
 

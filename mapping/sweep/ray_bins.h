@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "mapping/dsi/dsi_grid.h"
@@ -15,122 +17,108 @@ namespace efm {
 /// Consecutive depth planes.
 struct PlaneRange {
   int begin = 0;
-  int end = 0;               ///< One past the last.
-  double first_depth_m = 0;  ///< Of plane `begin`.
-  double last_depth_m = 0;   ///< Of plane `end - 1`.
+  int end = 0;       ///< One past the last.
+  double first = 0;  ///< Inverse depth of plane `begin`, 1/m.
+  double last = 0;   ///< Inverse depth of plane `end - 1`.
+
+  PlaneRange() = default;
+  PlaneRange(const DepthPlanes& planes, int begin_plane, int end_plane)
+      : begin(begin_plane),
+        end(end_plane),
+        first(1 / planes.depth(begin_plane)),
+        last(1 / planes.depth(end_plane - 1)) {}
 };
 
-/// Rays of one input, sorted into square bins by their pixel on one plane, the anchor plane (Z0 of
-/// Rebecq et al., IJCV 2018, Eq. 15). The rays that a tile sees in a group of planes lie in the
-/// bins around it. Within a bin, rays keep the order of time.
+/// Rays of consecutive packets that are in front of their cameras on the same planes, and whose
+/// cameras are close together. They are sorted into square bins by their pixel on one plane, the
+/// anchor plane (Z0 of Rebecq et al., IJCV 2018, Eq. 15): a tile's rays on any plane are in a few
+/// adjacent bins. Within a bin, rays keep the order of time.
 ///
-/// With u counted from the principal point and C the camera centre, `transferToPlane` reads
-/// u(1/Z) = (1 - C_z/Z) u_inf + f C_x / Z. From the anchor plane at Z0 a ray therefore shifts by
-/// (f C_x - C_z u_0) / (1 - C_z/Z0) per unit of inverse depth, likewise in y.
+/// A ray crosses the planes along a straight line. With u counted from the principal point, its
+/// pixel is linear in inverse depth: u(1/Z) = u_inf + (f C_x - C_z u_inf) / Z.
 class RayBins {
  public:
-  /// The planes that the rays are on, and the position of the anchor plane.
-  enum class Kind {
-    kAllPlanes,  ///< In front of the camera on all planes; anchor in the middle. 8 bytes a ray, its
-                 ///< pixel and shift exact to some 1e-4 px.
-    kFarPlanes,  ///< Forward rays that are on far planes only or shift far; anchor on the farthest
-                 ///< plane. 12 bytes a ray.
-    kNearPlanes,  ///< Backward rays that are on near planes only or shift far; anchor on the
-                  ///< nearest plane. 12 bytes a ray.
-  };
-
-  /// Sorts rays into bins: apart by kind and, where the camera moves far, by intervals of time in
-  /// which it does not, so that a tile's rays lie in fewer bins. Rays outside the view on all
-  /// planes are left out. Runs on the threads of the task arena that it is called in.
+  /// Sorts the rays of one input. Rays outside the view on all planes in front of their camera are
+  /// left out. Runs on the threads of the task arena that it is called in.
   static std::vector<RayBins> sort(const RayBundle& rays, const DsiGrid& grid);
 
-  /// Inverse depth of the anchor plane of rays that are on all planes, 1/m.
-  static double middleAnchor(const DepthPlanes& planes);
+  /// Whether the rays are in front of their cameras on all planes of a group, and forward.
+  bool covers(const PlaneRange& group) const {
+    return forward_ && planes_.begin <= group.begin && planes_.end >= group.end;
+  }
+  bool isInFront(int plane) const { return planes_.begin <= plane && plane < planes_.end; }
 
-  bool onAllPlanes() const { return kind_ == Kind::kAllPlanes; }
-  /// The largest shift of a ray inside the view in x or y, in pixels per unit of inverse depth.
-  double maxShift() const;
+  /// The pixels of the bins on some planes.
+  class Footprint {
+   private:
+    friend class RayBins;
 
-  class Footprint;
-  /// Prepares for a group of planes: one plane, where rays are not on all of them.
-  Footprint footprintIn(const PlaneRange& group) const;
-  /// Appends the rays that may fall into the tile's cells on planes of the group. Thread-safe.
+    /// The pixels of the bins along one axis, kept so that those that meet an interval are found by
+    /// search.
+    struct Side {
+      std::vector<float> max_until;  // of the bins up to this one
+      std::vector<float> min_from;   // of this bin and those after it
+      /// @return the first, and one past the last, of the bins that meet an interval.
+      std::pair<std::size_t, std::size_t> binsIn(float min, float max) const;
+    };
+
+    PlaneRange planes_;
+    Side columns_;
+    Side rows_;
+  };
+  /// @param planes in front of the rays' cameras.
+  Footprint footprintOn(const PlaneRange& planes) const;
+  /// Appends the rays that may fall into the tile's cells on planes of the footprint. Thread-safe.
+  /// @param moving whether the rays cross several planes; else they stand still on one.
   void gather(const Footprint& footprint, const TileCells& tile,
-              const kernels::TileFunctions& functions, TileRays& rays) const;
+              const kernels::TileFunctions& functions, bool moving, TileRays& rays) const;
 
  private:
   struct Range {
-    double min = 0;
-    double max = 0;
-
-    double middle() const { return 0.5 * (min + max); }
-    double width() const { return max - min; }
-    void extend(double value);
+    float min = 0;
+    float max = 0;
+    void extend(float value) {
+      min = std::min(min, value);
+      max = std::max(max, value);
+    }
   };
-  /// A ray by its pixel on the plane at infinity.
-  struct WideRay {
-    float x_inf = 0, y_inf = 0;
-    std::uint32_t packet = 0;
-  };
-  /// The shift of a packet's rays from (u, v), per unit of inverse depth: (a - c u, b - c v).
-  struct Shift {
-    double a = 0, b = 0, c = 0;
-  };
-  /// Bins along one axis.
+  /// The bins along one axis.
   struct Axis {
-    double principal = 0;  // point of the view, pixels
-    int pixels = 0;        // side of the view
-    double begin = 0;      // corner of the first bin, pixels
-    int bins = 0;
-    Range at_center;  // shifts of the packets at the principal point: their a or b
-    double step = 0;  // unit of compact rays' differences from the common shift
+    Axis() = default;
+    Axis(const Range& pixels, float side);
+    int bins() const { return static_cast<int>(on_anchor.size()); }
+    /// The bin of a pixel of the anchor plane. The outermost bins also hold what lies beyond them.
+    int binOf(float pixel) const {
+      const float bin = (pixel - begin) * bins_per_pixel;
+      return static_cast<int>(std::max(0.0F, std::min(bin, last_bin)));
+    }
 
-    Range fromPrincipal() const;
+    float begin = 0;  // of the first bin, pixels of the anchor plane
+    float bins_per_pixel = 1;
+    float last_bin = 0;
+    // The pixels of each bin's rays on the anchor plane, and on the plane at the other end.
+    std::vector<Range> on_anchor, on_other;
   };
 
-  using PacketIterator = std::vector<RayPacket>::const_iterator;
-
-  RayBins(Kind kind, std::vector<RayPacket> packets, const DsiGrid& grid);
-
-  static Shift shiftFrom(const RayPacket& packet, const ReferenceView& view, double anchor);
-  static PacketIterator endOfSlowMotion(PacketIterator packet, PacketIterator end,
-                                        const DsiGrid& grid);
-  Shift shiftOf(const RayPacket& packet) const;
-  std::size_t binAt(int column, int row) const {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_.bins) +
-           static_cast<std::size_t>(column);
-  }
-  void spanBins(const DsiGrid& grid);
+  RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> packets,
+          const ReferenceView& view);
+  Range pixelsOnAnchor(Eigen::Index axis, int pixels, double principal) const;
+  Footprint::Side sideOf(const Axis& axis, const PlaneRange& planes) const;
   template <typename Visit>
-  void forEachRay(const RayBundle& rays, const Visit& visit) const;
-  void countRays(const RayBundle& rays);
-  void storeCompact(const RayBundle& rays);
-  void storeWide(const RayBundle& rays);
-  std::vector<Range> footprintAlong(const Axis& axis, const PlaneRange& group) const;
-  void gatherWide(const Footprint& footprint, std::size_t bin,
-                  const kernels::GatherRequest& request, TileRays& rays) const;
+  void forEachRay(const RayBundle& bundle, const Visit& visit) const;
+  void store(const RayBundle& bundle);
 
-  Kind kind_;
+  PlaneRange planes_;  // in front of the cameras
+  bool forward_;
+  std::vector<RayPacket> packets_;
   ReferenceView view_;
-  double anchor_ = 0;  // inverse depth
+  double anchor_ =
+      0;  // inverse depth: of the two ends of the planes, where rays are closer together
+  double other_ = 0;  // of the other end
   Axis columns_;
   Axis rows_;
-  Range c_;                         // of the packets' shifts
-  std::vector<std::size_t> begin_;  // of each bin's rays, row by row, and the end of all
-  std::vector<kernels::CompactRay> compact_;
-  std::vector<WideRay> wide_;
-  std::vector<RayPacket> packets_;
-};
-
-/// The pixels that the rays of each bin may have in a group of planes.
-class RayBins::Footprint {
- private:
-  friend class RayBins;
-
-  PlaneRange group_;
-  std::vector<Range> columns_;  // by bin, pixels
-  std::vector<Range> rows_;
-  std::vector<PlaneTransfer> transfers_;  // of packets of wide rays, to the group's one plane
+  std::vector<std::uint32_t> begin_;  // of each bin's rays, row by row, and the end of all
+  std::vector<kernels::BinnedRay> rays_;
 };
 
 }  // namespace efm

@@ -2,16 +2,15 @@
 #include "mapping/sweep/ray_index.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace efm {
 namespace {
 
-/// The largest shift of a ray within a group of planes. With a larger one, a tile gathers more rays
-/// that are outside it on some planes; with a smaller one, it gathers more often.
-constexpr double kMaxGroupShift_px = 10;
-/// A limit where rays hardly move.
-constexpr int kMaxGroupPlanes = 20;
+/// How far rays move within a group of planes on average. If they move farther, a tile gathers more
+/// rays that are outside it on some planes; if less, it gathers more often.
+constexpr double kGroupShift_px = 6;
 
 /// Votes on planes behind the camera.
 std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
@@ -29,10 +28,40 @@ std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
   return behind;
 }
 
+/// The mean shift of rays per unit of inverse depth, in pixels: of a ray halfway between the
+/// principal point and the border of the view, for each packet.
+class MeanShift {
+ public:
+  explicit MeanShift(const DsiGrid& grid) : view_(grid.view) {
+    const double range = 1 / grid.planes.depth(0) - 1 / grid.planes.depth(grid.planes.size() - 1);
+    // A ray that crosses the view counts once, however fast it is.
+    max_shift_ = std::max(view_.width, view_.height) / std::max(range, 1e-12);
+  }
+
+  void add(const RayBundle& rays) {
+    for (const RayPacket& packet : rays.packets) {
+      const Eigen::Vector3d center = packet.center_ref.cwiseAbs();
+      const double shift = std::max(view_.fx * center.x() + 0.25 * view_.width * center.z(),
+                                    view_.fy * center.y() + 0.25 * view_.height * center.z());
+      const auto count = static_cast<double>(packet.end - packet.begin);
+      sum_ += count * std::min(shift, max_shift_);
+      count_ += count;
+    }
+  }
+  double mean() const { return count_ > 0 ? sum_ / count_ : 0; }
+
+ private:
+  ReferenceView view_;
+  double max_shift_ = 0;
+  double sum_ = 0;
+  double count_ = 0;
+};
+
 }  // namespace
 
 RayIndex::RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingKernel kernel)
     : functions_(kernels::tileFunctions(kernel)), planes_(grid.planes) {
+  MeanShift shift(grid);
   for (CameraRays& camera : cameras) {
     VoteCounts& votes = not_cast_.emplace_back();
     for (RayBundle& slot : camera) {
@@ -40,52 +69,67 @@ RayIndex::RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingK
       const std::uint64_t behind = countBehind(rays, grid);
       votes.behind_camera += behind;
       votes.outside_view += rays.size() * static_cast<std::uint64_t>(planes_.size()) - behind;
-      bins_.push_back(RayBins::sort(rays, grid));
+      shift.add(rays);
+      inputs_.push_back({RayBins::sort(rays, grid), {}});
     }
   }
-  groups_ = dividePlanes();
-  for (const PlaneRange& group : groups_) {
-    auto& footprints = footprints_.emplace_back();
-    for (const auto& input : bins_) {
-      auto& of_input = footprints.emplace_back();
-      for (const RayBins& bins : input) of_input.push_back(bins.footprintIn(group));
-    }
+  groups_ = dividePlanes(shift.mean());
+  for (Input& input : inputs_) {
+    for (const PlaneRange& group : groups_) input.groups.push_back(sourcesOf(input.bins, group));
   }
 }
 
-std::vector<PlaneRange> RayIndex::dividePlanes() const {
-  double max_shift = 0;
-  bool on_all_planes = true;
-  for (const auto& input : bins_) {
-    for (const RayBins& bins : input) {
-      on_all_planes = on_all_planes && bins.onAllPlanes();
-      if (bins.onAllPlanes()) max_shift = std::max(max_shift, bins.maxShift());
-    }
-  }
+std::vector<PlaneRange> RayIndex::dividePlanes(double shift) const {
   std::vector<PlaneRange> groups;
   for (int begin = 0; begin < planes_.size(); begin = groups.back().end) {
     const double first = 1 / planes_.depth(begin);
     int end = begin + 1;
-    while (on_all_planes && end < planes_.size() && end - begin < kMaxGroupPlanes &&
-           (first - 1 / planes_.depth(end)) * max_shift <= kMaxGroupShift_px) {
+    while (end < planes_.size() && (first - 1 / planes_.depth(end)) * shift <= kGroupShift_px)
       ++end;
-    }
-    groups.push_back({begin, end, planes_.depth(begin), planes_.depth(end - 1)});
+    groups.emplace_back(planes_, begin, end);
   }
   return groups;
+}
+
+RayIndex::GroupSources RayIndex::sourcesOf(const std::vector<RayBins>& bins,
+                                           const PlaneRange& group) const {
+  GroupSources sources;
+  for (std::size_t i = 0; i < bins.size(); ++i) {
+    if (bins[i].covers(group)) {
+      sources.in_group.push_back({i, bins[i].footprintOn(group)});
+      continue;
+    }
+    for (int plane = group.begin; plane < group.end; ++plane) {
+      if (!bins[i].isInFront(plane)) continue;
+      sources.on_plane.resize(static_cast<std::size_t>(group.end - group.begin));
+      sources.on_plane[static_cast<std::size_t>(plane - group.begin)].push_back(
+          {i, bins[i].footprintOn({planes_, plane, plane + 1})});
+    }
+  }
+  return sources;
 }
 
 void RayIndex::gather(std::size_t group, std::size_t input, const TileCells& tile,
                       TileRays& rays) const {
   rays.clear();
-  for (std::size_t i = 0; i < bins_[input].size(); ++i) {
-    bins_[input][i].gather(footprints_[group][input][i], tile, functions_, rays);
+  const Input& of = inputs_[input];
+  for (const Source& source : of.groups[group].in_group) {
+    of.bins[source.bins].gather(source.footprint, tile, functions_, true, rays);
   }
+  rays.keep();
   rays.pad();
 }
 
-double RayIndex::fromAnchor(int plane) const {
-  return 1 / planes_.depth(plane) - RayBins::middleAnchor(planes_);
+void RayIndex::gatherOn(int plane, std::size_t group, std::size_t input, const TileCells& tile,
+                        TileRays& rays) const {
+  const Input& of = inputs_[input];
+  const auto& on_plane = of.groups[group].on_plane;
+  if (on_plane.empty()) return;
+  rays.clearToKept();
+  for (const Source& source : on_plane[static_cast<std::size_t>(plane - groups_[group].begin)]) {
+    of.bins[source.bins].gather(source.footprint, tile, functions_, false, rays);
+  }
+  rays.pad();
 }
 
 }  // namespace efm

@@ -26,8 +26,8 @@ class TileAccumulator {
   void moveTo(const TileCells& tile);
 
   /// Votes with the tile's rays on one plane.
-  /// @param rays padded. @param from_anchor from the rays' anchor plane to this one, 1/m.
-  void vote(TileRays& rays, double from_anchor);
+  /// @param rays padded. @param from_first from the plane of the rays' pixels to this one, 1/m.
+  void vote(TileRays& rays, double from_first);
   /// Whether the votes are so few that it pays to skip empty cells.
   bool isSparse() const { return sparse_; }
 

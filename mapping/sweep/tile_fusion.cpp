@@ -12,8 +12,8 @@ TileFusion::TileFusion(const FusionOptions& options, const FusionInputs& inputs,
     : options_(options),
       inputs_(inputs),
       keep_(keep),
-      pairs_(keep == PlaneFusion::Keep::kFusedOnly && inputs.cameras == 2 && inputs.slots_per_group == 1 &&
-             isAndLike(options.across_cameras)),
+      pairs_(keep == PlaneFusion::Keep::kFusedOnly && inputs.cameras == 2 &&
+             inputs.slots_per_group == 1 && isAndLike(options.across_cameras)),
       accumulators_{TileAccumulator(kernel), TileAccumulator(kernel)},
       votes_(static_cast<std::size_t>(inputs.cameras)) {}
 
@@ -30,35 +30,35 @@ void TileFusion::moveTo(const TileCells& tile) {
   for (PlaneValues* values : {&first_, &second_, &sum_}) values->resize(pixels);
 }
 
-const PlaneValues& TileFusion::fuse(std::vector<TileRays>& rays, double from_anchor) {
-  if (pairs_) return fuseOccupied(rays, from_anchor);
+const PlaneValues& TileFusion::fuse(std::vector<TileRays>& rays, double from_first) {
+  if (pairs_) return fuseOccupied(rays, from_first);
   planes_->begin();
   for (const CameraSlot& input : planes_->inputs()) {
     TileAccumulator& accumulator = accumulators_[0];
-    accumulator.vote(
-        rays[static_cast<std::size_t>(input.camera * inputs_.slots_per_group * inputs_.groups + input.slot)],
-        from_anchor);
+    accumulator.vote(rays[static_cast<std::size_t>(
+                         input.camera * inputs_.slots_per_group * inputs_.groups + input.slot)],
+                     from_first);
     votes_[static_cast<std::size_t>(input.camera)] += accumulator.resolve(planes_->next().data());
     planes_->add(input);
   }
   return planes_->fused();
 }
 
-const PlaneValues& TileFusion::fuseOccupied(std::vector<TileRays>& rays, double from_anchor) {
+const PlaneValues& TileFusion::fuseOccupied(std::vector<TileRays>& rays, double from_first) {
   std::fill(sum_.begin(), sum_.end(), 0.0F);
   const auto groups = static_cast<std::size_t>(inputs_.groups);
   for (std::size_t group = 0; group < groups; ++group) {
-    addPair(rays[group], rays[groups + group], from_anchor);
+    addPair(rays[group], rays[groups + group], from_first);
   }
   return sum_;
 }
 
 /// Adds the mean of a group's two inputs where both have votes.
-void TileFusion::addPair(TileRays& first_rays, TileRays& second_rays, double from_anchor) {
+void TileFusion::addPair(TileRays& first_rays, TileRays& second_rays, double from_first) {
   kernels::TilePixels both = all_pixels_;
   // Many votes are resolved at once, few wait until the other input's pixels are known.
   const auto vote = [&](TileAccumulator& accumulator, TileRays& rays, PlaneValues& density) {
-    accumulator.vote(rays, from_anchor);
+    accumulator.vote(rays, from_first);
     if (!accumulator.isSparse()) return accumulator.resolve(density.data());
     const std::uint64_t votes = accumulator.findOccupied();
     both.intersect(accumulator.occupied());

@@ -25,16 +25,16 @@ class TileFusion {
   void moveTo(const TileCells& tile);
   /// The fused plane, until the next call.
   /// @param rays the tile's, padded: input (camera, slot) at camera * slots * groups + slot.
-  /// @param from_anchor from the rays' anchor plane to this one, 1/m.
-  const PlaneValues& fuse(std::vector<TileRays>& rays, double from_anchor);
+  /// @param from_first from the plane of the rays' pixels to this one, 1/m.
+  const PlaneValues& fuse(std::vector<TileRays>& rays, double from_first);
   /// A camera's own plane after `fuse`, where cameras are kept.
   const PlaneValues& ofCamera(int camera) const { return planes_->ofCamera(camera); }
   /// The votes of each camera on all tiles and planes so far.
   const std::vector<std::uint64_t>& votes() const { return votes_; }
 
  private:
-  const PlaneValues& fuseOccupied(std::vector<TileRays>& rays, double from_anchor);
-  void addPair(TileRays& first_rays, TileRays& second_rays, double from_anchor);
+  const PlaneValues& fuseOccupied(std::vector<TileRays>& rays, double from_first);
+  void addPair(TileRays& first_rays, TileRays& second_rays, double from_first);
 
   FusionOptions options_;
   FusionInputs inputs_;

@@ -26,13 +26,6 @@ void TileRays::reserve(std::size_t more) {
   for (PlaneValues* values : {&x_, &y_, &dx_, &dy_}) values->resize(needed + needed / 2);
 }
 
-void TileRays::add(float x, float y) {
-  x_[size_] = x;
-  y_[size_] = y;
-  dx_[size_] = dy_[size_] = 0;
-  ++size_;
-}
-
 void TileRays::pad() {
   reserve(0);
   for (std::size_t i = size_; i < size_ + kernels::kRayPadding; ++i) {

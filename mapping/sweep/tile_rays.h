@@ -25,18 +25,21 @@ struct TileCells {
   cv::Point origin;  ///< Of the coordinates of the tile's rays, pixels.
 };
 
-/// The rays that one tile sees of one input in a group of planes. Keeps its memory.
+/// The rays that one tile sees of one input: those of a group of planes, and after them those of
+/// one plane alone. Keeps its memory.
 class TileRays {
  public:
   void clear() { size_ = 0; }
+  /// The rays so far are those of the group.
+  void keep() { kept_ = size_; }
+  /// Removes the rays of one plane alone.
+  void clearToKept() { size_ = kept_; }
   std::size_t size() const { return size_; }
 
   /// Makes room for more rays, which a kernel may write after the existing ones.
   void reserve(std::size_t more);
   /// Sets the number of rays after a kernel wrote some.
   void resize(std::size_t size) { size_ = size; }
-  /// Adds a ray that does not move, into reserved room.
-  void add(float x, float y);
   /// Fills up the last vector with rays that no tile sees.
   void pad();
 
@@ -45,6 +48,7 @@ class TileRays {
  private:
   PlaneValues x_, y_, dx_, dy_;
   std::size_t size_ = 0;
+  std::size_t kept_ = 0;
 };
 
 }  // namespace efm

@@ -115,15 +115,18 @@ class TiledSweep {
       }
       const PlaneRange& planes = rays_.groups()[group];
       for (int plane = planes.begin; plane < planes.end; ++plane) {
-        sweepPlane(plane, tile.tile, scratch);
+        for (std::size_t input = 0; input < rays_.inputs(); ++input) {
+          rays_.gatherOn(plane, group, input, tile, scratch.rays[input]);
+        }
+        sweepPlane(plane, rays_.fromFirst(group, plane), tile.tile, scratch);
       }
     }
     scratch.fused.writeTo(fused_, t);
     for (std::size_t c = 0; c < cameras_.size(); ++c) scratch.cameras[c].writeTo(cameras_[c], t);
   }
 
-  void sweepPlane(int plane, const cv::Rect& tile, Scratch& scratch) {
-    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, rays_.fromAnchor(plane));
+  void sweepPlane(int plane, double from_first, const cv::Rect& tile, Scratch& scratch) {
+    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, from_first);
     scratch.fused.add(plane, fused);
     for (std::size_t c = 0; c < scratch.cameras.size(); ++c) {
       scratch.cameras[c].add(plane, scratch.fusion.ofCamera(static_cast<int>(c)));

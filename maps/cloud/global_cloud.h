@@ -114,7 +114,7 @@ class GlobalCloud {
     std::uint16_t free_space_violations = 0;
   };
   struct Keyframe {
-    std::vector<Sums> voxels;             // sorted
+    std::vector<Sums> voxels;            // sorted
     std::vector<Verdicts> verdicts;      // one per voxel; empty without consistency
     std::optional<VisibilityGrid> grid;  // with consistency, where the pose is known
   };

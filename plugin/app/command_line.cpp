@@ -161,7 +161,8 @@ void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
                   "Background noise: events per second and pixel")
       ->capture_default_str()
       ->group(kGroup);
-  command.add_option("--hot-pixels", arguments.noise.hot_fraction, "Fraction of hot pixels, 0 to 1")
+  command
+      .add_option("--hot-pixels", arguments.noise.hot_fraction, "Fraction of hot pixels, 0 to 1")
       ->capture_default_str()
       ->group(kGroup);
   command.add_option("--hot-hz", arguments.noise.hot_hz, "Events per second of a hot pixel")

@@ -45,8 +45,8 @@ void requireRanges(const SimulateArguments& arguments) {
   requireOption(arguments.refractory_us >= 0 && arguments.refractory_us <= 1e6, "--refractory-us",
                 arguments.refractory_us, "0 to 1e6 (microseconds)");
   requireRate("--noise-hz", arguments.noise.background_hz);
-  requireOption(arguments.noise.hot_fraction >= 0 && arguments.noise.hot_fraction <= 1, "--hot-pixels",
-                arguments.noise.hot_fraction, "0 to 1 (a share of the pixels)");
+  requireOption(arguments.noise.hot_fraction >= 0 && arguments.noise.hot_fraction <= 1,
+                "--hot-pixels", arguments.noise.hot_fraction, "0 to 1 (a share of the pixels)");
   requireRate("--hot-hz", arguments.noise.hot_hz);
 }
 

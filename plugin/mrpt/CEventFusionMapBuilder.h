@@ -74,9 +74,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void setDsiSink(DsiSink* sink);
 
   /// Feeds events and poses (CObservationRobotPose, CObservationOdometry). Poses of one source are
-  /// used: see PoseSourceSelector. Other observations are counted and ignored. A CObservationRobotPose of a
-  /// sensor on the rig gives T_world_rig = T_world_sensor * inverse(T_rig_sensor); with a hand-eye
-  /// transform in the options T_world_rig = T_world_sensor * T_body_rig.
+  /// used: see PoseSourceSelector. Other observations are counted and ignored. A
+  /// CObservationRobotPose of a sensor on the rig gives T_world_rig = T_world_sensor *
+  /// inverse(T_rig_sensor); with a hand-eye transform in the options T_world_rig = T_world_sensor *
+  /// T_body_rig.
   /// @throws std::invalid_argument if the observation is null or contradicts its sensor or earlier
   /// observations; std::logic_error after `finish`. Complete windows are mapped before an error is
   /// thrown; their keyframes are in the map and delivered. Of two errors, the first is thrown.

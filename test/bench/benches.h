@@ -10,6 +10,9 @@ void benchVoting(BenchSession& session);
 /// Whole stereo keyframes with stages and memory, fused and unfused. Kernels between the plain and
 /// the fastest one run with the smallest size on one thread only.
 void benchKeyframes(BenchSession& session);
+/// Stereo keyframes as shipped and with the paper's options, for several motions and rigs, on the
+/// fastest kernel and the plain one, on one thread.
+void benchMotions(BenchSession& session);
 /// The six rules and the running peaks.
 void benchFusion(BenchSession& session);
 /// From peaks to a depth map.

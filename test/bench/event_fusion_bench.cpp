@@ -26,7 +26,8 @@ using namespace efm::bench;  // NOLINT(google-build-using-namespace)
 constexpr const char* kUsage =
     "usage: event_fusion_bench [--quick] [--out DIR] [--commit TEXT] [GROUP ...] "
     "[--benchmark_...]\n"
-    "Runs the groups (all of them: voting keyframe fusion extraction global_cloud reading growth)\n"
+    "Runs the groups (all of them: voting keyframe motion fusion extraction global_cloud reading "
+    "growth)\n"
     "and writes DIR/performance.csv and DIR/performance.md.\n";
 
 struct Group {
@@ -34,10 +35,10 @@ struct Group {
   void (*run)(BenchSession&);
 };
 
-constexpr Group kGroups[] = {
-    {"voting", benchVoting},         {"keyframe", benchKeyframes},       {"fusion", benchFusion},
-    {"extraction", benchExtraction}, {"global_cloud", benchGlobalCloud}, {"reading", benchReading},
-    {"growth", benchGrowth}};
+constexpr Group kGroups[] = {{"voting", benchVoting},         {"keyframe", benchKeyframes},
+                             {"motion", benchMotions},        {"fusion", benchFusion},
+                             {"extraction", benchExtraction}, {"global_cloud", benchGlobalCloud},
+                             {"reading", benchReading},       {"growth", benchGrowth}};
 
 /// The members of a batch run in turns, unless an option changes this.
 void initializeBenchmark(std::string program, std::vector<std::string> words) {

@@ -89,16 +89,6 @@ void benchKeyframes(BenchSession& session) {
                     made, fused(made, kernel, threads));
       }
     }
-    // The defaults: events in groups, depth from neighbouring rays.
-    SyntheticWindow grouped = made;
-    grouped.options.split = SplitFusionOptions();
-    SyntheticWindow shipped = grouped;
-    shipped.options.extraction = DepthExtractionOptions();
-    const std::string fastest(nameOf(fastestKernel()));
-    addKeyframe(session, {"keyframe of groups", sensor.name(), fastest}, grouped,
-                fused(grouped, fastestKernel(), 1));
-    addKeyframe(session, {"keyframe as shipped", sensor.name(), fastest}, shipped,
-                fused(shipped, fastestKernel(), 1));
     session.run();
   }
 }

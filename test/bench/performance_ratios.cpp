@@ -43,6 +43,16 @@ void addRatios(std::vector<PerformanceRow>& rows) {
     };
     add("times_yardstick", other_kernel(kYardstick), "cpu_ms");
     add("times_unfused", other_kernel(kUnfused), "cpu_ms");
+    if (row.group == kAsShipped || row.group == kAsPaper) {
+      add("times_plain", other_kernel("plain"), "cpu_ms");
+    }
+    if (row.group == kAsShipped && row.kernel != "plain") {
+      add("times_plain_paper", quantityOf(rows, {kAsPaper, row.name, "plain", 1, {}}, "cpu_ms"),
+          "cpu_ms");
+      const auto paper = quantityOf(rows, {kAsPaper, row.name, row.kernel, 1, {}}, "cpu_ms");
+      const auto own = row.find("cpu_ms");
+      if (paper && own) row.quantities.push_back({"over_paper", *own / *paper});
+    }
     if (row.threads > 1) {
       add("times_one_thread", quantityOf(rows, {row.group, row.name, row.kernel, 1, {}}, "real_ms"),
           "real_ms");

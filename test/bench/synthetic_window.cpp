@@ -20,31 +20,36 @@ struct Edge {
   Eigen::Vector3d to;
 };
 
-/// The field of view of a DAVIS346, at any size. Without distortion, because it would slow down
-/// this function only.
-CameraModel cameraOf(int width, int height) {
-  const double scale = width / 346.0;
-  return {width,
-          height,
-          226.0 * scale,
-          226.0 * scale,
-          0.5 * (width - 1),
-          0.5 * (height - 1),
-          DistortionModel::kNone,
-          {}};
+/// The field of view of a DAVIS346, at any size.
+CameraModel cameraOf(const SyntheticWindowOptions& options) {
+  const double scale = options.width / 346.0;
+  CameraModel model{options.width,
+                    options.height,
+                    226.0 * scale,
+                    226.0 * scale,
+                    0.5 * (options.width - 1),
+                    0.5 * (options.height - 1),
+                    DistortionModel::kNone,
+                    {}};
+  if (options.strong_lens) {
+    model.fx = model.fy = 180.0 * scale;
+    model.distortion = DistortionModel::kRadtan;
+    model.coefficients = {-0.3, 0.08, 0, 0};
+  }
+  return model;
 }
 
 Rig rigOf(const SyntheticWindowOptions& options) {
   Rig rig;
   for (int c = 0; c < options.cameras; ++c) {
     const Rigid3 T_rig_cam{Eigen::Quaterniond::Identity(), {kBaseline_m * c, 0, 0}};
-    rig.cameras.push_back({cameraOf(options.width, options.height), T_rig_cam, 0});
+    rig.cameras.push_back({cameraOf(options), T_rig_cam, 0});
   }
   return rig;
 }
 
 /// Half a metre per second to and fro, with small rotations.
-Rigid3 poseAt(double t_s) {
+Rigid3 handHeldPose(double t_s) {
   const Eigen::Vector3d position(0.08 * std::sin(7 * t_s), 0.05 * std::sin(9 * t_s + 1),
                                  0.04 * std::sin(6 * t_s + 2));
   const Eigen::Vector3d rotation(0.03 * std::sin(8 * t_s), 0.04 * std::sin(5 * t_s),
@@ -52,12 +57,24 @@ Rigid3 poseAt(double t_s) {
   return {Eigen::Quaterniond(Eigen::AngleAxisd(rotation.norm(), rotation.normalized())), position};
 }
 
-Trajectory trajectoryOver(double duration_s) {
+/// @param fraction of the window, -0.5 to 0.5.
+Rigid3 poseOf(const WindowMotion& motion, double fraction) {
+  constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
+  const Eigen::Quaterniond turn(
+      Eigen::AngleAxisd(fraction * motion.turn_deg * kRadPerDeg, Eigen::Vector3d::UnitY()));
+  const Eigen::Vector3d circled(0, 0, motion.circled_m);
+  return {turn, fraction * motion.travel_m + circled - turn * circled};
+}
+
+Trajectory trajectoryOver(const SyntheticWindowOptions& options) {
+  const double duration_s = options.duration_s;
   Trajectory trajectory;
   for (int i = -1;; ++i) {
     const std::int64_t t_ns = i * kPoseStep_ns;
     const double t_s = 1e-9 * static_cast<double>(t_ns);
-    trajectory.add({kStart_ns + t_ns, poseAt(1 + t_s)});
+    trajectory.add({kStart_ns + t_ns, options.motion
+                                          ? poseOf(*options.motion, t_s / duration_s - 0.5)
+                                          : handHeldPose(1 + t_s)});
     if (t_s > duration_s) return trajectory;
   }
 }
@@ -116,12 +133,12 @@ class EventMaker {
 SyntheticWindow makeSyntheticWindow(const SyntheticWindowOptions& options) {
   SyntheticWindow made;
   made.rig = rigOf(options);
-  made.trajectory = trajectoryOver(options.duration_s);
+  made.trajectory = trajectoryOver(options);
   const auto duration_ns = static_cast<std::int64_t>(1e9 * options.duration_s);
   made.window = {kStart_ns, kStart_ns + duration_ns, kStart_ns + duration_ns / 2};
   made.options.split = SplitFusionOptions::none();
   made.options.extraction.extraction = ExtractionMethod::kPaper;
-  made.options.planes.min_depth_m = 0.8;
+  made.options.planes.min_depth_m = kNearLimit_m;
   made.options.planes.max_depth_m = 8.0;
 
   std::mt19937 random(options.seed);

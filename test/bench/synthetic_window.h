@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "mapping/events/event.h"
@@ -12,6 +14,19 @@
 
 namespace efm::bench {
 
+/// An even motion over a window, around the pose at its middle.
+struct WindowMotion {
+  const char* name = "";
+  Eigen::Vector3d travel_m = Eigen::Vector3d::Zero();
+  double turn_deg = 0;  ///< To the right.
+  /// Distance in front of the rig of the point that it circles, looking at it. 0: it turns on the
+  /// spot.
+  double circled_m = 0;
+};
+
+/// The nearest plane of all windows.
+inline constexpr double kNearLimit_m = 0.8;
+
 struct SyntheticWindowOptions {
   int width = 346;
   int height = 260;
@@ -19,9 +34,13 @@ struct SyntheticWindowOptions {
   int cameras = 2;  ///< Side by side, 0.1 m apart.
   double duration_s = 0.2;
   unsigned seed = 1;
+  std::optional<WindowMotion> motion;  ///< Not given: hand-held.
+  /// A wide lens with strong radial distortion. Events keep the pixels of the pinhole: times are
+  /// right, depths are not.
+  bool strong_lens = false;
 };
 
-/// The events of a window of a hand-held rig that looks at straight edges 1 to 6 m away. Every
+/// The events of a window of a rig that looks at straight edges 1 to 6 m away. Every
 /// tenth event is noise. They are made from the edges without images: millions of events in less
 /// than a second, with positions and times like real events.
 struct SyntheticWindow {

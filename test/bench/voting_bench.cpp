@@ -74,7 +74,8 @@ void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel ke
         accumulator.moveTo(cells);
         rays.gather(g, 0, cells, gathered);
         for (int plane = group.begin; plane < group.end; ++plane) {
-          accumulator.vote(gathered, rays.fromAnchor(plane));
+          rays.gatherOn(plane, g, 0, cells, gathered);
+          accumulator.vote(gathered, rays.fromFirst(g, plane));
           benchmark::DoNotOptimize(accumulator.resolve(density.data()));
           benchmark::ClobberMemory();
         }

@@ -12,7 +12,8 @@ namespace efm::test {
 /// Expects that `validate` refuses default options with this value of a field, and that the message
 /// contains the text.
 template <typename Options, typename Value>
-void expectRefused(Value Options::*field, std::common_type_t<Value> value, const std::string& text) {
+void expectRefused(Value Options::*field, std::common_type_t<Value> value,
+                   const std::string& text) {
   Options options;
   options.*field = value;
   EXPECT_THAT([&] { options.validate(); },

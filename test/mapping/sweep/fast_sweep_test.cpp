@@ -239,7 +239,7 @@ TEST_P(FastSweepOn, ParallaxOfHundredsOfPixelsAtHdIsThePlainKernels) {
   }
 }
 
-TEST_P(FastSweepOn, MarginsUpToAndBeyondTheRoomForCompactRaysAreThePlainKernels) {
+TEST_P(FastSweepOn, ParallaxOfTenTimesTheViewIsThePlainKernels) {
   const ReferenceView view{200, 150, 150, 150, 100, 75};
   const DepthPlanes planes = inverse(0.5, 5, 12);
   // From the middle a ray moves by 150 C_x (2 - 0.2) / 2 px to the outermost planes: 2048 with

@@ -43,8 +43,8 @@ std::vector<RayPath> pathsOf(const RayBundle& rays, const ReferenceView& view,
   std::vector<RayPath> paths;
   for (const RayPacket& packet : rays.packets) {
     for (std::size_t i = packet.begin; i < packet.end; ++i) {
-      paths.push_back({pixelOn(rays, packet, i, view, group.first_depth_m),
-                       pixelOn(rays, packet, i, view, group.last_depth_m)});
+      paths.push_back({pixelOn(rays, packet, i, view, 1 / group.first),
+                       pixelOn(rays, packet, i, view, 1 / group.last)});
     }
   }
   return paths;
@@ -75,21 +75,22 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
  protected:
   /// The rays of a bundle that a tile gathers, each as its path.
   std::vector<RayPath> gather(const std::vector<RayBins>& all, const TileCells& tile,
-                              const PlaneRange& group, const DepthPlanes& planes) const {
+                              const PlaneRange& group) const {
     TileRays found;
     for (const RayBins& bins : all) {
-      bins.gather(bins.footprintIn(group), tile, functions_, found);
+      const bool moving = bins.covers(group);
+      if (!moving && !bins.isInFront(group.begin)) continue;
+      bins.gather(bins.footprintOn(group), tile, functions_, moving, found);
     }
-    const double to_first = 1 / group.first_depth_m - RayBins::middleAnchor(planes);
-    const double to_last = 1 / group.last_depth_m - RayBins::middleAnchor(planes);
     const Eigen::Vector2d origin(tile.origin.x, tile.origin.y);
     std::vector<RayPath> paths;
     const kernels::MovingRays rays = found.view();
     for (std::size_t i = 0; i < rays.size; ++i) {
-      const Eigen::Vector2d anchor(rays.x[i], rays.y[i]);
+      const Eigen::Vector2d first(rays.x[i], rays.y[i]);
       const Eigen::Vector2d shift(rays.dx[i], rays.dy[i]);
-      paths.push_back({origin + (anchor + to_first * shift) / (1 << kernels::kFractionBits),
-                       origin + (anchor + to_last * shift) / (1 << kernels::kFractionBits)});
+      const Eigen::Vector2d last = first + (group.last - group.first) * shift;
+      paths.push_back({origin + first / (1 << kernels::kFractionBits),
+                       origin + last / (1 << kernels::kFractionBits)});
     }
     return paths;
   }
@@ -98,18 +99,19 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
   void expectEveryRayOnce(const RayBundle& rays, const ReferenceView& view,
                           const DepthPlanes& planes, int planes_per_group) const {
     const std::vector<RayBins> all = RayBins::sort(rays, {view, planes});
-    const bool on_all_planes =
-        std::all_of(all.begin(), all.end(), [](const RayBins& bins) { return bins.onAllPlanes(); });
+    const PlaneRange all_planes(planes, 0, planes.size());
+    const bool on_all_planes = std::all_of(
+        all.begin(), all.end(), [&](const RayBins& bins) { return bins.covers(all_planes); });
     if (!on_all_planes) planes_per_group = 1;
     for (int begin = 0; begin < planes.size(); begin += planes_per_group) {
       const int end = std::min(planes.size(), begin + planes_per_group);
-      const PlaneRange group{begin, end, planes.depth(begin), planes.depth(end - 1)};
+      const PlaneRange group(planes, begin, end);
       const std::vector<RayPath> paths = pathsOf(rays, view, group);
       for (const cv::Rect& tile : tilesOf(view, TileCells::kMaxPixels)) {
         const TileCells cells(tile, view);
         SCOPED_TRACE(testing::Message() << "tile " << tile.x << ", " << tile.y << ", planes "
                                         << begin << " to " << end - 1);
-        expectMatch(paths, gather(all, cells, group, planes), cells.in_view);
+        expectMatch(paths, gather(all, cells, group), cells.in_view);
       }
     }
   }
@@ -200,24 +202,6 @@ TEST_P(RayBinsOn, ATileFindsEachRayThatItSeesOnceWhereRaysMoveFartherThanBinsRea
   expectEveryRayOnce(rays, kView, planes, 1);
 }
 
-TEST(RayBins, NoRayInTheViewMovesFasterThanTheMaxShift) {
-  const DepthPlanes planes({0.5, 5, 10, PlaneSpacing::kInverse});
-  RandomRays random(6);
-  for (int i = 0; i < 50; ++i) {
-    const RayPacket source{
-        0, 0, {random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-1, 0.4)}, true};
-    const RayBundle rays = raysFrom({source}, planes, random);
-    for (const RayBins& bins : RayBins::sort(rays, {kView, planes})) {
-      ASSERT_TRUE(bins.onAllPlanes());
-      const double range = 1 / planes.depth(0) - 1 / planes.depth(9);
-      for (const RayPath& path : pathsOf(rays, kView, {0, 10, planes.depth(0), planes.depth(9)})) {
-        if (!votesIn(path, {0, 0, kView.width, kView.height})) continue;
-        ASSERT_LE((path.first - path.last).cwiseAbs().maxCoeff(), bins.maxShift() * range + 1e-3);
-      }
-    }
-  }
-}
-
 TEST(RayBins, RaysThatAreOnNoPlaneOrOutsideOnAllAreLeftOut) {
   const DepthPlanes planes({0.5, 5, 10, PlaneSpacing::kInverse});
   RayBundle behind;
@@ -233,10 +217,13 @@ TEST(TileRays, GrowingKeepsRaysAndPaddingIsNotCountedAndLiesOutsideEveryTile) {
     rays.reserve(more);
     for (std::size_t i = 0; i < more; ++i, ++size) {
       const auto value = static_cast<float>(size);
-      rays.add(value, value + 0.25F);
-      rays.view().dx[size] = value + 0.5F;
-      rays.view().dy[size] = value + 0.75F;
+      const kernels::MovingRays view = rays.view();
+      view.x[size] = value;
+      view.y[size] = value + 0.25F;
+      view.dx[size] = value + 0.5F;
+      view.dy[size] = value + 0.75F;
     }
+    rays.resize(size);
     rays.pad();
     ASSERT_EQ(rays.size(), size);
     const kernels::MovingRays view = rays.view();

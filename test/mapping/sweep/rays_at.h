@@ -18,10 +18,12 @@ inline constexpr float kTileUnit = 1 << kernels::kFractionBits;
 inline TileRays raysAt(const std::vector<Eigen::Vector2d>& points, const cv::Point& origin) {
   TileRays rays;
   rays.reserve(points.size());
-  for (const Eigen::Vector2d& point : points) {
-    rays.add(static_cast<float>(point.x() - origin.x) * kTileUnit,
-             static_cast<float>(point.y() - origin.y) * kTileUnit);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    rays.view().x[i] = static_cast<float>(points[i].x() - origin.x) * kTileUnit;
+    rays.view().y[i] = static_cast<float>(points[i].y() - origin.y) * kTileUnit;
+    rays.view().dx[i] = rays.view().dy[i] = 0;
   }
+  rays.resize(points.size());
   rays.pad();
   return rays;
 }
