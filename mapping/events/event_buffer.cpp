@@ -15,7 +15,7 @@ std::size_t EventBuffer::indexOf(std::int64_t t_ns) const {
   return static_cast<std::size_t>(first - events.begin());
 }
 
-std::uint64_t EventBuffer::insert(const std::vector<Event>& added) {
+std::uint64_t EventBuffer::insert(EventSpan added) {
   std::int64_t newest = begin < events.size() ? events.back().t_ns : kMinTimeNs;
   std::int64_t earliest_late = kMaxTimeNs;
   std::uint64_t late = 0;
@@ -28,14 +28,23 @@ std::uint64_t EventBuffer::insert(const std::vector<Event>& added) {
   }
   // Times are whole: the first event later than the earliest late one. The old events are sorted.
   const std::size_t first_unsorted = late > 0 ? indexOf(earliest_late + 1) : 0;
+  reserveFor(added.size());
   events.insert(events.end(), added.begin(), added.end());
-  used.resize(events.size(), 0);
+  used.resize(events.size());
   if (late > 0) sortFrom(first_unsorted);
   return late;
 }
 
+/// Grows by a quarter: a vector that doubles takes three times the memory of its events.
+void EventBuffer::reserveFor(std::size_t added) {
+  const std::size_t size = events.size() + added;
+  if (size > events.capacity()) {
+    events.reserve(std::max(size, events.capacity() + events.capacity() / 4));
+  }
+}
+
 void EventBuffer::sortFrom(std::size_t index) {
-  std::vector<std::pair<Event, char>> tail;
+  std::vector<std::pair<Event, bool>> tail;
   for (std::size_t i = index; i < events.size(); ++i) tail.emplace_back(events[i], used[i]);
   std::stable_sort(tail.begin(), tail.end(),
                    [](const auto& a, const auto& b) { return a.first.t_ns < b.first.t_ns; });

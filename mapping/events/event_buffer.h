@@ -12,7 +12,7 @@ namespace efm {
 /// One camera's events that a window may still need, in time order.
 struct EventBuffer {
   std::vector<Event> events;
-  std::vector<char> used;  ///< Parallel to `events`: the event voted in a keyframe.
+  std::vector<bool> used;  ///< Parallel to `events`: the event voted in a keyframe.
   std::size_t begin = 0;   ///< Events before this index are released.
 
   /// Index of the first event at or after a time.
@@ -24,11 +24,12 @@ struct EventBuffer {
   /// Inserts events, each after others of the same time. Cost: linear for events in time order;
   /// otherwise that of sorting the events after the earliest late one.
   /// @return the number of events that came after a newer one.
-  std::uint64_t insert(const std::vector<Event>& added);
+  std::uint64_t insert(EventSpan added);
   /// Frees the memory of released events; cost is constant on average.
   void compact();
 
  private:
+  void reserveFor(std::size_t added);
   void sortFrom(std::size_t index);
 };
 

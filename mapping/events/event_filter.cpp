@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/events/event_filter.h"
 
+#include <algorithm>
+
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
 
@@ -22,23 +24,17 @@ EventFilter::EventFilter(int width, int height, const EventFilterOptions& option
   }
 }
 
-bool EventFilter::keeps(const Event& event) {
-  if (hot_pixels_ && hot_pixels_->isHot(event)) return false;
-  return !background_activity_ || !background_activity_->isIsolated(event);
-}
-
 std::uint64_t FilteredEvents::release(std::int64_t until_ns, EventBuffer& buffer) {
   const std::size_t end = waiting_.indexOf(until_ns);
   const std::size_t released = end - waiting_.begin;
   if (released == 0) return 0;
-  kept_.clear();
-  for (std::size_t i = waiting_.begin; i < end; ++i) {
-    if (filter_.keeps(waiting_.events[i])) kept_.push_back(waiting_.events[i]);
-  }
+  Event* const first = waiting_.events.data() + waiting_.begin;
+  Event* const last =
+      std::remove_if(first, first + released, [&](const Event& e) { return !filter_.keeps(e); });
+  buffer.insert({first, last});
   waiting_.begin = end;
   waiting_.compact();
-  buffer.insert(kept_);
-  return released - kept_.size();
+  return released - static_cast<std::size_t>(last - first);
 }
 
 }  // namespace efm

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "mapping/events/background_activity_filter.h"
 #include "mapping/events/event.h"
@@ -33,7 +32,10 @@ class EventFilter {
   EventFilter(int width, int height, const EventFilterOptions& options);
 
   /// @param event the next one of the camera, in time order, inside the sensor.
-  bool keeps(const Event& event);
+  bool keeps(const Event& event) {
+    if (hot_pixels_ && hot_pixels_->isHot(event)) return false;
+    return !background_activity_ || !background_activity_->isIsolated(event);
+  }
 
  private:
   std::optional<HotPixelFilter> hot_pixels_;
@@ -47,7 +49,7 @@ class FilteredEvents {
   explicit FilteredEvents(EventFilter filter) : filter_(std::move(filter)) {}
 
   /// @return the number of events that came after a newer one.
-  std::uint64_t insert(const std::vector<Event>& events) { return waiting_.insert(events); }
+  std::uint64_t insert(EventSpan events) { return waiting_.insert(events); }
   /// Filters the events before `until_ns` and inserts those that remain into `buffer`. No event
   /// before `until_ns` may be inserted here afterwards.
   /// @return the number of events that the filter removed.
@@ -56,7 +58,6 @@ class FilteredEvents {
  private:
   EventFilter filter_;
   EventBuffer waiting_;
-  std::vector<Event> kept_;  // reused
 };
 
 }  // namespace efm

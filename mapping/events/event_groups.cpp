@@ -21,6 +21,7 @@ void SplitFusionOptions::validate() const {
 EventSpan EventPart::select(std::vector<Event>& buffer) const {
   if (!polarity) return all;
   buffer.clear();
+  buffer.reserve(all.size());  // takes no memory before it is written
   std::copy_if(all.begin(), all.end(), std::back_inserter(buffer),
                [this](const Event& event) { return event.polarity == *polarity; });
   return buffer;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/events/hot_pixel_filter.h"
 
+#include <algorithm>
 #include <array>
-#include <limits>
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
@@ -19,13 +19,14 @@ void HotPixelOptions::validate() const {
 
 HotPixelFilter::HotPixelFilter(int width, int height, const HotPixelOptions& options)
     : ratio_(options.ratio),
-      min_events_(options.min_events),
+      min_events_(static_cast<std::uint32_t>(options.min_events)),
       width_(width),
       height_(height),
       stride_(static_cast<std::size_t>(width) + 2) {
   options.validate();
   period_ns_ = durationFromSeconds(options.period_s);
-  pixels_.resize(stride_ * (static_cast<std::size_t>(height) + 2));
+  row_periods_.resize(static_cast<std::size_t>(height) + 2);
+  counts_.resize(stride_ * row_periods_.size());
 }
 
 void HotPixelFilter::enterPeriodOf(std::int64_t t_ns) {
@@ -36,22 +37,21 @@ void HotPixelFilter::enterPeriodOf(std::int64_t t_ns) {
   period_end_ns_ = period_begin_ns_ + period_ns_;
 }
 
-int HotPixelFilter::recentEvents(const Activity& pixel) const {
-  if (pixel.period == period_) return pixel.newest + pixel.before;
-  return pixel.period + 1 == period_ ? pixel.newest : 0;
+void HotPixelFilter::startPeriod(std::size_t row) {
+  const bool counted_before = row_periods_[row] + 1 == period_;
+  row_periods_[row] = period_;
+  const auto begin = counts_.begin() + static_cast<std::ptrdiff_t>(row * stride_);
+  std::transform(begin, begin + static_cast<std::ptrdiff_t>(stride_), begin,
+                 [&](std::uint32_t counts) { return counted_before ? counts >> kHalf : 0; });
 }
 
-bool HotPixelFilter::isHot(const Event& event) {
-  if (event.t_ns < period_begin_ns_ || event.t_ns >= period_end_ns_) enterPeriodOf(event.t_ns);
-  Activity* pixel = pixels_.data() + (std::size_t{event.y} + 1) * stride_ + event.x + 1;
-  if (pixel->period != period_) {
-    const bool fired_before = pixel->period + 1 == period_;
-    *pixel = {period_, 0, fired_before ? pixel->newest : std::uint16_t{0}};
-  }
-  if (pixel->newest < std::numeric_limits<std::uint16_t>::max()) ++pixel->newest;
-
-  const int own = pixel->newest + pixel->before;
-  if (own < min_events_ || width_ == 1 || height_ == 1) return false;
+/// Whether a pixel with enough events fires too often beside its neighbours.
+bool HotPixelFilter::isBusiest(const Event& event) {
+  if (width_ == 1 || height_ == 1) return false;
+  bringUpToDate(event.y);
+  bringUpToDate(event.y + std::size_t{2});
+  const std::uint32_t* pixel = &counts_[indexOf(event)];
+  const std::uint32_t own = eventsIn(*pixel);
   const auto row = static_cast<std::ptrdiff_t>(stride_);
   const std::array<std::ptrdiff_t, 8> neighbors = {-1,      1,        -row,    row,
                                                    row - 1, -row + 1, row + 1, -row - 1};
@@ -59,7 +59,7 @@ bool HotPixelFilter::isHot(const Event& event) {
       event.x == 0 || event.y == 0 || event.x + 1 == width_ || event.y + 1 == height_;
   int busy_ones_left = on_border ? 1 : 2;
   for (const std::ptrdiff_t offset : neighbors) {
-    if (ratio_ * recentEvents(pixel[offset]) >= own && --busy_ones_left == 0) return false;
+    if (ratio_ * eventsIn(pixel[offset]) >= own && --busy_ones_left == 0) return false;
   }
   return true;
 }

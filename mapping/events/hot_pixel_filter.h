@@ -40,23 +40,40 @@ class HotPixelFilter {
   /// @throws std::invalid_argument where the options are not valid.
   HotPixelFilter(int width, int height, const HotPixelOptions& options);
 
-  /// @param event the next one of the camera, inside the sensor. Constant cost. On a sensor that is
-  /// one pixel wide or high, pixels have too few neighbours: none is hot.
-  bool isHot(const Event& event);
+  /// @param event the next one of the camera, inside the sensor. Constant cost: most pixels have
+  /// fewer than `min_events`, so that their neighbours do not matter. On a sensor that is one pixel
+  /// wide or high, pixels have too few neighbours: none is hot.
+  bool isHot(const Event& event) {
+    if (event.t_ns < period_begin_ns_ || event.t_ns >= period_end_ns_) enterPeriodOf(event.t_ns);
+    bringUpToDate(event.y + std::size_t{1});
+    std::uint32_t& counts = counts_[indexOf(event)];
+    if (counts < kNewestFull) counts += kOneNewest;
+    return eventsIn(counts) >= min_events_ && isBusiest(event);
+  }
 
  private:
-  /// A pixel's events in the newest period with events of it, and in the period before.
-  struct Activity {
-    std::uint32_t period = 0;
-    std::uint16_t newest = 0;
-    std::uint16_t before = 0;
-  };
+  // A pixel's events in the period of its row (the high half) and in the one before (the low half).
+  static constexpr unsigned kHalf = 16;
+  static constexpr std::uint32_t kOneNewest = 1U << kHalf;
+  static constexpr std::uint32_t kNewestFull = (kOneNewest - 1) << kHalf;
+  static std::uint32_t eventsIn(std::uint32_t counts) {
+    return (counts >> kHalf) + counts % kOneNewest;
+  }
 
   void enterPeriodOf(std::int64_t t_ns);
-  int recentEvents(const Activity& pixel) const;
+  /// Takes a row's counts to the clock's period.
+  void bringUpToDate(std::size_t row) {
+    if (row_periods_[row] != period_) startPeriod(row);
+  }
+  void startPeriod(std::size_t row);
+  bool isBusiest(const Event& event);
+  /// In the counts, which have a frame of one silent pixel.
+  std::size_t indexOf(const Event& event) const {
+    return (std::size_t{event.y} + 1) * stride_ + event.x + 1;
+  }
 
   double ratio_;
-  int min_events_;
+  std::uint32_t min_events_;
   int width_;
   int height_;
   std::int64_t period_ns_;
@@ -64,7 +81,8 @@ class HotPixelFilter {
   std::int64_t period_end_ns_ = 0;
   std::uint32_t period_ = 0;  // of the clock, modulo 2^32
   std::size_t stride_;
-  std::vector<Activity> pixels_;  // row-major, with a frame of one silent pixel
+  std::vector<std::uint32_t> counts_;       // row-major
+  std::vector<std::uint32_t> row_periods_;  // the period of a row's counts
 };
 
 }  // namespace efm

@@ -57,26 +57,22 @@ void CameraStream::requireValid(const std::vector<Event>& events) const {
   }
 }
 
-std::uint64_t CameraStream::add(const std::vector<Event>& events, const TimeLimits& limits,
+std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& limits,
                                 std::int64_t released_ns) {
   counts_.read += events.size();
-  if (!selected_) counts_.dropped += events.size();
-  std::vector<Event> wanted;
-  wanted.reserve(events.size());
-  for (Event event : events) {
+  for (Event& event : events) {
     event.t_ns += time_offset_ns_;
     newest_ns_ = std::max(newest_ns_.value_or(event.t_ns), event.t_ns);
-    if (!selected_) continue;
-    if (!limits.contain(event.t_ns)) {
-      ++counts_.outside_window;
-    } else if (event.t_ns < released_ns) {
-      ++counts_.dropped;
-    } else {
-      wanted.push_back(event);
-    }
   }
+  const auto isUnwanted = [&](const Event& event) {
+    if (selected_ && limits.contain(event.t_ns) && event.t_ns >= released_ns) return false;
+    const bool outside_window = selected_ && !limits.contain(event.t_ns);
+    ++(outside_window ? counts_.outside_window : counts_.dropped);
+    return true;
+  };
+  events.erase(std::remove_if(events.begin(), events.end(), isUnwanted), events.end());
   covered_ns_ = std::max(covered_ns_, *newest_ns_ - kMaxEventDelayNs);
-  return filter_ ? filter_->insert(wanted) : buffer_.insert(wanted);
+  return filter_ ? filter_->insert(events) : buffer_.insert(events);
 }
 
 void CameraStream::coverUntil(std::int64_t t_ns) {
@@ -105,14 +101,14 @@ std::optional<std::int64_t> CameraStream::firstWithPose(const Trajectory& trajec
 void CameraStream::markUsed(const Window& window, const Trajectory& trajectory) {
   const std::size_t end = buffer_.indexOf(window.t1_ns);
   for (std::size_t i = buffer_.indexOf(window.t0_ns); i < end; ++i) {
-    if (trajectory.segmentAt(buffer_.events[i].t_ns, pose_cursor_)) buffer_.used[i] = 1;
+    if (trajectory.segmentAt(buffer_.events[i].t_ns, pose_cursor_)) buffer_.used[i] = true;
   }
 }
 
 void CameraStream::release(std::int64_t until_ns, const Trajectory& trajectory) {
   const std::size_t end = buffer_.indexOf(until_ns);
   for (; buffer_.begin < end; ++buffer_.begin) {
-    if (buffer_.used[buffer_.begin] != 0) {
+    if (buffer_.used[buffer_.begin]) {
       ++counts_.used;
     } else if (trajectory.segmentAt(buffer_.events[buffer_.begin].t_ns, pose_cursor_)) {
       ++counts_.outside_window;

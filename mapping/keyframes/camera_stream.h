@@ -41,8 +41,7 @@ class CameraStream {
   /// Adds valid events to the filter, or to the buffer if there is no filter. Events before
   /// `released_ns` and outside the limits are counted, and not added.
   /// @return the number of events that came after a newer one.
-  std::uint64_t add(const std::vector<Event>& events, const TimeLimits& limits,
-                    std::int64_t released_ns);
+  std::uint64_t add(std::vector<Event> events, const TimeLimits& limits, std::int64_t released_ns);
   /// All events before `t_ns` (the camera's own clock) have been added.
   void coverUntil(std::int64_t t_ns);
   /// Filters the events before a time and moves the others to the buffer. No event before this time
