@@ -5,6 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
@@ -77,16 +78,15 @@ void FusionMapper::addPose(const StampedPose& pose) {
   if (!trajectory_.add(pose)) ++counts_.duplicate_poses;
 }
 
-void FusionMapper::addEvents(int camera, const std::vector<Event>& events) {
+void FusionMapper::addEvents(int camera, std::vector<Event> events) {
   CameraStream& stream = cameras_.at(static_cast<std::size_t>(camera));
   if (events.empty()) return;
   stream.requireValid(events);
-  counts_.sorted_events += stream.add(events, options_.limits, released_ns_);
-
-  const std::int64_t newest_ns = *stream.newestNs();
-  reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
   const std::int64_t begin_ns = stream.onTrajectoryClock(events.front().t_ns);
   packet_ns_ = std::max(packet_ns_.value_or(begin_ns), begin_ns);
+  counts_.sorted_events += stream.add(std::move(events), options_.limits, released_ns_);
+  const std::int64_t newest_ns = *stream.newestNs();
+  reached_ns_ = std::max(reached_ns_.value_or(newest_ns), newest_ns);
 }
 
 void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
@@ -94,7 +94,10 @@ void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
 }
 
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
-  filterEvents();
+  {
+    const StageScope scope(stages, Stage::kFilter);
+    filterEvents();
+  }
   findStart();
   while (start_ns_) {
     skipEmptyWindows();
@@ -167,7 +170,11 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
     ++counts_.windows_without_events;
     return std::nullopt;
   }
-  auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, stages);
+  {
+    const StageScope scope(stages, Stage::kTables);
+    keyframeMapper();
+  }
+  auto keyframe = mapper_->map(window, events, trajectory_, sink, stages);
   if (keyframe) {
     countKeyframe(*keyframe);
   } else {

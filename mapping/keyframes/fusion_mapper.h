@@ -70,7 +70,7 @@ class FusionMapper : private RecordingProgress {
   /// counted.
   /// @throws std::invalid_argument where an event is later than that, or lies outside the sensor;
   /// then no event of this call is taken.
-  void addEvents(int camera, const std::vector<Event>& events);
+  void addEvents(int camera, std::vector<Event> events);
   /// Says that all of a camera's events before `t_ns` (its own clock) have been added, so that a
   /// camera without events does not delay the others. Without this call, a camera's events are
   /// complete until 10 ms before its newest one. A camera is silent if it has no event in the last

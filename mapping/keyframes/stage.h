@@ -3,10 +3,12 @@
 
 namespace efm {
 
-/// The stages of a keyframe, for time measurements. The mapping itself never reads a clock.
+/// The stages of the mapping, for time measurements. The mapping itself never reads a clock.
 enum class Stage {
-  kSweep,  ///< Packets, back-projection, votes and fusion.
-  kDepth,  ///< Extraction of the depth map.
+  kTables,  ///< Once: the tables of the cameras.
+  kFilter,  ///< Removal of noise from new events.
+  kSweep,   ///< Packets, back-projection, votes and fusion.
+  kDepth,   ///< Extraction of the depth map.
 };
 
 /// Called when a stage begins and ends, from the thread that runs the mapper.

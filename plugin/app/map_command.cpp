@@ -12,6 +12,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/outlier_removal.h"
 #include "plugin/app/mapping_run.h"
+#include "plugin/output/keyframe_writer.h"
 #include "plugin/output/map_output.h"
 #include "plugin/output/npy_file.h"
 
@@ -111,27 +112,36 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, EventFusi
 
 /// Runs a job and writes its results.
 /// @param kind of the output folder.
-/// @param take receives each keyframe.
+/// @param take receives each keyframe, in order, in a thread of its own.
 /// @param write writes the results after the last keyframe, if there is one.
 int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
            const std::function<void(MapOutput&, const KeyframeDepthMap&)>& take,
            const std::function<void(MapOutput&, MappingOutcome&)>& write) {
-  StageSeconds clock;
+  StageTimes whole;
+  whole.cpu.start = processSeconds();
   MappingOutcome outcome;
   std::optional<MapOutput> output;
   {
-    const SecondsScope total(clock.total);
+    const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
     const RecordingSource source = sourceOf(arguments, job.options);
     job.sequence_maximum = sequenceMaximumOf(source, job.options);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(arguments.out, kind, job.options.mapper.keyframe.planes);
-    job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { take(*output, keyframe); };
+    KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) { take(*output, keyframe); });
+    job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { writer.add(keyframe); };
+    job.processor_clock = [&] { return processSeconds() - writer.cpuSeconds(); };
     outcome = runMapping(job, *recording);
+    writer.finish();
+    whole.cpu.images = writer.cpuSeconds();
     outcome.report.faults = source.faults;
     warnOfRecalibration(arguments, outcome);
     if (outcome.report.counts.keyframes > 0) write(*output, outcome);
   }
-  outcome.report.seconds.total = clock.total;
+  StageTimes& times = outcome.report.times;
+  times.real.total = whole.real.total;
+  times.cpu.start = whole.cpu.start;
+  times.cpu.images = whole.cpu.images;
+  times.cpu.total = whole.cpu.start + whole.cpu.total;
   return conclude(outcome, *output);
 }
 
@@ -147,7 +157,8 @@ int runMap(const MapArguments& arguments) {
     output.writeKeyframe(keyframe);
   };
   const auto write = [refined](MapOutput& output, MappingOutcome& outcome) {
-    const SecondsScope map(outcome.report.seconds.map);
+    StageTimes& times = outcome.report.times;
+    const SecondsScope scope(times.real.map, times.cpu.output);
     writeAll(outcome, {[&] { output.writeCloud("map.pcd", outcome.points); },
                        [&] { output.writeFile("map.simplemap", saverOf(outcome.keyframes)); },
                        [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <exception>
 
 #include "mapping/depth/robust_maximum.h"
 #include "plugin/app/progress.h"
@@ -19,14 +20,14 @@ namespace {
 /// The loop over a recording: reads, feeds the builder, delivers keyframes.
 class Player {
  public:
-  Player(const MappingJob& job, Recording& recording, StageSeconds& seconds)
-      : job_(job), recording_(recording), seconds_(seconds) {
+  Player(const MappingJob& job, Recording& recording, StageTimes& times)
+      : job_(job), recording_(recording), times_(times) {
     EventFusionOptions options = job.options;
     options.mapper.keyframe.sequence_maximum = job.sequence_maximum;
     builder_.setOptions(options);
     builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // warningsOf summarises its warnings
-    builder_.setKeyframeCallback(
-        [this](const KeyframeDepthMap& keyframe) { pending_.push_back(keyframe); });
+    if (job.processor_clock) builder_.setProcessorClock(job.processor_clock);
+    builder_.setKeyframeCallback([this](const KeyframeDepthMap& keyframe) { deliver(keyframe); });
   }
 
   /// @return the error that stopped it before the recording's end, if there was one.
@@ -34,11 +35,11 @@ class Player {
     std::optional<std::string> error;
     for (bool more = true; more;) {
       more = attempt([this] { return playOne(); }, error);
-      deliver();
+      if (delivery_error_) std::rethrow_exception(delivery_error_);
       if (progress_.due()) showProgress();
     }
     attempt([this] { return builder_.finish(), false; }, error);
-    deliver();
+    if (delivery_error_) std::rethrow_exception(delivery_error_);
     return error;
   }
 
@@ -60,7 +61,7 @@ class Player {
   bool playOne() {
     mrpt::obs::CObservation::Ptr observation;
     {
-      const SecondsScope scope(seconds_.read);
+      const SecondsScope scope(times_.real.read, times_.cpu.read);
       observation = recording_.next();
     }
     if (!observation) return false;
@@ -83,10 +84,14 @@ class Player {
         job_.make_dsi_sink(makeReferenceView(events->camera, job_.options.mapper.keyframe.view)));
   }
 
-  /// Not a part of a step: an error of writing must not count as an error of reading.
-  void deliver() {
-    for (const KeyframeDepthMap& keyframe : pending_) job_.on_keyframe(keyframe);
-    pending_.clear();
+  /// An error of writing must not count as an error of reading: it is thrown after the step.
+  void deliver(const KeyframeDepthMap& keyframe) {
+    if (delivery_error_) return;
+    try {
+      job_.on_keyframe(keyframe);
+    } catch (...) {
+      delivery_error_ = std::current_exception();
+    }
   }
 
   void showProgress() {
@@ -96,9 +101,9 @@ class Player {
 
   const MappingJob& job_;
   Recording& recording_;
-  StageSeconds& seconds_;
+  StageTimes& times_;
   CEventFusionMapBuilder builder_;
-  std::vector<KeyframeDepthMap> pending_;
+  std::exception_ptr delivery_error_;  // of `on_keyframe`
   bool sink_offered_ = false;
   Progress progress_;
 };
@@ -172,7 +177,7 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport&
 
 MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   MappingOutcome outcome;
-  StageSeconds reading;
+  StageTimes reading;
   Player player(job, recording, reading);
   outcome.error = player.play();
 
@@ -185,10 +190,12 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   describeView(status.rig, job.options.mapper, outcome.report);
   outcome.report.sequence_maximum = job.sequence_maximum;
   outcome.report.refinement = status.refinement;
-  outcome.report.seconds = status.seconds;
-  outcome.report.seconds.read = reading.read;
+  StageTimes& times = outcome.report.times;
+  times = status.times;
+  times.real.read = reading.real.read;
+  times.cpu.read = reading.cpu.read;
   {
-    const SecondsScope scope(outcome.report.seconds.map);
+    const SecondsScope scope(times.real.map, times.cpu.output);
     outcome.points = player.builder().points();
     player.builder().getCurrentlyBuiltMap(outcome.keyframes);
     outcome.trajectory = player.builder().trajectory();
@@ -209,7 +216,7 @@ std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recordi
   MappingJob job;
   job.options = options;
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { maximum.add(keyframe.max_confidence); };
-  StageSeconds ignored;
+  StageTimes ignored;
   Player(job, recording, ignored).play();
   return maximum.value();
 }

@@ -24,6 +24,8 @@ struct MappingJob {
 
   /// Receives each keyframe, in order.
   std::function<void(const KeyframeDepthMap&)> on_keyframe;
+  /// Measures the stages of the mapping. Default: the processor time of the whole process.
+  ProcessorClock processor_clock;
   /// Makes the receiver of the DSI's planes. Called once, as soon as the reference camera is known.
   /// May be empty.
   std::function<DsiSink*(const ReferenceView&)> make_dsi_sink;
@@ -31,7 +33,7 @@ struct MappingJob {
 
 /// The results of a run.
 struct MappingOutcome {
-  MapReport report;  ///< Without the total of seconds.
+  MapReport report;  ///< Without the times of the whole run.
   std::vector<CloudPoint> points;
   mrpt::maps::CSimpleMap keyframes;  ///< Their clouds and poses.
   /// T_world_ref of the keyframes at t_ref: in the map, and of the tracker.

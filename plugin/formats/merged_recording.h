@@ -15,11 +15,11 @@ namespace efm {
 
 /// One event file per camera of a rig, as observations in the order of time.
 ///
-/// The first packets are empty, one per camera: they tell the whole rig. Each further packet has
-/// the events of one camera in 10 ms. A packet covers its camera until the camera's next event, and
-/// the camera's last packet covers it for ever (`kEndOfTimeNs`): nobody waits for a silent camera.
-/// The very last packet has no such time: there the recording ends. If a file has a wrong line, all
-/// events before it come before the error.
+/// The first packets are empty, one per camera: they announce the rig (see CObservationEvents).
+/// Each further packet has the events of one camera in 10 ms. A packet covers its camera until the
+/// camera's next event, and the camera's last packet covers it for ever (`kEndOfTimeNs`): nobody
+/// waits for a silent camera. The very last packet has no such time: there the recording ends. If a
+/// file has a wrong line, all events before it come before the error.
 class MergedRecording : public Recording {
  public:
   /// @param readers one per camera of the rig.

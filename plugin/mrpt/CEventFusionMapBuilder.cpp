@@ -121,6 +121,11 @@ void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   sink_ = sink;
 }
 
+void CEventFusionMapBuilder::setProcessorClock(ProcessorClock clock) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clock_ = std::move(clock);
+}
+
 void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>& feed) {
   std::exception_ptr error;
   {
@@ -171,7 +176,7 @@ std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapN
   // Within a callback: the caller of the callback goes on mapping.
   if (delivering_.count(std::this_thread::get_id()) != 0) return std::nullopt;
   mapping_failed_ = true;
-  std::optional<KeyframeDepthMap> keyframe = session_->next(sink_);
+  std::optional<KeyframeDepthMap> keyframe = session_->next(sink_, clock_);
   mapping_failed_ = false;
   if (keyframe) keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
   followRefinement();

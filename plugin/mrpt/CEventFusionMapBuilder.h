@@ -30,9 +30,11 @@ namespace efm {
 /// The same observations make the same map, bit for bit.
 ///
 /// The builder maps nothing until the rig is complete. The rig is complete when a packet begins
-/// more than a second after the first event; a camera that first appears later is an error. A call
-/// that asks for the map completes the rig after a tenth of a second, so a short recording needs no
-/// `finish`. With odometry alone it does not, because poses, which are better, may follow.
+/// more than a second after the first event, or with the first event if the options or the
+/// recording tell its cameras (see CObservationEvents). A camera that first appears later is an
+/// error. A call that asks for the map completes the rig after a tenth of a second, so a short
+/// recording needs no `finish`. With odometry alone it does not, because poses, which are better,
+/// may follow.
 ///
 /// If mapping fails (no memory, a sink that throws), the caller who feeds the builder gets the
 /// error, and so does each later one until mapping succeeds. A caller who asks for the map gets the
@@ -72,6 +74,9 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// @param sink receives every fused plane of every keyframe. Not owned, may be null. The threads
   /// of the sweep call it while the mutex is held: it must not use the builder.
   void setDsiSink(DsiSink* sink);
+  /// @param clock measures the stages of `status().times`: the processor time of the threads that
+  /// map. By default that of the whole process.
+  void setProcessorClock(ProcessorClock clock);
 
   /// Feeds events and poses (CObservationRobotPose, CObservationOdometry). Poses of one source are
   /// used: see PoseSourceSelector. Other observations are counted and ignored. A
@@ -163,6 +168,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
 
   KeyframeCallback callback_;
   DsiSink* sink_ = nullptr;
+  ProcessorClock clock_ = processSeconds;
   std::unique_ptr<MappingSession> session_;
   bool finished_ = false;
   std::uint64_t ignored_observations_ = 0;

@@ -25,6 +25,9 @@ namespace efm {
 /// Event times are exact, in integer nanoseconds of the recording's own clock. `timestamp` is the
 /// packet's first time, rounded to MRPT's tick. A stored packet has about 3 bytes per event and a
 /// checksum: reading a damaged packet is an error.
+///
+/// A recording announces its rig if it begins with an empty packet of each camera, which covers the
+/// camera until exactly its first event. Then nobody waits for further cameras.
 class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::Visualizable {
   DEFINE_SERIALIZABLE(CObservationEvents, efm)
 

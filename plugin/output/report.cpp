@@ -3,6 +3,7 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <variant>
 
@@ -26,6 +27,22 @@ Json asJson(const EventCounts& counts) {
 Json asJson(const StageSeconds& seconds) {
   return {{"total", seconds.total}, {"read", seconds.read},     {"sweep", seconds.sweep},
           {"depth", seconds.depth}, {"refine", seconds.refine}, {"map", seconds.map}};
+}
+
+/// Processor time: what a run costs once, and what grows with its events and its keyframes.
+Json byGrowth(const StageSeconds& cpu) {
+  const double measured = cpu.start + cpu.tables + cpu.output + cpu.read + cpu.filter + cpu.sweep +
+                          cpu.depth + cpu.refine + cpu.map + cpu.images;
+  return {{"total", cpu.total},
+          {"once", {{"start", cpu.start}, {"tables", cpu.tables}, {"output", cpu.output}}},
+          {"events", {{"read", cpu.read}, {"filter", cpu.filter}}},
+          {"keyframes",
+           {{"sweep", cpu.sweep},
+            {"depth", cpu.depth},
+            {"refine", cpu.refine},
+            {"map", cpu.map},
+            {"images", cpu.images}}},
+          {"other", std::max(0.0, cpu.total - measured)}};
 }
 
 Json asJson(const EventFusionOptions& options) {
@@ -76,8 +93,8 @@ std::uint64_t peakMemoryBytes() {
 }  // namespace
 
 double votesPerSecond(const MapReport& report) {
-  if (!(report.seconds.sweep > 0)) return 0;
-  return static_cast<double>(report.counts.votes.total()) / report.seconds.sweep;
+  const double sweep_s = report.times.real.sweep;
+  return sweep_s > 0 ? static_cast<double>(report.counts.votes.total()) / sweep_s : 0;
 }
 
 std::string reportJson(const MapReport& report) {
@@ -103,7 +120,8 @@ std::string reportJson(const MapReport& report) {
   json["sorted_events"] = counts.sorted_events;
   json["duplicate_poses"] = counts.duplicate_poses;
   json["points"] = report.points;
-  json["seconds"] = asJson(report.seconds);
+  json["seconds"] = asJson(report.times.real);
+  json["cpu_seconds"] = byGrowth(report.times.cpu);
   json["votes_per_second"] = votesPerSecond(report);
   json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
   json["threads"] = sweep.threadsOrCores();

@@ -20,7 +20,7 @@ struct MapReport {
   MapperCounts counts;
   std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: keyframes without its events.
   std::uint64_t points = 0;                     ///< Of the exported map.
-  StageSeconds seconds;
+  StageTimes times;
   EventFusionOptions options;                 ///< As used.
   TrackerFaults faults;                       ///< Of the perturbed poses.
   std::optional<RefinementState> refinement;  ///< Where poses were refined.
@@ -34,7 +34,8 @@ struct MapReport {
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
 /// outside_window + dropped + filtered), event_uses, votes (event_uses x planes = their sum),
-/// keyframes, silent (keyframes per camera, sub-intervals), points, seconds, votes_per_second,
+/// keyframes, silent (keyframes per camera, sub-intervals), points, seconds (real time),
+/// cpu_seconds (processor time: once per run, for events, for keyframes), votes_per_second,
 /// refinement where poses were refined (registered keyframes, loops, the learnt errors of the
 /// tracker), kernel, threads, peak_memory_bytes (of this process), reference_view and baseline_m
 /// where known, perturbation (the faults of the poses, if any), options (all of them) and version.

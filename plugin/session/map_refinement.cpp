@@ -63,11 +63,12 @@ void MapRefinement::finish() {
   }
   // The thread is idle: the refiner may be used here.
   double seconds = 0;
+  double cpu_seconds = 0;
   {
-    const SecondsScope scope(seconds);
+    const SecondsScope scope(seconds, cpu_seconds);
     refiner_.finish();
   }
-  publish(seconds);
+  publish(seconds, cpu_seconds);
 }
 
 std::map<std::size_t, Rigid3> MapRefinement::takeMoved() {
@@ -84,15 +85,16 @@ RefinementState MapRefinement::state() const {
 
 void MapRefinement::refine(Task task) {
   double seconds = 0;
+  double cpu_seconds = 0;
   {
-    const SecondsScope scope(seconds);
+    const SecondsScope scope(seconds, cpu_seconds);
     refiner_.add(std::move(task.cloud), task.T_odom_ref, task.stated);
   }
-  publish(seconds);
+  publish(seconds, cpu_seconds);
 }
 
 /// Copies the refiner's results for the other thread.
-void MapRefinement::publish(double seconds) {
+void MapRefinement::publish(double seconds, double cpu_seconds) {
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const std::size_t number : refiner_.takeMoved()) {
     moved_[number] = refiner_.T_world_ref(number);
@@ -103,6 +105,7 @@ void MapRefinement::publish(double seconds) {
   state_.counts = refiner_.counts();
   state_.tracker = refiner_.trackerErrors();
   state_.seconds += seconds;
+  state_.cpu_seconds += cpu_seconds;
 }
 
 void MapRefinement::runInBackground() {

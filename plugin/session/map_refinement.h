@@ -35,6 +35,7 @@ struct RefinementState {
   TrackerErrors tracker;    ///< As estimated.
   std::size_t waiting = 0;  ///< Keyframes not refined yet.
   double seconds = 0;       ///< Time spent refining.
+  double cpu_seconds = 0;   ///< Processor time of it.
 };
 
 /// The covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the newest
@@ -75,7 +76,7 @@ class MapRefinement {
   };
 
   void refine(Task task);
-  void publish(double seconds);
+  void publish(double seconds, double cpu_seconds);
   void runInBackground();
 
   MapRefinementOptions options_;

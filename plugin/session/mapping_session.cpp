@@ -77,13 +77,19 @@ void MappingSession::feed(CameraPacket packet) {
     extend(span, packet.events.front().t_ns + camera.time_offset_ns);
     extend(span, packet.events.back().t_ns + camera.time_offset_ns);
   }
-  mapper_.addEvents(packet.camera, packet.events);
+  const bool empty = packet.events.empty();
+  const std::int64_t begin_ns = empty ? 0 : packet.events.front().t_ns + camera.time_offset_ns;
+  {
+    const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
+    mapper_.addEvents(packet.camera, std::move(packet.events));
+  }
   if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
   status_.events = span;
-  if (packet.events.empty()) return;
-  const std::int64_t begin_ns = packet.events.front().t_ns + camera.time_offset_ns;
+  if (empty) return;
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
-  if (seenFor(kRigCompletesNs)) completeRig();
+  // Without a wait where neither another camera nor a better source of poses can come.
+  const bool known = rig_.isKnown() && pose_source_.selected();
+  if (known || seenFor(kRigCompletesNs)) completeRig();
 }
 
 /// Whether a packet began this long after the first event: by then every camera has sent one,
@@ -144,9 +150,9 @@ void MappingSession::finish() {
   rig_.requireNoneWaits();
 }
 
-std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink) {
+std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock) {
   if (!rig_.isComplete()) return std::nullopt;
-  StageTimer timer(status_.seconds);
+  StageTimer timer(status_.times, clock);
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
   if (keyframe) {
     insert(*keyframe);
@@ -167,7 +173,7 @@ void MappingSession::insert(KeyframeDepthMap& keyframe) {
     cloud_.cloud().requireInsertable(pointsInWorld(points, T_world_ref));
     keyframe.T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
   }
-  const SecondsScope scope(status_.seconds.map);
+  const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
   cloud_.insert(std::move(points), keyframe.T_world_ref);
   T_odom_ref_.push_back(T_odom_ref);
   status_.silent_keyframes.resize(mapper_.rig().cameras.size());
@@ -193,7 +199,7 @@ void MappingSession::moveKeyframes(double tolerance_m) {
 
 void MappingSession::applyPending() {
   if (!refinement_) return;
-  const SecondsScope scope(status_.seconds.map);
+  const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
   moveKeyframes(0);
 }
 
@@ -211,7 +217,8 @@ SessionStatus MappingSession::status() const {
   status.recalibrated_cameras = rig_.recalibratedCameras();
   if (refinement_) {
     status.refinement = refinement_->state();
-    status.seconds.refine = status.refinement->seconds;
+    status.times.real.refine = status.refinement->seconds;
+    status.times.cpu.refine = status.refinement->cpu_seconds;
   }
   return status;
 }

@@ -31,8 +31,9 @@ class MappingSession {
   /// file of the options that cannot be read.
   explicit MappingSession(const EventFusionOptions& options);
 
-  /// The rig is complete once a packet begins more than a second after the recording's first event,
-  /// whatever the length of packets.
+  /// The rig is complete with the first event if its cameras are known (RigAssembly::isKnown) and
+  /// the source of poses is selected; otherwise once a packet begins more than a second after the
+  /// recording's first event, whatever the length of packets.
   /// @throws std::invalid_argument where the packet contradicts its sensor or earlier packets;
   /// where its camera first appears in a complete rig, or waits for one of a lower index for more
   /// than a second of events; where the options name a camera that the rig does not have.
@@ -62,8 +63,10 @@ class MappingSession {
   /// may be added in between: they change no window that is covered. Where this throws, the earlier
   /// keyframes stay as they are.
   /// @param sink receives every fused plane; may be null.
+  /// @param clock the processor time of the threads that map.
   /// @return the keyframe with its refined pose, as known now.
-  std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr);
+  std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr,
+                                       const ProcessorClock& clock = processSeconds);
 
   /// The points of a keyframe in the cloud: of its fused map, or by option of its cameras' maps.
   std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;

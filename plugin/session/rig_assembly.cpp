@@ -33,6 +33,7 @@ std::vector<CameraPacket> RigAssembly::add(CameraPacket packet, FusionMapper& ma
     throw std::invalid_argument(fmt::format("camera {}: must be 0 or above", packet.camera));
   }
   applyOptions(packet);
+  noteAnnouncement(packet);
   std::vector<CameraPacket> ready;
   if (packet.camera > num_cameras_) {
     letWait(std::move(packet));
@@ -69,6 +70,25 @@ void RigAssembly::applyOptions(CameraPacket& packet) {
                 time_offsets_ns_.size(),
                 fmt::format("one per camera, and there is camera {}", camera));
   recorded.time_offset_ns = time_offsets_ns_[camera];
+}
+
+void RigAssembly::noteAnnouncement(const CameraPacket& packet) {
+  if (announced_) return;
+  if (packet.events.empty()) {
+    if (packet.covered_until_ns) announced_ns_[packet.camera] = *packet.covered_until_ns;
+    return;
+  }
+  const auto announcement = announced_ns_.find(packet.camera);
+  announced_ = announcement != announced_ns_.end() &&
+               announcement->second == packet.events.front().t_ns &&
+               announced_ns_.size() == static_cast<std::size_t>(num_cameras_);
+}
+
+bool RigAssembly::isKnown() const {
+  const auto count = static_cast<std::size_t>(num_cameras_);
+  if (anyCameraWaits() || count == 0) return false;
+  return announced_.value_or(false) || time_offsets_ns_.size() == count ||
+         (setup_.calibration && setup_.calibration->rig.cameras.size() == count);
 }
 
 void RigAssembly::addCamera(const RigCamera& camera, FusionMapper& mapper) {

@@ -44,6 +44,10 @@ class RigAssembly {
   /// @throws std::invalid_argument where the options name a camera that the rig does not have, or
   /// its calibration or time offsets have another number of cameras.
   void requireOptionsFit() const;
+  /// Whether no further camera can come: the options' calibration or time offsets have no other, or
+  /// the recording announced its cameras. It does so if it begins with an empty packet of each,
+  /// which covers its camera until exactly the first event.
+  bool isKnown() const;
   /// From now on a new camera is an error.
   void complete() { complete_ = true; }
   bool isComplete() const { return complete_; }
@@ -59,6 +63,7 @@ class RigAssembly {
 
  private:
   void applyOptions(CameraPacket& packet);
+  void noteAnnouncement(const CameraPacket& packet);
   void addCamera(const RigCamera& camera, FusionMapper& mapper);
   void letWait(CameraPacket packet);
   [[noreturn]] void refuseWithoutNext(int camera) const;
@@ -71,6 +76,8 @@ class RigAssembly {
 
   int num_cameras_ = 0;
   bool complete_ = false;
+  std::map<int, std::int64_t> announced_ns_;  // the end of each camera's empty packets
+  std::optional<bool> announced_;             // all cameras; known from the first event on
   std::set<int> recalibrated_;
   std::map<int, std::vector<CameraPacket>> waiting_;  // by camera
   std::optional<std::int64_t> waiting_since_ns_;      // begin of their first event

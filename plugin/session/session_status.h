@@ -22,8 +22,8 @@ struct TimeSpan {
 
 /// The input of a session and its work so far.
 struct SessionStatus {
-  MapperCounts counts;   ///< Complete after `finish`.
-  StageSeconds seconds;  ///< sweep, depth and map; the caller fills in the rest.
+  MapperCounts counts;  ///< Complete after `finish`.
+  StageTimes times;     ///< Of the stages within the session; the caller fills in the rest.
   std::optional<TimeSpan> events;
   std::optional<TimeSpan> poses;
   std::optional<PoseSourceId> pose_source;            ///< The source whose poses are used.

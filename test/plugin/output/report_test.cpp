@@ -18,7 +18,8 @@ MapReport smallReport() {
   report.counts.votes = {1500, 400, 100};
   report.counts.keyframes = 2;
   report.points = 7;
-  report.seconds = {9, 1, 4, 2, 0, 1.5};
+  report.times.real = {9, 1, 4, 2, 0, 1.5};
+  report.times.cpu = {100, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
   report.options.mapper.keyframe.sweep.threads = 3;
   return report;
 }
@@ -78,6 +79,12 @@ TEST(Report, EveryCountHasItsOwnKey) {
   const json seconds = {{"total", 9.0}, {"read", 1.0},   {"sweep", 4.0},
                         {"depth", 2.0}, {"refine", 0.0}, {"map", 1.5}};
   EXPECT_EQ(written["seconds"], seconds);
+  const json cpu_seconds = json::parse(R"({"total": 100,
+      "once": {"start": 8, "tables": 9, "output": 10},
+      "events": {"read": 1, "filter": 6},
+      "keyframes": {"sweep": 2, "depth": 3, "refine": 4, "map": 5, "images": 7},
+      "other": 45})");
+  EXPECT_EQ(written["cpu_seconds"], cpu_seconds);
   EXPECT_EQ(written["event_uses"], 20);
   EXPECT_EQ(written["keyframes"], 2);
   EXPECT_EQ(written["keyframes_without_pose"], 12);

@@ -181,6 +181,39 @@ TEST(MappingSession, ACameraThatAppearsAfterTheFirstSecondIsAnError) {
   EXPECT_THROW(session.addEvents(packetOf(recording, 1)), std::invalid_argument);
 }
 
+TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
+  const SyntheticRecording recording;
+  MappingSession expected(syntheticOptions());
+  mapPiecewise(expected, recording, 10);
+  enum class Start { kAnnounced, kInexact, kNoPoses, kTimeOffsets };
+  for (const auto& [start, early_keyframes] :
+       {std::pair{Start::kAnnounced, 3U}, std::pair{Start::kInexact, 0U},
+        std::pair{Start::kNoPoses, 0U}, std::pair{Start::kTimeOffsets, 3U}}) {
+    EventFusionOptions options = syntheticOptions();
+    if (start == Start::kTimeOffsets) options.rig.time_offsets_ns = {0, 0};
+    MappingSession session(options);
+    if (start != Start::kNoPoses) addPoses(session, recording);
+    for (const int c : {0, 1}) {
+      const auto index = static_cast<std::size_t>(c);
+      CameraPacket empty{c, recording.cameras[index], {}, recording.events[index].front().t_ns};
+      const bool exact = start == Start::kAnnounced || start == Start::kNoPoses;
+      if (!exact) --*empty.covered_until_ns;
+      session.addEvents(empty);
+    }
+    std::size_t early = 0;
+    for (int i = 0; i < 50; ++i) {
+      for (const int c : {0, 1}) {
+        session.addEvents(pieceOf(recording, c, 0.01 * i, 0.01 * (i + 1)));
+      }
+      early += mapDue(session).size();
+    }
+    EXPECT_EQ(early, early_keyframes) << static_cast<int>(start);
+    if (start == Start::kNoPoses) addPoses(session, recording);
+    mapRest(session);
+    expectSameMap(session, expected);
+  }
+}
+
 TEST(MappingSession, PacketsMayBeLongerThanASecond) {
   const SyntheticRecording recording(1.5);
   MappingSession expected(syntheticOptions());

@@ -122,7 +122,7 @@ TEST(UnrefinedSession, KeepsTheTrackersPoses) {
     EXPECT_EQ(points[i].p_world, expected[i].p_world);
   }
   EXPECT_FALSE(session.status().refinement);
-  EXPECT_EQ(session.status().seconds.refine, 0);
+  EXPECT_EQ(session.status().times.real.refine, 0);
 }
 
 TEST_P(RefinedSession, CountsItsWork) {
@@ -133,8 +133,8 @@ TEST_P(RefinedSession, CountsItsWork) {
   EXPECT_GT(status.refinement->counts.registered, keyframes.size() / 2);
   EXPECT_LT(status.refinement->counts.registered, keyframes.size());
   EXPECT_EQ(status.refinement->waiting, 0U);
-  EXPECT_GT(status.seconds.refine, 0);
-  EXPECT_EQ(status.seconds.refine, status.refinement->seconds);
+  EXPECT_GT(status.times.real.refine, 0);
+  EXPECT_EQ(status.times.real.refine, status.refinement->seconds);
 }
 
 // --- What the tracker says of its noise --------------------------------------------------------
