@@ -14,6 +14,10 @@ struct RigCamera {
   CameraModel model;
   Rigid3 T_rig_cam;                 ///< Extrinsic calibration.
   std::int64_t time_offset_ns = 0;  ///< Added to the camera's stamps: t = t_event + offset.
+
+  /// @throws std::invalid_argument naming the value and what was expected: a valid model, finite
+  /// extrinsics with a unit quaternion, an offset that no event's time overflows with.
+  void validate() const;
 };
 
 /// Calibrated and synchronised cameras, rigidly attached to each other.

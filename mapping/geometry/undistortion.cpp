@@ -1,51 +1,60 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/geometry/undistortion.h"
 
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core.hpp>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "mapping/geometry/lens_inverse.h"
 
 namespace efm {
-namespace {
 
-/// OpenCV's default of 5 iterations leaves errors of some tenths of a pixel in the corners.
-constexpr int kIterations = 50;
-constexpr double kEpsilon = 1e-12;
-
-std::vector<cv::Point2d> undistort(const CameraModel& model,
-                                   const std::vector<cv::Point2d>& pixels) {
-  const cv::Matx33d intrinsics(model.fx, 0, model.cx, 0, model.fy, model.cy, 0, 0, 1);
-  const cv::TermCriteria until(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, kIterations,
-                               kEpsilon);
-  std::vector<cv::Point2d> rays;
-  if (model.distortion == DistortionModel::kEquidistant) {
-    cv::fisheye::undistortPoints(pixels, rays, intrinsics, model.coefficients, cv::noArray(),
-                                 cv::noArray(), until);
-  } else {
-    cv::undistortPoints(pixels, rays, intrinsics, model.coefficients, cv::noArray(), cv::noArray(),
-                        until);
+UndistortionTable::UndistortionTable(const CameraModel& model)
+    : width_(model.width), height_(model.height) {
+  const LensInverse lens(model);
+  rays_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  tbb::parallel_for(0, height_, [&](int y) {
+    const auto row = rays_.begin() + static_cast<std::ptrdiff_t>(y) * width_;
+    Eigen::Vector2d before = LensInverse::noRay();
+    Eigen::Vector2d last = before;
+    for (int x = 0; x < width_; ++x) {
+      const Eigen::Vector2d ray = lens.rayThrough(x, y, 2 * last - before);
+      row[x] = ray.cast<float>();
+      before = last;
+      last = ray;
+    }
+  });
+  center_x_ = static_cast<int>(std::clamp(model.cx, 0.0, width_ - 1.0));
+  center_y_ = static_cast<int>(std::clamp(model.cy, 0.0, height_ - 1.0));
+  if (hasRay(center_x_, center_y_)) return;
+  const auto seen = std::find_if(rays_.begin(), rays_.end(),
+                                 [](const Eigen::Vector2f& ray) { return !std::isnan(ray.x()); });
+  if (seen == rays_.end()) {
+    throw std::invalid_argument(
+        "the lens: no pixel of the sensor has a viewing ray by its distortion coefficients and "
+        "principal point");
   }
-  return rays;
+  center_x_ = static_cast<int>((seen - rays_.begin()) % width_);
+  center_y_ = static_cast<int>((seen - rays_.begin()) / width_);
 }
 
-}  // namespace
-
-std::vector<Eigen::Vector2d> viewingRays(const CameraModel& model, int y) {
-  std::vector<cv::Point2d> pixels;
-  for (int x = 0; x < model.width; ++x) pixels.emplace_back(x, y);
-  std::vector<Eigen::Vector2d> rays;
-  rays.reserve(pixels.size());
-  for (const cv::Point2d& ray : undistort(model, pixels)) rays.emplace_back(ray.x, ray.y);
-  return rays;
+Eigen::Vector2d UndistortionTable::rayNear(int x, int y) const {
+  const int steps = std::max({std::abs(center_x_ - x), std::abs(center_y_ - y), 1});
+  for (int step = 0; step < steps; ++step) {
+    const int column = x + (center_x_ - x) * step / steps;
+    const int row = y + (center_y_ - y) * step / steps;
+    if (hasRay(column, row)) return ray(column, row);
+  }
+  return ray(center_x_, center_y_);
 }
 
-UndistortionTable::UndistortionTable(const CameraModel& model) {
-  model.validate();
-  width_ = model.width;
-  height_ = model.height;
-  rays_.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  for (int y = 0; y < height_; ++y) {
-    for (const Eigen::Vector2d& ray : viewingRays(model, y)) rays_.push_back(ray.cast<float>());
-  }
+std::vector<bool> UndistortionTable::outsideLens() const {
+  std::vector<bool> outside(rays_.size());
+  std::transform(rays_.begin(), rays_.end(), outside.begin(),
+                 [](const Eigen::Vector2f& ray) { return std::isnan(ray.x()); });
+  if (std::find(outside.begin(), outside.end(), true) == outside.end()) outside.clear();
+  return outside;
 }
 
 }  // namespace efm

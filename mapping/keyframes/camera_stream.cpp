@@ -2,19 +2,12 @@
 #include "mapping/keyframes/camera_stream.h"
 
 #include <algorithm>
-#include <stdexcept>
 #include <string>
+#include <utility>
+
+#include "mapping/events/event_check.h"
 
 namespace efm {
-namespace {
-
-[[noreturn]] void refuse(const Event& event, int camera, const std::string& expected) {
-  throw std::invalid_argument("camera " + std::to_string(camera) + ", event at " +
-                              formatSeconds(event.t_ns) + " s: " + expected);
-}
-
-}  // namespace
-
 EventCounts& EventCounts::operator+=(const EventCounts& other) {
   read += other.read;
   used += other.used;
@@ -22,30 +15,31 @@ EventCounts& EventCounts::operator+=(const EventCounts& other) {
   outside_window += other.outside_window;
   filtered += other.filtered;
   dropped += other.dropped;
+  outside_lens += other.outside_lens;
   return *this;
 }
 
 CameraStream::CameraStream(int index, const RigCamera& camera, bool selected,
-                           const EventFilterOptions& filter)
+                           std::vector<bool> outside_lens, const EventFilterOptions& filter)
     : index_(index),
-      width_(camera.model.width),
-      height_(camera.model.height),
+      model_(camera.model),
       time_offset_ns_(camera.time_offset_ns),
-      selected_(selected) {
-  if (filter.any()) filter_.emplace(EventFilter(width_, height_, filter));
+      selected_(selected),
+      outside_lens_(std::move(outside_lens)) {
+  if (filter.any()) filter_.emplace(EventFilter(model_.width, model_.height, filter));
 }
 
 void CameraStream::requireValid(const std::vector<Event>& events) const {
+  requireInsideSensor(events, index_, model_);
   std::int64_t newest_ns = newest_ns_.value_or(kMinTimeNs + kMaxEventDelayNs);
   for (const Event& event : events) {
-    if (event.x >= width_ || event.y >= height_) {
+    const auto lies_within = [](std::int64_t t_ns) {
+      return t_ns >= -kEndOfTimeNs && t_ns <= kEndOfTimeNs;
+    };
+    if (!lies_within(event.t_ns) || !lies_within(onTrajectoryClock(event.t_ns))) {
       refuse(event, index_,
-             "pixel (" + std::to_string(event.x) + ", " + std::to_string(event.y) +
-                 ") must lie inside the sensor of " + std::to_string(width_) + "x" +
-                 std::to_string(height_));
-    }
-    if (event.t_ns < -kEndOfTimeNs || event.t_ns > kEndOfTimeNs) {
-      refuse(event, index_, "times must lie within " + formatSeconds(kEndOfTimeNs) + " s");
+             "times must lie within " + formatSeconds(kEndOfTimeNs) +
+                 " s, with the camera's offset of " + formatSeconds(time_offset_ns_) + " s too");
     }
     const std::int64_t t_ns = onTrajectoryClock(event.t_ns);
     if (t_ns < newest_ns - kMaxEventDelayNs) {
@@ -65,10 +59,16 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
     newest_ns_ = std::max(newest_ns_.value_or(event.t_ns), event.t_ns);
   }
   const auto isUnwanted = [&](const Event& event) {
-    if (selected_ && limits.contain(event.t_ns) && event.t_ns >= released_ns) return false;
-    const bool outside_window = selected_ && !limits.contain(event.t_ns);
-    ++(outside_window ? counts_.outside_window : counts_.dropped);
-    return true;
+    std::uint64_t* reason = nullptr;
+    if (selected_ && !limits.contain(event.t_ns)) {
+      reason = &counts_.outside_window;
+    } else if (!selected_ || event.t_ns < released_ns) {
+      reason = &counts_.dropped;
+    } else if (isOutsideLens(event)) {
+      reason = &counts_.outside_lens;
+    }
+    if (reason != nullptr) ++*reason;
+    return reason != nullptr;
   };
   events.erase(std::remove_if(events.begin(), events.end(), isUnwanted), events.end());
   covered_ns_ = std::max(covered_ns_, *newest_ns_ - kMaxEventDelayNs);
@@ -76,8 +76,9 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
 }
 
 void CameraStream::coverUntil(std::int64_t t_ns) {
+  const std::int64_t own_ns = std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs);
   covered_ns_ =
-      std::max(covered_ns_, onTrajectoryClock(std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs)));
+      std::max(covered_ns_, std::clamp(onTrajectoryClock(own_ns), -kEndOfTimeNs, kEndOfTimeNs));
 }
 
 void CameraStream::filterUntil(std::int64_t t_ns) {

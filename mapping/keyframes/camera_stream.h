@@ -24,6 +24,8 @@ struct EventCounts {
   std::uint64_t outside_window = 0;  ///< Not used: in no window that was mapped.
   std::uint64_t dropped = 0;   ///< Came after their window was closed, or of an unselected camera.
   std::uint64_t filtered = 0;  ///< Removed as noise, with a pose or without.
+  /// Not used: the lens model has no viewing ray for this pixel (`LensInverse`).
+  std::uint64_t outside_lens = 0;
 
   EventCounts& operator+=(const EventCounts& other);
 };
@@ -33,13 +35,15 @@ struct EventCounts {
 class CameraStream {
  public:
   /// @param selected whether the camera's events take part.
-  CameraStream(int index, const RigCamera& camera, bool selected, const EventFilterOptions& filter);
+  /// @param outside_lens `UndistortionTable::outsideLens`; empty for a camera that takes no part.
+  CameraStream(int index, const RigCamera& camera, bool selected, std::vector<bool> outside_lens,
+               const EventFilterOptions& filter);
 
   /// @throws std::invalid_argument where an event lies outside the sensor, or comes more than 10 ms
   /// after a newer one.
   void requireValid(const std::vector<Event>& events) const;
   /// Adds valid events to the filter, or to the buffer if there is no filter. Events before
-  /// `released_ns` and outside the limits are counted, and not added.
+  /// `released_ns`, outside the limits and outside the lens are counted, and not added.
   /// @return the number of events that came after a newer one.
   std::uint64_t add(std::vector<Event> events, const TimeLimits& limits, std::int64_t released_ns);
   /// All events before `t_ns` (the camera's own clock) have been added.
@@ -70,11 +74,16 @@ class CameraStream {
   void release(std::int64_t until_ns, const Trajectory& trajectory);
 
  private:
+  bool isOutsideLens(const Event& event) const {
+    return !outside_lens_.empty() &&
+           outside_lens_[std::size_t{event.y} * static_cast<std::size_t>(model_.width) + event.x];
+  }
+
   int index_;
-  int width_;
-  int height_;
+  CameraModel model_;
   std::int64_t time_offset_ns_;
   bool selected_;
+  std::vector<bool> outside_lens_;
   std::optional<FilteredEvents> filter_;
   EventBuffer buffer_;
   std::size_t pose_cursor_ = 0;

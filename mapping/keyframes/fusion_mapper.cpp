@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/keyframes/fusion_mapper.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <numeric>
 #include <stdexcept>
@@ -59,10 +61,18 @@ FusionMapper::FusionMapper(const FusionMapperOptions& options)
 
 int FusionMapper::addCamera(const RigCamera& camera) {
   if (mapper_) throw std::logic_error("a camera was added after the first keyframe");
-  camera.model.validate();
+  camera.validate();
   const auto index = static_cast<int>(rig_.cameras.size());
+  const bool takes_part = selected(index);
+  std::vector<bool> outside_lens;
+  if (takes_part) {
+    tbb::task_arena arena(options_.keyframe.sweep.threadsOrCores());
+    const auto& [at, is_new] =
+        arena.execute([&] { return undistortion_.emplace(index, camera.model); });
+    outside_lens = at->second.outsideLens();
+  }
   rig_.cameras.push_back(camera);
-  cameras_.emplace_back(index, camera, selected(index), options_.filter);
+  cameras_.emplace_back(index, camera, takes_part, std::move(outside_lens), options_.filter);
   return index;
 }
 
@@ -170,11 +180,7 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
     ++counts_.windows_without_events;
     return std::nullopt;
   }
-  {
-    const StageScope scope(stages, Stage::kTables);
-    keyframeMapper();
-  }
-  auto keyframe = mapper_->map(window, events, trajectory_, sink, stages);
+  auto keyframe = keyframeMapper().map(window, events, trajectory_, sink, stages);
   if (keyframe) {
     countKeyframe(*keyframe);
   } else {
@@ -190,7 +196,11 @@ KeyframeMapper& FusionMapper::keyframeMapper() const {
       cameras.resize(rig_.cameras.size());
       std::iota(cameras.begin(), cameras.end(), 0);
     }
-    mapper_ = std::make_unique<KeyframeMapper>(rig_, cameras, options_.keyframe);
+    std::vector<UndistortionTable> tables;
+    for (const int camera : cameras) {
+      if (auto table = undistortion_.extract(camera)) tables.push_back(std::move(table.mapped()));
+    }
+    mapper_ = std::make_unique<KeyframeMapper>(rig_, cameras, options_.keyframe, std::move(tables));
   }
   return *mapper_;
 }

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
+#include "mapping/geometry/undistortion.h"
 #include "mapping/keyframes/camera_stream.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/keyframes/keyframe_policy.h"
@@ -59,9 +61,10 @@ class FusionMapper : private RecordingProgress {
   /// @throws std::invalid_argument where the options are not valid.
   explicit FusionMapper(const FusionMapperOptions& options);
 
+  /// Inverts the lens of a selected camera, pixel by pixel.
   /// @return the camera's index. All cameras are added before the first keyframe.
-  /// @throws std::invalid_argument where the calibration is not valid; std::logic_error after the
-  /// first keyframe.
+  /// @throws std::invalid_argument naming the value of the calibration that is not valid;
+  /// std::logic_error after the first keyframe.
   int addCamera(const RigCamera& camera);
   /// @throws std::invalid_argument where the pose is not valid, or more than a second older than
   /// the newest.
@@ -113,6 +116,7 @@ class FusionMapper : private RecordingProgress {
 
   FusionMapperOptions options_;
   Rig rig_;
+  mutable std::map<int, UndistortionTable> undistortion_;  // of selected cameras, until mapper_
   Trajectory trajectory_;
   std::unique_ptr<KeyframePolicy> policy_;
   mutable std::unique_ptr<KeyframeMapper> mapper_;  // made when first needed: the rig is complete

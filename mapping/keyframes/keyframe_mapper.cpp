@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "mapping/events/event_check.h"
 #include "mapping/keyframes/corrected_keyframe.h"
 #include "mapping/options/option_check.h"
 
@@ -43,27 +44,34 @@ void KeyframeMapperOptions::validate() const {
 }
 
 KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
-                               const KeyframeMapperOptions& options)
+                               const KeyframeMapperOptions& options,
+                               std::vector<UndistortionTable> undistortion)
     : rig_(std::move(rig)),
       selected_(std::move(selected)),
       options_(options),
       planes_(options.planes),
-      groups_(options.split, options.subintervals) {
+      groups_(options.split, options.subintervals),
+      undistortion_(std::move(undistortion)) {
   options_.validate();
   if (selected_.empty()) throw std::invalid_argument("cameras: at least one must take part");
   requireCamera(rig_, options_.reference_camera, "reference_camera");
-  const CameraModel& reference =
-      rig_.cameras[static_cast<std::size_t>(options_.reference_camera)].model;
+  const RigCamera& reference = cameraOf(options_.reference_camera);
   reference.validate();  // it may be none of the selected ones
-  view_ = makeReferenceView(reference, options_.view);
+  view_ = makeReferenceView(reference.model, options_.view);
   for (const int camera : selected_) {
     requireCamera(rig_, camera, "cameras");
-    undistortion_.emplace_back(rig_.cameras[static_cast<std::size_t>(camera)].model);
+    cameraOf(camera).validate();
   }
+  if (undistortion_.size() == selected_.size()) return;
+  undistortion_.clear();
+  tbb::task_arena arena(options_.sweep.threadsOrCores());
+  arena.execute([&] {
+    for (const int camera : selected_) undistortion_.emplace_back(cameraOf(camera).model);
+  });
 }
 
 Rigid3 KeyframeMapper::referencePose(const Rigid3& T_world_rig) const {
-  const auto& reference = rig_.cameras[static_cast<std::size_t>(options_.reference_camera)];
+  const RigCamera& reference = cameraOf(options_.reference_camera);
   const Rigid3 T_cam_ref{Eigen::Quaterniond::Identity(), options_.view.offset_m};
   return T_world_rig * reference.T_rig_cam * T_cam_ref;
 }
@@ -75,6 +83,9 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
                                                     StageHook* stages) {
   // 1. Input: events, trajectory, calibration.
   const std::vector<CameraEvents> cameras = selectedEvents(events);
+  for (const CameraEvents& camera : cameras) {  // what follows looks up and counts by pixel
+    requireInsideSensor(camera.events, camera.camera, camera.calibration->model);
+  }
   // 2. One reference view for all DSIs.
   const std::optional<Rigid3> T_world_rig = trajectory.poseAt(window.t_ref_ns);
   if (!T_world_rig) return std::nullopt;
@@ -101,8 +112,8 @@ std::vector<CameraEvents> KeyframeMapper::selectedEvents(
     const std::vector<EventSpan>& events) const {
   std::vector<CameraEvents> cameras;
   for (std::size_t i = 0; i < selected_.size(); ++i) {
-    const auto camera = static_cast<std::size_t>(selected_[i]);
-    cameras.push_back({selected_[i], &rig_.cameras[camera], &undistortion_[i], events[camera]});
+    const EventSpan& of_camera = events.at(static_cast<std::size_t>(selected_[i]));
+    cameras.push_back({selected_[i], &cameraOf(selected_[i]), &undistortion_[i], of_camera});
   }
   return cameras;
 }

@@ -48,12 +48,15 @@ struct KeyframeMapperOptions {
 class KeyframeMapper {
  public:
   /// @param selected indices of the rig's cameras whose events take part.
+  /// @param undistortion of the selected cameras, in their order, where they are known already.
   /// @throws std::invalid_argument where the options, a camera or an index is not valid.
-  KeyframeMapper(Rig rig, std::vector<int> selected, const KeyframeMapperOptions& options);
+  KeyframeMapper(Rig rig, std::vector<int> selected, const KeyframeMapperOptions& options,
+                 std::vector<UndistortionTable> undistortion = {});
 
-  /// @param events of the window, per camera of the rig, in time order, on the trajectory's clock,
-  /// inside the sensor (asserted).
+  /// @param events of the window, per camera of the rig, in time order, on the trajectory's clock.
   /// @return nothing where the reference time has no pose.
+  /// @throws std::invalid_argument naming an event of a selected camera that lies outside its
+  /// sensor. The check costs less than a thousandth of a keyframe.
   std::optional<KeyframeDepthMap> map(const Window& window, const std::vector<EventSpan>& events,
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
                                       StageHook* stages = nullptr);
@@ -65,6 +68,9 @@ class KeyframeMapper {
   const ReferenceView& view() const { return view_; }
 
  private:
+  const RigCamera& cameraOf(int index) const {
+    return rig_.cameras[static_cast<std::size_t>(index)];
+  }
   std::vector<CameraEvents> selectedEvents(const std::vector<EventSpan>& events) const;
   KeyframeDepthMap mapAlong(const WindowInput& input, const Trajectory& motion, DsiSink* sink,
                             StageHook* stages) const;

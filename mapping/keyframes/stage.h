@@ -5,7 +5,6 @@ namespace efm {
 
 /// The stages of the mapping, for time measurements. The mapping itself never reads a clock.
 enum class Stage {
-  kTables,  ///< Once: the tables of the cameras.
   kFilter,  ///< Removal of noise from new events.
   kSweep,   ///< Packets, back-projection, votes and fusion.
   kDepth,   ///< Extraction of the depth map.

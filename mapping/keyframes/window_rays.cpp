@@ -25,6 +25,7 @@ WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
         result.rays.emplace_back(backProject(events, packets, *camera.undistortion, input.view));
     result.events += rays.size();
     result.without_pose += packets.without_pose;
+    result.outside_lens += events.size() - packets.without_pose - rays.size();
     rays_in[part.subinterval] += rays.size();
   }
   result.silent_subintervals =
@@ -36,6 +37,7 @@ void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyfr
   for (const WindowRays& camera : cameras) {
     keyframe.events[static_cast<std::size_t>(camera.camera)] = camera.events;
     keyframe.without_pose += camera.without_pose;
+    keyframe.outside_lens += camera.outside_lens;
     if (camera.events == 0) {
       keyframe.silent_cameras.push_back(camera.camera);
     } else {

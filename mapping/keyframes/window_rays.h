@@ -19,6 +19,7 @@ struct WindowRays {
   CameraRays rays;                        ///< One bundle per part of `EventGroups`.
   std::uint64_t events = 0;               ///< With a ray.
   std::uint64_t without_pose = 0;         ///< Without a ray.
+  std::uint64_t outside_lens = 0;         ///< Without a ray, with a pose.
   std::uint64_t silent_subintervals = 0;  ///< Sub-intervals (of all slices) without a ray.
 };
 

@@ -112,6 +112,7 @@ std::vector<WarpedEvent> warpEvents(const CameraEvents& camera, std::size_t ever
   std::size_t cursor = 0;
   for (std::size_t i = every / 2; i < events.size(); i += every) {
     const Event& event = events[i];
+    if (!camera.undistortion->hasRay(event.x, event.y)) continue;
     const auto segment = trajectory.segmentAt(event.t_ns, cursor);
     if (!segment) continue;
     const Rigid3 T_ref_rig = target.T_ref_world * segment->poseAt(event.t_ns);

@@ -41,7 +41,7 @@ struct WarpTarget {
 };
 
 /// Warps one camera's events along a trajectory. The depth of an event is that of a pixel near its
-/// ray. Events without such a pixel or without a pose are left out.
+/// ray. Events without such a pixel, without a pose or outside the lens are left out.
 /// @param every of each `every` consecutive events, the middle one is warped.
 std::vector<WarpedEvent> warpEvents(const CameraEvents& camera, std::size_t every,
                                     const Trajectory& trajectory, const WarpTarget& target);

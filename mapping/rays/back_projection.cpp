@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/rays/back_projection.h"
 
+#include <cmath>
 #include <cstdint>
 
 namespace efm {
@@ -72,6 +73,8 @@ class BundleBuilder {
         .rays()[std::size_t{event.y} * static_cast<std::size_t>(undistortion_.width()) + event.x];
   }
 
+  static bool isRay(const Eigen::Vector2f& ray) { return !std::isnan(ray.x()); }
+
   void resize(std::size_t rays) {
     bundle_.x_inf.resize(rays);
     bundle_.y_inf.resize(rays);
@@ -80,15 +83,17 @@ class BundleBuilder {
   /// Appends the rays in frame `cam`. A separate loop, because table look-ups have no vectors.
   void lookUp(const PosePacket& packet) {
     const std::size_t first = bundle_.size();
-    const std::size_t count = packet.end - packet.begin;
-    resize(first + count);
-    float* x = bundle_.x_inf.data() + first;
-    float* y = bundle_.y_inf.data() + first;
-    for (std::size_t i = 0; i < count; ++i) {
-      const Eigen::Vector2f& ray = rayOf(events_[packet.begin + i]);
-      x[i] = ray.x();
-      y[i] = ray.y();
+    resize(first + packet.end - packet.begin);
+    float* x = bundle_.x_inf.data();
+    float* y = bundle_.y_inf.data();
+    std::size_t end = first;
+    for (std::size_t i = packet.begin; i < packet.end; ++i) {
+      const Eigen::Vector2f& ray = rayOf(events_[i]);
+      x[end] = ray.x();
+      y[end] = ray.y();
+      end += isRay(ray) ? 1 : 0;  // the next one takes its place
     }
+    resize(end);
   }
 
   /// Projects the rays from `begin` on in place. The homography is a copy that stays in registers.
@@ -111,6 +116,7 @@ class BundleBuilder {
     const std::size_t begin = bundle_.size();
     for (std::size_t i = packet.begin; i < packet.end; ++i) {
       const Eigen::Vector2f& ray_cam = rayOf(events_[i]);
+      if (!isRay(ray_cam)) continue;
       const ProjectedRay ray = project(ray_cam.x(), ray_cam.y());
       if ((ray.z < 0) == forward) continue;
       bundle_.x_inf.push_back(ray.x);

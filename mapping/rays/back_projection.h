@@ -30,7 +30,8 @@ struct RayBundle {
 /// (`EventGroups`). All cameras of a sweep have the same number of slots.
 using CameraRays = std::vector<RayBundle>;
 
-/// Back-projects the events of the packets. Events between packets are left out.
+/// Back-projects the events of the packets. Events between packets and outside the lens are left
+/// out. All events lie inside the sensor.
 RayBundle backProject(EventSpan events, const PosePackets& packets,
                       const UndistortionTable& undistortion, const ReferenceView& view);
 

@@ -50,7 +50,7 @@ VoteGrid::VoteGrid(const UndistortionTable& undistortion, const ReferenceView& v
   for (std::size_t i = 0; i < rays_cam_.size(); ++i) {
     const int x = spread(i % kGridSide, undistortion.width());
     const int y = spread(i / kGridSide, undistortion.height());
-    rays_cam_[i] = undistortion.ray(x, y).homogeneous();
+    rays_cam_[i] = undistortion.rayNear(x, y).homogeneous();
   }
 }
 

@@ -15,7 +15,8 @@
 namespace efm {
 
 /// The pixels of the reference view where the rays of a grid over the sensor, corners included,
-/// meet the nearest and the farthest plane.
+/// meet the nearest and the farthest plane. A pixel outside the lens stands for the next one
+/// inside.
 struct GridVotes {
   static constexpr std::size_t kRays = 9;
   static constexpr std::size_t kVotes = 2 * kRays;

@@ -114,6 +114,14 @@ std::vector<std::string> warningsOf(const SessionStatus& status, bool exclude_si
     warnings.push_back(fmt::format("{} events came later than newer ones and were sorted",
                                    status.counts.sorted_events));
   }
+  for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
+    const EventCounts& events = status.counts.cameras[c];
+    if (events.outside_lens == 0) continue;
+    warnings.push_back(
+        fmt::format("{} of {} events of camera {} were not used: its lens model has no viewing ray "
+                    "for their pixels (outside_lens)",
+                    events.outside_lens, events.read, c));
+  }
   for (std::size_t c = 0; c < status.silent_keyframes.size(); ++c) {
     if (status.silent_keyframes[c] == 0) continue;
     warnings.push_back(fmt::format(

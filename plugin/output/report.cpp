@@ -21,7 +21,8 @@ Json asJson(const EventCounts& counts) {
           {"without_pose", counts.without_pose},
           {"outside_window", counts.outside_window},
           {"dropped", counts.dropped},
-          {"filtered", counts.filtered}};
+          {"filtered", counts.filtered},
+          {"outside_lens", counts.outside_lens}};
 }
 
 Json asJson(const StageSeconds& seconds) {

@@ -52,9 +52,14 @@ MappingSession::MappingSession(const EventFusionOptions& options)
 }
 
 void MappingSession::addEvents(CameraPacket packet) {
+  std::vector<CameraPacket> packets;
+  {
+    const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
+    packets = rig_.add(std::move(packet), mapper_);
+  }
   // A refused packet takes no other one with it.
   std::exception_ptr refusal;
-  for (CameraPacket& ready : rig_.add(std::move(packet), mapper_)) {
+  for (CameraPacket& ready : packets) {
     try {
       feed(std::move(ready));
     } catch (const std::invalid_argument&) {
@@ -72,20 +77,18 @@ void MappingSession::feed(CameraPacket packet) {
                     "first packet",
                     packet.camera));
   }
-  std::optional<TimeSpan> span = status_.events;
-  if (!packet.events.empty()) {
-    extend(span, packet.events.front().t_ns + camera.time_offset_ns);
-    extend(span, packet.events.back().t_ns + camera.time_offset_ns);
-  }
   const bool empty = packet.events.empty();
-  const std::int64_t begin_ns = empty ? 0 : packet.events.front().t_ns + camera.time_offset_ns;
+  const std::int64_t first_ns = empty ? 0 : packet.events.front().t_ns;
+  const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns;
   {
     const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
     mapper_.addEvents(packet.camera, std::move(packet.events));
   }
   if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
-  status_.events = span;
   if (empty) return;
+  const std::int64_t begin_ns = first_ns + camera.time_offset_ns;
+  extend(status_.events, begin_ns);
+  extend(status_.events, last_ns + camera.time_offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
   // Without a wait where neither another camera nor a better source of poses can come.
   const bool known = rig_.isKnown() && pose_source_.selected();

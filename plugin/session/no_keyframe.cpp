@@ -61,6 +61,13 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
         "for this recording",
         counts.filtered);
   }
+  if (counts.outside_lens > 0 && counts.used == 0 &&
+      counts.outside_lens + counts.filtered + counts.dropped == counts.read) {
+    return fmt::format(
+        "{} of {} events lie outside the lens: its model has no viewing ray for their pixels, so "
+        "the calibration is wrong",
+        counts.outside_lens, counts.read);
+  }
   const std::uint64_t without_pose = status.counts.keyframes_without_pose;
   const bool saw_nothing = without_pose == 0 && status.counts.windows_without_events > 0;
   if (options.only_window) {

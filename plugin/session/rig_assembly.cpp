@@ -2,6 +2,7 @@
 #include "plugin/session/rig_assembly.h"
 
 #include <fmt/format.h>
+#include <algorithm>
 
 #include <iterator>
 #include <stdexcept>
@@ -101,9 +102,11 @@ void RigAssembly::letWait(CameraPacket packet) {
   const int camera = packet.camera;
   if (complete_ && waiting_.count(camera) != 0) refuseWithoutNext(camera);
   requireIncomplete(camera);
-  packet.calibration.model.validate();
+  packet.calibration.validate();
   if (!packet.events.empty()) {
-    const std::int64_t begin_ns = packet.events.front().t_ns + packet.calibration.time_offset_ns;
+    const std::int64_t first_ns =
+        std::clamp(packet.events.front().t_ns, -kEndOfTimeNs, kEndOfTimeNs);  // not yet checked
+    const std::int64_t begin_ns = first_ns + packet.calibration.time_offset_ns;
     if (!waiting_since_ns_) waiting_since_ns_ = begin_ns;
     if (begin_ns - *waiting_since_ns_ > kMaxWaitNs) refuseWithoutNext(camera);
   }

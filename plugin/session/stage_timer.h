@@ -22,7 +22,7 @@ struct StageSeconds {
   double filter = 0;  ///< Checks, buffering and noise filters of events.
   double images = 0;  ///< Images of keyframes.
   double start = 0;   ///< Before the command: the program and its libraries are loaded.
-  double tables = 0;  ///< Undistortion tables of the cameras.
+  double tables = 0;  ///< The rig and the undistortion tables of its cameras.
   double output = 0;  ///< Processor time alone: export of the map, and its files.
 };
 
@@ -81,8 +81,6 @@ class StageTimer : public StageHook {
  private:
   static double StageSeconds::*sumOf(Stage stage) {
     switch (stage) {
-      case Stage::kTables:
-        return &StageSeconds::tables;
       case Stage::kFilter:
         return &StageSeconds::filter;
       case Stage::kSweep:

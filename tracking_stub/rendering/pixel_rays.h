@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "mapping/geometry/camera.h"
@@ -10,12 +11,13 @@
 
 namespace efm {
 
-/// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and its change across the pixel.
+/// The viewing ray (X/Z, Y/Z) of a raw pixel's centre, and its change across the pixel. Not numbers
+/// where the pixel lies outside the lens: it is dark.
 struct PixelRay {
-  Eigen::Vector2d ray;
-  Eigen::Vector2d per_x;  ///< Per pixel to the right.
-  Eigen::Vector2d per_y;  ///< Per pixel down.
-  double pitch = 0;       ///< Size of the pixel in units of the ray.
+  Eigen::Vector2d ray = Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  Eigen::Vector2d per_x = ray;  ///< Per pixel to the right.
+  Eigen::Vector2d per_y = ray;  ///< Per pixel down.
+  double pitch = 0;             ///< Size of the pixel in units of the ray.
 
   /// The ray of a point in the pixel. The offsets from the centre are -0.5 to 0.5.
   Eigen::Vector2d at(double dx, double dy) const { return ray + dx * per_x + dy * per_y; }
@@ -24,7 +26,8 @@ struct PixelRay {
 /// The viewing rays of all pixels of a camera, with distortion.
 class PixelRays {
  public:
-  /// @throws std::invalid_argument where the model is not valid or has fewer than 2x2 pixels.
+  /// @throws std::invalid_argument where the model is not valid, has fewer than 2x2 pixels, or
+  /// no pixel has a ray.
   explicit PixelRays(const CameraModel& model);
 
   int width() const { return width_; }

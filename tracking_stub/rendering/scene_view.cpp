@@ -98,7 +98,7 @@ ViewHit SceneView::cast(const Eigen::Vector2d& ray) const {
     if (candidate.max_inverse_depth <= hit.inverse_depth) break;  // all others are farther
     const Facet& f = facets_[static_cast<std::size_t>(candidate.facet)];
     const double inverse_depth = at(f.inverse_depth, ray);
-    if (inverse_depth <= hit.inverse_depth) continue;
+    if (!(inverse_depth > hit.inverse_depth)) continue;
     const double u_over_depth = at(f.u_over_depth, ray);
     if (u_over_depth < 0 || u_over_depth > f.width_m * inverse_depth) continue;
     const double v_over_depth = at(f.v_over_depth, ray);

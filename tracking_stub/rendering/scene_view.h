@@ -32,7 +32,7 @@ class SceneView {
   /// @param scene outlives the view.
   SceneView(const Scene& scene, const Rigid3& T_world_cam, const RayBounds& bounds = {});
 
-  /// The first surface on the ray (X/Z, Y/Z).
+  /// The first surface on the ray (X/Z, Y/Z). A ray that is not a number hits none.
   ViewHit cast(const Eigen::Vector2d& ray) const;
 
   /// The surface point of a hit of this ray.

@@ -5,8 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
+#include <limits>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_scene.h"
 #include "test/mapping/options/refused_option.h"
@@ -23,6 +28,7 @@ using ::testing::ThrowsMessage;
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kStart_ns = 1'700'000'000'000'000'000;
 constexpr int kPlanes = 4;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::int64_t at(std::int64_t ms) { return kStart_ns + ms * kMs; }
 
@@ -78,7 +84,8 @@ class Mapper : public FusionMapper {
     std::vector<KeyframeDepthMap> keyframes = takeAll();
     const MapperCounts all = counts();
     for (const EventCounts& c : all.cameras) {
-      EXPECT_EQ(c.read, c.used + c.without_pose + c.outside_window + c.dropped + c.filtered);
+      EXPECT_EQ(c.read, c.used + c.without_pose + c.outside_window + c.dropped + c.filtered +
+                            c.outside_lens);
     }
     EXPECT_EQ(all.votes.total(), all.event_uses * kPlanes);
     return keyframes;
@@ -241,6 +248,82 @@ TEST(FusionMapper, AnEventOutsideTheSensorIsAnErrorAndNoEventOfItsPacketIsTaken)
               ThrowsMessage<std::invalid_argument>(
                   AllOf(HasSubstr("(48, 0)"), HasSubstr("48x36"), HasSubstr("0.000000002 s"))));
   EXPECT_EQ(mapper.counts().total().read, 0U);
+}
+
+TEST(FusionMapper, ACalibrationThatIsNoneIsRefusedWithItsValue) {
+  using Change = std::function<void(RigCamera&)>;
+  const std::vector<std::pair<const char*, Change>> cases = {
+      {"fx = 0: must be", [](RigCamera& c) { c.model.fx = 0; }},
+      {"T_rig_cam: x = nan: must be finite",
+       [](RigCamera& c) {
+         c.T_rig_cam.translation = {kNan, 0, 0};
+       }},
+      {"T_rig_cam: z = inf: must be finite",
+       [](RigCamera& c) {
+         c.T_rig_cam.translation = {0, 0, std::numeric_limits<double>::infinity()};
+       }},
+      {"quaternion = nan: must be 1", [](RigCamera& c) { c.T_rig_cam.rotation.w() = kNan; }},
+      {"quaternion = 2: must be 1", [](RigCamera& c) { c.T_rig_cam.rotation.w() = 2; }},
+      {"quaternion = 0: must be 1", [](RigCamera& c) { c.T_rig_cam.rotation.w() = 0; }},
+      {"time offset = 9223372036.854775807: must be within",
+       [](RigCamera& c) { c.time_offset_ns = kMaxTimeNs; }},
+      {"time offset = -4611686018.427387904: must be within 4611686018.427387903 s",
+       [](RigCamera& c) { c.time_offset_ns = -kEndOfTimeNs - 1; }},
+  };
+  for (const auto& [message, change] : cases) {
+    RigCamera camera{test::smallCamera(), {}, 0};
+    change(camera);
+    Mapper mapper(period(), 0);
+    EXPECT_THAT([&] { mapper.addCamera(camera); },
+                ThrowsMessage<std::invalid_argument>(HasSubstr(message)));
+    EXPECT_TRUE(mapper.rig().cameras.empty());
+    EXPECT_THAT([&] { KeyframeMapper({{camera}}, {0}, period().keyframe); },
+                ThrowsMessage<std::invalid_argument>(HasSubstr(message)));
+  }
+}
+
+TEST(FusionMapper, NoTimeOverflowsWithTheOffsetOfItsCamera) {
+  for (const std::int64_t sign : {-1, 1}) {
+    Mapper mapper(period(), 0);
+    mapper.addCamera({test::smallCamera(), {}, sign * kEndOfTimeNs});
+    mapper.coverUntil(0, sign * kMaxTimeNs);
+    const std::int64_t farthest_ns = -sign * kEndOfTimeNs;
+    mapper.addEvents(0, {eventAt(std::min<std::int64_t>(farthest_ns, 0)),
+                         eventAt(std::max<std::int64_t>(farthest_ns, 0))});
+    EXPECT_THAT([&] { mapper.addEvents(0, {eventAt(sign * kMs)}); },
+                ThrowsMessage<std::invalid_argument>(
+                    AllOf(HasSubstr("times must lie within"), HasSubstr("offset of"))));
+    EXPECT_EQ(mapper.counts().total().read, 2U);
+  }
+}
+
+TEST(FusionMapper, EventsOutsideTheLensAreCountedAndReachNoFilterAndNoWindow) {
+  FusionMapperOptions options = period();
+  options.filter.hot_pixels = true;
+  options.filter.hot_pixel.min_events = 40;
+  options.cameras = {1, 0};
+  Mapper mapper(options, 0);
+  mapper.addCamera({test::smallCamera(), {}, 0});
+  mapper.addCamera({test::foldingCamera(), {}, 0});
+  mapper.addCamera({test::foldingCamera(), {}, 0});  // takes no part
+  mapper.addPoses(0, 300);
+  for (int camera = 0; camera < 3; ++camera) {
+    std::vector<Event> events;
+    for (int ms = 0; ms < 250; ++ms) {
+      events.push_back({at(ms), 0, 0, true});  // hot
+      events.push_back({at(ms), 23, static_cast<std::uint16_t>(10 + ms % 16), true});
+    }
+    mapper.addEvents(camera, events);
+  }
+  EXPECT_EQ(mapper.end().size(), 2U);
+  const std::vector<EventCounts> counts = mapper.counts().cameras;
+  EXPECT_EQ(counts[0].outside_lens, 0U);
+  EXPECT_EQ(counts[0].filtered, 211U);
+  EXPECT_EQ(counts[1].outside_lens, 250U);
+  EXPECT_EQ(counts[1].used, 200U);
+  EXPECT_EQ(counts[1].filtered, 0U);
+  EXPECT_EQ(counts[2].outside_lens, 0U);
+  EXPECT_EQ(counts[2].dropped, 500U);
 }
 
 TEST(FusionMapper, EventsUpToTenMillisecondsLateAreSortedAndCounted) {

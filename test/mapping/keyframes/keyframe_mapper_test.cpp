@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 #include <stdexcept>
+#include <string>
+#include <utility>
 
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_recording.h"
@@ -16,6 +18,7 @@ namespace {
 
 using test::RandomScene;
 using test::same;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -184,6 +187,49 @@ TEST(KeyframeMapper, WithoutAPoseACameraIsAsSilentAsWithoutEvents) {
   EXPECT_THAT(keyframe.silent_cameras, ElementsAre(1));
   EXPECT_GE(keyframe.without_pose, 3000U);
   EXPECT_GT(keyframe.max_confidence, 0);
+}
+
+TEST(KeyframeMapper, EventsOutsideTheLensAreCountedAndChangeNothing) {
+  Recording recording(12, 2, 3000);
+  for (RigCamera& camera : recording.rig.cameras) camera.model = test::foldingCamera();
+  const UndistortionTable undistortion(test::foldingCamera());
+  Recording inside = recording;
+  for (auto& events : inside.events) {
+    const auto is_outside = [&](const Event& e) { return !undistortion.hasRay(e.x, e.y); };
+    events.erase(std::remove_if(events.begin(), events.end(), is_outside), events.end());
+  }
+  const std::size_t outside = 6000 - inside.events[0].size() - inside.events[1].size();
+  ASSERT_GT(outside, 500U);
+  for (const VotingKernel kernel : {VotingKernel::kPlain, fastestKernel()}) {
+    KeyframeMapperOptions options = fewPlanes();
+    options.sweep.kernel = kernel;
+    const KeyframeDepthMap all = map(recording, {0, 1}, options);
+    const KeyframeDepthMap expected = map(inside, {0, 1}, options);
+    EXPECT_EQ(all.outside_lens, outside);
+    EXPECT_EQ(expected.outside_lens, 0U);
+    EXPECT_EQ(all.events, expected.events);
+    EXPECT_EQ(all.votes.total(), expected.votes.total());
+    // Packets are other ones: their poses differ by less than their bound.
+    EXPECT_NEAR(all.max_confidence, expected.max_confidence, 0.02 * expected.max_confidence);
+  }
+}
+
+TEST(KeyframeMapper, AnEventOutsideTheSensorIsRefused) {
+  for (const auto& [x, y] : {std::pair<int, int>{48, 0}, {0, 36}, {65535, 65535}}) {
+    Recording recording(13, 2, 100);
+    recording.events[1][50].x = static_cast<std::uint16_t>(x);
+    recording.events[1][50].y = static_cast<std::uint16_t>(y);
+    KeyframeMapperOptions options = fewPlanes();
+    options.event_images = true;
+    KeyframeMapper mapper(recording.rig, {0, 1}, options);
+    EXPECT_THAT([&] { mapper.map(Recording::kWindow, recording.spans(), recording.trajectory); },
+                ThrowsMessage<std::invalid_argument>(
+                    AllOf(HasSubstr("camera 1"), HasSubstr("48x36"),
+                          HasSubstr("(" + std::to_string(x) + ", " + std::to_string(y) + ")"))));
+    KeyframeMapper other(recording.rig, {0}, options);
+    EXPECT_TRUE(other.map(Recording::kWindow, recording.spans(), recording.trajectory))
+        << "a camera that takes no part";
+  }
 }
 
 TEST(KeyframeMapper, InvalidOptionsAreNamed) {

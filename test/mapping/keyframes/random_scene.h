@@ -69,4 +69,11 @@ inline CameraModel smallCamera() {
   return {48, 36, 31.0, 31.5, 23.2, 17.8, DistortionModel::kRadtan, {-0.14, 0.09, 0.0003, 0.0002}};
 }
 
+/// Its model folds the image over: pixels more than 17 px from the centre have no ray.
+inline CameraModel foldingCamera() {
+  CameraModel model = smallCamera();
+  model.coefficients = {-0.5, 0, 0.0003, 0.0002};
+  return model;
+}
+
 }  // namespace efm::test

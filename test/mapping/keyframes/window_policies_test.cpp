@@ -163,7 +163,7 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
         EXPECT_EQ(counts.outside_window, expected.outside_window) << labelOf(options, seed);
         EXPECT_EQ(counts.dropped, expected.dropped) << labelOf(options, seed);
         EXPECT_EQ(counts.read, counts.used + counts.without_pose + counts.outside_window +
-                                   counts.dropped + counts.filtered);
+                                   counts.dropped + counts.filtered + counts.outside_lens);
       }
       EXPECT_EQ(played.counts.event_uses, uses) << labelOf(options, seed);
       EXPECT_EQ(played.counts.votes.total(), uses * 4) << "of four planes";

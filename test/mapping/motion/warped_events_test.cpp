@@ -103,5 +103,22 @@ TEST(WarpedEvents, EventsWithoutDepthAreLeftOut) {
   EXPECT_TRUE(warping.warp(flat(warping.view, 1), Trajectory(), events).empty()) << "no pose";
 }
 
+TEST(WarpedEvents, EventsOutsideTheLensAreLeftOut) {
+  const Warping warping;
+  RigCamera camera = warping.camera;
+  camera.model = test::foldingCamera();
+  const UndistortionTable undistortion(camera.model);
+  std::vector<Event> outside;
+  for (const Event& event : warping.recording.events.front()) {
+    if (!undistortion.hasRay(event.x, event.y)) outside.push_back(event);
+  }
+  ASSERT_GT(outside.size(), 20U);
+  const NearestDepths depths(flat(warping.view, 1.25F), 100);
+  EXPECT_TRUE(warpEvents({0, &camera, &undistortion, outside}, 1, warping.recording.trajectory,
+                         {warping.T_world_ref.inverse(), warping.view,
+                          inversePlanes(warping.planes), &depths, warping.window.t_ref_ns})
+                  .empty());
+}
+
 }  // namespace
 }  // namespace efm::warped_events_test

@@ -188,5 +188,35 @@ TEST(BackProjection, EventsBetweenPacketsAreLeftOut) {
   EXPECT_EQ(rays.packets[1].end, 15U);
 }
 
+TEST(BackProjection, EventsOutsideTheLensAreLeftOutInEveryDirection) {
+  const CameraModel model = test::foldingCamera();
+  const UndistortionTable undistortion(model);
+  const ReferenceView view = ReferenceView::of(model);
+  const std::vector<Event> events = onePerPixel(model);
+  for (const double turn_rad : {0.2, M_PI / 2, M_PI}) {
+    const Rigid3 T_ref_cam{
+        Eigen::Quaterniond(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitY())), {0, 0, 0}};
+    const RayBundle rays = backProject(
+        events, {{{0, 700, T_ref_cam}, {700, events.size(), T_ref_cam}}, 0}, undistortion, view);
+    std::vector<Eigen::Vector2d> expected;
+    for (const auto& [begin, end] : {std::pair<std::size_t, std::size_t>{0, 700}, {700, 1728}}) {
+      for (const bool forward : {true, false}) {
+        for (std::size_t i = begin; i < end; ++i) {
+          if (!undistortion.hasRay(events[i].x, events[i].y)) continue;
+          const Eigen::Vector3d direction =
+              T_ref_cam.rotation * undistortion.ray(events[i].x, events[i].y).homogeneous();
+          if ((direction.z() < 0) != forward) expected.push_back(view.project(direction));
+        }
+      }
+    }
+    EXPECT_LT(expected.size(), events.size() - 300) << "the case is there";
+    ASSERT_EQ(rays.size(), expected.size());
+    EXPECT_EQ(rays.packets.back().end, rays.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      EXPECT_NEAR(rays.x_inf[i], expected[i].x(), 1e-6 * (10 + expected[i].squaredNorm()));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace efm

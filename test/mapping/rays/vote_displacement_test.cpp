@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "test/mapping/keyframes/random_scene.h"
@@ -37,6 +38,28 @@ TEST(VoteGrid, VotesAreWhereTheRaysOfTheSensorMeetThePlanes) {
       EXPECT_NEAR(votes.x[i], exact.x(), 1e-9 * (10 + exact.squaredNorm()));
       EXPECT_NEAR(votes.y[i], exact.y(), 1e-9 * (10 + exact.squaredNorm()));
     }
+  }
+}
+
+TEST(VoteGrid, ACornerOutsideTheLensStandsForTheNextPixelInside) {
+  const CameraModel model = test::foldingCamera();
+  const UndistortionTable undistortion(model);
+  ASSERT_FALSE(undistortion.hasRay(0, 0));
+  ReferenceView view = ReferenceView::of(model);
+  const GridVotes votes =
+      VoteGrid(undistortion, view, kNearPlane_m, kFarPlane_m).votesFrom(Rigid3());
+  // A vote without motion is at its ray: the corner's is the last one that the lens sees.
+  const double corner = std::hypot(votes.x[0] - model.cx, votes.y[0] - model.cy);
+  double largest = 0;
+  for (int x = 0; x < model.width; ++x) {
+    for (int y = 0; y < model.height; ++y) {
+      if (!undistortion.hasRay(x, y)) continue;
+      largest = std::max(largest, undistortion.ray(x, y).norm() * model.fx);
+    }
+  }
+  EXPECT_GT(corner, 0.7 * largest);
+  for (std::size_t i = 0; i < GridVotes::kVotes; ++i) {
+    EXPECT_LT(std::hypot(votes.x[i] - model.cx, votes.y[i] - model.cy), 1.1 * largest);
   }
 }
 

@@ -58,12 +58,13 @@ TEST(Report, EveryCountHasItsOwnKey) {
   MapReport report = smallReport();
   MapperCounts& counts = report.counts;
   counts.cameras.assign(1, {});
-  counts.cameras[0].read = 45;
+  counts.cameras[0].read = 51;
   counts.cameras[0].used = 11;
   counts.cameras[0].without_pose = 7;
   counts.cameras[0].outside_window = 8;
   counts.cameras[0].dropped = 9;
   counts.cameras[0].filtered = 10;
+  counts.cameras[0].outside_lens = 6;
   counts.keyframes_without_pose = 12;
   counts.windows_without_events = 13;
   counts.silent_subintervals = 14;
@@ -71,8 +72,8 @@ TEST(Report, EveryCountHasItsOwnKey) {
   counts.duplicate_poses = 16;
   report.silent_keyframes = {0, 17};
   const json written = json::parse(reportJson(report));
-  const json events = {{"read", 45},          {"used", 11},   {"without_pose", 7},
-                       {"outside_window", 8}, {"dropped", 9}, {"filtered", 10}};
+  const json events = {{"read", 51},   {"used", 11},     {"without_pose", 7}, {"outside_window", 8},
+                       {"dropped", 9}, {"filtered", 10}, {"outside_lens", 6}};
   EXPECT_EQ(written["events"]["cameras"], json::array({events}));
   const json votes = {{"cast", 1500}, {"outside_view", 400}, {"behind_camera", 100}};
   EXPECT_EQ(written["votes"], votes);

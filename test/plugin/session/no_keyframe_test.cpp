@@ -41,6 +41,18 @@ TEST(WhyNoKeyframe, SaysThatTheFiltersLeftNothing) {
                         " events of the selected cameras for noise"));
 }
 
+TEST(WhyNoKeyframe, SaysThatTheLensSeesNoEvent) {
+  SyntheticRecording recording;
+  for (RigCamera& camera : recording.cameras) {
+    camera.model.distortion = DistortionModel::kRadtan;
+    camera.model.coefficients = {-1000, 0, 0, 0};
+    camera.model.cx = camera.model.cy = 0;  // the lens sees some pixels of this corner
+  }
+  const std::string events = std::to_string(recording.totalEvents());
+  EXPECT_THAT(why(recording, syntheticOptions()),
+              HasSubstr(events + " of " + events + " events lie outside the lens"));
+}
+
 TEST(WhyNoKeyframe, SaysThatEventsOrPosesAreMissing) {
   SyntheticRecording recording;
   recording.poses.clear();

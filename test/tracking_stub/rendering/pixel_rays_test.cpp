@@ -3,9 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "test/tracking_stub/scenes/edge_scene.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm {
 namespace {
@@ -26,6 +28,33 @@ TEST(PixelRays, HaveBoundsAroundThePixelsAreas) {
   const PixelRays rays(test::smallCamera().model);
   EXPECT_NEAR(rays.bounds().min.x(), -32.0 / 50, 1e-12);
   EXPECT_NEAR(rays.bounds().max.y(), 24.0 / 50, 1e-12);
+}
+
+TEST(PixelRays, PixelsOutsideTheLensAreDarkAndTheOthersDoNotKnowThem) {
+  CameraModel model = test::smallCamera().model;
+  model.distortion = DistortionModel::kRadtan;
+  model.coefficients = {-0.8, 0, 0,
+                        0};  // folds over at a ray of 0.645: 21.5 pixels from the centre
+  const FrameRenderer renderer(model);
+  Scene scene;
+  scene.addRectangle(test::facingWall(1, 20, 20), test::evenPaint(1));
+  Frame frame;
+  renderer.render(renderer.viewFrom(scene, Rigid3()), frame);
+  int dark = 0;
+  for (int y = 0; y < model.height; ++y) {
+    for (int x = 0; x < model.width; ++x) {
+      const double distance_px = std::hypot(x - model.cx, y - model.cy);
+      if (std::abs(distance_px - 21.5) < 0.1) continue;
+      const bool outside = distance_px > 21.5;
+      dark += outside ? 1 : 0;
+      ASSERT_EQ(std::isnan(renderer.rays()(x, y).ray.x()), outside) << x << ", " << y;
+      ASSERT_EQ(frame.surface(y, x), outside ? -1 : 0);
+      // The wall is brighter, up to the last pixel inside.
+      ASSERT_EQ(frame.log_intensity(y, x), outside ? 0.0F : 1.0F) << x << ", " << y;
+    }
+  }
+  EXPECT_GT(dark, 500);
+  EXPECT_LT(renderer.rays().bounds().max.x(), 0.9);
 }
 
 TEST(PixelRays, NeedMoreThanASinglePixel) {

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/geometry/lens_inverse.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "mapping/geometry/undistortion.h"
+
+namespace efm::lens_inverse_test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+using Real = long double;
+
+/// r of rho, and its derivative.
+struct Radius {
+  Real r, slope;
+};
+
+Radius radiusAt(const std::vector<double>& k, Real rho) {
+  const Real s = rho * rho;
+  Real power = 1;
+  Radius result{1, 1};
+  for (std::size_t i = 0; i < k.size(); ++i) {
+    power *= s;
+    result.r += static_cast<Real>(k[i]) * power;
+    result.slope += static_cast<Real>(2 * i + 3) * static_cast<Real>(k[i]) * power;
+  }
+  result.r *= rho;
+  return result;
+}
+
+template <typename Condition>
+Real lastWhere(const Condition& holds, Real low, Real high) {
+  for (int i = 0; i < 80; ++i) {
+    const Real middle = (low + high) / 2;
+    (holds(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+/// Where the lens folds over: found by a walk outwards from the centre.
+Real foldOf(const std::vector<double>& k, Real max_rho) {
+  constexpr Real kStep = 1e-3L;
+  const auto rises = [&](Real rho) { return radiusAt(k, rho).slope > 0; };
+  Real rho = 0;
+  while (rho < max_rho && rises(rho + kStep)) rho += kStep;
+  return std::min(max_rho, lastWhere(rises, rho, rho + kStep));
+}
+
+/// The exact inverse of a lens without tangential distortion; nothing beyond its fold.
+std::optional<Real> rhoOf(const std::vector<double>& k, Real r, Real fold) {
+  if (radiusAt(k, fold).r < r) return std::nullopt;
+  return lastWhere([&](Real rho) { return radiusAt(k, rho).r < r; }, 0, fold);
+}
+
+struct Lens {
+  std::string name;
+  double focal_px;
+  DistortionModel distortion;
+  std::vector<double> radial;  ///< k1, k2 ...
+  bool covers;                 ///< Every pixel has a ray.
+};
+
+constexpr auto kRadtan = DistortionModel::kRadtan;
+constexpr auto kEquidistant = DistortionModel::kEquidistant;
+
+/// All with the centre between pixels, so that four pixels are alike.
+const std::vector<Lens> kLenses = {
+    {"strong barrel, invertible everywhere", 180, kRadtan, {-0.45, 0.2, 0}, true},
+    {"strong barrel with k3", 170, kRadtan, {-0.6, 0.5, -0.1}, true},
+    {"folds over", 230, kRadtan, {-0.5, 0, 0}, false},
+    {"folds over and rises again", 250, kRadtan, {-0.6, 0.15, 0}, false},
+    {"pincushion", 250, kRadtan, {0.5, 0.3, 0.1}, true},
+    {"fisheye", 120, kEquidistant, {-0.048, 0.0113, -0.0554, 0.0215}, false},
+    {"fisheye beyond 90 degrees", 100, kEquidistant, {0.05, 0.01, 0, 0}, false},
+    {"fisheye that folds over and rises again", 160, kEquidistant, {-0.5, 0.1, 0.02, 0}, false},
+};
+
+CameraModel cameraOf(const Lens& lens) {
+  const std::vector<double>& k = lens.radial;
+  std::vector<double> coefficients = k;
+  if (lens.distortion == kRadtan) coefficients = {k[0], k[1], 0, 0, k[2]};
+  return {346, 260, lens.focal_px, lens.focal_px, 172.5, 129.5, lens.distortion, coefficients};
+}
+
+TEST(LensInverse, RaysAreExactUpToTheFoldAndNoPixelBeyondItHasOne) {
+  for (const Lens& lens : kLenses) {
+    const CameraModel model = cameraOf(lens);
+    const LensInverse inverse(model);
+    const UndistortionTable table(model);
+    const bool fisheye = lens.distortion == kEquidistant;
+    const Real fold = foldOf(lens.radial, fisheye ? std::atan(1e4L) : 10);
+    int outside = 0;
+    double largest_px = 0;
+    for (int y = 0; y < model.height / 2; ++y) {
+      for (int x = 0; x < model.width / 2; ++x) {
+        const Eigen::Vector2d distorted((x - model.cx) / model.fx, (y - model.cy) / model.fy);
+        const Real r =
+            std::hypot(static_cast<Real>(distorted.x()), static_cast<Real>(distorted.y()));
+        const std::optional<Real> rho = rhoOf(lens.radial, r, fold);
+        ASSERT_EQ(table.hasRay(x, y), rho.has_value()) << lens.name << ": " << x << ", " << y;
+        const Eigen::Vector2d ray = inverse.rayThrough(x, y);
+        ASSERT_EQ(std::isnan(ray.x()), !rho) << lens.name << ": " << x << ", " << y;
+        if (!rho) {
+          outside += 4;
+          continue;
+        }
+        const Real length = fisheye ? std::tan(*rho) : *rho;
+        const Eigen::Vector2d exact = static_cast<double>(length / r) * distorted;
+        EXPECT_LT((ray - exact).norm(), 1e-7 * (1 + exact.norm())) << lens.name;
+        EXPECT_LT((table.ray(x, y) - exact).norm(), 1e-7 * (1 + exact.norm())) << lens.name;
+        const Eigen::Vector2d pixel = model.project(ray.homogeneous());
+        largest_px = std::max(largest_px, (pixel - Eigen::Vector2d(x, y)).norm());
+      }
+    }
+    EXPECT_LT(largest_px, 1e-6) << lens.name;
+    if (lens.covers) {
+      EXPECT_EQ(outside, 0) << lens.name;
+      EXPECT_TRUE(table.outsideLens().empty()) << lens.name;
+    } else {
+      EXPECT_GT(outside, 1000) << lens.name << ": the case is there";
+      EXPECT_LT(outside, 346 * 260 / 2) << lens.name;
+      const std::vector<bool> mask = table.outsideLens();
+      EXPECT_EQ(std::count(mask.begin(), mask.end(), true), outside) << lens.name;
+    }
+  }
+}
+
+/// The model with a tangential part, forwards.
+Eigen::Vector2d distorted(const std::vector<double>& c, const Eigen::Vector2d& ray) {
+  const double x = ray.x();
+  const double y = ray.y();
+  const double s = x * x + y * y;
+  const double ratio = 1 + c[0] * s + c[1] * s * s + (c.size() > 4 ? c[4] * s * s * s : 0);
+  return {x * ratio + 2 * c[2] * x * y + c[3] * (s + 2 * x * x),
+          y * ratio + c[2] * (s + 2 * y * y) + 2 * c[3] * x * y};
+}
+
+bool isOnBranch(const std::vector<double>& c, const Eigen::Vector2d& ray) {
+  constexpr double kStep = 1e-5;
+  Eigen::Matrix2d by_ray;
+  for (int i = 0; i < 2; ++i) {
+    const Eigen::Vector2d step = kStep * Eigen::Vector2d::Unit(i);
+    by_ray.col(i) = (distorted(c, ray + step) - distorted(c, ray - step)) / (2 * kStep);
+  }
+  return by_ray.determinant() > 0 && by_ray.trace() > 0;
+}
+
+/// Walks outwards from the centre along many rays as far as the branch goes.
+/// @return per pixel whether the lens projects a ray there.
+cv::Mat1b pixelsSeen(const CameraModel& model) {
+  cv::Mat1b seen = cv::Mat1b::zeros(model.height, model.width);
+  constexpr int kDirections = 5000;
+  for (int i = 0; i < kDirections; ++i) {
+    const double angle = 2 * M_PI * i / kDirections;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    for (double length = 0; length < 4; length += 2e-3) {
+      const Eigen::Vector2d ray = length * direction;
+      if (!isOnBranch(model.coefficients, ray)) break;
+      const Eigen::Vector2d at = distorted(model.coefficients, ray);
+      const cv::Point pixel(cvRound(model.fx * at.x() + model.cx),
+                            cvRound(model.fy * at.y() + model.cy));
+      if (pixel.inside({0, 0, model.width, model.height})) seen(pixel) = 1;
+    }
+  }
+  return seen;
+}
+
+TEST(LensInverse, TangentialDistortionIsInvertedOnTheBranchOfTheCentre) {
+  for (const std::vector<double>& coefficients : {std::vector<double>{-0.45, 0.2, 0.01, -0.02},
+                                                  {-0.5, 0, 0.02, 0.01},
+                                                  {-0.6, 0.15, -0.01, 0.005, 0},
+                                                  {0.2, 0.1, -0.02, 0.03, 0.05}}) {
+    const CameraModel model{346, 260, 180, 182, 160.25, 140.5, kRadtan, coefficients};
+    const UndistortionTable table(model);
+    const cv::Mat1b seen = pixelsSeen(model);
+    double largest_px = 0;
+    double largest_step = 0;
+    int wrong = 0;
+    for (int y = 1; y < model.height - 1; ++y) {
+      for (int x = 1; x < model.width - 1; ++x) {
+        const int around = cv::countNonZero(seen(cv::Rect(x - 1, y - 1, 3, 3)));
+        const bool has_ray = table.hasRay(x, y);
+        if ((around == 9 && !has_ray) || (around == 0 && has_ray)) ++wrong;
+        if (!has_ray) continue;
+        const Eigen::Vector2d ray = table.ray(x, y);
+        const Eigen::Vector2d pixel = model.project(ray.homogeneous());
+        largest_px = std::max(largest_px, (pixel - Eigen::Vector2d(x, y)).norm());
+        if (!table.hasRay(x - 1, y)) continue;
+        largest_step = std::max(largest_step, (ray - table.ray(x - 1, y)).norm());
+      }
+    }
+    EXPECT_EQ(wrong, 0) << coefficients[0];
+    EXPECT_LT(largest_px, 1e-4);
+    EXPECT_LT(largest_step, 0.2) << "adjacent rays are near each other, also at a fold";
+  }
+}
+
+TEST(LensInverse, ALensThatProjectsNothingToTheSensorIsRefused) {
+  CameraModel model = cameraOf(kLenses[2]);
+  model.cx = 2000;
+  EXPECT_THAT([&] { UndistortionTable{model}; },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("no pixel")));
+}
+
+}  // namespace
+}  // namespace efm::lens_inverse_test
