@@ -28,19 +28,10 @@ std::uint64_t EventBuffer::insert(EventSpan added) {
   }
   // Times are whole: the first event later than the earliest late one. The old events are sorted.
   const std::size_t first_unsorted = late > 0 ? indexOf(earliest_late + 1) : 0;
-  reserveFor(added.size());
   events.insert(events.end(), added.begin(), added.end());
   used.resize(events.size());
   if (late > 0) sortFrom(first_unsorted);
   return late;
-}
-
-/// Grows by a quarter: a vector that doubles takes three times the memory of its events.
-void EventBuffer::reserveFor(std::size_t added) {
-  const std::size_t size = events.size() + added;
-  if (size > events.capacity()) {
-    events.reserve(std::max(size, events.capacity() + events.capacity() / 4));
-  }
 }
 
 void EventBuffer::sortFrom(std::size_t index) {

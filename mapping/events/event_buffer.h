@@ -25,11 +25,15 @@ struct EventBuffer {
   /// otherwise that of sorting the events after the earliest late one.
   /// @return the number of events that came after a newer one.
   std::uint64_t insert(EventSpan added);
+  /// Forgets the events from an index on.
+  void cut(std::size_t index) {
+    events.resize(index);
+    used.resize(index);
+  }
   /// Frees the memory of released events; cost is constant on average.
   void compact();
 
  private:
-  void reserveFor(std::size_t added);
   void sortFrom(std::size_t index);
 };
 

@@ -28,13 +28,24 @@ std::uint64_t FilteredEvents::release(std::int64_t until_ns, EventBuffer& buffer
   const std::size_t end = waiting_.indexOf(until_ns);
   const std::size_t released = end - waiting_.begin;
   if (released == 0) return 0;
-  Event* const first = waiting_.events.data() + waiting_.begin;
-  Event* const last =
-      std::remove_if(first, first + released, [&](const Event& e) { return !filter_.keeps(e); });
-  buffer.insert({first, last});
-  waiting_.begin = end;
-  waiting_.compact();
-  return released - static_cast<std::size_t>(last - first);
+  const auto at = [&](std::size_t i) {
+    return waiting_.events.begin() + static_cast<std::ptrdiff_t>(i);
+  };
+  const auto last = std::remove_if(at(waiting_.begin), at(end),
+                                   [&](const Event& event) { return !filter_.keeps(event); });
+  const auto kept = static_cast<std::size_t>(last - at(waiting_.begin));
+  if (buffer.begin == buffer.events.size() && kept > buffer.events.capacity()) {
+    // After a wait the memory changes hands: a copy would hold all events twice.
+    const std::vector<Event> rest(at(end), waiting_.events.end());
+    waiting_.cut(waiting_.begin + kept);
+    buffer = std::exchange(waiting_, {});
+    waiting_.insert(rest);
+  } else {
+    buffer.insert({&*at(waiting_.begin), &*at(waiting_.begin) + kept});
+    waiting_.begin = end;
+    waiting_.compact();
+  }
+  return released - kept;
 }
 
 }  // namespace efm
