@@ -29,6 +29,14 @@ bool isAvailable(VotingKernel kernel) {
   return std::find(all.begin(), all.end(), kernel) != all.end();
 }
 
-VotingKernel fastestKernel() { return availableKernels().back(); }
+VotingKernel fastestOf(const std::vector<VotingKernel>& kernels) {
+  VotingKernel fastest = VotingKernel::kPlain;
+  for (const VotingKernel kernel : kernels) {
+    if (kernel != VotingKernel::kBaseline) fastest = std::max(fastest, kernel);
+  }
+  return fastest;
+}
+
+VotingKernel fastestKernel() { return fastestOf(availableKernels()); }
 
 }  // namespace efm

@@ -6,10 +6,10 @@
 namespace efm {
 
 /// The code of the inner loops: plain scalar code, the specification, or vectors of one instruction
-/// set. From slow to fast within an architecture.
+/// set. Vectors from slow to fast within an architecture.
 enum class VotingKernel {
   kPlain,
-  kBaseline,  ///< Vectors that any processor of the architecture has.
+  kBaseline,  ///< What any processor of the architecture has. Slower than plain.
   kSse4,
   kAvx2,    ///< With FMA, BMI2 and F16C.
   kAvx512,  ///< F, BW, CD, DQ and VL.

@@ -75,14 +75,12 @@ void addSource(CLI::App& command, Arguments& arguments) {
 
 /// For a command without an option file, which has the length of a keyframe.
 template <typename Arguments>
-void requireKeyframeLengthOf(CLI::App& command, const std::shared_ptr<Arguments>& arguments) {
-  command.parse_complete_callback([arguments] {
-    try {
-      requireKeyframeLength(arguments->source.faults);
-    } catch (const std::invalid_argument& error) {
-      throw CLI::ValidationError("--perturb", error.what());
-    }
-  });
+void requireKeyframeLengthOf(const Arguments& arguments) {
+  try {
+    requireKeyframeLength(arguments.source.faults);
+  } catch (const std::invalid_argument& error) {
+    throw CLI::ValidationError("--perturb", error.what());
+  }
 }
 
 /// Sets a time from seconds of the recording's own clock, exact to the nanosecond.
@@ -229,7 +227,7 @@ void addImport(CLI::App& app, Run& run) {
       ->required()
       ->type_name("FILE.rawlog");
   addTimeLimits(command, *arguments);
-  requireKeyframeLengthOf(command, arguments);
+  command.parse_complete_callback([arguments] { requireKeyframeLengthOf(*arguments); });
 }
 
 void addMap(CLI::App& app, Run& run) {
@@ -254,11 +252,19 @@ void addDepth(CLI::App& app, Run& run) {
 }
 
 void addInfo(CLI::App& app, Run& run) {
-  CLI::App& command = *app.add_subcommand("info", "Print the contents of a recording");
+  CLI::App& command = *app.add_subcommand(
+      "info", "Print the contents of a recording, or the processor and its kernels");
   auto arguments = argumentsOf(command, run, runInfo);
   addSource(command, *arguments);
   addTimeLimits(command, *arguments);
-  requireKeyframeLengthOf(command, arguments);
+  command.add_flag("--system", arguments->system,
+                   "Print the processor and the kernels of the inner loops that it can run, and "
+                   "test them; needs no recording");
+  command.get_option("SOURCE")->required(false);
+  command.parse_complete_callback([arguments] {
+    if (!arguments->system && arguments->source.files.empty()) throw CLI::RequiredError("SOURCE");
+    requireKeyframeLengthOf(*arguments);
+  });
 }
 
 }  // namespace

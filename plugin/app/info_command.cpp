@@ -12,6 +12,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
+#include "plugin/app/system_info.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
@@ -144,6 +145,8 @@ void print(const Contents& contents, const RecordingCounts& counts) {
 }  // namespace
 
 int runInfo(const InfoArguments& arguments) {
+  const int status = arguments.system ? printSystem() : 0;
+  if (arguments.source.files.empty()) return status;
   RecordingSource source = arguments.source;
   source.faults.latency_ns = 0;  // latency changes no time stamp
   const std::unique_ptr<Recording> recording =
@@ -163,7 +166,7 @@ int runInfo(const InfoArguments& arguments) {
   }
   print(contents, recording->counts());
   if (stopped) std::rethrow_exception(stopped);
-  return 0;
+  return status;
 }
 
 }  // namespace efm

@@ -13,6 +13,7 @@ struct InfoArguments {
   RecordingSource source;
   std::optional<std::int64_t> t0_ns;
   std::optional<std::int64_t> t1_ns;
+  bool system = false;  ///< Also print the processor and its kernels; then no recording is needed.
 };
 
 /// `event-fusion info`: prints the contents of a recording.

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <regex>
 
+#include "mapping/dsi/voting_kernel.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {
@@ -92,6 +93,25 @@ TEST_F(ImportCommand, ReadsTheRealSliderRecordingCompletely) {
   const Result info = run("info s.rawlog");
   EXPECT_THAT(info.out, AllOf(HasSubstr("cam0: 240x180 pixels"),
                               HasSubstr("50000 events from 0.003811000 s to 0.174156000 s")));
+}
+
+TEST_F(ImportCommand, InfoTellsTheProcessorAndTestsItsKernelsWithoutARecording) {
+  const Result result = run("info --system");
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.err, IsEmpty());
+  EXPECT_THAT(result.out, AllOf(HasSubstr("processor: "), HasSubstr("cores: "),
+                                HasSubstr("kernel plain: self-test passed")));
+  for (const VotingKernel kernel : availableKernels()) {
+    EXPECT_THAT(result.out,
+                HasSubstr("kernel " + std::string(nameOf(kernel)) + ": self-test passed" +
+                          (kernel == fastestKernel() ? ", chosen" : "\n")));
+  }
+  writeSmallRecording();
+  EXPECT_THAT(run("info small --system").out,
+              AllOf(HasSubstr("processor: "), HasSubstr("cam0: 240x180")));
+  const Result nothing = run("info");
+  EXPECT_NE(nothing.status, 0);
+  EXPECT_THAT(nothing.err, HasSubstr("SOURCE is required"));
 }
 
 // --- simulate ----------------------------------------------------------------------------------

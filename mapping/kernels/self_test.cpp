@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/kernels/self_test.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <random>
+
+#include "mapping/kernels/bilinear_vote.h"
+#include "mapping/kernels/peaks.h"
+#include "mapping/kernels/tile_resolve.h"
+#include "mapping/kernels/tile_scatter.h"
+
+namespace efm::kernels {
+namespace {
+
+constexpr std::size_t kMaxRays = 4096;
+constexpr int kTilePixels = kTileCells - 1;
+constexpr int kViewPixels = kTileCells + 1;  // cell (x, y) begins at pixel (x, y) of this view
+constexpr float kUnit = 1 << kFractionBits;
+
+/// Numbers with 1/4096 as their last digit: sums of a few of them are exact in floats.
+class RandomNumbers {
+ public:
+  explicit RandomNumbers(std::uint32_t seed) : random_(seed) {}
+
+  /// From `from` to below `to`, a multiple of 1/`parts`.
+  float operator()(int from, int to, int parts) {
+    const auto steps = static_cast<std::uint32_t>((to - from) * parts);
+    return static_cast<float>(from) +
+           static_cast<float>(random_() % steps) / static_cast<float>(parts);
+  }
+
+ private:
+  std::mt19937 random_;
+};
+
+/// Memory of a tile, aligned as the kernels ask.
+struct TileMemory {
+  alignas(64) float x[kMaxRays + kRayPadding] = {};
+  alignas(64) float y[kMaxRays + kRayPadding] = {};
+  alignas(64) float dx[kMaxRays + kRayPadding] = {};
+  alignas(64) float dy[kMaxRays + kRayPadding] = {};
+  alignas(64) std::uint64_t cells[kTileCells * (kTileCells + 2)] = {};
+  alignas(64) std::uint8_t dirty[kDirtyFlags + kRayPadding] = {};
+  FullCell full[kMaxRays / kVotesPerCell + 1];
+  float density[kTilePixels * kTilePixels + kRayPadding] = {};
+  float sparse[kTilePixels * kTilePixels + kRayPadding] = {};
+};
+
+/// The votes of a cell, summed in 64 bits.
+struct CellTotal {
+  std::uint64_t a = 0, b = 0, ab = 0, votes = 0;
+
+  void add(const CellSums& sums) {
+    a += sums.a;
+    b += sums.b;
+    ab += sums.ab;
+    votes += sums.votes;
+  }
+  bool operator!=(const CellTotal& other) const {
+    return a != other.a || b != other.b || ab != other.ab || votes != other.votes;
+  }
+};
+
+using Cells = std::vector<CellTotal>;
+
+/// The functions of one kernel for a tile, against plain code.
+class TileTest {
+ public:
+  TileTest(VotingKernel kernel, std::uint32_t seed)
+      : scatter_(tileFunctions(kernel)), resolve_(resolveFunctions(kernel)), random_(seed) {}
+
+  std::vector<std::string> run() {
+    gather();
+    for (const float to_plane : {0.0F, 0.5F, 1.0F}) {
+      vote(to_plane);
+      resolve(to_plane);
+      resolveSparse(to_plane);
+    }
+    fillCells();
+    return failures_;
+  }
+
+ private:
+  void require(bool holds, const char* what) {
+    if (holds) return;
+    if (std::find(failures_.begin(), failures_.end(), what) == failures_.end()) {
+      failures_.emplace_back(what);
+    }
+  }
+
+  MovingRays rays() const { return {memory_->x, memory_->y, memory_->dx, memory_->dy, size_}; }
+  CellBuffer buffer() const { return {memory_->cells, memory_->dirty}; }
+
+  void gather() {
+    constexpr std::size_t kRays = 3001;  // no multiple of a vector's lanes
+    constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+    GatherRequest request;
+    request.to_first = -0.25F;
+    request.to_last = 0.75F;
+    request.right = request.bottom = kTileCells;
+    std::vector<BinnedRay> bin(kRays + kRayPadding);
+    std::vector<std::size_t> near;
+    for (std::size_t i = 0; i < kRays; ++i) {
+      const bool on_border = i % 3 == 0;  // often exactly
+      const int parts = on_border ? 2 : 4096;
+      const int shift_parts = on_border ? 1 : 1024;
+      bin[i] = {random_(-8, 72, parts), random_(-8, 72, parts), random_(-4, 4, shift_parts),
+                random_(-4, 4, shift_parts)};
+      if (i % 97 == 0) bin[i].x = kNan;
+      if (i % 101 == 0) bin[i].y = std::numeric_limits<float>::infinity();
+      if (comesNear(bin[i].x, bin[i].dx, request) && comesNear(bin[i].y, bin[i].dy, request)) {
+        near.push_back(i);
+      }
+    }
+    size_ = scatter_.gather(bin.data(), kRays, request, rays());
+    require(size_ == near.size(), "gather: the number of rays near a tile");
+    size_ = std::min(size_, near.size());
+    for (std::size_t i = 0; i < size_; ++i) {
+      const BinnedRay& ray = bin[near[i]];
+      require(memory_->x[i] == (ray.x + request.to_first * ray.dx) * kUnit &&
+                  memory_->y[i] == (ray.y + request.to_first * ray.dy) * kUnit &&
+                  memory_->dx[i] == ray.dx * kUnit && memory_->dy[i] == ray.dy * kUnit,
+              "gather: the rays near a tile");
+    }
+  }
+
+  static bool comesNear(float start, float shift, const GatherRequest& request) {
+    const float first = start + request.to_first * shift;
+    const float last = start + request.to_last * shift;
+    return std::max(first, last) >= 0 && std::min(first, last) < kTileCells;
+  }
+
+  /// @return the number of full cells.
+  std::size_t voteAll(float to_plane) {
+    for (std::size_t i = size_; i < size_ + kRayPadding; ++i) {  // left of and above every cell
+      memory_->x[i] = memory_->y[i] = -1;
+      memory_->dx[i] = memory_->dy[i] = 0;
+    }
+    const CellWindow window{buffer(), 0, 0, 0, kTileCells, kTileCells};
+    return static_cast<std::size_t>(scatter_.vote(rays(), to_plane, window, memory_->full) -
+                                    memory_->full);
+  }
+
+  /// Integer arithmetic, a ray at a time.
+  Cells plainCells(float to_plane) const {
+    Cells cells(kTileCells * kTileCells);
+    for (std::size_t i = 0; i < size_; ++i) {
+      const float x = memory_->x[i] + to_plane * memory_->dx[i];
+      const float y = memory_->y[i] + to_plane * memory_->dy[i];
+      constexpr float kEnd = kTileCells * kUnit;
+      if (!(x >= 0 && x < kEnd && y >= 0 && y < kEnd)) continue;
+      const auto column = static_cast<std::uint32_t>(x);
+      const auto row = static_cast<std::uint32_t>(y);
+      constexpr std::uint32_t kMask = (1U << kFractionBits) - 1;
+      const std::uint32_t a = column & kMask;
+      const std::uint32_t b = row & kMask;
+      const std::size_t cell =
+          std::size_t{row >> kFractionBits} * kTileCells + (column >> kFractionBits);
+      cells[cell].add({a, b, a * b >> (2 * kFractionBits - kProductBits), 1});
+    }
+    return cells;
+  }
+
+  void requireCells(const Cells& expected, std::size_t full) {
+    Cells found(expected.size());
+    for (std::size_t i = 0; i < found.size(); ++i) found[i].add(unpack(memory_->cells[i]));
+    for (std::size_t i = 0; i < full; ++i) {
+      const FullCell& cell = memory_->full[i];
+      require(cell.index < found.size() && unpack(cell.sums).votes == kVotesPerCell,
+              "vote: the full cells");
+      if (cell.index < found.size()) found[cell.index].add(unpack(cell.sums));
+    }
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      require(!(found[i] != expected[i]), "vote: the sums of the cells");
+      require(expected[i].votes == 0 || memory_->dirty[i / kLineCells] != 0,
+              "vote: the dirty lines");
+    }
+  }
+
+  void vote(float to_plane) {
+    const std::size_t full = voteAll(to_plane);
+    require(full == 0, "vote: the full cells");
+    requireCells(plainCells(to_plane), full);
+  }
+
+  void requireEmptyCells() {
+    require(std::all_of(std::begin(memory_->cells), std::end(memory_->cells),
+                        [](std::uint64_t cell) { return cell == 0; }) &&
+                std::all_of(memory_->dirty, memory_->dirty + kDirtyFlags,
+                            [](std::uint8_t flag) { return flag == 0; }),
+            "resolve: the cells are cleared");
+  }
+
+  /// Against the votes of the plain kernel on a whole plane.
+  void resolve(float to_plane) {
+    std::vector<float> plane(kViewPixels * kViewPixels, 0.0F);
+    const MovingRays from = rays();
+    for (std::size_t i = 0; i < size_; ++i) {
+      const float x = (from.x[i] + to_plane * from.dx[i]) / kUnit;
+      const float y = (from.y[i] + to_plane * from.dy[i]) / kUnit;
+      voteBilinear({&x, &y}, {0, 1, 1, 0, 0}, {plane.data(), kViewPixels, kViewPixels});
+    }
+    std::uint64_t inside = 0;
+    const Cells cells = plainCells(to_plane);
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (i % kTileCells > 0 && i >= kTileCells) inside += cells[i].votes;
+    }
+    const std::uint64_t votes = resolve_.all(buffer(), kTilePixels, kTilePixels, memory_->density);
+    require(votes == inside, "resolve: the number of votes");
+    requireEmptyCells();
+    for (int y = 0; y < kTilePixels; ++y) {
+      for (int x = 0; x < kTilePixels; ++x) {
+        // Products of fractions are cut to 1/32,768, and a pixel has some 30 votes around it.
+        const float difference = memory_->density[y * kTilePixels + x] -
+                                 plane[static_cast<std::size_t>((y + 1) * kViewPixels + x + 1)];
+        require(std::abs(difference) <= 1e-3F, "resolve: the densities");
+      }
+    }
+  }
+
+  /// The steps that skip empty cells give the same bits.
+  void resolveSparse(float to_plane) {
+    size_ = std::min<std::size_t>(size_, 200);
+    voteAll(to_plane);
+    resolve_.all(buffer(), kTilePixels, kTilePixels, memory_->density);
+    voteAll(to_plane);
+    const auto lines = std::make_unique<DirtyLines>();
+    const auto blocks = std::make_unique<PixelBlocks>();
+    TilePixels occupied;
+    occupied.width = occupied.height = kTilePixels;
+    resolve_.findOccupied(buffer(), occupied, *lines);
+    resolve_.listBlocks(occupied, *blocks);
+    std::fill(std::begin(memory_->sparse), std::end(memory_->sparse), 0.0F);
+    resolve_.blocks(memory_->cells, *blocks, memory_->sparse);
+    resolve_.clear(buffer(), *lines);
+    requireEmptyCells();
+    for (int y = 0; y < kTilePixels; ++y) {
+      for (int x = 0; x < kTilePixels; ++x) {
+        const bool listed = (occupied.rows[y] >> x & 1) != 0;
+        const float all = memory_->density[y * kTilePixels + x];
+        require(listed || all == 0, "resolve: the occupied pixels");
+        require(!listed || all == memory_->sparse[y * kTilePixels + x],
+                "resolve: the densities of blocks");
+      }
+    }
+  }
+
+  /// Many votes in few cells.
+  void fillCells() {
+    size_ = kMaxRays - 3;
+    for (std::size_t i = 0; i < size_; ++i) {
+      memory_->x[i] = random_(0, 3, 4096) * kUnit;
+      memory_->y[i] = random_(61, 64, 4096) * kUnit;
+      memory_->dx[i] = memory_->dy[i] = 0;
+    }
+    const std::size_t full = voteAll(0);
+    require(full > kMaxRays / kVotesPerCell / 2, "vote: the full cells");
+    requireCells(plainCells(0), full);
+  }
+
+  const TileFunctions& scatter_;
+  const ResolveFunctions& resolve_;
+  RandomNumbers random_;
+  std::unique_ptr<TileMemory> memory_ = std::make_unique<TileMemory>();
+  std::size_t size_ = 0;  // of the gathered rays
+  std::vector<std::string> failures_;
+};
+
+/// Peaks of some planes with many equal values.
+std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t pixels) {
+  RandomNumbers random(seed);
+  std::vector<float> best(pixels, -1.0F);
+  std::vector<std::int32_t> plane(pixels, -2);
+  std::vector<float> before = best;
+  std::vector<float> after = best;
+  std::vector<float> previous = best;
+  std::vector<float> values(pixels);
+  for (std::int32_t p = 0; p < 12; ++p) {
+    for (float& value : values) value = random(0, 2, 4);
+    peakFunctions(kernel).add(
+        {best.data(), plane.data(), before.data(), after.data(), previous.data()}, p, values.data(),
+        pixels);
+  }
+  std::vector<float> all = best;
+  all.insert(all.end(), plane.begin(), plane.end());
+  all.insert(all.end(), before.begin(), before.end());
+  all.insert(all.end(), after.begin(), after.end());
+  return all;
+}
+
+}  // namespace
+
+std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed) {
+  std::vector<std::string> failures;
+  if (kernel != VotingKernel::kPlain) failures = TileTest(kernel, seed).run();
+  for (const std::size_t pixels : {1U, 15U, 16U, 101U}) {
+    if (peaksOf(kernel, seed, pixels) == peaksOf(VotingKernel::kPlain, seed, pixels)) continue;
+    failures.emplace_back("peaks: the largest values");
+    break;
+  }
+  return failures;
+}
+
+}  // namespace efm::kernels

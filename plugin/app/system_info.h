@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace efm {
+
+/// Prints the processor, its cores and caches, the kernels that it can run and the one that is
+/// chosen, and tests each of them against the plain one.
+/// @return the process's exit status: 0 if all kernels passed.
+int printSystem();
+
+}  // namespace efm
