@@ -18,7 +18,7 @@ struct CameraEvents {
   int camera = 0;  ///< Index in the rig.
   const RigCamera* calibration = nullptr;
   const UndistortionTable* undistortion = nullptr;
-  EventSpan events;  ///< In time order, on the trajectory's clock.
+  EventSpan events;  ///< In time order, on the trajectory's clock, inside the sensor.
 };
 
 /// One window: the events of the selected cameras, and the view and planes of its DSI. Owns

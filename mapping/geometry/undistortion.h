@@ -17,8 +17,8 @@ namespace efm {
 /// HD image.
 class UndistortionTable {
  public:
-  /// Cost: one inversion of the lens per pixel, rows in parallel on the threads of the caller's
-  /// task arena; memory: 8 bytes per pixel.
+  /// Cost: one inversion of the lens per pixel, some 50 ns of processor time, rows in parallel on
+  /// the threads of the caller's task arena; memory: 8 bytes per pixel.
   /// @throws std::invalid_argument where the model is not valid, or no pixel has a ray.
   explicit UndistortionTable(const CameraModel& model);
 

