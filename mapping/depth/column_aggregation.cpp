@@ -5,7 +5,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 
@@ -23,7 +22,7 @@ class PeakFinder {
   explicit PeakFinder(int planes) : planes_(planes), step_planes_(planesPerStep(planes)) {}
 
   AggregatedPeak find(const std::vector<float>& sum) const {
-    const auto top = std::max_element(sum.begin(), sum.end());
+    const auto top = std::max_element(sum.begin(), sum.begin() + planes_);
     const auto plane = static_cast<int>(top - sum.begin());
     const float before = plane > 0 ? sum[static_cast<std::size_t>(plane - 1)] : -1;
     const float after = plane < planes_ - 1 ? sum[static_cast<std::size_t>(plane + 1)] : -1;
@@ -65,12 +64,9 @@ std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
   const PixelNeighbours neighbours(candidates, size);
   const PeakFinder finder(columns.planes());
   std::vector<AggregatedPeak> peaks(candidates.size());
-  std::array<float, 2 * PixelNeighbours::kRadius_px * PixelNeighbours::kRadius_px + 1> weights{};
-  for (std::size_t distance_sq = 0; distance_sq < weights.size(); ++distance_sq) {
-    weights[distance_sq] = std::exp(-static_cast<float>(distance_sq) / (2 * kSigma_px * kSigma_px));
-  }
+  const auto weights = PixelNeighbours::gaussian(kSigma_px);
   tbb::parallel_for(tbb::blocked_range<int>(0, candidates.rows()), [&](const auto& rows) {
-    std::vector<float> sum(static_cast<std::size_t>(columns.planes()));
+    std::vector<float> sum(static_cast<std::size_t>(columns.planes()) + DsiColumns::kPadding);
     for (int y = rows.begin(); y < rows.end(); ++y) {
       for (std::size_t i = candidates.rowBegin(y); i < candidates.rowBegin(y + 1); ++i) {
         const cv::Point pixel(candidates.column(i), y);

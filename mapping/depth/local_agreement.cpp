@@ -5,11 +5,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <utility>
+#include <limits>
 
-#include "mapping/depth/median.h"
 #include "mapping/depth/sparse_mask.h"
+#include "mapping/dsi/voting_kernel.h"
+#include "mapping/kernels/weighted_ranks.h"
 
 namespace efm {
 namespace {
@@ -17,27 +19,42 @@ namespace {
 /// Of the weight of other pixels by their distance.
 constexpr float kDistanceSigma_px = 2;
 
-/// A position and its weight.
-using Weighted = std::pair<float, float>;
-
-/// The smallest position with at least half of the weight at or below it. Reorders the positions.
-float weightedMedian(std::vector<Weighted>& positions) {
-  std::sort(positions.begin(), positions.end());
-  double total = 0;
-  for (const auto& [position, weight] : positions) total += weight;
-  double below = 0;
-  for (const auto& [position, weight] : positions) {
-    below += weight;
-    if (2 * below >= total) return position;
+/// The pixels around one pixel.
+class Surroundings {
+ public:
+  void clear() { size_ = 0; }
+  void add(float position, float weight) {
+    positions_[size_] = position;
+    weights_[size_++] = weight;
   }
-  return positions.back().first;
-}
 
-/// Median distance from a position. Reorders the positions.
-float medianDistance(std::vector<Weighted>& positions, float from) {
-  for (auto& [position, weight] : positions) position = std::abs(position - from);
-  return upperMedian(positions).first;
-}
+  /// The smallest position with at least half of the weight at or below it.
+  float weightedMedian() {
+    std::fill_n(below_.begin(), size_, 0.0F);
+    ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
+    // All weights are at or below the largest position.
+    const float total = *std::max_element(below_.begin(), below_.begin() + size_);
+    float median = std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (2 * below_[i] >= total) median = std::min(median, positions_[i]);
+    }
+    return median;
+  }
+
+  /// Median distance from a position. Reorders the positions.
+  float medianDistance(float from) {
+    for (std::size_t i = 0; i < size_; ++i) positions_[i] = std::abs(positions_[i] - from);
+    const auto middle = positions_.begin() + size_ / 2;
+    std::nth_element(positions_.begin(), middle, positions_.begin() + size_);
+    return *middle;
+  }
+
+ private:
+  using Values = std::array<float, PixelNeighbours::kMaxPixels + kernels::kRankPadding>;
+  const kernels::RankFunctions& ranks_ = kernels::rankFunctions(fastestKernel());
+  Values positions_{}, weights_{}, below_{};
+  std::size_t size_ = 0;
+};
 
 }  // namespace
 
@@ -45,25 +62,25 @@ std::vector<LocalAgreement> localAgreement(const SparseMask& mask, cv::Size size
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near) {
   const PixelNeighbours neighbours(mask, size);
+  const auto by_distance = PixelNeighbours::gaussian(kDistanceSigma_px);
   std::vector<LocalAgreement> agreement(mask.size());
   tbb::parallel_for(tbb::blocked_range<int>(0, mask.rows()), [&](const auto& rows) {
-    std::vector<Weighted> around;
+    Surroundings around;
     for (int y = rows.begin(); y < rows.end(); ++y) {
       for (std::size_t i = mask.rowBegin(y); i < mask.rowBegin(y + 1); ++i) {
         around.clear();
         float agreeing = 0;
         float others = 0;
         neighbours.forEach({mask.column(i), y}, [&](std::size_t j, cv::Point offset) {
-          around.emplace_back(positions[j], weights[j]);
+          around.add(positions[j], weights[j]);
           if (i == j) return;
-          const auto distance_sq = static_cast<float>(offset.dot(offset));
           const float weight =
-              weights[j] * std::exp(-distance_sq / (2 * kDistanceSigma_px * kDistanceSigma_px));
+              weights[j] * by_distance[static_cast<std::size_t>(offset.dot(offset))];
           others += weight;
           if (std::abs(positions[j] - positions[i]) < near) agreeing += weight;
         });
-        agreement[i].median = weightedMedian(around);
-        agreement[i].spread = medianDistance(around, agreement[i].median);
+        agreement[i].median = around.weightedMedian();
+        agreement[i].spread = around.medianDistance(agreement[i].median);
         agreement[i].agreeing_fraction = others > 0 ? agreeing / others : 0;
       }
     }

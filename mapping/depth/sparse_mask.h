@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -37,6 +39,17 @@ class SparseMask {
 class PixelNeighbours {
  public:
   static constexpr int kRadius_px = 4;
+  static constexpr std::size_t kMaxPixels = (2 * kRadius_px + 1) * (2 * kRadius_px + 1);
+
+  /// Gaussian weights by the square of the distance.
+  using Weights = std::array<float, 2 * kRadius_px * kRadius_px + 1>;
+  static Weights gaussian(float sigma_px) {
+    Weights weights{};
+    for (std::size_t distance_sq = 0; distance_sq < weights.size(); ++distance_sq) {
+      weights[distance_sq] = std::exp(-static_cast<float>(distance_sq) / (2 * sigma_px * sigma_px));
+    }
+    return weights;
+  }
 
   PixelNeighbours(const SparseMask& mask, cv::Size size) : index_(size, -1) {
     mask.forEach([&](std::size_t i, cv::Point at) { index_(at) = static_cast<int>(i); });

@@ -7,8 +7,13 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "mapping/dsi/voting_kernel.h"
+#include "mapping/kernels/columns.h"
+
 namespace efm {
 namespace {
+
+static_assert(DsiColumns::kPadding == kernels::kColumnPadding);
 
 constexpr float kMaxUnits = std::numeric_limits<std::uint16_t>::max();
 
@@ -52,20 +57,27 @@ DsiColumns::Tile DsiColumns::select(const cv::Rect& tile, const cv::Mat1f& confi
     indices.push_back(static_cast<std::size_t>(pixel.y * confidence.cols + pixel.x));
   }
   const auto length = static_cast<std::size_t>(planes);
-  columns.values.resize(indices.size() * length);
-  for (int plane = 0; plane < planes; ++plane) {
-    const float* values = volume.plane(plane);
-    std::uint16_t* column = columns.values.data() + plane;
+  columns.values.resize(indices.size() * length + kernels::kColumnPadding);
+  // So many planes at a time that a column's values fill a cache line.
+  constexpr int kPlanes = 32;
+  for (int begin = 0; begin < planes; begin += kPlanes) {
+    const int end = std::min(begin + kPlanes, planes);
+    std::uint16_t* column = columns.values.data();
     for (std::size_t i = 0; i < indices.size(); ++i, column += length) {
-      const float value = values[indices[i]] * to_units[i] + 0.5F;
-      *column = static_cast<std::uint16_t>(static_cast<int>(std::min(value, kMaxUnits)));
+      for (int plane = begin; plane < end; ++plane) {
+        const float value = volume.plane(plane)[indices[i]] * to_units[i] + 0.5F;
+        column[plane] = static_cast<std::uint16_t>(static_cast<int>(std::min(value, kMaxUnits)));
+      }
     }
   }
   return columns;
 }
 
 DsiColumns::DsiColumns(cv::Size view, int planes, std::vector<Tile> tiles)
-    : planes_(planes), tiles_(std::move(tiles)), index_(view, -1) {
+    : planes_(planes),
+      tiles_(std::move(tiles)),
+      index_(view, -1),
+      functions_(&kernels::columnFunctions(fastestKernel())) {
   for (const Tile& tile : tiles_) {
     const std::uint16_t* values = tile.values.data();
     for (std::size_t i = 0; i < tile.pixels.size(); ++i, values += planes_) {
@@ -77,10 +89,7 @@ DsiColumns::DsiColumns(cv::Size view, int planes, std::vector<Tile> tiles)
 
 void DsiColumns::addTo(float* sum, cv::Point pixel, float weight) const {
   const Column& column = columns_[static_cast<std::size_t>(index_(pixel))];
-  const float unit = weight * column.unit;
-  for (int plane = 0; plane < planes_; ++plane) {
-    sum[plane] += unit * static_cast<float>(column.values[plane]);
-  }
+  functions_->add(sum, column.values, static_cast<std::size_t>(planes_), weight * column.unit);
 }
 
 }  // namespace efm

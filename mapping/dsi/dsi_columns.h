@@ -11,6 +11,10 @@
 
 namespace efm {
 
+namespace kernels {
+struct ColumnFunctions;
+}  // namespace kernels
+
 /// The fused values of all planes on one tile of the view: plane by plane, each row-major.
 class TileVolume {
  public:
@@ -34,11 +38,14 @@ class TileVolume {
 /// rounding to 1/65535 of the column's peak moves no depth.
 class DsiColumns {
  public:
+  /// Of the sums of columns (kernels::kColumnPadding).
+  static constexpr std::size_t kPadding = 16;
+
   /// Columns of one tile.
   struct Tile {
     std::vector<cv::Point> pixels;      // of the view
     std::vector<float> units;           // per pixel
-    std::vector<std::uint16_t> values;  // [pixel][plane]
+    std::vector<std::uint16_t> values;  // [pixel][plane], with kernels::kColumnPadding
   };
   /// Selects the columns of a tile whose confidence is above the Gaussian mean around it. Where the
   /// window crosses the tile's edge, every pixel with votes has a column.
@@ -60,6 +67,7 @@ class DsiColumns {
     return column.unit * static_cast<float>(column.values[plane]);
   }
   /// sum[plane] += weight * value(pixel, plane) for all planes.
+  /// @param sum with room for kPadding more values.
   void addTo(float* sum, cv::Point pixel, float weight) const;
 
  private:
@@ -72,6 +80,7 @@ class DsiColumns {
   std::vector<Tile> tiles_;  // own the values
   std::vector<Column> columns_;
   cv::Mat1i index_;  // of columns_; -1 where there is none
+  const kernels::ColumnFunctions* functions_ = nullptr;
 };
 
 /// The result of a sweep for one DSI.

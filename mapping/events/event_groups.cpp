@@ -2,7 +2,6 @@
 #include "mapping/events/event_groups.h"
 
 #include <algorithm>
-#include <iterator>
 
 #include "mapping/options/option_check.h"
 
@@ -20,11 +19,18 @@ void SplitFusionOptions::validate() const {
 
 EventSpan EventPart::select(std::vector<Event>& buffer) const {
   if (!polarity) return all;
-  buffer.clear();
-  buffer.reserve(all.size());  // takes no memory before it is written
-  std::copy_if(all.begin(), all.end(), std::back_inserter(buffer),
-               [this](const Event& event) { return event.polarity == *polarity; });
-  return buffer;
+  const auto count = static_cast<std::size_t>(
+      std::count_if(all.begin(), all.end(),
+                    [this](const Event& event) { return event.polarity == *polarity; }));
+  // Without a branch, which random polarities make unpredictable: an event of the other polarity is
+  // overwritten by the next one.
+  if (buffer.size() < count + 1) buffer.resize(count + 1);
+  std::size_t size = 0;
+  for (const Event& event : all) {
+    buffer[size] = event;
+    size += event.polarity == *polarity ? 1 : 0;
+  }
+  return {buffer.data(), buffer.data() + count};
 }
 
 EventGroups::EventGroups(const SplitFusionOptions& split, const SubintervalOptions& subintervals)

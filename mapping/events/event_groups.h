@@ -39,7 +39,8 @@ struct EventPart {
   std::size_t subinterval = 0;   ///< Index among the sub-intervals of all slices.
 
   /// The part's events in their order: a view of `all`, or, with a polarity, of `buffer`.
-  /// @param buffer receives the events of the polarity; the view is valid until it changes.
+  /// @param buffer receives the events of the polarity, and grows where it is too small; the view
+  /// is valid until it changes.
   EventSpan select(std::vector<Event>& buffer) const;
 };
 

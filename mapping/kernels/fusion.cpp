@@ -85,34 +85,9 @@ void pair(float* values, const float* others, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) values[i] = Rule::pair(values[i], others[i]);
 }
 
-/// One past the last of the adjacent blocks from `begin` on in one row of the tile.
-std::size_t endOfRun(const PixelBlocks& blocks, std::size_t begin) {
-  std::size_t end = begin + 1;
-  while (end < blocks.size && blocks.blocks[end] == blocks.blocks[end - 1] + 1 &&
-         blocks.blocks[end] % kBlocksInRow != 0) {
-    ++end;
-  }
-  return end;
-}
-
-template <typename Rule>
-void addPair(float* sum, const float* values, const float* others, const PixelBlocks& blocks) {
-  for (std::size_t begin = 0, end = 0; begin < blocks.size; begin = end) {
-    end = endOfRun(blocks, begin);
-    const auto row = static_cast<int>(blocks.blocks[begin]) / kBlocksInRow;
-    const auto first = static_cast<int>(blocks.blocks[begin]) % kBlocksInRow * kBlockPixels;
-    const int last = std::min(first + static_cast<int>(end - begin) * kBlockPixels, blocks.width);
-    // The arrays never overlap: without this the compiler checks each short run.
-#pragma GCC ivdep
-    for (int i = row * blocks.width + first; i < row * blocks.width + last; ++i) {
-      sum[i] += Rule::pair(values[i], others[i]);
-    }
-  }
-}
-
 template <typename Rule>
 constexpr FusionSteps steps() {
-  return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>, addPair<Rule>};
+  return {Rule::kStart, fold<Rule>, finish<Rule>, pair<Rule>};
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 
 #include <cstddef>
 
-#include "mapping/kernels/tile_resolve.h"
-
 namespace efm::kernels {
 
 /// One rule's arithmetic over n voxels. Pointers need no alignment, and nothing beyond n is
@@ -17,10 +15,6 @@ struct FusionSteps {
   void (*finish)(float* sum, float inputs, std::size_t n) = nullptr;
   /// Replaces the first of two inputs by their mean, without a sum in between.
   void (*pair)(float* values, const float* others, std::size_t n) = nullptr;
-  /// Adds the mean of two inputs to a sum in some blocks of a tile; no pixel outside them is
-  /// touched.
-  void (*addPair)(float* sum, const float* values, const float* others,
-                  const PixelBlocks& blocks) = nullptr;
 };
 
 struct FusionFunctions {

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstring>
-#include <iterator>
+#include <limits>
 #include <numeric>
 
 #include "mapping/kernels/highway_targets.h"
@@ -90,8 +89,9 @@ struct RowOfCells {
     return hn::Sub(sumsOfB(east), differenceOfAB(east, west));
   }
   /// Their votes for the pixels above them.
-  HWY_INLINE UnsignedV toAbove() const {
-    return hn::Sub(hn::Add(votesOf(east), differenceOfA(west, east)), toBelow());
+  /// @param to_below as `toBelow` returns it.
+  HWY_INLINE UnsignedV toAbove(UnsignedV to_below) const {
+    return hn::Sub(hn::Add(votesOf(east), differenceOfA(west, east)), to_below);
   }
 };
 
@@ -107,7 +107,7 @@ HWY_INLINE FloatV densityOf(UnsignedV from_above, UnsignedV from_below) {
 HWY_INLINE void storeBefore(const float* end, FloatV value, float* values) {
   const Floats d;
   const auto lanes = static_cast<std::ptrdiff_t>(hn::Lanes(d));
-  if (values + lanes <= end) {
+  if (HWY_LIKELY(values + lanes <= end)) {
     hn::StoreU(value, d, values);
     return;
   }
@@ -130,140 +130,104 @@ HWY_INLINE std::uint64_t sumOfLanes(D d, V values) {
   return std::accumulate(lanes, lanes + hn::Lanes(d), std::uint64_t{0});
 }
 
-// ---------------------------------------------------------------- all pixels
+// ---------------------------------------------------------------- rows of pixels
 
-std::uint64_t resolveAll(const CellBuffer& buffer, int width, int height, float* values) {
-  std::uint64_t* cells = buffer.cells;
-  const Unsigned du;
-  const int lanes = static_cast<int>(hn::Lanes(du));
+/// Resolves a tile's rows of pixels downwards, a vector at a time, and clears its cells.
+class RowResolver {
+ public:
+  HWY_INLINE RowResolver(std::uint64_t* cells, int width) : cells_(cells) {
+    for (int x = 0; x < width; x += static_cast<int>(hn::Lanes(Unsigned()))) {
+      hn::Store(RowOfCells(cells + x).toBelow(), Unsigned(), from_above_ + x);
+    }
+    clearRow(cells);
+  }
+
+  /// The densities of pixels from x on. @param within the lanes inside the tile.
+  template <class Mask>
+  HWY_INLINE FloatV densities(int row, int x, Mask within) {
+    const Unsigned d;
+    const RowOfCells below(cells_ + static_cast<std::ptrdiff_t>(row + 1) * kTileCells + x);
+    votes_ =
+        hn::Add(votes_, hn::IfThenElseZero(within, hn::ShiftRight<kCountShift>(below.east.upper)));
+    const UnsignedV to_below = below.toBelow();
+    const FloatV density = densityOf(hn::Load(d, from_above_ + x), below.toAbove(to_below));
+    hn::Store(to_below, d, from_above_ + x);
+    return density;
+  }
+  HWY_INLINE void endRow(int row) {
+    clearRow(cells_ + static_cast<std::ptrdiff_t>(row + 1) * kTileCells);
+  }
+  std::uint64_t votes() const { return sumOfLanes(Unsigned(), votes_); }
+
+ private:
+  std::uint64_t* cells_;
+  UnsignedV votes_ = hn::Zero(Unsigned());
   // The votes of the row of cells above a pixel row.
-  HWY_ALIGN std::uint32_t from_above[kTileCells];
+  HWY_ALIGN std::uint32_t from_above_[kTileCells];
+};
+
+std::uint64_t resolveAll(std::uint64_t* cells, int width, int height, float* values) {
+  const Unsigned du;
   const float* end = values + static_cast<std::ptrdiff_t>(width) * height;
-  for (int x = 0; x < width; x += lanes) {
-    hn::Store(RowOfCells(cells + x).toBelow(), du, from_above + x);
-  }
-  clearRow(cells);
-  UnsignedV votes = hn::Zero(du);
-  for (int row = 0; row < height; ++row) {
-    std::uint64_t* left = cells + static_cast<std::ptrdiff_t>(row + 1) * kTileCells;
-    float* pixels = values + static_cast<std::ptrdiff_t>(row) * width;
-    for (int x = 0; x < width; x += lanes) {
-      const RowOfCells below(left + x);
+  RowResolver rows(cells, width);
+  for (int row = 0; row < height; ++row, values += width) {
+    for (int x = 0; x < width; x += static_cast<int>(hn::Lanes(du))) {
       const auto within = hn::FirstN(du, static_cast<std::size_t>(width - x));
-      votes =
-          hn::Add(votes, hn::IfThenElseZero(within, hn::ShiftRight<kCountShift>(below.east.upper)));
       // The next row overwrites values beyond this row.
-      storeBefore(end, densityOf(hn::Load(du, from_above + x), below.toAbove()), pixels + x);
-      hn::Store(below.toBelow(), du, from_above + x);
+      storeBefore(end, rows.densities(row, x, within), values + x);
     }
-    clearRow(left);
+    rows.endRow(row);
   }
-  std::fill_n(buffer.dirty, kDirtyFlags, std::uint8_t{0});
-  return sumOfLanes(du, votes);
+  return rows.votes();
 }
 
-// ---------------------------------------------------------------- some pixels
+// ---------------------------------------------------------------- pairs
 
-/// Lists the positions of numbers that are not zero. Reads and writes up to a vector past the last.
-/// @return their number.
-template <typename Number>
-HWY_INLINE std::size_t listNonZero(const Number* numbers, std::size_t count,
-                                   std::uint32_t* positions) {
-  const Unsigned d;
-  const hn::Rebind<Number, Unsigned> d_narrow;
-  // A load is faster than Highway's Iota, which writes lanes one by one.
-  HWY_ALIGN static constexpr std::uint32_t kLanes[] = {0, 1, 2,  3,  4,  5,  6,  7,
-                                                       8, 9, 10, 11, 12, 13, 14, 15};
-  static_assert(std::size(kLanes) >= hn::MaxLanes(Unsigned()));
-  UnsignedV position = hn::Load(d, kLanes);
-  const UnsignedV lanes = hn::Set(d, static_cast<std::uint32_t>(hn::Lanes(d)));
-  std::size_t size = 0;
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const UnsignedV number = hn::PromoteTo(d, hn::LoadU(d_narrow, numbers + i));
-    const auto there = hn::And(hn::Ne(number, hn::Zero(d)), hn::FirstN(d, count - i));
-    hn::StoreU(hn::Compress(position, there), d, positions + size);
-    size += hn::CountTrue(d, there);
-    position = hn::Add(position, lanes);
+// The means of two of `fusion.cpp`, with the same bits.
+
+struct Min {
+  static HWY_INLINE FloatV mean(FloatV a, FloatV b) { return hn::Min(a, b); }
+};
+
+struct Harmonic {
+  static HWY_INLINE FloatV mean(FloatV a, FloatV b) {
+    const Floats d;
+    const FloatV low = hn::Min(a, b);
+    const FloatV high = hn::Max(a, b);
+    const FloatV sum = hn::Max(hn::Add(low, high), hn::Set(d, std::numeric_limits<float>::min()));
+    return hn::Mul(hn::Add(low, low), hn::Div(high, sum));
   }
-  return size;
-}
+};
 
-std::uint64_t findOccupied(const CellBuffer& buffer, TilePixels& pixels, DirtyLines& lines) {
-  constexpr std::size_t kLinesInRow = kTileCells / kLineCells;
-  const auto rows_of_cells = static_cast<std::size_t>(pixels.height) + 1;
-  lines.size = listNonZero(buffer.dirty, kDirtyFlags, lines.lines);
+struct Geometric {
+  static HWY_INLINE FloatV mean(FloatV a, FloatV b) { return hn::Mul(hn::Sqrt(a), hn::Sqrt(b)); }
+};
 
-  const Cells d;
-  std::uint8_t occupied_in_line[kDirtyFlags] = {};  // bit x for a line's cell x
-  auto votes = hn::Zero(d);
-  auto votes_of_first_row = votes;
-  for (std::size_t i = 0; i < lines.size; ++i) {
-    const std::size_t line = lines.lines[i];
-    std::uint32_t occupied = 0;
-    for (std::size_t x = 0; x < kLineCells; x += hn::Lanes(d)) {
-      const auto cells = hn::Load(d, buffer.cells + kLineCells * line + x);
-      std::uint8_t bits[8] = {};
-      hn::StoreMaskBits(d, hn::Ne(cells, hn::Zero(d)), bits);
-      occupied |= std::uint32_t{bits[0]} << x;
-      votes = hn::Add(votes, hn::ShiftRight<32 + kCountShift>(cells));
+template <class Rule>
+void addPair(std::uint64_t* first, std::uint64_t* second, int width, int height, float* sum,
+             std::uint64_t votes[2]) {
+  const Floats d;
+  const Unsigned du;
+  const float* end = sum + static_cast<std::ptrdiff_t>(width) * height;
+  RowResolver first_rows(first, width);
+  RowResolver second_rows(second, width);
+  for (int row = 0; row < height; ++row, sum += width) {
+    for (int x = 0; x < width; x += static_cast<int>(hn::Lanes(d))) {
+      const auto within = hn::FirstN(du, static_cast<std::size_t>(width - x));
+      const FloatV mean =
+          Rule::mean(first_rows.densities(row, x, within), second_rows.densities(row, x, within));
+      const FloatV added = hn::IfThenElseZero(hn::RebindMask(d, within), mean);
+      storeBefore(end, hn::Add(hn::LoadU(d, sum + x), added), sum + x);
     }
-    occupied_in_line[line] = static_cast<std::uint8_t>(occupied);
-    if (line < kLinesInRow) votes_of_first_row = votes;
+    first_rows.endRow(row);
+    second_rows.endRow(row);
   }
-  // Lowest bits first, on all processors that there are kernels for.
-  std::uint64_t occupied[kTileCells + 2];
-  static_assert(sizeof(occupied) == sizeof(occupied_in_line));
-  std::memcpy(occupied, occupied_in_line, sizeof(occupied));
-
-  std::uint64_t votes_of_first_column = 0;
-  for (std::size_t y = 1; y < rows_of_cells; ++y) {
-    votes_of_first_column += buffer.cells[kTileCells * y] >> (32 + kCountShift);
-  }
-  const std::uint64_t in_tile = (std::uint64_t{1} << pixels.width) - 1;
-  for (int y = 0; y < pixels.height; ++y) {
-    const std::uint64_t cells = occupied[y] | occupied[y + 1];
-    pixels.rows[y] = (cells | cells >> 1) & in_tile;
-  }
-  return sumOfLanes(d, hn::Sub(votes, votes_of_first_row)) - votes_of_first_column;
+  votes[0] += first_rows.votes();
+  votes[1] += second_rows.votes();
 }
 
-void listBlocks(const TilePixels& pixels, PixelBlocks& blocks) {
-  blocks.width = pixels.width;
-  blocks.height = pixels.height;
-  std::uint16_t pixels_of_block[kTileCells * kBlocksInRow];
-  static_assert(sizeof(pixels_of_block) == sizeof(pixels.rows));
-  std::memcpy(pixels_of_block, pixels.rows, sizeof(pixels.rows));
-  blocks.size = listNonZero(pixels_of_block, static_cast<std::size_t>(kBlocksInRow * pixels.height),
-                            blocks.blocks);
-}
-
-void resolveBlocks(const std::uint64_t* cells, const PixelBlocks& blocks, float* values) {
-  const float* end = values + static_cast<std::ptrdiff_t>(blocks.width) * blocks.height;
-  for (std::size_t i = 0; i < blocks.size; ++i) {
-    const auto row = static_cast<std::ptrdiff_t>(blocks.blocks[i] / kBlocksInRow);
-    const auto first = static_cast<std::ptrdiff_t>(blocks.blocks[i] % kBlocksInRow * kBlockPixels);
-    const std::uint64_t* above = cells + row * kTileCells + first;
-    float* block = values + row * blocks.width + first;
-    for (std::size_t x = 0; x < kBlockPixels; x += hn::Lanes(Unsigned())) {
-      // Values beyond the row belong to later blocks or to none.
-      storeBefore(
-          end,
-          densityOf(RowOfCells(above + x).toBelow(), RowOfCells(above + kTileCells + x).toAbove()),
-          block + x);
-    }
-  }
-}
-
-void clear(const CellBuffer& buffer, const DirtyLines& lines) {
-  const Cells d;
-  for (std::size_t i = 0; i < lines.size; ++i) {
-    std::uint64_t* line = buffer.cells + std::size_t{kLineCells} * lines.lines[i];
-    for (std::size_t x = 0; x < kLineCells; x += hn::Lanes(d)) hn::Store(hn::Zero(d), d, line + x);
-  }
-  std::fill_n(buffer.dirty, kDirtyFlags, std::uint8_t{0});
-}
-
-constexpr ResolveFunctions kResolve = {resolveAll, findOccupied, listBlocks, resolveBlocks, clear};
+constexpr ResolveFunctions kResolve = {resolveAll, addPair<Min>, addPair<Harmonic>,
+                                       addPair<Geometric>};
 
 }  // namespace efm::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

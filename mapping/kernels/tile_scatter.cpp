@@ -170,10 +170,8 @@ class VoteEncoder {
 };
 
 /// Adds a batch's votes to their cells.
-HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const CellBuffer& tile,
+HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, std::uint64_t* cells,
                              FullCell* full) {
-  std::uint64_t* const cells = tile.cells;
-  std::uint8_t* const dirty = tile.dirty;
   constexpr std::size_t kLanes = hn::MaxLanes(Floats());
   for (std::size_t i = 0; i < count; i += kLanes) {
 #pragma GCC unroll 16
@@ -182,7 +180,6 @@ HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const Ce
       const std::uint32_t index = batch.index[vote];
       const std::uint64_t sums = batch.sums[i + k] + cells[index];
       cells[index] = sums;
-      dirty[index / kLineCells] = 1;
       if (HWY_UNLIKELY(static_cast<std::int64_t>(sums) < 0)) {
         *full++ = {index, sums};
         cells[index] = 0;
@@ -203,7 +200,7 @@ FullCell* vote(const MovingRays& rays, float to_plane, const CellWindow& window,
     for (std::size_t i = 0; i < size; i += lanes) {
       encoder.encode(begin + i, batch.index + i, batch.sums + i);
     }
-    full = scatter(batch, size, window.tile, full);
+    full = scatter(batch, size, window.cells, full);
   }
   return full;
 }

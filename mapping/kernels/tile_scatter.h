@@ -79,20 +79,9 @@ struct MovingRays {
   std::size_t size = 0;
 };
 
-/// A line is eight cells of a row. It begins on a cache line and has a dirty flag.
-inline constexpr int kLineCells = 8;
-inline constexpr int kDirtyFlags = kTileCells * (kTileCells + 2) / kLineCells;
-
-/// A tile's cells in rows of kTileCells, with two rows more than votes need.
-struct CellBuffer {
-  std::uint64_t* cells = nullptr;
-  /// Not zero for each line that may have votes: kDirtyFlags of them and kRayPadding.
-  std::uint8_t* dirty = nullptr;
-};
-
 /// The cells of a tile that votes may fall into.
 struct CellWindow {
-  CellBuffer tile;
+  std::uint64_t* cells = nullptr;  ///< The tile's, in rows of kTileCells.
   std::uint32_t first = 0;         ///< Index of the window's first cell in the tile.
   std::int32_t left = 0, top = 0;  ///< Its position from the rays' origin.
   std::uint32_t columns = 0, rows = 0;

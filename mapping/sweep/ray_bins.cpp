@@ -80,11 +80,20 @@ class Spread {
 }  // namespace
 
 RayBins::Axis::Axis(const Range& pixels, float side) : begin(pixels.min), bins_per_pixel(1 / side) {
-  constexpr Range kEmpty{std::numeric_limits<float>::infinity(),
-                         -std::numeric_limits<float>::infinity()};
-  on_anchor.assign(static_cast<std::size_t>((pixels.max - pixels.min) / side) + 1, kEmpty);
-  on_other = on_anchor;
-  last_bin = static_cast<float>(bins() - 1);
+  const float count = std::floor(std::max(0.0F, pixels.max - pixels.min) / side) + 1;
+  last_bin = count - 1;
+  on_anchor.resize(static_cast<std::size_t>(count));
+  on_other.resize(static_cast<std::size_t>(count));
+}
+
+RayBins::Directions::Directions(const RayBundle& rays) {
+  const auto rangeOf = [](const std::vector<float>& values) {
+    Range range;
+    for (const float value : values) range.extend(value);  // NaN changes nothing
+    return range;
+  };
+  x = rangeOf(rays.x_inf);
+  y = rangeOf(rays.y_inf);
 }
 
 std::vector<RayBins> RayBins::sort(const RayBundle& rays, const DsiGrid& grid) {
@@ -97,6 +106,7 @@ std::vector<RayBins> RayBins::sort(const RayBundle& rays, const DsiGrid& grid) {
   }
   const double min_rays =
       kRaysPerBin * static_cast<double>(grid.view.pixels()) / (kBin_px * kBin_px);
+  const Directions directions(rays);
   std::vector<RayBins> all;
   for (const auto& [key, packets] : in_front) {
     const auto& [forward, begin, end] = key;
@@ -111,7 +121,7 @@ std::vector<RayBins> RayBins::sort(const RayBundle& rays, const DsiGrid& grid) {
         ++packet;
       } while (packet != packets.end() &&
                (static_cast<double>(count) < min_rays || spread.pixels() <= kBin_px));
-      all.push_back(RayBins(planes, forward, {first, packet}, grid.view));
+      all.push_back(RayBins(planes, forward, {first, packet}, grid.view, directions));
     }
   }
   tbb::parallel_for_each(all, [&rays](RayBins& bins) { bins.store(rays); });
@@ -119,7 +129,7 @@ std::vector<RayBins> RayBins::sort(const RayBundle& rays, const DsiGrid& grid) {
 }
 
 RayBins::RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> packets,
-                 const ReferenceView& view)
+                 const ReferenceView& view, const Directions& directions)
     : planes_(planes), forward_(forward), packets_(std::move(packets)), view_(view) {
   double scale_first = 0;
   double scale_last = 0;
@@ -131,35 +141,54 @@ RayBins::RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> 
   }
   anchor_ = scale_first <= scale_last ? planes.first : planes.last;
   other_ = scale_first <= scale_last ? planes.last : planes.first;
-  const Range x = pixelsOnAnchor(1, view.width, view.cx);
-  const Range y = pixelsOnAnchor(2, view.height, view.cy);
-  const double area = double{x.max - x.min} * double{y.max - y.min};
-  const auto side = static_cast<float>(
-      std::max(kBin_px, std::sqrt(area * kRaysPerBin / static_cast<double>(count))));
-  columns_ = Axis(x, side);
-  rows_ = Axis(y, side);
+  columns_ = axisOf(1, view.width, view.cx, directions.x, count);
+  rows_ = axisOf(2, view.height, view.cy, directions.y, count);
 }
 
-/// The pixels on the anchor plane of rays that are inside the view there or at the other end.
-RayBins::Range RayBins::pixelsOnAnchor(Eigen::Index axis, int pixels, double principal) const {
-  Range range{0, static_cast<float>(pixels)};
+RayBins::Transfer RayBins::toOther(const RayPacket& packet, Eigen::Index axis,
+                                   double principal) const {
+  const Eigen::Array3d anchor = transferAt(packet, view_, anchor_);
+  const Eigen::Array3d other = transferAt(packet, view_, other_);
+  const double scale = other[0] / anchor[0];
+  return {scale, principal + other[axis] - scale * (principal + anchor[axis])};
+}
+
+/// Bins over the pixels on the anchor plane of all rays that are inside the view on some plane: at
+/// one of the two ends they are farthest from it.
+RayBins::Axis RayBins::axisOf(Eigen::Index axis, int pixels, double principal,
+                              const Range& at_infinity, std::size_t rays) const {
+  double in_view_min = 0;
+  double in_view_max = pixels;
+  double min = kInfinity;
+  double max = -kInfinity;
+  double widening = 1;  // from the anchor plane to the other end
   for (const RayPacket& packet : packets_) {
+    const Transfer to = toOther(packet, axis, principal);
+    in_view_min = std::min(in_view_min, (0 - to.offset) / to.scale);
+    in_view_max = std::max(in_view_max, (pixels - to.offset) / to.scale);
     const Eigen::Array3d anchor = transferAt(packet, view_, anchor_);
-    const Eigen::Array3d other = transferAt(packet, view_, other_);
-    for (const double pixel : {0.0, 1.0 * pixels}) {
-      const double u_inf = (pixel - principal - other[axis]) / other[0];
-      range.extend(static_cast<float>(principal + anchor[0] * u_inf + anchor[axis]));
+    for (const float u : {at_infinity.min, at_infinity.max}) {
+      const double pixel = principal + anchor[0] * (double{u} - principal) + anchor[axis];
+      min = std::min(min, pixel);
+      max = std::max(max, pixel);
     }
+    widening = std::max(widening, to.scale);
   }
-  return range;
+  const Range range{static_cast<float>(std::max(min, in_view_min)),
+                    static_cast<float>(std::min(max, in_view_max))};
+  // As many bins along either axis as rays fill on average.
+  const double bins = std::max(1.0, std::sqrt(static_cast<double>(rays) / kRaysPerBin));
+  const double width = std::max(double{range.max - range.min}, 1.0);
+  const double side = std::max(kBin_px / widening, width / bins);
+  return {range, static_cast<float>(side)};
 }
 
-/// Visits the rays that cross the view, packet by packet: visit(ray, column, row, x, y), with the
-/// bin and the pixel at the other end of the planes.
+/// Visits the rays that cross the view: visit(ray, column, row, x, y), with the bin and the pixel
+/// at the other end of the planes.
 template <typename Visit>
 void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
-  struct Transfer {
-    Transfer(const RayPacket& packet, const ReferenceView& view, double inverse_depth) {
+  struct ToPlane {
+    ToPlane(const RayPacket& packet, const ReferenceView& view, double inverse_depth) {
       const PlaneTransfer to = transferToPlane(packet, view, 1 / inverse_depth);
       scale = static_cast<float>(to.scale);
       x = static_cast<float>(to.offset_x);
@@ -169,12 +198,15 @@ void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
   };
   const auto crosses = [](float a, float b, int pixels) {
     constexpr float kRounding_px = 0.01F;
-    return std::isfinite(a) && std::isfinite(b) && std::max(a, b) >= -kRounding_px &&
-           std::min(a, b) <= static_cast<float>(pixels - 1) + kRounding_px;
+    constexpr float kFinite = 1e30F;
+    const float min = std::min(a, b);
+    const float max = std::max(a, b);
+    return (max >= -kRounding_px) & (min <= static_cast<float>(pixels - 1) + kRounding_px) &
+           (max - min < kFinite);
   };
   for (const RayPacket& packet : packets_) {
-    const Transfer anchor(packet, view_, anchor_);
-    const Transfer other(packet, view_, other_);
+    const ToPlane anchor(packet, view_, anchor_);
+    const ToPlane other(packet, view_, other_);
     const Eigen::Vector3d& center = packet.center_ref;
     const auto c = static_cast<float>(center.z());
     const auto a = static_cast<float>(view_.fx * center.x() + view_.cx * center.z());
@@ -186,7 +218,7 @@ void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
       const float y = anchor.scale * y_inf + anchor.y;
       const float x_other = other.scale * x_inf + other.x;
       const float y_other = other.scale * y_inf + other.y;
-      if (!crosses(x, x_other, view_.width) || !crosses(y, y_other, view_.height)) continue;
+      if (!(crosses(x, x_other, view_.width) & crosses(y, y_other, view_.height))) continue;
       visit(kernels::BinnedRay{x, y, a - c * x_inf, b - c * y_inf}, columns_.binOf(x),
             rows_.binOf(y), x_other, y_other);
     }
@@ -194,22 +226,22 @@ void RayBins::forEachRay(const RayBundle& bundle, const Visit& visit) const {
 }
 
 void RayBins::store(const RayBundle& bundle) {
-  const auto bin_at = [this](int column, int row) {
-    return static_cast<std::size_t>(row * columns_.bins() + column);
-  };
-  begin_.assign(bin_at(0, rows_.bins()) + 1, 0);
-  forEachRay(bundle, [&](const kernels::BinnedRay& ray, int column, int row, float x, float y) {
-    ++begin_[bin_at(column, row) + 1];
-    columns_.on_anchor[static_cast<std::size_t>(column)].extend(ray.x);
-    columns_.on_other[static_cast<std::size_t>(column)].extend(x);
-    rows_.on_anchor[static_cast<std::size_t>(row)].extend(ray.y);
-    rows_.on_other[static_cast<std::size_t>(row)].extend(y);
-  });
+  using kernels::BinnedRay;
+  const std::size_t columns = columns_.bins();
+  begin_.assign(rows_.bins() * columns + 1, 0);
+  forEachRay(bundle,
+             [&](const BinnedRay& ray, std::size_t column, std::size_t row, float x, float y) {
+               ++begin_[row * columns + column + 1];
+               columns_.on_anchor[column].extend(ray.x);
+               columns_.on_other[column].extend(x);
+               rows_.on_anchor[row].extend(ray.y);
+               rows_.on_other[row].extend(y);
+             });
   std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
   std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
   rays_.resize(begin_.back() + kernels::kRayPadding);
-  forEachRay(bundle, [&](const kernels::BinnedRay& ray, int column, int row, float, float) {
-    rays_[next[bin_at(column, row)]++] = ray;
+  forEachRay(bundle, [&](const BinnedRay& ray, std::size_t column, std::size_t row, float, float) {
+    rays_[next[row * columns + column]++] = ray;
   });
   packets_ = {};
 }
@@ -222,9 +254,9 @@ RayBins::Footprint RayBins::footprintOn(const PlaneRange& planes) const {
   return footprint;
 }
 
-/// Rays run straight: between two planes, a bin's pixels are at most the mean of those on the two.
+/// Rays run straight: on a plane between the two ends, pixels are weighted means of those there.
 RayBins::Footprint::Side RayBins::sideOf(const Axis& axis, const PlaneRange& planes) const {
-  const auto pixelsAt = [&](std::size_t bin, double inverse_depth) {
+  const auto pixelsOn = [&](std::size_t bin, double inverse_depth) {
     const Range& anchor = axis.on_anchor[bin];
     const Range& other = axis.on_other[bin];
     if (anchor.min > anchor.max || other_ == anchor_) return anchor;
@@ -233,15 +265,15 @@ RayBins::Footprint::Side RayBins::sideOf(const Axis& axis, const PlaneRange& pla
                  anchor.max + t * (other.max - anchor.max)};
   };
   Footprint::Side side;
-  for (std::size_t bin = 0; bin < axis.on_anchor.size(); ++bin) {
-    const Range first = pixelsAt(bin, planes.first);
-    const Range last = pixelsAt(bin, planes.last);
+  for (std::size_t bin = 0; bin < axis.bins(); ++bin) {
+    const Range first = pixelsOn(bin, planes.first);
+    const Range last = pixelsOn(bin, planes.last);
     side.min_from.push_back(std::min(first.min, last.min));
     side.max_until.push_back(std::max(first.max, last.max));
   }
-  for (std::size_t bin = 1; bin < side.max_until.size(); ++bin) {
+  for (std::size_t bin = 1; bin < axis.bins(); ++bin) {
     side.max_until[bin] = std::max(side.max_until[bin], side.max_until[bin - 1]);
-    const std::size_t back = side.min_from.size() - 1 - bin;
+    const std::size_t back = axis.bins() - 1 - bin;
     side.min_from[back] = std::min(side.min_from[back], side.min_from[back + 1]);
   }
   return side;
@@ -271,7 +303,7 @@ void RayBins::gather(const Footprint& footprint, const TileCells& tile,
   const auto [first_column, end_column] = footprint.columns_.binsIn(request.left, request.right);
   const auto [first_row, end_row] = footprint.rows_.binsIn(request.top, request.bottom);
   for (std::size_t row = first_row; row < end_row; ++row) {
-    const std::size_t bin = row * columns_.on_anchor.size();
+    const std::size_t bin = row * columns_.bins();
     const std::uint32_t begin = begin_[bin + first_column];
     const std::size_t count = begin_[bin + end_column] - begin;
     if (count == 0) continue;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -75,8 +76,8 @@ class RayBins {
 
  private:
   struct Range {
-    float min = 0;
-    float max = 0;
+    float min = std::numeric_limits<float>::infinity();
+    float max = -std::numeric_limits<float>::infinity();
     void extend(float value) {
       min = std::min(min, value);
       max = std::max(max, value);
@@ -86,11 +87,12 @@ class RayBins {
   struct Axis {
     Axis() = default;
     Axis(const Range& pixels, float side);
-    int bins() const { return static_cast<int>(on_anchor.size()); }
-    /// The bin of a pixel of the anchor plane. The outermost bins also hold what lies beyond them.
-    int binOf(float pixel) const {
+
+    std::size_t bins() const { return on_anchor.size(); }
+    /// The bin of a pixel of the anchor plane.
+    std::size_t binOf(float pixel) const {
       const float bin = (pixel - begin) * bins_per_pixel;
-      return static_cast<int>(std::max(0.0F, std::min(bin, last_bin)));
+      return static_cast<std::size_t>(std::max(0.0F, std::min(bin, last_bin)));
     }
 
     float begin = 0;  // of the first bin, pixels of the anchor plane
@@ -99,10 +101,22 @@ class RayBins {
     // The pixels of each bin's rays on the anchor plane, and on the plane at the other end.
     std::vector<Range> on_anchor, on_other;
   };
+  /// Of a packet's rays, from the anchor plane to the other end: x_other = scale x + offset.
+  struct Transfer {
+    double scale, offset;
+  };
+
+  /// The pixels of a bundle's rays on the plane at infinity.
+  struct Directions {
+    explicit Directions(const RayBundle& rays);
+    Range x, y;
+  };
 
   RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> packets,
-          const ReferenceView& view);
-  Range pixelsOnAnchor(Eigen::Index axis, int pixels, double principal) const;
+          const ReferenceView& view, const Directions& directions);
+  Transfer toOther(const RayPacket& packet, Eigen::Index axis, double principal) const;
+  Axis axisOf(Eigen::Index axis, int pixels, double principal, const Range& at_infinity,
+              std::size_t rays) const;
   Footprint::Side sideOf(const Axis& axis, const PlaneRange& planes) const;
   template <typename Visit>
   void forEachRay(const RayBundle& bundle, const Visit& visit) const;

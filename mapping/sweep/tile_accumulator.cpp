@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cassert>
 
+#include "mapping/kernels/fusion.h"
+
 namespace efm {
 namespace {
 
 constexpr int kStride = kernels::kTileCells;
-/// Up to this number of rays per pixel it pays to skip empty cells.
-constexpr double kMaxSparseRays = 1;
 
 }  // namespace
 
@@ -18,8 +18,7 @@ TileAccumulator::TileAccumulator(VotingKernel kernel)
       resolve_(kernels::resolveFunctions(kernel)),
       // Vectors read past the last row. A ray outside the view adds zero to a cell up to a tile
       // from the first cell inside.
-      cells_(static_cast<std::size_t>((kStride + 2) * kStride), 0),
-      dirty_(kernels::kDirtyFlags + kernels::kRayPadding, 0) {}
+      cells_(static_cast<std::size_t>((kStride + 2) * kStride), 0) {}
 
 void TileAccumulator::moveTo(const TileCells& tile) {
   assert(!pending_);
@@ -34,7 +33,7 @@ void TileAccumulator::vote(TileRays& rays, double from_first) {
     full_.resize(std::max(full_.size(), rays.size() / kernels::kVotesPerCell + 1));
     const cv::Point first = tile_.in_view.tl() - tile_.all.tl();
     const cv::Point corner = tile_.in_view.tl() - tile_.origin;
-    const kernels::CellWindow window{buffer(),
+    const kernels::CellWindow window{cells_.data(),
                                      static_cast<std::uint32_t>(first.y * kStride + first.x),
                                      corner.x,
                                      corner.y,
@@ -44,13 +43,12 @@ void TileAccumulator::vote(TileRays& rays, double from_first) {
         scatter_.vote(rays.view(), static_cast<float>(from_first), window, full_.data());
     full_cells_ = static_cast<std::size_t>(end - full_.data());
   }
-  sparse_ =
-      full_cells_ == 0 && static_cast<double>(rays.size()) <= kMaxSparseRays * tile_.tile.area();
 }
 
 std::uint64_t TileAccumulator::resolve(float* density) {
   pending_ = false;
-  const std::uint64_t votes = resolve_.all(buffer(), tile_.tile.width, tile_.tile.height, density);
+  const std::uint64_t votes =
+      resolve_.all(cells_.data(), tile_.tile.width, tile_.tile.height, density);
   return votes + addFullCells(density);
 }
 
@@ -82,24 +80,26 @@ std::uint64_t TileAccumulator::addFullCells(float* density) const {
   return votes;
 }
 
-std::uint64_t TileAccumulator::findOccupied() {
-  assert(pending_ && sparse_);
-  occupied_.width = tile_.tile.width;
-  occupied_.height = tile_.tile.height;
-  return resolve_.findOccupied(buffer(), occupied_, dirty_lines_);
-}
-
-kernels::PixelBlocks TileAccumulator::blocksOf(const kernels::TilePixels& pixels) const {
-  kernels::PixelBlocks blocks;
-  resolve_.listBlocks(pixels, blocks);
-  return blocks;
-}
-
-void TileAccumulator::resolveBlocks(const kernels::PixelBlocks& blocks, float* density) {
-  assert(pending_ && sparse_);
-  pending_ = false;
-  resolve_.blocks(cells_.data(), blocks, density);
-  resolve_.clear(buffer(), dirty_lines_);
+void TileAccumulator::addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second,
+                              float* sum, std::uint64_t votes[2]) {
+  const cv::Rect& tile = first.tile_.tile;
+  assert(first.pending_ && second.pending_ && tile == second.tile_.tile);
+  if (first.full_cells_ + second.full_cells_ == 0) {
+    first.pending_ = second.pending_ = false;
+    const kernels::ResolveFunctions& resolve = first.resolve_;
+    const auto add_pair = rule == FusionRule::kMin        ? resolve.addMin
+                          : rule == FusionRule::kHarmonic ? resolve.addHarmonic
+                                                          : resolve.addGeometric;
+    add_pair(first.cells_.data(), second.cells_.data(), tile.width, tile.height, sum, votes);
+    return;
+  }
+  const auto pixels = static_cast<std::size_t>(tile.area());
+  for (TileAccumulator* input : {&first, &second}) {
+    input->density_.resize(pixels);
+    votes[input == &first ? 0 : 1] += input->resolve(input->density_.data());
+  }
+  stepsOf(rule).pair(first.density_.data(), second.density_.data(), pixels);
+  for (std::size_t i = 0; i < pixels; ++i) sum[i] += first.density_[i];
 }
 
 }  // namespace efm

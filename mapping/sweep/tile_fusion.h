@@ -13,9 +13,8 @@ namespace efm {
 
 /// Votes and fuses all inputs of one tile, plane by plane.
 ///
-/// Two cameras under an AND-like rule, with one slot each, have a shortcut with the same bits:
-/// their mean is zero where one of them has no vote, so that only the other blocks are resolved
-/// and fused.
+/// Two cameras under an AND-like rule, whose slots are summed, have a shortcut with the same bits:
+/// their cells are resolved and fused at once.
 class TileFusion {
  public:
   /// @param kernel one of `availableKernels`, but not the plain one.
@@ -33,8 +32,7 @@ class TileFusion {
   const std::vector<std::uint64_t>& votes() const { return votes_; }
 
  private:
-  const PlaneValues& fuseOccupied(std::vector<TileRays>& rays, double from_first);
-  void addPair(TileRays& first_rays, TileRays& second_rays, double from_first);
+  const PlaneValues& fusePairs(std::vector<TileRays>& rays, double from_first);
 
   FusionOptions options_;
   FusionInputs inputs_;
@@ -43,8 +41,7 @@ class TileFusion {
   // The second one serves the shortcut.
   std::array<TileAccumulator, 2> accumulators_;
   std::optional<PlaneFusion> planes_;
-  kernels::TilePixels all_pixels_;
-  PlaneValues first_, second_, sum_;  // of the shortcut
+  PlaneValues sum_, group_sum_;  // of the shortcut
   std::vector<std::uint64_t> votes_;
 };
 

@@ -215,7 +215,9 @@ TEST(DsiColumns, AddToAddsTheWeightedColumn) {
   const DsiColumns columns({1, 1}, 3, std::move(tiles));
   ASSERT_TRUE(columns.has({0, 0}));
   std::vector<float> sum = {10, 20, 30};
+  sum.resize(3 + DsiColumns::kPadding);
   columns.addTo(sum.data(), {0, 0}, 0.5F);
+  sum.resize(3);
   EXPECT_THAT(sum, ::testing::Pointwise(::testing::FloatNear(1e-4F), {11.0F, 24.0F, 30.0F}));
 }
 

@@ -112,37 +112,5 @@ TEST(FusionKernel, AndLikeMeansOfZeroAreExactlyZeroAlsoBesideASubnormal) {
   EXPECT_EQ(pairOf(kRules[2], {0, 0, 5}, {0, 5, 0}), std::vector<float>(3, 0.0F));
 }
 
-TEST(FusionKernel, APairIsAddedInItsBlocksAndNowhereElse) {
-  std::mt19937 random(6);
-  for (const Rule& rule : kRules) {
-    for (const int width : {1, 7, 16, 17, 33, 48, 63}) {
-      constexpr int kHeight = 5;
-      const auto pixels = static_cast<std::size_t>(width * kHeight);
-      const std::vector<float> a = randomValues(random, pixels, -1, 1);
-      const std::vector<float> b = randomValues(random, pixels, -1, 1);
-      const std::vector<float> before = randomValues(random, pixels, -1, 1);
-      const std::vector<float> pair = pairOf(rule, a, b);
-      PixelBlocks blocks;
-      blocks.width = width;
-      blocks.height = kHeight;
-      std::vector<float> expected = before;
-      for (int y = 0; y < kHeight; ++y) {
-        for (int block = 0; block * kBlockPixels < width; ++block) {
-          if (random() % 2 == 0) continue;
-          blocks.blocks[blocks.size++] = static_cast<std::uint32_t>(kBlocksInRow * y + block);
-          const int end = std::min(width, (block + 1) * kBlockPixels);
-          for (int x = block * kBlockPixels; x < end; ++x) {
-            const auto i = static_cast<std::size_t>(y * width + x);
-            expected[i] += pair[i];
-          }
-        }
-      }
-      std::vector<float> sum = before;
-      (*rule).addPair(sum.data(), a.data(), b.data(), blocks);
-      ASSERT_EQ(sum, expected) << rule.name << ", " << width << " wide";
-    }
-  }
-}
-
 }  // namespace
 }  // namespace efm::kernels
