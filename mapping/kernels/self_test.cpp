@@ -10,9 +10,12 @@
 #include <random>
 
 #include "mapping/kernels/bilinear_vote.h"
+#include "mapping/kernels/columns.h"
+#include "mapping/kernels/fusion.h"
 #include "mapping/kernels/peaks.h"
 #include "mapping/kernels/tile_resolve.h"
 #include "mapping/kernels/tile_scatter.h"
+#include "mapping/kernels/weighted_ranks.h"
 
 namespace efm::kernels {
 namespace {
@@ -45,10 +48,10 @@ struct TileMemory {
   alignas(64) float dx[kMaxRays + kRayPadding] = {};
   alignas(64) float dy[kMaxRays + kRayPadding] = {};
   alignas(64) std::uint64_t cells[kTileCells * (kTileCells + 2)] = {};
-  alignas(64) std::uint8_t dirty[kDirtyFlags + kRayPadding] = {};
+  alignas(64) std::uint64_t others[kTileCells * (kTileCells + 2)] = {};
   FullCell full[kMaxRays / kVotesPerCell + 1];
   float density[kTilePixels * kTilePixels + kRayPadding] = {};
-  float sparse[kTilePixels * kTilePixels + kRayPadding] = {};
+  float sum[kTilePixels * kTilePixels + kSumPadding] = {};
 };
 
 /// The votes of a cell, summed in 64 bits.
@@ -79,7 +82,7 @@ class TileTest {
     for (const float to_plane : {0.0F, 0.5F, 1.0F}) {
       vote(to_plane);
       resolve(to_plane);
-      resolveSparse(to_plane);
+      resolvePairs(to_plane);
     }
     fillCells();
     return failures_;
@@ -94,7 +97,6 @@ class TileTest {
   }
 
   MovingRays rays() const { return {memory_->x, memory_->y, memory_->dx, memory_->dy, size_}; }
-  CellBuffer buffer() const { return {memory_->cells, memory_->dirty}; }
 
   void gather() {
     constexpr std::size_t kRays = 3001;  // no multiple of a vector's lanes
@@ -141,7 +143,7 @@ class TileTest {
       memory_->x[i] = memory_->y[i] = -1;
       memory_->dx[i] = memory_->dy[i] = 0;
     }
-    const CellWindow window{buffer(), 0, 0, 0, kTileCells, kTileCells};
+    const CellWindow window{memory_->cells, 0, 0, 0, kTileCells, kTileCells};
     return static_cast<std::size_t>(scatter_.vote(rays(), to_plane, window, memory_->full) -
                                     memory_->full);
   }
@@ -177,8 +179,6 @@ class TileTest {
     }
     for (std::size_t i = 0; i < found.size(); ++i) {
       require(!(found[i] != expected[i]), "vote: the sums of the cells");
-      require(expected[i].votes == 0 || memory_->dirty[i / kLineCells] != 0,
-              "vote: the dirty lines");
     }
   }
 
@@ -190,9 +190,7 @@ class TileTest {
 
   void requireEmptyCells() {
     require(std::all_of(std::begin(memory_->cells), std::end(memory_->cells),
-                        [](std::uint64_t cell) { return cell == 0; }) &&
-                std::all_of(memory_->dirty, memory_->dirty + kDirtyFlags,
-                            [](std::uint8_t flag) { return flag == 0; }),
+                        [](std::uint64_t cell) { return cell == 0; }),
             "resolve: the cells are cleared");
   }
 
@@ -210,7 +208,8 @@ class TileTest {
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (i % kTileCells > 0 && i >= kTileCells) inside += cells[i].votes;
     }
-    const std::uint64_t votes = resolve_.all(buffer(), kTilePixels, kTilePixels, memory_->density);
+    const std::uint64_t votes =
+        resolve_.all(memory_->cells, kTilePixels, kTilePixels, memory_->density);
     require(votes == inside, "resolve: the number of votes");
     requireEmptyCells();
     for (int y = 0; y < kTilePixels; ++y) {
@@ -223,29 +222,36 @@ class TileTest {
     }
   }
 
-  /// The steps that skip empty cells give the same bits.
-  void resolveSparse(float to_plane) {
-    size_ = std::min<std::size_t>(size_, 200);
-    voteAll(to_plane);
-    resolve_.all(buffer(), kTilePixels, kTilePixels, memory_->density);
-    voteAll(to_plane);
-    const auto lines = std::make_unique<DirtyLines>();
-    const auto blocks = std::make_unique<PixelBlocks>();
-    TilePixels occupied;
-    occupied.width = occupied.height = kTilePixels;
-    resolve_.findOccupied(buffer(), occupied, *lines);
-    resolve_.listBlocks(occupied, *blocks);
-    std::fill(std::begin(memory_->sparse), std::end(memory_->sparse), 0.0F);
-    resolve_.blocks(memory_->cells, *blocks, memory_->sparse);
-    resolve_.clear(buffer(), *lines);
-    requireEmptyCells();
-    for (int y = 0; y < kTilePixels; ++y) {
-      for (int x = 0; x < kTilePixels; ++x) {
-        const bool listed = (occupied.rows[y] >> x & 1) != 0;
-        const float all = memory_->density[y * kTilePixels + x];
-        require(listed || all == 0, "resolve: the occupied pixels");
-        require(!listed || all == memory_->sparse[y * kTilePixels + x],
-                "resolve: the densities of blocks");
+  /// Two inputs at once give the bits of each alone and of the plain mean.
+  void resolvePairs(float to_plane) {
+    const FusionFunctions& plain = fusionFunctions();
+    const struct {
+      ResolveFunctions::AddPair add;
+      const FusionSteps& steps;
+    } rules[] = {{resolve_.addMin, plain.min},
+                 {resolve_.addHarmonic, plain.harmonic},
+                 {resolve_.addGeometric, plain.geometric}};
+    constexpr std::size_t kPixels = kTilePixels * kTilePixels;
+    for (const auto& [add, steps] : rules) {
+      std::vector<float> first(kPixels);
+      std::vector<float> second(kPixels);
+      std::uint64_t votes[2] = {};
+      std::uint64_t expected[2] = {};
+      voteAll(0);
+      expected[0] = resolve_.all(memory_->cells, kTilePixels, kTilePixels, first.data());
+      voteAll(to_plane);
+      expected[1] = resolve_.all(memory_->cells, kTilePixels, kTilePixels, second.data());
+      steps.pair(first.data(), second.data(), kPixels);
+      voteAll(0);
+      std::copy(std::begin(memory_->cells), std::end(memory_->cells), memory_->others);
+      std::fill(std::begin(memory_->cells), std::end(memory_->cells), 0);
+      voteAll(to_plane);
+      std::fill(std::begin(memory_->sum), std::end(memory_->sum), 1.0F);
+      add(memory_->others, memory_->cells, kTilePixels, kTilePixels, memory_->sum, votes);
+      requireEmptyCells();
+      require(std::equal(votes, votes + 2, expected), "resolve: the votes of two inputs");
+      for (std::size_t i = 0; i < kPixels; ++i) {
+        require(memory_->sum[i] == 1.0F + first[i], "resolve: the mean of two inputs");
       }
     }
   }
@@ -293,16 +299,39 @@ std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t 
   return all;
 }
 
+/// Sums of columns and ranks of positions; arrays with padding.
+std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n) {
+  RandomNumbers random(seed);
+  std::vector<std::uint16_t> column(n + kColumnPadding);
+  std::vector<float> positions(n + kRankPadding);
+  std::vector<float> weights(n + kRankPadding);
+  for (std::size_t i = 0; i < n; ++i) {
+    column[i] = static_cast<std::uint16_t>(random(0, 65'535, 1));
+    positions[i] = random(0, 20, 1);
+    weights[i] = random(0, 3, 4096);
+  }
+  std::vector<float> sum(n + kColumnPadding, 0.1F);
+  std::vector<float> below(n + kRankPadding, 0.0F);
+  columnFunctions(kernel).add(sum.data(), column.data(), n, 0.3F);
+  rankFunctions(kernel).add(below.data(), positions.data(), weights.data(), n);
+  sum.resize(n);
+  sum.insert(sum.end(), below.begin(), below.begin() + static_cast<std::ptrdiff_t>(n));
+  return sum;
+}
+
 }  // namespace
 
 std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed) {
   std::vector<std::string> failures;
   if (kernel != VotingKernel::kPlain) failures = TileTest(kernel, seed).run();
-  for (const std::size_t pixels : {1U, 15U, 16U, 101U}) {
-    if (peaksOf(kernel, seed, pixels) == peaksOf(VotingKernel::kPlain, seed, pixels)) continue;
-    failures.emplace_back("peaks: the largest values");
-    break;
-  }
+  const auto differs = [&](const auto& function) {
+    for (const std::size_t n : {1U, 15U, 16U, 101U}) {
+      if (function(kernel, seed, n) != function(VotingKernel::kPlain, seed, n)) return true;
+    }
+    return false;
+  };
+  if (differs(peaksOf)) failures.emplace_back("peaks: the largest values");
+  if (differs(sumsOf)) failures.emplace_back("columns and ranks: the sums");
   return failures;
 }
 

@@ -24,7 +24,8 @@ trap 'rm -rf "$work"' EXIT
 mkdir "$work/include"
 ln -s "$highway/hwy" "$work/include/hwy"
 
-flags=(-std=c++17 -O2 -Wall -Wextra -Wpedantic -Wshadow -Werror -isystem "$work/include" -I "$root")
+# As in mapping/CMakeLists.txt, products are rounded before they are added.
+flags=(-std=c++17 -O2 -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Werror -isystem "$work/include" -I "$root")
 objects=()
 for file in "$root"/mapping/kernels/*.cpp "$root/test/kernels/self_test_main.cpp"; do
   object=$work/$(basename "$file" .cpp).o
