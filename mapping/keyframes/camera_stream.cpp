@@ -8,6 +8,32 @@
 #include "mapping/events/event_check.h"
 
 namespace efm {
+namespace {
+
+/// Tells of times in order whether a trajectory has a pose there. Asks it once per segment.
+class PosedTimes {
+ public:
+  PosedTimes(const Trajectory& trajectory, std::size_t& cursor)
+      : trajectory_(trajectory), cursor_(cursor) {}
+
+  bool contain(std::int64_t t_ns) {
+    if (t_ns >= first_ns_ && t_ns <= last_ns_) return true;
+    const auto segment = trajectory_.segmentAt(t_ns, cursor_);
+    if (!segment) return false;
+    first_ns_ = segment->first.t_ns;
+    last_ns_ = segment->last.t_ns;
+    return true;
+  }
+
+ private:
+  const Trajectory& trajectory_;
+  std::size_t& cursor_;
+  std::int64_t first_ns_ = kMaxTimeNs;
+  std::int64_t last_ns_ = kMinTimeNs;
+};
+
+}  // namespace
+
 EventCounts& EventCounts::operator+=(const EventCounts& other) {
   read += other.read;
   used += other.used;
@@ -100,18 +126,20 @@ std::optional<std::int64_t> CameraStream::firstWithPose(const Trajectory& trajec
 }
 
 void CameraStream::markUsed(const Window& window, const Trajectory& trajectory) {
+  PosedTimes posed(trajectory, pose_cursor_);
   const std::size_t end = buffer_.indexOf(window.t1_ns);
   for (std::size_t i = buffer_.indexOf(window.t0_ns); i < end; ++i) {
-    if (trajectory.segmentAt(buffer_.events[i].t_ns, pose_cursor_)) buffer_.used[i] = true;
+    if (posed.contain(buffer_.events[i].t_ns)) buffer_.used[i] = true;
   }
 }
 
 void CameraStream::release(std::int64_t until_ns, const Trajectory& trajectory) {
+  PosedTimes posed(trajectory, pose_cursor_);
   const std::size_t end = buffer_.indexOf(until_ns);
   for (; buffer_.begin < end; ++buffer_.begin) {
     if (buffer_.used[buffer_.begin]) {
       ++counts_.used;
-    } else if (trajectory.segmentAt(buffer_.events[buffer_.begin].t_ns, pose_cursor_)) {
+    } else if (posed.contain(buffer_.events[buffer_.begin].t_ns)) {
       ++counts_.outside_window;
     } else {
       ++counts_.without_pose;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <csignal>
 #include <cstddef>
 #include <deque>
 #include <exception>
@@ -14,8 +15,12 @@
 namespace efm {
 
 /// Writes keyframes in a thread of its own, in order, beside the making of the next ones. At most
-/// two keyframes wait, so that memory stays bounded. After an error nothing more is written. One
-/// thread calls it.
+/// one keyframe waits while another is written: memory stays bounded. After an error nothing more
+/// is written. One thread calls it.
+///
+/// A signal that ends the program (SIGINT, SIGTERM, SIGHUP) takes effect once no keyframe waits:
+/// the caller's thread and those that it starts block it, and the writer's accepts it when it is
+/// idle.
 class KeyframeWriter {
  public:
   using Write = std::function<void(const KeyframeDepthMap&)>;
@@ -27,7 +32,7 @@ class KeyframeWriter {
   KeyframeWriter(const KeyframeWriter&) = delete;
   KeyframeWriter& operator=(const KeyframeWriter&) = delete;
 
-  /// Waits while two keyframes wait. Shares the images of the keyframe: do not change them.
+  /// Waits while another keyframe waits. Shares the images of the keyframe: do not change them.
   /// @throws the error of an earlier keyframe.
   void add(const KeyframeDepthMap& keyframe);
   /// Waits until all keyframes are written. @throws the error of one.
@@ -37,6 +42,8 @@ class KeyframeWriter {
 
  private:
   void run();
+  void acceptSignals();
+  bool endIsPending() const;
 
   Write write_;
 
@@ -47,7 +54,8 @@ class KeyframeWriter {
   bool stop_ = false;
   std::exception_ptr error_;
 
-  std::thread thread_;  // last: it uses the others
+  sigset_t callers_signals_{};  // blocked before
+  std::thread thread_;          // last: it uses the others
 };
 
 }  // namespace efm
