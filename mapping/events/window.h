@@ -11,6 +11,8 @@ struct Window {
   std::int64_t t0_ns = 0;
   std::int64_t t1_ns = 0;
   std::int64_t t_ref_ns = 0;
+
+  bool contains(std::int64_t t_ns) const { return t_ns >= t0_ns && t_ns < t1_ns; }
 };
 
 /// Half-open [t0, t1) on the trajectory's clock; not given: no limit.

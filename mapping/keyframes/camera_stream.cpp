@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "mapping/events/even_choice.h"
 #include "mapping/events/event_check.h"
 
 namespace efm {
@@ -42,6 +43,7 @@ EventCounts& EventCounts::operator+=(const EventCounts& other) {
   filtered += other.filtered;
   dropped += other.dropped;
   outside_lens += other.outside_lens;
+  over_budget += other.over_budget;
   return *this;
 }
 
@@ -125,10 +127,14 @@ std::optional<std::int64_t> CameraStream::firstWithPose(const Trajectory& trajec
   return std::nullopt;
 }
 
-void CameraStream::markUsed(const Window& window, const Trajectory& trajectory) {
+void CameraStream::markUsed(const Window& window, const Trajectory& trajectory,
+                            std::size_t max_events) {
   PosedTimes posed(trajectory, pose_cursor_);
-  const std::size_t end = buffer_.indexOf(window.t1_ns);
-  for (std::size_t i = buffer_.indexOf(window.t0_ns); i < end; ++i) {
+  const std::size_t begin = buffer_.indexOf(window.t0_ns);
+  const EvenChoice choice(buffer_.indexOf(window.t1_ns) - begin, max_events);
+  if (!choice.all()) over_budget_.push_back(window);
+  for (std::size_t k = 0; k < choice.size(); ++k) {
+    const std::size_t i = begin + choice[k];
     if (posed.contain(buffer_.events[i].t_ns)) buffer_.used[i] = true;
   }
 }
@@ -137,14 +143,21 @@ void CameraStream::release(std::int64_t until_ns, const Trajectory& trajectory) 
   PosedTimes posed(trajectory, pose_cursor_);
   const std::size_t end = buffer_.indexOf(until_ns);
   for (; buffer_.begin < end; ++buffer_.begin) {
+    const std::int64_t t_ns = buffer_.events[buffer_.begin].t_ns;
     if (buffer_.used[buffer_.begin]) {
       ++counts_.used;
-    } else if (posed.contain(buffer_.events[buffer_.begin].t_ns)) {
-      ++counts_.outside_window;
-    } else {
+    } else if (!posed.contain(t_ns)) {
       ++counts_.without_pose;
+    } else if (std::any_of(over_budget_.begin(), over_budget_.end(),
+                           [&](const Window& window) { return window.contains(t_ns); })) {
+      ++counts_.over_budget;
+    } else {
+      ++counts_.outside_window;
     }
   }
+  over_budget_.erase(std::remove_if(over_budget_.begin(), over_budget_.end(),
+                                    [&](const Window& window) { return window.t1_ns <= until_ns; }),
+                     over_budget_.end());
   buffer_.compact();
 }
 

@@ -26,6 +26,8 @@ struct EventCounts {
   std::uint64_t filtered = 0;  ///< Removed as noise, with a pose or without.
   /// Not used: the lens model has no viewing ray for this pixel (`LensInverse`).
   std::uint64_t outside_lens = 0;
+  /// Not used: in a window that was mapped, but not among the events chosen there.
+  std::uint64_t over_budget = 0;
 
   EventCounts& operator+=(const EventCounts& other);
 };
@@ -68,8 +70,9 @@ class CameraStream {
   std::optional<std::int64_t> firstFrom(std::int64_t t_ns) const;
   /// Time of the first buffered event before `until_ns` with a pose.
   std::optional<std::int64_t> firstWithPose(const Trajectory& trajectory, std::int64_t until_ns);
-  /// Marks the window's events that have a pose as used.
-  void markUsed(const Window& window, const Trajectory& trajectory);
+  /// Marks the window's events that have a pose as used; those of an `EvenChoice` of at most
+  /// `max_events`.
+  void markUsed(const Window& window, const Trajectory& trajectory, std::size_t max_events);
   /// Counts and releases the events before a time.
   void release(std::int64_t until_ns, const Trajectory& trajectory);
 
@@ -86,6 +89,7 @@ class CameraStream {
   std::vector<bool> outside_lens_;
   std::optional<FilteredEvents> filter_;
   EventBuffer buffer_;
+  std::vector<Window> over_budget_;  // windows with events that were not chosen
   std::size_t pose_cursor_ = 0;
   std::optional<std::int64_t> newest_ns_;
   std::int64_t covered_ns_ = kMinTimeNs;

@@ -211,7 +211,10 @@ void FusionMapper::countKeyframe(const KeyframeDepthMap& keyframe) {
   counts_.silent_subintervals += keyframe.silent_subintervals;
   counts_.event_uses =
       std::accumulate(keyframe.events.begin(), keyframe.events.end(), counts_.event_uses);
-  for (CameraStream& camera : cameras_) camera.markUsed(keyframe.window, trajectory_);
+  const std::size_t max_events = options_.keyframe.max_events_per_camera;
+  for (CameraStream& camera : cameras_) {
+    camera.markUsed(keyframe.window, trajectory_, max_events);
+  }
 }
 
 /// Events before this time are complete, with their poses, and no later window needs them.

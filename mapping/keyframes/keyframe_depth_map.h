@@ -45,6 +45,7 @@ struct KeyframeDepthMap {
   std::vector<std::uint64_t> events;
   std::uint64_t without_pose = 0;   ///< Events of the window that had no pose.
   std::uint64_t outside_lens = 0;   ///< Events whose pixel has no viewing ray.
+  std::uint64_t over_budget = 0;    ///< Events of the window that were not chosen.
   VoteCounts votes;                 ///< Summed over cameras.
   std::vector<int> silent_cameras;  ///< Selected cameras without an event that voted.
   /// Sub-intervals (of all time slices) without an event that voted, summed over the other cameras.

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "mapping/events/even_choice.h"
 #include "mapping/events/event_check.h"
 #include "mapping/keyframes/corrected_keyframe.h"
 #include "mapping/options/option_check.h"
@@ -21,6 +22,21 @@ void requireCamera(const Rig& rig, int camera, const char* key) {
   const auto count = static_cast<int>(rig.cameras.size());
   requireOption(camera >= 0 && camera < count, key, camera,
                 "a camera of the recording: 0 to " + std::to_string(count - 1));
+}
+
+/// At most `max_events` of each camera; 0: all. @param chosen holds them where there are more.
+std::vector<CameraEvents> withinBudget(std::vector<CameraEvents> cameras, std::size_t max_events,
+                                       std::vector<std::vector<Event>>& chosen) {
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    cameras[i].events = chooseEvenly(cameras[i].events, max_events, chosen[i]);
+  }
+  return cameras;
+}
+
+std::uint64_t countOf(const std::vector<CameraEvents>& cameras) {
+  std::uint64_t count = 0;
+  for (const CameraEvents& camera : cameras) count += camera.events.size();
+  return count;
 }
 
 double maximumOf(const cv::Mat1f& confidence) {
@@ -82,10 +98,13 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
                                                     const Trajectory& trajectory, DsiSink* sink,
                                                     StageHook* stages) {
   // 1. Input: events, trajectory, calibration.
-  const std::vector<CameraEvents> cameras = selectedEvents(events);
-  for (const CameraEvents& camera : cameras) {  // what follows looks up and counts by pixel
+  const std::vector<CameraEvents> all = selectedEvents(events);
+  for (const CameraEvents& camera : all) {  // what follows looks up and counts by pixel
     requireInsideSensor(camera.events, camera.camera, camera.calibration->model);
   }
+  std::vector<std::vector<Event>> chosen(all.size());
+  const std::vector<CameraEvents> cameras =
+      withinBudget(all, options_.max_events_per_camera, chosen);
   // 2. One reference view for all DSIs.
   const std::optional<Rigid3> T_world_rig = trajectory.poseAt(window.t_ref_ns);
   if (!T_world_rig) return std::nullopt;
@@ -100,10 +119,10 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
     return mapCorrected({input, trajectory, options_.motion, sink, stages}, map_along);
   });
 
+  keyframe.over_budget = countOf(all) - countOf(cameras);
   sequence_maximum_.add(keyframe.max_confidence);
   if (options_.event_images) {
-    for (const CameraEvents& camera : cameras)
-      keyframe.event_images.push_back(eventImageOf(camera));
+    for (const CameraEvents& camera : all) keyframe.event_images.push_back(eventImageOf(camera));
   }
   return keyframe;
 }

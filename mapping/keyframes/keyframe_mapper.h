@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct KeyframeMapperOptions {
   int reference_camera = 0;
   ReferenceViewOptions view;
   SubintervalOptions subintervals;
+  /// Maximum number of a camera's events that take part, evenly chosen (`EvenChoice`); 0: no limit.
+  std::uint32_t max_events_per_camera = 0;
   SplitFusionOptions split;  ///< Groups of events; each is divided into the sub-intervals.
   /// Exclude a silent camera (none of its events votes) from the fusion. Otherwise it makes
   /// AND-like rules zero everywhere.

@@ -95,6 +95,7 @@ const std::vector<OptionKey>& optionKeys() {
       option("keyframes", "min_baseline_ratio", FIELD(mapper.policy.min_baseline_ratio)),
       option("keyframes", "min_visible_fraction", FIELD(mapper.policy.min_visible_fraction)),
       option("keyframes", "reference", FIELD(mapper.policy.reference)),
+      option("keyframes", "max_events_per_camera", KEYFRAME(max_events_per_camera)),
 
       option("dsi", "min_depth_m", KEYFRAME(planes.min_depth_m)),
       option("dsi", "max_depth_m", KEYFRAME(planes.max_depth_m)),

@@ -22,7 +22,8 @@ Json asJson(const EventCounts& counts) {
           {"outside_window", counts.outside_window},
           {"dropped", counts.dropped},
           {"filtered", counts.filtered},
-          {"outside_lens", counts.outside_lens}};
+          {"outside_lens", counts.outside_lens},
+          {"over_budget", counts.over_budget}};
 }
 
 Json asJson(const StageSeconds& seconds) {

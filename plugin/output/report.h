@@ -33,12 +33,13 @@ struct MapReport {
 };
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
-/// outside_window + dropped + filtered + outside_lens), event_uses, votes (event_uses x planes =
-/// their sum), keyframes, silent (keyframes per camera, sub-intervals), points, seconds (real time),
-/// cpu_seconds (processor time: once per run, for events, for keyframes), votes_per_second,
-/// refinement where poses were refined (registered keyframes, loops, the learnt errors of the
-/// tracker), kernel, threads, peak_memory_bytes (of this process), reference_view and baseline_m
-/// where known, perturbation (the faults of the poses, if any), options (all of them) and version.
+/// outside_window + dropped + filtered + outside_lens + over_budget), event_uses, votes (event_uses
+/// x planes = their sum), keyframes, silent (keyframes per camera, sub-intervals), points, seconds
+/// (real time), cpu_seconds (processor time: once per run, for events, for keyframes),
+/// votes_per_second, refinement where poses were refined (registered keyframes, loops, the learnt
+/// errors of the tracker), kernel, threads, peak_memory_bytes (of this process), reference_view and
+/// baseline_m where known, perturbation (the faults of the poses, if any), options (all of them)
+/// and version.
 std::string reportJson(const MapReport& report);
 
 /// Votes (used events times planes) over the sweep's seconds; 0 without a sweep.

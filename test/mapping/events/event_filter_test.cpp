@@ -56,8 +56,8 @@ LongRecording recordingWithHotPixels(std::uint32_t seed) {
 
 void expectToAddUp(const MapperCounts& counts) {
   for (const EventCounts& c : counts.cameras) {
-    EXPECT_EQ(c.read,
-              c.used + c.without_pose + c.outside_window + c.dropped + c.filtered + c.outside_lens);
+    EXPECT_EQ(c.read, c.used + c.without_pose + c.outside_window + c.dropped + c.filtered +
+                          c.outside_lens + c.over_budget);
   }
 }
 

@@ -85,7 +85,7 @@ class Mapper : public FusionMapper {
     const MapperCounts all = counts();
     for (const EventCounts& c : all.cameras) {
       EXPECT_EQ(c.read, c.used + c.without_pose + c.outside_window + c.dropped + c.filtered +
-                            c.outside_lens);
+                            c.outside_lens + c.over_budget);
     }
     EXPECT_EQ(all.votes.total(), all.event_uses * kPlanes);
     return keyframes;

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "mapping/events/even_choice.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_recording.h"
 
@@ -113,6 +114,32 @@ TEST(KeyframeMapper, SingleCamerasMapsAreThoseOfARunWithThisCameraAlone) {
       EXPECT_TRUE(same(camera.map, alone.camera_maps.at(0).map));
     }
   }
+}
+
+TEST(KeyframeMapper, OverItsBudgetACameraGivesAnEvenChoiceOfItsEvents) {
+  const Recording recording(7, 2, 3000);
+  KeyframeMapperOptions options = fewPlanes();
+  options.event_images = true;
+  const KeyframeDepthMap all = map(recording, {0, 1}, options);
+  Recording chosen = recording;
+  for (std::vector<Event>& events : chosen.events) {
+    std::vector<Event> some;
+    const EvenChoice choice(events.size(), 1000);
+    for (std::size_t k = 0; k < choice.size(); ++k) some.push_back(events[choice[k]]);
+    events = some;
+  }
+  const KeyframeDepthMap expected = map(chosen, {0, 1}, options);
+  options.max_events_per_camera = 1000;
+  const KeyframeDepthMap limited = map(recording, {0, 1}, options);
+  EXPECT_TRUE(same(limited.map, expected.map));
+  EXPECT_THAT(limited.events, ElementsAre(1000, 1000));
+  EXPECT_EQ(limited.over_budget, 4000U);
+  EXPECT_TRUE(same(limited.event_images[0].counts, all.event_images[0].counts))
+      << "the picture shows all events";
+  options.max_events_per_camera = 3000;
+  const KeyframeDepthMap within = map(recording, {0, 1}, options);
+  EXPECT_TRUE(same(within.map, all.map));
+  EXPECT_EQ(within.over_budget, 0U);
 }
 
 TEST(KeyframeMapper, EventImagesCountEveryEventOfTheWindowWithAPoseOrWithout) {

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "mapping/events/even_choice.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/played_recording.h"
 
@@ -21,7 +22,7 @@ using test::same;
 
 /// One of each policy, windows that overlap and windows that leave gaps among them.
 std::vector<FusionMapperOptions> allPolicies() {
-  std::vector<FusionMapperOptions> all(6, playedOptions());
+  std::vector<FusionMapperOptions> all(7, playedOptions());
   all[0].policy.window_s = 0.11;
   all[0].policy.stride_s = 0.04;
   all[1].policy.window_s = 0.03;
@@ -40,6 +41,8 @@ std::vector<FusionMapperOptions> allPolicies() {
   all[5] = all[4];
   all[5].limits.t0_ns = LongRecording::kStart_ns + 123'456'789;
   all[5].limits.t1_ns = LongRecording::kStart_ns + 444'444'444;
+  all[6] = all[0];
+  all[6].keyframe.max_events_per_camera = 100;
   return all;
 }
 
@@ -71,6 +74,7 @@ std::size_t expectTheSameHoweverCut(const LongRecording& recording,
       EXPECT_EQ(a.outside_window, b.outside_window) << label;
       EXPECT_EQ(a.dropped, b.dropped) << label;
       EXPECT_EQ(a.filtered, b.filtered) << label;
+      EXPECT_EQ(a.over_budget, b.over_budget) << label;
     }
     EXPECT_EQ(cut_up.counts.keyframes_without_pose, whole.counts.keyframes_without_pose) << label;
     EXPECT_EQ(cut_up.counts.windows_without_events, whole.counts.windows_without_events) << label;
@@ -123,10 +127,37 @@ TEST(WindowPolicies, TheResultDoesNotDependOnThePacketsWithLateCamerasAndMissing
   EXPECT_GE(keyframes, 500U);
 }
 
+/// The keyframes whose windows contain an event, and those that chose it.
+struct Choices {
+  std::uint64_t windows = 0;
+  std::uint64_t chosen = 0;
+};
+
+/// Of each event of a camera.
+std::vector<Choices> choicesOf(const LongRecording& recording, std::size_t camera,
+                               const FusionMapperOptions& options,
+                               const std::vector<KeyframeDepthMap>& keyframes) {
+  const std::vector<Event>& events = recording.events[camera];
+  std::vector<Choices> choices(events.size());
+  for (const KeyframeDepthMap& keyframe : keyframes) {
+    std::vector<std::size_t> inside;
+    for (std::size_t i = 0; i < events.size(); ++i) {
+      const std::int64_t t_ns = recording.timeOf(camera, events[i]);
+      if (!keyframe.window.contains(t_ns) || !options.limits.contain(t_ns)) continue;
+      inside.push_back(i);
+      ++choices[i].windows;
+    }
+    const EvenChoice choice(inside.size(), options.keyframe.max_events_per_camera);
+    for (std::size_t k = 0; k < choice.size(); ++k) ++choices[inside[choice[k]]].chosen;
+  }
+  return choices;
+}
+
 TEST(WindowPolicies, EveryEventIsCountedOnce) {
   std::uint64_t used = 0;
   std::uint64_t without_pose = 0;
   std::uint64_t outside = 0;
+  std::uint64_t over_budget = 0;
   for (const FusionMapperOptions& options : allPolicies()) {
     for (std::uint32_t seed = 1; seed <= 3; ++seed) {
       const LongRecording recording(seed, 1.0);
@@ -135,13 +166,10 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
       std::uint64_t uses = 0;
       for (std::size_t c = 0; c < 3; ++c) {
         EventCounts expected;
-        for (const Event& event : recording.events[c]) {
-          const std::int64_t t_ns = recording.timeOf(c, event);
+        const std::vector<Choices> choices = choicesOf(recording, c, options, played.keyframes);
+        for (std::size_t i = 0; i < recording.events[c].size(); ++i) {
+          const std::int64_t t_ns = recording.timeOf(c, recording.events[c][i]);
           const bool has_pose = trajectory.poseAt(t_ns).has_value();
-          const auto windows = static_cast<std::uint64_t>(std::count_if(
-              played.keyframes.begin(), played.keyframes.end(), [&](const auto& keyframe) {
-                return t_ns >= keyframe.window.t0_ns && t_ns < keyframe.window.t1_ns;
-              }));
           ++expected.read;
           if (c == 2) {
             ++expected.dropped;
@@ -149,11 +177,13 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
             ++expected.outside_window;
           } else if (!has_pose) {
             ++expected.without_pose;
-          } else if (windows == 0) {
+          } else if (choices[i].windows == 0) {
             ++expected.outside_window;
+          } else if (choices[i].chosen == 0) {
+            ++expected.over_budget;
           } else {
             ++expected.used;
-            uses += windows;
+            uses += choices[i].chosen;
           }
         }
         const EventCounts& counts = played.counts.cameras[c];
@@ -162,8 +192,10 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
         EXPECT_EQ(counts.without_pose, expected.without_pose) << labelOf(options, seed);
         EXPECT_EQ(counts.outside_window, expected.outside_window) << labelOf(options, seed);
         EXPECT_EQ(counts.dropped, expected.dropped) << labelOf(options, seed);
+        EXPECT_EQ(counts.over_budget, expected.over_budget) << labelOf(options, seed);
         EXPECT_EQ(counts.read, counts.used + counts.without_pose + counts.outside_window +
-                                   counts.dropped + counts.filtered + counts.outside_lens);
+                                   counts.dropped + counts.filtered + counts.outside_lens +
+                                   counts.over_budget);
       }
       EXPECT_EQ(played.counts.event_uses, uses) << labelOf(options, seed);
       EXPECT_EQ(played.counts.votes.total(), uses * 4) << "of four planes";
@@ -171,9 +203,11 @@ TEST(WindowPolicies, EveryEventIsCountedOnce) {
       used += played.counts.total().used;
       without_pose += played.counts.total().without_pose;
       outside += played.counts.total().outside_window;
+      over_budget += played.counts.total().over_budget;
     }
   }
-  EXPECT_GT(std::min({used, without_pose, outside}), 1000U) << "there is some of everything";
+  EXPECT_GT(std::min({used, without_pose, outside, over_budget}), 1000U)
+      << "there is some of everything";
 }
 
 /// Times of all events of the selected cameras from the first one with a pose on, in order.

@@ -55,8 +55,8 @@ TEST_F(MapCommand, CountsOfTheReportAddUp) {
   EXPECT_EQ(events["read"], recording.totalEvents());
   const auto sum = [](const json& counts) {
     std::uint64_t total = 0;
-    for (const char* key :
-         {"used", "without_pose", "outside_window", "dropped", "filtered", "outside_lens"}) {
+    for (const char* key : {"used", "without_pose", "outside_window", "dropped", "filtered",
+                            "outside_lens", "over_budget"}) {
       total += counts[key].get<std::uint64_t>();
     }
     return total;

@@ -81,6 +81,8 @@ const FieldCase kFields[] = {
     EFM_ROW("keyframes.min_baseline_ratio=0.3", mapper.policy.min_baseline_ratio, 0.3),
     EFM_ROW("keyframes.min_visible_fraction=0.25", mapper.policy.min_visible_fraction, 0.25),
     EFM_ROW("keyframes.reference=end", mapper.policy.reference, ReferenceTime::kEnd),
+    EFM_ROW("keyframes.max_events_per_camera=4000000000", mapper.keyframe.max_events_per_camera,
+            4'000'000'000U),
     EFM_ROW("dsi.min_depth_m=1", mapper.keyframe.planes.min_depth_m, 1),
     EFM_ROW("dsi.max_depth_m=20", mapper.keyframe.planes.max_depth_m, 20),
     EFM_ROW("dsi.num_planes=64", mapper.keyframe.planes.num_planes, 64),

@@ -58,13 +58,14 @@ TEST(Report, EveryCountHasItsOwnKey) {
   MapReport report = smallReport();
   MapperCounts& counts = report.counts;
   counts.cameras.assign(1, {});
-  counts.cameras[0].read = 51;
+  counts.cameras[0].read = 69;
   counts.cameras[0].used = 11;
   counts.cameras[0].without_pose = 7;
   counts.cameras[0].outside_window = 8;
   counts.cameras[0].dropped = 9;
   counts.cameras[0].filtered = 10;
   counts.cameras[0].outside_lens = 6;
+  counts.cameras[0].over_budget = 18;
   counts.keyframes_without_pose = 12;
   counts.windows_without_events = 13;
   counts.silent_subintervals = 14;
@@ -72,8 +73,8 @@ TEST(Report, EveryCountHasItsOwnKey) {
   counts.duplicate_poses = 16;
   report.silent_keyframes = {0, 17};
   const json written = json::parse(reportJson(report));
-  const json events = {{"read", 51},   {"used", 11},     {"without_pose", 7}, {"outside_window", 8},
-                       {"dropped", 9}, {"filtered", 10}, {"outside_lens", 6}};
+  const json events = {{"read", 69},   {"used", 11},     {"without_pose", 7}, {"outside_window", 8},
+                       {"dropped", 9}, {"filtered", 10}, {"outside_lens", 6}, {"over_budget", 18}};
   EXPECT_EQ(written["events"]["cameras"], json::array({events}));
   const json votes = {{"cast", 1500}, {"outside_view", 400}, {"behind_camera", 100}};
   EXPECT_EQ(written["votes"], votes);

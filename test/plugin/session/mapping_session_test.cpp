@@ -18,7 +18,7 @@ void expectCountsAddUp(const SessionStatus& status, std::uint64_t events, int pl
   const EventCounts total = status.counts.total();
   EXPECT_EQ(total.read, events);
   EXPECT_EQ(total.read, total.used + total.without_pose + total.outside_window + total.dropped +
-                            total.filtered + total.outside_lens);
+                            total.filtered + total.outside_lens + total.over_budget);
   EXPECT_EQ(status.counts.votes.total(),
             status.counts.event_uses * static_cast<std::uint64_t>(planes));
 }
