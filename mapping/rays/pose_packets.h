@@ -17,7 +17,9 @@ namespace efm {
 struct PosePacketsOptions {
   /// The maximum error of a vote because its event shares a pose, in pixels of the reference view.
   /// 0 gives every event its own pose. Range: 0 to 10. The default keeps the L1 error of the DSI
-  /// near 2e-3 of its mass.
+  /// near 2e-3 of its mass. A larger value saves at most 3 % of a keyframe's processor time: on the
+  /// simulated scenes 0.25 has the same depth errors, but on the real slider the paper's extraction
+  /// has 23.5 instead of 22.7 % wrong points already with 0.05.
   double packet_error_px = 0.02;
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.

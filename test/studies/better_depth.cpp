@@ -2,6 +2,8 @@
 // Split fusion and aggregation compared with the paper, on scenes that were not used for tuning.
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -54,12 +56,25 @@ std::vector<Method> methodsFor(const Scene3d& scene) {
   return methods;
 }
 
+/// The thresholds of the default extraction.
+struct Thresholds {
+  double min_local_contrast = 0;
+  double min_quality = 0;
+  std::string name() const {
+    return formatNumber(min_local_contrast, 2) + ", " + formatNumber(min_quality, 2);
+  }
+};
+
+constexpr Thresholds kThresholds[] = {{0.10, 0.05}, {0.15, 0.10}, {0.15, 0.05},
+                                      {0.15, 0.03}, {0.20, 0.05}, {0.20, 0.03}};
+
 /// One case with all methods.
 struct CaseResult {
   std::string name;
   std::vector<DepthCurve> curves;  // of each method
   double points = 0;               // of the paper with its own threshold
   PointQuality as_shipped;
+  std::vector<PointQuality> by_thresholds;  // of `kThresholds`
 };
 
 CaseResult runCase(const StudyRun& run, const Case& what) {
@@ -79,6 +94,12 @@ CaseResult runCase(const StudyRun& run, const Case& what) {
   }
   result.points = qualityOf(recording, windows, methods.front(), judge).points;
   result.as_shipped = qualityOf(recording, windows, methods.back(), judge);
+  for (const Thresholds& thresholds : kThresholds) {
+    Method with = methods.back();
+    with.options.extraction.min_local_contrast = thresholds.min_local_contrast;
+    with.options.extraction.min_quality = thresholds.min_quality;
+    result.by_thresholds.push_back(qualityOf(recording, windows, with, judge));
+  }
   return result;
 }
 
@@ -127,6 +148,35 @@ TextTable asShipped(const std::vector<CaseResult>& results) {
                           percent(quality.beyond_10, 2), percent(quality.recall),
                           percent(quality.f1()), percent(best), percent(quality.within_sigma),
                           percent(quality.within_2_sigma)});
+  }
+  return table;
+}
+
+/// F1 and wrong points of each pair of thresholds.
+TextTable byThresholds(const std::vector<CaseResult>& results) {
+  TextTable table;
+  table.head = {"case"};
+  for (const Thresholds& thresholds : kThresholds) {
+    table.head.push_back(thresholds.name() + ": F1 [%]");
+    table.head.emplace_back("beyond 10 % [%]");
+  }
+  std::vector<double> sums(2 * std::size(kThresholds));
+  const auto cases = static_cast<double>(results.size());
+  for (const CaseResult& result : results) {
+    std::vector<std::string>& row = table.rows.emplace_back();
+    row.push_back(result.name);
+    for (std::size_t i = 0; i < result.by_thresholds.size(); ++i) {
+      const PointQuality& quality = result.by_thresholds[i];
+      row.push_back(percent(quality.f1()));
+      row.push_back(percent(quality.beyond_10, 2));
+      sums[2 * i] += quality.f1() / cases;
+      sums[2 * i + 1] += quality.beyond_10 / cases;
+    }
+  }
+  std::vector<std::string>& mean = table.rows.emplace_back();
+  mean.emplace_back("mean");
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    mean.push_back(percent(sums[i], i % 2 == 0 ? 1 : 2));
   }
   return table;
 }
@@ -239,6 +289,17 @@ void studyBetterDepth(const StudyRun& run, StudySection& section) {
       "All cases have the same thresholds. *best F1*: with the best of ten thresholds for each "
       "case. The last columns are of points within five plane steps of the truth.");
   section.table(asShipped(results));
+  section.heading("Choice of the default thresholds");
+  section.text(
+      "By F1 over all presets (seed 1) and the real slider. Here is seed 7: `min_local_contrast`, "
+      "`min_quality`. A lower `min_quality` adds points and does not change the depth of the "
+      "others. Below 0.05, F1 grows little, and wrong points grow fast. `min_local_contrast` "
+      "selects the neighbours, too. With 0.10, wrong points multiply where events are dense "
+      "(hd_stereo, trinocular). With 0.20 the mean F1 is higher. But at equal numbers of points "
+      "there are more wrong points on poles_stereo and on the real slider (1.3 to 1.8 times), and "
+      "the median error of room_stereo is a tenth larger. So it stays at 0.15. For three cameras "
+      "and for HD, 0.20 and 0.03 are better.");
+  section.table(byThresholds(results));
   judgeAll(results, section);
   section.text(
       "A second pass was tried and removed. It divided the vote of each event along its ray, in "

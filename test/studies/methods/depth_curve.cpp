@@ -13,8 +13,9 @@
 namespace efm::studies {
 namespace {
 
-constexpr double kWrong = 0.1;       ///< Relative depth error of a wrong point.
-constexpr double kInlierPlanes = 5;  ///< Variances are judged for points within this distance.
+constexpr double kFewerCandidates = 0.1;  ///< Thresholds below it relax the local contrast, too.
+constexpr double kWrong = 0.1;            ///< Relative depth error of a wrong point.
+constexpr double kInlierPlanes = 5;       ///< Variances are judged for points within this distance.
 
 /// Counters over all keyframes.
 struct Tally {
@@ -49,7 +50,7 @@ DepthExtractionOptions withThreshold(DepthExtractionOptions extraction, double t
     extraction.threshold_c = threshold;
   } else {
     // More points need more candidates.
-    extraction.min_local_contrast *= std::clamp(threshold / extraction.min_quality, 0.3, 1.0);
+    extraction.min_local_contrast *= std::clamp(threshold / kFewerCandidates, 0.3, 1.0);
     extraction.min_quality = threshold;
   }
   return extraction;
