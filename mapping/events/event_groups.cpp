@@ -24,6 +24,7 @@ EventSpan EventPart::select(std::vector<Event>& buffer) const {
                     [this](const Event& event) { return event.polarity == *polarity; }));
   // Without a branch, which random polarities make unpredictable: an event of the other polarity is
   // overwritten by the next one.
+  buffer.reserve(all.size() + 1);  // takes no memory before it is written
   if (buffer.size() < count + 1) buffer.resize(count + 1);
   std::size_t size = 0;
   for (const Event& event : all) {
