@@ -48,6 +48,7 @@ struct TileMemory {
   alignas(64) float dx[kMaxRays + kRayPadding] = {};
   alignas(64) float dy[kMaxRays + kRayPadding] = {};
   alignas(64) std::uint64_t cells[kTileCells * (kTileCells + 2)] = {};
+  alignas(64) std::uint8_t dirty[2][kLines] = {};
   alignas(64) std::uint64_t others[kTileCells * (kTileCells + 2)] = {};
   FullCell full[kMaxRays / kVotesPerCell + 1];
   float density[kTilePixels * kTilePixels + kRayPadding] = {};
@@ -138,12 +139,12 @@ class TileTest {
   }
 
   /// @return the number of full cells.
-  std::size_t voteAll(float to_plane) {
+  std::size_t voteAll(float to_plane, std::uint8_t* marks = nullptr) {
     for (std::size_t i = size_; i < size_ + kRayPadding; ++i) {  // left of and above every cell
       memory_->x[i] = memory_->y[i] = -1;
       memory_->dx[i] = memory_->dy[i] = 0;
     }
-    const CellWindow window{memory_->cells, 0, 0, 0, kTileCells, kTileCells};
+    const CellWindow window{{memory_->cells, marks}, 0, 0, 0, kTileCells, kTileCells};
     return static_cast<std::size_t>(scatter_.vote(rays(), to_plane, window, memory_->full) -
                                     memory_->full);
   }
@@ -224,6 +225,7 @@ class TileTest {
 
   /// Two inputs at once give the bits of each alone and of the plain mean.
   void resolvePairs(float to_plane) {
+    if (to_plane > 0) size_ = std::min<std::size_t>(size_, 200);  // few votes, which are marked
     const FusionFunctions& plain = fusionFunctions();
     const struct {
       ResolveFunctions::AddPair add;
@@ -242,12 +244,15 @@ class TileTest {
       voteAll(to_plane);
       expected[1] = resolve_.all(memory_->cells, kTilePixels, kTilePixels, second.data());
       steps.pair(first.data(), second.data(), kPixels);
-      voteAll(0);
+      std::uint8_t* marks[2] = {to_plane > 0 ? memory_->dirty[0] : nullptr,
+                                to_plane > 0 ? memory_->dirty[1] : nullptr};
+      voteAll(0, marks[0]);
       std::copy(std::begin(memory_->cells), std::end(memory_->cells), memory_->others);
       std::fill(std::begin(memory_->cells), std::end(memory_->cells), 0);
-      voteAll(to_plane);
+      voteAll(to_plane, marks[1]);
       std::fill(std::begin(memory_->sum), std::end(memory_->sum), 1.0F);
-      add(memory_->others, memory_->cells, kTilePixels, kTilePixels, memory_->sum, votes);
+      add({memory_->others, marks[0]}, {memory_->cells, marks[1]}, kTilePixels, kTilePixels,
+          memory_->sum, votes);
       requireEmptyCells();
       require(std::equal(votes, votes + 2, expected), "resolve: the votes of two inputs");
       for (std::size_t i = 0; i < kPixels; ++i) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <limits>
 #include <numeric>
 
@@ -203,9 +204,10 @@ struct Geometric {
   static HWY_INLINE FloatV mean(FloatV a, FloatV b) { return hn::Mul(hn::Sqrt(a), hn::Sqrt(b)); }
 };
 
+/// All pixels, by rows.
 template <class Rule>
-void addPair(std::uint64_t* first, std::uint64_t* second, int width, int height, float* sum,
-             std::uint64_t votes[2]) {
+void addAll(std::uint64_t* first, std::uint64_t* second, int width, int height, float* sum,
+            std::uint64_t votes[2]) {
   const Floats d;
   const Unsigned du;
   const float* end = sum + static_cast<std::ptrdiff_t>(width) * height;
@@ -224,6 +226,90 @@ void addPair(std::uint64_t* first, std::uint64_t* second, int width, int height,
   }
   votes[0] += first_rows.votes();
   votes[1] += second_rows.votes();
+}
+
+/// For each line of a row of pixels a byte, not zero where one of their cells may have votes: cells
+/// of the rows above and below, of the line and of the next one.
+HWY_INLINE std::uint64_t linesWithVotes(const std::uint8_t* dirty, int row) {
+  constexpr int kLinesInRow = kTileCells / kLineCells;
+  std::uint64_t rows[2];
+  static_assert(kLinesInRow == sizeof(rows[0]));
+  std::memcpy(rows, dirty + static_cast<std::ptrdiff_t>(row) * kLinesInRow, sizeof(rows));
+  const std::uint64_t lines = rows[0] | rows[1];
+  return lines | lines >> 8;  // lowest bits first, on all processors that there are kernels for
+}
+
+/// Clears the marked lines and their marks. @return the votes of the cells whose upper left pixel
+/// lies in the tile.
+std::uint64_t clearMarked(const CellBuffer& buffer, int height) {
+  constexpr int kLinesInRow = kTileCells / kLineCells;
+  const Cells d;
+  auto votes = hn::Zero(d);
+  std::uint64_t of_border = 0;  // the first row and the first column of cells
+  for (int row = 0; row <= height; ++row) {
+    std::uint8_t* dirty = buffer.dirty + static_cast<std::ptrdiff_t>(row) * kLinesInRow;
+    std::uint64_t* cells = buffer.cells + static_cast<std::ptrdiff_t>(row) * kTileCells;
+    std::uint64_t marks = 0;
+    std::memcpy(&marks, dirty, sizeof(marks));
+    if (marks == 0) continue;
+    for (int x = 0; x < (row == 0 ? kTileCells : 1); ++x)
+      of_border += cells[x] >> (32 + kCountShift);
+    for (int line = 0; line < kLinesInRow; ++line) {
+      if (dirty[line] == 0) continue;
+      for (int x = kLineCells * line; x < kLineCells * (line + 1);
+           x += static_cast<int>(hn::Lanes(d))) {
+        votes = hn::Add(votes, hn::ShiftRight<32 + kCountShift>(hn::Load(d, cells + x)));
+        hn::Store(hn::Zero(d), d, cells + x);
+      }
+    }
+  }
+  std::fill_n(buffer.dirty, kLines, std::uint8_t{0});
+  return sumOfLanes(d, votes) - of_border;
+}
+
+/// The densities of pixels from x on, from the cells of both rows.
+HWY_INLINE FloatV densitiesAt(const std::uint64_t* cells, int row, int x) {
+  const std::uint64_t* above = cells + static_cast<std::ptrdiff_t>(row) * kTileCells + x;
+  const RowOfCells below(above + kTileCells);
+  return densityOf(RowOfCells(above).toBelow(), below.toAbove(below.toBelow()));
+}
+
+/// Pixels in lines where both have votes.
+template <class Rule>
+int addMarked(const CellBuffer& first, const CellBuffer& second, int width, int height, float* sum,
+              std::uint64_t votes[2]) {
+  const Floats d;
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(d));
+  constexpr int kLinesOfVector = (kLanes + kLineCells - 1) / kLineCells;
+  const float* end = sum + static_cast<std::ptrdiff_t>(width) * height;
+  int pixels = 0;
+  for (int row = 0; row < height; ++row, sum += width) {
+    // The mean is zero where one of the two is.
+    const std::uint64_t lines =
+        linesWithVotes(first.dirty, row) & linesWithVotes(second.dirty, row);
+    if (lines == 0) continue;
+    for (int x = 0; x < width; x += kLanes) {
+      const std::uint64_t of_vector = lines >> (8 * (x / kLineCells));
+      if ((of_vector & ((std::uint64_t{1} << (8 * kLinesOfVector)) - 1)) == 0) continue;
+      const FloatV mean =
+          Rule::mean(densitiesAt(first.cells, row, x), densitiesAt(second.cells, row, x));
+      const auto within = hn::FirstN(d, static_cast<std::size_t>(width - x));
+      const FloatV added = hn::IfThenElseZero(within, mean);
+      storeBefore(end, hn::Add(hn::LoadU(d, sum + x), added), sum + x);
+      pixels += std::min(kLanes, width - x);
+    }
+  }
+  votes[0] += clearMarked(first, height);
+  votes[1] += clearMarked(second, height);
+  return pixels;
+}
+
+template <class Rule>
+int addPair(const CellBuffer& first, const CellBuffer& second, int width, int height, float* sum,
+            std::uint64_t votes[2]) {
+  if (first.dirty != nullptr) return addMarked<Rule>(first, second, width, height, sum, votes);
+  addAll<Rule>(first.cells, second.cells, width, height, sum, votes);
+  return width * height;
 }
 
 constexpr ResolveFunctions kResolve = {resolveAll, addPair<Min>, addPair<Harmonic>,

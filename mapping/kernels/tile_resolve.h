@@ -20,10 +20,12 @@ struct ResolveFunctions {
   /// @return the votes of the cells whose upper left pixel lies in the tile.
   std::uint64_t (*all)(std::uint64_t* cells, int width, int height, float* values) = nullptr;
 
-  /// Adds the mean of two inputs' densities to a sum, without densities in memory.
+  /// Adds the mean of two inputs' densities to a sum, without densities in memory. Where votes are
+  /// marked, in both inputs, lines without votes are skipped; bits are the same. No mark is left.
   /// @param sum as `values` above, with padding. @param votes receives those of each input, added.
-  using AddPair = void (*)(std::uint64_t* first, std::uint64_t* second, int width, int height,
-                           float* sum, std::uint64_t votes[2]);
+  /// @return the number of pixels that were not skipped.
+  using AddPair = int (*)(const CellBuffer& first, const CellBuffer& second, int width, int height,
+                          float* sum, std::uint64_t votes[2]);
   AddPair addMin = nullptr;
   AddPair addHarmonic = nullptr;
   AddPair addGeometric = nullptr;

@@ -170,8 +170,11 @@ class VoteEncoder {
 };
 
 /// Adds a batch's votes to their cells.
-HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, std::uint64_t* cells,
+template <bool kMarks>
+HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const CellBuffer& tile,
                              FullCell* full) {
+  std::uint64_t* const cells = tile.cells;
+  std::uint8_t* const dirty = tile.dirty;
   constexpr std::size_t kLanes = hn::MaxLanes(Floats());
   for (std::size_t i = 0; i < count; i += kLanes) {
 #pragma GCC unroll 16
@@ -180,6 +183,7 @@ HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, std::uin
       const std::uint32_t index = batch.index[vote];
       const std::uint64_t sums = batch.sums[i + k] + cells[index];
       cells[index] = sums;
+      if (kMarks) dirty[index / kLineCells] = 1;
       if (HWY_UNLIKELY(static_cast<std::int64_t>(sums) < 0)) {
         *full++ = {index, sums};
         cells[index] = 0;
@@ -189,7 +193,8 @@ HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, std::uin
   return full;
 }
 
-FullCell* vote(const MovingRays& rays, float to_plane, const CellWindow& window, FullCell* full) {
+template <bool kMarks>
+FullCell* voteBy(const MovingRays& rays, float to_plane, const CellWindow& window, FullCell* full) {
   VoteBatch batch;
   const VoteEncoder encoder(rays, to_plane, window);
   const std::size_t lanes = hn::Lanes(Floats());
@@ -200,9 +205,14 @@ FullCell* vote(const MovingRays& rays, float to_plane, const CellWindow& window,
     for (std::size_t i = 0; i < size; i += lanes) {
       encoder.encode(begin + i, batch.index + i, batch.sums + i);
     }
-    full = scatter(batch, size, window.cells, full);
+    full = scatter<kMarks>(batch, size, window.tile, full);
   }
   return full;
+}
+
+FullCell* vote(const MovingRays& rays, float to_plane, const CellWindow& window, FullCell* full) {
+  return (window.tile.dirty == nullptr ? voteBy<false> : voteBy<true>)(rays, to_plane, window,
+                                                                       full);
 }
 
 constexpr TileFunctions kTile = {gather, vote};

@@ -79,9 +79,20 @@ struct MovingRays {
   std::size_t size = 0;
 };
 
+/// A line is eight cells of a row.
+inline constexpr int kLineCells = 8;
+inline constexpr int kLines = kTileCells * (kTileCells + 2) / kLineCells;
+
+/// A tile's cells in rows of kTileCells, with two rows more than votes need.
+struct CellBuffer {
+  std::uint64_t* cells = nullptr;
+  /// Of kLines lines: 1 where a line may have votes, else 0. Null: votes are not marked.
+  std::uint8_t* dirty = nullptr;
+};
+
 /// The cells of a tile that votes may fall into.
 struct CellWindow {
-  std::uint64_t* cells = nullptr;  ///< The tile's, in rows of kTileCells.
+  CellBuffer tile;
   std::uint32_t first = 0;         ///< Index of the window's first cell in the tile.
   std::int32_t left = 0, top = 0;  ///< Its position from the rays' origin.
   std::uint32_t columns = 0, rows = 0;

@@ -18,22 +18,24 @@ TileAccumulator::TileAccumulator(VotingKernel kernel)
       resolve_(kernels::resolveFunctions(kernel)),
       // Vectors read past the last row. A ray outside the view adds zero to a cell up to a tile
       // from the first cell inside.
-      cells_(static_cast<std::size_t>((kStride + 2) * kStride), 0) {}
+      cells_(static_cast<std::size_t>((kStride + 2) * kStride), 0),
+      dirty_(kernels::kLines, 0) {}
 
 void TileAccumulator::moveTo(const TileCells& tile) {
   assert(!pending_);
   tile_ = tile;
 }
 
-void TileAccumulator::vote(TileRays& rays, double from_first) {
+void TileAccumulator::vote(TileRays& rays, double from_first, bool marks) {
   assert(!pending_);
   pending_ = true;
+  marked_ = marks;
   full_cells_ = 0;
   if (rays.size() > 0 && !tile_.in_view.empty()) {
     full_.resize(std::max(full_.size(), rays.size() / kernels::kVotesPerCell + 1));
     const cv::Point first = tile_.in_view.tl() - tile_.all.tl();
     const cv::Point corner = tile_.in_view.tl() - tile_.origin;
-    const kernels::CellWindow window{cells_.data(),
+    const kernels::CellWindow window{buffer(),
                                      static_cast<std::uint32_t>(first.y * kStride + first.x),
                                      corner.x,
                                      corner.y,
@@ -80,18 +82,18 @@ std::uint64_t TileAccumulator::addFullCells(float* density) const {
   return votes;
 }
 
-void TileAccumulator::addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second,
-                              float* sum, std::uint64_t votes[2]) {
+int TileAccumulator::addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second,
+                             float* sum, std::uint64_t votes[2]) {
   const cv::Rect& tile = first.tile_.tile;
-  assert(first.pending_ && second.pending_ && tile == second.tile_.tile);
+  assert(first.pending_ && second.pending_ && first.marked_ == second.marked_ &&
+         tile == second.tile_.tile);
   if (first.full_cells_ + second.full_cells_ == 0) {
     first.pending_ = second.pending_ = false;
     const kernels::ResolveFunctions& resolve = first.resolve_;
     const auto add_pair = rule == FusionRule::kMin        ? resolve.addMin
                           : rule == FusionRule::kHarmonic ? resolve.addHarmonic
                                                           : resolve.addGeometric;
-    add_pair(first.cells_.data(), second.cells_.data(), tile.width, tile.height, sum, votes);
-    return;
+    return add_pair(first.buffer(), second.buffer(), tile.width, tile.height, sum, votes);
   }
   const auto pixels = static_cast<std::size_t>(tile.area());
   for (TileAccumulator* input : {&first, &second}) {
@@ -100,6 +102,7 @@ void TileAccumulator::addPair(FusionRule rule, TileAccumulator& first, TileAccum
   }
   stepsOf(rule).pair(first.density_.data(), second.density_.data(), pixels);
   for (std::size_t i = 0; i < pixels; ++i) sum[i] += first.density_[i];
+  return tile.area();
 }
 
 }  // namespace efm

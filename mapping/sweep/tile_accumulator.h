@@ -28,7 +28,9 @@ class TileAccumulator {
 
   /// Votes with the tile's rays on one plane.
   /// @param rays padded. @param from_first from the plane of the rays' pixels to this one, 1/m.
-  void vote(TileRays& rays, double from_first);
+  /// @param marks whether lines of cells with votes are marked, for `addPair`: it pays where few
+  /// cells have votes. Both inputs must be alike.
+  void vote(TileRays& rays, double from_first, bool marks = false);
   /// Resolves all pixels; no vote is left.
   /// @param density one value per pixel of the tile, row-major.
   /// @return the votes of the cells whose upper left pixel lies in the tile. Their sum over all
@@ -39,19 +41,22 @@ class TileAccumulator {
   /// `resolve` and the rule's mean.
   /// @param rule AND-like. @param sum as `density`, and kernels::kSumPadding. @param votes receives
   /// the votes of each input, added.
-  static void addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second, float* sum,
-                      std::uint64_t votes[2]);
+  static int addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second, float* sum,
+                     std::uint64_t votes[2]);
 
  private:
+  kernels::CellBuffer buffer() { return {cells_.data(), marked_ ? dirty_.data() : nullptr}; }
   std::uint64_t addFullCells(float* density) const;
 
   const kernels::TileFunctions& scatter_;
   const kernels::ResolveFunctions& resolve_;
   PixelValues<std::uint64_t> cells_;
+  PixelValues<std::uint8_t> dirty_;
   std::vector<kernels::FullCell> full_;
   std::size_t full_cells_ = 0;
   PlaneValues density_;   // of a pair with full cells
   bool pending_ = false;  // votes that are not resolved
+  bool marked_ = false;   // whether they are marked
   TileCells tile_;
 };
 

@@ -5,6 +5,15 @@
 
 namespace efm {
 
+namespace {
+
+/// Marks of lines with votes pay where few lines have them: with at most this number of rays per
+/// pixel in one of two inputs, as long as this fraction of pixels at most is not skipped.
+constexpr double kMaxMarkedRays = 1;
+constexpr double kMaxMarkedPixels = 0.5;
+
+}  // namespace
+
 TileFusion::TileFusion(const FusionOptions& options, const FusionInputs& inputs,
                        PlaneFusion::Keep keep, VotingKernel kernel)
     : options_(options),
@@ -24,6 +33,7 @@ void TileFusion::moveTo(const TileCells& tile) {
     planes_.emplace(options_, inputs_, pixels, keep_);
     return;
   }
+  skips_.assign(static_cast<std::size_t>(inputs_.slots_per_group * inputs_.groups), true);
   for (PlaneValues* sum : {&sum_, &group_sum_}) {
     sum->reserve(pixels + kernels::kSumPadding);
     sum->resize(pixels);
@@ -52,10 +62,16 @@ const PlaneValues& TileFusion::fusePairs(std::vector<TileRays>& rays, double fro
     PlaneValues& sum = slots_per_group == 1 ? sum_ : group_sum_;
     if (slots_per_group > 1) std::fill(sum.begin(), sum.end(), 0.0F);
     for (std::size_t slot = begin; slot < begin + slots_per_group; ++slot) {
-      accumulators_[0].vote(rays[slot], from_first);
-      accumulators_[1].vote(rays[slots + slot], from_first);
-      TileAccumulator::addPair(options_.across_cameras, accumulators_[0], accumulators_[1],
-                               sum.data(), votes_.data());
+      TileRays& first = rays[slot];
+      TileRays& second = rays[slots + slot];
+      const auto fewer = static_cast<double>(std::min(first.size(), second.size()));
+      const auto pixels = static_cast<double>(sum.size());
+      const bool marks = skips_[slot] && fewer <= kMaxMarkedRays * pixels;
+      accumulators_[0].vote(first, from_first, marks);
+      accumulators_[1].vote(second, from_first, marks);
+      const int resolved = TileAccumulator::addPair(options_.across_cameras, accumulators_[0],
+                                                    accumulators_[1], sum.data(), votes_.data());
+      if (marks) skips_[slot] = resolved <= kMaxMarkedPixels * pixels;
     }
     if (slots_per_group == 1) continue;
     const auto count = static_cast<float>(slots_per_group);

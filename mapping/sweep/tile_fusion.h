@@ -42,6 +42,7 @@ class TileFusion {
   std::array<TileAccumulator, 2> accumulators_;
   std::optional<PlaneFusion> planes_;
   PlaneValues sum_, group_sum_;  // of the shortcut
+  std::vector<bool> skips_;      // by slot: whether marks made it skip many pixels of this tile
   std::vector<std::uint64_t> votes_;
 };
 
