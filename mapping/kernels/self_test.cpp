@@ -105,6 +105,7 @@ class TileTest {
     GatherRequest request;
     request.to_first = -0.25F;
     request.to_last = 0.75F;
+    request.to_pixels = 0.5F;
     request.right = request.bottom = kTileCells;
     std::vector<BinnedRay> bin(kRays + kRayPadding);
     std::vector<std::size_t> near;
@@ -125,8 +126,8 @@ class TileTest {
     size_ = std::min(size_, near.size());
     for (std::size_t i = 0; i < size_; ++i) {
       const BinnedRay& ray = bin[near[i]];
-      require(memory_->x[i] == (ray.x + request.to_first * ray.dx) * kUnit &&
-                  memory_->y[i] == (ray.y + request.to_first * ray.dy) * kUnit &&
+      require(memory_->x[i] == (ray.x + request.to_pixels * ray.dx) * kUnit &&
+                  memory_->y[i] == (ray.y + request.to_pixels * ray.dy) * kUnit &&
                   memory_->dx[i] == ray.dx * kUnit && memory_->dy[i] == ray.dy * kUnit,
               "gather: the rays near a tile");
     }

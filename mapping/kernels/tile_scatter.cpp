@@ -64,8 +64,10 @@ std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest&
     const auto append = [&](FloatV values, float* to) {
       hn::StoreU(hn::Compress(values, near), d, to + size);
     };
-    append(hn::Mul(hn::Sub(x0, set(request.origin_x)), scale), rays.x);
-    append(hn::Mul(hn::Sub(y0, set(request.origin_y)), scale), rays.y);
+    const FloatV pixel_x = hn::MulAdd(set(request.to_pixels), dx, x);
+    const FloatV pixel_y = hn::MulAdd(set(request.to_pixels), dy, y);
+    append(hn::Mul(hn::Sub(pixel_x, set(request.origin_x)), scale), rays.x);
+    append(hn::Mul(hn::Sub(pixel_y, set(request.origin_y)), scale), rays.y);
     append(hn::Mul(dx, shift_scale), rays.dx);
     append(hn::Mul(dy, shift_scale), rays.dy);
     size += hn::CountTrue(d, near);

@@ -63,14 +63,15 @@ struct BinnedRay {
 /// The rays of bins that a tile needs.
 struct GatherRequest {
   float to_first = 0, to_last = 0;  ///< From the anchor plane to the group's first and last, 1/m.
-  float moving = 1;                 ///< 1; or 0 on a single plane, where rays stand still.
+  float to_pixels = 0;  ///< From the anchor plane to the plane of the gathered pixels, 1/m.
+  float moving = 1;     ///< 1; or 0 on a single plane, where rays stand still.
   float left = 0, right = 0, top = 0, bottom = 0;  ///< The tile's cells, pixels.
   float origin_x = 0, origin_y = 0;                ///< Of the gathered coordinates, pixels.
 };
 
-/// Rays that a tile may see in a group of planes, as four arrays: their pixels on the group's first
-/// plane and their shifts per inverse depth, in 1/4096 px. Neither depends on the tile, so a ray's
-/// vote has the same bits in every one.
+/// Rays that a tile may see in a group of planes, as four arrays: their pixels on one plane and
+/// their shifts per inverse depth, in 1/4096 px. Neither depends on the group or the tile, so a
+/// ray's vote has the same bits in every one.
 struct MovingRays {
   float* x = nullptr;
   float* y = nullptr;

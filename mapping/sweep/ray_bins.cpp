@@ -109,7 +109,8 @@ std::vector<RayBins> RayBins::sort(const RayBundle& rays, const DsiGrid& grid) {
   const Directions directions(rays);
   std::vector<RayBins> all;
   for (const auto& [key, packets] : in_front) {
-    const auto& [forward, begin, end] = key;
+    const int begin = std::get<1>(key);
+    const int end = std::get<2>(key);
     const PlaneRange planes(grid.planes, begin, end);
     for (auto packet = packets.begin(); packet != packets.end();) {
       const auto first = packet;
@@ -121,16 +122,17 @@ std::vector<RayBins> RayBins::sort(const RayBundle& rays, const DsiGrid& grid) {
         ++packet;
       } while (packet != packets.end() &&
                (static_cast<double>(count) < min_rays || spread.pixels() <= kBin_px));
-      all.push_back(RayBins(planes, forward, {first, packet}, grid.view, directions));
+      all.push_back(RayBins(planes, {first, packet}, grid, directions));
     }
   }
   tbb::parallel_for_each(all, [&rays](RayBins& bins) { bins.store(rays); });
   return all;
 }
 
-RayBins::RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> packets,
-                 const ReferenceView& view, const Directions& directions)
-    : planes_(planes), forward_(forward), packets_(std::move(packets)), view_(view) {
+RayBins::RayBins(const PlaneRange& planes, std::vector<RayPacket> packets, const DsiGrid& grid,
+                 const Directions& directions)
+    : planes_(planes), packets_(std::move(packets)), view_(grid.view) {
+  const ReferenceView& view = view_;
   double scale_first = 0;
   double scale_last = 0;
   std::size_t count = 0;
@@ -141,6 +143,7 @@ RayBins::RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> 
   }
   anchor_ = scale_first <= scale_last ? planes.first : planes.last;
   other_ = scale_first <= scale_last ? planes.last : planes.first;
+  to_pixels_ = pixelPlane(grid.planes) - anchor_;
   columns_ = axisOf(1, view.width, view.cx, directions.x, count);
   rows_ = axisOf(2, view.height, view.cy, directions.y, count);
 }
@@ -229,9 +232,11 @@ void RayBins::store(const RayBundle& bundle) {
   using kernels::BinnedRay;
   const std::size_t columns = columns_.bins();
   begin_.assign(rows_.bins() * columns + 1, 0);
+  float max_shift = 0;
   forEachRay(bundle,
              [&](const BinnedRay& ray, std::size_t column, std::size_t row, float x, float y) {
                ++begin_[row * columns + column + 1];
+               max_shift = std::max({max_shift, std::abs(ray.dx), std::abs(ray.dy)});
                columns_.on_anchor[column].extend(ray.x);
                columns_.on_other[column].extend(x);
                rows_.on_anchor[row].extend(ray.y);
@@ -244,6 +249,8 @@ void RayBins::store(const RayBundle& bundle) {
     rays_[next[row * columns + column]++] = ray;
   });
   packets_ = {};
+  constexpr double kMaxDistance_px = 8192;  // floats have 1/2048 px there
+  moving_ = double{max_shift} * std::abs(to_pixels_) <= kMaxDistance_px;
 }
 
 RayBins::Footprint RayBins::footprintOn(const PlaneRange& planes) const {
@@ -286,14 +293,15 @@ std::pair<std::size_t, std::size_t> RayBins::Footprint::Side::binsIn(float min, 
 }
 
 void RayBins::gather(const Footprint& footprint, const TileCells& tile,
-                     const kernels::TileFunctions& functions, bool moving, TileRays& rays) const {
+                     const kernels::TileFunctions& functions, TileRays& rays) const {
   constexpr double kRounding_px = 0.01;
   const cv::Rect& cells = tile.in_view;
   const auto narrow = [](double value) { return static_cast<float>(value); };
   kernels::GatherRequest request;
   request.to_first = narrow(footprint.planes_.first - anchor_);
   request.to_last = narrow(footprint.planes_.last - anchor_);
-  request.moving = moving ? 1.0F : 0.0F;
+  request.to_pixels = moving_ ? narrow(to_pixels_) : request.to_first;
+  request.moving = moving_ ? 1.0F : 0.0F;
   request.left = narrow(cells.x - kRounding_px);
   request.right = narrow(cells.x + cells.width + kRounding_px);
   request.top = narrow(cells.y - kRounding_px);

@@ -43,9 +43,13 @@ class RayBins {
   /// left out. Runs on the threads of the task arena that it is called in.
   static std::vector<RayBins> sort(const RayBundle& rays, const DsiGrid& grid);
 
-  /// Whether the rays are in front of their cameras on all planes of a group, and forward.
+  /// The plane where moving rays have their pixels, 1/m: in the middle of all planes.
+  static double pixelPlane(const DepthPlanes& planes) {
+    return 0.5 * (1 / planes.depth(0) + 1 / planes.depth(planes.size() - 1));
+  }
+  /// Whether the rays are in front of their cameras on all planes of a group, and can move over it.
   bool covers(const PlaneRange& group) const {
-    return forward_ && planes_.begin <= group.begin && planes_.end >= group.end;
+    return moving_ && planes_.begin <= group.begin && planes_.end >= group.end;
   }
   bool isInFront(int plane) const { return planes_.begin <= plane && plane < planes_.end; }
 
@@ -70,9 +74,10 @@ class RayBins {
   /// @param planes in front of the rays' cameras.
   Footprint footprintOn(const PlaneRange& planes) const;
   /// Appends the rays that may fall into the tile's cells on planes of the footprint. Thread-safe.
-  /// @param moving whether the rays cross several planes; else they stand still on one.
+  /// Rays so oblique that floats could not tell where they are from one plane on another stand
+  /// still: they need a footprint on a single plane.
   void gather(const Footprint& footprint, const TileCells& tile,
-              const kernels::TileFunctions& functions, bool moving, TileRays& rays) const;
+              const kernels::TileFunctions& functions, TileRays& rays) const;
 
  private:
   struct Range {
@@ -112,8 +117,8 @@ class RayBins {
     Range x, y;
   };
 
-  RayBins(const PlaneRange& planes, bool forward, std::vector<RayPacket> packets,
-          const ReferenceView& view, const Directions& directions);
+  RayBins(const PlaneRange& planes, std::vector<RayPacket> packets, const DsiGrid& grid,
+          const Directions& directions);
   Transfer toOther(const RayPacket& packet, Eigen::Index axis, double principal) const;
   Axis axisOf(Eigen::Index axis, int pixels, double principal, const Range& at_infinity,
               std::size_t rays) const;
@@ -123,12 +128,13 @@ class RayBins {
   void store(const RayBundle& bundle);
 
   PlaneRange planes_;  // in front of the cameras
-  bool forward_;
+  bool moving_ = true;
   std::vector<RayPacket> packets_;
   ReferenceView view_;
   double anchor_ =
       0;  // inverse depth: of the two ends of the planes, where rays are closer together
-  double other_ = 0;  // of the other end
+  double other_ = 0;      // of the other end
+  double to_pixels_ = 0;  // from the anchor to the plane of pixels
   Axis columns_;
   Axis rows_;
   std::vector<std::uint32_t> begin_;  // of each bin's rays, row by row, and the end of all

@@ -114,7 +114,7 @@ void RayIndex::gather(std::size_t group, std::size_t input, const TileCells& til
   rays.clear();
   const Input& of = inputs_[input];
   for (const Source& source : of.groups[group].in_group) {
-    of.bins[source.bins].gather(source.footprint, tile, functions_, true, rays);
+    of.bins[source.bins].gather(source.footprint, tile, functions_, rays);
   }
   rays.keep();
   rays.pad();
@@ -127,7 +127,7 @@ void RayIndex::gatherOn(int plane, std::size_t group, std::size_t input, const T
   if (on_plane.empty()) return;
   rays.clearToKept();
   for (const Source& source : on_plane[static_cast<std::size_t>(plane - groups_[group].begin)]) {
-    of.bins[source.bins].gather(source.footprint, tile, functions_, false, rays);
+    of.bins[source.bins].gather(source.footprint, tile, functions_, rays);
   }
   rays.pad();
 }

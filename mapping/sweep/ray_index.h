@@ -34,9 +34,9 @@ class RayIndex {
   /// those of another plane. Thread-safe.
   void gatherOn(int plane, std::size_t group, std::size_t input, const TileCells& tile,
                 TileRays& rays) const;
-  /// From the first plane of a group, where gathered rays have their pixels, to a plane, 1/m.
-  double fromFirst(std::size_t group, int plane) const {
-    return 1 / planes_.depth(plane) - groups_[group].first;
+  /// From the plane where moving rays have their pixels to a plane, 1/m.
+  double fromPixels(int plane) const {
+    return 1 / planes_.depth(plane) - RayBins::pixelPlane(planes_);
   }
 
   /// Frees the rays; the counts stay.

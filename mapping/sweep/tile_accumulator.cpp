@@ -26,7 +26,7 @@ void TileAccumulator::moveTo(const TileCells& tile) {
   tile_ = tile;
 }
 
-void TileAccumulator::vote(TileRays& rays, double from_first, bool marks) {
+void TileAccumulator::vote(TileRays& rays, double from_pixels, bool marks) {
   assert(!pending_);
   pending_ = true;
   marked_ = marks;
@@ -42,7 +42,7 @@ void TileAccumulator::vote(TileRays& rays, double from_first, bool marks) {
                                      static_cast<std::uint32_t>(tile_.in_view.width),
                                      static_cast<std::uint32_t>(tile_.in_view.height)};
     const kernels::FullCell* end =
-        scatter_.vote(rays.view(), static_cast<float>(from_first), window, full_.data());
+        scatter_.vote(rays.view(), static_cast<float>(from_pixels), window, full_.data());
     full_cells_ = static_cast<std::size_t>(end - full_.data());
   }
 }

@@ -27,10 +27,10 @@ class TileAccumulator {
   void moveTo(const TileCells& tile);
 
   /// Votes with the tile's rays on one plane.
-  /// @param rays padded. @param from_first from the plane of the rays' pixels to this one, 1/m.
+  /// @param rays padded. @param from_pixels from the plane of the rays' pixels to this one, 1/m.
   /// @param marks whether lines of cells with votes are marked, for `addPair`: it pays where few
   /// cells have votes. Both inputs must be alike.
-  void vote(TileRays& rays, double from_first, bool marks = false);
+  void vote(TileRays& rays, double from_pixels, bool marks = false);
   /// Resolves all pixels; no vote is left.
   /// @param density one value per pixel of the tile, row-major.
   /// @return the votes of the cells whose upper left pixel lies in the tile. Their sum over all

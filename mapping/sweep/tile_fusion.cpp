@@ -40,21 +40,21 @@ void TileFusion::moveTo(const TileCells& tile) {
   }
 }
 
-const PlaneValues& TileFusion::fuse(std::vector<TileRays>& rays, double from_first) {
-  if (pairs_) return fusePairs(rays, from_first);
+const PlaneValues& TileFusion::fuse(std::vector<TileRays>& rays, double from_pixels) {
+  if (pairs_) return fusePairs(rays, from_pixels);
   planes_->begin();
   for (const CameraSlot& input : planes_->inputs()) {
     TileAccumulator& accumulator = accumulators_[0];
     accumulator.vote(rays[static_cast<std::size_t>(
                          input.camera * inputs_.slots_per_group * inputs_.groups + input.slot)],
-                     from_first);
+                     from_pixels);
     votes_[static_cast<std::size_t>(input.camera)] += accumulator.resolve(planes_->next().data());
     planes_->add(input);
   }
   return planes_->fused();
 }
 
-const PlaneValues& TileFusion::fusePairs(std::vector<TileRays>& rays, double from_first) {
+const PlaneValues& TileFusion::fusePairs(std::vector<TileRays>& rays, double from_pixels) {
   std::fill(sum_.begin(), sum_.end(), 0.0F);
   const auto slots_per_group = static_cast<std::size_t>(inputs_.slots_per_group);
   const std::size_t slots = rays.size() / 2;
@@ -67,8 +67,8 @@ const PlaneValues& TileFusion::fusePairs(std::vector<TileRays>& rays, double fro
       const auto fewer = static_cast<double>(std::min(first.size(), second.size()));
       const auto pixels = static_cast<double>(sum.size());
       const bool marks = skips_[slot] && fewer <= kMaxMarkedRays * pixels;
-      accumulators_[0].vote(first, from_first, marks);
-      accumulators_[1].vote(second, from_first, marks);
+      accumulators_[0].vote(first, from_pixels, marks);
+      accumulators_[1].vote(second, from_pixels, marks);
       const int resolved = TileAccumulator::addPair(options_.across_cameras, accumulators_[0],
                                                     accumulators_[1], sum.data(), votes_.data());
       if (marks) skips_[slot] = resolved <= kMaxMarkedPixels * pixels;

@@ -24,15 +24,15 @@ class TileFusion {
   void moveTo(const TileCells& tile);
   /// The fused plane, until the next call.
   /// @param rays the tile's, padded: input (camera, slot) at camera * slots * groups + slot.
-  /// @param from_first from the plane of the rays' pixels to this one, 1/m.
-  const PlaneValues& fuse(std::vector<TileRays>& rays, double from_first);
+  /// @param from_pixels from the plane of the rays' pixels to this one, 1/m.
+  const PlaneValues& fuse(std::vector<TileRays>& rays, double from_pixels);
   /// A camera's own plane after `fuse`, where cameras are kept.
   const PlaneValues& ofCamera(int camera) const { return planes_->ofCamera(camera); }
   /// The votes of each camera on all tiles and planes so far.
   const std::vector<std::uint64_t>& votes() const { return votes_; }
 
  private:
-  const PlaneValues& fusePairs(std::vector<TileRays>& rays, double from_first);
+  const PlaneValues& fusePairs(std::vector<TileRays>& rays, double from_pixels);
 
   FusionOptions options_;
   FusionInputs inputs_;

@@ -118,15 +118,15 @@ class TiledSweep {
         for (std::size_t input = 0; input < rays_.inputs(); ++input) {
           rays_.gatherOn(plane, group, input, tile, scratch.rays[input]);
         }
-        sweepPlane(plane, rays_.fromFirst(group, plane), tile.tile, scratch);
+        sweepPlane(plane, rays_.fromPixels(plane), tile.tile, scratch);
       }
     }
     scratch.fused.writeTo(fused_, t);
     for (std::size_t c = 0; c < cameras_.size(); ++c) scratch.cameras[c].writeTo(cameras_[c], t);
   }
 
-  void sweepPlane(int plane, double from_first, const cv::Rect& tile, Scratch& scratch) {
-    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, from_first);
+  void sweepPlane(int plane, double from_pixels, const cv::Rect& tile, Scratch& scratch) {
+    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, from_pixels);
     scratch.fused.add(plane, fused);
     for (std::size_t c = 0; c < scratch.cameras.size(); ++c) {
       scratch.cameras[c].add(plane, scratch.fusion.ofCamera(static_cast<int>(c)));

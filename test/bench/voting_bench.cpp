@@ -75,7 +75,7 @@ void voteTiles(benchmark::State& state, const SweepInput& input, VotingKernel ke
         rays.gather(g, 0, cells, gathered);
         for (int plane = group.begin; plane < group.end; ++plane) {
           rays.gatherOn(plane, g, 0, cells, gathered);
-          accumulator.vote(gathered, rays.fromFirst(g, plane));
+          accumulator.vote(gathered, rays.fromPixels(plane));
           benchmark::DoNotOptimize(accumulator.resolve(density.data()));
           benchmark::ClobberMemory();
         }

@@ -98,8 +98,6 @@ TEST(KeyframeMapper, SingleCamerasMapsAreThoseOfARunWithThisCameraAlone) {
   for (const int subintervals : {1, 4}) {
     KeyframeMapperOptions options = fewPlanes(subintervals);
     options.reference_camera = 1;
-    // The fast kernels' last bits depend on the groups of planes, and these on all cameras.
-    options.sweep.kernel = VotingKernel::kPlain;
     const KeyframeDepthMap plain = map(recording, {0, 2}, options);
     EXPECT_THAT(plain.camera_maps, IsEmpty());
     options.camera_maps = true;

@@ -75,22 +75,23 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
  protected:
   /// The rays of a bundle that a tile gathers, each as its path.
   std::vector<RayPath> gather(const std::vector<RayBins>& all, const TileCells& tile,
-                              const PlaneRange& group) const {
+                              const PlaneRange& group, const DepthPlanes& planes) const {
     TileRays found;
     for (const RayBins& bins : all) {
-      const bool moving = bins.covers(group);
-      if (!moving && !bins.isInFront(group.begin)) continue;
-      bins.gather(bins.footprintOn(group), tile, functions_, moving, found);
+      const bool in_front = bins.covers(group) || bins.isInFront(group.begin);
+      if (in_front) bins.gather(bins.footprintOn(group), tile, functions_, found);
     }
     const Eigen::Vector2d origin(tile.origin.x, tile.origin.y);
     std::vector<RayPath> paths;
     const kernels::MovingRays rays = found.view();
-    for (std::size_t i = 0; i < rays.size; ++i) {
-      const Eigen::Vector2d first(rays.x[i], rays.y[i]);
+    const auto pixelAt = [&](std::size_t i, double from_pixels) -> Eigen::Vector2d {
+      const Eigen::Vector2d pixel(rays.x[i], rays.y[i]);
       const Eigen::Vector2d shift(rays.dx[i], rays.dy[i]);
-      const Eigen::Vector2d last = first + (group.last - group.first) * shift;
-      paths.push_back({origin + first / (1 << kernels::kFractionBits),
-                       origin + last / (1 << kernels::kFractionBits)});
+      return origin + (pixel + from_pixels * shift) / (1 << kernels::kFractionBits);
+    };
+    for (std::size_t i = 0; i < rays.size; ++i) {
+      paths.push_back({pixelAt(i, group.first - RayBins::pixelPlane(planes)),
+                       pixelAt(i, group.last - RayBins::pixelPlane(planes))});
     }
     return paths;
   }
@@ -111,7 +112,7 @@ class RayBinsOn : public ::testing::TestWithParam<VotingKernel> {
         const TileCells cells(tile, view);
         SCOPED_TRACE(testing::Message() << "tile " << tile.x << ", " << tile.y << ", planes "
                                         << begin << " to " << end - 1);
-        expectMatch(paths, gather(all, cells, group), cells.in_view);
+        expectMatch(paths, gather(all, cells, group, planes), cells.in_view);
       }
     }
   }
