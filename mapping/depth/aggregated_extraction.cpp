@@ -85,8 +85,7 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
   const cv::Mat1f& confidence = dsi.peaks.confidence;
   const cv::Mat1f contrast = localContrast(confidence, options.threshold_kernel);
   const SparseMask candidates(aboveContrast(contrast, options.min_local_contrast));
-  const std::vector<AggregatedPeak> peaks =
-      aggregateColumns(candidates, dsi.columns, confidence.size());
+  const std::vector<AggregatedPeak> peaks = aggregateColumns(candidates, dsi.columns);
 
   std::vector<float> positions(candidates.size());
   std::vector<float> weights(candidates.size());
@@ -95,9 +94,8 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
     weights[i] = contrast(at);
   });
   const PeakScale scale = scaleOf(peaks, planes.size());
-  const std::vector<LocalAgreement> around =
-      localAgreement(candidates, confidence.size(), positions, weights,
-                     static_cast<float>(kAgreementSteps * scale.step_planes));
+  const std::vector<LocalAgreement> around = localAgreement(
+      candidates, positions, weights, static_cast<float>(kAgreementSteps * scale.step_planes));
 
   const bool has_inner_planes = planes.size() > 2;
   cv::Mat1b mask = cv::Mat1b::zeros(confidence.size());

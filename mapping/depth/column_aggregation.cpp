@@ -60,12 +60,12 @@ class PeakFinder {
 double planesPerStep(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
 
 std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
-                                             const DsiColumns& columns, cv::Size size) {
-  const PixelNeighbours neighbours(candidates, size);
+                                             const DsiColumns& columns) {
   const PeakFinder finder(columns.planes());
   std::vector<AggregatedPeak> peaks(candidates.size());
   const auto weights = PixelNeighbours::gaussian(kSigma_px);
   tbb::parallel_for(tbb::blocked_range<int>(0, candidates.rows()), [&](const auto& rows) {
+    PixelNeighbours neighbours(candidates);
     std::vector<float> sum(static_cast<std::size_t>(columns.planes()) + DsiColumns::kPadding);
     for (int y = rows.begin(); y < rows.end(); ++y) {
       for (std::size_t i = candidates.rowBegin(y); i < candidates.rowBegin(y + 1); ++i) {

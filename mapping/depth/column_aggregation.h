@@ -27,7 +27,7 @@ struct AggregatedPeak {
 /// @param candidates pixels with columns (asserted). @param size of the view.
 /// @return one per pixel. Runs on the threads of the task arena that it is called in.
 std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
-                                             const DsiColumns& columns, cv::Size size);
+                                             const DsiColumns& columns);
 
 /// Planes per step: a step is a hundredth of the depth range, but at least one plane.
 double planesPerStep(int planes);

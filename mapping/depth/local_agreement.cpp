@@ -41,12 +41,17 @@ class Surroundings {
     return median;
   }
 
-  /// Median distance from a position. Reorders the positions.
+  /// Median distance from a position, the larger one of two. Positions are distances afterwards.
   float medianDistance(float from) {
     for (std::size_t i = 0; i < size_; ++i) positions_[i] = std::abs(positions_[i] - from);
-    const auto middle = positions_.begin() + size_ / 2;
-    std::nth_element(positions_.begin(), middle, positions_.begin() + size_);
-    return *middle;
+    std::fill_n(weights_.begin(), size_, 1.0F);
+    std::fill_n(below_.begin(), size_, 0.0F);
+    ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
+    float median = std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (below_[i] > static_cast<float>(size_ / 2)) median = std::min(median, positions_[i]);
+    }
+    return median;
   }
 
  private:
@@ -58,13 +63,14 @@ class Surroundings {
 
 }  // namespace
 
-std::vector<LocalAgreement> localAgreement(const SparseMask& mask, cv::Size size,
+std::vector<LocalAgreement> localAgreement(const SparseMask& mask,
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near) {
-  const PixelNeighbours neighbours(mask, size);
-  const auto by_distance = PixelNeighbours::gaussian(kDistanceSigma_px);
+  auto by_distance = PixelNeighbours::gaussian(kDistanceSigma_px);
+  by_distance[0] = 0;  // the pixel itself
   std::vector<LocalAgreement> agreement(mask.size());
   tbb::parallel_for(tbb::blocked_range<int>(0, mask.rows()), [&](const auto& rows) {
+    PixelNeighbours neighbours(mask);
     Surroundings around;
     for (int y = rows.begin(); y < rows.end(); ++y) {
       for (std::size_t i = mask.rowBegin(y); i < mask.rowBegin(y + 1); ++i) {
@@ -73,11 +79,10 @@ std::vector<LocalAgreement> localAgreement(const SparseMask& mask, cv::Size size
         float others = 0;
         neighbours.forEach({mask.column(i), y}, [&](std::size_t j, cv::Point offset) {
           around.add(positions[j], weights[j]);
-          if (i == j) return;
           const float weight =
               weights[j] * by_distance[static_cast<std::size_t>(offset.dot(offset))];
           others += weight;
-          if (std::abs(positions[j] - positions[i]) < near) agreeing += weight;
+          agreeing += std::abs(positions[j] - positions[i]) < near ? weight : 0.0F;
         });
         agreement[i].median = around.weightedMedian();
         agreement[i].spread = around.medianDistance(agreement[i].median);

@@ -20,7 +20,7 @@ struct LocalAgreement {
 /// @param positions of the mask's pixels, in planes. @param weights above 0.
 /// @param near positions closer than this agree, planes.
 /// @return one per pixel of the mask. Runs on the threads of the task arena that it is called in.
-std::vector<LocalAgreement> localAgreement(const SparseMask& mask, cv::Size size,
+std::vector<LocalAgreement> localAgreement(const SparseMask& mask,
                                            const std::vector<float>& positions,
                                            const std::vector<float>& weights, float near);
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -36,10 +37,12 @@ class SparseMask {
 };
 
 /// Finds the pixels of a sparse mask in the window of 9x9 pixels around a pixel, itself included.
+/// Remembers where the last window was: fast for pixels from left to right.
 class PixelNeighbours {
  public:
   static constexpr int kRadius_px = 4;
-  static constexpr std::size_t kMaxPixels = (2 * kRadius_px + 1) * (2 * kRadius_px + 1);
+  static constexpr int kRows = 2 * kRadius_px + 1;
+  static constexpr std::size_t kMaxPixels = kRows * kRows;
 
   /// Gaussian weights by the square of the distance.
   using Weights = std::array<float, 2 * kRadius_px * kRadius_px + 1>;
@@ -51,26 +54,41 @@ class PixelNeighbours {
     return weights;
   }
 
-  PixelNeighbours(const SparseMask& mask, cv::Size size) : index_(size, -1) {
-    mask.forEach([&](std::size_t i, cv::Point at) { index_(at) = static_cast<int>(i); });
-  }
+  /// @param mask outlives this object.
+  explicit PixelNeighbours(const SparseMask& mask) : mask_(&mask) {}
 
   /// Calls `visit(index, offset)` for each, row by row.
   template <typename Visit>
-  void forEach(cv::Point pixel, Visit visit) const {
-    const cv::Rect window = cv::Rect(pixel.x - kRadius_px, pixel.y - kRadius_px, 2 * kRadius_px + 1,
-                                     2 * kRadius_px + 1) &
-                            cv::Rect({0, 0}, index_.size());
-    for (int y = window.y; y < window.y + window.height; ++y) {
-      const int* row = index_[y];
-      for (int x = window.x; x < window.x + window.width; ++x) {
-        if (row[x] >= 0) visit(static_cast<std::size_t>(row[x]), cv::Point(x, y) - pixel);
+  void forEach(cv::Point pixel, Visit visit) {
+    if (pixel.y != last_.y || pixel.x < last_.x) begins_ = rowBegins(pixel.y);
+    last_ = pixel;
+    const int first = std::max(0, pixel.y - kRadius_px);
+    const int last = std::min(mask_->rows() - 1, pixel.y + kRadius_px);
+    for (int y = first; y <= last; ++y) {
+      std::size_t& begin = begins_[static_cast<std::size_t>(y - pixel.y + kRadius_px)];
+      const std::size_t end = mask_->rowBegin(y + 1);
+      while (begin < end && mask_->column(begin) < pixel.x - kRadius_px) ++begin;
+      for (std::size_t i = begin; i < end && mask_->column(i) <= pixel.x + kRadius_px; ++i) {
+        visit(i, cv::Point(mask_->column(i), y) - pixel);
       }
     }
   }
 
  private:
-  cv::Mat1i index_;  // -1: not in the mask
+  using Begins = std::array<std::size_t, kRows>;  // by row of the window
+
+  Begins rowBegins(int y) const {
+    Begins begins{};
+    for (int row = 0; row < kRows; ++row) {
+      const int of_mask = std::clamp(y - kRadius_px + row, 0, mask_->rows());
+      begins[static_cast<std::size_t>(row)] = mask_->rowBegin(of_mask);
+    }
+    return begins;
+  }
+
+  const SparseMask* mask_;
+  cv::Point last_{0, -1};
+  Begins begins_{};
 };
 
 }  // namespace efm

@@ -17,21 +17,24 @@ void SplitFusionOptions::validate() const {
                 "1 to 1000");
 }
 
-EventSpan EventPart::select(std::vector<Event>& buffer) const {
+EventSpan EventPart::select(PolaritySplit& split) const {
   if (!polarity) return all;
-  const auto count = static_cast<std::size_t>(
-      std::count_if(all.begin(), all.end(),
-                    [this](const Event& event) { return event.polarity == *polarity; }));
-  // Without a branch, which random polarities make unpredictable: an event of the other polarity is
-  // overwritten by the next one.
-  buffer.reserve(all.size() + 1);  // takes no memory before it is written
-  if (buffer.size() < count + 1) buffer.resize(count + 1);
-  std::size_t size = 0;
-  for (const Event& event : all) {
-    buffer[size] = event;
-    size += event.polarity == *polarity ? 1 : 0;
+  if (split.all.begin() != all.begin() || split.all.end() != all.end()) {
+    split.all = all;
+    const auto on_events = static_cast<std::size_t>(
+        std::count_if(all.begin(), all.end(), [](const Event& event) { return event.polarity; }));
+    const std::size_t sizes[2] = {all.size() - on_events, on_events};
+    for (const std::size_t on : {0, 1}) {
+      if (split.of[on].size() < sizes[on]) split.of[on].resize(sizes[on]);
+    }
+    // Without a branch, which random polarities make unpredictable.
+    Event* next[2] = {split.of[0].data(), split.of[1].data()};
+    for (const Event& event : all) *next[event.polarity ? 1 : 0]++ = event;
+    split.size[0] = sizes[0];
+    split.size[1] = sizes[1];
   }
-  return {buffer.data(), buffer.data() + count};
+  const std::size_t on = *polarity ? 1 : 0;
+  return EventSpan(split.of[on]).part(0, split.size[on]);
 }
 
 EventGroups::EventGroups(const SplitFusionOptions& split, const SubintervalOptions& subintervals)

@@ -31,6 +31,13 @@ struct SplitFusionOptions {
   void validate() const;
 };
 
+/// The events of a span, divided by polarity.
+struct PolaritySplit {
+  EventSpan all;             ///< The span.
+  std::vector<Event> of[2];  ///< Off and on events; may be longer than `size`.
+  std::size_t size[2] = {0, 0};
+};
+
 /// A part of one camera's events: one sub-interval of one slice, and of one polarity if the options
 /// divide by polarity.
 struct EventPart {
@@ -38,10 +45,10 @@ struct EventPart {
   std::optional<bool> polarity;  ///< Of the part's events; not given: both polarities.
   std::size_t subinterval = 0;   ///< Index among the sub-intervals of all slices.
 
-  /// The part's events in their order: a view of `all`, or, with a polarity, of `buffer`.
-  /// @param buffer receives the events of the polarity, and grows where it is too small; the view
-  /// is valid until it changes.
-  EventSpan select(std::vector<Event>& buffer) const;
+  /// The part's events in their order: a view of `all`, or, with a polarity, of `split`.
+  /// @param split keeps the events of both polarities for the next part; the view is valid until
+  /// it changes.
+  EventSpan select(PolaritySplit& split) const;
 };
 
 /// Which parts of the cameras are fused with each other.

@@ -16,9 +16,9 @@ WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
   WindowRays result;
   result.camera = camera.camera;
   std::vector<std::size_t> rays_in(groups.subintervals());
-  std::vector<Event> of_polarity;  // reused
+  PolaritySplit split;
   for (const EventPart& part : groups.partsOf(camera.events, input.window)) {
-    const EventSpan events = part.select(of_polarity);
+    const EventSpan events = part.select(split);
     const PosePackets packets = splitIntoPosePackets(
         events, *camera.calibration, *camera.undistortion, trajectory, geometry, options);
     const RayBundle& rays =

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include <opencv2/core.hpp>
 
 #include "mapping/keyframes/keyframe_mapper.h"
@@ -37,7 +39,7 @@ TEST(UnfusedKeyframe, FindsTheDepthsOfTheMapper) {
 }
 
 TEST(UnfusedKeyframe, HasNoMapWithoutAPoseAtTheReferenceTime) {
-  const SyntheticWindow made = makeSyntheticWindow({40, 30, 100, 2, 0.1, 1});
+  const SyntheticWindow made = makeSyntheticWindow({40, 30, 100, 2, 0.1, 1, std::nullopt, false});
   UnfusedKeyframe reference(made.rig, made.options);
   Window window = made.window;
   window.t_ref_ns += 10'000'000'000;

@@ -28,7 +28,9 @@ SimulatedRecording::SimulatedRecording(const SimulationOptions& options)
 SimulatedRecording SimulatedRecording::desk() {
   SimulatedRecording desk(makeSimulation({"desk_stereo", std::nullopt, 1}));
   desk.events_.resize(desk.simulation_.rig.cameras.size());
-  const auto recording = openRecording({{EFM_RECORDINGS "/desk_stereo"}});
+  RecordingSource source;
+  source.files = {EFM_RECORDINGS "/desk_stereo"};
+  const auto recording = openRecording(source);
   while (const auto observation = recording->next()) {
     const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
     if (!packet) continue;

@@ -52,7 +52,7 @@ cv::Mat1b randomMask(std::uint32_t seed, const cv::Size& size, int one_of) {
 
 std::vector<AggregatedPeak> aggregate(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   const SweptDsi swept = dsi.swept();
-  return aggregateColumns(SparseMask(mask), swept.columns, swept.peaks.confidence.size());
+  return aggregateColumns(SparseMask(mask), swept.columns);
 }
 
 /// The sum of the rays of the chosen pixels in 9x9, in double.
@@ -207,7 +207,8 @@ TEST(PlanesPerStep, IsOneUpToAHundredPlanesAndGrowsWithThem) {
 
 TEST(PixelNeighbours, AreTheMasksPixelsWithinFourRowByRow) {
   const cv::Mat1b mask = randomMask(13, {40, 30}, 4);
-  const PixelNeighbours neighbours(SparseMask(mask), mask.size());
+  const SparseMask sparse(mask);
+  PixelNeighbours neighbours(sparse);
   for (int y = 0; y < mask.rows; ++y) {
     for (int x = 0; x < mask.cols; ++x) {
       std::vector<cv::Point> expected;

@@ -35,7 +35,7 @@ struct Depths {
       kept_positions.push_back(positions(at));
       kept_weights.push_back(weights(at));
     });
-    return localAgreement(kept, mask.size(), kept_positions, kept_weights, kNear);
+    return localAgreement(kept, kept_positions, kept_weights, kNear);
   }
   /// Of one kept pixel.
   LocalAgreement at(const cv::Point& pixel) const {

@@ -52,10 +52,10 @@ TEST(EventGroups, EachEventOfAWindowIsInThePartOfItsSubintervalAndPolarity) {
     const std::int64_t intervals = division.split.time_slices * division.subintervals.count;
     EXPECT_EQ(groups.subintervals(), static_cast<std::size_t>(intervals));
     std::size_t seen = 0;
-    std::vector<Event> buffer;
+    PolaritySplit split;
     for (const EventPart& part : groups.partsOf(events, kWindow)) {
       EXPECT_EQ(part.polarity.has_value(), division.split.polarity);
-      const EventSpan selected = part.select(buffer);
+      const EventSpan selected = part.select(split);
       seen += selected.size();
       for (std::size_t i = 0; i < selected.size(); ++i) {
         const auto subinterval = static_cast<std::int64_t>(part.subinterval);
