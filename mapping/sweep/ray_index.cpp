@@ -8,9 +8,9 @@
 namespace efm {
 namespace {
 
-/// How far rays move within a group of planes on average. If they move farther, a tile gathers more
-/// rays that are outside it on some planes; if less, it gathers more often.
-constexpr double kGroupShift_px = 6;
+/// Gathering a ray for a group of planes costs as much as this number of votes, with the rays
+/// around the tile that are looked at in vain.
+constexpr double kGatheringVotes = 3.5;
 
 /// Votes on planes behind the camera.
 std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
@@ -79,13 +79,19 @@ RayIndex::RayIndex(std::vector<CameraRays> cameras, const DsiGrid& grid, VotingK
   }
 }
 
+/// Rays that move while they are in a group are gathered by more tiles, and vote outside them on
+/// some planes. With rays that move by s pixels from plane to plane, n planes in a group and tiles
+/// of t pixels, a vote costs 1 + n s / t + kGatheringVotes / n, which is least where n s is the
+/// root of kGatheringVotes t s.
 std::vector<PlaneRange> RayIndex::dividePlanes(double shift) const {
+  const double range = 1 / planes_.depth(0) - 1 / planes_.depth(planes_.size() - 1);
+  const double per_plane_px = shift * range / std::max(1, planes_.size() - 1);
+  const double group_px = std::sqrt(kGatheringVotes * TileCells::kMaxPixels * per_plane_px);
   std::vector<PlaneRange> groups;
   for (int begin = 0; begin < planes_.size(); begin = groups.back().end) {
     const double first = 1 / planes_.depth(begin);
     int end = begin + 1;
-    while (end < planes_.size() && (first - 1 / planes_.depth(end)) * shift <= kGroupShift_px)
-      ++end;
+    while (end < planes_.size() && (first - 1 / planes_.depth(end)) * shift <= group_px) ++end;
     groups.emplace_back(planes_, begin, end);
   }
   return groups;
