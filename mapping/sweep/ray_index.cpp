@@ -10,7 +10,7 @@ namespace {
 
 /// Gathering a ray for a group of planes costs as much as this number of votes, with the rays
 /// around the tile that are looked at in vain.
-constexpr double kGatheringVotes = 3.5;
+constexpr double kGatheringVotes = 2.5;
 
 /// Votes on planes behind the camera.
 std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
