@@ -10,6 +10,7 @@
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/depth/sparse_mask.h"
+#include "mapping/kernels/columns.h"
 
 namespace efm {
 namespace {
@@ -66,7 +67,7 @@ std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
   const auto weights = PixelNeighbours::gaussian(kSigma_px);
   tbb::parallel_for(tbb::blocked_range<int>(0, candidates.rows()), [&](const auto& rows) {
     PixelNeighbours neighbours(candidates);
-    std::vector<float> sum(static_cast<std::size_t>(columns.planes()) + DsiColumns::kPadding);
+    std::vector<float> sum(static_cast<std::size_t>(columns.planes()) + kernels::kColumnPadding);
     for (int y = rows.begin(); y < rows.end(); ++y) {
       for (std::size_t i = candidates.rowBegin(y); i < candidates.rowBegin(y + 1); ++i) {
         const cv::Point pixel(candidates.column(i), y);

@@ -24,7 +24,7 @@ struct AggregatedPeak {
 /// For each pixel of a mask, sums the DSI columns of the mask's pixels in 9x9 pixels around,
 /// weighted by a Gaussian of the distance, and finds the peak of the sum. Columns of other pixels
 /// are not summed: between edges the DSI is noise, which would move the peaks.
-/// @param candidates pixels with columns (asserted). @param size of the view.
+/// @param candidates pixels with columns (asserted).
 /// @return one per pixel. Runs on the threads of the task arena that it is called in.
 std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
                                              const DsiColumns& columns);

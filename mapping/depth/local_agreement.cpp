@@ -22,43 +22,44 @@ constexpr float kDistanceSigma_px = 2;
 /// The pixels around one pixel.
 class Surroundings {
  public:
-  void clear() { size_ = 0; }
+  void clear() {
+    size_ = 0;
+    total_ = 0;
+  }
   void add(float position, float weight) {
     positions_[size_] = position;
     weights_[size_++] = weight;
+    total_ += weight;
   }
 
   /// The smallest position with at least half of the weight at or below it.
-  float weightedMedian() {
-    std::fill_n(below_.begin(), size_, 0.0F);
-    ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
-    // All weights are at or below the largest position.
-    const float total = *std::max_element(below_.begin(), below_.begin() + size_);
-    float median = std::numeric_limits<float>::infinity();
-    for (std::size_t i = 0; i < size_; ++i) {
-      if (2 * below_[i] >= total) median = std::min(median, positions_[i]);
-    }
-    return median;
-  }
+  float weightedMedian() { return smallestWith(0.5F * total_); }
 
-  /// Median distance from a position, the larger one of two. Positions are distances afterwards.
+  /// Median distance from a position, the larger one of two. Positions are distances afterwards,
+  /// with equal weights.
   float medianDistance(float from) {
     for (std::size_t i = 0; i < size_; ++i) positions_[i] = std::abs(positions_[i] - from);
     std::fill_n(weights_.begin(), size_, 1.0F);
-    std::fill_n(below_.begin(), size_, 0.0F);
-    ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
-    float median = std::numeric_limits<float>::infinity();
-    for (std::size_t i = 0; i < size_; ++i) {
-      if (below_[i] > static_cast<float>(size_ / 2)) median = std::min(median, positions_[i]);
-    }
-    return median;
+    return smallestWith(static_cast<float>(size_ / 2 + 1));
   }
 
  private:
+  /// The smallest position with at least this weight at or below it.
+  float smallestWith(float min_weight) {
+    std::fill_n(below_.begin(), size_, 0.0F);
+    ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
+    float smallest = std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (below_[i] >= min_weight) smallest = std::min(smallest, positions_[i]);
+    }
+    return smallest;
+  }
+
   using Values = std::array<float, PixelNeighbours::kMaxPixels + kernels::kRankPadding>;
   const kernels::RankFunctions& ranks_ = kernels::rankFunctions(fastestKernel());
   Values positions_{}, weights_{}, below_{};
   std::size_t size_ = 0;
+  float total_ = 0;  // weight
 };
 
 }  // namespace

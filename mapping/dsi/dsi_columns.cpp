@@ -13,8 +13,6 @@
 namespace efm {
 namespace {
 
-static_assert(DsiColumns::kPadding == kernels::kColumnPadding);
-
 constexpr float kMaxUnits = std::numeric_limits<std::uint16_t>::max();
 
 /// The pixels of a tile that stand out from their surroundings.

@@ -38,9 +38,6 @@ class TileVolume {
 /// rounding to 1/65535 of the column's peak moves no depth.
 class DsiColumns {
  public:
-  /// Of the sums of columns (kernels::kColumnPadding).
-  static constexpr std::size_t kPadding = 16;
-
   /// Columns of one tile.
   struct Tile {
     std::vector<cv::Point> pixels;      // of the view
@@ -67,7 +64,7 @@ class DsiColumns {
     return column.unit * static_cast<float>(column.values[plane]);
   }
   /// sum[plane] += weight * value(pixel, plane) for all planes.
-  /// @param sum with room for kPadding more values.
+  /// @param sum with kernels::kColumnPadding.
   void addTo(float* sum, cv::Point pixel, float weight) const;
 
  private:

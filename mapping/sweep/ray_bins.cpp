@@ -22,24 +22,6 @@ constexpr double kRaysPerBin = 8;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// The planes in front of a packet's camera; empty where all are behind it.
-PlaneRange planesInFront(const RayPacket& packet, const DsiGrid& grid) {
-  const int count = grid.planes.size();
-  const auto in_front = [&](int plane) {
-    return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
-  };
-  // Forward rays leave their camera for the farther planes, backward rays for the nearer ones.
-  int begin = 0;
-  int end = count;
-  while (begin < end) {
-    const int middle = (begin + end) / 2;
-    in_front(middle) == packet.forward ? end = middle : begin = middle + 1;
-  }
-  const int from = packet.forward ? begin : 0;
-  const int until = packet.forward ? count : begin;
-  return from < until ? PlaneRange(grid.planes, from, until) : PlaneRange();
-}
-
 /// A packet's transfer to one end of the planes.
 Eigen::Array3d transferAt(const RayPacket& packet, const ReferenceView& view,
                           double inverse_depth) {
@@ -78,6 +60,23 @@ class Spread {
 };
 
 }  // namespace
+
+PlaneRange planesInFront(const RayPacket& packet, const DsiGrid& grid) {
+  const int count = grid.planes.size();
+  const auto in_front = [&](int plane) {
+    return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
+  };
+  // Forward rays leave their camera for the farther planes, backward rays for the nearer ones.
+  int begin = 0;
+  int end = count;
+  while (begin < end) {
+    const int middle = (begin + end) / 2;
+    in_front(middle) == packet.forward ? end = middle : begin = middle + 1;
+  }
+  const int from = packet.forward ? begin : 0;
+  const int until = packet.forward ? count : begin;
+  return from < until ? PlaneRange(grid.planes, from, until) : PlaneRange();
+}
 
 RayBins::Axis::Axis(const Range& pixels, float side) : begin(pixels.min), bins_per_pixel(1 / side) {
   const float count = std::floor(std::max(0.0F, pixels.max - pixels.min) / side) + 1;

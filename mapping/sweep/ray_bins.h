@@ -30,6 +30,9 @@ struct PlaneRange {
         last(1 / planes.depth(end_plane - 1)) {}
 };
 
+/// The planes in front of a packet's camera, along its rays; empty where all are behind it.
+PlaneRange planesInFront(const RayPacket& packet, const DsiGrid& grid);
+
 /// Rays of consecutive packets that are in front of their cameras on the same planes, and whose
 /// cameras are close together. They are sorted into square bins by their pixel on one plane, the
 /// anchor plane (Z0 of Rebecq et al., IJCV 2018, Eq. 15): a tile's rays on any plane are in a few

@@ -14,16 +14,11 @@ constexpr double kGatheringVotes = 2.5;
 
 /// Votes on planes behind the camera.
 std::uint64_t countBehind(const RayBundle& rays, const DsiGrid& grid) {
-  const auto in_front = [&](const RayPacket& packet, int plane) {
-    return transferToPlane(packet, grid.view, grid.planes.depth(plane)).in_front;
-  };
   std::uint64_t behind = 0;
   for (const RayPacket& packet : rays.packets) {
-    // With both outermost planes in front of the camera, all between them are.
-    if (in_front(packet, 0) && in_front(packet, grid.planes.size() - 1)) continue;
-    for (int plane = 0; plane < grid.planes.size(); ++plane) {
-      if (!in_front(packet, plane)) behind += packet.end - packet.begin;
-    }
+    const PlaneRange in_front = planesInFront(packet, grid);
+    const int planes = grid.planes.size() - (in_front.end - in_front.begin);
+    behind += static_cast<std::uint64_t>(planes) * (packet.end - packet.begin);
   }
   return behind;
 }

@@ -40,7 +40,7 @@ class TileAccumulator {
   /// Adds the mean of two inputs on the same tile to a sum; no vote is left. The bits are those of
   /// `resolve` and the rule's mean.
   /// @param rule AND-like. @param sum as `density`, and kernels::kSumPadding. @param votes receives
-  /// the votes of each input, added.
+  /// the votes of each input, added. @return the number of pixels that were not skipped.
   static int addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second, float* sum,
                      std::uint64_t votes[2]);
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 namespace efm {
-
 namespace {
 
 /// Marks of lines with votes pay where few lines have them: with at most this number of rays per

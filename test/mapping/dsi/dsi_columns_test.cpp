@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+#include "mapping/kernels/columns.h"
 #include "mapping/sweep/tiled_sweep.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/kernels/fast_kernels.h"
@@ -215,7 +216,7 @@ TEST(DsiColumns, AddToAddsTheWeightedColumn) {
   const DsiColumns columns({1, 1}, 3, std::move(tiles));
   ASSERT_TRUE(columns.has({0, 0}));
   std::vector<float> sum = {10, 20, 30};
-  sum.resize(3 + DsiColumns::kPadding);
+  sum.resize(3 + kernels::kColumnPadding);
   columns.addTo(sum.data(), {0, 0}, 0.5F);
   sum.resize(3);
   EXPECT_THAT(sum, ::testing::Pointwise(::testing::FloatNear(1e-4F), {11.0F, 24.0F, 30.0F}));
