@@ -16,20 +16,6 @@
 namespace efm {
 namespace {
 
-/// Linux's "model name", or else the name of the board, which Arm processors have instead.
-std::string processorName() {
-  std::ifstream cpuinfo("/proc/cpuinfo");
-  for (std::string line; std::getline(cpuinfo, line);) {
-    const auto colon = line.find(": ");
-    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
-      return line.substr(colon + 2);
-    }
-  }
-  std::string board;
-  std::getline(std::ifstream("/sys/firmware/devicetree/base/model"), board, '\0');
-  return board.empty() ? "unknown" : board;
-}
-
 /// The sizes of the data caches, as far as the system tells them.
 std::string cacheSizes() {
   std::string sizes;
@@ -44,6 +30,19 @@ std::string cacheSizes() {
 }
 
 }  // namespace
+
+std::string processorName() {
+  std::ifstream cpuinfo("/proc/cpuinfo");
+  for (std::string line; std::getline(cpuinfo, line);) {
+    const auto colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
+      return line.substr(colon + 2);
+    }
+  }
+  std::string board;
+  std::getline(std::ifstream("/sys/firmware/devicetree/base/model"), board, '\0');
+  return board.empty() ? "unknown" : board;
+}
 
 int printSystem() {
   fmt::print("event-fusion {}\nprocessor: {}\ncores: {}\ncaches: {}\n", EFM_VERSION,

@@ -5,20 +5,10 @@
 
 #include <fstream>
 
+#include "plugin/app/system_info.h"
+
 namespace efm::bench {
 namespace {
-
-/// The "model name" of the processor in Linux; "unknown" where there is none.
-std::string processorName() {
-  std::ifstream cpuinfo("/proc/cpuinfo");
-  for (std::string line; std::getline(cpuinfo, line);) {
-    const auto colon = line.find(": ");
-    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
-      return line.substr(colon + 2);
-    }
-  }
-  return "unknown";
-}
 
 std::string cacheSize(int level) {
   for (const auto& cache : benchmark::CPUInfo::Get().caches) {
