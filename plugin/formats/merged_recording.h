@@ -8,23 +8,23 @@
 #include <vector>
 
 #include "mapping/geometry/rig.h"
-#include "plugin/formats/event_text.h"
+#include "plugin/readers/event_packets.h"
 #include "plugin/recordings/recording.h"
 
 namespace efm {
 
-/// One event file per camera of a rig, as observations in the order of time.
+/// The event streams of a rig's cameras, as observations in the order of time.
 ///
 /// The first packets are empty, one per camera: they announce the rig (see CObservationEvents).
-/// Each further packet has the events of one camera in 10 ms. A packet covers its camera until the
-/// camera's next event, and the camera's last packet covers it for ever (`kEndOfTimeNs`): nobody
-/// waits for a silent camera. The very last packet has no such time: there the recording ends. If a
-/// file has a wrong line, all events before it come before the error.
+/// Each further packet has the events of one camera in a period. A packet covers its camera until
+/// the camera's next event, and the camera's last packet covers it for ever (`kEndOfTimeNs`):
+/// nobody waits for a silent camera. The very last packet has no such time: there the recording
+/// ends. If a stream has a wrong event, all events before it come before the error.
 class MergedRecording : public Recording {
  public:
-  /// @param readers one per camera of the rig.
-  /// @throws std::runtime_error if no camera has an event; the readers' errors.
-  MergedRecording(Rig rig, std::vector<EventTextReader> readers);
+  /// @param cameras one per camera of the rig; of none, there is no observation.
+  /// @throws std::runtime_error if no camera has an event; the streams' errors.
+  MergedRecording(Rig rig, std::vector<EventPackets> cameras);
 
   mrpt::obs::CObservation::Ptr next() override;
   std::string position() const override { return position_; }
@@ -37,7 +37,7 @@ class MergedRecording : public Recording {
                                         std::vector<Event> events);
 
   Rig rig_;
-  std::vector<EventTextReader> readers_;  // per camera
+  std::vector<EventPackets> cameras_;  // per camera
   std::string position_ = "the recording";
   std::size_t announced_ = 0;  // number of empty packets so far
 };

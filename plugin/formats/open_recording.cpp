@@ -3,13 +3,15 @@
 
 #include <fmt/format.h>
 
+#include <iterator>
 #include <stdexcept>
 #include <utility>
 
-#include "plugin/formats/dataset_folder.h"
+#include "plugin/formats/merged_recording.h"
 #include "plugin/formats/rawlog_recording.h"
 #include "plugin/formats/rawlog_signature.h"
-#include "plugin/formats/uzh_text.h"
+#include "plugin/readers/recording_formats.h"
+#include "plugin/readers/source_files.h"
 #include "plugin/recordings/perturbed_recording.h"
 #include "plugin/recordings/recording_with_poses.h"
 #include "plugin/recordings/rig_override_recording.h"
@@ -21,67 +23,167 @@ namespace {
 
 using Path = std::filesystem::path;
 
-/// A format of recordings. A new format is a row of the table below.
-struct Format {
-  std::string name;
-  bool (*looks_like)(const Path&);
-  std::unique_ptr<Recording> (*open)(const Path&, const RecordingOverrides&);
-  std::string description;  ///< For errors.
-};
+constexpr const char* kRawlog = "rawlog";
 
-const std::vector<Format>& formats() {
-  static const std::vector<Format> all = {
-      {"rawlog", [](const Path& source) { return std::filesystem::is_regular_file(source); },
-       [](const Path& source, const RecordingOverrides&) -> std::unique_ptr<Recording> {
-         requireRawlog(source);
-         return std::make_unique<RawlogRecording>(source);
-       },
-       "a rawlog file"},
-      {"folder", looksLikeDatasetFolder, openDatasetFolder,
-       "a dataset folder (camchain.yaml, cam0/events.txt, poses.txt)"},
-      {"uzh", looksLikeUzhFolder, openUzhFolder,
-       "a folder in the UZH layout (events.txt, groundtruth.txt, calib.txt)"},
-  };
+const RecordingFormat* formatNamed(const std::string& name) {
+  for (const RecordingFormat& format : readerFormats()) {
+    if (format.name == name) return &format;
+  }
+  throw std::runtime_error("'" + name + "' is not a known format");
+}
+
+[[noreturn]] void refuseUnknown(const Path& path) {
+  std::string expected = "a rawlog file";
+  for (const RecordingFormat& format : readerFormats()) expected += ", " + format.description;
+  throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
+}
+
+/// The format of a source; null for a rawlog.
+const RecordingFormat* formatOf(const Path& path, const std::string& name) {
+  if (!std::filesystem::exists(path)) {
+    throw std::runtime_error(path.string() + ": no such file or folder");
+  }
+  if (name == kRawlog) return nullptr;
+  if (name != "auto") return formatNamed(name);
+  const RecordingFormat* format = detectFormat(path);
+  if (format == nullptr && !isFile(path)) refuseUnknown(path);
+  return format;
+}
+
+std::string sourceNames(const std::vector<Path>& sources) {
+  std::string names;
+  for (const Path& source : sources) names += (names.empty() ? "" : ", ") + source.string();
+  return names;
+}
+
+/// Adds the parts of further files.
+void append(RecordingParts parts, const Path& source, RecordingParts& all) {
+  std::move(parts.cameras.begin(), parts.cameras.end(), std::back_inserter(all.cameras));
+  std::move(parts.poses.begin(), parts.poses.end(), std::back_inserter(all.poses));
+  if (parts.calibration && all.calibration) {
+    throw std::runtime_error(fmt::format(
+        "{}: a second calibration, beside {}: expected one of all cameras, or --calibration FILE",
+        source.string(), all.calibration->file.string()));
+  }
+  if (parts.calibration) all.calibration = std::move(parts.calibration);
+  if (!all.default_size) all.default_size = parts.default_size;
+  if (parts.T_body_rig) all.T_body_rig = parts.T_body_rig;
+}
+
+/// Files of the same format are opened together.
+RecordingParts openParts(const RecordingSource& source) {
+  RecordingParts all;
+  for (std::size_t i = 0; i < source.files.size();) {
+    const RecordingFormat* const format = formatOf(source.files[i], source.format);
+    if (format == nullptr) {
+      throw std::runtime_error(source.files[i].string() +
+                               ": a rawlog beside other sources: expected it alone");
+    }
+    std::vector<Path> files = {source.files[i++]};
+    while (i < source.files.size() && formatOf(source.files[i], source.format) == format) {
+      files.push_back(source.files[i++]);
+    }
+    RecordingParts parts = format->open(files, source.reader);
+    if (all.cameras.empty() && all.poses.empty()) {
+      std::swap(all, parts);
+    } else {
+      append(std::move(parts), files.front(), all);
+    }
+  }
   return all;
 }
 
-std::unique_ptr<Recording> openAs(const std::string& format, const Path& path,
-                                  const RecordingOverrides& given) {
-  std::string expected;
-  for (const Format& known : formats()) {
-    if (format == known.name || (format == "auto" && known.looks_like(path))) {
-      return known.open(path, given);
-    }
-    expected += (expected.empty() ? "" : ", ") + known.description;
+/// The size of a camera's sensor: of the stream, the given calibration, or the format's usual one.
+std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera,
+                                 const Calibration* given) {
+  if (const auto size = parts.cameras[camera]->size()) return size;
+  if (given != nullptr && camera < given->rig.cameras.size()) {
+    const CameraModel& model = given->rig.cameras[camera].model;
+    if (model.width > 0) return CameraSize{model.width, model.height};
   }
-  if (format != "auto") throw std::runtime_error("'" + format + "' is not a known format");
-  throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
+  return parts.default_size;
+}
+
+/// The recording's own rig if it has one. Then the caller replaces it by a given one and counts the
+/// difference.
+Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Calibration* given) {
+  const std::size_t count = parts.cameras.size();
+  const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
+  const Calibration* const calibration = own != nullptr ? own : given;
+  if (calibration == nullptr && source.complete) {
+    throw std::runtime_error(fmt::format("{}: no calibration: expected {}, or --calibration FILE",
+                                         sourceNames(source.files), parts.expected_calibration));
+  }
+  Rig rig;
+  for (std::size_t camera = 0; camera < count; ++camera) {
+    const std::optional<CameraSize> size = sizeOf(parts, camera, given);
+    if (calibration != nullptr) {
+      rig.cameras.push_back(calibration->camera(camera, size));
+    } else {
+      constexpr CameraSize kAny = {65'535, 65'535};
+      RigCamera& unknown = rig.cameras.emplace_back();
+      unknown.model.width = size.value_or(kAny).width;
+      unknown.model.height = size.value_or(kAny).height;
+    }
+  }
+  if (given != nullptr) given->requireLike(rig);
+  return rig;
+}
+
+std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& source,
+                                const Calibration* given) {
+  if (parts.cameras.empty() && source.complete) {
+    throw std::runtime_error(sourceNames(source.files) + ": no events: expected some");
+  }
+  Rig rig = parts.cameras.empty() ? Rig() : rigOf(parts, source, given);
+  std::vector<EventPackets> cameras;
+  for (std::size_t i = 0; i < parts.cameras.size(); ++i) {
+    const CameraModel& model = rig.cameras[i].model;
+    cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
+                         source.packet_ns);
+    if (source.start_ns) cameras.back().startAt(*source.start_ns);
+  }
+  std::unique_ptr<Recording> recording =
+      std::make_unique<MergedRecording>(std::move(rig), std::move(cameras));
+  if (!source.poses.empty()) return recording;
+  if (parts.poses.empty() && source.complete) {
+    throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",
+                                         sourceNames(source.files), parts.expected_poses));
+  }
+  if (parts.T_body_rig) {
+    for (StampedPose& pose : parts.poses) {
+      pose.T_world_rig = pose.T_world_rig * *parts.T_body_rig;
+    }
+  }
+  return std::make_unique<RecordingWithPoses>(std::move(recording), std::move(parts.poses));
+}
+
+std::unique_ptr<Recording> openOwn(const RecordingSource& source, const Calibration* given) {
+  if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
+  const Path& first = source.files.front();
+  if (formatOf(first, source.format) == nullptr && source.files.size() == 1) {
+    requireRawlog(first);
+    return std::make_unique<RawlogRecording>(first);
+  }
+  return join(openParts(source), source, given);
 }
 
 }  // namespace
 
 std::vector<std::string> recordingFormats() {
-  std::vector<std::string> names = {"auto"};
-  for (const Format& format : formats()) names.push_back(format.name);
+  std::vector<std::string> names = {"auto", kRawlog};
+  for (const RecordingFormat& format : readerFormats()) names.push_back(format.name);
   return names;
 }
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
-  if (source.files.size() != 1) {
-    throw std::runtime_error(fmt::format("{} sources: expected one", source.files.size()));
-  }
-  const Path& path = source.files.front();
-  if (!std::filesystem::exists(path)) {
-    throw std::runtime_error(path.string() + ": no such file or folder");
-  }
   const RigSetup setup = readRigSetup({source.calibration, source.hand_eye, {}, {}});
   std::vector<StampedPose> poses;
   if (!source.poses.empty()) poses = readPosesFile(source.poses);
 
-  const RecordingOverrides given = {setup.calibration ? &*setup.calibration : nullptr,
-                                    !poses.empty()};
-  std::unique_ptr<Recording> recording = openAs(source.format, path, given);
-  if (given.has_poses) {
+  std::unique_ptr<Recording> recording =
+      openOwn(source, setup.calibration ? &*setup.calibration : nullptr);
+  if (!source.poses.empty()) {
     recording = std::make_unique<RecordingWithPoses>(std::move(recording), std::move(poses));
   }
   if (source.faults.any()) {

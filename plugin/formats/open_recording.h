@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "plugin/readers/event_packets.h"
+#include "plugin/readers/recording_parts.h"
 #include "plugin/recordings/recording.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
@@ -14,7 +18,7 @@ namespace efm {
 /// A recording, and files that replace its poses, calibration or hand-eye transform. The recording
 /// needs none of its own then.
 struct RecordingSource {
-  std::vector<std::filesystem::path> files;  ///< One file or folder.
+  std::vector<std::filesystem::path> files;  ///< Files and folders of one recording.
   std::string format = "auto";               ///< One of `recordingFormats`. "auto": detected.
   std::filesystem::path poses;               ///< TUM, T_world_body. Empty: the recording's.
   std::filesystem::path calibration;         ///< See `readCalibration`. Empty: the recording's.
@@ -23,13 +27,21 @@ struct RecordingSource {
   /// Calibration and hand-eye transform replace those of the observations. Otherwise they are used
   /// only if the recording has none, and a map builder's options replace the others.
   bool override_rig = true;
+
+  ReaderOptions reader;
+  std::int64_t packet_ns = kPacketPeriodNs;  ///< Length of the packets of events, above 0.
+  /// Events before it may be left out without being read; a rawlog is read from its beginning.
+  std::optional<std::int64_t> start_ns;
+  /// Whether missing poses, or a missing calibration, are an error. Cameras without a calibration
+  /// have a model without a focal length.
+  bool complete = true;
 };
 
 /// The names of all formats, "auto" first.
 std::vector<std::string> recordingFormats();
 
-/// Opens a recording: a rawlog, a dataset folder (camchain.yaml, camN/events.txt, poses.txt) or a
-/// folder in the UZH text layout (events.txt, groundtruth.txt, calib.txt).
+/// Opens a recording: a rawlog, or the files and folders of `readerFormats`, whose cameras and
+/// poses are put together in the order of the files.
 /// @throws std::runtime_error naming the missing or wrong file and the expected ones;
 /// std::invalid_argument if the calibration is of other cameras or the faults are not valid.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);

@@ -32,6 +32,7 @@ CameraPacket packetOf(const CObservationEvents& observation) {
   packet.camera = observation.camera_index;
   packet.calibration.model = observation.camera;
   packet.calibration.T_rig_cam = rigidFrom(observation.camera_pose);
+  packet.calibration.time_offset_ns = observation.time_offset_ns;
   packet.events = observation.events;
   packet.covered_until_ns = observation.covered_until_ns;
   return packet;

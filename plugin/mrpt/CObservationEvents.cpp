@@ -63,7 +63,7 @@ std::vector<std::uint8_t> readBytes(CArchive& in, std::size_t size) {
 
 }  // namespace
 
-std::uint8_t CObservationEvents::serializeGetVersion() const { return 0; }
+std::uint8_t CObservationEvents::serializeGetVersion() const { return 1; }
 
 void CObservationEvents::serializeTo(CArchive& out) const {
   std::vector<std::uint8_t> content;
@@ -79,9 +79,9 @@ void CObservationEvents::serializeTo(CArchive& out) const {
 }
 
 void CObservationEvents::serializeFrom(CArchive& in, std::uint8_t version) {
-  if (version != 0) {
+  if (version > 1) {
     throw std::runtime_error(
-        fmt::format("events of version {}: this program reads version 0", version));
+        fmt::format("events of version {}: this program reads versions 0 and 1", version));
   }
   try {
     const auto size = in.ReadAs<std::uint32_t>();
@@ -90,7 +90,7 @@ void CObservationEvents::serializeFrom(CArchive& in, std::uint8_t version) {
     const std::vector<std::uint8_t> content = readBytes(in, size);
     if (checksumOf(content) != checksum) throw std::runtime_error("its checksum is wrong");
     auto archive = mrpt::serialization::archiveFrom(content);
-    readContent(archive);
+    readContent(archive, version);
   } catch (const std::exception& error) {
     throw std::runtime_error(std::string("a packet of events is damaged: ") + error.what());
   }
@@ -100,19 +100,22 @@ void CObservationEvents::writeContent(CArchive& out) const {
   out << sensorLabel << timestamp;
   out.WriteAs<std::int32_t>(camera_index);
   writeCamera(out, camera);
-  out << camera_pose << covered_until_ns.has_value() << covered_until_ns.value_or(0);
-  const std::vector<std::uint8_t> bytes = encodeEvents(events);
+  out << camera_pose << time_offset_ns << covered_until_ns.has_value()
+      << covered_until_ns.value_or(0);
+  const std::vector<std::uint8_t> bytes = encodeEvents(events, compression);
   out.WriteAs<std::uint32_t>(events.size());
   out << bytes;
 }
 
-void CObservationEvents::readContent(CArchive& in) {
+void CObservationEvents::readContent(CArchive& in, std::uint8_t version) {
   in >> sensorLabel >> timestamp;
   camera_index = in.ReadAs<std::int32_t>();
   camera = readCamera(in);
   bool covers = false;
   std::int64_t until_ns = 0;
-  in >> camera_pose >> covers >> until_ns;
+  in >> camera_pose;
+  time_offset_ns = version == 0 ? 0 : in.ReadAs<std::int64_t>();
+  in >> covers >> until_ns;
   covered_until_ns = covers ? std::optional(until_ns) : std::nullopt;
   const auto count = in.ReadAs<std::uint32_t>();
   std::vector<std::uint8_t> bytes;

@@ -12,6 +12,7 @@
 
 #include "mapping/events/event.h"
 #include "mapping/geometry/camera.h"
+#include "plugin/mrpt/event_encoding.h"
 
 // Visualizable's destructor is not virtual. Nobody deletes an observation through it.
 #pragma GCC diagnostic push
@@ -35,10 +36,13 @@ class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::
   int camera_index = 0;              ///< In the rig, 0 to 65,535.
   CameraModel camera;                ///< Calibration, the same in all packets of a camera.
   mrpt::poses::CPose3D camera_pose;  ///< T_rig_cam (MRPT's robot is the rig).
+  std::int64_t time_offset_ns = 0;   ///< Added to the stamps: t = t_event + offset.
   std::vector<Event> events;         ///< In time order.
   /// All events of the camera before this time are in this packet or in earlier ones. So an empty
   /// packet with this time says that there was no event.
   std::optional<std::int64_t> covered_until_ns;
+  /// How the events are stored. Zstandard is for rawlogs that are not compressed themselves.
+  EventCompression compression = EventCompression::kNone;
 
   void getSensorPose(mrpt::poses::CPose3D& out_pose) const override { out_pose = camera_pose; }
   void setSensorPose(const mrpt::poses::CPose3D& pose) override { camera_pose = pose; }
@@ -54,7 +58,7 @@ class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::
 
  private:
   void writeContent(mrpt::serialization::CArchive& out) const;
-  void readContent(mrpt::serialization::CArchive& in);
+  void readContent(mrpt::serialization::CArchive& in, std::uint8_t version);
 };
 
 }  // namespace efm

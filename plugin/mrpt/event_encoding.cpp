@@ -2,6 +2,7 @@
 #include "plugin/mrpt/event_encoding.h"
 
 #include <fmt/format.h>
+#include <zstd.h>
 
 #include <algorithm>
 #include <stdexcept>
@@ -11,6 +12,7 @@ namespace efm {
 namespace {
 
 constexpr std::uint8_t kColumns = 1;
+constexpr std::uint8_t kZstdColumns = 2;
 constexpr std::int64_t kTicksNs[] = {1, 1000};
 constexpr std::size_t kHeaderSize = 10;  // encoding, tick, first time
 
@@ -74,11 +76,8 @@ std::int64_t unzigzag(std::uint64_t code) {
   return static_cast<std::int64_t>((code >> 1) ^ (~(code & 1) + 1));
 }
 
-}  // namespace
-
-std::vector<std::uint8_t> encodeEvents(const std::vector<Event>& events) {
+std::vector<std::uint8_t> encodeColumns(const std::vector<Event>& events) {
   std::vector<std::uint8_t> bytes;
-  if (events.empty()) return bytes;
   const std::size_t count = events.size();
   bytes.reserve(kHeaderSize + 7 * count);
   const std::uint8_t tick = allStepsAreWholeMicroseconds(events) ? 1 : 0;
@@ -106,13 +105,12 @@ std::vector<std::uint8_t> encodeEvents(const std::vector<Event>& events) {
   return bytes;
 }
 
-std::vector<Event> decodeEvents(const std::vector<std::uint8_t>& bytes, std::size_t count) {
+std::vector<Event> decodeColumns(const std::vector<std::uint8_t>& bytes, std::size_t count) {
   ByteReader reader(bytes);
   std::vector<Event> events;
-  if (count == 0 && bytes.empty()) return events;
   if (const std::uint8_t encoding = reader.byte(); encoding != kColumns) {
     throw std::runtime_error(
-        fmt::format("encoded events: encoding {}, this program knows 1", encoding));
+        fmt::format("encoded events: encoding {}, this program knows 1 and 2", encoding));
   }
   const std::uint8_t tick = reader.byte();
   // Each event takes 4 bytes of coordinates at least.
@@ -140,6 +138,56 @@ std::vector<Event> decodeEvents(const std::vector<std::uint8_t>& bytes, std::siz
     events[i].polarity = ((polarity[i / 8] >> (i % 8)) & 1) != 0;
   }
   return events;
+}
+
+/// The bytes of encoding 1 as those of encoding 2.
+std::vector<std::uint8_t> compressed(const std::vector<std::uint8_t>& bytes) {
+  constexpr int kFastest = 1;
+  std::vector<std::uint8_t> result(1 + ZSTD_compressBound(bytes.size() - 1));
+  result[0] = kZstdColumns;
+  const std::size_t size = ZSTD_compress(result.data() + 1, result.size() - 1, bytes.data() + 1,
+                                         bytes.size() - 1, kFastest);
+  if (ZSTD_isError(size)) {
+    throw std::runtime_error(std::string("events cannot be compressed: ") +
+                             ZSTD_getErrorName(size));
+  }
+  result.resize(1 + size);
+  return result;
+}
+
+/// The reverse. @param count limits the memory that damaged bytes can ask for.
+std::vector<std::uint8_t> decompressed(const std::vector<std::uint8_t>& bytes, std::size_t count) {
+  constexpr std::size_t kMaxEventSize = 15;  // 10 of the time, 4 of the pixel, 1 of the polarity
+  const auto size = ZSTD_getFrameContentSize(bytes.data() + 1, bytes.size() - 1);
+  if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ||
+      size > kHeaderSize + kMaxEventSize * count) {
+    throw std::runtime_error("encoded events: a compressed size that cannot be");
+  }
+  std::vector<std::uint8_t> result(1 + size);
+  result[0] = kColumns;
+  const std::size_t read =
+      ZSTD_decompress(result.data() + 1, size, bytes.data() + 1, bytes.size() - 1);
+  if (ZSTD_isError(read) || read != size) {
+    throw std::runtime_error("encoded events: their compression is damaged");
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encodeEvents(const std::vector<Event>& events,
+                                       EventCompression compression) {
+  if (events.empty()) return {};
+  std::vector<std::uint8_t> bytes = encodeColumns(events);
+  return compression == EventCompression::kZstd ? compressed(bytes) : bytes;
+}
+
+std::vector<Event> decodeEvents(const std::vector<std::uint8_t>& bytes, std::size_t count) {
+  if (count == 0 && bytes.empty()) return {};
+  if (!bytes.empty() && bytes.front() == kZstdColumns) {
+    return decodeColumns(decompressed(bytes, count), count);
+  }
+  return decodeColumns(bytes, count);
 }
 
 }  // namespace efm

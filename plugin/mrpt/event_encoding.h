@@ -19,10 +19,14 @@ namespace efm {
 ///   variable-length integer of 7 bits a byte, the low bits first
 ///   the low bytes of all x, the high bytes of all x, the same of y
 ///   the polarities, 8 a byte
+/// Encoding 2: a Zstandard frame (RFC 8878) of encoding 1 without its first byte.
 /// No events have no bytes.
 
+enum class EventCompression { kNone, kZstd };
+
 /// @param events in any order of time.
-std::vector<std::uint8_t> encodeEvents(const std::vector<Event>& events);
+std::vector<std::uint8_t> encodeEvents(const std::vector<Event>& events,
+                                       EventCompression compression = EventCompression::kNone);
 
 /// @throws std::runtime_error if the bytes are not exactly `count` encoded events.
 std::vector<Event> decodeEvents(const std::vector<std::uint8_t>& bytes, std::size_t count);

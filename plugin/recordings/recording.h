@@ -8,11 +8,10 @@
 
 namespace efm {
 
-struct Calibration;
-
 /// Oddities of a recording that could be read.
 struct RecordingCounts {
   std::uint64_t sorted_events = 0;  ///< Came up to 10 ms after a newer one.
+  std::uint64_t lost_packets = 0;   ///< Missing in the numbers that the recording gives its packets.
 };
 
 /// A recording as a stream of observations in the order of time: CObservationEvents,
@@ -33,12 +32,6 @@ class Recording {
   virtual double progress() const = 0;
 
   virtual RecordingCounts counts() const { return {}; }
-};
-
-/// Replacements for parts of a recording, which a folder of text files may lack then.
-struct RecordingOverrides {
-  const Calibration* calibration = nullptr;  ///< Used where the folder has none; may be null.
-  bool has_poses = false;                    ///< Poses are inserted later.
 };
 
 }  // namespace efm

@@ -24,6 +24,7 @@ mrpt::obs::CObservation::Ptr RigOverrideRecording::next() {
                                      CameraSize{packet->camera.width, packet->camera.height});
       packet->camera = camera.model;
       packet->camera_pose = mrptPoseFrom(camera.T_rig_cam);
+      packet->time_offset_ns = camera.time_offset_ns;
     }
   } else if (setup_.T_body_rig && poseSourceOf(*observation)) {
     setBodyToRig(*observation, *setup_.T_body_rig);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/formats/dataset_folder.h"
+#include "plugin/readers/dataset_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,10 @@
 
 #include <string>
 
+#include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "test/plugin/formats/files.h"
+#include "test/plugin/formats/open_as.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -39,13 +41,13 @@ class DatasetFolder : public TemporaryFolder {
   void remove(const std::string& name) const { std::filesystem::remove(folder() / name); }
 
   std::string errorOfOpening() const {
-    return errorOf([&] { openDatasetFolder(folder()); });
+    return errorOf([&] { openAs("folder", folder()); });
   }
 };
 
 TEST_F(DatasetFolder, ReturnsEventsOfEachCameraAndPosesInOrder) {
   EXPECT_TRUE(looksLikeDatasetFolder(folder()));
-  const auto recording = openDatasetFolder(folder());
+  const auto recording = openAs("folder", folder());
   std::string labels;
   while (const auto observation = recording->next()) {
     labels += observation->sensorLabel + " ";
@@ -59,13 +61,13 @@ TEST_F(DatasetFolder, ReturnsEventsOfEachCameraAndPosesInOrder) {
 
 TEST_F(DatasetFolder, ReadsGroundtruthWithoutAPosesFile) {
   std::filesystem::rename(folder() / "poses.txt", folder() / "groundtruth.txt");
-  EXPECT_EQ(openDatasetFolder(folder())->next()->sensorLabel, "pose");
+  EXPECT_EQ(openAs("folder", folder())->next()->sensorLabel, "pose");
 }
 
 TEST_F(DatasetFolder, OtherFilesAreIgnored) {
   write("cam7/events.txt", "nonsense\n");
   write("notes.txt", "nonsense\n");
-  EXPECT_NO_THROW(openDatasetFolder(folder()));
+  EXPECT_NO_THROW(openAs("folder", folder()));
 }
 
 TEST_F(DatasetFolder, IsDetectedByItsCalibrationOrItsFirstCamera) {
@@ -98,7 +100,7 @@ TEST_F(DatasetFolder, ErrorsInAFileNameItAndTheLine) {
   EXPECT_THAT(errorOfOpening(), HasSubstr("poses.txt:2: "));
   write("cam1/events.txt", "0.2 0 0 0\n0.3 240 0 0\n");
   write("poses.txt", "0.3 1 2 3 0 0 0 1\n");
-  const auto recording = openDatasetFolder(folder());
+  const auto recording = openAs("folder", folder());
   EXPECT_THAT(errorOf([&] {
                 while (recording->next()) {
                 }

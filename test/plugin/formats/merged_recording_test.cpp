@@ -9,9 +9,11 @@
 #include <string>
 #include <utility>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
+#include "plugin/readers/event_text.h"
 #include "plugin/recordings/recording_with_poses.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/temporary_folder.h"
@@ -53,7 +55,7 @@ class MergedRecordingTest : public TemporaryFolder {
   RecordingWithPoses open(const std::vector<std::string>& texts,
                           std::vector<StampedPose> poses = {}) {
     Rig rig;
-    std::vector<EventTextReader> readers;
+    std::vector<EventPackets> cameras;
     for (std::size_t n = 0; n < texts.size(); ++n) {
       RigCamera& camera = rig.cameras.emplace_back();
       camera.model.width = 240;
@@ -62,9 +64,9 @@ class MergedRecordingTest : public TemporaryFolder {
       camera.T_rig_cam.translation.x() = static_cast<double>(n);
       const std::filesystem::path file = folder() / ("cam" + std::to_string(n)) / "events.txt";
       writeFile(file, texts[n]);
-      readers.emplace_back(file, CameraSize{240, 180});
+      cameras.emplace_back(std::make_unique<EventTextStream>(file), CameraSize{240, 180});
     }
-    return RecordingWithPoses(std::make_unique<MergedRecording>(std::move(rig), std::move(readers)),
+    return RecordingWithPoses(std::make_unique<MergedRecording>(std::move(rig), std::move(cameras)),
                               std::move(poses));
   }
 };

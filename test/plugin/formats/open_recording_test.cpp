@@ -20,7 +20,10 @@ class OpenRecording : public TemporaryFolder {
   static std::string errorOf(const std::vector<std::filesystem::path>& sources,
                              const std::string& format = "auto") {
     try {
-      openRecording({sources, format, {}, {}, {}, {}});
+      RecordingSource source;
+      source.files = sources;
+      source.format = format;
+      openRecording(source);
     } catch (const std::exception& error) {
       return error.what();
     }
@@ -40,11 +43,6 @@ TEST_F(OpenRecording, AnotherFolderIsAnErrorThatNamesTheExpectedFiles) {
 
 TEST_F(OpenRecording, AnUnknownFormatIsNamed) {
   EXPECT_THAT(errorOf({folder()}, "tape"), HasSubstr("'tape'"));
-}
-
-TEST_F(OpenRecording, TakesOneSource) {
-  EXPECT_THAT(errorOf({folder(), folder()}), HasSubstr("2 sources"));
-  EXPECT_THAT(errorOf({}), HasSubstr("0 sources"));
 }
 
 TEST_F(OpenRecording, FormatsBeginWithAuto) {

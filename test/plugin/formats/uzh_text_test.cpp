@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/formats/uzh_text.h"
+#include "plugin/readers/uzh_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
+#include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_time.h"
 #include "test/paths.h"
 #include "test/plugin/formats/files.h"
+#include "test/plugin/formats/open_as.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -34,7 +36,7 @@ class UzhText : public TemporaryFolder {
   }
   void remove(const std::string& name) const { std::filesystem::remove(folder() / name); }
   std::string errorOfOpening() const {
-    return errorOf([&] { openUzhFolder(folder()); });
+    return errorOf([&] { openAs("uzh", folder()); });
   }
   std::string sizeFound() const {
     const CameraSize size = uzhSensorSize(folder());
@@ -83,7 +85,7 @@ TEST_F(UzhText, TheSensorHasTheSizeOfTheFirstExistingImage) {
   cv::imwrite((folder() / "images" / "frame_1.png").string(), cv::Mat::zeros(260, 346, CV_8UC1));
   EXPECT_EQ(sizeFound(), "346x260");
   write("events.txt", "0.1 345 259 1\n");
-  EXPECT_NO_THROW(openUzhFolder(folder()));
+  EXPECT_NO_THROW(openAs("uzh", folder()));
 }
 
 TEST_F(UzhText, AnImageThatCannotBeReadIsAnError) {
@@ -116,7 +118,7 @@ TEST(UzhSliderDepth, IsReadWhole) {
   const std::filesystem::path folder = EFM_SHARED_DATA "/slider_depth";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not there";
   ASSERT_TRUE(looksLikeUzhFolder(folder));
-  const auto recording = openUzhFolder(folder);
+  const auto recording = openAs("uzh", folder);
   std::vector<Event> events;
   std::size_t poses = 0;
   std::int64_t newest_ns = 0;

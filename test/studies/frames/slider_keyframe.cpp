@@ -6,8 +6,9 @@
 #include <utility>
 
 #include "mapping/keyframes/keyframe_policy.h"
-#include "plugin/formats/event_text.h"
-#include "plugin/formats/uzh_text.h"
+#include "plugin/readers/event_packets.h"
+#include "plugin/readers/event_text.h"
+#include "plugin/readers/uzh_text.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm::studies {
@@ -20,7 +21,7 @@ SliderRecording readSlider(const std::filesystem::path& folder) {
     recording.trajectory.add(pose);
   }
   const std::int64_t first_pose_ns = recording.trajectory.poses().front().t_ns;
-  EventTextReader reader(folder / "events.txt", size);
+  EventPackets reader(std::make_unique<EventTextStream>(folder / "events.txt"), size);
   for (auto packet = reader.nextPacket(); !packet.empty(); packet = reader.nextPacket()) {
     for (const Event& event : packet) {
       if (event.t_ns >= first_pose_ns) recording.events.push_back(event);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/formats/event_text.h"
+#include "plugin/readers/event_text.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <limits>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -41,23 +42,10 @@ bool takeBlanks(const char*& text) {
   return any;
 }
 
-/// The end of the grid's period that contains a time.
-std::int64_t periodEnd(std::int64_t t_ns) {
-  std::int64_t rest_ns = t_ns % kPacketPeriodNs;
-  if (rest_ns < 0) rest_ns += kPacketPeriodNs;
-  return t_ns - rest_ns + kPacketPeriodNs;
-}
-
-std::optional<std::uint16_t> parsePixel(std::string_view text, int side) {
-  const std::optional<int> value = parseNumber<int>(text);
-  if (!value || *value < 0 || *value >= side) return std::nullopt;
-  return static_cast<std::uint16_t>(*value);
-}
-
 }  // namespace
 
-EventTextReader::EventTextReader(std::filesystem::path file, CameraSize size)
-    : file_(std::move(file)), size_(size), stream_(file_, std::ios::binary) {
+EventTextStream::EventTextStream(std::filesystem::path file)
+    : file_(std::move(file)), stream_(file_, std::ios::binary) {
   std::error_code error;
   if (!stream_ || std::filesystem::is_directory(file_, error)) {
     throw std::runtime_error(file_.string() + ": cannot be opened for reading");
@@ -66,55 +54,10 @@ EventTextReader::EventTextReader(std::filesystem::path file, CameraSize size)
   if (error) bytes_total_ = 0;  // a pipe
 }
 
-std::vector<Event> EventTextReader::nextPacket() {
-  readAhead();
-  if (first_ == events_.size()) {
-    if (error_) std::rethrow_exception(error_);
-    return {};
-  }
-  const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first_);
-  const auto end = std::partition_point(
-      begin, events_.end(),
-      [end_ns = periodEnd(begin->t_ns)](const Event& event) { return event.t_ns < end_ns; });
-  first_ = static_cast<std::size_t>(end - events_.begin());
-  return {begin, end};
-}
-
-std::optional<std::int64_t> EventTextReader::nextTime() {
-  readAhead();
-  if (first_ < events_.size()) return events_[first_].t_ns;
-  if (!error_) return std::nullopt;
-  if (newest_ns_ == -kEndOfTimeNs) std::rethrow_exception(error_);
-  return newest_ns_;
-}
-
-void EventTextReader::readAhead() {
-  while (!ended_ && !error_ && !packetIsComplete()) {
-    events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(first_));
-    first_ = 0;
-    try {
-      readBlock();
-    } catch (const std::runtime_error&) {
-      error_ = std::current_exception();  // thrown after the events above it
-    }
-    sortEvents();
-  }
-}
-
-void EventTextReader::sortEvents() {
-  if (!disordered_) return;
-  std::stable_sort(events_.begin(), events_.end(),
-                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
-  disordered_ = false;
-}
-
-/// Whether no further event can belong to the first packet.
-bool EventTextReader::packetIsComplete() const {
-  return first_ < events_.size() &&
-         newest_ns_ - kMaxEventDelayNs >= periodEnd(events_[first_].t_ns);
-}
-
-void EventTextReader::readBlock() {
+bool EventTextStream::read(std::vector<Event>& events) {
+  events.clear();
+  lines_.clear();
+  if (ended_) return false;
   block_.resize(kBlockBytes);
   stream_.read(block_.data() + carried_, static_cast<std::streamsize>(kBlockBytes - carried_));
   if (stream_.bad()) throw std::runtime_error(file_.string() + ": cannot be read to its end");
@@ -125,39 +68,49 @@ void EventTextReader::readBlock() {
   const std::string_view text(block_.data(), carried_ + count);
   const std::size_t newline = text.rfind('\n');
   const std::size_t whole = newline == std::string_view::npos ? 0 : newline + 1;
-  takeLines(text.data(), text.data() + whole);
+  takeLines(text.data(), text.data() + whole, events);
   carried_ = text.size() - whole;
   if (ended_ && carried_ > 0) {
     ++line_;
-    if (const auto event = parseLine(text.substr(whole), true)) take(*event);
+    takeLine(text.substr(whole), true, events);
   } else if (carried_ == kBlockBytes) {
     ++line_;
     throw std::runtime_error(fmt::format("{}{}: expected t x y p, not a line of over {} bytes",
                                          place(), inQuotes(text), kBlockBytes));
   }
   std::copy(text.begin() + static_cast<std::ptrdiff_t>(whole), text.end(), block_.begin());
+  return true;
 }
 
-void EventTextReader::takeLines(const char* begin, const char* end) {
+void EventTextStream::takeLines(const char* begin, const char* end, std::vector<Event>& events) {
   assert(begin == end || end[-1] == '\n');
+  lines_.emplace_back(events.size(), line_ + 1);
   Event event;
   while (begin != end) {
     ++line_;
     if (const char* const next = parsePlainLine(begin, event)) {
-      take(event);
+      events.push_back(event);
       begin = next;
     } else {
       const char* const newline = std::find(begin, end, '\n');
-      const std::string_view line(begin, static_cast<std::size_t>(newline - begin));
-      if (const auto parsed = parseLine(line, false)) take(*parsed);
+      takeLine({begin, static_cast<std::size_t>(newline - begin)}, false, events);
       begin = newline + 1;
     }
   }
 }
 
+void EventTextStream::takeLine(std::string_view line, bool unterminated,
+                               std::vector<Event>& events) {
+  if (const auto event = parseLine(line, unterminated)) {
+    events.push_back(*event);
+  } else {
+    lines_.emplace_back(events.size(), line_ + 1);
+  }
+}
+
 /// The fast path for a plain line. Each step stops at the newline at the latest.
 /// @return the next line; null if `parseLine` must parse this line.
-const char* EventTextReader::parsePlainLine(const char* text, Event& event) const {
+const char* EventTextStream::parsePlainLine(const char* text, Event& event) const {
   constexpr std::array<std::uint64_t, 10> kNanosecondsOfDigits = {
       1'000'000'000, 100'000'000, 10'000'000, 1'000'000, 100'000, 10'000, 1'000, 100, 10, 1};
   constexpr int kMaxSecondDigits = 10;
@@ -177,8 +130,8 @@ const char* EventTextReader::parsePlainLine(const char* text, Event& event) cons
   if (x.count < 1 || x.count > kMaxPixelDigits || !takeBlanks(text)) return nullptr;
   const Digits y = takeDigits(text);
   if (y.count < 1 || y.count > kMaxPixelDigits || !takeBlanks(text)) return nullptr;
-  if (x.value >= static_cast<std::uint64_t>(size_.width)) return nullptr;
-  if (y.value >= static_cast<std::uint64_t>(size_.height)) return nullptr;
+  constexpr std::uint64_t kMaxPixel = std::numeric_limits<std::uint16_t>::max();
+  if (x.value > kMaxPixel || y.value > kMaxPixel) return nullptr;
 
   const char polarity = *text;
   if (polarity != '0' && polarity != '1') return nullptr;
@@ -193,7 +146,7 @@ const char* EventTextReader::parsePlainLine(const char* text, Event& event) cons
   return text + 1;
 }
 
-std::optional<Event> EventTextReader::parseLine(std::string_view line, bool unterminated) const {
+std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unterminated) const {
   constexpr std::size_t kFields = 4;
   const std::string_view content = line.substr(0, line.find('#'));
   const std::vector<std::string_view> fields = splitWords(content);
@@ -211,12 +164,10 @@ std::optional<Event> EventTextReader::parseLine(std::string_view line, bool unte
     return std::runtime_error(
         fmt::format("{}{} = {}: expected {}", place(), name, inQuotes(value), expected));
   };
-  const auto side_of = [&](const char* name, std::string_view value, int side) {
-    const std::optional<std::uint16_t> pixel = parsePixel(value, side);
+  const auto pixel_of = [&](const char* name, std::string_view value) {
+    const std::optional<std::uint16_t> pixel = parseNumber<std::uint16_t>(value);
     if (pixel) return *pixel;
-    throw fail(name, value,
-               fmt::format("a whole number from 0 to {} (the sensor has {}x{} pixels)", side - 1,
-                           size_.width, size_.height));
+    throw fail(name, value, "a whole number from 0 to 65535");
   };
   const std::optional<std::int64_t> t_ns = parseSeconds(fields[0]);
   if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
@@ -224,27 +175,26 @@ std::optional<Event> EventTextReader::parseLine(std::string_view line, bool unte
   }
   Event event;
   event.t_ns = *t_ns;
-  event.x = side_of("x", fields[1], size_.width);
-  event.y = side_of("y", fields[2], size_.height);
+  event.x = pixel_of("x", fields[1]);
+  event.y = pixel_of("y", fields[2]);
   if (fields[3] != "0" && fields[3] != "1") throw fail("p", fields[3], "polarity 0 or 1");
   event.polarity = fields[3] == "1";
   return event;
 }
 
-void EventTextReader::take(const Event& event) {
-  if (event.t_ns >= newest_ns_) {
-    newest_ns_ = event.t_ns;
-  } else if (newest_ns_ - event.t_ns <= kMaxEventDelayNs) {
-    disordered_ = true;
-    ++sorted_events_;
-  } else {
-    throw std::runtime_error(fmt::format(
-        "{}t = '{}': expected events in time order, at most 10 ms before the newest ({})", place(),
-        formatSeconds(event.t_ns), formatSeconds(newest_ns_)));
-  }
-  events_.push_back(event);
+std::string EventTextStream::positionOf(std::size_t index) const {
+  const auto after =
+      std::upper_bound(lines_.begin(), lines_.end(), index,
+                       [](std::size_t i, const auto& entry) { return i < entry.first; });
+  const auto& [first, line] = *std::prev(after);
+  return fmt::format("{}:{}", file_.string(), line + (index - first));
 }
 
-std::string EventTextReader::place() const { return fmt::format("{}:{}: ", file_.string(), line_); }
+double EventTextStream::progress() const {
+  if (bytes_total_ == 0) return 0;
+  return std::min(1.0, static_cast<double>(bytes_read_) / static_cast<double>(bytes_total_));
+}
+
+std::string EventTextStream::place() const { return fmt::format("{}:{}: ", file_.string(), line_); }
 
 }  // namespace efm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/formats/event_text.h"
+#include "plugin/readers/event_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +11,7 @@
 #include <string>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/readers/event_packets.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -30,9 +31,11 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
 
-constexpr CameraSize kSize = {240, 180};
+EventPackets open(const std::filesystem::path& file) {
+  return EventPackets(std::make_unique<EventTextStream>(file), {240, 180});
+}
 
-std::vector<Event> readAll(EventTextReader& reader) {
+std::vector<Event> readAll(EventPackets& reader) {
   std::vector<Event> events;
   for (std::vector<Event> packet = reader.nextPacket(); !packet.empty();
        packet = reader.nextPacket()) {
@@ -56,7 +59,7 @@ class EventText : public TemporaryFolder {
 
   std::vector<Event> read(const std::string& text) const {
     writeFile(file(), text);
-    EventTextReader reader(file(), kSize);
+    EventPackets reader = open(file());
     return readAll(reader);
   }
   std::string errorOfText(const std::string& text) const {
@@ -141,7 +144,7 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
 
 TEST_F(EventText, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
   writeFile(file(), "0.020 1 0 0\n0.010 2 0 0\n0.015 3 0 0\n0.020 4 0 0\n0.025 5 0 0\n");
-  EventTextReader reader(file(), kSize);
+  EventPackets reader = open(file());
   EXPECT_THAT(readAll(reader),
               ElementsAre(Event{10'000'000, 2}, Event{15'000'000, 3}, Event{20'000'000, 1},
                           Event{20'000'000, 4}, Event{25'000'000, 5}));
@@ -150,7 +153,7 @@ TEST_F(EventText, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
 
 TEST_F(EventText, PacketsAreThePeriodsOfTheGridWithEvents) {
   writeFile(file(), "-0.001 0 0 0\n0 1 0 0\n0.009999999 2 0 0\n0.01 3 0 0\n7.123 4 0 0\n");
-  EventTextReader reader(file(), kSize);
+  EventPackets reader = open(file());
   EXPECT_EQ(reader.nextTime(), -1'000'000);
   EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{-1'000'000, 0}));
   EXPECT_EQ(reader.nextTime(), 0);
@@ -172,15 +175,14 @@ TEST_F(EventText, ManyBlocksAreReadCompletelyAndOnDemand) {
                       static_cast<std::uint16_t>(i * 11 % 180), i % 3 == 0});
   }
   writeFile(file(), textOf(events));  // 9 MB
-  EventTextReader reader(file(), kSize);
-  EXPECT_EQ(reader.bytesTotal(), std::filesystem::file_size(file()));
-  EXPECT_EQ(reader.bytesRead(), 0U);
+  EventPackets reader = open(file());
+  EXPECT_EQ(reader.stream().progress(), 0);
   std::vector<Event> read = reader.nextPacket();
-  EXPECT_LT(reader.bytesRead(), reader.bytesTotal() / 2);
+  EXPECT_LT(reader.stream().progress(), 0.5);
   const std::vector<Event> rest = readAll(reader);
   read.insert(read.end(), rest.begin(), rest.end());
   EXPECT_TRUE(read == events);
-  EXPECT_EQ(reader.bytesRead(), reader.bytesTotal());
+  EXPECT_EQ(reader.stream().progress(), 1);
 }
 
 TEST_F(EventText, LateEventsAreSortedAcrossBlocksAndStably) {
@@ -193,7 +195,7 @@ TEST_F(EventText, LateEventsAreSortedAcrossBlocksAndStably) {
                       static_cast<std::uint16_t>(i / 240 % 180), false});
   }
   writeFile(file(), textOf(events));
-  EventTextReader reader(file(), kSize);
+  EventPackets reader = open(file());
   const std::vector<Event> read = readAll(reader);
   std::stable_sort(events.begin(), events.end(),
                    [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
@@ -220,7 +222,7 @@ TEST_F(EventText, EventsAboveAWrongLineComeBeforeTheError) {
        {std::string("garbage\n"), std::string("0.0 1 2 1\n"), std::string("5.1 1"),
         std::string("5.1 240 2 1\n5.2 1 2 1\n"), std::string(3 << 20, 'x')}) {
     writeFile(file(), good + bad);
-    EventTextReader reader(file(), kSize);
+    EventPackets reader = open(file());
     std::vector<Event> given;
     const std::string error = errorOf([&] {
       while (reader.nextTime()) {
@@ -240,9 +242,9 @@ TEST_F(EventText, TheErrorOfABinaryFileHasNoControlCharacters) {
 }
 
 TEST_F(EventText, AMissingFileIsNamed) {
-  EXPECT_THAT(errorOf([&] { EventTextReader(file(), kSize); }),
+  EXPECT_THAT(errorOf([&] { open(file()); }),
               AllOf(StartsWith(file().string()), HasSubstr("cannot be opened")));
-  EXPECT_THAT(errorOf([&] { EventTextReader(folder(), kSize); }),
+  EXPECT_THAT(errorOf([&] { open(folder()); }),
               AllOf(StartsWith(folder().string()), HasSubstr("cannot be opened")));
 }
 
@@ -268,7 +270,7 @@ RC_GTEST_PROP(EventTextProperty, WrittenEventsAreReadBackInTimeOrder, ()) {
   }
   writeFile(propertyFile(), textOf(events));
 
-  EventTextReader reader(propertyFile(), kSize);
+  EventPackets reader = open(propertyFile());
   std::vector<Event> read;
   for (std::vector<Event> packet = reader.nextPacket(); !packet.empty();
        packet = reader.nextPacket()) {

@@ -2,10 +2,9 @@
 #pragma once
 
 #include <filesystem>
-#include <memory>
+#include <vector>
 
-#include "plugin/calibration/calibration_file.h"
-#include "plugin/recordings/recording.h"
+#include "plugin/readers/recording_parts.h"
 
 namespace efm {
 
@@ -15,13 +14,12 @@ namespace efm {
 ///   calib.txt         fx fy cx cy k1 k2 p1 p2 k3
 ///   images.txt        t file, optional: the size of an image is the sensor's.
 
-/// Whether the folder has an events.txt. `openUzhFolder` names other missing files.
+/// Whether the folder has an events.txt.
 bool looksLikeUzhFolder(const std::filesystem::path& folder);
 
-/// @throws std::runtime_error naming the file (and line) that is missing or wrong;
-/// std::invalid_argument if a given calibration has several cameras or another size.
-std::unique_ptr<Recording> openUzhFolder(const std::filesystem::path& folder,
-                                         const RecordingOverrides& given = {});
+/// @throws std::runtime_error naming the file (and line) that is missing or wrong.
+RecordingParts openUzhFolder(const std::vector<std::filesystem::path>& folders,
+                             const ReaderOptions& options);
 
 /// The size of the first existing image of images.txt. Without one 240x180: the whole dataset was
 /// recorded with a DAVIS240C.

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/readers/recording_formats.h"
+
+#include "plugin/readers/dataset_folder.h"
+#include "plugin/readers/uzh_text.h"
+
+namespace efm {
+
+const std::vector<RecordingFormat>& readerFormats() {
+  static const std::vector<RecordingFormat> all = {
+      {"folder", "a dataset folder (camchain.yaml, cam0/events.txt, poses.txt)",
+       looksLikeDatasetFolder, openDatasetFolder},
+      {"uzh", "a folder in the UZH layout (events.txt, groundtruth.txt, calib.txt)",
+       looksLikeUzhFolder, openUzhFolder},
+  };
+  return all;
+}
+
+const RecordingFormat* detectFormat(const std::filesystem::path& source) {
+  for (const RecordingFormat& format : readerFormats()) {
+    if (format.matches(source)) return &format;
+  }
+  return nullptr;
+}
+
+}  // namespace efm

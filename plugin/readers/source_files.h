@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <vector>
+
+namespace efm {
+
+/// Whether it is a regular file, or a link to one. Never throws.
+inline bool isFile(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
+/// @param what the format, for the error.
+/// @throws std::runtime_error where there are several sources.
+inline const std::filesystem::path& onlySource(const std::vector<std::filesystem::path>& sources,
+                                               const char* what) {
+  if (sources.size() == 1) return sources.front();
+  throw std::runtime_error(fmt::format("{}: {} sources: expected one, {}", sources.at(1).string(),
+                                       sources.size(), what));
+}
+
+}  // namespace efm
