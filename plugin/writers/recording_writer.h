@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/trajectory.h"
+
+namespace efm {
+
+/// Writes a recording in a format of other tools, in constant memory. Results get their names when
+/// `close` is called; without it, nothing is left.
+class RecordingWriter {
+ public:
+  virtual ~RecordingWriter() = default;
+
+  /// @param camera index in the rig.
+  /// @param events in time order, not before the camera's earlier ones. Times in ns of the
+  /// recording's clock, with the camera's time offset already added.
+  /// @throws std::runtime_error naming the file if it cannot be written, or the format cannot hold
+  /// a value.
+  virtual void addEvents(std::size_t camera, const std::vector<Event>& events) = 0;
+  /// @param pose T_world_rig; poses come in time order.
+  virtual void addPose(const StampedPose& pose) = 0;
+  /// Completes the files.
+  virtual void close() = 0;
+};
+
+}  // namespace efm
