@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -12,6 +13,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "plugin/app/evaluate_arguments.h"
+#include "plugin/app/export_command.h"
 #include "plugin/app/import_command.h"
 #include "plugin/app/info_command.h"
 #include "plugin/app/map_command.h"
@@ -116,6 +118,23 @@ template <typename Arguments>
 void addTimeLimits(CLI::App& command, Arguments& arguments) {
   addTime(command, "--t0", arguments.t0_ns, "Leave out events before this time");
   addTime(command, "--t1", arguments.t1_ns, "Leave out events from this time on");
+}
+
+/// For commands that write a rawlog.
+void addPacketLength(CLI::App& command, std::int64_t& packet_ns) {
+  command
+      .add_option_function<std::string>(
+          "--packet-s",
+          [&packet_ns](const std::string& text) {
+            const std::optional<std::int64_t> length_ns = parseSeconds(text);
+            if (!length_ns || *length_ns < 1'000 || *length_ns > kNanosecondsPerSecond) {
+              throw CLI::ValidationError("--packet-s",
+                                         inQuotes(text) + ": expected 0.000001 to 1 seconds");
+            }
+            packet_ns = *length_ns;
+          },
+          "Length of a packet of events; of a rawlog, packets stay as they are (default 0.01)")
+      ->type_name("SECONDS");
 }
 
 void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
@@ -227,6 +246,32 @@ void addImport(CLI::App& app, Run& run) {
       ->required()
       ->type_name("FILE.rawlog");
   addTimeLimits(command, *arguments);
+  static const std::map<std::string, RawlogCompression> kCompressions = {
+      {"gzip", RawlogCompression::kGzip},
+      {"zstd", RawlogCompression::kZstd},
+      {"none", RawlogCompression::kNone}};
+  command
+      .add_option("--compression", arguments->compression,
+                  "gzip: the whole rawlog (default). zstd: the events alone, in a plain rawlog; "
+                  "faster to write and to read. none")
+      ->transform(CLI::Transformer(kCompressions))
+      ->type_name("gzip|zstd|none");
+  addPacketLength(command, arguments->source.packet_ns);
+  command.parse_complete_callback([arguments] { requireKeyframeLengthOf(*arguments); });
+}
+
+void addExport(CLI::App& app, Run& run) {
+  CLI::App& command =
+      *app.add_subcommand("export", "Write a recording for other tools: text, DSEC's HDF5, MCAP");
+  auto arguments = argumentsOf(command, run, runExport);
+  addSource(command, *arguments);
+  command.add_option("--to", arguments->format, "The format to write")
+      ->required()
+      ->check(CLI::IsMember(exportFormats()));
+  command.add_option("--out", arguments->out, "The folder or the file to write; a new one")
+      ->required()
+      ->type_name("PATH");
+  addTimeLimits(command, *arguments);
   command.parse_complete_callback([arguments] { requireKeyframeLengthOf(*arguments); });
 }
 
@@ -282,7 +327,8 @@ std::function<int()> parseCommandLine(int argc, char** argv) {
   app.set_help_all_flag("--help-all", "Print the help of every command and exit");
   app.require_subcommand(1);
   Run run;
-  for (const auto add : {addSimulate, addImport, addMap, addDepth, addEvaluate, addInfo}) {
+  for (const auto add :
+       {addSimulate, addImport, addExport, addMap, addDepth, addEvaluate, addInfo}) {
     add(app, run);
   }
   try {

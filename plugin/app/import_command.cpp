@@ -15,11 +15,11 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
+#include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/time_cut.h"
 
 namespace efm {
 namespace {
@@ -63,8 +63,8 @@ void refuseLimitsWithoutEvents(const ImportArguments& arguments) {
 
 int runImport(const ImportArguments& arguments) {
   const std::unique_ptr<Recording> recording =
-      cutTime(openRecording(arguments.source), arguments.t0_ns, arguments.t1_ns);
-  RawlogWriter writer(arguments.out);
+      openInterval(arguments.source, arguments.t0_ns, arguments.t1_ns);
+  RawlogWriter writer(arguments.out, arguments.compression);
   std::map<std::string, std::uint64_t> events;  // per label
   std::uint64_t all_events = 0;
   std::uint64_t poses = 0;
@@ -95,6 +95,7 @@ int runImport(const ImportArguments& arguments) {
   if (others > 0) fmt::print("{} other observations\n", others);
   fmt::print("{} poses; {} events were out of order and sorted\n", poses,
              recording->counts().sorted_events);
+  warnOfLostPackets(recording->counts());
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
     std::cerr << fmt::format(
         "event-fusion: warning: odometry ({} observations) cannot hold the hand-eye transform: "

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "plugin/formats/open_recording.h"
+#include "plugin/formats/rawlog_writer.h"
 
 namespace efm {
 
@@ -14,6 +15,7 @@ struct ImportArguments {
   std::optional<std::int64_t> t0_ns;
   std::optional<std::int64_t> t1_ns;
   std::filesystem::path out;
+  RawlogCompression compression = RawlogCompression::kGzip;
 };
 
 /// `event-fusion import`: writes a recording as a rawlog.

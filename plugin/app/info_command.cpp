@@ -12,11 +12,11 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
+#include "plugin/app/recording_interval.h"
 #include "plugin/app/system_info.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/time_cut.h"
 
 namespace efm {
 namespace {
@@ -107,6 +107,16 @@ class Contents {
   }
 };
 
+std::string asText(const CameraModel& model) {
+  constexpr int kUnknown = 65'535;
+  const std::string size = model.width == kUnknown
+                               ? "unknown size"
+                               : fmt::format("{}x{} pixels", model.width, model.height);
+  if (model.fx <= 0) return size + ", no calibration";
+  return fmt::format("{}, focal length {:g} px, distortion {}", size, model.fx,
+                     nameOf(model.distortion));
+}
+
 void printStream(const Stream& stream, const char* what) {
   fmt::print("{} {}", stream.count, what);
   if (stream.first_ns) {
@@ -119,9 +129,7 @@ void printStream(const Stream& stream, const char* what) {
 void print(const Contents& contents, const RecordingCounts& counts) {
   fmt::print("{} observations\n", contents.observations);
   for (const auto& [label, camera] : contents.cameras) {
-    fmt::print("{}: {}x{} pixels, focal length {:g} px, distortion {}\n  ", label,
-               camera.model.width, camera.model.height, camera.model.fx,
-               nameOf(camera.model.distortion));
+    fmt::print("{}: {}\n  ", label, asText(camera.model));
     printStream(camera.events, "events");
   }
   for (const auto& [source, poses] : contents.pose_sources) {
@@ -140,6 +148,7 @@ void print(const Contents& contents, const RecordingCounts& counts) {
   if (counts.sorted_events > 0) {
     fmt::print("{} events out of order by up to 10 ms\n", counts.sorted_events);
   }
+  warnOfLostPackets(counts);
 }
 
 }  // namespace
@@ -149,8 +158,9 @@ int runInfo(const InfoArguments& arguments) {
   if (arguments.source.files.empty()) return status;
   RecordingSource source = arguments.source;
   source.faults.latency_ns = 0;  // latency changes no time stamp
+  source.complete = false;
   const std::unique_ptr<Recording> recording =
-      cutTime(openRecording(source), arguments.t0_ns, arguments.t1_ns);
+      openInterval(source, arguments.t0_ns, arguments.t1_ns);
   Contents contents;
   std::exception_ptr stopped;
   {

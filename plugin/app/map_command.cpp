@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <functional>
 #include <initializer_list>
 #include <iostream>
@@ -42,6 +43,15 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
     perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.policy.stride_s);
   }
+  // A stamp and its camera's time offset: the time that limits and windows speak of.
+  const auto& offsets_ns = options.rig.time_offsets_ns;
+  const std::int64_t none_ns = 0;
+  const auto [least, most] = std::minmax_element(offsets_ns.begin(), offsets_ns.end());
+  const auto& window = options.mapper.only_window;
+  const TimeLimits limits =
+      window ? TimeLimits{window->t0_ns, window->t1_ns} : options.mapper.limits;
+  if (limits.t0_ns) source.start_ns = *limits.t0_ns - (offsets_ns.empty() ? none_ns : *most);
+  if (limits.t1_ns) source.end_ns = *limits.t1_ns - (offsets_ns.empty() ? none_ns : *least);
   return source;
 }
 
@@ -110,6 +120,12 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, EventFusi
   return sequenceMaximum(options, *openRecording(source));
 }
 
+std::unique_ptr<Recording> openWhole(RecordingSource source) {
+  source.start_ns.reset();
+  source.end_ns.reset();
+  return openRecording(source);
+}
+
 /// Runs a job and writes its results.
 /// @param kind of the output folder.
 /// @param take receives each keyframe, in order, in a thread of its own.
@@ -133,6 +149,9 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     outcome = runMapping(job, *recording);
     writer.finish();
     whole.cpu.images = writer.cpuSeconds();
+    if (outcome.report.counts.keyframes == 0 && (source.start_ns || source.end_ns)) {
+      outcome = runMapping(job, *openWhole(source));  // for the error, which says all its times
+    }
     outcome.report.faults = source.faults;
     warnOfRecalibration(arguments, outcome);
     if (outcome.report.counts.keyframes > 0) write(*output, outcome);

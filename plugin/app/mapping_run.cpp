@@ -10,6 +10,7 @@
 
 #include "mapping/depth/robust_maximum.h"
 #include "plugin/app/progress.h"
+#include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/session/no_keyframe.h"
@@ -211,6 +212,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   }
   outcome.report.points = outcome.points.size();
   outcome.warnings = warningsOf(status, job.options.mapper.keyframe.exclude_silent);
+  if (const auto lost = lostPacketsWarning(recording.counts())) outcome.warnings.push_back(*lost);
   if (status.counts.event_uses == 0 && !outcome.error) {
     outcome.error = status.counts.keyframes == 0
                         ? "there is no keyframe: " + whyNoKeyframe(status, job.options.mapper)

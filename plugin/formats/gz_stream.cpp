@@ -88,8 +88,8 @@ std::size_t GzInputStream::Write(const void*, std::size_t) { refuse("a stream to
 std::uint64_t GzInputStream::Seek(std::int64_t, TSeekOrigin) { refuse("a stream goes forward"); }
 std::uint64_t GzInputStream::getTotalBytesCount() const { refuse("a stream has no known size"); }
 
-GzOutputStream::GzOutputStream(const std::filesystem::path& file)
-    : file_(gzopen(file.c_str(), "wb1"), gzclose_w) {
+GzOutputStream::GzOutputStream(const std::filesystem::path& file, bool compressed)
+    : file_(gzopen(file.c_str(), compressed ? "wb1" : "wbT"), gzclose_w) {
   if (!file_) {
     throw std::runtime_error(file.string() + ": cannot be made: " + std::strerror(errno));
   }

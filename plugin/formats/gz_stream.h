@@ -46,11 +46,11 @@ class GzInputStream : public mrpt::io::CStream {
   std::size_t at_ = 0;  // in the buffer
 };
 
-/// A gzip file as an MRPT stream for writing, with MRPT's compression level, 1.
+/// A gzip file, with MRPT's compression level, 1, or a plain file, as an MRPT stream for writing.
 class GzOutputStream : public mrpt::io::CStream {
  public:
   /// @throws std::runtime_error naming the file if it cannot be created.
-  explicit GzOutputStream(const std::filesystem::path& file);
+  explicit GzOutputStream(const std::filesystem::path& file, bool compressed = true);
 
   /// Completes the file. @throws std::runtime_error if not all bytes could be written.
   void close();

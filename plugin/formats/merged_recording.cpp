@@ -17,13 +17,15 @@ MergedRecording::MergedRecording(Rig rig, std::vector<EventPackets> cameras)
     : rig_(std::move(rig)), cameras_(std::move(cameras)) {
   requireOption(cameras_.size() == rig_.cameras.size(), "event streams", cameras_.size(),
                 "one per camera");
-  if (!cameras_.empty() && !nextCamera()) {
-    std::string names;
-    for (const EventPackets& camera : cameras_) {
-      names += (names.empty() ? "" : ", ") + camera.stream().name();
-    }
-    throw std::runtime_error(names + ": no events: expected at least one");
+}
+
+void MergedRecording::requireEvents() {
+  if (cameras_.empty() || nextCamera()) return;
+  std::string names;
+  for (const EventPackets& camera : cameras_) {
+    names += (names.empty() ? "" : ", ") + camera.stream().name();
   }
+  throw std::runtime_error(names + ": no events: expected at least one");
 }
 
 mrpt::obs::CObservation::Ptr MergedRecording::next() {

@@ -23,8 +23,10 @@ namespace efm {
 class MergedRecording : public Recording {
  public:
   /// @param cameras one per camera of the rig; of none, there is no observation.
-  /// @throws std::runtime_error if no camera has an event; the streams' errors.
   MergedRecording(Rig rig, std::vector<EventPackets> cameras);
+
+  /// @throws std::runtime_error if there are cameras and none has an event; the streams' errors.
+  void requireEvents();
 
   mrpt::obs::CObservation::Ptr next() override;
   std::string position() const override { return position_; }

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -130,6 +131,15 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
   return rig;
 }
 
+/// The least and the greatest time offset that a camera may have: none, the recording's own, the
+/// given one.
+std::pair<std::int64_t, std::int64_t> offsetsOf(const Rig& rig, std::size_t camera,
+                                                const Calibration* given) {
+  const std::int64_t own_ns = rig.cameras[camera].time_offset_ns;
+  const std::int64_t given_ns = given == nullptr ? 0 : given->rig.cameras[camera].time_offset_ns;
+  return std::minmax({std::int64_t{0}, own_ns, given_ns});
+}
+
 std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& source,
                                 const Calibration* given) {
   if (parts.cameras.empty() && source.complete) {
@@ -141,10 +151,14 @@ std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& sou
     const CameraModel& model = rig.cameras[i].model;
     cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
                          source.packet_ns);
-    if (source.start_ns) cameras.back().startAt(*source.start_ns);
+    const auto [earliest_ns, latest_ns] = offsetsOf(rig, i, given);
+    if (source.start_ns) cameras.back().startAt(*source.start_ns - latest_ns);
+    if (source.end_ns) cameras.back().stopAt(*source.end_ns - earliest_ns);
   }
-  std::unique_ptr<Recording> recording =
-      std::make_unique<MergedRecording>(std::move(rig), std::move(cameras));
+  const bool has_limits = source.start_ns || source.end_ns;
+  auto events = std::make_unique<MergedRecording>(std::move(rig), std::move(cameras));
+  if (!has_limits) events->requireEvents();
+  std::unique_ptr<Recording> recording = std::move(events);
   if (!source.poses.empty()) return recording;
   if (parts.poses.empty() && source.complete) {
     throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",

@@ -30,8 +30,10 @@ struct RecordingSource {
 
   ReaderOptions reader;
   std::int64_t packet_ns = kPacketPeriodNs;  ///< Length of the packets of events, above 0.
-  /// Events before it may be left out without being read; a rawlog is read from its beginning.
+  /// Events outside [start_ns, end_ns) are left out, most of them without being read. A rawlog has
+  /// no index and is read whole.
   std::optional<std::int64_t> start_ns;
+  std::optional<std::int64_t> end_ns;
   /// Whether missing poses, or a missing calibration, are an error. Cameras without a calibration
   /// have a model without a focal length.
   bool complete = true;

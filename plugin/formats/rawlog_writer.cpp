@@ -6,15 +6,23 @@
 #include <stdexcept>
 
 #include "plugin/formats/gz_stream.h"
+#include "plugin/mrpt/CObservationEvents.h"
 
 namespace efm {
 
-RawlogWriter::RawlogWriter(const std::filesystem::path& file)
-    : file_(file), stream_(std::make_unique<GzOutputStream>(file_.temporary())) {}
+RawlogWriter::RawlogWriter(const std::filesystem::path& file, RawlogCompression compression)
+    : file_(file),
+      compression_(compression),
+      stream_(std::make_unique<GzOutputStream>(file_.temporary(),
+                                               compression == RawlogCompression::kGzip)) {}
 
 RawlogWriter::~RawlogWriter() = default;
 
-void RawlogWriter::write(const mrpt::obs::CObservation& observation) {
+void RawlogWriter::write(mrpt::obs::CObservation& observation) {
+  if (auto* packet = dynamic_cast<CObservationEvents*>(&observation)) {
+    packet->compression = compression_ == RawlogCompression::kZstd ? EventCompression::kZstd
+                                                                   : EventCompression::kNone;
+  }
   try {
     auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(*stream_);
     archive << observation;

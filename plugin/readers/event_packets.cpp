@@ -112,8 +112,10 @@ void EventPackets::takeBlock() {
                  fmt::format("events in time order, at most 10 ms before the newest ({})",
                              formatSeconds(newest_ns_)));
     }
-    if (!start_ns_ || event.t_ns >= *start_ns_) events_.push_back(event);
+    if (start_ns_ && event.t_ns < *start_ns_) continue;
+    if (!stop_ns_ || event.t_ns < *stop_ns_) events_.push_back(event);
   }
+  if (stop_ns_ && newest_ns_ - kMaxEventDelayNs >= *stop_ns_) ended_ = true;
 }
 
 void EventPackets::sortEvents() {

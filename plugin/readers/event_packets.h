@@ -27,8 +27,11 @@ class EventPackets {
   EventPackets(std::unique_ptr<EventStream> stream, CameraSize size,
                std::int64_t period_ns = kPacketPeriodNs);
 
-  /// Leaves out the events before a time. Called before the others.
+  /// Leaves out the events before a time, without reading them if the format allows it. Called
+  /// before the others.
   void startAt(std::int64_t t_ns);
+  /// Leaves out the events from a time on, and reads no further than 10 ms behind it.
+  void stopAt(std::int64_t t_ns) { stop_ns_ = t_ns; }
 
   /// The events of the next period of the grid with events, in time order; events of equal time in
   /// the order of the file. Empty at the end.
@@ -55,6 +58,7 @@ class EventPackets {
   CameraSize size_;
   std::int64_t period_ns_;
   std::optional<std::int64_t> start_ns_;
+  std::optional<std::int64_t> stop_ns_;
   bool ended_ = false;
   std::exception_ptr error_;  // of the wrong event
 

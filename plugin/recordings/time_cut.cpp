@@ -58,9 +58,27 @@ CObservation::Ptr TimeCut::next() {
   while (ready_.empty()) {
     if (!readOne()) return nullptr;
   }
+  const auto packet = std::dynamic_pointer_cast<CObservationEvents>(ready_.front());
+  if (packet && !packet->events.empty() && !announcements_.empty()) announceBefore(*packet);
   CObservation::Ptr observation = std::move(ready_.front());
   ready_.pop_front();
   return observation;
+}
+
+/// Nothing of a camera comes before t0; its first packet must begin where the announcement ends.
+void TimeCut::announceBefore(const CObservationEvents& first) {
+  for (auto entry = announcements_.rbegin(); entry != announcements_.rend(); ++entry) {
+    const CObservationEvents::Ptr& announcement = entry->second;
+    std::int64_t& covered_ns = *announcement->covered_until_ns;
+    if (entry->first == first.camera_index) {
+      covered_ns = first.events.front().t_ns;
+    } else {
+      covered_ns = std::clamp(covered_ns, t0_ns_, t1_ns_);
+    }
+    announcement->timestamp = mrptTimeFrom(first.events.front().t_ns);
+    ready_.push_front(announcement);
+  }
+  announcements_.clear();
 }
 
 /// @return false once nothing can follow.
@@ -113,6 +131,11 @@ void TimeCut::noteProgress(int camera, std::int64_t begin_ns, std::int64_t cover
 void TimeCut::addPacket(const CObservationEvents::Ptr& packet) {
   const std::optional<std::int64_t> begin_ns = beginOf(*packet);
   if (!begin_ns) return;
+  if (packet->events.empty() && !has_events_) {
+    announcements_[packet->camera_index] = packet;
+    return;
+  }
+  has_events_ = true;
   noteProgress(packet->camera_index, *begin_ns, packet->covered_until_ns.value_or(*begin_ns));
   if (!cutEvents(*packet, *begin_ns, t0_ns_, t1_ns_)) return;
   if (*begin_ns < t0_ns_ && !began_) {

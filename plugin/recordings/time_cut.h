@@ -18,7 +18,8 @@ namespace efm {
 /// An interval [t0, t1) of a recording: its events, its poses, and of each source the nearest pose
 /// before and after, so that events keep poses on both sides. A packet without a time has the time
 /// of its first event; other observations without a time pass. At t1 it reads further until each
-/// camera has passed t1, but at most for a second: a packet may come only when it ends.
+/// camera has passed t1, but at most for a second: a packet may come only when it ends. Empty
+/// packets that announce the rig announce it before the first event of the interval.
 class TimeCut : public Recording {
  public:
   /// @param t0_ns, t1_ns nothing: no limit.
@@ -45,6 +46,7 @@ class TimeCut : public Recording {
   void addPacket(const CObservationEvents::Ptr& packet);
   void addOther(const mrpt::obs::CObservation::Ptr& observation);
   void deliver(const mrpt::obs::CObservation::Ptr& observation);
+  void announceBefore(const CObservationEvents& first);
 
   std::unique_ptr<Recording> recording_;
   std::int64_t t0_ns_;
@@ -53,6 +55,9 @@ class TimeCut : public Recording {
   std::map<PoseSourceId, PoseTrack> poses_;
   std::vector<mrpt::obs::CObservation::Ptr> across_;  // packets that t0 cuts, until delivered
   std::deque<mrpt::obs::CObservation::Ptr> ready_;
+  /// Per camera, the empty packets before the first event, until delivered.
+  std::map<int, CObservationEvents::Ptr> announcements_;
+  bool has_events_ = false;                   // one was read
   std::map<int, bool> passed_t1_;             // per camera
   std::int64_t first_begin_ns_ = kMaxTimeNs;  // of packets
   bool events_ended_ = false;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/truth/dataset_writer.h"
 
-#include <unistd.h>
-
+#include <algorithm>
 #include <charconv>
 #include <cstddef>
 #include <fstream>
@@ -87,31 +86,6 @@ void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
 
 }  // namespace
 
-DatasetWriter::DatasetWriter(fs::path folder) : folder_(std::move(folder)) {
-  if (folder_.empty()) {
-    throw std::runtime_error("'': expected the name of the folder to write");
-  }
-  folder_ = fs::absolute(folder_).lexically_normal();
-  if (!folder_.has_filename()) folder_ = folder_.parent_path();  // a trailing slash
-  std::error_code error;
-  if (fs::exists(folder_, error) && !(fs::is_directory(folder_) && fs::is_empty(folder_))) {
-    throw std::runtime_error(folder_.string() + ": exists already and is not an empty folder");
-  }
-  makeFolder(folder_.parent_path());
-  const fs::path unfinished = folder_.parent_path() / ("." + folder_.filename().string() +
-                                                       ".unfinished-" + std::to_string(getpid()));
-  fs::remove_all(unfinished, error);  // of a killed process with the same id
-  if (!fs::create_directory(unfinished, error)) {
-    throw std::runtime_error(unfinished.string() + ": cannot be made: " + error.message());
-  }
-  unfinished_ = unfinished;
-}
-
-DatasetWriter::~DatasetWriter() {
-  std::error_code ignored;
-  if (!unfinished_.empty()) fs::remove_all(unfinished_, ignored);
-}
-
 void DatasetWriter::write(const Simulation& simulation,
                           const std::vector<CameraRecording>& recordings) {
   const std::vector<RigCamera>& cameras = simulation.rig.cameras;
@@ -122,26 +96,23 @@ void DatasetWriter::write(const Simulation& simulation,
                 "T_rig_cam of camera 0", T_rig_cam0.translation.transpose(),
                 "the identity: poses.txt holds T_world_cam0");
 
+  const fs::path& folder = folder_.temporary();
   for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
-    const fs::path camera_folder = unfinished_ / ("cam" + std::to_string(camera));
+    const fs::path camera_folder = folder / ("cam" + std::to_string(camera));
     makeFolder(camera_folder);
     writeEvents(camera_folder / "events.txt", recordings[camera].events);
   }
-  writeText(unfinished_ / "camchain.yaml", formatCamchain(simulation.rig));
-  writeTumTrajectory(unfinished_ / "poses.txt", samplePoses(simulation));
+  writeText(folder / "camchain.yaml", formatCamchain(simulation.rig));
+  writeTumTrajectory(folder / "poses.txt", samplePoses(simulation));
   writeDepthMaps(simulation);
   const TruthClouds truth = makeTruthClouds(simulation, recordings);
-  writePly(unfinished_ / "gt_cloud.ply", truth.surfaces);
-  writePly(unfinished_ / "gt_edges.ply", truth.edges);
-
-  std::error_code error;
-  fs::rename(unfinished_, folder_, error);
-  if (error) throw std::runtime_error(folder_.string() + ": cannot be made: " + error.message());
-  unfinished_.clear();
+  writePly(folder / "gt_cloud.ply", truth.surfaces);
+  writePly(folder / "gt_edges.ply", truth.edges);
+  folder_.finish();
 }
 
 void DatasetWriter::writeDepthMaps(const Simulation& simulation) const {
-  const fs::path depth_folder = unfinished_ / "depth";
+  const fs::path depth_folder = folder_.temporary() / "depth";
   makeFolder(depth_folder);
   const ReferenceView view = ReferenceView::of(simulation.rig.cameras[0].model);
   std::string index;
@@ -156,10 +127,7 @@ void DatasetWriter::writeDepthMaps(const Simulation& simulation) const {
   writeText(depth_folder / "index.txt", index);
 }
 
-void writeEvents(const fs::path& file, const std::vector<Event>& events) {
-  std::ofstream stream(file, std::ios::binary);
-  constexpr std::size_t kFlushBytes = std::size_t{1} << 20;
-  std::string text;
+void appendEvents(std::string& text, EventSpan events) {
   for (const Event& event : events) {
     appendSeconds(text, event.t_ns);
     text += ' ';
@@ -167,12 +135,18 @@ void writeEvents(const fs::path& file, const std::vector<Event>& events) {
     text += ' ';
     appendNumber(text, event.y);
     text += event.polarity ? " 1\n" : " 0\n";
-    if (text.size() >= kFlushBytes) {
-      stream.write(text.data(), static_cast<std::streamsize>(text.size()));
-      text.clear();
-    }
   }
-  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
+}
+
+void writeEvents(const fs::path& file, const std::vector<Event>& events) {
+  constexpr std::size_t kBlock = 50'000;
+  std::ofstream stream(file, std::ios::binary);
+  std::string text;
+  for (std::size_t i = 0; i < events.size(); i += kBlock) {
+    text.clear();
+    appendEvents(text, EventSpan(events).part(i, std::min(i + kBlock, events.size())));
+    stream.write(text.data(), static_cast<std::streamsize>(text.size()));
+  }
   stream.close();
   if (!stream) throw cannotWrite(file);
 }

@@ -3,15 +3,17 @@
 
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/events/event.h"
 #include "mapping/geometry/rig.h"
 #include "tracking_stub/sensor/simulated_rig.h"
+#include "tracking_stub/truth/new_folder.h"
 
 namespace efm {
 
-/// Writes a simulated recording as a dataset folder:
+/// Writes a simulated recording as a dataset folder (a NewFolder):
 ///   camN/events.txt        a line `t x y p` per event
 ///   camchain.yaml          calibration in Kalibr's format
 ///   poses.txt              T_world_cam0 at 1 kHz, TUM
@@ -19,18 +21,12 @@ namespace efm {
 ///                          every 50 ms from the recording's start
 ///   depth/index.txt        a line `t file` per depth map, relative to depth/
 ///   gt_cloud.ply, gt_edges.ply   the truth clouds, frame `world`
-///
-/// The files are written to a temporary folder in the same parent folder. It is renamed when all
-/// files are written, and removed after an error.
 class DatasetWriter {
  public:
   /// Makes the temporary folder: an error is known before the simulation runs.
   /// @throws std::runtime_error naming the path where the folder exists and is not empty, or cannot
   /// be made.
-  explicit DatasetWriter(std::filesystem::path folder);
-  ~DatasetWriter();
-  DatasetWriter(const DatasetWriter&) = delete;
-  DatasetWriter& operator=(const DatasetWriter&) = delete;
+  explicit DatasetWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   /// Call it once.
   /// @param recordings of the simulation, one per camera.
@@ -41,13 +37,14 @@ class DatasetWriter {
  private:
   void writeDepthMaps(const Simulation& simulation) const;
 
-  std::filesystem::path folder_;
-  std::filesystem::path unfinished_;  // empty after it was renamed
+  NewFolder folder_;
 };
 
 /// Writes a line `t x y p` per event: seconds with nine decimals, polarity 0 or 1.
 /// @throws std::runtime_error naming the file.
 void writeEvents(const std::filesystem::path& file, const std::vector<Event>& events);
+/// Appends these lines to a text.
+void appendEvents(std::string& text, EventSpan events);
 
 /// The rig as a Kalibr camera chain.
 std::string formatCamchain(const Rig& rig);

@@ -44,6 +44,36 @@ TEST_F(ImportCommand, WritesARawlogAndPrintsItsContents) {
   EXPECT_TRUE(exists(folder() / "s.rawlog"));
 }
 
+TEST_F(ImportCommand, AnyCompressionAndPacketLengthGivesTheSameMap) {
+  write(SyntheticRecording());
+  const std::string map = mapOf("data");
+  for (const std::string options : {"--compression gzip", "--compression zstd",
+                                    "--compression none", "--compression zstd --packet-s 0.001"}) {
+    ASSERT_EQ(run("import data --out r.rawlog " + options).status, 0) << options;
+    EXPECT_EQ(mapOf("r.rawlog"), map) << options;
+  }
+  EXPECT_THAT(errorOf("import data --out r.rawlog --packet-s 0"), HasSubstr("--packet-s"));
+}
+
+TEST_F(ImportCommand, ACutRawlogStillAnnouncesItsCameras) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("import data --out cut.rawlog --t0 10.1 --t1 10.4").status, 0);
+  ASSERT_EQ(run("import cut.rawlog --out again.rawlog --compression zstd").status, 0);
+  EXPECT_EQ(mapOf("cut.rawlog"), mapOf("data --t0 10.1 --t1 10.4"));
+  EXPECT_EQ(mapOf("again.rawlog"), mapOf("cut.rawlog"));
+}
+
+TEST_F(ImportCommand, AnExportedFolderGivesTheSameMap) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  const Result result = run("export r.rawlog --to folder --out text");
+  EXPECT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(contentOf("text/cam1/events.txt"), contentOf("data/cam1/events.txt"));
+  EXPECT_EQ(mapOf("text"), mapOf("data"));
+  EXPECT_THAT(errorOf("export r.rawlog --to folder --out text"),
+              HasSubstr("exists already and is not an empty folder"));
+}
+
 TEST_F(ImportCommand, InfoIsTheSameForAFolderAndItsRawlog) {
   writeSmallRecording();
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);

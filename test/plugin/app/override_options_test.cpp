@@ -55,7 +55,7 @@ TEST_F(OverrideOptions, AMissingPartIsAnErrorThatNamesTheOption) {
   EXPECT_THAT(errorOf("map rig.ini data --out out"),
               HasSubstr("data: no poses: expected poses.txt or groundtruth.txt, or --poses FILE"));
   takeOut("camchain.yaml");
-  EXPECT_THAT(errorOf("info data --poses poses.txt"),
+  EXPECT_THAT(errorOf("import data --poses poses.txt --out r.rawlog"),
               HasSubstr("data: no calibration: expected camchain.yaml, or --calibration FILE"));
   EXPECT_THAT(errorOf("info data --poses nowhere.txt"), HasSubstr("nowhere.txt: cannot be opened"));
 }

@@ -66,8 +66,9 @@ class MergedRecordingTest : public TemporaryFolder {
       writeFile(file, texts[n]);
       cameras.emplace_back(std::make_unique<EventTextStream>(file), CameraSize{240, 180});
     }
-    return RecordingWithPoses(std::make_unique<MergedRecording>(std::move(rig), std::move(cameras)),
-                              std::move(poses));
+    auto merged = std::make_unique<MergedRecording>(std::move(rig), std::move(cameras));
+    merged->requireEvents();
+    return RecordingWithPoses(std::move(merged), std::move(poses));
   }
 };
 

@@ -84,7 +84,16 @@ TEST(TimeCut, KeepsPacketsThatSayACameraIsSilent) {
   EXPECT_THAT(cut({pose(0), packet(1, 100, 50'000, {}), packet(0, 100, 300, {200}), pose(200),
                    packet(0, 1000, 2000, {1500}), pose(1600)},
                   1200, 1550),
-              ElementsAre("pose 200", "cam1 1200 () 1550", "cam0 1500 (1500) 1550", "pose 1600"));
+              ElementsAre("pose 200", "cam1 1500 () 1550", "cam0 1500 (1500) 1550", "pose 1600"));
+}
+
+TEST(TimeCut, AnnouncesTheRigBeforeItsFirstEvent) {
+  // Three cameras; the first packet's camera must be covered until exactly its first event.
+  EXPECT_THAT(cut({packet(0, 100, 100, {}), packet(1, 100, 200, {}), packet(2, 100, 50'000, {}),
+                   packet(0, 100, 400, {100, 300}), packet(1, 200, 900, {200, 500})},
+                  250, 1500),
+              ElementsAre("cam0 300 () 300", "cam1 300 () 250", "cam2 300 () 1500",
+                          "cam0 300 (300) 400", "cam1 500 (500) 900"));
 }
 
 TEST(TimeCut, OfNothingIsEmpty) { EXPECT_THAT(cut(threePackets(), 10'000, 20'000), ElementsAre()); }

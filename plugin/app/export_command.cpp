@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/app/export_command.h"
+
+#include <fmt/format.h>
+
+#include <iostream>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "plugin/app/progress.h"
+#include "plugin/app/recording_interval.h"
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/pose_observation.h"
+#include "plugin/writers/folder_writer.h"
+
+namespace efm {
+namespace {
+
+struct ExportFormat {
+  std::string name;
+  std::unique_ptr<RecordingWriter> (*open)(const std::filesystem::path&, const Rig&);
+};
+
+template <typename Writer>
+std::unique_ptr<RecordingWriter> openWriter(const std::filesystem::path& out, const Rig& rig) {
+  return std::make_unique<Writer>(out, rig);
+}
+
+const std::vector<ExportFormat>& formats() {
+  static const std::vector<ExportFormat> all = {{"folder", openWriter<FolderWriter>}};
+  return all;
+}
+
+RigCamera cameraOf(const CObservationEvents& packet) {
+  return {packet.camera, rigidFrom(packet.camera_pose), 0};
+}
+
+/// The rig of a recording. One that announces its cameras is read up to its first event.
+/// @throws std::runtime_error if a camera is missing, or there is none.
+Rig rigOf(Recording& recording) {
+  std::map<int, RigCamera> cameras;
+  std::map<int, std::int64_t> announced_ns;
+  while (const auto observation = recording.next()) {
+    const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
+    if (packet == nullptr) continue;
+    cameras.emplace(packet->camera_index, cameraOf(*packet));
+    if (!packet->events.empty()) {
+      const auto announcement = announced_ns.find(packet->camera_index);
+      if (announcement != announced_ns.end() &&
+          announcement->second == packet->events.front().t_ns) {
+        break;
+      }
+      announced_ns.clear();
+    } else if (packet->covered_until_ns) {
+      announced_ns.emplace(packet->camera_index, *packet->covered_until_ns);
+    }
+  }
+  Rig rig;
+  for (const auto& [index, camera] : cameras) {
+    if (index != static_cast<int>(rig.cameras.size())) {
+      throw std::runtime_error(fmt::format("the recording has events of camera {} but none of {}",
+                                           index, rig.cameras.size()));
+    }
+    rig.cameras.push_back(camera);
+  }
+  if (rig.cameras.empty()) throw std::runtime_error("the recording has no events");
+  return rig;
+}
+
+/// Writes observations, and counts them.
+class Export {
+ public:
+  /// @param rig of the recording; the results' rig has camera 0's frame.
+  Export(const ExportArguments& arguments, Rig rig) : T_rig_cam0_(rig.cameras[0].T_rig_cam) {
+    const Rigid3 T_cam0_rig = T_rig_cam0_.inverse();
+    for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+      Rigid3& T = rig.cameras[i].T_rig_cam;
+      T = i == 0 ? Rigid3() : T_cam0_rig * T;
+    }
+    for (const ExportFormat& format : formats()) {
+      if (format.name == arguments.format) writer_ = format.open(arguments.out, rig);
+    }
+    if (!writer_) throw std::runtime_error("'" + arguments.format + "' is not a known format");
+  }
+
+  void add(const mrpt::obs::CObservation& observation) {
+    if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
+      std::vector<Event> shifted = packet->events;
+      for (Event& event : shifted) event.t_ns += packet->time_offset_ns;
+      writer_->addEvents(static_cast<std::size_t>(packet->camera_index), shifted);
+      events_ += shifted.size();
+    } else if (const auto source = poseSourceOf(observation)) {
+      if (!pose_source_) pose_source_ = source;
+      if (*source < *pose_source_ || *pose_source_ < *source) {
+        ++other_poses_;
+        return;
+      }
+      const ObservedPose pose = *poseIn(observation);
+      writer_->addPose({pose.t_ns, pose.T_world_body * pose.T_body_rig * T_rig_cam0_});
+      ++poses_;
+    }
+  }
+
+  void close(const std::filesystem::path& out) {
+    writer_->close();
+    fmt::print("{} events, {} poses; written to {}\n", events_, poses_, out.string());
+    if (other_poses_ > 0) {
+      std::cerr << fmt::format(
+          "event-fusion: warning: {} poses of other sources than {} were left out\n", other_poses_,
+          asText(*pose_source_));
+    }
+  }
+
+ private:
+  Rigid3 T_rig_cam0_;
+  std::unique_ptr<RecordingWriter> writer_;
+  std::optional<PoseSourceId> pose_source_;
+  std::uint64_t events_ = 0;
+  std::uint64_t poses_ = 0;
+  std::uint64_t other_poses_ = 0;
+};
+
+}  // namespace
+
+std::vector<std::string> exportFormats() {
+  std::vector<std::string> names;
+  for (const ExportFormat& format : formats()) names.push_back(format.name);
+  return names;
+}
+
+int runExport(const ExportArguments& arguments) {
+  const auto open = [&] {
+    return openInterval(arguments.source, arguments.t0_ns, arguments.t1_ns);
+  };
+  Export result(arguments, rigOf(*open()));
+  const std::unique_ptr<Recording> recording = open();
+  Progress progress;
+  while (const auto observation = recording->next()) {
+    result.add(*observation);
+    progress.showFraction("exporting", recording->progress());
+  }
+  result.close(arguments.out);
+  warnOfLostPackets(recording->counts());
+  return 0;
+}
+
+}  // namespace efm

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plugin/formats/open_recording.h"
+
+namespace efm {
+
+struct ExportArguments {
+  RecordingSource source;
+  std::optional<std::int64_t> t0_ns;
+  std::optional<std::int64_t> t1_ns;
+  std::string format;  ///< One of `exportFormats`.
+  std::filesystem::path out;
+};
+
+/// The formats that this build writes.
+std::vector<std::string> exportFormats();
+
+/// `event-fusion export`: writes a recording for other tools. Stamps have the cameras' time offsets
+/// added; poses are those of camera 0, T_world_cam0.
+/// @return the process's exit status.
+/// @throws std::exception if the recording cannot be read to its end or the result cannot be
+/// written. Then there is no result.
+int runExport(const ExportArguments& arguments);
+
+}  // namespace efm

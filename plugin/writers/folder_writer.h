@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <fstream>
+#include <vector>
+
+#include "plugin/writers/recording_writer.h"
+#include "tracking_stub/truth/new_folder.h"
+
+namespace efm {
+
+/// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0).
+class FolderWriter : public RecordingWriter {
+ public:
+  /// @param rig whose frame is that of camera 0.
+  /// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
+  FolderWriter(const std::filesystem::path& folder, const Rig& rig);
+
+  void addEvents(std::size_t camera, const std::vector<Event>& events) override;
+  void addPose(const StampedPose& pose) override;
+  void close() override;
+
+ private:
+  struct File {
+    std::filesystem::path path;
+    std::ofstream stream;
+  };
+  File open(const std::filesystem::path& path) const;
+
+  NewFolder folder_;
+  std::vector<File> events_;  // per camera
+  File poses_;
+};
+
+}  // namespace efm
