@@ -13,15 +13,18 @@ namespace {
 
 constexpr std::uint8_t kColumns = 1;
 constexpr std::uint8_t kZstdColumns = 2;
+constexpr std::size_t kMaxEventSize =
+    15;  // 10 bytes of the time, 4 of the pixel, 1 of the polarity
 constexpr std::int64_t kTicksNs[] = {1, 1000};
 constexpr std::size_t kHeaderSize = 10;  // encoding, tick, first time
 
-void putVarint(std::vector<std::uint8_t>& bytes, std::uint64_t value) {
+/// Writes an integer and moves `to` behind it.
+void putVarint(std::uint8_t*& to, std::uint64_t value) {
   while (value >= 0x80) {
-    bytes.push_back(static_cast<std::uint8_t>(value | 0x80));
+    *to++ = static_cast<std::uint8_t>(value | 0x80);
     value >>= 7;
   }
-  bytes.push_back(static_cast<std::uint8_t>(value));
+  *to++ = static_cast<std::uint8_t>(value);
 }
 
 /// Reads bytes in order. A read past the end is an error.
@@ -77,31 +80,41 @@ std::int64_t unzigzag(std::uint64_t code) {
 }
 
 std::vector<std::uint8_t> encodeColumns(const std::vector<Event>& events) {
-  std::vector<std::uint8_t> bytes;
   const std::size_t count = events.size();
-  bytes.reserve(kHeaderSize + 7 * count);
+  std::vector<std::uint8_t> bytes(kHeaderSize + kMaxEventSize * count);
   const std::uint8_t tick = allStepsAreWholeMicroseconds(events) ? 1 : 0;
-  bytes.push_back(kColumns);
-  bytes.push_back(tick);
+  std::uint8_t* to = bytes.data();
+  *to++ = kColumns;
+  *to++ = tick;
   const auto first = static_cast<std::uint64_t>(events.front().t_ns);
-  for (int shift = 0; shift < 64; shift += 8) {
-    bytes.push_back(static_cast<std::uint8_t>(first >> shift));
+  for (int shift = 0; shift < 64; shift += 8) *to++ = static_cast<std::uint8_t>(first >> shift);
+  // The divisor is a constant in each branch.
+  const auto put_steps = [&](auto tick_ns) {
+    for (std::size_t i = 1; i < count; ++i) {
+      putVarint(to, zigzag(stepBetween(events[i - 1].t_ns, events[i].t_ns) / tick_ns()));
+    }
+  };
+  if (tick == 1) {
+    put_steps([] { return kTicksNs[1]; });
+  } else {
+    put_steps([] { return kTicksNs[0]; });
   }
-  for (std::size_t i = 1; i < count; ++i) {
-    const std::int64_t step_ns = stepBetween(events[i - 1].t_ns, events[i].t_ns);
-    putVarint(bytes, zigzag(step_ns / kTicksNs[tick]));
+  for (const Event& event : events) {
+    to[0] = static_cast<std::uint8_t>(event.x);
+    to[count] = static_cast<std::uint8_t>(event.x >> 8);
+    to[2 * count] = static_cast<std::uint8_t>(event.y);
+    to[3 * count] = static_cast<std::uint8_t>(event.y >> 8);
+    ++to;
   }
-  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.x));
-  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.x >> 8));
-  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.y));
-  for (const Event& event : events) bytes.push_back(static_cast<std::uint8_t>(event.y >> 8));
+  to += 3 * count;
   for (std::size_t i = 0; i < count; i += 8) {
     unsigned bits = 0;
     for (std::size_t k = 0; k < 8 && i + k < count; ++k) {
       bits |= static_cast<unsigned>(events[i + k].polarity) << k;
     }
-    bytes.push_back(static_cast<std::uint8_t>(bits));
+    *to++ = static_cast<std::uint8_t>(bits);
   }
+  bytes.resize(static_cast<std::size_t>(to - bytes.data()));
   return bytes;
 }
 
@@ -157,7 +170,6 @@ std::vector<std::uint8_t> compressed(const std::vector<std::uint8_t>& bytes) {
 
 /// The reverse. @param count limits the memory that damaged bytes can ask for.
 std::vector<std::uint8_t> decompressed(const std::vector<std::uint8_t>& bytes, std::size_t count) {
-  constexpr std::size_t kMaxEventSize = 15;  // 10 of the time, 4 of the pixel, 1 of the polarity
   const auto size = ZSTD_getFrameContentSize(bytes.data() + 1, bytes.size() - 1);
   if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR ||
       size > kHeaderSize + kMaxEventSize * count) {
