@@ -53,16 +53,22 @@ void addSource(CLI::App& command, Arguments& arguments) {
           "Poses that replace the recording's: t tx ty tz qx qy qz qw, of the rig in the world")
       ->type_name("TUM.txt");
   command
-      .add_option(
-          "--calibration", arguments.source.calibration,
-          "Calibration that replaces the recording's: a Kalibr camera chain (YAML), or fx fy "
-          "cx cy k1 k2 p1 p2 k3 of one camera")
+      .add_option("--calibration", arguments.source.calibration,
+                  std::string("Calibration that replaces the recording's: ") + kCalibrationFiles)
       ->type_name("FILE");
   command
       .add_option("--hand-eye", arguments.source.hand_eye,
-                  "Pose of the rig on the tracked body: YAML with T_body_rig, 4x4; the poses are "
-                  "then those of the body")
+                  "Pose of the rig on the tracked body; the poses are then those of the body: YAML "
+                  "with T_body_rig, 4x4; a Kalibr camera chain with T_cam_imu; with --calibration, "
+                  "DSEC's cam_to_lidar.yaml or TUM-VIE's mocap-imu-calibration*.json")
       ->type_name("FILE");
+  command
+      .add_option("--topics", arguments.source.reader.topics,
+                  "Topics of a bag, or streams of a file, to read: events, one for each camera, "
+                  "and poses (default: found by their type)")
+      ->type_name("TOPIC[,TOPIC...]")
+      ->delimiter(',')
+      ->allow_extra_args(false);
   command
       .add_option_function<std::vector<std::string>>(
           "--perturb",

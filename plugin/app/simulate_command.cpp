@@ -65,7 +65,8 @@ Simulation makeOnTrajectory(const SimulateArguments& arguments) {
   options.duration_s = arguments.duration_s;
   options.seed = arguments.seed;
   const std::vector<StampedPose> poses = readTumTrajectory(arguments.trajectory);
-  const Rig rig = readCamchain(arguments.calibration);
+  Rig rig = readCamchain(arguments.calibration);
+  for (RigCamera& camera : rig.cameras) camera.time_offset_ns = 0;  // simulated cameras agree
   try {
     return makeTrajectorySimulation(options, poses, rig);
   } catch (const std::invalid_argument& error) {

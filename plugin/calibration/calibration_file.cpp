@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <cstdint>
 #include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -13,6 +15,11 @@
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/calibration/camchain.h"
+#include "plugin/calibration/camera_info_file.h"
+#include "plugin/calibration/dsec_calibration.h"
+#include "plugin/calibration/mrpt_camera_file.h"
+#include "plugin/calibration/tumvie_calibration.h"
+#include "plugin/calibration/yaml_entry.h"
 
 namespace efm {
 namespace {
@@ -21,19 +28,45 @@ std::string camerasInWords(std::size_t count) {
   return fmt::format("{} camera{}", count, count == 1 ? "" : "s");
 }
 
-/// The first word outside comments; empty where there is none.
-std::string firstWord(const std::filesystem::path& file) {
-  std::ifstream stream(file);
-  std::error_code ignored;
-  if (!stream || std::filesystem::is_directory(file, ignored)) {
+/// @throws std::runtime_error where it cannot be read, or is too large for a calibration.
+std::string readText(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kMaxBytes = 10'000'000;
+  std::error_code error;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file, error)) {
     throw std::runtime_error(file.string() + ": cannot be opened for reading");
   }
+  if (std::filesystem::file_size(file, error) > kMaxBytes && !error) {
+    throw std::runtime_error(
+        fmt::format("{}: larger than 10 MB: expected {}", file.string(), kCalibrationFiles));
+  }
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+/// The first word outside comments; empty where there is none.
+std::string firstWord(const std::string& text) {
+  std::istringstream stream(text);
   std::string word;
   while (stream >> word && word.front() == '#') {
     std::getline(stream, word);
     word.clear();
   }
   return word;
+}
+
+Calibration readYamlCalibration(const std::filesystem::path& file) {
+  const YAML::Node root = loadYaml(file.string());
+  if (root.IsMap()) {
+    const YamlEntry entry(file.string(), "", root);
+    if (entry.has("cam0")) return {file, readCamchain(file), readCamchainImu(file)};
+    if (entry.has("intrinsics") && entry.has("extrinsics")) return readDsecCalibration(entry, file);
+    if (entry.has("value0")) return readTumVieCalibration(entry, file);
+    if (entry.has("camera_matrix")) return {file, {{{readCameraInfo(entry), {}, 0}}}};
+  }
+  throw std::runtime_error(
+      fmt::format("{}: not a calibration: expected {}", file.string(), kCalibrationFiles));
 }
 
 std::vector<double> readNumbers(const std::filesystem::path& file) {
@@ -97,22 +130,13 @@ void Calibration::requireLike(const Rig& recorded) const {
 }
 
 Calibration readCalibration(const std::filesystem::path& file) {
-  const std::string word = firstWord(file);
-  if (!word.empty() && word.front() == '{') {
-    throw std::runtime_error(file.string() +
-                             ": JSON is not read yet: expected a camera chain as Kalibr has it, or "
-                             "nine numbers, fx fy cx cy k1 k2 p1 p2 k3");
-  }
-  Calibration calibration{file, {}};
-  if (parseNumber<double>(word)) {
-    CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
-    model.width = 0;
-    model.height = 0;
-    calibration.rig.cameras.push_back({model, {}, 0});
-  } else {
-    calibration.rig = readCamchain(file);
-  }
-  return calibration;
+  const std::string text = readText(file);
+  if (looksLikeIni(text)) return {file, readMrptCameras(text, file)};
+  if (!parseNumber<double>(firstWord(text))) return readYamlCalibration(file);
+  CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
+  model.width = 0;
+  model.height = 0;
+  return {file, {{{model, {}, 0}}}};
 }
 
 CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size) {

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "mapping/geometry/rig.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 
@@ -18,6 +19,9 @@ struct CameraSize {
 struct Calibration {
   std::filesystem::path file;
   Rig rig;  ///< Cameras have no width and height where the file has none.
+  /// Poses of other sensors, if the file has them. Hand-eye files refer to them.
+  std::optional<Rigid3> T_imu_rig{};
+  std::optional<Rigid3> T_camRect1_rig{};  ///< DSEC's rectified left frame camera.
 
   /// Camera `index` of the recording.
   /// @param sensor the camera's size, if the recording knows it.
@@ -34,9 +38,16 @@ struct Calibration {
   void requireLike(const Rig& recorded) const;
 };
 
-/// Reads a camera chain as `readCamchain` does, or nine numbers as `readUzhCalibration` does; these
-/// do not have the sensor's size.
-/// @throws std::runtime_error naming the file, the line, the value and what was expected.
+/// What `readCalibration` accepts, for errors.
+inline constexpr const char* kCalibrationFiles =
+    "a Kalibr camera chain, DSEC's cam_to_cam.yaml, TUM-VIE's camera-calibration*.json, "
+    "camera_info YAML of ROS, an .ini file of MRPT's camera calibration, or nine numbers, fx fy cx "
+    "cy k1 k2 p1 p2 k3";
+
+/// Reads a calibration, whose kind is found by its content: see `readCamchain`,
+/// `readDsecCalibration`, `readTumVieCalibration`, `readCameraInfo`, `readMrptCameras` and
+/// `readUzhCalibration`; the last one does not have the sensor's size.
+/// @throws std::runtime_error naming the file, the place, the value and what was expected.
 Calibration readCalibration(const std::filesystem::path& file);
 
 /// Reads the nine numbers fx fy cx cy k1 k2 p1 p2 k3, the UZH data sets' calib.txt: distortion is

@@ -3,52 +3,29 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstdlib>
 #include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
+#include "plugin/calibration/camera_entry.h"
 #include "plugin/calibration/yaml_entry.h"
 
 namespace efm {
 namespace {
 
-int sideOf(double value, const YamlEntry& entry) {
-  if (std::floor(value) == value && value >= 1 && value <= 65535) return static_cast<int>(value);
-  throw entry.failKey("resolution", fmt::format("{:g}", value), "whole numbers from 1 to 65535");
-}
-
-CameraModel readModel(const YamlEntry& entry) {
-  const std::string kind = entry.text("camera_model");
-  if (kind != "pinhole") throw entry.failKey("camera_model", inQuotes(kind), "pinhole");
-
-  CameraModel model;
-  const std::vector<double> intrinsics = entry.numbers("intrinsics", 4, "4, fx fy cx cy");
-  model.fx = intrinsics[0];
-  model.fy = intrinsics[1];
-  model.cx = intrinsics[2];
-  model.cy = intrinsics[3];
-  const std::vector<double> resolution = entry.numbers("resolution", 2, "2, width height");
-  model.width = sideOf(resolution[0], entry);
-  model.height = sideOf(resolution[1], entry);
-  const std::string distortion = entry.text("distortion_model");
-  try {
-    model.distortion = distortionModelFromName(distortion);
-  } catch (const std::invalid_argument&) {
-    throw entry.failKey("distortion_model", inQuotes(distortion), "radtan, equidistant or none");
-  }
-  if (model.distortion != DistortionModel::kNone || entry.has("distortion_coeffs")) {
-    model.coefficients = entry.numbers("distortion_coeffs", 0, "a list of numbers");
-  }
-  try {
-    model.validate();
-  } catch (const std::invalid_argument& error) {
-    throw entry.fail(error.what());
-  }
-  return model;
+/// The camera's clock: t_imu = t_cam + timeshift_cam_imu.
+std::int64_t timeShiftOf(const YamlEntry& entry) {
+  constexpr const char* kKey = "timeshift_cam_imu";
+  const std::string text = entry.text(kKey);
+  const std::optional<std::int64_t> shift_ns = parseSeconds(text);
+  if (shift_ns && std::abs(*shift_ns) < kEndOfTimeNs) return *shift_ns;
+  throw entry.failKey(kKey, inQuotes(text), "a time in seconds");
 }
 
 /// Whether a key is "camN" with a number N.
@@ -85,19 +62,36 @@ std::size_t countCameras(const std::string& file, const YAML::Node& root) {
 Rig readCamchain(const std::filesystem::path& file) {
   const YAML::Node root = loadYaml(file.string());
   const std::size_t count = countCameras(file.string(), root);
+  std::vector<std::int64_t> shifts_ns;
   Rig rig;
   for (std::size_t n = 0; n < count; ++n) {
     const std::string name = fmt::format("cam{}", n);
     const YamlEntry entry(file.string(), name, root[name]);
     RigCamera camera;
-    camera.model = readModel(entry);
+    camera.model = readKalibrCamera(entry, "intrinsics");
     if (n > 0) {
       const Rigid3 T_cn_cnm1 = entry.transform("T_cn_cnm1");
       camera.T_rig_cam = rig.cameras[n - 1].T_rig_cam * T_cn_cnm1.inverse();
     }
+    if (entry.has("timeshift_cam_imu") || !shifts_ns.empty()) {
+      if (shifts_ns.size() != n) {
+        throw entry.fail("timeshift_cam_imu: expected for all cameras, or for none");
+      }
+      shifts_ns.push_back(timeShiftOf(entry));
+      camera.time_offset_ns = shifts_ns[n] - shifts_ns[0];
+    }
     rig.cameras.push_back(camera);
   }
   return rig;
+}
+
+std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file) {
+  constexpr const char* kKey = "T_cam_imu";
+  const YAML::Node root = loadYaml(file.string());
+  countCameras(file.string(), root);
+  const YamlEntry cam0(file.string(), "cam0", root["cam0"]);
+  if (!cam0.has(kKey)) return std::nullopt;
+  return cam0.transform(kKey).inverse();
 }
 
 }  // namespace efm

@@ -4,14 +4,20 @@
 #include <filesystem>
 
 #include "mapping/geometry/rigid3.h"
+#include "plugin/calibration/calibration_file.h"
 
 namespace efm {
 
-/// Reads the rig's pose on the tracked body, from YAML with the one key
-///   T_body_rig   4x4, from the rig's frame to the body's:
-/// T_world_rig = T_world_body * T_body_rig. Other keys are ignored. Its rotation may be off by
-/// 1e-3, because of rounding; the nearest rotation is taken.
+/// Reads the rig's pose on the tracked body, whose poses a recording has:
+///   T_world_rig = T_world_body * T_body_rig.
+/// The kind of the file is found by its content:
+///   YAML with T_body_rig            4x4, from the rig's frame to the body's; other keys are
+///   ignored a Kalibr camera chain           the body is the IMU: `readCamchainImu` DSEC's
+///   cam_to_lidar.yaml        the body is the LiDAR: `readDsecHandEye` TUM-VIE's
+///   mocap-imu-calibration*.json    the body is the marker: `readTumVieHandEye`
+/// Rotations may be off by 1e-3, because of rounding; the nearest rotation is taken.
+/// @param calibration the rig's, which the last two need; null: none is given.
 /// @throws std::runtime_error naming the file, the key, the value and what was expected.
-Rigid3 readHandEye(const std::filesystem::path& file);
+Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibration = nullptr);
 
 }  // namespace efm

@@ -37,30 +37,70 @@ std::vector<double> YamlEntry::numbers(const char* key, std::size_t count,
   return numbersIn(find(key), key, count, expected);
 }
 
-Rigid3 YamlEntry::transform(const char* key) const {
-  constexpr double kMaxRotationError = 1e-3;
-  constexpr const char* kExpected = "4 rows of 4 numbers";
-  const YAML::Node rows = find(key);
-  if (!rows.IsSequence() || rows.size() != 4) throw failNode(rows, key, kExpected);
-  Eigen::Matrix4d matrix;
-  for (int row = 0; row < 4; ++row) {
-    matrix.row(row) = Eigen::RowVector4d::Map(numbersIn(rows[row], key, 4, kExpected).data());
-  }
+double YamlEntry::number(const char* key) const {
+  const YAML::Node value = find(key);
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const double number = value.IsScalar() ? value.as<double>(kNone) : kNone;
+  if (!std::isfinite(number)) throw failNode(value, key, "a finite number");
+  return number;
+}
 
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+Eigen::MatrixXd YamlEntry::matrix(const char* key, int rows, int columns) const {
+  const std::string expected =
+      fmt::format("{}rows of {} numbers", rows == 0 ? "" : fmt::format("{} ", rows), columns);
+  const YAML::Node list = find(key);
+  if (!list.IsSequence() || (rows != 0 && list.size() != static_cast<std::size_t>(rows))) {
+    throw failNode(list, key, expected);
+  }
+  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(list.size()), columns);
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    const std::vector<double> values =
+        numbersIn(list[static_cast<std::size_t>(row)], key, static_cast<std::size_t>(columns),
+                  expected.c_str());
+    matrix.row(row) = Eigen::RowVectorXd::Map(values.data(), columns);
+  }
+  return matrix;
+}
+
+Eigen::Quaterniond YamlEntry::rotationIn(const Eigen::Matrix3d& matrix, const char* key) const {
+  constexpr double kMaxRotationError = 1e-3;
   const double error =
-      (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+      (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (!(error <= kMaxRotationError)) {
     throw failKey(key, fmt::format("a matrix whose columns are off orthonormal by {:f}", error),
                   "a rotation, to 0.001");
   }
-  if (rotation.determinant() < 0) throw failKey(key, "a reflection", "a rotation");
-  if (matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+  if (matrix.determinant() < 0) throw failKey(key, "a reflection", "a rotation");
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
+  return Eigen::Quaterniond(nearest).normalized();
+}
+
+Eigen::Quaterniond YamlEntry::rotation(const char* key) const {
+  return rotationIn(matrix(key, 3, 3), key);
+}
+
+Rigid3 YamlEntry::transform(const char* key) const {
+  const Eigen::Matrix4d T_a_b = matrix(key, 4, 4);
+  const Eigen::Quaterniond rotation = rotationIn(T_a_b.topLeftCorner<3, 3>(), key);
+  if (T_a_b.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
     throw failKey(key, "a matrix with another last row", "0 0 0 1 there");
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
-  return {Eigen::Quaterniond(nearest).normalized(), matrix.topRightCorner<3, 1>()};
+  return {rotation, T_a_b.topRightCorner<3, 1>()};
+}
+
+std::string YamlEntry::nameOf(const std::string& part) const {
+  return name_.empty() ? part : fmt::format("{}: {}", name_, part);
+}
+
+YamlEntry YamlEntry::section(const char* key) const { return {file_, nameOf(key), find(key)}; }
+
+YamlEntry YamlEntry::item(const char* key, std::size_t index) const {
+  const YAML::Node list = find(key);
+  if (!list.IsSequence() || list.size() <= index) {
+    throw failNode(list, key, fmt::format("a list of at least {} items", index + 1));
+  }
+  return {file_, nameOf(fmt::format("{}[{}]", key, index)), list[index]};
 }
 
 YAML::Node YamlEntry::find(const char* key) const {

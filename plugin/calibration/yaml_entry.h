@@ -3,6 +3,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
@@ -26,9 +27,19 @@ class YamlEntry {
   /// @param count their number; 0: any.
   /// @param expected the meaning of the numbers, for errors.
   std::vector<double> numbers(const char* key, std::size_t count, const char* expected) const;
-  /// A 4x4 matrix. Its rotation may be off by 1e-3, because of rounding; the nearest rotation is
-  /// taken.
+  double number(const char* key) const;
+  /// A list of rows.
+  /// @param rows their number; 0: any.
+  Eigen::MatrixXd matrix(const char* key, int rows, int columns) const;
+  /// A 3x3 matrix. It may be off by 1e-3, because of rounding; the nearest rotation is taken.
+  Eigen::Quaterniond rotation(const char* key) const;
+  /// A 4x4 matrix; its rotation as `rotation` has it.
   Rigid3 transform(const char* key) const;
+
+  /// The keys and values below a key; errors call it "NAME: KEY".
+  YamlEntry section(const char* key) const;
+  /// The keys and values of an item of a list, from 0.
+  YamlEntry item(const char* key, std::size_t index) const;
 
   std::runtime_error failKey(const char* key, std::string_view found,
                              std::string_view expected) const;
@@ -36,6 +47,8 @@ class YamlEntry {
 
  private:
   YAML::Node find(const char* key) const;
+  std::string nameOf(const std::string& part) const;
+  Eigen::Quaterniond rotationIn(const Eigen::Matrix3d& matrix, const char* key) const;
   std::vector<double> numbersIn(const YAML::Node& list, const char* key, std::size_t count,
                                 const char* expected) const;
   std::runtime_error failNode(const YAML::Node& node, const char* key,

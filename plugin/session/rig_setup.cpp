@@ -8,7 +8,10 @@ namespace efm {
 RigSetup readRigSetup(const RigOptions& options) {
   RigSetup setup;
   if (!options.calibration.empty()) setup.calibration = readCalibration(options.calibration);
-  if (!options.hand_eye.empty()) setup.T_body_rig = readHandEye(options.hand_eye);
+  if (!options.hand_eye.empty()) {
+    setup.T_body_rig =
+        readHandEye(options.hand_eye, setup.calibration ? &*setup.calibration : nullptr);
+  }
   return setup;
 }
 

@@ -3,7 +3,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <mrpt/config/CConfigFile.h>
+#include <mrpt/img/TStereoCamera.h>
+#include <mrpt/poses/CPose3D.h>
+#include <mrpt/poses/CPose3DQuat.h>
 
+#include "test/plugin/calibration/replaced.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
@@ -11,7 +16,6 @@
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::EndsWith;
 using testing::HasSubstr;
 
@@ -68,11 +72,104 @@ TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
   EXPECT_NO_THROW(calibration.requireCameras(2));
 }
 
-TEST_F(CalibrationFile, AnErrorNamesTheFileAndTheExpectedFormats) {
-  EXPECT_THAT(errorOfText("{\"value0\": {}}\n"),
-              AllOf(HasSubstr("given.txt: JSON"), HasSubstr("expected a camera chain")));
-  EXPECT_THAT(errorOfText(""), HasSubstr("given.txt: cam0 is missing: expected a camera chain"));
-  EXPECT_THAT(errorOfText("200 200 120\n"), HasSubstr("given.txt: 3 numbers: expected 9"));
+constexpr const char* kCameraInfo =
+    "image_width: 346\nimage_height: 260\ncamera_name: left\n"
+    "camera_matrix: {rows: 3, cols: 3, data: [226, 0, 173, 0, 227, 133, 0, 0, 1]}\n"
+    "distortion_model: plumb_bob\n"
+    "distortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0.2, 0.3, 0.4, 0.5]}\n";
+
+TEST_F(CalibrationFile, MayBeTheCameraInfoOfRos) {
+  const Rig rig = read(kCameraInfo).rig;
+  ASSERT_EQ(rig.cameras.size(), 1U);
+  CameraModel expected{346, 260, 226, 227, 173, 133, DistortionModel::kRadtan, {}};
+  expected.coefficients = {0.1, 0.2, 0.3, 0.4, 0.5};
+  EXPECT_EQ(rig.cameras[0].model, expected);
+
+  std::string fisheye = replaced(kCameraInfo, "plumb_bob", "equidistant");
+  fisheye = replaced(fisheye, ", 0.5]", "]");
+  EXPECT_EQ(read(fisheye).rig.cameras[0].model.distortion, DistortionModel::kEquidistant);
+  EXPECT_EQ(read(replaced(fisheye, "equidistant", "fisheye")).rig.cameras[0].model,
+            read(fisheye).rig.cameras[0].model);
+}
+
+TEST_F(CalibrationFile, MayBeAnIniFileOfMrptsCameraCalibration) {
+  mrpt::img::TStereoCamera stereo;
+  stereo.leftCamera.ncols = 640;
+  stereo.leftCamera.nrows = 480;
+  stereo.leftCamera.setIntrinsicParamsFromValues(500, 501, 320, 240);
+  stereo.leftCamera.setDistortionPlumbBob(0.1, 0.2, 0.3, 0.4, 0.5);
+  stereo.rightCamera = stereo.leftCamera;
+  stereo.rightCamera.setDistortionKannalaBrandt(0.1, 0.2, 0.3, 0.4);
+  stereo.rightCameraPose = {0.1, 0.01, 0.02, 0.8, 0.6, 0, 0};
+  {
+    mrpt::config::CConfigFile file((folder() / "stereo.ini").string());
+    stereo.saveToConfigFile("CAMERA_PARAMS", file);
+    mrpt::config::CConfigFile one((folder() / "one.ini").string());
+    stereo.leftCamera.saveToConfigFile("ANY_NAME", one);
+  }
+  const Rig rig = readCalibration(folder() / "stereo.ini").rig;
+  ASSERT_EQ(rig.cameras.size(), 2U);
+  CameraModel left{640, 480, 500, 501, 320, 240, DistortionModel::kRadtan, {}};
+  left.coefficients = {0.1, 0.2, 0.3, 0.4, 0.5};
+  EXPECT_EQ(rig.cameras[0].model, left);
+  CameraModel right = left;
+  right.distortion = DistortionModel::kEquidistant;
+  right.coefficients = {0.1, 0.2, 0.3, 0.4};
+  EXPECT_EQ(rig.cameras[1].model, right);
+  // MRPT's own pose of the right camera carries its point to the left one.
+  const Eigen::Vector3d p_rig = rig.cameras[1].T_rig_cam * Eigen::Vector3d(1, 2, 3);
+  Eigen::Vector3d expected;
+  mrpt::poses::CPose3D(mrpt::poses::CPose3DQuat(stereo.rightCameraPose))
+      .composePoint(1, 2, 3, expected.x(), expected.y(), expected.z());
+  EXPECT_LT((p_rig - expected).norm(), 1e-5);
+
+  const Rig one = readCalibration(folder() / "one.ini").rig;
+  ASSERT_EQ(one.cameras.size(), 1U);
+  EXPECT_EQ(one.cameras[0].model, left);
+}
+
+TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
+  const std::string ini =
+      "; stereo\n[A_LEFT]\nresolution = [64 48]\nfx = 50\nfy = 50\ncx = 32\ncy = 24\n"
+      "distortion = none\n";
+  const struct {
+    std::string text;
+    const char* error;
+  } cases[] = {
+      {"", "given.txt: not a calibration: expected a Kalibr camera chain, DSEC's"},
+      {"[1, 2]\n", "given.txt: not a calibration: expected a Kalibr camera chain"},
+      {"left: {fx: 3}\n", "given.txt: not a calibration: expected a Kalibr camera chain"},
+      {std::string("\x89HDF\r\n\x1a\n\0\0", 10), "given.txt"},
+      {"200 200 120\n", "given.txt: 3 numbers: expected 9"},
+      {"200 x 120\n", "given.txt:1: 'x': expected a finite number"},
+      {R"({"value0": {}})", "given.txt:1: value0: resolution is missing"},
+      {R"({"value0": {"T_imu_marker": {"px": 1}}})", "value0: resolution is missing"},
+      {R"({"value0": {"resolution": [[1, 2]]}})",
+       "value0: resolution = a list: expected 4 rows of 2 numbers"},
+      {"intrinsics: {cam0: 3}\nextrinsics: {}\n", "intrinsics: cam0: expected keys and values"},
+      {"intrinsics: {}\nextrinsics: {}\n", "intrinsics: cam0 is missing"},
+      {replaced(kCameraInfo, "plumb_bob", "rational_polynomial"),
+       "given.txt:5: distortion_model = 'rational_polynomial': expected plumb_bob, equidistant"},
+      {replaced(kCameraInfo, "[226, 0,", "[226, 1,"),
+       ":4: camera_matrix: data = a matrix with skew"},
+      {replaced(kCameraInfo, "133, 0, 0, 1]", "133, 0, 0]"),
+       ":4: camera_matrix: data: 8 numbers: expected 9, fx 0 cx"},
+      {replaced(kCameraInfo, "260", "260.5"), "image_height = 260.5: expected whole numbers"},
+      {replaced(kCameraInfo, ", 0.4, 0.5]", "]"),
+       "number of distortion coefficients = 3: must be 4 or 5"},
+      {replaced(ini, "fx = 50", "fx = a"), "[A_LEFT]: fx = 'a': expected a finite number"},
+      {replaced(ini, "fx = 50", "fx 50"), "given.txt:4: 'fx 50': expected [section] or key"},
+      {replaced(ini, "fx = 50\n", ""), "given.txt: 0 sections with fx: expected one camera"},
+      {replaced(ini, "cx = 32\n", ""), "[A_LEFT]: cx is missing"},
+      {replaced(ini, "none", "fov"), "[A_LEFT]: distortion = 'fov': expected none, plumb_bob"},
+      {ini + replaced(ini, "A_LEFT", "B_RIGHT"), "2 sections with fx: expected one camera, or"},
+      {ini + replaced(ini, "A_LEFT", "A_RIGHT"), "given.txt: [A_LEFT2RIGHT_POSE] is missing"},
+      {ini + replaced(ini, "A_LEFT", "A_RIGHT") +
+           "[A_LEFT2RIGHT_POSE]\npose_quaternion = [1 0 0 2 0 0 0]\n",
+       "[A_LEFT2RIGHT_POSE]: pose_quaternion = a quaternion of length 2: expected a rotation"},
+  };
+  for (const auto& row : cases) EXPECT_THAT(errorOfText(row.text), HasSubstr(row.error));
+  EXPECT_NO_THROW(read(ini));
   EXPECT_THAT(errorOf([&] { readCalibration(folder() / "nowhere"); }),
               EndsWith("nowhere: cannot be opened for reading"));
   EXPECT_THAT(errorOf([&] { readCalibration(folder()); }),

@@ -6,6 +6,7 @@
 
 #include <string>
 
+#include "test/plugin/calibration/replaced.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
@@ -38,12 +39,6 @@ const std::string kCam1 = R"(cam1:
   - [0, 0, 1, 0.3]
   - [0, 0, 0, 1]
 )";
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
 
 class Camchain : public TemporaryFolder {
  protected:
@@ -112,6 +107,29 @@ TEST_F(Camchain, DistortionNoneNeedsNoCoefficients) {
 TEST_F(Camchain, MakesARoundedRotationExact) {
   const Rig rig = read(replaced(kCam0 + kCam1, "- [0, -1, 0, 0.1]", "- [0.0004, -0.9997, 0, 0.1]"));
   EXPECT_NEAR(rig.cameras[1].T_rig_cam.rotation.norm(), 1, 1e-15);
+}
+
+TEST_F(Camchain, ATimeOffsetIsTheTimeshiftMinusThatOfCameraZero) {
+  const std::string shifted =
+      replaced(kCam0, "  rostopic", "  timeshift_cam_imu: 0.00125\n  rostopic");
+  const Rig rig = read(shifted + kCam1 + "  timeshift_cam_imu: -2.5e-4\n");
+  EXPECT_EQ(rig.cameras[0].time_offset_ns, 0);
+  EXPECT_EQ(rig.cameras[1].time_offset_ns, -1'500'000);
+  for (const std::string& half : {shifted + kCam1, kCam0 + kCam1 + "  timeshift_cam_imu: 1\n"}) {
+    EXPECT_THAT(errorOfText(half), HasSubstr("cam1: timeshift_cam_imu"));
+  }
+  EXPECT_THAT(errorOfText(kCam0 + "  timeshift_cam_imu: 1ms\n"),
+              HasSubstr(":8: cam0: timeshift_cam_imu = '1ms': expected a time in seconds"));
+}
+
+TEST_F(Camchain, TheRigsPoseOnTheImuIsTheInverseOfCameraZeros) {
+  read(kCam0 + kCam1);
+  EXPECT_FALSE(readCamchainImu(file()));
+  read(kCam0 + "  T_cam_imu: [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]\n" + kCam1);
+  const std::optional<Rigid3> T_imu_rig = readCamchainImu(file());
+  ASSERT_TRUE(T_imu_rig);
+  // T_cam_imu carries the IMU's point (5, 6, 7) to (-6, 5, 7) + (1, 2, 3).
+  EXPECT_LT((*T_imu_rig * Eigen::Vector3d(-5, 7, 10) - Eigen::Vector3d(5, 6, 7)).norm(), 1e-12);
 }
 
 TEST_F(Camchain, AnErrorNamesTheFile) {

@@ -44,6 +44,26 @@ TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
               HasSubstr("hand_eye.yaml:2: T_body_rig = a list: expected 4 rows of 4 numbers"));
   EXPECT_THAT(errorOf([&] { readHandEye(folder() / "nowhere"); }),
               HasSubstr("nowhere: cannot be opened"));
+  EXPECT_THAT(errorOfText("cam0: {camera_model: pinhole}\n"),
+              HasSubstr("hand_eye.yaml:1: cam0: T_cam_imu is missing"));
+}
+
+TEST_F(HandEyeFile, OfTheImuIsThatOfTheCameraChain) {
+  // T_cam_imu carries the IMU's point (5, 6, 7) to (-6, 5, 7) + (1, 2, 3).
+  const Rigid3 T_imu_rig =
+      read("cam0: {T_cam_imu: [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]}\n");
+  EXPECT_LT((T_imu_rig * Eigen::Vector3d(-5, 7, 10) - Eigen::Vector3d(5, 6, 7)).norm(), 1e-12);
+}
+
+TEST_F(HandEyeFile, OfADataSetNeedsItsCalibration) {
+  const char* const lidar =
+      "T_lidar_camRect1: [[1, 0, 0, 1], [0, 1, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]\n";
+  EXPECT_THAT(errorOfText(lidar), AllOf(HasSubstr("hand_eye.yaml"), HasSubstr("cam_to_cam.yaml")));
+  const char* const marker =
+      R"({"value0": {"T_imu_marker": {"px": 0, "py": 0, "pz": 0, "qx": 0, "qy": 0, "qz": 0, "qw": 1}}})";
+  EXPECT_THAT(errorOfText(marker), HasSubstr("camera-calibration*.json"));
+  EXPECT_THAT(errorOfText(R"({"value0": {"T_imu_marker": {"px": 0}}})"),
+              AllOf(HasSubstr("value0: T_imu_marker: q"), HasSubstr(" is missing")));
 }
 
 }  // namespace
