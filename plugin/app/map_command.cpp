@@ -12,6 +12,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/outlier_removal.h"
+#include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
 #include "plugin/output/keyframe_writer.h"
 #include "plugin/output/map_output.h"
@@ -99,9 +100,14 @@ int conclude(const MappingOutcome& outcome, MapOutput& output) {
     std::cerr << "event-fusion: warning: " << warning << "\n";
   }
   if (outcome.report.counts.keyframes > 0) printSummary(outcome.report, output.folder());
-  if (!outcome.error) return 0;
-  std::cerr << "event-fusion: error: " << *outcome.error << "\n";
-  return 1;
+  if (outcome.error) {
+    std::cerr << "event-fusion: error: " << *outcome.error << "\n";
+    return 1;
+  }
+  if (!outcome.report.stopped_at) return 0;
+  std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
+                           100 * *outcome.report.stopped_at);
+  return kInterruptedStatus;
 }
 
 Window windowOf(const DepthArguments& arguments, ReferenceTime reference) {
@@ -149,7 +155,8 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     outcome = runMapping(job, *recording);
     writer.finish();
     whole.cpu.images = writer.cpuSeconds();
-    if (outcome.report.counts.keyframes == 0 && (source.start_ns || source.end_ns)) {
+    const bool limited = source.start_ns || source.end_ns;
+    if (outcome.report.counts.keyframes == 0 && limited && !outcome.report.stopped_at) {
       outcome = runMapping(job, *openWhole(source));  // for the error, which says all its times
     }
     outcome.report.faults = source.faults;
@@ -171,6 +178,8 @@ int runMap(const MapArguments& arguments) {
   job.options = optionsOf(arguments);
   job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
   job.options.mapper.limits.validate();
+  const Interruption interruption;
+  job.stop_requested = [&] { return interruption.requested(); };
   const bool refined = job.options.refinement.enabled;
   const auto take = [](MapOutput& output, const KeyframeDepthMap& keyframe) {
     output.writeKeyframe(keyframe);

@@ -33,7 +33,9 @@ struct DepthArguments : MappingArguments {
 
 /// `event-fusion map`: plays a recording and writes the map's folder. Prints a summary to stdout,
 /// warnings and errors to stderr.
-/// @return the process's exit status: 0 only if the whole recording is mapped.
+/// SIGINT or SIGTERM ends the run as the end of the recording would; a second one kills it.
+/// @return the process's exit status: 0 only if the whole recording is mapped, 130 where a signal
+/// stopped it.
 /// @throws std::exception if the options or the recording cannot be read, or a file cannot be
 /// written.
 int runMap(const MapArguments& arguments);

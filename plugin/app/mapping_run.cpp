@@ -35,6 +35,10 @@ class Player {
   std::optional<std::string> play() {
     std::optional<std::string> error;
     for (bool more = true; more;) {
+      if (job_.stop_requested && job_.stop_requested()) {
+        stopped_at_ = recording_.progress();
+        break;
+      }
       more = attempt([this] { return playOne(); }, error);
       if (delivery_error_) std::rethrow_exception(delivery_error_);
       if (progress_.due()) showProgress();
@@ -45,6 +49,8 @@ class Player {
   }
 
   const CEventFusionMapBuilder& builder() const { return builder_; }
+  /// The fraction of the recording that was mapped, if a stop was requested.
+  std::optional<double> stoppedAt() const { return stopped_at_; }
 
  private:
   /// Runs a step. @return false if it throws. `error` keeps the first message.
@@ -106,6 +112,7 @@ class Player {
   CEventFusionMapBuilder builder_;
   std::exception_ptr delivery_error_;  // of `on_keyframe`
   bool sink_offered_ = false;
+  std::optional<double> stopped_at_;
   Progress progress_;
 };
 
@@ -198,6 +205,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.report.options = job.options;
   describeView(status.rig, job.options.mapper, outcome.report);
   outcome.report.sequence_maximum = job.sequence_maximum;
+  outcome.report.stopped_at = player.stoppedAt();
   outcome.report.refinement = status.refinement;
   StageTimes& times = outcome.report.times;
   times = status.times;
@@ -213,7 +221,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.report.points = outcome.points.size();
   outcome.warnings = warningsOf(status, job.options.mapper.keyframe.exclude_silent);
   if (const auto lost = lostPacketsWarning(recording.counts())) outcome.warnings.push_back(*lost);
-  if (status.counts.event_uses == 0 && !outcome.error) {
+  if (status.counts.event_uses == 0 && !outcome.error && !player.stoppedAt()) {
     outcome.error = status.counts.keyframes == 0
                         ? "there is no keyframe: " + whyNoKeyframe(status, job.options.mapper)
                         : "no event of the keyframes' windows could be used";

@@ -22,6 +22,9 @@ struct MappingJob {
   /// The value of `max_confidence = sequence`. Default: the running maximum.
   std::optional<double> sequence_maximum;
 
+  /// Asked before each observation; where it says true, the rest of the recording is not mapped.
+  /// May be empty.
+  std::function<bool()> stop_requested;
   /// Receives each keyframe, in order.
   std::function<void(const KeyframeDepthMap&)> on_keyframe;
   /// Measures the stages of the mapping. Default: the processor time of the whole process.

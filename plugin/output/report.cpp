@@ -131,6 +131,7 @@ std::string reportJson(const MapReport& report) {
   if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
   if (report.view) json["reference_view"] = asJson(*report.view);
   if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
+  if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
   json["options"] = asJson(report.options);

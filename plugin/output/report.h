@@ -30,6 +30,8 @@ struct MapReport {
   /// they turn depth into disparity. Nothing where the rig was never complete or has one camera.
   std::optional<ReferenceView> view;
   std::optional<double> baseline_m;
+  /// The fraction of the recording that was mapped, where the run was interrupted.
+  std::optional<double> stopped_at;
 };
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
@@ -38,7 +40,8 @@ struct MapReport {
 /// (real time), cpu_seconds (processor time: once per run, for events, for keyframes),
 /// votes_per_second, refinement where poses were refined (registered keyframes, loops, the learnt
 /// errors of the tracker), kernel, threads, peak_memory_bytes (of this process), reference_view and
-/// baseline_m where known, perturbation (the faults of the poses, if any), options (all of them)
+/// baseline_m where known, stopped_at where the run was interrupted (the fraction of the recording
+/// that was mapped), perturbation (the faults of the poses, if any), options (all of them)
 /// and version.
 std::string reportJson(const MapReport& report);
 

@@ -188,6 +188,27 @@ TEST_F(MapCommand, ATruncatedRawlogIsAnErrorAfterTheMapSoFar) {
   EXPECT_TRUE(exists(folder() / "out" / "trajectory.txt"));
 }
 
+TEST_F(MapCommand, ASignalEndsItWithTheMapSoFar) {
+  write(SyntheticRecording(4.0));
+  int stopped = 0;
+  for (const char* const delay_s : {"0.3", "0.5", "0.6", "0.7", "0.9"}) {
+    const Result result = shell(std::string("rm -rf out; timeout --preserve-status -s INT ") +
+                                delay_s + " '" EFM_EVENT_FUSION "' map rig.ini data --out out " +
+                                "--set keyframes.stride_s=0.01");
+    if (!exists(folder() / "out" / "report.json")) continue;  // stopped before its first keyframe
+    const json report = reportIn("out");
+    ASSERT_EQ(report.contains("stopped_at"), result.status == 130) << result.err;
+    EXPECT_EQ(posesIn("out").size(), report["keyframes"]);
+    if (result.status == 0) continue;
+    ++stopped;
+    EXPECT_THAT(result.err, HasSubstr("stopped at "));
+    EXPECT_LE(report["stopped_at"], 1);
+    const std::size_t images = 4 * report["keyframes"].get<std::size_t>();
+    EXPECT_EQ(filesIn("out").size(), (images > 0 ? 4 : 1) + images);
+  }
+  EXPECT_GT(stopped, 0);
+}
+
 TEST_F(MapCommand, ARunWithoutKeyframesKeepsTheEarlierMap) {
   write(SyntheticRecording());
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
