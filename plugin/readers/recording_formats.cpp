@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/readers/recording_formats.h"
 
+#include "plugin/readers/bag_recording.h"
 #include "plugin/readers/dataset_folder.h"
 #include "plugin/readers/uzh_text.h"
 
@@ -12,6 +13,9 @@ const std::vector<RecordingFormat>& readerFormats() {
        looksLikeDatasetFolder, openDatasetFolder},
       {"uzh", "a folder in the UZH layout (events.txt, groundtruth.txt, calib.txt)",
        looksLikeUzhFolder, openUzhFolder},
+      {"rosbag", "a ROS 1 bag (.bag)", looksLikeRosbag, openBags},
+      {"rosbag2", "a ROS 2 bag (.mcap, .db3 or the folder with metadata.yaml)", looksLikeRosbag2,
+       openBags},
   };
   return all;
 }
