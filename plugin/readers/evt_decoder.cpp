@@ -9,6 +9,7 @@ namespace {
 
 /// Room for the events of many words, and for those that a vector writes behind its last.
 constexpr std::size_t kScratchEvents = 4096;
+constexpr std::size_t kScanWords = 64;
 constexpr std::uint64_t kNsPerUs = 1000;
 
 /// The upper four bits of a word.
@@ -113,6 +114,9 @@ struct Evt2Code {
 
   static Word load(Word word) { return word; }
   static std::uint32_t highOf(Word word) { return word & 0x0fff'ffffU; }
+  static Word highWord(const State& state) {
+    return kTimeHigh << 28U | (static_cast<Word>(state.high) & 0x0fff'ffffU);
+  }
   static Event* step(State& state, Word word, Event* at) {
     const unsigned type = typeOf(word);
     if (type <= kOn) {
@@ -134,6 +138,9 @@ struct Evt21Code {
   static std::uint32_t highOf(Word word) {
     return static_cast<std::uint32_t>(word >> 32U) & 0x0fff'ffffU;
   }
+  static Word highWord(const State& state) {
+    return Word{kTimeHigh} << 60U | (state.high & 0x0fff'ffffU) << 32U;
+  }
   static Event* step(State& state, Word word, Event* at) {
     const unsigned type = typeOf(word);
     if (type <= kOn) {
@@ -153,6 +160,9 @@ struct Evt3Code {
 
   static Word load(Word word) { return word; }
   static std::uint32_t highOf(Word word) { return bitsOf(word, 0, 12); }
+  static Word highWord(const State& state) {
+    return static_cast<Word>(kTimeHigh << 12U | (state.high & 0xfffU));
+  }
   static Event* step(State& state, Word word, Event* at) {
     const bool polarity = bitsOf(word, 11, 1) != 0;
     switch (typeOf(word)) {
@@ -224,11 +234,28 @@ Event* decodeWords(typename Code::State& kept, const std::uint8_t* data, std::si
   return at;
 }
 
+/// Follows the TIME_HIGH words. Most groups of words have none, or only repeat the last one: the
+/// first loop, which the compiler vectorises, finds them.
+template <typename Code>
+void scanWords(typename Code::State& state, const std::uint8_t* data, std::size_t count) {
+  using Word = typename Code::Word;
+  Word steps = 0;
+  const Word known = Code::highWord(state);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Word word = wordAt<Code>(data + i * sizeof(Word));
+    const bool is_step = (typeOf(word) == kTimeHigh) & (word != known);
+    steps = static_cast<Word>(steps | Word{is_step});
+  }
+  if (steps == 0 && state.has_high) return;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Word word = wordAt<Code>(data + i * sizeof(Word));
+    if (typeOf(word) == kTimeHigh) setHigh(state, Code::highOf(word));
+  }
+}
+
 }  // namespace
 
-EvtDecoder::EvtDecoder(EvtEncoding encoding) : encoding_(encoding), scratch_(kScratchEvents) {
-  reset();
-}
+EvtDecoder::EvtDecoder(EvtEncoding encoding) : encoding_(encoding) { reset(); }
 
 void EvtDecoder::reset() {
   carried_ = 0;
@@ -242,6 +269,7 @@ void EvtDecoder::skipGap() {
 }
 
 void EvtDecoder::decode(const std::uint8_t* data, std::size_t size, std::vector<Event>& events) {
+  scratch_.resize(kScratchEvents);
   withCode(encoding_, [&](auto code) {
     using Code = decltype(code);
     constexpr std::size_t kWord = sizeof(typename Code::Word);
@@ -275,14 +303,8 @@ void EvtDecoder::scanTime(const std::uint8_t* data, std::size_t size) {
     using Word = typename Code::Word;
     auto& state = std::get<typename Code::State>(state_);
     const auto scan = [&](const std::uint8_t* words, std::size_t count) {
-      Word last = 0;  // not a TIME_HIGH
-      for (std::size_t i = 0; i < count; ++i) {
-        const Word word = wordAt<Code>(words + i * sizeof(Word));
-        // The branch is rarely taken: most words have another type, or repeat the last TIME_HIGH.
-        if (typeOf(word) == kTimeHigh && word != last) {
-          setHigh(state, Code::highOf(word));
-          last = word;
-        }
+      for (std::size_t i = 0; i < count; i += kScanWords) {
+        scanWords<Code>(state, words + i * sizeof(Word), std::min(kScanWords, count - i));
       }
     };
     takeCarried(sizeof(Word), data, size, scan);
@@ -316,6 +338,16 @@ std::int64_t EvtDecoder::timeHighNs() const {
     return static_cast<std::int64_t>(kNsPerUs * 4096 * state->high);
   }
   return static_cast<std::int64_t>(kNsPerUs * 64 * std::get<Evt2State>(state_).high);
+}
+
+bool EvtDecoder::hasTime() const {
+  return std::visit([](const auto& state) { return state.begun; }, state_);
+}
+
+std::size_t EvtDecoder::wordBytes() const {
+  std::size_t bytes = 0;
+  withCode(encoding_, [&](auto code) { bytes = sizeof(typename decltype(code)::Word); });
+  return bytes;
 }
 
 }  // namespace efm

@@ -70,6 +70,10 @@ class EvtDecoder {
 
   /// The time of the last TIME_HIGH, with lower bits of 0; 0 before the first.
   std::int64_t timeHighNs() const;
+  /// Whether there was a TIME_HIGH.
+  bool hasTime() const;
+  /// The size of a word, 2, 4 or 8 bytes.
+  std::size_t wordBytes() const;
   /// The number of bytes of an incomplete word at the end of the data.
   std::size_t incompleteBytes() const { return carried_; }
   /// The number of events that came before their time and row were known.

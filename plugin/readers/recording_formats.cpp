@@ -3,6 +3,7 @@
 
 #include "plugin/readers/bag_recording.h"
 #include "plugin/readers/dataset_folder.h"
+#include "plugin/readers/prophesee_raw.h"
 #include "plugin/readers/uzh_text.h"
 
 namespace efm {
@@ -16,6 +17,8 @@ const std::vector<RecordingFormat>& readerFormats() {
       {"rosbag", "a ROS 1 bag (.bag)", looksLikeRosbag, openBags},
       {"rosbag2", "a ROS 2 bag (.mcap, .db3 or the folder with metadata.yaml)", looksLikeRosbag2,
        openBags},
+      {"raw", "a RAW file of a Prophesee camera (EVT 2.0, 2.1 or 3.0)", looksLikePropheseeRaw,
+       openPropheseeRaw},
   };
   return all;
 }
