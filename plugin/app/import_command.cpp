@@ -17,6 +17,7 @@
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
+#include "plugin/formats/rawlog_signature.h"
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
@@ -59,9 +60,21 @@ void refuseLimitsWithoutEvents(const ImportArguments& arguments) {
                                        formatSeconds(span_ns->second)));
 }
 
+/// An existing file is replaced only if it is a rawlog, and none of the sources.
+void refuseToDestroy(const ImportArguments& arguments) {
+  if (!std::filesystem::exists(arguments.out)) return;
+  for (const std::filesystem::path& source : arguments.source.files) {
+    if (!std::filesystem::equivalent(source, arguments.out)) continue;
+    throw std::runtime_error(arguments.out.string() +
+                             ": the recording itself: expected another file for the rawlog");
+  }
+  if (std::filesystem::is_regular_file(arguments.out)) requireRawlog(arguments.out);
+}
+
 }  // namespace
 
 int runImport(const ImportArguments& arguments) {
+  refuseToDestroy(arguments);
   const std::unique_ptr<Recording> recording =
       openInterval(arguments.source, arguments.t0_ns, arguments.t1_ns);
   RawlogWriter writer(arguments.out, arguments.compression);

@@ -18,7 +18,8 @@ struct ImportArguments {
   RawlogCompression compression = RawlogCompression::kGzip;
 };
 
-/// `event-fusion import`: writes a recording as a rawlog.
+/// `event-fusion import`: writes a recording as a rawlog. Replaces an earlier rawlog, no other
+/// file.
 /// @return the process's exit status.
 /// @throws std::exception if the recording cannot be read to its end or the rawlog cannot be
 /// written. Then there is no rawlog.

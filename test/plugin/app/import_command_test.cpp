@@ -63,6 +63,18 @@ TEST_F(ImportCommand, ACutRawlogStillAnnouncesItsCameras) {
   EXPECT_EQ(mapOf("again.rawlog"), mapOf("cut.rawlog"));
 }
 
+TEST_F(ImportCommand, ReplacesNothingButARawlog) {
+  writeSmallRecording();
+  const std::string events = contentOf("small/events.txt");
+  EXPECT_THAT(errorOf("import small --out small/events.txt"), HasSubstr("not a rawlog"));
+  EXPECT_EQ(contentOf("small/events.txt"), events);
+  ASSERT_EQ(run("import small --out s.rawlog").status, 0);
+  const std::string rawlog = contentOf("s.rawlog");
+  EXPECT_THAT(errorOf("import s.rawlog --out ./s.rawlog"), HasSubstr("the recording itself"));
+  EXPECT_EQ(contentOf("s.rawlog"), rawlog);
+  EXPECT_EQ(run("import small --out s.rawlog --t1 0.04").status, 0);
+}
+
 TEST_F(ImportCommand, AnExportedFolderGivesTheSameMap) {
   write(SyntheticRecording());
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
