@@ -15,6 +15,7 @@
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/writers/folder_writer.h"
+#include "plugin/writers/mcap_writer.h"
 
 namespace efm {
 namespace {
@@ -30,7 +31,8 @@ std::unique_ptr<RecordingWriter> openWriter(const std::filesystem::path& out, co
 }
 
 const std::vector<ExportFormat>& formats() {
-  static const std::vector<ExportFormat> all = {{"folder", openWriter<FolderWriter>}};
+  static const std::vector<ExportFormat> all = {{"folder", openWriter<FolderWriter>},
+                                                {"mcap", openWriter<McapWriter>}};
   return all;
 }
 

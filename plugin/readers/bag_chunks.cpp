@@ -7,7 +7,6 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <iterator>
 #include <new>
 #include <stdexcept>
 #include <utility>
@@ -18,6 +17,7 @@ namespace efm {
 namespace {
 
 constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 30;
+constexpr std::size_t kRecentBytes = 8 << 20;  // of chunks that are kept
 
 /// @return the number of bytes in `target`.
 std::size_t decompressLz4(const std::uint8_t* data, std::size_t size, std::uint8_t* target,
@@ -171,13 +171,19 @@ void ChunkedBag::setChunks(std::vector<BagChunk> chunks) {
   }
 }
 
+/// Cameras are read by turns, one some chunks before the other.
 std::shared_ptr<const ChunkMessages> ChunkedBag::chunk(std::size_t index) {
-  if (auto open = open_[index].lock()) return open;
+  const auto found = std::find_if(recent_.begin(), recent_.end(),
+                                  [&](const auto& entry) { return entry.first == index; });
+  if (found != recent_.end()) return found->second;
   auto chunk = std::make_shared<const ChunkMessages>(readChunk(chunks_[index]));
-  for (auto entry = open_.begin(); entry != open_.end();) {
-    entry = entry->second.expired() ? open_.erase(entry) : std::next(entry);
+  recent_.emplace_back(index, chunk);
+  std::size_t bytes = 0;
+  for (const auto& entry : recent_) bytes += entry.second->size;
+  while (!recent_.empty() && bytes > kRecentBytes) {
+    bytes -= recent_.front().second->size;
+    recent_.pop_front();
   }
-  open_[index] = chunk;
   return chunk;
 }
 

@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <fstream>
 #include <initializer_list>
-#include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "plugin/readers/bag_source.h"
@@ -43,11 +44,12 @@ struct ChunkMessages {
     bool cdr;
   };
   std::unique_ptr<std::uint8_t[]> bytes;
+  std::size_t size = 0;           // of `bytes`
   std::vector<Message> messages;  // in the order of the file; refer to `bytes`
 };
 
 /// A bag whose file is a sequence of chunks, each compressed by itself: ROS 1 bags and MCAP. Memory
-/// holds the list of chunks and one chunk for each cursor. Cursors at the same chunk share it.
+/// holds the list of chunks, the last ones that were read (8 MiB) and one chunk for each cursor.
 class ChunkedBag : public BagSource {
  public:
   std::unique_ptr<BagCursor> messages(std::size_t topic, std::int64_t from_log_ns) override;
@@ -72,7 +74,8 @@ class ChunkedBag : public BagSource {
   std::ifstream stream_;
   std::uint64_t file_size_ = 0;
   std::vector<BagChunk> chunks_;
-  std::map<std::size_t, std::weak_ptr<const ChunkMessages>> open_;  // by index in chunks_
+  /// The last chunks that were read, with their index in `chunks_`.
+  std::deque<std::pair<std::size_t, std::shared_ptr<const ChunkMessages>>> recent_;
 };
 
 enum class ChunkCompression { kNone, kBz2, kLz4, kZstd };

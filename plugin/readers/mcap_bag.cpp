@@ -230,6 +230,7 @@ ChunkMessages McapBag::readChunk(const BagChunk& chunk) {
     ByteReader bytes(file.get(), chunk.size);
     if (static_cast<McapOp>(*file.get()) == McapOp::kMessage) {
       messages.bytes = std::move(file);
+      messages.size = chunk.size;
       addMessages(bytes, messages);
       return messages;
     }
@@ -247,6 +248,7 @@ ChunkMessages McapBag::readChunk(const BagChunk& chunk) {
     const std::uint8_t* const data = content.take(packed);
     const std::uint8_t* const records =
         unpackChunk(compression, {std::move(file), data, packed}, size, messages.bytes);
+    messages.size = size;
     requireChecksum(checksum, records, size);
     addMessages(ByteReader(records, size), messages);
     return messages;

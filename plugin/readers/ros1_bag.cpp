@@ -228,6 +228,7 @@ ChunkMessages Ros1Bag::readChunk(const BagChunk& chunk) {
     ChunkMessages chunk_messages;
     const std::uint8_t* const data = unpackChunk(
         compression, {std::move(file), record.data, record.size}, size, chunk_messages.bytes);
+    chunk_messages.size = size;
     ByteReader messages(data, size);
     while (messages.remaining() > 0) {
       const Ros1Record message = takeRecord(messages);
