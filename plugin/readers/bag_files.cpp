@@ -29,13 +29,6 @@ constexpr std::string_view kMcapStart("\x89MCAP0\r\n", 8);
 constexpr std::string_view kZstdStart = "\x28\xb5\x2f\xfd";
 constexpr const char* kMetadata = "metadata.yaml";
 
-bool beginsWith(const fs::path& file, std::string_view start) {
-  if (!isFile(file)) return false;
-  std::ifstream stream(file, std::ios::binary);
-  std::string found(start.size(), '\0');
-  return stream.read(found.data(), static_cast<std::streamsize>(found.size())) && found == start;
-}
-
 /// "recording.db3.zstd"
 bool isCompressedBag(const fs::path& file) {
   const fs::path inner = file.stem().extension();

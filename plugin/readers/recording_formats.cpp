@@ -1,12 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/readers/recording_formats.h"
 
+#include "plugin/readers/aedat4.h"
 #include "plugin/readers/bag_recording.h"
 #include "plugin/readers/dataset_folder.h"
 #include "plugin/readers/prophesee_raw.h"
+#include "plugin/readers/source_files.h"
 #include "plugin/readers/uzh_text.h"
 
 namespace efm {
+
+bool looksLikeAedat4(const std::filesystem::path& file) { return beginsWith(file, kAedat4Magic); }
+
+#ifndef EFM_WITH_AEDAT4
+RecordingParts openAedat4(const std::vector<std::filesystem::path>& files, const ReaderOptions&) {
+  throw std::runtime_error(files.front().string() +
+                           ": this build does not read AEDAT4 (EFM_READ_AEDAT4)");
+}
+#endif
 
 const std::vector<RecordingFormat>& readerFormats() {
   static const std::vector<RecordingFormat> all = {
@@ -19,6 +30,7 @@ const std::vector<RecordingFormat>& readerFormats() {
        openBags},
       {"raw", "a RAW file of a Prophesee camera (EVT 2.0, 2.1 or 3.0)", looksLikePropheseeRaw,
        openPropheseeRaw},
+      {"aedat4", "an AEDAT4 file", looksLikeAedat4, openAedat4},
   };
   return all;
 }

@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -15,6 +17,14 @@ namespace efm {
 inline bool isFile(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::is_regular_file(path, ignored);
+}
+
+/// Whether a regular file begins with these bytes. Never throws.
+inline bool beginsWith(const std::filesystem::path& file, std::string_view start) {
+  if (!isFile(file)) return false;
+  std::ifstream stream(file, std::ios::binary);
+  std::string found(start.size(), '\0');
+  return stream.read(found.data(), static_cast<std::streamsize>(found.size())) && found == start;
 }
 
 /// @param what the format, for the error.
