@@ -11,6 +11,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
@@ -64,7 +65,8 @@ void refuseLimitsWithoutEvents(const ImportArguments& arguments) {
 void refuseToDestroy(const ImportArguments& arguments) {
   if (!std::filesystem::exists(arguments.out)) return;
   for (const std::filesystem::path& source : arguments.source.files) {
-    if (!std::filesystem::equivalent(source, arguments.out)) continue;
+    std::error_code ignored;  // of a missing source, which the reader reports
+    if (!std::filesystem::equivalent(source, arguments.out, ignored)) continue;
     throw std::runtime_error(arguments.out.string() +
                              ": the recording itself: expected another file for the rawlog");
   }
