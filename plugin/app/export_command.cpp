@@ -16,6 +16,9 @@
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/writers/folder_writer.h"
 #include "plugin/writers/mcap_writer.h"
+#ifdef EFM_WITH_HDF5
+#include "plugin/writers/hdf5_writer.h"
+#endif
 
 namespace efm {
 namespace {
@@ -31,8 +34,13 @@ std::unique_ptr<RecordingWriter> openWriter(const std::filesystem::path& out, co
 }
 
 const std::vector<ExportFormat>& formats() {
-  static const std::vector<ExportFormat> all = {{"folder", openWriter<FolderWriter>},
-                                                {"mcap", openWriter<McapWriter>}};
+  static const std::vector<ExportFormat> all = {
+      {"folder", openWriter<FolderWriter>},
+      {"mcap", openWriter<McapWriter>},
+#ifdef EFM_WITH_HDF5
+      {"dsec", openWriter<Hdf5Writer>},
+#endif
+  };
   return all;
 }
 

@@ -34,20 +34,23 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders, const Rea
   RecordingParts parts;
   parts.expected_calibration = "camchain.yaml";
   parts.expected_poses = "poses.txt or groundtruth.txt";
-  const fs::path camchain = folder / "camchain.yaml";
-  if (isFile(camchain)) parts.calibration = readCalibration(camchain);
+  addFolderFiles(folder, parts);
   const std::size_t count =
       parts.calibration ? parts.calibration->rig.cameras.size() : countCameras(folder);
   for (std::size_t camera = 0; camera < count; ++camera) {
     parts.cameras.push_back(std::make_unique<EventTextStream>(eventsOf(folder, camera)));
   }
+  return parts;
+}
+
+void addFolderFiles(const fs::path& folder, RecordingParts& parts) {
+  const fs::path camchain = folder / "camchain.yaml";
+  if (!parts.calibration && isFile(camchain)) parts.calibration = readCalibration(camchain);
   for (const char* name : {"poses.txt", "groundtruth.txt"}) {
     std::error_code ignored;
-    if (!fs::exists(folder / name, ignored)) continue;
+    if (!parts.poses.empty() || !fs::exists(folder / name, ignored)) continue;
     parts.poses = readPosesFile(folder / name);
-    break;
   }
-  return parts;
 }
 
 }  // namespace efm

@@ -22,4 +22,9 @@ bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folders,
                                  const ReaderOptions& options);
 
+/// Adds the folder's calibration (camchain.yaml) and poses (poses.txt or groundtruth.txt), where
+/// the parts have none.
+/// @throws std::runtime_error naming the file and the line that is wrong.
+void addFolderFiles(const std::filesystem::path& folder, RecordingParts& parts);
+
 }  // namespace efm

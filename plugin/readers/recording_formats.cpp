@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/readers/recording_formats.h"
 
+#include <stdexcept>
+
 #include "plugin/readers/aedat4.h"
 #include "plugin/readers/bag_recording.h"
 #include "plugin/readers/dataset_folder.h"
+#include "plugin/readers/hdf5_files.h"
+#include "plugin/readers/hdf5_recording.h"
 #include "plugin/readers/prophesee_raw.h"
 #include "plugin/readers/source_files.h"
 #include "plugin/readers/uzh_text.h"
@@ -11,6 +15,13 @@
 namespace efm {
 
 bool looksLikeAedat4(const std::filesystem::path& file) { return beginsWith(file, kAedat4Magic); }
+
+#ifndef EFM_WITH_HDF5
+RecordingParts openHdf5(const std::vector<std::filesystem::path>& sources, const ReaderOptions&) {
+  throw std::runtime_error(sources.front().string() +
+                           ": this build does not read HDF5 (EFM_READ_HDF5)");
+}
+#endif
 
 #ifndef EFM_WITH_AEDAT4
 RecordingParts openAedat4(const std::vector<std::filesystem::path>& files, const ReaderOptions&) {
@@ -20,7 +31,10 @@ RecordingParts openAedat4(const std::vector<std::filesystem::path>& files, const
 #endif
 
 const std::vector<RecordingFormat>& readerFormats() {
+  // A folder of HDF5 files may have a camchain.yaml, too: HDF5 comes before the dataset folder.
   static const std::vector<RecordingFormat> all = {
+      {"hdf5", "an HDF5 file, or a folder of them (DSEC, TUM-VIE, VECtor, M3ED, MVSEC, Metavision)",
+       looksLikeHdf5, openHdf5},
       {"folder", "a dataset folder (camchain.yaml, cam0/events.txt, poses.txt)",
        looksLikeDatasetFolder, openDatasetFolder},
       {"uzh", "a folder in the UZH layout (events.txt, groundtruth.txt, calib.txt)",

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace efm {
+
+/// Finds the HDF5 files of a recording. Needs no HDF5 library.
+
+struct CameraFile {
+  std::string camera;  ///< "left", "right", the folder's "camN", or empty: not in the name.
+  std::filesystem::path file;
+};
+
+/// Whether it is an HDF5 file, by its first bytes.
+bool isHdf5File(const std::filesystem::path& file);
+
+/// The HDF5 files of a recording's folder as the data sets are downloaded and unpacked: files of
+/// the folder, of folders in it whose names contain "event", and of a folder per camera in these:
+///   events/left/events.h5, events/right/events.h5              DSEC, event-fusion's export
+///   NAME_events_left/events.h5, NAME_events_right/events.h5    DSEC
+///   NAME-events_left.h5, NAME-events_right.h5                  TUM-VIE
+///   NAME.synced.left_event.hdf5, NAME.synced.right_event.hdf5  VECtor
+///   NAME_data.h5, NAME_pose_gt.h5                              M3ED
+///   NAME_data.hdf5, NAME_gt.hdf5                               MVSEC
+/// Maps of rectified pixels (rectify_map.h5) are left out. In the order of the cameras: left,
+/// right, others by name. Never throws.
+std::vector<CameraFile> hdf5FilesIn(const std::filesystem::path& folder);
+
+/// Whether it is an HDF5 file or a folder with `hdf5FilesIn`. Never throws.
+bool looksLikeHdf5(const std::filesystem::path& source);
+
+}  // namespace efm
