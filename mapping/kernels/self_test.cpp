@@ -55,18 +55,19 @@ struct TileMemory {
   float sum[kTilePixels * kTilePixels + kSumPadding] = {};
 };
 
-/// The votes of a cell, summed in 64 bits.
+/// The weights of a cell's votes by pixel, summed in 64 bits.
 struct CellTotal {
-  std::uint64_t a = 0, b = 0, ab = 0, votes = 0;
+  std::uint64_t upper_left = 0, lower_left = 0, upper_right = 0, lower_right = 0;
 
   void add(const CellSums& sums) {
-    a += sums.a;
-    b += sums.b;
-    ab += sums.ab;
-    votes += sums.votes;
+    upper_left += sums.upper_left;
+    lower_left += sums.lower_left;
+    upper_right += sums.upper_right;
+    lower_right += sums.lower_right;
   }
   bool operator!=(const CellTotal& other) const {
-    return a != other.a || b != other.b || ab != other.ab || votes != other.votes;
+    return upper_left != other.upper_left || lower_left != other.lower_left ||
+           upper_right != other.upper_right || lower_right != other.lower_right;
   }
 };
 
@@ -161,22 +162,31 @@ class TileTest {
       const auto column = static_cast<std::uint32_t>(x);
       const auto row = static_cast<std::uint32_t>(y);
       constexpr std::uint32_t kMask = (1U << kFractionBits) - 1;
+      // b is rounded to the units of weights, and the weights for the pixels on the right.
+      constexpr std::uint32_t kVote = 1U << kWeightBits;
+      constexpr std::uint32_t kHalf = 1U << (kFractionBits - 1);
       const std::uint32_t a = column & kMask;
-      const std::uint32_t b = row & kMask;
+      const std::uint32_t b = ((row & kMask) * kVote + kHalf) >> kFractionBits;
+      const std::uint32_t upper_right = ((kVote - b) * a + kHalf) >> kFractionBits;
+      const std::uint32_t lower_right = (b * a + kHalf) >> kFractionBits;
       const std::size_t cell =
           std::size_t{row >> kFractionBits} * kTileCells + (column >> kFractionBits);
-      cells[cell].add({a, b, a * b >> (2 * kFractionBits - kProductBits), 1});
+      cells[cell].add({kVote - b - upper_right, b - lower_right, upper_right, lower_right});
     }
     return cells;
   }
 
+  static constexpr std::uint64_t kTopBits = 0x8000'8000'8000'8000U;
+
   void requireCells(const Cells& expected, std::size_t full) {
     Cells found(expected.size());
-    for (std::size_t i = 0; i < found.size(); ++i) found[i].add(unpack(memory_->cells[i]));
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      found[i].add(unpack(memory_->cells[i]));
+      require((memory_->cells[i] & kTopBits) == 0, "vote: the full cells");
+    }
     for (std::size_t i = 0; i < full; ++i) {
       const FullCell& cell = memory_->full[i];
-      require(cell.index < found.size() && unpack(cell.sums).votes == kVotesPerCell,
-              "vote: the full cells");
+      require(cell.index < found.size() && (cell.sums & kTopBits) != 0, "vote: the full cells");
       if (cell.index < found.size()) found[cell.index].add(unpack(cell.sums));
     }
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -207,19 +217,25 @@ class TileTest {
     }
     std::uint64_t inside = 0;
     const Cells cells = plainCells(to_plane);
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (i % kTileCells > 0 && i >= kTileCells) inside += cells[i].votes;
+    for (int y = 0; y < kTileCells; ++y) {
+      for (int x = 0; x < kTileCells; ++x) {
+        const CellTotal& cell = cells[static_cast<std::size_t>(y * kTileCells + x)];
+        const bool left = x > 0;
+        const bool right = x < kTilePixels;
+        if (y > 0) inside += left * cell.upper_left + right * cell.upper_right;
+        if (y < kTilePixels) inside += left * cell.lower_left + right * cell.lower_right;
+      }
     }
-    const std::uint64_t votes =
+    const std::uint64_t units =
         resolve_.all(memory_->cells, kTilePixels, kTilePixels, memory_->density);
-    require(votes == inside, "resolve: the number of votes");
+    require(units == inside, "resolve: the sum of weights");
     requireEmptyCells();
     for (int y = 0; y < kTilePixels; ++y) {
       for (int x = 0; x < kTilePixels; ++x) {
-        // Products of fractions are cut to 1/32,768, and a pixel has some 30 votes around it.
+        // Weights are rounded to 1/1024, and a pixel has some 30 votes around it.
         const float difference = memory_->density[y * kTilePixels + x] -
                                  plane[static_cast<std::size_t>((y + 1) * kViewPixels + x + 1)];
-        require(std::abs(difference) <= 1e-3F, "resolve: the densities");
+        require(std::abs(difference) <= 1e-2F, "resolve: the densities");
       }
     }
   }
@@ -238,7 +254,7 @@ class TileTest {
     for (const auto& [add, steps] : rules) {
       std::vector<float> first(kPixels);
       std::vector<float> second(kPixels);
-      std::uint64_t votes[2] = {};
+      std::uint64_t units[2] = {};
       std::uint64_t expected[2] = {};
       voteAll(0);
       expected[0] = resolve_.all(memory_->cells, kTilePixels, kTilePixels, first.data());
@@ -253,9 +269,9 @@ class TileTest {
       voteAll(to_plane, marks[1]);
       std::fill(std::begin(memory_->sum), std::end(memory_->sum), 1.0F);
       add({memory_->others, marks[0]}, {memory_->cells, marks[1]}, kTilePixels, kTilePixels,
-          memory_->sum, votes);
+          memory_->sum, units);
       requireEmptyCells();
-      require(std::equal(votes, votes + 2, expected), "resolve: the votes of two inputs");
+      require(std::equal(units, units + 2, expected), "resolve: the weights of two inputs");
       for (std::size_t i = 0; i < kPixels; ++i) {
         require(memory_->sum[i] == 1.0F + first[i], "resolve: the mean of two inputs");
       }
@@ -271,7 +287,7 @@ class TileTest {
       memory_->dx[i] = memory_->dy[i] = 0;
     }
     const std::size_t full = voteAll(0);
-    require(full > kMaxRays / kVotesPerCell / 2, "vote: the full cells");
+    require(full > kMaxRays / kVotesPerCell / 8, "vote: the full cells");
     requireCells(plainCells(0), full);
   }
 

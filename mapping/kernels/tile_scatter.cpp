@@ -21,16 +21,11 @@ using FloatV = hn::Vec<Floats>;
 using UnsignedV = hn::Vec<Unsigned>;
 
 constexpr std::uint32_t kFractionMask = (1U << kFractionBits) - 1;
-constexpr std::uint32_t kSumMask = (1U << kSumBits) - 1;
-constexpr std::uint32_t kOneVote = 1U << kCountShift;
-constexpr std::uint32_t kProductMask = (kOneVote - 1) >> kProductShift;
-
-// A cell holds its votes' sums until their number sets the sign.
-static_assert(std::int64_t{kVotesPerCell} << kCountShift == std::int64_t{1} << 31);
-static_assert(kVotesPerCell * kFractionMask <= kSumMask);
-static_assert(kVotesPerCell * ((1U << kProductBits) - 1) <= kProductMask);
-// One vote's b ends within the lower 32 bits, where only a sum of many does not.
-static_assert(kSumBits + kFractionBits <= 32 && 2 * kSumBits == 32 + kProductShift);
+constexpr std::uint32_t kUnits = 1U << kWeightBits;  // of a vote
+constexpr std::uint64_t kFullCell = 0x8000'8000'8000'8000U;
+/// After this number of votes cells are looked at. No sum can leave its field before.
+constexpr std::size_t kVotesUnseen = kVotesPerCell;
+static_assert(0x7FFF + kVotesUnseen * kUnits <= 0xFFFF && kVotesPerCell * kUnits == 0x8000);
 
 /// Adding 2^23 leaves a float's value, rounded, in its last bits.
 constexpr float kToBits = 8388608.0F;
@@ -77,28 +72,59 @@ std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest&
 
 // ---------------------------------------------------------------- voting
 
-/// The product of two fractions, where the upper half of a cell has it.
-HWY_INLINE UnsignedV productOf(UnsignedV a, UnsignedV b) {
-#if HWY_TARGET == HWY_SCALAR
-  return hn::ShiftLeft<kProductShift>(
-      hn::ShiftRight<2 * kFractionBits - kProductBits>(hn::Mul(a, b)));
-#else
-  // The upper half of a 16-bit product, with both moved up, is ab in 1/65,536.
+/// The weights of votes for the two left pixels and for the two right ones, the upper pixel in the
+/// lower half.
+struct Weights {
+  UnsignedV left, right;
+};
+
+/// @param x, y positions in cells: the last bits are fractions. @param inside where not, weights
+/// are zero.
+template <class Mask>
+HWY_INLINE Weights weightsOf(UnsignedV x, UnsignedV y, Mask inside) {
   const Unsigned d;
-  const hn::Repartition<std::uint16_t, Unsigned> d16;
-  constexpr int kUp = 16 - kFractionBits;
-  const UnsignedV product = hn::BitCast(d, hn::MulHigh(hn::BitCast(d16, hn::ShiftLeft<kUp>(a)),
-                                                       hn::BitCast(d16, hn::ShiftLeft<kUp>(b))));
-  return hn::And(hn::ShiftLeft<kProductShift + kProductBits - 16>(product),
-                 hn::Set(d, kProductMask << kProductShift));
+#if HWY_TARGET == HWY_SCALAR
+  const auto set = [d](std::uint32_t value) { return hn::Set(d, value); };
+  const UnsignedV a = hn::ShiftLeft<15 - kFractionBits>(hn::And(x, set(kFractionMask)));
+  const UnsignedV lower = hn::ShiftRight<kFractionBits - kWeightBits>(
+      hn::Add(hn::And(y, set(kFractionMask)), set(1U << (kFractionBits - kWeightBits - 1))));
+  const UnsignedV upper = hn::Sub(set(kUnits), lower);
+  const auto toRight = [&](UnsignedV weight) {
+    return hn::ShiftRight<15>(hn::Add(hn::Mul(weight, a), set(1U << 14)));
+  };
+  const UnsignedV both = hn::IfThenElseZero(inside, hn::Or(upper, hn::ShiftLeft<16>(lower)));
+  const UnsignedV right =
+      hn::IfThenElseZero(inside, hn::Or(toRight(upper), hn::ShiftLeft<16>(toRight(lower))));
+#else
+  // Pairs of 16 bits. Products of them are rounded.
+  const hn::Repartition<std::int16_t, Unsigned> d16;
+  const hn::Repartition<std::uint8_t, Unsigned> d8;
+  HWY_ALIGN static constexpr std::uint8_t kLowerHalfTwice[16] = {0, 1, 0, 1, 4,  5,  4,  5,
+                                                                 8, 9, 8, 9, 12, 13, 12, 13};
+  const auto twice = hn::LoadDup128(d8, kLowerHalfTwice);
+  const auto fraction = hn::Set(d16, static_cast<std::int16_t>(kFractionMask));
+  const auto fractionOf = [&](UnsignedV value) {
+    return hn::And(hn::BitCast(d16, hn::TableLookupBytes(hn::BitCast(d8, value), twice)), fraction);
+  };
+  const auto pair = [d, d16](std::uint32_t low, std::uint32_t high) {
+    return hn::BitCast(d16, hn::Set(d, low | high << 16));
+  };
+  const auto across = hn::ShiftLeft<15 - kFractionBits>(fractionOf(x));
+  const auto below = hn::MulFixedPoint15(
+      fractionOf(y), hn::Set(d16, std::int16_t{1} << (15 - kFractionBits + kWeightBits)));
+  // Upper weights are kUnits - below.
+  const auto down = hn::Add(hn::Xor(below, pair(0xFFFF, 0)), pair(kUnits + 1, 0));
+  const UnsignedV both = hn::IfThenElseZero(inside, hn::BitCast(d, down));
+  const UnsignedV right = hn::BitCast(d, hn::MulFixedPoint15(hn::BitCast(d16, both), across));
 #endif
+  return {hn::Sub(both, right), right};
 }
 
 /// A batch of votes: vectors write it, and it is read one by one. It stays in the first-level
 /// cache.
 struct VoteBatch {
   static constexpr std::size_t kSize = 128;
-  HWY_ALIGN std::uint32_t index[kSize];
+  HWY_ALIGN std::uint32_t index[kSize] = {};
   HWY_ALIGN std::uint64_t sums[kSize];
 };
 
@@ -146,12 +172,8 @@ class VoteEncoder {
                                    hn::Set(du, kTileCells * kTileCells - 1));
     static_assert(kTileCells == 1 << 6);
     hn::Store(hn::Add(cell, first_), du, index);
-    const UnsignedV fraction_mask = hn::Set(du, kFractionMask);
-    const UnsignedV a = hn::And(x, fraction_mask);
-    const UnsignedV b = hn::And(y, fraction_mask);
-    const UnsignedV lower = hn::Or(a, hn::ShiftLeft<kSumBits>(b));
-    const UnsignedV upper = hn::Or(productOf(a, b), hn::Set(du, kOneVote));
-    storeHalves(hn::IfThenElseZero(inside, lower), hn::IfThenElseZero(inside, upper), sums);
+    const Weights weights = weightsOf(x, y, inside);
+    storeHalves(weights.left, weights.right, sums);
   }
 
  private:
@@ -171,6 +193,17 @@ class VoteEncoder {
   UnsignedV left_, top_, width_, height_, first_;
 };
 
+/// Moves full cells that some votes fell into to the list.
+HWY_INLINE FullCell* takeFull(const std::uint32_t* index, std::uint64_t* cells, FullCell* full) {
+  for (std::size_t vote = 0; vote < kVotesUnseen; ++vote) {
+    std::uint64_t& cell = cells[index[vote]];
+    if ((cell & kFullCell) == 0) continue;
+    *full++ = {index[vote], cell};
+    cell = 0;
+  }
+  return full;
+}
+
 /// Adds a batch's votes to their cells.
 template <bool kMarks>
 HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const CellBuffer& tile,
@@ -178,19 +211,21 @@ HWY_INLINE FullCell* scatter(const VoteBatch& batch, std::size_t count, const Ce
   std::uint64_t* const cells = tile.cells;
   std::uint8_t* const dirty = tile.dirty;
   constexpr std::size_t kLanes = hn::MaxLanes(Floats());
-  for (std::size_t i = 0; i < count; i += kLanes) {
+  static_assert(VoteBatch::kSize % kVotesUnseen == 0 && kVotesUnseen % kLanes == 0);
+  for (std::size_t begin = 0; begin < count; begin += kVotesUnseen) {
+    const std::size_t end = std::min(begin + kVotesUnseen, count);
+    std::uint64_t seen = 0;
+    for (std::size_t i = begin; i < end; i += kLanes) {
 #pragma GCC unroll 16
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      const std::size_t vote = i + laneOf(k, kLanes);
-      const std::uint32_t index = batch.index[vote];
-      const std::uint64_t sums = batch.sums[i + k] + cells[index];
-      cells[index] = sums;
-      if (kMarks) dirty[index / kLineCells] = 1;
-      if (HWY_UNLIKELY(static_cast<std::int64_t>(sums) < 0)) {
-        *full++ = {index, sums};
-        cells[index] = 0;
+      for (std::size_t k = 0; k < kLanes; ++k) {
+        const std::uint32_t index = batch.index[i + laneOf(k, kLanes)];
+        const std::uint64_t sums = batch.sums[i + k] + cells[index];
+        cells[index] = sums;
+        if (kMarks) dirty[index / kLineCells] = 1;
+        seen |= sums;
       }
     }
+    if (HWY_UNLIKELY((seen & kFullCell) != 0)) full = takeFull(batch.index + begin, cells, full);
   }
   return full;
 }

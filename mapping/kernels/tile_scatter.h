@@ -11,37 +11,30 @@ namespace efm::kernels {
 // Votes on one tile of one depth plane, small enough to stay in the first-level cache.
 //
 // A vote falls into the cell between four pixels: cell (x, y) is the square from pixel (x, y) to
-// (x + 1, y + 1). Let (a, b) be the vote's position in the cell. Its four bilinear weights are
-// linear in 1, a, b and ab. A cell sums these four numbers, packed into 64 bits, and a vote is one
-// addition. The weights are computed from the sums once per cell and plane (`tile_resolve.h`):
+// (x + 1, y + 1). A cell sums the weights that its votes give to each of these pixels, in units of
+// 1/1024, packed into 64 bits. So a vote is one addition:
 //
-//   bits  0 to 17: sum of a, in 1/4096        bits 36 to 56: sum of ab, in 1/32,768
-//   bits 18 to 35: sum of b, in 1/4096        bits 57 to 63: number of votes
+//   bits  0 to 15: the upper left pixel        bits 32 to 47: the upper right pixel
+//   bits 16 to 31: the lower left pixel        bits 48 to 63: the lower right pixel
 //
-// With the 64th vote the number reaches the top bit, and no sum has left its field yet. A cell
-// whose sign changes is full: it is copied to a list and set to zero.
+// The four weights of a vote sum to 1024. A sum that reaches 2^15 makes its cell full: the cell is
+// copied to a list and set to zero, before any sum can leave its field.
 
 inline constexpr int kTileCells = 64;     ///< Cells on a side of a tile at most; a row's stride.
 inline constexpr int kFractionBits = 12;  ///< Of a coordinate within its cell.
-inline constexpr int kProductBits = 15;   ///< Of the product of two.
-inline constexpr int kVotesPerCell = 64;  ///< A cell with this number of votes is full.
+inline constexpr int kWeightBits = 10;    ///< Of a weight; a vote has 2^kWeightBits units.
+inline constexpr int kVotesPerCell = 32;  ///< A full cell has at least this number of votes.
 
-/// A cell's sums, in the units above.
+/// The sums of a cell's weights by pixel, in units.
 struct CellSums {
-  std::uint32_t a = 0, b = 0, ab = 0, votes = 0;
+  std::uint32_t upper_left = 0, lower_left = 0, upper_right = 0, lower_right = 0;
 };
 
-inline constexpr int kSumBits = 18;  ///< Of the sum of a, and of b.
-inline constexpr int kProductShift =
-    2 * kSumBits - 32;                       ///< Of the sum of ab, in the upper 32 bits,
-inline constexpr int kCountShift = 57 - 32;  ///< and of the number of votes.
-
 inline CellSums unpack(std::uint64_t cell) {
-  const auto field = [cell](int first, int end) {
-    return static_cast<std::uint32_t>(cell >> first & ((std::uint64_t{1} << (end - first)) - 1));
+  const auto field = [cell](int first) {
+    return static_cast<std::uint32_t>(cell >> first & 0xFFFFU);
   };
-  return {field(0, kSumBits), field(kSumBits, 2 * kSumBits),
-          field(32 + kProductShift, 32 + kCountShift), field(32 + kCountShift, 64)};
+  return {field(0), field(16), field(32), field(48)};
 }
 
 /// Coordinates of rays count from an origin that adjacent tiles share, a multiple of this number of
@@ -113,7 +106,7 @@ struct TileFunctions {
                         const MovingRays& rays) = nullptr;
   /// Votes where the rays meet the plane that is `to_plane` (1/m) from the plane of their pixels.
   /// @param full receives full cells; has room for one of every kVotesPerCell rays. @return one
-  /// past the last one.
+  /// past the last one. Afterwards no sum of a cell is 2^15 or more.
   FullCell* (*vote)(const MovingRays& rays, float to_plane, const CellWindow& window,
                     FullCell* full) = nullptr;
 };

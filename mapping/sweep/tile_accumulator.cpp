@@ -49,41 +49,36 @@ void TileAccumulator::vote(TileRays& rays, double from_pixels, bool marks) {
 
 std::uint64_t TileAccumulator::resolve(float* density) {
   pending_ = false;
-  const std::uint64_t votes =
+  const std::uint64_t units =
       resolve_.all(cells_.data(), tile_.tile.width, tile_.tile.height, density);
-  return votes + addFullCells(density);
+  return units + addFullCells(density);
 }
 
-/// Adds the four weights of each full cell's votes, from their sums of 1, a, b and ab.
+/// Adds the weights of full cells. @return those of pixels in the tile, in units.
 std::uint64_t TileAccumulator::addFullCells(float* density) const {
-  constexpr float kFraction = 1.0F / (1 << kernels::kFractionBits);
-  constexpr float kProduct = 1.0F / (1 << kernels::kProductBits);
+  constexpr float kUnit = 1.0F / (1 << kernels::kWeightBits);
   const cv::Rect& tile = tile_.tile;
-  std::uint64_t votes = 0;
+  std::uint64_t units = 0;
   for (std::size_t i = 0; i < full_cells_; ++i) {
     const kernels::CellSums sums = kernels::unpack(full_[i].sums);
-    const float a = kFraction * static_cast<float>(sums.a);
-    const float b = kFraction * static_cast<float>(sums.b);
-    const float ab = kProduct * static_cast<float>(sums.ab);
-    const auto number = static_cast<float>(sums.votes);
     // Of the pixel to the lower right.
     const int x = static_cast<int>(full_[i].index) % kStride;
     const int y = static_cast<int>(full_[i].index) / kStride;
-    const auto add = [&](int column, int row, float weight) {
+    const auto add = [&](int column, int row, std::uint32_t weight) {
       if (column < 0 || row < 0 || column >= tile.width || row >= tile.height) return;
-      density[row * tile.width + column] += std::max(weight, 0.0F);
+      density[row * tile.width + column] += kUnit * static_cast<float>(weight);
+      units += weight;
     };
-    add(x - 1, y - 1, number - a - b + ab);
-    add(x, y - 1, a - ab);
-    add(x - 1, y, b - ab);
-    add(x, y, ab);
-    if (x >= 1 && y >= 1) votes += sums.votes;
+    add(x - 1, y - 1, sums.upper_left);
+    add(x, y - 1, sums.upper_right);
+    add(x - 1, y, sums.lower_left);
+    add(x, y, sums.lower_right);
   }
-  return votes;
+  return units;
 }
 
 int TileAccumulator::addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second,
-                             float* sum, std::uint64_t votes[2]) {
+                             float* sum, std::uint64_t units[2]) {
   const cv::Rect& tile = first.tile_.tile;
   assert(first.pending_ && second.pending_ && first.marked_ == second.marked_ &&
          tile == second.tile_.tile);
@@ -93,12 +88,12 @@ int TileAccumulator::addPair(FusionRule rule, TileAccumulator& first, TileAccumu
     const auto add_pair = rule == FusionRule::kMin        ? resolve.addMin
                           : rule == FusionRule::kHarmonic ? resolve.addHarmonic
                                                           : resolve.addGeometric;
-    return add_pair(first.buffer(), second.buffer(), tile.width, tile.height, sum, votes);
+    return add_pair(first.buffer(), second.buffer(), tile.width, tile.height, sum, units);
   }
   const auto pixels = static_cast<std::size_t>(tile.area());
   for (TileAccumulator* input : {&first, &second}) {
     input->density_.resize(pixels);
-    votes[input == &first ? 0 : 1] += input->resolve(input->density_.data());
+    units[input == &first ? 0 : 1] += input->resolve(input->density_.data());
   }
   stepsOf(rule).pair(first.density_.data(), second.density_.data(), pixels);
   for (std::size_t i = 0; i < pixels; ++i) sum[i] += first.density_[i];

@@ -33,16 +33,16 @@ class TileAccumulator {
   void vote(TileRays& rays, double from_pixels, bool marks = false);
   /// Resolves all pixels; no vote is left.
   /// @param density one value per pixel of the tile, row-major.
-  /// @return the votes of the cells whose upper left pixel lies in the tile. Their sum over all
-  /// tiles is the number of votes in the view.
+  /// @return the sum of all pixels' weights, in units. All tiles together have
+  /// 2^kernels::kWeightBits units for each vote in the view.
   std::uint64_t resolve(float* density);
 
   /// Adds the mean of two inputs on the same tile to a sum; no vote is left. The bits are those of
   /// `resolve` and the rule's mean.
-  /// @param rule AND-like. @param sum as `density`, and kernels::kSumPadding. @param votes receives
-  /// the votes of each input, added. @return the number of pixels that were not skipped.
+  /// @param rule AND-like. @param sum as `density`, and kernels::kSumPadding. @param units receives
+  /// those of each input, added. @return the number of pixels that were not skipped.
   static int addPair(FusionRule rule, TileAccumulator& first, TileAccumulator& second, float* sum,
-                     std::uint64_t votes[2]);
+                     std::uint64_t units[2]);
 
  private:
   kernels::CellBuffer buffer() { return {cells_.data(), marked_ ? dirty_.data() : nullptr}; }

@@ -23,7 +23,7 @@ TileFusion::TileFusion(const FusionOptions& options, const FusionInputs& inputs,
              (inputs.slots_per_group == 1 || (options.across_time == FusionRule::kArithmetic &&
                                               options.order == FusionOrder::kCamerasThenTime))),
       accumulators_{TileAccumulator(kernel), TileAccumulator(kernel)},
-      votes_(static_cast<std::size_t>(inputs.cameras)) {}
+      units_(static_cast<std::size_t>(inputs.cameras)) {}
 
 void TileFusion::moveTo(const TileCells& tile) {
   for (TileAccumulator& accumulator : accumulators_) accumulator.moveTo(tile);
@@ -47,7 +47,7 @@ const PlaneValues& TileFusion::fuse(std::vector<TileRays>& rays, double from_pix
     accumulator.vote(rays[static_cast<std::size_t>(
                          input.camera * inputs_.slots_per_group * inputs_.groups + input.slot)],
                      from_pixels);
-    votes_[static_cast<std::size_t>(input.camera)] += accumulator.resolve(planes_->next().data());
+    units_[static_cast<std::size_t>(input.camera)] += accumulator.resolve(planes_->next().data());
     planes_->add(input);
   }
   return planes_->fused();
@@ -69,7 +69,7 @@ const PlaneValues& TileFusion::fusePairs(std::vector<TileRays>& rays, double fro
       accumulators_[0].vote(first, from_pixels, marks);
       accumulators_[1].vote(second, from_pixels, marks);
       const int resolved = TileAccumulator::addPair(options_.across_cameras, accumulators_[0],
-                                                    accumulators_[1], sum.data(), votes_.data());
+                                                    accumulators_[1], sum.data(), units_.data());
       if (marks) skips_[slot] = resolved <= kMaxMarkedPixels * pixels;
     }
     if (slots_per_group == 1) continue;

@@ -28,8 +28,8 @@ class TileFusion {
   const PlaneValues& fuse(std::vector<TileRays>& rays, double from_pixels);
   /// A camera's own plane after `fuse`, where cameras are kept.
   const PlaneValues& ofCamera(int camera) const { return planes_->ofCamera(camera); }
-  /// The votes of each camera on all tiles and planes so far.
-  const std::vector<std::uint64_t>& votes() const { return votes_; }
+  /// The weights of each camera's votes on all tiles and planes so far, in units.
+  const std::vector<std::uint64_t>& units() const { return units_; }
 
  private:
   const PlaneValues& fusePairs(std::vector<TileRays>& rays, double from_pixels);
@@ -43,7 +43,7 @@ class TileFusion {
   std::optional<PlaneFusion> planes_;
   PlaneValues sum_, group_sum_;  // of the shortcut
   std::vector<bool> skips_;      // by slot: whether marks made it skip many pixels of this tile
-  std::vector<std::uint64_t> votes_;
+  std::vector<std::uint64_t> units_;
 };
 
 }  // namespace efm

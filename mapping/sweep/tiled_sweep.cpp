@@ -137,11 +137,12 @@ class TiledSweep {
   SweepResult result() {
     SweepResult result{fused_.sweptDsi(), {}, rays_.notCast()};
     for (ViewPeaks& camera : cameras_) result.cameras.push_back(camera.sweptDsi());
-    for (const Scratch& scratch : scratches_) {
-      for (std::size_t c = 0; c < result.votes.size(); ++c) {
-        result.votes[c].cast += scratch.fusion.votes()[c];
-        result.votes[c].outside_view -= scratch.fusion.votes()[c];
-      }
+    for (std::size_t c = 0; c < result.votes.size(); ++c) {
+      std::uint64_t units = 0;
+      for (const Scratch& scratch : scratches_) units += scratch.fusion.units()[c];
+      const std::uint64_t cast = units >> kernels::kWeightBits;
+      result.votes[c].cast += cast;
+      result.votes[c].outside_view -= cast;
     }
     return result;
   }

@@ -24,11 +24,13 @@ inline std::string nameOfKernel(const ::testing::TestParamInfo<VotingKernel>& te
   return std::string(nameOf(test.param));
 }
 
-/// The mass that a fast kernel may put into wrong voxels, as a fraction of all mass: a
-/// coordinate is rounded to 1/4096 px where the ray is sorted into bins and again where it votes,
-/// on average by 1/3 of that together, and a shift of d px in x and in y moves at most 4 d of a
-/// vote's weights; their product, cut to 1/32,768, moves 4 times half of that. 3.9e-4.
-inline constexpr double kFastErrorOverMass = 4.0 / 3 / 4096 + 4 * 0.5 / 32'768;
+/// The mass that a fast kernel may put into wrong voxels, as a fraction of all mass. A coordinate
+/// is rounded to 1/4096 px where the ray is sorted into bins and again where it votes, on average
+/// by 1/3 of that together, and a shift of d px in x and in y moves at most 4 d of a vote's
+/// weights. Weights are rounded to 1/1024: first those of the two rows, by a quarter of it on
+/// average, which moves two quarters, and then four times a quarter. 1.8e-3 for single votes; where
+/// several meet, less.
+inline constexpr double kFastErrorOverMass = 4.0 / 3 / 4096 + 1.5 / 1024;
 
 /// The same of the plain kernel. Float coordinates of some 40 px are good to 4e-6 px, at which a
 /// vote moves.

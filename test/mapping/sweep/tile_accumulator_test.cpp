@@ -23,8 +23,10 @@ constexpr double kLastFraction = 4095.0 / 4096;
 
 struct TileVotes {
   std::vector<float> density;
-  std::uint64_t votes = 0;
+  std::uint64_t units = 0;  // of all weights
 };
+
+constexpr std::uint64_t kUnitsOfVote = 1U << kernels::kWeightBits;
 
 TileVotes voteWith(TileAccumulator& accumulator, const cv::Rect& tile, const Points& points) {
   const TileCells cells(tile, test::kTiledView);
@@ -32,7 +34,7 @@ TileVotes voteWith(TileAccumulator& accumulator, const cv::Rect& tile, const Poi
   TileRays rays = test::raysAt(points, cells.origin);
   TileVotes result{std::vector<float>(static_cast<std::size_t>(tile.area()), -1.0F), 0};
   accumulator.vote(rays, 0);
-  result.votes = accumulator.resolve(result.density.data());
+  result.units = accumulator.resolve(result.density.data());
   return result;
 }
 
@@ -46,7 +48,7 @@ TileVotes voteOnView(VotingKernel kernel, const Points& points) {
       std::copy_n(part.density.begin() + y * tile.width, tile.width,
                   all.density.begin() + (tile.y + y) * test::kTiledView.width + tile.x);
     }
-    all.votes += part.votes;
+    all.units += part.units;
   }
   return all;
 }
@@ -82,7 +84,7 @@ VotesOneByOne voteOneByOne(const Points& points) {
 void expectPlainVotes(VotingKernel kernel, const Points& points, double per_vote) {
   const TileVotes fast = voteOnView(kernel, points);
   const VotesOneByOne plain = voteOneByOne(points);
-  EXPECT_EQ(fast.votes, plain.votes);
+  EXPECT_EQ(fast.units, plain.votes * kUnitsOfVote);
   for (std::size_t i = 0; i < plain.density.size(); ++i) {
     // A vote's float weights, and sums of full cells: one rounding for each of 64 votes at most.
     const double rounding = 1.2e-7 * (1 + static_cast<double>(points.size()) / 64);
@@ -92,8 +94,8 @@ void expectPlainVotes(VotingKernel kernel, const Points& points, double per_vote
   }
 }
 
-/// The products of fractions are cut to this.
-constexpr double kProductUnit = 1.0 / (1 << kernels::kProductBits);
+/// A weight is off by this at most: half a unit for the row, and half a unit for the column.
+constexpr double kWeightError = 1.0 / (1 << kernels::kWeightBits);
 
 class TileAccumulatorOn : public ::testing::TestWithParam<VotingKernel> {};
 
@@ -102,7 +104,7 @@ INSTANTIATE_TEST_SUITE_P(Kernels, TileAccumulatorOn, ::testing::ValuesIn(test::f
 
 TEST_P(TileAccumulatorOn, AVoteIsSharedBilinearlyAmongFourPixels) {
   const TileVotes votes = voteOnView(GetParam(), {{1.25, 0.5}});
-  EXPECT_EQ(votes.votes, 1U);
+  EXPECT_EQ(votes.units, kUnitsOfVote);
   EXPECT_EQ(votes.density[1], 0.375F);
   EXPECT_EQ(votes.density[2], 0.125F);
   EXPECT_EQ(votes.density[151], 0.375F);
@@ -124,17 +126,16 @@ TEST_P(TileAccumulatorOn, ThousandsOfVotesInOneVoxelAreThePlainKernelsAndAllCoun
                                    {148, 0},
                                    {0, 128},
                                    {148, 128}}) {
-    for (const auto& [fraction, product_fits] :
+    for (const auto& [fraction, fits] :
          std::vector<std::pair<Eigen::Vector2d, bool>>{{{0, 0}, true},
                                                        {{0.5, 0.5}, true},
                                                        {{0.25, 0.75}, true},
-                                                       {{0, kLastFraction}, true},
-                                                       {{kLastFraction, 0}, true},
+                                                       {{0, kLastFraction}, false},
+                                                       {{kLastFraction, 0}, false},
                                                        {{1.0 / 4096, 1.0 / 4096}, false},
                                                        {{0.3330078125, 0.7001953125}, false},
                                                        {{kLastFraction, kLastFraction}, false}}) {
-      expectPlainVotes(GetParam(), Points(10'000, corner + fraction),
-                       product_fits ? 0 : kProductUnit);
+      expectPlainVotes(GetParam(), Points(10'000, corner + fraction), fits ? 0 : kWeightError);
     }
   }
 }
@@ -143,7 +144,7 @@ TEST_P(TileAccumulatorOn, ACellMayFillUpAtAnyVote) {
   for (const std::size_t votes :
        {1U, 62U, 63U, 64U, 65U, 127U, 128U, 129U, 191U, 192U, 255U, 256U, 257U, 4096U}) {
     for (const double fraction : {0.0, 0.5, kLastFraction}) {
-      expectPlainVotes(GetParam(), Points(votes, {30 + fraction, 20 + fraction}), kProductUnit);
+      expectPlainVotes(GetParam(), Points(votes, {30 + fraction, 20 + fraction}), kWeightError);
     }
   }
 }
@@ -162,7 +163,7 @@ TEST_P(TileAccumulatorOn, EveryCellOfTheLargestTileMayBeFullAtOnce) {
     }
     TileAccumulator accumulator(GetParam());
     const TileVotes votes = voteWith(accumulator, tile, points);
-    EXPECT_EQ(votes.votes, std::uint64_t{kVotes} * 63 * 63);
+    EXPECT_EQ(votes.units, std::uint64_t{kVotes} * 63 * 63 * kUnitsOfVote);
     // The four weights around a pixel are those of one vote, whatever the fraction.
     for (const float density : votes.density) ASSERT_NEAR(density, kVotes, 1e-4) << fraction;
   }
@@ -179,10 +180,10 @@ TEST_P(TileAccumulatorOn, RandomVotesAreThePlainKernelsToWithinTheirRounding) {
     }
     const TileVotes fast = voteOnView(GetParam(), points);
     const VotesOneByOne plain = voteOneByOne(points);
-    EXPECT_EQ(fast.votes, plain.votes);
+    EXPECT_EQ(fast.units, plain.votes * kUnitsOfVote);
     for (std::size_t i = 0; i < plain.density.size(); ++i) {
       // Some four votes around a pixel: a dozen at most.
-      ASSERT_NEAR(fast.density[i], plain.density[i], 12 * kProductUnit) << "of " << count;
+      ASSERT_NEAR(fast.density[i], plain.density[i], 12 * kWeightError) << "of " << count;
     }
   }
 }
@@ -198,7 +199,7 @@ TEST_P(TileAccumulatorOn,
     for (const double off : {-1.0 / 4096, 0.0, 1.0 / 4096}) rows.push_back(border + off);
   }
   for (const double x : columns) {
-    for (const double y : rows) expectPlainVotes(GetParam(), {{x, y}}, kProductUnit);
+    for (const double y : rows) expectPlainVotes(GetParam(), {{x, y}}, kWeightError);
   }
 }
 
@@ -209,7 +210,7 @@ TEST_P(TileAccumulatorOn, ARayThatIsNowhereNearOrNoNumberVotesNowhere) {
                              -2048.0, 1024.0, -1024.0, 4096.0, 1048576.0, -1048576.0}) {
     for (const auto& point : Points{{wrong, 20}, {20, wrong}, {wrong, wrong}}) {
       const TileVotes votes = voteOnView(GetParam(), Points(100, point));
-      EXPECT_EQ(votes.votes, 0U) << wrong;
+      EXPECT_EQ(votes.units, 0U) << wrong;
       EXPECT_EQ(std::accumulate(votes.density.begin(), votes.density.end(), 0.0F), 0) << wrong;
     }
   }
@@ -225,7 +226,7 @@ TEST_P(TileAccumulatorOn, RaysMoveAlongTheirShiftToThePlane) {
   std::vector<float> density(static_cast<std::size_t>(cells.tile.area()), -1.0F);
   for (const double to_plane : {-1.0, 0.0, 0.5, 4.0}) {
     accumulator.vote(rays, to_plane);
-    EXPECT_EQ(accumulator.resolve(density.data()), 1U);
+    EXPECT_EQ(accumulator.resolve(density.data()), kUnitsOfVote);
     const int x = static_cast<int>(10 + 4 * to_plane);
     const int y = static_cast<int>(10 - 2 * to_plane);
     EXPECT_EQ(density[static_cast<std::size_t>(y * 50 + x)], 1.0F) << to_plane;
@@ -249,26 +250,17 @@ TEST_P(TileAccumulatorOn, NothingIsLeftOfEarlierTilesAndPlanes) {
     TileAccumulator unused(GetParam());
     const TileVotes after = voteWith(used, tile, few);
     const TileVotes alone = voteWith(unused, tile, few);
-    EXPECT_EQ(after.votes, alone.votes) << "tile " << tile.x << ", " << tile.y;
+    EXPECT_EQ(after.units, alone.units) << "tile " << tile.x << ", " << tile.y;
     EXPECT_EQ(after.density, alone.density) << "tile " << tile.x << ", " << tile.y;
   }
 }
 
-TEST(CellSums, UnpackingFindsEveryFieldOfAFullCellAndNoBitOfAnother) {
-  const std::uint64_t max = kernels::kVotesPerCell;
-  const std::uint64_t a = max * 4095;
-  const std::uint64_t b = max * 4094;
-  const std::uint64_t ab = max * 32'767;
-  const auto fields = [](std::uint64_t cell) {
-    const kernels::CellSums sums = kernels::unpack(cell);
-    return std::vector<std::uint64_t>{sums.a, sums.b, sums.ab, sums.votes};
-  };
-  using Fields = std::vector<std::uint64_t>;
-  EXPECT_EQ(fields(a | b << 18 | ab << 36 | max << 57), (Fields{a, b, ab, max}));
-  EXPECT_EQ(fields((1U << 18) - 1), (Fields{(1U << 18) - 1, 0, 0, 0}));
-  EXPECT_EQ(fields(((std::uint64_t{1} << 18) - 1) << 18), (Fields{0, (1U << 18) - 1, 0, 0}));
-  EXPECT_EQ(fields(((std::uint64_t{1} << 21) - 1) << 36), (Fields{0, 0, (1U << 21) - 1, 0}));
-  EXPECT_EQ(fields(std::uint64_t{127} << 57), (Fields{0, 0, 0, 127}));
+TEST(CellSums, UnpackingFindsEveryField) {
+  const kernels::CellSums sums = kernels::unpack(0xFFFE'8001'0002'7FFDU);
+  EXPECT_EQ(sums.upper_left, 0x7FFDU);
+  EXPECT_EQ(sums.lower_left, 2U);
+  EXPECT_EQ(sums.upper_right, 0x8001U);
+  EXPECT_EQ(sums.lower_right, 0xFFFEU);
 }
 
 }  // namespace

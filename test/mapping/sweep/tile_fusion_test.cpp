@@ -44,7 +44,7 @@ INSTANTIATE_TEST_SUITE_P(Kernels, TileFusionOn, ::testing::ValuesIn(test::fastKe
 /// The inputs of a tile on two planes, fused by `PlaneFusion` alone.
 PlaneValues fusePlainly(VotingKernel kernel, const TileCells& cells, std::vector<TileRays>& rays,
                         const FusionOptions& options, const FusionInputs& inputs,
-                        std::vector<std::uint64_t>& votes) {
+                        std::vector<std::uint64_t>& units) {
   TileAccumulator accumulator(kernel);
   accumulator.moveTo(cells);
   PlaneFusion fusion(options, inputs, static_cast<std::size_t>(cells.tile.area()));
@@ -53,7 +53,7 @@ PlaneValues fusePlainly(VotingKernel kernel, const TileCells& cells, std::vector
     const auto slots = static_cast<std::size_t>(inputs.slots_per_group * inputs.groups);
     const auto camera = static_cast<std::size_t>(input.camera);
     accumulator.vote(rays[camera * slots + static_cast<std::size_t>(input.slot)], 0);
-    votes[camera] += accumulator.resolve(fusion.next().data());
+    units[camera] += accumulator.resolve(fusion.next().data());
     fusion.add(input);
   }
   return fusion.fused();
@@ -67,7 +67,7 @@ TEST_P(TileFusionOn, HasTheBitsOfPlaneFusionAlsoWherePairsAreResolvedAndFusedAtO
         const FusionOptions options{rule, FusionRule::kArithmetic, order};
         TileFusion fusion(options, inputs, PlaneFusion::Keep::kFusedOnly, GetParam());
         TileFusion keeping(options, inputs, PlaneFusion::Keep::kCameras, GetParam());
-        std::vector<std::uint64_t> votes(static_cast<std::size_t>(inputs.cameras));
+        std::vector<std::uint64_t> units(static_cast<std::size_t>(inputs.cameras));
         for (const cv::Rect& tile : kTiles) {
           SCOPED_TRACE(testing::Message() << tile << ", " << nameOf(rule) << ", " << inputs.cameras
                                           << " cameras, " << inputs.groups << " groups");
@@ -80,11 +80,11 @@ TEST_P(TileFusionOn, HasTheBitsOfPlaneFusionAlsoWherePairsAreResolvedAndFusedAtO
           }
           for (int plane = 0; plane < 2; ++plane) {
             const PlaneValues expected =
-                fusePlainly(GetParam(), cells, rays, options, inputs, votes);
+                fusePlainly(GetParam(), cells, rays, options, inputs, units);
             ASSERT_EQ(fusion.fuse(rays, 0), expected);
             ASSERT_EQ(keeping.fuse(rays, 0), expected);
-            ASSERT_EQ(fusion.votes(), votes);
-            ASSERT_EQ(keeping.votes(), votes);
+            ASSERT_EQ(fusion.units(), units);
+            ASSERT_EQ(keeping.units(), units);
           }
         }
       }
