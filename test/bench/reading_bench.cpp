@@ -15,8 +15,10 @@
 #include "plugin/formats/open_recording.h"
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/readers/recording_formats.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
+#include "test/plugin/readers/evt_words.h"
 
 namespace efm::bench {
 namespace {
@@ -82,6 +84,37 @@ void readAll(benchmark::State& state, const fs::path& path) {
   countRate(state, "events/s", static_cast<double>(events));
 }
 
+/// Decodes the events of a recording's first camera, and does no more with them.
+void decodeAll(benchmark::State& state, const fs::path& path) {
+  const RecordingFormat& format = *detectFormat(path);
+  std::vector<Event> block;
+  std::size_t events = 0;
+  for (auto _ : state) {
+    events = 0;
+    RecordingParts parts = format.open({path}, {});
+    while (parts.cameras.front()->read(block)) events += block.size();
+  }
+  countRate(state, "events/s", static_cast<double>(events));
+}
+
+/// An edge that many neighbouring pixels see at once: runs of eight in a row.
+std::vector<Event> runsOf(const std::vector<Event>& events, int width) {
+  constexpr std::size_t kRun = 8;
+  std::vector<Event> runs;
+  for (std::size_t i = 0; i < events.size(); i += kRun) {
+    Event event = events[i];
+    event.x = static_cast<std::uint16_t>(std::min<int>(event.x, width - static_cast<int>(kRun)));
+    for (std::size_t k = 0; k < kRun; ++k, ++event.x) runs.push_back(event);
+  }
+  return runs;
+}
+
+void writeRaw(const fs::path& file, const std::string& version, EvtEncoding encoding,
+              const std::vector<Event>& events) {
+  std::ofstream(file, std::ios::binary) << "% evt " << version << "\n% geometry 240x180\n% end\n"
+                                        << evtBytes(encoding, events);
+}
+
 }  // namespace
 
 void benchReading(BenchSession& session) {
@@ -102,6 +135,20 @@ void benchReading(BenchSession& session) {
     add(rawlog.c_str(), scratch / rawlog);
   }
   add("text", scratch / "us");
+
+  const auto add_decoding = [&](const char* name, const fs::path& path) {
+    session.add({"decoding", name, ""},
+                [path](benchmark::State& state) { decodeAll(state, path); });
+  };
+  makeIrregular(made.events.front(), 1000);
+  const std::vector<Event>& events = made.events.front();
+  writeRaw(scratch / "evt2.raw", "2.0", EvtEncoding::kEvt2, events);
+  writeRaw(scratch / "evt3.raw", "3.0", EvtEncoding::kEvt3, events);
+  writeRaw(scratch / "evt3_runs.raw", "3.0", EvtEncoding::kEvt3, runsOf(events, options.width));
+  add_decoding("text", scratch / "us");
+  add_decoding("EVT 2.0", scratch / "evt2.raw");
+  add_decoding("EVT 3.0", scratch / "evt3.raw");
+  add_decoding("EVT 3.0, runs of 8 pixels", scratch / "evt3_runs.raw");
   session.run();
 }
 
