@@ -64,24 +64,26 @@ std::shared_ptr<BagSource> openBagFile(const fs::path& file) {
 
 /// The files that metadata.yaml lists, relative to its folder.
 std::vector<fs::path> filesOfMetadata(const fs::path& metadata) {
+  std::vector<fs::path> files;
+  std::string compression;
   try {
     const YAML::Node root = YAML::LoadFile(metadata.string())["rosbag2_bagfile_information"];
-    if (!root) throw std::runtime_error("no rosbag2_bagfile_information");
-    const YAML::Node compression = root["compression_mode"];
-    if (compression && !compression.Scalar().empty() && compression.Scalar() != "NONE") {
-      refuseCompressed(metadata);
-    }
-    std::vector<fs::path> files;
+    if (root["compression_mode"]) compression = root["compression_mode"].as<std::string>();
     for (const YAML::Node& file : root["relative_file_paths"]) {
       // Older bags have the folder's name in front.
       files.push_back(metadata.parent_path() / fs::path(file.as<std::string>()).filename());
     }
-    if (files.empty()) throw std::runtime_error("no relative_file_paths");
-    return files;
   } catch (const YAML::Exception& error) {
     throw std::runtime_error(fmt::format("{}: {}: expected the metadata of a ROS 2 bag",
                                          metadata.string(), error.what()));
   }
+  if (!compression.empty() && compression != "NONE") refuseCompressed(metadata);
+  if (files.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: relative_file_paths is missing or empty: expected the bag's files",
+                    metadata.string()));
+  }
+  return files;
 }
 
 }  // namespace
