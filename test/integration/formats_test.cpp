@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// One recording in every format gives one depth map. Independent programs wrote the formats
+// (test/formats).
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "test/plugin/app/app_test.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kFormats = EFM_RECORDINGS "/formats";
+
+/// A recording as a user names it.
+struct Recorded {
+  std::string name;
+  std::string sources;  ///< Below `formats/`.
+  std::string lacks;    ///< What options must give: "calibration", "poses" or both.
+};
+
+void PrintTo(const Recorded& recorded, std::ostream* stream) { *stream << recorded.name; }
+
+class Formats : public AppTest, public testing::WithParamInterface<Recorded> {
+ protected:
+  /// The depth map and the confidence map of a window in the middle of the recording.
+  std::string mapsOf(const std::string& recording) const {
+    const Result result = run("depth " EFM_SOURCE_DIR "/config/simulated_stereo.ini " + recording +
+                              " --t0 1.45 --t1 1.6 --out out");
+    EXPECT_EQ(result.status, 0) << recording << "\n" << result.err;
+    return contentOf("out/depth.tiff") + contentOf("out/confidence.tiff");
+  }
+  static std::string folderRecording() { return (kFormats / "desk").string(); }
+  const std::string& mapsOfFolder() const {
+    static const std::string maps = mapsOf(folderRecording());
+    return maps;
+  }
+};
+
+TEST_P(Formats, GivesTheDepthMapOfTheTextFolder) {
+  std::string arguments;
+  std::istringstream sources(GetParam().sources);
+  for (std::string source; sources >> source;) arguments += " " + (kFormats / source).string();
+  const auto lacks = [](const char* part) {
+    return GetParam().lacks.find(part) != std::string::npos;
+  };
+  if (lacks("calibration")) arguments += " --calibration " + folderRecording() + "/camchain.yaml";
+  if (lacks("poses")) arguments += " --poses " + folderRecording() + "/poses.txt";
+  EXPECT_TRUE(mapsOf(arguments) == mapsOfFolder());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, Formats,
+    testing::Values(Recorded{"dsec", "hdf5/dsec", "calibration poses"},
+                    Recorded{"tum_vie", "hdf5/tum_vie", "calibration poses"},
+                    Recorded{"m3ed", "hdf5/m3ed/desk_data.h5", "calibration poses"},
+                    Recorded{"mvsec", "hdf5/mvsec/desk_data.hdf5", "calibration poses"},
+                    Recorded{"metavision", "hdf5/metavision/left.h5 hdf5/metavision/right.h5",
+                             "calibration poses"},
+                    Recorded{"evt2", "raw/evt2/cam0.raw raw/evt2/cam1.raw", "calibration poses"},
+                    Recorded{"evt21", "raw/evt21/cam0.raw raw/evt21/cam1.raw", "calibration poses"},
+                    Recorded{"evt21_legacy", "raw/evt21_legacy/cam0.raw raw/evt21_legacy/cam1.raw",
+                             "calibration poses"},
+                    Recorded{"evt3", "raw/evt3/cam0.raw raw/evt3/cam1.raw", "calibration poses"},
+                    Recorded{"bag_dvs", "ros1_bag/dvs.bag", "calibration"},
+                    Recorded{"bag_prophesee", "ros1_bag/prophesee_lz4.bag", "calibration"},
+                    Recorded{"bag_evt3", "ros1_bag/evt3_bz2.bag", "calibration"},
+                    Recorded{"bag_mono", "ros1_bag/mono.bag", "calibration"},
+                    Recorded{"ros2_dvs", "ros2_bag/dvs", "calibration"},
+                    Recorded{"ros2_mono", "ros2_bag/mono.db3", "calibration"},
+                    Recorded{"mcap_evt3", "ros2_bag/evt3.mcap", "calibration"},
+                    Recorded{"mcap_prophesee", "ros2_bag/prophesee.mcap", "calibration"}),
+    [](const auto& row) { return row.param.name; });
+
+TEST_F(Formats, ExportedRecordingsGiveTheDepthMapOfTheTextFolder) {
+  const std::string& maps = mapsOfFolder();
+  EXPECT_GT(reportIn("out")["points"], 2000) << "the maps show something";
+  ASSERT_EQ(run("import " + folderRecording() + " --out r.rawlog --compression zstd").status, 0);
+  EXPECT_TRUE(mapsOf("r.rawlog") == maps);
+  for (const std::string format : {"folder", "dsec", "mcap"}) {
+    const Result result = run("export r.rawlog --to " + format + " --out " + format);
+    ASSERT_EQ(result.status, 0) << result.err;
+    EXPECT_TRUE(mapsOf(format) == maps) << format;
+  }
+}
+
+}  // namespace
+}  // namespace efm
