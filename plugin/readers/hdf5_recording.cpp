@@ -17,6 +17,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
+#include "plugin/readers/crash_probe.h"
 #include "plugin/readers/dataset_folder.h"
 #include "plugin/readers/hdf5_events.h"
 #include "plugin/readers/hdf5_files.h"
@@ -65,8 +66,8 @@ std::vector<StampedPose> readPoses(const std::shared_ptr<const Hdf5File>& file,
   const auto times = std::make_shared<Hdf5Rows>(file, poses.times);
   if (matrices->rowNumbers() != kMatrixNumbers || matrices->size() != times->size()) {
     throw matrices->fail(
-        fmt::format("{} rows of {} numbers: expected {} 4x4 matrices, as many as "
-                    "{} has times",
+        fmt::format("{} rows of {} numbers: expected {} matrices of 4x4 numbers, "
+                    "as many as {} has",
                     matrices->size(), matrices->rowNumbers(), times->size(), poses.times));
   }
   const Hdf5Column time = Hdf5Column::ofMatrix(times, 0);
@@ -175,7 +176,7 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
 }
 
 /// @return whether the file has events or poses.
-bool addFile(const fs::path& path, RecordingParts& parts) {
+bool addParts(const fs::path& path, RecordingParts& parts) {
   const auto file = std::make_shared<const Hdf5File>(path);
   bool any = false;
   for (const Hdf5Layout& layout : hdf5Layouts()) any = addCameras(file, layout, parts) || any;
@@ -186,6 +187,21 @@ bool addFile(const fs::path& path, RecordingParts& parts) {
     if (parts.poses.empty()) parts.poses = readPoses(file, poses);
   }
   return any;
+}
+
+/// The same. Some versions of the HDF5 library crash on damaged descriptions of data sets.
+bool addFile(const fs::path& path, RecordingParts& parts) {
+  const bool sound = survives([&path] {
+    RecordingParts tried;
+    addParts(path, tried);
+    std::vector<Event> events;
+    for (const auto& camera : tried.cameras) camera->read(events);
+  });
+  if (!sound) {
+    throw std::runtime_error(path.string() +
+                             ": the HDF5 library crashes on it: expected a file without damage");
+  }
+  return addParts(path, parts);
 }
 
 [[noreturn]] void refuse(const fs::path& path) {
