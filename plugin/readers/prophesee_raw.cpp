@@ -178,7 +178,8 @@ PropheseeRawStream::PropheseeRawStream(std::filesystem::path file)
 /// Reads the block behind the current one. @return false at the end.
 bool PropheseeRawStream::readBlock() {
   block_byte_ += block_.size();
-  block_.resize(kRawBlockBytes);
+  block_.resize(
+      std::min<std::uint64_t>(kRawBlockBytes, bytes_total_ - std::min(block_byte_, bytes_total_)));
   stream_.read(reinterpret_cast<char*>(block_.data()), static_cast<std::streamsize>(block_.size()));
   block_.resize(static_cast<std::size_t>(stream_.gcount()));
   if (stream_.bad()) throw std::runtime_error(file_.string() + ": cannot be read to its end");
