@@ -3,7 +3,7 @@
 
 #include <hdf5.h>
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>

@@ -19,6 +19,9 @@
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
 #include "test/plugin/readers/evt_words.h"
+#ifdef EFM_WITH_HDF5
+#include "plugin/writers/hdf5_writer.h"
+#endif
 
 namespace efm::bench {
 namespace {
@@ -57,6 +60,16 @@ void writeTextFolder(const fs::path& folder, const SyntheticWindow& made) {
     events << line.data();
   }
 }
+
+#ifdef EFM_WITH_HDF5
+/// The same in DSEC's layout: HDF5, Blosc with Zstandard.
+void writeHdf5(const fs::path& folder, const SyntheticWindow& made) {
+  Hdf5Writer writer(folder, {{made.rig.cameras.front()}});
+  writer.addEvents(0, made.events.front());
+  writer.addPose({1'000'000'000, {}});
+  writer.close();
+}
+#endif
 
 /// Imports that folder.
 void writeRawlog(const fs::path& file, const fs::path& folder) {
@@ -149,6 +162,10 @@ void benchReading(BenchSession& session) {
   add_decoding("EVT 2.0", scratch / "evt2.raw");
   add_decoding("EVT 3.0", scratch / "evt3.raw");
   add_decoding("EVT 3.0, runs of 8 pixels", scratch / "evt3_runs.raw");
+#ifdef EFM_WITH_HDF5
+  writeHdf5(scratch / "hdf5", made);
+  add_decoding("HDF5, Blosc", scratch / "hdf5");
+#endif
   session.run();
 }
 
