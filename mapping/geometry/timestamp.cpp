@@ -72,14 +72,17 @@ std::optional<DecimalDigits> splitDecimal(std::string_view text) {
 
 }  // namespace
 
-std::optional<std::int64_t> parseSeconds(std::string_view text) {
+std::optional<std::int64_t> parseSeconds(std::string_view text) { return parseTimeIn(text, 0); }
+
+std::optional<std::int64_t> parseTimeIn(std::string_view text, int exponent) {
   bool negative = false;
   if (!text.empty() && (text.front() == '-' || text.front() == '+')) {
     negative = text.front() == '-';
     text.remove_prefix(1);
   }
-  const std::optional<DecimalDigits> digits = splitDecimal(text);
+  std::optional<DecimalDigits> digits = splitDecimal(text);
   if (!digits) return std::nullopt;
+  digits->exponent += exponent;
 
   // Digits up to this index are whole nanoseconds; the next one rounds.
   const std::int64_t whole =

@@ -26,6 +26,10 @@ inline constexpr std::int64_t kEndOfTimeNs = kMaxTimeNs / 2;
 /// @return nothing where the text is not a number from end to end or does not fit 64 bits.
 std::optional<std::int64_t> parseSeconds(std::string_view text);
 
+/// The same for a decimal number of a unit of 10^`exponent` seconds: -6 for microseconds.
+/// @param exponent -9 to 0.
+std::optional<std::int64_t> parseTimeIn(std::string_view text, int exponent);
+
 /// Decimal seconds with nine decimals ("%.9f"), exact.
 std::string formatSeconds(std::int64_t t_ns);
 

@@ -70,6 +70,16 @@ void addSource(CLI::App& command, Arguments& arguments) {
       ->delimiter(',')
       ->allow_extra_args(false);
   command
+      .add_option(
+          "--columns", arguments.source.reader.columns,
+          "The columns of text events: t, x, y, p, and - for one to ignore, e.g. \"x y p t\" "
+          "(default: those of the header, else t x y p)")
+      ->type_name("COLUMNS");
+  command
+      .add_option("--time-unit", arguments.source.reader.time_unit,
+                  "The unit of times in text events and NumPy arrays (default: found, else s)")
+      ->check(CLI::IsMember({"s", "ms", "us", "ns"}));
+  command
       .add_option_function<std::vector<std::string>>(
           "--perturb",
           [&arguments](const std::vector<std::string>& assignments) {

@@ -14,6 +14,7 @@
 #include "mapping/options/option_check.h"
 #include "mapping/options/quoted_text.h"
 #include "maps/io/atomic_file.h"
+#include "maps/io/npy_header.h"
 #include "plugin/evaluation/npy_image.h"
 #include "plugin/evaluation/pfm_image.h"
 

@@ -10,10 +10,7 @@ namespace efm {
 /// The maximum width and height of a PFM or NumPy image. More means a damaged header.
 inline constexpr std::uint64_t kMaxImageSide = 65535;
 
-/// Whether these are the first bytes of a NumPy array (.npy).
-bool looksLikeNpy(std::string_view bytes);
-
-/// The image of a NumPy array (NEP 1; format 1.0 to 3.0): two dimensions, [row][column], float32 or
+/// The image of a NumPy array (`parseNpyHeader`): two dimensions, [row][column], float32 or
 /// float64 of either byte order, in C order. Doubles are rounded to float.
 /// @throws std::runtime_error naming the wrong part of the header, its value and the expected one.
 cv::Mat1f parseNpy(std::string_view bytes);

@@ -11,13 +11,13 @@
 #include "plugin/formats/merged_recording.h"
 #include "plugin/formats/rawlog_recording.h"
 #include "plugin/formats/rawlog_signature.h"
+#include "plugin/readers/pose_file.h"
 #include "plugin/readers/recording_formats.h"
 #include "plugin/readers/source_files.h"
 #include "plugin/recordings/perturbed_recording.h"
 #include "plugin/recordings/recording_with_poses.h"
 #include "plugin/recordings/rig_override_recording.h"
 #include "plugin/session/rig_setup.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {
@@ -193,7 +193,7 @@ std::vector<std::string> recordingFormats() {
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
   const RigSetup setup = readRigSetup({source.calibration, source.hand_eye, {}, {}});
   std::vector<StampedPose> poses;
-  if (!source.poses.empty()) poses = readPosesFile(source.poses);
+  if (!source.poses.empty()) poses = readPoses(source.poses, source.reader);
 
   std::unique_ptr<Recording> recording =
       openOwn(source, setup.calibration ? &*setup.calibration : nullptr);

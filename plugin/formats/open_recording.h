@@ -20,7 +20,7 @@ namespace efm {
 struct RecordingSource {
   std::vector<std::filesystem::path> files;  ///< Files and folders of one recording.
   std::string format = "auto";               ///< One of `recordingFormats`. "auto": detected.
-  std::filesystem::path poses;               ///< TUM, T_world_body. Empty: the recording's.
+  std::filesystem::path poses;               ///< See `readPoses`. Empty: the recording's.
   std::filesystem::path calibration;         ///< See `readCalibration`. Empty: the recording's.
   std::filesystem::path hand_eye;            ///< See `readHandEye`. Empty: the recording's.
   TrackerFaults faults;                      ///< Of the poses (CObservationRobotPose).

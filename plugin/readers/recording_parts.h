@@ -37,6 +37,11 @@ struct ReaderOptions {
   /// Topics of bags, or names of streams, to read: events (one per camera, in the order of the
   /// cameras) and poses. Empty: found by their type.
   std::vector<std::string> topics;
+  /// The columns of text events, e.g. "x y p t", `-` for one to ignore. Empty: those of the header,
+  /// else t x y p.
+  std::string columns;
+  /// The unit of times in text events and NumPy arrays: s, ms, us or ns. Empty: found, else s.
+  std::string time_unit;
 };
 
 /// A family of formats. A new one is a row of the table in recording_formats.cpp.

@@ -44,12 +44,14 @@ std::runtime_error quaternionError(const std::vector<std::string_view>& fields, 
   return std::runtime_error(text.str());
 }
 
-StampedPose parsePose(const std::vector<std::string_view>& fields) {
+}  // namespace
+
+StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_exponent) {
   if (fields.size() != kFieldNames.size()) {
     throw std::runtime_error(std::to_string(fields.size()) +
                              " fields: expected 8, t tx ty tz qx qy qz qw");
   }
-  const std::optional<std::int64_t> t_ns = parseSeconds(fields[0]);
+  const std::optional<std::int64_t> t_ns = parseTimeIn(fields[0], time_exponent);
   if (!t_ns) throw fieldError(0, fields[0], "a time in decimal seconds");
   if (*t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
     throw fieldError(0, fields[0], "a time within 4.6e9 s of 0");
@@ -65,8 +67,6 @@ StampedPose parsePose(const std::vector<std::string_view>& fields) {
   return pose;
 }
 
-}  // namespace
-
 std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file) {
   std::ifstream stream(file);
   if (!stream) throw std::runtime_error(file.string() + ": cannot be opened for reading");
@@ -81,7 +81,7 @@ std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::stri
         splitWords(std::string_view(line).substr(0, line.find('#')));
     if (fields.empty()) continue;
     try {
-      poses.push_back(parsePose(fields));
+      poses.push_back(parseTumPose(fields));
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(name + ":" + std::to_string(number) + ": " + error.what());
     }

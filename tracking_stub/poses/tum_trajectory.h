@@ -5,6 +5,7 @@
 #include <istream>
 #include <ostream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
@@ -25,6 +26,12 @@ std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::stri
 /// The same for the poses of a recording: at least one.
 /// @throws std::runtime_error naming the file that has no pose.
 std::vector<StampedPose> readPosesFile(const std::filesystem::path& file);
+
+/// The pose of a line.
+/// @param fields t tx ty tz qx qy qz qw.
+/// @param time_exponent of the unit of t: 10^time_exponent seconds, -9 to 0.
+/// @throws std::runtime_error naming the field, its value and the expected value.
+StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_exponent = 0);
 
 /// Writes times with nine decimals and other numbers with 17 significant digits: the file is read
 /// back exactly, up to the rounding of the normalisation.

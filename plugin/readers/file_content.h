@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+struct archive;
+
+namespace efm {
+
+/// Whether a file is compressed (gzip, bzip2, xz, Zstandard) or a zip archive, by its first bytes.
+/// Never throws.
+bool isCompressed(const std::filesystem::path& file);
+
+/// The bytes of a file from front to back; of a compressed file, and of a member of a zip archive,
+/// those of its content. Memory is that of a block.
+class FileContent {
+ public:
+  /// @param member of a zip archive; empty: its only file.
+  /// @throws std::runtime_error if the file cannot be opened, has no such member or several, or
+  /// this build does not read archives (EFM_READ_ARCHIVES).
+  explicit FileContent(std::filesystem::path file, const std::string& member = {});
+  ~FileContent();
+  FileContent(FileContent&&) noexcept;
+  FileContent& operator=(FileContent&&) = delete;
+
+  /// @return the number of bytes read: fewer than `count` only at the end.
+  /// @throws std::runtime_error naming the file that is damaged or cannot be read.
+  std::size_t read(char* to, std::size_t count);
+  /// The rest.
+  /// @throws std::runtime_error as `read`, and where it is longer than `max_bytes`.
+  std::string readAll(std::size_t max_bytes);
+
+  /// The size of a plain file. Other ones, and pipes, cannot seek: 0.
+  std::uint64_t seekableBytes() const { return archive_ ? 0 : bytes_; }
+  /// Continues at a byte of a plain file.
+  void seek(std::uint64_t byte);
+  /// The fraction of the file's bytes that has been read, 0 to 1.
+  double progress() const;
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  struct CloseArchive {
+    void operator()(archive* opened) const;
+  };
+  std::runtime_error failure(const std::string& what) const;
+
+  std::filesystem::path file_;
+  std::string member_;
+  std::uint64_t bytes_ = 0;
+  std::uint64_t position_ = 0;  // of a plain file
+  std::ifstream plain_;
+  std::unique_ptr<archive, CloseArchive> archive_;
+};
+
+/// The names of the files in a zip archive, in its order.
+/// @throws std::runtime_error as `FileContent`.
+std::vector<std::string> membersOf(const std::filesystem::path& file);
+
+}  // namespace efm

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/readers/pose_file.h"
+
+#include <array>
+#include <fstream>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+
+#include "maps/io/npy_header.h"
+#include "plugin/readers/file_content.h"
+#include "plugin/readers/recording_formats.h"
+#include "plugin/readers/source_files.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The first bytes of the content; nothing of what cannot be read.
+std::string firstBytes(const fs::path& file) {
+  constexpr std::size_t kBytes = 4096;
+  std::string bytes(kBytes, '\0');
+  FileContent content(file);
+  bytes.resize(content.read(bytes.data(), kBytes));
+  return bytes;
+}
+
+bool isNpz(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::array<char, 2> magic{};
+  stream.read(magic.data(), magic.size());
+  if (std::string_view(magic.data(), 2) != "PK") return false;
+  for (const std::string& member : membersOf(file)) {
+    if (fs::path(member).extension() != ".npy") return false;
+  }
+  return true;
+}
+
+std::vector<StampedPose> posesOfRecording(const fs::path& file, const ReaderOptions& options) {
+  const RecordingFormat* const format = detectFormat(file);
+  if (format == nullptr) {
+    throw std::runtime_error(file.string() +
+                             ": not a file of poses: expected text (t tx ty tz qx qy qz qw, or "
+                             "columns with a header), NumPy arrays, or a recording with poses");
+  }
+  RecordingParts parts = format->open({file}, options);
+  if (parts.T_body_rig) {
+    for (StampedPose& pose : parts.poses) pose.T_world_rig = pose.T_world_rig * *parts.T_body_rig;
+  }
+  return std::move(parts.poses);
+}
+
+std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions& options) {
+  std::error_code ignored;
+  if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
+  if (isNpz(file)) return readPoseArrays(file, options);
+  const std::string start = firstBytes(file);
+  if (looksLikeNpy(start)) return readPoseArrays(file, options);
+  if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
+  if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
+  return readPoseText(file, options);
+}
+
+}  // namespace
+
+std::vector<StampedPose> readPoses(const fs::path& file, const ReaderOptions& options) {
+  std::vector<StampedPose> poses = readAnyPoses(file, options);
+  if (!poses.empty()) return poses;
+  throw std::runtime_error(file.string() +
+                           ": no poses: expected at least one line t tx ty tz qx qy qz qw");
+}
+
+}  // namespace efm
