@@ -38,9 +38,8 @@ template <typename Arguments>
 void addSource(CLI::App& command, Arguments& arguments) {
   command
       .add_option("SOURCE", arguments.source.files,
-                  "The recording: a rawlog, or a folder of text files (camchain.yaml, "
-                  "cam0/events.txt, poses.txt; or the UZH layout: events.txt, groundtruth.txt, "
-                  "calib.txt)")
+                  "The recording: a rawlog, a folder, or the files of one recording (text, HDF5, "
+                  "bags, RAW, AEDAT4, NumPy); docs/recordings.md describes them")
       ->required();
   command
       .add_option("--format", arguments.source.format,
@@ -50,8 +49,9 @@ void addSource(CLI::App& command, Arguments& arguments) {
   command
       .add_option(
           "--poses", arguments.source.poses,
-          "Poses that replace the recording's: t tx ty tz qx qy qz qw, of the rig in the world")
-      ->type_name("TUM.txt");
+          "Poses that replace the recording's, of the rig in the world: text (t tx ty tz qx qy qz "
+          "qw, or columns with a header), NumPy arrays, or a recording with poses")
+      ->type_name("FILE");
   command
       .add_option("--calibration", arguments.source.calibration,
                   std::string("Calibration that replaces the recording's: ") + kCalibrationFiles)

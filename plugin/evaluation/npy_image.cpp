@@ -30,8 +30,8 @@ cv::Size imageSizeOf(const NpyHeader& header) {
 cv::Mat1f parseNpy(std::string_view bytes) {
   const NpyHeader header = parseNpyHeader(bytes);
   if (header.type != NumberType::kFloat32 && header.type != NumberType::kFloat64) {
-    throw std::runtime_error(fmt::format(
-        "the array's header: descr = '{}': expected float32 or float64", header.descr));
+    throw std::runtime_error(
+        fmt::format("the array's header: descr = '{}': expected float32 or float64", header.descr));
   }
   const cv::Size size = imageSizeOf(header);
   const std::string_view data = bytes.substr(header.data_begin);

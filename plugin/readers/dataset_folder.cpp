@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 fs::path eventsOf(const fs::path& folder, std::size_t camera) {
-  return folder / ("cam" + std::to_string(camera)) / "events.txt";
+  return eventFileIn(folder / ("cam" + std::to_string(camera)));
 }
 
 std::size_t countCameras(const fs::path& folder) {
@@ -29,7 +29,8 @@ bool looksLikeDatasetFolder(const fs::path& folder) {
   return isFile(folder / "camchain.yaml") || isFile(eventsOf(folder, 0));
 }
 
-RecordingParts openDatasetFolder(const std::vector<fs::path>& folders, const ReaderOptions&) {
+RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
+                                 const ReaderOptions& options) {
   const fs::path& folder = onlySource(folders, "a dataset folder");
   RecordingParts parts;
   parts.expected_calibration = "camchain.yaml";
@@ -38,7 +39,7 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders, const Rea
   const std::size_t count =
       parts.calibration ? parts.calibration->rig.cameras.size() : countCameras(folder);
   for (std::size_t camera = 0; camera < count; ++camera) {
-    parts.cameras.push_back(std::make_unique<EventTextStream>(eventsOf(folder, camera)));
+    parts.cameras.push_back(std::make_unique<EventTextStream>(eventsOf(folder, camera), options));
   }
   return parts;
 }

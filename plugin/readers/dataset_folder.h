@@ -10,11 +10,12 @@ namespace efm {
 
 /// The project's own text layout, which `event-fusion simulate` writes:
 ///   camchain.yaml     the rig
-///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera
+///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera; other names
+///                     and columns: `eventFileIn`, `findEventColumns`
 ///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0
 /// Other files are ignored.
 
-/// Whether the folder has a camchain.yaml or a cam0/events.txt.
+/// Whether the folder has a camchain.yaml, or events in cam0.
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 
 /// Without camchain.yaml, the cameras are cam0, cam1, … without gaps.

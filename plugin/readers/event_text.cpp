@@ -7,17 +7,20 @@
 #include <array>
 #include <cassert>
 #include <limits>
+#include <memory>
 #include <stdexcept>
-#include <system_error>
 #include <utility>
 
+#include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
+#include "plugin/readers/source_files.h"
 
 namespace efm {
 namespace {
 
 constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
+constexpr std::size_t kFirstBytes = std::size_t{1} << 16;
 
 bool isDigit(char c) { return c >= '0' && c <= '9'; }
 bool isBlank(char c) { return c == ' ' || c == '\t'; }
@@ -42,30 +45,73 @@ bool takeBlanks(const char*& text) {
   return any;
 }
 
+/// Moves `text` behind a separator and the blanks around it. @return whether there was one.
+bool takeSeparator(const char*& text, char separator) {
+  const bool any = takeBlanks(text);
+  if (separator == ' ') return any;
+  if (*text != separator) return false;
+  ++text;
+  takeBlanks(text);
+  return true;
+}
+
+bool takePixel(const char*& text, std::uint16_t& pixel) {
+  constexpr int kMaxPixelDigits = 5;
+  const Digits digits = takeDigits(text);
+  if (digits.count < 1 || digits.count > kMaxPixelDigits ||
+      digits.value > std::numeric_limits<std::uint16_t>::max()) {
+    return false;
+  }
+  pixel = static_cast<std::uint16_t>(digits.value);
+  return true;
+}
+
+bool takePolarity(const char*& text, bool& polarity) {
+  const bool negative = *text == '-';
+  text += negative ? 1 : 0;
+  polarity = *text == '1' && !negative;
+  if (*text != '1' && (*text != '0' || negative)) return false;
+  ++text;
+  return true;
+}
+
+bool takeIgnored(const char*& text, char separator) {
+  const char* const begin = text;
+  while (*text != separator && !isBlank(*text) && *text != '\n' && *text != '\r' && *text != '#') {
+    ++text;
+  }
+  return text != begin;
+}
+
+/// The whole lines at the beginning of a text.
+std::string_view wholeLines(std::string_view text, bool ended) {
+  return ended ? text : text.substr(0, text.rfind('\n') + 1);
+}
+
 }  // namespace
 
-EventTextStream::EventTextStream(std::filesystem::path file)
-    : file_(std::move(file)), stream_(file_, std::ios::binary) {
-  std::error_code error;
-  if (!stream_ || std::filesystem::is_directory(file_, error)) {
-    throw std::runtime_error(file_.string() + ": cannot be opened for reading");
-  }
-  bytes_total_ = std::filesystem::file_size(file_, error);
-  if (error) bytes_total_ = 0;  // a pipe
+EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions& options)
+    : content_(std::move(file)), block_(kFirstBytes) {
+  carried_ = content_.read(block_.data(), kFirstBytes);
+  ended_ = carried_ < kFirstBytes;
+  const std::string_view first(block_.data(), carried_);
+  columns_ = findEventColumns(wholeLines(first, ended_), options, name());
 }
 
 bool EventTextStream::read(std::vector<Event>& events) {
   events.clear();
   lines_.clear();
-  if (ended_) return false;
+  if (started_ && ended_) return false;
+  started_ = true;
   block_.resize(kBlockBytes);
-  stream_.read(block_.data() + carried_, static_cast<std::streamsize>(kBlockBytes - carried_));
-  if (stream_.bad()) throw std::runtime_error(file_.string() + ": cannot be read to its end");
-  const auto count = static_cast<std::size_t>(stream_.gcount());
-  bytes_read_ += count;
-  ended_ = stream_.eof();
+  if (!ended_) {
+    const std::size_t wanted = kBlockBytes - carried_;
+    const std::size_t count = content_.read(block_.data() + carried_, wanted);
+    ended_ = count < wanted;
+    carried_ += count;
+  }
 
-  const std::string_view text(block_.data(), carried_ + count);
+  const std::string_view text(block_.data(), carried_);
   const std::size_t newline = text.rfind('\n');
   const std::size_t whole = newline == std::string_view::npos ? 0 : newline + 1;
   takeLines(text.data(), text.data() + whole, events);
@@ -75,8 +121,8 @@ bool EventTextStream::read(std::vector<Event>& events) {
     takeLine(text.substr(whole), true, events);
   } else if (carried_ == kBlockBytes) {
     ++line_;
-    throw std::runtime_error(fmt::format("{}{}: expected t x y p, not a line of over {} bytes",
-                                         place(), inQuotes(text), kBlockBytes));
+    throw std::runtime_error(fmt::format("{}: {}: expected t x y p, not a line of over {} bytes",
+                                         place(line_), inQuotes(text), kBlockBytes));
   }
   std::copy(text.begin() + static_cast<std::ptrdiff_t>(whole), text.end(), block_.begin());
   return true;
@@ -101,85 +147,150 @@ void EventTextStream::takeLines(const char* begin, const char* end, std::vector<
 
 void EventTextStream::takeLine(std::string_view line, bool unterminated,
                                std::vector<Event>& events) {
-  if (const auto event = parseLine(line, unterminated)) {
+  const bool header = first_byte_ == 0 && line_ <= columns_.header_lines;
+  if (const auto event = header ? std::nullopt : parseLine(line, unterminated)) {
     events.push_back(*event);
   } else {
     lines_.emplace_back(events.size(), line_ + 1);
   }
 }
 
+/// @return false if `parseLine` must parse the line.
+bool EventTextStream::takeTime(const char*& text, Event& event) const {
+  constexpr std::array<std::uint64_t, 10> kPowers = {
+      1, 10, 100, 1'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000, 1'000'000'000};
+  constexpr int kMaxDigits = 19;
+  const int decimals_of_ns = 9 + columns_.time_exponent;
+  const Digits whole = takeDigits(text);
+  if (whole.count < 1 || whole.count > kMaxDigits - decimals_of_ns) return false;
+  std::uint64_t t_ns = whole.value * kPowers[static_cast<std::size_t>(decimals_of_ns)];
+  if (*text == '.') {
+    const Digits decimals = takeDigits(++text);
+    if (decimals.count > decimals_of_ns) return false;
+    t_ns += decimals.value * kPowers[static_cast<std::size_t>(decimals_of_ns - decimals.count)];
+  }
+  if (t_ns >= static_cast<std::uint64_t>(kEndOfTimeNs)) return false;
+  event.t_ns = static_cast<std::int64_t>(t_ns);
+  return true;
+}
+
 /// The fast path for a plain line. Each step stops at the newline at the latest.
 /// @return the next line; null if `parseLine` must parse this line.
 const char* EventTextStream::parsePlainLine(const char* text, Event& event) const {
-  constexpr std::array<std::uint64_t, 10> kNanosecondsOfDigits = {
-      1'000'000'000, 100'000'000, 10'000'000, 1'000'000, 100'000, 10'000, 1'000, 100, 10, 1};
-  constexpr int kMaxSecondDigits = 10;
-  constexpr int kMaxPixelDigits = 5;
-
-  const Digits seconds = takeDigits(text);
-  if (seconds.count < 1 || seconds.count > kMaxSecondDigits) return nullptr;
-  std::uint64_t t_ns = seconds.value * kNanosecondsOfDigits[0];
-  if (*text == '.') {
-    const Digits decimals = takeDigits(++text);
-    if (decimals.count >= static_cast<std::ptrdiff_t>(kNanosecondsOfDigits.size())) return nullptr;
-    t_ns += decimals.value * kNanosecondsOfDigits[static_cast<std::size_t>(decimals.count)];
+  if (columns_.isUsual()) {
+    if (!takeTime(text, event) || !takeBlanks(text) || !takePixel(text, event.x) ||
+        !takeBlanks(text) || !takePixel(text, event.y) || !takeBlanks(text) ||
+        !takePolarity(text, event.polarity)) {
+      return nullptr;
+    }
+  } else {
+    for (std::size_t k = 0; k < columns_.order.size(); ++k) {
+      if (k > 0 && !takeSeparator(text, columns_.separator)) return nullptr;
+      const char column = columns_.order[k];
+      const bool taken = column == 't'   ? takeTime(text, event)
+                         : column == 'x' ? takePixel(text, event.x)
+                         : column == 'y' ? takePixel(text, event.y)
+                         : column == 'p' ? takePolarity(text, event.polarity)
+                                         : takeIgnored(text, columns_.separator);
+      if (!taken) return nullptr;
+    }
   }
-  if (t_ns >= static_cast<std::uint64_t>(kEndOfTimeNs) || !takeBlanks(text)) return nullptr;
-
-  const Digits x = takeDigits(text);
-  if (x.count < 1 || x.count > kMaxPixelDigits || !takeBlanks(text)) return nullptr;
-  const Digits y = takeDigits(text);
-  if (y.count < 1 || y.count > kMaxPixelDigits || !takeBlanks(text)) return nullptr;
-  constexpr std::uint64_t kMaxPixel = std::numeric_limits<std::uint16_t>::max();
-  if (x.value > kMaxPixel || y.value > kMaxPixel) return nullptr;
-
-  const char polarity = *text;
-  if (polarity != '0' && polarity != '1') return nullptr;
-  ++text;
   if (*text == '\r') ++text;
-  if (*text != '\n') return nullptr;
-
-  event.t_ns = static_cast<std::int64_t>(t_ns);
-  event.x = static_cast<std::uint16_t>(x.value);
-  event.y = static_cast<std::uint16_t>(y.value);
-  event.polarity = polarity == '1';
-  return text + 1;
+  return *text == '\n' ? text + 1 : nullptr;
 }
 
 std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unterminated) const {
-  constexpr std::size_t kFields = 4;
   const std::string_view content = line.substr(0, line.find('#'));
-  const std::vector<std::string_view> fields = splitWords(content);
+  const std::vector<std::string_view> fields = eventFields(trimmed(content), columns_.separator);
   if (fields.empty()) return std::nullopt;
-  if (fields.size() < kFields && unterminated) {
-    throw std::runtime_error(fmt::format(
-        "{}{}: expected t x y p, but the file ends within the line", place(), inQuotes(content)));
+  std::string names;
+  for (const char column : columns_.order)
+    names += fmt::format("{}{}", names.empty() ? "" : " ", column);
+  const std::size_t count = columns_.order.size();
+  if (fields.size() < count && unterminated) {
+    throw std::runtime_error(fmt::format("{}: {}: expected {}, but the file ends within the line",
+                                         place(line_), inQuotes(content), names));
   }
-  if (fields.size() != kFields) {
-    throw std::runtime_error(fmt::format("{}{}: expected 4 fields, t x y p, not {}", place(),
-                                         inQuotes(content), fields.size()));
+  if (fields.size() != count) {
+    throw std::runtime_error(fmt::format("{}: {}: expected {} fields, {}, not {}", place(line_),
+                                         inQuotes(content), count, names, fields.size()));
   }
 
   const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {
     return std::runtime_error(
-        fmt::format("{}{} = {}: expected {}", place(), name, inQuotes(value), expected));
+        fmt::format("{}: {} = {}: expected {}", place(line_), name, inQuotes(value), expected));
   };
-  const auto pixel_of = [&](const char* name, std::string_view value) {
-    const std::optional<std::uint16_t> pixel = parseNumber<std::uint16_t>(value);
+  const auto field_of = [&](char column) { return fields[columns_.order.find(column)]; };
+  const auto pixel_of = [&](const char* name) {
+    const std::optional<std::uint16_t> pixel = parseNumber<std::uint16_t>(field_of(name[0]));
     if (pixel) return *pixel;
-    throw fail(name, value, "a whole number from 0 to 65535");
+    throw fail(name, field_of(name[0]), "a whole number from 0 to 65535");
   };
-  const std::optional<std::int64_t> t_ns = parseSeconds(fields[0]);
+  const std::string_view time = field_of('t');
+  const std::optional<std::int64_t> t_ns = parseTimeIn(time, columns_.time_exponent);
   if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
-    throw fail("t", fields[0], "a time in decimal seconds");
+    throw fail("t", time,
+               columns_.time_exponent == 0 ? "a time in decimal seconds" : "a decimal time");
   }
   Event event;
   event.t_ns = *t_ns;
-  event.x = pixel_of("x", fields[1]);
-  event.y = pixel_of("y", fields[2]);
-  if (fields[3] != "0" && fields[3] != "1") throw fail("p", fields[3], "polarity 0 or 1");
-  event.polarity = fields[3] == "1";
+  event.x = pixel_of("x");
+  event.y = pixel_of("y");
+  const std::string_view polarity = field_of('p');
+  if (polarity != "0" && polarity != "1" && polarity != "-1") {
+    throw fail("p", polarity, "polarity 0 or 1, or -1 or 1 (columns in another order: --columns)");
+  }
+  event.polarity = polarity == "1";
   return event;
+}
+
+/// The first event of the lines that begin after a byte: the byte of its line, and its time.
+/// Nothing if the next bytes have none.
+std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEventAfter(
+    std::uint64_t byte) {
+  std::array<char, 4096> bytes{};
+  content_.seek(byte);
+  const std::string_view text(bytes.data(), content_.read(bytes.data(), bytes.size()));
+  for (std::size_t begin = text.find('\n'); begin != std::string_view::npos;) {
+    ++begin;
+    const std::size_t newline = text.find('\n', begin);
+    if (newline == std::string_view::npos) break;
+    Event event;
+    if (parsePlainLine(text.data() + begin, event) != nullptr) {
+      return std::pair(byte + begin, event.t_ns);
+    }
+    try {
+      const auto parsed = parseLine(text.substr(begin, newline - begin), false);
+      if (parsed) return std::pair(byte + begin, parsed->t_ns);
+    } catch (const std::runtime_error&) {
+      return std::nullopt;  // `read` reports it where it comes to it
+    }
+    begin = newline;
+  }
+  return std::nullopt;
+}
+
+void EventTextStream::seek(std::int64_t t_ns) {
+  constexpr std::uint64_t kCloseBytes = std::uint64_t{1} << 16;
+  // An event that is more than 10 ms older than another one before it is an error: no event of t_ns
+  // or later is before one that is 10 ms older.
+  const std::int64_t before_ns = t_ns - kMaxEventDelayNs;
+  std::uint64_t low = 0;
+  std::uint64_t high = content_.seekableBytes();
+  if (high <= kFirstBytes) return;
+  while (high > low + kCloseBytes) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    const auto event = firstEventAfter(middle);
+    if (event && event->second < before_ns) {
+      low = event->first;
+    } else {
+      high = middle;
+    }
+  }
+  content_.seek(low);
+  carried_ = 0;
+  ended_ = false;
+  first_byte_ = low;
 }
 
 std::string EventTextStream::positionOf(std::size_t index) const {
@@ -187,14 +298,42 @@ std::string EventTextStream::positionOf(std::size_t index) const {
       std::upper_bound(lines_.begin(), lines_.end(), index,
                        [](std::size_t i, const auto& entry) { return i < entry.first; });
   const auto& [first, line] = *std::prev(after);
-  return fmt::format("{}:{}", file_.string(), line + (index - first));
+  return place(line + (index - first));
 }
 
-double EventTextStream::progress() const {
-  if (bytes_total_ == 0) return 0;
-  return std::min(1.0, static_cast<double>(bytes_read_) / static_cast<double>(bytes_total_));
+std::string EventTextStream::place(std::uint64_t line) const {
+  if (first_byte_ == 0) return fmt::format("{}:{}", name(), line);
+  return fmt::format("{}: line {} after byte {}", name(), line, first_byte_);
 }
 
-std::string EventTextStream::place() const { return fmt::format("{}:{}: ", file_.string(), line_); }
+bool looksLikeEventText(const std::filesystem::path& file) {
+  if (!isFile(file)) return false;
+  try {
+    constexpr std::size_t kBytes = 4096;
+    std::array<char, kBytes> bytes{};
+    FileContent content(file);
+    const std::size_t count = content.read(bytes.data(), kBytes);
+    return looksLikeEventLines(wholeLines({bytes.data(), count}, count < kBytes));
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+RecordingParts openEventText(const std::vector<std::filesystem::path>& files,
+                             const ReaderOptions& options) {
+  RecordingParts parts;
+  for (const std::filesystem::path& file : files) {
+    parts.cameras.push_back(std::make_unique<EventTextStream>(file, options));
+  }
+  return parts;
+}
+
+std::filesystem::path eventFileIn(const std::filesystem::path& folder) {
+  for (const char* name :
+       {"events.txt", "events.csv", "events.txt.gz", "events.csv.gz", "events.zip"}) {
+    if (isFile(folder / name)) return folder / name;
+  }
+  return folder / "events.txt";
+}
 
 }  // namespace efm

@@ -102,6 +102,8 @@ FileContent::FileContent(std::filesystem::path file, const std::string& member)
       throw failure("several files in it: expected one");
     }
     member_ = member;
+#else
+    static_cast<void>(member);
 #endif
   } else {
     plain_.open(file_, std::ios::binary);

@@ -6,6 +6,8 @@
 #include "plugin/readers/aedat4.h"
 #include "plugin/readers/bag_recording.h"
 #include "plugin/readers/dataset_folder.h"
+#include "plugin/readers/event_text.h"
+#include "plugin/readers/evimo2.h"
 #include "plugin/readers/hdf5_files.h"
 #include "plugin/readers/hdf5_recording.h"
 #include "plugin/readers/prophesee_raw.h"
@@ -45,6 +47,10 @@ const std::vector<RecordingFormat>& readerFormats() {
       {"raw", "a RAW file of a Prophesee camera (EVT 2.0, 2.1 or 3.0)", looksLikePropheseeRaw,
        openPropheseeRaw},
       {"aedat4", "an AEDAT4 file", looksLikeAedat4, openAedat4},
+      {"evimo2", "a folder of EVIMO2 (dataset_events_t.npy and others)", looksLikeEvimo2,
+       openEvimo2},
+      {"text", "a text file with a line t x y p per event, also compressed", looksLikeEventText,
+       openEventText},
   };
   return all;
 }

@@ -47,9 +47,11 @@ std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
 /// The events, with the size of the images.
 class UzhEvents : public EventTextStream {
  public:
-  explicit UzhEvents(const fs::path& folder)
-      : EventTextStream(folder / "events.txt"), size_(sizeOfImages(folder)) {}
-  std::optional<CameraSize> size() const override { return size_; }
+  UzhEvents(const fs::path& folder, const ReaderOptions& options)
+      : EventTextStream(eventFileIn(folder), options), size_(sizeOfImages(folder)) {}
+  std::optional<CameraSize> size() const override {
+    return size_ ? size_ : EventTextStream::size();
+  }
 
  private:
   std::optional<CameraSize> size_;
@@ -57,15 +59,15 @@ class UzhEvents : public EventTextStream {
 
 }  // namespace
 
-bool looksLikeUzhFolder(const fs::path& folder) { return isFile(folder / "events.txt"); }
+bool looksLikeUzhFolder(const fs::path& folder) { return isFile(eventFileIn(folder)); }
 
-RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderOptions&) {
+RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderOptions& options) {
   const fs::path& folder = onlySource(folders, "a folder in the UZH layout");
   RecordingParts parts;
   parts.expected_calibration = "calib.txt";
   parts.expected_poses = "groundtruth.txt";
   parts.default_size = kDavis240c;
-  parts.cameras.push_back(std::make_unique<UzhEvents>(folder));
+  parts.cameras.push_back(std::make_unique<UzhEvents>(folder, options));
   std::error_code ignored;
   if (fs::exists(folder / "calib.txt", ignored)) {
     CameraModel model = readUzhCalibration(folder / "calib.txt", kDavis240c);

@@ -9,12 +9,12 @@
 namespace efm {
 
 /// The text layout of the UZH event camera dataset (Mueggler et al., IJRR 2017), one camera:
-///   events.txt        t x y p
+///   events.txt        t x y p; other names and columns: `eventFileIn`, `findEventColumns`
 ///   groundtruth.txt   t px py pz qx qy qz qw, T_world_cam
 ///   calib.txt         fx fy cx cy k1 k2 p1 p2 k3
 ///   images.txt        t file, optional: the size of an image is the sensor's.
 
-/// Whether the folder has an events.txt.
+/// Whether the folder has events.
 bool looksLikeUzhFolder(const std::filesystem::path& folder);
 
 /// @throws std::runtime_error naming the file (and line) that is missing or wrong.

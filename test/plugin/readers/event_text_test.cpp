@@ -127,7 +127,7 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
       {"0.1 65536 0 0\n", 1, {"x = '65536': expected"}},
       {"0.1 4294967296 0 0\n", 1, {"x = '4294967296': expected"}},
       {"0.1 1 2 2\n", 1, {"p = '2'", "expected polarity 0 or 1"}},
-      {"0.1 1 2 -1\n", 1, {"p = '-1'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 -0\n", 1, {"p = '-0'", "expected polarity 0 or 1"}},
       {"0.1 1 2 01\n", 1, {"p = '01'", "expected polarity 0 or 1"}},
       {"0.1 1 2 10\n", 1, {"p = '10'", "expected polarity 0 or 1"}},
       {"0.1 1 2 true\n", 1, {"p = 'true'", "expected polarity 0 or 1"}},
