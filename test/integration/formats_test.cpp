@@ -27,7 +27,7 @@ struct Recorded {
 
 void PrintTo(const Recorded& recorded, std::ostream* stream) { *stream << recorded.name; }
 
-class Formats : public AppTest, public testing::WithParamInterface<Recorded> {
+class FormatsByOption : public AppTest {
  protected:
   /// The depth map and the confidence map of a window in the middle of the recording.
   std::string mapsOf(const std::string& recording) const {
@@ -43,6 +43,8 @@ class Formats : public AppTest, public testing::WithParamInterface<Recorded> {
   }
 };
 
+class Formats : public FormatsByOption, public testing::WithParamInterface<Recorded> {};
+
 TEST_P(Formats, GivesTheDepthMapOfTheTextFolder) {
   std::string arguments;
   std::istringstream sources(GetParam().sources);
@@ -55,9 +57,28 @@ TEST_P(Formats, GivesTheDepthMapOfTheTextFolder) {
   EXPECT_TRUE(mapsOf(arguments) == mapsOfFolder());
 }
 
+TEST_F(FormatsByOption, TextInOtherColumnsGivesTheSameDepthMap) {
+  EXPECT_TRUE(mapsOf((kFormats / "text/us").string() + " --columns x,y,p,t --time-unit us") ==
+              mapsOfFolder());
+}
+
+TEST_F(FormatsByOption, PosesOfAnyKindGiveTheSameDepthMap) {
+  for (const char* poses : {"poses_euroc.csv", "poses_mocap_data.txt", "poses.npz"}) {
+    EXPECT_TRUE(mapsOf(folderRecording() + " --poses " + (kFormats / "text" / poses).string()) ==
+                mapsOfFolder())
+        << poses;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, Formats,
-    testing::Values(Recorded{"dsec", "hdf5/dsec", "calibration poses"},
+    testing::Values(Recorded{"csv", "text/csv", ""}, Recorded{"gz", "text/gz", ""},
+                    Recorded{"zip", "text/zip", ""}, Recorded{"minus", "text/minus", ""},
+                    Recorded{"evimo2",
+                             "evimo2/left_camera/sfm/eval/scene_00 "
+                             "evimo2/right_camera/sfm/eval/scene_00",
+                             "calibration poses"},
+                    Recorded{"dsec", "hdf5/dsec", "calibration poses"},
                     Recorded{"tum_vie", "hdf5/tum_vie", "calibration poses"},
                     Recorded{"m3ed", "hdf5/m3ed/desk_data.h5", "calibration poses"},
                     Recorded{"mvsec", "hdf5/mvsec/desk_data.hdf5", "calibration poses"},
