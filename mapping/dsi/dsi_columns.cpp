@@ -2,18 +2,31 @@
 #include "mapping/dsi/dsi_columns.h"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
-#include <limits>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "mapping/dsi/voting_kernel.h"
-#include "mapping/kernels/columns.h"
 
 namespace efm {
 namespace {
 
-constexpr float kMaxUnits = std::numeric_limits<std::uint16_t>::max();
+constexpr float kRootsPerPeak = 8191;
+
+/// The bytes of values from 0 to a column's peak, in steps of 1/kRootsPerPeak: to compute each root
+/// is slower.
+using RootTable = std::array<std::uint8_t, static_cast<std::size_t>(kRootsPerPeak) + 1>;
+
+RootTable makeRootTable() {
+  RootTable table{};
+  for (std::size_t i = 0; i < table.size(); ++i) {
+    const float below = 1 - static_cast<float>(i) / kRootsPerPeak;
+    table[i] = static_cast<std::uint8_t>(std::lround(kernels::kMaxRoot * std::sqrt(below)));
+  }
+  return table;
+}
 
 /// The pixels of a tile that stand out from their surroundings.
 std::vector<cv::Point> standingOut(const cv::Mat1f& confidence, int window) {
@@ -47,24 +60,29 @@ DsiColumns::Tile DsiColumns::select(const cv::Rect& tile, const cv::Mat1f& confi
                                     const TileVolume& volume, int planes, int window) {
   Tile columns;
   std::vector<std::size_t> indices;  // of pixels in the tile's planes
-  std::vector<float> to_units;
-  for (const cv::Point& pixel : standingOut(confidence, window)) {
-    columns.pixels.push_back(pixel + tile.tl());
-    columns.units.push_back(confidence(pixel) / kMaxUnits);
-    to_units.push_back(kMaxUnits / confidence(pixel));
+  std::vector<float> to_index;
+  const std::vector<cv::Point> pixels = standingOut(confidence, window);
+  columns.pixels.reserve(pixels.size());
+  columns.units.reserve(pixels.size());
+  for (const cv::Point& pixel : pixels) {
+    columns.pixels.emplace_back(pixel + tile.tl());
+    columns.units.push_back(confidence(pixel) / kernels::kColumnPeak);
+    to_index.push_back(kRootsPerPeak / confidence(pixel));
     indices.push_back(static_cast<std::size_t>(pixel.y * confidence.cols + pixel.x));
   }
+  static const RootTable roots = makeRootTable();
   const auto length = static_cast<std::size_t>(planes);
-  columns.values.resize(indices.size() * length + kernels::kColumnPadding);
-  // So many planes at a time that a column's values fill a cache line.
+  columns.roots.resize(indices.size() * length + kernels::kColumnPadding);
+  // Few planes at a time, so that their lines stay in the first-level cache for the next pixels.
   constexpr int kPlanes = 32;
   for (int begin = 0; begin < planes; begin += kPlanes) {
     const int end = std::min(begin + kPlanes, planes);
-    std::uint16_t* column = columns.values.data();
+    std::uint8_t* column = columns.roots.data();
     for (std::size_t i = 0; i < indices.size(); ++i, column += length) {
       for (int plane = begin; plane < end; ++plane) {
-        const float value = volume.plane(plane)[indices[i]] * to_units[i] + 0.5F;
-        column[plane] = static_cast<std::uint16_t>(static_cast<int>(std::min(value, kMaxUnits)));
+        const float index = volume.plane(plane)[indices[i]] * to_index[i] + 0.5F;
+        column[plane] =
+            roots[static_cast<std::size_t>(static_cast<int>(std::min(kRootsPerPeak, index)))];
       }
     }
   }
@@ -72,22 +90,24 @@ DsiColumns::Tile DsiColumns::select(const cv::Rect& tile, const cv::Mat1f& confi
 }
 
 DsiColumns::DsiColumns(cv::Size view, int planes, std::vector<Tile> tiles)
-    : planes_(planes),
-      tiles_(std::move(tiles)),
-      index_(view, -1),
-      functions_(&kernels::columnFunctions(fastestKernel())) {
-  for (const Tile& tile : tiles_) {
-    const std::uint16_t* values = tile.values.data();
-    for (std::size_t i = 0; i < tile.pixels.size(); ++i, values += planes_) {
-      index_(tile.pixels[i]) = static_cast<int>(columns_.size());
-      columns_.push_back({values, tile.units[i]});
+    : planes_(planes), index_(view, -1), functions_(&kernels::columnFunctions(fastestKernel())) {
+  std::size_t count = 0;
+  for (const Tile& tile : tiles) count += tile.pixels.size();
+  columns_.reserve(count);
+  for (Tile& tile : tiles) {
+    const std::uint8_t* roots = tile.roots.data();
+    for (std::size_t i = 0; i < tile.pixels.size(); ++i, roots += planes_) {
+      index_(cv::Point(tile.pixels[i])) = static_cast<int>(columns_.size());
+      columns_.push_back({roots, tile.units[i]});
     }
+    roots_.push_back(std::move(tile.roots));  // stay where they are
+    tile = {};
   }
 }
 
 void DsiColumns::addTo(float* sum, cv::Point pixel, float weight) const {
   const Column& column = columns_[static_cast<std::size_t>(index_(pixel))];
-  functions_->add(sum, column.values, static_cast<std::size_t>(planes_), weight * column.unit);
+  functions_->add(sum, column.roots, static_cast<std::size_t>(planes_), weight * column.unit);
 }
 
 }  // namespace efm

@@ -12,8 +12,9 @@ constexpr float kNoValue = -1;
 
 }  // namespace
 
-DsiPeaks unwrittenPeaks(const ReferenceView& view) {
+DsiPeaks unwrittenPeaks(const ReferenceView& view, bool confidence_alone) {
   const cv::Size size(view.width, view.height);
+  if (confidence_alone) return {cv::Mat1f(size), {}, {}, {}};
   return {cv::Mat1f(size), cv::Mat1i(size), cv::Mat1f(size), cv::Mat1f(size)};
 }
 
@@ -33,6 +34,7 @@ void RunningPeaks::add(int plane, const PlaneValues& values) {
 
 void RunningPeaks::writeTo(DsiPeaks& images, const cv::Rect& tile) const {
   efm::writeTo(images.confidence(tile), best_);
+  if (images.plane.empty()) return;
   efm::writeTo(images.plane(tile), plane_);
   efm::writeTo(images.before(tile), before_);
   efm::writeTo(images.after(tile), after_);

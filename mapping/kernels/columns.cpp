@@ -13,14 +13,16 @@ HWY_BEFORE_NAMESPACE();
 namespace efm::kernels::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-void add(float* sum, const std::uint16_t* values, std::size_t planes, float unit) {
+void add(float* sum, const std::uint8_t* roots, std::size_t planes, float unit) {
   const hn::ScalableTag<float> d;
   const hn::RebindToSigned<decltype(d)> d_signed;
-  const hn::Rebind<std::uint16_t, decltype(d)> d_narrow;
+  const hn::Rebind<std::uint8_t, decltype(d)> d_narrow;
   const auto units = hn::Set(d, unit);
+  const auto peak = hn::Set(d, kColumnPeak);
   for (std::size_t plane = 0; plane < planes; plane += hn::Lanes(d)) {
-    const auto value =
-        hn::ConvertTo(d, hn::PromoteTo(d_signed, hn::LoadU(d_narrow, values + plane)));
+    const auto below =
+        hn::ConvertTo(d, hn::PromoteTo(d_signed, hn::LoadU(d_narrow, roots + plane)));
+    const auto value = hn::NegMulAdd(below, below, peak);  // exact
     // No fused multiplication: all kernels give the same bits.
     hn::StoreU(hn::Add(hn::LoadU(d, sum + plane), hn::Mul(units, value)), d, sum + plane);
   }
@@ -35,9 +37,9 @@ HWY_AFTER_NAMESPACE();
 namespace efm::kernels {
 namespace {
 
-void addPlain(float* sum, const std::uint16_t* values, std::size_t planes, float unit) {
+void addPlain(float* sum, const std::uint8_t* roots, std::size_t planes, float unit) {
   for (std::size_t plane = 0; plane < planes; ++plane) {
-    sum[plane] += unit * static_cast<float>(values[plane]);
+    sum[plane] += unit * columnValue(roots[plane]);
   }
 }
 

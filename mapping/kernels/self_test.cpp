@@ -324,11 +324,11 @@ std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t 
 /// Sums of columns and ranks of positions; arrays with padding.
 std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n) {
   RandomNumbers random(seed);
-  std::vector<std::uint16_t> column(n + kColumnPadding);
+  std::vector<std::uint8_t> column(n + kColumnPadding);
   std::vector<float> positions(n + kRankPadding);
   std::vector<float> weights(n + kRankPadding);
   for (std::size_t i = 0; i < n; ++i) {
-    column[i] = static_cast<std::uint16_t>(random(0, 65'535, 1));
+    column[i] = static_cast<std::uint8_t>(random(0, 255, 1));
     positions[i] = random(0, 20, 1);
     weights[i] = random(0, 3, 4096);
   }

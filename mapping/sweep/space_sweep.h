@@ -42,7 +42,7 @@ struct SweepRequest {
   /// fused groups are summed. Divides the number of slots.
   int groups = 1;
   /// Also columns of the pixels whose confidence is above its mean in a Gaussian window of this
-  /// side: odd, at least 3. 0: no columns.
+  /// side: odd, at least 3. The peaks then have the confidence alone. 0: no columns.
   int column_window = 0;
 };
 
@@ -59,7 +59,7 @@ struct SweepResult {
 /// each plane it votes for every camera and sub-interval, fuses the votes, and updates the peak of
 /// every pixel. It stores no volume. Memory besides the rays is O(width * height), for any number
 /// of planes and sub-intervals; `camera_peaks` multiply it by the cameras, the plain kernel by the
-/// threads. Columns add two bytes per plane of a selected pixel, a sink adds four per voxel. The
+/// threads. Columns add a byte per plane of a selected pixel, a sink adds four per voxel. The
 /// order of planes and threads never changes the result.
 /// @param cameras the rays of each camera that is fused, at least one; consumed.
 /// @throws std::invalid_argument where the options are not valid.

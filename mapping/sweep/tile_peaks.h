@@ -15,13 +15,14 @@
 
 namespace efm {
 
-/// The peaks and columns of one DSI on all tiles: the fused one, or one camera's.
+/// The peaks and columns of one DSI on all tiles: the fused one, or one camera's. With columns, of
+/// the peaks the confidence alone.
 class ViewPeaks {
  public:
   ViewPeaks(const DsiGrid& grid, int column_window, std::size_t tiles)
       : planes_(grid.planes.size()),
         column_window_(column_window),
-        peaks_(unwrittenPeaks(grid.view)),
+        peaks_(unwrittenPeaks(grid.view, column_window > 0)),
         columns_(tiles) {}
 
   /// The whole view, when every tile is written. Its columns are moved out.

@@ -89,11 +89,11 @@ TEST(KeyframeMemory, OfAStereoPairAtHdHasBoundsAboveTheEventsWhateverTheSubinter
     ASSERT_GT(megabytesAbove(before), 0);
     EXPECT_LT(megabytesAbove(before), 150) << subintervals << " sub-intervals";
   }
-  // Aggregation keeps two bytes a plane of each pixel that stands out: of events without any order
-  // every other one, 80 MB here.
+  // Aggregation keeps a byte a plane of each pixel that stands out: of events without any order
+  // every other one, 45 MB here.
   for (const int subintervals : {1, 8}) {
     ASSERT_TRUE(map(ExtractionMethod::kAggregated, subintervals));
-    EXPECT_LT(megabytesAbove(before), 260) << subintervals << " sub-intervals";
+    EXPECT_LT(megabytesAbove(before), 200) << subintervals << " sub-intervals";
   }
   RecordProperty("megabytes", std::to_string(megabytesAbove(before)));
 }

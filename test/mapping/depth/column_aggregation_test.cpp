@@ -80,12 +80,13 @@ bool isTie(const std::vector<double>& sum, double top) {
 
 void expectNaive(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   const std::vector<AggregatedPeak> peaks = aggregate(dsi, mask);
+  const ChosenDsi rounded = dsi.rounded();
   const SparseMask chosen(mask);
   ASSERT_EQ(peaks.size(), chosen.size());
   const double place = std::max(1.0, (dsi.planes - 1) / 99.0);
   int compared = 0;
   chosen.forEach([&](std::size_t i, cv::Point pixel) {
-    const std::vector<double> sum = naiveSum(dsi, mask, pixel);
+    const std::vector<double> sum = naiveSum(rounded, mask, pixel);
     const auto best = static_cast<int>(std::max_element(sum.begin(), sum.end()) - sum.begin());
     const double top = sum[static_cast<std::size_t>(best)];
     if (isTie(sum, top)) return;

@@ -66,6 +66,19 @@ struct ChosenDsi {
                                                             volume, planes, kWindowBeyondAllTiles)};
     return {std::move(peaks), DsiColumns(size, planes, std::move(all))};
   }
+
+  /// The values as its columns have them: rounded.
+  ChosenDsi rounded() const {
+    const DsiColumns columns = swept().columns;
+    ChosenDsi copy(size, planes);
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        if (!columns.has({x, y})) continue;
+        copy.setColumn({x, y}, [&](int plane) { return columns.value({x, y}, plane); });
+      }
+    }
+    return copy;
+  }
 };
 
 }  // namespace efm::test
