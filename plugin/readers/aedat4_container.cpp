@@ -23,7 +23,8 @@ namespace {
 
 constexpr std::size_t kMaxAedat4Bytes = std::size_t{1} << 28U;
 
-// FlatBuffers as their schemas define them. A field's number is 4 + 2 * its index.
+// FlatBuffers as their schemas define them. A field's number is 4 + 2 * its index. The verifier
+// asks for the name Verify. NOLINTBEGIN(readability-identifier-naming)
 
 /// table IOHeader { compression: int32; dataTablePosition: int64 = -1; infoNode: string; }
 class Aedat4HeaderTable : private flatbuffers::Table {
@@ -79,6 +80,8 @@ class Aedat4IndexTable : private flatbuffers::Table {
            verifier.EndTable();
   }
 };
+
+// NOLINTEND(readability-identifier-naming)
 
 /// The root of a FlatBuffer that begins with its size.
 template <typename Table>

@@ -78,6 +78,7 @@ void readOrRefuse(const std::string& path, const std::int64_t* seek_ns, std::int
 
 }  // namespace
 
+// NOLINTNEXTLINE(readability-identifier-naming)
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const MemoryFile file(data, size);
   std::int64_t middle_ns = 0;
