@@ -9,6 +9,9 @@ import subprocess
 import sys
 import tempfile
 
+import h5py
+import numpy as np
+
 HERE = pathlib.Path(__file__).parent
 FORMATS = HERE.parent / "formats"
 
@@ -34,6 +37,18 @@ def write(corpus, name, file, data):
     (corpus / name / file).write_bytes(data)
 
 
+def write_chunks(path, corpus):
+    """Chunks of 500 numbers of two bytes, in each filter of undo_filters.cpp."""
+    filters = (dict(compression=32001, compression_opts=(0, 0, 0, 0, 1, 1, 5)), dict(compression="lzf"),
+               dict(compression="gzip"), dict(compression="gzip", shuffle=True), dict(compression="lzf", shuffle=True))
+    with h5py.File(path, "w") as file:
+        for n, options in enumerate(filters):
+            numbers = (np.arange(500) * 7 % 346).astype("u2")
+            data = file.create_dataset(str(n), data=numbers, chunks=(500,), **options)
+            header = bytes([n, 1]) + (numbers.nbytes - 1).to_bytes(2, "little")
+            write(corpus, "hdf5_chunks", f"filter{n}", header + data.id.read_direct_chunk((0,))[1])
+
+
 def main(corpus=HERE / "corpus"):
     corpus = pathlib.Path(corpus)
     with tempfile.TemporaryDirectory() as scratch:
@@ -51,6 +66,7 @@ def main(corpus=HERE / "corpus"):
         run("write_aedat4.py", scratch / "dataset", scratch / "aedat4")
         for kind in ("none", "lz4", "zstd"):
             write(corpus, "aedat4", kind, (scratch / "aedat4" / f"{kind}.aedat4").read_bytes())
+        write_chunks(scratch / "chunks.h5", corpus)
 
 
 if __name__ == "__main__":
