@@ -101,8 +101,8 @@ void requireKeyframeLengthOf(const Arguments& arguments) {
   }
 }
 
-/// Sets a time from seconds of the recording's own clock, exact to the nanosecond.
-void setTime(const std::string& text, const std::string& name, std::int64_t& t_ns) {
+/// A number of seconds, exact to the nanosecond.
+std::int64_t nanosecondsOf(const std::string& text, const std::string& name) {
   const std::optional<std::int64_t> parsed = parseSeconds(text);
   if (!parsed) {
     throw CLI::ValidationError(name, inQuotes(text) + ": expected a time in seconds");
@@ -110,30 +110,45 @@ void setTime(const std::string& text, const std::string& name, std::int64_t& t_n
   if (*parsed >= kEndOfTimeNs || *parsed <= -kEndOfTimeNs) {
     throw CLI::ValidationError(name, inQuotes(text) + ": expected a time within 4.6e9 s of 0");
   }
-  t_ns = *parsed;
+  return *parsed;
 }
 
-CLI::Option* addTime(CLI::App& command, const std::string& name, std::int64_t& t_ns,
+CLI::Option* addTime(CLI::App& command, const std::string& name, std::optional<TimeArgument>& time,
                      const std::string& help) {
   return command
       .add_option_function<std::string>(
-          name, [&t_ns, name](const std::string& text) { setTime(text, name, t_ns); }, help)
-      ->type_name("SECONDS");
+          name,
+          [&time, name](const std::string& text) {
+            const bool from_start = text[0] == '+';
+            time =
+                TimeArgument{nanosecondsOf(from_start ? text.substr(1) : text, name), from_start};
+          },
+          help + "; +S: S seconds after the first event")
+      ->type_name("[+]SECONDS");
 }
 
-CLI::Option* addTime(CLI::App& command, const std::string& name, std::optional<std::int64_t>& t_ns,
-                     const std::string& help) {
-  return command
-      .add_option_function<std::string>(
-          name, [&t_ns, name](const std::string& text) { setTime(text, name, t_ns.emplace(0)); },
-          help)
-      ->type_name("SECONDS");
-}
-
+/// @return --t0.
 template <typename Arguments>
-void addTimeLimits(CLI::App& command, Arguments& arguments) {
-  addTime(command, "--t0", arguments.t0_ns, "Leave out events before this time");
-  addTime(command, "--t1", arguments.t1_ns, "Leave out events from this time on");
+CLI::Option* addTimeLimits(CLI::App& command, Arguments& arguments) {
+  CLI::Option* const t0 =
+      addTime(command, "--t0", arguments.times.t0, "Leave out events before this time");
+  CLI::Option* const t1 =
+      addTime(command, "--t1", arguments.times.t1, "Leave out events from this time on");
+  command
+      .add_option_function<std::string>(
+          "--duration",
+          [&arguments](const std::string& text) {
+            const std::int64_t duration_ns = nanosecondsOf(text, "--duration");
+            if (duration_ns <= 0) {
+              throw CLI::ValidationError("--duration",
+                                         inQuotes(text) + ": expected a time above 0");
+            }
+            arguments.times.duration_ns = duration_ns;
+          },
+          "Instead of --t1: the time from --t0, or from the first event")
+      ->type_name("SECONDS")
+      ->excludes(t1);
+  return t0;
 }
 
 /// For commands that write a rawlog.
@@ -228,9 +243,15 @@ void addSimulate(CLI::App& app, Run& run) {
   trajectory->needs(scene);
   calibration->needs(scene);
   scene->needs(trajectory)->needs(calibration);
-  addTime(command, "--start", arguments->start_ns,
+  command
+      .add_option_function<std::string>(
+          "--start",
+          [arguments](const std::string& text) {
+            arguments->start_ns = nanosecondsOf(text, "--start");
+          },
           "Start time on the trajectory, in its clock; by default the first half second with at "
           "least half the mean speed")
+      ->type_name("SECONDS")
       ->needs(scene);
   command
       .add_option(
@@ -304,10 +325,12 @@ void addDepth(CLI::App& app, Run& run) {
       *app.add_subcommand("depth", "Make the depth map of one time window of a recording");
   auto arguments = argumentsOf(command, run, runDepth);
   addMappingArguments(command, *arguments);
-  addTime(command, "--t0", arguments->t0_ns, "Start of the window")->required();
-  addTime(command, "--t1", arguments->t1_ns, "End of the window, not part of it")->required();
-  addTime(command, "--ref-time", arguments->t_ref_ns,
+  addTimeLimits(command, *arguments)->required();
+  addTime(command, "--ref-time", arguments->t_ref,
           "Time of the reference view; by default the middle of the window");
+  command.parse_complete_callback([arguments] {
+    if (!arguments->times.t1 && !arguments->times.duration_ns) throw CLI::RequiredError("--t1");
+  });
   command.add_flag("--save-dsi", arguments->save_dsi,
                    "Also write the whole DSI, dsi.npy (float32, [plane][row][column])");
 }

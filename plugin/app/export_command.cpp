@@ -142,9 +142,8 @@ std::vector<std::string> exportFormats() {
 }
 
 int runExport(const ExportArguments& arguments) {
-  const auto open = [&] {
-    return openInterval(arguments.source, arguments.t0_ns, arguments.t1_ns);
-  };
+  const TimeLimits limits = resolve(arguments.times, arguments.source);
+  const auto open = [&] { return openInterval(arguments.source, limits); };
   Export result(arguments, rigOf(*open()));
   const std::unique_ptr<Recording> recording = open();
   Progress progress;

@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 
 namespace efm {
 
 struct ExportArguments {
   RecordingSource source;
-  std::optional<std::int64_t> t0_ns;
-  std::optional<std::int64_t> t1_ns;
+  TimeArguments times;
   std::string format;  ///< One of `exportFormats`.
   std::filesystem::path out;
 };

@@ -27,11 +27,11 @@ namespace efm {
 namespace {
 
 /// The time limits, for an error.
-std::string limitsText(const ImportArguments& arguments) {
+std::string limitsText(const TimeLimits& limits) {
   std::string text;
-  if (arguments.t0_ns) text += fmt::format("from --t0 {} s", formatSeconds(*arguments.t0_ns));
-  if (arguments.t0_ns && arguments.t1_ns) text += " ";
-  if (arguments.t1_ns) text += fmt::format("until --t1 {} s", formatSeconds(*arguments.t1_ns));
+  if (limits.t0_ns) text += fmt::format("from --t0 {} s", formatSeconds(*limits.t0_ns));
+  if (limits.t0_ns && limits.t1_ns) text += " ";
+  if (limits.t1_ns) text += fmt::format("until --t1 {} s", formatSeconds(*limits.t1_ns));
   return text;
 }
 
@@ -52,12 +52,12 @@ std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(const ImportArgum
 
 /// Refuses time limits without events: they may be mistyped.
 /// @throws std::runtime_error naming the times of the recording's events.
-void refuseLimitsWithoutEvents(const ImportArguments& arguments) {
-  if (!arguments.t0_ns && !arguments.t1_ns) return;
+void refuseLimitsWithoutEvents(const ImportArguments& arguments, const TimeLimits& limits) {
+  if (!limits.t0_ns && !limits.t1_ns) return;
   const auto span_ns = eventSpan(arguments);
   if (!span_ns) return;  // a recording without events may have other observations
   throw std::runtime_error(fmt::format("no event {}: the recording has events from {} s to {} s",
-                                       limitsText(arguments), formatSeconds(span_ns->first),
+                                       limitsText(limits), formatSeconds(span_ns->first),
                                        formatSeconds(span_ns->second)));
 }
 
@@ -77,8 +77,8 @@ void refuseToDestroy(const ImportArguments& arguments) {
 
 int runImport(const ImportArguments& arguments) {
   refuseToDestroy(arguments);
-  const std::unique_ptr<Recording> recording =
-      openInterval(arguments.source, arguments.t0_ns, arguments.t1_ns);
+  const TimeLimits limits = resolve(arguments.times, arguments.source);
+  const std::unique_ptr<Recording> recording = openInterval(arguments.source, limits);
   RawlogWriter writer(arguments.out, arguments.compression);
   std::map<std::string, std::uint64_t> events;  // per label
   std::uint64_t all_events = 0;
@@ -100,9 +100,9 @@ int runImport(const ImportArguments& arguments) {
       }
       progress.showFraction("importing", recording->progress());
     }
-    if (all_events == 0) refuseLimitsWithoutEvents(arguments);
+    if (all_events == 0) refuseLimitsWithoutEvents(arguments, limits);
     if (all_events + poses + others == 0) {
-      throw std::runtime_error("the recording holds nothing " + limitsText(arguments));
+      throw std::runtime_error("the recording holds nothing " + limitsText(limits));
     }
     writer.close();
   }

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 
+#include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/formats/rawlog_writer.h"
 
@@ -12,8 +11,7 @@ namespace efm {
 
 struct ImportArguments {
   RecordingSource source;
-  std::optional<std::int64_t> t0_ns;
-  std::optional<std::int64_t> t1_ns;
+  TimeArguments times;
   std::filesystem::path out;
   RawlogCompression compression = RawlogCompression::kGzip;
 };

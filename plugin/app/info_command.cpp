@@ -160,7 +160,7 @@ int runInfo(const InfoArguments& arguments) {
   source.faults.latency_ns = 0;  // latency changes no time stamp
   source.complete = false;
   const std::unique_ptr<Recording> recording =
-      openInterval(source, arguments.t0_ns, arguments.t1_ns);
+      openInterval(source, resolve(arguments.times, source));
   Contents contents;
   std::exception_ptr stopped;
   {

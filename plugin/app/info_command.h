@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 
+#include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 
 namespace efm {
 
 struct InfoArguments {
   RecordingSource source;
-  std::optional<std::int64_t> t0_ns;
-  std::optional<std::int64_t> t1_ns;
+  TimeArguments times;
   bool system = false;  ///< Also print the processor and its kernels; then no recording is needed.
 };
 

@@ -111,8 +111,9 @@ int conclude(const MappingOutcome& outcome, MapOutput& output) {
 }
 
 Window windowOf(const DepthArguments& arguments, ReferenceTime reference) {
-  Window window = windowOf(arguments.t0_ns, arguments.t1_ns, reference);
-  window.t_ref_ns = arguments.t_ref_ns.value_or(window.t_ref_ns);
+  const TimeLimits limits = resolve(arguments.times, arguments.source);
+  Window window = windowOf(*limits.t0_ns, *limits.t1_ns, reference);
+  if (arguments.t_ref) window.t_ref_ns = resolve(*arguments.t_ref, arguments.source);
   return window;
 }
 
@@ -176,7 +177,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
 int runMap(const MapArguments& arguments) {
   MappingJob job;
   job.options = optionsOf(arguments);
-  job.options.mapper.limits = {arguments.t0_ns, arguments.t1_ns};
+  job.options.mapper.limits = resolve(arguments.times, arguments.source);
   job.options.mapper.limits.validate();
   const Interruption interruption;
   job.stop_requested = [&] { return interruption.requested(); };

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 
 namespace efm {
@@ -15,19 +15,16 @@ namespace efm {
 struct MappingArguments {
   std::filesystem::path config;
   RecordingSource source;
+  TimeArguments times;  ///< Of the window, for `depth`.
   std::filesystem::path out;
   std::vector<std::string> sets;  ///< section.key=value
 };
 
-struct MapArguments : MappingArguments {
-  std::optional<std::int64_t> t0_ns;
-  std::optional<std::int64_t> t1_ns;
-};
+struct MapArguments : MappingArguments {};
 
 struct DepthArguments : MappingArguments {
-  std::int64_t t0_ns = 0;
-  std::int64_t t1_ns = 0;
-  std::optional<std::int64_t> t_ref_ns;  ///< Default: middle or end of the window, by the options.
+  /// Time of the reference view. Default: middle or end of the window, by the options.
+  std::optional<TimeArgument> t_ref;
   bool save_dsi = false;
 };
 

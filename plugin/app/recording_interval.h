@@ -6,14 +6,35 @@
 #include <optional>
 #include <string>
 
+#include "mapping/events/window.h"
 #include "plugin/formats/open_recording.h"
 
 namespace efm {
 
-/// Opens the interval [t0, t1) of a recording: its events, and the poses around them (see TimeCut).
-/// Most events outside are not read, where the format has an index.
-std::unique_ptr<Recording> openInterval(RecordingSource source, std::optional<std::int64_t> t0_ns,
-                                        std::optional<std::int64_t> t1_ns);
+/// A time on the command line: on the recording's clock, or ("+3.2") from its first event on.
+struct TimeArgument {
+  std::int64_t ns = 0;
+  bool from_start = false;
+};
+
+/// An interval of a recording on the command line.
+struct TimeArguments {
+  std::optional<TimeArgument> t0;
+  std::optional<TimeArgument> t1;
+  std::optional<std::int64_t> duration_ns;  ///< From t0, or from the first event.
+};
+
+/// The time of the recording's first event.
+/// @throws std::runtime_error if it has none; the errors of `openRecording`.
+std::int64_t startOf(const RecordingSource& source);
+
+/// The time on the recording's clock. Opens the recording only if it must.
+std::int64_t resolve(const TimeArgument& time, const RecordingSource& source);
+TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
+
+/// Opens an interval of a recording: its events, and the poses around them (see TimeCut). Most
+/// events outside are not read, where the format has an index.
+std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits);
 
 /// A warning if the recording says that it lacks packets.
 std::optional<std::string> lostPacketsWarning(const RecordingCounts& counts);
