@@ -151,9 +151,9 @@ class ChunkedBag::Cursor : public BagCursor {
 };
 
 ChunkedBag::ChunkedBag(std::filesystem::path file)
-    : BagSource(std::move(file)), stream_(file_, std::ios::binary) {
-  if (!stream_) throw std::runtime_error(file_.string() + ": cannot be opened for reading");
-  file_size_ = std::filesystem::file_size(file_);
+    : BagSource(std::move(file)), stream_(this->file(), std::ios::binary) {
+  if (!stream_) throw std::runtime_error(this->file().string() + ": cannot be opened for reading");
+  file_size_ = std::filesystem::file_size(this->file());
 }
 
 std::unique_ptr<BagCursor> ChunkedBag::messages(std::size_t topic, std::int64_t from_log_ns) {
@@ -162,13 +162,14 @@ std::unique_ptr<BagCursor> ChunkedBag::messages(std::size_t topic, std::int64_t 
 
 void ChunkedBag::setChunks(std::vector<BagChunk> chunks) {
   chunks_ = std::move(chunks);
-  bool first = true;
+  const BagChunk* first = nullptr;
+  const BagChunk* last = nullptr;
   for (const BagChunk& chunk : chunks_) {
     if (chunk.topics == 0) continue;
-    first_log_ns_ = first ? chunk.first_log_ns : std::min(first_log_ns_, chunk.first_log_ns);
-    last_log_ns_ = first ? chunk.last_log_ns : std::max(last_log_ns_, chunk.last_log_ns);
-    first = false;
+    if (first == nullptr || chunk.first_log_ns < first->first_log_ns) first = &chunk;
+    if (last == nullptr || chunk.last_log_ns > last->last_log_ns) last = &chunk;
   }
+  if (first != nullptr) setLogTimes(first->first_log_ns, last->last_log_ns);
 }
 
 /// Cameras are read by turns, one some chunks before the other.
@@ -206,7 +207,7 @@ std::unique_ptr<std::uint8_t[]> ChunkedBag::readBytes(std::uint64_t offset, std:
 }
 
 std::runtime_error ChunkedBag::errorAt(std::uint64_t offset, const std::string& what) const {
-  return std::runtime_error(fmt::format("{}: byte {}: {}", file_.string(), offset, what));
+  return std::runtime_error(fmt::format("{}: byte {}: {}", file().string(), offset, what));
 }
 
 }  // namespace efm

@@ -38,11 +38,17 @@ void BagEventDecoder::fitClock(BagCursor& cursor) {
   if (type_ != RosType::kEventPacket) return;
   BagMessage message;
   std::vector<Event> events;
-  for (int i = 0; i < kClockPackets && cursor.next(message); ++i) {
-    const EventPacketMessage packet = decodeEventPacket(message);
-    events.clear();
-    decodePacket(packet, events);
-    if (!events.empty()) clock_.observe(packet.stamp_ns, events.front().t_ns);
+  try {
+    for (int packets = 0; packets < kClockPackets && cursor.next(message);) {
+      const EventPacketMessage packet = decodeEventPacket(message);
+      events.clear();
+      decodePacket(packet, events);
+      if (events.empty()) continue;
+      clock_.observe(packet.stamp_ns, events.front().t_ns);
+      ++packets;
+    }
+  } catch (const std::runtime_error&) {
+    // Reading comes to it, after the events before.
   }
   // The time base of `mono` is the host's time or the sensor's.
   if (!evt_ && clock_.isHostClock()) clock_.useHostTime();
@@ -56,15 +62,15 @@ void BagEventDecoder::restart() {
 }
 
 void BagEventDecoder::decode(const BagMessage& message, std::vector<Event>& events) {
-  const auto takeSize = [this](const CameraSize& size) {
+  const auto take_size = [this](const CameraSize& size) {
     if (size.width > 0 && size.height > 0) size_ = size;
   };
   if (type_ == RosType::kEventArray) {
-    takeSize(decodeEventArray(message, events));
+    take_size(decodeEventArray(message, events));
     return;
   }
   const EventPacketMessage packet = decodeEventPacket(message);
-  takeSize(packet.size);
+  take_size(packet.size);
   const std::size_t first = events.size();
   decodePacket(packet, events);
   if (events.size() == first) return;
@@ -102,16 +108,12 @@ void BagEventDecoder::chooseEncoding(std::string_view encoding) {
   clock_ = SensorClock(evt->wrap_ns);
 }
 
-BagEvents::BagEvents(std::vector<BagTopicPart> parts) {
+BagEvents::BagEvents(const std::vector<BagTopicPart>& parts) {
   assert(!parts.empty());
-  for (BagTopicPart& topic : parts) {
+  for (const BagTopicPart& topic : parts) {
     Part part = {topic, BagEventDecoder(topic.bag->topics()[topic.topic])};
-    try {
-      part.decoder.fitClock(*topic.bag->messages(topic.topic, kMinTimeNs));
-      if (!size_) size_ = firstSize(part);
-    } catch (const std::runtime_error&) {
-      // Reading comes to it, after the events before.
-    }
+    part.decoder.fitClock(*topic.bag->messages(topic.topic, kMinTimeNs));
+    if (!size_) size_ = firstSize(part);
     // The next bag of a recording goes on with the same clock.
     if (!parts_.empty()) {
       part.decoder.clock().share(parts_.back().decoder.clock(), kContinuedClockNs);
@@ -165,7 +167,11 @@ std::optional<CameraSize> BagEvents::firstSize(const Part& part) {
   BagEventDecoder decoder = part.decoder;
   BagMessage message;
   std::vector<Event> events;
-  if (cursor->next(message)) decoder.decode(message, events);
+  try {
+    if (cursor->next(message)) decoder.decode(message, events);
+  } catch (const std::runtime_error&) {
+    // Reading comes to it.
+  }
   return decoder.size();
 }
 

@@ -29,8 +29,8 @@ class BagEventDecoder {
   /// @param topic its name and type.
   explicit BagEventDecoder(const BagTopic& topic);
 
-  /// Takes the first packets of the topic into account, for the sensor's clock. Nothing to do for
-  /// EventArray: its events have the host's time.
+  /// Takes the first 100 packets with events into account, for the sensor's clock. Nothing to do
+  /// for EventArray: its events have the host's time. Never throws at damaged data.
   void fitClock(BagCursor& cursor);
   SensorClock& clock() { return clock_; }
 
@@ -62,7 +62,7 @@ class BagEventDecoder {
 class BagEvents : public EventStream {
  public:
   /// @param parts of the same topic, in time order, at least one.
-  explicit BagEvents(std::vector<BagTopicPart> parts);
+  explicit BagEvents(const std::vector<BagTopicPart>& parts);
 
   /// Uses the clock of another camera where the two are synchronised, see SensorClock.
   void shareClock(BagEvents& other);

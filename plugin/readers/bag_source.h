@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace efm {
@@ -54,6 +56,22 @@ class BagSource {
   virtual std::unique_ptr<BagCursor> messages(std::size_t topic, std::int64_t from_log_ns) = 0;
 
  protected:
+  /// @return its index, the same for a topic of the same name and type.
+  std::size_t addTopic(const BagTopic& topic) {
+    const auto same = [&](const BagTopic& other) {
+      return other.name == topic.name && other.type == topic.type;
+    };
+    const auto found = std::find_if(topics_.begin(), topics_.end(), same);
+    const auto index = static_cast<std::size_t>(found - topics_.begin());
+    if (found == topics_.end()) topics_.push_back(topic);
+    return index;
+  }
+  void setLogTimes(std::int64_t first_ns, std::int64_t last_ns) {
+    first_log_ns_ = first_ns;
+    last_log_ns_ = last_ns;
+  }
+
+ private:
   std::filesystem::path file_;
   std::vector<BagTopic> topics_;
   std::int64_t first_log_ns_ = 0;

@@ -152,12 +152,7 @@ void McapBag::takeSchemaOrChannel(McapRecord& record) {
     const std::string name(takeText(content));
     const std::string_view encoding = takeText(content);
     if (type == types_.end() || (encoding != "cdr" && encoding != "ros1")) return;
-    const auto same = [&](const BagTopic& topic) {
-      return topic.name == name && topic.type == type->second;
-    };
-    const auto found = std::find_if(topics_.begin(), topics_.end(), same);
-    channels_[id] = {static_cast<std::size_t>(found - topics_.begin()), encoding == "cdr"};
-    if (found == topics_.end()) topics_.push_back({name, type->second});
+    channels_[id] = {addTopic({name, type->second}), encoding == "cdr"};
   }
 }
 

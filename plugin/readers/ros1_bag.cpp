@@ -188,14 +188,8 @@ void Ros1Bag::addConnection(const Ros1Record& record) {
   const Ros1Fields connection(ByteReader(record.data, record.size));
   const BagTopic topic = {std::string(record.fields.text("topic")),
                           std::string(connection.text("type"))};
-  const auto same = [&](const BagTopic& other) {
-    return other.name == topic.name && other.type == topic.type;
-  };
   // Several publishers of a topic have a connection each.
-  const auto found = std::find_if(topics_.begin(), topics_.end(), same);
-  topic_of_[record.fields.number<std::uint32_t>("conn")] =
-      static_cast<std::size_t>(found - topics_.begin());
-  if (found == topics_.end()) topics_.push_back(topic);
+  topic_of_[record.fields.number<std::uint32_t>("conn")] = addTopic(topic);
 }
 
 void Ros1Bag::addChunk(const Ros1Record& record, std::vector<BagChunk>& chunks) const {

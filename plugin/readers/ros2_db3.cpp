@@ -41,9 +41,6 @@ class SqlQuery {
     return status == SQLITE_ROW;
   }
   std::int64_t number(int column) const { return sqlite3_column_int64(statement_.get(), column); }
-  bool isNull(int column) const {
-    return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
-  }
   std::string text(int column) const {
     const auto* const text = sqlite3_column_text(statement_.get(), column);
     return text == nullptr ? std::string() : reinterpret_cast<const char*>(text);
@@ -65,24 +62,30 @@ class SqlQuery {
   std::unique_ptr<sqlite3_stmt, decltype(&sqlite3_finalize)> statement_;
 };
 
+/// The first column of a row.
+std::int64_t logTime(const SqlQuery& row) {
+  return std::clamp(row.number(0), -kEndOfTimeNs, kEndOfTimeNs);
+}
+
 class Db3Bag : public BagSource {
  public:
   explicit Db3Bag(std::filesystem::path file)
-      : BagSource(std::move(file)), name_(file_.string()), database_(nullptr, &sqlite3_close) {
+      : BagSource(std::move(file)),
+        name_(this->file().string()),
+        database_(nullptr, &sqlite3_close) {
     open();
     SqlQuery topics(database_.get(), name_,
                     "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
     while (topics.next()) {
       const std::string format = topics.text(3);
       if (format != "cdr") continue;
-      topics_.push_back({topics.text(1), typeWithoutMsg(topics.text(2))});
-      ids_.push_back(topics.number(0));
+      const BagTopic topic = {topics.text(1), typeWithoutMsg(topics.text(2))};
+      if (addTopic(topic) == ids_.size()) ids_.push_back(topics.number(0));
     }
     // Each alone: SQLite takes either from its index.
     SqlQuery first(database_.get(), name_, "SELECT min(timestamp) FROM messages");
     SqlQuery last(database_.get(), name_, "SELECT max(timestamp) FROM messages");
-    if (first.next()) first_log_ns_ = std::clamp(first.number(0), -kEndOfTimeNs, kEndOfTimeNs);
-    if (last.next()) last_log_ns_ = std::clamp(last.number(0), -kEndOfTimeNs, kEndOfTimeNs);
+    if (first.next() && last.next()) setLogTimes(logTime(first), logTime(last));
   }
 
   std::unique_ptr<BagCursor> messages(std::size_t topic, std::int64_t from_log_ns) override;
@@ -102,7 +105,7 @@ void Db3Bag::open() {
   std::error_code ignored;
   const bool journal = std::filesystem::exists(name_ + "-wal", ignored);
   std::string uri = "file:";
-  for (const char c : std::filesystem::absolute(file_).string()) {
+  for (const char c : std::filesystem::absolute(file()).string()) {
     const bool special = c == '%' || c == '?' || c == '#';
     uri += special ? fmt::format("%{:02x}", c) : std::string(1, c);
   }
@@ -116,7 +119,7 @@ void Db3Bag::open() {
                                          name_, sqlite3_errstr(status)));
   }
   // No value is longer than the file.
-  const std::uintmax_t size = std::filesystem::file_size(file_);
+  const std::uintmax_t size = std::filesystem::file_size(file());
   sqlite3_limit(database, SQLITE_LIMIT_LENGTH,
                 static_cast<int>(std::min<std::uintmax_t>(size, std::numeric_limits<int>::max())));
 }
@@ -135,7 +138,7 @@ class Db3Bag::Cursor : public BagCursor {
       return false;
     }
     const auto [data, size] = query_.bytes(1);
-    message = {std::clamp(query_.number(0), -kEndOfTimeNs, kEndOfTimeNs), data, size, true};
+    message = {logTime(query_), data, size, true};
     return true;
   }
 
@@ -147,7 +150,7 @@ class Db3Bag::Cursor : public BagCursor {
 /// Messages come in the order of their ids, that of the recording: reading by time would jump.
 std::unique_ptr<BagCursor> Db3Bag::messages(std::size_t topic, std::int64_t from_log_ns) {
   std::int64_t first_id = std::numeric_limits<std::int64_t>::min();
-  if (from_log_ns > first_log_ns_) {
+  if (from_log_ns > firstLogNs()) {
     SqlQuery query(database_.get(), name_,
                    "SELECT id FROM messages WHERE timestamp >= ? ORDER BY timestamp LIMIT 1");
     first_id = query.bind(1, from_log_ns).next() ? query.number(0)

@@ -237,12 +237,12 @@ CameraModel decodeCameraInfo(const BagMessage& message) {
         fmt::format("{} distortion coefficients: expected at most {}", count, kMaxCoefficients));
   }
   for (std::uint32_t i = 0; i < count; ++i) model.coefficients.push_back(fields.finite("D"));
-  std::array<double, 9> K;  // fx 0 cx, 0 fy cy, 0 0 1
-  for (double& value : K) value = fields.finite("K");
-  model.fx = K[0];
-  model.cx = K[2];
-  model.fy = K[4];
-  model.cy = K[5];
+  std::array<double, 9> matrix;  // fx 0 cx, 0 fy cy, 0 0 1
+  for (double& value : matrix) value = fields.finite("K");
+  model.fx = matrix[0];
+  model.cx = matrix[2];
+  model.fy = matrix[4];
+  model.cy = matrix[5];
   if (name == "equidistant" || name == "fisheye") {
     model.distortion = DistortionModel::kEquidistant;
   } else if (name == "plumb_bob" && count > 0) {
