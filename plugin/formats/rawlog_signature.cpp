@@ -54,8 +54,9 @@ void requireRawlog(const std::filesystem::path& file) {
   if (!bytes.empty() && beginsAnObject(bytes)) return;
   const std::string why =
       bytes.empty() ? "it is empty" : "it begins with " + inQuotes(bytes.substr(0, kShown));
-  throw std::runtime_error(file.string() + ": not a rawlog (" + why +
-                           "): expected a rawlog, or the folder of a recording as text files");
+  throw std::runtime_error(
+      file.string() + ": not a rawlog (" + why +
+      "): expected a rawlog, or a recording in another format (docs/recordings.md)");
 }
 
 }  // namespace efm

@@ -19,7 +19,8 @@ struct EventColumns {
   std::uint64_t header_lines = 0;  ///< To skip at the beginning of the file.
   std::optional<CameraSize> size;  ///< From a first line `width height`.
 
-  bool isUsual() const { return order == "txyp" && separator == ' '; }
+  /// t x y p in seconds, between blanks.
+  bool isUsual() const { return order == "txyp" && separator == ' ' && time_exponent == 0; }
 };
 
 /// Finds the columns from the beginning of a file. A first line with names (t or time …, x, y, p or

@@ -55,7 +55,26 @@ bool takeSeparator(const char*& text, char separator) {
   return true;
 }
 
-bool takePixel(const char*& text, std::uint16_t& pixel) {
+/// @param decimals_of_ns 9 where times count seconds, 0 where they count nanoseconds.
+/// @return false if `parseLine` must parse the line.
+inline bool takeTime(const char*& text, int decimals_of_ns, Event& event) {
+  constexpr std::array<std::uint64_t, 10> kPowers = {
+      1, 10, 100, 1'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000, 1'000'000'000};
+  constexpr int kMaxDigits = 19;
+  const Digits whole = takeDigits(text);
+  if (whole.count < 1 || whole.count > kMaxDigits - decimals_of_ns) return false;
+  std::uint64_t t_ns = whole.value * kPowers[static_cast<std::size_t>(decimals_of_ns)];
+  if (*text == '.') {
+    const Digits decimals = takeDigits(++text);
+    if (decimals.count > decimals_of_ns) return false;
+    t_ns += decimals.value * kPowers[static_cast<std::size_t>(decimals_of_ns - decimals.count)];
+  }
+  if (t_ns >= static_cast<std::uint64_t>(kEndOfTimeNs)) return false;
+  event.t_ns = static_cast<std::int64_t>(t_ns);
+  return true;
+}
+
+inline bool takePixel(const char*& text, std::uint16_t& pixel) {
   constexpr int kMaxPixelDigits = 5;
   const Digits digits = takeDigits(text);
   if (digits.count < 1 || digits.count > kMaxPixelDigits ||
@@ -66,7 +85,7 @@ bool takePixel(const char*& text, std::uint16_t& pixel) {
   return true;
 }
 
-bool takePolarity(const char*& text, bool& polarity) {
+inline bool takePolarity(const char*& text, bool& polarity) {
   const bool negative = *text == '-';
   text += negative ? 1 : 0;
   polarity = *text == '1' && !negative;
@@ -96,6 +115,7 @@ EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions
   ended_ = carried_ < kFirstBytes;
   const std::string_view first(block_.data(), carried_);
   columns_ = findEventColumns(wholeLines(first, ended_), options, name());
+  usual_ = columns_.isUsual();
 }
 
 bool EventTextStream::read(std::vector<Event>& events) {
@@ -155,39 +175,21 @@ void EventTextStream::takeLine(std::string_view line, bool unterminated,
   }
 }
 
-/// @return false if `parseLine` must parse the line.
-bool EventTextStream::takeTime(const char*& text, Event& event) const {
-  constexpr std::array<std::uint64_t, 10> kPowers = {
-      1, 10, 100, 1'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000, 1'000'000'000};
-  constexpr int kMaxDigits = 19;
-  const int decimals_of_ns = 9 + columns_.time_exponent;
-  const Digits whole = takeDigits(text);
-  if (whole.count < 1 || whole.count > kMaxDigits - decimals_of_ns) return false;
-  std::uint64_t t_ns = whole.value * kPowers[static_cast<std::size_t>(decimals_of_ns)];
-  if (*text == '.') {
-    const Digits decimals = takeDigits(++text);
-    if (decimals.count > decimals_of_ns) return false;
-    t_ns += decimals.value * kPowers[static_cast<std::size_t>(decimals_of_ns - decimals.count)];
-  }
-  if (t_ns >= static_cast<std::uint64_t>(kEndOfTimeNs)) return false;
-  event.t_ns = static_cast<std::int64_t>(t_ns);
-  return true;
-}
-
 /// The fast path for a plain line. Each step stops at the newline at the latest.
 /// @return the next line; null if `parseLine` must parse this line.
 const char* EventTextStream::parsePlainLine(const char* text, Event& event) const {
-  if (columns_.isUsual()) {
-    if (!takeTime(text, event) || !takeBlanks(text) || !takePixel(text, event.x) ||
+  if (usual_) {
+    if (!takeTime(text, 9, event) || !takeBlanks(text) || !takePixel(text, event.x) ||
         !takeBlanks(text) || !takePixel(text, event.y) || !takeBlanks(text) ||
         !takePolarity(text, event.polarity)) {
       return nullptr;
     }
   } else {
+    const int decimals_of_ns = 9 + columns_.time_exponent;
     for (std::size_t k = 0; k < columns_.order.size(); ++k) {
       if (k > 0 && !takeSeparator(text, columns_.separator)) return nullptr;
       const char column = columns_.order[k];
-      const bool taken = column == 't'   ? takeTime(text, event)
+      const bool taken = column == 't'   ? takeTime(text, decimals_of_ns, event)
                          : column == 'x' ? takePixel(text, event.x)
                          : column == 'y' ? takePixel(text, event.y)
                          : column == 'p' ? takePolarity(text, event.polarity)

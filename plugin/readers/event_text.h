@@ -37,13 +37,13 @@ class EventTextStream : public EventStream {
   void takeLines(const char* begin, const char* end, std::vector<Event>& events);
   void takeLine(std::string_view line, bool unterminated, std::vector<Event>& events);
   const char* parsePlainLine(const char* text, Event& event) const;
-  bool takeTime(const char*& text, Event& event) const;
   std::optional<Event> parseLine(std::string_view line, bool unterminated) const;
   std::optional<std::pair<std::uint64_t, std::int64_t>> firstEventAfter(std::uint64_t byte);
   std::string place(std::uint64_t line) const;
 
   FileContent content_;
   EventColumns columns_;
+  bool usual_ = true;  // columns_.isUsual()
   bool started_ = false;
   bool ended_ = false;
 

@@ -227,7 +227,8 @@ TEST_F(ImportCommand, AFileOfAnotherKindIsAnErrorThatNamesTheExpectedKind) {
   write("picture.png", "\x89PNG\r\n\x1a\n");
   write("short", "\x97");
   write("words.bin", std::string("\x05\0\0\0a b c", 9));
-  const std::string expected = ": expected a rawlog, or the folder of a recording as text files\n";
+  const std::string expected =
+      ": expected a rawlog, or a recording in another format (docs/recordings.md)\n";
   const std::pair<const char*, const char*> cases[] = {
       {"small/events.txt", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
       {"small/events.txt.gz", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
@@ -236,6 +237,8 @@ TEST_F(ImportCommand, AFileOfAnotherKindIsAnErrorThatNamesTheExpectedKind) {
       {"words.bin", "it begins with '\\x05\\x00\\x00\\x00a b c'"}};
   for (const auto& [file, why] : cases) {
     for (const char* format : {"", " --format rawlog"}) {
+      const bool is_text = std::string_view(file).substr(0, 6) == "small/";
+      if (is_text && *format == '\0') continue;  // a recording of its own
       const Result result = run(std::string("info ") + file + format);
       EXPECT_NE(result.status, 0) << file;
       EXPECT_EQ(result.err, "event-fusion: error: " + std::string(file) + ": not a rawlog (" + why +
