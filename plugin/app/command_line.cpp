@@ -39,7 +39,7 @@ void addSource(CLI::App& command, Arguments& arguments) {
   command
       .add_option("SOURCE", arguments.source.files,
                   "The recording: a rawlog, a folder, or the files of one recording (text, HDF5, "
-                  "bags, RAW, AEDAT4, NumPy); docs/recordings.md describes them")
+                  "ROS bags, MCAP, Prophesee RAW, AEDAT4, NumPy): see docs/recordings.md")
       ->required();
   command
       .add_option("--format", arguments.source.format,
@@ -71,7 +71,7 @@ void addSource(CLI::App& command, Arguments& arguments) {
       ->allow_extra_args(false);
   command
       .add_option(
-          "--columns", arguments.source.reader.columns,
+          "--event-columns", arguments.source.reader.columns,
           "The columns of text events: t, x, y, p, and - for one to ignore, e.g. \"x y p t\" "
           "(default: those of the header, else t x y p)")
       ->type_name("COLUMNS");

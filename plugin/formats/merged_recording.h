@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "mapping/geometry/rig.h"
-#include "plugin/readers/event_packets.h"
 #include "plugin/recordings/recording.h"
+#include "plugin/streams/event_packets.h"
 
 namespace efm {
 

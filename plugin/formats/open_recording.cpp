@@ -13,11 +13,11 @@
 #include "plugin/formats/rawlog_signature.h"
 #include "plugin/readers/pose_file.h"
 #include "plugin/readers/recording_formats.h"
-#include "plugin/readers/source_files.h"
 #include "plugin/recordings/perturbed_recording.h"
 #include "plugin/recordings/recording_with_poses.h"
 #include "plugin/recordings/rig_override_recording.h"
 #include "plugin/session/rig_setup.h"
+#include "plugin/streams/source_files.h"
 
 namespace efm {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "plugin/readers/event_packets.h"
-#include "plugin/readers/recording_parts.h"
 #include "plugin/recordings/recording.h"
+#include "plugin/streams/event_packets.h"
+#include "plugin/streams/recording_parts.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm {

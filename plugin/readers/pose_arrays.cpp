@@ -10,10 +10,10 @@
 #include <string>
 #include <string_view>
 
-#include "plugin/readers/file_content.h"
-#include "plugin/readers/npy_array.h"
+#include "plugin/numpy/npy_array.h"
 #include "plugin/readers/pose_file.h"
-#include "plugin/readers/time_unit.h"
+#include "plugin/streams/file_content.h"
+#include "plugin/streams/time_unit.h"
 
 namespace efm {
 namespace {

@@ -8,9 +8,9 @@
 #include <system_error>
 
 #include "maps/io/npy_header.h"
-#include "plugin/readers/file_content.h"
 #include "plugin/readers/recording_formats.h"
-#include "plugin/readers/source_files.h"
+#include "plugin/streams/file_content.h"
+#include "plugin/streams/source_files.h"
 
 namespace efm {
 namespace {

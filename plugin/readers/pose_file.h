@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
-#include "plugin/readers/recording_parts.h"
+#include "plugin/streams/recording_parts.h"
 
 namespace efm {
 

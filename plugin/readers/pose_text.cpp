@@ -11,9 +11,9 @@
 
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
-#include "plugin/readers/file_content.h"
 #include "plugin/readers/pose_file.h"
-#include "plugin/readers/time_unit.h"
+#include "plugin/streams/file_content.h"
+#include "plugin/streams/time_unit.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {

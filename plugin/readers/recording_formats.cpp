@@ -3,16 +3,16 @@
 
 #include <stdexcept>
 
-#include "plugin/readers/aedat4.h"
-#include "plugin/readers/bag_recording.h"
-#include "plugin/readers/dataset_folder.h"
-#include "plugin/readers/event_text.h"
-#include "plugin/readers/evimo2.h"
-#include "plugin/readers/hdf5_files.h"
-#include "plugin/readers/hdf5_recording.h"
-#include "plugin/readers/prophesee_raw.h"
-#include "plugin/readers/source_files.h"
-#include "plugin/readers/uzh_text.h"
+#include "plugin/bags/bag_recording.h"
+#include "plugin/hdf5/hdf5_files.h"
+#include "plugin/hdf5/hdf5_recording.h"
+#include "plugin/numpy/evimo2.h"
+#include "plugin/sensors/aedat4.h"
+#include "plugin/sensors/prophesee_raw.h"
+#include "plugin/streams/source_files.h"
+#include "plugin/text/dataset_folder.h"
+#include "plugin/text/event_text.h"
+#include "plugin/text/uzh_text.h"
 
 namespace efm {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "plugin/readers/recording_parts.h"
+#include "plugin/streams/recording_parts.h"
 
 namespace efm {
 

@@ -11,7 +11,7 @@ namespace efm {
 /// Oddities of a recording that could be read.
 struct RecordingCounts {
   std::uint64_t sorted_events = 0;  ///< Came up to 10 ms after a newer one.
-  std::uint64_t lost_packets = 0;   ///< Missing in the numbers that the recording gives its packets.
+  std::uint64_t lost_packets = 0;  ///< Missing in the numbers that the recording gives its packets.
 };
 
 /// A recording as a stream of observations in the order of time: CObservationEvents,

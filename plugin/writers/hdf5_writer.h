@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/readers/hdf5_file.h"
+#include "plugin/hdf5/hdf5_file.h"
 #include "plugin/writers/recording_writer.h"
 #include "tracking_stub/truth/new_folder.h"
 

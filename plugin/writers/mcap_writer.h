@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "maps/io/atomic_file.h"
-#include "plugin/readers/mcap_format.h"
+#include "plugin/bags/mcap_format.h"
 #include "plugin/writers/recording_writer.h"
 
 namespace efm {

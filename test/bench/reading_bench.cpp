@@ -18,7 +18,7 @@
 #include "plugin/readers/recording_formats.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
-#include "test/plugin/readers/evt_words.h"
+#include "test/plugin/sensors/evt_words.h"
 #ifdef EFM_WITH_HDF5
 #include "plugin/writers/hdf5_writer.h"
 #endif

@@ -9,7 +9,7 @@ OUT/csv, gz, zip, minus and us are dataset folders:
   gz      camN/events.txt.gz   t x y p
   zip     camN/events.zip      t x y p
   minus   camN/events.txt      t x y p, polarity -1 and 1, below a first line `width height`
-  us      camN/events.txt      x y p t, t in whole microseconds: --columns "x y p t" --time-unit us
+  us      camN/events.txt      x y p t, t in whole microseconds: --event-columns "x y p t" --time-unit us
 The poses of all are OUT/poses_*: EuRoC's CSV, TUM-VIE's mocap_data.txt, NumPy arrays.
 """
 import gzip

@@ -58,7 +58,7 @@ TEST_P(Formats, GivesTheDepthMapOfTheTextFolder) {
 }
 
 TEST_F(FormatsByOption, TextInOtherColumnsGivesTheSameDepthMap) {
-  EXPECT_TRUE(mapsOf((kFormats / "text/us").string() + " --columns x,y,p,t --time-unit us") ==
+  EXPECT_TRUE(mapsOf((kFormats / "text/us").string() + " --event-columns x,y,p,t --time-unit us") ==
               mapsOfFolder());
 }
 

@@ -40,7 +40,7 @@ forbid tracking_stub "(maps|plugin|test)/" "may include mapping/ and tracking_st
 forbid tracking_stub "$mrpt|$pcl|$ceres|$recordings|$front" "may use what mapping/ uses"
 forbid plugin "(test|plugin/app)/" "never includes the application or the tests" '^plugin/app/'
 forbid plugin "$ceres" "refinement is reached through maps/"
-forbid plugin "$recordings" "HDF5 and ROS bags stay in plugin/readers/ and plugin/writers/" '^plugin/(readers|writers)/'
+forbid plugin "$recordings" "HDF5 stays in plugin/hdf5/ and plugin/writers/" '^plugin/(hdf5|writers)/'
 
 forbid plugin "$mrpt" "MRPT stays in mrpt/, recordings/, formats/ and app/" \
   '^plugin/(mrpt|recordings|formats|app)/'

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/readers/dataset_folder.h"
+#include "plugin/text/dataset_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

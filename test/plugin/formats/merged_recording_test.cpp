@@ -13,8 +13,8 @@
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
-#include "plugin/readers/event_text.h"
 #include "plugin/recordings/recording_with_poses.h"
+#include "plugin/text/event_text.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/readers/uzh_text.h"
+#include "plugin/text/uzh_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

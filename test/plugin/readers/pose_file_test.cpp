@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "test/plugin/formats/files.h"
-#include "test/plugin/readers/zip_file.h"
+#include "test/plugin/numpy/zip_file.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -11,7 +11,7 @@
 
 #include "mapping/geometry/trajectory.h"
 #include "plugin/evaluation/depth_series.h"
-#include "plugin/readers/uzh_text.h"
+#include "plugin/text/uzh_text.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm::studies {

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "mapping/keyframes/keyframe_policy.h"
-#include "plugin/readers/event_packets.h"
-#include "plugin/readers/event_text.h"
-#include "plugin/readers/uzh_text.h"
+#include "plugin/streams/event_packets.h"
+#include "plugin/text/event_text.h"
+#include "plugin/text/uzh_text.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm::studies {

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/bags/ros_messages.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/quoted_text.h"
+#include "plugin/streams/byte_reader.h"
+
+namespace efm {
+namespace {
+
+struct NamedRosType {
+  std::string_view name;
+  RosType type;
+};
+constexpr NamedRosType kRosTypes[] = {
+    {"dvs_msgs/EventArray", RosType::kEventArray},
+    {"prophesee_event_msgs/EventArray", RosType::kEventArray},
+    {"event_camera_msgs/EventPacket", RosType::kEventPacket},
+    {"event_array_msgs/EventArray", RosType::kEventPacket},
+    {"geometry_msgs/PoseStamped", RosType::kPose},
+    {"geometry_msgs/PoseWithCovarianceStamped", RosType::kPoseWithCovariance},
+    {"geometry_msgs/TransformStamped", RosType::kTransform},
+    {"nav_msgs/Odometry", RosType::kOdometry},
+    {"sensor_msgs/CameraInfo", RosType::kCameraInfo},
+};
+
+/// The fields of a message, in either serialisation.
+class MessageFields {
+ public:
+  explicit MessageFields(const BagMessage& message)
+      : bytes_(message.data, message.size), cdr_(message.cdr) {
+    if (!cdr_) return;
+    constexpr int kBigEndian = 0;
+    constexpr int kLittleEndian = 1;
+    const int zero = bytes_.number<std::uint8_t>();
+    const int kind = bytes_.number<std::uint8_t>();
+    if (zero != 0 || kind > kLittleEndian) {
+      throw std::runtime_error(fmt::format(
+          "CDR header = {} {}: expected 0 0 or 0 1, plain CDR of version 1", zero, kind));
+    }
+    bytes_.number<std::uint16_t>();  // options
+    bytes_.setBigEndian(kind == kBigEndian);
+    bytes_.alignFromHere();
+  }
+
+  ByteReader& bytes() { return bytes_; }
+  template <typename T>
+  T number() {
+    return bytes_.number<T>();
+  }
+  std::int64_t time() {
+    // The seconds of ROS 1 have no sign.
+    const std::int64_t seconds = cdr_ ? std::int64_t{bytes_.number<std::int32_t>()}
+                                      : std::int64_t{bytes_.number<std::uint32_t>()};
+    const std::uint32_t nanoseconds = bytes_.number<std::uint32_t>();
+    return seconds * kNanosecondsPerSecond + nanoseconds;
+  }
+  std::string_view text() {
+    const std::uint32_t size = bytes_.number<std::uint32_t>();
+    const std::string_view text = bytes_.text(size);
+    return cdr_ && !text.empty() ? text.substr(0, text.size() - 1) : text;  // a zero at the end
+  }
+  /// @return the stamp.
+  std::int64_t header() {
+    if (!cdr_) bytes_.number<std::uint32_t>();  // seq
+    const std::int64_t t_ns = time();
+    text();  // frame_id
+    return t_ns;
+  }
+  CameraSize size() {
+    const auto side = [this](const char* name) {
+      constexpr std::uint32_t kMaxSide = 65'535;
+      const std::uint32_t value = bytes_.number<std::uint32_t>();
+      if (value <= kMaxSide) return static_cast<int>(value);
+      throw std::runtime_error(fmt::format("{} = {}: expected 0 to {}", name, value, kMaxSide));
+    };
+    const int height = side("height");
+    const int width = side("width");
+    return {width, height};
+  }
+  double finite(const char* name) {
+    const double value = bytes_.number<double>();
+    if (std::isfinite(value)) return value;
+    throw std::runtime_error(fmt::format("{} = {}: expected a finite number", name, value));
+  }
+
+ private:
+  ByteReader bytes_;
+  bool cdr_;
+};
+
+/// An event of an EventArray: x, y (16 bits), seconds, nanoseconds (32 bits), polarity (8 bits).
+constexpr std::size_t kRosEventBytes = 13;
+
+/// The event at `bytes`, whose seconds are at `time`. Little-endian.
+Event eventAt(const std::uint8_t* bytes, const std::uint8_t* time) {
+  Event event;
+  std::uint32_t seconds;
+  std::uint32_t nanoseconds;
+  std::memcpy(&event.x, bytes, 2);
+  std::memcpy(&event.y, bytes + 2, 2);
+  std::memcpy(&seconds, time, 4);
+  std::memcpy(&nanoseconds, time + 4, 4);
+  event.t_ns = std::int64_t{seconds} * kNanosecondsPerSecond + nanoseconds;
+  event.polarity = time[8] != 0;
+  return event;
+}
+
+}  // namespace
+
+RosType rosTypeOf(std::string_view type) {
+  for (const NamedRosType& known : kRosTypes) {
+    if (known.name == type) return known.type;
+  }
+  return RosType::kOther;
+}
+
+bool hasEvents(RosType type) {
+  return type == RosType::kEventArray || type == RosType::kEventPacket;
+}
+
+bool hasPoses(RosType type) {
+  return type == RosType::kPose || type == RosType::kPoseWithCovariance ||
+         type == RosType::kTransform || type == RosType::kOdometry;
+}
+
+CameraSize decodeEventArray(const BagMessage& message, std::vector<Event>& events) {
+  MessageFields fields(message);
+  fields.header();
+  const CameraSize size = fields.size();
+  const std::uint32_t count = fields.number<std::uint32_t>();
+  ByteReader& bytes = fields.bytes();
+  if (count > bytes.remaining() / kRosEventBytes) {
+    throw std::runtime_error(fmt::format("{} events in {} bytes: expected at most {}", count,
+                                         bytes.remaining(), bytes.remaining() / kRosEventBytes));
+  }
+  events.reserve(events.size() + count);
+  if (!message.cdr) {
+    const std::uint8_t* event = bytes.take(count * kRosEventBytes);
+    for (std::uint32_t i = 0; i < count; ++i, event += kRosEventBytes) {
+      events.push_back(eventAt(event, event + 4));
+    }
+    return size;
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Event event;
+    event.x = fields.number<std::uint16_t>();
+    event.y = fields.number<std::uint16_t>();
+    event.t_ns = fields.time();
+    event.polarity = fields.number<std::uint8_t>() != 0;
+    events.push_back(event);
+  }
+  return size;
+}
+
+EventPacketMessage decodeEventPacket(const BagMessage& message) {
+  MessageFields fields(message);
+  EventPacketMessage packet;
+  packet.stamp_ns = fields.header();
+  packet.size = fields.size();
+  packet.sequence = fields.number<std::uint64_t>();
+  packet.time_base = fields.number<std::uint64_t>();
+  packet.encoding = fields.text();
+  if (fields.number<std::uint8_t>() != 0) {
+    throw std::runtime_error("is_bigendian = 1: expected 0, events in little-endian words");
+  }
+  packet.data_size = fields.number<std::uint32_t>();
+  packet.data = fields.bytes().take(packet.data_size);
+  return packet;
+}
+
+void decodeMonoEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
+  constexpr std::size_t kWord = 8;
+  if (packet.data_size % kWord != 0) {
+    throw std::runtime_error(
+        fmt::format("{} bytes of mono events: expected a multiple of 8", packet.data_size));
+  }
+  if (packet.time_base >= static_cast<std::uint64_t>(kEndOfTimeNs)) {
+    throw std::runtime_error(fmt::format(
+        "time_base = {}: expected a time in ns before the year 2116", packet.time_base));
+  }
+  events.reserve(events.size() + packet.data_size / kWord);
+  const std::uint8_t* const end = packet.data + packet.data_size;
+  for (const std::uint8_t* bytes = packet.data; bytes != end; bytes += kWord) {
+    std::uint64_t word;
+    std::memcpy(&word, bytes, kWord);
+    Event event;
+    event.t_ns = static_cast<std::int64_t>(packet.time_base + (word & 0xffff'ffffU));
+    event.x = static_cast<std::uint16_t>(word >> 32);
+    event.y = static_cast<std::uint16_t>(word >> 48 & 0x7fffU);
+    event.polarity = word >> 63 != 0;
+    events.push_back(event);
+  }
+}
+
+StampedPose decodePose(const BagMessage& message, RosType type) {
+  constexpr double kMaxLengthError = 0.01;
+  MessageFields fields(message);
+  StampedPose pose;
+  pose.t_ns = fields.header();
+  if (type == RosType::kTransform || type == RosType::kOdometry) fields.text();  // child_frame_id
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    pose.T_world_rig.translation[axis] = fields.finite("position");
+  }
+  Eigen::Quaterniond& rotation = pose.T_world_rig.rotation;
+  for (Eigen::Index i = 0; i < 4; ++i) rotation.coeffs()[i] = fields.finite("orientation");
+  const double norm = rotation.coeffs().stableNorm();
+  if (!(std::abs(norm - 1) <= kMaxLengthError)) {
+    throw std::runtime_error(
+        fmt::format("orientation of length {:g}: expected 1 within 1 %, a rotation", norm));
+  }
+  rotation.coeffs() /= norm;
+  return pose;
+}
+
+CameraModel decodeCameraInfo(const BagMessage& message) {
+  constexpr std::uint32_t kMaxCoefficients = 14;
+  MessageFields fields(message);
+  fields.header();
+  const CameraSize size = fields.size();
+  CameraModel model;
+  model.width = size.width;
+  model.height = size.height;
+  const std::string name(fields.text());
+  const std::uint32_t count = fields.number<std::uint32_t>();
+  if (count > kMaxCoefficients) {
+    throw std::runtime_error(
+        fmt::format("{} distortion coefficients: expected at most {}", count, kMaxCoefficients));
+  }
+  for (std::uint32_t i = 0; i < count; ++i) model.coefficients.push_back(fields.finite("D"));
+  std::array<double, 9> matrix;  // fx 0 cx, 0 fy cy, 0 0 1
+  for (double& value : matrix) value = fields.finite("K");
+  model.fx = matrix[0];
+  model.cx = matrix[2];
+  model.fy = matrix[4];
+  model.cy = matrix[5];
+  if (name == "equidistant" || name == "fisheye") {
+    model.distortion = DistortionModel::kEquidistant;
+  } else if (name == "plumb_bob" && count > 0) {
+    model.distortion = DistortionModel::kRadtan;
+  } else if (std::all_of(model.coefficients.begin(), model.coefficients.end(),
+                         [](double value) { return value == 0; })) {
+    model.coefficients.clear();
+  } else {
+    throw std::runtime_error(fmt::format(
+        "distortion_model = {}: expected plumb_bob, equidistant or fisheye", inQuotes(name)));
+  }
+  return model;
+}
+
+}  // namespace efm

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/streams/event_packets.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/option_check.h"
+
+namespace efm {
+
+EventPackets::EventPackets(std::unique_ptr<EventStream> stream, CameraSize size,
+                           std::int64_t period_ns)
+    : stream_(std::move(stream)), size_(size), period_ns_(period_ns), newest_ns_(-kEndOfTimeNs) {
+  requireOption(period_ns > 0, "packet period (ns)", period_ns, "above 0");
+}
+
+void EventPackets::startAt(std::int64_t t_ns) {
+  start_ns_ = t_ns;
+  stream_->seek(t_ns - kMaxEventDelayNs);
+}
+
+std::vector<Event> EventPackets::nextPacket() {
+  readAhead();
+  if (first_ == events_.size()) {
+    if (error_) std::rethrow_exception(error_);
+    return {};
+  }
+  const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first_);
+  const auto end = std::partition_point(
+      begin, events_.end(),
+      [end_ns = periodEnd(begin->t_ns)](const Event& event) { return event.t_ns < end_ns; });
+  first_ = static_cast<std::size_t>(end - events_.begin());
+  return {begin, end};
+}
+
+std::optional<std::int64_t> EventPackets::nextTime() {
+  readAhead();
+  if (first_ < events_.size()) return events_[first_].t_ns;
+  if (!error_) return std::nullopt;
+  if (newest_ns_ == -kEndOfTimeNs) std::rethrow_exception(error_);
+  return newest_ns_;
+}
+
+void EventPackets::readAhead() {
+  while (!ended_ && !error_ && !packetIsComplete()) {
+    events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(first_));
+    first_ = 0;
+    readBlock();
+    sortEvents();
+  }
+}
+
+/// The end of the grid's period that contains a time.
+std::int64_t EventPackets::periodEnd(std::int64_t t_ns) const {
+  std::int64_t rest_ns = t_ns % period_ns_;
+  if (rest_ns < 0) rest_ns += period_ns_;
+  return t_ns - rest_ns + period_ns_;
+}
+
+/// Whether no further event can belong to the first packet.
+bool EventPackets::packetIsComplete() const {
+  return first_ < events_.size() &&
+         newest_ns_ - kMaxEventDelayNs >= periodEnd(events_[first_].t_ns);
+}
+
+/// An error comes after the events before it.
+void EventPackets::readBlock() {
+  std::exception_ptr damaged;
+  try {
+    ended_ = !stream_->read(block_);
+  } catch (const std::exception&) {
+    damaged = std::current_exception();
+  }
+  try {
+    takeBlock();
+  } catch (const std::runtime_error&) {
+    error_ = std::current_exception();
+  }
+  if (!error_) error_ = damaged;
+}
+
+void EventPackets::takeBlock() {
+  const auto fail = [this](std::size_t i, const char* name, const auto& value,
+                           const std::string& expected) {
+    return std::runtime_error(
+        fmt::format("{}: {} = '{}': expected {}", stream_->positionOf(i), name, value, expected));
+  };
+  const auto fail_pixel = [&](std::size_t i, const char* name, int value, int side) {
+    return fail(i, name, value,
+                fmt::format("a whole number from 0 to {} (the sensor has {}x{} pixels)", side - 1,
+                            size_.width, size_.height));
+  };
+  events_.reserve(events_.size() + block_.size());
+  for (std::size_t i = 0; i < block_.size(); ++i) {
+    const Event& event = block_[i];
+    if (event.x >= size_.width) throw fail_pixel(i, "x", event.x, size_.width);
+    if (event.y >= size_.height) throw fail_pixel(i, "y", event.y, size_.height);
+    if (event.t_ns >= newest_ns_) {
+      if (event.t_ns >= kEndOfTimeNs) {
+        throw fail(i, "t", event.t_ns, "a time in ns before the year 2116");
+      }
+      newest_ns_ = event.t_ns;
+    } else if (newest_ns_ - event.t_ns <= kMaxEventDelayNs) {
+      disordered_ = true;
+      ++sorted_events_;
+    } else {
+      throw fail(i, "t", formatSeconds(event.t_ns),
+                 fmt::format("events in time order, at most 10 ms before the newest ({})",
+                             formatSeconds(newest_ns_)));
+    }
+    if (start_ns_ && event.t_ns < *start_ns_) continue;
+    if (!stop_ns_ || event.t_ns < *stop_ns_) events_.push_back(event);
+  }
+  if (stop_ns_ && newest_ns_ - kMaxEventDelayNs >= *stop_ns_) ended_ = true;
+}
+
+void EventPackets::sortEvents() {
+  if (!disordered_) return;
+  std::stable_sort(events_.begin(), events_.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  disordered_ = false;
+}
+
+}  // namespace efm

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plugin/streams/event_stream.h"
+
+namespace efm {
+
+/// The default period of the grid of packets: packet k has the events of [k·10 ms, (k+1)·10 ms).
+inline constexpr std::int64_t kPacketPeriodNs = 10'000'000;
+
+/// Checks the events of a camera, sorts those that are up to 10 ms late and divides them into
+/// packets on a grid of time. Reads on demand: memory holds a block and the events of a packet and
+/// 10 ms. A wrong event is a std::runtime_error that names the position, the value and the expected
+/// one. It is thrown after the packets of the events before it, and again by every further call.
+class EventPackets {
+ public:
+  /// @param size pixels beyond it are wrong.
+  /// @param period_ns of the grid, above 0.
+  EventPackets(std::unique_ptr<EventStream> stream, CameraSize size,
+               std::int64_t period_ns = kPacketPeriodNs);
+
+  /// Leaves out the events before a time, without reading them if the format allows it. Called
+  /// before the others.
+  void startAt(std::int64_t t_ns);
+  /// Leaves out the events from a time on, and reads no further than 10 ms behind it.
+  void stopAt(std::int64_t t_ns) { stop_ns_ = t_ns; }
+
+  /// The events of the next period of the grid with events, in time order; events of equal time in
+  /// the order of the file. Empty at the end.
+  /// @throws std::runtime_error at a wrong event.
+  std::vector<Event> nextPacket();
+  /// The first time of the next packet; nothing at the end. If the next call of `nextPacket`
+  /// throws, the time of the newest event.
+  /// @throws std::runtime_error at a wrong event without an event before it.
+  std::optional<std::int64_t> nextTime();
+
+  /// The number of events after a newer one.
+  std::uint64_t sortedEvents() const { return sorted_events_; }
+  const EventStream& stream() const { return *stream_; }
+
+ private:
+  void readAhead();
+  bool packetIsComplete() const;
+  std::int64_t periodEnd(std::int64_t t_ns) const;
+  void readBlock();
+  void takeBlock();
+  void sortEvents();
+
+  std::unique_ptr<EventStream> stream_;
+  CameraSize size_;
+  std::int64_t period_ns_;
+  std::optional<std::int64_t> start_ns_;
+  std::optional<std::int64_t> stop_ns_;
+  bool ended_ = false;
+  std::exception_ptr error_;  // of the wrong event
+
+  std::vector<Event> block_;
+  std::vector<Event> events_;  // sorted between calls; returned before first_
+  std::size_t first_ = 0;
+  std::int64_t newest_ns_;
+  bool disordered_ = false;
+  std::uint64_t sorted_events_ = 0;
+};
+
+}  // namespace efm

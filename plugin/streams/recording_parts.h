@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/geometry/rigid3.h"
+#include "mapping/geometry/trajectory.h"
+#include "plugin/calibration/calibration_file.h"
+#include "plugin/streams/event_stream.h"
+
+namespace efm {
+
+/// What a reader finds in the files of a recording. All parts may be missing: other sources, or
+/// files of their own, may have them.
+struct RecordingParts {
+  std::vector<std::unique_ptr<EventStream>> cameras;
+  /// The recording's own calibration, of all cameras.
+  std::optional<Calibration> calibration;
+  /// The sensors' size where neither the stream nor a calibration knows it.
+  std::optional<CameraSize> default_size;
+
+  std::vector<StampedPose> poses;    ///< T_world_body, in any order.
+  std::optional<Rigid3> T_body_rig;  ///< Nothing: the poses are the rig's.
+
+  /// What the format calls its missing parts, for errors: "calib.txt".
+  std::string expected_calibration = "a calibration in the recording";
+  std::string expected_poses = "poses in the recording";
+};
+
+/// Choices that a reader cannot find in the file.
+struct ReaderOptions {
+  /// Topics of bags, or names of streams, to read: events (one per camera, in the order of the
+  /// cameras) and poses. Empty: found by their type.
+  std::vector<std::string> topics;
+  /// The columns of text events, e.g. "x y p t", `-` for one to ignore. Empty: those of the header,
+  /// else t x y p.
+  std::string columns;
+  /// The unit of times in text events and NumPy arrays: s, ms, us or ns. Empty: found, else s.
+  std::string time_unit;
+};
+
+/// A family of formats. A new one is a row of the table in recording_formats.cpp.
+struct RecordingFormat {
+  std::string name;         ///< Of `--format`.
+  std::string description;  ///< For errors.
+  /// Whether a file or folder has this format, by its content. Never throws.
+  bool (*matches)(const std::filesystem::path&);
+  /// Opens the files of one recording, at least one. Cameras are in the order of the files.
+  /// @throws std::runtime_error naming the file and what was expected.
+  RecordingParts (*open)(const std::vector<std::filesystem::path>& files, const ReaderOptions&);
+};
+
+}  // namespace efm

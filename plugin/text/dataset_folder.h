@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "plugin/streams/recording_parts.h"
+
+namespace efm {
+
+/// The project's own text layout, which `event-fusion simulate` writes:
+///   camchain.yaml     the rig
+///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera; other names
+///                     and columns: `eventFileIn`, `findEventColumns`
+///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0
+/// Other files are ignored.
+
+/// Whether the folder has a camchain.yaml, or events in cam0.
+bool looksLikeDatasetFolder(const std::filesystem::path& folder);
+
+/// Without camchain.yaml, the cameras are cam0, cam1, … without gaps.
+/// @throws std::runtime_error naming the file (and line) that is missing or wrong.
+RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folders,
+                                 const ReaderOptions& options);
+
+/// Adds the folder's calibration (camchain.yaml) and poses (poses.txt or groundtruth.txt), where
+/// the parts have none.
+/// @throws std::runtime_error naming the file and the line that is wrong.
+void addFolderFiles(const std::filesystem::path& folder, RecordingParts& parts);
+
+}  // namespace efm

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "plugin/bags/bag_recording.h"
+#include "plugin/bags/mcap_format.h"
+#include "plugin/writers/mcap_writer.h"
+#include "test/plugin/formats/files.h"
+#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr std::int64_t kFirstNs = 1'700'000'000'000'000'123;
+
+/// A recording of 2 s of one camera, in chunks of 1 MiB.
+class Mcap : public TemporaryFolder {
+ protected:
+  Mcap() : file_(folder() / "recording.mcap") {
+    CameraModel model;
+    model.width = 640;
+    model.height = 480;
+    model.fx = 500;
+    model.fy = 501;
+    model.cx = 320.5;
+    model.cy = 240.5;
+    model.distortion = DistortionModel::kEquidistant;
+    model.coefficients = {0.1, -0.2, 0.3, -0.4};
+    rig_.cameras.push_back({model, {}, 0});
+  }
+
+  void write(int events_per_packet) {
+    std::mt19937 random(1);
+    events_.clear();
+    McapWriter writer(file_, rig_);
+    for (std::int64_t packet = 0; packet < 200; ++packet) {
+      std::vector<Event> events;
+      for (std::int64_t i = 0; i < events_per_packet; ++i) {
+        events.push_back({kFirstNs + packet * 10'000'000 + i * 10'000'000 / events_per_packet,
+                          static_cast<std::uint16_t>(random() % 640),
+                          static_cast<std::uint16_t>(random() % 480), (random() & 1U) != 0});
+      }
+      writer.addEvents(0, events);
+      writer.addPose({kFirstNs + packet * 10'000'000, T_world_rig_});
+      events_.insert(events_.end(), events.begin(), events.end());
+    }
+    EXPECT_FALSE(std::filesystem::exists(file_)) << "before it is complete";
+    writer.close();
+  }
+  RecordingParts open() const { return openBags({file_}, {}); }
+  std::string errorOfBytes(const std::string& bytes) const {
+    writeFile(file_, bytes);
+    return errorOf([&] { readStream(*open().cameras.at(0)); });
+  }
+
+  std::filesystem::path file_;
+  Rig rig_;
+  Rigid3 T_world_rig_ = {Eigen::Quaterniond(0.5, -0.5, 0.5, 0.5), {1.25, -2, 1.0 / 3}};
+  std::vector<Event> events_;
+};
+
+TEST_F(Mcap, WhatIsWrittenIsReadBackExactly) {
+  write(2'000);
+  RecordingParts recording = open();
+  ASSERT_EQ(recording.cameras.size(), 1U);
+  EXPECT_TRUE(readStream(*recording.cameras[0]) == events_);
+  ASSERT_EQ(recording.poses.size(), 200U);
+  EXPECT_EQ(recording.poses[7].t_ns, kFirstNs + 70'000'000);
+  EXPECT_TRUE(isSame(recording.poses[7].T_world_rig, T_world_rig_));
+  ASSERT_TRUE(recording.calibration);
+  EXPECT_TRUE(recording.calibration->rig.cameras.at(0).model == rig_.cameras[0].model);
+}
+
+TEST_F(Mcap, LongPacketsAreDivided) {
+  McapWriter writer(file_, rig_);
+  std::vector<Event> events;
+  for (std::int64_t i = 0; i < 300'000; ++i) events.push_back({kFirstNs + i * 40'000, 1, 2, true});
+  writer.addEvents(0, events);  // 12 s
+  writer.close();
+  EXPECT_TRUE(readStream(*open().cameras.at(0)) == events);
+}
+
+TEST_F(Mcap, ValuesThatRosCannotHoldAreErrors) {
+  McapWriter writer(file_, rig_);
+  for (const auto& [event, expected] :
+       {std::make_pair(Event{-1, 0, 0, true}, "expected 0 to 2147483647"),
+        std::make_pair(Event{std::int64_t{1} << 62, 0, 0, true}, "expected 0 to 2147483647"),
+        std::make_pair(Event{0, 0, 0x8000, true}, "y = 32768: expected at most 32767")}) {
+    EXPECT_THAT(errorOf([&, event = event] { writer.addEvents(0, {event}); }),
+                AllOf(StartsWith(file_.string()), HasSubstr(expected)));
+  }
+}
+
+TEST_F(Mcap, AFileWithoutASummaryIsRead) {
+  write(2'000);
+  const std::string bytes = readText(file_);
+  // Without the summary: the same recording.
+  const std::size_t data_end = bytes.rfind(std::string("\x0f\4\0\0\0\0\0\0\0", 9));
+  writeFile(file_, bytes.substr(0, data_end));
+  RecordingParts whole = open();
+  EXPECT_TRUE(readStream(*whole.cameras.at(0)) == events_);
+  EXPECT_EQ(whole.poses.size(), 200U);
+
+  EXPECT_THAT(errorOfBytes(bytes.substr(0, data_end / 2)),
+              AllOf(StartsWith(file_.string() + ": byte "), HasSubstr("which may be cut off")));
+}
+
+TEST_F(Mcap, DamagedDataHaveAnotherChecksum) {
+  write(200);
+  const std::string bytes = readText(file_);
+  const std::size_t chunk = bytes.find(std::string("zstd")) + 4 + 8;
+  const std::size_t summary = bytes.rfind("/cam0/events");
+  for (const auto& [place, expected] :
+       {std::make_pair(chunk + 20'000, "damaged"), std::make_pair(summary, "checksum")}) {
+    std::string damaged = bytes;
+    damaged[place] ^= 1;
+    EXPECT_THAT(errorOfBytes(damaged),
+                AllOf(StartsWith(file_.string() + ": byte "), HasSubstr(expected)));
+  }
+}
+
+TEST_F(Mcap, DamagedFilesAreReadOrRefused) {
+  write(20);
+  readDamaged(readText(file_), file_, "rosbag2");
+}
+
+}  // namespace
+}  // namespace efm

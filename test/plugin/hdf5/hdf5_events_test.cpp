@@ -1,0 +1,440 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/hdf5/hdf5_events.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "maps/io/atomic_file.h"
+#include "plugin/hdf5/hdf5_files.h"
+#include "plugin/hdf5/hdf5_recording.h"
+#include "plugin/readers/recording_formats.h"
+#include "plugin/text/dataset_folder.h"
+#include "plugin/writers/hdf5_writer.h"
+#include "test/paths.h"
+#include "test/plugin/formats/files.h"
+#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/temporary_folder.h"
+#include "tracking_stub/poses/tum_trajectory.h"
+#include "tracking_stub/truth/dataset_writer.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+namespace fs = std::filesystem;
+
+Rig rigOfTwo() {
+  Rig rig;
+  for (int i = 0; i < 2; ++i) {
+    RigCamera camera;
+    camera.model = {346, 260, 226.5, 227, 173.25, 133, DistortionModel::kRadtan, {-0.1, 0.2, 0, 0}};
+    camera.T_rig_cam.translation.x() = 0.1 * i;
+    if (i == 1) camera.T_rig_cam.rotation = rotationBy({0.01, -0.02, 0.03});
+    rig.cameras.push_back(camera);
+  }
+  return rig;
+}
+
+/// Events at today's times, which doubles resolve to 240 ns, in bursts with gaps of 15 ms.
+std::vector<Event> eventsOf(std::uint32_t seed, std::size_t count) {
+  std::mt19937 random(seed);
+  std::vector<Event> events;
+  std::int64_t t_ns = 1'700'000'000'123'457'000 + seed * 1'000;
+  for (std::size_t i = 0; i < count; ++i) {
+    t_ns += i % 40'000 == 39'999 ? 15'000'000 : static_cast<std::int64_t>(random() % 3) * 1'000;
+    events.push_back({t_ns, static_cast<std::uint16_t>(random() % 346),
+                      static_cast<std::uint16_t>(random() % 260), random() % 2 == 0});
+  }
+  return events;
+}
+
+/// A recording in all layouts, which h5py writes once.
+class Hdf5Layouts : public testing::Test {
+ protected:
+  static constexpr std::size_t kEvents = 150'000;
+
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("efm_hdf5_layouts_" + std::to_string(getpid()));
+    written_ = write(folder_, kEvents) && write(folder_ / "small", 3'000);
+  }
+  /// Writes a text folder, and the layouts from it. @return whether h5py could.
+  static bool write(const fs::path& folder, std::size_t events) {
+    const fs::path data = folder / "data";
+    for (std::uint32_t camera = 0; camera < 2; ++camera) {
+      const fs::path cam = data / ("cam" + std::to_string(camera));
+      fs::create_directories(cam);
+      writeEvents(cam / "events.txt", eventsOf(camera, events));
+    }
+    writeFile(data / "camchain.yaml", formatCamchain(rigOfTwo()));
+    writeTumTrajectory(data / "poses.txt", poses());
+    const std::string command = "/usr/bin/python3 '" EFM_SOURCE_DIR
+                                "/test/formats/write_hdf5.py' '" +
+                                data.string() + "' '" + folder.string() + "'";
+    return std::system(command.c_str()) == 0;
+  }
+  static void TearDownTestSuite() { fs::remove_all(folder_); }
+  void SetUp() override {
+    ASSERT_TRUE(written_) << "packages.txt: python3-h5py, hdf5-filter-plugin-blosc-serial";
+  }
+
+  static std::vector<StampedPose> poses() {
+    std::vector<StampedPose> poses;
+    for (int i = 0; i < 5; ++i) {
+      poses.push_back({1'700'000'000'123'000'000 + i * 50'000'000,
+                       {rotationBy({0.1 * i, 0.2, -0.3}), {1.0 * i, 2, 3}}});
+    }
+    return poses;
+  }
+  /// The sources of each layout; those of the text folder first.
+  static std::vector<std::vector<fs::path>> recordings() {
+    return {{folder_ / "dsec"},
+            {folder_ / "tum_vie"},
+            {folder_ / "m3ed"},
+            {folder_ / "mvsec"},
+            {folder_ / "metavision/left.h5", folder_ / "metavision/right.h5"}};
+  }
+
+  static inline fs::path folder_;
+  static inline bool written_ = false;
+};
+
+TEST_F(Hdf5Layouts, AllHaveTheEventsThatWereWritten) {
+  for (const auto& sources : recordings()) {
+    SCOPED_TRACE(sources.front());
+    ASSERT_NE(detectFormat(sources.front()), nullptr);
+    EXPECT_EQ(detectFormat(sources.front())->name, "hdf5");
+    const RecordingParts parts = openHdf5(sources, {});
+    ASSERT_EQ(parts.cameras.size(), 2U);
+    for (std::uint32_t camera = 0; camera < 2; ++camera) {
+      EXPECT_EQ(parts.cameras[camera]->progress(), 0);
+      EXPECT_TRUE(readStream(*parts.cameras[camera]) == eventsOf(camera, kEvents));
+      EXPECT_EQ(parts.cameras[camera]->progress(), 1);
+    }
+  }
+}
+
+TEST_F(Hdf5Layouts, SeekLeavesOutNoEventFromItsTimeOnAndFewBefore) {
+  const std::vector<Event> all = eventsOf(1, kEvents);
+  const std::int64_t first_ns = all.front().t_ns;
+  for (const auto& sources : recordings()) {
+    SCOPED_TRACE(sources.front());
+    for (const std::int64_t t_ns : {first_ns - 5'000'000'000, first_ns, first_ns + 1,
+                                    first_ns + 42'345'678, first_ns + 100'000'000, all.back().t_ns,
+                                    all.back().t_ns + 1, first_ns + 90'000'000'000}) {
+      const auto camera = std::move(openHdf5(sources, {}).cameras.at(1));
+      camera->seek(t_ns);
+      const std::vector<Event> read = readStream(*camera);
+      ASSERT_LE(read.size(), all.size());
+      EXPECT_TRUE(std::equal(read.rbegin(), read.rend(), all.rbegin())) << "the last events";
+      const auto left_out = all.end() - static_cast<std::ptrdiff_t>(read.size());
+      if (left_out != all.begin()) {
+        EXPECT_LT(std::prev(left_out)->t_ns, t_ns);
+      }
+      if (t_ns > first_ns && !read.empty()) {
+        EXPECT_GE(read.front().t_ns, std::min(t_ns, all.back().t_ns) - 1'000'000);
+      }
+    }
+  }
+}
+
+TEST_F(Hdf5Layouts, FilesKnowTheSensorsTheCalibrationAndThePoses) {
+  for (const char* name : {"m3ed", "mvsec"}) {
+    const RecordingParts parts = openHdf5({folder_ / name}, {});
+    EXPECT_EQ(parts.cameras[1]->size().value().width, 346);
+    ASSERT_EQ(parts.poses.size(), poses().size()) << name;
+    for (std::size_t i = 0; i < parts.poses.size(); ++i) {
+      EXPECT_EQ(parts.poses[i].t_ns, poses()[i].t_ns);
+      const Rigid3 difference = parts.poses[i].T_world_rig.inverse() * poses()[i].T_world_rig;
+      EXPECT_LT(difference.translation.norm() + difference.rotation.vec().norm(), 1e-12);
+    }
+  }
+  const RecordingParts m3ed = openHdf5({folder_ / "m3ed"}, {});
+  const Rig rig = rigOfTwo();
+  for (std::size_t i = 0; i < 2; ++i) {
+    const RigCamera& camera = m3ed.calibration.value().rig.cameras.at(i);
+    EXPECT_EQ(camera.model, rig.cameras[i].model);
+    EXPECT_TRUE(camera.T_rig_cam.translation.isApprox(rig.cameras[i].T_rig_cam.translation, 1e-12));
+    EXPECT_TRUE(camera.T_rig_cam.rotation.isApprox(rig.cameras[i].T_rig_cam.rotation, 1e-12));
+  }
+  const RecordingParts metavision = openHdf5({folder_ / "metavision/left.h5"}, {});
+  EXPECT_EQ(metavision.cameras[0]->size().value().height, 260);
+}
+
+TEST_F(Hdf5Layouts, DamagedFilesAreReadOrRefused) {
+  for (const char* name : {"dsec/events/left/events.h5", "m3ed/desk_data.h5",
+                           "m3ed/desk_pose_gt.h5", "mvsec/desk_data.hdf5"}) {
+    readDamaged(readBytes(folder_ / "small" / name), folder_ / "damaged.h5", "hdf5");
+  }
+}
+
+/// Files that a test writes.
+class Hdf5Events : public TemporaryFolder {
+ protected:
+  fs::path file() const { return folder() / "events.h5"; }
+
+  /// Writes data sets, not compressed.
+  class Writing {
+   public:
+    explicit Writing(const fs::path& file)
+        : id_(H5Fcreate(file.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose) {}
+
+    template <typename Number>
+    void add(const char* path, hid_t type, const std::vector<Number>& numbers,
+             std::vector<hsize_t> sides = {}, hid_t creation = H5P_DEFAULT) {
+      if (sides.empty()) sides = {numbers.size()};
+      const Hdf5Id links(H5Pcreate(H5P_LINK_CREATE), H5Pclose);
+      H5Pset_create_intermediate_group(links.get(), 1);
+      const Hdf5Id space(H5Screate_simple(static_cast<int>(sides.size()), sides.data(), nullptr),
+                         H5Sclose);
+      const Hdf5Id set(
+          H5Dcreate2(id_.get(), path, type, space.get(), links.get(), creation, H5P_DEFAULT),
+          H5Dclose);
+      ASSERT_TRUE(set.valid()) << path;
+      if (!numbers.empty()) {
+        ASSERT_GE(H5Dwrite(set.get(), memoryType<Number>(), H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                           numbers.data()),
+                  0);
+      }
+    }
+
+   private:
+    template <typename Number>
+    static hid_t memoryType() {
+      return std::is_same_v<Number, double> ? H5T_NATIVE_DOUBLE : H5T_NATIVE_LLONG;
+    }
+    Hdf5Id id_;
+  };
+
+  using Numbers = std::vector<long long>;
+  struct Columns {
+    Numbers x = {1, 2, 3};
+    Numbers y = {4, 5, 6};
+    Numbers t = {0, 1'500, 2'500};
+    Numbers p = {1, 0, 1};
+  };
+  /// DSEC's layout.
+  void write(const Columns& columns) const {
+    Writing writing(file());
+    writing.add("events/x", H5T_STD_U32LE, columns.x);
+    writing.add("events/y", H5T_STD_U16LE, columns.y);
+    writing.add("events/t", H5T_STD_I64LE, columns.t);
+    writing.add("events/p", H5T_STD_I8LE, columns.p);
+  }
+  std::string errorOfFile() const {
+    return errorOf([&] {
+      for (const auto& camera : openHdf5({file()}, {}).cameras) readStream(*camera);
+    });
+  }
+};
+
+TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
+  const std::string place = file().string() + ":/events";
+  const auto check = [&](const Columns& columns, const std::string& expected,
+                         std::size_t events_before) {
+    write(columns);
+    const RecordingParts parts = openHdf5({file()}, {});
+    std::vector<Event> block;
+    EXPECT_EQ(errorOf([&] { parts.cameras.at(0)->read(block); }), expected);
+    EXPECT_EQ(block.size(), events_before);
+  };
+  Columns columns;
+  columns.x = {1, 2, 65'536};
+  check(columns, place + "[2]: x = '65536': expected a whole number from 0 to 65535", 2);
+  columns.p = {1, 2, 0};
+  check(columns, place + "[1]: p = '2': expected polarity 1, 0 or -1", 1);
+  columns.t = {5'000'000'000'000'000, 0, 0};
+  check(columns, place + "[0]: t = '5000000000000000': expected a time before the year 2116", 0);
+}
+
+TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
+  struct Case {
+    std::function<void(Writing&)> write;
+    std::vector<std::string> parts;
+  };
+  const Numbers three = {1, 2, 3};
+  const auto chunked = [](H5Z_filter_t filter) {
+    Hdf5Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    const hsize_t side = 3;
+    H5Pset_chunk(creation.get(), 1, &side);
+    if (filter != 0) H5Pset_filter(creation.get(), filter, H5Z_FLAG_OPTIONAL, 0, nullptr);
+    return creation;
+  };
+  const auto rest = [three](Writing& writing) {
+    writing.add("events/y", H5T_STD_U16LE, three);
+    writing.add("events/t", H5T_STD_I64LE, three);
+    writing.add("events/p", H5T_STD_U8LE, three);
+  };
+  const std::vector<Case> cases = {
+      {[&](Writing& writing) { writing.add("rectify_map", H5T_IEEE_F32LE, three); },
+       {"without events or poses", "/events/x (DSEC", "/CD/events (Metavision)", "/Cn_T_C0"}},
+      {[&](Writing& writing) { writing.add("events/x", H5T_STD_U16LE, three); },
+       {":/events/y: cannot be opened", "expected a data set"}},
+      {[&](Writing& writing) {
+         writing.add("events/x", H5T_STD_U16LE, Numbers{1, 2});
+         rest(writing);
+       },
+       {":/events/y: 3 numbers: expected 2, as many as /events/x has"}},
+      {[&](Writing& writing) { writing.add("events/x", H5T_STD_U16BE, three); },
+       {":/events/x: expected whole numbers", "little-endian"}},
+      {[&](Writing& writing) {
+         const Hdf5Id ecf = chunked(0x8ECF);
+         writing.add("CD/events", H5T_STD_U16LE, three, {}, ecf.get());
+       },
+       {":/CD/events: it is compressed with Prophesee's ECF (0x8ECF)", "hdf5_ecf"}},
+      {[&](Writing& writing) {
+         const Hdf5Id lz4 = chunked(32004);
+         writing.add("events/x", H5T_STD_U16LE, three, {}, lz4.get());
+       },
+       {":/events/x: it is compressed with filter 32004", "HDF5_PLUGIN_PATH"}},
+      {[&](Writing& writing) { writing.add("CD/events", H5T_STD_U16LE, three); },
+       {":/CD/events: expected a list of compound values with a field x"}},
+      {[&](Writing& writing) {
+         const Hdf5Id plain = chunked(0);
+         writing.add("events/x", H5T_STD_U16LE, Numbers{}, {3}, plain.get());
+         rest(writing);
+       },
+       {":/events/x[0]: the chunk is missing: expected a complete file"}},
+      {[&](Writing& writing) {
+         writing.add("davis/left/events", H5T_IEEE_F64LE, std::vector<double>{1, 2, 3}, {1, 3});
+       },
+       {":/davis/left/events: 3 columns: expected 4 or more"}},
+      {[&](Writing& writing) {
+         writing.add("davis/left/events", H5T_IEEE_F64LE,
+                     std::vector<double>{1, 2, std::nan(""), 1}, {1, 4});
+       },
+       {":/davis/left/events[0]: t = 'nan': expected a time"}},
+      {[&](Writing& writing) {
+         writing.add("Cn_T_C0", H5T_IEEE_F64LE, std::vector<double>(16, 0.5), {1, 4, 4});
+         writing.add("ts", H5T_STD_I64LE, Numbers{1});
+       },
+       {":/Cn_T_C0[0]: expected a 4x4 matrix of a rotation and a translation"}},
+      {[&](Writing& writing) {
+         writing.add("Cn_T_C0", H5T_IEEE_F64LE, std::vector<double>(16, 0.5), {1, 4, 4});
+         writing.add("ts", H5T_STD_I64LE, three);
+       },
+       {":/Cn_T_C0: 1 rows of 16 numbers: expected 3 matrices of 4x4 numbers, as many as /ts has"}},
+  };
+  for (const Case& wrong : cases) {
+    {
+      Writing writing(file());
+      wrong.write(writing);
+    }
+    const std::string error = errorOfFile();
+    EXPECT_THAT(error, StartsWith(file().string()));
+    for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
+  }
+  writeFile(file(), "x y t p\n");
+  EXPECT_THAT(errorOfFile(), HasSubstr("expected a complete HDF5 file"));
+}
+
+TEST_F(Hdf5Events, AnIndexThatIsWrongIsNotBelieved) {
+  Columns columns;
+  for (const Numbers& index :
+       {Numbers{0, 3, 3}, Numbers{2, 2, 2}, Numbers{-1, 99, 99}, Numbers{}}) {
+    write(columns);
+    {
+      const Hdf5Id id(H5Fopen(file().c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
+      const hsize_t side = index.size();
+      const Hdf5Id space(H5Screate_simple(1, &side, nullptr), H5Sclose);
+      const Hdf5Id set(H5Dcreate2(id.get(), "ms_to_idx", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
+                                  H5P_DEFAULT, H5P_DEFAULT),
+                       H5Dclose);
+      if (side > 0) {
+        H5Dwrite(set.get(), H5T_NATIVE_LLONG, H5S_ALL, H5S_ALL, H5P_DEFAULT, index.data());
+      }
+    }
+    const RecordingParts parts = openHdf5({file()}, {});
+    parts.cameras[0]->seek(1'200'000);
+    EXPECT_THAT(readStream(*parts.cameras[0]),
+                ElementsAre(Event{1'500'000, 2, 5, false}, Event{2'500'000, 3, 6, true}));
+  }
+}
+
+TEST_F(Hdf5Events, AFolderOfTwoRecordingsIsRefused) {
+  write({});
+  fs::copy_file(file(), folder() / "a-events_left.h5");
+  fs::rename(file(), folder() / "b-events_left.h5");
+  EXPECT_THAT(errorOf([&] { openHdf5({folder()}, {}); }),
+              AllOf(StartsWith((folder() / "b-events_left.h5").string()),
+                    HasSubstr("a second recording"), HasSubstr("a-events_left.h5")));
+}
+
+TEST_F(Hdf5Events, AFolderWithoutEventsOfHdf5IsNone) {
+  write({});
+  fs::rename(file(), folder() / "rectify_map.h5");
+  writeFile(folder() / "events/left/events.h5", "no HDF5");
+  EXPECT_FALSE(looksLikeHdf5(folder()));
+  EXPECT_FALSE(looksLikeHdf5(folder() / "missing"));
+}
+
+/// The writer's folder.
+class Hdf5WriterTest : public TemporaryFolder {
+ protected:
+  fs::path out() const { return folder() / "out"; }
+};
+
+TEST_F(Hdf5WriterTest, TheFolderIsReadBack) {
+  constexpr std::size_t kEvents = 150'000;
+  Rig rig = rigOfTwo();
+  rig.cameras.push_back(rig.cameras[1]);  // silent
+  Hdf5Writer writer(out(), rig);
+  for (std::size_t camera = 0; camera < 2; ++camera) {
+    const std::vector<Event> events = eventsOf(static_cast<std::uint32_t>(camera), kEvents);
+    writer.addEvents(camera, {events.begin(), events.begin() + 70'001});
+    writer.addEvents(camera, {events.begin() + 70'001, events.end()});
+  }
+  writer.addPose({1'700'000'000'123'456'789, rig.cameras[1].T_rig_cam});
+  EXPECT_FALSE(fs::exists(out())) << "not before it is complete";
+  writer.close();
+
+  EXPECT_EQ(detectFormat(out())->name, "hdf5");
+  const RecordingParts parts = openHdf5({out()}, {});
+  ASSERT_EQ(parts.cameras.size(), 3U);
+  EXPECT_EQ(parts.calibration.value().rig.cameras.size(), 3U);
+  ASSERT_EQ(parts.poses.size(), 1U);
+  EXPECT_EQ(parts.poses[0].t_ns, 1'700'000'000'123'456'789);
+  for (std::uint32_t camera = 0; camera < 2; ++camera) {
+    EXPECT_TRUE(readStream(*parts.cameras[camera]) == eventsOf(camera, kEvents));
+  }
+  EXPECT_TRUE(readStream(*parts.cameras[2]).empty());
+  EXPECT_THAT(errorOf([&] { Hdf5Writer again(out(), rig); }),
+              AllOf(StartsWith(out().string()), HasSubstr("not an empty folder")));
+}
+
+TEST_F(Hdf5WriterTest, TheIndexIsTheFirstEventOfEachMillisecond) {
+  Hdf5Writer writer(out(), {{rigOfTwo().cameras[0]}});
+  std::vector<Event> events;
+  for (const std::int64_t t_us : {7'777, 7'778, 8'777, 8'777, 11'776, 11'777}) {
+    events.push_back({t_us * 1'000, 1, 2, true});
+  }
+  writer.addEvents(0, events);
+  writer.close();
+  const auto file = std::make_shared<const Hdf5File>(out() / "events/left/events.h5");
+  EXPECT_EQ(file->integer("/t_offset"), 7'777);
+  EXPECT_THAT(file->numbers("/ms_to_idx", 5, "of events"), ElementsAre(0, 2, 4, 4, 5));
+}
+
+TEST_F(Hdf5WriterTest, TimesThatTheLayoutCannotHoldAreErrors) {
+  Hdf5Writer writer(out(), {{rigOfTwo().cameras[0]}});
+  writer.addEvents(0, {{1'000'000'000}});
+  EXPECT_THAT(errorOf([&] { writer.addEvents(0, {{1'000'001'500}}); }),
+              AllOf(HasSubstr("events/left/events.h5: event 1 at 1.000001500 s"),
+                    HasSubstr("whole microseconds")));
+  EXPECT_THAT(errorOf([&] { writer.addEvents(0, {{4'295'968'000'000}}); }),
+              HasSubstr("within 71 minutes"));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Text events of other layouts than t x y p.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/readers/recording_formats.h"
+#include "plugin/streams/event_packets.h"
+#include "plugin/text/event_text.h"
+#include "test/plugin/formats/files.h"
+#include "test/plugin/numpy/zip_file.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::vector<Event> allEventsOf(EventStream& stream) {
+  std::vector<Event> all;
+  std::vector<Event> block;
+  while (stream.read(block)) all.insert(all.end(), block.begin(), block.end());
+  return all;
+}
+
+class EventColumnsText : public TemporaryFolder {
+ protected:
+  std::filesystem::path write(const std::string& text, const char* name = "e.txt") const {
+    writeFile(folder() / name, text);
+    return folder() / name;
+  }
+  std::string errorOfText(const std::string& text, const ReaderOptions& options = {}) const {
+    return errorOf([&] {
+      EventTextStream stream(write(text), options);
+      allEventsOf(stream);
+    });
+  }
+};
+
+TEST_F(EventColumnsText, OrderUnitAndPolarityAreThoseOfTheHeaderOrTheOptions) {
+  const std::vector<Event> expected = {{1'000'000, 12, 34, true}, {2'001'000, 239, 0, false}};
+  const struct {
+    const char* text;
+    const char* columns;
+    const char* time_unit;
+  } rows[] = {
+      {"0.001 12 34 1\n0.002001 239 0 -1\n", "", ""},
+      {"240 180\n0.001 12 34 1\n0.002001 239 0 0\n", "", ""},
+      {"t,x,y,p\n0.001,12,34,1\n0.002001,239,0,0\n", "", ""},
+      {"x,y,pol,timestamp_us\r\n12,34,1,1000\r\n239,0,0,2001\r\n", "", ""},
+      {"# x [px], y [px], p, t [us]\n12, 34, 1, 1000\n239 ,0, -1, 2001\n", "", ""},
+      {"frame;polarity;x;y;time (ns)\n7;1;12;34;1000000\n8;0;239;0;2001000\n", "", ""},
+      {"# recorded on Monday\nevents of camera\n0.001 12 34 1\n0.002001 239 0 0\n", "", ""},
+      {"12 34 0.001 1\n239 0 0.002001 0\n", "x y t p", ""},
+      {"12 34 9 1 1\n239 0 9 2.001 -1\n", "x,y,-,t,p", "ms"},
+      {"1000 12 34 1\n2001 239 0 0\n", "", "us"},
+      {"1000000\t12  34 1\n2001000 239 0 0 # late\n", "", "ns"},
+      {"1.0 12 34 1\n2.001 239 0 0", "", "ms"},
+  };
+  for (const auto& row : rows) {
+    EventTextStream stream(write(row.text), ReaderOptions{{}, row.columns, row.time_unit});
+    const std::vector<Event> events = allEventsOf(stream);
+    EXPECT_TRUE(events == expected) << row.text << events.size();
+  }
+  EventTextStream sized(write("240 180\n0.001 12 34 1\n"));
+  ASSERT_TRUE(sized.size());
+  EXPECT_EQ(sized.size()->width, 240);
+  EXPECT_EQ(sized.size()->height, 180);
+}
+
+TEST_F(EventColumnsText, TheUnitOfWholeNumbersIsToldOrCertain) {
+  std::string small;
+  std::string large;
+  for (int i = 0; i < 12; ++i) {
+    small += std::to_string(1'000'000 + i) + " 1 2 0\n";
+    large += std::to_string(1'700'000'000'000'000'000 + i) + " 1 2 0\n";
+  }
+  EXPECT_THAT(errorOfText(small),
+              AllOf(HasSubstr("e.txt: all times are whole numbers"), HasSubstr("--time-unit")));
+  EventTextStream stream(write(large));
+  EXPECT_EQ(allEventsOf(stream).at(1).t_ns, 1'700'000'000'000'000'001);
+}
+
+TEST_F(EventColumnsText, AnErrorNamesTheLineTheColumnAndTheOption) {
+  EXPECT_THAT(errorOfText("t,x,y,p\n0.1,1,2,0\n0.2,1,,0\n"), HasSubstr("e.txt:3: y = ''"));
+  EXPECT_THAT(errorOfText("t,x,y,p\n0.1,1,2\n"),
+              HasSubstr("e.txt:2: '0.1,1,2': expected 4 fields"));
+  EXPECT_THAT(errorOfText("x y t p\n1 2 a 0\n"), HasSubstr("e.txt:2: t = 'a': expected a time"));
+  EXPECT_THAT(errorOfText("1 2 1 0.5\n"), HasSubstr("--event-columns"));
+  EXPECT_THAT(errorOfText("0.1 1 2 0\n240 180\n"), HasSubstr("e.txt:2: '240 180': expected 4"));
+  for (const char* wrong : {"x y t", "x y t p p", "x y t q", "t x y p z"}) {
+    EXPECT_THAT(errorOfText("0.1 1 2 0\n", ReaderOptions{{}, wrong, {}}),
+                AllOf(HasSubstr("--event-columns"), HasSubstr(wrong)));
+  }
+}
+
+std::string manyLines(int count) {
+  std::string text;
+  for (int i = 0; i < count; ++i) {
+    text += formatSeconds(1'000'000'000 + i * std::int64_t{10'000}) + " " +
+            std::to_string(i % 240) + " 7 1\n";
+  }
+  return text;
+}
+
+TEST_F(EventColumnsText, CompressedTextHasTheEventsOfTheText) {
+  const std::string text = manyLines(100'000);
+  EventTextStream plain(write(text));
+  const std::vector<Event> expected = allEventsOf(plain);
+  ASSERT_EQ(expected.size(), 100'000U);
+  writeGzip(folder() / "events.txt.gz", text);
+  writeZip(folder() / "events.zip", {{"events.txt", text}});
+  for (const char* name : {"events.txt.gz", "events.zip"}) {
+    EventTextStream stream(folder() / name);
+    stream.seek(1'500'000'000);
+    EXPECT_TRUE(allEventsOf(stream) == expected) << name;
+    EXPECT_NEAR(stream.progress(), 1, 0.01) << name;
+    ASSERT_NE(detectFormat(folder() / name), nullptr) << name;
+    EXPECT_EQ(detectFormat(folder() / name)->name, "text") << name;
+  }
+  std::filesystem::resize_file(folder() / "events.txt.gz",
+                               std::filesystem::file_size(folder() / "events.txt.gz") / 2);
+  EXPECT_THAT(errorOf([&] {
+                EventTextStream stream(folder() / "events.txt.gz");
+                allEventsOf(stream);
+              }),
+              HasSubstr("events.txt.gz: cannot be unpacked to its end"));
+}
+
+TEST_F(EventColumnsText, SeekingLeavesOutNothingAndReadsLittle) {
+  std::string text = manyLines(400'000);  // 4 s in 7 MB, with comments and late events
+  text += "# the end\n4.999900000 1 1 0\n5.000100000 2 2 0\n4.995 3 3 0\n5.0002 4 4 0\n";
+  const std::filesystem::path file = write(text);
+  EventTextStream whole(file);
+  const std::vector<Event> all = allEventsOf(whole);
+  for (const std::int64_t t_ns : {-1'000'000'000L, 1'000'000'000L, 1'000'010'000L, 2'345'678'000L,
+                                  4'990'000'000L, 5'000'050'000L, 9'000'000'000L}) {
+    EventTextStream stream(file);
+    stream.seek(t_ns);
+    const std::vector<Event> found = allEventsOf(stream);
+    ASSERT_LE(found.size(), all.size()) << t_ns;
+    const auto left_out = static_cast<std::ptrdiff_t>(all.size() - found.size());
+    EXPECT_TRUE(std::equal(found.begin(), found.end(), all.begin() + left_out)) << t_ns;
+    for (auto event = all.begin(); event != all.begin() + left_out; ++event) {
+      ASSERT_LT(event->t_ns, t_ns) << t_ns;
+    }
+    const auto needed = std::count_if(all.begin(), all.end(),
+                                      [&](const Event& event) { return event.t_ns >= t_ns; });
+    EXPECT_LT(static_cast<std::ptrdiff_t>(found.size()) - needed, 10'000) << t_ns;
+  }
+  writeFile(file, text + "5.1 1 2\n");
+  EventTextStream damaged(file);
+  damaged.seek(4'000'000'000);
+  EXPECT_THAT(errorOf([&] { allEventsOf(damaged); }),
+              AllOf(HasSubstr("e.txt: line "), HasSubstr(" after byte "), HasSubstr("'5.1 1 2'")));
+}
+
+TEST_F(EventColumnsText, OnlyLinesOfEventsAreEventText) {
+  const struct {
+    const char* text;
+    bool is;
+  } rows[] = {{"0.1 1 2 0\n", true},
+              {"240 180\n0.1 1 2 0\n", true},
+              {"x,y,p,t\n1,2,0,0.5\n", true},
+              {"# a\n0.1,1,2,0\n", true},
+              {"", false},
+              {"1 0 0 0 0 0 0 1\n", false},
+              {"hello world\n", false},
+              {"{\"a\": 1}\n", false},
+              {"200 200 120 90 0 0 0 0 0\n", false}};
+  for (const auto& row : rows) {
+    EXPECT_EQ(looksLikeEventText(write(row.text)), row.is) << row.text;
+  }
+  EXPECT_FALSE(looksLikeEventText(folder()));
+  EXPECT_FALSE(looksLikeEventText(folder() / "nowhere"));
+  EXPECT_FALSE(looksLikeEventText(write(std::string("0.1 1 2 0\n\0", 11))));
+}
+
+}  // namespace
+}  // namespace efm

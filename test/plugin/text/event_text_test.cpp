@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/text/event_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <rapidcheck/gtest.h>
+#include <algorithm>
+#include <random>
+#include <string>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/streams/event_packets.h"
+#include "test/plugin/formats/files.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+
+// Where GoogleTest looks for it.
+static std::ostream& operator<<(std::ostream& stream, const Event& event) {
+  return stream << formatSeconds(event.t_ns) << " " << event.x << " " << event.y << " "
+                << event.polarity;
+}
+
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::StartsWith;
+
+EventPackets open(const std::filesystem::path& file) {
+  return EventPackets(std::make_unique<EventTextStream>(file), {240, 180});
+}
+
+std::vector<Event> readAll(EventPackets& reader) {
+  std::vector<Event> events;
+  for (std::vector<Event> packet = reader.nextPacket(); !packet.empty();
+       packet = reader.nextPacket()) {
+    events.insert(events.end(), packet.begin(), packet.end());
+  }
+  return events;
+}
+
+std::string textOf(const std::vector<Event>& events) {
+  std::string text;
+  for (const Event& event : events) {
+    text += formatSeconds(event.t_ns) + " " + std::to_string(event.x) + " " +
+            std::to_string(event.y) + (event.polarity ? " 1\n" : " 0\n");
+  }
+  return text;
+}
+
+class EventText : public TemporaryFolder {
+ protected:
+  std::filesystem::path file() const { return folder() / "events.txt"; }
+
+  std::vector<Event> read(const std::string& text) const {
+    writeFile(file(), text);
+    EventPackets reader = open(file());
+    return readAll(reader);
+  }
+  std::string errorOfText(const std::string& text) const {
+    return errorOf([&] { read(text); });
+  }
+  /// What an error about a line begins with.
+  std::string line(int number) const { return file().string() + ":" + std::to_string(number); }
+};
+
+TEST_F(EventText, HasTimePixelAndPolarityInThisOrder) {
+  EXPECT_THAT(read("0.003811000 96 133 0\n0.003820001 127 171 1\n"),
+              ElementsAre(Event{3'811'000, 96, 133, false}, Event{3'820'001, 127, 171, true}));
+}
+
+TEST_F(EventText, TimesOfTodayAreExact) {
+  EXPECT_THAT(read("1700000000.123456789 0 0 1\n1700000000.123456790 0 0 1\n"),
+              ElementsAre(Event{1'700'000'000'123'456'789, 0, 0, true},
+                          Event{1'700'000'000'123'456'790, 0, 0, true}));
+}
+
+TEST_F(EventText, TimesMayHaveAnyNumberOfDecimalsASignOrAnExponent) {
+  EXPECT_THAT(read("-1.5 0 0 0\n-0 0 0 0\n.5 0 0 0\n1 0 0 0\n1. 0 0 0\n1.25 0 0 0\n"
+                   "1.3333333336 0 0 0\n1.5e0 0 0 0\n00000000002.0 0 0 0\n"),
+              ElementsAre(Event{-1'500'000'000}, Event{0}, Event{500'000'000}, Event{1'000'000'000},
+                          Event{1'000'000'000}, Event{1'250'000'000}, Event{1'333'333'334},
+                          Event{1'500'000'000}, Event{2'000'000'000}));
+}
+
+TEST_F(EventText, BlanksCommentsAndLineEndsAreIgnored) {
+  EXPECT_THAT(read("# t x y p\r\n\r\n\n  0.1\t1  2\t 0 \r\n0.2 3 4 1\r\n0.3 5 6 0 # dust\n \t\n"),
+              ElementsAre(Event{100'000'000, 1, 2, false}, Event{200'000'000, 3, 4, true},
+                          Event{300'000'000, 5, 6, false}));
+}
+
+TEST_F(EventText, TheLastLineNeedsNoNewline) {
+  EXPECT_THAT(read("0.1 1 2 0\n0.2 3 4 1"),
+              ElementsAre(Event{100'000'000, 1, 2, false}, Event{200'000'000, 3, 4, true}));
+}
+
+TEST_F(EventText, AnEmptyFileHasNoEvents) {
+  EXPECT_THAT(read(""), IsEmpty());
+  EXPECT_THAT(read("# nothing\n\n"), IsEmpty());
+}
+
+TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
+  struct Case {
+    const char* text;
+    int line;
+    std::vector<std::string> parts;
+  };
+  const Case cases[] = {
+      {"0.1 1 2 0\n0.2 3 4", 2, {"'0.2 3 4'", "expected t x y p", "the file ends within the line"}},
+      {"0.", 1, {"the file ends"}},
+      {"0.1 1 2 0\n\n0.2 3 1\n", 3, {"'0.2 3 1': expected 4 fields", "not 3"}},
+      {"0.1 1 2 0 7\n", 1, {"expected 4 fields", "not 5"}},
+      {"0.1 1 2 0\nabc 1 2 0\n", 2, {"t = 'abc': expected a time"}},
+      {"0.1s 1 2 0\n", 1, {"t = '0.1s': expected a time"}},
+      {"nan 1 2 0\n", 1, {"t = 'nan': expected a time"}},
+      {"99999999999 1 2 0\n", 1, {"t = '99999999999': expected a time"}},
+      {"0.1 1.5 2 0\n", 1, {"x = '1.5': expected a whole number"}},
+      {"0.1 1 0x2 0\n", 1, {"y = '0x2': expected a whole number"}},
+      {"0.1 1 2 0\n0.1 240 2 0\n", 2, {"x = '240': expected", "0 to 239", "240x180"}},
+      {"0.1 1 180 0\n", 1, {"y = '180': expected", "0 to 179", "240x180"}},
+      {"0.1 -1 0 0\n", 1, {"x = '-1': expected"}},
+      {"0.1 65536 0 0\n", 1, {"x = '65536': expected"}},
+      {"0.1 4294967296 0 0\n", 1, {"x = '4294967296': expected"}},
+      {"0.1 1 2 2\n", 1, {"p = '2'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 -0\n", 1, {"p = '-0'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 01\n", 1, {"p = '01'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 10\n", 1, {"p = '10'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 true\n", 1, {"p = 'true'", "expected polarity 0 or 1"}},
+      {"0.020 1 0 0\n0.009999999 2 0 0\n",
+       2,
+       {"t = '0.009999999': expected", "at most 10 ms", "0.020000000"}}};
+  for (const Case& wrong : cases) {
+    const std::string error = errorOfText(wrong.text);
+    EXPECT_THAT(error, StartsWith(line(wrong.line)));
+    for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
+  }
+  EXPECT_THAT(read("0.1 239 179 0\n"), ElementsAre(Event{100'000'000, 239, 179, false}));
+}
+
+TEST_F(EventText, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
+  writeFile(file(), "0.020 1 0 0\n0.010 2 0 0\n0.015 3 0 0\n0.020 4 0 0\n0.025 5 0 0\n");
+  EventPackets reader = open(file());
+  EXPECT_THAT(readAll(reader),
+              ElementsAre(Event{10'000'000, 2}, Event{15'000'000, 3}, Event{20'000'000, 1},
+                          Event{20'000'000, 4}, Event{25'000'000, 5}));
+  EXPECT_EQ(reader.sortedEvents(), 2U);
+}
+
+TEST_F(EventText, PacketsAreThePeriodsOfTheGridWithEvents) {
+  writeFile(file(), "-0.001 0 0 0\n0 1 0 0\n0.009999999 2 0 0\n0.01 3 0 0\n7.123 4 0 0\n");
+  EventPackets reader = open(file());
+  EXPECT_EQ(reader.nextTime(), -1'000'000);
+  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{-1'000'000, 0}));
+  EXPECT_EQ(reader.nextTime(), 0);
+  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{0, 1}, Event{9'999'999, 2}));
+  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{10'000'000, 3}));
+  EXPECT_EQ(reader.nextTime(), 7'123'000'000);
+  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{7'123'000'000, 4}));
+  EXPECT_EQ(reader.nextTime(), std::nullopt);
+  EXPECT_THAT(reader.nextPacket(), IsEmpty());
+  EXPECT_THAT(reader.nextPacket(), IsEmpty());
+}
+
+TEST_F(EventText, ManyBlocksAreReadCompletelyAndOnDemand) {
+  std::vector<Event> events;
+  events.reserve(300'000);
+  for (int i = 0; i < 300'000; ++i) {
+    events.push_back({1'700'000'000'000'000'000 + i * std::int64_t{1'009},
+                      static_cast<std::uint16_t>(i * 7 % 240),
+                      static_cast<std::uint16_t>(i * 11 % 180), i % 3 == 0});
+  }
+  writeFile(file(), textOf(events));  // 9 MB
+  EventPackets reader = open(file());
+  EXPECT_EQ(reader.stream().progress(), 0);
+  std::vector<Event> read = reader.nextPacket();
+  EXPECT_LT(reader.stream().progress(), 0.5);
+  const std::vector<Event> rest = readAll(reader);
+  read.insert(read.end(), rest.begin(), rest.end());
+  EXPECT_TRUE(read == events);
+  EXPECT_EQ(reader.stream().progress(), 1);
+}
+
+TEST_F(EventText, LateEventsAreSortedAcrossBlocksAndStably) {
+  std::vector<Event> events;
+  events.reserve(200'000);
+  std::mt19937 random(1);
+  for (std::int64_t i = 0; i < 200'000; ++i) {  // 2 s in 4 MB
+    const std::int64_t late_ms = random() % 11;
+    events.push_back({(1000 + i / 100 - late_ms) * 1'000'000, static_cast<std::uint16_t>(i % 240),
+                      static_cast<std::uint16_t>(i / 240 % 180), false});
+  }
+  writeFile(file(), textOf(events));
+  EventPackets reader = open(file());
+  const std::vector<Event> read = readAll(reader);
+  std::stable_sort(events.begin(), events.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  EXPECT_TRUE(read == events);
+}
+
+TEST_F(EventText, AnErrorBehindManyBlocksNamesItsLine) {
+  std::string text;
+  for (int i = 0; i < 150'000; ++i) text += "1700000000.123456789 12 34 1\n";
+  EXPECT_THAT(errorOfText(text + "1700000000.2 12 340 1\n"),
+              AllOf(StartsWith(line(150'001)), HasSubstr("'340'")));
+}
+
+TEST_F(EventText, EventsAboveAWrongLineComeBeforeTheError) {
+  std::vector<Event> events;
+  for (std::int64_t i = 0; i < 5000; ++i) {  // 5 s; disorder that is sorted, too
+    const std::int64_t late_ms = i % 7 == 0 ? 3 : 0;
+    events.push_back({(i - late_ms) * 1'000'000, static_cast<std::uint16_t>(i % 240), 7, true});
+  }
+  const std::string good = textOf(events);
+  std::stable_sort(events.begin(), events.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  for (const std::string& bad :
+       {std::string("garbage\n"), std::string("0.0 1 2 1\n"), std::string("5.1 1"),
+        std::string("5.1 240 2 1\n5.2 1 2 1\n"), std::string(3 << 20, 'x')}) {
+    writeFile(file(), good + bad);
+    EventPackets reader = open(file());
+    std::vector<Event> given;
+    const std::string error = errorOf([&] {
+      while (reader.nextTime()) {
+        for (const Event& event : reader.nextPacket()) given.push_back(event);
+      }
+    });
+    EXPECT_TRUE(given == events) << given.size() << " of " << events.size() << " events";
+    EXPECT_THAT(error, StartsWith(line(5001)));
+    EXPECT_EQ(errorOf([&] { reader.nextPacket(); }), error) << "it stays";
+  }
+}
+
+TEST_F(EventText, TheErrorOfABinaryFileHasNoControlCharacters) {
+  EXPECT_THAT(errorOfText(std::string(3 << 20, '\x1b')),
+              AllOf(StartsWith(line(1)), HasSubstr("\\x1b\\x1b"), HasSubstr("1048576 bytes"),
+                    testing::Not(HasSubstr("\x1b"))));
+}
+
+TEST_F(EventText, AMissingFileIsNamed) {
+  EXPECT_THAT(errorOf([&] { open(file()); }),
+              AllOf(StartsWith(file().string()), HasSubstr("cannot be opened")));
+  EXPECT_THAT(errorOf([&] { open(folder()); }),
+              AllOf(StartsWith(folder().string()), HasSubstr("cannot be opened")));
+}
+
+/// For properties, which are no fixtures.
+std::filesystem::path propertyFile() {
+  return std::filesystem::temp_directory_path() /
+         ("efm_event_text_" + std::to_string(getpid()) + ".txt");
+}
+
+RC_GTEST_PROP(EventTextProperty, WrittenEventsAreReadBackInTimeOrder, ()) {
+  std::int64_t t_ns = *rc::gen::inRange<std::int64_t>(-1'000'000'000, 1'800'000'000'000'000'000);
+  std::vector<Event> events;
+  const int count = *rc::gen::inRange(1, 200);
+  std::int64_t newest_ns = t_ns;
+  std::uint64_t late = 0;
+  for (int i = 0; i < count; ++i) {
+    t_ns = newest_ns + *rc::gen::inRange<std::int64_t>(-kMaxEventDelayNs, 20'000'000);
+    if (i == 0) newest_ns = t_ns;
+    late += t_ns < newest_ns ? 1 : 0;
+    newest_ns = std::max(newest_ns, t_ns);
+    events.push_back({t_ns, *rc::gen::inRange<std::uint16_t>(0, 240),
+                      *rc::gen::inRange<std::uint16_t>(0, 180), *rc::gen::arbitrary<bool>()});
+  }
+  writeFile(propertyFile(), textOf(events));
+
+  EventPackets reader = open(propertyFile());
+  std::vector<Event> read;
+  for (std::vector<Event> packet = reader.nextPacket(); !packet.empty();
+       packet = reader.nextPacket()) {
+    RC_ASSERT(packet.back().t_ns - packet.front().t_ns < kPacketPeriodNs);
+    read.insert(read.end(), packet.begin(), packet.end());
+  }
+  std::filesystem::remove(propertyFile());
+
+  std::stable_sort(events.begin(), events.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  RC_ASSERT(read == events);
+  RC_ASSERT(reader.sortedEvents() == late);
+}
+
+}  // namespace
+}  // namespace efm
