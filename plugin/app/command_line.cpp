@@ -12,6 +12,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
+#include "plugin/app/config_files.h"
 #include "plugin/app/evaluate_arguments.h"
 #include "plugin/app/export_command.h"
 #include "plugin/app/import_command.h"
@@ -168,15 +169,40 @@ void addPacketLength(CLI::App& command, std::int64_t& packet_ns) {
       ->type_name("SECONDS");
 }
 
+/// The names of the program's option files, for a help text.
+std::string configList() {
+  std::string list;
+  for (const std::string& name : configNames()) list += (list.empty() ? "" : ", ") + name;
+  return list.empty() ? "" : " (" + list + ")";
+}
+
+/// An option file before the sources is CONFIG.
+void takeConfig(MappingArguments& arguments) {
+  auto& files = arguments.source.files;
+  if (files.front().extension() != ".ini") return;
+  if (!arguments.config.empty()) {
+    throw CLI::ValidationError("--config", "a second option file: " + files.front().string());
+  }
+  arguments.config = files.front().string();
+  files.erase(files.begin());
+  if (files.empty()) throw CLI::RequiredError("SOURCE");
+}
+
 void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
-  command
-      .add_option("CONFIG", arguments.config,
-                  "The option file (.ini); config/default.ini has all keys")
-      ->required();
   addSource(command, arguments);
-  command.add_option("--out", arguments.out, "Folder for the results; created if missing")
-      ->required()
+  command.get_option("SOURCE")->description("[CONFIG.ini] SOURCE...: the option file, if any; " +
+                                            command.get_option("SOURCE")->get_description());
+  command
+      .add_option("--config", arguments.config,
+                  "The option file, in place of CONFIG.ini: a file, or a name" + configList() +
+                      "; the default has all keys")
+      ->type_name("NAME|FILE");
+  command
+      .add_option("-o,--out", arguments.out,
+                  "Folder for the results; an earlier result is replaced (default: named after the "
+                  "recording, in the working folder)")
       ->type_name("DIR");
+  command.add_flag("--force", arguments.force, "Write into a folder that holds other files");
   command
       .add_option("--set", arguments.sets,
                   "Overrides one option of CONFIG, e.g. --set dsi.num_planes=200; may be repeated")
@@ -318,6 +344,7 @@ void addMap(CLI::App& app, Run& run) {
   auto arguments = argumentsOf(command, run, runMap);
   addMappingArguments(command, *arguments);
   addTimeLimits(command, *arguments);
+  command.parse_complete_callback([arguments] { takeConfig(*arguments); });
 }
 
 void addDepth(CLI::App& app, Run& run) {
@@ -329,6 +356,7 @@ void addDepth(CLI::App& app, Run& run) {
   addTime(command, "--ref-time", arguments->t_ref,
           "Time of the reference view; by default the middle of the window");
   command.parse_complete_callback([arguments] {
+    takeConfig(*arguments);
     if (!arguments->times.t1 && !arguments->times.duration_ns) throw CLI::RequiredError("--t1");
   });
   command.add_flag("--save-dsi", arguments->save_dsi,

@@ -8,10 +8,14 @@
 #include <initializer_list>
 #include <iostream>
 #include <memory>
+#include <stdexcept>
+#include <string>
+#include <system_error>
 
 #include "mapping/geometry/timestamp.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/outlier_removal.h"
+#include "plugin/app/config_files.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
 #include "plugin/output/keyframe_writer.h"
@@ -23,7 +27,7 @@ namespace {
 
 EventFusionOptions optionsOf(const MappingArguments& arguments) {
   OptionReader reader;
-  reader.readFile(arguments.config);
+  if (!arguments.config.empty()) reader.readFile(findConfig(arguments.config));
   for (const std::string& assignment : arguments.sets) reader.set(assignment);
   EventFusionOptions options = reader.options();
   if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
@@ -133,6 +137,27 @@ std::unique_ptr<Recording> openWhole(RecordingSource source) {
   return openRecording(source);
 }
 
+/// "NAME_map" or "NAME_depth" in the working folder, after the first source.
+std::filesystem::path outputFolder(const MappingArguments& arguments, OutputKind kind) {
+  if (!arguments.out.empty()) return arguments.out;
+  std::filesystem::path source = std::filesystem::absolute(arguments.source.files.at(0));
+  source = source.lexically_normal();
+  if (!source.has_filename()) source = source.parent_path();  // a trailing slash
+  const bool is_folder = std::filesystem::is_directory(source);
+  const std::string name = (is_folder ? source.filename() : source.stem()).string();
+  return name + (kind == OutputKind::kMap ? "_map" : "_depth");
+}
+
+/// A folder that holds something else than an earlier result is probably a mistake.
+void refuseForeignFolder(const std::filesystem::path& folder, bool force) {
+  std::error_code ignored;
+  if (force || !std::filesystem::is_directory(folder, ignored)) return;
+  if (std::filesystem::is_empty(folder) || MapOutput::holdsResult(folder)) return;
+  throw std::runtime_error(folder.string() +
+                           ": holds other files than a map's: expected a new folder, an empty one, "
+                           "one of an earlier result, or --force");
+}
+
 /// Runs a job and writes its results.
 /// @param kind of the output folder.
 /// @param take receives each keyframe, in order, in a thread of its own.
@@ -149,7 +174,9 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     const RecordingSource source = sourceOf(arguments, job.options);
     job.sequence_maximum = sequenceMaximumOf(source, job.options);
     const std::unique_ptr<Recording> recording = openRecording(source);
-    output.emplace(arguments.out, kind, job.options.mapper.keyframe.planes);
+    const std::filesystem::path folder = outputFolder(arguments, kind);
+    refuseForeignFolder(folder, arguments.force);
+    output.emplace(folder, kind, job.options.mapper.keyframe.planes);
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) { take(*output, keyframe); });
     job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { writer.add(keyframe); };
     job.processor_clock = [&] { return processSeconds() - writer.cpuSeconds(); };
@@ -209,7 +236,7 @@ int runDepth(const DepthArguments& arguments) {
   std::unique_ptr<NpyDsiFile> dsi;
   if (arguments.save_dsi) {
     job.make_dsi_sink = [&](const ReferenceView& view) {
-      dsi = std::make_unique<NpyDsiFile>(arguments.out / "dsi.npy",
+      dsi = std::make_unique<NpyDsiFile>(outputFolder(arguments, OutputKind::kDepth) / "dsi.npy",
                                          options.mapper.keyframe.planes.num_planes, view);
       return dsi.get();
     };

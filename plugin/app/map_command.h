@@ -13,10 +13,12 @@ namespace efm {
 
 /// The common arguments of `map` and `depth`.
 struct MappingArguments {
-  std::filesystem::path config;
+  /// The option file, its name without ".ini" (see `findConfig`), or empty: the defaults.
+  std::string config;
   RecordingSource source;
-  TimeArguments times;  ///< Of the window, for `depth`.
-  std::filesystem::path out;
+  TimeArguments times;            ///< Of the window, for `depth`.
+  std::filesystem::path out;      ///< Empty: named after the recording, in the working folder.
+  bool force = false;             ///< Write into a folder that holds other files.
   std::vector<std::string> sets;  ///< section.key=value
 };
 

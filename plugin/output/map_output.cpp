@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/output/map_output.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -118,6 +119,13 @@ MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
                      const DepthPlanesOptions& limits)
     : folder_(std::move(folder)), kind_(kind), limits_(limits) {
   makeFolder(folder_);
+}
+
+bool MapOutput::holdsResult(const std::filesystem::path& folder) {
+  const auto has = [&](std::string_view name) { return std::filesystem::exists(folder / name); };
+  return has("keyframes") || std::any_of(kMapFiles.begin(), kMapFiles.end(), has) ||
+         std::any_of(kDepthFiles.begin(), kDepthFiles.end(), has) ||
+         std::any_of(kImages.begin(), kImages.end(), has);
 }
 
 /// A map of five keyframes must not show two of an earlier map of seven.

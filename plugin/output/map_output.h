@@ -34,6 +34,9 @@ class MapOutput {
   /// @throws std::runtime_error where the folder cannot be made.
   MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits);
 
+  /// Whether a folder has a file or a folder that a MapOutput of either kind may have written.
+  static bool holdsResult(const std::filesystem::path& folder);
+
   /// Writes the keyframe's four images below keyframes/.
   void writeKeyframe(const KeyframeDepthMap& keyframe);
   /// Writes the four images straight into the folder: for a folder of one keyframe.

@@ -137,5 +137,33 @@ TEST_F(MapOptions, SubintervalsOfEveryKindMapTheRecording) {
   }
 }
 
+TEST_F(MapOptions, OneLineIsEnough) {
+  write(SyntheticRecording());
+  const std::string defaults = " --set dsi.num_planes=20";
+  ASSERT_EQ(run("map " EFM_SOURCE_DIR "/config/default.ini data --out out" + defaults).status, 0);
+  const std::string map = contentOf("out/map.pcd");
+  ASSERT_EQ(run("map data" + defaults).status, 0);
+  EXPECT_EQ(contentOf("data_map/map.pcd"), map);
+  ASSERT_EQ(run("map --config default data/ -o again" + defaults).status, 0);
+  EXPECT_EQ(contentOf("again/map.pcd"), map);
+  EXPECT_EQ(run("depth data/ --t0 +0.1 --duration 0.2" + defaults).status, 0);
+  EXPECT_TRUE(exists(folder() / "data_depth" / "depth.tiff"));
+  EXPECT_THAT(errorOf("map --config nothing data"), HasSubstr("one of davis240c_rpg, "));
+  EXPECT_THAT(errorOf("map --config default rig.ini data"), HasSubstr("a second option file"));
+  EXPECT_THAT(errorOf("map rig.ini"), HasSubstr("SOURCE"));
+  EXPECT_THAT(errorOf("map nowhere.ini data"), HasSubstr("nowhere.ini"));
+}
+
+TEST_F(MapOptions, AFolderWithOtherFilesIsRefused) {
+  write(SyntheticRecording());
+  write("thesis/chapter1.tex", "valuable");
+  const std::string command = "map rig.ini data --out thesis";
+  EXPECT_THAT(errorOf(command), HasSubstr("thesis: holds other files than a map's"));
+  EXPECT_EQ(filesIn("thesis").size(), 1U);
+  EXPECT_EQ(run(command + " --force").status, 0);
+  EXPECT_EQ(run(command).status, 0) << "holds an earlier result";
+  EXPECT_EQ(contentOf("thesis/chapter1.tex"), "valuable");
+}
+
 }  // namespace
 }  // namespace efm
