@@ -100,7 +100,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& row) { return row.param.name; });
 
 TEST_F(Formats, ExportedRecordingsGiveTheDepthMapOfTheTextFolder) {
-  const std::string& maps = mapsOfFolder();
+  const std::string maps = mapsOf(folderRecording());
   EXPECT_GT(reportIn("out")["points"], 2000) << "the maps show something";
   ASSERT_EQ(run("import " + folderRecording() + " --out r.rawlog --compression zstd").status, 0);
   EXPECT_TRUE(mapsOf("r.rawlog") == maps);
