@@ -223,7 +223,7 @@ ChunkMessages McapBag::readChunk(const BagChunk& chunk) {
   return located(chunk.offset, [&] {
     ChunkMessages messages;
     ByteReader bytes(file.get(), chunk.size);
-    if (static_cast<McapOp>(*file.get()) == McapOp::kMessage) {
+    if (chunk.size > 0 && static_cast<McapOp>(*file.get()) == McapOp::kMessage) {
       messages.bytes = std::move(file);
       messages.size = chunk.size;
       addMessages(bytes, messages);

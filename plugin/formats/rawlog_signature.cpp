@@ -9,6 +9,7 @@
 
 #include "mapping/options/quoted_text.h"
 #include "plugin/formats/gz_stream.h"
+#include "plugin/streams/file_content.h"
 
 namespace efm {
 namespace {
@@ -52,8 +53,13 @@ void requireRawlog(const std::filesystem::path& file) {
     return;  // damaged: the reader reports it
   }
   if (!bytes.empty() && beginsAnObject(bytes)) return;
-  const std::string why =
+  std::string why =
       bytes.empty() ? "it is empty" : "it begins with " + inQuotes(bytes.substr(0, kShown));
+#ifndef EFM_WITH_ARCHIVES
+  if (isCompressed(file)) {
+    why += "; this build does not read other compressed files, EFM_READ_ARCHIVES";
+  }
+#endif
   throw std::runtime_error(
       file.string() + ": not a rawlog (" + why +
       "): expected a rawlog, or a recording in another format (docs/recordings.md)");

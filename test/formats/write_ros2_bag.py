@@ -96,7 +96,7 @@ def write_loose_mcap(path, messages):
         file.write(record(15, struct.pack("<I", 0)) + record(2, struct.pack("<QQI", 0, 0, 0)) + MAGIC)
 
 
-def write_chunked_mcap(path, messages):
+def write_chunked_mcap(path, messages, compression="lz4", compress=lz4.frame.compress, checksum=zlib.crc32):
     records, channels = channels_of(messages)
     sizes = itertools.accumulate(len(data) for _, _, _, data in messages)
     chunk_of = [size // CHUNK_BYTES for size in sizes]
@@ -111,10 +111,10 @@ def write_chunked_mcap(path, messages):
                 offsets.setdefault(channels[topic], []).append((t_ns, len(content)))
                 times.append(t_ns)
                 content += message_record(channels[topic], sequence, t_ns, data)
-            packed = lz4.frame.compress(bytes(content))
+            packed = compress(bytes(content))
             span = struct.pack("<QQ", min(times), max(times))
             start = file.tell()
-            chunk = record(6, span + struct.pack("<QI", len(content), zlib.crc32(content)) + text("lz4") + struct.pack("<Q", len(packed)) + packed)
+            chunk = record(6, span + struct.pack("<QI", len(content), checksum(content)) + text(compression) + struct.pack("<Q", len(packed)) + packed)
             file.write(chunk)
             index_start = file.tell()
             positions = {}
@@ -123,12 +123,12 @@ def write_chunked_mcap(path, messages):
                 file.write(record(7, struct.pack("<H", channel) + text(b"".join(struct.pack("<QQ", *entry) for entry in entries))))
             indexes.append(record(8, span + struct.pack("<QQ", start, len(chunk)) +
                                   text(b"".join(struct.pack("<HQ", *entry) for entry in positions.items())) +
-                                  struct.pack("<Q", file.tell() - index_start) + text("lz4") + struct.pack("<QQ", len(packed), len(content))))
+                                  struct.pack("<Q", file.tell() - index_start) + text(compression) + struct.pack("<QQ", len(packed), len(content))))
         file.write(record(15, struct.pack("<I", 0)))
         summary_start = file.tell()
         summary = records + b"".join(indexes)
         footer = struct.pack("<BQQQ", 2, 20, summary_start, 0)
-        file.write(summary + footer + struct.pack("<I", zlib.crc32(summary + footer)) + MAGIC)
+        file.write(summary + footer + struct.pack("<I", checksum(summary + footer)) + MAGIC)
 
 
 def main(folder, out):

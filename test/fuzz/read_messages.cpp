@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Reads any bytes as the messages of a bag's topic. The first byte chooses the type and the
+// serialisation; then each message has its length in two bytes.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plugin/bags/bag_events.h"
+#include "plugin/bags/ros_messages.h"
+#include "test/fuzz/reading.h"
+
+namespace {
+
+constexpr const char* kName = "any.bag";
+constexpr std::int64_t kPeriodNs = 10'000'000;
+constexpr const char* kTypes[] = {
+    "dvs_msgs/EventArray",       "event_camera_msgs/EventPacket",
+    "geometry_msgs/PoseStamped", "geometry_msgs/PoseWithCovarianceStamped",
+    "nav_msgs/Odometry",         "geometry_msgs/TransformStamped",
+    "sensor_msgs/CameraInfo",
+};
+
+/// Messages in memory, recorded 10 ms apart.
+class Messages : public efm::BagSource {
+ public:
+  Messages(const std::uint8_t* data, std::size_t size) : BagSource(kName) {
+    const std::uint8_t kind = *data;
+    addTopic({"/events", kTypes[(kind >> 1) % std::size(kTypes)]});
+    for (std::size_t at = 1; at + 2 <= size;) {
+      const std::size_t length = data[at] + data[at + 1] * std::size_t{256};
+      at += 2;
+      // A copy of its own, so that no byte behind a message can be read.
+      messages_.emplace_back(data + at, data + at + std::min(length, size - at));
+      at += std::min(length, size - at);
+    }
+    cdr_ = kind % 2 != 0;
+    if (!messages_.empty()) setLogTimes(0, timeOf(messages_.size() - 1));
+  }
+
+  std::unique_ptr<efm::BagCursor> messages(std::size_t, std::int64_t from_log_ns) override {
+    return std::make_unique<Cursor>(*this, from_log_ns);
+  }
+
+ private:
+  class Cursor : public efm::BagCursor {
+   public:
+    Cursor(const Messages& bag, std::int64_t from_log_ns) : bag_(bag) {
+      while (next_ < bag_.messages_.size() && timeOf(next_) < from_log_ns) ++next_;
+    }
+    bool next(efm::BagMessage& message) override {
+      if (next_ == bag_.messages_.size()) return false;
+      const std::vector<std::uint8_t>& bytes = bag_.messages_[next_];
+      message = {timeOf(next_++), bytes.data(), bytes.size(), bag_.cdr_};
+      return true;
+    }
+
+   private:
+    const Messages& bag_;
+    std::size_t next_ = 0;
+  };
+  static std::int64_t timeOf(std::size_t index) {
+    return static_cast<std::int64_t>(index) * kPeriodNs;
+  }
+
+  std::vector<std::vector<std::uint8_t>> messages_;
+  bool cdr_ = false;
+};
+
+void decodeAll(Messages& bag, efm::RosType type) {
+  const auto cursor = bag.messages(0, 0);
+  efm::BagMessage message;
+  while (cursor->next(message)) {
+    // The caller of these knows the file's name.
+    efm::fuzz::readOrRefuse("", [&] {
+      if (efm::hasPoses(type)) {
+        efm::decodePose(message, type);
+      } else {
+        efm::decodeCameraInfo(message);
+      }
+    });
+  }
+}
+
+}  // namespace
+
+// NOLINTNEXTLINE(readability-identifier-naming)
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  if (size == 0) return 0;
+  const auto bag = std::make_shared<Messages>(data, size);
+  const efm::RosType type = efm::rosTypeOf(bag->topics()[0].type);
+  if (!efm::hasEvents(type)) {
+    decodeAll(*bag, type);
+    return 0;
+  }
+  std::int64_t middle_ns = 0;
+  efm::fuzz::readOrRefuse(kName, [&] {
+    efm::BagEvents events({{bag, 0}});
+    middle_ns = efm::fuzz::readStream(events);
+  });
+  efm::fuzz::readOrRefuse(kName, [&] {
+    efm::BagEvents events({{bag, 0}});
+    events.seek(middle_ns);
+    efm::fuzz::readStream(events);
+  });
+  return 0;
+}

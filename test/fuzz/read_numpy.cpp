@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Reads any bytes as a NumPy array or an archive of arrays: its numbers, from its beginning and
+// after a seek, and its poses.
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "plugin/numpy/npy_array.h"
+#include "plugin/readers/pose_file.h"
+#include "plugin/streams/file_content.h"
+#include "test/fuzz/reading.h"
+
+namespace {
+
+constexpr std::size_t kBlockRows = 256;
+
+void readNumbers(efm::NpyArray& array) {
+  constexpr std::uint64_t kMaxRows = 100'000;
+  while (array.position() < kMaxRows) {
+    const std::size_t rows = array.readRows(kBlockRows);
+    if (rows == 0) return;
+    for (std::size_t row = 0; row < rows; row += std::max<std::size_t>(rows - 1, 1)) {
+      for (std::size_t column = 0; column < array.columns(); ++column) {
+        array.number(row, column);
+        array.whole(row, column);
+        array.time(row, column, 0);
+        array.time(row, column, -9);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+// NOLINTNEXTLINE(readability-identifier-naming)
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const efm::fuzz::MemoryFile file({}, data, size);
+  const std::string path = file.path();
+  if (efm::isCompressed(path)) {
+    efm::fuzz::readOrRefuse(path, [&] {
+      for (const std::string& member : efm::membersOf(path)) {
+        efm::fuzz::readOrRefuse(path, [&] {
+          efm::NpyArray array(path, member);
+          readNumbers(array);
+        });
+      }
+    });
+  } else {
+    efm::fuzz::readOrRefuse(path, [&] {
+      efm::NpyArray array(path);
+      readNumbers(array);
+      array.seek(array.rows() / 2);
+      readNumbers(array);
+    });
+  }
+  efm::fuzz::readOrRefuse(path, [&] { efm::readPoseArrays(path, {}); });
+  return 0;
+}
