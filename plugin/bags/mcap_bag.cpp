@@ -120,6 +120,13 @@ bool McapBag::readSummary() {
   if (chunks.empty()) return false;
   std::sort(chunks.begin(), chunks.end(),
             [](const BagChunk& a, const BagChunk& b) { return a.offset < b.offset; });
+  for (std::size_t i = 1; i < chunks.size(); ++i) {
+    const BagChunk& before = chunks[i - 1];
+    if (before.size <= chunks[i].offset - before.offset) continue;
+    throw errorAt(before.offset, fmt::format("a chunk of {} bytes: expected its end before the "
+                                             "next one, which begins at byte {}",
+                                             before.size, chunks[i].offset));
+  }
   setChunks(std::move(chunks));
   return true;
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstring>
 #include <random>
 #include <string>
 #include <vector>
@@ -127,6 +129,27 @@ TEST_F(Mcap, DamagedDataHaveAnotherChecksum) {
     EXPECT_THAT(errorOfBytes(damaged),
                 AllOf(StartsWith(file_.string() + ": byte "), HasSubstr(expected)));
   }
+}
+
+// Else a short file could claim the same chunk any number of times.
+TEST_F(Mcap, ChunksThatOverlapAreRefused) {
+  write(2'000);
+  std::string bytes = readText(file_);
+  std::uint64_t size = 0;
+  std::size_t chunk = kMcapMagic.size();
+  while (bytes[chunk] != static_cast<char>(McapOp::kChunk)) {
+    std::memcpy(&size, &bytes[chunk + 1], sizeof size);
+    chunk += kMcapRecordHead + size;
+  }
+  // The chunk's index begins with the same two times; then come its offset and its size.
+  const std::size_t index = bytes.rfind(bytes.substr(chunk + kMcapRecordHead, 16));
+  std::memcpy(&size, &bytes[index + 24], sizeof size);
+  size *= 2;  // records of another kind lie between chunks
+  std::memcpy(&bytes[index + 24], &size, sizeof size);
+  std::fill_n(bytes.end() - 12, 4, '\0');  // no checksum
+  EXPECT_THAT(errorOfBytes(bytes),
+              StartsWith(fmt::format("{}: byte {}: a chunk of {} bytes: expected its end before",
+                                     file_.string(), chunk, size)));
 }
 
 TEST_F(Mcap, DamagedFilesAreReadOrRefused) {
