@@ -74,6 +74,14 @@ class Db3Bag : public BagSource {
         name_(this->file().string()),
         database_(nullptr, &sqlite3_close) {
     open();
+    // Not views: one could be a query without an end.
+    SqlQuery tables(database_.get(), name_,
+                    "SELECT count(*) FROM sqlite_master WHERE type = 'table' AND rootpage > 0 AND "
+                    "name IN ('topics', 'messages')");
+    if (!tables.next() || tables.number(0) != 2) {
+      throw std::runtime_error(
+          fmt::format("{}: expected the tables `topics` and `messages` of a ROS 2 bag", name_));
+    }
     SqlQuery topics(database_.get(), name_,
                     "SELECT id, name, type, serialization_format FROM topics ORDER BY id");
     while (topics.next()) {

@@ -364,6 +364,19 @@ TEST_F(BagRecording, WrongFilesAreErrorsThatSayWhatToDo) {
   EXPECT_EQ(readStream(*open({folder() / "good"}).cameras.at(0)).size(), 150U);
 }
 
+TEST_F(BagRecording, ADatabaseHasTablesNotViews) {
+  const fs::path file = folder() / "bag.db3";
+  writeDb3(file, arraysOf("/events", packetsFrom(kStartNs, 3), RosBytes::kCdr));
+  sqlite3* database = nullptr;
+  sqlite3_open(file.c_str(), &database);
+  sqlite3_exec(database,
+               "ALTER TABLE topics RENAME TO other; CREATE VIEW topics AS SELECT * FROM other",
+               nullptr, nullptr, nullptr);
+  sqlite3_close(database);
+  EXPECT_THAT(errorOf([&] { open({file}); }),
+              StartsWith(file.string() + ": expected the tables `topics` and `messages`"));
+}
+
 TEST_F(BagRecording, DamagedBagsAreReadOrRefused) {
   const auto packets = packetsFrom(kStartNs, 6);
   for (const Container container : kContainers) {
