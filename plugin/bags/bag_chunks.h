@@ -66,6 +66,15 @@ class ChunkedBag : public BagSource {
   void setChunks(std::vector<BagChunk> chunks);
   /// An error at a byte of the file: "a.bag: byte 4117: …".
   std::runtime_error errorAt(std::uint64_t offset, const std::string& what) const;
+  /// Calls `read`; its errors become those of a byte of the file.
+  template <typename Read>
+  auto located(std::uint64_t offset, const Read& read) const {
+    try {
+      return read();
+    } catch (const std::runtime_error& error) {
+      throw errorAt(offset, error.what());
+    }
+  }
 
  private:
   class Cursor;

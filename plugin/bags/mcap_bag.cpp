@@ -58,14 +58,6 @@ class McapBag : public ChunkedBag {
   ChunkMessages readChunk(const BagChunk& chunk) override;
 
  private:
-  template <typename Read>
-  auto located(std::uint64_t offset, const Read& read) const {
-    try {
-      return read();
-    } catch (const std::runtime_error& error) {
-      throw errorAt(offset, error.what());
-    }
-  }
   bool readSummary();
   void scanFile();
   static void takeTimes(const ChunkMessages& found, BagChunk& chunk);
@@ -81,7 +73,7 @@ class McapBag : public ChunkedBag {
   std::map<std::uint16_t, Channel> channels_;
 };
 
-/// @return whether the file has an index.
+/// @return whether the file has an index of its chunks and names their channels there.
 bool McapBag::readSummary() {
   const std::uint64_t magic = kMcapMagic.size();
   const std::uint64_t tail_size = kMcapRecordHead + kMcapFooterContent + magic;
@@ -103,21 +95,29 @@ bool McapBag::readSummary() {
                                       magic, footer));
   }
 
-  std::vector<BagChunk> chunks;
   const auto section = readBytes(summary, fileSize() - summary);
   located(summary, [&] {
     requireChecksum(checksum, section.get(),
                     footer - summary + kMcapRecordHead + kMcapFooterContent - sizeof(checksum));
   });
+  // Chunks refer to channels, which may come behind them.
+  std::vector<std::pair<std::uint64_t, ByteReader>> indexes;
+  bool has_channels = false;
   ByteReader records(section.get(), footer - summary);
   while (records.remaining() > 0) {
-    located(summary + records.position(), [&] {
+    const std::uint64_t at = summary + records.position();
+    located(at, [&] {
       McapRecord record = takeMcapRecord(records);
-      if (record.op == McapOp::kChunkIndex) chunks.push_back(chunkOfIndex(record.content));
+      if (record.op == McapOp::kChunkIndex) indexes.emplace_back(at, record.content);
+      has_channels = has_channels || record.op == McapOp::kChannel;
       takeSchemaOrChannel(record);
     });
   }
-  if (chunks.empty()) return false;
+  if (indexes.empty() || !has_channels) return false;
+  std::vector<BagChunk> chunks;
+  for (const auto& [at, content] : indexes) {
+    located(at, [&, index = content] { chunks.push_back(chunkOfIndex(index)); });
+  }
   std::sort(chunks.begin(), chunks.end(),
             [](const BagChunk& a, const BagChunk& b) { return a.offset < b.offset; });
   for (std::size_t i = 1; i < chunks.size(); ++i) {

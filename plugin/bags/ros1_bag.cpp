@@ -106,14 +106,6 @@ class Ros1Bag : public ChunkedBag {
   ChunkMessages readChunk(const BagChunk& chunk) override;
 
  private:
-  template <typename Read>
-  auto located(std::uint64_t offset, const Read& read) const {
-    try {
-      return read();
-    } catch (const std::runtime_error& error) {
-      throw errorAt(offset, error.what());
-    }
-  }
   std::uint64_t readBagHeader(std::uint64_t offset);
   void readSummary(std::uint64_t offset);
   void addConnection(const Ros1Record& record);

@@ -117,6 +117,37 @@ TEST_F(Mcap, AFileWithoutASummaryIsRead) {
               AllOf(StartsWith(file_.string() + ": byte "), HasSubstr("which may be cut off")));
 }
 
+TEST_F(Mcap, TheSummaryMayHaveAnyOrderAndNoChannels) {
+  write(2'000);
+  const std::string bytes = readText(file_);
+  const std::size_t footer =
+      bytes.size() - kMcapMagic.size() - kMcapFooterContent - kMcapRecordHead;
+  const auto number_at = [&](std::size_t at) {
+    std::uint64_t number = 0;
+    std::memcpy(&number, bytes.data() + at, sizeof(number));
+    return static_cast<std::size_t>(number);
+  };
+  const std::size_t begin = number_at(footer + kMcapRecordHead);
+  std::string indexes;
+  std::string others;
+  for (std::size_t at = begin; at < footer;) {
+    const std::string record = bytes.substr(at, kMcapRecordHead + number_at(at + 1));
+    const bool is_index = static_cast<McapOp>(record[0]) == McapOp::kChunkIndex;
+    (is_index ? indexes : others) += record;
+    at += record.size();
+  }
+  const std::string no_checksum(4, '\0');
+  const std::string end =
+      bytes.substr(footer, kMcapRecordHead + 16) + no_checksum + std::string(kMcapMagic);
+  for (const std::string& summary : {indexes + others, indexes}) {
+    writeFile(file_, bytes.substr(0, begin) + summary + end);
+    RecordingParts recording = open();
+    ASSERT_EQ(recording.cameras.size(), 1U);
+    EXPECT_TRUE(readStream(*recording.cameras[0]) == events_);
+    EXPECT_EQ(recording.poses.size(), 200U);
+  }
+}
+
 TEST_F(Mcap, DamagedDataHaveAnotherChecksum) {
   write(200);
   const std::string bytes = readText(file_);
