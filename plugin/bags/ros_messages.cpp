@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "plugin/streams/byte_reader.h"
@@ -203,7 +204,6 @@ void decodeMonoEvents(const EventPacketMessage& packet, std::vector<Event>& even
 }
 
 StampedPose decodePose(const BagMessage& message, RosType type) {
-  constexpr double kMaxLengthError = 0.01;
   MessageFields fields(message);
   StampedPose pose;
   pose.t_ns = fields.header();
@@ -211,14 +211,15 @@ StampedPose decodePose(const BagMessage& message, RosType type) {
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     pose.T_world_rig.translation[axis] = fields.finite("position");
   }
-  Eigen::Quaterniond& rotation = pose.T_world_rig.rotation;
-  for (Eigen::Index i = 0; i < 4; ++i) rotation.coeffs()[i] = fields.finite("orientation");
-  const double norm = rotation.coeffs().stableNorm();
-  if (!(std::abs(norm - 1) <= kMaxLengthError)) {
+  Eigen::Quaterniond numbers;
+  for (Eigen::Index i = 0; i < 4; ++i) numbers.coeffs()[i] = fields.finite("orientation");
+  const auto rotation = rotationNear(numbers);
+  if (!rotation) {
     throw std::runtime_error(
-        fmt::format("orientation of length {:g}: expected 1 within 1 %, a rotation", norm));
+        fmt::format("orientation of length {:g}: expected 1 within 1 %, a rotation",
+                    numbers.coeffs().stableNorm()));
   }
-  rotation.coeffs() /= norm;
+  pose.T_world_rig.rotation = *rotation;
   return pose;
 }
 

@@ -5,11 +5,11 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "mapping/geometry/rounded_rotation.h"
 #include "mapping/options/quoted_text.h"
 
 namespace efm {
@@ -63,17 +63,13 @@ Eigen::MatrixXd YamlEntry::matrix(const char* key, int rows, int columns) const 
 }
 
 Eigen::Quaterniond YamlEntry::rotationIn(const Eigen::Matrix3d& matrix, const char* key) const {
-  constexpr double kMaxRotationError = 1e-3;
+  if (const auto rotation = rotationNear(matrix)) return *rotation;
   const double error =
       (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= kMaxRotationError)) {
-    throw failKey(key, fmt::format("a matrix whose columns are off orthonormal by {:f}", error),
-                  "a rotation, to 0.001");
-  }
-  if (matrix.determinant() < 0) throw failKey(key, "a reflection", "a rotation");
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
-  return Eigen::Quaterniond(nearest).normalized();
+  const std::string found =
+      error > 1e-3 ? fmt::format("a matrix whose columns are off orthonormal by {:f}", error)
+                   : "a reflection";
+  throw failKey(key, found, "a rotation, to 0.001");
 }
 
 Eigen::Quaterniond YamlEntry::rotation(const char* key) const {

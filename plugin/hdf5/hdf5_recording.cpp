@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <cmath>
 #include <map>
 #include <memory>
@@ -14,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
@@ -43,19 +43,9 @@ constexpr Hdf5Poses kPoses[] = {
 
 constexpr std::size_t kMatrixNumbers = 16;
 
-/// A rigid transform from the rows of a 4x4 matrix; nothing if it is none. The rotation may be off
-/// by 1e-3, because of rounding.
-std::optional<Rigid3> rigidOf(const double* rows) {
-  const Eigen::Matrix4d matrix =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows);
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  constexpr double kTolerance = 1e-3;
-  const bool is_rigid =
-      matrix.allFinite() && rotation.determinant() > 0 &&
-      (rotation * rotation.transpose()).isIdentity(kTolerance) &&
-      (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() < kTolerance;
-  if (!is_rigid) return std::nullopt;
-  return Rigid3{Eigen::Quaterniond(rotation).normalized(), matrix.topRightCorner<3, 1>()};
+/// A transform from the rows of a 4x4 matrix; nothing if it is none.
+std::optional<Rigid3> transformOf(const double* rows) {
+  return transformNear(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows));
 }
 
 constexpr const char* kExpectedRigid = "a 4x4 matrix of a rotation and a translation";
@@ -91,7 +81,7 @@ std::vector<StampedPose> readPoses(const std::shared_ptr<const Hdf5File>& file,
         return true;
       });
     }
-    const std::optional<Rigid3> transform = rigidOf(rows);
+    const std::optional<Rigid3> transform = transformOf(rows);
     if (!transform) throw matrices->failAt(i, fmt::format("expected {}", kExpectedRigid));
     pose.T_world_rig = poses.inverse ? transform->inverse() : *transform;
     read.push_back(pose);
@@ -129,7 +119,7 @@ RigCamera readCalib(const Hdf5File& file, const std::string& group) {
   }
   const std::string transform = group + "/T_to_prophesee_left";
   const std::optional<Rigid3> T_rig_cam =
-      rigidOf(file.numbers(transform, kMatrixNumbers, kExpectedRigid).data());
+      transformOf(file.numbers(transform, kMatrixNumbers, kExpectedRigid).data());
   if (!T_rig_cam) throw file.fail(transform, fmt::format("expected {}", kExpectedRigid));
   camera.T_rig_cam = *T_rig_cam;
   try {

@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "plugin/numpy/npy_array.h"
+#include "plugin/streams/number_checks.h"
 #include "plugin/streams/source_files.h"
 #include "plugin/streams/time_unit.h"
 #include "tracking_stub/poses/tum_trajectory.h"
@@ -91,9 +93,7 @@ class Evimo2Events : public EventStream {
     requireShape(t_, 1);
     requireShape(xy_, 2);
     requireShape(p_, 1);
-    const NumberType type = t_.header().type;
-    const bool real = type == NumberType::kFloat32 || type == NumberType::kFloat64;
-    if (!real) time_exponent_ = wholeTimeExponent(options);
+    if (!t_.isReal()) time_exponent_ = wholeTimeExponent(options);
   }
 
   bool read(std::vector<Event>& events) override {
@@ -175,9 +175,7 @@ class Evimo2Events : public EventStream {
 
   std::uint16_t pixel(std::size_t row, std::size_t column, const char* name) const {
     const double value = xy_.number(row, column);
-    if (value >= 0 && value <= 65'535 && std::floor(value) == value) {
-      return static_cast<std::uint16_t>(value);
-    }
+    if (const auto pixel = wholeNumber(value, 0, 65'535)) return static_cast<std::uint16_t>(*pixel);
     throw xy_.failure(begin_ + row,
                       fmt::format("{} = {}: expected a whole number from 0 to 65535", name, value));
   }

@@ -20,10 +20,6 @@ Number littleEndianNumber(const char* bytes) {
   return number;
 }
 
-bool isReal(NumberType type) {
-  return type == NumberType::kFloat32 || type == NumberType::kFloat64;
-}
-
 }  // namespace
 
 NpyArray::NpyArray(const std::filesystem::path& file, const std::string& member)
@@ -52,6 +48,10 @@ NpyArray::NpyArray(const std::filesystem::path& file, const std::string& member)
   }
   columns_ = static_cast<std::size_t>(columns);
   row_bytes_ = columns_ * sizeOf(header_.type);
+}
+
+bool NpyArray::isReal() const {
+  return header_.type == NumberType::kFloat32 || header_.type == NumberType::kFloat64;
 }
 
 std::size_t NpyArray::readRows(std::size_t max_rows) {
@@ -102,7 +102,7 @@ std::optional<std::int64_t> NpyArray::time(std::size_t row, std::size_t column,
                                            int exponent) const {
   std::int64_t unit_ns = 1;
   for (int k = exponent; k > -9; --k) unit_ns *= 10;
-  if (isReal(header_.type)) {
+  if (isReal()) {
     const double value = number(row, column);
     return unit_ns == 1 ? nanoseconds(value * 1e-3, 1'000) : nanoseconds(value, unit_ns);
   }

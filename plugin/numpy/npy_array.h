@@ -27,6 +27,8 @@ class NpyArray {
   /// Numbers per row: the product of all sizes but the first one.
   std::size_t columns() const { return columns_; }
   std::uint64_t rows() const { return rows_; }
+  /// Whether the numbers are float or double.
+  bool isReal() const;
 
   /// Replaces the block by the next rows; fewer than `max_rows` only at the end.
   /// @return the number of rows.

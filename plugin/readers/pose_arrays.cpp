@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "mapping/geometry/rounded_rotation.h"
 #include "plugin/numpy/npy_array.h"
 #include "plugin/readers/pose_file.h"
 #include "plugin/streams/file_content.h"
@@ -21,26 +21,17 @@ namespace {
 constexpr std::size_t kPoseBlockRows = 4096;
 
 Rigid3 poseFromVector(const std::array<double, 7>& v) {
-  const Eigen::Quaterniond rotation(v[6], v[3], v[4], v[5]);
-  const double norm = rotation.coeffs().stableNorm();
-  if (!(std::abs(norm - 1) <= 0.01)) {
-    throw std::runtime_error(fmt::format(
-        "qx qy qz qw of length {:g}: expected a rotation, of length 1 within 1 %", norm));
-  }
-  return {Eigen::Quaterniond(rotation.coeffs() / norm), {v[0], v[1], v[2]}};
+  const Eigen::Quaterniond numbers(v[6], v[3], v[4], v[5]);
+  if (const auto rotation = rotationNear(numbers)) return {*rotation, {v[0], v[1], v[2]}};
+  throw std::runtime_error(
+      fmt::format("qx qy qz qw of length {:g}: expected a rotation, of length 1 within 1 %",
+                  numbers.coeffs().stableNorm()));
 }
 
-Rigid3 poseFromMatrix(const Eigen::Matrix4d& T_world_body) {
-  const Eigen::Matrix3d rotation = T_world_body.topLeftCorner<3, 3>();
-  const double error =
-      (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (!(error <= 1e-3) || rotation.determinant() < 0 ||
-      T_world_body.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
-    throw std::runtime_error("a 4x4 matrix: expected a rotation, to 0.001, and a last row 0 0 0 1");
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d nearest = svd.matrixU() * svd.matrixV().transpose();
-  return {Eigen::Quaterniond(nearest).normalized(), T_world_body.topRightCorner<3, 1>()};
+Rigid3 poseFromMatrix(const Eigen::Matrix4d& numbers) {
+  if (const auto T_world_body = transformNear(numbers)) return *T_world_body;
+  throw std::runtime_error(
+      "a 4x4 matrix: expected a rotation and a last row 0 0 0 1, both to 0.001");
 }
 
 /// @param first the pose's first column.
@@ -144,13 +135,11 @@ PoseArrays openPoseArrays(const std::filesystem::path& file) {
 }
 
 TimeSample timeSampleOf(const NpyArray& times, std::size_t rows) {
-  const NumberType type = times.header().type;
-  const bool real = type == NumberType::kFloat32 || type == NumberType::kFloat64;
   TimeSample sample;
   for (std::size_t row = 0; row < rows; ++row) {
     const double t = times.number(row);
     ++sample.count;
-    sample.whole = sample.whole && (!real || std::floor(t) == t);
+    sample.whole = sample.whole && (!times.isReal() || std::floor(t) == t);
     sample.max = std::max(sample.max, std::abs(t));
   }
   return sample;

@@ -2,7 +2,6 @@
 #include "tracking_stub/poses/tum_trajectory.h"
 
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <fstream>
 #include <iomanip>
@@ -11,6 +10,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
@@ -20,7 +20,6 @@ namespace {
 
 constexpr std::array<std::string_view, 8> kFieldNames = {"t",  "tx", "ty", "tz",
                                                          "qx", "qy", "qz", "qw"};
-constexpr double kMaxLengthError = 0.01;  // of a quaternion; files have few digits
 
 std::runtime_error fieldError(std::size_t field, std::string_view text, const char* expected) {
   return std::runtime_error(std::string(kFieldNames[field]) + " = " + inQuotes(text) +
@@ -59,11 +58,11 @@ StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_e
   StampedPose pose;
   pose.t_ns = *t_ns;
   pose.T_world_rig.translation = {numberIn(fields, 1), numberIn(fields, 2), numberIn(fields, 3)};
-  const Eigen::Quaterniond rotation(numberIn(fields, 7), numberIn(fields, 4), numberIn(fields, 5),
-                                    numberIn(fields, 6));
-  const double norm = rotation.coeffs().stableNorm();
-  if (!(std::abs(norm - 1) <= kMaxLengthError)) throw quaternionError(fields, norm);
-  pose.T_world_rig.rotation.coeffs() = rotation.coeffs() / norm;
+  const Eigen::Quaterniond numbers(numberIn(fields, 7), numberIn(fields, 4), numberIn(fields, 5),
+                                   numberIn(fields, 6));
+  const auto rotation = rotationNear(numbers);
+  if (!rotation) throw quaternionError(fields, numbers.coeffs().stableNorm());
+  pose.T_world_rig.rotation = *rotation;
   return pose;
 }
 
@@ -105,13 +104,15 @@ void writeTumTrajectory(const std::filesystem::path& file, const std::vector<Sta
 }
 
 void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses) {
-  stream << "# t tx ty tz qx qy qz qw\n" << std::setprecision(17);
-  for (const StampedPose& pose : poses) {
-    const Eigen::Vector3d& p = pose.T_world_rig.translation;
-    const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
-    stream << formatSeconds(pose.t_ns) << ' ' << p.x() << ' ' << p.y() << ' ' << p.z() << ' '
-           << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
-  }
+  stream << "# t tx ty tz qx qy qz qw\n";
+  for (const StampedPose& pose : poses) writeTumPose(stream, pose);
+}
+
+void writeTumPose(std::ostream& stream, const StampedPose& pose) {
+  const Eigen::Vector3d& p = pose.T_world_rig.translation;
+  const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
+  stream << std::setprecision(17) << formatSeconds(pose.t_ns) << ' ' << p.x() << ' ' << p.y() << ' '
+         << p.z() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
 }
 
 }  // namespace efm

@@ -38,5 +38,7 @@ StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_e
 /// @throws std::runtime_error naming the file that cannot be written.
 void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses);
 void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses);
+/// Writes the line of a pose.
+void writeTumPose(std::ostream& stream, const StampedPose& pose);
 
 }  // namespace efm
