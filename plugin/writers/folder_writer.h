@@ -2,10 +2,10 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
 #include <vector>
 
 #include "plugin/writers/recording_writer.h"
+#include "plugin/writers/text_file.h"
 #include "tracking_stub/truth/new_folder.h"
 
 namespace efm {
@@ -22,15 +22,9 @@ class FolderWriter : public RecordingWriter {
   void close() override;
 
  private:
-  struct File {
-    std::filesystem::path path;
-    std::ofstream stream;
-  };
-  File open(const std::filesystem::path& path) const;
-
   NewFolder folder_;
-  std::vector<File> events_;  // per camera
-  File poses_;
+  std::vector<TextFile> events_;  // per camera
+  TextFile poses_;
 };
 
 }  // namespace efm

@@ -48,11 +48,6 @@ std::string cameraName(std::size_t camera) {
   return fmt::format("cam{}", camera);
 }
 
-void closeText(std::ofstream& stream, const fs::path& path) {
-  stream.close();
-  if (!stream) throw std::runtime_error(path.string() + ": cannot be written");
-}
-
 }  // namespace
 
 Hdf5List::Hdf5List(hid_t file, const char* path, hid_t type)
@@ -147,13 +142,13 @@ void Hdf5Writer::Camera::close() {
   file_ = {};
 }
 
-Hdf5Writer::Hdf5Writer(const fs::path& folder, const Rig& rig) : folder_(folder) {
+Hdf5Writer::Hdf5Writer(const fs::path& folder, const Rig& rig)
+    : folder_(folder), poses_(folder_.temporary() / "poses.txt") {
   const Hdf5Quiet quiet;
-  const fs::path camchain = folder_.temporary() / "camchain.yaml";
-  std::ofstream text(camchain, std::ios::binary);
-  text << formatCamchain(rig);
-  closeText(text, camchain);
-  poses_.open(folder_.temporary() / "poses.txt", std::ios::binary);
+  TextFile camchain(folder_.temporary() / "camchain.yaml");
+  camchain.stream() << formatCamchain(rig);
+  camchain.close();
+  writeTumTrajectory(poses_.stream(), {});
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
     const fs::path path = folder_.temporary() / "events" / cameraName(camera);
     fs::create_directories(path);
@@ -175,7 +170,7 @@ void Hdf5Writer::addEvents(std::size_t camera, const std::vector<Event>& events)
   }
 }
 
-void Hdf5Writer::addPose(const StampedPose& pose) { writeTumTrajectory(poses_, {pose}); }
+void Hdf5Writer::addPose(const StampedPose& pose) { writeTumPose(poses_.stream(), pose); }
 
 void Hdf5Writer::close() {
   const Hdf5Quiet quiet;
@@ -186,7 +181,7 @@ void Hdf5Writer::close() {
       throw std::runtime_error(fmt::format("{}: {}", camera.path().string(), error.what()));
     }
   }
-  closeText(poses_, folder_.temporary() / "poses.txt");
+  poses_.close();
   folder_.finish();
 }
 

@@ -4,13 +4,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "plugin/hdf5/hdf5_file.h"
 #include "plugin/writers/recording_writer.h"
+#include "plugin/writers/text_file.h"
 #include "tracking_stub/truth/new_folder.h"
 
 namespace efm {
@@ -79,7 +79,7 @@ class Hdf5Writer : public RecordingWriter {
 
   NewFolder folder_;
   std::vector<Camera> cameras_;
-  std::ofstream poses_;
+  TextFile poses_;
 };
 
 }  // namespace efm

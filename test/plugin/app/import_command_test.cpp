@@ -81,6 +81,7 @@ TEST_F(ImportCommand, AnExportedFolderGivesTheSameMap) {
   const Result result = run("export r.rawlog --to folder --out text");
   EXPECT_EQ(result.status, 0) << result.err;
   EXPECT_EQ(contentOf("text/cam1/events.txt"), contentOf("data/cam1/events.txt"));
+  EXPECT_EQ(contentOf("text/poses.txt").rfind('#'), 0U) << "a header, and no other one";
   EXPECT_EQ(mapOf("text"), mapOf("data"));
   EXPECT_THAT(errorOf("export r.rawlog --to folder --out text"),
               HasSubstr("exists already and is not an empty folder"));
