@@ -20,27 +20,27 @@ import h5py
 import numpy as np
 import yaml
 
+from dataset_folder import cameras_of, read_events, read_poses
+
 BLOSC_ZSTD = dict(compression=32001, compression_opts=(0, 0, 0, 0, 1, 1, 5))
 SIDES = ("left", "right")
 
 
-def read_events(folder, camera):
+def columns_of(events):
     """x, y, t (whole microseconds) and p of a camera."""
-    numbers = np.fromfile(folder / f"cam{camera}" / "events.txt", sep=" ").reshape(-1, 4)
-    t_us = np.rint(numbers[:, 0] * 1e6).astype("i8")
-    return {"x": numbers[:, 1].astype("u2"), "y": numbers[:, 2].astype("u2"), "t": t_us, "p": numbers[:, 3].astype("u1")}
+    return {"x": events["x"], "y": events["y"], "t": events["t"] // 1000, "p": events["p"].astype("u1")}
 
 
-def read_poses(folder):
-    """Times in whole microseconds and 4x4 matrices T_world_cam0."""
-    rows = np.loadtxt(folder / "poses.txt", ndmin=2)
-    x, y, z, w = (rows[:, 4:8] / np.linalg.norm(rows[:, 4:8], axis=1, keepdims=True)).T
+def matrices_of(poses):
+    """Times in whole microseconds, rows tx ty tz qx qy qz qw, and 4x4 matrices T_world_cam0."""
+    rows = np.array([numbers for _, numbers in poses]).reshape(-1, 7)
+    x, y, z, w = (rows[:, 3:] / np.linalg.norm(rows[:, 3:], axis=1, keepdims=True)).T
     matrices = np.tile(np.eye(4), (len(rows), 1, 1))
     matrices[:, 0, :3] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], 1)
     matrices[:, 1, :3] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], 1)
     matrices[:, 2, :3] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], 1)
-    matrices[:, :3, 3] = rows[:, 1:4]
-    return np.rint(rows[:, 0] * 1e6).astype("i8"), matrices, rows
+    matrices[:, :3, 3] = rows[:, :3]
+    return np.array([t_ns // 1000 for t_ns, _ in poses], dtype="i8"), matrices, rows
 
 
 def index_of_milliseconds(t_us):
@@ -104,8 +104,8 @@ def write_metavision(path, events, resolution):
 
 def main(folder, out):
     calibration = yaml.safe_load((folder / "camchain.yaml").read_text())
-    cameras = [read_events(folder, n) for n in range(len(SIDES)) if (folder / f"cam{n}").exists()]
-    poses = read_poses(folder)
+    cameras = [columns_of(read_events(file)) for file in cameras_of(folder)[:len(SIDES)]]
+    poses = matrices_of(read_poses(folder))
     for n, (side, events) in enumerate(zip(SIDES, cameras)):
         write_dsec(out / "dsec/events" / side / "events.h5", events, "u4", [(65536,)] * 4)
         write_dsec(out / f"tum_vie/desk-events_{side}.h5", events, "i8", [(50000,), (50000,), (12500,), (100000,)])
@@ -115,7 +115,7 @@ def main(folder, out):
     with open(out / "tum_vie/mocap_data.txt", "w") as mocap:
         mocap.write("# timestamp[us] px py pz qx qy qz qw\n")
         for t_us, row in zip(poses[0], poses[2]):
-            mocap.write(" ".join([str(t_us)] + [repr(float(value)) for value in row[1:]]) + "\n")
+            mocap.write(" ".join([str(t_us)] + [repr(float(value)) for value in row]) + "\n")
 
 
 if __name__ == "__main__":

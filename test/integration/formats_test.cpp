@@ -89,6 +89,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Recorded{"evt21_legacy", "raw/evt21_legacy/cam0.raw raw/evt21_legacy/cam1.raw",
                              "calibration poses"},
                     Recorded{"evt3", "raw/evt3/cam0.raw raw/evt3/cam1.raw", "calibration poses"},
+                    Recorded{"aedat4", "aedat4/lz4.aedat4", "calibration poses"},
                     Recorded{"bag_dvs", "ros1_bag/dvs.bag", "calibration"},
                     Recorded{"bag_prophesee", "ros1_bag/prophesee_lz4.bag", "calibration"},
                     Recorded{"bag_evt3", "ros1_bag/evt3_bz2.bag", "calibration"},
