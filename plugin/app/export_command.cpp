@@ -152,7 +152,7 @@ int runExport(const ExportArguments& arguments) {
     progress.showFraction("exporting", recording->progress());
   }
   result.close(arguments.out);
-  warnOfLostPackets(recording->counts());
+  warnOfLosses(recording->counts());
   return 0;
 }
 

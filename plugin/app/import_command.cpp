@@ -110,7 +110,7 @@ int runImport(const ImportArguments& arguments) {
   if (others > 0) fmt::print("{} other observations\n", others);
   fmt::print("{} poses; {} events were out of order and sorted\n", poses,
              recording->counts().sorted_events);
-  warnOfLostPackets(recording->counts());
+  warnOfLosses(recording->counts());
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
     std::cerr << fmt::format(
         "event-fusion: warning: odometry ({} observations) cannot hold the hand-eye transform: "

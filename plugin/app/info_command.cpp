@@ -148,7 +148,7 @@ void print(const Contents& contents, const RecordingCounts& counts) {
   if (counts.sorted_events > 0) {
     fmt::print("{} events out of order by up to 10 ms\n", counts.sorted_events);
   }
-  warnOfLostPackets(counts);
+  warnOfLosses(counts);
 }
 
 }  // namespace

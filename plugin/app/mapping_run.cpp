@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 #include "mapping/depth/robust_maximum.h"
 #include "plugin/app/progress.h"
@@ -220,7 +221,9 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   }
   outcome.report.points = outcome.points.size();
   outcome.warnings = warningsOf(status, job.options.mapper.keyframe.exclude_silent);
-  if (const auto lost = lostPacketsWarning(recording.counts())) outcome.warnings.push_back(*lost);
+  for (std::string& warning : lossWarnings(recording.counts())) {
+    outcome.warnings.push_back(std::move(warning));
+  }
   if (status.counts.event_uses == 0 && !outcome.error && !player.stoppedAt()) {
     outcome.error = status.counts.keyframes == 0
                         ? "there is no keyframe: " + whyNoKeyframe(status, job.options.mapper)

@@ -13,7 +13,11 @@
 namespace efm {
 
 std::int64_t startOf(const RecordingSource& source) {
-  RecordingSource events = source;
+  RecordingSource events;  // their times need no pose and no transform
+  events.files = source.files;
+  events.format = source.format;
+  events.calibration = source.calibration;
+  events.reader = source.reader;
   events.complete = false;
   const std::unique_ptr<Recording> recording = openRecording(events);
   while (const auto observation = recording->next()) {
@@ -28,11 +32,19 @@ std::int64_t resolve(const TimeArgument& time, const RecordingSource& source) {
 }
 
 TimeLimits resolve(const TimeArguments& times, const RecordingSource& source) {
+  std::optional<std::int64_t> start_ns;
+  const auto start = [&] {
+    if (!start_ns) start_ns = startOf(source);
+    return *start_ns;
+  };
+  const auto at = [&](const TimeArgument& time) {
+    return time.from_start ? start() + time.ns : time.ns;
+  };
   TimeLimits limits;
-  if (times.t0) limits.t0_ns = resolve(*times.t0, source);
-  if (times.t1) limits.t1_ns = resolve(*times.t1, source);
+  if (times.t0) limits.t0_ns = at(*times.t0);
+  if (times.t1) limits.t1_ns = at(*times.t1);
   if (times.duration_ns) {
-    limits.t1_ns = (limits.t0_ns ? *limits.t0_ns : startOf(source)) + *times.duration_ns;
+    limits.t1_ns = (limits.t0_ns ? *limits.t0_ns : start()) + *times.duration_ns;
   }
   return limits;
 }
@@ -43,15 +55,24 @@ std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits
   return cutTime(openRecording(source), limits.t0_ns, limits.t1_ns);
 }
 
-std::optional<std::string> lostPacketsWarning(const RecordingCounts& counts) {
-  if (counts.lost_packets == 0) return std::nullopt;
-  return fmt::format("the recording lacks {} packets of events: their numbers have gaps",
-                     counts.lost_packets);
+std::vector<std::string> lossWarnings(const RecordingCounts& counts) {
+  std::vector<std::string> warnings;
+  if (counts.lost_packets > 0) {
+    warnings.push_back(fmt::format(
+        "the recording lacks {} packets of events: their numbers have gaps", counts.lost_packets));
+  }
+  if (counts.undated_events > 0) {
+    warnings.push_back(
+        fmt::format("{} events were left out: the recording does not say their time or row, at its "
+                    "beginning or after a gap",
+                    counts.undated_events));
+  }
+  return warnings;
 }
 
-void warnOfLostPackets(const RecordingCounts& counts) {
-  if (const auto text = lostPacketsWarning(counts)) {
-    std::cerr << "event-fusion: warning: " << *text << "\n";
+void warnOfLosses(const RecordingCounts& counts) {
+  for (const std::string& text : lossWarnings(counts)) {
+    std::cerr << "event-fusion: warning: " << text << "\n";
   }
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "mapping/events/window.h"
 #include "plugin/formats/open_recording.h"
@@ -36,9 +37,9 @@ TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
 /// events outside are not read, where the format has an index.
 std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits);
 
-/// A warning if the recording says that it lacks packets.
-std::optional<std::string> lostPacketsWarning(const RecordingCounts& counts);
-/// Prints it to stderr.
-void warnOfLostPackets(const RecordingCounts& counts);
+/// Warnings of what the recording lacks: packets, or the times of events.
+std::vector<std::string> lossWarnings(const RecordingCounts& counts);
+/// Prints them to stderr.
+void warnOfLosses(const RecordingCounts& counts);
 
 }  // namespace efm

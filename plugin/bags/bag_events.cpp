@@ -52,11 +52,13 @@ void BagEventDecoder::fitClock(BagCursor& cursor) {
   }
   // The time base of `mono` is the host's time or the sensor's.
   if (!evt_ && clock_.isHostClock()) clock_.useHostTime();
-  restart();
+  restart(false);
   lost_packets_ = 0;
+  undated_events_ = 0;
 }
 
-void BagEventDecoder::restart() {
+void BagEventDecoder::restart(bool inside) {
+  count_undated_ = !inside;
   sequence_.reset();
   if (evt_) evt_->reset();
 }
@@ -87,7 +89,11 @@ void BagEventDecoder::decodePacket(const EventPacketMessage& packet, std::vector
   }
   sequence_ = packet.sequence;
   if (evt_) {
+    const std::size_t before = events.size();
+    const std::uint64_t undated_before = evt_->undatedEvents();
     evt_->decode(packet.data, packet.data_size, events);
+    if (count_undated_) undated_events_ += evt_->undatedEvents() - undated_before;
+    count_undated_ = count_undated_ || events.size() > before;
   } else {
     decodeMonoEvents(packet, events);
   }
@@ -134,7 +140,7 @@ void BagEvents::begin(std::size_t part, std::int64_t from_log_ns) {
   part_ = part;
   log_ns_ = std::max(from_log_ns, parts_[part].topic.bag->firstLogNs());
   cursor_ = parts_[part].topic.bag->messages(parts_[part].topic.topic, from_log_ns);
-  parts_[part].decoder.restart();
+  parts_[part].decoder.restart(from_log_ns > parts_[part].topic.bag->firstLogNs());
 }
 
 bool BagEvents::nextMessage(BagMessage& message) {
@@ -179,7 +185,7 @@ std::optional<CameraSize> BagEvents::firstSize(const Part& part) {
 std::optional<std::int64_t> BagEvents::firstTime(const Part& part, std::int64_t from_log_ns) {
   const auto cursor = part.topic.bag->messages(part.topic.topic, from_log_ns);
   BagEventDecoder decoder = part.decoder;
-  decoder.restart();
+  decoder.restart(true);
   BagMessage message;
   std::vector<Event> events;
   while (cursor->next(message)) {
@@ -251,6 +257,12 @@ std::uint64_t BagEvents::lostPackets() const {
   std::uint64_t lost = 0;
   for (const Part& part : parts_) lost += part.decoder.lostPackets();
   return lost;
+}
+
+std::uint64_t BagEvents::undatedEvents() const {
+  std::uint64_t undated = 0;
+  for (const Part& part : parts_) undated += part.decoder.undatedEvents();
+  return undated;
 }
 
 }  // namespace efm

@@ -38,10 +38,14 @@ class BagEventDecoder {
   /// @throws std::runtime_error without the file's name; `events` has the events before the damage.
   void decode(const BagMessage& message, std::vector<Event>& events);
   /// The next message is not the one after the last one.
-  void restart();
+  /// @param inside the recording: until the first event whose time and row are known, events
+  /// without them are not counted.
+  void restart(bool inside);
 
   /// Gaps in the numbers of the packets so far.
   std::uint64_t lostPackets() const { return lost_packets_; }
+  /// Events without a time or row so far: see `EventStream::undatedEvents`.
+  std::uint64_t undatedEvents() const { return undated_events_; }
   /// Of the last message; nothing where the message does not say it.
   std::optional<CameraSize> size() const { return size_; }
 
@@ -56,6 +60,8 @@ class BagEventDecoder {
   SensorClock clock_{0};
   std::optional<std::uint64_t> sequence_;  // of the last packet
   std::uint64_t lost_packets_ = 0;
+  bool count_undated_ = true;
+  std::uint64_t undated_events_ = 0;
 };
 
 /// The events of one camera: a topic of one or several bags.
@@ -75,6 +81,7 @@ class BagEvents : public EventStream {
   double progress() const override;
   std::optional<CameraSize> size() const override { return size_; }
   std::uint64_t lostPackets() const override;
+  std::uint64_t undatedEvents() const override;
 
  private:
   struct Part {

@@ -214,7 +214,7 @@ RecordingParts openBags(const std::vector<std::filesystem::path>& files,
     for (auto& bag : openBagFiles(file)) bags.push_back(std::move(bag));
   }
   const RosTopics topics = topicsOf(bags);
-  requireTopics(topics, options, files.front());
+  if (!options.topics_of_other_files) requireTopics(topics, options, files.front());
 
   RosTopics cameras = chosen(topics, options, hasEvents);
   cameras.erase(std::remove_if(cameras.begin(), cameras.end(), isTrigger), cameras.end());

@@ -79,6 +79,7 @@ RecordingCounts MergedRecording::counts() const {
   for (const EventPackets& camera : cameras_) {
     counts.sorted_events += camera.sortedEvents();
     counts.lost_packets += camera.stream().lostPackets();
+    counts.undated_events += camera.stream().undatedEvents();
   }
   return counts;
 }

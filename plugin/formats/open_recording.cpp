@@ -68,7 +68,6 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
   }
   if (parts.calibration) all.calibration = std::move(parts.calibration);
   if (!all.default_size) all.default_size = parts.default_size;
-  if (parts.T_body_rig) all.T_body_rig = parts.T_body_rig;
 }
 
 /// Files of the same format are opened together.
@@ -163,11 +162,6 @@ std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& sou
   if (parts.poses.empty() && source.complete) {
     throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",
                                          sourceNames(source.files), parts.expected_poses));
-  }
-  if (parts.T_body_rig) {
-    for (StampedPose& pose : parts.poses) {
-      pose.T_world_rig = pose.T_world_rig * *parts.T_body_rig;
-    }
   }
   return std::make_unique<RecordingWithPoses>(std::move(recording), std::move(parts.poses));
 }

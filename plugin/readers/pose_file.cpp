@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/readers/pose_file.h"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <fstream>
 #include <stdexcept>
@@ -37,18 +39,18 @@ bool isNpz(const fs::path& file) {
   return true;
 }
 
-std::vector<StampedPose> posesOfRecording(const fs::path& file, const ReaderOptions& options) {
+std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions options) {
   const RecordingFormat* const format = detectFormat(file);
   if (format == nullptr) {
     throw std::runtime_error(file.string() +
                              ": not a file of poses: expected text (t tx ty tz qx qy qz qw, or "
                              "columns with a header), NumPy arrays, or a recording with poses");
   }
+  options.topics_of_other_files = true;  // they are those of the events, too
   RecordingParts parts = format->open({file}, options);
-  if (parts.T_body_rig) {
-    for (StampedPose& pose : parts.poses) pose.T_world_rig = pose.T_world_rig * *parts.T_body_rig;
-  }
-  return std::move(parts.poses);
+  if (!parts.poses.empty()) return std::move(parts.poses);
+  throw std::runtime_error(
+      fmt::format("{}: no poses: expected {}", file.string(), parts.expected_poses));
 }
 
 std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions& options) {

@@ -12,8 +12,7 @@ namespace efm {
 /// Reads poses T_world_body from a file, whose kind is found by its content:
 ///   text, also compressed   see `readPoseText`
 ///   NumPy arrays            see `readPoseArrays`
-///   a recording with poses  a bag, an HDF5 file, a folder: `detectFormat`; if its poses have a
-///                           T_body_rig of their own, they are the rig's.
+///   a recording with poses  a bag, an HDF5 file, a folder: `detectFormat`
 /// @return at least one pose, in the order of the file.
 /// @throws std::runtime_error naming the file, the place, the value and what was expected.
 std::vector<StampedPose> readPoses(const std::filesystem::path& file,

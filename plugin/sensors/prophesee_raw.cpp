@@ -220,6 +220,7 @@ void PropheseeRawStream::seek(std::int64_t t_ns) {
     scan.scanTime(block_.data(), block_.size());
     if (scan.timeHighNs() + kMaxAheadNs >= t_ns) break;
   }
+  from_beginning_ = false;
   stream_.clear();
   stream_.seekg(static_cast<std::streamoff>(start_byte));
   block_.clear();

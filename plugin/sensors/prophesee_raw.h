@@ -37,6 +37,10 @@ class PropheseeRawStream : public EventStream {
   std::string name() const override { return file_.string(); }
   double progress() const override;
   std::optional<CameraSize> size() const override { return header_.size; }
+  /// The file has no gaps: only events at its beginning have no time.
+  std::uint64_t undatedEvents() const override {
+    return from_beginning_ ? decoder_.undatedEvents() : 0;
+  }
 
  private:
   bool readBlock();
@@ -47,6 +51,7 @@ class PropheseeRawStream : public EventStream {
   std::uint64_t bytes_total_ = 0;
   RawHeader header_;
   EvtDecoder decoder_;
+  bool from_beginning_ = true;
   EvtDecoder at_block_;  // the decoder before the block
   std::vector<std::uint8_t> block_;
   std::uint64_t block_byte_ = 0;  // the position of the block in the file

@@ -37,8 +37,11 @@ class EventStream {
   virtual double progress() const = 0;
   /// The sensor's pixels, if the file knows them.
   virtual std::optional<CameraSize> size() const { return std::nullopt; }
-  /// Events that the file says are lost: gaps in the numbers of its messages, as far as known.
+  /// The gaps in the numbers of the file's packets: how many are missing, as far as known.
   virtual std::uint64_t lostPackets() const { return 0; }
+  /// Events that were left out because their time or row is not known: those before the sensor's
+  /// first words of time, and those after a gap. Not those before the time of `seek`.
+  virtual std::uint64_t undatedEvents() const { return 0; }
 };
 
 }  // namespace efm

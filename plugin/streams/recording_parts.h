@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/calibration/calibration_file.h"
 #include "plugin/streams/event_stream.h"
@@ -24,8 +23,7 @@ struct RecordingParts {
   /// The sensors' size where neither the stream nor a calibration knows it.
   std::optional<CameraSize> default_size;
 
-  std::vector<StampedPose> poses;    ///< T_world_body, in any order.
-  std::optional<Rigid3> T_body_rig;  ///< Nothing: the poses are the rig's.
+  std::vector<StampedPose> poses;  ///< T_world_body, in any order.
 
   /// What the format calls its missing parts, for errors: "calib.txt".
   std::string expected_calibration = "a calibration in the recording";
@@ -42,6 +40,8 @@ struct ReaderOptions {
   std::string columns;
   /// The unit of times in text events and NumPy arrays: s, ms, us or ns. Empty: found, else s.
   std::string time_unit;
+  /// Whether `topics` may have names of other files. Otherwise an unknown name is an error.
+  bool topics_of_other_files = false;
 };
 
 /// A family of formats. A new one is a row of the table in recording_formats.cpp.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/readers/pose_file.h"
 #include "plugin/readers/recording_formats.h"
 #include "test/paths.h"
 #include "test/plugin/bags/bag_bytes.h"
@@ -249,6 +250,12 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
   }
   EXPECT_EQ(open({two}).expected_poses,
             "the choice of one by --topics, of /left/pose, /other/pose");
+  ReaderOptions options;
+  options.topics = {"/events/of/another/bag", "/other/pose"};
+  EXPECT_EQ(readPoses(two, options).at(0).t_ns, kStartNs + 3);
+  options.topics.pop_back();
+  EXPECT_THAT(errorOf([&] { readPoses(two, options); }),
+              HasSubstr("the choice of one by --topics"));
   EXPECT_THAT(errorOf([&] { open({one}, {"/left"}); }),
               AllOf(StartsWith(one.string()), HasSubstr("no topic /left"),
                     HasSubstr("/cam2/events"), HasSubstr("/left/odometry")));
@@ -291,7 +298,21 @@ TEST_F(BagRecording, LostPacketsAreCountedAndTheClockGoesOn) {
     RecordingParts recording = open({write("bag", container, messages)});
     EXPECT_TRUE(readStream(*recording.cameras.at(0)) == flat(left));
     EXPECT_EQ(recording.cameras[0]->lostPackets(), 2'001U);
+    EXPECT_EQ(recording.cameras[0]->undatedEvents(), 0U) << "each packet says its time";
   }
+}
+
+TEST_F(BagRecording, EventsWithoutATimeAfterAGapAreCounted) {
+  const auto packets = packetsFrom(kStartNs, 4);
+  RecordedMessages messages = evt3Of("/events", packets, RosBytes::kCdr);
+  const std::int64_t stamp_ns = kStartNs + 100 * kMsNs;
+  messages.push_back(
+      {"/events", kPacket, stamp_ns,
+       eventPacket(RosBytes::kCdr, stamp_ns, 110, "evt3", evt3Words({0x2002, 0x2003, 0x2004}))});
+  RecordingParts recording = open({write("bag", Container::kDb3, messages)});
+  EXPECT_TRUE(readStream(*recording.cameras.at(0)) == flat(packets));
+  EXPECT_EQ(recording.cameras[0]->lostPackets(), 6U);
+  EXPECT_EQ(recording.cameras[0]->undatedEvents(), 3U);
 }
 
 TEST_F(BagRecording, CamerasSynchronisedByWireKeepTheirCommonClock) {

@@ -96,6 +96,18 @@ TEST_F(PropheseeRaw, ASeekLeavesOutNothingFromItsTimeOnAndMostBeforeIt) {
   }
 }
 
+TEST_F(PropheseeRaw, EventsBeforeTheFirstTimeAreCountedUnlessTheyLieBeforeTheSoughtTime) {
+  writeFile(file(), "% evt 3.0\n" + evt3Words({0x0001, 0x2002, 0x2003, 0x8001, 0x6000, 0x2004}) +
+                        evtBytes(EvtEncoding::kEvt3, longRecording()));
+  PropheseeRawStream whole(file());
+  EXPECT_EQ(readStream(whole).front().x, 4);
+  EXPECT_EQ(whole.undatedEvents(), 2U);
+  PropheseeRawStream end(file());
+  end.seek(20'000'000'000);
+  readStream(end);
+  EXPECT_EQ(end.undatedEvents(), 0U);
+}
+
 TEST_F(PropheseeRaw, ThePositionOfAnEventIsThatOfItsWord) {
   const std::string header = "% evt 3.0\n";
   // The fourth word has one event, the sixth two.
