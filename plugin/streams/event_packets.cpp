@@ -80,7 +80,7 @@ void EventPackets::readBlock() {
   } catch (const std::runtime_error&) {
     error_ = std::current_exception();
   }
-  if (!error_) error_ = damaged;
+  if (!error_ && !ended_) error_ = damaged;
 }
 
 void EventPackets::takeBlock() {
@@ -94,6 +94,8 @@ void EventPackets::takeBlock() {
                 fmt::format("a whole number from 0 to {} (the sensor has {}x{} pixels)", side - 1,
                             size_.width, size_.height));
   };
+  const std::int64_t end_ns =
+      std::min(stop_ns_.value_or(kEndOfTimeNs), kEndOfTimeNs - kMaxEventDelayNs) + kMaxEventDelayNs;
   events_.reserve(events_.size() + block_.size());
   for (std::size_t i = 0; i < block_.size(); ++i) {
     const Event& event = block_[i];
@@ -104,6 +106,8 @@ void EventPackets::takeBlock() {
         throw fail(i, "t", event.t_ns, "a time in ns before the year 2116");
       }
       newest_ns_ = event.t_ns;
+      ended_ = newest_ns_ >= end_ns;
+      if (ended_) return;  // also from errors behind it
     } else if (newest_ns_ - event.t_ns <= kMaxEventDelayNs) {
       disordered_ = true;
       ++sorted_events_;
@@ -115,7 +119,6 @@ void EventPackets::takeBlock() {
     if (start_ns_ && event.t_ns < *start_ns_) continue;
     if (!stop_ns_ || event.t_ns < *stop_ns_) events_.push_back(event);
   }
-  if (stop_ns_ && newest_ns_ - kMaxEventDelayNs >= *stop_ns_) ended_ = true;
 }
 
 void EventPackets::sortEvents() {
