@@ -2,8 +2,10 @@
 // Reads any bytes as the messages of a bag's topic. The first byte chooses the type and the
 // serialisation; then each message has its length in two bytes.
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <utility>
