@@ -92,6 +92,12 @@ void addSource(CLI::App& command, Arguments& arguments) {
       ->allow_extra_args(false);
 }
 
+template <typename Arguments>
+void addStrict(CLI::App& command, Arguments& arguments) {
+  command.add_flag("--strict", arguments.strict,
+                   "A warning is an error: exit status 1, after the results are written");
+}
+
 /// For a command without an option file, which has the length of a keyframe.
 template <typename Arguments>
 void requireKeyframeLengthOf(const Arguments& arguments) {
@@ -208,6 +214,7 @@ void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
                   "Overrides one option of CONFIG, e.g. --set dsi.num_planes=200; may be repeated")
       ->type_name("SECTION.KEY=VALUE")
       ->allow_extra_args(false);
+  addStrict(command, arguments);
 }
 
 void addPixelOptions(CLI::App& command, SimulateArguments& arguments) {
@@ -369,6 +376,7 @@ void addInfo(CLI::App& app, Run& run) {
   auto arguments = argumentsOf(command, run, runInfo);
   addSource(command, *arguments);
   addTimeLimits(command, *arguments);
+  addStrict(command, *arguments);
   command.add_flag("--system", arguments->system,
                    "Print the processor and the kernels of the inner loops that it can run, and "
                    "test them; needs no recording");

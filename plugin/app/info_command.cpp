@@ -6,104 +6,34 @@
 #include <algorithm>
 #include <cstdint>
 #include <exception>
+#include <iterator>
 #include <map>
-#include <optional>
+#include <utility>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/app/system_info.h"
 #include "plugin/formats/open_recording.h"
-#include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/pose_observation.h"
+#include "plugin/session/camera_view.h"
+#include "plugin/session/health_checks.h"
 
 namespace efm {
 namespace {
 
-/// Times of events or poses, in the order of the recording.
-struct Stream {
-  std::uint64_t count = 0;
-  std::optional<std::int64_t> first_ns;
-  std::optional<std::int64_t> last_ns;
-  std::int64_t max_gap_ns = 0;
-  std::int64_t max_gap_start_ns = 0;
-
-  void add(std::int64_t t_ns) {
-    ++count;
-    if (last_ns && t_ns - *last_ns > max_gap_ns) {
-      max_gap_ns = t_ns - *last_ns;
-      max_gap_start_ns = *last_ns;
-    }
-    first_ns = std::min(first_ns.value_or(t_ns), t_ns);
-    last_ns = std::max(last_ns.value_or(t_ns), t_ns);
-  }
-  double seconds() const { return first_ns ? secondsBetween(*first_ns, *last_ns) : 0.0; }
-  double rate() const { return seconds() > 0 ? static_cast<double>(count) / seconds() : 0.0; }
-};
-
-struct CameraInfo {
-  CameraModel model;
-  Stream events;
-  std::vector<Event> newest;  // the last packet: the next pose may lie within it
-};
-
-std::uint64_t countEvents(const std::vector<Event>& events, std::int64_t from_ns,
-                          std::int64_t until_ns) {
-  return static_cast<std::uint64_t>(std::count_if(
-      events.begin(), events.end(),
-      [&](const Event& event) { return event.t_ns >= from_ns && event.t_ns < until_ns; }));
-}
-
 /// The contents of a recording.
-class Contents {
- public:
+struct Contents {
   std::uint64_t observations = 0;
-  std::map<std::string, CameraInfo> cameras;  // by label
-  std::map<PoseSourceId, Stream> pose_sources;
-  Stream poses;                                 // of all sources
-  std::uint64_t events_before_poses = 0;        // earlier than the first pose
-  std::uint64_t events_after_poses = 0;         // later than the last pose
+  RecordingStatistics statistics;
   std::map<std::string, std::uint64_t> others;  // by class
 
   void add(const mrpt::obs::CObservation& observation) {
     ++observations;
-    if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
-      addPacket(*packet);
-    } else if (const auto source = poseSourceOf(observation)) {
-      const std::int64_t t_ns = poseIn(observation)->t_ns;
-      pose_sources[*source].add(t_ns);
-      addPose(t_ns);
-    } else {
-      ++others[observation.GetRuntimeClass()->className];
-    }
-  }
-
- private:
-  void addPacket(const CObservationEvents& packet) {
-    CameraInfo& camera = cameras[packet.sensorLabel];
-    camera.model = packet.camera;
-    for (const Event& event : packet.events) camera.events.add(event.t_ns);
-    if (poses.last_ns) {
-      events_before_poses += countEvents(packet.events, -kMaxTimeNs, *poses.first_ns);
-      events_after_poses += countEvents(packet.events, *poses.last_ns + 1, kMaxTimeNs);
-    }
-    camera.newest = packet.events;
-  }
-
-  /// The recording is in the order of time: a new pose can lie only within the last packet of each
-  /// camera.
-  void addPose(std::int64_t t_ns) {
-    const bool first = poses.count == 0;
-    poses.add(t_ns);
-    if (*poses.last_ns == t_ns) events_after_poses = 0;
-    for (const auto& [label, camera] : cameras) {
-      const std::uint64_t not_before = countEvents(camera.newest, t_ns, kMaxTimeNs);
-      if (first) events_before_poses += camera.events.count - not_before;
-      if (*poses.last_ns == t_ns) {
-        events_after_poses += countEvents(camera.newest, t_ns + 1, kMaxTimeNs);
-      }
-    }
+    if (addObservation(observation, statistics)) return;
+    ++others[observation.GetRuntimeClass()->className];
   }
 };
 
@@ -112,12 +42,14 @@ std::string asText(const CameraModel& model) {
   const std::string size = model.width == kUnknown
                                ? "unknown size"
                                : fmt::format("{}x{} pixels", model.width, model.height);
-  if (model.fx <= 0) return size + ", no calibration";
-  return fmt::format("{}, focal length {:g} px, distortion {}", size, model.fx,
-                     nameOf(model.distortion));
+  if (!isCalibrated(model)) return size + ", no calibration";
+  const Eigen::Vector2d view_deg = fieldOfView(model) / kRadiansPerDegree;
+  return fmt::format(
+      "{}, focal length {:g} px, distortion {}, field of view {:.1f} x {:.1f} degrees", size,
+      model.fx, nameOf(model.distortion), view_deg.x(), view_deg.y());
 }
 
-void printStream(const Stream& stream, const char* what) {
+void printStream(const StreamStatistics& stream, const char* what) {
   fmt::print("{} {}", stream.count, what);
   if (stream.first_ns) {
     fmt::print(" from {} s to {} s ({:g} s, {:g} per second)", formatSeconds(*stream.first_ns),
@@ -126,29 +58,69 @@ void printStream(const Stream& stream, const char* what) {
   fmt::print("\n");
 }
 
-void print(const Contents& contents, const RecordingCounts& counts) {
-  fmt::print("{} observations\n", contents.observations);
-  for (const auto& [label, camera] : contents.cameras) {
-    fmt::print("{}: {}\n  ", label, asText(camera.model));
+/// The rate of a camera's events over the time of all cameras' events.
+void printRate(const EventRate& rate, std::int64_t first_ns, std::int64_t last_ns) {
+  constexpr int kIntervals = 40;
+  const std::vector<double> rates = rate.over(first_ns, last_ns, kIntervals);
+  const double max = *std::max_element(rates.begin(), rates.end());
+  if (max > 0) fmt::print("  rate |{}| up to {:.3g} per second\n", sparkline(rates), max);
+}
+
+void printCameras(const RecordingStatistics& statistics) {
+  const auto span = statistics.eventSpan();
+  for (const auto& [key, camera] : statistics.cameras()) {
+    fmt::print("{}: {}\n  ", camera.label, asText(camera.camera.model));
     printStream(camera.events, "events");
+    if (span) printRate(camera.rate, span->first, span->second);
   }
-  for (const auto& [source, poses] : contents.pose_sources) {
-    fmt::print("{}:\n  ", asText(source));
-    printStream(poses, "poses");
-    if (poses.count > 1) {
-      fmt::print("  largest gap {:g} s, after {} s\n", 1e-9 * static_cast<double>(poses.max_gap_ns),
-                 formatSeconds(poses.max_gap_start_ns));
+  const auto& cameras = statistics.cameras();
+  for (auto a = cameras.begin(); a != cameras.end(); ++a) {
+    for (auto b = std::next(a); b != cameras.end(); ++b) {
+      fmt::print("baseline {} to {}: {:g} m\n", a->second.label, b->second.label,
+                 baselineOf(a->second.camera, b->second.camera));
     }
   }
-  if (contents.pose_sources.empty()) fmt::print("0 poses\n");
-  fmt::print("  {} events before the first pose, {} after the last\n", contents.events_before_poses,
-             contents.events_after_poses);
+}
+
+void printPoses(const RecordingStatistics& statistics) {
+  for (const auto& [source, used] : statistics.poseSources()) {
+    const StreamStatistics& poses = used.poses;
+    fmt::print("{}:\n  ", asText(source));
+    printStream(poses, "poses");
+    if (poses.count < 2) continue;
+    fmt::print("  largest gap {:g} s, after {} s\n", 1e-9 * static_cast<double>(poses.max_gap_ns),
+               formatSeconds(poses.max_gap_start_ns));
+    fmt::print("  path {:.4g} m, speed {:.3g} m/s on average, up to {:.3g} m/s and {:.3g} rad/s\n",
+               used.path_m, poses.seconds() > 0 ? used.path_m / poses.seconds() : 0.0,
+               used.max_speed, used.max_rotation_rate);
+  }
+  if (statistics.poseSources().empty()) {
+    fmt::print("0 poses\n");
+  } else if (statistics.eventSpan()) {
+    fmt::print("  the poses cover {:.1f} % of the events' time\n", 100 * statistics.overlap());
+  }
+  fmt::print("  {} events before the first pose, {} after the last\n",
+             statistics.eventsBeforePoses(), statistics.eventsAfterPoses());
+}
+
+void print(const Contents& contents, const RecordingCounts& counts) {
+  fmt::print("{} observations\n", contents.observations);
+  printCameras(contents.statistics);
+  printPoses(contents.statistics);
   for (const auto& [name, count] : contents.others)
     fmt::print("{}: {} observations\n", name, count);
   if (counts.sorted_events > 0) {
     fmt::print("{} events out of order by up to 10 ms\n", counts.sorted_events);
   }
-  warnOfLosses(counts);
+}
+
+std::vector<Warning> warningsOf(const Contents& contents, const RecordingCounts& counts) {
+  std::vector<Warning> warnings = missingParts(contents.statistics);
+  for (Warning& warning : healthWarnings(contents.statistics, {})) {
+    warnings.push_back(std::move(warning));
+  }
+  for (Warning& warning : lossWarnings(counts)) warnings.push_back(std::move(warning));
+  return warnings;
 }
 
 }  // namespace
@@ -175,8 +147,10 @@ int runInfo(const InfoArguments& arguments) {
     }
   }
   print(contents, recording->counts());
-  if (stopped) std::rethrow_exception(stopped);
-  return status;
+  if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
+  const std::vector<Warning> warnings = warningsOf(contents, recording->counts());
+  printWarnings(warnings);
+  return arguments.strict && failStrictly(warnings) ? 1 : status;
 }
 
 }  // namespace efm

@@ -11,6 +11,7 @@ namespace efm {
 struct InfoArguments {
   RecordingSource source;
   TimeArguments times;
+  bool strict = false;  ///< A warning is an error.
   bool system = false;  ///< Also print the processor and its kernels; then no recording is needed.
 };
 

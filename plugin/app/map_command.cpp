@@ -18,6 +18,7 @@
 #include "plugin/app/config_files.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
+#include "plugin/app/observed_statistics.h"
 #include "plugin/output/keyframe_writer.h"
 #include "plugin/output/map_output.h"
 #include "plugin/output/npy_file.h"
@@ -70,9 +71,19 @@ void printSummary(const MapReport& report, const std::filesystem::path& folder) 
 void warnOfRecalibration(const MappingArguments& arguments, MappingOutcome& outcome) {
   if (outcome.recalibrated_cameras == 0) return;
   if (!arguments.source.calibration.empty()) return;  // --calibration is intended
-  outcome.warnings.push_back(outcome.report.options.rig.calibration.string() +
-                             " replaced another calibration, the recording's own; --set "
-                             "rig.calibration= keeps that");
+  outcome.report.warnings.push_back(
+      {"calibration-replaced", outcome.report.options.rig.calibration.string() +
+                                   " replaced another calibration, the recording's own; --set "
+                                   "rig.calibration= keeps that"});
+}
+
+void warnOfNoPoints(MapReport& report) {
+  if (report.counts.keyframes == 0 || report.points > 0) return;
+  report.warnings.push_back(
+      {"no-points",
+       "the map has no point: keyframes saw too few events, or every point was removed ([depth] "
+       "min_quality, [map] min_keyframes, [dsi] min_depth_m and max_depth_m), or the calibration "
+       "and the poses do not explain the events"});
 }
 
 /// Writes all files, even if one fails. The outcome has the first error.
@@ -94,21 +105,19 @@ std::function<void(const std::filesystem::path&)> saverOf(const mrpt::maps::CSim
 }
 
 /// Writes the report; prints warnings, summary and error. @return the exit status.
-int conclude(const MappingOutcome& outcome, MapOutput& output) {
+int conclude(const MappingOutcome& outcome, MapOutput& output, bool strict) {
   // A run without a keyframe leaves the results of an earlier run as they are.
   const bool made_nothing = outcome.error && outcome.report.counts.keyframes == 0;
   if (!made_nothing || !std::filesystem::exists(output.folder() / "report.json")) {
     output.writeReport(reportJson(outcome.report));
   }
-  for (const std::string& warning : outcome.warnings) {
-    std::cerr << "event-fusion: warning: " << warning << "\n";
-  }
+  printWarnings(outcome.report.warnings);
   if (outcome.report.counts.keyframes > 0) printSummary(outcome.report, output.folder());
   if (outcome.error) {
     std::cerr << "event-fusion: error: " << *outcome.error << "\n";
     return 1;
   }
-  if (!outcome.report.stopped_at) return 0;
+  if (!outcome.report.stopped_at) return strict && failStrictly(outcome.report.warnings) ? 1 : 0;
   std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
                            100 * *outcome.report.stopped_at);
   return kInterruptedStatus;
@@ -190,13 +199,14 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     outcome.report.faults = source.faults;
     warnOfRecalibration(arguments, outcome);
     if (outcome.report.counts.keyframes > 0) write(*output, outcome);
+    warnOfNoPoints(outcome.report);
   }
   StageTimes& times = outcome.report.times;
   times.real.total = whole.real.total;
   times.cpu.start = whole.cpu.start;
   times.cpu.images = whole.cpu.images;
   times.cpu.total = whole.cpu.start + whole.cpu.total;
-  return conclude(outcome, *output);
+  return conclude(outcome, *output, arguments.strict);
 }
 
 }  // namespace

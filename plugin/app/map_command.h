@@ -19,6 +19,7 @@ struct MappingArguments {
   TimeArguments times;            ///< Of the window, for `depth`.
   std::filesystem::path out;      ///< Empty: named after the recording, in the working folder.
   bool force = false;             ///< Write into a folder that holds other files.
+  bool strict = false;            ///< A warning is an error.
   std::vector<std::string> sets;  ///< section.key=value
 };
 

@@ -10,11 +10,13 @@
 #include <utility>
 
 #include "mapping/depth/robust_maximum.h"
+#include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/session/no_keyframe.h"
+#include "plugin/session/session_warnings.h"
 
 namespace efm {
 namespace {
@@ -23,11 +25,16 @@ namespace {
 class Player {
  public:
   Player(const MappingJob& job, Recording& recording, StageTimes& times)
-      : job_(job), recording_(recording), times_(times) {
+      : job_(job),
+        recording_(recording),
+        times_(times),
+        depths_(job.options.mapper.keyframe.planes) {
     EventFusionOptions options = job.options;
     options.mapper.keyframe.sequence_maximum = job.sequence_maximum;
     builder_.setOptions(options);
-    builder_.setMinLoggingLevel(mrpt::system::LVL_ERROR);  // warningsOf summarises its warnings
+    statistics_ = RecordingStatistics(statisticsOptions(options));
+    builder_.setMinLoggingLevel(
+        mrpt::system::LVL_ERROR);  // sessionWarnings summarises its warnings
     if (job.processor_clock) builder_.setProcessorClock(job.processor_clock);
     builder_.setKeyframeCallback([this](const KeyframeDepthMap& keyframe) { deliver(keyframe); });
   }
@@ -50,6 +57,15 @@ class Player {
   }
 
   const CEventFusionMapBuilder& builder() const { return builder_; }
+  /// What is implausible about the recording and its depths. @param rig as it was used.
+  std::vector<Warning> healthWarnings(const Rig& rig) {
+    statistics_.setCameras(rig.cameras);
+    const FusionMapperOptions& options = job_.options.mapper;
+    std::vector<Warning> warnings = efm::healthWarnings(
+        statistics_, {options.keyframe.planes.min_depth_m, options.trajectory.max_pose_gap_s});
+    for (Warning& warning : depths_.warnings()) warnings.push_back(std::move(warning));
+    return warnings;
+  }
   /// The fraction of the recording that was mapped, if a stop was requested.
   std::optional<double> stoppedAt() const { return stopped_at_; }
 
@@ -79,6 +95,7 @@ class Player {
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(recording_.position() + ": " + error.what());
     }
+    addObservation(*observation, statistics_);  // valid: the builder took it
     return true;
   }
 
@@ -95,6 +112,7 @@ class Player {
   /// An error of writing must not count as an error of reading: it is thrown after the step.
   void deliver(const KeyframeDepthMap& keyframe) {
     if (delivery_error_) return;
+    depths_.add(keyframe.map.depth);
     try {
       job_.on_keyframe(keyframe);
     } catch (...) {
@@ -111,66 +129,13 @@ class Player {
   Recording& recording_;
   StageTimes& times_;
   CEventFusionMapBuilder builder_;
+  RecordingStatistics statistics_;
+  DepthStatistics depths_;
   std::exception_ptr delivery_error_;  // of `on_keyframe`
   bool sink_offered_ = false;
   std::optional<double> stopped_at_;
   Progress progress_;
 };
-
-std::vector<std::string> warningsOf(const SessionStatus& status, bool exclude_silent) {
-  std::vector<std::string> warnings;
-  if (status.counts.sorted_events > 0) {
-    warnings.push_back(fmt::format("{} events came later than newer ones and were sorted",
-                                   status.counts.sorted_events));
-  }
-  for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
-    const EventCounts& events = status.counts.cameras[c];
-    if (events.outside_lens == 0) continue;
-    warnings.push_back(
-        fmt::format("{} of {} events of camera {} were not used: its lens model has no viewing ray "
-                    "for their pixels (outside_lens)",
-                    events.outside_lens, events.read, c));
-  }
-  for (std::size_t c = 0; c < status.silent_keyframes.size(); ++c) {
-    if (status.silent_keyframes[c] == 0) continue;
-    warnings.push_back(fmt::format(
-        "camera {} had no event in {} of {} keyframes: {}", c, status.silent_keyframes[c],
-        status.counts.keyframes,
-        exclude_silent ? "the others were fused without it"
-                       : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
-                         "([rig] exclude_silent leaves silent cameras out)"));
-  }
-  if (status.counts.silent_subintervals > 0) {
-    warnings.push_back(
-        fmt::format("{} sub-intervals of a camera had no event: rules that ask all of them (min, "
-                    "harmonic, geometric) find nothing where one is empty",
-                    status.counts.silent_subintervals));
-  }
-  for (const auto& [source, count] : status.other_poses) {
-    if (!status.pose_source) break;  // no keyframe: the error says so
-    warnings.push_back(fmt::format("{} poses were not used: {}, beside {}", count, asText(source),
-                                   asText(*status.pose_source)));
-  }
-  if (status.counts.duplicate_poses > 0) {
-    warnings.push_back(fmt::format("{} poses had the time of an earlier one and were left out",
-                                   status.counts.duplicate_poses));
-  }
-  if (status.refinement && status.refinement->counts.registered + 1 < status.counts.keyframes) {
-    warnings.push_back(fmt::format(
-        "{} of {} keyframes found no place by their points: the tracker's motion stands there",
-        status.counts.keyframes - 1 - status.refinement->counts.registered,
-        status.counts.keyframes));
-  }
-  if (status.counts.keyframes > 0 && status.counts.keyframes_without_pose > 0) {
-    warnings.push_back(fmt::format("{} windows were left out: no pose at their reference time",
-                                   status.counts.keyframes_without_pose));
-  }
-  if (status.counts.keyframes > 0 && status.counts.windows_without_events > 0) {
-    warnings.push_back(fmt::format("{} windows were left out: the selected cameras saw nothing",
-                                   status.counts.windows_without_events));
-  }
-  return warnings;
-}
 
 /// Reports the reference view and the shortest baseline, for disparities.
 void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport& report) {
@@ -220,9 +185,13 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
     outcome.tracker_trajectory = player.builder().trackerTrajectory();
   }
   outcome.report.points = outcome.points.size();
-  outcome.warnings = warningsOf(status, job.options.mapper.keyframe.exclude_silent);
-  for (std::string& warning : lossWarnings(recording.counts())) {
-    outcome.warnings.push_back(std::move(warning));
+  std::vector<Warning>& warnings = outcome.report.warnings;
+  warnings = player.healthWarnings(status.rig);
+  for (Warning& warning : sessionWarnings(status, job.options.mapper)) {
+    warnings.push_back(std::move(warning));
+  }
+  for (Warning& warning : lossWarnings(recording.counts())) {
+    warnings.push_back(std::move(warning));
   }
   if (status.counts.event_uses == 0 && !outcome.error && !player.stoppedAt()) {
     outcome.error = status.counts.keyframes == 0

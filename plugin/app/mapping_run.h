@@ -43,7 +43,6 @@ struct MappingOutcome {
   std::vector<StampedPose> trajectory;
   std::vector<StampedPose> tracker_trajectory;
   std::size_t recalibrated_cameras = 0;  ///< Their recorded calibrations differ from the options'.
-  std::vector<std::string> warnings;     ///< About the input, one line each.
   /// Why the recording was not read to its end or has no keyframe.
   std::optional<std::string> error;
 };

@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include <iostream>
 #include <stdexcept>
 #include <utility>
 
+#include "plugin/app/observed_statistics.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/time_cut.h"
 
@@ -55,25 +55,23 @@ std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits
   return cutTime(openRecording(source), limits.t0_ns, limits.t1_ns);
 }
 
-std::vector<std::string> lossWarnings(const RecordingCounts& counts) {
-  std::vector<std::string> warnings;
+std::vector<Warning> lossWarnings(const RecordingCounts& counts) {
+  std::vector<Warning> warnings;
   if (counts.lost_packets > 0) {
-    warnings.push_back(fmt::format(
-        "the recording lacks {} packets of events: their numbers have gaps", counts.lost_packets));
+    warnings.push_back(
+        {"lost-packets",
+         fmt::format("the recording lacks {} packets of events: their numbers have gaps",
+                     counts.lost_packets)});
   }
   if (counts.undated_events > 0) {
     warnings.push_back(
-        fmt::format("{} events were left out: the recording does not say their time or row, at its "
-                    "beginning or after a gap",
-                    counts.undated_events));
+        {"undated-events", fmt::format("{} events were left out: the recording does not say their "
+                                       "time or row, at its beginning or after a gap",
+                                       counts.undated_events)});
   }
   return warnings;
 }
 
-void warnOfLosses(const RecordingCounts& counts) {
-  for (const std::string& text : lossWarnings(counts)) {
-    std::cerr << "event-fusion: warning: " << text << "\n";
-  }
-}
+void warnOfLosses(const RecordingCounts& counts) { printWarnings(lossWarnings(counts)); }
 
 }  // namespace efm

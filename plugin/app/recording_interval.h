@@ -9,6 +9,7 @@
 
 #include "mapping/events/window.h"
 #include "plugin/formats/open_recording.h"
+#include "plugin/session/health_checks.h"
 
 namespace efm {
 
@@ -38,7 +39,7 @@ TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
 std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits);
 
 /// Warnings of what the recording lacks: packets, or the times of events.
-std::vector<std::string> lossWarnings(const RecordingCounts& counts);
+std::vector<Warning> lossWarnings(const RecordingCounts& counts);
 /// Prints them to stderr.
 void warnOfLosses(const RecordingCounts& counts);
 

@@ -92,6 +92,14 @@ std::uint64_t peakMemoryBytes() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
 }
 
+Json asJson(const std::vector<Warning>& warnings) {
+  Json json = Json::array();
+  for (const Warning& warning : warnings) {
+    json.push_back({{"name", warning.name}, {"text", warning.text}});
+  }
+  return json;
+}
+
 }  // namespace
 
 double votesPerSecond(const MapReport& report) {
@@ -132,6 +140,7 @@ std::string reportJson(const MapReport& report) {
   if (report.view) json["reference_view"] = asJson(*report.view);
   if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
   if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
+  json["warnings"] = asJson(report.warnings);
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
   json["options"] = asJson(report.options);

@@ -9,6 +9,7 @@
 #include "mapping/geometry/reference_view.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "plugin/options/option_file.h"
+#include "plugin/session/health_checks.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/stage_timer.h"
 #include "tracking_stub/faults/tracker_faults.h"
@@ -32,6 +33,7 @@ struct MapReport {
   std::optional<double> baseline_m;
   /// The fraction of the recording that was mapped, where the run was interrupted.
   std::optional<double> stopped_at;
+  std::vector<Warning> warnings;
 };
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
@@ -41,8 +43,8 @@ struct MapReport {
 /// votes_per_second, refinement where poses were refined (registered keyframes, loops, the learnt
 /// errors of the tracker), kernel, threads, peak_memory_bytes (of this process), reference_view and
 /// baseline_m where known, stopped_at where the run was interrupted (the fraction of the recording
-/// that was mapped), perturbation (the faults of the poses, if any), options (all of them)
-/// and version.
+/// that was mapped), warnings (each with name and text), perturbation (the faults of the poses, if
+/// any), options (all of them) and version.
 std::string reportJson(const MapReport& report);
 
 /// Votes (used events times planes) over the sweep's seconds; 0 without a sweep.

@@ -28,7 +28,7 @@ class ImportCommand : public AppTest {
   void writeSmallRecording() const {
     write("small/events.txt", "0.010 1 2 1\n0.020 3 4 0\n0.030 5 6 1\n0.029 7 8 0\n0.050 1 1 1\n");
     write("small/groundtruth.txt",
-          "0.015 0 0 0 0 0 0 1\n0.030 0 0 0 0 0 0 1\n0.045 0 0 0 0 0 0 1\n");
+          "0.015 0 0 0 0 0 0 1\n0.030 0.01 0 0 0 0 0 1\n0.045 0.02 0 0 0 0 0 1\n");
     write("small/calib.txt", "200 200 120 90 0 0 0 0 0\n");
   }
 };
@@ -97,7 +97,9 @@ TEST_F(ImportCommand, InfoIsTheSameForAFolderAndItsRawlog) {
               AllOf(HasSubstr("cam0: 240x180 pixels, focal length 200 px, distortion radtan"),
                     HasSubstr("5 events from 0.010000000 s to 0.050000000 s"),
                     HasSubstr("3 poses from 0.015000000 s to 0.045000000 s"),
-                    HasSubstr("largest gap 0.015 s"),
+                    HasSubstr("field of view 61.9 x 48.5 degrees"), HasSubstr("  rate |"),
+                    HasSubstr("largest gap 0.015 s"), HasSubstr("  path "),
+                    HasSubstr("the poses cover 75.0 % of the events' time"),
                     HasSubstr("1 events before the first pose, 1 after the last"),
                     HasSubstr("1 events out of order")));
   EXPECT_EQ(rawlog.status, 0);
@@ -136,6 +138,7 @@ TEST_F(ImportCommand, ReadsTheRealSliderRecordingCompletely) {
   const Result info = run("info s.rawlog");
   EXPECT_THAT(info.out, AllOf(HasSubstr("cam0: 240x180 pixels"),
                               HasSubstr("50000 events from 0.003811000 s to 0.174156000 s")));
+  EXPECT_THAT(info.err, IsEmpty()) << "a sound recording";
 }
 
 TEST_F(ImportCommand, InfoTellsTheProcessorAndTestsItsKernelsWithoutARecording) {

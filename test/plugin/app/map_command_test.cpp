@@ -258,7 +258,51 @@ TEST_F(MapCommand, ASilentCameraIsAWarning) {
   recording.events[1].clear();
   write(recording);
   const Result result = run("map rig.ini data --out out");
-  EXPECT_THAT(result.err, HasSubstr("warning: camera 1 had no event in 3 of 3 keyframes"));
+  EXPECT_EQ(result.status, 0);
+  EXPECT_THAT(result.err,
+              AllOf(HasSubstr("event-fusion: warning: silent-camera: camera 1 has no event"),
+                    HasSubstr("warning: silent-keyframes: camera 1 had no event in 3 of 3 keyfr")));
+}
+
+TEST_F(MapCommand, WarningsHaveNamesAndByOptionAreErrors) {
+  SyntheticRecording recording;
+  for (StampedPose& pose : recording.poses) pose.T_world_rig.translation.setZero();
+  write(recording);
+  const auto warned = HasSubstr("event-fusion: warning: no-motion: the poses move by at most 0 m");
+  const auto error = HasSubstr("event-fusion: error: 1 warnings, and --strict makes them errors");
+  for (const std::string command : {"map rig.ini data --out out", "info data",
+                                    "depth rig.ini data --out out2 --t0 10.1 --t1 10.4"}) {
+    const Result result = run(command);
+    EXPECT_EQ(result.status, 0) << command;
+    EXPECT_THAT(result.err, AllOf(warned, Not(error))) << command;
+  }
+  for (const std::string out : {"out", "out2"}) {
+    const json warnings = reportIn(out)["warnings"];
+    ASSERT_EQ(warnings.size(), 1U) << warnings;
+    EXPECT_EQ(warnings[0]["name"], "no-motion");
+    EXPECT_THAT(warnings[0]["text"].get<std::string>(), HasSubstr("at most 0 m"));
+  }
+  for (const std::string command : {"map rig.ini data --out strict", "info data",
+                                    "depth rig.ini data --out strict2 --t0 10.1 --t1 10.4"}) {
+    const Result result = run(command + " --strict");
+    EXPECT_EQ(result.status, 1) << command;
+    EXPECT_THAT(result.err, AllOf(warned, error)) << command;
+  }
+  EXPECT_EQ(filesIn("strict"), filesIn("out"));
+  EXPECT_EQ(filesIn("strict2"), filesIn("out2"));
+}
+
+TEST_F(MapCommand, DepthsAtALimitAndMapsWithoutPointsAreWarnings) {
+  write(SyntheticRecording());  // at 2 m
+  for (const std::string command :
+       {"map rig.ini data --out out", "depth rig.ini data --out out2 --t0 10.1 --t1 10.3"}) {
+    EXPECT_THAT(run(command + " --set depth.min_quality=1e6").err,
+                HasSubstr("warning: no-points: the map has no point"));
+  }
+  const std::string at_limit =
+      " --set dsi.max_depth_m=2 --set dsi.num_planes=100 --set depth.extraction=paper";
+  EXPECT_THAT(run("map rig.ini data --out out" + at_limit).err,
+              AllOf(HasSubstr("warning: depths-at-limit: "), Not(HasSubstr("no-points"))));
 }
 
 // --- depth -----------------------------------------------------------------------------------

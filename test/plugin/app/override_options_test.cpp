@@ -137,7 +137,8 @@ TEST_F(OverrideOptions, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning
     const std::string map = "map rig.ini " + recording + " --out out ";
     EXPECT_EQ(run(map + "--set rig.calibration=same.yaml").err, "") << recording;
     EXPECT_THAT(run(map + "--set rig.calibration=other.yaml").err,
-                HasSubstr("warning: other.yaml replaced another calibration, the recording's own; "
+                HasSubstr("warning: calibration-replaced: other.yaml replaced another calibration, "
+                          "the recording's own; "
                           "--set rig.calibration= keeps that"))
         << recording;
     EXPECT_EQ(run(map + "--calibration other.yaml").err, "") << recording << ": it was asked for";
@@ -155,7 +156,8 @@ TEST_F(OverrideOptions, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning
   write("same.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
   write("other.txt", "100 101 59.5 44.5 0 0 0 0 0\n");
   const std::string map = "map rig.ini uzh --out out ";
-  const auto warning = HasSubstr("warning: other.txt replaced another calibration");
+  const auto warning =
+      HasSubstr("warning: calibration-replaced: other.txt replaced another calibration");
   EXPECT_THAT(run(map + "--set rig.calibration=same.txt").err, Not(HasSubstr("replaced")));
   EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, warning);
   EXPECT_THAT(run(map + "--calibration other.txt").err, Not(HasSubstr("replaced")));

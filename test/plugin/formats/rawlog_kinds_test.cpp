@@ -217,8 +217,9 @@ TEST_F(RawlogKinds, OfSeveralSourcesOneIsUsedAndTheOthersAreCounted) {
   save(rawlog, "both.rawlog");
   const Result result = run("map rig.ini both.rawlog --out out");
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.err, HasSubstr("warning: 51 poses were not used: odometry 'wheels', beside "
-                                    "poses 'pose'"));
+  EXPECT_THAT(result.err,
+              HasSubstr("warning: unused-poses: 51 poses were not used: odometry 'wheels', beside "
+                        "poses 'pose'"));
   expectNear(pointsOfMap(), map);
 
   const auto slipped = mapOf("both.rawlog", "--set rig.pose_source=wheels");

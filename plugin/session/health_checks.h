@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "mapping/geometry/depth_planes.h"
+#include "plugin/session/event_fusion_options.h"
+#include "plugin/session/recording_statistics.h"
+#include "plugin/session/session_status.h"
+
+namespace efm {
+
+/// Something implausible, which does not stop a run: docs/recordings.md has a table of the names.
+struct Warning {
+  std::string name;  ///< "clock-overlap"
+  std::string text;  ///< A sentence with the values, and the option or file that would mend it.
+};
+
+/// What is compared with the options of a map; without a map, the defaults serve.
+struct HealthLimits {
+  double near_depth_m = 0.5;
+  double max_pose_gap_s = 0.25;
+};
+
+/// Checks the calibration, the clocks, the motion and the events of a recording.
+std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
+                                    const HealthLimits& limits);
+
+/// What a recording lacks for a map: events, calibration, poses.
+std::vector<Warning> missingParts(const RecordingStatistics& recording);
+
+/// Counts the depths of keyframes near the limits.
+class DepthStatistics {
+ public:
+  explicit DepthStatistics(const DepthPlanesOptions& planes) : planes_(planes) {}
+
+  /// @param depth in metres, 0 where there is none.
+  void add(const cv::Mat_<float>& depth);
+  std::vector<Warning> warnings() const;
+
+ private:
+  DepthPlanesOptions planes_;
+  std::uint64_t depths_ = 0;
+  std::uint64_t nearest_ = 0;   // near the nearest plane
+  std::uint64_t farthest_ = 0;  // near the farthest plane
+};
+
+}  // namespace efm

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/recording_statistics.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/session/rig_setup.h"
+
+namespace efm {
+namespace {
+
+std::uint64_t countBetween(const std::vector<std::int64_t>& times_ns, std::int64_t from_ns,
+                           std::int64_t until_ns) {
+  return static_cast<std::uint64_t>(
+      std::count_if(times_ns.begin(), times_ns.end(),
+                    [&](std::int64_t t_ns) { return t_ns >= from_ns && t_ns < until_ns; }));
+}
+
+/// Differences of such times do not overflow, even where nobody has checked a recording.
+std::int64_t inRange(std::int64_t t_ns) { return std::clamp(t_ns, -kEndOfTimeNs, kEndOfTimeNs); }
+
+std::int64_t onTrajectoryClock(std::int64_t t_ns, std::int64_t offset_ns) {
+  return inRange(inRange(t_ns) + inRange(offset_ns));
+}
+
+double distanceOf(const Rigid3& T_world_a, const Rigid3& T_world_b) {
+  return (T_world_b.translation - T_world_a.translation).norm();
+}
+
+double angleOf(const Rigid3& T_world_a, const Rigid3& T_world_b) {
+  return T_world_a.rotation.angularDistance(T_world_b.rotation);
+}
+
+}  // namespace
+
+StatisticsOptions statisticsOptions(const EventFusionOptions& options) {
+  StatisticsOptions statistics;
+  const FusionMapperOptions& mapper = options.mapper;
+  statistics.limits = mapper.limits;
+  statistics.cameras = mapper.cameras;
+  statistics.time_offsets_ns = options.rig.time_offsets_ns;
+  statistics.T_body_rig = readRigSetup(options.rig).T_body_rig;
+  statistics.pose_source = options.rig.pose_source;
+  if (mapper.only_window) {
+    statistics.limits = {mapper.only_window->t0_ns, mapper.only_window->t1_ns};
+    statistics.window_s = secondsBetween(mapper.only_window->t0_ns, mapper.only_window->t1_ns);
+  } else if (mapper.policy.policy != KeyframePolicyKind::kEvents) {
+    statistics.window_s = mapper.policy.window_s;
+  }
+  return statistics;
+}
+
+void StreamStatistics::add(std::int64_t from_ns, std::int64_t until_ns, std::uint64_t number) {
+  count += number;
+  if (last_ns && from_ns > *last_ns && from_ns - *last_ns > max_gap_ns) {
+    max_gap_ns = from_ns - *last_ns;
+    max_gap_start_ns = *last_ns;
+  }
+  first_ns = std::min(first_ns.value_or(from_ns), from_ns);
+  last_ns = std::max(last_ns.value_or(until_ns), until_ns);
+}
+
+double StreamStatistics::seconds() const {
+  return first_ns ? secondsBetween(*first_ns, *last_ns) : 0.0;
+}
+
+double StreamStatistics::rate() const {
+  return seconds() > 0 ? static_cast<double>(count) / seconds() : 0.0;
+}
+
+void PoseStatistics::add(const StampedPose& pose, std::int64_t window_ns) {
+  // Over a shorter step, the noise of a tracker with a high rate looks like speed.
+  constexpr std::int64_t kMinStepNs = 10'000'000;
+  const bool late = poses.last_ns && pose.t_ns <= *poses.last_ns;
+  poses.add(pose.t_ns, pose.t_ns, 1);
+  if (late) return;
+  if (!step_begin_) step_begin_ = window_begin_ = pose;
+  if (pose.t_ns - step_begin_->t_ns >= kMinStepNs) {
+    const double step_s = secondsBetween(step_begin_->t_ns, pose.t_ns);
+    const double step_m = distanceOf(step_begin_->T_world_rig, pose.T_world_rig);
+    path_m += step_m;
+    max_speed = std::max(max_speed, step_m / step_s);
+    max_rotation_rate =
+        std::max(max_rotation_rate, angleOf(step_begin_->T_world_rig, pose.T_world_rig) / step_s);
+    step_begin_ = pose;
+  }
+  max_shift_m = std::max(max_shift_m, distanceOf(window_begin_->T_world_rig, pose.T_world_rig));
+  max_rotation_rad =
+      std::max(max_rotation_rad, angleOf(window_begin_->T_world_rig, pose.T_world_rig));
+  if (pose.t_ns - window_begin_->t_ns >= window_ns) window_begin_ = pose;
+}
+
+void RecordingStatistics::addEvents(int index, const std::string& label, const RigCamera& camera,
+                                    const std::vector<Event>& events) {
+  const auto& selected = options_.cameras;
+  if (!selected.empty() && std::count(selected.begin(), selected.end(), index) == 0) return;
+  const auto [entry, is_new] = cameras_.try_emplace({index, label});
+  CameraStatistics& statistics = entry->second;
+  const auto width = static_cast<std::size_t>(camera.model.width);
+  if (is_new) {
+    statistics.label = label;
+    statistics.camera = camera;
+    const auto offset = static_cast<std::size_t>(index);
+    if (offset < options_.time_offsets_ns.size()) {
+      statistics.camera.time_offset_ns = options_.time_offsets_ns[offset];
+    }
+    // Without a calibration a sensor may have the largest size there is.
+    constexpr std::size_t kMaxPixels = 1U << 24U;
+    const std::size_t pixels = width * static_cast<std::size_t>(camera.model.height);
+    if (pixels <= kMaxPixels) statistics.pixels.assign(pixels, 0);
+  }
+  const std::int64_t from_ns = options_.limits.t0_ns.value_or(kMinTimeNs);
+  const std::int64_t until_ns = options_.limits.t1_ns.value_or(kMaxTimeNs);
+  const std::int64_t offset_ns = statistics.camera.time_offset_ns;
+  std::vector<std::int64_t>& times_ns = statistics.newest_ns;
+  times_ns.clear();
+  times_ns.reserve(events.size());
+  std::uint64_t positive = 0;
+  for (const Event& event : events) {
+    const std::int64_t t_ns = onTrajectoryClock(event.t_ns, offset_ns);
+    if (t_ns < from_ns || t_ns >= until_ns) continue;
+    statistics.rate.add(t_ns);
+    positive += event.polarity ? 1 : 0;
+    const std::size_t pixel = event.y * width + event.x;
+    if (pixel < statistics.pixels.size()) ++statistics.pixels[pixel];
+    times_ns.push_back(t_ns);
+  }
+  if (times_ns.empty()) return;
+  statistics.positive += positive;
+  const auto [first_ns, last_ns] = std::minmax_element(times_ns.begin(), times_ns.end());
+  statistics.events.add(*first_ns, *last_ns, times_ns.size());
+  if (!poses_.last_ns || (*first_ns >= *poses_.first_ns && *last_ns <= *poses_.last_ns)) return;
+  events_before_poses_ += countBetween(statistics.newest_ns, kMinTimeNs, *poses_.first_ns);
+  events_after_poses_ += countBetween(statistics.newest_ns, *poses_.last_ns + 1, kMaxTimeNs);
+}
+
+void RecordingStatistics::addPose(const PoseSourceId& source, std::int64_t t_ns,
+                                  const Rigid3& T_world_body, const Rigid3& T_body_rig) {
+  t_ns = inRange(t_ns);
+  const auto [entry, is_new] = pose_sources_.try_emplace(source);
+  if (is_new) entry->second.order = pose_sources_.size();
+  const Rigid3 T_world_rig = T_world_body * options_.T_body_rig.value_or(T_body_rig);
+  entry->second.add({t_ns, T_world_rig}, durationFromSeconds(options_.window_s));
+  countAroundPose(t_ns);
+}
+
+/// The recording is in the order of time: a new pose can lie only within the last packet of each
+/// camera.
+void RecordingStatistics::countAroundPose(std::int64_t t_ns) {
+  const bool first = poses_.count == 0;
+  poses_.add(t_ns, t_ns, 1);
+  const bool newest = *poses_.last_ns == t_ns;
+  if (newest) events_after_poses_ = 0;
+  for (const auto& [key, camera] : cameras_) {
+    if (first) {
+      events_before_poses_ +=
+          camera.events.count - countBetween(camera.newest_ns, t_ns, kMaxTimeNs);
+    }
+    if (newest) events_after_poses_ += countBetween(camera.newest_ns, t_ns + 1, kMaxTimeNs);
+  }
+}
+
+void RecordingStatistics::setCameras(const std::vector<RigCamera>& cameras) {
+  for (auto& [key, statistics] : cameras_) {
+    const auto index = static_cast<std::size_t>(key.first);
+    if (index < cameras.size()) statistics.camera = cameras[index];
+  }
+}
+
+const PoseStatistics* RecordingStatistics::usedPoses() const {
+  const PoseStatistics* used = nullptr;
+  PoseKind kind = PoseKind::kPose;
+  for (const auto& [source, poses] : pose_sources_) {
+    if (!options_.pose_source.empty() && source.label != options_.pose_source) continue;
+    if (used && std::tie(kind, used->order) <= std::tie(source.kind, poses.order)) continue;
+    used = &poses;
+    kind = source.kind;
+  }
+  return used;
+}
+
+std::optional<std::pair<std::int64_t, std::int64_t>> RecordingStatistics::eventSpan() const {
+  std::optional<std::pair<std::int64_t, std::int64_t>> span;
+  for (const auto& [key, camera] : cameras_) {
+    if (!camera.events.first_ns) continue;
+    if (!span) span = {*camera.events.first_ns, *camera.events.last_ns};
+    span->first = std::min(span->first, *camera.events.first_ns);
+    span->second = std::max(span->second, *camera.events.last_ns);
+  }
+  return span;
+}
+
+double RecordingStatistics::overlap() const {
+  const auto span = eventSpan();
+  const PoseStatistics* const used = usedPoses();
+  if (!span || !used) return 1;
+  const std::int64_t from_ns = std::max(span->first, *used->poses.first_ns);
+  const std::int64_t until_ns = std::min(span->second, *used->poses.last_ns);
+  if (from_ns > until_ns) return 0;
+  const double events_s = secondsBetween(span->first, span->second);
+  return events_s > 0 ? secondsBetween(from_ns, until_ns) / events_s : 1;
+}
+
+}  // namespace efm

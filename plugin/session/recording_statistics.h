@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mapping/events/event.h"
+#include "mapping/events/window.h"
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/trajectory.h"
+#include "plugin/session/event_fusion_options.h"
+#include "plugin/session/event_rate.h"
+#include "plugin/session/pose_source_selector.h"
+
+namespace efm {
+
+/// Which part of a recording counts, and how it is understood. The default: all, as recorded.
+struct StatisticsOptions {
+  TimeLimits limits;                          ///< Events outside do not count.
+  std::vector<int> cameras;                   ///< Those that take part; empty: all.
+  std::vector<std::int64_t> time_offsets_ns;  ///< One per camera, instead of the recording's.
+  std::optional<Rigid3> T_body_rig;           ///< Instead of the recording's.
+  std::string pose_source;                    ///< The label of the source; empty: the best one.
+  /// The motion that counts is that within this time.
+  double window_s = 1.0;
+};
+
+/// The options of a map, as far as they are known before it.
+/// @throws std::runtime_error naming a file of the options that cannot be read.
+StatisticsOptions statisticsOptions(const EventFusionOptions& options);
+
+/// Times of events or poses, in the order of the recording, on the trajectory's clock.
+struct StreamStatistics {
+  std::uint64_t count = 0;
+  std::optional<std::int64_t> first_ns;
+  std::optional<std::int64_t> last_ns;
+  std::int64_t max_gap_ns = 0;  ///< Between two additions.
+  std::int64_t max_gap_start_ns = 0;
+
+  /// Adds a number of times in the closed interval [from, until].
+  void add(std::int64_t from_ns, std::int64_t until_ns, std::uint64_t number);
+  double seconds() const;
+  double rate() const;  ///< Per second; 0 where the stream has no duration.
+};
+
+/// The events of one camera.
+struct CameraStatistics {
+  std::string label;
+  RigCamera camera;
+  StreamStatistics events;
+  std::uint64_t positive = 0;  ///< Events of positive polarity.
+  EventRate rate;
+  /// Events per pixel, row-major; empty where the sensor is too large to count them.
+  std::vector<std::uint32_t> pixels;
+
+  std::vector<std::int64_t> newest_ns;  ///< Times of the last packet.
+};
+
+/// The poses of one source.
+struct PoseStatistics {
+  StreamStatistics poses;
+  std::size_t order = 0;  ///< Among the sources, by their first poses.
+  double path_m = 0;
+  double max_speed = 0;          ///< m/s, over at least 10 ms.
+  double max_rotation_rate = 0;  ///< rad/s, over at least 10 ms.
+  double max_shift_m = 0;        ///< The largest distance from the first pose of a window.
+  double max_rotation_rad = 0;   ///< The largest rotation from the first pose of a window.
+
+  void add(const StampedPose& pose, std::int64_t window_ns);
+
+ private:
+  std::optional<StampedPose> step_begin_;
+  std::optional<StampedPose> window_begin_;
+};
+
+/// Sees each observation of a recording once and counts what can be judged: see `healthWarnings`.
+/// Memory does not grow with the recording. Not thread-safe.
+class RecordingStatistics {
+ public:
+  /// By the index of the camera and its label.
+  using Cameras = std::map<std::pair<int, std::string>, CameraStatistics>;
+
+  explicit RecordingStatistics(StatisticsOptions options = {}) : options_(std::move(options)) {}
+
+  /// @param events in time order.
+  void addEvents(int index, const std::string& label, const RigCamera& camera,
+                 const std::vector<Event>& events);
+  /// @param T_body_rig of the recording.
+  void addPose(const PoseSourceId& source, std::int64_t t_ns, const Rigid3& T_world_body,
+               const Rigid3& T_body_rig);
+  /// The calibrations that a map used instead of the recorded ones.
+  void setCameras(const std::vector<RigCamera>& cameras);
+
+  const Cameras& cameras() const { return cameras_; }
+  const std::map<PoseSourceId, PoseStatistics>& poseSources() const { return pose_sources_; }
+  /// The source whose poses are used: see PoseSourceSelector. Null where there is none.
+  const PoseStatistics* usedPoses() const;
+  /// First and last event of all cameras.
+  std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan() const;
+  /// The fraction of the events' time that the used poses cover, 0 to 1; 1 without events or poses.
+  double overlap() const;
+  /// Events earlier than the first pose, and later than the last, of all sources.
+  std::uint64_t eventsBeforePoses() const { return events_before_poses_; }
+  std::uint64_t eventsAfterPoses() const { return events_after_poses_; }
+
+ private:
+  void countAroundPose(std::int64_t t_ns);
+
+  StatisticsOptions options_;
+  Cameras cameras_;
+  std::map<PoseSourceId, PoseStatistics> pose_sources_;
+  StreamStatistics poses_;  // of all sources
+  std::uint64_t events_before_poses_ = 0;
+  std::uint64_t events_after_poses_ = 0;
+};
+
+}  // namespace efm

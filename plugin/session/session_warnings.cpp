@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/session_warnings.h"
+
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+namespace efm {
+namespace {
+
+/// Collects warnings: a name, and a sentence in fmt's format.
+class WarningList {
+ public:
+  template <typename... Values>
+  void add(const char* name, fmt::format_string<Values...> text, Values&&... values) {
+    warnings_.push_back({name, fmt::format(text, std::forward<Values>(values)...)});
+  }
+  std::vector<Warning> take() { return std::move(warnings_); }
+
+ private:
+  std::vector<Warning> warnings_;
+};
+
+void addUnusedEvents(const SessionStatus& status, const FusionMapperOptions& options,
+                     WarningList& warnings) {
+  if (status.counts.sorted_events > 0) {
+    warnings.add("sorted-events", "{} events came later than newer ones and were sorted",
+                 status.counts.sorted_events);
+  }
+  for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
+    const EventCounts& events = status.counts.cameras[c];
+    if (events.outside_lens == 0) continue;
+    warnings.add("outside-lens",
+                 "{} of {} events of camera {} were not used: its lens model has no viewing ray "
+                 "for their pixels (outside_lens)",
+                 events.outside_lens, events.read, c);
+  }
+  if (status.counts.keyframes == 0) return;  // the error says why
+  const EventCounts counts = status.counts.total();
+  const std::uint64_t wanted = counts.read - counts.dropped;  // events of unselected cameras
+  if (counts.without_pose > wanted / 2) {
+    warnings.add("events-without-pose",
+                 "{} of {} events have no pose: poses begin late, end early or have gaps "
+                 "(--poses, [rig] max_pose_gap_s)",
+                 counts.without_pose, wanted);
+  }
+  // With limits on time, or windows apart from each other, it is what was asked for.
+  const bool gapless = options.policy.policy != KeyframePolicyKind::kPeriod ||
+                       options.policy.stride_s <= options.policy.window_s;
+  const bool whole = !options.only_window && !options.limits.t0_ns && !options.limits.t1_ns;
+  if (whole && gapless && counts.outside_window > wanted / 2) {
+    warnings.add("events-outside-windows",
+                 "{} of {} events lie in no window that was mapped: windows are too long for the "
+                 "recording, or saw too little motion ([keyframes] window_s, min_baseline_ratio)",
+                 counts.outside_window, wanted);
+  }
+}
+
+void addSilence(const SessionStatus& status, bool exclude_silent, WarningList& warnings) {
+  for (std::size_t c = 0; c < status.silent_keyframes.size(); ++c) {
+    if (status.silent_keyframes[c] == 0) continue;
+    warnings.add("silent-keyframes", "camera {} had no event in {} of {} keyframes: {}", c,
+                 status.silent_keyframes[c], status.counts.keyframes,
+                 exclude_silent
+                     ? "the others were fused without it"
+                     : "rules that ask all cameras (min, harmonic, geometric) find nothing there "
+                       "([rig] exclude_silent leaves silent cameras out)");
+  }
+  if (status.counts.silent_subintervals > 0) {
+    warnings.add("silent-subintervals",
+                 "{} sub-intervals of a camera had no event: rules that ask all of them (min, "
+                 "harmonic, geometric) find nothing where one is empty ([fusion] subintervals)",
+                 status.counts.silent_subintervals);
+  }
+}
+
+void addUnusedPoses(const SessionStatus& status, WarningList& warnings) {
+  for (const auto& [source, count] : status.other_poses) {
+    if (!status.pose_source) break;  // no keyframe: the error says so
+    warnings.add("unused-poses", "{} poses were not used: {}, beside {} ([rig] pose_source)", count,
+                 asText(source), asText(*status.pose_source));
+  }
+  if (status.counts.duplicate_poses > 0) {
+    warnings.add("duplicate-poses", "{} poses had the time of an earlier one and were left out",
+                 status.counts.duplicate_poses);
+  }
+}
+
+void addKeyframes(const SessionStatus& status, WarningList& warnings) {
+  const MapperCounts& counts = status.counts;
+  if (status.refinement && status.refinement->counts.registered + 1 < counts.keyframes) {
+    warnings.add("unregistered-keyframes",
+                 "{} of {} keyframes found no place by their points: the tracker's motion stands "
+                 "there",
+                 counts.keyframes - 1 - status.refinement->counts.registered, counts.keyframes);
+  }
+  if (counts.keyframes == 0) return;
+  if (counts.keyframes_without_pose > 0) {
+    warnings.add("windows-without-pose",
+                 "{} windows were left out: no pose at their reference time ([rig] max_pose_gap_s)",
+                 counts.keyframes_without_pose);
+  }
+  if (counts.windows_without_events > 0) {
+    warnings.add("windows-without-events",
+                 "{} windows were left out: the selected cameras saw nothing",
+                 counts.windows_without_events);
+  }
+}
+
+}  // namespace
+
+std::vector<Warning> sessionWarnings(const SessionStatus& status,
+                                     const FusionMapperOptions& options) {
+  WarningList warnings;
+  addUnusedEvents(status, options, warnings);
+  addSilence(status, options.keyframe.exclude_silent, warnings);
+  addUnusedPoses(status, warnings);
+  addKeyframes(status, warnings);
+  return warnings.take();
+}
+
+}  // namespace efm

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/health_checks.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <set>
+#include <string>
+
+#include "mapping/geometry/angle.h"
+#include "plugin/calibration/camchain.h"
+#include "plugin/session/session_warnings.h"
+#include "test/paths.h"
+#include "test/plugin/session/synthetic_recording.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+using Names = std::multiset<std::string>;
+
+Names namesOf(const std::vector<Warning>& warnings) {
+  Names names;
+  for (const Warning& warning : warnings) names.insert(warning.name);
+  return names;
+}
+
+RecordingStatistics statisticsOf(const SyntheticRecording& recording,
+                                 const StatisticsOptions& options = {}) {
+  RecordingStatistics statistics(options);
+  for (const StampedPose& pose : recording.poses) {
+    statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
+  }
+  for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
+    statistics.addEvents(static_cast<int>(c), "cam", recording.cameras[c], recording.events[c]);
+  }
+  return statistics;
+}
+
+std::vector<Warning> warningsOf(const SyntheticRecording& recording,
+                                const StatisticsOptions& options = {}) {
+  const RecordingStatistics statistics = statisticsOf(recording, options);
+  std::vector<Warning> warnings = missingParts(statistics);
+  for (const Warning& warning : healthWarnings(statistics, {})) warnings.push_back(warning);
+  return warnings;
+}
+
+/// Turns pose i by `rate` radians per second.
+void rotate(SyntheticRecording& recording, double rate) {
+  double angle = 0;
+  for (StampedPose& pose : recording.poses) {
+    pose.T_world_rig.rotation = rotationBy({0, angle, 0});
+    angle += 0.01 * rate;
+  }
+}
+
+void keepStill(SyntheticRecording& recording) {
+  for (StampedPose& pose : recording.poses) pose.T_world_rig.translation.setZero();
+}
+
+/// Two seconds; some 2,000 events of each camera.
+SyntheticRecording soundRecording() {
+  static const SyntheticRecording recording(2.0);
+  return recording;
+}
+
+struct Fault {
+  const char* what;
+  std::function<void(SyntheticRecording&)> make;
+  Names expected;
+};
+
+const std::vector<Fault> kFaults = {
+    {"none", [](auto&) {}, {}},
+    {"a baseline of 90 m",
+     [](auto& r) {
+       r.cameras[1].T_rig_cam.translation = {90, 0, 0};
+     },
+     {"baseline"}},
+    {"a baseline of 0.1 mm",
+     [](auto& r) {
+       r.cameras[1].T_rig_cam.translation = {1e-4, 0, 0};
+     },
+     {"baseline"}},
+    {"a telescope", [](auto& r) { r.cameras[0].model.fx = 3000; }, {"focal-length"}},
+    {"a focal length of 2 px", [](auto& r) { r.cameras[1].model.fx = 2; }, {"focal-length"}},
+    {"a fisheye lens of 150 degrees",
+     [](auto& r) {
+       r.cameras[0].model.distortion = DistortionModel::kEquidistant;
+       r.cameras[0].model.coefficients = {0, 0, 0, 0};
+       r.cameras[0].model.fx = r.cameras[0].model.fy = 48;
+     },
+     {}},
+    {"fx and cx swapped",
+     [](auto& r) { std::swap(r.cameras[0].model.fx, r.cameras[0].model.cx); },
+     {"principal-point"}},
+    {"cy of another resolution", [](auto& r) { r.cameras[0].model.cy = 400; }, {"principal-point"}},
+    {"coefficients that fold the image over",
+     [](auto& r) {
+       r.cameras[0].model.distortion = DistortionModel::kRadtan;
+       r.cameras[0].model.coefficients = {-1.5, 0, 0, 0};
+     },
+     {"lens"}},
+    {"poses a second late",
+     [](auto& r) {
+       for (StampedPose& pose : r.poses) pose.t_ns += 1'000'000'000;
+     },
+     {"clock-overlap"}},
+    {"a tracker that starts late, in a short recording",
+     [](auto& r) {
+       r = SyntheticRecording(0.5);
+       r.poses.erase(r.poses.begin(), r.poses.begin() + 8);
+     },
+     {}},
+    {"poses of another clock",
+     [](auto& r) {
+       for (StampedPose& pose : r.poses) pose.t_ns += 1'700'000'000'000'000'000;
+     },
+     {"clock-overlap"}},
+    {"a lost tracker",
+     [](auto& r) { r.poses.erase(r.poses.begin() + 50, r.poses.begin() + 90); },
+     {"pose-gap"}},
+    {"no motion", keepStill, {"no-motion"}},
+    {"rotation alone",
+     [](auto& r) {
+       keepStill(r);
+       rotate(r, 0.5);
+     },
+     {"rotation-only"}},
+    {"positions in millimetres",
+     [](auto& r) {
+       for (StampedPose& pose : r.poses) pose.T_world_rig.translation *= 1000;
+     },
+     {"speed"}},
+    {"a rotation of 30 rad/s", [](auto& r) { rotate(r, 30); }, {"rotation-rate"}},
+    {"a silent camera", [](auto& r) { r.events[1].clear(); }, {"silent-camera"}},
+    {"a covered lens", [](auto& r) { r.events[1].resize(100); }, {"few-events"}},
+    {"one polarity",
+     [](auto& r) {
+       for (Event& event : r.events[0]) event.polarity = true;
+     },
+     {"polarity"}},
+    {"no polarity",
+     [](auto& r) {
+       for (Event& event : r.events[1]) event.polarity = false;
+     },
+     {"polarity"}},
+    {"one column of hot pixels",
+     [](auto& r) {
+       for (Event& event : r.events[0]) event.x = 7;
+     },
+     {"hot-pixels"}},
+    {"no poses", [](auto& r) { r.poses.clear(); }, {"no-poses"}},
+    {"no events", [](auto& r) { r.events.assign(2, {}); }, {"no-events"}},
+    {"no calibration", [](auto& r) { r.cameras[1].model.fx = 0; }, {"no-calibration"}},
+};
+
+TEST(HealthChecks, EachFaultHasItsWarningAndNoOther) {
+  for (const Fault& fault : kFaults) {
+    SyntheticRecording recording = soundRecording();
+    ASSERT_GT(recording.events[0].size(), 2000U);
+    fault.make(recording);
+    EXPECT_EQ(namesOf(warningsOf(recording)), fault.expected) << fault.what;
+  }
+}
+
+TEST(HealthChecks, CountWithTheOptionsOfTheMap) {
+  SyntheticRecording recording = soundRecording();
+  recording.events[1].clear();
+  StatisticsOptions options;
+  options.cameras = {0};
+  EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "the silent camera takes no part";
+
+  recording = soundRecording();
+  for (StampedPose& pose : recording.poses) pose.t_ns += 1'000'000'000;
+  options = {};
+  options.limits.t0_ns = SyntheticRecording::kStartNs + 1'000'000'000;
+  EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "earlier events do not count";
+  options = {};
+  options.time_offsets_ns = {1'000'000'000, 1'000'000'000};
+  EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "the clocks differ by this";
+
+  recording = soundRecording();
+  keepStill(recording);
+  rotate(recording, 0.5);
+  options = {};
+  options.T_body_rig = Rigid3{Eigen::Quaterniond::Identity(), {0, 0, 1}};
+  EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "an arm of a metre turns";
+
+  const RecordingStatistics statistics = statisticsOf(soundRecording());
+  EXPECT_EQ(namesOf(healthWarnings(statistics, {100, 0.25})), Names{"no-motion"});
+  EXPECT_EQ(namesOf(healthWarnings(statistics, {0.5, 0.005})), Names{"pose-gap"});
+}
+
+TEST(HealthChecks, SaysTheValuesAndTheOption) {
+  SyntheticRecording recording = soundRecording();
+  for (StampedPose& pose : recording.poses) pose.t_ns += 1'000'000'000;
+  EXPECT_THAT(warningsOf(recording).at(0).text,
+              AllOf(HasSubstr("the poses cover 50.1 % of the events' time"),
+                    HasSubstr("poses from 11.000000000 to 13.000000000 s"), HasSubstr("--poses")));
+}
+
+TEST(HealthChecks, TheRigsOfDataSetsAreSound) {
+  for (const char* file : {"dsec.yaml", "mvsec.yaml", "tumvie_a.yaml", "tumvie_b.yaml"}) {
+    const Rig rig = readCamchain(std::string(EFM_SOURCE_DIR "/config/calibration/") + file);
+    SyntheticRecording recording = soundRecording();
+    recording.cameras = rig.cameras;
+    EXPECT_THAT(namesOf(warningsOf(recording)), IsEmpty()) << file;
+  }
+}
+
+TEST(HealthChecks, DepthsAtALimitAreSeen) {
+  DepthPlanesOptions planes;  // 0.5 to 5 m: 2 and 0.2 in inverse depth
+  const auto warningsAt = [&](float depth_m, int percent, int depths = 500) {
+    cv::Mat_<float> depth(20, 50, 0.0F);
+    for (int i = 0; i < depths; ++i) {
+      depth(i / 50, i % 50) = i * 100 < percent * depths ? depth_m : 1.0F;
+    }
+    DepthStatistics statistics(planes);
+    statistics.add(depth);
+    return statistics.warnings();
+  };
+  EXPECT_THAT(warningsAt(0.508F, 10).at(0).text,
+              AllOf(HasSubstr("10 % of the depths lie at the nearest plane"), HasSubstr("0.5 m")));
+  EXPECT_THAT(warningsAt(4.4F, 10).at(0).text, HasSubstr("farthest plane, 5 m"));
+  EXPECT_THAT(warningsAt(0.508F, 4), IsEmpty());
+  EXPECT_THAT(warningsAt(0.52F, 10), IsEmpty());
+  EXPECT_THAT(warningsAt(4.0F, 10), IsEmpty());
+  EXPECT_THAT(warningsAt(0.508F, 10, 90), IsEmpty());
+  planes.num_planes = 40;
+  EXPECT_THAT(warningsAt(0.508F, 10), IsEmpty());
+}
+
+TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
+  FusionMapperOptions options;
+  SessionStatus sound;
+  sound.counts.cameras = {{100, 60, 20, 20, 0, 0}};
+  sound.counts.keyframes = 3;
+  sound.silent_keyframes = {0};
+  sound.pose_source = PoseSourceId{PoseKind::kPose, "pose"};
+  EXPECT_THAT(sessionWarnings(sound, options), IsEmpty());
+
+  struct Row {
+    const char* expected;
+    std::function<void(SessionStatus&)> make;
+  };
+  const std::vector<Row> rows = {
+      {"sorted-events", [](auto& s) { s.counts.sorted_events = 1; }},
+      {"outside-lens", [](auto& s) { s.counts.cameras[0].outside_lens = 1; }},
+      {"events-without-pose", [](auto& s) { s.counts.cameras[0].without_pose = 60; }},
+      {"events-outside-windows", [](auto& s) { s.counts.cameras[0].outside_window = 60; }},
+      {"silent-keyframes", [](auto& s) { s.silent_keyframes[0] = 1; }},
+      {"silent-subintervals", [](auto& s) { s.counts.silent_subintervals = 1; }},
+      {"unused-poses",
+       [](auto& s) {
+         s.other_poses[{PoseKind::kOdometry, "wheels"}] = 5;
+       }},
+      {"duplicate-poses", [](auto& s) { s.counts.duplicate_poses = 1; }},
+      {"unregistered-keyframes", [](auto& s) { s.refinement.emplace(); }},
+      {"windows-without-pose", [](auto& s) { s.counts.keyframes_without_pose = 1; }},
+      {"windows-without-events", [](auto& s) { s.counts.windows_without_events = 1; }},
+  };
+  for (const Row& row : rows) {
+    SessionStatus status = sound;
+    row.make(status);
+    EXPECT_EQ(namesOf(sessionWarnings(status, options)), Names{row.expected});
+  }
+  sound.counts.cameras[0].outside_window = 60;
+  options.limits.t0_ns = 5;
+  EXPECT_THAT(sessionWarnings(sound, options), IsEmpty()) << "they were left out by a limit";
+}
+
+}  // namespace
+}  // namespace efm
