@@ -274,7 +274,7 @@ void DepthStatistics::add(const cv::Mat_<float>& depth) {
 
 std::vector<Warning> DepthStatistics::warnings() const {
   // Evenly spread depths: 2 %. Measured on six simulated scenes and a real one: with limits around
-  // the scene at most 2.4 %; with half of the scene beyond a limit 7 to 23 % in eight of ten cases.
+  // the scene at most 2.4 %; with much of the scene beyond a limit 7 to 74 % in eight of ten cases.
   // It is not more, because most pixels without a peak inside the limits are rejected.
   constexpr double kMaxFraction = 0.06;
   constexpr std::uint64_t kMinDepths = 100;  // fewer may lie there by chance
