@@ -114,10 +114,11 @@ TEST_F(DeskStereoDsi, TheKernelIsExactUpToItsRounding) {
   const Error error = compareWith(oracleDsi(true));
   std::cout << "kernel error: L1 " << error.l1 << " of the mass, same peak plane "
             << error.same_peak << "\n";
-  // Coordinates are rounded to 1/4096 px, twice: some 1e-4 of the mass. Peaks that move by it are
-  // ties of single votes.
-  EXPECT_LE(error.l1, 2e-4);
-  EXPECT_GE(error.same_peak, 0.995);
+  // Coordinates are rounded to 1/4096 px, twice, weights to 1/1024: 3.4e-4 of the mass, a sixth of
+  // what sharing poses costs. Peaks that move by it are ties of few votes.
+  EXPECT_LE(error.l1, 5e-4);
+  EXPECT_GE(error.same_peak, 0.98);
+  EXPECT_GE(error.near_peak_kept, 0.999);
 }
 
 TEST_F(DeskStereoDsi, SharingPosesCostsNextToNothing) {
