@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CObservationEvents.h"
@@ -114,6 +115,8 @@ class Export {
     }
   }
 
+  void add(const TruthDepth& truth) { writer_->addTruth(truth.t_ns, truth.file); }
+
   void close(const std::filesystem::path& out) {
     writer_->close();
     fmt::print("{} events, {} poses; written to {}\n", events_, poses_, out.string());
@@ -150,6 +153,11 @@ int runExport(const ExportArguments& arguments) {
   while (const auto observation = recording->next()) {
     result.add(*observation);
     progress.showFraction("exporting", recording->progress());
+  }
+  for (const TruthDepth& truth : openTruth(arguments.source)) {
+    const bool inside = truth.t_ns >= limits.t0_ns.value_or(kMinTimeNs) &&
+                        truth.t_ns < limits.t1_ns.value_or(kMaxTimeNs);
+    if (inside) result.add(truth);
   }
   result.close(arguments.out);
   warnOfLosses(recording->counts());

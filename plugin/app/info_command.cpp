@@ -147,6 +147,9 @@ int runInfo(const InfoArguments& arguments) {
     }
   }
   print(contents, recording->counts());
+  if (const auto truth = openTruth(source); !truth.empty()) {
+    fmt::print("truth: {} depth maps of camera 0\n", truth.size());
+  }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
   const std::vector<Warning> warnings = warningsOf(contents, recording->counts());
   printWarnings(warnings);

@@ -67,6 +67,7 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
         source.string(), all.calibration->file.string()));
   }
   if (parts.calibration) all.calibration = std::move(parts.calibration);
+  std::move(parts.truth.begin(), parts.truth.end(), std::back_inserter(all.truth));
   if (!all.default_size) all.default_size = parts.default_size;
 }
 
@@ -201,6 +202,11 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     recording = std::make_unique<RigOverrideRecording>(std::move(recording), setup);
   }
   return recording;
+}
+
+std::vector<TruthDepth> openTruth(const RecordingSource& source) {
+  if (formatOf(source.files.at(0), source.format) == nullptr) return {};  // a rawlog
+  return openParts(source).truth;
 }
 
 }  // namespace efm

@@ -48,4 +48,7 @@ std::vector<std::string> recordingFormats();
 /// std::invalid_argument if the calibration is of other cameras or the faults are not valid.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
+/// The depth maps of the recording's truth, if it has any that is read: a dataset folder's.
+std::vector<TruthDepth> openTruth(const RecordingSource& source);
+
 }  // namespace efm

@@ -14,6 +14,12 @@
 
 namespace efm {
 
+/// A depth map of the truth.
+struct TruthDepth {
+  std::int64_t t_ns = 0;
+  std::filesystem::path file;  ///< float32 TIFF: z-depth in metres in camera 0's undistorted view.
+};
+
 /// What a reader finds in the files of a recording. All parts may be missing: other sources, or
 /// files of their own, may have them.
 struct RecordingParts {
@@ -24,6 +30,8 @@ struct RecordingParts {
   std::optional<CameraSize> default_size;
 
   std::vector<StampedPose> poses;  ///< T_world_body, in any order.
+
+  std::vector<TruthDepth> truth;  ///< In the order of the recording.
 
   /// What the format calls its missing parts, for errors: "calib.txt".
   std::string expected_calibration = "a calibration in the recording";

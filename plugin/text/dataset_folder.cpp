@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/text/dataset_folder.h"
 
+#include <fmt/format.h>
+
+#include <fstream>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 
+#include "mapping/geometry/timestamp.h"
+#include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 #include "plugin/streams/source_files.h"
 #include "plugin/text/event_text.h"
 #include "tracking_stub/poses/tum_trajectory.h"
@@ -21,6 +29,25 @@ std::size_t countCameras(const fs::path& folder) {
   std::size_t count = 0;
   while (isFile(eventsOf(folder, count))) ++count;
   return count;
+}
+
+/// The depth maps that depth/index.txt lists, a line `t file` each.
+std::vector<TruthDepth> truthIn(const fs::path& folder) {
+  const fs::path index = folder / "depth" / "index.txt";
+  std::vector<TruthDepth> truth;
+  std::ifstream stream(index);
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const auto words = splitWords(std::string_view(line).substr(0, line.find('#')));
+    if (words.empty()) continue;
+    const auto t_ns = parseSeconds(words[0]);
+    if (!t_ns || words.size() != 2) {
+      throw std::runtime_error(fmt::format("{}:{}: {}: expected a time and the name of a file",
+                                           index.string(), number, inQuotes(line)));
+    }
+    truth.push_back({*t_ns, index.parent_path() / words[1]});
+  }
+  return truth;
 }
 
 }  // namespace
@@ -45,6 +72,7 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
 }
 
 void addFolderFiles(const fs::path& folder, RecordingParts& parts) {
+  parts.truth = truthIn(folder);
   const fs::path camchain = folder / "camchain.yaml";
   if (!parts.calibration && isFile(camchain)) parts.calibration = readCalibration(camchain);
   for (const char* name : {"poses.txt", "groundtruth.txt"}) {

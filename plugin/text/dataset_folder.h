@@ -13,6 +13,7 @@ namespace efm {
 ///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera; other names
 ///                     and columns: `eventFileIn`, `findEventColumns`
 ///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0
+///   depth/index.txt   with truth: t file, depth maps of camera 0 (see TruthDepth)
 /// Other files are ignored.
 
 /// Whether the folder has a camchain.yaml, or events in cam0.

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "mapping/geometry/timestamp.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/truth/dataset_writer.h"
 
@@ -29,7 +30,19 @@ void FolderWriter::addEvents(std::size_t camera, const std::vector<Event>& event
 
 void FolderWriter::addPose(const StampedPose& pose) { writeTumPose(poses_.stream(), pose); }
 
+void FolderWriter::addTruth(std::int64_t t_ns, const std::filesystem::path& file) {
+  const std::filesystem::path depth = folder_.temporary() / "depth";
+  if (!truth_) {
+    std::filesystem::create_directory(depth);
+    truth_ = std::make_unique<TextFile>(depth / "index.txt");
+  }
+  const std::string name = "cam0_" + formatSeconds(t_ns) + ".tiff";
+  std::filesystem::copy_file(file, depth / name);
+  truth_->stream() << formatSeconds(t_ns) << " " << name << "\n";
+}
+
 void FolderWriter::close() {
+  if (truth_) truth_->close();
   for (TextFile& file : events_) file.close();
   poses_.close();
   folder_.finish();

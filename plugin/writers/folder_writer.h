@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <vector>
 
 #include "plugin/writers/recording_writer.h"
@@ -10,7 +11,8 @@
 
 namespace efm {
 
-/// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0).
+/// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0);
+/// depth/ with the truth.
 class FolderWriter : public RecordingWriter {
  public:
   /// @param rig whose frame is that of camera 0.
@@ -19,12 +21,14 @@ class FolderWriter : public RecordingWriter {
 
   void addEvents(std::size_t camera, const std::vector<Event>& events) override;
   void addPose(const StampedPose& pose) override;
+  void addTruth(std::int64_t t_ns, const std::filesystem::path& file) override;
   void close() override;
 
  private:
   NewFolder folder_;
   std::vector<TextFile> events_;  // per camera
   TextFile poses_;
+  std::unique_ptr<TextFile> truth_;  // the index, if there is any
 };
 
 }  // namespace efm

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <vector>
 
 #include "mapping/events/event.h"
@@ -24,6 +26,12 @@ class RecordingWriter {
   virtual void addEvents(std::size_t camera, const std::vector<Event>& events) = 0;
   /// @param pose T_world_rig; poses come in time order.
   virtual void addPose(const StampedPose& pose) = 0;
+  /// Adds a depth map of camera 0: a float32 TIFF file in metres. Most formats have no place for
+  /// it.
+  virtual void addTruth(std::int64_t t_ns, const std::filesystem::path& file) {
+    static_cast<void>(t_ns);
+    static_cast<void>(file);
+  }
   /// Completes the files.
   virtual void close() = 0;
 };

@@ -63,6 +63,19 @@ TEST_F(ImportCommand, ACutRawlogStillAnnouncesItsCameras) {
   EXPECT_EQ(mapOf("again.rawlog"), mapOf("cut.rawlog"));
 }
 
+TEST_F(ImportCommand, TheTruthOfAFolderIsExportedWithIt) {
+  write(SyntheticRecording());
+  write("data/depth/index.txt", "# t file\n10.100000000 a.tiff\n10.300000000 b.tiff\n");
+  write("data/depth/a.tiff", "first");
+  write("data/depth/b.tiff", "second");
+  EXPECT_THAT(run("info data").out, HasSubstr("truth: 2 depth maps of camera 0"));
+  ASSERT_EQ(run("export data --to folder --out text --t0 10.2").status, 0);
+  EXPECT_EQ(contentOf("text/depth/index.txt"), "10.300000000 cam0_10.300000000.tiff\n");
+  EXPECT_EQ(contentOf("text/depth/cam0_10.300000000.tiff"), "second");
+  write("data/depth/index.txt", "10.1 a.tiff\nlater b.tiff\n");
+  EXPECT_THAT(errorOf("info data"), HasSubstr("depth/index.txt:2: 'later b.tiff': expected"));
+}
+
 TEST_F(ImportCommand, ReplacesNothingButARawlog) {
   writeSmallRecording();
   const std::string events = contentOf("small/events.txt");
@@ -83,6 +96,7 @@ TEST_F(ImportCommand, AnExportedFolderGivesTheSameMap) {
   EXPECT_EQ(contentOf("text/cam1/events.txt"), contentOf("data/cam1/events.txt"));
   EXPECT_EQ(contentOf("text/poses.txt").rfind('#'), 0U) << "a header, and no other one";
   EXPECT_EQ(mapOf("text"), mapOf("data"));
+  EXPECT_FALSE(exists(folder() / "text" / "depth"));
   EXPECT_THAT(errorOf("export r.rawlog --to folder --out text"),
               HasSubstr("exists already and is not an empty folder"));
 }
