@@ -33,7 +33,7 @@ step 3 "simulate two event cameras over a desk, 2 s"
 step 4 "import the recording into a rawlog"
 "$tool" import "$out/recording" --out "$out/recording.rawlog"
 step 5 "play the rawlog through the plugin"
-"$tool" map config/simulated_stereo.ini "$out/recording.rawlog" --out "$out"
+"$tool" map config/simulated_stereo.ini "$out/recording.rawlog" --out "$out" --force
 step 6 "measure the depth maps against the simulator's truth"
 "$tool" evaluate depth "$out" "$out/recording/depth" --tolerance-px 1 --focal 226 --baseline 0.1 \
   --json >"$out/evaluation.json"
