@@ -3,13 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <iostream>
 #include <map>
 #include <memory>
 #include <stdexcept>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CObservationEvents.h"
@@ -121,9 +121,8 @@ class Export {
     writer_->close();
     fmt::print("{} events, {} poses; written to {}\n", events_, poses_, out.string());
     if (other_poses_ > 0) {
-      std::cerr << fmt::format(
-          "event-fusion: warning: {} poses of other sources than {} were left out\n", other_poses_,
-          asText(*pose_source_));
+      printWarnings({{"unused-poses", fmt::format("{} poses of other sources than {} were left out",
+                                                  other_poses_, asText(*pose_source_))}});
     }
   }
 

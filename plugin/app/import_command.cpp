@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
-#include <iostream>
 #include <map>
 #include <optional>
 #include <stdexcept>
@@ -15,6 +14,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
@@ -112,10 +112,10 @@ int runImport(const ImportArguments& arguments) {
              recording->counts().sorted_events);
   warnOfLosses(recording->counts());
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
-    std::cerr << fmt::format(
-        "event-fusion: warning: odometry ({} observations) cannot hold the hand-eye transform: "
-        "give it to map as well\n",
-        odometry);
+    printWarnings({{"hand-eye-left-out",
+                    fmt::format("odometry ({} observations) cannot hold the hand-eye transform: "
+                                "give it to map as well (--hand-eye)",
+                                odometry)}});
   }
   const auto bytes = static_cast<double>(std::filesystem::file_size(arguments.out));
   fmt::print("written to {}, {:.1f} MB, {:.2f} bytes per event\n", arguments.out.string(),

@@ -133,10 +133,7 @@ Calibration readCalibration(const std::filesystem::path& file) {
   const std::string text = readText(file);
   if (looksLikeIni(text)) return {file, readMrptCameras(text, file)};
   if (!parseNumber<double>(firstWord(text))) return readYamlCalibration(file);
-  CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
-  model.width = 0;
-  model.height = 0;
-  return {file, {{{model, {}, 0}}}};
+  return readUzhCalibration(file);
 }
 
 CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size) {
@@ -160,6 +157,13 @@ CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize siz
     throw std::runtime_error(file.string() + ": " + error.what());
   }
   return model;
+}
+
+Calibration readUzhCalibration(const std::filesystem::path& file) {
+  CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
+  model.width = 0;
+  model.height = 0;
+  return {file, {{{model, {}, 0}}}};
 }
 
 }  // namespace efm

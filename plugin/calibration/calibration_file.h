@@ -54,5 +54,7 @@ Calibration readCalibration(const std::filesystem::path& file);
 /// radtan with five coefficients, even where all are zero.
 /// @throws std::runtime_error naming the file, the value or the count, and what was expected.
 CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size);
+/// The same without the sensor's size, which the file does not have: width and height are 0.
+Calibration readUzhCalibration(const std::filesystem::path& file);
 
 }  // namespace efm

@@ -67,7 +67,6 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
         source.string(), all.calibration->file.string()));
   }
   if (parts.calibration) all.calibration = std::move(parts.calibration);
-  std::move(parts.truth.begin(), parts.truth.end(), std::back_inserter(all.truth));
   if (!all.default_size) all.default_size = parts.default_size;
 }
 
@@ -205,8 +204,14 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
 }
 
 std::vector<TruthDepth> openTruth(const RecordingSource& source) {
-  if (formatOf(source.files.at(0), source.format) == nullptr) return {};  // a rawlog
-  return openParts(source).truth;
+  std::vector<TruthDepth> truth;
+  for (const Path& file : source.files) {
+    const RecordingFormat* const format = formatOf(file, source.format);
+    if (format == nullptr || format->truth == nullptr) continue;
+    const std::vector<TruthDepth> found = format->truth(file);
+    truth.insert(truth.end(), found.begin(), found.end());
+  }
+  return truth;
 }
 
 }  // namespace efm

@@ -48,7 +48,9 @@ std::vector<std::string> recordingFormats();
 /// std::invalid_argument if the calibration is of other cameras or the faults are not valid.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
-/// The depth maps of the recording's truth, if it has any that is read: a dataset folder's.
+/// The depth maps of the recording's truth, if it has any that is read: that of the formats with
+/// `RecordingFormat::truth`. Opens no events.
+/// @throws std::runtime_error naming the file and the line that is wrong.
 std::vector<TruthDepth> openTruth(const RecordingSource& source);
 
 }  // namespace efm

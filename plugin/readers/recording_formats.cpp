@@ -36,9 +36,9 @@ const std::vector<RecordingFormat>& readerFormats() {
   // A folder of HDF5 files may have a camchain.yaml, too: HDF5 comes before the dataset folder.
   static const std::vector<RecordingFormat> all = {
       {"hdf5", "an HDF5 file, or a folder of them (DSEC, TUM-VIE, VECtor, M3ED, MVSEC, Metavision)",
-       looksLikeHdf5, openHdf5},
+       looksLikeHdf5, openHdf5, truthOfFolder},
       {"folder", "a dataset folder (camchain.yaml, cam0/events.txt, poses.txt)",
-       looksLikeDatasetFolder, openDatasetFolder},
+       looksLikeDatasetFolder, openDatasetFolder, truthOfFolder},
       {"uzh", "a folder in the UZH layout (events.txt, groundtruth.txt, calib.txt)",
        looksLikeUzhFolder, openUzhFolder},
       {"rosbag", "a ROS 1 bag (.bag)", looksLikeRosbag, openBags},

@@ -31,8 +31,6 @@ struct RecordingParts {
 
   std::vector<StampedPose> poses;  ///< T_world_body, in any order.
 
-  std::vector<TruthDepth> truth;  ///< In the order of the recording.
-
   /// What the format calls its missing parts, for errors: "calib.txt".
   std::string expected_calibration = "a calibration in the recording";
   std::string expected_poses = "poses in the recording";
@@ -61,6 +59,9 @@ struct RecordingFormat {
   /// Opens the files of one recording, at least one. Cameras are in the order of the files.
   /// @throws std::runtime_error naming the file and what was expected.
   RecordingParts (*open)(const std::vector<std::filesystem::path>& files, const ReaderOptions&);
+  /// The depth maps of a source's truth, in the order of its list; null where the format has none.
+  /// @throws std::runtime_error naming the file and the line that is wrong.
+  std::vector<TruthDepth> (*truth)(const std::filesystem::path& source) = nullptr;
 };
 
 }  // namespace efm

@@ -31,25 +31,6 @@ std::size_t countCameras(const fs::path& folder) {
   return count;
 }
 
-/// The depth maps that depth/index.txt lists, a line `t file` each.
-std::vector<TruthDepth> truthIn(const fs::path& folder) {
-  const fs::path index = folder / "depth" / "index.txt";
-  std::vector<TruthDepth> truth;
-  std::ifstream stream(index);
-  std::string line;
-  for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    const auto words = splitWords(std::string_view(line).substr(0, line.find('#')));
-    if (words.empty()) continue;
-    const auto t_ns = parseSeconds(words[0]);
-    if (!t_ns || words.size() != 2) {
-      throw std::runtime_error(fmt::format("{}:{}: {}: expected a time and the name of a file",
-                                           index.string(), number, inQuotes(line)));
-    }
-    truth.push_back({*t_ns, index.parent_path() / words[1]});
-  }
-  return truth;
-}
-
 }  // namespace
 
 bool looksLikeDatasetFolder(const fs::path& folder) {
@@ -72,7 +53,6 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
 }
 
 void addFolderFiles(const fs::path& folder, RecordingParts& parts) {
-  parts.truth = truthIn(folder);
   const fs::path camchain = folder / "camchain.yaml";
   if (!parts.calibration && isFile(camchain)) parts.calibration = readCalibration(camchain);
   for (const char* name : {"poses.txt", "groundtruth.txt"}) {
@@ -80,6 +60,24 @@ void addFolderFiles(const fs::path& folder, RecordingParts& parts) {
     if (!parts.poses.empty() || !fs::exists(folder / name, ignored)) continue;
     parts.poses = readPosesFile(folder / name);
   }
+}
+
+std::vector<TruthDepth> truthOfFolder(const fs::path& folder) {
+  const fs::path index = folder / "depth" / "index.txt";
+  std::vector<TruthDepth> truth;
+  std::ifstream stream(index);
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const auto words = splitWords(std::string_view(line).substr(0, line.find('#')));
+    if (words.empty()) continue;
+    const auto t_ns = parseSeconds(words[0]);
+    if (!t_ns || words.size() != 2) {
+      throw std::runtime_error(fmt::format("{}:{}: {}: expected a time and the name of a file",
+                                           index.string(), number, inQuotes(line)));
+    }
+    truth.push_back({*t_ns, index.parent_path() / words[1]});
+  }
+  return truth;
 }
 
 }  // namespace efm

@@ -29,4 +29,8 @@ RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folde
 /// @throws std::runtime_error naming the file and the line that is wrong.
 void addFolderFiles(const std::filesystem::path& folder, RecordingParts& parts);
 
+/// The depth maps that the folder's depth/index.txt lists, a line `t file` each; none without it.
+/// @throws std::runtime_error naming the file and the line that is wrong.
+std::vector<TruthDepth> truthOfFolder(const std::filesystem::path& folder);
+
 }  // namespace efm

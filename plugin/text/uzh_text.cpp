@@ -70,10 +70,7 @@ RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderO
   parts.cameras.push_back(std::make_unique<UzhEvents>(folder, options));
   std::error_code ignored;
   if (fs::exists(folder / "calib.txt", ignored)) {
-    CameraModel model = readUzhCalibration(folder / "calib.txt", kDavis240c);
-    model.width = 0;  // the file does not say it
-    model.height = 0;
-    parts.calibration = Calibration{folder / "calib.txt", {{{model, {}, 0}}}};
+    parts.calibration = readUzhCalibration(folder / "calib.txt");
   }
   if (fs::exists(folder / "groundtruth.txt", ignored)) {
     parts.poses = readPosesFile(folder / "groundtruth.txt");

@@ -110,5 +110,19 @@ TEST_F(DatasetFolder, ErrorsInAFileNameItAndTheLine) {
   EXPECT_THAT(errorOfOpening(), AllOf(HasSubstr("cam1/events.txt:1: "), HasSubstr("'240'")));
 }
 
+TEST_F(DatasetFolder, ADamagedListOfTheTruthStopsOnlyWhoAsksForIt) {
+  RecordingSource source;
+  source.files = {folder()};
+  EXPECT_TRUE(openTruth(source).empty());
+  write("depth/index.txt", "# t file\n0.3 a.tiff\n");
+  const std::vector<TruthDepth> truth = openTruth(source);
+  ASSERT_EQ(truth.size(), 1U);
+  EXPECT_EQ(truth[0].t_ns, 300'000'000);
+  EXPECT_EQ(truth[0].file, folder() / "depth" / "a.tiff");
+  write("depth/index.txt", "0.3 a.tiff\nsoon b.tiff\n");
+  EXPECT_NO_THROW(openAs("folder", folder()));
+  EXPECT_THAT(errorOf([&] { openTruth(source); }), HasSubstr("index.txt:2: 'soon b.tiff'"));
+}
+
 }  // namespace
 }  // namespace efm
