@@ -5,6 +5,8 @@
 #include <functional>
 #include <memory>
 
+#include "plugin/app/progress.h"
+
 namespace efm {
 
 /// Runs a command and returns the process's exit status.
@@ -19,5 +21,8 @@ std::shared_ptr<Arguments> argumentsOf(CLI::App& command, Run& run,
   command.callback([arguments, handler, &run] { run = [=] { return handler(*arguments); }; });
   return arguments;
 }
+
+/// Adds --quiet and, for a command with keyframes, --verbose.
+void addVerbosity(CLI::App& command, Verbosity& verbosity, bool has_keyframes = false);
 
 }  // namespace efm

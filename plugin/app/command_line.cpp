@@ -59,6 +59,7 @@ void addImport(CLI::App& app, Run& run) {
       ->transform(CLI::Transformer(kCompressions))
       ->type_name("gzip|zstd|none");
   addPacketLength(command, arguments->source.packet_ns);
+  addVerbosity(command, arguments->verbosity);
   command.parse_complete_callback(
       [arguments] { requireKeyframeLengthOf(arguments->source.faults); });
 }
@@ -75,6 +76,7 @@ void addExport(CLI::App& app, Run& run) {
       ->required()
       ->type_name("PATH");
   addTimeLimits(command, arguments->times);
+  addVerbosity(command, arguments->verbosity);
   command.parse_complete_callback(
       [arguments] { requireKeyframeLengthOf(arguments->source.faults); });
 }
@@ -86,6 +88,7 @@ void addInfo(CLI::App& app, Run& run) {
   addSource(command, arguments->source);
   addTimeLimits(command, arguments->times);
   addStrict(command, arguments->strict);
+  addVerbosity(command, arguments->verbosity);
   command.add_flag("--system", arguments->system,
                    "Print the processor and the kernels of the inner loops that it can run, and "
                    "test them; needs no recording");
@@ -97,6 +100,18 @@ void addInfo(CLI::App& app, Run& run) {
 }
 
 }  // namespace
+
+void addVerbosity(CLI::App& command, Verbosity& verbosity, bool has_keyframes) {
+  CLI::Option* const quiet = command.add_flag_callback(
+      "-q,--quiet", [&verbosity] { verbosity = Verbosity::kQuiet; },
+      "Print warnings and errors alone: no progress, no result");
+  if (!has_keyframes) return;
+  command
+      .add_flag_callback(
+          "-v,--verbose", [&verbosity] { verbosity = Verbosity::kVerbose; },
+          "Also print a line per keyframe, with the time that it took")
+      ->excludes(quiet);
+}
 
 std::function<int()> parseCommandLine(int argc, char** argv) {
   CLI::App app(

@@ -85,7 +85,8 @@ Rig rigOf(Recording& recording) {
 class Export {
  public:
   /// @param rig of the recording; the results' rig has camera 0's frame.
-  Export(const ExportArguments& arguments, Rig rig) : T_rig_cam0_(rig.cameras[0].T_rig_cam) {
+  Export(const ExportArguments& arguments, Rig rig)
+      : T_rig_cam0_(rig.cameras[0].T_rig_cam), quiet_(arguments.verbosity == Verbosity::kQuiet) {
     const Rigid3 T_cam0_rig = T_rig_cam0_.inverse();
     for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
       Rigid3& T = rig.cameras[i].T_rig_cam;
@@ -119,7 +120,7 @@ class Export {
 
   void close(const std::filesystem::path& out) {
     writer_->close();
-    fmt::print("{} events, {} poses; written to {}\n", events_, poses_, out.string());
+    if (!quiet_) fmt::print("{} events, {} poses; written to {}\n", events_, poses_, out.string());
     if (other_poses_ > 0) {
       printWarnings({{"unused-poses", fmt::format("{} poses of other sources than {} were left out",
                                                   other_poses_, asText(*pose_source_))}});
@@ -128,6 +129,7 @@ class Export {
 
  private:
   Rigid3 T_rig_cam0_;
+  bool quiet_;
   std::unique_ptr<RecordingWriter> writer_;
   std::optional<PoseSourceId> pose_source_;
   std::uint64_t events_ = 0;
@@ -148,10 +150,10 @@ int runExport(const ExportArguments& arguments) {
   const auto open = [&] { return openInterval(arguments.source, limits); };
   Export result(arguments, rigOf(*open()));
   const std::unique_ptr<Recording> recording = open();
-  Progress progress;
+  Progress progress("exporting", arguments.verbosity);
   while (const auto observation = recording->next()) {
     result.add(*observation);
-    progress.showFraction("exporting", recording->progress());
+    progress.show(recording->progress());
   }
   for (const TruthDepth& truth : openTruth(arguments.source)) {
     const bool inside = truth.t_ns >= limits.t0_ns.value_or(kMinTimeNs) &&

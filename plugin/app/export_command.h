@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 
@@ -15,6 +16,7 @@ struct ExportArguments {
   TimeArguments times;
   std::string format;  ///< One of `exportFormats`.
   std::filesystem::path out;
+  Verbosity verbosity = Verbosity::kNormal;
 };
 
 /// The formats that this build writes.

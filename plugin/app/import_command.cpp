@@ -86,7 +86,7 @@ int runImport(const ImportArguments& arguments) {
   std::uint64_t odometry = 0;  // of them
   std::uint64_t others = 0;
   {
-    Progress progress;
+    Progress progress("importing", arguments.verbosity);
     while (const auto observation = recording->next()) {
       writer.write(*observation);
       if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
@@ -98,7 +98,7 @@ int runImport(const ImportArguments& arguments) {
       } else {
         ++others;
       }
-      progress.showFraction("importing", recording->progress());
+      progress.show(recording->progress());
     }
     if (all_events == 0) refuseLimitsWithoutEvents(arguments, limits);
     if (all_events + poses + others == 0) {
@@ -106,10 +106,6 @@ int runImport(const ImportArguments& arguments) {
     }
     writer.close();
   }
-  for (const auto& [label, count] : events) fmt::print("{}: {} events\n", label, count);
-  if (others > 0) fmt::print("{} other observations\n", others);
-  fmt::print("{} poses; {} events were out of order and sorted\n", poses,
-             recording->counts().sorted_events);
   warnOfLosses(recording->counts());
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
     printWarnings({{"hand-eye-left-out",
@@ -117,6 +113,11 @@ int runImport(const ImportArguments& arguments) {
                                 "give it to map as well (--hand-eye)",
                                 odometry)}});
   }
+  if (arguments.verbosity == Verbosity::kQuiet) return 0;
+  for (const auto& [label, count] : events) fmt::print("{}: {} events\n", label, count);
+  if (others > 0) fmt::print("{} other observations\n", others);
+  fmt::print("{} poses; {} events were out of order and sorted\n", poses,
+             recording->counts().sorted_events);
   const auto bytes = static_cast<double>(std::filesystem::file_size(arguments.out));
   fmt::print("written to {}, {:.1f} MB, {:.2f} bytes per event\n", arguments.out.string(),
              bytes * 1e-6, all_events == 0 ? 0.0 : bytes / static_cast<double>(all_events));

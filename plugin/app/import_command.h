@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/formats/rawlog_writer.h"
@@ -14,6 +15,7 @@ struct ImportArguments {
   TimeArguments times;
   std::filesystem::path out;
   RawlogCompression compression = RawlogCompression::kGzip;
+  Verbosity verbosity = Verbosity::kNormal;
 };
 
 /// `event-fusion import`: writes a recording as a rawlog. Replaces an earlier rawlog, no other

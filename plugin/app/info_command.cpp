@@ -136,18 +136,19 @@ int runInfo(const InfoArguments& arguments) {
   Contents contents;
   std::exception_ptr stopped;
   {
-    Progress progress;
+    Progress progress("reading", arguments.verbosity);
     try {
       while (const auto observation = recording->next()) {
         contents.add(*observation);
-        progress.showFraction("reading", recording->progress());
+        progress.show(recording->progress());
       }
     } catch (const std::exception&) {
       stopped = std::current_exception();
     }
   }
-  print(contents, recording->counts());
-  if (const auto truth = openTruth(source); !truth.empty()) {
+  const bool quiet = arguments.verbosity == Verbosity::kQuiet;
+  if (!quiet) print(contents, recording->counts());
+  if (const auto truth = openTruth(source); !truth.empty() && !quiet) {
     fmt::print("truth: {} depth maps of camera 0\n", truth.size());
   }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then

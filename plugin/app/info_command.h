@@ -3,6 +3,7 @@
 
 #include <filesystem>
 
+#include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
 
@@ -13,9 +14,11 @@ struct InfoArguments {
   TimeArguments times;
   bool strict = false;  ///< A warning is an error.
   bool system = false;  ///< Also print the processor and its kernels; then no recording is needed.
+  Verbosity verbosity = Verbosity::kNormal;
 };
 
-/// `event-fusion info`: prints the contents of a recording.
+/// `event-fusion info`: prints the contents of a recording; if quiet, only what is wrong with
+/// it.
 /// @return the process's exit status.
 /// @throws std::exception if the recording cannot be read to its end. The contents before the error
 /// have been printed.

@@ -105,19 +105,21 @@ std::function<void(const std::filesystem::path&)> saverOf(const mrpt::maps::CSim
 }
 
 /// Writes the report; prints warnings, summary and error. @return the exit status.
-int conclude(const MappingOutcome& outcome, MapOutput& output, bool strict) {
+int conclude(const MappingOutcome& outcome, MapOutput& output, const MappingArguments& arguments) {
   // A run without a keyframe leaves the results of an earlier run as they are.
   const bool made_nothing = outcome.error && outcome.report.counts.keyframes == 0;
   if (!made_nothing || !std::filesystem::exists(output.folder() / "report.json")) {
     output.writeReport(reportJson(outcome.report));
   }
   printWarnings(outcome.report.warnings);
-  if (outcome.report.counts.keyframes > 0) printSummary(outcome.report, output.folder());
+  const bool quiet = arguments.verbosity == Verbosity::kQuiet;
+  if (outcome.report.counts.keyframes > 0 && !quiet) printSummary(outcome.report, output.folder());
   if (outcome.error) {
     std::cerr << "event-fusion: error: " << *outcome.error << "\n";
     return 1;
   }
-  if (!outcome.report.stopped_at) return strict && failStrictly(outcome.report.warnings) ? 1 : 0;
+  if (!outcome.report.stopped_at)
+    return arguments.strict && failStrictly(outcome.report.warnings) ? 1 : 0;
   std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
                            100 * *outcome.report.stopped_at);
   return kInterruptedStatus;
@@ -131,13 +133,14 @@ Window windowOf(const DepthArguments& arguments, ReferenceTime reference) {
 }
 
 /// The first pass over the recording, for max_confidence = sequence.
-std::optional<double> sequenceMaximumOf(const RecordingSource& source, EventFusionOptions options) {
+std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJob job) {
+  EventFusionOptions& options = job.options;
   if (options.mapper.keyframe.extraction.max_confidence.level != WhiteLevel::kSequence) {
     return std::nullopt;
   }
   options.mapper.only_window.reset();
   options.refinement.enabled = false;  // changes no confidence
-  return sequenceMaximum(options, *openRecording(source));
+  return sequenceMaximum(job, *openRecording(source));
 }
 
 std::unique_ptr<Recording> openWhole(RecordingSource source) {
@@ -181,7 +184,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
     const RecordingSource source = sourceOf(arguments, job.options);
-    job.sequence_maximum = sequenceMaximumOf(source, job.options);
+    job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseForeignFolder(folder, arguments.force);
@@ -206,7 +209,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   times.cpu.start = whole.cpu.start;
   times.cpu.images = whole.cpu.images;
   times.cpu.total = whole.cpu.start + whole.cpu.total;
-  return conclude(outcome, *output, arguments.strict);
+  return conclude(outcome, *output, arguments);
 }
 
 }  // namespace
@@ -214,6 +217,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
 int runMap(const MapArguments& arguments) {
   MappingJob job;
   job.options = optionsOf(arguments);
+  job.verbosity = arguments.verbosity;
   job.options.mapper.limits = resolve(arguments.times, arguments.source);
   job.options.mapper.limits.validate();
   const Interruption interruption;
@@ -240,6 +244,7 @@ int runMap(const MapArguments& arguments) {
 int runDepth(const DepthArguments& arguments) {
   MappingJob job;
   job.options = optionsOf(arguments);
+  job.verbosity = arguments.verbosity;
   job.options.mapper.only_window = windowOf(arguments, job.options.mapper.policy.reference);
   job.options.mapper.validate();
   const EventFusionOptions options = job.options;

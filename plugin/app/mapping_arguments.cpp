@@ -52,6 +52,7 @@ void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
       ->type_name("SECTION.KEY=VALUE")
       ->allow_extra_args(false);
   addStrict(command, arguments.strict);
+  addVerbosity(command, arguments.verbosity, true);
   command.footer(configList);
 }
 

@@ -7,16 +7,19 @@
 
 #include <algorithm>
 #include <exception>
+#include <numeric>
+#include <opencv2/core.hpp>
 #include <utility>
 
 #include "mapping/depth/robust_maximum.h"
+#include "mapping/geometry/timestamp.h"
 #include "plugin/app/observed_statistics.h"
-#include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/session/no_keyframe.h"
 #include "plugin/session/session_warnings.h"
+#include "plugin/session/time_text.h"
 
 namespace efm {
 namespace {
@@ -28,7 +31,8 @@ class Player {
       : job_(job),
         recording_(recording),
         times_(times),
-        depths_(job.options.mapper.keyframe.planes) {
+        depths_(job.options.mapper.keyframe.planes),
+        progress_(job.activity, job.verbosity) {
     EventFusionOptions options = job.options;
     options.mapper.keyframe.sequence_maximum = job.sequence_maximum;
     builder_.setOptions(options);
@@ -44,7 +48,7 @@ class Player {
     std::optional<std::string> error;
     for (bool more = true; more;) {
       if (job_.stop_requested && job_.stop_requested()) {
-        stopped_at_ = recording_.progress();
+        stopped_at_ = fraction();
         break;
       }
       more = attempt([this] { return playOne(); }, error);
@@ -113,6 +117,7 @@ class Player {
   void deliver(const KeyframeDepthMap& keyframe) {
     if (delivery_error_) return;
     depths_.add(keyframe.map.depth);
+    if (job_.verbosity == Verbosity::kVerbose) progress_.print(keyframeLine(keyframe));
     try {
       job_.on_keyframe(keyframe);
     } catch (...) {
@@ -121,8 +126,48 @@ class Player {
   }
 
   void showProgress() {
-    progress_.show(fmt::format("{:3.0f} %, {} keyframes", 100 * recording_.progress(),
-                               builder_.status().counts.keyframes));
+    const SessionStatus status = builder_.status();
+    const double seconds = std::max(progress_.seconds(), 1e-3);
+    std::string details =
+        fmt::format("{} keyframes, {:.2g} M events/s", status.counts.keyframes,
+                    1e-6 * static_cast<double>(status.counts.total().read) / seconds);
+    if (status.events) {
+      details +=
+          fmt::format(", {:.2g}x real time",
+                      secondsBetween(status.events->first_ns, status.events->last_ns) / seconds);
+    }
+    progress_.show(fraction(), details);
+  }
+
+  /// The fraction of the work that is done: of the events' time if its end is known, otherwise of
+  /// the input.
+  double fraction() const {
+    const std::optional<TimeSpan> events = builder_.status().events;
+    const auto& window = job_.options.mapper.only_window;
+    const TimeLimits limits =
+        window ? TimeLimits{window->t0_ns, window->t1_ns} : job_.options.mapper.limits;
+    if (!limits.t1_ns) return recording_.progress();
+    if (!events) return 0;
+    const std::int64_t first_ns = limits.t0_ns.value_or(events->first_ns);
+    return std::clamp(
+        secondsBetween(first_ns, events->last_ns) / secondsBetween(first_ns, *limits.t1_ns), 0.0,
+        1.0);
+  }
+
+  /// For --verbose: what a keyframe has, and the time that its stages took.
+  std::string keyframeLine(const KeyframeDepthMap& keyframe) {
+    const SessionStatus status = builder_.status();
+    const StageSeconds& now = status.times.real;
+    const StageSeconds before = std::exchange(told_, now);
+    std::optional<std::int64_t> start_ns;
+    if (status.events) start_ns = status.events->first_ns;
+    return fmt::format(
+        "keyframe {} at {}: {} events, {} depths; sweep {:.3f} s, depth {:.3f} s, refinement "
+        "{:.3f} s",
+        status.counts.keyframes, timeText(keyframe.window.t_ref_ns, start_ns),
+        std::accumulate(keyframe.events.begin(), keyframe.events.end(), std::uint64_t{0}),
+        cv::countNonZero(keyframe.map.depth), now.sweep - before.sweep, now.depth - before.depth,
+        now.refine - before.refine);
   }
 
   const MappingJob& job_;
@@ -134,6 +179,7 @@ class Player {
   std::exception_ptr delivery_error_;  // of `on_keyframe`
   bool sink_offered_ = false;
   std::optional<double> stopped_at_;
+  StageSeconds told_;  // until the last keyframe
   Progress progress_;
 };
 
@@ -201,10 +247,11 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   return outcome;
 }
 
-std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recording& recording) {
+std::optional<double> sequenceMaximum(MappingJob job, Recording& recording) {
   RobustMaximum maximum;
-  MappingJob job;
-  job.options = options;
+  job.activity = "first pass";
+  if (job.verbosity == Verbosity::kVerbose) job.verbosity = Verbosity::kNormal;
+  job.make_dsi_sink = nullptr;
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { maximum.add(keyframe.max_confidence); };
   StageTimes ignored;
   Player(job, recording, ignored).play();

@@ -10,6 +10,7 @@
 
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/cloud_point.h"
+#include "plugin/app/progress.h"
 #include "plugin/options/option_file.h"
 #include "plugin/output/report.h"
 #include "plugin/recordings/recording.h"
@@ -19,6 +20,8 @@ namespace efm {
 /// How to map a recording.
 struct MappingJob {
   EventFusionOptions options;
+  Verbosity verbosity = Verbosity::kNormal;
+  std::string activity = "mapping";  ///< For the progress.
   /// The value of `max_confidence = sequence`. Default: the running maximum.
   std::optional<double> sequence_maximum;
 
@@ -47,17 +50,18 @@ struct MappingOutcome {
   std::optional<std::string> error;
 };
 
-/// Plays a recording through a map builder, with progress on stderr if it is a terminal. If reading
-/// stops with an error, the data before it are mapped.
+/// Plays a recording through a map builder, with progress on stderr. If reading stops with an
+/// error, the data before it are mapped.
 /// @throws std::invalid_argument if the options are not valid; the exceptions of `on_keyframe` and
 /// `make_dsi_sink`.
 MappingOutcome runMapping(const MappingJob& job, Recording& recording);
 
 /// The first of two passes: computes the robust maximum of the keyframes' confidences. Costs as
 /// much as mapping the recording. An error of the recording ends it; `runMapping` reports the
-/// error.
+/// error, and a requested stop ends it.
+/// @param job whose receivers are not called.
 /// @return nothing if there is no keyframe.
 /// @throws std::invalid_argument if the options are not valid.
-std::optional<double> sequenceMaximum(const EventFusionOptions& options, Recording& recording);
+std::optional<double> sequenceMaximum(MappingJob job, Recording& recording);
 
 }  // namespace efm

@@ -94,6 +94,7 @@ void addSimulate(CLI::App& app, Run& run) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   addPixelOptions(command, *arguments);
+  addVerbosity(command, arguments->verbosity);
   command.add_option("--out", arguments->out, "The folder to write: a new or an empty one")
       ->required()
       ->type_name("DIR");

@@ -95,13 +95,14 @@ int runSimulate(const SimulateArguments& arguments) {
   DatasetWriter writer(arguments.out);
   std::vector<CameraRecording> recordings;
   {
-    Progress progress;
+    Progress progress("simulating", arguments.verbosity);
     SimulationRun run;
-    run.progress = [&progress](double fraction) { progress.showFraction("simulating", fraction); };
+    run.progress = [&progress](double fraction) { progress.show(fraction); };
     recordings = simulateEvents(simulation, run);
-    progress.show("writing");
+    progress.begin("writing the recording");
     writer.write(simulation, recordings);
   }
+  if (arguments.verbosity == Verbosity::kQuiet) return 0;
   for (std::size_t c = 0; c < recordings.size(); ++c) {
     fmt::print("cam{}: {} events\n", c, recordings[c].events.size());
   }

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "plugin/app/progress.h"
 #include "tracking_stub/sensor/event_noise.h"
 
 namespace efm {
@@ -25,6 +26,7 @@ struct SimulateArguments {
   double refractory_us = 0;
   EventNoiseOptions noise;
   std::filesystem::path out;
+  Verbosity verbosity = Verbosity::kNormal;
 };
 
 /// `event-fusion simulate`: simulates a recording with exact truth and writes it as a dataset

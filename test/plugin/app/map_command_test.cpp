@@ -45,6 +45,22 @@ TEST_F(MapCommand, WritesTheFilesOfTheContract) {
   }
 }
 
+TEST_F(MapCommand, QuietCommandsSayNothingAndVerboseOnesALinePerKeyframe) {
+  write(SyntheticRecording());
+  for (const std::string command :
+       {"import data --out data.rawlog", "export data --to folder --out copy", "info data",
+        "map rig.ini data --out out", "depth rig.ini data --out depth --t0 10.1 --t1 10.3",
+        "simulate --preset desk_stereo --duration 0.01 --out simulated"}) {
+    const Result result = run(command + " --quiet");
+    EXPECT_EQ(result.status, 0) << command;
+    EXPECT_EQ(result.out + result.err, "") << command;
+  }
+  const Result result = run("map rig.ini data --out out -v");
+  EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 3);
+  EXPECT_THAT(result.err, HasSubstr("keyframe 1 at 10.102000000 s (+0.1 s): 639 events, "));
+  EXPECT_NE(run("map rig.ini data --out out -v -q").status, 0);
+}
+
 TEST_F(MapCommand, CountsOfTheReportAddUp) {
   const SyntheticRecording recording;
   write(recording);

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/time_text.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+std::string offsetText(std::int64_t t_ns, std::int64_t start_ns) {
+  const double milliseconds = std::round(1e3 * secondsBetween(start_ns, t_ns));
+  return fmt::format("{:+.12g}", milliseconds / 1e3 + 0.0);  // + 0: no "-0"
+}
+
+}  // namespace
+
+std::string timeText(std::int64_t t_ns, std::optional<std::int64_t> start_ns) {
+  const std::string time = formatSeconds(t_ns) + " s";
+  if (!start_ns) return time;
+  return fmt::format("{} ({} s)", time, offsetText(t_ns, *start_ns));
+}
+
+std::string timeText(std::int64_t first_ns, std::int64_t last_ns,
+                     std::optional<std::int64_t> start_ns) {
+  const std::string times =
+      fmt::format("{} to {} s", formatSeconds(first_ns), formatSeconds(last_ns));
+  if (!start_ns) return times;
+  return fmt::format("{} ({} to {} s)", times, offsetText(first_ns, *start_ns),
+                     offsetText(last_ns, *start_ns));
+}
+
+}  // namespace efm
