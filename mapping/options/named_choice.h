@@ -4,6 +4,9 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "mapping/options/nearest_name.h"
 
 namespace efm {
 
@@ -24,15 +27,16 @@ std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
 }
 
 /// The enumerator with a name.
-/// @throws std::invalid_argument naming the value and the known names.
+/// @throws std::invalid_argument naming the value, and the nearest of the known names.
 template <typename Enum, std::size_t N>
 Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
-  std::string known;
+  std::vector<std::string> known;
   for (const auto& choice : table) {
     if (choice.name == name) return choice.value;
-    known += (known.empty() ? "" : ", ") + std::string(choice.name);
+    known.emplace_back(choice.name);
   }
-  throw std::invalid_argument("'" + std::string(name) + "' is not one of: " + known);
+  throw std::invalid_argument("'" + std::string(name) +
+                              "' is unknown: " + expectedName(name, known));
 }
 
 }  // namespace efm

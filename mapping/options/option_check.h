@@ -15,7 +15,7 @@ void requireOption(bool holds, std::string_view key, const Value& value,
                    std::string_view expected) {
   if (holds) return;
   std::ostringstream message;
-  message.precision(17);
+  message.precision(15);  // as typed: 0.1, not 0.10000000000000001
   message << key << " = " << value << ": must be " << expected;
   throw std::invalid_argument(message.str());
 }
