@@ -22,6 +22,7 @@
 #include "plugin/output/keyframe_writer.h"
 #include "plugin/output/map_output.h"
 #include "plugin/output/npy_file.h"
+#include "plugin/output/summary.h"
 
 namespace efm {
 namespace {
@@ -59,12 +60,6 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
   if (limits.t0_ns) source.start_ns = *limits.t0_ns - (offsets_ns.empty() ? none_ns : *most);
   if (limits.t1_ns) source.end_ns = *limits.t1_ns - (offsets_ns.empty() ? none_ns : *least);
   return source;
-}
-
-void printSummary(const MapReport& report, const std::filesystem::path& folder) {
-  fmt::print("{} keyframes, {} points, {:.1f} million votes/s; written to {}\n",
-             report.counts.keyframes, report.points, votesPerSecond(report) * 1e-6,
-             folder.string());
 }
 
 /// Warns if the option file replaced the recording's own calibration, which may be the better one.
@@ -105,7 +100,9 @@ std::function<void(const std::filesystem::path&)> saverOf(const mrpt::maps::CSim
 }
 
 /// Writes the report; prints warnings, summary and error. @return the exit status.
-int conclude(const MappingOutcome& outcome, MapOutput& output, const MappingArguments& arguments) {
+int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
+             const MappingArguments& arguments) {
+  outcome.report.peak_memory_bytes = peakMemoryBytes();
   // A run without a keyframe leaves the results of an earlier run as they are.
   const bool made_nothing = outcome.error && outcome.report.counts.keyframes == 0;
   if (!made_nothing || !std::filesystem::exists(output.folder() / "report.json")) {
@@ -113,7 +110,8 @@ int conclude(const MappingOutcome& outcome, MapOutput& output, const MappingArgu
   }
   printWarnings(outcome.report.warnings);
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
-  if (outcome.report.counts.keyframes > 0 && !quiet) printSummary(outcome.report, output.folder());
+  if (outcome.report.counts.keyframes > 0 && !quiet)
+    std::cout << summaryOf(outcome.report, kind, output.folder());
   if (outcome.error) {
     std::cerr << "event-fusion: error: " << *outcome.error << "\n";
     return 1;
@@ -209,7 +207,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   times.cpu.start = whole.cpu.start;
   times.cpu.images = whole.cpu.images;
   times.cpu.total = whole.cpu.start + whole.cpu.total;
-  return conclude(outcome, *output, arguments);
+  return conclude(outcome, kind, *output, arguments);
 }
 
 }  // namespace
@@ -265,6 +263,7 @@ int runDepth(const DepthArguments& arguments) {
   };
   const auto write = [&](MapOutput& output, MappingOutcome& outcome) {
     outcome.report.points = points.size();
+    outcome.report.extent = extentOf(points);
     writeAll(outcome, {[&] { output.writeCloud("points.pcd", points); },
                        [&] {
                          if (dsi) dsi->finish();

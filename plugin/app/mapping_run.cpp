@@ -231,6 +231,13 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
     outcome.tracker_trajectory = player.builder().trackerTrajectory();
   }
   outcome.report.points = outcome.points.size();
+  outcome.report.extent = extentOf(outcome.points);
+  if (status.events) {
+    outcome.report.recording_s = secondsBetween(status.events->first_ns, status.events->last_ns);
+  }
+  if (status.refinement && !outcome.trajectory.empty()) {
+    outcome.report.pose_shift = shiftBetween(outcome.tracker_trajectory, outcome.trajectory);
+  }
   std::vector<Warning>& warnings = outcome.report.warnings;
   warnings = player.healthWarnings(status.rig);
   for (Warning& warning : sessionWarnings(status, job.options.mapper)) {

@@ -11,6 +11,8 @@
 #include <iostream>
 #include <utility>
 
+#include "plugin/session/time_text.h"
+
 namespace efm {
 namespace {
 
@@ -36,13 +38,6 @@ double steadySeconds() {
 
 ProgressOutput ProgressOutput::standardError() {
   return {std::cerr, columnsOfStandardError, steadySeconds};
-}
-
-std::string durationText(double seconds) {
-  const auto whole = static_cast<long long>(std::llround(std::max(0.0, seconds)));
-  if (whole < 60) return fmt::format("{} s", whole);
-  if (whole < 3600) return fmt::format("{}:{:02} min", whole / 60, whole % 60);
-  return fmt::format("{:02}:{:02} h", whole / 3600, whole / 60 % 60);
 }
 
 Progress::Progress(std::string activity, Verbosity verbosity, ProgressOutput output)

@@ -69,7 +69,4 @@ class Progress {
   bool shown_ = false;
 };
 
-/// A duration: "42 s", "3:05 min" or, from an hour on, "01:23 h" (HH:MM).
-std::string durationText(double seconds);
-
 }  // namespace efm

@@ -67,6 +67,18 @@ Json asJson(const TrackerFaults& faults) {
   return json;
 }
 
+Json asJson(const MapExtent& extent) {
+  const auto list = [](const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); };
+  return {{"min", list(extent.min_m)}, {"max", list(extent.max_m)}};
+}
+
+Json asJson(const PoseShift& shift) {
+  return {{"median_m", shift.median_m},
+          {"max_m", shift.max_m},
+          {"median_deg", shift.median_rad / kRadiansPerDegree},
+          {"max_deg", shift.max_rad / kRadiansPerDegree}};
+}
+
 Json asJson(const RefinementState& refinement) {
   const RefinementCounts& counts = refinement.counts;
   const TrackerErrors& tracker = refinement.tracker;
@@ -86,12 +98,6 @@ Json asJson(const ReferenceView& view) {
           {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
 }
 
-std::uint64_t peakMemoryBytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
-}
-
 Json asJson(const std::vector<Warning>& warnings) {
   Json json = Json::array();
   for (const Warning& warning : warnings) {
@@ -101,6 +107,12 @@ Json asJson(const std::vector<Warning>& warnings) {
 }
 
 }  // namespace
+
+std::uint64_t peakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
+}
 
 double votesPerSecond(const MapReport& report) {
   const double sweep_s = report.times.real.sweep;
@@ -130,18 +142,21 @@ std::string reportJson(const MapReport& report) {
   json["sorted_events"] = counts.sorted_events;
   json["duplicate_poses"] = counts.duplicate_poses;
   json["points"] = report.points;
+  if (report.extent) json["extent_m"] = asJson(*report.extent);
+  json["recording_seconds"] = report.recording_s;
   json["seconds"] = asJson(report.times.real);
   json["cpu_seconds"] = byGrowth(report.times.cpu);
   json["votes_per_second"] = votesPerSecond(report);
   json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
   json["threads"] = sweep.threadsOrCores();
-  json["peak_memory_bytes"] = peakMemoryBytes();
+  json["peak_memory_bytes"] = report.peak_memory_bytes;
   if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
   if (report.view) json["reference_view"] = asJson(*report.view);
   if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
   if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
   json["warnings"] = asJson(report.warnings);
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
+  if (report.pose_shift) json["refinement"]["moved"] = asJson(*report.pose_shift);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
   json["options"] = asJson(report.options);
   return json.dump(2) + "\n";

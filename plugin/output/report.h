@@ -9,6 +9,7 @@
 #include "mapping/geometry/reference_view.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "plugin/options/option_file.h"
+#include "plugin/output/map_measures.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/stage_timer.h"
@@ -21,10 +22,14 @@ struct MapReport {
   MapperCounts counts;
   std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: keyframes without its events.
   std::uint64_t points = 0;                     ///< Of the exported map.
+  std::optional<MapExtent> extent;              ///< Of these points.
+  double recording_s = 0;                       ///< From the first event that was read to the last.
+  std::uint64_t peak_memory_bytes = 0;          ///< Of the process.
   StageTimes times;
   EventFusionOptions options;                 ///< As used.
   TrackerFaults faults;                       ///< Of the perturbed poses.
   std::optional<RefinementState> refinement;  ///< Where poses were refined.
+  std::optional<PoseShift> pose_shift;        ///< By the refinement.
   /// The value of `max_confidence = sequence`, where a first pass found it.
   std::optional<double> sequence_maximum;
   /// The view of the depth maps, and the distance of its camera to the nearest other selected one:
@@ -38,14 +43,19 @@ struct MapReport {
 
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
 /// outside_window + dropped + filtered + outside_lens + over_budget), event_uses, votes (event_uses
-/// x planes = their sum), keyframes, silent (keyframes per camera, sub-intervals), points, seconds
-/// (real time), cpu_seconds (processor time: once per run, for events, for keyframes),
-/// votes_per_second, refinement where poses were refined (registered keyframes, loops, the learnt
-/// errors of the tracker), kernel, threads, peak_memory_bytes (of this process), reference_view and
-/// baseline_m where known, stopped_at where the run was interrupted (the fraction of the recording
-/// that was mapped), warnings (each with name and text), perturbation (the faults of the poses, if
-/// any), options (all of them) and version.
+/// x planes = their sum), keyframes, silent (keyframes per camera, sub-intervals), points, extent_m
+/// (min and max, frame `world`; absent without points), recording_seconds (from the first event to
+/// the last), seconds (real time), cpu_seconds (processor time: once per run, for events, for
+/// keyframes), votes_per_second, refinement where poses were refined (registered keyframes, loops,
+/// the learnt errors of the tracker, and under `moved` how far it moved poses), kernel, threads,
+/// peak_memory_bytes (of this process), reference_view and baseline_m where known, stopped_at where
+/// the run was interrupted (the fraction of the recording that was mapped), warnings (each with
+/// name and text), perturbation (the faults of the poses, if any), options (all of them) and
+/// version.
 std::string reportJson(const MapReport& report);
+
+/// The most memory that this process has had so far.
+std::uint64_t peakMemoryBytes();
 
 /// Votes (used events times planes) over the sweep's seconds; 0 without a sweep.
 double votesPerSecond(const MapReport& report);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "mapping/geometry/timestamp.h"
@@ -30,6 +31,13 @@ std::string timeText(std::int64_t first_ns, std::int64_t last_ns,
   if (!start_ns) return times;
   return fmt::format("{} ({} to {} s)", times, offsetText(first_ns, *start_ns),
                      offsetText(last_ns, *start_ns));
+}
+
+std::string durationText(double seconds) {
+  const auto whole = static_cast<long long>(std::llround(std::max(0.0, seconds)));
+  if (whole < 60) return fmt::format("{} s", whole);
+  if (whole < 3600) return fmt::format("{}:{:02} min", whole / 60, whole % 60);
+  return fmt::format("{:02}:{:02} h", whole / 3600, whole / 60 % 60);
 }
 
 }  // namespace efm

@@ -16,4 +16,7 @@ std::string timeText(std::int64_t t_ns, std::optional<std::int64_t> start_ns);
 std::string timeText(std::int64_t first_ns, std::int64_t last_ns,
                      std::optional<std::int64_t> start_ns);
 
+/// A duration: "42 s", "3:05 min" or, from an hour on, "01:23 h" (HH:MM).
+std::string durationText(double seconds);
+
 }  // namespace efm

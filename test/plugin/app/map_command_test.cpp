@@ -31,7 +31,7 @@ TEST_F(MapCommand, WritesTheFilesOfTheContract) {
 
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.err, IsEmpty()) << "quiet when not on a terminal";
-  EXPECT_THAT(result.out, AllOf(HasSubstr("3 keyframes"), HasSubstr("out")));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("keyframes   3\n"), HasSubstr("out: map.pcd")));
   const auto files = filesIn("out");
   EXPECT_EQ(files.size(), 4U + 3 * 4) << testing::PrintToString(files);
   EXPECT_THAT(files,
