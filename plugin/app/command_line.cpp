@@ -10,8 +10,10 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
+#include "plugin/app/argument_checks.h"
 #include "plugin/app/command.h"
 #include "plugin/app/evaluate_arguments.h"
+#include "plugin/app/exit_status.h"
 #include "plugin/app/export_command.h"
 #include "plugin/app/import_command.h"
 #include "plugin/app/info_command.h"
@@ -53,11 +55,13 @@ void addImport(CLI::App& app, Run& run) {
       {"zstd", RawlogCompression::kZstd},
       {"none", RawlogCompression::kNone}};
   command
-      .add_option("--compression", arguments->compression,
-                  "gzip: the whole rawlog (default). zstd: the events alone, in a plain rawlog; "
-                  "faster to write and to read. none")
-      ->transform(CLI::Transformer(kCompressions))
-      ->type_name("gzip|zstd|none");
+      .add_option_function<std::string>(
+          "--compression",
+          [arguments](const std::string& name) { arguments->compression = kCompressions.at(name); },
+          "gzip: the whole rawlog (default). zstd: the events alone, in a plain rawlog; "
+          "faster to write and to read. none")
+      ->check(oneOf({"gzip", "zstd", "none"}))
+      ->type_name("");
   addPacketLength(command, arguments->source.packet_ns);
   addVerbosity(command, arguments->verbosity);
   command.parse_complete_callback(
@@ -71,7 +75,7 @@ void addExport(CLI::App& app, Run& run) {
   addSource(command, arguments->source);
   command.add_option("--to", arguments->format, "The format to write")
       ->required()
-      ->check(CLI::IsMember(exportFormats()));
+      ->check(oneOf(exportFormats()));
   command.add_option("--out", arguments->out, "The folder or the file to write; a new one")
       ->required()
       ->type_name("PATH");
@@ -125,6 +129,12 @@ std::function<int()> parseCommandLine(int argc, char** argv) {
   app.set_version_flag("--version", std::string("event-fusion ") + EFM_VERSION);
   app.set_help_all_flag("--help-all", "Print the help of every command and exit");
   app.require_subcommand(1);
+  app.footer(
+      "Exit status:\n"
+      "  0    the job is done\n"
+      "  1    the job could not be done: data, files, disk, memory; or a warning, with --strict\n"
+      "  2    the command line or an option file is wrong\n"
+      "  130  stopped as requested (Ctrl-C)");
   Run run;
   for (const auto add :
        {addSimulate, addImport, addExport, addMap, addDepth, addEvaluate, addInfo}) {
@@ -133,7 +143,8 @@ std::function<int()> parseCommandLine(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return [status = app.exit(error)] { return status; };  // also prints help and version
+    if (error.get_exit_code() != 0) throw UsageError(errorText(app, error));
+    return [status = app.exit(error)] { return status; };  // prints help or the version
   }
   return run;
 }

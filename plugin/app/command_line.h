@@ -5,8 +5,9 @@
 
 namespace efm {
 
-/// Parses the command line. Prints the help, the version, or the error of a wrong command line.
+/// Parses the command line. Prints the help or the version.
 /// @return runs the chosen command, if there is one, and returns the process's exit status.
+/// @throws UsageError if the command line is wrong.
 std::function<int()> parseCommandLine(int argc, char** argv);
 
 }  // namespace efm

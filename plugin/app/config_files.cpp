@@ -4,10 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <stdexcept>
 #include <system_error>
 
+#include "mapping/options/nearest_name.h"
 #include "mapping/options/quoted_text.h"
+#include "plugin/app/exit_status.h"
 
 namespace efm {
 namespace {
@@ -43,13 +44,17 @@ std::vector<std::string> configNames() {
 fs::path findConfig(const std::string& name_or_path) {
   std::error_code ignored;
   const fs::path path = name_or_path;
-  if (path.extension() == kSuffix || fs::is_regular_file(path, ignored)) return path;
+  if (fs::is_regular_file(path, ignored)) return path;
+  if (path.extension() == kSuffix) {
+    if (fs::exists(path, ignored)) return path;  // reading it says what it is
+    throw UsageError(name_or_path + ": no such option file");
+  }
   const std::vector<std::string> names = configNames();
   if (std::binary_search(names.begin(), names.end(), name_or_path)) {
     return configFolder() / (name_or_path + kSuffix);
   }
-  throw std::runtime_error(fmt::format("--config {}: expected an option file, or one of {}",
-                                       inQuotes(name_or_path), fmt::join(names, ", ")));
+  throw UsageError(fmt::format("--config {}: no such option file: {}", inQuotes(name_or_path),
+                               expectedName(name_or_path, names)));
 }
 
 }  // namespace efm

@@ -13,8 +13,8 @@ namespace efm {
 /// Their names without ".ini", sorted: "default", "dsec", …
 std::vector<std::string> configNames();
 
-/// The option file of a name. A path, or a name that ends with ".ini", is returned as it is.
-/// @throws std::runtime_error naming the known names if it is none of them.
+/// The option file of a name. A path is returned as it is.
+/// @throws UsageError if there is no such file, or naming the known names if it is none of them.
 std::filesystem::path findConfig(const std::string& name_or_path);
 
 }  // namespace efm

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "plugin/app/argument_checks.h"
 #include "plugin/app/evaluate_command.h"
 #include "plugin/evaluation/depth_evaluation_text.h"
 
@@ -21,7 +22,7 @@ CLI::Option* addList(CLI::App& command, const std::string& name, std::vector<dou
   return command.add_option(name, values, help)
       ->delimiter(',')
       ->allow_extra_args(false)
-      ->check(CLI::PositiveNumber)
+      ->check(aboveZero())
       ->type_name("A,B,...");
 }
 
@@ -47,11 +48,11 @@ void addEvaluateDepth(CLI::App& evaluate, Run& run) {
       .add_option("--focal", arguments->focal_px,
                   "Focal length in pixels, for bad-pix; by default from EST's report.json or from "
                   "GT's camchain.yaml")
-      ->check(CLI::PositiveNumber);
+      ->check(aboveZero());
   command
       .add_option("--baseline", arguments->baseline_m,
                   "Baseline in metres, for bad-pix; by default from the same file")
-      ->check(CLI::PositiveNumber);
+      ->check(aboveZero());
   command.add_option("--max-depth", options.pairing.max_depth_m,
                      "Leave out truth beyond this depth in metres");
   command.add_option("--scale", options.png_scale,
@@ -118,12 +119,12 @@ void addEvaluateTrajectory(CLI::App& evaluate, Run& run) {
           "Maximum time in seconds between the two poses of a pair; each pose of the shorter "
           "file is paired with the nearest of the other")
       ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
+      ->check(zeroOrMore());
   command
       .add_option("--align", arguments->alignment,
                   "For absolute errors: se3 (least-squares rotation and translation, no scale), "
                   "origin (the first poses coincide) or none")
-      ->check(CLI::IsMember({"se3", "origin", "none"}))
+      ->check(oneOf({"se3", "origin", "none"}))
       ->capture_default_str();
   addList(command, "--lengths", arguments->lengths_m,
           "Relative errors over sub-trajectories of these lengths in metres; without --lengths, "

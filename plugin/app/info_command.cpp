@@ -13,6 +13,7 @@
 
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/exit_status.h"
 #include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
@@ -154,7 +155,7 @@ int runInfo(const InfoArguments& arguments) {
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
   const std::vector<Warning> warnings = warningsOf(contents, recording->counts());
   printWarnings(warnings);
-  return arguments.strict && failStrictly(warnings) ? 1 : status;
+  return arguments.strict && failStrictly(warnings) ? kFailedStatus : status;
 }
 
 }  // namespace efm

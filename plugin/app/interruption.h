@@ -16,7 +16,4 @@ class Interruption {
   bool requested() const;
 };
 
-/// The exit status of a process that stopped as requested: what a shell reports for SIGINT.
-inline constexpr int kInterruptedStatus = 130;
-
 }  // namespace efm

@@ -16,6 +16,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/outlier_removal.h"
 #include "plugin/app/config_files.h"
+#include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
 #include "plugin/app/observed_statistics.h"
@@ -28,10 +29,12 @@ namespace efm {
 namespace {
 
 EventFusionOptions optionsOf(const MappingArguments& arguments) {
-  OptionReader reader;
-  if (!arguments.config.empty()) reader.readFile(findConfig(arguments.config));
-  for (const std::string& assignment : arguments.sets) reader.set(assignment);
-  EventFusionOptions options = reader.options();
+  EventFusionOptions options = asUsage([&] {
+    OptionReader reader;
+    if (!arguments.config.empty()) reader.readFile(findConfig(arguments.config));
+    for (const std::string& assignment : arguments.sets) reader.set(assignment);
+    return reader.options();
+  });
   if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
   if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // the only source
   if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
@@ -112,12 +115,10 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
   if (outcome.report.counts.keyframes > 0 && !quiet)
     std::cout << summaryOf(outcome.report, kind, output.folder());
-  if (outcome.error) {
-    std::cerr << "event-fusion: error: " << *outcome.error << "\n";
-    return 1;
+  if (outcome.error) return fail(*outcome.error);
+  if (!outcome.report.stopped_at) {
+    return arguments.strict && failStrictly(outcome.report.warnings) ? kFailedStatus : 0;
   }
-  if (!outcome.report.stopped_at)
-    return arguments.strict && failStrictly(outcome.report.warnings) ? 1 : 0;
   std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
                            100 * *outcome.report.stopped_at);
   return kInterruptedStatus;
@@ -217,7 +218,7 @@ int runMap(const MapArguments& arguments) {
   job.options = optionsOf(arguments);
   job.verbosity = arguments.verbosity;
   job.options.mapper.limits = resolve(arguments.times, arguments.source);
-  job.options.mapper.limits.validate();
+  asUsage([&] { job.options.mapper.limits.validate(); });
   const Interruption interruption;
   job.stop_requested = [&] { return interruption.requested(); };
   const bool refined = job.options.refinement.enabled;
@@ -244,7 +245,7 @@ int runDepth(const DepthArguments& arguments) {
   job.options = optionsOf(arguments);
   job.verbosity = arguments.verbosity;
   job.options.mapper.only_window = windowOf(arguments, job.options.mapper.policy.reference);
-  job.options.mapper.validate();
+  asUsage([&] { job.options.mapper.validate(); });
   const EventFusionOptions options = job.options;
   std::unique_ptr<NpyDsiFile> dsi;
   if (arguments.save_dsi) {

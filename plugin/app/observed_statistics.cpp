@@ -5,6 +5,7 @@
 
 #include <iostream>
 
+#include "plugin/app/exit_status.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
@@ -32,8 +33,7 @@ void printWarnings(const std::vector<Warning>& warnings) {
 
 bool failStrictly(const std::vector<Warning>& warnings) {
   if (warnings.empty()) return false;
-  std::cerr << fmt::format("event-fusion: error: {} warnings, and --strict makes them errors\n",
-                           warnings.size());
+  fail(fmt::format("{} warnings, and --strict makes them errors", warnings.size()));
   return true;
 }
 

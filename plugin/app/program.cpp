@@ -11,15 +11,11 @@
 #include <string>
 
 #include "plugin/app/command_line.h"
+#include "plugin/app/exit_status.h"
 #include "plugin/mrpt/registration.h"
 
 namespace efm {
 namespace {
-
-int fail(const std::string& message) {
-  std::cerr << "event-fusion: error: " << message << "\n";
-  return 1;
-}
 
 /// Flushes stdout. @return the status, or a failure if stdout cannot be written.
 int finished(int status) {
@@ -34,11 +30,18 @@ int finished(int status) {
 
 }  // namespace
 
+int fail(const std::string& message, int status) {
+  std::cerr << "event-fusion: error: " << message << "\n";
+  return status;
+}
+
 int runProgram(int argc, char** argv) {
   try {
     const std::function<int()> run = parseCommandLine(argc, argv);
     registerClasses();
     return finished(run());
+  } catch (const UsageError& error) {
+    return fail(error.what(), kUsageStatus);
   } catch (const std::bad_alloc&) {
     return fail("out of memory");
   } catch (const std::exception& error) {

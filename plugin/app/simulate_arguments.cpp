@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <string>
 
+#include "plugin/app/argument_checks.h"
 #include "plugin/app/simulate_command.h"
 #include "plugin/app/source_arguments.h"
 #include "tracking_stub/presets/simulation_preset.h"
@@ -55,11 +56,11 @@ void addSimulate(CLI::App& app, Run& run) {
       "around a trajectory, seen by a calibrated rig");
   auto arguments = argumentsOf(command, run, runSimulate);
   CLI::Option* preset = command.add_option("--preset", arguments->preset, "Scene, rig and motion")
-                            ->check(CLI::IsMember(simulationPresets()));
+                            ->check(oneOf(simulationPresets()));
   CLI::Option* scene = command
                            .add_option("--scene", arguments->scene,
                                        "A scene around the trajectory; upwards is the cameras' -y")
-                           ->check(CLI::IsMember(simulationScenes()))
+                           ->check(oneOf(simulationScenes()))
                            ->excludes(preset);
   CLI::Option* trajectory =
       command
@@ -91,7 +92,7 @@ void addSimulate(CLI::App& app, Run& run) {
       ->type_name("SECONDS");
   command
       .add_option("--seed", arguments->seed, "Seed of all random numbers, a whole number from 0")
-      ->check(CLI::NonNegativeNumber)
+      ->check(zeroOrMore())
       ->capture_default_str();
   addPixelOptions(command, *arguments);
   addVerbosity(command, arguments->verbosity);

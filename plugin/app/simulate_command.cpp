@@ -9,6 +9,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
+#include "plugin/app/exit_status.h"
 #include "plugin/app/progress.h"
 #include "plugin/calibration/camchain.h"
 #include "tracking_stub/poses/tum_trajectory.h"
@@ -88,7 +89,7 @@ void setPixels(const SimulateArguments& arguments, Simulation& simulation) {
 }  // namespace
 
 int runSimulate(const SimulateArguments& arguments) {
-  requireRanges(arguments);
+  asUsage([&] { requireRanges(arguments); });
   Simulation simulation =
       arguments.preset.empty() ? makeOnTrajectory(arguments) : makePreset(arguments);
   setPixels(arguments, simulation);

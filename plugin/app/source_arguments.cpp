@@ -7,6 +7,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
+#include "plugin/app/argument_checks.h"
 #include "plugin/options/tracker_fault_keys.h"
 
 namespace efm {
@@ -29,7 +30,7 @@ void addSource(CLI::App& command, RecordingSource& source) {
                   "ROS bags, MCAP, Prophesee RAW, AEDAT4, NumPy): see docs/recordings.md")
       ->required();
   command.add_option("--format", source.format, "The format of the recording (auto: detected)")
-      ->check(CLI::IsMember(recordingFormats()))
+      ->check(oneOf(recordingFormats()))
       ->capture_default_str();
   command
       .add_option(
@@ -63,7 +64,7 @@ void addSource(CLI::App& command, RecordingSource& source) {
   command
       .add_option("--time-unit", source.reader.time_unit,
                   "The unit of times in text events and NumPy arrays (default: found, else s)")
-      ->check(CLI::IsMember({"s", "ms", "us", "ns"}));
+      ->check(oneOf({"s", "ms", "us", "ns"}));
   command
       .add_option_function<std::vector<std::string>>(
           "--perturb",

@@ -299,14 +299,6 @@ TEST_F(ImportCommand, OutputThatCannotBeWrittenIsAnError) {
   }
 }
 
-TEST_F(ImportCommand, WrongUsageIsAnErrorThatNamesTheOption) {
-  EXPECT_NE(run("").status, 0);
-  EXPECT_THAT(run("import small").err, HasSubstr("--out"));
-  EXPECT_THAT(run("info small --format tape").err, HasSubstr("tape"));
-  EXPECT_THAT(run("info small --t0 soon").err, HasSubstr("soon"));
-  EXPECT_NE(run("info small --t0 soon").status, 0);
-}
-
 TEST_F(ImportCommand, HelpAndVersionSucceed) {
   const Result help = run("--help");
   EXPECT_EQ(help.status, 0);
