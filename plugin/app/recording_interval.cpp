@@ -56,7 +56,7 @@ std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits
 }
 
 std::vector<Warning> lossWarnings(const RecordingCounts& counts) {
-  std::vector<Warning> warnings;
+  std::vector<Warning> warnings = counts.warnings;
   if (counts.lost_packets > 0) {
     warnings.push_back(
         {"lost-packets",

@@ -80,6 +80,9 @@ RecordingCounts MergedRecording::counts() const {
     counts.sorted_events += camera.sortedEvents();
     counts.lost_packets += camera.stream().lostPackets();
     counts.undated_events += camera.stream().undatedEvents();
+    for (Warning& warning : camera.stream().warnings()) {
+      counts.warnings.push_back(std::move(warning));
+    }
   }
   return counts;
 }

@@ -205,7 +205,7 @@ bool addFile(const fs::path& path, RecordingParts& parts) {
                   path.string(), expected, kPoses[0].matrices, kPoses[1].matrices));
 }
 
-void addFolder(const fs::path& folder, RecordingParts& parts) {
+void addFolder(const fs::path& folder, const ReaderOptions& options, RecordingParts& parts) {
   bool any = false;
   std::map<std::string, fs::path> files;  // with events, of each side
   for (const auto& [side, file] : hdf5FilesIn(folder)) {
@@ -221,12 +221,12 @@ void addFolder(const fs::path& folder, RecordingParts& parts) {
     }
   }
   if (!any) refuse(folder);
-  addFolderFiles(folder, parts);
+  addFolderFiles(folder, options, parts);
 }
 
 }  // namespace
 
-RecordingParts openHdf5(const std::vector<fs::path>& sources, const ReaderOptions&) {
+RecordingParts openHdf5(const std::vector<fs::path>& sources, const ReaderOptions& options) {
   RecordingParts parts;
   for (const fs::path& source : sources) {
     std::error_code ignored;
@@ -234,7 +234,7 @@ RecordingParts openHdf5(const std::vector<fs::path>& sources, const ReaderOption
       if (!addFile(source, parts)) refuse(source);
       continue;
     }
-    addFolder(source, parts);
+    addFolder(source, options, parts);
   }
   return parts;
 }

@@ -135,6 +135,7 @@ class Evimo2Events : public EventStream {
     return t_.rows() == 0 ? 1 : static_cast<double>(t_.position()) / static_cast<double>(t_.rows());
   }
   std::optional<CameraSize> size() const override { return size_; }
+  std::vector<Warning> warnings() const override { return warnings_; }
 
  private:
   void requireShape(const NpyArray& array, std::size_t columns) const {
@@ -148,11 +149,12 @@ class Evimo2Events : public EventStream {
     TimeSample sample;
     const std::size_t rows = t_.readRows(1000);
     for (std::size_t row = 0; row < rows; ++row) {
-      ++sample.count;
-      sample.max = std::max(sample.max, std::abs(t_.number(row)));
+      sample.add(t_.number(row), true);
     }
     t_.seek(0);
-    return timeExponent(options, sample, t_.name());
+    TimeUnit unit = findTimeUnit(options, sample, kUsualEventRate, t_.name());
+    if (unit.warning) warnings_.push_back(std::move(*unit.warning));
+    return unit.exponent;
   }
 
   Event eventAt(std::size_t row) const {
@@ -186,6 +188,7 @@ class Evimo2Events : public EventStream {
   bool inverted_;
   std::optional<CameraSize> size_;
   int time_exponent_ = 0;
+  std::vector<Warning> warnings_;
   std::uint64_t begin_ = 0;  // row of the block
 };
 

@@ -23,9 +23,10 @@ constexpr std::size_t kPoseBlockRows = 4096;
 Rigid3 poseFromVector(const std::array<double, 7>& v) {
   const Eigen::Quaterniond numbers(v[6], v[3], v[4], v[5]);
   if (const auto rotation = rotationNear(numbers)) return {*rotation, {v[0], v[1], v[2]}};
-  throw std::runtime_error(
-      fmt::format("qx qy qz qw of length {:g}: expected a rotation, of length 1 within 1 %",
-                  numbers.coeffs().stableNorm()));
+  throw std::runtime_error(fmt::format(
+      "qx qy qz qw of length {:g}: expected a rotation, of length 1 within 1 %; are the columns "
+      "in this order?",
+      numbers.coeffs().stableNorm()));
 }
 
 Rigid3 poseFromMatrix(const Eigen::Matrix4d& numbers) {
@@ -138,9 +139,7 @@ TimeSample timeSampleOf(const NpyArray& times, std::size_t rows) {
   TimeSample sample;
   for (std::size_t row = 0; row < rows; ++row) {
     const double t = times.number(row);
-    ++sample.count;
-    sample.whole = sample.whole && (!times.isReal() || std::floor(t) == t);
-    sample.max = std::max(sample.max, std::abs(t));
+    sample.add(t, !times.isReal() || std::floor(t) == t);
   }
   return sample;
 }
@@ -163,7 +162,7 @@ std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
     if (&times != &poses) times.readRows(kPoseBlockRows);
     if (!exponent) {
       const TimeSample sample = timeSampleOf(times, rows);
-      exponent = sample.whole ? timeExponent(options, sample, times.name()) : 0;
+      exponent = sample.whole ? poseTimeExponent(options, sample, times.name()) : 0;
     }
     for (std::size_t row = 0; row < rows; ++row) {
       const std::optional<std::int64_t> t_ns = times.time(row, 0, *exponent);

@@ -13,6 +13,7 @@
 #include "plugin/readers/recording_formats.h"
 #include "plugin/streams/file_content.h"
 #include "plugin/streams/source_files.h"
+#include "plugin/text/pose_text.h"
 
 namespace efm {
 namespace {

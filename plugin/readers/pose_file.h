@@ -10,23 +10,13 @@
 namespace efm {
 
 /// Reads poses T_world_body from a file, whose kind is found by its content:
-///   text, also compressed   see `readPoseText`
+///   text, also compressed   see `readPoseText` (text/)
 ///   NumPy arrays            see `readPoseArrays`
 ///   a recording with poses  a bag, an HDF5 file, a folder: `detectFormat`
 /// @return at least one pose, in the order of the file.
 /// @throws std::runtime_error naming the file, the place, the value and what was expected.
 std::vector<StampedPose> readPoses(const std::filesystem::path& file,
                                    const ReaderOptions& options = {});
-
-/// Reads text with a line per pose:
-///   t tx ty tz qx qy qz qw    decimal seconds, metres: the format of the TUM RGB-D benchmark;
-///   columns in any order      if a header names them: EuRoC's CSV (#timestamp [ns], p_RS_R_x [m],
-///                             …, q_RS_w [], …), TUM-VIE's mocap_data.txt (microseconds).
-/// The header may begin with a `#`; blanks or commas separate the fields. Times are exact. Whole
-/// numbers without a unit in the header have that of the option, see `timeExponent`.
-/// @throws std::runtime_error naming file, line, value and what was expected.
-std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
-                                      const ReaderOptions& options);
 
 /// Reads the poses of NumPy arrays:
 ///   one array N x 8           t tx ty tz qx qy qz qw

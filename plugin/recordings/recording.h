@@ -5,6 +5,9 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include "mapping/options/warning.h"
 
 namespace efm {
 
@@ -13,6 +16,7 @@ struct RecordingCounts {
   std::uint64_t sorted_events = 0;  ///< Came up to 10 ms after a newer one.
   std::uint64_t lost_packets = 0;  ///< Missing in the numbers that the recording gives its packets.
   std::uint64_t undated_events = 0;  ///< Left out: see `EventStream::undatedEvents`.
+  std::vector<Warning> warnings;     ///< Of the readers: see `EventStream::warnings`.
 };
 
 /// A recording as a stream of observations in the order of time: CObservationEvents,

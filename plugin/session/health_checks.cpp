@@ -93,6 +93,35 @@ void checkLens(int camera, const CameraModel& model, Warnings& warnings) {
                    camera, 100 * fraction, nameOf(model.distortion))});
 }
 
+using ClockSpan = std::pair<std::int64_t, std::int64_t>;
+
+/// Whether the poses would cover the events if the events' times were `factor` times larger. Almost
+/// nothing among the poses is no fit, but chance.
+bool fitsWith(double factor, const ClockSpan& events, const ClockSpan& poses) {
+  const double first = factor * static_cast<double>(events.first);
+  const double last = factor * static_cast<double>(events.second);
+  const double begin = std::max(first, static_cast<double>(poses.first));
+  const double end = std::min(last, static_cast<double>(poses.second));
+  const auto poses_ns = static_cast<double>(poses.second - poses.first);
+  return end - begin > 0.5 * (last - first) && last - first > 0.1 * poses_ns;
+}
+
+/// The unit of either that would let both fit; else a question.
+std::string clockGuess(const ClockSpan& events, const ClockSpan& poses) {
+  double factor = 1;
+  for (const char* unit : {"ms", "us", "ns"}) {
+    factor /= 1000;
+    if (fitsWith(factor, events, poses)) {
+      return fmt::format("they fit if the events' times are in {}: --time-unit {}", unit, unit);
+    }
+    if (fitsWith(1 / factor, events, poses)) {
+      return fmt::format("they fit if the poses' times are in {}: a header names it, t_{} tx …",
+                         unit, unit);
+    }
+  }
+  return "have they one clock and one unit?";
+}
+
 void checkClocks(const RecordingStatistics& recording, Warnings& warnings) {
   // Trackers start late; in a recording of a second that is a large fraction. Another clock or
   // another unit leaves nothing.
@@ -106,12 +135,11 @@ void checkClocks(const RecordingStatistics& recording, Warnings& warnings) {
   const StreamStatistics& poses = recording.usedPoses()->poses;
   warnings.push_back(
       {"clock-overlap",
-       fmt::format(
-           "the poses cover {:.1f} % of the events' time: events from {} to {} s, poses "
-           "from {} to {} s; have they one clock and one unit? (--poses, --time-unit, [rig] "
-           "time_offsets_s)",
-           100 * overlap, formatSeconds(span.first), formatSeconds(span.second),
-           formatSeconds(*poses.first_ns), formatSeconds(*poses.last_ns))});
+       fmt::format("the poses cover {:.1f} % of the events' time: events from {} to {} s, poses "
+                   "from {} to {} s; {} (--poses, --time-unit, [rig] time_offsets_s)",
+                   100 * overlap, formatSeconds(span.first), formatSeconds(span.second),
+                   formatSeconds(*poses.first_ns), formatSeconds(*poses.last_ns),
+                   clockGuess(span, {*poses.first_ns, *poses.last_ns}))});
 }
 
 void checkPoseGap(const RecordingStatistics& recording, double max_gap_s, Warnings& warnings) {

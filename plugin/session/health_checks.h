@@ -7,17 +7,12 @@
 #include <vector>
 
 #include "mapping/geometry/depth_planes.h"
+#include "mapping/options/warning.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/recording_statistics.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
-
-/// Something implausible, which does not stop a run: docs/recordings.md has a table of the names.
-struct Warning {
-  std::string name;  ///< "clock-overlap"
-  std::string text;  ///< A sentence with the values, and the option or file that would mend it.
-};
 
 /// What is compared with the options of a map; without a map, the defaults serve.
 struct HealthLimits {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mapping/events/event.h"
+#include "mapping/options/warning.h"
 #include "plugin/calibration/calibration_file.h"
 
 namespace efm {
@@ -42,6 +43,9 @@ class EventStream {
   /// Events that were left out because their time or row is not known: those before the sensor's
   /// first words of time, and those after a gap. Not those before the time of `seek`.
   virtual std::uint64_t undatedEvents() const { return 0; }
+  /// What the reader concluded from the values, where the file does not say it: `time-unit`,
+  /// `event-columns`.
+  virtual std::vector<Warning> warnings() const { return {}; }
 };
 
 }  // namespace efm

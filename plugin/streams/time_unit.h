@@ -5,31 +5,62 @@
 #include <string>
 #include <string_view>
 
+#include "mapping/options/warning.h"
 #include "plugin/streams/recording_parts.h"
 
 namespace efm {
 
 /// A unit of time as its exponent: 10^exponent seconds, 0, -3, -6 or -9.
 
-/// "s", "ms", "us" or "ns", also as "sec", "µs" …; nothing for other words.
+/// "s", "ms", "us" or "ns", also as "sec", "µs", "microseconds" …; nothing for other words.
 std::optional<int> timeExponentOf(std::string_view unit);
+
+/// The name of a unit: "us" for -6.
+std::string timeUnitOf(int exponent);
 
 /// The times at the beginning of a file that does not name their unit.
 struct TimeSample {
   int count = 0;
-  bool whole = true;  ///< Without decimals.
-  double max = 0;     ///< The largest absolute value.
+  bool whole = true;    ///< Without decimals.
+  double max = 0;       ///< The largest absolute value.
+  double earliest = 0;  ///< Of the times.
+  double latest = 0;
+
+  void add(double t, bool is_whole);
 };
 
-/// The exponent of `--time-unit` if there is one, else the unit that the times can have: seconds
-/// where they have decimals (or are fewer than ten), nanoseconds where they are too large for
-/// another unit.
-/// @param where for the error.
-/// @throws std::runtime_error naming the option, where the unit cannot be told.
-int timeExponent(const ReaderOptions& options, const TimeSample& sample, const std::string& where);
+/// How many things of a kind come in a second, usually: for the guess of a unit.
+struct UsualRate {
+  const char* things;
+  double min;
+  double max;
+};
+inline constexpr UsualRate kUsualEventRate = {"events", 1e3, 3e7};
+inline constexpr UsualRate kUsualPoseRate = {"poses", 5, 2000};
+
+/// A unit of time, and how it was found.
+struct TimeUnit {
+  int exponent = 0;
+  std::optional<Warning> warning;  ///< Where the values alone say it.
+};
+
+/// The unit of `--time-unit` if there is one, else the one that the times have:
+///   nanoseconds   where they are too large for another unit;
+///   seconds       where they have decimals (or are fewer than ten);
+///   a unit in which they are of the years 2000 to 2050, and their rate is usual: with a warning.
+/// @param where for errors.
+/// @throws std::runtime_error naming the option and the likely unit, where it is not certain: other
+/// whole numbers, and decimals that are far too rare for seconds.
+TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
+                      const UsualRate& usual, const std::string& where);
+
+/// The same for poses, as an exponent. A unit that their values alone say is an error, too.
+int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,
+                     const std::string& where);
 
 /// What a word of a header names, and the unit in its brackets or after its last underscore:
-/// "#timestamp [ns]" is timestamp and ns, "t_us" is t and us. In lower case.
+/// "#timestamp [ns]" is timestamp and ns, "t_us" is t and us, "microseconds" is t and us. In lower
+/// case.
 struct HeaderWord {
   std::string name;
   std::optional<int> time_exponent;  ///< Of a time.

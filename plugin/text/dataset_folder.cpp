@@ -14,7 +14,7 @@
 #include "mapping/options/text_parsing.h"
 #include "plugin/streams/source_files.h"
 #include "plugin/text/event_text.h"
-#include "tracking_stub/poses/tum_trajectory.h"
+#include "plugin/text/pose_text.h"
 
 namespace efm {
 namespace {
@@ -43,7 +43,7 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
   RecordingParts parts;
   parts.expected_calibration = "camchain.yaml";
   parts.expected_poses = "poses.txt or groundtruth.txt";
-  addFolderFiles(folder, parts);
+  addFolderFiles(folder, options, parts);
   const std::size_t count =
       parts.calibration ? parts.calibration->rig.cameras.size() : countCameras(folder);
   for (std::size_t camera = 0; camera < count; ++camera) {
@@ -52,13 +52,13 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
   return parts;
 }
 
-void addFolderFiles(const fs::path& folder, RecordingParts& parts) {
+void addFolderFiles(const fs::path& folder, const ReaderOptions& options, RecordingParts& parts) {
   const fs::path camchain = folder / "camchain.yaml";
   if (!parts.calibration && isFile(camchain)) parts.calibration = readCalibration(camchain);
   for (const char* name : {"poses.txt", "groundtruth.txt"}) {
     std::error_code ignored;
     if (!parts.poses.empty() || !fs::exists(folder / name, ignored)) continue;
-    parts.poses = readPosesFile(folder / name);
+    parts.poses = requirePoseText(folder / name, options);
   }
 }
 

@@ -12,7 +12,7 @@ namespace efm {
 ///   camchain.yaml     the rig
 ///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera; other names
 ///                     and columns: `eventFileIn`, `findEventColumns`
-///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0
+///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0 (`readPoseText`)
 ///   depth/index.txt   with truth: t file, depth maps of camera 0 (see TruthDepth)
 /// Other files are ignored.
 
@@ -27,7 +27,8 @@ RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folde
 /// Adds the folder's calibration (camchain.yaml) and poses (poses.txt or groundtruth.txt), where
 /// the parts have none.
 /// @throws std::runtime_error naming the file and the line that is wrong.
-void addFolderFiles(const std::filesystem::path& folder, RecordingParts& parts);
+void addFolderFiles(const std::filesystem::path& folder, const ReaderOptions& options,
+                    RecordingParts& parts);
 
 /// The depth maps that the folder's depth/index.txt lists, a line `t file` each; none without it.
 /// @throws std::runtime_error naming the file and the line that is wrong.

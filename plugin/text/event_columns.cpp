@@ -4,17 +4,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/streams/time_unit.h"
+#include "plugin/text/column_order.h"
 
 namespace efm {
 namespace {
 
-constexpr std::size_t kSampledLines = 1000;
+constexpr std::size_t kSampledLines = 5000;
 
 std::string_view takeTextLine(std::string_view& text) {
   const std::size_t end = std::min(text.find('\n'), text.size());
@@ -34,10 +35,20 @@ bool hasNumber(const std::vector<std::string_view>& fields) {
 }
 
 char columnOf(const HeaderWord& word) {
+  constexpr struct {
+    char column;
+    std::string_view names;  // between blanks
+  } kNames[] = {{'x',
+                 " x u col column x_pos pos_x xpos posx x_px px_x pixel_x x_pixel x_coord coord_x "
+                 "x_coordinate x_addr "},
+                {'y',
+                 " y v row y_pos pos_y ypos posy y_px px_y pixel_y y_pixel y_coord coord_y "
+                 "y_coordinate y_addr "},
+                {'p', " p pol pols polarity polarities on on_off sign "}};
   if (word.isTime()) return 't';
-  if (word.name == "x" || word.name == "y") return word.name[0];
-  for (const char* name : {"p", "pol", "polarity", "on"}) {
-    if (word.name == name) return 'p';
+  for (const auto& [column, names] : kNames) {
+    const std::string name = " " + word.name + " ";
+    if (names.find(name) != std::string_view::npos) return column;
   }
   return '-';
 }
@@ -48,8 +59,15 @@ bool isComplete(const std::string& order) {
   });
 }
 
+/// The lines before the first event.
+struct Header {
+  bool named = false;               // it names the columns
+  std::string_view not_understood;  // a line of words
+};
+
 /// Takes order and unit from a line of names; leaves both where it names no event.
-void takeNames(std::string_view line, EventColumns& columns) {
+/// @return whether it does.
+bool takeNames(std::string_view line, EventColumns& columns) {
   if (!line.empty() && line.front() == '#') line = trimmed(line.substr(1));
   std::string order;
   std::optional<int> exponent;
@@ -58,9 +76,10 @@ void takeNames(std::string_view line, EventColumns& columns) {
     order += columnOf(word);
     if (order.back() == 't') exponent = word.time_exponent;
   }
-  if (!isComplete(order)) return;
+  if (!isComplete(order)) return false;
   columns.order = order;
   if (exponent) columns.time_exponent = *exponent;
+  return true;
 }
 
 std::string orderOfOption(const std::string& text) {
@@ -81,7 +100,7 @@ std::optional<CameraSize> sizeIn(const std::vector<std::string_view>& fields) {
 }
 
 /// Skips the lines before the first event. @return the rest of the text.
-std::string_view takeHeader(std::string_view text, EventColumns& columns) {
+std::string_view takeHeader(std::string_view text, EventColumns& columns, Header& header) {
   for (std::uint64_t lines = 0; !text.empty();) {
     const std::string_view rest = text;
     const std::string_view line = takeTextLine(text);
@@ -93,10 +112,58 @@ std::string_view takeHeader(std::string_view text, EventColumns& columns) {
     if (!comment && !size && hasNumber(fields)) return rest;
     if (size && (columns.size || text.empty())) return rest;
     if (size) columns.size = size;
-    if (!size) takeNames(line, columns);
+    if (!size && takeNames(line, columns)) {
+      header.named = true;
+    } else if (!size && !comment && fields.size() >= 4) {
+      header.not_understood = line;
+    }
     columns.header_lines = lines;
   }
   return {};
+}
+
+std::string asWords(const std::string& order) {
+  std::string words;
+  for (const char column : order) words += (words.empty() ? "" : " ") + std::string(1, column);
+  return words;
+}
+
+/// @throws std::runtime_error where the values show another order than the usual one, but not
+/// surely.
+void takeOrderOfValues(const EventRows& rows, const Header& header, const std::string& file,
+                       EventColumns& columns) {
+  const std::optional<ColumnOrder> found = orderOfValues(rows, columns.order);
+  const bool usual = !found || found->order == columns.order;
+  const std::string words = asWords(found ? found->order : columns.order);
+  if (!usual && !found->certain) {
+    throw std::runtime_error(
+        fmt::format("{}: by their values, the columns are probably {}: expected {}, a header with "
+                    "their names, or --event-columns \"{}\"",
+                    file, words, asWords(columns.order), words));
+  }
+  if (found) columns.order = found->order;
+  const bool misread = !header.not_understood.empty() && !rows.empty() &&
+                       rows.front().size() == columns.order.size();
+  if (usual && !misread) return;
+  columns.warnings.push_back(
+      {"event-columns",
+       misread ? fmt::format("{}: the header {} is not understood: the columns are read as {} "
+                             "(--event-columns \"{}\")",
+                             file, inQuotes(header.not_understood), words, words)
+               : fmt::format("{}: by their values, the columns are {} (--event-columns \"{}\")",
+                             file, words, words)});
+}
+
+TimeSample timesIn(const EventRows& rows, const EventColumns& columns) {
+  const std::size_t t_column = columns.order.find('t');
+  TimeSample sample;
+  for (const std::vector<std::string_view>& row : rows) {
+    if (row.size() != columns.order.size()) continue;
+    const std::string_view text = row[t_column];
+    const std::optional<double> t = parseFinite(text);
+    if (t) sample.add(*t, text.find_first_of(".eE") == std::string_view::npos);
+  }
+  return sample;
 }
 
 }  // namespace
@@ -118,32 +185,33 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
   constexpr int kUnknown = 1;
   EventColumns columns;
   columns.time_exponent = kUnknown;
-  std::string_view rest = takeHeader(beginning, columns);
-  if (!options.columns.empty()) columns.order = orderOfOption(options.columns);
-  if (!options.time_unit.empty()) columns.time_exponent = *timeExponentOf(options.time_unit);
-
-  const std::size_t t_column = columns.order.find('t');
-  TimeSample sample;
+  Header header;
+  std::string_view rest = takeHeader(beginning, columns, header);
+  EventRows rows;
   for (std::size_t k = 0; k < kSampledLines && !rest.empty(); ++k) {
     const std::string_view line = takeTextLine(rest);
     if (k == 0) columns.separator = separatorOf(line);
-    const std::vector<std::string_view> fields = eventFields(line, columns.separator);
-    if (fields.size() != columns.order.size()) continue;
-    const std::optional<double> t = parseFinite(fields[t_column]);
-    if (!t) continue;
-    ++sample.count;
-    sample.whole = sample.whole && fields[t_column].find_first_of(".eE") == std::string_view::npos;
-    sample.max = std::max(sample.max, std::abs(*t));
+    rows.push_back(eventFields(line.substr(0, line.find('#')), columns.separator));
   }
-  if (columns.time_exponent == kUnknown)
-    columns.time_exponent = timeExponent(options, sample, file);
+  if (!options.columns.empty()) {
+    columns.order = orderOfOption(options.columns);
+  } else if (!header.named) {
+    takeOrderOfValues(rows, header, file, columns);
+  }
+  if (!options.time_unit.empty()) columns.time_exponent = *timeExponentOf(options.time_unit);
+  if (columns.time_exponent == kUnknown) {
+    TimeUnit unit = findTimeUnit(options, timesIn(rows, columns), kUsualEventRate, file);
+    columns.time_exponent = unit.exponent;
+    if (unit.warning) columns.warnings.push_back(std::move(*unit.warning));
+  }
   return columns;
 }
 
 bool looksLikeEventLines(std::string_view beginning) {
   if (beginning.find('\0') != std::string_view::npos) return false;
   EventColumns columns;
-  std::string_view rest = takeHeader(beginning, columns);
+  Header ignored;
+  std::string_view rest = takeHeader(beginning, columns, ignored);
   if (rest.empty()) return false;
   const std::string_view line = takeTextLine(rest);
   const std::vector<std::string_view> fields = eventFields(line, separatorOf(line));

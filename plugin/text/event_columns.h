@@ -18,18 +18,20 @@ struct EventColumns {
   int time_exponent = 0;           ///< Times count 10^time_exponent seconds.
   std::uint64_t header_lines = 0;  ///< To skip at the beginning of the file.
   std::optional<CameraSize> size;  ///< From a first line `width height`.
+  std::vector<Warning> warnings;   ///< Where the values alone say order or unit.
 
   /// t x y p in seconds, between blanks.
   bool isUsual() const { return order == "txyp" && separator == ' ' && time_exponent == 0; }
 };
 
-/// Finds the columns from the beginning of a file. A first line with names (t or time …, x, y, p or
-/// pol …, also behind a `#`) gives order and unit, one with two whole numbers the sensor's size;
-/// options come before both. Without them: t x y p.
+/// Finds the columns from the beginning of a file. A first line with names (t or time …, x or col
+/// …, y or row …, p or pol …, also behind a `#`) gives order and unit, one with two whole numbers
+/// the sensor's size; options come before both. Without them: t x y p, or the order that the values
+/// show (`orderOfValues`), with a warning.
 /// @param beginning whole lines.
 /// @param file for errors.
-/// @throws std::runtime_error where `--event-columns` is wrong, or the unit of time cannot be told
-/// (see `timeExponent`).
+/// @throws std::runtime_error where `--event-columns` is wrong; where the order is likely but not
+/// certain; where the unit of time is not certain (`findTimeUnit`).
 EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& options,
                               const std::string& file);
 

@@ -214,8 +214,10 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
                                          place(line_), inQuotes(content), names));
   }
   if (fields.size() != count) {
-    throw std::runtime_error(fmt::format("{}: {}: expected {} fields, {}, not {}", place(line_),
-                                         inQuotes(content), count, names, fields.size()));
+    throw std::runtime_error(fmt::format(
+        "{}: {}: expected {} fields, {}, not {} (other columns: --event-columns, - for one to "
+        "ignore)",
+        place(line_), inQuotes(content), count, names, fields.size()));
   }
 
   const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {
@@ -226,7 +228,8 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   const auto pixel_of = [&](const char* name) {
     const std::optional<std::uint16_t> pixel = parseNumber<std::uint16_t>(field_of(name[0]));
     if (pixel) return *pixel;
-    throw fail(name, field_of(name[0]), "a whole number from 0 to 65535");
+    throw fail(name, field_of(name[0]),
+               "a whole number from 0 to 65535 (columns in another order: --event-columns)");
   };
   const std::string_view time = field_of('t');
   const std::optional<std::int64_t> t_ns = parseTimeIn(time, columns_.time_exponent);

@@ -32,6 +32,7 @@ class EventTextStream : public EventStream {
   double progress() const override { return started_ ? content_.progress() : 0; }
   /// Of a first line `width height`.
   std::optional<CameraSize> size() const override { return columns_.size; }
+  std::vector<Warning> warnings() const override { return columns_.warnings; }
 
  private:
   void takeLines(const char* begin, const char* end, std::vector<Event>& events);

@@ -13,7 +13,7 @@
 
 #include "plugin/streams/source_files.h"
 #include "plugin/text/event_text.h"
-#include "tracking_stub/poses/tum_trajectory.h"
+#include "plugin/text/pose_text.h"
 
 namespace efm {
 namespace {
@@ -73,7 +73,7 @@ RecordingParts openUzhFolder(const std::vector<fs::path>& folders, const ReaderO
     parts.calibration = readUzhCalibration(folder / "calib.txt");
   }
   if (fs::exists(folder / "groundtruth.txt", ignored)) {
-    parts.poses = readPosesFile(folder / "groundtruth.txt");
+    parts.poses = requirePoseText(folder / "groundtruth.txt", options);
   }
   return parts;
 }

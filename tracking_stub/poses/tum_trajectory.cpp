@@ -2,6 +2,7 @@
 #include "tracking_stub/poses/tum_trajectory.h"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <fstream>
 #include <iomanip>
@@ -40,6 +41,12 @@ std::runtime_error quaternionError(const std::vector<std::string_view>& fields, 
   std::ostringstream text;
   text << "qx qy qz qw = " << inQuotes(values) << ", of length " << norm
        << ": expected a rotation, of length 1 within 1 %";
+  double squares = 0;
+  for (std::size_t field = 1; field <= 4; ++field) squares += std::pow(numberIn(fields, field), 2);
+  text << (std::abs(squares - 1) < 0.01
+               ? "; tx ty tz qx has length 1: is the order t qx qy qz qw tx ty tz? "
+               : "; are the columns t tx ty tz qx qy qz qw? ")
+       << "A header names other ones";
   return std::runtime_error(text.str());
 }
 
@@ -48,7 +55,8 @@ std::runtime_error quaternionError(const std::vector<std::string_view>& fields, 
 StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_exponent) {
   if (fields.size() != kFieldNames.size()) {
     throw std::runtime_error(std::to_string(fields.size()) +
-                             " fields: expected 8, t tx ty tz qx qy qz qw");
+                             " fields: expected 8, t tx ty tz qx qy qz qw" +
+                             (fields.size() == 7 ? " (angles are not read)" : ""));
   }
   const std::optional<std::int64_t> t_ns = parseTimeIn(fields[0], time_exponent);
   if (!t_ns) throw fieldError(0, fields[0], "a time in decimal seconds");

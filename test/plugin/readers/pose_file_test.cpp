@@ -91,7 +91,12 @@ TEST_F(PoseFile, TheUnitOfWholeNumbersIsToldOrCertain) {
     large += std::to_string(1'700'000'000'000'000'000 + i) + " 1 2 3 0 0 0 1\n";
   }
   EXPECT_THAT(errorOfFile("small.txt", small),
-              AllOf(HasSubstr("small.txt: all times are whole"), HasSubstr("--time-unit")));
+              AllOf(HasSubstr("small.txt: all times are whole"), HasSubstr("--time-unit ms")));
+  std::string dated;  // 100 Hz: certain for events, but poses have no place for a warning
+  for (int i = 0; i < 12; ++i) {
+    dated += std::to_string(1'700'000'000'000'000 + i * 10'000) + " 1 2 3 0 0 0 1\n";
+  }
+  EXPECT_THAT(errorOfFile("dated.txt", dated), HasSubstr("(--time-unit us)"));
   ReaderOptions options;
   options.time_unit = "us";
   EXPECT_EQ(readPoses(folder() / "small.txt", options)[1].t_ns, 928'219'000);
@@ -143,6 +148,10 @@ TEST_F(PoseFile, AFolderAndARecordingHaveTheirOwnPoses) {
   write("events.txt", "0.1 1 2 0\n");
   write("groundtruth.txt", kTum);
   expectTwo(readPoses(folder()), 1'000'000'001, 1'700'000'000'123'456'789, "folder");
+  write("groundtruth.txt",
+        "#timestamp [us],qw,qx,qy,qz,px,py,pz\n1000000.001,.5,.5,.5,.5,1,2,3\n"
+        "1700000000123456.789,.6,.8,0,0,4,5,6\n");
+  expectTwo(readPoses(folder()), 1'000'000'001, 1'700'000'000'123'456'789, "with a header");
 }
 
 TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
@@ -159,6 +168,10 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"a.txt", "1.5 1 2 3 0 0 0 1\nabc 1 2 3 0 0 0 1\n", "a.txt:2: 'abc 1 2 3 0 0 0 1': expected"},
       {"a.txt", "1.5,1,2,3,0,0,0,1\n", "a.txt:1: commas without a header"},
       {"a.csv", "#t [us], tx, ty, tz, qx, qy, qz\n", "there is no column qw"},
+      {"a.csv", "t_us,x,y,z,roll,pitch,yaw\n", "angles are not read, because"},
+      {"a.txt", "1.5 1 2 3 10 20 30\n", "7 fields: expected 8, t tx ty tz qx qy qz qw (angles are"},
+      {"a.txt", "1.5 1 0 0 0 1 2 3\n", "is the order t qx qy qz qw tx ty tz? A header names"},
+      {"a.txt", "1.5 1 2 3 0 45 0 0\n", "are the columns t tx ty tz qx qy qz qw? A header names"},
       {"a.csv", header + "1,1,2,3,0,0,0\n", "a.csv:2: 7 fields: expected 8, as in the header"},
       {"a.csv", header + "1,1,2,3,0,0,0,z\n", "a.csv:2: qw = 'z': expected a finite number"},
       {"a.bin", std::string("\x7f\0ELF", 5), "a.bin: not a file of poses: expected text"},

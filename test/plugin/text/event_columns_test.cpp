@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <string>
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/text_parsing.h"
 #include "plugin/readers/recording_formats.h"
 #include "plugin/streams/event_packets.h"
 #include "plugin/text/event_text.h"
@@ -61,6 +63,10 @@ TEST_F(EventColumnsText, OrderUnitAndPolarityAreThoseOfTheHeaderOrTheOptions) {
       {"1000 12 34 1\n2001 239 0 0\n", "", "us"},
       {"1000000\t12  34 1\n2001000 239 0 0 # late\n", "", "ns"},
       {"1.0 12 34 1\n2.001 239 0 0", "", "ms"},
+      {"x_pos,y_pos,polarity,time_us\n12,34,1,1000\n239,0,0,2001\n", "", ""},
+      {"row,col,on_off,microseconds\n34,12,1,1000\n0,239,0,2001\n", "", ""},
+      {"Timestamp(us) U V Sign\n1000 12 34 1\n2001 239 0 -1\n", "", ""},
+      {"time [milliseconds];y;x;p\n1;34;12;1\n2.001;0;239;0\n", "", ""},
   };
   for (const auto& row : rows) {
     EventTextStream stream(write(row.text), ReaderOptions{{}, row.columns, row.time_unit});
@@ -84,6 +90,66 @@ TEST_F(EventColumnsText, TheUnitOfWholeNumbersIsToldOrCertain) {
               AllOf(HasSubstr("e.txt: all times are whole numbers"), HasSubstr("--time-unit")));
   EventTextStream stream(write(large));
   EXPECT_EQ(allEventsOf(stream).at(1).t_ns, 1'700'000'000'000'000'001);
+}
+
+/// Events as a sensor makes them, in any order and unit.
+/// @param format of a line with the fields {t}, {x}, {y} and {p}.
+/// @param start and step of the times, in the unit.
+std::string linesOf(const std::string& format, int count, double start, double step, int decimals) {
+  std::string text;
+  for (int i = 0; i < count; ++i) {
+    text += fmt::format(format + "\n",
+                        fmt::arg("t", fmt::format("{:.{}f}", start + i * step, decimals)),
+                        fmt::arg("x", i * 97 % 240), fmt::arg("y", i * 59 % 180),
+                        fmt::arg("p", i * 7 % 3 == 0 ? 1 : 0));
+  }
+  return text;
+}
+
+TEST_F(EventColumnsText, TheOrderThatTheValuesShowIsUsedAndSaid) {
+  const std::string usual = linesOf("{t} {x} {y} {p}", 200, 1, 1e-5, 6);
+  EventTextStream expected(write(usual, "usual.txt"));
+  EXPECT_THAT(expected.warnings(), testing::IsEmpty());
+  const std::vector<Event> events = allEventsOf(expected);
+  ASSERT_EQ(events.size(), 200U);
+  for (const char* order : {"x y t p", "x y p t", "p t x y", "t x p y"}) {
+    std::string format;
+    for (const std::string_view word : splitWords(order)) format += "{" + std::string(word) + "} ";
+    EventTextStream stream(write(linesOf(format, 200, 1, 1e-5, 6)));
+    EXPECT_TRUE(allEventsOf(stream) == events) << order;
+    ASSERT_THAT(stream.warnings(), testing::SizeIs(1)) << order;
+    EXPECT_EQ(stream.warnings()[0].name, "event-columns");
+    EXPECT_THAT(stream.warnings()[0].text, HasSubstr(std::string("--event-columns \"") + order));
+    // So few lines may look so by chance.
+    EXPECT_THAT(errorOfText(linesOf(format, 20, 1, 1e-5, 6)),
+                AllOf(HasSubstr("probably "), HasSubstr(order)));
+  }
+  // Times that fall now and then, and a polarity that is always 1, are no reason for doubt.
+  for (const std::string& text : {linesOf("{t} {x} {y} 1", 200, 1, 1e-5, 6),
+                                  usual + linesOf("{t} {x} {y} {p}", 200, 0, 1e-5, 6)}) {
+    EventTextStream stream(write(text));
+    EXPECT_THAT(stream.warnings(), testing::IsEmpty());
+    EXPECT_FALSE(allEventsOf(stream).empty());
+  }
+  EventTextStream named(write("a,b,c,d\n" + linesOf("{t},{x},{y},{p}", 200, 1, 1e-5, 6)));
+  ASSERT_THAT(named.warnings(), testing::SizeIs(1));
+  EXPECT_THAT(named.warnings()[0].text, HasSubstr("the header 'a,b,c,d' is not understood"));
+}
+
+TEST_F(EventColumnsText, TheUnitThatTheValuesShowIsUsedAndSaidIfItIsCertain) {
+  const auto of = [](double start, double step, int decimals) {
+    return linesOf("{t} {x} {y} {p}", 2000, start, step, decimals);
+  };
+  // 100,000 events per second in all units.
+  EXPECT_THAT(errorOfText(of(5, 10, 0)), HasSubstr("probably us, where 2000 events take 0.02 s"));
+  EXPECT_THAT(errorOfText(of(5, 10'000, 0)), HasSubstr("expected --time-unit ns"));
+  EXPECT_THAT(errorOfText(of(5e6, 10, 1)), HasSubstr("not seconds: probably us"));
+  EXPECT_THAT(errorOfText(of(1.7e12, 0.01, 2)), HasSubstr("not seconds: probably ms"));
+  EventTextStream stream(write(of(1.7e15, 10, 0)));
+  EXPECT_EQ(allEventsOf(stream).at(1).t_ns, 1'700'000'000'000'010'000);
+  ASSERT_THAT(stream.warnings(), testing::SizeIs(1));
+  EXPECT_EQ(stream.warnings()[0].name, "time-unit");
+  EXPECT_THAT(stream.warnings()[0].text, HasSubstr("(--time-unit us)"));
 }
 
 TEST_F(EventColumnsText, AnErrorNamesTheLineTheColumnAndTheOption) {

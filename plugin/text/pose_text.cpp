@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/text/pose_text.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -11,7 +12,6 @@
 
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
-#include "plugin/readers/pose_file.h"
 #include "plugin/streams/file_content.h"
 #include "plugin/streams/time_unit.h"
 #include "tracking_stub/poses/tum_trajectory.h"
@@ -72,6 +72,7 @@ std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
   columns.named = true;
   columns.count = 0;
   std::array<bool, kPoseFields> found{};
+  bool angles = false;
   for (const std::string_view text : words) {
     const HeaderWord word = headerWord(text);
     if (word.name.empty()) {
@@ -79,6 +80,7 @@ std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
       continue;
     }
     const std::optional<std::size_t> field = poseFieldOf(word);
+    angles = angles || startsWithAny(word.name, {"roll", "pitch", "yaw", "euler"});
     if (field && !found[*field]) {
       found[*field] = true;
       columns.column[*field] = columns.count;
@@ -87,6 +89,12 @@ std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
     ++columns.count;
   }
   if (!found[0] || std::count(found.begin(), found.end(), true) < 4) return std::nullopt;
+  if (angles && !found[4]) {
+    throw std::runtime_error(
+        inQuotes(line) +
+        ": angles are not read, because their order and axes differ between tools: expected a "
+        "quaternion, qx qy qz qw");
+  }
   for (std::size_t field = 0; field < kPoseFields; ++field) {
     if (found[field]) continue;
     throw std::runtime_error(
@@ -134,8 +142,8 @@ std::vector<PoseLine> poseLines(std::string_view text, PoseColumns& columns,
 }
 
 /// @param columns of the lines, with the unit of the header.
-int poseTimeExponent(const std::vector<PoseLine>& lines, const PoseColumns& columns,
-                     const std::filesystem::path& file, const ReaderOptions& options) {
+int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
+               const std::filesystem::path& file, const ReaderOptions& options) {
   if (columns.time_exponent) return *columns.time_exponent;
   constexpr std::size_t kSample = 100;
   TimeSample sample;
@@ -143,13 +151,13 @@ int poseTimeExponent(const std::vector<PoseLine>& lines, const PoseColumns& colu
     const std::vector<std::string_view> fields = poseFields(lines[i].text);
     if (fields.size() <= columns.column[0]) continue;
     const std::string_view t = fields[columns.column[0]];
-    ++sample.count;
-    sample.whole = sample.whole && t.find_first_of(".eE") == std::string_view::npos;
-    sample.max = std::max(sample.max, std::abs(parseFinite(t).value_or(0)));
+    if (const auto value = parseFinite(t)) {
+      sample.add(*value, t.find_first_of(".eE") == std::string_view::npos);
+    }
   }
   if (!sample.whole) return 0;  // the option is that of the events
   if (columns.named && file.filename().string().find("mocap_data") != std::string::npos) return -6;
-  return timeExponent(options, sample, file.string());
+  return poseTimeExponent(options, sample, file.string());
 }
 
 }  // namespace
@@ -160,7 +168,7 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
   const std::string text = FileContent(file).readAll(kMaxBytes);
   PoseColumns columns;
   const std::vector<PoseLine> lines = poseLines(text, columns, file.string());
-  const int exponent = poseTimeExponent(lines, columns, file, options);
+  const int exponent = exponentOf(lines, columns, file, options);
   std::vector<StampedPose> poses;
   poses.reserve(lines.size());
   for (const PoseLine& line : lines) {
@@ -184,6 +192,14 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
     }
   }
   return poses;
+}
+
+std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
+                                         const ReaderOptions& options) {
+  std::vector<StampedPose> poses = readPoseText(file, options);
+  if (!poses.empty()) return poses;
+  throw std::runtime_error(file.string() +
+                           ": no poses: expected at least one line t tx ty tz qx qy qz qw");
 }
 
 }  // namespace efm
