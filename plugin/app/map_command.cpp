@@ -28,13 +28,17 @@
 namespace efm {
 namespace {
 
-EventFusionOptions optionsOf(const MappingArguments& arguments) {
-  EventFusionOptions options = asUsage([&] {
+OptionReader readerOf(const MappingArguments& arguments) {
+  return asUsage([&] {
     OptionReader reader;
     if (!arguments.config.empty()) reader.readFile(findConfig(arguments.config));
     for (const std::string& assignment : arguments.sets) reader.set(assignment);
-    return reader.options();
+    return reader;
   });
+}
+
+EventFusionOptions optionsOf(const MappingArguments& arguments) {
+  EventFusionOptions options = asUsage([&] { return readerOf(arguments).options(); });
   if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
   if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // the only source
   if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
@@ -47,6 +51,11 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
   RecordingSource source = arguments.source;
   source.calibration = options.rig.calibration;
   source.hand_eye = options.rig.hand_eye;
+  const OptionReader reader = readerOf(arguments);
+  if (arguments.source.calibration.empty()) {
+    source.calibration_given = reader.given("rig", "calibration");
+  }
+  if (arguments.source.hand_eye.empty()) source.hand_eye_given = reader.given("rig", "hand_eye");
   source.override_rig = false;  // the builder's options do
   PosePerturbationOptions& perturbation = source.faults.perturbation;
   perturbation.max_pose_gap_s = options.mapper.trajectory.max_pose_gap_s;
@@ -115,7 +124,7 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
   if (outcome.report.counts.keyframes > 0 && !quiet)
     std::cout << summaryOf(outcome.report, kind, output.folder());
-  if (outcome.error) return fail(*outcome.error);
+  if (outcome.error) return fail(readerOf(arguments).withOrigins(*outcome.error));
   if (!outcome.report.stopped_at) {
     return arguments.strict && failStrictly(outcome.report.warnings) ? kFailedStatus : 0;
   }

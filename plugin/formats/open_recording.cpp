@@ -176,6 +176,13 @@ std::unique_ptr<Recording> openOwn(const RecordingSource& source, const Calibrat
   return join(openParts(source), source, given);
 }
 
+/// @param given how the user gave the file; empty: as the value of `option`.
+void requireGivenFile(const Path& file, const char* option, const std::string& given) {
+  if (file.empty() || std::filesystem::exists(file)) return;
+  throw std::runtime_error(
+      fmt::format("{}: no such file", given.empty() ? option + (" " + file.string()) : given));
+}
+
 }  // namespace
 
 std::vector<std::string> recordingFormats() {
@@ -185,6 +192,9 @@ std::vector<std::string> recordingFormats() {
 }
 
 std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
+  requireGivenFile(source.poses, "--poses", {});
+  requireGivenFile(source.calibration, "--calibration", source.calibration_given);
+  requireGivenFile(source.hand_eye, "--hand-eye", source.hand_eye_given);
   const RigSetup setup = readRigSetup({source.calibration, source.hand_eye, {}, {}});
   std::vector<StampedPose> poses;
   if (!source.poses.empty()) poses = readPoses(source.poses, source.reader);

@@ -23,7 +23,10 @@ struct RecordingSource {
   std::filesystem::path poses;               ///< See `readPoses`. Empty: the recording's.
   std::filesystem::path calibration;         ///< See `readCalibration`. Empty: the recording's.
   std::filesystem::path hand_eye;            ///< See `readHandEye`. Empty: the recording's.
-  TrackerFaults faults;                      ///< Of the poses (CObservationRobotPose).
+  /// Where and how these two were given, for errors. Empty: as --calibration and --hand-eye.
+  std::string calibration_given;
+  std::string hand_eye_given;
+  TrackerFaults faults;  ///< Of the poses (CObservationRobotPose).
   /// Calibration and hand-eye transform replace those of the observations. Otherwise they are used
   /// only if the recording has none, and a map builder's options replace the others.
   bool override_rig = true;

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/options/nearest_name.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 
@@ -25,9 +27,44 @@ template <typename... Values>
   throw std::invalid_argument(fmt::format(format, std::forward<Values>(values)...));
 }
 
+std::string bracketed(std::string_view section) { return "[" + std::string(section) + "]"; }
+
 void requireSection(std::string_view origin, std::string_view section) {
   if (isOptionSection(section)) return;
-  refuse("{}: unknown section [{}]; known: {}", origin, printable(section), knownOptionSections());
+  refuse("{}: unknown section [{}]: {}", origin, printable(section),
+         expectedName(bracketed(section), optionSections()));
+}
+
+/// The origin of what the command line sets.
+constexpr std::string_view kSet = "--set";
+
+/// A key as the user gave it: "rig.ini:3: [dsi] num_planes", or "--set dsi.num_planes".
+std::string keyText(const OptionOrigin& origin, std::string_view section, std::string_view key) {
+  return origin.name == kSet ? fmt::format("{} {}.{}", kSet, section, printable(key))
+                             : fmt::format("{} {}", origin.name, printable(key));
+}
+
+/// What an error says of an unknown key.
+std::string unknownKey(std::string_view section, std::string_view key) {
+  for (const OptionKey& entry : optionKeys()) {
+    if (entry.key == key) return fmt::format("unknown key: it is one of [{}]", entry.section);
+  }
+  return "unknown key: " + expectedName(key, optionKeysOf(section));
+}
+
+bool isWordCharacter(char c) {
+  return c == '_' || std::isalnum(static_cast<unsigned char>(c)) != 0;
+}
+
+/// Whether a text has a word.
+bool mentions(std::string_view text, std::string_view word) {
+  for (std::size_t at = text.find(word); at != std::string_view::npos;
+       at = text.find(word, at + 1)) {
+    const std::size_t end = at + word.size();
+    const bool begins = at == 0 || !isWordCharacter(text[at - 1]);
+    if (begins && (end == text.size() || !isWordCharacter(text[end]))) return true;
+  }
+  return false;
 }
 
 bool startsComment(std::string_view text) {
@@ -102,13 +139,14 @@ void OptionReader::set(std::string_view assignment) {
   const std::string_view section = trimmed(assignment.substr(0, dot));
   requireSection("--set " + printable(assignment), section);
   assign(section, trimmed(assignment.substr(dot + 1, equals - dot - 1)),
-         trimmed(assignment.substr(equals + 1)), {originOf("--set", section), {}});
+         trimmed(assignment.substr(equals + 1)), {std::string(kSet), {}});
 }
 
 void OptionReader::set(std::string_view section, std::string_view key, std::string_view value,
                        const OptionOrigin& origin) {
   if (!isOptionSection(section)) {
-    refuse("{} unknown section; known: {}", origin.name, knownOptionSections());
+    refuse("{} unknown section: {}", origin.name,
+           expectedName(bracketed(section), optionSections()));
   }
   assign(section, key, trimmed(withoutComment(value)), origin);
 }
@@ -121,16 +159,18 @@ void OptionReader::assign(std::string_view section, std::string_view key, std::s
   });
   if (entry == keys.end()) {
     const std::string_view former = formerOptionError(section, key);
-    if (!former.empty()) refuse("{} {}: {}", origin.name, key, former);
-    refuse("{} {}: unknown key; known: {}", origin.name, printable(key), knownOptionKeys(section));
+    refuse("{}: {}", keyText(origin, section, key),
+           former.empty() ? unknownKey(section, key) : std::string(former));
   }
+  const char* const equals = origin.name == kSet ? "=" : " = ";
+  const std::string text = keyText(origin, section, key) + equals + printable(value);
   try {
     const std::filesystem::path path = origin.folder / value;
     entry->read(options_, entry->is_path && !value.empty() ? path.native() : value);
   } catch (const std::invalid_argument& error) {
-    refuse("{} {} = {}: {}", origin.name, printable(key), printable(value), error.what());
+    refuse("{}: {}", text, error.what());
   }
-  origins_[{std::string(section), std::string(key)}] = origin.name;
+  given_[{std::string(section), std::string(key)}] = {text, ++assignments_};
 }
 
 EventFusionOptions OptionReader::options() const {
@@ -141,17 +181,55 @@ EventFusionOptions OptionReader::options() const {
   } catch (const std::invalid_argument& error) {
     // The structs say "key = value: must be ..."; they know neither sections nor files.
     const std::string message = error.what();
-    const std::string key = message.substr(0, message.find(" = "));
+    const std::size_t equals = message.find(" = ");
+    const std::size_t colon = message.find(": ", equals);
+    if (colon == std::string::npos) throw;
     for (const OptionKey& entry : optionKeys()) {
-      if (entry.key != key) continue;
-      const auto origin = origins_.find({std::string(entry.section), key});
-      refuse("{} {}",
-             origin == origins_.end() ? originOf("default", entry.section) : origin->second,
-             message);
+      if (entry.key != message.substr(0, equals)) continue;
+      refuseOutOfRange(entry, message.substr(0, colon), message.substr(colon + 2));
     }
     throw;
   }
   return options_;
+}
+
+/// @param value "key = value".
+void OptionReader::refuseOutOfRange(const OptionKey& entry, const std::string& value,
+                                    const std::string& expected) const {
+  const auto find = [this](const OptionKey& key) {
+    const auto found = given_.find({std::string(key.section), std::string(key.key)});
+    return found == given_.end() ? Given() : found->second;
+  };
+  const Given own = find(entry);
+  const std::string own_text =
+      own.order > 0 ? own.text : fmt::format("default: [{}] {}", entry.section, value);
+  std::string others;
+  for (const OptionKey& other : optionKeys()) {
+    if (other.section != entry.section || other.key == entry.key) continue;
+    if (!mentions(expected, other.key)) continue;
+    const Given given = find(other);
+    if (given.order > own.order) {
+      refuse("{}: contradicts {}, which {}", given.text, own_text, expected);
+    }
+    others += fmt::format(" ({})", given.order > 0 ? given.text
+                                                   : fmt::format("{} = {} by default", other.key,
+                                                                 textOf(other.value(options_))));
+  }
+  refuse("{}: {}{}", own_text, expected, others);
+}
+
+std::string OptionReader::withOrigins(std::string error) const {
+  const std::string said = error;
+  for (const auto& [name, given] : given_) {
+    const std::string shown = fmt::format("[{}] {}", name.first, name.second);
+    if (mentions(said, shown)) error += " (" + given.text + ")";
+  }
+  return error;
+}
+
+std::string OptionReader::given(std::string_view section, std::string_view key) const {
+  const auto found = given_.find({std::string(section), std::string(key)});
+  return found == given_.end() ? std::string() : found->second.text;
 }
 
 }  // namespace efm

@@ -44,16 +44,31 @@ class OptionReader {
   void set(std::string_view section, std::string_view key, std::string_view value,
            const OptionOrigin& origin);
 
-  /// @throws std::invalid_argument where a value is out of range.
+  /// @throws std::invalid_argument where a value is out of range. Of two values that contradict
+  /// each other, the error begins with the one that was given last.
   EventFusionOptions options() const;
+
+  /// Where and how an option was given: "rig.ini:3: [dsi] num_planes = 0", or
+  /// "--set dsi.num_planes=0". Empty if it was not given.
+  std::string given(std::string_view section, std::string_view key) const;
+  /// An error about options, "… [rig] cameras …", with where and how they were given.
+  std::string withOrigins(std::string error) const;
 
  private:
   void readLines(std::string_view text, const OptionOrigin& file);
   void assign(std::string_view section, std::string_view key, std::string_view value,
               const OptionOrigin& origin);
 
+  [[noreturn]] void refuseOutOfRange(const OptionKey& entry, const std::string& value,
+                                     const std::string& expected) const;
+
+  struct Given {
+    std::string text;
+    int order = 0;  // the n-th of all
+  };
   EventFusionOptions options_;
-  std::map<std::pair<std::string, std::string>, std::string> origins_;  // of (section, key)
+  std::map<std::pair<std::string, std::string>, Given> given_;  // of (section, key)
+  int assignments_ = 0;
 };
 
 }  // namespace efm

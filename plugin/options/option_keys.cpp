@@ -199,24 +199,22 @@ std::string_view formerOptionError(std::string_view section, std::string_view ke
   return {};
 }
 
-std::string knownOptionKeys(std::string_view section) {
-  std::string known;
+std::vector<std::string> optionKeysOf(std::string_view section) {
+  std::vector<std::string> keys;
   for (const OptionKey& entry : optionKeys()) {
-    if (entry.section == section) known += (known.empty() ? "" : ", ") + std::string(entry.key);
+    if (entry.section == section) keys.emplace_back(entry.key);
   }
-  return known;
+  return keys;
 }
 
-std::string knownOptionSections() {
-  std::string known;
+std::vector<std::string> optionSections() {
+  std::vector<std::string> sections;
   std::string_view last;
   for (const OptionKey& entry : optionKeys()) {
-    if (entry.section != last) {
-      known += (known.empty() ? "[" : ", [") + std::string(entry.section) + "]";
-    }
+    if (entry.section != last) sections.push_back("[" + std::string(entry.section) + "]");
     last = entry.section;
   }
-  return known;
+  return sections;
 }
 
 std::vector<NamedOption> listOptions(const EventFusionOptions& options) {
@@ -227,6 +225,6 @@ std::vector<NamedOption> listOptions(const EventFusionOptions& options) {
   return list;
 }
 
-bool isOptionSection(std::string_view section) { return !knownOptionKeys(section).empty(); }
+bool isOptionSection(std::string_view section) { return !optionKeysOf(section).empty(); }
 
 }  // namespace efm

@@ -39,8 +39,9 @@ bool isOptionSection(std::string_view section);
 /// other keys.
 std::string_view formerOptionError(std::string_view section, std::string_view key);
 
-/// The keys of a section and the sections, for errors.
-std::string knownOptionKeys(std::string_view section);
-std::string knownOptionSections();
+/// The keys of a section; none of an unknown one.
+std::vector<std::string> optionKeysOf(std::string_view section);
+/// All sections: "[rig]", …
+std::vector<std::string> optionSections();
 
 }  // namespace efm

@@ -10,6 +10,7 @@
 
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/nearest_name.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 
@@ -127,7 +128,7 @@ const std::vector<FaultKey>& keys() {
 void setTrackerFault(std::string_view assignment, TrackerFaults& faults) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string_view::npos) {
-    throw std::invalid_argument(fmt::format("{}: expected key=value; known keys: {}",
+    throw std::invalid_argument(fmt::format("{}: expected key=value; keys: {}",
                                             inQuotes(assignment), knownTrackerFaults()));
   }
   const std::string_view key = trimmed(assignment.substr(0, equals));
@@ -135,8 +136,10 @@ void setTrackerFault(std::string_view assignment, TrackerFaults& faults) {
   const auto entry = std::find_if(keys().begin(), keys().end(),
                                   [&](const FaultKey& known) { return known.key == key; });
   if (entry == keys().end()) {
-    throw std::invalid_argument(fmt::format("{}: unknown key {}; known: {}", printable(assignment),
-                                            inQuotes(key), knownTrackerFaults()));
+    std::vector<std::string> known;
+    for (const FaultKey& one : keys()) known.emplace_back(one.key);
+    throw std::invalid_argument(
+        fmt::format("{}: unknown key: {}", printable(assignment), expectedName(key, known)));
   }
   try {
     entry->read(faults, value);

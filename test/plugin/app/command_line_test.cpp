@@ -17,6 +17,7 @@ struct Case {
 TEST_F(CommandLine, AnErrorIsOneLineWithThePrefixAndAStatus) {
   write("data/events.txt", "0.1 1 2 1\n");
   write("wrong.ini", "[dsi]\nnum_planes = 0\n");
+  write("calibration.ini", "[rig]\ncalibration = none.yaml\n");
   const Case cases[] = {
       // Commands and options.
       {"", 2, "no command: expected one of simulate, import, …"},
@@ -45,9 +46,20 @@ TEST_F(CommandLine, AnErrorIsOneLineWithThePrefixAndAStatus) {
       {"map data --config dsc", 2, "--config 'dsc': no such option file: did you mean dsec?"},
       {"map none.ini data", 2, "none.ini: no such option file"},
       {"map wrong.ini data", 2, "wrong.ini:2: [dsi] num_planes = 0: must be 1 to 100000"},
-      {"map data --set dsi.num_planes=x", 2, "--set…"},
+      {"map data --set dsi.num_planes=x", 2, "--set dsi.num_planes=x: must be a whole number"},
       {"map data --t0 5 --t1 3", 2, "t1 = 3.000000000 s: must be after t0 = 5.000000000 s"},
+      {"map data --set dsi.nun_planes=3", 2,
+       "--set dsi.nun_planes: unknown key: did you mean num_…"},
+      {"map data --set fusion.across_time=harmoic", 2,
+       "--set fusion.across_time=harmoic: 'harmoic' is unknown: did you mean harmonic? One of: …"},
+      {"map data --perturb nois_m=3", 2, "--perturb: nois_m=3: unknown key: did you mean noise_m?"},
       // The job cannot be done.
+      {"map data --poses none.txt", 1, "--poses none.txt: no such file"},
+      {"map data --calibration none.yaml", 1, "--calibration none.yaml: no such file"},
+      {"map calibration.ini data", 1,
+       "calibration.ini:2: [rig] calibration = none.yaml: no such file"},
+      {"map calibration.ini data --set rig.hand_eye=h.yaml --calibration data/events.txt", 1,
+       "--set rig.hand_eye=h.yaml: no such file"},
       {"info nowhere", 1, "nowhere: no such file or folder"},
       {"map data", 1, "data: no calibration: …"},
   };

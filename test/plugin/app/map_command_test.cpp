@@ -150,7 +150,7 @@ TEST_F(MapCommand, WrongArgumentsAreErrorsThatNameThem) {
       {"map unknown.ini data", "unknown.ini:2: [dsi] planes: unknown key"},
       {"map range.ini data", "range.ini:2: [dsi] num_planes = 0: must be"},
       {"map rig.ini data --set dsi.num_planes=many",
-       "[dsi] num_planes = many: must be a whole number"},
+       "--set dsi.num_planes=many: must be a whole number"},
       {"depth rig.ini data --t0 10.3 --t1 10.1", "must end after it begins"},
       {"depth rig.ini data --t0 soon --t1 10.1", "soon"},
       {"depth rig.ini data --t0 -9e9 --t1 9e9", "expected a time within 4.6e9 s of 0"},

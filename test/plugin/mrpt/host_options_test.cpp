@@ -73,11 +73,11 @@ TEST(HostOptions, WrongSectionsKeysAndValuesAreErrorsThatNameThem) {
   EXPECT_EQ(errorOf("[a_dsi]\nnum_planes = ten\n", "a"),
             "options, section a_dsi: num_planes = ten: must be a whole number");
   EXPECT_THAT(errorOf("[a_dsi]\nplanes = 10\n", "a"),
-              HasSubstr("options, section a_dsi: planes: unknown key; known: min_depth_m"));
+              HasSubstr("options, section a_dsi: planes: unknown key: expected one of min_depth_m"));
   EXPECT_THAT(errorOf("[a_dsi]\nnum_planes = -3\n", "a"),
               HasSubstr("options, section a_dsi: num_planes = -3: must be"));
   EXPECT_THAT(errorOf("[a_dsi]\nnum_planes = 10\n[a_bsi]\nx = 1\n", "a"),
-              HasSubstr("options, section a_bsi: unknown section; known: [rig]"));
+              HasSubstr("options, section a_bsi: unknown section: did you mean [dsi]?"));
   EXPECT_THAT(errorOf("[dsi]\nnum_planes = 10\n", "a"), HasSubstr("no section begins with a_"));
 }
 

@@ -236,10 +236,12 @@ void expectErrors(const std::vector<ErrorCase>& cases) {
 
 TEST(OptionReader, AnErrorNamesTheLine) {
   expectErrors({
-      {"\n[dsii]\n", "rig.ini:2: unknown section [dsii]", "known: [rig], [keyframes], [dsi]"},
+      {"\n[dsii]\n", "rig.ini:2: unknown section [dsii]", "did you mean [dsi]?"},
+      {"[camera]\n", "rig.ini:1: unknown section [camera]: expected one of [rig], [keyframes], "},
+      {"[dsi]\nwindow_s = 3\n", "rig.ini:2: [dsi] window_s: unknown key: it is one of [keyframes]"},
       {"[dsi]\nplanes = 3\n", "rig.ini:2: [dsi] planes: unknown key", "num_planes"},
       {"[refinement]\nenable = true\n", "rig.ini:2: [refinement] enable: unknown key",
-       "background"},
+       "did you mean enabled?"},
       {"num_planes = 3\n", "rig.ini:1: 'num_planes = 3': expected [section] or, below a section"},
       {"[dsi]\nnum_planes 3\n", "rig.ini:2: 'num_planes 3': expected"},
       {"[dsi\nnum_planes = 3\n", "rig.ini:1: '[dsi': expected"},
@@ -280,7 +282,10 @@ TEST(OptionReader, AnErrorSaysTheExpectedKindOfAValue) {
       {"depth", "subplane", {"yes", "1"}, "must be true or false"},
       {"depth", "max_confidence", {"most"}, "must be a number, keyframe or sequence"},
       {"fusion", "shuffle_seed", {"-1"}, "must be a whole number, 0 to 4294967295"},
-      {"fusion", "order", {"time"}, "'time' is unknown: expected one of cameras_then_time, time_then_cameras"},
+      {"fusion",
+       "order",
+       {"time"},
+       "'time' is unknown: expected one of cameras_then_time, time_then_cameras"},
       {"performance", "threads", {"many"}, "must be a whole number, or auto"},
       {"rig",
        "cameras",
@@ -346,11 +351,11 @@ TEST(OptionReader, AnErrorSaysTheRangeOfAValueInTheUnitsOfTheFile) {
                 AllOf(StartsWith("rig.ini:2: " + section + " " + row.option + ": must be"),
                       HasSubstr(row.range)));
   }
-  EXPECT_THAT(errorOf("[dsi]\nwidth = 65535\nheight = 65535\n"),
-              AllOf(StartsWith("rig.ini:2: [dsi] width = 65535: must be at most"),
-                    HasSubstr("height of 65535")));
-  // The far limit is not in the file: its default is 5.
-  EXPECT_THAT(errorOf("[dsi]\nmin_depth_m = 6\n"), AllOf(HasSubstr("[dsi]"), HasSubstr("must be")));
+  EXPECT_THAT(
+      errorOf("[dsi]\nwidth = 65535\nheight = 65535\n"),
+      AllOf(StartsWith("rig.ini:3: [dsi] height = 65535: contradicts rig.ini:2: [dsi] width "
+                       "= 65535, which must be at most"),
+            HasSubstr("height of 65535")));
   EXPECT_NO_THROW(
       optionsOf("[refinement]\ntracker_noise_deg = 1000\ntracker_drift_deg_per_m = 1000\n"));
 }
@@ -435,9 +440,51 @@ TEST(OptionReader, AnErrorNamesAWrongSet) {
   EXPECT_THAT(errorOfSet("dsi.num_planes"), StartsWith("--set dsi.num_planes: expected"));
   EXPECT_THAT(errorOfSet("num_planes=3"), StartsWith("--set num_planes=3: expected"));
   EXPECT_THAT(errorOfSet("dsii.num_planes=3"), HasSubstr("unknown section [dsii]"));
-  EXPECT_THAT(errorOfSet("dsi.planes=3"), StartsWith("--set: [dsi] planes: unknown key"));
-  EXPECT_THAT(errorOfSet("dsi.num_planes=x"), StartsWith("--set: [dsi] num_planes = x: must be"));
-  EXPECT_THAT(errorOfSet("dsi.num_planes=0"), StartsWith("--set: [dsi] num_planes = 0: must be"));
+  EXPECT_THAT(errorOfSet("dsi.planes=3"),
+              StartsWith("--set dsi.planes: unknown key: expected one"));
+  EXPECT_THAT(errorOfSet("dsi.num_planes=x"), StartsWith("--set dsi.num_planes=x: must be"));
+  EXPECT_THAT(errorOfSet("dsi.num_planes = 0"), StartsWith("--set dsi.num_planes=0: must be"));
+}
+
+TEST(OptionReader, AnErrorOfTwoValuesBeginsWithTheOneThatWasGivenLast) {
+  const std::string must = "must be finite and above min_depth_m";
+  const auto error = [](const std::string& text, const std::vector<std::string>& sets) {
+    return messageOf([&] {
+      OptionReader reader;
+      reader.readText(text, "rig.ini");
+      for (const std::string& assignment : sets) reader.set(assignment);
+      reader.options();
+    });
+  };
+  const std::string file = "[dsi]\nmax_depth_m = 10\nmin_depth_m = 1\n";
+  EXPECT_EQ(error(file, {"dsi.max_depth_m=0.1"}),
+            "--set dsi.max_depth_m=0.1: " + must + " (rig.ini:3: [dsi] min_depth_m = 1)");
+  EXPECT_EQ(
+      error(file, {"dsi.min_depth_m=20"}),
+      "--set dsi.min_depth_m=20: contradicts rig.ini:2: [dsi] max_depth_m = 10, which " + must);
+  EXPECT_EQ(error(file, {"dsi.min_depth_m=20", "dsi.max_depth_m=15"}),
+            "--set dsi.max_depth_m=15: " + must + " (--set dsi.min_depth_m=20)");
+  EXPECT_EQ(
+      error("[dsi]\nmax_depth_m = 1\nmin_depth_m = 10\n", {"dsi.num_planes=9"}),
+      "rig.ini:3: [dsi] min_depth_m = 10: contradicts rig.ini:2: [dsi] max_depth_m = 1, which " +
+          must);
+  // What is not given has its default.
+  EXPECT_EQ(error("", {"dsi.min_depth_m=20"}),
+            "--set dsi.min_depth_m=20: contradicts default: [dsi] max_depth_m = 5, which " + must);
+  EXPECT_EQ(error("", {"dsi.max_depth_m=0.1"}),
+            "--set dsi.max_depth_m=0.1: " + must + " (min_depth_m = 0.5 by default)");
+}
+
+TEST(OptionReader, AnErrorOfARecordingSaysHowItsOptionsWereGiven) {
+  OptionReader reader;
+  reader.readText("[rig]\ncameras = 0,5\n", "rig.ini");
+  reader.set("dsi.reference_camera=2");
+  EXPECT_EQ(reader.withOrigins("r.bag: [rig] cameras = 5: must be a camera"),
+            "r.bag: [rig] cameras = 5: must be a camera (rig.ini:2: [rig] cameras = 0,5)");
+  EXPECT_EQ(reader.withOrigins("[dsi] reference_camera = 2: [rig] camera"),
+            "[dsi] reference_camera = 2: [rig] camera (--set dsi.reference_camera=2)");
+  EXPECT_EQ(reader.given("rig", "cameras"), "rig.ini:2: [rig] cameras = 0,5");
+  EXPECT_EQ(reader.given("rig", "calibration"), "");
 }
 
 TEST(OptionReader, ErrorsHoldNoControlCharacters) {

@@ -69,7 +69,8 @@ TEST(TrackerFaultKeys, AreListedWithValuesThatReadBack) {
 
 TEST(TrackerFaultKeys, ErrorsNameKeyValueAndWhatWasExpected) {
   const std::pair<const char*, const char*> cases[] = {
-      {"wobble=1", "unknown key 'wobble'; known: noise_m, noise_deg"},
+      {"wobble=1", "wobble=1: unknown key: expected one of noise_m, noise_deg"},
+      {"nois_m=1", "nois_m=1: unknown key: did you mean noise_m?"},
       {"noise_m", "'noise_m': expected key=value"},
       {"noise_m=much", "noise_m = much: must be a number, 0 to 1000 (metres)"},
       {"noise_deg=-1", "noise_deg = -1: must be a number, 0 to 180 (degrees)"},
