@@ -211,6 +211,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
 
   SessionStatus status = player.builder().status();
   status.counts.sorted_events += recording.counts().sorted_events;
+  outcome.report.skipped_events = recording.counts().skipped_events;
   outcome.report.counts = status.counts;
   outcome.recalibrated_cameras = status.recalibrated_cameras;
   outcome.report.silent_keyframes = status.silent_keyframes;

@@ -18,6 +18,7 @@ std::int64_t startOf(const RecordingSource& source) {
   events.format = source.format;
   events.calibration = source.calibration;
   events.reader = source.reader;
+  events.skip_bad_events = source.skip_bad_events;
   events.complete = false;
   const std::unique_ptr<Recording> recording = openRecording(events);
   while (const auto observation = recording->next()) {
@@ -68,6 +69,12 @@ std::vector<Warning> lossWarnings(const RecordingCounts& counts) {
         {"undated-events", fmt::format("{} events were left out: the recording does not say their "
                                        "time or row, at its beginning or after a gap",
                                        counts.undated_events)});
+  }
+  if (counts.skipped_events > 0) {
+    warnings.push_back(
+        {"skipped-events", fmt::format("{} bad events were left out, the first one found: "
+                                       "{}",
+                                       counts.skipped_events, counts.first_skipped)});
   }
   return warnings;
 }

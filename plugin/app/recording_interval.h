@@ -38,7 +38,8 @@ TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
 /// events outside are not read, where the format has an index.
 std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits);
 
-/// Warnings of the readers, and of what the recording lacks: packets, or the times of events.
+/// Warnings of the readers, and of what the recording lacks: packets, the times of events, or
+/// events that were left out.
 std::vector<Warning> lossWarnings(const RecordingCounts& counts);
 /// Prints them to stderr.
 void warnOfLosses(const RecordingCounts& counts);

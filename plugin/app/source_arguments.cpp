@@ -66,6 +66,12 @@ void addSource(CLI::App& command, RecordingSource& source) {
                   "The unit of times in text events and NumPy arrays (default: found, else s)")
       ->check(oneOf({"s", "ms", "us", "ns"}));
   command
+      .add_option("--skip-bad-events", source.skip_bad_events,
+                  "Leave out up to N bad events of the recording: lines that are none (text), "
+                  "pixels outside the sensor, times over 10 ms late (default 0: an error)")
+      ->type_name("N")
+      ->check(CLI::NonNegativeNumber);
+  command
       .add_option_function<std::vector<std::string>>(
           "--perturb",
           [&source](const std::vector<std::string>& assignments) {

@@ -13,8 +13,12 @@
 #include "plugin/mrpt/mrpt_time.h"
 
 namespace efm {
-MergedRecording::MergedRecording(Rig rig, std::vector<EventPackets> cameras)
-    : rig_(std::move(rig)), cameras_(std::move(cameras)) {
+MergedRecording::MergedRecording(Rig rig, std::vector<EventPackets> cameras,
+                                 std::uint64_t skip_bad_events)
+    : rig_(std::move(rig)),
+      bad_(std::make_unique<BadEvents>(skip_bad_events)),
+      cameras_(std::move(cameras)) {
+  for (EventPackets& camera : cameras_) camera.skipBadEvents(*bad_);
   requireOption(cameras_.size() == rig_.cameras.size(), "event streams", cameras_.size(),
                 "one per camera");
 }
@@ -76,6 +80,8 @@ double MergedRecording::progress() const {
 
 RecordingCounts MergedRecording::counts() const {
   RecordingCounts counts;
+  counts.skipped_events = bad_->count();
+  counts.first_skipped = bad_->first();
   for (const EventPackets& camera : cameras_) {
     counts.sorted_events += camera.sortedEvents();
     counts.lost_packets += camera.stream().lostPackets();

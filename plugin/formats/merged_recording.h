@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,7 +24,9 @@ namespace efm {
 class MergedRecording : public Recording {
  public:
   /// @param cameras one per camera of the rig; of none, there is no observation.
-  MergedRecording(Rig rig, std::vector<EventPackets> cameras);
+  /// @param skip_bad_events the number of bad events that are left out, of all cameras together; a
+  /// further one is an error.
+  MergedRecording(Rig rig, std::vector<EventPackets> cameras, std::uint64_t skip_bad_events = 0);
 
   /// @throws std::runtime_error if there are cameras and none has an event; the streams' errors.
   void requireEvents();
@@ -39,6 +42,7 @@ class MergedRecording : public Recording {
                                         std::vector<Event> events);
 
   Rig rig_;
+  std::unique_ptr<BadEvents> bad_;     // the cameras refer to it
   std::vector<EventPackets> cameras_;  // per camera
   std::string position_ = "the recording";
   std::size_t announced_ = 0;  // number of empty packets so far

@@ -155,7 +155,8 @@ std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& sou
     if (source.end_ns) cameras.back().stopAt(*source.end_ns - earliest_ns);
   }
   const bool has_limits = source.start_ns || source.end_ns;
-  auto events = std::make_unique<MergedRecording>(std::move(rig), std::move(cameras));
+  auto events =
+      std::make_unique<MergedRecording>(std::move(rig), std::move(cameras), source.skip_bad_events);
   if (!has_limits) events->requireEvents();
   std::unique_ptr<Recording> recording = std::move(events);
   if (!source.poses.empty()) return recording;

@@ -32,6 +32,8 @@ struct RecordingSource {
   bool override_rig = true;
 
   ReaderOptions reader;
+  /// The number of bad events of the whole recording that are left out. One more is an error.
+  std::uint64_t skip_bad_events = 0;
   std::int64_t packet_ns = kPacketPeriodNs;  ///< Length of the packets of events, above 0.
   /// Events outside [start_ns, end_ns) are left out, most of them without being read. A rawlog has
   /// no index and is read whole.

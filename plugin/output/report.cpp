@@ -140,6 +140,7 @@ std::string reportJson(const MapReport& report) {
   json["silent"] = {{"keyframes", report.silent_keyframes},
                     {"subintervals", counts.silent_subintervals}};
   json["sorted_events"] = counts.sorted_events;
+  json["skipped_events"] = report.skipped_events;
   json["duplicate_poses"] = counts.duplicate_poses;
   json["points"] = report.points;
   if (report.extent) json["extent_m"] = asJson(*report.extent);

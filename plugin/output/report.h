@@ -38,6 +38,7 @@ struct MapReport {
   std::optional<double> baseline_m;
   /// The fraction of the recording that was mapped, where the run was interrupted.
   std::optional<double> stopped_at;
+  std::uint64_t skipped_events = 0;  ///< Bad ones that the reader left out.
   std::vector<Warning> warnings;
 };
 
@@ -46,12 +47,12 @@ struct MapReport {
 /// x planes = their sum), keyframes, silent (keyframes per camera, sub-intervals), points, extent_m
 /// (min and max, frame `world`; absent without points), recording_seconds (from the first event to
 /// the last), seconds (real time), cpu_seconds (processor time: once per run, for events, for
-/// keyframes), votes_per_second, refinement where poses were refined (registered keyframes, loops,
-/// the learnt errors of the tracker, and under `moved` how far it moved poses), kernel, threads,
-/// peak_memory_bytes (of this process), reference_view and baseline_m where known, stopped_at where
-/// the run was interrupted (the fraction of the recording that was mapped), warnings (each with
-/// name and text), perturbation (the faults of the poses, if any), options (all of them) and
-/// version.
+/// keyframes), votes_per_second, sorted_events, skipped_events (bad ones that the reader left out),
+/// refinement where poses were refined (registered keyframes, loops, the learnt errors of the
+/// tracker, and under `moved` how far it moved poses), kernel, threads, peak_memory_bytes (of this
+/// process), reference_view and baseline_m where known, stopped_at where the run was interrupted
+/// (the fraction of the recording that was mapped), warnings (each with name and text),
+/// perturbation (the faults of the poses, if any), options (all of them) and version.
 std::string reportJson(const MapReport& report);
 
 /// The most memory that this process has had so far.

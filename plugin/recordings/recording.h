@@ -16,6 +16,8 @@ struct RecordingCounts {
   std::uint64_t sorted_events = 0;  ///< Came up to 10 ms after a newer one.
   std::uint64_t lost_packets = 0;  ///< Missing in the numbers that the recording gives its packets.
   std::uint64_t undated_events = 0;  ///< Left out: see `EventStream::undatedEvents`.
+  std::uint64_t skipped_events = 0;  ///< Bad ones, left out: see `BadEvents`.
+  std::string first_skipped;         ///< The error of the first of them.
   std::vector<Warning> warnings;     ///< Of the readers: see `EventStream::warnings`.
 };
 

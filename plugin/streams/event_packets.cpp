@@ -18,6 +18,11 @@ EventPackets::EventPackets(std::unique_ptr<EventStream> stream, CameraSize size,
   requireOption(period_ns > 0, "packet period (ns)", period_ns, "above 0");
 }
 
+void EventPackets::skipBadEvents(BadEvents& bad) {
+  bad_ = &bad;
+  stream_->skipBadEvents(bad);
+}
+
 void EventPackets::startAt(std::int64_t t_ns) {
   start_ns_ = t_ns;
   stream_->seek(t_ns - kMaxEventDelayNs);
@@ -83,38 +88,52 @@ void EventPackets::readBlock() {
   if (!error_ && !ended_) error_ = damaged;
 }
 
+bool EventPackets::isGood(const Event& event) const {
+  const bool in_order = event.t_ns >= newest_ns_ || newest_ns_ - event.t_ns <= kMaxEventDelayNs;
+  return event.x < size_.width && event.y < size_.height && event.t_ns < kEndOfTimeNs && in_order;
+}
+
+/// Why an event of the block is not good.
+std::string EventPackets::problemOf(std::size_t i) const {
+  const auto problem = [&](const char* name, const auto& value, const std::string& expected) {
+    return fmt::format("{}: {} = '{}': expected {}", stream_->positionOf(i), name, value, expected);
+  };
+  const auto pixel_problem = [&](const char* name, int value, int side) {
+    return problem(name, value,
+                   fmt::format("a whole number from 0 to {} (the sensor has {}x{} pixels; are x "
+                               "and y in this order, and is the resolution right?)",
+                               side - 1, size_.width, size_.height));
+  };
+  const Event& event = block_[i];
+  if (event.x >= size_.width) return pixel_problem("x", event.x, size_.width);
+  if (event.y >= size_.height) return pixel_problem("y", event.y, size_.height);
+  if (event.t_ns >= kEndOfTimeNs) {
+    return problem("t", event.t_ns, "a time in ns before the year 2116");
+  }
+  return problem("t", formatSeconds(event.t_ns),
+                 fmt::format("events in time order, at most 10 ms before the newest ({})",
+                             formatSeconds(newest_ns_)));
+}
+
 void EventPackets::takeBlock() {
-  const auto fail = [this](std::size_t i, const char* name, const auto& value,
-                           const std::string& expected) {
-    return std::runtime_error(
-        fmt::format("{}: {} = '{}': expected {}", stream_->positionOf(i), name, value, expected));
-  };
-  const auto fail_pixel = [&](std::size_t i, const char* name, int value, int side) {
-    return fail(i, name, value,
-                fmt::format("a whole number from 0 to {} (the sensor has {}x{} pixels)", side - 1,
-                            size_.width, size_.height));
-  };
   const std::int64_t end_ns =
       std::min(stop_ns_.value_or(kEndOfTimeNs), kEndOfTimeNs - kMaxEventDelayNs) + kMaxEventDelayNs;
   events_.reserve(events_.size() + block_.size());
   for (std::size_t i = 0; i < block_.size(); ++i) {
     const Event& event = block_[i];
-    if (event.x >= size_.width) throw fail_pixel(i, "x", event.x, size_.width);
-    if (event.y >= size_.height) throw fail_pixel(i, "y", event.y, size_.height);
+    if (!isGood(event)) {
+      const std::string problem = problemOf(i);
+      if (bad_ == nullptr) throw std::runtime_error(problem);
+      bad_->skip(problem);
+      continue;
+    }
     if (event.t_ns >= newest_ns_) {
-      if (event.t_ns >= kEndOfTimeNs) {
-        throw fail(i, "t", event.t_ns, "a time in ns before the year 2116");
-      }
       newest_ns_ = event.t_ns;
       ended_ = newest_ns_ >= end_ns;
       if (ended_) return;  // also from errors behind it
-    } else if (newest_ns_ - event.t_ns <= kMaxEventDelayNs) {
+    } else {
       disordered_ = true;
       ++sorted_events_;
-    } else {
-      throw fail(i, "t", formatSeconds(event.t_ns),
-                 fmt::format("events in time order, at most 10 ms before the newest ({})",
-                             formatSeconds(newest_ns_)));
     }
     if (start_ns_ && event.t_ns < *start_ns_) continue;
     if (!stop_ns_ || event.t_ns < *stop_ns_) events_.push_back(event);

@@ -27,6 +27,8 @@ class EventPackets {
   EventPackets(std::unique_ptr<EventStream> stream, CameraSize size,
                std::int64_t period_ns = kPacketPeriodNs);
 
+  /// Wrong events are given to `bad`, and left out. Called before the others. `bad` outlives this.
+  void skipBadEvents(BadEvents& bad);
   /// Leaves out the events before a time, without reading them if the format allows it. Called
   /// before the others.
   void startAt(std::int64_t t_ns);
@@ -52,11 +54,14 @@ class EventPackets {
   std::int64_t periodEnd(std::int64_t t_ns) const;
   void readBlock();
   void takeBlock();
+  bool isGood(const Event& event) const;
+  std::string problemOf(std::size_t i) const;
   void sortEvents();
 
   std::unique_ptr<EventStream> stream_;
   CameraSize size_;
   std::int64_t period_ns_;
+  BadEvents* bad_ = nullptr;
   std::optional<std::int64_t> start_ns_;
   std::optional<std::int64_t> stop_ns_;
   bool ended_ = false;

@@ -10,6 +10,7 @@
 #include "mapping/events/event.h"
 #include "mapping/options/warning.h"
 #include "plugin/calibration/calibration_file.h"
+#include "plugin/streams/bad_events.h"
 
 namespace efm {
 
@@ -25,6 +26,10 @@ class EventStream {
   /// @throws std::runtime_error at damaged data, naming file, position, value and what was
   /// expected. `events` has the events before it. The stream is not read again.
   virtual bool read(std::vector<Event>& events) = 0;
+
+  /// From now on a damaged event is given to `bad`, and left out, where the rest of the data can be
+  /// read without it. Others do as before. `bad` outlives the stream.
+  virtual void skipBadEvents(BadEvents& bad) { static_cast<void>(bad); }
 
   /// Continues near a time: the next block may begin with any event, but none of this time or later
   /// is left out. Called before `read`. Without an index, a stream stays at its beginning.

@@ -168,7 +168,7 @@ void EventTextStream::takeLines(const char* begin, const char* end, std::vector<
 void EventTextStream::takeLine(std::string_view line, bool unterminated,
                                std::vector<Event>& events) {
   const bool header = first_byte_ == 0 && line_ <= columns_.header_lines;
-  if (const auto event = header ? std::nullopt : parseLine(line, unterminated)) {
+  if (const auto event = header ? std::nullopt : parseOrSkip(line, unterminated)) {
     events.push_back(*event);
   } else {
     lines_.emplace_back(events.size(), line_ + 1);
@@ -248,6 +248,17 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   }
   event.polarity = polarity == "1";
   return event;
+}
+
+/// The event of a line; nothing where it has none, or a bad one that is left out.
+std::optional<Event> EventTextStream::parseOrSkip(std::string_view line, bool unterminated) {
+  try {
+    return parseLine(line, unterminated);
+  } catch (const std::runtime_error& error) {
+    if (bad_ == nullptr) throw;
+    bad_->skip(error.what());
+    return std::nullopt;
+  }
 }
 
 /// The first event of the lines that begin after a byte: the byte of its line, and its time.

@@ -25,6 +25,7 @@ class EventTextStream : public EventStream {
   explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {});
 
   bool read(std::vector<Event>& events) override;
+  void skipBadEvents(BadEvents& bad) override { bad_ = &bad; }
   /// By bisection, to 64 KiB. A compressed file stays at its beginning.
   void seek(std::int64_t t_ns) override;
   std::string positionOf(std::size_t index) const override;
@@ -39,11 +40,13 @@ class EventTextStream : public EventStream {
   void takeLine(std::string_view line, bool unterminated, std::vector<Event>& events);
   const char* parsePlainLine(const char* text, Event& event) const;
   std::optional<Event> parseLine(std::string_view line, bool unterminated) const;
+  std::optional<Event> parseOrSkip(std::string_view line, bool unterminated);
   std::optional<std::pair<std::uint64_t, std::int64_t>> firstEventAfter(std::uint64_t byte);
   std::string place(std::uint64_t line) const;
 
   FileContent content_;
   EventColumns columns_;
+  BadEvents* bad_ = nullptr;
   bool usual_ = true;  // columns_.isUsual()
   bool started_ = false;
   bool ended_ = false;

@@ -71,6 +71,7 @@ TEST(Report, EveryCountHasItsOwnKey) {
   counts.silent_subintervals = 14;
   counts.sorted_events = 15;
   counts.duplicate_poses = 16;
+  report.skipped_events = 3;
   report.silent_keyframes = {0, 17};
   report.recording_s = 2.5;
   report.peak_memory_bytes = 123;
@@ -97,6 +98,7 @@ TEST(Report, EveryCountHasItsOwnKey) {
   EXPECT_EQ(written["silent"]["subintervals"], 14);
   EXPECT_EQ(written["silent"]["keyframes"], json::array({0, 17}));
   EXPECT_EQ(written["sorted_events"], 15);
+  EXPECT_EQ(written["skipped_events"], 3);
   EXPECT_EQ(written["duplicate_poses"], 16);
   EXPECT_EQ(written["points"], 7);
   EXPECT_EQ(written["recording_seconds"], 2.5);

@@ -79,5 +79,36 @@ TEST_F(PacketsOfText, DamageBehindAnIntervalIsNoError) {
   EXPECT_THAT(errorOf([&] { read(290 * kMs, 330 * kMs); }), testing::HasSubstr("damaged"));
 }
 
+TEST_F(PacketsOfText, BadEventsAreLeftOutUpToTheLimitOfAllCameras) {
+  const std::string good = "0.1 1 2 0\n0.2 3 4 1\n";
+  const std::string bad = "0.2 3 4\nnan 3 4 1\n0.2 300 4 1\n0.2 3 8 1\n0.18 3 4 1\n";
+  for (const char* name : {"cam0.txt", "cam1.txt"}) {
+    writeFile(folder() / name, good + bad + "0.3 5 6 0\n0.4 5");
+  }
+  const auto readBoth = [&](BadEvents& events) {
+    std::size_t count = 0;
+    for (const char* name : {"cam0.txt", "cam1.txt"}) {
+      EventPackets packets(std::make_unique<EventTextStream>(folder() / name), {300, 8});
+      packets.skipBadEvents(events);
+      for (auto packet = packets.nextPacket(); !packet.empty(); packet = packets.nextPacket()) {
+        count += packet.size();
+      }
+    }
+    return count;
+  };
+  BadEvents twelve(12);
+  EXPECT_EQ(readBoth(twelve), 6U);
+  EXPECT_EQ(twelve.count(), 12U);
+  EXPECT_THAT(twelve.first(), testing::HasSubstr("cam0.txt:3: '0.2 3 4': expected 4 fields"));
+  BadEvents eleven(11);
+  EXPECT_THAT(errorOf([&] { readBoth(eleven); }),
+              testing::AllOf(testing::HasSubstr("cam1.txt:7: t = '0.18"),
+                             testing::HasSubstr("(11 bad events before it were left out")));
+  BadEvents none(0);
+  EXPECT_THAT(errorOf([&] { readBoth(none); }),
+              testing::AllOf(testing::HasSubstr("cam0.txt:3: "),
+                             testing::HasSubstr("(--skip-bad-events N leaves out up to N")));
+}
+
 }  // namespace
 }  // namespace efm
