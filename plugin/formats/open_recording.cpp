@@ -13,6 +13,7 @@
 #include "plugin/formats/rawlog_signature.h"
 #include "plugin/readers/pose_file.h"
 #include "plugin/readers/recording_formats.h"
+#include "plugin/readers/unread_formats.h"
 #include "plugin/recordings/perturbed_recording.h"
 #include "plugin/recordings/recording_with_poses.h"
 #include "plugin/recordings/rig_override_recording.h"
@@ -47,8 +48,12 @@ const RecordingFormat* formatOf(const Path& path, const std::string& name) {
   if (name == kRawlog) return nullptr;
   if (name != "auto") return formatNamed(name);
   const RecordingFormat* format = detectFormat(path);
-  if (format == nullptr && !isFile(path)) refuseUnknown(path);
-  return format;
+  if (format != nullptr) return format;
+  if (const auto unread = unreadFormat(path)) {
+    throw std::runtime_error(fmt::format("{}: {} (docs/recordings.md)", path.string(), *unread));
+  }
+  if (!isFile(path)) refuseUnknown(path);
+  return nullptr;
 }
 
 std::string sourceNames(const std::vector<Path>& sources) {

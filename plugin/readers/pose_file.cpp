@@ -11,6 +11,7 @@
 
 #include "maps/io/npy_header.h"
 #include "plugin/readers/recording_formats.h"
+#include "plugin/readers/unread_formats.h"
 #include "plugin/streams/file_content.h"
 #include "plugin/streams/source_files.h"
 #include "plugin/text/pose_text.h"
@@ -40,9 +41,17 @@ bool isNpz(const fs::path& file) {
   return true;
 }
 
+void refuseUnread(const fs::path& file) {
+  if (isCompressed(file) || fs::is_directory(file)) return;
+  if (const auto unread = unreadFormat(file)) {
+    throw std::runtime_error(file.string() + ": " + *unread);
+  }
+}
+
 std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions options) {
   const RecordingFormat* const format = detectFormat(file);
   if (format == nullptr) {
+    refuseUnread(file);
     throw std::runtime_error(file.string() +
                              ": not a file of poses: expected text (t tx ty tz qx qy qz qw, or "
                              "columns with a header), NumPy arrays, or a recording with poses");
@@ -62,6 +71,7 @@ std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions&
   if (looksLikeNpy(start)) return readPoseArrays(file, options);
   if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
+  refuseUnread(file);
   return readPoseText(file, options);
 }
 

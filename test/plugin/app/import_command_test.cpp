@@ -250,8 +250,6 @@ TEST_F(ImportCommand, AFileOfAnotherKindIsAnErrorThatNamesTheExpectedKind) {
   const std::pair<const char*, const char*> cases[] = {
       {"small/events.txt", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
       {"small/events.txt.gz", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
-      {"empty.rawlog", "it is empty"},
-      {"picture.png", "it begins with '\\x89PNG\\x0d\\x0a\\x1a\\x0a'"},
       {"words.bin", "it begins with '\\x05\\x00\\x00\\x00a b c'"}};
   for (const auto& [file, why] : cases) {
     for (const char* format : {"", " --format rawlog"}) {
@@ -263,6 +261,12 @@ TEST_F(ImportCommand, AFileOfAnotherKindIsAnErrorThatNamesTheExpectedKind) {
                                 ")" + expected);
     }
   }
+  EXPECT_EQ(run("info picture.png").err,
+            "event-fusion: error: picture.png: a PNG picture: expected events; pictures and videos "
+            "have none (docs/recordings.md)\n");
+  EXPECT_THAT(run("info picture.png --format rawlog").err, HasSubstr("not a rawlog (it begins wi"));
+  EXPECT_THAT(run("info empty.rawlog --format rawlog").err,
+              HasSubstr("not a rawlog (it is empty)"));
   EXPECT_THAT(run("info short").err, HasSubstr("stopped at entry 0 of short: the file ends in the"))
       << "it may be cut";
 }

@@ -161,7 +161,7 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
     std::string bytes;
     const char* error;
   } cases[] = {
-      {"a.txt", "", "a.txt: no poses: expected at least one line"},
+      {"a.txt", "", "a.txt: an empty file"},
       {"a.txt", "# nothing\n", "a.txt: no poses"},
       {"a.txt", "1 2 3\n", "a.txt:1: 3 fields: expected 8, t tx ty"},
       {"a.txt", "# x\n1.5 1 2 3 0 0 0 2\n", "a.txt:2: qx qy qz qw = '0 0 0 2', of length 2"},
