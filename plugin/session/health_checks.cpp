@@ -5,93 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
-#include <numeric>
 
 #include "mapping/geometry/angle.h"
-#include "mapping/geometry/lens_inverse.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/session/camera_checks.h"
 #include "plugin/session/camera_view.h"
 
 namespace efm {
 namespace {
 
 using Warnings = std::vector<Warning>;
-
-void checkBaselines(const RecordingStatistics& recording, Warnings& warnings) {
-  // From a stereo microscope to a train; metres that are really millimetres, and the other way
-  // round, are a factor of 1000 off.
-  constexpr double kMinBaselineM = 0.005;
-  constexpr double kMaxBaselineM = 20;
-  const auto& cameras = recording.cameras();
-  for (auto a = cameras.begin(); a != cameras.end(); ++a) {
-    for (auto b = std::next(a); b != cameras.end(); ++b) {
-      const double baseline_m = baselineOf(a->second.camera, b->second.camera);
-      if (baseline_m >= kMinBaselineM && baseline_m <= kMaxBaselineM) continue;
-      if (!isCalibrated(a->second.camera.model)) continue;  // nothing is known of its pose either
-      warnings.push_back(
-          {"baseline",
-           fmt::format("cameras {} and {} are {:g} m apart: expected {:g} to {:g} m; "
-                       "are the translations of the calibration in metres? "
-                       "(--calibration)",
-                       a->first.first, b->first.first, baseline_m, kMinBaselineM, kMaxBaselineM)});
-    }
-  }
-}
-
-void checkFieldOfView(int camera, const CameraModel& model, Warnings& warnings) {
-  // A telescope, and the limit of a pinhole image. A fisheye lens sees up to 220 degrees.
-  constexpr double kMinDeg = 5;
-  const double max_deg = model.distortion == DistortionModel::kEquidistant ? 220 : 170;
-  const double view_deg = fieldOfView(model).x() / kRadiansPerDegree;
-  if (view_deg >= kMinDeg && view_deg <= max_deg) return;
-  warnings.push_back(
-      {"focal-length",
-       fmt::format("camera {}: a focal length of {:g} px and {} columns are a field of view of "
-                   "{:.3g} degrees: expected {:g} to {:g}; is the calibration in pixels, and of "
-                   "this resolution? (--calibration)",
-                   camera, model.fx, model.width, view_deg, kMinDeg, max_deg)});
-}
-
-void checkPrincipalPoint(int camera, const CameraModel& model, Warnings& warnings) {
-  // Lenses are mounted within a few per cent of the centre; a cut-out of a sensor reaches further.
-  const auto in_middle = [](double center, int size) {
-    return center >= 0.25 * size && center <= 0.75 * size;
-  };
-  if (in_middle(model.cx, model.width) && in_middle(model.cy, model.height)) return;
-  warnings.push_back(
-      {"principal-point",
-       fmt::format("camera {}: the principal point ({:g}, {:g}) lies outside the middle half of "
-                   "the {}x{} pixels; is the calibration of this resolution, and in the order fx "
-                   "fy cx cy? (--calibration)",
-                   camera, model.cx, model.cy, model.width, model.height)});
-}
-
-/// The fraction of a grid's pixels without a viewing ray.
-double fractionWithoutRay(const CameraModel& model) {
-  constexpr int kGrid = 64;  // enough for a fraction of 5 %, and quick
-  const LensInverse lens(model);
-  int without = 0;
-  for (int row = 0; row < kGrid; ++row) {
-    for (int column = 0; column < kGrid; ++column) {
-      const double x = (model.width - 1) * (column / (kGrid - 1.0));
-      const double y = (model.height - 1) * (row / (kGrid - 1.0));
-      without += std::isnan(lens.rayThrough(x, y).x()) ? 1 : 0;
-    }
-  }
-  return static_cast<double>(without) / (kGrid * kGrid);
-}
-
-void checkLens(int camera, const CameraModel& model, Warnings& warnings) {
-  constexpr double kMaxFraction = 0.05;  // the corners of a wide lens may have no ray
-  const double fraction = fractionWithoutRay(model);
-  if (fraction <= kMaxFraction) return;
-  warnings.push_back(
-      {"lens",
-       fmt::format("camera {}: the lens model has no viewing ray for {:.0f} % of the pixels; are "
-                   "the coefficients in the order of the model '{}'? (--calibration)",
-                   camera, 100 * fraction, nameOf(model.distortion))});
-}
 
 using ClockSpan = std::pair<std::int64_t, std::int64_t>;
 
@@ -193,79 +116,17 @@ void checkSpeeds(const PoseStatistics& poses, Warnings& warnings) {
   }
 }
 
-void checkActivity(const RecordingStatistics& recording, Warnings& warnings) {
-  constexpr std::uint64_t kEnough = 1000;  // fewer say nothing
-  std::uint64_t most = 0;
-  for (const auto& [key, camera] : recording.cameras()) most = std::max(most, camera.events.count);
-  for (const auto& [key, camera] : recording.cameras()) {
-    const std::uint64_t count = camera.events.count;
-    if (count == 0 && most > 0) {
-      warnings.push_back({"silent-camera", fmt::format("camera {} has no event; [rig] cameras "
-                                                       "leaves it out",
-                                                       key.first)});
-    } else if (most >= kEnough && count < most / 10) {  // equal cameras differ by a factor of 2
-      warnings.push_back(
-          {"few-events", fmt::format("camera {} has {} events, another one {}: is its lens covered "
-                                     "or its sensitivity lower? ([rig] cameras leaves it out)",
-                                     key.first, count, most)});
-    }
-    if (count >= kEnough && (camera.positive == 0 || camera.positive == count)) {
-      warnings.push_back(
-          {"polarity", fmt::format("all {} events of camera {} have the polarity {}: is it the "
-                                   "right column? (--event-columns; [fusion] split_polarity = "
-                                   "false does without)",
-                                   count, key.first, camera.positive == 0 ? 0 : 1)});
-    }
-  }
-}
-
-/// The fraction of a camera's events that its busiest 1 % of pixels have.
-double fractionOfBusiest(const CameraStatistics& camera) {
-  std::vector<std::uint32_t> pixels = camera.pixels;
-  const auto busiest = static_cast<std::ptrdiff_t>(pixels.size() / 100);
-  std::nth_element(pixels.begin(), pixels.begin() + busiest, pixels.end(), std::greater<>());
-  const auto events = std::accumulate(pixels.begin(), pixels.begin() + busiest, std::uint64_t{0});
-  return static_cast<double>(events) / static_cast<double>(camera.events.count);
-}
-
-void checkHotPixels(const RecordingStatistics& recording, Warnings& warnings) {
-  // Edges sweep over most of the image. One hot pixel among the others' events is for the filter.
-  constexpr double kMaxFraction = 0.9;
-  for (const auto& [key, camera] : recording.cameras()) {
-    // With fewer events, 1 % of the pixels may have them all by chance.
-    if (camera.pixels.empty() || camera.events.count < camera.pixels.size() / 10) continue;
-    const double fraction = fractionOfBusiest(camera);
-    if (fraction <= kMaxFraction) continue;
-    warnings.push_back(
-        {"hot-pixels",
-         fmt::format("{:.0f} % of the events of camera {} come from 1 % of its pixels: hot pixels, "
-                     "a blinking light or a wrong column ([filter] hot_pixel_ratio, "
-                     "--event-columns)",
-                     100 * fraction, key.first)});
-  }
-}
-
 }  // namespace
 
 std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
                                     const HealthLimits& limits) {
-  Warnings warnings;
-  checkBaselines(recording, warnings);
-  for (const auto& [key, camera] : recording.cameras()) {
-    const CameraModel& model = camera.camera.model;
-    if (!isCalibrated(model)) continue;
-    checkFieldOfView(key.first, model, warnings);
-    checkPrincipalPoint(key.first, model, warnings);
-    checkLens(key.first, model, warnings);
-  }
+  Warnings warnings = cameraWarnings(recording);
   checkClocks(recording, warnings);
   checkPoseGap(recording, limits.max_pose_gap_s, warnings);
   if (const PoseStatistics* const poses = recording.usedPoses()) {
     checkMotion(*poses, limits.near_depth_m, warnings);
     checkSpeeds(*poses, warnings);
   }
-  checkActivity(recording, warnings);
-  checkHotPixels(recording, warnings);
   return warnings;
 }
 

@@ -44,8 +44,13 @@ RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
   parts.expected_calibration = "camchain.yaml";
   parts.expected_poses = "poses.txt or groundtruth.txt";
   addFolderFiles(folder, options, parts);
-  const std::size_t count =
-      parts.calibration ? parts.calibration->rig.cameras.size() : countCameras(folder);
+  const std::size_t with_events = countCameras(folder);
+  const std::size_t count = parts.calibration ? parts.calibration->rig.cameras.size() : with_events;
+  if (count < with_events) {
+    throw std::runtime_error(
+        fmt::format("{}: {} cameras: expected {}, because the folder has events of cam0 to cam{}",
+                    parts.calibration->file.string(), count, with_events, with_events - 1));
+  }
   for (std::size_t camera = 0; camera < count; ++camera) {
     parts.cameras.push_back(std::make_unique<EventTextStream>(eventsOf(folder, camera), options));
   }

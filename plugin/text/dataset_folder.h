@@ -14,7 +14,7 @@ namespace efm {
 ///                     and columns: `eventFileIn`, `findEventColumns`
 ///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0 (`readPoseText`)
 ///   depth/index.txt   with truth: t file, depth maps of camera 0 (see TruthDepth)
-/// Other files are ignored.
+/// Other files are ignored, but events of a further camera than those of camchain.yaml are an error.
 
 /// Whether the folder has a camchain.yaml, or events in cam0.
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);

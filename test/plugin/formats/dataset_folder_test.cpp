@@ -81,6 +81,11 @@ TEST_F(DatasetFolder, IsDetectedByItsCalibrationOrItsFirstCamera) {
   EXPECT_FALSE(looksLikeDatasetFolder(folder() / "nowhere"));
 }
 
+TEST_F(DatasetFolder, EventsOfACameraWithoutACalibrationAreAnError) {
+  write("cam2/events.txt", "0.2 0 0 0\n");
+  EXPECT_THAT(errorOfOpening(), HasSubstr("camchain.yaml: 2 cameras: expected 3, because"));
+}
+
 TEST_F(DatasetFolder, ACameraWithoutAFileIsAnError) {
   remove("cam1/events.txt");
   EXPECT_THAT(errorOfOpening(), HasSubstr("cam1/events.txt: cannot be opened"));

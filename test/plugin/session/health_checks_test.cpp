@@ -154,6 +154,18 @@ const std::vector<Fault> kFaults = {
        for (Event& event : r.events[0]) event.x = 7;
      },
      {"hot-pixels"}},
+    {"a camera with a clock 2 s ahead, and poses of both times",
+     [](auto& r) {
+       for (Event& event : r.events[1]) event.t_ns += 2'000'000'000;
+       const std::vector<StampedPose> poses = r.poses;
+       for (StampedPose pose : poses) {
+         pose.t_ns += 2'000'000'000;
+         pose.T_world_rig.translation += poses.back().T_world_rig.translation;
+         r.poses.push_back(pose);
+       }
+     },
+     {"camera-clocks"}},
+    {"one file of events twice", [](auto& r) { r.events[1] = r.events[0]; }, {"same-events"}},
     {"no poses", [](auto& r) { r.poses.clear(); }, {"no-poses"}},
     {"no events", [](auto& r) { r.events.assign(2, {}); }, {"no-events"}},
     {"no calibration", [](auto& r) { r.cameras[1].model.fx = 0; }, {"no-calibration"}},
