@@ -34,8 +34,12 @@ std::filesystem::path replaceableFile(const std::filesystem::path& path) {
 }  // namespace
 
 AtomicFile::AtomicFile(const std::filesystem::path& path)
-    : path_(replaceableFile(path)), temporary_(path_) {
-  temporary_.replace_filename(path_.stem().string() + ".partial" + path_.extension().string());
+    : path_(replaceableFile(path)), temporary_(temporaryOf(path_)) {}
+
+std::filesystem::path AtomicFile::temporaryOf(const std::filesystem::path& path) {
+  std::filesystem::path temporary = path;
+  temporary.replace_filename(path.stem().string() + ".partial" + path.extension().string());
+  return temporary;
 }
 
 AtomicFile::~AtomicFile() {

@@ -20,9 +20,13 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
+  /// The temporary name: "map.partial.pcd" for "map.pcd". A killed program leaves a file there; the
+  /// next one that writes the file replaces it.
+  static std::filesystem::path temporaryOf(const std::filesystem::path& path);
+
   /// The file that `replace` creates or replaces.
   const std::filesystem::path& path() const { return path_; }
-  /// The file to write: "map.partial.pcd" for "map.pcd".
+  /// The file to write.
   const std::filesystem::path& temporary() const { return temporary_; }
   /// Renames the complete temporary file. @throws std::filesystem::filesystem_error.
   void replace() const { std::filesystem::rename(temporary_, path_); }

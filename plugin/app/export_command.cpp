@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/interruption.h"
 #include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
@@ -148,16 +149,20 @@ std::vector<std::string> exportFormats() {
 int runExport(const ExportArguments& arguments) {
   const TimeLimits limits = resolve(arguments.times, arguments.source);
   const auto open = [&] { return openInterval(arguments.source, limits); };
-  Export result(arguments, rigOf(*open()));
+  const Rig rig = rigOf(*open());
+  const Interruption interruption;
+  Export result(arguments, rig);
   const std::unique_ptr<Recording> recording = open();
   Progress progress("exporting", arguments.verbosity);
   while (const auto observation = recording->next()) {
+    interruption.check();
     result.add(*observation);
     progress.show(recording->progress());
   }
   for (const TruthDepth& truth : openTruth(arguments.source)) {
     const bool inside = truth.t_ns >= limits.t0_ns.value_or(kMinTimeNs) &&
                         truth.t_ns < limits.t1_ns.value_or(kMaxTimeNs);
+    interruption.check();
     if (inside) result.add(truth);
   }
   result.close(arguments.out);

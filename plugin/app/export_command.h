@@ -25,6 +25,7 @@ std::vector<std::string> exportFormats();
 /// `event-fusion export`: writes a recording for other tools. Stamps have the cameras' time offsets
 /// added; poses are those of camera 0, T_world_cam0.
 /// @return the process's exit status.
+/// @throws Interrupted if a signal came; then there is no result.
 /// @throws std::exception if the recording cannot be read to its end or the result cannot be
 /// written. Then there is no result.
 int runExport(const ExportArguments& arguments);

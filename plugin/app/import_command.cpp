@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/interruption.h"
 #include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
@@ -79,6 +80,7 @@ int runImport(const ImportArguments& arguments) {
   refuseToDestroy(arguments);
   const TimeLimits limits = resolve(arguments.times, arguments.source);
   const std::unique_ptr<Recording> recording = openInterval(arguments.source, limits);
+  const Interruption interruption;
   RawlogWriter writer(arguments.out, arguments.compression);
   std::map<std::string, std::uint64_t> events;  // per label
   std::uint64_t all_events = 0;
@@ -88,6 +90,7 @@ int runImport(const ImportArguments& arguments) {
   {
     Progress progress("importing", arguments.verbosity);
     while (const auto observation = recording->next()) {
+      interruption.check();
       writer.write(*observation);
       if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
         events[packet->sensorLabel] += packet->events.size();

@@ -21,6 +21,7 @@ struct ImportArguments {
 /// `event-fusion import`: writes a recording as a rawlog. Replaces an earlier rawlog, no other
 /// file.
 /// @return the process's exit status.
+/// @throws Interrupted if a signal came; then there is no result.
 /// @throws std::exception if the recording cannot be read to its end or the rawlog cannot be
 /// written. Then there is no rawlog.
 int runImport(const ImportArguments& arguments);

@@ -1,34 +1,61 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/interruption.h"
 
+#include <unistd.h>
+
 #include <array>
+#include <cerrno>
 #include <csignal>
+#include <ctime>
+#include <string_view>
 
 namespace efm {
 namespace {
 
 constexpr std::array<int, 2> kSignals = {SIGINT, SIGTERM};
 
+/// `timeout` sends its signal twice: to the process and to its group.
+constexpr double kSameSignalS = 0.3;
+constexpr std::string_view kNote =
+    "\nevent-fusion: stopping as soon as possible; a second signal ends it at once\n";
+
 volatile std::sig_atomic_t signal_came = 0;
+volatile std::sig_atomic_t on_terminal = 0;
+std::timespec came_at;  // the handler's alone
 std::array<struct sigaction, kSignals.size()> earlier_actions;
 
-/// From now on, signals have their default action. All calls are safe in a handler.
-void noteSignal(int) {
-  signal_came = 1;
-  for (const int signal : kSignals) {
-    struct sigaction action = {};
-    sigaction(signal, nullptr, &action);
-    if (action.sa_handler == noteSignal) std::signal(signal, SIG_DFL);
+double secondsSince(const std::timespec& before) {
+  std::timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec - before.tv_sec) +
+         1e-9 * static_cast<double>(now.tv_nsec - before.tv_nsec);
+}
+
+/// All calls are safe in a handler, which the two signals do not interrupt.
+void noteSignal(int signal) {
+  const int error = errno;
+  if (signal_came == 0) {
+    clock_gettime(CLOCK_MONOTONIC, &came_at);
+    signal_came = 1;
+    if (on_terminal != 0 && write(STDERR_FILENO, kNote.data(), kNote.size()) < 0) {
+      // The terminal is gone.
+    }
+  } else if (secondsSince(came_at) > kSameSignalS) {
+    std::signal(signal, SIG_DFL);
+    raise(signal);  // when the handler returns
   }
+  errno = error;
 }
 
 }  // namespace
 
 Interruption::Interruption() {
   signal_came = 0;
+  on_terminal = isatty(STDERR_FILENO);
   struct sigaction action = {};
   action.sa_handler = noteSignal;
   action.sa_flags = SA_RESTART;
+  for (const int signal : kSignals) sigaddset(&action.sa_mask, signal);
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     sigaction(kSignals[i], nullptr, &earlier_actions[i]);
     // A shell starts background jobs with signals ignored: they stay so.
@@ -43,5 +70,9 @@ Interruption::~Interruption() {
 }
 
 bool Interruption::requested() const { return signal_came != 0; }
+
+void Interruption::check() const {
+  if (requested()) throw Interrupted();
+}
 
 }  // namespace efm

@@ -116,8 +116,8 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
              const MappingArguments& arguments) {
   outcome.report.peak_memory_bytes = peakMemoryBytes();
   // A run without a keyframe leaves the results of an earlier run as they are.
-  const bool made_nothing = outcome.error && outcome.report.counts.keyframes == 0;
-  if (!made_nothing || !std::filesystem::exists(output.folder() / "report.json")) {
+  if (outcome.report.counts.keyframes > 0 ||
+      !std::filesystem::exists(output.folder() / "report.json")) {
     output.writeReport(reportJson(outcome.report));
   }
   printWarnings(outcome.report.warnings);
@@ -198,7 +198,10 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     refuseForeignFolder(folder, arguments.force);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes);
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) { take(*output, keyframe); });
-    job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { writer.add(keyframe); };
+    job.on_keyframe = [&, note = job.on_keyframe](const KeyframeDepthMap& keyframe) {
+      if (note) note(keyframe);
+      writer.add(keyframe);
+    };
     job.processor_clock = [&] { return processSeconds() - writer.cpuSeconds(); };
     outcome = runMapping(job, *recording);
     writer.finish();
@@ -250,6 +253,7 @@ int runMap(const MapArguments& arguments) {
 }
 
 int runDepth(const DepthArguments& arguments) {
+  const Interruption interruption;
   MappingJob job;
   job.options = optionsOf(arguments);
   job.verbosity = arguments.verbosity;
@@ -264,6 +268,13 @@ int runDepth(const DepthArguments& arguments) {
       return dsi.get();
     };
   }
+  bool made = false;
+  // A part of the window is no result. A keyframe that is made is written.
+  job.on_keyframe = [&](const KeyframeDepthMap&) { made = true; };
+  job.stop_requested = [&] {
+    if (!made) interruption.check();
+    return false;
+  };
   std::vector<CloudPoint> points;
   const auto take = [&](MapOutput& output, const KeyframeDepthMap& keyframe) {
     output.writeImages(keyframe);

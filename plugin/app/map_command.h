@@ -42,7 +42,9 @@ struct DepthArguments : MappingArguments {
 /// written.
 int runMap(const MapArguments& arguments);
 
-/// `event-fusion depth`: maps one window.
+/// `event-fusion depth`: maps one window. SIGINT or SIGTERM ends it without a result, unless the
+/// keyframe is made: then its files are written.
+/// @throws Interrupted if a signal came before; an earlier result stays.
 int runDepth(const DepthArguments& arguments);
 
 }  // namespace efm

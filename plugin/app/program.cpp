@@ -12,6 +12,7 @@
 
 #include "plugin/app/command_line.h"
 #include "plugin/app/exit_status.h"
+#include "plugin/app/interruption.h"
 #include "plugin/mrpt/registration.h"
 
 namespace efm {
@@ -42,6 +43,9 @@ int runProgram(int argc, char** argv) {
     return finished(run());
   } catch (const UsageError& error) {
     return fail(error.what(), kUsageStatus);
+  } catch (const Interrupted& interrupted) {
+    std::cerr << "event-fusion: " << interrupted.what() << "\n";
+    return kInterruptedStatus;
   } catch (const std::bad_alloc&) {
     return fail("out of memory");
   } catch (const std::exception& error) {

@@ -10,6 +10,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
 #include "plugin/app/exit_status.h"
+#include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
 #include "plugin/calibration/camchain.h"
 #include "tracking_stub/poses/tum_trajectory.h"
@@ -93,15 +94,19 @@ int runSimulate(const SimulateArguments& arguments) {
   Simulation simulation =
       arguments.preset.empty() ? makeOnTrajectory(arguments) : makePreset(arguments);
   setPixels(arguments, simulation);
+  const Interruption interruption;
   DatasetWriter writer(arguments.out);
   std::vector<CameraRecording> recordings;
   {
     Progress progress("simulating", arguments.verbosity);
     SimulationRun run;
-    run.progress = [&progress](double fraction) { progress.show(fraction); };
+    run.progress = [&](double fraction) {
+      interruption.check();
+      progress.show(fraction);
+    };
     recordings = simulateEvents(simulation, run);
     progress.begin("writing the recording");
-    writer.write(simulation, recordings);
+    writer.write(simulation, recordings, [&] { interruption.check(); });
   }
   if (arguments.verbosity == Verbosity::kQuiet) return 0;
   for (std::size_t c = 0; c < recordings.size(); ++c) {

@@ -32,6 +32,7 @@ struct SimulateArguments {
 /// `event-fusion simulate`: simulates a recording with exact truth and writes it as a dataset
 /// folder.
 /// @return the process's exit status.
+/// @throws Interrupted if a signal came; then there is no result.
 /// @throws std::exception if the arguments are not valid or something cannot be written.
 int runSimulate(const SimulateArguments& arguments);
 

@@ -26,9 +26,10 @@ namespace {
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
-constexpr std::array<std::string_view, 5> kMapFiles = {"map.pcd", "map.simplemap", "trajectory.txt",
-                                                       "trajectory_tracker.txt", "report.json"};
-constexpr std::array<std::string_view, 3> kDepthFiles = {"points.pcd", "dsi.npy", "report.json"};
+// The report is first: without it, what is left of an earlier result does not look complete.
+constexpr std::array<std::string_view, 5> kMapFiles = {"report.json", "map.pcd", "map.simplemap",
+                                                       "trajectory.txt", "trajectory_tracker.txt"};
+constexpr std::array<std::string_view, 3> kDepthFiles = {"report.json", "points.pcd", "dsi.npy"};
 
 void makeFolder(const std::filesystem::path& folder) {
   if (folder.empty()) throw std::runtime_error("'': expected the name of the folder to write");
@@ -40,16 +41,22 @@ void makeFolder(const std::filesystem::path& folder) {
   }
 }
 
-/// Removes the regular files of these names; others were not written here.
-template <std::size_t N>
-void removeFiles(const std::filesystem::path& folder,
-                 const std::array<std::string_view, N>& names) {
-  for (const std::string_view name : names) {
-    const std::filesystem::path file = folder / name;
-    if (std::filesystem::is_regular_file(std::filesystem::symlink_status(file))) {
-      std::filesystem::remove(file);
-    }
+/// A file that is not regular was not written here.
+void removeFile(const std::filesystem::path& file) {
+  if (std::filesystem::is_regular_file(std::filesystem::symlink_status(file))) {
+    std::filesystem::remove(file);
   }
+}
+
+template <typename Names>
+void removeFiles(const std::filesystem::path& folder, const Names& names) {
+  for (const std::string_view name : names) removeFile(folder / name);
+}
+
+/// What a killed run left of the files that it was writing.
+template <typename Names>
+void removePartialFiles(const std::filesystem::path& folder, const Names& names) {
+  for (const std::string_view name : names) removeFile(AtomicFile::temporaryOf(folder / name));
 }
 
 constexpr std::string_view kCameraFolder = "cam";  // and the camera's index
@@ -66,13 +73,16 @@ bool isCameraFolder(const std::filesystem::directory_entry& entry) {
 /// Removes the images of a keyframe and of its single cameras.
 void removeImages(const std::filesystem::path& folder) {
   removeFiles(folder, kImages);
+  removePartialFiles(folder, kImages);
   std::vector<std::filesystem::path> cameras;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (isCameraFolder(entry)) cameras.push_back(entry.path());
   }
   for (const std::filesystem::path& camera : cameras) {
     removeFiles(camera, kImages);
+    removePartialFiles(camera, kImages);
     removeFiles(camera, std::array{kEventImage});
+    removePartialFiles(camera, std::array{kEventImage});
     if (std::filesystem::is_empty(camera)) std::filesystem::remove(camera);
   }
 }
@@ -119,6 +129,12 @@ MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
                      const DepthPlanesOptions& limits)
     : folder_(std::move(folder)), kind_(kind), limits_(limits) {
   makeFolder(folder_);
+  // Before the first file of this run: one may be under way when `removeEarlier` runs (dsi.npy).
+  if (kind_ == OutputKind::kMap) {
+    removePartialFiles(folder_, kMapFiles);
+  } else {
+    removePartialFiles(folder_, kDepthFiles);
+  }
 }
 
 bool MapOutput::holdsResult(const std::filesystem::path& folder) {

@@ -19,8 +19,10 @@ enum class OutputKind {
   kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
 };
 
-/// The folder that a map is written to. A file appears under its name when it is complete. A
-/// std::runtime_error names a file that cannot be written.
+/// The folder that a map is written to. A file appears under its name when it is complete. Of an
+/// earlier result report.json is removed first, and the caller writes it last: a folder with a
+/// report.json is complete, and all its files are of one run. A std::runtime_error names a file
+/// that cannot be written.
 ///
 ///     map.pcd  map.simplemap  trajectory.txt  report.json
 ///     trajectory_tracker.txt   where poses were refined

@@ -87,7 +87,8 @@ void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
 }  // namespace
 
 void DatasetWriter::write(const Simulation& simulation,
-                          const std::vector<CameraRecording>& recordings) {
+                          const std::vector<CameraRecording>& recordings,
+                          const std::function<void()>& before_file) {
   const std::vector<RigCamera>& cameras = simulation.rig.cameras;
   requireOption(!cameras.empty() && recordings.size() == cameras.size(), "recordings",
                 recordings.size(), "one per camera, at least one");
@@ -100,24 +101,29 @@ void DatasetWriter::write(const Simulation& simulation,
   for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
     const fs::path camera_folder = folder / ("cam" + std::to_string(camera));
     makeFolder(camera_folder);
+    before_file();
     writeEvents(camera_folder / "events.txt", recordings[camera].events);
   }
   writeText(folder / "camchain.yaml", formatCamchain(simulation.rig));
   writeTumTrajectory(folder / "poses.txt", samplePoses(simulation));
-  writeDepthMaps(simulation);
+  writeDepthMaps(simulation, before_file);
+  before_file();
   const TruthClouds truth = makeTruthClouds(simulation, recordings);
   writePly(folder / "gt_cloud.ply", truth.surfaces);
   writePly(folder / "gt_edges.ply", truth.edges);
+  before_file();
   folder_.finish();
 }
 
-void DatasetWriter::writeDepthMaps(const Simulation& simulation) const {
+void DatasetWriter::writeDepthMaps(const Simulation& simulation,
+                                   const std::function<void()>& before_file) const {
   const fs::path depth_folder = folder_.temporary() / "depth";
   makeFolder(depth_folder);
   const ReferenceView view = ReferenceView::of(simulation.rig.cameras[0].model);
   std::string index;
   for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs();
        t_ns += kDepthPeriodNs) {
+    before_file();
     const std::string name = "cam0_" + formatSeconds(t_ns) + ".tiff";
     const fs::path file = depth_folder / name;
     const Rigid3 T_world_cam0 = simulation.motion->poseAt(t_ns);

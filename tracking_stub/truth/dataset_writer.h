@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -30,12 +31,15 @@ class DatasetWriter {
 
   /// Call it once.
   /// @param recordings of the simulation, one per camera.
+  /// @param before_file called before each file. If it throws, there is no folder.
   /// @throws std::invalid_argument where camera 0 is not the rig's frame; std::runtime_error naming
   /// the path where something cannot be written.
-  void write(const Simulation& simulation, const std::vector<CameraRecording>& recordings);
+  void write(
+      const Simulation& simulation, const std::vector<CameraRecording>& recordings,
+      const std::function<void()>& before_file = [] {});
 
  private:
-  void writeDepthMaps(const Simulation& simulation) const;
+  void writeDepthMaps(const Simulation& simulation, const std::function<void()>& before_file) const;
 
   NewFolder folder_;
 };

@@ -5,6 +5,7 @@
 #include <unistd.h>
 #include <wordexp.h>
 
+#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -28,6 +29,25 @@ class AppTest : public ProgramTest {
     if (child == 0) _exit(runHere(arguments));
     int status = -1;
     EXPECT_EQ(waitpid(child, &status, 0), child);
+    return resultOf(status);
+  }
+
+  /// Runs event-fusion and sends it SIGINT as soon as `ready` holds, unless it ends before.
+  template <typename Ready>
+  Result interrupted(const std::string& arguments, Ready ready) const {
+    std::cout.flush();
+    std::fflush(nullptr);
+    const pid_t child = fork();
+    if (child == 0) _exit(runHere(arguments));
+    int status = -1;
+    while (waitpid(child, &status, WNOHANG) == 0) {
+      if (ready()) {
+        kill(child, SIGINT);
+        EXPECT_EQ(waitpid(child, &status, 0), child);
+        break;
+      }
+      usleep(500);
+    }
     return resultOf(status);
   }
 
