@@ -142,9 +142,9 @@ TEST_F(RefinementOption, WrongValuesAreErrorsThatNameSectionKeyAndValue) {
   const auto error = [&](const std::string& option) {
     return errorOf("map rig.ini data --out none --set refinement." + option);
   };
-  EXPECT_THAT(error("window=0"), HasSubstr("[refinement] window = 0: must be from 1 to 1000"));
+  EXPECT_THAT(error("window=0"), HasSubstr("--set refinement.window=0: must be from 1 to 1000"));
   EXPECT_THAT(error("tracker_noise_deg=-2"),
-              HasSubstr("[refinement] tracker_noise_deg = -2: must be from 0 to 1000"));
+              HasSubstr("--set refinement.tracker_noise_deg=-2: must be from 0 to 1000"));
   EXPECT_THAT(error("windows=3"), AllOf(HasSubstr("windows"), HasSubstr("unknown key")));
 }
 
