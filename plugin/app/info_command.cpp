@@ -21,6 +21,7 @@
 #include "plugin/formats/open_recording.h"
 #include "plugin/session/camera_view.h"
 #include "plugin/session/health_checks.h"
+#include "plugin/session/time_text.h"
 
 namespace efm {
 namespace {
@@ -84,13 +85,15 @@ void printCameras(const RecordingStatistics& statistics) {
 }
 
 void printPoses(const RecordingStatistics& statistics) {
+  std::optional<std::int64_t> start_ns;
+  if (const auto events = statistics.eventSpan()) start_ns = events->first;
   for (const auto& [source, used] : statistics.poseSources()) {
     const StreamStatistics& poses = used.poses;
     fmt::print("{}:\n  ", asText(source));
     printStream(poses, "poses");
     if (poses.count < 2) continue;
-    fmt::print("  largest gap {:g} s, after {} s\n", 1e-9 * static_cast<double>(poses.max_gap_ns),
-               formatSeconds(poses.max_gap_start_ns));
+    fmt::print("  largest gap {:g} s, after {}\n", 1e-9 * static_cast<double>(poses.max_gap_ns),
+               timeText(poses.max_gap_start_ns, start_ns));
     fmt::print("  path {:.4g} m, speed {:.3g} m/s on average, up to {:.3g} m/s and {:.3g} rad/s\n",
                used.path_m, poses.seconds() > 0 ? used.path_m / poses.seconds() : 0.0,
                used.max_speed, used.max_rotation_rate);

@@ -210,6 +210,10 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.error = player.play();
 
   SessionStatus status = player.builder().status();
+  if (outcome.error && status.events) {
+    *outcome.error +=
+        "; events were read until " + timeText(status.events->last_ns, status.events->first_ns);
+  }
   status.counts.sorted_events += recording.counts().sorted_events;
   outcome.report.skipped_events = recording.counts().skipped_events;
   outcome.report.counts = status.counts;

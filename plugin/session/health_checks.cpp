@@ -10,6 +10,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/camera_checks.h"
 #include "plugin/session/camera_view.h"
+#include "plugin/session/time_text.h"
 
 namespace efm {
 namespace {
@@ -58,10 +59,10 @@ void checkClocks(const RecordingStatistics& recording, Warnings& warnings) {
   const StreamStatistics& poses = recording.usedPoses()->poses;
   warnings.push_back(
       {"clock-overlap",
-       fmt::format("the poses cover {:.1f} % of the events' time: events from {} to {} s, poses "
-                   "from {} to {} s; {} (--poses, --time-unit, [rig] time_offsets_s)",
-                   100 * overlap, formatSeconds(span.first), formatSeconds(span.second),
-                   formatSeconds(*poses.first_ns), formatSeconds(*poses.last_ns),
+       fmt::format("the poses cover {:.1f} % of the events' time: events from {}, poses "
+                   "from {}; {} (--poses, --time-unit, [rig] time_offsets_s)",
+                   100 * overlap, timeText(span.first, span.second, span.first),
+                   timeText(*poses.first_ns, *poses.last_ns, span.first),
                    clockGuess(span, {*poses.first_ns, *poses.last_ns}))});
 }
 
@@ -75,9 +76,9 @@ void checkPoseGap(const RecordingStatistics& recording, double max_gap_s, Warnin
   if (!matters || secondsBetween(start_ns, end_ns) <= max_gap_s) return;
   warnings.push_back(
       {"pose-gap",
-       fmt::format("the largest gap between two poses is {:g} s, after {} s: events in gaps of "
+       fmt::format("the largest gap between two poses is {:g} s, after {}: events in gaps of "
                    "more than {:g} s are not used ([rig] max_pose_gap_s)",
-                   secondsBetween(start_ns, end_ns), formatSeconds(start_ns), max_gap_s)});
+                   secondsBetween(start_ns, end_ns), timeText(start_ns, span->first), max_gap_s)});
 }
 
 void checkMotion(const PoseStatistics& poses, double near_depth_m, Warnings& warnings) {

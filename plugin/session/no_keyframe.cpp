@@ -8,13 +8,10 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/session/time_text.h"
 
 namespace efm {
 namespace {
-
-std::string asText(const TimeSpan& span) {
-  return fmt::format("{} to {} s", formatSeconds(span.first_ns), formatSeconds(span.last_ns));
-}
 
 /// What makes a window full, by the policy.
 std::string fullWindow(const KeyframePolicyOptions& options) {
@@ -46,8 +43,12 @@ std::string whyNoPoses(const SessionStatus& status) {
 std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options) {
   if (!status.events) return "the recording has no events";
   if (!status.poses) return whyNoPoses(status);
-  const std::string spans = fmt::format("the events span {}, the poses {}", asText(*status.events),
-                                        asText(*status.poses));
+  const std::int64_t start_ns = status.events->first_ns;
+  const auto text = [&](const TimeSpan& span) {
+    return timeText(span.first_ns, span.last_ns, start_ns);
+  };
+  const std::string spans =
+      fmt::format("the events span {}, the poses {}", text(*status.events), text(*status.poses));
   const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);
   const std::int64_t last_ns = std::min(status.events->last_ns, status.poses->last_ns);
   if (first_ns > last_ns) {
@@ -72,12 +73,12 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
   const bool saw_nothing = without_pose == 0 && status.counts.windows_without_events > 0;
   if (options.only_window) {
     const Window& window = *options.only_window;
-    const std::string interval = "the window " + asText({window.t0_ns, window.t1_ns});
+    const std::string interval = "the window " + text({window.t0_ns, window.t1_ns});
     if (saw_nothing) {
       return fmt::format("the selected cameras have no event in {}; {}", interval, spans);
     }
-    return fmt::format("there is no pose at the reference time {} s of {}; {}",
-                       formatSeconds(window.t_ref_ns), interval, spans);
+    return fmt::format("there is no pose at the reference time {} of {}; {}",
+                       timeText(window.t_ref_ns, start_ns), interval, spans);
   }
   if (saw_nothing) {
     return "the selected cameras have no event in any window that was full: " + spans;

@@ -112,8 +112,8 @@ TEST_F(ImportCommand, InfoIsTheSameForAFolderAndItsRawlog) {
                     HasSubstr("5 events from 0.010000000 s to 0.050000000 s"),
                     HasSubstr("3 poses from 0.015000000 s to 0.045000000 s"),
                     HasSubstr("field of view 61.9 x 48.5 degrees"), HasSubstr("  rate |"),
-                    HasSubstr("largest gap 0.015 s"), HasSubstr("  path "),
-                    HasSubstr("the poses cover 75.0 % of the events' time"),
+                    HasSubstr("largest gap 0.015 s, after 0.015000000 s (+0.005 s)\n"),
+                    HasSubstr("  path "), HasSubstr("the poses cover 75.0 % of the events' time"),
                     HasSubstr("1 events before the first pose, 1 after the last"),
                     HasSubstr("1 events out of order")));
   EXPECT_EQ(rawlog.status, 0);

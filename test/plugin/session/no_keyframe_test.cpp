@@ -24,9 +24,10 @@ TEST(WhyNoKeyframe, SaysTheGapBetweenPosesAndEvents) {
   recording.events[0][0].t_ns = 10'100'000'000;
   for (StampedPose& pose : recording.poses) pose.t_ns += 5'000'000'000;
 
-  EXPECT_EQ(why(recording, syntheticOptions()),
-            "the events span 10.100000000 to 10.100000000 s, the poses 15.000000000 to "
-            "15.400000000 s: they miss each other by 4.900000000 s");
+  EXPECT_EQ(
+      why(recording, syntheticOptions()),
+      "the events span 10.100000000 to 10.100000000 s (+0 to +0 s), the poses 15.000000000 to "
+      "15.400000000 s (+4.9 to +5.3 s): they miss each other by 4.900000000 s");
 
   for (StampedPose& pose : recording.poses) pose.t_ns -= 10'000'000'000;
   EXPECT_THAT(why(recording, syntheticOptions()), HasSubstr("miss each other by 4.700000000 s"));
@@ -78,14 +79,15 @@ TEST(WhyNoKeyframe, SaysThatWindowsHadNoPoseAtTheirReferenceTime) {
 
   options.mapper.only_window = Window{10'000'000'000, 10'500'000'000, 500'000'000};
   EXPECT_THAT(why(recording, options),
-              HasSubstr("no pose at the reference time 0.500000000 s of the window"));
+              HasSubstr("no pose at the reference time 0.500000000 s (-9.502 s) of the window"));
 }
 
 TEST(WhyNoKeyframe, SaysThatTheWindowHasNoEvents) {
   EventFusionOptions options = syntheticOptions();
   options.mapper.only_window = Window{0, 1'000'000'000, 500'000'000};
   EXPECT_THAT(why(SyntheticRecording(), options),
-              HasSubstr("no event in the window 0.000000000 to 1.000000000 s; the events span"));
+              HasSubstr("no event in the window 0.000000000 to 1.000000000 s (-10.002 to -9.002 "
+                        "s); the events span"));
 }
 
 }  // namespace
