@@ -108,22 +108,70 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
     const StageScope scope(stages, Stage::kFilter);
     filterEvents();
   }
-  findStart();
-  while (start_ns_) {
-    skipEmptyWindows();
-    const std::optional<Window> window = policy_->current(*this);
-    if (!window || !isCovered(*window)) break;
+  while (const std::optional<Window> window = coveredWindow()) {
     std::optional<KeyframeDepthMap> keyframe = mapWindow(*window, sink, stages);
     policy_->advance(*window, keyframe ? &*keyframe : nullptr);
     releaseBefore(releasableUntil());
     if (keyframe) return keyframe;
   }
+  releaseUnneeded();
+  return std::nullopt;
+}
+
+std::optional<WindowData> FusionMapper::window() {
+  filterEvents();
+  std::optional<Window> window = coveredWindow();
+  if (!window && finished_ && start_ns_) {
+    const std::int64_t t0_ns = policy_->earliestStart(*this);
+    const std::int64_t t1_ns = std::min(completeNs(), reachedNs() + 1);
+    if (t0_ns < t1_ns) window = windowOf(t0_ns, t1_ns, options_.policy.reference);
+  }
+  if (!window) return std::nullopt;
+  return WindowData{*window, eventsOf(*window), &trajectory_};
+}
+
+void FusionMapper::skipWindow(const Window& window) {
+  policy_->advance(window, nullptr);
+  releaseUnneeded();
+}
+
+void FusionMapper::configure(const KeyframePolicyOptions& policy,
+                             const DepthPlanesOptions& planes) {
+  if (counts_.keyframes > 0) throw std::logic_error("new options after the first keyframe");
+  options_.policy = policy;
+  if (!options_.only_window) policy_ = makeKeyframePolicy(policy, depthGuess(planes));
+  setPlanes(planes);
+}
+
+void FusionMapper::setPlanes(const DepthPlanesOptions& planes) {
+  options_.keyframe.planes = planes;
+  if (mapper_) mapper_->setPlanes(planes);
+}
+
+/// The current window, if all of its events and poses are here.
+std::optional<Window> FusionMapper::coveredWindow() {
+  findStart();
+  if (!start_ns_) return std::nullopt;
+  skipEmptyWindows();
+  const std::optional<Window> window = policy_->current(*this);
+  return window && isCovered(*window) ? window : std::nullopt;
+}
+
+std::vector<EventSpan> FusionMapper::eventsOf(const Window& window) const {
+  std::vector<EventSpan> events;
+  for (const CameraStream& camera : cameras_) {
+    events.push_back(camera.between(window.t0_ns, window.t1_ns));
+  }
+  return events;
+}
+
+/// Where no window is covered.
+void FusionMapper::releaseUnneeded() {
   if (finished_) {
     releaseBefore(kMaxTimeNs);
   } else if (start_ns_) {
     releaseBefore(releasableUntil());
   }
-  return std::nullopt;
 }
 
 /// The filters see an event once no earlier one of its camera can come.
@@ -172,10 +220,7 @@ bool FusionMapper::isCovered(const Window& window) const {
 
 std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, DsiSink* sink,
                                                         StageHook* stages) {
-  std::vector<EventSpan> events;
-  for (const CameraStream& camera : cameras_) {
-    events.push_back(camera.between(window.t0_ns, window.t1_ns));
-  }
+  const std::vector<EventSpan> events = eventsOf(window);
   if (std::all_of(events.begin(), events.end(), [](EventSpan span) { return span.empty(); })) {
     ++counts_.windows_without_events;
     return std::nullopt;

@@ -12,6 +12,7 @@
 #include "mapping/events/event.h"
 #include "mapping/events/event_filter.h"
 #include "mapping/events/window.h"
+#include "mapping/events/window_data.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/geometry/undistortion.h"
@@ -85,6 +86,21 @@ class FusionMapper : private RecordingProgress {
   /// Maps the next window that is covered, if there is one. Costs the keyframe's whole work.
   std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr, StageHook* stages = nullptr);
 
+  /// The data of the window that `next` would map: without mapping it, and without its keyframe.
+  /// @return nothing where no window is covered; after `finish` also the rest, which no window
+  /// fills.
+  ///   Valid until data are added or a window is mapped or skipped.
+  std::optional<WindowData> window();
+  /// Goes on to the next window without mapping this one.
+  void skipWindow(const Window& window);
+  /// Replaces options, as if they had been given at the start.
+  /// @throws std::logic_error after the first keyframe; std::invalid_argument where they are not
+  /// valid.
+  void configure(const KeyframePolicyOptions& policy, const DepthPlanesOptions& planes);
+  /// The depth planes of the keyframes from now on.
+  /// @throws std::invalid_argument where the options are not valid.
+  void setPlanes(const DepthPlanesOptions& planes);
+
   /// Complete once `finish` was called and `next` returned nothing.
   MapperCounts counts() const;
   const Rig& rig() const { return rig_; }
@@ -94,6 +110,9 @@ class FusionMapper : private RecordingProgress {
   void filterEvents();
   void findStart();
   void skipEmptyWindows();
+  std::optional<Window> coveredWindow();
+  std::vector<EventSpan> eventsOf(const Window& window) const;
+  void releaseUnneeded();
   bool isCovered(const Window& window) const;
   std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageHook* stages);
   KeyframeMapper& keyframeMapper() const;

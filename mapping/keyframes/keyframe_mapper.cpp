@@ -86,6 +86,11 @@ KeyframeMapper::KeyframeMapper(Rig rig, std::vector<int> selected,
   });
 }
 
+void KeyframeMapper::setPlanes(const DepthPlanesOptions& planes) {
+  planes_ = DepthPlanes(planes);
+  options_.planes = planes;
+}
+
 Rigid3 KeyframeMapper::referencePose(const Rigid3& T_world_rig) const {
   const RigCamera& reference = cameraOf(options_.reference_camera);
   const Rigid3 T_cam_ref{Eigen::Quaterniond::Identity(), options_.view.offset_m};

@@ -64,6 +64,9 @@ class KeyframeMapper {
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
                                       StageHook* stages = nullptr);
 
+  /// The depth planes from now on. @throws std::invalid_argument where they are not valid.
+  void setPlanes(const DepthPlanesOptions& planes);
+
   /// T_world_ref of the reference view for a pose of the rig.
   Rigid3 referencePose(const Rigid3& T_world_rig) const;
   const Rig& rig() const { return rig_; }

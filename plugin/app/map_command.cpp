@@ -20,6 +20,7 @@
 #include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
 #include "plugin/app/observed_statistics.h"
+#include "plugin/app/recording_survey.h"
 #include "plugin/output/keyframe_writer.h"
 #include "plugin/output/map_output.h"
 #include "plugin/output/npy_file.h"
@@ -151,6 +152,16 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJo
   return sequenceMaximum(job, *openRecording(source));
 }
 
+/// Chooses the automatic options in a first pass over the recording.
+void chooseAutomatic(const RecordingSource& source, MappingJob& job) {
+  if (!job.options.automatic.any()) return;
+  const RecordingSurvey survey =
+      surveyRecording(job.options, *openRecording(source), job.verbosity);
+  job.chosen = chooseOptions(job.options.automatic, survey.rig, survey.samples, survey.duration_s,
+                             job.options.mapper);
+  job.options.automatic = {};
+}
+
 std::unique_ptr<Recording> openWhole(RecordingSource source) {
   source.start_ns.reset();
   source.end_ns.reset();
@@ -192,6 +203,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
     const RecordingSource source = sourceOf(arguments, job.options);
+    chooseAutomatic(source, job);
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
     const std::filesystem::path folder = outputFolder(arguments, kind);

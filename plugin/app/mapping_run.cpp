@@ -220,6 +220,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.recalibrated_cameras = status.recalibrated_cameras;
   outcome.report.silent_keyframes = status.silent_keyframes;
   outcome.report.options = job.options;
+  outcome.report.chosen = job.chosen;
   describeView(status.rig, job.options.mapper, outcome.report);
   outcome.report.sequence_maximum = job.sequence_maximum;
   outcome.report.stopped_at = player.stoppedAt();

@@ -20,6 +20,7 @@ namespace efm {
 /// How to map a recording.
 struct MappingJob {
   EventFusionOptions options;
+  std::vector<ChosenOption> chosen;  ///< Those of them that were automatic.
   Verbosity verbosity = Verbosity::kNormal;
   std::string activity = "mapping";  ///< For the progress.
   /// The value of `max_confidence = sequence`. Default: the running maximum.

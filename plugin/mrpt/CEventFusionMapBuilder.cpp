@@ -20,23 +20,13 @@
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/session_feed.h"
 #include "plugin/pictures/depth_picture.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 
 namespace efm {
 namespace {
-
-CameraPacket packetOf(const CObservationEvents& observation) {
-  CameraPacket packet;
-  packet.camera = observation.camera_index;
-  packet.calibration.model = observation.camera;
-  packet.calibration.T_rig_cam = rigidFrom(observation.camera_pose);
-  packet.calibration.time_offset_ns = observation.time_offset_ns;
-  packet.events = observation.events;
-  packet.covered_until_ns = observation.covered_until_ns;
-  return packet;
-}
 
 /// The exception of a step; null if it throws none.
 template <typename Step>
@@ -220,12 +210,8 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
   if (!observation) throw std::invalid_argument("the builder was given no observation (null)");
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     advance([&](MappingSession& session) { session.addEvents(packetOf(*events)); });
-  } else if (const auto observed = poseIn(*observation)) {
-    advance([&](MappingSession& session) {
-      const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
-      session.addPose({observed->t_ns, observed->T_world_body * T_body_rig},
-                      *poseSourceOf(*observation), observed->noise);
-    });
+  } else if (poseSourceOf(*observation)) {
+    advance([&](MappingSession& session) { addPoseOf(*observation, session); });
   } else {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++ignored_observations_;

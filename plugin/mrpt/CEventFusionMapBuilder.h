@@ -62,7 +62,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   using KeyframeCallback = std::function<void(const KeyframeDepthMap&)>;
 
   /// @throws std::invalid_argument if the options are not valid.
-  explicit CEventFusionMapBuilder(const EventFusionOptions& builder_options = {});
+  explicit CEventFusionMapBuilder(const EventFusionOptions& builder_options = defaultOptions());
   ~CEventFusionMapBuilder() override;
 
   /// Starts over with other options.

@@ -174,10 +174,12 @@ void OptionReader::assign(std::string_view section, std::string_view key, std::s
 }
 
 EventFusionOptions OptionReader::options() const {
+  EventFusionOptions options = options_;
+  fitAutomatic(options.automatic, options.mapper);
   try {
-    options_.mapper.validate();
-    options_.cloud.validate();
-    options_.refinement.validate();
+    options.mapper.validate();
+    options.cloud.validate();
+    options.refinement.validate();
   } catch (const std::invalid_argument& error) {
     // The structs say "key = value: must be ..."; they know neither sections nor files.
     const std::string message = error.what();
@@ -190,7 +192,7 @@ EventFusionOptions OptionReader::options() const {
     }
     throw;
   }
-  return options_;
+  return options;
 }
 
 /// @param value "key = value".

@@ -28,7 +28,7 @@ struct OptionOrigin {
 class OptionReader {
  public:
   /// @param start the values of keys that are not given.
-  explicit OptionReader(const EventFusionOptions& start = {}) : options_(start) {}
+  explicit OptionReader(const EventFusionOptions& start = defaultOptions()) : options_(start) {}
 
   /// @throws std::runtime_error where the file cannot be read; std::invalid_argument at an unknown
   /// section or key, a key given twice, or a value of the wrong kind.

@@ -44,6 +44,24 @@ OptionKey optionOrAuto(std::string_view section, std::string_view key, Field fie
           }};
 }
 
+/// A key whose value is chosen from the data by the word "auto".
+template <typename Field, typename Flag>
+OptionKey optionOrChosen(std::string_view section, std::string_view key, Field field, Flag flag) {
+  return {section, key,
+          [field, flag](EventFusionOptions& options, std::string_view text) {
+            flag(options) = text == "auto";
+            if (text == "auto") return;
+            try {
+              parseInto(text, field(options));
+            } catch (const std::invalid_argument& error) {
+              throw std::invalid_argument(error.what() + std::string(", or auto"));
+            }
+          },
+          [field, flag](const EventFusionOptions& options) {
+            return flag(options) ? OptionValue(std::string("auto")) : valueOf(field(options));
+          }};
+}
+
 /// The degrees with the fewest digits that are these radians: the written ones, if they had no more
 /// than 15 digits.
 double degreesThatReadAs(double angle_rad) {
@@ -89,17 +107,21 @@ const std::vector<OptionKey>& optionKeys() {
       option("rig", "exclude_silent", KEYFRAME(exclude_silent)),
 
       option("keyframes", "policy", FIELD(mapper.policy.policy)),
-      option("keyframes", "window_s", FIELD(mapper.policy.window_s)),
-      option("keyframes", "stride_s", FIELD(mapper.policy.stride_s)),
+      optionOrChosen("keyframes", "window_s", FIELD(mapper.policy.window_s),
+                     FIELD(automatic.window_s)),
+      optionOrChosen("keyframes", "stride_s", FIELD(mapper.policy.stride_s),
+                     FIELD(automatic.stride_s)),
       option("keyframes", "window_events", FIELD(mapper.policy.window_events)),
       option("keyframes", "min_baseline_ratio", FIELD(mapper.policy.min_baseline_ratio)),
       option("keyframes", "min_visible_fraction", FIELD(mapper.policy.min_visible_fraction)),
       option("keyframes", "reference", FIELD(mapper.policy.reference)),
       option("keyframes", "max_events_per_camera", KEYFRAME(max_events_per_camera)),
 
-      option("dsi", "min_depth_m", KEYFRAME(planes.min_depth_m)),
-      option("dsi", "max_depth_m", KEYFRAME(planes.max_depth_m)),
-      option("dsi", "num_planes", KEYFRAME(planes.num_planes)),
+      optionOrChosen("dsi", "min_depth_m", KEYFRAME(planes.min_depth_m),
+                     FIELD(automatic.min_depth_m)),
+      optionOrChosen("dsi", "max_depth_m", KEYFRAME(planes.max_depth_m),
+                     FIELD(automatic.max_depth_m)),
+      optionOrChosen("dsi", "num_planes", KEYFRAME(planes.num_planes), FIELD(automatic.num_planes)),
       option("dsi", "spacing", KEYFRAME(planes.spacing)),
       option("dsi", "reference_camera", KEYFRAME(reference_camera)),
       optionOrAuto("dsi", "fov_deg", KEYFRAME(view.fov_deg)),

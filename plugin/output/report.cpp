@@ -98,6 +98,14 @@ Json asJson(const ReferenceView& view) {
           {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
 }
 
+Json asJson(const std::vector<ChosenOption>& chosen) {
+  Json json = Json::array();
+  for (const ChosenOption& option : chosen) {
+    json.push_back({{"key", option.key}, {"value", option.value}, {"reason", option.reason}});
+  }
+  return json;
+}
+
 Json asJson(const std::vector<Warning>& warnings) {
   Json json = Json::array();
   for (const Warning& warning : warnings) {
@@ -159,6 +167,7 @@ std::string reportJson(const MapReport& report) {
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.pose_shift) json["refinement"]["moved"] = asJson(*report.pose_shift);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
+  if (!report.chosen.empty()) json["chosen"] = asJson(report.chosen);
   json["options"] = asJson(report.options);
   return json.dump(2) + "\n";
 }

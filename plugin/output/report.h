@@ -27,6 +27,7 @@ struct MapReport {
   std::uint64_t peak_memory_bytes = 0;          ///< Of the process.
   StageTimes times;
   EventFusionOptions options;                 ///< As used.
+  std::vector<ChosenOption> chosen;           ///< Those of them that were automatic.
   TrackerFaults faults;                       ///< Of the perturbed poses.
   std::optional<RefinementState> refinement;  ///< Where poses were refined.
   std::optional<PoseShift> pose_shift;        ///< By the refinement.
@@ -52,7 +53,8 @@ struct MapReport {
 /// tracker, and under `moved` how far it moved poses), kernel, threads, peak_memory_bytes (of this
 /// process), reference_view and baseline_m where known, stopped_at where the run was interrupted
 /// (the fraction of the recording that was mapped), warnings (each with name and text),
-/// perturbation (the faults of the poses, if any), options (all of them) and version.
+/// perturbation (the faults of the poses, if any), chosen (the automatic options: key, value and
+/// reason), options (all of them, with these values) and version.
 std::string reportJson(const MapReport& report);
 
 /// The most memory that this process has had so far.

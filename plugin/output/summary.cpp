@@ -75,6 +75,15 @@ std::string timeLine(const MapReport& report) {
                             1e-6 * static_cast<double>(report.peak_memory_bytes));
 }
 
+/// "window_s 0.5, min_depth_m 0.61; report.json says why".
+std::string chosenText(const std::vector<ChosenOption>& chosen) {
+  std::string text;
+  for (const ChosenOption& option : chosen) {
+    text += fmt::format("{}{} {:g}", text.empty() ? "" : ", ", option.key, option.value);
+  }
+  return text + "; report.json says why";
+}
+
 std::string shiftText(const PoseShift& shift) {
   return fmt::format(
       "moved the poses by {:.2f} cm and {:.2f} degrees (median), at most {:.2f} cm and {:.2f} "
@@ -106,6 +115,7 @@ std::string summaryOf(const MapReport& report, OutputKind kind,
   if (events.read > 0) addLine(text, "events", eventsText(events));
   addLine(text, "time", timeLine(report));
   if (report.pose_shift) addLine(text, "refinement", shiftText(*report.pose_shift));
+  if (!report.chosen.empty()) addLine(text, "chosen", chosenText(report.chosen));
   if (!report.warnings.empty()) {
     addLine(text, "warnings",
             fmt::format("{}, on stderr and in report.json", report.warnings.size()));

@@ -20,6 +20,9 @@ constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
 /// The same limit if the map is requested.
 constexpr std::int64_t kRigCompletesEarlyNs = kNanosecondsPerSecond / 10;
 
+/// In live operation, automatic options are chosen from the first window of this length.
+constexpr double kFirstWindowS = 1;
+
 bool sameCalibration(const RigCamera& a, const RigCamera& b) {
   return a.model == b.model && isSame(a.T_rig_cam, b.T_rig_cam) &&
          a.time_offset_ns == b.time_offset_ns;
@@ -35,7 +38,7 @@ void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
 FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
   FusionMapperOptions mapper = options.mapper;
   if (options.late_fusion) mapper.keyframe.camera_maps = true;
-  return mapper;
+  return options.automatic.any() ? surveyOptions(mapper, kFirstWindowS) : mapper;
 }
 
 }  // namespace
@@ -154,16 +157,40 @@ void MappingSession::finish() {
 }
 
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock) {
-  if (!rig_.isComplete()) return std::nullopt;
+  if (!rig_.isComplete() || !chooseAutomatic()) return std::nullopt;
   StageTimer timer(status_.times, clock);
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
   if (keyframe) {
+    if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
+      mapper_.setPlanes(depth_follower_->planes());
+    }
     insert(*keyframe);
   } else if (finished_ && refinement_ && !std::exchange(all_refined_, true)) {
     refinement_->finish();
     applyPending();
   }
   return keyframe;
+}
+
+std::optional<WindowData> MappingSession::window() {
+  return rig_.isComplete() ? mapper_.window() : std::nullopt;
+}
+
+/// Chooses automatic options as soon as the first window is there. @return whether none is left.
+bool MappingSession::chooseAutomatic() {
+  if (!options_.automatic.any()) return true;
+  const std::optional<WindowData> first = mapper_.window();
+  if (!first && !finished_) return false;
+  std::vector<WindowSample> samples;
+  if (first) samples.push_back(sampleOf(*first));
+  status_.chosen =
+      chooseOptions(options_.automatic, mapper_.rig(), samples, std::nullopt, options_.mapper);
+  const AutomaticOptions automatic = std::exchange(options_.automatic, {});
+  if (automatic.min_depth_m || automatic.max_depth_m) {
+    depth_follower_.emplace(automatic, options_.mapper.keyframe.planes);
+  }
+  mapper_.configure(options_.mapper.policy, options_.mapper.keyframe.planes);
+  return true;
 }
 
 /// Inserts a keyframe into the cloud at its refined pose, and moves others to theirs.

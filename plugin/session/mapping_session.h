@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
+#include "mapping/survey/depth_follower.h"
 #include "maps/cloud/global_cloud.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/refined_cloud.h"
@@ -71,6 +72,11 @@ class MappingSession {
   /// The points of a keyframe in the cloud: of its fused map, or by option of its cameras' maps.
   std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;
 
+  /// Instead of `next`, for a first pass over a recording: the data of the next window, which is
+  /// not mapped. See FusionMapper::window.
+  std::optional<WindowData> window();
+  void skipWindow(const Window& window) { mapper_.skipWindow(window); }
+
   /// Moves all keyframes in the cloud to their refined poses.
   void applyPending();
 
@@ -90,6 +96,7 @@ class MappingSession {
   void completeRig();
   void usePoses(const std::vector<StampedPose>& poses);
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
+  bool chooseAutomatic();
   void insert(KeyframeDepthMap& keyframe);
   void moveKeyframes(double tolerance_m);
 
@@ -97,6 +104,7 @@ class MappingSession {
   RigAssembly rig_;
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
+  std::optional<DepthFollower> depth_follower_;  // where depth limits are automatic
   RefinedCloud cloud_;
   std::unique_ptr<MapRefinement> refinement_;  // where poses are refined
   std::vector<Rigid3> T_odom_ref_;

@@ -8,6 +8,7 @@
 
 #include "mapping/geometry/rig.h"
 #include "mapping/keyframes/fusion_mapper.h"
+#include "mapping/survey/option_choice.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/pose_source_selector.h"
 #include "plugin/session/stage_timer.h"
@@ -31,6 +32,7 @@ struct SessionStatus {
   std::vector<std::uint64_t> silent_keyframes;        ///< Per camera: keyframes without its events.
   Rig rig;                                    ///< The cameras so far, with the options' overrides.
   std::size_t recalibrated_cameras = 0;       ///< Cameras whose recorded calibration differs.
+  std::vector<ChosenOption> chosen;           ///< Automatic options.
   std::optional<RefinementState> refinement;  ///< Where poses are refined.
 };
 

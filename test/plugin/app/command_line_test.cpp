@@ -46,7 +46,7 @@ TEST_F(CommandLine, AnErrorIsOneLineWithThePrefixAndAStatus) {
       {"map data --config dsc", 2, "--config 'dsc': no such option file: did you mean dsec?"},
       {"map none.ini data", 2, "none.ini: no such option file"},
       {"map wrong.ini data", 2, "wrong.ini:2: [dsi] num_planes = 0: must be 1 to 100000"},
-      {"map data --set dsi.num_planes=x", 2, "--set dsi.num_planes=x: must be a whole number"},
+      {"map data --set dsi.num_planes=x", 2, "--set dsi.num_planes=x: must be a whole number, or auto"},
       {"map data --t0 5 --t1 3", 2, "t1 = 3.000000000 s: must be after t0 = 5.000000000 s"},
       {"map data --set dsi.nun_planes=3", 2,
        "--set dsi.nun_planes: unknown key: did you mean num_…"},

@@ -71,7 +71,7 @@ TEST(HostOptions, WithoutPrefixTheSectionsHaveTheirOwnNames) {
 
 TEST(HostOptions, WrongSectionsKeysAndValuesAreErrorsThatNameThem) {
   EXPECT_EQ(errorOf("[a_dsi]\nnum_planes = ten\n", "a"),
-            "options, section a_dsi: num_planes = ten: must be a whole number");
+            "options, section a_dsi: num_planes = ten: must be a whole number, or auto");
   EXPECT_THAT(errorOf("[a_dsi]\nplanes = 10\n", "a"),
               HasSubstr("options, section a_dsi: planes: unknown key: expected one of min_depth_m"));
   EXPECT_THAT(errorOf("[a_dsi]\nnum_planes = -3\n", "a"),
@@ -91,7 +91,7 @@ TEST_F(HostOptionsFile, ErrorsNameTheFile) {
     builder.loadFromConfigFileName(file, "a");
     FAIL() << "no error";
   } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(error.what(), file + ", section a_dsi: num_planes = ten: must be a whole number");
+    EXPECT_EQ(error.what(), file + ", section a_dsi: num_planes = ten: must be a whole number, or auto");
   }
 }
 

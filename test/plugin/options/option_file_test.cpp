@@ -53,7 +53,7 @@ std::string listed(const EventFusionOptions& options) {
 }
 
 TEST(OptionReader, KeysThatAreNotGivenKeepTheirDefaults) {
-  EXPECT_EQ(listed(optionsOf("")), listed(EventFusionOptions{}));
+  EXPECT_EQ(listed(optionsOf("")), listed(defaultOptions()));
 }
 
 /// An assignment, and whether its field has the value.
@@ -271,8 +271,10 @@ TEST(OptionReader, AnErrorSaysTheExpectedKindOfAValue) {
       {"dsi",
        "num_planes",
        {"abc", "1e3", "0x10", "100 planes", "99999999999", ""},
-       "must be a whole number"},
-      {"dsi", "min_depth_m", {"1,5", "1.5m", "nan", "inf"}, "must be a number"},
+       "must be a whole number, or auto"},
+      {"keyframes", "window_events", {"many"}, "must be a whole number"},
+      {"dsi", "min_depth_m", {"1,5", "1.5m", "nan", "inf"}, "must be a number, or auto"},
+      {"depth", "min_quality", {"1,5", "1.5m", "nan", "inf"}, "must be a number"},
       {"dsi", "spacing", {"cubic"}, "'cubic' is unknown: expected one of inverse, linear"},
       {"dsi", "fov_deg", {"wide"}, "must be a number, or auto"},
       {"dsi",
@@ -469,10 +471,20 @@ TEST(OptionReader, AnErrorOfTwoValuesBeginsWithTheOneThatWasGivenLast) {
       "rig.ini:3: [dsi] min_depth_m = 10: contradicts rig.ini:2: [dsi] max_depth_m = 1, which " +
           must);
   // What is not given has its default.
-  EXPECT_EQ(error("", {"dsi.min_depth_m=20"}),
-            "--set dsi.min_depth_m=20: contradicts default: [dsi] max_depth_m = 5, which " + must);
-  EXPECT_EQ(error("", {"dsi.max_depth_m=0.1"}),
-            "--set dsi.max_depth_m=0.1: " + must + " (min_depth_m = 0.5 by default)");
+  EXPECT_EQ(error("", {"refinement.last_distance_px=0"}),
+            "--set refinement.last_distance_px=0: must be above 0, at most 10000 (pixels)");
+}
+
+TEST(OptionReader, OneOfTwoLimitsMayBeChosenFromTheData) {
+  // Beyond the built-in values, which the other limit has until it is chosen.
+  for (const char* const text : {"[dsi]\nmin_depth_m = 20\n", "[dsi]\nmax_depth_m = 0.1\n",
+                                 "[keyframes]\npolicy = baseline\nwindow_s = 0.01\n"}) {
+    EXPECT_NO_THROW(optionsOf(text)) << text;
+  }
+  const EventFusionOptions options = optionsOf("[dsi]\nmin_depth_m = 20\nmax_depth_m = auto\n");
+  EXPECT_FALSE(options.automatic.min_depth_m);
+  EXPECT_TRUE(options.automatic.max_depth_m);
+  EXPECT_EQ(options.mapper.keyframe.planes.min_depth_m, 20);
 }
 
 TEST(OptionReader, AnErrorOfARecordingSaysHowItsOptionsWereGiven) {
@@ -515,7 +527,7 @@ TEST(OptionReader, AnErrorNamesAnUnreadableFile) {
 TEST(ConfigFolder, DefaultFileEqualsTheDefaultsAndNamesEveryKey) {
   OptionReader reader;
   reader.readFile(kConfigFolder / "default.ini");
-  EXPECT_EQ(listed(reader.options()), listed(EventFusionOptions{}));
+  EXPECT_EQ(listed(reader.options()), listed(defaultOptions()));
 
   std::ifstream file(kConfigFolder / "default.ini");
   std::multiset<std::string> named;

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/keyframes/fusion_mapper.h"
+#include "mapping/survey/window_sample.h"
+
+namespace efm {
+
+/// Options whose values are chosen from the data: `auto` in an option file.
+struct AutomaticOptions {
+  bool min_depth_m = false;
+  bool max_depth_m = false;
+  bool num_planes = false;
+  bool window_s = false;
+  bool stride_s = false;
+
+  bool any() const { return min_depth_m || max_depth_m || num_planes || window_s || stride_s; }
+};
+
+/// The value that was chosen for an option, and the reason in words.
+struct ChosenOption {
+  std::string key;  ///< "min_depth_m"
+  double value = 0;
+  std::string reason;
+};
+
+/// Gives automatic options values that fit those of the others, until they are chosen.
+void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& options);
+
+/// The number of planes is chosen between these.
+inline constexpr int kMinAutomaticPlanes = 50;
+inline constexpr int kMaxAutomaticPlanes = 400;
+
+/// The options of a first pass over a recording: consecutive windows of `window_s`.
+FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s);
+
+/// Replaces automatic options:
+/// - depth limits: those of nearly all points of a coarse sweep over a wide range, widened;
+/// - the window: as long as most of the view stays in sight, up to a second, and a quarter of the
+///   recording; the stride: half of the window;
+/// - planes: neighbouring ones are about a pixel of parallax apart, over the cameras and the
+///   window's motion.
+/// The same samples give the same choice.
+/// @param duration_s of the recording, as far as events have poses; not given: not known yet.
+/// @param options in: with the values for where nothing can be chosen; out: with the choice.
+/// @param samples of the recording; may be empty.
+/// @throws std::invalid_argument where the options do not fit the rig.
+std::vector<ChosenOption> chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
+                                        const std::vector<WindowSample>& samples,
+                                        std::optional<double> duration_s,
+                                        FusionMapperOptions& options);
+
+}  // namespace efm

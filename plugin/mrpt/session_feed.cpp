@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/session_feed.h"
+
+#include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/pose_observation.h"
+
+namespace efm {
+
+CameraPacket packetOf(const CObservationEvents& observation) {
+  CameraPacket packet;
+  packet.camera = observation.camera_index;
+  packet.calibration.model = observation.camera;
+  packet.calibration.T_rig_cam = rigidFrom(observation.camera_pose);
+  packet.calibration.time_offset_ns = observation.time_offset_ns;
+  packet.events = observation.events;
+  packet.covered_until_ns = observation.covered_until_ns;
+  return packet;
+}
+
+bool addPoseOf(const mrpt::obs::CObservation& observation, MappingSession& session) {
+  const std::optional<ObservedPose> observed = poseIn(observation);
+  if (!observed) return false;
+  const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
+  session.addPose({observed->t_ns, observed->T_world_body * T_body_rig}, *poseSourceOf(observation),
+                  observed->noise);
+  return true;
+}
+
+}  // namespace efm
