@@ -154,6 +154,16 @@ void takeOrderOfValues(const EventRows& rows, const Header& header, const std::s
                              file, words, words)});
 }
 
+/// @throws std::runtime_error where the values show another order than that of the option.
+void refuseOtherOrder(const EventRows& rows, const std::string& option, const std::string& file,
+                      const std::string& order) {
+  const std::optional<ColumnOrder> found = orderOfValues(rows, order);
+  if (!found || !found->certain || found->order == order) return;
+  throw std::runtime_error(
+      fmt::format("--event-columns {}: the columns of {} are {} by their values", inQuotes(option),
+                  file, asWords(found->order)));
+}
+
 TimeSample timesIn(const EventRows& rows, const EventColumns& columns) {
   const std::size_t t_column = columns.order.find('t');
   TimeSample sample;
@@ -195,6 +205,7 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
   }
   if (!options.columns.empty()) {
     columns.order = orderOfOption(options.columns);
+    refuseOtherOrder(rows, options.columns, file, columns.order);
   } else if (!header.named) {
     takeOrderOfValues(rows, header, file, columns);
   }

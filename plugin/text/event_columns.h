@@ -30,7 +30,7 @@ struct EventColumns {
 /// show (`orderOfValues`), with a warning.
 /// @param beginning whole lines.
 /// @param file for errors.
-/// @throws std::runtime_error where `--event-columns` is wrong; where the order is likely but not
+/// @throws std::runtime_error where `--event-columns` is wrong, also by the values; where the order is likely but not
 /// certain; where the unit of time is not certain (`findTimeUnit`).
 EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& options,
                               const std::string& file);

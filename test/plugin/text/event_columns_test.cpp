@@ -124,6 +124,10 @@ TEST_F(EventColumnsText, TheOrderThatTheValuesShowIsUsedAndSaid) {
     EXPECT_THAT(errorOfText(linesOf(format, 20, 1, 1e-5, 6)),
                 AllOf(HasSubstr("probably "), HasSubstr(order)));
   }
+  EXPECT_THAT(errorOfText(usual, ReaderOptions{{}, "x y t p", {}}),
+              AllOf(HasSubstr("--event-columns 'x y t p'"), HasSubstr("e.txt are t x y p by")));
+  EventTextStream swapped(write(usual), ReaderOptions{{}, "t y x p", {}});  // may be so
+  EXPECT_EQ(allEventsOf(swapped).at(1).y, events.at(1).x);
   // Times that fall now and then, and a polarity that is always 1, are no reason for doubt.
   for (const std::string& text : {linesOf("{t} {x} {y} 1", 200, 1, 1e-5, 6),
                                   usual + linesOf("{t} {x} {y} {p}", 200, 0, 1e-5, 6)}) {
