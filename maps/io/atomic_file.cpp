@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/atomic_file.h"
 
+#include <cerrno>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -33,6 +34,19 @@ std::filesystem::path replaceableFile(const std::filesystem::path& path) {
 
 }  // namespace
 
+std::string reasonNotWritten(int error_number) {
+  switch (error_number) {
+    case ENOSPC:
+      return "the disk is full";
+    case EDQUOT:
+      return "the disk quota is used up";
+    case EFBIG:
+      return "the file would be larger than the system allows (ulimit -f)";
+    default:
+      return "";
+  }
+}
+
 AtomicFile::AtomicFile(const std::filesystem::path& path)
     : path_(replaceableFile(path)), temporary_(temporaryOf(path_)) {}
 
@@ -50,11 +64,14 @@ AtomicFile::~AtomicFile() {
 void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write) {
   const AtomicFile file(path);
+  errno = 0;
   try {
     write(file.temporary());
     file.replace();
   } catch (const std::exception& error) {
-    throw std::runtime_error("cannot write " + path.string() + ": " + error.what());
+    const std::string why = reasonNotWritten(errno);
+    throw std::runtime_error("cannot write " + path.string() + ": " +
+                             (why.empty() ? error.what() : why));
   }
 }
 

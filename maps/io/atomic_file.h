@@ -39,9 +39,13 @@ class AtomicFile {
 /// Writes a file by an AtomicFile.
 /// @param write creates the file at the path that it receives.
 /// @throws std::runtime_error naming `path` where the file cannot be written or renamed. The
-/// message includes that of `write`.
+/// message includes that of `write`, or that the disk is full.
 void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write);
+
+/// Why bytes cannot be written, in words: the disk is full, or a limit is reached. Empty for other
+/// values of errno.
+std::string reasonNotWritten(int error_number);
 
 /// All bytes of a file.
 /// @throws std::runtime_error where the file does not exist, is not regular, or cannot be read to

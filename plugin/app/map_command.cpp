@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <functional>
 #include <initializer_list>
 #include <iostream>
@@ -16,6 +17,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/outlier_removal.h"
 #include "plugin/app/config_files.h"
+#include "plugin/app/error_words.h"
 #include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
@@ -99,8 +101,8 @@ void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void(
   for (const auto& write : files) {
     try {
       write();
-    } catch (const std::runtime_error& error) {
-      if (!outcome.error) outcome.error = error.what();
+    } catch (const std::exception& error) {
+      if (!outcome.error) outcome.error = inWords(error);
     }
   }
 }
@@ -119,7 +121,7 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
   // A run without a keyframe leaves the results of an earlier run as they are.
   if (outcome.report.counts.keyframes > 0 ||
       !std::filesystem::exists(output.folder() / "report.json")) {
-    output.writeReport(reportJson(outcome.report));
+    writeAll(outcome, {[&] { output.writeReport(reportJson(outcome.report)); }});
   }
   printWarnings(outcome.report.warnings);
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
@@ -209,14 +211,26 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseForeignFolder(folder, arguments.force);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes);
-    KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) { take(*output, keyframe); });
+    std::atomic<int> written = 0;
+    KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
+      take(*output, keyframe);
+      ++written;
+    });
     job.on_keyframe = [&, note = job.on_keyframe](const KeyframeDepthMap& keyframe) {
       if (note) note(keyframe);
       writer.add(keyframe);
     };
     job.processor_clock = [&] { return processSeconds() - writer.cpuSeconds(); };
-    outcome = runMapping(job, *recording);
-    writer.finish();
+    try {
+      outcome = runMapping(job, *recording);
+      writer.finish();
+    } catch (const Interrupted&) {
+      throw;
+    } catch (const std::runtime_error& error) {
+      if (written == 0) throw;
+      throw std::runtime_error(fmt::format("{}; {} keyframes before it are written to {}",
+                                           inWords(error), written.load(), folder.string()));
+    }
     whole.cpu.images = writer.cpuSeconds();
     const bool limited = source.start_ns || source.end_ns;
     if (outcome.report.counts.keyframes == 0 && limited && !outcome.report.stopped_at) {

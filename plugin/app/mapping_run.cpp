@@ -13,6 +13,7 @@
 
 #include "mapping/depth/robust_maximum.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/error_words.h"
 #include "plugin/app/observed_statistics.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
@@ -80,7 +81,7 @@ class Player {
     try {
       return step();
     } catch (const std::exception& caught) {
-      if (!error) error = caught.what();
+      if (!error) error = inWords(caught);
       return false;
     }
   }

@@ -2,15 +2,16 @@
 #include "plugin/app/program.h"
 
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <exception>
 #include <functional>
 #include <iostream>
-#include <new>
 #include <string>
 
 #include "plugin/app/command_line.h"
+#include "plugin/app/error_words.h"
 #include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/mrpt/registration.h"
@@ -37,6 +38,7 @@ int fail(const std::string& message, int status) {
 }
 
 int runProgram(int argc, char** argv) {
+  std::signal(SIGXFSZ, SIG_IGN);  // a file above `ulimit -f` is an error of writing
   try {
     const std::function<int()> run = parseCommandLine(argc, argv);
     registerClasses();
@@ -46,10 +48,8 @@ int runProgram(int argc, char** argv) {
   } catch (const Interrupted& interrupted) {
     std::cerr << "event-fusion: " << interrupted.what() << "\n";
     return kInterruptedStatus;
-  } catch (const std::bad_alloc&) {
-    return fail("out of memory");
   } catch (const std::exception& error) {
-    return fail(error.what());
+    return fail(inWords(error));
   }
 }
 

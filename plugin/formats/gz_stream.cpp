@@ -9,6 +9,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "maps/io/atomic_file.h"
+
 namespace efm {
 namespace {
 
@@ -16,11 +18,17 @@ constexpr std::size_t kBufferSize = std::size_t{1} << 18;
 
 [[noreturn]] void refuse(const char* what) { throw std::logic_error(what); }
 
+std::string systemReason() {
+  const int number = errno;
+  const std::string why = reasonNotWritten(number);
+  return why.empty() ? std::strerror(number) : why;
+}
+
 std::string reasonOf(gzFile file) {
   int code = Z_OK;
   const char* message = gzerror(file, &code);
   if (code == Z_BUF_ERROR) return "the file ends in the middle of its data";
-  if (code == Z_ERRNO) return std::strerror(errno);
+  if (code == Z_ERRNO) return systemReason();
   if (message == nullptr || *message == '\0') return "unknown error";
   const std::string text = message;  // "<path>: <reason>"; the caller names the file
   const auto colon = text.rfind(": ");
@@ -112,7 +120,7 @@ std::size_t GzOutputStream::Write(const void* buffer, std::size_t count) {
 void GzOutputStream::close() {
   gzFile handle = file_.release();
   if (handle != nullptr && gzclose_w(handle) != Z_OK) {
-    throw std::runtime_error(std::string("cannot be completed: ") + std::strerror(errno));
+    throw std::runtime_error("cannot be completed: " + systemReason());
   }
 }
 

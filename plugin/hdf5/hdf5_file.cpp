@@ -5,8 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <string_view>
 #include <system_error>
+
+#include "maps/io/atomic_file.h"
 
 namespace efm {
 namespace {
@@ -45,6 +49,12 @@ std::optional<std::string> readText(hid_t type, hid_t space, const Read& read) {
 std::string hdf5Cause() {
   std::string cause;
   H5Ewalk2(H5E_DEFAULT, H5E_WALK_UPWARD, keepCause, &cause);
+  constexpr std::string_view kErrno = "errno = ";
+  const std::size_t number = cause.find(kErrno);
+  if (number != std::string::npos) {
+    const std::string why = reasonNotWritten(std::atoi(cause.c_str() + number + kErrno.size()));
+    if (!why.empty()) return " (" + why + ")";
+  }
   return cause.empty() ? cause : " (" + cause + ")";
 }
 

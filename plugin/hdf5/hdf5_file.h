@@ -45,6 +45,9 @@ class Hdf5Id {
 class Hdf5Quiet {
  public:
   Hdf5Quiet() {
+    // At the process's end, the library would crash over a file that it could not write.
+    static const herr_t no_exit_handler = H5dont_atexit();
+    static_cast<void>(no_exit_handler);
     H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }

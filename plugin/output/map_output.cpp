@@ -108,7 +108,16 @@ void removeKeyframes(const std::filesystem::path& keyframes) {
 
 void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
   writeAtomically(path, [&](const std::filesystem::path& temporary) {
-    if (!cv::imwrite(temporary.string(), image)) throw std::runtime_error("imwrite failed");
+    // Not imwrite: where the disk is full, the libraries of pictures print that to stderr.
+    std::vector<std::uint8_t> bytes;
+    if (!cv::imencode(path.extension().string(), image, bytes)) {
+      throw std::runtime_error("no picture can be made of it");
+    }
+    std::ofstream file(temporary, std::ios::binary);
+    file.write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
+    file.close();
+    if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
   });
 }
 

@@ -26,6 +26,7 @@ void FolderWriter::addEvents(std::size_t camera, const std::vector<Event>& event
   std::string text;
   appendEvents(text, events);
   events_.at(camera).stream() << text;
+  events_.at(camera).requireWritten();
 }
 
 void FolderWriter::addPose(const StampedPose& pose) { writeTumPose(poses_.stream(), pose); }

@@ -144,7 +144,6 @@ void Hdf5Writer::Camera::close() {
 
 Hdf5Writer::Hdf5Writer(const fs::path& folder, const Rig& rig)
     : folder_(folder), poses_(folder_.temporary() / "poses.txt") {
-  const Hdf5Quiet quiet;
   TextFile camchain(folder_.temporary() / "camchain.yaml");
   camchain.stream() << formatCamchain(rig);
   camchain.close();
@@ -161,7 +160,6 @@ Hdf5Writer::Hdf5Writer(const fs::path& folder, const Rig& rig)
 }
 
 void Hdf5Writer::addEvents(std::size_t camera, const std::vector<Event>& events) {
-  const Hdf5Quiet quiet;
   Camera& file = cameras_.at(camera);
   try {
     for (const Event& event : events) file.add(event);
@@ -173,7 +171,6 @@ void Hdf5Writer::addEvents(std::size_t camera, const std::vector<Event>& events)
 void Hdf5Writer::addPose(const StampedPose& pose) { writeTumPose(poses_.stream(), pose); }
 
 void Hdf5Writer::close() {
-  const Hdf5Quiet quiet;
   for (Camera& camera : cameras_) {
     try {
       camera.close();

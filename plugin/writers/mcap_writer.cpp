@@ -6,6 +6,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <limits>
 #include <stdexcept>
 #include <string_view>
@@ -281,6 +282,14 @@ std::string McapWriter::statistics() const {
 void McapWriter::write(const std::string& bytes) {
   stream_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   position_ += bytes.size();
+  requireWritten();
+}
+
+void McapWriter::requireWritten() const {
+  if (stream_) return;
+  const std::string why = reasonNotWritten(errno);
+  throw std::runtime_error(file_.path().string() + ": " +
+                           (why.empty() ? "cannot be written" : why));
 }
 
 void McapWriter::close() {
@@ -300,7 +309,7 @@ void McapWriter::close() {
   appendNumber(summary, checksumOf(summary));
   write(summary.append(kMcapMagic));
   stream_.close();
-  if (!stream_) throw std::runtime_error(file_.path().string() + ": cannot be written");
+  requireWritten();
   file_.replace();
 }
 

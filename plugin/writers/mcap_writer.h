@@ -55,6 +55,8 @@ class McapWriter : public RecordingWriter {
   std::string channelRecords() const;
   std::string statistics() const;
   void write(const std::string& bytes);
+  /// @throws std::runtime_error if the last bytes could not be written.
+  void requireWritten() const;
   void finishChunk();
 
   AtomicFile file_;

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/writers/text_file.h"
 
+#include <cerrno>
 #include <stdexcept>
 #include <utility>
+
+#include "maps/io/atomic_file.h"
 
 namespace efm {
 
@@ -13,7 +16,13 @@ TextFile::TextFile(std::filesystem::path path)
 
 void TextFile::close() {
   stream_.close();
-  if (!stream_) throw std::runtime_error(path_.string() + ": cannot be written");
+  requireWritten();
+}
+
+void TextFile::requireWritten() const {
+  if (stream_) return;
+  const std::string why = reasonNotWritten(errno);
+  throw std::runtime_error(path_.string() + ": " + (why.empty() ? "cannot be written" : why));
 }
 
 }  // namespace efm

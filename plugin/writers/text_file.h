@@ -13,7 +13,10 @@ class TextFile {
   explicit TextFile(std::filesystem::path path);
 
   std::ofstream& stream() { return stream_; }
-  /// @throws std::runtime_error naming the file if it could not be written.
+  /// @throws std::runtime_error naming the file if it could not be written, and why if the last
+  /// bytes could not.
+  void requireWritten() const;
+  /// @throws std::runtime_error as `requireWritten`.
   void close();
 
  private:

@@ -2,8 +2,10 @@
 #include "tracking_stub/truth/dataset_writer.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cstddef>
+#include <cstring>
 #include <fstream>
 #include <iomanip>
 #include <opencv2/imgcodecs.hpp>
@@ -27,7 +29,9 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kDepthPeriodNs = 50'000'000;
 
 std::runtime_error cannotWrite(const fs::path& path) {
-  return std::runtime_error(path.string() + ": cannot be written");
+  const std::string why =
+      errno == ENOSPC || errno == EFBIG ? ": " + std::string(std::strerror(errno)) : "";
+  return std::runtime_error(path.string() + ": cannot be written" + why);
 }
 
 void makeFolder(const fs::path& folder) {
