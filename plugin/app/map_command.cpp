@@ -157,8 +157,7 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJo
 /// Chooses the automatic options in a first pass over the recording.
 void chooseAutomatic(const RecordingSource& source, MappingJob& job) {
   if (!job.options.automatic.any()) return;
-  const RecordingSurvey survey =
-      surveyRecording(job.options, *openRecording(source), job.verbosity);
+  const RecordingSurvey survey = surveyRecording(job, *openRecording(source));
   job.chosen = chooseOptions(job.options.automatic, survey.rig, survey.samples, survey.duration_s,
                              job.options.mapper);
   job.options.automatic = {};

@@ -35,7 +35,8 @@ struct DepthArguments : MappingArguments {
 
 /// `event-fusion map`: plays a recording and writes the map's folder. Prints a summary to stdout,
 /// warnings and errors to stderr.
-/// SIGINT or SIGTERM ends the run as the end of the recording would; a second one kills it.
+/// SIGINT or SIGTERM ends the run as the end of the recording would; a second one kills it. In
+/// the first look at the recording (automatic options) it ends without a result: Interrupted.
 /// @return the process's exit status: 0 only if the whole recording is mapped, 130 where a signal
 /// stopped it.
 /// @throws std::exception if the options or the recording cannot be read, or a file cannot be

@@ -6,6 +6,7 @@
 
 #include "mapping/events/even_choice.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
 #include "plugin/mrpt/session_feed.h"
 
@@ -27,12 +28,11 @@ void thinOut(CameraPacket& packet) {
 
 }  // namespace
 
-RecordingSurvey surveyRecording(const EventFusionOptions& options, Recording& recording,
-                                Verbosity verbosity) {
-  EventFusionOptions survey = options;
+RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording) {
+  EventFusionOptions survey = job.options;
   survey.automatic = {};
   survey.refinement.enabled = false;
-  survey.mapper = surveyOptions(options.mapper, kWindowS);
+  survey.mapper = surveyOptions(job.options.mapper, kWindowS);
   MappingSession session(survey);
   SpreadSamples samples;
   const auto take = [&] {
@@ -41,9 +41,10 @@ RecordingSurvey surveyRecording(const EventFusionOptions& options, Recording& re
       session.skipWindow(data->window);
     }
   };
-  Progress progress("reading", verbosity);
+  Progress progress("first look", job.verbosity);
   try {
     while (const auto observation = recording.next()) {
+      if (job.stop_requested && job.stop_requested()) throw Interrupted();
       if (const auto* events = dynamic_cast<const CObservationEvents*>(observation.get())) {
         CameraPacket packet = packetOf(*events);
         thinOut(packet);
@@ -58,6 +59,8 @@ RecordingSurvey surveyRecording(const EventFusionOptions& options, Recording& re
     if (samples.samples().empty()) {
       if (const std::optional<WindowData> rest = session.window()) samples.add(*rest);
     }
+  } catch (const Interrupted&) {
+    throw;
   } catch (const std::exception&) {
   }
   const SessionStatus status = session.status();

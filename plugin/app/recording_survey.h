@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "mapping/survey/window_sample.h"
-#include "plugin/app/progress.h"
+#include "plugin/app/mapping_run.h"
 #include "plugin/recordings/recording.h"
-#include "plugin/session/event_fusion_options.h"
 
 namespace efm {
 
@@ -21,8 +21,9 @@ struct RecordingSurvey {
 /// Reads a recording once. An error of the recording ends it: the pass that maps reports the error.
 /// Memory does not grow with its length: of more than a million events per second and camera, some
 /// are chosen evenly.
-/// @throws std::runtime_error naming a file of the options that cannot be read.
-RecordingSurvey surveyRecording(const EventFusionOptions& options, Recording& recording,
-                                Verbosity verbosity);
+/// @param job whose receivers are not called.
+/// @throws std::runtime_error naming a file of the options that cannot be read; Interrupted if a
+/// stop was requested.
+RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording);
 
 }  // namespace efm

@@ -132,7 +132,7 @@ TEST_F(Interruption, ASignalEndsAMapWithWhatIsMade) {
     kill(child, trial % 4 < 2 ? SIGINT : SIGTERM);
     const int status = end(child);
     if (!has("report.json")) {
-      EXPECT_TRUE(WIFSIGNALED(status)) << "before it took signals";
+      EXPECT_NE(status, 0) << "before the first pass ended";
       EXPECT_EQ(files(), std::set<std::string>());
       continue;
     }
