@@ -42,6 +42,7 @@ constexpr Study kStudies[] = {
     {"better_depth", "12. Depth better than the paper's", studyBetterDepth},
     {"motion", "13. Motion corrected inside the keyframe", studyMotionCorrection},
     {"refinement", "14. Poses refined, the map corrected", studyRefinement},
+    {"automatic", "15. Options chosen from the data", studyAutomatic},
 };
 
 constexpr const char* kUsage =

@@ -38,4 +38,7 @@ void studyMotionCorrection(const StudyRun& run, StudySection& section);
 /// Poses of keyframes refined, with drift and noise of the tracker.
 void studyRefinement(const StudyRun& run, StudySection& section);
 
+/// Options chosen from the data, against options set by hand.
+void studyAutomatic(const StudyRun& run, StudySection& section);
+
 }  // namespace efm::studies
