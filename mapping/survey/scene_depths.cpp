@@ -10,15 +10,11 @@
 namespace efm {
 namespace {
 
-/// A view of this width has enough pixels for the distribution of depths.
-constexpr int kCoarseWidth = 240;
-constexpr std::uint32_t kCoarseEvents = 100'000;  // of each camera
 /// Surer points than a map needs: a wrong depth would widen the range.
 constexpr double kCoarseQuality = 0.1;
 /// At the nearest plane, the distance of the cameras moves the view by this fraction of its width.
 /// Nearer things are hardly seen twice.
 constexpr double kNearestMove = 0.5;
-constexpr double kPlaneStepPx = 1.0;
 constexpr double kFarthestParallaxPx = 0.5;  // beyond it, depth cannot be told from infinity
 constexpr int kMaxCoarsePlanes = 400;
 
@@ -31,14 +27,15 @@ std::vector<int> selectedCameras(const Rig& rig, const FusionMapperOptions& opti
   return cameras;
 }
 
-KeyframeMapperOptions coarse(const Rig& rig, const FusionMapperOptions& options) {
+KeyframeMapperOptions coarse(const Rig& rig, const FusionMapperOptions& options,
+                             const Coarseness& coarseness) {
   KeyframeMapperOptions coarse = options.keyframe;
   const auto reference = static_cast<std::size_t>(coarse.reference_camera);
   const int width = coarse.view.width.value_or(
-      reference < rig.cameras.size() ? rig.cameras[reference].model.width : kCoarseWidth);
-  coarse.view.width = std::min(width, kCoarseWidth);
+      reference < rig.cameras.size() ? rig.cameras[reference].model.width : coarseness.width);
+  coarse.view.width = std::min(width, coarseness.width);
   coarse.view.height.reset();
-  coarse.max_events_per_camera = kCoarseEvents;
+  coarse.max_events_per_camera = coarseness.events;
   coarse.extraction = {};
   coarse.extraction.min_quality = kCoarseQuality;
   coarse.motion = {};
@@ -98,9 +95,12 @@ std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
   return motion;
 }
 
-CoarseSweep::CoarseSweep(const Rig& rig, const FusionMapperOptions& options)
-    : options_(options), mapper_(rig, selectedCameras(rig, options), coarse(rig, options)) {
-  options_.keyframe = coarse(rig, options);
+CoarseSweep::CoarseSweep(const Rig& rig, const FusionMapperOptions& options,
+                         const Coarseness& coarseness)
+    : options_(options),
+      plane_step_px_(coarseness.plane_step_px),
+      mapper_(rig, selectedCameras(rig, options), coarse(rig, options, coarseness)) {
+  options_.keyframe = coarse(rig, options, coarseness);
 }
 
 std::optional<KeyframeDepthMap> CoarseSweep::map(const WindowData& data) {
@@ -113,7 +113,7 @@ std::optional<KeyframeDepthMap> CoarseSweep::map(const WindowData& data) {
   planes.max_depth_m = std::max(2 * near_m, motion->parallax_px_m / kFarthestParallaxPx);
   planes.num_planes =
       1 + std::min(kMaxCoarsePlanes,
-                   static_cast<int>(std::ceil(motion->parallax_px_m / near_m / kPlaneStepPx)));
+                   static_cast<int>(std::ceil(motion->parallax_px_m / near_m / plane_step_px_)));
   mapper_.setPlanes(planes);
   return mapper_.map(data.window, data.events, *data.trajectory);
 }

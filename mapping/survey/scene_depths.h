@@ -23,12 +23,20 @@ struct ViewMotion {
 std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
                                    const FusionMapperOptions& options);
 
+/// How coarse a sweep is. The default has enough pixels for the distribution of depths.
+struct Coarseness {
+  int width = 240;                 ///< Of the view, pixels, at most.
+  std::uint32_t events = 100'000;  ///< Of each camera, at most.
+  double plane_step_px = 1;        ///< Parallax between neighbouring planes.
+};
+
 /// Sweeps samples coarsely, over a wide range of depths that follows from the baseline, in a small
 /// view.
 class CoarseSweep {
  public:
   /// @throws std::invalid_argument where the options do not fit the rig.
-  CoarseSweep(const Rig& rig, const FusionMapperOptions& options);
+  CoarseSweep(const Rig& rig, const FusionMapperOptions& options,
+              const Coarseness& coarseness = {});
 
   /// The keyframe of the window. @return nothing without a pose, without events or without
   /// parallax.
@@ -38,6 +46,7 @@ class CoarseSweep {
 
  private:
   FusionMapperOptions options_;  // with the small view
+  double plane_step_px_;
   KeyframeMapper mapper_;
 };
 

@@ -24,6 +24,18 @@ WindowSample sampleOf(const WindowData& data) {
   return sample;
 }
 
+std::vector<EventSpan> eventsWithin(const WindowSample& sample, const Window& window) {
+  const auto earlier = [](const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; };
+  std::vector<EventSpan> spans;
+  for (const std::vector<Event>& events : sample.events) {
+    const auto begin = std::lower_bound(events.begin(), events.end(), window.t0_ns, earlier);
+    const auto end = std::lower_bound(begin, events.end(), window.t1_ns, earlier);
+    spans.push_back(EventSpan(events).part(static_cast<std::size_t>(begin - events.begin()),
+                                           static_cast<std::size_t>(end - events.begin())));
+  }
+  return spans;
+}
+
 WindowData middleOf(const WindowSample& sample, double duration_s) {
   const Window& whole = sample.window;
   const std::int64_t length_ns =
@@ -32,13 +44,7 @@ WindowData middleOf(const WindowSample& sample, double duration_s) {
   WindowData middle;
   middle.window = {t0_ns, t0_ns + length_ns, t0_ns + length_ns / 2};
   middle.trajectory = &sample.trajectory;
-  const auto earlier = [](const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; };
-  for (const std::vector<Event>& events : sample.events) {
-    const auto begin = std::lower_bound(events.begin(), events.end(), t0_ns, earlier);
-    const auto end = std::lower_bound(begin, events.end(), t0_ns + length_ns, earlier);
-    middle.events.push_back(EventSpan(events).part(static_cast<std::size_t>(begin - events.begin()),
-                                                   static_cast<std::size_t>(end - events.begin())));
-  }
+  middle.events = eventsWithin(sample, middle.window);
   return middle;
 }
 

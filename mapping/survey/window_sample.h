@@ -24,6 +24,9 @@ inline constexpr std::size_t kMaxSampleEvents = 300'000;
 
 WindowSample sampleOf(const WindowData& data);
 
+/// The events of a sample within a window, per camera.
+std::vector<EventSpan> eventsWithin(const WindowSample& sample, const Window& window);
+
 /// The part of a sample within a time around the middle of its window, at most all of it.
 WindowData middleOf(const WindowSample& sample, double duration_s);
 

@@ -123,7 +123,9 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
       !std::filesystem::exists(output.folder() / "report.json")) {
     writeAll(outcome, {[&] { output.writeReport(reportJson(outcome.report)); }});
   }
-  printWarnings(outcome.report.warnings);
+  const std::vector<Warning>& warnings = outcome.report.warnings;
+  printWarnings(
+      {warnings.begin() + static_cast<std::ptrdiff_t>(outcome.told_warnings), warnings.end()});
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
   if (outcome.report.counts.keyframes > 0 && !quiet)
     std::cout << summaryOf(outcome.report, kind, output.folder());
@@ -154,10 +156,13 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJo
   return sequenceMaximum(job, *openRecording(source));
 }
 
-/// Chooses the automatic options in a first pass over the recording.
-void chooseAutomatic(const RecordingSource& source, MappingJob& job) {
-  if (!job.options.automatic.any()) return;
+/// A first pass over the recording: warns of poses that do not explain the events, and chooses the
+/// automatic options.
+void survey(const RecordingSource& source, MappingJob& job) {
   const RecordingSurvey survey = surveyRecording(job, *openRecording(source));
+  job.warnings = survey.poseWarnings(job.options.mapper);
+  printWarnings(job.warnings);
+  if (!job.options.automatic.any()) return;
   job.chosen = chooseOptions(job.options.automatic, survey.rig, survey.samples, survey.duration_s,
                              job.options.mapper);
   job.options.automatic = {};
@@ -204,7 +209,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
     const RecordingSource source = sourceOf(arguments, job.options);
-    chooseAutomatic(source, job);
+    survey(source, job);
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
     const std::filesystem::path folder = outputFolder(arguments, kind);

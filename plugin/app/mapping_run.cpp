@@ -246,7 +246,11 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
     outcome.report.pose_shift = shiftBetween(outcome.tracker_trajectory, outcome.trajectory);
   }
   std::vector<Warning>& warnings = outcome.report.warnings;
-  warnings = player.healthWarnings(status.rig);
+  warnings = job.warnings;
+  outcome.told_warnings = warnings.size();
+  for (Warning& warning : player.healthWarnings(status.rig)) {
+    warnings.push_back(std::move(warning));
+  }
   for (Warning& warning : sessionWarnings(status, job.options.mapper)) {
     warnings.push_back(std::move(warning));
   }

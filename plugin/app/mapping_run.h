@@ -21,6 +21,7 @@ namespace efm {
 struct MappingJob {
   EventFusionOptions options;
   std::vector<ChosenOption> chosen;  ///< Those of them that were automatic.
+  std::vector<Warning> warnings;     ///< Of the first pass; printed already.
   Verbosity verbosity = Verbosity::kNormal;
   std::string activity = "mapping";  ///< For the progress.
   /// The value of `max_confidence = sequence`. Default: the running maximum.
@@ -46,6 +47,7 @@ struct MappingOutcome {
   /// T_world_ref of the keyframes at t_ref: in the map, and of the tracker.
   std::vector<StampedPose> trajectory;
   std::vector<StampedPose> tracker_trajectory;
+  std::size_t told_warnings = 0;  ///< The first warnings of the report, which are printed already.
   std::size_t recalibrated_cameras = 0;  ///< Their recorded calibrations differ from the options'.
   /// Why the recording was not read to its end or has no keyframe.
   std::optional<std::string> error;

@@ -9,6 +9,7 @@
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
 #include "plugin/mrpt/session_feed.h"
+#include "plugin/session/pose_warning.h"
 
 namespace efm {
 namespace {
@@ -26,50 +27,75 @@ void thinOut(CameraPacket& packet) {
   if (!chosen.empty()) packet.events = std::move(chosen);
 }
 
+EventFusionOptions surveyOptions(EventFusionOptions options) {
+  options.automatic = {};
+  options.refinement.enabled = false;
+  options.mapper = surveyOptions(options.mapper, kWindowS);
+  return options;
+}
+
 }  // namespace
 
-RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording) {
-  EventFusionOptions survey = job.options;
-  survey.automatic = {};
-  survey.refinement.enabled = false;
-  survey.mapper = surveyOptions(job.options.mapper, kWindowS);
-  MappingSession session(survey);
-  SpreadSamples samples;
-  const auto take = [&] {
-    while (const std::optional<WindowData> data = session.window()) {
-      samples.add(*data);
-      session.skipWindow(data->window);
-    }
-  };
-  Progress progress("first look", job.verbosity);
+std::vector<Warning> RecordingSurvey::poseWarnings(const FusionMapperOptions& options) const {
   try {
-    while (const auto observation = recording.next()) {
-      if (job.stop_requested && job.stop_requested()) throw Interrupted();
-      if (const auto* events = dynamic_cast<const CObservationEvents*>(observation.get())) {
-        CameraPacket packet = packetOf(*events);
-        thinOut(packet);
-        session.addEvents(std::move(packet));
-      } else if (!addPoseOf(*observation, session)) {
-        continue;
-      }
-      take();
-      progress.show(recording.progress());
+    if (const auto finding = checkPoses(rig, samples, options)) return {poseWarning(*finding, rig)};
+  } catch (const std::invalid_argument&) {
+  }
+  return {};
+}
+
+RecordingSurveyor::RecordingSurveyor(const EventFusionOptions& options)
+    : session_(surveyOptions(options)) {}
+
+void RecordingSurveyor::add(const mrpt::obs::CObservation& observation) {
+  if (const auto* events = dynamic_cast<const CObservationEvents*>(&observation)) {
+    CameraPacket packet = packetOf(*events);
+    thinOut(packet);
+    session_.addEvents(std::move(packet));
+  } else if (!addPoseOf(observation, session_)) {
+    return;
+  }
+  takeWindows();
+}
+
+void RecordingSurveyor::takeWindows() {
+  while (const std::optional<WindowData> data = session_.window()) {
+    samples_.add(*data);
+    session_.skipWindow(data->window);
+  }
+}
+
+RecordingSurvey RecordingSurveyor::finish() {
+  try {
+    session_.finish();
+    if (samples_.samples().empty()) {
+      if (const std::optional<WindowData> rest = session_.window()) samples_.add(*rest);
     }
-    session.finish();
-    if (samples.samples().empty()) {
-      if (const std::optional<WindowData> rest = session.window()) samples.add(*rest);
-    }
-  } catch (const Interrupted&) {
-    throw;
   } catch (const std::exception&) {
   }
-  const SessionStatus status = session.status();
-  RecordingSurvey result{status.rig, samples.samples(), std::nullopt};
+  const SessionStatus status = session_.status();
+  RecordingSurvey result{status.rig, samples_.samples(), std::nullopt};
   if (status.events && status.poses) {
     result.duration_s = secondsBetween(std::max(status.events->first_ns, status.poses->first_ns),
                                        std::min(status.events->last_ns, status.poses->last_ns));
   }
   return result;
+}
+
+RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording) {
+  RecordingSurveyor surveyor(job.options);
+  Progress progress("first look", job.verbosity);
+  try {
+    while (const auto observation = recording.next()) {
+      if (job.stop_requested && job.stop_requested()) throw Interrupted();
+      surveyor.add(*observation);
+      progress.show(recording.progress());
+    }
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception&) {
+  }
+  return surveyor.finish();
 }
 
 }  // namespace efm

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/pose_warning.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+const char* nameOf(PoseMistake mistake) {
+  switch (mistake) {
+    case PoseMistake::kInverted:
+      return "poses-inverted";
+    case PoseMistake::kQuaternionOrder:
+      return "quaternion-order";
+    case PoseMistake::kCamerasSwapped:
+    case PoseMistake::kStereoInverted:
+      return "cameras-swapped";
+    case PoseMistake::kAxes:
+      return "axis-convention";
+    case PoseMistake::kTimeShift:
+      return "time-shift";
+    case PoseMistake::kUnknown:
+      break;
+  }
+  return "poses-unexplained";
+}
+
+/// The axes of the rig, written as axes of the body: "-y, -z, x".
+std::string axesText(const Eigen::Matrix3d& R_body_rig) {
+  std::string text;
+  for (int column = 0; column < 3; ++column) {
+    for (int row = 0; row < 3; ++row) {
+      if (std::abs(R_body_rig(row, column)) < 0.5) continue;
+      text += column > 0 ? ", " : "";
+      text += R_body_rig(row, column) < 0 ? "-" : "";
+      text += "xyz"[row];
+    }
+  }
+  return text;
+}
+
+std::string matrixText(const Eigen::Matrix3d& R_body_rig) {
+  std::string text = "[";
+  for (int row = 0; row < 3; ++row) {
+    text += fmt::format("[{:g}, {:g}, {:g}, 0], ", R_body_rig(row, 0) + 0.0,
+                        R_body_rig(row, 1) + 0.0, R_body_rig(row, 2) + 0.0);
+  }
+  return text + "[0, 0, 0, 1]]";
+}
+
+/// One value per camera.
+std::string offsetsText(const Rig& rig, double shift_s) {
+  std::string text;
+  for (const RigCamera& camera : rig.cameras) {
+    const double offset_s = secondsBetween(0, camera.time_offset_ns) + shift_s;
+    text += (text.empty() ? "" : ",") + fmt::format("{:.3f}", offset_s);
+  }
+  return text;
+}
+
+std::string remedyOf(const PoseFinding& finding, const Rig& rig) {
+  switch (finding.mistake) {
+    case PoseMistake::kInverted:
+      return "with each pose inverted; the poses must be T_world_rig, from the rig to the world "
+             "(--poses)";
+    case PoseMistake::kQuaternionOrder:
+      return "with the quaternions read as qw qx qy qz; the order must be qx qy qz qw, or a header "
+             "must name the columns (--poses)";
+    case PoseMistake::kCamerasSwapped:
+      return "with the events of cameras 0 and 1 exchanged; their files or the cameras of the "
+             "calibration are in the wrong order (--calibration)";
+    case PoseMistake::kStereoInverted:
+      return "with the transform between cameras 0 and 1 inverted; T_cn_cnm1 maps from camera 0 to "
+             "camera 1 (--calibration)";
+    case PoseMistake::kAxes:
+      return fmt::format(
+          "if the rig's axes x, y, z are the axes {} of the poses; give a file with T_body_rig: {} "
+          "(--hand-eye), after the hand-eye transform that there may be",
+          axesText(finding.R_body_rig), matrixText(finding.R_body_rig));
+    case PoseMistake::kTimeShift:
+      return fmt::format("with the poses {:.3f} s {}; --set rig.time_offsets_s={} mends it",
+                         std::abs(finding.shift_s), finding.shift_s < 0 ? "later" : "earlier",
+                         offsetsText(rig, finding.shift_s));
+    case PoseMistake::kUnknown:
+      break;
+  }
+  return "";
+}
+
+}  // namespace
+
+Warning poseWarning(const PoseFinding& finding, const Rig& rig) {
+  Warning warning;
+  warning.name = nameOf(finding.mistake);
+  if (finding.mistake == PoseMistake::kUnknown) {
+    warning.text =
+        "the poses do not explain the events: wrong poses explain them as well; are poses, events "
+        "and calibration of one recording, and are the positions in metres? (--poses, "
+        "--calibration, --hand-eye)";
+    return warning;
+  }
+  warning.text =
+      fmt::format("the events are {:.1f} times as sharp {}", finding.gain, remedyOf(finding, rig));
+  for (const PoseMistake other : finding.alternatives) {
+    warning.text += fmt::format("; or it is {}, which explains them as well", nameOf(other));
+  }
+  return warning;
+}
+
+}  // namespace efm
