@@ -12,6 +12,8 @@ struct CloudPoint {
   Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< Metres, frame `world`.
   float confidence = 0;                               ///< Fused ray density at the point, above 0.
   std::uint32_t support = 1;                          ///< Number of keyframes that saw it.
+  /// Of a global cloud: the lowest number of a keyframe that saw it.
+  std::uint64_t first_keyframe = 0;
 };
 
 /// For messages, with all digits: "(1, 2.5, -3)".

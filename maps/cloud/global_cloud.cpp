@@ -158,8 +158,9 @@ bool GlobalCloud::isExcluded(const Keyframe& keyframe, std::size_t voxel) const 
          violations > static_cast<std::size_t>(options_.consistency.max_contradictions);
 }
 
-/// Merges the sorted voxels of all keyframes, and calls visit(total, support) for each voxel in
-/// order. The keyframes of a voxel are summed in the order of their numbers.
+/// Merges the sorted voxels of all keyframes, and calls visit(total, supporting) for each voxel in
+/// order, with the numbers of the keyframes that support it, ascending. The keyframes of a voxel
+/// are summed in the order of their numbers.
 template <typename Visit>
 void GlobalCloud::visitVoxels(const Visit& visit) const {
   struct Run {
@@ -202,22 +203,23 @@ void GlobalCloud::visitVoxels(const Visit& visit) const {
     }
     if (supporting.empty()) continue;
     std::sort(supporting.begin(), supporting.end());
-    const auto end = std::unique(supporting.begin(), supporting.end());
-    visit(total, static_cast<std::uint32_t>(end - supporting.begin()));
+    supporting.erase(std::unique(supporting.begin(), supporting.end()), supporting.end());
+    visit(total, supporting);
   }
 }
 
 std::vector<CloudPoint> GlobalCloud::points(int min_keyframes) const {
   std::vector<CloudPoint> points;
-  visitVoxels([&](const Sums& total, std::uint32_t support) {
-    if (std::int64_t{support} >= min_keyframes) points.push_back(pointOf(total, support));
+  visitVoxels([&](const Sums& total, const std::vector<std::uint64_t>& supporting) {
+    if (static_cast<std::int64_t>(supporting.size()) < min_keyframes) return;
+    points.push_back(pointOf(total, supporting));
   });
   return points;
 }
 
 std::size_t GlobalCloud::voxels() const {
   std::size_t count = 0;
-  visitVoxels([&](const Sums&, std::uint32_t) { ++count; });
+  visitVoxels([&](const Sums&, const std::vector<std::uint64_t>&) { ++count; });
   return count;
 }
 
@@ -247,9 +249,10 @@ Eigen::Vector3d GlobalCloud::positionOf(const Sums& sums) const {
   return corner + sums.weighted_offset / sums.weight;
 }
 
-CloudPoint GlobalCloud::pointOf(const Sums& total, std::uint32_t support) const {
+CloudPoint GlobalCloud::pointOf(const Sums& total,
+                                const std::vector<std::uint64_t>& supporting) const {
   return {positionOf(total), static_cast<float>(total.weight / static_cast<double>(total.count)),
-          support};
+          static_cast<std::uint32_t>(supporting.size()), supporting.front()};
 }
 
 }  // namespace efm

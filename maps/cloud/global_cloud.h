@@ -36,7 +36,8 @@ struct GlobalCloudOptions {
 /// Each keyframe has its own voxels with the sums of its points. `points` merges them: the position
 /// of a voxel is the mean of its points, weighted by their confidence. Its confidence is their mean
 /// confidence. Its support is the number of keyframes that have a point in the voxel or support
-/// such a point. So the cost of inserting or removing a keyframe does not grow with the map.
+/// such a point. Its first keyframe is the lowest of their numbers. So the cost of inserting or
+/// removing a keyframe does not grow with the map.
 ///
 /// Two keyframes whose numbers differ by at most `kMaxNumberDifference` check each other's points
 /// (VisibilityGrid). Each voxel of a keyframe has two bits per other keyframe: one for support, one
@@ -122,7 +123,7 @@ class GlobalCloud {
   VoxelPoint voxelPointOf(const CloudPoint& point) const;
   std::vector<Sums> voxelsOf(const std::vector<CloudPoint>& points) const;
   Eigen::Vector3d positionOf(const Sums& sums) const;
-  CloudPoint pointOf(const Sums& total, std::uint32_t support) const;
+  CloudPoint pointOf(const Sums& total, const std::vector<std::uint64_t>& supporting) const;
   void check(Keyframe& checked, const Keyframe& by, unsigned bit) const;
   template <typename Visit>
   void visitNeighbors(std::uint64_t number, const Visit& visit);

@@ -58,6 +58,7 @@ TEST(GlobalCloud, SupportCountsKeyframesNotPoints) {
 
   ASSERT_EQ(cloud.points().size(), 1U);
   EXPECT_EQ(cloud.points()[0].support, 1U);
+  EXPECT_EQ(cloud.points()[0].first_keyframe, 5U);
 }
 
 TEST(GlobalCloud, ExportsPointsWithEnoughSupport) {
