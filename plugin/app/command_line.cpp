@@ -20,6 +20,7 @@
 #include "plugin/app/mapping_arguments.h"
 #include "plugin/app/simulate_arguments.h"
 #include "plugin/app/source_arguments.h"
+#include "plugin/app/view_command.h"
 
 namespace efm {
 namespace {
@@ -103,6 +104,13 @@ void addInfo(CLI::App& app, Run& run) {
   });
 }
 
+void addView(CLI::App& app, Run& run) {
+  CLI::App& command = *app.add_subcommand("view", "Open a map's page, map.html, in the browser");
+  auto arguments = argumentsOf(command, run, runView);
+  command.add_option("DIR", arguments->path, "The folder that `map` wrote, or its map.html")
+      ->required();
+}
+
 }  // namespace
 
 void addVerbosity(CLI::App& command, Verbosity& verbosity, bool has_keyframes) {
@@ -137,7 +145,7 @@ std::function<int()> parseCommandLine(int argc, char** argv) {
       "  130  stopped as requested (Ctrl-C)");
   Run run;
   for (const auto add :
-       {addSimulate, addImport, addExport, addMap, addDepth, addEvaluate, addInfo}) {
+       {addSimulate, addImport, addExport, addMap, addDepth, addEvaluate, addInfo, addView}) {
     add(app, run);
   }
   try {

@@ -27,6 +27,7 @@
 #include "plugin/output/map_output.h"
 #include "plugin/output/npy_file.h"
 #include "plugin/output/summary.h"
+#include "plugin/viewer/map_page.h"
 
 namespace efm {
 namespace {
@@ -114,10 +115,38 @@ std::function<void(const std::filesystem::path&)> saverOf(const mrpt::maps::CSim
   };
 }
 
-/// Writes the report; prints warnings, summary and error. @return the exit status.
+/// Writes map.html, which shows the report, and adds its time to the report's.
+void writePage(MappingOutcome& outcome, MapOutput& output, const KeyframePictures& pictures) {
+  MapReport& report = outcome.report;
+  double real_s = 0, cpu_s = 0;
+  {
+    const SecondsScope scope(real_s, cpu_s);
+    const std::filesystem::path folder = std::filesystem::absolute(output.folder() / "");
+    const MapPage page = {folder.lexically_normal().parent_path().filename().string(),
+                          outcome.points,
+                          report.options.cloud.voxel_size_m,
+                          outcome.trajectory,
+                          pictures,
+                          report.view,
+                          reportJson(report)};
+    writeAll(outcome,
+             {[&] { output.writePage([&](std::ostream& file) { writeMapPage(file, page); }); }});
+  }
+  report.times.real.map += real_s;
+  report.times.real.total += real_s;
+  report.times.cpu.output += cpu_s;
+  report.times.cpu.total += cpu_s;
+}
+
+/// Writes the page of a map and the report; prints warnings, summary and error. @return the exit
+/// status.
 int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
-             const MappingArguments& arguments) {
+             const KeyframePictures& pictures, const MappingArguments& arguments) {
   outcome.report.peak_memory_bytes = peakMemoryBytes();
+  if (kind == OutputKind::kMap && outcome.report.counts.keyframes > 0) {
+    writePage(outcome, output, pictures);
+    outcome.report.peak_memory_bytes = peakMemoryBytes();
+  }
   // A run without a keyframe leaves the results of an earlier run as they are.
   if (outcome.report.counts.keyframes > 0 ||
       !std::filesystem::exists(output.folder() / "report.json")) {
@@ -206,6 +235,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   whole.cpu.start = processSeconds();
   MappingOutcome outcome;
   std::optional<MapOutput> output;
+  std::optional<KeyframePictures> pictures;
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
     const RecordingSource source = sourceOf(arguments, job.options);
@@ -215,9 +245,11 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseForeignFolder(folder, arguments.force);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes);
+    pictures.emplace(job.options.mapper.keyframe.planes);
     std::atomic<int> written = 0;
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
       take(*output, keyframe);
+      if (kind == OutputKind::kMap) pictures->add(keyframe.map.depth);
       ++written;
     });
     job.on_keyframe = [&, note = job.on_keyframe](const KeyframeDepthMap& keyframe) {
@@ -250,7 +282,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   times.cpu.start = whole.cpu.start;
   times.cpu.images = whole.cpu.images;
   times.cpu.total = whole.cpu.start + whole.cpu.total;
-  return conclude(outcome, kind, *output, arguments);
+  return conclude(outcome, kind, *output, *pictures, arguments);
 }
 
 }  // namespace

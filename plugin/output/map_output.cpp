@@ -27,7 +27,8 @@ constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.t
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
 // The report is first: without it, what is left of an earlier result does not look complete.
-constexpr std::array<std::string_view, 5> kMapFiles = {"report.json", "map.pcd", "map.simplemap",
+constexpr std::array<std::string_view, 6> kMapFiles = {"report.json",    "map.html",
+                                                       "map.pcd",        "map.simplemap",
                                                        "trajectory.txt", "trajectory_tracker.txt"};
 constexpr std::array<std::string_view, 3> kDepthFiles = {"report.json", "points.pcd", "dsi.npy"};
 
@@ -214,6 +215,11 @@ void MapOutput::writeFile(const std::string& name,
                           const std::function<void(const std::filesystem::path&)>& write) {
   removeEarlier();
   writeAtomically(folder_ / name, write);
+}
+
+void MapOutput::writePage(const std::function<void(std::ostream&)>& write) {
+  removeEarlier();
+  writeText(folder_ / "map.html", write);
 }
 
 void MapOutput::writeReport(const std::string& json) {

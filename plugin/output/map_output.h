@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,8 @@ namespace efm {
 
 /// The files of a folder. Each kind replaces its own files alone.
 enum class OutputKind {
-  kMap,    ///< map.pcd, map.simplemap, trajectory.txt, report.json, keyframes/<t_ref>/ with images
+  /// map.pcd, map.simplemap, map.html, trajectory.txt, report.json, keyframes/<t_ref>/ with images
+  kMap,
   kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
 };
 
@@ -24,7 +26,7 @@ enum class OutputKind {
 /// report.json is complete, and all its files are of one run. A std::runtime_error names a file
 /// that cannot be written.
 ///
-///     map.pcd  map.simplemap  trajectory.txt  report.json
+///     map.pcd  map.simplemap  map.html  trajectory.txt  report.json
 ///     trajectory_tracker.txt   where poses were refined
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
 ///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   by option
@@ -52,6 +54,8 @@ class MapOutput {
   /// @param write writes a file at the given path; the file is renamed afterwards.
   void writeFile(const std::string& name,
                  const std::function<void(const std::filesystem::path&)>& write);
+  /// map.html.
+  void writePage(const std::function<void(std::ostream&)>& write);
   void writeReport(const std::string& json);
 
   const std::filesystem::path& folder() const { return folder_; }

@@ -97,7 +97,7 @@ std::string filesText(const MapReport& report, OutputKind kind,
   if (kind == OutputKind::kDepth) {
     return folder.string() + ": points.pcd, depth.tiff, depth.png, report.json";
   }
-  return folder.string() + ": map.pcd, keyframes/*/depth.png, trajectory.txt, " +
+  return folder.string() + ": map.html, map.pcd, keyframes/*/depth.png, trajectory.txt, " +
          (report.refinement ? "trajectory_tracker.txt, " : "") + "report.json";
 }
 

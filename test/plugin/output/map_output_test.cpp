@@ -69,6 +69,7 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
     MapOutput earlier(folder(), OutputKind::kMap, {});
     earlier.writeKeyframe(smallKeyframe(1'000'000'000));
     earlier.writeCloud("map.pcd", {});
+    earlier.writePage([](std::ostream& page) { page << "mine"; });
     earlier.writeFile("map.simplemap", [](const auto& file) { std::ofstream(file) << "mine"; });
     earlier.writeReport("{}");
   }
@@ -87,6 +88,7 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
 
   EXPECT_FALSE(exists(folder() / "map.pcd"));
   EXPECT_FALSE(exists(folder() / "map.simplemap"));
+  EXPECT_FALSE(exists(folder() / "map.html"));
   EXPECT_FALSE(exists(keyframes / "1.000000000" / "depth.tiff"));
   EXPECT_TRUE(exists(keyframes / "1.000000000" / "notes.txt"));
   EXPECT_TRUE(exists(folder() / "notes.txt"));

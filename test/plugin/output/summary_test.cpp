@@ -24,12 +24,13 @@ MapReport usualReport() {
 }
 
 TEST(Summary, OfAUsualMapIsShort) {
-  EXPECT_EQ(summaryOf(usualReport(), OutputKind::kMap, "out"),
-            "keyframes   31\n"
-            "points      48210\n"
-            "events      100.0 % of 1000 used\n"
-            "time        21 s for 1:00 min of recording; at most 812 MB of memory\n"
-            "results     out: map.pcd, keyframes/*/depth.png, trajectory.txt, report.json\n");
+  EXPECT_EQ(
+      summaryOf(usualReport(), OutputKind::kMap, "out"),
+      "keyframes   31\n"
+      "points      48210\n"
+      "events      100.0 % of 1000 used\n"
+      "time        21 s for 1:00 min of recording; at most 812 MB of memory\n"
+      "results     out: map.html, map.pcd, keyframes/*/depth.png, trajectory.txt, report.json\n");
 }
 
 TEST(Summary, OfADepthMapHasNoKeyframesAndItsOwnFiles) {
@@ -73,8 +74,8 @@ TEST(Summary, EachFactHasItsLine) {
        "refinement  moved the poses by 1.20 cm and 1.00 degrees (median), at most 50.00 cm and "
        "10.00 degrees\n"},
       {[](MapReport& report) { report.refinement.emplace(); },
-       "results     out: map.pcd, keyframes/*/depth.png, trajectory.txt, trajectory_tracker.txt, "
-       "report.json\n"},
+       "results     out: map.html, map.pcd, keyframes/*/depth.png, trajectory.txt, "
+       "trajectory_tracker.txt, report.json\n"},
       {[](MapReport& report) {
          report.warnings = {{"a", "b"}, {"c", "d"}};
        },

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/app/view_command.h"
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+
+namespace efm {
+namespace {
+
+std::filesystem::path pageIn(const std::filesystem::path& path) {
+  namespace fs = std::filesystem;
+  if (!fs::exists(path)) {
+    throw std::runtime_error(path.string() + ": no such folder: expected one that `map` wrote");
+  }
+  if (!fs::is_directory(path)) {
+    if (path.extension() == ".html") return fs::absolute(path);
+    throw std::runtime_error(path.string() +
+                             ": expected a folder that `map` wrote, or its map.html");
+  }
+  if (fs::exists(path / "map.html")) return fs::absolute(path / "map.html").lexically_normal();
+  const char* const why =
+      fs::exists(path / "map.pcd")
+          ? ": an earlier version made this map, or it was not written to its end; map it again"
+          : ": expected the page that `map` writes into its folder";
+  throw std::runtime_error((path / "map.html").string() + why);
+}
+
+/// @return whether the system's program for pages took it.
+bool openPage(const std::filesystem::path& page) {
+#ifdef __APPLE__
+  const char* const opener = "open";
+#else
+  const char* const opener = "xdg-open";
+  // Without a screen xdg-open may start a browser of the terminal, which shows no map.
+  if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) return false;
+#endif
+  const std::string file = page.string();
+  const pid_t child = fork();
+  if (child == 0) {
+    const int null = open("/dev/null", O_RDWR);
+    dup2(null, STDOUT_FILENO);
+    dup2(null, STDERR_FILENO);
+    execlp(opener, opener, file.c_str(), static_cast<char*>(nullptr));
+    _exit(127);
+  }
+  int status = -1;
+  return child > 0 && waitpid(child, &status, 0) == child && WIFEXITED(status) &&
+         WEXITSTATUS(status) == 0;
+}
+
+}  // namespace
+
+int runView(const ViewArguments& arguments) {
+  const std::filesystem::path page = pageIn(arguments.path);
+  std::cout << page.string() << std::endl;
+  if (!openPage(page)) {
+    std::cerr << "event-fusion: no browser could be started here: open the file in one\n";
+  }
+  return 0;
+}
+
+}  // namespace efm

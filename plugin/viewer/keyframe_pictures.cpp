@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/viewer/keyframe_pictures.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "plugin/pictures/depth_picture.h"
+
+namespace efm {
+namespace {
+
+/// Joins blocks of factor x factor pixels: the nearest depth of each, so that thin edges stay.
+cv::Mat1f reduced(const cv::Mat1f& depth_m, int factor) {
+  if (factor == 1) return depth_m;
+  cv::Mat1f small(depth_m.rows / factor, depth_m.cols / factor, 0.0F);
+  for (int y = 0; y < small.rows * factor; ++y) {
+    for (int x = 0; x < small.cols * factor; ++x) {
+      float& nearest = small(y / factor, x / factor);
+      const float depth = depth_m(y, x);
+      if (depth > 0 && (!(nearest > 0) || depth < nearest)) nearest = depth;
+    }
+  }
+  return small;
+}
+
+}  // namespace
+
+void KeyframePictures::add(const cv::Mat1f& depth_m) {
+  const std::size_t keyframe = keyframes_++;
+  if (keyframe % stride_ != 0) return;
+  const int factor = (depth_m.cols + kMaxWidth - 1) / kMaxWidth;
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(".png", depthPicture(reduced(depth_m, factor), limits_), bytes)) {
+    throw std::runtime_error("no picture can be made of a depth map");
+  }
+  bytes_ += bytes.size();
+  pictures_.emplace(keyframe, std::move(bytes));
+  while (bytes_ > max_bytes_ && pictures_.size() > 1) {
+    stride_ *= 2;
+    for (auto picture = pictures_.begin(); picture != pictures_.end();) {
+      if (picture->first % stride_ == 0) {
+        ++picture;
+        continue;
+      }
+      bytes_ -= picture->second.size();
+      picture = pictures_.erase(picture);
+    }
+  }
+}
+
+}  // namespace efm

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/viewer/map_page.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <random>
+#include <set>
+#include <sstream>
+
+#include "plugin/viewer/base64.h"
+
+namespace efm {
+namespace {
+
+using nlohmann::json;
+using testing::Each;
+using testing::HasSubstr;
+using testing::Not;
+
+std::vector<CloudPoint> randomPoints(int count, const Eigen::Vector3d& origin_m) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> coordinate(-1, 1);
+  std::vector<CloudPoint> points;
+  for (int i = 0; i < count; ++i) {
+    const Eigen::Vector3d p(20 * coordinate(random), coordinate(random), 0.1 * coordinate(random));
+    const auto number = static_cast<std::uint32_t>(i);
+    points.push_back({origin_m + p, 1.0F + static_cast<float>(i), 1 + number % 300, number});
+  }
+  return points;
+}
+
+TEST(Base64, IsThatOfTheStandard) {
+  const std::pair<std::string, std::string> cases[] = {
+      {"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foobar", "Zm9vYmFy"}};
+  for (const auto& [bytes, text] : cases) EXPECT_EQ(base64({bytes.begin(), bytes.end()}), text);
+  EXPECT_EQ(base64({0xFB, 0xFF, 0xBF}), "+/+/");
+}
+
+/// Far from the origin of the world, as in a town's coordinates.
+TEST(PagePoints, PositionsAreOffByHalfAStepAtMost) {
+  const std::vector<CloudPoint> points = randomPoints(1000, {4e5, 5e6, 300});
+  const PagePoints page(points, 0.01);
+  ASSERT_EQ(page.size(), points.size());
+  EXPECT_NEAR(page.step_m().x(), 40.0 / 65535, 1e-5);
+  EXPECT_EQ(page.thinned_m(), 0);
+  std::set<std::size_t> found;
+  for (std::size_t i = 0; i < page.size(); ++i) {
+    const PagePoint quantised = page.at(i);
+    const CloudPoint& point = points[quantised.keyframe];  // a keyframe of its own each
+    found.insert(quantised.keyframe);
+    EXPECT_EQ(quantised.support, std::min<std::uint32_t>(point.support, 255));
+    for (int axis = 0; axis < 3; ++axis) {
+      const double p = page.origin_m()[axis] + page.step_m()[axis] * quantised.cell[axis];
+      // Beside half a step: the digits of a double at 5e6 m.
+      EXPECT_LE(std::abs(p - point.p_world[axis]), 0.5 * page.step_m()[axis] + 1e-8);
+    }
+    const double level = std::log(point.confidence / page.lowConfidence()) /
+                         std::log(page.highConfidence() / page.lowConfidence());
+    EXPECT_NEAR(quantised.confidence, 255 * std::clamp(level, 0.0, 1.0), 0.51);
+  }
+  EXPECT_EQ(found.size(), points.size()) << "each point once";
+}
+
+TEST(PagePoints, AnyFirstPartCoversTheMap) {
+  std::vector<CloudPoint> line;  // sorted, as a map is
+  for (int i = 0; i < 100000; ++i) line.push_back({{0.01 * i, 0, 0}, 1.0F});
+  const PagePoints page(line, 0.01);
+  std::array<int, 10> histogram{};
+  for (std::size_t i = 0; i < 1000; ++i) ++histogram.at(page.at(i).cell[0] / 6554);
+  EXPECT_THAT(histogram, Each(testing::AllOf(testing::Ge(95), testing::Le(105))));
+}
+
+TEST(PagePoints, MoreThanTheLimitAreThinnedToTheBestOfEachCell) {
+  std::vector<CloudPoint> points = randomPoints(20000, {0, 0, 0});
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].support = i == 1234 ? 99 : 1;
+  const PagePoints page(points, 0.01, 1000);
+  EXPECT_LE(page.size(), 1000U);
+  EXPECT_GE(page.size(), 700U) << "not many fewer than there may be";
+  EXPECT_GT(page.thinned_m(), 0.01);
+  std::set<std::tuple<double, double, double>> cells;
+  bool has_best = false;
+  for (std::size_t i = 0; i < page.size(); ++i) {
+    const CloudPoint& point = points[page.at(i).keyframe];
+    has_best = has_best || point.support == 99;
+    const Eigen::Vector3d cell =
+        ((point.p_world - page.origin_m()) / page.thinned_m()).array().floor();
+    EXPECT_TRUE(cells.insert({cell.x(), cell.y(), cell.z()}).second) << "two points of a cell";
+  }
+  EXPECT_TRUE(has_best);
+}
+
+TEST(PagePoints, OneOrNoPointAndManyKeyframesFit) {
+  EXPECT_EQ(PagePoints({}, 0.01).size(), 0U);
+  const std::vector<CloudPoint> one = {{{1, 2, 3}, 4.0F, 1, 200'000}};
+  const PagePoints page(one, 0.01);
+  ASSERT_EQ(page.size(), 1U);
+  EXPECT_EQ(page.origin_m(), one[0].p_world);
+  EXPECT_EQ(page.at(0).keyframe, 200'000 / page.keyframeStep());
+}
+
+TEST(KeyframePictures, KeepEverySecondOneWhereTheyAreTooLarge) {
+  const cv::Mat1f depth(260, 720, 2.0F);
+  KeyframePictures pictures({}, 3000);
+  for (int i = 0; i < 100; ++i) pictures.add(depth);
+  std::size_t bytes = 0;
+  std::set<std::size_t> numbers;
+  for (const auto& [number, png] : pictures.pictures()) {
+    bytes += png.size();
+    numbers.insert(number);
+  }
+  EXPECT_LE(bytes, 3000U);
+  ASSERT_GE(numbers.size(), 2U);
+  const std::size_t stride = *std::next(numbers.begin());
+  EXPECT_GT(stride, 1U);
+  for (std::size_t n = 0, i = 0; n < 100; n += stride, ++i) EXPECT_EQ(numbers.count(n), 1U) << n;
+  EXPECT_EQ(numbers.size(), (99 / stride) + 1);
+}
+
+/// The data of a page by the id of their script element, read as a browser does.
+std::string dataOf(const std::string& page, const std::string& id) {
+  const std::size_t tag = page.find("<script id=\"" + id + "\"");
+  const std::size_t begin = page.find('>', tag) + 1;
+  return page.substr(begin, page.find("</script", begin) - begin);
+}
+
+TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
+  const std::string mean = "\"'</script><!--<script>alert(1)</ScRiPt>&amp;\\";
+  const std::vector<CloudPoint> points = randomPoints(3, {0, 0, 0});
+  const std::vector<StampedPose> trajectory = {{1'500'000'000, {}}};
+  KeyframePictures pictures({});
+  pictures.add(cv::Mat1f(2, 2, 1.0F));
+  const MapPage page = {mean,
+                        points,
+                        0.01,
+                        trajectory,
+                        pictures,
+                        ReferenceView{2, 2, 1, 1, 1, 1},
+                        json{{"warnings", {{{"name", mean}, {"text", mean}}}}}.dump()};
+  std::ostringstream stream;
+  writeMapPage(stream, page);
+
+  const std::string html = stream.str();
+  EXPECT_THAT(html, Not(HasSubstr("alert(1)</")));
+  const json map = json::parse(dataOf(html, "map-data"));
+  EXPECT_EQ(map["name"], mean);
+  EXPECT_EQ(map["keyframes"][0]["t"], "1.500000000");
+  EXPECT_EQ(map["keyframes"][0]["q"], json({0.0, 0.0, 0.0, 1.0}));
+  EXPECT_EQ(json::parse(dataOf(html, "report-data"))["warnings"][0]["text"], mean);
+  EXPECT_EQ(dataOf(html, "point-data").size(), 40U) << "30 bytes";
+  EXPECT_THAT(json::parse(dataOf(html, "picture-data"))["0"], HasSubstr("iVBORw0KGgo"));
+  for (const char* mark : {"<!-- data -->", "<!-- draw.js -->", "http:", "https:"}) {
+    EXPECT_THAT(html, Not(HasSubstr(mark)));
+  }
+}
+
+TEST(MapPage, SaysHowManyPointsAreLeftOut) {
+  const std::vector<CloudPoint> points = randomPoints(5000, {0, 0, 0});
+  const std::vector<StampedPose> trajectory;
+  const KeyframePictures pictures({});
+  const MapPage page = {"map", points, 0.01, trajectory, pictures, {}, "{}", 100};
+  std::ostringstream stream;
+  writeMapPage(stream, page);
+  const json map = json::parse(dataOf(stream.str(), "map-data"));
+  EXPECT_EQ(map["all_points"], 5000);
+  EXPECT_LE(map["points"], 100);
+  EXPECT_GT(map["thinned_m"], 0.01);
+  EXPECT_EQ(dataOf(stream.str(), "point-data").size(),
+            (map["points"].get<std::size_t>() * 10 + 2) / 3 * 4);
+}
+
+}  // namespace
+}  // namespace efm
