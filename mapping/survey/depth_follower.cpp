@@ -34,14 +34,14 @@ bool DepthFollower::follow(const cv::Mat1f& depth) {
   }
   if (scene.inverse.size() < kMinScenePoints) return false;
   std::sort(scene.inverse.begin(), scene.inverse.end());
-  const InverseRange range = denseRange(scene);
+  const InverseRange range = limitsAround(denseRange(scene));
 
   const DepthPlanesOptions before = planes_;
   if (automatic_.min_depth_m) {
-    planes_.min_depth_m = followed(planes_.min_depth_m, 1 / range.near / kLimitMargin);
+    planes_.min_depth_m = followed(planes_.min_depth_m, 1 / range.near);
   }
   if (automatic_.max_depth_m) {
-    planes_.max_depth_m = followed(planes_.max_depth_m, kLimitMargin / range.far);
+    planes_.max_depth_m = followed(planes_.max_depth_m, 1 / range.far);
   }
   if (planes_.max_depth_m < kMaxChange * planes_.min_depth_m) planes_ = before;
   if (automatic_.num_planes) {

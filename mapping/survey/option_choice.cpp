@@ -141,15 +141,29 @@ double parallaxIn(const std::vector<WindowSample>& samples, double window_s, con
   return parallaxes.empty() ? 0 : medianOf(parallaxes);
 }
 
+void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choice) {
+  const InverseRange scene = denseRange(depths);
+  const InverseRange limits = limitsAround(scene);
+  double max_m = 1 / limits.far;
+  std::string reason =
+      "the scene lies at " + number(1 / scene.near) + " to " + number(1 / scene.far) + " m";
+  // Where a third of a pixel of parallax is a tenth of the depth. It matters for a single camera
+  // that moves little.
+  const double accurate_m = 0.1 / (1.0 / 3) * parallax_px_m;
+  const double most_m = 2 / medianOf(depths.inverse);
+  if (accurate_m < max_m) {
+    max_m = std::max(accurate_m, most_m);
+    reason += ", and the parallax is too small for larger depths";
+  }
+  choice.depths(roundedDown(1 / limits.near, 2), roundedUp(max_m, 2), reason);
+}
+
+/// A hundred planes, and more where they would be more than a pixel of parallax apart.
 void choosePlanes(double parallax_px_m, const DepthPlanesOptions& planes, Choice& choice) {
-  // Measured: with 1 pixel, the median error is a tenth to a fifth larger; with less, hardly
-  // smaller.
-  constexpr double kPlaneStepPx = 0.6;
   const double parallax_px = parallax_px_m * (1 / planes.min_depth_m - 1 / planes.max_depth_m);
-  const double wanted = 1 + std::ceil(parallax_px / kPlaneStepPx);
-  choice.planes(
-      static_cast<int>(std::clamp<double>(wanted, kMinAutomaticPlanes, kMaxAutomaticPlanes)),
-      number(parallax_px) + " pixels of parallax between the limits");
+  choice.planes(static_cast<int>(std::clamp<double>(1 + std::ceil(parallax_px), kMinAutomaticPlanes,
+                                                    kMaxAutomaticPlanes)),
+                number(parallax_px) + " pixels of parallax between the limits");
 }
 
 }  // namespace
@@ -200,14 +214,12 @@ std::vector<ChosenOption> chooseOptions(const AutomaticOptions& automatic, const
     chooseWindow(motionLimit(samples, rig, options, medianOf(depths.inverse)), duration_s, choice);
   }
   const double window_s = lengthOf(options);
+  const double parallax_px_m = parallaxIn(samples, window_s, rig, options);
   depths = sceneDepths(sweep, samples, window_s);
   if (!depths.inverse.empty()) {
-    const InverseRange range = denseRange(depths);
-    choice.depths(
-        roundedDown(1 / range.near / kLimitMargin, 2), roundedUp(kLimitMargin / range.far, 2),
-        "the scene lies at " + number(1 / range.near) + " to " + number(1 / range.far) + " m");
+    chooseDepths(depths, parallax_px_m, choice);
   }
-  choosePlanes(parallaxIn(samples, window_s, rig, options), options.keyframe.planes, choice);
+  choosePlanes(parallax_px_m, options.keyframe.planes, choice);
   return choice.take();
 }
 

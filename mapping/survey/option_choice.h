@@ -32,7 +32,7 @@ struct ChosenOption {
 void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& options);
 
 /// The number of planes is chosen between these.
-inline constexpr int kMinAutomaticPlanes = 50;
+inline constexpr int kMinAutomaticPlanes = 100;
 inline constexpr int kMaxAutomaticPlanes = 400;
 
 /// The options of a first pass over a recording: consecutive windows of `window_s`.

@@ -149,6 +149,17 @@ InverseRange denseRange(const SceneDepths& depths) {
   return {*far, *near};
 }
 
+InverseRange limitsAround(const InverseRange& scene) {
+  constexpr double kMinMargin = 1.25;
+  constexpr double kMinRatio = 10;
+  // Room in front of the scene shows ambiguous peaks; room behind it has the wrong points of weak
+  // parallax, too.
+  constexpr double kFarExponent = 0.75;
+  const double margin = std::sqrt(kMinRatio * scene.far / scene.near);
+  return {scene.far / std::max(kMinMargin, std::pow(margin, kFarExponent)),
+          scene.near * std::max(kMinMargin, margin)};
+}
+
 SceneDepths sceneDepths(CoarseSweep& sweep, const std::vector<WindowSample>& samples,
                         double window_s) {
   SceneDepths depths;

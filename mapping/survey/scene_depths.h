@@ -57,11 +57,6 @@ struct SceneDepths {
   std::size_t windows = 0;      ///< That have points.
 };
 
-/// The limits of a map are this factor nearer and farther than its scene. Closer limits hide that a
-/// peak is ambiguous; wider ones cost planes. Measured on six scenes at equal points: with 1.3 the
-/// wrong points of `hd_stereo` are 1.5 times those of wide limits, with 1.6 as many.
-inline constexpr double kLimitMargin = 1.6;
-
 /// Fewer points do not tell the range of depths.
 inline constexpr std::size_t kMinScenePoints = 100;
 
@@ -75,6 +70,11 @@ struct InverseRange {
 /// points and half of its fraction of the planes.
 /// @param depths with at least one point.
 InverseRange denseRange(const SceneDepths& depths);
+
+/// The limits of a map for a scene of this range: by a factor of at least 1.25 wider on both sides,
+/// and nearly a factor of 10 apart. Closer limits hide that a peak is ambiguous: with limits a
+/// factor of 4 apart, `hd_stereo` has 2.5 times the wrong points at equal numbers of points.
+InverseRange limitsAround(const InverseRange& scene);
 
 SceneDepths sceneDepths(CoarseSweep& sweep, const std::vector<WindowSample>& samples,
                         double window_s);

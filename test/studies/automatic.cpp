@@ -96,7 +96,7 @@ Comparison compareOnPreset(const StudyRun& run, const Case& what) {
   options.preset = what.name;
   if (run.quick) options.duration_s = 0.3;
   return compareOn(run.recordings->make("automatic_" + what.name, makeSimulation(options)), what,
-                   run.pick(2, 1));
+                   run.pick(4, 1));
 }
 
 /// The real slider: its truth is from its frames.
@@ -191,14 +191,14 @@ void studyAutomatic(const StudyRun& run, StudySection& section) {
   for (const Case& preset : presets) results.push_back(compareOnPreset(run, preset));
   if (!run.quick) {
     results.push_back(compareOn(run.recordings->make("automatic_mvsec", mvsecInRoom(run, 5)),
-                                {"MVSEC's rig on flying1", {{1, 6.5, 100}, 1}}, 2));
+                                {"MVSEC's rig on flying1", {{1, 6.5, 100}, 1}}, 4));
   }
   section.text(
       "Without an option file, `event-fusion map` chooses depth limits, number of planes and "
       "window "
       "from a first look at the recording. Here they are compared with those that we set by hand "
       "for these recordings: the limits of section 12, windows of half a second, 250 planes for "
-      "1280 pixels; the .ini files of the slider and of MVSEC. Two windows each. *points*: with "
+      "1280 pixels; the .ini files of the slider and of MVSEC. Four windows each. *points*: with "
       "the default thresholds. *equal points*: the smaller of both numbers, each on its own curve "
       "over the thresholds. A point is wrong if its depth error is over 10 %, with the best truth "
       "within a pixel; the slider's truth is from its frames (section 11).");
