@@ -71,7 +71,7 @@ const pointers = new Map();
 let draggedPixels = 0;
 
 canvas.addEventListener("pointerdown", event => {
-  if (event.isTrusted) canvas.setPointerCapture(event.pointerId);
+  canvas.setPointerCapture(event.pointerId);
   if (pointers.size === 0) draggedPixels = 0;
   pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
 });
