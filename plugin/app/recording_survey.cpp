@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/recording_survey.h"
 
+#include "mapping/survey/depth_agreement.h"
+
 #include <algorithm>
 #include <exception>
 
@@ -38,7 +40,13 @@ EventFusionOptions surveyOptions(EventFusionOptions options) {
 
 std::vector<Warning> RecordingSurvey::poseWarnings(const FusionMapperOptions& options) const {
   try {
-    if (const auto finding = checkPoses(rig, samples, options)) return {poseWarning(*finding, rig)};
+    // A mistake that is named says more than that depths disagree.
+    const auto finding = checkPoses(rig, samples, options);
+    if (finding && finding->mistake != PoseMistake::kUnknown) return {poseWarning(*finding, rig)};
+    if (const auto agreement = depthAgreement(rig, samples, options)) {
+      if (const auto warning = agreementWarning(*agreement)) return {*warning};
+    }
+    if (finding) return {poseWarning(*finding, rig)};
   } catch (const std::invalid_argument&) {
   }
   return {};
