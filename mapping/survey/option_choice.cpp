@@ -147,9 +147,9 @@ void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choic
   double max_m = 1 / limits.far;
   std::string reason =
       "the scene lies at " + number(1 / scene.near) + " to " + number(1 / scene.far) + " m";
-  // Where a third of a pixel of parallax is a tenth of the depth. It matters for a single camera
+  // Where a quarter of a pixel of parallax is a tenth of the depth. It matters for a single camera
   // that moves little.
-  const double accurate_m = 0.1 / (1.0 / 3) * parallax_px_m;
+  const double accurate_m = 0.1 / 0.25 * parallax_px_m;
   const double most_m = 2 / medianOf(depths.inverse);
   if (accurate_m < max_m) {
     max_m = std::max(accurate_m, most_m);

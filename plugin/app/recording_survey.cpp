@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/recording_survey.h"
 
-#include "mapping/survey/depth_agreement.h"
-
 #include <algorithm>
 #include <exception>
 
 #include "mapping/events/even_choice.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/survey/depth_agreement.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
 #include "plugin/mrpt/session_feed.h"
