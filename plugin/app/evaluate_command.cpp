@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "plugin/app/output_checks.h"
 #include "plugin/evaluation/cloud_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_text.h"
@@ -40,6 +41,14 @@ TrajectoryAlignment alignmentOf(const std::string& name) {
   throw std::invalid_argument("--align " + name + ": expected se3, origin or none");
 }
 
+/// @param inputs files, or folders whose files are read.
+void refusePlotOver(const EvaluationOutput& output,
+                    const std::vector<std::filesystem::path>& inputs) {
+  if (output.plot.empty()) return;
+  refuseToReplace(output.plot, inputs);
+  refuseFileIn(inputs, output.plot);
+}
+
 /// Writes the plot, if asked for, and prints the errors.
 template <typename Plot>
 int finish(const EvaluationOutput& output, const std::string& table, const std::string& json,
@@ -52,6 +61,7 @@ int finish(const EvaluationOutput& output, const std::string& table, const std::
 }  // namespace
 
 int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
+  refusePlotOver(arguments.output, {arguments.estimate, arguments.truth, arguments.options.mask});
   const std::optional<StereoBaseline> stereo = stereoBaseline(arguments);
   DepthEvaluationOptions options = arguments.options;
   if (stereo) options.focal_baseline = stereo->focalBaseline();
@@ -62,6 +72,8 @@ int runEvaluateDepth(const EvaluateDepthArguments& arguments) {
 }
 
 int runEvaluateMap(const EvaluateMapArguments& arguments) {
+  refusePlotOver(arguments.output,
+                 {arguments.estimate, arguments.truth, arguments.options.to_find});
   const CloudEvaluation evaluation =
       evaluateCloud(arguments.estimate, arguments.truth, arguments.options);
   return finish(arguments.output, evaluationTable(evaluation), evaluationJson(evaluation),
@@ -69,6 +81,7 @@ int runEvaluateMap(const EvaluateMapArguments& arguments) {
 }
 
 int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments) {
+  refusePlotOver(arguments.output, {arguments.estimate, arguments.truth});
   using Unit = RelativeSpacing::Unit;
   TrajectoryEvaluationOptions options = arguments.options;
   options.alignment = alignmentOf(arguments.alignment);

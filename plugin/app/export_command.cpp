@@ -11,6 +11,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/observed_statistics.h"
+#include "plugin/app/output_checks.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CObservationEvents.h"
@@ -138,6 +139,12 @@ class Export {
   std::uint64_t other_poses_ = 0;
 };
 
+/// An empty folder may be there: a writer of folders fills it.
+void refuseExisting(const std::filesystem::path& out) {
+  if (!std::filesystem::is_regular_file(out)) return;
+  throw std::runtime_error(out.string() + ": it exists: expected the name of a new file or folder");
+}
+
 }  // namespace
 
 std::vector<std::string> exportFormats() {
@@ -147,6 +154,8 @@ std::vector<std::string> exportFormats() {
 }
 
 int runExport(const ExportArguments& arguments) {
+  refuseToReplace(arguments.out, inputsOf(arguments.source));
+  refuseExisting(arguments.out);
   const TimeLimits limits = resolve(arguments.times, arguments.source);
   const auto open = [&] { return openInterval(arguments.source, limits); };
   const Rig rig = rigOf(*open());

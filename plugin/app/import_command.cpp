@@ -10,12 +10,12 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/observed_statistics.h"
+#include "plugin/app/output_checks.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/formats/open_recording.h"
@@ -62,21 +62,15 @@ void refuseLimitsWithoutEvents(const ImportArguments& arguments, const TimeLimit
                                        formatSeconds(span_ns->second)));
 }
 
-/// An existing file is replaced only if it is a rawlog, and none of the sources.
+/// An existing file is replaced only if it is a rawlog, and none of the inputs.
 void refuseToDestroy(const ImportArguments& arguments) {
-  if (!std::filesystem::exists(arguments.out)) return;
-  for (const std::filesystem::path& source : arguments.source.files) {
-    std::error_code ignored;  // of a missing source, which the reader reports
-    if (!std::filesystem::equivalent(source, arguments.out, ignored)) continue;
-    throw std::runtime_error(arguments.out.string() +
-                             ": the recording itself: expected another file for the rawlog");
-  }
   if (std::filesystem::is_regular_file(arguments.out)) requireRawlog(arguments.out);
 }
 
 }  // namespace
 
 int runImport(const ImportArguments& arguments) {
+  refuseToReplace(arguments.out, inputsOf(arguments.source));
   refuseToDestroy(arguments);
   const TimeLimits limits = resolve(arguments.times, arguments.source);
   const std::unique_ptr<Recording> recording = openInterval(arguments.source, limits);

@@ -22,6 +22,7 @@
 #include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
 #include "plugin/app/observed_statistics.h"
+#include "plugin/app/output_checks.h"
 #include "plugin/app/recording_survey.h"
 #include "plugin/output/keyframe_writer.h"
 #include "plugin/output/map_output.h"
@@ -214,14 +215,27 @@ std::filesystem::path outputFolder(const MappingArguments& arguments, OutputKind
   return name + (kind == OutputKind::kMap ? "_map" : "_depth");
 }
 
-/// A folder that holds something else than an earlier result is probably a mistake.
-void refuseForeignFolder(const std::filesystem::path& folder, bool force) {
+/// Refuses a folder with an input. One that holds something else than an earlier result of the same
+/// kind is probably a mistake.
+void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
+                        const MappingArguments& arguments, const RecordingSource& source) {
+  std::vector<std::filesystem::path> inputs = inputsOf(source);
+  if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
+  refuseToReplace(folder, inputs);
   std::error_code ignored;
-  if (force || !std::filesystem::is_directory(folder, ignored)) return;
-  if (std::filesystem::is_empty(folder) || MapOutput::holdsResult(folder)) return;
-  throw std::runtime_error(folder.string() +
-                           ": holds other files than a map's: expected a new folder, an empty one, "
-                           "one of an earlier result, or --force");
+  if (arguments.force || !std::filesystem::is_directory(folder, ignored)) return;
+  if (std::filesystem::is_empty(folder)) return;
+  if (!MapOutput::holdsResult(folder)) {
+    throw std::runtime_error(folder.string() +
+                             ": holds other files than a map's: expected a new folder, an empty "
+                             "one, one of an earlier result, or --force");
+  }
+  const bool is_map = kind == OutputKind::kMap;
+  if (MapOutput::holdsFilesOf(is_map ? OutputKind::kDepth : OutputKind::kMap, folder)) {
+    throw std::runtime_error(fmt::format(
+        "{}: holds the result of `{}`: expected another folder, or --force to replace it",
+        folder.string(), is_map ? "depth" : "map"));
+  }
 }
 
 /// Runs a job and writes its results.
@@ -239,11 +253,11 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
     const RecordingSource source = sourceOf(arguments, job.options);
+    const std::filesystem::path folder = outputFolder(arguments, kind);
+    refuseOutputFolder(folder, kind, arguments, source);
     survey(source, job);
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
-    const std::filesystem::path folder = outputFolder(arguments, kind);
-    refuseForeignFolder(folder, arguments.force);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes);
     pictures.emplace(job.options.mapper.keyframe.planes);
     std::atomic<int> written = 0;

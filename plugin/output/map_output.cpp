@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <stdexcept>
@@ -26,11 +27,11 @@ namespace {
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
-// The report is first: without it, what is left of an earlier result does not look complete.
-constexpr std::array<std::string_view, 6> kMapFiles = {"report.json",    "map.html",
-                                                       "map.pcd",        "map.simplemap",
+// Removed first: without it, what is left of an earlier result does not look complete.
+constexpr const char* kReport = "report.json";
+constexpr std::array<std::string_view, 5> kMapFiles = {"map.html", "map.pcd", "map.simplemap",
                                                        "trajectory.txt", "trajectory_tracker.txt"};
-constexpr std::array<std::string_view, 3> kDepthFiles = {"report.json", "points.pcd", "dsi.npy"};
+constexpr std::array<std::string_view, 2> kDepthFiles = {"points.pcd", "dsi.npy"};
 
 void makeFolder(const std::filesystem::path& folder) {
   if (folder.empty()) throw std::runtime_error("'': expected the name of the folder to write");
@@ -105,6 +106,18 @@ void removeKeyframes(const std::filesystem::path& keyframes) {
     removeImages(keyframe);
     if (std::filesystem::is_empty(keyframe)) std::filesystem::remove(keyframe);
   }
+  if (!std::filesystem::is_symlink(keyframes) && std::filesystem::is_empty(keyframes)) {
+    std::filesystem::remove(keyframes);
+  }
+}
+
+/// Whether a file is the report of a run.
+bool isReport(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) return false;
+  std::ifstream stream(file);
+  const auto report = nlohmann::json::parse(stream, nullptr, false);
+  return report.is_object() && report.contains("version") && report.contains("options") &&
+         report.contains("keyframes");
 }
 
 void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
@@ -140,27 +153,37 @@ MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
     : folder_(std::move(folder)), kind_(kind), limits_(limits) {
   makeFolder(folder_);
   // Before the first file of this run: one may be under way when `removeEarlier` runs (dsi.npy).
-  if (kind_ == OutputKind::kMap) {
-    removePartialFiles(folder_, kMapFiles);
-  } else {
-    removePartialFiles(folder_, kDepthFiles);
-  }
+  removePartialFiles(folder_, kMapFiles);
+  removePartialFiles(folder_, kDepthFiles);
+  // The mark of a killed run stays where nothing else tells that the folder is a result's.
+  if (isReport(folder_ / kReport)) removePartialFiles(folder_, std::array{kReport});
 }
 
 bool MapOutput::holdsResult(const std::filesystem::path& folder) {
+  return isReport(folder / kReport) ||
+         std::filesystem::exists(AtomicFile::temporaryOf(folder / kReport));
+}
+
+bool MapOutput::holdsFilesOf(OutputKind kind, const std::filesystem::path& folder) {
   const auto has = [&](std::string_view name) { return std::filesystem::exists(folder / name); };
-  return has("keyframes") || std::any_of(kMapFiles.begin(), kMapFiles.end(), has) ||
-         std::any_of(kDepthFiles.begin(), kDepthFiles.end(), has) ||
+  if (kind == OutputKind::kMap) {
+    return has("keyframes") || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);
+  }
+  return std::any_of(kDepthFiles.begin(), kDepthFiles.end(), has) ||
          std::any_of(kImages.begin(), kImages.end(), has);
 }
 
 /// A map of five keyframes must not show two of an earlier map of seven.
 void MapOutput::removeEarlier() {
   if (std::exchange(began_, true)) return;
-  if (kind_ == OutputKind::kMap) {
+  const bool replaces_both = holdsResult(folder_);
+  std::ofstream(AtomicFile::temporaryOf(folder_ / kReport)) << "{}\n";
+  removeFiles(folder_, std::array{kReport});
+  if (replaces_both || kind_ == OutputKind::kMap) {
     removeFiles(folder_, kMapFiles);
     removeKeyframes(folder_ / "keyframes");
-  } else {
+  }
+  if (replaces_both || kind_ == OutputKind::kDepth) {
     removeFiles(folder_, kDepthFiles);
     removeImages(folder_);
   }
@@ -224,7 +247,7 @@ void MapOutput::writePage(const std::function<void(std::ostream&)>& write) {
 
 void MapOutput::writeReport(const std::string& json) {
   removeEarlier();
-  writeText(folder_ / "report.json", [&](std::ostream& stream) { stream << json; });
+  writeText(folder_ / kReport, [&](std::ostream& stream) { stream << json; });
 }
 
 }  // namespace efm

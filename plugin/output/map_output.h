@@ -14,7 +14,7 @@
 
 namespace efm {
 
-/// The files of a folder. Each kind replaces its own files alone.
+/// The files of a folder, which holds one kind.
 enum class OutputKind {
   /// map.pcd, map.simplemap, map.html, trajectory.txt, report.json, keyframes/<t_ref>/ with images
   kMap,
@@ -26,20 +26,26 @@ enum class OutputKind {
 /// report.json is complete, and all its files are of one run. A std::runtime_error names a file
 /// that cannot be written.
 ///
+/// Until then the folder has report.partial.json, by which the next run knows that it may replace
+/// what a killed run left.
+///
 ///     map.pcd  map.simplemap  map.html  trajectory.txt  report.json
 ///     trajectory_tracker.txt   where poses were refined
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
 ///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   by option
 class MapOutput {
  public:
-  /// Creates the folder. Right before the first file is written, the files of an earlier run of the
-  /// same kind are removed: a run that writes nothing leaves them.
+  /// Creates the folder. Right before the first file is written, the files of an earlier run are
+  /// removed, those of the other kind only where `holdsResult`: a run that writes nothing leaves
+  /// them.
   /// @param limits the colours of depth.png run between its depths.
   /// @throws std::runtime_error where the folder cannot be made.
   MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits);
 
-  /// Whether a folder has a file or a folder that a MapOutput of either kind may have written.
+  /// Whether a folder has the report of a run of either kind, or the mark of one that was killed.
   static bool holdsResult(const std::filesystem::path& folder);
+  /// Whether a folder has a file or a folder with a name that only this kind writes.
+  static bool holdsFilesOf(OutputKind kind, const std::filesystem::path& folder);
 
   /// Writes the keyframe's four images below keyframes/.
   void writeKeyframe(const KeyframeDepthMap& keyframe);

@@ -148,6 +148,11 @@ TEST_F(EvaluateCommand, WrongInputsAreErrors) {
               HasSubstr("max_depth_m = nan"));
   EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --plot plot.jpg"),
               HasSubstr("plot.jpg: expected a name that ends in .png"));
+  cv::imwrite((folder() / "data" / "own.png").string(), cv::Mat1b(2, 2, std::uint8_t{9}));
+  EXPECT_THAT(errorOf("evaluate depth plane.tiff data/own.png --plot data/../data/own.png"),
+              HasSubstr("it is the input data/own.png itself"));
+  EXPECT_THAT(errorOf("evaluate trajectory data data --plot data/own.png"),
+              HasSubstr("data/own.png: it may be an input, as it is in data"));
   cv::imwrite((folder() / "mm.png").string(), cv::Mat_<std::uint16_t>(90, 120, std::uint16_t{9}));
   EXPECT_THAT(errorOf("evaluate depth mm.png plane.tiff"), HasSubstr("--scale"));
   EXPECT_THAT(errorOf("evaluate map plane.tiff plane.tiff"), HasSubstr("expected .pcd or .ply"));

@@ -83,7 +83,18 @@ TEST_F(ImportCommand, ReplacesNothingButARawlog) {
   EXPECT_EQ(contentOf("small/events.txt"), events);
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);
   const std::string rawlog = contentOf("s.rawlog");
-  EXPECT_THAT(errorOf("import s.rawlog --out ./s.rawlog"), HasSubstr("the recording itself"));
+  EXPECT_THAT(errorOf("import s.rawlog --out ./s.rawlog"),
+              HasSubstr("it is the input s.rawlog itself"));
+  const std::string bytes = contentOf("s.rawlog");
+  EXPECT_THAT(errorOf("import small --poses s.rawlog --out s.rawlog"),
+              HasSubstr("it is the input"));
+  for (const char* target : {"mcap", "folder"}) {
+    EXPECT_THAT(errorOf(std::string("export s.rawlog --out s.rawlog --to ") + target),
+                HasSubstr("s.rawlog: it is the input s.rawlog itself"));
+    EXPECT_THAT(errorOf(std::string("export small --out s.rawlog --to ") + target),
+                HasSubstr("s.rawlog: it exists: expected the name of a new file or folder"));
+  }
+  EXPECT_EQ(contentOf("s.rawlog"), bytes);
   EXPECT_EQ(contentOf("s.rawlog"), rawlog);
   EXPECT_EQ(run("import small --out s.rawlog --t1 0.04").status, 0);
 }

@@ -253,12 +253,67 @@ TEST_F(MapCommand, ARunWithoutKeyframesKeepsTheEarlierMap) {
   }
 }
 
-TEST_F(MapCommand, DepthKeepsTheEarlierMapInTheFolder) {
+TEST_F(MapCommand, AFolderHoldsTheFilesOfOneRun) {
   write(SyntheticRecording());
+  const std::string depth = "depth rig.ini data --out out --t0 10.1 --t1 10.3";
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
   const auto map_files = filesIn("out");
-  ASSERT_EQ(run("depth rig.ini data --out out --t0 10.1 --t1 10.3").status, 0);
-  EXPECT_THAT(filesIn("out"), testing::IsSupersetOf(map_files));
+  EXPECT_THAT(errorOf(depth), HasSubstr("out: holds the result of `map`: expected another folder"));
+  EXPECT_EQ(filesIn("out"), map_files);
+  ASSERT_EQ(run(depth + " --force").status, 0);
+  EXPECT_EQ(filesIn("out").size(), 6U) << testing::PrintToString(filesIn("out"));
+  EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("holds the result of `depth`"));
+  ASSERT_EQ(run("map rig.ini data --out out --force").status, 0);
+  EXPECT_EQ(filesIn("out"), map_files);
+}
+
+TEST_F(MapCommand, AResultReplacesNoInputAndNoForeignFile) {
+  write(SyntheticRecording());
+  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
+  const auto in_out = [&](const char* from, const char* to) {
+    std::filesystem::remove_all(folder() / "out");
+    std::filesystem::create_directory(folder() / "out");
+    if (std::string(from).empty()) {
+      std::ofstream(folder() / "out" / to) << "{}";
+    } else {
+      std::filesystem::copy_file(folder() / from, folder() / "out" / to);
+    }
+  };
+  const struct {
+    const char* from;
+    const char* to;
+    std::string command;
+    const char* words;
+  } cases[] = {
+      {"data/poses.txt", "trajectory.txt", "map rig.ini data --poses out/trajectory.txt",
+       "out: it holds the input out/trajectory.txt itself"},
+      {"r.rawlog", "map.simplemap", "map rig.ini out/map.simplemap", "out: it holds the input"},
+      {"r.rawlog", "map.simplemap", "map rig.ini ./out", "out: it is the input ./out itself"},
+      {"data/camchain.yaml", "report.json", "map rig.ini data --calibration out/report.json",
+       "out: it holds the input out/report.json"},
+      {"data/camchain.yaml", "depth.png",
+       "depth rig.ini data --t0 10.1 --t1 10.3 --set rig.calibration=out/depth.png",
+       "out: it holds the input out/depth.png"},
+      {"rig.ini", "map.html", "map --config out/map.html data", "out: it holds the input"},
+  };
+  for (const auto& [from, to, command, words] : cases) {
+    in_out(from, to);
+    for (const char* force : {"", " --force"}) {
+      EXPECT_THAT(errorOf(command + " --out out" + force), HasSubstr(words));
+      EXPECT_EQ(contentOf(std::string("out/") + to), contentOf(from)) << command;
+      EXPECT_EQ(filesIn("out").size(), 1U) << command;
+    }
+  }
+  std::filesystem::remove_all(folder() / "out");
+  std::filesystem::create_directory(folder() / "out");
+  std::filesystem::create_symlink("../r.rawlog", folder() / "out" / "map.pcd");
+  EXPECT_THAT(errorOf("map rig.ini r.rawlog --out out --force"),
+              HasSubstr("out/map.pcd: it is the input r.rawlog itself"));
+  for (const char* foreign : {"trajectory.txt", "report.json", "depth.png"}) {
+    in_out("", foreign);
+    EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("out: holds other files"));
+    EXPECT_EQ(contentOf(std::string("out/") + foreign), "{}");
+  }
 }
 
 TEST_F(MapCommand, AnOutputThatCannotBeWrittenIsAnErrorThatNamesIt) {

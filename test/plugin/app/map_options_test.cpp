@@ -117,7 +117,7 @@ TEST_F(MapOptions, OutliersAreRemovedFromTheCloudOfOneKeyframeToo) {
 TEST_F(MapOptions, OtherFilesAreWrittenIfOneCannotBeWritten) {
   write(SyntheticRecording());
   std::filesystem::create_directories(folder() / "out" / "map.pcd" / "in the way");
-  const Result result = run("map rig.ini data --out out");
+  const Result result = run("map rig.ini data --out out --force");
   EXPECT_NE(result.status, 0);
   EXPECT_THAT(result.err, HasSubstr("map.pcd"));
   for (const char* file : {"map.simplemap", "trajectory.txt", "report.json"}) {

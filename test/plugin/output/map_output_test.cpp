@@ -96,29 +96,47 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
   EXPECT_TRUE(exists(folder() / "elsewhere" / "depth.tiff"));
 }
 
-TEST_F(MapOutputTest, EachKindLeavesTheFilesOfTheOther) {
-  MapOutput map(folder(), OutputKind::kMap, {});
-  map.writeKeyframe(smallKeyframe(1'000'000'000));
-  map.writeTrajectory("trajectory.txt", {});
-  map.writeCloud("map.pcd", {});
-  MapOutput depth(folder(), OutputKind::kDepth, {});
-  depth.writeImages(smallKeyframe(1'000'000'000));
-  depth.writeCloud("points.pcd", {});
-  std::ofstream(folder() / "dsi.npy") << "a DSI";
-  EXPECT_TRUE(exists(folder() / "map.pcd"));
-  EXPECT_TRUE(exists(folder() / "trajectory.txt"));
-  EXPECT_TRUE(exists(folder() / "keyframes" / "1.000000000" / "depth.tiff"));
-
-  MapOutput(folder(), OutputKind::kMap, {}).writeReport("{}");
-  EXPECT_FALSE(exists(folder() / "map.pcd"));
-  EXPECT_TRUE(exists(folder() / "depth.tiff"));
-  EXPECT_TRUE(exists(folder() / "points.pcd"));
-  EXPECT_TRUE(exists(folder() / "dsi.npy"));
-
-  MapOutput(folder(), OutputKind::kDepth, {}).writeReport("{}");
-  EXPECT_FALSE(exists(folder() / "depth.tiff"));
-  EXPECT_FALSE(exists(folder() / "points.pcd"));
-  EXPECT_FALSE(exists(folder() / "dsi.npy"));
+TEST_F(MapOutputTest, AResultReplacesOneOfTheOtherKindAndNoFilesOfOthers) {
+  const char* const kinds_files[] = {
+      "map.pcd", "trajectory.txt", "keyframes/1.000000000/depth.tiff", "depth.tiff", "points.pcd"};
+  const auto expectFiles = [&](bool of_map, bool of_depth) {
+    for (std::size_t i = 0; i < 5; ++i) {
+      EXPECT_EQ(exists(folder() / kinds_files[i]), i < 3 ? of_map : of_depth) << kinds_files[i];
+    }
+    EXPECT_EQ(MapOutput::holdsFilesOf(OutputKind::kMap, folder()), of_map);
+    EXPECT_EQ(MapOutput::holdsFilesOf(OutputKind::kDepth, folder()), of_depth);
+  };
+  const auto writeMap = [&] {
+    MapOutput map(folder(), OutputKind::kMap, {});
+    map.writeKeyframe(smallKeyframe(1'000'000'000));
+    map.writeTrajectory("trajectory.txt", {});
+    map.writeCloud("map.pcd", {});
+  };
+  const auto writeDepth = [&](const std::string& report) {
+    MapOutput depth(folder(), OutputKind::kDepth, {});
+    depth.writeImages(smallKeyframe(1'000'000'000));
+    depth.writeCloud("points.pcd", {});
+    if (!report.empty()) depth.writeReport(report);
+  };
+  const auto mark = folder() / "report.partial.json";
+  EXPECT_FALSE(MapOutput::holdsResult(folder()));
+  writeMap();
+  EXPECT_TRUE(exists(mark));
+  EXPECT_TRUE(MapOutput::holdsResult(folder())) << "of a killed run";
+  expectFiles(true, false);
+  writeDepth(R"({"version": "1", "options": {}, "keyframes": 1})");
+  EXPECT_FALSE(exists(mark));
+  EXPECT_TRUE(MapOutput::holdsResult(folder()));
+  expectFiles(false, true);
+  writeMap();
+  expectFiles(true, false);
+  std::filesystem::remove(mark);
+  for (const char* foreign : {"", "{}", "[1]", R"({"version": "1", "options": {}})", "text"}) {
+    std::ofstream(folder() / "report.json") << foreign;
+    EXPECT_FALSE(MapOutput::holdsResult(folder())) << foreign;
+  }
+  writeDepth("{}");
+  expectFiles(true, true);
 }
 
 TEST_F(MapOutputTest, AnErrorNamesAFolderThatCannotBeMade) {

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/app/output_checks.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// With all links followed, as far as the path exists.
+fs::path resolved(const fs::path& path) {
+  std::error_code error;
+  fs::path whole = fs::weakly_canonical(fs::absolute(path, error), error);
+  if (error) whole = path;
+  return whole.has_filename() ? whole : whole.parent_path();
+}
+
+bool isSame(const fs::path& one, const fs::path& other) {
+  std::error_code missing;
+  return fs::equivalent(one, other, missing);
+}
+
+bool isBelow(const fs::path& path, const fs::path& folder) {
+  const auto end = std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first;
+  return end == folder.end();
+}
+
+/// The file in a folder that is an input by a link.
+fs::path linkTo(const fs::path& input, const fs::path& folder) {
+  std::error_code unreadable;
+  const auto skip = fs::directory_options::skip_permission_denied;
+  for (fs::recursive_directory_iterator entry(folder, skip, unreadable), end;
+       !unreadable && entry != end; entry.increment(unreadable)) {
+    if (isSame(entry->path(), input)) return entry->path();
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<fs::path> inputsOf(const RecordingSource& source) {
+  std::vector<fs::path> inputs = source.files;
+  inputs.insert(inputs.end(), {source.poses, source.calibration, source.hand_eye});
+  return inputs;
+}
+
+void refuseToReplace(const fs::path& out, const std::vector<fs::path>& inputs) {
+  std::error_code ignored;
+  if (!fs::exists(out, ignored)) return;
+  const bool is_folder = fs::is_directory(out, ignored);
+  for (const fs::path& input : inputs) {
+    if (input.empty() || !fs::exists(input, ignored)) continue;
+    const auto refuse = [&](const fs::path& replaced, const char* why) {
+      return std::runtime_error(replaced.string() + why + input.string() +
+                                " itself: expected another " + (is_folder ? "folder" : "file") +
+                                " for the results");
+    };
+    if (isSame(input, out)) throw refuse(out, ": it is the input ");
+    if (!is_folder) continue;
+    if (isBelow(resolved(input), resolved(out))) throw refuse(out, ": it holds the input ");
+    const fs::path link = linkTo(input, out);
+    if (!link.empty()) throw refuse(link, ": it is the input ");
+  }
+}
+
+void refuseFileIn(const std::vector<fs::path>& folders, const fs::path& out) {
+  std::error_code ignored;
+  if (!fs::exists(out, ignored)) return;
+  for (const fs::path& folder : folders) {
+    if (!fs::is_directory(folder, ignored) || !isBelow(resolved(out), resolved(folder))) continue;
+    throw std::runtime_error(out.string() + ": it may be an input, as it is in " + folder.string() +
+                             ": expected a file that does not exist yet");
+  }
+}
+
+}  // namespace efm
