@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 #include <tuple>
+#include <unordered_set>
+#include <utility>
 
 namespace efm {
 namespace {
@@ -74,14 +76,31 @@ PagePoints::PagePoints(const std::vector<CloudPoint>& points, double voxel_size_
   keyframe_step_ = last_keyframe / 65536 + 1;
   findConfidences();
   if (points.size() > limit) {
-    // A map is made of surfaces: the number of their cells falls with the square of the edge.
-    double cell_m =
-        voxel_size_m * std::sqrt(static_cast<double>(points.size()) / static_cast<double>(limit));
-    constexpr double kGrowth = 1.1;  // of each trial: at most a fifth of the points too few
-    while (!thin(cell_m)) cell_m *= kGrowth;
+    double cell_m = voxel_size_m;
+    const auto wanted = 0.97 * static_cast<double>(limit);
+    constexpr int kMaxTrials = 20;  // four to ten suffice
+    for (int trial = 0; trial < kMaxTrials; ++trial) {
+      const double ratio = countCells(cell_m) / wanted;
+      if (ratio > 0.95 && ratio < 1.01) break;
+      // A map is made of surfaces: the number of their cells falls with the square of the edge.
+      cell_m *= std::sqrt(ratio);
+    }
+    while (!thin(cell_m)) cell_m *= 1.03;
     thinned_m_ = cell_m;
   }
   stride_ = longStride(size());
+}
+
+/// An estimate of the number of cells that have points, from a fraction of all cells: a hash
+/// selects them, some 20,000 of those that are wanted.
+double PagePoints::countCells(double cell_m) const {
+  const std::uint64_t divisor = limit_ / 20'000 + 1;
+  std::unordered_set<std::uint64_t> cells;
+  for (const CloudPoint& point : points_) {
+    const std::uint64_t hash = hashOf(gridCellOf(point, origin_m_, cell_m));
+    if ((hash >> 32U) % divisor == 0) cells.insert(hash);
+  }
+  return static_cast<double>(divisor) * static_cast<double>(cells.size());
 }
 
 /// @return false as soon as there are too many cells.

@@ -54,6 +54,7 @@ class PagePoints {
   std::uint64_t keyframeStep() const { return keyframe_step_; }
 
  private:
+  double countCells(double cell_m) const;
   bool thin(double cell_m);
   void findConfidences();
 

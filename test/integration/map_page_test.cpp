@@ -64,7 +64,7 @@ class MapPageInABrowser : public ProgramTest {
     EXPECT_THAT(measured["requests"], IsEmpty()) << measured["requests"];
     EXPECT_EQ(measured["refused"], 3) << "the page's policy refuses requests of three kinds";
     EXPECT_EQ(measured["gl_error"], 0);
-    for (const char* change : {"turned", "moved", "zoomed", "turned_by_key", "coloured"}) {
+    for (const char* change : {"turned", "moved", "zoomed", "turned_by_key", "aimed", "coloured"}) {
       // A change of the view moves most of what is drawn.
       EXPECT_GT(measured[change].get<double>(), 0.5 * measured["drawn"].get<double>()) << change;
     }

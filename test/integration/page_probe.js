@@ -52,6 +52,12 @@ async function probe() {
   measured.moved = effectOf(() => drag(80, 30, {shiftKey: true}));
   measured.zoomed = effectOf(() => canvas.dispatchEvent(new WheelEvent("wheel", {deltaY: -300})));
   measured.turned_by_key = effectOf(() => press("ArrowLeft"));
+  measured.aimed = effectOf(() => {  // a double click turns about the point that is there
+    let p = null;
+    for (let i = 0; i < map.points && !p; ++i) p = onScreen(pointAt(i), projection(canvas.clientWidth / canvas.clientHeight).matrix);
+    const box = canvas.getBoundingClientRect();
+    canvas.dispatchEvent(new MouseEvent("dblclick", {clientX: box.left + p.x, clientY: box.top + p.y}));
+  });
   measured.coloured = effectOf(() => choose("colour", "confidence", "change"));
 
   // The map grows with time: the points, without path and cameras.

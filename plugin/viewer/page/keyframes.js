@@ -75,13 +75,21 @@ const isShown = i => {
 /// The nearest point that is drawn within a few pixels of a position of the canvas.
 function pointNear(x, y) {
   const {matrix} = projection(canvas.clientWidth / canvas.clientHeight);
-  let best = null, least = Infinity;
+  const width = canvas.clientWidth, height = canvas.clientHeight, reach = 6;
+  // Rows of the projection for cells instead of metres: no array is made per point.
+  const row = k => [0, 1, 2].map(j => matrix[4 * j + k] * map.step_m[j])
+    .concat(dot([matrix[k], matrix[4 + k], matrix[8 + k]], origin) + matrix[12 + k]);
+  const [[ax, bx, cx, dx], [ay, by, cy, dy], , [aw, bw, cw, dw]] = [0, 1, 2, 3].map(row);
+  let best = -1, least = Infinity;
   for (let i = 0; i < map.points; ++i) {
-    const p = pointAt(i), at = onScreen(p, matrix);
-    if (!at || Math.hypot(at.x - x, at.y - y) > 6 || at.w >= least || !isShown(i)) continue;
-    [best, least] = [p, at.w];
+    const a = cellOf(i, 0), b = cellOf(i, 1), c = cellOf(i, 2);
+    const w = aw * a + bw * b + cw * c + dw;
+    if (w <= 0 || w >= least) continue;
+    const right = ((ax * a + bx * b + cx * c + dx) / w + 1) / 2 * width - x;
+    const down = (1 - (ay * a + by * b + cy * c + dy) / w) / 2 * height - y;
+    if (right * right + down * down < reach * reach && isShown(i)) [best, least] = [i, w];
   }
-  return best;
+  return best < 0 ? null : pointAt(best);
 }
 
 function countShown() {
