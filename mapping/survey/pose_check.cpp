@@ -2,116 +2,34 @@
 #include "mapping/survey/pose_check.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
-#include <functional>
-#include <limits>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/survey/scene_depths.h"
+#include "mapping/survey/event_sharpness.h"
+#include "mapping/survey/sample_piece.h"
 
 namespace efm {
 namespace {
 
 // Measured on six simulated recordings and a real one, right and with each mistake: the figures are
 // in README.md.
-constexpr double kMinGain = 1.15;      // of a mistake that is reported
-constexpr double kMinShiftGain = 1.1;  // of a time shift: other times of a smooth motion are alike
-constexpr double kMinDistinction = 1.4;  // of the best poses from typical wrong ones
-constexpr double kMinExplained = 1.25;   // of right poses from typical wrong ones, several cameras
-constexpr double kEqual = 0.97;          // of the best gain: as good
-constexpr double kPieceS = 0.5;
-constexpr std::size_t kPieces = 4;
-constexpr double kMinShiftM = 0.005;  // within a piece; as the warning `no-motion`
+constexpr double kMinGain = 1.15;  // of a mistake that is reported
+// Of a time shift: other times of a smooth motion are much alike. Depths of a single camera follow
+// the noise of poses.
+constexpr double kMinShiftGain = 1.07;
+constexpr double kMinShiftGainOfOne = 1.15;
+// Of the best poses from typical wrong ones; of other times, which are much alike.
+constexpr double kMinDistinction = 1.45;
+constexpr double kMinShiftDistinction = 1.3;
+constexpr double kMinExplained = 1.25;  // of right poses from typical wrong ones, several cameras
+constexpr double kEqual = 0.97;         // of the best gain: as good
+constexpr double kBlurred = 1e-6;       // a hundredth of wrong poses' sharpness: no rays meet
+constexpr double kMinShiftM = 0.005;    // within a piece; as the warning `no-motion`
 constexpr double kMaxTimeShiftS = 0.5;
 constexpr double kTimeStepS = 0.05;
-constexpr double kFinestTimeStepS = 0.001;
-
-/// A short part of a sample.
-struct Piece {
-  Window window;
-  std::vector<EventSpan> events;
-  const Trajectory* trajectory;
-};
-
-/// The interval that the events of a sample and its poses share.
-std::pair<std::int64_t, std::int64_t> coveredBy(const WindowSample& sample) {
-  const std::vector<StampedPose>& poses = sample.trajectory.poses();
-  if (poses.empty()) return {0, 0};
-  std::int64_t begin_ns = std::max(sample.window.t0_ns, poses.front().t_ns);
-  std::int64_t end_ns = std::min(sample.window.t1_ns, poses.back().t_ns);
-  for (const std::vector<Event>& events : sample.events) {
-    if (events.empty()) continue;
-    begin_ns = std::max(begin_ns, events.front().t_ns);
-    end_ns = std::min(end_ns, events.back().t_ns);
-  }
-  return {begin_ns, std::max(begin_ns, end_ns)};
-}
-
-std::vector<Piece> piecesOf(const std::vector<WindowSample>& samples) {
-  std::vector<Piece> pieces;
-  const std::size_t of_each = (kPieces + samples.size() - 1) / samples.size();
-  for (const WindowSample& sample : samples) {
-    const auto [begin_ns, end_ns] = coveredBy(sample);
-    const std::int64_t whole_ns = end_ns - begin_ns;
-    const std::int64_t length_ns =
-        std::min({whole_ns, durationFromSeconds(kPieceS),
-                  std::max(whole_ns / 2, durationFromSeconds(kPieceS / 2))});
-    if (length_ns <= 0) continue;
-    for (std::size_t i = 0; i < of_each; ++i) {
-      const auto t0_ns = begin_ns + (whole_ns - length_ns) * static_cast<std::int64_t>(2 * i + 1) /
-                                        static_cast<std::int64_t>(2 * of_each);
-      const Window window{t0_ns, t0_ns + length_ns, t0_ns + length_ns / 2};
-      pieces.push_back({window, eventsWithin(sample, window), &sample.trajectory});
-    }
-  }
-  // Evenly spread.
-  std::vector<Piece> chosen;
-  for (std::size_t i = 0; i < std::min(kPieces, pieces.size()); ++i) {
-    chosen.push_back(pieces[i * pieces.size() / std::min(kPieces, pieces.size())]);
-  }
-  return chosen;
-}
-
-/// A mistake, and how to undo it.
-struct Hypothesis {
-  PoseMistake mistake;
-  std::function<Rigid3(const Rigid3&)> T_world_rig;  // from the pose as it is; empty: as it is
-  Eigen::Matrix3d R_body_rig = Eigen::Matrix3d::Identity();
-};
-
-/// All 23 rotations other than none that map axes to axes.
-std::vector<Eigen::Matrix3d> axisRotations() {
-  std::vector<Eigen::Matrix3d> rotations;
-  std::array<int, 3> order{0, 1, 2};
-  do {
-    for (unsigned signs = 0; signs < 8; ++signs) {
-      Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
-      for (int row = 0; row < 3; ++row) {
-        rotation(row, order[static_cast<std::size_t>(row)]) = (signs >> row) % 2 == 0 ? 1 : -1;
-      }
-      if (rotation.determinant() > 0 && !rotation.isIdentity()) rotations.push_back(rotation);
-    }
-  } while (std::next_permutation(order.begin(), order.end()));
-  return rotations;
-}
-
-std::vector<Hypothesis> poseHypotheses() {
-  std::vector<Hypothesis> all;
-  all.push_back({PoseMistake::kInverted, [](const Rigid3& pose) { return pose.inverse(); }});
-  all.push_back({PoseMistake::kQuaternionOrder, [](const Rigid3& pose) {
-                   const Eigen::Quaterniond& q = pose.rotation;
-                   return Rigid3{{q.x(), q.y(), q.z(), q.w()}, pose.translation};
-                 }});
-  for (const Eigen::Matrix3d& rotation : axisRotations()) {
-    const Rigid3 T_body_rig{Eigen::Quaterniond(rotation), Eigen::Vector3d::Zero()};
-    all.push_back({PoseMistake::kAxes,
-                   [T_body_rig](const Rigid3& pose) { return pose * T_body_rig; }, rotation});
-  }
-  return all;
-}
+constexpr double kFinestTimeStepS = 0.003;  // measured: a peak is found to 1 to 6 ms
 
 /// The rig with the other transform between its first two cameras.
 Rig withInvertedStereo(Rig rig) {
@@ -125,52 +43,6 @@ bool takesPart(int camera, const FusionMapperOptions& options) {
   return cameras.empty() || std::find(cameras.begin(), cameras.end(), camera) != cameras.end();
 }
 
-/// The options of the sharpness: the cameras of the map, in a small view.
-FusionMapperOptions sharpnessOptions(const FusionMapperOptions& options) {
-  FusionMapperOptions result;
-  result.cameras = options.cameras;
-  result.keyframe.reference_camera = options.keyframe.reference_camera;
-  result.keyframe.sweep.threads = options.keyframe.sweep.threads;
-  result.keyframe.sweep.kernel = options.keyframe.sweep.kernel;
-  result.keyframe.packets.packet_error_px = 0.1;
-  return result;
-}
-
-/// Measures how well poses and rig explain events: the squares of the DSI's confidences (the
-/// largest fused value of each pixel), relative to the number of events. Rays that meet in few
-/// points give few large values.
-class Sharpness {
- public:
-  Sharpness(const Rig& rig, const FusionMapperOptions& options)
-      : rig_(rig), options_(sharpnessOptions(options)), sweep_(rig, options_, kCoarseness) {}
-
-  bool moves(const Piece& piece) const {
-    const auto motion = motionIn({piece.window, piece.events, piece.trajectory}, rig_, options_);
-    return motion && motion->shift_m >= kMinShiftM;
-  }
-  double of(const Piece& piece, const Trajectory& trajectory) {
-    const auto keyframe = sweep_.map({piece.window, piece.events, &trajectory});
-    if (!keyframe) return 0;
-    double events = 0;
-    for (const std::uint64_t count : keyframe->events) events += static_cast<double>(count);
-    if (events == 0) return 0;
-    const cv::Mat1f& confidence = keyframe->map.confidence;
-    return confidence.dot(confidence) / (events * events);
-  }
-  double of(const Piece& piece, const Hypothesis& hypothesis) {
-    const auto moved = [&](const StampedPose& pose) {
-      return hypothesis.T_world_rig(pose.T_world_rig);
-    };
-    return of(piece, piece.trajectory->moved(piece.window.t0_ns, piece.window.t1_ns, moved));
-  }
-
- private:
-  static constexpr Coarseness kCoarseness{160, 20'000, 2};
-  Rig rig_;
-  FusionMapperOptions options_;
-  CoarseSweep sweep_;
-};
-
 /// Gains of one hypothesis over the poses as they are: a logarithm per piece.
 struct Gains {
   std::vector<double> logs;
@@ -181,7 +53,7 @@ struct Gains {
   double mean() const {
     double sum = 0;
     for (const double log : logs) sum += log;
-    return logs.empty() ? 0 : std::exp(sum / static_cast<double>(logs.size()));
+    return logs.empty() ? 1 : std::exp(sum / static_cast<double>(logs.size()));
   }
   /// Whether most pieces are sharper by half of the gain.
   bool agree(double min_gain) const {
@@ -196,12 +68,10 @@ class PoseCheck {
   PoseCheck(const Rig& rig, const std::vector<WindowSample>& samples,
             const FusionMapperOptions& options)
       : rig_(rig), options_(options), sharpness_(rig, options) {
-    for (Piece& piece : piecesOf(samples)) {
-      if (!sharpness_.moves(piece)) continue;
-      const double as_given = sharpness_.of(piece, *piece.trajectory);
-      if (as_given <= 0) continue;
+    for (SamplePiece& piece : piecesOf(samples, options.trajectory)) {
+      if (sharpness_.shiftIn(piece) < kMinShiftM) continue;
+      as_given_.push_back(std::max(sharpness_.of(piece, piece.trajectory), kBlurred));
       pieces_.push_back(std::move(piece));
-      as_given_.push_back(as_given);
     }
   }
 
@@ -223,12 +93,19 @@ class PoseCheck {
     // The first half of the pieces excludes most hypotheses.
     constexpr double kPromising = 1.05;
     std::vector<double> wrong;
-    for (const Hypothesis& hypothesis : poseHypotheses()) {
+    for (const PoseHypothesis& hypothesis : poseHypotheses()) {
       Candidate candidate;
       candidate.finding.mistake = hypothesis.mistake;
       candidate.finding.R_body_rig = hypothesis.R_body_rig;
-      compare([&](const Piece& piece) { return sharpness_.of(piece, hypothesis); }, candidate,
-              kPromising);
+      compare(
+          [&](const SamplePiece& piece) {
+            const auto moved = [&](const StampedPose& pose) {
+              return hypothesis.T_world_rig(pose.T_world_rig);
+            };
+            const Window& window = piece.window;
+            return sharpness_.of(piece, piece.trajectory.moved(window.t0_ns, window.t1_ns, moved));
+          },
+          candidate, kPromising);
       wrong.push_back(candidate.gains.mean());
       candidates_.push_back(std::move(candidate));
     }
@@ -245,55 +122,61 @@ class PoseCheck {
     const CameraModel& right = rig_.cameras[1].model;
     if (left.width == right.width && left.height == right.height) {
       compare(
-          [&](Piece piece) {
+          [&](SamplePiece piece) {
             std::swap(piece.events[0], piece.events[1]);
-            return sharpness_.of(piece, *piece.trajectory);
+            return sharpness_.of(piece, piece.trajectory);
           },
           swapped, 1);
       candidates_.push_back(swapped);
     }
     Candidate inverted;
     inverted.finding.mistake = PoseMistake::kStereoInverted;
-    Sharpness sharpness(withInvertedStereo(rig_), options_);
-    compare([&](const Piece& piece) { return sharpness.of(piece, *piece.trajectory); }, inverted,
-            1);
+    EventSharpness sharpness(withInvertedStereo(rig_), options_);
+    compare([&](const SamplePiece& piece) { return sharpness.of(piece, piece.trajectory); },
+            inverted, 1);
     candidates_.push_back(inverted);
+  }
+
+  /// The gains of a shift of the first `count` pieces, as far as poses cover them.
+  Gains gainsOfShift(double shift_s, std::size_t count) {
+    Gains gains;
+    const std::int64_t shift_ns = durationFromSeconds(shift_s);
+    for (std::size_t i = 0; i < count; ++i) {
+      const SamplePiece& piece = pieces_[i];
+      const std::vector<StampedPose>& poses = piece.trajectory.poses();
+      if (poses.front().t_ns > piece.window.t0_ns + shift_ns ||
+          poses.back().t_ns < piece.window.t1_ns + shift_ns) {
+        continue;
+      }
+      Trajectory moved(options_.trajectory);
+      for (const StampedPose& pose : poses) moved.add({pose.t_ns - shift_ns, pose.T_world_rig});
+      gains.add(sharpness_.of(piece, moved), as_given_[i]);
+    }
+    if (2 * gains.logs.size() < count) gains.logs.clear();
+    return gains;
   }
 
   /// From coarse to fine.
   void compareTimes() {
+    constexpr double kPromising = 1.02;
     Candidate best;
     best.finding.mistake = PoseMistake::kTimeShift;
-    double best_gain = 1;
-    const auto attempt = [&](double shift_s) {
-      Candidate candidate = best;
-      candidate.finding.shift_s = shift_s;
-      candidate.gains = {};
-      for (std::size_t i = 0; i < pieces_.size(); ++i) {
-        const Piece& piece = pieces_[i];
-        const std::int64_t shift_ns = durationFromSeconds(shift_s);
-        const std::vector<StampedPose>& poses = piece.trajectory->poses();
-        if (poses.front().t_ns > piece.window.t0_ns + shift_ns ||
-            poses.back().t_ns < piece.window.t1_ns + shift_ns) {
-          continue;
-        }
-        Trajectory moved(options_.trajectory);
-        for (const StampedPose& pose : poses) moved.add({pose.t_ns - shift_ns, pose.T_world_rig});
-        candidate.gains.add(sharpness_.of(piece, moved), as_given_[i]);
-      }
-      if (2 * candidate.gains.logs.size() <= pieces_.size()) return;
-      if (candidate.gains.mean() <= best_gain) return;
-      best_gain = candidate.gains.mean();
-      best = candidate;
+    const auto attempt = [&](double shift_s, std::size_t count) {
+      const Gains gains = gainsOfShift(shift_s, count);
+      if (gains.mean() <= best.gains.mean()) return;
+      best.finding.shift_s = shift_s;
+      best.gains = gains;
     };
     for (double shift_s = kTimeStepS; shift_s <= kMaxTimeShiftS; shift_s += kTimeStepS) {
-      attempt(shift_s);
-      attempt(-shift_s);
+      attempt(shift_s, (pieces_.size() + 1) / 2);
+      attempt(-shift_s, (pieces_.size() + 1) / 2);
     }
+    if (best.gains.mean() < kPromising) return;
+    best.gains = gainsOfShift(best.finding.shift_s, pieces_.size());
     for (double step_s = kTimeStepS / 2; step_s >= kFinestTimeStepS; step_s /= 2) {
       const double middle_s = best.finding.shift_s;
-      attempt(middle_s - step_s);
-      attempt(middle_s + step_s);
+      attempt(middle_s - step_s, pieces_.size());
+      attempt(middle_s + step_s, pieces_.size());
     }
     candidates_.push_back(best);
   }
@@ -332,19 +215,24 @@ class PoseCheck {
   static double gainOf(const Candidate& candidate) { return candidate.gains.mean(); }
   bool isClear(const Candidate& candidate) const {
     const bool time = candidate.finding.mistake == PoseMistake::kTimeShift;
-    const double min_gain = time ? kMinShiftGain : kMinGain;
+    const double min_shift_gain = severalCameras() ? kMinShiftGain : kMinShiftGainOfOne;
+    const double min_gain = time ? min_shift_gain : kMinGain;
     return gainOf(candidate) >= min_gain && candidate.gains.agree(min_gain) &&
-           gainOf(candidate) >= kMinDistinction * typical_wrong_;
+           gainOf(candidate) >= (time ? kMinShiftDistinction : kMinDistinction) * typical_wrong_;
+  }
+  bool severalCameras() const {
+    const std::vector<int>& cameras = options_.cameras;
+    return (cameras.empty() ? rig_.cameras.size() : cameras.size()) > 1;
   }
   std::optional<PoseFinding> unexplained() const {
-    if (rig_.cameras.size() < 2 || 1 >= kMinExplained * typical_wrong_) return std::nullopt;
+    if (!severalCameras() || 1 >= kMinExplained * typical_wrong_) return std::nullopt;
     return PoseFinding{};
   }
 
   const Rig& rig_;
   const FusionMapperOptions& options_;
-  Sharpness sharpness_;
-  std::vector<Piece> pieces_;
+  EventSharpness sharpness_;
+  std::vector<SamplePiece> pieces_;
   std::vector<double> as_given_;  // of each piece
   std::vector<Candidate> candidates_;
   double typical_wrong_ = 0;  // the median gain of the hypotheses: at most one is right

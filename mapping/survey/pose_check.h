@@ -6,20 +6,10 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
+#include "mapping/survey/pose_hypotheses.h"
 #include "mapping/survey/window_sample.h"
 
 namespace efm {
-
-/// A common mistake about poses or the rig.
-enum class PoseMistake {
-  kInverted,         ///< The poses are T_rig_world.
-  kQuaternionOrder,  ///< qx qy qz qw were read from qw qx qy qz.
-  kCamerasSwapped,   ///< The events of cameras 0 and 1 are exchanged.
-  kStereoInverted,   ///< The transform between cameras 0 and 1 is inverted.
-  kAxes,             ///< The axes of the tracked body are others than the rig's.
-  kTimeShift,        ///< The clocks of events and poses differ.
-  kUnknown,          ///< The poses do not explain the events; no other mistake would, either.
-};
 
 /// A mistake that would explain why the events are not as sharp as they could be.
 struct PoseFinding {
@@ -34,7 +24,7 @@ struct PoseFinding {
 };
 
 /// Compares how sharp the events of samples are with the poses as they are, and with each mistake
-/// undone. Sharp: many rays meet in few points; see `pose_check.cpp`. A single camera sees the
+/// undone. Sharp: many rays meet in few points; see `EventSharpness`. A single camera sees the
 /// direction of the motion alone, and depths can make up for some mistakes: less is found.
 /// @return nothing where the poses explain the events best, where no sample has parallax, and where
 ///   the rig hardly moves.

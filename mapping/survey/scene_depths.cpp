@@ -37,6 +37,7 @@ KeyframeMapperOptions coarse(const Rig& rig, const FusionMapperOptions& options,
   coarse.view.height.reset();
   coarse.max_events_per_camera = coarseness.events;
   coarse.extraction = {};
+  coarse.extraction.extraction = coarseness.extraction;
   coarse.extraction.min_quality = kCoarseQuality;
   coarse.motion = {};
   coarse.camera_maps = false;

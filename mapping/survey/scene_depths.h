@@ -28,6 +28,7 @@ struct Coarseness {
   int width = 240;                 ///< Of the view, pixels, at most.
   std::uint32_t events = 100'000;  ///< Of each camera, at most.
   double plane_step_px = 1;        ///< Parallax between neighbouring planes.
+  ExtractionMethod extraction = ExtractionMethod::kAggregated;
 };
 
 /// Sweeps samples coarsely, over a wide range of depths that follows from the baseline, in a small

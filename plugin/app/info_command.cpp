@@ -17,6 +17,7 @@
 #include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
+#include "plugin/app/recording_survey.h"
 #include "plugin/app/system_info.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/session/camera_view.h"
@@ -127,6 +128,42 @@ std::vector<Warning> warningsOf(const Contents& contents, const RecordingCounts&
   return warnings;
 }
 
+/// Gives a survey the observations of a recording, as long as it takes them: a recording may lack
+/// what a map needs.
+class PatientSurveyor {
+ public:
+  explicit PatientSurveyor(const EventFusionOptions& options) : options_(options) {}
+
+  void add(const mrpt::obs::CObservation& observation) {
+    if (!surveyor_) return;
+    try {
+      surveyor_->add(observation);
+    } catch (const std::exception&) {
+      surveyor_.reset();
+    }
+  }
+  /// Prints the values that `map` would choose. @return the warnings about the poses.
+  std::vector<Warning> finish(bool quiet) {
+    if (!surveyor_) return {};
+    const RecordingSurvey survey = surveyor_->finish();
+    if (survey.samples.empty()) return {};
+    FusionMapperOptions options = options_.mapper;
+    const std::vector<ChosenOption> chosen =
+        chooseOptions(options_.automatic, survey.rig, survey.samples, survey.duration_s, options);
+    if (!quiet) {
+      fmt::print("the options that are auto would be:\n");
+      for (const ChosenOption& option : chosen) {
+        fmt::print("  {} = {:g}: {}\n", option.key, option.value, option.reason);
+      }
+    }
+    return survey.poseWarnings(options);
+  }
+
+ private:
+  EventFusionOptions options_;
+  std::optional<RecordingSurveyor> surveyor_{options_};
+};
+
 }  // namespace
 
 int runInfo(const InfoArguments& arguments) {
@@ -138,12 +175,14 @@ int runInfo(const InfoArguments& arguments) {
   const std::unique_ptr<Recording> recording =
       openInterval(source, resolve(arguments.times, source));
   Contents contents;
+  PatientSurveyor surveyor(defaultOptions());
   std::exception_ptr stopped;
   {
     Progress progress("reading", arguments.verbosity);
     try {
       while (const auto observation = recording->next()) {
         contents.add(*observation);
+        surveyor.add(*observation);
         progress.show(recording->progress());
       }
     } catch (const std::exception&) {
@@ -156,7 +195,10 @@ int runInfo(const InfoArguments& arguments) {
     fmt::print("truth: {} depth maps of camera 0\n", truth.size());
   }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
-  const std::vector<Warning> warnings = warningsOf(contents, recording->counts());
+  std::vector<Warning> warnings = surveyor.finish(quiet);
+  for (Warning& warning : warningsOf(contents, recording->counts())) {
+    warnings.push_back(std::move(warning));
+  }
   printWarnings(warnings);
   return arguments.strict && failStrictly(warnings) ? kFailedStatus : status;
 }

@@ -64,6 +64,36 @@ std::vector<Mistake> poseMistakes() {
        "",
        kFine,
        {"warning: speed:", "are positions in metres"}},
+      {"poses that are T_rig_world",
+       eachPose([](StampedPose& pose, const StampedPose&) {
+         pose.T_world_rig = pose.T_world_rig.inverse();
+       }),
+       "",
+       kFine,
+       {"warning: poses-inverted:", "times as sharp"}},
+      {"quaternions in the order w x y z",
+       eachPose([](StampedPose& pose, const StampedPose&) {
+         const Eigen::Quaterniond q = pose.T_world_rig.rotation;
+         pose.T_world_rig.rotation = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y());
+       }),
+       "",
+       kFine,
+       {"warning: quaternion-order:", "qx qy qz qw"}},
+      {"poses of a body with x forward",
+       eachPose([](StampedPose& pose, const StampedPose&) {
+         Eigen::Matrix3d R_body_rig;
+         R_body_rig << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+         pose.T_world_rig.rotation = pose.T_world_rig.rotation * R_body_rig.transpose();
+       }),
+       "",
+       kFine,
+       {"warning: axis-convention:", "-y, -z, x",
+        "T_body_rig: [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]]"}},
+      {"cameras exchanged",
+       [](Draft& draft) { std::swap(draft.events[0], draft.events[1]); },
+       "",
+       kFine,
+       {"warning: cameras-swapped:"}},
       {"a jump of the tracker",
        eachPose([](StampedPose& pose, const StampedPose& first) {
          if (pose.t_ns - first.t_ns > 200'000'000) pose.T_world_rig.translation.x() += 2;
