@@ -15,7 +15,7 @@ function look(from) {
                   front: [0, 0.02], side: [Math.PI / 2, 0.02]}[from];
   [camera.yaw, camera.pitch] = angles;
   camera.target = middle;
-  camera.distance = 0.9 * radius / Math.sin(kFieldOfView / 2);
+  camera.distance = 0.95 * radius / Math.sin(kFieldOfView / 2);
 }
 
 /// The axes of the screen: right, up, and towards the viewer.

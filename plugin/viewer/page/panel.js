@@ -60,7 +60,10 @@ function showNumbers() {
     addRow("chosen", option.key, `${number(option.value)}: ${option.reason}`);
   }
   for (const [section, keys] of Object.entries(report.options)) {
-    for (const [key, value] of Object.entries(keys)) addRow("options", `${section}.${key}`, String(value));
+    for (const [key, value] of Object.entries(keys)) {
+      const text = typeof value === "number" ? String(Number(value.toPrecision(8))) : String(value);
+      addRow("options", `${section}.${key}`, text);
+    }
   }
   element("depth-near").textContent = `${number(map.depths_m[0])} m`;
   element("depth-far").textContent = `${number(map.depths_m[1])} m`;
