@@ -27,10 +27,15 @@ PlaneSpacing planeSpacingFromName(std::string_view name) { return valueIn(kSpaci
 
 void DepthPlanesOptions::validate() const {
   constexpr int kMaxPlanes = 100'000;
+  // No camera sees depths outside; beyond, planes and votes lose their digits.
+  constexpr double kMinDepthM = 1e-3;
+  constexpr double kMaxDepthM = 1e6;
   requireOption(std::isfinite(min_depth_m) && min_depth_m > 0, "min_depth_m", min_depth_m,
                 "finite and above 0");
   requireOption(std::isfinite(max_depth_m) && max_depth_m > min_depth_m, "max_depth_m", max_depth_m,
                 "finite and above min_depth_m");
+  requireOption(min_depth_m >= kMinDepthM, "min_depth_m", min_depth_m, "at least 0.001");
+  requireOption(max_depth_m <= kMaxDepthM, "max_depth_m", max_depth_m, "at most 1000000");
   requireOption(num_planes >= 1 && num_planes <= kMaxPlanes, "num_planes", num_planes,
                 "1 to 100000");
 }

@@ -103,6 +103,10 @@ std::string errorText(const CLI::App& app, const CLI::ParseError& error) {
   if (text.compare(0, conversion.size(), conversion) == 0) {  // only numbers are converted
     return text.substr(conversion.size()) + ": expected a number";
   }
+  const std::size_t repeated = text.find(": At Most 1 required but received ");
+  if (repeated != std::string::npos) {
+    return text.substr(0, repeated) + ": given more than once: expected it once";
+  }
   return wrong_value ? text : text + "; see " + path + " --help";
 }
 

@@ -55,9 +55,11 @@ void addEvaluateDepth(CLI::App& evaluate, Run& run) {
       ->check(aboveZero());
   command.add_option("--max-depth", options.pairing.max_depth_m,
                      "Leave out truth beyond this depth in metres");
-  command.add_option("--scale", options.png_scale,
-                     "Of 16-bit PNG, units per metre (1000: millimetres, 256: KITTI, 5000: TUM); "
-                     "below 1 metres per unit");
+  command
+      .add_option("--scale", options.png_scale,
+                  "Of 16-bit PNG, units per metre (1000: millimetres, 256: KITTI, 5000: TUM); "
+                  "below 1 metres per unit")
+      ->check(aboveZero());
   command
       .add_option("--mask", options.mask,
                   "Compare only the pixels that are not black in this image")

@@ -53,10 +53,11 @@ RigCamera cameraOf(const CObservationEvents& packet) {
 
 /// The rig of a recording. One that announces its cameras is read up to its first event.
 /// @throws std::runtime_error if a camera is missing, or there is none.
-Rig rigOf(Recording& recording) {
+Rig rigOf(const RecordingSource& source, const TimeLimits& limits) {
+  const std::unique_ptr<Recording> recording = openInterval(source, limits);
   std::map<int, RigCamera> cameras;
   std::map<int, std::int64_t> announced_ns;
-  while (const auto observation = recording.next()) {
+  while (const auto observation = recording->next()) {
     const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
     if (packet == nullptr) continue;
     cameras.emplace(packet->camera_index, cameraOf(*packet));
@@ -79,6 +80,7 @@ Rig rigOf(Recording& recording) {
     }
     rig.cameras.push_back(camera);
   }
+  if (rig.cameras.empty()) refuseLimitsWithoutEvents(source, limits);
   if (rig.cameras.empty()) throw std::runtime_error("the recording has no events");
   return rig;
 }
@@ -158,7 +160,7 @@ int runExport(const ExportArguments& arguments) {
   refuseExisting(arguments.out);
   const TimeLimits limits = resolve(arguments.times, arguments.source);
   const auto open = [&] { return openInterval(arguments.source, limits); };
-  const Rig rig = rigOf(*open());
+  const Rig rig = rigOf(arguments.source, limits);
   const Interruption interruption;
   Export result(arguments, rig);
   const std::unique_ptr<Recording> recording = open();

@@ -23,44 +23,10 @@
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/session/time_text.h"
 
 namespace efm {
 namespace {
-
-/// The time limits, for an error.
-std::string limitsText(const TimeLimits& limits) {
-  std::string text;
-  if (limits.t0_ns) text += fmt::format("from --t0 {} s", formatSeconds(*limits.t0_ns));
-  if (limits.t0_ns && limits.t1_ns) text += " ";
-  if (limits.t1_ns) text += fmt::format("until --t1 {} s", formatSeconds(*limits.t1_ns));
-  return text;
-}
-
-/// Times of the first and the last event of the whole recording.
-std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(const ImportArguments& arguments) {
-  const std::unique_ptr<Recording> recording = openRecording(arguments.source);
-  std::optional<std::pair<std::int64_t, std::int64_t>> span_ns;
-  while (const auto observation = recording->next()) {
-    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
-    if (!packet || packet->events.empty()) continue;
-    const std::int64_t first_ns = packet->events.front().t_ns;
-    const std::int64_t last_ns = packet->events.back().t_ns;
-    if (!span_ns) span_ns.emplace(first_ns, last_ns);
-    span_ns = {std::min(span_ns->first, first_ns), std::max(span_ns->second, last_ns)};
-  }
-  return span_ns;
-}
-
-/// Refuses time limits without events: they may be mistyped.
-/// @throws std::runtime_error naming the times of the recording's events.
-void refuseLimitsWithoutEvents(const ImportArguments& arguments, const TimeLimits& limits) {
-  if (!limits.t0_ns && !limits.t1_ns) return;
-  const auto span_ns = eventSpan(arguments);
-  if (!span_ns) return;  // a recording without events may have other observations
-  throw std::runtime_error(fmt::format("no event {}: the recording has events from {} s to {} s",
-                                       limitsText(limits), formatSeconds(span_ns->first),
-                                       formatSeconds(span_ns->second)));
-}
 
 /// An existing file is replaced only if it is a rawlog, and none of the inputs.
 void refuseToDestroy(const ImportArguments& arguments) {
@@ -97,7 +63,7 @@ int runImport(const ImportArguments& arguments) {
       }
       progress.show(recording->progress());
     }
-    if (all_events == 0) refuseLimitsWithoutEvents(arguments, limits);
+    if (all_events == 0) refuseLimitsWithoutEvents(arguments.source, limits);
     if (all_events + poses + others == 0) {
       throw std::runtime_error("the recording holds nothing " + limitsText(limits));
     }

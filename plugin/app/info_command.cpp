@@ -172,8 +172,8 @@ int runInfo(const InfoArguments& arguments) {
   RecordingSource source = arguments.source;
   source.faults.latency_ns = 0;  // latency changes no time stamp
   source.complete = false;
-  const std::unique_ptr<Recording> recording =
-      openInterval(source, resolve(arguments.times, source));
+  const TimeLimits limits = resolve(arguments.times, source);
+  const std::unique_ptr<Recording> recording = openInterval(source, limits);
   Contents contents;
   PatientSurveyor surveyor(defaultOptions());
   std::exception_ptr stopped;
@@ -195,6 +195,7 @@ int runInfo(const InfoArguments& arguments) {
     fmt::print("truth: {} depth maps of camera 0\n", truth.size());
   }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
+  if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source, limits);
   std::vector<Warning> warnings = surveyor.finish(quiet);
   for (Warning& warning : warningsOf(contents, recording->counts())) {
     warnings.push_back(std::move(warning));

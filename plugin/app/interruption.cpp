@@ -12,7 +12,7 @@
 namespace efm {
 namespace {
 
-constexpr std::array<int, 2> kSignals = {SIGINT, SIGTERM};
+constexpr std::array<int, 3> kSignals = {SIGINT, SIGTERM, SIGHUP};
 
 /// `timeout` sends its signal twice: to the process and to its group.
 constexpr double kSameSignalS = 0.3;
@@ -31,7 +31,7 @@ double secondsSince(const std::timespec& before) {
          1e-9 * static_cast<double>(now.tv_nsec - before.tv_nsec);
 }
 
-/// All calls are safe in a handler, which the two signals do not interrupt.
+/// All calls are safe in a handler, which the signals do not interrupt.
 void noteSignal(int signal) {
   const int error = errno;
   if (signal_came == 0) {

@@ -5,7 +5,7 @@
 
 namespace efm {
 
-/// While it lives, the first SIGINT or SIGTERM of the process is a request to stop, and a terminal
+/// While it lives, the first SIGINT, SIGTERM or SIGHUP of the process is a request to stop, and a terminal
 /// says so. A second one ends the process at once, unless it comes within 0.3 s of the first. One
 /// object at a time.
 class Interruption {

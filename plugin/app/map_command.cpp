@@ -159,7 +159,11 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
   if (outcome.report.counts.keyframes > 0 && !quiet)
     std::cout << summaryOf(outcome.report, kind, output.folder());
-  if (outcome.error) return fail(readerOf(arguments).withOrigins(*outcome.error));
+  if (outcome.error) {
+    const OptionReader reader = readerOf(arguments);
+    if (const auto wrong = reader.wrongOption(*outcome.error)) return fail(*wrong, kUsageStatus);
+    return fail(reader.withOrigins(*outcome.error));
+  }
   if (!outcome.report.stopped_at) {
     return arguments.strict && failStrictly(outcome.report.warnings) ? kFailedStatus : 0;
   }
@@ -238,6 +242,11 @@ void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
   }
 }
 
+/// Throws a UsageError where an error is about an option that was given.
+void refuseOption(const MappingArguments& arguments, const std::invalid_argument& error) {
+  if (const auto wrong = readerOf(arguments).wrongOption(error.what())) throw UsageError(*wrong);
+}
+
 /// Runs a job and writes its results.
 /// @param kind of the output folder.
 /// @param take receives each keyframe, in order, in a thread of its own.
@@ -255,7 +264,12 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     const RecordingSource source = sourceOf(arguments, job.options);
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseOutputFolder(folder, kind, arguments, source);
-    survey(source, job);
+    try {
+      survey(source, job);
+    } catch (const std::invalid_argument& error) {
+      refuseOption(arguments, error);
+      throw;
+    }
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes);
@@ -275,6 +289,9 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
       outcome = runMapping(job, *recording);
       writer.finish();
     } catch (const Interrupted&) {
+      throw;
+    } catch (const std::invalid_argument& error) {
+      refuseOption(arguments, error);
       throw;
     } catch (const std::runtime_error& error) {
       if (written == 0) throw;

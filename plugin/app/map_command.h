@@ -35,7 +35,7 @@ struct DepthArguments : MappingArguments {
 
 /// `event-fusion map`: plays a recording and writes the map's folder. Prints a summary to stdout,
 /// warnings and errors to stderr.
-/// SIGINT or SIGTERM ends the run as the end of the recording would; a second one kills it. In
+/// SIGINT, SIGTERM or SIGHUP ends the run as the end of the recording would; a second one kills it. In
 /// the first look at the recording (automatic options) it ends without a result: Interrupted.
 /// @return the process's exit status: 0 only if the whole recording is mapped, 130 where a signal
 /// stopped it.
@@ -43,7 +43,7 @@ struct DepthArguments : MappingArguments {
 /// written.
 int runMap(const MapArguments& arguments);
 
-/// `event-fusion depth`: maps one window. SIGINT or SIGTERM ends it without a result, unless the
+/// `event-fusion depth`: maps one window. SIGINT, SIGTERM or SIGHUP ends it without a result, unless the
 /// keyframe is made: then its files are written.
 /// @throws Interrupted if a signal came before; an earlier result stays.
 int runDepth(const DepthArguments& arguments);

@@ -3,14 +3,35 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/app/observed_statistics.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/time_cut.h"
+#include "plugin/session/time_text.h"
 
 namespace efm {
+namespace {
+
+/// Times of the first and the last event of the whole recording.
+std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(const RecordingSource& source) {
+  const std::unique_ptr<Recording> recording = openRecording(source);
+  std::optional<std::pair<std::int64_t, std::int64_t>> span_ns;
+  while (const auto observation = recording->next()) {
+    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+    if (!packet || packet->events.empty()) continue;
+    const std::int64_t first_ns = packet->events.front().t_ns;
+    const std::int64_t last_ns = packet->events.back().t_ns;
+    if (!span_ns) span_ns.emplace(first_ns, last_ns);
+    span_ns = {std::min(span_ns->first, first_ns), std::max(span_ns->second, last_ns)};
+  }
+  return span_ns;
+}
+
+}  // namespace
 
 std::int64_t startOf(const RecordingSource& source) {
   RecordingSource events;  // their times need no pose and no transform
@@ -54,6 +75,15 @@ std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits
   source.start_ns = limits.t0_ns;
   source.end_ns = limits.t1_ns;
   return cutTime(openRecording(source), limits.t0_ns, limits.t1_ns);
+}
+
+void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& limits) {
+  if (!limits.t0_ns && !limits.t1_ns) return;
+  const auto span_ns = eventSpan(source);
+  if (!span_ns) return;  // a recording without events may have other observations
+  throw std::runtime_error(fmt::format("no event {}: the recording has events from {} s to {} s",
+                                       limitsText(limits), formatSeconds(span_ns->first),
+                                       formatSeconds(span_ns->second)));
 }
 
 std::vector<Warning> lossWarnings(const RecordingCounts& counts) {

@@ -38,6 +38,10 @@ TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
 /// events outside are not read, where the format has an index.
 std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits);
 
+/// Refuses time limits without events: they may be mistyped. A recording without any event passes.
+/// @throws std::runtime_error naming the times of the recording's events.
+void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& limits);
+
 /// Warnings of the readers, and of what the recording lacks: packets, the times of events, or
 /// events that were left out.
 std::vector<Warning> lossWarnings(const RecordingCounts& counts);

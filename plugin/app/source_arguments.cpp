@@ -70,7 +70,7 @@ void addSource(CLI::App& command, RecordingSource& source) {
                   "Leave out up to N bad events of the recording: lines that are none (text), "
                   "pixels outside the sensor, times over 10 ms late (default 0: an error)")
       ->type_name("N")
-      ->check(CLI::NonNegativeNumber);
+      ->check(zeroOrMore());
   command
       .add_option_function<std::vector<std::string>>(
           "--perturb",

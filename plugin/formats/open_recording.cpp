@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "plugin/calibration/calibration_file.h"
 #include "plugin/formats/merged_recording.h"
 #include "plugin/formats/rawlog_recording.h"
 #include "plugin/formats/rawlog_signature.h"
@@ -75,15 +76,40 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
   if (!all.default_size) all.default_size = parts.default_size;
 }
 
+template <typename Read>
+bool reads(const Read& read) {
+  try {
+    read();
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+/// Says what a source is that no format of events takes.
+[[noreturn]] void refuseBesideOthers(const Path& path, const ReaderOptions& options) {
+  const std::string name = path.string();
+  if (path.extension() == ".ini") {
+    throw std::runtime_error(name +
+                             ": an .ini file among the sources: expected one option file, before "
+                             "the recording; a calibration is given with --calibration");
+  }
+  if (reads([&] { readPoses(path, options); })) {
+    throw std::runtime_error(name + ": poses: expected --poses " + name);
+  }
+  if (reads([&] { readCalibration(path); })) {
+    throw std::runtime_error(name + ": a calibration: expected --calibration " + name);
+  }
+  requireRawlog(path);
+  throw std::runtime_error(name + ": a rawlog beside other sources: expected it alone");
+}
+
 /// Files of the same format are opened together.
 RecordingParts openParts(const RecordingSource& source) {
   RecordingParts all;
   for (std::size_t i = 0; i < source.files.size();) {
     const RecordingFormat* const format = formatOf(source.files[i], source.format);
-    if (format == nullptr) {
-      throw std::runtime_error(source.files[i].string() +
-                               ": a rawlog beside other sources: expected it alone");
-    }
+    if (format == nullptr) refuseBesideOthers(source.files[i], source.reader);
     std::vector<Path> files = {source.files[i++]};
     while (i < source.files.size() && formatOf(source.files[i], source.format) == format) {
       files.push_back(source.files[i++]);
@@ -98,12 +124,15 @@ RecordingParts openParts(const RecordingSource& source) {
   return all;
 }
 
-/// The size of a camera's sensor: of the stream, the given calibration, or the format's usual one.
+/// The size of a camera's sensor: of the stream, the recording's own calibration, the given one, or
+/// the format's usual one.
 std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera,
                                  const Calibration* given) {
   if (const auto size = parts.cameras[camera]->size()) return size;
-  if (given != nullptr && camera < given->rig.cameras.size()) {
-    const CameraModel& model = given->rig.cameras[camera].model;
+  const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
+  for (const Calibration* const calibration : {own, given}) {
+    if (calibration == nullptr || camera >= calibration->rig.cameras.size()) continue;
+    const CameraModel& model = calibration->rig.cameras[camera].model;
     if (model.width > 0) return CameraSize{model.width, model.height};
   }
   return parts.default_size;

@@ -102,6 +102,9 @@ void RawlogRecording::takeActions(const mrpt::obs::CSensoryFrame& frame) {
 /// MRPT treats every exception of a stream before an object's name as the end of the file.
 std::string RawlogRecording::whyStopped(const std::exception& error) {
   std::string reason = reasonOf(error);
+  if (reason.find("Assert condition failed") != std::string::npos) {
+    return "the data are damaged: they are no object that MRPT wrote";
+  }
   if (reason.find("EOF") == std::string::npos) return reason;
   try {
     stream_.atEnd();  // throws the same exception again

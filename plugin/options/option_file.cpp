@@ -229,6 +229,23 @@ std::string OptionReader::withOrigins(std::string error) const {
   return error;
 }
 
+std::optional<std::string> OptionReader::wrongOption(const std::string& error) const {
+  for (const auto& [name, given] : given_) {
+    const std::string section = fmt::format("[{}] ", name.first);
+    std::size_t begin = error.find(section + name.second + " ");
+    if (begin != std::string::npos) {
+      begin += section.size();
+    } else if (error.rfind(name.second + " = ", 0) == 0) {
+      begin = 0;
+    } else {
+      continue;
+    }
+    if (error.find(": must be ", begin) == std::string::npos) continue;
+    return given.text + ": " + error.substr(begin);
+  }
+  return std::nullopt;
+}
+
 std::string OptionReader::given(std::string_view section, std::string_view key) const {
   const auto found = given_.find({std::string(section), std::string(key)});
   return found == given_.end() ? std::string() : found->second.text;

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -53,6 +54,10 @@ class OptionReader {
   std::string given(std::string_view section, std::string_view key) const;
   /// An error about options, "… [rig] cameras …", with where and how they were given.
   std::string withOrigins(std::string error) const;
+  /// An error that says of an option that was given, "[rig] cameras = 5: must be …", or
+  /// "cameras = 5: must be …" in the beginning: it then begins with where and how it was given.
+  /// Nothing for other errors.
+  std::optional<std::string> wrongOption(const std::string& error) const;
 
  private:
   void readLines(std::string_view text, const OptionOrigin& file);

@@ -47,6 +47,11 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
   const auto text = [&](const TimeSpan& span) {
     return timeText(span.first_ns, span.last_ns, start_ns);
   };
+  const auto& [t0_ns, t1_ns] = options.limits;
+  if ((t0_ns && *t0_ns > status.events->last_ns) || (t1_ns && *t1_ns <= status.events->first_ns)) {
+    return fmt::format("no event lies {}: the events span {}", limitsText(options.limits),
+                       text(*status.events));
+  }
   const std::string spans =
       fmt::format("the events span {}, the poses {}", text(*status.events), text(*status.poses));
   const std::int64_t first_ns = std::max(status.events->first_ns, status.poses->first_ns);

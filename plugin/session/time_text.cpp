@@ -33,6 +33,14 @@ std::string timeText(std::int64_t first_ns, std::int64_t last_ns,
                      offsetText(last_ns, *start_ns));
 }
 
+std::string limitsText(const TimeLimits& limits) {
+  std::string text;
+  if (limits.t0_ns) text += fmt::format("from --t0 {} s", formatSeconds(*limits.t0_ns));
+  if (limits.t0_ns && limits.t1_ns) text += " ";
+  if (limits.t1_ns) text += fmt::format("until --t1 {} s", formatSeconds(*limits.t1_ns));
+  return text;
+}
+
 std::string durationText(double seconds) {
   const auto whole = static_cast<long long>(std::llround(std::max(0.0, seconds)));
   if (whole < 60) return fmt::format("{} s", whole);

@@ -170,6 +170,51 @@ TEST_F(MapCommand, WrongArgumentsAreErrorsThatNameThem) {
               HasSubstr("no event in the window 20.000000000 to 21.000000000 s"));
 }
 
+TEST_F(MapCommand, OptionsThatTheRecordingOrTheMachineRefusesAreErrorsOfTheCommandLine) {
+  write(SyntheticRecording());
+  for (const auto& [set, words] : std::initializer_list<std::pair<std::string, const char*>>{
+           {"rig.cameras=0,5", ": cameras = 5: must be a camera of the recording: 0 to 1"},
+           {"dsi.reference_camera=7", ": reference_camera = 7: must be a camera of"},
+           {"rig.time_offsets_s=1", ": time_offsets_s (how many) = 1: must be one per camera"},
+           {"dsi.width=65535", ": width = 65535: must be at most 67108864 pixels"},
+           {"dsi.min_depth_m=1e-4", ": must be at least 0.001"},
+           {"dsi.max_depth_m=1e300", ": must be at most 1000000"}}) {
+    const Result result = run("map rig.ini data --out out --set " + set);
+    EXPECT_EQ(result.status, 2) << set;
+    EXPECT_THAT(result.err, HasSubstr("event-fusion: error: --set " + set + words));
+  }
+  for (const auto& [arguments, words] : std::initializer_list<std::pair<std::string, const char*>>{
+           {"info data --skip-bad-events -1", "--skip-bad-events: '-1': expected a number, 0 or"},
+           {"info data --t0 1 --t0 2", "--t0: given more than once"},
+           {"evaluate depth data data --scale 0", "--scale: '0': expected a number above 0"}}) {
+    const Result result = run(arguments);
+    EXPECT_EQ(result.status, 2) << arguments;
+    EXPECT_THAT(result.err, HasSubstr("event-fusion: error: " + std::string(words)));
+  }
+}
+
+TEST_F(MapCommand, ErrorsNameTheFileThatIsWrong) {
+  write(SyntheticRecording());
+  std::string camchain = contentOf("data/camchain.yaml");
+  const auto size = camchain.find("[120, 90]");
+  ASSERT_NE(size, std::string::npos) << camchain;
+  std::ofstream(folder() / "half.yaml") << camchain.replace(size, 9, "[60, 45]");
+  const std::string events = "map data/cam0/events.txt data/cam1/events.txt ";
+  for (const auto& [arguments, words] : std::initializer_list<std::pair<std::string, const char*>>{
+           {"map rig.ini data --calibration half.yaml",
+            "half.yaml: camera 0 has 60x45 pixels: expected 120x90 pixels, as the recording has"},
+           {events + "data/poses.txt", "data/poses.txt: poses: expected --poses data/poses.txt"},
+           {events + "data/camchain.yaml", "data/camchain.yaml: a calibration: expected --calibr"},
+           {"map rig.ini rig.ini data", "rig.ini: an .ini file among the sources"},
+           {"map rig.ini data --t0 90", "no event lies from --t0 90.000000000 s: the events span"},
+           {"export data --to mcap --t0 90",
+            "no event from --t0 90.000000000 s: the recording has"},
+           {"info data --t0 90", "no event from --t0 90.000000000 s: the recording has events"}}) {
+    const std::string out = arguments[0] == 'i' ? "" : " --out out";
+    EXPECT_THAT(errorOf(arguments + out), HasSubstr(words));
+  }
+}
+
 TEST_F(MapCommand, EventsOutsideTheSensorAreAnError) {
   SyntheticRecording recording;
   recording.events[0].back().x = 120;

@@ -202,9 +202,9 @@ TEST_F(OverrideOptions, TimeOffsetsMoveACamerasEventsToThePosesClock) {
   EXPECT_NE(mapOf("data"), map);
   EXPECT_EQ(mapOf("data --set rig.time_offsets_s=0,-0.042"), map);
   EXPECT_THAT(errorOf("map rig.ini data --out out --set rig.time_offsets_s=0"),
-              HasSubstr("[rig] time_offsets_s (how many) = 1: must be one per camera"));
+              HasSubstr("time_offsets_s (how many) = 1: must be one per camera"));
   EXPECT_THAT(errorOf("map rig.ini data --out out --set rig.time_offsets_s=0,0,0"),
-              HasSubstr("[rig] time_offsets_s (how many) = 3: must be one per camera"));
+              HasSubstr("time_offsets_s (how many) = 3: must be one per camera"));
 }
 
 // --- Real recordings -----------------------------------------------------------------------------
