@@ -36,6 +36,10 @@ namespace efm {
 /// recording needs no `finish`. With odometry alone it does not, because poses, which are better,
 /// may follow.
 ///
+/// Automatic options (the default of depth limits, planes and windows) are chosen from the first
+/// second of events with poses, or from all of a shorter recording. Then the depth limits follow
+/// the keyframes.
+///
 /// If mapping fails (no memory, a sink that throws), the caller who feeds the builder gets the
 /// error, and so does each later one until mapping succeeds. A caller who asks for the map gets the
 /// map so far.

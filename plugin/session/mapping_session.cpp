@@ -182,9 +182,13 @@ bool MappingSession::chooseAutomatic() {
   const std::optional<WindowData> first = mapper_.window();
   if (!first && !finished_) return false;
   std::vector<WindowSample> samples;
-  if (first) samples.push_back(sampleOf(*first));
+  std::optional<double> duration_s;  // not known before the end
+  if (first) {
+    samples.push_back(sampleOf(*first));
+    if (finished_) duration_s = secondsBetween(first->window.t0_ns, first->window.t1_ns);
+  }
   status_.chosen =
-      chooseOptions(options_.automatic, mapper_.rig(), samples, std::nullopt, options_.mapper);
+      chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, options_.mapper);
   const AutomaticOptions automatic = std::exchange(options_.automatic, {});
   if (automatic.min_depth_m || automatic.max_depth_m) {
     depth_follower_.emplace(automatic, options_.mapper.keyframe.planes);

@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+#include <string>
+
+#include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/temporary_folder.h"
@@ -40,6 +44,24 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOn) {
   // 0.5 / 8 of 1 / (2 m), a little over one step of the planes.
   const double step = (1.0 / 1.0 - 1.0 / 5.0) / 29;
   EXPECT_LT(depthErrors(pairs).median_inverse, 1.5 * step);
+}
+
+TEST(MappingSession, AutomaticOptionsAreChosenFromTheFirstWindow) {
+  const SyntheticRecording recording;
+  EventFusionOptions options = syntheticOptions();
+  options.automatic = defaultOptions().automatic;
+  MappingSession session(options);
+
+  const auto keyframes = mapAll(session, recording);
+
+  ASSERT_FALSE(keyframes.empty());
+  std::map<std::string, double> chosen;
+  for (const ChosenOption& option : session.status().chosen) chosen[option.key] = option.value;
+  EXPECT_EQ(chosen.size(), 5U);
+  EXPECT_LT(chosen["min_depth_m"], SyntheticRecording::kDepthM);
+  EXPECT_GT(chosen["max_depth_m"], SyntheticRecording::kDepthM);
+  const Window& window = keyframes.front().window;
+  EXPECT_NEAR(secondsBetween(window.t0_ns, window.t1_ns), chosen["window_s"], 1e-6);
 }
 
 TEST(MappingSession, CountsOfOverlappingWindowsAddUp) {
