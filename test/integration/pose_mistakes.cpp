@@ -64,6 +64,11 @@ std::vector<Mistake> poseMistakes() {
        "",
        kFine,
        {"warning: speed:", "are positions in metres"}},
+      {"positions twice as large",
+       eachPose([](StampedPose& pose, const StampedPose&) { pose.T_world_rig.translation *= 2; }),
+       "",
+       kFine,
+       {"warning: scale: the depths from the motion are", "both must be in metres"}},
       {"poses that are T_rig_world",
        eachPose([](StampedPose& pose, const StampedPose&) {
          pose.T_world_rig = pose.T_world_rig.inverse();
