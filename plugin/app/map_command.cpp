@@ -261,7 +261,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   std::optional<KeyframePictures> pictures;
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
-    const RecordingSource source = sourceOf(arguments, job.options);
+    RecordingSource source = sourceOf(arguments, job.options);
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseOutputFolder(folder, kind, arguments, source);
     try {
@@ -270,6 +270,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
       refuseOption(arguments, error);
       throw;
     }
+    source = sourceOf(arguments, job.options);  // the stride may have been chosen
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes);
@@ -355,9 +356,9 @@ int runDepth(const DepthArguments& arguments) {
   const EventFusionOptions options = job.options;
   std::unique_ptr<NpyDsiFile> dsi;
   if (arguments.save_dsi) {
-    job.make_dsi_sink = [&](const ReferenceView& view) {
+    job.make_dsi_sink = [&](const ReferenceView& view, int num_planes) {
       dsi = std::make_unique<NpyDsiFile>(outputFolder(arguments, OutputKind::kDepth) / "dsi.npy",
-                                         options.mapper.keyframe.planes.num_planes, view);
+                                         num_planes, view);
       return dsi.get();
     };
   }

@@ -108,10 +108,11 @@ class Player {
   void offerDsiSink(const mrpt::obs::CObservation& observation) {
     if (sink_offered_ || !job_.make_dsi_sink) return;
     const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
-    if (!events || events->camera_index != job_.options.mapper.keyframe.reference_camera) return;
+    const KeyframeMapperOptions& keyframe = job_.options.mapper.keyframe;
+    if (!events || events->camera_index != keyframe.reference_camera) return;
     sink_offered_ = true;
-    builder_.setDsiSink(
-        job_.make_dsi_sink(makeReferenceView(events->camera, job_.options.mapper.keyframe.view)));
+    builder_.setDsiSink(job_.make_dsi_sink(makeReferenceView(events->camera, keyframe.view),
+                                           keyframe.planes.num_planes));
   }
 
   /// An error of writing must not count as an error of reading: it is thrown after the step.

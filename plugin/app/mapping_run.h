@@ -34,9 +34,9 @@ struct MappingJob {
   std::function<void(const KeyframeDepthMap&)> on_keyframe;
   /// Measures the stages of the mapping. Default: the processor time of the whole process.
   ProcessorClock processor_clock;
-  /// Makes the receiver of the DSI's planes. Called once, as soon as the reference camera is known.
-  /// May be empty.
-  std::function<DsiSink*(const ReferenceView&)> make_dsi_sink;
+  /// Makes the receiver of the DSI's planes, of this number. Called once, as soon as the reference
+  /// camera is known. May be empty.
+  std::function<DsiSink*(const ReferenceView&, int num_planes)> make_dsi_sink;
 };
 
 /// The results of a run.

@@ -354,7 +354,7 @@ void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& fil
   mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (newest_depth_.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
-  const cv::Mat3b picture = depthPicture(newest_depth_, options_.mapper.keyframe.planes);
+  const cv::Mat3b picture = depthPicture(newest_depth_, session_->planes());
   writeAtomically(file, [&](const std::filesystem::path& temporary) {
     if (!cv::imwrite(temporary.string(), picture)) throw std::runtime_error("imwrite failed");
   });

@@ -81,6 +81,10 @@ class MappingSession {
   void applyPending();
 
   const GlobalCloud& cloud() const { return cloud_.cloud(); }
+  /// The depth planes of the next keyframe.
+  const DepthPlanesOptions& planes() const {
+    return depth_follower_ ? depth_follower_->planes() : options_.mapper.keyframe.planes;
+  }
   /// The poses of this session's keyframes, in their order: in the cloud, and by the tracker.
   const std::vector<Rigid3>& T_world_ref() const { return cloud_.T_world_ref(); }
   const std::vector<Rigid3>& T_odom_ref() const { return T_odom_ref_; }

@@ -455,6 +455,17 @@ TEST_F(MapCommand, TheMaximaOfTheSavedDsiAreTheConfidences) {
   }
 }
 
+TEST_F(MapCommand, TheSavedDsiHasTheChosenPlanes) {
+  write(SyntheticRecording());
+  const std::string automatic = " --set dsi.num_planes=auto --set dsi.min_depth_m=0.05";
+  ASSERT_EQ(run("depth rig.ini data --out out --t0 10.1 --t1 10.3 --save-dsi" + automatic).status,
+            0);
+  const nlohmann::json planes = reportIn("out")["options"]["dsi"]["num_planes"];
+  ASSERT_NE(planes, 100) << "not the placeholder";
+  EXPECT_THAT(contentOf("out/dsi.npy").substr(0, 128),
+              HasSubstr("'shape': (" + std::to_string(planes.get<int>()) + ", "));
+}
+
 TEST_F(MapCommand, DepthUsesTheGivenReferenceTime) {
   write(SyntheticRecording());
   ASSERT_EQ(run("depth rig.ini data --out a --t0 10.1 --t1 10.3").status, 0);
