@@ -91,6 +91,18 @@ std::string remedyOf(const PoseFinding& finding, const Rig& rig) {
   return "";
 }
 
+/// A mistake beside the one that the warning's name says; two mistakes share a name.
+std::string alternativeText(PoseMistake mistake) {
+  switch (mistake) {
+    case PoseMistake::kCamerasSwapped:
+      return "the events of cameras 0 and 1 are exchanged";
+    case PoseMistake::kStereoInverted:
+      return "the transform between cameras 0 and 1 is inverted";
+    default:
+      return std::string("it is ") + nameOf(mistake);
+  }
+}
+
 }  // namespace
 
 Warning poseWarning(const PoseFinding& finding, const Rig& rig) {
@@ -106,7 +118,7 @@ Warning poseWarning(const PoseFinding& finding, const Rig& rig) {
   warning.text =
       fmt::format("the events are {:.1f} times as sharp {}", finding.gain, remedyOf(finding, rig));
   for (const PoseMistake other : finding.alternatives) {
-    warning.text += fmt::format("; or it is {}, which explains them as well", nameOf(other));
+    warning.text += fmt::format("; or {}, which explains them as well", alternativeText(other));
   }
   return warning;
 }

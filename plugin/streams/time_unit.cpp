@@ -159,6 +159,13 @@ bool HeaderWord::isTime() const {
   return std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
 }
 
+std::optional<double> metresOf(std::string_view unit) {
+  if (unit == "m") return 1;
+  if (unit == "cm") return 0.01;
+  if (unit == "mm") return 0.001;
+  return std::nullopt;
+}
+
 HeaderWord headerWord(std::string_view text) {
   std::string lower;
   for (const char c : text) {
@@ -173,17 +180,22 @@ HeaderWord headerWord(std::string_view text) {
   if (bracket != std::string_view::npos) {
     const std::size_t end = content.find_first_of("])", bracket);
     const std::size_t length = std::min(end, content.size()) - bracket - 1;
-    word.time_exponent = timeExponentOf(trimmed(content.substr(bracket + 1, length)));
+    word.unit = std::string(trimmed(content.substr(bracket + 1, length)));
+    word.time_exponent = timeExponentOf(word.unit);
     return word;
   }
   // "us": a unit alone. "s" may be another thing.
   if (const auto unit = word.name.size() > 1 ? timeExponentOf(word.name) : std::nullopt) {
-    return {"t", unit};
+    return {"t", word.name, unit};
   }
   const std::size_t underscore = word.name.rfind('_');
   if (underscore != std::string::npos) {
-    word.time_exponent = timeExponentOf(std::string_view(word.name).substr(underscore + 1));
-    if (word.time_exponent) word.name.resize(underscore);
+    const std::string unit = word.name.substr(underscore + 1);
+    word.time_exponent = timeExponentOf(unit);
+    if (word.time_exponent || metresOf(unit)) {
+      word.unit = unit;
+      word.name.resize(underscore);
+    }
   }
   return word;
 }

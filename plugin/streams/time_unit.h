@@ -18,6 +18,9 @@ std::optional<int> timeExponentOf(std::string_view unit);
 /// The name of a unit: "us" for -6.
 std::string timeUnitOf(int exponent);
 
+/// Metres in a unit of length: 0.001 for "mm"; nothing for other words than m, cm and mm.
+std::optional<double> metresOf(std::string_view unit);
+
 /// The times at the beginning of a file that does not name their unit.
 struct TimeSample {
   int count = 0;
@@ -59,10 +62,11 @@ int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,
                      const std::string& where);
 
 /// What a word of a header names, and the unit in its brackets or after its last underscore:
-/// "#timestamp [ns]" is timestamp and ns, "t_us" is t and us, "microseconds" is t and us. In lower
-/// case.
+/// "#timestamp [ns]" is timestamp and ns, "t_us" is t and us, "microseconds" is t and us, "x_mm" is
+/// x and mm. In lower case.
 struct HeaderWord {
   std::string name;
+  std::string unit;                  ///< Empty where there is none.
   std::optional<int> time_exponent;  ///< Of a time.
 
   bool isTime() const;

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -61,6 +62,20 @@ struct PoseColumns {
   std::size_t count = kPoseFields;  // of a line
   bool named = false;
   std::optional<int> time_exponent;
+  Eigen::Vector3d metres = Eigen::Vector3d::Ones();  // in the unit of tx, ty and tz
+
+  /// Takes the unit that a header gives to a field; rotations have none.
+  /// @throws std::runtime_error for an unknown unit of a position.
+  void setUnit(std::size_t field, const HeaderWord& word) {
+    if (field == 0) time_exponent = word.time_exponent;
+    if (field == 0 || field > 3 || word.unit.empty()) return;
+    const std::optional<double> unit_m = metresOf(word.unit);
+    if (!unit_m) {
+      throw std::runtime_error(fmt::format("the unit {} of {}: expected m, cm or mm",
+                                           inQuotes(word.unit), kPoseFieldNames[field]));
+    }
+    metres[static_cast<Eigen::Index>(field) - 1] = *unit_m;
+  }
 };
 
 /// The columns that a header names; nothing where the line is no header.
@@ -73,18 +88,19 @@ std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
   columns.count = 0;
   std::array<bool, kPoseFields> found{};
   bool angles = false;
+  std::optional<std::size_t> field;
   for (const std::string_view text : words) {
     const HeaderWord word = headerWord(text);
     if (word.name.empty()) {
-      if (columns.count == columns.column[0] + 1) columns.time_exponent = word.time_exponent;
+      if (field) columns.setUnit(*field, word);
       continue;
     }
-    const std::optional<std::size_t> field = poseFieldOf(word);
+    field = poseFieldOf(word);
     angles = angles || startsWithAny(word.name, {"roll", "pitch", "yaw", "euler"});
     if (field && !found[*field]) {
       found[*field] = true;
       columns.column[*field] = columns.count;
-      if (*field == 0) columns.time_exponent = word.time_exponent;
+      columns.setUnit(*field, word);
     }
     ++columns.count;
   }
@@ -187,6 +203,7 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
             "commas without a header: expected a header with the columns' names");
       }
       poses.push_back(parseTumPose(fields, exponent));
+      poses.back().T_world_rig.translation.array() *= columns.metres.array();
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(fmt::format("{}:{}: {}", file.string(), line.number, error.what()));
     }

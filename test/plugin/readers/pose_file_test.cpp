@@ -77,6 +77,14 @@ TEST_F(PoseFile, TextHasTheColumnsOfTheTumBenchmarkOrOfItsHeader) {
        "5\n"
        "0.6;0.8;0;0;4;5;6;7\n",
        5, 7},
+      {"millimetres.csv",
+       "t_ns,qw,qx,qy,qz,x_mm,y_cm,z [m]\n5,0.5,0.5,0.5,0.5,1000,200,3\n"
+       "7,0.6,0.8,0,0,4000,500,6\n",
+       5, 7},
+      {"blank_millimetres.txt",
+       "# t [s] tx [mm] ty [mm] tz [mm] qx qy qz qw\n1.5 1000 2000 3000 0.5 0.5 0.5 0.5\n"
+       "2.5 4000 5000 6000 0.8 0 0 0.6\n",
+       1'500'000'000, 2'500'000'000},
   };
   for (const auto& row : rows) {
     expectTwo(readPoses(write(row.name, row.text)), row.t0_ns, row.t1_ns, row.name);
@@ -168,6 +176,8 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"a.txt", "1.5 1 2 3 0 0 0 1\nabc 1 2 3 0 0 0 1\n", "a.txt:2: 'abc 1 2 3 0 0 0 1': expected"},
       {"a.txt", "1.5,1,2,3,0,0,0,1\n", "a.txt:1: commas without a header"},
       {"a.csv", "#t [us], tx, ty, tz, qx, qy, qz\n", "there is no column qw"},
+      {"a.csv", "t_us,x [ft],y [ft],z [ft],qx,qy,qz,qw\n",
+       "a.csv:1: the unit 'ft' of tx: expected"},
       {"a.csv", "t_us,x,y,z,roll,pitch,yaw\n", "angles are not read, because"},
       {"a.txt", "1.5 1 2 3 10 20 30\n", "7 fields: expected 8, t tx ty tz qx qy qz qw (angles are"},
       {"a.txt", "1.5 1 0 0 0 1 2 3\n", "is the order t qx qy qz qw tx ty tz? A header names"},

@@ -10,6 +10,7 @@
 
 #include "mapping/geometry/angle.h"
 #include "plugin/calibration/camchain.h"
+#include "plugin/session/pose_warning.h"
 #include "plugin/session/session_warnings.h"
 #include "test/paths.h"
 #include "test/plugin/session/synthetic_recording.h"
@@ -284,6 +285,16 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
   sound.counts.cameras[0].outside_window = 60;
   options.limits.t0_ns = 5;
   EXPECT_THAT(sessionWarnings(sound, options), IsEmpty()) << "they were left out by a limit";
+}
+
+TEST(PoseWarning, SaysTwoMistakesOfOneNameApart) {
+  PoseFinding finding;
+  finding.mistake = PoseMistake::kCamerasSwapped;
+  finding.alternatives = {PoseMistake::kStereoInverted, PoseMistake::kInverted};
+  EXPECT_THAT(poseWarning(finding, Rig{}).text,
+              AllOf(HasSubstr("with the events of cameras 0 and 1 exchanged"),
+                    HasSubstr("; or the transform between cameras 0 and 1 is inverted, which"),
+                    HasSubstr("; or it is poses-inverted, which")));
 }
 
 }  // namespace
