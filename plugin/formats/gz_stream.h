@@ -16,16 +16,20 @@ namespace efm {
 
 using GzFile = std::unique_ptr<gzFile_s, int (*)(gzFile_s*)>;
 
+/// A pipe is read in small pieces, so that what was written to it is there soon.
+enum class GzSource { kFile, kPipe };
+
 /// A gzip file or a plain file as an MRPT stream for reading. A truncated file is an error, which
 /// mrpt::io::CFileGZInputStream does not notice.
 class GzInputStream : public mrpt::io::CStream {
  public:
+  /// Opening a pipe waits for its writer; reading, for more data.
   /// @throws std::runtime_error naming the file if it cannot be opened.
-  explicit GzInputStream(const std::filesystem::path& file);
+  explicit GzInputStream(const std::filesystem::path& file, GzSource source = GzSource::kFile);
 
   /// @throws std::runtime_error if the file is truncated or its compression is damaged.
   bool atEnd();
-  /// The fraction of the file that has been read, 0 to 1.
+  /// The fraction of the file that has been read, 0 to 1; of a pipe, 1.
   double progress() const;
 
   /// @return less than `count` only at the end.
@@ -40,6 +44,7 @@ class GzInputStream : public mrpt::io::CStream {
   void fill();
 
   GzFile file_;
+  std::size_t buffer_size_;
   std::uint64_t file_size_ = 0;
   std::uint64_t position_ = 0;
   std::vector<std::uint8_t> buffer_;

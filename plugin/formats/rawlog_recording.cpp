@@ -58,8 +58,8 @@ std::string reasonOf(const std::exception& error) {
 
 }  // namespace
 
-RawlogRecording::RawlogRecording(std::filesystem::path file)
-    : file_(std::move(file)), stream_(file_) {}
+RawlogRecording::RawlogRecording(std::filesystem::path file, GzSource source)
+    : file_(std::move(file)), stream_(file_, source) {}
 
 void RawlogRecording::readEntry() {
   auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);

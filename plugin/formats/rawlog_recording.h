@@ -17,7 +17,7 @@ namespace efm {
 class RawlogRecording : public Recording {
  public:
   /// @throws std::runtime_error naming the file if it cannot be opened.
-  explicit RawlogRecording(std::filesystem::path file);
+  explicit RawlogRecording(std::filesystem::path file, GzSource source = GzSource::kFile);
 
   /// @throws std::runtime_error "stopped at entry N of FILE: reason" if the file is truncated or
   /// damaged, or has an unknown class. Entries count from 0, as in MRPT's programs. All entries
