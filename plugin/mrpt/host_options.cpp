@@ -36,6 +36,14 @@ std::string placeIn(const mrpt::config::CConfigFileBase& source, const std::stri
   return nameOf(source) + ", section " + section + ":";
 }
 
+OptionOrigin originIn(const mrpt::config::CConfigFileBase& source, const std::string& section) {
+  OptionOrigin origin{placeIn(source, section), {}};
+  // Absolute, so that options saved to another folder name the same files.
+  const std::filesystem::path file = fileOf(source);
+  if (!file.empty()) origin.folder = std::filesystem::absolute(file).parent_path();
+  return origin;
+}
+
 std::vector<std::string> sectionsBelow(const mrpt::config::CConfigFileBase& source,
                                        const std::string& prefix) {
   std::vector<std::string> sections;
@@ -50,10 +58,7 @@ void readHostSection(const mrpt::config::CConfigFileBase& source, const std::str
                      std::string_view section, OptionReader& reader) {
   std::vector<std::string> keys;
   source.getAllKeys(host_section, keys);
-  OptionOrigin origin{placeIn(source, host_section), {}};
-  // Absolute, so that options saved to another folder name the same files.
-  const std::filesystem::path file = fileOf(source);
-  if (!file.empty()) origin.folder = std::filesystem::absolute(file).parent_path();
+  const OptionOrigin origin = originIn(source, host_section);
   for (const std::string& key : keys) {
     reader.set(section, key, source.read_string(host_section, key, ""), origin);
   }

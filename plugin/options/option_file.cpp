@@ -71,7 +71,8 @@ bool startsComment(std::string_view text) {
   return text.substr(0, 1) == ";" || text.substr(0, 1) == "#" || text.substr(0, 2) == "//";
 }
 
-/// The line up to a comment, which starts the line or follows a blank.
+}  // namespace
+
 std::string_view withoutComment(std::string_view line) {
   for (std::size_t i = 0; i < line.size(); ++i) {
     const bool after_blank = i == 0 || line[i - 1] == ' ' || line[i - 1] == '\t';
@@ -79,8 +80,6 @@ std::string_view withoutComment(std::string_view line) {
   }
   return line;
 }
-
-}  // namespace
 
 void OptionReader::readFile(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);

@@ -13,6 +13,10 @@
 
 namespace efm {
 
+/// A line, or a value, up to a comment: it begins with ';', '#' or "//", at the start or after a
+/// blank.
+std::string_view withoutComment(std::string_view line);
+
 /// The origin of options: a file.
 struct OptionOrigin {
   std::string name;              ///< Errors begin with it: "host.ini, section mapper_dsi:".
