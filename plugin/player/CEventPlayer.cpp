@@ -22,6 +22,8 @@ namespace {
 
 using mrpt::obs::CObservation;
 
+constexpr double kLongPauseS = 10;
+
 /// What the recording lacks; empty if nothing.
 std::string lossesOf(const RecordingCounts& counts) {
   std::string losses;
@@ -68,6 +70,7 @@ void CEventPlayer::begin() {
   start_ = std::chrono::steady_clock::now();
   shift_ns_ = 0;
   newest_ = {};
+  paused_until_ns_ = player_->startNs();
   if (options_.restamp == Restamp::kNow) {
     const std::int64_t first_ns = nanosecondsFrom(mrptTimeFrom(player_->startNs()));
     shift_ns_ = nanosecondsFrom(mrpt::Clock::now()) - first_ns;
@@ -109,12 +112,24 @@ void CEventPlayer::doProcess() {
 }
 
 CEventPlayer::Observations CEventPlayer::observationsDue(std::size_t max_count) {
-  Observations observations = player_->observationsUntil(now(), max_count);
+  const std::int64_t now_ns = now();
+  Observations observations = player_->observationsUntil(now_ns, max_count);
+  noteLongPause(now_ns);
   for (const CObservation::Ptr& observation : observations) {
     if (shift_ns_ != 0) shiftTimes(*observation, shift_ns_);
     newest_ = std::max(newest_, observation->timestamp);
   }
   return observations;
+}
+
+void CEventPlayer::noteLongPause(std::int64_t now_ns) {
+  const std::optional<std::int64_t> next_ns = player_->nextNs();
+  if (!next_ns || *next_ns == paused_until_ns_) return;
+  const double pause_s = secondsBetween(now_ns, *next_ns) / options_.speed;
+  if (pause_s < kLongPauseS) return;
+  paused_until_ns_ = *next_ns;
+  MRPT_LOG_WARN(fmt::format("{}: nothing comes for {:.0f} s, until {} s on the recording's clock",
+                            options_.recording, pause_s, formatSeconds(*next_ns)));
 }
 
 /// Its stamp is the newest: rawlog-grabber sorts by stamps, and never writes the last observation.

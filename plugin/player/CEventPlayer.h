@@ -23,9 +23,10 @@ namespace efm {
 /// too, and then plays what it owes as fast as the host takes it: it is late, but loses nothing.
 /// (MRPT 2.5.8 reads `max_queue_len` and lets the queue grow.)
 ///
-/// At the end it logs how many observations there were and how late the latest one was. A
-/// CObservationComment with this text follows the last observation, and then nothing. Has no thread
-/// of its own: `doProcess` reads the recording.
+/// A pause of the recording of more than 10 s is logged when it begins: it may come from poses on
+/// another clock. At the end the player logs how many observations there were and how late the
+/// latest one was. A CObservationComment with this text follows the last observation, and then
+/// nothing. Has no thread of its own: `doProcess` reads the recording.
 class CEventPlayer : public mrpt::system::COutputLogger, public mrpt::hwdrivers::CGenericSensor {
   DEFINE_GENERIC_SENSOR(CEventPlayer)
 
@@ -53,6 +54,7 @@ class CEventPlayer : public mrpt::system::COutputLogger, public mrpt::hwdrivers:
   void begin();
   std::int64_t now() const;
   Observations observationsDue(std::size_t max_count);
+  void noteLongPause(std::int64_t now_ns);
   mrpt::obs::CObservation::Ptr commentAtEnd();
 
   PlayerOptions options_;
@@ -60,8 +62,9 @@ class CEventPlayer : public mrpt::system::COutputLogger, public mrpt::hwdrivers:
   std::chrono::steady_clock::time_point start_;
   bool begun_ = false;
   bool ended_ = false;
-  std::int64_t shift_ns_ = 0;       // of all times
-  mrpt::Clock::time_point newest_;  // of the stamps that were delivered
+  std::int64_t paused_until_ns_ = 0;  // of the long pause that was logged last
+  std::int64_t shift_ns_ = 0;         // of all times
+  mrpt::Clock::time_point newest_;    // of the stamps that were delivered
 };
 
 }  // namespace efm

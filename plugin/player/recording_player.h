@@ -8,6 +8,7 @@
 #include <exception>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "plugin/recordings/recording.h"
@@ -40,6 +41,10 @@ class RecordingPlayer {
   std::vector<mrpt::obs::CObservation::Ptr> observationsUntil(std::int64_t now_ns,
                                                               std::size_t max_count);
 
+  /// When the next observation comes, as far as it was read; nothing where none waits.
+  std::optional<std::int64_t> nextNs() const {
+    return waiting_.empty() ? std::nullopt : std::optional(waiting_.begin()->first);
+  }
   /// Whether all observations were returned and the recording has no error.
   bool ended() const { return read_all_ && !error_ && waiting_.empty(); }
   /// The longest time from an observation's time to the call that returned it, on the recording's

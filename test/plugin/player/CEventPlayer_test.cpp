@@ -199,6 +199,29 @@ TEST_F(EventPlayer, RestampedObservationsBeginNowAndKeepTheirDistances) {
   EXPECT_EQ(events, recording_.totalEvents());
 }
 
+/// Poses on another clock would otherwise look like a sensor that hangs.
+TEST_F(EventPlayer, ALongPauseIsLoggedOnce) {
+  std::ofstream(folder() / "late.txt") << "10 0 0 0 0 0 0 1\n1700000000 0 0 0 0 0 0 1\n";
+  const auto player =
+      sensor("process_rate = 100\nrecording = data\nspeed = 1000\nposes = late.txt\n");
+  auto& logger = dynamic_cast<CEventPlayer&>(*player);
+  std::vector<std::string> warnings;
+  logger.setMinLoggingLevel(mrpt::system::LVL_WARN);
+  logger.logging_enable_console_output = false;
+  logger.logRegisterCallback([&](std::string_view text, const mrpt::system::VerbosityLevel,
+                                 std::string_view,
+                                 const mrpt::Clock::time_point) { warnings.emplace_back(text); });
+  player->initialize();
+  for (int i = 0; i < 100; ++i) {
+    player->doProcess();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_FALSE(logger.ended());
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_THAT(warnings[0], HasSubstr("data: nothing comes for 1"));
+  EXPECT_THAT(warnings[0], HasSubstr(" s, until 1700000000.000000000 s on"));
+}
+
 TEST_F(EventPlayer, APipeIsPlayedToo) {
   ASSERT_EQ(mkfifo((folder() / "pipe").c_str(), 0600), 0);
   std::thread writer([&] {
