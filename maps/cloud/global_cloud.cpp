@@ -17,6 +17,10 @@ namespace {
   throw std::invalid_argument("point " + pointText(point) + ": " + why);
 }
 
+[[noreturn]] void refuseMissing(std::uint64_t keyframe) {
+  throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is not in the map");
+}
+
 /// Bits for the keyframes with lower numbers; as many for those with higher ones.
 constexpr unsigned kLowerBits = GlobalCloud::kMaxNumberDifference;
 
@@ -70,20 +74,30 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
   if (keyframes_.count(keyframe) != 0) {
     throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is in the map already");
   }
-  const std::vector<CloudPoint> inliers = removeOutliers(points, options_.outliers);
-  Keyframe inserted;
-  inserted.voxels = voxelsOf(inliers);
-  const bool consistent = options_.consistency.consistency != Consistency::kNone;
-  if (consistent) inserted.verdicts.resize(inserted.voxels.size());
-  if (consistent && T_world_ref) {
-    inserted.grid.emplace(inliers, *T_world_ref, options_.consistency);
-  }
-  keyframes_.emplace(keyframe, std::move(inserted));
-  if (consistent) checkMutually(keyframe);
+  keyframes_.emplace(keyframe, keyframeOf(points, T_world_ref));
+  checkMutually(keyframe);
 }
 
-void GlobalCloud::requireInsertable(const std::vector<CloudPoint>& points) const {
-  for (const CloudPoint& point : points) voxelPointOf(point);
+void GlobalCloud::replace(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
+                          const std::optional<Rigid3>& T_world_ref) {
+  const auto replaced = keyframes_.find(keyframe);
+  if (replaced == keyframes_.end()) refuseMissing(keyframe);
+  Keyframe made = keyframeOf(points, T_world_ref);
+  forgetVerdictsOf(keyframe);
+  replaced->second = std::move(made);
+  checkMutually(keyframe);
+}
+
+/// The inliers of a keyframe, not yet checked by others.
+GlobalCloud::Keyframe GlobalCloud::keyframeOf(const std::vector<CloudPoint>& points,
+                                              const std::optional<Rigid3>& T_world_ref) const {
+  const std::vector<CloudPoint> inliers = removeOutliers(points, options_.outliers);
+  Keyframe keyframe;
+  keyframe.voxels = voxelsOf(inliers);
+  if (options_.consistency.consistency == Consistency::kNone) return keyframe;
+  keyframe.verdicts.resize(keyframe.voxels.size());
+  if (T_world_ref) keyframe.grid.emplace(inliers, *T_world_ref, options_.consistency);
+  return keyframe;
 }
 
 /// The sums of each voxel, sorted.
@@ -129,6 +143,7 @@ void GlobalCloud::check(Keyframe& checked, const Keyframe& by, unsigned bit) con
 }
 
 void GlobalCloud::checkMutually(std::uint64_t number) {
+  if (options_.consistency.consistency == Consistency::kNone) return;
   Keyframe& keyframe = keyframes_.at(number);
   visitNeighbors(number, [&](std::uint64_t other, Keyframe& neighbor) {
     check(keyframe, neighbor, bitOf(other, number));
@@ -137,11 +152,13 @@ void GlobalCloud::checkMutually(std::uint64_t number) {
 }
 
 void GlobalCloud::remove(std::uint64_t keyframe) {
-  if (keyframes_.erase(keyframe) == 0) {
-    throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is not in the map");
-  }
-  visitNeighbors(keyframe, [&](std::uint64_t other, Keyframe& neighbor) {
-    const unsigned bits_left = ~(1U << bitOf(keyframe, other));
+  if (keyframes_.erase(keyframe) == 0) refuseMissing(keyframe);
+  forgetVerdictsOf(keyframe);
+}
+
+void GlobalCloud::forgetVerdictsOf(std::uint64_t number) {
+  visitNeighbors(number, [&](std::uint64_t other, Keyframe& neighbor) {
+    const unsigned bits_left = ~(1U << bitOf(number, other));
     for (Verdicts& verdicts : neighbor.verdicts) {
       verdicts.supports = static_cast<std::uint16_t>(verdicts.supports & bits_left);
       verdicts.free_space_violations =

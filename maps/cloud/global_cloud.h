@@ -68,8 +68,10 @@ class GlobalCloud {
   void insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
               const std::optional<Rigid3>& T_world_ref = std::nullopt);
 
-  /// @throws std::invalid_argument where `insert` refuses one of the points.
-  void requireInsertable(const std::vector<CloudPoint>& points) const;
+  /// Replaces the points and the pose of a keyframe, as `remove` and `insert` do.
+  /// @throws std::invalid_argument as they do. The map is unchanged then.
+  void replace(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
+               const std::optional<Rigid3>& T_world_ref);
 
   /// Removes a keyframe. The map is as if it had never been inserted, and the number is free again.
   /// Cost: linear in the points of the keyframe and of those that it checked.
@@ -120,6 +122,8 @@ class GlobalCloud {
     std::optional<VisibilityGrid> grid;  // with consistency, where the pose is known
   };
 
+  Keyframe keyframeOf(const std::vector<CloudPoint>& points,
+                      const std::optional<Rigid3>& T_world_ref) const;
   VoxelPoint voxelPointOf(const CloudPoint& point) const;
   std::vector<Sums> voxelsOf(const std::vector<CloudPoint>& points) const;
   Eigen::Vector3d positionOf(const Sums& sums) const;
@@ -128,6 +132,7 @@ class GlobalCloud {
   template <typename Visit>
   void visitNeighbors(std::uint64_t number, const Visit& visit);
   void checkMutually(std::uint64_t number);
+  void forgetVerdictsOf(std::uint64_t number);
   bool isExcluded(const Keyframe& keyframe, std::size_t voxel) const;
   template <typename Visit>
   void visitVoxels(const Visit& visit) const;

@@ -2,8 +2,8 @@
 #include "maps/cloud/refined_cloud.h"
 
 #include <algorithm>
-#include <cassert>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace efm {
@@ -26,22 +26,50 @@ double maxMotion(const Rigid3& from, const Rigid3& to, double radius_m) {
 }  // namespace
 
 void RefinedCloud::insertFixed(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref) {
-  assert(T_world_ref_.empty());
+  if (!T_world_ref_.empty()) {
+    throw std::invalid_argument("a keyframe of an earlier map must come before new ones");
+  }
   cloud_.insert(fixed_, points, T_world_ref);
   ++fixed_;
 }
 
 void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_ref) {
-  cloud_.insert(fixed_ + T_world_ref_.size(), pointsInWorld(points, T_world_ref), T_world_ref);
+  const std::vector<CloudPoint> in_world = pointsInWorld(points, T_world_ref);
+  const std::size_t keyframe = T_world_ref_.size();
   T_world_ref_.push_back(T_world_ref);
-  if (!movable_) return;
-  const double radius_m = radiusOf(points);
-  kept_.push_back({std::move(points), radius_m});
+  try {
+    if (movable_) {
+      const double radius_m = radiusOf(points);
+      kept_.push_back({std::move(points), radius_m});
+    }
+    cloud_.insert(fixed_ + keyframe, in_world, T_world_ref);
+  } catch (...) {
+    forgetNewest();
+    throw;
+  }
 }
 
-void RefinedCloud::move(std::size_t keyframe, const Rigid3& T_world_ref) {
-  assert(movable_ && keyframe < T_world_ref_.size());
-  pending_[keyframe] = T_world_ref;
+void RefinedCloud::removeNewest() {
+  if (T_world_ref_.empty()) return;
+  cloud_.remove(fixed_ + T_world_ref_.size() - 1);
+  pending_.erase(T_world_ref_.size() - 1);
+  forgetNewest();
+}
+
+void RefinedCloud::forgetNewest() {
+  T_world_ref_.pop_back();
+  if (kept_.size() > T_world_ref_.size()) kept_.pop_back();
+}
+
+void RefinedCloud::move(std::map<std::size_t, Rigid3> T_world_ref) {
+  if (T_world_ref.empty()) return;
+  const std::size_t last = T_world_ref.rbegin()->first;
+  if (!movable_ || last >= T_world_ref_.size()) {
+    throw std::invalid_argument("keyframe " + std::to_string(last) + " cannot be moved: " +
+                                (movable_ ? "it is not in the cloud" : "keyframes are fixed"));
+  }
+  T_world_ref.merge(pending_);  // a new request replaces an earlier one
+  pending_ = std::move(T_world_ref);
 }
 
 void RefinedCloud::applyPending(double tolerance_m, std::size_t max_count) {
@@ -56,25 +84,22 @@ void RefinedCloud::applyPending(double tolerance_m, std::size_t max_count) {
       ++next;  // it stays pending
       continue;
     }
+    if (!stays) {
+      try {
+        put(keyframe, T_world_ref);
+      } catch (const std::invalid_argument&) {
+        pending_.erase(next);  // it would be refused again
+        throw;
+      }
+      ++moved;
+    }
     next = pending_.erase(next);
-    if (stays) continue;
-    put(keyframe, T_world_ref);
-    ++moved;
   }
 }
 
 void RefinedCloud::put(std::size_t keyframe, const Rigid3& T_world_ref) {
-  const std::vector<ViewPoint>& points = kept_[keyframe].points;
-  const auto insert = [&](const Rigid3& T_in_world) {
-    cloud_.insert(fixed_ + keyframe, pointsInWorld(points, T_in_world), T_in_world);
-  };
-  cloud_.remove(fixed_ + keyframe);
-  try {
-    insert(T_world_ref);
-  } catch (const std::invalid_argument&) {
-    insert(T_world_ref_[keyframe]);
-    throw;
-  }
+  cloud_.replace(fixed_ + keyframe, pointsInWorld(kept_[keyframe].points, T_world_ref),
+                 T_world_ref);
   T_world_ref_[keyframe] = T_world_ref;
 }
 

@@ -22,17 +22,22 @@ class RefinedCloud {
   RefinedCloud(const GlobalCloudOptions& options, bool movable)
       : cloud_(options), movable_(movable) {}
 
-  /// Inserts a keyframe of an earlier map. It never moves. All of them come before `insert`.
-  /// @throws std::invalid_argument as GlobalCloud::insert does.
+  /// Inserts a keyframe of an earlier map. It never moves.
+  /// @throws std::invalid_argument as GlobalCloud::insert does, and after an `insert`.
   void insertFixed(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
-  /// Inserts the next keyframe. @throws as `insertFixed`.
+  /// Inserts the next keyframe. @throws as `insertFixed`. The cloud is unchanged after any error.
   void insert(std::vector<ViewPoint> points, const Rigid3& T_world_ref);
+  /// Removes the keyframe that was inserted last, if there is one.
+  void removeNewest();
 
-  /// Requests a new pose for a keyframe that was inserted. `applyPending` moves it.
-  void move(std::size_t keyframe, const Rigid3& T_world_ref);
+  /// Requests new poses for keyframes, by their numbers. `applyPending` moves them.
+  /// @throws std::invalid_argument where a keyframe was not inserted, or keyframes are not movable.
+  /// Nothing is requested then.
+  void move(std::map<std::size_t, Rigid3> T_world_ref);
   /// Moves keyframes to their requested poses where a point is off by more than the tolerance: the
   /// oldest first, and at most `max_count` of them. A tolerance of 0 moves all, bit for bit.
-  /// @throws std::invalid_argument as GlobalCloud::insert does. That keyframe keeps its old pose.
+  /// @throws std::invalid_argument as GlobalCloud::insert does. That keyframe keeps its old pose,
+  /// and its request is dropped.
   void applyPending(double tolerance_m,
                     std::size_t max_count = std::numeric_limits<std::size_t>::max());
 
@@ -42,6 +47,7 @@ class RefinedCloud {
 
  private:
   void put(std::size_t keyframe, const Rigid3& T_world_ref);
+  void forgetNewest();
 
   struct KeptPoints {
     std::vector<ViewPoint> points;

@@ -62,7 +62,10 @@ WindowGraph KeyframeGraph::solveFrom(std::size_t first_free, const PoseGraphOpti
     window.add(factors[f]);
   }
   window.addTracker(tracker.inGraph());
-  window.solve(options);
+  if (!window.solve(options)) {
+    ++failed_solves;
+    return window;
+  }
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     if (!window.has(i)) continue;
     RefinedKeyframe& keyframe = keyframes[i];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "maps/refinement/pose_refinement.h"
@@ -17,6 +18,8 @@ struct KeyframeGraph {
   /// From registrations and loops. Ascending by `to`, except for proposed loops.
   std::vector<RelativePoseFactor> factors;
   TrackerModel tracker;
+  /// Minima that could not be computed; poses stayed there. Of registrations, windows and loops.
+  std::uint64_t failed_solves = 0;
 
   std::size_t newest() const { return keyframes.size() - 1; }
 
@@ -28,7 +31,8 @@ struct KeyframeGraph {
   /// keyframe: a bounded number, the nearest first.
   std::vector<std::size_t> nearestViews(std::size_t end) const;
 
-  /// Solves the poses of the keyframes from `first_free` on, except the first keyframe.
+  /// Solves the poses of the keyframes from `first_free` on, except the first keyframe. They stay
+  /// where the minimum cannot be computed.
   WindowGraph solveFrom(std::size_t first_free, const PoseGraphOptions& options);
 };
 

@@ -24,21 +24,20 @@ constexpr double kMaxPriorSigmas = 6;
 /// Beyond this, differences of poses lose too many digits, and their squares overflow.
 constexpr double kMaxPositionM = 1e9;
 
-void requireUsable(const Rigid3& T_odom_ref, const std::optional<PoseNoise>& stated,
-                   std::size_t number) {
-  const std::string name = "keyframe " + std::to_string(number);
+}  // namespace
+
+void KeyframeRefiner::requireUsable(const Rigid3& T_odom_ref,
+                                    const std::optional<PoseNoise>& stated) {
   if (!T_odom_ref.translation.allFinite() || !T_odom_ref.rotation.coeffs().allFinite() ||
       T_odom_ref.translation.cwiseAbs().maxCoeff() > kMaxPositionM) {
-    throw std::invalid_argument(name + ": its pose is not finite, or farther than 1e9 m");
+    throw std::invalid_argument("keyframe: its pose is not finite, or farther than 1e9 m");
   }
   if (!stated) return;
-  requireOption(stated->noise_m >= 0 && std::isfinite(stated->noise_m), name + ": noise_m",
+  requireOption(stated->noise_m >= 0 && std::isfinite(stated->noise_m), "keyframe: noise_m",
                 stated->noise_m, "0 or above");
-  requireOption(stated->noise_rad >= 0 && std::isfinite(stated->noise_rad), name + ": noise_rad",
+  requireOption(stated->noise_rad >= 0 && std::isfinite(stated->noise_rad), "keyframe: noise_rad",
                 stated->noise_rad, "0 or above");
 }
-
-}  // namespace
 
 KeyframeRefiner::KeyframeRefiner(const RefinementOptions& options)
     : options_(options),
@@ -51,14 +50,25 @@ KeyframeRefiner::KeyframeRefiner(const RefinementOptions& options)
 void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
                           const std::optional<PoseNoise>& stated) {
   const std::size_t number = graph_.keyframes.size();
-  requireUsable(T_odom_ref, stated, number);
+  requireUsable(T_odom_ref, stated);
   RefinedKeyframe keyframe{std::move(cloud), T_odom_ref, T_odom_ref, T_odom_ref};
   keyframe.noise_scale = graph_.tracker.scaleOf(stated);
   keyframe.first_factor = graph_.factors.size();
-  if (number > 0) predict(keyframe);  // 1.
+  if (number > 0) predict(graph_.keyframes.back(), keyframe);  // 1.
   graph_.keyframes.push_back(std::move(keyframe));
   if (number == 0) return;
+  const std::uint64_t registered = registered_;
+  try {
+    refineNewest();
+  } catch (...) {
+    registered_ = registered;
+    dropNewestPoints();
+    throw;
+  }
+}
 
+void KeyframeRefiner::refineNewest() {
+  const std::size_t number = graph_.newest();
   registerNewest();  // 2.
   const auto window = static_cast<std::size_t>(options_.window);
   const std::size_t first_free = number + 1 > window ? number + 1 - window : 0;
@@ -68,9 +78,20 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
   if (number > window) graph_.keyframes[number - window - 1].cloud.releaseTree();
 }
 
+/// After an error: the newest keyframe keeps the tracker's motion, and others do not meet its
+/// points again. Factors of other keyframes stay.
+void KeyframeRefiner::dropNewestPoints() {
+  RefinedKeyframe& newest = graph_.keyframes.back();
+  graph_.factors.resize(newest.first_factor);
+  newest.cloud.clear();
+  newest.moved = true;
+  const RefinedKeyframe& last = graph_.keyframes[graph_.newest() - 1];
+  predict(last, newest);
+  covariance_ += graph_.tracker.errors().driftCovariance(newest.path_length_m - last.path_length_m);
+}
+
 /// The pose by the motion of the tracker since the last keyframe.
-void KeyframeRefiner::predict(RefinedKeyframe& keyframe) const {
-  const RefinedKeyframe& last = graph_.keyframes.back();
+void KeyframeRefiner::predict(const RefinedKeyframe& last, RefinedKeyframe& keyframe) {
   const Rigid3 T_last_ref = last.T_odom_ref.inverse() * keyframe.T_odom_ref;
   keyframe.T_world_ref_denoised = last.T_world_ref_denoised * T_last_ref;
   keyframe.T_world_ref = keyframe.T_world_ref_denoised;
@@ -94,6 +115,7 @@ void KeyframeRefiner::registerNewest() {
   const Registration registration =
       registerKeyframe(number, newest.cloud, map, {newest.T_world_ref, sqrtInformation(covariance)},
                        options_.registration);
+  graph_.failed_solves += registration.failed_solves;
   if (registration.inliers < kMinPairs || registration.inlierRatio() < kMinPairedFraction ||
       registration.from_prior > kMaxPriorSigmas) {
     return;
@@ -132,11 +154,12 @@ void KeyframeRefiner::finish() {
   if (keyframes() >= 2) updateCovariance(loops_.solveAll(graph_));
 }
 
-std::vector<std::size_t> KeyframeRefiner::takeMoved() {
-  std::vector<std::size_t> moved;
+std::map<std::size_t, Rigid3> KeyframeRefiner::takeMoved() {
+  std::map<std::size_t, Rigid3> moved;
   for (std::size_t i = 0; i < keyframes(); ++i) {
-    if (std::exchange(graph_.keyframes[i].moved, false)) moved.push_back(i);
+    if (graph_.keyframes[i].moved) moved.emplace_hint(moved.end(), i, T_world_ref(i));
   }
+  for (const auto& [number, T_world_ref] : moved) graph_.keyframes[number].moved = false;
   return moved;
 }
 
@@ -152,7 +175,7 @@ Rigid3 KeyframeRefiner::T_world_ref_denoised() const {
 
 RefinementCounts KeyframeRefiner::counts() const {
   const LoopCounts& loops = loops_.counts();
-  return {registered_, loops.checked, loops.verified, loops.dropped};
+  return {registered_, loops.checked, loops.verified, loops.dropped, graph_.failed_solves};
 }
 
 }  // namespace efm

@@ -3,8 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
-#include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/keyframe_graph.h"
@@ -18,6 +18,7 @@ struct RefinementCounts {
   std::uint64_t loop_checks = 0;  ///< As in LoopCounts.
   std::uint64_t loops = 0;
   std::uint64_t loops_dropped = 0;
+  std::uint64_t failed_solves = 0;  ///< Minima that could not be computed: poses stayed.
 };
 
 /// Refines the poses of keyframes by their points, one keyframe after the other:
@@ -38,11 +39,16 @@ class KeyframeRefiner {
   /// @throws std::invalid_argument where the options are not valid.
   explicit KeyframeRefiner(const RefinementOptions& options);
 
+  /// @throws std::invalid_argument where the pose is not finite or beyond a million kilometres, or
+  /// the stated noise is not finite or below 0.
+  static void requireUsable(const Rigid3& T_odom_ref, const std::optional<PoseNoise>& stated);
+
   /// Adds the next keyframe. Numbers count from 0.
   /// @param stated the noise of this pose as the tracker states it. It replaces the expected noise.
   /// Where errors are learnt, it is corrected by the same factor.
-  /// @throws std::invalid_argument where the pose is not finite or beyond a million kilometres, or
-  /// the stated noise is not finite or below 0. The keyframe is not added then.
+  /// @throws std::invalid_argument as `requireUsable`. The keyframe is not added then. After any
+  /// other error `keyframes` says whether it was added: then it has lost its points, and keeps the
+  /// tracker's motion. The next keyframe may be added in either case.
   void add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
            const std::optional<PoseNoise>& stated = std::nullopt);
   /// Checks a loop that the caller proposes.
@@ -57,8 +63,8 @@ class KeyframeRefiner {
   const Rigid3& T_world_ref(std::size_t number) const {
     return graph_.keyframes.at(number).T_world_ref;
   }
-  /// Returns the numbers, ascending, of the keyframes that were added or moved since the last call.
-  std::vector<std::size_t> takeMoved();
+  /// Returns T_world_ref of the keyframes that were added or moved since the last call, by number.
+  std::map<std::size_t, Rigid3> takeMoved();
 
   /// Brings current poses of the tracker to the refined world; the identity without keyframes.
   Rigid3 T_world_odom() const;
@@ -72,7 +78,9 @@ class KeyframeRefiner {
   RefinementCounts counts() const;
 
  private:
-  void predict(RefinedKeyframe& keyframe) const;
+  static void predict(const RefinedKeyframe& last, RefinedKeyframe& keyframe);
+  void refineNewest();
+  void dropNewestPoints();
   void registerNewest();
   void updateCovariance(const WindowGraph& solved);
 

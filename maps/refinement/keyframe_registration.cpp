@@ -173,6 +173,15 @@ Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud
   Registration registration;
   Rigid3& T_world_ref = registration.T_world_ref;
   T_world_ref = prior.T_map_ref;
+  const auto align = [&](const Neighbours& found, const AlignmentOptions& alignment) {
+    const auto aligned = alignToMap(found.pairs, prior, T_world_ref, alignment);
+    if (aligned) {
+      T_world_ref = *aligned;
+    } else {
+      ++registration.failed_solves;
+    }
+    return aligned.has_value();
+  };
 
   AlignmentOptions coarse = options.alignment;
   coarse.max_iterations = std::min(coarse.max_iterations, kCoarseIterations);
@@ -180,13 +189,13 @@ Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud
   constexpr double kSigmas = 3;
   double distance_px = std::min(kSigmas * uncertaintyPx(cloud, prior), options.first_distance_px);
   for (; distance_px > options.last_distance_px; distance_px *= kShrink) {
-    const Neighbours found = search.find(T_world_ref, distance_px, stride);
-    T_world_ref = alignToMap(found.pairs, prior, T_world_ref, coarse);
+    align(search.find(T_world_ref, distance_px, stride), coarse);
   }
+  bool aligned = false;
   for (int round = 0; round < kLastRounds; ++round) {
-    const Neighbours found = search.find(T_world_ref, options.last_distance_px, 1);
-    T_world_ref = alignToMap(found.pairs, prior, T_world_ref, options.alignment);
+    aligned = align(search.find(T_world_ref, options.last_distance_px, 1), options.alignment);
   }
+  if (!aligned) return registration;
 
   summarize(search.find(T_world_ref, options.last_distance_px, 1), map, number,
             options.alignment.robust_sigmas, registration);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
@@ -43,6 +44,7 @@ struct Registration {
   double median_error = 0;
   /// The distance of the pose from the prior, in standard deviations of the prior.
   double from_prior = 0;
+  std::uint64_t failed_solves = 0;  ///< Minima that could not be computed.
 
   /// Fraction of the visible points that are inliers.
   double inlierRatio() const;
@@ -57,6 +59,7 @@ struct Registration {
 /// rounds with 300 points, two with all points.
 /// @param number of the keyframe, for the factors.
 /// @param prior in the world, not singular. It determines the directions that the map leaves open.
+/// @return without inliers and factors where the last minimum cannot be computed.
 Registration registerKeyframe(std::size_t number, const RegistrationCloud& cloud,
                               const std::vector<MapKeyframe>& map, const PosePrior& prior,
                               const KeyframeRegistrationOptions& options);

@@ -53,8 +53,9 @@ bool LoopCloser::check(KeyframeGraph& graph, const LoopCandidate& candidate) {
   const Matrix6d covariance =
       errors.noiseCovariance(older.noise_scale) + errors.noiseCovariance(newer.noise_scale) +
       errors.driftCovariance(std::abs(newer.path_length_m - older.path_length_m));
-  const std::optional<RelativePoseFactor> factor = verifyLoop(
-      candidate, older.cloud, newer.cloud, covariance, options_.loop, options_.registration);
+  const auto [factor, failed_solves] = verifyLoop(candidate, older.cloud, newer.cloud, covariance,
+                                                  options_.loop, options_.registration);
+  graph.failed_solves += failed_solves;
   for (const std::size_t keyframe : {candidate.older, candidate.newer}) {
     if (keyframe + static_cast<std::size_t>(options_.window) < graph.keyframes.size()) {
       graph.keyframes[keyframe].cloud.releaseTree();
@@ -74,10 +75,16 @@ std::optional<WindowGraph> LoopCloser::solveWhenDue(KeyframeGraph& graph) {
     return std::nullopt;
   }
   solved_at_ = newest;
-  return solve(graph, *oldest_unsolved_);
+  WindowGraph solved = solve(graph, *oldest_unsolved_);
+  oldest_unsolved_.reset();
+  return solved;
 }
 
-WindowGraph LoopCloser::solveAll(KeyframeGraph& graph) { return solve(graph, 1); }
+WindowGraph LoopCloser::solveAll(KeyframeGraph& graph) {
+  WindowGraph solved = solve(graph, 1);
+  oldest_unsolved_.reset();
+  return solved;
+}
 
 WindowGraph LoopCloser::solve(KeyframeGraph& graph, std::size_t first_free) {
   // Loops count in full. Where they do not fit, drift is larger than short paths have shown.
@@ -89,7 +96,6 @@ WindowGraph LoopCloser::solve(KeyframeGraph& graph, std::size_t first_free) {
   }
   // Wrong loops lose weight.
   WindowGraph solved = graph.solveFrom(first_free, options_.graph);
-  oldest_unsolved_.reset();
   // Loops that the other factors contradict are dropped.
   const std::vector<RelativePoseFactor*> wrong = contradictedLoops(graph, kMaxError);
   if (wrong.empty()) return solved;

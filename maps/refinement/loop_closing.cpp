@@ -89,28 +89,30 @@ double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in,
   return checked > 0 ? static_cast<double>(in_view) / static_cast<double>(checked) : 0;
 }
 
-std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
-                                             const RegistrationCloud& older,
-                                             const RegistrationCloud& newer,
-                                             const Matrix6d& covariance, const LoopOptions& options,
-                                             const KeyframeRegistrationOptions& registration) {
+LoopCheck verifyLoop(const LoopCandidate& candidate, const RegistrationCloud& older,
+                     const RegistrationCloud& newer, const Matrix6d& covariance,
+                     const LoopOptions& options, const KeyframeRegistrationOptions& registration) {
   KeyframeRegistrationOptions wider = registration;
   wider.first_distance_px *= kFirstDistanceFactor;
   const Registration there = registerWith(newer, older, candidate.T_older_newer, covariance, wider);
-  if (!isPlausible(there, options)) return std::nullopt;
+  LoopCheck check;
+  check.failed_solves = there.failed_solves;
+  if (!isPlausible(there, options)) return check;
   const Registration back =
       registerWith(older, newer, there.T_world_ref.inverse(), covariance, registration);
-  if (!isPlausible(back, options)) return std::nullopt;
+  check.failed_solves += back.failed_solves;
+  if (!isPlausible(back, options)) return check;
   const Vector6d difference = differenceOf(there.T_world_ref * back.T_world_ref);
   if (difference.head<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_m ||
       difference.tail<3>().norm() > kBothWaysSigmas * options.loop_max_sigma_rad) {
-    return std::nullopt;
+    return check;
   }
   RelativePoseFactor factor = withSystematicError(there.factors.front());
   factor.from = candidate.older;
   factor.to = candidate.newer;
   factor.robust = true;
-  return factor;
+  check.factor = factor;
+  return check;
 }
 
 }  // namespace efm

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 
 #include "mapping/geometry/angle.h"
@@ -33,18 +34,22 @@ struct LoopCandidate {
   Rigid3 T_older_newer;  ///< The approximate relative pose.
 };
 
+/// What the registrations of a candidate say.
+struct LoopCheck {
+  std::optional<RelativePoseFactor> factor;
+  std::uint64_t failed_solves = 0;  ///< As in Registration.
+};
+
 /// The fraction of the points of one keyframe that lie in the view of another one.
 double viewOverlap(const RegistrationCloud& of, const RegistrationCloud& in, const Rigid3& T_in_of);
 
 /// Registers the keyframes of a candidate with each other, in both directions. A wrong place may
 /// look right in one direction only.
 /// @param covariance of T_older_newer.
-/// @return a robust factor; nothing where a registration has too few pairs, too large errors, too
+/// @return a robust factor; none where a registration has too few pairs, too large errors, too
 /// large standard deviations or too large a distance from T_older_newer, or where the two disagree.
-std::optional<RelativePoseFactor> verifyLoop(const LoopCandidate& candidate,
-                                             const RegistrationCloud& older,
-                                             const RegistrationCloud& newer,
-                                             const Matrix6d& covariance, const LoopOptions& options,
-                                             const KeyframeRegistrationOptions& registration);
+LoopCheck verifyLoop(const LoopCandidate& candidate, const RegistrationCloud& older,
+                     const RegistrationCloud& newer, const Matrix6d& covariance,
+                     const LoopOptions& options, const KeyframeRegistrationOptions& registration);
 
 }  // namespace efm

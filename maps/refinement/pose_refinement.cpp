@@ -199,10 +199,13 @@ void requireSolver(double robust_sigmas, int max_iterations) {
 void AlignmentOptions::validate() const { requireSolver(robust_sigmas, max_iterations); }
 void PoseGraphOptions::validate() const { requireSolver(robust_sigmas, max_iterations); }
 
-Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
-                  const Rigid3& T_map_start, const AlignmentOptions& options) {
-  if (!std::all_of(pairs.begin(), pairs.end(), [](const auto& pair) { return isFinite(pair); })) {
-    return T_map_start;
+std::optional<Rigid3> alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
+                                 const Rigid3& T_map_start, const AlignmentOptions& options) {
+  // The prior is a factor between the fixed origin of the map and the pose.
+  const RelativePoseFactor factor{0, 1, prior.T_map_ref, prior.sqrt_information};
+  if (!std::all_of(pairs.begin(), pairs.end(), [](const auto& pair) { return isFinite(pair); }) ||
+      !isFinite(factor) || !isFinite(T_map_start)) {
+    return std::nullopt;
   }
   PoseBlock pose = blockOf(T_map_start);
   PoseManifold manifold = poseManifold();
@@ -212,9 +215,7 @@ Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
   for (const PointPair& pair : pairs) {
     problem.AddResidualBlock(new PairCost(new PairError{pair}), &loss, pose.data());
   }
-  // The prior is a factor between the fixed origin of the map and the pose.
   PoseBlock origin = blockOf(Rigid3{});
-  const RelativePoseFactor factor{0, 1, prior.T_map_ref, prior.sqrt_information};
   problem.AddResidualBlock(new FactorCost(new FactorError{factor}), nullptr, origin.data(),
                            pose.data());
   problem.SetParameterBlockConstant(origin.data());
@@ -223,7 +224,8 @@ Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
       solverOptions(options.max_iterations, ceres::DENSE_NORMAL_CHOLESKY);
   solver.function_tolerance = options.min_gain;
   ceres::Solve(solver, &problem, &summary);
-  return summary.IsSolutionUsable() ? rigidOf(pose) : T_map_start;
+  if (!summary.IsSolutionUsable()) return std::nullopt;
+  return rigidOf(pose);
 }
 
 double errorOf(const RelativePoseFactor& factor, const Rigid3& T_world_from,
@@ -245,17 +247,18 @@ MotionEstimate motionOf(const RelativePoseFactor& factor, double open_variance) 
   return motion;
 }
 
-void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph) {
-  if (!isFinite(graph)) return;
+bool solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph) {
+  if (!isFinite(graph)) return false;
   GraphProblem problem(graph, options.robust_sigmas);
-  if (problem.empty()) return;
+  if (problem.empty()) return true;
   ceres::Solver::Summary summary;
   ceres::Solve(solverOptions(options.max_iterations, ceres::SPARSE_NORMAL_CHOLESKY),
                &problem.problem(), &summary);
-  if (!summary.IsSolutionUsable()) return;
+  if (!summary.IsSolutionUsable()) return false;
   for (std::size_t i = 0; i < graph.T_world_node.size(); ++i) {
     if (!graph.fixed[i] && problem.has(i)) graph.T_world_node[i] = rigidOf(problem.block(i));
   }
+  return true;
 }
 
 std::optional<Matrix6d> poseCovariance(const PoseGraphOptions& options, const PoseGraph& graph,

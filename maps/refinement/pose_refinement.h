@@ -44,10 +44,10 @@ struct AlignmentOptions {
 
 /// The pose that aligns the points of a keyframe with those of the map: the minimum of the sum of
 /// squared errors of all pairs and the prior near the start (Levenberg-Marquardt). The prior
-/// determines the directions that the pairs leave open. The result is the start where the minimum
-/// cannot be computed.
-Rigid3 alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
-                  const Rigid3& T_map_start, const AlignmentOptions& options);
+/// determines the directions that the pairs leave open.
+/// @return nothing where the minimum cannot be computed.
+std::optional<Rigid3> alignToMap(const std::vector<PointPair>& pairs, const PosePrior& prior,
+                                 const Rigid3& T_map_start, const AlignmentOptions& options);
 
 /// A measurement of one pose relative to another. The error is
 /// sqrt_information * differenceOf(T_from_to^-1 * T_world_from^-1 * T_world_to) + offset.
@@ -91,9 +91,9 @@ struct PoseGraphOptions {
   void validate() const;
 };
 
-/// Moves the poses that are not fixed to the minimum of the sum of squared errors. They stay where
-/// the minimum cannot be computed.
-void solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph);
+/// Moves the poses that are not fixed to the minimum of the sum of squared errors.
+/// @return false where the minimum cannot be computed. The poses stay then.
+bool solvePoseGraph(const PoseGraphOptions& options, PoseGraph& graph);
 
 /// The covariance of a pose that is not fixed, given the fixed poses: of its translation along the
 /// axes of the world in metres, then of a rotation vector about them in radians.

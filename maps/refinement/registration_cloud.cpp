@@ -63,6 +63,14 @@ std::optional<std::size_t> RegistrationCloud::nearest(const Eigen::Vector3d& p_r
   return neighbor.index;
 }
 
+void RegistrationCloud::clear() noexcept {
+  std::vector<RegistrationPoint>().swap(points_);
+  num_query_points_ = 0;
+  max_inverse_depth_ = 0;
+  min_inverse_depth_ = 0;
+  tree_.reset();
+}
+
 void RegistrationCloud::releaseTree() const { tree_.reset(); }
 
 }  // namespace efm

@@ -35,6 +35,8 @@ class RegistrationCloud {
   /// @return nothing where no point is within the distance.
   std::optional<std::size_t> nearest(const Eigen::Vector3d& p_ref, double max_distance_px) const;
 
+  /// Drops all points: nothing is in view, and nothing is found.
+  void clear() noexcept;
   /// Frees the search tree. The next search builds it again. Neither is thread-safe.
   void releaseTree() const;
 

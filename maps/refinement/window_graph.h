@@ -25,7 +25,8 @@ class WindowGraph {
   void add(RelativePoseFactor factor);
   /// Adds the factors of the tracker: its motions and its noise.
   void addTracker(const TrackerErrors& errors);
-  void solve(const PoseGraphOptions& options) { solvePoseGraph(options, graph_); }
+  /// As `solvePoseGraph`.
+  bool solve(const PoseGraphOptions& options) { return solvePoseGraph(options, graph_); }
 
   bool has(std::size_t keyframe) const { return node_[keyframe].has_value(); }
   /// The poses of a keyframe in the graph.

@@ -49,12 +49,13 @@ struct MapReport {
 /// (min and max, frame `world`; absent without points), recording_seconds (from the first event to
 /// the last), seconds (real time), cpu_seconds (processor time: once per run, for events, for
 /// keyframes), votes_per_second, sorted_events, skipped_events (bad ones that the reader left out),
-/// refinement where poses were refined (registered keyframes, loops, the learnt errors of the
-/// tracker, and under `moved` how far it moved poses), kernel, threads, peak_memory_bytes (of this
-/// process), reference_view and baseline_m where known, stopped_at where the run was interrupted
-/// (the fraction of the recording that was mapped), warnings (each with name and text),
-/// perturbation (the faults of the poses, if any), chosen (the automatic options: key, value and
-/// reason), options (all of them, with these values) and version.
+/// refinement where poses were refined (registered keyframes, loops, failed_solves: minima that
+/// could not be computed, failures: errors, after which a keyframe keeps the tracker's motion,
+/// last_error, the learnt errors of the tracker, and under `moved` how far it moved poses), kernel,
+/// threads, peak_memory_bytes (of this process), reference_view and baseline_m where known,
+/// stopped_at where the run was interrupted (the fraction of the recording that was mapped),
+/// warnings (each with name and text), perturbation (the faults of the poses, if any), chosen (the
+/// automatic options: key, value and reason), options (all of them, with these values) and version.
 std::string reportJson(const MapReport& report);
 
 /// The most memory that this process has had so far.

@@ -11,6 +11,17 @@ namespace {
 /// More waiting keyframes lose their points.
 constexpr std::size_t kMaxWaiting = 50;
 
+std::string textOf(const std::exception_ptr& error) {
+  if (!error) return {};
+  try {
+    std::rethrow_exception(error);
+  } catch (const std::exception& exception) {
+    return exception.what();
+  } catch (...) {
+    return "unknown error";
+  }
+}
+
 }  // namespace
 
 Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig) {
@@ -41,15 +52,16 @@ MapRefinement::~MapRefinement() {
 
 Rigid3 MapRefinement::add(const KeyframeDepthMap& keyframe,
                           const std::optional<PoseNoise>& stated) {
+  KeyframeRefiner::requireUsable(keyframe.T_world_ref, stated);
   Task task{RegistrationCloud(keyframe, options_.refiner.points), keyframe.T_world_ref, stated};
   if (!options_.background) {
-    refine(std::move(task));
+    if (!refine(task)) std::rethrow_exception(std::exchange(unthrown_, nullptr));
     return refiner_.T_world_ref(refiner_.keyframes() - 1);
   }
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (error_) std::rethrow_exception(error_);
-  if (waiting_.size() >= kMaxWaiting) task.cloud = RegistrationCloud({}, options_.refiner.points);
+  if (waiting_.size() >= kMaxWaiting) task.cloud.clear();
   waiting_.push_back(std::move(task));
+  held_ = 0;
   changed_.notify_all();
   return state_.T_world_odom * keyframe.T_world_ref;
 }
@@ -57,18 +69,31 @@ Rigid3 MapRefinement::add(const KeyframeDepthMap& keyframe,
 void MapRefinement::finish() {
   {
     std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait(
-        lock, [this] { return error_ || !options_.background || (waiting_.empty() && !busy_); });
-    if (error_) std::rethrow_exception(error_);
+    held_ = 0;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return waiting_.size() == held_; });
   }
   // The thread is idle: the refiner may be used here.
-  double seconds = 0;
-  double cpu_seconds = 0;
-  {
-    const SecondsScope scope(seconds, cpu_seconds);
-    refiner_.finish();
+  work([this] { refiner_.finish(); });
+}
+
+void MapRefinement::fail(std::exception_ptr error) noexcept {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++state_.failures;
+  if (!unthrown_) unthrown_ = error;
+  last_failure_ = std::move(error);
+}
+
+void MapRefinement::throwFailure() {
+  if (options_.background) return;
+  if (const std::exception_ptr error = std::exchange(unthrown_, nullptr)) {
+    std::rethrow_exception(error);
   }
-  publish(seconds, cpu_seconds);
+}
+
+Rigid3 MapRefinement::predict(const Rigid3& T_odom_ref) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return state_.T_world_odom * T_odom_ref;
 }
 
 std::map<std::size_t, Rigid3> MapRefinement::takeMoved() {
@@ -79,26 +104,43 @@ std::map<std::size_t, Rigid3> MapRefinement::takeMoved() {
 RefinementState MapRefinement::state() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   RefinementState state = state_;
-  state.waiting = waiting_.size() + (busy_ ? 1 : 0);
+  state.waiting = waiting_.size();
+  state.last_error = textOf(last_failure_);
   return state;
 }
 
-void MapRefinement::refine(Task task) {
+/// @return whether the refiner has the keyframe. Otherwise the task has lost its points.
+bool MapRefinement::refine(Task& task) {
+  const std::size_t number = refiner_.keyframes();
+  work([&] { refiner_.add(std::move(task.cloud), task.T_odom_ref, task.stated); });
+  task.cloud.clear();
+  return refiner_.keyframes() > number;
+}
+
+/// Runs a step of the refiner, and publishes its results. Counts errors.
+template <typename Step>
+void MapRefinement::work(const Step& step) {
   double seconds = 0;
   double cpu_seconds = 0;
-  {
+  try {
     const SecondsScope scope(seconds, cpu_seconds);
-    refiner_.add(std::move(task.cloud), task.T_odom_ref, task.stated);
+    step();
+  } catch (...) {
+    fail(std::current_exception());
   }
-  publish(seconds, cpu_seconds);
+  try {
+    publish(seconds, cpu_seconds);
+  } catch (...) {
+    fail(std::current_exception());
+  }
 }
 
 /// Copies the refiner's results for the other thread.
 void MapRefinement::publish(double seconds, double cpu_seconds) {
+  std::map<std::size_t, Rigid3> moved = refiner_.takeMoved();
   const std::lock_guard<std::mutex> lock(mutex_);
-  for (const std::size_t number : refiner_.takeMoved()) {
-    moved_[number] = refiner_.T_world_ref(number);
-  }
+  moved.merge(moved_);  // a new pose replaces an earlier one
+  moved_ = std::move(moved);
   state_.T_world_odom = refiner_.T_world_odom();
   state_.T_world_ref_denoised = refiner_.T_world_ref_denoised();
   state_.covariance = refiner_.covariance();
@@ -111,24 +153,18 @@ void MapRefinement::publish(double seconds, double cpu_seconds) {
 void MapRefinement::runInBackground() {
   std::unique_lock<std::mutex> lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] { return stop_ || !waiting_.empty(); });
+    changed_.wait(lock, [this] { return stop_ || waiting_.size() > held_; });
     if (stop_) return;
-    Task task = std::move(waiting_.front());
-    waiting_.pop_front();
-    busy_ = true;
+    Task& task = waiting_.front();  // stays where it is when others are added
     lock.unlock();
-    std::exception_ptr error;
-    try {
-      refine(std::move(task));
-    } catch (...) {
-      error = std::current_exception();
-    }
+    const bool refined = refine(task);
     lock.lock();
-    busy_ = false;
+    if (refined) {
+      waiting_.pop_front();
+    } else {
+      held_ = waiting_.size();  // it is tried again with the next keyframe
+    }
     changed_.notify_all();
-    if (!error) continue;
-    error_ = error;
-    return;
   }
 }
 

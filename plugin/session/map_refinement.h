@@ -3,11 +3,13 @@
 
 #include <condition_variable>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <exception>
 #include <map>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 
 #include "mapping/keyframes/keyframe_depth_map.h"
@@ -34,8 +36,11 @@ struct RefinementState {
   RefinementCounts counts;
   TrackerErrors tracker;    ///< As estimated.
   std::size_t waiting = 0;  ///< Keyframes not refined yet.
-  double seconds = 0;       ///< Time spent refining.
-  double cpu_seconds = 0;   ///< Processor time of it.
+  /// Errors so far. A keyframe whose refinement fails keeps the tracker's motion.
+  std::uint64_t failures = 0;
+  std::string last_error;  ///< Of the last failure; empty without one.
+  double seconds = 0;      ///< Time spent refining.
+  double cpu_seconds = 0;  ///< Processor time of it.
 };
 
 /// The covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the newest
@@ -46,7 +51,9 @@ Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig);
 /// Refines keyframes one after the other, by option in a background thread. One thread calls it.
 /// `finish` waits for the refinement; `add` waits only without the background thread. If the
 /// background thread is 50 keyframes behind, the next keyframes are added without their points:
-/// they keep the tracker's motion.
+/// they keep the tracker's motion. So does a keyframe whose refinement fails; the next one is
+/// refined again. `state` counts failures. Without the background thread, `throwFailure` throws
+/// them.
 class MapRefinement {
  public:
   /// @throws std::invalid_argument where the options are not valid.
@@ -59,10 +66,19 @@ class MapRefinement {
   /// Adds the next keyframe; keyframes are numbered from 0.
   /// @param stated the noise that the tracker states for its pose.
   /// @return T_world_ref as known now.
-  /// @throws the error of an earlier keyframe in the background.
+  /// @throws std::invalid_argument as KeyframeRefiner::requireUsable. After any error the keyframe
+  /// is not added.
   Rigid3 add(const KeyframeDepthMap& keyframe, const std::optional<PoseNoise>& stated);
-  /// Waits for all keyframes and solves them together. @throws as `add`.
+  /// Waits for all keyframes and solves them together.
   void finish();
+
+  /// Counts an error of the caller, who could not use a refined pose.
+  void fail(std::exception_ptr error) noexcept;
+  /// Without the background thread: throws the first failure since the last call, if there was one.
+  void throwFailure();
+
+  /// T_world_ref of a keyframe that is not added yet, by its pose of the tracker.
+  Rigid3 predict(const Rigid3& T_odom_ref) const;
 
   /// T_world_ref of the keyframes that moved since the last call, by their numbers.
   std::map<std::size_t, Rigid3> takeMoved();
@@ -75,7 +91,9 @@ class MapRefinement {
     std::optional<PoseNoise> stated;
   };
 
-  void refine(Task task);
+  bool refine(Task& task);
+  template <typename Step>
+  void work(const Step& step);
   void publish(double seconds, double cpu_seconds);
   void runInBackground();
 
@@ -84,10 +102,11 @@ class MapRefinement {
 
   mutable std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
-  std::deque<Task> waiting_;
-  bool busy_ = false;
+  std::deque<Task> waiting_;  // the first one is in work
+  std::size_t held_ = 0;      // all of them: the first one could not be added to the refiner
   bool stop_ = false;
-  std::exception_ptr error_;
+  std::exception_ptr last_failure_;
+  std::exception_ptr unthrown_;
   std::map<std::size_t, Rigid3> moved_;
   RefinementState state_;
 

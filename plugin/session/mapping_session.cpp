@@ -169,6 +169,7 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
     refinement_->finish();
     applyPending();
   }
+  if (!keyframe && refinement_) refinement_->throwFailure();
   return keyframe;
 }
 
@@ -197,35 +198,44 @@ bool MappingSession::chooseAutomatic() {
   return true;
 }
 
-/// Inserts a keyframe into the cloud at its refined pose, and moves others to theirs.
+/// Inserts a keyframe into the cloud, refines it, and moves it and others to their refined poses.
+/// Cloud and refinement number keyframes alike: after an error neither has the keyframe.
 void MappingSession::insert(KeyframeDepthMap& keyframe) {
   const Rigid3 T_odom_ref = keyframe.T_world_ref;
-  std::vector<ViewPoint> points = pointsOf(keyframe);
-  if (refinement_) {
-    // A keyframe that the map refuses must not be refined either: both number keyframes alike.
-    const Rigid3 T_world_ref = refinement_->state().T_world_odom * T_odom_ref;
-    cloud_.cloud().requireInsertable(pointsInWorld(points, T_world_ref));
-    keyframe.T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
-  }
-  const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
-  cloud_.insert(std::move(points), keyframe.T_world_ref);
-  T_odom_ref_.push_back(T_odom_ref);
   status_.silent_keyframes.resize(mapper_.rig().cameras.size());
+  T_odom_ref_.push_back(T_odom_ref);
+  try {
+    Rigid3 T_world_ref = refinement_ ? refinement_->predict(T_odom_ref) : T_odom_ref;
+    {
+      const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
+      cloud_.insert(pointsOf(keyframe), T_world_ref);
+    }
+    if (refinement_) T_world_ref = refinement_->add(keyframe, noiseAt(keyframe.window.t_ref_ns));
+    keyframe.T_world_ref = T_world_ref;
+  } catch (...) {
+    if (cloud_.T_world_ref().size() == T_odom_ref_.size()) cloud_.removeNewest();
+    T_odom_ref_.pop_back();
+    throw;
+  }
   for (const int camera : keyframe.silent_cameras) {
     ++status_.silent_keyframes[static_cast<std::size_t>(camera)];
   }
   // Nobody sees a motion of a small part of a voxel.
   constexpr double kVoxelFraction = 0.1;
-  if (refinement_) moveKeyframes(kVoxelFraction * options_.cloud.voxel_size_m);
+  if (!refinement_) return;
+  const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);
+  try {
+    moveKeyframes(kVoxelFraction * options_.cloud.voxel_size_m);
+  } catch (...) {
+    refinement_->fail(std::current_exception());
+  }
 }
 
 /// Moves keyframes in the cloud to their refined poses; in live operation a few at a time, because
 /// the mapping goes on.
 void MappingSession::moveKeyframes(double tolerance_m) {
   constexpr std::size_t kMaxMovesWhenLive = 16;
-  for (const auto& [keyframe, T_world_ref] : refinement_->takeMoved()) {
-    cloud_.move(keyframe, T_world_ref);
-  }
+  cloud_.move(refinement_->takeMoved());
   const bool live = options_.refinement.background && tolerance_m > 0;
   cloud_.applyPending(tolerance_m,
                       live ? kMaxMovesWhenLive : std::numeric_limits<std::size_t>::max());

@@ -62,7 +62,9 @@ class MappingSession {
   /// Maps the next window that is covered, if there is one, and inserts it into the cloud. By
   /// option refines its pose, and moves the keyframes that this moves. Data in the order of time
   /// may be added in between: they change no window that is covered. Where this throws, the earlier
-  /// keyframes stay as they are.
+  /// keyframes stay as they are. Where a refinement fails, its keyframe is returned with the
+  /// tracker's motion. Without the background thread the call that finds no further window throws
+  /// the error then.
   /// @param sink receives every fused plane; may be null.
   /// @param clock the processor time of the threads that map.
   /// @return the keyframe with its refined pose, as known now.

@@ -95,6 +95,17 @@ void addKeyframes(const SessionStatus& status, WarningList& warnings) {
                  "there",
                  counts.keyframes - 1 - status.refinement->counts.registered, counts.keyframes);
   }
+  if (status.refinement && status.refinement->failures > 0) {
+    warnings.add("refinement-failures",
+                 "the refinement failed {} times, the last time with: {}; these keyframes keep the "
+                 "tracker's motion",
+                 status.refinement->failures, status.refinement->last_error);
+  }
+  if (status.refinement && status.refinement->counts.failed_solves > 0) {
+    warnings.add("failed-solves",
+                 "{} minima of the refinement could not be computed: poses stayed as they were",
+                 status.refinement->counts.failed_solves);
+  }
   if (counts.keyframes == 0) return;
   if (counts.keyframes_without_pose > 0) {
     warnings.add("windows-without-pose",

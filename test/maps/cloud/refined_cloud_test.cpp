@@ -86,7 +86,7 @@ void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
       const std::size_t moved = random() % count;
       const double extent = std::pow(10.0, -static_cast<double>(random() % 5));
       asked[fixed + moved] = asked[fixed + moved] * randomPose(random, extent, extent);
-      cloud.move(moved, asked[fixed + moved]);
+      cloud.move({{moved, asked[fixed + moved]}});
     } else {
       cloud.applyPending(random() % 2 == 0 ? 0 : 0.01, random() % 6);
     }
@@ -120,8 +120,8 @@ TEST(RefinedCloud, AKeyframeWithinTheToleranceStays) {
   T_shifted.translation = {0.003, 0, 0};
   Rigid3 T_rotated;  // 4 m away: 0.004 m
   T_rotated.rotation = Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitY());
-  cloud.move(0, T_shifted);
-  cloud.move(1, T_rotated);
+  cloud.move({{0, T_shifted}});
+  cloud.move({{1, T_rotated}});
 
   cloud.applyPending(0.0045);
   EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {}));
@@ -141,7 +141,7 @@ TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
     Rigid3 T_nearest_ref = T_world_ref;
     T_nearest_ref.rotation.x() = std::nextafter(T_nearest_ref.rotation.x(), 2);
     cloud.insert({{{0, 0, 2}, 1}}, T_world_ref);
-    cloud.move(cloud.T_world_ref().size() - 1, T_nearest_ref);
+    cloud.move({{cloud.T_world_ref().size() - 1, T_nearest_ref}});
     cloud.applyPending(0);
     EXPECT_TRUE(isSame(cloud.T_world_ref().back(), T_nearest_ref));
   }
@@ -153,7 +153,7 @@ TEST(RefinedCloud, SmallMotionsAddUpToTheTolerance) {
   Rigid3 T_world_ref;
   for (int step = 1; step <= 10; ++step) {
     T_world_ref.translation.x() = 0.001 * step;
-    cloud.move(0, T_world_ref);
+    cloud.move({{0, T_world_ref}});
     cloud.applyPending(0.0045);
     EXPECT_LE(std::abs(cloud.T_world_ref()[0].translation.x() - 0.001 * step), 0.0045);
   }
@@ -165,7 +165,7 @@ TEST(RefinedCloud, MovesTheOldestFirstUpToTheMaximum) {
   Rigid3 T_world_ref;
   T_world_ref.translation = {1, 0, 0};
   for (std::size_t i = 0; i < 5; ++i) cloud.insert({{{0, 0, 2}, 1}}, {});
-  for (const std::size_t i : {4U, 0U, 2U, 3U}) cloud.move(i, T_world_ref);
+  for (const std::size_t i : {4U, 0U, 2U, 3U}) cloud.move({{i, T_world_ref}});
   const auto moved = [&] {
     std::vector<std::size_t> numbers;
     for (std::size_t i = 0; i < 5; ++i) {
@@ -183,6 +183,41 @@ TEST(RefinedCloud, MovesTheOldestFirstUpToTheMaximum) {
   EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2, 3, 4}));
 }
 
+TEST(RefinedCloud, RefusesToMoveWhatItDoesNotHaveOrHold) {
+  using Poses = std::map<std::size_t, Rigid3>;
+  Rigid3 T_world_ref;
+  T_world_ref.translation = {1, 0, 0};
+  for (const bool movable : {true, false}) {
+    RefinedCloud cloud(optionsOf(Consistency::kNone), movable);
+    cloud.insertFixed({{{0, 0, 2}, 1}}, {});
+    EXPECT_THROW(cloud.move({{0, T_world_ref}}), std::invalid_argument) << "an earlier map's";
+    cloud.insert({{{0, 0, 2}, 1}}, {});
+    const Poses beyond = {{0, T_world_ref}, {1, T_world_ref}};
+    EXPECT_THROW(cloud.move(movable ? beyond : Poses{{0, T_world_ref}}), std::invalid_argument);
+    cloud.applyPending(0);
+    EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {})) << "nothing was requested";
+    EXPECT_THROW(cloud.insertFixed({}, {}), std::invalid_argument);
+  }
+}
+
+TEST(RefinedCloud, WithoutItsNewestKeyframeItIsAsBefore) {
+  std::mt19937 random(4);
+  const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
+  RefinedCloud cloud(options, true);
+  PosedKeyframes keyframes;
+  for (int i = 0; i < 3; ++i) {
+    keyframes.points.push_back(randomPoints(random, 50));
+    keyframes.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
+    cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
+  }
+  cloud.insert(randomPoints(random, 50), {});
+  cloud.move({{3, randomPose(random, 1, 1)}});
+  cloud.removeNewest();
+  cloud.applyPending(0);
+  EXPECT_EQ(cloud.T_world_ref().size(), 3U);
+  EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
+}
+
 TEST(RefinedCloud, AKeyframeThatCannotBeMovedKeepsItsPose) {
   std::mt19937 random(3);
   const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
@@ -196,13 +231,13 @@ TEST(RefinedCloud, AKeyframeThatCannotBeMovedKeepsItsPose) {
   for (const double too_far_m : {1e30, std::numeric_limits<double>::quiet_NaN()}) {
     Rigid3 T_world_ref;
     T_world_ref.translation = {too_far_m, 0, 0};
-    cloud.move(1, T_world_ref);
+    cloud.move({{1, T_world_ref}});
     EXPECT_THROW(cloud.applyPending(0), std::invalid_argument);
     EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
     EXPECT_NO_THROW(cloud.applyPending(0)) << "it is not tried again";
   }
   keyframes.T_world_ref[1] = randomPose(random, 0.1, 0.1);
-  cloud.move(1, keyframes.T_world_ref[1]);
+  cloud.move({{1, keyframes.T_world_ref[1]}});
   cloud.applyPending(0);
   EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
 }

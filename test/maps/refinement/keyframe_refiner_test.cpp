@@ -316,7 +316,7 @@ TEST(KeyframeRefiner, APoseOrANoiseThatIsNotFiniteIsRefusedAndChangesNothing) {
     const auto cloud = [&] { return RegistrationCloud(walk.seen[i], quick().points); };
     const auto expect_refused = [&](const Rigid3& pose, const std::optional<PoseNoise>& stated) {
       EXPECT_THAT([&] { disturbed.add(cloud(), pose, stated); },
-                  ThrowsMessage<std::invalid_argument>(HasSubstr("keyframe " + std::to_string(i))));
+                  ThrowsMessage<std::invalid_argument>(HasSubstr("keyframe: ")));
     };
     expect_refused(rotated, {});
     expect_refused(viewTurned(0, {0, 0, std::numeric_limits<double>::infinity()}), {});
@@ -330,6 +330,45 @@ TEST(KeyframeRefiner, APoseOrANoiseThatIsNotFiniteIsRefusedAndChangesNothing) {
   }
 }
 
+TEST(KeyframeRefiner, CountsMinimaThatCannotBeComputedAndMovesNothing) {
+  const Walk walk;
+  KeyframeRefiner refiner(quick());
+  for (std::size_t i = 0; i < walk.seen.size(); ++i) {
+    refiner.add(RegistrationCloud(walk.seen[i], quick().points), walk.tracked[i]);
+  }
+  EXPECT_EQ(refiner.counts().failed_solves, 0U);
+  const Poses before = posesOf(refiner);
+  Rigid3 not_a_number;
+  not_a_number.translation.y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(refiner.propose({0, 9, not_a_number}));
+  EXPECT_GT(refiner.counts().failed_solves, 0U);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    EXPECT_TRUE(sameBits(refiner.T_world_ref(i), before[i])) << i;
+  }
+}
+
+TEST(KeyframeGraph, AWindowWithoutAMinimumIsCountedAndStays) {
+  const Walk walk;
+  KeyframeGraph graph{{}, {}, TrackerModel({}, false)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    RefinedKeyframe keyframe{RegistrationCloud(walk.seen[i], quick().points), walk.truth[i],
+                             walk.tracked[i], walk.tracked[i]};
+    graph.keyframes.push_back(std::move(keyframe));
+  }
+  RelativePoseFactor factor{1, 2, walk.truth[1].inverse() * walk.truth[2]};
+  factor.offset[3] = std::numeric_limits<double>::infinity();
+  graph.factors.push_back(factor);
+  graph.solveFrom(1, {});
+  EXPECT_EQ(graph.failed_solves, 1U);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_TRUE(sameBits(graph.keyframes[i].T_world_ref, walk.tracked[i])) << i;
+  }
+  graph.factors.clear();
+  graph.solveFrom(1, {});
+  EXPECT_EQ(graph.failed_solves, 1U);
+  EXPECT_FALSE(sameBits(graph.keyframes[2].T_world_ref, walk.tracked[2])) << "by the tracker";
+}
+
 TEST(KeyframeRefiner, SaysWhichKeyframesMoved) {
   const Walk walk;
   RefinementOptions options = quick();
@@ -340,14 +379,13 @@ TEST(KeyframeRefiner, SaysWhichKeyframesMoved) {
   Poses known;
   for (std::size_t i = 0; i < walk.seen.size(); ++i) {
     refiner.add(RegistrationCloud(walk.seen[i], options.points), walk.tracked[i]);
-    const std::vector<std::size_t> moved = refiner.takeMoved();
+    const std::map<std::size_t, Rigid3> moved = refiner.takeMoved();
     EXPECT_TRUE(refiner.takeMoved().empty());
-    EXPECT_TRUE(std::is_sorted(moved.begin(), moved.end()));
     EXPECT_LE(moved.size(), 4U) << "the window";
     ASSERT_FALSE(moved.empty());
-    EXPECT_EQ(moved.back(), i) << "the new one too";
+    EXPECT_EQ(moved.rbegin()->first, i) << "the new one too";
     known.resize(i + 1);
-    for (const std::size_t k : moved) known[k] = refiner.T_world_ref(k);
+    for (const auto& [k, T_world_ref] : moved) known[k] = T_world_ref;
     for (std::size_t k = 0; k <= i; ++k) {
       EXPECT_TRUE(sameBits(known[k], refiner.T_world_ref(k))) << k << " moved unsaid at " << i;
     }

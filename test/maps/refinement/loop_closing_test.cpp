@@ -30,7 +30,8 @@ std::optional<RelativePoseFactor> verify(const Rigid3& T_older_newer,
                                          const RegistrationCloud& older,
                                          const RegistrationCloud& newer, double sigma_m,
                                          double sigma_rad) {
-  return verifyLoop({3, 8, T_older_newer}, older, newer, covarianceOf(sigma_m, sigma_rad), {}, {});
+  return verifyLoop({3, 8, T_older_newer}, older, newer, covarianceOf(sigma_m, sigma_rad), {}, {})
+      .factor;
 }
 
 TEST(ViewOverlap, IsTheFractionOfPointsInView) {
@@ -171,16 +172,16 @@ TEST(VerifyLoop, OptionsLimitTheSigmasAndTheInliers) {
       cloudFrom(world, viewTurned(2 * kRadiansPerDegree, {0.05, 0, 0}), random);
   const LoopCandidate candidate{0, 1, viewTurned(2 * kRadiansPerDegree, {0.05, 0, 0})};
   const Matrix6d covariance = covarianceOf(0.02, 0.5 * kRadiansPerDegree);
-  EXPECT_TRUE(verifyLoop(candidate, older, newer, covariance, {}, {}));
+  EXPECT_TRUE(verifyLoop(candidate, older, newer, covariance, {}, {}).factor);
   LoopOptions strict;
   strict.loop_max_sigma_m = 1e-5;
-  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}));
+  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}).factor);
   strict = {};
   strict.loop_max_sigma_rad = 1e-6;
-  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}));
+  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}).factor);
   strict = {};
   strict.loop_min_inliers = 1;
-  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}));
+  EXPECT_FALSE(verifyLoop(candidate, older, newer, covariance, strict, {}).factor);
 }
 
 TEST(LoopOptions, ValuesOutOfRangeAreRefusedByName) {

@@ -111,7 +111,9 @@ TEST(Report, ErrorsOfTheTrackerAreInMetresAndDegrees) {
   MapReport report = smallReport();
   EXPECT_FALSE(json::parse(reportJson(report)).contains("refinement"));
   report.refinement.emplace();
-  report.refinement->counts = {1, 2, 3, 4};
+  report.refinement->counts = {1, 2, 3, 4, 5};
+  report.refinement->failures = 6;
+  report.refinement->last_error = "no memory";
   report.refinement->tracker = {0.5, M_PI / 180, 0.25, 2 * M_PI / 180};
   report.pose_shift = PoseShift{0.5, 0.75, M_PI / 180, 2 * M_PI / 180};
   const json written = json::parse(reportJson(report))["refinement"];
@@ -123,6 +125,9 @@ TEST(Report, ErrorsOfTheTrackerAreInMetresAndDegrees) {
   EXPECT_EQ(written["loop_checks"], 2);
   EXPECT_EQ(written["loops"], 3);
   EXPECT_EQ(written["loops_dropped"], 4);
+  EXPECT_EQ(written["failed_solves"], 5);
+  EXPECT_EQ(written["failures"], 6);
+  EXPECT_EQ(written["last_error"], "no memory");
   EXPECT_EQ(written["tracker"]["noise_m"], 0.5);
   EXPECT_NEAR(written["tracker"]["noise_deg"], 1, 1e-12);
   EXPECT_EQ(written["tracker"]["drift"], 0.25);

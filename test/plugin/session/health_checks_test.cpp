@@ -261,6 +261,12 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
     const char* expected;
     std::function<void(SessionStatus&)> make;
   };
+  const auto refined = [](const std::function<void(RefinementState&)>& change) {
+    return [change](SessionStatus& status) {
+      status.refinement.emplace().counts.registered = 2;
+      change(*status.refinement);
+    };
+  };
   const std::vector<Row> rows = {
       {"sorted-events", [](auto& s) { s.counts.sorted_events = 1; }},
       {"outside-lens", [](auto& s) { s.counts.cameras[0].outside_lens = 1; }},
@@ -274,6 +280,8 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
        }},
       {"duplicate-poses", [](auto& s) { s.counts.duplicate_poses = 1; }},
       {"unregistered-keyframes", [](auto& s) { s.refinement.emplace(); }},
+      {"refinement-failures", refined([](auto& r) { r.failures = 1; })},
+      {"failed-solves", refined([](auto& r) { r.counts.failed_solves = 1; })},
       {"windows-without-pose", [](auto& s) { s.counts.keyframes_without_pose = 1; }},
       {"windows-without-events", [](auto& s) { s.counts.windows_without_events = 1; }},
   };
