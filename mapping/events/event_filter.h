@@ -50,6 +50,8 @@ class FilteredEvents {
 
   /// @return the number of events that came after a newer one.
   std::uint64_t insert(EventSpan events) { return waiting_.insert(events); }
+  /// The number of events that were not filtered yet.
+  std::size_t waiting() const { return waiting_.events.size() - waiting_.begin; }
   /// Filters the events before `until_ns` and inserts those that remain into `buffer`. No event
   /// before `until_ns` may be inserted here afterwards.
   /// @return the number of events that the filter removed.

@@ -20,6 +20,12 @@ struct RigCamera {
   void validate() const;
 };
 
+/// Whether both have the same lens, pose on the rig and clock, to the last bit.
+inline bool isSame(const RigCamera& a, const RigCamera& b) {
+  return a.model == b.model && isSame(a.T_rig_cam, b.T_rig_cam) &&
+         a.time_offset_ns == b.time_offset_ns;
+}
+
 /// Calibrated and synchronised cameras, rigidly attached to each other.
 struct Rig {
   std::vector<RigCamera> cameras;

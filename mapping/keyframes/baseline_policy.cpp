@@ -106,6 +106,12 @@ std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) c
   return next_ns_.value_or(recording.startNs());
 }
 
+std::uint64_t BaselinePolicy::giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) {
+  if (t_ns <= earliestStart(recording)) return 0;
+  startAt(t_ns);
+  return 1;
+}
+
 void BaselinePolicy::advance(const Window& window, const KeyframeDepthMap* keyframe) {
   startAt(window.t1_ns);
   if (keyframe == nullptr) return;

@@ -29,6 +29,7 @@ class BaselinePolicy : public KeyframePolicy {
   void advance(const Window& window, const KeyframeDepthMap* keyframe) override;
   /// Every window has events: none is skipped.
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
+  std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) override;
 
  private:
   bool isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,

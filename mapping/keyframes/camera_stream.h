@@ -66,6 +66,10 @@ class CameraStream {
   }
   /// The number of buffered events before a time.
   std::size_t countBefore(std::int64_t t_ns) const { return buffer_.indexOf(t_ns) - buffer_.begin; }
+  /// Events that are held, filtered or not.
+  std::size_t heldEvents() const {
+    return buffer_.events.size() - buffer_.begin + (filter_ ? filter_->waiting() : 0);
+  }
   /// Time of the first buffered event at or after a time.
   std::optional<std::int64_t> firstFrom(std::int64_t t_ns) const;
   /// Time of the first buffered event before `until_ns` with a pose.

@@ -51,6 +51,21 @@ EventCounts MapperCounts::total() const {
   return sum;
 }
 
+MapperCounts& MapperCounts::operator+=(const MapperCounts& other) {
+  cameras.resize(std::max(cameras.size(), other.cameras.size()));
+  for (std::size_t i = 0; i < other.cameras.size(); ++i) cameras[i] += other.cameras[i];
+  event_uses += other.event_uses;
+  votes += other.votes;
+  keyframes += other.keyframes;
+  keyframes_without_pose += other.keyframes_without_pose;
+  windows_without_events += other.windows_without_events;
+  windows_given_up += other.windows_given_up;
+  silent_subintervals += other.silent_subintervals;
+  sorted_events += other.sorted_events;
+  duplicate_poses += other.duplicate_poses;
+  return *this;
+}
+
 FusionMapper::FusionMapper(const FusionMapperOptions& options)
     : options_(options), trajectory_(options.trajectory) {
   options_.validate();
@@ -133,6 +148,26 @@ std::optional<WindowData> FusionMapper::window() {
 void FusionMapper::skipWindow(const Window& window) {
   policy_->advance(window, nullptr);
   releaseUnneeded();
+}
+
+void FusionMapper::giveUpBefore(std::int64_t t_ns) {
+  if (start_ns_) counts_.windows_given_up += policy_->giveUpBefore(*this, t_ns);
+  for (CameraStream& camera : cameras_) camera.filterUntil(t_ns);
+  releaseBefore(t_ns);
+}
+
+std::size_t FusionMapper::heldEvents() const {
+  return std::accumulate(
+      cameras_.begin(), cameras_.end(), std::size_t{0},
+      [](std::size_t sum, const CameraStream& camera) { return sum + camera.heldEvents(); });
+}
+
+std::int64_t FusionMapper::oldestHeldNs() const {
+  std::int64_t oldest_ns = kMaxTimeNs;
+  for (const CameraStream& camera : cameras_) {
+    oldest_ns = std::min(oldest_ns, camera.firstFrom(kMinTimeNs).value_or(kMaxTimeNs));
+  }
+  return oldest_ns;
 }
 
 void FusionMapper::configure(const KeyframePolicyOptions& policy,

@@ -44,11 +44,13 @@ struct MapperCounts {
   std::uint64_t keyframes = 0;
   std::uint64_t keyframes_without_pose = 0;  ///< Windows whose reference time had no pose.
   std::uint64_t windows_without_events = 0;  ///< Skipped: no selected camera has events.
+  std::uint64_t windows_given_up = 0;        ///< See `FusionMapper::giveUpBefore`.
   std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes; without silent cameras.
   std::uint64_t sorted_events = 0;           ///< Came after a newer one of their camera.
   std::uint64_t duplicate_poses = 0;
 
   EventCounts total() const;
+  MapperCounts& operator+=(const MapperCounts& other);
 };
 
 /// Events and poses in, keyframes out: buffers the input and maps a window as soon as events and
@@ -93,6 +95,15 @@ class FusionMapper : private RecordingProgress {
   std::optional<WindowData> window();
   /// Goes on to the next window without mapping this one.
   void skipWindow(const Window& window);
+  /// Gives up the windows that begin before a time, with or without data, and releases the events
+  /// before it. Such an event that comes later is counted as dropped.
+  void giveUpBefore(std::int64_t t_ns);
+  /// The events that windows may still need.
+  std::size_t heldEvents() const;
+  /// The time of the first of them; kMaxTimeNs if there is none.
+  std::int64_t oldestHeldNs() const;
+  /// No event of a selected camera before this time is still to come.
+  std::int64_t eventsCompleteNs() const;
   /// Replaces options, as if they had been given at the start.
   /// @throws std::logic_error after the first keyframe; std::invalid_argument where they are not
   /// valid.
@@ -122,7 +133,6 @@ class FusionMapper : private RecordingProgress {
 
   bool selected(int camera) const;
   std::int64_t completeUntil(const CameraStream& camera) const;
-  std::int64_t eventsCompleteNs() const;
   std::size_t countBefore(std::int64_t t_ns) const;
 
   // RecordingProgress, for the policy.

@@ -2,6 +2,7 @@
 #include "mapping/keyframes/keyframe_policy.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/baseline_policy.h"
@@ -42,14 +43,19 @@ class PeriodPolicy : public KeyframePolicy {
   std::uint64_t advancePast(const RecordingProgress& recording, std::int64_t t_ns) override {
     const std::int64_t since_first_end_ns = t_ns - recording.startNs() - window_ns_;
     if (since_first_end_ns < 0) return 0;
-    const std::int64_t next = since_first_end_ns / stride_ns_ + 1;
-    if (next <= index_) return 0;
-    const auto passed = static_cast<std::uint64_t>(next - index_);
-    index_ = next;
-    return passed;
+    return moveTo(since_first_end_ns / stride_ns_ + 1);
+  }
+  std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
+    const std::int64_t since_start_ns = t_ns - recording.startNs();
+    return since_start_ns <= 0 ? 0 : moveTo((since_start_ns - 1) / stride_ns_ + 1);
   }
 
  private:
+  std::uint64_t moveTo(std::int64_t next) {
+    if (next <= index_) return 0;
+    return static_cast<std::uint64_t>(next - std::exchange(index_, next));
+  }
+
   std::int64_t window_ns_;
   std::int64_t stride_ns_;
   ReferenceTime reference_;
@@ -74,6 +80,11 @@ class EventsPolicy : public KeyframePolicy {
   }
   void advance(const Window& window, const KeyframeDepthMap*) override { next_ns_ = window.t1_ns; }
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
+  std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
+    if (t_ns <= earliestStart(recording)) return 0;
+    next_ns_ = t_ns;
+    return 1;
+  }
 
  private:
   std::int64_t window_events_;
@@ -95,6 +106,11 @@ class SingleWindowPolicy : public KeyframePolicy {
   void advance(const Window&, const KeyframeDepthMap*) override { window_.reset(); }
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t t_ns) override {
     if (!window_ || window_->t1_ns > t_ns) return 0;
+    window_.reset();
+    return 1;
+  }
+  std::uint64_t giveUpBefore(const RecordingProgress&, std::int64_t t_ns) override {
+    if (!window_ || window_->t0_ns >= t_ns) return 0;
     window_.reset();
     return 1;
   }

@@ -94,6 +94,9 @@ class KeyframePolicy {
   /// number.
   /// @return the number of skipped windows.
   virtual std::uint64_t advancePast(const RecordingProgress& recording, std::int64_t t_ns) = 0;
+  /// Gives up the windows that begin before `t_ns`. @return their number; at most 1 where windows
+  /// depend on data.
+  virtual std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) = 0;
 };
 
 /// @param depth_guess_m mean depth of the scene before the first keyframe.

@@ -2,7 +2,6 @@
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 
 #include <fmt/format.h>
-#include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CSensoryFrame.h>
@@ -19,6 +18,7 @@
 #include "plugin/mrpt/host_options.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/points_map.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/session_feed.h"
 #include "plugin/pictures/depth_picture.h"
@@ -39,19 +39,6 @@ std::exception_ptr errorOf(Step step) {
   return nullptr;
 }
 
-/// The exported points as float32, as MRPT has points.
-mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& points) {
-  auto map = mrpt::maps::CPointsMapXYZI::Create();
-  map->resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f p_world = points[i].p_world.cast<float>();
-    map->setPointFast(i, p_world.x(), p_world.y(), p_world.z());
-    map->setPointIntensity(i, points[i].confidence);
-  }
-  map->mark_as_modified();
-  return map;
-}
-
 /// Moves and inserts keyframes of a map until they equal `keyframes`. @return whether it changed.
 bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
   bool changed = map.keyframes().size() < keyframes.size();
@@ -66,6 +53,20 @@ bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyf
   return changed;
 }
 
+std::vector<StampedPose> posesOf(const std::vector<StoredKeyframe>& keyframes) {
+  std::vector<StampedPose> poses;
+  for (const StoredKeyframe& keyframe : keyframes) {
+    poses.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
+  }
+  return poses;
+}
+
+/// A host that knows MRPT alone ends the recording by this.
+bool isFinish(const mrpt::obs::CObservation& observation) {
+  const auto* comment = dynamic_cast<const mrpt::obs::CObservationComment*>(&observation);
+  return comment != nullptr && comment->text == "event_fusion: finish";
+}
+
 }  // namespace
 
 CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder_options) {
@@ -73,15 +74,47 @@ CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder
   restart(builder_options);
 }
 
-CEventFusionMapBuilder::~CEventFusionMapBuilder() = default;
+CEventFusionMapBuilder::~CEventFusionMapBuilder() {
+  if (const auto live = liveMapping()) live->stop();
+}
 
-void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options) {
-  session_ = std::make_unique<MappingSession>(builder_options);
+std::shared_ptr<LiveMapping> CEventFusionMapBuilder::liveMapping() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return live_;
+}
+
+/// @param earlier keyframes of an initial map.
+void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
+                                     std::vector<StoredKeyframe> earlier) {
+  const std::shared_ptr<LiveMapping> former = liveMapping();
+  if (former && former->runsHere()) {
+    throw std::logic_error("the builder cannot start over from its own callback");
+  }
+  const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
+  auto session = std::make_unique<MappingSession>(builder_options);
+  for (const StoredKeyframe& keyframe : earlier) {
+    session->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
+  }
+  std::shared_ptr<LiveMapping> live;
+  if (builder_options.live.enabled) {
+    live = std::make_shared<LiveMapping>(builder_options, earlier, liveCallbacks());
+  }
+  // Without the lock: its thread may run a callback that uses the builder.
+  if (former) former->stop();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  live_ = std::move(live);
+  if (live_) {
+    live_->setSink(sink_);
+    live_->setClock(clock_);
+  }
+  handed_out_.reset();
+  tracker_poses_.clear();
+  session_ = std::move(session);
   options_ = builder_options;
   finished_ = false;
   ignored_observations_ = 0;
   reckoning_ = {};
-  keyframes_.clear();
+  keyframes_ = std::move(earlier);
   newest_depth_ = {};
   silent_cameras_.clear();
   mapping_failed_ = false;
@@ -93,7 +126,7 @@ void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_option
   builder_options.mapper.validate();
   builder_options.cloud.validate();
   builder_options.refinement.validate();
-  const std::lock_guard<std::mutex> lock(mutex_);
+  builder_options.live.validate();
   restart(builder_options);
 }
 
@@ -107,14 +140,46 @@ void CEventFusionMapBuilder::setKeyframeCallback(KeyframeCallback callback) {
   callback_ = std::move(callback);
 }
 
+void CEventFusionMapBuilder::setMapCallback(MapCallback callback) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  map_callback_ = std::move(callback);
+}
+
+LiveMapping::Callbacks CEventFusionMapBuilder::liveCallbacks() {
+  LiveMapping::Callbacks callbacks;
+  callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
+    std::vector<std::string> warnings;
+    KeyframeCallback callback;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      warnings = warningsOfSilence(keyframe);
+      callback = callback_;
+    }
+    for (const std::string& warning : warnings) MRPT_LOG_WARN(warning);
+    if (callback) callback(keyframe);
+  };
+  callbacks.on_map = [this](const std::shared_ptr<const MapSnapshot>& map) {
+    MapCallback callback;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      callback = map_callback_;
+    }
+    if (callback) callback(map);
+  };
+  callbacks.warn = [this](const std::string& text) { MRPT_LOG_WARN(text); };
+  return callbacks;
+}
+
 void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
+  if (live_) live_->setSink(sink);
 }
 
 void CEventFusionMapBuilder::setProcessorClock(ProcessorClock clock) {
   const std::lock_guard<std::mutex> lock(mutex_);
   clock_ = std::move(clock);
+  if (live_) live_->setClock(clock_);
 }
 
 void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>& feed) {
@@ -209,16 +274,60 @@ std::vector<std::string> CEventFusionMapBuilder::warningsOfSilence(
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
   if (!observation) throw std::invalid_argument("the builder was given no observation (null)");
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
-    advance([&](MappingSession& session) { session.addEvents(packetOf(*events)); });
+    addEvents(packetOf(*events));
   } else if (poseSourceOf(*observation)) {
-    advance([&](MappingSession& session) { addPoseOf(*observation, session); });
+    addPose(*observation);
+  } else if (isFinish(*observation)) {
+    finish();
   } else {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++ignored_observations_;
   }
 }
 
+void CEventFusionMapBuilder::addEvents(CameraPacket packet) {
+  const bool updates = options.enableMapUpdating;  // MRPT's, of every map builder
+  if (const auto live = liveMapping()) {
+    if (updates) {
+      live->input().add(std::move(packet));
+    } else {
+      live->input().skip(packet);
+    }
+    return;
+  }
+  advance([&](MappingSession& session) {
+    if (updates) {
+      session.addEvents(std::move(packet));
+    } else {
+      session.skipEvents(packet);
+    }
+  });
+}
+
+void CEventFusionMapBuilder::addPose(const mrpt::obs::CObservation& observation) {
+  // Under the lock.
+  const auto note = [&](const std::optional<Rigid3>& T_body_rig) {
+    const std::optional<ObservedPose> observed = poseIn(observation);
+    const Rigid3 T_world_rig = rigPose(*observed, T_body_rig);
+    tracker_poses_.add(observation, *observed, T_world_rig);
+    return QueuedPose{{observed->t_ns, T_world_rig}, *poseSourceOf(observation), observed->noise};
+  };
+  if (const auto live = liveMapping()) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    live->input().add(note(live->T_body_rig()));
+    return;
+  }
+  advance([&](MappingSession& session) {
+    const QueuedPose pose = note(session.setup().T_body_rig);
+    session.addPose(pose.pose, pose.source, pose.noise);
+  });
+}
+
 void CEventFusionMapBuilder::finish() {
+  if (const auto live = liveMapping()) {
+    live->finish();
+    return;
+  }
   advance([this](MappingSession& session) {
     finished_ = true;
     session.finish();
@@ -226,6 +335,7 @@ void CEventFusionMapBuilder::finish() {
 }
 
 SessionStatus CEventFusionMapBuilder::status() const {
+  if (const auto live = liveMapping()) return live->status();
   const std::lock_guard<std::mutex> lock(mutex_);
   return session_->status();
 }
@@ -236,34 +346,34 @@ std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
 }
 
 std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
+  if (const auto live = liveMapping()) return live->map()->points;
   const std::lock_guard<std::mutex> lock(mutex_);
   applyPending();
   return session_->cloud().points();
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
+  if (const auto live = liveMapping()) return posesOf(live->map()->keyframes);
   const std::lock_guard<std::mutex> lock(mutex_);
   applyPending();
-  return keyframePoses();
-}
-
-std::vector<StampedPose> CEventFusionMapBuilder::keyframePoses() const {
-  std::vector<StampedPose> poses;
-  for (const StoredKeyframe& keyframe : keyframes_) {
-    poses.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
-  }
-  return poses;
+  return posesOf(keyframes_);
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  std::vector<StampedPose> poses = keyframePoses();
-  const std::vector<Rigid3>& T_odom_ref = session_->T_odom_ref();
-  const std::size_t earlier = poses.size() - T_odom_ref.size();
-  for (std::size_t i = 0; i < T_odom_ref.size(); ++i) {
-    poses[earlier + i].T_world_rig = T_odom_ref[i];
+  const auto withTracker = [](std::vector<StampedPose> poses,
+                              const std::vector<Rigid3>& T_odom_ref) {
+    const std::size_t earlier = poses.size() - T_odom_ref.size();
+    for (std::size_t i = 0; i < T_odom_ref.size(); ++i) {
+      poses[earlier + i].T_world_rig = T_odom_ref[i];
+    }
+    return poses;
+  };
+  if (const auto live = liveMapping()) {
+    const auto map = live->map();
+    return withTracker(posesOf(map->keyframes), map->T_odom_ref);
   }
-  return poses;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return withTracker(posesOf(keyframes_), session_->T_odom_ref());
 }
 
 // --- mrpt::config::CLoadableOptions ----------------------------------------------------------
@@ -285,29 +395,26 @@ void CEventFusionMapBuilder::saveToConfigFile(mrpt::config::CConfigFileBase& tar
 void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_map,
                                         const mrpt::poses::CPosePDF* /*x0*/) {
   std::vector<StoredKeyframe> earlier = keyframesOf(initial_map);
-  const std::lock_guard<std::mutex> lock(mutex_);
-  auto session = std::make_unique<MappingSession>(options_);
-  for (const StoredKeyframe& keyframe : earlier) {
-    session->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
+  for (StoredKeyframe& keyframe : earlier) {  // the host may change its clouds
+    keyframe.points = std::make_shared<mrpt::maps::CPointsMapXYZI>(*keyframe.points);
   }
-  restart(EventFusionOptions(options_));
-  session_ = std::move(session);
-  keyframes_ = std::move(earlier);
+  restart(usedOptions(), std::move(earlier));
 }
 
 mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() const {
+  const std::shared_ptr<LiveMapping> live = liveMapping();
+  const std::optional<SessionStatus> live_status =
+      live ? std::optional(live->status()) : std::nullopt;
   const std::lock_guard<std::mutex> lock(mutex_);
+  const SessionStatus status = live_status ? *live_status : session_->status();
   auto estimate = mrpt::poses::CPose3DPDFGaussian::Create();
-  const std::optional<StampedPose>& newest = session_->newestPose();
-  if (!newest) return estimate;
-  const std::optional<RefinementState> refinement = session_->status().refinement;
-  if (!refinement) {
-    estimate->mean = mrptPoseFrom(newest->T_world_rig);
-    return estimate;
-  }
-  const Rigid3 T_world_rig = refinement->T_world_odom * newest->T_world_rig;
+  const mrpt::poses::CPose3DPDFGaussian* newest = tracker_poses_.newest(status.pose_source);
+  if (newest == nullptr) return estimate;
+  *estimate = *newest;
+  if (!status.refinement) return estimate;
+  const Rigid3 T_world_rig = status.refinement->T_world_odom * rigidFrom(newest->mean);
   return std::make_shared<mrpt::poses::CPose3DPDFGaussian>(
-      mrptPoseFrom(T_world_rig, covarianceAt(*refinement, T_world_rig)));
+      mrptPoseFrom(T_world_rig, covarianceAt(*status.refinement, T_world_rig)));
 }
 
 void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollection& action,
@@ -317,13 +424,23 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
     const std::lock_guard<std::mutex> lock(mutex_);
     pose = reckoning_.poseAfter(action, observations);
   }
-  if (pose) processObservation(pose);
-  for (const mrpt::obs::CObservation::Ptr& observation : observations) {
-    processObservation(observation);
-  }
+  // One bad observation takes no other one with it.
+  std::exception_ptr error;
+  const auto process = [&](const mrpt::obs::CObservation::Ptr& observation) {
+    const std::exception_ptr refusal = errorOf([&] { processObservation(observation); });
+    if (!error) error = refusal;
+  };
+  if (pose) process(pose);
+  for (const mrpt::obs::CObservation::Ptr& observation : observations) process(observation);
+  if (error) std::rethrow_exception(error);
 }
 
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
+  if (const auto live = liveMapping()) {
+    out_map.clear();
+    for (const SimpleMapFrame& frame : live->map()->frames) out_map.insert(frame.pose, frame.frame);
+    return;
+  }
   mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   out_map.clear();
@@ -331,12 +448,20 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
+  if (const auto live = liveMapping()) {
+    return static_cast<unsigned int>(live->map()->keyframes.size());
+  }
   mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   return static_cast<unsigned int>(keyframes_.size());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
+  if (const auto live = liveMapping()) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    handed_out_ = live->map();
+    return &handed_out_->metric_map;
+  }
   mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(options_.cloud);
@@ -351,10 +476,18 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
-  mapForQuery();
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (newest_depth_.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
-  const cv::Mat3b picture = depthPicture(newest_depth_, session_->planes());
+  cv::Mat1f depth;
+  DepthPlanesOptions planes;
+  if (const auto live = liveMapping()) {
+    std::tie(depth, planes) = live->newestDepth();
+  } else {
+    mapForQuery();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    depth = newest_depth_;
+    planes = session_->planes();
+  }
+  if (depth.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
+  const cv::Mat3b picture = depthPicture(depth, planes);
   writeAtomically(file, [&](const std::filesystem::path& temporary) {
     if (!cv::imwrite(temporary.string(), picture)) throw std::runtime_error("imwrite failed");
   });

@@ -19,7 +19,9 @@
 #include "maps/cloud/cloud_point.h"
 #include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/dead_reckoning.h"
+#include "plugin/mrpt/live_mapping.h"
 #include "plugin/mrpt/stored_keyframe.h"
+#include "plugin/mrpt/tracker_poses.h"
 #include "plugin/options/option_file.h"
 #include "plugin/session/mapping_session.h"
 
@@ -64,6 +66,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// the builder or asks for the map. With one such thread, keyframes come in the order of their
   /// windows. May use the builder, whose map then ends with this keyframe.
   using KeyframeCallback = std::function<void(const KeyframeDepthMap&)>;
+  /// Live operation: receives each new snapshot of the map, in the mapping's thread.
+  using MapCallback = std::function<void(const std::shared_ptr<const MapSnapshot>&)>;
 
   /// @throws std::invalid_argument if the options are not valid.
   explicit CEventFusionMapBuilder(const EventFusionOptions& builder_options = defaultOptions());
@@ -75,6 +79,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void setOptions(const EventFusionOptions& builder_options);
   EventFusionOptions usedOptions() const;
   void setKeyframeCallback(KeyframeCallback callback);
+  void setMapCallback(MapCallback callback);
   /// @param sink receives every fused plane of every keyframe. Not owned, may be null. The threads
   /// of the sweep call it while the mutex is held: it must not use the builder.
   void setDsiSink(DsiSink* sink);
@@ -153,10 +158,14 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
     std::vector<std::string> warnings;  // for the log
   };
 
-  void restart(const EventFusionOptions& builder_options);
+  void restart(const EventFusionOptions& builder_options, std::vector<StoredKeyframe> earlier = {});
+  /// Null in playback.
+  std::shared_ptr<LiveMapping> liveMapping() const;
+  LiveMapping::Callbacks liveCallbacks();
+  void addEvents(CameraPacket packet);
+  void addPose(const mrpt::obs::CObservation& observation);
   void followRefinement();
   void applyPending() const;
-  std::vector<StampedPose> keyframePoses() const;
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
   /// Feeds the session under the lock, then maps and delivers. Throws the first error at the end.
   void advance(const std::function<void(MappingSession&)>& feed);
@@ -167,15 +176,18 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// Maps the complete windows for a query. Const, as MRPT's queries are.
   void mapForQuery() const;
 
+  std::mutex restart_mutex_;  // one at a time starts over
   mutable std::mutex mutex_;  // protects all members below
   EventFusionOptions options_;
 
   KeyframeCallback callback_;
+  MapCallback map_callback_;
   DsiSink* sink_ = nullptr;
   ProcessorClock clock_ = processSeconds;
   std::unique_ptr<MappingSession> session_;
   bool finished_ = false;
   std::uint64_t ignored_observations_ = 0;
+  TrackerPoses tracker_poses_;
   DeadReckoning reckoning_;                // of the actions
   std::vector<StoredKeyframe> keyframes_;  // the initial map's first
   cv::Mat1f newest_depth_;                 // of the newest keyframe
@@ -184,6 +196,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::set<std::thread::id> delivering_;   // threads within a callback
   mutable mrpt::maps::CMultiMetricMap metric_map_;
   mutable CEventFusionMap::Ptr event_map_;  // in metric_map_
+  std::shared_ptr<LiveMapping> live_;       // null in playback, which uses session_
+  mutable std::shared_ptr<const MapSnapshot> handed_out_;
 };
 
 }  // namespace efm

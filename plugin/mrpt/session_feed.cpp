@@ -3,6 +3,7 @@
 
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/tracker_poses.h"
 
 namespace efm {
 
@@ -20,9 +21,8 @@ CameraPacket packetOf(const CObservationEvents& observation) {
 bool addPoseOf(const mrpt::obs::CObservation& observation, MappingSession& session) {
   const std::optional<ObservedPose> observed = poseIn(observation);
   if (!observed) return false;
-  const Rigid3 T_body_rig = session.setup().T_body_rig.value_or(observed->T_body_rig);
-  session.addPose({observed->t_ns, observed->T_world_body * T_body_rig}, *poseSourceOf(observation),
-                  observed->noise);
+  session.addPose({observed->t_ns, rigPose(*observed, session.setup().T_body_rig)},
+                  *poseSourceOf(observation), observed->noise);
   return true;
 }
 

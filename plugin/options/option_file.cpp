@@ -179,6 +179,7 @@ EventFusionOptions OptionReader::options() const {
     options.mapper.validate();
     options.cloud.validate();
     options.refinement.validate();
+    options.live.validate();
   } catch (const std::invalid_argument& error) {
     // The structs say "key = value: must be ..."; they know neither sections nor files.
     const std::string message = error.what();

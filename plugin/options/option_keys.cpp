@@ -190,6 +190,14 @@ const std::vector<OptionKey>& optionKeys() {
       option("refinement", "motion_sigma_deg_s", KEYFRAME(motion.motion_sigma_deg_s)),
       option("refinement", "motion_rounds", KEYFRAME(motion.motion_rounds)),
 
+      option("live", "enabled", FIELD(live.enabled)),
+      option("live", "max_event_rate", FIELD(live.max_event_rate)),
+      option("live", "max_queue_events", FIELD(live.max_queue_events)),
+      option("live", "max_queue_mb", FIELD(live.max_queue_mb)),
+      option("live", "max_pose_wait_s", FIELD(live.max_pose_wait_s)),
+      option("live", "max_speed_m_s", FIELD(live.max_speed_m_s)),
+      option("live", "max_turn_deg_s", FIELD(live.max_turn_deg_s)),
+
       option("output", "camera_maps", KEYFRAME(camera_maps)),
       option("output", "event_images", KEYFRAME(event_images)),
 

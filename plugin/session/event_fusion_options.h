@@ -4,6 +4,7 @@
 #include "mapping/keyframes/fusion_mapper.h"
 #include "mapping/survey/option_choice.h"
 #include "maps/cloud/global_cloud.h"
+#include "plugin/session/live_options.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/rig_setup.h"
 
@@ -20,6 +21,7 @@ struct EventFusionOptions {
   GlobalCloudOptions cloud;
   MapRefinementOptions refinement;
   RigOptions rig;
+  LiveOptions live;
 };
 
 /// The options of a program that was told nothing: what can be chosen from the data is.

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
@@ -22,11 +23,6 @@ constexpr std::int64_t kRigCompletesEarlyNs = kNanosecondsPerSecond / 10;
 
 /// In live operation, automatic options are chosen from the first window of this length.
 constexpr double kFirstWindowS = 1;
-
-bool sameCalibration(const RigCamera& a, const RigCamera& b) {
-  return a.model == b.model && isSame(a.T_rig_cam, b.T_rig_cam) &&
-         a.time_offset_ns == b.time_offset_ns;
-}
 
 void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
   if (!span) span = TimeSpan{t_ns, t_ns};
@@ -55,26 +51,62 @@ MappingSession::MappingSession(const EventFusionOptions& options)
 }
 
 void MappingSession::addEvents(CameraPacket packet) {
+  const int camera = packet.camera;
+  const std::size_t events = packet.events.size();
+  if (options_.live.enabled && events > 0) restartAfterStep(camera, packet.events.front().t_ns);
   std::vector<CameraPacket> packets;
-  {
+  try {
     const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
     packets = rig_.add(std::move(packet), mapper_);
+  } catch (const std::invalid_argument&) {
+    status_.refused_events[camera] += events;
+    throw;
   }
   // A refused packet takes no other one with it.
   std::exception_ptr refusal;
   for (CameraPacket& ready : packets) {
+    const int ready_camera = ready.camera;
+    const std::size_t ready_events = ready.events.size();
+    const std::int64_t ready_ns = ready_events > 0 ? ready.events.front().t_ns : 0;
+    const std::uint64_t read = mapper_.counts().total().read;
     try {
       feed(std::move(ready));
     } catch (const std::invalid_argument&) {
+      if (mapper_.counts().total().read == read) {
+        status_.refused_events[ready_camera] += ready_events;
+        if (ready_events > 0) refused_since_ns_.try_emplace(ready_camera, ready_ns);
+      }
       if (!refusal) refusal = std::current_exception();
+      continue;
     }
+    refused_since_ns_.erase(ready_camera);
   }
   if (refusal) std::rethrow_exception(refusal);
 }
 
+/// Where a camera's packets have been refused for a second of its clock, the clock went back: the
+/// mapping starts anew, with the map so far.
+void MappingSession::restartAfterStep(int camera, std::int64_t t_ns) {
+  const auto since = refused_since_ns_.find(camera);
+  if (since == refused_since_ns_.end() || t_ns - since->second < kNanosecondsPerSecond) return;
+  if (status_.events) mapper_.giveUpBefore(status_.events->last_ns + 1);
+  earlier_counts_ += mapper_.counts();
+  const Rig rig = mapper_.rig();
+  mapper_ = FusionMapper(mapperOptions(options_));
+  for (const RigCamera& rig_camera : rig.cameras) mapper_.addCamera(rig_camera);
+  if (depth_follower_) mapper_.setPlanes(depth_follower_->planes());
+  ++status_.clock_steps;
+  status_.events.reset();
+  newest_begin_ns_.reset();
+  newest_pose_.reset();
+  next_stretch_.clear();
+  noises_.clear();
+  refused_since_ns_.clear();
+}
+
 void MappingSession::feed(CameraPacket packet) {
   const RigCamera& camera = mapper_.rig().cameras[static_cast<std::size_t>(packet.camera)];
-  if (!sameCalibration(camera, packet.calibration)) {
+  if (!isSame(camera, packet.calibration)) {
     throw std::invalid_argument(
         fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "
                     "first packet",
@@ -107,13 +139,13 @@ bool MappingSession::seenFor(std::int64_t duration_ns) const {
 void MappingSession::completeRig() {
   if (rig_.isComplete()) return;
   rig_.requireOptionsFit();
-  usePoses(pose_source_.select());
+  usePoses(pose_source_.select(), std::nullopt);
   rig_.complete();
 }
 
 void MappingSession::addPose(const StampedPose& pose, const PoseSourceId& source,
                              const std::optional<PoseNoise>& noise) {
-  usePoses(pose_source_.add(source, pose));
+  usePoses(pose_source_.add(source, pose), noise);
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // Of two poses of the same time the first counts, and so does its noise.
   if (refinement_ && used) noises_[source].try_emplace(pose.t_ns, noise);
@@ -129,12 +161,90 @@ std::optional<PoseNoise> MappingSession::noiseAt(std::int64_t t_ns) {
   return noises.begin()->second;
 }
 
-void MappingSession::usePoses(const std::vector<StampedPose>& poses) {
+/// @param noise stated with the poses.
+void MappingSession::usePoses(const std::vector<StampedPose>& poses,
+                              const std::optional<PoseNoise>& noise) {
   for (const StampedPose& pose : poses) {
+    if (options_.live.enabled &&
+        (!next_stretch_.empty() || isJump(pose, noise.value_or(PoseNoise{})))) {
+      next_stretch_.push_back(pose);
+      continue;
+    }
     mapper_.addPose(pose);
     extend(status_.poses, pose.t_ns);
     if (!newest_pose_ || pose.t_ns >= newest_pose_->t_ns) newest_pose_ = pose;
   }
+}
+
+/// Whether no motion explains a pose after the one before it.
+bool MappingSession::isJump(const StampedPose& pose, const PoseNoise& noise) const {
+  if (!newest_pose_ || pose.t_ns <= newest_pose_->t_ns) return false;
+  constexpr double kSigmas = 5;
+  const double dt_s = secondsBetween(newest_pose_->t_ns, pose.t_ns);
+  const Rigid3 motion = newest_pose_->T_world_rig.inverse() * pose.T_world_rig;
+  const double turn_rad = Eigen::AngleAxisd(motion.rotation).angle();
+  return motion.translation.norm() > options_.live.max_speed_m_s * dt_s + kSigmas * noise.noise_m ||
+         std::min(turn_rad, 2 * kPi - turn_rad) >
+             options_.live.max_turn_deg_s * kRadiansPerDegree * dt_s + kSigmas * noise.noise_rad;
+}
+
+/// Goes on to the poses after a jump, once all windows before it are mapped. Windows that span it
+/// are given up. @return whether it did.
+bool MappingSession::beginStretch() {
+  if (next_stretch_.empty()) return false;
+  if (!finished_ && mapper_.eventsCompleteNs() < newest_pose_->t_ns) return false;
+  ++status_.pose_jumps;
+  mapper_.giveUpBefore(next_stretch_.front().t_ns);
+  newest_pose_.reset();
+  usePoses(std::exchange(next_stretch_, {}), std::nullopt);
+  return true;
+}
+
+/// Gives up the windows whose poses are overdue, where no other window can be mapped.
+void MappingSession::limitPoseWait() {
+  if (!options_.live.enabled || finished_ || !status_.events) return;
+  const std::int64_t overdue_ns =
+      status_.events->last_ns - durationFromSeconds(options_.live.max_pose_wait_s);
+  if (!newest_pose_ || newest_pose_->t_ns < overdue_ns) mapper_.giveUpBefore(overdue_ns);
+}
+
+void MappingSession::skipEvents(const CameraPacket& packet) {
+  if (packet.events.empty()) return;
+  status_.paused_events[packet.camera] += packet.events.size();
+  giveUpBefore(packet.camera, packet.events.back().t_ns + 1);
+}
+
+void MappingSession::giveUpBefore(int camera, std::int64_t until_ns) {
+  const auto& cameras = mapper_.rig().cameras;
+  const auto index = static_cast<std::size_t>(camera);
+  const std::int64_t offset_ns = index < cameras.size() ? cameras[index].time_offset_ns : 0;
+  mapper_.giveUpBefore(until_ns + offset_ns);
+}
+
+bool MappingSession::giveUpOldestWindow() {
+  const std::optional<Window> oldest = nextWindow();
+  if (!oldest) return false;
+  if (mapper_.eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns)) return false;
+  mapper_.giveUpBefore(oldest->t0_ns + 1);
+  return true;
+}
+
+void MappingSession::giveUpOlderHalf() {
+  const std::int64_t oldest_ns = mapper_.oldestHeldNs();
+  if (status_.events && oldest_ns < status_.events->last_ns) {
+    mapper_.giveUpBefore(oldest_ns + (status_.events->last_ns - oldest_ns) / 2 + 1);
+  }
+}
+
+void MappingSession::giveUpWindow(const Window& window) {
+  const std::optional<Window> next = nextWindow();
+  if (next && next->t0_ns == window.t0_ns) mapper_.giveUpBefore(window.t0_ns + 1);
+}
+
+std::optional<Window> MappingSession::nextWindow() {
+  if (!rig_.isComplete() || options_.automatic.any()) return std::nullopt;
+  const std::optional<WindowData> data = mapper_.window();
+  return data ? std::optional(data->window) : std::nullopt;
 }
 
 void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
@@ -150,16 +260,21 @@ void MappingSession::completeEarly() {
 
 void MappingSession::finish() {
   finished_ = true;
-  usePoses(pose_source_.select());
+  usePoses(pose_source_.select(), std::nullopt);
   mapper_.finish();
   completeRig();
   rig_.requireNoneWaits();
 }
 
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock) {
-  if (!rig_.isComplete() || !chooseAutomatic()) return std::nullopt;
+  if (!rig_.isComplete() || !chooseAutomatic()) {
+    limitPoseWait();
+    return std::nullopt;
+  }
   StageTimer timer(status_.times, clock);
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
+  while (!keyframe && beginStretch()) keyframe = mapper_.next(sink, &timer);
+  if (!keyframe) limitPoseWait();
   if (keyframe) {
     if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
       mapper_.setPlanes(depth_follower_->planes());
@@ -253,7 +368,8 @@ std::vector<ViewPoint> MappingSession::pointsOf(const KeyframeDepthMap& keyframe
 
 SessionStatus MappingSession::status() const {
   SessionStatus status = status_;
-  status.counts = mapper_.counts();
+  status.counts = earlier_counts_;
+  status.counts += mapper_.counts();
   status.pose_source = pose_source_.selected();
   status.other_poses = pose_source_.unused();
   status.rig = mapper_.rig();

@@ -79,6 +79,23 @@ class MappingSession {
   std::optional<WindowData> window();
   void skipWindow(const Window& window) { mapper_.skipWindow(window); }
 
+  /// Counts a packet that is not to be mapped, and gives up its windows.
+  void skipEvents(const CameraPacket& packet);
+  /// Gives up the windows that lack events of a camera.
+  /// @param until_ns on the camera's clock: events before it are missing.
+  void giveUpBefore(int camera, std::int64_t until_ns);
+  /// Gives up the oldest window that could be mapped, if newer events fill another one.
+  /// @return whether it did.
+  bool giveUpOldestWindow();
+  /// Gives up the windows of the older half of the events.
+  void giveUpOlderHalf();
+  /// The window that `next` would map, if there is one.
+  std::optional<Window> nextWindow();
+  /// Gives this window up if it is still the next one.
+  void giveUpWindow(const Window& window);
+  /// The events that windows may still need.
+  std::size_t heldEvents() const { return mapper_.heldEvents(); }
+
   /// Moves all keyframes in the cloud to their refined poses.
   void applyPending();
 
@@ -100,7 +117,11 @@ class MappingSession {
   void feed(CameraPacket packet);
   bool seenFor(std::int64_t duration_ns) const;
   void completeRig();
-  void usePoses(const std::vector<StampedPose>& poses);
+  void restartAfterStep(int camera, std::int64_t t_ns);
+  void usePoses(const std::vector<StampedPose>& poses, const std::optional<PoseNoise>& noise);
+  bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
+  bool beginStretch();
+  void limitPoseWait();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   bool chooseAutomatic();
   void insert(KeyframeDepthMap& keyframe);
@@ -110,6 +131,7 @@ class MappingSession {
   RigAssembly rig_;
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
+  MapperCounts earlier_counts_;                  // of mappers before a step of the clock
   std::optional<DepthFollower> depth_follower_;  // where depth limits are automatic
   RefinedCloud cloud_;
   std::unique_ptr<MapRefinement> refinement_;  // where poses are refined
@@ -120,7 +142,9 @@ class MappingSession {
   bool all_refined_ = false;
   std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
   std::optional<StampedPose> newest_pose_;
-  SessionStatus status_;  // incomplete: see status()
+  std::vector<StampedPose> next_stretch_;  // poses after a jump, until those before it are used up
+  std::map<int, std::int64_t> refused_since_ns_;  // by camera; first event of the refused packets
+  SessionStatus status_;                          // incomplete: see status()
 };
 
 }  // namespace efm

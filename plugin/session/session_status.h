@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mapping/geometry/rig.h"
@@ -21,10 +22,40 @@ struct TimeSpan {
   std::int64_t last_ns = 0;
 };
 
+/// What became of one camera's events before the mapping, in live operation:
+/// received = thinned + held + queued + dropped + paused + refused + taken.
+struct QueueCounts {
+  std::uint64_t received = 0;
+  std::uint64_t thinned = 0;  ///< By the budget in sensor time.
+  std::uint64_t held = 0;     ///< Until the end of their 10 ms.
+  std::uint64_t queued = 0;
+  std::uint64_t dropped = 0;  ///< The queue was full.
+  std::uint64_t paused = 0;   ///< Map updating was disabled.
+  std::uint64_t refused = 0;  ///< In a packet that contradicts its camera.
+  std::uint64_t taken = 0;    ///< By the mapping: `MapperCounts::read`, or `refused_events`.
+};
+
+struct LiveStatus {
+  std::map<int, QueueCounts> cameras;
+  std::uint64_t refused_poses = 0;  ///< More than a second older than the newest.
+  std::uint64_t errors = 0;         ///< Of the mapping, the refinement and callbacks.
+  std::string last_error;           ///< Of these and of refused observations; empty: none.
+  bool failing = false;             ///< The last keyframe could not be made.
+
+  /// The part of the received events that was dropped or thinned, 0 to 1.
+  double dropRatio() const;
+};
+
 /// The input of a session and its work so far.
 struct SessionStatus {
   MapperCounts counts;  ///< Complete after `finish`.
   StageTimes times;     ///< Of the stages within the session; the caller fills in the rest.
+  /// Live operation: events of packets that were refused, by camera. In playback an error.
+  std::map<int, std::uint64_t> refused_events;
+  /// Playback: events that came while map updating was disabled, by camera.
+  std::map<int, std::uint64_t> paused_events;
+  std::uint64_t pose_jumps = 0;   ///< Live operation: new stretches of poses.
+  std::uint64_t clock_steps = 0;  ///< Live operation: the clock went back, and the mapping with it.
   std::optional<TimeSpan> events;
   std::optional<TimeSpan> poses;
   std::optional<PoseSourceId> pose_source;            ///< The source whose poses are used.
@@ -34,6 +65,7 @@ struct SessionStatus {
   std::size_t recalibrated_cameras = 0;       ///< Cameras whose recorded calibration differs.
   std::vector<ChosenOption> chosen;           ///< Automatic options.
   std::optional<RefinementState> refinement;  ///< Where poses are refined.
+  std::optional<LiveStatus> live;             ///< In live operation.
 };
 
 }  // namespace efm

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/live/input_queue.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/events/event_check.h"
+
+namespace efm {
+namespace {
+
+std::uint64_t bytesOf(const CameraPacket& packet) {
+  return sizeof(CameraPacket) + packet.events.capacity() * sizeof(Event);
+}
+
+CameraPacket withoutEvents(const CameraPacket& packet) {
+  return {packet.camera, packet.calibration, {}, packet.covered_until_ns};
+}
+
+}  // namespace
+
+InputQueue::InputQueue(const LiveOptions& options) : options_(options) {}
+
+InputQueue::Camera& InputQueue::cameraOf(int index) {
+  return cameras_.try_emplace(index, options_.max_event_rate).first->second;
+}
+
+void InputQueue::add(CameraPacket packet) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (ended_) return;
+  Camera& camera = cameraOf(packet.camera);
+  camera.counts.received += packet.events.size();
+  try {
+    requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
+    if (camera.last && !isSame(camera.last->calibration, packet.calibration)) {
+      throw std::invalid_argument(
+          fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "
+                      "earlier packets",
+                      packet.camera));
+    }
+  } catch (const std::invalid_argument&) {
+    camera.counts.refused += packet.events.size();
+    throw;
+  }
+  packet.events = camera.budget.pass(std::move(packet.events), packet.covered_until_ns);
+  camera.last = withoutEvents(packet);
+  push(std::move(packet));
+}
+
+void InputQueue::push(CameraPacket packet) {
+  events_ += packet.events.size();
+  bytes_ += bytesOf(packet);
+  packets_.push_back(std::move(packet));
+  while (isFull() && !packets_.empty()) dropOldest();
+  changed_.notify_one();
+}
+
+bool InputQueue::isFull() const {
+  return events_ > static_cast<std::uint64_t>(options_.max_queue_events) ||
+         static_cast<double>(bytes_) > options_.max_queue_mb * 1e6;
+}
+
+void InputQueue::dropOldest() {
+  const CameraPacket& oldest = packets_.front();
+  events_ -= oldest.events.size();
+  bytes_ -= bytesOf(oldest);
+  cameraOf(oldest.camera).counts.dropped += oldest.events.size();
+  noteMissing(oldest);
+  packets_.pop_front();
+}
+
+void InputQueue::noteMissing(const CameraPacket& packet) {
+  if (packet.events.empty()) return;
+  const std::int64_t until_ns = packet.events.back().t_ns + 1;
+  std::int64_t& missing_ns = dropped_until_ns_.try_emplace(packet.camera, until_ns).first->second;
+  missing_ns = std::max(missing_ns, until_ns);
+}
+
+void InputQueue::skip(const CameraPacket& packet) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (ended_) return;
+  QueueCounts& counts = cameraOf(packet.camera).counts;
+  counts.received += packet.events.size();
+  counts.paused += packet.events.size();
+  noteMissing(packet);
+  changed_.notify_one();
+}
+
+void InputQueue::add(QueuedPose pose) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (ended_) return;
+  poses_.push_back(std::move(pose));
+  changed_.notify_one();
+}
+
+void InputQueue::end() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (ended_) return;
+  ended_ = true;
+  for (auto& [index, camera] : cameras_) {
+    if (!camera.last) continue;
+    CameraPacket rest = *camera.last;
+    rest.events = camera.budget.finish();
+    if (!rest.events.empty()) push(std::move(rest));
+  }
+  changed_.notify_one();
+}
+
+void InputQueue::stop() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  stopped_ = true;
+  changed_.notify_one();
+}
+
+InputQueue::Batch InputQueue::wait(std::optional<Clock::time_point> until) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const auto has_input = [this] {
+    return stopped_ || ended_ || !packets_.empty() || !poses_.empty() || !dropped_until_ns_.empty();
+  };
+  if (until) {
+    changed_.wait_until(lock, *until, has_input);
+  } else {
+    changed_.wait(lock, has_input);
+  }
+  return takeLocked();
+}
+
+InputQueue::Batch InputQueue::take() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return takeLocked();
+}
+
+InputQueue::Batch InputQueue::takeLocked() {
+  Batch batch;
+  batch.poses = std::exchange(poses_, {});
+  batch.packets.assign(std::move_iterator(packets_.begin()), std::move_iterator(packets_.end()));
+  packets_.clear();
+  for (const CameraPacket& packet : batch.packets) {
+    cameraOf(packet.camera).counts.taken += packet.events.size();
+  }
+  batch.dropped_until_ns = std::exchange(dropped_until_ns_, {});
+  events_ = 0;
+  bytes_ = 0;
+  batch.ended = ended_;
+  batch.stopped = stopped_;
+  return batch;
+}
+
+std::uint64_t InputQueue::queuedEvents() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return events_;
+}
+
+std::map<int, QueueCounts> InputQueue::counts() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::map<int, QueueCounts> counts;
+  for (const auto& [index, camera] : cameras_) {
+    QueueCounts& of_camera = counts[index];
+    of_camera = camera.counts;
+    of_camera.thinned = camera.budget.thinned();
+    of_camera.held = camera.budget.held();
+    of_camera.queued = of_camera.received - of_camera.thinned - of_camera.held - of_camera.dropped -
+                       of_camera.paused - of_camera.refused - of_camera.taken;
+  }
+  return counts;
+}
+
+}  // namespace efm

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "plugin/live/event_budget.h"
+#include "plugin/session/live_options.h"
+#include "plugin/session/mapping_session.h"
+
+namespace efm {
+
+/// A pose on its way to a session.
+struct QueuedPose {
+  StampedPose pose;
+  PoseSourceId source;
+  std::optional<PoseNoise> noise;
+};
+
+/// The input of a mapping that runs in another thread: thinned to the budget, and bounded in events
+/// and in bytes. Where it is full, the oldest packets are dropped, never poses. Any thread adds;
+/// one takes. Adding never waits for the mapping.
+class InputQueue {
+ public:
+  explicit InputQueue(const LiveOptions& options);
+
+  /// @throws std::invalid_argument where an event lies outside the sensor, or the calibration is
+  /// not that of the camera's earlier packets: the packet is refused.
+  void add(CameraPacket packet);
+  void add(QueuedPose pose);
+  /// Counts a packet that is not to be mapped.
+  void skip(const CameraPacket& packet);
+  /// No more input will come. Packets and poses that are added afterwards are not taken.
+  void end();
+  /// Wakes up the taking thread for good.
+  void stop();
+
+  struct Batch {
+    std::vector<QueuedPose> poses;  ///< In the order they came.
+    std::vector<CameraPacket> packets;
+    /// The cameras with dropped or skipped packets, and until when, on their own clocks: a window
+    /// that begins earlier lacks events.
+    std::map<int, std::int64_t> dropped_until_ns;
+    bool ended = false;
+    bool stopped = false;
+  };
+  using Clock = std::chrono::steady_clock;
+  /// Waits for input, at most until then.
+  Batch wait(std::optional<Clock::time_point> until = std::nullopt);
+  /// The input that is there.
+  Batch take();
+
+  std::uint64_t queuedEvents() const;
+  std::map<int, QueueCounts> counts() const;
+
+ private:
+  struct Camera {
+    explicit Camera(double max_rate) : budget(max_rate) {}
+    EventBudget budget;
+    std::optional<CameraPacket> last;  // without events
+    QueueCounts counts;
+  };
+
+  Camera& cameraOf(int index);
+  void push(CameraPacket packet);
+  void dropOldest();
+  void noteMissing(const CameraPacket& packet);
+  bool isFull() const;
+  Batch takeLocked();
+
+  const LiveOptions options_;
+
+  mutable std::mutex mutex_;  // of the members below
+  std::condition_variable changed_;
+  std::map<int, Camera> cameras_;
+  std::deque<CameraPacket> packets_;
+  std::vector<QueuedPose> poses_;
+  std::map<int, std::int64_t> dropped_until_ns_;
+  std::uint64_t events_ = 0;  // in packets_
+  std::uint64_t bytes_ = 0;
+  bool ended_ = false;
+  bool stopped_ = false;
+};
+
+}  // namespace efm

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/live_mapping.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/points_map.h"
+
+namespace efm {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// The snapshot of the map may take this part of the time.
+constexpr int kMapCostDivisor = 20;
+
+std::string errorText() {
+  try {
+    throw;
+  } catch (const std::exception& error) {
+    return error.what();
+  } catch (...) {
+    return "an exception of another type";
+  }
+}
+
+SimpleMapFrame simpleMapFrameOf(const StoredKeyframe& keyframe) {
+  mrpt::maps::CSimpleMap map;
+  insertInto(map, keyframe);
+  SimpleMapFrame frame;
+  map.get(0, frame.pose, frame.frame);
+  return frame;
+}
+
+}  // namespace
+
+LiveMapping::LiveMapping(const EventFusionOptions& options, std::vector<StoredKeyframe> earlier,
+                         Callbacks callbacks)
+    : options_(options.live),
+      callbacks_(std::move(callbacks)),
+      queue_(options.live),
+      session_(std::make_unique<MappingSession>(options)),
+      next_map_(std::make_shared<MapSnapshot>()) {
+  T_body_rig_ = session_->setup().T_body_rig;
+  for (const StoredKeyframe& keyframe : earlier) {
+    session_->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
+    next_map_->frames.push_back(simpleMapFrameOf(keyframe));
+  }
+  next_map_->keyframes = std::move(earlier);
+  publishMap(true);
+  publishState();
+  thread_ = std::thread([this] { run(); });
+}
+
+LiveMapping::~LiveMapping() { stop(); }
+
+void LiveMapping::stop() {
+  queue_.stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+void LiveMapping::run() {
+  bool goes_on = true;
+  while (goes_on) {
+    // A snapshot that was put off is made as soon as it may be.
+    goes_on = feed(map_changed_ ? queue_.wait(map_renewed_ + kMapCostDivisor * map_cost_)
+                                : queue_.wait());
+    while (mapNext()) {
+      const bool more = feed(queue_.take());
+      goes_on = goes_on && more;
+      if (!more) break;
+    }
+    if (goes_on) publishMap(false);
+    warnOfLosses();
+  }
+}
+
+/// @return whether more may come.
+bool LiveMapping::feed(InputQueue::Batch batch) {
+  if (batch.stopped) return false;
+  for (const QueuedPose& pose : batch.poses) {
+    try {
+      session_->addPose(pose.pose, pose.source, pose.noise);
+    } catch (const std::invalid_argument&) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ++live_.refused_poses;
+      live_.last_error = errorText();
+    }
+  }
+  for (const auto& [camera, until_ns] : batch.dropped_until_ns) {
+    session_->giveUpBefore(camera, until_ns);
+  }
+  for (CameraPacket& packet : batch.packets) {
+    try {
+      session_->addEvents(std::move(packet));
+    } catch (const std::exception&) {  // refused, or no memory
+      noteError("", false);
+    }
+  }
+  publishState();
+  if (!batch.ended) return true;
+  std::exception_ptr error;
+  try {
+    session_->finish();
+  } catch (const std::exception&) {
+    error = std::current_exception();
+    noteError("the end of the input", true);
+  }
+  while (mapNext()) {
+  }
+  publishMap(true);
+  publishState();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  finished_ = true;
+  finish_error_ = error;
+  finished_changed_.notify_all();
+  return false;
+}
+
+/// @return whether it made a keyframe or gave one up.
+bool LiveMapping::mapNext() {
+  giveUpExcess();
+  DsiSink* sink = nullptr;
+  ProcessorClock clock;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    sink = sink_;
+    clock = clock_;
+  }
+  std::optional<KeyframeDepthMap> keyframe;
+  std::optional<Window> window;
+  try {
+    window = session_->nextWindow();
+    keyframe = session_->next(sink, clock);
+    if (keyframe) {
+      StoredKeyframe stored = storedKeyframe(*keyframe, session_->pointsOf(*keyframe));
+      next_map_->frames.push_back(simpleMapFrameOf(stored));
+      next_map_->keyframes.push_back(std::move(stored));
+      map_changed_ = true;
+    }
+  } catch (const std::exception&) {
+    noteError("a keyframe", true);
+    if (!window) return false;
+    session_->giveUpWindow(*window);
+    return true;
+  }
+  if (!keyframe) return false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    live_.failing = false;
+    newest_depth_ = keyframe->map.depth;
+    planes_ = session_->planes();
+  }
+  publishMap(false);
+  publishState();
+  try {
+    if (callbacks_.on_keyframe) callbacks_.on_keyframe(*keyframe);
+  } catch (const std::exception&) {
+    noteError("the callback of a keyframe", true);
+  }
+  return true;
+}
+
+/// Newest wins: input that waits is bounded.
+void LiveMapping::giveUpExcess() {
+  const auto is_excess = [this] {
+    const std::uint64_t events = session_->heldEvents() + queue_.queuedEvents();
+    return events > static_cast<std::uint64_t>(options_.max_queue_events) ||
+           static_cast<double>(events * sizeof(Event)) > options_.max_queue_mb * 1e6;
+  };
+  while (is_excess() && session_->giveUpOldestWindow()) {
+  }
+  // No window can be mapped, so none can be given up: it is too large, or waits for poses.
+  if (is_excess() && !session_->nextWindow()) session_->giveUpOlderHalf();
+}
+
+void LiveMapping::publishState() {
+  SessionStatus status = session_->status();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  status_ = std::move(status);
+}
+
+/// Copies the keyframes and exports the cloud, unless this would take too large a part of the time.
+void LiveMapping::publishMap(bool at_once) {
+  const Clock::time_point begin = Clock::now();
+  if (map_ && !map_changed_ && !at_once) return;
+  if (map_ && !at_once && begin - map_renewed_ < kMapCostDivisor * map_cost_) return;
+  std::shared_ptr<const MapSnapshot> made;
+  try {
+    session_->applyPending();
+    const std::vector<Rigid3>& T_world_ref = session_->T_world_ref();
+    // A keyframe whose points could not be stored is in no snapshot.
+    const std::size_t earlier = next_map_->keyframes.size() - T_world_ref.size();
+    for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
+      StoredKeyframe& keyframe = next_map_->keyframes[earlier + i];
+      if (isSame(keyframe.T_world_ref, T_world_ref[i])) continue;
+      keyframe.T_world_ref = T_world_ref[i];
+      next_map_->frames[earlier + i] = simpleMapFrameOf(keyframe);
+    }
+    next_map_->T_odom_ref = session_->T_odom_ref();
+    auto map = std::make_shared<MapSnapshot>(*next_map_);
+    map->points = session_->cloud().points();
+    map->metric_map.maps.push_back(pointsMapOf(map->points));
+    made = std::move(map);
+  } catch (const std::exception&) {
+    noteError("the snapshot of the map", true);
+    return;
+  }
+  map_renewed_ = Clock::now();
+  map_cost_ = map_renewed_ - begin;
+  map_changed_ = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    map_ = made;
+  }
+  if (!callbacks_.on_map || !thread_.joinable()) return;
+  try {
+    callbacks_.on_map(made);
+  } catch (const std::exception&) {
+    noteError("the callback of the map", true);
+  }
+}
+
+/// Within a handler.
+/// @param counts as an error; otherwise it is a refused observation.
+void LiveMapping::noteError(const std::string& doing, bool counts) {
+  const std::string text = errorText();
+  bool is_new = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    is_new = live_.last_error != text;
+    live_.last_error = text;
+    if (counts) {
+      ++live_.errors;
+      live_.failing = true;
+    }
+  }
+  if (is_new && callbacks_.warn) callbacks_.warn(doing.empty() ? text : doing + ": " + text);
+}
+
+/// At most once a second.
+void LiveMapping::warnOfLosses() {
+  const Clock::time_point now = Clock::now();
+  if (now - warned_ < std::chrono::seconds(1) || !callbacks_.warn) return;
+  std::uint64_t losses = 0;
+  std::string text;
+  for (const auto& [camera, counts] : queue_.counts()) {
+    losses += counts.dropped + counts.thinned;
+    text += fmt::format("; camera {}: {} dropped, {} thinned, of {} events", camera, counts.dropped,
+                        counts.thinned, counts.received);
+  }
+  const std::size_t given_up = session_->status().counts.windows_given_up;
+  if (losses == warned_losses_ && given_up == warned_given_up_) return;
+  warned_ = now;
+  warned_losses_ = losses;
+  warned_given_up_ = given_up;
+  callbacks_.warn(fmt::format("{} windows given up so far{}", given_up, text));
+}
+
+void LiveMapping::finish() {
+  if (runsHere()) throw std::logic_error("the builder cannot be finished from its own callback");
+  queue_.end();
+  std::unique_lock<std::mutex> lock(mutex_);
+  finished_changed_.wait(lock, [this] { return finished_; });
+  if (finish_error_) std::rethrow_exception(std::exchange(finish_error_, nullptr));
+}
+
+void LiveMapping::setSink(DsiSink* sink) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sink_ = sink;
+}
+
+void LiveMapping::setClock(ProcessorClock clock) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clock_ = std::move(clock);
+}
+
+SessionStatus LiveMapping::status() const {
+  std::map<int, QueueCounts> cameras = queue_.counts();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  SessionStatus status = status_;
+  status.live = live_;
+  status.live->cameras = std::move(cameras);
+  return status;
+}
+
+std::shared_ptr<const MapSnapshot> LiveMapping::map() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return map_;
+}
+
+std::pair<cv::Mat1f, DepthPlanesOptions> LiveMapping::newestDepth() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return {newest_depth_, planes_};
+}
+
+}  // namespace efm

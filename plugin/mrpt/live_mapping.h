@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <mrpt/maps/CMultiMetricMap.h>
+#include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/poses/CPose3DPDF.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <exception>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "maps/cloud/cloud_point.h"
+#include "plugin/live/input_queue.h"
+#include "plugin/mrpt/stored_keyframe.h"
+#include "plugin/session/mapping_session.h"
+
+namespace efm {
+
+/// A keyframe of a simplemap. Shared with those who asked for the map: never changed.
+struct SimpleMapFrame {
+  mrpt::poses::CPose3DPDF::Ptr pose;
+  mrpt::obs::CSensoryFrame::Ptr frame;
+};
+
+/// The map as it was at one moment.
+struct MapSnapshot {
+  std::vector<StoredKeyframe> keyframes;   ///< Of the initial map first.
+  std::vector<Rigid3> T_odom_ref;          ///< Of the others: by the tracker.
+  std::vector<SimpleMapFrame> frames;      ///< The keyframes as those of a simplemap.
+  std::vector<CloudPoint> points;          ///< The exported points.
+  mrpt::maps::CMultiMetricMap metric_map;  ///< The points as a CPointsMapXYZI.
+};
+
+/// Maps in a thread of its own, for live operation. Adding input never waits for the mapping, and
+/// results are snapshots: nothing here waits for a sweep but `finish` and the destructor, which
+/// waits for the current one.
+///
+/// A snapshot of the map is renewed after each keyframe, as long as this takes at most a twentieth
+/// of the time; the state is always renewed. Where the mapping falls behind until the input that
+/// waits is as large as the queue may be, it gives up the oldest windows.
+///
+/// An error of the mapping, the refinement or a callback is counted and logged; its window is given
+/// up and the next one is tried.
+class LiveMapping {
+ public:
+  struct Callbacks {
+    /// All run in the mapping's thread.
+    std::function<void(const KeyframeDepthMap&)> on_keyframe;
+    std::function<void(const std::shared_ptr<const MapSnapshot>&)> on_map;
+    std::function<void(const std::string&)> warn;
+  };
+
+  /// @param earlier keyframes of an initial map.
+  /// @throws std::runtime_error naming a file of the options that cannot be read.
+  LiveMapping(const EventFusionOptions& options, std::vector<StoredKeyframe> earlier,
+              Callbacks callbacks);
+  /// Ends without mapping the rest.
+  ~LiveMapping();
+  LiveMapping(const LiveMapping&) = delete;
+  LiveMapping& operator=(const LiveMapping&) = delete;
+
+  /// The same, waiting for the current keyframe; further input is lost. Not from the mapping's
+  /// thread. One thread at a time.
+  void stop();
+
+  InputQueue& input() { return queue_; }
+  /// The pose of the rig on the body, from the options.
+  const std::optional<Rigid3>& T_body_rig() const { return T_body_rig_; }
+  /// Maps the rest of the input and waits for it.
+  /// @throws std::logic_error in the mapping's own thread; the error of the rig: a camera or an
+  /// option that does not fit.
+  void finish();
+
+  void setSink(DsiSink* sink);
+  void setClock(ProcessorClock clock);
+
+  SessionStatus status() const;
+  /// Never null.
+  std::shared_ptr<const MapSnapshot> map() const;
+  /// The newest keyframe's depth map, empty before the first one, and its planes.
+  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
+  bool runsHere() const { return std::this_thread::get_id() == thread_.get_id(); }
+
+ private:
+  void run();
+  bool feed(InputQueue::Batch batch);
+  bool mapNext();
+  void giveUpExcess();
+  void publishState();
+  void publishMap(bool at_once);
+  void noteError(const std::string& doing, bool counts);
+  void warnOfLosses();
+
+  const LiveOptions options_;
+  Callbacks callbacks_;
+  std::optional<Rigid3> T_body_rig_;
+  InputQueue queue_;
+
+  // Of the mapping's thread.
+  std::unique_ptr<MappingSession> session_;
+  std::shared_ptr<MapSnapshot> next_map_;  // the keyframes so far
+  bool map_changed_ = false;
+  std::chrono::steady_clock::time_point map_renewed_;
+  std::chrono::steady_clock::duration map_cost_{};
+  std::chrono::steady_clock::time_point warned_;
+  std::uint64_t warned_losses_ = 0;
+  std::size_t warned_given_up_ = 0;
+
+  mutable std::mutex mutex_;  // of the members below; held for copies alone
+  std::condition_variable finished_changed_;
+  DsiSink* sink_ = nullptr;
+  ProcessorClock clock_ = processSeconds;
+  SessionStatus status_;
+  LiveStatus live_;
+  std::shared_ptr<const MapSnapshot> map_;
+  cv::Mat1f newest_depth_;
+  DepthPlanesOptions planes_;
+  bool finished_ = false;
+  std::exception_ptr finish_error_;
+
+  std::thread thread_;  // last: it uses the others
+};
+
+}  // namespace efm

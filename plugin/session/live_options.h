@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+
+namespace efm {
+
+/// Live operation: mapping in a thread of its own beside a sensor that does not wait.
+struct LiveOptions {
+  /// false: playback. Each observation is mapped before the next one is taken, and the same
+  /// observations make the same map.
+  bool enabled = false;
+  /// Events per second of sensor time and camera; more are thinned evenly. 0: no limit. Depends on
+  /// the events alone, so that the same input gives the same map however loaded the machine is.
+  double max_event_rate = 1'000'000;
+  /// Input that waits for the mapping: its events of all cameras, and their memory. Beyond either
+  /// one the oldest windows are given up. At least 1000 events, 1 MB.
+  std::int64_t max_queue_events = 20'000'000;
+  double max_queue_mb = 512;
+  /// Events wait this long for poses. Seconds, above 0, at most 3600.
+  double max_pose_wait_s = 2;
+  /// A pose that is farther from the one before it, even by five standard deviations less, begins a
+  /// new stretch: no window spans both. Metres per second, degrees per second, above 0.
+  double max_speed_m_s = 50;
+  double max_turn_deg_s = 1500;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+}  // namespace efm
