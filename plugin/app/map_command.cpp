@@ -29,6 +29,7 @@
 #include "plugin/output/npy_file.h"
 #include "plugin/output/summary.h"
 #include "plugin/viewer/map_page.h"
+#include "plugin/window/map_frames.h"
 
 namespace efm {
 namespace {
@@ -327,6 +328,14 @@ int runMap(const MapArguments& arguments) {
   asUsage([&] { job.options.mapper.limits.validate(); });
   const Interruption interruption;
   job.stop_requested = [&] { return interruption.requested(); };
+  std::optional<MapFrames> frames;
+  if (!arguments.record_frames.empty()) {
+    std::vector<std::filesystem::path> inputs = inputsOf(sourceOf(arguments, job.options));
+    if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
+    refuseToReplace(arguments.record_frames, inputs);
+    frames.emplace(arguments.record_frames, arguments.force);
+    job.watchers.push_back(&*frames);
+  }
   const bool refined = job.options.refinement.enabled;
   const auto take = [](MapOutput& output, const KeyframeDepthMap& keyframe) {
     output.writeKeyframe(keyframe);

@@ -25,7 +25,9 @@ struct MappingArguments {
   std::vector<std::string> sets;  ///< section.key=value
 };
 
-struct MapArguments : MappingArguments {};
+struct MapArguments : MappingArguments {
+  std::filesystem::path record_frames;  ///< Folder for a picture per keyframe; empty: none.
+};
 
 struct DepthArguments : MappingArguments {
   /// Time of the reference view. Default: middle or end of the window, by the options.
@@ -35,16 +37,16 @@ struct DepthArguments : MappingArguments {
 
 /// `event-fusion map`: plays a recording and writes the map's folder. Prints a summary to stdout,
 /// warnings and errors to stderr.
-/// SIGINT, SIGTERM or SIGHUP ends the run as the end of the recording would; a second one kills it. In
-/// the first look at the recording (automatic options) it ends without a result: Interrupted.
+/// SIGINT, SIGTERM or SIGHUP ends the run as the end of the recording would; a second one kills it.
+/// In the first look at the recording (automatic options) it ends without a result: Interrupted.
 /// @return the process's exit status: 0 only if the whole recording is mapped, 130 where a signal
 /// stopped it.
 /// @throws std::exception if the options or the recording cannot be read, or a file cannot be
 /// written.
 int runMap(const MapArguments& arguments);
 
-/// `event-fusion depth`: maps one window. SIGINT, SIGTERM or SIGHUP ends it without a result, unless the
-/// keyframe is made: then its files are written.
+/// `event-fusion depth`: maps one window. SIGINT, SIGTERM or SIGHUP ends it without a result,
+/// unless the keyframe is made: then its files are written.
 /// @throws Interrupted if a signal came before; an earlier result stays.
 int runDepth(const DepthArguments& arguments);
 

@@ -64,6 +64,11 @@ void addMap(CLI::App& app, Run& run) {
   auto arguments = argumentsOf(command, run, runMap);
   addMappingArguments(command, *arguments);
   addTimeLimits(command, arguments->times);
+  command
+      .add_option("--record-frames", arguments->record_frames,
+                  "Draw the growing map after each keyframe, without a screen: frame_000001.png, … "
+                  "in DIR, with the trajectory, the newest depth map and rates")
+      ->type_name("DIR");
   command.parse_complete_callback([arguments] { takeConfig(*arguments); });
 }
 

@@ -122,9 +122,37 @@ class Player {
     if (job_.verbosity == Verbosity::kVerbose) progress_.print(keyframeLine(keyframe));
     try {
       job_.on_keyframe(keyframe);
+      for (MapWatcher* watcher : job_.watchers) {
+        const double start_s = progress_.seconds();
+        if (watcher->due()) watcher->show(snapshotOf(keyframe));
+        watched_s_ += progress_.seconds() - start_s;
+      }
     } catch (...) {
       delivery_error_ = std::current_exception();
     }
+  }
+
+  /// The map so far, with the rates of the mapping: without the time that the watchers took.
+  MapSnapshot snapshotOf(const KeyframeDepthMap& keyframe) const {
+    const SessionStatus status = builder_.status();
+    const double seconds = std::max(progress_.seconds() - watched_s_, 1e-3);
+    MapSnapshot snapshot{keyframe,
+                         job_.options.mapper.keyframe.planes,
+                         builder_.points(),
+                         builder_.trajectory(),
+                         {}};
+    const double keyframes = static_cast<double>(status.counts.keyframes);
+    const double read = static_cast<double>(status.counts.total().read);
+    snapshot.lines = {
+        fmt::format("{} keyframes, {} points", status.counts.keyframes, snapshot.points.size()),
+        fmt::format("{:.2f} M events: {:.2f} M events/s, {:.1f} keyframes/s", 1e-6 * read,
+                    1e-6 * read / seconds, keyframes / seconds)};
+    if (status.events) {
+      const double events_s = secondsBetween(status.events->first_ns, status.events->last_ns);
+      snapshot.lines.push_back(fmt::format("{:.2f} s of the recording, {:.2g}x real time", events_s,
+                                           events_s / seconds));
+    }
+    return snapshot;
   }
 
   void showProgress() {
@@ -181,7 +209,8 @@ class Player {
   std::exception_ptr delivery_error_;  // of `on_keyframe`
   bool sink_offered_ = false;
   std::optional<double> stopped_at_;
-  StageSeconds told_;  // until the last keyframe
+  double watched_s_ = 0;  // in the watchers
+  StageSeconds told_;     // until the last keyframe
   Progress progress_;
 };
 
@@ -271,6 +300,7 @@ std::optional<double> sequenceMaximum(MappingJob job, Recording& recording) {
   job.activity = "first pass";
   if (job.verbosity == Verbosity::kVerbose) job.verbosity = Verbosity::kNormal;
   job.make_dsi_sink = nullptr;
+  job.watchers.clear();
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { maximum.add(keyframe.max_confidence); };
   StageTimes ignored;
   Player(job, recording, ignored).play();

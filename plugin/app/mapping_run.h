@@ -14,6 +14,7 @@
 #include "plugin/options/option_file.h"
 #include "plugin/output/report.h"
 #include "plugin/recordings/recording.h"
+#include "plugin/window/map_snapshot.h"
 
 namespace efm {
 
@@ -32,6 +33,8 @@ struct MappingJob {
   std::function<bool()> stop_requested;
   /// Receives each keyframe, in order.
   std::function<void(const KeyframeDepthMap&)> on_keyframe;
+  /// See the map after each keyframe, in the thread that maps. Not owned.
+  std::vector<MapWatcher*> watchers;
   /// Measures the stages of the mapping. Default: the processor time of the whole process.
   ProcessorClock processor_clock;
   /// Makes the receiver of the DSI's planes, of this number. Called once, as soon as the reference
@@ -55,8 +58,8 @@ struct MappingOutcome {
 
 /// Plays a recording through a map builder, with progress on stderr. If reading stops with an
 /// error, the data before it are mapped.
-/// @throws std::invalid_argument if the options are not valid; the exceptions of `on_keyframe` and
-/// `make_dsi_sink`.
+/// @throws std::invalid_argument if the options are not valid; the exceptions of `on_keyframe`, of
+/// `make_dsi_sink` and of the watchers.
 MappingOutcome runMapping(const MappingJob& job, Recording& recording);
 
 /// The first of two passes: computes the robust maximum of the keyframes' confidences. Costs as

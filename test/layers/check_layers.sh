@@ -42,8 +42,8 @@ forbid plugin "(test|plugin/app)/" "never includes the application or the tests"
 forbid plugin "$ceres" "refinement is reached through maps/"
 forbid plugin "$recordings" "HDF5 stays in plugin/hdf5/ and plugin/writers/" '^plugin/(hdf5|writers)/'
 
-forbid plugin "$mrpt" "MRPT stays in mrpt/, recordings/, formats/, player/ and app/" \
-  '^plugin/(mrpt|recordings|formats|player|app)/'
+forbid plugin "$mrpt" "MRPT stays in mrpt/, recordings/, formats/, player/, window/ and app/" \
+  '^plugin/(mrpt|recordings|formats|player|window|app)/'
 
 # Every room is in the table, and includes only the rooms that the table allows it.
 rooms=$(awk '

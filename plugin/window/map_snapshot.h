@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/trajectory.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
+#include "maps/cloud/cloud_point.h"
+
+namespace efm {
+
+/// A map right after a keyframe.
+struct MapSnapshot {
+  KeyframeDepthMap keyframe;            ///< The newest one.
+  DepthPlanesOptions planes;            ///< The limits of its depths.
+  std::vector<CloudPoint> points;       ///< Of the whole map.
+  std::vector<StampedPose> trajectory;  ///< T_world_ref of all keyframes; not empty.
+  std::vector<std::string> lines;       ///< Counts and rates, as text.
+};
+
+/// Shows how a map grows.
+class MapWatcher {
+ public:
+  virtual ~MapWatcher() = default;
+  /// Whether it wants a snapshot after this keyframe. A snapshot costs an export of the map.
+  virtual bool due() = 0;
+  /// @throws std::runtime_error if it cannot be shown; that ends the mapping.
+  virtual void show(MapSnapshot snapshot) = 0;
+};
+
+}  // namespace efm
