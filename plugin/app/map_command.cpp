@@ -274,7 +274,8 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     source = sourceOf(arguments, job.options);  // the stride may have been chosen
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
-    output.emplace(folder, kind, job.options.mapper.keyframe.planes);
+    output.emplace(folder, kind, job.options.mapper.keyframe.planes,
+                   arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure);
     pictures.emplace(job.options.mapper.keyframe.planes);
     std::atomic<int> written = 0;
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {

@@ -17,10 +17,11 @@ struct MappingArguments {
   /// The option file, its name without ".ini" (see `findConfig`), or empty: the defaults.
   std::string config;
   RecordingSource source;
-  TimeArguments times;        ///< Of the window, for `depth`.
-  std::filesystem::path out;  ///< Empty: named after the recording, in the working folder.
-  bool force = false;         ///< Write into a folder that holds other files.
-  bool strict = false;        ///< A warning is an error.
+  TimeArguments times;          ///< Of the window, for `depth`.
+  std::filesystem::path out;    ///< Empty: named after the recording, in the working folder.
+  bool force = false;           ///< Write into a folder that holds other files.
+  bool plain_pictures = false;  ///< depth.png and confidence.png without enlargement and bar.
+  bool strict = false;          ///< A warning is an error.
   Verbosity verbosity = Verbosity::kNormal;
   std::vector<std::string> sets;  ///< section.key=value
 };

@@ -51,6 +51,8 @@ void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
                   "Overrides one option of CONFIG, e.g. --set dsi.num_planes=200; may be repeated")
       ->type_name("SECTION.KEY=VALUE")
       ->allow_extra_args(false);
+  command.add_flag("--plain-pictures", arguments.plain_pictures,
+                   "Write depth.png and confidence.png in the sensor's size, without colour bar");
   addStrict(command, arguments.strict);
   addVerbosity(command, arguments.verbosity, true);
   command.footer(configList);

@@ -79,8 +79,8 @@ cv::Mat3b depthImages(const EvaluatedMap& map, const DepthEvaluationOptions& opt
   double max_error_m = quantileOf(shown.errors_m, shown.errors_m.empty() ? 1 : 0.95);
   if (!(max_error_m > 0)) max_error_m = 0.01;
   const std::string title = fmt::format("estimate {}, {} points", map.name, map.errors.points);
-  return sideBySide({drawValues({title, shown.estimate, depths, "m", true}),
-                     drawValues({"truth", shown.truth, depths, "m", true}),
+  return sideBySide({drawValues({title, shown.estimate, depths, "m", Palette::kBrightToDark}),
+                     drawValues({"truth", shown.truth, depths, "m", Palette::kBrightToDark}),
                      drawValues({"absolute error", shown.error, {0, max_error_m}, "m"})});
 }
 

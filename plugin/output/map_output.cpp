@@ -149,8 +149,8 @@ void writeText(const std::filesystem::path& path, Write write) {
 }  // namespace
 
 MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
-                     const DepthPlanesOptions& limits)
-    : folder_(std::move(folder)), kind_(kind), limits_(limits) {
+                     const DepthPlanesOptions& limits, PictureStyle style)
+    : folder_(std::move(folder)), kind_(kind), limits_(limits), style_(style) {
   makeFolder(folder_);
   // Before the first file of this run: one may be under way when `removeEarlier` runs (dsi.npy).
   removePartialFiles(folder_, kMapFiles);
@@ -220,8 +220,14 @@ void MapOutput::writeImagesTo(const std::filesystem::path& folder,
 void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) const {
   writeImage(folder / "depth.tiff", map.depth);
   writeImage(folder / "confidence.tiff", map.confidence);
-  writeImage(folder / "depth.png", depthPicture(map.depth, limits_));
-  writeImage(folder / "confidence.png", confidencePicture(map.confidence));
+  const bool plain = style_ == PictureStyle::kPlain;
+  writeImage(folder / "depth.png",
+             plain ? depthPicture(map.depth, limits_) : depthFigure(map, limits_));
+  if (plain) {
+    writeImage(folder / "confidence.png", confidencePicture(map.confidence));
+  } else {
+    writeImage(folder / "confidence.png", confidenceFigure(map.confidence));
+  }
 }
 
 void MapOutput::writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses) {

@@ -21,6 +21,12 @@ enum class OutputKind {
   kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
 };
 
+/// How depth.png and confidence.png are drawn.
+enum class PictureStyle {
+  kFigure,  ///< For a paper: with a colour bar, small ones enlarged.
+  kPlain,   ///< The image alone, of the depth map's size.
+};
+
 /// The folder that a map is written to. A file appears under its name when it is complete. Of an
 /// earlier result report.json is removed first, and the caller writes it last: a folder with a
 /// report.json is complete, and all its files are of one run. A std::runtime_error names a file
@@ -40,7 +46,8 @@ class MapOutput {
   /// them.
   /// @param limits the colours of depth.png run between its depths.
   /// @throws std::runtime_error where the folder cannot be made.
-  MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits);
+  MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits,
+            PictureStyle style = PictureStyle::kFigure);
 
   /// Whether a folder has the report of a run of either kind, or the mark of one that was killed.
   static bool holdsResult(const std::filesystem::path& folder);
@@ -74,6 +81,7 @@ class MapOutput {
   std::filesystem::path folder_;
   OutputKind kind_;
   DepthPlanesOptions limits_;
+  PictureStyle style_;
   bool began_ = false;  // a file was written
 };
 

@@ -2,11 +2,39 @@
 #include "plugin/pictures/depth_picture.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "plugin/pictures/value_picture.h"
+
 namespace efm {
+namespace {
+
+/// Pixels. Sensors that are narrower are enlarged.
+constexpr int kMinFigureWidth = 640;
+
+double maximumOf(const cv::Mat1f& confidence) {
+  double maximum = 0;
+  cv::minMaxLoc(confidence, nullptr, &maximum);
+  return maximum;
+}
+
+/// Light grey where the confidence is high. The root shows low ones, too.
+cv::Mat1b lightGrey(const cv::Mat1f& confidence) {
+  constexpr double kDarkest = 60;  // levels below white
+  const double maximum = maximumOf(confidence);
+  cv::Mat1b grey(confidence.size(), uchar{255});
+  if (!(maximum > 0)) return grey;
+  cv::Mat1f root;
+  cv::sqrt(confidence, root);
+  root.convertTo(grey, CV_8U, -kDarkest / std::sqrt(maximum), 255);
+  return grey;
+}
+
+}  // namespace
 
 cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits) {
   const double far_inverse = 1 / limits.max_depth_m;
@@ -25,9 +53,35 @@ cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limit
   return picture;
 }
 
+AxisRange depthAxis(const DepthPlanesOptions& limits) {
+  return {limits.min_depth_m, limits.max_depth_m, AxisScale::kInverse};
+}
+
+cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits) {
+  ValuePicture figure;
+  figure.values = map.depth.clone();
+  figure.values.setTo(std::numeric_limits<float>::quiet_NaN(), ~(map.depth > 0));
+  figure.range = depthAxis(limits);
+  figure.unit = "m";
+  figure.palette = Palette::kBrightToDark;
+  figure.min_width = kMinFigureWidth;
+  figure.under = lightGrey(map.confidence);
+  return drawValues(figure);
+}
+
+cv::Mat3b confidenceFigure(const cv::Mat1f& confidence) {
+  const double maximum = maximumOf(confidence);
+  ValuePicture figure;
+  figure.values = confidence;
+  figure.range = {0, maximum > 0 ? maximum : 1};
+  figure.unit = "confidence";
+  figure.palette = Palette::kWhiteToBlack;
+  figure.min_width = kMinFigureWidth;
+  return drawValues(figure);
+}
+
 cv::Mat1b confidencePicture(const cv::Mat1f& confidence) {
-  double maximum = 0;
-  cv::minMaxLoc(confidence, nullptr, &maximum);
+  const double maximum = maximumOf(confidence);
   cv::Mat1b picture;
   confidence.convertTo(picture, CV_8U, maximum > 0 ? -255 / maximum : 0, 255);
   return picture;

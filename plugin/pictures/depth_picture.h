@@ -3,7 +3,9 @@
 
 #include <opencv2/core.hpp>
 
+#include "mapping/depth/depth_map.h"
 #include "mapping/geometry/depth_planes.h"
+#include "plugin/pictures/plot_axis.h"
 
 namespace efm {
 
@@ -11,6 +13,15 @@ namespace efm {
 /// white without depth (0).
 /// @return 8-bit BGR, of the map's size.
 cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits);
+
+/// The axis of depths between two limits: linear in inverse depth.
+AxisRange depthAxis(const DepthPlanesOptions& limits);
+
+/// A depth map for a paper: perceptual colours, the confidence in light grey under the depths, a
+/// colour bar in metres. Images of small sensors are enlarged by a whole factor.
+cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits);
+/// A confidence map in the same layout, black at the map's maximum.
+cv::Mat3b confidenceFigure(const cv::Mat1f& confidence);
 
 /// Grey levels of a confidence map, negated as in Ghosh and Gallego 2022: white is 0, black is the
 /// map's maximum.

@@ -75,16 +75,36 @@ std::vector<AxisTick> logarithmicTicks(const AxisRange& range, int max_ticks) {
   return ticks;
 }
 
+/// The roundest values first, where their neighbours leave them space.
+std::vector<AxisTick> inverseTicks(const AxisRange& range, int max_ticks) {
+  static const std::vector<double> kRoundness[] = {{1}, {2, 5}, {1.5, 3}, {4, 7}, {1.2, 2.5, 6, 8}};
+  std::vector<AxisTick> ticks;
+  for (const std::vector<double>& factors : kRoundness) {
+    for (const AxisTick& tick : powersInside(range, factors, 1)) {
+      const double at = range.fractionAlong(tick.value);
+      const bool has_space = std::none_of(ticks.begin(), ticks.end(), [&](const AxisTick& other) {
+        return std::abs(range.fractionAlong(other.value) - at) * max_ticks < 1;
+      });
+      if (has_space) ticks.push_back(tick);
+    }
+  }
+  if (ticks.size() < 2) return linearTicks(range, max_ticks);
+  std::sort(ticks.begin(), ticks.end(),
+            [](const AxisTick& a, const AxisTick& b) { return a.value < b.value; });
+  return ticks;
+}
+
 }  // namespace
 
 double AxisRange::fractionAlong(double value) const {
   if (scale == AxisScale::kLinear) return (value - from) / (to - from);
   if (!(value > 0)) return std::numeric_limits<double>::quiet_NaN();
+  if (scale == AxisScale::kInverse) return (1 / value - 1 / from) / (1 / to - 1 / from);
   return std::log(value / from) / std::log(to / from);
 }
 
 AxisRange rangeAround(const std::vector<double>& values, AxisScale scale) {
-  const bool logarithmic = scale == AxisScale::kLogarithmic;
+  const bool logarithmic = scale != AxisScale::kLinear;
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const double value : values) {
@@ -104,8 +124,15 @@ AxisRange rangeAround(const std::vector<double>& values, AxisScale scale) {
 
 std::vector<AxisTick> ticksOf(const AxisRange& range, int max_ticks) {
   if (!(range.from < range.to)) return {};
-  return range.scale == AxisScale::kLinear ? linearTicks(range, max_ticks)
-                                           : logarithmicTicks(range, max_ticks);
+  switch (range.scale) {
+    case AxisScale::kLogarithmic:
+      return logarithmicTicks(range, max_ticks);
+    case AxisScale::kInverse:
+      return inverseTicks(range, max_ticks);
+    case AxisScale::kLinear:
+      break;
+  }
+  return linearTicks(range, max_ticks);
 }
 
 }  // namespace efm

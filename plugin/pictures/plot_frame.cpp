@@ -13,6 +13,9 @@ namespace {
 
 constexpr int kPlotFont = cv::FONT_HERSHEY_SIMPLEX;
 
+/// Of the strokes of a text, in pixels.
+int thicknessOf(double scale) { return std::max(1, cvRound(1.7 * scale)); }
+
 AxisRange rangeOf(const CurvePlot& plot, const PlotAxis& axis, bool is_x) {
   std::vector<double> values;
   for (const Curve& curve : plot.curves) {
@@ -123,12 +126,12 @@ void drawAxes(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& frame)
 
 cv::Size plotTextSize(const std::string& text, double scale) {
   int baseline = 0;
-  const cv::Size size = cv::getTextSize(text, kPlotFont, scale, 1, &baseline);
+  const cv::Size size = cv::getTextSize(text, kPlotFont, scale, thicknessOf(scale), &baseline);
   return {size.width, size.height + baseline};
 }
 
 void writeText(cv::Mat3b& picture, const std::string& text, cv::Point at, double scale) {
-  cv::putText(picture, text, at, kPlotFont, scale, kPlotInk, 1, cv::LINE_AA);
+  cv::putText(picture, text, at, kPlotFont, scale, kPlotInk, thicknessOf(scale), cv::LINE_AA);
 }
 
 }  // namespace efm

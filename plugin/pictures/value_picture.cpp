@@ -11,84 +11,90 @@
 namespace efm {
 namespace {
 
-// In pixels.
+// In pixels of a picture of up to 480 pixels.
 constexpr int kTitleHeight = 24;
 constexpr int kBarHeight = 12;
 constexpr int kBarGap = 6;
 constexpr int kTickHeight = 18;
 
-int widthOf(const std::string& text) { return plotTextSize(text).width; }
+/// The size of text and bar.
+double scaleOf(int width) { return std::max(1.0, width / 480.0); }
 
-/// Colours of fractions of the range. NaN is white.
-cv::Mat3b coloured(const cv::Mat1f& fractions, bool red_first) {
-  cv::Mat1b levels(fractions.size(), uchar{0});
-  cv::Mat1b none(fractions.size(), uchar{0});
-  for (int y = 0; y < fractions.rows; ++y) {
-    for (int x = 0; x < fractions.cols; ++x) {
-      const float fraction = fractions(y, x);
+/// Levels of the palette. `none` is 255 where there is no value.
+cv::Mat1b levelsOf(const ValuePicture& picture, cv::Mat1b& none) {
+  cv::Mat1b levels(picture.values.size(), uchar{0});
+  none = cv::Mat1b(picture.values.size(), uchar{0});
+  for (int y = 0; y < levels.rows; ++y) {
+    for (int x = 0; x < levels.cols; ++x) {
+      const float value = picture.values(y, x);
+      const double fraction = std::isnan(value) ? value : picture.range.fractionAlong(value);
       if (std::isnan(fraction)) {
         none(y, x) = 255;
         continue;
       }
-      const float along = red_first ? 1 - fraction : fraction;
-      levels(y, x) = cv::saturate_cast<uchar>(255 * std::clamp(along, 0.F, 1.F));
+      levels(y, x) = cv::saturate_cast<uchar>(255 * std::clamp(fraction, 0.0, 1.0));
     }
   }
-  cv::Mat3b picture;
-  cv::applyColorMap(levels, picture, cv::COLORMAP_JET);
-  picture.setTo(cv::Scalar::all(255), none);
-  return picture;
-}
-
-cv::Mat1f fractionsOf(const ValuePicture& picture) {
-  cv::Mat1f fractions(picture.values.size());
-  std::transform(picture.values.begin(), picture.values.end(), fractions.begin(), [&](float value) {
-    return static_cast<float>(picture.range.fractionAlong(value));
-  });
-  return fractions;
-}
-
-cv::Mat3b barOf(const ValuePicture& picture, int width) {
-  cv::Mat3b bar(kBarGap + kBarHeight + kTickHeight, width, cv::Vec3b(255, 255, 255));
-  const cv::Rect area(1, kBarGap, width - 2, kBarHeight);
-  cv::Mat1f fractions(kBarHeight, area.width);
-  for (int x = 0; x < area.width; ++x) {
-    fractions.col(x).setTo(static_cast<float>(x) / static_cast<float>(area.width - 1));
-  }
-  coloured(fractions, picture.red_first).copyTo(bar(area));
-  cv::rectangle(bar, area, kPlotInk);
-  const int baseline = bar.rows - 5;
-  int next_free = 0;
-  const int unit_from = width - widthOf(picture.unit) - 2;
-  for (const AxisTick& tick : ticksOf(picture.range, std::max(3, width / 60))) {
-    const int x = area.x + cvRound(picture.range.fractionAlong(tick.value) * (area.width - 1));
-    const int from = x - widthOf(tick.text) / 2;
-    const int to = from + widthOf(tick.text);
-    cv::line(bar, {x, area.br().y}, {x, area.br().y + 2}, kPlotInk);
-    if (from < next_free || to + 6 > unit_from) continue;
-    writeText(bar, tick.text, {from, baseline});
-    next_free = to + 6;
-  }
-  writeText(bar, picture.unit, {unit_from, baseline});
-  return bar;
+  return levels;
 }
 
 }  // namespace
+
+cv::Mat3b drawBar(const AxisRange& range, Palette palette, const std::string& unit, int width) {
+  const double scale = scaleOf(width);
+  const auto scaled = [&](int pixels) { return cvRound(scale * pixels); };
+  const double text_scale = scale * kPlotTextScale;
+  const auto widthOf = [&](const std::string& text) {
+    return plotTextSize(text, text_scale).width;
+  };
+
+  cv::Mat3b bar(scaled(kBarGap + kBarHeight + kTickHeight), width, cv::Vec3b(255, 255, 255));
+  const cv::Rect area(1, scaled(kBarGap), width - 2, scaled(kBarHeight));
+  cv::Mat1b levels(area.size());
+  for (int x = 0; x < area.width; ++x) {
+    levels.col(x).setTo(cv::saturate_cast<uchar>(255.0 * x / (area.width - 1)));
+  }
+  coloured(levels, palette).copyTo(bar(area));
+  cv::rectangle(bar, area, kPlotInk);
+  const int baseline = bar.rows - scaled(5);
+  int next_free = 0;
+  const int unit_from = width - widthOf(unit) - 2;
+  const int max_ticks = std::max(3, cvRound(width / (60 * scale)));
+  for (const AxisTick& tick : ticksOf(range, max_ticks)) {
+    const int x = area.x + cvRound(range.fractionAlong(tick.value) * (area.width - 1));
+    const int from = x - widthOf(tick.text) / 2;
+    const int to = from + widthOf(tick.text);
+    cv::line(bar, {x, area.br().y}, {x, area.br().y + scaled(2)}, kPlotInk, scaled(1));
+    if (from < next_free || to + scaled(6) > unit_from) continue;
+    writeText(bar, tick.text, {from, baseline}, text_scale);
+    next_free = to + scaled(6);
+  }
+  writeText(bar, unit, {unit_from, baseline}, text_scale);
+  return bar;
+}
 
 cv::Mat3b drawValues(const ValuePicture& picture) {
   if (picture.values.empty()) {
     throw std::invalid_argument("the picture '" + picture.title + "' has no values");
   }
-  cv::Mat3b image = coloured(fractionsOf(picture), picture.red_first);
+  cv::Mat1b none;
+  cv::Mat3b image = coloured(levelsOf(picture, none), picture.palette);
+  if (picture.under.empty()) {
+    image.setTo(cv::Scalar::all(255), none);
+  } else {
+    coloured(~picture.under, Palette::kWhiteToBlack).copyTo(image, none);
+  }
   const int times = std::max(1, (picture.min_width + image.cols - 1) / image.cols);
-  cv::resize(image, image, {}, times, times, cv::INTER_NEAREST);
-  const cv::Mat3b bar = barOf(picture, image.cols);
+  if (times > 1) cv::resize(image, image, {}, times, times, cv::INTER_NEAREST);
+  const cv::Mat3b bar = drawBar(picture.range, picture.palette, picture.unit, image.cols);
 
-  cv::Mat3b whole(kTitleHeight + image.rows + bar.rows, image.cols, cv::Vec3b(255, 255, 255));
-  writeText(whole, picture.title, {2, kTitleHeight - 8});
-  image.copyTo(whole(cv::Rect({0, kTitleHeight}, image.size())));
-  cv::rectangle(whole, cv::Rect({0, kTitleHeight}, image.size()), cv::Scalar::all(200));
-  bar.copyTo(whole(cv::Rect({0, kTitleHeight + image.rows}, bar.size())));
+  const double scale = scaleOf(image.cols);
+  const int top = picture.title.empty() ? 0 : cvRound(scale * kTitleHeight);
+  cv::Mat3b whole(top + image.rows + bar.rows, image.cols, cv::Vec3b(255, 255, 255));
+  writeText(whole, picture.title, {2, top - cvRound(scale * 8)}, scale * kPlotTextScale);
+  image.copyTo(whole(cv::Rect({0, top}, image.size())));
+  cv::rectangle(whole, cv::Rect({0, top}, image.size()), cv::Scalar::all(200));
+  bar.copyTo(whole(cv::Rect({0, top + image.rows}, bar.size())));
   return whole;
 }
 

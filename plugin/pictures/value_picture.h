@@ -4,21 +4,28 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "plugin/pictures/palette.h"
 #include "plugin/pictures/plot_axis.h"
 
 namespace efm {
 
 /// An image of values as colours, with a colour bar.
 struct ValuePicture {
-  std::string title;
-  cv::Mat1f values;        ///< NaN (no value) is white.
-  AxisRange range;         ///< Of the colours. A value outside has the colour of the nearer end.
-  std::string unit;        ///< Written at the bar.
-  bool red_first = false;  ///< Red is the low end, as for depth. Otherwise blue is.
-  int min_width = 320;     ///< Pixels. A smaller image is enlarged by a whole number.
+  std::string title;  ///< Empty: the picture begins with the image.
+  cv::Mat1f values;   ///< NaN: no value.
+  AxisRange range;    ///< Of the colours. A value outside has the colour of the nearer end.
+  std::string unit;   ///< Written at the bar.
+  Palette palette = Palette::kBlueToRed;
+  int min_width = 320;   ///< Pixels. A smaller image is enlarged by a whole number.
+  cv::Mat1b under = {};  ///< Grey levels where there is no value. Empty: white.
 };
 
+/// Text and bar are larger in wide pictures, so that they can be read where the picture is as wide
+/// as a column of a paper.
 /// @throws std::invalid_argument if there are no values.
 cv::Mat3b drawValues(const ValuePicture& picture);
+
+/// The colour bar alone, `width` pixels wide: colours, ticks and the unit on white.
+cv::Mat3b drawBar(const AxisRange& range, Palette palette, const std::string& unit, int width);
 
 }  // namespace efm

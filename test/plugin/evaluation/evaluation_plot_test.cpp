@@ -50,8 +50,9 @@ TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
   EXPECT_EQ(drawn(middle, drawn.cols / 2), kWhite);
   EXPECT_GT(low[0], low[2]) << "blue";
   EXPECT_GT(high[2], high[0]) << "red";
-  picture.red_first = true;
-  EXPECT_EQ(drawValues(picture)(middle, drawn.cols / 6), high);
+  picture.under = (cv::Mat1b(1, 3) << 0, 200, 0);
+  EXPECT_EQ(drawValues(picture)(middle, drawn.cols / 2), cv::Vec3b(200, 200, 200));
+  EXPECT_EQ(drawValues(picture)(middle, drawn.cols / 6), low) << "grey is under the values alone";
   EXPECT_THROW(drawValues({}), std::invalid_argument);
 }
 

@@ -58,8 +58,15 @@ TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
       cv::imread((keyframe / "confidence.tiff").string(), cv::IMREAD_UNCHANGED);
   ASSERT_EQ(confidence.type(), CV_32F);
   EXPECT_EQ(confidence.at<float>(1, 2), 17.5F);
-  EXPECT_EQ(cv::imread((keyframe / "depth.png").string()).size(), cv::Size(4, 3));
-  EXPECT_EQ(cv::imread((keyframe / "confidence.png").string()).size(), cv::Size(4, 3));
+  const auto sizeOf = [&](const char* name) {
+    return cv::imread((keyframe / name).string()).size();
+  };
+  EXPECT_EQ(sizeOf("depth.png").width, 640);
+  EXPECT_EQ(sizeOf("confidence.png"), sizeOf("depth.png"));
+  MapOutput(folder() / "out", OutputKind::kMap, {}, PictureStyle::kPlain).writeKeyframe(small);
+  EXPECT_EQ(sizeOf("depth.png"), cv::Size(4, 3));
+  EXPECT_EQ(sizeOf("confidence.png"), cv::Size(4, 3));
+  output.writeTrajectory("trajectory.txt", {{small.window.t_ref_ns, small.T_world_ref}});
   EXPECT_THAT(contentOf(folder() / "out" / "trajectory.txt"),
               HasSubstr("1700000000.123456789 1 2 3 0 0 0 1\n"));
 }

@@ -24,6 +24,34 @@ TEST(DepthPicture, MiddleOfInverseDepthIsGreen) {
   EXPECT_GT(bgr[1], 200);
 }
 
+double lightness(const cv::Vec3b& bgr) { return 0.114 * bgr[0] + 0.587 * bgr[1] + 0.299 * bgr[2]; }
+
+/// In grey print depths must differ from each other and from the paper.
+TEST(DepthFigure, IsReadableInGreyAndShowsTheConfidenceWithoutDepth) {
+  DepthMap map;
+  map.depth = cv::Mat1f::zeros(180, 240);
+  map.confidence = cv::Mat1f::zeros(180, 240);
+  const float depths[] = {1, 1.2F, 1.6F, 2.5F, 4};
+  for (int k = 0; k < 5; ++k) map.depth(100, 20 * k) = depths[k];
+  map.confidence(100, 200) = 9;
+  const cv::Mat3b figure = depthFigure(map, {1.0, 4.0, 10, PlaneSpacing::kInverse});
+  ASSERT_EQ(figure.cols, 3 * 240) << "a whole factor";
+  ASSERT_GT(figure.rows, 3 * 180) << "the bar";
+  double lighter = 215;  // white is 255
+  for (int k = 0; k < 5; ++k) {
+    const double light = lightness(figure(301, 3 * 20 * k + 1));
+    EXPECT_LT(light, lighter - 10) << depths[k];
+    lighter = light;
+  }
+  const cv::Vec3b grey = figure(301, 601);
+  EXPECT_EQ(grey[0], grey[2]);
+  EXPECT_LT(grey[0], 255);
+  EXPECT_EQ(figure(301, 631), cv::Vec3b(255, 255, 255));
+  map.depth = cv::Mat1f::zeros(720, 1280);
+  map.confidence = cv::Mat1f::zeros(720, 1280);
+  EXPECT_EQ(depthFigure(map, {1.0, 4.0, 10}).cols, 1280) << "not enlarged";
+}
+
 TEST(ConfidencePicture, IsBrightWhereSmallAndDarkWhereLarge) {
   const cv::Mat1b picture = confidencePicture((cv::Mat1f(1, 3) << 0, 5, 10));
   EXPECT_EQ(picture(0, 0), 255);
