@@ -133,14 +133,14 @@ class Player {
   }
 
   /// The map so far, with the rates of the mapping: without the time that the watchers took.
-  MapSnapshot snapshotOf(const KeyframeDepthMap& keyframe) const {
+  WatchedMap snapshotOf(const KeyframeDepthMap& keyframe) const {
     const SessionStatus status = builder_.status();
     const double seconds = std::max(progress_.seconds() - watched_s_, 1e-3);
-    MapSnapshot snapshot{keyframe,
-                         job_.options.mapper.keyframe.planes,
-                         builder_.points(),
-                         builder_.trajectory(),
-                         {}};
+    WatchedMap snapshot{keyframe,
+                        job_.options.mapper.keyframe.planes,
+                        builder_.points(),
+                        builder_.trajectory(),
+                        {}};
     const double keyframes = static_cast<double>(status.counts.keyframes);
     const double read = static_cast<double>(status.counts.total().read);
     snapshot.lines = {

@@ -14,7 +14,7 @@
 #include "plugin/options/option_file.h"
 #include "plugin/output/report.h"
 #include "plugin/recordings/recording.h"
-#include "plugin/window/map_snapshot.h"
+#include "plugin/window/watched_map.h"
 
 namespace efm {
 

@@ -56,7 +56,7 @@ MapFrames::MapFrames(const fs::path& folder, bool force) : folder_(folder) {
   prepareFolder(folder, force);
 }
 
-void MapFrames::show(MapSnapshot snapshot) {
+void MapFrames::show(WatchedMap snapshot) {
   scene_.show(snapshot);
   const auto scene = scene_.scene();
   renderer_->setCamera(*scene, scene->getViewport()->getCamera());

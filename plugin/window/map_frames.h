@@ -22,7 +22,7 @@ class MapFrames : public MapWatcher {
 
   bool due() override { return true; }
   /// @throws std::runtime_error naming the file if it cannot be written.
-  void show(MapSnapshot snapshot) override;
+  void show(WatchedMap snapshot) override;
 
  private:
   std::filesystem::path folder_;

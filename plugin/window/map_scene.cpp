@@ -110,7 +110,7 @@ MapScene::MapScene() : scene_(mrpt::opengl::COpenGLScene::Create()) {
   addPicture(*scene_, "confidence", 0.06);
 }
 
-void MapScene::show(const MapSnapshot& snapshot) {
+void MapScene::show(const WatchedMap& snapshot) {
   if (shown_ == 0) origin_world_ = snapshot.trajectory.front().T_world_rig.translation;
   R_scene_world_ =
       Eigen::Quaterniond::FromTwoVectors(upwardOf(snapshot.trajectory), Eigen::Vector3d::UnitZ())
@@ -122,7 +122,7 @@ void MapScene::show(const MapSnapshot& snapshot) {
   ++shown_;
 }
 
-void MapScene::showPoints(const MapSnapshot& snapshot) {
+void MapScene::showPoints(const WatchedMap& snapshot) {
   static const cv::Mat3b kColours = heightColours();
   auto& cloud = objectOf<CPointCloudColoured>(*scene_, "cloud");
   const std::size_t step = 1 + (snapshot.points.size() / (kMaxPoints + 1));
@@ -158,7 +158,7 @@ void MapScene::showPoints(const MapSnapshot& snapshot) {
   radius_m_ += follow * ((high - low).norm() / 2 - radius_m_);
 }
 
-void MapScene::showCameras(const MapSnapshot& snapshot) {
+void MapScene::showCameras(const WatchedMap& snapshot) {
   auto& trajectory = objectOf<CSetOfLines>(*scene_, "trajectory");
   trajectory.clear();
   for (std::size_t i = 1; i < snapshot.trajectory.size(); ++i) {
@@ -184,7 +184,7 @@ void MapScene::showCameras(const MapSnapshot& snapshot) {
   }
 }
 
-void MapScene::showPictures(const MapSnapshot& snapshot) {
+void MapScene::showPictures(const WatchedMap& snapshot) {
   const DepthMap& map = snapshot.keyframe.map;
   setPicture(*scene_, "depth", depthPicture(map.depth, snapshot.planes));
   cv::Mat3b confidence;
@@ -204,7 +204,7 @@ void MapScene::showPictures(const MapSnapshot& snapshot) {
   scene_->getViewport("confidence")->addTextMessage(8, -16, "confidence", 0, font);
 }
 
-void MapScene::turnView(const MapSnapshot& snapshot) {
+void MapScene::turnView(const WatchedMap& snapshot) {
   const Eigen::Vector3d forward = R_scene_world_ * axisOf(snapshot.trajectory.back(), 2);
   const double follow = shown_ == 0 ? 1 : kFollow;
   heading_ += follow * (forward.head<2>() - heading_);

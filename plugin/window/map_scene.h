@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "plugin/window/map_snapshot.h"
+#include "plugin/window/watched_map.h"
 
 namespace efm {
 
@@ -27,15 +27,15 @@ class MapScene {
   static constexpr std::size_t kMaxPoints = 1'000'000;
 
   MapScene();
-  void show(const MapSnapshot& snapshot);
+  void show(const WatchedMap& snapshot);
   /// The scene changes with each `show`; not thread-safe.
   mrpt::opengl::COpenGLScene::Ptr scene() const { return scene_; }
 
  private:
-  void showPoints(const MapSnapshot& snapshot);
-  void showCameras(const MapSnapshot& snapshot);
-  void showPictures(const MapSnapshot& snapshot);
-  void turnView(const MapSnapshot& snapshot);
+  void showPoints(const WatchedMap& snapshot);
+  void showCameras(const WatchedMap& snapshot);
+  void showPictures(const WatchedMap& snapshot);
+  void turnView(const WatchedMap& snapshot);
   /// In the frame of the scene, metres.
   Eigen::Vector3d inScene(const Eigen::Vector3d& p_world) const {
     return R_scene_world_ * (p_world - origin_world_);

@@ -12,7 +12,7 @@
 namespace efm {
 
 /// A map right after a keyframe.
-struct MapSnapshot {
+struct WatchedMap {
   KeyframeDepthMap keyframe;            ///< The newest one.
   DepthPlanesOptions planes;            ///< The limits of its depths.
   std::vector<CloudPoint> points;       ///< Of the whole map.
@@ -27,7 +27,7 @@ class MapWatcher {
   /// Whether it wants a snapshot after this keyframe. A snapshot costs an export of the map.
   virtual bool due() = 0;
   /// @throws std::runtime_error if it cannot be shown; that ends the mapping.
-  virtual void show(MapSnapshot snapshot) = 0;
+  virtual void show(WatchedMap snapshot) = 0;
 };
 
 }  // namespace efm
