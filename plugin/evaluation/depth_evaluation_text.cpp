@@ -3,10 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "plugin/evaluation/text_table.h"
@@ -16,64 +18,103 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// A field of DepthErrors in the table and in the JSON.
-struct Column {
+/// A field of DepthErrors in the tables and in the JSON.
+struct Measure {
   const char* key;
-  const char* heading;
+  const char* name;  ///< In the tables, as the unit, factor and decimals.
   const char* unit;
   std::optional<double> (*value)(const DepthErrors&);
-  double factor;  ///< In the table.
-  int decimals;   ///< In the table.
+  double factor;
+  int decimals;
+  bool of_each_map;  ///< Has a column in the table of the maps, which has space for six.
   const char* help;
 };
 
 using E = DepthErrors;
 using V = std::optional<double>;
 
-constexpr std::array<Column, 13> kColumns = {{
-    {"mean_abs_m", "mean", "|dZ| m", [](const E& e) { return V(e.mean_abs_m); }, 1, 4,
+constexpr std::array<Measure, 13> kMeasures = {{
+    {"mean_abs_m", "mean |dZ|", "m", [](const E& e) { return V(e.mean_abs_m); }, 1, 4, true,
      "mean |Z - Z_true|, metres"},
-    {"median_abs_m", "median", "|dZ| m", [](const E& e) { return V(e.median_abs_m); }, 1, 4,
+    {"median_abs_m", "median |dZ|", "m", [](const E& e) { return V(e.median_abs_m); }, 1, 4, true,
      "median |Z - Z_true|, metres"},
-    {"median_inverse", "median", "|d1/Z| /m", [](const E& e) { return V(e.median_inverse); }, 1, 5,
-     "median |1/Z - 1/Z_true|, 1/m"},
-    {"bad_pix_5px", "bad-pix", "5px 5% %", [](const E& e) { return e.bad_pix_5px; }, 100, 2,
+    {"median_inverse", "median |d(1/Z)|", "1/m", [](const E& e) { return V(e.median_inverse); }, 1,
+     5, false, "median |1/Z - 1/Z_true|, 1/m"},
+    {"bad_pix_5px", "bad-pix 5px,5%", "%", [](const E& e) { return e.bad_pix_5px; }, 100, 2, true,
      "fraction with a disparity error over 5 px and 5 %"},
-    {"bad_pix_3px", "bad-pix", "3px 5% %", [](const E& e) { return e.bad_pix_3px; }, 100, 2,
+    {"bad_pix_3px", "bad-pix 3px,5%", "%", [](const E& e) { return e.bad_pix_3px; }, 100, 2, false,
      "fraction with a disparity error over 3 px and 5 % (KITTI)"},
-    {"silog", "SILog", "x100", [](const E& e) { return V(e.silog); }, 1, 3,
+    {"silog", "SILog", "x100", [](const E& e) { return V(e.silog); }, 1, 3, false,
      "100 (mean d^2 - (mean d)^2), d = ln Z - ln Z_true"},
-    {"aerrr", "AErrR", "%", [](const E& e) { return V(e.aerrr); }, 100, 2,
+    {"aerrr", "AErrR", "%", [](const E& e) { return V(e.aerrr); }, 100, 2, true,
      "mean |Z - Z_true| / Z_true"},
-    {"aerrr_by_estimate", "AErrR", "by est %", [](const E& e) { return V(e.aerrr_by_estimate); },
-     100, 2, "mean |Z - Z_true| / Z"},
-    {"log_rmse", "logRMSE", "x100", [](const E& e) { return V(e.log_rmse); }, 1, 3,
+    {"aerrr_by_estimate", "AErrR by estimate", "%",
+     [](const E& e) { return V(e.aerrr_by_estimate); }, 100, 2, false, "mean |Z - Z_true| / Z"},
+    {"log_rmse", "log RMSE", "x100", [](const E& e) { return V(e.log_rmse); }, 1, 3, false,
      "100 sqrt(mean d^2)"},
-    {"delta_1", "d<1.25", "%", [](const E& e) { return V(e.delta[0]); }, 100, 2,
+    {"delta_1", "delta<1.25", "%", [](const E& e) { return V(e.delta[0]); }, 100, 2, true,
      "fraction with max(Z/Z_true, Z_true/Z) under 1.25"},
-    {"delta_2", "<1.25^2", "%", [](const E& e) { return V(e.delta[1]); }, 100, 2,
+    {"delta_2", "delta<1.25^2", "%", [](const E& e) { return V(e.delta[1]); }, 100, 2, false,
      "the same under 1.25^2"},
-    {"delta_3", "<1.25^3", "%", [](const E& e) { return V(e.delta[2]); }, 100, 2,
+    {"delta_3", "delta<1.25^3", "%", [](const E& e) { return V(e.delta[2]); }, 100, 2, false,
      "the same under 1.25^3"},
-    {"beyond_tenth", "beyond", "10% %", [](const E& e) { return V(e.beyond_tenth); }, 100, 2,
+    {"beyond_tenth", "beyond 10%", "%", [](const E& e) { return V(e.beyond_tenth); }, 100, 2, false,
      "fraction with |Z - Z_true| over a tenth of Z_true"},
 }};
 
-std::vector<std::string> rowOf(const std::string& name, const DepthErrors& errors) {
-  std::vector<std::string> row = {name, std::to_string(errors.points)};
-  for (const Column& column : kColumns) {
-    const auto value = column.value(errors);
-    const bool there = errors.points > 0 && value;
-    row.push_back(there ? fixedText(column.factor * *value, column.decimals) : "-");
+std::string valueText(const Measure& measure, const DepthErrors& errors) {
+  const auto value = measure.value(errors);
+  const bool there = errors.points > 0 && value;
+  return there ? fixedText(measure.factor * *value, measure.decimals) : "-";
+}
+
+/// A line per map, with the measures `of_each_map`.
+std::string mapsTable(const std::vector<EvaluatedMap>& maps) {
+  TextTable table;
+  std::vector<std::string> names = {"map", "points"};
+  std::vector<std::string> units = {"", ""};
+  for (const Measure& measure : kMeasures) {
+    if (!measure.of_each_map) continue;
+    // "bad-pix 5px,5%" takes two lines of the heading, and so do all.
+    const std::string_view name = measure.name;
+    const std::size_t blank = std::min(name.find(' '), name.size());
+    names.emplace_back(name.substr(0, blank));
+    units.push_back(
+        fmt::format("{} {}", name.substr(std::min(blank + 1, name.size())), measure.unit));
   }
-  return row;
+  table.add(names);
+  table.add(units);
+  for (const EvaluatedMap& map : maps) {
+    std::vector<std::string> row = {map.name, std::to_string(map.errors.points)};
+    for (const Measure& measure : kMeasures) {
+      if (measure.of_each_map) row.push_back(valueText(measure, map.errors));
+    }
+    table.add(row);
+  }
+  return table.text();
+}
+
+/// A line per measure.
+std::string measuresTable(const DepthEvaluation& evaluation) {
+  const bool several = evaluation.maps.size() > 1;
+  TextTable table;
+  const auto add = [&](const std::string& name, const std::string& mean, const std::string& all) {
+    table.add(several ? std::vector{name, mean, all} : std::vector{name, all});
+  };
+  add("", "mean of maps", "all points");
+  add("points", "", std::to_string(evaluation.all.points));
+  for (const Measure& measure : kMeasures) {
+    add(fmt::format("{}, {}", measure.name, measure.unit), valueText(measure, evaluation.mean),
+        valueText(measure, evaluation.all));
+  }
+  return table.text();
 }
 
 Json asJson(const DepthErrors& errors) {
   Json json = {{"points", errors.points}};
   if (errors.points == 0) return json;
-  for (const Column& column : kColumns) {
-    if (const auto value = column.value(errors)) json[column.key] = *value;
+  for (const Measure& measure : kMeasures) {
+    if (const auto value = measure.value(errors)) json[measure.key] = *value;
   }
   return json;
 }
@@ -87,7 +128,7 @@ std::string detectionTable(const PrecisionRecall& detection) {
                fixedText(100 * detection.f1(k), 2)});
   }
   return table.text() +
-         fmt::format("{} estimates beside a truth, {} without, {} pixels with a truth\n",
+         fmt::format("{} estimates with a truth, {} without\n{} pixels with a truth\n",
                      detection.estimates, detection.estimates_without_truth, detection.truths);
 }
 
@@ -95,23 +136,15 @@ std::string detectionTable(const PrecisionRecall& detection) {
 
 std::string evaluationTable(const DepthEvaluation& evaluation,
                             const std::optional<StereoBaseline>& stereo) {
-  TextTable table;
-  std::vector<std::string> headings = {"map", "points"};
-  std::vector<std::string> units = {"", ""};
-  for (const Column& column : kColumns) {
-    headings.emplace_back(column.heading);
-    units.emplace_back(column.unit);
-  }
-  table.add(headings);
-  table.add(units);
-  for (const EvaluatedMap& map : evaluation.maps) table.add(rowOf(map.name, map.errors));
+  std::string text;
   if (evaluation.maps.size() > 1) {
-    table.add(rowOf("mean of maps", evaluation.mean));
-    table.add(rowOf("all points", evaluation.all));
+    text = mapsTable(evaluation.maps) + "\n";
+  } else if (!evaluation.maps.empty()) {
+    text = "map " + evaluation.maps.front().name + "\n";
   }
-  std::string text = table.text() + "\n" + detectionTable(evaluation.detection);
+  text += measuresTable(evaluation) + "\n" + detectionTable(evaluation.detection);
   if (stereo) {
-    text += fmt::format("bad-pix with focal length {:.2f} px and baseline {:.4f} m ({})\n",
+    text += fmt::format("bad-pix with focal length {:.2f} px and baseline {:.4f} m\n({})\n",
                         stereo->focal_px, stereo->baseline_m, stereo->source);
   } else if (!evaluation.all.bad_pix_5px) {
     text += "no bad-pix: it needs a focal length and a baseline (--focal, --baseline)\n";
@@ -160,8 +193,8 @@ std::string depthEvaluationKeys() {
   std::string text =
       "Keys of --json (fractions from 0 to 1):\n"
       "  maps      a list, one entry per map: name, points and\n";
-  for (const Column& column : kColumns) {
-    text += fmt::format("            {:18}{}\n", column.key, column.help);
+  for (const Measure& measure : kMeasures) {
+    text += fmt::format("            {:18}{}\n", measure.key, measure.help);
   }
   return text +
          "            (left out if points is 0; bad_pix_... only with focal length and baseline)\n"

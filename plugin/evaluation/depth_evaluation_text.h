@@ -8,8 +8,9 @@
 
 namespace efm {
 
-/// A table: a line per map, the mean of the maps and all points. Then precision, recall and F1 over
-/// the thresholds, the maps without partner, and the focal length and baseline of bad-pix.
+/// Tables of at most 80 columns. Of several maps: a line per map with the main measures. Then a
+/// line per measure, with the mean of the maps and the value of all points; precision, recall and
+/// F1 over the thresholds, the maps without partner, and the focal length and baseline of bad-pix.
 std::string evaluationTable(const DepthEvaluation& evaluation,
                             const std::optional<StereoBaseline>& stereo = std::nullopt);
 

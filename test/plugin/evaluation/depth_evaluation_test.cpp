@@ -7,6 +7,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 
 #include "plugin/evaluation/depth_evaluation_text.h"
 #include "test/plugin/temporary_folder.h"
@@ -14,6 +15,7 @@
 namespace efm {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 class EvaluateDepth : public TemporaryFolder {
@@ -119,10 +121,29 @@ TEST_F(EvaluateDepth, BadPixelsNeedFocalLengthTimesBaseline) {
   options.focal_baseline = 40;  // 20 px and 10 px
   const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), options);
   EXPECT_EQ(evaluation.mean.bad_pix_5px, 1);
-  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("100.00    100.00"));
+  EXPECT_THAT(evaluationTable(evaluation), AllOf(HasSubstr("bad-pix 5px,5%, %         100.00\n"),
+                                                 HasSubstr("AErrR, %                   50.00\n")));
   const auto without = evaluateDepth(folder() / "a.tiff", folder() / "b.tiff", {});
   EXPECT_THAT(evaluationTable(without), HasSubstr("no bad-pix: it needs"));
   EXPECT_FALSE(nlohmann::json::parse(evaluationJson(without))["all"].contains("bad_pix_5px"));
+}
+
+TEST_F(EvaluateDepth, TheTablesOfManyMapsHave80Columns) {
+  for (const char* t : {"1600000000.100000000", "1600000000.200000000"}) {
+    tiff("out/keyframes/" + std::string(t) + "/depth.tiff", 2);
+    std::ofstream(folder() / "index.txt", std::ios::app) << t << " a.tiff\n";
+  }
+  tiff("a.tiff", 250, {4, 3});
+  DepthEvaluationOptions options;
+  options.focal_baseline = 40;
+  const std::string table = evaluationTable(evaluateDepth(folder() / "out", folder(), options),
+                                            StereoBaseline{400, 0.1, "as given"});
+  // A line per map with the main measures; all measures of all maps below.
+  EXPECT_THAT(table, AllOf(HasSubstr("\n1600000000.200000000      12  248.0000  248.0000    "
+                                     "100.00  99.20        0.00\n"),
+                           HasSubstr("beyond 10%, %               100.00      100.00\n")));
+  std::istringstream lines(table);
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
 }
 
 TEST_F(EvaluateDepth, AMapWithoutPointsIsNotPartOfTheMean) {
