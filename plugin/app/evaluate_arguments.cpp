@@ -108,8 +108,10 @@ void addEvaluateTrajectory(CLI::App& evaluate, Run& run) {
       "Trajectories are TUM files: t tx ty tz qx qy qz qw");
   auto arguments = argumentsOf(command, run, runEvaluateTrajectory);
   command
-      .add_option("EST", arguments->estimate,
-                  "The estimate, or the folder of `map` (its trajectory.txt: the keyframes' poses)")
+      .add_option(
+          "EST", arguments->estimate,
+          "The estimate, or the folder of `map` (its trajectory.txt: the keyframes' poses, as the "
+          "recording has them or as refined)")
       ->required();
   command
       .add_option("GT", arguments->truth,

@@ -100,6 +100,36 @@ double durationOf(const TrajectoryEvaluation& evaluation) {
   return secondsBetween(evaluation.pairs.front().t_ns, evaluation.pairs.back().t_ns);
 }
 
+/// What the alignment does, and the transform that it found.
+std::string alignmentText(const TrajectoryEvaluation& evaluation) {
+  const std::string name = "alignment  " + nameOf(evaluation.alignment) + ": ";
+  if (evaluation.alignment == TrajectoryAlignment::kNone) return name + "the poses as they are\n";
+  const Rigid3& T_world_map = evaluation.T_world_map;
+  const Eigen::Vector3d& p = T_world_map.translation;
+  return name +
+         (evaluation.alignment == TrajectoryAlignment::kSe3
+              ? "least squares over all positions, without scale\n"
+              : "the first poses coincide\n") +
+         fmt::format("           moved by ({:.3f}, {:.3f}, {:.3f}) m, turned by {:.3f} deg\n",
+                     p.x(), p.y(), p.z(),
+                     kDegrees * Eigen::AngleAxisd(T_world_map.rotation).angle());
+}
+
+std::string comparedText(const TrajectoryEvaluation& evaluation) {
+  return fmt::format(
+             "estimate   {}\n"
+             "truth      {}\n"
+             "pairs      {} of {} estimated and {} true poses, at most {:.6g} s apart\n"
+             "time       {} s to {} s: {:.3f} s\n"
+             "true path  {:.3f} m through the pairs\n",
+             evaluation.estimate_file.string(), evaluation.truth_file.string(),
+             evaluation.pairs.size(), evaluation.estimate_poses, evaluation.truth_poses,
+             evaluation.max_difference_s, formatSeconds(evaluation.pairs.front().t_ns),
+             formatSeconds(evaluation.pairs.back().t_ns), durationOf(evaluation),
+             evaluation.true_length_m) +
+         alignmentText(evaluation);
+}
+
 }  // namespace
 
 TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
@@ -112,6 +142,9 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
   const std::vector<StampedPose> true_poses = readPosesFile(truth_file);
 
   TrajectoryEvaluation evaluation;
+  evaluation.estimate_file = estimate_file;
+  evaluation.truth_file = truth_file;
+  evaluation.max_difference_s = options.max_difference_s;
   evaluation.estimate_poses = estimate.size();
   evaluation.truth_poses = true_poses.size();
   evaluation.pairs = associatePoses(estimate, true_poses, options.max_difference_s);
@@ -135,23 +168,20 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
 }
 
 std::string evaluationTable(const TrajectoryEvaluation& evaluation) {
-  TextTable table;
-  table.add({"", "pairs", "rmse", "mean", "median", "std", "min", "max"});
-  table.add(rowOf("absolute, m", statisticsOf(evaluation.errors.translation_m), 1));
-  table.add(rowOf("absolute, deg", statisticsOf(evaluation.errors.rotation_rad), kDegrees));
+  TextTable positions;
+  TextTable rotations;
+  positions.add({"position, m", "pairs", "rmse", "mean", "median", "std", "min", "max"});
+  rotations.add({"rotation, deg", "pairs", "rmse", "mean", "median", "std", "min", "max"});
+  positions.add(rowOf("absolute", statisticsOf(evaluation.errors.translation_m), 1));
+  rotations.add(rowOf("absolute", statisticsOf(evaluation.errors.rotation_rad), kDegrees));
   for (const EvaluatedSpacing& relative : evaluation.relative) {
     const std::string name =
-        fmt::format("relative over {:.{}f} {}", relative.spacing.amount,
+        fmt::format("over {:.{}f} {}", relative.spacing.amount,
                     relative.spacing.unit == Unit::kFrames ? 0 : 3, nameOf(relative.spacing.unit));
-    table.add(rowOf(name + ", m", relative.translation_m, 1));
-    table.add(rowOf(name + ", deg", relative.rotation_rad, kDegrees));
+    positions.add(rowOf(name, relative.translation_m, 1));
+    rotations.add(rowOf(name, relative.rotation_rad, kDegrees));
   }
-  return table.text() +
-         fmt::format(
-             "{} pairs of {} estimated and {} true poses, over {:.3f} m and {:.3f} s; "
-             "alignment {}\n",
-             evaluation.pairs.size(), evaluation.estimate_poses, evaluation.truth_poses,
-             evaluation.true_length_m, durationOf(evaluation), nameOf(evaluation.alignment));
+  return comparedText(evaluation) + "\n" + positions.text() + "\n" + rotations.text();
 }
 
 std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
@@ -159,11 +189,15 @@ std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
   const Eigen::Quaterniond& q = T_world_map.rotation;
   const Eigen::Vector3d& p = T_world_map.translation;
   Json json;
+  json["estimate_file"] = evaluation.estimate_file.string();
+  json["truth_file"] = evaluation.truth_file.string();
   json["pairs"] = evaluation.pairs.size();
   json["estimate_poses"] = evaluation.estimate_poses;
   json["truth_poses"] = evaluation.truth_poses;
   json["length_m"] = evaluation.true_length_m;
   json["duration_s"] = durationOf(evaluation);
+  json["first_s"] = formatSeconds(evaluation.pairs.front().t_ns);
+  json["last_s"] = formatSeconds(evaluation.pairs.back().t_ns);
   json["alignment"] = nameOf(evaluation.alignment);
   json["aligned_by"] = {{"translation_m", {p.x(), p.y(), p.z()}},
                         {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
@@ -178,8 +212,11 @@ std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
 
 std::string trajectoryEvaluationKeys() {
   return "Keys of --json (statistics: rmse, mean, median, std, min, max):\n"
+         "  estimate_file, truth_file            the two files that are compared\n"
          "  pairs, estimate_poses, truth_poses   numbers of pairs and of poses in both files\n"
          "  length_m, duration_s                 of the true path through the pairs\n"
+         "  first_s, last_s                      times of the first and the last pair, as text\n"
+         "                                       with nine decimals\n"
          "  alignment, aligned_by                the kind of alignment, and its transform from\n"
          "                                       the estimate to the truth: translation_m,\n"
          "                                       quaternion_xyzw\n"

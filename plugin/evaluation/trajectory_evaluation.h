@@ -28,9 +28,12 @@ struct EvaluatedSpacing {
 };
 
 struct TrajectoryEvaluation {
+  std::filesystem::path estimate_file;
+  std::filesystem::path truth_file;
   std::uint64_t estimate_poses = 0;  ///< In the files.
   std::uint64_t truth_poses = 0;
-  std::vector<PosePair> pairs;
+  double max_difference_s = 0;  ///< Of the options.
+  std::vector<PosePair> pairs;  ///< In the order of time.
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
   Rigid3 T_world_map;        ///< Aligns the estimate with the truth.
   PoseErrors errors;         ///< Absolute, of each pair.
@@ -46,6 +49,8 @@ TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
                                         const std::filesystem::path& truth,
                                         const TrajectoryEvaluationOptions& options);
 
+/// What was compared (files, pairs, times, alignment), then the errors; at most 80 columns, but for
+/// long file names.
 std::string evaluationTable(const TrajectoryEvaluation& evaluation);
 /// `trajectoryEvaluationKeys` describes the keys.
 std::string evaluationJson(const TrajectoryEvaluation& evaluation);
