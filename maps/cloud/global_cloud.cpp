@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bitset>
 #include <cmath>
+#include <iterator>
+#include <limits>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -71,6 +73,7 @@ GlobalCloud::GlobalCloud(const GlobalCloudOptions& options) : options_(options) 
 
 void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
                          const std::optional<Rigid3>& T_world_ref) {
+  if (settled_below_ > 0) requireUnsettled(keyframe, settled_below_ + kMaxNumberDifference);
   if (keyframes_.count(keyframe) != 0) {
     throw std::invalid_argument("keyframe " + std::to_string(keyframe) + " is in the map already");
   }
@@ -80,6 +83,7 @@ void GlobalCloud::insert(std::uint64_t keyframe, const std::vector<CloudPoint>& 
 
 void GlobalCloud::replace(std::uint64_t keyframe, const std::vector<CloudPoint>& points,
                           const std::optional<Rigid3>& T_world_ref) {
+  requireUnsettled(keyframe, settled_below_);
   const auto replaced = keyframes_.find(keyframe);
   if (replaced == keyframes_.end()) refuseMissing(keyframe);
   Keyframe made = keyframeOf(points, T_world_ref);
@@ -152,6 +156,7 @@ void GlobalCloud::checkMutually(std::uint64_t number) {
 }
 
 void GlobalCloud::remove(std::uint64_t keyframe) {
+  requireUnsettled(keyframe, settled_below_);
   if (keyframes_.erase(keyframe) == 0) refuseMissing(keyframe);
   forgetVerdictsOf(keyframe);
 }
@@ -175,11 +180,22 @@ bool GlobalCloud::isExcluded(const Keyframe& keyframe, std::size_t voxel) const 
          violations > static_cast<std::size_t>(options_.consistency.max_contradictions);
 }
 
-/// Merges the sorted voxels of all keyframes, and calls visit(total, supporting) for each voxel in
-/// order, with the numbers of the keyframes that support it, ascending. The keyframes of a voxel
-/// are summed in the order of their numbers.
+void GlobalCloud::requireUnsettled(std::uint64_t keyframe, std::uint64_t from) const {
+  if (keyframe >= from) return;
+  throw std::invalid_argument("keyframe " + std::to_string(keyframe) +
+                              ": the keyframes around it are merged for good");
+}
+
+/// The first number of `SettledVoxel::recent`.
+std::uint64_t GlobalCloud::recentFrom(std::uint64_t below) const {
+  return below < kLowerBits ? 0 : below - kLowerBits;
+}
+
+/// Merges the sorted voxels of the settled keyframes and of those below a number, and calls
+/// visit(voxel) for each in order. The keyframes of a voxel are summed in the order of their
+/// numbers.
 template <typename Visit>
-void GlobalCloud::visitVoxels(const Visit& visit) const {
+void GlobalCloud::visitVoxels(std::uint64_t below, const Visit& visit) const {
   struct Run {
     const Keyframe* keyframe;
     std::uint64_t number;
@@ -193,23 +209,36 @@ void GlobalCloud::visitVoxels(const Visit& visit) const {
   };
   std::vector<Run> runs;
   for (const auto& [number, keyframe] : keyframes_) {
-    if (!keyframe.voxels.empty()) runs.push_back({&keyframe, number, 0});
+    if (number < below && !keyframe.voxels.empty()) runs.push_back({&keyframe, number, 0});
   }
   std::make_heap(runs.begin(), runs.end(), comes_later);
 
-  std::vector<std::uint64_t> supporting;  // numbers of keyframes
-  while (!runs.empty()) {
-    Sums total;
-    total.index = runs.front().index();
-    supporting.clear();
-    while (!runs.empty() && runs.front().index() == total.index) {
+  MergedVoxel voxel;
+  auto settled = settled_.begin();
+  while (!runs.empty() || settled != settled_.end()) {
+    const bool starts_settled = settled != settled_.end() &&
+                                (runs.empty() || !(runs.front().index() < settled->sums.index));
+    voxel.sums = starts_settled ? settled->sums : Sums{};
+    voxel.first = starts_settled ? settled->first : std::numeric_limits<std::uint64_t>::max();
+    voxel.older = starts_settled ? settled->older : 0;
+    voxel.supporting.clear();
+    if (starts_settled) {
+      for (unsigned bit = 0; bit < 2 * kLowerBits; ++bit) {
+        if ((settled->recent >> bit & 1U) == 0) continue;
+        voxel.supporting.push_back(recentFrom(settled_below_) + bit);
+      }
+      ++settled;
+    } else {
+      voxel.sums.index = runs.front().index();
+    }
+    while (!runs.empty() && runs.front().index() == voxel.sums.index) {
       std::pop_heap(runs.begin(), runs.end(), comes_later);
       Run& run = runs.back();
       if (!isExcluded(*run.keyframe, run.next)) {
-        total.add(run.keyframe->voxels[run.next]);
-        supporting.push_back(run.number);
+        voxel.sums.add(run.keyframe->voxels[run.next]);
+        voxel.supporting.push_back(run.number);
         if (!run.keyframe->verdicts.empty()) {
-          appendNumbers(run.keyframe->verdicts[run.next].supports, run.number, supporting);
+          appendNumbers(run.keyframe->verdicts[run.next].supports, run.number, voxel.supporting);
         }
       }
       if (++run.next == run.keyframe->voxels.size()) {
@@ -218,25 +247,56 @@ void GlobalCloud::visitVoxels(const Visit& visit) const {
         std::push_heap(runs.begin(), runs.end(), comes_later);
       }
     }
-    if (supporting.empty()) continue;
+    auto& supporting = voxel.supporting;
     std::sort(supporting.begin(), supporting.end());
     supporting.erase(std::unique(supporting.begin(), supporting.end()), supporting.end());
-    visit(total, supporting);
+    if (voxel.support() == 0) continue;
+    if (!supporting.empty()) voxel.first = std::min(voxel.first, supporting.front());
+    visit(voxel);
   }
+}
+
+void GlobalCloud::settle(std::uint64_t below) {
+  if (below <= settled_below_) return;
+  const std::uint64_t recent_from = recentFrom(below);
+  std::vector<SettledVoxel> settled;
+  settled.reserve(settled_.size());
+  visitVoxels(below, [&](const MergedVoxel& voxel) {
+    SettledVoxel merged{voxel.sums, voxel.first, voxel.older, 0};
+    for (const std::uint64_t number : voxel.supporting) {
+      if (number < recent_from) {
+        ++merged.older;
+      } else {
+        merged.recent = static_cast<std::uint16_t>(merged.recent | 1U << (number - recent_from));
+      }
+    }
+    settled.push_back(merged);
+  });
+  settled_ = std::move(settled);
+  const auto end = keyframes_.lower_bound(below);
+  settled_keyframes_ += static_cast<std::size_t>(std::distance(keyframes_.begin(), end));
+  keyframes_.erase(keyframes_.begin(), end);
+  settled_below_ = below;
+}
+
+std::size_t GlobalCloud::unsettledVoxels() const {
+  std::size_t count = 0;
+  for (const auto& [number, keyframe] : keyframes_) count += keyframe.voxels.size();
+  return count;
 }
 
 std::vector<CloudPoint> GlobalCloud::points(int min_keyframes) const {
   std::vector<CloudPoint> points;
-  visitVoxels([&](const Sums& total, const std::vector<std::uint64_t>& supporting) {
-    if (static_cast<std::int64_t>(supporting.size()) < min_keyframes) return;
-    points.push_back(pointOf(total, supporting));
+  visitVoxels(std::numeric_limits<std::uint64_t>::max(), [&](const MergedVoxel& voxel) {
+    if (static_cast<std::int64_t>(voxel.support()) < min_keyframes) return;
+    points.push_back(pointOf(voxel));
   });
   return points;
 }
 
 std::size_t GlobalCloud::voxels() const {
   std::size_t count = 0;
-  visitVoxels([&](const Sums&, const std::vector<std::uint64_t>&) { ++count; });
+  visitVoxels(std::numeric_limits<std::uint64_t>::max(), [&](const MergedVoxel&) { ++count; });
   return count;
 }
 
@@ -266,10 +326,10 @@ Eigen::Vector3d GlobalCloud::positionOf(const Sums& sums) const {
   return corner + sums.weighted_offset / sums.weight;
 }
 
-CloudPoint GlobalCloud::pointOf(const Sums& total,
-                                const std::vector<std::uint64_t>& supporting) const {
-  return {positionOf(total), static_cast<float>(total.weight / static_cast<double>(total.count)),
-          static_cast<std::uint32_t>(supporting.size()), supporting.front()};
+CloudPoint GlobalCloud::pointOf(const MergedVoxel& voxel) const {
+  const Sums& sums = voxel.sums;
+  return {positionOf(sums), static_cast<float>(sums.weight / static_cast<double>(sums.count)),
+          static_cast<std::uint32_t>(voxel.support()), voxel.first};
 }
 
 }  // namespace efm

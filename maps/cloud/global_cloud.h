@@ -78,6 +78,16 @@ class GlobalCloud {
   /// @throws std::invalid_argument where the number is not in the map.
   void remove(std::uint64_t keyframe);
 
+  /// Merges the keyframes below a number for good, so that memory and the cost of `points` grow
+  /// with the voxels of the map, not with its keyframes. The map stays the same, bit for bit. Cost:
+  /// linear in the merged voxels.
+  /// @param below all keyframes below `below` + `kMaxNumberDifference` are in the map, or never
+  /// will be: `insert` refuses them from now on, `remove` and `replace` those below `below`.
+  void settle(std::uint64_t below);
+  /// The number of voxels that `settle` merged, and of those that keyframes have of their own.
+  std::size_t settledVoxels() const { return settled_.size(); }
+  std::size_t unsettledVoxels() const;
+
   /// The points with a support of at least `min_keyframes`, sorted by voxel (x, y, z). Cost:
   /// merging the voxels of all keyframes.
   std::vector<CloudPoint> points() const { return points(options_.min_keyframes); }
@@ -85,7 +95,7 @@ class GlobalCloud {
 
   /// Number of voxels that are not excluded. Costs as much as `points`.
   std::size_t voxels() const;
-  std::size_t keyframes() const { return keyframes_.size(); }
+  std::size_t keyframes() const { return settled_keyframes_ + keyframes_.size(); }
   const GlobalCloudOptions& options() const { return options_; }
 
  private:
@@ -122,12 +132,31 @@ class GlobalCloud {
     std::optional<VisibilityGrid> grid;  // with consistency, where the pose is known
   };
 
+  /// A voxel of settled keyframes. Keyframes that support it are counted, and those whose numbers
+  /// are near the first one that is not settled are known, because others may support it by them
+  /// too.
+  struct SettledVoxel {
+    Sums sums;
+    std::uint64_t first = 0;   ///< The lowest number that supports it.
+    std::uint32_t older = 0;   ///< Keyframes below `settled_below_` - kMaxNumberDifference.
+    std::uint16_t recent = 0;  ///< A bit for each number from there on.
+  };
+  /// A voxel of all keyframes.
+  struct MergedVoxel {
+    Sums sums;
+    std::uint64_t first = 0;
+    std::uint32_t older = 0;                ///< Supporting keyframes that are not in `supporting`.
+    std::vector<std::uint64_t> supporting;  ///< Numbers, ascending.
+
+    std::size_t support() const { return older + supporting.size(); }
+  };
+
   Keyframe keyframeOf(const std::vector<CloudPoint>& points,
                       const std::optional<Rigid3>& T_world_ref) const;
   VoxelPoint voxelPointOf(const CloudPoint& point) const;
   std::vector<Sums> voxelsOf(const std::vector<CloudPoint>& points) const;
   Eigen::Vector3d positionOf(const Sums& sums) const;
-  CloudPoint pointOf(const Sums& total, const std::vector<std::uint64_t>& supporting) const;
+  CloudPoint pointOf(const MergedVoxel& voxel) const;
   void check(Keyframe& checked, const Keyframe& by, unsigned bit) const;
   template <typename Visit>
   void visitNeighbors(std::uint64_t number, const Visit& visit);
@@ -135,10 +164,15 @@ class GlobalCloud {
   void forgetVerdictsOf(std::uint64_t number);
   bool isExcluded(const Keyframe& keyframe, std::size_t voxel) const;
   template <typename Visit>
-  void visitVoxels(const Visit& visit) const;
+  void visitVoxels(std::uint64_t below, const Visit& visit) const;
+  std::uint64_t recentFrom(std::uint64_t below) const;
+  void requireUnsettled(std::uint64_t keyframe, std::uint64_t from) const;
 
   GlobalCloudOptions options_;
-  std::map<std::uint64_t, Keyframe> keyframes_;  // by number
+  std::map<std::uint64_t, Keyframe> keyframes_;  // by number; those that are not settled
+  std::vector<SettledVoxel> settled_;            // sorted
+  std::uint64_t settled_below_ = 0;              // keyframes below this number are settled
+  std::size_t settled_keyframes_ = 0;
 };
 
 }  // namespace efm

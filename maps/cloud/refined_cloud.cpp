@@ -47,6 +47,15 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
     forgetNewest();
     throw;
   }
+  if (!movable_) settle(fixed_ + keyframe);
+}
+
+/// Merges the keyframes that no later one checks, when enough voxels have gathered.
+void RefinedCloud::settle(std::uint64_t newest) {
+  constexpr std::size_t kMinVoxels = 200'000;  // some 14 MB
+  if (newest < GlobalCloud::kMaxNumberDifference) return;
+  if (cloud_.unsettledVoxels() < std::max(kMinVoxels, cloud_.settledVoxels() / 2)) return;
+  cloud_.settle(newest - GlobalCloud::kMaxNumberDifference);
 }
 
 void RefinedCloud::removeNewest() {

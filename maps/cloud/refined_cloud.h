@@ -48,6 +48,7 @@ class RefinedCloud {
  private:
   void put(std::size_t keyframe, const Rigid3& T_world_ref);
   void forgetNewest();
+  void settle(std::uint64_t newest);
 
   struct KeptPoints {
     std::vector<ViewPoint> points;

@@ -9,10 +9,11 @@
 namespace efm::test {
 
 inline bool sameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  return std::equal(
-      a.begin(), a.end(), b.begin(), b.end(), [](const CloudPoint& p, const CloudPoint& q) {
-        return p.p_world == q.p_world && p.confidence == q.confidence && p.support == q.support;
-      });
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const CloudPoint& p, const CloudPoint& q) {
+                      return p.p_world == q.p_world && p.confidence == q.confidence &&
+                             p.support == q.support && p.first_keyframe == q.first_keyframe;
+                    });
 }
 
 }  // namespace efm::test

@@ -214,5 +214,35 @@ TEST(MapConsistency, TheMapDependsOnItsKeyframesAloneBitForBit) {
   }
 }
 
+TEST(MapConsistency, SettledKeyframesMakeTheSameMapBitForBit) {
+  std::mt19937 random(7);
+  const std::vector<View> views = viewsWithOutliers(random, 40);
+  for (const Consistency consistency :
+       {Consistency::kNone, Consistency::kSupport, Consistency::kVisibility}) {
+    GlobalCloud kept(withConsistency(consistency));
+    GlobalCloud settled(withConsistency(consistency));
+    for (std::uint64_t k = 0; k < views.size(); ++k) {
+      kept.insert(k, views[k].points, views[k].T_world_ref);
+      settled.insert(k, views[k].points, views[k].T_world_ref);
+      // At any time, one keyframe or several at once.
+      if (k >= GlobalCloud::kMaxNumberDifference && random() % 3 == 0) {
+        settled.settle(k - GlobalCloud::kMaxNumberDifference);
+      }
+      if (k % 10 != 9) continue;
+      for (const int min_keyframes : {1, 3}) {
+        EXPECT_TRUE(test::sameBits(settled.points(min_keyframes), kept.points(min_keyframes)));
+      }
+    }
+    EXPECT_EQ(settled.keyframes(), kept.keyframes());
+    EXPECT_GT(settled.settledVoxels(), 0U);
+    EXPECT_LT(settled.unsettledVoxels(), kept.unsettledVoxels() / 2);
+    EXPECT_THROW(settled.insert(5, {}), std::invalid_argument);
+    EXPECT_THROW(settled.remove(5), std::invalid_argument);
+    settled.remove(39);
+    kept.remove(39);
+    EXPECT_TRUE(test::sameBits(settled.points(), kept.points()));
+  }
+}
+
 }  // namespace
 }  // namespace efm
