@@ -334,6 +334,11 @@ void CEventFusionMapBuilder::finish() {
   });
 }
 
+std::shared_ptr<const MapSnapshot> CEventFusionMapBuilder::snapshot() const {
+  const auto live = liveMapping();
+  return live ? live->map() : nullptr;
+}
+
 SessionStatus CEventFusionMapBuilder::status() const {
   if (const auto live = liveMapping()) return live->status();
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -353,7 +358,7 @@ std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
-  if (const auto live = liveMapping()) return posesOf(live->map()->keyframes);
+  if (const auto live = liveMapping()) return live->map()->trajectory;
   const std::lock_guard<std::mutex> lock(mutex_);
   applyPending();
   return posesOf(keyframes_);
@@ -370,7 +375,7 @@ std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
   };
   if (const auto live = liveMapping()) {
     const auto map = live->map();
-    return withTracker(posesOf(map->keyframes), map->T_odom_ref);
+    return withTracker(map->trajectory, map->T_odom_ref);
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   return withTracker(posesOf(keyframes_), session_->T_odom_ref());
@@ -449,7 +454,7 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
   if (const auto live = liveMapping()) {
-    return static_cast<unsigned int>(live->map()->keyframes.size());
+    return static_cast<unsigned int>(live->map()->frames.size());
   }
   mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);

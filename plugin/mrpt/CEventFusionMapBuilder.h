@@ -99,6 +99,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// Ends the recording: maps the remaining windows.
   void finish();
 
+  /// Live operation: the newest snapshot of the map; null in playback.
+  std::shared_ptr<const MapSnapshot> snapshot() const;
   SessionStatus status() const;
   /// The number of observations that were neither events nor poses.
   std::uint64_t ignoredObservations() const;

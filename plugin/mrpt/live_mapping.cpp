@@ -43,14 +43,12 @@ LiveMapping::LiveMapping(const EventFusionOptions& options, std::vector<StoredKe
     : options_(options.live),
       callbacks_(std::move(callbacks)),
       queue_(options.live),
-      session_(std::make_unique<MappingSession>(options)),
-      next_map_(std::make_shared<MapSnapshot>()) {
+      session_(std::make_unique<MappingSession>(options)) {
   T_body_rig_ = session_->setup().T_body_rig;
-  for (const StoredKeyframe& keyframe : earlier) {
+  for (StoredKeyframe& keyframe : earlier) {
     session_->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
-    next_map_->frames.push_back(simpleMapFrameOf(keyframe));
+    keep(std::move(keyframe));
   }
-  next_map_->keyframes = std::move(earlier);
   publishMap(true);
   publishState();
   thread_ = std::thread([this] { run(); });
@@ -137,9 +135,7 @@ bool LiveMapping::mapNext() {
     window = session_->nextWindow();
     keyframe = session_->next(sink, clock);
     if (keyframe) {
-      StoredKeyframe stored = storedKeyframe(*keyframe, session_->pointsOf(*keyframe));
-      next_map_->frames.push_back(simpleMapFrameOf(stored));
-      next_map_->keyframes.push_back(std::move(stored));
+      keep(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
       map_changed_ = true;
     }
   } catch (const std::exception&) {
@@ -178,6 +174,15 @@ void LiveMapping::giveUpExcess() {
   if (is_excess() && !session_->nextWindow()) session_->giveUpOlderHalf();
 }
 
+void LiveMapping::keep(StoredKeyframe keyframe) {
+  next_map_.trajectory.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
+  next_map_.frames.push_back(simpleMapFrameOf(keyframe));
+  keyframes_.push_back(std::move(keyframe));
+  if (keyframes_.size() <= static_cast<std::size_t>(options_.max_keyframes)) return;
+  keyframes_.pop_front();
+  next_map_.frames.erase(next_map_.frames.begin());
+}
+
 void LiveMapping::publishState() {
   SessionStatus status = session_->status();
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -193,16 +198,18 @@ void LiveMapping::publishMap(bool at_once) {
   try {
     session_->applyPending();
     const std::vector<Rigid3>& T_world_ref = session_->T_world_ref();
-    // A keyframe whose points could not be stored is in no snapshot.
-    const std::size_t earlier = next_map_->keyframes.size() - T_world_ref.size();
-    for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
-      StoredKeyframe& keyframe = next_map_->keyframes[earlier + i];
-      if (isSame(keyframe.T_world_ref, T_world_ref[i])) continue;
-      keyframe.T_world_ref = T_world_ref[i];
-      next_map_->frames[earlier + i] = simpleMapFrameOf(keyframe);
+    std::vector<StampedPose>& trajectory = next_map_.trajectory;
+    const std::size_t earlier = trajectory.size() - T_world_ref.size();
+    const std::size_t forgotten = trajectory.size() - keyframes_.size();
+    for (std::size_t i = earlier; i < trajectory.size(); ++i) {
+      if (isSame(trajectory[i].T_world_rig, T_world_ref[i - earlier])) continue;
+      trajectory[i].T_world_rig = T_world_ref[i - earlier];
+      if (i < forgotten) continue;
+      keyframes_[i - forgotten].T_world_ref = trajectory[i].T_world_rig;
+      next_map_.frames[i - forgotten] = simpleMapFrameOf(keyframes_[i - forgotten]);
     }
-    next_map_->T_odom_ref = session_->T_odom_ref();
-    auto map = std::make_shared<MapSnapshot>(*next_map_);
+    next_map_.T_odom_ref = session_->T_odom_ref();
+    auto map = std::make_shared<MapSnapshot>(next_map_);
     map->points = session_->cloud().points();
     map->metric_map.maps.push_back(pointsMapOf(map->points));
     made = std::move(map);

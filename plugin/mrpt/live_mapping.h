@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -31,9 +32,9 @@ struct SimpleMapFrame {
 
 /// The map as it was at one moment.
 struct MapSnapshot {
-  std::vector<StoredKeyframe> keyframes;   ///< Of the initial map first.
+  std::vector<StampedPose> trajectory;     ///< Of all keyframes, those of the initial map first.
   std::vector<Rigid3> T_odom_ref;          ///< Of the others: by the tracker.
-  std::vector<SimpleMapFrame> frames;      ///< The keyframes as those of a simplemap.
+  std::vector<SimpleMapFrame> frames;      ///< The newest keyframes, as those of a simplemap.
   std::vector<CloudPoint> points;          ///< The exported points.
   mrpt::maps::CMultiMetricMap metric_map;  ///< The points as a CPointsMapXYZI.
 };
@@ -93,6 +94,7 @@ class LiveMapping {
   bool feed(InputQueue::Batch batch);
   bool mapNext();
   void giveUpExcess();
+  void keep(StoredKeyframe keyframe);
   void publishState();
   void publishMap(bool at_once);
   void noteError(const std::string& doing, bool counts);
@@ -104,8 +106,9 @@ class LiveMapping {
   InputQueue queue_;
 
   // Of the mapping's thread.
+  std::deque<StoredKeyframe> keyframes_;  // the newest ones
   std::unique_ptr<MappingSession> session_;
-  std::shared_ptr<MapSnapshot> next_map_;  // the keyframes so far
+  MapSnapshot next_map_;  // the keyframes so far
   bool map_changed_ = false;
   std::chrono::steady_clock::time_point map_renewed_;
   std::chrono::steady_clock::duration map_cost_{};

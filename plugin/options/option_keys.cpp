@@ -195,6 +195,7 @@ const std::vector<OptionKey>& optionKeys() {
       option("live", "max_queue_events", FIELD(live.max_queue_events)),
       option("live", "max_queue_mb", FIELD(live.max_queue_mb)),
       option("live", "max_pose_wait_s", FIELD(live.max_pose_wait_s)),
+      option("live", "max_keyframes", FIELD(live.max_keyframes)),
       option("live", "max_speed_m_s", FIELD(live.max_speed_m_s)),
       option("live", "max_turn_deg_s", FIELD(live.max_turn_deg_s)),
 

@@ -15,10 +15,13 @@ struct LiveOptions {
   double max_event_rate = 1'000'000;
   /// Input that waits for the mapping: its events of all cameras, and their memory. Beyond either
   /// one the oldest windows are given up. At least 1000 events, 1 MB.
-  std::int64_t max_queue_events = 20'000'000;
-  double max_queue_mb = 512;
+  std::int64_t max_queue_events = 5'000'000;
+  double max_queue_mb = 256;
   /// Events wait this long for poses. Seconds, above 0, at most 3600.
   double max_pose_wait_s = 2;
+  /// Keyframes with their own clouds, for MRPT's simplemaps: the newest ones. At least 1. The
+  /// points of all stay in the map.
+  int max_keyframes = 1000;
   /// A pose that is farther from the one before it, even by five standard deviations less, begins a
   /// new stretch: no window spans both. Metres per second, degrees per second, above 0.
   double max_speed_m_s = 50;

@@ -103,6 +103,24 @@ TEST(LiveBuilder, MakesTheMapOfPlayback) {
   EXPECT_EQ(status.live->errors, 0U) << status.live->last_error;
 }
 
+TEST(LiveBuilder, OldKeyframesLeaveTheSimplemapAndStayInTheMap) {
+  const Observations observations = observationsOf(SyntheticRecording(2));
+  CEventFusionMapBuilder all(liveOptions());
+  playPatiently(all, observations);
+  EventFusionOptions options = liveOptions();
+  options.live.max_keyframes = 4;
+  CEventFusionMapBuilder builder(options);
+  playPatiently(builder, observations);
+
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 4U);
+  mrpt::maps::CSimpleMap simple_map;
+  builder.getCurrentlyBuiltMap(simple_map);
+  const auto [pose, frame] = simple_map.get(3);
+  EXPECT_NEAR(pose->getMeanVal().x(), all.trajectory().back().T_world_rig.translation.x(), 1e-12);
+  EXPECT_EQ(keyframeTimes(builder), keyframeTimes(all));
+  expectSameBits(builder.points(), all.points());
+}
+
 TEST(LiveBuilder, ABudgetInSensorTimeGivesTheSameMapAtAnyPace) {
   const Observations observations = observationsOf(SyntheticRecording());
   EventFusionOptions options = liveOptions();

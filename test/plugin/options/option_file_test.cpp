@@ -164,6 +164,7 @@ const FieldCase kFields[] = {
     EFM_ROW("live.max_queue_events=3000", live.max_queue_events, 3000),
     EFM_ROW("live.max_queue_mb=64", live.max_queue_mb, 64),
     EFM_ROW("live.max_pose_wait_s=0.5", live.max_pose_wait_s, 0.5),
+    EFM_ROW("live.max_keyframes=20", live.max_keyframes, 20),
     EFM_ROW("live.max_speed_m_s=20", live.max_speed_m_s, 20),
     EFM_ROW("live.max_turn_deg_s=700", live.max_turn_deg_s, 700),
     EFM_ROW("output.camera_maps=true", mapper.keyframe.camera_maps, true),
