@@ -61,7 +61,6 @@ Rigid3 MapRefinement::add(const KeyframeDepthMap& keyframe,
   const std::lock_guard<std::mutex> lock(mutex_);
   if (waiting_.size() >= kMaxWaiting) task.cloud.clear();
   waiting_.push_back(std::move(task));
-  held_ = 0;
   changed_.notify_all();
   return state_.T_world_odom * keyframe.T_world_ref;
 }
@@ -156,14 +155,12 @@ void MapRefinement::runInBackground() {
     changed_.wait(lock, [this] { return stop_ || waiting_.size() > held_; });
     if (stop_) return;
     Task& task = waiting_.front();  // stays where it is when others are added
+    const std::size_t waiting = waiting_.size();
     lock.unlock();
     const bool refined = refine(task);
     lock.lock();
-    if (refined) {
-      waiting_.pop_front();
-    } else {
-      held_ = waiting_.size();  // it is tried again with the next keyframe
-    }
+    if (refined) waiting_.pop_front();
+    held_ = refined ? 0 : waiting;  // it is tried again with the next keyframe
     changed_.notify_all();
   }
 }

@@ -103,7 +103,7 @@ class MapRefinement {
   mutable std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
   std::deque<Task> waiting_;  // the first one is in work
-  std::size_t held_ = 0;      // all of them: the first one could not be added to the refiner
+  std::size_t held_ = 0;      // as many wait until there are more: the first one found no memory
   bool stop_ = false;
   std::exception_ptr last_failure_;
   std::exception_ptr unthrown_;
