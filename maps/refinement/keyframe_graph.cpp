@@ -2,6 +2,7 @@
 #include "maps/refinement/keyframe_graph.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "maps/refinement/loop_closing.h"
@@ -10,6 +11,8 @@ namespace efm {
 namespace {
 
 constexpr std::size_t kMaxNearestViews = 50;
+/// With up to 0.3 MB of points each.
+constexpr std::size_t kMaxPlaces = 1000;
 
 Eigen::Vector3d centreOfView(const RefinedKeyframe& keyframe) {
   const double inverse_depth = keyframe.cloud.middleInverseDepth();
@@ -43,10 +46,40 @@ std::vector<std::size_t> KeyframeGraph::bestOverlaps(const std::vector<std::size
   return numbersOf(ranked, static_cast<std::size_t>(count));
 }
 
-std::vector<std::size_t> KeyframeGraph::nearestViews(std::size_t end) const {
+void KeyframeGraph::addPlace(std::size_t keyframe) {
+  places.push_back(keyframe);
+  if (places.size() <= kMaxPlaces) return;
+  const auto redundant = places.begin() + static_cast<std::ptrdiff_t>(mostRedundant());
+  keyframes[*redundant].cloud.clear();
+  places.erase(redundant);
+}
+
+/// The index of the newer one of the two places that are nearest to each other, in position and in
+/// centre of view.
+std::size_t KeyframeGraph::mostRedundant() const {
+  using Position = Eigen::Matrix<double, 6, 1>;
+  std::vector<Position> positions;
+  for (const std::size_t place : places) {
+    positions.emplace_back();
+    positions.back() << keyframes[place].T_world_ref.translation, centreOfView(keyframes[place]);
+  }
+  std::size_t redundant = 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < positions.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      const double squared = (positions[i] - positions[k]).squaredNorm();
+      if (squared >= nearest) continue;
+      nearest = squared;
+      redundant = i;
+    }
+  }
+  return redundant;
+}
+
+std::vector<std::size_t> KeyframeGraph::nearestViews() const {
   const Eigen::Vector3d centre = centreOfView(keyframes.back());
   std::vector<std::pair<double, std::size_t>> ranked;
-  for (std::size_t i = 0; i < end; ++i) {
+  for (const std::size_t i : places) {
     ranked.emplace_back((centreOfView(keyframes[i]) - centre).squaredNorm(), i);
   }
   const std::size_t count = std::min(ranked.size(), kMaxNearestViews);

@@ -20,6 +20,8 @@ struct KeyframeGraph {
   TrackerModel tracker;
   /// Minima that could not be computed; poses stayed there. Of registrations, windows and loops.
   std::uint64_t failed_solves = 0;
+  /// Earlier keyframes that loops may lead to, ascending.
+  std::vector<std::size_t> places = {};
 
   std::size_t newest() const { return keyframes.size() - 1; }
 
@@ -27,13 +29,19 @@ struct KeyframeGraph {
   /// largest overlap first.
   std::vector<std::size_t> bestOverlaps(const std::vector<std::size_t>& candidates,
                                         double min_overlap, int count) const;
-  /// The keyframes with numbers below `end` whose centres of view are nearest to that of the newest
-  /// keyframe: a bounded number, the nearest first.
-  std::vector<std::size_t> nearestViews(std::size_t end) const;
+  /// Lets later keyframes find loops to this one. Of too many such places, the one that is most
+  /// like an earlier one loses its points: so memory and time are bounded.
+  void addPlace(std::size_t keyframe);
+  /// The places whose centres of view are nearest to that of the newest keyframe: a bounded number,
+  /// the nearest first.
+  std::vector<std::size_t> nearestViews() const;
 
   /// Solves the poses of the keyframes from `first_free` on, except the first keyframe. They stay
   /// where the minimum cannot be computed.
   WindowGraph solveFrom(std::size_t first_free, const PoseGraphOptions& options);
+
+ private:
+  std::size_t mostRedundant() const;
 };
 
 }  // namespace efm

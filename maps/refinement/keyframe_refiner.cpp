@@ -69,13 +69,16 @@ void KeyframeRefiner::add(RegistrationCloud cloud, const Rigid3& T_odom_ref,
 
 void KeyframeRefiner::refineNewest() {
   const std::size_t number = graph_.newest();
-  registerNewest();  // 2.
   const auto window = static_cast<std::size_t>(options_.window);
+  if (number > window) {
+    graph_.keyframes[number - window - 1].cloud.releaseTree();
+    graph_.addPlace(number - window - 1);
+  }
+  registerNewest();  // 2.
   const std::size_t first_free = number + 1 > window ? number + 1 - window : 0;
   updateCovariance(graph_.solveFrom(first_free, options_.graph));  // 3.
   loops_.search(graph_);                                           // 4.
   if (const auto solved = loops_.solveWhenDue(graph_)) updateCovariance(*solved);
-  if (number > window) graph_.keyframes[number - window - 1].cloud.releaseTree();
 }
 
 /// After an error: the newest keyframe keeps the tracker's motion, and others do not meet its

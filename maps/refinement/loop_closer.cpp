@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "maps/refinement/condensed_graph.h"
+
 namespace efm {
 namespace {
 
@@ -36,9 +38,8 @@ void LoopCloser::search(KeyframeGraph& graph) {
   const std::size_t newest = graph.newest();
   const auto window = static_cast<std::size_t>(options_.window);
   if (!options_.loop.loops || options_.loop.loop_checks == 0 || newest <= window) return;
-  for (const std::size_t older :
-       graph.bestOverlaps(graph.nearestViews(newest - window), options_.loop.loop_min_overlap,
-                          options_.loop.loop_checks)) {
+  for (const std::size_t older : graph.bestOverlaps(
+           graph.nearestViews(), options_.loop.loop_min_overlap, options_.loop.loop_checks)) {
     check(graph,
           {older, newest,
            graph.keyframes[older].T_world_ref.inverse() * graph.keyframes[newest].T_world_ref});
@@ -90,6 +91,13 @@ WindowGraph LoopCloser::solve(KeyframeGraph& graph, std::size_t first_free) {
   // Loops count in full. Where they do not fit, drift is larger than short paths have shown.
   PoseGraphOptions trusting = options_.graph;
   trusting.robust_sigmas = std::min(kTrustFactor * trusting.robust_sigmas, kMaxRobustSigmas);
+  first_free = std::max<std::size_t>(first_free, 1);
+  if (graph.keyframes.size() - first_free > kMaxSolvedTogether) {
+    solveCondensed(graph, first_free, trusting);
+    solveCondensed(graph, first_free, options_.graph);
+    return graph.solveFrom(graph.keyframes.size() - static_cast<std::size_t>(options_.window),
+                           options_.graph);
+  }
   graph.solveFrom(first_free, trusting);
   while (!contradictedLoops(graph, kMaxTrustedError).empty() && graph.tracker.increaseDrift()) {
     graph.solveFrom(first_free, trusting);
