@@ -6,9 +6,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <exception>
+#include <mutex>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <thread>
 #include <utility>
 
 #include "mapping/depth/robust_maximum.h"
@@ -18,6 +21,7 @@
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/mrpt_time.h"
 #include "plugin/session/no_keyframe.h"
 #include "plugin/session/session_warnings.h"
 #include "plugin/session/time_text.h"
@@ -41,7 +45,11 @@ class Player {
     builder_.setMinLoggingLevel(
         mrpt::system::LVL_ERROR);  // sessionWarnings summarises its warnings
     if (job.processor_clock) builder_.setProcessorClock(job.processor_clock);
-    builder_.setKeyframeCallback([this](const KeyframeDepthMap& keyframe) { deliver(keyframe); });
+    builder_.setKeyframeCallback([this](const KeyframeDepthMap& keyframe) {
+      if (!job_.options.live.enabled) return deliver(keyframe);
+      const std::lock_guard<std::mutex> lock(made_mutex_);  // the mapping's own thread
+      made_.push_back(keyframe);
+    });
   }
 
   /// @return the error that stopped it before the recording's end, if there was one.
@@ -53,10 +61,12 @@ class Player {
         break;
       }
       more = attempt([this] { return playOne(); }, error);
+      deliverMade();
       if (delivery_error_) std::rethrow_exception(delivery_error_);
       if (progress_.due()) showProgress();
     }
     attempt([this] { return builder_.finish(), false; }, error);
+    deliverMade();
     if (delivery_error_) std::rethrow_exception(delivery_error_);
     return error;
   }
@@ -95,6 +105,7 @@ class Player {
     }
     if (!observation) return false;
     offerDsiSink(*observation);
+    if (job_.options.live.enabled) waitForTimeOf(*observation);
     try {
       builder_.processObservation(observation);
     } catch (const std::invalid_argument& error) {
@@ -102,6 +113,30 @@ class Player {
     }
     addObservation(*observation, statistics_);  // valid: the builder took it
     return true;
+  }
+
+  /// Live operation plays the recording at the speed of the sensor.
+  void waitForTimeOf(const mrpt::obs::CObservation& observation) {
+    using Clock = std::chrono::steady_clock;
+    const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
+    const std::int64_t t_ns = events && !events->events.empty()
+                                  ? events->events.back().t_ns
+                                  : nanosecondsFrom(observation.timestamp);
+    if (!first_ns_) {
+      first_ns_ = t_ns;
+      began_ = Clock::now();
+    }
+    std::this_thread::sleep_until(began_ + std::chrono::nanoseconds(t_ns - *first_ns_));
+  }
+
+  /// In live operation: the keyframes that the mapping's thread has made, in this thread.
+  void deliverMade() {
+    std::vector<KeyframeDepthMap> made;
+    {
+      const std::lock_guard<std::mutex> lock(made_mutex_);
+      made.swap(made_);
+    }
+    for (const KeyframeDepthMap& keyframe : made) deliver(keyframe);
   }
 
   /// The first packet of the reference camera tells the size of the DSI's planes.
@@ -208,6 +243,10 @@ class Player {
   DepthStatistics depths_;
   std::exception_ptr delivery_error_;  // of `on_keyframe`
   bool sink_offered_ = false;
+  std::mutex made_mutex_;                 // of made_
+  std::vector<KeyframeDepthMap> made_;    // in live operation, not delivered
+  std::optional<std::int64_t> first_ns_;  // in live operation, of the first observation
+  std::chrono::steady_clock::time_point began_;
   std::optional<double> stopped_at_;
   double watched_s_ = 0;  // in the watchers
   StageSeconds told_;     // until the last keyframe
@@ -250,6 +289,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   outcome.report.counts = status.counts;
   outcome.recalibrated_cameras = status.recalibrated_cameras;
   outcome.report.silent_keyframes = status.silent_keyframes;
+  outcome.report.live = status.live;
   outcome.report.options = job.options;
   outcome.report.chosen = job.chosen;
   describeView(status.rig, job.options.mapper, outcome.report);
@@ -299,6 +339,7 @@ std::optional<double> sequenceMaximum(MappingJob job, Recording& recording) {
   RobustMaximum maximum;
   job.activity = "first pass";
   if (job.verbosity == Verbosity::kVerbose) job.verbosity = Verbosity::kNormal;
+  job.options.live.enabled = false;
   job.make_dsi_sink = nullptr;
   job.watchers.clear();
   job.on_keyframe = [&](const KeyframeDepthMap& keyframe) { maximum.add(keyframe.max_confidence); };

@@ -112,7 +112,9 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::vector<StampedPose> trackerTrajectory() const;
 
   /// Reads the sections "[<prefix>_dsi]", "[<prefix>_map]" ..., or "[dsi]", "[map]" ... for an
-  /// empty prefix, and starts over: see plugin/mrpt/host_options.h. Missing keys keep their values.
+  /// empty prefix, and starts over: see plugin/mrpt/host_options.h. Where there are sections
+  /// "[event_fusion_dsi]" ..., an empty prefix means them, and "[map]" is the host's own. Missing
+  /// keys keep their values.
   /// @throws std::invalid_argument naming the file, section, key and value; std::runtime_error if
   /// the file is missing. Nothing changes then.
   void loadFromConfigFile(const mrpt::config::CConfigFileBase& source,

@@ -79,6 +79,12 @@ void readHostOptions(const mrpt::config::CConfigFileBase& source, const std::str
     }
     return;
   }
+  // A host may have a [map] or [output] of its own: where ours have a prefix, only they count.
+  const std::string prefixed = "event_fusion";
+  if (!sectionsBelow(source, prefixed).empty()) {
+    readHostOptions(source, prefixed, reader);
+    return;
+  }
   std::vector<std::string> sections;
   source.getAllSections(sections);
   for (const std::string& section : sections) {

@@ -13,8 +13,10 @@ namespace efm {
 ///
 /// With the prefix "mapper" our sections are [mapper_dsi], [mapper_map] and so on; any other
 /// section that begins with "mapper_" is an error. With an empty prefix they are [dsi], [map], ...,
-/// and all other sections belong to the host. Our sections are checked as in our own files, but
-/// MRPT hides a key that is given twice.
+/// and all other sections belong to the host. A host with a [map] of its own calls ours
+/// [event_fusion_dsi], [event_fusion_map], ...: where there is such a section, an empty prefix
+/// means "event_fusion". Our sections are checked as in our own files, but MRPT hides a key that is
+/// given twice.
 /// @throws std::invalid_argument naming the file (if there is one), the section, the key and the
 /// value, or the prefix if no section has it; std::runtime_error if the source's file is missing,
 /// which MRPT treats as an empty file.

@@ -290,8 +290,11 @@ SessionStatus LiveMapping::status() const {
   std::map<int, QueueCounts> cameras = queue_.counts();
   const std::lock_guard<std::mutex> lock(mutex_);
   SessionStatus status = status_;
+  const LiveStatus of_session = *status.live;
   status.live = live_;
   status.live->cameras = std::move(cameras);
+  status.live->pose_jumps = of_session.pose_jumps;
+  status.live->clock_steps = of_session.clock_steps;
   return status;
 }
 

@@ -96,6 +96,27 @@ Json asJson(const RefinementState& refinement) {
             {"drift_deg_per_m", tracker.drift_rad / kRadiansPerDegree}}}};
 }
 
+Json asJson(const LiveStatus& live, const MapperCounts& counts) {
+  Json cameras = Json::array();
+  for (const auto& [index, camera] : live.cameras) {
+    cameras.push_back({{"camera", index},
+                       {"received", camera.received},
+                       {"thinned", camera.thinned},
+                       {"dropped", camera.dropped},
+                       {"refused", camera.refused},
+                       {"paused", camera.paused},
+                       {"taken", camera.taken}});
+  }
+  return {{"drop_ratio", live.dropRatio()},
+          {"cameras", cameras},
+          {"windows_given_up", counts.windows_given_up},
+          {"pose_jumps", live.pose_jumps},
+          {"clock_steps", live.clock_steps},
+          {"refused_poses", live.refused_poses},
+          {"errors", live.errors},
+          {"last_error", live.last_error}};
+}
+
 Json asJson(const ReferenceView& view) {
   return {{"width", view.width}, {"height", view.height}, {"fx", view.fx},
           {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
@@ -166,6 +187,7 @@ std::string reportJson(const MapReport& report) {
   if (report.view) json["reference_view"] = asJson(*report.view);
   if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
   if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
+  if (report.live) json["live"] = asJson(*report.live, counts);
   json["warnings"] = asJson(report.warnings);
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.pose_shift) json["refinement"]["moved"] = asJson(*report.pose_shift);

@@ -12,6 +12,7 @@
 #include "plugin/output/map_measures.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/map_refinement.h"
+#include "plugin/session/session_status.h"
 #include "plugin/session/stage_timer.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
@@ -21,6 +22,7 @@ namespace efm {
 struct MapReport {
   MapperCounts counts;
   std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: keyframes without its events.
+  std::optional<LiveStatus> live;               ///< Of live operation.
   std::uint64_t points = 0;                     ///< Of the exported map.
   std::optional<MapExtent> extent;              ///< Of these points.
   double recording_s = 0;                       ///< From the first event that was read to the last.
@@ -54,7 +56,9 @@ struct MapReport {
 /// last_error, the learnt errors of the tracker, and under `moved` how far it moved poses), kernel,
 /// threads, peak_memory_bytes (of this process), reference_view and baseline_m where known,
 /// stopped_at where the run was interrupted (the fraction of the recording that was mapped),
-/// warnings (each with name and text), perturbation (the faults of the poses, if any), chosen (the
+/// live in live operation (drop_ratio, per camera what became of its events before the mapping,
+/// windows_given_up, pose_jumps, clock_steps, refused_poses, errors and last_error), warnings (each
+/// with name and text), perturbation (the faults of the poses, if any), chosen (the
 /// automatic options: key, value and reason), options (all of them, with these values) and version.
 std::string reportJson(const MapReport& report);
 

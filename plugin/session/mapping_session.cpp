@@ -45,6 +45,7 @@ MappingSession::MappingSession(const EventFusionOptions& options)
       pose_source_(options.rig.pose_source),
       mapper_(mapperOptions(options)),
       cloud_(options.cloud, options.refinement.enabled) {
+  if (options.live.enabled) status_.live.emplace();
   if (options.refinement.enabled) {
     refinement_ = std::make_unique<MapRefinement>(options.refinement);
   }
@@ -95,7 +96,7 @@ void MappingSession::restartAfterStep(int camera, std::int64_t t_ns) {
   mapper_ = FusionMapper(mapperOptions(options_));
   for (const RigCamera& rig_camera : rig.cameras) mapper_.addCamera(rig_camera);
   if (depth_follower_) mapper_.setPlanes(depth_follower_->planes());
-  ++status_.clock_steps;
+  ++status_.live->clock_steps;
   status_.events.reset();
   newest_begin_ns_.reset();
   newest_pose_.reset();
@@ -193,7 +194,7 @@ bool MappingSession::isJump(const StampedPose& pose, const PoseNoise& noise) con
 bool MappingSession::beginStretch() {
   if (next_stretch_.empty()) return false;
   if (!finished_ && mapper_.eventsCompleteNs() < newest_pose_->t_ns) return false;
-  ++status_.pose_jumps;
+  ++status_.live->pose_jumps;
   mapper_.giveUpBefore(next_stretch_.front().t_ns);
   newest_pose_.reset();
   usePoses(std::exchange(next_stretch_, {}), std::nullopt);

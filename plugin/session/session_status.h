@@ -37,6 +37,8 @@ struct QueueCounts {
 
 struct LiveStatus {
   std::map<int, QueueCounts> cameras;
+  std::uint64_t pose_jumps = 0;     ///< New stretches of poses.
+  std::uint64_t clock_steps = 0;    ///< The clock went back, and the mapping started anew.
   std::uint64_t refused_poses = 0;  ///< More than a second older than the newest.
   std::uint64_t errors = 0;         ///< Of the mapping, the refinement and callbacks.
   std::string last_error;           ///< Of these and of refused observations; empty: none.
@@ -54,8 +56,6 @@ struct SessionStatus {
   std::map<int, std::uint64_t> refused_events;
   /// Playback: events that came while map updating was disabled, by camera.
   std::map<int, std::uint64_t> paused_events;
-  std::uint64_t pose_jumps = 0;   ///< Live operation: new stretches of poses.
-  std::uint64_t clock_steps = 0;  ///< Live operation: the clock went back, and the mapping with it.
   std::optional<TimeSpan> events;
   std::optional<TimeSpan> poses;
   std::optional<PoseSourceId> pose_source;            ///< The source whose poses are used.
@@ -65,7 +65,7 @@ struct SessionStatus {
   std::size_t recalibrated_cameras = 0;       ///< Cameras whose recorded calibration differs.
   std::vector<ChosenOption> chosen;           ///< Automatic options.
   std::optional<RefinementState> refinement;  ///< Where poses are refined.
-  std::optional<LiveStatus> live;             ///< In live operation.
+  std::optional<LiveStatus> live{};           ///< In live operation.
 };
 
 }  // namespace efm

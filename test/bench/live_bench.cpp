@@ -208,7 +208,7 @@ void printCounts(const SessionStatus& status) {
         queue.received == before + queue.taken ? "agree" : "DIFFER");
   }
   fmt::print("{} keyframes, {} windows given up, {} jumps, {} errors {}\n", status.counts.keyframes,
-             status.counts.windows_given_up, status.pose_jumps, status.live->errors,
+             status.counts.windows_given_up, status.live->pose_jumps, status.live->errors,
              status.live->last_error);
 }
 

@@ -52,6 +52,14 @@ TEST(HostOptions, SectionsHaveThePrefixAndOtherSectionsAreIgnored) {
   EXPECT_EQ(options.cloud.voxel_size_m, 0.5);
 }
 
+TEST(HostOptions, AHostWithAMapOfItsOwnNeedsNoPrefix) {
+  const EventFusionOptions options = optionsOf(
+      "[map]\nfile = not_ours\n[output]\nlog = x\n[event_fusion_map]\nvoxel_size_m = 0.5\n", "");
+  EXPECT_EQ(options.cloud.voxel_size_m, 0.5);
+  EXPECT_THAT(errorOf("[map]\nfile = x\n[event_fusion_map]\nvoxel = 1\n", ""),
+              HasSubstr("section event_fusion_map: voxel"));
+}
+
 TEST(HostOptions, TheRefinementHasThePrefixToo) {
   const EventFusionOptions options =
       optionsOf("[front_refinement]\nenabled = true\ntracker_noise_deg = 90\n", "front");
@@ -72,8 +80,9 @@ TEST(HostOptions, WithoutPrefixTheSectionsHaveTheirOwnNames) {
 TEST(HostOptions, WrongSectionsKeysAndValuesAreErrorsThatNameThem) {
   EXPECT_EQ(errorOf("[a_dsi]\nnum_planes = ten\n", "a"),
             "options, section a_dsi: num_planes = ten: must be a whole number, or auto");
-  EXPECT_THAT(errorOf("[a_dsi]\nplanes = 10\n", "a"),
-              HasSubstr("options, section a_dsi: planes: unknown key: expected one of min_depth_m"));
+  EXPECT_THAT(
+      errorOf("[a_dsi]\nplanes = 10\n", "a"),
+      HasSubstr("options, section a_dsi: planes: unknown key: expected one of min_depth_m"));
   EXPECT_THAT(errorOf("[a_dsi]\nnum_planes = -3\n", "a"),
               HasSubstr("options, section a_dsi: num_planes = -3: must be"));
   EXPECT_THAT(errorOf("[a_dsi]\nnum_planes = 10\n[a_bsi]\nx = 1\n", "a"),
@@ -91,7 +100,8 @@ TEST_F(HostOptionsFile, ErrorsNameTheFile) {
     builder.loadFromConfigFileName(file, "a");
     FAIL() << "no error";
   } catch (const std::invalid_argument& error) {
-    EXPECT_EQ(error.what(), file + ", section a_dsi: num_planes = ten: must be a whole number, or auto");
+    EXPECT_EQ(error.what(),
+              file + ", section a_dsi: num_planes = ten: must be a whole number, or auto");
   }
 }
 

@@ -216,7 +216,7 @@ TEST(LiveBuilder, EventsWaitForPosesOnlySoLong) {
   expectSumsAgree(status);
   EXPECT_GT(status.counts.total().without_pose, status.counts.total().read / 4);
   EXPECT_GT(*keyframeTimes(builder).rbegin(), recording.poses.back().t_ns - 300'000'000);
-  EXPECT_EQ(status.pose_jumps, 0U) << "the rig went on at its speed";
+  EXPECT_EQ(status.live->pose_jumps, 0U) << "the rig went on at its speed";
 }
 
 TEST(LiveBuilder, AJumpOfTheTrackerBeginsANewStretch) {
@@ -233,7 +233,7 @@ TEST(LiveBuilder, AJumpOfTheTrackerBeginsANewStretch) {
   playPatiently(builder, observations);
 
   const SessionStatus status = builder.status();
-  EXPECT_EQ(status.pose_jumps, 1U);
+  EXPECT_EQ(status.live->pose_jumps, 1U);
   expectSumsAgree(status);
   CEventFusionMapBuilder playback(syntheticOptions());
   play(playback, observationsOf(recording));
@@ -250,7 +250,7 @@ TEST(LiveBuilder, AJumpOfTheTrackerBeginsANewStretch) {
   };
   CEventFusionMapBuilder doubtful(liveOptions());
   playPatiently(doubtful, changed(observations, doubt));
-  EXPECT_EQ(doubtful.status().pose_jumps, 0U);
+  EXPECT_EQ(doubtful.status().live->pose_jumps, 0U);
 }
 
 TEST(LiveBuilder, AClockThatGoesBackStartsTheMappingAnew) {
@@ -262,7 +262,7 @@ TEST(LiveBuilder, AClockThatGoesBackStartsTheMappingAnew) {
   playPatiently(builder, observations);  // the same times again
 
   const SessionStatus status = builder.status();
-  EXPECT_EQ(status.clock_steps, 1U);
+  EXPECT_EQ(status.live->clock_steps, 1U);
   EXPECT_GT(status.refused_events.at(0), 0U);
   expectSumsAgree(status);
   // All of the first time (windows of 0.2 s, every 0.1 s), and of the second from 1 s on.
