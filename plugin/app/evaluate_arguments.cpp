@@ -94,6 +94,9 @@ void addEvaluateMap(CLI::App& evaluate, Run& run) {
                   "The true points for completeness, if not all of GT: gt_edges.ply of a simulated "
                   "dataset has the surfaces that fired events")
       ->type_name("FILE");
+  command.add_flag("--align", arguments->options.align,
+                   "Align the map with the truth first (ICP: rotation and translation, no scale), "
+                   "for a truth in another frame, near the map's");
   addList(command, "--distances", arguments->options.distances_m,
           "Distances in metres for completeness and outliers")
       ->capture_default_str();

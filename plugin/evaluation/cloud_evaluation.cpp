@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
 #include "maps/io/point_cloud_file.h"
 #include "plugin/evaluation/file_in_folder.h"
 #include "plugin/evaluation/text_table.h"
@@ -39,15 +40,57 @@ Json distanceJson(const SampleStatistics& statistics, double p90_m) {
           {"max_m", statistics.max},       {"p90_m", p90_m}};
 }
 
+/// Moves the map into the truth's frame.
+CloudAlignment align(std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
+                     const std::filesystem::path& map_file) {
+  try {
+    const CloudAlignment alignment = alignCloud(map, truth);
+    for (CloudPoint& point : map) point.p_world = alignment.T_truth_map * point.p_world;
+    return alignment;
+  } catch (const std::exception& error) {
+    throw std::runtime_error(map_file.string() + ": --align: " + error.what());
+  }
+}
+
+double degreesOf(const Rigid3& transform) {
+  return 180 / kPi * Eigen::AngleAxisd(transform.rotation).angle();
+}
+
+Json alignmentJson(const CloudAlignment& alignment) {
+  const Eigen::Vector3d& p = alignment.T_truth_map.translation;
+  const Eigen::Matrix3d rotation = alignment.T_truth_map.rotation.toRotationMatrix();
+  Json matrix = Json::array();
+  for (int row = 0; row < 3; ++row) {
+    matrix.push_back({rotation(row, 0), rotation(row, 1), rotation(row, 2), p[row]});
+  }
+  matrix.push_back({0, 0, 0, 1});
+  return {{"translation_m", {p.x(), p.y(), p.z()}},
+          {"rotation_deg", degreesOf(alignment.T_truth_map)},
+          {"T_truth_map", matrix},
+          {"points", alignment.points},
+          {"points_used", alignment.points_used}};
+}
+
+std::string alignmentText(const CloudAlignment& alignment) {
+  const Eigen::Vector3d& p = alignment.T_truth_map.translation;
+  return fmt::format(
+      "aligned with the truth: moved by ({:.4f}, {:.4f}, {:.4f}) m\n"
+      "  and turned by {:.4f} deg about the origin, from {} of {} points compared\n\n",
+      p.x(), p.y(), p.z(), degreesOf(alignment.T_truth_map), alignment.points_used,
+      alignment.points);
+}
+
 }  // namespace
 
 CloudEvaluation evaluateCloud(const std::filesystem::path& estimated,
                               const std::filesystem::path& truth,
                               const CloudEvaluationOptions& options) {
-  const auto map = readPoints(fileInFolder(estimated, {"map.pcd", "points.pcd"}));
+  const std::filesystem::path map_file = fileInFolder(estimated, {"map.pcd", "points.pcd"});
+  auto map = readPoints(map_file);
   const auto surfaces = readPoints(fileInFolder(truth, {"gt_cloud.ply"}));
   CloudEvaluation evaluation;
   evaluation.non_finite = map.non_finite + surfaces.non_finite;
+  if (options.align) evaluation.alignment = align(map.points, surfaces.points, map_file);
   if (options.to_find.empty()) {
     evaluation.errors = cloudErrors(map.points, surfaces.points, options.distances_m);
   } else {
@@ -73,7 +116,8 @@ std::string evaluationTable(const CloudEvaluation& evaluation) {
                fixedText(100 * step.outliers, 2), fixedText(100 * step.completeness, 2),
                fixedText(100 * step.f1, 2)});
   }
-  std::string text = distances.text() + "\n" + steps.text();
+  std::string text = evaluation.alignment ? alignmentText(*evaluation.alignment) : "";
+  text += distances.text() + "\n" + steps.text();
   if (evaluation.non_finite > 0) {
     text += fmt::format("{} points are not finite and were left out\n", evaluation.non_finite);
   }
@@ -95,6 +139,7 @@ std::string evaluationJson(const CloudEvaluation& evaluation) {
                              {"f1", step.f1}});
   }
   json["non_finite"] = evaluation.non_finite;
+  if (evaluation.alignment) json["alignment"] = alignmentJson(*evaluation.alignment);
   return json.dump(2) + "\n";
 }
 
@@ -107,7 +152,11 @@ std::string cloudEvaluationKeys() {
          "            points within this distance of the truth), outliers (the rest),\n"
          "            completeness (fraction of the true points within this distance of the\n"
          "            map), f1 (harmonic mean of within and completeness)\n"
-         "  non_finite   points of the files that are not finite; they are left out\n";
+         "  non_finite   points of the files that are not finite; they are left out\n"
+         "  alignment    with --align: translation_m, rotation_deg (the angle), T_truth_map (the\n"
+         "            4x4 matrix, rows; turns about the origin, then moves), points (of the map,\n"
+         "            that were compared with the truth), points_used (of these, in the last\n"
+         "            round)\n";
 }
 
 }  // namespace efm

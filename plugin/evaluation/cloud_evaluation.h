@@ -3,10 +3,12 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "maps/metrics/cloud_metrics.h"
+#include "plugin/evaluation/cloud_alignment.h"
 
 namespace efm {
 
@@ -14,16 +16,18 @@ struct CloudEvaluationOptions {
   std::vector<double> distances_m = defaultCloudDistances();  ///< Each above 0.
   /// The true points for completeness, for example a dataset's gt_edges.ply. Empty: all points.
   std::filesystem::path to_find;
+  bool align = false;  ///< Aligns the map with the truth before errors are taken (`alignCloud`).
 };
 
 struct CloudEvaluation {
   CloudErrors errors;
   std::uint64_t non_finite = 0;  ///< Points of the files that are not finite. They are left out.
+  std::optional<CloudAlignment> alignment;
 };
 
 /// Compares a map with the truth: PCD or PLY files, or a run's folder (its map.pcd or points.pcd)
 /// and a dataset's (its gt_cloud.ply).
-/// @throws std::runtime_error naming a file that cannot be read or has no point;
+/// @throws std::runtime_error naming a file that cannot be read, has no point or cannot be aligned;
 /// std::invalid_argument if a distance is not above 0.
 CloudEvaluation evaluateCloud(const std::filesystem::path& estimated,
                               const std::filesystem::path& truth,

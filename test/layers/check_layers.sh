@@ -39,6 +39,7 @@ forbid maps "$pcl|liblzf" "PCL stays in point_search, liblzf in pcd_file" '^maps
 forbid tracking_stub "(maps|plugin|test)/" "may include mapping/ and tracking_stub/"
 forbid tracking_stub "$mrpt|$pcl|$ceres|$recordings|$front" "may use what mapping/ uses"
 forbid plugin "(test|plugin/app)/" "never includes the application or the tests" '^plugin/app/'
+forbid plugin "$pcl" "PCL stays in cloud_alignment" '^plugin/evaluation/cloud_alignment\.cpp:'
 forbid plugin "$ceres" "refinement is reached through maps/"
 forbid plugin "$recordings" "HDF5 stays in plugin/hdf5/ and plugin/writers/" '^plugin/(hdf5|writers)/'
 

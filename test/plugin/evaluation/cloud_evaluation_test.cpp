@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -96,6 +97,42 @@ TEST_F(EvaluateCloud, PointsThatAreNotFiniteAreCounted) {
   EXPECT_EQ(evaluation.non_finite, 1U);
   EXPECT_EQ(evaluation.errors.accuracy.count, 1U);
   EXPECT_THAT(evaluationTable(evaluation), HasSubstr("1 points are not finite"));
+}
+
+TEST_F(EvaluateCloud, AlignsAMapWithTheTruthOnlyWhereAsked) {
+  // A corner of three squares of 1 m, every 5 cm; the map lies 0.125 m farther along each axis.
+  std::vector<CloudPoint> map;
+  std::vector<Eigen::Vector3f> truth;
+  for (int i = 0; i < 3 * 20 * 20; ++i) {
+    Eigen::Vector3f p(0.05F * static_cast<float>(i % 20), 0.05F * static_cast<float>(i / 20 % 20),
+                      0);
+    std::rotate(p.data(), p.data() + i / 400, p.data() + 3);
+    truth.push_back(p);
+    map.push_back({p.cast<double>() + Eigen::Vector3d::Constant(0.125), 1, 1});
+  }
+  writePcd(folder() / "map.pcd", map);
+  writePly(folder() / "truth.ply", truth);
+  const auto as_it_is = evaluateCloud(folder() / "map.pcd", folder() / "truth.ply", {{0.05}, {}});
+  EXPECT_GT(as_it_is.errors.accuracy.mean, 0.1);
+  EXPECT_FALSE(nlohmann::json::parse(evaluationJson(as_it_is)).contains("alignment"));
+
+  const auto aligned =
+      evaluateCloud(folder() / "map.pcd", folder() / "truth.ply", {{0.05}, {}, true});
+  // Without noise, only the last step (0.01 mm) and the rounding of floats are left.
+  EXPECT_LT(aligned.errors.accuracy.max, 1e-4);
+  EXPECT_EQ(aligned.errors.steps.at(0).completeness, 1) << "of the truth to the moved map";
+  EXPECT_THAT(evaluationTable(aligned), AllOf(HasSubstr("moved by (-0.125"), HasSubstr("turned by"),
+                                              HasSubstr("of 1200 points compared")));
+  const auto json = nlohmann::json::parse(evaluationJson(aligned))["alignment"];
+  EXPECT_NEAR(json["T_truth_map"][2][3], -0.125, 1e-4);
+  EXPECT_NEAR(json["T_truth_map"][0][0], 1, 1e-6);
+  EXPECT_EQ(json["points"], 1200);
+  for (const auto& [key, value] : json.items()) {
+    EXPECT_THAT(cloudEvaluationKeys(), HasSubstr(key));
+  }
+  cloud("line.pcd", std::vector<double>(60, 1.0));
+  EXPECT_THROW(evaluateCloud(folder() / "map.pcd", folder() / "line.pcd", {{0.05}, {}, true}),
+               std::runtime_error);
 }
 
 TEST_F(EvaluateCloud, AWrongInputIsAnErrorThatNamesIt) {
