@@ -15,6 +15,9 @@ std::string_view nameOf(PlaneSpacing spacing);
 /// @throws std::invalid_argument naming the value and the known names.
 PlaneSpacing planeSpacingFromName(std::string_view name);
 
+/// The nearest plane is at least this far, metres.
+inline constexpr double kMinDepthM = 1e-3;
+
 struct DepthPlanesOptions {
   double min_depth_m = 0.5;  ///< Depth of the nearest plane, above 0.
   double max_depth_m = 5.0;  ///< Depth of the farthest plane, above `min_depth_m`.

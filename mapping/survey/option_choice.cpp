@@ -155,7 +155,8 @@ void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choic
     max_m = std::max(accurate_m, most_m);
     reason += ", and the parallax is too small for larger depths";
   }
-  choice.depths(roundedDown(1 / limits.near, 2), roundedUp(max_m, 2), reason);
+  const double min_m = std::max(roundedDown(1 / limits.near, 2), kMinDepthM);
+  choice.depths(min_m, std::max(roundedUp(max_m, 2), 2 * min_m), reason);
 }
 
 /// A hundred planes, and more where they would be more than a pixel of parallax apart.

@@ -110,11 +110,13 @@ std::optional<KeyframeDepthMap> CoarseSweep::map(const WindowData& data) {
   const double distance_m = std::max(motion->rig_baseline_m, motion->shift_m);
   const double near_m = distance_m * mapper_.view().fx / mapper_.view().width / kNearestMove;
   DepthPlanesOptions planes;
-  planes.min_depth_m = near_m;
-  planes.max_depth_m = std::max(2 * near_m, motion->parallax_px_m / kFarthestParallaxPx);
+  planes.min_depth_m = std::max(near_m, kMinDepthM);
+  planes.max_depth_m =
+      std::max(2 * planes.min_depth_m, motion->parallax_px_m / kFarthestParallaxPx);
   planes.num_planes =
       1 + std::min(kMaxCoarsePlanes,
-                   static_cast<int>(std::ceil(motion->parallax_px_m / near_m / plane_step_px_)));
+                   static_cast<int>(
+                       std::ceil(motion->parallax_px_m / planes.min_depth_m / plane_step_px_)));
   mapper_.setPlanes(planes);
   return mapper_.map(data.window, data.events, *data.trajectory);
 }

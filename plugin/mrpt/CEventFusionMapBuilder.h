@@ -51,10 +51,14 @@ namespace efm {
 /// every window whose events are complete. Only `finish` maps a window that ends in the last 10 ms
 /// of the recording: the last packets do not say until when their cameras are covered.
 ///
-/// Thread-safe. One mutex is held while a keyframe is made. It is not held while a keyframe is
-/// delivered or a message is logged: callbacks of both may use the builder. `processObservation`
-/// returns after the windows that became complete are mapped. Several threads may feed the builder:
-/// overlapping calls have no order, but observations in the order of time make the same map.
+/// In live operation (`[live] enabled`) all of this happens in a thread of the builder's own, and
+/// no call but `finish` waits for it: see LiveMapping and plugin/README.md.
+///
+/// Thread-safe. In playback one mutex is held while a keyframe is made. It is not held while a
+/// keyframe is delivered or a message is logged: callbacks of both may use the builder.
+/// `processObservation` returns after the windows that became complete are mapped. Several threads
+/// may feed the builder: overlapping calls have no order, but observations in the order of time
+/// make the same map.
 class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
                                public mrpt::config::CLoadableOptions,
                                public mrpt::rtti::CObject {
@@ -131,8 +135,9 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void initialize(const mrpt::maps::CSimpleMap& initial_map = mrpt::maps::CSimpleMap(),
                   const mrpt::poses::CPosePDF* x0 = nullptr) override;
   /// The newest pose of the rig; before the first pose, the identity. Without refinement it is the
-  /// tracker's pose, without covariance. With refinement it is corrected by the latest refinement,
-  /// which gives its covariance (relative to the oldest fixed keyframes of the last window).
+  /// tracker's pose with the covariance that the tracker states. With refinement it is corrected by
+  /// the latest refinement, which gives its covariance (relative to the oldest fixed keyframes of
+  /// the last window).
   mrpt::poses::CPose3DPDF::Ptr getCurrentPoseEstimation() const override;
   /// Feeds the pose after the action's movement (see DeadReckoning), then each observation of the
   /// frame.

@@ -153,6 +153,7 @@ bool LiveMapping::mapNext() {
   }
   publishMap(false);
   publishState();
+  warnOfRefinement();
   try {
     if (callbacks_.on_keyframe) callbacks_.on_keyframe(*keyframe);
   } catch (const std::exception&) {
@@ -247,6 +248,13 @@ void LiveMapping::noteError(const std::string& doing, bool counts) {
     }
   }
   if (is_new && callbacks_.warn) callbacks_.warn(doing.empty() ? text : doing + ": " + text);
+}
+
+void LiveMapping::warnOfRefinement() {
+  const std::optional<RefinementState> refinement = session_->status().refinement;
+  if (!refinement || refinement->failures <= warned_failures_) return;
+  warned_failures_ = refinement->failures;
+  if (callbacks_.warn) callbacks_.warn("refinement: " + refinement->last_error);
 }
 
 /// At most once a second.

@@ -98,6 +98,7 @@ class LiveMapping {
   void publishState();
   void publishMap(bool at_once);
   void noteError(const std::string& doing, bool counts);
+  void warnOfRefinement();
   void warnOfLosses();
 
   const LiveOptions options_;
@@ -115,6 +116,7 @@ class LiveMapping {
   std::chrono::steady_clock::time_point warned_;
   std::uint64_t warned_losses_ = 0;
   std::size_t warned_given_up_ = 0;
+  std::uint64_t warned_failures_ = 0;
 
   mutable std::mutex mutex_;  // of the members below; held for copies alone
   std::condition_variable finished_changed_;

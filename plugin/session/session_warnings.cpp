@@ -87,6 +87,21 @@ void addUnusedPoses(const SessionStatus& status, WarningList& warnings) {
   }
 }
 
+void addLosses(const SessionStatus& status, WarningList& warnings) {
+  if (!status.live) return;
+  const std::uint64_t given_up = status.counts.windows_given_up;
+  if (status.live->dropRatio() > 0 || given_up > 0) {
+    warnings.add("events-lost",
+                 "{:.1f} % of the events were thinned or dropped, and {} windows given up: the "
+                 "machine is too slow for more ([live] max_event_rate, max_queue_events)",
+                 100 * status.live->dropRatio(), given_up);
+  }
+  if (status.live->errors > 0) {
+    warnings.add("mapping-errors", "{} errors while mapping, the last one: {}", status.live->errors,
+                 status.live->last_error);
+  }
+}
+
 void addKeyframes(const SessionStatus& status, WarningList& warnings) {
   const MapperCounts& counts = status.counts;
   if (status.refinement && status.refinement->counts.registered + 1 < counts.keyframes) {
@@ -128,6 +143,7 @@ std::vector<Warning> sessionWarnings(const SessionStatus& status,
   addSilence(status, options.keyframe.exclude_silent, warnings);
   addUnusedPoses(status, warnings);
   addKeyframes(status, warnings);
+  addLosses(status, warnings);
   return warnings.take();
 }
 
