@@ -31,6 +31,14 @@ struct EventImage {
 /// @param camera with events inside the sensor alone: `KeyframeMapper` refuses others.
 EventImage eventImageOf(const CameraEvents& camera);
 
+/// The reference camera's events as an image that fits on the depth map: undistorted, those nearest
+/// to the reference time. One event per 8 pixels of the sensor draws sharp edges; all events of a
+/// window would blur them by the window's motion. Events outside the view are left out.
+/// @param camera the reference camera of `view`.
+/// @return per pixel of the view: negative, positive events.
+cv::Mat_<cv::Vec2i> viewEventsOf(const CameraEvents& camera, const ReferenceView& view,
+                                 std::int64_t t_ref_ns);
+
 /// The depth map of one window of events.
 struct KeyframeDepthMap {
   Window window;
@@ -53,6 +61,8 @@ struct KeyframeDepthMap {
 
   std::vector<CameraDepthMap> camera_maps;  ///< Of the fused cameras, if the options ask for them.
   std::vector<EventImage> event_images;     ///< Of the selected cameras, if asked for.
+  /// `viewEventsOf` the reference camera. Empty unless asked for, and where it is not selected.
+  cv::Mat_<cv::Vec2i> view_events;
 };
 
 }  // namespace efm

@@ -129,6 +129,12 @@ std::optional<KeyframeDepthMap> KeyframeMapper::map(const Window& window,
   if (options_.event_images) {
     for (const CameraEvents& camera : all) keyframe.event_images.push_back(eventImageOf(camera));
   }
+  if (options_.view_events) {
+    for (const CameraEvents& camera : all) {
+      if (camera.camera != options_.reference_camera) continue;
+      keyframe.view_events = viewEventsOf(camera, view_, window.t_ref_ns);
+    }
+  }
   return keyframe;
 }
 

@@ -40,6 +40,7 @@ struct KeyframeMapperOptions {
   std::optional<double> sequence_maximum;
   bool camera_maps = false;   ///< Also a depth map of each camera alone, in the same view.
   bool event_images = false;  ///< Also each camera's events as an image.
+  bool view_events = false;   ///< Also the reference camera's events in the view.
 
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;

@@ -42,6 +42,7 @@ KeyframeMapperOptions coarse(const Rig& rig, const FusionMapperOptions& options,
   coarse.motion = {};
   coarse.camera_maps = false;
   coarse.event_images = false;
+  coarse.view_events = false;
   coarse.exclude_silent = true;
   return coarse;
 }

@@ -280,7 +280,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     std::atomic<int> written = 0;
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
       take(*output, keyframe);
-      if (kind == OutputKind::kMap) pictures->add(keyframe.map.depth);
+      if (kind == OutputKind::kMap) pictures->add(keyframe.map.depth, keyframe.view_events);
       ++written;
     });
     job.on_keyframe = [&, note = job.on_keyframe](const KeyframeDepthMap& keyframe) {
@@ -327,6 +327,7 @@ int runMap(const MapArguments& arguments) {
   job.verbosity = arguments.verbosity;
   job.options.mapper.limits = resolve(arguments.times, arguments.source);
   asUsage([&] { job.options.mapper.limits.validate(); });
+  job.options.mapper.keyframe.view_events = true;  // the page shows them
   const Interruption interruption;
   job.stop_requested = [&] { return interruption.requested(); };
   std::optional<MapFrames> frames;

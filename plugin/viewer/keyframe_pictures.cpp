@@ -24,18 +24,35 @@ cv::Mat1f reduced(const cv::Mat1f& depth_m, int factor) {
   return small;
 }
 
+/// Joins blocks of factor x factor pixels: the sum of their events.
+cv::Mat_<cv::Vec2i> reduced(const cv::Mat_<cv::Vec2i>& events, int factor) {
+  if (factor == 1) return events;
+  cv::Mat_<cv::Vec2i> small =
+      cv::Mat_<cv::Vec2i>::zeros(events.rows / factor, events.cols / factor);
+  for (int y = 0; y < small.rows * factor; ++y) {
+    for (int x = 0; x < small.cols * factor; ++x) small(y / factor, x / factor) += events(y, x);
+  }
+  return small;
+}
+
+std::vector<std::uint8_t> pngOf(const cv::Mat& image) {
+  std::vector<std::uint8_t> bytes;
+  if (!cv::imencode(".png", image, bytes)) {
+    throw std::runtime_error("no picture can be made of a keyframe");
+  }
+  return bytes;
+}
+
 }  // namespace
 
-void KeyframePictures::add(const cv::Mat1f& depth_m) {
+void KeyframePictures::add(const cv::Mat1f& depth_m, const cv::Mat_<cv::Vec2i>& events) {
   const std::size_t keyframe = keyframes_++;
   if (keyframe % stride_ != 0) return;
   const int factor = (depth_m.cols + kMaxWidth - 1) / kMaxWidth;
-  std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", depthPicture(reduced(depth_m, factor), limits_), bytes)) {
-    throw std::runtime_error("no picture can be made of a depth map");
-  }
-  bytes_ += bytes.size();
-  pictures_.emplace(keyframe, std::move(bytes));
+  KeyframePicture added = {pngOf(depthPicture(reduced(depth_m, factor), limits_)), {}};
+  if (!events.empty()) added.events = pngOf(eventPicture(reduced(events, factor)));
+  bytes_ += added.bytes();
+  pictures_.emplace(keyframe, std::move(added));
   while (bytes_ > max_bytes_ && pictures_.size() > 1) {
     stride_ *= 2;
     for (auto picture = pictures_.begin(); picture != pictures_.end();) {
@@ -43,7 +60,7 @@ void KeyframePictures::add(const cv::Mat1f& depth_m) {
         ++picture;
         continue;
       }
-      bytes_ -= picture->second.size();
+      bytes_ -= picture->second.bytes();
       picture = pictures_.erase(picture);
     }
   }

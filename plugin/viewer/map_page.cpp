@@ -48,8 +48,9 @@ Json asJson(const std::vector<StampedPose>& trajectory) {
 
 Json asJson(const KeyframePictures& pictures) {
   Json json = Json::object();
-  for (const auto& [keyframe, png] : pictures.pictures()) {
-    json[std::to_string(keyframe)] = base64(png);
+  for (const auto& [keyframe, picture] : pictures.pictures()) {
+    json[std::to_string(keyframe)] = {{"depth", base64(picture.depth)},
+                                      {"events", base64(picture.events)}};
   }
   return json;
 }

@@ -17,7 +17,7 @@ function bytesOf(text) {
 
 const map = JSON.parse(takeText("map-data"));
 const report = JSON.parse(takeText("report-data"));
-const pictures = JSON.parse(takeText("picture-data"));  // PNG by the number of a keyframe
+const pictures = JSON.parse(takeText("picture-data"));  // PNGs by the number of a keyframe
 const kPointBytes = 10;  // position 3 x 2, confidence, support, first keyframe 2
 let pointBytes = bytesOf(takeText("point-data"));
 

@@ -1,4 +1,4 @@
-// The keyframes: their path and frusta as lines, which one is selected, and its depth map.
+// The keyframes: their path and frusta as lines, which one is selected, its depth map and events.
 const steps = keyframes.slice(1).map((k, i) => norm(add(k.p, keyframes[i].p, -1)))
   .sort((a, b) => a - b);
 const step = steps.length > 0 ? percentile(steps, 0.5) : 0;
@@ -101,10 +101,14 @@ function countShown() {
 /// @param number of a keyframe, or -1 for none.
 function select(number) {
   shown.selected = number;
-  const picture = element("picture"), png = pictures[number];
-  picture.hidden = element("depth-legend").hidden = !png;
-  if (png) picture.src = `data:image/png;base64,${png}`;
-  else picture.removeAttribute("src");
+  const kept = pictures[number];
+  element("pictures").hidden = !kept;
+  element("events").hidden = !kept || !kept.events;
+  for (const [id, kind] of [["picture", "depth"], ["event-picture", "events"]]) {
+    const image = element(id);
+    if (kept && kept[kind]) image.src = `data:image/png;base64,${kept[kind]}`;
+    else image.removeAttribute("src");
+  }
   const note = element("picture-text");
   note.replaceChildren();
   if (number < 0) {
@@ -114,11 +118,12 @@ function select(number) {
     const at = add(keyframe.p, centre).map(value => value.toFixed(2)).join(", ");
     element("keyframe-text").textContent =
       `${number + 1} of ${keyframes.length}, t = ${keyframe.t} s, at (${at}) m`;
-    picture.alt = `Depth map of keyframe ${number + 1}`;
+    element("picture").alt = `Depth map of keyframe ${number + 1}`;
+    element("event-picture").alt = `Events of keyframe ${number + 1}`;
     const file = document.createElement("a");
     file.href = `keyframes/${keyframe.t}/depth.png`;
     file.textContent = `keyframes/${keyframe.t}/depth.png`;
-    note.append(png ? "Full size: " : "This page has no picture of it, to stay small. The file: ", file);
+    note.append(kept ? "Full size: " : "This page has no picture of it, to stay small. The file: ", file);
   }
   requestDraw();
 }
