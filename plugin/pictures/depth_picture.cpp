@@ -36,7 +36,8 @@ cv::Mat1b lightGrey(const cv::Mat1f& confidence) {
 
 }  // namespace
 
-cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits) {
+cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits,
+                       Palette palette) {
   const double far_inverse = 1 / limits.max_depth_m;
   const double range = 1 / limits.min_depth_m - far_inverse;
   cv::Mat1b nearness(depth_m.size(), 0);
@@ -47,8 +48,8 @@ cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limit
       nearness(y, x) = cv::saturate_cast<uchar>(255 * fraction);
     }
   }
-  cv::Mat3b picture;
-  cv::applyColorMap(nearness, picture, cv::COLORMAP_JET);
+  const bool from_far = palette == Palette::kBlueToRed;
+  cv::Mat3b picture = coloured(from_far ? nearness : cv::Mat1b(~nearness), palette);
   picture.setTo(cv::Scalar::all(255), ~(depth_m > 0));
   return picture;
 }

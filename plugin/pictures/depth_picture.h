@@ -5,14 +5,16 @@
 
 #include "mapping/depth/depth_map.h"
 #include "mapping/geometry/depth_planes.h"
+#include "plugin/pictures/palette.h"
 #include "plugin/pictures/plot_axis.h"
 
 namespace efm {
 
-/// Colours of a depth map, linear in inverse depth: red at the near limit, blue at the far limit,
-/// white without depth (0).
+/// Colours of a depth map, linear in inverse depth, white without depth (0).
+/// @param palette kBlueToRed: red at the near limit. Others begin at the near limit.
 /// @return 8-bit BGR, of the map's size.
-cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits);
+cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits,
+                       Palette palette = Palette::kBlueToRed);
 
 /// The axis of depths between two limits: linear in inverse depth.
 AxisRange depthAxis(const DepthPlanesOptions& limits);

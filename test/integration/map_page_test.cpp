@@ -92,7 +92,7 @@ TEST_F(MapPageInABrowser, OfTheDeskDrawsAndAnswers) {
   // A semi-dense map: lines on an empty ground. 1026 x 768 pixels.
   EXPECT_GT(light["drawn"], 5000);
   EXPECT_LT(light["drawn"], 400000);
-  EXPECT_EQ(light["picture_width"], 346);
+  EXPECT_EQ(light["picture_sizes"], json({{346, 260}, {346, 260}})) << "depth map and events";
   const json report = json::parse(contentOf(out + "/report.json"));
   EXPECT_THAT(
       light["text"].get<std::string>(),
@@ -126,9 +126,11 @@ TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
   }
   KeyframePictures pictures({});
   cv::Mat1f depth(480, 640);
+  cv::Mat_<cv::Vec2i> events(depth.size());
   for (int i = 0; i < 500; ++i) {
-    cv::randu(depth, -10, 10);  // noise: the largest picture there is
-    pictures.add(depth);
+    cv::randu(depth, -10, 10);  // noise: the largest pictures there are
+    cv::randu(events, 0, 3);
+    pictures.add(depth, events);
   }
   const ReferenceView view{640, 480, 300, 300, 320, 240};
   {

@@ -73,7 +73,7 @@ async function probe() {
   choose("slab", "");
   toggleLines();
 
-  // A click on a camera shows its depth map.
+  // A click on a camera shows its depth map and its events.
   look("top");
   if (map.view) {
     const line = frustumLines(0).map(p => onScreen(p, projection(canvas.clientWidth / canvas.clientHeight).matrix));
@@ -83,7 +83,8 @@ async function probe() {
   }
   await settled();
   measured.selected = shown.selected;
-  measured.picture_width = element("picture").naturalWidth;
+  measured.picture_sizes = ["picture", "event-picture"].map(id => element(id))
+    .map(image => image.checkVisibility() ? [image.naturalWidth, image.naturalHeight] : []);
 
   // No request leaves the page, not even one that it would try.
   measured.problems = problems.slice();

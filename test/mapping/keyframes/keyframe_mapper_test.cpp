@@ -176,6 +176,44 @@ TEST(KeyframeMapper, EventImagesHaveTheSizeOfTheSensorNotOfTheView) {
   EXPECT_EQ(keyframe.event_images.at(0).counts.size(), cv::Size(48, 36));
 }
 
+TEST(KeyframeMapper, ViewEventsAreTheReferenceCamerasNearestToTheReferenceTimeWithoutDistortion) {
+  Recording recording(5, 2, 3000);
+  KeyframeMapperOptions options = fewPlanes();
+  options.reference_camera = 1;
+  options.view.width = 60;
+  options.view.fov_deg = 40;  // narrower than the camera's
+  EXPECT_TRUE(map(recording, {0, 1}, options).view_events.empty());
+  options.view_events = true;
+  EXPECT_TRUE(map(recording, {0}, options).view_events.empty()) << "it is not selected";
+
+  std::vector<Event>& events = recording.events[1];
+  const UndistortionTable table(recording.rig.cameras[1].model);
+  const auto first_after = std::count_if(events.begin(), events.end(), [](const Event& event) {
+    return event.t_ns < Recording::kWindow.t_ref_ns;
+  });
+  const std::ptrdiff_t half = 48 * 36 / 8 / 2;  // one event per 8 pixels
+  const std::vector<Event> nearest(events.begin() + first_after - half,
+                                   events.begin() + first_after + half);
+  // All events of a window that has few.
+  const std::vector<Event> few(events.begin(), events.begin() + 100);
+  for (const std::vector<Event>* shown : {&nearest, &few}) {
+    if (shown == &few) events = few;
+    const KeyframeDepthMap keyframe = map(recording, {0, 1}, options);
+    cv::Mat_<cv::Vec2i> expected = cv::Mat_<cv::Vec2i>::zeros(keyframe.map.depth.size());
+    int outside = 0;
+    for (const Event& event : *shown) {
+      const Eigen::Vector2d p = keyframe.view.project(table.ray(event.x, event.y).homogeneous());
+      const cv::Point pixel(cvRound(p.x()), cvRound(p.y()));
+      const bool inside = pixel.inside({{}, expected.size()});
+      if (inside) ++expected(pixel)[event.polarity ? 1 : 0];
+      outside += inside ? 0 : 1;
+    }
+    EXPECT_TRUE(same(keyframe.view_events, expected));
+    EXPECT_GT(outside, 10);
+    EXPECT_LT(outside, static_cast<int>(shown->size()) - 10);
+  }
+}
+
 TEST(KeyframeMapper, AnExcludedSilentCameraChangesNothing) {
   Recording recording(6, 3, 4000);
   recording.events[1].clear();

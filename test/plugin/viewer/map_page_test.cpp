@@ -8,10 +8,12 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <set>
 #include <sstream>
 
+#include "plugin/pictures/depth_picture.h"
 #include "plugin/viewer/base64.h"
 
 namespace efm {
@@ -20,6 +22,7 @@ namespace {
 using nlohmann::json;
 using testing::Each;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 
 std::vector<CloudPoint> randomPoints(int count, const Eigen::Vector3d& origin_m) {
@@ -105,12 +108,13 @@ TEST(PagePoints, OneOrNoPointAndManyKeyframesFit) {
 
 TEST(KeyframePictures, KeepEverySecondOneWhereTheyAreTooLarge) {
   const cv::Mat1f depth(260, 720, 2.0F);
+  const cv::Mat_<cv::Vec2i> events(260, 720, cv::Vec2i(0, 1));
   KeyframePictures pictures({}, 3000);
-  for (int i = 0; i < 100; ++i) pictures.add(depth);
+  for (int i = 0; i < 100; ++i) pictures.add(depth, events);
   std::size_t bytes = 0;
   std::set<std::size_t> numbers;
-  for (const auto& [number, png] : pictures.pictures()) {
-    bytes += png.size();
+  for (const auto& [number, picture] : pictures.pictures()) {
+    bytes += picture.depth.size() + picture.events.size();
     numbers.insert(number);
   }
   EXPECT_LE(bytes, 3000U);
@@ -119,6 +123,33 @@ TEST(KeyframePictures, KeepEverySecondOneWhereTheyAreTooLarge) {
   EXPECT_GT(stride, 1U);
   for (std::size_t n = 0, i = 0; n < 100; n += stride, ++i) EXPECT_EQ(numbers.count(n), 1U) << n;
   EXPECT_EQ(numbers.size(), (99 / stride) + 1);
+}
+
+TEST(KeyframePictures, JoinBlocksOfPixelsToTheNearestDepthAndTheSumOfEvents) {
+  cv::Mat1f depth(2, 2 * KeyframePictures::kMaxWidth, 0.0F);
+  cv::Mat_<cv::Vec2i> events = cv::Mat_<cv::Vec2i>::zeros(depth.size());
+  depth(1, 10) = 4;
+  depth(0, 11) = 2;
+  events(0, 20) = {1, 0};
+  events(1, 21) = {0, 2};
+  const DepthPlanesOptions limits;
+  KeyframePictures pictures(limits);
+  pictures.add(depth, events);
+  pictures.add(depth, {});
+  const auto decoded = [](const std::vector<std::uint8_t>& png) {
+    return cv::Mat3b(cv::imdecode(png, cv::IMREAD_COLOR));
+  };
+  const cv::Vec3b white(255, 255, 255);
+  const cv::Mat3b depth_picture = decoded(pictures.pictures().at(0).depth);
+  const cv::Mat3b event_picture = decoded(pictures.pictures().at(0).events);
+  ASSERT_EQ(depth_picture.size(), cv::Size(KeyframePictures::kMaxWidth, 1));
+  ASSERT_EQ(event_picture.size(), depth_picture.size());
+  EXPECT_EQ(depth_picture(0, 5),
+            depthPicture((cv::Mat1f(1, 1) << 2), limits, Palette::kBrightToDark)(0, 0));
+  EXPECT_EQ(depth_picture(0, 10), white);
+  EXPECT_EQ(event_picture(0, 10), eventPicture(cv::Mat_<cv::Vec2i>(1, 1, cv::Vec2i(1, 2)))(0, 0));
+  EXPECT_EQ(event_picture(0, 5), white);
+  EXPECT_THAT(pictures.pictures().at(1).events, IsEmpty());
 }
 
 /// The data of a page by the id of their script element, read as a browser does.
@@ -133,7 +164,7 @@ TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
   const std::vector<CloudPoint> points = randomPoints(3, {0, 0, 0});
   const std::vector<StampedPose> trajectory = {{1'500'000'000, {}}};
   KeyframePictures pictures({});
-  pictures.add(cv::Mat1f(2, 2, 1.0F));
+  pictures.add(cv::Mat1f(2, 2, 1.0F), cv::Mat_<cv::Vec2i>(2, 2, cv::Vec2i(1, 0)));
   const MapPage page = {mean,
                         points,
                         0.01,
@@ -152,7 +183,9 @@ TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
   EXPECT_EQ(map["keyframes"][0]["q"], json({0.0, 0.0, 0.0, 1.0}));
   EXPECT_EQ(json::parse(dataOf(html, "report-data"))["warnings"][0]["text"], mean);
   EXPECT_EQ(dataOf(html, "point-data").size(), 40U) << "30 bytes";
-  EXPECT_THAT(json::parse(dataOf(html, "picture-data"))["0"], HasSubstr("iVBORw0KGgo"));
+  for (const char* kind : {"depth", "events"}) {
+    EXPECT_THAT(json::parse(dataOf(html, "picture-data"))["0"][kind], HasSubstr("iVBORw0KGgo"));
+  }
   for (const char* mark : {"<!-- data -->", "<!-- draw.js -->", "http:", "https:"}) {
     EXPECT_THAT(html, Not(HasSubstr(mark)));
   }
