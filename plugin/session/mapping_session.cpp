@@ -45,7 +45,10 @@ MappingSession::MappingSession(const EventFusionOptions& options)
       pose_source_(options.rig.pose_source),
       mapper_(mapperOptions(options)),
       cloud_(options.cloud, options.refinement.enabled) {
-  if (options.live.enabled) status_.live.emplace();
+  if (options.live.enabled) {
+    status_.live.emplace();
+    rig_.declare(mapper_);
+  }
   if (options.refinement.enabled) {
     refinement_ = std::make_unique<MapRefinement>(options.refinement);
   }

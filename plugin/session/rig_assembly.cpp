@@ -29,6 +29,19 @@ RigAssembly::RigAssembly(const EventFusionOptions& options)
       time_offsets_ns_(options.rig.time_offsets_ns),
       setup_(readRigSetup(options.rig)) {}
 
+void RigAssembly::declare(FusionMapper& mapper) {
+  if (!setup_.calibration) return;
+  const std::vector<RigCamera>& cameras = setup_.calibration->rig.cameras;
+  const auto has_size = [](const RigCamera& camera) { return camera.model.width > 0; };
+  if (!std::all_of(cameras.begin(), cameras.end(), has_size)) return;
+  if (!time_offsets_ns_.empty()) setup_.calibration->requireCameras(time_offsets_ns_.size());
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    RigCamera camera = cameras[i];
+    if (!time_offsets_ns_.empty()) camera.time_offset_ns = time_offsets_ns_[i];
+    addCamera(camera, mapper);
+  }
+}
+
 std::vector<CameraPacket> RigAssembly::add(CameraPacket packet, FusionMapper& mapper) {
   if (packet.camera < 0) {
     throw std::invalid_argument(fmt::format("camera {}: must be 0 or above", packet.camera));

@@ -33,6 +33,9 @@ class RigAssembly {
   /// @throws std::runtime_error naming a file of the options that cannot be read.
   explicit RigAssembly(const EventFusionOptions& options);
 
+  /// Adds all cameras of the options' calibration to the mapper, if it has their sizes: then none
+  /// is waited for, and each may begin at any time.
+  void declare(FusionMapper& mapper);
   /// Adds the packet's camera to the mapper if it is the next one, and then each camera that waited
   /// for it.
   /// @return the packets of known cameras, in the order to feed them; none while this one waits.

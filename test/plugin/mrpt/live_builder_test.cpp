@@ -8,10 +8,12 @@
 
 #include <atomic>
 #include <chrono>
+#include <fstream>
 #include <future>
 #include <set>
 
 #include "test/plugin/mrpt/observations.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
@@ -217,6 +219,41 @@ TEST(LiveBuilder, EventsWaitForPosesOnlySoLong) {
   EXPECT_GT(status.counts.total().without_pose, status.counts.total().read / 4);
   EXPECT_GT(*keyframeTimes(builder).rbegin(), recording.poses.back().t_ns - 300'000'000);
   EXPECT_EQ(status.live->pose_jumps, 0U) << "the rig went on at its speed";
+}
+
+class LiveBuilderWithFiles : public TemporaryFolder {};
+
+TEST_F(LiveBuilderWithFiles, ADeclaredRigWaitsForNoCamera) {
+  const std::string camera =
+      "  camera_model: pinhole\n  intrinsics: [100, 100, 59.5, 44.5]\n"
+      "  distortion_model: none\n  distortion_coeffs: []\n  resolution: [120, 90]\n";
+  std::ofstream(folder() / "rig.yaml")
+      << "cam0:\n" << camera << "cam1:\n" << camera
+      << "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+  EventFusionOptions options = liveOptions();
+  options.rig.calibration = folder() / "rig.yaml";
+  // Camera 1 begins at 1.6 s: undeclared, it would be an error from 1 s on.
+  Observations observations = observationsOf(SyntheticRecording(3));
+  const auto is_missing = [](const CObservation::Ptr& observation) {
+    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+    return packet && packet->camera_index == 1 &&
+           nanosecondsFrom(packet->timestamp) < SyntheticRecording::kStartNs + 1'600'000'000;
+  };
+  observations.erase(std::remove_if(observations.begin(), observations.end(), is_missing),
+                     observations.end());
+  CEventFusionMapBuilder builder(options);
+  const auto early = static_cast<std::ptrdiff_t>(observations.size() * 45 / 100);  // 1.5 s
+  feedPatiently(builder, {observations.begin(), observations.begin() + early});
+  EXPECT_EQ(builder.status().rig.cameras.size(), 2U);
+  playPatiently(builder, {observations.begin() + early, observations.end()});
+
+  const SessionStatus status = builder.status();
+  expectSumsAgree(status);
+  EXPECT_EQ(status.live->errors, 0U) << status.live->last_error;
+  EXPECT_GT(status.counts.cameras.at(1).used, 0U);
+  EXPECT_GT(status.silent_keyframes.at(1), 5U) << "counted";
+  EXPECT_LT(status.silent_keyframes.at(1), 18U);
+  EXPECT_GT(builder.trajectory().size(), 24U);
 }
 
 TEST(LiveBuilder, AJumpOfTheTrackerBeginsANewStretch) {
