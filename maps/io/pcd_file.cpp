@@ -4,29 +4,18 @@
 #include <liblzf/lzf.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 #include <stdexcept>
 #include <string>
 
 #include "mapping/options/quoted_text.h"
+#include "maps/io/little_endian.h"
 #include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
 
 namespace efm {
 namespace {
-
-void writeLittleEndian(std::ostream& stream, float value) {
-  std::uint32_t bits = 0;
-  static_assert(sizeof(bits) == sizeof(value));
-  std::memcpy(&bits, &value, sizeof(bits));
-  const std::array<char, 4> bytes = {
-      static_cast<char>(bits & 0xFFU), static_cast<char>(bits >> 8U & 0xFFU),
-      static_cast<char>(bits >> 16U & 0xFFU), static_cast<char>(bits >> 24U)};
-  stream.write(bytes.data(), bytes.size());
-}
 
 /// The lines of a header by their keys.
 using HeaderLines = std::map<std::string, WordLine, std::less<>>;

@@ -2,11 +2,15 @@
 #include "maps/io/ply_file.h"
 
 #include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstdint>
 #include <map>
 #include <stdexcept>
 #include <string>
 
 #include "mapping/options/quoted_text.h"
+#include "maps/io/little_endian.h"
 #include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
 
@@ -116,6 +120,26 @@ void skip(TextScanner& scanner, const PlyElement& element, bool is_text) {
 }
 
 }  // namespace
+
+void writePlyTo(std::ostream& stream, const std::vector<CloudPoint>& points,
+                const std::vector<PointColour>& colours) {
+  assert(colours.size() == points.size());
+  stream << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size()
+         << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\n"
+            "property uchar green\nproperty uchar blue\nproperty float confidence\n"
+            "property uint support\nend_header\n";
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const CloudPoint& point = points[i];
+    if (!point.p_world.allFinite() || !std::isfinite(point.confidence)) {
+      throw std::runtime_error("point " + std::to_string(i) + " " + pointText(point) +
+                               ": expected finite numbers");
+    }
+    for (const double value : point.p_world) writeLittleEndian(stream, value);
+    for (const std::uint8_t value : colours[i]) writeLittleEndian(stream, value);
+    writeLittleEndian(stream, point.confidence);
+    writeLittleEndian(stream, point.support);
+  }
+}
 
 PointCloudContent parsePly(std::string_view bytes) {
   TextScanner scanner(bytes);

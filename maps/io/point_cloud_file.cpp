@@ -14,13 +14,28 @@
 
 namespace efm {
 
-void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& points) {
+namespace {
+
+/// @param write puts the content into the stream.
+template <typename Write>
+void writeBinary(const std::filesystem::path& path, Write write) {
   writeAtomically(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary);
-    writePcdTo(file, points);
+    write(file);
     file.close();
     if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
   });
+}
+
+}  // namespace
+
+void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& points) {
+  writeBinary(path, [&](std::ostream& stream) { writePcdTo(stream, points); });
+}
+
+void writeColouredPly(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
+                      const std::vector<PointColour>& colours) {
+  writeBinary(path, [&](std::ostream& stream) { writePlyTo(stream, points, colours); });
 }
 
 PointCloudContent readPointCloud(const std::filesystem::path& path) {

@@ -30,6 +30,7 @@
 #include "plugin/output/summary.h"
 #include "plugin/viewer/map_page.h"
 #include "plugin/window/map_frames.h"
+#include "plugin/window/map_scene.h"
 
 namespace efm {
 namespace {
@@ -342,10 +343,15 @@ int runMap(const MapArguments& arguments) {
   const auto take = [](MapOutput& output, const KeyframeDepthMap& keyframe) {
     output.writeKeyframe(keyframe);
   };
-  const auto write = [refined](MapOutput& output, MappingOutcome& outcome) {
+  const bool ply = job.options.ply;
+  const auto write = [refined, ply](MapOutput& output, MappingOutcome& outcome) {
     StageTimes& times = outcome.report.times;
     const SecondsScope scope(times.real.map, times.cpu.output);
     writeAll(outcome, {[&] { output.writeCloud("map.pcd", outcome.points); },
+                       [&] {
+                         if (!ply) return;
+                         output.writeColouredCloud(outcome.points, upwardOf(outcome.trajectory));
+                       },
                        [&] { output.writeFile("map.simplemap", saverOf(outcome.keyframes)); },
                        [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },
                        [&] {

@@ -201,6 +201,7 @@ const std::vector<OptionKey>& optionKeys() {
 
       option("output", "camera_maps", KEYFRAME(camera_maps)),
       option("output", "event_images", KEYFRAME(event_images)),
+      option("output", "ply", FIELD(ply)),
 
       optionOrAuto("performance", "threads", KEYFRAME(sweep.threads)),
       optionOrAuto("performance", "kernel", KEYFRAME(sweep.kernel)),

@@ -18,6 +18,7 @@
 #include "maps/io/atomic_file.h"
 #include "maps/io/point_cloud_file.h"
 #include "plugin/pictures/depth_picture.h"
+#include "plugin/pictures/height_colours.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
@@ -29,8 +30,8 @@ constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.t
 constexpr std::string_view kEventImage = "events.png";
 // Removed first: without it, what is left of an earlier result does not look complete.
 constexpr const char* kReport = "report.json";
-constexpr std::array<std::string_view, 5> kMapFiles = {"map.html", "map.pcd", "map.simplemap",
-                                                       "trajectory.txt", "trajectory_tracker.txt"};
+constexpr std::array<std::string_view, 6> kMapFiles = {
+    "map.html", "map.pcd", "map.ply", "map.simplemap", "trajectory.txt", "trajectory_tracker.txt"};
 constexpr std::array<std::string_view, 2> kDepthFiles = {"points.pcd", "dsi.npy"};
 
 void makeFolder(const std::filesystem::path& folder) {
@@ -238,6 +239,12 @@ void MapOutput::writeTrajectory(const std::string& name, const std::vector<Stamp
 void MapOutput::writeCloud(const std::string& name, const std::vector<CloudPoint>& points) {
   removeEarlier();
   writePcd(folder_ / name, points);
+}
+
+void MapOutput::writeColouredCloud(const std::vector<CloudPoint>& points,
+                                   const Eigen::Vector3d& upward) {
+  removeEarlier();
+  writeColouredPly(folder_ / "map.ply", points, coloursByHeight(points, upward));
 }
 
 void MapOutput::writeFile(const std::string& name,

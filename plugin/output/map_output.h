@@ -16,7 +16,8 @@ namespace efm {
 
 /// The files of a folder, which holds one kind.
 enum class OutputKind {
-  /// map.pcd, map.simplemap, map.html, trajectory.txt, report.json, keyframes/<t_ref>/ with images
+  /// map.pcd, map.ply, map.simplemap, map.html, trajectory.txt, report.json, keyframes/<t_ref>/
+  /// with images
   kMap,
   kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
 };
@@ -36,6 +37,7 @@ enum class PictureStyle {
 /// what a killed run left.
 ///
 ///     map.pcd  map.simplemap  map.html  trajectory.txt  report.json
+///     map.ply                  by option
 ///     trajectory_tracker.txt   where poses were refined
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
 ///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   by option
@@ -63,6 +65,9 @@ class MapOutput {
   void writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses);
   /// @param name "map.pcd" or "points.pcd".
   void writeCloud(const std::string& name, const std::vector<CloudPoint>& points);
+  /// map.ply, coloured by height.
+  /// @param upward a unit vector, frame `world`.
+  void writeColouredCloud(const std::vector<CloudPoint>& points, const Eigen::Vector3d& upward);
   /// @param name "map.simplemap".
   /// @param write writes a file at the given path; the file is renamed afterwards.
   void writeFile(const std::string& name,

@@ -22,6 +22,7 @@ struct EventFusionOptions {
   MapRefinementOptions refinement;
   RigOptions rig;
   LiveOptions live;
+  bool ply = false;  ///< `map` also writes map.ply, coloured by height.
 };
 
 /// The options of a program that was told nothing: what can be chosen from the data is.

@@ -21,6 +21,7 @@ namespace efm {
 namespace {
 
 using testing::AllOf;
+using testing::EndsWith;
 using testing::HasSubstr;
 
 class PointCloudFile : public testing::Test {
@@ -146,6 +147,24 @@ void expectNear(const std::vector<CloudPoint>& read, const std::vector<CloudPoin
     EXPECT_NEAR(read[i].confidence, points[i].confidence, points[i].confidence * relative);
     EXPECT_EQ(read[i].support, 1U);
   }
+}
+
+TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
+  const std::vector<CloudPoint> points = {{{450'000.123456789, 5'200'000.25, -3}, 17.5F, 4},
+                                          {{1e-9, 0, 2}, 0.25F, 70'000}};
+  writeColouredPly(folder_ / "map.ply", points, {{1, 2, 3}, {254, 255, 0}});
+  const PointCloudContent content = readPointCloud(folder_ / "map.ply");
+  ASSERT_EQ(content.points.size(), 2U);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(content.points[i].p_world, points[i].p_world);
+  // The last bytes of a vertex, which the reader leaves out.
+  const std::string bytes = readBytes(folder_ / "map.ply");
+  EXPECT_THAT(bytes, AllOf(HasSubstr("property uchar red\nproperty uchar green\nproperty uchar blue"
+                                     "\nproperty float confidence\nproperty uint support\n"),
+                           EndsWith(std::string("\xFE\xFF\0", 3) + raw(0.25F) + raw(70'000U))));
+  EXPECT_EQ(filesInFolder(), 1U);
+  EXPECT_THROW(writeColouredPly(folder_ / "map.ply", {{{1, 2, NAN}, 1, 1}}, {{0, 0, 0}}),
+               std::runtime_error);
+  EXPECT_EQ(readPointCloud(folder_ / "map.ply").points.size(), 2U) << "the earlier file stays";
 }
 
 TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {

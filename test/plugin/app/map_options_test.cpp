@@ -11,6 +11,7 @@ namespace efm {
 namespace {
 
 using nlohmann::json;
+using testing::AnyOf;
 using testing::Contains;
 using testing::Each;
 using testing::HasSubstr;
@@ -66,13 +67,15 @@ TEST_F(MapOptions, OneKeyframeHasTheWhiteLevelOfTheWholeRecording) {
   EXPECT_EQ(reportIn("one")["sequence_maximum"], reportIn("out")["sequence_maximum"]);
 }
 
-TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenToo) {
+TEST_F(MapOptions, WhatTheOutputSectionAsksForIsWrittenToo) {
   write(SyntheticRecording());
   // With slices of time a camera alone is fused across them.
   const std::string map = "map rig.ini data --set fusion.time_slices=1 ";
-  ASSERT_EQ(
-      run(map + "--out out --set output.camera_maps=true --set output.event_images=true").status,
-      0);
+  ASSERT_EQ(run(map + "--out out --set output.camera_maps=true --set output.event_images=true "
+                      "--set output.ply=true")
+                .status,
+            0);
+  EXPECT_EQ(pointsIn("out/map.ply"), pointsIn("out/map.pcd"));
   ASSERT_EQ(run(map + "--out alone --set rig.cameras=1").status, 0);
   const auto poses = posesIn("out");
   for (const StampedPose& pose : poses) {
@@ -86,7 +89,7 @@ TEST_F(MapOptions, SingleCamerasAndTheirEventsAreWrittenToo) {
 
   // A run without them leaves none behind.
   ASSERT_EQ(run("map rig.ini data --out out").status, 0);
-  EXPECT_THAT(filesIn("out"), Each(Not(HasSubstr("cam"))));
+  EXPECT_THAT(filesIn("out"), Each(Not(AnyOf(HasSubstr("cam"), HasSubstr("ply")))));
 }
 
 TEST_F(MapOptions, LateFusionJoinsTheCloudsOfSingleCameras) {

@@ -169,6 +169,7 @@ const FieldCase kFields[] = {
     EFM_ROW("live.max_turn_deg_s=700", live.max_turn_deg_s, 700),
     EFM_ROW("output.camera_maps=true", mapper.keyframe.camera_maps, true),
     EFM_ROW("output.event_images=true", mapper.keyframe.event_images, true),
+    EFM_ROW("output.ply=true", ply, true),
     EFM_ROW("performance.threads=2", mapper.keyframe.sweep.threads, 2),
     EFM_ROW("performance.kernel=plain", mapper.keyframe.sweep.kernel, VotingKernel::kPlain),
     EFM_ROW("performance.packet_error_px=0", mapper.keyframe.packets.packet_error_px, 0),

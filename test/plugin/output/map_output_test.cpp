@@ -76,6 +76,7 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
     MapOutput earlier(folder(), OutputKind::kMap, {});
     earlier.writeKeyframe(smallKeyframe(1'000'000'000));
     earlier.writeCloud("map.pcd", {});
+    earlier.writeColouredCloud({{{1, 2, 3}, 1, 1}}, Eigen::Vector3d::UnitZ());
     earlier.writePage([](std::ostream& page) { page << "mine"; });
     earlier.writeFile("map.simplemap", [](const auto& file) { std::ofstream(file) << "mine"; });
     earlier.writeReport("{}");
@@ -91,9 +92,11 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
 
   MapOutput output(folder(), OutputKind::kMap, {});
   EXPECT_TRUE(exists(folder() / "map.pcd")) << "nothing was written yet";
+  EXPECT_TRUE(exists(folder() / "map.ply"));
   output.writeReport("{}");
 
   EXPECT_FALSE(exists(folder() / "map.pcd"));
+  EXPECT_FALSE(exists(folder() / "map.ply"));
   EXPECT_FALSE(exists(folder() / "map.simplemap"));
   EXPECT_FALSE(exists(folder() / "map.html"));
   EXPECT_FALSE(exists(keyframes / "1.000000000" / "depth.tiff"));
