@@ -28,9 +28,11 @@
 #include "plugin/output/map_output.h"
 #include "plugin/output/npy_file.h"
 #include "plugin/output/summary.h"
+#include "plugin/pictures/keyframe_sheet.h"
+#include "plugin/pictures/map_picture.h"
+#include "plugin/pictures/upward.h"
 #include "plugin/viewer/map_page.h"
 #include "plugin/window/map_frames.h"
-#include "plugin/window/map_scene.h"
 
 namespace efm {
 namespace {
@@ -340,25 +342,32 @@ int runMap(const MapArguments& arguments) {
     job.watchers.push_back(&*frames);
   }
   const bool refined = job.options.refinement.enabled;
-  const auto take = [](MapOutput& output, const KeyframeDepthMap& keyframe) {
+  KeyframeSheet sheet;
+  const auto take = [&](MapOutput& output, const KeyframeDepthMap& keyframe) {
     output.writeKeyframe(keyframe);
+    sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
   };
-  const bool ply = job.options.ply;
-  const auto write = [refined, ply](MapOutput& output, MappingOutcome& outcome) {
+  const auto write = [&](MapOutput& output, MappingOutcome& outcome) {
+    const DepthPlanesOptions& limits = outcome.report.options.mapper.keyframe.planes;
     StageTimes& times = outcome.report.times;
     const SecondsScope scope(times.real.map, times.cpu.output);
-    writeAll(outcome, {[&] { output.writeCloud("map.pcd", outcome.points); },
-                       [&] {
-                         if (!ply) return;
-                         output.writeColouredCloud(outcome.points, upwardOf(outcome.trajectory));
-                       },
-                       [&] { output.writeFile("map.simplemap", saverOf(outcome.keyframes)); },
-                       [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },
-                       [&] {
-                         if (!refined) return;
-                         output.writeTrajectory("trajectory_tracker.txt",
-                                                outcome.tracker_trajectory);
-                       }});
+    writeAll(outcome,
+             {[&] { output.writeCloud("map.pcd", outcome.points); },
+              [&] {
+                if (!job.options.ply) return;
+                output.writeColouredCloud(outcome.points, upwardOf(outcome.trajectory));
+              },
+              [&] { output.writeFile("map.simplemap", saverOf(outcome.keyframes)); },
+              [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },
+              [&] {
+                if (!refined) return;
+                output.writeTrajectory("trajectory_tracker.txt", outcome.tracker_trajectory);
+              },
+              [&] {
+                if (outcome.trajectory.empty()) return;  // nothing to draw
+                output.writePicture("map.png", drawMap(outcome.points, outcome.trajectory));
+                output.writePicture("overview.png", sheet.draw(limits));
+              }});
   };
   return runJob(arguments, job, OutputKind::kMap, take, write);
 }

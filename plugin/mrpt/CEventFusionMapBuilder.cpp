@@ -492,7 +492,7 @@ void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& fil
     planes = session_->planes();
   }
   if (depth.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
-  const cv::Mat3b picture = depthPicture(depth, planes);
+  const cv::Mat3b picture = depthPicture(depth, planes, Palette::kBrightToDark);
   writeAtomically(file, [&](const std::filesystem::path& temporary) {
     if (!cv::imwrite(temporary.string(), picture)) throw std::runtime_error("imwrite failed");
   });

@@ -30,8 +30,9 @@ constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.t
 constexpr std::string_view kEventImage = "events.png";
 // Removed first: without it, what is left of an earlier result does not look complete.
 constexpr const char* kReport = "report.json";
-constexpr std::array<std::string_view, 6> kMapFiles = {
-    "map.html", "map.pcd", "map.ply", "map.simplemap", "trajectory.txt", "trajectory_tracker.txt"};
+constexpr std::array<std::string_view, 8> kMapFiles = {
+    "map.html",      "map.pcd",      "map.png",        "map.ply",
+    "map.simplemap", "overview.png", "trajectory.txt", "trajectory_tracker.txt"};
 constexpr std::array<std::string_view, 2> kDepthFiles = {"points.pcd", "dsi.npy"};
 
 void makeFolder(const std::filesystem::path& folder) {
@@ -222,8 +223,8 @@ void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& ma
   writeImage(folder / "depth.tiff", map.depth);
   writeImage(folder / "confidence.tiff", map.confidence);
   const bool plain = style_ == PictureStyle::kPlain;
-  writeImage(folder / "depth.png",
-             plain ? depthPicture(map.depth, limits_) : depthFigure(map, limits_));
+  writeImage(folder / "depth.png", plain ? depthPicture(map.depth, limits_, Palette::kBlueToRed)
+                                         : depthFigure(map, limits_));
   if (plain) {
     writeImage(folder / "confidence.png", confidencePicture(map.confidence));
   } else {
@@ -251,6 +252,11 @@ void MapOutput::writeFile(const std::string& name,
                           const std::function<void(const std::filesystem::path&)>& write) {
   removeEarlier();
   writeAtomically(folder_ / name, write);
+}
+
+void MapOutput::writePicture(const std::string& name, const cv::Mat3b& picture) {
+  removeEarlier();
+  writeImage(folder_ / name, picture);
 }
 
 void MapOutput::writePage(const std::function<void(std::ostream&)>& write) {

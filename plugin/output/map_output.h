@@ -16,8 +16,8 @@ namespace efm {
 
 /// The files of a folder, which holds one kind.
 enum class OutputKind {
-  /// map.pcd, map.ply, map.simplemap, map.html, trajectory.txt, report.json, keyframes/<t_ref>/
-  /// with images
+  /// map.pcd, map.ply, map.simplemap, map.html, map.png, overview.png, trajectory.txt, report.json,
+  /// keyframes/<t_ref>/ with images
   kMap,
   kDepth,  ///< the images of one keyframe, points.pcd, dsi.npy, report.json
 };
@@ -36,7 +36,7 @@ enum class PictureStyle {
 /// Until then the folder has report.partial.json, by which the next run knows that it may replace
 /// what a killed run left.
 ///
-///     map.pcd  map.simplemap  map.html  trajectory.txt  report.json
+///     map.pcd  map.simplemap  map.html  map.png  overview.png  trajectory.txt  report.json
 ///     map.ply                  by option
 ///     trajectory_tracker.txt   where poses were refined
 ///     keyframes/<t_ref, "%.9f">/{depth.tiff,confidence.tiff,depth.png,confidence.png}
@@ -72,6 +72,8 @@ class MapOutput {
   /// @param write writes a file at the given path; the file is renamed afterwards.
   void writeFile(const std::string& name,
                  const std::function<void(const std::filesystem::path&)>& write);
+  /// @param name "map.png" or "overview.png".
+  void writePicture(const std::string& name, const cv::Mat3b& picture);
   /// map.html.
   void writePage(const std::function<void(std::ostream&)>& write);
   void writeReport(const std::string& json);

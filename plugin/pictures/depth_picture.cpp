@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "plugin/pictures/value_picture.h"
@@ -38,20 +37,32 @@ cv::Mat1b lightGrey(const cv::Mat1f& confidence) {
 
 cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits,
                        Palette palette) {
-  const double far_inverse = 1 / limits.max_depth_m;
-  const double range = 1 / limits.min_depth_m - far_inverse;
-  cv::Mat1b nearness(depth_m.size(), 0);
-  for (int y = 0; y < depth_m.rows; ++y) {
-    for (int x = 0; x < depth_m.cols; ++x) {
-      if (!(depth_m(y, x) > 0)) continue;
-      const double fraction = (1.0 / static_cast<double>(depth_m(y, x)) - far_inverse) / range;
-      nearness(y, x) = cv::saturate_cast<uchar>(255 * fraction);
-    }
-  }
-  const bool from_far = palette == Palette::kBlueToRed;
-  cv::Mat3b picture = coloured(from_far ? nearness : cv::Mat1b(~nearness), palette);
+  // The rainbow goes from far to near.
+  const bool far_first = palette == Palette::kBlueToRed;
+  const double from = 1 / (far_first ? limits.max_depth_m : limits.min_depth_m);
+  const double to = 1 / (far_first ? limits.min_depth_m : limits.max_depth_m);
+  const double slope = 255 / (to - from);
+  cv::Mat1f inverse;
+  cv::divide(1.0, depth_m, inverse);
+  cv::Mat1b levels;
+  inverse.convertTo(levels, CV_8U, slope, -slope * from);
+  cv::Mat3b picture = coloured(levels, palette);
   picture.setTo(cv::Scalar::all(255), ~(depth_m > 0));
   return picture;
+}
+
+cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width) {
+  const int factor = (depth_m.cols + max_width - 1) / max_width;
+  if (factor <= 1) return depth_m;
+  cv::Mat1f small(depth_m.rows / factor, depth_m.cols / factor, 0.0F);
+  for (int y = 0; y < small.rows * factor; ++y) {
+    for (int x = 0; x < small.cols * factor; ++x) {
+      float& nearest = small(y / factor, x / factor);
+      const float depth = depth_m(y, x);
+      if (depth > 0 && (!(nearest > 0) || depth < nearest)) nearest = depth;
+    }
+  }
+  return small;
 }
 
 AxisRange depthAxis(const DepthPlanesOptions& limits) {
@@ -60,8 +71,7 @@ AxisRange depthAxis(const DepthPlanesOptions& limits) {
 
 cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits) {
   ValuePicture figure;
-  figure.values = map.depth.clone();
-  figure.values.setTo(std::numeric_limits<float>::quiet_NaN(), ~(map.depth > 0));
+  figure.values = map.depth;
   figure.range = depthAxis(limits);
   figure.unit = "m";
   figure.palette = Palette::kBrightToDark;

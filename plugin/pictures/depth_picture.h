@@ -10,11 +10,15 @@
 
 namespace efm {
 
-/// Colours of a depth map, linear in inverse depth, white without depth (0).
-/// @param palette kBlueToRed: red at the near limit. Others begin at the near limit.
+/// Colours of a depth map, linear in inverse depth, white without depth (0). `kBlueToRed` is red at
+/// the near limit and blue at the far one.
 /// @return 8-bit BGR, of the map's size.
 cv::Mat3b depthPicture(const cv::Mat1f& depth_m, const DepthPlanesOptions& limits,
                        Palette palette = Palette::kBlueToRed);
+
+/// A depth map of at most `max_width` pixels: joins square blocks of pixels to the nearest depth of
+/// each, so that thin edges stay.
+cv::Mat1f reducedDepth(const cv::Mat1f& depth_m, int max_width);
 
 /// The axis of depths between two limits: linear in inverse depth.
 AxisRange depthAxis(const DepthPlanesOptions& limits);

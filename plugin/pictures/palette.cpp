@@ -15,6 +15,7 @@ struct PaletteSource {
 
 PaletteSource sourceOf(Palette palette) {
   if (palette == Palette::kBlueToRed) return {cv::COLORMAP_JET, 0, 1};
+  if (palette == Palette::kRainbow) return {cv::COLORMAP_TURBO, 0.06, 0.96};
   return {cv::COLORMAP_PLASMA, 0.88, 0};  // kBrightToDark
 }
 

@@ -12,6 +12,7 @@ enum class Palette {
   /// by colour-blind readers. Cut where it is too light for white paper.
   kBrightToDark,
   kWhiteToBlack,
+  kRainbow,  ///< For height: turbo without its darkest ends, readable on white.
 };
 
 /// @param levels 0: the low end of the range, 255: the high end.

@@ -20,21 +20,27 @@ constexpr int kTickHeight = 18;
 /// The size of text and bar.
 double scaleOf(int width) { return std::max(1.0, width / 480.0); }
 
+/// The values on a scale on which the axis is linear. Where the axis cannot show a value it is
+/// meaningless.
+cv::Mat1f linearised(const cv::Mat1f& values, AxisScale scale) {
+  if (scale == AxisScale::kLinear) return values;
+  cv::Mat1f linear;  // not a header of the values, which are the caller's
+  if (scale == AxisScale::kInverse) cv::divide(1.0, values, linear);
+  if (scale == AxisScale::kLogarithmic) cv::log(values, linear);
+  return linear;
+}
+
 /// Levels of the palette. `none` is 255 where there is no value.
 cv::Mat1b levelsOf(const ValuePicture& picture, cv::Mat1b& none) {
-  cv::Mat1b levels(picture.values.size(), uchar{0});
-  none = cv::Mat1b(picture.values.size(), uchar{0});
-  for (int y = 0; y < levels.rows; ++y) {
-    for (int x = 0; x < levels.cols; ++x) {
-      const float value = picture.values(y, x);
-      const double fraction = std::isnan(value) ? value : picture.range.fractionAlong(value);
-      if (std::isnan(fraction)) {
-        none(y, x) = 255;
-        continue;
-      }
-      levels(y, x) = cv::saturate_cast<uchar>(255 * std::clamp(fraction, 0.0, 1.0));
-    }
-  }
+  const AxisRange& range = picture.range;
+  const cv::Mat1f ends =
+      linearised((cv::Mat1f(1, 2) << static_cast<float>(range.from), static_cast<float>(range.to)),
+                 range.scale);
+  const double slope = 255 / (static_cast<double>(ends(1)) - ends(0));
+  cv::Mat1b levels;
+  linearised(picture.values, range.scale).convertTo(levels, CV_8U, slope, -slope * ends(0));
+  none = range.scale == AxisScale::kLinear ? cv::Mat1b(picture.values != picture.values)
+                                           : cv::Mat1b(~(picture.values > 0));
   return levels;
 }
 

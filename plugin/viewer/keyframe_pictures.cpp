@@ -10,20 +10,6 @@
 namespace efm {
 namespace {
 
-/// Joins blocks of factor x factor pixels: the nearest depth of each, so that thin edges stay.
-cv::Mat1f reduced(const cv::Mat1f& depth_m, int factor) {
-  if (factor == 1) return depth_m;
-  cv::Mat1f small(depth_m.rows / factor, depth_m.cols / factor, 0.0F);
-  for (int y = 0; y < small.rows * factor; ++y) {
-    for (int x = 0; x < small.cols * factor; ++x) {
-      float& nearest = small(y / factor, x / factor);
-      const float depth = depth_m(y, x);
-      if (depth > 0 && (!(nearest > 0) || depth < nearest)) nearest = depth;
-    }
-  }
-  return small;
-}
-
 /// Joins blocks of factor x factor pixels: the sum of their events.
 cv::Mat_<cv::Vec2i> reduced(const cv::Mat_<cv::Vec2i>& events, int factor) {
   if (factor == 1) return events;
@@ -51,7 +37,7 @@ void KeyframePictures::add(const cv::Mat1f& depth_m, const cv::Mat_<cv::Vec2i>& 
   if (keyframe % stride_ != 0) return;
   const int factor = (depth_m.cols + kMaxWidth - 1) / kMaxWidth;
   KeyframePicture added = {
-      pngOf(depthPicture(reduced(depth_m, factor), limits_, Palette::kBrightToDark)), {}};
+      pngOf(depthPicture(reducedDepth(depth_m, kMaxWidth), limits_, Palette::kBrightToDark)), {}};
   if (!events.empty()) added.events = pngOf(eventPicture(reduced(events, factor)));
   bytes_ += added.bytes();
   pictures_.emplace(keyframe, std::move(added));

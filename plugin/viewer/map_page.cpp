@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/pictures/upward.h"
 #include "plugin/viewer/base64.h"
 #include "plugin/viewer/page_source.h"
 
@@ -67,6 +68,7 @@ Json describe(const MapPage& page, const PagePoints& points) {
       {"confidence", {points.lowConfidence(), points.highConfidence()}},
       {"keyframe_step", points.keyframeStep()},
       {"depths_m", {page.pictures.limits().min_depth_m, page.pictures.limits().max_depth_m}},
+      {"up", asJson(upwardOf(page.trajectory))},
       {"keyframes", asJson(page.trajectory)}};
   if (page.view) {
     const ReferenceView& view = *page.view;

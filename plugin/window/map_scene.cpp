@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "plugin/pictures/depth_picture.h"
+#include "plugin/pictures/upward.h"
 
 namespace efm {
 namespace {
@@ -66,28 +67,6 @@ void setPicture(mrpt::opengl::COpenGLScene& scene, const char* name, const cv::M
 }
 
 }  // namespace
-
-Eigen::Vector3d upwardOf(const std::vector<StampedPose>& trajectory) {
-  constexpr int kSteps = 100;
-  constexpr double kPull = 0.05;  // towards -y, which decides where the x axes do not
-  Eigen::Vector3d guess = Eigen::Vector3d::Zero();
-  for (const StampedPose& pose : trajectory) guess -= axisOf(pose, 1);
-  if (guess.norm() < 1e-9) guess = -axisOf(trajectory.front(), 1);
-  guess.normalize();
-  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
-  for (const StampedPose& pose : trajectory) {
-    across += axisOf(pose, 0) * axisOf(pose, 0).transpose();
-  }
-  across /= static_cast<double>(trajectory.size());
-  Eigen::Vector3d up = guess;
-  for (int i = 0; i < kSteps; ++i) {
-    up = (up + kPull * up.dot(guess) * guess - across * up).normalized();
-  }
-  if (up.dot(guess) < 0) up = -up;
-  int axis = 0;
-  if (up.cwiseAbs().maxCoeff(&axis) < std::cos(M_PI / 12)) return up;
-  return std::copysign(1.0, up[axis]) * Eigen::Vector3d::Unit(axis);
-}
 
 MapScene::MapScene() : scene_(mrpt::opengl::COpenGLScene::Create()) {
   auto main = scene_->getViewport();

@@ -10,11 +10,6 @@
 
 namespace efm {
 
-/// A direction away from the ground, of length 1: nearly across the cameras' x axes, near their
-/// mean -y. An axis of the world that is within 15 degrees of it is taken.
-/// @param trajectory not empty.
-Eigen::Vector3d upwardOf(const std::vector<StampedPose>& trajectory);
-
 /// A growing map as a scene of MRPT: the points in colours of their height (blue is low, red is
 /// high), the trajectory, the frustum of the newest keyframe; beside it that keyframe's depth map
 /// and confidence; counts and rates as text. The scene's z axis is upwards.

@@ -50,25 +50,7 @@ const firstKeyframeOf = i => cells.getUint16(i * kPointBytes + 8, true) * map.ke
 /// The keyframes: centre p of the camera, its rotation q, time t in seconds as text.
 const keyframes = map.keyframes.map(k => ({t: k.t, q: k.q, p: add(k.p, centre, -1)}));
 
-/// Up: across the cameras' x axes, which lie level in most recordings, and near their mean -y. The
-/// directions are those of the largest eigenvalue, by power iteration. Within 15 degrees of an
-/// axis of the world, that axis.
-function findUp() {
-  if (keyframes.length === 0) return [0, 0, 1];
-  const mean = keyframes.reduce((sum, k) => add(sum, rotate(k.q, [0, -1, 0])), [0, 0, 0]);
-  if (norm(mean) < 0.2 * keyframes.length) return [0, 0, 1];  // the camera looked everywhere
-  const guess = unit(mean), xs = keyframes.map(k => rotate(k.q, [1, 0, 0]));
-  let up = guess;
-  for (let trial = 0; trial < 40; ++trial) {
-    let next = add(up, guess, 0.05 * dot(up, guess));
-    for (const x of xs) next = add(next, x, -dot(x, up) / xs.length);
-    up = unit(next);
-  }
-  if (dot(up, guess) < 0) up = scale(up, -1);
-  const axis = up.findIndex(value => Math.abs(value) > Math.cos(Math.PI / 12));
-  return axis < 0 ? up : [0, 1, 2].map(k => k === axis ? Math.sign(up[k]) : 0);
-}
-const up = findUp();
+const up = map.up;  // a unit vector
 
 /// Sorted samples of a value of the points, which are in an order without any.
 function samplesOf(value) {

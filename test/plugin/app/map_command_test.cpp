@@ -35,8 +35,8 @@ TEST_F(MapCommand, WritesTheFilesOfTheContract) {
   EXPECT_THAT(result.out, AllOf(HasSubstr("keyframes   3\n"), HasSubstr("out: map.html, map.pcd")));
   const auto files = filesIn("out");
   EXPECT_EQ(files.size(), 5U + 3 * 4) << testing::PrintToString(files);
-  EXPECT_THAT(files, testing::IsSupersetOf({"map.html", "map.pcd", "map.simplemap", "report.json",
-                                            "trajectory.txt"}));
+  EXPECT_THAT(files, testing::IsSupersetOf({"map.html", "map.pcd", "map.png", "map.simplemap",
+                                            "overview.png", "report.json", "trajectory.txt"}));
   const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
   ASSERT_EQ(poses.size(), 3U);
   for (const StampedPose& pose : poses) {

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "mapping/geometry/trajectory.h"
+#include "maps/cloud/cloud_point.h"
+
+namespace efm {
+
+/// A map from above and from the side, for a paper: the points coloured by height and the denser
+/// the more opaque, the trajectory, a scale bar in metres. Some 1400 pixels wide.
+/// @param points may be empty: then the picture has the trajectory alone.
+/// @param trajectory T_world_ref of the keyframes.
+/// @throws std::invalid_argument if there is neither a point nor a keyframe.
+cv::Mat3b drawMap(const std::vector<CloudPoint>& points,
+                  const std::vector<StampedPose>& trajectory);
+
+}  // namespace efm
