@@ -2,6 +2,7 @@
 #include "plugin/app/map_command.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -33,6 +34,7 @@
 #include "plugin/pictures/upward.h"
 #include "plugin/viewer/map_page.h"
 #include "plugin/window/map_frames.h"
+#include "plugin/window/map_window.h"
 
 namespace efm {
 namespace {
@@ -333,6 +335,11 @@ int runMap(const MapArguments& arguments) {
   job.options.mapper.keyframe.view_events = true;  // the page shows them
   const Interruption interruption;
   job.stop_requested = [&] { return interruption.requested(); };
+  std::unique_ptr<MapWindow> window;
+  if (arguments.view) {
+    window = MapWindow::open();
+    job.watchers.push_back(window.get());
+  }
   std::optional<MapFrames> frames;
   if (!arguments.record_frames.empty()) {
     std::vector<std::filesystem::path> inputs = inputsOf(sourceOf(arguments, job.options));
@@ -369,7 +376,13 @@ int runMap(const MapArguments& arguments) {
                 output.writePicture("overview.png", sheet.draw(limits));
               }});
   };
-  return runJob(arguments, job, OutputKind::kMap, take, write);
+  const int status = runJob(arguments, job, OutputKind::kMap, take, write);
+  const bool interactive = isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1;
+  if (window && interactive && window->isOpen()) {
+    std::cerr << "event-fusion: a key in the window closes it\n";
+    window->wait(job.stop_requested);
+  }
+  return status;
 }
 
 int runDepth(const DepthArguments& arguments) {

@@ -27,6 +27,7 @@ struct MappingArguments {
 };
 
 struct MapArguments : MappingArguments {
+  bool view = false;                    ///< Show the growing map in a window.
   std::filesystem::path record_frames;  ///< Folder for a picture per keyframe; empty: none.
 };
 

@@ -66,6 +66,11 @@ void addMap(CLI::App& app, Run& run) {
   auto arguments = argumentsOf(command, run, runMap);
   addMappingArguments(command, *arguments);
   addTimeLimits(command, arguments->times);
+  command.add_flag(
+      "--view", arguments->view,
+      "Show the growing map in a window; the mouse turns, moves and zooms it. Closing it "
+      "does not end the mapping. At the end it stays until a key is pressed in it or it is "
+      "closed; without a terminal it closes at once");
   command
       .add_option("--record-frames", arguments->record_frames,
                   "Draw the growing map after each keyframe, without a screen: frame_000001.png, … "

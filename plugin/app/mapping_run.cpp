@@ -68,6 +68,7 @@ class Player {
     attempt([this] { return builder_.finish(), false; }, error);
     deliverMade();
     if (delivery_error_) std::rethrow_exception(delivery_error_);
+    showWatchers(true);
     return error;
   }
 
@@ -157,13 +158,19 @@ class Player {
     if (job_.verbosity == Verbosity::kVerbose) progress_.print(keyframeLine(keyframe));
     try {
       job_.on_keyframe(keyframe);
-      for (MapWatcher* watcher : job_.watchers) {
-        const double start_s = progress_.seconds();
-        if (watcher->due()) watcher->show(snapshotOf(keyframe));
-        watched_s_ += progress_.seconds() - start_s;
-      }
+      if (!job_.watchers.empty()) newest_ = keyframe;
+      showWatchers(false);
     } catch (...) {
       delivery_error_ = std::current_exception();
+    }
+  }
+
+  void showWatchers(bool is_last) {
+    if (!newest_) return;
+    for (MapWatcher* watcher : job_.watchers) {
+      const double start_s = progress_.seconds();
+      if (watcher->due(is_last)) watcher->show(snapshotOf(*newest_));
+      watched_s_ += progress_.seconds() - start_s;
     }
   }
 
@@ -248,8 +255,9 @@ class Player {
   std::optional<std::int64_t> first_ns_;  // in live operation, of the first observation
   std::chrono::steady_clock::time_point began_;
   std::optional<double> stopped_at_;
-  double watched_s_ = 0;  // in the watchers
-  StageSeconds told_;     // until the last keyframe
+  std::optional<KeyframeDepthMap> newest_;  // for the watchers
+  double watched_s_ = 0;                    // in the watchers
+  StageSeconds told_;                       // until the last keyframe
   Progress progress_;
 };
 

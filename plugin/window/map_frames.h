@@ -20,7 +20,7 @@ class MapFrames : public MapWatcher {
   /// nothing can be rendered on this machine.
   MapFrames(const std::filesystem::path& folder, bool force);
 
-  bool due() override { return true; }
+  bool due(bool is_last) override { return !is_last; }
   /// @throws std::runtime_error naming the file if it cannot be written.
   void show(WatchedMap snapshot) override;
 

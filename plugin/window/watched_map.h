@@ -24,8 +24,9 @@ struct WatchedMap {
 class MapWatcher {
  public:
   virtual ~MapWatcher() = default;
-  /// Whether it wants a snapshot after this keyframe. A snapshot costs an export of the map.
-  virtual bool due() = 0;
+  /// Whether it wants a snapshot now. A snapshot costs an export of the map.
+  /// @param is_last asked once more after the last keyframe.
+  virtual bool due(bool is_last) = 0;
   /// @throws std::runtime_error if it cannot be shown; that ends the mapping.
   virtual void show(WatchedMap snapshot) = 0;
 };

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// `map --record-frames`: the growing map is drawn without a screen.
+// `map --record-frames` and `map --view`: the growing map is drawn without a screen, and in a
+// window.
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -22,11 +24,30 @@ class GrowingMap : public ProgramTest {
     const cv::Mat3b picture = cv::imread((folder() / frame).string());
     EXPECT_EQ(picture.size(), cv::Size(1280, 720)) << frame;
     if (picture.empty()) return 0;
-    const cv::Mat3b left = picture.colRange(0, 960);
-    return static_cast<int>(std::count_if(left.begin(), left.end(), [](const cv::Vec3b& colour) {
+    return colouredIn(cv::Mat3b(picture.colRange(0, 960)));
+  }
+  template <typename Colour>
+  static int colouredIn(const cv::Mat_<Colour>& picture) {
+    return static_cast<int>(std::count_if(picture.begin(), picture.end(), [](const Colour& colour) {
       const auto [least, most] = std::minmax({colour[0], colour[1], colour[2]});
       return most - least > 80;
     }));
+  }
+
+  /// The screen of Xvfb in its file: a header of big-endian words, then 4 bytes a pixel.
+  static cv::Mat4b screenIn(std::string dump) {
+    const auto word = [&](std::size_t index) {
+      std::uint32_t value = 0;
+      for (std::size_t i = 0; i < 4; ++i) {
+        value = value << 8 | static_cast<unsigned char>(dump.at(4 * index + i));
+      }
+      return value;
+    };
+    const std::size_t header = word(0) + std::size_t{12} * word(19);  // with the table of colours
+    const int columns = static_cast<int>(word(4));
+    const int rows = static_cast<int>(word(5));
+    if (dump.size() < header + std::size_t{word(12)} * static_cast<std::size_t>(rows)) return {};
+    return cv::Mat4b(cv::Mat(rows, columns, CV_8UC4, dump.data() + header, word(12)).clone());
   }
 };
 
@@ -49,6 +70,42 @@ TEST_F(GrowingMap, HasAFrameForEachKeyframeAndTheSameResult) {
   write("new/frames/frame_000009.png", "of an earlier run");
   EXPECT_EQ(shell(frames + "--record-frames new/frames").status, 0);
   EXPECT_EQ(filesIn("new/frames").size(), 3U);
+}
+
+TEST_F(GrowingMap, IsShownInAWindow) {
+  if (shell("command -v xvfb-run").status != 0) GTEST_SKIP() << "there is no xvfb-run";
+  write(SyntheticRecording(3));
+  const std::string map = mapOf("data");
+  std::filesystem::create_directories(folder() / "shots");
+  // Copies of the screen while the map grows.
+  const Result result = shell(
+      "xvfb-run -a -s '-screen 0 1280x720x24 -fbdir .' sh -c \""
+      "'" EFM_EVENT_FUSION
+      "' map rig.ini data --out out2 --view & map=\\$!; i=0; "
+      "while kill -0 \\$map 2>/dev/null; do i=\\$((i + 1)); cp Xvfb_screen0 shots/\\$i; "
+      "sleep 0.1; done; wait \\$map\"");
+
+  ASSERT_EQ(result.status, 0) << result.err;
+  EXPECT_EQ(contentOf("out2/map.pcd"), map);
+  int most = 0;
+  for (const std::string& shot : filesIn("shots")) {
+    const cv::Mat4b screen = screenIn(contentOf("shots/" + shot));
+    if (screen.empty()) continue;
+    EXPECT_EQ(screen.size(), cv::Size(1280, 720));
+    most = std::max(most, colouredIn(screen));
+  }
+  EXPECT_GT(most, 100);
+}
+
+TEST_F(GrowingMap, NeedsADisplayForAWindow) {
+  write(SyntheticRecording());
+  const Result result =
+      shell("env -u DISPLAY '" EFM_EVENT_FUSION "' map rig.ini data --out out --view");
+  EXPECT_EQ(result.status, 1);
+  EXPECT_THAT(result.err,
+              testing::AllOf(HasSubstr("DISPLAY is not set"),
+                             HasSubstr("--record-frames DIR renders without a screen")));
+  EXPECT_FALSE(exists(folder() / "out")) << "before the mapping";
 }
 
 TEST_F(GrowingMap, RefusesFoldersThatItMustNotTouch) {
