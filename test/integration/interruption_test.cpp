@@ -101,7 +101,8 @@ class Interruption : public TemporaryFolder {
     const std::size_t keyframes = report["keyframes"];
     std::set<std::string> expected = {"report.json"};
     if (keyframes > 0) {
-      expected.insert({"keyframes", "map.html", "map.pcd", "map.simplemap", "trajectory.txt"});
+      expected.insert({"keyframes", "map.html", "map.pcd", "map.png", "map.simplemap",
+                       "overview.png", "trajectory.txt"});
       if (report.contains("refinement")) expected.insert("trajectory_tracker.txt");
       const auto poses = readTumTrajectory(out() / "trajectory.txt");
       EXPECT_EQ(poses.size(), keyframes);

@@ -34,7 +34,7 @@ TEST_F(MapCommand, WritesTheFilesOfTheContract) {
   EXPECT_THAT(result.err, IsEmpty()) << "quiet when not on a terminal";
   EXPECT_THAT(result.out, AllOf(HasSubstr("keyframes   3\n"), HasSubstr("out: map.html, map.pcd")));
   const auto files = filesIn("out");
-  EXPECT_EQ(files.size(), 5U + 3 * 4) << testing::PrintToString(files);
+  EXPECT_EQ(files.size(), 7U + 3 * 4) << testing::PrintToString(files);
   EXPECT_THAT(files, testing::IsSupersetOf({"map.html", "map.pcd", "map.png", "map.simplemap",
                                             "overview.png", "report.json", "trajectory.txt"}));
   const auto poses = readTumTrajectory(folder() / "out" / "trajectory.txt");
@@ -281,7 +281,7 @@ TEST_F(MapCommand, ASignalEndsItWithTheMapSoFar) {
   const std::size_t keyframes = report["keyframes"];
   EXPECT_GT(keyframes, 0U);
   EXPECT_EQ(posesIn("out").size(), keyframes);
-  EXPECT_EQ(filesIn("out").size(), 5 + 4 * keyframes);
+  EXPECT_EQ(filesIn("out").size(), 7 + 4 * keyframes);
 }
 
 TEST_F(MapCommand, ARunWithoutKeyframesKeepsTheEarlierMap) {
