@@ -372,7 +372,8 @@ int runMap(const MapArguments& arguments) {
               },
               [&] {
                 if (outcome.trajectory.empty()) return;  // nothing to draw
-                output.writePicture("map.png", drawMap(outcome.points, outcome.trajectory));
+                output.writePicture("map.png", drawMap(outcome.points, outcome.trajectory,
+                                                       outcome.report.options.cloud.voxel_size_m));
                 output.writePicture("overview.png", sheet.draw(limits));
               }});
   };

@@ -80,7 +80,7 @@ cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits) {
   return drawValues(figure);
 }
 
-cv::Mat3b confidenceFigure(const cv::Mat1f& confidence) {
+cv::Mat1b confidenceFigure(const cv::Mat1f& confidence) {
   const double maximum = maximumOf(confidence);
   ValuePicture figure;
   figure.values = confidence;
@@ -88,7 +88,10 @@ cv::Mat3b confidenceFigure(const cv::Mat1f& confidence) {
   figure.unit = "confidence";
   figure.palette = Palette::kWhiteToBlack;
   figure.min_width = kMinFigureWidth;
-  return drawValues(figure);
+  // Nothing in it has a colour, and one channel is encoded faster than three.
+  cv::Mat1b grey;
+  cv::extractChannel(drawValues(figure), grey, 0);
+  return grey;
 }
 
 cv::Mat1b confidencePicture(const cv::Mat1f& confidence) {

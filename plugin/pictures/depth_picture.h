@@ -26,8 +26,8 @@ AxisRange depthAxis(const DepthPlanesOptions& limits);
 /// A depth map for a paper: perceptual colours, the confidence in light grey under the depths, a
 /// colour bar in metres. Images of small sensors are enlarged by a whole factor.
 cv::Mat3b depthFigure(const DepthMap& map, const DepthPlanesOptions& limits);
-/// A confidence map in the same layout, black at the map's maximum.
-cv::Mat3b confidenceFigure(const cv::Mat1f& confidence);
+/// A confidence map in the same layout, black at the map's maximum, grey.
+cv::Mat1b confidenceFigure(const cv::Mat1f& confidence);
 
 /// Grey levels of a confidence map, negated as in Ghosh and Gallego 2022: white is 0, black is the
 /// map's maximum.

@@ -13,11 +13,11 @@ namespace efm {
 namespace {
 
 // Pixels.
-constexpr int kMaxWidth = 1400;
-constexpr int kMaxHeight = 1400;
+constexpr int kMaxWidth = 1500;
+constexpr int kMaxHeight = 1500;
 constexpr int kMinWidth = 800;  // of the legend
 constexpr int kLabelHeight = 30;
-constexpr int kLegendHeight = 56;
+constexpr int kLegendHeight = 64;
 constexpr int kBorder = 8;
 constexpr int kViewGap = 24;
 
@@ -74,6 +74,13 @@ class ShownPositions {
   const std::vector<StampedPose>& trajectory_;
   std::vector<Eigen::Vector3d> samples_;
 };
+
+/// The length of the trajectory's extent along an axis.
+double travelled(const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& axis) {
+  Extent extent;
+  for (const StampedPose& pose : trajectory) extent.add(pose.T_world_rig.translation.dot(axis));
+  return extent.length();
+}
 
 /// Where the cameras look on average, without its part along `up`; short where they turn around.
 Eigen::Vector3d levelLook(const std::vector<StampedPose>& trajectory, const Eigen::Vector3d& up) {
@@ -154,11 +161,13 @@ MapLayout layOutMap(const std::vector<CloudPoint>& points,
   const ShownPositions positions(points, trajectory);
   const Eigen::Vector3d up = upwardOf(trajectory);
   const Eigen::Vector3d look = levelLook(trajectory, up);
+  const bool looks_one_way = look.norm() > 0.5 * static_cast<double>(trajectory.size());
   Axes axes;
   Arrangement arrangement;
   double best = 0;
-  // The side view looks as the cameras do where that costs little.
-  constexpr double kLookBonus = 1.2;
+  // The side view looks as the cameras do, but not along a street: cameras that travel forwards
+  // are seen from the side.
+  constexpr double kLookBonus = 1.4;
   const Eigen::Vector3d axis = levelAxis(positions, up);
   for (Eigen::Vector3d right : {axis, Eigen::Vector3d(up.cross(axis))}) {
     const Eigen::Vector3d away = up.cross(right);
@@ -166,7 +175,9 @@ MapLayout layOutMap(const std::vector<CloudPoint>& points,
     if ((looks_away ? look.dot(away) : look.dot(right)) < 0) right = -right;
     const Axes turned = {right, up.cross(right), up};
     const Arrangement candidate = arrange(positions, turned);
-    const double quality = (looks_away ? kLookBonus : 1) * candidate.pixels_per_m;
+    const bool bonus = looks_away && looks_one_way &&
+                       travelled(trajectory, turned.away) <= travelled(trajectory, turned.right);
+    const double quality = (bonus ? kLookBonus : 1) * candidate.pixels_per_m;
     if (quality <= best) continue;
     best = quality;
     axes = turned;
@@ -192,8 +203,9 @@ MapLayout layOutMap(const std::vector<CloudPoint>& points,
                                   positions.along(axes.up).middle() * axes.up;
   layout.top = {{first, top}, axes.right, axes.away, p_world, scale};
   layout.side = {{second, side}, axes.right, axes.up, p_world, scale};
-  layout.legend = {kBorder, layout.size.height - kLegendHeight - kBorder,
-                   layout.size.width - 2 * kBorder, kLegendHeight};
+  const int legend_width = std::max(views_width, kMinWidth - 2 * kBorder);
+  layout.legend = {(layout.size.width - legend_width) / 2,
+                   layout.size.height - kLegendHeight - kBorder, legend_width, kLegendHeight};
   if (!points.empty()) {
     const Extent heights = positions.ofPoints(up);
     const double least = std::max(heights.length(), 0.01);

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "mapping/geometry/angle.h"
 #include "plugin/pictures/map_layout.h"
 #include "plugin/pictures/plot_frame.h"
 #include "plugin/pictures/value_picture.h"
@@ -39,12 +40,15 @@ class Splats {
   cv::Mat3b picture(double sigma) {
     cv::GaussianBlur(weights_, weights_, {}, sigma);
     cv::GaussianBlur(heights_, heights_, {}, sigma);
+    const double lone = 1 / (2 * kPi * sigma * sigma);  // the weight at a point without neighbours
+    weights_ *= 1 / lone;
+    heights_ *= 1 / lone;
     const float typical = typicalWeight();
     cv::Mat1b levels(weights_.size(), uchar{0});
     for (int y = 0; y < levels.rows; ++y) {
       for (int x = 0; x < levels.cols; ++x) {
         const float weight = weights_(y, x);
-        if (weight > 1e-4F) levels(y, x) = cv::saturate_cast<uchar>(255 * heights_(y, x) / weight);
+        if (weight > 1e-3F) levels(y, x) = cv::saturate_cast<uchar>(255 * heights_(y, x) / weight);
       }
     }
     cv::Mat3b picture = coloured(levels, kHeightPalette);
@@ -69,27 +73,31 @@ class Splats {
   float typicalWeight() const {
     std::vector<float> weights;
     for (const float weight : weights_) {
-      if (weight > 0.02F) weights.push_back(weight);
+      if (weight > 0.08F) weights.push_back(weight);
     }
     if (weights.empty()) return 1;
     const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
     std::nth_element(weights.begin(), middle, weights.end());
-    return std::max(0.15F, *middle);
+    return std::max(0.6F, *middle);
   }
 
   cv::Mat1f weights_;
   cv::Mat1f heights_;  // sums, weighted
 };
 
+AxisRange heightsOf(const MapLayout& layout) { return {layout.heights_m[0], layout.heights_m[1]}; }
+
 void drawPoints(cv::Mat3b& picture, const MapView& view, const std::vector<CloudPoint>& points,
-                const Eigen::Vector3d& up, const AxisRange& heights) {
+                const MapLayout& layout, double sigma) {
+  const Eigen::Vector3d& up = layout.side.upwards;
+  const AxisRange heights = heightsOf(layout);
   Splats splats(view.area.size());
   const cv::Point2d corner = view.area.tl();
   for (const CloudPoint& point : points) {
     const double level = std::clamp(heights.fractionAlong(point.p_world.dot(up)), 0.0, 1.0);
     splats.add(view.pixelOf(point.p_world) - corner, static_cast<float>(level));
   }
-  splats.picture(0.8).copyTo(picture(view.area));
+  splats.picture(sigma).copyTo(picture(view.area));
 }
 
 void drawTrajectory(cv::Mat3b& picture, const MapView& view,
@@ -131,9 +139,9 @@ void drawLegend(cv::Mat3b& picture, const MapLayout& layout, bool has_points) {
   const double scale = layout.top.pixels_per_m;
   const double length_m = roundLength(220 / scale);
   const int length = cvRound(length_m * scale);
-  cv::rectangle(picture, cv::Rect(area.x, area.y + 10, length, 6), kPlotInk, cv::FILLED);
+  cv::rectangle(picture, cv::Rect(area.x, area.y + 14, length, 6), kPlotInk, cv::FILLED);
   writeText(picture, fmt::format("{:g} m", length_m), {area.x, area.br().y - 10}, kLabelScale);
-  const cv::Point sample(area.x + 290, area.y + 13);
+  const cv::Point sample(area.x + 290, area.y + 17);
   cv::line(picture, sample, sample + cv::Point(60, 0), kPlotInk, 2, cv::LINE_AA);
   cv::circle(picture, sample, 6, kPlotInk, cv::FILLED, cv::LINE_AA);
   cv::circle(picture, sample + cv::Point(60, 0), 6, kPlotInk, cv::FILLED, cv::LINE_AA);
@@ -141,23 +149,27 @@ void drawLegend(cv::Mat3b& picture, const MapLayout& layout, bool has_points) {
   writeText(picture, "start to end", {sample.x - 6, area.br().y - 10}, kLabelScale);
   if (!has_points) return;
   const int width = std::min(600, area.width - 460);
-  const cv::Mat3b bar =
-      drawBar({layout.heights_m[0], layout.heights_m[1]}, kHeightPalette, "m high", width);
-  bar.copyTo(picture(cv::Rect({area.br().x - width, area.y}, bar.size())));
+  const cv::Mat3b bar = drawBar(heightsOf(layout), kHeightPalette, "height (m)", width);
+  bar.copyTo(picture(cv::Rect({area.br().x - width, area.y + 6}, bar.size())));
 }
 
 }  // namespace
 
-cv::Mat3b drawMap(const std::vector<CloudPoint>& points,
-                  const std::vector<StampedPose>& trajectory) {
+cv::Mat3b drawMap(const std::vector<CloudPoint>& points, const std::vector<StampedPose>& trajectory,
+                  double voxel_size_m) {
   if (points.empty() && trajectory.empty()) {
     throw std::invalid_argument("a map without points and keyframes has no picture");
   }
   const MapLayout layout = layOutMap(points, trajectory);
-  const AxisRange heights = {layout.heights_m[0], layout.heights_m[1]};
+  // Few points on much paper are drawn larger.
+  const double pixels_per_point =
+      layout.top.area.area() / (1.0 + static_cast<double>(points.size()));
+  const double sigma = std::clamp(
+      std::max(0.6 * voxel_size_m * layout.top.pixels_per_m, 0.1 * std::sqrt(pixels_per_point)),
+      0.8, 3.0);
   cv::Mat3b picture(layout.size, cv::Vec3b(255, 255, 255));
   for (const auto& [view, name] : {std::pair{layout.top, "top view"}, {layout.side, "side view"}}) {
-    drawPoints(picture, view, points, layout.side.upwards, heights);
+    drawPoints(picture, view, points, layout, sigma);
     drawTrajectory(picture, view, trajectory);
     cv::rectangle(picture, view.area, kMapGrey);
     writeText(picture, name, view.area.tl() - cv::Point(0, 8), kLabelScale);

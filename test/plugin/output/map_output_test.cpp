@@ -78,6 +78,10 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
     earlier.writeCloud("map.pcd", {});
     earlier.writeColouredCloud({{{1, 2, 3}, 1, 1}}, Eigen::Vector3d::UnitZ());
     earlier.writePage([](std::ostream& page) { page << "mine"; });
+    for (const char* name : {"map.png", "overview.png"}) {
+      earlier.writePicture(name, cv::Mat3b::zeros(2, 2));
+      ASSERT_TRUE(exists(folder() / name));
+    }
     earlier.writeFile("map.simplemap", [](const auto& file) { std::ofstream(file) << "mine"; });
     earlier.writeReport("{}");
   }
@@ -99,6 +103,8 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
   EXPECT_FALSE(exists(folder() / "map.ply"));
   EXPECT_FALSE(exists(folder() / "map.simplemap"));
   EXPECT_FALSE(exists(folder() / "map.html"));
+  EXPECT_FALSE(exists(folder() / "map.png"));
+  EXPECT_FALSE(exists(folder() / "overview.png"));
   EXPECT_FALSE(exists(keyframes / "1.000000000" / "depth.tiff"));
   EXPECT_TRUE(exists(keyframes / "1.000000000" / "notes.txt"));
   EXPECT_TRUE(exists(folder() / "notes.txt"));

@@ -14,6 +14,8 @@
 namespace efm {
 namespace {
 
+constexpr double kVoxel = 0.01;  // metres
+
 /// Cameras that look along +y of a world with z up, on a line along x.
 std::vector<StampedPose> lookingAlongY(int count) {
   Eigen::Matrix3d R_world_cam;  // columns: x right, y down, z forward
@@ -80,13 +82,35 @@ TEST(MapLayout, FarOutliersDoNotChangeTheScale) {
 }
 
 TEST(MapPicture, DrawsWhatThereIs) {
-  const cv::Mat3b whole = drawMap(box(), lookingAlongY(3));
+  const cv::Mat3b whole = drawMap(box(), lookingAlongY(3), kVoxel);
   EXPECT_LE(std::max(whole.rows, whole.cols), 2000);
-  const int legend = cv::countNonZero(colouredIn(drawMap({}, lookingAlongY(3))));
+  const int legend = cv::countNonZero(colouredIn(drawMap({}, lookingAlongY(3), kVoxel)));
   // 9,471 points in two views, which hide each other.
   EXPECT_GT(cv::countNonZero(colouredIn(whole)), legend + 10'000);
-  EXPECT_GT(cv::countNonZero(colouredIn(drawMap({{{1, 2, 3}, 1.0F}}, lookingAlongY(1)))), 0);
-  EXPECT_THROW(drawMap({}, {}), std::invalid_argument);
+  EXPECT_GT(cv::countNonZero(colouredIn(drawMap({{{1, 2, 3}, 1.0F}}, lookingAlongY(1), kVoxel))),
+            0);
+  EXPECT_THROW(drawMap({}, {}, kVoxel), std::invalid_argument);
+}
+
+TEST(MapPicture, ItsBarIsARoundNumberOfMetresLong) {
+  for (const double size : {0.01, 1.0, 30.0}) {
+    std::vector<CloudPoint> points = box();
+    for (CloudPoint& point : points) point.p_world *= size;
+    const MapLayout layout = layOutMap(points, lookingAlongY(1));
+    const cv::Mat3b legend = drawMap(points, lookingAlongY(1), kVoxel)(layout.legend);
+    cv::Mat1b ink;
+    cv::inRange(legend.colRange(0, 250), cv::Scalar::all(40), cv::Scalar::all(40), ink);
+    cv::Mat1i longest;  // per row
+    cv::reduce(ink / 255, longest, 1, cv::REDUCE_SUM, CV_32S);
+    double bar = 0;
+    cv::minMaxLoc(longest, nullptr, &bar);
+    EXPECT_GT(bar, 220 / 2.6) << "as long as the next round number allows";
+    double metres = bar / layout.top.pixels_per_m;
+    while (metres < 0.95) metres *= 10;
+    while (metres > 9.5) metres /= 10;
+    const double nearest = metres < 1.5 ? 1 : metres < 3.5 ? 2 : 5;
+    EXPECT_NEAR(metres, nearest, 0.51 / bar * nearest * 1.01) << size << ": half a pixel";
+  }
 }
 
 TEST(KeyframeSheet, ShowsTwelveOfAnyNumberEvenly) {
