@@ -380,7 +380,7 @@ int runMap(const MapArguments& arguments) {
   const int status = runJob(arguments, job, OutputKind::kMap, take, write);
   const bool interactive = isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1;
   if (window && interactive && window->isOpen()) {
-    std::cerr << "event-fusion: a key in the window closes it\n";
+    std::cerr << "event-fusion: the window stays until it is closed or a key is pressed in it\n";
     window->wait(job.stop_requested);
   }
   return status;

@@ -85,6 +85,9 @@ MapScene::MapScene() : scene_(mrpt::opengl::COpenGLScene::Create()) {
   };
   add_lines("trajectory", {255, 255, 255, 255}, 2);
   add_lines("frustum", {255, 200, 60, 255}, 2);
+  auto column = scene_->createViewport("column");  // behind the pictures, where a window is grey
+  column->setViewportPosition(kPicturesLeft - 0.01, 0, 1.01 - kPicturesLeft, 1);
+  column->setCustomBackgroundColor(kBackground);
   addPicture(*scene_, "depth", 0.52);
   addPicture(*scene_, "confidence", 0.06);
 }

@@ -21,7 +21,7 @@ std::unique_ptr<MapWindow> MapWindow::open() {
   if (!symbol) {
     const char* const why = dlerror();
     throw std::runtime_error(std::string("--view: the window's library cannot be loaded: ") +
-                             (why ? why : "no reason given"));
+                             (why ? why : "no reason given") + "; --record-frames DIR needs none");
   }
   using Open = MapWindow* (*)();
   std::unique_ptr<MapWindow> window(reinterpret_cast<Open>(symbol)());
