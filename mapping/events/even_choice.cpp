@@ -35,4 +35,11 @@ EventSpan chooseEvenly(EventSpan events, std::size_t limit, std::vector<Event>& 
   return EventSpan(buffer);
 }
 
+std::vector<Event> chosenEvenly(EventSpan events, std::size_t limit) {
+  std::vector<Event> chosen;
+  const EventSpan view = chooseEvenly(events, limit, chosen);
+  if (chosen.empty()) chosen.assign(view.begin(), view.end());
+  return chosen;
+}
+
 }  // namespace efm

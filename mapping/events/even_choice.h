@@ -32,5 +32,7 @@ class EvenChoice {
 /// `buffer`.
 /// @param buffer receives the chosen events; the view is valid until it changes.
 EventSpan chooseEvenly(EventSpan events, std::size_t limit, std::vector<Event>& buffer);
+/// A copy of the chosen events.
+std::vector<Event> chosenEvenly(EventSpan events, std::size_t limit);
 
 }  // namespace efm

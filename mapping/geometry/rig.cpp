@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/geometry/rig.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
@@ -20,6 +22,18 @@ void RigCamera::validate() const {
   requireOption(std::isfinite(at.z()), "T_rig_cam: z", at.z(), "finite (metres)");
   requireOption(time_offset_ns >= -kEndOfTimeNs && time_offset_ns <= kEndOfTimeNs, "time offset",
                 formatSeconds(time_offset_ns), "within " + formatSeconds(kEndOfTimeNs) + " s");
+}
+
+bool isSelected(int camera, const std::vector<int>& selection) {
+  return selection.empty() ||
+         std::find(selection.begin(), selection.end(), camera) != selection.end();
+}
+
+std::vector<int> selectedCameras(const Rig& rig, const std::vector<int>& selection) {
+  if (!selection.empty()) return selection;
+  std::vector<int> all(rig.cameras.size());
+  std::iota(all.begin(), all.end(), 0);
+  return all;
 }
 
 }  // namespace efm

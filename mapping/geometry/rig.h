@@ -31,4 +31,10 @@ struct Rig {
   std::vector<RigCamera> cameras;
 };
 
+/// Whether a camera is one of those that are chosen by their indices; empty: all are.
+bool isSelected(int camera, const std::vector<int>& selection);
+/// The indices of the cameras that are chosen, in the order of the selection; empty: all of the
+/// rig.
+std::vector<int> selectedCameras(const Rig& rig, const std::vector<int>& selection);
+
 }  // namespace efm

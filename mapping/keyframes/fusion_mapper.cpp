@@ -78,7 +78,7 @@ int FusionMapper::addCamera(const RigCamera& camera) {
   if (mapper_) throw std::logic_error("a camera was added after the first keyframe");
   camera.validate();
   const auto index = static_cast<int>(rig_.cameras.size());
-  const bool takes_part = selected(index);
+  const bool takes_part = isSelected(index, options_.cameras);
   std::vector<bool> outside_lens;
   if (takes_part) {
     tbb::task_arena arena(options_.keyframe.sweep.threadsOrCores());
@@ -271,11 +271,7 @@ std::optional<KeyframeDepthMap> FusionMapper::mapWindow(const Window& window, Ds
 
 KeyframeMapper& FusionMapper::keyframeMapper() const {
   if (!mapper_) {
-    std::vector<int> cameras = options_.cameras;
-    if (cameras.empty()) {
-      cameras.resize(rig_.cameras.size());
-      std::iota(cameras.begin(), cameras.end(), 0);
-    }
+    const std::vector<int> cameras = selectedCameras(rig_, options_.cameras);
     std::vector<UndistortionTable> tables;
     for (const int camera : cameras) {
       if (auto table = undistortion_.extract(camera)) tables.push_back(std::move(table.mapped()));
@@ -316,11 +312,6 @@ MapperCounts FusionMapper::counts() const {
   MapperCounts counts = counts_;
   for (const CameraStream& camera : cameras_) counts.cameras.push_back(camera.counts());
   return counts;
-}
-
-bool FusionMapper::selected(int camera) const {
-  const std::vector<int>& cameras = options_.cameras;
-  return cameras.empty() || std::find(cameras.begin(), cameras.end(), camera) != cameras.end();
 }
 
 /// No event of a camera before this time is still to come.

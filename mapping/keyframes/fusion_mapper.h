@@ -131,7 +131,6 @@ class FusionMapper : private RecordingProgress {
   std::int64_t releasableUntil() const;
   void releaseBefore(std::int64_t t_ns);
 
-  bool selected(int camera) const;
   std::int64_t completeUntil(const CameraStream& camera) const;
   std::size_t countBefore(std::int64_t t_ns) const;
 

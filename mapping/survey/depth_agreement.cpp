@@ -36,8 +36,7 @@ void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
 std::optional<DepthAgreement> depthAgreement(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options) {
-  const std::size_t cameras = options.cameras.empty() ? rig.cameras.size() : options.cameras.size();
-  if (cameras < 2) return std::nullopt;
+  if (selectedCameras(rig, options.cameras).size() < 2) return std::nullopt;
   CoarseSweep rig_sweep(rig, options);
   CoarseSweep motion_sweep(rig, withCamera(options, options.keyframe.reference_camera));
   std::vector<double> ratios;

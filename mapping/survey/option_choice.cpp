@@ -8,6 +8,7 @@
 #include <iterator>
 #include <utility>
 
+#include "mapping/depth/median.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/scene_depths.h"
 
@@ -71,12 +72,6 @@ std::string number(double value) {
   return digits.data();
 }
 
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// A number with this many significant digits, for people to read; not above the value.
 double roundedDown(double value, int digits) {
   const double unit = std::pow(10.0, std::floor(std::log10(value)) - digits + 1);
@@ -106,7 +101,7 @@ double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
       const auto motion = motionIn(middleOf(sample, window_s), rig, options);
       if (motion) moves.push_back(moveOf(*motion));
     }
-    if (moves.empty() || medianOf(moves) <= kMaxMove) break;
+    if (moves.empty() || upperMedian(moves) <= kMaxMove) break;
   }
   return roundedDown(window_s, 1);
 }
@@ -138,7 +133,7 @@ double parallaxIn(const std::vector<WindowSample>& samples, double window_s, con
     const auto motion = motionIn(middleOf(sample, window_s), rig, options);
     if (motion) parallaxes.push_back(motion->parallax_px_m);
   }
-  return parallaxes.empty() ? 0 : medianOf(parallaxes);
+  return parallaxes.empty() ? 0 : upperMedian(parallaxes);
 }
 
 void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choice) {
@@ -150,7 +145,7 @@ void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choic
   // Where a quarter of a pixel of parallax is a tenth of the depth. It matters for a single camera
   // that moves little.
   const double accurate_m = 0.1 / 0.25 * parallax_px_m;
-  const double most_m = 2 / medianOf(depths.inverse);
+  const double most_m = 2 / depths.median();
   if (accurate_m < max_m) {
     max_m = std::max(accurate_m, most_m);
     reason += ", and the parallax is too small for larger depths";
@@ -212,7 +207,7 @@ std::vector<ChosenOption> chooseOptions(const AutomaticOptions& automatic, const
     return choice.take();
   }
   if (!options.only_window) {
-    chooseWindow(motionLimit(samples, rig, options, medianOf(depths.inverse)), duration_s, choice);
+    chooseWindow(motionLimit(samples, rig, options, depths.median()), duration_s, choice);
   }
   const double window_s = lengthOf(options);
   const double parallax_px_m = parallaxIn(samples, window_s, rig, options);

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "mapping/depth/median.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/event_sharpness.h"
 #include "mapping/survey/sample_piece.h"
@@ -40,11 +41,6 @@ Rig withInvertedStereo(Rig rig) {
   const Rigid3 T_cam0_cam1 = rig.cameras[0].T_rig_cam.inverse() * rig.cameras[1].T_rig_cam;
   rig.cameras[1].T_rig_cam = rig.cameras[0].T_rig_cam * T_cam0_cam1.inverse();
   return rig;
-}
-
-bool takesPart(int camera, const FusionMapperOptions& options) {
-  const std::vector<int>& cameras = options.cameras;
-  return cameras.empty() || std::find(cameras.begin(), cameras.end(), camera) != cameras.end();
 }
 
 /// Gains of one hypothesis over the poses as they are: a logarithm per piece.
@@ -113,13 +109,13 @@ class PoseCheck {
       wrong.push_back(candidate.gains.mean());
       candidates_.push_back(std::move(candidate));
     }
-    std::nth_element(wrong.begin(), wrong.begin() + static_cast<std::ptrdiff_t>(wrong.size() / 2),
-                     wrong.end());
-    typical_wrong_ = wrong[wrong.size() / 2];
+    typical_wrong_ = upperMedian(wrong);
   }
 
   void compareCameras() {
-    if (rig_.cameras.size() < 2 || !takesPart(0, options_) || !takesPart(1, options_)) return;
+    if (rig_.cameras.size() < 2 || !isSelected(0, options_.cameras) ||
+        !isSelected(1, options_.cameras))
+      return;
     Candidate swapped;
     swapped.finding.mistake = PoseMistake::kCamerasSwapped;
     const CameraModel& left = rig_.cameras[0].model;
@@ -224,10 +220,7 @@ class PoseCheck {
     return gainOf(candidate) >= min_gain && candidate.gains.agree(min_gain) &&
            gainOf(candidate) >= (time ? kMinShiftDistinction : kMinDistinction) * typical_wrong_;
   }
-  bool severalCameras() const {
-    const std::vector<int>& cameras = options_.cameras;
-    return (cameras.empty() ? rig_.cameras.size() : cameras.size()) > 1;
-  }
+  bool severalCameras() const { return selectedCameras(rig_, options_.cameras).size() > 1; }
   std::optional<PoseFinding> unexplained() const {
     if (!severalCameras() || 1 >= kMinExplained * typical_wrong_) return std::nullopt;
     double span_s = 0;

@@ -15,12 +15,7 @@ constexpr std::size_t kPieces = 4;
 
 std::vector<std::vector<Event>> thinned(const std::vector<EventSpan>& events) {
   std::vector<std::vector<Event>> all;
-  for (const EventSpan& span : events) {
-    std::vector<Event> chosen;
-    const EventSpan some = chooseEvenly(span, kMaxPieceEvents, chosen);
-    if (chosen.empty()) chosen.assign(some.begin(), some.end());
-    all.push_back(std::move(chosen));
-  }
+  for (const EventSpan& span : events) all.push_back(chosenEvenly(span, kMaxPieceEvents));
   return all;
 }
 

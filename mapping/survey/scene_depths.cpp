@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <numeric>
 #include <utility>
 
 namespace efm {
@@ -18,18 +17,9 @@ constexpr double kNearestMove = 0.5;
 constexpr double kFarthestParallaxPx = 0.5;  // beyond it, depth cannot be told from infinity
 constexpr int kMaxCoarsePlanes = 400;
 
-std::vector<int> selectedCameras(const Rig& rig, const FusionMapperOptions& options) {
-  std::vector<int> cameras = options.cameras;
-  if (cameras.empty()) {
-    cameras.resize(rig.cameras.size());
-    std::iota(cameras.begin(), cameras.end(), 0);
-  }
-  return cameras;
-}
-
-KeyframeMapperOptions coarse(const Rig& rig, const FusionMapperOptions& options,
-                             const Coarseness& coarseness) {
-  KeyframeMapperOptions coarse = options.keyframe;
+FusionMapperOptions withSmallView(FusionMapperOptions options, const Rig& rig,
+                                  const Coarseness& coarseness) {
+  KeyframeMapperOptions& coarse = options.keyframe;
   const auto reference = static_cast<std::size_t>(coarse.reference_camera);
   const int width = coarse.view.width.value_or(
       reference < rig.cameras.size() ? rig.cameras[reference].model.width : coarseness.width);
@@ -44,7 +34,7 @@ KeyframeMapperOptions coarse(const Rig& rig, const FusionMapperOptions& options,
   coarse.event_images = false;
   coarse.view_events = false;
   coarse.exclude_silent = true;
-  return coarse;
+  return options;
 }
 
 /// How far a unit of inverse depth (1/m) moves the view of a camera at `p_view` (metres), in
@@ -82,7 +72,7 @@ std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
     const std::optional<Rigid3> T_world_then = data.trajectory->poseAt(t_ns);
     if (!T_world_then) continue;
     const Rigid3 T_view_rig = T_view_world * *T_world_then;
-    for (const int camera : selectedCameras(rig, options)) {
+    for (const int camera : selectedCameras(rig, options.cameras)) {
       const Rigid3& T_rig_cam = rig.cameras.at(static_cast<std::size_t>(camera)).T_rig_cam;
       motion.rig_baseline_m =
           std::max(motion.rig_baseline_m, (T_rig_cam.translation - T_rig_view.translation).norm());
@@ -99,11 +89,9 @@ std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
 
 CoarseSweep::CoarseSweep(const Rig& rig, const FusionMapperOptions& options,
                          const Coarseness& coarseness)
-    : options_(options),
+    : options_(withSmallView(options, rig, coarseness)),
       plane_step_px_(coarseness.plane_step_px),
-      mapper_(rig, selectedCameras(rig, options), coarse(rig, options, coarseness)) {
-  options_.keyframe = coarse(rig, options, coarseness);
-}
+      mapper_(rig, selectedCameras(rig, options.cameras), options_.keyframe) {}
 
 std::optional<KeyframeDepthMap> CoarseSweep::map(const WindowData& data) {
   const std::optional<ViewMotion> motion = motionIn(data, mapper_.rig(), options_);
@@ -170,11 +158,9 @@ SceneDepths sceneDepths(CoarseSweep& sweep, const std::vector<WindowSample>& sam
   for (const WindowSample& sample : samples) {
     const std::optional<KeyframeDepthMap> keyframe = sweep.map(middleOf(sample, window_s));
     if (!keyframe) continue;
-    const std::size_t before = depths.inverse.size();
     for (const float depth_m : keyframe->map.depth) {
       if (depth_m > 0) depths.inverse.push_back(1 / static_cast<double>(depth_m));
     }
-    if (depths.inverse.size() > before) ++depths.windows;
     depths.nearest = std::max(depths.nearest, 1 / sweep.planes().depth(0));
   }
   std::sort(depths.inverse.begin(), depths.inverse.end());

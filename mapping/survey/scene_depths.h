@@ -55,7 +55,9 @@ class CoarseSweep {
 struct SceneDepths {
   std::vector<double> inverse;  ///< Inverse depths of the points, 1/m, in increasing order.
   double nearest = 0;           ///< The inverse depth of the nearest plane, 1/m.
-  std::size_t windows = 0;      ///< That have points.
+
+  /// The upper median, 1/m. @pre There is a point.
+  double median() const { return inverse[inverse.size() / 2]; }
 };
 
 /// Fewer points do not tell the range of depths.

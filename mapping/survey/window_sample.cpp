@@ -13,10 +13,7 @@ WindowSample sampleOf(const WindowData& data) {
   WindowSample sample;
   sample.window = data.window;
   for (const EventSpan& events : data.events) {
-    std::vector<Event> chosen;
-    const EventSpan some = chooseEvenly(events, kMaxSampleEvents, chosen);
-    if (chosen.empty()) chosen.assign(some.begin(), some.end());
-    sample.events.push_back(std::move(chosen));
+    sample.events.push_back(chosenEvenly(events, kMaxSampleEvents));
   }
   sample.trajectory =
       data.trajectory->moved(data.window.t0_ns, data.window.t1_ns,

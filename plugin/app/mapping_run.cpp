@@ -267,10 +267,7 @@ void describeView(const Rig& rig, const FusionMapperOptions& options, MapReport&
   if (reference >= rig.cameras.size()) return;
   report.view = makeReferenceView(rig.cameras[reference].model, options.keyframe.view);
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const auto& used = options.cameras;
-    const bool takes_part =
-        used.empty() || std::count(used.begin(), used.end(), static_cast<int>(c)) > 0;
-    if (c == reference || !takes_part) continue;
+    if (c == reference || !isSelected(static_cast<int>(c), options.cameras)) continue;
     const double distance_m =
         (rig.cameras[c].T_rig_cam.translation - rig.cameras[reference].T_rig_cam.translation)
             .norm();

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "mapping/depth/median.h"
 #include "mapping/geometry/angle.h"
 #include "plugin/pictures/map_layout.h"
 #include "plugin/pictures/plot_frame.h"
@@ -76,9 +77,7 @@ class Splats {
       if (weight > 0.08F) weights.push_back(weight);
     }
     if (weights.empty()) return 1;
-    const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
-    std::nth_element(weights.begin(), middle, weights.end());
-    return std::max(0.6F, *middle);
+    return std::max(0.6F, upperMedian(weights));
   }
 
   cv::Mat1f weights_;
