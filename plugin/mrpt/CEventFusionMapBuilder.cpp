@@ -91,13 +91,16 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
-  auto session = std::make_unique<MappingSession>(builder_options);
-  for (const StoredKeyframe& keyframe : earlier) {
-    session->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
-  }
+  std::unique_ptr<MappingSession> session;
   std::shared_ptr<LiveMapping> live;
   if (builder_options.live.enabled) {
-    live = std::make_shared<LiveMapping>(builder_options, earlier, liveCallbacks());
+    live =
+        std::make_shared<LiveMapping>(builder_options, std::exchange(earlier, {}), liveCallbacks());
+  } else {
+    session = std::make_unique<MappingSession>(builder_options);
+    for (const StoredKeyframe& keyframe : earlier) {
+      session->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
+    }
   }
   // Without the lock: its thread may run a callback that uses the builder.
   if (former) former->stop();
@@ -117,7 +120,6 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   keyframes_ = std::move(earlier);
   newest_depth_ = {};
   silent_cameras_.clear();
-  mapping_failed_ = false;
   metric_map_.maps.clear();
   event_map_.reset();
 }
@@ -195,23 +197,11 @@ void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>&
   if (error) std::rethrow_exception(error);
 }
 
-void CEventFusionMapBuilder::mapForQuery() const {
-  auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: see the declaration
-  bool failed = false;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    session_->completeEarly();
-    failed = mapping_failed_;
-  }
-  if (!failed) self->mapComplete();  // otherwise the feeding caller got the error
-  const std::lock_guard<std::mutex> lock(mutex_);
-  applyPending();
-}
-
 /// Moves cloud and keyframes to their refined poses, under the lock, so that all queries agree.
 void CEventFusionMapBuilder::applyPending() const {
   session_->applyPending();
-  const_cast<CEventFusionMapBuilder*>(this)->followRefinement();  // NOLINT: as in mapForQuery
+  auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: MRPT's queries are const
+  self->followRefinement();
 }
 
 /// Gives the stored keyframes the poses of the cloud's keyframes.
@@ -224,16 +214,24 @@ void CEventFusionMapBuilder::followRefinement() {
 }
 
 void CEventFusionMapBuilder::mapComplete() {
-  while (const std::optional<MadeKeyframe> made = mapNext()) deliver(*made);
+  std::exception_ptr error;
+  const auto keepFirst = [&](const std::exception_ptr& next) {
+    if (!error) error = next;
+  };
+  std::optional<MadeKeyframe> made;
+  do {
+    made.reset();
+    keepFirst(errorOf([&] { made = mapNext(); }));
+    if (made) keepFirst(errorOf([&] { deliver(*made); }));
+  } while (made);
+  if (error) std::rethrow_exception(error);
 }
 
 std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapNext() {
   const std::lock_guard<std::mutex> lock(mutex_);
   // Within a callback: the caller of the callback goes on mapping.
   if (delivering_.count(std::this_thread::get_id()) != 0) return std::nullopt;
-  mapping_failed_ = true;
   std::optional<KeyframeDepthMap> keyframe = session_->next(sink_, clock_);
-  mapping_failed_ = false;
   if (keyframe) keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
   followRefinement();
   if (!keyframe) return std::nullopt;
@@ -407,11 +405,8 @@ void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_ma
 }
 
 mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() const {
-  const std::shared_ptr<LiveMapping> live = liveMapping();
-  const std::optional<SessionStatus> live_status =
-      live ? std::optional(live->status()) : std::nullopt;
+  const SessionStatus status = this->status();
   const std::lock_guard<std::mutex> lock(mutex_);
-  const SessionStatus status = live_status ? *live_status : session_->status();
   auto estimate = mrpt::poses::CPose3DPDFGaussian::Create();
   const mrpt::poses::CPose3DPDFGaussian* newest = tracker_poses_.newest(status.pose_source);
   if (newest == nullptr) return estimate;
@@ -446,8 +441,8 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
     for (const SimpleMapFrame& frame : live->map()->frames) out_map.insert(frame.pose, frame.frame);
     return;
   }
-  mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
+  applyPending();
   out_map.clear();
   for (const StoredKeyframe& keyframe : keyframes_) insertInto(out_map, keyframe);
 }
@@ -456,7 +451,6 @@ unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
   if (const auto live = liveMapping()) {
     return static_cast<unsigned int>(live->map()->frames.size());
   }
-  mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
   return static_cast<unsigned int>(keyframes_.size());
 }
@@ -467,8 +461,8 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
     handed_out_ = live->map();
     return &handed_out_->metric_map;
   }
-  mapForQuery();
   const std::lock_guard<std::mutex> lock(mutex_);
+  applyPending();
   if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(options_.cloud);
   const bool changed = bringUpToDate(*event_map_, keyframes_);
   if (metric_map_.maps.empty() || changed) {
@@ -486,7 +480,6 @@ void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& fil
   if (const auto live = liveMapping()) {
     std::tie(depth, planes) = live->newestDepth();
   } else {
-    mapForQuery();
     const std::lock_guard<std::mutex> lock(mutex_);
     depth = newest_depth_;
     planes = session_->planes();

@@ -47,9 +47,9 @@ namespace efm {
 /// map so far.
 ///
 /// A program that knows MRPT alone makes the builder by its name, sets its options as those of a
-/// CLoadableOptions and uses it as a CMetricMapBuilder. A call that asks for the map first maps
-/// every window whose events are complete. Only `finish` maps a window that ends in the last 10 ms
-/// of the recording: the last packets do not say until when their cameras are covered.
+/// CLoadableOptions and uses it as a CMetricMapBuilder. Asking for the map changes nothing: it has
+/// the keyframes so far. `finish` maps the windows that wait for the rig or for more events: all of
+/// a recording under a second whose rig is not declared, and those that end in the last 10 ms.
 ///
 /// In live operation (`[live] enabled`) all of this happens in a thread of the builder's own, and
 /// no call but `finish` waits for it: see LiveMapping and plugin/README.md.
@@ -67,7 +67,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
  public:
   /// Receives each keyframe once, after it is inserted into the map and before the next one is
   /// made. A later refinement may change its pose: see `trajectory`. Runs in the thread that feeds
-  /// the builder or asks for the map. With one such thread, keyframes come in the order of their
+  /// the builder. With one such thread, keyframes come in the order of their
   /// windows. May use the builder, whose map then ends with this keyframe.
   using KeyframeCallback = std::function<void(const KeyframeDepthMap&)>;
   /// Live operation: receives each new snapshot of the map, in the mapping's thread.
@@ -182,8 +182,6 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void mapComplete();
   std::optional<MadeKeyframe> mapNext();
   void deliver(const MadeKeyframe& made);
-  /// Maps the complete windows for a query. Const, as MRPT's queries are.
-  void mapForQuery() const;
 
   std::mutex restart_mutex_;  // one at a time starts over
   mutable std::mutex mutex_;  // protects all members below
@@ -193,7 +191,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   MapCallback map_callback_;
   DsiSink* sink_ = nullptr;
   ProcessorClock clock_ = processSeconds;
-  std::unique_ptr<MappingSession> session_;
+  std::unique_ptr<MappingSession> session_;  // null in live operation, which uses live_
   bool finished_ = false;
   std::uint64_t ignored_observations_ = 0;
   TrackerPoses tracker_poses_;
@@ -201,11 +199,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   std::vector<StoredKeyframe> keyframes_;  // the initial map's first
   cv::Mat1f newest_depth_;                 // of the newest keyframe
   std::set<int> silent_cameras_;           // with a warning in the log
-  bool mapping_failed_ = false;            // the last time
   std::set<std::thread::id> delivering_;   // threads within a callback
   mutable mrpt::maps::CMultiMetricMap metric_map_;
   mutable CEventFusionMap::Ptr event_map_;  // in metric_map_
-  std::shared_ptr<LiveMapping> live_;       // null in playback, which uses session_
+  std::shared_ptr<LiveMapping> live_;       // null in playback
   mutable std::shared_ptr<const MapSnapshot> handed_out_;
 };
 

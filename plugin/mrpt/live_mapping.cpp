@@ -153,7 +153,6 @@ bool LiveMapping::mapNext() {
   }
   publishMap(false);
   publishState();
-  warnOfRefinement();
   try {
     if (callbacks_.on_keyframe) callbacks_.on_keyframe(*keyframe);
   } catch (const std::exception&) {
@@ -186,8 +185,16 @@ void LiveMapping::keep(StoredKeyframe keyframe) {
 
 void LiveMapping::publishState() {
   SessionStatus status = session_->status();
-  const std::lock_guard<std::mutex> lock(mutex_);
-  status_ = std::move(status);
+  std::string failure;
+  if (status.refinement && status.refinement->failures > warned_failures_) {
+    warned_failures_ = status.refinement->failures;
+    failure = status.refinement->last_error;
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_ = std::move(status);
+  }
+  if (!failure.empty() && callbacks_.warn) callbacks_.warn("refinement: " + failure);
 }
 
 /// Copies the keyframes and exports the cloud, unless this would take too large a part of the time.
@@ -248,13 +255,6 @@ void LiveMapping::noteError(const std::string& doing, bool counts) {
     }
   }
   if (is_new && callbacks_.warn) callbacks_.warn(doing.empty() ? text : doing + ": " + text);
-}
-
-void LiveMapping::warnOfRefinement() {
-  const std::optional<RefinementState> refinement = session_->status().refinement;
-  if (!refinement || refinement->failures <= warned_failures_) return;
-  warned_failures_ = refinement->failures;
-  if (callbacks_.warn) callbacks_.warn("refinement: " + refinement->last_error);
 }
 
 /// At most once a second.

@@ -98,7 +98,6 @@ class LiveMapping {
   void publishState();
   void publishMap(bool at_once);
   void noteError(const std::string& doing, bool counts);
-  void warnOfRefinement();
   void warnOfLosses();
 
   const LiveOptions options_;

@@ -18,9 +18,6 @@ namespace {
 
 /// A new camera may appear within this time of the recording's first event.
 constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
-/// The same limit if the map is requested.
-constexpr std::int64_t kRigCompletesEarlyNs = kNanosecondsPerSecond / 10;
-
 /// In live operation, automatic options are chosen from the first window of this length.
 constexpr double kFirstWindowS = 1;
 
@@ -254,12 +251,6 @@ std::optional<Window> MappingSession::nextWindow() {
 void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
                                    const Rigid3& T_world_ref) {
   cloud_.insertFixed(points, T_world_ref);
-}
-
-void MappingSession::completeEarly() {
-  // Another camera or a better source of poses may still come.
-  if (rig_.anyCameraWaits() || !pose_source_.selected() || !seenFor(kRigCompletesEarlyNs)) return;
-  completeRig();
 }
 
 void MappingSession::finish() {

@@ -48,12 +48,6 @@ class MappingSession {
   /// Inserts a keyframe of an earlier map into the cloud, before the first new one.
   /// @throws std::invalid_argument as GlobalCloud::insert does.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
-  /// Completes the rig for somebody who asks for the map, so that a short recording becomes a map
-  /// without `finish`: where a packet began more than a tenth of a second after the first event and
-  /// the source of poses is selected. Changes no keyframe. A camera that first appears later is an
-  /// error.
-  /// @throws std::invalid_argument where the options name a camera that the rig does not have.
-  void completeEarly();
   /// No more data will come.
   /// @throws std::invalid_argument where a camera's events came, but none of one of a lower index.
   /// The other cameras are mapped all the same.

@@ -11,6 +11,7 @@
 #include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CActionCollection.h>
+#include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CRawlog.h>
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/rtti/CObject.h>
@@ -47,6 +48,12 @@ std::size_t play(const std::string& file, mrpt::slam::CMetricMapBuilder& builder
     if (observation) one.insert(observation);
     builder.processActionObservation(action ? *action : no_action, frame ? *frame : one);
   }
+  auto end = mrpt::obs::CObservationComment::Create();
+  end->text = "event_fusion: finish";
+  mrpt::obs::CActionCollection no_action;
+  mrpt::obs::CSensoryFrame last;
+  last.insert(end);
+  builder.processActionObservation(no_action, last);
   return entry;
 }
 
