@@ -118,6 +118,11 @@ void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
   cameras_.at(static_cast<std::size_t>(camera)).coverUntil(t_ns);
 }
 
+void FusionMapper::coverAllUntil(std::int64_t t_ns) {
+  for (CameraStream& camera : cameras_) camera.coverUntil(t_ns - camera.onTrajectoryClock(0));
+  if (!start_ns_) giveUpBefore(t_ns);
+}
+
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
   {
     const StageScope scope(stages, Stage::kFilter);

@@ -82,6 +82,9 @@ class FusionMapper : private RecordingProgress {
   /// complete until 10 ms before its newest one. A camera is silent if it has no event in the last
   /// second before the newest packet of any camera begins. A silent camera does not delay others.
   void coverUntil(int camera, std::int64_t t_ns);
+  /// The same for all cameras. `t_ns` is on the trajectory's clock. Poses before it are forgotten
+  /// where no window needs them.
+  void coverAllUntil(std::int64_t t_ns);
   /// No more data will come. Windows that are not full are not mapped.
   void finish() { finished_ = true; }
 

@@ -18,6 +18,11 @@ namespace {
 
 /// A new camera may appear within this time of the recording's first event.
 constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
+/// In live operation, poses wait for events so long.
+constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
+/// Stands for the tracker among the cameras.
+constexpr int kTracker = -1;
+
 /// In live operation, automatic options are chosen from the first window of this length.
 constexpr double kFirstWindowS = 1;
 
@@ -54,7 +59,6 @@ MappingSession::MappingSession(const EventFusionOptions& options)
 void MappingSession::addEvents(CameraPacket packet) {
   const int camera = packet.camera;
   const std::size_t events = packet.events.size();
-  if (options_.live.enabled && events > 0) restartAfterStep(camera, packet.events.front().t_ns);
   std::vector<CameraPacket> packets;
   try {
     const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
@@ -75,7 +79,7 @@ void MappingSession::addEvents(CameraPacket packet) {
     } catch (const std::invalid_argument&) {
       if (mapper_.counts().total().read == read) {
         status_.refused_events[ready_camera] += ready_events;
-        if (ready_events > 0) refused_since_ns_.try_emplace(ready_camera, ready_ns);
+        if (ready_events > 0) noteRefusal(ready_camera, ready_ns);
       }
       if (!refusal) refusal = std::current_exception();
       continue;
@@ -85,11 +89,11 @@ void MappingSession::addEvents(CameraPacket packet) {
   if (refusal) std::rethrow_exception(refusal);
 }
 
-/// Where a camera's packets have been refused for a second of its clock, the clock went back: the
-/// mapping starts anew, with the map so far.
-void MappingSession::restartAfterStep(int camera, std::int64_t t_ns) {
-  const auto since = refused_since_ns_.find(camera);
-  if (since == refused_since_ns_.end() || t_ns - since->second < kNanosecondsPerSecond) return;
+/// In live operation: where all packets of a camera, or all poses, have been refused for a second
+/// of their clock, the clock went back. The mapping starts anew then, with the map so far.
+void MappingSession::noteRefusal(int sensor, std::int64_t t_ns) {
+  const std::int64_t since_ns = refused_since_ns_.try_emplace(sensor, t_ns).first->second;
+  if (!options_.live.enabled || t_ns - since_ns < kNanosecondsPerSecond) return;
   if (status_.events) mapper_.giveUpBefore(status_.events->last_ns + 1);
   earlier_counts_ += mapper_.counts();
   const Rig rig = mapper_.rig();
@@ -146,7 +150,14 @@ void MappingSession::completeRig() {
 
 void MappingSession::addPose(const StampedPose& pose, const PoseSourceId& source,
                              const std::optional<PoseNoise>& noise) {
-  usePoses(pose_source_.add(source, pose), noise);
+  const std::vector<StampedPose> poses = pose_source_.add(source, pose);
+  try {
+    usePoses(poses, noise);
+  } catch (const std::invalid_argument&) {
+    noteRefusal(kTracker, pose.t_ns);
+    throw;
+  }
+  if (!poses.empty()) refused_since_ns_.erase(kTracker);
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // Of two poses of the same time the first counts, and so does its noise.
   if (refinement_ && used) noises_[source].try_emplace(pose.t_ns, noise);
@@ -201,9 +212,15 @@ bool MappingSession::beginStretch() {
   return true;
 }
 
-/// Gives up the windows whose poses are overdue, where no other window can be mapped.
-void MappingSession::limitPoseWait() {
-  if (!options_.live.enabled || finished_ || !status_.events) return;
+/// Where no window can be mapped, neither events nor poses wait for the others without end: gives
+/// up the windows whose poses are overdue, and takes overdue events for silence.
+void MappingSession::limitWaits() {
+  if (!options_.live.enabled || finished_) return;
+  if (newest_pose_) {
+    const StampedPose& newest = next_stretch_.empty() ? *newest_pose_ : next_stretch_.back();
+    mapper_.coverAllUntil(newest.t_ns - kMaxEventWaitNs);
+  }
+  if (!status_.events) return;
   const std::int64_t overdue_ns =
       status_.events->last_ns - durationFromSeconds(options_.live.max_pose_wait_s);
   if (!newest_pose_ || newest_pose_->t_ns < overdue_ns) mapper_.giveUpBefore(overdue_ns);
@@ -263,13 +280,13 @@ void MappingSession::finish() {
 
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock) {
   if (!rig_.isComplete() || !chooseAutomatic()) {
-    limitPoseWait();
+    limitWaits();
     return std::nullopt;
   }
   StageTimer timer(status_.times, clock);
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
   while (!keyframe && beginStretch()) keyframe = mapper_.next(sink, &timer);
-  if (!keyframe) limitPoseWait();
+  if (!keyframe) limitWaits();
   if (keyframe) {
     if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
       mapper_.setPlanes(depth_follower_->planes());

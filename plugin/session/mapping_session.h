@@ -111,11 +111,11 @@ class MappingSession {
   void feed(CameraPacket packet);
   bool seenFor(std::int64_t duration_ns) const;
   void completeRig();
-  void restartAfterStep(int camera, std::int64_t t_ns);
+  void noteRefusal(int sensor, std::int64_t t_ns);
   void usePoses(const std::vector<StampedPose>& poses, const std::optional<PoseNoise>& noise);
   bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
   bool beginStretch();
-  void limitPoseWait();
+  void limitWaits();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   bool chooseAutomatic();
   void insert(KeyframeDepthMap& keyframe);
@@ -137,8 +137,9 @@ class MappingSession {
   std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
   std::optional<StampedPose> newest_pose_;
   std::vector<StampedPose> next_stretch_;  // poses after a jump, until those before it are used up
-  std::map<int, std::int64_t> refused_since_ns_;  // by camera; first event of the refused packets
-  SessionStatus status_;                          // incomplete: see status()
+  // By camera, or the tracker: the first time that was refused since the newest one that was not.
+  std::map<int, std::int64_t> refused_since_ns_;
+  SessionStatus status_;  // incomplete: see status()
 };
 
 }  // namespace efm

@@ -228,8 +228,9 @@ TEST_F(LiveBuilderWithFiles, ADeclaredRigWaitsForNoCamera) {
       "  camera_model: pinhole\n  intrinsics: [100, 100, 59.5, 44.5]\n"
       "  distortion_model: none\n  distortion_coeffs: []\n  resolution: [120, 90]\n";
   std::ofstream(folder() / "rig.yaml")
-      << "cam0:\n" << camera << "cam1:\n" << camera
-      << "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+      << "cam0:\n"
+      << camera << "cam1:\n"
+      << camera << "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
   EventFusionOptions options = liveOptions();
   options.rig.calibration = folder() / "rig.yaml";
   // Camera 1 begins at 1.6 s: undeclared, it would be an error from 1 s on.
@@ -300,11 +301,60 @@ TEST(LiveBuilder, AClockThatGoesBackStartsTheMappingAnew) {
 
   const SessionStatus status = builder.status();
   EXPECT_EQ(status.live->clock_steps, 1U);
-  EXPECT_GT(status.refused_events.at(0), 0U);
+  EXPECT_GT(status.refused_events.at(0) + status.live->refused_poses, 0U);
   expectSumsAgree(status);
   // All of the first time (windows of 0.2 s, every 0.1 s), and of the second from 1 s on.
   EXPECT_GE(builder.trajectory().size(), 23U + 12U);
   EXPECT_LT(builder.trajectory()[24].t_ns, recording.poses.back().t_ns - 1'000'000'000);
+}
+
+TEST(LiveBuilder, OnePoseFromTheFutureCostsASecond) {
+  const SyntheticRecording recording(3);
+  Observations observations = observationsOf(recording);
+  const auto future = changed({observations[2]},
+                              [](CObservation& pose) { pose.timestamp += std::chrono::hours(1); });
+  ASSERT_EQ(future[0]->sensorLabel, "pose");
+  observations.insert(observations.begin() + 100, future[0]);  // of 900
+  CEventFusionMapBuilder builder(liveOptions());
+  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+  playPatiently(builder, observations);
+
+  const SessionStatus status = builder.status();
+  EXPECT_EQ(status.live->clock_steps, 1U);
+  expectSumsAgree(status);
+  CEventFusionMapBuilder playback(syntheticOptions());
+  play(playback, observationsOf(recording));
+  const std::set<std::int64_t> all = keyframeTimes(playback);
+  const std::set<std::int64_t> times = keyframeTimes(builder);
+  EXPECT_GE(times.size(), all.size() - 14) << "windows of 0.2 s, every 0.1 s";
+  EXPECT_LT(times.size(), all.size());
+}
+
+TEST(LiveBuilder, PosesWaitForEventsTenMinutes) {
+  const SyntheticRecording recording;
+  const Observations observations = observationsOf(recording);
+  for (const double wait_s : {590, 610}) {
+    CEventFusionMapBuilder builder(liveOptions());
+    Observations poses;
+    Observations packets;
+    for (const auto& observation : observations) {
+      (observation->sensorLabel == "pose" ? poses : packets).push_back(observation);
+    }
+    const auto newest = changed({poses.back()}, [&](CObservation& pose) {
+      pose.timestamp +=
+          std::chrono::duration_cast<mrpt::Clock::duration>(std::chrono::duration<double>(wait_s));
+    });
+    feed(builder, poses);
+    feed(builder, newest);
+    while (builder.status().poses.value_or(TimeSpan{}).last_ns <= recording.poses.back().t_ns) {
+      std::this_thread::yield();
+    }
+    playPatiently(builder, packets);
+    const SessionStatus status = builder.status();
+    expectSumsAgree(status);
+    EXPECT_EQ(status.counts.total().dropped == status.counts.total().read, wait_s > 600) << wait_s;
+    EXPECT_EQ(builder.trajectory().size(), wait_s > 600 ? 0U : 3U);
+  }
 }
 
 TEST(LiveBuilder, AfterAnErrorTheNextKeyframeIsTried) {
