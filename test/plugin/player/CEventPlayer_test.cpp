@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include <fstream>
+#include <functional>
 #include <thread>
 
 #include "plugin/formats/rawlog_writer.h"
@@ -16,6 +17,7 @@
 #include "plugin/mrpt/mrpt_time.h"
 #include "test/plugin/formats/dataset_of.h"
 #include "test/plugin/message_of.h"
+#include "test/plugin/mrpt/observations.h"
 #include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -76,15 +78,20 @@ Observations taken(CGenericSensor& sensor) {
   return all;
 }
 
-/// Plays to the end. @return all observations, in the order in which they came.
-Observations playToTheEnd(CGenericSensor& sensor) {
-  Observations all;
+/// Plays to the end. @param use receives the observations as they come.
+void playToTheEnd(CGenericSensor& sensor,
+                  const std::function<void(const CObservation::Ptr&)>& use) {
   const auto deadline = Clock::now() + std::chrono::seconds(60);
   while (!dynamic_cast<const CEventPlayer&>(sensor).ended()) {
     if (Clock::now() > deadline) throw std::runtime_error("it does not end");
     sensor.doProcess();
-    for (const auto& observation : taken(sensor)) all.push_back(observation);
+    for (const auto& observation : taken(sensor)) use(observation);
   }
+}
+
+Observations playToTheEnd(CGenericSensor& sensor) {
+  Observations all;
+  playToTheEnd(sensor, [&](const CObservation::Ptr& observation) { all.push_back(observation); });
   return all;
 }
 
@@ -133,6 +140,24 @@ TEST_F(EventPlayer, PlaysAllInRealTimeAndNothingEarly) {
   EXPECT_EQ(events, recording_.events);
   player->doProcess();
   EXPECT_TRUE(taken(*player).empty()) << "nothing follows the end";
+}
+
+TEST_F(EventPlayer, FeedsALiveMapBuilder) {
+  CEventFusionMapBuilder playback(syntheticOptions());
+  play(playback, expected());
+  EventFusionOptions options = syntheticOptions();
+  options.live.enabled = true;
+  CEventFusionMapBuilder live(options);
+  const auto player = sensor("process_rate = 100\nrecording = data\nspeed = 2\n");
+  player->initialize();
+  playToTheEnd(*player,
+               [&](const CObservation::Ptr& observation) { live.processObservation(observation); });
+  live.finish();
+
+  ASSERT_FALSE(playback.points().empty());
+  expectSameBits(live.points(), playback.points());
+  EXPECT_EQ(live.status().live->dropRatio(), 0);
+  EXPECT_EQ(live.status().live->errors, 0U) << live.status().live->last_error;
 }
 
 TEST_F(EventPlayer, TheQueueOfASlowHostHasALimitAndNothingIsLost) {
