@@ -267,19 +267,29 @@ TEST(LiveBuilder, AJumpOfTheTrackerBeginsANewStretch) {
     }
   };
   const Observations observations = changed(observationsOf(recording), move);
-  CEventFusionMapBuilder builder(liveOptions());
-  playPatiently(builder, observations);
-
-  const SessionStatus status = builder.status();
-  EXPECT_EQ(status.live->pose_jumps, 1U);
-  expectSumsAgree(status);
   CEventFusionMapBuilder playback(syntheticOptions());
   play(playback, observationsOf(recording));
   const auto all = keyframeTimes(playback);
-  const auto times = keyframeTimes(builder);
-  for (const std::int64_t t_ns : all) {  // windows of 0.2 s around t_ns
-    const bool spans = t_ns - 100'000'000 < jump_ns && t_ns + 100'000'000 > jump_ns - 10'000'000;
-    EXPECT_EQ(times.count(t_ns), spans ? 0U : 1U) << t_ns;
+  for (const bool refines : {false, true}) {
+    EventFusionOptions options = liveOptions();
+    options.refinement.enabled = refines;
+    CEventFusionMapBuilder builder(options);
+    playPatiently(builder, observations);
+
+    const SessionStatus status = builder.status();
+    EXPECT_EQ(status.live->pose_jumps, 1U);
+    expectSumsAgree(status);
+    const auto times = keyframeTimes(builder);
+    for (const std::int64_t t_ns : all) {  // windows of 0.2 s around t_ns
+      const bool spans = t_ns - 100'000'000 < jump_ns && t_ns + 100'000'000 > jump_ns - 10'000'000;
+      EXPECT_EQ(times.count(t_ns), spans ? 0U : 1U) << t_ns;
+    }
+    for (const StampedPose& keyframe : builder.trajectory()) {
+      // The rig itself moves by 1.6 m.
+      EXPECT_EQ(keyframe.T_world_rig.translation.x() > 5, keyframe.t_ns > jump_ns);
+    }
+    EXPECT_EQ(status.refinement.has_value(), refines);
+    EXPECT_EQ(status.refinement.value_or(RefinementState{}).failures, 0U);
   }
   // A noise that explains it is no jump.
   const auto doubt = [&](CObservation& observation) {
