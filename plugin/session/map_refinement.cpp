@@ -147,6 +147,7 @@ void MapRefinement::publish(double seconds, double cpu_seconds) {
   state_.tracker = refiner_.trackerErrors();
   state_.seconds += seconds;
   state_.cpu_seconds += cpu_seconds;
+  state_.most_seconds = std::max(state_.most_seconds, seconds);
 }
 
 void MapRefinement::runInBackground() {

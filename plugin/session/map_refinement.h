@@ -38,9 +38,10 @@ struct RefinementState {
   std::size_t waiting = 0;  ///< Keyframes not refined yet.
   /// Errors so far. A keyframe whose refinement fails keeps the tracker's motion.
   std::uint64_t failures = 0;
-  std::string last_error;  ///< Of the last failure; empty without one.
-  double seconds = 0;      ///< Time spent refining.
-  double cpu_seconds = 0;  ///< Processor time of it.
+  std::string last_error;   ///< Of the last failure; empty without one.
+  double seconds = 0;       ///< Time spent refining.
+  double cpu_seconds = 0;   ///< Processor time of it.
+  double most_seconds = 0;  ///< The longest time of one keyframe.
 };
 
 /// The covariance of a corrected pose of the tracker, in the order of `poseCovariance`: the newest

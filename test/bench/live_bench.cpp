@@ -3,6 +3,7 @@
 // speed, another one asks for every result 50 times a second. Prints how long the calls took, what
 // was lost and how the memory grew.
 #include <fmt/format.h>
+#include <malloc.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 
@@ -67,11 +68,21 @@ class Latencies {
   std::vector<double> all_ms_;
 };
 
-double residentMegabytes() {
+/// Of the process, and how much of it is in use: the rest waits for the next allocation.
+std::string memory() {
   std::ifstream status("/proc/self/statm");
   double pages = 0;
   status >> pages >> pages;
-  return pages * 4096e-6;
+  const auto heap = ::mallinfo2();
+  return fmt::format("{:.0f} MB, {:.0f} MB in use", pages * 4096e-6,
+                     static_cast<double>(heap.uordblks + heap.hblkhd) * 1e-6);
+}
+
+std::string refinementOf(const SessionStatus& status) {
+  const auto& state = status.refinement;
+  if (!state) return "";
+  return fmt::format("; refined in {:.1f} s, at most {:.2f} s for a keyframe, {} loops, {} wait",
+                     state->seconds, state->most_seconds, state->counts.loops, state->waiting);
 }
 
 /// A recording that goes on: forward, backward in time, forward again. Each event `rate` times.
@@ -260,8 +271,9 @@ void run(const Arguments& arguments) {
       builder.processObservation(observation);
       of_observations.add(millisecondsSince(call));
       if (t_s >= next_memory_s) {
-        fmt::print("{:6.0f} s: {:.0f} MB, {} keyframes\n", t_s, residentMegabytes(),
-                   builder.status().counts.keyframes);
+        const SessionStatus status = builder.status();
+        fmt::print("{:6.0f} s: {}, {} keyframes{}\n", t_s, memory(), status.counts.keyframes,
+                   refinementOf(status));
         std::fflush(stdout);
         next_memory_s += std::max(1.0, arguments.seconds / 20);
       }
@@ -272,8 +284,8 @@ void run(const Arguments& arguments) {
   const auto points = builder.points();
   fmt::print("from the last event of a window to its keyframe: {}\n", of_keyframes.text());
   printCounts(builder.status());
-  fmt::print("{:.0f} MB at the end; {} points, hash {:016x}\n", residentMegabytes(), points.size(),
-             hashOf(points));
+  fmt::print("{} at the end{}; {} points, hash {:016x}\n", memory(), refinementOf(builder.status()),
+             points.size(), hashOf(points));
   if (!arguments.pcd.empty()) writePcd(arguments.pcd, points);
 }
 
