@@ -15,10 +15,12 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/io/atomic_file.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/exception_of.h"
 #include "plugin/mrpt/host_options.h"
+#include "plugin/mrpt/live_mapping.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
-#include "plugin/mrpt/points_map.h"
+#include "plugin/mrpt/playback_mapping.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/session_feed.h"
 #include "plugin/pictures/depth_picture.h"
@@ -27,39 +29,6 @@ IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 
 namespace efm {
 namespace {
-
-/// The exception of a step; null if it throws none.
-template <typename Step>
-std::exception_ptr errorOf(Step step) {
-  try {
-    step();
-  } catch (...) {
-    return std::current_exception();
-  }
-  return nullptr;
-}
-
-/// Moves and inserts keyframes of a map until they equal `keyframes`. @return whether it changed.
-bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
-  bool changed = map.keyframes().size() < keyframes.size();
-  for (std::size_t i = 0; i < map.keyframes().size(); ++i) {
-    if (isSame(map.keyframes()[i].T_world_ref, keyframes[i].T_world_ref)) continue;
-    map.moveKeyframe(i, keyframes[i].T_world_ref);
-    changed = true;
-  }
-  for (std::size_t i = map.keyframes().size(); i < keyframes.size(); ++i) {
-    map.insertKeyframe(keyframes[i]);
-  }
-  return changed;
-}
-
-std::vector<StampedPose> posesOf(const std::vector<StoredKeyframe>& keyframes) {
-  std::vector<StampedPose> poses;
-  for (const StoredKeyframe& keyframe : keyframes) {
-    poses.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
-  }
-  return poses;
-}
 
 /// A host that knows MRPT alone ends the recording by this.
 bool isFinish(const mrpt::obs::CObservation& observation) {
@@ -74,54 +43,38 @@ CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder
   restart(builder_options);
 }
 
-CEventFusionMapBuilder::~CEventFusionMapBuilder() {
-  if (const auto live = liveMapping()) live->stop();
-}
+CEventFusionMapBuilder::~CEventFusionMapBuilder() = default;
 
-std::shared_ptr<LiveMapping> CEventFusionMapBuilder::liveMapping() const {
+std::shared_ptr<HostedMapping> CEventFusionMapBuilder::mapping() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return live_;
+  return mapping_;
 }
 
 /// @param earlier keyframes of an initial map.
 void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      std::vector<StoredKeyframe> earlier) {
-  const std::shared_ptr<LiveMapping> former = liveMapping();
-  if (former && former->runsHere()) {
+  // Before the lock: who has it may wait for the end of this very callback.
+  if (const auto current = mapping(); current && !current->mayStopHere()) {
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
-  std::unique_ptr<MappingSession> session;
-  std::shared_ptr<LiveMapping> live;
+  std::shared_ptr<HostedMapping> next;
   if (builder_options.live.enabled) {
-    live =
-        std::make_shared<LiveMapping>(builder_options, std::exchange(earlier, {}), liveCallbacks());
+    next = std::make_shared<LiveMapping>(builder_options, std::move(earlier), callbacks());
   } else {
-    session = std::make_unique<MappingSession>(builder_options);
-    for (const StoredKeyframe& keyframe : earlier) {
-      session->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
-    }
+    next = std::make_shared<PlaybackMapping>(builder_options, std::move(earlier), callbacks());
   }
   // Without the lock: its thread may run a callback that uses the builder.
-  if (former) former->stop();
+  if (const auto former = mapping()) former->stop();
   const std::lock_guard<std::mutex> lock(mutex_);
-  live_ = std::move(live);
-  if (live_) {
-    live_->setSink(sink_);
-    live_->setClock(clock_);
-  }
-  handed_out_.reset();
+  mapping_ = std::move(next);
+  mapping_->setSink(sink_);
+  mapping_->setClock(clock_);
   tracker_poses_.clear();
-  session_ = std::move(session);
   options_ = builder_options;
-  finished_ = false;
   ignored_observations_ = 0;
   reckoning_ = {};
-  keyframes_ = std::move(earlier);
-  newest_depth_ = {};
   silent_cameras_.clear();
-  metric_map_.maps.clear();
-  event_map_.reset();
 }
 
 void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_options) {
@@ -147,8 +100,8 @@ void CEventFusionMapBuilder::setMapCallback(MapCallback callback) {
   map_callback_ = std::move(callback);
 }
 
-LiveMapping::Callbacks CEventFusionMapBuilder::liveCallbacks() {
-  LiveMapping::Callbacks callbacks;
+HostedMapping::Callbacks CEventFusionMapBuilder::callbacks() {
+  HostedMapping::Callbacks callbacks;
   callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
     std::vector<std::string> warnings;
     KeyframeCallback callback;
@@ -175,86 +128,13 @@ LiveMapping::Callbacks CEventFusionMapBuilder::liveCallbacks() {
 void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
-  if (live_) live_->setSink(sink);
+  mapping_->setSink(sink);
 }
 
 void CEventFusionMapBuilder::setProcessorClock(ProcessorClock clock) {
   const std::lock_guard<std::mutex> lock(mutex_);
   clock_ = std::move(clock);
-  if (live_) live_->setClock(clock_);
-}
-
-void CEventFusionMapBuilder::advance(const std::function<void(MappingSession&)>& feed) {
-  std::exception_ptr error;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (finished_) throw std::logic_error("the builder was given an observation after its end");
-    error = errorOf([&] { feed(*session_); });
-  }
-  // A refused observation does not stop the mapping of earlier ones.
-  const std::exception_ptr mapping_error = errorOf([this] { mapComplete(); });
-  if (!error) error = mapping_error;
-  if (error) std::rethrow_exception(error);
-}
-
-/// Moves cloud and keyframes to their refined poses, under the lock, so that all queries agree.
-void CEventFusionMapBuilder::applyPending() const {
-  session_->applyPending();
-  auto* self = const_cast<CEventFusionMapBuilder*>(this);  // NOLINT: MRPT's queries are const
-  self->followRefinement();
-}
-
-/// Gives the stored keyframes the poses of the cloud's keyframes.
-void CEventFusionMapBuilder::followRefinement() {
-  const std::vector<Rigid3>& T_world_ref = session_->T_world_ref();
-  const std::size_t earlier = keyframes_.size() - T_world_ref.size();
-  for (std::size_t i = 0; i < T_world_ref.size(); ++i) {
-    keyframes_[earlier + i].T_world_ref = T_world_ref[i];
-  }
-}
-
-void CEventFusionMapBuilder::mapComplete() {
-  std::exception_ptr error;
-  const auto keepFirst = [&](const std::exception_ptr& next) {
-    if (!error) error = next;
-  };
-  std::optional<MadeKeyframe> made;
-  do {
-    made.reset();
-    keepFirst(errorOf([&] { made = mapNext(); }));
-    if (made) keepFirst(errorOf([&] { deliver(*made); }));
-  } while (made);
-  if (error) std::rethrow_exception(error);
-}
-
-std::optional<CEventFusionMapBuilder::MadeKeyframe> CEventFusionMapBuilder::mapNext() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  // Within a callback: the caller of the callback goes on mapping.
-  if (delivering_.count(std::this_thread::get_id()) != 0) return std::nullopt;
-  std::optional<KeyframeDepthMap> keyframe = session_->next(sink_, clock_);
-  if (keyframe) keyframes_.push_back(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
-  followRefinement();
-  if (!keyframe) return std::nullopt;
-  newest_depth_ = keyframe->map.depth;
-  std::vector<std::string> warnings = warningsOfSilence(*keyframe);
-  return MadeKeyframe{std::move(*keyframe), callback_, std::move(warnings)};
-}
-
-void CEventFusionMapBuilder::deliver(const MadeKeyframe& made) {
-  const auto self = std::this_thread::get_id();
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    delivering_.insert(self);
-  }
-  const std::exception_ptr error = errorOf([&] {
-    for (const std::string& warning : made.warnings) MRPT_LOG_WARN(warning);
-    if (made.callback) made.callback(made.keyframe);
-  });
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    delivering_.erase(self);
-  }
-  if (error) std::rethrow_exception(error);
+  mapping_->setClock(clock_);
 }
 
 /// One warning per camera. `status` counts the silent keyframes.
@@ -284,99 +164,45 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
 }
 
 void CEventFusionMapBuilder::addEvents(CameraPacket packet) {
-  const bool updates = options.enableMapUpdating;  // MRPT's, of every map builder
-  if (const auto live = liveMapping()) {
-    if (updates) {
-      live->input().add(std::move(packet));
-    } else {
-      live->input().skip(packet);
-    }
-    return;
+  if (options.enableMapUpdating) {  // MRPT's, of every map builder
+    mapping()->addEvents(std::move(packet));
+  } else {
+    mapping()->skipEvents(packet);
   }
-  advance([&](MappingSession& session) {
-    if (updates) {
-      session.addEvents(std::move(packet));
-    } else {
-      session.skipEvents(packet);
-    }
-  });
 }
 
 void CEventFusionMapBuilder::addPose(const mrpt::obs::CObservation& observation) {
-  // Under the lock.
-  const auto note = [&](const std::optional<Rigid3>& T_body_rig) {
-    const std::optional<ObservedPose> observed = poseIn(observation);
-    const Rigid3 T_world_rig = rigPose(*observed, T_body_rig);
-    tracker_poses_.add(observation, *observed, T_world_rig);
-    return QueuedPose{{observed->t_ns, T_world_rig}, *poseSourceOf(observation), observed->noise};
-  };
-  if (const auto live = liveMapping()) {
+  const auto mapping = this->mapping();
+  const std::optional<ObservedPose> observed = poseIn(observation);
+  const Rigid3 T_world_rig = rigPose(*observed, mapping->T_body_rig());
+  {
     const std::lock_guard<std::mutex> lock(mutex_);
-    live->input().add(note(live->T_body_rig()));
-    return;
+    tracker_poses_.add(observation, *observed, T_world_rig);
   }
-  advance([&](MappingSession& session) {
-    const QueuedPose pose = note(session.setup().T_body_rig);
-    session.addPose(pose.pose, pose.source, pose.noise);
-  });
+  mapping->addPose({{observed->t_ns, T_world_rig}, *poseSourceOf(observation), observed->noise});
 }
 
-void CEventFusionMapBuilder::finish() {
-  if (const auto live = liveMapping()) {
-    live->finish();
-    return;
-  }
-  advance([this](MappingSession& session) {
-    finished_ = true;
-    session.finish();
-  });
-}
+void CEventFusionMapBuilder::finish() { mapping()->finish(); }
 
 std::shared_ptr<const MapSnapshot> CEventFusionMapBuilder::snapshot() const {
-  const auto live = liveMapping();
-  return live ? live->map() : nullptr;
+  return mapping()->snapshot();
 }
 
-SessionStatus CEventFusionMapBuilder::status() const {
-  if (const auto live = liveMapping()) return live->status();
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return session_->status();
-}
+SessionStatus CEventFusionMapBuilder::status() const { return mapping()->status(); }
 
 std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return ignored_observations_;
 }
 
-std::vector<CloudPoint> CEventFusionMapBuilder::points() const {
-  if (const auto live = liveMapping()) return live->map()->points;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  applyPending();
-  return session_->cloud().points();
-}
+std::vector<CloudPoint> CEventFusionMapBuilder::points() const { return mapping()->points(); }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
-  if (const auto live = liveMapping()) return live->map()->trajectory;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  applyPending();
-  return posesOf(keyframes_);
+  return mapping()->keyframePoses().in_map;
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
-  const auto withTracker = [](std::vector<StampedPose> poses,
-                              const std::vector<Rigid3>& T_odom_ref) {
-    const std::size_t earlier = poses.size() - T_odom_ref.size();
-    for (std::size_t i = 0; i < T_odom_ref.size(); ++i) {
-      poses[earlier + i].T_world_rig = T_odom_ref[i];
-    }
-    return poses;
-  };
-  if (const auto live = liveMapping()) {
-    const auto map = live->map();
-    return withTracker(map->trajectory, map->T_odom_ref);
-  }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return withTracker(posesOf(keyframes_), session_->T_odom_ref());
+  return mapping()->keyframePoses().by_tracker;
 }
 
 // --- mrpt::config::CLoadableOptions ----------------------------------------------------------
@@ -427,7 +253,7 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
   // One bad observation takes no other one with it.
   std::exception_ptr error;
   const auto process = [&](const mrpt::obs::CObservation::Ptr& observation) {
-    const std::exception_ptr refusal = errorOf([&] { processObservation(observation); });
+    const std::exception_ptr refusal = exceptionOf([&] { processObservation(observation); });
     if (!error) error = refusal;
   };
   if (pose) process(pose);
@@ -436,54 +262,21 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
 }
 
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
-  if (const auto live = liveMapping()) {
-    out_map.clear();
-    for (const SimpleMapFrame& frame : live->map()->frames) out_map.insert(frame.pose, frame.frame);
-    return;
-  }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  applyPending();
   out_map.clear();
-  for (const StoredKeyframe& keyframe : keyframes_) insertInto(out_map, keyframe);
+  mapping()->copyTo(out_map);
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
-  if (const auto live = liveMapping()) {
-    return static_cast<unsigned int>(live->map()->frames.size());
-  }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return static_cast<unsigned int>(keyframes_.size());
+  return static_cast<unsigned int>(mapping()->simpleMapSize());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
-  if (const auto live = liveMapping()) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    handed_out_ = live->map();
-    return &handed_out_->metric_map;
-  }
-  const std::lock_guard<std::mutex> lock(mutex_);
-  applyPending();
-  if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(options_.cloud);
-  const bool changed = bringUpToDate(*event_map_, keyframes_);
-  if (metric_map_.maps.empty() || changed) {
-    metric_map_.maps.clear();
-    metric_map_.maps.push_back(event_map_);
-    metric_map_.maps.push_back(pointsMapOf(event_map_->cloud().points()));
-  }
-  return &metric_map_;
+  return mapping()->metricMap();
 }
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
-  cv::Mat1f depth;
-  DepthPlanesOptions planes;
-  if (const auto live = liveMapping()) {
-    std::tie(depth, planes) = live->newestDepth();
-  } else {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    depth = newest_depth_;
-    planes = session_->planes();
-  }
+  const auto [depth, planes] = mapping()->newestDepth();
   if (depth.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(depth, planes, Palette::kBrightToDark);
   writeAtomically(file, [&](const std::filesystem::path& temporary) {

@@ -10,16 +10,14 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "maps/cloud/cloud_point.h"
 #include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/dead_reckoning.h"
-#include "plugin/mrpt/live_mapping.h"
+#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/mrpt/stored_keyframe.h"
 #include "plugin/mrpt/tracker_poses.h"
 #include "plugin/options/option_file.h"
@@ -54,8 +52,8 @@ namespace efm {
 /// In live operation (`[live] enabled`) all of this happens in a thread of the builder's own, and
 /// no call but `finish` waits for it: see LiveMapping and plugin/README.md.
 ///
-/// Thread-safe. In playback one mutex is held while a keyframe is made. It is not held while a
-/// keyframe is delivered or a message is logged: callbacks of both may use the builder.
+/// Thread-safe. In playback a call that needs the map waits while a keyframe is made, but not while
+/// one is delivered or a message is logged: callbacks of both may use the builder.
 /// `processObservation` returns after the windows that became complete are mapped. Several threads
 /// may feed the builder: overlapping calls have no order, but observations in the order of time
 /// make the same map.
@@ -160,28 +158,12 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void saveCurrentEstimationToImage(const std::string& file, bool format_emf_bmp = true) override;
 
  private:
-  /// A keyframe that is in the map and not yet delivered.
-  struct MadeKeyframe {
-    KeyframeDepthMap keyframe;
-    KeyframeCallback callback;
-    std::vector<std::string> warnings;  // for the log
-  };
-
   void restart(const EventFusionOptions& builder_options, std::vector<StoredKeyframe> earlier = {});
-  /// Null in playback.
-  std::shared_ptr<LiveMapping> liveMapping() const;
-  LiveMapping::Callbacks liveCallbacks();
+  std::shared_ptr<HostedMapping> mapping() const;
+  HostedMapping::Callbacks callbacks();
   void addEvents(CameraPacket packet);
   void addPose(const mrpt::obs::CObservation& observation);
-  void followRefinement();
-  void applyPending() const;
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
-  /// Feeds the session under the lock, then maps and delivers. Throws the first error at the end.
-  void advance(const std::function<void(MappingSession&)>& feed);
-  /// Maps the complete windows and delivers their keyframes, one by one.
-  void mapComplete();
-  std::optional<MadeKeyframe> mapNext();
-  void deliver(const MadeKeyframe& made);
 
   std::mutex restart_mutex_;  // one at a time starts over
   mutable std::mutex mutex_;  // protects all members below
@@ -191,19 +173,11 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   MapCallback map_callback_;
   DsiSink* sink_ = nullptr;
   ProcessorClock clock_ = processSeconds;
-  std::unique_ptr<MappingSession> session_;  // null in live operation, which uses live_
-  bool finished_ = false;
   std::uint64_t ignored_observations_ = 0;
   TrackerPoses tracker_poses_;
-  DeadReckoning reckoning_;                // of the actions
-  std::vector<StoredKeyframe> keyframes_;  // the initial map's first
-  cv::Mat1f newest_depth_;                 // of the newest keyframe
-  std::set<int> silent_cameras_;           // with a warning in the log
-  std::set<std::thread::id> delivering_;   // threads within a callback
-  mutable mrpt::maps::CMultiMetricMap metric_map_;
-  mutable CEventFusionMap::Ptr event_map_;  // in metric_map_
-  std::shared_ptr<LiveMapping> live_;       // null in playback
-  mutable std::shared_ptr<const MapSnapshot> handed_out_;
+  DeadReckoning reckoning_;                 // of the actions
+  std::set<int> silent_cameras_;            // with a warning in the log
+  std::shared_ptr<HostedMapping> mapping_;  // never null. Last: its callbacks use the others
 };
 
 }  // namespace efm

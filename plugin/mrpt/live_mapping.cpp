@@ -54,7 +54,7 @@ LiveMapping::LiveMapping(const EventFusionOptions& options, std::vector<StoredKe
   thread_ = std::thread([this] { run(); });
 }
 
-LiveMapping::~LiveMapping() { stop(); }
+LiveMapping::~LiveMapping() { LiveMapping::stop(); }
 
 void LiveMapping::stop() {
   queue_.stop();
@@ -306,7 +306,22 @@ SessionStatus LiveMapping::status() const {
   return status;
 }
 
-std::shared_ptr<const MapSnapshot> LiveMapping::map() const {
+KeyframePoses LiveMapping::keyframePoses() {
+  const auto map = snapshot();
+  return efm::keyframePoses(map->trajectory, map->T_odom_ref);
+}
+
+void LiveMapping::copyTo(mrpt::maps::CSimpleMap& map) {
+  for (const SimpleMapFrame& frame : snapshot()->frames) map.insert(frame.pose, frame.frame);
+}
+
+const mrpt::maps::CMultiMetricMap* LiveMapping::metricMap() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  handed_out_ = map_;
+  return &handed_out_->metric_map;
+}
+
+std::shared_ptr<const MapSnapshot> LiveMapping::snapshot() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return map_;
 }

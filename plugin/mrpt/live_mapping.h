@@ -17,27 +17,12 @@
 #include <thread>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
 #include "plugin/live/input_queue.h"
+#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/mrpt/stored_keyframe.h"
 #include "plugin/session/mapping_session.h"
 
 namespace efm {
-
-/// A keyframe of a simplemap. Shared with those who asked for the map: never changed.
-struct SimpleMapFrame {
-  mrpt::poses::CPose3DPDF::Ptr pose;
-  mrpt::obs::CSensoryFrame::Ptr frame;
-};
-
-/// The map as it was at one moment.
-struct MapSnapshot {
-  std::vector<StampedPose> trajectory;     ///< Of all keyframes, those of the initial map first.
-  std::vector<Rigid3> T_odom_ref;          ///< Of the others: by the tracker.
-  std::vector<SimpleMapFrame> frames;      ///< The newest keyframes, as those of a simplemap.
-  std::vector<CloudPoint> points;          ///< The exported points.
-  mrpt::maps::CMultiMetricMap metric_map;  ///< The points as a CPointsMapXYZI.
-};
 
 /// Maps in a thread of its own, for live operation. Adding input never waits for the mapping, and
 /// results are snapshots: nothing here waits for a sweep but `finish` and the destructor, which
@@ -49,47 +34,46 @@ struct MapSnapshot {
 ///
 /// An error of the mapping, the refinement or a callback is counted and logged; its window is given
 /// up and the next one is tried.
-class LiveMapping {
+class LiveMapping : public HostedMapping {
  public:
-  struct Callbacks {
-    /// All run in the mapping's thread.
-    std::function<void(const KeyframeDepthMap&)> on_keyframe;
-    std::function<void(const std::shared_ptr<const MapSnapshot>&)> on_map;
-    std::function<void(const std::string&)> warn;
-  };
-
   /// @param earlier keyframes of an initial map.
   /// @throws std::runtime_error naming a file of the options that cannot be read.
   LiveMapping(const EventFusionOptions& options, std::vector<StoredKeyframe> earlier,
               Callbacks callbacks);
   /// Ends without mapping the rest.
-  ~LiveMapping();
+  ~LiveMapping() override;
   LiveMapping(const LiveMapping&) = delete;
   LiveMapping& operator=(const LiveMapping&) = delete;
 
-  /// The same, waiting for the current keyframe; further input is lost. Not from the mapping's
-  /// thread. One thread at a time.
-  void stop();
+  /// The same, waiting for the current keyframe. One thread at a time.
+  void stop() override;
+  bool mayStopHere() const override { return !runsHere(); }
 
-  InputQueue& input() { return queue_; }
-  /// The pose of the rig on the body, from the options.
-  const std::optional<Rigid3>& T_body_rig() const { return T_body_rig_; }
+  /// Copies the packet. @throws std::invalid_argument as InputQueue::add.
+  void addEvents(CameraPacket packet) override { queue_.add(std::move(packet)); }
+  void skipEvents(const CameraPacket& packet) override { queue_.skip(packet); }
+  void addPose(const QueuedPose& pose) override { queue_.add(pose); }
   /// Maps the rest of the input and waits for it.
   /// @throws std::logic_error in the mapping's own thread; the error of the rig: a camera or an
   /// option that does not fit.
-  void finish();
+  void finish() override;
 
-  void setSink(DsiSink* sink);
-  void setClock(ProcessorClock clock);
+  void setSink(DsiSink* sink) override;
+  void setClock(ProcessorClock clock) override;
 
-  SessionStatus status() const;
+  std::optional<Rigid3> T_body_rig() const override { return T_body_rig_; }
+  SessionStatus status() const override;
+  std::vector<CloudPoint> points() override { return snapshot()->points; }
+  KeyframePoses keyframePoses() override;
+  std::size_t simpleMapSize() const override { return snapshot()->frames.size(); }
+  void copyTo(mrpt::maps::CSimpleMap& map) override;
+  const mrpt::maps::CMultiMetricMap* metricMap() override;
   /// Never null.
-  std::shared_ptr<const MapSnapshot> map() const;
-  /// The newest keyframe's depth map, empty before the first one, and its planes.
-  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
-  bool runsHere() const { return std::this_thread::get_id() == thread_.get_id(); }
+  std::shared_ptr<const MapSnapshot> snapshot() const override;
+  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const override;
 
  private:
+  bool runsHere() const { return std::this_thread::get_id() == thread_.get_id(); }
   void run();
   bool feed(InputQueue::Batch batch);
   bool mapNext();
@@ -124,6 +108,7 @@ class LiveMapping {
   SessionStatus status_;
   LiveStatus live_;
   std::shared_ptr<const MapSnapshot> map_;
+  std::shared_ptr<const MapSnapshot> handed_out_;  // whose metric map was returned last
   cv::Mat1f newest_depth_;
   DepthPlanesOptions planes_;
   bool finished_ = false;

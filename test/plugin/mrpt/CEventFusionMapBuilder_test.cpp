@@ -329,8 +329,6 @@ TEST(CEventFusionMapBuilder, NoQueryIsAnsweredWhileAKeyframeIsMade) {
                      {"points", [&] { builder.points(); }},
                      {"trajectory", [&] { builder.trajectory(); }},
                      {"trackerTrajectory", [&] { builder.trackerTrajectory(); }},
-                     {"usedOptions", [&] { builder.usedOptions(); }},
-                     {"ignoredObservations", [&] { builder.ignoredObservations(); }},
                      {"getCurrentPoseEstimation", [&] { builder.getCurrentPoseEstimation(); }},
                      {"getCurrentlyBuiltMapSize", [&] { builder.getCurrentlyBuiltMapSize(); }}});
   builder.setDsiSink(&sink);

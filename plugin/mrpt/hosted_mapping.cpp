@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/hosted_mapping.h"
+
+namespace efm {
+
+KeyframePoses keyframePoses(std::vector<StampedPose> in_map,
+                            const std::vector<Rigid3>& T_odom_ref) {
+  KeyframePoses poses{in_map, std::move(in_map)};
+  const std::size_t earlier = poses.by_tracker.size() - T_odom_ref.size();
+  for (std::size_t i = 0; i < T_odom_ref.size(); ++i) {
+    poses.by_tracker[earlier + i].T_world_rig = T_odom_ref[i];
+  }
+  return poses;
+}
+
+}  // namespace efm
