@@ -279,9 +279,11 @@ void GlobalCloud::settle(std::uint64_t below) {
   settled_below_ = below;
 }
 
-std::size_t GlobalCloud::unsettledVoxels() const {
+std::size_t GlobalCloud::unsettledVoxels(std::uint64_t below) const {
   std::size_t count = 0;
-  for (const auto& [number, keyframe] : keyframes_) count += keyframe.voxels.size();
+  for (auto at = keyframes_.begin(); at != keyframes_.end() && at->first < below; ++at) {
+    count += at->second.voxels.size();
+  }
   return count;
 }
 

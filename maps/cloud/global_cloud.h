@@ -84,9 +84,9 @@ class GlobalCloud {
   /// @param below all keyframes below `below` + `kMaxNumberDifference` are in the map, or never
   /// will be: `insert` refuses them from now on, `remove` and `replace` those below `below`.
   void settle(std::uint64_t below);
-  /// The number of voxels that `settle` merged, and of those that keyframes have of their own.
+  /// The number of voxels that `settle` merged, and of those that it would merge.
   std::size_t settledVoxels() const { return settled_.size(); }
-  std::size_t unsettledVoxels() const;
+  std::size_t unsettledVoxels(std::uint64_t below) const;
 
   /// The points with a support of at least `min_keyframes`, sorted by voxel (x, y, z). Cost:
   /// merging the voxels of all keyframes.

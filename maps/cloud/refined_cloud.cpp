@@ -38,7 +38,7 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
   const std::size_t keyframe = T_world_ref_.size();
   T_world_ref_.push_back(T_world_ref);
   try {
-    if (movable_) {
+    if (movable_ > 0) {
       const double radius_m = radiusOf(points);
       kept_.push_back({std::move(points), radius_m});
     }
@@ -47,15 +47,31 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
     forgetNewest();
     throw;
   }
-  if (!movable_) settle(fixed_ + keyframe);
+  settle();
 }
 
-/// Merges the keyframes that no later one checks, when enough voxels have gathered.
-void RefinedCloud::settle(std::uint64_t newest) {
+/// When enough voxels have gathered, merges the keyframes that cannot change any more: neither they
+/// nor those that check them may move from now on.
+void RefinedCloud::settle() {
   constexpr std::size_t kMinVoxels = 200'000;  // some 14 MB
-  if (newest < GlobalCloud::kMaxNumberDifference) return;
-  if (cloud_.unsettledVoxels() < std::max(kMinVoxels, cloud_.settledVoxels() / 2)) return;
-  cloud_.settle(newest - GlobalCloud::kMaxNumberDifference);
+  constexpr std::uint64_t kCheckers = GlobalCloud::kMaxNumberDifference;
+  const std::uint64_t newest = fixed_ + T_world_ref_.size() - 1;
+  if (newest < movable_ || newest - movable_ < kCheckers) return;
+  const std::uint64_t below = newest - movable_ - kCheckers;
+  if (cloud_.unsettledVoxels(below) < std::max(kMinVoxels, cloud_.settledVoxels() / 2)) return;
+  const std::uint64_t first_movable = below + kCheckers;
+  if (movable_ > 0 && first_movable > fixed_) freeze(first_movable - fixed_);
+  cloud_.settle(below);
+}
+
+/// Moves the keyframes below a number for the last time, and forgets their points.
+void RefinedCloud::freeze(std::size_t below) {
+  while (!pending_.empty() && pending_.begin()->first < below) {
+    const auto [keyframe, T_world_ref] = *pending_.begin();
+    pending_.erase(pending_.begin());
+    put(keyframe, T_world_ref);
+  }
+  for (; frozen_ < below; ++frozen_) kept_[frozen_] = {};
 }
 
 void RefinedCloud::removeNewest() {
@@ -73,10 +89,11 @@ void RefinedCloud::forgetNewest() {
 void RefinedCloud::move(std::map<std::size_t, Rigid3> T_world_ref) {
   if (T_world_ref.empty()) return;
   const std::size_t last = T_world_ref.rbegin()->first;
-  if (!movable_ || last >= T_world_ref_.size()) {
+  if (movable_ == 0 || last >= T_world_ref_.size()) {
     throw std::invalid_argument("keyframe " + std::to_string(last) + " cannot be moved: " +
-                                (movable_ ? "it is not in the cloud" : "keyframes are fixed"));
+                                (movable_ > 0 ? "it is not in the cloud" : "keyframes are fixed"));
   }
+  T_world_ref.erase(T_world_ref.begin(), T_world_ref.lower_bound(frozen_));
   T_world_ref.merge(pending_);  // a new request replaces an earlier one
   pending_ = std::move(T_world_ref);
 }

@@ -13,13 +13,16 @@
 namespace efm {
 
 /// The global cloud with keyframes that move. Each keyframe keeps its points in its own view; it is
-/// removed and inserted again with its new pose. The cost of a move does not grow with the map. Not
-/// thread-safe.
+/// removed and inserted again with its new pose. The cost of a move does not grow with the map.
+/// Keyframes that cannot move any more are merged into the map for good. Not thread-safe.
 class RefinedCloud {
  public:
-  /// @param movable whether keyframes may move. Then their points are kept, 16 bytes each.
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+
+  /// @param movable how many of the newest keyframes may move, at least; 0: none may. Their points
+  /// are kept, 16 bytes each.
   /// @throws std::invalid_argument where the options are not valid.
-  RefinedCloud(const GlobalCloudOptions& options, bool movable)
+  RefinedCloud(const GlobalCloudOptions& options, std::size_t movable)
       : cloud_(options), movable_(movable) {}
 
   /// Inserts a keyframe of an earlier map. It never moves.
@@ -30,7 +33,8 @@ class RefinedCloud {
   /// Removes the keyframe that was inserted last, if there is one.
   void removeNewest();
 
-  /// Requests new poses for keyframes, by their numbers. `applyPending` moves them.
+  /// Requests new poses for keyframes, by their numbers. `applyPending` moves them. A request for a
+  /// keyframe that cannot move any more is dropped: it keeps its last pose.
   /// @throws std::invalid_argument where a keyframe was not inserted, or keyframes are not movable.
   /// Nothing is requested then.
   void move(std::map<std::size_t, Rigid3> T_world_ref);
@@ -48,7 +52,8 @@ class RefinedCloud {
  private:
   void put(std::size_t keyframe, const Rigid3& T_world_ref);
   void forgetNewest();
-  void settle(std::uint64_t newest);
+  void settle();
+  void freeze(std::size_t below);
 
   struct KeptPoints {
     std::vector<ViewPoint> points;
@@ -56,10 +61,11 @@ class RefinedCloud {
   };
 
   GlobalCloud cloud_;
-  bool movable_;
-  std::size_t fixed_ = 0;
+  std::size_t movable_;
+  std::size_t fixed_ = 0;   // keyframes of an earlier map
+  std::size_t frozen_ = 0;  // the first keyframes, which cannot move any more
   std::vector<Rigid3> T_world_ref_;
-  std::vector<KeptPoints> kept_;           // one per T_world_ref_ where movable
+  std::vector<KeptPoints> kept_;  // one per T_world_ref_ where keyframes move; frozen: none
   std::map<std::size_t, Rigid3> pending_;  // requested poses
 };
 

@@ -19,8 +19,8 @@ struct LiveOptions {
   double max_queue_mb = 256;
   /// Events wait this long for poses. Seconds, above 0, at most 3600.
   double max_pose_wait_s = 2;
-  /// Keyframes with their own clouds, for MRPT's simplemaps: the newest ones. At least 1. The
-  /// points of all stay in the map.
+  /// Keyframes with their own clouds, for MRPT's simplemaps and for the refinement to move: the
+  /// newest ones. At least 1. The points of all stay in the map.
   int max_keyframes = 1000;
   /// A pose that is farther from the one before it, even by five standard deviations less, begins a
   /// new stretch: no window spans both. Metres per second, degrees per second, above 0.

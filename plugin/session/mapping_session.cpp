@@ -39,6 +39,13 @@ FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
   return options.automatic.any() ? surveyOptions(mapper, kFirstWindowS) : mapper;
 }
 
+/// How many keyframes the refinement may move.
+std::size_t movableKeyframes(const EventFusionOptions& options) {
+  if (!options.refinement.enabled) return 0;
+  return options.live.enabled ? static_cast<std::size_t>(options.live.max_keyframes)
+                              : RefinedCloud::kAll;
+}
+
 }  // namespace
 
 MappingSession::MappingSession(const EventFusionOptions& options)
@@ -46,7 +53,7 @@ MappingSession::MappingSession(const EventFusionOptions& options)
       rig_(options),
       pose_source_(options.rig.pose_source),
       mapper_(mapperOptions(options)),
-      cloud_(options.cloud, options.refinement.enabled) {
+      cloud_(options.cloud, movableKeyframes(options)) {
   if (options.live.enabled) {
     status_.live.emplace();
     rig_.declare(mapper_);

@@ -64,7 +64,7 @@ struct PosedKeyframes {
 /// Keyframes of an earlier map, new ones, motions and `applyPending` in any order.
 void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
   std::mt19937 random(seed);
-  RefinedCloud cloud(options, true);
+  RefinedCloud cloud(options, RefinedCloud::kAll);
   PosedKeyframes keyframes;
   const std::size_t fixed = random() % 4;
   for (std::size_t i = 0; i < fixed; ++i) {
@@ -114,7 +114,7 @@ RC_GTEST_PROP(RefinedCloud, IsANewMapWhereKeyframesCheckEachOther, ()) {
 
 TEST(RefinedCloud, AKeyframeWithinTheToleranceStays) {
   std::mt19937 random(2);
-  RefinedCloud cloud(optionsOf(Consistency::kNone), true);
+  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
   for (int i = 0; i < 2; ++i) cloud.insert({{{0, 0, 2}, 1}, {{0, 0, 4}, 1}}, {});
   Rigid3 T_shifted;
   T_shifted.translation = {0.003, 0, 0};
@@ -134,7 +134,7 @@ TEST(RefinedCloud, AKeyframeWithinTheToleranceStays) {
 }
 
 TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
-  RefinedCloud cloud(optionsOf(Consistency::kNone), true);
+  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
   std::mt19937 random(2);
   for (int i = 0; i < 200; ++i) {
     const Rigid3 T_world_ref = randomPose(random, 1, 1);
@@ -148,7 +148,7 @@ TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
 }
 
 TEST(RefinedCloud, SmallMotionsAddUpToTheTolerance) {
-  RefinedCloud cloud(optionsOf(Consistency::kNone), true);
+  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
   cloud.insert({{{0, 0, 2}, 1}}, {});
   Rigid3 T_world_ref;
   for (int step = 1; step <= 10; ++step) {
@@ -161,7 +161,7 @@ TEST(RefinedCloud, SmallMotionsAddUpToTheTolerance) {
 }
 
 TEST(RefinedCloud, MovesTheOldestFirstUpToTheMaximum) {
-  RefinedCloud cloud(optionsOf(Consistency::kNone), true);
+  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
   Rigid3 T_world_ref;
   T_world_ref.translation = {1, 0, 0};
   for (std::size_t i = 0; i < 5; ++i) cloud.insert({{{0, 0, 2}, 1}}, {});
@@ -187,23 +187,60 @@ TEST(RefinedCloud, RefusesToMoveWhatItDoesNotHaveOrHold) {
   using Poses = std::map<std::size_t, Rigid3>;
   Rigid3 T_world_ref;
   T_world_ref.translation = {1, 0, 0};
-  for (const bool movable : {true, false}) {
+  for (const std::size_t movable : {RefinedCloud::kAll, std::size_t{0}}) {
     RefinedCloud cloud(optionsOf(Consistency::kNone), movable);
     cloud.insertFixed({{{0, 0, 2}, 1}}, {});
     EXPECT_THROW(cloud.move({{0, T_world_ref}}), std::invalid_argument) << "an earlier map's";
     cloud.insert({{{0, 0, 2}, 1}}, {});
     const Poses beyond = {{0, T_world_ref}, {1, T_world_ref}};
-    EXPECT_THROW(cloud.move(movable ? beyond : Poses{{0, T_world_ref}}), std::invalid_argument);
+    EXPECT_THROW(cloud.move(movable > 0 ? beyond : Poses{{0, T_world_ref}}), std::invalid_argument);
     cloud.applyPending(0);
     EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {})) << "nothing was requested";
     EXPECT_THROW(cloud.insertFixed({}, {}), std::invalid_argument);
   }
 }
 
+TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
+  std::mt19937 random(5);
+  GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
+  options.voxel_size_m = 0.001;  // a voxel for almost each point: enough of them settle
+  constexpr std::size_t kMovable = 12;
+  RefinedCloud cloud(options, kMovable);
+  cloud.insertFixed({}, {});
+  PosedKeyframes keyframes;
+  std::size_t stayed = 0;
+  for (std::size_t k = 0; k < 40; ++k) {
+    keyframes.points.push_back(randomPoints(random, 12'000));
+    cloud.insert(keyframes.points.back(), randomPose(random, 0.1, 0.1));
+    // The newest one, the oldest that may move, and some of all.
+    std::map<std::size_t, Rigid3> moves{{k, randomPose(random, 0.1, 0.1)}};
+    if (k >= kMovable) moves[k - kMovable] = randomPose(random, 0.1, 0.1);
+    for (int i = 0; i < 2; ++i) moves[random() % (k + 1)] = randomPose(random, 0.1, 0.1);
+    cloud.move(moves);
+    if (k % 3 != 2) continue;  // others stay pending while keyframes are settled
+    cloud.applyPending(0);
+    for (const auto& [keyframe, T_world_ref] : moves) {
+      const bool moved = isSame(cloud.T_world_ref()[keyframe], T_world_ref);
+      EXPECT_TRUE(moved || keyframe + kMovable < k) << keyframe << " of " << k;
+      if (!moved) ++stayed;
+    }
+  }
+  EXPECT_GT(cloud.cloud().settledVoxels(), 0U);
+  EXPECT_GT(stayed, 0U);
+  cloud.applyPending(0);
+  GlobalCloud same(options);
+  same.insert(0, {}, Rigid3{});
+  for (std::size_t k = 0; k < keyframes.points.size(); ++k) {
+    const Rigid3& T_world_ref = cloud.T_world_ref()[k];
+    same.insert(k + 1, pointsInWorld(keyframes.points[k], T_world_ref), T_world_ref);
+  }
+  EXPECT_TRUE(test::sameBits(cloud.cloud().points(), same.points()));
+}
+
 TEST(RefinedCloud, WithoutItsNewestKeyframeItIsAsBefore) {
   std::mt19937 random(4);
   const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
-  RefinedCloud cloud(options, true);
+  RefinedCloud cloud(options, RefinedCloud::kAll);
   PosedKeyframes keyframes;
   for (int i = 0; i < 3; ++i) {
     keyframes.points.push_back(randomPoints(random, 50));
@@ -221,7 +258,7 @@ TEST(RefinedCloud, WithoutItsNewestKeyframeItIsAsBefore) {
 TEST(RefinedCloud, AKeyframeThatCannotBeMovedKeepsItsPose) {
   std::mt19937 random(3);
   const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
-  RefinedCloud cloud(options, true);
+  RefinedCloud cloud(options, RefinedCloud::kAll);
   PosedKeyframes keyframes;
   for (int i = 0; i < 3; ++i) {
     keyframes.points.push_back(randomPoints(random, 50));
