@@ -110,7 +110,7 @@ TEST_F(EvaluateTrajectory, TheTableSaysWhatItComparesIn80Columns) {
   std::vector<StampedPose> truth = readPosesFile(helix("gt.txt"));
   truth.resize(30);
   write("data/poses.txt", truth);
-  helix("out/trajectory.txt", {{}, {1, -2, 3}});
+  helix("out/trajectory.txt", {Eigen::Quaterniond::Identity(), {1, -2, 3}});
   for (const auto& [alignment, name, transform] :
        {std::tuple{TrajectoryAlignment::kSe3, "se3: least squares",
                    "moved by (-1.000, 2.000, -3.000) m, turned by 0.000 deg\n"},

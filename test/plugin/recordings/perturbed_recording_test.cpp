@@ -112,7 +112,8 @@ TEST(PerturbedRecording, MovesPosesAndKeepsAllElse) {
   for (const char* label : {"one", "two"}) {
     for (const auto& pose : posesOf(all, label)) {
       const auto& robot = robotPose(pose);
-      const auto& before = robotPose(poseAt(timeOf(robot)));
+      const auto unperturbed = poseAt(timeOf(robot));
+      const auto& before = robotPose(unperturbed);
       EXPECT_EQ(robot.sensorPose, before.sensorPose);
       EXPECT_TRUE(robot.pose.cov == before.pose.cov);
       EXPECT_GT(robot.pose.mean.distanceTo(before.pose.mean), 1e-5);

@@ -56,11 +56,15 @@ std::vector<std::size_t> rareOnes(const std::vector<std::size_t>& sizes) {
 
 }  // namespace efm
 
-// The other forms of operator new call this one.
+// The forms for arrays call these. Sanitizers have one of their own without an exception.
 void* operator new(std::size_t size) {
   if (efm::fails(size)) throw std::bad_alloc();
   if (void* memory = std::malloc(size > 0 ? size : 1)) return memory;
   throw std::bad_alloc();
+}
+
+void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
+  return efm::fails(size) ? nullptr : std::malloc(size > 0 ? size : 1);
 }
 
 void operator delete(void* memory) noexcept { std::free(memory); }
