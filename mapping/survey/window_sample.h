@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "mapping/events/event.h"
@@ -39,6 +40,8 @@ class SpreadSamples {
   /// Called with each window of a recording, in their order.
   void add(const WindowData& data);
   const std::vector<WindowSample>& samples() const { return samples_; }
+  /// The samples, which this object has no more.
+  std::vector<WindowSample> take() { return std::move(samples_); }
 
  private:
   std::vector<WindowSample> samples_;

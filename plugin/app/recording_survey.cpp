@@ -81,7 +81,7 @@ RecordingSurvey RecordingSurveyor::finish() {
   } catch (const std::exception&) {
   }
   const SessionStatus status = session_.status();
-  RecordingSurvey result{status.rig, samples_.samples(), std::nullopt};
+  RecordingSurvey result{status.rig, samples_.take(), std::nullopt};
   if (status.events && status.poses) {
     result.duration_s = secondsBetween(std::max(status.events->first_ns, status.poses->first_ns),
                                        std::min(status.events->last_ns, status.poses->last_ns));

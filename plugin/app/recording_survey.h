@@ -33,7 +33,7 @@ class RecordingSurveyor {
 
   /// @throws std::exception where a MappingSession does; then nothing more may be added.
   void add(const mrpt::obs::CObservation& observation);
-  /// After the last observation, or after an error.
+  /// Once: after the last observation, or after an error.
   RecordingSurvey finish();
 
  private:
