@@ -245,7 +245,6 @@ class Player {
   const MappingJob& job_;
   Recording& recording_;
   StageTimes& times_;
-  CEventFusionMapBuilder builder_;
   RecordingStatistics statistics_;
   DepthStatistics depths_;
   std::exception_ptr delivery_error_;  // of `on_keyframe`
@@ -259,6 +258,7 @@ class Player {
   double watched_s_ = 0;                    // in the watchers
   StageSeconds told_;                       // until the last keyframe
   Progress progress_;
+  CEventFusionMapBuilder builder_;  // last: its thread uses the others
 };
 
 /// Reports the reference view and the shortest baseline, for disparities.

@@ -36,7 +36,9 @@ std::vector<Event> EventBudget::pass(std::vector<Event> events,
   if (!covered_until_ns) return passed;
   if (intervalOf(*covered_until_ns) > interval_) endInterval(passed);
   if (!held_.empty()) {
-    covered_until_ns = std::min(*covered_until_ns, interval_ * kIntervalNs);
+    const auto earlier = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
+    const Event& oldest = *std::min_element(held_.begin(), held_.end(), earlier);
+    covered_until_ns = std::min({*covered_until_ns, interval_ * kIntervalNs, oldest.t_ns});
   }
   return passed;
 }

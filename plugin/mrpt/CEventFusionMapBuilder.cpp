@@ -43,7 +43,10 @@ CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder
   restart(builder_options);
 }
 
-CEventFusionMapBuilder::~CEventFusionMapBuilder() = default;
+// While all members are there: the mapping's thread may be in a callback that uses the builder.
+CEventFusionMapBuilder::~CEventFusionMapBuilder() {
+  if (mapping_) mapping_->stop();
+}
 
 std::shared_ptr<HostedMapping> CEventFusionMapBuilder::mapping() const {
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -32,9 +32,7 @@ namespace efm {
 /// The builder maps nothing until the rig is complete. The rig is complete when a packet begins
 /// more than a second after the first event, or with the first event if the options or the
 /// recording tell its cameras (see CObservationEvents). A camera that first appears later is an
-/// error. A call that asks for the map completes the rig after a tenth of a second, so a short
-/// recording needs no `finish`. With odometry alone it does not, because poses, which are better,
-/// may follow.
+/// error.
 ///
 /// Automatic options (the default of depth limits, planes and windows) are chosen from the first
 /// second of events with poses, or from all of a shorter recording. Then the depth limits follow
@@ -83,7 +81,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void setKeyframeCallback(KeyframeCallback callback);
   void setMapCallback(MapCallback callback);
   /// @param sink receives every fused plane of every keyframe. Not owned, may be null. The threads
-  /// of the sweep call it while the mutex is held: it must not use the builder.
+  /// of the sweep call it while the mutex is held: it must not use the builder. In live operation a
+  /// keyframe that is being made still uses the former sink: it must live until the next keyframe.
   void setDsiSink(DsiSink* sink);
   /// @param clock measures the stages of `status().times`: the processor time of the threads that
   /// map. By default that of the whole process.
@@ -95,8 +94,9 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// inverse(T_rig_sensor); with a hand-eye transform in the options T_world_rig = T_world_sensor *
   /// T_body_rig.
   /// @throws std::invalid_argument if the observation is null or contradicts its sensor or earlier
-  /// observations; std::logic_error after `finish`. Complete windows are mapped before an error is
-  /// thrown; their keyframes are in the map and delivered. Of two errors, the first is thrown.
+  /// observations; std::logic_error after `finish` in playback (live, it is lost). Complete windows
+  /// are mapped before an error is thrown; their keyframes are in the map and delivered. Of two
+  /// errors, the first is thrown.
   void processObservation(const mrpt::obs::CObservation::Ptr& observation);
   /// Ends the recording: maps the remaining windows.
   void finish();
@@ -142,8 +142,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void processActionObservation(mrpt::obs::CActionCollection& action,
                                 mrpt::obs::CSensoryFrame& observations) override;
   /// One entry per keyframe: the pose of its reference view and a frame with its cloud; see
-  /// `insertInto` in plugin/mrpt/stored_keyframe.h. The builder shares the clouds: do not change
-  /// them.
+  /// `insertInto` in plugin/mrpt/stored_keyframe.h. The builder shares the frames and their
+  /// clouds: do not change them.
   void getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const override;
   /// The number of keyframes.
   unsigned int getCurrentlyBuiltMapSize() override;
@@ -177,7 +177,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   TrackerPoses tracker_poses_;
   DeadReckoning reckoning_;                 // of the actions
   std::set<int> silent_cameras_;            // with a warning in the log
-  std::shared_ptr<HostedMapping> mapping_;  // never null. Last: its callbacks use the others
+  std::shared_ptr<HostedMapping> mapping_;  // never null; used without the lock
 };
 
 }  // namespace efm

@@ -64,17 +64,30 @@ void LiveMapping::stop() {
 void LiveMapping::run() {
   bool goes_on = true;
   while (goes_on) {
-    // A snapshot that was put off is made as soon as it may be.
-    goes_on = feed(map_changed_ ? queue_.wait(map_renewed_ + kMapCostDivisor * map_cost_)
-                                : queue_.wait());
-    while (mapNext()) {
-      const bool more = feed(queue_.take());
-      goes_on = goes_on && more;
-      if (!more) break;
+    try {
+      goes_on = runOnce();
+    } catch (...) {  // no memory
+      noteError("the input", true);
     }
-    if (goes_on) publishMap(false);
-    warnOfLosses();
   }
+  const std::lock_guard<std::mutex> lock(mutex_);  // stopped: nobody waits for the end any more
+  finished_ = true;
+  finished_changed_.notify_all();
+}
+
+/// @return whether more may come.
+bool LiveMapping::runOnce() {
+  // A snapshot that was put off is made as soon as it may be.
+  bool goes_on =
+      feed(map_changed_ ? queue_.wait(map_renewed_ + kMapCostDivisor * map_cost_) : queue_.wait());
+  while (mapNext()) {
+    const bool more = feed(queue_.take());
+    goes_on = goes_on && more;
+    if (!more) break;
+  }
+  if (goes_on) publishMap(false);
+  warnOfLosses();
+  return goes_on;
 }
 
 /// @return whether more may come.
@@ -83,7 +96,7 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
   for (const QueuedPose& pose : batch.poses) {
     try {
       session_->addPose(pose.pose, pose.source, pose.noise);
-    } catch (const std::invalid_argument&) {
+    } catch (...) {
       const std::lock_guard<std::mutex> lock(mutex_);
       ++live_.refused_poses;
       live_.last_error = errorText();
@@ -95,7 +108,7 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
   for (CameraPacket& packet : batch.packets) {
     try {
       session_->addEvents(std::move(packet));
-    } catch (const std::exception&) {  // refused, or no memory
+    } catch (...) {  // refused, or no memory
       noteError("", false);
     }
   }
@@ -104,11 +117,12 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
   std::exception_ptr error;
   try {
     session_->finish();
-  } catch (const std::exception&) {
+  } catch (...) {
     error = std::current_exception();
     noteError("the end of the input", true);
   }
   while (mapNext()) {
+    if (queue_.take().stopped) break;
   }
   publishMap(true);
   publishState();
@@ -138,7 +152,7 @@ bool LiveMapping::mapNext() {
       keep(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
       map_changed_ = true;
     }
-  } catch (const std::exception&) {
+  } catch (...) {
     noteError("a keyframe", true);
     if (!window) return false;
     session_->giveUpWindow(*window);
@@ -155,7 +169,7 @@ bool LiveMapping::mapNext() {
   publishState();
   try {
     if (callbacks_.on_keyframe) callbacks_.on_keyframe(*keyframe);
-  } catch (const std::exception&) {
+  } catch (...) {
     noteError("the callback of a keyframe", true);
   }
   return true;
@@ -221,8 +235,10 @@ void LiveMapping::publishMap(bool at_once) {
     map->points = session_->cloud().points();
     map->metric_map.maps.push_back(pointsMapOf(map->points));
     made = std::move(map);
-  } catch (const std::exception&) {
+  } catch (...) {
     noteError("the snapshot of the map", true);
+    map_renewed_ = Clock::now();  // the next try costs as much
+    map_cost_ = map_renewed_ - begin;
     return;
   }
   map_renewed_ = Clock::now();
@@ -235,7 +251,7 @@ void LiveMapping::publishMap(bool at_once) {
   if (!callbacks_.on_map || !thread_.joinable()) return;
   try {
     callbacks_.on_map(made);
-  } catch (const std::exception&) {
+  } catch (...) {
     noteError("the callback of the map", true);
   }
 }
@@ -254,7 +270,11 @@ void LiveMapping::noteError(const std::string& doing, bool counts) {
       live_.failing = true;
     }
   }
-  if (is_new && callbacks_.warn) callbacks_.warn(doing.empty() ? text : doing + ": " + text);
+  // Refusals at most once a second.
+  const Clock::time_point now = Clock::now();
+  if (!is_new || (!counts && now - refusal_logged_ < std::chrono::seconds(1))) return;
+  if (!counts) refusal_logged_ = now;
+  if (callbacks_.warn) callbacks_.warn(doing.empty() ? text : doing + ": " + text);
 }
 
 /// At most once a second.
@@ -302,6 +322,7 @@ SessionStatus LiveMapping::status() const {
   status.live = live_;
   status.live->cameras = std::move(cameras);
   status.live->pose_jumps = of_session.pose_jumps;
+  status.live->refused_poses += of_session.refused_poses;
   status.live->clock_steps = of_session.clock_steps;
   return status;
 }
@@ -312,7 +333,12 @@ KeyframePoses LiveMapping::keyframePoses() {
 }
 
 void LiveMapping::copyTo(mrpt::maps::CSimpleMap& map) {
-  for (const SimpleMapFrame& frame : snapshot()->frames) map.insert(frame.pose, frame.frame);
+  for (const SimpleMapFrame& frame : snapshot()->frames) {
+    // A host may move its map.
+    map.insert(
+        std::dynamic_pointer_cast<mrpt::poses::CPose3DPDF>(frame.pose->duplicateGetSmartPtr()),
+        frame.frame);
+  }
 }
 
 const mrpt::maps::CMultiMetricMap* LiveMapping::metricMap() {

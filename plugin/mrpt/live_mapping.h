@@ -75,6 +75,7 @@ class LiveMapping : public HostedMapping {
  private:
   bool runsHere() const { return std::this_thread::get_id() == thread_.get_id(); }
   void run();
+  bool runOnce();
   bool feed(InputQueue::Batch batch);
   bool mapNext();
   void giveUpExcess();
@@ -97,6 +98,7 @@ class LiveMapping : public HostedMapping {
   std::chrono::steady_clock::time_point map_renewed_;
   std::chrono::steady_clock::duration map_cost_{};
   std::chrono::steady_clock::time_point warned_;
+  std::chrono::steady_clock::time_point refusal_logged_;
   std::uint64_t warned_losses_ = 0;
   std::size_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;

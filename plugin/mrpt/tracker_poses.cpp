@@ -3,6 +3,7 @@
 
 #include <mrpt/obs/CObservationRobotPose.h>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/mrpt_pose.h"
 
 namespace efm {
@@ -15,7 +16,11 @@ void TrackerPoses::add(const mrpt::obs::CObservation& observation, const Observe
                        const Rigid3& T_world_rig) {
   const auto [at, is_new] = newest_.try_emplace(*poseSourceOf(observation));
   Newest& newest = at->second;
-  if (!is_new && observed.t_ns < newest.t_ns) return;
+  // One that is much older than the newest says that its time was wrong, or the clock went back.
+  if (!is_new && observed.t_ns < newest.t_ns &&
+      newest.t_ns - observed.t_ns <= kNanosecondsPerSecond) {
+    return;
+  }
   newest.t_ns = observed.t_ns;
   newest.pose = {};
   if (const auto* robot = dynamic_cast<const mrpt::obs::CObservationRobotPose*>(&observation)) {

@@ -91,7 +91,7 @@ void MappingSession::addEvents(CameraPacket packet) {
       if (!refusal) refusal = std::current_exception();
       continue;
     }
-    refused_since_ns_.erase(ready_camera);
+    if (ready_events > 0) refused_since_ns_.erase(ready_camera);
   }
   if (refusal) std::rethrow_exception(refusal);
 }
@@ -127,6 +127,8 @@ void MappingSession::feed(CameraPacket packet) {
   const bool empty = packet.events.empty();
   const std::int64_t first_ns = empty ? 0 : packet.events.front().t_ns;
   const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns;
+  std::int64_t newest_ns = last_ns;  // the last events may be late
+  for (const Event& event : packet.events) newest_ns = std::max(newest_ns, event.t_ns);
   {
     const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
     mapper_.addEvents(packet.camera, std::move(packet.events));
@@ -136,6 +138,7 @@ void MappingSession::feed(CameraPacket packet) {
   const std::int64_t begin_ns = first_ns + camera.time_offset_ns;
   extend(status_.events, begin_ns);
   extend(status_.events, last_ns + camera.time_offset_ns);
+  extend(status_.events, newest_ns + camera.time_offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
   // Without a wait where neither another camera nor a better source of poses can come.
   const bool known = rig_.isKnown() && pose_source_.selected();
@@ -161,7 +164,8 @@ void MappingSession::addPose(const StampedPose& pose, const PoseSourceId& source
   try {
     usePoses(poses, noise);
   } catch (const std::invalid_argument&) {
-    noteRefusal(kTracker, pose.t_ns);
+    const bool is_old = newest_pose_ && pose.t_ns < newest_pose_->t_ns - kNanosecondsPerSecond;
+    if (is_old) noteRefusal(kTracker, pose.t_ns);
     throw;
   }
   if (!poses.empty()) refused_since_ns_.erase(kTracker);
@@ -186,7 +190,7 @@ void MappingSession::usePoses(const std::vector<StampedPose>& poses,
   for (const StampedPose& pose : poses) {
     if (options_.live.enabled &&
         (!next_stretch_.empty() || isJump(pose, noise.value_or(PoseNoise{})))) {
-      next_stretch_.push_back(pose);
+      next_stretch_.push_back({pose, noise});
       continue;
     }
     mapper_.addPose(pose);
@@ -213,9 +217,16 @@ bool MappingSession::beginStretch() {
   if (next_stretch_.empty()) return false;
   if (!finished_ && mapper_.eventsCompleteNs() < newest_pose_->t_ns) return false;
   ++status_.live->pose_jumps;
-  mapper_.giveUpBefore(next_stretch_.front().t_ns);
+  mapper_.giveUpBefore(next_stretch_.front().first.t_ns);
   newest_pose_.reset();
-  usePoses(std::exchange(next_stretch_, {}), std::nullopt);
+  for (const auto& [pose, noise] : std::exchange(next_stretch_, {})) {
+    try {
+      usePoses({pose}, noise);
+    } catch (const std::invalid_argument&) {
+      ++status_.live->refused_poses;
+    }
+  }
+  if (finished_ && next_stretch_.empty()) mapper_.finish();
   return true;
 }
 
@@ -224,8 +235,15 @@ bool MappingSession::beginStretch() {
 void MappingSession::limitWaits() {
   if (!options_.live.enabled || finished_) return;
   if (newest_pose_) {
-    const StampedPose& newest = next_stretch_.empty() ? *newest_pose_ : next_stretch_.back();
-    mapper_.coverAllUntil(newest.t_ns - kMaxEventWaitNs);
+    const StampedPose& newest = next_stretch_.empty() ? *newest_pose_ : next_stretch_.back().first;
+    const std::int64_t overdue_ns = newest.t_ns - kMaxEventWaitNs;
+    mapper_.coverAllUntil(overdue_ns);
+    for (auto& [source, noises] : noises_)
+      noises.erase(noises.begin(), noises.lower_bound(overdue_ns));
+    const auto in_time =
+        std::find_if(next_stretch_.begin(), next_stretch_.end(),
+                     [&](const auto& waiting) { return waiting.first.t_ns >= overdue_ns; });
+    next_stretch_.erase(next_stretch_.begin(), in_time);
   }
   if (!status_.events) return;
   const std::int64_t overdue_ns =
@@ -242,8 +260,18 @@ void MappingSession::skipEvents(const CameraPacket& packet) {
 void MappingSession::giveUpBefore(int camera, std::int64_t until_ns) {
   const auto& cameras = mapper_.rig().cameras;
   const auto index = static_cast<std::size_t>(camera);
-  const std::int64_t offset_ns = index < cameras.size() ? cameras[index].time_offset_ns : 0;
-  mapper_.giveUpBefore(until_ns + offset_ns);
+  if (index >= cameras.size()) return;  // nothing of it is here
+  // The times are not checked: those beyond the others are not believed.
+  std::int64_t until = std::clamp(until_ns, -kEndOfTimeNs, kEndOfTimeNs);
+  until = std::clamp(until + cameras[index].time_offset_ns, -kEndOfTimeNs, kEndOfTimeNs);
+  if (options_.live.enabled) {
+    constexpr std::int64_t kMaxAheadNs = 10 * kNanosecondsPerSecond;
+    std::int64_t newest_ns = status_.events ? status_.events->last_ns : kMinTimeNs;
+    if (newest_pose_) newest_ns = std::max(newest_ns, newest_pose_->t_ns);
+    if (newest_ns == kMinTimeNs) return;
+    until = std::min(until, newest_ns + kMaxAheadNs);
+  }
+  mapper_.giveUpBefore(until);
 }
 
 bool MappingSession::giveUpOldestWindow() {
@@ -280,7 +308,7 @@ void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
 void MappingSession::finish() {
   finished_ = true;
   usePoses(pose_source_.select(), std::nullopt);
-  mapper_.finish();
+  if (next_stretch_.empty()) mapper_.finish();  // otherwise after the windows before the jump
   completeRig();
   rig_.requireNoneWaits();
 }

@@ -136,7 +136,8 @@ class MappingSession {
   bool all_refined_ = false;
   std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
   std::optional<StampedPose> newest_pose_;
-  std::vector<StampedPose> next_stretch_;  // poses after a jump, until those before it are used up
+  // Poses after a jump with their stated noise, until those before it are used up.
+  std::vector<std::pair<StampedPose, std::optional<PoseNoise>>> next_stretch_;
   // By camera, or the tracker: the first time that was refused since the newest one that was not.
   std::map<int, std::int64_t> refused_since_ns_;
   SessionStatus status_;  // incomplete: see status()

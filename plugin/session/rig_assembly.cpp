@@ -122,6 +122,8 @@ void RigAssembly::letWait(CameraPacket packet) {
     const std::int64_t begin_ns = first_ns + packet.calibration.time_offset_ns;
     if (!waiting_since_ns_) waiting_since_ns_ = begin_ns;
     if (begin_ns - *waiting_since_ns_ > kMaxWaitNs) refuseWithoutNext(camera);
+  } else if (waiting_.count(camera) != 0) {
+    return;  // the first one has the calibration
   }
   waiting_[camera].push_back(std::move(packet));
 }
@@ -135,7 +137,7 @@ void RigAssembly::requireIncomplete(int camera) const {
   if (!complete_) return;
   throw std::invalid_argument(fmt::format(
       "camera {} first appears when the rig is complete: all cameras must be there within a second "
-      "of the first event, and before that where somebody asks for the map",
+      "of the first event",
       camera));
 }
 

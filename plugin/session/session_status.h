@@ -39,8 +39,8 @@ struct LiveStatus {
   std::map<int, QueueCounts> cameras;
   std::uint64_t pose_jumps = 0;     ///< New stretches of poses.
   std::uint64_t clock_steps = 0;    ///< The clock went back, and the mapping started anew.
-  std::uint64_t refused_poses = 0;  ///< More than a second older than the newest.
-  std::uint64_t errors = 0;         ///< Of the mapping, the refinement and callbacks.
+  std::uint64_t refused_poses = 0;  ///< Over a second older than the newest, or not valid.
+  std::uint64_t errors = 0;         ///< Of the mapping and callbacks; see `RefinementState`, too.
   std::string last_error;           ///< Of these and of refused observations; empty: none.
   bool failing = false;             ///< The last keyframe could not be made.
 

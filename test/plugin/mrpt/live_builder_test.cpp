@@ -274,7 +274,11 @@ TEST(LiveBuilder, AJumpOfTheTrackerBeginsANewStretch) {
     EventFusionOptions options = liveOptions();
     options.refinement.enabled = refines;
     CEventFusionMapBuilder builder(options);
-    playPatiently(builder, observations);
+    if (refines) {
+      playPatiently(builder, observations);
+    } else {
+      play(builder, observations);  // the jump waits when the end comes
+    }
 
     const SessionStatus status = builder.status();
     EXPECT_EQ(status.live->pose_jumps, 1U);
@@ -318,6 +322,49 @@ TEST(LiveBuilder, AClockThatGoesBackStartsTheMappingAnew) {
   EXPECT_LT(builder.trajectory()[24].t_ns, recording.poses.back().t_ns - 1'000'000'000);
 }
 
+TEST(LiveBuilder, EventsAloneThatGoBackInShortPacketsStartTheMappingAnew) {
+  const SyntheticRecording recording(3);
+  CEventFusionMapBuilder builder(liveOptions());
+  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+  std::vector<std::size_t> begin(2, 0);
+  Observations observations;
+  for (std::int64_t t_ns = SyntheticRecording::kStartNs; t_ns < recording.poses.back().t_ns;
+       t_ns += 1'000'000) {  // the budget holds events until the end of their 10 ms
+    for (std::size_t c = 0; c < 2; ++c) {
+      auto packet = packetObservation(recording, static_cast<int>(c));
+      packet->timestamp = mrptTimeFrom(t_ns);
+      const std::vector<Event>& events = recording.events[c];
+      for (; begin[c] < events.size() && events[begin[c]].t_ns < t_ns + 1'000'000; ++begin[c]) {
+        packet->events.push_back(events[begin[c]]);
+      }
+      observations.push_back(packet);
+    }
+  }
+  // After half a second one event of camera 0 lies an hour ahead.
+  auto ahead = packetObservation(recording, 0);
+  ahead->events = {{SyntheticRecording::kStartNs + 3'600'000'000'000, 1, 1, true}};
+  observations.insert(observations.begin() + 1000, ahead);
+  std::size_t pose = 0;
+  for (const auto& observation : observations) {
+    const std::int64_t t_ns = nanosecondsFrom(observation->timestamp);
+    for (; observation != ahead && pose < recording.poses.size() &&
+           recording.poses[pose].t_ns <= t_ns + 10'000'000;
+         ++pose) {
+      auto robot = mrpt::obs::CObservationRobotPose::Create();
+      robot->timestamp = mrptTimeFrom(recording.poses[pose].t_ns);
+      robot->sensorLabel = "pose";
+      robot->pose.mean = mrptPoseFrom(recording.poses[pose].T_world_rig);
+      builder.processObservation(robot);
+    }
+    feedPatiently(builder, {observation});
+  }
+  builder.finish();
+  const SessionStatus status = builder.status();
+  EXPECT_EQ(status.live->clock_steps, 1U);
+  expectSumsAgree(status);
+  EXPECT_GE(builder.trajectory().size(), 10U) << "of 28";
+}
+
 TEST(LiveBuilder, OnePoseFromTheFutureCostsASecond) {
   const SyntheticRecording recording(3);
   Observations observations = observationsOf(recording);
@@ -338,6 +385,8 @@ TEST(LiveBuilder, OnePoseFromTheFutureCostsASecond) {
   const std::set<std::int64_t> times = keyframeTimes(builder);
   EXPECT_GE(times.size(), all.size() - 14) << "windows of 0.2 s, every 0.1 s";
   EXPECT_LT(times.size(), all.size());
+  EXPECT_NEAR(builder.getCurrentPoseEstimation()->getMeanVal().x(),
+              recording.poses.back().T_world_rig.translation.x(), 1e-9);
 }
 
 TEST(LiveBuilder, PosesWaitForEventsTenMinutes) {
@@ -417,6 +466,40 @@ TEST(LiveBuilder, RefusedObservationsAreCountedAndTheMapGoesOn) {
   EXPECT_THAT(status.live->last_error, HasSubstr("1.0"));
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
   expectSumsAgree(status);
+}
+
+TEST(LiveBuilder, IsDestroyedWhileACallbackUsesIt) {
+  const Observations observations = observationsOf(SyntheticRecording(1.5));
+  for (int i = 0; i < 3; ++i) {
+    std::promise<void> within;
+    std::atomic<bool> is_first{true};
+    {
+      CEventFusionMapBuilder builder(liveOptions());
+      builder.setKeyframeCallback([&](const KeyframeDepthMap&) {
+        if (!is_first.exchange(false)) return;
+        within.set_value();
+        for (int k = 0; k < 200; ++k) {
+          builder.points();
+          builder.status();
+          std::this_thread::sleep_for(std::chrono::microseconds(100));
+        }
+      });
+      feed(builder, observations);
+      within.get_future().wait();
+    }
+  }
+}
+
+TEST(LiveBuilder, FinishReturnsWhereAnotherThreadStartsOver) {
+  const Observations observations = observationsOf(SyntheticRecording(2));
+  for (int i = 0; i < 5; ++i) {
+    CEventFusionMapBuilder builder(liveOptions());
+    feed(builder, observations);
+    auto finished = std::async(std::launch::async, [&] { builder.finish(); });
+    std::this_thread::sleep_for(std::chrono::milliseconds(10 * i));
+    builder.initialize();
+    ASSERT_EQ(finished.wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  }
 }
 
 TEST(LiveBuilder, StartsOverAndEndsWhileItMaps) {
