@@ -28,7 +28,7 @@ PlaneSpacing planeSpacingFromName(std::string_view name) { return valueIn(kSpaci
 void DepthPlanesOptions::validate() const {
   constexpr int kMaxPlanes = 100'000;
   // No camera sees depths outside; beyond, planes and votes lose their digits.
-    constexpr double kMaxDepthM = 1e6;
+  constexpr double kMaxDepthM = 1e6;
   requireOption(std::isfinite(min_depth_m) && min_depth_m > 0, "min_depth_m", min_depth_m,
                 "finite and above 0");
   requireOption(std::isfinite(max_depth_m) && max_depth_m > min_depth_m, "max_depth_m", max_depth_m,

@@ -20,9 +20,9 @@ cv::Mat_<cv::Vec2i> viewEventsOf(const CameraEvents& camera, const ReferenceView
   constexpr std::size_t kPixelsPerEvent = 8;
   const CameraModel& model = camera.calibration->model;
   const EventSpan& all = camera.events;
-  const std::size_t count = std::min(
-      all.size(), static_cast<std::size_t>(model.width) * static_cast<std::size_t>(model.height) /
-                      kPixelsPerEvent);
+  const std::size_t count =
+      std::min(all.size(), static_cast<std::size_t>(model.width) *
+                               static_cast<std::size_t>(model.height) / kPixelsPerEvent);
   const Event* at_reference =
       std::lower_bound(all.begin(), all.end(), t_ref_ns,
                        [](const Event& event, std::int64_t t_ns) { return event.t_ns < t_ns; });
