@@ -101,6 +101,8 @@ class FusionMapper : private RecordingProgress {
   /// Gives up the windows that begin before a time, with or without data, and releases the events
   /// before it. Such an event that comes later is counted as dropped.
   void giveUpBefore(std::int64_t t_ns);
+  /// The same for all events so far.
+  void giveUpAll() { giveUpBefore(reachedNs() + 1); }
   /// The events that windows may still need.
   std::size_t heldEvents() const;
   /// The time of the first of them; kMaxTimeNs if there is none.

@@ -101,7 +101,7 @@ void MappingSession::addEvents(CameraPacket packet) {
 void MappingSession::noteRefusal(int sensor, std::int64_t t_ns) {
   const std::int64_t since_ns = refused_since_ns_.try_emplace(sensor, t_ns).first->second;
   if (!options_.live.enabled || t_ns - since_ns < kNanosecondsPerSecond) return;
-  if (status_.events) mapper_.giveUpBefore(status_.events->last_ns + 1);
+  mapper_.giveUpAll();
   earlier_counts_ += mapper_.counts();
   const Rig rig = mapper_.rig();
   mapper_ = FusionMapper(mapperOptions(options_));
@@ -127,8 +127,6 @@ void MappingSession::feed(CameraPacket packet) {
   const bool empty = packet.events.empty();
   const std::int64_t first_ns = empty ? 0 : packet.events.front().t_ns;
   const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns;
-  std::int64_t newest_ns = last_ns;  // the last events may be late
-  for (const Event& event : packet.events) newest_ns = std::max(newest_ns, event.t_ns);
   {
     const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
     mapper_.addEvents(packet.camera, std::move(packet.events));
@@ -138,7 +136,6 @@ void MappingSession::feed(CameraPacket packet) {
   const std::int64_t begin_ns = first_ns + camera.time_offset_ns;
   extend(status_.events, begin_ns);
   extend(status_.events, last_ns + camera.time_offset_ns);
-  extend(status_.events, newest_ns + camera.time_offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
   // Without a wait where neither another camera nor a better source of poses can come.
   const bool known = rig_.isKnown() && pose_source_.selected();
