@@ -19,15 +19,28 @@ constexpr int kClockPackets = 100;
 constexpr std::int64_t kSameClockNs = 10'000'000;       // cameras that are synchronised by wire
 constexpr std::int64_t kContinuedClockNs = 50'000'000;  // bags of one recording: also drift
 
-struct EvtEncodingName {
+constexpr std::int64_t wrapNs(int bits) { return (std::int64_t{1} << bits) * 1'000; }
+
+}  // namespace
+
+/// An encoding of EventPacket.
+struct PacketEncoding {
   std::string_view name;
-  EvtEncoding encoding;
-  std::int64_t wrap_ns;
+  std::optional<EvtEncoding> evt;  ///< Its words; else `decode` takes a packet.
+  std::int64_t wrap_ns = 0;
+  void (*decode)(const EventPacketMessage& packet, std::vector<Event>& events) = nullptr;
+  bool has_host_times = false;  ///< Always Unix times: no clock is fitted.
 };
-constexpr EvtEncodingName kEvtEncodings[] = {
-    {"evt3", EvtEncoding::kEvt3, (std::int64_t{1} << 24) * 1'000},
-    {"evt21", EvtEncoding::kEvt21, (std::int64_t{1} << 34) * 1'000},
-    {"evt2", EvtEncoding::kEvt2, (std::int64_t{1} << 34) * 1'000},
+
+namespace {
+
+constexpr PacketEncoding kPacketEncodings[] = {
+    {"evt3", EvtEncoding::kEvt3, wrapNs(24)},
+    {"evt21", EvtEncoding::kEvt21, wrapNs(34)},
+    {"evt2", EvtEncoding::kEvt2, wrapNs(34)},
+    {"mono", std::nullopt, 0, decodeMonoEvents},
+    {"libcaer", std::nullopt, 0, decodeLibcaerEvents, true},
+    {"libcaer_cmp", std::nullopt, 0, decodeLibcaerCmpEvents, true},
 };
 
 }  // namespace
@@ -51,7 +64,7 @@ void BagEventDecoder::fitClock(BagCursor& cursor) {
     // Reading comes to it, after the events before.
   }
   // The time base of `mono` is the host's time or the sensor's.
-  if (!evt_ && clock_.isHostClock()) clock_.useHostTime();
+  if (!evt_ && (hasHostTimes() || clock_.isHostClock())) clock_.useHostTime();
   restart(false);
   lost_packets_ = 0;
   undated_events_ = 0;
@@ -75,14 +88,14 @@ void BagEventDecoder::decode(const BagMessage& message, std::vector<Event>& even
   take_size(packet.size);
   const std::size_t first = events.size();
   decodePacket(packet, events);
-  if (events.size() == first) return;
+  if (events.size() == first || hasHostTimes()) return;
   const std::int64_t shift_ns = clock_.shiftFor(packet.stamp_ns, events[first].t_ns);
   for (std::size_t i = first; i < events.size(); ++i) events[i].t_ns += shift_ns;
 }
 
 /// Appends the events with the sensor's times.
 void BagEventDecoder::decodePacket(const EventPacketMessage& packet, std::vector<Event>& events) {
-  if (packet.encoding != encoding_) chooseEncoding(packet.encoding);
+  if (encoding_ == nullptr || packet.encoding != encoding_->name) chooseEncoding(packet.encoding);
   if (sequence_ && packet.sequence > *sequence_ + 1) {
     lost_packets_ += packet.sequence - *sequence_ - 1;
     if (evt_) evt_->skipGap();
@@ -95,23 +108,27 @@ void BagEventDecoder::decodePacket(const EventPacketMessage& packet, std::vector
     if (count_undated_) undated_events_ += evt_->undatedEvents() - undated_before;
     count_undated_ = count_undated_ || events.size() > before;
   } else {
-    decodeMonoEvents(packet, events);
+    encoding_->decode(packet, events);
   }
 }
 
-void BagEventDecoder::chooseEncoding(std::string_view encoding) {
-  const auto* const evt =
-      std::find_if(std::begin(kEvtEncodings), std::end(kEvtEncodings),
-                   [&](const EvtEncodingName& known) { return known.name == encoding; });
-  if (!encoding_.empty() || (evt == std::end(kEvtEncodings) && encoding != "mono")) {
-    throw std::runtime_error(
-        fmt::format("encoding = {}: expected {}", inQuotes(encoding),
-                    encoding_.empty() ? "evt3, evt21, evt2 or mono" : inQuotes(encoding_)));
+void BagEventDecoder::chooseEncoding(std::string_view name) {
+  const auto* const found =
+      std::find_if(std::begin(kPacketEncodings), std::end(kPacketEncodings),
+                   [&](const PacketEncoding& known) { return known.name == name; });
+  if (encoding_ != nullptr || found == std::end(kPacketEncodings)) {
+    throw std::runtime_error(fmt::format("encoding = {}: expected {}", inQuotes(name),
+                                         encoding_ == nullptr
+                                             ? "evt3, evt21, evt2, mono, libcaer or libcaer_cmp"
+                                             : inQuotes(encoding_->name)));
   }
-  encoding_ = encoding;
-  if (evt == std::end(kEvtEncodings)) return;
-  evt_.emplace(evt->encoding);
-  clock_ = SensorClock(evt->wrap_ns);
+  encoding_ = found;
+  if (encoding_->evt) evt_.emplace(*encoding_->evt);
+  clock_ = SensorClock(encoding_->wrap_ns);
+}
+
+bool BagEventDecoder::hasHostTimes() const {
+  return encoding_ != nullptr && encoding_->has_host_times;
 }
 
 BagEvents::BagEvents(const std::vector<BagTopicPart>& parts) {

@@ -23,6 +23,8 @@ struct BagTopicPart {
   std::size_t topic = 0;  ///< Index in `bag->topics()`.
 };
 
+struct PacketEncoding;
+
 /// Decodes the messages of one events topic, EventArray or EventPacket, one after the other.
 class BagEventDecoder {
  public:
@@ -51,12 +53,13 @@ class BagEventDecoder {
 
  private:
   void decodePacket(const EventPacketMessage& packet, std::vector<Event>& events);
-  void chooseEncoding(std::string_view encoding);
+  void chooseEncoding(std::string_view name);
+  bool hasHostTimes() const;
 
   RosType type_;
   std::optional<CameraSize> size_;
-  std::string encoding_;           // of EventPacket
-  std::optional<EvtDecoder> evt_;  // nothing: mono
+  const PacketEncoding* encoding_ = nullptr;  // of EventPacket
+  std::optional<EvtDecoder> evt_;             // of the EVT encodings
   SensorClock clock_{0};
   std::optional<std::uint64_t> sequence_;  // of the last packet
   std::uint64_t lost_packets_ = 0;

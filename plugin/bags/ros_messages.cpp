@@ -14,6 +14,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "plugin/streams/byte_reader.h"
+#include "plugin/streams/number_checks.h"
 
 namespace efm {
 namespace {
@@ -116,6 +117,37 @@ Event eventAt(const std::uint8_t* bytes, const std::uint8_t* time) {
   return event;
 }
 
+template <typename Time>
+std::string notATime(const char* name, Time t_ns) {
+  return fmt::format("{} = {}: expected a time in ns before the year 2116", name, t_ns);
+}
+
+std::int64_t timeBaseOf(const EventPacketMessage& packet) {
+  if (packet.time_base < static_cast<std::uint64_t>(kEndOfTimeNs)) {
+    return static_cast<std::int64_t>(packet.time_base);
+  }
+  throw std::runtime_error(notATime("time_base", packet.time_base));
+}
+
+/// Calls `take` for the words of a packet's events. Its errors become those of a word.
+template <typename Word, typename Take>
+void forWords(const EventPacketMessage& packet, const Take& take) {
+  const std::size_t count = packet.data_size / sizeof(Word);
+  for (std::size_t i = 0; i < count; ++i) {
+    Word word;
+    std::memcpy(&word, packet.data + i * sizeof(Word), sizeof(Word));
+    try {
+      take(word);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(
+          fmt::format("{} events: word {}: {}", packet.encoding, i, error.what()));
+    }
+  }
+  if (packet.data_size % sizeof(Word) == 0) return;
+  throw std::runtime_error(fmt::format("{} bytes of {} events: expected a multiple of {}",
+                                       packet.data_size, packet.encoding, sizeof(Word)));
+}
+
 }  // namespace
 
 RosType rosTypeOf(std::string_view type) {
@@ -180,27 +212,80 @@ EventPacketMessage decodeEventPacket(const BagMessage& message) {
 }
 
 void decodeMonoEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
-  constexpr std::size_t kWord = 8;
-  if (packet.data_size % kWord != 0) {
-    throw std::runtime_error(
-        fmt::format("{} bytes of mono events: expected a multiple of 8", packet.data_size));
-  }
-  if (packet.time_base >= static_cast<std::uint64_t>(kEndOfTimeNs)) {
-    throw std::runtime_error(fmt::format(
-        "time_base = {}: expected a time in ns before the year 2116", packet.time_base));
-  }
-  events.reserve(events.size() + packet.data_size / kWord);
-  const std::uint8_t* const end = packet.data + packet.data_size;
-  for (const std::uint8_t* bytes = packet.data; bytes != end; bytes += kWord) {
-    std::uint64_t word;
-    std::memcpy(&word, bytes, kWord);
-    Event event;
-    event.t_ns = static_cast<std::int64_t>(packet.time_base + (word & 0xffff'ffffU));
-    event.x = static_cast<std::uint16_t>(word >> 32);
-    event.y = static_cast<std::uint16_t>(word >> 48 & 0x7fffU);
-    event.polarity = word >> 63 != 0;
-    events.push_back(event);
-  }
+  const std::int64_t base_ns = timeBaseOf(packet);
+  events.reserve(events.size() + packet.data_size / sizeof(std::uint64_t));
+  forWords<std::uint64_t>(packet, [&](std::uint64_t word) {
+    events.push_back({base_ns + static_cast<std::int64_t>(word & 0xffff'ffffU),
+                      static_cast<std::uint16_t>(word >> 32),
+                      static_cast<std::uint16_t>(word >> 48 & 0x7fffU), word >> 63 != 0});
+  });
+}
+
+void decodeLibcaerEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
+  constexpr std::int64_t kRangeUs = std::int64_t{1} << 31;
+  const std::int64_t base_ns = timeBaseOf(packet);
+  std::int64_t wraps_us = 0;
+  std::int64_t last_us = 0;
+  events.reserve(events.size() + packet.data_size / sizeof(std::uint64_t));
+  forWords<std::uint64_t>(packet, [&](std::uint64_t word) {
+    const std::int64_t t_us = static_cast<std::int32_t>(word >> 32);
+    if (t_us < 0) throw std::runtime_error(fmt::format("t = {} µs: expected 0 or more", t_us));
+    if (last_us - t_us > kRangeUs / 2) wraps_us += kRangeUs;
+    last_us = t_us;
+    const std::int64_t t_ns = base_ns + (wraps_us + t_us) * kNanosecondsPerMicrosecond;
+    if (t_ns >= kEndOfTimeNs) throw std::runtime_error(notATime("t", t_ns));
+    events.push_back({t_ns, static_cast<std::uint16_t>(word >> 17 & 0x7fffU),
+                      static_cast<std::uint16_t>(word >> 2 & 0x7fffU), (word >> 1 & 1U) != 0});
+  });
+}
+
+void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
+  enum Code { kTimeHigh, kTimeLow, kColumn, kRow, kVectorRow, kVector };
+  constexpr unsigned kVectorRows = 8;
+  constexpr unsigned kEndRow = 0x1'0000;  // no event has it
+  const std::int64_t base_us = timeBaseOf(packet) / kNanosecondsPerMicrosecond;
+  unsigned high_us = 0;
+  unsigned low_us = 0;
+  unsigned column = 0;
+  unsigned vector_row = 0;
+  bool vector_polarity = false;
+  const auto add = [&](unsigned row, bool polarity) {
+    events.push_back({(base_us + (high_us | low_us)) * kNanosecondsPerMicrosecond,
+                      static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row),
+                      polarity});
+  };
+  forWords<std::uint16_t>(packet, [&](std::uint16_t word) {
+    const unsigned time = word & 0xfffU;
+    const unsigned address = word & 0x7ffU;
+    const bool polarity = (word & 0x800U) != 0;
+    switch (const int code = word >> 12U; code) {
+      case kTimeHigh:
+        high_us = time << 12U;
+        break;
+      case kTimeLow:
+        low_us = time;
+        break;
+      case kColumn:
+        column = address;
+        break;
+      case kRow:
+        add(address, polarity);
+        break;
+      case kVectorRow:
+        vector_row = address;
+        vector_polarity = polarity;
+        break;
+      case kVector:
+        for (unsigned i = 0; i < kVectorRows; ++i) {
+          if ((word >> i & 1U) != 0) add(vector_row + i, vector_polarity);
+        }
+        // Stays beyond every sensor instead of wrapping to row 0.
+        vector_row = std::min(vector_row, kEndRow - 2 * kVectorRows) + kVectorRows;
+        break;
+      default:
+        throw std::runtime_error(fmt::format("code {}: expected 0 to {}", code, int{kVector}));
+    }
+  });
 }
 
 StampedPose decodePose(const BagMessage& message, RosType type) {

@@ -43,18 +43,33 @@ struct EventPacketMessage {
   std::int64_t stamp_ns = 0;  ///< When the host received the first bytes.
   CameraSize size;
   std::uint64_t sequence = 0;   ///< A gap is a loss.
-  std::uint64_t time_base = 0;  ///< ns; of the encoding `mono` only.
+  std::uint64_t time_base = 0;  ///< ns; not of the EVT encodings.
   std::string_view encoding;    ///< "evt3", "mono", …; refers to the message's bytes.
   const std::uint8_t* data = nullptr;
   std::size_t data_size = 0;  ///< bytes
 };
 EventPacketMessage decodeEventPacket(const BagMessage& message);
 
-/// Appends the events of encoding `mono`: 8 bytes an event, little-endian; bit 63 the polarity, 62
-/// to 48 the row, 47 to 32 the column, 31 to 0 the time after time_base (ns).
-/// @throws std::runtime_error where the size is no multiple of 8, or a time has no place in 64
-/// bits.
+/// These append the events of a packet in an encoding of little-endian words. Nothing is kept from
+/// one packet to the next.
+/// @throws std::runtime_error at an incomplete or wrong word, after the events before it; and where
+/// time_base is not a time.
+
+/// Encoding `mono`: 8 bytes an event; bit 63 the polarity, 62 to 48 the row, 47 to 32 the column,
+/// 31 to 0 the time after time_base (ns).
 void decodeMonoEvents(const EventPacketMessage& packet, std::vector<Event>& events);
+
+/// Encoding `libcaer`: 8 bytes an event; bits 63 to 32 the time after time_base (µs, 0 to 2^31 -
+/// 1), 31 to 17 the column, 16 to 2 the row, 1 the polarity. Where the time falls by more than half
+/// of its range it has wrapped: 2^31 µs are added from there on. A smaller fall is an event that
+/// comes late.
+void decodeLibcaerEvents(const EventPacketMessage& packet, std::vector<Event>& events);
+
+/// Encoding `libcaer_cmp`: words of 16 bits, the code in the upper 4. The words change the time
+/// after time_base (µs; 12 upper and 12 lower bits), the column, and the row and polarity where a
+/// vector begins. An event is a row with its polarity, or a bit of a vector: 8 rows of a column,
+/// after which the next vector begins. All values are 0 at the beginning of a packet.
+void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>& events);
 
 /// T_world_body of any type that `hasPoses`: the pose itself, or that of the child frame.
 /// @throws std::runtime_error also for values that are not finite and for a quaternion that is not

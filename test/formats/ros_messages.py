@@ -87,14 +87,34 @@ def evt3_words(packet):
     return words[new].astype("<u2")
 
 
+def libcaer_words(packet):
+    """Polarity, row and column in 32 bits, and the microseconds since the first event."""
+    address = packet["x"].astype("u4") << 17 | packet["y"].astype("u4") << 2 | packet["p"].astype("u4") << 1 | 1
+    return np.stack([address, (packet["t"] - packet["t"][0]) // 1000], axis=1).astype("<u4")
+
+
+def libcaer_cmp_words(packet):
+    """TIME_HIGH, TIME_LOW, ADDR_X where they change, ADDR_Y for each event; the first event as a vector."""
+    t_us = (packet["t"] - packet["t"][0]) // 1000
+    words = np.stack([t_us >> 12 & 0xFFF, 0x1000 | (t_us & 0xFFF), 0x2000 | packet["x"].astype("i8"),
+                      0x3000 | packet["p"].astype("i8") << 11 | packet["y"]], axis=1)
+    new = np.ones(words.shape, dtype=bool)
+    new[1:, :3] = words[1:, :3] != words[:-1, :3]
+    vector = [0x4000 | int(words[0, 3] & 0xFFF), 0x5001]
+    return np.concatenate([words[0, :3], vector, words[new][4:]]).astype("<u2")
+
+
+WORDS = {"mono": mono_words, "evt3": evt3_words, "libcaer": libcaer_words, "libcaer_cmp": libcaer_cmp_words}
+
+
 def event_packets(events, size, cdr, encoding):
     """event_camera_msgs/EventPacket. The host stamps packets up to 3 ms late, the first one by 3 ms."""
     for sequence, packet in enumerate(packets_of(events)):
         t_ns = int(packet["t"][0])
         stamp = t_ns + (3 - sequence) % 4 * HOST_DELAY_NS
-        words = mono_words(packet) if encoding == "mono" else evt3_words(packet)
+        words = WORDS[encoding](packet)
         message = Message(cdr).header(stamp, sequence).add("I", size[1], size[0]).add("Q", sequence)
-        message.add("Q", t_ns if encoding == "mono" else 0).text(encoding).add("B", 0).add("I", words.nbytes)
+        message.add("Q", 0 if encoding == "evt3" else t_ns).text(encoding).add("B", 0).add("I", words.nbytes)
         message.data += words.tobytes()
         yield max(stamp, int(packet["t"][-1])) + LOG_DELAY_NS, message.bytes()
 

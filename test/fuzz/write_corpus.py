@@ -74,10 +74,10 @@ def write_messages(dataset, corpus):
         return [message.add("d", 1, 2, 3, 0, 0, 0.6, 0.8).bytes()] * 2
 
     for cdr in (False, True):
-        packets = {encoding: [data for _, data in ros.event_packets(events, (64, 48), cdr, encoding)] for encoding in ("mono", "evt3")}
+        packets = {encoding: [data for _, data in ros.event_packets(events, (64, 48), cdr, encoding)] for encoding in ros.WORDS}
         camera = header(cdr).add("I", 48, 64).text("plumb_bob").add("I", 5).add("d", *[0.01] * 5, 50, 0, 32, 0, 50, 24, 0, 0, 1)
         for name, kind, messages in (("array", 0, [data for _, data in ros.event_arrays(events, (64, 48), cdr)]),
-                                     ("mono", 1, packets["mono"]), ("evt3", 1, packets["evt3"]),
+                                     *((encoding, 1, packets[encoding]) for encoding in packets),
                                      ("pose", 2, pose(header(cdr))), ("covariance", 3, pose(header(cdr))),
                                      ("odometry", 4, pose(header(cdr, "base"))), ("transform", 5, pose(header(cdr, "base"))),
                                      ("camera_info", 6, [camera.bytes()])):

@@ -13,6 +13,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/readers/pose_file.h"
 #include "plugin/readers/recording_formats.h"
+#include "plugin/streams/event_packets.h"
 #include "test/paths.h"
 #include "test/plugin/bags/bag_bytes.h"
 #include "test/plugin/bags/ros_message_bytes.h"
@@ -313,6 +314,91 @@ TEST_F(BagRecording, EventsWithoutATimeAfterAGapAreCounted) {
   EXPECT_TRUE(readStream(*recording.cameras.at(0)) == flat(packets));
   EXPECT_EQ(recording.cameras[0]->lostPackets(), 6U);
   EXPECT_EQ(recording.cameras[0]->undatedEvents(), 3U);
+}
+
+/// As libcaer's driver has them: several rows of a column at a time. Each packet begins with values
+/// that the one before has set otherwise.
+std::vector<Event> columnsOfEvents(std::int64_t from_ns, std::mt19937& random) {
+  std::vector<Event> events;
+  for (std::int64_t t_us = 0; t_us < 10'000; t_us += 1 + random() % 900) {
+    const auto x = static_cast<std::uint16_t>(random() % 640);
+    const bool polarity = random() % 2 != 0;
+    unsigned y = random() % 400;
+    for (unsigned left = 1 + random() % 9; left > 0; --left, y += 1 + random() % 9) {
+      events.push_back({from_ns + t_us * 1'000, x, static_cast<std::uint16_t>(y), polarity});
+    }
+  }
+  return events;
+}
+
+TEST_F(BagRecording, LibcaersTimesAreTheHostsWhateverTheStamps) {
+  constexpr std::int64_t kWrapNs = (std::int64_t{1} << 31) * 1'000;
+  for (const Container container : kContainers) {
+    const RosBytes kind = bytesOf(container);
+    for (const bool packed : {false, true}) {
+      std::mt19937 random(packed ? 1 : 2);
+      RecordedMessages messages;
+      std::vector<std::vector<Event>> packets;
+      for (std::int64_t i = 0; i < 30; ++i) {
+        if (i == 10 || i == 11) continue;  // lost
+        packets.push_back(columnsOfEvents(kStartNs + i * 10 * kMsNs, random));
+        // The 31 bits begin again in packet 20.
+        const std::int64_t low_base_ns =
+            kStartNs + 205 * kMsNs - kWrapNs + (i > 20 ? kWrapNs : std::int64_t{0});
+        const std::int64_t base_ns = packed ? packets.back().front().t_ns : low_base_ns;
+        // The sensor's clock and the host's differ by 0.1 s more with each packet.
+        const std::int64_t stamp_ns = kStartNs + i * 110 * kMsNs;
+        messages.push_back({"/events", kPacket, stamp_ns,
+                            eventPacket(kind, stamp_ns, static_cast<std::uint64_t>(i),
+                                        packed ? "libcaer_cmp" : "libcaer",
+                                        packed ? libcaerCmpWords(packets.back(), base_ns)
+                                               : libcaerWords(packets.back(), base_ns),
+                                        static_cast<std::uint64_t>(base_ns))});
+      }
+      const fs::path file = write("bag", container, messages);
+      const RecordingParts recording = open({file});
+      EventStream& camera = *recording.cameras.at(0);
+      EXPECT_EQ(camera.size()->height, 480);
+      EXPECT_TRUE(readStream(camera) == flat(packets)) << packed;
+      EXPECT_EQ(camera.lostPackets(), 2U);
+      EXPECT_EQ(camera.undatedEvents(), 0U);
+      const RecordingParts again = open({file});
+      again.cameras[0]->seek(kStartNs + 250 * kMsNs);
+      const std::vector<Event> end = readStream(*again.cameras[0]);
+      EXPECT_LE(end.front().t_ns, kStartNs + 250 * kMsNs);
+      EXPECT_GT(end.front().t_ns, kStartNs + 100 * kMsNs);
+    }
+  }
+}
+
+TEST_F(BagRecording, AnEventBesideTheSensorNamesItsMessageAndNumber) {
+  const std::string words =
+      libcaerCmpWords({{kStartNs, 639, 479, true}, {kStartNs, 640, 2, true}}, kStartNs);
+  const fs::path file =
+      write("bag", Container::kMcap,
+            {{"/events", kPacket, kStartNs,
+              eventPacket(RosBytes::kCdr, kStartNs, 0, "libcaer_cmp", words, kStartNs)}});
+  EventPackets packets(std::move(open({file}).cameras.at(0)), {640, 480});
+  EXPECT_EQ(packets.nextPacket().size(), 1U);
+  EXPECT_THAT(errorOf([&] { packets.nextPacket(); }),
+              StartsWith(file.string() +
+                         ": /events: message of 1700000000.000000000: event 1: x = '640': expected "
+                         "a whole number from 0 to 639"));
+}
+
+TEST_F(BagRecording, AnotherEncodingIsAnErrorThatNamesThoseThatAreRead) {
+  for (const auto& [second, expected] :
+       {std::make_pair("libcaer_raw", "'libcaer_raw': expected 'libcaer'"),
+        std::make_pair("", "expected evt3, evt21, evt2, mono, libcaer or libcaer_cmp")}) {
+    const std::string first = *second == '\0' ? "libcaer_raw" : "libcaer";
+    RecordedMessages messages;
+    for (const std::string& encoding : {first, std::string(second)}) {
+      messages.push_back({"/events", kPacket, kStartNs,
+                          eventPacket(RosBytes::kCdr, kStartNs, 0, encoding, "", kStartNs)});
+    }
+    const fs::path file = write("bag", Container::kMcap, messages);
+    EXPECT_THAT(errorOf([&] { readStream(*open({file}).cameras.at(0)); }), HasSubstr(expected));
+  }
 }
 
 TEST_F(BagRecording, CamerasSynchronisedByWireKeepTheirCommonClock) {

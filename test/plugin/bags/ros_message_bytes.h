@@ -105,6 +105,53 @@ inline std::string monoWords(const std::vector<Event>& events, std::int64_t base
   return bytes;
 }
 
+/// @param base_ns the µs after it have 31 bits, and begin again.
+inline std::string libcaerWords(const std::vector<Event>& events, std::int64_t base_ns) {
+  std::string bytes;
+  for (const Event& event : events) {
+    putWord(bytes, static_cast<std::uint32_t>(event.x << 17 | event.y << 2 |
+                                              (event.polarity ? 2 : 0) | 1));  // 1: valid
+    putWord(bytes, static_cast<std::uint32_t>((event.t_ns - base_ns) / 1'000 & 0x7fff'ffff));
+  }
+  return bytes;
+}
+
+/// A word of each kind where its value changes; events of the same time, column and polarity in
+/// vectors, of which one follows the other without a word of its own row.
+inline std::string libcaerCmpWords(const std::vector<Event>& events, std::int64_t base_ns) {
+  std::string bytes;
+  const auto put = [&](unsigned code, unsigned value) {
+    putWord(bytes, static_cast<std::uint16_t>(code << 12U | value));
+  };
+  unsigned high = 0;
+  unsigned low = 0;
+  unsigned x = 0;
+  for (std::size_t i = 0; i < events.size();) {
+    const Event& first = events[i];
+    const unsigned polarity = first.polarity ? 0x800 : 0;
+    const auto t_us = static_cast<unsigned>((first.t_ns - base_ns) / 1'000);
+    if (high != t_us >> 12U) put(0, high = t_us >> 12U);
+    if (low != (t_us & 0xfffU)) put(1, low = t_us & 0xfffU);
+    if (x != first.x) put(2, x = first.x);
+    std::vector<unsigned> rows;
+    while (i < events.size() && events[i].t_ns == first.t_ns && events[i].x == first.x &&
+           events[i].polarity == first.polarity && (rows.empty() || events[i].y > rows.back())) {
+      rows.push_back(events[i++].y);
+    }
+    if (rows.size() == 1) {
+      put(3, polarity | first.y);
+      continue;
+    }
+    put(4, polarity | first.y);
+    for (unsigned base = first.y, at = 0; at < rows.size(); base += 8) {
+      unsigned mask = 0;
+      while (at < rows.size() && rows[at] < base + 8) mask |= 1U << (rows[at++] - base);
+      put(5, mask);
+    }
+  }
+  return bytes;
+}
+
 inline std::string poseStamped(RosBytes kind, std::int64_t t_ns, const Rigid3& T) {
   return RosMessage(kind).header(t_ns, "world").pose(T).bytes();
 }
