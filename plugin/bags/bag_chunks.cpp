@@ -150,8 +150,8 @@ class ChunkedBag::Cursor : public BagCursor {
   std::size_t next_message_ = 0;
 };
 
-ChunkedBag::ChunkedBag(std::filesystem::path file)
-    : BagSource(std::move(file)), stream_(this->file(), std::ios::binary) {
+ChunkedBag::ChunkedBag(std::filesystem::path file, std::string_view repair)
+    : BagSource(std::move(file)), repair_(repair), stream_(this->file(), std::ios::binary) {
   if (!stream_) throw std::runtime_error(this->file().string() + ": cannot be opened for reading");
   file_size_ = std::filesystem::file_size(this->file());
 }
@@ -207,7 +207,8 @@ std::unique_ptr<std::uint8_t[]> ChunkedBag::readBytes(std::uint64_t offset, std:
 }
 
 std::runtime_error ChunkedBag::errorAt(std::uint64_t offset, const std::string& what) const {
-  return std::runtime_error(fmt::format("{}: byte {}: {}", file().string(), offset, what));
+  return std::runtime_error(
+      fmt::format("{}: byte {}: {}{}", file().string(), offset, what, repair_));
 }
 
 }  // namespace efm

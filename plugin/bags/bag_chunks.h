@@ -55,7 +55,8 @@ class ChunkedBag : public BagSource {
   std::unique_ptr<BagCursor> messages(std::size_t topic, std::int64_t from_log_ns) override;
 
  protected:
-  explicit ChunkedBag(std::filesystem::path file);
+  /// @param repair what damaged bags of this kind are repaired with, for errors; may be empty.
+  explicit ChunkedBag(std::filesystem::path file, std::string_view repair = {});
 
   virtual ChunkMessages readChunk(const BagChunk& chunk) = 0;
 
@@ -80,6 +81,7 @@ class ChunkedBag : public BagSource {
   class Cursor;
   std::shared_ptr<const ChunkMessages> chunk(std::size_t index);
 
+  std::string_view repair_;
   std::ifstream stream_;
   std::uint64_t file_size_ = 0;
   std::vector<BagChunk> chunks_;

@@ -84,21 +84,34 @@ RosTopics topicsOf(const std::vector<std::shared_ptr<BagSource>>& bags) {
 }
 
 /// Calls `take` for the messages of a topic until it returns false.
+/// @return the error of damage in the bag that ends them; empty without damage.
+/// @throws std::runtime_error naming the message that `take` refuses.
 template <typename Take>
-void forMessages(const RosTopic& topic, const Take& take) {
+std::string forMessages(const RosTopic& topic, const Take& take) {
   for (const BagTopicPart& part : topic.parts) {
     const auto cursor = part.bag->messages(part.topic, kMinTimeNs);
     BagMessage message;
-    while (cursor->next(message)) {
+    std::string damage;
+    const auto next = [&] {
       try {
-        if (!take(message)) return;
+        return cursor->next(message);
+      } catch (const std::runtime_error& error) {
+        damage = error.what();
+        return false;
+      }
+    };
+    while (next()) {
+      try {
+        if (!take(message)) return {};
       } catch (const std::runtime_error& error) {
         throw std::runtime_error(fmt::format("{}: {}: message of {}: {}", part.bag->file().string(),
                                              topic.name, formatSeconds(message.log_ns),
                                              error.what()));
       }
     }
+    if (!damage.empty()) return damage;
   }
+  return {};
 }
 
 std::string namesOf(const RosTopics& topics) {
@@ -148,6 +161,8 @@ bool isTrigger(const RosTopic& topic) {
   return trigger;
 }
 
+std::string beforeThe(const std::string& damage) { return " before the damage (" + damage + ")"; }
+
 void addPoses(const RosTopics& all, RecordingParts& parts) {
   RosTopics topics = all;
   if (topics.size() > 1) {
@@ -163,10 +178,11 @@ void addPoses(const RosTopics& all, RecordingParts& parts) {
     return;
   }
   if (topics.empty()) return;
-  forMessages(topics.front(), [&](const BagMessage& message) {
+  parts.poses_damage = forMessages(topics.front(), [&](const BagMessage& message) {
     parts.poses.push_back(decodePose(message, topics.front().type));
     return true;
   });
+  if (!parts.poses_damage.empty()) parts.expected_poses += beforeThe(parts.poses_damage);
 }
 
 std::string_view namespaceOf(std::string_view topic) { return topic.substr(0, topic.rfind('/')); }
@@ -184,7 +200,7 @@ void addCalibration(const RosTopics& topics, const RosTopics& cameras, Recording
         namespaceOf(topic.name) != namespaceOf(cameras.front().name)) {
       continue;
     }
-    forMessages(topic, [&](const BagMessage& message) {
+    const std::string damage = forMessages(topic, [&](const BagMessage& message) {
       const CameraModel model = decodeCameraInfo(message);
       if (model.fx == 0) return false;
       try {
@@ -198,6 +214,7 @@ void addCalibration(const RosTopics& topics, const RosTopics& cameras, Recording
       parts.calibration = std::move(calibration);
       return false;
     });
+    if (!damage.empty()) parts.expected_calibration += beforeThe(damage);
     return;
   }
 }

@@ -5,6 +5,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <exception>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -50,7 +51,8 @@ void requireChecksum(std::uint32_t claimed, const std::uint8_t* data, std::size_
 
 class McapBag : public ChunkedBag {
  public:
-  explicit McapBag(const std::filesystem::path& file) : ChunkedBag(file) {
+  explicit McapBag(const std::filesystem::path& file)
+      : ChunkedBag(file, " (`mcap recover` writes a file of what is intact)") {
     if (!readSummary()) scanFile();
   }
 
@@ -169,12 +171,14 @@ void McapBag::scanFile() {
   constexpr std::uint64_t kLooseBytes = 1 << 20;
   std::vector<BagChunk> chunks;
   BagChunk loose;  // messages outside chunks
+  std::exception_ptr damage;
   const auto add = [&](BagChunk& chunk) {
     if (chunk.size == 0) return;
     if (!chunks.empty()) chunk.first_log_ns = chunk.last_log_ns = chunks.back().last_log_ns;
     try {
       takeTimes(readChunk(chunk), chunk);
     } catch (const std::runtime_error&) {
+      damage = std::current_exception();
       chunk.topics = ~std::uint64_t{0};
     }
     chunks.push_back(chunk);
@@ -191,7 +195,10 @@ void McapBag::scanFile() {
       op = static_cast<McapOp>(bytes.number<std::uint8_t>());
       if (op == McapOp::kDataEnd || op == McapOp::kFooter) break;
       const std::uint64_t size = bytes.number<std::uint64_t>();
-      if (size < record.size - kMcapRecordHead) record.size = kMcapRecordHead + size;
+      // A file that was not written to its end may end in zeros, which are no records.
+      if (op != McapOp() && size < record.size - kMcapRecordHead) {
+        record.size = kMcapRecordHead + size;
+      }
     }
     const std::uint64_t next = offset + record.size;
     if (next > fileSize()) op = McapOp::kChunk;
@@ -212,6 +219,7 @@ void McapBag::scanFile() {
     offset = next;
   }
   add(loose);
+  if (damage && topics().empty()) std::rethrow_exception(damage);  // else nobody would say it
   setChunks(std::move(chunks));
 }
 

@@ -73,6 +73,7 @@ void append(RecordingParts parts, const Path& source, RecordingParts& all) {
         source.string(), all.calibration->file.string()));
   }
   if (parts.calibration) all.calibration = std::move(parts.calibration);
+  if (all.poses_damage.empty()) all.poses_damage = std::move(parts.poses_damage);
   if (!all.default_size) all.default_size = parts.default_size;
 }
 
@@ -198,7 +199,8 @@ std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& sou
     throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",
                                          sourceNames(source.files), parts.expected_poses));
   }
-  return std::make_unique<RecordingWithPoses>(std::move(recording), std::move(parts.poses));
+  return std::make_unique<RecordingWithPoses>(std::move(recording), std::move(parts.poses),
+                                              std::move(parts.poses_damage));
 }
 
 std::unique_ptr<Recording> openOwn(const RecordingSource& source, const Calibration* given) {

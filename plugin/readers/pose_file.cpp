@@ -58,6 +58,7 @@ std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions op
   }
   options.topics_of_other_files = true;  // they are those of the events, too
   RecordingParts parts = format->open({file}, options);
+  if (!parts.poses_damage.empty()) throw std::runtime_error(parts.poses_damage);
   if (!parts.poses.empty()) return std::move(parts.poses);
   throw std::runtime_error(
       fmt::format("{}: no poses: expected {}", file.string(), parts.expected_poses));

@@ -2,6 +2,7 @@
 #include "plugin/recordings/recording_with_poses.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 #include "plugin/mrpt/mrpt_time.h"
@@ -10,8 +11,8 @@
 namespace efm {
 
 RecordingWithPoses::RecordingWithPoses(std::unique_ptr<Recording> recording,
-                                       std::vector<StampedPose> poses)
-    : recording_(std::move(recording)), poses_(std::move(poses)) {
+                                       std::vector<StampedPose> poses, std::string damage)
+    : recording_(std::move(recording)), poses_(std::move(poses)), damage_(std::move(damage)) {
   std::stable_sort(poses_.begin(), poses_.end(),
                    [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
 }
@@ -25,6 +26,7 @@ mrpt::obs::CObservation::Ptr RecordingWithPoses::next() {
     return poseObservation({pose.t_ns, pose.T_world_rig, {}}, "pose");
   }
   if (error_) std::rethrow_exception(error_);
+  if (ended_ && !damage_.empty()) throw std::runtime_error(damage_);
   if (ended_) return nullptr;
   position_ = recording_->position();
   return std::exchange(ahead_, nullptr);

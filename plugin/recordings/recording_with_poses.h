@@ -17,7 +17,9 @@ namespace efm {
 class RecordingWithPoses : public Recording {
  public:
   /// @param poses T_world_body, in any order; poses of equal time keep their order.
-  RecordingWithPoses(std::unique_ptr<Recording> recording, std::vector<StampedPose> poses);
+  /// @param damage the error that ended the poses, thrown at the recording's end; empty: none did.
+  RecordingWithPoses(std::unique_ptr<Recording> recording, std::vector<StampedPose> poses,
+                     std::string damage = {});
 
   /// An error of the recording comes after all poses.
   mrpt::obs::CObservation::Ptr next() override;
@@ -31,6 +33,7 @@ class RecordingWithPoses : public Recording {
   std::unique_ptr<Recording> recording_;
   std::vector<StampedPose> poses_;  // in time order
   std::size_t next_pose_ = 0;
+  std::string damage_;                  // of the poses
   mrpt::obs::CObservation::Ptr ahead_;  // the recording's next observation, if read
   bool ended_ = false;
   std::exception_ptr error_;  // the error that ended the recording

@@ -30,6 +30,8 @@ struct RecordingParts {
   std::optional<CameraSize> default_size;
 
   std::vector<StampedPose> poses;  ///< T_world_body, in any order.
+  /// The error of the damage behind `poses`; empty: they are all.
+  std::string poses_damage;
 
   /// What the format calls its missing parts, for errors: "calib.txt".
   std::string expected_calibration = "a calibration in the recording";

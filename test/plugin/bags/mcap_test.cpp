@@ -5,12 +5,16 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "plugin/bags/bag_recording.h"
 #include "plugin/bags/mcap_format.h"
+#include "plugin/formats/open_recording.h"
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/readers/pose_file.h"
 #include "plugin/writers/mcap_writer.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/streams/damaged_files.h"
@@ -112,9 +116,83 @@ TEST_F(Mcap, AFileWithoutASummaryIsRead) {
   RecordingParts whole = open();
   EXPECT_TRUE(readStream(*whole.cameras.at(0)) == events_);
   EXPECT_EQ(whole.poses.size(), 200U);
+  EXPECT_EQ(whole.poses_damage, "");
+  EXPECT_THAT(errorOfBytes(bytes.substr(0, data_end) + std::string(100, '\0')),
+              AllOf(HasSubstr(fmt::format("byte {}: ", data_end)), HasSubstr("may be cut off")))
+      << "zeros are no records";
+}
 
-  EXPECT_THAT(errorOfBytes(bytes.substr(0, data_end / 2)),
-              AllOf(StartsWith(file_.string() + ": byte "), HasSubstr("which may be cut off")));
+TEST_F(Mcap, OfACutFileWhatIsBeforeTheDamageIsRead) {
+  write(2'000);
+  const std::string bytes = readText(file_);
+  const std::string half = bytes.substr(0, bytes.size() / 2);
+  // The rest is missing, or was not written any more.
+  for (const auto& [zeros, expected] : {std::make_pair(std::size_t{0}, "which may be cut off"),
+                                        std::make_pair(bytes.size() / 2, "a damaged chunk")}) {
+    writeFile(file_, half + std::string(zeros, '\0'));
+    const RecordingParts recording = open();
+    ASSERT_TRUE(recording.calibration);
+    EXPECT_GT(recording.poses.size(), 50U);
+    EXPECT_LT(recording.poses.size(), 150U);
+    EXPECT_EQ(recording.poses.back().t_ns,
+              kFirstNs + static_cast<std::int64_t>(recording.poses.size() - 1) * 10'000'000);
+    std::vector<Event> read;
+    std::vector<Event> block;
+    const std::string damage = errorOf([&] {
+      while (true) {
+        recording.cameras.at(0)->read(block);
+        read.insert(read.end(), block.begin(), block.end());
+      }
+    });
+    EXPECT_THAT(damage, AllOf(StartsWith(file_.string() + ": byte "), HasSubstr(expected),
+                              HasSubstr("`mcap recover`")));
+    EXPECT_EQ(recording.poses_damage, damage);
+    // The messages of a chunk come in the order of their times.
+    EXPECT_NEAR(static_cast<double>(read.size()), 2e3 * static_cast<double>(recording.poses.size()),
+                2e3);
+    EXPECT_TRUE(std::equal(read.begin(), read.end(), events_.begin()));
+    EXPECT_EQ(errorOf([&] { readPoses(file_, {}); }), damage) << "by --poses";
+  }
+  // Within the first chunk, nothing is known of any topic.
+  EXPECT_THAT(errorOfBytes(bytes.substr(0, 5'000)), HasSubstr("which may be cut off"));
+}
+
+TEST_F(Mcap, DamageAmongThePosesIsToldAfterAllEvents) {
+  write(200);
+  McapWriter writer(file_, rig_);
+  writer.addEvents(0, events_);
+  for (std::int64_t i = 0; i < 20'000; ++i) {
+    writer.addPose({kFirstNs + i * 100'000, T_world_rig_});  // chunks of their own
+  }
+  writer.close();
+  std::string bytes = readText(file_);
+  const std::size_t data_end = bytes.rfind(std::string("\x0f\4\0\0\0\0\0\0\0", 9));
+  bytes[bytes.rfind("zstd", data_end) + 1'000] ^= 1;
+  writeFile(file_, bytes);
+
+  RecordingSource source;
+  source.files = {file_};
+  const std::unique_ptr<Recording> recording = openRecording(source);
+  std::size_t events = 0;
+  std::size_t poses = 0;
+  EXPECT_THAT(errorOf([&] {
+                while (const auto observation = recording->next()) {
+                  const auto packet =
+                      std::dynamic_pointer_cast<const CObservationEvents>(observation);
+                  packet ? events += packet->events.size() : ++poses;
+                }
+              }),
+              AllOf(StartsWith(file_.string() + ": byte "), HasSubstr("damaged")));
+  EXPECT_EQ(events, events_.size());
+  EXPECT_GT(poses, 5'000U);
+  EXPECT_LT(poses, 20'000U);
+  source.poses = folder() / "poses.txt";  // other poses have no damage
+  writeFile(source.poses, "1.7e9 0 0 0 0 0 0 1\n");
+  const std::unique_ptr<Recording> other = openRecording(source);
+  EXPECT_EQ(errorOf([&] {
+              while (other->next()) continue;
+            }),
+            "no error");
 }
 
 TEST_F(Mcap, TheSummaryMayHaveAnyOrderAndNoChannels) {
