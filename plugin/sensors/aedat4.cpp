@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstring>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -96,7 +97,8 @@ bool Aedat4Stream::read(std::vector<Event>& events) {
   }
   events.resize(packet.count);
   for (std::size_t i = 0; i < packet.count; ++i) {
-    const Aedat4Event& from = packet.begin[i];
+    Aedat4Event from;
+    std::memcpy(&from, packet.begin + i * sizeof(from), sizeof(from));
     constexpr std::int64_t kEndUs = kEndOfTimeNs / kNsPerAedat4Tick;
     if (from.t_us >= kEndUs || from.t_us <= -kEndUs) {
       events.resize(i);

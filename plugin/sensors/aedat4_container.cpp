@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/sensors/aedat4_container.h"
 
-#include <flatbuffers/flatbuffers.h>
 #include <fmt/format.h>
 #include <lz4frame.h>
 #include <tinyxml2.h>
 #include <zstd.h>
 
 #include <algorithm>
+#include <cstring>
 #include <fstream>
 #include <memory>
 #include <new>
@@ -23,78 +23,89 @@ namespace {
 
 constexpr std::size_t kMaxAedat4Bytes = std::size_t{1} << 28U;
 
-// FlatBuffers as their schemas define them. A field's number is 4 + 2 * its index. The verifier
-// asks for the name Verify. NOLINTBEGIN(readability-identifier-naming)
-
-/// table IOHeader { compression: int32; dataTablePosition: int64 = -1; infoNode: string; }
-class Aedat4HeaderTable : private flatbuffers::Table {
+/// A table of a FlatBuffer. Its values may lie at any byte: writers in other languages than C++
+/// align them to another beginning. So each value is copied, at a position that is checked.
+class FlatTable {
  public:
-  std::int32_t compression() const { return GetField<std::int32_t>(4, 0); }
-  std::int64_t indexByte() const { return GetField<std::int64_t>(6, -1); }
-  const flatbuffers::String* info() const { return GetPointer<const flatbuffers::String*>(8); }
-  bool Verify(flatbuffers::Verifier& verifier) const {
-    return VerifyTableStart(verifier) && VerifyField<std::int32_t>(verifier, 4, 4) &&
-           VerifyField<std::int64_t>(verifier, 6, 8) && VerifyOffset(verifier, 8) &&
-           verifier.VerifyString(info()) && verifier.EndTable();
+  /// The root of a FlatBuffer behind its size in 4 bytes. Refers to `bytes`.
+  FlatTable(const std::vector<std::uint8_t>& bytes, std::string_view identifier)
+      : bytes_(bytes.data()), size_(bytes.size()) {
+    constexpr std::uint64_t kSizeBytes = 4;
+    if (size_ < kSizeBytes + 8 || valueAt<std::uint32_t>(0) != size_ - kSizeBytes ||
+        textAt(kSizeBytes + 4, 4) != identifier) {
+      throw std::runtime_error(
+          fmt::format("{} bytes: expected a FlatBuffer '{}' of this size", size_, identifier));
+    }
+    table_ = targetOf(kSizeBytes);
   }
-};
 
-/// table EventPacket { elements: [Event]; }
-class Aedat4EventsTable : private flatbuffers::Table {
- public:
-  using Events = flatbuffers::Vector<const Aedat4Event*>;
-  const Events* events() const { return GetPointer<const Events*>(4); }
-  bool Verify(flatbuffers::Verifier& verifier) const {
-    return VerifyTableStart(verifier) && VerifyOffset(verifier, 4) &&
-           verifier.VerifyVector(events()) && verifier.EndTable();
+  bool has(std::uint64_t field) const { return positionOf(field).has_value(); }
+  template <typename Number>
+  Number number(std::uint64_t field, Number absent) const {
+    const std::optional<std::uint64_t> position = positionOf(field);
+    return position ? valueAt<Number>(*position) : absent;
   }
-};
-
-struct Aedat4PacketHeader {
-  std::int32_t stream;
-  std::int32_t size;
-};
-
-/// table FileDataDefinition { byteOffset: int64; packetInfo: PacketHeader; numElements: int64;
-///                            timestampStart: int64; timestampEnd: int64; }
-class Aedat4IndexEntryTable : private flatbuffers::Table {
- public:
-  std::int64_t byte() const { return GetField<std::int64_t>(4, 0); }
-  const Aedat4PacketHeader* packet() const { return GetStruct<const Aedat4PacketHeader*>(6); }
-  std::int64_t lastUs() const { return GetField<std::int64_t>(12, 0); }
-  bool Verify(flatbuffers::Verifier& verifier) const {
-    return VerifyTableStart(verifier) && VerifyField<std::int64_t>(verifier, 4, 8) &&
-           VerifyField<Aedat4PacketHeader>(verifier, 6, 4) &&
-           VerifyField<std::int64_t>(verifier, 12, 8) && verifier.EndTable();
+  std::string_view text(std::uint64_t field) const {
+    const Elements characters = elements(field, 1);
+    return textAt(characters.position, characters.count);
   }
-};
-
-/// table FileDataTable { table: [FileDataDefinition]; }
-class Aedat4IndexTable : private flatbuffers::Table {
- public:
-  using Entries = flatbuffers::Vector<flatbuffers::Offset<Aedat4IndexEntryTable>>;
-  const Entries* entries() const { return GetPointer<const Entries*>(4); }
-  bool Verify(flatbuffers::Verifier& verifier) const {
-    return VerifyTableStart(verifier) && VerifyOffset(verifier, 4) &&
-           verifier.VerifyVector(entries()) && verifier.VerifyVectorOfTables(entries()) &&
-           verifier.EndTable();
+  /// Where the elements of a vector lie; none if the table has no such field.
+  struct Elements {
+    std::uint64_t position = 0;
+    std::uint64_t count = 0;
+  };
+  Elements elements(std::uint64_t field, std::uint64_t element_bytes) const {
+    const std::optional<std::uint64_t> position = positionOf(field);
+    if (!position) return {};
+    const std::uint64_t vector = targetOf(*position);
+    const std::uint64_t count = valueAt<std::uint32_t>(vector);
+    require(vector + sizeof(std::uint32_t), count * element_bytes);
+    return {vector + sizeof(std::uint32_t), count};
   }
-};
+  /// A table of a vector of tables.
+  FlatTable element(const Elements& tables, std::uint64_t index) const {
+    FlatTable table = *this;
+    table.table_ = targetOf(tables.position + index * sizeof(std::uint32_t));
+    return table;
+  }
 
-// NOLINTEND(readability-identifier-naming)
-
-/// The root of a FlatBuffer that begins with its size.
-template <typename Table>
-const Table& flatbufferRoot(const std::vector<std::uint8_t>& bytes, const char* identifier) {
-  flatbuffers::Verifier::Options options;
-  options.max_tables = static_cast<flatbuffers::uoffset_t>(bytes.size() / 4);
-  flatbuffers::Verifier verifier(bytes.data(), bytes.size(), options);
-  if (!verifier.VerifySizePrefixedBuffer<Table>(identifier)) {
+ private:
+  void require(std::uint64_t position, std::uint64_t count) const {
+    if (position <= size_ && count <= size_ - position) return;
     throw std::runtime_error(
-        fmt::format("{} bytes: expected a FlatBuffer '{}' of this size", bytes.size(), identifier));
+        fmt::format("a FlatBuffer of {} bytes with a value at byte {}: expected "
+                    "all values within it",
+                    size_, position));
   }
-  return *flatbuffers::GetSizePrefixedRoot<Table>(bytes.data());
-}
+  template <typename Number>
+  Number valueAt(std::uint64_t position) const {
+    require(position, sizeof(Number));
+    Number value;  // the host is little-endian, like the file
+    std::memcpy(&value, bytes_ + position, sizeof(Number));
+    return value;
+  }
+  std::string_view textAt(std::uint64_t position, std::uint64_t count) const {
+    require(position, count);
+    return {reinterpret_cast<const char*>(bytes_ + position), static_cast<std::size_t>(count)};
+  }
+  std::uint64_t targetOf(std::uint64_t offset) const {
+    return offset + valueAt<std::uint32_t>(offset);
+  }
+  /// A list before or behind the table has the fields' positions: 0 or missing of absent ones.
+  std::optional<std::uint64_t> positionOf(std::uint64_t field) const {
+    const std::uint64_t list =
+        table_ - static_cast<std::uint64_t>(std::int64_t{valueAt<std::int32_t>(table_)});
+    const std::uint64_t entry = 4 + 2 * field;
+    if (entry + 2 > valueAt<std::uint16_t>(list)) return std::nullopt;
+    const std::uint16_t offset = valueAt<std::uint16_t>(list + entry);
+    if (offset == 0) return std::nullopt;
+    return table_ + offset;
+  }
+
+  const std::uint8_t* bytes_;
+  std::uint64_t size_;
+  std::uint64_t table_ = 0;
+};
 
 /// A child <node name="…"> or <attr key="…"> of a node; null if there is none.
 const tinyxml2::XMLElement* xmlChild(const tinyxml2::XMLElement* node, const char* kind,
@@ -114,7 +125,7 @@ std::string xmlAttribute(const tinyxml2::XMLElement* node, const char* key) {
 }
 
 /// The streams of events that the header's XML lists.
-std::vector<Aedat4StreamInfo> streamsOf(const std::string& xml) {
+std::vector<Aedat4StreamInfo> streamsOf(std::string_view xml) {
   tinyxml2::XMLDocument document;
   if (document.Parse(xml.data(), xml.size()) != tinyxml2::XML_SUCCESS) {
     throw std::runtime_error(fmt::format("information of {} bytes, wrong in line {}: expected XML",
@@ -232,7 +243,8 @@ Aedat4Header readAedat4Header(const std::filesystem::path& file) {
     throw fail(0, "expected '#!AER-DAT4.0'");
   }
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  const std::uint64_t size = flatbuffers::ReadScalar<std::uint32_t>(bytes.data());
+  std::uint32_t size = 0;
+  std::memcpy(&size, bytes.data(), sizeof(size));
   const std::uint64_t begin = magic.size() + bytes.size();
   const std::uint64_t left = header.file_size - std::min(begin, header.file_size);
   if (!stream || size > left) {
@@ -244,17 +256,18 @@ Aedat4Header readAedat4Header(const std::filesystem::path& file) {
               static_cast<std::streamsize>(size));
   if (!stream) throw fail(begin, "the header cannot be read");
   try {
-    const Aedat4HeaderTable& table = flatbufferRoot<Aedat4HeaderTable>(bytes, "IOHE");
-    header.compression = static_cast<Aedat4Compression>(table.compression());
+    // table IOHeader { compression: int32; dataTablePosition: int64 = -1; infoNode: string; }
+    const FlatTable table(bytes, "IOHE");
+    header.compression = table.number(0, Aedat4Compression::kNone);
     if (header.compression < Aedat4Compression::kNone ||
         header.compression > Aedat4Compression::kZstdHigh) {
       throw std::runtime_error(
           fmt::format("compression = {}: expected 0 (none), 1 or 2 (LZ4), 3 or 4 (Zstandard)",
-                      table.compression()));
+                      static_cast<std::int32_t>(header.compression)));
     }
-    header.streams = streamsOf(table.info() == nullptr ? "" : table.info()->str());
+    header.streams = streamsOf(table.text(2));
     header.packets_begin = begin + size;
-    const auto index = static_cast<std::uint64_t>(table.indexByte());
+    const auto index = static_cast<std::uint64_t>(table.number(1, std::int64_t{-1}));
     header.has_index = index >= header.packets_begin && index < header.file_size;
     header.packets_end = header.has_index ? index : header.file_size;
   } catch (const std::runtime_error& error) {
@@ -281,22 +294,25 @@ void decompressAedat4(Aedat4Compression compression, const std::vector<std::uint
 }
 
 Aedat4Events eventsOfAedat4(const std::vector<std::uint8_t>& bytes) {
-  const Aedat4EventsTable::Events* const events =
-      flatbufferRoot<Aedat4EventsTable>(bytes, "EVTS").events();
-  if (events == nullptr || events->size() == 0) return {};
-  return {events->Get(0), events->size()};
+  // table EventPacket { elements: [Event]; }
+  const auto events = FlatTable(bytes, "EVTS").elements(0, sizeof(Aedat4Event));
+  return {bytes.data() + events.position, events.count};
 }
 
 std::vector<Aedat4IndexEntry> indexOfAedat4(const std::vector<std::uint8_t>& bytes) {
+  // table FileDataTable { table: [FileDataDefinition]; }
+  // table FileDataDefinition { byteOffset: int64; packetInfo: PacketHeader; numElements: int64;
+  //                            timestampStart: int64; timestampEnd: int64; }
+  // struct PacketHeader { stream: int32; size: int32; }
+  const FlatTable root(bytes, "FTAB");
+  const FlatTable::Elements entries = root.elements(0, sizeof(std::uint32_t));
   std::vector<Aedat4IndexEntry> index;
-  const Aedat4IndexTable::Entries* const entries =
-      flatbufferRoot<Aedat4IndexTable>(bytes, "FTAB").entries();
-  if (entries == nullptr) return index;
-  index.reserve(entries->size());
-  for (const Aedat4IndexEntryTable* entry : *entries) {
-    if (entry->packet() == nullptr) continue;
-    index.push_back(
-        {static_cast<std::uint64_t>(entry->byte()), entry->packet()->stream, entry->lastUs()});
+  index.reserve(entries.count);
+  for (std::uint64_t i = 0; i < entries.count; ++i) {
+    const FlatTable entry = root.element(entries, i);
+    if (!entry.has(1)) continue;
+    index.push_back({entry.number(0, std::uint64_t{0}), entry.number(1, std::int32_t{0}),
+                     entry.number(4, std::int64_t{0})});
   }
   return index;
 }

@@ -38,7 +38,7 @@ struct Aedat4Header {
 };
 
 /// An event in a packet, as the file has it.
-struct alignas(8) Aedat4Event {
+struct Aedat4Event {
   std::int64_t t_us;  ///< Unix time.
   std::int16_t x;
   std::int16_t y;
@@ -63,9 +63,9 @@ Aedat4Header readAedat4Header(const std::filesystem::path& file);
 void decompressAedat4(Aedat4Compression compression, const std::vector<std::uint8_t>& packed,
                       std::vector<std::uint8_t>& bytes);
 
-/// The events of a decompressed packet: a view.
+/// The events of a decompressed packet: a view of `count` times an Aedat4Event, not aligned.
 struct Aedat4Events {
-  const Aedat4Event* begin = nullptr;
+  const std::uint8_t* begin = nullptr;
   std::size_t count = 0;
 };
 /// @throws std::runtime_error, without the file's name, where the bytes are not a packet of events.

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <string>
 #include <utility>
 #include <vector>
@@ -58,6 +59,17 @@ std::string eventPacket(const std::vector<Aedat4Event>& events) {
   return finished(builder, builder.EndTable(table), "EVTS");
 }
 
+/// The same FlatBuffer with all its values `skip` bytes later, as a writer that aligns otherwise.
+std::string shifted(std::string bytes, std::uint32_t skip) {
+  std::uint32_t number = 0;
+  for (const std::size_t at : {std::size_t{0}, sizeof(number)}) {  // the size, the root's position
+    std::memcpy(&number, &bytes[at], sizeof(number));
+    number += skip;
+    std::memcpy(&bytes[at], &number, sizeof(number));
+  }
+  return bytes.insert(12, skip, '\0');  // behind the identifier
+}
+
 struct Entry {
   std::int64_t byte;
   std::array<std::int32_t, 2> packet;  // stream, size
@@ -90,7 +102,8 @@ std::string indexOf(const std::vector<Entry>& entries) {
   return finished(builder, builder.EndTable(table), "FTAB");
 }
 
-std::string headerOf(Aedat4Compression compression, std::int64_t index, const std::string& xml) {
+std::string headerOf(Aedat4Compression compression, std::int64_t index, const std::string& xml,
+                     std::uint32_t skip = 0) {
   flatbuffers::FlatBufferBuilder builder;
   builder.ForceDefaults(true);  // so that its size is the same for every index
   const auto info = builder.CreateString(xml);
@@ -98,7 +111,7 @@ std::string headerOf(Aedat4Compression compression, std::int64_t index, const st
   builder.AddElement(4, static_cast<std::int32_t>(compression), 0);
   builder.AddElement(6, index, std::int64_t{-1});
   builder.AddOffset(8, info);
-  return "#!AER-DAT4.0\r\n" + finished(builder, builder.EndTable(table), "IOHE");
+  return "#!AER-DAT4.0\r\n" + shifted(finished(builder, builder.EndTable(table), "IOHE"), skip);
 }
 
 std::string streamXml(int id, const std::string& type, const std::string& source) {
@@ -116,10 +129,12 @@ std::string outInfo(const std::string& streams) {
          streams + "</node></dv>";
 }
 
-/// Streams 0 and 3 have events, 1 has IMU samples. The list in the file is not in order.
+/// Streams 0 and 3 have events, the others another kind of data. The list in the file is not in
+/// order.
 const std::string& twoCameras() {
   static const std::string xml = outInfo(
-      streamXml(3, "EVTS", "right") + streamXml(1, "IMUS", "left") + streamXml(0, "EVTS", "left"));
+      streamXml(3, "EVTS", "right") + streamXml(1, "IMUS", "left") + streamXml(2, "FRME", "left") +
+      streamXml(4, "TRIG", "left") + streamXml(0, "EVTS", "left"));
   return xml;
 }
 
@@ -148,13 +163,12 @@ std::string packetBytes(std::int32_t stream, const std::string& data) {
   return textOf(&stream, 4) + textOf(&size, 4) + data;
 }
 
-std::string recording(Aedat4Compression compression, bool with_index,
-                      const std::string& xml = twoCameras()) {
-  const std::string begin = headerOf(compression, -1, xml);
+std::string recording(Aedat4Compression compression, bool with_index, std::uint32_t skip = 0) {
+  const std::string begin = headerOf(compression, -1, twoCameras(), skip);
   std::string packets;
   std::vector<Entry> entries;
   for (int packet = 0; packet < kPackets; ++packet) {
-    for (const int stream : {0, 1, 3}) {
+    for (const int stream : {0, 1, 2, 3, 4}) {
       std::vector<Aedat4Event> events;
       for (const Event& event : packetEvents(stream, packet)) {
         events.push_back({event.t_ns / 1000,
@@ -163,7 +177,9 @@ std::string recording(Aedat4Compression compression, bool with_index,
                           static_cast<std::uint8_t>(event.polarity),
                           {}});
       }
-      const std::string data = compressed(compression, eventPacket(events));
+      const std::string data =
+          compressed(compression, stream % 3 == 0 ? shifted(eventPacket(events), skip)
+                                                  : "a FlatBuffer of another kind");
       entries.push_back({static_cast<std::int64_t>(begin.size() + packets.size() + 8),
                          {stream, static_cast<std::int32_t>(data.size())},
                          100,
@@ -174,7 +190,8 @@ std::string recording(Aedat4Compression compression, bool with_index,
   }
   if (!with_index) return begin + packets;
   const auto index = static_cast<std::int64_t>(begin.size() + packets.size());
-  return headerOf(compression, index, xml) + packets + compressed(compression, indexOf(entries));
+  return headerOf(compression, index, twoCameras(), skip) + packets +
+         compressed(compression, shifted(indexOf(entries), skip));
 }
 
 class Aedat4 : public TemporaryFolder {
@@ -205,6 +222,41 @@ TEST_F(Aedat4, EachStreamOfEventsIsACamera) {
     EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3)) << compression;
     EXPECT_EQ(parts.cameras[1]->progress(), 1);
   }
+}
+
+TEST_F(Aedat4, FlatBuffersMayBeAlignedToAnyByte) {
+  for (std::uint32_t skip = 1; skip < 8; ++skip) {
+    const auto compression = static_cast<Aedat4Compression>(skip % 5);
+    writeFile(file(), recording(compression, true, skip));
+    RecordingParts parts = open();
+    ASSERT_EQ(parts.cameras.size(), 2U);
+    EXPECT_EQ(parts.cameras[1]->size()->height, 480);
+    EXPECT_TRUE(readStream(*parts.cameras[0]) == streamEvents(0)) << skip;
+    parts.cameras[1]->seek((kStartUs + 17'500) * 1000);
+    EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3, 17)) << skip;
+  }
+}
+
+TEST_F(Aedat4, EachPositionInAFlatBufferIsChecked) {
+  const std::string good = eventPacket({{1, 2, 3, 1, {}}});
+  ASSERT_EQ(good.size() % 4, 0U);
+  std::size_t refused = 0;
+  // Every number of it, once beyond the end and once before the beginning.
+  for (std::size_t at = 0; at + 4 <= good.size(); at += 2) {
+    for (const std::uint32_t wrong : {0x7fff'fff0U, 0xffff'fff0U, 0x8000'0000U}) {
+      std::string damaged = good;
+      std::memcpy(&damaged[at], &wrong, sizeof(wrong));
+      const std::vector<std::uint8_t> bytes(damaged.begin(), damaged.end());
+      if (errorOf([&] {
+            const Aedat4Events events = eventsOfAedat4(bytes);
+            const auto begin = static_cast<std::size_t>(events.begin - bytes.data());
+            EXPECT_LE(begin + events.count * sizeof(Aedat4Event), bytes.size()) << at;
+          }) != "no error") {
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GT(refused, 20U);
 }
 
 TEST_F(Aedat4, StreamsAreChosenByCameraOutputOrNumber) {
