@@ -30,6 +30,32 @@ std::optional<int> sideOf(std::string_view text) {
   return side && *side > 0 && *side <= kMaxSide ? side : std::nullopt;
 }
 
+/// Cameras by the beginning of a value in the header: of a generation, or of one system.
+struct KnownCamera {
+  std::string_view key;
+  std::string_view value;
+  CameraSize size;
+};
+constexpr KnownCamera kKnownCameras[] = {
+    {"plugin_name", "hal_plugin_gen3_", {640, 480}},
+    {"plugin_name", "hal_plugin_gen31_", {640, 480}},
+    {"plugin_name", "hal_plugin_gen4_", {1280, 720}},
+    {"plugin_name", "hal_plugin_gen41_", {1280, 720}},
+    {"system_ID", "21", {640, 480}},
+    {"system_ID", "48", {1280, 720}},
+};
+
+std::optional<CameraSize> sizeOfCamera(std::string_view key, std::string_view value) {
+  for (const KnownCamera& camera : kKnownCameras) {
+    const bool generation = camera.value.back() == '_';
+    if (key == camera.key &&
+        (generation ? value.substr(0, camera.value.size()) : value) == camera.value) {
+      return camera.size;
+    }
+  }
+  return std::nullopt;
+}
+
 /// The first bytes of a file, of at most the size of a header.
 std::string beginningOf(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -57,7 +83,9 @@ class RawHeaderParser {
       if (key == "format") takeFormat(value, header);
       if (key == "geometry") takeGeometry(value, header);
       if (key == "endianness") takeOrder(value);
+      if (!camera_size_) camera_size_ = sizeOfCamera(key, value);
     }
+    if (!header.size) header.size = camera_size_;
     if (!encoding_) {
       throw std::runtime_error(
           fmt::format("{}: no encoding: expected a RAW file with a line '% evt 3.0', 2.0 or 2.1 in "
@@ -152,6 +180,7 @@ class RawHeaderParser {
   int number_ = 0;
   std::optional<EvtEncoding> encoding_;
   bool legacy_order_ = false;
+  std::optional<CameraSize> camera_size_;  // of a camera that the header names
 };
 
 std::ifstream openRaw(const std::filesystem::path& file) {

@@ -17,8 +17,10 @@ namespace efm {
 /// What the lines "% key value" at the beginning of a RAW file say.
 struct RawHeader {
   EvtEncoding encoding = EvtEncoding::kEvt3;  ///< "% evt 3.0" or "% format EVT3;…"
-  std::optional<CameraSize> size;  ///< "% geometry 1280x720" or "% format …;height=720;…"
-  std::uint64_t bytes = 0;         ///< Of the header; the words follow.
+  /// "% geometry 1280x720" or "% format …;height=720;…"; else of the camera that "% plugin_name" or
+  /// "% system_ID" names, as files of 2020 have it.
+  std::optional<CameraSize> size;
+  std::uint64_t bytes = 0;  ///< Of the header; the words follow.
 };
 
 /// The events of a RAW file of a Prophesee camera. Times are those of the sensor's clock, see
