@@ -107,13 +107,20 @@ std::int64_t BaselinePolicy::earliestStart(const RecordingProgress& recording) c
 }
 
 std::uint64_t BaselinePolicy::giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) {
-  if (t_ns <= earliestStart(recording)) return 0;
+  const std::int64_t from_ns = earliestStart(recording);
+  if (t_ns <= from_ns) return 0;
   startAt(t_ns);
-  return 1;
+  const std::int64_t uncounted_ns = std::max(from_ns, counted_until_ns_);
+  if (t_ns <= uncounted_ns || recording.eventsIn(from_ns, t_ns) == 0) return 0;
+  // Nobody knows the windows that would have come: the longest ones are assumed.
+  const std::int64_t windows = (t_ns - uncounted_ns - 1) / window_ns_ + 1;
+  counted_until_ns_ = uncounted_ns + windows * window_ns_;
+  return static_cast<std::uint64_t>(windows);
 }
 
 void BaselinePolicy::advance(const Window& window, const KeyframeDepthMap* keyframe) {
   startAt(window.t1_ns);
+  counted_until_ns_ = kMinTimeNs;
   if (keyframe == nullptr) return;
   SeenPoints seen = pointsOf(*keyframe);
   if (!seen.points_world.empty()) mean_depth_m_ = seen.mean_depth_m;

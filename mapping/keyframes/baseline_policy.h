@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/keyframe_policy.h"
 
 namespace efm {
@@ -40,9 +41,10 @@ class BaselinePolicy : public KeyframePolicy {
   std::int64_t window_ns_;
   std::int64_t stride_ns_;
   double mean_depth_m_;
-  std::vector<Eigen::Vector3d> seen_world_;  // points of the last keyframe
-  std::optional<std::int64_t> next_ns_;      // earliest start of the next window
-  std::int64_t duration_ns_;                 // the next candidate
+  std::vector<Eigen::Vector3d> seen_world_;     // points of the last keyframe
+  std::optional<std::int64_t> next_ns_;         // earliest start of the next window
+  std::int64_t duration_ns_;                    // the next candidate
+  std::int64_t counted_until_ns_ = kMinTimeNs;  // by the windows that were given up
 };
 
 }  // namespace efm

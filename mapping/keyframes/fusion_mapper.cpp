@@ -138,9 +138,13 @@ std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* sta
   return std::nullopt;
 }
 
-std::optional<WindowData> FusionMapper::window() {
+std::optional<Window> FusionMapper::nextWindow() {
   filterEvents();
-  std::optional<Window> window = coveredWindow();
+  return coveredWindow();
+}
+
+std::optional<WindowData> FusionMapper::window() {
+  std::optional<Window> window = nextWindow();
   if (!window && finished_ && start_ns_) {
     const std::int64_t t0_ns = policy_->earliestStart(*this);
     const std::int64_t t1_ns = std::min(completeNs(), reachedNs() + 1);
@@ -152,12 +156,17 @@ std::optional<WindowData> FusionMapper::window() {
 
 void FusionMapper::skipWindow(const Window& window) {
   policy_->advance(window, nullptr);
-  releaseUnneeded();
+  releaseBefore(releasableUntil());
+}
+
+void FusionMapper::giveUpWindow(const Window& window) {
+  ++counts_.windows_given_up;
+  skipWindow(window);
 }
 
 void FusionMapper::giveUpBefore(std::int64_t t_ns) {
-  if (start_ns_) counts_.windows_given_up += policy_->giveUpBefore(*this, t_ns);
   for (CameraStream& camera : cameras_) camera.filterUntil(t_ns);
+  if (start_ns_) counts_.windows_given_up += policy_->giveUpBefore(*this, t_ns);
   releaseBefore(t_ns);
 }
 
@@ -365,6 +374,10 @@ std::optional<std::int64_t> FusionMapper::timeOfEvent(std::int64_t from_ns,
     }
   }
   return t_ns;
+}
+
+std::int64_t FusionMapper::eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const {
+  return static_cast<std::int64_t>(countBefore(t1_ns) - countBefore(t0_ns));
 }
 
 std::optional<Rigid3> FusionMapper::viewPoseAt(std::int64_t t_ns) const {

@@ -44,7 +44,7 @@ struct MapperCounts {
   std::uint64_t keyframes = 0;
   std::uint64_t keyframes_without_pose = 0;  ///< Windows whose reference time had no pose.
   std::uint64_t windows_without_events = 0;  ///< Skipped: no selected camera has events.
-  std::uint64_t windows_given_up = 0;        ///< See `FusionMapper::giveUpBefore`.
+  std::uint64_t windows_given_up = 0;        ///< See `FusionMapper::giveUpWindow`, `giveUpBefore`.
   std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes; without silent cameras.
   std::uint64_t sorted_events = 0;           ///< Came after a newer one of their camera.
   std::uint64_t duplicate_poses = 0;
@@ -96,8 +96,12 @@ class FusionMapper : private RecordingProgress {
   /// fills.
   ///   Valid until data are added or a window is mapped or skipped.
   std::optional<WindowData> window();
+  /// The window that `next` would map, if there is one.
+  std::optional<Window> nextWindow();
   /// Goes on to the next window without mapping this one.
   void skipWindow(const Window& window);
+  /// The same; the window counts as given up.
+  void giveUpWindow(const Window& window);
   /// Gives up the windows that begin before a time, with or without data, and releases the events
   /// before it. Such an event that comes later is counted as dropped.
   void giveUpBefore(std::int64_t t_ns);
@@ -144,6 +148,7 @@ class FusionMapper : private RecordingProgress {
   std::int64_t reachedNs() const override;
   std::int64_t completeNs() const override;
   std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns, std::int64_t count) const override;
+  std::int64_t eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const override;
   std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const override;
   const ReferenceView& view() const override { return keyframeMapper().view(); }
 

@@ -78,18 +78,28 @@ class EventsPolicy : public KeyframePolicy {
   std::int64_t earliestStart(const RecordingProgress& recording) const override {
     return next_ns_.value_or(recording.startNs());
   }
-  void advance(const Window& window, const KeyframeDepthMap*) override { next_ns_ = window.t1_ns; }
+  void advance(const Window& window, const KeyframeDepthMap*) override {
+    next_ns_ = window.t1_ns;
+    counted_events_ = 0;
+  }
   std::uint64_t advancePast(const RecordingProgress&, std::int64_t) override { return 0; }
   std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) override {
-    if (t_ns <= earliestStart(recording)) return 0;
+    const std::int64_t from_ns = earliestStart(recording);
+    if (t_ns <= from_ns) return 0;
+    counted_events_ -= recording.eventsIn(from_ns, t_ns);
     next_ns_ = t_ns;
-    return 1;
+    if (counted_events_ >= 0) return 0;
+    const std::int64_t windows = (-counted_events_ - 1) / window_events_ + 1;
+    counted_events_ += windows * window_events_;
+    return static_cast<std::uint64_t>(windows);
   }
 
  private:
   std::int64_t window_events_;
   ReferenceTime reference_;
   std::optional<std::int64_t> next_ns_;
+  /// The events that the last window given up still lacks: their loss is counted with it.
+  std::int64_t counted_events_ = 0;
 };
 
 class SingleWindowPolicy : public KeyframePolicy {

@@ -70,6 +70,8 @@ class RecordingProgress {
   /// nothing while fewer events are complete.
   virtual std::optional<std::int64_t> timeOfEvent(std::int64_t from_ns,
                                                   std::int64_t count) const = 0;
+  /// The number of events of the selected cameras in [t0, t1) that are here, complete or not.
+  virtual std::int64_t eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const = 0;
   /// T_world_ref of a reference view at a time; nothing where there is no pose.
   virtual std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const = 0;
   virtual const ReferenceView& view() const = 0;
@@ -94,8 +96,9 @@ class KeyframePolicy {
   /// number.
   /// @return the number of skipped windows.
   virtual std::uint64_t advancePast(const RecordingProgress& recording, std::int64_t t_ns) = 0;
-  /// Gives up the windows that begin before `t_ns`. @return their number; at most 1 where windows
-  /// depend on data.
+  /// Gives up the windows that begin before `t_ns`. @return their number. Where the ends of windows
+  /// depend on data, which may be missing, it is the number that the events before `t_ns` would
+  /// have filled. A window that is given up piece by piece counts once.
   virtual std::uint64_t giveUpBefore(const RecordingProgress& recording, std::int64_t t_ns) = 0;
 };
 

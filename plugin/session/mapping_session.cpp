@@ -275,7 +275,7 @@ bool MappingSession::giveUpOldestWindow() {
   const std::optional<Window> oldest = nextWindow();
   if (!oldest) return false;
   if (mapper_.eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns)) return false;
-  mapper_.giveUpBefore(oldest->t0_ns + 1);
+  mapper_.giveUpWindow(*oldest);
   return true;
 }
 
@@ -288,13 +288,12 @@ void MappingSession::giveUpOlderHalf() {
 
 void MappingSession::giveUpWindow(const Window& window) {
   const std::optional<Window> next = nextWindow();
-  if (next && next->t0_ns == window.t0_ns) mapper_.giveUpBefore(window.t0_ns + 1);
+  if (next && next->t0_ns == window.t0_ns) mapper_.giveUpWindow(*next);
 }
 
 std::optional<Window> MappingSession::nextWindow() {
   if (!rig_.isComplete() || options_.automatic.any()) return std::nullopt;
-  const std::optional<WindowData> data = mapper_.window();
-  return data ? std::optional(data->window) : std::nullopt;
+  return mapper_.nextWindow();
 }
 
 void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,

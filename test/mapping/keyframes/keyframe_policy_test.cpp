@@ -59,6 +59,31 @@ TEST(KeyframePolicy, WindowsBeforeATimeAreSkippedTogether) {
   EXPECT_GT(policy->current(startingAt(0))->t1_ns, 1'000'000'000'000'000'000);
 }
 
+TEST(KeyframePolicy, WindowsThatAreGivenUpPieceByPieceCountOnce) {
+  constexpr std::int64_t kMs = 1'000'000;
+  KeyframePolicyOptions options = period(0.1, 0.1);
+  options.window_events = 100;
+  Recording recording = startingAt(0);
+  for (int ms = 0; ms < 2000; ++ms) recording.events_ns.push_back(ms * kMs);
+  recording.complete_ns = 0;  // as without poses: no window is known
+  for (const auto kind :
+       {KeyframePolicyKind::kPeriod, KeyframePolicyKind::kEvents, KeyframePolicyKind::kBaseline}) {
+    options.policy = kind;
+    const auto policy = makeKeyframePolicy(options, kDepthGuess_m);
+    std::uint64_t windows = 0;
+    for (int ms = 0; ms <= 1000; ms += 7) windows += policy->giveUpBefore(recording, ms * kMs);
+    EXPECT_EQ(windows, 10U) << nameOf(kind);  // until 994 ms
+    EXPECT_EQ(policy->giveUpBefore(recording, 500 * kMs), 0U) << "not twice";
+    EXPECT_EQ(policy->giveUpBefore(recording, 1001 * kMs), 1U) << nameOf(kind);
+    EXPECT_EQ(policy->giveUpBefore(recording, 1501 * kMs), 5U) << nameOf(kind);
+    policy->advance({1501 * kMs, 1601 * kMs, 1501 * kMs}, nullptr);
+    EXPECT_EQ(policy->giveUpBefore(recording, 1701 * kMs), 1U) << nameOf(kind);
+    if (kind == KeyframePolicyKind::kPeriod) continue;  // its windows do not depend on events
+    policy->giveUpBefore(recording, 2000 * kMs);
+    EXPECT_EQ(policy->giveUpBefore(recording, 9000 * kMs), 0U) << "there is no event";
+  }
+}
+
 TEST(KeyframePolicy, ASingleWindowComesOnce) {
   const auto policy = makeSingleWindowPolicy({10, 20, 15});
   ASSERT_TRUE(policy->current(startingAt(kStart_ns)));

@@ -30,6 +30,10 @@ class KnownRecording : public RecordingProgress {
     event += count - 1;
     return *event < complete_ns ? std::optional(*event) : std::nullopt;
   }
+  std::int64_t eventsIn(std::int64_t t0_ns, std::int64_t t1_ns) const override {
+    const auto first = std::lower_bound(events_ns.begin(), events_ns.end(), t0_ns);
+    return std::lower_bound(first, events_ns.end(), t1_ns) - first;
+  }
   std::optional<Rigid3> viewPoseAt(std::int64_t t_ns) const override {
     return T_world_ref_at(t_ns);
   }

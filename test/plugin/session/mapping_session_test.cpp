@@ -267,6 +267,68 @@ TEST(MappingSession, ARefusedPacketLeavesTheCountsAsTheyWere) {
   EXPECT_FALSE(session.status().events);
 }
 
+// --- Windows that are given up -------------------------------------------------------------------
+
+/// Options of live operation with windows of about 0.2 s that do not overlap.
+EventFusionOptions liveOptions(KeyframePolicyKind policy) {
+  EventFusionOptions options = syntheticOptions();
+  options.live.enabled = true;
+  options.mapper.policy.policy = policy;
+  options.mapper.policy.window_events = 400;
+  options.mapper.policy.min_baseline_ratio = 0.05;
+  options.mapper.policy.stride_s = policy == KeyframePolicyKind::kBaseline ? 0.05 : 0.2;
+  return options;
+}
+
+/// Feeds two seconds and does not end them: windows stay to come.
+void feedTwoSeconds(MappingSession& session) {
+  const SyntheticRecording recording(2);
+  addPoses(session, recording);
+  for (const double begin_s : {0.0, 1.1}) {  // the second packets make the rig complete
+    for (const int c : {0, 1}) session.addEvents(pieceOf(recording, c, begin_s, begin_s + 1.1));
+  }
+}
+
+/// The starts of the windows, if none of them is mapped.
+std::vector<std::int64_t> startsOfWindows(MappingSession& session) {
+  std::vector<std::int64_t> starts;
+  while (const auto data = session.window()) {
+    starts.push_back(data->window.t0_ns);
+    session.skipWindow(data->window);
+  }
+  return starts;
+}
+
+TEST(MappingSession, AWindowIsGivenUpAsAWholeAndCountedOnceWithEveryPolicy) {
+  for (const auto& [policy, at_least] :
+       {std::pair{KeyframePolicyKind::kPeriod, 8U}, std::pair{KeyframePolicyKind::kEvents, 15U},
+        std::pair{KeyframePolicyKind::kBaseline, 6U}}) {
+    MappingSession skipping(liveOptions(policy));
+    feedTwoSeconds(skipping);
+    const std::vector<std::int64_t> expected = startsOfWindows(skipping);
+    ASSERT_GE(expected.size(), at_least);
+    for (const bool for_overload : {false, true}) {  // or for an error
+      MappingSession session(liveOptions(policy));
+      feedTwoSeconds(session);
+      std::vector<std::int64_t> starts;
+      std::size_t given_up = 0;
+      while (const std::optional<Window> window = session.nextWindow()) {
+        if (starts.size() == expected.size()) break;
+        starts.push_back(window->t0_ns);
+        if (!for_overload) {
+          session.giveUpWindow(*window);
+        } else if (!session.giveUpOldestWindow()) {
+          break;  // no newer events fill another one
+        }
+        ++given_up;
+      }
+      EXPECT_EQ(starts, expected) << nameOf(policy);
+      EXPECT_GE(given_up, expected.size() - 1) << nameOf(policy);
+      EXPECT_EQ(session.status().counts.windows_given_up, given_up) << nameOf(policy);
+    }
+  }
+}
+
 // --- The options' calibration ------------------------------------------------------------------
 
 class CalibratedSession : public TemporaryFolder {
