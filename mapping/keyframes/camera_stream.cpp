@@ -11,6 +11,11 @@
 namespace efm {
 namespace {
 
+/// An event before this time comes too late after one at `t_ns`. The time may not be checked yet.
+std::int64_t lateAfter(std::int64_t t_ns) {
+  return std::max(t_ns, kMinTimeNs + kMaxEventDelayNs) - kMaxEventDelayNs;
+}
+
 /// Tells of times in order whether a trajectory has a pose there. Asks it once per segment.
 class PosedTimes {
  public:
@@ -59,7 +64,7 @@ CameraStream::CameraStream(int index, const RigCamera& camera, bool selected,
 
 void CameraStream::requireValid(const std::vector<Event>& events) const {
   requireInsideSensor(events, index_, model_);
-  std::int64_t newest_ns = newest_ns_.value_or(kMinTimeNs + kMaxEventDelayNs);
+  std::int64_t late_before_ns = lateBefore();
   for (const Event& event : events) {
     const auto lies_within = [](std::int64_t t_ns) {
       return t_ns >= -kEndOfTimeNs && t_ns <= kEndOfTimeNs;
@@ -69,14 +74,42 @@ void CameraStream::requireValid(const std::vector<Event>& events) const {
              "times must lie within " + formatSeconds(kEndOfTimeNs) +
                  " s, with the camera's offset of " + formatSeconds(time_offset_ns_) + " s too");
     }
-    const std::int64_t t_ns = onTrajectoryClock(event.t_ns);
-    if (t_ns < newest_ns - kMaxEventDelayNs) {
+    if (event.t_ns < late_before_ns) {
       refuse(event, index_,
              "must not come more than 10 ms after a newer one, that at " +
-                 formatSeconds(newest_ns - time_offset_ns_) + " s");
+                 formatSeconds(late_before_ns + kMaxEventDelayNs) + " s");
     }
-    newest_ns = std::max(newest_ns, t_ns);
+    late_before_ns = std::max(late_before_ns, lateAfter(event.t_ns));
   }
+}
+
+/// An event before this time, on the camera's clock, comes too late after the newest one.
+std::int64_t CameraStream::lateBefore() const {
+  return newest_ns_ ? lateAfter(*newest_ns_ - time_offset_ns_) : kMinTimeNs;
+}
+
+bool CameraStream::isOlder(const std::vector<Event>& events) const {
+  std::int64_t late_before_ns = kMinTimeNs;  // within the packet
+  for (const Event& event : events) {
+    if (event.t_ns < late_before_ns || event.t_ns >= lateBefore()) return false;
+    late_before_ns = std::max(late_before_ns, lateAfter(event.t_ns));
+  }
+  return !events.empty();
+}
+
+std::uint64_t CameraStream::dropLate(std::vector<Event>& events) {
+  std::int64_t late_before_ns = lateBefore();
+  const auto is_late = [&](const Event& event) {
+    if (event.t_ns < late_before_ns) return true;
+    late_before_ns = std::max(late_before_ns, lateAfter(event.t_ns));
+    return false;
+  };
+  const auto late = std::remove_if(events.begin(), events.end(), is_late);
+  const auto count = static_cast<std::uint64_t>(events.end() - late);
+  events.erase(late, events.end());
+  counts_.read += count;
+  counts_.dropped += count;
+  return count;
 }
 
 std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& limits,

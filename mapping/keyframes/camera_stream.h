@@ -22,7 +22,8 @@ struct EventCounts {
   std::uint64_t used = 0;            ///< Voted in at least one keyframe.
   std::uint64_t without_pose = 0;    ///< Not used: the trajectory has no pose at this time.
   std::uint64_t outside_window = 0;  ///< Not used: in no window that was mapped.
-  std::uint64_t dropped = 0;   ///< Came after their window was closed, or of an unselected camera.
+  /// Came too late for their window, or of an unselected camera.
+  std::uint64_t dropped = 0;
   std::uint64_t filtered = 0;  ///< Removed as noise, with a pose or without.
   /// Not used: the lens model has no viewing ray for this pixel (`LensInverse`).
   std::uint64_t outside_lens = 0;
@@ -44,6 +45,10 @@ class CameraStream {
   /// @throws std::invalid_argument where an event lies outside the sensor, or comes more than 10 ms
   /// after a newer one.
   void requireValid(const std::vector<Event>& events) const;
+  /// See FusionMapper::isOlder.
+  bool isOlder(const std::vector<Event>& events) const;
+  /// See FusionMapper::dropLate.
+  std::uint64_t dropLate(std::vector<Event>& events);
   /// Adds valid events to the filter, or to the buffer if there is no filter. Events before
   /// `released_ns`, outside the limits and outside the lens are counted, and not added.
   /// @return the number of events that came after a newer one.
@@ -85,6 +90,8 @@ class CameraStream {
     return !outside_lens_.empty() &&
            outside_lens_[std::size_t{event.y} * static_cast<std::size_t>(model_.width) + event.x];
   }
+
+  std::int64_t lateBefore() const;
 
   int index_;
   CameraModel model_;

@@ -62,6 +62,7 @@ MapperCounts& MapperCounts::operator+=(const MapperCounts& other) {
   windows_given_up += other.windows_given_up;
   silent_subintervals += other.silent_subintervals;
   sorted_events += other.sorted_events;
+  late_events += other.late_events;
   duplicate_poses += other.duplicate_poses;
   return *this;
 }

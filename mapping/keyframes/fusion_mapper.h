@@ -47,6 +47,7 @@ struct MapperCounts {
   std::uint64_t windows_given_up = 0;        ///< See `FusionMapper::giveUpWindow`, `giveUpBefore`.
   std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes; without silent cameras.
   std::uint64_t sorted_events = 0;           ///< Came after a newer one of their camera.
+  std::uint64_t late_events = 0;             ///< See `FusionMapper::dropLate`.
   std::uint64_t duplicate_poses = 0;
 
   EventCounts total() const;
@@ -77,6 +78,16 @@ class FusionMapper : private RecordingProgress {
   /// @throws std::invalid_argument where an event is later than that, or lies outside the sensor;
   /// then no event of this call is taken.
   void addEvents(int camera, std::vector<Event> events);
+  /// Whether a camera's clock may have gone back: the events are in order, and each one comes more
+  /// than 10 ms after a newer one of earlier calls.
+  bool isOlder(int camera, const std::vector<Event>& events) const {
+    return cameras_.at(static_cast<std::size_t>(camera)).isOlder(events);
+  }
+  /// Before `addEvents`, where such events are no error: takes out the events that come more than
+  /// 10 ms after a newer one, and counts them as read and dropped.
+  void dropLate(int camera, std::vector<Event>& events) {
+    counts_.late_events += cameras_.at(static_cast<std::size_t>(camera)).dropLate(events);
+  }
   /// Says that all of a camera's events before `t_ns` (its own clock) have been added, so that a
   /// camera without events does not delay the others. Without this call, a camera's events are
   /// complete until 10 ms before its newest one. A camera is silent if it has no event in the last

@@ -10,6 +10,7 @@ namespace efm {
 namespace {
 
 constexpr std::int64_t kIntervalNs = 10'000'000;
+constexpr std::int64_t kLateIntervals = 100;
 
 std::int64_t intervalOf(std::int64_t t_ns) {
   return t_ns / kIntervalNs - (t_ns % kIntervalNs < 0 ? 1 : 0);
@@ -26,7 +27,8 @@ std::vector<Event> EventBudget::pass(std::vector<Event> events,
   std::vector<Event> passed;
   for (const Event& event : events) {
     const std::int64_t interval = intervalOf(event.t_ns);
-    const bool is_late = interval == interval_ - 1;
+    const bool is_late =
+        !held_.empty() && interval < interval_ && interval > interval_ - kLateIntervals;
     if (interval != interval_ && !is_late) {
       endInterval(passed);
       interval_ = interval;

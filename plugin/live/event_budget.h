@@ -15,8 +15,8 @@ namespace efm {
 /// their order of arrival, not on the packets that they arrive in, nor on the machine.
 ///
 /// The events of the current 10 ms are held until a later event, or a packet's cover, ends it. A
-/// late event, of the 10 ms before, belongs to the current 10 ms. After a step of the clock another
-/// interval is the current one.
+/// late event, of the second before, belongs to the current 10 ms. After a step of the clock
+/// another interval is the current one.
 class EventBudget {
  public:
   /// @param max_rate events per second; 0: all events pass at once.

@@ -32,6 +32,12 @@ void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
   span->last_ns = std::max(span->last_ns, t_ns);
 }
 
+/// The time may not be checked yet.
+std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns) {
+  const auto within = [](std::int64_t t) { return std::clamp(t, -kEndOfTimeNs, kEndOfTimeNs); };
+  return within(within(t_ns) + time_offset_ns);
+}
+
 /// Late fusion needs the maps of single cameras.
 FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
   FusionMapperOptions mapper = options.mapper;
@@ -78,29 +84,50 @@ void MappingSession::addEvents(CameraPacket packet) {
   std::exception_ptr refusal;
   for (CameraPacket& ready : packets) {
     const int ready_camera = ready.camera;
+    std::optional<std::int64_t> older_ns;
+    if (options_.live.enabled && mapper_.isOlder(ready_camera, ready.events)) {
+      older_ns = trajectoryTime(ready.events.front().t_ns, ready.calibration.time_offset_ns);
+    } else if (options_.live.enabled) {
+      mapper_.dropLate(ready_camera, ready.events);
+    }
     const std::size_t ready_events = ready.events.size();
-    const std::int64_t ready_ns = ready_events > 0 ? ready.events.front().t_ns : 0;
     const std::uint64_t read = mapper_.counts().total().read;
     try {
       feed(std::move(ready));
     } catch (const std::invalid_argument&) {
       if (mapper_.counts().total().read == read) {
         status_.refused_events[ready_camera] += ready_events;
-        if (ready_events > 0) noteRefusal(ready_camera, ready_ns);
       }
       if (!refusal) refusal = std::current_exception();
-      continue;
+      if (older_ns) noteOlder(ready_camera, *older_ns);
     }
-    if (ready_events > 0) refused_since_ns_.erase(ready_camera);
   }
   if (refusal) std::rethrow_exception(refusal);
 }
 
-/// In live operation: where all packets of a camera, or all poses, have been refused for a second
-/// of their clock, the clock went back. The mapping starts anew then, with the map so far.
-void MappingSession::noteRefusal(int sensor, std::int64_t t_ns) {
-  const std::int64_t since_ns = refused_since_ns_.try_emplace(sensor, t_ns).first->second;
-  if (!options_.live.enabled || t_ns - since_ns < kNanosecondsPerSecond) return;
+/// In live operation: where a camera, or the tracker, sends nothing but older data for a second of
+/// its clock, that clock went back. Not where other cameras go on ahead of it: then it alone is
+/// wrong, and what it sends is refused.
+void MappingSession::noteOlder(int sensor, std::int64_t t_ns) {
+  if (!options_.live.enabled) return;
+  for (auto& [other, older] : older_) older.others_ns.erase(sensor);
+  const Older& older = older_.try_emplace(sensor, Older{t_ns, {}}).first->second;
+  const bool alone = sensor != kTracker &&
+                     std::any_of(older.others_ns.begin(), older.others_ns.end(), [&](auto& other) {
+                       return other.second - t_ns > kNanosecondsPerSecond;
+                     });
+  if (!alone && t_ns - older.since_ns >= kNanosecondsPerSecond) startAnew();
+}
+
+/// The sensor's newest data are no older than those before.
+void MappingSession::noteInTime(int sensor, std::int64_t t_ns) {
+  older_.erase(sensor);
+  if (sensor == kTracker) return;
+  for (auto& [other, older] : older_) older.others_ns[sensor] = t_ns;
+}
+
+/// The clock went back: maps on it from now on, with the map so far.
+void MappingSession::startAnew() {
   mapper_.giveUpAll();
   earlier_counts_ += mapper_.counts();
   const Rig rig = mapper_.rig();
@@ -113,7 +140,7 @@ void MappingSession::noteRefusal(int sensor, std::int64_t t_ns) {
   newest_pose_.reset();
   next_stretch_.clear();
   noises_.clear();
-  refused_since_ns_.clear();
+  older_.clear();
 }
 
 void MappingSession::feed(CameraPacket packet) {
@@ -134,6 +161,7 @@ void MappingSession::feed(CameraPacket packet) {
   if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
   if (empty) return;
   const std::int64_t begin_ns = first_ns + camera.time_offset_ns;
+  noteInTime(packet.camera, begin_ns);
   extend(status_.events, begin_ns);
   extend(status_.events, last_ns + camera.time_offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
@@ -162,10 +190,10 @@ void MappingSession::addPose(const StampedPose& pose, const PoseSourceId& source
     usePoses(poses, noise);
   } catch (const std::invalid_argument&) {
     const bool is_old = newest_pose_ && pose.t_ns < newest_pose_->t_ns - kNanosecondsPerSecond;
-    if (is_old) noteRefusal(kTracker, pose.t_ns);
+    if (is_old) noteOlder(kTracker, pose.t_ns);
     throw;
   }
-  if (!poses.empty()) refused_since_ns_.erase(kTracker);
+  if (!poses.empty()) noteInTime(kTracker, pose.t_ns);
   const bool used = !pose_source_.selected() || *pose_source_.selected() == source;
   // Of two poses of the same time the first counts, and so does its noise.
   if (refinement_ && used) noises_[source].try_emplace(pose.t_ns, noise);
@@ -259,8 +287,7 @@ void MappingSession::giveUpBefore(int camera, std::int64_t until_ns) {
   const auto index = static_cast<std::size_t>(camera);
   if (index >= cameras.size()) return;  // nothing of it is here
   // The times are not checked: those beyond the others are not believed.
-  std::int64_t until = std::clamp(until_ns, -kEndOfTimeNs, kEndOfTimeNs);
-  until = std::clamp(until + cameras[index].time_offset_ns, -kEndOfTimeNs, kEndOfTimeNs);
+  std::int64_t until = trajectoryTime(until_ns, cameras[index].time_offset_ns);
   if (options_.live.enabled) {
     constexpr std::int64_t kMaxAheadNs = 10 * kNanosecondsPerSecond;
     std::int64_t newest_ns = status_.events ? status_.events->last_ns : kMinTimeNs;

@@ -111,7 +111,9 @@ class MappingSession {
   void feed(CameraPacket packet);
   bool seenFor(std::int64_t duration_ns) const;
   void completeRig();
-  void noteRefusal(int sensor, std::int64_t t_ns);
+  void noteOlder(int sensor, std::int64_t t_ns);
+  void noteInTime(int sensor, std::int64_t t_ns);
+  void startAnew();
   void usePoses(const std::vector<StampedPose>& poses, const std::optional<PoseNoise>& noise);
   bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
   bool beginStretch();
@@ -138,9 +140,13 @@ class MappingSession {
   std::optional<StampedPose> newest_pose_;
   // Poses after a jump with their stated noise, until those before it are used up.
   std::vector<std::pair<StampedPose, std::optional<PoseNoise>>> next_stretch_;
-  // By camera, or the tracker: the first time that was refused since the newest one that was not.
-  std::map<int, std::int64_t> refused_since_ns_;
-  SessionStatus status_;  // incomplete: see status()
+  /// A sensor that sends older data than before.
+  struct Older {
+    std::int64_t since_ns;
+    std::map<int, std::int64_t> others_ns;  // cameras that go on, and until when
+  };
+  std::map<int, Older> older_;  // by camera, or the tracker
+  SessionStatus status_;        // incomplete: see status()
 };
 
 }  // namespace efm

@@ -75,6 +75,17 @@ TEST(EventBudget, AStepOfTheClockBackHoldsNothingForGood) {
   EXPECT_EQ(budget.held(), 1U);
 }
 
+TEST(EventBudget, LateEventsCountForTheCurrent10Ms) {
+  std::vector<std::int64_t> times_ns;
+  for (std::int64_t i = 0; i < 60; ++i) {  // twenty of each 10 ms, and as many from 20 ms before
+    times_ns.push_back((100 + i / 20) * kIntervalNs + i % 20);
+    times_ns.push_back(times_ns.back() - 2 * kIntervalNs);
+  }
+  EventBudget budget(500);
+  EXPECT_EQ(passed(budget, eventsAt(times_ns), {}, false).size(), 15U);
+  EXPECT_EQ(budget.thinned(), 105U);
+}
+
 TEST(EventBudget, CoverEndsBeforeTheEventsThatAreHeld) {
   EventBudget budget(100);
   std::optional<std::int64_t> covered_ns = kIntervalNs + 5;
