@@ -113,8 +113,12 @@ HostedMapping::Callbacks CEventFusionMapBuilder::callbacks() {
       warnings = warningsOfSilence(keyframe);
       callback = callback_;
     }
-    for (const std::string& warning : warnings) MRPT_LOG_WARN(warning);
+    // A callback of the log that throws takes no keyframe from the host.
+    const std::exception_ptr error = exceptionOf([&] {
+      for (const std::string& warning : warnings) MRPT_LOG_WARN(warning);
+    });
     if (callback) callback(keyframe);
+    if (error) std::rethrow_exception(error);
   };
   callbacks.on_map = [this](const std::shared_ptr<const MapSnapshot>& map) {
     MapCallback callback;

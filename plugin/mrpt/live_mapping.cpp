@@ -67,7 +67,7 @@ void LiveMapping::run() {
     try {
       goes_on = runOnce();
     } catch (...) {  // no memory
-      noteError("the input", true);
+      noteError("the input", Fault::kMapping);
     }
   }
   const std::lock_guard<std::mutex> lock(mutex_);  // stopped: nobody waits for the end any more
@@ -109,7 +109,7 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
     try {
       session_->addEvents(std::move(packet));
     } catch (...) {  // refused, or no memory
-      noteError("", false);
+      noteError("", Fault::kInput);
     }
   }
   publishState();
@@ -119,7 +119,7 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
     session_->finish();
   } catch (...) {
     error = std::current_exception();
-    noteError("the end of the input", true);
+    noteError("the end of the input", Fault::kMapping);
   }
   while (mapNext()) {
     if (queue_.take().stopped) break;
@@ -153,7 +153,7 @@ bool LiveMapping::mapNext() {
       map_changed_ = true;
     }
   } catch (...) {
-    noteError("a keyframe", true);
+    noteError("a keyframe", Fault::kMapping);
     if (!window) return false;
     session_->giveUpWindow(*window);
     return true;
@@ -167,10 +167,8 @@ bool LiveMapping::mapNext() {
   }
   publishMap(false);
   publishState();
-  try {
-    if (callbacks_.on_keyframe) callbacks_.on_keyframe(*keyframe);
-  } catch (...) {
-    noteError("the callback of a keyframe", true);
+  if (callbacks_.on_keyframe) {
+    callBack("the callback of a keyframe", [&] { callbacks_.on_keyframe(*keyframe); });
   }
   return true;
 }
@@ -208,7 +206,7 @@ void LiveMapping::publishState() {
     const std::lock_guard<std::mutex> lock(mutex_);
     status_ = std::move(status);
   }
-  if (!failure.empty() && callbacks_.warn) callbacks_.warn("refinement: " + failure);
+  if (!failure.empty()) warn("refinement: " + failure);
 }
 
 /// Copies the keyframes and exports the cloud, unless this would take too large a part of the time.
@@ -236,7 +234,7 @@ void LiveMapping::publishMap(bool at_once) {
     map->metric_map.maps.push_back(pointsMapOf(map->points));
     made = std::move(map);
   } catch (...) {
-    noteError("the snapshot of the map", true);
+    noteError("the snapshot of the map", Fault::kMapping);
     map_renewed_ = Clock::now();  // the next try costs as much
     map_cost_ = map_renewed_ - begin;
     return;
@@ -249,38 +247,53 @@ void LiveMapping::publishMap(bool at_once) {
     map_ = made;
   }
   if (!callbacks_.on_map || !thread_.joinable()) return;
+  callBack("the callback of the map", [&] { callbacks_.on_map(made); });
+}
+
+/// What a host's callback throws is counted, and told the first time.
+template <typename Call>
+void LiveMapping::callBack(const char* name, Call call) {
   try {
-    callbacks_.on_map(made);
+    call();
   } catch (...) {
-    noteError("the callback of the map", true);
+    noteError(name, Fault::kCallback);
   }
 }
 
-/// Within a handler.
-/// @param counts as an error; otherwise it is a refused observation.
-void LiveMapping::noteError(const std::string& doing, bool counts) {
-  const std::string text = errorText();
-  bool is_new = false;
+void LiveMapping::warn(const std::string& text) {
+  if (callbacks_.warn) callBack("the callback of the log", [&] { callbacks_.warn(text); });
+}
+
+/// Within a handler. Throws nothing, even without memory: the thread has nobody to catch it.
+void LiveMapping::noteError(const char* doing, Fault fault) noexcept {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    is_new = live_.last_error != text;
-    live_.last_error = text;
-    if (counts) {
-      ++live_.errors;
-      live_.failing = true;
-    }
+    if (fault != Fault::kInput) ++live_.errors;
+    if (fault == Fault::kMapping) live_.failing = true;
   }
-  // Refusals at most once a second.
-  const Clock::time_point now = Clock::now();
-  if (!is_new || (!counts && now - refusal_logged_ < std::chrono::seconds(1))) return;
-  if (!counts) refusal_logged_ = now;
-  if (callbacks_.warn) callbacks_.warn(doing.empty() ? text : doing + ": " + text);
+  try {
+    const std::string text = errorText();
+    bool is_new = false;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_new = live_.last_error != text;
+      live_.last_error = text;
+    }
+    if (fault == Fault::kCallback) is_new = told_callbacks_.insert(doing).second;
+    // Refusals at most once a second.
+    const Clock::time_point now = Clock::now();
+    const bool refused = fault == Fault::kInput;
+    if (!is_new || (refused && now - refusal_logged_ < std::chrono::seconds(1))) return;
+    if (refused) refusal_logged_ = now;
+    warn(refused ? text : std::string(doing) + ": " + text);
+  } catch (...) {  // no memory: it is counted
+  }
 }
 
 /// At most once a second.
 void LiveMapping::warnOfLosses() {
   const Clock::time_point now = Clock::now();
-  if (now - warned_ < std::chrono::seconds(1) || !callbacks_.warn) return;
+  if (now - warned_ < std::chrono::seconds(1)) return;
   std::uint64_t losses = 0;
   std::string text;
   for (const auto& [camera, counts] : queue_.counts()) {
@@ -293,7 +306,7 @@ void LiveMapping::warnOfLosses() {
   warned_ = now;
   warned_losses_ = losses;
   warned_given_up_ = given_up;
-  callbacks_.warn(fmt::format("{} windows given up so far{}", given_up, text));
+  warn(fmt::format("{} windows given up so far{}", given_up, text));
 }
 
 void LiveMapping::finish() {

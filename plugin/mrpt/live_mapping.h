@@ -13,6 +13,7 @@
 #include <memory>
 #include <mutex>
 #include <opencv2/core.hpp>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -82,7 +83,12 @@ class LiveMapping : public HostedMapping {
   void keep(StoredKeyframe keyframe);
   void publishState();
   void publishMap(bool at_once);
-  void noteError(const std::string& doing, bool counts);
+  /// Of the mapping; of a host's callback; of input, which is refused.
+  enum class Fault { kMapping, kCallback, kInput };
+  template <typename Call>
+  void callBack(const char* name, Call call);
+  void warn(const std::string& text);
+  void noteError(const char* doing, Fault fault) noexcept;
   void warnOfLosses();
 
   const LiveOptions options_;
@@ -99,6 +105,7 @@ class LiveMapping : public HostedMapping {
   std::chrono::steady_clock::duration map_cost_{};
   std::chrono::steady_clock::time_point warned_;
   std::chrono::steady_clock::time_point refusal_logged_;
+  std::set<std::string> told_callbacks_;  // that threw
   std::uint64_t warned_losses_ = 0;
   std::size_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;
