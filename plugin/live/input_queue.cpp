@@ -31,9 +31,12 @@ InputQueue::Camera& InputQueue::cameraOf(int index) {
 
 void InputQueue::add(CameraPacket packet) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (ended_) return;
   Camera& camera = cameraOf(packet.camera);
   camera.counts.received += packet.events.size();
+  if (ended_) {
+    camera.counts.after_end += packet.events.size();
+    return;
+  }
   try {
     requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
     if (camera.last && !isSame(camera.last->calibration, packet.calibration)) {
@@ -82,17 +85,20 @@ void InputQueue::noteMissing(const CameraPacket& packet) {
 
 void InputQueue::skip(const CameraPacket& packet) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (ended_) return;
   QueueCounts& counts = cameraOf(packet.camera).counts;
   counts.received += packet.events.size();
   counts.paused += packet.events.size();
+  if (ended_) return;
   noteMissing(packet);
   changed_.notify_one();
 }
 
 void InputQueue::add(QueuedPose pose) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (ended_) return;
+  if (ended_) {
+    ++poses_after_end_;
+    return;
+  }
   poses_.push_back(std::move(pose));
   changed_.notify_one();
 }
@@ -155,6 +161,11 @@ std::uint64_t InputQueue::queuedEvents() const {
   return events_;
 }
 
+std::uint64_t InputQueue::posesAfterEnd() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return poses_after_end_;
+}
+
 std::map<int, QueueCounts> InputQueue::counts() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::map<int, QueueCounts> counts;
@@ -164,7 +175,7 @@ std::map<int, QueueCounts> InputQueue::counts() const {
     of_camera.thinned = camera.budget.thinned();
     of_camera.held = camera.budget.held();
     of_camera.queued = of_camera.received - of_camera.thinned - of_camera.held - of_camera.dropped -
-                       of_camera.paused - of_camera.refused - of_camera.taken;
+                       of_camera.paused - of_camera.refused - of_camera.after_end - of_camera.taken;
   }
   return counts;
 }

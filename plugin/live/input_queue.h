@@ -36,7 +36,7 @@ class InputQueue {
   void add(QueuedPose pose);
   /// Counts a packet that is not to be mapped.
   void skip(const CameraPacket& packet);
-  /// No more input will come. Packets and poses that are added afterwards are not taken.
+  /// No more input will come. Packets and poses that are added afterwards are counted.
   void end();
   /// Wakes up the taking thread for good.
   void stop();
@@ -58,6 +58,7 @@ class InputQueue {
 
   std::uint64_t queuedEvents() const;
   std::map<int, QueueCounts> counts() const;
+  std::uint64_t posesAfterEnd() const;
 
  private:
   struct Camera {
@@ -81,6 +82,7 @@ class InputQueue {
   std::map<int, Camera> cameras_;
   std::deque<CameraPacket> packets_;
   std::vector<QueuedPose> poses_;
+  std::uint64_t poses_after_end_ = 0;
   std::map<int, std::int64_t> dropped_until_ns_;
   std::uint64_t events_ = 0;  // in packets_
   std::uint64_t bytes_ = 0;

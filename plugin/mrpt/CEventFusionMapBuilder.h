@@ -94,9 +94,9 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// inverse(T_rig_sensor); with a hand-eye transform in the options T_world_rig = T_world_sensor *
   /// T_body_rig.
   /// @throws std::invalid_argument if the observation is null or contradicts its sensor or earlier
-  /// observations; std::logic_error after `finish` in playback (live, it is lost). Complete windows
-  /// are mapped before an error is thrown; their keyframes are in the map and delivered. Of two
-  /// errors, the first is thrown.
+  /// observations; std::logic_error after `finish` in playback (live, it is counted). Complete
+  /// windows are mapped before an error is thrown; their keyframes are in the map and delivered. Of
+  /// two errors, the first is thrown.
   void processObservation(const mrpt::obs::CObservation::Ptr& observation);
   /// Ends the recording: maps the remaining windows.
   void finish();

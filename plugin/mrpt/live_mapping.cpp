@@ -48,6 +48,7 @@ LiveMapping::LiveMapping(const EventFusionOptions& options, std::vector<StoredKe
   for (StoredKeyframe& keyframe : earlier) {
     session_->insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
     keep(std::move(keyframe));
+    forgetOldest();
   }
   publishMap(true);
   publishState();
@@ -145,20 +146,26 @@ bool LiveMapping::mapNext() {
   }
   std::optional<KeyframeDepthMap> keyframe;
   std::optional<Window> window;
+  const std::size_t kept = next_map_.trajectory.size();
+  const std::size_t kept_frames = keyframes_.size();
   try {
     window = session_->nextWindow();
-    keyframe = session_->next(sink, clock);
-    if (keyframe) {
-      keep(storedKeyframe(*keyframe, session_->pointsOf(*keyframe)));
-      map_changed_ = true;
-    }
+    keyframe = session_->next(sink, clock, [this](const KeyframeDepthMap& made) {
+      keep(storedKeyframe(made, session_->pointsOf(made)));
+    });
   } catch (...) {
+    // The session does not have this keyframe.
+    next_map_.trajectory.resize(kept);
+    next_map_.frames.resize(std::min(next_map_.frames.size(), kept_frames));
+    keyframes_.resize(std::min(keyframes_.size(), kept_frames));
     noteError("a keyframe", Fault::kMapping);
     if (!window) return false;
     session_->giveUpWindow(*window);
     return true;
   }
   if (!keyframe) return false;
+  forgetOldest();
+  map_changed_ = true;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     live_.failing = false;
@@ -190,6 +197,9 @@ void LiveMapping::keep(StoredKeyframe keyframe) {
   next_map_.trajectory.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
   next_map_.frames.push_back(simpleMapFrameOf(keyframe));
   keyframes_.push_back(std::move(keyframe));
+}
+
+void LiveMapping::forgetOldest() {
   if (keyframes_.size() <= static_cast<std::size_t>(options_.max_keyframes)) return;
   keyframes_.pop_front();
   next_map_.frames.erase(next_map_.frames.begin());
@@ -223,10 +233,14 @@ void LiveMapping::publishMap(bool at_once) {
     const std::size_t forgotten = trajectory.size() - keyframes_.size();
     for (std::size_t i = earlier; i < trajectory.size(); ++i) {
       if (isSame(trajectory[i].T_world_rig, T_world_ref[i - earlier])) continue;
-      trajectory[i].T_world_rig = T_world_ref[i - earlier];
-      if (i < forgotten) continue;
-      keyframes_[i - forgotten].T_world_ref = trajectory[i].T_world_rig;
-      next_map_.frames[i - forgotten] = simpleMapFrameOf(keyframes_[i - forgotten]);
+      if (i >= forgotten) {
+        StoredKeyframe moved = keyframes_[i - forgotten];
+        moved.T_world_ref = T_world_ref[i - earlier];
+        next_map_.frames[i - forgotten] = simpleMapFrameOf(moved);
+        keyframes_[i - forgotten] = std::move(moved);
+      }
+      trajectory[i].T_world_rig =
+          T_world_ref[i - earlier];  // last: without memory it is tried again
     }
     next_map_.T_odom_ref = session_->T_odom_ref();
     auto map = std::make_shared<MapSnapshot>(next_map_);
@@ -329,13 +343,14 @@ void LiveMapping::setClock(ProcessorClock clock) {
 
 SessionStatus LiveMapping::status() const {
   std::map<int, QueueCounts> cameras = queue_.counts();
+  const std::uint64_t poses_after_end = queue_.posesAfterEnd();
   const std::lock_guard<std::mutex> lock(mutex_);
   SessionStatus status = status_;
   const LiveStatus of_session = *status.live;
   status.live = live_;
   status.live->cameras = std::move(cameras);
   status.live->pose_jumps = of_session.pose_jumps;
-  status.live->refused_poses += of_session.refused_poses;
+  status.live->refused_poses += of_session.refused_poses + poses_after_end;
   status.live->clock_steps = of_session.clock_steps;
   return status;
 }

@@ -81,6 +81,7 @@ class LiveMapping : public HostedMapping {
   bool mapNext();
   void giveUpExcess();
   void keep(StoredKeyframe keyframe);
+  void forgetOldest();
   void publishState();
   void publishMap(bool at_once);
   /// Of the mapping; of a host's callback; of input, which is refused.

@@ -95,11 +95,17 @@ std::optional<KeyframeDepthMap> PlaybackMapping::mapNext() {
   const std::lock_guard<std::mutex> lock(mutex_);
   // Within a callback: the caller of the callback goes on mapping.
   if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return std::nullopt;
-  std::optional<KeyframeDepthMap> keyframe = session_.next(sink_, clock_);
-  if (keyframe) {
-    keyframes_.push_back(storedKeyframe(*keyframe, session_.pointsOf(*keyframe)));
-    newest_depth_ = keyframe->map.depth;
+  const std::size_t kept = keyframes_.size();
+  std::optional<KeyframeDepthMap> keyframe;
+  try {
+    keyframe = session_.next(sink_, clock_, [this](const KeyframeDepthMap& made) {
+      keyframes_.push_back(storedKeyframe(made, session_.pointsOf(made)));
+    });
+  } catch (...) {
+    keyframes_.resize(kept);
+    throw;
   }
+  if (keyframe) newest_depth_ = keyframe->map.depth;
   followRefinement();
   return keyframe;
 }

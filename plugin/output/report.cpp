@@ -105,6 +105,7 @@ Json asJson(const LiveStatus& live, const MapperCounts& counts) {
                        {"dropped", camera.dropped},
                        {"refused", camera.refused},
                        {"paused", camera.paused},
+                       {"after_end", camera.after_end},
                        {"taken", camera.taken}});
   }
   return {{"drop_ratio", live.dropRatio()},

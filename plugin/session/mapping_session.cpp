@@ -259,10 +259,14 @@ bool MappingSession::beginStretch() {
 /// up the windows whose poses are overdue, and takes overdue events for silence.
 void MappingSession::limitWaits() {
   if (!options_.live.enabled || finished_) return;
+  pose_source_.limitWaiting(kMaxEventWaitNs);
+  std::optional<std::int64_t> newest_ns = pose_source_.waitingNs();
   if (newest_pose_) {
-    const StampedPose& newest = next_stretch_.empty() ? *newest_pose_ : next_stretch_.back().first;
-    const std::int64_t overdue_ns = newest.t_ns - kMaxEventWaitNs;
-    mapper_.coverAllUntil(overdue_ns);
+    newest_ns = next_stretch_.empty() ? newest_pose_->t_ns : next_stretch_.back().first.t_ns;
+    mapper_.coverAllUntil(*newest_ns - kMaxEventWaitNs);
+  }
+  if (newest_ns) {
+    const std::int64_t overdue_ns = std::max(*newest_ns, -kEndOfTimeNs) - kMaxEventWaitNs;
     for (auto& [source, noises] : noises_)
       noises.erase(noises.begin(), noises.lower_bound(overdue_ns));
     const auto in_time =
@@ -336,7 +340,8 @@ void MappingSession::finish() {
   rig_.requireNoneWaits();
 }
 
-std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock) {
+std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock,
+                                                     const KeyframeStore& store) {
   if (!rig_.isComplete() || !chooseAutomatic()) {
     limitWaits();
     return std::nullopt;
@@ -349,7 +354,7 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
     if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
       mapper_.setPlanes(depth_follower_->planes());
     }
-    insert(*keyframe);
+    insert(*keyframe, store);
   } else if (finished_ && refinement_ && !std::exchange(all_refined_, true)) {
     refinement_->finish();
     applyPending();
@@ -385,11 +390,12 @@ bool MappingSession::chooseAutomatic() {
 
 /// Inserts a keyframe into the cloud, refines it, and moves it and others to their refined poses.
 /// Cloud and refinement number keyframes alike: after an error neither has the keyframe.
-void MappingSession::insert(KeyframeDepthMap& keyframe) {
+void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& store) {
   const Rigid3 T_odom_ref = keyframe.T_world_ref;
   status_.silent_keyframes.resize(mapper_.rig().cameras.size());
   T_odom_ref_.push_back(T_odom_ref);
   try {
+    if (store) store(keyframe);
     Rigid3 T_world_ref = refinement_ ? refinement_->predict(T_odom_ref) : T_odom_ref;
     {
       const SecondsScope scope(status_.times.real.map, status_.times.cpu.map);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -53,6 +54,7 @@ class MappingSession {
   /// The other cameras are mapped all the same.
   void finish();
 
+  using KeyframeStore = std::function<void(const KeyframeDepthMap&)>;
   /// Maps the next window that is covered, if there is one, and inserts it into the cloud. By
   /// option refines its pose, and moves the keyframes that this moves. Data in the order of time
   /// may be added in between: they change no window that is covered. Where this throws, the earlier
@@ -61,9 +63,13 @@ class MappingSession {
   /// the error then.
   /// @param sink receives every fused plane; may be null.
   /// @param clock the processor time of the threads that map.
+  /// @param store called with the keyframe, at its pose by the tracker, before it is inserted. If
+  /// it throws, the keyframe is not inserted. If this function throws after it, the keyframe is not
+  /// inserted either.
   /// @return the keyframe with its refined pose, as known now.
   std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr,
-                                       const ProcessorClock& clock = processSeconds);
+                                       const ProcessorClock& clock = processSeconds,
+                                       const KeyframeStore& store = {});
 
   /// The points of a keyframe in the cloud: of its fused map, or by option of its cameras' maps.
   std::vector<ViewPoint> pointsOf(const KeyframeDepthMap& keyframe) const;
@@ -120,7 +126,7 @@ class MappingSession {
   void limitWaits();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   bool chooseAutomatic();
-  void insert(KeyframeDepthMap& keyframe);
+  void insert(KeyframeDepthMap& keyframe, const KeyframeStore& store);
   void moveKeyframes(double tolerance_m);
 
   EventFusionOptions options_;

@@ -2,6 +2,7 @@
 #include "plugin/session/pose_source_selector.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "mapping/options/quoted_text.h"
 
@@ -39,6 +40,18 @@ std::vector<StampedPose> PoseSourceSelector::select() {
       waiting_.begin(), waiting_.end(),
       [](const WaitingPose& a, const WaitingPose& b) { return a.source.kind < b.source.kind; });
   return select(PoseSourceId(best->source));
+}
+
+void PoseSourceSelector::limitWaiting(std::int64_t max_age_ns) {
+  // One with a wrong time must not keep those behind it.
+  while (!waiting_.empty() && std::abs(waiting_.back().pose.t_ns / 2 -
+                                       waiting_.front().pose.t_ns / 2) > max_age_ns / 2) {
+    waiting_.pop_front();
+  }
+}
+
+std::optional<std::int64_t> PoseSourceSelector::waitingNs() const {
+  return waiting_.empty() ? std::nullopt : std::optional(waiting_.back().pose.t_ns);
 }
 
 /// Returns the waiting poses of a source and counts the others.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -51,6 +52,10 @@ class PoseSourceSelector {
   std::vector<StampedPose> add(const PoseSourceId& source, const StampedPose& pose);
   /// Selects the best source so far and waits no longer. @return as `add`.
   std::vector<StampedPose> select();
+  /// Forgets waiting poses that are this much older than the last one.
+  void limitWaiting(std::int64_t max_age_ns);
+  /// The time of the last waiting pose.
+  std::optional<std::int64_t> waitingNs() const;
 
   const std::optional<PoseSourceId>& selected() const { return selected_; }
   /// The number of poses of other sources.
@@ -67,7 +72,7 @@ class PoseSourceSelector {
   std::string label_;
   std::optional<PoseSourceId> selected_;
   bool waits_ = true;  // for a better source
-  std::vector<WaitingPose> waiting_;
+  std::deque<WaitingPose> waiting_;
   std::map<PoseSourceId, std::uint64_t> unused_;
 };
 

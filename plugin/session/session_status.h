@@ -23,26 +23,28 @@ struct TimeSpan {
 };
 
 /// What became of one camera's events before the mapping, in live operation:
-/// received = thinned + held + queued + dropped + paused + refused + taken.
+/// received = thinned + held + queued + dropped + paused + refused + after_end + taken.
 struct QueueCounts {
   std::uint64_t received = 0;
   std::uint64_t thinned = 0;  ///< By the budget in sensor time.
   std::uint64_t held = 0;     ///< Until the end of their 10 ms.
   std::uint64_t queued = 0;
-  std::uint64_t dropped = 0;  ///< The queue was full.
-  std::uint64_t paused = 0;   ///< Map updating was disabled.
-  std::uint64_t refused = 0;  ///< In a packet that contradicts its camera.
-  std::uint64_t taken = 0;    ///< By the mapping: `MapperCounts::read`, or `refused_events`.
+  std::uint64_t dropped = 0;    ///< The queue was full.
+  std::uint64_t paused = 0;     ///< Map updating was disabled.
+  std::uint64_t refused = 0;    ///< In a packet that contradicts its camera.
+  std::uint64_t after_end = 0;  ///< Came after the end.
+  std::uint64_t taken = 0;      ///< By the mapping: `MapperCounts::read`, or `refused_events`.
 };
 
 struct LiveStatus {
   std::map<int, QueueCounts> cameras;
-  std::uint64_t pose_jumps = 0;     ///< New stretches of poses.
-  std::uint64_t clock_steps = 0;    ///< The clock went back, and the mapping started anew.
-  std::uint64_t refused_poses = 0;  ///< Over a second older than the newest, or not valid.
-  std::uint64_t errors = 0;         ///< Of the mapping and callbacks; see `RefinementState`, too.
-  std::string last_error;           ///< Of these and of refused observations; empty: none.
-  bool failing = false;             ///< The last keyframe could not be made.
+  std::uint64_t pose_jumps = 0;   ///< New stretches of poses.
+  std::uint64_t clock_steps = 0;  ///< The clock went back, and the mapping started anew.
+  /// Over a second older than the newest, not valid, or after the end.
+  std::uint64_t refused_poses = 0;
+  std::uint64_t errors = 0;  ///< Of the mapping and callbacks; see `RefinementState`, too.
+  std::string last_error;    ///< Of these and of refused observations; empty: none.
+  bool failing = false;      ///< The last keyframe could not be made.
 
   /// The part of the received events that was dropped or thinned, 0 to 1.
   double dropRatio() const;

@@ -144,7 +144,14 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   ASSERT_EQ(batch.packets.size(), 2U);
   EXPECT_EQ(batch.packets[1].events.size(), 10U);
   EXPECT_EQ(queue.counts().at(0).thinned, 20U);
-  EXPECT_EQ(queue.counts().at(0).received, 30U);
+  EXPECT_EQ(queue.counts().at(0).received, 60U);
+  EXPECT_EQ(queue.counts().at(0).after_end, 30U);
+  EXPECT_EQ(queue.counts().at(0).queued, 0U);
+  queue.skip(packet(0, 7, 5));
+  EXPECT_EQ(queue.counts().at(0).paused, 5U);
+  queue.add(QueuedPose{{1, {}}, {}, {}});
+  EXPECT_EQ(queue.posesAfterEnd(), 1U);
+  EXPECT_TRUE(queue.take().poses.empty());
 }
 
 }  // namespace

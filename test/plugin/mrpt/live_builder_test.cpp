@@ -10,9 +10,11 @@
 #include <chrono>
 #include <fstream>
 #include <future>
+#include <new>
 #include <set>
 
 #include "test/plugin/mrpt/live_driver.h"
+#include "test/plugin/session/failing_allocation.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -468,6 +470,65 @@ TEST_P(BuilderOfBothModes, AFrameWithABadObservationLosesNoOther) {
   builder.finish();
   EXPECT_GT(refusals, 100);
   EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+}
+
+TEST_P(BuilderOfBothModes, WhereMemoryEndsTheMapAndTheCloudsOfItsKeyframesStayEqual) {
+  struct FailingSink : DsiSink {
+    std::size_t skipped = std::size_t(-1);
+    int keyframes = 0;
+    void addPlane(int plane, const float* /*values*/) override {
+      if (plane == 29 && ++keyframes == 2) failAllocation(Allocating::kThisThread, skipped);
+    }
+  };
+  const SyntheticRecording recording;
+  const Observations observations = announced(recording, observationsOf(recording));
+  EventFusionOptions options = this->options();
+  options.mapper.keyframe.sweep.threads = 1;  // the sink is called by the thread that maps
+  const auto run = [&](std::size_t skipped) {
+    FailingSink sink;
+    sink.skipped = skipped;
+    CEventFusionMapBuilder builder(options);
+    builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+    builder.setDsiSink(&sink);
+    std::vector<std::size_t> allocations;
+    builder.setKeyframeCallback([&](const KeyframeDepthMap&) {
+      if (sink.keyframes == 2) allocations = stopFailing();
+    });
+    std::size_t errors = 0;
+    for (const auto& observation : observations) {
+      try {
+        feedPatiently(builder, {observation});
+      } catch (const std::bad_alloc&) {
+        ++errors;
+      }
+    }
+    builder.finish();
+    stopFailing();
+
+    const SessionStatus status = builder.status();
+    if (status.live) errors = status.live->errors;
+    EXPECT_LE(errors, skipped == std::size_t(-1) ? 0U : 1U);
+    mrpt::maps::CSimpleMap simple_map;
+    builder.getCurrentlyBuiltMap(simple_map);
+    const std::vector<StampedPose> trajectory = builder.trajectory();
+    EXPECT_GE(trajectory.size(), 2U) << "of three";
+    EXPECT_EQ(simple_map.size(), trajectory.size());
+    const std::vector<StoredKeyframe> keyframes = keyframesOf(simple_map);
+    for (std::size_t i = 0; i < std::min(keyframes.size(), trajectory.size()); ++i) {
+      EXPECT_LT(std::abs(keyframes[i].t_ref_ns - trajectory[i].t_ns), 100) << "MRPT's tick";
+    }
+    CEventFusionMapBuilder again(options);
+    again.initialize(simple_map);
+    expectSameBits(again.points(), builder.points());
+    return allocations;
+  };
+  const std::vector<std::size_t> rare = rareOnes(run(std::size_t(-1)));
+  ASSERT_GT(rare.size(), 10U);
+  for (std::size_t i = 0; i < rare.size(); i += rare.size() / 30 + 1) {
+    SCOPED_TRACE("allocation " + std::to_string(rare[i]));
+    run(rare[i]);
+    if (HasFailure()) return;
+  }
 }
 
 TEST_P(BuilderOfBothModes, TheCloudsOfAnInitialMapAreCopied) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <iterator>
 #include <set>
 #include <thread>
 #include <vector>
@@ -50,7 +51,7 @@ inline void playPatiently(CEventFusionMapBuilder& builder, const Observations& o
 inline void expectSumsAgree(const SessionStatus& status) {
   for (const auto& [camera, queue] : status.live->cameras) {
     EXPECT_EQ(queue.received, queue.thinned + queue.held + queue.queued + queue.dropped +
-                                  queue.paused + queue.refused + queue.taken);
+                                  queue.paused + queue.refused + queue.after_end + queue.taken);
     const EventCounts& counts = status.counts.cameras.at(static_cast<std::size_t>(camera));
     const auto refused = status.refused_events.find(camera);
     EXPECT_EQ(queue.taken,
@@ -76,6 +77,19 @@ Observations changed(Observations observations, Change change) {
     change(*observation);
   }
   return observations;
+}
+
+/// Begins a recording with what announces its cameras: an empty packet of each, until its start.
+inline Observations announced(const SyntheticRecording& recording, Observations observations) {
+  Observations all;
+  for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
+    auto packet = packetObservation(recording, static_cast<int>(c));
+    packet->timestamp = mrptTimeFrom(SyntheticRecording::kStartNs);
+    packet->covered_until_ns = recording.events[c].front().t_ns;
+    all.push_back(packet);
+  }
+  std::move(observations.begin(), observations.end(), std::back_inserter(all));
+  return all;
 }
 
 }  // namespace efm

@@ -63,5 +63,24 @@ TEST(LiveLosses, WhatAHostsCallbacksThrowIsCountedAndToldOnce) {
   }
 }
 
+TEST(LiveLosses, OdometryWaitsForEventsTenMinutes) {
+  const SyntheticRecording recording(1.3);
+  const PoseSourceId wheels{PoseKind::kOdometry, "wheels"};
+  MappingSession session(liveOptions());
+  std::size_t keyframes = 0;
+  for (std::int64_t ago_s = 7200; ago_s > 0; --ago_s) {  // a time in the future among them
+    const std::int64_t t_ns = SyntheticRecording::kStartNs - ago_s * 1000 * kMs;
+    session.addPose({ago_s == 5000 ? -t_ns : t_ns, recording.poses.front().T_world_rig}, wheels);
+    EXPECT_FALSE(session.next());
+  }
+  for (const StampedPose& pose : recording.poses) session.addPose(pose, wheels);
+  addEvents(session, recording);
+  session.finish();
+  while (session.next()) ++keyframes;
+  EXPECT_EQ(keyframes, 11U);
+  // The one at 1 s before the start was the last that came alone.
+  EXPECT_EQ(session.status().poses->first_ns, SyntheticRecording::kStartNs - 601'000 * kMs);
+}
+
 }  // namespace
 }  // namespace efm
