@@ -16,6 +16,11 @@ std::int64_t lateAfter(std::int64_t t_ns) {
   return std::max(t_ns, kMinTimeNs + kMaxEventDelayNs) - kMaxEventDelayNs;
 }
 
+bool isInOneOf(const std::vector<Window>& windows, std::int64_t t_ns) {
+  return std::any_of(windows.begin(), windows.end(),
+                     [&](const Window& window) { return window.contains(t_ns); });
+}
+
 /// Tells of times in order whether a trajectory has a pose there. Asks it once per segment.
 class PosedTimes {
  public:
@@ -172,6 +177,15 @@ void CameraStream::markUsed(const Window& window, const Trajectory& trajectory,
   }
 }
 
+void CameraStream::giveUp(std::int64_t t0_ns, std::int64_t t1_ns) {
+  if (t0_ns >= t1_ns) return;
+  if (!given_up_.empty() && given_up_.back().t1_ns >= t0_ns) {
+    given_up_.back().t1_ns = std::max(given_up_.back().t1_ns, t1_ns);
+  } else {
+    given_up_.push_back({t0_ns, t1_ns, t0_ns});
+  }
+}
+
 void CameraStream::release(std::int64_t until_ns, const Trajectory& trajectory) {
   PosedTimes posed(trajectory, pose_cursor_);
   const std::size_t end = buffer_.indexOf(until_ns);
@@ -181,16 +195,19 @@ void CameraStream::release(std::int64_t until_ns, const Trajectory& trajectory) 
       ++counts_.used;
     } else if (!posed.contain(t_ns)) {
       ++counts_.without_pose;
-    } else if (std::any_of(over_budget_.begin(), over_budget_.end(),
-                           [&](const Window& window) { return window.contains(t_ns); })) {
+    } else if (isInOneOf(over_budget_, t_ns)) {
       ++counts_.over_budget;
+    } else if (isInOneOf(given_up_, t_ns)) {
+      ++counts_.dropped;
     } else {
       ++counts_.outside_window;
     }
   }
-  over_budget_.erase(std::remove_if(over_budget_.begin(), over_budget_.end(),
-                                    [&](const Window& window) { return window.t1_ns <= until_ns; }),
-                     over_budget_.end());
+  for (std::vector<Window>* windows : {&over_budget_, &given_up_}) {
+    windows->erase(std::remove_if(windows->begin(), windows->end(),
+                                  [&](const Window& window) { return window.t1_ns <= until_ns; }),
+                   windows->end());
+  }
   buffer_.compact();
 }
 

@@ -22,7 +22,7 @@ struct EventCounts {
   std::uint64_t used = 0;            ///< Voted in at least one keyframe.
   std::uint64_t without_pose = 0;    ///< Not used: the trajectory has no pose at this time.
   std::uint64_t outside_window = 0;  ///< Not used: in no window that was mapped.
-  /// Came too late for their window, or of an unselected camera.
+  /// Came too late, in windows that were given up, or of an unselected camera.
   std::uint64_t dropped = 0;
   std::uint64_t filtered = 0;  ///< Removed as noise, with a pose or without.
   /// Not used: the lens model has no viewing ray for this pixel (`LensInverse`).
@@ -82,6 +82,8 @@ class CameraStream {
   /// Marks the window's events that have a pose as used; those of an `EvenChoice` of at most
   /// `max_events`.
   void markUsed(const Window& window, const Trajectory& trajectory, std::size_t max_events);
+  /// The windows of [t0, t1) are not mapped: their events that no other one uses count as dropped.
+  void giveUp(std::int64_t t0_ns, std::int64_t t1_ns);
   /// Counts and releases the events before a time.
   void release(std::int64_t until_ns, const Trajectory& trajectory);
 
@@ -101,6 +103,7 @@ class CameraStream {
   std::optional<FilteredEvents> filter_;
   EventBuffer buffer_;
   std::vector<Window> over_budget_;  // windows with events that were not chosen
+  std::vector<Window> given_up_;     // times of windows that were given up, in order
   std::size_t pose_cursor_ = 0;
   std::optional<std::int64_t> newest_ns_;
   std::int64_t covered_ns_ = kMinTimeNs;

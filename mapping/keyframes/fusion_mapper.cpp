@@ -51,6 +51,16 @@ EventCounts MapperCounts::total() const {
   return sum;
 }
 
+WindowsGivenUp& WindowsGivenUp::operator+=(const WindowsGivenUp& other) {
+  overload += other.overload;
+  jump += other.jump;
+  no_pose += other.no_pose;
+  error += other.error;
+  paused += other.paused;
+  clock_reset += other.clock_reset;
+  return *this;
+}
+
 MapperCounts& MapperCounts::operator+=(const MapperCounts& other) {
   cameras.resize(std::max(cameras.size(), other.cameras.size()));
   for (std::size_t i = 0; i < other.cameras.size(); ++i) cameras[i] += other.cameras[i];
@@ -121,7 +131,7 @@ void FusionMapper::coverUntil(int camera, std::int64_t t_ns) {
 
 void FusionMapper::coverAllUntil(std::int64_t t_ns) {
   for (CameraStream& camera : cameras_) camera.coverUntil(t_ns - camera.onTrajectoryClock(0));
-  if (!start_ns_) giveUpBefore(t_ns);
+  if (!start_ns_) giveUpBefore(t_ns, &WindowsGivenUp::no_pose);
 }
 
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
@@ -160,15 +170,35 @@ void FusionMapper::skipWindow(const Window& window) {
   releaseBefore(releasableUntil());
 }
 
-void FusionMapper::giveUpWindow(const Window& window) {
-  ++counts_.windows_given_up;
-  skipWindow(window);
+void FusionMapper::giveUpWindow(const Window& window, GiveUpReason reason) {
+  ++(counts_.windows_given_up.*reason);
+  policy_->advance(window, nullptr);
+  loseEvents(window.t0_ns, policy_->earliestStart(*this), reason);
+  releaseBefore(releasableUntil());
 }
 
-void FusionMapper::giveUpBefore(std::int64_t t_ns) {
+void FusionMapper::giveUpBefore(std::int64_t t_ns, GiveUpReason reason) {
   for (CameraStream& camera : cameras_) camera.filterUntil(t_ns);
-  if (start_ns_) counts_.windows_given_up += policy_->giveUpBefore(*this, t_ns);
+  std::int64_t from_ns = kMinTimeNs;
+  std::int64_t until_ns = t_ns;
+  if (start_ns_) {
+    from_ns = policy_->earliestStart(*this);
+    counts_.windows_given_up.*reason += policy_->giveUpBefore(*this, t_ns);
+    until_ns = policy_->earliestStart(*this);
+  }
+  loseEvents(from_ns, until_ns, reason);
   releaseBefore(t_ns);
+}
+
+/// The windows of [t0, t1) are given up.
+void FusionMapper::loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, GiveUpReason reason) {
+  if (reason == &WindowsGivenUp::paused) return;  // the host does not want them
+  for (CameraStream& camera : cameras_) camera.giveUp(t0_ns, t1_ns);
+}
+
+void FusionMapper::loseKeyframe() {
+  --counts_.keyframes;
+  ++counts_.windows_given_up.error;
 }
 
 std::size_t FusionMapper::heldEvents() const {

@@ -37,6 +37,20 @@ struct FusionMapperOptions {
   void validate() const;
 };
 
+/// Windows that were given up, by reason.
+struct WindowsGivenUp {
+  std::uint64_t overload = 0;     ///< Too much input waited, or input was dropped.
+  std::uint64_t jump = 0;         ///< The tracker jumped within them.
+  std::uint64_t no_pose = 0;      ///< Their poses did not come in time.
+  std::uint64_t error = 0;        ///< They could not be mapped.
+  std::uint64_t paused = 0;       ///< Map updating was disabled.
+  std::uint64_t clock_reset = 0;  ///< They waited when a clock went back.
+
+  std::uint64_t total() const { return overload + jump + no_pose + error + paused + clock_reset; }
+  WindowsGivenUp& operator+=(const WindowsGivenUp& other);
+};
+using GiveUpReason = std::uint64_t WindowsGivenUp::*;
+
 struct MapperCounts {
   std::vector<EventCounts> cameras;
   std::uint64_t event_uses = 0;  ///< Summed over keyframes, which may overlap.
@@ -44,7 +58,7 @@ struct MapperCounts {
   std::uint64_t keyframes = 0;
   std::uint64_t keyframes_without_pose = 0;  ///< Windows whose reference time had no pose.
   std::uint64_t windows_without_events = 0;  ///< Skipped: no selected camera has events.
-  std::uint64_t windows_given_up = 0;        ///< See `FusionMapper::giveUpWindow`, `giveUpBefore`.
+  WindowsGivenUp windows_given_up;           ///< See `FusionMapper::giveUpWindow`, `giveUpBefore`.
   std::uint64_t silent_subintervals = 0;     ///< Summed over keyframes; without silent cameras.
   std::uint64_t sorted_events = 0;           ///< Came after a newer one of their camera.
   std::uint64_t late_events = 0;             ///< See `FusionMapper::dropLate`.
@@ -112,12 +126,15 @@ class FusionMapper : private RecordingProgress {
   /// Goes on to the next window without mapping this one.
   void skipWindow(const Window& window);
   /// The same; the window counts as given up.
-  void giveUpWindow(const Window& window);
+  void giveUpWindow(const Window& window, GiveUpReason reason);
   /// Gives up the windows that begin before a time, with or without data, and releases the events
-  /// before it. Such an event that comes later is counted as dropped.
-  void giveUpBefore(std::int64_t t_ns);
+  /// before it. Such an event that comes later is counted as dropped, and so is each event of these
+  /// windows that no other one uses, unless the reason is `paused`.
+  void giveUpBefore(std::int64_t t_ns, GiveUpReason reason);
   /// The same for all events so far.
-  void giveUpAll() { giveUpBefore(reachedNs() + 1); }
+  void giveUpAll(GiveUpReason reason) { giveUpBefore(reachedNs() + 1, reason); }
+  /// The newest keyframe is not kept: its window counts as given up for an error.
+  void loseKeyframe();
   /// The events that windows may still need.
   std::size_t heldEvents() const;
   /// The time of the first of them; kMaxTimeNs if there is none.
@@ -143,6 +160,7 @@ class FusionMapper : private RecordingProgress {
   void skipEmptyWindows();
   std::optional<Window> coveredWindow();
   std::vector<EventSpan> eventsOf(const Window& window) const;
+  void loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, GiveUpReason reason);
   void releaseUnneeded();
   bool isCovered(const Window& window) const;
   std::optional<KeyframeDepthMap> mapWindow(const Window& window, DsiSink* sink, StageHook* stages);

@@ -72,15 +72,15 @@ void InputQueue::dropOldest() {
   events_ -= oldest.events.size();
   bytes_ -= bytesOf(oldest);
   cameraOf(oldest.camera).counts.dropped += oldest.events.size();
-  noteMissing(oldest);
+  noteMissing(oldest, &WindowsGivenUp::overload);
   packets_.pop_front();
 }
 
-void InputQueue::noteMissing(const CameraPacket& packet) {
+void InputQueue::noteMissing(const CameraPacket& packet, GiveUpReason reason) {
   if (packet.events.empty()) return;
-  const std::int64_t until_ns = packet.events.back().t_ns + 1;
-  std::int64_t& missing_ns = dropped_until_ns_.try_emplace(packet.camera, until_ns).first->second;
-  missing_ns = std::max(missing_ns, until_ns);
+  MissingEvents& missing = missing_[packet.camera];
+  missing.until_ns = std::max(missing.until_ns, packet.events.back().t_ns + 1);
+  missing.reason = reason;
 }
 
 void InputQueue::skip(const CameraPacket& packet) {
@@ -89,7 +89,7 @@ void InputQueue::skip(const CameraPacket& packet) {
   counts.received += packet.events.size();
   counts.paused += packet.events.size();
   if (ended_) return;
-  noteMissing(packet);
+  noteMissing(packet, &WindowsGivenUp::paused);
   changed_.notify_one();
 }
 
@@ -125,7 +125,7 @@ void InputQueue::stop() {
 InputQueue::Batch InputQueue::wait(std::optional<Clock::time_point> until) {
   std::unique_lock<std::mutex> lock(mutex_);
   const auto has_input = [this] {
-    return stopped_ || ended_ || !packets_.empty() || !poses_.empty() || !dropped_until_ns_.empty();
+    return stopped_ || ended_ || !packets_.empty() || !poses_.empty() || !missing_.empty();
   };
   if (until) {
     changed_.wait_until(lock, *until, has_input);
@@ -148,7 +148,7 @@ InputQueue::Batch InputQueue::takeLocked() {
   for (const CameraPacket& packet : batch.packets) {
     cameraOf(packet.camera).counts.taken += packet.events.size();
   }
-  batch.dropped_until_ns = std::exchange(dropped_until_ns_, {});
+  batch.missing = std::exchange(missing_, {});
   events_ = 0;
   bytes_ = 0;
   batch.ended = ended_;

@@ -44,9 +44,8 @@ class InputQueue {
   struct Batch {
     std::vector<QueuedPose> poses;  ///< In the order they came.
     std::vector<CameraPacket> packets;
-    /// The cameras with dropped or skipped packets, and until when, on their own clocks: a window
-    /// that begins earlier lacks events.
-    std::map<int, std::int64_t> dropped_until_ns;
+    /// The cameras with dropped or skipped packets.
+    std::map<int, MissingEvents> missing;
     bool ended = false;
     bool stopped = false;
   };
@@ -71,7 +70,7 @@ class InputQueue {
   Camera& cameraOf(int index);
   void push(CameraPacket packet);
   void dropOldest();
-  void noteMissing(const CameraPacket& packet);
+  void noteMissing(const CameraPacket& packet, GiveUpReason reason);
   bool isFull() const;
   Batch takeLocked();
 
@@ -83,7 +82,7 @@ class InputQueue {
   std::deque<CameraPacket> packets_;
   std::vector<QueuedPose> poses_;
   std::uint64_t poses_after_end_ = 0;
-  std::map<int, std::int64_t> dropped_until_ns_;
+  std::map<int, MissingEvents> missing_;
   std::uint64_t events_ = 0;  // in packets_
   std::uint64_t bytes_ = 0;
   bool ended_ = false;

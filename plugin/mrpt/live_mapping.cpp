@@ -103,9 +103,7 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
       live_.last_error = errorText();
     }
   }
-  for (const auto& [camera, until_ns] : batch.dropped_until_ns) {
-    session_->giveUpBefore(camera, until_ns);
-  }
+  for (const auto& [camera, missing] : batch.missing) session_->noteMissing(camera, missing);
   for (CameraPacket& packet : batch.packets) {
     try {
       session_->addEvents(std::move(packet));
@@ -315,12 +313,12 @@ void LiveMapping::warnOfLosses() {
     text += fmt::format("; camera {}: {} dropped, {} thinned, of {} events", camera, counts.dropped,
                         counts.thinned, counts.received);
   }
-  const std::size_t given_up = session_->status().counts.windows_given_up;
-  if (losses == warned_losses_ && given_up == warned_given_up_) return;
+  const WindowsGivenUp given_up = session_->status().counts.windows_given_up;
+  if (losses == warned_losses_ && given_up.total() == warned_given_up_) return;
   warned_ = now;
   warned_losses_ = losses;
-  warned_given_up_ = given_up;
-  warn(fmt::format("{} windows given up so far{}", given_up, text));
+  warned_given_up_ = given_up.total();
+  warn(fmt::format("so far {}{}", asText(given_up), text));
 }
 
 void LiveMapping::finish() {
@@ -347,6 +345,7 @@ SessionStatus LiveMapping::status() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   SessionStatus status = status_;
   const LiveStatus of_session = *status.live;
+  for (const auto& [camera, counts] : of_session.cameras) cameras[camera].lost = counts.lost;
   status.live = live_;
   status.live->cameras = std::move(cameras);
   status.live->pose_jumps = of_session.pose_jumps;

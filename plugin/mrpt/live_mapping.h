@@ -108,7 +108,7 @@ class LiveMapping : public HostedMapping {
   std::chrono::steady_clock::time_point refusal_logged_;
   std::set<std::string> told_callbacks_;  // that threw
   std::uint64_t warned_losses_ = 0;
-  std::size_t warned_given_up_ = 0;
+  std::uint64_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;
 
   mutable std::mutex mutex_;  // of the members below; held for copies alone

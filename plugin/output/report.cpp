@@ -96,6 +96,12 @@ Json asJson(const RefinementState& refinement) {
             {"drift_deg_per_m", tracker.drift_rad / kRadiansPerDegree}}}};
 }
 
+Json asJson(const WindowsGivenUp& windows) {
+  return {{"overload", windows.overload}, {"jump", windows.jump},
+          {"no_pose", windows.no_pose},   {"error", windows.error},
+          {"paused", windows.paused},     {"clock_reset", windows.clock_reset}};
+}
+
 Json asJson(const LiveStatus& live, const MapperCounts& counts) {
   Json cameras = Json::array();
   for (const auto& [index, camera] : live.cameras) {
@@ -106,11 +112,14 @@ Json asJson(const LiveStatus& live, const MapperCounts& counts) {
                        {"refused", camera.refused},
                        {"paused", camera.paused},
                        {"after_end", camera.after_end},
-                       {"taken", camera.taken}});
+                       {"taken", camera.taken},
+                       {"lost", camera.lost}});
   }
   return {{"drop_ratio", live.dropRatio()},
           {"cameras", cameras},
-          {"windows_given_up", counts.windows_given_up},
+          {"windows_given_up", counts.windows_given_up.total()},
+          {"windows_given_up_for", asJson(counts.windows_given_up)},
+          {"late_events", counts.late_events},
           {"pose_jumps", live.pose_jumps},
           {"clock_steps", live.clock_steps},
           {"refused_poses", live.refused_poses},

@@ -128,7 +128,7 @@ void MappingSession::noteInTime(int sensor, std::int64_t t_ns) {
 
 /// The clock went back: maps on it from now on, with the map so far.
 void MappingSession::startAnew() {
-  mapper_.giveUpAll();
+  mapper_.giveUpAll(&WindowsGivenUp::clock_reset);
   earlier_counts_ += mapper_.counts();
   const Rig rig = mapper_.rig();
   mapper_ = FusionMapper(mapperOptions(options_));
@@ -141,6 +141,7 @@ void MappingSession::startAnew() {
   next_stretch_.clear();
   noises_.clear();
   older_.clear();
+  missing_.clear();
 }
 
 void MappingSession::feed(CameraPacket packet) {
@@ -159,12 +160,19 @@ void MappingSession::feed(CameraPacket packet) {
     mapper_.addEvents(packet.camera, std::move(packet.events));
   }
   if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
-  if (empty) return;
+  if (empty) {
+    if (packet.covered_until_ns) {
+      giveUpMissing(packet.camera, trajectoryTime(*packet.covered_until_ns, camera.time_offset_ns));
+    }
+    return;
+  }
+  giveUpMissing(packet.camera, std::max(first_ns, last_ns) + camera.time_offset_ns);
   const std::int64_t begin_ns = first_ns + camera.time_offset_ns;
   noteInTime(packet.camera, begin_ns);
   extend(status_.events, begin_ns);
   extend(status_.events, last_ns + camera.time_offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
+  giveUpOverdue();
   // Without a wait where neither another camera nor a better source of poses can come.
   const bool known = rig_.isKnown() && pose_source_.selected();
   if (known || seenFor(kRigCompletesNs)) completeRig();
@@ -242,7 +250,7 @@ bool MappingSession::beginStretch() {
   if (next_stretch_.empty()) return false;
   if (!finished_ && mapper_.eventsCompleteNs() < newest_pose_->t_ns) return false;
   ++status_.live->pose_jumps;
-  mapper_.giveUpBefore(next_stretch_.front().first.t_ns);
+  mapper_.giveUpBefore(next_stretch_.front().first.t_ns, &WindowsGivenUp::jump);
   newest_pose_.reset();
   for (const auto& [pose, noise] : std::exchange(next_stretch_, {})) {
     try {
@@ -277,49 +285,64 @@ void MappingSession::limitWaits() {
   if (!status_.events) return;
   const std::int64_t overdue_ns =
       status_.events->last_ns - durationFromSeconds(options_.live.max_pose_wait_s);
-  if (!newest_pose_ || newest_pose_->t_ns < overdue_ns) mapper_.giveUpBefore(overdue_ns);
+  if (!newest_pose_ || newest_pose_->t_ns < overdue_ns) {
+    mapper_.giveUpBefore(overdue_ns, &WindowsGivenUp::no_pose);
+  }
 }
 
 void MappingSession::skipEvents(const CameraPacket& packet) {
   if (packet.events.empty()) return;
   status_.paused_events[packet.camera] += packet.events.size();
-  giveUpBefore(packet.camera, packet.events.back().t_ns + 1);
+  noteMissing(packet.camera, {packet.events.back().t_ns + 1, &WindowsGivenUp::paused});
 }
 
-void MappingSession::giveUpBefore(int camera, std::int64_t until_ns) {
-  const auto& cameras = mapper_.rig().cameras;
+void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
+  MissingEvents& noted = missing_[camera];
+  noted = {std::max(noted.until_ns, missing.until_ns), missing.reason};
+}
+
+/// Gives up the windows that lack events of a camera.
+/// @param next_ns no event before this time, on the trajectory's clock, is missing: the camera's
+/// own next data begin earlier.
+void MappingSession::giveUpMissing(int camera, std::int64_t next_ns) {
+  const auto missing = missing_.find(camera);
   const auto index = static_cast<std::size_t>(camera);
-  if (index >= cameras.size()) return;  // nothing of it is here
-  // The times are not checked: those beyond the others are not believed.
-  std::int64_t until = trajectoryTime(until_ns, cameras[index].time_offset_ns);
-  if (options_.live.enabled) {
-    constexpr std::int64_t kMaxAheadNs = 10 * kNanosecondsPerSecond;
-    std::int64_t newest_ns = status_.events ? status_.events->last_ns : kMinTimeNs;
-    if (newest_pose_) newest_ns = std::max(newest_ns, newest_pose_->t_ns);
-    if (newest_ns == kMinTimeNs) return;
-    until = std::min(until, newest_ns + kMaxAheadNs);
+  if (missing == missing_.end() || index >= mapper_.rig().cameras.size()) return;
+  const std::int64_t offset_ns = mapper_.rig().cameras[index].time_offset_ns;
+  const std::int64_t until_ns = trajectoryTime(missing->second.until_ns, offset_ns);
+  mapper_.giveUpBefore(std::min(until_ns, next_ns), missing->second.reason);
+  missing_.erase(missing);
+}
+
+/// A camera that lacks events may send nothing any more.
+void MappingSession::giveUpOverdue() {
+  const std::map<int, MissingEvents> missing = missing_;
+  for (const auto& [camera, events] : missing) {
+    if (events.until_ns <= *newest_begin_ns_) giveUpMissing(camera, kMaxTimeNs);
   }
-  mapper_.giveUpBefore(until);
 }
 
 bool MappingSession::giveUpOldestWindow() {
   const std::optional<Window> oldest = nextWindow();
   if (!oldest) return false;
   if (mapper_.eventsCompleteNs() < oldest->t1_ns + (oldest->t1_ns - oldest->t0_ns)) return false;
-  mapper_.giveUpWindow(*oldest);
+  mapper_.giveUpWindow(*oldest, &WindowsGivenUp::overload);
   return true;
 }
 
 void MappingSession::giveUpOlderHalf() {
   const std::int64_t oldest_ns = mapper_.oldestHeldNs();
   if (status_.events && oldest_ns < status_.events->last_ns) {
-    mapper_.giveUpBefore(oldest_ns + (status_.events->last_ns - oldest_ns) / 2 + 1);
+    mapper_.giveUpBefore(oldest_ns + (status_.events->last_ns - oldest_ns) / 2 + 1,
+                         &WindowsGivenUp::overload);
   }
 }
 
 void MappingSession::giveUpWindow(const Window& window) {
   const std::optional<Window> next = nextWindow();
-  if (next && next->t0_ns == window.t0_ns) mapper_.giveUpWindow(*next);
+  if (next && next->t0_ns == window.t0_ns) {
+    mapper_.giveUpWindow(*next, &WindowsGivenUp::error);
+  }
 }
 
 std::optional<Window> MappingSession::nextWindow() {
@@ -334,6 +357,14 @@ void MappingSession::insertEarlier(const std::vector<CloudPoint>& points,
 
 void MappingSession::finish() {
   finished_ = true;
+  while (!missing_.empty()) {
+    const int camera = missing_.begin()->first;
+    giveUpMissing(camera, kMaxTimeNs);
+    missing_.erase(camera);
+  }
+  for (const auto& [camera, events] : rig_.waitingEvents()) {
+    status_.refused_events[camera] += events;  // those for which the next camera comes now
+  }
   usePoses(pose_source_.select(), std::nullopt);
   if (next_stretch_.empty()) mapper_.finish();  // otherwise after the windows before the jump
   completeRig();
@@ -351,10 +382,15 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
   while (!keyframe && beginStretch()) keyframe = mapper_.next(sink, &timer);
   if (!keyframe) limitWaits();
   if (keyframe) {
-    if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
-      mapper_.setPlanes(depth_follower_->planes());
+    try {
+      if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
+        mapper_.setPlanes(depth_follower_->planes());
+      }
+      insert(*keyframe, store);
+    } catch (...) {
+      mapper_.loseKeyframe();
+      throw;
     }
-    insert(*keyframe, store);
   } else if (finished_ && refinement_ && !std::exchange(all_refined_, true)) {
     refinement_->finish();
     applyPending();
@@ -450,6 +486,17 @@ SessionStatus MappingSession::status() const {
   status.other_poses = pose_source_.unused();
   status.rig = mapper_.rig();
   status.silent_keyframes.resize(status.rig.cameras.size());
+  if (status.live) {
+    for (const auto& [camera, events] : status.refused_events) {
+      status.live->cameras[camera].lost += events;
+    }
+    for (std::size_t c = 0; c < status.counts.cameras.size(); ++c) {
+      const auto camera = static_cast<int>(c);
+      if (!isSelected(camera, options_.mapper.cameras)) continue;
+      const EventCounts& counts = status.counts.cameras[c];
+      status.live->cameras[camera].lost += counts.dropped + counts.without_pose;
+    }
+  }
   status.recalibrated_cameras = rig_.recalibratedCameras();
   if (refinement_) {
     status.refinement = refinement_->state();

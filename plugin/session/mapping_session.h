@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,6 +21,12 @@
 #include "plugin/session/session_status.h"
 
 namespace efm {
+
+/// Events of a camera that are not there, until a time on its clock, and why.
+struct MissingEvents {
+  std::int64_t until_ns = std::numeric_limits<std::int64_t>::min();
+  GiveUpReason reason = &WindowsGivenUp::overload;
+};
 
 /// Turns packets of events and poses, in the order of a recording, into keyframes and the global
 /// cloud: puts the rig together as its cameras appear, feeds the mapper and inserts its keyframes.
@@ -81,9 +88,9 @@ class MappingSession {
 
   /// Counts a packet that is not to be mapped, and gives up its windows.
   void skipEvents(const CameraPacket& packet);
-  /// Gives up the windows that lack events of a camera.
-  /// @param until_ns on the camera's clock: events before it are missing.
-  void giveUpBefore(int camera, std::int64_t until_ns);
+  /// Says that events of a camera are missing: the windows that lack them are given up once the
+  /// next data are there, which also tell where a time was wrong.
+  void noteMissing(int camera, const MissingEvents& missing);
   /// Gives up the oldest window that could be mapped, if newer events fill another one.
   /// @return whether it did.
   bool giveUpOldestWindow();
@@ -123,6 +130,8 @@ class MappingSession {
   void usePoses(const std::vector<StampedPose>& poses, const std::optional<PoseNoise>& noise);
   bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
   bool beginStretch();
+  void giveUpMissing(int camera, std::int64_t next_ns);
+  void giveUpOverdue();
   void limitWaits();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   bool chooseAutomatic();
@@ -151,8 +160,9 @@ class MappingSession {
     std::int64_t since_ns;
     std::map<int, std::int64_t> others_ns;  // cameras that go on, and until when
   };
-  std::map<int, Older> older_;  // by camera, or the tracker
-  SessionStatus status_;        // incomplete: see status()
+  std::map<int, Older> older_;            // by camera, or the tracker
+  std::map<int, MissingEvents> missing_;  // by camera
+  SessionStatus status_;                  // incomplete: see status()
 };
 
 }  // namespace efm

@@ -156,6 +156,14 @@ void RigAssembly::requireOptionsFit() const {
                 fmt::format("one per camera of the recording: {}", count));
 }
 
+std::map<int, std::uint64_t> RigAssembly::waitingEvents() const {
+  std::map<int, std::uint64_t> events;
+  for (const auto& [camera, packets] : waiting_) {
+    for (const CameraPacket& packet : packets) events[camera] += packet.events.size();
+  }
+  return events;
+}
+
 void RigAssembly::requireNoneWaits() const {
   if (!waiting_.empty()) refuseWithoutNext(waiting_.begin()->first);
 }

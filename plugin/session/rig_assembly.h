@@ -55,6 +55,8 @@ class RigAssembly {
   void complete() { complete_ = true; }
   bool isComplete() const { return complete_; }
 
+  /// The events in the packets that wait, by camera.
+  std::map<int, std::uint64_t> waitingEvents() const;
   bool anyCameraWaits() const { return !waiting_.empty(); }
   /// @throws std::invalid_argument where a camera waits for one that never came.
   void requireNoneWaits() const;

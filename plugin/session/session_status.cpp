@@ -1,14 +1,33 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/session_status.h"
 
+#include <fmt/format.h>
+
 namespace efm {
+
+std::string asText(const WindowsGivenUp& windows) {
+  std::string text = fmt::format("{} windows given up", windows.total());
+  const char* separator = ": ";
+  const auto add = [&](std::uint64_t count, const char* reason) {
+    if (count == 0) return;
+    text += fmt::format("{}{} {}", separator, count, reason);
+    separator = ", ";
+  };
+  add(windows.overload, "for overload");
+  add(windows.jump, "across a jump of the tracker");
+  add(windows.no_pose, "without poses");
+  add(windows.error, "for errors");
+  add(windows.paused, "while map updating was disabled");
+  add(windows.clock_reset, "at a clock reset");
+  return text;
+}
 
 double LiveStatus::dropRatio() const {
   std::uint64_t received = 0;
   std::uint64_t missing = 0;
   for (const auto& [index, camera] : cameras) {
     received += camera.received;
-    missing += camera.thinned + camera.dropped;
+    missing += camera.thinned + camera.dropped + camera.refused + camera.after_end + camera.lost;
   }
   return received == 0 ? 0 : static_cast<double>(missing) / static_cast<double>(received);
 }

@@ -33,8 +33,14 @@ struct QueueCounts {
   std::uint64_t paused = 0;     ///< Map updating was disabled.
   std::uint64_t refused = 0;    ///< In a packet that contradicts its camera.
   std::uint64_t after_end = 0;  ///< Came after the end.
-  std::uint64_t taken = 0;      ///< By the mapping: `MapperCounts::read`, or `refused_events`.
+  std::uint64_t taken = 0;      ///< By the mapping: `EventCounts::read`, or `refused_events`.
+  /// Of those taken: refused, dropped or without a pose. Not counted for a camera that takes no
+  /// part.
+  std::uint64_t lost = 0;
 };
+
+/// "3 windows given up: 2 for overload, 1 without poses".
+std::string asText(const WindowsGivenUp& windows);
 
 struct LiveStatus {
   std::map<int, QueueCounts> cameras;
@@ -46,7 +52,9 @@ struct LiveStatus {
   std::string last_error;    ///< Of these and of refused observations; empty: none.
   bool failing = false;      ///< The last keyframe could not be made.
 
-  /// The part of the received events that was dropped or thinned, 0 to 1.
+  /// The part of the received events that is lost, 0 to 1: thinned, dropped, refused, after the
+  /// end, without a pose, or in windows that were given up. Events that the options leave out, and
+  /// those that came while map updating was disabled, are not lost.
   double dropRatio() const;
 };
 

@@ -89,12 +89,17 @@ void addUnusedPoses(const SessionStatus& status, WarningList& warnings) {
 
 void addLosses(const SessionStatus& status, WarningList& warnings) {
   if (!status.live) return;
-  const std::uint64_t given_up = status.counts.windows_given_up;
-  if (status.live->dropRatio() > 0 || given_up > 0) {
-    warnings.add("events-lost",
-                 "{:.1f} % of the events were thinned or dropped, and {} windows given up: the "
-                 "machine is too slow for more ([live] max_event_rate, max_queue_events)",
-                 100 * status.live->dropRatio(), given_up);
+  const WindowsGivenUp& given_up = status.counts.windows_given_up;
+  if (status.live->dropRatio() > 0 || given_up.total() > 0) {
+    bool overload = given_up.overload > 0;
+    for (const auto& [index, camera] : status.live->cameras) {
+      overload = overload || camera.thinned + camera.dropped > 0;
+    }
+    warnings.add("events-lost", "{:.1f} % of the events were lost; {}{}",
+                 100 * status.live->dropRatio(), asText(given_up),
+                 overload ? "; the machine is too slow for more ([live] max_event_rate, "
+                            "max_queue_events)"
+                          : "");
   }
   if (status.live->errors > 0) {
     warnings.add("mapping-errors", "{} errors while mapping, the last one: {}", status.live->errors,

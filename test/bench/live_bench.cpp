@@ -211,16 +211,17 @@ std::uint64_t hashOf(const std::vector<CloudPoint>& points) {
 void printCounts(const SessionStatus& status) {
   for (const auto& [camera, queue] : status.live->cameras) {
     const EventCounts& counts = status.counts.cameras.at(static_cast<std::size_t>(camera));
-    const std::uint64_t before =
-        queue.thinned + queue.held + queue.queued + queue.dropped + queue.paused + queue.refused;
+    const std::uint64_t before = queue.thinned + queue.held + queue.queued + queue.dropped +
+                                 queue.paused + queue.refused + queue.after_end;
     fmt::print(
         "camera {}: received {}, thinned {}, dropped {}, used {}, without pose {}, the sums {}\n",
         camera, queue.received, queue.thinned, queue.dropped, counts.used, counts.without_pose,
         queue.received == before + queue.taken ? "agree" : "DIFFER");
   }
-  fmt::print("{} keyframes, {} windows given up, {} jumps, {} errors {}\n", status.counts.keyframes,
-             status.counts.windows_given_up, status.live->pose_jumps, status.live->errors,
-             status.live->last_error);
+  fmt::print("{} keyframes, {}, {} jumps, {} clock resets, {} errors {}; drop ratio {:.3f}\n",
+             status.counts.keyframes, asText(status.counts.windows_given_up),
+             status.live->pose_jumps, status.live->clock_steps, status.live->errors,
+             status.live->last_error, status.live->dropRatio());
 }
 
 void run(const Arguments& arguments) {

@@ -118,8 +118,9 @@ TEST(InputQueue, DropsTheOldestPacketsAndNoPoseWhereItIsFull) {
   EXPECT_EQ(batch.poses.size(), 1U);
   ASSERT_EQ(batch.packets.size(), 1U);
   EXPECT_EQ(batch.packets[0].events.size(), 7U);
-  EXPECT_EQ(batch.dropped_until_ns, (std::map<int, std::int64_t>{{0, 31}, {1, 41}}));
-  EXPECT_TRUE(queue.take().dropped_until_ns.empty());
+  EXPECT_EQ(batch.missing.at(0).until_ns, 31);
+  EXPECT_EQ(batch.missing.at(1).until_ns, 41);
+  EXPECT_TRUE(queue.take().missing.empty());
   EXPECT_EQ(queue.counts().at(1).taken, 7U);
 }
 

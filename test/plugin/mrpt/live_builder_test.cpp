@@ -512,6 +512,7 @@ TEST_P(BuilderOfBothModes, WhereMemoryEndsTheMapAndTheCloudsOfItsKeyframesStayEq
     builder.getCurrentlyBuiltMap(simple_map);
     const std::vector<StampedPose> trajectory = builder.trajectory();
     EXPECT_GE(trajectory.size(), 2U) << "of three";
+    EXPECT_EQ(status.counts.keyframes, trajectory.size());
     EXPECT_EQ(simple_map.size(), trajectory.size());
     const std::vector<StoredKeyframe> keyframes = keyframesOf(simple_map);
     for (std::size_t i = 0; i < std::min(keyframes.size(), trajectory.size()); ++i) {
