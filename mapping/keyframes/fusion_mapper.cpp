@@ -154,9 +154,9 @@ std::optional<Window> FusionMapper::nextWindow() {
   return coveredWindow();
 }
 
-std::optional<WindowData> FusionMapper::window() {
+std::optional<WindowData> FusionMapper::window(bool rest) {
   std::optional<Window> window = nextWindow();
-  if (!window && finished_ && start_ns_) {
+  if (!window && (rest || finished_) && start_ns_) {
     const std::int64_t t0_ns = policy_->earliestStart(*this);
     const std::int64_t t1_ns = std::min(completeNs(), reachedNs() + 1);
     if (t0_ns < t1_ns) window = windowOf(t0_ns, t1_ns, options_.policy.reference);

@@ -117,10 +117,11 @@ class FusionMapper : private RecordingProgress {
   std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr, StageHook* stages = nullptr);
 
   /// The data of the window that `next` would map: without mapping it, and without its keyframe.
+  /// @param rest also the data so far where they do not fill a window.
   /// @return nothing where no window is covered; after `finish` also the rest, which no window
   /// fills.
   ///   Valid until data are added or a window is mapped or skipped.
-  std::optional<WindowData> window();
+  std::optional<WindowData> window(bool rest = false);
   /// The window that `next` would map, if there is one.
   std::optional<Window> nextWindow();
   /// Goes on to the next window without mapping this one.

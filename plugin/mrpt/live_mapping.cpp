@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -103,6 +104,7 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
       live_.last_error = errorText();
     }
   }
+  chooseBefore(batch);
   for (const auto& [camera, missing] : batch.missing) session_->noteMissing(camera, missing);
   for (CameraPacket& packet : batch.packets) {
     try {
@@ -132,9 +134,21 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
   return false;
 }
 
+/// The window that automatic options are chosen from is not given up before the choice.
+void LiveMapping::chooseBefore(const InputQueue::Batch& batch) {
+  constexpr double kEnoughS = 0.2;
+  const bool loses = std::any_of(
+      batch.missing.begin(), batch.missing.end(),
+      [](const auto& missing) { return missing.second.reason == &WindowsGivenUp::overload; });
+  try {
+    if (loses) session_->chooseFromSoFar(kEnoughS);
+  } catch (...) {
+    noteError("the choice of options", Fault::kMapping);
+  }
+}
+
 /// @return whether it made a keyframe or gave one up.
 bool LiveMapping::mapNext() {
-  giveUpExcess();
   DsiSink* sink = nullptr;
   ProcessorClock clock;
   {
@@ -147,6 +161,7 @@ bool LiveMapping::mapNext() {
   const std::size_t kept = next_map_.trajectory.size();
   const std::size_t kept_frames = keyframes_.size();
   try {
+    giveUpExcess();
     window = session_->nextWindow();
     keyframe = session_->next(sink, clock, [this](const KeyframeDepthMap& made) {
       keep(storedKeyframe(made, session_->pointsOf(made)));
@@ -185,6 +200,7 @@ void LiveMapping::giveUpExcess() {
     return events > static_cast<std::uint64_t>(options_.max_queue_events) ||
            static_cast<double>(events * sizeof(Event)) > options_.max_queue_mb * 1e6;
   };
+  if (is_excess() && session_->chooseFromSoFar(0)) return;
   while (is_excess() && session_->giveUpOldestWindow()) {
   }
   // No window can be mapped, so none can be given up: it is too large, or waits for poses.
@@ -308,12 +324,13 @@ void LiveMapping::warnOfLosses() {
   if (now - warned_ < std::chrono::seconds(1)) return;
   std::uint64_t losses = 0;
   std::string text;
-  for (const auto& [camera, counts] : queue_.counts()) {
-    losses += counts.dropped + counts.thinned;
-    text += fmt::format("; camera {}: {} dropped, {} thinned, of {} events", camera, counts.dropped,
-                        counts.thinned, counts.received);
+  const SessionStatus status = this->status();
+  for (const auto& [camera, counts] : status.live->cameras) {
+    losses += counts.dropped + counts.thinned + counts.lost;
+    text += fmt::format("; camera {}: {} dropped, {} thinned, {} lost afterwards, of {} events",
+                        camera, counts.dropped, counts.thinned, counts.lost, counts.received);
   }
-  const WindowsGivenUp given_up = session_->status().counts.windows_given_up;
+  const WindowsGivenUp& given_up = status.counts.windows_given_up;
   if (losses == warned_losses_ && given_up.total() == warned_given_up_) return;
   warned_ = now;
   warned_losses_ = losses;

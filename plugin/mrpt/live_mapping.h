@@ -78,6 +78,7 @@ class LiveMapping : public HostedMapping {
   void run();
   bool runOnce();
   bool feed(InputQueue::Batch batch);
+  void chooseBefore(const InputQueue::Batch& batch);
   bool mapNext();
   void giveUpExcess();
   void keep(StoredKeyframe keyframe);

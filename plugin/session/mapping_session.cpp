@@ -45,6 +45,18 @@ FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
   return options.automatic.any() ? surveyOptions(mapper, kFirstWindowS) : mapper;
 }
 
+/// Shortens a chosen window, and a chosen stride with it.
+void limitWindow(double max_s, KeyframePolicyOptions& policy, std::vector<ChosenOption>& chosen) {
+  for (ChosenOption& option : chosen) {
+    double* value_s = option.key == "window_s" ? &policy.window_s : nullptr;
+    if (option.key == "stride_s") value_s = &policy.stride_s;
+    const double limit_s = value_s == &policy.stride_s ? policy.window_s / 2 : max_s;
+    if (value_s == nullptr || *value_s <= limit_s) continue;
+    *value_s = option.value = limit_s;
+    option.reason = "no longer one fits into the queue of live operation";
+  }
+}
+
 /// How many keyframes the refinement may move.
 std::size_t movableKeyframes(const EventFusionOptions& options) {
   if (!options.refinement.enabled) return 0;
@@ -363,7 +375,7 @@ void MappingSession::finish() {
     missing_.erase(camera);
   }
   for (const auto& [camera, events] : rig_.waitingEvents()) {
-    status_.refused_events[camera] += events;  // those for which the next camera comes now
+    status_.refused_events[camera] += events;
   }
   usePoses(pose_source_.select(), std::nullopt);
   if (next_stretch_.empty()) mapper_.finish();  // otherwise after the windows before the jump
@@ -408,20 +420,36 @@ bool MappingSession::chooseAutomatic() {
   if (!options_.automatic.any()) return true;
   const std::optional<WindowData> first = mapper_.window();
   if (!first && !finished_) return false;
-  std::vector<WindowSample> samples;
   std::optional<double> duration_s;  // not known before the end
-  if (first) {
-    samples.push_back(sampleOf(*first));
-    if (finished_) duration_s = secondsBetween(first->window.t0_ns, first->window.t1_ns);
-  }
+  if (first && finished_) duration_s = secondsBetween(first->window.t0_ns, first->window.t1_ns);
+  choose(first, duration_s, std::nullopt);
+  return true;
+}
+
+bool MappingSession::chooseFromSoFar(double at_least_s) {
+  if (!rig_.isComplete() || !options_.automatic.any()) return false;
+  const std::optional<WindowData> data = mapper_.window(true);
+  if (!data) return false;
+  const double duration_s = secondsBetween(data->window.t0_ns, data->window.t1_ns);
+  if (duration_s < at_least_s) return false;
+  choose(data, std::nullopt, duration_s / 2);
+  return true;
+}
+
+/// @param duration_s of the recording, where it is known.
+/// @param max_window_s the longest window that the queue holds, where it is known.
+void MappingSession::choose(const std::optional<WindowData>& first,
+                            std::optional<double> duration_s, std::optional<double> max_window_s) {
+  std::vector<WindowSample> samples;
+  if (first) samples.push_back(sampleOf(*first));
   status_.chosen =
       chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, options_.mapper);
+  if (max_window_s) limitWindow(*max_window_s, options_.mapper.policy, status_.chosen);
   const AutomaticOptions automatic = std::exchange(options_.automatic, {});
   if (automatic.min_depth_m || automatic.max_depth_m) {
     depth_follower_.emplace(automatic, options_.mapper.keyframe.planes);
   }
   mapper_.configure(options_.mapper.policy, options_.mapper.keyframe.planes);
-  return true;
 }
 
 /// Inserts a keyframe into the cloud, refines it, and moves it and others to their refined poses.

@@ -96,6 +96,11 @@ class MappingSession {
   bool giveUpOldestWindow();
   /// Gives up the windows of the older half of the events.
   void giveUpOlderHalf();
+  /// Where automatic options wait for their first window: chooses them from the data so far, if
+  /// these last at least so long. Their windows last at most half as long as these data.
+  /// @return whether it chose.
+  /// @throws std::invalid_argument where the options do not fit the rig.
+  bool chooseFromSoFar(double at_least_s);
   /// The window that `next` would map, if there is one.
   std::optional<Window> nextWindow();
   /// Gives this window up if it is still the next one.
@@ -135,6 +140,8 @@ class MappingSession {
   void limitWaits();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   bool chooseAutomatic();
+  void choose(const std::optional<WindowData>& first, std::optional<double> duration_s,
+              std::optional<double> max_window_s);
   void insert(KeyframeDepthMap& keyframe, const KeyframeStore& store);
   void moveKeyframes(double tolerance_m);
 

@@ -44,6 +44,9 @@ struct Arguments {
   int rate = 1;
   std::vector<double> lost;    // the tracker is silent from, to
   std::vector<double> silent;  // camera 1 is silent from, to
+  std::vector<double> jumps;   // the tracker jumps at these times
+  bool late = false;           // an event of each packet of camera 1 comes 20 ms late
+  bool throwing_log = false;   // the host's log throws
 };
 
 double millisecondsSince(Clock::time_point begin) {
@@ -231,6 +234,10 @@ void run(const Arguments& arguments) {
   for (const std::string& assignment : arguments.set) reader.set(assignment);
   EndlessRecording recording(readAll(arguments.recording), arguments.rate);
   CEventFusionMapBuilder builder(reader.options());
+  if (arguments.throwing_log) {
+    builder.logging_enable_console_output = false;
+    builder.logRegisterCallback([](auto&&...) { throw std::runtime_error("the log is full"); });
+  }
 
   std::mutex mutex;
   std::deque<std::pair<std::int64_t, Clock::time_point>> fed;  // newest time of the events
@@ -259,6 +266,16 @@ void run(const Arguments& arguments) {
       };
       if (!packet && during(arguments.lost)) continue;
       if (packet && packet->camera_index == 1 && during(arguments.silent)) continue;
+      if (arguments.late && packet && packet->camera_index == 1 && !packet->events.empty()) {
+        packet->events.push_back(packet->events.back());
+        packet->events.back().t_ns -= 20'000'000;
+      }
+      if (const auto pose =
+              std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation)) {
+        const auto jumps = std::count_if(arguments.jumps.begin(), arguments.jumps.end(),
+                                         [&](double jump_s) { return t_s >= jump_s; });
+        pose->pose.mean.y_incr(10 * static_cast<double>(jumps));
+      }
       if (arguments.speed > 0) {
         std::this_thread::sleep_until(begin +
                                       std::chrono::duration_cast<Clock::duration>(
@@ -306,6 +323,9 @@ int main(int argc, char** argv) {
   app.add_option("--rate", arguments.rate, "How often each event comes");
   app.add_option("--lost", arguments.lost, "The tracker is silent FROM TO, seconds")->expected(2);
   app.add_option("--silent", arguments.silent, "Camera 1 is silent FROM TO, seconds")->expected(2);
+  app.add_option("--jumps", arguments.jumps, "The tracker jumps by 10 m at these times, seconds");
+  app.add_flag("--late", arguments.late, "An event of each packet of camera 1 comes 20 ms late");
+  app.add_flag("--throwing-log", arguments.throwing_log, "The host's log throws");
   app.add_option("--pcd", arguments.pcd, "Writes the map");
   CLI11_PARSE(app, argc, argv);
   try {

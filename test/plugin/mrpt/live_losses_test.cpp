@@ -63,6 +63,40 @@ TEST(LiveLosses, WhatAHostsCallbacksThrowIsCountedAndToldOnce) {
   }
 }
 
+TEST(LiveLosses, OptionsAreChosenFromWhatIsThereWhereTheQueueIsFull) {
+  const SyntheticRecording recording(3);  // some 2000 events per second
+  for (const bool is_announced : {true, false}) {
+    EventFusionOptions options = liveOptions();
+    options.automatic = defaultOptions().automatic;
+    options.live.max_queue_events = 1000;
+    CEventFusionMapBuilder builder(options);
+    builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+    const Observations observations = observationsOf(recording);
+    playPatiently(builder, is_announced ? announced(recording, observations) : observations);
+
+    const SessionStatus status = builder.status();
+    expectSumsAgree(status);
+    ASSERT_EQ(status.chosen.size(), 5U);
+    double window_s = 0;
+    for (const ChosenOption& option : status.chosen) {
+      if (option.key == "window_s") window_s = option.value;
+    }
+    EXPECT_GT(window_s, 0.05);
+    EXPECT_LT(window_s, 0.35) << "two windows fit into the queue";
+    EXPECT_GT(builder.points().size(), 30U);
+    const double mapped_s = 3 - (is_announced ? 0 : 1);  // without a second for further cameras
+    EXPECT_GT(static_cast<double>(builder.trajectory().size()), (mapped_s - 0.3) / window_s);
+    if (is_announced) {
+      EXPECT_EQ(status.counts.windows_given_up.total(), 0U)
+          << asText(status.counts.windows_given_up);
+      EXPECT_EQ(status.live->dropRatio(), 0);
+    } else {
+      EXPECT_GT(status.live->dropRatio(), 0.02);
+      EXPECT_LT(status.live->dropRatio(), 0.33);
+    }
+  }
+}
+
 TEST(LiveLosses, GivenUpWindowsAreCountedByReasonAndTheirEventsAreLost) {
   const SyntheticRecording recording(2);
   const Observations healthy = observationsOf(recording);
