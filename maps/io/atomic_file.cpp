@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/atomic_file.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -10,12 +14,14 @@
 namespace efm {
 namespace {
 
+std::runtime_error cannotWrite(const std::filesystem::path& path, const std::string& why) {
+  return std::runtime_error("cannot write '" + path.string() + "': " + why);
+}
+
 /// The path itself, or the file at the end of its symbolic links.
 std::filesystem::path replaceableFile(const std::filesystem::path& path) {
   constexpr int kMaxLinks = 40;  // as Linux has it
-  const auto refuse = [&](const std::string& why) {
-    return std::runtime_error("cannot write '" + path.string() + "': " + why);
-  };
+  const auto refuse = [&](const std::string& why) { return cannotWrite(path, why); };
   if (path.empty()) throw refuse("expected the name of a file");
   std::error_code error;
   std::filesystem::path file = path;
@@ -47,27 +53,61 @@ std::string reasonNotWritten(int error_number) {
   }
 }
 
-AtomicFile::AtomicFile(const std::filesystem::path& path)
-    : path_(replaceableFile(path)), temporary_(temporaryOf(path_)) {}
+AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(replaceableFile(path)) {
+  for (int trial = 0;; ++trial) {
+    temporary_ = temporaryName(path_, getpid(), trial);
+    const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file >= 0) {
+      ::close(file);
+      return;
+    }
+    if (errno == EEXIST) continue;
+    const std::string why = reasonNotWritten(errno);
+    throw cannotWrite(path, why.empty() ? std::strerror(errno) : why);
+  }
+}
 
-std::filesystem::path AtomicFile::temporaryOf(const std::filesystem::path& path) {
+std::filesystem::path AtomicFile::temporaryName(const std::filesystem::path& path, pid_t process,
+                                                int trial) {
+  const std::string number =
+      std::to_string(process) + (trial == 0 ? "" : "-" + std::to_string(trial));
   std::filesystem::path temporary = path;
-  temporary.replace_filename(path.stem().string() + ".partial" + path.extension().string());
+  temporary.replace_filename(path.stem().string() + ".partial-" + number +
+                             path.extension().string());
   return temporary;
 }
 
 AtomicFile::~AtomicFile() {
   std::error_code ignored;
-  std::filesystem::remove(temporary_, ignored);
+  if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
+}
+
+void AtomicFile::replace(DiskSync sync) {
+  if (sync == DiskSync::kNow) syncToDisk(temporary_);
+  std::filesystem::rename(temporary_, path_);
+  temporary_.clear();  // the name may be another process's file from now on
+  if (sync == DiskSync::kNow) syncToDisk(path_.has_parent_path() ? path_.parent_path() : ".");
+}
+
+void syncToDisk(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return;  // a folder that may be written to, but not read
+  const int error = ::fsync(file) == 0 ? 0 : errno;
+  ::close(file);
+  if (error == 0 || error == EINVAL || error == ENOSYS || error == EOPNOTSUPP) return;
+  errno = error;
+  throw std::filesystem::filesystem_error("cannot be written to the disk", path,
+                                          std::error_code(error, std::generic_category()));
 }
 
 void writeAtomically(const std::filesystem::path& path,
-                     const std::function<void(const std::filesystem::path& temporary)>& write) {
-  const AtomicFile file(path);
+                     const std::function<void(const std::filesystem::path& temporary)>& write,
+                     DiskSync sync) {
+  AtomicFile file(path);
   errno = 0;
   try {
     write(file.temporary());
-    file.replace();
+    file.replace(sync);
   } catch (const std::exception& error) {
     const std::string why = reasonNotWritten(errno);
     throw std::runtime_error("cannot write " + path.string() + ": " +

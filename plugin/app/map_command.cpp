@@ -200,8 +200,9 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJo
 /// automatic options.
 void survey(const RecordingSource& source, MappingJob& job) {
   const RecordingSurvey survey = surveyRecording(job, *openRecording(source));
-  job.warnings = survey.poseWarnings(job.options.mapper);
-  printWarnings(job.warnings);
+  const std::vector<Warning> warnings = survey.poseWarnings(job.options.mapper);
+  printWarnings(warnings);
+  job.warnings.insert(job.warnings.end(), warnings.begin(), warnings.end());
   if (!job.options.automatic.any()) return;
   job.chosen = chooseOptions(job.options.automatic, survey.rig, survey.samples, survey.duration_s,
                              job.options.mapper);
@@ -225,6 +226,35 @@ std::filesystem::path outputFolder(const MappingArguments& arguments, OutputKind
   return name + (kind == OutputKind::kMap ? "_map" : "_depth");
 }
 
+/// The recording's files in a form that another run from another folder gets, too.
+std::vector<std::string> namesOf(const RecordingSource& source) {
+  std::vector<std::string> names;
+  for (const std::filesystem::path& file : source.files) {
+    names.push_back(std::filesystem::weakly_canonical(file).string());
+  }
+  return names;
+}
+
+/// What this run is going to replace, unless it is a complete result of the same recording.
+std::vector<Warning> replacementWarnings(const std::filesystem::path& folder,
+                                         const RecordingSource& source) {
+  const auto earlier = MapOutput::earlierResult(folder);
+  if (!earlier || earlier->keyframes == 0) return {};
+  if (earlier->complete && earlier->isOf(namesOf(source))) return {};
+  const std::string recording = earlier->recording.empty()
+                                    ? "an unknown recording"
+                                    : fmt::format("{}", fmt::join(earlier->recording, ", "));
+  const std::string text =
+      earlier->complete
+          ? fmt::format("{} holds the result of {} ({} keyframes): this run replaces it",
+                        folder.string(), recording, earlier->keyframes)
+          : fmt::format(
+                "{} holds {} keyframes of {}, left by a run that was killed: this run replaces "
+                "them",
+                folder.string(), earlier->keyframes, recording);
+  return {{"replaced-result", text}};
+}
+
 /// Refuses a folder with an input. One that holds something else than an earlier result of the same
 /// kind is probably a mistake.
 void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
@@ -235,7 +265,7 @@ void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
   std::error_code ignored;
   if (arguments.force || !std::filesystem::is_directory(folder, ignored)) return;
   if (std::filesystem::is_empty(folder)) return;
-  if (!MapOutput::holdsResult(folder)) {
+  if (!MapOutput::earlierResult(folder)) {
     throw std::runtime_error(folder.string() +
                              ": holds other files than a map's: expected a new folder, an empty "
                              "one, one of an earlier result, or --force");
@@ -270,6 +300,8 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     RecordingSource source = sourceOf(arguments, job.options);
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseOutputFolder(folder, kind, arguments, source);
+    job.warnings = replacementWarnings(folder, source);
+    printWarnings(job.warnings);
     try {
       survey(source, job);
     } catch (const std::invalid_argument& error) {
@@ -280,7 +312,8 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const std::unique_ptr<Recording> recording = openRecording(source);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes,
-                   arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure);
+                   arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure,
+                   namesOf(source));
     pictures.emplace(job.options.mapper.keyframe.planes);
     std::atomic<int> written = 0;
     KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
@@ -311,6 +344,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     if (outcome.report.counts.keyframes == 0 && limited && !outcome.report.stopped_at) {
       outcome = runMapping(job, *openWhole(source));  // for the error, which says all its times
     }
+    outcome.report.recording = namesOf(source);
     outcome.report.faults = source.faults;
     warnOfRecalibration(arguments, outcome);
     if (outcome.report.counts.keyframes > 0) write(*output, outcome);

@@ -9,6 +9,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
+#include "maps/io/new_folder.h"
 #include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
@@ -95,7 +96,7 @@ int runSimulate(const SimulateArguments& arguments) {
       arguments.preset.empty() ? makeOnTrajectory(arguments) : makePreset(arguments);
   setPixels(arguments, simulation);
   const Interruption interruption;
-  DatasetWriter writer(arguments.out);
+  NewFolder folder(arguments.out);  // an error is known before the simulation runs
   std::vector<CameraRecording> recordings;
   {
     Progress progress("simulating", arguments.verbosity);
@@ -106,7 +107,8 @@ int runSimulate(const SimulateArguments& arguments) {
     };
     recordings = simulateEvents(simulation, run);
     progress.begin("writing the recording");
-    writer.write(simulation, recordings, [&] { interruption.check(); });
+    writeDataset(folder.temporary(), simulation, recordings, [&] { interruption.check(); });
+    folder.finish();
   }
   if (arguments.verbosity == Verbosity::kQuiet) return 0;
   for (std::size_t c = 0; c < recordings.size(); ++c) {

@@ -30,6 +30,7 @@ constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.t
 constexpr std::string_view kEventImage = "events.png";
 // Removed first: without it, what is left of an earlier result does not look complete.
 constexpr const char* kReport = "report.json";
+constexpr const char* kKeyframes = "keyframes";
 constexpr std::array<std::string_view, 8> kMapFiles = {
     "map.html",      "map.pcd",      "map.png",        "map.ply",
     "map.simplemap", "overview.png", "trajectory.txt", "trajectory_tracker.txt"};
@@ -45,11 +46,10 @@ void makeFolder(const std::filesystem::path& folder) {
   }
 }
 
-/// A file that is not regular was not written here.
-void removeFile(const std::filesystem::path& file) {
-  if (std::filesystem::is_regular_file(std::filesystem::symlink_status(file))) {
-    std::filesystem::remove(file);
-  }
+/// A file that is not regular was not written here. @return whether there was one to remove.
+bool removeFile(const std::filesystem::path& file) {
+  return std::filesystem::is_regular_file(std::filesystem::symlink_status(file)) &&
+         std::filesystem::remove(file);
 }
 
 template <typename Names>
@@ -57,10 +57,26 @@ void removeFiles(const std::filesystem::path& folder, const Names& names) {
   for (const std::string_view name : names) removeFile(folder / name);
 }
 
-/// What a killed run left of the files that it was writing.
-template <typename Names>
-void removePartialFiles(const std::filesystem::path& folder, const Names& names) {
-  for (const std::string_view name : names) removeFile(AtomicFile::temporaryOf(folder / name));
+/// Removes the files that a killed run was writing.
+void removeTemporaryFiles(const std::filesystem::path& folder, pid_t process) {
+  const auto removeIn = [&](const std::filesystem::path& place, const auto& names) {
+    for (const std::string_view name : names) {
+      for (int trial = 0; removeFile(AtomicFile::temporaryName(place / name, process, trial));
+           ++trial) {
+      }
+    }
+  };
+  const auto removeImagesIn = [&](const std::filesystem::path& place) {
+    removeIn(place, kImages);
+    removeIn(place, std::array{kEventImage});
+  };
+  removeIn(folder, kMapFiles);
+  removeIn(folder, kDepthFiles);
+  removeIn(folder, std::array{std::string_view(kReport)});
+  removeImagesIn(folder);
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (std::filesystem::is_directory(entry.symlink_status())) removeImagesIn(entry.path());
+  }
 }
 
 constexpr std::string_view kCameraFolder = "cam";  // and the camera's index
@@ -77,16 +93,13 @@ bool isCameraFolder(const std::filesystem::directory_entry& entry) {
 /// Removes the images of a keyframe and of its single cameras.
 void removeImages(const std::filesystem::path& folder) {
   removeFiles(folder, kImages);
-  removePartialFiles(folder, kImages);
   std::vector<std::filesystem::path> cameras;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (isCameraFolder(entry)) cameras.push_back(entry.path());
   }
   for (const std::filesystem::path& camera : cameras) {
     removeFiles(camera, kImages);
-    removePartialFiles(camera, kImages);
     removeFiles(camera, std::array{kEventImage});
-    removePartialFiles(camera, std::array{kEventImage});
     if (std::filesystem::is_empty(camera)) std::filesystem::remove(camera);
   }
 }
@@ -98,13 +111,18 @@ bool isKeyframeFolder(const std::filesystem::directory_entry& entry) {
          std::filesystem::is_directory(entry.symlink_status());
 }
 
+std::vector<std::filesystem::path> keyframeFolders(const std::filesystem::path& keyframes) {
+  std::vector<std::filesystem::path> folders;
+  if (!std::filesystem::is_directory(keyframes)) return folders;
+  for (const auto& entry : std::filesystem::directory_iterator(keyframes)) {
+    if (isKeyframeFolder(entry)) folders.push_back(entry.path());
+  }
+  return folders;
+}
+
 void removeKeyframes(const std::filesystem::path& keyframes) {
   if (!std::filesystem::is_directory(keyframes)) return;
-  std::vector<std::filesystem::path> earlier;
-  for (const auto& entry : std::filesystem::directory_iterator(keyframes)) {
-    if (isKeyframeFolder(entry)) earlier.push_back(entry.path());
-  }
-  for (const std::filesystem::path& keyframe : earlier) {
+  for (const std::filesystem::path& keyframe : keyframeFolders(keyframes)) {
     removeImages(keyframe);
     if (std::filesystem::is_empty(keyframe)) std::filesystem::remove(keyframe);
   }
@@ -113,17 +131,25 @@ void removeKeyframes(const std::filesystem::path& keyframes) {
   }
 }
 
-/// Whether a file is the report of a run.
-bool isReport(const std::filesystem::path& file) {
-  if (!std::filesystem::is_regular_file(file)) return false;
+/// The report of a run, if the file is one.
+std::optional<EarlierResult> readReport(const std::filesystem::path& file) {
+  if (!std::filesystem::is_regular_file(file)) return std::nullopt;
   std::ifstream stream(file);
   const auto report = nlohmann::json::parse(stream, nullptr, false);
-  return report.is_object() && report.contains("version") && report.contains("options") &&
-         report.contains("keyframes");
+  if (!report.is_object() || !report.contains("version") || !report.contains("options") ||
+      !report.contains("keyframes")) {
+    return std::nullopt;
+  }
+  try {
+    return EarlierResult{true, report.value("recording", std::vector<std::string>()),
+                         report["keyframes"].get<std::uint64_t>()};
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
 }
 
-void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
-  writeAtomically(path, [&](const std::filesystem::path& temporary) {
+void writeImageFile(const std::filesystem::path& path, const cv::Mat& image) {
+  const auto write = [&](const std::filesystem::path& temporary) {
     // Not imwrite: where the disk is full, the libraries of pictures print that to stderr.
     std::vector<std::uint8_t> bytes;
     // Matching beside run lengths: a third of the size of OpenCV's default, in the same time.
@@ -139,7 +165,8 @@ void writeImage(const std::filesystem::path& path, const cv::Mat& image) {
                static_cast<std::streamsize>(bytes.size()));
     file.close();
     if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
-  });
+  };
+  writeAtomically(path, write, DiskSync::kLater);
 }
 
 /// @param write puts the content into the stream.
@@ -155,26 +182,41 @@ void writeText(const std::filesystem::path& path, Write write) {
 
 }  // namespace
 
-MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
-                     const DepthPlanesOptions& limits, PictureStyle style)
-    : folder_(std::move(folder)), kind_(kind), limits_(limits), style_(style) {
-  makeFolder(folder_);
-  // Before the first file of this run: one may be under way when `removeEarlier` runs (dsi.npy).
-  removePartialFiles(folder_, kMapFiles);
-  removePartialFiles(folder_, kDepthFiles);
-  // The mark of a killed run stays where nothing else tells that the folder is a result's.
-  if (isReport(folder_ / kReport)) removePartialFiles(folder_, std::array{kReport});
+bool EarlierResult::isOf(const std::vector<std::string>& files) const {
+  const auto text = [](const std::vector<std::string>& names) {
+    return nlohmann::json(names).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  };
+  return text(recording) == text(files);
 }
 
-bool MapOutput::holdsResult(const std::filesystem::path& folder) {
-  return isReport(folder / kReport) ||
-         std::filesystem::exists(AtomicFile::temporaryOf(folder / kReport));
+MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
+                     const DepthPlanesOptions& limits, PictureStyle style,
+                     std::vector<std::string> recording)
+    : folder_(std::move(folder)),
+      kind_(kind),
+      limits_(limits),
+      style_(style),
+      recording_(std::move(recording)) {
+  makeFolder(folder_);
+  // Before the first file of this run: one may be under way when `removeEarlier` runs (dsi.npy).
+  const auto killed = RunMark::ofKilledRun(folder_);
+  if (!killed) return;
+  removeTemporaryFiles(folder_, killed->process);
+  // The mark stays where nothing else tells that the folder is a result's.
+  if (readReport(folder_ / kReport)) removeFile(folder_ / RunMark::kName);
+}
+
+std::optional<EarlierResult> MapOutput::earlierResult(const std::filesystem::path& folder) {
+  const auto killed = RunMark::ofKilledRun(folder);
+  if (auto result = readReport(folder / kReport)) return result;
+  if (!killed) return std::nullopt;
+  return EarlierResult{false, killed->recording, keyframeFolders(folder / kKeyframes).size()};
 }
 
 bool MapOutput::holdsFilesOf(OutputKind kind, const std::filesystem::path& folder) {
   const auto has = [&](std::string_view name) { return std::filesystem::exists(folder / name); };
   if (kind == OutputKind::kMap) {
-    return has("keyframes") || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);
+    return has(kKeyframes) || std::any_of(kMapFiles.begin(), kMapFiles.end(), has);
   }
   return std::any_of(kDepthFiles.begin(), kDepthFiles.end(), has) ||
          std::any_of(kImages.begin(), kImages.end(), has);
@@ -182,24 +224,25 @@ bool MapOutput::holdsFilesOf(OutputKind kind, const std::filesystem::path& folde
 
 /// A map of five keyframes must not show two of an earlier map of seven.
 void MapOutput::removeEarlier() {
-  if (std::exchange(began_, true)) return;
-  const bool replaces_both = holdsResult(folder_);
-  std::ofstream(AtomicFile::temporaryOf(folder_ / kReport)) << "{}\n";
+  if (mark_) return;
+  const bool replaces_both = earlierResult(folder_).has_value();
+  mark_ = std::make_unique<RunMark>(folder_, recording_);
   removeFiles(folder_, std::array{kReport});
   if (replaces_both || kind_ == OutputKind::kMap) {
     removeFiles(folder_, kMapFiles);
-    removeKeyframes(folder_ / "keyframes");
+    removeKeyframes(folder_ / kKeyframes);
   }
   if (replaces_both || kind_ == OutputKind::kDepth) {
     removeFiles(folder_, kDepthFiles);
     removeImages(folder_);
   }
+  syncToDisk(folder_);
 }
 
 void MapOutput::writeKeyframe(const KeyframeDepthMap& keyframe) {
   removeEarlier();
   const std::filesystem::path folder =
-      folder_ / "keyframes" / formatSeconds(keyframe.window.t_ref_ns);
+      folder_ / kKeyframes / formatSeconds(keyframe.window.t_ref_ns);
   makeFolder(folder);
   writeImagesTo(folder, keyframe);
 }
@@ -210,7 +253,7 @@ void MapOutput::writeImages(const KeyframeDepthMap& keyframe) {
 }
 
 void MapOutput::writeImagesTo(const std::filesystem::path& folder,
-                              const KeyframeDepthMap& keyframe) const {
+                              const KeyframeDepthMap& keyframe) {
   writeMap(folder, keyframe.map);
   for (const CameraDepthMap& camera : keyframe.camera_maps) {
     const std::filesystem::path own = folder / cameraFolder(camera.camera);
@@ -224,7 +267,17 @@ void MapOutput::writeImagesTo(const std::filesystem::path& folder,
   }
 }
 
-void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) const {
+/// Pictures wait for the disk together, before the report: four files per keyframe would each wait.
+void MapOutput::writeImage(const std::filesystem::path& path, const cv::Mat& image) {
+  writeImageFile(path, image);
+  const std::size_t folder = folder_.native().size();
+  for (std::filesystem::path part = path; part.native().size() > folder;) {
+    not_on_disk_.insert(part);
+    part = part.parent_path();
+  }
+}
+
+void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) {
   writeImage(folder / "depth.tiff", map.depth);
   writeImage(folder / "confidence.tiff", map.confidence);
   const bool plain = style_ == PictureStyle::kPlain;
@@ -271,7 +324,10 @@ void MapOutput::writePage(const std::function<void(std::ostream&)>& write) {
 
 void MapOutput::writeReport(const std::string& json) {
   removeEarlier();
+  for (const std::filesystem::path& path : not_on_disk_) syncToDisk(path);
+  not_on_disk_.clear();
   writeText(folder_ / kReport, [&](std::ostream& stream) { stream << json; });
+  removeFile(folder_ / RunMark::kName);
 }
 
 }  // namespace efm

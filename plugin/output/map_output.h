@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
+#include <optional>
 #include <ostream>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -11,6 +15,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/cloud_point.h"
+#include "plugin/output/run_mark.h"
 
 namespace efm {
 
@@ -28,13 +33,23 @@ enum class PictureStyle {
   kPlain,   ///< The image alone, of the depth map's size.
 };
 
+/// The result of an earlier run in a folder.
+struct EarlierResult {
+  bool complete = false;               ///< Otherwise its run was killed.
+  std::vector<std::string> recording;  ///< Its files. Empty: the result does not name them.
+  std::uint64_t keyframes = 0;
+
+  /// Whether it is of these files. Bytes that are not UTF-8 may differ.
+  bool isOf(const std::vector<std::string>& files) const;
+};
+
 /// The folder that a map is written to. A file appears under its name when it is complete. Of an
 /// earlier result report.json is removed first, and the caller writes it last: a folder with a
 /// report.json is complete, and all its files are of one run. A std::runtime_error names a file
 /// that cannot be written.
 ///
-/// Until then the folder has report.partial.json, by which the next run knows that it may replace
-/// what a killed run left.
+/// Until then the folder has a RunMark, by which the next run knows that it may replace what a
+/// killed run left.
 ///
 ///     map.pcd  map.simplemap  map.html  map.png  overview.png  trajectory.txt  report.json
 ///     map.ply                  by option
@@ -44,15 +59,18 @@ enum class PictureStyle {
 class MapOutput {
  public:
   /// Creates the folder. Right before the first file is written, the files of an earlier run are
-  /// removed, those of the other kind only where `holdsResult`: a run that writes nothing leaves
-  /// them.
+  /// removed, those of the other kind only where it is an `earlierResult`: a run that writes
+  /// nothing leaves them.
   /// @param limits the colours of depth.png run between its depths.
-  /// @throws std::runtime_error where the folder cannot be made.
+  /// @param recording its files, for the next run.
+  /// @throws std::runtime_error where the folder cannot be made, or another run writes its result
+  /// there; so do the functions that write.
   MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits,
-            PictureStyle style = PictureStyle::kFigure);
+            PictureStyle style = PictureStyle::kFigure, std::vector<std::string> recording = {});
 
-  /// Whether a folder has the report of a run of either kind, or the mark of one that was killed.
-  static bool holdsResult(const std::filesystem::path& folder);
+  /// The result of either kind in a folder: a report, or the mark of a run that was killed.
+  /// @throws std::runtime_error where another run is writing its result there.
+  static std::optional<EarlierResult> earlierResult(const std::filesystem::path& folder);
   /// Whether a folder has a file or a folder with a name that only this kind writes.
   static bool holdsFilesOf(OutputKind kind, const std::filesystem::path& folder);
 
@@ -82,14 +100,17 @@ class MapOutput {
 
  private:
   void removeEarlier();
-  void writeImagesTo(const std::filesystem::path& folder, const KeyframeDepthMap& keyframe) const;
-  void writeMap(const std::filesystem::path& folder, const DepthMap& map) const;
+  void writeImagesTo(const std::filesystem::path& folder, const KeyframeDepthMap& keyframe);
+  void writeImage(const std::filesystem::path& path, const cv::Mat& image);
+  void writeMap(const std::filesystem::path& folder, const DepthMap& map);
 
   std::filesystem::path folder_;
   OutputKind kind_;
   DepthPlanesOptions limits_;
   PictureStyle style_;
-  bool began_ = false;  // a file was written
+  std::vector<std::string> recording_;
+  std::unique_ptr<RunMark> mark_;                // from the first file on
+  std::set<std::filesystem::path> not_on_disk_;  // pictures and their folders
 };
 
 }  // namespace efm

@@ -171,6 +171,7 @@ std::string reportJson(const MapReport& report) {
 
   Json json;
   json["version"] = EFM_VERSION;
+  if (!report.recording.empty()) json["recording"] = report.recording;
   json["events"] = events;
   json["event_uses"] = counts.event_uses;
   json["votes"] = {{"cast", counts.votes.cast},
@@ -204,7 +205,7 @@ std::string reportJson(const MapReport& report) {
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);
   if (!report.chosen.empty()) json["chosen"] = asJson(report.chosen);
   json["options"] = asJson(report.options);
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace efm

@@ -20,6 +20,7 @@ namespace efm {
 
 /// The counts, times and options of a run: the content of report.json.
 struct MapReport {
+  std::vector<std::string> recording;  ///< The absolute names of its files.
   MapperCounts counts;
   std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: keyframes without its events.
   std::optional<LiveStatus> live;               ///< Of live operation.
@@ -58,9 +59,9 @@ struct MapReport {
 /// stopped_at where the run was interrupted (the fraction of the recording that was mapped),
 /// live in live operation (drop_ratio, per camera what became of its events before the mapping,
 /// windows_given_up and for which reason, late_events, pose_jumps, clock_steps, refused_poses,
-/// errors and last_error), warnings (each with name and text), perturbation (the faults of the
-/// poses, if any), chosen (the automatic options: key, value and reason), options (all of them,
-/// with these values) and version.
+/// errors and last_error), warnings (each with name and text), recording (its files), perturbation
+/// (the faults of the poses, if any), chosen (the automatic options: key, value and reason), options
+/// (all of them, with these values) and version. Bytes of names that are not UTF-8 become U+FFFD.
 std::string reportJson(const MapReport& report);
 
 /// The most memory that this process has had so far.

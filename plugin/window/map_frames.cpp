@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "maps/io/atomic_file.h"
+
 namespace efm {
 namespace {
 
@@ -17,13 +19,14 @@ namespace fs = std::filesystem;
 constexpr unsigned kWidth = 1280;
 constexpr unsigned kHeight = 720;
 
-/// Whether a file is named frame_000001.png.
+/// Whether a file is named frame_000001.png, or has the temporary name of such a file, which a
+/// killed run leaves.
 bool isFrame(const fs::path& file) {
   const std::string name = file.filename().string();
-  return name.size() == 16 && name.compare(0, 6, "frame_") == 0 &&
-         name.compare(12, 4, ".png") == 0 &&
+  return name.size() >= 16 && name.compare(0, 6, "frame_") == 0 && file.extension() == ".png" &&
          std::all_of(name.begin() + 6, name.begin() + 12,
-                     [](unsigned char c) { return std::isdigit(c) != 0; });
+                     [](unsigned char c) { return std::isdigit(c) != 0; }) &&
+         (name.size() == 16 || name.compare(12, 9, ".partial-") == 0);
 }
 
 void prepareFolder(const fs::path& folder, bool force) {
@@ -62,10 +65,9 @@ void MapFrames::show(WatchedMap snapshot) {
   renderer_->setCamera(*scene, scene->getViewport()->getCamera());
   mrpt::img::CImage image;
   renderer_->render_RGB(*scene, image);
-  const fs::path file = folder_ / fmt::format("frame_{:06}.png", ++frames_);
-  if (!image.saveToFile(file.string())) {
-    throw std::runtime_error(file.string() + ": cannot be written");
-  }
+  writeAtomically(folder_ / fmt::format("frame_{:06}.png", ++frames_), [&](const fs::path& file) {
+    if (!image.saveToFile(file.string())) throw std::runtime_error("it cannot be written");
+  });
 }
 
 }  // namespace efm

@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "maps/io/new_folder.h"
 #include "plugin/writers/recording_writer.h"
 #include "plugin/writers/text_file.h"
-#include "tracking_stub/truth/new_folder.h"
 
 namespace efm {
 

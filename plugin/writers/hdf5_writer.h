@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "maps/io/new_folder.h"
 #include "plugin/hdf5/hdf5_file.h"
 #include "plugin/writers/recording_writer.h"
 #include "plugin/writers/text_file.h"
-#include "tracking_stub/truth/new_folder.h"
 
 namespace efm {
 

@@ -150,8 +150,10 @@ TEST_F(Interruption, ASignalEndsAMapWithWhatIsMade) {
 TEST_F(Interruption, AMapWithoutKeyframesKeepsTheEarlierResult) {
   ASSERT_EQ(run(mapArguments(kStride[0], false)), 0);
   const std::set<std::string> earlier = files();
-  const auto partial = out() / "map.partial.pcd";
-  std::ofstream(partial) << "of a killed run";  // the next run removes it before it reads
+  // Of a killed run: the next one removes it before it reads.
+  const auto partial = out() / "map.partial-1.pcd";
+  std::ofstream(partial) << "half";
+  std::ofstream(out() / "report.partial.json") << R"({"recording": [], "process": 1})";
   // Packets of single events are slow to read.
   const std::string slow = (folder() / "slow.rawlog").string();
   ASSERT_EQ(run({"import", EFM_RECORDINGS "/desk_stereo", "--packet-s", "0.00001", "--out", slow}),

@@ -88,40 +88,8 @@ void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
   text << "  - [0, 0, 0, 1]\n";
 }
 
-}  // namespace
-
-void DatasetWriter::write(const Simulation& simulation,
-                          const std::vector<CameraRecording>& recordings,
-                          const std::function<void()>& before_file) {
-  const std::vector<RigCamera>& cameras = simulation.rig.cameras;
-  requireOption(!cameras.empty() && recordings.size() == cameras.size(), "recordings",
-                recordings.size(), "one per camera, at least one");
-  const Rigid3& T_rig_cam0 = cameras[0].T_rig_cam;
-  requireOption(T_rig_cam0.translation.isZero(0) && T_rig_cam0.rotation.vec().isZero(0),
-                "T_rig_cam of camera 0", T_rig_cam0.translation.transpose(),
-                "the identity: poses.txt holds T_world_cam0");
-
-  const fs::path& folder = folder_.temporary();
-  for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
-    const fs::path camera_folder = folder / ("cam" + std::to_string(camera));
-    makeFolder(camera_folder);
-    before_file();
-    writeEvents(camera_folder / "events.txt", recordings[camera].events);
-  }
-  writeText(folder / "camchain.yaml", formatCamchain(simulation.rig));
-  writeTumTrajectory(folder / "poses.txt", samplePoses(simulation));
-  writeDepthMaps(simulation, before_file);
-  before_file();
-  const TruthClouds truth = makeTruthClouds(simulation, recordings);
-  writePly(folder / "gt_cloud.ply", truth.surfaces);
-  writePly(folder / "gt_edges.ply", truth.edges);
-  before_file();
-  folder_.finish();
-}
-
-void DatasetWriter::writeDepthMaps(const Simulation& simulation,
-                                   const std::function<void()>& before_file) const {
-  const fs::path depth_folder = folder_.temporary() / "depth";
+void writeDepthMaps(const fs::path& depth_folder, const Simulation& simulation,
+                    const std::function<void()>& before_file) {
   makeFolder(depth_folder);
   const ReferenceView view = ReferenceView::of(simulation.rig.cameras[0].model);
   std::string index;
@@ -135,6 +103,35 @@ void DatasetWriter::writeDepthMaps(const Simulation& simulation,
     index += formatSeconds(t_ns) + " " + name + "\n";
   }
   writeText(depth_folder / "index.txt", index);
+}
+
+}  // namespace
+
+void writeDataset(const fs::path& folder, const Simulation& simulation,
+                  const std::vector<CameraRecording>& recordings,
+                  const std::function<void()>& before_file) {
+  const std::vector<RigCamera>& cameras = simulation.rig.cameras;
+  requireOption(!cameras.empty() && recordings.size() == cameras.size(), "recordings",
+                recordings.size(), "one per camera, at least one");
+  const Rigid3& T_rig_cam0 = cameras[0].T_rig_cam;
+  requireOption(T_rig_cam0.translation.isZero(0) && T_rig_cam0.rotation.vec().isZero(0),
+                "T_rig_cam of camera 0", T_rig_cam0.translation.transpose(),
+                "the identity: poses.txt holds T_world_cam0");
+
+  for (std::size_t camera = 0; camera < cameras.size(); ++camera) {
+    const fs::path camera_folder = folder / ("cam" + std::to_string(camera));
+    makeFolder(camera_folder);
+    before_file();
+    writeEvents(camera_folder / "events.txt", recordings[camera].events);
+  }
+  writeText(folder / "camchain.yaml", formatCamchain(simulation.rig));
+  writeTumTrajectory(folder / "poses.txt", samplePoses(simulation));
+  writeDepthMaps(folder / "depth", simulation, before_file);
+  before_file();
+  const TruthClouds truth = makeTruthClouds(simulation, recordings);
+  writePly(folder / "gt_cloud.ply", truth.surfaces);
+  writePly(folder / "gt_edges.ply", truth.edges);
+  before_file();
 }
 
 void appendEvents(std::string& text, EventSpan events) {

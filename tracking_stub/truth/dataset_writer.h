@@ -4,17 +4,15 @@
 #include <filesystem>
 #include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "mapping/events/event.h"
 #include "mapping/geometry/rig.h"
 #include "tracking_stub/sensor/simulated_rig.h"
-#include "tracking_stub/truth/new_folder.h"
 
 namespace efm {
 
-/// Writes a simulated recording as a dataset folder (a NewFolder):
+/// Writes a simulated recording as a dataset:
 ///   camN/events.txt        a line `t x y p` per event
 ///   camchain.yaml          calibration in Kalibr's format
 ///   poses.txt              T_world_cam0 at 1 kHz, TUM
@@ -22,27 +20,15 @@ namespace efm {
 ///                          every 50 ms from the recording's start
 ///   depth/index.txt        a line `t file` per depth map, relative to depth/
 ///   gt_cloud.ply, gt_edges.ply   the truth clouds, frame `world`
-class DatasetWriter {
- public:
-  /// Makes the temporary folder: an error is known before the simulation runs.
-  /// @throws std::runtime_error naming the path where the folder exists and is not empty, or cannot
-  /// be made.
-  explicit DatasetWriter(std::filesystem::path folder) : folder_(std::move(folder)) {}
-
-  /// Call it once.
-  /// @param recordings of the simulation, one per camera.
-  /// @param before_file called before each file. If it throws, there is no folder.
-  /// @throws std::invalid_argument where camera 0 is not the rig's frame; std::runtime_error naming
-  /// the path where something cannot be written.
-  void write(
-      const Simulation& simulation, const std::vector<CameraRecording>& recordings,
-      const std::function<void()>& before_file = [] {});
-
- private:
-  void writeDepthMaps(const Simulation& simulation, const std::function<void()>& before_file) const;
-
-  NewFolder folder_;
-};
+/// @param folder that exists, without files of these names.
+/// @param recordings of the simulation, one per camera.
+/// @param before_file called before each file; it may throw.
+/// @throws std::invalid_argument where camera 0 is not the rig's frame; std::runtime_error naming
+/// the path where something cannot be written.
+void writeDataset(
+    const std::filesystem::path& folder, const Simulation& simulation,
+    const std::vector<CameraRecording>& recordings,
+    const std::function<void()>& before_file = [] {});
 
 /// Writes a line `t x y p` per event: seconds with nine decimals, polarity 0 or 1.
 /// @throws std::runtime_error naming the file.

@@ -6,10 +6,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
+
+#include "maps/io/new_folder.h"
 
 namespace efm {
 namespace {
@@ -47,6 +52,14 @@ class AtomicFileTest : public ::testing::Test {
     return "no error";
   }
 
+  std::vector<std::string> names() const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder))
+      names.push_back(entry.path().filename());
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+
   const fs::path folder;
 };
 
@@ -71,6 +84,21 @@ TEST_F(AtomicFileTest, AWriteThatFailsLeavesTheOneBeforeAndNothingElse) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
 }
 
+TEST_F(AtomicFileTest, AFullDiskIsNamed) {
+  if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+  try {
+    writeAtomically(folder / "a.txt", [](const fs::path&) {
+      std::ofstream full("/dev/full");
+      full << "text" << std::flush;
+      if (!full) throw std::runtime_error("it cannot be written");
+    });
+    ADD_FAILURE() << "no error";
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error.what(), "cannot write " + (folder / "a.txt").string() + ": the disk is full");
+  }
+  EXPECT_TRUE(fs::is_empty(folder));
+}
+
 TEST_F(AtomicFileTest, WithoutReplaceItLeavesNothing) {
   {
     const AtomicFile file(folder / "a.txt");
@@ -79,10 +107,70 @@ TEST_F(AtomicFileTest, WithoutReplaceItLeavesNothing) {
   EXPECT_TRUE(fs::is_empty(folder));
 }
 
+TEST_F(AtomicFileTest, FilesOfOthersStay) {
+  const std::string own = std::to_string(getpid());
+  std::vector<std::string> others = {"a.partial-" + own + ".txt", "a.partial-" + own + "-1.txt",
+                                     "a.partial.txt"};
+  for (const std::string& name : others) std::ofstream(folder / name) << name;
+  AtomicFile first(folder / "a.txt");
+  EXPECT_EQ(first.temporary(), folder / ("a.partial-" + own + "-2.txt"));
+  {
+    AtomicFile second(folder / "a.txt");
+    EXPECT_EQ(second.temporary(), folder / ("a.partial-" + own + "-3.txt"));
+    std::ofstream(second.temporary()) << "second";
+    std::ofstream(first.temporary()) << "first";
+    second.replace();
+    EXPECT_EQ(contentOf(folder / "a.txt"), "second");
+    std::ofstream(folder / ("a.partial-" + own + "-3.txt")) << "of another process, by now";
+  }
+  first.replace();
+  EXPECT_EQ(contentOf(folder / "a.txt"), "first");
+  for (const std::string& name : others) EXPECT_EQ(contentOf(folder / name), name);
+  others.insert(others.end(), {"a.partial-" + own + "-3.txt", "a.txt"});
+  EXPECT_THAT(names(), testing::UnorderedElementsAreArray(others));
+}
+
+TEST_F(AtomicFileTest, ANewFolderLeavesThoseOfOthers) {
+  const std::string unfinished = ".new.unfinished-" + std::to_string(getpid());
+  fs::create_directory(folder / unfinished);
+  std::ofstream(folder / unfinished / "precious.txt") << "x";
+  {
+    const NewFolder failing(folder / "new");
+    EXPECT_EQ(failing.temporary(), folder / (unfinished + "-1"));
+    NewFolder made(folder / "new/");
+    EXPECT_EQ(made.temporary(), folder / (unfinished + "-2"));
+    std::ofstream(made.temporary() / "a.txt") << "text";
+    made.finish();
+  }
+  EXPECT_THAT(names(), testing::ElementsAre(unfinished, "new"));
+  EXPECT_EQ(contentOf(folder / "new" / "a.txt"), "text");
+  EXPECT_EQ(contentOf(folder / unfinished / "precious.txt"), "x");
+}
+
+TEST_F(AtomicFileTest, AnErrorNamesTheFolderThatCannotBeMade) {
+  fs::create_directories(folder / "desk");
+  std::ofstream(folder / "desk/precious.txt") << "x";
+  std::ofstream(folder / "file") << "x";
+  const std::pair<fs::path, std::string> rows[] = {
+      {folder / "desk", (folder / "desk").string()},
+      {folder / "file/desk", (folder / "file").string()},
+      {"", "'': expected the name of the folder"}};
+  for (const auto& [path, expected] : rows) {
+    try {
+      const NewFolder made(path);
+      ADD_FAILURE() << path << ": no error";
+    } catch (const std::runtime_error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(expected));
+    }
+  }
+  EXPECT_THAT(names(), testing::ElementsAre("desk", "file"));
+}
+
 TEST_F(AtomicFileTest, FoldersAndDevicesAreNotReplaced) {
   EXPECT_THAT(errorOf(""), HasSubstr("'': expected the name of a file"));
   EXPECT_THAT(errorOf(folder), HasSubstr("'" + folder.string() + "': it is a folder"));
   EXPECT_THAT(errorOf(folder / "new/"), HasSubstr("it is a folder"));
+  EXPECT_THAT(errorOf(folder / "no" / "a"), HasSubstr("no/a': No such file or directory"));
   ASSERT_EQ(mkfifo((folder / "pipe").c_str(), 0600), 0);
   EXPECT_THAT(errorOf(folder / "pipe"), HasSubstr("not a regular file"));
   EXPECT_THAT(errorOf("/dev/null"), HasSubstr("not a regular file"));

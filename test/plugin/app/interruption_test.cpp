@@ -10,6 +10,7 @@
 namespace efm {
 namespace {
 
+using testing::AnyOf;
 using testing::HasSubstr;
 
 class Interrupted : public AppTest {
@@ -52,12 +53,58 @@ TEST_F(Interrupted, CommandsLeaveTheirWholeResultOrNothing) {
   }
 }
 
-TEST_F(Interrupted, AnImportReplacesWhatAKilledOneLeft) {
-  write(SyntheticRecording());
-  write("r.partial.rawlog", std::string(1'000'000, 'x'));
-  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
-  ASSERT_EQ(run("import data --out clean.rawlog").status, 0);
-  EXPECT_EQ(contentOf("r.rawlog"), contentOf("clean.rawlog"));
+TEST_F(Interrupted, AnInputNamedLikeATemporaryFileStays) {
+  importRecording(SyntheticRecording());
+  const std::string rawlog = contentOf("data.rawlog");
+  write("r.partial.rawlog", rawlog);
+  write("other.partial.rawlog", "of another program");
+  ASSERT_EQ(run("import r.partial.rawlog --out r.rawlog").status, 0);
+  EXPECT_EQ(contentOf("r.partial.rawlog"), rawlog);
+  EXPECT_EQ(contentOf("r.rawlog"), rawlog);
+  ASSERT_EQ(run("import data --out other.rawlog").status, 0);
+  EXPECT_EQ(contentOf("other.partial.rawlog"), "of another program");
+  ASSERT_EQ(run("export r.rawlog --to mcap --out m.partial.mcap").status, 0);
+  const std::string mcap = contentOf("m.partial.mcap");
+  ASSERT_EQ(
+      run("export m.partial.mcap --calibration data/camchain.yaml --to mcap --out m.mcap").status,
+      0);
+  EXPECT_EQ(contentOf("m.partial.mcap"), mcap);
+  EXPECT_EQ(contentOf("m.mcap"), mcap);
+  EXPECT_FALSE(anyNameHas("partial-"));
+}
+
+TEST_F(Interrupted, AResultThatIsReplacedIsNamed) {
+  importRecording(SyntheticRecording());
+  const std::string place = std::filesystem::canonical(folder()).string();
+  const auto warningOf = [&](const std::string& recording) {
+    const Result result = run("map rig.ini " + recording + " --out out");
+    EXPECT_EQ(result.status, 0);
+    const nlohmann::json report = reportIn("out");
+    EXPECT_EQ(report["recording"][0], place + "/" + recording);
+    EXPECT_EQ(report["warnings"].size(), result.err.empty() ? 0U : 1U);
+    return result.err;
+  };
+  const std::string warning = "event-fusion: warning: replaced-result: out holds ";
+  EXPECT_EQ(warningOf("data"), "");
+  EXPECT_EQ(warningOf("data"), "") << "the same recording";
+  EXPECT_EQ(warningOf("data.rawlog"),
+            warning + "the result of " + place + "/data (3 keyframes): this run replaces it\n");
+  std::filesystem::remove(folder() / "out/report.json");
+  std::filesystem::remove_all(
+      std::filesystem::directory_iterator(folder() / "out/keyframes")->path());
+  write("out/report.partial.json", R"({"recording": ["/a.bag", "/b.txt"], "process": 1})");
+  EXPECT_EQ(warningOf("data.rawlog"),
+            warning +
+                "2 keyframes of /a.bag, /b.txt, left by a run that was killed: this run "
+                "replaces them\n");
+}
+
+TEST_F(Interrupted, TwoImportsOfOneNameWriteTheWholeResultOfOne) {
+  importRecording(SyntheticRecording());
+  ASSERT_EQ(run("import data --out cut.rawlog --t1 10.4").status, 0);
+  const std::string import = "'" EFM_EVENT_FUSION "' import data --out r.rawlog";
+  ASSERT_EQ(shell("{ " + import + " & " + import + " --t1 10.4 && wait $!; }").status, 0);
+  EXPECT_THAT(contentOf("r.rawlog"), AnyOf(contentOf("data.rawlog"), contentOf("cut.rawlog")));
   EXPECT_FALSE(anyNameHas("partial"));
 }
 

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstring>
@@ -11,6 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include "maps/io/atomic_file.h"
 #include "plugin/output/npy_file.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
@@ -44,10 +47,8 @@ KeyframeDepthMap smallKeyframe(std::int64_t t_ref_ns) {
 class MapOutputTest : public TemporaryFolder {};
 
 TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
-  MapOutput output(folder() / "out", OutputKind::kMap, {});
   const KeyframeDepthMap small = smallKeyframe(1'700'000'000'123'456'789);
-  output.writeKeyframe(small);
-  output.writeTrajectory("trajectory.txt", {{small.window.t_ref_ns, small.T_world_ref}});
+  MapOutput(folder() / "out", OutputKind::kMap, {}).writeKeyframe(small);
 
   const auto keyframe = folder() / "out" / "keyframes" / "1700000000.123456789";
   const cv::Mat depth = cv::imread((keyframe / "depth.tiff").string(), cv::IMREAD_UNCHANGED);
@@ -63,7 +64,8 @@ TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
   };
   EXPECT_EQ(sizeOf("depth.png").width, 640);
   EXPECT_EQ(sizeOf("confidence.png"), sizeOf("depth.png"));
-  MapOutput(folder() / "out", OutputKind::kMap, {}, PictureStyle::kPlain).writeKeyframe(small);
+  MapOutput output(folder() / "out", OutputKind::kMap, {}, PictureStyle::kPlain);
+  output.writeKeyframe(small);
   EXPECT_EQ(sizeOf("depth.png"), cv::Size(4, 3));
   EXPECT_EQ(sizeOf("confidence.png"), cv::Size(4, 3));
   output.writeTrajectory("trajectory.txt", {{small.window.t_ref_ns, small.T_world_ref}});
@@ -135,24 +137,77 @@ TEST_F(MapOutputTest, AResultReplacesOneOfTheOtherKindAndNoFilesOfOthers) {
     if (!report.empty()) depth.writeReport(report);
   };
   const auto mark = folder() / "report.partial.json";
-  EXPECT_FALSE(MapOutput::holdsResult(folder()));
+  EXPECT_FALSE(MapOutput::earlierResult(folder()));
   writeMap();
   EXPECT_TRUE(exists(mark));
-  EXPECT_TRUE(MapOutput::holdsResult(folder())) << "of a killed run";
+  ASSERT_TRUE(MapOutput::earlierResult(folder())) << "of a killed run";
   expectFiles(true, false);
-  writeDepth(R"({"version": "1", "options": {}, "keyframes": 1})");
+  writeDepth(R"({"version": "1", "options": {}, "keyframes": 3, "recording": ["a", "b"]})");
   EXPECT_FALSE(exists(mark));
-  EXPECT_TRUE(MapOutput::holdsResult(folder()));
+  const auto result = MapOutput::earlierResult(folder());
+  ASSERT_TRUE(result);
+  EXPECT_TRUE(result->complete);
+  EXPECT_EQ(result->keyframes, 3U);
+  EXPECT_TRUE(result->isOf({"a", "b"}));
+  EXPECT_FALSE(result->isOf({"b", "a"}));
+  EXPECT_FALSE(result->isOf({"a"}));
   expectFiles(false, true);
   writeMap();
   expectFiles(true, false);
   std::filesystem::remove(mark);
   for (const char* foreign : {"", "{}", "[1]", R"({"version": "1", "options": {}})", "text"}) {
     std::ofstream(folder() / "report.json") << foreign;
-    EXPECT_FALSE(MapOutput::holdsResult(folder())) << foreign;
+    EXPECT_FALSE(MapOutput::earlierResult(folder())) << foreign;
   }
   writeDepth("{}");
   expectFiles(true, true);
+  for (const char* foreign : {"", "{}", "[1]", R"({"process": 1})"}) {
+    std::ofstream(mark) << foreign;
+    EXPECT_FALSE(MapOutput::earlierResult(folder())) << foreign;
+  }
+}
+
+TEST_F(MapOutputTest, OneRunAtATimeWritesAFolder) {
+  int ready[2];
+  ASSERT_EQ(pipe(ready), 0);
+  const pid_t other = fork();
+  if (other == 0) {
+    MapOutput output(folder(), OutputKind::kMap, {}, {}, {"/data/a.rawlog"});
+    output.writeKeyframe(smallKeyframe(1'000'000'000));
+    output.writeKeyframe(smallKeyframe(2'000'000'000));
+    const AtomicFile unfinished(folder() / "map.pcd");
+    static_cast<void>(write(ready[1], "x", 1));
+    pause();
+    _exit(1);
+  }
+  char byte = 0;
+  ASSERT_EQ(read(ready[0], &byte, 1), 1);
+  const std::string at_work = folder().string() + ": another run is writing its result there";
+  EXPECT_THAT(messageOf([&] { MapOutput::earlierResult(folder()); }), HasSubstr(at_work));
+  EXPECT_THAT(messageOf([&] { MapOutput(folder(), OutputKind::kMap, {}); }), HasSubstr(at_work));
+  kill(other, SIGKILL);
+  waitpid(other, nullptr, 0);
+
+  const std::string number = std::to_string(other);
+  const auto left = folder() / ("map.partial-" + number + ".pcd");
+  EXPECT_TRUE(exists(left));
+  const auto killed = MapOutput::earlierResult(folder());
+  ASSERT_TRUE(killed);
+  EXPECT_FALSE(killed->complete);
+  EXPECT_EQ(killed->keyframes, 2U);
+  EXPECT_TRUE(killed->isOf({"/data/a.rawlog"}));
+  const std::string others[] = {"map.partial.pcd", "map.partial-" + number + "0.pcd",
+                                "notes.partial-" + number + ".txt"};
+  for (const std::string& name : others) std::ofstream(folder() / name) << "mine";
+  MapOutput output(folder(), OutputKind::kMap, {});
+  EXPECT_FALSE(exists(left));
+  EXPECT_TRUE(exists(folder() / "keyframes" / "2.000000000")) << "nothing was written yet";
+  output.writeKeyframe(smallKeyframe(3'000'000'000));
+  EXPECT_FALSE(exists(folder() / "keyframes" / "2.000000000"));
+  for (const std::string& name : others) EXPECT_TRUE(exists(folder() / name)) << name;
+  EXPECT_THAT(messageOf([&] { MapOutput(folder(), OutputKind::kDepth, {}); }), HasSubstr(at_work));
+  output.writeReport("{}");
+  EXPECT_NO_THROW(MapOutput(folder(), OutputKind::kMap, {}));
 }
 
 TEST_F(MapOutputTest, AnErrorNamesAFolderThatCannotBeMade) {

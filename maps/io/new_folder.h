@@ -5,11 +5,11 @@
 
 namespace efm {
 
-/// A folder that appears under its name when all its files are written. Until then it has a
-/// temporary name in the same parent folder; it is removed after an error.
+/// A folder that appears under its name when all its files are written and on the disk. Until then
+/// it has a temporary name in the same parent folder; it is removed after an error.
 class NewFolder {
  public:
-  /// Makes the temporary folder.
+  /// Makes the temporary folder: ".NAME.unfinished-PROCESS", or where that exists, with a number.
   /// @throws std::runtime_error naming the path where the folder exists and is not empty, or cannot
   /// be made.
   explicit NewFolder(std::filesystem::path folder);

@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/truth/new_folder.h"
+#include "maps/io/new_folder.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 #include <utility>
+
+#include "maps/io/atomic_file.h"
 
 namespace efm {
 
@@ -25,13 +30,17 @@ NewFolder::NewFolder(fs::path folder) : folder_(std::move(folder)) {
   const fs::path parent = folder_.parent_path();
   fs::create_directories(parent, error);
   if (error) throw std::runtime_error(parent.string() + ": cannot be made: " + error.message());
-  const fs::path unfinished =
-      parent / ("." + folder_.filename().string() + ".unfinished-" + std::to_string(getpid()));
-  fs::remove_all(unfinished, error);  // of a killed process with the same id
-  if (!fs::create_directory(unfinished, error)) {
-    throw std::runtime_error(unfinished.string() + ": cannot be made: " + error.message());
+  const std::string name =
+      "." + folder_.filename().string() + ".unfinished-" + std::to_string(getpid());
+  for (int trial = 0;; ++trial) {
+    const fs::path unfinished = parent / (name + (trial == 0 ? "" : "-" + std::to_string(trial)));
+    if (::mkdir(unfinished.c_str(), 0777) == 0) {
+      unfinished_ = unfinished;
+      return;
+    }
+    if (errno == EEXIST) continue;
+    throw std::runtime_error(unfinished.string() + ": cannot be made: " + std::strerror(errno));
   }
-  unfinished_ = unfinished;
 }
 
 NewFolder::~NewFolder() {
@@ -40,10 +49,13 @@ NewFolder::~NewFolder() {
 }
 
 void NewFolder::finish() {
+  for (const auto& entry : fs::recursive_directory_iterator(unfinished_)) syncToDisk(entry.path());
+  syncToDisk(unfinished_);
   std::error_code error;
   fs::rename(unfinished_, folder_, error);
   if (error) throw std::runtime_error(folder_.string() + ": cannot be made: " + error.message());
   unfinished_.clear();
+  syncToDisk(folder_.parent_path());
 }
 
 }  // namespace efm
