@@ -140,7 +140,7 @@ std::string evaluationJson(const CloudEvaluation& evaluation) {
   }
   json["non_finite"] = evaluation.non_finite;
   if (evaluation.alignment) json["alignment"] = alignmentJson(*evaluation.alignment);
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string cloudEvaluationKeys() {

@@ -186,7 +186,7 @@ std::string evaluationJson(const DepthEvaluation& evaluation,
   }
   json["without_truth"] = evaluation.without_truth;
   json["without_estimate"] = evaluation.without_estimate;
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string depthEvaluationKeys() {

@@ -207,7 +207,7 @@ std::string evaluationJson(const TrajectoryEvaluation& evaluation) {
   for (const EvaluatedSpacing& relative : evaluation.relative) {
     json["rpe"].push_back(asJson(relative));
   }
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 std::string trajectoryEvaluationKeys() {

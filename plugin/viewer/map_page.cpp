@@ -98,7 +98,7 @@ void writeMapPage(std::ostream& stream, const MapPage& page) {
   const std::size_t mark = source.find(kDataMark);
   stream << source.substr(0, mark);
   beginData(stream, "map-data", "application/json");
-  stream << inScript(describe(page, points).dump());
+  stream << inScript(describe(page, points).dump(-1, ' ', false, Json::error_handler_t::replace));
   endData(stream);
   beginData(stream, "report-data", "application/json");
   stream << inScript(page.report_json);

@@ -31,7 +31,7 @@ struct MapPage {
 /// Writes the map as one HTML page that needs no other file and no network: the points, the
 /// keyframes and the report as data, and the program that shows them (`page/`). About 13.4 bytes
 /// per point. The page says how many points and pictures were left out.
-/// @throws std::exception where a text is not UTF-8. Errors of the stream stay in its state.
+/// Bytes that are not UTF-8 become U+FFFD. Errors of the stream stay in its state.
 void writeMapPage(std::ostream& stream, const MapPage& page);
 
 }  // namespace efm

@@ -168,5 +168,25 @@ TEST_F(MapOptions, AFolderWithOtherFilesIsRefused) {
   EXPECT_EQ(contentOf("thesis/chapter1.tex"), "valuable");
 }
 
+TEST_F(MapOptions, NamesThatAreNotUtf8CostNoResult) {
+  write(SyntheticRecording());
+  std::filesystem::rename(folder() / "data", folder() / "d\xe9");
+  std::filesystem::rename(folder() / "rig.ini", folder() / "r\xe9.ini");
+  for (const char* time : {"first", "again, with the same recording"}) {
+    const Result result =
+        run("map 'd\xe9' --config 'r\xe9.ini' --poses 'd\xe9/poses.txt' "
+            "--calibration 'd\xe9/camchain.yaml' --out 'o\xe9'");
+    EXPECT_EQ(result.status, 0) << time;
+    EXPECT_EQ(result.err, "") << time;
+  }
+  const std::string unknown = "\xef\xbf\xbd";  // U+FFFD
+  EXPECT_EQ(reportIn("o\xe9")["options"]["rig"]["calibration"], "d" + unknown + "/camchain.yaml");
+  EXPECT_THAT(contentOf("o\xe9/map.html"), HasSubstr("{\"name\":\"o" + unknown + "\","));
+  const Result evaluation =
+      run("evaluate trajectory 'o\xe9/trajectory.txt' 'd\xe9/poses.txt' --align none --json");
+  EXPECT_EQ(evaluation.status, 0) << evaluation.err;
+  EXPECT_EQ(json::parse(evaluation.out)["truth_file"], "d" + unknown + "/poses.txt");
+}
+
 }  // namespace
 }  // namespace efm
