@@ -111,11 +111,11 @@ std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
         ": angles are not read, because their order and axes differ between tools: expected a "
         "quaternion, qx qy qz qw");
   }
-  for (std::size_t field = 0; field < kPoseFields; ++field) {
-    if (found[field]) continue;
+  for (std::size_t expected = 0; expected < kPoseFields; ++expected) {
+    if (found[expected]) continue;
     throw std::runtime_error(
         fmt::format("{}: there is no column {}: expected t tx ty tz qx qy qz qw", inQuotes(line),
-                    kPoseFieldNames[field]));
+                    kPoseFieldNames[expected]));
   }
   return columns;
 }

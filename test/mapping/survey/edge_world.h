@@ -37,7 +37,7 @@ struct EdgeWorld {
   static Rig rig(std::size_t cameras) {
     Rig rig;
     for (std::size_t c = 0; c < cameras; ++c) {
-      const CameraModel model{160, 120, 120, 120, 79.5, 59.5};
+      const CameraModel model{160, 120, 120, 120, 79.5, 59.5, DistortionModel::kNone, {}};
       rig.cameras.push_back({model,
                              {rotationBy({0, 0.05 * static_cast<double>(c), 0}),
                               {0.1 * static_cast<double>(c), 0.01 * static_cast<double>(c), 0}}});

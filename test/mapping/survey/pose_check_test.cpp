@@ -104,7 +104,9 @@ TEST(PoseCheck, FindsEachMistake) {
       const std::optional<PoseFinding> finding = wrong.check();
       ASSERT_TRUE(finding) << row.name << ", cameras: " << cameras;
       EXPECT_EQ(finding->mistake, row.found) << row.name << ", cameras: " << cameras;
-      if (row.found == PoseMistake::kAxes) EXPECT_EQ(finding->R_body_rig, forwardLeftUp());
+      if (row.found == PoseMistake::kAxes) {
+        EXPECT_EQ(finding->R_body_rig, forwardLeftUp());
+      }
       if (row.found == PoseMistake::kTimeShift) {
         // Neighbouring times of the search are 3 ms apart, and the events have noise.
         EXPECT_NEAR(finding->shift_s, 0.2, 0.02);

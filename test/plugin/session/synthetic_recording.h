@@ -68,7 +68,7 @@ struct SyntheticRecording {
 
   static std::vector<Event> eventsOf(const RigCamera& camera,
                                      const std::vector<Eigen::Vector3d>& dots, std::int64_t steps) {
-    std::vector<Event> events;
+    std::vector<Event> seen;
     std::vector<Eigen::Vector2i> last(dots.size(), {-1, -1});
     for (std::int64_t step = 0; step <= steps; ++step) {
       const Rigid3 T_cam_world = (poseAt(step) * camera.T_rig_cam).inverse();
@@ -81,11 +81,11 @@ struct SyntheticRecording {
             rounded.y() >= camera.model.height) {
           continue;
         }
-        events.push_back({kStartNs + step * kStepNs, static_cast<std::uint16_t>(rounded.x()),
-                          static_cast<std::uint16_t>(rounded.y()), step % 2 == 0});
+        seen.push_back({kStartNs + step * kStepNs, static_cast<std::uint16_t>(rounded.x()),
+                        static_cast<std::uint16_t>(rounded.y()), step % 2 == 0});
       }
     }
-    return events;
+    return seen;
   }
 };
 
