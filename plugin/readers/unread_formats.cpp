@@ -22,6 +22,11 @@ using std::string_view_literals::operator""sv;
 
 constexpr std::size_t kBeginning = 512;  // a tar archive's magic is at byte 257
 
+constexpr const char* kOwnResult =
+    "expected a recording; `event-fusion view` shows a map, `event-fusion evaluate` compares it "
+    "with "
+    "the truth";
+
 struct UnreadFormat {
   std::string_view magic;
   const char* name;
@@ -67,7 +72,8 @@ constexpr UnreadFormat kUnreadFormats[] = {
     {"\x93NUMPY"sv, "a NumPy array", "give poses as --poses FILE; write events as text or as HDF5"},
     {"\x7f\x45LF"sv, "a program (ELF)", "expected a recording"},
     {"%PDF-"sv, "a PDF document", "expected a recording"},
-    {"ply\n"sv, "a point cloud (PLY)", "expected a recording"},
+    {"ply\n"sv, "a point cloud (PLY)", kOwnResult},
+    {"# .PCD"sv, "a point cloud (PCD)", kOwnResult},
     {"<!doctype html"sv, "an HTML page", "the download failed or needs a login"},
     {"<html"sv, "an HTML page", "the download failed or needs a login"},
     {"<?xml"sv, "an XML document", "the download failed, or it is no recording"},
@@ -123,6 +129,29 @@ std::string unpackedBeginning(const fs::path& file) {
   return bytes;
 }
 
+/// Whether a file is the report.json of a run.
+bool isReport(const fs::path& file) {
+  constexpr std::size_t kMostBytes = 1 << 20;
+  std::string text(kMostBytes, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return text.compare(0, 1, "{") == 0 && text.find("\"votes_per_second\"") != std::string::npos;
+}
+
+/// The name of a file or folder that this program writes.
+const char* ownResult(const fs::path& source) {
+  if (isFile(source / "report.json") && isReport(source / "report.json")) {
+    return "the result of an earlier run";
+  }
+  if (!isFile(source)) return nullptr;
+  const std::string bytes = rawBeginning(source);
+  if (bytes.find("name=\"generator\" content=\"event-fusion\"") != std::string::npos) {
+    return "the page of a map";
+  }
+  return isReport(source) ? "the report of an earlier run" : nullptr;
+}
+
 std::optional<std::string> unreadFile(const fs::path& file) {
   const std::string bytes = rawBeginning(file);
   if (bytes.empty()) return fmt::format("an empty file: {}", kIncomplete);
@@ -167,6 +196,7 @@ std::optional<std::string> unreadFolder(const fs::path& folder) {
 
 std::optional<std::string> unreadFormat(const fs::path& source) {
   try {
+    if (const char* const own = ownResult(source)) return fmt::format("{}: {}", own, kOwnResult);
     if (fs::is_directory(source)) return unreadFolder(source);
     return isFile(source) ? unreadFile(source) : std::nullopt;  // a pipe can be read only once
   } catch (const std::exception&) {                             // the folder cannot be listed

@@ -63,6 +63,22 @@ TEST_F(UnreadFormats, AreNamedByTheirFirstBytes) {
   for (const auto& [bytes, name] : cases) EXPECT_TRUE(begins(nameOf(bytes), name));
 }
 
+TEST_F(UnreadFormats, OwnResultsSayWhatShowsThem) {
+  const std::string what =
+      ": expected a recording; `event-fusion view` shows a map, `event-fusion ev";
+  const std::string report = R"({"version": "1", "votes_per_second": 1})";
+  EXPECT_TRUE(begins(nameOf(report), "the report of an earlier run" + what));
+  EXPECT_EQ(nameOf(R"({"version": "1"})"), "");
+  EXPECT_TRUE(begins(nameOf("<!DOCTYPE html>\n<meta name=\"generator\" content=\"event-fusion\">"),
+                     "the page of a map" + what));
+  EXPECT_TRUE(begins(nameOf("# .PCD v0.7 - Point Cloud Data\n"), "a point cloud (PCD)" + what));
+  writeFile(folder() / "map.html", "<!DOCTYPE html>");
+  writeFile(folder() / "report.json", "{}");
+  EXPECT_TRUE(begins(unreadFormat(folder()).value_or(""), "a folder; map.html in it is an HTML"));
+  writeFile(folder() / "report.json", report);
+  EXPECT_TRUE(begins(unreadFormat(folder()).value_or(""), "the result of an earlier run" + what));
+}
+
 TEST_F(UnreadFormats, AreNamedWithinCompressedFiles) {
   const std::filesystem::path file = folder() / "file";
   const auto name_of_zip = [&](const std::vector<std::pair<std::string, std::string>>& members) {
