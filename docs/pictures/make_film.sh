@@ -11,7 +11,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 # The events end after 0.17 s. A keyframe every 2 ms makes the map grow over some 40 frames.
-build/release/bin/event-fusion map --quiet config/davis240c_slider.ini "$recording" \
+build/release/bin/event-fusion map --quiet "$recording" --config davis240c_slider \
   --set keyframes.policy=period --set keyframes.stride_s=0.002 --set keyframes.window_s=0.08 \
   --record-frames "$work/frames" --out "$work/map"
 

@@ -130,9 +130,11 @@ std::function<int()> parseCommandLine(int argc, char** argv) {
       "Maps with event cameras: events and poses in, semi-dense depth maps and one global point "
       "cloud out.\n\n"
       "From a recording to a map:\n"
-      "  event-fusion simulate --preset desk_stereo --out desk\n"
-      "  event-fusion import desk --out desk.rawlog\n"
-      "  event-fusion map config/simulated_stereo.ini desk.rawlog --out out\n",
+      "  event-fusion info RECORDING             what it holds, and what is not plausible\n"
+      "  event-fusion map  RECORDING --out out   makes a map; no option is needed\n"
+      "  event-fusion view out                   opens out/map.html in the browser\n\n"
+      "RECORDING is a rawlog, a folder, or the files of one recording. Without one:\n"
+      "  event-fusion simulate --preset desk_stereo --out RECORDING\n",
       "event-fusion");
   app.set_version_flag("--version", std::string("event-fusion ") + EFM_VERSION);
   app.set_help_all_flag("--help-all", "Print the help of every command and exit");

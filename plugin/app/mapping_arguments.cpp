@@ -18,7 +18,7 @@ std::string configList() {
   return list.empty() ? "" : "Option files that come with the program: " + list;
 }
 
-/// An option file before the sources is CONFIG.
+/// An option file before the sources is taken like --config.
 void takeConfig(MappingArguments& arguments) {
   auto& files = arguments.source.files;
   if (files.front().extension() != ".ini") return;
@@ -32,13 +32,10 @@ void takeConfig(MappingArguments& arguments) {
 
 void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
   addSource(command, arguments.source);
-  command.get_option("SOURCE")->description("[CONFIG.ini] SOURCE...: the option file, if any; " +
-                                            command.get_option("SOURCE")->get_description());
   command
       .add_option(
           "--config", arguments.config,
-          "The option file, in place of CONFIG.ini: a file, or a name of those listed below; "
-          "the default has all keys")
+          "The option file: a name of those listed below, or a file; `default` has all keys")
       ->type_name("NAME|FILE");
   command
       .add_option("-o,--out", arguments.out,
@@ -48,7 +45,7 @@ void addMappingArguments(CLI::App& command, MappingArguments& arguments) {
   command.add_flag("--force", arguments.force, "Write into a folder that holds other files");
   command
       .add_option("--set", arguments.sets,
-                  "Overrides one option of CONFIG, e.g. --set dsi.num_planes=200; may be repeated")
+                  "Overrides one option, e.g. --set dsi.num_planes=200; may be repeated")
       ->type_name("SECTION.KEY=VALUE")
       ->allow_extra_args(false);
   command.add_flag("--plain-pictures", arguments.plain_pictures,
