@@ -51,13 +51,21 @@ RigCamera cameraOf(const CObservationEvents& packet) {
   return {packet.camera, rigidFrom(packet.camera_pose), 0};
 }
 
-/// The rig of a recording. One that announces its cameras is read up to its first event.
+/// The rig of a recording. One that announces its cameras is read up to its first event, another to
+/// its end or its damage.
 /// @throws std::runtime_error if a camera is missing, or there is none.
 Rig rigOf(const RecordingSource& source, const TimeLimits& limits) {
   const std::unique_ptr<Recording> recording = openInterval(source, limits);
   std::map<int, RigCamera> cameras;
   std::map<int, std::int64_t> announced_ns;
-  while (const auto observation = recording->next()) {
+  while (true) {
+    mrpt::obs::CObservation::Ptr observation;
+    try {
+      observation = recording->next();
+    } catch (const std::exception&) {
+      if (cameras.empty()) throw;
+    }
+    if (!observation) break;
     const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
     if (packet == nullptr) continue;
     cameras.emplace(packet->camera_index, cameraOf(*packet));
@@ -91,6 +99,9 @@ class Export {
   /// @param rig of the recording; the results' rig has camera 0's frame.
   Export(const ExportArguments& arguments, Rig rig)
       : T_rig_cam0_(rig.cameras[0].T_rig_cam), quiet_(arguments.verbosity == Verbosity::kQuiet) {
+    for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+      cameras_.emplace(static_cast<int>(i), rig.cameras[i].model);
+    }
     const Rigid3 T_cam0_rig = T_rig_cam0_.inverse();
     for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
       Rigid3& T = rig.cameras[i].T_rig_cam;
@@ -122,18 +133,23 @@ class Export {
 
   void add(const TruthDepth& truth) { writer_->addTruth(truth.t_ns, truth.file); }
 
-  void close(const std::filesystem::path& out) {
+  /// @param damage the error that ended the recording. @return the process's exit status.
+  int close(const std::filesystem::path& out, const std::optional<std::string>& damage) {
+    if (events_ == 0 && damage) throw std::runtime_error(*damage);
     writer_->close();
     if (!quiet_) fmt::print("{} events, {} poses; written to {}\n", events_, poses_, out.string());
+    printWarnings(missingParts(cameras_, events_ > 0, poses_ > 0));
     if (other_poses_ > 0) {
       printWarnings({{"unused-poses", fmt::format("{} poses of other sources than {} were left out",
                                                   other_poses_, asText(*pose_source_))}});
     }
+    return damage ? failAfter(*damage, events_, poses_, out) : 0;
   }
 
  private:
   Rigid3 T_rig_cam0_;
   bool quiet_;
+  std::map<int, CameraModel> cameras_;
   std::unique_ptr<RecordingWriter> writer_;
   std::optional<PoseSourceId> pose_source_;
   std::uint64_t events_ = 0;
@@ -158,27 +174,30 @@ std::vector<std::string> exportFormats() {
 int runExport(const ExportArguments& arguments) {
   refuseToReplace(arguments.out, inputsOf(arguments.source));
   refuseExisting(arguments.out);
-  const TimeLimits limits = resolve(arguments.times, arguments.source);
-  const auto open = [&] { return openInterval(arguments.source, limits); };
-  const Rig rig = rigOf(arguments.source, limits);
+  RecordingSource source = arguments.source;
+  source.complete = false;
+  const TimeLimits limits = resolve(arguments.times, source);
+  const Rig rig = rigOf(source, limits);
   const Interruption interruption;
   Export result(arguments, rig);
-  const std::unique_ptr<Recording> recording = open();
-  Progress progress("exporting", arguments.verbosity);
-  while (const auto observation = recording->next()) {
-    interruption.check();
-    result.add(*observation);
-    progress.show(recording->progress());
+  const std::unique_ptr<Recording> recording = openInterval(source, limits);
+  std::optional<std::string> damage;
+  {
+    Progress progress("exporting", arguments.verbosity);
+    damage = readAll(*recording, [&](const mrpt::obs::CObservation& observation) {
+      interruption.check();
+      result.add(observation);
+      progress.show(recording->progress());
+    });
   }
-  for (const TruthDepth& truth : openTruth(arguments.source)) {
+  for (const TruthDepth& truth : openTruth(source)) {
     const bool inside = truth.t_ns >= limits.t0_ns.value_or(kMinTimeNs) &&
                         truth.t_ns < limits.t1_ns.value_or(kMaxTimeNs);
     interruption.check();
     if (inside) result.add(truth);
   }
-  result.close(arguments.out);
   warnOfLosses(recording->counts());
-  return 0;
+  return result.close(arguments.out, damage);
 }
 
 }  // namespace efm

@@ -26,8 +26,10 @@ std::vector<std::string> exportFormats();
 /// added; poses are those of camera 0, T_world_cam0.
 /// @return the process's exit status.
 /// @throws Interrupted if a signal came; then there is no result.
-/// @throws std::exception if the recording cannot be read to its end or the result cannot be
-/// written. Then there is no result.
+/// A recording without poses or calibration will do. Of a damaged one, what came before the damage
+/// is written, and the status is 1.
+/// @throws std::exception if no event can be read or the result cannot be written. Then there is no
+/// result.
 int runExport(const ExportArguments& arguments);
 
 }  // namespace efm

@@ -23,6 +23,7 @@
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/session/health_checks.h"
 #include "plugin/session/time_text.h"
 
 namespace efm {
@@ -38,8 +39,10 @@ void refuseToDestroy(const ImportArguments& arguments) {
 int runImport(const ImportArguments& arguments) {
   refuseToReplace(arguments.out, inputsOf(arguments.source));
   refuseToDestroy(arguments);
-  const TimeLimits limits = resolve(arguments.times, arguments.source);
-  const std::unique_ptr<Recording> recording = openInterval(arguments.source, limits);
+  RecordingSource source = arguments.source;
+  source.complete = false;
+  const TimeLimits limits = resolve(arguments.times, source);
+  const std::unique_ptr<Recording> recording = openInterval(source, limits);
   const Interruption interruption;
   RawlogWriter writer(arguments.out, arguments.compression);
   std::map<std::string, std::uint64_t> events;  // per label
@@ -47,28 +50,33 @@ int runImport(const ImportArguments& arguments) {
   std::uint64_t poses = 0;
   std::uint64_t odometry = 0;  // of them
   std::uint64_t others = 0;
+  std::map<int, CameraModel> cameras;
+  std::optional<std::string> damage;
   {
     Progress progress("importing", arguments.verbosity);
-    while (const auto observation = recording->next()) {
+    damage = readAll(*recording, [&](mrpt::obs::CObservation& observation) {
       interruption.check();
-      writer.write(*observation);
-      if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
+      writer.write(observation);
+      if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
+        cameras.emplace(packet->camera_index, packet->camera);
         events[packet->sensorLabel] += packet->events.size();
         all_events += packet->events.size();
-      } else if (const auto source = poseSourceOf(*observation)) {
+      } else if (const auto poses_of = poseSourceOf(observation)) {
         ++poses;
-        if (source->kind == PoseKind::kOdometry) ++odometry;
+        if (poses_of->kind == PoseKind::kOdometry) ++odometry;
       } else {
         ++others;
       }
       progress.show(recording->progress());
-    }
-    if (all_events == 0) refuseLimitsWithoutEvents(arguments.source, limits);
+    });
+    if (all_events == 0 && damage) throw std::runtime_error(*damage);
+    if (all_events == 0) refuseLimitsWithoutEvents(source, limits);
     if (all_events + poses + others == 0) {
       throw std::runtime_error("the recording holds nothing " + limitsText(limits));
     }
     writer.close();
   }
+  printWarnings(missingParts(cameras, all_events > 0, poses > 0));
   warnOfLosses(recording->counts());
   if (odometry > 0 && !arguments.source.hand_eye.empty()) {
     printWarnings({{"hand-eye-left-out",
@@ -76,7 +84,8 @@ int runImport(const ImportArguments& arguments) {
                                 "give it to map as well (--hand-eye)",
                                 odometry)}});
   }
-  if (arguments.verbosity == Verbosity::kQuiet) return 0;
+  const int status = damage ? failAfter(*damage, all_events, poses, arguments.out) : 0;
+  if (arguments.verbosity == Verbosity::kQuiet) return status;
   for (const auto& [label, count] : events) fmt::print("{}: {} events\n", label, count);
   if (others > 0) fmt::print("{} other observations\n", others);
   fmt::print("{} poses; {} events were out of order and sorted\n", poses,
@@ -84,7 +93,7 @@ int runImport(const ImportArguments& arguments) {
   const auto bytes = static_cast<double>(std::filesystem::file_size(arguments.out));
   fmt::print("written to {}, {:.1f} MB, {:.2f} bytes per event\n", arguments.out.string(),
              bytes * 1e-6, all_events == 0 ? 0.0 : bytes / static_cast<double>(all_events));
-  return 0;
+  return status;
 }
 
 }  // namespace efm

@@ -22,8 +22,10 @@ struct ImportArguments {
 /// file.
 /// @return the process's exit status.
 /// @throws Interrupted if a signal came; then there is no result.
-/// @throws std::exception if the recording cannot be read to its end or the rawlog cannot be
-/// written. Then there is no rawlog.
+/// A recording without poses or calibration will do. Of a damaged one, what came before the damage
+/// is written, and the status is 1.
+/// @throws std::exception if no event can be read or the rawlog cannot be written. Then there is no
+/// rawlog.
 int runImport(const ImportArguments& arguments);
 
 }  // namespace efm

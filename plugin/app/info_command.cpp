@@ -19,6 +19,7 @@
 #include "plugin/app/recording_interval.h"
 #include "plugin/app/recording_survey.h"
 #include "plugin/app/system_info.h"
+#include "plugin/calibration/known_size.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/session/camera_view.h"
 #include "plugin/session/health_checks.h"
@@ -41,10 +42,8 @@ struct Contents {
 };
 
 std::string asText(const CameraModel& model) {
-  constexpr int kUnknown = 65'535;
-  const std::string size = model.width == kUnknown
-                               ? "unknown size"
-                               : fmt::format("{}x{} pixels", model.width, model.height);
+  const std::string size =
+      knownSize(model) ? fmt::format("{}x{} pixels", model.width, model.height) : "unknown size";
   if (!isCalibrated(model)) return size + ", no calibration";
   const Eigen::Vector2d view_deg = fieldOfView(model) / kRadiansPerDegree;
   return fmt::format(

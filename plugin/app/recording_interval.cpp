@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/app/error_words.h"
+#include "plugin/app/exit_status.h"
 #include "plugin/app/observed_statistics.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/time_cut.h"
@@ -77,6 +79,20 @@ std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits
   return cutTime(openRecording(source), limits.t0_ns, limits.t1_ns);
 }
 
+std::optional<std::string> readAll(Recording& recording,
+                                   const std::function<void(mrpt::obs::CObservation&)>& take) {
+  while (true) {
+    mrpt::obs::CObservation::Ptr observation;
+    try {
+      observation = recording.next();
+    } catch (const std::exception& error) {
+      return inWords(error);
+    }
+    if (!observation) return std::nullopt;
+    take(*observation);
+  }
+}
+
 void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& limits) {
   if (!limits.t0_ns && !limits.t1_ns) return;
   const auto span_ns = eventSpan(source);
@@ -84,6 +100,12 @@ void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& 
   throw std::runtime_error(fmt::format("no event {}: the recording has events from {} s to {} s",
                                        limitsText(limits), formatSeconds(span_ns->first),
                                        formatSeconds(span_ns->second)));
+}
+
+int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,
+              const std::filesystem::path& out) {
+  return fail(fmt::format("{}; {} events and {} poses before it are written to {}", damage, events,
+                          poses, out.string()));
 }
 
 std::vector<Warning> lossWarnings(const RecordingCounts& counts) {

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -38,9 +40,20 @@ TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
 /// events outside are not read, where the format has an index.
 std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits);
 
+/// Reads a recording to its end, or to its damage.
+/// @param take receives each observation; what it throws ends the reading.
+/// @return the error of the recording, if it was not read to its end.
+std::optional<std::string> readAll(Recording& recording,
+                                   const std::function<void(mrpt::obs::CObservation&)>& take);
+
 /// Refuses time limits without events: they may be mistyped. A recording without any event passes.
 /// @throws std::runtime_error naming the times of the recording's events.
 void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& limits);
+
+/// Reports the damage that ended a recording, after all before it was written.
+/// @return the process's exit status.
+int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,
+              const std::filesystem::path& out);
 
 /// Warnings of the readers, and of what the recording lacks: packets, the times of events, or
 /// events that were left out.

@@ -17,6 +17,7 @@
 #include "plugin/calibration/camchain.h"
 #include "plugin/calibration/camera_info_file.h"
 #include "plugin/calibration/dsec_calibration.h"
+#include "plugin/calibration/known_size.h"
 #include "plugin/calibration/mrpt_camera_file.h"
 #include "plugin/calibration/tumvie_calibration.h"
 #include "plugin/calibration/yaml_entry.h"
@@ -123,8 +124,7 @@ void Calibration::requireCameras(std::size_t count) const {
 
 void Calibration::requireLike(const Rig& recorded) const {
   for (std::size_t i = 0; i < recorded.cameras.size(); ++i) {
-    const CameraModel& model = recorded.cameras[i].model;
-    camera(i, CameraSize{model.width, model.height});
+    camera(i, knownSize(recorded.cameras[i].model));
   }
   requireCameras(recorded.cameras.size());
 }

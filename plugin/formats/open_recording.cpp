@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "plugin/calibration/calibration_file.h"
+#include "plugin/calibration/known_size.h"
 #include "plugin/formats/merged_recording.h"
 #include "plugin/formats/rawlog_recording.h"
 #include "plugin/formats/rawlog_signature.h"
@@ -92,8 +93,8 @@ bool reads(const Read& read) {
   const std::string name = path.string();
   if (path.extension() == ".ini") {
     throw std::runtime_error(name +
-                             ": an .ini file among the sources: expected one option file, before "
-                             "the recording; a calibration is given with --calibration");
+                             ": an .ini file among the sources: expected one option file, --config "
+                             "NAME; a calibration is given with --calibration");
   }
   if (reads([&] { readPoses(path, options); })) {
     throw std::runtime_error(name + ": poses: expected --poses " + name);
@@ -129,7 +130,10 @@ RecordingParts openParts(const RecordingSource& source) {
 /// the format's usual one.
 std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera,
                                  const Calibration* given) {
-  if (const auto size = parts.cameras[camera]->size()) return size;
+  if (const auto size = parts.cameras[camera]->size()) {
+    const bool is_known = size->width < kUnknownSize.width || size->height < kUnknownSize.height;
+    if (is_known) return size;
+  }
   const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
   for (const Calibration* const calibration : {own, given}) {
     if (calibration == nullptr || camera >= calibration->rig.cameras.size()) continue;
@@ -155,10 +159,9 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
     if (calibration != nullptr) {
       rig.cameras.push_back(calibration->camera(camera, size));
     } else {
-      constexpr CameraSize kAny = {65'535, 65'535};
       RigCamera& unknown = rig.cameras.emplace_back();
-      unknown.model.width = size.value_or(kAny).width;
-      unknown.model.height = size.value_or(kAny).height;
+      unknown.model.width = size.value_or(kUnknownSize).width;
+      unknown.model.height = size.value_or(kUnknownSize).height;
     }
   }
   if (given != nullptr) given->requireLike(rig);

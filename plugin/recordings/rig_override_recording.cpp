@@ -3,6 +3,7 @@
 
 #include <utility>
 
+#include "plugin/calibration/known_size.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
 
@@ -19,9 +20,8 @@ mrpt::obs::CObservation::Ptr RigOverrideRecording::next() {
   } else if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
     cameras_.insert(packet->camera_index);
     if (setup_.calibration) {
-      const RigCamera camera =
-          setup_.calibration->camera(static_cast<std::size_t>(packet->camera_index),
-                                     CameraSize{packet->camera.width, packet->camera.height});
+      const RigCamera camera = setup_.calibration->camera(
+          static_cast<std::size_t>(packet->camera_index), knownSize(packet->camera));
       packet->camera = camera.model;
       packet->camera_pose = mrptPoseFrom(camera.T_rig_cam);
       packet->time_offset_ns = camera.time_offset_ns;

@@ -132,17 +132,24 @@ std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
 }
 
 std::vector<Warning> missingParts(const RecordingStatistics& recording) {
-  Warnings warnings;
-  if (!recording.eventSpan()) warnings.push_back({"no-events", "there are no events"});
+  std::map<int, CameraModel> cameras;
   for (const auto& [key, camera] : recording.cameras()) {
-    if (isCalibrated(camera.camera.model)) continue;
+    cameras.emplace(key.first, camera.camera.model);
+  }
+  return missingParts(cameras, recording.eventSpan().has_value(), recording.usedPoses() != nullptr);
+}
+
+std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
+                                  bool has_poses) {
+  Warnings warnings;
+  if (!has_events) warnings.push_back({"no-events", "there are no events"});
+  for (const auto& [index, model] : cameras) {
+    if (isCalibrated(model)) continue;
     warnings.push_back(
         {"no-calibration",
-         fmt::format("camera {} has no calibration: a map needs --calibration", key.first)});
+         fmt::format("camera {} has no calibration: a map needs --calibration", index)});
   }
-  if (!recording.usedPoses()) {
-    warnings.push_back({"no-poses", "there are no poses: a map needs --poses"});
-  }
+  if (!has_poses) warnings.push_back({"no-poses", "there are no poses: a map needs --poses"});
   return warnings;
 }
 

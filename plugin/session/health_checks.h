@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/camera.h"
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/options/warning.h"
 #include "plugin/session/event_fusion_options.h"
@@ -26,6 +28,9 @@ std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
 
 /// What a recording lacks for a map: events, calibration, poses.
 std::vector<Warning> missingParts(const RecordingStatistics& recording);
+/// @param cameras by their index.
+std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
+                                  bool has_poses);
 
 /// Counts the depths of keyframes near the limits.
 class DepthStatistics {

@@ -31,6 +31,7 @@ std::string fullWindow(const KeyframePolicyOptions& options) {
 
 std::string whyNoPoses(const SessionStatus& status) {
   std::string why = "the recording has no poses";
+  if (status.other_poses.empty()) return why + ": a map needs --poses FILE";
   const char* before = " of the source that [rig] pose_source says, but of ";
   for (const auto& [source, count] : status.other_poses) {
     why += std::exchange(before, ", ") + asText(source);

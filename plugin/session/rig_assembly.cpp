@@ -10,6 +10,8 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
+#include "plugin/calibration/known_size.h"
+#include "plugin/session/camera_view.h"
 
 namespace efm {
 namespace {
@@ -72,12 +74,16 @@ void RigAssembly::applyOptions(CameraPacket& packet) {
   const auto camera = static_cast<std::size_t>(packet.camera);
   RigCamera& recorded = packet.calibration;
   if (setup_.calibration) {
-    const RigCamera given =
-        setup_.calibration->camera(camera, CameraSize{recorded.model.width, recorded.model.height});
+    const RigCamera given = setup_.calibration->camera(camera, knownSize(recorded.model));
     if (given.model != recorded.model || !areNear(given.T_rig_cam, recorded.T_rig_cam)) {
       recalibrated_.insert(packet.camera);
     }
     recorded = given;
+  }
+  if (!isCalibrated(recorded.model)) {
+    throw std::invalid_argument(fmt::format(
+        "camera {} has no calibration: a map needs --calibration FILE ([rig] calibration)",
+        camera));
   }
   if (time_offsets_ns_.empty()) return;
   requireOption(camera < time_offsets_ns_.size(), "[rig] time_offsets_s (how many)",

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
@@ -16,10 +15,7 @@ FolderWriter::FolderWriter(const std::filesystem::path& folder, const Rig& rig)
     std::filesystem::create_directory(cam);
     events_.emplace_back(cam / "events.txt");
   }
-  TextFile camchain(folder_.temporary() / "camchain.yaml");
-  camchain.stream() << formatCamchain(rig);
-  camchain.close();
-  writeTumTrajectory(poses_.stream(), {});
+  writeCamchain(folder_.temporary(), rig);
 }
 
 void FolderWriter::addEvents(std::size_t camera, const std::vector<Event>& events) {
@@ -29,7 +25,7 @@ void FolderWriter::addEvents(std::size_t camera, const std::vector<Event>& event
   events_.at(camera).requireWritten();
 }
 
-void FolderWriter::addPose(const StampedPose& pose) { writeTumPose(poses_.stream(), pose); }
+void FolderWriter::addPose(const StampedPose& pose) { poses_.add(pose); }
 
 void FolderWriter::addTruth(std::int64_t t_ns, const std::filesystem::path& file) {
   const std::filesystem::path depth = folder_.temporary() / "depth";

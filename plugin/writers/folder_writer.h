@@ -12,7 +12,7 @@
 namespace efm {
 
 /// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0);
-/// depth/ with the truth.
+/// depth/ with the truth. What the recording lacks is left out.
 class FolderWriter : public RecordingWriter {
  public:
   /// @param rig whose frame is that of camera 0.
@@ -27,7 +27,7 @@ class FolderWriter : public RecordingWriter {
  private:
   NewFolder folder_;
   std::vector<TextFile> events_;  // per camera
-  TextFile poses_;
+  PoseTextFile poses_;
   std::unique_ptr<TextFile> truth_;  // the index, if there is any
 };
 

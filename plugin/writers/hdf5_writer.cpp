@@ -9,8 +9,6 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/poses/tum_trajectory.h"
-#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 namespace {
@@ -144,10 +142,7 @@ void Hdf5Writer::Camera::close() {
 
 Hdf5Writer::Hdf5Writer(const fs::path& folder, const Rig& rig)
     : folder_(folder), poses_(folder_.temporary() / "poses.txt") {
-  TextFile camchain(folder_.temporary() / "camchain.yaml");
-  camchain.stream() << formatCamchain(rig);
-  camchain.close();
-  writeTumTrajectory(poses_.stream(), {});
+  writeCamchain(folder_.temporary(), rig);
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
     const fs::path path = folder_.temporary() / "events" / cameraName(camera);
     fs::create_directories(path);
@@ -168,7 +163,7 @@ void Hdf5Writer::addEvents(std::size_t camera, const std::vector<Event>& events)
   }
 }
 
-void Hdf5Writer::addPose(const StampedPose& pose) { writeTumPose(poses_.stream(), pose); }
+void Hdf5Writer::addPose(const StampedPose& pose) { poses_.add(pose); }
 
 void Hdf5Writer::close() {
   for (Camera& camera : cameras_) {

@@ -80,7 +80,7 @@ class Hdf5Writer : public RecordingWriter {
   NewFolder folder_;
   Hdf5Quiet quiet_;  // also while the cameras' files are closed
   std::vector<Camera> cameras_;
-  TextFile poses_;
+  PoseTextFile poses_;
 };
 
 }  // namespace efm

@@ -156,7 +156,7 @@ void McapWriter::addPacket(std::size_t camera, const Event* begin, const Event* 
   const std::int64_t t_ns = begin->t_ns;
   const std::uint32_t seconds = stampSeconds(t_ns);
   std::uint64_t& sequence = next_sequence_[camera];
-  if (sequence == 0) {
+  if (sequence == 0 && model.fx > 0) {  // calibrated
     CdrWriter info;
     addHeader(info, seconds, t_ns, frameOf(camera));
     addCamera(info, model);

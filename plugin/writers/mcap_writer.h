@@ -17,7 +17,7 @@ namespace efm {
 /// index and checksums):
 ///   /camN/events       event_camera_msgs/EventPacket, encoding mono: the times are exact (ns), and
 ///                      event_camera_py and our reader decode it
-///   /camN/camera_info  sensor_msgs/CameraInfo, once
+///   /camN/camera_info  sensor_msgs/CameraInfo, once, of a calibrated camera
 ///   /pose              geometry_msgs/PoseStamped, T_world_rig
 /// The cameras' poses on the rig have no message: a rig of several cameras needs a calibration
 /// file.

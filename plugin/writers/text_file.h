@@ -3,6 +3,11 @@
 
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <utility>
+
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/trajectory.h"
 
 namespace efm {
 
@@ -23,5 +28,24 @@ class TextFile {
   std::filesystem::path path_;
   std::ofstream stream_;
 };
+
+/// poses.txt, TUM format. Without a pose there is no file.
+class PoseTextFile {
+ public:
+  explicit PoseTextFile(std::filesystem::path path) : path_(std::move(path)) {}
+
+  /// @throws std::runtime_error naming the file if it cannot be made.
+  void add(const StampedPose& pose);
+  /// @throws std::runtime_error naming the file if it could not be written.
+  void close();
+
+ private:
+  std::filesystem::path path_;
+  std::unique_ptr<TextFile> file_;
+};
+
+/// Writes camchain.yaml, if the cameras are calibrated.
+/// @throws std::runtime_error naming the file if it cannot be written.
+void writeCamchain(const std::filesystem::path& folder, const Rig& rig);
 
 }  // namespace efm

@@ -14,6 +14,7 @@ namespace efm {
 namespace {
 
 using testing::AllOf;
+using testing::Contains;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -61,6 +62,66 @@ TEST_F(ImportCommand, ACutRawlogStillAnnouncesItsCameras) {
   ASSERT_EQ(run("import cut.rawlog --out again.rawlog --compression zstd").status, 0);
   EXPECT_EQ(mapOf("cut.rawlog"), mapOf("data --t0 10.1 --t1 10.4"));
   EXPECT_EQ(mapOf("again.rawlog"), mapOf("cut.rawlog"));
+}
+
+TEST_F(ImportCommand, EventsAloneAreImportedAndExported) {
+  write(SyntheticRecording());
+  const std::string rest = " --calibration data/camchain.yaml --poses data/poses.txt";
+  const std::string map = mapOf("data");
+  for (const std::string command : {"import --out e.rawlog", "export --to folder --out text",
+#ifdef EFM_WITH_HDF5
+                                    "export --to dsec --out h5",
+#endif
+                                    "export --to mcap --out e.mcap"}) {
+    const Result result = run(command + " data/cam0/events.txt data/cam1/events.txt");
+    ASSERT_EQ(result.status, 0) << command << result.err;
+    EXPECT_THAT(result.err,
+                AllOf(HasSubstr("warning: no-calibration: camera 0 has no calibration: a map"),
+                      HasSubstr("no-calibration: camera 1"),
+                      HasSubstr("warning: no-poses: there are no poses: a map needs")))
+        << command;
+    const std::string out = command.substr(command.rfind(' ') + 1);
+    EXPECT_EQ(mapOf(out + rest), map) << command;
+    EXPECT_THAT(errorOf("map rig.ini " + out + " --out no --poses data/poses.txt"),
+                HasSubstr("no calibration: "))
+        << command;
+    EXPECT_THAT(errorOf("map rig.ini " + out + " --out no --calibration data/camchain.yaml"),
+                HasSubstr("--poses"))
+        << command;
+  }
+  EXPECT_THAT(run("info e.rawlog").out, HasSubstr("cam1: unknown size, no calibration"));
+  const Result again = run("export e.rawlog --to folder --out again" + rest);
+  EXPECT_EQ(again.err, "");
+  EXPECT_EQ(mapOf("again"), map);
+}
+
+TEST_F(ImportCommand, OfADamagedRecordingAllBeforeTheDamageIsWritten) {
+  write(SyntheticRecording());
+  const std::string events = contentOf("data/cam0/events.txt");
+  const std::size_t line = events.find('\n', events.size() / 2) + 1;
+  write("data/cam0/events.txt", events.substr(0, line) + "damage\n" + events.substr(line));
+  const auto lines = std::to_string(
+      std::count(events.begin(), events.begin() + static_cast<std::ptrdiff_t>(line), '\n'));
+  for (const std::string command :
+       {"import data --out d.rawlog", "export data --to folder --out text",
+        "export data --to mcap --out d.mcap"}) {
+    const std::string out = command.substr(command.rfind(' ') + 1);
+    const Result result = run(command);
+    EXPECT_EQ(result.status, 1) << command;
+    EXPECT_THAT(result.err,
+                AllOf(HasSubstr("data/cam0/events.txt:"), HasSubstr("'damage': expected"),
+                      HasSubstr("poses before it are written to " + out + "\n")));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    const Result info =
+        run("info " + out + (out == "d.mcap" ? " --calibration data/camchain.yaml" : ""));
+    EXPECT_THAT(info.out, HasSubstr("\n  " + lines + " events from ")) << command << info.err;
+  }
+  const std::string rawlog = contentOf("d.rawlog");
+  write("cut.rawlog", rawlog.substr(0, rawlog.size() / 2));
+  const Result cut = run("import cut.rawlog --out c.rawlog");
+  EXPECT_EQ(cut.status, 1);
+  EXPECT_THAT(cut.err, HasSubstr("stopped at entry"));
+  EXPECT_EQ(run("import c.rawlog --out again.rawlog").status, 0) << "it is whole";
 }
 
 TEST_F(ImportCommand, TheTruthOfAFolderIsExportedWithIt) {
@@ -151,7 +212,7 @@ TEST_F(ImportCommand, AnIntervalWithoutEventsIsAnErrorWithTheTimesOfTheEvents) {
     EXPECT_NE(result.status, 0);
     EXPECT_THAT(result.err, AllOf(StartsWith("event-fusion: error: no event "), EndsWith(span)));
     EXPECT_FALSE(exists(folder() / "s.rawlog"));
-    EXPECT_FALSE(exists(folder() / "s.partial.rawlog"));
+    EXPECT_THAT(filesIn("."), Not(Contains(HasSubstr("partial"))));
   }
   EXPECT_THAT(run("import small --out s.rawlog --t0 7 --t1 8").err,
               HasSubstr("no event from --t0 7.000000000 s until --t1 8.000000000 s: "));
@@ -218,12 +279,12 @@ TEST_F(ImportCommand, AMissingRecordingIsAnErrorOnOneLine) {
 
 TEST_F(ImportCommand, AnEventOutsideTheSensorIsAnErrorThatNamesTheLineAndLeavesNoRawlog) {
   writeSmallRecording();
-  write("small/events.txt", "0.010 1 2 1\n0.020 240 4 0\n");
+  write("small/events.txt", "0.010 240 4 0\n0.020 1 2 1\n");
   const Result result = run("import small --out s.rawlog");
   EXPECT_NE(result.status, 0);
-  EXPECT_THAT(result.err, AllOf(HasSubstr("events.txt:2: "), HasSubstr("240")));
+  EXPECT_THAT(result.err, AllOf(HasSubstr("events.txt:1: "), HasSubstr("240")));
   EXPECT_FALSE(exists(folder() / "s.rawlog"));
-  EXPECT_FALSE(exists(folder() / "s.partial.rawlog"));
+  EXPECT_THAT(filesIn("."), Not(Contains(HasSubstr("partial"))));
 }
 
 TEST_F(ImportCommand, InfoOfATruncatedFolderPrintsTheContentsBeforeTheErrorAndFails) {

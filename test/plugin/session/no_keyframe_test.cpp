@@ -57,7 +57,8 @@ TEST(WhyNoKeyframe, SaysThatTheLensSeesNoEvent) {
 TEST(WhyNoKeyframe, SaysThatEventsOrPosesAreMissing) {
   SyntheticRecording recording;
   recording.poses.clear();
-  EXPECT_EQ(why(recording, syntheticOptions()), "the recording has no poses");
+  EXPECT_EQ(why(recording, syntheticOptions()),
+            "the recording has no poses: a map needs --poses FILE");
   recording.events.assign(2, {});
   EXPECT_EQ(why(recording, syntheticOptions()), "the recording has no events");
 }
