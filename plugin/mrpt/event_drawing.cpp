@@ -16,6 +16,15 @@ namespace {
 
 using mrpt::math::TPoint3D;
 
+/// A camera without a calibration is drawn with a field of view of 53 degrees.
+CameraModel drawnModel(CameraModel camera) {
+  if (camera.fx > 0) return camera;
+  camera.fx = camera.fy = camera.width;
+  camera.cx = 0.5 * (camera.width - 1);
+  camera.cy = 0.5 * (camera.height - 1);
+  return camera;
+}
+
 /// The position of a pixel on the drawn image plane, in the camera's frame.
 TPoint3D onImagePlane(const CameraModel& camera, double x, double y) {
   return {(x - camera.cx) / camera.fx * kDrawnPlaneM, (y - camera.cy) / camera.fy * kDrawnPlaneM,
@@ -37,7 +46,8 @@ mrpt::opengl::CRenderizable::Ptr frustumOf(const CameraModel& camera) {
   return lines;
 }
 
-mrpt::opengl::CRenderizable::Ptr pointsOf(const CObservationEvents& packet) {
+mrpt::opengl::CRenderizable::Ptr pointsOf(const CObservationEvents& packet,
+                                          const CameraModel& model) {
   const std::size_t count = packet.events.size();
   const std::size_t drawn = std::min(count, kMaxDrawnEvents);
   auto points = mrpt::opengl::CPointCloudColoured::Create();
@@ -45,7 +55,7 @@ mrpt::opengl::CRenderizable::Ptr pointsOf(const CObservationEvents& packet) {
   points->reserve(drawn);
   for (std::size_t i = 0; i < drawn; ++i) {
     const Event& event = packet.events[i * count / drawn];
-    const TPoint3D p_cam = onImagePlane(packet.camera, event.x, event.y);
+    const TPoint3D p_cam = onImagePlane(model, event.x, event.y);
     const std::uint8_t red = event.polarity ? 220 : 0;
     const std::uint8_t blue = event.polarity ? 0 : 220;
     points->insertPoint({static_cast<float>(p_cam.x), static_cast<float>(p_cam.y),
@@ -60,8 +70,9 @@ void drawEvents(const CObservationEvents& packet, mrpt::opengl::CSetOfObjects& o
   auto camera = mrpt::opengl::CSetOfObjects::Create();
   camera->setPose(packet.camera_pose);
   camera->insert(mrpt::opengl::stock_objects::CornerXYZSimple(0.5F, 2.0F));
-  camera->insert(frustumOf(packet.camera));
-  camera->insert(pointsOf(packet));
+  const CameraModel model = drawnModel(packet.camera);
+  camera->insert(frustumOf(model));
+  camera->insert(pointsOf(packet, model));
   out.insert(camera);
 }
 

@@ -47,6 +47,14 @@ TEST(EventDrawing, AnEventIsAPointOnTheImagePlaneInTheColourOfItsPolarity) {
   EXPECT_GT(points->getPointColor(1).B, 200);
 }
 
+TEST(EventDrawing, ACameraWithoutACalibrationIsDrawnWithTheFocalLengthOfItsWidth) {
+  CObservationEvents packet = twoLines();
+  packet.camera = {240, 180, 0, 0, 0, 0, DistortionModel::kNone, {}};
+  const auto points = pointsOf(packet);
+  EXPECT_NEAR(points->getPoint3Df(0).x, (40 - 119.5) / 240 * kDrawnPlaneM, 1e-6);
+  EXPECT_NEAR(points->getPoint3Df(0).y, (20 - 89.5) / 240 * kDrawnPlaneM, 1e-6);
+}
+
 TEST(EventDrawing, IsDrawnAtTheCamerasPoseOnTheRig) {
   CObservationEvents packet = twoLines();
   packet.camera_pose = mrpt::poses::CPose3D(1, 2, 3, 0.1, 0.2, 0.3);
