@@ -249,7 +249,7 @@ std::vector<Warning> replacementWarnings(const std::filesystem::path& folder,
           ? fmt::format("{} holds the result of {} ({} keyframes): this run replaces it",
                         folder.string(), recording, earlier->keyframes)
           : fmt::format(
-                "{} holds {} keyframes of {}, left by a run that was killed: this run replaces "
+                "{} holds {} keyframes of {}, left by a run that did not end: this run replaces "
                 "them",
                 folder.string(), earlier->keyframes, recording);
   return {{"replaced-result", text}};

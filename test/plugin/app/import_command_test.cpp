@@ -155,6 +155,12 @@ TEST_F(ImportCommand, ReplacesNothingButARawlog) {
     EXPECT_THAT(errorOf(std::string("export small --out s.rawlog --to ") + target),
                 HasSubstr("s.rawlog: it exists: expected the name of a new file or folder"));
   }
+  std::filesystem::create_hard_link(folder() / "s.rawlog", folder() / "hard.rawlog");
+  std::filesystem::create_symlink("s.rawlog", folder() / "soft.rawlog");
+  for (const char* link : {"hard.rawlog", "soft.rawlog"}) {
+    EXPECT_THAT(errorOf(std::string("import s.rawlog --out ") + link),
+                HasSubstr(std::string(link) + ": it is the input s.rawlog itself"));
+  }
   EXPECT_EQ(contentOf("s.rawlog"), bytes);
   EXPECT_EQ(contentOf("s.rawlog"), rawlog);
   EXPECT_EQ(run("import small --out s.rawlog --t1 0.04").status, 0);

@@ -95,7 +95,7 @@ TEST_F(Interrupted, AResultThatIsReplacedIsNamed) {
   write("out/report.partial.json", R"({"recording": ["/a.bag", "/b.txt"], "process": 1})");
   EXPECT_EQ(warningOf("data.rawlog"),
             warning +
-                "2 keyframes of /a.bag, /b.txt, left by a run that was killed: this run "
+                "2 keyframes of /a.bag, /b.txt, left by a run that did not end: this run "
                 "replaces them\n");
 }
 
