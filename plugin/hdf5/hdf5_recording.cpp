@@ -17,7 +17,6 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
-#include "plugin/hdf5/crash_probe.h"
 #include "plugin/hdf5/hdf5_events.h"
 #include "plugin/hdf5/hdf5_files.h"
 #include "plugin/streams/number_checks.h"
@@ -166,7 +165,7 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
 }
 
 /// @return whether the file has events or poses.
-bool addParts(const fs::path& path, RecordingParts& parts) {
+bool addFile(const fs::path& path, RecordingParts& parts) {
   const auto file = std::make_shared<const Hdf5File>(path);
   bool any = false;
   for (const Hdf5Layout& layout : hdf5Layouts()) any = addCameras(file, layout, parts) || any;
@@ -177,21 +176,6 @@ bool addParts(const fs::path& path, RecordingParts& parts) {
     if (parts.poses.empty()) parts.poses = readPoses(file, poses);
   }
   return any;
-}
-
-/// The same. Some versions of the HDF5 library crash on damaged descriptions of data sets.
-bool addFile(const fs::path& path, RecordingParts& parts) {
-  const bool sound = survives([&path] {
-    RecordingParts tried;
-    addParts(path, tried);
-    std::vector<Event> events;
-    for (const auto& camera : tried.cameras) camera->read(events);
-  });
-  if (!sound) {
-    throw std::runtime_error(path.string() +
-                             ": the HDF5 library crashes on it: expected a file without damage");
-  }
-  return addParts(path, parts);
 }
 
 [[noreturn]] void refuse(const fs::path& path) {

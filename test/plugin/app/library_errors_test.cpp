@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <mrpt/core/exceptions.h>
 
+#include <chrono>
 #include <new>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <system_error>
 
 #include "plugin/app/error_words.h"
+#include "plugin/app/hdf5_trial.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {
@@ -57,6 +60,33 @@ TEST(ErrorWords, HaveNothingThatALibraryAddsForItsProgrammers) {
         wordsOf([] { throw std::runtime_error("x.bag: std::bad_alloc"); })}) {
     EXPECT_THAT(text, StartsWith("out of memory: try fewer planes"));
   }
+}
+
+TEST(Hdf5Trial, SaysHowAProgramFails) {
+  using std::chrono::milliseconds;
+  constexpr milliseconds kLong(60'000);
+  EXPECT_EQ(failureOf({"true"}, kLong), std::nullopt);
+  EXPECT_EQ(failureOf({"sh", "-c", "kill -s SEGV $$"}, kLong), "crashes");
+  EXPECT_EQ(failureOf({"sh", "-c", "exit 3"}, kLong), "crashes");
+  EXPECT_EQ(failureOf({"sleep", "600"}, milliseconds(50)), "does not end within 0.05 s");
+  EXPECT_EQ(failureOf({"/no/such/program"}, kLong), std::nullopt) << "then it is read all the same";
+}
+
+class Hdf5Trials : public AppTest {};
+
+TEST_F(Hdf5Trials, LeaveTheErrorToTheProgram) {
+  write(SyntheticRecording());
+  ASSERT_EQ(shell("'" EFM_EVENT_FUSION "' export data --to dsec --out good").status, 0);
+  const std::filesystem::path file = "good/events/left/events.h5";
+  write("damaged.h5", contentOf(file).substr(0, 2'000));
+  for (const char* source : {"good", "damaged.h5", "missing.h5"}) {
+    const Result trial = shell(std::string("'" EFM_EVENT_FUSION "' --try-hdf5 ") + source);
+    EXPECT_EQ(trial.status, 0);
+    EXPECT_EQ(trial.out + trial.err, "");
+  }
+  EXPECT_EQ(shell("'" EFM_EVENT_FUSION "' info good").status, 0);
+  EXPECT_THAT(shell("'" EFM_EVENT_FUSION "' info damaged.h5").err,
+              HasSubstr("damaged.h5: cannot be opened as HDF5"));
 }
 
 /// Files above 50 blocks (of 512 or 1024 bytes, by the shell) cannot be written, as if the disk
