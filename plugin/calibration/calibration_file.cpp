@@ -12,6 +12,7 @@
 #include <system_error>
 #include <vector>
 
+#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/calibration/camchain.h"
@@ -43,7 +44,7 @@ std::string readText(const std::filesystem::path& file) {
   }
   std::ostringstream text;
   text << stream.rdbuf();
-  return text.str();
+  return std::string(withoutByteOrderMark(text.str()));
 }
 
 /// The first word outside comments; empty where there is none.
@@ -75,8 +76,8 @@ std::vector<double> readNumbers(const std::filesystem::path& file) {
   std::vector<double> numbers;
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    for (const std::string_view word :
-         splitWords(std::string_view(line).substr(0, line.find('#')))) {
+    const std::string_view content = number == 1 ? withoutByteOrderMark(line) : line;
+    for (const std::string_view word : splitWords(content.substr(0, content.find('#')))) {
       const std::optional<double> value = parseFinite(word);
       if (!value) {
         throw std::runtime_error(fmt::format("{}:{}: {}: expected a finite number", file.string(),

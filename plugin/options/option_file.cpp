@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/nearest_name.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
@@ -97,10 +98,7 @@ void OptionReader::readText(std::string_view text, const std::string& name) {
 }
 
 void OptionReader::readLines(std::string_view text, const OptionOrigin& file) {
-  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";  // some editors begin files with it
-  if (text.substr(0, kByteOrderMark.size()) == kByteOrderMark) {
-    text.remove_prefix(kByteOrderMark.size());
-  }
+  text = withoutByteOrderMark(text);
   std::map<std::pair<std::string, std::string>, int> lines;  // of this text
   std::string section;
   for (int number = 1; !text.empty(); ++number) {

@@ -3,9 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
-
-#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
@@ -23,8 +22,8 @@ struct ColumnValues {
   bool has_minus_one = false;
   bool has_others = false;
 
-  void add(std::string_view text, double value) {
-    whole = whole && text.find_first_of(".eE") == std::string_view::npos;
+  void add(double value) {
+    whole = whole && std::floor(value) == value;
     min = std::min(min, value);
     max = std::max(max, value);
     max_drop = std::max(max_drop, max - value);
@@ -46,12 +45,9 @@ using AllValues = std::array<ColumnValues, kColumns>;
 /// @return the number of rows.
 std::size_t addRows(const EventRows& rows, AllValues& columns) {
   std::size_t count = 0;
-  for (const std::vector<std::string_view>& row : rows) {
+  for (const std::vector<double>& row : rows) {
     if (row.size() != kColumns) continue;
-    std::array<std::optional<double>, kColumns> numbers;
-    std::transform(row.begin(), row.end(), numbers.begin(), parseFinite);
-    if (std::find(numbers.begin(), numbers.end(), std::nullopt) != numbers.end()) continue;
-    for (std::size_t k = 0; k < kColumns; ++k) columns[k].add(row[k], *numbers[k]);
+    for (std::size_t k = 0; k < kColumns; ++k) columns[k].add(row[k]);
     ++count;
   }
   return count;

@@ -3,13 +3,12 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace efm {
 
-/// The fields of some lines of events.
-using EventRows = std::vector<std::vector<std::string_view>>;
+/// The numbers of some events, a number per column.
+using EventRows = std::vector<std::vector<double>>;
 
 /// An order of the columns t, x, y and p, a letter per column.
 struct ColumnOrder {
@@ -22,7 +21,7 @@ struct ColumnOrder {
 /// The order of four columns as their values show it: times rise, the polarity has the values 0 and
 /// 1 or -1 and 1, pixels are whole numbers that come and go. An order that is expected and possible
 /// comes before all others.
-/// @param rows of which those without four fields are ignored.
+/// @param rows of which those without four numbers are ignored.
 /// @return nothing where the values show no order, or several.
 std::optional<ColumnOrder> orderOfValues(const EventRows& rows, const std::string& expected);
 

@@ -4,18 +4,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
-#include "plugin/streams/time_unit.h"
-#include "plugin/text/column_order.h"
+#include "plugin/text/pose_text.h"
 
 namespace efm {
 namespace {
 
 constexpr std::size_t kSampledLines = 5000;
+constexpr const char* kExpectedNames = "t=NAME x=NAME y=NAME p=NAME, each once";
 
 std::string_view takeTextLine(std::string_view& text) {
   const std::size_t end = std::min(text.find('\n'), text.size());
@@ -24,9 +26,10 @@ std::string_view takeTextLine(std::string_view& text) {
   return line;
 }
 
+/// With semicolons, commas are decimal ones.
 char separatorOf(std::string_view line) {
-  const std::size_t found = line.find_first_of(",;");
-  return found == std::string_view::npos ? ' ' : line[found];
+  if (line.find(';') != std::string_view::npos) return ';';
+  return line.find(',') != std::string_view::npos ? ',' : ' ';
 }
 
 bool hasNumber(const std::vector<std::string_view>& fields) {
@@ -34,29 +37,14 @@ bool hasNumber(const std::vector<std::string_view>& fields) {
                      [](std::string_view field) { return parseNumber<double>(field).has_value(); });
 }
 
-char columnOf(const HeaderWord& word) {
-  constexpr struct {
-    char column;
-    std::string_view names;  // between blanks
-  } kNames[] = {{'x',
-                 " x u col column x_pos pos_x xpos posx x_px px_x pixel_x x_pixel x_coord coord_x "
-                 "x_coordinate x_addr "},
-                {'y',
-                 " y v row y_pos pos_y ypos posy y_px px_y pixel_y y_pixel y_coord coord_y "
-                 "y_coordinate y_addr "},
-                {'p', " p pol pols polarity polarities on on_off sign "}};
-  if (word.isTime()) return 't';
-  for (const auto& [column, names] : kNames) {
-    const std::string name = " " + word.name + " ";
-    if (names.find(name) != std::string_view::npos) return column;
-  }
-  return '-';
-}
-
 bool isComplete(const std::string& order) {
   return std::all_of(std::begin("txyp"), std::end("txyp") - 1, [&](char column) {
     return std::count(order.begin(), order.end(), column) == 1;
   });
+}
+
+bool isComment(std::string_view line) {
+  return !line.empty() && (line.front() == '#' || line.front() == '%');
 }
 
 /// The lines before the first event.
@@ -68,12 +56,12 @@ struct Header {
 /// Takes order and unit from a line of names; leaves both where it names no event.
 /// @return whether it does.
 bool takeNames(std::string_view line, EventColumns& columns) {
-  if (!line.empty() && line.front() == '#') line = trimmed(line.substr(1));
+  if (isComment(line)) line = trimmed(line.substr(1));
   std::string order;
   std::optional<int> exponent;
   for (const std::string_view field : eventFields(line, separatorOf(line))) {
     const HeaderWord word = headerWord(field);
-    order += columnOf(word);
+    order += eventColumnOf(word);
     if (order.back() == 't') exponent = word.time_exponent;
   }
   if (!isComplete(order)) return false;
@@ -105,7 +93,7 @@ std::string_view takeHeader(std::string_view text, EventColumns& columns, Header
     const std::string_view rest = text;
     const std::string_view line = takeTextLine(text);
     ++lines;
-    const bool comment = !line.empty() && line.front() == '#';
+    const bool comment = isComment(line);
     const std::vector<std::string_view> fields = eventFields(line, separatorOf(line));
     if (line.empty()) continue;
     const std::optional<CameraSize> size = comment ? std::nullopt : sizeIn(fields);
@@ -122,49 +110,45 @@ std::string_view takeHeader(std::string_view text, EventColumns& columns, Header
   return {};
 }
 
-std::string asWords(const std::string& order) {
-  std::string words;
-  for (const char column : order) words += (words.empty() ? "" : " ") + std::string(1, column);
-  return words;
+std::string asWords(const std::string& order) { return fmt::format("{}", fmt::join(order, " ")); }
+
+/// The fields of some lines.
+using TextRows = std::vector<std::vector<std::string_view>>;
+
+std::optional<double> numberOf(std::string_view text) {
+  if (const auto number = parseFinite(text)) return number;
+  return polarityOf(text);
 }
 
-/// @throws std::runtime_error where the values show another order than the usual one, but not
-/// surely.
-void takeOrderOfValues(const EventRows& rows, const Header& header, const std::string& file,
-                       EventColumns& columns) {
-  const std::optional<ColumnOrder> found = orderOfValues(rows, columns.order);
-  const bool usual = !found || found->order == columns.order;
-  const std::string words = asWords(found ? found->order : columns.order);
-  if (!usual && !found->certain) {
-    throw std::runtime_error(
-        fmt::format("{}: by their values, the columns are probably {}: expected {}, a header with "
-                    "their names, or --event-columns \"{}\"",
-                    file, words, asWords(columns.order), words));
+/// The numbers of the lines that have no other fields.
+EventRows numbersOf(const TextRows& lines) {
+  EventRows rows;
+  for (const std::vector<std::string_view>& line : lines) {
+    std::vector<double> row;
+    for (const std::string_view field : line) {
+      const std::optional<double> number = numberOf(field);
+      if (number) row.push_back(*number);
+    }
+    if (row.size() == line.size()) rows.push_back(std::move(row));
   }
-  if (found) columns.order = found->order;
-  const bool misread = !header.not_understood.empty() && !rows.empty() &&
-                       rows.front().size() == columns.order.size();
-  if (usual && !misread) return;
-  columns.warnings.push_back(
-      {"event-columns",
-       misread ? fmt::format("{}: the header {} is not understood: the columns are read as {} "
-                             "(--event-columns \"{}\")",
-                             file, inQuotes(header.not_understood), words, words)
-               : fmt::format("{}: by their values, the columns are {} (--event-columns \"{}\")",
-                             file, words, words)});
+  return rows;
 }
 
-/// @throws std::runtime_error where the values show another order than that of the option.
-void refuseOtherOrder(const EventRows& rows, const std::string& option, const std::string& file,
-                      const std::string& order) {
-  const std::optional<ColumnOrder> found = orderOfValues(rows, order);
-  if (!found || !found->certain || found->order == order) return;
-  throw std::runtime_error(
-      fmt::format("--event-columns {}: the columns of {} are {} by their values", inQuotes(option),
-                  file, asWords(found->order)));
+/// Says that a header is not understood, where its columns are as many as those of the lines.
+void warnOfHeader(const TextRows& rows, const Header& header, const std::string& file,
+                  EventColumns& columns) {
+  if (header.not_understood.empty() || rows.empty() ||
+      rows.front().size() != columns.order.size()) {
+    return;
+  }
+  const std::string words = asWords(columns.order);
+  columns.warnings = {
+      {"event-columns", fmt::format("{}: the header {} is not understood: the columns are read as "
+                                    "{} (--event-columns \"{}\")",
+                                    file, inQuotes(header.not_understood), words, words)}};
 }
 
-TimeSample timesIn(const EventRows& rows, const EventColumns& columns) {
+TimeSample timesIn(const TextRows& rows, const EventColumns& columns) {
   const std::size_t t_column = columns.order.find('t');
   TimeSample sample;
   for (const std::vector<std::string_view>& row : rows) {
@@ -174,6 +158,44 @@ TimeSample timesIn(const EventRows& rows, const EventColumns& columns) {
     if (t) sample.add(*t, text.find_first_of(".eE") == std::string_view::npos);
   }
   return sample;
+}
+
+/// The first line with numbers.
+struct FirstEvent {
+  std::uint64_t line = 0;
+  std::string_view text;
+  std::vector<std::string_view> fields;
+  std::string order;  // of a header, else the usual one
+};
+
+std::optional<FirstEvent> firstEventOf(std::string_view beginning) {
+  if (beginning.find('\0') != std::string_view::npos) return std::nullopt;
+  EventColumns columns;
+  Header ignored;
+  std::string_view rest = takeHeader(beginning, columns, ignored);
+  FirstEvent first;
+  if (rest.empty()) return std::nullopt;
+  const std::string_view before = beginning.substr(0, beginning.size() - rest.size());
+  first.line = 1 + static_cast<std::uint64_t>(std::count(before.begin(), before.end(), '\n'));
+  first.text = takeTextLine(rest);
+  first.fields = eventFields(first.text, separatorOf(first.text));
+  first.order = columns.order;
+  return first;
+}
+
+/// Whether the numbers between blanks or semicolons are such with a comma for a point.
+bool hasDecimalCommas(std::string_view line) {
+  const std::vector<std::string_view> fields = splitWords(line, " \t;");
+  bool any = false;
+  for (const std::string_view field : fields) {
+    std::string number(field);
+    const std::size_t comma = number.find(',');
+    const bool decimal = comma != std::string::npos && comma + 1 < number.size();
+    if (decimal) number[comma] = '.';
+    any = any || decimal;
+    if (!numberOf(number)) return false;
+  }
+  return any && fields.size() >= 4;
 }
 
 }  // namespace
@@ -197,17 +219,15 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
   columns.time_exponent = kUnknown;
   Header header;
   std::string_view rest = takeHeader(beginning, columns, header);
-  EventRows rows;
+  TextRows rows;
   for (std::size_t k = 0; k < kSampledLines && !rest.empty(); ++k) {
     const std::string_view line = takeTextLine(rest);
     if (k == 0) columns.separator = separatorOf(line);
     rows.push_back(eventFields(line.substr(0, line.find('#')), columns.separator));
   }
-  if (!options.columns.empty()) {
-    columns.order = orderOfOption(options.columns);
-    refuseOtherOrder(rows, options.columns, file, columns.order);
-  } else if (!header.named) {
-    takeOrderOfValues(rows, header, file, columns);
+  if (!options.columns.empty() || !header.named) {
+    columns.order = findColumnOrder(numbersOf(rows), options, file, columns.warnings);
+    if (options.columns.empty()) warnOfHeader(rows, header, file, columns);
   }
   if (!options.time_unit.empty()) columns.time_exponent = *timeExponentOf(options.time_unit);
   if (columns.time_exponent == kUnknown) {
@@ -218,19 +238,128 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
   return columns;
 }
 
-bool looksLikeEventLines(std::string_view beginning) {
-  if (beginning.find('\0') != std::string_view::npos) return false;
-  EventColumns columns;
-  Header ignored;
-  std::string_view rest = takeHeader(beginning, columns, ignored);
-  if (rest.empty()) return false;
-  const std::string_view line = takeTextLine(rest);
-  const std::vector<std::string_view> fields = eventFields(line, separatorOf(line));
-  const bool numbers = std::all_of(fields.begin(), fields.end(), [](std::string_view field) {
-    return parseFinite(field).has_value();
-  });
-  return numbers && fields.size() >= 4 && fields.size() != 8 &&
-         (fields.size() == 4 || columns.order.size() == fields.size());
+bool looksLikeEventLines(std::string_view beginning, const std::string& option) {
+  const std::optional<FirstEvent> first = firstEventOf(beginning);
+  if (!first) return false;
+  const std::size_t count = first->fields.size();
+  std::string order = first->order;
+  if (!option.empty() && option.find('=') == std::string::npos) {
+    order = orderOfOption(option);
+  } else if (count == 4 && order.size() != 4) {
+    order = "txyp";
+  } else if (count == 8) {
+    return false;  // a pose
+  }
+  if (count != order.size()) return false;
+  for (std::size_t k = 0; k < count; ++k) {
+    if ((order[k] != '-' || option.empty()) && !numberOf(first->fields[k])) return false;
+  }
+  return true;
+}
+
+std::optional<std::string> whyNoEventLines(std::string_view beginning) {
+  const std::optional<FirstEvent> first = firstEventOf(beginning);
+  if (!first) return std::nullopt;
+  const auto why = [&](const std::string& what) {
+    return fmt::format("{}: {}: {}", first->line, inQuotes(first->text), what);
+  };
+  if (hasDecimalCommas(first->text)) {
+    return why("decimal commas: expected decimal points (tr , . <FILE >NEW)");
+  }
+  const std::size_t count = first->fields.size();
+  if (count == 12) return why(kPosesWithoutTimes);
+  if (count != first->order.size()) {
+    return why(fmt::format(
+        "expected {} fields, {}, not {} (other columns: --event-columns, - for one to ignore)",
+        first->order.size(), asWords(first->order), count));
+  }
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::string_view field = first->fields[k];
+    if (numberOf(field)) continue;
+    return why(fmt::format("{} = {}: expected {}", first->order[k], inQuotes(field),
+                           first->order[k] == 'p' ? kExpectedPolarity : "a number"));
+  }
+  return std::nullopt;
+}
+
+std::optional<int> polarityOf(std::string_view text) {
+  if (const auto number = parseFinite(text)) {
+    const bool is_polarity = *number == 0 ? text.front() == '0' : std::abs(*number) == 1;
+    const bool has_zeros = text.size() > 1 && text[0] == '0' && text[1] != '.';
+    return is_polarity && !has_zeros ? std::optional(static_cast<int>(*number)) : std::nullopt;
+  }
+  std::string small;
+  for (const char c : text) small += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (small == "true" || small == "on") return 1;
+  if (small == "false" || small == "off") return 0;
+  return std::nullopt;
+}
+
+char eventColumnOf(const HeaderWord& word) {
+  constexpr struct {
+    char column;
+    std::string_view names;  // between blanks
+  } kNames[] = {
+      {'x',
+       " x xs u col column x_pos pos_x xpos posx x_px px_x pixel_x x_pixel x_coord coord_x "
+       "x_coordinate x_addr "},
+      {'y',
+       " y ys v row y_pos pos_y ypos posy y_px px_y pixel_y y_pixel y_coord coord_y "
+       "y_coordinate y_addr "},
+      {'p', " p ps pol pols polarity polarities on on_off sign "}};
+  if (word.isTime()) return 't';
+  for (const auto& [column, names] : kNames) {
+    const std::string name = " " + word.name + " ";
+    if (names.find(name) != std::string_view::npos) return column;
+  }
+  return '-';
+}
+
+std::string findColumnOrder(const EventRows& rows, const ReaderOptions& options,
+                            const std::string& file, std::vector<Warning>& warnings) {
+  if (!options.columns.empty()) {
+    const std::string order = orderOfOption(options.columns);
+    const std::optional<ColumnOrder> found = orderOfValues(rows, order);
+    if (!found || !found->certain || found->order == order) return order;
+    throw std::runtime_error(
+        fmt::format("--event-columns {}: the columns of {} are {} by their values",
+                    inQuotes(options.columns), file, asWords(found->order)));
+  }
+  const std::string usual = EventColumns().order;
+  const std::optional<ColumnOrder> found = orderOfValues(rows, usual);
+  if (!found || found->order == usual) return usual;
+  const std::string words = asWords(found->order);
+  if (!found->certain) {
+    throw std::runtime_error(
+        fmt::format("{}: by their values, the columns are probably {}: expected {}, a header with "
+                    "their names, or --event-columns \"{}\"",
+                    file, words, asWords(usual), words));
+  }
+  warnings.push_back(
+      {"event-columns", fmt::format("{}: by their values, the columns are {} (--event-columns "
+                                    "\"{}\")",
+                                    file, words, words)});
+  return found->order;
+}
+
+std::optional<EventNames> eventNamesOf(const std::string& option) {
+  if (option.find('=') == std::string::npos) return std::nullopt;
+  EventNames names;
+  for (const std::string_view word : splitWords(option, " ,")) {
+    std::string* const name = word.substr(0, 2) == "t="   ? &names.t
+                              : word.substr(0, 2) == "x=" ? &names.x
+                              : word.substr(0, 2) == "y=" ? &names.y
+                              : word.substr(0, 2) == "p=" ? &names.p
+                                                          : nullptr;
+    if (name == nullptr || !name->empty() || word.size() < 3) {
+      throw std::runtime_error(
+          fmt::format("--event-columns {}: expected {}", inQuotes(option), kExpectedNames));
+    }
+    *name = word.substr(2);
+  }
+  if (!names.t.empty() && !names.x.empty() && !names.y.empty() && !names.p.empty()) return names;
+  throw std::runtime_error(
+      fmt::format("--event-columns {}: expected {}", inQuotes(option), kExpectedNames));
 }
 
 }  // namespace efm

@@ -12,8 +12,10 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
+#include "plugin/streams/number_checks.h"
 #include "plugin/streams/source_files.h"
 
 namespace efm {
@@ -74,6 +76,14 @@ inline bool takeTime(const char*& text, int decimals_of_ns, Event& event) {
   return true;
 }
 
+/// Moves `text` behind a point and zeros: 96.0 is a pixel.
+inline void takeZeroDecimals(const char*& text) {
+  if (*text != '.') return;
+  do {
+    ++text;
+  } while (*text == '0');
+}
+
 inline bool takePixel(const char*& text, std::uint16_t& pixel) {
   constexpr int kMaxPixelDigits = 5;
   const Digits digits = takeDigits(text);
@@ -82,6 +92,7 @@ inline bool takePixel(const char*& text, std::uint16_t& pixel) {
     return false;
   }
   pixel = static_cast<std::uint16_t>(digits.value);
+  takeZeroDecimals(text);
   return true;
 }
 
@@ -91,6 +102,7 @@ inline bool takePolarity(const char*& text, bool& polarity) {
   polarity = *text == '1' && !negative;
   if (*text != '1' && (*text != '0' || negative)) return false;
   ++text;
+  takeZeroDecimals(text);
   return true;
 }
 
@@ -113,7 +125,7 @@ EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions
     : content_(std::move(file)), block_(kFirstBytes) {
   carried_ = content_.read(block_.data(), kFirstBytes);
   ended_ = carried_ < kFirstBytes;
-  const std::string_view first(block_.data(), carried_);
+  const std::string_view first = withoutByteOrderMark({block_.data(), carried_});
   columns_ = findEventColumns(wholeLines(first, ended_), options, name());
   usual_ = columns_.isUsual();
 }
@@ -131,7 +143,8 @@ bool EventTextStream::read(std::vector<Event>& events) {
     carried_ += count;
   }
 
-  const std::string_view text(block_.data(), carried_);
+  std::string_view text(block_.data(), carried_);
+  if (first_byte_ == 0 && line_ == 0) text = withoutByteOrderMark(text);
   const std::size_t newline = text.rfind('\n');
   const std::size_t whole = newline == std::string_view::npos ? 0 : newline + 1;
   takeLines(text.data(), text.data() + whole, events);
@@ -205,19 +218,17 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   const std::string_view content = line.substr(0, line.find('#'));
   const std::vector<std::string_view> fields = eventFields(trimmed(content), columns_.separator);
   if (fields.empty()) return std::nullopt;
-  std::string names;
-  for (const char column : columns_.order)
-    names += fmt::format("{}{}", names.empty() ? "" : " ", column);
+  const auto names = [&] { return fmt::join(columns_.order, " "); };
   const std::size_t count = columns_.order.size();
   if (fields.size() < count && unterminated) {
     throw std::runtime_error(fmt::format("{}: {}: expected {}, but the file ends within the line",
-                                         place(line_), inQuotes(content), names));
+                                         place(line_), inQuotes(content), names()));
   }
   if (fields.size() != count) {
     throw std::runtime_error(fmt::format(
         "{}: {}: expected {} fields, {}, not {} (other columns: --event-columns, - for one to "
         "ignore)",
-        place(line_), inQuotes(content), count, names, fields.size()));
+        place(line_), inQuotes(content), count, names(), fields.size()));
   }
 
   const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {
@@ -226,8 +237,9 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   };
   const auto field_of = [&](char column) { return fields[columns_.order.find(column)]; };
   const auto pixel_of = [&](const char* name) {
-    const std::optional<std::uint16_t> pixel = parseNumber<std::uint16_t>(field_of(name[0]));
-    if (pixel) return *pixel;
+    const std::optional<double> number = parseFinite(field_of(name[0]));
+    const auto pixel = number ? wholeNumber(*number, 0, 65'535) : std::nullopt;
+    if (pixel) return static_cast<std::uint16_t>(*pixel);
     throw fail(name, field_of(name[0]),
                "a whole number from 0 to 65535 (columns in another order: --event-columns)");
   };
@@ -241,12 +253,12 @@ std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unte
   event.t_ns = *t_ns;
   event.x = pixel_of("x");
   event.y = pixel_of("y");
-  const std::string_view polarity = field_of('p');
-  if (polarity != "0" && polarity != "1" && polarity != "-1") {
-    throw fail("p", polarity,
-               "polarity 0 or 1, or -1 or 1 (columns in another order: --event-columns)");
+  const std::optional<int> polarity = polarityOf(field_of('p'));
+  if (!polarity) {
+    throw fail("p", field_of('p'),
+               std::string(kExpectedPolarity) + " (columns in another order: --event-columns)");
   }
-  event.polarity = polarity == "1";
+  event.polarity = *polarity == 1;
   return event;
 }
 
@@ -323,14 +335,22 @@ std::string EventTextStream::place(std::uint64_t line) const {
   return fmt::format("{}: line {} after byte {}", name(), line, first_byte_);
 }
 
+std::string beginningOfText(const std::filesystem::path& file) {
+  constexpr std::size_t kBytes = 4096;
+  std::string bytes(kBytes, '\0');
+  FileContent content(file);
+  bytes.resize(content.read(bytes.data(), kBytes));
+  const std::string_view text = withoutByteOrderMark(bytes);
+  return std::string(wholeLines(text, bytes.size() < kBytes));
+}
+
 bool looksLikeEventText(const std::filesystem::path& file) {
-  if (!isFile(file)) return false;
+  return looksLikeEventText(file, ReaderOptions());
+}
+
+bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options) {
   try {
-    constexpr std::size_t kBytes = 4096;
-    std::array<char, kBytes> bytes{};
-    FileContent content(file);
-    const std::size_t count = content.read(bytes.data(), kBytes);
-    return looksLikeEventLines(wholeLines({bytes.data(), count}, count < kBytes));
+    return isFile(file) && looksLikeEventLines(beginningOfText(file), options.columns);
   } catch (const std::exception&) {
     return false;
   }

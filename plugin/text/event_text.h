@@ -17,8 +17,8 @@
 namespace efm {
 
 /// Events from text, also compressed, with a line per event: t x y p, or other columns
-/// (`findEventColumns`); exact decimal times, pixel, polarity 0 or -1 and 1. Blank lines, text
-/// after a `#`, repeated blanks, tabs and CRLF are ignored.
+/// (`findEventColumns`); exact decimal times, pixel (also as 96.0), polarity (`polarityOf`). Blank
+/// lines, text after a `#`, repeated blanks, tabs, CRLF and a byte order mark are ignored.
 class EventTextStream : public EventStream {
  public:
   /// @throws std::runtime_error if the file cannot be opened, or its columns are not clear.
@@ -62,6 +62,12 @@ class EventTextStream : public EventStream {
 
 /// Whether a file, which may be compressed, has lines of events. Never throws.
 bool looksLikeEventText(const std::filesystem::path& file);
+/// The same of the columns that an option names.
+bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options);
+
+/// The whole lines at the beginning of a text, which may be compressed.
+/// @throws std::runtime_error naming the file that cannot be read.
+std::string beginningOfText(const std::filesystem::path& file);
 
 /// A camera per file.
 /// @throws std::runtime_error as `EventTextStream`.

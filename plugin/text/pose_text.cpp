@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/streams/file_content.h"
@@ -165,6 +166,10 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
   TimeSample sample;
   for (std::size_t i = 0; i < std::min(lines.size(), kSample); ++i) {
     const std::vector<std::string_view> fields = poseFields(lines[i].text);
+    if (!columns.named && fields.size() == 12) {
+      throw std::runtime_error(
+          fmt::format("{}:{}: {}", file.string(), lines[i].number, kPosesWithoutTimes));
+    }
     if (fields.size() <= columns.column[0]) continue;
     const std::string_view t = fields[columns.column[0]];
     if (const auto value = parseFinite(t)) {
@@ -183,7 +188,7 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
   constexpr std::size_t kMaxBytes = 2'000'000'000;
   const std::string text = FileContent(file).readAll(kMaxBytes);
   PoseColumns columns;
-  const std::vector<PoseLine> lines = poseLines(text, columns, file.string());
+  const std::vector<PoseLine> lines = poseLines(withoutByteOrderMark(text), columns, file.string());
   const int exponent = exponentOf(lines, columns, file, options);
   std::vector<StampedPose> poses;
   poses.reserve(lines.size());

@@ -9,6 +9,12 @@
 
 namespace efm {
 
+/// What is said of a line of 12 numbers: KITTI's poses are the first three rows of a matrix.
+inline constexpr const char* kPosesWithoutTimes =
+    "12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz qx qy qz qw, or "
+    "a "
+    ".npz file with N times and N x 4 x 4 matrices";
+
 /// Reads text, also compressed, with a line per pose T_world_body:
 ///   t tx ty tz qx qy qz qw    decimal seconds, metres: the format of the TUM RGB-D benchmark;
 ///   columns in any order      if a header names them: EuRoC's CSV (#timestamp [ns], p_RS_R_x [m],

@@ -13,6 +13,7 @@
 
 #include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 
@@ -84,8 +85,8 @@ std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::stri
   std::vector<StampedPose> poses;
   std::string line;
   for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    const std::vector<std::string_view> fields =
-        splitWords(std::string_view(line).substr(0, line.find('#')));
+    const std::string_view content = number == 1 ? withoutByteOrderMark(line) : line;
+    const std::vector<std::string_view> fields = splitWords(content.substr(0, content.find('#')));
     if (fields.empty()) continue;
     try {
       poses.push_back(parseTumPose(fields));

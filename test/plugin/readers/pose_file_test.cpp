@@ -67,6 +67,9 @@ TEST_F(PoseFile, TextHasTheColumnsOfTheTumBenchmarkOrOfItsHeader) {
       {"blank_unit.txt",
        "# time [ms] x y z qx qy qz qw\n7 1 2 3 .5 .5 .5 .5\n8.5 4 5 6 0.8 0 0 0.6\n", 7'000'000,
        8'500'000},
+      {"mark.txt", std::string("\xEF\xBB\xBF") + kTum, 1'000'000'001, 1'700'000'000'123'456'789},
+      {"mark.csv", "\xEF\xBB\xBFt_ns,x,y,z,qx,qy,qz,qw\n5,1,2,3,.5,.5,.5,.5\n7,4,5,6,.8,0,0,.6\n",
+       5, 7},
       {"data.csv",
        "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], "
        "q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\r\n"
@@ -175,6 +178,8 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"a.txt", "# x\n1.5 1 2 3 0 0 0 2\n", "a.txt:2: qx qy qz qw = '0 0 0 2', of length 2"},
       {"a.txt", "1.5 1 2 3 0 0 0 1\nabc 1 2 3 0 0 0 1\n", "a.txt:2: 'abc 1 2 3 0 0 0 1': expected"},
       {"a.txt", "1.5,1,2,3,0,0,0,1\n", "a.txt:1: commas without a header"},
+      {"a.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 9 0 1 0 0 0 0 1 0\n",
+       "a.txt:1: 12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz"},
       {"a.csv", "#t [us], tx, ty, tz, qx, qy, qz\n", "there is no column qw"},
       {"a.csv", "t_us,x [ft],y [ft],z [ft],qx,qy,qz,qw\n",
        "a.csv:1: the unit 'ft' of tx: expected"},

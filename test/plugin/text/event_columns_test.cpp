@@ -63,13 +63,26 @@ TEST_F(EventColumnsText, OrderUnitAndPolarityAreThoseOfTheHeaderOrTheOptions) {
       {"1000 12 34 1\n2001 239 0 0\n", "", "us"},
       {"1000000\t12  34 1\n2001000 239 0 0 # late\n", "", "ns"},
       {"1.0 12 34 1\n2.001 239 0 0", "", "ms"},
+      {"\xEF\xBB\xBF"
+       "0.001 12 34 1\n0.002001 239 0 -1\n",
+       "", ""},
+      {"\xEF\xBB\xBFt;x;y;p\n0.001;12;34;1\n0.002001;239;0;0\n", "", ""},
+      {"% t x y p\n0.001 12 34 1\n0.002001 239 0 0\n", "", ""},
+      {"0.001 12.0 34. 1.00\n0.002001 239 0.0 0.0\n", "", ""},
+      {"1e-3 1.2e+01 34 1e0\n2.001e-03 2.39e2 0e+00 -1.0\n", "", ""},
+      {"0.001 12 34 True\n0.002001 239 0 false\n", "", ""},
+      {"0.001,12,34,ON\n0.002001,239,0,Off\n", "", ""},
+      {"12 34 1 0.001 left\n239 0 0 0.002001 left\n", "x y p t -", ""},
+      {",x,y,polarity,ts\n0,12,34,True,0.001\n1,239,0,False,0.002001\n", "", ""},
       {"x_pos,y_pos,polarity,time_us\n12,34,1,1000\n239,0,0,2001\n", "", ""},
       {"row,col,on_off,microseconds\n34,12,1,1000\n0,239,0,2001\n", "", ""},
       {"Timestamp(us) U V Sign\n1000 12 34 1\n2001 239 0 -1\n", "", ""},
       {"time [milliseconds];y;x;p\n1;34;12;1\n2.001;0;239;0\n", "", ""},
   };
   for (const auto& row : rows) {
-    EventTextStream stream(write(row.text), ReaderOptions{{}, row.columns, row.time_unit});
+    const ReaderOptions options{{}, row.columns, row.time_unit};
+    EventTextStream stream(write(row.text), options);
+    EXPECT_TRUE(looksLikeEventText(folder() / "e.txt", options)) << row.text;
     const std::vector<Event> events = allEventsOf(stream);
     EXPECT_TRUE(events == expected) << row.text << events.size();
   }

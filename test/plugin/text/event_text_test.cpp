@@ -120,6 +120,9 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
       {"nan 1 2 0\n", 1, {"t = 'nan': expected a time"}},
       {"99999999999 1 2 0\n", 1, {"t = '99999999999': expected a time"}},
       {"0.1 1.5 2 0\n", 1, {"x = '1.5': expected a whole number"}},
+      {"0.1 96.0 2 0\n0.2 96.5 2 0\n", 2, {"x = '96.5': expected a whole number"}},
+      {"0.1 96.000001 2 0\n", 1, {"x = '96.000001': expected a whole number"}},
+      {"0.1 1 2 0.5\n", 1, {"p = '0.5': expected polarity"}},
       {"0.1 1 0x2 0\n", 1, {"y = '0x2': expected a whole number"}},
       {"0.1 1 2 0\n0.1 240 2 0\n", 2, {"x = '240': expected", "0 to 239", "240x180"}},
       {"0.1 1 180 0\n", 1, {"y = '180': expected", "0 to 179", "240x180"}},
@@ -130,7 +133,7 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
       {"0.1 1 2 -0\n", 1, {"p = '-0'", "expected polarity 0 or 1"}},
       {"0.1 1 2 01\n", 1, {"p = '01'", "expected polarity 0 or 1"}},
       {"0.1 1 2 10\n", 1, {"p = '10'", "expected polarity 0 or 1"}},
-      {"0.1 1 2 true\n", 1, {"p = 'true'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 up\n", 1, {"p = 'up'", "expected polarity 0 or 1, or -1 or 1, or True or False"}},
       {"0.020 1 0 0\n0.009999999 2 0 0\n",
        2,
        {"t = '0.009999999': expected", "at most 10 ms", "0.020000000"}}};
