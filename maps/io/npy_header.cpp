@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/io/npy_header.h"
 
+#include <algorithm>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -51,7 +52,13 @@ std::string_view npyValueOf(std::string_view dictionary, const std::string& key)
   return trimmed(dictionary.substr(colon + 1));
 }
 
-void setNpyType(std::string_view descr, NpyHeader& header) {
+struct NpyType {
+  NumberType type;
+  bool big_endian;
+};
+
+/// The type of "<f4"; nothing where it is no number.
+std::optional<NpyType> npyTypeOf(std::string_view descr) {
   constexpr struct {
     std::string_view name;
     NumberType type;
@@ -61,23 +68,154 @@ void setNpyType(std::string_view descr, NpyHeader& header) {
       {"u4", NumberType::kUint32},  {"i8", NumberType::kInt64},   {"u8", NumberType::kUint64},
       {"f4", NumberType::kFloat32}, {"f8", NumberType::kFloat64},
   };
-  if (descr.size() >= 5 && descr[0] == '\'' && descr[4] == '\'') {
-    const char order = descr[1];
-    for (const auto& [name, type] : kTypes) {
-      if (descr.substr(2, 2) != name) continue;
-      if (order != '<' && order != '>' && !(order == '|' && sizeOf(type) == 1)) break;
-      header.descr = descr.substr(1, 3);
-      header.type = type;
-      header.big_endian = order == '>';
-      return;
-    }
+  if (descr.size() != 3) return std::nullopt;
+  const char order = descr[0];
+  for (const auto& [name, type] : kTypes) {
+    if (descr.substr(1) != name) continue;
+    if (order != '<' && order != '>' && !(order == '|' && sizeOf(type) == 1)) break;
+    return NpyType{type, order == '>'};
   }
-  throw wrongNpyHeader("descr = " + inQuotes(descr.substr(0, descr.find(','))) +
-                       (descr.substr(0, 3) == "'|O" ? ", Python objects" : "") +
-                       ": expected numbers ('<f4', '<f8', '|u1', '<u2', '<i8')");
+  return std::nullopt;
 }
 
-std::vector<std::uint64_t> npyShapeOf(std::string_view text) {
+std::runtime_error wrongNpyType(std::string_view descr) {
+  return wrongNpyHeader("descr = " + inQuotes(descr.substr(0, descr.find(','))) +
+                        (descr.substr(0, 3) == "'|O" ? ", Python objects" : "") +
+                        ": expected numbers ('<f4', '<f8', '|u1', '<u2', '<i8')");
+}
+
+constexpr std::size_t kMaxElementBytes = 65'536;
+
+/// Parses the list of fields of a structured type: [('x', '<u2'), ('', '|V2'), ('p', '|i1', (3,))].
+/// The fields of structures and arrays within have no use: their bytes are counted.
+class NpyFieldParser {
+ public:
+  explicit NpyFieldParser(std::string_view text) : text_(text), all_(text) {}
+
+  void parse(NpyHeader& header) {
+    header.element_bytes = list(&header.fields, 0);
+    header.structured = true;
+    if (header.element_bytes == 0) throw fail();
+  }
+
+ private:
+  /// @param fields where the numbers are added; null: nowhere.
+  /// @return the bytes of all fields.
+  std::size_t list(std::vector<NpyField>* fields, int depth) {
+    constexpr int kMaxDepth = 8;
+    if (depth > kMaxDepth) throw fail();
+    std::size_t bytes = 0;
+    take('[');
+    while (!takes(']')) {
+      take('(');
+      NpyField field;
+      field.name = name();
+      field.offset = bytes;
+      take(',');
+      std::size_t size = 0;
+      bool is_number = false;
+      if (next() == '[') {
+        size = list(nullptr, depth + 1);
+      } else {
+        const std::string_view type = quoted();
+        const std::optional<NpyType> number = npyTypeOf(type);
+        is_number = number.has_value();
+        if (number) field.type = number->type;
+        if (number) field.big_endian = number->big_endian;
+        size = number ? sizeOf(number->type) : bytesOf(type);
+      }
+      std::size_t count = 1;
+      if (takes(',') && next() != ')') count = arraySize();
+      take(')');
+      if (count > kMaxElementBytes || size * count > kMaxElementBytes - bytes) throw fail();
+      bytes += size * count;
+      if (is_number && count == 1 && fields != nullptr) fields->push_back(std::move(field));
+      if (!takes(',') && next() != ']') throw fail();
+    }
+    return bytes;
+  }
+
+  /// A name, or a title and a name in brackets.
+  std::string name() {
+    if (!takes('(')) return std::string(quoted());
+    quoted();
+    take(',');
+    const std::string_view text = quoted();
+    takes(',');
+    take(')');
+    return std::string(text);
+  }
+
+  std::string_view quoted() {
+    const char quote = next();
+    if (quote != '\'' && quote != '"') throw fail();
+    const std::size_t end = text_.find(quote, 1);
+    if (end == std::string_view::npos) throw fail();
+    const std::string_view text = text_.substr(1, end - 1);
+    text_.remove_prefix(end + 1);
+    return text;
+  }
+
+  /// The bytes of a type that is no number: "|V4", "<U8", "<M8[us]".
+  std::size_t bytesOf(std::string_view type) const {
+    if (type.size() < 3 || type[1] == 'O') throw wrongNpyType("'" + std::string(type) + "'");
+    const auto bytes = parseNumber<std::size_t>(type.substr(2, type.find('[') - 2));
+    if (!bytes || *bytes > kMaxElementBytes) throw fail();
+    return *bytes * (type[1] == 'U' ? 4 : 1);
+  }
+
+  /// "3", or "(2, 3)".
+  std::size_t arraySize() {
+    const bool many = takes('(');
+    std::size_t size = 1;
+    do {
+      next();
+      std::size_t digits = 0;
+      while (digits < text_.size() && text_[digits] >= '0' && text_[digits] <= '9') ++digits;
+      const auto side = parseNumber<std::size_t>(text_.substr(0, digits));
+      if (!side || *side > kMaxElementBytes) throw fail();
+      text_.remove_prefix(digits);
+      size = std::min(size * *side, kMaxElementBytes + 1);
+    } while (many && takes(',') && next() != ')');
+    if (many) take(')');
+    return size;
+  }
+
+  /// The next character behind blanks.
+  char next() {
+    while (!text_.empty() && text_.front() == ' ') text_.remove_prefix(1);
+    if (text_.empty()) throw fail();
+    return text_.front();
+  }
+  bool takes(char character) {
+    if (next() != character) return false;
+    text_.remove_prefix(1);
+    return true;
+  }
+  void take(char character) {
+    if (!takes(character)) throw fail();
+  }
+  std::runtime_error fail() const {
+    return wrongNpyHeader("descr = " + inQuotes(all_.substr(0, 60)) +
+                          ": expected a list of fields, of at most 64 KiB in all");
+  }
+
+  std::string_view text_;
+  std::string_view all_;
+};
+
+void setNpyType(std::string_view descr, NpyHeader& header) {
+  if (!descr.empty() && descr.front() == '[') return NpyFieldParser(descr).parse(header);
+  const std::size_t end = descr.empty() ? descr.npos : descr.find(descr.front(), 1);
+  const auto type = end == descr.npos ? std::nullopt : npyTypeOf(descr.substr(1, end - 1));
+  if (!type || descr.front() != '\'') throw wrongNpyType(descr);
+  header.descr = descr.substr(1, end - 1);
+  header.type = type->type;
+  header.big_endian = type->big_endian;
+  header.element_bytes = sizeOf(type->type);
+}
+
+std::vector<std::uint64_t> npyShapeOf(std::string_view text, std::size_t element_bytes) {
   const std::size_t end = text.find(')');
   const auto refuse = [&] {
     return wrongNpyHeader(
@@ -87,7 +225,7 @@ std::vector<std::uint64_t> npyShapeOf(std::string_view text) {
   if (text.empty() || text.front() != '(' || end == std::string_view::npos) throw refuse();
   constexpr std::uint64_t kMaxCount = std::uint64_t{1} << 53;
   std::vector<std::uint64_t> shape;
-  std::uint64_t count = 1;
+  std::uint64_t count = std::max<std::size_t>(1, element_bytes / 8);  // of 8 bytes
   for (const std::string_view word : splitWords(text.substr(1, end - 1), " ,")) {
     const std::optional<std::uint64_t> size = parseNumber<std::uint64_t>(word);
     if (!size || *size > kMaxCount || (*size > 0 && count > kMaxCount / *size)) throw refuse();
@@ -112,13 +250,18 @@ NpyHeader parseNpyHeader(std::string_view bytes) {
   NpyHeader header;
   header.data_begin = dictionary.data_begin;
   setNpyType(npyValueOf(dictionary.text, "descr"), header);
-  const std::string_view order = npyValueOf(dictionary.text, "fortran_order");
-  header.shape = npyShapeOf(npyValueOf(dictionary.text, "shape"));
-  if (order.substr(0, 5) != "False" && header.shape.size() > 1) {
-    throw wrongNpyHeader("fortran_order = " + inQuotes(order.substr(0, order.find(','))) +
-                         ": expected False, rows one after the other");
-  }
+  header.fortran_order = npyValueOf(dictionary.text, "fortran_order").substr(0, 5) != "False";
+  header.shape = npyShapeOf(npyValueOf(dictionary.text, "shape"), header.element_bytes);
   return header;
+}
+
+void requirePlainRows(const NpyHeader& header) {
+  if (header.structured) {
+    throw wrongNpyHeader("a structured array: expected numbers ('<f4', '<f8', '|u1', '<u2')");
+  }
+  if (header.fortran_order && header.shape.size() > 1) {
+    throw wrongNpyHeader("fortran_order = 'True': expected False, rows one after the other");
+  }
 }
 
 }  // namespace efm

@@ -11,25 +11,42 @@
 
 namespace efm {
 
+/// A number in each element of a structured array.
+struct NpyField {
+  std::string name;
+  NumberType type = NumberType::kFloat32;
+  bool big_endian = false;
+  std::size_t offset = 0;  ///< Bytes from the beginning of the element.
+};
+
 /// What precedes the numbers of a NumPy array (.npy; NEP 1, format 1.0 to 3.0).
 struct NpyHeader {
   std::string descr;                       ///< The type as the file has it: "<f4".
   NumberType type = NumberType::kFloat32;  ///< Booleans are kUint8.
   bool big_endian = false;
+  /// Of a structured array, the fields that are a number; `type` has no meaning then.
+  std::vector<NpyField> fields;
+  bool structured = false;
+  bool fortran_order = false;
+  std::size_t element_bytes = 0;
   std::vector<std::uint64_t> shape;  ///< Empty for a single number.
   std::size_t data_begin = 0;        ///< Bytes before the numbers.
 
-  std::uint64_t count() const;  ///< Of all numbers; at most 2^53.
-  std::uint64_t bytes() const { return count() * sizeOf(type); }
+  std::uint64_t count() const;                                     ///< Of all elements.
+  std::uint64_t bytes() const { return count() * element_bytes; }  ///< Below 2^60.
 };
 
 /// Whether these are the first bytes of a NumPy array.
 bool looksLikeNpy(std::string_view bytes);
 
-/// Parses the header of an array in C order.
+/// Parses the header of an array of numbers, or of structures with numbers.
 /// @param bytes the beginning of the file; 64 KiB contain any header of an array of numbers.
 /// @throws std::runtime_error "the array's header: …" naming the wrong part, its value and the
-/// expected one: no array, Fortran order, or something else than numbers, such as Python objects.
+/// expected one: no array, or something else than numbers, such as Python objects.
 NpyHeader parseNpyHeader(std::string_view bytes);
+
+/// @throws std::runtime_error as `parseNpyHeader`, for structures, and for rows that do not stand
+/// one after the other.
+void requirePlainRows(const NpyHeader& header);
 
 }  // namespace efm

@@ -29,6 +29,7 @@ cv::Size imageSizeOf(const NpyHeader& header) {
 
 cv::Mat1f parseNpy(std::string_view bytes) {
   const NpyHeader header = parseNpyHeader(bytes);
+  requirePlainRows(header);
   if (header.type != NumberType::kFloat32 && header.type != NumberType::kFloat64) {
     throw std::runtime_error(
         fmt::format("the array's header: descr = '{}': expected float32 or float64", header.descr));

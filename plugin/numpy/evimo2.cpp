@@ -4,16 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
-#include "plugin/numpy/npy_array.h"
-#include "plugin/streams/number_checks.h"
+#include "plugin/numpy/array_events.h"
 #include "plugin/streams/source_files.h"
-#include "plugin/streams/time_unit.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
@@ -21,7 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kEvimo2BlockRows = std::size_t{1} << 16;
 constexpr CameraSize kEvimo2Size = {640, 480};
 
 /// The data set's layout is CAMERA/CATEGORY/SUBCATEGORY/SEQUENCE.
@@ -82,115 +78,25 @@ CameraModel modelOf(const fs::path& info) {
   return model;
 }
 
-class Evimo2Events : public EventStream {
- public:
-  Evimo2Events(const fs::path& folder, const ReaderOptions& options)
-      : t_(folder / "dataset_events_t.npy"),
-        xy_(folder / "dataset_events_xy.npy"),
-        p_(folder / "dataset_events_p.npy"),
-        inverted_(isSamsung(folder)),
-        size_(sizeOfDepth(folder)) {
-    requireShape(t_, 1);
-    requireShape(xy_, 2);
-    requireShape(p_, 1);
-    if (!t_.isReal()) time_exponent_ = wholeTimeExponent(options);
-  }
-
-  bool read(std::vector<Event>& events) override {
-    events.clear();
-    begin_ = t_.position();
-    const std::size_t rows = t_.readRows(kEvimo2BlockRows);
-    if (rows == 0) return false;
-    xy_.readRows(kEvimo2BlockRows);
-    p_.readRows(kEvimo2BlockRows);
-    events.reserve(rows);
-    for (std::size_t row = 0; row < rows; ++row) events.push_back(eventAt(row));
-    return true;
-  }
-
-  void seek(std::int64_t t_ns) override {
-    // An event of t_ns or later is not before one that is more than 10 ms older.
-    const std::int64_t before_ns = t_ns - kMaxEventDelayNs;
-    std::uint64_t low = 0;
-    std::uint64_t high = t_.rows();
-    while (low < high) {
-      const std::uint64_t middle = low + (high - low) / 2;
-      t_.seek(middle);
-      t_.readRows(1);
-      const std::optional<std::int64_t> t = t_.time(0, 0, time_exponent_);
-      if (t && *t < before_ns) {
-        low = middle + 1;
-      } else {
-        high = middle;
-      }
-    }
-    for (NpyArray* array : {&t_, &xy_, &p_}) array->seek(low);
-  }
-
-  std::string positionOf(std::size_t index) const override {
-    return fmt::format("{}: row {}", t_.name(), begin_ + index);
-  }
-  std::string name() const override { return t_.name(); }
-  double progress() const override {
-    return t_.rows() == 0 ? 1 : static_cast<double>(t_.position()) / static_cast<double>(t_.rows());
-  }
-  std::optional<CameraSize> size() const override { return size_; }
-  std::vector<Warning> warnings() const override { return warnings_; }
-
- private:
-  void requireShape(const NpyArray& array, std::size_t columns) const {
-    if (array.rows() == t_.rows() && (array.columns() == columns || array.rows() == 0)) return;
+std::unique_ptr<EventStream> eventsOf(const fs::path& folder, const ReaderOptions& options) {
+  const auto t = std::make_shared<NpyArray>(folder / "dataset_events_t.npy");
+  const auto xy = std::make_shared<NpyArray>(folder / "dataset_events_xy.npy");
+  const auto p = std::make_shared<NpyArray>(folder / "dataset_events_p.npy");
+  const auto require_shape = [&](const NpyArray& array, std::size_t columns) {
+    if (array.rows() == t->rows() && (array.columns() == columns || array.rows() == 0)) return;
     throw std::runtime_error(fmt::format("{}: {} rows of {} numbers: expected {} of {}",
-                                         array.name(), array.rows(), array.columns(), t_.rows(),
+                                         array.name(), array.rows(), array.columns(), t->rows(),
                                          columns));
-  }
-
-  int wholeTimeExponent(const ReaderOptions& options) {
-    TimeSample sample;
-    const std::size_t rows = t_.readRows(1000);
-    for (std::size_t row = 0; row < rows; ++row) {
-      sample.add(t_.number(row), true);
-    }
-    t_.seek(0);
-    TimeUnit unit = findTimeUnit(options, sample, kUsualEventRate, t_.name());
-    if (unit.warning) warnings_.push_back(std::move(*unit.warning));
-    return unit.exponent;
-  }
-
-  Event eventAt(std::size_t row) const {
-    const std::optional<std::int64_t> t_ns = t_.time(row, 0, time_exponent_);
-    if (!t_ns) {
-      throw t_.failure(begin_ + row,
-                       fmt::format("t = {}: expected a time before the year 2116", t_.number(row)));
-    }
-    Event event;
-    event.t_ns = *t_ns;
-    event.x = pixel(row, 0, "x");
-    event.y = pixel(row, 1, "y");
-    const double polarity = p_.number(row);
-    if (polarity != 0 && polarity != 1) {
-      throw p_.failure(begin_ + row, fmt::format("p = {}: expected polarity 0 or 1", polarity));
-    }
-    event.polarity = (polarity == 1) != inverted_;
-    return event;
-  }
-
-  std::uint16_t pixel(std::size_t row, std::size_t column, const char* name) const {
-    const double value = xy_.number(row, column);
-    if (const auto pixel = wholeNumber(value, 0, 65'535)) return static_cast<std::uint16_t>(*pixel);
-    throw xy_.failure(begin_ + row,
-                      fmt::format("{} = {}: expected a whole number from 0 to 65535", name, value));
-  }
-
-  NpyArray t_;
-  NpyArray xy_;
-  NpyArray p_;
-  bool inverted_;
-  std::optional<CameraSize> size_;
-  int time_exponent_ = 0;
-  std::vector<Warning> warnings_;
-  std::uint64_t begin_ = 0;  // row of the block
-};
+  };
+  require_shape(*t, 1);
+  require_shape(*xy, 2);
+  require_shape(*p, 1);
+  NpyEventColumns columns = {{t, 0}, {xy, 0}, {xy, 1}, {p, 0}, {}, false, {}, {}};
+  if (t->isReal()) columns.time_exponent = 0;
+  columns.inverted = isSamsung(folder);
+  columns.size = sizeOfDepth(folder);
+  return std::make_unique<ArrayEvents>(std::move(columns), options);
+}
 
 }  // namespace
 
@@ -201,7 +107,7 @@ RecordingParts openEvimo2(const std::vector<fs::path>& folders, const ReaderOpti
   parts.default_size = kEvimo2Size;
   parts.expected_poses = "poses.txt, from dataset_info.npz (docs/recordings.md)";
   for (const fs::path& folder : folders) {
-    parts.cameras.push_back(std::make_unique<Evimo2Events>(folder, options));
+    parts.cameras.push_back(eventsOf(folder, options));
     if (parts.poses.empty() && isFile(folder / "poses.txt")) {
       parts.poses = readPosesFile(folder / "poses.txt");
     }

@@ -9,7 +9,7 @@
 namespace efm {
 
 /// EVIMO2 v2 (Burner et al., 2022) as NumPy arrays, a folder per camera and sequence:
-///   dataset_events_t.npy    N times in seconds, real; rounded to microseconds
+///   dataset_events_t.npy    N times in seconds, real
 ///   dataset_events_xy.npy   N x 2, pixel
 ///   dataset_events_p.npy    N polarities, 0 or 1; the Samsung camera's are the other way around
 ///   dataset_info.npz        K (3 x 3), D (k1 k2 p1 p2: radtan); `meta` is a pickled Python object

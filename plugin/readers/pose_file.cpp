@@ -3,13 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <array>
-#include <fstream>
 #include <stdexcept>
-#include <string_view>
+#include <string>
 #include <system_error>
 
-#include "maps/io/npy_header.h"
+#include "plugin/numpy/event_arrays.h"
 #include "plugin/readers/recording_formats.h"
 #include "plugin/readers/unread_formats.h"
 #include "plugin/streams/file_content.h"
@@ -28,17 +26,6 @@ std::string firstBytes(const fs::path& file) {
   FileContent content(file);
   bytes.resize(content.read(bytes.data(), kBytes));
   return bytes;
-}
-
-bool isNpz(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::array<char, 2> magic{};
-  stream.read(magic.data(), magic.size());
-  if (std::string_view(magic.data(), 2) != "PK") return false;
-  for (const std::string& member : membersOf(file)) {
-    if (fs::path(member).extension() != ".npy") return false;
-  }
-  return true;
 }
 
 void refuseUnread(const fs::path& file) {
@@ -67,9 +54,8 @@ std::vector<StampedPose> posesOfRecording(const fs::path& file, ReaderOptions op
 std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions& options) {
   std::error_code ignored;
   if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
-  if (isNpz(file)) return readPoseArrays(file, options);
+  if (looksLikeNumpy(file)) return readPoseArrays(file, options);
   const std::string start = firstBytes(file);
-  if (looksLikeNpy(start)) return readPoseArrays(file, options);
   if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
   refuseUnread(file);

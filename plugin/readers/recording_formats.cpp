@@ -6,6 +6,7 @@
 #include "plugin/bags/bag_recording.h"
 #include "plugin/hdf5/hdf5_files.h"
 #include "plugin/hdf5/hdf5_recording.h"
+#include "plugin/numpy/event_arrays.h"
 #include "plugin/numpy/evimo2.h"
 #include "plugin/sensors/aedat4.h"
 #include "plugin/sensors/prophesee_raw.h"
@@ -49,6 +50,7 @@ const std::vector<RecordingFormat>& readerFormats() {
       {"aedat4", "an AEDAT4 file", looksLikeAedat4, openAedat4},
       {"evimo2", "a folder of EVIMO2 (dataset_events_t.npy and others)", looksLikeEvimo2,
        openEvimo2},
+      {"numpy", "events in NumPy arrays (.npy, .npz)", looksLikeNumpy, openEventArrays},
       {"text", "a text file with a line t x y p per event, also compressed", looksLikeEventText,
        openEventText},
   };

@@ -69,7 +69,6 @@ constexpr UnreadFormat kUnreadFormats[] = {
     {"\x80\x03"sv, "a pickle of Python objects", kAsText},
     {"\x80\x04"sv, "a pickle of Python objects", kAsText},
     {"\x80\x05"sv, "a pickle of Python objects", kAsText},
-    {"\x93NUMPY"sv, "a NumPy array", "give poses as --poses FILE; write events as text or as HDF5"},
     {"\x7f\x45LF"sv, "a program (ELF)", "expected a recording"},
     {"%PDF-"sv, "a PDF document", "expected a recording"},
     {"ply\n"sv, "a point cloud (PLY)", kOwnResult},

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <type_traits>
 
@@ -28,18 +29,29 @@ std::optional<std::int64_t> wholeNumber(Number number, std::int64_t min, std::in
   return static_cast<std::int64_t>(number);
 }
 
-/// A time of a file in nanoseconds; nothing beyond `kEndOfTimeNs`. Real numbers are rounded to
-/// whole microseconds: a double resolves today's times in seconds to 240 ns.
-/// @param unit_ns of the number: whole microseconds.
+/// A time of a file in nanoseconds; nothing beyond `kEndOfTimeNs`. A real number is rounded to the
+/// finest of 1, 10, 100 and 1000 ns that its type resolves there. So decimals that were written
+/// come back, and none is invented. A double resolves seconds to 1 ns up to 97 days, and today's
+/// Unix time to 240 ns.
+/// @param unit_ns of the number: a power of ten.
 template <typename Number>
 std::optional<std::int64_t> nanoseconds(Number time, std::int64_t unit_ns) {
   if constexpr (std::is_floating_point_v<Number>) {
-    const double microseconds = std::round(
-        static_cast<double>(time) * static_cast<double>(unit_ns / kNanosecondsPerMicrosecond));
-    constexpr std::int64_t kEnd = kEndOfTimeNs / kNanosecondsPerMicrosecond;
-    const auto whole = wholeNumber(microseconds, -kEnd, kEnd);
+    const Number size = std::abs(time);
+    const Number step = std::nextafter(size, std::numeric_limits<Number>::infinity()) - size;
+    const double step_ns = static_cast<double>(step) * static_cast<double>(unit_ns);
+    std::int64_t grid_ns = 1;
+    while (grid_ns < kNanosecondsPerMicrosecond && static_cast<double>(grid_ns) < step_ns) {
+      grid_ns *= 10;
+    }
+    const auto value = static_cast<double>(time);
+    const double rounded =
+        std::round(unit_ns >= grid_ns ? value * static_cast<double>(unit_ns / grid_ns)
+                                      : value / static_cast<double>(grid_ns / unit_ns));
+    const std::int64_t end = kEndOfTimeNs / grid_ns;
+    const auto whole = wholeNumber(rounded, -end, end);
     if (!whole) return std::nullopt;
-    return *whole * kNanosecondsPerMicrosecond;
+    return *whole * grid_ns;
   } else {
     const std::int64_t end = kEndOfTimeNs / unit_ns;
     const auto whole = wholeNumber(time, -end, end);

@@ -43,10 +43,11 @@ struct ReaderOptions {
   /// Topics of bags, or names of streams, to read: events (one per camera, in the order of the
   /// cameras) and poses. Empty: found by their type.
   std::vector<std::string> topics;
-  /// The columns of text events, e.g. "x y p t", `-` for one to ignore. Empty: those of the header,
-  /// else t x y p.
+  /// The columns of text events and arrays, e.g. "x y p t", `-` for one to ignore. Empty: those of
+  /// the header, else t x y p. Or the names of arrays, fields or data sets: "t=a x=b y=c p=d".
   std::string columns;
-  /// The unit of times in text events and NumPy arrays: s, ms, us or ns. Empty: found, else s.
+  /// The unit of times in text events and NumPy arrays, and of real times in HDF5: s, ms, us or ns.
+  /// Empty: found, else s.
   std::string time_unit;
   /// Whether `topics` may have names of other files. Otherwise an unknown name is an error.
   bool topics_of_other_files = false;

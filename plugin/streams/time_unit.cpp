@@ -105,6 +105,12 @@ std::string timeUnitOf(int exponent) {
   return exponent == 0 ? "s" : exponent == -3 ? "ms" : exponent == -6 ? "us" : "ns";
 }
 
+std::int64_t nanosecondsPer(int exponent) {
+  std::int64_t unit_ns = 1;
+  for (int k = exponent; k > -9; --k) unit_ns *= 10;
+  return unit_ns;
+}
+
 void TimeSample::add(double t, bool is_whole) {
   earliest = count == 0 ? t : std::min(earliest, t);
   latest = count == 0 ? t : std::max(latest, t);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -17,6 +18,9 @@ std::optional<int> timeExponentOf(std::string_view unit);
 
 /// The name of a unit: "us" for -6.
 std::string timeUnitOf(int exponent);
+
+/// Nanoseconds in a unit: 1000 for -6.
+std::int64_t nanosecondsPer(int exponent);
 
 /// Metres in a unit of length: 0.001 for "mm"; nothing for other words than m, cm and mm.
 std::optional<double> metresOf(std::string_view unit);

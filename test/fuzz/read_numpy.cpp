@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Reads any bytes as a NumPy array or an archive of arrays: its numbers, from its beginning and
-// after a seek, and its poses.
+// after a seek, its poses and its events.
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "plugin/numpy/event_arrays.h"
 #include "plugin/numpy/npy_array.h"
 #include "plugin/readers/pose_file.h"
 #include "plugin/streams/file_content.h"
@@ -56,5 +59,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     });
   }
   efm::fuzz::readOrRefuse(path, [&] { efm::readPoseArrays(path, {}); });
+  for (const char* columns : {"", "t=a x=b y=c p=d", "x y - p t"}) {
+    efm::ReaderOptions options;
+    options.columns = columns;
+    options.time_unit = "us";
+    efm::fuzz::readOrRefuse(path, [&] {
+      const auto camera = std::move(efm::openEventArrays({path}, options).cameras.at(0));
+      camera->seek(1'000'000'000);
+      std::vector<efm::Event> events;
+      for (int blocks = 0; blocks < 4 && camera->read(events); ++blocks) camera->positionOf(0);
+    });
+  }
   return 0;
 }

@@ -52,13 +52,14 @@ inline void writeGzip(const std::filesystem::path& file, const std::string& cont
 }
 
 /// A NumPy array, format 1.0.
-/// @param descr "<f8".
+/// @param descr "<f8", or a list of fields.
 /// @param shape "(2, 8)".
 template <typename Number>
 std::string npyArray(const std::string& descr, const std::string& shape,
                      const std::vector<Number>& numbers) {
-  const std::string dictionary =
-      "{'descr': '" + descr + "', 'fortran_order': False, 'shape': " + shape + ", }\n";
+  const std::string quote = descr.front() == '[' ? "" : "'";
+  const std::string dictionary = "{'descr': " + quote + descr + quote +
+                                 ", 'fortran_order': False, 'shape': " + shape + ", }\n";
   std::string bytes = "\x93NUMPY";
   bytes += std::string("\x01\x00", 2);
   bytes += bytesOfNumber(static_cast<std::uint16_t>(dictionary.size())) + dictionary;
