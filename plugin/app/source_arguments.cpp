@@ -58,12 +58,14 @@ void addSource(CLI::App& command, RecordingSource& source) {
   command
       .add_option(
           "--event-columns", source.reader.columns,
-          "The columns of text events: t, x, y, p, and - for one to ignore, e.g. \"x y p t\" "
-          "(default: those of the header, else t x y p)")
+          "The columns of text events and N x 4 arrays: t, x, y, p, and - for one to ignore, e.g. "
+          "\"x y p t\" (default: those of the header, else t x y p); or the names of arrays, fields "
+          "or data sets in NumPy and HDF5: \"t=NAME x=NAME y=NAME p=NAME\"")
       ->type_name("COLUMNS");
   command
       .add_option("--time-unit", source.reader.time_unit,
-                  "The unit of times in text events and NumPy arrays (default: found, else s)")
+                  "The unit of times in text events, NumPy arrays and real times of HDF5 (default: "
+                  "found, else s)")
       ->check(oneOf({"s", "ms", "us", "ns"}));
   command
       .add_option("--skip-bad-events", source.skip_bad_events,

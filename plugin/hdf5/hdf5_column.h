@@ -24,6 +24,8 @@ class Hdf5Column {
   static Hdf5Column ofField(std::shared_ptr<Hdf5Rows> rows, const std::string& field);
 
   std::uint64_t size() const { return rows_->size(); }
+  /// Whether the numbers are float or double.
+  bool isReal() const { return type_ == Type::kFloat || type_ == Type::kDouble; }
   Hdf5Rows& rows() const { return *rows_; }
 
   /// Calls `take(i, number)` for the rows first + i, i from 0 to count - 1, up to the first one

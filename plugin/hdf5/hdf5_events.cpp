@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/streams/number_checks.h"
+#include "plugin/streams/time_unit.h"
 
 namespace efm {
 namespace {
@@ -51,6 +53,14 @@ const std::vector<Hdf5Layout>& hdf5Layouts() {
        "/ms_to_idx",
        "/t_offset",
        std::nullopt},
+      {"E2VID",
+       {""},
+       "",
+       {"/events/xs", "/events/ys", "/events/ts", "/events/ps"},
+       0,
+       "",
+       "",
+       std::nullopt},
       {"M3ED",
        {"/prophesee/left", "/prophesee/right"},
        "",
@@ -80,7 +90,8 @@ const std::vector<Hdf5Layout>& hdf5Layouts() {
 }
 
 Hdf5EventStream::Hdf5EventStream(std::shared_ptr<const Hdf5File> file, const Hdf5Layout& layout,
-                                 const std::string& camera, std::optional<CameraSize> size)
+                                 const std::string& camera, std::optional<CameraSize> size,
+                                 const ReaderOptions& options)
     : file_(std::move(file)),
       place_(camera + layout.signature()),
       size_(size),
@@ -88,10 +99,13 @@ Hdf5EventStream::Hdf5EventStream(std::shared_ptr<const Hdf5File> file, const Hdf
   if (layout.events.empty()) place_.resize(place_.rfind('/'));
   openColumns(layout, camera);
   count_ = columns_[kX].size();
+  const bool of_layout =
+      unit_ns_ == kNanosecondsPerSecond || (unit_ns_ != 0 && !columns_[kT].isReal());
+  if (!of_layout) findUnit(options);
   if (!layout.offset.empty() && file_->has(camera + layout.offset)) {
     const std::string path = camera + layout.offset;
     const std::int64_t offset = file_->integer(path);
-    const auto offset_ns = nanoseconds(offset, unit_ns_);
+    const auto offset_ns = nanoseconds(offset, layout.time_unit_ns);
     if (!offset_ns) throw file_->fail(path, fmt::format("{}: expected a time", offset));
     offset_ns_ = *offset_ns;
   }
@@ -119,6 +133,24 @@ void Hdf5EventStream::openColumns(const Hdf5Layout& layout, const std::string& c
                                                 layout.columns[kX]));
     }
   }
+}
+
+/// Finds the unit from the times of the first block.
+void Hdf5EventStream::findUnit(const ReaderOptions& options) {
+  constexpr std::uint64_t kSample = 5000;
+  TimeSample sample;
+  if (count_ > 0) {
+    const auto rows = std::min(columns_[kT].rows().blockAt(0).end, kSample);
+    columns_[kT].forEach(0, static_cast<std::size_t>(rows), [&](std::size_t, auto number) {
+      const auto t = static_cast<double>(number);
+      if (std::isfinite(t)) sample.add(t, std::floor(t) == t);
+      return true;
+    });
+  }
+  TimeUnit unit = findTimeUnit(options, sample, kUsualEventRate,
+                               fmt::format("{}:{}", name(), columns_[kT].rows().path()));
+  unit_ns_ = nanosecondsPer(unit.exponent);
+  if (unit.warning) warnings_.push_back(std::move(*unit.warning));
 }
 
 bool Hdf5EventStream::read(std::vector<Event>& events) {

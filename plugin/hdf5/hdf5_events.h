@@ -12,6 +12,7 @@
 #include "plugin/hdf5/hdf5_column.h"
 #include "plugin/hdf5/hdf5_file.h"
 #include "plugin/streams/event_stream.h"
+#include "plugin/streams/recording_parts.h"
 
 namespace efm {
 
@@ -25,9 +26,11 @@ struct Hdf5Layout {
   /// x, y, t and p: data sets in the group; the fields of compound rows; empty: the columns of a
   /// matrix in this order.
   std::array<std::string, 4> columns;
+  /// Of t. 0: it is not known. Real times have this unit only if it is seconds. An unknown unit is
+  /// found from the values (`findTimeUnit`).
   std::int64_t time_unit_ns = 0;
   std::string index;   ///< In the group: the first event of each millisecond of t. Or empty.
-  std::string offset;  ///< In the group: is added to t, in the unit of t. Or empty.
+  std::string offset;  ///< In the group: is added to t; a whole number of `time_unit_ns`. Or empty.
   std::optional<CameraSize> size;  ///< Of the sensor, if all recordings have the same.
 
   /// The data set by which a file with this layout is known.
@@ -36,16 +39,18 @@ struct Hdf5Layout {
 
 const std::vector<Hdf5Layout>& hdf5Layouts();
 
-/// The events of a camera in an HDF5 file. Times in seconds are doubles, which resolve today's
-/// times to 240 ns: they are rounded to whole microseconds, the unit of the sensors. Reads chunk by
-/// chunk; `seek` reads the index and a few chunks.
+/// The events of a camera in an HDF5 file. Real times are rounded to what they resolve
+/// (`nanoseconds`). Reads chunk by chunk; `seek` reads the index and a few chunks.
 class Hdf5EventStream : public EventStream {
  public:
   /// @param camera one of the layout's groups.
   /// @param size of the sensor, if it is known.
-  /// @throws std::runtime_error naming the file and the data set that is missing or wrong.
+  /// @param options the unit of times that the layout does not know.
+  /// @throws std::runtime_error naming the file and the data set that is missing or wrong, or whose
+  /// unit of time is not certain.
   Hdf5EventStream(std::shared_ptr<const Hdf5File> file, const Hdf5Layout& layout,
-                  const std::string& camera, std::optional<CameraSize> size);
+                  const std::string& camera, std::optional<CameraSize> size,
+                  const ReaderOptions& options);
 
   bool read(std::vector<Event>& events) override;
   void seek(std::int64_t t_ns) override;
@@ -53,11 +58,13 @@ class Hdf5EventStream : public EventStream {
   std::string name() const override { return file_->path().string(); }
   double progress() const override;
   std::optional<CameraSize> size() const override { return size_; }
+  std::vector<Warning> warnings() const override { return warnings_; }
 
  private:
   enum Column : std::size_t { kX, kY, kT, kP };
 
   void openColumns(const Hdf5Layout& layout, const std::string& camera);
+  void findUnit(const ReaderOptions& options);
   void append(std::vector<Event>& events);
   std::int64_t timeAt(std::uint64_t index) const;
   std::optional<std::uint64_t> indexed(std::int64_t t_ns) const;
@@ -70,6 +77,7 @@ class Hdf5EventStream : public EventStream {
   std::int64_t offset_ns_ = 0;
   std::vector<Hdf5Column> columns_;  // x, y, t, p
   std::optional<Hdf5Column> index_;  // of milliseconds
+  std::vector<Warning> warnings_;
   std::uint64_t count_ = 0;
   std::uint64_t first_ = 0;  // event of the last block
   std::uint64_t next_ = 0;

@@ -20,7 +20,9 @@
 #include "plugin/hdf5/hdf5_events.h"
 #include "plugin/hdf5/hdf5_files.h"
 #include "plugin/streams/number_checks.h"
+#include "plugin/streams/time_unit.h"
 #include "plugin/text/dataset_folder.h"
+#include "plugin/text/event_columns.h"
 
 namespace efm {
 namespace {
@@ -142,7 +144,7 @@ std::optional<CameraSize> sizeOfAttribute(const Hdf5File& file) {
 
 /// Adds the cameras of a layout. @return whether the file has any.
 bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& layout,
-                RecordingParts& parts) {
+                const ReaderOptions& options, RecordingParts& parts) {
   Calibration calibration{file->path(), {}};
   std::size_t count = 0;
   for (const std::string& camera : layout.cameras) {
@@ -153,7 +155,7 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
       size = CameraSize{calibrated.model.width, calibrated.model.height};
       calibration.rig.cameras.push_back(calibrated);
     }
-    parts.cameras.push_back(std::make_unique<Hdf5EventStream>(file, layout, camera, size));
+    parts.cameras.push_back(std::make_unique<Hdf5EventStream>(file, layout, camera, size, options));
     ++count;
   }
   // Without the first camera, T_rig_cam of the others has another rig.
@@ -164,11 +166,47 @@ bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& l
   return count > 0;
 }
 
-/// @return whether the file has events or poses.
-bool addFile(const fs::path& path, RecordingParts& parts) {
-  const auto file = std::make_shared<const Hdf5File>(path);
+/// The layout of the data sets, or of the fields of a compound data set, with given names.
+Hdf5Layout namedLayout(const Hdf5File& file, const EventNames& names) {
+  Hdf5Layout layout = {"--event-columns", {""}, "", {}, 0, "", "", std::nullopt};
+  const std::string* const all[] = {&names.x, &names.y, &names.t, &names.p};
+  for (std::size_t i = 0; i < layout.columns.size(); ++i) {
+    layout.columns[i] = (all[i]->front() == '/' ? "" : "/") + *all[i];
+  }
+  const std::string parent = fs::path(layout.columns[0]).parent_path().string();
+  if (file.has(layout.columns[0]) || !file.has(parent)) return layout;
+  layout.events = parent;
+  for (std::string& column : layout.columns) {
+    const fs::path path = column;
+    if (path.parent_path() != parent) throw file.fail(column, "expected a field of " + parent);
+    column = path.filename().string();
+  }
+  return layout;
+}
+
+/// Adds the cameras of the layout that the option names, or of the known layouts.
+bool addEvents(const std::shared_ptr<const Hdf5File>& file, const ReaderOptions& options,
+               RecordingParts& parts) {
+  const std::optional<EventNames> names = eventNamesOf(options.columns);
+  if (names) {
+    const Hdf5Layout layout = namedLayout(*file, *names);
+    ReaderOptions named = options;
+    const auto exponent = headerWord(fs::path(names->t).filename().string()).time_exponent;
+    if (named.time_unit.empty() && exponent) named.time_unit = timeUnitOf(*exponent);
+    if (addCameras(file, layout, named, parts)) return true;
+  }
   bool any = false;
-  for (const Hdf5Layout& layout : hdf5Layouts()) any = addCameras(file, layout, parts) || any;
+  for (const Hdf5Layout& layout : hdf5Layouts()) {
+    any = addCameras(file, layout, options, parts) || any;
+  }
+  if (any && names) throw file->fail("/" + names->x, "no such data set (--event-columns)");
+  return any;
+}
+
+/// @return whether the file has events or poses.
+bool addFile(const fs::path& path, const ReaderOptions& options, RecordingParts& parts) {
+  const auto file = std::make_shared<const Hdf5File>(path);
+  bool any = addEvents(file, options, parts);
   for (const Hdf5Poses& poses : kPoses) {
     if (!file->has(poses.matrices)) continue;
     any = true;
@@ -184,8 +222,9 @@ bool addFile(const fs::path& path, RecordingParts& parts) {
     expected += fmt::format("{}{} ({}), ", layout.cameras.front(), layout.signature(), layout.name);
   }
   throw std::runtime_error(
-      fmt::format("{}: an HDF5 file without events or poses: expected {}or "
-                  "poses, {} (MVSEC) or {} (M3ED)",
+      fmt::format("{}: an HDF5 file without events or poses: expected {}others by "
+                  "--event-columns \"t=PATH x=PATH y=PATH p=PATH\", or poses, {} (MVSEC) or {} "
+                  "(M3ED)",
                   path.string(), expected, kPoses[0].matrices, kPoses[1].matrices));
 }
 
@@ -194,7 +233,7 @@ void addFolder(const fs::path& folder, const ReaderOptions& options, RecordingPa
   std::map<std::string, fs::path> files;  // with events, of each side
   for (const auto& [side, file] : hdf5FilesIn(folder)) {
     const std::size_t cameras = parts.cameras.size();
-    any = addFile(file, parts) || any;
+    any = addFile(file, options, parts) || any;
     if (parts.cameras.size() == cameras) continue;
     const auto [other, is_new] = files.emplace(side, file);
     if (!is_new) {
@@ -215,7 +254,7 @@ RecordingParts openHdf5(const std::vector<fs::path>& sources, const ReaderOption
   for (const fs::path& source : sources) {
     std::error_code ignored;
     if (!fs::is_directory(source, ignored)) {
-      if (!addFile(source, parts)) refuse(source);
+      if (!addFile(source, options, parts)) refuse(source);
       continue;
     }
     addFolder(source, options, parts);

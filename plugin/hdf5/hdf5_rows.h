@@ -31,6 +31,7 @@ class Hdf5Rows {
 
   static constexpr std::uint64_t kMaxChunkBytes = std::uint64_t{1} << 27;
 
+  const std::string& path() const { return path_; }
   std::uint64_t size() const { return size_; }
   /// The numbers of a row: the product of the other dimensions.
   std::size_t rowNumbers() const { return row_numbers_; }

@@ -47,10 +47,11 @@ bool isLying(const std::vector<std::uint64_t>& shape, std::size_t columns) {
 }
 
 /// Whether the array has the numbers of all events.
-/// @param columns of an event, as the option says: 4 or more.
+/// @param columns of an event, as the option says: 4 or more, or 0 where they have names.
 bool hasEvents(const NpyHeader& header, std::size_t columns) {
   if (header.structured) return !header.fields.empty();
-  return isMatrix(header) && (header.shape[1] == columns || isLying(header.shape, columns));
+  return columns > 0 && isMatrix(header) &&
+         (header.shape[1] == columns || isLying(header.shape, columns));
 }
 
 bool hasPoses(const NpyHeader& header) {
@@ -60,9 +61,9 @@ bool hasPoses(const NpyHeader& header) {
   return shape.size() == 2 && (shape[1] == 7 || shape[1] == 8);
 }
 
-/// The columns of an event in `--event-columns`: its letters, else 4.
+/// The columns of an event in `--event-columns`: its letters, or 0 for names. Without it 4.
 std::size_t columnsOf(const ReaderOptions& options) {
-  if (options.columns.find('=') != std::string::npos) return 4;
+  if (options.columns.find('=') != std::string::npos) return 0;
   const auto letters = std::count_if(options.columns.begin(), options.columns.end(),
                                      [](char c) { return c != ' ' && c != ','; });
   return std::max<std::size_t>(4, static_cast<std::size_t>(letters));

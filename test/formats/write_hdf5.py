@@ -8,6 +8,7 @@ Below OUT:
     dsec/        events/{left,right}/events.h5: Blosc with Zstandard
     tum_vie/     desk-events_{left,right}.h5: Blosc with Zstandard, another chunk size per column; mocap_data.txt
     m3ed/        desk_data.h5: both cameras and their calibration, LZF; desk_pose_gt.h5
+    e2vid/       left.h5, right.h5: xs ys ts ps, times in seconds, not compressed
     mvsec/       desk_data.hdf5: both cameras, times in seconds, deflate; desk_gt.hdf5
     metavision/  left.h5, right.h5: compound values, not compressed
 
@@ -93,6 +94,12 @@ def write_mvsec(out, cameras, poses):
         file["davis/left/pose"] = poses[1]
 
 
+def write_e2vid(path, events):
+    with new_file(path) as file:
+        for name, values in (("xs", events["x"]), ("ys", events["y"]), ("ts", events["t"] / 1e6), ("ps", events["p"] == 1)):
+            file[f"events/{name}"] = values
+
+
 def write_metavision(path, events, resolution):
     rows = np.empty(len(events["t"]), dtype=[("x", "u2"), ("y", "u2"), ("p", "i2"), ("t", "i8")])
     for name, values in events.items():
@@ -109,6 +116,7 @@ def main(folder, out):
     for n, (side, events) in enumerate(zip(SIDES, cameras)):
         write_dsec(out / "dsec/events" / side / "events.h5", events, "u4", [(65536,)] * 4)
         write_dsec(out / f"tum_vie/desk-events_{side}.h5", events, "i8", [(50000,), (50000,), (12500,), (100000,)])
+        write_e2vid(out / f"e2vid/{side}.h5", events)
         write_metavision(out / f"metavision/{side}.h5", events, calibration[f"cam{n}"]["resolution"])
     write_m3ed(out / "m3ed", cameras, calibration, poses)
     write_mvsec(out / "mvsec", cameras, poses)

@@ -103,6 +103,7 @@ class Hdf5Layouts : public testing::Test {
             {folder_ / "tum_vie"},
             {folder_ / "m3ed"},
             {folder_ / "mvsec"},
+            {folder_ / "e2vid/left.h5", folder_ / "e2vid/right.h5"},
             {folder_ / "metavision/left.h5", folder_ / "metavision/right.h5"}};
   }
 
@@ -256,6 +257,92 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
   check(columns, place + "[1]: p = '2': expected polarity 1, 0 or -1", 1);
   columns.t = {5'000'000'000'000'000, 0, 0};
   check(columns, place + "[0]: t = '5000000000000000': expected a time before the year 2116", 0);
+}
+
+TEST_F(Hdf5Events, RealTimesAreSecondsAndKeepTheDigitsThatTheyHold) {
+  const Numbers pixels = {1, 2};
+  const struct {
+    hid_t type;
+    std::vector<double> t;
+    std::vector<std::int64_t> t_ns;
+  } rows[] = {
+      {H5T_IEEE_F64LE, {0.000012, 12.345678912}, {12'000, 12'345'678'912}},
+      {H5T_IEEE_F64LE, {-0.5, 3e6 + 0.123456789}, {-500'000'000, 3'000'000'123'456'789}},
+      {H5T_IEEE_F64LE,  // doubles have steps of 240 ns there
+       {1.5e9 + 0.000001, 1'500'000'001.123456},
+       {1'500'000'000'000'001'000, 1'500'000'001'123'456'000}},
+      {H5T_IEEE_F32LE, {0.25, 10.123456}, {250'000'000, 10'123'456'000}},
+  };
+  const char* const names[][4] = {{"events/x", "events/y", "events/t", "events/p"},
+                                  {"events/xs", "events/ys", "events/ts", "events/ps"},
+                                  {"a/col", "a/row", "b/stamps", "a/sign"}};
+  for (const auto& row : rows) {
+    for (const auto& [x, y, t, p] : names) {
+      {
+        Writing writing(file());
+        writing.add(x, H5T_STD_U16LE, pixels);
+        writing.add(y, H5T_STD_U16LE, Numbers{3, 4});
+        writing.add(t, row.type, row.t);
+        writing.add(p, H5T_STD_I8LE, Numbers{1, -1});
+      }
+      ReaderOptions options;
+      if (*x == 'a') options.columns = "t=b/stamps x=/a/col y=a/row p=a/sign";
+      const RecordingParts parts = openHdf5({file()}, options);
+      EXPECT_THAT(readStream(*parts.cameras.at(0)),
+                  ElementsAre(Event{row.t_ns[0], 1, 3, true}, Event{row.t_ns[1], 2, 4, false}))
+          << x;
+    }
+  }
+}
+
+TEST_F(Hdf5Events, TheUnitOfTimesIsToldOrFoundWhereTheLayoutDoesNotSayIt) {
+  const Numbers many(2000, 1);
+  Numbers whole;
+  for (int i = 0; i < 2000; ++i) whole.push_back(5'000'000 + 10 * i);
+  const std::vector<double> real(whole.begin(), whole.end());
+  const auto first_of = [&](const char* t, hid_t type, const auto& times,
+                            const ReaderOptions& options) {
+    {
+      Writing writing(file());
+      for (const char* name : {"x", "y", "p"}) {
+        const std::string path = std::string("events/") + name + (t[8] == 's' ? "s" : "");
+        writing.add(path.c_str(), H5T_STD_U16LE, many);
+      }
+      writing.add(t, type, times);
+    }
+    return readStream(*openHdf5({file()}, options).cameras.at(0)).at(1).t_ns;
+  };
+  ReaderOptions ms;
+  ms.time_unit = "ms";
+  EXPECT_EQ(first_of("events/t", H5T_STD_I64LE, whole, {}), 5'000'010'000);
+  EXPECT_EQ(first_of("events/t", H5T_STD_I64LE, whole, ms), 5'000'010'000) << "DSEC's are us";
+  EXPECT_EQ(first_of("events/t", H5T_IEEE_F64LE, real, ms), 5'000'010'000'000);
+  EXPECT_EQ(first_of("events/ts", H5T_STD_I64LE, whole, ms), 5'000'010'000'000);
+  const std::string expected = ": all times are whole numbers, of an unknown unit: probably us";
+  EXPECT_THAT(errorOf([&] { first_of("events/ts", H5T_STD_I64LE, whole, {}); }),
+              HasSubstr(":/events/ts" + expected));
+  EXPECT_THAT(errorOf([&] { first_of("events/t", H5T_IEEE_F64LE, real, {}); }),
+              HasSubstr(":/events/t" + expected));
+}
+
+TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
+  ASSERT_EQ(std::system(("/usr/bin/python3 -c 'import h5py, numpy as np; "
+                         "h5py.File(\"" +
+                         file().string() +
+                         "\", \"w\")[\"a/list\"] = "
+                         "np.array([(5, 1, 7, 8)], dtype=[(\"time_us\", \"i8\"), (\"on\", \"?\"), "
+                         "(\"u\", \"u2\"), (\"v\", \"u2\")])'")
+                            .c_str()),
+            0);
+  ReaderOptions options;
+  options.columns = "t=a/list/time_us x=a/list/u y=a/list/v p=a/list/on";
+  EXPECT_THAT(readStream(*openHdf5({file()}, options).cameras.at(0)),
+              ElementsAre(Event{5'000, 7, 8, true}));
+  options.columns = "t=a/list/t x=a/list/u y=a/list/v p=a/list/on";
+  EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }), HasSubstr("with a field t"));
+  write({});
+  EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }),
+              HasSubstr("events.h5:/a/list/u: no such data set (--event-columns)"));
 }
 
 TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {

@@ -168,6 +168,12 @@ TEST_F(EventArrays, AnErrorNamesTheFileWhatItHasAndWhatWasExpected) {
     const fs::path file = write("e.npy", row.bytes);
     EXPECT_THAT(errorOfFile(file), AllOf(StartsWith(file.string()), HasSubstr(row.error)));
   }
+  const fs::path matrix = write("e.npy", npyArray("<f8", "(10, 4)", ten));
+  ReaderOptions named;
+  named.columns = "t=a x=b y=c p=d";
+  EXPECT_THAT(
+      errorOfFile(matrix, named),
+      HasSubstr("e.npy: (10, 4); --event-columns 't=a x=b y=c p=d' names others" + expected));
   const std::string three = npyArray("<f8", "(3,)", ten);
   const fs::path archive = folder() / "e.npz";
   writeZip(archive, {{"t.npy", three}, {"x.npy", three}, {"y.npy", three}});
