@@ -9,6 +9,7 @@
 #include "mapping/options/quoted_text.h"
 #include "plugin/app/argument_checks.h"
 #include "plugin/options/tracker_fault_keys.h"
+#include "plugin/streams/number_checks.h"
 
 namespace efm {
 namespace {
@@ -59,7 +60,8 @@ void addSource(CLI::App& command, RecordingSource& source) {
       .add_option(
           "--event-columns", source.reader.columns,
           "The columns of text events and N x 4 arrays: t, x, y, p, and - for one to ignore, e.g. "
-          "\"x y p t\" (default: those of the header, else t x y p); or the names of arrays, fields "
+          "\"x y p t\" (default: those of the header, else t x y p); or the names of arrays, "
+          "fields "
           "or data sets in NumPy and HDF5: \"t=NAME x=NAME y=NAME p=NAME\"")
       ->type_name("COLUMNS");
   command
@@ -67,6 +69,18 @@ void addSource(CLI::App& command, RecordingSource& source) {
                   "The unit of times in text events, NumPy arrays and real times of HDF5 (default: "
                   "found, else s)")
       ->check(oneOf({"s", "ms", "us", "ns"}));
+  command
+      .add_option_function<std::string>(
+          "--sensor-size",
+          [&source](const std::string& text) {
+            source.reader.sensor_size = cameraSizeOf(text);
+            if (!source.reader.sensor_size) {
+              throw CLI::ValidationError("--sensor-size",
+                                         inQuotes(text) + ": expected columns x rows, as 346x260");
+            }
+          },
+          "The pixels of the sensors, where neither the recording nor the calibration says them")
+      ->type_name("WIDTHxHEIGHT");
   command
       .add_option("--skip-bad-events", source.skip_bad_events,
                   "Leave out up to N bad events of the recording: lines that are none (text), "

@@ -80,6 +80,7 @@ double MergedRecording::progress() const {
 
 RecordingCounts MergedRecording::counts() const {
   RecordingCounts counts;
+  counts.warnings = warnings_;
   counts.skipped_events = bad_->count();
   counts.first_skipped = bad_->first();
   for (const EventPackets& camera : cameras_) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/geometry/rig.h"
@@ -28,6 +29,9 @@ class MergedRecording : public Recording {
   /// further one is an error.
   MergedRecording(Rig rig, std::vector<EventPackets> cameras, std::uint64_t skip_bad_events = 0);
 
+  /// Adds to the warnings of `counts`.
+  void addWarnings(std::vector<Warning> warnings) { warnings_ = std::move(warnings); }
+
   /// @throws std::runtime_error if there are cameras and none has an event; the streams' errors.
   void requireEvents();
 
@@ -44,6 +48,7 @@ class MergedRecording : public Recording {
   Rig rig_;
   std::unique_ptr<BadEvents> bad_;     // the cameras refer to it
   std::vector<EventPackets> cameras_;  // per camera
+  std::vector<Warning> warnings_;
   std::string position_ = "the recording";
   std::size_t announced_ = 0;  // number of empty packets so far
 };

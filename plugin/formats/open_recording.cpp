@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <iterator>
+#include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "plugin/calibration/calibration_file.h"
@@ -21,6 +24,9 @@
 #include "plugin/recordings/rig_override_recording.h"
 #include "plugin/session/rig_setup.h"
 #include "plugin/streams/source_files.h"
+#include "plugin/text/event_columns.h"
+#include "plugin/text/event_text.h"
+#include "plugin/text/pose_text.h"
 
 namespace efm {
 namespace {
@@ -42,8 +48,9 @@ const RecordingFormat* formatNamed(const std::string& name) {
   throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
 }
 
-/// The format of a source; null for a rawlog.
-const RecordingFormat* formatOf(const Path& path, const std::string& name) {
+/// The format of a source; null for a rawlog, and for a file of no format.
+const RecordingFormat* formatOf(const Path& path, const RecordingSource& source) {
+  const std::string& name = source.format;
   if (!std::filesystem::exists(path)) {
     throw std::runtime_error(path.string() + ": no such file or folder");
   }
@@ -51,6 +58,7 @@ const RecordingFormat* formatOf(const Path& path, const std::string& name) {
   if (name != "auto") return formatNamed(name);
   const RecordingFormat* format = detectFormat(path);
   if (format != nullptr) return format;
+  if (looksLikeEventText(path, source.reader)) return formatNamed("text");
   if (const auto unread = unreadFormat(path)) {
     throw std::runtime_error(fmt::format("{}: {} (docs/recordings.md)", path.string(), *unread));
   }
@@ -88,32 +96,103 @@ bool reads(const Read& read) {
   }
 }
 
-/// Says what a source is that no format of events takes.
-[[noreturn]] void refuseBesideOthers(const Path& path, const ReaderOptions& options) {
+/// Whether it is a file that readCalibration reads.
+bool isCalibration(const Path& path) {
+  constexpr std::uintmax_t kMaxBytes = 100'000;
+  std::error_code error;
+  return isFile(path) && std::filesystem::file_size(path, error) <= kMaxBytes && !error &&
+         reads([&] { readCalibration(path); });
+}
+
+/// Whether it is a text of poses, also a compressed one.
+bool isPoses(const Path& path) {
+  bool poses = false;
+  return reads([&] { poses = isFile(path) && looksLikePoseLines(beginningOfText(path)); }) && poses;
+}
+
+/// Says what a file is that is no recording, or what the reader that fits best does not accept.
+[[noreturn]] void refuse(const Path& path) {
   const std::string name = path.string();
-  if (path.extension() == ".ini") {
+  if (path.extension() == ".ini" && !isCalibration(path)) {
     throw std::runtime_error(name +
                              ": an .ini file among the sources: expected one option file, --config "
                              "NAME; a calibration is given with --calibration");
   }
-  if (reads([&] { readPoses(path, options); })) {
-    throw std::runtime_error(name + ": poses: expected --poses " + name);
-  }
-  if (reads([&] { readCalibration(path); })) {
+  if (isPoses(path)) throw std::runtime_error(name + ": poses: expected --poses " + name);
+  if (isCalibration(path)) {
     throw std::runtime_error(name + ": a calibration: expected --calibration " + name);
   }
-  requireRawlog(path);
-  throw std::runtime_error(name + ": a rawlog beside other sources: expected it alone");
+  const std::optional<std::string> why = whyNoRawlog(path);
+  if (!why) throw std::runtime_error(name + ": a rawlog beside other sources: expected it alone");
+  if (const auto line = whyNoEventLines(beginningOfText(path))) {
+    throw std::runtime_error(name + ":" + *line);
+  }
+  throw std::runtime_error(
+      fmt::format("{}: not a recording ({}): expected a rawlog, or a recording in another format "
+                  "(docs/recordings.md)",
+                  name, *why));
+}
+
+/// Whether the user calls a file of no other format a rawlog, or it is one.
+bool isRawlog(const Path& path, const RecordingSource& source) {
+  return source.format == kRawlog ||
+         path.filename().string().find(".rawlog") != std::string::npos || !whyNoRawlog(path);
+}
+
+/// The only file of a folder that has a part of the recording which its format did not find. Others
+/// are named in what is expected.
+/// @param has whether a file has it.
+/// @param option that gives another one.
+template <typename Has>
+std::optional<Path> onlyFileOf(const Path& folder, const Has& has, const char* option,
+                               RecordingParts& parts, std::string& expected) {
+  std::vector<Path> found;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (has(entry.path())) found.push_back(entry.path());
+  }
+  std::sort(found.begin(), found.end());
+  if (found.size() == 1) {
+    parts.warnings.push_back(
+        {"found-file", fmt::format("{}: taken, as the only one in the folder ({})",
+                                   found.front().string(), option)});
+    return found.front();
+  }
+  for (const Path& path : found) {
+    expected += (&path == &found.front() ? " (not clear: " : ", ") + path.filename().string();
+  }
+  if (!found.empty()) expected += ")";
+  return std::nullopt;
+}
+
+/// Takes the calibration and the poses that a folder has with other names than its format knows.
+void takeFilesOfFolder(const RecordingSource& source, RecordingParts& parts) {
+  const Path& folder = source.files.front();
+  if (source.files.size() != 1 || !std::filesystem::is_directory(folder)) return;
+  if (!parts.calibration && source.calibration.empty()) {
+    const auto has = [&](const Path& path) {
+      return isCalibration(path) &&
+             readCalibration(path).rig.cameras.size() == parts.cameras.size();
+    };
+    if (const auto file =
+            onlyFileOf(folder, has, "--calibration", parts, parts.expected_calibration)) {
+      parts.calibration = readCalibration(*file);
+    }
+  }
+  if (parts.poses.empty() && source.poses.empty()) {
+    if (const auto file = onlyFileOf(folder, isPoses, "--poses", parts, parts.expected_poses)) {
+      parts.poses = readPoses(*file, source.reader);
+    }
+  }
 }
 
 /// Files of the same format are opened together.
 RecordingParts openParts(const RecordingSource& source) {
   RecordingParts all;
   for (std::size_t i = 0; i < source.files.size();) {
-    const RecordingFormat* const format = formatOf(source.files[i], source.format);
-    if (format == nullptr) refuseBesideOthers(source.files[i], source.reader);
+    const RecordingFormat* const format = formatOf(source.files[i], source);
+    if (format == nullptr) refuse(source.files[i]);
     std::vector<Path> files = {source.files[i++]};
-    while (i < source.files.size() && formatOf(source.files[i], source.format) == format) {
+    while (i < source.files.size() && formatOf(source.files[i], source) == format) {
       files.push_back(source.files[i++]);
     }
     RecordingParts parts = format->open(files, source.reader);
@@ -126,10 +205,9 @@ RecordingParts openParts(const RecordingSource& source) {
   return all;
 }
 
-/// The size of a camera's sensor: of the stream, the recording's own calibration, the given one, or
-/// the format's usual one.
-std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera,
-                                 const Calibration* given) {
+/// The size of a camera's sensor: of the stream, the recording's own calibration, or the given one.
+std::optional<CameraSize> knownSizeOf(const RecordingParts& parts, std::size_t camera,
+                                      const Calibration* given) {
   if (const auto size = parts.cameras[camera]->size()) {
     const bool is_known = size->width < kUnknownSize.width || size->height < kUnknownSize.height;
     if (is_known) return size;
@@ -140,7 +218,22 @@ std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera
     const CameraModel& model = calibration->rig.cameras[camera].model;
     if (model.width > 0) return CameraSize{model.width, model.height};
   }
-  return parts.default_size;
+  return std::nullopt;
+}
+
+/// The same, or that of the option, or the format's usual one.
+/// @throws std::runtime_error where the option has another size than is known.
+std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera,
+                                 const Calibration* given, const RecordingSource& source) {
+  const std::optional<CameraSize> known = knownSizeOf(parts, camera, given);
+  const std::optional<CameraSize>& told = source.reader.sensor_size;
+  if (!known) return told ? told : parts.default_size;
+  if (told && (told->width != known->width || told->height != known->height)) {
+    throw std::runtime_error(fmt::format("--sensor-size {}x{}: {} has {}x{} pixels", told->width,
+                                         told->height, parts.cameras[camera]->name(), known->width,
+                                         known->height));
+  }
+  return known;
 }
 
 /// The recording's own rig if it has one. Then the caller replaces it by a given one and counts the
@@ -155,7 +248,7 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
   }
   Rig rig;
   for (std::size_t camera = 0; camera < count; ++camera) {
-    const std::optional<CameraSize> size = sizeOf(parts, camera, given);
+    const std::optional<CameraSize> size = sizeOf(parts, camera, given, source);
     if (calibration != nullptr) {
       rig.cameras.push_back(calibration->camera(camera, size));
     } else {
@@ -196,6 +289,7 @@ std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& sou
   auto events =
       std::make_unique<MergedRecording>(std::move(rig), std::move(cameras), source.skip_bad_events);
   if (!has_limits) events->requireEvents();
+  events->addWarnings(std::move(parts.warnings));
   std::unique_ptr<Recording> recording = std::move(events);
   if (!source.poses.empty()) return recording;
   if (parts.poses.empty() && source.complete) {
@@ -212,11 +306,20 @@ std::unique_ptr<Recording> openOwn(const RecordingSource& source, const Calibrat
   if (source.allow_pipe && source.files.size() == 1 && std::filesystem::is_fifo(first)) {
     return std::make_unique<RawlogRecording>(first, GzSource::kPipe);
   }
-  if (formatOf(first, source.format) == nullptr && source.files.size() == 1) {
+  if (formatOf(first, source) == nullptr && source.files.size() == 1) {
+    if (!isRawlog(first, source)) refuse(first);
     requireRawlog(first);
+    if (source.reader.sensor_size) {
+      throw std::runtime_error(
+          first.string() +
+          ": a rawlog, which has the size of its cameras: --sensor-size has no "
+          "use");
+    }
     return std::make_unique<RawlogRecording>(first);
   }
-  return join(openParts(source), source, given);
+  RecordingParts parts = openParts(source);
+  takeFilesOfFolder(source, parts);
+  return join(std::move(parts), source, given);
 }
 
 /// @param given how the user gave the file; empty: as the value of `option`.
@@ -259,7 +362,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
 std::vector<TruthDepth> openTruth(const RecordingSource& source) {
   std::vector<TruthDepth> truth;
   for (const Path& file : source.files) {
-    const RecordingFormat* const format = formatOf(file, source.format);
+    const RecordingFormat* const format = formatOf(file, source);
     if (format == nullptr || format->truth == nullptr) continue;
     const std::vector<TruthDepth> found = format->truth(file);
     truth.insert(truth.end(), found.begin(), found.end());

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -42,7 +43,7 @@ bool beginsAnObject(std::string_view bytes) {
 
 }  // namespace
 
-void requireRawlog(const std::filesystem::path& file) {
+std::optional<std::string> whyNoRawlog(const std::filesystem::path& file) {
   constexpr std::size_t kBytes = 128;
   constexpr std::size_t kShown = 24;
   GzInputStream stream(file);
@@ -50,18 +51,23 @@ void requireRawlog(const std::filesystem::path& file) {
   try {
     bytes.resize(stream.Read(bytes.data(), bytes.size()));
   } catch (const std::exception&) {
-    return;  // damaged: the reader reports it
+    return std::nullopt;  // damaged: the reader reports it
   }
-  if (!bytes.empty() && beginsAnObject(bytes)) return;
-  std::string why =
-      bytes.empty() ? "it is empty" : "it begins with " + inQuotes(bytes.substr(0, kShown));
+  if (bytes.empty()) return "it is empty";
+  if (beginsAnObject(bytes)) return std::nullopt;
+  return "it begins with " + inQuotes(bytes.substr(0, kShown));
+}
+
+void requireRawlog(const std::filesystem::path& file) {
+  std::optional<std::string> why = whyNoRawlog(file);
+  if (!why) return;
 #ifndef EFM_WITH_ARCHIVES
   if (isCompressed(file)) {
-    why += "; this build does not read other compressed files, EFM_READ_ARCHIVES";
+    *why += "; this build does not read other compressed files, EFM_READ_ARCHIVES";
   }
 #endif
   throw std::runtime_error(
-      file.string() + ": not a rawlog (" + why +
+      file.string() + ": not a rawlog (" + *why +
       "): expected a rawlog, or a recording in another format (docs/recordings.md)");
 }
 

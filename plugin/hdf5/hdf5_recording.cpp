@@ -16,7 +16,6 @@
 #include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/quoted_text.h"
-#include "mapping/options/text_parsing.h"
 #include "plugin/hdf5/hdf5_events.h"
 #include "plugin/hdf5/hdf5_files.h"
 #include "plugin/streams/number_checks.h"
@@ -131,15 +130,10 @@ RigCamera readCalib(const Hdf5File& file, const std::string& group) {
   return camera;
 }
 
-/// "640x480", Metavision's attribute.
+/// Metavision's attribute.
 std::optional<CameraSize> sizeOfAttribute(const Hdf5File& file) {
   const std::optional<std::string> text = file.attribute("geometry");
-  const std::size_t cross = text ? text->find('x') : std::string::npos;
-  if (cross == std::string::npos) return std::nullopt;
-  const auto width = parseNumber<std::uint16_t>(std::string_view(*text).substr(0, cross));
-  const auto height = parseNumber<std::uint16_t>(std::string_view(*text).substr(cross + 1));
-  if (!width || !height) return std::nullopt;
-  return CameraSize{*width, *height};
+  return text ? cameraSizeOf(*text) : std::nullopt;
 }
 
 /// Adds the cameras of a layout. @return whether the file has any.

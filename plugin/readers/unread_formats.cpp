@@ -34,6 +34,8 @@ struct UnreadFormat {
   std::size_t at = 0;  // the byte at which the magic begins
 };
 
+constexpr std::string_view kBagDescription = "rosbag2_bagfile_information";
+
 constexpr const char* kUnpack = "unpack it, and give the recording in it";
 constexpr const char* kNoEvents = "expected events; pictures and videos have none";
 constexpr const char* kAsText = "write its events as text, a line t x y p each, or as HDF5";
@@ -44,6 +46,11 @@ constexpr UnreadFormat kUnreadFormats[] = {
     {"version https://git-lfs"sv, "a pointer of git-LFS, not the file itself", "run git lfs pull"},
     {"% Data file"sv, "a DAT file of Prophesee",
      "give the RAW file, or convert it to HDF5 with Metavision's tools"},
+    {"% "sv, "a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header",
+     "the encoding of its events is not known; give the RAW file as it was recorded"},
+    {"Event Stream"sv, "an Event Stream file (.es)",
+     "it is not read; save the t, x, y and on that the Python package event_stream reads as a "
+     "NumPy array, and give --time-unit us"},
     {"#!AER-DAT1"sv, "an AEDAT 1 file", kConvert},
     {"#!AER-DAT2"sv, "an AEDAT 2 file", kConvert},
     {"#!AER-DAT3"sv, "an AEDAT 3 file", kConvert},
@@ -156,6 +163,10 @@ std::optional<std::string> unreadFile(const fs::path& file) {
   if (bytes.empty()) return fmt::format("an empty file: {}", kIncomplete);
   if (bytes.size() == kBeginning && bytes.find_first_not_of('\0') == std::string::npos) {
     return fmt::format("a file of zeros: {}", kIncomplete);
+  }
+  if (bytes.compare(0, kBagDescription.size(), kBagDescription) == 0) {
+    const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    return "the description of a ROS 2 bag: expected its folder, " + folder.string();
   }
   if (isCompressed(file)) {
     try {

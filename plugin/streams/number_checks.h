@@ -5,13 +5,26 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string_view>
 #include <type_traits>
 
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/text_parsing.h"
+#include "plugin/calibration/calibration_file.h"
 
 namespace efm {
 
 inline constexpr std::int64_t kNanosecondsPerMicrosecond = 1'000;
+
+/// The size that "640x480" says; nothing for other texts.
+inline std::optional<CameraSize> cameraSizeOf(std::string_view text) {
+  const std::size_t cross = text.find('x');
+  if (cross == std::string_view::npos) return std::nullopt;
+  const auto width = parseNumber<std::uint16_t>(text.substr(0, cross));
+  const auto height = parseNumber<std::uint16_t>(text.substr(cross + 1));
+  if (!width || !height || *width == 0 || *height == 0) return std::nullopt;
+  return CameraSize{*width, *height};
+}
 
 /// A number of a file as a whole number within [min, max]; nothing if it is none.
 template <typename Number>

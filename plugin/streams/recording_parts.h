@@ -33,6 +33,8 @@ struct RecordingParts {
   /// The error of the damage behind `poses`; empty: they are all.
   std::string poses_damage;
 
+  std::vector<Warning> warnings;  ///< Which files were taken for the parts.
+
   /// What the format calls its missing parts, for errors: "calib.txt".
   std::string expected_calibration = "a calibration in the recording";
   std::string expected_poses = "poses in the recording";
@@ -49,6 +51,8 @@ struct ReaderOptions {
   /// The unit of times in text events and NumPy arrays, and of real times in HDF5: s, ms, us or ns.
   /// Empty: found, else s.
   std::string time_unit;
+  /// The pixels of all sensors, where neither the recording nor a calibration has them.
+  std::optional<CameraSize> sensor_size{};
   /// Whether `topics` may have names of other files. Otherwise an unknown name is an error.
   bool topics_of_other_files = false;
 };

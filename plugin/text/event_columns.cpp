@@ -267,6 +267,10 @@ std::optional<std::string> whyNoEventLines(std::string_view beginning) {
     return why("decimal commas: expected decimal points (tr , . <FILE >NEW)");
   }
   const std::size_t count = first->fields.size();
+  const auto numbers =
+      std::count_if(first->fields.begin(), first->fields.end(),
+                    [](std::string_view field) { return numberOf(field).has_value(); });
+  if (2 * static_cast<std::size_t>(numbers) < count) return std::nullopt;  // prose
   if (count == 12) return why(kPosesWithoutTimes);
   if (count != first->order.size()) {
     return why(fmt::format(

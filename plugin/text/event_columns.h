@@ -43,7 +43,7 @@ EventColumns findEventColumns(std::string_view beginning, const ReaderOptions& o
 bool looksLikeEventLines(std::string_view beginning, const std::string& option = {});
 
 /// Why `looksLikeEventLines` does not hold of text with numbers: "3: '1 2 3': 3 fields: expected
-/// …", beginning with the line; nothing where no line has numbers.
+/// …", beginning with the line; nothing where the first line with numbers has more words.
 std::optional<std::string> whyNoEventLines(std::string_view beginning);
 
 /// 0, 1 or -1, also as 1.0; true and on are 1, false and off 0, in any letters.

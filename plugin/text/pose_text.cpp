@@ -181,12 +181,8 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
   return poseTimeExponent(options, sample, file.string());
 }
 
-}  // namespace
-
-std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
-                                      const ReaderOptions& options) {
-  constexpr std::size_t kMaxBytes = 2'000'000'000;
-  const std::string text = FileContent(file).readAll(kMaxBytes);
+std::vector<StampedPose> posesOf(std::string_view text, const std::filesystem::path& file,
+                                 const ReaderOptions& options) {
   PoseColumns columns;
   const std::vector<PoseLine> lines = poseLines(withoutByteOrderMark(text), columns, file.string());
   const int exponent = exponentOf(lines, columns, file, options);
@@ -214,6 +210,24 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
     }
   }
   return poses;
+}
+
+}  // namespace
+
+std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
+                                      const ReaderOptions& options) {
+  constexpr std::size_t kMaxBytes = 2'000'000'000;
+  return posesOf(FileContent(file).readAll(kMaxBytes), file, options);
+}
+
+bool looksLikePoseLines(std::string_view beginning) {
+  ReaderOptions options;
+  options.time_unit = "ns";  // any: the values say nothing of it
+  try {
+    return !posesOf(beginning, {}, options).empty();
+  } catch (const std::runtime_error&) {
+    return false;
+  }
 }
 
 std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
@@ -25,6 +26,9 @@ inline constexpr const char* kPosesWithoutTimes =
 /// @throws std::runtime_error naming file, line, value and what was expected.
 std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
                                       const ReaderOptions& options);
+
+/// Whether the whole lines at the beginning of a file are poses.
+bool looksLikePoseLines(std::string_view beginning);
 
 /// The same for the poses of a recording: at least one.
 /// @throws std::runtime_error as `readPoseText`; naming the file that has no pose.

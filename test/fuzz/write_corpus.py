@@ -122,7 +122,7 @@ def write_encodings(events, corpus):
 
 
 def write_numpy(events, corpus):
-    """Arrays as EVIMO2 has them, and poses."""
+    """Arrays as EVIMO2 has them, poses, and events in one array or several."""
     def add(name, save, *arrays, **named):
         file = io.BytesIO()
         save(file, *arrays, **named)
@@ -137,6 +137,11 @@ def write_numpy(events, corpus):
     add("info", np.savez, K=np.eye(3), D=np.zeros(5))
     add("poses", np.save, np.column_stack([times, poses]))
     add("pose_vectors", np.savez_compressed, t=times, poses=poses.astype("f4"))
+    columns = np.array([events["t"] * 1e-9, events["x"], events["y"], events["p"]])
+    add("columns", np.save, columns.T)
+    add("structured", np.save, events.astype(np.dtype({"names": ["p", "x", "y", "t"], "formats": ["i1", ">u2", "<f4", "<i8"],
+                                                       "offsets": [1, 4, 8, 16]})))
+    add("arrays", np.savez_compressed, **dict(zip("abcd", columns)))
     add("pose_matrices", np.savez, t_us=(times * 1e6).astype("i8"), T_world_body=np.tile(np.eye(4), (20, 1, 1)))
 
 

@@ -337,8 +337,9 @@ TEST_F(ImportCommand, AFileOfAnotherKindIsAnErrorThatNamesTheExpectedKind) {
       if (is_text && *format == '\0') continue;  // a recording of its own
       const Result result = run(std::string("info ") + file + format);
       EXPECT_NE(result.status, 0) << file;
-      EXPECT_EQ(result.err, "event-fusion: error: " + std::string(file) + ": not a rawlog (" + why +
-                                ")" + expected);
+      EXPECT_EQ(result.err, "event-fusion: error: " + std::string(file) +
+                                (*format == '\0' ? ": not a recording (" : ": not a rawlog (") +
+                                why + ")" + expected);
     }
   }
   EXPECT_EQ(run("info picture.png").err,

@@ -184,6 +184,8 @@ TEST_F(MapCommand, OptionsThatTheRecordingOrTheMachineRefusesAreErrorsOfTheComma
     EXPECT_THAT(result.err, HasSubstr("event-fusion: error: --set " + set + words));
   }
   for (const auto& [arguments, words] : std::initializer_list<std::pair<std::string, const char*>>{
+           {"info data --sensor-size 346", "--sensor-size: '346': expected columns x rows, as 346"},
+           {"info data --sensor-size 346x0", "--sensor-size: '346x0': expected columns x rows"},
            {"info data --skip-bad-events -1", "--skip-bad-events: '-1': expected a number, 0 or"},
            {"info data --t0 1 --t0 2", "--t0: given more than once"},
            {"evaluate depth data data --scale 0", "--scale: '0': expected a number above 0"}}) {
