@@ -59,12 +59,14 @@ void GlobalCloud::Sums::add(const VoxelPoint& point) {
   ++count;
   weight += point.weight;
   weighted_offset += point.weight * point.offset;
+  weighted_sigma += point.weight * point.sigma;
 }
 
 void GlobalCloud::Sums::add(const Sums& other) {
   count += other.count;
   weight += other.weight;
   weighted_offset += other.weighted_offset;
+  weighted_sigma = std::hypot(weighted_sigma, other.weighted_sigma);
 }
 
 GlobalCloud::GlobalCloud(const GlobalCloudOptions& options) : options_(options) {
@@ -287,13 +289,13 @@ std::size_t GlobalCloud::unsettledVoxels(std::uint64_t below) const {
   return count;
 }
 
-std::vector<CloudPoint> GlobalCloud::points(int min_keyframes) const {
+MapCloud::ConstPtr GlobalCloud::points(int min_keyframes) const {
   std::vector<CloudPoint> points;
   visitVoxels(std::numeric_limits<std::uint64_t>::max(), [&](const MergedVoxel& voxel) {
     if (static_cast<std::int64_t>(voxel.support()) < min_keyframes) return;
     points.push_back(pointOf(voxel));
   });
-  return points;
+  return mapCloudOf(points, options_.voxel_size_m);
 }
 
 std::size_t GlobalCloud::voxels() const {
@@ -317,7 +319,8 @@ GlobalCloud::VoxelPoint GlobalCloud::voxelPointOf(const CloudPoint& point) const
   return {{static_cast<std::int64_t>(cell.x()), static_cast<std::int64_t>(cell.y()),
            static_cast<std::int64_t>(cell.z())},
           point.p_world - cell * options_.voxel_size_m,
-          static_cast<double>(point.confidence)};
+          static_cast<double>(point.confidence),
+          static_cast<double>(point.sigma)};
 }
 
 Eigen::Vector3d GlobalCloud::positionOf(const Sums& sums) const {
@@ -331,7 +334,8 @@ Eigen::Vector3d GlobalCloud::positionOf(const Sums& sums) const {
 CloudPoint GlobalCloud::pointOf(const MergedVoxel& voxel) const {
   const Sums& sums = voxel.sums;
   return {positionOf(sums), static_cast<float>(sums.weight / static_cast<double>(sums.count)),
-          static_cast<std::uint32_t>(voxel.support()), voxel.first};
+          static_cast<std::uint32_t>(voxel.support()), voxel.first,
+          static_cast<float>(sums.weighted_sigma / sums.weight)};
 }
 
 }  // namespace efm

@@ -11,6 +11,7 @@
 #include "mapping/geometry/rigid3.h"
 #include "maps/cloud/cloud_point.h"
 #include "maps/cloud/keyframe_consistency.h"
+#include "maps/cloud/map_point.h"
 #include "maps/cloud/outlier_removal.h"
 #include "maps/cloud/visibility_grid.h"
 
@@ -38,6 +39,12 @@ struct GlobalCloudOptions {
 /// confidence. Its support is the number of keyframes that have a point in the voxel or support
 /// such a point. Its first keyframe is the lowest of their numbers. So the cost of inserting or
 /// removing a keyframe does not grow with the map.
+///
+/// The sigma of a voxel is that of its mean position, p = sum(w_i p_i) / sum(w_i). The depths of a
+/// keyframe in a voxel come from the same edge, events and poses: their errors are taken as fully
+/// correlated, so many of them are not more exact than one. Those of two keyframes are taken as
+/// independent. So sigma = sqrt(sum over keyframes of (sum of w_i sigma_i)^2) / sum(w_i). It is NaN
+/// where the sigma of a point is not known.
 ///
 /// Two keyframes whose numbers differ by at most `kMaxNumberDifference` check each other's points
 /// (VisibilityGrid). Each voxel of a keyframe has two bits per other keyframe: one for support, one
@@ -90,8 +97,8 @@ class GlobalCloud {
 
   /// The points with a support of at least `min_keyframes`, sorted by voxel (x, y, z). Cost:
   /// merging the voxels of all keyframes.
-  std::vector<CloudPoint> points() const { return points(options_.min_keyframes); }
-  std::vector<CloudPoint> points(int min_keyframes) const;
+  MapCloud::ConstPtr points() const { return points(options_.min_keyframes); }
+  MapCloud::ConstPtr points(int min_keyframes) const;
 
   /// Number of voxels that are not excluded. Costs as much as `points`.
   std::size_t voxels() const;
@@ -108,6 +115,7 @@ class GlobalCloud {
     VoxelIndex index;
     Eigen::Vector3d offset;  // from the corner of the voxel, metres
     double weight = 0;
+    double sigma = 0;  // metres
   };
   /// The sums over the points in a voxel, of one keyframe or of all. Offsets are from the corner of
   /// the voxel: sums of coordinates far from the origin would lose digits.
@@ -116,6 +124,8 @@ class GlobalCloud {
     std::uint64_t count = 0;
     double weight = 0;
     Eigen::Vector3d weighted_offset = Eigen::Vector3d::Zero();
+    /// Of one keyframe the sum of weighted sigmas, of several the root of the sum of its squares.
+    double weighted_sigma = 0;
 
     void add(const VoxelPoint& point);
     void add(const Sums& other);

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 
 namespace efm {
 
@@ -15,10 +17,13 @@ namespace efm {
 struct ViewPoint {
   Eigen::Vector3f p_ref = Eigen::Vector3f::Zero();  ///< Metres, frame `ref`.
   float confidence = 0;                             ///< Fused ray density at the point, above 0.
+  /// Standard deviation of depth, metres; NaN where it is not known.
+  float sigma = std::numeric_limits<float>::quiet_NaN();
 };
 
 /// The points of a keyframe, p_ref = Z * K^-1 (x, y, 1)^T: one for each pixel with a depth and a
-/// confidence above 0, row by row.
+/// confidence above 0, row by row. sigma_Z = Z^2 * sigma_(1/Z): Z is the inverse of the inverse
+/// depth, whose variance the keyframe has.
 /// @throws std::invalid_argument where an image does not have the size of the view.
 std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe);
 
@@ -32,8 +37,8 @@ std::vector<ViewPoint> lateFusionPoints(const KeyframeDepthMap& keyframe);
 std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
                                       const Rigid3& T_world_ref);
 
-/// `viewPoints` and `lateFusionPoints` in the world.
-std::vector<CloudPoint> keyframeCloud(const KeyframeDepthMap& keyframe);
-std::vector<CloudPoint> lateFusionCloud(const KeyframeDepthMap& keyframe);
+/// `viewPoints` in the world, as a cloud of PCL.
+/// @param resolution_m see `mapCloudOf`.
+MapCloud::ConstPtr keyframeCloud(const KeyframeDepthMap& keyframe, double resolution_m = 0.01);
 
 }  // namespace efm

@@ -10,7 +10,7 @@
 
 namespace efm {
 
-// All uses of PCL. Its searches work on floats, which are precise near the origin only.
+// The searches of PCL. They work on floats, which are precise near the origin only.
 
 /// The median of each coordinate. Few points far away do not move it, unlike the mean.
 /// @param points at least one.

@@ -53,7 +53,7 @@ void RefinedCloud::insert(std::vector<ViewPoint> points, const Rigid3& T_world_r
 /// When enough voxels have gathered, merges the keyframes that cannot change any more: neither they
 /// nor those that check them may move from now on.
 void RefinedCloud::settle() {
-  constexpr std::size_t kMinVoxels = 200'000;  // some 14 MB
+  constexpr std::size_t kMinVoxels = 200'000;  // some 15 MB
   constexpr std::uint64_t kCheckers = GlobalCloud::kMaxNumberDifference;
   const std::uint64_t newest = fixed_ + T_world_ref_.size() - 1;
   if (newest < movable_ || newest - movable_ < kCheckers) return;

@@ -20,7 +20,7 @@ class RefinedCloud {
   static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
   /// @param movable how many of the newest keyframes may move, at least; 0: none may. Their points
-  /// are kept, 16 bytes each.
+  /// are kept, 20 bytes each.
   /// @throws std::invalid_argument where the options are not valid.
   RefinedCloud(const GlobalCloudOptions& options, std::size_t movable)
       : cloud_(options), movable_(movable) {}

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 
@@ -140,20 +141,27 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
 
 }  // namespace
 
-void writePcdTo(std::ostream& stream, const std::vector<CloudPoint>& points) {
-  stream << "# .PCD v0.7 - Point Cloud Data file format\n"
-            "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
-            "WIDTH "
-         << points.size() << "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << points.size()
-         << "\nDATA binary\n";
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f p_world = points[i].p_world.cast<float>();
-    if (!p_world.allFinite() || !std::isfinite(points[i].confidence)) {
-      throw std::runtime_error("point " + std::to_string(i) + " " + pointText(points[i]) +
+void writePcdTo(std::ostream& stream, const MapCloud& cloud) {
+  std::ostringstream header;
+  header.precision(17);
+  header << "# .PCD v0.7 - Point Cloud Data file format\n"
+            "VERSION 0.7\nFIELDS x y z intensity support sigma\nSIZE 4 4 4 4 4 4\n"
+            "TYPE F F F F U F\nCOUNT 1 1 1 1 1 1\nWIDTH "
+         << cloud.size() << "\nHEIGHT 1\nVIEWPOINT " << cloud.sensor_origin_.x() << " "
+         << cloud.sensor_origin_.y() << " " << cloud.sensor_origin_.z() << " 1 0 0 0\nPOINTS "
+         << cloud.size() << "\nDATA binary\n";
+  stream << header.str();
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const MapPoint& point = cloud[i];
+    if (!point.getVector3fMap().allFinite() || !std::isfinite(point.intensity)) {
+      throw std::runtime_error("point " + std::to_string(i) + " " +
+                               pointText({positionIn(cloud, point), point.intensity}) +
                                ": expected finite numbers within a float's range");
     }
-    for (const float value : p_world) writeLittleEndian(stream, value);
-    writeLittleEndian(stream, points[i].confidence);
+    for (const float value : point.getVector3fMap()) writeLittleEndian(stream, value);
+    writeLittleEndian(stream, point.intensity);
+    writeLittleEndian(stream, point.support);
+    writeLittleEndian(stream, point.sigma);
   }
 }
 

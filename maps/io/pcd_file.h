@@ -10,8 +10,8 @@
 namespace efm {
 
 /// Writes a binary PCD file, version 0.7.
-/// @throws std::runtime_error where a float cannot hold a point.
-void writePcdTo(std::ostream& stream, const std::vector<CloudPoint>& points);
+/// @throws std::runtime_error naming a point that is not finite.
+void writePcdTo(std::ostream& stream, const MapCloud& cloud);
 
 /// @throws std::runtime_error naming the line or byte, the value and the expected one.
 PointCloudContent parsePcd(std::string_view bytes);

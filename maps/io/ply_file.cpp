@@ -121,22 +121,23 @@ void skip(TextScanner& scanner, const PlyElement& element, bool is_text) {
 
 }  // namespace
 
-void writePlyTo(std::ostream& stream, const std::vector<CloudPoint>& points,
+void writePlyTo(std::ostream& stream, const MapCloud& cloud,
                 const std::vector<PointColour>& colours) {
-  assert(colours.size() == points.size());
-  stream << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size()
+  assert(colours.size() == cloud.size());
+  stream << "ply\nformat binary_little_endian 1.0\nelement vertex " << cloud.size()
          << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\n"
             "property uchar green\nproperty uchar blue\nproperty float confidence\n"
             "property uint support\nend_header\n";
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const CloudPoint& point = points[i];
-    if (!point.p_world.allFinite() || !std::isfinite(point.confidence)) {
-      throw std::runtime_error("point " + std::to_string(i) + " " + pointText(point) +
-                               ": expected finite numbers");
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const MapPoint& point = cloud[i];
+    const Eigen::Vector3d p_world = positionIn(cloud, point);
+    if (!p_world.allFinite() || !std::isfinite(point.intensity)) {
+      throw std::runtime_error("point " + std::to_string(i) + " " +
+                               pointText({p_world, point.intensity}) + ": expected finite numbers");
     }
-    for (const double value : point.p_world) writeLittleEndian(stream, value);
+    for (const double value : p_world) writeLittleEndian(stream, value);
     for (const std::uint8_t value : colours[i]) writeLittleEndian(stream, value);
-    writeLittleEndian(stream, point.confidence);
+    writeLittleEndian(stream, point.intensity);
     writeLittleEndian(stream, point.support);
   }
 }

@@ -12,7 +12,7 @@ namespace efm {
 /// Writes a binary little-endian file of the Stanford polygon format, version 1.0.
 /// @param colours one per point.
 /// @throws std::runtime_error naming a point that is not finite.
-void writePlyTo(std::ostream& stream, const std::vector<CloudPoint>& points,
+void writePlyTo(std::ostream& stream, const MapCloud& cloud,
                 const std::vector<PointColour>& colours);
 
 /// Parses the Stanford polygon format, version 1.0. The element `vertex` is the cloud.

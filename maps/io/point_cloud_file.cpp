@@ -29,13 +29,13 @@ void writeBinary(const std::filesystem::path& path, Write write) {
 
 }  // namespace
 
-void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& points) {
-  writeBinary(path, [&](std::ostream& stream) { writePcdTo(stream, points); });
+void writePcd(const std::filesystem::path& path, const MapCloud& cloud) {
+  writeBinary(path, [&](std::ostream& stream) { writePcdTo(stream, cloud); });
 }
 
-void writeColouredPly(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
+void writeColouredPly(const std::filesystem::path& path, const MapCloud& cloud,
                       const std::vector<PointColour>& colours) {
-  writeBinary(path, [&](std::ostream& stream) { writePlyTo(stream, points, colours); });
+  writeBinary(path, [&](std::ostream& stream) { writePlyTo(stream, cloud, colours); });
 }
 
 PointCloudContent readPointCloud(const std::filesystem::path& path) {

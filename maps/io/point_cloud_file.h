@@ -7,15 +7,15 @@
 #include <vector>
 
 #include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 
 namespace efm {
 
-/// Writes a binary PCD file, whatever the extension of the path. The fields are x, y, z and
-/// intensity (the confidence), all float32. An empty cloud is a valid file. The file appears when
-/// it is complete (AtomicFile).
-/// @throws std::runtime_error naming the path where it cannot be written or a float cannot hold a
-/// point.
-void writePcd(const std::filesystem::path& path, const std::vector<CloudPoint>& points);
+/// Writes a binary PCD file, whatever the extension of the path. Its fields are those of MapPoint,
+/// its VIEWPOINT is the cloud's `sensor_origin_`. An empty cloud is a valid file. The file appears
+/// when it is complete (AtomicFile).
+/// @throws std::runtime_error naming the path where it cannot be written or a point is not finite.
+void writePcd(const std::filesystem::path& path, const MapCloud& cloud);
 
 /// Red, green and blue.
 using PointColour = std::array<std::uint8_t, 3>;
@@ -25,7 +25,7 @@ using PointColour = std::array<std::uint8_t, 3>;
 /// support (uint). The file appears when it is complete (AtomicFile).
 /// @param colours one per point.
 /// @throws std::runtime_error naming the path where it cannot be written or a point is not finite.
-void writeColouredPly(const std::filesystem::path& path, const std::vector<CloudPoint>& points,
+void writeColouredPly(const std::filesystem::path& path, const MapCloud& cloud,
                       const std::vector<PointColour>& colours);
 
 struct PointCloudContent {

@@ -130,7 +130,7 @@ void writePage(MappingOutcome& outcome, MapOutput& output, const KeyframePicture
     const SecondsScope scope(real_s, cpu_s);
     const std::filesystem::path folder = std::filesystem::absolute(output.folder() / "");
     const MapPage page = {folder.lexically_normal().parent_path().filename().string(),
-                          outcome.points,
+                          *outcome.points,
                           report.options.cloud.voxel_size_m,
                           outcome.trajectory,
                           pictures,
@@ -393,10 +393,10 @@ int runMap(const MapArguments& arguments) {
     StageTimes& times = outcome.report.times;
     const SecondsScope scope(times.real.map, times.cpu.output);
     writeAll(outcome,
-             {[&] { output.writeCloud("map.pcd", outcome.points); },
+             {[&] { output.writeCloud("map.pcd", *outcome.points); },
               [&] {
                 if (!job.options.ply) return;
-                output.writeColouredCloud(outcome.points, upwardOf(outcome.trajectory));
+                output.writeColouredCloud(*outcome.points, upwardOf(outcome.trajectory));
               },
               [&] { output.writeFile("map.simplemap", saverOf(outcome.keyframes)); },
               [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },
@@ -406,7 +406,7 @@ int runMap(const MapArguments& arguments) {
               },
               [&] {
                 if (outcome.trajectory.empty()) return;  // nothing to draw
-                output.writePicture("map.png", drawMap(outcome.points, outcome.trajectory,
+                output.writePicture("map.png", drawMap(*outcome.points, outcome.trajectory,
                                                        outcome.report.options.cloud.voxel_size_m));
                 output.writePicture("overview.png", sheet.draw(limits));
               }});
@@ -443,17 +443,19 @@ int runDepth(const DepthArguments& arguments) {
     if (!made) interruption.check();
     return false;
   };
-  std::vector<CloudPoint> points;
+  MapCloud::ConstPtr points;
   const auto take = [&](MapOutput& output, const KeyframeDepthMap& keyframe) {
     output.writeImages(keyframe);
+    const std::vector<CloudPoint> in_world =
+        pointsInWorld(options.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe),
+                      keyframe.T_world_ref);
     points =
-        removeOutliers(options.late_fusion ? lateFusionCloud(keyframe) : keyframeCloud(keyframe),
-                       options.cloud.outliers);
+        mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
   };
   const auto write = [&](MapOutput& output, MappingOutcome& outcome) {
-    outcome.report.points = points.size();
-    outcome.report.extent = extentOf(points);
-    writeAll(outcome, {[&] { output.writeCloud("points.pcd", points); },
+    outcome.report.points = points->size();
+    outcome.report.extent = extentOf(*points);
+    writeAll(outcome, {[&] { output.writeCloud("points.pcd", *points); },
                        [&] {
                          if (dsi) dsi->finish();
                        }});

@@ -186,7 +186,7 @@ class Player {
     const double keyframes = static_cast<double>(status.counts.keyframes);
     const double read = static_cast<double>(status.counts.total().read);
     snapshot.lines = {
-        fmt::format("{} keyframes, {} points", status.counts.keyframes, snapshot.points.size()),
+        fmt::format("{} keyframes, {} points", status.counts.keyframes, snapshot.points->size()),
         fmt::format("{:.2f} M events: {:.2f} M events/s, {:.1f} keyframes/s", 1e-6 * read,
                     1e-6 * read / seconds, keyframes / seconds)};
     if (status.events) {
@@ -312,8 +312,8 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
     outcome.trajectory = player.builder().trajectory();
     outcome.tracker_trajectory = player.builder().trackerTrajectory();
   }
-  outcome.report.points = outcome.points.size();
-  outcome.report.extent = extentOf(outcome.points);
+  outcome.report.points = outcome.points->size();
+  outcome.report.extent = extentOf(*outcome.points);
   if (status.events) {
     outcome.report.recording_s = secondsBetween(status.events->first_ns, status.events->last_ns);
   }

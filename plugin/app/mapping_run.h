@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mapping/keyframes/keyframe_mapper.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/app/progress.h"
 #include "plugin/options/option_file.h"
 #include "plugin/output/report.h"
@@ -45,7 +45,7 @@ struct MappingJob {
 /// The results of a run.
 struct MappingOutcome {
   MapReport report;  ///< Without the times of the whole run.
-  std::vector<CloudPoint> points;
+  MapCloud::ConstPtr points;
   mrpt::maps::CSimpleMap keyframes;  ///< Their clouds and poses.
   /// T_world_ref of the keyframes at t_ref: in the map, and of the tracker.
   std::vector<StampedPose> trajectory;

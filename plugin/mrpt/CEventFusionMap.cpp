@@ -7,6 +7,7 @@
 #include <mrpt/opengl/CSetOfObjects.h>
 #include <mrpt/poses/CPose3D.h>
 #include <mrpt/serialization/CArchive.h>
+#include <mrpt/serialization/stl_serialization.h>
 
 #include <algorithm>
 #include <array>
@@ -47,6 +48,18 @@ void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
   in >> name >> options.consistency_tolerance >> options.consistency_cell_deg;
   options.consistency = consistencyFromName(name);
   options.max_contradictions = in.ReadAs<std::int32_t>();
+}
+
+/// Maps of versions 0 and 1 had no sigma.
+void readSigma(mrpt::serialization::CArchive& in, StoredKeyframe& keyframe) {
+  std::vector<float> sigma;
+  in >> sigma;
+  if (sigma.empty()) return;
+  if (sigma.size() != keyframe.points->size()) {
+    throw std::runtime_error(fmt::format("an event fusion map with {} sigmas for {} points",
+                                         sigma.size(), keyframe.points->size()));
+  }
+  keyframe.sigma = std::make_shared<std::vector<float>>(std::move(sigma));
 }
 
 }  // namespace
@@ -147,7 +160,7 @@ double CEventFusionMap::internal_computeObservationLikelihood(
 
 // --- Storing ---------------------------------------------------------------------------------
 
-std::uint8_t CEventFusionMap::serializeGetVersion() const { return 1; }
+std::uint8_t CEventFusionMap::serializeGetVersion() const { return 2; }
 
 void CEventFusionMap::serializeTo(CArchive& out) const {
   const GlobalCloudOptions& options = cloud_.options();
@@ -164,14 +177,14 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
     const Eigen::Vector3d& t = keyframe.T_world_ref.translation;
     const Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
     out << keyframe.t_ref_ns << t.x() << t.y() << t.z() << q.x() << q.y() << q.z() << q.w()
-        << *keyframe.points;
+        << *keyframe.points << (keyframe.sigma ? *keyframe.sigma : std::vector<float>());
   }
 }
 
 void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
-  if (version > 1) {
+  if (version > 2) {
     throw std::runtime_error(fmt::format(
-        "an event fusion map of version {}: this program reads versions 0 and 1", version));
+        "an event fusion map of version {}: this program reads versions 0 to 2", version));
   }
   GlobalCloudOptions options;
   in >> genericMapParams >> options.voxel_size_m;
@@ -188,6 +201,7 @@ void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
     in >> keyframe.t_ref_ns >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
     keyframe.points = CPointsMapXYZI::Create();
     in >> *keyframe.points;
+    if (version >= 2) readSigma(in, keyframe);
     read.insertKeyframe(keyframe);
   }
   keyframes_ = std::move(read.keyframes_);
@@ -212,36 +226,37 @@ std::string CEventFusionMap::asString() const {
 
 void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
   if (!genericMapParams.enableSaveAs3DObject) return;
-  const std::vector<CloudPoint> points = cloud_.points();
+  const MapCloud::ConstPtr points = cloud_.points();
   // The colour scale ends at the 95th percentile: a few points have far larger confidences.
   std::vector<float> sorted;
-  sorted.reserve(points.size());
-  for (const CloudPoint& point : points) sorted.push_back(point.confidence);
+  sorted.reserve(points->size());
+  for (const MapPoint& point : *points) sorted.push_back(point.intensity);
   const std::size_t below = sorted.size() - sorted.size() / 20;
   std::sort(sorted.begin(), sorted.end());
   const float scale = sorted.empty() ? 1.0F : sorted[below > 0 ? below - 1 : 0];
 
   auto drawn = mrpt::opengl::CPointCloudColoured::Create();
   drawn->setPointSize(2);
-  drawn->reserve(points.size());
-  for (const CloudPoint& point : points) {
-    const Eigen::Vector3f p_world = point.p_world.cast<float>();
+  drawn->reserve(points->size());
+  for (const MapPoint& point : *points) {
+    const Eigen::Vector3f p_world = positionIn(*points, point).cast<float>();
     const mrpt::img::TColor colour =
-        mrpt::img::colormap(mrpt::img::cmJET, std::min(1.0F, point.confidence / scale));
+        mrpt::img::colormap(mrpt::img::cmJET, std::min(1.0F, point.intensity / scale));
     drawn->insertPoint({p_world.x(), p_world.y(), p_world.z(), colour.R, colour.G, colour.B});
   }
   out.insert(drawn);
 }
 
 void CEventFusionMap::saveMetricMapRepresentationToFile(const std::string& prefix) const {
-  writePcd(prefix + ".pcd", cloud_.points());
+  writePcd(prefix + ".pcd", *cloud_.points());
 }
 
 const CSimplePointsMap* CEventFusionMap::getAsSimplePointsMap() const {
   if (!simple_points_) {
     simple_points_.emplace();
-    for (const CloudPoint& point : cloud_.points()) {
-      const Eigen::Vector3f p_world = point.p_world.cast<float>();
+    const MapCloud::ConstPtr points = cloud_.points();
+    for (const MapPoint& point : *points) {
+      const Eigen::Vector3f p_world = positionIn(*points, point).cast<float>();
       simple_points_->insertPointFast(p_world.x(), p_world.y(), p_world.z());
     }
     simple_points_->mark_as_modified();

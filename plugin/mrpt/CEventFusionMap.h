@@ -2,13 +2,13 @@
 #pragma once
 
 #include <mrpt/maps/CMetricMap.h>
-#include <mrpt/maps/CSimplePointsMap.h>
 
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "maps/cloud/global_cloud.h"
+#include "plugin/mrpt/mrpt_point_maps.h"
 #include "plugin/mrpt/stored_keyframe.h"
 
 namespace efm {

@@ -202,7 +202,7 @@ std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
   return ignored_observations_;
 }
 
-std::vector<CloudPoint> CEventFusionMapBuilder::points() const { return mapping()->points(); }
+MapCloud::ConstPtr CEventFusionMapBuilder::points() const { return mapping()->points(); }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
   return mapping()->keyframePoses().in_map;

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/dead_reckoning.h"
 #include "plugin/mrpt/hosted_mapping.h"
@@ -107,7 +107,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// The number of observations that were neither events nor poses.
   std::uint64_t ignoredObservations() const;
   /// The exported points of the global cloud.
-  std::vector<CloudPoint> points() const;
+  MapCloud::ConstPtr points() const;
   /// T_world_ref of all keyframes at t_ref: in the map, and of the tracker. They differ for refined
   /// keyframes.
   std::vector<StampedPose> trajectory() const;

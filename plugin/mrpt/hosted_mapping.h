@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/live/input_queue.h"
 #include "plugin/session/mapping_session.h"
 
@@ -30,7 +30,7 @@ struct MapSnapshot {
   std::vector<StampedPose> trajectory;     ///< Of all keyframes, those of the initial map first.
   std::vector<Rigid3> T_odom_ref;          ///< Of the others: by the tracker.
   std::vector<SimpleMapFrame> frames;      ///< The newest keyframes, as those of a simplemap.
-  std::vector<CloudPoint> points;          ///< The exported points.
+  MapCloud::ConstPtr points;               ///< The exported points.
   mrpt::maps::CMultiMetricMap metric_map;  ///< The points as a CPointsMapXYZI.
 };
 
@@ -73,7 +73,7 @@ class HostedMapping {
   /// The pose of the rig on the body, from the options.
   virtual std::optional<Rigid3> T_body_rig() const = 0;
   virtual SessionStatus status() const = 0;
-  virtual std::vector<CloudPoint> points() = 0;
+  virtual MapCloud::ConstPtr points() = 0;
   virtual KeyframePoses keyframePoses() = 0;
   /// The keyframes of a simplemap.
   virtual std::size_t simpleMapSize() const = 0;

@@ -259,7 +259,7 @@ void LiveMapping::publishMap(bool at_once) {
     next_map_.T_odom_ref = session_->T_odom_ref();
     auto map = std::make_shared<MapSnapshot>(next_map_);
     map->points = session_->cloud().points();
-    map->metric_map.maps.push_back(pointsMapOf(map->points));
+    map->metric_map.maps.push_back(pointsMapOf(*map->points));
     made = std::move(map);
   } catch (...) {
     noteError("the snapshot of the map", Fault::kMapping);

@@ -64,7 +64,7 @@ class LiveMapping : public HostedMapping {
 
   std::optional<Rigid3> T_body_rig() const override { return T_body_rig_; }
   SessionStatus status() const override;
-  std::vector<CloudPoint> points() override { return snapshot()->points; }
+  MapCloud::ConstPtr points() override { return snapshot()->points; }
   KeyframePoses keyframePoses() override;
   std::size_t simpleMapSize() const override { return snapshot()->frames.size(); }
   void copyTo(mrpt::maps::CSimpleMap& map) override;

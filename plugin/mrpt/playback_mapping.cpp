@@ -155,7 +155,7 @@ SessionStatus PlaybackMapping::status() const {
   return session_.status();
 }
 
-std::vector<CloudPoint> PlaybackMapping::points() {
+MapCloud::ConstPtr PlaybackMapping::points() {
   const std::lock_guard<std::mutex> lock(mutex_);
   applyPending();
   return session_.cloud().points();
@@ -190,7 +190,7 @@ const mrpt::maps::CMultiMetricMap* PlaybackMapping::metricMap() {
   if (metric_map_.maps.empty() || changed) {
     metric_map_.maps.clear();
     metric_map_.maps.push_back(event_map_);
-    metric_map_.maps.push_back(pointsMapOf(event_map_->cloud().points()));
+    metric_map_.maps.push_back(pointsMapOf(*event_map_->cloud().points()));
   }
   return &metric_map_;
 }

@@ -37,7 +37,7 @@ class PlaybackMapping : public HostedMapping {
 
   std::optional<Rigid3> T_body_rig() const override { return session_.setup().T_body_rig; }
   SessionStatus status() const override;
-  std::vector<CloudPoint> points() override;
+  MapCloud::ConstPtr points() override;
   KeyframePoses keyframePoses() override;
   std::size_t simpleMapSize() const override;
   void copyTo(mrpt::maps::CSimpleMap& map) override;

@@ -3,13 +3,13 @@
 
 namespace efm {
 
-mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& points) {
+mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const MapCloud& cloud) {
   auto map = mrpt::maps::CPointsMapXYZI::Create();
-  map->resize(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f p_world = points[i].p_world.cast<float>();
+  map->resize(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3f p_world = positionIn(cloud, cloud[i]).cast<float>();
     map->setPointFast(i, p_world.x(), p_world.y(), p_world.z());
-    map->setPointIntensity(i, points[i].confidence);
+    map->setPointIntensity(i, cloud[i].intensity);
   }
   map->mark_as_modified();
   return map;

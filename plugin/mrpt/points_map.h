@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mrpt/maps/CPointsMapXYZI.h>
-
-#include <vector>
-
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
+#include "plugin/mrpt/mrpt_point_maps.h"
 
 namespace efm {
 
 /// The points as float32, as MRPT has points.
-mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const std::vector<CloudPoint>& points);
+mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const MapCloud& cloud);
 
 }  // namespace efm

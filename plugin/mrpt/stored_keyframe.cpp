@@ -21,16 +21,20 @@ StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
                               const std::vector<ViewPoint>& points) {
   auto cloud = CPointsMapXYZI::Create();
   cloud->resize(points.size());
+  std::vector<float> sigma(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3f& p_ref = points[i].p_ref;
     cloud->setPointFast(i, p_ref.x(), p_ref.y(), p_ref.z());
     cloud->setPointIntensity(i, points[i].confidence);
+    sigma[i] = points[i].sigma;
   }
   cloud->mark_as_modified();
-  return {keyframe.window.t_ref_ns, keyframe.T_world_ref, std::move(cloud)};
+  return {keyframe.window.t_ref_ns, keyframe.T_world_ref, std::move(cloud),
+          std::make_shared<std::vector<float>>(std::move(sigma))};
 }
 
-std::vector<ViewPoint> viewPointsOf(const CPointsMapXYZI& cloud) {
+std::vector<ViewPoint> viewPointsOf(const StoredKeyframe& keyframe) {
+  const CPointsMapXYZI& cloud = *keyframe.points;
   const auto& x = cloud.getPointsBufferRef_x();
   const auto& y = cloud.getPointsBufferRef_y();
   const auto& z = cloud.getPointsBufferRef_z();
@@ -40,12 +44,13 @@ std::vector<ViewPoint> viewPointsOf(const CPointsMapXYZI& cloud) {
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (confidence[i] == 0) continue;
     points.push_back({{x[i], y[i], z[i]}, confidence[i]});
+    if (keyframe.sigma) points.back().sigma = keyframe.sigma->at(i);
   }
   return points;
 }
 
 std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe) {
-  return pointsInWorld(viewPointsOf(*keyframe.points), keyframe.T_world_ref);
+  return pointsInWorld(viewPointsOf(keyframe), keyframe.T_world_ref);
 }
 
 std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,

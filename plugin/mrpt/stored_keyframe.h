@@ -1,35 +1,38 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
-#include <mrpt/obs/CObservationPointCloud.h>
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/cloud/cloud_point.h"
 #include "maps/cloud/keyframe_cloud.h"
+#include "plugin/mrpt/mrpt_point_maps.h"
 
 namespace efm {
 
-/// The points of a keyframe in its reference view, and the pose of the view. 16 bytes a point.
+/// The points of a keyframe in its reference view, and the pose of the view. 20 bytes a point.
 /// Transformed to the world, they are the points of the map again, bit for bit.
 struct StoredKeyframe {
   std::int64_t t_ref_ns = 0;
   Rigid3 T_world_ref;
   /// In frame `ref`, float, intensity = confidence. Never null; shared and never changed.
   mrpt::maps::CPointsMapXYZI::Ptr points;
+  /// Standard deviation of depth of each point, metres; null where it is not known: a simplemap has
+  /// no place for it.
+  std::shared_ptr<const std::vector<float>> sigma = nullptr;
 };
 
 /// @param points the keyframe's points in the map.
 StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
                               const std::vector<ViewPoint>& points);
 
-/// The points of a cloud with a confidence. (MRPT's clouds may have points of intensity 0.)
-std::vector<ViewPoint> viewPointsOf(const mrpt::maps::CPointsMapXYZI& cloud);
+/// The points of a keyframe with a confidence. (MRPT's clouds may have points of intensity 0.)
+std::vector<ViewPoint> viewPointsOf(const StoredKeyframe& keyframe);
 /// p_world = T_world_ref * p_ref.
 std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe);
 

@@ -7,12 +7,14 @@
 
 namespace efm {
 
-std::optional<MapExtent> extentOf(const std::vector<CloudPoint>& points) {
-  if (points.empty()) return std::nullopt;
-  MapExtent extent{points.front().p_world, points.front().p_world};
-  for (const CloudPoint& point : points) {
-    extent.min_m = extent.min_m.cwiseMin(point.p_world);
-    extent.max_m = extent.max_m.cwiseMax(point.p_world);
+std::optional<MapExtent> extentOf(const MapCloud& cloud) {
+  if (cloud.empty()) return std::nullopt;
+  const Eigen::Vector3d first = positionIn(cloud, cloud.front());
+  MapExtent extent{first, first};
+  for (const MapPoint& point : cloud) {
+    const Eigen::Vector3d p_world = positionIn(cloud, point);
+    extent.min_m = extent.min_m.cwiseMin(p_world);
+    extent.max_m = extent.max_m.cwiseMax(p_world);
   }
   return extent;
 }

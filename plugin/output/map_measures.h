@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 
 namespace efm {
 
@@ -17,7 +17,7 @@ struct MapExtent {
 };
 
 /// @return nothing without points.
-std::optional<MapExtent> extentOf(const std::vector<CloudPoint>& points);
+std::optional<MapExtent> extentOf(const MapCloud& cloud);
 
 /// How far the refinement moved the keyframes' poses.
 struct PoseShift {

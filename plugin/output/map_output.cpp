@@ -295,15 +295,14 @@ void MapOutput::writeTrajectory(const std::string& name, const std::vector<Stamp
   writeText(folder_ / name, [&](std::ostream& stream) { writeTumTrajectory(stream, poses); });
 }
 
-void MapOutput::writeCloud(const std::string& name, const std::vector<CloudPoint>& points) {
+void MapOutput::writeCloud(const std::string& name, const MapCloud& cloud) {
   removeEarlier();
-  writePcd(folder_ / name, points);
+  writePcd(folder_ / name, cloud);
 }
 
-void MapOutput::writeColouredCloud(const std::vector<CloudPoint>& points,
-                                   const Eigen::Vector3d& upward) {
+void MapOutput::writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward) {
   removeEarlier();
-  writeColouredPly(folder_ / "map.ply", points, coloursByHeight(points, upward));
+  writeColouredPly(folder_ / "map.ply", cloud, coloursByHeight(cloud, upward));
 }
 
 void MapOutput::writeFile(const std::string& name,

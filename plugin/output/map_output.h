@@ -14,7 +14,7 @@
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_mapper.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/output/run_mark.h"
 
 namespace efm {
@@ -82,10 +82,10 @@ class MapOutput {
   /// @param name "trajectory.txt" or "trajectory_tracker.txt".
   void writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses);
   /// @param name "map.pcd" or "points.pcd".
-  void writeCloud(const std::string& name, const std::vector<CloudPoint>& points);
+  void writeCloud(const std::string& name, const MapCloud& cloud);
   /// map.ply, coloured by height.
   /// @param upward a unit vector, frame `world`.
-  void writeColouredCloud(const std::vector<CloudPoint>& points, const Eigen::Vector3d& upward);
+  void writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward);
   /// @param name "map.simplemap".
   /// @param write writes a file at the given path; the file is renamed afterwards.
   void writeFile(const std::string& name,

@@ -8,11 +8,10 @@
 
 namespace efm {
 
-std::vector<PointColour> coloursByHeight(const std::vector<CloudPoint>& points,
-                                         const Eigen::Vector3d& upward) {
-  if (points.empty()) return {};
+std::vector<PointColour> coloursByHeight(const MapCloud& cloud, const Eigen::Vector3d& upward) {
+  if (cloud.empty()) return {};
   std::vector<double> sorted;
-  for (const CloudPoint& point : points) sorted.push_back(upward.dot(point.p_world));
+  for (const MapPoint& point : cloud) sorted.push_back(upward.dot(positionIn(cloud, point)));
   std::sort(sorted.begin(), sorted.end());
   const std::size_t hundredth = sorted.size() / 100;
   const double low = sorted[hundredth];
@@ -22,8 +21,8 @@ std::vector<PointColour> coloursByHeight(const std::vector<CloudPoint>& points,
   for (int level = 0; level < 256; ++level) levels(level) = cv::saturate_cast<uchar>(255 - level);
   const cv::Mat3b table = coloured(levels, Palette::kBrightToDark);
   std::vector<PointColour> colours;
-  for (const CloudPoint& point : points) {
-    const double height = (upward.dot(point.p_world) - low) / range;
+  for (const MapPoint& point : cloud) {
+    const double height = (upward.dot(positionIn(cloud, point)) - low) / range;
     const cv::Vec3b& bgr = table(static_cast<int>(255 * std::clamp(height, 0.0, 1.0)));
     colours.push_back({bgr[2], bgr[1], bgr[0]});
   }

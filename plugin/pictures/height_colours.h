@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "maps/io/point_cloud_file.h"
 
 namespace efm {
@@ -12,7 +12,6 @@ namespace efm {
 /// changes evenly. The lowest and the highest hundredth of the points, where outliers are, do not
 /// widen its range.
 /// @param upward a unit vector, frame `world`.
-std::vector<PointColour> coloursByHeight(const std::vector<CloudPoint>& points,
-                                         const Eigen::Vector3d& upward);
+std::vector<PointColour> coloursByHeight(const MapCloud& cloud, const Eigen::Vector3d& upward);
 
 }  // namespace efm

@@ -50,11 +50,13 @@ Extent robustExtent(std::vector<double>& values) {
 /// The positions that decide what is shown.
 class ShownPositions {
  public:
-  ShownPositions(const std::vector<CloudPoint>& points, const std::vector<StampedPose>& trajectory)
+  ShownPositions(const MapCloud& cloud, const std::vector<StampedPose>& trajectory)
       : trajectory_(trajectory) {
     constexpr std::size_t kSamples = 20'000;
-    const std::size_t step = points.size() / kSamples + 1;
-    for (std::size_t i = 0; i < points.size(); i += step) samples_.push_back(points[i].p_world);
+    const std::size_t step = cloud.size() / kSamples + 1;
+    for (std::size_t i = 0; i < cloud.size(); i += step) {
+      samples_.push_back(positionIn(cloud, cloud[i]));
+    };
   }
 
   Extent ofPoints(const Eigen::Vector3d& axis) const {
@@ -156,9 +158,8 @@ cv::Point2d MapView::pixelOf(const Eigen::Vector3d& p) const {
           area.y + 0.5 * (area.height - 1) - pixels_per_m * offset_m.dot(upwards)};
 }
 
-MapLayout layOutMap(const std::vector<CloudPoint>& points,
-                    const std::vector<StampedPose>& trajectory) {
-  const ShownPositions positions(points, trajectory);
+MapLayout layOutMap(const MapCloud& cloud, const std::vector<StampedPose>& trajectory) {
+  const ShownPositions positions(cloud, trajectory);
   const Eigen::Vector3d up = upwardOf(trajectory);
   const Eigen::Vector3d look = levelLook(trajectory, up);
   const bool looks_one_way = look.norm() > 0.5 * static_cast<double>(trajectory.size());
@@ -206,7 +207,7 @@ MapLayout layOutMap(const std::vector<CloudPoint>& points,
   const int legend_width = std::max(views_width, kMinWidth - 2 * kBorder);
   layout.legend = {(layout.size.width - legend_width) / 2,
                    layout.size.height - kLegendHeight - kBorder, legend_width, kLegendHeight};
-  if (!points.empty()) {
+  if (!cloud.empty()) {
     const Extent heights = positions.ofPoints(up);
     const double least = std::max(heights.length(), 0.01);
     layout.heights_m = {heights.low, heights.low + least};

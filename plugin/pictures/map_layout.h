@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mapping/geometry/trajectory.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 
 namespace efm {
 
@@ -35,9 +35,8 @@ struct MapLayout {
 /// Lays out the top view and the side view of a map, side by side or one above the other and turned
 /// around the direction up such that the scale is as large as possible. The views show 98 % of the
 /// points along each axis and the whole trajectory: far outliers do not change the scale.
-/// @param points may be empty.
+/// @param cloud may be empty.
 /// @param trajectory T_world_ref of the keyframes; not empty where there are no points.
-MapLayout layOutMap(const std::vector<CloudPoint>& points,
-                    const std::vector<StampedPose>& trajectory);
+MapLayout layOutMap(const MapCloud& cloud, const std::vector<StampedPose>& trajectory);
 
 }  // namespace efm

@@ -86,15 +86,16 @@ class Splats {
 
 AxisRange heightsOf(const MapLayout& layout) { return {layout.heights_m[0], layout.heights_m[1]}; }
 
-void drawPoints(cv::Mat3b& picture, const MapView& view, const std::vector<CloudPoint>& points,
+void drawPoints(cv::Mat3b& picture, const MapView& view, const MapCloud& cloud,
                 const MapLayout& layout, double sigma) {
   const Eigen::Vector3d& up = layout.side.upwards;
   const AxisRange heights = heightsOf(layout);
   Splats splats(view.area.size());
   const cv::Point2d corner = view.area.tl();
-  for (const CloudPoint& point : points) {
-    const double level = std::clamp(heights.fractionAlong(point.p_world.dot(up)), 0.0, 1.0);
-    splats.add(view.pixelOf(point.p_world) - corner, static_cast<float>(level));
+  for (const MapPoint& point : cloud) {
+    const Eigen::Vector3d p_world = positionIn(cloud, point);
+    const double level = std::clamp(heights.fractionAlong(p_world.dot(up)), 0.0, 1.0);
+    splats.add(view.pixelOf(p_world) - corner, static_cast<float>(level));
   }
   splats.picture(sigma).copyTo(picture(view.area));
 }
@@ -154,26 +155,26 @@ void drawLegend(cv::Mat3b& picture, const MapLayout& layout, bool has_points) {
 
 }  // namespace
 
-cv::Mat3b drawMap(const std::vector<CloudPoint>& points, const std::vector<StampedPose>& trajectory,
+cv::Mat3b drawMap(const MapCloud& cloud, const std::vector<StampedPose>& trajectory,
                   double voxel_size_m) {
-  if (points.empty() && trajectory.empty()) {
+  if (cloud.empty() && trajectory.empty()) {
     throw std::invalid_argument("a map without points and keyframes has no picture");
   }
-  const MapLayout layout = layOutMap(points, trajectory);
+  const MapLayout layout = layOutMap(cloud, trajectory);
   // Few points on much paper are drawn larger.
   const double pixels_per_point =
-      layout.top.area.area() / (1.0 + static_cast<double>(points.size()));
+      layout.top.area.area() / (1.0 + static_cast<double>(cloud.size()));
   const double sigma = std::clamp(
       std::max(0.6 * voxel_size_m * layout.top.pixels_per_m, 0.1 * std::sqrt(pixels_per_point)),
       0.8, 3.0);
   cv::Mat3b picture(layout.size, cv::Vec3b(255, 255, 255));
   for (const auto& [view, name] : {std::pair{layout.top, "top view"}, {layout.side, "side view"}}) {
-    drawPoints(picture, view, points, layout, sigma);
+    drawPoints(picture, view, cloud, layout, sigma);
     drawTrajectory(picture, view, trajectory);
     cv::rectangle(picture, view.area, kMapGrey);
     writeText(picture, name, view.area.tl() - cv::Point(0, 8), kLabelScale);
   }
-  drawLegend(picture, layout, !points.empty());
+  drawLegend(picture, layout, !cloud.empty());
   return picture;
 }
 

@@ -9,7 +9,7 @@
 
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/trajectory.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/viewer/keyframe_pictures.h"
 #include "plugin/viewer/page_points.h"
 
@@ -17,9 +17,9 @@ namespace efm {
 
 /// The content of map.html.
 struct MapPage {
-  std::string name;                       ///< Of the map, for the title.
-  const std::vector<CloudPoint>& points;  ///< Of the map, with their first keyframes.
-  double voxel_size_m;                    ///< Of the map.
+  std::string name;        ///< Of the map, for the title.
+  const MapCloud& points;  ///< Of the map, with their first keyframes.
+  double voxel_size_m;     ///< Of the map.
   /// T_world_ref of the keyframes at t_ref; a point's first keyframe is an index of it.
   const std::vector<StampedPose>& trajectory;
   const KeyframePictures& pictures;

@@ -17,8 +17,9 @@ constexpr std::uint32_t kFree = std::numeric_limits<std::uint32_t>::max();
 
 using GridCell = Eigen::Matrix<std::int64_t, 3, 1>;
 
-GridCell gridCellOf(const CloudPoint& point, const Eigen::Vector3d& origin_m, double cell_m) {
-  return ((point.p_world - origin_m) / cell_m).array().floor().cast<std::int64_t>();
+GridCell gridCellOf(const Eigen::Vector3d& p_world, const Eigen::Vector3d& origin_m,
+                    double cell_m) {
+  return ((p_world - origin_m) / cell_m).array().floor().cast<std::int64_t>();
 }
 
 /// Mixes the bits of the three indices (the constants are odd and random).
@@ -31,8 +32,8 @@ std::uint64_t hashOf(const GridCell& cell) {
   return hash;
 }
 
-bool isBetter(const CloudPoint& a, const CloudPoint& b) {
-  return std::tie(a.support, a.confidence) > std::tie(b.support, b.confidence);
+bool isBetter(const MapPoint& a, const MapPoint& b) {
+  return std::tie(a.support, a.intensity) > std::tie(b.support, b.intensity);
 }
 
 /// A stride near the golden section that visits each of n points once.
@@ -60,22 +61,22 @@ void PagePoint::appendTo(std::vector<std::uint8_t>& bytes) const {
   append(keyframe);
 }
 
-PagePoints::PagePoints(const std::vector<CloudPoint>& points, double voxel_size_m,
-                       std::size_t limit)
-    : points_(points), limit_(limit) {
-  if (points.empty()) return;
-  Eigen::Vector3d max_m = points.front().p_world;
-  std::uint64_t last_keyframe = 0;
+PagePoints::PagePoints(const MapCloud& cloud, double voxel_size_m, std::size_t limit)
+    : cloud_(cloud), limit_(limit) {
+  if (cloud.empty()) return;
+  Eigen::Vector3d max_m = positionIn(cloud, cloud.front());
+  std::uint32_t last_keyframe = 0;
   origin_m_ = max_m;
-  for (const CloudPoint& point : points) {
-    origin_m_ = origin_m_.cwiseMin(point.p_world);
-    max_m = max_m.cwiseMax(point.p_world);
+  for (const MapPoint& point : cloud) {
+    const Eigen::Vector3d p_world = positionIn(cloud, point);
+    origin_m_ = origin_m_.cwiseMin(p_world);
+    max_m = max_m.cwiseMax(p_world);
     last_keyframe = std::max(last_keyframe, point.first_keyframe);
   }
   step_m_ = (max_m - origin_m_) / kMaxCell;
   keyframe_step_ = last_keyframe / 65536 + 1;
   findConfidences();
-  if (points.size() > limit) {
+  if (cloud.size() > limit) {
     double cell_m = voxel_size_m;
     const auto wanted = 0.97 * static_cast<double>(limit);
     constexpr int kMaxTrials = 20;  // four to ten suffice
@@ -96,8 +97,8 @@ PagePoints::PagePoints(const std::vector<CloudPoint>& points, double voxel_size_
 double PagePoints::countCells(double cell_m) const {
   const std::uint64_t divisor = limit_ / 20'000 + 1;
   std::unordered_set<std::uint64_t> cells;
-  for (const CloudPoint& point : points_) {
-    const std::uint64_t hash = hashOf(gridCellOf(point, origin_m_, cell_m));
+  for (const MapPoint& point : cloud_) {
+    const std::uint64_t hash = hashOf(gridCellOf(positionIn(cloud_, point), origin_m_, cell_m));
     if ((hash >> 32U) % divisor == 0) cells.insert(hash);
   }
   return static_cast<double>(divisor) * static_cast<double>(cells.size());
@@ -109,16 +110,19 @@ bool PagePoints::thin(double cell_m) {
   while (slots < 2 * limit_) slots *= 2;
   std::vector<std::uint32_t> table(slots, kFree);  // open addressing
   std::size_t used = 0;
-  for (std::uint32_t i = 0; i < points_.size(); ++i) {
-    const GridCell cell = gridCellOf(points_[i], origin_m_, cell_m);
+  const auto cellAt = [&](std::uint32_t i) {
+    return gridCellOf(positionIn(cloud_, cloud_[i]), origin_m_, cell_m);
+  };
+  for (std::uint32_t i = 0; i < cloud_.size(); ++i) {
+    const GridCell cell = cellAt(i);
     std::size_t slot = hashOf(cell) & (slots - 1);
-    while (table[slot] != kFree && gridCellOf(points_[table[slot]], origin_m_, cell_m) != cell) {
+    while (table[slot] != kFree && cellAt(table[slot]) != cell) {
       slot = (slot + 1) & (slots - 1);
     }
     if (table[slot] == kFree) {
       if (++used > limit_) return false;
       table[slot] = i;
-    } else if (isBetter(points_[i], points_[table[slot]])) {
+    } else if (isBetter(cloud_[i], cloud_[table[slot]])) {
       table[slot] = i;
     }
   }
@@ -129,9 +133,9 @@ bool PagePoints::thin(double cell_m) {
 }
 
 void PagePoints::findConfidences() {
-  std::vector<float> confidences(points_.size());
-  std::transform(points_.begin(), points_.end(), confidences.begin(),
-                 [](const CloudPoint& point) { return point.confidence; });
+  std::vector<float> confidences(cloud_.size());
+  std::transform(cloud_.begin(), cloud_.end(), confidences.begin(),
+                 [](const MapPoint& point) { return point.intensity; });
   const auto percentile = [&](std::size_t percent) {
     const auto at =
         confidences.begin() + static_cast<std::ptrdiff_t>((confidences.size() - 1) * percent / 100);
@@ -144,13 +148,14 @@ void PagePoints::findConfidences() {
 
 PagePoint PagePoints::at(std::size_t i) const {
   const std::size_t walked = (i * stride_) % size();
-  const CloudPoint& point = points_[kept_.empty() ? walked : kept_[walked]];
+  const MapPoint& point = cloud_[kept_.empty() ? walked : kept_[walked]];
+  const Eigen::Vector3d p_world = positionIn(cloud_, point);
   PagePoint out;
   for (int axis = 0; axis < 3; ++axis) {
-    out.cell[axis] = cellOf(point.p_world[axis] - origin_m_[axis], step_m_[axis]);
+    out.cell[axis] = cellOf(p_world[axis] - origin_m_[axis], step_m_[axis]);
   }
   const float range = std::log(high_confidence_ / low_confidence_);
-  const float level = range > 0 ? std::log(point.confidence / low_confidence_) / range : 1.0F;
+  const float level = range > 0 ? std::log(point.intensity / low_confidence_) / range : 1.0F;
   out.confidence = static_cast<std::uint8_t>(std::lround(255 * std::clamp(level, 0.0F, 1.0F)));
   out.support = static_cast<std::uint8_t>(std::min<std::uint32_t>(point.support, 255));
   out.keyframe = static_cast<std::uint16_t>(point.first_keyframe / keyframe_step_);

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 
 namespace efm {
 
@@ -31,14 +31,14 @@ class PagePoints {
  public:
   static constexpr std::size_t kDefaultLimit = 2'000'000;
 
-  /// Keeps a reference to the points. Memory: 4 bytes per point of the page, and while points are
+  /// Keeps a reference to the cloud. Memory: 4 bytes per point of the page, and while points are
   /// thinned 4 bytes per cell of a hash table, twice the limit or more.
-  /// @param points all finite, with confidences above 0.
+  /// @param cloud all finite, with confidences above 0.
   /// @param voxel_size_m of the map. Above 0.
-  explicit PagePoints(const std::vector<CloudPoint>& points, double voxel_size_m,
+  explicit PagePoints(const MapCloud& cloud, double voxel_size_m,
                       std::size_t limit = kDefaultLimit);
 
-  std::size_t size() const { return points_.size() <= limit_ ? points_.size() : kept_.size(); }
+  std::size_t size() const { return cloud_.size() <= limit_ ? cloud_.size() : kept_.size(); }
   /// @param i below `size`.
   PagePoint at(std::size_t i) const;
 
@@ -58,7 +58,7 @@ class PagePoints {
   bool thin(double cell_m);
   void findConfidences();
 
-  const std::vector<CloudPoint>& points_;
+  const MapCloud& cloud_;
   std::size_t limit_;
   std::vector<std::uint32_t> kept_;  // indices, where points were thinned
   double thinned_m_ = 0;

@@ -107,11 +107,11 @@ void MapScene::show(const WatchedMap& snapshot) {
 void MapScene::showPoints(const WatchedMap& snapshot) {
   static const cv::Mat3b kColours = heightColours();
   auto& cloud = objectOf<CPointCloudColoured>(*scene_, "cloud");
-  const std::size_t step = 1 + (snapshot.points.size() / (kMaxPoints + 1));
+  const std::size_t step = 1 + (snapshot.points->size() / (kMaxPoints + 1));
   std::vector<Eigen::Vector3d> points;
-  points.reserve(snapshot.points.size() / step + 1);
-  for (std::size_t i = 0; i < snapshot.points.size(); i += step) {
-    points.push_back(inScene(snapshot.points[i].p_world));
+  points.reserve(snapshot.points->size() / step + 1);
+  for (std::size_t i = 0; i < snapshot.points->size(); i += step) {
+    points.push_back(inScene(positionIn(*snapshot.points, (*snapshot.points)[i])));
   }
   Eigen::Vector3d low = inScene(snapshot.trajectory.back().T_world_rig.translation), high = low;
   for (int axis = 0; axis < 3 && !points.empty(); ++axis) {

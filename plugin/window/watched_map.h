@@ -7,7 +7,7 @@
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 
 namespace efm {
 
@@ -15,7 +15,7 @@ namespace efm {
 struct WatchedMap {
   KeyframeDepthMap keyframe;            ///< The newest one.
   DepthPlanesOptions planes;            ///< The limits of its depths.
-  std::vector<CloudPoint> points;       ///< Of the whole map.
+  MapCloud::ConstPtr points;            ///< Of the whole map.
   std::vector<StampedPose> trajectory;  ///< T_world_ref of all keyframes; not empty.
   std::vector<std::string> lines;       ///< Counts and rates, as text.
 };

@@ -22,7 +22,8 @@ std::vector<CloudPoint> cloudOf(const SyntheticWindow& made, int planes) {
   KeyframeMapper mapper(made.rig, {0, 1}, options);
   const auto keyframe =
       mapper.map(made.window, {made.events.begin(), made.events.end()}, made.trajectory);
-  return keyframe ? keyframeCloud(*keyframe) : std::vector<CloudPoint>();
+  if (!keyframe) return {};
+  return pointsInWorld(viewPoints(*keyframe), keyframe->T_world_ref);
 }
 
 /// Random points in a hall, in keyframes of a hundred thousand.

@@ -201,12 +201,11 @@ class Poller {
   std::thread thread_;
 };
 
-std::uint64_t hashOf(const std::vector<CloudPoint>& points) {
+std::uint64_t hashOf(const MapCloud& cloud) {
   std::uint64_t hash = 1469598103934665603ULL;  // FNV-1a
-  for (const CloudPoint& point : points) {
-    const auto* bytes = reinterpret_cast<const unsigned char*>(point.p_world.data());
-    for (std::size_t i = 0; i < 3 * sizeof(double); ++i)
-      hash = (hash ^ bytes[i]) * 1099511628211ULL;
+  for (const MapPoint& point : cloud) {
+    const auto* bytes = reinterpret_cast<const unsigned char*>(point.data);
+    for (std::size_t i = 0; i < 3 * sizeof(float); ++i) hash = (hash ^ bytes[i]) * 1099511628211ULL;
   }
   return hash;
 }
@@ -303,8 +302,8 @@ void run(const Arguments& arguments) {
   fmt::print("from the last event of a window to its keyframe: {}\n", of_keyframes.text());
   printCounts(builder.status());
   fmt::print("{} at the end{}; {} points, hash {:016x}\n", memory(), refinementOf(builder.status()),
-             points.size(), hashOf(points));
-  if (!arguments.pcd.empty()) writePcd(arguments.pcd, points);
+             points->size(), hashOf(*points));
+  if (!arguments.pcd.empty()) writePcd(arguments.pcd, *points);
 }
 
 }  // namespace

@@ -98,9 +98,9 @@ TEST_F(DeskStereo, TheHarmonicMeanRejectsOutliersInShortWindows) {
 
 TEST_F(DeskStereo, TheMapLiesOnTheTrueSurfaces) {
   const auto points = test::globalCloudOf(recording_->map(options(0.5, 0.25)));
-  ASSERT_GT(points.size(), 10'000U);
-  const double median_m = recording_->medianDistanceToSurfaces(points);
-  std::cout << "map: " << points.size() << " points, median distance to the surfaces "
+  ASSERT_GT(points->size(), 10'000U);
+  const double median_m = recording_->medianDistanceToSurfaces(*points);
+  std::cout << "map: " << points->size() << " points, median distance to the surfaces "
             << 100 * median_m << " cm\n";
   EXPECT_LE(median_m, 0.03);
 }

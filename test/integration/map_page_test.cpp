@@ -135,7 +135,7 @@ TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
   const ReferenceView view{640, 480, 300, 300, 320, 240};
   {
     std::ofstream file(folder() / "map.html", std::ios::binary);
-    writeMapPage(file, {"terraces", points, 0.05, trajectory, pictures, view,
+    writeMapPage(file, {"terraces", *mapCloudOf(points, 0.05), 0.05, trajectory, pictures, view,
                         contentOf(EFM_SOURCE_DIR "/test/integration/page_report.json")});
   }
   EXPECT_LT(file_size(folder() / "map.html"), 40'000'000U);

@@ -63,28 +63,28 @@ std::vector<DepthPair> SimulatedRecording::pairs(const KeyframeDepthMap& keyfram
   return pairDepths(keyframe.map.depth, truthOf(keyframe), pairing);
 }
 
-double SimulatedRecording::medianDistanceToSurfaces(const std::vector<CloudPoint>& points) const {
+double SimulatedRecording::medianDistanceToSurfaces(const MapCloud& cloud) const {
   std::vector<double> distances;
-  for (const CloudPoint& point : points) {
-    distances.push_back(nearestSurface(simulation_.scene, point.p_world).distance_m);
+  for (const MapPoint& point : cloud) {
+    distances.push_back(nearestSurface(simulation_.scene, positionIn(cloud, point)).distance_m);
   }
   if (distances.empty()) return std::numeric_limits<double>::infinity();
   return upperMedian(distances);
 }
 
-double SimulatedRecording::shareBeyond(const std::vector<CloudPoint>& points,
-                                       double distance_m) const {
-  const auto beyond = std::count_if(points.begin(), points.end(), [&](const CloudPoint& point) {
-    return nearestSurface(simulation_.scene, point.p_world).distance_m > distance_m;
+double SimulatedRecording::shareBeyond(const MapCloud& cloud, double distance_m) const {
+  const auto beyond = std::count_if(cloud.begin(), cloud.end(), [&](const MapPoint& point) {
+    return nearestSurface(simulation_.scene, positionIn(cloud, point)).distance_m > distance_m;
   });
-  return static_cast<double>(beyond) / static_cast<double>(points.size());
+  return static_cast<double>(beyond) / static_cast<double>(cloud.size());
 }
 
-std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes,
-                                      const GlobalCloudOptions& options) {
+MapCloud::ConstPtr globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes,
+                                 const GlobalCloudOptions& options) {
   GlobalCloud cloud(options);
   for (const KeyframeDepthMap& keyframe : keyframes) {
-    cloud.insert(cloud.keyframes(), keyframeCloud(keyframe), keyframe.T_world_ref);
+    cloud.insert(cloud.keyframes(), pointsInWorld(viewPoints(keyframe), keyframe.T_world_ref),
+                 keyframe.T_world_ref);
   }
   return cloud.points();
 }

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
-#include "maps/cloud/cloud_point.h"
 #include "maps/cloud/global_cloud.h"
+#include "maps/cloud/map_point.h"
 #include "maps/metrics/depth_metrics.h"
 #include "tracking_stub/presets/simulation_preset.h"
 
@@ -31,9 +31,9 @@ class SimulatedRecording {
   std::vector<DepthPair> pairs(const KeyframeDepthMap& keyframe) const;
 
   /// Median distance of a cloud's points to the nearest point of any surface, metres.
-  double medianDistanceToSurfaces(const std::vector<CloudPoint>& points) const;
+  double medianDistanceToSurfaces(const MapCloud& cloud) const;
   /// Share of a cloud's points that are farther than this from any surface.
-  double shareBeyond(const std::vector<CloudPoint>& points, double distance_m) const;
+  double shareBeyond(const MapCloud& cloud, double distance_m) const;
 
  private:
   explicit SimulatedRecording(Simulation simulation);
@@ -44,7 +44,7 @@ class SimulatedRecording {
 };
 
 /// All keyframes in one cloud of voxels of a centimetre.
-std::vector<CloudPoint> globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes,
-                                      const GlobalCloudOptions& options = {});
+MapCloud::ConstPtr globalCloudOf(const std::vector<KeyframeDepthMap>& keyframes,
+                                 const GlobalCloudOptions& options = {});
 
 }  // namespace efm::test

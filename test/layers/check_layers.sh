@@ -35,11 +35,12 @@ forbid mapping/kernels "mapping/[^k]" "may include mapping/kernels/ alone"
 forbid maps "(tracking_stub|plugin|test)/" "may include mapping/ and maps/"
 forbid maps "$mrpt|$recordings|$front" "may use PCL, Ceres and what mapping/ uses"
 forbid maps "$ceres" "Ceres stays in one pair of files" '^maps/refinement/pose_refinement\.(h|cpp):'
-forbid maps "$pcl|liblzf" "PCL stays in point_search, liblzf in pcd_file" '^maps/(cloud/point_search|io/pcd_file)\.cpp:'
+forbid maps "$pcl" "PCL stays in cloud/, at its point type and its searches" '^maps/cloud/(map_point|point_search)\.(h|cpp):'
+forbid maps "liblzf" "liblzf stays in pcd_file" '^maps/io/pcd_file\.cpp:'
 forbid tracking_stub "(maps|plugin|test)/" "may include mapping/ and tracking_stub/"
 forbid tracking_stub "$mrpt|$pcl|$ceres|$recordings|$front" "may use what mapping/ uses"
 forbid plugin "(test|plugin/app)/" "never includes the application or the tests" '^plugin/app/'
-forbid plugin "$pcl" "PCL stays in cloud_alignment" '^plugin/evaluation/cloud_alignment\.cpp:'
+forbid plugin "$pcl" "PCL stays in maps/ (map_point.h is its header) and cloud_alignment" '^plugin/evaluation/cloud_alignment\.cpp:'
 forbid plugin "$ceres" "refinement is reached through maps/"
 forbid plugin "$recordings" "HDF5 stays in plugin/hdf5/ and plugin/writers/" '^plugin/(hdf5|writers)/'
 

@@ -2,18 +2,29 @@
 #pragma once
 
 #include <algorithm>
+#include <cstring>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 
 namespace efm::test {
 
-inline bool sameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                    [](const CloudPoint& p, const CloudPoint& q) {
-                      return p.p_world == q.p_world && p.confidence == q.confidence &&
-                             p.support == q.support && p.first_keyframe == q.first_keyframe;
+inline bool sameBits(const MapCloud& a, const MapCloud& b) {
+  return a.sensor_origin_ == b.sensor_origin_ &&
+         std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                    [](const MapPoint& p, const MapPoint& q) {
+                      return std::memcmp(&p, &q, sizeof(MapPoint)) == 0;
                     });
+}
+
+/// The points of a cloud in the world.
+inline std::vector<CloudPoint> worldPoints(const MapCloud& cloud) {
+  std::vector<CloudPoint> points;
+  for (const MapPoint& point : cloud) {
+    points.push_back({positionIn(cloud, point), point.intensity, point.support,
+                      point.first_keyframe, point.sigma});
+  }
+  return points;
 }
 
 }  // namespace efm::test

@@ -35,7 +35,9 @@ std::vector<ViewPoint> randomPoints(std::mt19937& random, std::size_t count) {
   while (points.size() < count) {
     const float x = uniform(random);
     const float y = uniform(random);
-    points.push_back({{x, y, 2 + 0.2F * uniform(random)}, 1 + uniform(random) / 2});
+    const float depth_m = 2 + 0.2F * uniform(random);
+    const float confidence = 1 + uniform(random) / 2;
+    points.push_back({{x, y, depth_m}, confidence, 0.01F * confidence});
   }
   return points;
 }
@@ -52,7 +54,7 @@ struct PosedKeyframes {
   std::vector<std::vector<ViewPoint>> points;
   std::vector<Rigid3> T_world_ref;
 
-  std::vector<CloudPoint> pointsOf(const GlobalCloudOptions& options) const {
+  MapCloud::ConstPtr pointsOf(const GlobalCloudOptions& options) const {
     GlobalCloud cloud(options);
     for (std::size_t i = 0; i < points.size(); ++i) {
       cloud.insert(i, pointsInWorld(points[i], T_world_ref[i]), T_world_ref[i]);
@@ -94,14 +96,14 @@ void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
     for (std::size_t i = 0; i < keyframes.points.size() - fixed; ++i) {
       keyframes.T_world_ref[fixed + i] = cloud.T_world_ref()[i];
     }
-    RC_ASSERT(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
+    RC_ASSERT(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
   }
   cloud.applyPending(0);
   for (std::size_t i = fixed; i < asked.size(); ++i) {
     RC_ASSERT(isSame(cloud.T_world_ref()[i - fixed], asked[i]));
   }
   keyframes.T_world_ref = asked;
-  RC_ASSERT(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
+  RC_ASSERT(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
 }
 
 RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
@@ -234,7 +236,7 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
     const Rigid3& T_world_ref = cloud.T_world_ref()[k];
     same.insert(k + 1, pointsInWorld(keyframes.points[k], T_world_ref), T_world_ref);
   }
-  EXPECT_TRUE(test::sameBits(cloud.cloud().points(), same.points()));
+  EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *same.points()));
 }
 
 TEST(RefinedCloud, WithoutItsNewestKeyframeItIsAsBefore) {
@@ -252,7 +254,7 @@ TEST(RefinedCloud, WithoutItsNewestKeyframeItIsAsBefore) {
   cloud.removeNewest();
   cloud.applyPending(0);
   EXPECT_EQ(cloud.T_world_ref().size(), 3U);
-  EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
+  EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
 }
 
 TEST(RefinedCloud, AKeyframeThatCannotBeMovedKeepsItsPose) {
@@ -270,13 +272,13 @@ TEST(RefinedCloud, AKeyframeThatCannotBeMovedKeepsItsPose) {
     T_world_ref.translation = {too_far_m, 0, 0};
     cloud.move({{1, T_world_ref}});
     EXPECT_THROW(cloud.applyPending(0), std::invalid_argument);
-    EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
+    EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
     EXPECT_NO_THROW(cloud.applyPending(0)) << "it is not tried again";
   }
   keyframes.T_world_ref[1] = randomPose(random, 0.1, 0.1);
   cloud.move({{1, keyframes.T_world_ref[1]}});
   cloud.applyPending(0);
-  EXPECT_TRUE(test::sameBits(cloud.cloud().points(), keyframes.pointsOf(options)));
+  EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ class PointCloudFile : public testing::Test {
   /// The error of writing one point, or none.
   static std::string writeRefusalOf(const std::filesystem::path& path, const CloudPoint& point) {
     try {
-      writePcd(path, {{{1, 2, 3}, 1.0F}, point});
+      writePcd(path, *mapCloudOf({{{1, 2, 3}, 1.0F}, point}, 0.01));
     } catch (const std::runtime_error& error) {
       return error.what();
     }
@@ -106,21 +106,27 @@ std::string asLzf(const std::string& bytes) {
   return packed;
 }
 
-/// The same points as a file of each format and encoding: names and bytes.
+/// The same points as a file of each format and encoding: names and bytes. All but the first have
+/// the fields of maps before they had support and sigma.
 std::vector<std::pair<std::string, std::string>> filesOf(const std::vector<CloudPoint>& points) {
   std::ostringstream pcd;
-  writePcdTo(pcd, points);
-  const std::string pcd_header = pcd.str().substr(0, pcd.str().find("binary\n"));
-  const std::string ply_header = " 1.0\nelement vertex " + std::to_string(points.size()) +
+  writePcdTo(pcd, *mapCloudOf(points, 1e9));
+  const std::string count = std::to_string(points.size());
+  const std::string pcd_header =
+      "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH " +
+      count + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + count + "\nDATA ";
+  const std::string ply_header = " 1.0\nelement vertex " + count +
                                  "\nproperty float x\nproperty float y\nproperty float z\n"
                                  "property float intensity\nend_header\n";
   std::ostringstream text;
   text.precision(9);
   std::vector<std::vector<float>> columns(4);
+  std::string by_point;
   for (const CloudPoint& point : points) {
     const Eigen::Vector3f p = point.p_world.cast<float>();
     text << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << point.confidence << '\n';
     for (int axis = 0; axis < 3; ++axis) columns[axis].push_back(p[axis]);
+    by_point += rawFloats({p.x(), p.y(), p.z(), point.confidence});
     columns[3].push_back(point.confidence);
   }
   std::string by_field;
@@ -131,8 +137,8 @@ std::vector<std::pair<std::string, std::string>> filesOf(const std::vector<Cloud
           {"compressed.pcd", pcd_header + "binary_compressed\n" +
                                  raw(static_cast<std::uint32_t>(packed.size())) +
                                  raw(static_cast<std::uint32_t>(by_field.size())) + packed},
-          {"binary.ply", "ply\nformat binary_little_endian" + ply_header +
-                             pcd.str().substr(pcd_header.size() + sizeof("binary"))},
+          {"older.pcd", pcd_header + "binary\n" + by_point},
+          {"binary.ply", "ply\nformat binary_little_endian" + ply_header + by_point},
           {"text.ply", "ply\nformat ascii" + ply_header + text.str()}};
 }
 
@@ -150,9 +156,9 @@ void expectNear(const std::vector<CloudPoint>& read, const std::vector<CloudPoin
 }
 
 TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
-  const std::vector<CloudPoint> points = {{{450'000.123456789, 5'200'000.25, -3}, 17.5F, 4},
-                                          {{1e-9, 0, 2}, 0.25F, 70'000}};
-  writeColouredPly(folder_ / "map.ply", points, {{1, 2, 3}, {254, 255, 0}});
+  const std::vector<CloudPoint> points = {{{450'000.125, 5'200'000.25, -3}, 17.5F, 4},
+                                          {{449'999.5, 5'200'001, 2}, 0.25F, 70'000}};
+  writeColouredPly(folder_ / "map.ply", *mapCloudOf(points, 0.01), {{1, 2, 3}, {254, 255, 0}});
   const PointCloudContent content = readPointCloud(folder_ / "map.ply");
   ASSERT_EQ(content.points.size(), 2U);
   for (int i = 0; i < 2; ++i) EXPECT_EQ(content.points[i].p_world, points[i].p_world);
@@ -162,8 +168,9 @@ TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
                                      "\nproperty float confidence\nproperty uint support\n"),
                            EndsWith(std::string("\xFE\xFF\0", 3) + raw(0.25F) + raw(70'000U))));
   EXPECT_EQ(filesInFolder(), 1U);
-  EXPECT_THROW(writeColouredPly(folder_ / "map.ply", {{{1, 2, NAN}, 1, 1}}, {{0, 0, 0}}),
-               std::runtime_error);
+  EXPECT_THROW(
+      writeColouredPly(folder_ / "map.ply", *mapCloudOf({{{1, 2, NAN}, 1, 1}}, 0.01), {{0, 0, 0}}),
+      std::runtime_error);
   EXPECT_EQ(readPointCloud(folder_ / "map.ply").points.size(), 2U) << "the earlier file stays";
 }
 
@@ -172,7 +179,7 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
     GTEST_SKIP() << "the package pcl-tools is not installed";
   }
   const std::vector<CloudPoint> points = plainPoints(1000);
-  writePcd(folder_ / "map.pcd", points);
+  writePcd(folder_ / "map.pcd", *mapCloudOf(points, 1e9));
   EXPECT_EQ(filesInFolder(), 1U) << "no temporary file stays";
   const auto run = [this](const std::string& command) {
     return std::system(
@@ -218,7 +225,7 @@ TEST_F(PointCloudFile, IsReadBackAsTheSameFloatsOfAnyMagnitude) {
   while (points.size() < 5000) {
     points.push_back({{any_float(), any_float(), any_float()}, any_float()});
   }
-  writePcd(folder_ / "map.pcd", points);
+  writePcd(folder_ / "map.pcd", *mapCloudOf(points, 1e9));
   const PointCloudContent content = readPointCloud(folder_ / "map.pcd");
   ASSERT_EQ(content.points.size(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {

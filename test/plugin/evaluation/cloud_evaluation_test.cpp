@@ -33,7 +33,7 @@ class EvaluateCloud : public TemporaryFolder {
     if (path.extension() == ".ply") {
       writePly(path, positions);
     } else {
-      writePcd(path, points);
+      writePcd(path, *mapCloudOf(points, 0.01));
     }
     return path;
   }
@@ -110,7 +110,7 @@ TEST_F(EvaluateCloud, AlignsAMapWithTheTruthOnlyWhereAsked) {
     truth.push_back(p);
     map.push_back({p.cast<double>() + Eigen::Vector3d::Constant(0.125), 1, 1});
   }
-  writePcd(folder() / "map.pcd", map);
+  writePcd(folder() / "map.pcd", *mapCloudOf(map, 0.01));
   writePly(folder() / "truth.ply", truth);
   const auto as_it_is = evaluateCloud(folder() / "map.pcd", folder() / "truth.ply", {{0.05}, {}});
   EXPECT_GT(as_it_is.errors.accuracy.mean, 0.1);

@@ -189,9 +189,9 @@ TEST_F(RawlogKinds, TheBuilderMapsBothAsMrptReadsThem) {
     }
     builder.finish();
     std::vector<Eigen::Vector4f>& map = maps.emplace_back();
-    for (const CloudPoint& point : builder.points()) {
-      const Eigen::Vector3f p_world = point.p_world.cast<float>();
-      map.emplace_back(p_world.x(), p_world.y(), p_world.z(), point.confidence);
+    const MapCloud::ConstPtr points = builder.points();
+    for (const MapPoint& point : *points) {
+      map.emplace_back(point.x, point.y, point.z, point.intensity);
     }
     mrpt::poses::CPose3D pose;
     builder.getCurrentPoseEstimation()->getMean(pose);

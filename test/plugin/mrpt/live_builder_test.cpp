@@ -30,7 +30,7 @@ TEST(LiveBuilder, MakesTheMapOfPlayback) {
   CEventFusionMapBuilder live(liveOptions());
   playPatiently(live, observations);
 
-  ASSERT_GT(live.points().size(), 30U);
+  ASSERT_GT(live.points()->size(), 30U);
   expectSameBits(live.points(), playback.points());
   EXPECT_EQ(keyframeTimes(live), keyframeTimes(playback));
   EXPECT_EQ(live.getCurrentlyBuiltMapSize(), 3U);
@@ -40,7 +40,7 @@ TEST(LiveBuilder, MakesTheMapOfPlayback) {
   const auto* metric_map = live.getCurrentlyBuiltMetricMap();
   ASSERT_EQ(metric_map->maps.size(), 1U);
   EXPECT_EQ(dynamic_cast<const mrpt::maps::CPointsMapXYZI&>(*metric_map->maps[0]).size(),
-            live.points().size());
+            live.points()->size());
   const SessionStatus status = live.status();
   expectSumsAgree(status);
   EXPECT_EQ(status.live->dropRatio(), 0);
@@ -69,7 +69,7 @@ TEST(LiveBuilder, ABudgetInSensorTimeGivesTheSameMapAtAnyPace) {
   const Observations observations = observationsOf(SyntheticRecording());
   EventFusionOptions options = liveOptions();
   options.live.max_event_rate = 1000;  // of some 4000
-  std::vector<std::vector<CloudPoint>> maps;
+  std::vector<MapCloud::ConstPtr> maps;
   for (const bool patient : {true, false}) {
     CEventFusionMapBuilder builder(options);
     if (patient) {
@@ -119,7 +119,7 @@ TEST(LiveBuilder, TheCallerNeverWaitsAndNewestInputWins) {
   // All of these return while the mapping stands still.
   for (; i < observations.size(); ++i) builder.processObservation(observations[i]);
   EXPECT_GE(builder.getCurrentlyBuiltMapSize(), 1U);
-  EXPECT_FALSE(builder.points().empty());
+  EXPECT_FALSE(builder.points()->empty());
   const auto pose = builder.getCurrentPoseEstimation();
   EXPECT_NEAR(pose->getMeanVal().x(), 1.6, 1e-9) << "the newest pose, though nothing is mapped";
   const SessionStatus before = builder.status();
@@ -537,13 +537,13 @@ TEST_P(BuilderOfBothModes, TheCloudsOfAnInitialMapAreCopied) {
   CEventFusionMapBuilder builder(options());
   playPatiently(builder, observationsOf(SyntheticRecording()));
   builder.getCurrentlyBuiltMap(simple_map);
-  const std::size_t points = builder.points().size();
+  const std::size_t points = builder.points()->size();
   builder.initialize(simple_map);
   for (const auto& [pose, frame] : simple_map) {
     auto seen = frame->getObservationByClass<mrpt::obs::CObservationPointCloud>();
     seen->pointcloud->clear();
   }
-  EXPECT_EQ(builder.points().size(), points);
+  EXPECT_EQ(builder.points()->size(), points);
   mrpt::maps::CSimpleMap again;
   builder.getCurrentlyBuiltMap(again);
   const auto [pose, frame] = again.get(0);

@@ -6,11 +6,11 @@
 
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
+#include "test/maps/cloud/cloud_points.h"
 #include "test/plugin/session/synthetic_recording.h"
 
 namespace efm {
@@ -50,22 +50,25 @@ inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(
   return observations;
 }
 
-inline void expectSameBits(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_EQ(a[i].p_world, b[i].p_world);
-    EXPECT_EQ(a[i].confidence, b[i].confidence);
-    EXPECT_EQ(a[i].support, b[i].support);
-  }
+inline void expectSameBits(const MapCloud::ConstPtr& a, const MapCloud::ConstPtr& b) {
+  EXPECT_EQ(a->size(), b->size());
+  EXPECT_TRUE(test::sameBits(*a, *b));
+}
+
+/// A simplemap has no place for the sigma of its points.
+inline MapCloud::ConstPtr withoutSigma(const MapCloud::ConstPtr& cloud) {
+  auto copy = pcl::make_shared<MapCloud>(*cloud);
+  for (MapPoint& point : *copy) point.sigma = MapPoint().sigma;
+  return copy;
 }
 
 /// The same points up to a distance, with the same support.
-inline void expectNear(const std::vector<CloudPoint>& a, const std::vector<CloudPoint>& b,
+inline void expectNear(const MapCloud::ConstPtr& a, const MapCloud::ConstPtr& b,
                        double tolerance_m) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    EXPECT_LT((a[i].p_world - b[i].p_world).norm(), tolerance_m);
-    EXPECT_EQ(a[i].support, b[i].support);
+  ASSERT_EQ(a->size(), b->size());
+  for (std::size_t i = 0; i < a->size(); ++i) {
+    EXPECT_LT((positionIn(*a, a->at(i)) - positionIn(*b, b->at(i))).norm(), tolerance_m);
+    EXPECT_EQ(a->at(i).support, b->at(i).support);
   }
 }
 

@@ -133,7 +133,7 @@ TEST_F(MapOutputTest, AResultReplacesOneOfTheOtherKindAndNoFilesOfOthers) {
   const auto writeDepth = [&](const std::string& report) {
     MapOutput depth(folder(), OutputKind::kDepth, {});
     depth.writeImages(smallKeyframe(1'000'000'000));
-    depth.writeCloud("points.pcd", {});
+    depth.writeCloud("points.pcd", MapCloud());
     if (!report.empty()) depth.writeReport(report);
   };
   const auto mark = folder() / "report.partial.json";

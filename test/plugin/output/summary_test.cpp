@@ -88,8 +88,9 @@ TEST(Summary, EachFactHasItsLine) {
 }
 
 TEST(Summary, MeasuresOfTheMapAreItsBoxAndThePosesShift) {
-  EXPECT_FALSE(extentOf({}));
-  const auto extent = extentOf({{{1, 5, -3}, 1, 1}, {{2, 4, -3}, 1, 1}, {{0, 6, -2}, 1, 1}});
+  EXPECT_FALSE(extentOf(MapCloud()));
+  const auto extent =
+      extentOf(*mapCloudOf({{{1, 5, -3}, 1, 1}, {{2, 4, -3}, 1, 1}, {{0, 6, -2}, 1, 1}}, 0.01));
   ASSERT_TRUE(extent);
   EXPECT_EQ(extent->min_m, Eigen::Vector3d(0, 4, -3));
   EXPECT_EQ(extent->max_m, Eigen::Vector3d(2, 6, -2));

@@ -15,7 +15,7 @@ TEST(ColoursByHeight, HigherIsBrighterAndOutliersDoNotWidenTheRange) {
   // 101 points along -y, which is up; then the same with an outlier far below and one far above.
   std::vector<CloudPoint> points;
   for (int i = 0; i <= 100; ++i) points.push_back({{5.0 * i, -0.1 * i, 1}, 1, 1});
-  const auto colours = coloursByHeight(points, -Eigen::Vector3d::UnitY());
+  const auto colours = coloursByHeight(*mapCloudOf(points, 0.01), -Eigen::Vector3d::UnitY());
   ASSERT_EQ(colours.size(), points.size());
   for (std::size_t i = 10; i <= 100; i += 10) {
     EXPECT_GT(lightness(colours[i]), lightness(colours[i - 10]) + 5) << i;
@@ -25,16 +25,16 @@ TEST(ColoursByHeight, HigherIsBrighterAndOutliersDoNotWidenTheRange) {
 
   points.push_back({{0, 1000, 0}, 1, 1});
   points.push_back({{0, -1000, 0}, 1, 1});
-  const auto with_outliers = coloursByHeight(points, -Eigen::Vector3d::UnitY());
+  const auto with_outliers = coloursByHeight(*mapCloudOf(points, 0.01), -Eigen::Vector3d::UnitY());
   EXPECT_EQ(with_outliers[101], colours[0]);
   EXPECT_EQ(with_outliers[102], colours[100]);
   EXPECT_EQ(with_outliers[50], colours[50]);
 }
 
 TEST(ColoursByHeight, CloudsWithoutHeightHaveAColour) {
-  EXPECT_TRUE(coloursByHeight({}, Eigen::Vector3d::UnitZ()).empty());
+  EXPECT_TRUE(coloursByHeight(MapCloud(), Eigen::Vector3d::UnitZ()).empty());
   const std::vector<CloudPoint> flat(3, {{1, 2, 3}, 1, 1});
-  EXPECT_EQ(coloursByHeight(flat, Eigen::Vector3d::UnitZ()).size(), 3U);
+  EXPECT_EQ(coloursByHeight(*mapCloudOf(flat, 0.01), Eigen::Vector3d::UnitZ()).size(), 3U);
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST(Upward, IsAcrossTheLevelAxesOfTheCameras) {
 
 TEST(MapLayout, BothViewsHaveOneScaleAndShowTheMap) {
   const auto trajectory = lookingAlongY(3);
-  const MapLayout layout = layOutMap(box(), trajectory);
+  const MapLayout layout = layOutMap(*mapCloudOf(box(), kVoxel), trajectory);
   EXPECT_EQ(layout.top.pixels_per_m, layout.side.pixels_per_m);
   const Eigen::Vector3d a(0.5, 1.5, 0.2);
   const Eigen::Vector3d b(3.5, 1.5, 0.2);
@@ -75,29 +75,31 @@ TEST(MapLayout, BothViewsHaveOneScaleAndShowTheMap) {
 
 TEST(MapLayout, FarOutliersDoNotChangeTheScale) {
   std::vector<CloudPoint> points = box();
-  const MapLayout without = layOutMap(points, lookingAlongY(3));
+  const MapLayout without = layOutMap(*mapCloudOf(points, kVoxel), lookingAlongY(3));
   for (int i = 0; i < 20; ++i) points.push_back({{500, -300, 100}, 1.0F});
-  const MapLayout with = layOutMap(points, lookingAlongY(3));
+  const MapLayout with = layOutMap(*mapCloudOf(points, kVoxel), lookingAlongY(3));
   EXPECT_NEAR(with.top.pixels_per_m, without.top.pixels_per_m, 0.1 * without.top.pixels_per_m);
 }
 
 TEST(MapPicture, DrawsWhatThereIs) {
-  const cv::Mat3b whole = drawMap(box(), lookingAlongY(3), kVoxel);
+  const cv::Mat3b whole = drawMap(*mapCloudOf(box(), kVoxel), lookingAlongY(3), kVoxel);
   EXPECT_LE(std::max(whole.rows, whole.cols), 2000);
-  const int legend = cv::countNonZero(colouredIn(drawMap({}, lookingAlongY(3), kVoxel)));
+  const int legend = cv::countNonZero(colouredIn(drawMap(MapCloud(), lookingAlongY(3), kVoxel)));
   // 9,471 points in two views, which hide each other.
   EXPECT_GT(cv::countNonZero(colouredIn(whole)), legend + 10'000);
-  EXPECT_GT(cv::countNonZero(colouredIn(drawMap({{{1, 2, 3}, 1.0F}}, lookingAlongY(1), kVoxel))),
+  EXPECT_GT(cv::countNonZero(colouredIn(
+                drawMap(*mapCloudOf({{{1, 2, 3}, 1.0F}}, kVoxel), lookingAlongY(1), kVoxel))),
             0);
-  EXPECT_THROW(drawMap({}, {}, kVoxel), std::invalid_argument);
+  EXPECT_THROW(drawMap(MapCloud(), {}, kVoxel), std::invalid_argument);
 }
 
 TEST(MapPicture, ItsBarIsARoundNumberOfMetresLong) {
   for (const double size : {0.01, 1.0, 30.0}) {
     std::vector<CloudPoint> points = box();
     for (CloudPoint& point : points) point.p_world *= size;
-    const MapLayout layout = layOutMap(points, lookingAlongY(1));
-    const cv::Mat3b legend = drawMap(points, lookingAlongY(1), kVoxel)(layout.legend);
+    const MapLayout layout = layOutMap(*mapCloudOf(points, kVoxel), lookingAlongY(1));
+    const cv::Mat3b legend =
+        drawMap(*mapCloudOf(points, kVoxel), lookingAlongY(1), kVoxel)(layout.legend);
     cv::Mat1b ink;
     cv::inRange(legend.colRange(0, 250), cv::Scalar::all(40), cv::Scalar::all(40), ink);
     cv::Mat1i longest;  // per row

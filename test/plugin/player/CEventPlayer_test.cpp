@@ -154,7 +154,7 @@ TEST_F(EventPlayer, FeedsALiveMapBuilder) {
                [&](const CObservation::Ptr& observation) { live.processObservation(observation); });
   live.finish();
 
-  ASSERT_FALSE(playback.points().empty());
+  ASSERT_FALSE(playback.points()->empty());
   expectSameBits(live.points(), playback.points());
   EXPECT_EQ(live.status().live->dropRatio(), 0);
   EXPECT_EQ(live.status().live->errors, 0U) << live.status().live->last_error;

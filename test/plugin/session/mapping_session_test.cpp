@@ -36,8 +36,8 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOn) {
   EXPECT_EQ(keyframes.size(),
             3U);  // [0, .2), [.1, .3), [.2, .4); [.3, .5) ends after the last event
   std::vector<DepthPair> pairs;
-  for (const CloudPoint& point : session.cloud().points()) {
-    pairs.push_back({point.p_world.z(), SyntheticRecording::kDepthM});
+  for (const MapPoint& point : *session.cloud().points()) {
+    pairs.push_back({point.z, SyntheticRecording::kDepthM});
   }
   ASSERT_GT(pairs.size(), 30U);
   // A window sees 8 px of parallax of dots that are rounded to pixels: an error of half a pixel is

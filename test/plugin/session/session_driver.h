@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plugin/session/mapping_session.h"
+#include "test/maps/cloud/cloud_points.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/session/synthetic_recording.h"
 
@@ -92,14 +93,8 @@ inline void expectSameMap(const MappingSession& session, const MappingSession& e
     EXPECT_TRUE(isSame(session.T_world_ref()[i], expected.T_world_ref()[i])) << "keyframe " << i;
     EXPECT_TRUE(isSame(session.T_odom_ref()[i], expected.T_odom_ref()[i])) << "keyframe " << i;
   }
-  const auto points = session.cloud().points();
-  const auto expected_points = expected.cloud().points();
-  ASSERT_EQ(points.size(), expected_points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    EXPECT_EQ(points[i].p_world, expected_points[i].p_world);
-    EXPECT_EQ(points[i].confidence, expected_points[i].confidence);
-    EXPECT_EQ(points[i].support, expected_points[i].support);
-  }
+  EXPECT_EQ(session.cloud().points()->size(), expected.cloud().points()->size());
+  EXPECT_TRUE(test::sameBits(*session.cloud().points(), *expected.cloud().points()));
 }
 
 }  // namespace efm

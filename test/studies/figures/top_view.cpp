@@ -44,8 +44,7 @@ TopView viewOfAll(const std::vector<Wall>& walls, double pixel_m) {
   return view;
 }
 
-cv::Mat3b drawTopView(const std::vector<CloudPoint>& points, const std::vector<Wall>& walls,
-                      const TopView& view) {
+cv::Mat3b drawTopView(const MapCloud& cloud, const std::vector<Wall>& walls, const TopView& view) {
   // The density of a well visible wall: 3.5 points in a square centimetre.
   constexpr double kDarkDensity = 3.5e4;
   const auto dark_count =
@@ -53,9 +52,10 @@ cv::Mat3b drawTopView(const std::vector<CloudPoint>& points, const std::vector<W
   cv::Mat1f count(sizeOf(view), 0.0F);
   cv::Mat1f height(sizeOf(view), 0.0F);
   const cv::Rect inside({0, 0}, sizeOf(view));
-  for (const CloudPoint& point : points) {
-    const double z = point.p_world.z();
-    const cv::Point pixel = pixelOf(view, point.p_world);
+  for (const MapPoint& point : cloud) {
+    const Eigen::Vector3d p_world = positionIn(cloud, point);
+    const double z = p_world.z();
+    const cv::Point pixel = pixelOf(view, p_world);
     if (z < view.min_height_m || z > view.max_height_m || !inside.contains(pixel)) continue;
     count(pixel) += 1;
     height(pixel) +=

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "test/studies/refinement/wall_thickness.h"
 
 namespace efm::studies {
@@ -25,7 +25,6 @@ TopView viewOfAll(const std::vector<Wall>& walls, double pixel_m);
 
 /// Draws a map's points, blue low and red high, darker where there are more, and the true upright
 /// walls as grey lines.
-cv::Mat3b drawTopView(const std::vector<CloudPoint>& points, const std::vector<Wall>& walls,
-                      const TopView& view);
+cv::Mat3b drawTopView(const MapCloud& cloud, const std::vector<Wall>& walls, const TopView& view);
 
 }  // namespace efm::studies

@@ -49,8 +49,7 @@ double MapTruth::medianOffRays(const std::vector<KeyframeDepthMap>& keyframes,
 }
 
 MapErrors MapTruth::errorsOf(const std::vector<KeyframeDepthMap>& keyframes,
-                             const std::vector<Rigid3>& T_map_ref,
-                             const std::vector<CloudPoint>& points) {
+                             const std::vector<Rigid3>& T_map_ref, const MapCloud& cloud) {
   std::vector<PosePair> pairs;
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     pairs.push_back({keyframes[i].window.t_ref_ns, T_map_ref[i], T_world_ref(keyframes[i])});
@@ -74,8 +73,8 @@ MapErrors MapTruth::errorsOf(const std::vector<KeyframeDepthMap>& keyframes,
 
   std::vector<NearPoint> near;
   std::vector<double> distances;
-  for (const CloudPoint& point : points) {
-    const Eigen::Vector3d p_world = T_world_map * point.p_world;
+  for (const MapPoint& point : cloud) {
+    const Eigen::Vector3d p_world = T_world_map * positionIn(cloud, point);
     near.push_back({p_world, nearestSurface(simulation_.scene, p_world)});
     distances.push_back(near.back().nearest.distance_m);
   }

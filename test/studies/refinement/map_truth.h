@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mapping/keyframes/keyframe_depth_map.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "test/studies/refinement/wall_thickness.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 
@@ -34,10 +34,10 @@ class MapTruth {
 
   /// @param keyframes their depth maps count, their poses do not.
   /// @param T_map_ref estimated poses of the keyframes.
-  /// @param points of the map with these poses.
+  /// @param cloud of the map with these poses.
   /// @throws std::invalid_argument where there are fewer than three keyframes.
   MapErrors errorsOf(const std::vector<KeyframeDepthMap>& keyframes,
-                     const std::vector<Rigid3>& T_map_ref, const std::vector<CloudPoint>& points);
+                     const std::vector<Rigid3>& T_map_ref, const MapCloud& cloud);
 
   Rigid3 T_world_ref(const KeyframeDepthMap& keyframe) const;
   const std::vector<Wall>& walls() const { return walls_; }

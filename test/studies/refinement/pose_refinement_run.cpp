@@ -79,9 +79,9 @@ PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOption
   return run;
 }
 
-std::vector<CloudPoint> mapAt(const std::vector<KeyframeDepthMap>& keyframes,
-                              const std::vector<Rigid3>& T_world_ref,
-                              const GlobalCloudOptions& options) {
+MapCloud::ConstPtr mapAt(const std::vector<KeyframeDepthMap>& keyframes,
+                         const std::vector<Rigid3>& T_world_ref,
+                         const GlobalCloudOptions& options) {
   GlobalCloud cloud(options);
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     cloud.insert(i, pointsInWorld(viewPoints(keyframes[i]), T_world_ref[i]), T_world_ref[i]);

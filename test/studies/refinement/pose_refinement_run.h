@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "mapping/keyframes/keyframe_depth_map.h"
-#include "maps/cloud/cloud_point.h"
 #include "maps/cloud/global_cloud.h"
+#include "maps/cloud/map_point.h"
 #include "maps/refinement/keyframe_refiner.h"
 #include "plugin/session/event_fusion_options.h"
 #include "test/studies/recordings/recording_cache.h"
@@ -19,8 +19,8 @@ namespace efm::studies {
 struct PoseRefinementRun {
   std::vector<KeyframeDepthMap> keyframes;  ///< With the tracker's poses.
   std::vector<Rigid3> T_odom_ref;
-  std::vector<Rigid3> T_world_ref;      ///< Refined, at the end.
-  std::vector<CloudPoint> refined_map;  ///< Exported by the session.
+  std::vector<Rigid3> T_world_ref;  ///< Refined, at the end.
+  MapCloud::ConstPtr refined_map;   ///< Exported by the session.
   RefinementCounts counts;
 };
 
@@ -31,9 +31,8 @@ PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOption
                              TrackerFaults faults);
 
 /// The map of keyframes at these poses.
-std::vector<CloudPoint> mapAt(const std::vector<KeyframeDepthMap>& keyframes,
-                              const std::vector<Rigid3>& T_world_ref,
-                              const GlobalCloudOptions& options);
+MapCloud::ConstPtr mapAt(const std::vector<KeyframeDepthMap>& keyframes,
+                         const std::vector<Rigid3>& T_world_ref, const GlobalCloudOptions& options);
 
 /// The result of refining keyframes.
 struct RefinerRun {

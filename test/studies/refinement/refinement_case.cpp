@@ -92,12 +92,12 @@ class RefinementCaseRun {
 
   MapErrors errorsAt(const PoseRefinementRun& run, const std::vector<Rigid3>& T_map_ref) {
     return truth_.errorsOf(run.keyframes, T_map_ref,
-                           mapAt(run.keyframes, T_map_ref, options_.cloud));
+                           *mapAt(run.keyframes, T_map_ref, options_.cloud));
   }
 
   RefinementOutcome outcomeOf(const PoseRefinementRun& run) {
     return {errorsAt(run, run.T_odom_ref),
-            truth_.errorsOf(run.keyframes, run.T_world_ref, run.refined_map)};
+            truth_.errorsOf(run.keyframes, run.T_world_ref, *run.refined_map)};
   }
 
   void noise(std::uint64_t seed) {

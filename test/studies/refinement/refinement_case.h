@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/map_point.h"
 #include "maps/refinement/keyframe_refiner.h"
 #include "test/studies/recordings/study_run.h"
 #include "test/studies/refinement/false_loops.h"
@@ -35,7 +35,7 @@ struct RefinementOutcome {
 
 /// Maps and trajectories for the pictures.
 struct RefinementDrawing {
-  std::vector<CloudPoint> tracker_map, refined_map;
+  MapCloud::ConstPtr tracker_map, refined_map;
   std::vector<Rigid3> T_world_true, T_odom_ref, T_world_ref;
 };
 

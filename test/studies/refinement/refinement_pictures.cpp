@@ -33,8 +33,8 @@ cv::Mat3b drawMaps(const RefinementDrawing& drawing, const std::vector<Wall>& wa
   grid.columns = {"at the tracker's poses", "at refined poses"};
   grid.rows = {"all", "the corner that is seen twice"};
   for (const TopView& view : {all, corner}) {
-    grid.pictures.push_back({drawTopView(drawing.tracker_map, walls, view),
-                             drawTopView(drawing.refined_map, walls, view)});
+    grid.pictures.push_back({drawTopView(*drawing.tracker_map, walls, view),
+                             drawTopView(*drawing.refined_map, walls, view)});
   }
   grid.width_px = kWidthPx;
   return drawGrid(grid);

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <pcl/point_cloud.h>
+#include <pcl/register_point_struct.h>
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "maps/cloud/cloud_point.h"
+
+namespace pcl {
+struct PointXYZI;
+}
+
+namespace efm {
+
+/// A point of a map, registered as a point type of PCL: x, y, z, intensity, support and sigma are
+/// its fields in PCL's files. PCL's own templates compile for it where PCL_NO_PRECOMPILE is defined
+/// before the first header of PCL.
+///
+/// The members of PCL_ADD_POINT4D are written out: the header of that macro takes 2 s to compile.
+struct EIGEN_ALIGN16 MapPoint {
+  __extension__ union EIGEN_ALIGN16 {
+    float data[4] = {0, 0, 0, 1};
+    __extension__ struct {
+      float x, y, z;  ///< Metres, frame `world`, relative to the cloud's `sensor_origin_`.
+    };
+  };
+  float intensity = 0;        ///< The confidence: fused ray density at the point.
+  std::uint32_t support = 1;  ///< Number of keyframes that saw it.
+  /// Standard deviation of its depth, metres; NaN where it is not known. See GlobalCloud.
+  float sigma = std::numeric_limits<float>::quiet_NaN();
+  std::uint32_t first_keyframe = 0;  ///< The lowest number of a keyframe that saw it; no field.
+
+  auto getVector3fMap() { return Eigen::Vector3f::Map(data); }
+  auto getVector3fMap() const { return Eigen::Vector3f::Map(data); }
+  auto getVector4fMap() { return Eigen::Vector4f::MapAligned(data); }
+  auto getVector4fMap() const { return Eigen::Vector4f::MapAligned(data); }
+  auto getArray3fMap() { return Eigen::Array3f::Map(data); }
+  auto getArray3fMap() const { return Eigen::Array3f::Map(data); }
+  auto getArray4fMap() { return Eigen::Array4f::MapAligned(data); }
+  auto getArray4fMap() const { return Eigen::Array4f::MapAligned(data); }
+  PCL_MAKE_ALIGNED_OPERATOR_NEW
+};
+
+/// The cloud of a map or of a keyframe. `sensor_origin_` is the origin of its points in the world:
+/// 0, or far from there (`mapCloudOf`) a position nearby. `sensor_orientation_` is the identity.
+using MapCloud = pcl::PointCloud<MapPoint>;
+
+/// p_world of a point.
+inline Eigen::Vector3d positionIn(const MapCloud& cloud, const MapPoint& point) {
+  return cloud.sensor_origin_.head<3>().cast<double>() + point.getVector3fMap().cast<double>();
+}
+
+/// The points in their order. Where a float's step at the largest coordinate is more than a tenth
+/// of the resolution, their origin is the median position, rounded to a power of ten that is fine
+/// enough itself: it has few digits, as PCL's programs write at most six.
+/// @param resolution_m for example the size of a voxel; above 0.
+/// @throws std::invalid_argument naming a point that is not finite.
+MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolution_m);
+
+/// For functions of PCL that take this type alone. Relative to the same `sensor_origin_`.
+pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud);
+
+}  // namespace efm
+
+POINT_CLOUD_REGISTER_POINT_STRUCT(efm::MapPoint, (float, x, x)(float, y, y)(float, z, z)  //
+                                  (float, intensity, intensity)                           //
+                                  (std::uint32_t, support, support)                       //
+                                  (float, sigma, sigma))
