@@ -453,8 +453,7 @@ int runDepth(const DepthArguments& arguments) {
         mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
   };
   const auto write = [&](MapOutput& output, MappingOutcome& outcome) {
-    outcome.report.points = points->size();
-    outcome.report.extent = extentOf(*points);
+    describePoints(*points, outcome.report);
     writeAll(outcome, {[&] { output.writeCloud("points.pcd", *points); },
                        [&] {
                          if (dsi) dsi->finish();

@@ -312,8 +312,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
     outcome.trajectory = player.builder().trajectory();
     outcome.tracker_trajectory = player.builder().trackerTrajectory();
   }
-  outcome.report.points = outcome.points->size();
-  outcome.report.extent = extentOf(*outcome.points);
+  describePoints(*outcome.points, outcome.report);
   if (status.events) {
     outcome.report.recording_s = secondsBetween(status.events->first_ns, status.events->last_ns);
   }

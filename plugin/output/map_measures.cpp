@@ -7,14 +7,22 @@
 
 namespace efm {
 
-std::optional<MapExtent> extentOf(const MapCloud& cloud) {
+std::optional<MapExtent> extentOf(const MapCloud& cloud, double outside) {
   if (cloud.empty()) return std::nullopt;
-  const Eigen::Vector3d first = positionIn(cloud, cloud.front());
-  MapExtent extent{first, first};
-  for (const MapPoint& point : cloud) {
-    const Eigen::Vector3d p_world = positionIn(cloud, point);
-    extent.min_m = extent.min_m.cwiseMin(p_world);
-    extent.max_m = extent.max_m.cwiseMax(p_world);
+  MapExtent extent;
+  const auto last = static_cast<std::ptrdiff_t>(cloud.size() - 1);
+  const auto cut = static_cast<std::ptrdiff_t>(outside * static_cast<double>(last));
+  std::vector<float> values(cloud.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto valueAt = [&](std::ptrdiff_t index) {
+      std::nth_element(values.begin(), values.begin() + index, values.end());
+      return static_cast<double>(cloud.sensor_origin_[axis]) +
+             static_cast<double>(values[static_cast<std::size_t>(index)]);
+    };
+    std::transform(cloud.begin(), cloud.end(), values.begin(),
+                   [&](const MapPoint& point) { return point.data[axis]; });
+    extent.min_m[axis] = valueAt(cut);
+    extent.max_m[axis] = valueAt(last - cut);
   }
   return extent;
 }

@@ -10,14 +10,16 @@
 
 namespace efm {
 
-/// The box around a map, in metres, frame `world`.
+/// A box around points of a map, in metres, frame `world`.
 struct MapExtent {
   Eigen::Vector3d min_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d max_m = Eigen::Vector3d::Zero();
 };
 
+/// @param outside the fraction of the points that lie outside, at each end of each axis; 0 for the
+/// box around all of them.
 /// @return nothing without points.
-std::optional<MapExtent> extentOf(const MapCloud& cloud);
+std::optional<MapExtent> extentOf(const MapCloud& cloud, double outside = 0);
 
 /// How far the refinement moved the keyframes' poses.
 struct PoseShift {

@@ -161,6 +161,13 @@ double votesPerSecond(const MapReport& report) {
   return sweep_s > 0 ? static_cast<double>(report.counts.votes.total()) / sweep_s : 0;
 }
 
+void describePoints(const MapCloud& cloud, MapReport& report) {
+  constexpr double kFar = 0.001;
+  report.points = cloud.size();
+  report.extent = extentOf(cloud);
+  report.most_extent = extentOf(cloud, kFar);
+}
+
 std::string reportJson(const MapReport& report) {
   const MapperCounts& counts = report.counts;
   const SpaceSweepOptions& sweep = report.options.mapper.keyframe.sweep;
@@ -187,6 +194,7 @@ std::string reportJson(const MapReport& report) {
   json["duplicate_poses"] = counts.duplicate_poses;
   json["points"] = report.points;
   if (report.extent) json["extent_m"] = asJson(*report.extent);
+  if (report.most_extent) json["most_extent_m"] = asJson(*report.most_extent);
   json["recording_seconds"] = report.recording_s;
   json["seconds"] = asJson(report.times.real);
   json["cpu_seconds"] = byGrowth(report.times.cpu);

@@ -33,6 +33,7 @@ std::string shortDurationText(double seconds) {
   return seconds < kShortS ? fmt::format("{:.1f} s", seconds) : durationText(seconds);
 }
 
+/// Of 0.1 to 99.9 % of the points: the extent that a reader expects of a room.
 std::string extentText(const MapExtent& extent) {
   const Eigen::Vector3d size_m = extent.max_m - extent.min_m;
   std::string text = fmt::format("{:.2f} x {:.2f} x {:.2f} m:", size_m.x(), size_m.y(), size_m.z());
@@ -110,7 +111,7 @@ std::string summaryOf(const MapReport& report, OutputKind kind,
     addLine(text, "keyframes", std::to_string(report.counts.keyframes));
   }
   addLine(text, "points", std::to_string(report.points));
-  if (report.extent) addLine(text, "extent", extentText(*report.extent));
+  if (report.most_extent) addLine(text, "extent", extentText(*report.most_extent));
   const EventCounts events = report.counts.total();
   if (events.read > 0) addLine(text, "events", eventsText(events));
   addLine(text, "time", timeLine(report));

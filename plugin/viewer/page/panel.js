@@ -11,10 +11,11 @@ function showNumbers() {
   document.title = `${map.name}: map`;
   element("name").textContent = map.name;
   const kNoBreak = "\u00a0";
-  const size = extent.map(e => e.toFixed(1)).join(" × ") + " m";
+  const most = report.most_extent_m;  // without the few points far from all others
+  const size = most ? most.max.map((end, k) => (end - most.min[k]).toFixed(1)).join(" × ") + " m" : "";
   element("summary").textContent =
     `${plural(report.keyframes, "keyframe")}, ${plural(map.all_points, "point")}` +
-    (map.points > 0 ? `, ${size.replaceAll(" ", kNoBreak)}` : "");
+    (most ? `, ${size.replaceAll(" ", kNoBreak)}` : "");
 
   const events = report.events, seconds = value => `${number(value)} s`;
   const part = value => `${(100 * value / events.read).toFixed(1)} %`;
@@ -26,9 +27,9 @@ function showNumbers() {
   for (const [key, words] of left) {
     if (events[key] > 0) addRow("report", "not used", `${part(events[key])} ${words}`);
   }
-  if (report.extent_m) {
+  if (most) {
     ["x", "y", "z"].forEach((axis, k) => addRow("report", axis,
-      `${report.extent_m.min[k].toFixed(2)} to ${report.extent_m.max[k].toFixed(2)} m`));
+      `${most.min[k].toFixed(2)} to ${most.max[k].toFixed(2)} m`));
   }
   addRow("report", "voxel", `${number(map.voxel_m)} m`);
   addRow("report", "recording", seconds(report.recording_seconds));

@@ -76,6 +76,7 @@ TEST(Report, EveryCountHasItsOwnKey) {
   report.recording_s = 2.5;
   report.peak_memory_bytes = 123;
   report.extent = MapExtent{{1, 2, 3}, {4, 5, 6}};
+  report.most_extent = MapExtent{{1, 2, 3}, {4, 5, 5}};
   const json written = json::parse(reportJson(report));
   const json events = {{"read", 69},   {"used", 11},     {"without_pose", 7}, {"outside_window", 8},
                        {"dropped", 9}, {"filtered", 10}, {"outside_lens", 6}, {"over_budget", 18}};
@@ -105,6 +106,8 @@ TEST(Report, EveryCountHasItsOwnKey) {
   EXPECT_EQ(written["peak_memory_bytes"], 123);
   const json extent = {{"min", {1.0, 2.0, 3.0}}, {"max", {4.0, 5.0, 6.0}}};
   EXPECT_EQ(written["extent_m"], extent);
+  const json most = {{"min", {1.0, 2.0, 3.0}}, {"max", {4.0, 5.0, 5.0}}};
+  EXPECT_EQ(written["most_extent_m"], most);
 }
 
 TEST(Report, ErrorsOfTheTrackerAreInMetresAndDegrees) {

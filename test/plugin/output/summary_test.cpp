@@ -44,7 +44,8 @@ TEST(Summary, OfADepthMapHasNoKeyframesAndItsOwnFiles) {
 TEST(Summary, EachFactHasItsLine) {
   const std::pair<std::function<void(MapReport&)>, const char*> cases[] = {
       {[](MapReport& report) {
-         report.extent = MapExtent{{-1.2, 0, -100}, {3.054, 0.5, -99.5}};
+         report.most_extent = MapExtent{{-1.2, 0, -100}, {3.054, 0.5, -99.5}};
+         report.extent = MapExtent{{-9, -9, -900}, {9, 9, 900}};
        },
        "extent      4.25 x 0.50 x 0.50 m: x -1.20 to 3.05, y 0.00 to 0.50, z -100.00 to -99.50\n"},
       {[](MapReport& report) {
@@ -94,6 +95,22 @@ TEST(Summary, MeasuresOfTheMapAreItsBoxAndThePosesShift) {
   ASSERT_TRUE(extent);
   EXPECT_EQ(extent->min_m, Eigen::Vector3d(0, 4, -3));
   EXPECT_EQ(extent->max_m, Eigen::Vector3d(2, 6, -2));
+
+  // 2001 points along x, 1 m apart; on y and z, one in a thousand lies far away.
+  std::vector<CloudPoint> points;
+  for (int i = 0; i <= 2000; ++i) {
+    const bool is_far = i == 700 || i == 1400;
+    points.push_back({{i - 500.0, is_far ? 1e4 : 0.001 * i, is_far ? -1e4 : 5}, 1});
+  }
+  MapReport report;
+  describePoints(*mapCloudOf(points, 0.01), report);
+  EXPECT_EQ(report.points, 2001U);
+  EXPECT_EQ(report.extent->max_m, Eigen::Vector3d(1500, 1e4, 5));
+  EXPECT_EQ(report.extent->min_m, Eigen::Vector3d(-500, 0, -1e4));
+  EXPECT_EQ(report.most_extent->min_m.x(), -498);
+  EXPECT_EQ(report.most_extent->max_m.x(), 1498);
+  EXPECT_FLOAT_EQ(report.most_extent->max_m.y(), 2);
+  EXPECT_EQ(report.most_extent->min_m.z(), 5);
 
   std::vector<StampedPose> before(3);
   std::vector<StampedPose> after(3);
