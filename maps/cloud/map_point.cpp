@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "maps/cloud/point_search.h"
 
@@ -19,17 +20,26 @@ double floatStepAt(double coordinate) {
   return static_cast<double>(std::nextafter(rounded, kInfinity) - rounded);
 }
 
+/// See `coarseStepOf`.
+/// @param reaches the largest coordinate of each point.
+std::optional<double> coarseStepAt(std::vector<double> reaches, double resolution_m) {
+  if (reaches.empty()) return std::nullopt;
+  const auto at = reaches.end() - 1 - static_cast<std::ptrdiff_t>(reaches.size() / 1000);
+  std::nth_element(reaches.begin(), at, reaches.end());
+  const double step_m = floatStepAt(*at);
+  return step_m > 0.1 * resolution_m ? std::optional(step_m) : std::nullopt;
+}
+
 /// The origin of a cloud's points.
 Eigen::Vector3d originOf(const std::vector<CloudPoint>& points, double resolution_m) {
-  if (points.empty()) return Eigen::Vector3d::Zero();
-  double largest_m = 0;
+  std::vector<double> reaches;
+  reaches.reserve(points.size());
   for (const CloudPoint& point : points) {
-    largest_m = std::max(largest_m, point.p_world.cwiseAbs().maxCoeff());
+    reaches.push_back(point.p_world.cwiseAbs().maxCoeff());
   }
-  const double max_step_m = 0.1 * resolution_m;
-  if (!(floatStepAt(largest_m) > max_step_m)) return Eigen::Vector3d::Zero();
+  if (!coarseStepAt(std::move(reaches), resolution_m)) return Eigen::Vector3d::Zero();
   // The step of floats from x to 2 x is at most x / 2^23.
-  const double unit_m = std::pow(10, std::floor(std::log10(max_step_m * (1 << 23))));
+  const double unit_m = std::pow(10, std::floor(std::log10(0.1 * resolution_m * (1 << 23))));
   return (medianPosition(points) / unit_m).array().round() * unit_m;
 }
 
@@ -49,6 +59,15 @@ MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolutio
     made.first_keyframe = static_cast<std::uint32_t>(point.first_keyframe);
   }
   return cloud;
+}
+
+std::optional<double> coarseStepOf(const MapCloud& cloud, double resolution_m) {
+  std::vector<double> reaches;
+  reaches.reserve(cloud.size());
+  for (const MapPoint& point : cloud) {
+    reaches.push_back(positionIn(cloud, point).cwiseAbs().maxCoeff());
+  }
+  return coarseStepAt(std::move(reaches), resolution_m);
 }
 
 pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud) {

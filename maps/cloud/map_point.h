@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "maps/cloud/cloud_point.h"
@@ -55,12 +56,17 @@ inline Eigen::Vector3d positionIn(const MapCloud& cloud, const MapPoint& point) 
   return cloud.sensor_origin_.head<3>().cast<double>() + point.getVector3fMap().cast<double>();
 }
 
-/// The points in their order. Where a float's step at the largest coordinate is more than a tenth
-/// of the resolution, their origin is the median position, rounded to a power of ten that is fine
-/// enough itself: it has few digits, as PCL's programs write at most six.
+/// The points in their order. Where floats are too coarse for them (`coarseStepOf`), their origin
+/// is the median position, rounded to a power of ten that is fine enough itself: it has few digits,
+/// as PCL's programs write at most six.
 /// @param resolution_m for example the size of a voxel; above 0.
 /// @throws std::invalid_argument naming a point that is not finite.
 MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolution_m);
+
+/// The step of floats at the world coordinates of a map, where it is more than a tenth of the
+/// resolution: where programs round points that take them as floats. At 99.9 % of the points: a few
+/// wrong ones may lie anywhere.
+std::optional<double> coarseStepOf(const MapCloud& cloud, double resolution_m);
 
 /// For functions of PCL that take this type alone. Relative to the same `sensor_origin_`.
 pcl::PointCloud<pcl::PointXYZI>::Ptr xyziCloudOf(const MapCloud& cloud);

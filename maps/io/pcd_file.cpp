@@ -11,6 +11,7 @@
 #include <string>
 
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 #include "maps/io/little_endian.h"
 #include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
@@ -96,6 +97,26 @@ std::uint64_t pointsOf(const HeaderLines& lines) {
                 std::to_string(width) + " x " + std::to_string(height));
   }
   return points;
+}
+
+/// The origin of the points. Of a cloud with the fields of MapPoint, VIEWPOINT is this origin. In
+/// others it is the place of a sensor, and the points may be relative to anything.
+Eigen::Vector3d originOf(const HeaderLines& lines, const std::vector<RecordField>& fields) {
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  const auto has = [&](const char* name) {
+    return std::any_of(fields.begin(), fields.end(),
+                       [name](const RecordField& field) { return field.name == name; });
+  };
+  const auto viewpoint = lines.find("VIEWPOINT");
+  if (viewpoint == lines.end() || !has("support") || !has("sigma")) return origin;
+  const WordLine& line = viewpoint->second;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto number =
+        axis + 1 < line.words.size() ? parseFinite(line.words[axis + 1]) : std::nullopt;
+    if (!number) line.refuse("VIEWPOINT: expected 7 numbers, the origin of the points first");
+    origin[static_cast<Eigen::Index>(axis)] = *number;
+  }
+  return origin;
 }
 
 std::uint64_t readNumber(TextScanner& scanner) {
@@ -184,6 +205,8 @@ PointCloudContent parsePcd(std::string_view bytes) {
     data.refuse("DATA " + inQuotes(encoding) + ": expected ascii, binary or binary_compressed");
   }
   scanner.expectEnd();
+  const Eigen::Vector3d origin = originOf(lines, fields);
+  for (CloudPoint& point : content.points) point.p_world += origin;
   return content;
 }
 

@@ -12,8 +12,8 @@
 namespace efm {
 
 /// Writes a binary PCD file, whatever the extension of the path. Its fields are those of MapPoint,
-/// its VIEWPOINT is the cloud's `sensor_origin_`. An empty cloud is a valid file. The file appears
-/// when it is complete (AtomicFile).
+/// its VIEWPOINT is the cloud's `sensor_origin_`, which `readPointCloud` adds. An empty cloud is a
+/// valid file. The file appears when it is complete (AtomicFile).
 /// @throws std::runtime_error naming the path where it cannot be written or a point is not finite.
 void writePcd(const std::filesystem::path& path, const MapCloud& cloud);
 

@@ -104,6 +104,19 @@ void warnOfNoPoints(MapReport& report) {
        "and the poses do not explain the events"});
 }
 
+void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
+  const auto step_m = coarseStepOf(cloud, report.options.cloud.voxel_size_m);
+  if (!step_m) return;
+  const auto& origin = cloud.sensor_origin_;
+  report.warnings.push_back(
+      {"far-coordinates",
+       fmt::format("a float has steps of {:.2g} m at the map's coordinates, over a tenth of a "
+                   "voxel: x, y and z of the PCD file are relative to its VIEWPOINT, ({:.0f}, "
+                   "{:.0f}, {:.0f}), which viewers do not add; MRPT's maps of points are rounded; "
+                   "map.ply has doubles (--set output.ply=true)",
+                   *step_m, origin.x(), origin.y(), origin.z())});
+}
+
 /// Writes all files, even if one fails. The outcome has the first error.
 void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void()>> files) {
   for (const auto& write : files) {
@@ -349,6 +362,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     warnOfRecalibration(arguments, outcome);
     if (outcome.report.counts.keyframes > 0) write(*output, outcome);
     warnOfNoPoints(outcome.report);
+    if (outcome.points) warnOfFarPoints(*outcome.points, outcome.report);
   }
   StageTimes& times = outcome.report.times;
   times.real.total = whole.real.total;

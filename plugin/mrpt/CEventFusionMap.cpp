@@ -8,6 +8,7 @@
 #include <mrpt/poses/CPose3D.h>
 #include <mrpt/serialization/CArchive.h>
 #include <mrpt/serialization/stl_serialization.h>
+#include <mrpt/system/COutputLogger.h>
 
 #include <algorithm>
 #include <array>
@@ -19,6 +20,7 @@
 #include "maps/io/point_cloud_file.h"
 #include "plugin/mrpt/host_options.h"
 #include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/points_map.h"
 
 MAP_DEFINITION_REGISTER("efm::CEventFusionMap,eventFusionMap", efm::CEventFusionMap)
 
@@ -227,6 +229,7 @@ std::string CEventFusionMap::asString() const {
 void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const {
   if (!genericMapParams.enableSaveAs3DObject) return;
   const MapCloud::ConstPtr points = cloud_.points();
+  warnOfRounding(*points);
   // The colour scale ends at the 95th percentile: a few points have far larger confidences.
   std::vector<float> sorted;
   sorted.reserve(points->size());
@@ -247,6 +250,15 @@ void CEventFusionMap::getVisualizationInto(mrpt::opengl::CSetOfObjects& out) con
   out.insert(drawn);
 }
 
+/// Once.
+void CEventFusionMap::warnOfRounding(const MapCloud& points) const {
+  if (warned_of_rounding_) return;
+  const auto warning = roundingWarning(points, cloud_.options().voxel_size_m);
+  if (!warning) return;
+  warned_of_rounding_ = true;
+  mrpt::system::COutputLogger("CEventFusionMap").logStr(mrpt::system::LVL_WARN, *warning);
+}
+
 void CEventFusionMap::saveMetricMapRepresentationToFile(const std::string& prefix) const {
   writePcd(prefix + ".pcd", *cloud_.points());
 }
@@ -255,6 +267,7 @@ const CSimplePointsMap* CEventFusionMap::getAsSimplePointsMap() const {
   if (!simple_points_) {
     simple_points_.emplace();
     const MapCloud::ConstPtr points = cloud_.points();
+    warnOfRounding(*points);
     for (const MapPoint& point : *points) {
       const Eigen::Vector3f p_world = positionIn(*points, point).cast<float>();
       simple_points_->insertPointFast(p_world.x(), p_world.y(), p_world.z());

@@ -53,11 +53,13 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
   /// Writes "<prefix>.pcd".
   /// @throws std::runtime_error naming the file if it cannot be written.
   void saveMetricMapRepresentationToFile(const std::string& prefix) const override;
-  /// The exported points. The map owns them, and they change with it.
+  /// The exported points. The map owns them, and they change with it. Where floats are too coarse
+  /// for them, MRPT's log has a warning.
   const mrpt::maps::CSimplePointsMap* getAsSimplePointsMap() const override;
   using CMetricMap::getAsSimplePointsMap;
 
  private:
+  void warnOfRounding(const MapCloud& points) const;
   void internal_clear() override;
   bool internal_insertObservation(
       const mrpt::obs::CObservation& observation,
@@ -72,6 +74,7 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
   std::vector<StoredKeyframe> keyframes_;
   GlobalCloud cloud_;
   mutable std::optional<mrpt::maps::CSimplePointsMap> simple_points_;  // made on demand
+  mutable bool warned_of_rounding_ = false;
 
   MAP_DEFINITION_START(CEventFusionMap)
   GlobalCloudOptions options;

@@ -270,6 +270,11 @@ void LiveMapping::publishMap(bool at_once) {
   map_renewed_ = Clock::now();
   map_cost_ = map_renewed_ - begin;
   map_changed_ = false;
+  if (const auto warning = roundingWarning(*made->points, session_->cloud().options().voxel_size_m);
+      warning && !warned_of_rounding_ && callbacks_.warn) {
+    warned_of_rounding_ = true;
+    callbacks_.warn(*warning);
+  }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     map_ = made;

@@ -111,6 +111,7 @@ class LiveMapping : public HostedMapping {
   std::uint64_t warned_losses_ = 0;
   std::uint64_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;
+  bool warned_of_rounding_ = false;
 
   mutable std::mutex mutex_;  // of the members below; held for copies alone
   std::condition_variable finished_changed_;

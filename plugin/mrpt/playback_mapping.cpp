@@ -183,6 +183,14 @@ void PlaybackMapping::copyTo(mrpt::maps::CSimpleMap& map) {
 }
 
 const mrpt::maps::CMultiMetricMap* PlaybackMapping::metricMap() {
+  std::optional<std::string> warning;
+  updateMetricMap(warning);
+  if (warning && callbacks_.warn) callbacks_.warn(*warning);  // without the lock
+  return &metric_map_;
+}
+
+/// @param warning is set the first time that the points are rounded.
+void PlaybackMapping::updateMetricMap(std::optional<std::string>& warning) {
   const std::lock_guard<std::mutex> lock(mutex_);
   applyPending();
   if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(cloud_options_);
@@ -190,9 +198,11 @@ const mrpt::maps::CMultiMetricMap* PlaybackMapping::metricMap() {
   if (metric_map_.maps.empty() || changed) {
     metric_map_.maps.clear();
     metric_map_.maps.push_back(event_map_);
-    metric_map_.maps.push_back(pointsMapOf(*event_map_->cloud().points()));
+    const MapCloud::ConstPtr points = event_map_->cloud().points();
+    metric_map_.maps.push_back(pointsMapOf(*points));
+    if (!warned_of_rounding_) warning = roundingWarning(*points, cloud_options_.voxel_size_m);
+    warned_of_rounding_ = warned_of_rounding_ || warning;
   }
-  return &metric_map_;
 }
 
 std::pair<cv::Mat1f, DepthPlanesOptions> PlaybackMapping::newestDepth() const {

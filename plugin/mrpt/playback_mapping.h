@@ -51,6 +51,7 @@ class PlaybackMapping : public HostedMapping {
   std::optional<KeyframeDepthMap> mapNext();
   void deliver(const KeyframeDepthMap& keyframe);
   void applyPending();
+  void updateMetricMap(std::optional<std::string>& warning);
   void followRefinement();
 
   const GlobalCloudOptions cloud_options_;
@@ -67,6 +68,7 @@ class PlaybackMapping : public HostedMapping {
   std::set<std::thread::id> delivering_;  // threads within a callback
   mrpt::maps::CMultiMetricMap metric_map_;
   CEventFusionMap::Ptr event_map_;  // in metric_map_
+  bool warned_of_rounding_ = false;
 };
 
 }  // namespace efm

@@ -53,6 +53,7 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
               0.051 * far.resolution_m)
         << far.p_world.transpose();
     EXPECT_EQ(cloud->at(0).first_keyframe, 4U);
+    EXPECT_EQ(coarseStepOf(*cloud, far.resolution_m).has_value(), !far.origin.isZero());
     const auto xyzi = xyziCloudOf(*cloud);
     EXPECT_EQ(xyzi->sensor_origin_, cloud->sensor_origin_);
     EXPECT_EQ(xyzi->at(0).getVector3fMap(), cloud->at(0).getVector3fMap());
@@ -61,8 +62,11 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
 }
 
 TEST(MapCloud, APointFarFromTheOthersDoesNotMoveTheOrigin) {
-  const auto cloud = mapCloudOf({{{1, 2, 3}, 1}, {{1, 2, 3}, 1}, {{1e7, 0, 0}, 1}}, 0.01);
+  std::vector<CloudPoint> points(1000, {{1, 2, 3}, 1});
+  points[500].p_world = {1e7, 0, 0};
+  const auto cloud = mapCloudOf(points, 0.01);
   EXPECT_EQ(cloud->sensor_origin_.head<3>(), Eigen::Vector3f::Zero());
+  EXPECT_FALSE(coarseStepOf(*cloud, 0.01)) << "the map is not far away";
   EXPECT_TRUE(mapCloudOf({}, 0.01)->empty());
 }
 

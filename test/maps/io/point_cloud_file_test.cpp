@@ -11,6 +11,7 @@
 #include <fstream>
 #include <limits>
 #include <random>
+#include <set>
 #include <sstream>
 
 #include "maps/io/atomic_file.h"
@@ -34,6 +35,10 @@ class PointCloudFile : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
+  int runInFolder(const std::string& command) const {
+    return std::system(
+        ("cd '" + folder_.string() + "' && " + command + " >/dev/null 2>&1").c_str());
+  }
   std::size_t filesInFolder() const {
     return static_cast<std::size_t>(
         std::distance(std::filesystem::directory_iterator(folder_), {}));
@@ -179,19 +184,23 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
     GTEST_SKIP() << "the package pcl-tools is not installed";
   }
   const std::vector<CloudPoint> points = plainPoints(1000);
-  writePcd(folder_ / "map.pcd", *mapCloudOf(points, 1e9));
+  std::vector<CloudPoint> with_sigma = points;
+  for (CloudPoint& point : with_sigma) point.sigma = 0.25F;
+  writePcd(folder_ / "map.pcd", *mapCloudOf(with_sigma, 1e9));
   EXPECT_EQ(filesInFolder(), 1U) << "no temporary file stays";
-  const auto run = [this](const std::string& command) {
-    return std::system(
-        ("cd '" + folder_.string() + "' && " + command + " >/dev/null 2>&1").c_str());
-  };
-  ASSERT_EQ(run("pcl_convert_pcd_ascii_binary map.pcd a.pcd 0"), 0);
-  ASSERT_EQ(run("pcl_convert_pcd_ascii_binary map.pcd c.pcd 2"), 0);
-  ASSERT_EQ(run("pcl_pcd2ply -format 0 map.pcd a.ply"), 0);
-  ASSERT_EQ(run("pcl_pcd2ply -format 1 map.pcd b.ply"), 0);
+  ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary map.pcd a.pcd 0"), 0);
+  ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary map.pcd c.pcd 2"), 0);
+  ASSERT_EQ(runInFolder("pcl_pcd2ply -format 0 map.pcd a.ply"), 0);
+  ASSERT_EQ(runInFolder("pcl_pcd2ply -format 1 map.pcd b.ply"), 0);
   expectNear(readPointCloud(folder_ / "a.pcd").points, points, 1e-6);
   expectNear(readPointCloud(folder_ / "a.ply").points, points, 1e-6);
   expectNear(readPointCloud(folder_ / "b.ply").points, points, 0);
+  // Their filters keep the fields: the mean of the points of a voxel, support as they count it.
+  ASSERT_EQ(runInFolder("pcl_voxel_grid map.pcd v.pcd -leaf 5,5,5"), 0);
+  ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary v.pcd va.pcd 0"), 0);
+  EXPECT_LT(readPointCloud(folder_ / "va.pcd").points.size(), 200U);
+  EXPECT_THAT(readBytes(folder_ / "va.pcd"),
+              AllOf(HasSubstr("\nFIELDS x y z intensity support sigma\n"), HasSubstr(" 1 0.25\n")));
   // This program pads the compressed file to a whole page.
   std::string bytes = readBytes(folder_ / "c.pcd");
   const std::size_t sizes = bytes.find("compressed\n") + 11;
@@ -199,6 +208,54 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
   std::memcpy(&packed_bytes, bytes.data() + sizes, sizeof(packed_bytes));
   expectNear(parsePcd(std::string_view(bytes).substr(0, sizes + 8 + packed_bytes)).points, points,
              0);
+}
+
+/// With poses in UTM coordinates: a float has steps of 0.5 m at 5,400,000 m.
+TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> offset_m(-2.5, 2.5);
+  std::vector<CloudPoint> points;
+  while (points.size() < 4649) {
+    points.push_back({{450'123 + offset_m(random), 5'400'456 + offset_m(random), 100}, 2});
+  }
+  const auto expectAllDigits = [&](const std::string& name, double tolerance_m) {
+    const auto read = readPointCloud(folder_ / name).points;
+    ASSERT_EQ(read.size(), points.size());
+    std::set<double> heights;
+    for (std::size_t i = 0; i < read.size(); ++i) {
+      heights.insert(read[i].p_world.y());
+      ASSERT_LT((read[i].p_world - points[i].p_world).norm(), tolerance_m) << name;
+    }
+    EXPECT_GT(heights.size(), 4000U) << name;  // of floats in the world: 11
+  };
+  writePcd(folder_ / "map.pcd", *mapCloudOf(points, 0.01));
+  expectAllDigits("map.pcd", 1e-4);
+  EXPECT_THAT(readBytes(folder_ / "map.pcd"),
+              AllOf(HasSubstr("\nFIELDS x y z intensity support sigma\n"),
+                    HasSubstr("\nVIEWPOINT 450000 5400000 0 1 0 0 0\n")));
+  if (std::system("command -v pcl_convert_pcd_ascii_binary >/dev/null") != 0) {
+    GTEST_SKIP() << "the package pcl-tools is not installed";
+  }
+  ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary map.pcd a.pcd 0"), 0);
+  expectAllDigits("a.pcd", 1e-3);
+  ASSERT_EQ(runInFolder("pcl_outlier_removal map.pcd o.pcd -method radius -radius 9 -min_pts 1"),
+            0);
+  expectAllDigits("o.pcd", 1e-4);
+}
+
+/// The place of a sensor, whose points may be relative to anything.
+TEST_F(PointCloudFile, ViewpointsOfOtherProgramsAreNotAdded) {
+  const std::string start = "VERSION 0.7\nFIELDS x y z";
+  const std::string end = "WIDTH 1\nHEIGHT 1\nVIEWPOINT 10 20 30 1 0 0 0\nPOINTS 1\nDATA ascii\n";
+  const auto other = contentOf("a.pcd", start + "\nSIZE 4 4 4\nTYPE F F F\n" + end + "1 2 3\n");
+  EXPECT_EQ(other.points.at(0).p_world, Eigen::Vector3d(1, 2, 3));
+  const std::string ours = " support sigma\nSIZE 4 4 4 4 4\nTYPE F F F U F\n";
+  const auto map = contentOf("b.pcd", start + ours + end + "1 2 3 4 nan\n");
+  EXPECT_EQ(map.points.at(0).p_world, Eigen::Vector3d(11, 22, 33));
+  std::string wrong = end;
+  wrong.replace(wrong.find("20"), 2, "x");
+  EXPECT_THAT(refusalOf("c.pcd", start + ours + wrong + "1 2 3 4 nan\n"),
+              HasSubstr("line 7: VIEWPOINT: expected 7 numbers"));
 }
 
 TEST_F(PointCloudFile, IsReadBackFromEachEncoding) {

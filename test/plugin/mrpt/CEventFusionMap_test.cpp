@@ -273,6 +273,27 @@ TEST(CEventFusionMap, ReturnsItsPointsAsMrptsSimplestMap) {
   EXPECT_EQ(map.getAsSimplePointsMap()->size(), map.cloud().points()->size()) << "after it grew";
 }
 
+TEST(CEventFusionMap, WarnsWhereMrptsFloatsRoundItsPoints) {
+  const MapCloud::ConstPtr near = mapOf(1).cloud().points();
+  EXPECT_FALSE(roundingWarning(*near, 0.25));
+  StoredKeyframe keyframe = randomKeyframe(1);
+  keyframe.T_world_ref.translation += Eigen::Vector3d(450'000, 5'400'000, 100);
+  GlobalCloudOptions options;
+  options.voxel_size_m = 0.01;
+  CEventFusionMap map(options);
+  map.insertKeyframe(keyframe);
+  EXPECT_THAT(*roundingWarning(*map.cloud().points(), 0.01), HasSubstr("steps at the map's "
+                                                                       "coordinates are 0.5 m"));
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  map.getAsSimplePointsMap();
+  map.getVisualization();
+  const std::string text =
+      testing::internal::GetCapturedStdout() + testing::internal::GetCapturedStderr();
+  EXPECT_THAT(text, HasSubstr("MRPT's maps have float points"));
+  EXPECT_EQ(text.find("MRPT's maps"), text.rfind("MRPT's maps")) << "once";
+}
+
 TEST(CEventFusionMap, IsDescribedByKeyframesAndVoxelSize) {
   EXPECT_THAT(mapOf(3).asString(), HasSubstr("3 keyframes"));
   EXPECT_THAT(mapOf(3).asString(), HasSubstr("0.25 m"));
