@@ -91,6 +91,21 @@ std::optional<Window> BaselinePolicy::current(const RecordingProgress& recording
   }
 }
 
+std::optional<Window> BaselinePolicy::last(const RecordingProgress& recording,
+                                           std::int64_t end_ns) const {
+  const auto first_ns = recording.timeOfEvent(earliestStart(recording), 1);
+  if (!first_ns || *first_ns >= end_ns) return std::nullopt;
+  const auto T_world_ref1 = recording.viewPoseAt(end_ns - 1);  // of the last event
+  std::int64_t t0_ns = std::min(*first_ns, end_ns - stride_ns_);
+  for (; t0_ns >= recording.startNs() && end_ns - t0_ns <= window_ns_; t0_ns -= stride_ns_) {
+    const auto T_world_ref0 = recording.viewPoseAt(t0_ns);
+    if (T_world_ref0 && T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
+      return windowOf(t0_ns, end_ns, options_.reference);
+    }
+  }
+  return std::nullopt;
+}
+
 bool BaselinePolicy::isEnough(const Rigid3& T_world_ref0, const Rigid3& T_world_ref1,
                               const ReferenceView& view) const {
   const double baseline_m = (T_world_ref1.translation - T_world_ref0.translation).norm();

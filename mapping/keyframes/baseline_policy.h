@@ -26,6 +26,12 @@ class BaselinePolicy : public KeyframePolicy {
   BaselinePolicy(const KeyframePolicyOptions& options, double depth_guess_m);
 
   std::optional<Window> current(const RecordingProgress& recording) override;
+  /// Grows from the end back, stride by stride.
+  std::optional<Window> last(const RecordingProgress& recording,
+                             std::int64_t end_ns) const override;
+  std::int64_t earliestLast(const RecordingProgress& recording) const override {
+    return earliestStart(recording) - window_ns_;
+  }
   std::int64_t earliestStart(const RecordingProgress& recording) const override;
   void advance(const Window& window, const KeyframeDepthMap* keyframe) override;
   /// Every window has events: none is skipped.

@@ -165,6 +165,15 @@ std::optional<std::int64_t> CameraStream::firstWithPose(const Trajectory& trajec
   return std::nullopt;
 }
 
+std::optional<std::int64_t> CameraStream::lastWithPose(const Trajectory& trajectory,
+                                                       std::int64_t until_ns) {
+  const EventSpan before = buffer_.between(kMinTimeNs, until_ns);
+  for (std::size_t i = before.size(); i-- > 0;) {
+    if (trajectory.segmentAt(before[i].t_ns, pose_cursor_)) return before[i].t_ns;
+  }
+  return std::nullopt;
+}
+
 void CameraStream::markUsed(const Window& window, const Trajectory& trajectory,
                             std::size_t max_events) {
   PosedTimes posed(trajectory, pose_cursor_);

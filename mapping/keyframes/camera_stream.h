@@ -79,6 +79,8 @@ class CameraStream {
   std::optional<std::int64_t> firstFrom(std::int64_t t_ns) const;
   /// Time of the first buffered event before `until_ns` with a pose.
   std::optional<std::int64_t> firstWithPose(const Trajectory& trajectory, std::int64_t until_ns);
+  /// Time of the last buffered event before `until_ns` with a pose.
+  std::optional<std::int64_t> lastWithPose(const Trajectory& trajectory, std::int64_t until_ns);
   /// Marks the window's events that have a pose as used; those of an `EvenChoice` of at most
   /// `max_events`.
   void markUsed(const Window& window, const Trajectory& trajectory, std::size_t max_events);

@@ -234,7 +234,20 @@ std::optional<Window> FusionMapper::coveredWindow() {
   if (!start_ns_) return std::nullopt;
   skipEmptyWindows();
   const std::optional<Window> window = policy_->current(*this);
-  return window && isCovered(*window) ? window : std::nullopt;
+  return window && isCovered(*window) ? window : lastWindow();
+}
+
+/// The window that ends with the recording, once all others are mapped. It needs events that may
+/// have been released where windows were given up.
+std::optional<Window> FusionMapper::lastWindow() {
+  if (!finished_ || !options_.fill_last_window) return std::nullopt;
+  std::optional<std::int64_t> last_ns;
+  for (CameraStream& camera : cameras_) {
+    last_ns = std::max(last_ns, camera.lastWithPose(trajectory_, completeNs()));
+  }
+  if (!last_ns) return std::nullopt;
+  const std::optional<Window> window = policy_->last(*this, *last_ns + 1);
+  return window && window->t0_ns >= released_ns_ ? window : std::nullopt;
 }
 
 std::vector<EventSpan> FusionMapper::eventsOf(const Window& window) const {
@@ -340,7 +353,8 @@ void FusionMapper::countKeyframe(const KeyframeDepthMap& keyframe) {
 
 /// Events before this time are complete, with their poses, and no later window needs them.
 std::int64_t FusionMapper::releasableUntil() const {
-  const std::int64_t start_ns = policy_->earliestStart(*this);
+  std::int64_t start_ns = policy_->earliestStart(*this);
+  if (options_.fill_last_window) start_ns = std::min(start_ns, policy_->earliestLast(*this));
   return finished_ ? start_ns : std::min(start_ns, completeNs());
 }
 

@@ -28,6 +28,9 @@ struct FusionMapperOptions {
   KeyframePolicyOptions policy;
   /// If given, this window is the only keyframe, and `policy` is not used.
   std::optional<Window> only_window;
+  /// At the end of the recording, where the last window is not full: one that is full and ends
+  /// right after the last event with a pose. So it overlaps the window before.
+  bool fill_last_window = true;
   KeyframeMapperOptions keyframe;
   std::vector<int> cameras;  ///< Indices of the cameras that take part, each once; empty: all.
   TimeLimits limits;         ///< Events and windows outside are not used.
@@ -110,7 +113,8 @@ class FusionMapper : private RecordingProgress {
   /// The same for all cameras. `t_ns` is on the trajectory's clock. Poses before it are forgotten
   /// where no window needs them.
   void coverAllUntil(std::int64_t t_ns);
-  /// No more data will come. Windows that are not full are not mapped.
+  /// No more data will come. Windows that are not full are not mapped: the last one begins earlier
+  /// (`fill_last_window`). A recording that is shorter than a window has none.
   void finish() { finished_ = true; }
 
   /// Maps the next window that is covered, if there is one. Costs the keyframe's whole work.
@@ -160,6 +164,7 @@ class FusionMapper : private RecordingProgress {
   void findStart();
   void skipEmptyWindows();
   std::optional<Window> coveredWindow();
+  std::optional<Window> lastWindow();
   std::vector<EventSpan> eventsOf(const Window& window) const;
   void loseEvents(std::int64_t t0_ns, std::int64_t t1_ns, GiveUpReason reason);
   void releaseUnneeded();

@@ -36,6 +36,19 @@ class PeriodPolicy : public KeyframePolicy {
     if (recording.reachedNs() < window.t1_ns) return std::nullopt;
     return window;
   }
+  std::optional<Window> last(const RecordingProgress& recording,
+                             std::int64_t end_ns) const override {
+    const std::int64_t next_ns = earliestStart(recording);
+    const std::int64_t t0_ns = end_ns - window_ns_;
+    const bool in_the_window_before = index_ > 0 && t0_ns <= next_ns - stride_ns_;
+    if (end_ns <= next_ns || in_the_window_before || t0_ns < recording.startNs()) {
+      return std::nullopt;
+    }
+    return windowOf(t0_ns, end_ns, reference_);
+  }
+  std::int64_t earliestLast(const RecordingProgress& recording) const override {
+    return earliestStart(recording) - std::min(stride_ns_, window_ns_);
+  }
   std::int64_t earliestStart(const RecordingProgress& recording) const override {
     return recording.startNs() + index_ * stride_ns_;
   }
@@ -75,10 +88,22 @@ class EventsPolicy : public KeyframePolicy {
     if (!last_ns) return std::nullopt;
     return windowOf(*recording.timeOfEvent(from_ns, 1), *last_ns + 1, reference_);
   }
+  std::optional<Window> last(const RecordingProgress& recording,
+                             std::int64_t end_ns) const override {
+    if (recording.eventsIn(earliestStart(recording), end_ns) == 0) return std::nullopt;
+    const std::int64_t from_ns = earliestLast(recording);
+    const std::int64_t excess = recording.eventsIn(from_ns, end_ns) - window_events_;
+    if (excess < 0) return std::nullopt;
+    return windowOf(*recording.timeOfEvent(from_ns, excess + 1), end_ns, reference_);
+  }
+  std::int64_t earliestLast(const RecordingProgress& recording) const override {
+    return before_ns_.value_or(recording.startNs());
+  }
   std::int64_t earliestStart(const RecordingProgress& recording) const override {
     return next_ns_.value_or(recording.startNs());
   }
   void advance(const Window& window, const KeyframeDepthMap*) override {
+    before_ns_ = window.t0_ns;
     next_ns_ = window.t1_ns;
     counted_events_ = 0;
   }
@@ -87,7 +112,7 @@ class EventsPolicy : public KeyframePolicy {
     const std::int64_t from_ns = earliestStart(recording);
     if (t_ns <= from_ns) return 0;
     counted_events_ -= recording.eventsIn(from_ns, t_ns);
-    next_ns_ = t_ns;
+    before_ns_ = next_ns_ = t_ns;
     if (counted_events_ >= 0) return 0;
     const std::int64_t windows = (-counted_events_ - 1) / window_events_ + 1;
     counted_events_ += windows * window_events_;
@@ -97,6 +122,7 @@ class EventsPolicy : public KeyframePolicy {
  private:
   std::int64_t window_events_;
   ReferenceTime reference_;
+  std::optional<std::int64_t> before_ns_;  // start of the window before
   std::optional<std::int64_t> next_ns_;
   /// The events that the last window given up still lacks: their loss is counted with it.
   std::int64_t counted_events_ = 0;
@@ -107,6 +133,12 @@ class SingleWindowPolicy : public KeyframePolicy {
   explicit SingleWindowPolicy(const Window& window) : window_(window) {}
 
   std::optional<Window> current(const RecordingProgress&) override { return window_; }
+  std::optional<Window> last(const RecordingProgress&, std::int64_t) const override {
+    return std::nullopt;
+  }
+  std::int64_t earliestLast(const RecordingProgress& recording) const override {
+    return earliestStart(recording);
+  }
   std::int64_t earliestStart(const RecordingProgress&) const override {
     return window_ ? window_->t0_ns : kMaxTimeNs;
   }

@@ -84,6 +84,14 @@ class KeyframePolicy {
   /// The current window, as soon as the recording certainly fills it.
   /// @return nothing before that, and after the last window.
   virtual std::optional<Window> current(const RecordingProgress& recording) = 0;
+  /// Of a recording that has ended: a full window that ends with it, if events before `end_ns` are
+  /// in no other one.
+  /// @param end_ns right after the last event with a pose.
+  /// @return nothing where that window would begin before the recording does.
+  virtual std::optional<Window> last(const RecordingProgress& recording,
+                                     std::int64_t end_ns) const = 0;
+  /// `last` needs no events before this time.
+  virtual std::int64_t earliestLast(const RecordingProgress& recording) const = 0;
   /// No later window needs events before this time, or poses before `earliestReference`.
   virtual std::int64_t earliestStart(const RecordingProgress& recording) const = 0;
   virtual std::int64_t earliestReference(const RecordingProgress& recording) const {

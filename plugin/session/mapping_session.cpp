@@ -42,6 +42,7 @@ std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns) {
 FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
   FusionMapperOptions mapper = options.mapper;
   if (options.late_fusion) mapper.keyframe.camera_maps = true;
+  if (options.live.enabled) mapper.fill_last_window = false;
   return options.automatic.any() ? surveyOptions(mapper, kFirstWindowS) : mapper;
 }
 

@@ -193,6 +193,28 @@ TEST(BaselinePolicy, StartsAtTheNextEventAfterAnyGap) {
   EXPECT_FALSE(policy.current(recording)) << "no window is without events";
 }
 
+TEST(BaselinePolicy, TheLastWindowGrowsFromTheEndBack) {
+  const auto moving =
+      recordingOf([](std::int64_t t_ns) { return moved(0.9 * secondsSinceStart(t_ns)); });
+  BaselinePolicy policy(options(0.3, 0.05), kDepthGuess_m);
+  policy.advance(*policy.current(moving), nullptr);  // [0, 0.25)
+  EXPECT_FALSE(policy.last(moving, kStart_ns + 250 * kMs)) << "all events are in a window";
+  // From the first event that is in none: 0.225 m from 0.05 s, 0.18 m from 0.1 s.
+  const auto window = policy.last(moving, kStart_ns + 300 * kMs);
+  ASSERT_TRUE(window);
+  EXPECT_EQ(window->t0_ns, kStart_ns + 50 * kMs);
+  EXPECT_EQ(window->t1_ns, kStart_ns + 300 * kMs);
+  EXPECT_EQ(policy.earliestLast(moving), kStart_ns - 50 * kMs);
+  // At rest from 0.2 s on: 0.18 m in all.
+  const auto stops = recordingOf(
+      [](std::int64_t t_ns) { return moved(0.9 * std::min(0.2, secondsSinceStart(t_ns))); });
+  EXPECT_FALSE(policy.last(stops, kStart_ns + 300 * kMs)) << "never enough";
+  KeyframePolicyOptions shorter = options(0.2, 0.05);
+  BaselinePolicy impatient(shorter, kDepthGuess_m);
+  impatient.advance({kStart_ns, kStart_ns + 250 * kMs, kStart_ns}, nullptr);
+  EXPECT_FALSE(impatient.last(moving, kStart_ns + 300 * kMs)) << "not in the longest window";
+}
+
 TEST(BaselinePolicy, TheReferenceMayStandAtTheEnd) {
   KeyframePolicyOptions at_end = options(1.0, 0.05);
   at_end.reference = ReferenceTime::kEnd;

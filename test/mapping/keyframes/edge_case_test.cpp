@@ -205,5 +205,73 @@ TEST(EdgeCase, ACameraWithoutEventsMakesAndLikeRulesZeroUnlessItIsExcluded) {
   }
 }
 
+TEST(EdgeCase, TheLastWindowIsFullAndEndsWithTheRecording) {
+  struct Case {
+    const char* what;
+    double window_s, stride_s;
+    int poses_ms, events_ms;  // an event every millisecond, a pose every 10 ms, until here
+    std::int64_t limit_ms;    // of the time, or 0
+    std::size_t keyframes;
+    int last_begin_ms, last_end_ms;  // the events of the last window
+    std::uint64_t used;
+  };
+  for (const Case& c :
+       {Case{"moved back", 0.1, 0.1, 400, 270, 0, 3, 170, 270, 270},
+        {"one more event than fits", 0.1, 0.1, 400, 201, 0, 3, 101, 201, 201},
+        {"the strides fit", 0.1, 0.1, 400, 201, 200, 2, 100, 200, 200},
+        {"overlapping windows", 0.1, 0.04, 400, 301, 0, 7, 201, 301, 301},
+        {"overlapping windows that fit", 0.1, 0.05, 400, 301, 300, 5, 200, 300, 300},
+        {"windows apart, in the third", 0.05, 0.1, 400, 230, 0, 3, 180, 230, 150},
+        {"windows apart, between them", 0.05, 0.1, 400, 195, 0, 2, 100, 150, 100},
+        {"poses end first", 0.1, 0.1, 250, 330, 0, 3, 150, 250, 250},
+        {"a limit", 0.1, 0.1, 400, 330, 260, 3, 160, 260, 260},
+        {"shorter than a window", 0.1, 0.1, 400, 99, 0, 0, 0, 0, 0}}) {
+    FusionMapperOptions period = options();
+    period.filter.hot_pixels = false;
+    period.policy.window_s = c.window_s;
+    period.policy.stride_s = c.stride_s;
+    if (c.limit_ms > 0) period.limits.t1_ns = kStart_ns + c.limit_ms * kMs;
+    FusionMapper mapper(period);
+    mapper.addCamera({test::smallCamera(), {}, 0});
+    std::vector<KeyframeDepthMap> keyframes;
+    for (int ms = 0; ms < std::max(c.poses_ms + 10, c.events_ms); ++ms) {
+      if (ms % 10 == 0 && ms <= c.poses_ms) mapper.addPose({kStart_ns + ms * kMs, {}});
+      if (ms < c.events_ms) mapper.addEvents(0, {eventAt(kStart_ns + ms * kMs)});
+      for (auto& keyframe : takeAll(mapper)) keyframes.push_back(std::move(keyframe));
+    }
+    mapper.finish();
+    for (auto& keyframe : takeAll(mapper)) keyframes.push_back(std::move(keyframe));
+    ASSERT_EQ(keyframes.size(), c.keyframes) << c.what;
+    EXPECT_EQ(mapper.counts().total().used, c.used) << c.what;
+    if (keyframes.empty()) continue;
+    const Window last = keyframes.back().window;
+    const auto length_ms = static_cast<int>(1e3 * c.window_s);
+    EXPECT_EQ(last.t1_ns - last.t0_ns, length_ms * kMs) << c.what;
+    EXPECT_EQ(keyframes.back().events[0], static_cast<std::uint64_t>(length_ms)) << c.what;
+    // Right after its last event, or at a multiple of the stride.
+    EXPECT_GT(last.t1_ns, kStart_ns + (c.last_end_ms - 1) * kMs) << c.what;
+    EXPECT_LE(last.t1_ns, kStart_ns + c.last_end_ms * kMs) << c.what;
+    EXPECT_GT(last.t0_ns, kStart_ns + (c.last_begin_ms - 1) * kMs) << c.what;
+    EXPECT_LE(last.t0_ns, kStart_ns + c.last_begin_ms * kMs) << c.what;
+  }
+}
+
+TEST(EdgeCase, TheLastWindowReachesNotIntoEventsThatWereGivenUp) {
+  for (const auto& [until_ms, keyframes] : {std::pair{150, 1U}, std::pair{190, 0U}}) {
+    FusionMapperOptions period = options();
+    period.filter.hot_pixels = false;
+    FusionMapper mapper(period);
+    mapper.addCamera({test::smallCamera(), {}, 0});
+    for (int i = 0; i <= 40; ++i) mapper.addPose({kStart_ns + i * 10 * kMs, {}});
+    std::vector<Event> events;
+    for (int ms = 0; ms < 280; ++ms) events.push_back(eventAt(kStart_ns + ms * kMs));
+    mapper.addEvents(0, events);
+    ASSERT_TRUE(mapper.nextWindow());
+    mapper.giveUpBefore(kStart_ns + until_ms * kMs);
+    mapper.finish();
+    EXPECT_EQ(takeAll(mapper).size(), keyframes) << until_ms;
+  }
+}
+
 }  // namespace
 }  // namespace efm::edge_case_test

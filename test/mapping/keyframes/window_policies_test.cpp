@@ -224,6 +224,15 @@ std::vector<std::int64_t> eventTimes(const LongRecording& recording) {
   return {start, times.end()};
 }
 
+/// The time of the last event that has a pose before the last one.
+std::int64_t lastPosed(const std::vector<std::int64_t>& times, const LongRecording& recording) {
+  const Trajectory trajectory = recording.trajectory();
+  const auto last = std::find_if(times.rbegin(), times.rend(), [&](std::int64_t t_ns) {
+    return t_ns < recording.poses.back().t_ns && trajectory.poseAt(t_ns);
+  });
+  return *last;
+}
+
 /// Those that have a pose at their reference time.
 std::vector<Window> mappable(const std::vector<Window>& windows, const Trajectory& trajectory) {
   std::vector<Window> result;
@@ -242,7 +251,8 @@ void expectWindows(const Played& played, const std::vector<Window>& windows) {
   }
 }
 
-TEST(WindowPolicies, WindowsOfAFixedNumberOfEventsFollowEachOther) {
+TEST(WindowPolicies, WindowsOfAFixedNumberOfEventsFollowEachOtherAndTheLastIsMovedBack) {
+  int moved_back = 0;
   for (std::uint32_t seed = 1; seed <= 4; ++seed) {
     const LongRecording recording(seed, 1.0);
     const std::vector<std::int64_t> times = eventTimes(recording);
@@ -262,9 +272,17 @@ TEST(WindowPolicies, WindowsOfAFixedNumberOfEventsFollowEachOther) {
       EXPECT_GE(windows.size(), 2U);
       if (count == 1) windows.resize(10);  // each keyframe costs something
       if (count == 1) options.limits.t1_ns = windows.back().t1_ns;
+      const std::int64_t end_ns = lastPosed(times, recording) + 1;
+      const auto end = std::lower_bound(times.begin(), times.end(), end_ns);
+      if (count > 1 && windows.back().t1_ns < end_ns) {  // the last ones that are that many
+        const std::int64_t t0_ns = *(end - static_cast<std::ptrdiff_t>(count));
+        windows.push_back({t0_ns, end_ns, t0_ns + (end_ns - t0_ns) / 2});
+        ++moved_back;
+      }
       expectWindows(play(recording, options, seed), mappable(windows, recording.trajectory()));
     }
   }
+  EXPECT_GE(moved_back, 9) << "of 12";
 }
 
 double meanDepth(const cv::Mat1f& depth) { return cv::mean(depth, depth > 0)[0]; }
@@ -272,6 +290,7 @@ double meanDepth(const cv::Mat1f& depth) { return cv::mean(depth, depth > 0)[0];
 TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
   std::size_t keyframes = 0;
   std::size_t different_lengths = 0;
+  std::size_t moved_back = 0;
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     const LongRecording recording(seed, seed % 2 == 0 ? 2.0 : 0.7);
     const std::vector<std::int64_t> times = eventTimes(recording);
@@ -316,17 +335,32 @@ TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
         break;
       }
     }
+    // From the end back, stride by stride, until the motion is enough.
+    const std::int64_t end_ns = lastPosed(times, recording) + 1;
+    const auto rest = std::lower_bound(times.begin(), times.end(), from_ns);
+    if (rest != times.end() && *rest < end_ns) {
+      std::int64_t t0_ns = std::min(*rest, end_ns - 12'000'000);
+      for (; t0_ns >= times.front() && end_ns - t0_ns <= 100'000'000; t0_ns -= 12'000'000) {
+        if (!centre(t0_ns)) continue;
+        if ((*centre(end_ns - 1) - *centre(t0_ns)).norm() < 0.04 * mean_depth_m) continue;
+        windows.push_back({t0_ns, end_ns, t0_ns + (end_ns - t0_ns) / 2});
+        ++moved_back;
+        break;
+      }
+    }
     expectWindows(played, mappable(windows, trajectory));
     keyframes += played.keyframes.size();
   }
   EXPECT_GE(keyframes, 20U);
   EXPECT_GE(different_lengths, 5U);
+  EXPECT_GE(moved_back, 3U) << "of 5";
 }
 
 TEST(WindowPolicies, ARigAtRestTakesNoMemoryAndMakesNoKeyframe) {
   constexpr std::int64_t kMs = LongRecording::kMs;
   FusionMapperOptions options = playedOptions();
   options.cameras = {};
+  options.fill_last_window = false;
   options.policy.policy = KeyframePolicyKind::kBaseline;
   options.policy.window_s = 0.1;
   options.policy.stride_s = 0.02;

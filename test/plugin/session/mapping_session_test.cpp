@@ -76,6 +76,25 @@ TEST(MappingSession, CountsOfOverlappingWindowsAddUp) {
   EXPECT_GT(status.counts.total().outside_window, 0U) << "the last window is not full";
 }
 
+TEST(MappingSession, InPlaybackTheLastWindowIsMovedBackToEndWithTheRecording) {
+  const SyntheticRecording recording;
+  for (const bool live : {false, true}) {
+    EventFusionOptions options = syntheticOptions();
+    options.mapper.fill_last_window = true;
+    options.live.enabled = live;
+    MappingSession session(options);
+    const auto keyframes = mapAll(session, recording);
+    ASSERT_EQ(keyframes.size(), live ? 3U : 4U);
+    EXPECT_EQ(session.status().counts.total().outside_window > 100, live);
+    if (live) continue;
+    const Window& last = keyframes.back().window;
+    EXPECT_EQ(last.t1_ns - last.t0_ns, 200'000'000);
+    // The last event before the last pose.
+    EXPECT_EQ(last.t1_ns, recording.poses.back().t_ns - 1'000'000 + 1);
+    expectCountsAddUp(session.status(), recording.totalEvents(), 30);
+  }
+}
+
 TEST(MappingSession, EventsOutsideTheTimeLimitsAreInNoWindow) {
   const SyntheticRecording recording;
   const std::int64_t start_ns = SyntheticRecording::kStartNs;
@@ -281,8 +300,7 @@ EventFusionOptions liveOptions(KeyframePolicyKind policy) {
 }
 
 /// Feeds two seconds and does not end them: windows stay to come.
-void feedTwoSeconds(MappingSession& session) {
-  const SyntheticRecording recording(2);
+void feedTwoSeconds(MappingSession& session, const SyntheticRecording& recording) {
   addPoses(session, recording);
   for (const double begin_s : {0.0, 1.1}) {  // the second packets make the rig complete
     for (const int c : {0, 1}) session.addEvents(pieceOf(recording, c, begin_s, begin_s + 1.1));
@@ -300,16 +318,17 @@ std::vector<std::int64_t> startsOfWindows(MappingSession& session) {
 }
 
 TEST(MappingSession, AWindowIsGivenUpAsAWholeAndCountedOnceWithEveryPolicy) {
+  const SyntheticRecording recording(2);
   for (const auto& [policy, at_least] :
        {std::pair{KeyframePolicyKind::kPeriod, 8U}, std::pair{KeyframePolicyKind::kEvents, 15U},
         std::pair{KeyframePolicyKind::kBaseline, 6U}}) {
     MappingSession skipping(liveOptions(policy));
-    feedTwoSeconds(skipping);
+    feedTwoSeconds(skipping, recording);
     const std::vector<std::int64_t> expected = startsOfWindows(skipping);
     ASSERT_GE(expected.size(), at_least);
     for (const bool for_overload : {false, true}) {  // or for an error
       MappingSession session(liveOptions(policy));
-      feedTwoSeconds(session);
+      feedTwoSeconds(session, recording);
       std::vector<std::int64_t> starts;
       std::size_t given_up = 0;
       while (const std::optional<Window> window = session.nextWindow()) {

@@ -94,6 +94,7 @@ inline EventFusionOptions syntheticOptions() {
   EventFusionOptions options;
   options.mapper.policy.window_s = 0.2;
   options.mapper.policy.stride_s = 0.1;
+  options.mapper.fill_last_window = false;  // as in live operation, which is compared with playback
   options.mapper.keyframe.planes = {1, 5, 30, PlaneSpacing::kInverse};
   options.mapper.keyframe.extraction.threshold_c = 60;  // lone dots stand out far
   return options;
