@@ -31,7 +31,9 @@ void DepthPlanesOptions::validate() const {
   constexpr double kMaxDepthM = 1e6;
   requireOption(std::isfinite(min_depth_m) && min_depth_m > 0, "min_depth_m", min_depth_m,
                 "finite and above 0");
-  requireOption(std::isfinite(max_depth_m) && max_depth_m > min_depth_m, "max_depth_m", max_depth_m,
+  requireOption(std::isfinite(max_depth_m) && max_depth_m > kMinDepthM, "max_depth_m", max_depth_m,
+                "finite and above 0.001");
+  requireOption(max_depth_m > min_depth_m, "max_depth_m", max_depth_m,
                 "finite and above min_depth_m");
   requireOption(min_depth_m >= kMinDepthM, "min_depth_m", min_depth_m, "at least 0.001");
   requireOption(max_depth_m <= kMaxDepthM, "max_depth_m", max_depth_m, "at most 1000000");

@@ -171,7 +171,8 @@ void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& option
   if (contradict && automatic.max_depth_m) {
     planes.max_depth_m = kDepthRatio * planes.min_depth_m;
   } else if (contradict && automatic.min_depth_m) {
-    planes.min_depth_m = planes.max_depth_m / kDepthRatio;
+    // A valid one: an error is about the limit that was given.
+    planes.min_depth_m = std::max(planes.max_depth_m / kDepthRatio, kMinDepthM);
   }
   KeyframePolicyOptions& policy = options.policy;
   if (automatic.stride_s) policy.stride_s = std::min(policy.stride_s, policy.window_s);

@@ -479,6 +479,20 @@ TEST(OptionReader, AnErrorOfTwoValuesBeginsWithTheOneThatWasGivenLast) {
       error("[dsi]\nmax_depth_m = 1\nmin_depth_m = 10\n", {"dsi.num_planes=9"}),
       "rig.ini:3: [dsi] min_depth_m = 10: contradicts rig.ini:2: [dsi] max_depth_m = 1, which " +
           must);
+  // Not the other limit, which is auto.
+  for (const char* const value : {"-3", "0", "0.0001", "0.001"}) {
+    const std::string set = std::string("dsi.max_depth_m=") + value;
+    EXPECT_EQ(error("", {set}), "--set " + set + ": must be finite and above 0.001");
+    EXPECT_EQ(error("", {set, "dsi.min_depth_m=1"}),
+              "--set " + set + ": must be finite and above 0.001");
+  }
+  for (const char* const value : {"-3", "0"}) {
+    const std::string set = std::string("dsi.min_depth_m=") + value;
+    EXPECT_EQ(error("", {set}), "--set " + set + ": must be finite and above 0");
+    EXPECT_EQ(error("", {set, "dsi.max_depth_m=-4"}),
+              "--set " + set + ": must be finite and above 0");
+  }
+  EXPECT_NO_THROW(optionsOf("[dsi]\nmax_depth_m = 0.0011\n"));
   // What is not given has its default.
   EXPECT_EQ(error("", {"refinement.last_distance_px=0"}),
             "--set refinement.last_distance_px=0: must be above 0, at most 10000 (pixels)");
