@@ -95,8 +95,12 @@ void warnOfRecalibration(const MappingArguments& arguments, MappingOutcome& outc
                                    "rig.calibration= keeps that"});
 }
 
+bool isWithoutPoints(const MapReport& report) {
+  return report.counts.keyframes > 0 && report.points == 0;
+}
+
 void warnOfNoPoints(MapReport& report) {
-  if (report.counts.keyframes == 0 || report.points > 0) return;
+  if (!isWithoutPoints(report)) return;
   report.warnings.push_back(
       {"no-points",
        "the map has no point: keyframes saw too few events, or every point was removed ([depth] "
@@ -184,7 +188,9 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
     return fail(reader.withOrigins(*outcome.error));
   }
   if (!outcome.report.stopped_at) {
-    return arguments.strict && failStrictly(outcome.report.warnings) ? kFailedStatus : 0;
+    const bool strict = arguments.strict && failStrictly(warnings);
+    if (isWithoutPoints(outcome.report)) return fail("the map has no point; its files are written");
+    return strict ? kFailedStatus : 0;
   }
   std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
                            100 * *outcome.report.stopped_at);

@@ -55,7 +55,7 @@ std::vector<Mistake> eventMistakes() {
       {"a silent camera",
        [](Draft& draft) { draft.events[1].clear(); },
        "",
-       kFine,
+       kJobError,
        {"warning: silent-camera: camera 1", "warning: no-points:"}},
       {"a camera with a twentieth of the events",
        [](Draft& draft) {
@@ -103,7 +103,7 @@ std::vector<Mistake> eventMistakes() {
       {"a camera 1000 s late",
        eachEvent(1, [](Event& event) { event.t_ns += 1'000'000'000'000; }),
        "",
-       kFine,
+       kJobError,
        {"warning: camera-clocks:", "warning: clock-overlap:"}},
       {"events that are not sorted",
        [](Draft& draft) {

@@ -412,9 +412,13 @@ TEST_F(MapCommand, DepthsAtALimitAndMapsWithoutPointsAreWarnings) {
   write(SyntheticRecording());  // at 2 m
   for (const std::string command :
        {"map rig.ini data --out out", "depth rig.ini data --out out2 --t0 10.1 --t1 10.3"}) {
-    EXPECT_THAT(run(command + " --set depth.min_quality=1e6").err,
-                HasSubstr("warning: no-points: the map has no point"));
+    const Result result = run(command + " --set depth.min_quality=1e6");
+    EXPECT_THAT(result.err, AllOf(HasSubstr("warning: no-points: the map has no point"),
+                                  HasSubstr("event-fusion: error: the map has no point")));
+    EXPECT_EQ(result.status, 1) << "the job is not done";
   }
+  ASSERT_EQ(run("map rig.ini data --out full").status, 0);
+  EXPECT_EQ(filesIn("out"), filesIn("full")) << "everything is written";
   const std::string at_limit =
       " --set dsi.max_depth_m=2 --set dsi.num_planes=100 --set depth.extraction=paper";
   EXPECT_THAT(run("map rig.ini data --out out" + at_limit).err,
