@@ -36,7 +36,7 @@ class Player {
       : job_(job),
         recording_(recording),
         times_(times),
-        depths_(job.options.mapper.keyframe.planes),
+        depths_(job.options.mapper.keyframe.planes, job.chosen),
         progress_(job.activity, job.verbosity) {
     EventFusionOptions options = job.options;
     options.mapper.keyframe.sequence_maximum = job.sequence_maximum;

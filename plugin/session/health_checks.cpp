@@ -181,11 +181,18 @@ std::vector<Warning> DepthStatistics::warnings() const {
   const auto check = [&](std::uint64_t count, const char* which, double limit_m, const char* key) {
     const double fraction = static_cast<double>(count) / static_cast<double>(depths_);
     if (fraction <= kMaxFraction) return;
-    warnings.push_back(
-        {"depths-at-limit",
-         fmt::format("{:.0f} % of the depths lie at the {} plane, {:g} m: the scene goes on beyond "
-                     "it ([dsi] {}), or calibration and poses do not explain the events",
-                     100 * fraction, which, limit_m, key)});
+    const auto chosen = std::find_if(chosen_.begin(), chosen_.end(),
+                                     [&](const ChosenOption& option) { return option.key == key; });
+    const std::string why = chosen == chosen_.end()
+                                ? fmt::format("the scene goes on beyond it ([dsi] {})", key)
+                                : fmt::format(
+                                      "auto chose it, because {}; where the scene goes on "
+                                      "beyond it, [dsi] {} sets another one",
+                                      chosen->reason, key);
+    warnings.push_back({"depths-at-limit",
+                        fmt::format("{:.0f} % of the depths lie at the {} plane, {:g} m: {}, or "
+                                    "calibration and poses do not explain the events",
+                                    100 * fraction, which, limit_m, why)});
   };
   check(nearest_, "nearest", planes_.min_depth_m, "min_depth_m");
   check(farthest_, "farthest", planes_.max_depth_m, "max_depth_m");

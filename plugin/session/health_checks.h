@@ -5,11 +5,13 @@
 #include <map>
 #include <opencv2/core.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/geometry/camera.h"
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/options/warning.h"
+#include "mapping/survey/option_choice.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/recording_statistics.h"
 #include "plugin/session/session_status.h"
@@ -35,7 +37,9 @@ std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, boo
 /// Counts the depths of keyframes near the limits.
 class DepthStatistics {
  public:
-  explicit DepthStatistics(const DepthPlanesOptions& planes) : planes_(planes) {}
+  /// @param chosen the options that were automatic: their limits are not the user's.
+  explicit DepthStatistics(const DepthPlanesOptions& planes, std::vector<ChosenOption> chosen = {})
+      : planes_(planes), chosen_(std::move(chosen)) {}
 
   /// @param depth in metres, 0 where there is none.
   void add(const cv::Mat_<float>& depth);
@@ -43,6 +47,7 @@ class DepthStatistics {
 
  private:
   DepthPlanesOptions planes_;
+  std::vector<ChosenOption> chosen_;
   std::uint64_t depths_ = 0;
   std::uint64_t nearest_ = 0;   // near the nearest plane
   std::uint64_t farthest_ = 0;  // near the farthest plane

@@ -228,12 +228,13 @@ TEST(HealthChecks, TheRigsOfDataSetsAreSound) {
 
 TEST(HealthChecks, DepthsAtALimitAreSeen) {
   DepthPlanesOptions planes;  // 0.5 to 5 m: 2 and 0.2 in inverse depth
+  std::vector<ChosenOption> chosen;
   const auto warningsAt = [&](float depth_m, int percent, int depths = 500) {
     cv::Mat_<float> depth(20, 50, 0.0F);
     for (int i = 0; i < depths; ++i) {
       depth(i / 50, i % 50) = i * 100 < percent * depths ? depth_m : 1.0F;
     }
-    DepthStatistics statistics(planes);
+    DepthStatistics statistics(planes, chosen);
     statistics.add(depth);
     return statistics.warnings();
   };
@@ -244,6 +245,12 @@ TEST(HealthChecks, DepthsAtALimitAreSeen) {
   EXPECT_THAT(warningsAt(0.52F, 10), IsEmpty());
   EXPECT_THAT(warningsAt(4.0F, 10), IsEmpty());
   EXPECT_THAT(warningsAt(0.508F, 10, 90), IsEmpty());
+  EXPECT_THAT(warningsAt(4.4F, 10).at(0).text, HasSubstr("goes on beyond it ([dsi] max_depth_m)"));
+  chosen = {{"num_planes", 100, "why not"}, {"max_depth_m", 5, "the scene lies at 1 to 4 m"}};
+  EXPECT_THAT(warningsAt(4.4F, 10).at(0).text,
+              HasSubstr("5 m: auto chose it, because the scene lies at 1 to 4 m; where the scene "
+                        "goes on beyond it, [dsi] max_depth_m sets another one"));
+  EXPECT_THAT(warningsAt(0.508F, 10).at(0).text, HasSubstr("beyond it ([dsi] min_depth_m)"));
   planes.num_planes = 40;
   EXPECT_THAT(warningsAt(0.508F, 10), IsEmpty());
 }
