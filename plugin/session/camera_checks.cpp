@@ -8,6 +8,7 @@
 #include <functional>
 #include <iterator>
 #include <numeric>
+#include <utility>
 
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/lens_inverse.h"
@@ -146,6 +147,81 @@ void checkHotPixels(const RecordingStatistics& recording, std::vector<Warning>& 
   }
 }
 
+/// The events of the columns, or of the rows, of a camera.
+/// @param most that count of each pixel.
+std::vector<double> eventsByLine(const CameraStatistics& camera, std::uint32_t most, bool columns) {
+  const auto width = static_cast<std::size_t>(camera.camera.model.width);
+  std::vector<double> lines(columns ? width : camera.pixels.size() / width);
+  for (std::size_t i = 0; i < camera.pixels.size(); ++i) {
+    lines[columns ? i % width : i / width] += std::min(camera.pixels[i], most);
+  }
+  return lines;
+}
+
+/// How many lines on one side lie outside the area that has events: where these end from a line to
+/// the next. Where a scene ends, the motion blurs the end over many lines.
+std::size_t linesOutside(const std::vector<double>& lines) {
+  constexpr double kMinOutside = 0.07;  // of all lines: 320 columns of 346, for example
+  constexpr double kMaxEvents = 0.02;   // per line outside, of those inside
+  constexpr double kMinAtEdge = 0.3;    // per line beside the edge, of those inside
+  const std::size_t size = lines.size();
+  const std::size_t edge = std::max<std::size_t>(3, size / 50);
+  double outside = 0;
+  double inside = std::accumulate(lines.begin(), lines.end(), 0.0);
+  std::size_t found = 0;
+  double density = 0;  // inside
+  for (std::size_t k = 1; k + edge < size; ++k) {
+    outside += lines[k - 1];
+    inside -= lines[k - 1];
+    const auto from = lines.begin() + static_cast<std::ptrdiff_t>(k);
+    const double mean = inside / static_cast<double>(size - k);
+    const double at_edge = std::accumulate(from, from + static_cast<std::ptrdiff_t>(edge), 0.0) /
+                           static_cast<double>(edge);
+    const bool is_empty = outside <= kMaxEvents * mean * static_cast<double>(k);
+    if (!is_empty || mean <= 0 || at_edge < kMinAtEdge * mean) continue;
+    found = k;
+    density = mean;
+  }
+  while (found > 0 && lines[found - 1] >= kMinAtEdge * density) --found;
+  return static_cast<double>(found) >= kMinOutside * static_cast<double>(size) ? found : 0;
+}
+
+/// The first and the last line with events.
+std::pair<std::size_t, std::size_t> linesInside(std::vector<double> lines) {
+  const std::size_t first = linesOutside(lines);
+  std::reverse(lines.begin(), lines.end());
+  return {first, lines.size() - 1 - linesOutside(lines)};
+}
+
+void checkSensorArea(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
+  // Of the pixels of the area. With fewer, the events are of some edges of the scene alone.
+  constexpr double kMinActive = 0.2;
+  for (const auto& [key, camera] : recording.cameras()) {
+    std::vector<std::uint32_t> active;
+    for (const std::uint32_t events : camera.pixels) {
+      if (events > 0) active.push_back(events);
+    }
+    if (active.size() < kEnoughEvents) continue;
+    const auto middle = active.begin() + static_cast<std::ptrdiff_t>(active.size() / 2);
+    std::nth_element(active.begin(), middle, active.end());
+    const std::uint32_t most = 2 * *middle;  // of a hot pixel
+    const auto [left, right] = linesInside(eventsByLine(camera, most, true));
+    const auto [top, bottom] = linesInside(eventsByLine(camera, most, false));
+    const std::size_t area = (right - left + 1) * (bottom - top + 1);
+    if (area == camera.pixels.size()) continue;
+    if (static_cast<double>(active.size()) < kMinActive * static_cast<double>(area)) continue;
+    const CameraModel& model = camera.camera.model;
+    warnings.push_back(
+        {"sensor-area",
+         fmt::format(
+             "camera {} has events in columns {} to {} of 0 to {} and rows {} to {} of 0 to "
+             "{} alone: are its pictures cropped, or its pixels binned? The calibration "
+             "must be of the pixels that the events have: the resolution, and cx and cy "
+             "less by an offset that was cut off (--calibration)",
+             key.first, left, right, model.width - 1, top, bottom, model.height - 1)});
+  }
+}
+
 void checkCameraClocks(const RecordingStatistics& recording, std::vector<Warning>& warnings) {
   // Cameras of a rig are started together. Where they share less than half of the time of the
   // shorter stream, their clocks have another zero, or the files are of two recordings.
@@ -201,6 +277,7 @@ std::vector<Warning> cameraWarnings(const RecordingStatistics& recording) {
   }
   checkActivity(recording, warnings);
   checkHotPixels(recording, warnings);
+  checkSensorArea(recording, warnings);
   checkCameraClocks(recording, warnings);
   checkTwins(recording, warnings);
   return warnings;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <iterator>
 #include <random>
+#include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "test/integration/mistakes.h"
@@ -39,6 +40,21 @@ void milliseconds(const Event& event, std::string& text) {
 void timeLast(const Event& event, std::string& text) {
   fmt::format_to(std::back_inserter(text), "{} {} {} {}\n", event.x, event.y,
                  event.polarity ? 1 : 0, formatSeconds(event.t_ns));
+}
+
+/// Without this many columns at the left, and 106 in all.
+std::function<void(Draft&)> cropped(int left) {
+  return [left](Draft& draft) {
+    for (std::vector<Event>& events : draft.events) {
+      std::vector<Event> kept;
+      for (Event event : events) {
+        if (event.x < left || event.x >= left + 240) continue;
+        event.x = static_cast<std::uint16_t>(event.x - left);
+        kept.push_back(event);
+      }
+      events = std::move(kept);
+    }
+  };
 }
 
 constexpr auto kNoChange = [](Draft&) {};
@@ -105,6 +121,24 @@ std::vector<Mistake> eventMistakes() {
        "",
        kJobError,
        {"warning: camera-clocks:", "warning: clock-overlap:"}},
+      {"cropped pictures",
+       cropped(106),
+       "",
+       kFine,
+       {"warning: sensor-area: camera 0 has events in columns 0 to 239 of 0 to 345",
+        "warning: sensor-area: camera 1", "--calibration"}},
+      {"binned pixels",
+       [](Draft& draft) {
+         for (std::vector<Event>& events : draft.events) {
+           for (Event& event : events) {
+             event.x /= 2;
+             event.y /= 2;
+           }
+         }
+       },
+       "",
+       kFine,
+       {"columns 0 to 172 of 0 to 345 and rows 0 to 129 of 0 to 259"}},
       {"events that are not sorted",
        [](Draft& draft) {
          std::shuffle(draft.events[0].begin(), draft.events[0].end(), std::mt19937(1));

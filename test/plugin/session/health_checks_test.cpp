@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <random>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "mapping/geometry/angle.h"
 #include "plugin/calibration/camchain.h"
@@ -222,7 +224,86 @@ TEST(HealthChecks, TheRigsOfDataSetsAreSound) {
     const Rig rig = readCamchain(std::string(EFM_SOURCE_DIR "/config/calibration/") + file);
     SyntheticRecording recording = soundRecording();
     recording.cameras = rig.cameras;
+    for (std::vector<Event>& events : recording.events) {  // all over the sensor
+      for (Event& event : events) {
+        event.x = static_cast<std::uint16_t>(event.x * rig.cameras[0].model.width / 120);
+        event.y = static_cast<std::uint16_t>(event.y * rig.cameras[0].model.height / 90);
+      }
+    }
     EXPECT_THAT(namesOf(warningsOf(recording)), IsEmpty()) << file;
+  }
+}
+
+/// A camera of 120x90 pixels, and events in a rectangle of them.
+struct Sensor {
+  std::vector<std::uint16_t> counts = std::vector<std::uint16_t>(120 * 90, 0);
+
+  /// @param columns, rows: the first and the one after the last.
+  Sensor& fill(std::pair<int, int> columns, std::pair<int, int> rows, double share = 0.5,
+               std::uint16_t events = 3) {
+    std::mt19937 random(1);
+    for (int y = rows.first; y < rows.second; ++y) {
+      for (int x = columns.first; x < columns.second; ++x) {
+        if (static_cast<double>(random()) / 4294967296.0 >= share) continue;
+        counts[static_cast<std::size_t>(120 * y + x)] = events;
+      }
+    }
+    return *this;
+  }
+  std::vector<Warning> warnings() const {
+    std::vector<Event> events;
+    for (std::size_t i = 0; i < counts.size(); ++i) {
+      const Event event{1000, static_cast<std::uint16_t>(i % 120),
+                        static_cast<std::uint16_t>(i / 120), i % 2 == 0};
+      events.insert(events.end(), counts[i], event);
+    }
+    RecordingStatistics statistics;
+    statistics.addEvents(0, "cam", SyntheticRecording(0.01).cameras[0], events);
+    return healthWarnings(statistics, {});
+  }
+};
+
+TEST(HealthChecks, EventsThatOccupyAPartOfTheSensorAreSeen) {
+  const std::pair<int, int> all_columns = {0, 120}, all_rows = {0, 90};
+  struct Row {
+    const char* what;
+    Sensor sensor;
+    const char* area;  // in the warning; empty: none
+  };
+  Sensor fading;  // a scene that ends within the motion of its image
+  for (int x = 0; x < 120; ++x) fading.fill({x, x + 1}, all_rows, std::min(1.0, 0.02 * x));
+  const std::vector<Row> rows = {
+      {"all", Sensor().fill(all_columns, all_rows), ""},
+      {"cropped at the right", Sensor().fill({0, 80}, all_rows), "columns 0 to 79 of 0 to 119"},
+      {"cropped at the left", Sensor().fill({40, 120}, all_rows), "columns 40 to 119 of 0"},
+      {"at both sides", Sensor().fill({20, 100}, all_rows), "columns 20 to 99 of 0 to 119"},
+      {"below", Sensor().fill(all_columns, {0, 70}), "rows 0 to 69 of 0 to 89"},
+      {"above", Sensor().fill(all_columns, {20, 90}), "rows 20 to 89 of 0 to 89"},
+      {"by 9 columns", Sensor().fill({0, 111}, all_rows), "columns 0 to 110 of"},
+      {"by 8 columns", Sensor().fill({0, 112}, all_rows), ""},
+      {"binned", Sensor().fill({0, 60}, {0, 45}), "columns 0 to 59 of 0 to 119 and rows 0 to 44 "},
+      {"binned, with stray events",
+       Sensor().fill(all_columns, all_rows, 0.003).fill({0, 60}, {0, 45}),
+       "columns 0 to 59 of 0 to 119 and rows 0 to 44 "},
+      {"with noise on the other side",
+       Sensor().fill(all_columns, all_rows, 0.02).fill({0, 60}, all_rows), ""},
+      {"with hot pixels on the other side",
+       Sensor().fill({100, 101}, {10, 12}, 1, 60'000).fill({0, 60}, all_rows),
+       "columns 0 to 59 of"},
+      {"hot pixels have most events",
+       Sensor().fill(all_columns, all_rows).fill({100, 102}, {10, 20}, 1, 60'000), ""},
+      {"short: edges of the scene alone", Sensor().fill({0, 80}, all_rows, 0.18), ""},
+      {"a little longer", Sensor().fill({0, 80}, all_rows, 0.25), "columns 0 to 79 of"},
+      {"a few events", Sensor().fill({0, 30}, {0, 30}, 0.9), ""},
+      {"fading", fading, ""},
+  };
+  for (const Row& row : rows) {
+    std::string text;
+    for (const Warning& warning : row.sensor.warnings()) {
+      if (warning.name == "sensor-area") text = warning.text;
+    }
+    EXPECT_THAT(text, HasSubstr(row.area)) << row.what;
+    EXPECT_EQ(text.empty(), std::string(row.area).empty()) << row.what << ": " << text;
   }
 }
 
