@@ -118,9 +118,10 @@ void print(const Contents& contents, const RecordingCounts& counts) {
   }
 }
 
-std::vector<Warning> warningsOf(const Contents& contents, const RecordingCounts& counts) {
+std::vector<Warning> warningsOf(const Contents& contents, const HealthLimits& limits,
+                                const RecordingCounts& counts) {
   std::vector<Warning> warnings = missingParts(contents.statistics);
-  for (Warning& warning : healthWarnings(contents.statistics, {})) {
+  for (Warning& warning : healthWarnings(contents.statistics, limits)) {
     warnings.push_back(std::move(warning));
   }
   for (Warning& warning : lossWarnings(counts)) warnings.push_back(std::move(warning));
@@ -142,7 +143,8 @@ class PatientSurveyor {
     }
   }
   /// Prints the values that `map` would choose. @return the warnings about the poses.
-  std::vector<Warning> finish(bool quiet) {
+  /// @param limits receives the depths that were chosen.
+  std::vector<Warning> finish(bool quiet, HealthLimits& limits) {
     if (!surveyor_) return {};
     const RecordingSurvey survey = surveyor_->finish();
     if (survey.samples.empty()) return {};
@@ -155,6 +157,8 @@ class PatientSurveyor {
         fmt::print("  {} = {:g}: {}\n", option.key, option.value, option.reason);
       }
     }
+    limits.near_depth_m = options.keyframe.planes.min_depth_m;
+    limits.far_depth_m = options.keyframe.planes.max_depth_m;
     return survey.poseWarnings(options);
   }
 
@@ -195,8 +199,9 @@ int runInfo(const InfoArguments& arguments) {
   }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
   if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source, limits);
-  std::vector<Warning> warnings = surveyor.finish(quiet);
-  for (Warning& warning : warningsOf(contents, recording->counts())) {
+  HealthLimits health;
+  std::vector<Warning> warnings = surveyor.finish(quiet, health);
+  for (Warning& warning : warningsOf(contents, health, recording->counts())) {
     warnings.push_back(std::move(warning));
   }
   printWarnings(warnings);

@@ -77,8 +77,9 @@ class Player {
   std::vector<Warning> healthWarnings(const Rig& rig) {
     statistics_.setCameras(rig.cameras);
     const FusionMapperOptions& options = job_.options.mapper;
+    const DepthPlanesOptions& planes = options.keyframe.planes;
     std::vector<Warning> warnings = efm::healthWarnings(
-        statistics_, {options.keyframe.planes.min_depth_m, options.trajectory.max_pose_gap_s});
+        statistics_, {planes.min_depth_m, planes.max_depth_m, options.trajectory.max_pose_gap_s});
     for (Warning& warning : depths_.warnings()) warnings.push_back(std::move(warning));
     return warnings;
   }

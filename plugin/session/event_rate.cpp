@@ -37,6 +37,21 @@ std::vector<double> EventRate::over(std::int64_t t0_ns, std::int64_t t1_ns, int 
   return rates;
 }
 
+double EventRate::countIn(std::int64_t t0_ns, std::int64_t t1_ns) const {
+  double count = 0;
+  if (!start_ns_) return count;
+  const double width_s = std::ldexp(1e-9, log2_width_);
+  const double first = secondsBetween(*start_ns_, t0_ns) / width_s;
+  const double last = secondsBetween(*start_ns_, t1_ns) / width_s;
+  const auto end = static_cast<std::size_t>(std::clamp<double>(std::ceil(last), 0, kBins));
+  for (auto bin = static_cast<std::size_t>(std::clamp<double>(first, 0, kBins)); bin < end; ++bin) {
+    const auto begin = static_cast<double>(bin);
+    const double overlap = std::min(last, begin + 1) - std::max(first, begin);
+    count += static_cast<double>(counts_[bin]) * std::max(overlap, 0.0);
+  }
+  return count;
+}
+
 std::string sparkline(const std::vector<double>& values) {
   static constexpr const char* kBlocks[] = {"▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
   const double max = values.empty() ? 0 : *std::max_element(values.begin(), values.end());

@@ -23,11 +23,13 @@ class EventRate {
   }
 
   /// Events per second in intervals of equal length that divide [t0, t1]. An event counts for the
-  /// intervals that its bin overlaps: a bin is at most 1/512 of the time from the first event on.
+  /// intervals that its bin overlaps: a bin is at most 1/4096 of the time from the first event on.
   std::vector<double> over(std::int64_t t0_ns, std::int64_t t1_ns, int intervals) const;
+  /// The number of events in [t0, t1): of each bin, in proportion to its overlap.
+  double countIn(std::int64_t t0_ns, std::int64_t t1_ns) const;
 
  private:
-  static constexpr std::int64_t kBins = 1024;
+  static constexpr std::int64_t kBins = 8192;
 
   void joinBins();
 

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/camera_checks.h"
 #include "plugin/session/camera_view.h"
+#include "plugin/session/motion_checks.h"
 #include "plugin/session/time_text.h"
 
 namespace efm {
@@ -127,6 +129,10 @@ std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
   if (const PoseStatistics* const poses = recording.usedPoses()) {
     checkMotion(*poses, limits.near_depth_m, warnings);
     checkSpeeds(*poses, warnings);
+    const double middle_depth_m = 2 / (1 / limits.near_depth_m + 1 / limits.far_depth_m);
+    for (Warning& warning : motionWarnings(recording, middle_depth_m, limits.max_pose_gap_s)) {
+      warnings.push_back(std::move(warning));
+    }
   }
   return warnings;
 }

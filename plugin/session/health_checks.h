@@ -21,6 +21,7 @@ namespace efm {
 /// What is compared with the options of a map; without a map, the defaults serve.
 struct HealthLimits {
   double near_depth_m = 0.5;
+  double far_depth_m = 5;
   double max_pose_gap_s = 0.25;
 };
 

@@ -75,6 +75,7 @@ void PoseStatistics::add(const StampedPose& pose, std::int64_t window_ns) {
   const bool late = poses.last_ns && pose.t_ns <= *poses.last_ns;
   poses.add(pose.t_ns, pose.t_ns, 1);
   if (late) return;
+  motion.add(pose);
   if (!step_begin_) step_begin_ = window_begin_ = pose;
   if (pose.t_ns - step_begin_->t_ns >= kMinStepNs) {
     const double step_s = secondsBetween(step_begin_->t_ns, pose.t_ns);

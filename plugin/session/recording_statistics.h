@@ -15,6 +15,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/event_rate.h"
+#include "plugin/session/pose_motion.h"
 #include "plugin/session/pose_source_selector.h"
 
 namespace efm {
@@ -70,6 +71,7 @@ struct PoseStatistics {
   double max_rotation_rate = 0;  ///< rad/s, over at least 10 ms.
   double max_shift_m = 0;        ///< The largest distance from the first pose of a window.
   double max_rotation_rad = 0;   ///< The largest rotation from the first pose of a window.
+  PoseMotion motion;
 
   void add(const StampedPose& pose, std::int64_t window_ns);
 

@@ -106,6 +106,28 @@ std::vector<Mistake> poseMistakes() {
        "",
        kFine,
        {"warning: speed:", "the tracker jumps"}},
+      {"a step of 5 cm, as of a loop closure",
+       eachPose([](StampedPose& pose, const StampedPose& first) {
+         if (pose.t_ns - first.t_ns > 250'000'000) pose.T_world_rig.translation.y() -= 0.05;
+       }),
+       "",
+       kFine,
+       {"warning: pose-jump: the poses jump by 0.05", "--poses"}},
+      {"a tracker that hangs for 0.15 s",
+       [](Draft& draft) {
+         const Rigid3 T_world_rig = draft.poses[150].T_world_rig;
+         for (std::size_t i = 150; i <= 300; ++i) draft.poses[i].T_world_rig = T_world_rig;
+       },
+       "",
+       kFine,
+       {"warning: poses-frozen: the poses repeat for 0.15 s, after 1.5"}},
+      {"0.15 s without poses",
+       [](Draft& draft) {
+         draft.poses.erase(draft.poses.begin() + 151, draft.poses.begin() + 300);
+       },
+       "",
+       kFine,
+       {"warning: pose-interpolation: poses are 0.15 s apart", "rig.max_pose_gap_s=0.1"}},
       {"poses that turn too fast",
        eachPose([](StampedPose& pose, const StampedPose& first) {
          const double angle = 40 * secondsBetween(first.t_ns, pose.t_ns);

@@ -207,8 +207,8 @@ TEST(HealthChecks, CountWithTheOptionsOfTheMap) {
   EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "an arm of a metre turns";
 
   const RecordingStatistics statistics = statisticsOf(soundRecording());
-  EXPECT_EQ(namesOf(healthWarnings(statistics, {100, 0.25})), Names{"no-motion"});
-  EXPECT_EQ(namesOf(healthWarnings(statistics, {0.5, 0.005})), Names{"pose-gap"});
+  EXPECT_EQ(namesOf(healthWarnings(statistics, {100, 200, 0.25})), Names{"no-motion"});
+  EXPECT_EQ(namesOf(healthWarnings(statistics, {0.5, 5, 0.005})), Names{"pose-gap"});
 }
 
 TEST(HealthChecks, SaysTheValuesAndTheOption) {

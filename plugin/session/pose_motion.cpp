@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/pose_motion.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+/// Speeds at a step are those of poses within this time: shorter than most accelerations, longer
+/// than the jitter of a tracker.
+constexpr std::int64_t kReachNs = 50'000'000;
+/// Speeds before and after poses that repeat.
+constexpr std::int64_t kHoldReachNs = 200'000'000;
+/// A step waits for this many poses after it, and for `kHoldReachNs`.
+constexpr std::size_t kStepsAround = 2;
+/// LiDAR odometry has a pose per turn, 0.1 s and a little jitter: nobody would mend that.
+constexpr std::int64_t kMinGapNs = 105'000'000;
+constexpr std::size_t kMaxBins = 1024;
+
+using Poses = std::deque<StampedPose>;
+
+struct Velocity {
+  Eigen::Vector3d linear;   // m/s
+  Eigen::Vector3d angular;  // rad/s
+};
+
+Velocity velocityOf(const StampedPose& from, const StampedPose& to) {
+  const double dt_s = secondsBetween(from.t_ns, to.t_ns);
+  Eigen::Quaterniond turn = from.T_world_rig.rotation.conjugate() * to.T_world_rig.rotation;
+  if (turn.w() < 0) turn.coeffs() = -turn.coeffs();  // the shorter way
+  const double sine = turn.vec().norm();
+  const double angle = 2 * std::atan2(sine, turn.w());
+  const Eigen::Vector3d rotation =
+      sine > 0 ? Eigen::Vector3d(turn.vec() * (angle / sine)) : Eigen::Vector3d::Zero();
+  return {(to.T_world_rig.translation - from.T_world_rig.translation) / dt_s, rotation / dt_s};
+}
+
+MotionAmount differenceOf(const Velocity& a, const Velocity& b) {
+  return {(a.linear - b.linear).norm(), (a.angular - b.angular).norm()};
+}
+
+Velocity meanOf(const Velocity& a, const Velocity& b) {
+  return {(a.linear + b.linear) / 2, (a.angular + b.angular) / 2};
+}
+
+/// The velocity of the poses before one, over a time and a number of steps at least, if there are.
+std::optional<Velocity> velocityBefore(const Poses& poses, std::size_t last, std::int64_t reach_ns,
+                                       std::size_t steps) {
+  if (last < steps) return std::nullopt;
+  std::size_t first = last - steps;
+  while (first > 0 && poses[last].t_ns - poses[first].t_ns < reach_ns) --first;
+  return velocityOf(poses[first], poses[last]);
+}
+
+/// The velocity of the poses after one.
+std::optional<Velocity> velocityAfter(const Poses& poses, std::size_t first, std::int64_t reach_ns,
+                                      std::size_t steps) {
+  std::size_t last = first + steps;
+  if (last >= poses.size()) return std::nullopt;
+  while (last + 1 < poses.size() && poses[last].t_ns - poses[first].t_ns < reach_ns) ++last;
+  return velocityOf(poses[first], poses[last]);
+}
+
+MotionAmount speedOf(const Velocity& velocity) {
+  return {velocity.linear.norm(), velocity.angular.norm()};
+}
+
+template <typename Span, typename Value>
+void keepLarger(Span& kept, const Span& other, Value value) {
+  if (value(other) > value(kept)) kept = other;
+}
+
+double deviationOf(const PoseStep& step) { return step.deviation; }
+double missedIn(const PoseGap& gap) { return gap.missed.sum(); }
+double durationOf(const PoseHold& hold) { return secondsBetween(hold.t0_ns, hold.t1_ns); }
+
+void merge(PoseMotion::Bin& bin, const PoseMotion::Bin& other) {
+  keepLarger(bin.step_m, other.step_m, deviationOf);
+  keepLarger(bin.step_rad, other.step_rad, deviationOf);
+  keepLarger(bin.gap, other.gap, missedIn);
+  keepLarger(bin.hold, other.hold, durationOf);
+}
+
+}  // namespace
+
+bool isRest(const PoseHold& hold) { return hold.t1_ns - hold.t0_ns >= kHoldReachNs; }
+
+void PoseMotion::add(const StampedPose& pose) {
+  if (poses_.empty()) start_ns_ = pose.t_ns;
+  poses_.push_back(pose);
+  while (next_ + 1 + kStepsAround < poses_.size() &&
+         pose.t_ns - poses_[next_ + 1].t_ns >= kHoldReachNs) {
+    look(next_++);
+  }
+  while (next_ > kStepsAround && poses_[next_].t_ns - poses_[1].t_ns >= kHoldReachNs) {
+    poses_.pop_front();
+    --next_;
+  }
+}
+
+PoseMotion PoseMotion::completed() const {
+  PoseMotion motion = *this;
+  while (motion.next_ + 1 < motion.poses_.size()) motion.look(motion.next_++);
+  if (!motion.poses_.empty()) motion.lookAtHold(motion.next_);  // the end of the last hold
+  return motion;
+}
+
+MotionAmount PoseMotion::meanSpeed() const {
+  return moving_s_ > 0 ? path_ * (1 / moving_s_) : MotionAmount();
+}
+
+/// @param step from this one of poses_ to the next one.
+void PoseMotion::look(std::size_t step) {
+  lookAtHold(step);
+  const StampedPose& from = poses_[step];
+  const StampedPose& to = poses_[step + 1];
+  const Velocity velocity = velocityOf(from, to);
+  const double dt_s = secondsBetween(from.t_ns, to.t_ns);
+  path_.m += speedOf(velocity).m * dt_s;
+  path_.rad += speedOf(velocity).rad * dt_s;
+  moving_s_ += dt_s;
+  if (to.t_ns - from.t_ns >= kMinGapNs) return lookAtGap(step);
+  const auto before = velocityBefore(poses_, step, kReachNs, kStepsAround);
+  const auto after = velocityAfter(poses_, step + 1, kReachNs, kStepsAround);
+  if (!before || !after) return;
+  // The least of three: a jump deviates from all of them, its neighbours only where it lies within
+  // their `before` or `after`.
+  MotionAmount deviation = differenceOf(velocity, meanOf(*before, *after));
+  for (const Velocity& beside : {*before, *after}) {
+    const MotionAmount other = differenceOf(velocity, beside);
+    deviation = {std::min(deviation.m, other.m), std::min(deviation.rad, other.rad)};
+  }
+  Bin found;
+  found.step_m = {{from.t_ns, to.t_ns}, deviation.m};
+  found.step_rad = {{from.t_ns, to.t_ns}, deviation.rad};
+  merge(binAt(from.t_ns), found);
+}
+
+void PoseMotion::lookAtGap(std::size_t step) {
+  const StampedPose& from = poses_[step];
+  const StampedPose& to = poses_[step + 1];
+  const double dt_s = secondsBetween(from.t_ns, to.t_ns);
+  const Velocity velocity = velocityOf(from, to);
+  const auto before = velocityBefore(poses_, step, kReachNs, 1);
+  const auto after = velocityAfter(poses_, step + 1, kReachNs, 1);
+  PoseGap gap = {{from.t_ns, to.t_ns}, speedOf(velocity) * dt_s, {}};
+  if (before && after) {
+    gap.missed = differenceOf(*before, *after) * (dt_s / 8);
+    const MotionAmount jump = differenceOf(velocity, meanOf(*before, *after)) * (dt_s / 2);
+    gap.missed = {std::max(gap.missed.m, jump.m), std::max(gap.missed.rad, jump.rad)};
+  } else if (before || after) {
+    gap.missed = differenceOf(velocity, before ? *before : *after) * (dt_s / 4);
+  }
+  Bin found;
+  found.gap = gap;
+  merge(binAt(from.t_ns), found);
+}
+
+/// A hold begins or ends with the step, or goes on.
+void PoseMotion::lookAtHold(std::size_t step) {
+  const StampedPose& from = poses_[step];
+  const bool repeats =
+      step + 1 < poses_.size() && isSame(from.T_world_rig, poses_[step + 1].T_world_rig);
+  if (repeats == hold_.has_value()) return;
+  if (repeats) {
+    hold_ = PoseHold{{from.t_ns, from.t_ns}, {}, false};
+    if (const auto before = velocityBefore(poses_, step, kHoldReachNs, 1)) {
+      hold_->speed = speedOf(*before);
+    }
+    return;
+  }
+  Bin found;
+  found.hold = *hold_;
+  hold_.reset();
+  found.hold.t1_ns = from.t_ns;
+  if (isRest(found.hold)) moving_s_ -= durationOf(found.hold);
+  // Without the step that ends the hold: it may be a jump.
+  if (const auto after = velocityAfter(poses_, step + 1, kHoldReachNs, 1)) {
+    found.hold.speed_after = speedOf(*after).sum() > found.hold.speed.sum();
+    if (found.hold.speed_after) found.hold.speed = speedOf(*after);
+  }
+  merge(binAt(found.hold.t0_ns), found);
+}
+
+PoseMotion::Bin& PoseMotion::binAt(std::int64_t t_ns) {
+  auto index = static_cast<std::size_t>((t_ns - start_ns_) / bin_ns_);
+  for (; index >= kMaxBins; index /= 2) {
+    for (std::size_t bin = 0; bin < bins_.size(); ++bin) {
+      if (bin % 2 == 0) {
+        bins_[bin / 2] = bins_[bin];
+      } else {
+        merge(bins_[bin / 2], bins_[bin]);
+      }
+    }
+    bins_.resize((bins_.size() + 1) / 2);
+    bin_ns_ *= 2;
+  }
+  if (index >= bins_.size()) bins_.resize(index + 1);
+  return bins_[index];
+}
+
+}  // namespace efm
