@@ -18,6 +18,10 @@ namespace {
 /// Longer windows have more parallax, and more of the drift of a tracker.
 constexpr double kMaxWindowS = 1;
 
+double parallaxBetween(const DepthPlanesOptions& limits, double parallax_px_m) {
+  return parallax_px_m * (1 / limits.min_depth_m - 1 / limits.max_depth_m);
+}
+
 /// The values of a choice so far, and their reasons.
 class Choice {
  public:
@@ -40,16 +44,17 @@ class Choice {
   void planes(int count, const std::string& reason) {
     set(automatic_.num_planes, "num_planes", options_.keyframe.planes.num_planes, count, reason);
   }
-  /// Leaves all values as they are.
-  void keepAll(const std::string& reason) {
+  /// Leaves all values but the depth limits as they are: no scene is known.
+  OptionChoice withoutScene(double min_m, double max_m, const std::string& reason) {
     if (!options_.only_window) {
       const KeyframePolicyOptions& policy = options_.policy;
       set(automatic_.window_s, "window_s", options_.policy.window_s, policy.window_s, reason);
       set(automatic_.stride_s, "stride_s", options_.policy.stride_s, policy.stride_s, reason);
     }
-    const DepthPlanesOptions planes = options_.keyframe.planes;
-    depths(planes.min_depth_m, planes.max_depth_m, reason);
+    const DepthPlanesOptions& planes = options_.keyframe.planes;
+    depths(min_m, max_m, reason);
     this->planes(planes.num_planes, reason);
+    return {take(), false, (planes.num_planes - 1) / parallaxBetween(planes, 1)};
   }
   std::vector<ChosenOption> take() { return std::move(chosen_); }
 
@@ -154,14 +159,6 @@ void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choic
   choice.depths(min_m, std::max(roundedUp(max_m, 2), 2 * min_m), reason);
 }
 
-/// A hundred planes, and more where they would be more than a pixel of parallax apart.
-void choosePlanes(double parallax_px_m, const DepthPlanesOptions& planes, Choice& choice) {
-  const double parallax_px = parallax_px_m * (1 / planes.min_depth_m - 1 / planes.max_depth_m);
-  choice.planes(static_cast<int>(std::clamp<double>(1 + std::ceil(parallax_px), kMinAutomaticPlanes,
-                                                    kMaxAutomaticPlanes)),
-                number(parallax_px) + " pixels of parallax between the limits");
-}
-
 }  // namespace
 
 void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& options) {
@@ -179,6 +176,13 @@ void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& option
   if (automatic.window_s) policy.window_s = std::max(policy.stride_s, policy.window_s);
 }
 
+int automaticPlanes(const DepthPlanesOptions& limits, double parallax_px_m) {
+  constexpr double kMinPlanes = 100;
+  constexpr double kMaxPlanes = 400;
+  return static_cast<int>(
+      std::clamp(1 + std::ceil(parallaxBetween(limits, parallax_px_m)), kMinPlanes, kMaxPlanes));
+}
+
 FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s) {
   options.policy = {};
   options.policy.window_s = window_s;
@@ -187,14 +191,14 @@ FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s) 
   return options;
 }
 
-std::vector<ChosenOption> chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
-                                        const std::vector<WindowSample>& samples,
-                                        std::optional<double> duration_s,
-                                        FusionMapperOptions& options) {
+OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
+                           const std::vector<WindowSample>& samples,
+                           std::optional<double> duration_s, FusionMapperOptions& options) {
   Choice choice(automatic, options);
+  const DepthPlanesOptions given = options.keyframe.planes;
   if (samples.empty()) {
-    choice.keepAll("the default: no event has a pose");
-    return choice.take();
+    return choice.withoutScene(given.min_depth_m, given.max_depth_m,
+                               "the default: no event has a pose");
   }
   CoarseSweep sweep(rig, options);
   // Longer windows have more parallax; shorter ones keep the view.
@@ -204,8 +208,8 @@ std::vector<ChosenOption> chooseOptions(const AutomaticOptions& automatic, const
     if (depths.inverse.size() >= kMinScenePoints) break;
   }
   if (depths.inverse.size() < kMinScenePoints) {
-    choice.keepAll("the default: a coarse sweep found no scene");
-    return choice.take();
+    return choice.withoutScene(given.min_depth_m, given.max_depth_m,
+                               "the default: a coarse sweep found no scene");
   }
   if (!options.only_window) {
     chooseWindow(motionLimit(samples, rig, options, depths.median()), duration_s, choice);
@@ -216,8 +220,18 @@ std::vector<ChosenOption> chooseOptions(const AutomaticOptions& automatic, const
   if (!depths.inverse.empty()) {
     chooseDepths(depths, parallax_px_m, choice);
   }
-  choosePlanes(parallax_px_m, options.keyframe.planes, choice);
-  return choice.take();
+  const DepthPlanesOptions& planes = options.keyframe.planes;
+  choice.planes(
+      automaticPlanes(planes, parallax_px_m),
+      number(parallaxBetween(planes, parallax_px_m)) + " pixels of parallax between the limits");
+  return {choice.take(), true, parallax_px_m};
+}
+
+OptionChoice chooseWideDepths(const AutomaticOptions& automatic, FusionMapperOptions& options) {
+  constexpr double kNearM = 0.3;
+  constexpr double kFarM = 100;
+  return Choice(automatic, options)
+      .withoutScene(kNearM, kFarM, "no scene was found: a wide range of depths");
 }
 
 }  // namespace efm

@@ -28,12 +28,20 @@ struct ChosenOption {
   std::string reason;
 };
 
+/// What `chooseOptions` chose.
+struct OptionChoice {
+  std::vector<ChosenOption> options;
+  bool found_scene = false;
+  /// The parallax of a unit of inverse depth in a typical window, pixels per 1/m. Without a scene
+  /// the one for which the number of planes would be chosen.
+  double parallax_px_m = 0;
+};
+
 /// Gives automatic options values that fit those of the others, until they are chosen.
 void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& options);
 
-/// The number of planes is chosen between these.
-inline constexpr int kMinAutomaticPlanes = 100;
-inline constexpr int kMaxAutomaticPlanes = 400;
+/// 100 planes, and more where they would be more than a pixel of parallax apart, up to 400.
+int automaticPlanes(const DepthPlanesOptions& limits, double parallax_px_m);
 
 /// The options of a first pass over a recording: consecutive windows of `window_s`.
 FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s);
@@ -49,9 +57,12 @@ FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s);
 /// @param options in: with the values for where nothing can be chosen; out: with the choice.
 /// @param samples of the recording; may be empty.
 /// @throws std::invalid_argument where the options do not fit the rig.
-std::vector<ChosenOption> chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
-                                        const std::vector<WindowSample>& samples,
-                                        std::optional<double> duration_s,
-                                        FusionMapperOptions& options);
+OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
+                           const std::vector<WindowSample>& samples,
+                           std::optional<double> duration_s, FusionMapperOptions& options);
+
+/// Replaces automatic depth limits by a range that holds nearly every scene, 0.3 to 100 m, where no
+/// scene was found. The other options keep their values.
+OptionChoice chooseWideDepths(const AutomaticOptions& automatic, FusionMapperOptions& options);
 
 }  // namespace efm

@@ -150,7 +150,8 @@ class PatientSurveyor {
     if (survey.samples.empty()) return {};
     FusionMapperOptions options = options_.mapper;
     const std::vector<ChosenOption> chosen =
-        chooseOptions(options_.automatic, survey.rig, survey.samples, survey.duration_s, options);
+        chooseOptions(options_.automatic, survey.rig, survey.samples, survey.duration_s, options)
+            .options;
     if (!quiet) {
       fmt::print("the options that are auto would be:\n");
       for (const ChosenOption& option : chosen) {

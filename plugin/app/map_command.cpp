@@ -224,7 +224,8 @@ void survey(const RecordingSource& source, MappingJob& job) {
   job.warnings.insert(job.warnings.end(), warnings.begin(), warnings.end());
   if (!job.options.automatic.any()) return;
   job.chosen = chooseOptions(job.options.automatic, survey.rig, survey.samples, survey.duration_s,
-                             job.options.mapper);
+                             job.options.mapper)
+                   .options;
   job.options.automatic = {};
 }
 

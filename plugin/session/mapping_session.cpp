@@ -443,12 +443,13 @@ void MappingSession::choose(const std::optional<WindowData>& first,
                             std::optional<double> duration_s, std::optional<double> max_window_s) {
   std::vector<WindowSample> samples;
   if (first) samples.push_back(sampleOf(*first));
-  status_.chosen =
+  OptionChoice choice =
       chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, options_.mapper);
+  status_.chosen = std::move(choice.options);
   if (max_window_s) limitWindow(*max_window_s, options_.mapper.policy, status_.chosen);
   const AutomaticOptions automatic = std::exchange(options_.automatic, {});
   if (automatic.min_depth_m || automatic.max_depth_m) {
-    depth_follower_.emplace(automatic, options_.mapper.keyframe.planes);
+    depth_follower_.emplace(automatic, options_.mapper.keyframe.planes, choice.parallax_px_m);
   }
   mapper_.configure(options_.mapper.policy, options_.mapper.keyframe.planes);
 }

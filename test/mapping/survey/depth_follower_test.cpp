@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -34,7 +35,7 @@ DepthPlanesOptions planesFor(double near_m, double far_m) {
 
 TEST(DepthFollower, LimitsFollowAScene) {
   for (const double factor : {0.4, 2.0}) {  // nearer, farther
-    DepthFollower follower(limits(), planesFor(1, 4));
+    DepthFollower follower(limits(), planesFor(1, 4), 100);
     for (int keyframe = 0; keyframe < 10; ++keyframe) follower.follow(scene(factor, 4 * factor));
     // Within the factor of 1.2 that noise may have.
     const DepthPlanesOptions wanted = planesFor(factor, 4 * factor);
@@ -43,8 +44,53 @@ TEST(DepthFollower, LimitsFollowAScene) {
   }
 }
 
+TEST(DepthFollower, PlanesComeBackWithTheScene) {
+  struct Row {
+    const char* what;
+    double near_m, far_m;  // of the scene beside which something else comes
+    double other_near_m, other_far_m;
+    double planes_m;  // per 1/m of inverse depth
+  };
+  const Row rows[] = {
+      {"a near object comes and goes", 1, 4, 0.2, 4, 200},
+      {"the far wall comes and goes", 1, 4, 1, 40, 260},
+      {"the near things go and come", 0.5, 4, 2, 4, 100},
+      {"the wall goes and comes", 0.5, 10, 0.5, 1, 100},
+      {"more planes than may be", 0.5, 4, 2, 8, 900},
+      {"fewer planes than may be", 1, 4, 0.2, 4, 20},
+  };
+  for (const Row& row : rows) {
+    const auto planesOf = [&](const DepthPlanesOptions& limits) {
+      return std::clamp(
+          std::ceil(1 + row.planes_m * (1 / limits.min_depth_m - 1 / limits.max_depth_m)), 100.0,
+          400.0);
+    };
+    DepthPlanesOptions start = planesFor(row.near_m, row.far_m);
+    start.num_planes = static_cast<int>(planesOf(start));
+    DepthFollower follower(limits(), start, row.planes_m);
+    std::uint32_t seed = 0;
+    const auto see = [&](double near_m, double far_m) {
+      for (int keyframe = 0; keyframe < 20; ++keyframe) {
+        follower.follow(scene(near_m, far_m, ++seed));
+        EXPECT_EQ(follower.planes().num_planes, planesOf(follower.planes())) << row.what;
+      }
+    };
+    for (int time = 0; time < 2; ++time) {
+      see(row.other_near_m, row.other_far_m);
+      EXPECT_GT(std::abs(std::log(follower.planes().min_depth_m / start.min_depth_m)) +
+                    std::abs(std::log(follower.planes().max_depth_m / start.max_depth_m)),
+                std::log(1.25))
+          << row.what;
+      see(row.near_m, row.far_m);
+      // The limits come back up to the factor of 1.2 that noise may have.
+      EXPECT_NEAR(follower.planes().num_planes, start.num_planes, 0.25 * start.num_planes)
+          << row.what;
+    }
+  }
+}
+
 TEST(DepthFollower, NoiseChangesNothing) {
-  DepthFollower follower(limits(), planesFor(1, 4));
+  DepthFollower follower(limits(), planesFor(1, 4), 100);
   for (std::uint32_t seed = 0; seed < 20; ++seed) EXPECT_FALSE(follower.follow(scene(1, 4, seed)));
   EXPECT_FALSE(follower.follow(cv::Mat1f(40, 50, 0.0F)));  // an empty keyframe
   cv::Mat1f few(40, 50, 0.0F);
@@ -55,7 +101,7 @@ TEST(DepthFollower, NoiseChangesNothing) {
 TEST(DepthFollower, GivenLimitsStay) {
   AutomaticOptions only_far;
   only_far.max_depth_m = true;
-  DepthFollower follower(only_far, {0.5, 4, 100});
+  DepthFollower follower(only_far, {0.5, 4, 100}, 100);
   for (int keyframe = 0; keyframe < 10; ++keyframe) follower.follow(scene(2, 10));
   EXPECT_EQ(follower.planes().min_depth_m, 0.5);
   EXPECT_GT(follower.planes().max_depth_m, 10);

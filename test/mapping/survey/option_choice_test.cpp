@@ -20,7 +20,8 @@ TEST(OptionChoice, LimitsEncloseTheScene) {
     const Rig rig = EdgeWorld::rig(2);
     FusionMapperOptions options;
     const auto chosen = chooseOptions(kAll, rig, {world.sample(rig)}, 2.0, options);
-    EXPECT_EQ(chosen.size(), 5U);
+    EXPECT_TRUE(chosen.found_scene);
+    EXPECT_EQ(chosen.options.size(), 5U);
     const DepthPlanesOptions& planes = options.keyframe.planes;
     // The limits are around nearly all edges and less than 10 times apart; the rig moves by 0.25 m.
     EXPECT_LT(planes.min_depth_m, 0.9 * factor);
@@ -39,7 +40,8 @@ TEST(OptionChoice, GivenOptionsStay) {
   options.policy.window_s = 0.33;
   AutomaticOptions automatic;
   automatic.max_depth_m = true;
-  const auto chosen = chooseOptions(automatic, rig, {EdgeWorld().sample(rig)}, 2.0, options);
+  const auto chosen =
+      chooseOptions(automatic, rig, {EdgeWorld().sample(rig)}, 2.0, options).options;
   ASSERT_EQ(chosen.size(), 1U);
   EXPECT_EQ(chosen[0].key, "max_depth_m");
   EXPECT_EQ(chosen[0].value, options.keyframe.planes.max_depth_m);
@@ -52,8 +54,9 @@ TEST(OptionChoice, KeepsTheValuesWhereNothingIsSeen) {
   FusionMapperOptions options;
   const DepthPlanesOptions before = options.keyframe.planes;
   const auto chosen = chooseOptions(kAll, EdgeWorld::rig(1), {}, std::nullopt, options);
-  EXPECT_EQ(chosen.size(), 5U);
-  for (const ChosenOption& option : chosen) {
+  EXPECT_FALSE(chosen.found_scene);
+  EXPECT_EQ(chosen.options.size(), 5U);
+  for (const ChosenOption& option : chosen.options) {
     EXPECT_EQ(option.reason, "the default: no event has a pose");
   }
   EXPECT_EQ(options.keyframe.planes.min_depth_m, before.min_depth_m);
