@@ -55,6 +55,7 @@ WindowsGivenUp& WindowsGivenUp::operator+=(const WindowsGivenUp& other) {
   overload += other.overload;
   jump += other.jump;
   no_pose += other.no_pose;
+  no_scene += other.no_scene;
   error += other.error;
   paused += other.paused;
   clock_reset += other.clock_reset;
@@ -154,15 +155,19 @@ std::optional<Window> FusionMapper::nextWindow() {
   return coveredWindow();
 }
 
-std::optional<WindowData> FusionMapper::window(bool rest) {
-  std::optional<Window> window = nextWindow();
-  if (!window && (rest || finished_) && start_ns_) {
-    const std::int64_t t0_ns = policy_->earliestStart(*this);
-    const std::int64_t t1_ns = std::min(completeNs(), reachedNs() + 1);
-    if (t0_ns < t1_ns) window = windowOf(t0_ns, t1_ns, options_.policy.reference);
-  }
-  if (!window) return std::nullopt;
+std::optional<WindowData> FusionMapper::window() {
+  const std::optional<Window> window = nextWindow();
+  if (!window) return finished_ ? rest() : std::nullopt;
   return WindowData{*window, eventsOf(*window), &trajectory_};
+}
+
+std::optional<WindowData> FusionMapper::rest() const {
+  if (!start_ns_) return std::nullopt;
+  const std::int64_t t0_ns = policy_->earliestStart(*this);
+  const std::int64_t t1_ns = std::min(completeNs(), reachedNs() + 1);
+  if (t0_ns >= t1_ns) return std::nullopt;
+  const Window window = windowOf(t0_ns, t1_ns, options_.policy.reference);
+  return WindowData{window, eventsOf(window), &trajectory_};
 }
 
 void FusionMapper::skipWindow(const Window& window) {
@@ -217,10 +222,17 @@ std::int64_t FusionMapper::oldestHeldNs() const {
 
 void FusionMapper::configure(const KeyframePolicyOptions& policy,
                              const DepthPlanesOptions& planes) {
-  if (counts_.keyframes > 0) throw std::logic_error("new options after the first keyframe");
   options_.policy = policy;
-  if (!options_.only_window) policy_ = makeKeyframePolicy(policy, depthGuess(planes));
   setPlanes(planes);
+  if (options_.only_window) return;
+  policy_ = makeKeyframePolicy(policy, depthGuess(planes));
+  if (!start_ns_ || released_ns_ <= *start_ns_) return;
+  const std::uint64_t given_up = policy_->giveUpBefore(*this, released_ns_);
+  WindowsGivenUp& counts = counts_.windows_given_up;
+  if (counts.no_scene > 0 && counts_.keyframes == 0) {  // they are counted as those of the new policy
+    const std::uint64_t others = counts.total() - counts.no_scene;
+    counts.no_scene = given_up - std::min(given_up, others);
+  }
 }
 
 void FusionMapper::setPlanes(const DepthPlanesOptions& planes) {

@@ -45,11 +45,14 @@ struct WindowsGivenUp {
   std::uint64_t overload = 0;     ///< Too much input waited, or input was dropped.
   std::uint64_t jump = 0;         ///< The tracker jumped within them.
   std::uint64_t no_pose = 0;      ///< Their poses did not come in time.
+  std::uint64_t no_scene = 0;     ///< They showed no scene to choose automatic options from.
   std::uint64_t error = 0;        ///< They could not be mapped.
   std::uint64_t paused = 0;       ///< Map updating was disabled.
   std::uint64_t clock_reset = 0;  ///< They waited when a clock went back.
 
-  std::uint64_t total() const { return overload + jump + no_pose + error + paused + clock_reset; }
+  std::uint64_t total() const {
+    return overload + jump + no_pose + no_scene + error + paused + clock_reset;
+  }
   WindowsGivenUp& operator+=(const WindowsGivenUp& other);
 };
 using GiveUpReason = std::uint64_t WindowsGivenUp::*;
@@ -121,13 +124,14 @@ class FusionMapper : private RecordingProgress {
   std::optional<KeyframeDepthMap> next(DsiSink* sink = nullptr, StageHook* stages = nullptr);
 
   /// The data of the window that `next` would map: without mapping it, and without its keyframe.
-  /// @param rest also the data so far where they do not fill a window.
-  /// @return nothing where no window is covered; after `finish` also the rest, which no window
-  /// fills.
+  /// @return nothing where no window is covered; after `finish` also the rest.
   ///   Valid until data are added or a window is mapped or skipped.
-  std::optional<WindowData> window(bool rest = false);
+  std::optional<WindowData> window();
   /// The window that `next` would map, if there is one.
   std::optional<Window> nextWindow();
+  /// The data that no window fills: from the beginning of the next window to where events and poses
+  /// are complete. @return nothing where there are none. Valid as those of `window`.
+  std::optional<WindowData> rest() const;
   /// Goes on to the next window without mapping this one.
   void skipWindow(const Window& window);
   /// The same; the window counts as given up.
@@ -146,9 +150,9 @@ class FusionMapper : private RecordingProgress {
   std::int64_t oldestHeldNs() const;
   /// No event of a selected camera before this time is still to come.
   std::int64_t eventsCompleteNs() const;
-  /// Replaces options, as if they had been given at the start.
-  /// @throws std::logic_error after the first keyframe; std::invalid_argument where they are not
-  /// valid.
+  /// Replaces options, as if they had been given at the start. Goes on with the first window whose
+  /// events are all held; before the first keyframe those before it are given up.
+  /// @throws std::invalid_argument where they are not valid.
   void configure(const KeyframePolicyOptions& policy, const DepthPlanesOptions& planes);
   /// The depth planes of the keyframes from now on.
   /// @throws std::invalid_argument where the options are not valid.

@@ -28,7 +28,9 @@ void thinOut(CameraPacket& packet) {
   if (!chosen.empty()) packet.events = std::move(chosen);
 }
 
+/// Not in live operation, which maps windows and forgets them.
 EventFusionOptions surveyOptions(EventFusionOptions options) {
+  options.live.enabled = false;
   options.automatic = {};
   options.refinement.enabled = false;
   options.mapper = surveyOptions(options.mapper, kWindowS);

@@ -97,9 +97,10 @@ Json asJson(const RefinementState& refinement) {
 }
 
 Json asJson(const WindowsGivenUp& windows) {
-  return {{"overload", windows.overload}, {"jump", windows.jump},
-          {"no_pose", windows.no_pose},   {"error", windows.error},
-          {"paused", windows.paused},     {"clock_reset", windows.clock_reset}};
+  return {
+      {"overload", windows.overload},      {"jump", windows.jump},   {"no_pose", windows.no_pose},
+      {"no_scene", windows.no_scene},      {"error", windows.error}, {"paused", windows.paused},
+      {"clock_reset", windows.clock_reset}};
 }
 
 Json asJson(const LiveStatus& live, const MapperCounts& counts) {

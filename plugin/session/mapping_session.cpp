@@ -23,9 +23,6 @@ constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
 /// Stands for the tracker among the cameras.
 constexpr int kTracker = -1;
 
-/// In live operation, automatic options are chosen from the first window of this length.
-constexpr double kFirstWindowS = 1;
-
 void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
   if (!span) span = TimeSpan{t_ns, t_ns};
   span->first_ns = std::min(span->first_ns, t_ns);
@@ -38,26 +35,6 @@ std::int64_t trajectoryTime(std::int64_t t_ns, std::int64_t time_offset_ns) {
   return within(within(t_ns) + time_offset_ns);
 }
 
-/// Late fusion needs the maps of single cameras.
-FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
-  FusionMapperOptions mapper = options.mapper;
-  if (options.late_fusion) mapper.keyframe.camera_maps = true;
-  if (options.live.enabled) mapper.fill_last_window = false;
-  return options.automatic.any() ? surveyOptions(mapper, kFirstWindowS) : mapper;
-}
-
-/// Shortens a chosen window, and a chosen stride with it.
-void limitWindow(double max_s, KeyframePolicyOptions& policy, std::vector<ChosenOption>& chosen) {
-  for (ChosenOption& option : chosen) {
-    double* value_s = option.key == "window_s" ? &policy.window_s : nullptr;
-    if (option.key == "stride_s") value_s = &policy.stride_s;
-    const double limit_s = value_s == &policy.stride_s ? policy.window_s / 2 : max_s;
-    if (value_s == nullptr || *value_s <= limit_s) continue;
-    *value_s = option.value = limit_s;
-    option.reason = "no longer one fits into the queue of live operation";
-  }
-}
-
 /// How many keyframes the refinement may move.
 std::size_t movableKeyframes(const EventFusionOptions& options) {
   if (!options.refinement.enabled) return 0;
@@ -68,7 +45,8 @@ std::size_t movableKeyframes(const EventFusionOptions& options) {
 }  // namespace
 
 MappingSession::MappingSession(const EventFusionOptions& options)
-    : options_(options),
+    : automatic_(options.automatic),
+      options_(options),
       rig_(options),
       pose_source_(options.rig.pose_source),
       mapper_(mapperOptions(options)),
@@ -155,6 +133,9 @@ void MappingSession::startAnew() {
   noises_.clear();
   older_.clear();
   missing_.clear();
+  no_scene_since_ns_.reset();
+  events_without_scene_ = 0;
+  look_again_ns_ = kMinTimeNs;
 }
 
 void MappingSession::feed(CameraPacket packet) {
@@ -257,11 +238,16 @@ bool MappingSession::isJump(const StampedPose& pose, const PoseNoise& noise) con
              options_.live.max_turn_deg_s * kRadiansPerDegree * dt_s + kSigmas * noise.noise_rad;
 }
 
+/// Whether the tracker jumped, and all events before the jump are here.
+bool MappingSession::stretchEnds() const {
+  if (next_stretch_.empty()) return false;
+  return finished_ || mapper_.eventsCompleteNs() >= newest_pose_->t_ns;
+}
+
 /// Goes on to the poses after a jump, once all windows before it are mapped. Windows that span it
 /// are given up. @return whether it did.
 bool MappingSession::beginStretch() {
-  if (next_stretch_.empty()) return false;
-  if (!finished_ && mapper_.eventsCompleteNs() < newest_pose_->t_ns) return false;
+  if (!stretchEnds()) return false;
   ++status_.live->pose_jumps;
   mapper_.giveUpBefore(next_stretch_.front().first.t_ns, &WindowsGivenUp::jump);
   newest_pose_.reset();
@@ -399,6 +385,7 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
       if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
         mapper_.setPlanes(depth_follower_->planes());
       }
+      if (depth_follower_) lookAgain(keyframe->window);
       insert(*keyframe, store);
     } catch (...) {
       mapper_.loseKeyframe();
@@ -414,44 +401,6 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
 
 std::optional<WindowData> MappingSession::window() {
   return rig_.isComplete() ? mapper_.window() : std::nullopt;
-}
-
-/// Chooses automatic options as soon as the first window is there. @return whether none is left.
-bool MappingSession::chooseAutomatic() {
-  if (!options_.automatic.any()) return true;
-  const std::optional<WindowData> first = mapper_.window();
-  if (!first && !finished_) return false;
-  std::optional<double> duration_s;  // not known before the end
-  if (first && finished_) duration_s = secondsBetween(first->window.t0_ns, first->window.t1_ns);
-  choose(first, duration_s, std::nullopt);
-  return true;
-}
-
-bool MappingSession::chooseFromSoFar(double at_least_s) {
-  if (!rig_.isComplete() || !options_.automatic.any()) return false;
-  const std::optional<WindowData> data = mapper_.window(true);
-  if (!data) return false;
-  const double duration_s = secondsBetween(data->window.t0_ns, data->window.t1_ns);
-  if (duration_s < at_least_s) return false;
-  choose(data, std::nullopt, duration_s / 2);
-  return true;
-}
-
-/// @param duration_s of the recording, where it is known.
-/// @param max_window_s the longest window that the queue holds, where it is known.
-void MappingSession::choose(const std::optional<WindowData>& first,
-                            std::optional<double> duration_s, std::optional<double> max_window_s) {
-  std::vector<WindowSample> samples;
-  if (first) samples.push_back(sampleOf(*first));
-  OptionChoice choice =
-      chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, options_.mapper);
-  status_.chosen = std::move(choice.options);
-  if (max_window_s) limitWindow(*max_window_s, options_.mapper.policy, status_.chosen);
-  const AutomaticOptions automatic = std::exchange(options_.automatic, {});
-  if (automatic.min_depth_m || automatic.max_depth_m) {
-    depth_follower_.emplace(automatic, options_.mapper.keyframe.planes, choice.parallax_px_m);
-  }
-  mapper_.configure(options_.mapper.policy, options_.mapper.keyframe.planes);
 }
 
 /// Inserts a keyframe into the cloud, refines it, and moves it and others to their refined poses.

@@ -121,11 +121,14 @@ class MappingSession {
   const std::vector<Rigid3>& T_odom_ref() const { return T_odom_ref_; }
   /// The files of the options.
   const RigSetup& setup() const { return rig_.setup(); }
+  /// See SessionStatus.
+  std::uint64_t choices() const { return status_.choices; }
   /// The newest pose of the selected source, as the tracker has it.
   const std::optional<StampedPose>& newestPose() const { return newest_pose_; }
   SessionStatus status() const;
 
  private:
+  static FusionMapperOptions mapperOptions(const EventFusionOptions& options);
   void feed(CameraPacket packet);
   bool seenFor(std::int64_t duration_ns) const;
   void completeRig();
@@ -134,23 +137,34 @@ class MappingSession {
   void startAnew();
   void usePoses(const std::vector<StampedPose>& poses, const std::optional<PoseNoise>& noise);
   bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
+  bool stretchEnds() const;
   bool beginStretch();
   void giveUpMissing(int camera, std::int64_t next_ns);
   void giveUpOverdue();
   void limitWaits();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
+  // In automatic_choice.cpp.
   bool chooseAutomatic();
-  void choose(const std::optional<WindowData>& first, std::optional<double> duration_s,
-              std::optional<double> max_window_s);
+  void use(OptionChoice choice, const FusionMapperOptions& chosen);
+  std::optional<WindowData> firstLook();
+  bool skipWithoutScene(const Window& window, std::size_t events);
+  void keepOptions();
+  void lookAgain(const Window& window);
+
   void insert(KeyframeDepthMap& keyframe, const KeyframeStore& store);
   void moveKeyframes(double tolerance_m);
 
-  EventFusionOptions options_;
+  const AutomaticOptions automatic_;  // as they were given
+  EventFusionOptions options_;        // automatic: those that are to be chosen now
   RigAssembly rig_;
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
   MapperCounts earlier_counts_;                  // of mappers before a step of the clock
   std::optional<DepthFollower> depth_follower_;  // where depth limits are automatic
+  std::optional<std::int64_t> no_scene_since_ns_;
+  std::size_t events_without_scene_ = 0;
+  std::int64_t look_again_ns_ = kMinTimeNs;  // not before
+  std::int64_t look_interval_ns_ = 0;
   RefinedCloud cloud_;
   std::unique_ptr<MapRefinement> refinement_;  // where poses are refined
   std::vector<Rigid3> T_odom_ref_;

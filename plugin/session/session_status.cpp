@@ -16,6 +16,7 @@ std::string asText(const WindowsGivenUp& windows) {
   add(windows.overload, "for overload");
   add(windows.jump, "across a jump of the tracker");
   add(windows.no_pose, "without poses");
+  add(windows.no_scene, "without a scene");
   add(windows.error, "for errors");
   add(windows.paused, "while map updating was disabled");
   add(windows.clock_reset, "at a clock reset");

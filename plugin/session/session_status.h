@@ -73,7 +73,9 @@ struct SessionStatus {
   std::vector<std::uint64_t> silent_keyframes;        ///< Per camera: keyframes without its events.
   Rig rig;                                    ///< The cameras so far, with the options' overrides.
   std::size_t recalibrated_cameras = 0;       ///< Cameras whose recorded calibration differs.
-  std::vector<ChosenOption> chosen;           ///< Automatic options.
+  std::vector<ChosenOption> chosen;           ///< Automatic options, and from what.
+  std::uint64_t choices = 0;                  ///< How often they were chosen.
+  bool scene_unknown = false;                 ///< The last choice found no scene: it is a guess.
   std::optional<RefinementState> refinement;  ///< Where poses are refined.
   std::optional<LiveStatus> live{};           ///< In live operation.
 };

@@ -149,7 +149,17 @@ std::vector<Warning> sessionWarnings(const SessionStatus& status,
   addUnusedPoses(status, warnings);
   addKeyframes(status, warnings);
   addLosses(status, warnings);
-  return warnings.take();
+  std::vector<Warning> all = warnings.take();
+  if (status.scene_unknown) all.push_back(noSceneWarning(options.keyframe.planes));
+  return all;
+}
+
+Warning noSceneWarning(const DepthPlanesOptions& planes) {
+  return {"no-scene",
+          fmt::format("no scene was found to choose depth limits from: {:g} to {:g} m are a guess. "
+                      "The camera rests or only turns, or poses and calibration do not explain the "
+                      "events ([dsi] min_depth_m, max_depth_m)",
+                      planes.min_depth_m, planes.max_depth_m)};
 }
 
 }  // namespace efm

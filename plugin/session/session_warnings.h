@@ -12,4 +12,7 @@ namespace efm {
 std::vector<Warning> sessionWarnings(const SessionStatus& status,
                                      const FusionMapperOptions& options);
 
+/// Automatic options were chosen without a scene.
+Warning noSceneWarning(const DepthPlanesOptions& planes);
+
 }  // namespace efm

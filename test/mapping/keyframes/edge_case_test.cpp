@@ -267,7 +267,7 @@ TEST(EdgeCase, TheLastWindowReachesNotIntoEventsThatWereGivenUp) {
     for (int ms = 0; ms < 280; ++ms) events.push_back(eventAt(kStart_ns + ms * kMs));
     mapper.addEvents(0, events);
     ASSERT_TRUE(mapper.nextWindow());
-    mapper.giveUpBefore(kStart_ns + until_ms * kMs);
+    mapper.giveUpBefore(kStart_ns + until_ms * kMs, &WindowsGivenUp::overload);
     mapper.finish();
     EXPECT_EQ(takeAll(mapper).size(), keyframes) << until_ms;
   }

@@ -4,7 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <limits>
 #include <map>
+#include <set>
 #include <string>
 
 #include "mapping/geometry/timestamp.h"
@@ -17,12 +20,17 @@ namespace efm {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
-void expectCountsAddUp(const SessionStatus& status, std::uint64_t events, int planes) {
+void expectEventsAddUp(const SessionStatus& status, std::uint64_t events) {
   const EventCounts total = status.counts.total();
   EXPECT_EQ(total.read, events);
   EXPECT_EQ(total.read, total.used + total.without_pose + total.outside_window + total.dropped +
                             total.filtered + total.outside_lens + total.over_budget);
+}
+
+void expectCountsAddUp(const SessionStatus& status, std::uint64_t events, int planes) {
+  expectEventsAddUp(status, events);
   EXPECT_EQ(status.counts.votes.total(),
             status.counts.event_uses * static_cast<std::uint64_t>(planes));
 }
@@ -62,6 +70,97 @@ TEST(MappingSession, AutomaticOptionsAreChosenFromTheFirstWindow) {
   EXPECT_GT(chosen["max_depth_m"], SyntheticRecording::kDepthM);
   const Window& window = keyframes.front().window;
   EXPECT_NEAR(secondsBetween(window.t0_ns, window.t1_ns), chosen["window_s"], 1e-6);
+}
+
+/// The distance of a map's points from the plane of the dots, in steps of 30 planes from 1 to 5 m.
+double medianErrorInSteps(const MappingSession& session) {
+  std::vector<DepthPair> pairs;
+  for (const CloudPoint& point : session.cloud().points()) {
+    pairs.push_back({point.p_world.z(), SyntheticRecording::kDepthM});
+  }
+  if (pairs.empty()) return std::numeric_limits<double>::infinity();
+  return depthErrors(pairs).median_inverse / ((1.0 / 1.0 - 1.0 / 5.0) / 29);
+}
+
+TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
+  struct Row {
+    double duration_s;
+    std::vector<double> jumps_s;
+    std::set<std::ptrdiff_t> mapped;  // stretches, from 1
+    bool before_the_end;
+  };
+  const Row rows[] = {
+      {2.4, {0.3, 0.6}, {3}, true},             // the choice waits for the third stretch
+      {3.2, {0.3, 1.2, 2.0}, {2, 3, 4}, true},  // chosen in the second one, which lasts 0.9 s
+      {0.9, {0.2}, {2}, false},                 // what the end leaves is chosen from
+  };
+  for (const Row& row : rows) {
+    SyntheticRecording recording(row.duration_s);
+    std::vector<std::int64_t> begins_ns{SyntheticRecording::kStartNs};
+    for (const double jump_s : row.jumps_s) {
+      begins_ns.push_back(SyntheticRecording::kStartNs + durationFromSeconds(jump_s));
+    }
+    const auto stretchOf = [&](std::int64_t t_ns) {
+      return std::upper_bound(begins_ns.begin(), begins_ns.end(), t_ns) - begins_ns.begin();
+    };
+    for (StampedPose& pose : recording.poses) {
+      pose.T_world_rig.translation.y() += 10.0 * static_cast<double>(stretchOf(pose.t_ns));
+    }
+    EventFusionOptions options = syntheticOptions();
+    options.automatic = defaultOptions().automatic;
+    options.live.enabled = true;
+    MappingSession session(options);
+
+    std::vector<KeyframeDepthMap> keyframes = mapUnfinished(session, recording, 10);
+    EXPECT_EQ(!keyframes.empty(), row.before_the_end) << row.jumps_s[0];
+    for (KeyframeDepthMap& keyframe : mapRest(session)) keyframes.push_back(std::move(keyframe));
+
+    const std::string what = testing::PrintToString(row.jumps_s);
+    EXPECT_EQ(session.status().live->pose_jumps, row.jumps_s.size()) << what;
+    std::set<std::ptrdiff_t> mapped;
+    for (const KeyframeDepthMap& keyframe : keyframes) {
+      EXPECT_EQ(stretchOf(keyframe.window.t0_ns), stretchOf(keyframe.window.t1_ns - 1)) << what;
+      mapped.insert(stretchOf(keyframe.window.t0_ns));
+    }
+    EXPECT_EQ(mapped, row.mapped) << what;
+    EXPECT_LT(medianErrorInSteps(session), 1.5) << what;
+    for (const ChosenOption& option : session.status().chosen) {
+      EXPECT_THAT(option.reason, Not(HasSubstr("default"))) << what;
+    }
+    expectEventsAddUp(session.status(), recording.totalEvents());
+  }
+}
+
+TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
+  constexpr double kDepthM = 20;
+  constexpr double kSpeedMS = 2;
+  for (const double rest_s : {1.3, 10.7}) {  // shorter and longer than the choice waits
+    const SyntheticRecording recording(rest_s + 4.3, 1, {kDepthM, kSpeedMS, rest_s, 1});
+    EventFusionOptions options = syntheticOptions();
+    options.automatic = defaultOptions().automatic;
+    options.live.enabled = true;
+    MappingSession session(options);
+
+    const std::vector<KeyframeDepthMap> keyframes = mapUnfinished(session, recording, 50);
+
+    ASSERT_FALSE(keyframes.empty()) << rest_s;
+    const DepthPlanesOptions& planes = session.planes();
+    const double pixel = 1 / (recording.cameras[0].model.fx * kSpeedMS);  // in a window of 1 s
+    const double step = std::max(
+        pixel, (1 / planes.min_depth_m - 1 / planes.max_depth_m) / (planes.num_planes - 1));
+    std::vector<DepthPair> pairs;
+    for (const float depth_m : keyframes.back().map.depth) {
+      if (depth_m > 0) pairs.push_back({depth_m, kDepthM});
+    }
+    ASSERT_GT(pairs.size(), 100U) << rest_s;
+    EXPECT_LT(depthErrors(pairs).median_inverse, step) << rest_s;
+    EXPECT_LT(planes.min_depth_m, kDepthM) << rest_s;
+    EXPECT_GT(planes.max_depth_m, kDepthM) << rest_s;
+    const SessionStatus status = session.status();
+    EXPECT_EQ(status.choices, rest_s < 10 ? 1U : 2U) << "the first time without a scene";
+    EXPECT_FALSE(status.scene_unknown) << rest_s;
+    EXPECT_THAT(status.chosen.at(0).reason, HasSubstr("; from 1 s at ")) << rest_s;
+  }
 }
 
 TEST(MappingSession, CountsOfOverlappingWindowsAddUp) {

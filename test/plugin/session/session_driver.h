@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -63,8 +64,11 @@ inline std::vector<KeyframeDepthMap> mapAll(MappingSession& session,
 }
 
 /// In packets of this length, the last camera's first; maps after each.
-inline void mapPiecewise(MappingSession& session, const SyntheticRecording& recording,
-                         int packet_ms) {
+/// @return the keyframes before the end.
+inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
+                                                   const SyntheticRecording& recording,
+                                                   int packet_ms) {
+  std::vector<KeyframeDepthMap> keyframes;
   std::vector<std::size_t> begin(recording.cameras.size(), 0);
   for (std::size_t p = 0; p < recording.poses.size(); ++p) {
     session.addPose(recording.poses[p]);
@@ -81,8 +85,15 @@ inline void mapPiecewise(MappingSession& session, const SyntheticRecording& reco
       }
       session.addEvents(std::move(packet));
     }
-    mapDue(session);
+    std::vector<KeyframeDepthMap> made = mapDue(session);
+    std::move(made.begin(), made.end(), std::back_inserter(keyframes));
   }
+  return keyframes;
+}
+
+inline void mapPiecewise(MappingSession& session, const SyntheticRecording& recording,
+                         int packet_ms) {
+  mapUnfinished(session, recording, packet_ms);
   mapRest(session);
 }
 

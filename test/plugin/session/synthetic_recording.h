@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <random>
@@ -15,7 +16,15 @@
 
 namespace efm {
 
-/// Bright dots on the plane z = 2 m of the world, seen by a stereo rig that moves along x without
+/// What a synthetic recording is of.
+struct SyntheticScene {
+  double depth_m = 2;
+  double speed_m_s = 0.8;
+  double rest_s = 0;       ///< The rig stands still so long at first.
+  int noise_per_step = 0;  ///< Events at random pixels, of each camera.
+};
+
+/// Bright dots on a plane z = 2 m of the world, seen by a stereo rig that moves along x without
 /// turning: an event whenever a dot comes to another pixel. Small, exact and the same every time.
 struct SyntheticRecording {
   static constexpr double kDepthM = 2.0;
@@ -27,7 +36,9 @@ struct SyntheticRecording {
   std::vector<StampedPose> poses;          ///< Every 10 ms, from the start to the end.
 
   /// Moves by 0.8 m/s for `duration_s`; camera 1 stands 0.1 m to the right of camera 0.
-  explicit SyntheticRecording(double duration_s = 0.5, int num_cameras = 2) {
+  explicit SyntheticRecording(double duration_s = 0.5, int num_cameras = 2,
+                              const SyntheticScene& scene = {})
+      : scene_(scene) {
     for (int c = 0; c < num_cameras; ++c) {
       RigCamera camera;
       camera.model = {120, 90, 100.0, 100.0, 59.5, 44.5, DistortionModel::kNone, {}};
@@ -49,26 +60,28 @@ struct SyntheticRecording {
   }
 
  private:
-  static Rigid3 poseAt(std::int64_t step) {
+  Rigid3 poseAt(std::int64_t step) const {
     Rigid3 T_world_rig;
-    T_world_rig.translation = {0.8 * static_cast<double>(step * kStepNs) * 1e-9, 0, 0};
+    const double t_s = std::max(0.0, static_cast<double>(step * kStepNs) * 1e-9 - scene_.rest_s);
+    T_world_rig.translation = {scene_.speed_m_s * t_s, 0, 0};
     return T_world_rig;
   }
 
-  static std::vector<Eigen::Vector3d> randomDots() {
+  std::vector<Eigen::Vector3d> randomDots() const {
     std::mt19937 random(7);
     std::vector<Eigen::Vector3d> dots;
     for (int i = 0; i < 60; ++i) {
       const double x = -1.5 + 4.0 * (static_cast<double>(random()) / 4294967296.0);
       const double y = -0.8 + 1.6 * (static_cast<double>(random()) / 4294967296.0);
-      dots.emplace_back(x, y, kDepthM);
+      dots.push_back(scene_.depth_m / kDepthM * Eigen::Vector3d(x, y, kDepthM));
     }
     return dots;
   }
 
-  static std::vector<Event> eventsOf(const RigCamera& camera,
-                                     const std::vector<Eigen::Vector3d>& dots, std::int64_t steps) {
+  std::vector<Event> eventsOf(const RigCamera& camera, const std::vector<Eigen::Vector3d>& dots,
+                              std::int64_t steps) const {
     std::vector<Event> seen;
+    std::mt19937 random(11 + static_cast<std::uint32_t>(1000 * camera.T_rig_cam.translation.x()));
     std::vector<Eigen::Vector2i> last(dots.size(), {-1, -1});
     for (std::int64_t step = 0; step <= steps; ++step) {
       const Rigid3 T_cam_world = (poseAt(step) * camera.T_rig_cam).inverse();
@@ -84,9 +97,15 @@ struct SyntheticRecording {
         seen.push_back({kStartNs + step * kStepNs, static_cast<std::uint16_t>(rounded.x()),
                         static_cast<std::uint16_t>(rounded.y()), step % 2 == 0});
       }
+      for (int i = 0; i < scene_.noise_per_step; ++i) {
+        seen.push_back({kStartNs + step * kStepNs, static_cast<std::uint16_t>(random() % 120),
+                        static_cast<std::uint16_t>(random() % 90), step % 2 == 0});
+      }
     }
     return seen;
   }
+
+  SyntheticScene scene_;
 };
 
 /// Options that suit the synthetic recording: three keyframes in half a second.

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The members of MappingSession that choose automatic options.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/session/mapping_session.h"
+
+namespace efm {
+namespace {
+
+/// In live operation, automatic options are chosen from the first window of this length. After a
+/// jump of the tracker it begins at a multiple of the stride.
+constexpr double kFirstWindowS = 1;
+constexpr double kFirstStrideS = 0.1;
+/// What a jump of the tracker leaves of such a window is enough if it is as long as this.
+constexpr double kMinFirstWindowS = 0.5;
+/// Without a scene, the choice waits so long, and for at most `max_queue_events` events.
+constexpr std::int64_t kMaxSceneWaitNs = 10 * kNanosecondsPerSecond;
+/// After so many keyframes in a row that do not agree with their limits the scene is looked for
+/// again; once in such an interval, which doubles up to the longest while the scene that is found
+/// does not help.
+constexpr int kMaxMisfits = 3;
+constexpr std::int64_t kLookIntervalNs = 2 * kNanosecondsPerSecond;
+constexpr std::int64_t kMaxLookIntervalNs = 8 * kNanosecondsPerSecond;
+
+double lengthOf(const WindowData& data) {
+  return secondsBetween(data.window.t0_ns, data.window.t1_ns);
+}
+
+/// Adds to each reason what the option was chosen from.
+void noteSource(const WindowData& data, std::vector<ChosenOption>& chosen) {
+  for (ChosenOption& option : chosen) {
+    option.reason +=
+        fmt::format("; from {:.3g} s at {} s", lengthOf(data), formatSeconds(data.window.t0_ns));
+  }
+}
+
+/// Shortens a chosen window, and a chosen stride with it.
+void limitWindow(double max_s, KeyframePolicyOptions& policy, std::vector<ChosenOption>& chosen) {
+  for (ChosenOption& option : chosen) {
+    double* value_s = option.key == "window_s" ? &policy.window_s : nullptr;
+    if (option.key == "stride_s") value_s = &policy.stride_s;
+    const double limit_s = value_s == &policy.stride_s ? policy.window_s / 2 : max_s;
+    if (value_s == nullptr || *value_s <= limit_s) continue;
+    *value_s = option.value = limit_s;
+    option.reason = "no longer one fits into the queue of live operation";
+  }
+}
+
+}  // namespace
+
+/// Late fusion needs the maps of single cameras; a choice of options needs windows to look at.
+FusionMapperOptions MappingSession::mapperOptions(const EventFusionOptions& options) {
+  FusionMapperOptions mapper = options.mapper;
+  if (options.late_fusion) mapper.keyframe.camera_maps = true;
+  if (options.live.enabled) mapper.fill_last_window = false;
+  if (!options.automatic.any()) return mapper;
+  mapper = surveyOptions(mapper, kFirstWindowS);
+  mapper.policy.stride_s = kFirstStrideS;
+  return mapper;
+}
+
+/// Chooses automatic options as soon as a window shows the scene, or where none does so for too
+/// long. A second choice keeps the first one's options where it sees no scene. @return whether none
+/// is left.
+bool MappingSession::chooseAutomatic() {
+  const bool is_first = status_.choices == 0;
+  while (options_.automatic.any()) {
+    const std::optional<WindowData> data = firstLook();
+    if (!data && is_first && beginStretch()) continue;
+    if (!data && !finished_ && !stretchEnds()) return false;
+    std::vector<WindowSample> samples;
+    std::optional<double> duration_s;  // where it is not a whole window
+    if (data) samples.push_back(sampleOf(*data));
+    if (data && (finished_ || lengthOf(*data) < kFirstWindowS)) duration_s = lengthOf(*data);
+    FusionMapperOptions chosen = options_.mapper;
+    OptionChoice choice =
+        chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, chosen);
+    if (!choice.found_scene && !is_first) {
+      keepOptions();
+      break;
+    }
+    if (data) {
+      if (!choice.found_scene) {
+        std::size_t events = 0;
+        for (const EventSpan& span : data->events) events += span.size();
+        if (skipWithoutScene(data->window, events)) continue;
+        choice = chooseWideDepths(options_.automatic, chosen);
+      }
+      noteSource(*data, choice.options);
+    }
+    use(std::move(choice), chosen);
+  }
+  return true;
+}
+
+bool MappingSession::chooseFromSoFar(double at_least_s) {
+  if (!rig_.isComplete() || !options_.automatic.any()) return false;
+  std::optional<WindowData> data = mapper_.window();
+  if (!data) data = mapper_.rest();
+  if (!data || lengthOf(*data) < at_least_s) return false;
+  FusionMapperOptions chosen = options_.mapper;
+  OptionChoice choice =
+      chooseOptions(options_.automatic, mapper_.rig(), {sampleOf(*data)}, std::nullopt, chosen);
+  if (!choice.found_scene && status_.choices > 0) {
+    keepOptions();
+    return true;
+  }
+  if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
+  limitWindow(lengthOf(*data) / 2, chosen.policy, choice.options);
+  noteSource(*data, choice.options);
+  use(std::move(choice), chosen);
+  return true;
+}
+
+/// A window to choose from. At a jump of the tracker, what it leaves of the window.
+std::optional<WindowData> MappingSession::firstLook() {
+  std::optional<WindowData> data = mapper_.window();
+  if (data || !stretchEnds()) return data;
+  data = mapper_.rest();
+  return data && lengthOf(*data) >= kMinFirstWindowS ? data : std::nullopt;
+}
+
+/// Gives up a window that shows no scene, unless that has lasted too long or nothing comes after
+/// it. @return whether it did.
+bool MappingSession::skipWithoutScene(const Window& window, std::size_t events) {
+  if (!no_scene_since_ns_) no_scene_since_ns_ = window.t0_ns;
+  events_without_scene_ += events;
+  if (window.t1_ns - *no_scene_since_ns_ >= kMaxSceneWaitNs) return false;
+  if (events_without_scene_ > static_cast<std::size_t>(options_.live.max_queue_events)) {
+    return false;
+  }
+  if (secondsBetween(window.t0_ns, window.t1_ns) < kFirstWindowS) return beginStretch();
+  mapper_.giveUpBefore(window.t1_ns, &WindowsGivenUp::no_scene);
+  return true;
+}
+
+/// Goes on with the options of the first choice.
+void MappingSession::keepOptions() {
+  options_.automatic = {};
+  mapper_.configure(options_.mapper.policy, planes());
+}
+
+/// Goes on with the options of a choice.
+void MappingSession::use(OptionChoice choice, const FusionMapperOptions& chosen) {
+  options_.mapper = chosen;
+  options_.automatic = {};
+  const DepthPlanesOptions& planes = chosen.keyframe.planes;
+  if (automatic_.min_depth_m || automatic_.max_depth_m) {
+    depth_follower_.emplace(automatic_, planes, choice.parallax_px_m);
+  }
+  mapper_.configure(chosen.policy, planes);
+  status_.chosen = std::move(choice.options);
+  status_.scene_unknown = !choice.found_scene;
+  ++status_.choices;
+  look_interval_ns_ = std::clamp(2 * look_interval_ns_, kLookIntervalNs, kMaxLookIntervalNs);
+}
+
+/// Where keyframes do not agree with their limits, chooses the options once more from the data
+/// after this window.
+void MappingSession::lookAgain(const Window& window) {
+  if (depth_follower_->misfits() == 0) look_interval_ns_ = kLookIntervalNs;
+  if (depth_follower_->misfits() < kMaxMisfits || window.t1_ns < look_again_ns_) return;
+  look_again_ns_ = window.t1_ns + look_interval_ns_;
+  options_.automatic = automatic_;
+  mapper_.configure(mapperOptions(options_).policy, planes());
+}
+
+}  // namespace efm
