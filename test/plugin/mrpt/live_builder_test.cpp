@@ -83,7 +83,7 @@ TEST(LiveBuilder, ABudgetInSensorTimeGivesTheSameMapAtAnyPace) {
     EXPECT_EQ(status.live->cameras.at(0).dropped, 0U);
     maps.push_back(builder.points());
   }
-  ASSERT_GT(maps[0].size(), 0U);
+  ASSERT_GT(maps[0]->size(), 0U);
   expectSameBits(maps[0], maps[1]);
 }
 

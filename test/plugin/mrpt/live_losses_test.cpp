@@ -83,7 +83,7 @@ TEST(LiveLosses, OptionsAreChosenFromWhatIsThereWhereTheQueueIsFull) {
     }
     EXPECT_GT(window_s, 0.05);
     EXPECT_LT(window_s, 0.35) << "two windows fit into the queue";
-    EXPECT_GT(builder.points().size(), 30U);
+    EXPECT_GT(builder.points()->size(), 30U);
     const double mapped_s = 3 - (is_announced ? 0 : 1);  // without a second for further cameras
     EXPECT_GT(static_cast<double>(builder.trajectory().size()), (mapped_s - 0.3) / window_s);
     if (is_announced) {
@@ -197,7 +197,7 @@ TEST(LiveLosses, InputAfterTheEndIsCounted) {
   const Observations observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(liveOptions());
   playPatiently(builder, observations);
-  const std::size_t points = builder.points().size();
+  const std::size_t points = builder.points()->size();
   std::uint64_t events = 0;
   std::uint64_t poses = 0;
   for (const auto& observation : observations) {
@@ -209,7 +209,7 @@ TEST(LiveLosses, InputAfterTheEndIsCounted) {
   const SessionStatus status = builder.status();
   EXPECT_EQ(status.live->cameras.at(0).after_end + status.live->cameras.at(1).after_end, events);
   EXPECT_EQ(status.live->refused_poses, poses);
-  EXPECT_EQ(builder.points().size(), points);
+  EXPECT_EQ(builder.points()->size(), points);
   EXPECT_DOUBLE_EQ(status.live->dropRatio(), 0.5);
   expectSumsAgree(status);
 }

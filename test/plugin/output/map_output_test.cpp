@@ -78,7 +78,7 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
     MapOutput earlier(folder(), OutputKind::kMap, {});
     earlier.writeKeyframe(smallKeyframe(1'000'000'000));
     earlier.writeCloud("map.pcd", {});
-    earlier.writeColouredCloud({{{1, 2, 3}, 1, 1}}, Eigen::Vector3d::UnitZ());
+    earlier.writeColouredCloud(*mapCloudOf({{{1, 2, 3}, 1, 1}}, 1), Eigen::Vector3d::UnitZ());
     earlier.writePage([](std::ostream& page) { page << "mine"; });
     for (const char* name : {"map.png", "overview.png"}) {
       earlier.writePicture(name, cv::Mat3b::zeros(2, 2));

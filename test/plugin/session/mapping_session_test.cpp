@@ -75,8 +75,9 @@ TEST(MappingSession, AutomaticOptionsAreChosenFromTheFirstWindow) {
 /// The distance of a map's points from the plane of the dots, in steps of 30 planes from 1 to 5 m.
 double medianErrorInSteps(const MappingSession& session) {
   std::vector<DepthPair> pairs;
-  for (const CloudPoint& point : session.cloud().points()) {
-    pairs.push_back({point.p_world.z(), SyntheticRecording::kDepthM});
+  const MapCloud::ConstPtr points = session.cloud().points();
+  for (const MapPoint& point : *points) {
+    pairs.push_back({positionIn(*points, point).z(), SyntheticRecording::kDepthM});
   }
   if (pairs.empty()) return std::numeric_limits<double>::infinity();
   return depthErrors(pairs).median_inverse / ((1.0 / 1.0 - 1.0 / 5.0) / 29);
