@@ -17,12 +17,13 @@
 #include "plugin/app/observed_statistics.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
-#include "plugin/app/recording_survey.h"
 #include "plugin/app/system_info.h"
 #include "plugin/calibration/known_size.h"
 #include "plugin/formats/open_recording.h"
+#include "plugin/mrpt/session_feed.h"
 #include "plugin/session/camera_view.h"
 #include "plugin/session/health_checks.h"
+#include "plugin/session/recording_survey.h"
 #include "plugin/session/time_text.h"
 
 namespace efm {
@@ -137,7 +138,7 @@ class PatientSurveyor {
   void add(const mrpt::obs::CObservation& observation) {
     if (!surveyor_) return;
     try {
-      surveyor_->add(observation);
+      addTo(*surveyor_, observation);
     } catch (const std::exception&) {
       surveyor_.reset();
     }

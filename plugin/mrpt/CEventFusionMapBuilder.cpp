@@ -128,6 +128,7 @@ HostedMapping::Callbacks CEventFusionMapBuilder::callbacks() {
     }
     if (callback) callback(map);
   };
+  callbacks.info = [this](const std::string& text) { MRPT_LOG_INFO(text); };
   callbacks.warn = [this](const std::string& text) { MRPT_LOG_WARN(text); };
   return callbacks;
 }

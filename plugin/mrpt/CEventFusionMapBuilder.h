@@ -34,9 +34,12 @@ namespace efm {
 /// recording tell its cameras (see CObservationEvents). A camera that first appears later is an
 /// error.
 ///
-/// Automatic options (the default of depth limits, planes and windows) are chosen from the first
-/// second of events with poses, or from all of a shorter recording. Then the depth limits follow
-/// the keyframes.
+/// Automatic options (the default of depth limits, planes and windows) are chosen as the program
+/// chooses them: from the whole recording, so nothing is mapped before `finish`, and the map is the
+/// program's, bit for bit. Where the events exceed `[live] max_queue_mb`, or map updating is
+/// disabled meanwhile, they are chosen from what is there; then the depth limits follow the
+/// keyframes. In live operation they are chosen from the first second that shows a scene. The log
+/// and `status().chosen` say what was chosen from what.
 ///
 /// If mapping fails (no memory, a sink that throws), the caller who feeds the builder gets the
 /// error, and so does each later one until mapping succeeds. A caller who asks for the map gets the

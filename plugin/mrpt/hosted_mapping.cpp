@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/hosted_mapping.h"
 
+#include "plugin/session/session_warnings.h"
+
 namespace efm {
 
 KeyframePoses keyframePoses(std::vector<StampedPose> in_map,
@@ -11,6 +13,13 @@ KeyframePoses keyframePoses(std::vector<StampedPose> in_map,
     poses.by_tracker[earlier + i].T_world_rig = T_odom_ref[i];
   }
   return poses;
+}
+
+void tellChoice(const SessionStatus& status, const HostedMapping::Callbacks& callbacks) {
+  if (callbacks.info) callbacks.info(choiceText(status));
+  if (!status.scene_unknown || !callbacks.warn) return;
+  const Warning warning = noSceneWarning();
+  callbacks.warn(warning.name + ": " + warning.text);
 }
 
 }  // namespace efm

@@ -51,6 +51,7 @@ class HostedMapping {
     std::function<void(const KeyframeDepthMap&)> on_keyframe;
     std::function<void(const std::shared_ptr<const MapSnapshot>&)> on_map;
     std::function<void(const std::string&)> warn;
+    std::function<void(const std::string&)> info;
   };
 
   virtual ~HostedMapping() = default;
@@ -85,5 +86,8 @@ class HostedMapping {
   /// The newest keyframe's depth map, empty before the first one, and its planes.
   virtual std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const = 0;
 };
+
+/// Logs the automatic options and why. Where no scene was found, as a warning.
+void tellChoice(const SessionStatus& status, const HostedMapping::Callbacks& callbacks);
 
 }  // namespace efm

@@ -221,6 +221,9 @@ void LiveMapping::forgetOldest() {
 
 void LiveMapping::publishState() {
   SessionStatus status = session_->status();
+  if (std::exchange(told_choices_, status.choices) != status.choices) {
+    callBack("the callback of the log", [&] { tellChoice(status, callbacks_); });
+  }
   std::string failure;
   if (status.refinement && status.refinement->failures > warned_failures_) {
     warned_failures_ = status.refinement->failures;

@@ -112,6 +112,7 @@ class LiveMapping : public HostedMapping {
   std::uint64_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;
   bool warned_of_rounding_ = false;
+  std::uint64_t told_choices_ = 0;
 
   mutable std::mutex mutex_;  // of the members below; held for copies alone
   std::condition_variable finished_changed_;

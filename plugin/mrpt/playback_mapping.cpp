@@ -43,6 +43,8 @@ void PlaybackMapping::addEvents(CameraPacket packet) {
 }
 
 void PlaybackMapping::skipEvents(const CameraPacket& packet) {
+  if (packet.events.empty()) return;
+  advance([&] { session_.endSurvey(); });  // maps what is complete so far
   advance([&] { session_.skipEvents(packet); });
 }
 
@@ -86,9 +88,22 @@ void PlaybackMapping::mapComplete() {
   do {
     made.reset();
     keepFirst(exceptionOf([&] { made = mapNext(); }));
+    keepFirst(exceptionOf([&] { tellChoice(); }));
     if (made) keepFirst(exceptionOf([&] { deliver(*made); }));
   } while (made);
   if (error) std::rethrow_exception(error);
+}
+
+/// Logs a choice of options, without the lock.
+void PlaybackMapping::tellChoice() {
+  SessionStatus status;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (session_.choices() == told_choices_) return;
+    told_choices_ = session_.choices();
+    status = session_.status();
+  }
+  efm::tellChoice(status, callbacks_);
 }
 
 std::optional<KeyframeDepthMap> PlaybackMapping::mapNext() {

@@ -48,6 +48,7 @@ class PlaybackMapping : public HostedMapping {
  private:
   void advance(const std::function<void()>& feed);
   void mapComplete();
+  void tellChoice();
   std::optional<KeyframeDepthMap> mapNext();
   void deliver(const KeyframeDepthMap& keyframe);
   void applyPending();
@@ -63,6 +64,7 @@ class PlaybackMapping : public HostedMapping {
   ProcessorClock clock_ = processSeconds;
   bool finished_ = false;
   bool stopped_ = false;
+  std::uint64_t told_choices_ = 0;
   std::vector<StoredKeyframe> keyframes_;  // the initial map's first
   cv::Mat1f newest_depth_;
   std::set<std::thread::id> delivering_;  // threads within a callback

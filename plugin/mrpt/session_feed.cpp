@@ -18,12 +18,13 @@ CameraPacket packetOf(const CObservationEvents& observation) {
   return packet;
 }
 
-bool addPoseOf(const mrpt::obs::CObservation& observation, MappingSession& session) {
-  const std::optional<ObservedPose> observed = poseIn(observation);
-  if (!observed) return false;
-  session.addPose({observed->t_ns, rigPose(*observed, session.setup().T_body_rig)},
-                  *poseSourceOf(observation), observed->noise);
-  return true;
+void addTo(RecordingSurveyor& surveyor, const mrpt::obs::CObservation& observation) {
+  if (const auto* events = dynamic_cast<const CObservationEvents*>(&observation)) {
+    surveyor.addEvents(packetOf(*events));
+  } else if (const std::optional<ObservedPose> observed = poseIn(observation)) {
+    surveyor.addPose({observed->t_ns, rigPose(*observed, surveyor.setup().T_body_rig)},
+                     *poseSourceOf(observation));
+  }
 }
 
 }  // namespace efm

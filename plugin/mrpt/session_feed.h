@@ -4,16 +4,16 @@
 #include <mrpt/obs/CObservation.h>
 
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/session/mapping_session.h"
+#include "plugin/session/recording_survey.h"
 
 namespace efm {
 
 /// The events of an observation, with their camera.
 CameraPacket packetOf(const CObservationEvents& observation);
 
-/// Adds the pose of an observation to a session: T_world_rig = T_world_body * T_body_rig, with the
-/// options' T_body_rig if they have one. @return false for an observation without a pose.
-/// @throws std::invalid_argument where the pose is not valid.
-bool addPoseOf(const mrpt::obs::CObservation& observation, MappingSession& session);
+/// Adds the events or the pose of an observation to a survey: T_world_rig = T_world_body *
+/// T_body_rig, with the options' T_body_rig if they have one. Ignores other observations.
+/// @throws std::exception where the survey does, or where the pose is not valid.
+void addTo(RecordingSurveyor& surveyor, const mrpt::obs::CObservation& observation);
 
 }  // namespace efm

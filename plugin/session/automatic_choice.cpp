@@ -7,6 +7,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/mapping_session.h"
+#include "plugin/session/recording_survey.h"
 
 namespace efm {
 namespace {
@@ -67,6 +68,7 @@ FusionMapperOptions MappingSession::mapperOptions(const EventFusionOptions& opti
 /// long. A second choice keeps the first one's options where it sees no scene. @return whether none
 /// is left.
 bool MappingSession::chooseAutomatic() {
+  if (surveyor_) return chooseFromSurvey();
   const bool is_first = status_.choices == 0;
   while (options_.automatic.any()) {
     const std::optional<WindowData> data = firstLook();
@@ -75,7 +77,7 @@ bool MappingSession::chooseAutomatic() {
     std::vector<WindowSample> samples;
     std::optional<double> duration_s;  // where it is not a whole window
     if (data) samples.push_back(sampleOf(*data));
-    if (data && (finished_ || lengthOf(*data) < kFirstWindowS)) duration_s = lengthOf(*data);
+    if (data && lengthOf(*data) < kFirstWindowS) duration_s = lengthOf(*data);
     FusionMapperOptions chosen = options_.mapper;
     OptionChoice choice =
         chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, chosen);
@@ -112,6 +114,29 @@ bool MappingSession::chooseFromSoFar(double at_least_s) {
   if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
   limitWindow(lengthOf(*data) / 2, chosen.policy, choice.options);
   noteSource(*data, choice.options);
+  use(std::move(choice), chosen);
+  return true;
+}
+
+/// In playback: as soon as the recording has ended, or there is too much of it.
+bool MappingSession::chooseFromSurvey() {
+  const double held_mb = static_cast<double>(mapper_.heldEvents() * sizeof(Event)) / 1e6;
+  if (!finished_ && !survey_ends_ && held_mb <= options_.live.max_queue_mb) return false;
+  const RecordingSurvey survey = std::exchange(surveyor_, nullptr)->finish();
+  FusionMapperOptions chosen = options_.mapper;
+  OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,
+                                      finished_ ? survey.duration_s : std::nullopt, chosen);
+  if (finished_) {  // all of it was seen: limits that follow would be no better
+    use(std::move(choice), chosen);
+    depth_follower_.reset();
+    return true;
+  }
+  if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
+  for (ChosenOption& option : choice.options) {
+    option.reason += fmt::format(
+        "; from the first {:.3g} s of a stream{}", survey.duration_s.value_or(0),
+        survey_ends_ ? "" : fmt::format(", {:.0f} MB of events ([live] max_queue_mb)", held_mb));
+  }
   use(std::move(choice), chosen);
   return true;
 }

@@ -12,6 +12,7 @@
 
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/session/recording_survey.h"
 
 namespace efm {
 namespace {
@@ -22,6 +23,15 @@ constexpr std::int64_t kRigCompletesNs = kNanosecondsPerSecond;
 constexpr std::int64_t kMaxEventWaitNs = 600 * kNanosecondsPerSecond;
 /// Stands for the tracker among the cameras.
 constexpr int kTracker = -1;
+
+/// What a survey refuses, the mapping refuses, too.
+template <typename Add>
+void survey(Add add) {
+  try {
+    add();
+  } catch (const std::invalid_argument&) {
+  }
+}
 
 void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
   if (!span) span = TimeSpan{t_ns, t_ns};
@@ -55,12 +65,18 @@ MappingSession::MappingSession(const EventFusionOptions& options)
     status_.live.emplace();
     rig_.declare(mapper_);
   }
+  if (options.automatic.any() && !options.live.enabled) {
+    surveyor_ = std::make_unique<RecordingSurveyor>(options);
+  }
   if (options.refinement.enabled) {
     refinement_ = std::make_unique<MapRefinement>(options.refinement);
   }
 }
 
+MappingSession::~MappingSession() = default;
+
 void MappingSession::addEvents(CameraPacket packet) {
+  if (surveyor_) survey([&] { surveyor_->addEvents(packet); });
   const int camera = packet.camera;
   const std::size_t events = packet.events.size();
   std::vector<CameraPacket> packets;
@@ -187,6 +203,7 @@ void MappingSession::completeRig() {
 
 void MappingSession::addPose(const StampedPose& pose, const PoseSourceId& source,
                              const std::optional<PoseNoise>& noise) {
+  if (surveyor_) survey([&] { surveyor_->addPose(pose, source); });
   const std::vector<StampedPose> poses = pose_source_.add(source, pose);
   try {
     usePoses(poses, noise);

@@ -28,9 +28,16 @@ struct MissingEvents {
   GiveUpReason reason = &WindowsGivenUp::overload;
 };
 
+class RecordingSurveyor;
+
 /// Turns packets of events and poses, in the order of a recording, into keyframes and the global
 /// cloud: puts the rig together as its cameras appear, feeds the mapper and inserts its keyframes.
 /// Not thread-safe. Knows nothing of MRPT.
+///
+/// In playback, automatic options are chosen from the whole recording, by the code that chooses
+/// them for a program that reads it twice: nothing is mapped before `finish`, and all events are
+/// held. A recording with more events than `[live] max_queue_mb` holds is a stream: the options are
+/// chosen from what is there, and then the depth limits follow the keyframes.
 ///
 /// Use: add data, and after each call `next` until it returns nothing; at the end `finish`, and
 /// `next` again.
@@ -39,6 +46,7 @@ class MappingSession {
   /// @throws std::invalid_argument where the options are not valid; std::runtime_error naming a
   /// file of the options that cannot be read.
   explicit MappingSession(const EventFusionOptions& options);
+  ~MappingSession();
 
   /// The rig is complete with the first event if its cameras are known (RigAssembly::isKnown) and
   /// the source of poses is selected; otherwise once a packet begins more than a second after the
@@ -56,6 +64,8 @@ class MappingSession {
   /// Inserts a keyframe of an earlier map into the cloud, before the first new one.
   /// @throws std::invalid_argument as GlobalCloud::insert does.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
+  /// Chooses automatic options from the data so far.
+  void endSurvey() { survey_ends_ = true; }
   /// No more data will come.
   /// @throws std::invalid_argument where a camera's events came, but none of one of a lower index.
   /// The other cameras are mapped all the same.
@@ -146,6 +156,7 @@ class MappingSession {
   // In automatic_choice.cpp.
   bool chooseAutomatic();
   void use(OptionChoice choice, const FusionMapperOptions& chosen);
+  bool chooseFromSurvey();
   std::optional<WindowData> firstLook();
   bool skipWithoutScene(const Window& window, std::size_t events);
   void keepOptions();
@@ -160,6 +171,8 @@ class MappingSession {
   PoseSourceSelector pose_source_;
   FusionMapper mapper_;
   MapperCounts earlier_counts_;                  // of mappers before a step of the clock
+  std::unique_ptr<RecordingSurveyor> surveyor_;  // in playback, until options are chosen
+  bool survey_ends_ = false;
   std::optional<DepthFollower> depth_follower_;  // where depth limits are automatic
   std::optional<std::int64_t> no_scene_since_ns_;
   std::size_t events_without_scene_ = 0;

@@ -33,4 +33,13 @@ double LiveStatus::dropRatio() const {
   return received == 0 ? 0 : static_cast<double>(missing) / static_cast<double>(received);
 }
 
+std::string choiceText(const SessionStatus& status) {
+  std::string text = "options chosen from the data:";
+  for (const ChosenOption& option : status.chosen) {
+    text += fmt::format(" {} = {:g} ({});", option.key, option.value, option.reason);
+  }
+  text.pop_back();
+  return text;
+}
+
 }  // namespace efm

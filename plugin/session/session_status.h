@@ -80,4 +80,7 @@ struct SessionStatus {
   std::optional<LiveStatus> live{};           ///< In live operation.
 };
 
+/// The automatic options and why, for a log.
+std::string choiceText(const SessionStatus& status);
+
 }  // namespace efm

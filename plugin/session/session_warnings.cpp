@@ -150,16 +150,16 @@ std::vector<Warning> sessionWarnings(const SessionStatus& status,
   addKeyframes(status, warnings);
   addLosses(status, warnings);
   std::vector<Warning> all = warnings.take();
-  if (status.scene_unknown) all.push_back(noSceneWarning(options.keyframe.planes));
+  if (status.scene_unknown) all.push_back(noSceneWarning());
   return all;
 }
 
-Warning noSceneWarning(const DepthPlanesOptions& planes) {
-  return {"no-scene",
-          fmt::format("no scene was found to choose depth limits from: {:g} to {:g} m are a guess. "
-                      "The camera rests or only turns, or poses and calibration do not explain the "
-                      "events ([dsi] min_depth_m, max_depth_m)",
-                      planes.min_depth_m, planes.max_depth_m)};
+Warning noSceneWarning() {
+  return {
+      "no-scene",
+      "no scene was found to choose depth limits from, so they are a guess: the camera rests or "
+      "only turns, or poses and calibration do not explain the events ([dsi] min_depth_m, "
+      "max_depth_m)"};
 }
 
 }  // namespace efm

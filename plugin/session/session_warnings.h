@@ -13,6 +13,6 @@ std::vector<Warning> sessionWarnings(const SessionStatus& status,
                                      const FusionMapperOptions& options);
 
 /// Automatic options were chosen without a scene.
-Warning noSceneWarning(const DepthPlanesOptions& planes);
+Warning noSceneWarning();
 
 }  // namespace efm

@@ -3,10 +3,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <mrpt/obs/CRawlog.h>
 
 #include <sstream>
 
 #include "maps/io/point_cloud_file.h"
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "test/paths.h"
 #include "test/plugin/program_test.h"
 
@@ -61,6 +63,27 @@ TEST_F(MrptHost, MapsAllOfALongerRecording) {
   ASSERT_EQ(result.status, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("13 keyframes"));
   expectTheMapOfEventFusion();
+}
+
+TEST_F(MrptHost, WithDefaultOptionsMakesTheMapOfTheProgram) {
+  importRecording(SyntheticRecording(3.2));
+  ASSERT_EQ(run("map data.rawlog --out out").status, 0);
+  write("host.ini", "[camera]\nfps = 30\n");
+
+  const Result result = host("");
+
+  ASSERT_EQ(result.status, 0) << result.err;
+  expectTheMapOfEventFusion();
+  // Bit for bit.
+  CEventFusionMapBuilder builder;
+  mrpt::obs::CRawlog rawlog;
+  ASSERT_TRUE(rawlog.loadFromRawLogFile((folder() / "data.rawlog").string()));
+  for (std::size_t i = 0; i < rawlog.size(); ++i) {
+    builder.processObservation(rawlog.getAsObservation(i));
+  }
+  builder.finish();
+  writePcd(folder() / "host.pcd", builder.points());
+  EXPECT_EQ(contentOf("host.pcd"), contentOf("out/map.pcd"));
 }
 
 TEST_F(MrptHost, ErrorsNameTheWrongSectionKeyAndValue) {

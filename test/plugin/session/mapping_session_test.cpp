@@ -12,6 +12,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
+#include "plugin/session/recording_survey.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
@@ -20,6 +21,7 @@ namespace efm {
 namespace {
 
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 
 void expectEventsAddUp(const SessionStatus& status, std::uint64_t events) {
@@ -54,22 +56,72 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOn) {
   EXPECT_LT(depthErrors(pairs).median_inverse, 1.5 * step);
 }
 
-TEST(MappingSession, AutomaticOptionsAreChosenFromTheFirstWindow) {
-  const SyntheticRecording recording;
+EventFusionOptions automaticOptions() {
   EventFusionOptions options = syntheticOptions();
   options.automatic = defaultOptions().automatic;
-  MappingSession session(options);
+  return options;
+}
 
-  const auto keyframes = mapAll(session, recording);
+RecordingSurvey surveyOf(const SyntheticRecording& recording, const EventFusionOptions& options) {
+  RecordingSurveyor surveyor(options);
+  for (const StampedPose& pose : recording.poses) surveyor.addPose(pose, {});
+  for (const int c : {0, 1}) surveyor.addEvents(packetOf(recording, c));
+  return surveyor.finish();
+}
 
-  ASSERT_FALSE(keyframes.empty());
-  std::map<std::string, double> chosen;
-  for (const ChosenOption& option : session.status().chosen) chosen[option.key] = option.value;
-  EXPECT_EQ(chosen.size(), 5U);
-  EXPECT_LT(chosen["min_depth_m"], SyntheticRecording::kDepthM);
-  EXPECT_GT(chosen["max_depth_m"], SyntheticRecording::kDepthM);
-  const Window& window = keyframes.front().window;
-  EXPECT_NEAR(secondsBetween(window.t0_ns, window.t1_ns), chosen["window_s"], 1e-6);
+TEST(MappingSession, InPlaybackOptionsAreChosenFromTheWholeRecording) {
+  for (const double duration_s : {0.5, 4.2}) {
+    const SyntheticRecording recording(duration_s);
+    EventFusionOptions options = automaticOptions();
+    const RecordingSurvey survey = surveyOf(recording, options);
+    const OptionChoice choice = chooseOptions(options.automatic, survey.rig, survey.samples,
+                                              survey.duration_s, options.mapper);
+    EXPECT_TRUE(choice.found_scene);
+    options.automatic = {};
+    MappingSession expected(options);
+    mapAll(expected, recording);
+    MappingSession session(automaticOptions());
+
+    EXPECT_THAT(mapUnfinished(session, recording, 10), IsEmpty()) << "more may come";
+    EXPECT_THAT(mapRest(session), Not(IsEmpty()));
+
+    expectSameMap(session, expected);
+    const SessionStatus status = session.status();
+    ASSERT_EQ(status.chosen.size(), 5U);
+    for (std::size_t i = 0; i < 5; ++i) {
+      EXPECT_EQ(status.chosen[i].key, choice.options[i].key);
+      EXPECT_EQ(status.chosen[i].value, choice.options[i].value);
+      EXPECT_EQ(status.chosen[i].reason, choice.options[i].reason);
+    }
+  }
+}
+
+TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
+  const SyntheticRecording recording(3.2);
+  for (const bool is_full : {true, false}) {
+    EventFusionOptions options = automaticOptions();
+    if (is_full) options.live.max_queue_mb = 0.1;  // some 6000 of 22,000 events
+    MappingSession session(options);
+    if (!is_full) session.endSurvey();
+    EXPECT_THAT(mapUnfinished(session, recording, 10), Not(IsEmpty())) << is_full;
+    const SessionStatus status = session.status();
+    ASSERT_EQ(status.chosen.size(), 5U);
+    EXPECT_THAT(status.chosen[0].reason, HasSubstr(" s of a stream")) << is_full;
+    EXPECT_EQ(status.chosen[0].reason.find("max_queue_mb") != std::string::npos, is_full);
+  }
+}
+
+TEST(MappingSession, TheFirstLookAtARecordingIsNoLiveOperation) {
+  SyntheticRecording recording(4.2);
+  for (StampedPose& pose : recording.poses) {  // a jump after 0.7 s
+    const bool is_later = pose.t_ns > SyntheticRecording::kStartNs + 700'000'000;
+    pose.T_world_rig.translation.y() += is_later ? 10 : 0;
+  }
+  EventFusionOptions options = automaticOptions();
+  options.live.enabled = true;
+  const RecordingSurvey survey = surveyOf(recording, options);
+  EXPECT_EQ(survey.samples.size(), 2U);  // of 2 s each
+  EXPECT_NEAR(survey.duration_s.value_or(0), 4.2, 0.02);
 }
 
 /// The distance of a map's points from the plane of the dots, in steps of 30 planes from 1 to 5 m.
@@ -107,8 +159,7 @@ TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
     for (StampedPose& pose : recording.poses) {
       pose.T_world_rig.translation.y() += 10.0 * static_cast<double>(stretchOf(pose.t_ns));
     }
-    EventFusionOptions options = syntheticOptions();
-    options.automatic = defaultOptions().automatic;
+    EventFusionOptions options = automaticOptions();
     options.live.enabled = true;
     MappingSession session(options);
 
@@ -137,8 +188,7 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
   constexpr double kSpeedMS = 2;
   for (const double rest_s : {1.3, 10.7}) {  // shorter and longer than the choice waits
     const SyntheticRecording recording(rest_s + 4.3, 1, {kDepthM, kSpeedMS, rest_s, 1});
-    EventFusionOptions options = syntheticOptions();
-    options.automatic = defaultOptions().automatic;
+    EventFusionOptions options = automaticOptions();
     options.live.enabled = true;
     MappingSession session(options);
 

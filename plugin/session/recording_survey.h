@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "mapping/options/warning.h"
+#include "mapping/survey/window_sample.h"
+#include "plugin/session/mapping_session.h"
+
+namespace efm {
+
+/// What a first pass over a recording found: its cameras and some of its windows, evenly spread.
+struct RecordingSurvey {
+  Rig rig;
+  std::vector<WindowSample> samples;
+  /// The time from the first to the last event with a pose; nothing without such events.
+  std::optional<double> duration_s;
+
+  /// Whether the poses explain the events. An error is left to the pass that maps.
+  std::vector<Warning> poseWarnings(const FusionMapperOptions& options) const;
+};
+
+/// Surveys a recording in one pass, from the same calls as a MappingSession. Memory does not grow
+/// with its length: of more than a million events per second and camera, some are chosen evenly.
+class RecordingSurveyor {
+ public:
+  /// @throws std::runtime_error naming a file of the options that cannot be read.
+  explicit RecordingSurveyor(const EventFusionOptions& options);
+
+  /// @throws std::exception where a MappingSession does; then nothing more may be added.
+  void addEvents(CameraPacket packet);
+  void addPose(const StampedPose& pose, const PoseSourceId& source);
+  /// Once: after the last data, or after an error.
+  RecordingSurvey finish();
+
+  /// The files of the options.
+  const RigSetup& setup() const { return session_.setup(); }
+
+ private:
+  void takeWindows();
+
+  MappingSession session_;
+  SpreadSamples samples_;
+};
+
+}  // namespace efm
