@@ -70,12 +70,12 @@ TEST_F(EvaluateCommand, ComparesTheMapsOfARecordingWithItsFolder) {
   EXPECT_GT(image("depth.png").rows, 400);
 
   const json errors = jsonOf("evaluate depth out data");
-  EXPECT_EQ(errors["maps"].size(), 3U);
+  EXPECT_EQ(errors["maps"].size(), 4U);
   EXPECT_LT(errors["all"]["median_inverse"], 0.06);
   EXPECT_GT(errors["all"]["delta_1"], 0.9);
   EXPECT_EQ(errors["focal_px"], 100);
   EXPECT_NEAR(errors["baseline_m"], 0.1, 1e-9);
-  EXPECT_EQ(errors["truths"], 3 * 90 * 120);
+  EXPECT_EQ(errors["truths"], 4 * 90 * 120);
   EXPECT_EQ(errors["without_truth"], 0);
 }
 
@@ -121,7 +121,7 @@ TEST_F(EvaluateCommand, ComparesTheKeyframesTrajectoryWithThePoses) {
               AllOf(HasSubstr("positions lie on a line"), HasSubstr("--align origin")));
   for (const char* alignment : {"none", "origin"}) {
     const json errors = jsonOf(std::string("evaluate trajectory out data --align ") + alignment);
-    EXPECT_EQ(errors["pairs"], 3);
+    EXPECT_EQ(errors["pairs"], 4);
     EXPECT_LT(errors["ate"]["translation_m"]["max"], 0.01);
     EXPECT_EQ(errors["alignment"], alignment);
   }

@@ -88,14 +88,14 @@ TEST_F(Interrupted, AResultThatIsReplacedIsNamed) {
   EXPECT_EQ(warningOf("data"), "");
   EXPECT_EQ(warningOf("data"), "") << "the same recording";
   EXPECT_EQ(warningOf("data.rawlog"),
-            warning + "the result of " + place + "/data (3 keyframes): this run replaces it\n");
+            warning + "the result of " + place + "/data (4 keyframes): this run replaces it\n");
   std::filesystem::remove(folder() / "out/report.json");
   std::filesystem::remove_all(
       std::filesystem::directory_iterator(folder() / "out/keyframes")->path());
   write("out/report.partial.json", R"({"recording": ["/a.bag", "/b.txt"], "process": 1})");
   EXPECT_EQ(warningOf("data.rawlog"),
             warning +
-                "2 keyframes of /a.bag, /b.txt, left by a run that did not end: this run "
+                "3 keyframes of /a.bag, /b.txt, left by a run that did not end: this run "
                 "replaces them\n");
 }
 

@@ -109,7 +109,7 @@ TEST_F(MapOptions, OutliersAreRemovedFromTheCloudOfOneKeyframeToo) {
   write(SyntheticRecording());
   const std::string depth = "depth rig.ini data --t0 10.1 --t1 10.4 ";
   ASSERT_EQ(run(depth + "--out all").status, 0);
-  ASSERT_EQ(run(depth + "--out some --set map.outlier_radius_m=0.02"
+  ASSERT_EQ(run(depth + "--out some --set map.outlier_radius_m=0.05"
                         " --set map.outlier_min_neighbors=4")
                 .status,
             0);

@@ -55,7 +55,7 @@ TEST_F(OverrideOptions, AMissingPartIsAnErrorThatNamesTheOption) {
   EXPECT_THAT(errorOf("map rig.ini data --out out"),
               HasSubstr("data: no poses: expected poses.txt or groundtruth.txt, or --poses FILE"));
   takeOut("camchain.yaml");
-  EXPECT_THAT(errorOf("import data --poses poses.txt --out r.rawlog"),
+  EXPECT_THAT(errorOf("map rig.ini data --poses poses.txt --out out"),
               HasSubstr("data: no calibration: expected camchain.yaml, or --calibration FILE"));
   EXPECT_THAT(errorOf("info data --poses nowhere.txt"),
               HasSubstr("--poses nowhere.txt: no such file"));
@@ -135,7 +135,7 @@ TEST_F(OverrideOptions, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning
   rig.cameras[1].T_rig_cam.translation.y() += 0.001;
   write("other.yaml", formatCamchain(rig));
   for (const std::string recording : {"data", "r.rawlog"}) {
-    const std::string map = "map rig.ini " + recording + " --out out ";
+    const std::string map = "map rig.ini " + recording + " --out of_" + recording + " ";
     EXPECT_EQ(run(map + "--set rig.calibration=same.yaml").err, "") << recording;
     EXPECT_THAT(run(map + "--set rig.calibration=other.yaml").err,
                 HasSubstr("warning: calibration-replaced: other.yaml replaced another calibration, "
@@ -145,7 +145,7 @@ TEST_F(OverrideOptions, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning
     EXPECT_EQ(run(map + "--calibration other.yaml").err, "") << recording << ": it was asked for";
   }
   takeOut("camchain.yaml");
-  EXPECT_EQ(run("map rig.ini data --out out --set rig.calibration=other.yaml").err, "")
+  EXPECT_EQ(run("map rig.ini data --out of_data --set rig.calibration=other.yaml").err, "")
       << "there is no other";
 }
 
@@ -163,7 +163,7 @@ TEST_F(OverrideOptions, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning
   EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, warning);
   EXPECT_THAT(run(map + "--calibration other.txt").err, Not(HasSubstr("replaced")));
   ASSERT_EQ(run("import uzh --out r.rawlog").status, 0);
-  EXPECT_THAT(run("map rig.ini r.rawlog --out out --set rig.calibration=other.txt").err, warning);
+  EXPECT_THAT(run("map rig.ini r.rawlog --out of_r --set rig.calibration=other.txt").err, warning);
   fs::remove(folder() / "uzh" / "calib.txt");
   EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, Not(HasSubstr("replaced")));
 }

@@ -149,7 +149,7 @@ TEST_F(RefinementOption, WrongValuesAreErrorsThatNameSectionKeyAndValue) {
 }
 
 TEST_F(RefinementOption, ARecordingMayHaveOneKeyframe) {
-  const Result result = map("--t1 10.15" + kRefined, "out");
+  const Result result = map("--t1 10.102" + kRefined, "out");
   EXPECT_EQ(result.err, "");
   EXPECT_EQ(contentOf("out/trajectory.txt"), contentOf("out/trajectory_tracker.txt"));
   EXPECT_EQ(reportIn("out")["refinement"]["registered"], 0);

@@ -71,6 +71,7 @@ TEST_F(UnreadFormats, OwnResultsSayWhatShowsThem) {
   EXPECT_TRUE(begins(nameOf("<!DOCTYPE html>\n<meta name=\"generator\" content=\"event-fusion\">"),
                      "the page of a map" + what));
   EXPECT_TRUE(begins(nameOf("# .PCD v0.7 - Point Cloud Data\n"), "a point cloud (PCD)" + what));
+  std::filesystem::remove(folder() / "file");
   writeFile(folder() / "map.html", "<!DOCTYPE html>");
   writeFile(folder() / "report.json", "{}");
   EXPECT_TRUE(begins(unreadFormat(folder()).value_or(""), "a folder; map.html in it is an HTML"));
