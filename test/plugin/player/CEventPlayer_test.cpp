@@ -282,7 +282,7 @@ TEST_F(EventPlayer, ErrorsNameTheKeyTheValueAndWhatWasExpected) {
            {"recording = data\nprocess_rate = abc\n", "process_rate = abc: must be 0.01 to 1e5"},
            {"process_rate = 100\nrecording = nothing\n",
             "recording = nothing: no such file or folder"},
-           {"process_rate = 100\nrecording = host.ini\n", "host.ini: not a"},
+           {"process_rate = 100\nrecording = host.ini\n", "host.ini: an .ini file among the sources"},
            {good + "speed = 0\n", "speed = 0: must be 0.001 to 1000"},
            {good + "sped = 2\n", "sped = 2: unknown key: did you mean speed?"},
            {good + "max_queue_len = 0\n", "max_queue_len = 0: must be 1 to 1000000"},
