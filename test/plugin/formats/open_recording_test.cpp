@@ -79,8 +79,9 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
        "expected t tx ty tz qx qy qz qw, or a .npz file with N times and N x 4 x 4 matrices"},
       {"calib.txt", "200 200 120 90 0 0 0 0 0\n", ": a calibration: expected --calibration PATH"},
       {"rig.ini", "[dsi]\nnum_planes = 5\n",
-       ": an .ini file among the sources: expected one option file, before the recording; a "
-       "calibration is given with --calibration"},
+       ": an .ini file among the sources: expected one option file, --config NAME; a calibration "
+       "is "
+       "given with --calibration"},
       {"old.raw", "% date 2020-01-01\n% plugin_name hal\n\0\1\2"s,
        ": a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header: the encoding "
        "of "
@@ -93,8 +94,7 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
        ": the description of a ROS 2 bag: expected its folder, FOLDER (docs/recordings.md)"},
       {"notes.txt", "words\n",
        ": not a recording (it begins with 'words\\x0a'): expected a rawlog, or a recording in "
-       "another "
-       "format (docs/recordings.md)"},
+       "another format (docs/recordings.md)"},
       {"readme", "gain = 5 at 3 of the set\n",
        ": not a recording (it begins with 'gain = 5 at 3 of the set'): expected a rawlog, or a "
        "recording in another format (docs/recordings.md)"},
