@@ -23,6 +23,7 @@ FusionMapperOptions options(int planes = 4) {
   options.keyframe.extraction.extraction = ExtractionMethod::kPaper;
   options.policy.window_s = 0.1;
   options.policy.stride_s = 0.1;
+  options.fill_last_window = false;  // a single window of 0.1 s in most of these recordings
   options.keyframe.planes = {0.5, 4.0, planes, PlaneSpacing::kInverse};
   options.keyframe.sweep.threads = 1;
   return options;
@@ -227,6 +228,7 @@ TEST(EdgeCase, TheLastWindowIsFullAndEndsWithTheRecording) {
         {"a limit", 0.1, 0.1, 400, 330, 260, 3, 160, 260, 260},
         {"shorter than a window", 0.1, 0.1, 400, 99, 0, 0, 0, 0, 0}}) {
     FusionMapperOptions period = options();
+    period.fill_last_window = true;
     period.filter.hot_pixels = false;
     period.policy.window_s = c.window_s;
     period.policy.stride_s = c.stride_s;
@@ -259,6 +261,7 @@ TEST(EdgeCase, TheLastWindowIsFullAndEndsWithTheRecording) {
 TEST(EdgeCase, TheLastWindowReachesNotIntoEventsThatWereGivenUp) {
   for (const auto& [until_ms, keyframes] : {std::pair{150, 1U}, std::pair{190, 0U}}) {
     FusionMapperOptions period = options();
+    period.fill_last_window = true;
     period.filter.hot_pixels = false;
     FusionMapper mapper(period);
     mapper.addCamera({test::smallCamera(), {}, 0});

@@ -321,6 +321,7 @@ TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
       for (int strides = 1; strides <= 8 && centre(t0_ns); ++strides) {
         const std::int64_t t1_ns = t0_ns + strides * std::int64_t{12'000'000};
         over = t1_ns > recording.poses.back().t_ns;
+        if (over) from_ns = t0_ns;  // not decided
         if (over) break;
         if (!centre(t1_ns) || (*centre(t1_ns) - *centre(t0_ns)).norm() < 0.04 * mean_depth_m) {
           continue;
