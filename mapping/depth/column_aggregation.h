@@ -18,7 +18,8 @@ struct AggregatedPeak {
   static constexpr int kMinSteps = 3;
   static constexpr int kMaxSteps = 12;
   std::array<float, kMaxSteps - kMinSteps + 1> second_peak{};
-  bool at_end = false;  ///< The peak lies on the first or the last plane.
+  /// The peak lies on the first or the last plane; with over 800 planes, in their quarter of a step.
+  bool at_end = false;
 };
 
 /// For each pixel of a mask, sums the DSI columns of the mask's pixels in 9x9 pixels around,

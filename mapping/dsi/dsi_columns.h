@@ -33,7 +33,8 @@ class TileVolume {
 /// points have one: their confidence is above that of their surroundings. They are a third of a
 /// view at most in practice, and the only part of the DSI that is stored. A value takes a byte
 /// (`kernels::columnValue`), which moves no depth that matters: with 100 to 400 planes, points and
-/// errors are as with two bytes.
+/// errors are as with two bytes. With many more, neighbouring planes share a byte:
+/// `aggregateColumns` then compares planes that are further apart.
 class DsiColumns {
  public:
   /// Columns of one tile.

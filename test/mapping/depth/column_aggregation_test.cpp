@@ -135,16 +135,19 @@ TEST(ColumnAggregation, EqualsTheNaiveSumOnViewsSmallerThanTheWindow) {
   }
 }
 
-TEST(ColumnAggregation, ASingleRidgeIsFoundBetweenPlanesWithItsWidth) {
-  for (const double at : {20.0, 20.25, 20.5, 33.8}) {
-    ChosenDsi dsi({11, 11}, 100);
-    dsi.setColumn({5, 5}, [&](int plane) { return 10 * ridge(plane, at, 3); });
-    cv::Mat1b mask = cv::Mat1b::zeros(11, 11);
-    mask(5, 5) = 255;
-    const AggregatedPeak peak = aggregate(dsi, mask).at(0);
-    EXPECT_NEAR(peak.position, at, 0.02);
-    EXPECT_NEAR(peak.width_sq, 9, 1.0);
-    EXPECT_FALSE(peak.at_end);
+TEST(ColumnAggregation, ASingleRidgeIsFoundBetweenPlanesWithItsWidthForAnyNumberOfPlanes) {
+  for (const int planes : {100, 400, 800, 1600, 6400}) {
+    const double step = (planes - 1) / 99.0;
+    for (const double at : {20.0, 20.25, 20.5, 33.8}) {
+      ChosenDsi dsi({11, 11}, planes);
+      dsi.setColumn({5, 5}, [&](int plane) { return 10 * ridge(plane / step, at, 3); });
+      cv::Mat1b mask = cv::Mat1b::zeros(11, 11);
+      mask(5, 5) = 255;
+      const AggregatedPeak peak = aggregate(dsi, mask).at(0);
+      EXPECT_NEAR(peak.position / step, at, 0.02) << planes;
+      EXPECT_NEAR(peak.width_sq / (step * step), 9, 1.0) << planes;
+      EXPECT_FALSE(peak.at_end);
+    }
   }
 }
 
