@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <iterator>
 #include <set>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "test/plugin/mrpt/observations.h"
@@ -79,17 +79,17 @@ Observations changed(Observations observations, Change change) {
   return observations;
 }
 
-/// Begins a recording with what announces its cameras: an empty packet of each, until its start.
+/// The recording announces its cameras: the empty packets at its beginning last until their first
+/// events.
 inline Observations announced(const SyntheticRecording& recording, Observations observations) {
-  Observations all;
-  for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
-    auto packet = packetObservation(recording, static_cast<int>(c));
-    packet->timestamp = mrptTimeFrom(SyntheticRecording::kStartNs);
-    packet->covered_until_ns = recording.events[c].front().t_ns;
-    all.push_back(packet);
-  }
-  std::move(observations.begin(), observations.end(), std::back_inserter(all));
-  return all;
+  return changed(std::move(observations), [&](mrpt::obs::CObservation& observation) {
+    CObservationEvents* packet = packetIn(observation);
+    if (packet == nullptr || !packet->events.empty()) return;
+    const auto& events = recording.events[static_cast<std::size_t>(packet->camera_index)];
+    if (*packet->covered_until_ns <= events.front().t_ns) {
+      packet->covered_until_ns = events.front().t_ns;
+    }
+  });
 }
 
 }  // namespace efm

@@ -78,11 +78,13 @@ TEST(LiveLosses, OptionsAreChosenFromWhatIsThereWhereTheQueueIsFull) {
     expectSumsAgree(status);
     ASSERT_EQ(status.chosen.size(), 5U);
     double window_s = 0;
+    std::string reason;
     for (const ChosenOption& option : status.chosen) {
       if (option.key == "window_s") window_s = option.value;
+      if (option.key == "window_s") reason = option.reason;
     }
     EXPECT_GT(window_s, 0.05);
-    EXPECT_LT(window_s, 0.35) << "two windows fit into the queue";
+    EXPECT_LT(window_s, is_announced ? 0.35 : 0.55) << "two fit into the queue; " << reason;
     EXPECT_GT(builder.points()->size(), 30U);
     const double mapped_s = 3 - (is_announced ? 0 : 1);  // without a second for further cameras
     EXPECT_GT(static_cast<double>(builder.trajectory().size()), (mapped_s - 0.3) / window_s);
@@ -92,7 +94,7 @@ TEST(LiveLosses, OptionsAreChosenFromWhatIsThereWhereTheQueueIsFull) {
       EXPECT_EQ(status.live->dropRatio(), 0);
     } else {
       EXPECT_GT(status.live->dropRatio(), 0.02);
-      EXPECT_LT(status.live->dropRatio(), 0.33);
+      EXPECT_LT(status.live->dropRatio(), 0.5);
     }
   }
 }
