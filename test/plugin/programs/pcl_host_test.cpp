@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "maps/io/point_cloud_file.h"
@@ -36,7 +37,7 @@ TEST_F(PclHost, FiltersSearchesAndAlignsTheMap) {
   EXPECT_EQ(numberAfter(result.out, "points"), points);
   for (const char* filtered : {"voxel grid", "with a neighbour", "near their neighbours"}) {
     EXPECT_GT(numberAfter(result.out, filtered), 0.1 * points) << result.out;
-    EXPECT_LT(numberAfter(result.out, filtered), points) << result.out;
+    EXPECT_LE(numberAfter(result.out, filtered), points) << result.out;
   }
   const Eigen::Vector3d& middle = expected[expected.size() / 2].p_world;
   const auto neighbours = std::count_if(
