@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <random>
 #include <set>
@@ -14,6 +15,8 @@
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
+#include "test/paths.h"
+#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {
@@ -117,10 +120,10 @@ struct Hand {
         all.push_back({kBeginNs + std::llround(1e9 * t_s), 5, 5, true});
       }
     }
-    statistics.addEvents(0, "cam", camera, all);
     for (const StampedPose& pose : poses) {
       statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
     }
+    statistics.addEvents(0, "cam", camera, all);
     return motionWarnings(statistics, kDepthM, 0.25);
   }
   Names names() const {
@@ -231,6 +234,55 @@ TEST(MotionChecks, AStepThatATrackerOtherwiseDoesNotMakeIsAJump) {
       AllOf(
           HasSubstr("jump by 0.0602 m after 1002.990000000 s (+2.99 s), the largest of 2: 12 pix"),
           HasSubstr("--poses")));
+}
+
+/// The warnings of measured poses at 1.5 m with a steady stream of events.
+Names namesOf(const std::vector<StampedPose>& poses, double focal_px, double depth_m) {
+  RecordingStatistics statistics;
+  RigCamera camera;
+  camera.model = {120, 90, focal_px, focal_px, 59.5, 44.5, DistortionModel::kNone, {}};
+  std::vector<Event> events;
+  for (std::int64_t t_ns = poses.front().t_ns; t_ns < poses.back().t_ns; t_ns += 5'000'000) {
+    events.push_back({t_ns, 5, 5, true});
+  }
+  for (const StampedPose& pose : poses) {
+    statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
+  }
+  statistics.addEvents(0, "cam", camera, events);
+  Names names;
+  for (const Warning& warning : motionWarnings(statistics, depth_m, 0.25))
+    names.insert(warning.name);
+  return names;
+}
+
+TEST(MotionChecks, MeasuredTrajectoriesHaveNoFaultButThoseThatAreMade) {
+  const std::filesystem::path folder = EFM_SHARED_DATA "/trajectories";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no trajectories in " << folder;
+  struct Row {
+    const char* file;
+    double focal_px;
+    double depth_m;  // of the scenes of this data set
+    double jump_m;   // that is seen
+  };
+  for (const Row& row :
+       {Row{"rpg_eccv18_desk.txt", 200, 1.5, 0.05}, Row{"tumvie_desk2.txt", 600, 1.5, 0.02},
+        Row{"mvsec_indoor_flying1.txt", 226, 1.5, 0.5},
+        Row{"dsec_zurich_city_04.txt", 555, 10, 0.5}}) {
+    const std::vector<StampedPose> poses = readTumTrajectory(folder / row.file);
+    EXPECT_EQ(namesOf(poses, row.focal_px, row.depth_m), Names()) << row.file;
+    std::vector<StampedPose> jump = poses;
+    for (std::size_t i = poses.size() / 3; i < poses.size(); ++i) {
+      jump[i].T_world_rig.translation.z() -= row.jump_m;
+    }
+    EXPECT_EQ(namesOf(jump, row.focal_px, row.depth_m), kJump) << row.file;
+    std::vector<StampedPose> frozen = poses;
+    for (std::size_t i = 1; i < frozen.size(); ++i) {
+      const double t_s = secondsBetween(poses[0].t_ns, poses[i].t_ns);
+      if (t_s > 8 && t_s < 8.5) frozen[i].T_world_rig = frozen[i - 1].T_world_rig;
+    }
+    const Names names = namesOf(frozen, row.focal_px, row.depth_m);
+    EXPECT_EQ(names.count("poses-frozen"), 1U) << row.file;
+  }
 }
 
 TEST(MotionChecks, LongRecordingsAreSeenWithTheSameMemory) {
