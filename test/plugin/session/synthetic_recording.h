@@ -62,8 +62,9 @@ struct SyntheticRecording {
  private:
   Rigid3 poseAt(std::int64_t step) const {
     Rigid3 T_world_rig;
-    const double t_s = std::max(0.0, static_cast<double>(step * kStepNs) * 1e-9 - scene_.rest_s);
-    T_world_rig.translation = {scene_.speed_m_s * t_s, 0, 0};
+    const std::int64_t t_ns = step * kStepNs - std::llround(scene_.rest_s * 1e9);
+    T_world_rig.translation = {
+        scene_.speed_m_s * static_cast<double>(std::max<std::int64_t>(0, t_ns)) * 1e-9, 0, 0};
     return T_world_rig;
   }
 
