@@ -82,7 +82,7 @@ TEST_F(MrptHost, WithDefaultOptionsMakesTheMapOfTheProgram) {
     builder.processObservation(rawlog.getAsObservation(i));
   }
   builder.finish();
-  writePcd(folder() / "host.pcd", builder.points());
+  writePcd(folder() / "host.pcd", *builder.points());
   EXPECT_EQ(contentOf("host.pcd"), contentOf("out/map.pcd"));
 }
 

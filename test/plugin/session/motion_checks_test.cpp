@@ -258,16 +258,16 @@ Names namesOf(const std::vector<StampedPose>& poses, double focal_px, double dep
 TEST(MotionChecks, MeasuredTrajectoriesHaveNoFaultButThoseThatAreMade) {
   const std::filesystem::path folder = EFM_SHARED_DATA "/trajectories";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no trajectories in " << folder;
-  struct Row {
+  struct Measured {
     const char* file;
     double focal_px;
     double depth_m;  // of the scenes of this data set
     double jump_m;   // that is seen
   };
-  for (const Row& row :
-       {Row{"rpg_eccv18_desk.txt", 200, 1.5, 0.05}, Row{"tumvie_desk2.txt", 600, 1.5, 0.02},
-        Row{"mvsec_indoor_flying1.txt", 226, 1.5, 0.5},
-        Row{"dsec_zurich_city_04.txt", 555, 10, 0.5}}) {
+  for (const Measured& row : {Measured{"rpg_eccv18_desk.txt", 200, 1.5, 0.05},
+                              Measured{"tumvie_desk2.txt", 600, 1.5, 0.02},
+                              Measured{"mvsec_indoor_flying1.txt", 226, 1.5, 0.5},
+                              Measured{"dsec_zurich_city_04.txt", 555, 10, 0.5}}) {
     const std::vector<StampedPose> poses = readTumTrajectory(folder / row.file);
     EXPECT_EQ(namesOf(poses, row.focal_px, row.depth_m), Names()) << row.file;
     std::vector<StampedPose> jump = poses;
