@@ -59,17 +59,17 @@ TEST_F(GrowingMap, HasAFrameForEachKeyframeAndTheSameResult) {
   Result result = shell(frames + "--record-frames new/frames");
 
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("keyframes   3\n"));
-  EXPECT_THAT(filesIn("new/frames"),
-              testing::ElementsAre("frame_000001.png", "frame_000002.png", "frame_000003.png"));
+  EXPECT_THAT(result.out, HasSubstr("keyframes   4\n"));
+  EXPECT_THAT(filesIn("new/frames"), testing::ElementsAre("frame_000001.png", "frame_000002.png",
+                                                          "frame_000003.png", "frame_000004.png"));
   EXPECT_EQ(contentOf("out2/map.pcd"), map);
   const int first = cloudPixelsIn("new/frames/frame_000001.png");
   EXPECT_GT(first, 100);
-  EXPECT_GT(cloudPixelsIn("new/frames/frame_000003.png"), first);
+  EXPECT_GT(cloudPixelsIn("new/frames/frame_000004.png"), first);
 
   write("new/frames/frame_000009.png", "of an earlier run");
   EXPECT_EQ(shell(frames + "--record-frames new/frames").status, 0);
-  EXPECT_EQ(filesIn("new/frames").size(), 3U);
+  EXPECT_EQ(filesIn("new/frames").size(), 4U);
 }
 
 TEST_F(GrowingMap, IsShownInAWindow) {

@@ -48,7 +48,7 @@ TEST_F(MrptHost, MapsARecordingShorterThanASecond) {
   const Result result = host("mapper");
 
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr("3 keyframes"), HasSubstr("event fusion map")));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("4 keyframes"), HasSubstr("event fusion map")));
   EXPECT_GT(file_size(folder() / "saved.simplemap"), 1000U);
   expectTheMapOfEventFusion();
 }
@@ -61,7 +61,7 @@ TEST_F(MrptHost, MapsAllOfALongerRecording) {
   const Result result = host("");
 
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("13 keyframes"));
+  EXPECT_THAT(result.out, HasSubstr("14 keyframes"));
   expectTheMapOfEventFusion();
 }
 

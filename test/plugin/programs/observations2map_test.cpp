@@ -33,7 +33,7 @@ class Observations2map : public ProgramTest {
 TEST_F(Observations2map, BuildsTheMapThatEventFusionWrote) {
   const Result result = build("voxel_size_m = 0.01\n");
   ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("3 observations"));
+  EXPECT_THAT(result.out, HasSubstr("4 observations"));
 
   const auto expected = readPointCloud(folder() / "out" / "map.pcd").points;
   const auto built = readPointCloud(folder() / "built_efm__CEventFusionMap_00.pcd").points;
