@@ -363,6 +363,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     const bool limited = source.start_ns || source.end_ns;
     if (outcome.report.counts.keyframes == 0 && limited && !outcome.report.stopped_at) {
       outcome = runMapping(job, *openWhole(source));  // for the error, which says all its times
+      writer.finish();  // without an error: the events after the end filled the window
     }
     outcome.report.recording = namesOf(source);
     outcome.report.faults = source.faults;
