@@ -18,7 +18,7 @@ struct AggregatedPeak {
   static constexpr int kMinSteps = 3;
   static constexpr int kMaxSteps = 12;
   std::array<float, kMaxSteps - kMinSteps + 1> second_peak{};
-  /// The peak lies on the first or the last plane; with over 800 planes, in their quarter of a step.
+  /// The peak lies on the first or the last plane (with over 800 planes, in their quarter step).
   bool at_end = false;
 };
 

@@ -229,7 +229,7 @@ void FusionMapper::configure(const KeyframePolicyOptions& policy,
   if (!start_ns_ || released_ns_ <= *start_ns_) return;
   const std::uint64_t given_up = policy_->giveUpBefore(*this, released_ns_);
   WindowsGivenUp& counts = counts_.windows_given_up;
-  if (counts.no_scene > 0 && counts_.keyframes == 0) {  // they are counted as those of the new policy
+  if (counts.no_scene > 0 && counts_.keyframes == 0) {  // counted as those of the new policy
     const std::uint64_t others = counts.total() - counts.no_scene;
     counts.no_scene = given_up - std::min(given_up, others);
   }

@@ -66,8 +66,9 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// live in live operation (drop_ratio, per camera what became of its events before the mapping,
 /// windows_given_up and for which reason, late_events, pose_jumps, clock_steps, refused_poses,
 /// errors and last_error), warnings (each with name and text), recording (its files), perturbation
-/// (the faults of the poses, if any), chosen (the automatic options: key, value and reason), options
-/// (all of them, with these values) and version. Bytes of names that are not UTF-8 become U+FFFD.
+/// (the faults of the poses, if any), chosen (the automatic options: key, value and reason),
+/// options (all of them, with these values) and version. Bytes of names that are not UTF-8 become
+/// U+FFFD.
 std::string reportJson(const MapReport& report);
 
 /// The most memory that this process has had so far.

@@ -61,9 +61,8 @@ TEST_F(CalibrationFile, MayBeginWithAByteOrderMark) {
   const std::string mark = "\xEF\xBB\xBF";
   EXPECT_EQ(read(mark + "200 201 120 90 0.1 0 0 0 0\n").rig.cameras.at(0).model.fx, 200);
   EXPECT_EQ(read(mark + (kCamchain + 14)).rig.cameras.at(1).model.fx, 300);
-  EXPECT_EQ(read(mark +
-                 "[CAMERA]\nresolution = [640 480]\nfx = 300\nfy = 301\ncx = 320\ncy = 240\n"
-                 "dist = [0 0 0 0 0]\n")
+  EXPECT_EQ(read(mark + "[CAMERA]\nresolution = [640 480]\nfx = 300\nfy = 301\ncx = 320\ncy = 240\n"
+                        "dist = [0 0 0 0 0]\n")
                 .rig.cameras.at(0)
                 .model.fx,
             300);

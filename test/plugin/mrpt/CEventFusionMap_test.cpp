@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/CEventFusionMap.h"
-#include "plugin/mrpt/points_map.h"
 #include "maps/io/point_cloud_file.h"
+#include "plugin/mrpt/points_map.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
