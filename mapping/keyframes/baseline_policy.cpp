@@ -100,6 +100,7 @@ std::optional<Window> BaselinePolicy::last(const RecordingProgress& recording,
   for (; t0_ns >= recording.startNs() && end_ns - t0_ns <= window_ns_; t0_ns -= stride_ns_) {
     const auto T_world_ref0 = recording.viewPoseAt(t0_ns);
     if (T_world_ref0 && T_world_ref1 && isEnough(*T_world_ref0, *T_world_ref1, recording.view())) {
+      if (end_ns - *first_ns < (end_ns - t0_ns) * KeyframePolicy::kLeastAdded) break;
       return windowOf(t0_ns, end_ns, options_.reference);
     }
   }

@@ -51,14 +51,14 @@ EventCounts MapperCounts::total() const {
   return sum;
 }
 
+std::uint64_t WindowsGivenUp::total() const {
+  return std::accumulate(
+      std::begin(kGiveUpReasons), std::end(kGiveUpReasons), std::uint64_t{0},
+      [this](std::uint64_t sum, const NamedReason& reason) { return sum + this->*reason.count; });
+}
+
 WindowsGivenUp& WindowsGivenUp::operator+=(const WindowsGivenUp& other) {
-  overload += other.overload;
-  jump += other.jump;
-  no_pose += other.no_pose;
-  no_scene += other.no_scene;
-  error += other.error;
-  paused += other.paused;
-  clock_reset += other.clock_reset;
+  for (const NamedReason& reason : kGiveUpReasons) this->*reason.count += other.*reason.count;
   return *this;
 }
 

@@ -29,7 +29,8 @@ struct FusionMapperOptions {
   /// If given, this window is the only keyframe, and `policy` is not used.
   std::optional<Window> only_window;
   /// At the end of the recording, where the last window is not full: one that is full and ends
-  /// right after the last event with a pose. So it overlaps the window before.
+  /// right after the last event with a pose. So it overlaps the window before. Not where less than
+  /// a tenth of it is new.
   bool fill_last_window = true;
   KeyframeMapperOptions keyframe;
   std::vector<int> cameras;  ///< Indices of the cameras that take part, each once; empty: all.
@@ -50,12 +51,25 @@ struct WindowsGivenUp {
   std::uint64_t paused = 0;       ///< Map updating was disabled.
   std::uint64_t clock_reset = 0;  ///< They waited when a clock went back.
 
-  std::uint64_t total() const {
-    return overload + jump + no_pose + no_scene + error + paused + clock_reset;
-  }
+  std::uint64_t total() const;
   WindowsGivenUp& operator+=(const WindowsGivenUp& other);
 };
 using GiveUpReason = std::uint64_t WindowsGivenUp::*;
+
+struct NamedReason {
+  GiveUpReason count;
+  const char* name;
+  const char* text;  ///< What follows "3 windows were given up".
+};
+inline constexpr NamedReason kGiveUpReasons[] = {
+    {&WindowsGivenUp::overload, "overload", "for overload"},
+    {&WindowsGivenUp::jump, "jump", "across a jump of the tracker"},
+    {&WindowsGivenUp::no_pose, "no_pose", "without poses"},
+    {&WindowsGivenUp::no_scene, "no_scene", "without a scene"},
+    {&WindowsGivenUp::error, "error", "for errors"},
+    {&WindowsGivenUp::paused, "paused", "while map updating was disabled"},
+    {&WindowsGivenUp::clock_reset, "clock_reset", "at a clock reset"},
+};
 
 struct MapperCounts {
   std::vector<EventCounts> cameras;

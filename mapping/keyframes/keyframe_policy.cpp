@@ -40,10 +40,9 @@ class PeriodPolicy : public KeyframePolicy {
                              std::int64_t end_ns) const override {
     const std::int64_t next_ns = earliestStart(recording);
     const std::int64_t t0_ns = end_ns - window_ns_;
-    const bool in_the_window_before = index_ > 0 && t0_ns <= next_ns - stride_ns_;
-    if (end_ns <= next_ns || in_the_window_before || t0_ns < recording.startNs()) {
-      return std::nullopt;
-    }
+    const std::int64_t new_ns = t0_ns - (next_ns - stride_ns_);  // no other window has them
+    const bool adds_little = index_ > 0 && new_ns < std::min(stride_ns_, window_ns_) * kLeastAdded;
+    if (end_ns <= next_ns || adds_little || t0_ns < recording.startNs()) return std::nullopt;
     return windowOf(t0_ns, end_ns, reference_);
   }
   std::int64_t earliestLast(const RecordingProgress& recording) const override {
@@ -90,7 +89,8 @@ class EventsPolicy : public KeyframePolicy {
   }
   std::optional<Window> last(const RecordingProgress& recording,
                              std::int64_t end_ns) const override {
-    if (recording.eventsIn(earliestStart(recording), end_ns) == 0) return std::nullopt;
+    const std::int64_t new_events = recording.eventsIn(earliestStart(recording), end_ns);
+    if (new_events == 0 || new_events < window_events_ * kLeastAdded) return std::nullopt;
     const std::int64_t from_ns = earliestLast(recording);
     const std::int64_t excess = recording.eventsIn(from_ns, end_ns) - window_events_;
     if (excess < 0) return std::nullopt;

@@ -30,6 +30,13 @@ inline std::optional<double> parseFinite(std::string_view text) {
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
+/// A text without the mark of UTF-8 that some editors put at its beginning.
+inline std::string_view withoutByteOrderMark(std::string_view text) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  if (text.substr(0, kMark.size()) == kMark) text.remove_prefix(kMark.size());
+  return text;
+}
+
 /// The text without blanks at both ends.
 std::string_view trimmed(std::string_view text);
 

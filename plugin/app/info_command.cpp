@@ -18,7 +18,7 @@
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/app/system_info.h"
-#include "plugin/calibration/known_size.h"
+#include "plugin/calibration/calibration_file.h"
 #include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/session_feed.h"
 #include "plugin/session/camera_view.h"

@@ -12,13 +12,11 @@
 #include <system_error>
 #include <vector>
 
-#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/calibration/camchain.h"
 #include "plugin/calibration/camera_info_file.h"
 #include "plugin/calibration/dsec_calibration.h"
-#include "plugin/calibration/known_size.h"
 #include "plugin/calibration/mrpt_camera_file.h"
 #include "plugin/calibration/tumvie_calibration.h"
 #include "plugin/calibration/yaml_entry.h"

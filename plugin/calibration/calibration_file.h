@@ -15,6 +15,18 @@ struct CameraSize {
   int height = 0;
 };
 
+/// The size of a sensor whose size nobody knows: events have no pixel beyond it.
+inline constexpr CameraSize kUnknownSize = {65'535, 65'535};
+
+/// The size, where it is known.
+inline std::optional<CameraSize> knownSize(const CameraSize& size) {
+  const bool is_known = size.width < kUnknownSize.width || size.height < kUnknownSize.height;
+  return is_known ? std::optional(size) : std::nullopt;
+}
+inline std::optional<CameraSize> knownSize(const CameraModel& model) {
+  return knownSize(CameraSize{model.width, model.height});
+}
+
 /// A rig's calibration from a file of its own.
 struct Calibration {
   std::filesystem::path file;

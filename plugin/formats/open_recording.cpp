@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "plugin/calibration/calibration_file.h"
-#include "plugin/calibration/known_size.h"
 #include "plugin/formats/merged_recording.h"
 #include "plugin/formats/rawlog_recording.h"
 #include "plugin/formats/rawlog_signature.h"
@@ -209,8 +208,7 @@ RecordingParts openParts(const RecordingSource& source) {
 std::optional<CameraSize> knownSizeOf(const RecordingParts& parts, std::size_t camera,
                                       const Calibration* given) {
   if (const auto size = parts.cameras[camera]->size()) {
-    const bool is_known = size->width < kUnknownSize.width || size->height < kUnknownSize.height;
-    if (is_known) return size;
+    if (const auto known = knownSize(*size)) return known;
   }
   const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
   for (const Calibration* const calibration : {own, given}) {

@@ -142,8 +142,7 @@ void Hdf5EventStream::findUnit(const ReaderOptions& options) {
   if (count_ > 0) {
     const auto rows = std::min(columns_[kT].rows().blockAt(0).end, kSample);
     columns_[kT].forEach(0, static_cast<std::size_t>(rows), [&](std::size_t, auto number) {
-      const auto t = static_cast<double>(number);
-      if (std::isfinite(t)) sample.add(t, std::floor(t) == t);
+      sample.add(static_cast<double>(number));
       return true;
     });
   }

@@ -97,8 +97,7 @@ int ArrayEvents::findExponent(const ReaderOptions& options) {
   TimeSample sample;
   const std::size_t rows = t.array->sampleRows(std::min(kSample, block_rows_));
   for (std::size_t row = 0; row < rows; ++row) {
-    const double time = t.array->number(row, t.index);
-    if (std::isfinite(time)) sample.add(time, std::floor(time) == time);
+    sample.add(t.array->number(row, t.index));
   }
   TimeUnit unit = findTimeUnit(options, sample, kUsualEventRate, name());
   if (unit.warning) columns_.warnings.push_back(std::move(*unit.warning));

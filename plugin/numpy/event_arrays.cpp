@@ -140,6 +140,18 @@ bool isMetavision(const std::vector<NpyField>& fields) {
                     });
 }
 
+/// The columns with these names; the name of t may say its unit.
+template <typename ColumnOf>
+NpyEventColumns columnsNamed(const EventNames& names, const ColumnOf& column) {
+  NpyEventColumns columns;
+  columns.t = column(names.t);
+  columns.x = column(names.x);
+  columns.y = column(names.y);
+  columns.p = column(names.p);
+  columns.time_exponent = headerWord(names.t).time_exponent;
+  return columns;
+}
+
 /// The columns of a structured array.
 NpyEventColumns fieldsOf(const fs::path& file, const FoundArray& found,
                          const ReaderOptions& options) {
@@ -148,13 +160,9 @@ NpyEventColumns fieldsOf(const fs::path& file, const FoundArray& found,
   const std::optional<EventNames> names = namesOf(all, options);
   if (!names) refuse(file, {found}, options);
   const auto array = std::make_shared<NpyArray>(file, found.member, NpyPart{true, {}, false});
-  const auto column = [&](const std::string& name) { return NpyColumn{array, indexOf(name, all)}; };
-  NpyEventColumns columns;
-  columns.t = column(names->t);
-  columns.x = column(names->x);
-  columns.y = column(names->y);
-  columns.p = column(names->p);
-  columns.time_exponent = headerWord(names->t).time_exponent;
+  NpyEventColumns columns = columnsNamed(*names, [&](const std::string& name) {
+    return NpyColumn{array, indexOf(name, all)};
+  });
   if (isMetavision(found.header.fields)) columns.time_exponent = -6;
   return columns;
 }
@@ -207,16 +215,9 @@ std::optional<NpyEventColumns> separateColumnsOf(const fs::path& file,
   }
   const std::optional<EventNames> names = namesOf(names_of_lists, options);
   if (!names) return std::nullopt;
-  const auto column = [&](const std::string& name) {
+  return columnsNamed(*names, [&](const std::string& name) {
     return NpyColumn{std::make_shared<NpyArray>(file, members[indexOf(name, names_of_lists)]), 0};
-  };
-  NpyEventColumns columns;
-  columns.t = column(names->t);
-  columns.x = column(names->x);
-  columns.y = column(names->y);
-  columns.p = column(names->p);
-  columns.time_exponent = headerWord(names->t).time_exponent;
-  return columns;
+  });
 }
 
 NpyEventColumns eventColumnsOf(const fs::path& file, const ReaderOptions& options) {

@@ -10,7 +10,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/nearest_name.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"

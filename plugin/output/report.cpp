@@ -97,10 +97,9 @@ Json asJson(const RefinementState& refinement) {
 }
 
 Json asJson(const WindowsGivenUp& windows) {
-  return {
-      {"overload", windows.overload},      {"jump", windows.jump},   {"no_pose", windows.no_pose},
-      {"no_scene", windows.no_scene},      {"error", windows.error}, {"paused", windows.paused},
-      {"clock_reset", windows.clock_reset}};
+  Json json = Json::object();
+  for (const NamedReason& reason : kGiveUpReasons) json[reason.name] = windows.*reason.count;
+  return json;
 }
 
 Json asJson(const LiveStatus& live, const MapperCounts& counts) {

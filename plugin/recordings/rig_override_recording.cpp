@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "plugin/calibration/known_size.h"
+#include "plugin/calibration/calibration_file.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
 

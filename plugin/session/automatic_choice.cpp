@@ -81,20 +81,8 @@ bool MappingSession::chooseAutomatic() {
     FusionMapperOptions chosen = options_.mapper;
     OptionChoice choice =
         chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, chosen);
-    if (!choice.found_scene && !is_first) {
-      keepOptions();
-      break;
-    }
-    if (data) {
-      if (!choice.found_scene) {
-        std::size_t events = 0;
-        for (const EventSpan& span : data->events) events += span.size();
-        if (skipWithoutScene(data->window, events)) continue;
-        choice = chooseWideDepths(options_.automatic, chosen);
-      }
-      noteSource(*data, choice.options);
-    }
-    use(std::move(choice), chosen);
+    if (data && is_first && !choice.found_scene && skipWithoutScene(*data)) continue;
+    useLook(data, std::move(choice), std::move(chosen), std::nullopt);
   }
   return true;
 }
@@ -107,15 +95,21 @@ bool MappingSession::chooseFromSoFar(double at_least_s) {
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice =
       chooseOptions(options_.automatic, mapper_.rig(), {sampleOf(*data)}, std::nullopt, chosen);
-  if (!choice.found_scene && status_.choices > 0) {
-    keepOptions();
-    return true;
-  }
-  if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
-  limitWindow(lengthOf(*data) / 2, chosen.policy, choice.options);
-  noteSource(*data, choice.options);
-  use(std::move(choice), chosen);
+  useLook(data, std::move(choice), std::move(chosen), lengthOf(*data) / 2);
   return true;
+}
+
+/// Uses what was chosen from a look at live data: without a scene wide limits of depth, or the
+/// options of the first choice.
+void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice choice,
+                             FusionMapperOptions chosen, std::optional<double> max_window_s) {
+  if (!choice.found_scene && status_.choices > 0) return keepOptions();
+  if (data) {
+    if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
+    if (max_window_s) limitWindow(*max_window_s, chosen.policy, choice.options);
+    noteSource(*data, choice.options);
+  }
+  use(std::move(choice), chosen);
 }
 
 /// In playback: as soon as the recording has ended, or there is too much of it.
@@ -151,9 +145,10 @@ std::optional<WindowData> MappingSession::firstLook() {
 
 /// Gives up a window that shows no scene, unless that has lasted too long or nothing comes after
 /// it. @return whether it did.
-bool MappingSession::skipWithoutScene(const Window& window, std::size_t events) {
+bool MappingSession::skipWithoutScene(const WindowData& data) {
+  const Window& window = data.window;
   if (!no_scene_since_ns_) no_scene_since_ns_ = window.t0_ns;
-  events_without_scene_ += events;
+  for (const EventSpan& span : data.events) events_without_scene_ += span.size();
   if (window.t1_ns - *no_scene_since_ns_ >= kMaxSceneWaitNs) return false;
   if (events_without_scene_ > static_cast<std::size_t>(options_.live.max_queue_events)) {
     return false;

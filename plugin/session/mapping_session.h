@@ -155,10 +155,12 @@ class MappingSession {
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   // In automatic_choice.cpp.
   bool chooseAutomatic();
-  void use(OptionChoice choice, const FusionMapperOptions& chosen);
   bool chooseFromSurvey();
+  void useLook(const std::optional<WindowData>& data, OptionChoice choice,
+               FusionMapperOptions chosen, std::optional<double> max_window_s);
+  void use(OptionChoice choice, const FusionMapperOptions& chosen);
   std::optional<WindowData> firstLook();
-  bool skipWithoutScene(const Window& window, std::size_t events);
+  bool skipWithoutScene(const WindowData& data);
   void keepOptions();
   void lookAgain(const Window& window);
 

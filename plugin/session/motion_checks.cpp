@@ -46,8 +46,8 @@ class MotionChecks {
     return span.t0_ns < events_.t1_ns && span.t1_ns > events_.t0_ns;
   }
   std::string startOf(const PoseSpan& span) const { return timeText(span.t0_ns, events_.t0_ns); }
-  static std::string timesText(int count) {
-    return count > 1 ? fmt::format(", {} times, the longest", count) : std::string();
+  static std::string timesText(int count, const char* which) {
+    return count > 1 ? fmt::format(", {} times, the {}", count, which) : std::string();
   }
 
   /// The part of a span that has events.
@@ -118,7 +118,7 @@ class MotionChecks {
              "mean rate: at the speed {} it the image moves by {:.3g} pixels in this time; does "
              "the tracker hang? Take the repeated poses out (--poses): events in gaps over "
              "max_pose_gap_s are not used",
-             timesText(count), hold_s, startOf(longest),
+             timesText(count, "longest"), hold_s, startOf(longest),
              100 * eventRate(longest) / eventRate(events_),
              longest.speed_after ? "after" : "before", pixels(longest.speed) * hold_s)});
   }
@@ -146,9 +146,8 @@ class MotionChecks {
              "and "
              "straight interpolation misses some {:.2g} of them; a pose at least every 0.1 s is "
              "needed (--poses), or --set rig.max_pose_gap_s=0.1 leaves these events out",
-             secondsBetween(worst.t0_ns, worst.t1_ns),
-             count > 1 ? fmt::format(", {} times, the worst", count) : std::string(),
-             startOf(worst), pixels(worst.moved), pixels(worst.missed))});
+             secondsBetween(worst.t0_ns, worst.t1_ns), timesText(count, "worst"), startOf(worst),
+             pixels(worst.moved), pixels(worst.missed))});
   }
 
   /// The deviation of most steps, and of all that are no jumps by far: nothing where there are too

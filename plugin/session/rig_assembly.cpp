@@ -10,7 +10,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
-#include "plugin/calibration/known_size.h"
+#include "plugin/calibration/calibration_file.h"
 #include "plugin/session/camera_view.h"
 
 namespace efm {

@@ -8,18 +8,12 @@ namespace efm {
 std::string asText(const WindowsGivenUp& windows) {
   std::string text = fmt::format("{} windows given up", windows.total());
   const char* separator = ": ";
-  const auto add = [&](std::uint64_t count, const char* reason) {
-    if (count == 0) return;
-    text += fmt::format("{}{} {}", separator, count, reason);
+  for (const NamedReason& reason : kGiveUpReasons) {
+    const std::uint64_t count = windows.*reason.count;
+    if (count == 0) continue;
+    text += fmt::format("{}{} {}", separator, count, reason.text);
     separator = ", ";
-  };
-  add(windows.overload, "for overload");
-  add(windows.jump, "across a jump of the tracker");
-  add(windows.no_pose, "without poses");
-  add(windows.no_scene, "without a scene");
-  add(windows.error, "for errors");
-  add(windows.paused, "while map updating was disabled");
-  add(windows.clock_reset, "at a clock reset");
+  }
   return text;
 }
 

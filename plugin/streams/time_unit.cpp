@@ -119,6 +119,10 @@ void TimeSample::add(double t, bool is_whole) {
   max = std::max(max, std::abs(t));
 }
 
+void TimeSample::add(double t) {
+  if (std::isfinite(t)) add(t, std::floor(t) == t);
+}
+
 TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
                       const UsualRate& usual, const std::string& where) {
   constexpr int kEnough = 10;

@@ -34,6 +34,8 @@ struct TimeSample {
   double latest = 0;
 
   void add(double t, bool is_whole);
+  /// A number that is not finite is left out.
+  void add(double t);
 };
 
 /// How many things of a kind come in a second, usually: for the guess of a unit.

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/streams/number_checks.h"

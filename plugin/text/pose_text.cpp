@@ -11,7 +11,6 @@
 #include <string>
 #include <string_view>
 
-#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/streams/file_content.h"

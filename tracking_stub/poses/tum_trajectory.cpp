@@ -13,7 +13,6 @@
 
 #include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/byte_order_mark.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 

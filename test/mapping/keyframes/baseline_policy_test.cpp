@@ -199,6 +199,8 @@ TEST(BaselinePolicy, TheLastWindowGrowsFromTheEndBack) {
   BaselinePolicy policy(options(0.3, 0.05), kDepthGuess_m);
   policy.advance(*policy.current(moving), nullptr);  // [0, 0.25)
   EXPECT_FALSE(policy.last(moving, kStart_ns + 250 * kMs)) << "all events are in a window";
+  EXPECT_FALSE(policy.last(moving, kStart_ns + 274 * kMs)) << "less than a tenth would be new";
+  EXPECT_TRUE(policy.last(moving, kStart_ns + 276 * kMs));
   // From the first event that is in none: 0.225 m from 0.05 s, 0.18 m from 0.1 s.
   const auto window = policy.last(moving, kStart_ns + 300 * kMs);
   ASSERT_TRUE(window);

@@ -218,9 +218,11 @@ TEST(EdgeCase, TheLastWindowIsFullAndEndsWithTheRecording) {
   };
   for (const Case& c :
        {Case{"moved back", 0.1, 0.1, 400, 270, 0, 3, 170, 270, 270},
-        {"one more event than fits", 0.1, 0.1, 400, 201, 0, 3, 101, 201, 201},
+        {"a tenth is new", 0.1, 0.1, 400, 211, 0, 3, 111, 211, 211},
+        {"less than a tenth is new", 0.1, 0.1, 400, 210, 0, 2, 100, 200, 200},
         {"the strides fit", 0.1, 0.1, 400, 201, 200, 2, 100, 200, 200},
-        {"overlapping windows", 0.1, 0.04, 400, 301, 0, 7, 201, 301, 301},
+        {"overlapping windows", 0.1, 0.04, 400, 305, 0, 7, 205, 305, 305},
+        {"overlapping windows, less is new", 0.1, 0.04, 400, 304, 0, 6, 200, 300, 300},
         {"overlapping windows that fit", 0.1, 0.05, 400, 301, 300, 5, 200, 300, 300},
         {"windows apart, in the third", 0.05, 0.1, 400, 230, 0, 3, 180, 230, 150},
         {"windows apart, between them", 0.05, 0.1, 400, 195, 0, 2, 100, 150, 100},

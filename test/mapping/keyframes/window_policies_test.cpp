@@ -274,7 +274,8 @@ TEST(WindowPolicies, WindowsOfAFixedNumberOfEventsFollowEachOtherAndTheLastIsMov
       if (count == 1) options.limits.t1_ns = windows.back().t1_ns;
       const std::int64_t end_ns = lastPosed(times, recording) + 1;
       const auto end = std::lower_bound(times.begin(), times.end(), end_ns);
-      if (count > 1 && windows.back().t1_ns < end_ns) {  // the last ones that are that many
+      const auto unmapped = static_cast<std::size_t>(end - std::min(first, end));
+      if (count > 1 && 10 * unmapped >= count) {  // the last ones that are that many
         const std::int64_t t0_ns = *(end - static_cast<std::ptrdiff_t>(count));
         windows.push_back({t0_ns, end_ns, t0_ns + (end_ns - t0_ns) / 2});
         ++moved_back;
@@ -344,6 +345,7 @@ TEST(WindowPolicies, BaselineWindowsAreTheShortestWithEnoughMotion) {
       for (; t0_ns >= times.front() && end_ns - t0_ns <= 100'000'000; t0_ns -= 12'000'000) {
         if (!centre(t0_ns)) continue;
         if ((*centre(end_ns - 1) - *centre(t0_ns)).norm() < 0.04 * mean_depth_m) continue;
+        if (10 * (end_ns - *rest) < end_ns - t0_ns) break;  // little of it is new
         windows.push_back({t0_ns, end_ns, t0_ns + (end_ns - t0_ns) / 2});
         ++moved_back;
         break;
