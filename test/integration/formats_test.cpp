@@ -5,10 +5,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <map>
+#include <memory>
+#include <random>
 #include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "plugin/formats/open_recording.h"
+#include "plugin/mrpt/CObservationEvents.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {
@@ -43,18 +51,69 @@ class FormatsByOption : public AppTest {
   }
 };
 
-class Formats : public FormatsByOption, public testing::WithParamInterface<Recorded> {};
+class Formats : public FormatsByOption, public testing::WithParamInterface<Recorded> {
+ protected:
+  static RecordingSource source() {
+    RecordingSource source;
+    std::istringstream paths(GetParam().sources);
+    for (std::string path; paths >> path;) source.files.push_back(kFormats / path);
+    const auto lacks = [](const char* part) {
+      return GetParam().lacks.find(part) != std::string::npos;
+    };
+    if (lacks("calibration")) source.calibration = folderRecording() + "/camchain.yaml";
+    if (lacks("poses")) source.poses = folderRecording() + "/poses.txt";
+    return source;
+  }
+};
 
 TEST_P(Formats, GivesTheDepthMapOfTheTextFolder) {
+  const RecordingSource recording = source();
   std::string arguments;
-  std::istringstream sources(GetParam().sources);
-  for (std::string source; sources >> source;) arguments += " " + (kFormats / source).string();
-  const auto lacks = [](const char* part) {
-    return GetParam().lacks.find(part) != std::string::npos;
-  };
-  if (lacks("calibration")) arguments += " --calibration " + folderRecording() + "/camchain.yaml";
-  if (lacks("poses")) arguments += " --poses " + folderRecording() + "/poses.txt";
+  for (const fs::path& file : recording.files) arguments += " " + file.string();
+  if (!recording.calibration.empty())
+    arguments += " --calibration " + recording.calibration.string();
+  if (!recording.poses.empty()) arguments += " --poses " + recording.poses.string();
   EXPECT_TRUE(mapsOf(arguments) == mapsOfFolder());
+}
+
+/// The events of each camera.
+std::map<int, std::vector<Event>> eventsOf(const RecordingSource& source) {
+  std::map<int, std::vector<Event>> events;
+  const std::unique_ptr<Recording> recording = openRecording(source);
+  while (const auto observation = recording->next()) {
+    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+    if (!packet) continue;
+    std::vector<Event>& camera = events[packet->camera_index];
+    camera.insert(camera.end(), packet->events.begin(), packet->events.end());
+  }
+  return events;
+}
+
+TEST_P(Formats, APartIsWhatTheWholeHasThere) {
+  RecordingSource part = source();
+  const std::map<int, std::vector<Event>> whole = eventsOf(part);
+  ASSERT_EQ(whole.size(), GetParam().name.find("mono") == std::string::npos ? 2U : 1U);
+  std::mt19937 random(1);
+  for (int trial = 0; trial < 4; ++trial) {
+    const std::vector<Event>& camera = whole.at(trial % static_cast<int>(whole.size()));
+    std::array<std::int64_t, 2> limits{};  // times of events: each limit is seen to be exact
+    for (std::int64_t& limit : limits) limit = camera[random() % camera.size()].t_ns;
+    const auto [start_ns, end_ns] = std::minmax({limits[0], limits[1] + trial});
+    part.start_ns = start_ns;
+    part.end_ns = end_ns;
+    std::map<int, std::vector<Event>> expected;
+    for (const auto& [index, events] : whole) {
+      for (const Event& event : events) {
+        if (event.t_ns >= start_ns && event.t_ns < end_ns) expected[index].push_back(event);
+      }
+    }
+    std::map<int, std::vector<Event>> found = eventsOf(part);
+    for (const auto& [index, events] : whole) {
+      EXPECT_TRUE(found[index] == expected[index])
+          << "camera " << index << " from " << start_ns << " to " << end_ns << ": "
+          << found[index].size() << " events instead of " << expected[index].size();
+    }
+  }
 }
 
 TEST_F(FormatsByOption, TextInOtherColumnsGivesTheSameDepthMap) {

@@ -3,6 +3,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "plugin/pictures/palette.h"
+#include "plugin/pictures/value_picture.h"
+
 namespace efm {
 namespace {
 
@@ -50,6 +57,32 @@ TEST(DepthFigure, IsReadableInGreyAndShowsTheConfidenceWithoutDepth) {
   map.depth = cv::Mat1f::zeros(720, 1280);
   map.confidence = cv::Mat1f::zeros(720, 1280);
   EXPECT_EQ(depthFigure(map, {1.0, 4.0, 10}).cols, 1280) << "not enlarged";
+}
+
+/// Its first and its last colour from left to right.
+std::pair<cv::Vec3b, cv::Vec3b> endsOf(const cv::Mat3b& bar) {
+  std::vector<cv::Vec3b> colours;
+  for (int x = 0; x < bar.cols; ++x) {
+    for (int y = 0; y < bar.rows; ++y) {
+      const cv::Vec3b& pixel = bar(y, x);
+      const auto [low, high] = std::minmax({pixel[0], pixel[1], pixel[2]});
+      if (high - low > 60) colours.push_back(pixel);  // neither paper nor ink
+    }
+  }
+  return {colours.at(0), colours.back()};
+}
+
+TEST(ColourBar, RunsFromTheColourOfItsLowEndToThatOfItsHighEnd) {
+  for (const Palette palette : {Palette::kRainbow, Palette::kBlueToRed}) {
+    const cv::Mat3b ends = coloured((cv::Mat1b(1, 2) << 0, 255), palette);
+    const auto [first, last] = endsOf(drawBar({2, 8}, palette, "m", 400));
+    EXPECT_LT(cv::norm(first, ends(0, 0)), 12);
+    EXPECT_LT(cv::norm(last, ends(0, 1)), 12);
+    // The same colours as the image beside it.
+    const cv::Mat3b picture = drawValues({"", (cv::Mat1f(1, 2) << 2, 8), {2, 8}, "m", palette, 2});
+    EXPECT_LT(cv::norm(picture(0, 0), ends(0, 0)), 12);
+    EXPECT_LT(cv::norm(picture(0, 1), ends(0, 1)), 12);
+  }
 }
 
 TEST(ConfidencePicture, IsBrightWhereSmallAndDarkWhereLarge) {

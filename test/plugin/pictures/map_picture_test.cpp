@@ -93,6 +93,74 @@ TEST(MapPicture, DrawsWhatThereIs) {
   EXPECT_THROW(drawMap(MapCloud(), {}, kVoxel), std::invalid_argument);
 }
 
+/// Points of an F, 1 m wide and 2 m high, along two axes.
+std::vector<Eigen::Vector3d> letterF(const Eigen::Vector3d& corner, const Eigen::Vector3d& right,
+                                     const Eigen::Vector3d& up) {
+  std::vector<Eigen::Vector3d> points;
+  for (double along = 0; along <= 2; along += 0.005) points.push_back(corner + along * up);
+  for (double along = 0; along <= 1; along += 0.005) {
+    points.push_back(corner + 2 * up + along * right);
+    if (along <= 0.5) points.push_back(corner + up + along * right);
+  }
+  return points;
+}
+
+/// The part of a line of pixels that is set.
+double shareOf(const cv::Mat1b& mask) {
+  return static_cast<double>(cv::countNonZero(mask)) / static_cast<double>(mask.total());
+}
+
+/// Whether a mask shows an F, upright and not mirrored.
+void expectF(const cv::Mat1b& mask) {
+  const cv::Rect box = cv::boundingRect(mask);
+  const cv::Mat1b letter = mask(box);
+  const int width = std::max(3, box.width / 20);
+  EXPECT_NEAR(static_cast<double>(box.height) / box.width, 2, 0.2);
+  cv::Mat1b any;
+  const auto along = [&](const cv::Rect& part, int dimension) {
+    cv::reduce(letter(part), any, dimension, cv::REDUCE_MAX);
+    return shareOf(any);
+  };
+  EXPECT_GT(along({0, 0, width, box.height}, 1), 0.95) << "the stem is at the left";
+  EXPECT_GT(along({0, 0, box.width, width}, 0), 0.95) << "the long arm is at the top";
+  EXPECT_NEAR(along({0, (box.height - width) / 2, box.width, width}, 0), 0.55, 0.1);
+  EXPECT_LT(along({0, box.height - width, box.width, width}, 0), 0.2) << "no arm below";
+}
+
+TEST(MapPicture, AnFStandsUprightInBothViews) {
+  // World frames with z up, with y down (the first camera's), and with cameras that look back.
+  const Eigen::Matrix3d y_down =
+      Eigen::AngleAxisd(0.5 * kPi, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  const Eigen::Matrix3d back = Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  for (const Eigen::Matrix3d& R : {Eigen::Matrix3d(Eigen::Matrix3d::Identity()), y_down, back}) {
+    std::vector<StampedPose> trajectory = lookingAlongY(3);
+    for (StampedPose& pose : trajectory) {
+      pose.T_world_rig = Rigid3{Eigen::Quaterniond(R), {0, 0, 0}} * pose.T_world_rig;
+    }
+    // It rises as it goes away: the same letter from above and from the side.
+    std::vector<CloudPoint> points;
+    for (const Eigen::Vector3d& p : letterF({1, 1, 0}, {1, 0, 0}, {0, 1, 1})) {
+      points.push_back({R * p, 1.0F});
+    }
+    const MapCloud::ConstPtr cloud = mapCloudOf(points, kVoxel);
+    const MapLayout layout = layOutMap(*cloud, trajectory);
+    const cv::Mat3b picture = drawMap(*cloud, trajectory, kVoxel);
+    for (const MapView* view : {&layout.top, &layout.side}) {
+      const cv::Mat3b area = picture(view->area);
+      const cv::Mat1b mask = colouredIn(area);
+      expectF(mask);
+      const cv::Rect box = cv::boundingRect(mask);
+      EXPECT_NEAR(box.width, view->pixels_per_m, 0.1 * view->pixels_per_m) << "it is 1 m wide";
+      const cv::Scalar high = cv::mean(area(cv::Rect(box.x, box.y, box.width, 3)),
+                                       mask(cv::Rect(box.x, box.y, box.width, 3)));
+      const cv::Rect foot(box.x, box.br().y - 6, box.width, 3);
+      const cv::Scalar low = cv::mean(area(foot), mask(foot));
+      EXPECT_GT(high[2], high[0]) << "high is red";
+      EXPECT_GT(low[0], low[2]) << "low is blue";
+    }
+  }
+}
+
 TEST(MapPicture, ItsBarIsARoundNumberOfMetresLong) {
   for (const double size : {0.01, 1.0, 30.0}) {
     std::vector<CloudPoint> points = box();
