@@ -46,7 +46,8 @@ TEST(MappingSession, MapsThePlaneThatTheDotsLieOn) {
   EXPECT_EQ(keyframes.size(),
             3U);  // [0, .2), [.1, .3), [.2, .4); [.3, .5) ends after the last event
   std::vector<DepthPair> pairs;
-  for (const MapPoint& point : *session.cloud().points()) {
+  const MapCloud::ConstPtr points = session.cloud().points();
+  for (const MapPoint& point : *points) {
     pairs.push_back({point.z, SyntheticRecording::kDepthM});
   }
   ASSERT_GT(pairs.size(), 30U);
