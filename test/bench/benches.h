@@ -1,27 +1,68 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "test/bench/bench_session.h"
+#include <benchmark/benchmark.h>
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "test/bench/synthetic_window.h"
 
 namespace efm::bench {
 
+/// A sensor and its number of events in a window.
+struct SensorSize {
+  int width = 0;
+  int height = 0;
+  std::size_t events = 0;  ///< Per camera.
+
+  std::string name() const { return std::to_string(width) + "x" + std::to_string(height); }
+  SyntheticWindowOptions window(int cameras) const { return {width, height, events, cameras}; }
+};
+
+/// The smallest first.
+using Sensors = std::vector<SensorSize>;
+
+inline constexpr int kPlanes = 100;
+
+/// The value of `make`, made at the first call: no benchmark may need it, because of a filter.
+template <typename Make>
+auto lazily(Make make) {
+  using Value = std::invoke_result_t<Make>;
+  const auto made = std::make_shared<std::unique_ptr<Value>>();
+  return [=]() -> Value& {
+    if (!*made) made->reset(new Value(make()));
+    return **made;
+  };
+}
+
+/// Adds a benchmark of processor time. `run.py` compares benchmarks whose names have the same first
+/// two parts.
+template <typename Measure>
+benchmark::internal::Benchmark* add(const std::string& name, Measure measure) {
+  return benchmark::RegisterBenchmark(name.c_str(), measure)
+      ->Unit(benchmark::kMillisecond)
+      ->MeasureProcessCPUTime();
+}
+
+/// Sets a rate: `count` of each iteration, per second.
+inline void countRate(benchmark::State& state, const char* name, double count) {
+  state.counters[name] = benchmark::Counter(count, benchmark::Counter::kIsIterationInvariantRate);
+}
+
 /// Votes of one camera on one thread, per kernel and sensor, and the yardstick.
-void benchVoting(BenchSession& session);
-/// Whole stereo keyframes with stages and memory, fused and unfused. Kernels between the plain and
-/// the fastest one run with the smallest size on one thread only.
-void benchKeyframes(BenchSession& session);
-/// Stereo keyframes as shipped and with the paper's options, for several motions and rigs, on the
-/// fastest kernel and the plain one, on one thread.
-void benchMotions(BenchSession& session);
-/// The six rules and the running peaks.
-void benchFusion(BenchSession& session);
-/// From peaks to a depth map.
-void benchExtraction(BenchSession& session);
+void addVoting(const Sensors& sensors);
+/// Whole keyframes: stages and memory, as shipped and with the paper's options for several motions
+/// and rigs, and over each of their sizes.
+void addKeyframes(const Sensors& sensors);
+/// The six rules, the running peaks, and from peaks to a depth map.
+void addFusion(const Sensors& sensors);
 /// Inserting a keyframe's cloud into small and large maps.
-void benchGlobalCloud(BenchSession& session);
-/// Events from text and from a rawlog.
-void benchReading(BenchSession& session);
-/// A keyframe's time over each of its sizes.
-void benchGrowth(BenchSession& session);
+void addGlobalCloud(const Sensors& sensors);
+/// Events from text, a rawlog and the files of sensors.
+void addReading(const Sensors& sensors);
 
 }  // namespace efm::bench

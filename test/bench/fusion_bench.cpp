@@ -5,11 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "mapping/depth/paper_extraction.h"
 #include "mapping/dsi/dsi_peaks.h"
 #include "mapping/dsi/fusion_rule.h"
 #include "mapping/dsi/plane_values.h"
 #include "mapping/dsi/voting_kernel.h"
+#include "mapping/sweep/space_sweep.h"
 #include "test/bench/benches.h"
+#include "test/bench/sweep_input.h"
 
 namespace efm::bench {
 namespace {
@@ -42,37 +45,43 @@ void fuseTwo(benchmark::State& state, FusionRule rule, std::size_t voxels) {
 }
 
 /// All planes of a DSI.
-void addPeaks(benchmark::State& state, int planes, VotingKernel kernel, std::size_t voxels) {
+void addPeaks(benchmark::State& state, VotingKernel kernel, std::size_t voxels) {
   constexpr unsigned kDifferent = 7;  // planes; more would not fit into the cache
   std::vector<PlaneValues> values;
   for (unsigned i = 0; i < kDifferent; ++i) values.push_back(densities(voxels, i));
   for (auto _ : state) {
     RunningPeaks peaks(voxels, kernel);
-    for (int plane = 0; plane < planes; ++plane) {
+    for (int plane = 0; plane < kPlanes; ++plane) {
       peaks.add(plane, values[static_cast<unsigned>(plane) % kDifferent]);
     }
     benchmark::DoNotOptimize(peaks);
   }
-  countVoxels(state, voxels * static_cast<std::size_t>(planes));
+  countVoxels(state, voxels * static_cast<std::size_t>(kPlanes));
 }
 
 }  // namespace
 
-void benchFusion(BenchSession& session) {
-  const SensorSize& sensor = session.plan().sensors.front();
-  const std::size_t voxels =
-      static_cast<std::size_t>(sensor.width) * static_cast<std::size_t>(sensor.height);
+void addFusion(const Sensors& sensors) {
+  const SensorSize& smallest = sensors.front();
+  const auto voxels =
+      static_cast<std::size_t>(smallest.width) * static_cast<std::size_t>(smallest.height);
+  const std::string name = "fusion/" + smallest.name() + "/";
   for (const FusionRule rule : allFusionRules()) {
-    session.add({"fusion", sensor.name() + "/" + std::string(nameOf(rule)), "plain"},
-                [=](benchmark::State& state) { fuseTwo(state, rule, voxels); });
+    add(name + std::string(nameOf(rule)) + "/plain",
+        [=](benchmark::State& state) { fuseTwo(state, rule, voxels); });
   }
   for (const VotingKernel kernel : availableKernels()) {
-    session.add({"fusion", sensor.name() + "/peaks", std::string(nameOf(kernel))},
-                [=, planes = session.plan().planes](benchmark::State& state) {
-                  addPeaks(state, planes, kernel, voxels);
-                });
+    add(name + "peaks/" + std::string(nameOf(kernel)),
+        [=](benchmark::State& state) { addPeaks(state, kernel, voxels); });
   }
-  session.run();
+  for (const SensorSize& sensor : sensors) {
+    add("extraction/" + sensor.name(), [=](benchmark::State& state) {
+      const SweepInput input = makeSweepInput(makeSyntheticWindow(sensor.window(2)), kPlanes);
+      const DsiPeaks peaks = sweepSpace(input.cameras, {input.view, input.planes}).fused.peaks;
+      for (auto _ : state) benchmark::DoNotOptimize(extractAsPaper(peaks, input.planes, {}));
+      countRate(state, "pixels/s", static_cast<double>(input.view.pixels()));
+    });
+  }
 }
 
 }  // namespace efm::bench

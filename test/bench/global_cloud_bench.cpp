@@ -16,10 +16,9 @@ namespace {
 
 constexpr std::uint64_t kInsertedKeyframe = 1'000'000;  // an unused number
 
-std::vector<CloudPoint> cloudOf(const SyntheticWindow& made, int planes) {
-  KeyframeMapperOptions options = made.options;
-  options.planes.num_planes = planes;
-  KeyframeMapper mapper(made.rig, {0, 1}, options);
+std::vector<CloudPoint> keyframeCloud(const SensorSize& sensor) {
+  const SyntheticWindow made = makeSyntheticWindow(sensor.window(2));
+  KeyframeMapper mapper(made.rig, {0, 1}, made.options);
   const auto keyframe =
       mapper.map(made.window, {made.events.begin(), made.events.end()}, made.trajectory);
   if (!keyframe) return {};
@@ -47,24 +46,23 @@ GlobalCloud hallOf(std::uint64_t points) {
 
 }  // namespace
 
-void benchGlobalCloud(BenchSession& session) {
-  const SyntheticWindow made = makeSyntheticWindow(session.plan().sensors.front().window(2));
-  const std::vector<CloudPoint> cloud = cloudOf(made, session.plan().planes);
-  std::vector<GlobalCloud> maps;  // all in memory: compared cases take turns
-  for (const std::uint64_t points : session.plan().map_points) maps.push_back(hallOf(points));
-  for (std::size_t i = 0; i < maps.size(); ++i) {
-    const std::string name = "into " + std::to_string(session.plan().map_points[i]) + " points";
-    session.add({"global_cloud", name, ""}, [&, map = &maps[i]](benchmark::State& state) {
-      for (auto _ : state) {
-        map->insert(kInsertedKeyframe, cloud);
-        state.PauseTiming();
-        map->remove(kInsertedKeyframe);
-        state.ResumeTiming();
-      }
-      countRate(state, "points/s", static_cast<double>(cloud.size()));
-    });
+void addGlobalCloud(const Sensors& sensors) {
+  const auto cloud = lazily([sensor = sensors.front()] { return keyframeCloud(sensor); });
+  for (const std::uint64_t points : {1'000, 100'000, 10'000'000}) {
+    const auto map = lazily([=] { return hallOf(points); });  // all in memory: they take turns
+    add("global_cloud/insertion/into " + std::to_string(points) + " points",
+        [=](benchmark::State& state) {
+          GlobalCloud& into = map();
+          const std::vector<CloudPoint>& inserted = cloud();
+          for (auto _ : state) {
+            into.insert(kInsertedKeyframe, inserted);
+            state.PauseTiming();
+            into.remove(kInsertedKeyframe);
+            state.ResumeTiming();
+          }
+          countRate(state, "points/s", static_cast<double>(inserted.size()));
+        });
   }
-  session.run();
 }
 
 }  // namespace efm::bench

@@ -1,96 +1,235 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <functional>
-#include <memory>
+#include <malloc.h>
+
+#include <cmath>
+#include <fstream>
+#include <numeric>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "mapping/dsi/voting_kernel.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/bench/benches.h"
-#include "test/bench/peak_memory.h"
-#include "test/bench/performance_ratios.h"
 #include "test/bench/stage_clock.h"
-#include "test/bench/synthetic_window.h"
 #include "test/bench/unfused_keyframe.h"
 
 namespace efm::bench {
 namespace {
 
-/// Makes the keyframe of a window once.
-using KeyframeRun = std::function<void(StageHook*)>;
-/// Prepares a run. Its memory counts as the keyframe's, its time does not.
-using Preparation = std::function<KeyframeRun()>;
+/// A keyframe of a window, with the paper's fusion and depths unless it is as shipped.
+struct KeyframeCase {
+  VotingKernel kernel = VotingKernel::kPlain;
+  int threads = 1;
+  int planes = kPlanes;
+  int subintervals = 1;
+  bool as_shipped = false;
+
+  KeyframeMapper mapper(const SyntheticWindow& made) const {
+    KeyframeMapperOptions options = made.options;
+    if (as_shipped) {
+      options.split = SplitFusionOptions();
+      options.extraction = DepthExtractionOptions();
+    }
+    options.planes.num_planes = planes;
+    options.subintervals.count = subintervals;
+    options.sweep.threads = threads;
+    options.sweep.kernel = kernel;
+    std::vector<int> cameras(made.events.size());
+    std::iota(cameras.begin(), cameras.end(), 0);
+    return {made.rig, cameras, options};
+  }
+};
+
+const std::set<VotingKernel>& plainAndFastest() {
+  static const std::set<VotingKernel> kKernels = {VotingKernel::kPlain, fastestKernel()};
+  return kKernels;
+}
 
 std::vector<EventSpan> spansOf(const SyntheticWindow& made) {
   return {made.events.begin(), made.events.end()};
 }
 
-Preparation fused(const SyntheticWindow& made, VotingKernel kernel, int threads) {
-  return [&made, kernel, threads] {
-    KeyframeMapperOptions options = made.options;
-    options.sweep.kernel = kernel;
-    options.sweep.threads = threads;
-    const auto mapper = std::make_shared<KeyframeMapper>(made.rig, std::vector<int>{0, 1}, options);
-    return [&made, mapper, events = spansOf(made)](StageHook* stages) {
-      benchmark::DoNotOptimize(mapper->map(made.window, events, made.trajectory, nullptr, stages));
-    };
-  };
-}
-
-Preparation unfused(const SyntheticWindow& made) {
-  return [&made] {
-    const auto mapper = std::make_shared<UnfusedKeyframe>(made.rig, made.options);
-    return [&made, mapper, events = spansOf(made)](StageHook* stages) {
-      benchmark::DoNotOptimize(mapper->map(made.window, events, made.trajectory, stages));
-    };
-  };
-}
-
-void countEvents(benchmark::State& state, const SyntheticWindow& made) {
+void countVotes(benchmark::State& state, const SyntheticWindow& made, int planes) {
   double events = 0;
   for (const auto& of_camera : made.events) events += static_cast<double>(of_camera.size());
-  const double votes = events * made.options.planes.num_planes;
   countRate(state, "events/s", events);
-  countRate(state, "votes/s", votes);
+  countRate(state, "votes/s", events * planes);
 }
 
-/// Measures the memory without the events, then the time.
-void addKeyframe(BenchSession& session, const BenchCase& what, const SyntheticWindow& made,
-                 const Preparation& prepare) {
-  const std::optional<double> peak_mb = peakMemory_mb([&] { prepare()(nullptr); });
-  session.add(what, [&made, prepare, peak_mb](benchmark::State& state) {
-    const KeyframeRun run = prepare();
+void makeKeyframes(benchmark::State& state, const SyntheticWindow& made, const KeyframeCase& what) {
+  const std::vector<EventSpan> events = spansOf(made);
+  KeyframeMapper mapper = what.mapper(made);
+  for (auto _ : state) benchmark::DoNotOptimize(mapper.map(made.window, events, made.trajectory));
+  countVotes(state, made, what.planes);
+}
+
+/// A line of /proc/self/status, in MB of 1e6 bytes; 0 without it.
+double statusLine_mb(const std::string& key) {
+  constexpr double kMbPerKib = 1024e-6;
+  std::ifstream status("/proc/self/status");
+  double kib = 0;
+  for (std::string word; status >> word;) {
+    if (word == key + ":" && status >> kib) break;
+  }
+  return kMbPerKib * kib;
+}
+
+/// The additional peak memory of this process while `work` runs. Linux can reset the peak. Google
+/// Benchmark's MemoryManager would run every benchmark again for it.
+template <typename Work>
+double peakMemory_mb(const Work& work) {
+  malloc_trim(0);  // kept free memory would hide new memory
+  std::ofstream("/proc/self/clear_refs") << "5" << std::flush;
+  const double before_mb = statusLine_mb("VmRSS");
+  work();
+  return statusLine_mb("VmHWM") - before_mb;
+}
+
+/// Adds a keyframe with its stages and its memory without the events.
+/// @param prepare a window for a function that makes its keyframe. Its memory counts as the
+/// keyframe's, its time does not.
+template <typename LazyWindow, typename Prepare>
+void addStages(const std::string& name, const LazyWindow& window, const Prepare& prepare) {
+  add(name, [=, peak_mb = std::optional<double>()](benchmark::State& state) mutable {
+    const SyntheticWindow& made = window();
+    if (!peak_mb) peak_mb = peakMemory_mb([&] { prepare(made)(nullptr); });
+    auto map = prepare(made);
     StageClock stages;
-    for (auto _ : state) run(&stages);
-    countEvents(state, made);
+    for (auto _ : state) map(&stages);
+    countVotes(state, made, kPlanes);
     constexpr auto kMean = benchmark::Counter::kAvgIterations;
     state.counters["warp_ms"] = benchmark::Counter(stages.warp_ms, kMean);
     state.counters["sweep_ms"] = benchmark::Counter(stages.sweep_ms, kMean);
     state.counters["depth_ms"] = benchmark::Counter(stages.depth_ms, kMean);
-    if (peak_mb) state.counters["peak_mb"] = *peak_mb;
+    state.counters["peak_mb"] = *peak_mb;
   });
+}
+
+/// Stereo keyframes, fused and unfused. Kernels between the plain and the fastest one run with the
+/// smallest size on one thread only.
+void addStereo(const SensorSize& sensor, bool smallest) {
+  const auto window = lazily([=] { return makeSyntheticWindow(sensor.window(2)); });
+  const std::string name = "keyframe/" + sensor.name() + "/";
+  addStages(name + "unfused/threads:1", window, [](const SyntheticWindow& made) {
+    return [&made, events = spansOf(made),
+            keyframe = UnfusedKeyframe(made.rig, made.options)](StageHook* stages) mutable {
+      benchmark::DoNotOptimize(keyframe.map(made.window, events, made.trajectory, stages));
+    };
+  });
+  for (const VotingKernel kernel : availableKernels()) {
+    const bool outermost = plainAndFastest().count(kernel) > 0;
+    for (const int threads : {1, 2}) {
+      if (!outermost && (threads > 1 || !smallest)) continue;
+      KeyframeCase what;
+      what.kernel = kernel;
+      what.threads = threads;
+      addStages(name + std::string(nameOf(kernel)) + "/threads:" + std::to_string(threads), window,
+                [=](const SyntheticWindow& made) {
+                  return [&made, events = spansOf(made),
+                          mapper = what.mapper(made)](StageHook* stages) mutable {
+                    benchmark::DoNotOptimize(
+                        mapper.map(made.window, events, made.trajectory, nullptr, stages));
+                  };
+                });
+    }
+  }
+}
+
+/// A keyframe as shipped and with the paper's options.
+void addMotion(const std::string& name, const SyntheticWindowOptions& window,
+               int subintervals = 1) {
+  const auto made = lazily([=] { return makeSyntheticWindow(window); });
+  for (const bool as_shipped : {true, false}) {
+    for (const VotingKernel kernel : plainAndFastest()) {
+      const KeyframeCase what{kernel, 1, kPlanes, subintervals, as_shipped};
+      add("motion/" + name + (as_shipped ? "/as shipped/" : "/paper/") +
+              std::string(nameOf(kernel)),
+          [=](benchmark::State& state) { makeKeyframes(state, made(), what); });
+    }
+  }
+}
+
+/// Stereo keyframes for several motions and rigs.
+void addMotions(const Sensors& sensors) {
+  const std::vector<WindowMotion> motions = {
+      {"sideways", {0.5 * kNearLimit_m, 0, 0}},
+      {"forward, half the near limit", {0, 0, 0.5 * kNearLimit_m}},
+      {"forward, the near limit", {0, 0, kNearLimit_m}},
+      {"forward, 3 near limits", {0, 0, 3 * kNearLimit_m}},
+      {"backward, the near limit", {0, 0, -kNearLimit_m}},
+      {"rotation alone", {0, 0, 0}, 20},
+      {"turn on the spot", {0, 0, 0}, 90},
+      {"circling", {0, 0, 0}, 30, 2},
+  };
+  const SensorSize& smallest = sensors.front();
+  for (const SensorSize& sensor : sensors) {
+    addMotion(sensor.name() + " hand-held", sensor.window(2));
+    for (const WindowMotion& motion : motions) {
+      const std::string name = motion.name;
+      const bool everywhere = name == "sideways" || name == "forward, 3 near limits";
+      if (&sensor != &smallest && !everywhere) continue;
+      SyntheticWindowOptions window = sensor.window(2);
+      window.motion = motion;
+      addMotion(sensor.name() + " " + name, window);
+    }
+  }
+  SyntheticWindowOptions strong = smallest.window(2);
+  strong.strong_lens = true;
+  addMotion(smallest.name() + " strong lens", strong);
+  addMotion(smallest.name() + " 1 camera", smallest.window(1));
+  addMotion(smallest.name() + " 3 cameras", smallest.window(3));
+  addMotion(smallest.name() + " 8 sub-intervals", smallest.window(2), 8);
+}
+
+/// Stereo keyframes with one size 1, 2, 4, 8 and 16 times as large.
+/// @param grow makes the size of the window or of the case `factor` times as large.
+template <typename Grow>
+void addGrowth(const std::string& name, const SyntheticWindowOptions& smallest, const Grow& grow) {
+  for (const VotingKernel kernel : plainAndFastest()) {
+    add("growth/" + name + "/" + std::string(nameOf(kernel)),
+        [=](benchmark::State& state) {
+          const auto factor = static_cast<int>(state.range(0));
+          SyntheticWindowOptions window = smallest;
+          KeyframeCase what;
+          what.kernel = kernel;
+          grow(window, what, factor);
+          makeKeyframes(state, makeSyntheticWindow(window), what);
+          state.SetComplexityN(factor);
+        })
+        ->RangeMultiplier(2)
+        ->Range(1, 16)
+        ->Complexity();
+  }
 }
 
 }  // namespace
 
-void benchKeyframes(BenchSession& session) {
-  for (const SensorSize& sensor : session.plan().sensors) {
-    SyntheticWindow made = makeSyntheticWindow(sensor.window(2));
-    made.options.planes.num_planes = session.plan().planes;
-    addKeyframe(session, {"keyframe", sensor.name(), kUnfused}, made, unfused(made));
-    const bool smallest = sensor.width == session.plan().sensors.front().width;
-    for (const VotingKernel kernel : availableKernels()) {
-      const bool outermost = kernel == VotingKernel::kPlain || kernel == fastestKernel();
-      if (!outermost && !smallest) continue;
-      for (const int threads : {1, 2}) {
-        if (!outermost && threads > 1) continue;
-        addKeyframe(session, {"keyframe", sensor.name(), std::string(nameOf(kernel)), threads},
-                    made, fused(made, kernel, threads));
-      }
-    }
-    session.run();
-  }
+void addKeyframes(const Sensors& sensors) {
+  const SensorSize& smallest = sensors.front();
+  for (const SensorSize& sensor : sensors) addStereo(sensor, &sensor == &smallest);
+  addMotions(sensors);
+  addGrowth("events", smallest.window(2),
+            [](SyntheticWindowOptions& window, KeyframeCase&, unsigned factor) {
+              window.events_per_camera *= factor;
+            });
+  addGrowth("planes", smallest.window(2),
+            [](SyntheticWindowOptions&, KeyframeCase& what, int factor) {
+              what.planes = kPlanes / 2 * factor;
+            });
+  addGrowth(
+      "cameras", smallest.window(2),
+      [](SyntheticWindowOptions& window, KeyframeCase&, int factor) { window.cameras = factor; });
+  addGrowth(
+      "subintervals", smallest.window(2),
+      [](SyntheticWindowOptions&, KeyframeCase& what, int factor) { what.subintervals = factor; });
+  addGrowth("pixels", smallest.window(2),
+            [](SyntheticWindowOptions& window, KeyframeCase&, int factor) {
+              const double scale = std::sqrt(0.25 * factor);
+              window.width = static_cast<int>(std::round(window.width * scale));
+              window.height = static_cast<int>(std::round(window.height * scale));
+            });
 }
 
 }  // namespace efm::bench

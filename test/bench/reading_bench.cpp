@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -9,7 +11,7 @@
 #include <memory>
 #include <random>
 #include <string>
-#include <utility>
+#include <system_error>
 #include <vector>
 
 #include "plugin/formats/open_recording.h"
@@ -128,45 +130,77 @@ void writeRaw(const fs::path& file, const std::string& version, EvtEncoding enco
                                         << evtBytes(encoding, events);
 }
 
+/// A folder that exists as long as this object.
+class ScratchFolder {
+ public:
+  ScratchFolder()
+      : path_(fs::temp_directory_path() / ("event_fusion_bench." + std::to_string(getpid()))) {
+    fs::create_directories(path_);
+  }
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// @param tick_ns resolution of the times.
+SyntheticWindow irregularWindow(std::size_t count, std::int64_t tick_ns) {
+  // The sensor of a UZH folder without images has 240x180 pixels.
+  SyntheticWindow made = makeSyntheticWindow({240, 180, count, 1});
+  makeIrregular(made.events.front(), tick_ns);
+  return made;
+}
+
 }  // namespace
 
-void benchReading(BenchSession& session) {
-  // The sensor of a UZH folder without images has 240x180 pixels.
-  SyntheticWindowOptions options = session.plan().sensors.back().window(1);
-  options.width = 240;
-  options.height = 180;
-  SyntheticWindow made = makeSyntheticWindow(options);
-  const auto add = [&](const char* name, const fs::path& path) {
-    session.add({"reading", name, ""}, [path](benchmark::State& state) { readAll(state, path); });
+void addReading(const Sensors& sensors) {
+  const std::size_t count = sensors.back().events;
+  const auto scratch = lazily([] { return ScratchFolder(); });
+  const auto us = lazily([=] { return irregularWindow(count, 1000); });
+  const auto file = [=](const char* name, const auto& write) {
+    return lazily([=] {
+      const fs::path path = scratch().path() / name;
+      write(path);
+      return path;
+    });
   };
-  const fs::path& scratch = session.plan().scratch;
-  for (const auto& [unit, tick_ns] : {std::pair("us", 1000), std::pair("ns", 1)}) {
-    makeIrregular(made.events.front(), tick_ns);
-    writeTextFolder(scratch / unit, made);
-    const std::string rawlog = std::string("rawlog of ") + unit;  // the bytes per event differ
-    writeRawlog(scratch / rawlog, scratch / unit);
-    add(rawlog.c_str(), scratch / rawlog);
-  }
-  add("text", scratch / "us");
+  const auto text = file("us", [=](const fs::path& path) { writeTextFolder(path, us()); });
+  const auto text_ns =
+      file("ns", [=](const fs::path& path) { writeTextFolder(path, irregularWindow(count, 1)); });
 
-  const auto add_decoding = [&](const char* name, const fs::path& path) {
-    session.add({"decoding", name, ""},
-                [path](benchmark::State& state) { decodeAll(state, path); });
+  const auto add_reading = [](const std::string& name, const auto& path) {
+    add("reading/recording/" + name, [=](benchmark::State& state) { readAll(state, path()); });
   };
-  makeIrregular(made.events.front(), 1000);
-  const std::vector<Event>& events = made.events.front();
-  writeRaw(scratch / "evt2.raw", "2.0", EvtEncoding::kEvt2, events);
-  writeRaw(scratch / "evt3.raw", "3.0", EvtEncoding::kEvt3, events);
-  writeRaw(scratch / "evt3_runs.raw", "3.0", EvtEncoding::kEvt3, runsOf(events, options.width));
-  add_decoding("text", scratch / "us");
-  add_decoding("EVT 2.0", scratch / "evt2.raw");
-  add_decoding("EVT 3.0", scratch / "evt3.raw");
-  add_decoding("EVT 3.0, runs of 8 pixels", scratch / "evt3_runs.raw");
+  // The bytes per event differ.
+  add_reading("rawlog of us",
+              file("us.rawlog", [=](const fs::path& path) { writeRawlog(path, text()); }));
+  add_reading("rawlog of ns",
+              file("ns.rawlog", [=](const fs::path& path) { writeRawlog(path, text_ns()); }));
+  add_reading("text", text);
+
+  const auto add_decoding = [](const std::string& name, const auto& path) {
+    add("reading/decoding/" + name, [=](benchmark::State& state) { decodeAll(state, path()); });
+  };
+  const auto add_raw = [&](const std::string& name, const char* version, EvtEncoding encoding,
+                           bool runs) {
+    add_decoding(name, file(runs ? "runs.raw" : version, [=](const fs::path& path) {
+                   const std::vector<Event>& events = us().events.front();
+                   writeRaw(path, version, encoding, runs ? runsOf(events, 240) : events);
+                 }));
+  };
+  add_decoding("text", text);
+  add_raw("EVT 2.0", "2.0", EvtEncoding::kEvt2, false);
+  add_raw("EVT 3.0", "3.0", EvtEncoding::kEvt3, false);
+  add_raw("EVT 3.0, runs of 8 pixels", "3.0", EvtEncoding::kEvt3, true);
 #ifdef EFM_WITH_HDF5
-  writeHdf5(scratch / "hdf5", made);
-  add_decoding("HDF5, Blosc", scratch / "hdf5");
+  add_decoding("HDF5, Blosc", file("hdf5", [=](const fs::path& path) { writeHdf5(path, us()); }));
 #endif
-  session.run();
 }
 
 }  // namespace efm::bench

@@ -22,8 +22,8 @@ using bench::SyntheticWindowOptions;
 // Limits of every kernel, compared with the oracle with the same packets.
 constexpr double kMaxError = 1e-3;        // of the mass
 constexpr double kMaxSignedError = 3e-5;  // of the mass
-// Weights are rounded to 1/1024 of a vote. Where two planes differ by less, rounding decides which is
-// the peak: of the pixels with votes.
+// Weights are rounded to 1/1024 of a vote. Where two planes differ by less, rounding decides which
+// is the peak: of the pixels with votes.
 constexpr double kMinEqualPeaks = 0.975;
 // The min of two cameras is often a single vote, which changes little between planes.
 constexpr double kMinEqualPeaksOfMin = 0.965;

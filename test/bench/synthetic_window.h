@@ -34,7 +34,7 @@ struct SyntheticWindowOptions {
   int cameras = 2;  ///< Side by side, 0.1 m apart.
   double duration_s = 0.2;
   unsigned seed = 1;
-  std::optional<WindowMotion> motion;  ///< Not given: hand-held.
+  std::optional<WindowMotion> motion = {};  ///< Not given: hand-held.
   /// A wide lens with strong radial distortion. Events keep the pixels of the pinhole: times are
   /// right, depths are not.
   bool strong_lens = false;

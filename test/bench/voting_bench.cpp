@@ -13,7 +13,6 @@
 #include "mapping/sweep/tile_rays.h"
 #include "mapping/sweep/tiled_sweep.h"
 #include "test/bench/benches.h"
-#include "test/bench/performance_ratios.h"
 #include "test/bench/sweep_input.h"
 
 namespace efm::bench {
@@ -100,22 +99,22 @@ void sweep(benchmark::State& state, const SweepInput& input, VotingKernel kernel
 
 }  // namespace
 
-void benchVoting(BenchSession& session) {
-  for (const SensorSize& sensor : session.plan().sensors) {
-    const SweepInput input =
-        makeSweepInput(makeSyntheticWindow(sensor.window(1)), session.plan().planes);
-    session.add({kVoting, sensor.name(), kYardstick},
-                [&](benchmark::State& state) { voteYardstick(state, input); });
+void addVoting(const Sensors& sensors) {
+  for (const SensorSize& sensor : sensors) {
+    const auto input =
+        lazily([=] { return makeSweepInput(makeSyntheticWindow(sensor.window(1)), kPlanes); });
+    const std::string name = "voting/" + sensor.name();
+    add(name + "/densities/yardstick",
+        [=](benchmark::State& state) { voteYardstick(state, input()); });
     for (const VotingKernel kernel : availableKernels()) {
       if (kernel == VotingKernel::kPlain) continue;  // the yardstick
-      session.add({kVoting, sensor.name(), std::string(nameOf(kernel))},
-                  [&, kernel](benchmark::State& state) { voteTiles(state, input, kernel); });
+      add(name + "/densities/" + std::string(nameOf(kernel)),
+          [=](benchmark::State& state) { voteTiles(state, input(), kernel); });
     }
     for (const VotingKernel kernel : availableKernels()) {
-      session.add({kOneCameraSweep, sensor.name(), std::string(nameOf(kernel))},
-                  [&, kernel](benchmark::State& state) { sweep(state, input, kernel); });
+      add(name + "/sweep/" + std::string(nameOf(kernel)),
+          [=](benchmark::State& state) { sweep(state, input(), kernel); });
     }
-    session.run();
   }
 }
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <filesystem>
@@ -7,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "test/bench/program_arguments.h"
 #include "test/paths.h"
 #include "test/studies/recordings/real_rigs.h"
 #include "test/studies/report/study_report.h"
@@ -45,26 +46,30 @@ constexpr Study kStudies[] = {
     {"automatic", "15. Options chosen from the data", studyAutomatic},
 };
 
-constexpr const char* kUsage =
-    "usage: event_fusion_studies [--quick] --out DIR --cache DIR [--data DIR] [NAME ...]\n"
-    "Runs the studies (all where none is named) and writes DIR/studies.md and DIR/studies/*.png.\n"
-    "Simulated events are kept in the cache. Names:";
+struct Arguments {
+  bool quick = false;
+  std::string out;
+  std::string cache;
+  std::string data = EFM_SHARED_DATA;
+  std::vector<std::string> names;  ///< Of studies; empty for all.
+};
 
 /// @return the number of studies without their data.
-int runStudies(const efm::bench::ProgramArguments& arguments) {
-  const fs::path out = arguments.value("--out");
+int runStudies(const Arguments& arguments) {
+  const fs::path out = arguments.out;
   const fs::path pictures = out / "studies";
   fs::create_directories(pictures);
-  RecordingCache recordings(arguments.value("--cache"));
-  const StudyRun run{arguments.quick, arguments.value("--data", EFM_SHARED_DATA), pictures,
-                     &recordings};
+  RecordingCache recordings(arguments.cache);
+  const StudyRun run{arguments.quick, arguments.data, pictures, &recordings};
   StudyReport report(out / "studies.md");
   std::vector<std::string> order;
   for (const Study& study : kStudies) order.emplace_back(study.name);
 
   int skipped = 0;
   for (const Study& study : kStudies) {
-    if (!arguments.includes(study.name)) continue;
+    const auto& names = arguments.names;
+    if (!names.empty() && std::find(names.begin(), names.end(), study.name) == names.end())
+      continue;
     std::cout << study.title << std::endl;
     const auto began = std::chrono::steady_clock::now();
     StudySection section(study.title, pictures);
@@ -88,15 +93,17 @@ int runStudies(const efm::bench::ProgramArguments& arguments) {
 
 int main(int argc, char** argv) {
   try {
-    efm::bench::ArgumentRules rules{{"--out", "--cache", "--data"}, {}, kUsage};
-    for (const Study& study : kStudies) {
-      rules.names.emplace_back(study.name);
-      rules.usage += std::string(" ") + study.name;
-    }
-    const auto arguments = efm::bench::readArguments({argv + 1, argv + argc}, rules);
-    if (arguments.value("--out").empty() || arguments.value("--cache").empty()) {
-      throw std::invalid_argument(rules.usage);
-    }
+    std::vector<std::string> known;
+    for (const Study& study : kStudies) known.emplace_back(study.name);
+    Arguments arguments;
+    CLI::App app("Runs the studies and writes DIR/studies.md and DIR/studies/*.png");
+    app.add_flag("--quick", arguments.quick, "tiny: tests that every study runs");
+    app.add_option("--out", arguments.out, "DIR")->required();
+    app.add_option("--cache", arguments.cache, "folder of simulated events")->required();
+    app.add_option("--data", arguments.data, "folder of real recordings");
+    app.add_option("names", arguments.names, "studies; all by default")
+        ->check(CLI::IsMember(known));
+    CLI11_PARSE(app, argc, argv);
     return runStudies(arguments) > 0 ? kSkipped : 0;
   } catch (const std::exception& error) {
     std::cerr << "event_fusion_studies: " << error.what() << '\n';

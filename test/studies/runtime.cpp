@@ -14,7 +14,6 @@
 #include "mapping/dsi/voting_kernel.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "plugin/pictures/curve_plot.h"
-#include "test/bench/growth_fit.h"
 #include "test/bench/stage_clock.h"
 #include "test/bench/synthetic_window.h"
 #include "test/studies/methods/error_figures.h"
@@ -178,6 +177,18 @@ double sizeOf(const Sizes& sizes, const std::string& varied) {
   return sizes.pixels();
 }
 
+/// The exponent k of time = a * size^k: the slope of the least-squares line through the logarithms.
+double fittedExponent(const std::vector<double>& sizes, const std::vector<double>& times) {
+  const auto centred_logs = [](const std::vector<double>& values) -> Eigen::ArrayXd {
+    const Eigen::ArrayXd logs =
+        Eigen::Map<const Eigen::ArrayXd>(values.data(), static_cast<Eigen::Index>(values.size()))
+            .log();
+    return logs - logs.mean();
+  };
+  const Eigen::ArrayXd x = centred_logs(sizes);
+  return (x * centred_logs(times)).sum() / x.square().sum();
+}
+
 struct Exponents {
   double measured = 0;
   double of_formula = 0;
@@ -195,7 +206,7 @@ Exponents exponentsOver(const std::vector<Sample>& samples, const Fit& formula,
     measured.push_back(sample.times.sweepMs());
     of_formula.push_back(formula.ms(sample.sizes));
   }
-  return {bench::fittedExponent(sizes, measured), bench::fittedExponent(sizes, of_formula)};
+  return {fittedExponent(sizes, measured), fittedExponent(sizes, of_formula)};
 }
 
 TextTable tableOf(const std::vector<Sample>& samples, const Fit& formula) {
@@ -316,7 +327,7 @@ void byKernel(const StudyRun& run, StudySection& section) {
     areas.push_back(side * side);
     times.push_back(measure(run, sizes).depth_ms);
   }
-  const double exponent = bench::fittedExponent(areas, times);
+  const double exponent = fittedExponent(areas, times);
   section.trend("the threshold takes N_p N_k (exponent over N_k 0.85 to 1.15)",
                 exponent >= 0.85 && exponent <= 1.15,
                 formatNumber(exponent, 2) + "; " + listed(times, 2) +
