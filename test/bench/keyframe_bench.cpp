@@ -3,6 +3,9 @@
 
 #include <cmath>
 #include <fstream>
+#include <limits>
+#include <map>
+#include <memory>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -76,12 +79,13 @@ double statusLine_mb(const std::string& key) {
   return kMbPerKib * kib;
 }
 
-/// The additional peak memory of this process while `work` runs. Linux can reset the peak. Google
-/// Benchmark's MemoryManager would run every benchmark again for it.
+/// The additional peak memory of this process while `work` runs; NaN where the system, unlike
+/// Linux, cannot reset the peak. Google Benchmark's MemoryManager would run every benchmark again.
 template <typename Work>
 double peakMemory_mb(const Work& work) {
   malloc_trim(0);  // kept free memory would hide new memory
-  std::ofstream("/proc/self/clear_refs") << "5" << std::flush;
+  const bool reset = (std::ofstream("/proc/self/clear_refs") << "5" << std::flush).good();
+  if (!reset) return std::numeric_limits<double>::quiet_NaN();
   const double before_mb = statusLine_mb("VmRSS");
   work();
   return statusLine_mb("VmHWM") - before_mb;
@@ -187,6 +191,7 @@ void addMotions(const Sensors& sensors) {
 /// @param grow makes the size of the window or of the case `factor` times as large.
 template <typename Grow>
 void addGrowth(const std::string& name, const SyntheticWindowOptions& smallest, const Grow& grow) {
+  const auto windows = std::make_shared<std::map<int, SyntheticWindow>>();  // by factor
   for (const VotingKernel kernel : plainAndFastest()) {
     add("growth/" + name + "/" + std::string(nameOf(kernel)),
         [=](benchmark::State& state) {
@@ -195,7 +200,9 @@ void addGrowth(const std::string& name, const SyntheticWindowOptions& smallest, 
           KeyframeCase what;
           what.kernel = kernel;
           grow(window, what, factor);
-          makeKeyframes(state, makeSyntheticWindow(window), what);
+          SyntheticWindow& made = (*windows)[factor];
+          if (made.events.empty()) made = makeSyntheticWindow(window);
+          makeKeyframes(state, made, what);
           state.SetComplexityN(factor);
         })
         ->RangeMultiplier(2)
