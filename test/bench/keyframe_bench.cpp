@@ -46,8 +46,8 @@ struct KeyframeCase {
 };
 
 const std::set<VotingKernel>& plainAndFastest() {
-  static const std::set<VotingKernel> kKernels = {VotingKernel::kPlain, fastestKernel()};
-  return kKernels;
+  static const std::set<VotingKernel> both = {VotingKernel::kPlain, fastestKernel()};
+  return both;
 }
 
 std::vector<EventSpan> spansOf(const SyntheticWindow& made) {
