@@ -100,10 +100,6 @@ def tables(cases):
     def ratio(reference, own, time="cpu_ms"):
         return cases[reference][time] / cases[own][time] if {reference, own} <= cases.keys() else ""
 
-    def rows(group, *columns):
-        return [[*name[1:], *(case.get(column, "") for column in columns)]
-                for name, case in cases.items() if name[0] == group]
-
     motion = []
     for case in dict.fromkeys(name[1] for name in cases if name[0] == "motion"):
         fastest = [name[3] for name in cases if name[:2] == ("motion", case)][-1]
@@ -135,12 +131,13 @@ def tables(cases):
     yield ("Growth", ["case", "kernel", "exponent"],
            [[*growth, statistics.linear_regression(*zip(*logs)).slope]
             for growth, logs in growths.items() if len(logs) > 1])
-    yield ("Fusion and peaks", ["size", "case", "kernel", "cpu_ms", "voxels/s"],
-           rows("fusion", "cpu_ms", "voxels/s"))
-    yield "Extraction", ["case", "cpu_ms", "pixels/s"], rows("extraction", "cpu_ms", "pixels/s")
-    yield ("Global cloud", ["group", "case", "cpu_ms", "points/s"],
-           rows("global_cloud", "cpu_ms", "points/s"))
-    yield "Reading", ["group", "case", "cpu_ms", "events/s"], rows("reading", "cpu_ms", "events/s")
+    for title, group, parts, rate in (
+            ("Fusion and peaks", "fusion", ["size", "case", "kernel"], "voxels/s"),
+            ("Extraction", "extraction", ["case"], "pixels/s"),
+            ("Global cloud", "global_cloud", ["group", "case"], "points/s"),
+            ("Reading", "reading", ["group", "case"], "events/s")):
+        yield (title, [*parts, "cpu_ms", rate],
+               [[*n[1:], c["cpu_ms"], c[rate]] for n, c in cases.items() if n[0] == group])
 
 
 def readable(value):

@@ -65,11 +65,10 @@ int runStudies(const Arguments& arguments) {
   std::vector<std::string> order;
   for (const Study& study : kStudies) order.emplace_back(study.name);
 
+  const auto& names = arguments.names.empty() ? order : arguments.names;
   int skipped = 0;
   for (const Study& study : kStudies) {
-    const auto& names = arguments.names;
-    if (!names.empty() && std::find(names.begin(), names.end(), study.name) == names.end())
-      continue;
+    if (std::find(names.begin(), names.end(), study.name) == names.end()) continue;
     std::cout << study.title << std::endl;
     const auto began = std::chrono::steady_clock::now();
     StudySection section(study.title, pictures);
