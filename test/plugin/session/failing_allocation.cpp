@@ -17,7 +17,7 @@ std::atomic<std::size_t> failing_number{0};
 std::atomic<Allocating> counted_threads{Allocating::kThisThread};
 thread_local bool is_this_thread = false;
 
-std::array<std::size_t, 65536> sizes_of{};
+std::array<std::atomic<std::size_t>, 65536> sizes_of{};
 
 bool fails(std::size_t size) {
   if (!counting) return false;
