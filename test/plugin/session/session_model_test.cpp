@@ -1,0 +1,653 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A naive model says what becomes of each event, pose and window in live operation. The input queue
+// and the session agree with it after every step of random schedules.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "plugin/live/input_queue.h"
+#include "test/plugin/session/session_driver.h"
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kS = 1000 * kMs;
+constexpr std::int64_t kTickNs = 10 * kMs;
+constexpr int kCameras = 2;
+constexpr int kTracker = -1;
+
+using Table = std::map<std::string, std::uint64_t>;
+
+/// Everything that is counted.
+Table tableOf(const SessionStatus& status) {
+  Table table;
+  const MapperCounts& counts = status.counts;
+  for (std::size_t c = 0; c < counts.cameras.size(); ++c) {
+    const EventCounts& of = counts.cameras[c];
+    const auto name = [&](const char* what) { return fmt::format("camera {} {}", c, what); };
+    table[name("read")] = of.read;
+    table[name("used")] = of.used;
+    table[name("without_pose")] = of.without_pose;
+    table[name("outside_window")] = of.outside_window;
+    table[name("dropped")] = of.dropped;
+    table[name("other")] = of.filtered + of.outside_lens + of.over_budget;
+  }
+  for (const auto& [camera, events] : status.refused_events) {
+    table[fmt::format("camera {} refused", camera)] = events;
+  }
+  for (const NamedReason& reason : kGiveUpReasons) {
+    table[std::string("given up: ") + reason.name] = counts.windows_given_up.*reason.count;
+  }
+  table["keyframes"] = counts.keyframes;
+  table["keyframes_without_pose"] = counts.keyframes_without_pose;
+  table["windows_without_events"] = counts.windows_without_events;
+  table["late_events"] = counts.late_events;
+  table["duplicate_poses"] = counts.duplicate_poses;
+  table["pose_jumps"] = status.live->pose_jumps;
+  table["clock_steps"] = status.live->clock_steps;
+  table["refused_poses"] = status.live->refused_poses;
+  return table;
+}
+
+/// The counts that differ.
+std::vector<std::string> differences(const Table& table, const Table& expected) {
+  std::vector<std::string> rows;
+  for (const auto& [what, count] : table) {
+    const auto at = expected.find(what);
+    const std::uint64_t other = at == expected.end() ? 0 : at->second;
+    if (count != other) rows.push_back(fmt::format("{}: {}, model {}", what, count, other));
+  }
+  return rows;
+}
+
+/// What the session should count: windows of one length at one stride, given options. Keeps all
+/// that waits in plain lists and looks through all of it each time.
+class Model {
+ public:
+  explicit Model(const EventFusionOptions& options)
+      : window_ns_(std::llround(options.mapper.policy.window_s * 1e9)),
+        stride_ns_(std::llround(options.mapper.policy.stride_s * 1e9)),
+        pose_wait_ns_(std::llround(options.live.max_pose_wait_s * 1e9)),
+        max_speed_m_s_(options.live.max_speed_m_s) {
+    status.live.emplace();
+    status.counts.cameras.resize(kCameras);
+  }
+
+  SessionStatus status;
+
+  void addPose(const StampedPose& pose) {
+    if (!use(pose)) {
+      ++status.live->refused_poses;
+      const auto& newest = clock_.newest_pose;
+      if (newest && pose.t_ns < newest->t_ns - kS) noteOlder(kTracker, pose.t_ns);
+    } else {
+      clock_.older.erase(kTracker);
+    }
+  }
+
+  void addEvents(const CameraPacket& packet) {
+    const int c = packet.camera;
+    Camera& camera = clock_.cameras[static_cast<std::size_t>(c)];
+    EventCounts& counts = status.counts.cameras[static_cast<std::size_t>(c)];
+    const std::vector<Event>& events = packet.events;
+    std::int64_t newest_ns = camera.newest_ns.value_or(kMinTimeNs + kTickNs);
+    const auto is_late = [&](const Event& event) { return event.t_ns < newest_ns - kTickNs; };
+    const auto is_before = [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; };
+    if (!events.empty() && std::is_sorted(events.begin(), events.end(), is_before) &&
+        std::all_of(events.begin(), events.end(), is_late)) {
+      status.refused_events[c] += events.size();
+      return noteOlder(c, events.front().t_ns);
+    }
+    std::vector<std::int64_t> in_time;
+    for (const Event& event : events) {
+      ++counts.read;
+      if (is_late(event)) ++status.counts.late_events;
+      if (is_late(event) || event.t_ns < clock_.released_ns) ++counts.dropped;
+      if (is_late(event)) continue;
+      newest_ns = std::max(newest_ns, event.t_ns);
+      in_time.push_back(event.t_ns);
+      if (event.t_ns >= clock_.released_ns) camera.held.push_back({event.t_ns, false});
+    }
+    if (packet.covered_until_ns) {
+      camera.covered_ns = std::max(camera.covered_ns, *packet.covered_until_ns);
+    }
+    if (in_time.empty()) {
+      if (packet.covered_until_ns) giveUpMissing(c, *packet.covered_until_ns);
+      return;
+    }
+    const std::int64_t first_ns = in_time.front();
+    const std::int64_t last_ns = in_time.back();
+    camera.newest_ns = std::max(camera.newest_ns.value_or(last_ns), last_ns);
+    clock_.newest_begin_ns = std::max(clock_.newest_begin_ns, first_ns);
+    clock_.reached_ns = std::max(clock_.reached_ns, last_ns);
+    giveUpMissing(c, last_ns);
+    clock_.older.erase(c);
+    for (auto& [other, older] : clock_.older) older.others_ns[c] = first_ns;
+    const std::map<int, MissingEvents> missing = clock_.missing;
+    for (const auto& [other, lacking] : missing) {
+      if (lacking.until_ns <= clock_.newest_begin_ns) giveUpMissing(other, kMaxTimeNs);
+    }
+  }
+
+  void noteMissing(int camera, const MissingEvents& missing) {
+    MissingEvents& noted = clock_.missing[camera];
+    noted = {std::max(noted.until_ns, missing.until_ns), missing.reason};
+  }
+
+  void finish() {
+    finished_ = true;
+    while (!clock_.missing.empty()) giveUpMissing(clock_.missing.begin()->first, kMaxTimeNs);
+  }
+
+  /// The next window that can be mapped; those without events are passed.
+  std::optional<Window> nextWindow() {
+    do {
+      if (const std::optional<Window> window = windowOfStretch()) return window;
+    } while (beginStretch());
+    return std::nullopt;
+  }
+
+  enum class Outcome { kMapped, kMappingFails, kStoringFails, kTooMuch };
+  /// @return whether it made a keyframe.
+  bool map(const Window& window, Outcome outcome) {
+    MapperCounts& counts = status.counts;
+    bool empty = true;
+    for (Camera& camera : clock_.cameras) empty = empty && !camera.has(window);
+    const bool mapped = !empty && hasPose(window.t_ref_ns);
+    ++clock_.next;
+    if (outcome == Outcome::kTooMuch || (outcome == Outcome::kMappingFails && mapped)) {
+      ++(outcome == Outcome::kTooMuch ? counts.windows_given_up.overload
+                                      : counts.windows_given_up.error);
+      lose(window.t0_ns, nextStartNs());
+    } else if (mapped) {
+      ++(outcome == Outcome::kMapped ? counts.keyframes : counts.windows_given_up.error);
+      for (Camera& camera : clock_.cameras) {
+        for (Held& event : camera.held) {
+          event.used = event.used || (window.contains(event.t_ns) && hasPose(event.t_ns));
+        }
+      }
+    } else {
+      ++(empty ? counts.windows_without_events : counts.keyframes_without_pose);
+    }
+    release(finished_ ? nextStartNs() : std::min(nextStartNs(), completeNs()));
+    return mapped;
+  }
+
+  /// No window can be mapped now.
+  void wait() {
+    if (finished_) return release(kMaxTimeNs);
+    if (clock_.start_ns) release(std::min(nextStartNs(), completeNs()));
+    if (clock_.reached_ns == kMinTimeNs) return;
+    std::optional<std::int64_t> newest_pose_ns;
+    if (clock_.newest_pose) newest_pose_ns = clock_.newest_pose->t_ns;
+    if (!clock_.next_stretch.empty()) newest_pose_ns = clock_.next_stretch.back().t_ns;
+    const std::int64_t overdue_ns = clock_.reached_ns - pose_wait_ns_;
+    if (!newest_pose_ns || *newest_pose_ns < overdue_ns) {
+      giveUpBefore(overdue_ns, &WindowsGivenUp::no_pose);
+    }
+  }
+
+  std::size_t heldEvents() const {
+    return clock_.cameras[0].held.size() + clock_.cameras[1].held.size();
+  }
+  std::int64_t eventsCompleteNs() const {
+    std::int64_t complete_ns = kMaxTimeNs;
+    for (const Camera& camera : clock_.cameras) {
+      complete_ns = std::min(complete_ns, completeNs(camera));
+    }
+    return complete_ns;
+  }
+
+ private:
+  struct Held {
+    std::int64_t t_ns;
+    bool used;
+  };
+  struct Camera {
+    std::vector<Held> held;
+    std::optional<std::int64_t> newest_ns;
+    std::int64_t covered_ns = kMinTimeNs;
+
+    bool has(const Window& window) const {
+      return std::any_of(held.begin(), held.end(),
+                         [&](const Held& event) { return window.contains(event.t_ns); });
+    }
+  };
+  struct Older {
+    std::int64_t since_ns;
+    std::map<int, std::int64_t> others_ns;
+  };
+  /// All that begins anew when a clock goes back.
+  struct Clock {
+    std::array<Camera, kCameras> cameras;
+    std::set<std::int64_t> poses_ns;
+    std::optional<StampedPose> newest_pose;
+    std::vector<StampedPose> next_stretch;  // poses after a jump
+    std::optional<std::int64_t> start_ns;
+    std::int64_t next = 0;  // window
+    std::int64_t newest_begin_ns = kMinTimeNs;
+    std::int64_t reached_ns = kMinTimeNs;
+    std::int64_t released_ns = kMinTimeNs;
+    std::vector<std::pair<std::int64_t, std::int64_t>> lost_ns;  // windows that are not mapped
+    std::map<int, MissingEvents> missing;
+    std::map<int, Older> older;
+  };
+
+  bool hasPose(std::int64_t t_ns) const {
+    constexpr std::int64_t kMaxGapNs = 250 * kMs;
+    const auto after = clock_.poses_ns.lower_bound(t_ns);
+    if (after == clock_.poses_ns.end()) return false;
+    if (*after == t_ns) return true;
+    return after != clock_.poses_ns.begin() && *after - *std::prev(after) <= kMaxGapNs;
+  }
+  std::int64_t completeNs(const Camera& camera) const {
+    if (finished_) return kMaxTimeNs;
+    std::int64_t complete_ns = camera.covered_ns;
+    if (camera.newest_ns) complete_ns = std::max(complete_ns, *camera.newest_ns - kTickNs);
+    const bool any = clock_.newest_begin_ns != kMinTimeNs;
+    return any ? std::max(complete_ns, clock_.newest_begin_ns - kS) : complete_ns;
+  }
+  std::int64_t completeNs() const {
+    if (clock_.poses_ns.empty()) return kMinTimeNs;
+    return std::min(*clock_.poses_ns.rbegin(), eventsCompleteNs());
+  }
+  std::int64_t nextStartNs() const { return *clock_.start_ns + clock_.next * stride_ns_; }
+
+  /// @return false where the pose is refused.
+  bool use(const StampedPose& pose) {
+    if (!clock_.next_stretch.empty() || isJump(pose)) {
+      clock_.next_stretch.push_back(pose);
+      return true;
+    }
+    if (!pose.T_world_rig.translation.allFinite()) return false;
+    if (!clock_.poses_ns.empty() && pose.t_ns < *clock_.poses_ns.rbegin() - kS) return false;
+    if (!clock_.poses_ns.insert(pose.t_ns).second) ++status.counts.duplicate_poses;
+    if (!clock_.newest_pose || pose.t_ns >= clock_.newest_pose->t_ns) clock_.newest_pose = pose;
+    return true;
+  }
+  bool isJump(const StampedPose& pose) const {
+    if (!clock_.newest_pose || pose.t_ns <= clock_.newest_pose->t_ns) return false;
+    const auto step = pose.T_world_rig.translation - clock_.newest_pose->T_world_rig.translation;
+    return step.norm() >
+           max_speed_m_s_ * 1e-9 * static_cast<double>(pose.t_ns - clock_.newest_pose->t_ns);
+  }
+  bool beginStretch() {
+    if (clock_.next_stretch.empty()) return false;
+    if (eventsCompleteNs() < clock_.newest_pose->t_ns) return false;
+    ++status.live->pose_jumps;
+    giveUpBefore(clock_.next_stretch.front().t_ns, &WindowsGivenUp::jump);
+    clock_.newest_pose.reset();
+    const std::vector<StampedPose> poses = std::exchange(clock_.next_stretch, {});
+    for (const StampedPose& pose : poses) status.live->refused_poses += use(pose) ? 0 : 1;
+    return true;
+  }
+
+  std::optional<Window> windowOfStretch() {
+    if (!findStart()) return std::nullopt;
+    passEmptyWindows();
+    const std::int64_t t0_ns = nextStartNs();
+    const Window window{t0_ns, t0_ns + window_ns_, t0_ns + window_ns_ / 2};
+    const bool covered = clock_.reached_ns >= window.t1_ns && completeNs() >= window.t1_ns;
+    return covered ? std::optional(window) : std::nullopt;
+  }
+  /// The first event with a pose, once no camera can bring an earlier one.
+  bool findStart() {
+    if (clock_.start_ns || clock_.poses_ns.empty()) return clock_.start_ns.has_value();
+    std::int64_t first_ns = kMaxTimeNs;
+    for (const Camera& camera : clock_.cameras) {
+      for (const Held& event : camera.held) {
+        if (hasPose(event.t_ns)) first_ns = std::min(first_ns, event.t_ns);
+      }
+    }
+    decide(std::min(first_ns, completeNs()));
+    if (first_ns < kMaxTimeNs && eventsCompleteNs() >= first_ns) clock_.start_ns = first_ns;
+    return clock_.start_ns.has_value();
+  }
+  void passEmptyWindows() {
+    std::int64_t empty_ns = clock_.reached_ns;
+    for (const Camera& camera : clock_.cameras) {
+      std::int64_t next_ns = kMaxTimeNs;
+      for (const Held& event : camera.held) {
+        if (event.t_ns >= nextStartNs()) next_ns = std::min(next_ns, event.t_ns);
+      }
+      empty_ns = std::min(empty_ns, next_ns == kMaxTimeNs ? completeNs(camera) : next_ns);
+    }
+    for (; nextStartNs() + window_ns_ <= empty_ns; ++clock_.next) {
+      ++status.counts.windows_without_events;
+    }
+  }
+
+  void giveUpBefore(std::int64_t t_ns, GiveUpReason reason) {
+    std::int64_t from_ns = kMinTimeNs;
+    std::int64_t until_ns = t_ns;
+    if (clock_.start_ns) {
+      from_ns = nextStartNs();
+      for (; nextStartNs() < t_ns; ++clock_.next) ++(status.counts.windows_given_up.*reason);
+      until_ns = nextStartNs();
+    }
+    if (reason != &WindowsGivenUp::paused) lose(from_ns, until_ns);
+    release(t_ns);
+  }
+  void giveUpMissing(int camera, std::int64_t next_ns) {
+    const auto missing = clock_.missing.find(camera);
+    if (missing == clock_.missing.end()) return;
+    giveUpBefore(std::min(missing->second.until_ns, next_ns), missing->second.reason);
+    clock_.missing.erase(camera);
+  }
+  void lose(std::int64_t t0_ns, std::int64_t t1_ns) { clock_.lost_ns.push_back({t0_ns, t1_ns}); }
+  void release(std::int64_t t_ns) {
+    if (t_ns <= clock_.released_ns) return;
+    clock_.released_ns = t_ns;
+    decide(t_ns);
+  }
+  /// Says what became of the events before a time.
+  void decide(std::int64_t t_ns) {
+    for (std::size_t c = 0; c < kCameras; ++c) {
+      EventCounts& counts = status.counts.cameras[c];
+      std::vector<Held> later;
+      for (const Held& event : clock_.cameras[c].held) {
+        const bool lost =
+            std::any_of(clock_.lost_ns.begin(), clock_.lost_ns.end(), [&](const auto& interval) {
+              return event.t_ns >= interval.first && event.t_ns < interval.second;
+            });
+        if (event.t_ns >= t_ns) {
+          later.push_back(event);
+        } else {
+          ++(event.used             ? counts.used
+             : !hasPose(event.t_ns) ? counts.without_pose
+             : lost                 ? counts.dropped
+                                    : counts.outside_window);
+        }
+      }
+      clock_.cameras[c].held = later;
+    }
+  }
+  /// A clock that alone is behind the others is wrong; otherwise a second of older data says that
+  /// it went back.
+  void noteOlder(int sensor, std::int64_t t_ns) {
+    for (auto& [other, older] : clock_.older) older.others_ns.erase(sensor);
+    const Older older = clock_.older.try_emplace(sensor, Older{t_ns, {}}).first->second;
+    for (const auto& [other, other_ns] : older.others_ns) {
+      if (sensor != kTracker && other_ns - t_ns > kS) return;
+    }
+    if (t_ns - older.since_ns < kS) return;
+    giveUpBefore(clock_.reached_ns + 1, &WindowsGivenUp::clock_reset);
+    clock_ = {};
+    ++status.live->clock_steps;
+  }
+
+  std::int64_t window_ns_;
+  std::int64_t stride_ns_;
+  std::int64_t pose_wait_ns_;
+  double max_speed_m_s_;
+  Clock clock_;
+  bool finished_ = false;
+};
+
+enum Trouble {
+  kHealthy,
+  kCameraSilent,     // its events are lost
+  kCameraLate,       // its packets come together, later
+  kCameraClockBack,  // one camera's
+  kClockBack,        // all clocks, for good
+  kTrackerLost,
+  kTrackerJumps,
+  kTrackerClockBack,
+  kPosesTwice,
+  kLatePoses,
+  kBadPoses,
+  kLateEvents,
+  kBadPackets,
+  kPaused,
+  kHostStalls,  // it takes no input
+  kMappingFails,
+  kStoringFails,
+  kTooMuchWaits,
+  kNumTroubles
+};
+
+struct Phase {
+  int fault;
+  int camera;
+  int ticks;
+};
+
+void showValue(const Phase& phase, std::ostream& os) {
+  os << "{" << phase.fault << ", camera " << phase.camera << ", " << phase.ticks << " ticks}";
+}
+
+/// Session, queue and model in one thread.
+class Run {
+ public:
+  Run(const EventFusionOptions& options, const SyntheticRecording& recording)
+      : options_(options),
+        recording_(recording),
+        queue_(options.live),
+        session_(options),
+        model_(options) {}
+
+  void play(const std::vector<Phase>& phases) {
+    runPhase({kHealthy, 0, 5});
+    for (const Phase& phase : phases) runPhase(phase);
+    queue_.end();
+    taking_ = true;
+    step(kHealthy);
+    RC_ASSERT(session_.heldEvents() == 0U);
+    const SessionStatus status = session_.status();
+    for (const auto& [camera, counts] : queue_.counts()) {
+      RC_ASSERT(counts.held + counts.queued == 0U);
+      const EventCounts& taken = status.counts.cameras.at(std::size_t(camera));
+      RC_ASSERT(taken.read ==
+                taken.used + taken.without_pose + taken.outside_window + taken.dropped);
+    }
+  }
+
+ private:
+  void runPhase(const Phase& phase) {
+    if (phase.fault == kClockBack) shift_ns_ -= 1503 * kMs + phase.ticks * kTickNs;
+    if (phase.fault == kTrackerJumps) away_m_ += 10;
+    taking_ = phase.fault != kHostStalls;
+    for (int tick = 0; tick < phase.ticks && tick_ + 1 < recording_.poses.size(); ++tick) {
+      ++tick_;
+      addPose(phase.fault);
+      for (int c = 0; c < kCameras; ++c) {
+        const bool last = tick + 1 == phase.ticks;
+        addPacket(c, c == phase.camera ? phase.fault : pausedOr(phase.fault), last);
+      }
+      step(phase.fault);
+    }
+  }
+  static int pausedOr(int fault) { return fault == kPaused ? kPaused : kHealthy; }
+
+  void addPose(int fault) {
+    StampedPose pose = recording_.poses[tick_];
+    pose.t_ns += shift_ns_;
+    pose.T_world_rig.translation.y() += away_m_;
+    if (fault == kTrackerLost) return;
+    if (fault == kTrackerClockBack) pose.t_ns -= 3 * kS;
+    if (fault == kBadPoses) pose.T_world_rig.translation.x() = std::nan("");
+    if (fault == kPosesTwice) queue_.add(QueuedPose{pose, {}, {}});
+    queue_.add(QueuedPose{pose, {}, {}});
+    pose.t_ns -= 505 * kMs;
+    if (fault == kLatePoses) queue_.add(QueuedPose{pose, {}, {}});
+  }
+
+  void addPacket(int c, int fault, bool last) {
+    const auto index = static_cast<std::size_t>(c);
+    CameraPacket packet{c, recording_.cameras[index], {}, {}};
+    const std::int64_t until_ns = recording_.poses[tick_].t_ns;
+    std::size_t& begin = begin_[index];
+    const std::vector<Event>& events = recording_.events[index];
+    for (; begin < events.size() && events[begin].t_ns < until_ns; ++begin) {
+      packet.events.push_back(events[begin]);
+      packet.events.back().t_ns += shift_ns_;
+    }
+    packet.covered_until_ns = until_ns + shift_ns_;
+    if (fault == kCameraSilent) return;
+    CameraPacket& waiting = late_[index];
+    packet.events.insert(packet.events.begin(), waiting.events.begin(), waiting.events.end());
+    waiting.events.clear();
+    if (fault == kCameraLate && !last) {
+      waiting = packet;
+      return;
+    }
+    if (fault == kCameraClockBack) {
+      packet.covered_until_ns.reset();
+      for (Event& event : packet.events) event.t_ns -= 5 * kS;
+    }
+    const std::int64_t now_ns = until_ns + shift_ns_;
+    if (fault == kLateEvents) packet.events.push_back({now_ns - 40 * kMs, 1, 1, true});
+    if (fault == kBadPackets) packet.events.push_back({now_ns, 120, 1, true});
+    received_[index] += packet.events.size();
+    if (fault == kPaused) return queue_.skip(packet);
+    try {
+      queue_.add(std::move(packet));
+    } catch (const std::invalid_argument&) {
+      RC_ASSERT(fault == kBadPackets);
+    }
+  }
+
+  /// As the mapping's thread does.
+  void step(int fault) {
+    std::uint64_t queued = 0;
+    for (const auto& [camera, counts] : queue_.counts()) {
+      RC_ASSERT(counts.received == received_[std::size_t(camera)]);
+      queued += counts.queued;
+    }
+    RC_ASSERT(queued == queue_.queuedEvents());
+    RC_ASSERT(queued <= static_cast<std::uint64_t>(options_.live.max_queue_events));
+    if (!taking_) return;
+    const InputQueue::Batch batch = queue_.take();
+    for (const QueuedPose& pose : batch.poses) {
+      try {
+        session_.addPose(pose.pose, pose.source, pose.noise);
+      } catch (const std::invalid_argument&) {
+        ++refused_poses_;
+      }
+      model_.addPose(pose.pose);
+    }
+    for (const auto& [camera, missing] : batch.missing) {
+      session_.noteMissing(camera, missing);
+      model_.noteMissing(camera, missing);
+    }
+    for (const CameraPacket& packet : batch.packets) {
+      taken_[std::size_t(packet.camera)] += packet.events.size();
+      try {
+        session_.addEvents(packet);
+      } catch (const std::invalid_argument&) {
+      }
+      model_.addEvents(packet);
+    }
+    if (batch.ended) {
+      session_.finish();
+      model_.finish();
+    }
+    while (mapNext(fault)) {
+    }
+    model_.wait();
+    compare();
+  }
+
+  bool mapNext(int fault) {
+    if (fault == kTooMuchWaits) {
+      const std::optional<Window> oldest = model_.nextWindow();
+      const bool given_up =
+          oldest && model_.eventsCompleteNs() >= 2 * oldest->t1_ns - oldest->t0_ns;
+      if (given_up) model_.map(*oldest, Model::Outcome::kTooMuch);
+      RC_ASSERT(session_.giveUpOldestWindow() == given_up);
+    }
+    struct FailingSink : DsiSink {
+      void addPlane(int, const float*) override { throw std::runtime_error("disk full"); }
+    } sink;
+    using Outcome = Model::Outcome;
+    const auto outcome = fault == kMappingFails   ? Outcome::kMappingFails
+                         : fault == kStoringFails ? Outcome::kStoringFails
+                                                  : Outcome::kMapped;
+    bool expected = false;
+    std::optional<Window> mapped;
+    while (!expected) {
+      mapped = model_.nextWindow();
+      if (!mapped) break;
+      expected = model_.map(*mapped, outcome);
+    }
+    std::optional<Window> window;
+    try {
+      window = session_.nextWindow();
+      const auto keyframe =
+          session_.next(fault == kMappingFails ? &sink : nullptr, processSeconds, [&](const auto&) {
+            if (fault == kStoringFails) throw std::runtime_error("disk full");
+          });
+      RC_ASSERT(keyframe.has_value() == expected);
+      if (keyframe) RC_ASSERT(keyframe->window.t0_ns == mapped->t0_ns);
+      return keyframe.has_value();
+    } catch (const std::runtime_error&) {
+      RC_ASSERT(expected);
+      if (window) session_.giveUpWindow(*window);
+      return window.has_value();
+    }
+  }
+
+  void compare() {
+    SessionStatus status = session_.status();
+    status.live->refused_poses += refused_poses_;
+    const Table table = tableOf(status);
+    RC_ASSERT(differences(table, tableOf(model_.status)) == std::vector<std::string>{});
+    RC_ASSERT(session_.heldEvents() == model_.heldEvents());
+    for (const auto& [what, count] : earlier_) RC_ASSERT(table.at(what) >= count);
+    earlier_ = table;
+    for (const auto& [camera, counts] : queue_.counts()) {
+      const auto index = static_cast<std::size_t>(camera);
+      RC_ASSERT(counts.queued == 0U);
+      RC_ASSERT(counts.taken == taken_[index]);
+      const auto refused = status.refused_events.find(camera);
+      RC_ASSERT(counts.taken == status.counts.cameras.at(index).read +
+                                    (refused == status.refused_events.end() ? 0 : refused->second));
+    }
+  }
+
+  EventFusionOptions options_;
+  const SyntheticRecording& recording_;
+  InputQueue queue_;
+  MappingSession session_;
+  Model model_;
+  std::size_t tick_ = 0;
+  std::array<std::size_t, kCameras> begin_{};
+  std::array<CameraPacket, kCameras> late_;
+  std::array<std::uint64_t, kCameras> received_{};
+  std::array<std::uint64_t, kCameras> taken_{};
+  std::int64_t shift_ns_ = 0;
+  double away_m_ = 0;
+  bool taking_ = true;
+  std::uint64_t refused_poses_ = 0;
+  Table earlier_;
+};
+
+RC_GTEST_PROP(SessionModel, SaysWhatBecomesOfEachEventPoseAndWindow, ()) {
+  static const SyntheticRecording recording(6, kCameras, {2, 0.4, 0, 0});
+  EventFusionOptions options = syntheticOptions();
+  options.live.enabled = true;
+  options.rig.time_offsets_ns = {0, 0};
+  options.mapper.keyframe.planes.num_planes = 4;
+  options.mapper.keyframe.sweep.threads = 1;
+  options.live.max_event_rate = 0;
+  options.live.max_queue_events = *rc::gen::element(60, 1'000'000);
+  options.live.max_pose_wait_s = *rc::gen::element(0.2, 0.6, 2.0);
+  const auto phase = rc::gen::construct<Phase>(
+      rc::gen::inRange(0, static_cast<int>(kNumTroubles)), rc::gen::inRange(0, kCameras),
+      rc::gen::weightedOneOf<int>({{5, rc::gen::inRange(1, 40)}, {1, rc::gen::inRange(90, 250)}}));
+  const auto phases = *rc::gen::container<std::vector<Phase>>(phase);
+  Run(options, recording).play(phases);
+}
+
+}  // namespace
+}  // namespace efm
