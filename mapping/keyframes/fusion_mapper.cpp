@@ -136,12 +136,15 @@ void FusionMapper::coverAllUntil(std::int64_t t_ns) {
 }
 
 std::optional<KeyframeDepthMap> FusionMapper::next(DsiSink* sink, StageHook* stages) {
+  failed_.reset();
   {
     const StageScope scope(stages, Stage::kFilter);
     filterEvents();
   }
   while (const std::optional<Window> window = coveredWindow()) {
+    failed_ = window;
     std::optional<KeyframeDepthMap> keyframe = mapWindow(*window, sink, stages);
+    failed_.reset();
     policy_->advance(*window, keyframe ? &*keyframe : nullptr);
     releaseBefore(releasableUntil());
     if (keyframe) return keyframe;
@@ -180,6 +183,12 @@ void FusionMapper::giveUpWindow(const Window& window, GiveUpReason reason) {
   policy_->advance(window, nullptr);
   loseEvents(window.t0_ns, policy_->earliestStart(*this), reason);
   releaseBefore(releasableUntil());
+}
+
+bool FusionMapper::giveUpFailed() {
+  if (!failed_) return false;
+  giveUpWindow(*std::exchange(failed_, std::nullopt), &WindowsGivenUp::error);
+  return true;
 }
 
 void FusionMapper::giveUpBefore(std::int64_t t_ns, GiveUpReason reason) {

@@ -150,6 +150,9 @@ class FusionMapper : private RecordingProgress {
   void skipWindow(const Window& window);
   /// The same; the window counts as given up.
   void giveUpWindow(const Window& window, GiveUpReason reason);
+  /// After `next` has thrown: gives up the window that it was mapping, for an error.
+  /// @return whether there was one. Otherwise the next call of `next` tries the same again.
+  bool giveUpFailed();
   /// Gives up the windows that begin before a time, with or without data, and releases the events
   /// before it. Such an event that comes later is counted as dropped, and so is each event of these
   /// windows that no other one uses, unless the reason is `paused`.
@@ -217,6 +220,7 @@ class FusionMapper : private RecordingProgress {
   std::optional<std::int64_t> packet_ns_;   // first event of the newest packet of any camera
   std::int64_t released_ns_ = kMinTimeNs;   // earlier events are counted and released
   bool finished_ = false;
+  std::optional<Window> failed_;  // `next` began to map it, and did not end
   MapperCounts counts_;  // without those of the cameras
 };
 

@@ -157,12 +157,10 @@ bool LiveMapping::mapNext() {
     clock = clock_;
   }
   std::optional<KeyframeDepthMap> keyframe;
-  std::optional<Window> window;
   const std::size_t kept = next_map_.trajectory.size();
   const std::size_t kept_frames = keyframes_.size();
   try {
     giveUpExcess();
-    window = session_->nextWindow();
     keyframe = session_->next(sink, clock, [this](const KeyframeDepthMap& made) {
       keep(storedKeyframe(made, session_->pointsOf(made)));
     });
@@ -172,9 +170,7 @@ bool LiveMapping::mapNext() {
     next_map_.frames.resize(std::min(next_map_.frames.size(), kept_frames));
     keyframes_.resize(std::min(keyframes_.size(), kept_frames));
     noteError("a keyframe", Fault::kMapping);
-    if (!window) return false;
-    session_->giveUpWindow(*window);
-    return true;
+    return session_->giveUpFailed();
   }
   if (!keyframe) return false;
   forgetOldest();

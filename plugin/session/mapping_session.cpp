@@ -354,11 +354,8 @@ void MappingSession::giveUpOlderHalf() {
   }
 }
 
-void MappingSession::giveUpWindow(const Window& window) {
-  const std::optional<Window> next = nextWindow();
-  if (next && next->t0_ns == window.t0_ns) {
-    mapper_.giveUpWindow(*next, &WindowsGivenUp::error);
-  }
+bool MappingSession::giveUpFailed() {
+  return std::exchange(keyframe_lost_, false) || mapper_.giveUpFailed();
 }
 
 std::optional<Window> MappingSession::nextWindow() {
@@ -389,6 +386,7 @@ void MappingSession::finish() {
 
 std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const ProcessorClock& clock,
                                                      const KeyframeStore& store) {
+  keyframe_lost_ = false;
   if (!rig_.isComplete() || !chooseAutomatic()) {
     limitWaits();
     return std::nullopt;
@@ -406,6 +404,7 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
       insert(*keyframe, store);
     } catch (...) {
       mapper_.loseKeyframe();
+      keyframe_lost_ = true;
       throw;
     }
   } else if (finished_ && refinement_ && !std::exchange(all_refined_, true)) {

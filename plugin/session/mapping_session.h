@@ -111,10 +111,11 @@ class MappingSession {
   /// @return whether it chose.
   /// @throws std::invalid_argument where the options do not fit the rig.
   bool chooseFromSoFar(double at_least_s);
-  /// The window that `next` would map, if there is one.
+  /// The next window that is covered, if there is one.
   std::optional<Window> nextWindow();
-  /// Gives this window up if it is still the next one.
-  void giveUpWindow(const Window& window);
+  /// After `next` has thrown: gives up the window that it was mapping.
+  /// @return whether it goes on to another window. Otherwise it was none that failed.
+  bool giveUpFailed();
   /// The events that windows may still need.
   std::size_t heldEvents() const { return mapper_.heldEvents(); }
 
@@ -186,6 +187,7 @@ class MappingSession {
   // The stated noise of the poses of each source, by their times.
   std::map<PoseSourceId, std::map<std::int64_t, std::optional<PoseNoise>>> noises_;
   bool finished_ = false;
+  bool keyframe_lost_ = false;  // the last call of `next` made one and threw
   bool all_refined_ = false;
   std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
   std::optional<StampedPose> newest_pose_;

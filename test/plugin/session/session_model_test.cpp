@@ -580,9 +580,7 @@ class Run {
       if (!mapped) break;
       expected = model_.map(*mapped, outcome);
     }
-    std::optional<Window> window;
     try {
-      window = session_.nextWindow();
       const auto keyframe =
           session_.next(fault == kMappingFails ? &sink : nullptr, processSeconds, [&](const auto&) {
             if (fault == kStoringFails) throw std::runtime_error("disk full");
@@ -592,8 +590,7 @@ class Run {
       return keyframe.has_value();
     } catch (const std::runtime_error&) {
       RC_ASSERT(expected);
-      if (window) session_.giveUpWindow(*window);
-      return window.has_value();
+      return session_.giveUpFailed();
     }
   }
 
