@@ -301,7 +301,7 @@ void MappingSession::limitWaits() {
   if (!status_.events) return;
   const std::int64_t overdue_ns =
       status_.events->last_ns - durationFromSeconds(options_.live.max_pose_wait_s);
-  if (!newest_pose_ || newest_pose_->t_ns < overdue_ns) {
+  if (!newest_ns || *newest_ns < overdue_ns) {
     mapper_.giveUpBefore(overdue_ns, &WindowsGivenUp::no_pose);
   }
 }
