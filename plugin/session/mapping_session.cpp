@@ -197,7 +197,7 @@ bool MappingSession::seenFor(std::int64_t duration_ns) const {
 void MappingSession::completeRig() {
   if (rig_.isComplete()) return;
   rig_.requireOptionsFit();
-  usePoses(pose_source_.select(), std::nullopt);
+  for (const StampedPose& pose : pose_source_.select()) useWaiting(pose, std::nullopt);
   rig_.complete();
 }
 
@@ -243,6 +243,16 @@ void MappingSession::usePoses(const std::vector<StampedPose>& poses,
   }
 }
 
+/// In live operation one that is refused takes no other one with it.
+void MappingSession::useWaiting(const StampedPose& pose, const std::optional<PoseNoise>& noise) {
+  try {
+    usePoses({pose}, noise);
+  } catch (const std::invalid_argument&) {
+    if (!options_.live.enabled) throw;
+    ++status_.live->refused_poses;
+  }
+}
+
 /// Whether no motion explains a pose after the one before it.
 bool MappingSession::isJump(const StampedPose& pose, const PoseNoise& noise) const {
   if (!newest_pose_ || pose.t_ns <= newest_pose_->t_ns) return false;
@@ -268,13 +278,7 @@ bool MappingSession::beginStretch() {
   ++status_.live->pose_jumps;
   mapper_.giveUpBefore(next_stretch_.front().first.t_ns, &WindowsGivenUp::jump);
   newest_pose_.reset();
-  for (const auto& [pose, noise] : std::exchange(next_stretch_, {})) {
-    try {
-      usePoses({pose}, noise);
-    } catch (const std::invalid_argument&) {
-      ++status_.live->refused_poses;
-    }
-  }
+  for (const auto& [pose, noise] : std::exchange(next_stretch_, {})) useWaiting(pose, noise);
   if (finished_ && next_stretch_.empty()) mapper_.finish();
   return true;
 }
@@ -378,7 +382,7 @@ void MappingSession::finish() {
   for (const auto& [camera, events] : rig_.waitingEvents()) {
     status_.refused_events[camera] += events;
   }
-  usePoses(pose_source_.select(), std::nullopt);
+  for (const StampedPose& pose : pose_source_.select()) useWaiting(pose, std::nullopt);
   if (next_stretch_.empty()) mapper_.finish();  // otherwise after the windows before the jump
   completeRig();
   rig_.requireNoneWaits();

@@ -147,6 +147,7 @@ class MappingSession {
   void noteInTime(int sensor, std::int64_t t_ns);
   void startAnew();
   void usePoses(const std::vector<StampedPose>& poses, const std::optional<PoseNoise>& noise);
+  void useWaiting(const StampedPose& pose, const std::optional<PoseNoise>& noise);
   bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
   bool stretchEnds() const;
   bool beginStretch();
