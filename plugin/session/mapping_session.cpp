@@ -83,7 +83,7 @@ void MappingSession::addEvents(CameraPacket packet) {
   try {
     const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
     packets = rig_.add(std::move(packet), mapper_);
-  } catch (const std::invalid_argument&) {
+  } catch (...) {
     status_.refused_events[camera] += events;
     throw;
   }
@@ -98,11 +98,12 @@ void MappingSession::addEvents(CameraPacket packet) {
       mapper_.dropLate(ready_camera, ready.events);
     }
     const std::size_t ready_events = ready.events.size();
-    const std::uint64_t read = mapper_.counts().total().read;
+    std::optional<std::uint64_t> read;
     try {
+      read = mapper_.counts().total().read;
       feed(std::move(ready));
-    } catch (const std::invalid_argument&) {
-      if (mapper_.counts().total().read == read) {
+    } catch (...) {  // it contradicts its camera, or no memory
+      if (!read || mapper_.counts().total().read == *read) {
         status_.refused_events[ready_camera] += ready_events;
       }
       if (!refusal) refusal = std::current_exception();
@@ -135,12 +136,12 @@ void MappingSession::noteInTime(int sensor, std::int64_t t_ns) {
 
 /// The clock went back: maps on it from now on, with the map so far.
 void MappingSession::startAnew() {
+  FusionMapper anew(mapperOptions(options_));  // complete before it is used: memory may fail
+  for (const RigCamera& rig_camera : mapper_.rig().cameras) anew.addCamera(rig_camera);
+  if (depth_follower_) anew.setPlanes(depth_follower_->planes());
   mapper_.giveUpAll(&WindowsGivenUp::clock_reset);
   earlier_counts_ += mapper_.counts();
-  const Rig rig = mapper_.rig();
-  mapper_ = FusionMapper(mapperOptions(options_));
-  for (const RigCamera& rig_camera : rig.cameras) mapper_.addCamera(rig_camera);
-  if (depth_follower_) mapper_.setPlanes(depth_follower_->planes());
+  mapper_ = std::move(anew);
   ++status_.live->clock_steps;
   status_.events.reset();
   newest_begin_ns_.reset();
