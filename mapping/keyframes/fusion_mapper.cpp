@@ -221,6 +221,12 @@ std::size_t FusionMapper::heldEvents() const {
       [](std::size_t sum, const CameraStream& camera) { return sum + camera.heldEvents(); });
 }
 
+std::uint64_t FusionMapper::readEvents() const {
+  return std::accumulate(
+      cameras_.begin(), cameras_.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const CameraStream& camera) { return sum + camera.counts().read; });
+}
+
 std::int64_t FusionMapper::oldestHeldNs() const {
   std::int64_t oldest_ns = kMaxTimeNs;
   for (const CameraStream& camera : cameras_) {

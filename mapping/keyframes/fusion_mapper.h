@@ -161,6 +161,8 @@ class FusionMapper : private RecordingProgress {
   void giveUpAll(GiveUpReason reason) { giveUpBefore(reachedNs() + 1, reason); }
   /// The newest keyframe is not kept: its window counts as given up for an error.
   void loseKeyframe();
+  /// All events that were added, of all cameras: the sum of `EventCounts::read`.
+  std::uint64_t readEvents() const;
   /// The events that windows may still need.
   std::size_t heldEvents() const;
   /// The time of the first of them; kMaxTimeNs if there is none.

@@ -91,21 +91,17 @@ void MappingSession::addEvents(CameraPacket packet) {
   std::exception_ptr refusal;
   for (CameraPacket& ready : packets) {
     const int ready_camera = ready.camera;
+    const std::uint64_t complete = mapper_.readEvents() + ready.events.size();
     std::optional<std::int64_t> older_ns;
-    if (options_.live.enabled && mapper_.isOlder(ready_camera, ready.events)) {
-      older_ns = trajectoryTime(ready.events.front().t_ns, ready.calibration.time_offset_ns);
-    } else if (options_.live.enabled) {
-      mapper_.dropLate(ready_camera, ready.events);
-    }
-    const std::size_t ready_events = ready.events.size();
-    std::optional<std::uint64_t> read;
     try {
-      read = mapper_.counts().total().read;
+      if (options_.live.enabled && mapper_.isOlder(ready_camera, ready.events)) {
+        older_ns = trajectoryTime(ready.events.front().t_ns, ready.calibration.time_offset_ns);
+      } else if (options_.live.enabled) {
+        mapper_.dropLate(ready_camera, ready.events);
+      }
       feed(std::move(ready));
     } catch (...) {  // it contradicts its camera, or no memory
-      if (!read || mapper_.counts().total().read == *read) {
-        status_.refused_events[ready_camera] += ready_events;
-      }
+      status_.refused_events[ready_camera] += complete - mapper_.readEvents();
       if (!refusal) refusal = std::current_exception();
       if (older_ns) noteOlder(ready_camera, *older_ns);
     }

@@ -495,7 +495,7 @@ class Run {
     pose.t_ns += shift_ns_;
     pose.T_world_rig.translation.y() += away_m_;
     if (fault == kTrackerLost) return;
-    if (fault == kTrackerClockBack) pose.t_ns -= 3 * kS;
+    if (fault == kTrackerClockBack) pose.t_ns -= 3007 * kMs;  // at no other time again
     if (fault == kBadPoses) pose.T_world_rig.translation.x() = std::nan("");
     if (fault == kPosesTwice) queue_.add(QueuedPose{pose, source_, {}});
     queue_.add(QueuedPose{pose, source_, {}});
