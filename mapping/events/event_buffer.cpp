@@ -28,9 +28,16 @@ std::uint64_t EventBuffer::insert(EventSpan added) {
   }
   // Times are whole: the first event later than the earliest late one. The old events are sorted.
   const std::size_t first_unsorted = late > 0 ? indexOf(earliest_late + 1) : 0;
-  events.insert(events.end(), added.begin(), added.end());
-  used.resize(events.size());
-  if (late > 0) sortFrom(first_unsorted);
+  const std::size_t before = events.size();
+  try {
+    events.insert(events.end(), added.begin(), added.end());
+    used.resize(events.size());
+    if (late > 0) sortFrom(first_unsorted);
+  } catch (...) {  // no memory
+    events.resize(before);
+    used.resize(before);
+    throw;
+  }
   return late;
 }
 

@@ -24,6 +24,7 @@ struct EventBuffer {
   /// Inserts events, each after others of the same time. Cost: linear for events in time order;
   /// otherwise that of sorting the events after the earliest late one.
   /// @return the number of events that came after a newer one.
+  /// @throws std::bad_alloc without a change.
   std::uint64_t insert(EventSpan added);
   /// Forgets the events from an index on.
   void cut(std::size_t index) {

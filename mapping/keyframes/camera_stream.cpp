@@ -2,6 +2,7 @@
 #include "mapping/keyframes/camera_stream.h"
 
 #include <algorithm>
+#include <new>
 #include <string>
 #include <utility>
 
@@ -138,7 +139,12 @@ std::uint64_t CameraStream::add(std::vector<Event> events, const TimeLimits& lim
   };
   events.erase(std::remove_if(events.begin(), events.end(), isUnwanted), events.end());
   covered_ns_ = std::max(covered_ns_, *newest_ns_ - kMaxEventDelayNs);
-  return filter_ ? filter_->insert(events) : buffer_.insert(events);
+  try {
+    return filter_ ? filter_->insert(events) : buffer_.insert(events);
+  } catch (const std::bad_alloc&) {
+    counts_.dropped += events.size();
+    throw;
+  }
 }
 
 void CameraStream::coverUntil(std::int64_t t_ns) {
