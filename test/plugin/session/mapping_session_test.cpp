@@ -475,6 +475,10 @@ std::vector<std::int64_t> startsOfWindows(MappingSession& session) {
   return starts;
 }
 
+struct FullDisk : DsiSink {
+  void addPlane(int, const float*) override { throw std::runtime_error("disk full"); }
+};
+
 TEST(MappingSession, AWindowIsGivenUpAsAWholeAndCountedOnceWithEveryPolicy) {
   const SyntheticRecording recording(2);
   for (const auto& [policy, at_least] :
@@ -484,16 +488,26 @@ TEST(MappingSession, AWindowIsGivenUpAsAWholeAndCountedOnceWithEveryPolicy) {
     feedTwoSeconds(skipping, recording);
     const std::vector<std::int64_t> expected = startsOfWindows(skipping);
     ASSERT_GE(expected.size(), at_least);
-    MappingSession session(liveOptions(policy));
-    feedTwoSeconds(session, recording);
-    std::vector<std::int64_t> starts;
-    while (const std::optional<Window> window = session.nextWindow()) {
-      starts.push_back(window->t0_ns);
-      if (!session.giveUpOldestWindow()) break;  // no newer events fill another one
+    for (const bool for_overload : {false, true}) {  // or for an error
+      MappingSession session(liveOptions(policy));
+      feedTwoSeconds(session, recording);
+      std::vector<std::int64_t> starts;
+      std::size_t given_up = 0;
+      while (const std::optional<Window> window = session.nextWindow()) {
+        starts.push_back(window->t0_ns);
+        if (!for_overload) {
+          FullDisk sink;
+          EXPECT_THROW(session.next(&sink, processSeconds), std::runtime_error);
+          ASSERT_TRUE(session.giveUpFailed());
+        } else if (!session.giveUpOldestWindow()) {
+          break;  // no newer events fill another one
+        }
+        ++given_up;
+      }
+      EXPECT_EQ(starts, expected) << nameOf(policy);
+      EXPECT_GE(given_up, expected.size() - 1) << nameOf(policy);
+      EXPECT_EQ(session.status().counts.windows_given_up.total(), given_up) << nameOf(policy);
     }
-    EXPECT_EQ(starts, expected) << nameOf(policy);
-    EXPECT_EQ(session.status().counts.windows_given_up.total(), starts.size() - 1)
-        << nameOf(policy);
   }
 }
 
