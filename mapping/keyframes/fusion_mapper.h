@@ -223,7 +223,7 @@ class FusionMapper : private RecordingProgress {
   std::int64_t released_ns_ = kMinTimeNs;   // earlier events are counted and released
   bool finished_ = false;
   std::optional<Window> failed_;  // `next` began to map it, and did not end
-  MapperCounts counts_;  // without those of the cameras
+  MapperCounts counts_;           // without those of the cameras
 };
 
 }  // namespace efm
