@@ -29,8 +29,8 @@ struct FusionMapperOptions {
   /// If given, this window is the only keyframe, and `policy` is not used.
   std::optional<Window> only_window;
   /// At the end of the recording, where the last window is not full: one that is full and ends
-  /// right after the last event with a pose. So it overlaps the window before. Not where less than
-  /// a tenth of it is new.
+  /// right after the last event with a pose. So it overlaps the window before. Not where it
+  /// adds less than a tenth of what other windows add.
   bool fill_last_window = true;
   KeyframeMapperOptions keyframe;
   std::vector<int> cameras;  ///< Indices of the cameras that take part, each once; empty: all.

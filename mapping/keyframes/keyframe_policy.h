@@ -80,16 +80,16 @@ class RecordingProgress {
 /// Decides which windows of a recording become keyframes, in order of t0.
 class KeyframePolicy {
  public:
-  /// A last window in which less than this fraction of the events is new would be the window before
-  /// once more, and each would seem to support the other's depths.
+  /// A last window that adds less than this fraction of what other windows add would be the window
+  /// before once more, and each would seem to support the other's depths.
   static constexpr double kLeastAdded = 0.1;
 
   virtual ~KeyframePolicy() = default;
   /// The current window, as soon as the recording certainly fills it.
   /// @return nothing before that, and after the last window.
   virtual std::optional<Window> current(const RecordingProgress& recording) = 0;
-  /// Of a recording that has ended: a full window that ends with it, if at least `kLeastAdded` of
-  /// its events (of its time) are in no other one.
+  /// Of a recording that has ended: a full window that ends with it, if it adds enough that is in
+  /// no other one (`kLeastAdded`).
   /// @param end_ns right after the last event with a pose.
   /// @return nothing where that window would begin before the recording does.
   virtual std::optional<Window> last(const RecordingProgress& recording,
