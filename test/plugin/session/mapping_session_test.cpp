@@ -475,10 +475,6 @@ std::vector<std::int64_t> startsOfWindows(MappingSession& session) {
   return starts;
 }
 
-struct FullDisk : DsiSink {
-  void addPlane(int, const float*) override { throw std::runtime_error("disk full"); }
-};
-
 TEST(MappingSession, AWindowIsGivenUpAsAWholeAndCountedOnceWithEveryPolicy) {
   const SyntheticRecording recording(2);
   for (const auto& [policy, at_least] :
@@ -496,7 +492,7 @@ TEST(MappingSession, AWindowIsGivenUpAsAWholeAndCountedOnceWithEveryPolicy) {
       while (const std::optional<Window> window = session.nextWindow()) {
         starts.push_back(window->t0_ns);
         if (!for_overload) {
-          FullDisk sink;
+          AlwaysFailingSink sink;
           EXPECT_THROW(session.next(&sink, processSeconds), std::runtime_error);
           ASSERT_TRUE(session.giveUpFailed());
         } else if (!session.giveUpOldestWindow()) {

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -33,6 +34,13 @@ inline CameraPacket pieceOf(const SyntheticRecording& recording, int camera, dou
   events.erase(std::remove_if(events.begin(), events.end(), outside), events.end());
   return packet;
 }
+
+/// No keyframe is made with it.
+struct AlwaysFailingSink : DsiSink {
+  void addPlane(int /*plane*/, const float* /*values*/) override {
+    throw std::runtime_error("disk full");
+  }
+};
 
 inline void addPoses(MappingSession& session, const SyntheticRecording& recording) {
   for (const StampedPose& pose : recording.poses) session.addPose(pose);

@@ -165,6 +165,9 @@ class Model {
     return std::nullopt;
   }
 
+  /// The same, without going on to the poses after a jump.
+  std::optional<Window> oldestWindow() { return rig_complete_ ? windowOfStretch() : std::nullopt; }
+
   enum class Outcome { kMapped, kMappingFails, kStoringFails, kTooMuch };
   /// @return whether it made a keyframe.
   bool map(const Window& window, Outcome outcome) {
@@ -589,16 +592,14 @@ class Run {
 
   bool mapNext(int fault) {
     if (fault == kTooMuchWaits) {
-      const std::optional<Window> oldest = predicts_ ? model_.nextWindow() : std::nullopt;
+      const std::optional<Window> oldest = predicts_ ? model_.oldestWindow() : std::nullopt;
       const bool given_up =
           oldest && model_.eventsCompleteNs() >= 2 * oldest->t1_ns - oldest->t0_ns;
       if (given_up) model_.map(*oldest, Model::Outcome::kTooMuch);
       const bool gives_up = session_.giveUpOldestWindow();
       RC_ASSERT(!predicts_ || gives_up == given_up);
     }
-    struct FailingSink : DsiSink {
-      void addPlane(int, const float*) override { throw std::runtime_error("disk full"); }
-    } sink;
+    AlwaysFailingSink sink;
     using Outcome = Model::Outcome;
     const auto outcome = fault == kMappingFails   ? Outcome::kMappingFails
                          : fault == kStoringFails ? Outcome::kStoringFails
