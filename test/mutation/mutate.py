@@ -39,9 +39,9 @@ def code_of(text):
 NEGATED = {"<": ">=", "<=": ">", ">": "<=", ">=": "<", "==": "!=", "!=": "=="}
 BOUNDARY = {"<": "<=", "<=": "<", ">": ">=", ">=": ">"}
 TWINS = [("x", "y"), ("width", "height"), ("rows", "cols"), ("fx", "fy"), ("cx", "cy"), ("front", "back"),
-         ("min", "max"), ("t0_ns", "t1_ns"), ("lower_bound", "upper_bound"), ("floor", "ceil"),
+         ("min", "max"), ("t0_ns", "t1_ns"), ("lower_bound", "upper_bound"), ("floor", "ceil"), ("floor", "round"),
          ("first", "second"), ("u", "v"), ("break", "continue"), ("true", "false"), ("begin", "end"),
-         ("rotation", "rotation.inverse()"), ("floor", "round"), ("min_depth_m", "max_depth_m"),
+         ("rotation", "rotation.inverse()"), ("min_depth_m", "max_depth_m"),
          ("T_world_rig", "T_world_rig.inverse()"), ("any_of", "all_of")]
 UNITS = [("1e-9", "1e-6"), ("1e9", "1e6"), ("1e-6", "1e-3"), ("1e6", "1e3"), ("1e-3", "1"), ("1000", "1"),
          ("kRadiansPerDegree", "1.0"), ("kNanosecondsPerSecond", "1'000'000"), ("100", "1")]
@@ -90,7 +90,7 @@ def changes_in(file, text):
     for one, other in TWINS:
         for old, new in ((one, other), (other, one)):
             if re.fullmatch(r"\w+", old):
-                yield from made("twin", r"(?<![\w\"])(" + old + r")(?![\w\"<(]*[<\"])\b", lambda m, new=new: [new])
+                yield from made("twin", rf"(?<!\w)({old})(?!\w)", lambda m, new=new: [new])
     for one, other in UNITS:
         yield from made("unit", r"(?<![\w.'])(" + re.escape(one) + r")(?![\w.'])", lambda m, other=other: [other])
 
@@ -224,6 +224,7 @@ class Run:
         self.rooms = read_rooms()
         self.set_aside = read_set_aside()
         self.limits_s = {}
+        self.bytes = {}  # of the programs of a room, without a change
         self.results = []
 
     def prepare(self, rooms):
@@ -240,19 +241,18 @@ class Run:
             if failed:
                 sys.exit(f"mutate.py: {failed} fails without a change")
             self.limits_s[program] = int(3 * (time.monotonic() - begin)) + 20
+        self.bytes = {room: bytes_of(self.rooms[room]) for room in rooms}
 
     def outcome(self, room, change, text):
         """(outcome, who noticed it)"""
         programs = self.rooms[room]
-        build(programs)
-        before = bytes_of(programs)
         path = os.path.join(TREE, change.file)
         with open(path, "w") as file:
             file.write(text[:change.begin] + change.text + text[change.end:])
         try:
             if not build(programs):
                 return "did not build", ""
-            if bytes_of(programs) == before:
+            if bytes_of(programs) == self.bytes[room]:
                 return "same program", ""
             for program in programs:
                 noticed = run_test(program, self.limits_s[program])
@@ -305,7 +305,7 @@ class Run:
 
     def print_table(self):
         columns = ("caught", "survived", "set aside", "same program", "did not build")
-        print("\n| room | noticed | " + " | ".join(columns) + " |\n|---" * 1 + "|---" * (len(columns) + 1) + "|")
+        print(f"\n| room | noticed | {' | '.join(columns)} |\n{'|---' * (len(columns) + 2)}|")
         rooms = list(dict.fromkeys(result["room"] for result in self.results))
         for room in [*rooms, "all"]:
             counts = collections.Counter(
