@@ -20,7 +20,7 @@ import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 ROOT = os.path.dirname(os.path.dirname(HERE))
-TREE = os.path.join(ROOT, "build", "mutation")
+TREE = os.environ.get("EFM_MUTATION_TREE", os.path.join(ROOT, "build", "mutation"))
 BUILD = os.path.join(TREE, "build", "release")
 MEMORY_BYTES = 12 << 30
 
@@ -149,21 +149,43 @@ def configure():
                     f"-DEFM_SHARED_DATA={os.path.realpath(data)}"], check=True, stdout=subprocess.DEVNULL)
 
 
-def build(programs):
-    return subprocess.run(["cmake", "--build", BUILD, "--target", *programs, "event-fusion"],
+def build(targets):
+    return subprocess.run(["cmake", "--build", BUILD, "--target", *targets],
                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
 
 
-def bytes_of(programs):
-    """A hash of what the tests run."""
-    digest = hashlib.sha256()
-    folder = os.path.join(BUILD, "lib")
-    files = [os.path.join(BUILD, "bin", name) for name in (*programs, "event-fusion")]
-    files += [os.path.join(folder, name) for name in sorted(os.listdir(folder)) if name.endswith(".so")]
-    for file in files:
-        with open(file, "rb") as content:
-            digest.update(content.read())
-    return digest.hexdigest()
+def content_of(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+class Program:
+    """A test program and what it runs: libraries of the tree, and the command where its tests call it."""
+
+    def __init__(self, name):
+        self.name = name
+        self.targets = [name]
+        self.files = [os.path.join(BUILD, "bin", name)]
+        if not build(self.targets):
+            sys.exit("mutate.py: the tree does not build")
+        libraries = [name for name in sorted(os.listdir(os.path.join(BUILD, "lib"))) if name.endswith(".so")]
+        if b"bin/event-fusion" in content_of(self.files[0]):
+            self.targets += ["event-fusion", *(name[3:-3] for name in libraries)]
+            self.files.append(os.path.join(BUILD, "bin", "event-fusion"))
+        else:
+            linked = subprocess.run(["ldd", self.files[0]], capture_output=True, text=True).stdout
+            libraries = [name for name in libraries if name in linked]
+        self.files += [os.path.join(BUILD, "lib", name) for name in libraries]
+        if not build(self.targets):
+            sys.exit("mutate.py: the tree does not build")
+        self.unchanged = self.bytes()
+
+    def bytes(self):
+        """A hash of what the tests run."""
+        digest = hashlib.sha256()
+        for file in self.files:
+            digest.update(content_of(file))
+        return digest.hexdigest()
 
 
 # Nothing outside the test's own folder of temporary files can be written: a wrong change may delete anything.
@@ -223,42 +245,41 @@ class Run:
         self.arguments = arguments
         self.rooms = read_rooms()
         self.set_aside = read_set_aside()
+        self.programs = {}
         self.limits_s = {}
-        self.bytes = {}  # of the programs of a room, without a change
         self.results = []
 
     def prepare(self, rooms):
         copy_tree()
         configure()
-        programs = sorted({program for room in rooms for program in self.rooms[room]})
-        if not build(programs):
-            sys.exit("mutate.py: the tree does not build")
+        names = sorted({name for room in rooms for name in self.rooms[room]})
+        self.programs = {name: Program(name) for name in names}
         subprocess.run(["ctest", "--preset", "release", "-R", "^(recordings|formats)$"], cwd=TREE, check=True,
                        stdout=subprocess.DEVNULL)
-        for program in programs:  # a test that fails anyway notices nothing
+        for program in names:  # a test that fails anyway notices nothing
             begin = time.monotonic()
             failed = run_test(program, 1800)
             if failed:
                 sys.exit(f"mutate.py: {failed} fails without a change")
             self.limits_s[program] = int(3 * (time.monotonic() - begin)) + 20
-        self.bytes = {room: bytes_of(self.rooms[room]) for room in rooms}
 
     def outcome(self, room, change, text):
         """(outcome, who noticed it)"""
-        programs = self.rooms[room]
         path = os.path.join(TREE, change.file)
         with open(path, "w") as file:
             file.write(text[:change.begin] + change.text + text[change.end:])
+        outcome = "same program"
         try:
-            if not build(programs):
-                return "did not build", ""
-            if bytes_of(programs) == self.bytes[room]:
-                return "same program", ""
-            for program in programs:
-                noticed = run_test(program, self.limits_s[program])
+            for program in (self.programs[name] for name in self.rooms[room]):
+                if not build(program.targets):
+                    return "did not build", ""
+                if program.bytes() == program.unchanged:
+                    continue
+                outcome = "survived"
+                noticed = run_test(program.name, self.limits_s[program.name])
                 if noticed:
                     return "caught", noticed
-            return "survived", ""
+            return outcome, ""
         finally:
             with open(path, "w") as file:
                 file.write(text)
