@@ -53,8 +53,10 @@ void addEvaluateDepth(CLI::App& evaluate, Run& run) {
       .add_option("--baseline", arguments->baseline_m,
                   "Baseline in metres, for bad-pix; by default from the same file")
       ->check(aboveZero());
-  command.add_option("--max-depth", options.pairing.max_depth_m,
-                     "Leave out truth beyond this depth in metres");
+  command
+      .add_option("--max-depth", options.pairing.max_depth_m,
+                  "Leave out truth beyond this depth in metres")
+      ->check(aboveZero());
   command
       .add_option("--scale", options.png_scale,
                   "Of 16-bit PNG, units per metre (1000: millimetres, 256: KITTI, 5000: TUM); "
@@ -67,7 +69,8 @@ void addEvaluateDepth(CLI::App& evaluate, Run& run) {
   command
       .add_option("--tolerance-px", options.pairing.tolerance_px,
                   "Compare with the best truth within this distance in pixels")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(zeroOrMore());
   addList(command, "--thresholds", options.thresholds_m,
           "Error thresholds in metres for precision (fraction of the estimates with a truth whose "
           "error is within the threshold), recall (fraction of the true pixels with such an "

@@ -46,6 +46,8 @@ class Interruption : public TemporaryFolder {
   pid_t start(std::vector<std::string> arguments) const {
     const pid_t child = fork();
     if (child != 0) return child;
+    for (const int number : {SIGINT, SIGTERM})
+      std::signal(number, SIG_DFL);  // the parent may ignore
     const int null = open("/dev/null", O_RDWR);
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(null, stream);
     arguments.insert(arguments.begin(), EFM_EVENT_FUSION);

@@ -64,6 +64,8 @@ class AppTest : public ProgramTest {
 
  private:
   int runHere(const std::string& arguments) const {
+    for (const int number : {SIGINT, SIGTERM})
+      std::signal(number, SIG_DFL);  // the parent may ignore
     wordexp_t words{};
     const bool ready = chdir(folder().c_str()) == 0 && std::freopen("/dev/null", "r", stdin) &&
                        std::freopen("stdout.txt", "w", stdout) &&

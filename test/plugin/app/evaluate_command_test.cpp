@@ -133,45 +133,5 @@ TEST_F(EvaluateCommand, ComparesTheKeyframesTrajectoryWithThePoses) {
   EXPECT_FALSE(image("path.png").empty());
 }
 
-TEST_F(EvaluateCommand, WrongInputsAreErrors) {
-  writePlane(folder() / "plane.tiff");
-  EXPECT_EQ(errorOf("evaluate depth nowhere.tiff plane.tiff"),
-            "event-fusion: error: no such file: nowhere.tiff\n");
-  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --focal 100"),
-              HasSubstr("bad-pix needs both --focal and --baseline"));
-  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --focal -1"), HasSubstr("--focal"));
-  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --thresholds 0.1,0"),
-              HasSubstr("--thresholds"));
-  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --tolerance-px -1"),
-              HasSubstr("tolerance_px = -1"));
-  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --max-depth nan"),
-              HasSubstr("max_depth_m = nan"));
-  EXPECT_THAT(errorOf("evaluate depth plane.tiff plane.tiff --plot plot.jpg"),
-              HasSubstr("plot.jpg: expected a name that ends in .png"));
-  cv::imwrite((folder() / "data" / "own.png").string(), cv::Mat1b(2, 2, std::uint8_t{9}));
-  EXPECT_THAT(errorOf("evaluate depth plane.tiff data/own.png --plot data/../data/own.png"),
-              HasSubstr("it is the input data/own.png itself"));
-  EXPECT_THAT(errorOf("evaluate trajectory data data --plot data/own.png"),
-              HasSubstr("data/own.png: it may be an input, as it is in data"));
-  cv::imwrite((folder() / "mm.png").string(), cv::Mat_<std::uint16_t>(90, 120, std::uint16_t{9}));
-  EXPECT_THAT(errorOf("evaluate depth mm.png plane.tiff"), HasSubstr("--scale"));
-  EXPECT_THAT(errorOf("evaluate map plane.tiff plane.tiff"), HasSubstr("expected .pcd or .ply"));
-  EXPECT_THAT(errorOf("evaluate trajectory data data --align sim3"), HasSubstr("--align"));
-  EXPECT_THAT(errorOf("evaluate trajectory data data --max-diff -1"), HasSubstr("--max-diff"));
-  EXPECT_THAT(errorOf("evaluate trajectory data data --frames 0.5 --align none"),
-              HasSubstr("0.5: must be above 0, of frames a whole number"));
-  EXPECT_NE(run("evaluate").status, 0);
-}
-
-TEST_F(EvaluateCommand, HelpHasTheKeysOfTheJson) {
-  for (const auto& [kind, key] : {std::pair{"depth", "aerrr_by_estimate"},
-                                  {"map", "completeness"},
-                                  {"trajectory", "translation_percent"}}) {
-    const Result help = run(std::string("evaluate ") + kind + " --help");
-    EXPECT_EQ(help.status, 0);
-    EXPECT_THAT(help.out, AllOf(HasSubstr("Keys of --json"), HasSubstr(key), HasSubstr("--plot")));
-  }
-}
-
 }  // namespace
 }  // namespace efm

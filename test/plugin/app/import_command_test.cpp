@@ -137,35 +137,6 @@ TEST_F(ImportCommand, TheTruthOfAFolderIsExportedWithIt) {
   EXPECT_THAT(errorOf("info data"), HasSubstr("depth/index.txt:2: 'later b.tiff': expected"));
 }
 
-TEST_F(ImportCommand, ReplacesNothingButARawlog) {
-  writeSmallRecording();
-  const std::string events = contentOf("small/events.txt");
-  EXPECT_THAT(errorOf("import small --out small/events.txt"), HasSubstr("not a rawlog"));
-  EXPECT_EQ(contentOf("small/events.txt"), events);
-  ASSERT_EQ(run("import small --out s.rawlog").status, 0);
-  const std::string rawlog = contentOf("s.rawlog");
-  EXPECT_THAT(errorOf("import s.rawlog --out ./s.rawlog"),
-              HasSubstr("it is the input s.rawlog itself"));
-  const std::string bytes = contentOf("s.rawlog");
-  EXPECT_THAT(errorOf("import small --poses s.rawlog --out s.rawlog"),
-              HasSubstr("it is the input"));
-  for (const char* target : {"mcap", "folder"}) {
-    EXPECT_THAT(errorOf(std::string("export s.rawlog --out s.rawlog --to ") + target),
-                HasSubstr("s.rawlog: it is the input s.rawlog itself"));
-    EXPECT_THAT(errorOf(std::string("export small --out s.rawlog --to ") + target),
-                HasSubstr("s.rawlog: it exists: expected the name of a new file or folder"));
-  }
-  std::filesystem::create_hard_link(folder() / "s.rawlog", folder() / "hard.rawlog");
-  std::filesystem::create_symlink("s.rawlog", folder() / "soft.rawlog");
-  for (const char* link : {"hard.rawlog", "soft.rawlog"}) {
-    EXPECT_THAT(errorOf(std::string("import s.rawlog --out ") + link),
-                HasSubstr(std::string(link) + ": it is the input s.rawlog itself"));
-  }
-  EXPECT_EQ(contentOf("s.rawlog"), bytes);
-  EXPECT_EQ(contentOf("s.rawlog"), rawlog);
-  EXPECT_EQ(run("import small --out s.rawlog --t1 0.04").status, 0);
-}
-
 TEST_F(ImportCommand, AnExportedFolderGivesTheSameMap) {
   write(SyntheticRecording());
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
@@ -200,28 +171,6 @@ TEST_F(ImportCommand, InfoIsTheSameForAFolderAndItsRawlog) {
   const std::size_t end = folder.out.find('\n', sorted) + 1;
   EXPECT_EQ(rawlog.out, folder.out.substr(0, sorted) + folder.out.substr(end));
   EXPECT_THAT(rawlog.out, HasSubstr("the options that are auto would be:\n  window_s = 0.2: "));
-}
-
-TEST_F(ImportCommand, ImportsAnIntervalOfTheRecording) {
-  writeSmallRecording();
-  const Result result = run("import small --out s.rawlog --t0 0.02 --t1 0.03");
-  EXPECT_EQ(result.status, 0);
-  EXPECT_THAT(result.out, AllOf(HasSubstr("cam0: 2 events"), HasSubstr("2 poses")));
-}
-
-TEST_F(ImportCommand, AnIntervalWithoutEventsIsAnErrorWithTheTimesOfTheEvents) {
-  writeSmallRecording();
-  const char* const span = ": the recording has events from 0.010000000 s to 0.050000000 s\n";
-  // Around the middle one lie poses, but no event.
-  for (const char* times : {"--t0 7 --t1 8", "--t0 0.011 --t1 0.018", "--t0 7", "--t1 0.005"}) {
-    const Result result = run(std::string("import small --out s.rawlog ") + times);
-    EXPECT_NE(result.status, 0);
-    EXPECT_THAT(result.err, AllOf(StartsWith("event-fusion: error: no event "), EndsWith(span)));
-    EXPECT_FALSE(exists(folder() / "s.rawlog"));
-    EXPECT_THAT(filesIn("."), Not(Contains(HasSubstr("partial"))));
-  }
-  EXPECT_THAT(run("import small --out s.rawlog --t0 7 --t1 8").err,
-              HasSubstr("no event from --t0 7.000000000 s until --t1 8.000000000 s: "));
 }
 
 TEST_F(ImportCommand, ReadsTheRealSliderRecordingCompletely) {
@@ -274,35 +223,6 @@ TEST_F(ImportCommand, ASimulatedRecordingBecomesARawlog) {
 
 // --- Bad input ---------------------------------------------------------------------------------
 
-TEST_F(ImportCommand, AMissingRecordingIsAnErrorOnOneLine) {
-  for (const char* command : {"import nowhere --out s.rawlog", "info nowhere"}) {
-    const Result result = run(command);
-    EXPECT_NE(result.status, 0) << command;
-    EXPECT_EQ(result.err, "event-fusion: error: nowhere: no such file or folder\n");
-  }
-  EXPECT_FALSE(exists(folder() / "s.rawlog"));
-}
-
-TEST_F(ImportCommand, AnEventOutsideTheSensorIsAnErrorThatNamesTheLineAndLeavesNoRawlog) {
-  writeSmallRecording();
-  write("small/events.txt", "0.010 240 4 0\n0.020 1 2 1\n");
-  const Result result = run("import small --out s.rawlog");
-  EXPECT_NE(result.status, 0);
-  EXPECT_THAT(result.err, AllOf(HasSubstr("events.txt:1: "), HasSubstr("240")));
-  EXPECT_FALSE(exists(folder() / "s.rawlog"));
-  EXPECT_THAT(filesIn("."), Not(Contains(HasSubstr("partial"))));
-}
-
-TEST_F(ImportCommand, InfoOfATruncatedFolderPrintsTheContentsBeforeTheErrorAndFails) {
-  writeSmallRecording();
-  write("small/events.txt", "0.010 1 2 1\n0.020 3 4 0\n0.030 5");
-  const Result result = run("info small");
-  EXPECT_NE(result.status, 0);
-  EXPECT_THAT(result.out, AllOf(HasSubstr("2 events from 0.010000000 s to 0.020000000 s"),
-                                HasSubstr("3 poses from 0.015000000 s to 0.045000000 s")));
-  EXPECT_THAT(result.err, HasSubstr("small/events.txt:3: '0.030 5': expected t x y p, but the"));
-}
-
 TEST_F(ImportCommand, InfoOfATruncatedRawlogPrintsTheContentsBeforeTheErrorAndFails) {
   writeSmallRecording();
   ASSERT_EQ(run("import small --out s.rawlog").status, 0);
@@ -318,58 +238,6 @@ TEST_F(ImportCommand, InfoOfATruncatedRawlogPrintsTheContentsBeforeTheErrorAndFa
       << result.err;
 }
 
-TEST_F(ImportCommand, AFileOfAnotherKindIsAnErrorThatNamesTheExpectedKind) {
-  writeSmallRecording();
-  ASSERT_EQ(std::system(("gzip -k '" + (folder() / "small/events.txt").string() + "'").c_str()), 0);
-  write("empty.rawlog", "");
-  write("picture.png", "\x89PNG\r\n\x1a\n");
-  write("short", "\x97");
-  write("words.bin", std::string("\x05\0\0\0a b c", 9));
-  const std::string expected =
-      ": expected a rawlog, or a recording in another format (docs/recordings.md)\n";
-  const std::pair<const char*, const char*> cases[] = {
-      {"small/events.txt", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
-      {"small/events.txt.gz", "it begins with '0.010 1 2 1\\x0a0.020 3 4 0\\x0a'"},
-      {"words.bin", "it begins with '\\x05\\x00\\x00\\x00a b c'"}};
-  for (const auto& [file, why] : cases) {
-    for (const char* format : {"", " --format rawlog"}) {
-      const bool is_text = std::string_view(file).substr(0, 6) == "small/";
-      if (is_text && *format == '\0') continue;  // a recording of its own
-      const Result result = run(std::string("info ") + file + format);
-      EXPECT_NE(result.status, 0) << file;
-      EXPECT_EQ(result.err, "event-fusion: error: " + std::string(file) +
-                                (*format == '\0' ? ": not a recording (" : ": not a rawlog (") +
-                                why + ")" + expected);
-    }
-  }
-  EXPECT_EQ(run("info picture.png").err,
-            "event-fusion: error: picture.png: a PNG picture: expected events; pictures and videos "
-            "have none (docs/recordings.md)\n");
-  EXPECT_THAT(run("info picture.png --format rawlog").err, HasSubstr("not a rawlog (it begins wi"));
-  EXPECT_THAT(run("info empty.rawlog --format rawlog").err,
-              HasSubstr("not a rawlog (it is empty)"));
-  EXPECT_THAT(run("info short").err, HasSubstr("stopped at entry 0 of short: the file ends in the"))
-      << "it may be cut";
-}
-
-TEST_F(ImportCommand, ARawlogThatCannotBeWrittenIsAnError) {
-  writeSmallRecording();
-  const Result result = run("import small --out nowhere/s.rawlog");
-  EXPECT_NE(result.status, 0);
-  EXPECT_THAT(result.err, HasSubstr("nowhere/"));
-}
-
-TEST_F(ImportCommand, AnOutputThatIsAFolderIsAnErrorAndStays) {
-  writeSmallRecording();
-  std::filesystem::create_directory(folder() / "taken");
-  EXPECT_THAT(run("import small --out taken").err, HasSubstr("'taken': it is a folder"));
-  EXPECT_THAT(run("import small --out ''").err, HasSubstr("'': expected the name of a file"));
-  EXPECT_THAT(run("simulate --preset desk_stereo --out ''").err,
-              HasSubstr("'': expected the name of the folder"));
-  EXPECT_THAT(run("info small --format rawlog").err, HasSubstr("small: a folder: expected a file"));
-  EXPECT_TRUE(is_directory(folder() / "taken"));
-}
-
 TEST_F(ImportCommand, OutputThatCannotBeWrittenIsAnError) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
   writeSmallRecording();
@@ -382,15 +250,6 @@ TEST_F(ImportCommand, OutputThatCannotBeWrittenIsAnError) {
                 StartsWith("event-fusion: error: the output cannot be written"))
         << arguments;
   }
-}
-
-TEST_F(ImportCommand, HelpAndVersionSucceed) {
-  const Result help = run("--help");
-  EXPECT_EQ(help.status, 0);
-  EXPECT_THAT(help.out, AllOf(HasSubstr("simulate"), HasSubstr("import"), HasSubstr("info")));
-  const Result version = run("--version");
-  EXPECT_EQ(version.status, 0);
-  EXPECT_THAT(version.out, StartsWith("event-fusion 0."));
 }
 
 }  // namespace

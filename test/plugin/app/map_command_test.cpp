@@ -117,12 +117,6 @@ TEST_F(MapCommand, ARawlogGivesTheSameMapAsTheFolder) {
   EXPECT_EQ(contentOf("one/map.pcd"), contentOf("two/map.pcd"));
 }
 
-TEST_F(MapCommand, TimeLimitsAreHalfOpenAndInTheRecordingsClock) {
-  write(SyntheticRecording());
-  ASSERT_EQ(run("map rig.ini data --out out --t0 10.1 --t1 10.35").status, 0);
-  EXPECT_EQ(reportIn("out")["keyframes"], 2) << "the last window ends with the limit";
-}
-
 // --- Bad input -------------------------------------------------------------------------------
 
 TEST_F(MapCommand, TimesMayCountFromTheFirstEvent) {
@@ -141,100 +135,6 @@ TEST_F(MapCommand, TimesMayCountFromTheFirstEvent) {
   EXPECT_THAT(errorOf("map rig.ini data --out out --duration -1"), HasSubstr("--duration"));
 }
 
-TEST_F(MapCommand, WrongArgumentsAreErrorsThatNameThem) {
-  write(SyntheticRecording());
-  write("unknown.ini", "[dsi]\nplanes = 3\n");
-  write("range.ini", "[dsi]\nnum_planes = 0\n");
-  const std::pair<const char*, const char*> cases[] = {
-      {"map nowhere.ini data", "nowhere.ini"},
-      {"map rig.ini nowhere.rawlog", "nowhere.rawlog"},
-      {"map unknown.ini data", "unknown.ini:2: [dsi] planes: unknown key"},
-      {"map range.ini data", "range.ini:2: [dsi] num_planes = 0: must be"},
-      {"map rig.ini data --set dsi.num_planes=many",
-       "--set dsi.num_planes=many: must be a whole number"},
-      {"depth rig.ini data --t0 10.3 --t1 10.1", "must end after it begins"},
-      {"depth rig.ini data --t0 soon --t1 10.1", "soon"},
-      {"depth rig.ini data --t0 -9e9 --t1 9e9", "expected a time within 4.6e9 s of 0"},
-      {"depth rig.ini data --t0 1 --t1 4.7e9", "expected a time within 4.6e9 s of 0"},
-      {"depth rig.ini data --t0 -4.7e9 --t1 1", "expected a time within 4.6e9 s of 0"},
-      {"depth rig.ini data --t0 1 --t1 2 --ref-time 5e9", "expected a time within 4.6e9 s of 0"}};
-  for (const auto& [arguments, message] : cases) {
-    EXPECT_THAT(errorOf(arguments + std::string(" --out out")), HasSubstr(message));
-    EXPECT_FALSE(exists(folder() / "out")) << arguments;
-  }
-  EXPECT_THAT(errorOf("map rig.ini data --out out --set rig.cameras=0,5"),
-              HasSubstr("cameras = 5: must be a camera of the recording: 0 to 1"));
-  EXPECT_THAT(errorOf("map rig.ini data --out out --set dsi.reference_camera=2"),
-              HasSubstr("reference_camera = 2: must be"));
-  EXPECT_THAT(errorOf("depth rig.ini data --out out --t0 20 --t1 21"),
-              HasSubstr("no event in the window 20.000000000 to 21.000000000 s"));
-}
-
-TEST_F(MapCommand, OptionsThatTheRecordingOrTheMachineRefusesAreErrorsOfTheCommandLine) {
-  write(SyntheticRecording());
-  for (const auto& [set, words] : std::initializer_list<std::pair<std::string, const char*>>{
-           {"rig.cameras=0,5", ": cameras = 5: must be a camera of the recording: 0 to 1"},
-           {"dsi.reference_camera=7", ": reference_camera = 7: must be a camera of"},
-           {"rig.time_offsets_s=1", ": time_offsets_s (how many) = 1: must be one per camera"},
-           {"dsi.width=65535", ": width = 65535: must be at most 67108864 pixels"},
-           {"dsi.min_depth_m=1e-4", ": must be at least 0.001"},
-           {"dsi.max_depth_m=1e300", ": must be at most 1000000"}}) {
-    const Result result = run("map rig.ini data --out out --set " + set);
-    EXPECT_EQ(result.status, 2) << set;
-    EXPECT_THAT(result.err, HasSubstr("event-fusion: error: --set " + set + words));
-  }
-  for (const auto& [arguments, words] : std::initializer_list<std::pair<std::string, const char*>>{
-           {"info data --sensor-size 346", "--sensor-size: '346': expected columns x rows, as 346"},
-           {"info data --sensor-size 346x0", "--sensor-size: '346x0': expected columns x rows"},
-           {"info data --skip-bad-events -1", "--skip-bad-events: '-1': expected a number, 0 or"},
-           {"info data --t0 1 --t0 2", "--t0: given more than once"},
-           {"evaluate depth data data --scale 0", "--scale: '0': expected a number above 0"}}) {
-    const Result result = run(arguments);
-    EXPECT_EQ(result.status, 2) << arguments;
-    EXPECT_THAT(result.err, HasSubstr("event-fusion: error: " + std::string(words)));
-  }
-}
-
-TEST_F(MapCommand, ErrorsNameTheFileThatIsWrong) {
-  write(SyntheticRecording());
-  std::string camchain = contentOf("data/camchain.yaml");
-  const auto size = camchain.find("[120, 90]");
-  ASSERT_NE(size, std::string::npos) << camchain;
-  std::ofstream(folder() / "half.yaml") << camchain.replace(size, 9, "[60, 45]");
-  const std::string events = "map data/cam0/events.txt data/cam1/events.txt ";
-  for (const auto& [arguments, words] : std::initializer_list<std::pair<std::string, const char*>>{
-           {"map rig.ini data --calibration half.yaml",
-            "half.yaml: camera 0 has 60x45 pixels: expected 120x90 pixels, as the recording has"},
-           {events + "data/poses.txt", "data/poses.txt: poses: expected --poses data/poses.txt"},
-           {events + "data/camchain.yaml", "data/camchain.yaml: a calibration: expected --calibr"},
-           {"map rig.ini rig.ini data", "rig.ini: an .ini file among the sources"},
-           {"map rig.ini data --t0 90", "no event lies from --t0 90.000000000 s: the events span"},
-           {"export data --to mcap --t0 90",
-            "no event from --t0 90.000000000 s: the recording has"},
-           {"info data --t0 90", "no event from --t0 90.000000000 s: the recording has events"}}) {
-    const std::string out = arguments[0] == 'i' ? "" : " --out out";
-    EXPECT_THAT(errorOf(arguments + out), HasSubstr(words));
-  }
-}
-
-TEST_F(MapCommand, EventsOutsideTheSensorAreAnError) {
-  SyntheticRecording recording;
-  recording.events[0].back().x = 120;
-  write(recording);
-  EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("120"));
-}
-
-TEST_F(MapCommand, AWrongCountOfDistortionCoefficientsIsAnError) {
-  SyntheticRecording recording;
-  write(recording);
-  recording.cameras[1].model.distortion = DistortionModel::kRadtan;
-  recording.cameras[1].model.coefficients = {0.1, 0.2, 0.3};
-  Rig rig;
-  rig.cameras = recording.cameras;
-  std::ofstream(folder() / "data" / "camchain.yaml") << formatCamchain(rig);
-  EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("coefficients"));
-}
-
 TEST_F(MapCommand, PosesThatMissTheEventsAreAnErrorThatSaysByHowMuch) {
   SyntheticRecording recording;
   for (StampedPose& pose : recording.poses) pose.t_ns += 100'000'000'000;
@@ -243,13 +143,6 @@ TEST_F(MapCommand, PosesThatMissTheEventsAreAnErrorThatSaysByHowMuch) {
   EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("they miss each other by 99.5"));
   EXPECT_EQ(reportIn("out")["keyframes"], 0) << "the report is written all the same";
   EXPECT_FALSE(exists(folder() / "out" / "map.pcd"));
-}
-
-TEST_F(MapCommand, ARecordingShorterThanAWindowIsAnErrorThatSaysSo) {
-  write(SyntheticRecording());
-  EXPECT_THAT(errorOf("map rig.ini data --out out --set keyframes.window_s=3"),
-              HasSubstr("no window of 3.000000000 s"));
-  EXPECT_EQ(reportIn("out")["keyframes"], 0);
 }
 
 TEST_F(MapCommand, ATruncatedRawlogIsAnErrorAfterTheMapSoFar) {
@@ -361,12 +254,6 @@ TEST_F(MapCommand, AResultReplacesNoInputAndNoForeignFile) {
     EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("out: holds other files"));
     EXPECT_EQ(contentOf(std::string("out/") + foreign), "{}");
   }
-}
-
-TEST_F(MapCommand, AnOutputThatCannotBeWrittenIsAnErrorThatNamesIt) {
-  write(SyntheticRecording());
-  std::ofstream(folder() / "out") << "a file";
-  EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("out"));
 }
 
 TEST_F(MapCommand, ASilentCameraIsAWarning) {

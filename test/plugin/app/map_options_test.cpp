@@ -128,18 +128,6 @@ TEST_F(MapOptions, OtherFilesAreWrittenIfOneCannotBeWritten) {
   }
 }
 
-TEST_F(MapOptions, SubintervalsOfEveryKindMapTheRecording) {
-  write(SyntheticRecording());
-  for (const std::string options :
-       {"--set fusion.order=time_then_cameras", "--set fusion.split=count",
-        "--set fusion.shuffle=shift", "--set fusion.shuffle=random",
-        "--set fusion.across_time=harmonic --set fusion.across_cameras=arithmetic"}) {
-    const Result result = run("map rig.ini data --out out --set fusion.subintervals=3 " + options);
-    EXPECT_EQ(result.status, 0) << options << "\n" << result.err;
-    EXPECT_GT(reportIn("out")["points"], 0) << options;
-  }
-}
-
 TEST_F(MapOptions, OneLineIsEnough) {
   write(SyntheticRecording());
   const std::string defaults = " --set dsi.num_planes=20";
@@ -155,17 +143,6 @@ TEST_F(MapOptions, OneLineIsEnough) {
   EXPECT_THAT(errorOf("map --config default rig.ini data"), HasSubstr("a second option file"));
   EXPECT_THAT(errorOf("map rig.ini"), HasSubstr("SOURCE"));
   EXPECT_THAT(errorOf("map nowhere.ini data"), HasSubstr("nowhere.ini"));
-}
-
-TEST_F(MapOptions, AFolderWithOtherFilesIsRefused) {
-  write(SyntheticRecording());
-  write("thesis/chapter1.tex", "valuable");
-  const std::string command = "map rig.ini data --out thesis";
-  EXPECT_THAT(errorOf(command), HasSubstr("thesis: holds other files than a map's"));
-  EXPECT_EQ(filesIn("thesis").size(), 1U);
-  EXPECT_EQ(run(command + " --force").status, 0);
-  EXPECT_EQ(run(command).status, 0) << "holds an earlier result";
-  EXPECT_EQ(contentOf("thesis/chapter1.tex"), "valuable");
 }
 
 TEST_F(MapOptions, NamesThatAreNotUtf8CostNoResult) {

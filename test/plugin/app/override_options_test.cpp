@@ -50,17 +50,6 @@ TEST_F(OverrideOptions, ExternalPosesAndCalibrationMakeTheSameMap) {
   EXPECT_EQ(run(depth + "--poses poses.txt --calibration camchain.yaml").status, 0);
 }
 
-TEST_F(OverrideOptions, AMissingPartIsAnErrorThatNamesTheOption) {
-  takeOut("poses.txt");
-  EXPECT_THAT(errorOf("map rig.ini data --out out"),
-              HasSubstr("data: no poses: expected poses.txt or groundtruth.txt, or --poses FILE"));
-  takeOut("camchain.yaml");
-  EXPECT_THAT(errorOf("map rig.ini data --poses poses.txt --out out"),
-              HasSubstr("data: no calibration: expected camchain.yaml, or --calibration FILE"));
-  EXPECT_THAT(errorOf("info data --poses nowhere.txt"),
-              HasSubstr("--poses nowhere.txt: no such file"));
-}
-
 TEST_F(OverrideOptions, TheyReplaceThePartsOfTheRecording) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   const std::string map = mapOf("data");
@@ -166,31 +155,6 @@ TEST_F(OverrideOptions, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning
   EXPECT_THAT(run("map rig.ini r.rawlog --out of_r --set rig.calibration=other.txt").err, warning);
   fs::remove(folder() / "uzh" / "calib.txt");
   EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, Not(HasSubstr("replaced")));
-}
-
-TEST_F(OverrideOptions, CalibrationsOfOtherCamerasAreErrorsThatNameTheFileAndBothNumbers) {
-  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
-  const auto write_cameras = [&](const std::string& name, int count, int width) {
-    Rig rig{SyntheticRecording(0.1, count).cameras};
-    for (RigCamera& camera : rig.cameras) camera.model.width = width;
-    write(name, formatCamchain(rig));
-  };
-  write_cameras("one.yaml", 1, 120);
-  write_cameras("three.yaml", 3, 120);
-  write_cameras("large.yaml", 2, 640);
-  const std::string map = "map rig.ini --out out ";
-  EXPECT_THAT(errorOf(map + "data --calibration one.yaml"),
-              HasSubstr("one.yaml: 1 camera, but the recording has camera 1"));
-  EXPECT_THAT(errorOf(map + "data --calibration three.yaml"),
-              HasSubstr("three.yaml: 3 cameras: expected 2, as the recording has"));
-  EXPECT_THAT(errorOf(map + "r.rawlog --calibration one.yaml"),
-              HasSubstr("one.yaml: 1 camera, but the recording has camera 1"));
-  EXPECT_THAT(errorOf(map + "r.rawlog --calibration three.yaml"),
-              HasSubstr("three.yaml: 3 cameras: expected 2, as the recording has"));
-  EXPECT_THAT(errorOf("import r.rawlog --out x.rawlog --calibration three.yaml"),
-              HasSubstr("three.yaml: 3 cameras: expected 2, as the recording has"));
-  EXPECT_THAT(errorOf(map + "r.rawlog --calibration large.yaml"),
-              HasSubstr("large.yaml: camera 0 has 640x90 pixels: expected 120x90 pixels"));
 }
 
 TEST_F(OverrideOptions, TimeOffsetsMoveACamerasEventsToThePosesClock) {

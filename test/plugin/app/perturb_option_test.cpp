@@ -103,20 +103,5 @@ TEST_F(PerturbOption, WorksForOneKeyframe) {
   EXPECT_EQ(reportIn("one")["perturbation"]["noise_m"], 0.01);
 }
 
-TEST_F(PerturbOption, ErrorsNameKeyValueAndExpectedValue) {
-  const std::string map = "map rig.ini data --out out --perturb ";
-  EXPECT_THAT(errorOf(map + "wobble=1"),
-              AllOf(HasSubstr("--perturb"), HasSubstr("unknown key: expected one of noise_m")));
-  EXPECT_THAT(errorOf(map + "noise_m=0.1,noise_deg=much"),
-              HasSubstr("noise_deg = much: must be a number, 0 to 180 (degrees)"));
-  EXPECT_THAT(errorOf(map + "drop=2"), HasSubstr("drop = 2: must be a number, 0 to 1"));
-  EXPECT_THAT(errorOf(map + "noise_m"), HasSubstr("expected key=value"));
-  EXPECT_FALSE(exists(folder() / "out")) << "before anything is written";
-  for (const char* command : {"import data --out x.rawlog", "info data"}) {
-    EXPECT_THAT(errorOf(std::string(command) + " --perturb keyframe_noise_m=0.1"),
-                HasSubstr("--perturb: keyframe_s: must be given with keyframe_noise_m"));
-  }
-}
-
 }  // namespace
 }  // namespace efm

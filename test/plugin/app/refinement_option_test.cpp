@@ -100,14 +100,6 @@ TEST_F(RefinementOption, WithoutRefinementThereIsNoTrajectoryOfTheTracker) {
   EXPECT_EQ(contentOf("out/map.pcd"), points);
 }
 
-TEST_F(RefinementOption, AShorterRunReplacesTheTrajectoriesOfALongerOne) {
-  map(kRefined, "out");
-  const std::size_t before = posesIn("out", "trajectory_tracker.txt").size();
-  map(kRefined + " --t1 11", "out");
-  EXPECT_LT(posesIn("out", "trajectory_tracker.txt").size(), before);
-  EXPECT_EQ(posesIn("out", "trajectory_tracker.txt").size(), posesIn("out").size());
-}
-
 TEST_F(RefinementOption, OneKeyframeHasTheTrackersPose) {
   const std::string depth = "depth rig.ini data --t0 10.2 --t1 10.4";
   ASSERT_EQ(run(depth + " --out one").status, 0);
@@ -136,16 +128,6 @@ TEST_F(RefinementOption, DegreesAreReportedAsGiven) {
   EXPECT_EQ(options["tracker_noise_deg"], 0.3);
   EXPECT_EQ(options["loop_max_sigma_deg"], 0.7);
   EXPECT_EQ(options["tracker_drift_deg_per_m"], 1.1);
-}
-
-TEST_F(RefinementOption, WrongValuesAreErrorsThatNameSectionKeyAndValue) {
-  const auto error = [&](const std::string& option) {
-    return errorOf("map rig.ini data --out none --set refinement." + option);
-  };
-  EXPECT_THAT(error("window=0"), HasSubstr("--set refinement.window=0: must be from 1 to 1000"));
-  EXPECT_THAT(error("tracker_noise_deg=-2"),
-              HasSubstr("--set refinement.tracker_noise_deg=-2: must be from 0 to 1000"));
-  EXPECT_THAT(error("windows=3"), AllOf(HasSubstr("windows"), HasSubstr("unknown key")));
 }
 
 TEST_F(RefinementOption, ARecordingMayHaveOneKeyframe) {

@@ -76,50 +76,6 @@ TEST_F(SimulateCommand, NoiseHasItsRate) {
   EXPECT_NEAR(lines, expected, 0.25 * expected);
 }
 
-TEST_F(SimulateCommand, ErrorsNameTheFileOrTheOption) {
-  writeRigAndTrajectory();
-  const std::string on_walk = "--scene room --trajectory walk.txt --calibration rig.yaml ";
-  EXPECT_THAT(simulateError(on_walk + "--duration 3 --out sim"),
-              HasSubstr("walk.txt: duration_s = 3"));
-  EXPECT_THAT(simulateError("--scene room --trajectory none.txt --calibration rig.yaml --out sim"),
-              HasSubstr("none.txt"));
-  EXPECT_THAT(simulateError(on_walk + "--mismatch 2 --out sim"), HasSubstr("mismatch = 2"));
-  EXPECT_THAT(simulateError("--out sim"), HasSubstr("--preset"));
-  simulateError("--preset slider --scene room --out sim");
-  simulateError("--scene room --trajectory walk.txt --out sim");
-  EXPECT_FALSE(exists(folder() / "sim"));
-}
-
-TEST_F(SimulateCommand, AValueOutOfRangeIsAnErrorThatNamesTheOptionAndItsUnit) {
-  const std::pair<const char*, const char*> cases[] = {
-      {"--duration -1", "--duration = -1: must be 0.001 to 600 (seconds)"},
-      {"--threshold-on 1e-3", "--threshold-on = 0.001: must be 0.01 or more (log intensity)"},
-      {"--threshold-off 0", "--threshold-off = 0: must be 0.01 or more (log intensity)"},
-      {"--threshold-off inf", "--threshold-off = inf: must be 0.01 or more (log intensity)"},
-      {"--mismatch 2", "--mismatch = 2: must be 0 to 0.5 (a share of the thresholds)"},
-      {"--refractory-us -1", "--refractory-us = -1: must be 0 to 1e6 (microseconds)"},
-      {"--refractory-us 1e300", "--refractory-us = "},
-      {"--refractory-us nan", "--refractory-us = nan"},
-      {"--noise-hz -1", "--noise-hz = -1: must be 0 to 1e5 (events per second and pixel)"},
-      {"--hot-pixels 2", "--hot-pixels = 2: must be 0 to 1 (a share of the pixels)"},
-      {"--hot-hz 1e6", "--hot-hz = 1000000: must be 0 to 1e5 (events per second and pixel)"},
-      {"--seed -1", "--seed"},
-      {"--seed 1.5", "--seed"}};
-  for (const auto& [option, expected] : cases) {
-    EXPECT_THAT(simulateError("--preset slider --out sim " + std::string(option)),
-                HasSubstr(expected))
-        << option;
-  }
-  EXPECT_FALSE(exists(folder() / "sim"));
-}
-
-TEST_F(SimulateCommand, TakesTheLargestSeed) {
-  writeRigAndTrajectory();
-  simulate(
-      "--scene room --trajectory walk.txt --calibration rig.yaml --duration 0.002 "
-      "--seed 18446744073709551615 --out sim");
-}
-
 TEST_F(SimulateCommand, SimulatesRealRigsOnRealTrajectories) {
   const std::filesystem::path shared = EFM_SHARED_DATA;
   if (!std::filesystem::exists(shared / "trajectories")) GTEST_SKIP() << shared << " is not there";

@@ -63,18 +63,5 @@ TEST_F(ViewCommand, SaysWhereThePageIsIfNothingOpensIt) {
   EXPECT_FALSE(exists(folder() / "opened.txt")) << "a browser of the terminal shows no map";
 }
 
-TEST_F(ViewCommand, ErrorsNameThePlaceAndWhatWasExpected) {
-  write("earlier/map.pcd", "a cloud");
-  write("other/notes.txt", "mine");
-  const std::pair<const char*, const char*> cases[] = {
-      {"view nowhere", "nowhere: no such folder: expected one that `map` wrote"},
-      {"view other/notes.txt", "other/notes.txt: expected a folder that `map` wrote"},
-      {"view other", "other/map.html: expected the page that `map` writes into its folder"},
-      {"view earlier", "earlier/map.html: an earlier version made this map, or"}};
-  for (const auto& [arguments, message] : cases) {
-    EXPECT_THAT(errorOf(arguments), HasSubstr(message)) << arguments;
-  }
-}
-
 }  // namespace
 }  // namespace efm
