@@ -116,6 +116,10 @@ class PoseCheck {
     if (rig_.cameras.size() < 2 || !isSelected(0, options_.cameras) ||
         !isSelected(1, options_.cameras))
       return;
+    const auto both_have_events = [](const SamplePiece& piece) {
+      return !piece.events[0].empty() && !piece.events[1].empty();
+    };
+    if (!std::any_of(pieces_.begin(), pieces_.end(), both_have_events)) return;
     Candidate swapped;
     swapped.finding.mistake = PoseMistake::kCamerasSwapped;
     const CameraModel& left = rig_.cameras[0].model;
