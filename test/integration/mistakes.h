@@ -14,14 +14,15 @@ constexpr int kFine = 0;        // with a warning
 constexpr int kJobError = 1;    // of the recording
 constexpr int kUsageError = 2;  // of the command line or the option file
 
-/// A deliberate mistake in a recording or on the command line, and the words that name it. A new
-/// row needs a name, a change and the words.
+/// A deliberate mistake in a recording or on the command line, and what `map` says of it.
 struct Mistake {
   const char* name;
   std::function<void(DraftRecording&)> make;
   std::string arguments;  ///< Of `map`, further ones.
   int status;
-  std::vector<std::string> words;  ///< On stderr. "warning: NAME:" is a named warning.
+  /// The beginning of each line on stderr, behind "event-fusion: ". A number behind ~ is met within
+  /// a fifth. "…" as the last one: others may follow from the mistake.
+  std::vector<std::string> lines;
 };
 
 /// Writes a file into the recording's folder.
