@@ -7,10 +7,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
 #include <string>
 #include <vector>
 
+#include "test/integration/letter_f.h"
 #include "test/plugin/program_test.h"
+#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {
@@ -28,10 +32,21 @@ class GrowingMap : public ProgramTest {
   }
   template <typename Colour>
   static int colouredIn(const cv::Mat_<Colour>& picture) {
-    return static_cast<int>(std::count_if(picture.begin(), picture.end(), [](const Colour& colour) {
-      const auto [least, most] = std::minmax({colour[0], colour[1], colour[2]});
-      return most - least > 80;
-    }));
+    return static_cast<int>(std::count_if(picture.begin(), picture.end(), isColour<Colour>));
+  }
+  static cv::Mat1b colours(const cv::Mat3b& picture) {
+    cv::Mat1b mask(picture.size());
+    std::transform(picture.begin(), picture.end(), mask.begin(),
+                   [](const cv::Vec3b& colour) { return isColour(colour) ? 255 : 0; });
+    return mask;
+  }
+  template <typename Colour>
+  static bool isColour(const Colour& colour) {
+    const auto [least, most] = std::minmax({colour[0], colour[1], colour[2]});
+    return most - least > 80;
+  }
+  std::vector<StampedPose> posesOfMap() const {
+    return readTumTrajectory(folder() / "out" / "trajectory.txt");
   }
 
   /// The screen of Xvfb in its file: a header of big-endian words, then 4 bytes a pixel.
@@ -70,6 +85,61 @@ TEST_F(GrowingMap, HasAFrameForEachKeyframeAndTheSameResult) {
   write("new/frames/frame_000009.png", "of an earlier run");
   EXPECT_EQ(shell(frames + "--record-frames new/frames").status, 0);
   EXPECT_EQ(filesIn("new/frames").size(), 4U);
+}
+
+/// Dots of an F before the cameras, 0.6 m wide and 1.2 m high, upright as they see it.
+SyntheticScene letterF() {
+  SyntheticScene scene;
+  std::mt19937 random(3);
+  const auto stroke = [&](double x0, double x1, double y0, double y1, int count) {
+    for (int i = 0; i < count; ++i) {
+      const double u = random() / 4294967296.0;
+      const double v = random() / 4294967296.0;
+      scene.dots.emplace_back(x0 + u * (x1 - x0), y0 + v * (y1 - y0), SyntheticRecording::kDepthM);
+    }
+  };
+  stroke(-0.1, 0.0, -0.6, 0.6, 40);  // y is down
+  stroke(0.0, 0.5, -0.6, -0.5, 20);
+  stroke(0.0, 0.3, -0.05, 0.05, 12);
+  return scene;
+}
+
+TEST_F(GrowingMap, AnFStandsUprightInEveryPicture) {
+  write(SyntheticRecording(0.5, 2, letterF()));
+  ASSERT_EQ(shell("env -u DISPLAY '" EFM_EVENT_FUSION
+                  "' map rig.ini data --out out --record-frames frames")
+                .status,
+            0);
+  const auto picture = [this](const std::filesystem::path& file) {
+    return cv::Mat3b(cv::imread((folder() / file).string()));
+  };
+  const std::string keyframe = "out/keyframes/" + formatSeconds(posesOfMap().at(0).t_ns);
+  expectF(cv::imread((folder() / keyframe / "depth.tiff").string(), cv::IMREAD_UNCHANGED) > 0);
+
+  const cv::Mat3b map = picture("out/map.png");
+  expectF(colours(map({map.cols / 2, 0, map.cols - map.cols / 2, map.rows * 9 / 10})));
+  const cv::Mat3b sheet = picture("out/overview.png");  // two by two keyframes and a bar
+  for (const cv::Point& cell : {cv::Point(0, 0), {1, 0}, {0, 1}, {1, 1}}) {
+    const cv::Size size(sheet.cols / 2, sheet.rows * 47 / 100);
+    expectF(colours(sheet({{cell.x * size.width, cell.y * size.height}, size})));
+  }
+
+  const cv::Mat3b frame = picture("frames/frame_000004.png");
+  for (const int top : {92, 423}) {  // depth, confidence
+    cv::Mat1b ground;
+    cv::inRange(frame({972, top, 294, 220}), cv::Scalar::all(255), cv::Scalar::all(255), ground);
+    expectF(ground == 0);
+  }
+  cv::Mat1b high, low;  // in perspective, behind the camera that is drawn: red and blue points
+  const cv::Mat3b cloud = frame.colRange(0, 960);
+  cv::inRange(cloud, cv::Scalar(0, 0, 150), cv::Scalar(60, 110, 255), high);
+  cv::inRange(cloud, cv::Scalar(150, 0, 0), cv::Scalar(255, 150, 110), low);
+  ASSERT_GT(cv::countNonZero(high), 50);
+  ASSERT_GT(cv::countNonZero(low), 20);
+  const cv::Rect arm = cv::boundingRect(high), foot = cv::boundingRect(low);
+  EXPECT_LT(arm.br().y, foot.y) << "high is up";
+  EXPECT_GT(arm.br().x, foot.br().x + 3 * foot.width) << "the arm points to the right";
+  EXPECT_NEAR(arm.x, foot.x, foot.width);
 }
 
 TEST_F(GrowingMap, IsShownInAWindow) {

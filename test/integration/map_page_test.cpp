@@ -4,13 +4,19 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <cstring>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/angle.h"
 #include "plugin/viewer/map_page.h"
+#include "test/integration/letter_f.h"
 #include "test/paths.h"
 #include "test/plugin/program_test.h"
 
@@ -31,12 +37,13 @@ class MapPageInABrowser : public ProgramTest {
   }
 
   /// Opens a copy of the page with the probe in it. @return what the probe measured.
-  json measure(const std::filesystem::path& page, const std::string& options = "") const {
+  json measure(const std::filesystem::path& page, const std::string& options = "",
+               const std::string& probe = "page_probe.js") const {
     std::string html = contentOf(page);
     const auto insert = [&](const char* before, const std::string& script) {
       html.insert(html.rfind(before), "<script>" + script + "</script>");
     };
-    insert("</body>", contentOf(EFM_SOURCE_DIR "/test/integration/page_probe.js"));
+    insert("</body>", contentOf(EFM_SOURCE_DIR "/test/integration/" + probe));
     insert("<link rel=\"icon\"", R"(const problems = [];
       for (const kind of ["error", "unhandledrejection", "securitypolicyviolation"])
         addEventListener(kind, e => problems.push(`${kind} ${e.message || e.reason || e.blockedURI}`));
@@ -107,6 +114,24 @@ TEST_F(MapPageInABrowser, OfTheDeskDrawsAndAnswers) {
       << "the same on another ground";
 }
 
+/// From base 64.
+std::vector<std::uint8_t> bytesOf(const std::string& text) {
+  std::vector<std::uint8_t> bytes;
+  std::uint32_t bits = 0;
+  int count = 0;
+  for (const char c : text) {
+    const char* const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    const char* const digit = std::strchr(digits, c);
+    if (digit == nullptr || c == '\0') break;
+    bits = bits << 6 | static_cast<std::uint32_t>(digit - digits);
+    count += 6;
+    if (count < 8) continue;
+    count -= 8;
+    bytes.push_back(static_cast<std::uint8_t>(bits >> count));
+  }
+  return bytes;
+}
+
 /// Terraces of 300 x 300 m, seen by 500 keyframes.
 TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
   std::mt19937 random(3);
@@ -147,6 +172,100 @@ TEST_F(MapPageInABrowser, OfTwoMillionPointsIsSmallDrawsAndTurns) {
   EXPECT_THAT(measured["text"].get<std::string>(),
               testing::AllOf(HasSubstr("of the 2,300,000 points of the map"),
                              HasSubstr("left out to keep it small"), HasSubstr("made-up-warning")));
+}
+
+/// The mean colour of what is drawn in some rows of a box, in the order of OpenCV.
+cv::Vec3d colourOf(const cv::Mat3b& picture, const cv::Mat1b& mask, const cv::Rect& rows) {
+  const cv::Scalar mean = cv::mean(picture(rows), mask(rows));
+  return {mean[0], mean[1], mean[2]};
+}
+
+/// An F that gets higher, more confident, better supported and newer from its foot to its top, in
+/// worlds that are turned against the view: as a person sees it, and with the colours of the bar.
+TEST_F(MapPageInABrowser, AnFStandsUprightInTheColoursOfTheBar) {
+  Eigen::Matrix3d y_down;  // the frame of the first camera
+  y_down << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  const Eigen::Matrix3d back = Eigen::AngleAxisd(kPi, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const struct {
+    const char* view;
+    Eigen::Matrix3d R_world_view;  ///< The view has x right, y forwards and z up.
+    Eigen::Vector3d along;         ///< The stem.
+  } cases[] = {{"front", y_down, {0, 0, 1}}, {"top", back, {0, 1, 0}}};
+  constexpr int kKeyframes = 11;
+  for (const auto& [view, R_world_view, along] : cases) {
+    std::vector<CloudPoint> points;
+    const auto add = [&, R = R_world_view, along = along](double right, double up) {
+      const double share = up / 2;
+      points.push_back(
+          {R * (right * Eigen::Vector3d::UnitX() + up * along + Eigen::Vector3d(0, 3, 5)),
+           static_cast<float>(std::pow(100, share)),
+           1 + static_cast<std::uint32_t>(std::lround(40 * share)),
+           static_cast<std::uint64_t>(std::lround((kKeyframes - 1) * share))});
+    };
+    for (int i = 0; i <= 400; ++i) {
+      add(0, 0.005 * i);
+      add(0.0025 * i, 2);
+      add(0.00125 * i, 1);
+    }
+    for (int i = 0; i < 40; ++i) add(0.001 * i, 0);  // enough for the low end of the bar
+    Eigen::Matrix3d R_view_cam;  // columns: x right, y down, z forwards
+    R_view_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+    std::vector<StampedPose> trajectory;
+    for (int i = 0; i < kKeyframes; ++i) {
+      trajectory.push_back({i * 1'000'000'000LL,
+                            {Eigen::Quaterniond(Eigen::Matrix3d(R_world_view * R_view_cam)),
+                             R_world_view * Eigen::Vector3d(0.1 * i, 2, 5)}});
+    }
+    {
+      std::ofstream file(folder() / "map.html", std::ios::binary);
+      const KeyframePictures pictures({});
+      writeMapPage(file, {"F", *mapCloudOf(points, 1e-4), 1e-4, trajectory, pictures,
+                          ReferenceView{640, 480, 300, 300, 320, 240},
+                          contentOf(EFM_SOURCE_DIR "/test/integration/page_report.json")});
+    }
+    const json measured = measure("map.html", "", "page_letter_probe.js");
+    EXPECT_THAT(measured["problems"], IsEmpty()) << measured["problems"];
+    int seen = 0;
+    for (const json& drawn : measured["views"]) {
+      const std::string colour = drawn["colour"];
+      if (drawn["view"] != view) continue;
+      SCOPED_TRACE(view + (" " + colour));
+      const cv::Mat3b picture = cv::imdecode(bytesOf(drawn["picture"]), cv::IMREAD_COLOR);
+      const cv::Vec3b ground = picture(0, 0);
+      cv::Mat1b mask;
+      cv::inRange(picture, ground, ground, mask);
+      mask = mask == 0;
+      const cv::Rect box = cv::boundingRect(mask);
+      expectF(mask);
+      ++seen;
+      if (colour == "height" && along.z() == 0) continue;
+      // The view is from the middle of the letter: half of the way lies at half of the height.
+      const auto& bar = drawn["bar"];
+      EXPECT_EQ(drawn["direction"], "linear-gradient(to right");
+      for (const double share : {0.0, 0.5, 1.0}) {
+        const int y = box.y + static_cast<int>(std::lround((1 - share) * (box.height - 6)));
+        const cv::Vec3d found = colourOf(picture, mask, {box.x, y, box.width, 6});
+        const double place = share * static_cast<double>(bar.size() - 1);
+        const auto below = static_cast<std::size_t>(place);
+        const json& a = bar[below];
+        const json& b = bar[std::min(below + 1, bar.size() - 1)];
+        for (int channel = 0; channel < 3; ++channel) {
+          const double part = place - static_cast<double>(below);
+          const double expected =
+              (1 - part) * a[channel].get<double>() + part * b[channel].get<double>();
+          EXPECT_NEAR(found[2 - channel], expected, 12) << "at " << share;
+        }
+      }
+      const std::pair<std::string, std::string> ends = {drawn["low"], drawn["high"]};
+      const std::map<std::string, std::pair<std::string, std::string>> expected = {
+          {"height", {"5.00", "7.00"}},
+          {"confidence", {"1", "100"}},
+          {"support", {"1", "41 or more"}},
+          {"time", {"0.00", "10.00"}}};
+      EXPECT_EQ(ends, expected.at(colour));
+    }
+    EXPECT_EQ(seen, 4);
+  }
 }
 
 }  // namespace

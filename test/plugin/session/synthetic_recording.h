@@ -22,6 +22,7 @@ struct SyntheticScene {
   double speed_m_s = 0.8;
   double rest_s = 0;       ///< The rig stands still so long at first.
   int noise_per_step = 0;  ///< Events at random pixels, of each camera.
+  std::vector<Eigen::Vector3d> dots;  ///< In the world; none: random ones in the view.
 };
 
 /// Bright dots on a plane z = 2 m of the world, seen by a stereo rig that moves along x without
@@ -45,7 +46,7 @@ struct SyntheticRecording {
       camera.T_rig_cam.translation = {0.1 * c, 0, 0};
       cameras.push_back(camera);
     }
-    const std::vector<Eigen::Vector3d> dots = randomDots();
+    const std::vector<Eigen::Vector3d> dots = scene_.dots.empty() ? randomDots() : scene_.dots;
     const auto steps = static_cast<std::int64_t>(std::llround(duration_s * 1e9)) / kStepNs;
     for (const RigCamera& camera : cameras) events.push_back(eventsOf(camera, dots, steps));
     for (std::int64_t step = 0; step <= steps; step += 10) {
