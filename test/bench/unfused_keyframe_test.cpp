@@ -3,8 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <optional>
-
 #include <opencv2/core.hpp>
 
 #include "mapping/keyframes/keyframe_mapper.h"
@@ -36,14 +34,6 @@ TEST(UnfusedKeyframe, FindsTheDepthsOfTheMapper) {
   const cv::Mat1b differ = cv::abs(fused->map.depth - unfused->depth) > 1e-3;
   EXPECT_LE(cv::countNonZero(differ), found / 500);
   EXPECT_LT(cv::norm(fused->map.confidence, unfused->confidence, cv::NORM_INF), 1e-3);
-}
-
-TEST(UnfusedKeyframe, HasNoMapWithoutAPoseAtTheReferenceTime) {
-  const SyntheticWindow made = makeSyntheticWindow({40, 30, 100, 2, 0.1, 1, std::nullopt, false});
-  UnfusedKeyframe reference(made.rig, made.options);
-  Window window = made.window;
-  window.t_ref_ns += 10'000'000'000;
-  EXPECT_FALSE(reference.map(window, {made.events[0], made.events[1]}, made.trajectory));
 }
 
 }  // namespace

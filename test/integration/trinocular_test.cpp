@@ -61,17 +61,5 @@ TEST_F(Trinocular, ThreeCamerasAreSurerThanTwoWhereAllVote) {
   EXPECT_LT(of_all, median_error(keyframe({0, 2}, FusionRule::kHarmonic), "0+2"));
 }
 
-TEST_F(Trinocular, NoRuleIgnoresTheThirdCamera) {
-  for (const FusionRule rule : allFusionRules()) {
-    const KeyframeDepthMap all = keyframe({0, 1, 2}, rule);
-    for (const std::vector<int>& two : {std::vector{0, 1}, {0, 2}, {1, 2}}) {
-      const KeyframeDepthMap pair = keyframe(two, rule);
-      const cv::Mat1b differs = all.map.confidence != pair.map.confidence;
-      EXPECT_GT(cv::countNonZero(differs), 1000)
-          << nameOf(rule) << " without " << 3 - two[0] - two[1];
-    }
-  }
-}
-
 }  // namespace
 }  // namespace efm
