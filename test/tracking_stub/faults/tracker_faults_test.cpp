@@ -33,6 +33,12 @@ TEST(TrackerFaults, AreNoneByDefault) {
   EXPECT_TRUE(sameBits(withFaults(poses, TrackerFaults()), poses));
 }
 
+TEST(TrackerFaults, AreTheSameWhereTheSourceHasAPauseBetweenPoses) {
+  const auto poses = windingWay(100);
+  const auto halting = efm::withFaults(std::make_unique<HaltingSource>(poses), everyFault());
+  EXPECT_TRUE(sameBits(polled(*halting), withFaults(poses, everyFault())));
+}
+
 TEST(TrackerFaults, OfOneKindDoNotChangeOthers) {
   const auto poses = windingWay(500);
   TrackerFaults faults = everyFault();

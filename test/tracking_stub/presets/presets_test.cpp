@@ -56,6 +56,13 @@ TEST_P(Presets, KeepWhatTheyPromise) {
     EXPECT_LE(depths.farthest, promise.max_depth_m);
     EXPECT_LE(depths.sky, promise.sky);
   }
+  if (promise.preset == "desk_stereo") EXPECT_EQ(simulation.duration_ns, 2'000'000'000);
+  if (promise.preset == "room_stereo") {  // it ends at its first pose
+    const Rigid3 T_begin_end = simulation.motion->poseAt(simulation.start_ns).inverse() *
+                               simulation.motion->poseAt(simulation.endNs());
+    EXPECT_LT(T_begin_end.translation.norm(), 1e-6);
+    EXPECT_LT(T_begin_end.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
+  }
   // In the first 4 ms, sources project to their pixels within half a pixel and the motion of a
   // step.
   simulation.duration_ns = 4'000'000;
@@ -76,16 +83,6 @@ INSTANTIATE_TEST_SUITE_P(All, Presets,
                                            Promise{"room_stereo", 2, 346, 260, 0.9, 7},
                                            Promise{"trinocular", 3, 640, 480, 0.7, 5}),
                          [](const auto& preset) { return preset.param.preset; });
-
-TEST(RoomStereo, EndsAtItsFirstPose) {
-  SimulationOptions options;
-  options.preset = "room_stereo";
-  const Simulation room = makeSimulation(options);
-  const Rigid3 T_begin_end =
-      room.motion->poseAt(room.start_ns).inverse() * room.motion->poseAt(room.endNs());
-  EXPECT_LT(T_begin_end.translation.norm(), 1e-6);
-  EXPECT_LT(T_begin_end.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
-}
 
 }  // namespace
 }  // namespace efm

@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "test/paths.h"
+#include "test/plugin/message_of.h"
 #include "test/tracking_stub/presets/visible_depths.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
 #include "test/tracking_stub/scenes/ray_cast.h"
@@ -47,12 +48,7 @@ Rig smallRig() {
 }
 
 std::string errorOf(const TrajectorySimulationOptions& options) {
-  try {
-    makeTrajectorySimulation(options, walk(), smallRig());
-  } catch (const std::invalid_argument& error) {
-    return error.what();
-  }
-  return "no error";
+  return messageOf([&] { makeTrajectorySimulation(options, walk(), smallRig()); });
 }
 
 test::VisibleDepths depthsOf(const Simulation& simulation) {
