@@ -63,14 +63,34 @@ TEST(KeyframeCloud, PixelsWithoutDepthOrConfidenceGiveNoPoint) {
   keyframe.map.depth(0, 1) = 1.0F;
   keyframe.map.confidence(0, 1) = 0.0F;
 
-  EXPECT_EQ(keyframeCloud(keyframe)->size(), 1U);
+  keyframe.map.variance = cv::Mat1f::ones(2, 3);
+  keyframe.map.variance(0, 0) = INFINITY;
+  ASSERT_EQ(viewPoints(keyframe).size(), 1U);
+  EXPECT_TRUE(std::isnan(viewPoints(keyframe)[0].sigma)) << "of a peak without curvature";
+}
+
+TEST(KeyframeCloud, LateFusionIsThePointsOfOneCameraAfterTheOther) {
+  KeyframeDepthMap keyframe = smallKeyframe();
+  EXPECT_TRUE(lateFusionPoints(keyframe).empty());
+  keyframe.camera_maps.resize(2);
+  for (int c = 0; c < 2; ++c) {
+    keyframe.camera_maps[c].map = smallKeyframe().map;
+    keyframe.camera_maps[c].map.depth = cv::Mat1f::zeros(2, 3);
+    keyframe.camera_maps[c].map.depth(c, 2) = 2.0F + static_cast<float>(c);
+  }
+  const std::vector<ViewPoint> points = lateFusionPoints(keyframe);
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_EQ(points[0].p_ref, Eigen::Vector3f(1, 0, 2));
+  EXPECT_EQ(points[1].p_ref, Eigen::Vector3f(1.5F, 1.5F, 3));
 }
 
 TEST(KeyframeCloud, ImagesOfAnotherSizeThanTheViewAreRefused) {
-  KeyframeDepthMap keyframe = smallKeyframe();
-  keyframe.map.confidence = cv::Mat1f::ones(3, 3);
-
-  EXPECT_THROW(keyframeCloud(keyframe), std::invalid_argument);
+  for (cv::Mat1f DepthMap::*image :
+       {&DepthMap::depth, &DepthMap::confidence, &DepthMap::variance}) {
+    KeyframeDepthMap keyframe = smallKeyframe();
+    keyframe.map.*image = cv::Mat1f::ones(3, 3);
+    EXPECT_THROW(keyframeCloud(keyframe), std::invalid_argument);
+  }
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "edge_world.h"
+#include "edges.h"
 #include "mapping/geometry/angle.h"
 #include "maps/refinement/condensed_graph.h"
 #include "random_poses.h"
