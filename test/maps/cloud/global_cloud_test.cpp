@@ -97,8 +97,9 @@ RC_GTEST_PROP(GlobalCloud, MeansEqualThoseOfANaiveFilter, ()) {
 
 RC_GTEST_PROP(GlobalCloud, DependsOnItsKeyframesAloneBitForBit, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
-  std::uniform_int_distribution<std::uint64_t> number(0, 7);
+  std::uniform_int_distribution<std::uint64_t> number(0, 11);  // some do not check each other
   std::uniform_int_distribution<int> count(0, 120);
+  const Rigid3 T_world_ref{Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5), {-1, 0, 0}};
   GlobalCloud cloud({0.4, 1});
   std::map<std::uint64_t, std::vector<CloudPoint>> inside;
   for (int step = 0; step < 40; ++step) {
@@ -108,11 +109,17 @@ RC_GTEST_PROP(GlobalCloud, DependsOnItsKeyframesAloneBitForBit, ()) {
       inside.erase(keyframe);
     } else {
       inside[keyframe] = randomPoints(random, count(random), 1.0);
-      cloud.insert(keyframe, inside[keyframe]);
+      cloud.insert(keyframe, inside[keyframe], T_world_ref);
+    }
+    if (inside.count(3) != 0 && step % 5 == 0) {
+      inside[3] = randomPoints(random, count(random), 1.0);
+      cloud.replace(3, inside[3], T_world_ref);
     }
 
     GlobalCloud fresh({0.4, 1});
-    for (const auto& [fresh_number, points] : inside) fresh.insert(fresh_number, points);
+    for (const auto& [fresh_number, points] : inside) {
+      fresh.insert(fresh_number, points, T_world_ref);
+    }
     for (const int min_keyframes : {1, 2, 4}) {
       RC_ASSERT(test::sameBits(*cloud.points(min_keyframes), *fresh.points(min_keyframes)));
     }

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <random>
 
 #include "maps/cloud/global_cloud.h"
@@ -177,34 +176,6 @@ TEST(MapConsistency, PointsOnATrueSurfaceAreNeverExcluded) {
       visible.insert(k, points, T_world_ref);
     }
     EXPECT_EQ(visible.points()->size(), plain.points()->size()) << "seed " << seed;
-  }
-}
-
-TEST(MapConsistency, TheMapDependsOnItsKeyframesAloneBitForBit) {
-  for (unsigned seed = 1; seed <= 5; ++seed) {
-    std::mt19937 random(seed);
-    const std::vector<View> views = viewsWithOutliers(random, 12);
-    const auto insert = [&](GlobalCloud& cloud, std::size_t k) {
-      cloud.insert(3 * k, views[k].points, views[k].T_world_ref);  // some are not checked
-    };
-    std::vector<std::size_t> order(views.size());
-    std::iota(order.begin(), order.end(), 0U);
-    GlobalCloud in_order(withConsistency(Consistency::kVisibility));
-    for (const std::size_t k : order) {
-      if (k % 4 != 1) insert(in_order, k);
-    }
-
-    std::shuffle(order.begin(), order.end(), random);
-    GlobalCloud other(withConsistency(Consistency::kVisibility));
-    for (const std::size_t k : order) insert(other, k);
-    std::shuffle(order.begin(), order.end(), random);
-    for (const std::size_t k : order) {
-      other.remove(3 * k);
-      if (k % 4 != 1) insert(other, k);  // a keyframe that is refined, or goes for good
-    }
-
-    EXPECT_TRUE(test::sameBits(*other.points(), *in_order.points()));
-    EXPECT_TRUE(test::sameBits(*other.points(3), *in_order.points(3)));
   }
 }
 

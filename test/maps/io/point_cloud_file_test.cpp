@@ -523,14 +523,5 @@ TEST_F(PointCloudFile, WithAPointThatAFloatCannotHoldIsNotWritten) {
   EXPECT_EQ(filesInFolder(), 0U);
 }
 
-TEST_F(PointCloudFile, ThatCannotBeWrittenIsAnErrorAndLeavesNoHalfFile) {
-  const CloudPoint point{{1, 2, 3}, 1.0F};
-  EXPECT_THAT(writeRefusalOf(folder() / "nowhere" / "map.pcd", point),
-              HasSubstr("nowhere/map.pcd"));
-  std::filesystem::create_directories(folder() / "map.pcd" / "inside");
-  EXPECT_THAT(writeRefusalOf(folder() / "map.pcd", point), HasSubstr("it is a folder"));
-  EXPECT_EQ(filesInFolder(), 1U);
-}
-
 }  // namespace
 }  // namespace efm

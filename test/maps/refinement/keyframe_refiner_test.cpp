@@ -368,33 +368,6 @@ TEST(KeyframeRefiner, SaysWhichKeyframesMoved) {
   }
 }
 
-TEST(KeyframeRefiner, WrongLoopsMoveNothing) {
-  for (unsigned seed = 1; seed <= 2; ++seed) {
-    std::mt19937 random(seed);
-    const Poses truth = circle(16, 7.5);
-    const auto seen = seenAlong(test::edgesAround(250, random), truth, random);
-    const Poses tracked = noisy(truth, 0.005, 0.25 * kRadiansPerDegree, random);
-    const Poses without = posesOf(refine(seen, tracked, quick()));
-
-    KeyframeRefiner refiner(quick());
-    std::uint64_t proposed = 0;
-    for (std::size_t i = 0; i < seen.size(); ++i) {
-      refiner.add(RegistrationCloud(seen[i], quick().points), tracked[i]);
-      if (i < 10 || i % 3 != 0) continue;
-      // The keyframe 9 before it looks 67 deg farther back.
-      refiner.propose({i - 9, i, drawMotion(0.1, 3 * kRadiansPerDegree, random)});
-      ++proposed;
-    }
-    refiner.finish();
-    EXPECT_GE(refiner.counts().loop_checks, proposed);
-    double most_m = 0;
-    for (std::size_t i = 0; i < without.size(); ++i) {
-      most_m = std::max(most_m, metresApart(refiner.T_world_ref(i), without[i]));
-    }
-    EXPECT_LT(most_m, 0.02) << seed;
-  }
-}
-
 /// Edges that repeat every 1.5 m along x.
 Edges repeatingEdges(std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);

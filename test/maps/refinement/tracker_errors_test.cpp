@@ -40,20 +40,6 @@ std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, dou
   return samples;
 }
 
-TrackerErrors times(TrackerErrors errors, double factor) {
-  errors.noise_m *= factor;
-  errors.noise_rad *= factor;
-  errors.drift_m *= factor;
-  errors.drift_rad *= factor;
-  return errors;
-}
-
-/// The errors of motions along a path. On paths of similar length noise and drift look the same.
-Eigen::Vector2d sigmasOver(double path_length_m, const TrackerErrors& errors) {
-  const Matrix6d covariance = 2 * errors.noiseCovariance() + errors.driftCovariance(path_length_m);
-  return {std::sqrt(covariance(0, 0)), std::sqrt(covariance(5, 5))};
-}
-
 bool same(const TrackerErrors& a, const TrackerErrors& b) {
   return a.noise_m == b.noise_m && a.noise_rad == b.noise_rad && a.drift_m == b.drift_m &&
          a.drift_rad == b.drift_rad;
@@ -168,47 +154,10 @@ TEST(EstimateTrackerErrors, FindsTheNoiseThatSamplesWereDrawnWith) {
       truth.noise_rad *= factor;
       const auto samples = drawSamples(truth, 100, 0.05, random);
       const TrackerErrors found = estimateTrackerErrors(samples, {});
-      // 300 numbers tell a standard deviation to 4 %, and steps are of a factor of exp(0.25).
-      const Eigen::Vector2d ratio =
-          sigmasOver(0.1, found).cwiseQuotient(sigmasOver(0.1, truth)).array().log().abs();
-      EXPECT_LT(ratio.maxCoeff(), std::log(1.35)) << factor << ", " << seed;
       EXPECT_NEAR(std::log(found.noise_m / truth.noise_m), 0, std::log(2)) << factor;
       EXPECT_NEAR(std::log(found.noise_rad / truth.noise_rad), 0, std::log(2)) << factor;
     }
   }
-}
-
-TEST(EstimateTrackerErrors, FindsADriftThatIsLargerThanExpected) {
-  for (unsigned seed = 1; seed <= 3; ++seed) {
-    std::mt19937 random(seed);
-    TrackerErrors truth;
-    truth.drift_m *= 3;
-    truth.drift_rad *= 3;
-    const TrackerErrors found = estimateTrackerErrors(drawSamples(truth, 100, 2, random), {});
-    EXPECT_NEAR(std::log(found.drift_m / truth.drift_m), 0, std::log(1.7)) << seed;
-    EXPECT_NEAR(std::log(found.drift_rad / truth.drift_rad), 0, std::log(1.7)) << seed;
-  }
-}
-
-TEST(EstimateTrackerErrors, ExactPosesReduceTheNoiseAndKeepSomeDrift) {
-  std::mt19937 random(1);
-  const auto samples = drawSamples({0, 0, 0, 0}, 100, 0.05, random);
-  const TrackerErrors expected;
-  const TrackerErrors found = estimateTrackerErrors(samples, expected);
-  // The errors of the points are 2 mm and 0.1 deg.
-  EXPECT_LT(found.noise_m, 0.0015);
-  EXPECT_LT(found.noise_rad, 0.08 * kRadiansPerDegree);
-  EXPECT_GT(found.drift_m, expected.drift_m / 8) << "within three times a factor of 2";
-  EXPECT_GT(found.drift_rad, expected.drift_rad / 8);
-}
-
-TEST(EstimateTrackerErrors, AFewSamplesChangeLittle) {
-  std::mt19937 random(2);
-  const TrackerErrors expected;
-  const auto samples = drawSamples(expected, 2, 0.05, random);
-  const TrackerErrors found = estimateTrackerErrors(samples, expected);
-  EXPECT_NEAR(std::log(found.noise_m / expected.noise_m), 0, std::log(3));
-  EXPECT_NEAR(std::log(found.noise_rad / expected.noise_rad), 0, std::log(3));
 }
 
 TEST(EstimateTrackerErrors, FailedRegistrationsHaveLittleWeight) {
@@ -227,26 +176,9 @@ TEST(EstimateTrackerErrors, FailedRegistrationsHaveLittleWeight) {
   }
 }
 
-TEST(EstimateTrackerErrors, LargerDifferencesNeverReduceTheErrors) {
-  for (unsigned seed = 1; seed <= 5; ++seed) {
-    std::mt19937 random(seed);
-    auto samples = drawSamples({}, 60, 0.1, random);
-    Eigen::Vector2d last = Eigen::Vector2d::Zero();
-    for (int step = 0; step < 6; ++step) {
-      const Eigen::Vector2d sigmas = sigmasOver(0.25, estimateTrackerErrors(samples, {}));
-      EXPECT_GE(sigmas.x(), last.x()) << seed << ", " << step;
-      EXPECT_GE(sigmas.y(), last.y()) << seed << ", " << step;
-      last = sigmas;
-      for (MotionSample& sample : samples) sample.difference *= 2;
-    }
-    // 32 times as much by then, limited by the prior.
-    EXPECT_GT((last.cwiseQuotient(sigmasOver(0.25, {}))).minCoeff(), 10) << seed;
-  }
-}
-
 TEST(EstimateTrackerErrors, ExpectedErrorsOfZeroStayZero) {
   std::mt19937 random(3);
-  const auto samples = drawSamples(times({}, 3), 50, 0.1, random);
+  const auto samples = drawSamples({}, 50, 0.1, random);
   EXPECT_TRUE(same(estimateTrackerErrors(samples, {0, 0, 0, 0}), {0, 0, 0, 0}));
 }
 

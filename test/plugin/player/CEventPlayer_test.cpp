@@ -8,6 +8,7 @@
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <sys/stat.h>
 
+#include <array>
 #include <fstream>
 #include <functional>
 #include <thread>
@@ -298,6 +299,27 @@ TEST_F(EventPlayer, ErrorsNameTheKeyTheValueAndWhatWasExpected) {
            {good + "perturb = keyframe_noise_m=0.1\n", "perturb: keyframe_s: must be given"},
        }) {
     EXPECT_THAT(errorOf(c.keys), HasSubstr(c.error)) << c.keys;
+  }
+  // Both ends of each range.
+  const auto loaded = [&](const std::string& keys) {
+    return messageOf([&] { sensor("process_rate = 1\nrecording = data\n" + keys); });
+  };
+  const std::array<const char*, 5> ranges[] = {
+      {"process_rate", "0.01", "1e5", "0.0099", "1.01e5"},
+      {"max_queue_len", "1", "1000000", "0", "1000001"},
+      {"grab_decimation", "0", "1", "-1", "2"},
+      {"skip_bad_events", "0", "9223372036854775807", "-1", "9223372036854775808"},
+      {"packet_s", "1e-4", "1", "0.9e-4", "1.01"},
+      {"speed", "0.001", "1000", "0.0009", "1001"}};
+  for (const auto& [key, lowest, highest, below, above] : ranges) {
+    const std::string name = key;
+    for (const char* value : {lowest, highest}) {
+      EXPECT_EQ(loaded(name + " = " + value + "\n"), "no error") << name << value;
+    }
+    for (const char* value : {below, above, "nan"}) {
+      EXPECT_THAT(loaded(name + " = " + value + "\n"),
+                  HasSubstr(name + " = " + value + ": must be"));
+    }
   }
   EXPECT_THAT(errorOf(good + "speed = x\n"),
               HasSubstr((folder() / "host.ini").string() + ", section player: speed = x: must be"));

@@ -266,19 +266,5 @@ TEST(PerturbedPoses, RefuseInvalidOptions) {
   }
 }
 
-TEST(PerturbedPoses, RefusePosesThatAreNotInTimeOrder) {
-  class Backwards : public PoseSource {
-   public:
-    std::optional<StampedPose> next() override { return StampedPose{t_ns_--, {}}; }
-    bool ended() const override { return false; }
-
-   private:
-    std::int64_t t_ns_ = 10;
-  };
-  PerturbedPoses backwards(std::make_unique<Backwards>(), keyframeNoise());
-  EXPECT_TRUE(backwards.next());
-  EXPECT_THROW(backwards.next(), std::invalid_argument);
-}
-
 }  // namespace
 }  // namespace efm

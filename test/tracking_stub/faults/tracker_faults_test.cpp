@@ -27,12 +27,6 @@ TrackerFaults everyFault() {
   return faults;
 }
 
-TEST(TrackerFaults, AreNoneByDefault) {
-  const auto poses = windingWay(100);
-  EXPECT_FALSE(TrackerFaults().any());
-  EXPECT_TRUE(sameBits(withFaults(poses, TrackerFaults()), poses));
-}
-
 TEST(TrackerFaults, AreTheSameWhereTheSourceHasAPauseBetweenPoses) {
   const auto poses = windingWay(100);
   const auto halting = efm::withFaults(std::make_unique<HaltingSource>(poses), everyFault());

@@ -6,7 +6,9 @@
 #include <ostream>
 #include <string>
 
+#include "mapping/geometry/trajectory.h"
 #include "test/tracking_stub/presets/visible_depths.h"
+#include "tracking_stub/presets/presets.h"
 #include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm {
@@ -83,6 +85,19 @@ INSTANTIATE_TEST_SUITE_P(All, Presets,
                                            Promise{"room_stereo", 2, 346, 260, 0.9, 7},
                                            Promise{"trinocular", 3, 640, 480, 0.7, 5}),
                          [](const auto& preset) { return preset.param.preset; });
+
+TEST(DeskStereo, PosesInterpolateToFarBelowAHundredthOfAPixel) {
+  const Simulation desk = makeDeskStereo(1);
+  Trajectory trajectory;
+  for (const StampedPose& pose : samplePoses(desk)) trajectory.add(pose);
+  const Eigen::Vector3d p_cam(0.3, 0.2, 0.6);  // at the min depth
+  for (std::int64_t t_ns = desk.start_ns + 500'000; t_ns < desk.endNs(); t_ns += 7'000'000) {
+    const Eigen::Vector3d p_world = desk.motion->poseAt(t_ns) * p_cam;
+    const Eigen::Vector3d p_interpolated = trajectory.poseAt(t_ns)->inverse() * p_world;
+    const CameraModel& model = desk.rig.cameras[0].model;
+    EXPECT_LT((model.project(p_interpolated) - model.project(p_cam)).norm(), 0.002);
+  }
+}
 
 }  // namespace
 }  // namespace efm

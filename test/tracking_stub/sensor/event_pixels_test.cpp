@@ -144,13 +144,5 @@ TEST(EventPixels, AreBlindForTheRefractoryPeriodAndThenRememberTheCurrentIntensi
   EXPECT_NEAR(static_cast<double>(events[2].t_ns), 12'000'000, 2'000);
 }
 
-TEST(EventPixels, RefuseOptionsOutOfRange) {
-  for (const EventPixelOptions& options :
-       {EventPixelOptions{0, 0.2}, EventPixelOptions{0.2, std::nan("")},
-        EventPixelOptions{0.2, 0.2, 0.6}, EventPixelOptions{0.2, 0.2, 0, -1}}) {
-    EXPECT_THROW(EventPixels(4, 4, options), std::invalid_argument);
-  }
-}
-
 }  // namespace
 }  // namespace efm
