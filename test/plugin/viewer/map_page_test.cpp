@@ -94,19 +94,29 @@ TEST(PagePoints, MoreThanTheLimitAreThinnedToTheBestOfEachCell) {
   EXPECT_GT(page.thinned_m(), 0.01);
   // Of each cell the highest support, and of these the highest confidence.
   std::map<std::tuple<double, double, double>, std::pair<std::uint32_t, float>> best;
-  const auto cell_of = [&](const CloudPoint& point) {
+  const auto cell_of = [&](const MapPoint& point) {
     const Eigen::Vector3d cell =
-        ((point.p_world - page.origin_m()) / page.thinned_m()).array().floor();
+        ((positionIn(*cloud, point) - page.origin_m()) / page.thinned_m()).array().floor();
     return std::tuple(cell.x(), cell.y(), cell.z());
   };
-  for (const CloudPoint& point : points) {
+  for (const MapPoint& point : *cloud) {
     auto& of_cell = best[cell_of(point)];
-    of_cell = std::max(of_cell, std::pair(point.support, point.confidence));
+    of_cell = std::max(of_cell, std::pair(point.support, point.intensity));
   }
   EXPECT_EQ(page.size(), best.size());
   for (std::size_t i = 0; i < page.size(); ++i) {
-    const CloudPoint& point = points[page.at(i).keyframe];
-    EXPECT_EQ(best[cell_of(point)], std::pair(point.support, point.confidence)) << i;
+    const MapPoint& point = cloud->at(page.at(i).keyframe);
+    EXPECT_EQ(best[cell_of(point)], std::pair(point.support, point.intensity)) << i;
+  }
+}
+
+/// Eight corners: a cell has one of them or all, no number between.
+TEST(PagePoints, ThinningEndsWhereNoCellGivesTheNumber) {
+  std::vector<CloudPoint> corners;
+  for (int i = 0; i < 8; ++i) corners.push_back({{i % 2 * 1.0, i / 2 % 2 * 1.0, i / 4 * 1.0}, 1});
+  const MapCloud::ConstPtr cloud = mapCloudOf(corners, 0.01);
+  for (const double voxel_m : {0.01, 0.013, 0.017, 0.02, 0.023}) {
+    EXPECT_EQ(PagePoints(*cloud, voxel_m, 4).size(), 1U) << voxel_m;
   }
 }
 
@@ -187,7 +197,7 @@ TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
   const std::string mean = "\"'</script><!--<script>alert(1)</ScRiPt>&amp;\\";
   const MapCloud::ConstPtr points =
       mapCloudOf({{{1, 2, 3}, 4, 1, 0}, {{1, 2, 65538}, 8, 1, 70'000}, {{2, 2, 3}, 2, 1, 1}}, 1e9);
-  const std::vector<StampedPose> trajectory = {{1'500'000'000, {}}};
+  const std::vector<StampedPose> trajectory = {{1'500'000'000, {{0.8, 0, 0.6, 0}, {4, 5, 6}}}};
   KeyframePictures pictures({});
   pictures.add(cv::Mat1f(2, 2, 1.0F), cv::Mat_<cv::Vec2i>(2, 2, cv::Vec2i(1, 0)));
   const MapPage page = {mean,
@@ -206,12 +216,13 @@ TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
   json expected = json::parse(R"({"points": 3, "all_points": 3, "thinned_m": 0.0, "voxel_m": 0.01,
     "origin_m": [1.0, 2.0, 3.0], "confidence": [2.0, 4.0], "keyframe_step": 2,
     "up": [0.0, -1.0, 0.0],
-    "keyframes": [{"t": "1.500000000", "p": [0.0, 0.0, 0.0], "q": [0.0, 0.0, 0.0, 1.0]}],
+    "keyframes": [{"t": "1.500000000", "p": [4.0, 5.0, 6.0], "q": [0.0, 0.6, 0.0, 0.8]}],
     "view": {"width": 2, "height": 3, "fx": 4.0, "fy": 5.0, "cx": 6.0, "cy": 7.0}})");
   expected["name"] = mean;
   expected["step_m"] = {1.0 / 65535, 0.0, 1.0};
   expected["depths_m"] = {pictures.limits().min_depth_m, pictures.limits().max_depth_m};
   EXPECT_EQ(map, expected);
+  EXPECT_THAT(dataOf(html, "map-data"), Not(HasSubstr("\n"))) << "no blanks to read";
   EXPECT_EQ(json::parse(dataOf(html, "report-data"))["warnings"][0]["text"], mean);
   EXPECT_EQ(dataOf(html, "point-data").size(), 40U) << "30 bytes";
   for (const char* kind : {"depth", "events"}) {
@@ -226,7 +237,7 @@ TEST(MapPage, SaysHowManyPointsAreLeftOut) {
   const MapCloud::ConstPtr points = mapCloudOf(randomPoints(15'000, {0, 0, 0}), 0.01);
   const std::vector<StampedPose> trajectory;
   const KeyframePictures pictures({});
-  for (const std::size_t limit : {100U, 20'000U}) {
+  for (const std::size_t limit : {100U, 15'000U}) {
     const MapPage page = {"map", *points, 0.01, trajectory, pictures, {}, "{}", limit};
     std::ostringstream stream;
     writeMapPage(stream, page);
@@ -234,6 +245,7 @@ TEST(MapPage, SaysHowManyPointsAreLeftOut) {
     const PagePoints shown(*points, 0.01, limit);
     EXPECT_EQ(map["all_points"], 15'000);
     EXPECT_EQ(map["points"], shown.size());
+    EXPECT_EQ(shown.size() == 15'000, limit == 15'000) << "as many as there may be";
     EXPECT_EQ(map["thinned_m"], shown.thinned_m());
     EXPECT_FALSE(map.contains("view"));
     std::vector<std::uint8_t> bytes;
