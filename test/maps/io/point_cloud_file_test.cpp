@@ -243,19 +243,6 @@ TEST_F(PointCloudFile, IsReadBackFromEachEncoding) {
   }
 }
 
-// As a simulated recording has it.
-TEST_F(PointCloudFile, WithoutAnIntensityHasConfidenceOne) {
-  const PointCloudContent content =
-      parse("gt_cloud.ply",
-            "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty float x\n"
-            "property float y\nproperty float z\nend_header\n" +
-                rawFloats({1, 2, 3, -4, 5.5F, 6}));
-
-  ASSERT_EQ(content.points.size(), 2U);
-  EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(-4, 5.5, 6));
-  EXPECT_EQ(content.points[1].confidence, 1.0F);
-}
-
 TEST_F(PointCloudFile, DoublesAreReadInFull) {
   const double x = 1000000.123456789;
   const std::string ply_fields =
@@ -379,6 +366,7 @@ TEST_F(PointCloudFile, PointsThatAreNotFiniteAreCounted) {
   EXPECT_EQ(content.non_finite, 2U);
   ASSERT_EQ(content.points.size(), 2U);
   EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(4, 5, 0));
+  EXPECT_EQ(content.points[1].confidence, 1.0F) << "without an intensity";
 }
 
 TEST_F(PointCloudFile, CutShortAnywhereIsAnError) {

@@ -43,15 +43,6 @@ class EvaluateCloud : public TemporaryFolder {
   }
 };
 
-TEST_F(EvaluateCloud, ReadsBothFormats) {
-  const auto truth = cloud("truth.ply", {0, 1, 2});
-  for (const auto& map : {cloud("a.pcd", {0.25, 1}), cloud("b.ply", {0.25, 1})}) {
-    const CloudEvaluation evaluation = evaluateCloud(map, truth, {{0.5}, {}});
-    EXPECT_EQ(evaluation.errors.accuracy.mean, 0.125) << map;
-    EXPECT_EQ(evaluation.errors.steps.at(0).completeness, 2.0 / 3) << map;
-  }
-}
-
 TEST_F(EvaluateCloud, ReadsTheCloudsOfFolders) {
   cloud("out/map.pcd", {0, 1});
   cloud("one/points.pcd", {0, 1});

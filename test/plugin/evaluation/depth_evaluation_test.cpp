@@ -118,7 +118,35 @@ TEST_F(EvaluateDepth, TheTablesOfManyMapsHaveALinePerMapAndAllMeasuresBelow) {
   options.thresholds_m = {0.1, 0.3};
   EXPECT_EQ(evaluationTable(evaluateDepth(folder() / "out", folder(), options),
                             StereoBaseline{400, 0.1, "as given"}),
-            R"(@30@)");
+            R"(map                   points    mean  median   bad-pix  AErrR  delta<1.25
+                              |dZ| m  |dZ| m  5px,5% %      %           %
+1600000000.100000000      12  0.2000  0.2000      0.00   9.09      100.00
+1600000000.200000000      12  0.8000  0.8000      0.00  36.36        0.00
+
+                      mean of maps  all points
+points                                      24
+mean |dZ|, m                0.5000      0.5000
+median |dZ|, m              0.5000      0.5000
+median |d(1/Z)|, 1/m       0.08333     0.08333
+bad-pix 5px,5%, %             0.00        0.00
+bad-pix 3px,5%, %            50.00       50.00
+SILog, x100                  0.000       4.110
+AErrR, %                     22.73       22.73
+AErrR by estimate, %         18.33       18.33
+log RMSE, x100              20.273      22.943
+delta<1.25, %                50.00       50.00
+delta<1.25^2, %             100.00      100.00
+delta<1.25^3, %             100.00      100.00
+beyond 10%, %                50.00       50.00
+
+error up to m  precision %  recall %   F1 %
+0.100                 0.00      0.00   0.00
+0.300                50.00     50.00  50.00
+24 estimates with a truth, 0 without
+24 pixels with a truth
+bad-pix with focal length 400.00 px and baseline 0.1000 m
+(as given)
+)");
 }
 
 TEST_F(EvaluateDepth, AMapWithoutPointsIsNotPartOfTheMean) {

@@ -8,10 +8,8 @@
 
 #include "plugin/evaluation/cloud_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_plot.h"
-#include "plugin/evaluation/text_table.h"
 #include "plugin/evaluation/trajectory_evaluation_plot.h"
 #include "plugin/pictures/picture_file.h"
-#include "plugin/pictures/picture_grid.h"
 #include "plugin/pictures/value_picture.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/pictures/sketch.h"
@@ -23,21 +21,6 @@ namespace {
 using testing::HasSubstr;
 
 const cv::Vec3b kWhite(255, 255, 255);
-
-TEST(PictureGrid, JoinsPicturesOnWhiteWithoutChangingThem) {
-  const cv::Mat3b red(10, 20, cv::Vec3b(0, 0, 255));
-  const cv::Mat3b blue(30, 5, cv::Vec3b(255, 0, 0));
-  const cv::Mat3b row = sideBySide({red, blue});
-  EXPECT_EQ(row.rows, 30);
-  EXPECT_EQ(cv::countNonZero(row.reshape(1) == 0), 2 * (10 * 20 + 30 * 5));
-  EXPECT_EQ(row(29, 0), kWhite);
-  EXPECT_EQ(row(29, row.cols - 1), blue(0, 0));
-  const cv::Mat3b column = oneBelowAnother({red, blue});
-  EXPECT_EQ(column.cols, 20);
-  EXPECT_EQ(column(0, 0), red(0, 0));
-  EXPECT_EQ(column(column.rows - 1, 10), blue(0, 0)) << "in the middle";
-  EXPECT_TRUE(sideBySide({}).empty());
-}
 
 TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
   ValuePicture picture;
@@ -56,15 +39,6 @@ TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
   EXPECT_EQ(drawValues(picture)(middle, drawn.cols / 2), cv::Vec3b(200, 200, 200));
   EXPECT_EQ(drawValues(picture)(middle, drawn.cols / 6), low) << "grey is under the values alone";
   EXPECT_THROW(drawValues({}), std::invalid_argument);
-}
-
-TEST(TextTable, ColumnsFitTheirCells) {
-  TextTable table;
-  table.add({"a", "long"});
-  table.add({"wide", "1", "x"});
-  table.add({"b"});
-  EXPECT_EQ(table.text(), "a     long\nwide     1  x\nb\n");
-  EXPECT_EQ(fixedText(1.005, 1), "1.0");
 }
 
 class EvaluationPlot : public TemporaryFolder {
