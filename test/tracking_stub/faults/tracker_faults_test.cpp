@@ -30,7 +30,11 @@ TrackerFaults everyFault() {
 TEST(TrackerFaults, AreTheSameWhereTheSourceHasAPauseBetweenPoses) {
   const auto poses = windingWay(100);
   const auto halting = efm::withFaults(std::make_unique<HaltingSource>(poses), everyFault());
-  EXPECT_TRUE(sameBits(polled(*halting), withFaults(poses, everyFault())));
+  const auto faulty = withFaults(poses, everyFault());
+  EXPECT_TRUE(sameBits(polled(*halting), faulty));
+  TrackerFaults other = everyFault();
+  other.perturbation.seed = other.dropouts.seed = 9;
+  EXPECT_FALSE(sameBits(withFaults(poses, other), faulty));
 }
 
 TEST(TrackerFaults, OfOneKindDoNotChangeOthers) {

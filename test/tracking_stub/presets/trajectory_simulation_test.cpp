@@ -72,7 +72,7 @@ TEST(TrajectorySimulation, ScenesAreUprightAroundThePath) {
        {Case{"room", 1.2, 0.7, 9, 0}, {"street", 1.6, 2.5, 51, 0.4}, {"poles", 0, 0.8, 5.2, 0}}) {
     TrajectorySimulationOptions options;
     options.scene = of.scene;
-    options.duration_s = 3;
+    options.duration_s = 0.5;
     const Simulation simulation = makeTrajectorySimulation(options, walk(), smallRig());
     // Down is +z, and ahead +x.
     const Vector3d begin = simulation.motion->poseAt(simulation.start_ns).translation;
