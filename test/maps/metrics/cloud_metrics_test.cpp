@@ -50,6 +50,8 @@ TEST(CloudErrors, AreWorkedOutByHand) {
   EXPECT_DOUBLE_EQ(errors.steps[1].completeness, 3.0 / 4);
   EXPECT_DOUBLE_EQ(errors.steps[2].outliers, 0);
   EXPECT_DOUBLE_EQ(errors.steps[2].completeness, 1);
+  EXPECT_EQ(defaultCloudDistances(),
+            (std::vector<double>{0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1}));
 }
 
 TEST(CloudErrors, CompletenessMayHaveAnotherTruth) {

@@ -25,6 +25,8 @@ TEST(PrecisionRecall, AreWorkedOutByHand) {
   EXPECT_DOUBLE_EQ(counts.precision(2), 1);
   EXPECT_DOUBLE_EQ(counts.recall(2), 3.0 / 5);
   EXPECT_EQ(counts.f1(3), 0);
+  EXPECT_EQ(defaultDepthThresholds(), (std::vector<double>{0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15,
+                                                           0.2, 0.3, 0.5, 0.7, 1, 2, 5}));
 
   PrecisionRecall twice = counts;
   twice.add(counts);
