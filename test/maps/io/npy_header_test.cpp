@@ -121,6 +121,8 @@ TEST(NpyHeader, WrongOnesAreErrorsThatSayWhatIsWrong) {
       {whole.substr(0, 9), "the file ends inside it"},
       {npy(dictionary("'<f4'"), 2).substr(0, 11), "the file ends inside it"},
       {whole.substr(0, whole.size() - 1), "the file ends inside it"},
+      {npy(""), "there is no 'descr'"},
+      {npy("", 2), "there is no 'descr'"},
       {npy("{}", 0), "version 0: expected 1, 2 or 3"},
       {npy("{}", 4), "version 4: expected 1, 2 or 3"},
       {npy("{'descr': '<f4'}"), "there is no 'fortran_order'"},

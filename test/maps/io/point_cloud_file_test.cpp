@@ -264,6 +264,7 @@ TEST_F(PointCloudFile, DoublesAreReadInFull) {
   for (const PointCloudContent& content : contents) {
     ASSERT_EQ(content.points.size(), 1U);
     EXPECT_EQ(content.points[0].p_world, Eigen::Vector3d(x, 2, 3));
+    EXPECT_EQ(content.points[0].confidence, 1.0F) << "without an intensity";
   }
 }
 
@@ -332,7 +333,7 @@ TEST_F(PointCloudFile, OtherFieldsAndElementsAreIgnored) {
   // Points of four bytes of padding, x, a pair of shorts, y and z.
   const PointCloudContent pcd =
       parse("c.pcd",
-            "# by hand\n\nVERSION 0.7\nCOLUMNS _ x pair y z intensity\nSIZE 1 4 2 4 4 1\nTYPE U F "
+            "#by hand\n\nVERSION 0.7\nCOLUMNS _ x pair y z intensity\nSIZE 1 4 2 4 4 1\nTYPE U F "
             "U F F I\n"
             "COUNT 4 1 2 1 1 1\nWIDTH 1\nHEIGHT 2\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\n"
             "DATA binary\n" +
@@ -366,7 +367,6 @@ TEST_F(PointCloudFile, PointsThatAreNotFiniteAreCounted) {
   EXPECT_EQ(content.non_finite, 2U);
   ASSERT_EQ(content.points.size(), 2U);
   EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(4, 5, 0));
-  EXPECT_EQ(content.points[1].confidence, 1.0F) << "without an intensity";
 }
 
 TEST_F(PointCloudFile, CutShortAnywhereIsAnError) {
@@ -483,6 +483,12 @@ TEST_F(PointCloudFile, ThatIsMalformedSaysWhereAndWhatWasExpected) {
   for (const auto& [bytes, expected] : of_pcd) {
     EXPECT_THAT(messageOf([&, &wrong = bytes] { parsePcd(wrong); }), HasSubstr(expected)) << bytes;
   }
+  // At the limits: the most numbers of a field, and no more bytes than elements need.
+  EXPECT_NO_THROW(
+      parsePcd("FIELDS x y z all\nSIZE 4 4 4 1\nTYPE F F F U\nCOUNT 1 1 1 1048576\n"
+               "POINTS 0\nDATA binary\n"));
+  EXPECT_NO_THROW(parsePly(little + "element eye 2\nproperty double f\nelement none 3\n" +
+                           "element vertex 0\n" + end + "1234567812345678"));
   for (const auto& [bytes, expected] : of_ply) {
     EXPECT_THAT(messageOf([&, &wrong = bytes] { parsePly(wrong); }), HasSubstr(expected)) << bytes;
   }
