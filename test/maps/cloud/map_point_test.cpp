@@ -53,7 +53,12 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
               0.051 * far.resolution_m)
         << far.p_world.transpose();
     EXPECT_EQ(cloud->at(0).first_keyframe, 4U);
-    EXPECT_EQ(coarseStepOf(*cloud, far.resolution_m).has_value(), !far.origin.isZero());
+    EXPECT_EQ(cloud->at(0).support, 3U);
+    EXPECT_EQ(cloud->at(0).sigma, 0.5F);
+    const auto step_m = coarseStepOf(*cloud, far.resolution_m);
+    EXPECT_EQ(step_m.has_value(), !far.origin.isZero());
+    // Floats of 24 bits: of 16385 in steps of 2^(14 - 23).
+    if (far.p_world.x() == 16385) EXPECT_EQ(step_m, std::ldexp(1, -9));
     const auto xyzi = xyziCloudOf(*cloud);
     EXPECT_EQ(xyzi->sensor_origin_, cloud->sensor_origin_);
     EXPECT_EQ(xyzi->at(0).getVector3fMap(), cloud->at(0).getVector3fMap());
@@ -67,6 +72,8 @@ TEST(MapCloud, APointFarFromTheOthersDoesNotMoveTheOrigin) {
   const auto cloud = mapCloudOf(points, 0.01);
   EXPECT_EQ(cloud->sensor_origin_.head<3>(), Eigen::Vector3f::Zero());
   EXPECT_FALSE(coarseStepOf(*cloud, 0.01)) << "the map is not far away";
+  points[501].p_world = {0, -1e7, 0};
+  EXPECT_TRUE(coarseStepOf(*mapCloudOf(points, 0.01), 0.01)) << "more than 0.1 % of it are";
   EXPECT_TRUE(mapCloudOf({}, 0.01)->empty());
 }
 

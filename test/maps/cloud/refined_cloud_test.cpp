@@ -63,9 +63,10 @@ struct PosedKeyframes {
   }
 };
 
-/// Keyframes of an earlier map, new ones, motions and `applyPending` in any order.
-void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
-  std::mt19937 random(seed);
+// Keyframes of an earlier map, new ones, motions and `applyPending` in any order.
+RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
+  const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   RefinedCloud cloud(options, RefinedCloud::kAll);
   PosedKeyframes keyframes;
   const std::size_t fixed = random() % 4;
@@ -106,14 +107,6 @@ void checkAnyOrder(const GlobalCloudOptions& options, unsigned seed) {
   RC_ASSERT(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
 }
 
-RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
-  checkAnyOrder(optionsOf(Consistency::kNone), *rc::gen::arbitrary<unsigned>());
-}
-
-RC_GTEST_PROP(RefinedCloud, IsANewMapWhereKeyframesCheckEachOther, ()) {
-  checkAnyOrder(optionsOf(Consistency::kVisibility), *rc::gen::arbitrary<unsigned>());
-}
-
 TEST(RefinedCloud, AKeyframeWithinTheToleranceStays) {
   std::mt19937 random(2);
   RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
@@ -147,19 +140,6 @@ TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
     cloud.applyPending(0);
     EXPECT_TRUE(isSame(cloud.T_world_ref().back(), T_nearest_ref));
   }
-}
-
-TEST(RefinedCloud, SmallMotionsAddUpToTheTolerance) {
-  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
-  cloud.insert({{{0, 0, 2}, 1}}, {});
-  Rigid3 T_world_ref;
-  for (int step = 1; step <= 10; ++step) {
-    T_world_ref.translation.x() = 0.001 * step;
-    cloud.move({{0, T_world_ref}});
-    cloud.applyPending(0.0045);
-    EXPECT_LE(std::abs(cloud.T_world_ref()[0].translation.x() - 0.001 * step), 0.0045);
-  }
-  EXPECT_GT(cloud.T_world_ref()[0].translation.x(), 0);
 }
 
 TEST(RefinedCloud, MovesTheOldestFirstUpToTheMaximum) {
@@ -206,13 +186,14 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
   std::mt19937 random(5);
   GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
   options.voxel_size_m = 0.001;  // a voxel for almost each point: enough of them settle
-  constexpr std::size_t kMovable = 12;
+  constexpr std::size_t kMovable = 3;
   RefinedCloud cloud(options, kMovable);
   cloud.insertFixed({}, {});
   PosedKeyframes keyframes;
   std::size_t stayed = 0;
-  for (std::size_t k = 0; k < 40; ++k) {
-    keyframes.points.push_back(randomPoints(random, 12'000));
+  for (std::size_t k = 0; k < 32; ++k) {
+    // Five keyframes make the 200,000 voxels that are worth a merge.
+    keyframes.points.push_back(randomPoints(random, k % 12 < 5 ? 42'000 : 500));
     cloud.insert(keyframes.points.back(), randomPose(random, 0.1, 0.1));
     // The newest one, the oldest that may move, and some of all.
     std::map<std::size_t, Rigid3> moves{{k, randomPose(random, 0.1, 0.1)}};
@@ -239,7 +220,7 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
   EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *same.points()));
 }
 
-TEST(RefinedCloud, WithoutItsNewestKeyframeItIsAsBefore) {
+TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARefusedMoveItIsAsBefore) {
   std::mt19937 random(4);
   const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
   RefinedCloud cloud(options, RefinedCloud::kAll);
@@ -255,18 +236,6 @@ TEST(RefinedCloud, WithoutItsNewestKeyframeItIsAsBefore) {
   cloud.applyPending(0);
   EXPECT_EQ(cloud.T_world_ref().size(), 3U);
   EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
-}
-
-TEST(RefinedCloud, AKeyframeThatCannotBeMovedKeepsItsPose) {
-  std::mt19937 random(3);
-  const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
-  RefinedCloud cloud(options, RefinedCloud::kAll);
-  PosedKeyframes keyframes;
-  for (int i = 0; i < 3; ++i) {
-    keyframes.points.push_back(randomPoints(random, 50));
-    keyframes.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
-    cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
-  }
   for (const double too_far_m : {1e30, std::numeric_limits<double>::quiet_NaN()}) {
     Rigid3 T_world_ref;
     T_world_ref.translation = {too_far_m, 0, 0};

@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <random>
 #include <set>
@@ -17,6 +16,8 @@
 #include "maps/io/atomic_file.h"
 #include "maps/io/pcd_file.h"
 #include "maps/io/ply_file.h"
+#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
@@ -25,56 +26,20 @@ using testing::AllOf;
 using testing::EndsWith;
 using testing::HasSubstr;
 
-class PointCloudFile : public testing::Test {
+class PointCloudFile : public TemporaryFolder {
  protected:
-  void SetUp() override {
-    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
-    folder_ = std::filesystem::temp_directory_path() / ("efm_" + name);
-    std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
   int runInFolder(const std::string& command) const {
     return std::system(
-        ("cd '" + folder_.string() + "' && " + command + " >/dev/null 2>&1").c_str());
+        ("cd '" + folder().string() + "' && " + command + " >/dev/null 2>&1").c_str());
   }
   std::size_t filesInFolder() const {
     return static_cast<std::size_t>(
-        std::distance(std::filesystem::directory_iterator(folder_), {}));
-  }
-
-  PointCloudContent contentOf(const std::string& name, const std::string& bytes) const {
-    std::ofstream(folder_ / name, std::ios::binary) << bytes;
-    return readPointCloud(folder_ / name);
-  }
-
-  /// The error without the path, which must be there.
-  static std::string refusalOf(const std::filesystem::path& path) {
-    try {
-      readPointCloud(path);
-    } catch (const std::runtime_error& error) {
-      const std::string start = "cannot read " + path.string() + ": ";
-      EXPECT_EQ(std::string(error.what()).substr(0, start.size()), start);
-      return std::string(error.what()).substr(start.size());
-    }
-    return "accepted";
-  }
-  std::string refusalOf(const std::string& name, const std::string& bytes) const {
-    std::ofstream(folder_ / name, std::ios::binary) << bytes;
-    return refusalOf(folder_ / name);
+        std::distance(std::filesystem::directory_iterator(folder()), {}));
   }
   /// The error of writing one point, or none.
   static std::string writeRefusalOf(const std::filesystem::path& path, const CloudPoint& point) {
-    try {
-      writePcd(path, *mapCloudOf({{{1, 2, 3}, 1.0F}, point}, 0.01));
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "accepted";
+    return messageOf([&] { writePcd(path, *mapCloudOf({{{1, 2, 3}, 1.0F}, point}, 0.01)); });
   }
-
-  std::filesystem::path folder_;
 };
 
 PointCloudContent parse(const std::filesystem::path& name, const std::string& bytes) {
@@ -163,20 +128,25 @@ void expectNear(const std::vector<CloudPoint>& read, const std::vector<CloudPoin
 TEST_F(PointCloudFile, AColouredPlyKeepsAllDigitsAndHasTheColours) {
   const std::vector<CloudPoint> points = {{{450'000.125, 5'200'000.25, -3}, 17.5F, 4},
                                           {{449'999.5, 5'200'001, 2}, 0.25F, 70'000}};
-  writeColouredPly(folder_ / "map.ply", *mapCloudOf(points, 0.01), {{1, 2, 3}, {254, 255, 0}});
-  const PointCloudContent content = readPointCloud(folder_ / "map.ply");
+  writeColouredPly(folder() / "map.ply", *mapCloudOf(points, 0.01), {{1, 2, 3}, {254, 255, 0}});
+  const PointCloudContent content = readPointCloud(folder() / "map.ply");
   ASSERT_EQ(content.points.size(), 2U);
   for (int i = 0; i < 2; ++i) EXPECT_EQ(content.points[i].p_world, points[i].p_world);
   // The last bytes of a vertex, which the reader leaves out.
-  const std::string bytes = readBytes(folder_ / "map.ply");
+  const std::string bytes = readBytes(folder() / "map.ply");
   EXPECT_THAT(bytes, AllOf(HasSubstr("property uchar red\nproperty uchar green\nproperty uchar blue"
                                      "\nproperty float confidence\nproperty uint support\n"),
                            EndsWith(std::string("\xFE\xFF\0", 3) + raw(0.25F) + raw(70'000U))));
   EXPECT_EQ(filesInFolder(), 1U);
   EXPECT_THROW(
-      writeColouredPly(folder_ / "map.ply", *mapCloudOf({{{1, 2, NAN}, 1, 1}}, 0.01), {{0, 0, 0}}),
+      writeColouredPly(folder() / "map.ply", *mapCloudOf({{{1, 2, NAN}, 1, 1}}, 0.01), {{0, 0, 0}}),
       std::runtime_error);
-  EXPECT_EQ(readPointCloud(folder_ / "map.ply").points.size(), 2U) << "the earlier file stays";
+  EXPECT_EQ(readPointCloud(folder() / "map.ply").points.size(), 2U) << "the earlier file stays";
+  std::ostringstream stream;
+  EXPECT_THAT(messageOf([&] {
+                writePlyTo(stream, *mapCloudOf({{{0, 0, 0}, INFINITY}}, 0.01), {{0, 0, 0}});
+              }),
+              HasSubstr("point 0 ("));
 }
 
 TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
@@ -186,23 +156,23 @@ TEST_F(PointCloudFile, IsReadByThePclProgramsAndTheirFilesAreReadBack) {
   const std::vector<CloudPoint> points = plainPoints(1000);
   std::vector<CloudPoint> with_sigma = points;
   for (CloudPoint& point : with_sigma) point.sigma = 0.25F;
-  writePcd(folder_ / "map.pcd", *mapCloudOf(with_sigma, 1e9));
+  writePcd(folder() / "map.pcd", *mapCloudOf(with_sigma, 1e9));
   EXPECT_EQ(filesInFolder(), 1U) << "no temporary file stays";
   ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary map.pcd a.pcd 0"), 0);
   ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary map.pcd c.pcd 2"), 0);
   ASSERT_EQ(runInFolder("pcl_pcd2ply -format 0 map.pcd a.ply"), 0);
   ASSERT_EQ(runInFolder("pcl_pcd2ply -format 1 map.pcd b.ply"), 0);
-  expectNear(readPointCloud(folder_ / "a.pcd").points, points, 1e-6);
-  expectNear(readPointCloud(folder_ / "a.ply").points, points, 1e-6);
-  expectNear(readPointCloud(folder_ / "b.ply").points, points, 0);
+  expectNear(readPointCloud(folder() / "a.pcd").points, points, 1e-6);
+  expectNear(readPointCloud(folder() / "a.ply").points, points, 1e-6);
+  expectNear(readPointCloud(folder() / "b.ply").points, points, 0);
   // Their filters keep the fields: the mean of the points of a voxel, support as they count it.
   ASSERT_EQ(runInFolder("pcl_voxel_grid map.pcd v.pcd -leaf 5,5,5"), 0);
   ASSERT_EQ(runInFolder("pcl_convert_pcd_ascii_binary v.pcd va.pcd 0"), 0);
-  EXPECT_LT(readPointCloud(folder_ / "va.pcd").points.size(), 200U);
-  EXPECT_THAT(readBytes(folder_ / "va.pcd"),
+  EXPECT_LT(readPointCloud(folder() / "va.pcd").points.size(), 200U);
+  EXPECT_THAT(readBytes(folder() / "va.pcd"),
               AllOf(HasSubstr("\nFIELDS x y z intensity support sigma\n"), HasSubstr(" 1 0.25\n")));
   // This program pads the compressed file to a whole page.
-  std::string bytes = readBytes(folder_ / "c.pcd");
+  std::string bytes = readBytes(folder() / "c.pcd");
   const std::size_t sizes = bytes.find("compressed\n") + 11;
   std::uint32_t packed_bytes = 0;
   std::memcpy(&packed_bytes, bytes.data() + sizes, sizeof(packed_bytes));
@@ -219,7 +189,7 @@ TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
     points.push_back({{450'123 + offset_m(random), 5'400'456 + offset_m(random), 100}, 2});
   }
   const auto expectAllDigits = [&](const std::string& name, double tolerance_m) {
-    const auto read = readPointCloud(folder_ / name).points;
+    const auto read = readPointCloud(folder() / name).points;
     ASSERT_EQ(read.size(), points.size());
     std::set<double> heights;
     for (std::size_t i = 0; i < read.size(); ++i) {
@@ -228,9 +198,9 @@ TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
     }
     EXPECT_GT(heights.size(), 4000U) << name;  // of floats in the world: 11
   };
-  writePcd(folder_ / "map.pcd", *mapCloudOf(points, 0.01));
+  writePcd(folder() / "map.pcd", *mapCloudOf(points, 0.01));
   expectAllDigits("map.pcd", 1e-4);
-  EXPECT_THAT(readBytes(folder_ / "map.pcd"),
+  EXPECT_THAT(readBytes(folder() / "map.pcd"),
               AllOf(HasSubstr("\nFIELDS x y z intensity support sigma\n"),
                     HasSubstr("\nVIEWPOINT 450000 5400000 0 1 0 0 0\n")));
   if (std::system("command -v pcl_convert_pcd_ascii_binary >/dev/null") != 0) {
@@ -248,61 +218,29 @@ TEST_F(PointCloudFile, PointsFarFromTheOriginKeepTheirDigits) {
 TEST_F(PointCloudFile, ViewpointsOfOtherProgramsAreNotAdded) {
   const std::string start = "VERSION 0.7\nFIELDS x y z";
   const std::string end = "WIDTH 1\nHEIGHT 1\nVIEWPOINT 10 20 30 1 0 0 0\nPOINTS 1\nDATA ascii\n";
-  const auto other = contentOf("a.pcd", start + "\nSIZE 4 4 4\nTYPE F F F\n" + end + "1 2 3\n");
+  const auto other = parse("a.pcd", start + "\nSIZE 4 4 4\nTYPE F F F\n" + end + "1 2 3\n");
   EXPECT_EQ(other.points.at(0).p_world, Eigen::Vector3d(1, 2, 3));
   const std::string ours = " support sigma\nSIZE 4 4 4 4 4\nTYPE F F F U F\n";
-  const auto map = contentOf("b.pcd", start + ours + end + "1 2 3 4 nan\n");
+  const auto map = parse("b.pcd", start + ours + end + "1 2 3 4 nan\n");
   EXPECT_EQ(map.points.at(0).p_world, Eigen::Vector3d(11, 22, 33));
   std::string wrong = end;
   wrong.replace(wrong.find("20"), 2, "x");
-  EXPECT_THAT(refusalOf("c.pcd", start + ours + wrong + "1 2 3 4 nan\n"),
+  EXPECT_THAT(messageOf([&] { parsePcd(start + ours + wrong + "1 2 3 4 nan\n"); }),
+              HasSubstr("line 7: VIEWPOINT: expected 7 numbers"));
+  wrong.replace(wrong.find(" x 30 1 0 0 0"), 13, " 20");
+  EXPECT_THAT(messageOf([&] { parsePcd(start + ours + wrong + "1 2 3 4 nan\n"); }),
               HasSubstr("line 7: VIEWPOINT: expected 7 numbers"));
 }
 
 TEST_F(PointCloudFile, IsReadBackFromEachEncoding) {
   for (const int count : {0, 1000}) {
-    const std::vector<CloudPoint> points = plainPoints(count);
+    std::vector<CloudPoint> points = plainPoints(count);
+    if (count > 0) points.push_back({{-0.0, 1e-45, -3e38}, 1e-38F});  // of any magnitude
     for (const auto& [name, bytes] : filesOf(points)) {
       SCOPED_TRACE(name);
       expectNear(parse(name, bytes).points, points, 0);
     }
   }
-}
-
-TEST_F(PointCloudFile, IsReadBackAsTheSameFloatsOfAnyMagnitude) {
-  std::mt19937 random(1);
-  std::vector<CloudPoint> points = {{{0, -0.0, 1e-45}, 1e-38F}};
-  const auto any_float = [&random] {
-    float number = std::numeric_limits<float>::quiet_NaN();
-    while (!std::isfinite(number)) {
-      const auto bits = static_cast<std::uint32_t>(random());
-      std::memcpy(&number, &bits, sizeof(number));
-    }
-    return number;
-  };
-  while (points.size() < 5000) {
-    points.push_back({{any_float(), any_float(), any_float()}, any_float()});
-  }
-  writePcd(folder_ / "map.pcd", *mapCloudOf(points, 1e9));
-  const PointCloudContent content = readPointCloud(folder_ / "map.pcd");
-  ASSERT_EQ(content.points.size(), points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    EXPECT_EQ(content.points[i].p_world, points[i].p_world.cast<float>().cast<double>());
-    EXPECT_EQ(content.points[i].confidence, points[i].confidence);
-  }
-}
-
-// As a simulated recording has it.
-TEST_F(PointCloudFile, WithoutAnIntensityHasConfidenceOne) {
-  const PointCloudContent content =
-      contentOf("gt_cloud.ply",
-                "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty float x\n"
-                "property float y\nproperty float z\nend_header\n" +
-                    rawFloats({1, 2, 3, -4, 5.5F, 6}));
-
-  ASSERT_EQ(content.points.size(), 2U);
-  EXPECT_EQ(content.points[1].p_world, Eigen::Vector3d(-4, 5.5, 6));
-  EXPECT_EQ(content.points[1].confidence, 1.0F);
 }
 
 TEST_F(PointCloudFile, DoublesAreReadInFull) {
@@ -316,16 +254,65 @@ TEST_F(PointCloudFile, DoublesAreReadInFull) {
   const std::string bytes = raw(x) + raw(2.0) + raw(3.0);
   const std::string text = "1000000.123456789 2 3\n";
   const std::vector<PointCloudContent> contents = {
-      contentOf("b.ply", "ply\nformat binary_big_endian" + ply_fields + swapped),
-      contentOf("l.ply", "ply\nformat binary_little_endian" + ply_fields + bytes),
-      contentOf("a.ply", "ply\nformat ascii" + ply_fields + text),
-      contentOf("b.pcd", pcd + "binary\n" + bytes),
-      contentOf("a.pcd", pcd + "ascii\n" + text),
+      parse("b.ply", "ply\nformat binary_big_endian" + ply_fields + swapped),
+      parse("l.ply", "ply\nformat binary_little_endian" + ply_fields + bytes),
+      parse("a.ply", "ply\nformat ascii" + ply_fields + text),
+      parse("b.pcd", pcd + "binary\n" + bytes),
+      parse("a.pcd", pcd + "ascii\n" + text),
   };
 
   for (const PointCloudContent& content : contents) {
     ASSERT_EQ(content.points.size(), 1U);
     EXPECT_EQ(content.points[0].p_world, Eigen::Vector3d(x, 2, 3));
+    EXPECT_EQ(content.points[0].confidence, 1.0F) << "without an intensity";
+  }
+}
+
+TEST_F(PointCloudFile, NumbersOfEachTypeAreRead) {
+  struct Type {
+    std::string pcd;
+    std::vector<std::string> ply;
+    std::string bytes;
+    float value;
+  };
+  const Type types[] = {
+      {"I 1", {"char", "int8"}, raw(std::int8_t{-7}), -7},
+      {"U 1", {"uchar", "uint8"}, raw(std::uint8_t{200}), 200},
+      {"I 2", {"short", "int16"}, raw(std::int16_t{-300}), -300},
+      {"U 2", {"ushort", "uint16"}, raw(std::uint16_t{60'000}), 60'000},
+      {"I 4", {"int", "int32"}, raw(-70'000), -70'000},
+      {"U 4", {"uint", "uint32"}, raw(4'000'000'000U), 4e9F},
+      {"I 8", {}, raw(std::int64_t{-5'000'000'000}), -5e9F},
+      {"U 8", {}, raw(std::uint64_t{1} << 63U), 9223372036854775808.0F},
+      {"F 4", {"float", "float32"}, raw(-2.5F), -2.5F},
+      {"F 8", {"double", "float64"}, raw(0.25), 0.25F},
+  };
+  const std::string xyz = rawFloats({1, 2, 3});
+  for (const Type& type : types) {
+    std::ostringstream text;
+    text.precision(20);
+    text << "1 2 3 " << type.value << "\n";
+    std::vector<PointCloudContent> contents;
+    const std::string pcd = "FIELDS x y z intensity\nTYPE F F F " + type.pcd.substr(0, 1) +
+                            "\nSIZE 4 4 4 " + type.pcd.substr(2) + "\nPOINTS 1\nDATA ";
+    contents.push_back(parsePcd(pcd + "binary\n" + xyz + type.bytes));
+    contents.push_back(parsePcd(pcd + "ascii\n" + text.str()));
+    for (const std::string& name : type.ply) {
+      const std::string ply =
+          " 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+          "z\nproperty " +
+          name + " intensity\nend_header\n";
+      contents.push_back(parsePly("ply\nformat binary_little_endian" + ply + xyz + type.bytes));
+      contents.push_back(parsePly("ply\nformat ascii" + ply + text.str()));
+    }
+    for (const PointCloudContent& content : contents) {
+      EXPECT_EQ(content.points.at(0).confidence, type.value) << type.pcd;
+    }
+    if (type.pcd[0] == 'F') continue;
+    for (const char* wrong : {"1 2 3 0.5\n", "1 2 3 1e3\n"}) {
+      EXPECT_THROW(parsePcd(pcd + "ascii\n" + wrong), std::runtime_error) << type.pcd;
+    }
+    if (type.pcd[0] == 'U') EXPECT_THROW(parsePcd(pcd + "ascii\n1 2 3 -1\n"), std::runtime_error);
   }
 }
 
@@ -335,24 +322,34 @@ TEST_F(PointCloudFile, OtherFieldsAndElementsAreIgnored) {
       "element vertex 2\nproperty uchar red\nproperty float z\nproperty short intensity\n"
       "property float y\nproperty float x\n";
   const std::string after = "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
-  const PointCloudContent text = contentOf(
-      "a.ply", "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nobj_info x\r\n" + before + vertex +
-                   after + "1 0.5\n2 0.5\n255 3 -7 2 1\n\n0 6 8 5 4\r\n3 0 1 1\n");
-  const PointCloudContent binary = contentOf(
+  const PointCloudContent text =
+      parse("a.ply", "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nobj_info x\r\n" + before +
+                         vertex + after + "1 0.5\n2 0.5\n255 3 -7 2 1\n\n0 6 8 5 4\r\n3 0 1 1\n");
+  const PointCloudContent binary = parse(
       "b.ply", "ply\nformat binary_big_endian 1.0\n" + before + vertex + after +
                    std::string(18, 'c') + "r" + raw(3.0F, true) + raw(std::int16_t{-7}, true) +
                    rawFloats({2, 1}, true) + "r" + raw(6.0F, true) + raw(std::int16_t{8}, true) +
                    rawFloats({5, 4}, true) + "faces");
   // Points of four bytes of padding, x, a pair of shorts, y and z.
   const PointCloudContent pcd =
-      contentOf("c.pcd",
-                "VERSION 0.7\nFIELDS _ x pair y z intensity\nSIZE 1 4 2 4 4 1\nTYPE U F U F F I\n"
-                "COUNT 4 1 2 1 1 1\nWIDTH 1\nHEIGHT 2\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\n"
-                "DATA binary\n" +
-                    ("____" + raw(1.0F)) + "pair" + rawFloats({2, 3}) + raw(std::int8_t{-7}) +
-                    ("____" + raw(4.0F)) + "pair" + rawFloats({5, 6}) + raw(std::int8_t{8}));
+      parse("c.pcd",
+            "#by hand\n\nVERSION 0.7\nCOLUMNS _ x pair y z intensity\nSIZE 1 4 2 4 4 1\nTYPE U F "
+            "U F F I\n"
+            "COUNT 4 1 2 1 1 1\nWIDTH 1\nHEIGHT 2\nVIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\n"
+            "DATA binary\n" +
+                ("____" + raw(1.0F)) + "pair" + rawFloats({2, 3}) + raw(std::int8_t{-7}) +
+                ("____" + raw(4.0F)) + "pair" + rawFloats({5, 6}) + raw(std::int8_t{8}));
 
-  for (const PointCloudContent& content : {text, binary, pcd}) {
+  // A compressed file has the fields one after the other, without the padding.
+  const std::string plain = rawFloats({1, 4}) + "pairpair" + rawFloats({2, 5}) + rawFloats({3, 6}) +
+                            raw(std::int8_t{-7}) + raw(std::int8_t{8});
+  const PointCloudContent compressed = parsePcd(
+      "FIELDS x _ pair y z intensity\nSIZE 4 1 2 4 4 1\nTYPE F U U F F I\n"
+      "COUNT 1 3 2 1 1 1\nPOINTS 2\nDATA binary_compressed\n" +
+      raw(static_cast<std::uint32_t>(asLzf(plain).size())) +
+      raw(static_cast<std::uint32_t>(plain.size())) + asLzf(plain));
+
+  for (const PointCloudContent& content : {text, binary, pcd, compressed}) {
     ASSERT_EQ(content.points.size(), 2U);
     EXPECT_EQ(content.points[0].p_world, Eigen::Vector3d(1, 2, 3));
     EXPECT_EQ(content.points[0].confidence, -7.0F);
@@ -363,9 +360,9 @@ TEST_F(PointCloudFile, OtherFieldsAndElementsAreIgnored) {
 
 TEST_F(PointCloudFile, PointsThatAreNotFiniteAreCounted) {
   const PointCloudContent content =
-      contentOf("holes.pcd",
-                "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 2\nPOINTS 4\nDATA ascii\n"
-                "nan nan nan\n1 2 3\n1 -inf 3\n4 5 1e-60\n");
+      parse("holes.pcd",
+            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 2\nPOINTS 4\nDATA ascii\n"
+            "nan nan nan\n1 2 3\n1 -inf 3\n4 5 1e-60\n");
 
   EXPECT_EQ(content.non_finite, 2U);
   ASSERT_EQ(content.points.size(), 2U);
@@ -398,108 +395,126 @@ TEST_F(PointCloudFile, DamagedAnywhereIsAnErrorOrAsManyPoints) {
 
 TEST_F(PointCloudFile, ThatIsMalformedSaysWhereAndWhatWasExpected) {
   const std::string pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n";
+  const std::string xyz_pcd = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\n";
+  const std::string packed = pcd + "DATA binary_compressed\n";
   const std::string ply = "ply\nformat ascii 1.0\nelement vertex 1\n";
   const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
-  struct Case {
-    const char* name;
-    std::string bytes;
-    std::vector<std::string> parts;
+  const std::string little = "ply\nformat binary_little_endian 1.0\n";
+  const std::string end = xyz + "end_header\n";
+  const std::pair<std::string, std::string> of_pcd[] = {
+      {"", "line 1: the file ends: expected a line of a PCD header"},
+      {"FIELDS x y", "line 1: 'FIELDS x y', then the file ends"},
+      {"ply\n", "line 1: 'ply': expected one of VERSION FIELDS"},
+      {pcd + "DATA ascii\n1 2 banana\n", "line 8: z 'banana': expected a number"},
+      {pcd + "DATA ascii\n1 2\n", "line 8: point 1 has 2 numbers: expected 3"},
+      {pcd + "DATA ascii\n1 2 3\n4 5 6\n", "more bytes: expected the end"},
+      {pcd + "DATA ascii\n", "line 8: the file ends: expected point 1 of 1"},
+      {pcd + "DATA ascii\n1 2 3", "line 8: '1 2 3', then the file ends"},
+      {pcd + "DATA ascii\n1 2 1e39\n", "line 8: z '1e39': expected a number"},
+      {pcd + "DATA binary\n12345678901", "11 bytes are left: expected 1 points of 12"},
+      {pcd + "DATA binary\n1234567890123", "1 more bytes: expected the end"},
+      {pcd + "DATA zip\n", "line 7: DATA 'zip': expected ascii, binary or"},
+      {"FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 0\nDATA ascii\n",
+       "no field z: expected x, y and z among the fields (x, y)"},
+      {"FIELDS x y z\nSIZE 4 4\nTYPE F F F\nPOINTS 0\nDATA ascii\n",
+       "line 2: 2 values: expected 3, as many as FIELDS has"},
+      {"FIELDS x y z\nSIZE 4 4 3\nTYPE F F F\nPOINTS 0\nDATA ascii\n",
+       "line 3: TYPE 'F' of SIZE '3': expected I or U"},
+      {xyz_pcd + "DATA ascii\n", "line 4: DATA ends the header: expected POINTS before it"},
+      {xyz_pcd + "WIDTH 2\nHEIGHT 3\nPOINTS 5\nDATA ascii\n",
+       "line 6: POINTS 5: expected WIDTH x HEIGHT, 2 x 3"},
+      {xyz_pcd + "POINTS -1\nDATA ascii\n", "line 4: '-1': expected a whole number from 0 on"},
+      {xyz_pcd + "POINTS 18446744073709551615\nDATA binary\n",
+       "0 bytes are left: expected 18446744073709551615 points of 12 bytes"},
+      {"FIELDS x y z x\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 0\nDATA ascii\n",
+       "field x is there twice"},
+      {"FIELDS x y z\nFIELDS x y z\n", "line 2: FIELDS again: expected it once"},
+      {pcd + "DATA binary_compressed\n" + raw(12U) + raw(24U) + "123456789012",
+       "24 bytes when decompressed: expected 1 points of 12 bytes"},
+      {pcd + "DATA binary_compressed\n" + raw(12U) + raw(12U) +
+           "\377\377\377\377\377\377\377\377\377\377\377\377",
+       "12 compressed bytes: expected 12 when decompressed: is the file damaged?"},
+      {packed + "1234567", "expected the sizes of the compressed points, 8 bytes"},
+      {packed + raw(13U) + raw(12U) + std::string(12, 'x'),
+       "12 bytes are left: expected 13 that decompress to 12"},
+      {packed + raw(0U) + raw(12U), "expected 0 that decompress to 12"},
+      {xyz_pcd + "COUNT 1 0 1\nPOINTS 0\nDATA ascii\n", "line 4: COUNT 0: expected 1 to 1048576"},
+      {xyz_pcd + "COUNT 1 1 1048577\nPOINTS 0\nDATA ascii\n", "line 4: COUNT 1048577: expected"},
+      {xyz_pcd + "COUNT 1 2 1\nPOINTS 0\nDATA ascii\n", "field y has 2 numbers: expected 1"},
+      {xyz_pcd + "COUNT 1 1\nPOINTS 0\nDATA ascii\n", "line 4: 2 values: expected 3"},
+      {xyz_pcd + "WIDTH 2\nHEIGHT 2\nPOINTS 6\nDATA ascii\n",
+       "line 6: POINTS 6: expected WIDTH x HEIGHT"},
+      {xyz_pcd + "WIDTH 0\nHEIGHT 2\nPOINTS 2\nDATA ascii\n", "POINTS 2: expected WIDTH x HEIGHT"},
+      {xyz_pcd + "WIDTH 2\nHEIGHT 0\nPOINTS 2\nDATA ascii\n", "POINTS 2: expected WIDTH x HEIGHT"},
+      {xyz_pcd + "POINTS\nDATA ascii\n", "line 4: '': expected a whole number from 0 on"},
+      {pcd + "DATA ascii twice\n", "line 7: DATA '': expected ascii"},
+      {"SIZE 4\nTYPE F\nPOINTS 0\nDATA ascii\n", "expected FIELDS before it"},
+      {"FIELDS x\nTYPE F\nPOINTS 0\nDATA ascii\n", "expected SIZE before it"},
+      {"FIELDS x\nSIZE 4\nPOINTS 0\nDATA ascii\n", "expected TYPE before it"},
   };
-  for (const Case& wrong : std::vector<Case>{
-           {"a.pcd", "", {"line 1: the file ends: expected a line of a PCD header"}},
-           {"b.pcd", "FIELDS x y", {"line 1: 'FIELDS x y', then the file ends"}},
-           {"c.pcd", "ply\n", {"line 1: 'ply': expected one of VERSION FIELDS"}},
-           {"d.pcd", pcd + "DATA ascii\n1 2 banana\n", {"line 8: z 'banana': expected a number"}},
-           {"e.pcd", pcd + "DATA ascii\n1 2\n", {"line 8: point 1 has 2 numbers: expected 3"}},
-           {"f.pcd", pcd + "DATA ascii\n1 2 3\n4 5 6\n", {"byte", "more bytes: expected the end"}},
-           {"g.pcd", pcd + "DATA ascii\n", {"line 8: the file ends: expected point 1 of 1"}},
-           {"h.pcd", pcd + "DATA ascii\n1 2 3", {"line 8: '1 2 3', then the file ends"}},
-           {"i.pcd", pcd + "DATA ascii\n1 2 1e39\n", {"line 8: z '1e39': expected a number"}},
-           {"j.pcd",
-            pcd + "DATA binary\n12345678901",
-            {"11 bytes are left: expected 1 points of 12"}},
-           {"k.pcd", pcd + "DATA binary\n1234567890123", {"1 more bytes: expected the end"}},
-           {"l.pcd", pcd + "DATA zip\n", {"line 7: DATA 'zip': expected ascii, binary or"}},
-           {"m.pcd",
-            "FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 0\nDATA ascii\n",
-            {"no field z: expected x, y and z among the fields (x, y)"}},
-           {"n.pcd",
-            "FIELDS x y z\nSIZE 4 4\nTYPE F F F\nPOINTS 0\nDATA ascii\n",
-            {"line 2: 2 values: expected 3, as many as FIELDS has"}},
-           {"o.pcd",
-            "FIELDS x y z\nSIZE 4 4 3\nTYPE F F F\nPOINTS 0\nDATA ascii\n",
-            {"line 3: TYPE 'F' of SIZE '3': expected I or U"}},
-           {"p.pcd",
-            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nDATA ascii\n",
-            {"line 4: DATA ends the header: expected POINTS before it"}},
-           {"q.pcd",
-            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 3\nPOINTS 5\nDATA ascii\n",
-            {"line 6: POINTS 5: expected WIDTH x HEIGHT, 2 x 3"}},
-           {"r.pcd",
-            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS -1\nDATA ascii\n",
-            {"line 4: '-1': expected a whole number from 0 on"}},
-           {"s.pcd",
-            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 18446744073709551615\nDATA binary\n",
-            {"0 bytes are left: expected 18446744073709551615 points of 12 bytes"}},
-           {"t.pcd",
-            "FIELDS x y z x\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 0\nDATA ascii\n",
-            {"field x is there twice"}},
-           {"u.pcd", "FIELDS x y z\nFIELDS x y z\n", {"line 2: FIELDS again: expected it once"}},
-           {"v.pcd",
-            pcd + "DATA binary_compressed\n" + raw(12U) + raw(24U) + "123456789012",
-            {"24 bytes when decompressed: expected 1 points of 12 bytes"}},
-           {"w.pcd",
-            pcd + "DATA binary_compressed\n" + raw(12U) + raw(12U) +
-                "\377\377\377\377\377\377\377\377\377\377\377\377",
-            {"12 compressed bytes: expected 12 when decompressed: is the file damaged?"}},
-           {"a.ply", "PLY\n", {"line 1: not a PLY file: expected ply"}},
-           {"b.ply", "ply\nformat ascii 2.0\n", {"line 2: not a known format"}},
-           {"c.ply", ply + "property float\n", {"line 4: expected property TYPE NAME"}},
-           {"d.ply", ply + "property half x\n", {"line 4: type 'half': expected char"}},
-           {"e.ply", ply + "end_header\n", {"no field x"}},
-           {"f.ply",
-            ply + xyz + "property list uchar int l\nend_header\n1 2 3 0\n",
-            {"line 7: a list in element vertex"}},
-           {"g.ply", ply + xyz + "end_header\n1 2 x\n", {"line 8: z 'x': expected a number"}},
-           {"h.ply", ply + xyz, {"line 7: the file ends: expected a line of a PLY header"}},
-           {"i.ply",
-            "ply\nformat ascii 1.0\nend_header\n",
-            {"line 3: end_header without an element vertex"}},
-           {"j.ply", ply + xyz + "end\033[2J\n", {"line 7: 'end\\x1b[2J': expected comment"}},
-           {"k.ply",
-            "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar int l\n"
-            "element vertex 1\n" +
-                xyz + "end_header\n",
-            {"line 4: a list in element face: expected lists behind element vertex"}},
-           {"cloud.xyz", "1 2 3\n", {"extension '.xyz': expected .pcd or .ply"}},
-       }) {
-    const std::string refusal = refusalOf(wrong.name, wrong.bytes);
-    for (const std::string& part : wrong.parts) EXPECT_THAT(refusal, HasSubstr(part)) << wrong.name;
+  const std::pair<std::string, std::string> of_ply[] = {
+      {"PLY\n", "line 1: not a PLY file: expected ply"},
+      {"ply\nformat ascii 2.0\n", "line 2: not a known format"},
+      {ply + "property float\n", "line 4: expected property TYPE NAME"},
+      {ply + "property half x\n", "line 4: type 'half': expected char"},
+      {ply + "end_header\n", "no field x"},
+      {ply + xyz + "property list uchar int l\nend_header\n1 2 3 0\n",
+       "line 7: a list in element vertex"},
+      {ply + xyz + "end_header\n1 2 x\n", "line 8: z 'x': expected a number"},
+      {ply + xyz, "line 7: the file ends: expected a line of a PLY header"},
+      {"ply\nformat ascii 1.0\nend_header\n", "line 3: end_header without an element vertex"},
+      {ply + xyz + "end\033[2J\n", "line 7: 'end\\x1b[2J': expected comment"},
+      {"ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar int l\n"
+       "element vertex 1\n" +
+           xyz + "end_header\n",
+       "line 4: a list in element face: expected lists behind element vertex"},
+      {"ply\nformat ascii 1.0 x\n", "line 2: not a known format"},
+      {"ply\nformat binary 1.0\n", "line 2: not a known format"},
+      {"ply\nelement vertex 1\n", "line 2: not a known format"},
+      {"ply\nformat ascii 1.0\nproperty float x\n",
+       "line 3: a property: expected an element before"},
+      {"ply\nformat ascii 1.0\nelement vertex\n", "line 3: expected element NAME COUNT"},
+      {ply + "property list uchar int\n", "line 4: expected property TYPE NAME"},
+      {little + "element eye 3\nproperty double f\nelement vertex 0\n" + end +
+           "12345678901234567890123",
+       "23 bytes are left: expected 3 elements eye of 8 bytes"},
+      {ply + xyz + "element face 0\nend_header\n1 2 3\n4\n", "more bytes: expected the end"},
+  };
+  for (const auto& [bytes, expected] : of_pcd) {
+    EXPECT_THAT(messageOf([&, &wrong = bytes] { parsePcd(wrong); }), HasSubstr(expected)) << bytes;
+  }
+  // At the limits: the most numbers of a field, and no more bytes than elements need.
+  EXPECT_NO_THROW(
+      parsePcd("FIELDS x y z all\nSIZE 4 4 4 1\nTYPE F F F U\nCOUNT 1 1 1 1048576\n"
+               "POINTS 0\nDATA binary\n"));
+  EXPECT_NO_THROW(parsePly(little + "element eye 2\nproperty double f\nelement none 3\n" +
+                           "element vertex 0\n" + end + "1234567812345678"));
+  for (const auto& [bytes, expected] : of_ply) {
+    EXPECT_THAT(messageOf([&, &wrong = bytes] { parsePly(wrong); }), HasSubstr(expected)) << bytes;
   }
 }
 
-TEST_F(PointCloudFile, ThatIsMissingOrAFolderIsAnError) {
-  std::filesystem::create_directories(folder_ / "folder.ply");
-  EXPECT_EQ(refusalOf(folder_ / "nowhere.pcd"), "there is no such file");
-  EXPECT_EQ(refusalOf(folder_ / "folder.ply"), "it is not a regular file");
+TEST_F(PointCloudFile, ThatIsMissingAFolderOrOfAnotherKindIsAnErrorThatNamesIt) {
+  std::filesystem::create_directories(folder() / "folder.PLY");
+  const std::pair<std::string, std::string> cases[] = {
+      {"nowhere.pcd", "there is no such file"},
+      {"folder.PLY", "it is not a regular file"},
+      {"cloud.xyz", "extension '.xyz': expected .pcd or .ply"}};
+  for (const auto& [name, why] : cases) {
+    const auto path = folder() / name;
+    EXPECT_EQ(messageOf([&] { readPointCloud(path); }),
+              "cannot read " + path.string() + ": " + why);
+  }
 }
 
 TEST_F(PointCloudFile, WithAPointThatAFloatCannotHoldIsNotWritten) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   for (const CloudPoint& point :
        {CloudPoint{{1e39, 0, 0}, 1.0F}, {{0, std::nan(""), 0}, 1.0F}, {{0, 0, 0}, kInfinity}}) {
-    EXPECT_THAT(writeRefusalOf(folder_ / "map.pcd", point),
+    EXPECT_THAT(writeRefusalOf(folder() / "map.pcd", point),
                 AllOf(HasSubstr("map.pcd: point 1 ("), HasSubstr("expected finite numbers")));
   }
   EXPECT_EQ(filesInFolder(), 0U);
-}
-
-TEST_F(PointCloudFile, ThatCannotBeWrittenIsAnErrorAndLeavesNoHalfFile) {
-  const CloudPoint point{{1, 2, 3}, 1.0F};
-  EXPECT_THAT(writeRefusalOf(folder_ / "nowhere" / "map.pcd", point), HasSubstr("nowhere/map.pcd"));
-  std::filesystem::create_directories(folder_ / "map.pcd" / "inside");
-  EXPECT_THAT(writeRefusalOf(folder_ / "map.pcd", point), HasSubstr("it is a folder"));
-  EXPECT_EQ(filesInFolder(), 1U);
 }
 
 }  // namespace

@@ -21,10 +21,14 @@ TEST(PairDepths, PixelsWithoutAnEstimateOrATruthAreLeftOut) {
 }
 
 TEST(PairDepths, TruthFartherThanTheLimitCountsAsNone) {
-  const cv::Mat1f estimate = (cv::Mat1f(1, 2) << 2, 2);
-  const cv::Mat1f truth = (cv::Mat1f(1, 2) << 5, 6);
+  const cv::Mat1f estimate = (cv::Mat1f(1, 3) << 2, 2, 2);
+  const cv::Mat1f truth = (cv::Mat1f(1, 3) << 5, 6, 4);
 
-  EXPECT_EQ(pairDepths(estimate, truth, {0, 5.0}).size(), 1U);
+  EXPECT_EQ(pairDepths(estimate, truth, {0, 5.0}).size(), 2U);
+  for (const DepthPairingOptions& wrong : {DepthPairingOptions{-1, 5}, {101, 5}, {0, 0}}) {
+    EXPECT_THROW(pairDepths(estimate, truth, wrong), std::invalid_argument);
+  }
+  EXPECT_NO_THROW(pairDepths(estimate, truth, {100, 1e-9}));
 }
 
 TEST(PairDepths, ToleranceTakesTheTruthNearestInInverseDepth) {

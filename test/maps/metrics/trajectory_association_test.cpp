@@ -54,7 +54,10 @@ TEST(AssociatePoses, TakesPosesInAnyOrder) {
 }
 
 TEST(AssociatePoses, RefusesAnInvalidLimit) {
-  EXPECT_THROW(associatePoses({}, {}, -1), std::invalid_argument);
+  EXPECT_THROW(associatePoses({}, {}, -1e-9), std::invalid_argument);
+  EXPECT_THROW(associatePoses({}, {}, 1.001e6), std::invalid_argument);
+  EXPECT_NO_THROW(associatePoses({}, {}, 1e6));
+  EXPECT_THAT(paired({10}, {10}, 0), ElementsAre(Pair(10, 10)));
   EXPECT_THROW(associatePoses({}, {}, std::numeric_limits<double>::quiet_NaN()),
                std::invalid_argument);
 }

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "edge_world.h"
+#include "edges.h"
 #include "mapping/geometry/angle.h"
 #include "maps/refinement/condensed_graph.h"
 #include "random_poses.h"
@@ -130,6 +130,27 @@ TEST(KeyframeGraph, OfTooManyPlacesTheMostRedundantOneLosesItsPoints) {
   }
   EXPECT_EQ(graph.nearestViews().front(), kPlaces);
   EXPECT_EQ(graph.nearestViews().size(), 50U);
+}
+
+TEST(KeyframeGraph, RanksKeyframesByOverlapAndByTheDistanceOfWhatTheySee) {
+  KeyframeDepthMap wall = test::emptyKeyframe(test::smallView());
+  wall.map.depth = 2;
+  wall.map.variance = 1e-4;
+  KeyframeGraph graph{{}, {}, TrackerModel({}, false)};
+  const Rigid3 poses[] = {test::viewTurned(0, {0, 0, 0}),      test::viewTurned(0, {0, 0, -4}),
+                          test::viewTurned(M_PI, {1.8, 0, 0}), test::viewTurned(M_PI, {0.3, 0, 0}),
+                          test::viewTurned(M_PI, {0.9, 0, 0}), test::viewTurned(M_PI, {0, 0, 0})};
+  for (const Rigid3& T_world_ref : poses) {
+    graph.keyframes.push_back({RegistrationCloud(wall, {}), T_world_ref, T_world_ref, T_world_ref});
+  }
+  using Numbers = std::vector<std::size_t>;
+  // It sees (0, 0, -2), as keyframe 1 does from the other side.
+  // Of the newest one's 160 columns, 2 m away at 130 pixels, 1.8 m are 117 and 0.9 m are 59.
+  EXPECT_EQ(graph.bestOverlaps({0, 1, 2, 3, 4}, 0.1, 9), (Numbers{1, 3, 4, 2}));
+  EXPECT_EQ(graph.bestOverlaps({0, 1, 2, 3, 4}, 0.1, 2), (Numbers{1, 3}));
+  EXPECT_EQ(graph.bestOverlaps({2, 4}, 0.4, 9), (Numbers{4}));
+  graph.places = {0, 1, 2, 3, 4};
+  EXPECT_EQ(graph.nearestViews(), (Numbers{1, 3, 4, 2, 0}));
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "edge_world.h"
+#include "edges.h"
 #include "mapping/geometry/angle.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"
@@ -17,7 +17,7 @@ namespace {
 
 using test::drawMotion;
 using test::drawPose;
-using test::EdgeWorld;
+using test::Edges;
 using test::kInverseDepthSigma;
 using test::metresApart;
 using test::priorOf;
@@ -32,7 +32,7 @@ struct Step {
   RegistrationCloud map;
   RegistrationCloud cloud;
 
-  Step(const EdgeWorld& world, std::mt19937& random, double sigma = kInverseDepthSigma)
+  Step(const Edges& world, std::mt19937& random, double sigma = kInverseDepthSigma)
       : map(seenFrom(world, T_world_map, sigma, random), {}),
         cloud(seenFrom(world, T_world_ref, sigma, random), {}) {}
 
@@ -99,7 +99,7 @@ TEST(KeyframeRegistration, FindsAPoseThatAnUncertainPriorMissesByManyPixels) {
 
 TEST(KeyframeRegistration, SeveralKeyframesGiveAFactorEach) {
   std::mt19937 random(3);
-  const EdgeWorld world = test::edgesAround(150, random);
+  const Edges world = test::edgesAround(150, random);
   const Step step(world, random);
   const Rigid3 T_world_other = viewTurned(-3 * kRadiansPerDegree, {-0.1, 0, 0});
   const RegistrationCloud other(seenFrom(world, T_world_other, kInverseDepthSigma, random), {});
@@ -203,7 +203,7 @@ TEST(KeyframeRegistration, AlongStripesItStaysWithThePrior) {
 TEST(KeyframeRegistration, FewPointsDoNotMoveItFarFromThePrior) {
   for (const int count : {1, 2, 5, 29}) {
     std::mt19937 random(static_cast<unsigned>(count));
-    const EdgeWorld world = test::edgesAround(150, random);
+    const Edges world = test::edgesAround(150, random);
     Step step(world, random);
     KeyframeDepthMap sparse = seenFrom(world, step.T_world_ref, kInverseDepthSigma, random);
     test::keepFirst(count, sparse);
@@ -221,9 +221,13 @@ TEST(KeyframeRegistration, FewPointsDoNotMoveItFarFromThePrior) {
 
 TEST(KeyframeRegistrationOptions, ValuesOutOfRangeAreRefusedByName) {
   using Options = KeyframeRegistrationOptions;
-  test::expectRefused(&Options::last_distance_px, 0, "last_distance_px = 0");
-  test::expectRefused(&Options::first_distance_px, 1, "first_distance_px = 1");
-  test::expectRefused(&Options::alignment, AlignmentOptions{3, 0, 0}, "max_iterations = 0");
+  test::expectRange(&Options::last_distance_px, test::kAboveZero, 16, "_distance_px");
+  test::expectRange(&Options::first_distance_px, 2, 1e4, "first_distance_px");
+  Options options;
+  options.first_distance_px = options.last_distance_px = 1e4;
+  EXPECT_EQ(messageOf([&] { options.validate(); }), "no error");
+  options.alignment.max_iterations = 0;
+  EXPECT_THAT(messageOf([&] { options.validate(); }), testing::HasSubstr("max_iterations = 0"));
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "edge_world.h"
+#include "edges.h"
 #include "mapping/geometry/angle.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"
@@ -19,7 +19,7 @@ namespace {
 using test::cloudFrom;
 using test::covarianceOf;
 using test::drawMotion;
-using test::EdgeWorld;
+using test::Edges;
 using test::kInverseDepthSigma;
 using test::metresApart;
 using test::radiansApart;
@@ -45,11 +45,6 @@ TEST(ViewOverlap, IsTheFractionOfPointsInView) {
   EXPECT_NEAR(viewOverlap(cloud, cloud, viewTurned(0, {half_m, 0, 0})), 0.5, 0.07);
   EXPECT_EQ(viewOverlap(cloud, cloud, viewTurned(0, {2.5 * half_m, 0, 0})), 0);
   EXPECT_EQ(viewOverlap(cloud, cloud, viewTurned(M_PI, {0, 0, 0})), 0);
-}
-
-TEST(ViewOverlap, IsZeroWithoutPoints) {
-  std::mt19937 random(1);
-  const RegistrationCloud cloud = cloudFrom(test::edgesAround(100, random), {}, random);
   const RegistrationCloud nothing(test::emptyKeyframe(test::smallView()), {});
   EXPECT_EQ(viewOverlap(nothing, cloud, {}), 0);
   EXPECT_EQ(viewOverlap(cloud, nothing, {}), 0);
@@ -60,7 +55,7 @@ TEST(VerifyLoop, ConfirmsTheSamePlaceAndItsPose) {
   constexpr int kSeeds = 10;
   for (unsigned seed = 1; seed <= kSeeds; ++seed) {
     std::mt19937 random(seed);
-    const EdgeWorld world = test::edgesAround(150, random);
+    const Edges world = test::edgesAround(150, random);
     const Rigid3 T_world_newer = viewTurned(5 * kRadiansPerDegree, {0.1, 0.02, -0.05});
     const RegistrationCloud older = cloudFrom(world, {}, random);
     const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
@@ -79,7 +74,7 @@ TEST(VerifyLoop, ConfirmsTheSamePlaceAndItsPose) {
 
 TEST(VerifyLoop, NeverTakesOnePlaceForAnother) {
   std::mt19937 random(1);
-  for (int draw = 0; draw < 30; ++draw) {
+  for (int draw = 0; draw < 15; ++draw) {
     const RegistrationCloud older = cloudFrom(test::edgesAround(150, random), {}, random);
     const RegistrationCloud newer = cloudFrom(test::edgesAround(150, random), {}, random);
     EXPECT_FALSE(verify(drawMotion(0.1, 2 * kRadiansPerDegree, random), older, newer, 0.2,
@@ -90,9 +85,9 @@ TEST(VerifyLoop, NeverTakesOnePlaceForAnother) {
 
 TEST(VerifyLoop, NeverConfirmsAPlaceThatIsFarFromTheTruth) {
   std::mt19937 random(2);
-  const EdgeWorld world = test::edgesAround(150, random);
+  const Edges world = test::edgesAround(150, random);
   int confirmed = 0;
-  for (int draw = 0; draw < 30; ++draw) {
+  for (int draw = 0; draw < 15; ++draw) {
     const Rigid3 T_world_newer =
         viewTurned(0, {0, 0, 0}) * drawMotion(0.1, 5 * kRadiansPerDegree, random);
     const RegistrationCloud older = cloudFrom(world, {}, random);
@@ -104,43 +99,14 @@ TEST(VerifyLoop, NeverConfirmsAPlaceThatIsFarFromTheTruth) {
     EXPECT_LT(metresApart(factor->T_from_to, T_world_newer), 0.05) << draw;
     EXPECT_LT(radiansApart(factor->T_from_to, T_world_newer), 1 * kRadiansPerDegree) << draw;
   }
-  EXPECT_LT(confirmed, 30);
-}
-
-/// Upright poles side by side, all alike.
-EdgeWorld poles(double period_m, double length_m) {
-  EdgeWorld world;
-  for (int i = -20; i <= 20; ++i) {
-    const double x_m = i * period_m;
-    world.push_back({{x_m, -length_m / 2, 3}, {x_m, length_m / 2, 3}});
-  }
-  return world;
-}
-
-TEST(VerifyLoop, ARowOfEqualPolesIsNotShiftedByOnePole) {
-  // Only the prior distinguishes the poles: with 2 cm it does, with the distance of poles it
-  // cannot.
-  std::mt19937 random(3);
-  const EdgeWorld world = poles(0.3, 1);
-  const RegistrationCloud older = cloudFrom(world, {}, random);
-  const RegistrationCloud newer = cloudFrom(world, viewTurned(0, {0.05, 0, 0}), random);
-  const auto factor =
-      verify(viewTurned(0, {0.05 + 0.3, 0, 0}), older, newer, 0.02, 0.3 * kRadiansPerDegree);
-  if (factor) {
-    EXPECT_NEAR(factor->T_from_to.translation.x(), 0.35, 0.02) << "at the prior";
-  }
-  const auto near =
-      verify(viewTurned(0, {0.06, 0, 0}), older, newer, 0.02, 0.3 * kRadiansPerDegree);
-  if (near) {
-    EXPECT_NEAR(near->T_from_to.translation.x(), 0.05, 0.02);
-  }
+  EXPECT_LT(confirmed, 15);
 }
 
 TEST(VerifyLoop, APlaceWithThreeTimesAsManyEdgesIsAnotherOne) {
   // All points of the newer keyframe have neighbours, a third of the older one have.
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
-    EdgeWorld world = test::edgesAround(100, random);
+    Edges world = test::edgesAround(100, random);
     const Rigid3 T_world_newer = viewTurned(2 * kRadiansPerDegree, {0.05, 0, 0});
     const RegistrationCloud newer = cloudFrom(world, T_world_newer, random);
     EXPECT_TRUE(
@@ -153,7 +119,7 @@ TEST(VerifyLoop, APlaceWithThreeTimesAsManyEdgesIsAnotherOne) {
 
 TEST(VerifyLoop, FewPointsAreNotEnough) {
   std::mt19937 random(5);
-  const EdgeWorld world = test::edgesAround(150, random);
+  const Edges world = test::edgesAround(150, random);
   const RegistrationCloud older = cloudFrom(world, {}, random);
   KeyframeDepthMap sparse = seenFrom(world, {}, kInverseDepthSigma, random);
   test::keepFirst(99, sparse);
@@ -166,7 +132,7 @@ TEST(VerifyLoop, FewPointsAreNotEnough) {
 
 TEST(VerifyLoop, OptionsLimitTheSigmasAndTheInliers) {
   std::mt19937 random(6);
-  const EdgeWorld world = test::edgesAround(150, random);
+  const Edges world = test::edgesAround(150, random);
   const RegistrationCloud older = cloudFrom(world, {}, random);
   const RegistrationCloud newer =
       cloudFrom(world, viewTurned(2 * kRadiansPerDegree, {0.05, 0, 0}), random);
@@ -185,22 +151,21 @@ TEST(VerifyLoop, OptionsLimitTheSigmasAndTheInliers) {
 }
 
 TEST(LoopOptions, ValuesOutOfRangeAreRefusedByName) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  test::expectRefused(&LoopOptions::loop_min_overlap, 0, "loop_min_overlap = 0");
-  test::expectRefused(&LoopOptions::loop_min_inliers, 1.5, "loop_min_inliers = 1.5");
-  test::expectRefused(&LoopOptions::loop_max_sigma_m, nan, "loop_max_sigma_m = nan");
-  test::expectRefused(&LoopOptions::loop_max_sigma_rad, 0, "loop_max_sigma_deg = 0");
-  test::expectRefused(&LoopOptions::loop_checks, -1, "loop_checks = -1");
+  const double infinity = std::numeric_limits<double>::infinity();
+  test::expectRange(&LoopOptions::loop_min_overlap, test::kAboveZero, 1, "loop_min_overlap");
+  test::expectRange(&LoopOptions::loop_min_inliers, 0, 1, "loop_min_inliers");
+  test::expectRange(&LoopOptions::loop_max_sigma_m, test::kAboveZero, infinity, "loop_max_sigma_m");
+  test::expectRange(&LoopOptions::loop_max_sigma_rad, test::kAboveZero, infinity,
+                    "loop_max_sigma_deg");
+  test::expectRange(&LoopOptions::loop_checks, 0, 100, "loop_checks");
 }
 
 TEST(VerifyLoop, StripesDoNotConfirmAPositionAlongThem) {
-  const EdgeWorld stripes = test::stripes();
+  const Edges stripes = test::stripes();
   std::mt19937 random(4);
   const RegistrationCloud older = cloudFrom(stripes, {}, random);
   const RegistrationCloud newer = cloudFrom(stripes, viewTurned(0, {0.2, 0, 0}), random);
-  const auto factor = verify({}, older, newer, 0.1, 1 * kRadiansPerDegree);
-  EXPECT_FALSE(factor && std::abs(factor->T_from_to.translation.x() - 0.2) > 0.05)
-      << "at " << factor->T_from_to.translation.transpose();
+  EXPECT_FALSE(verify({}, older, newer, 0.1, 1 * kRadiansPerDegree));
 }
 
 }  // namespace

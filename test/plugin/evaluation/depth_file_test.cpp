@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <rapidcheck/gtest.h>
 
 #include <cmath>
 #include <cstring>
@@ -13,6 +12,7 @@
 #include "maps/io/atomic_file.h"
 #include "plugin/evaluation/npy_image.h"
 #include "plugin/evaluation/pfm_image.h"
+#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -33,10 +33,9 @@ std::string bytesOf(std::vector<Number> numbers, bool big_endian = false) {
   return bytes;
 }
 
-std::string npy(const std::string& dictionary, const std::string& data, char version = 1) {
-  std::string length(version == 1 ? 2 : 4, '\0');
-  length[0] = static_cast<char>(dictionary.size());
-  return std::string("\x93NUMPY") + version + '\0' + length + dictionary + data;
+std::string npy(const std::string& dictionary, const std::string& data) {
+  const char length = static_cast<char>(dictionary.size());
+  return std::string("\x93NUMPY\1\0", 8) + length + '\0' + dictionary + data;
 }
 
 class DepthFile : public TemporaryFolder {
@@ -51,12 +50,7 @@ class DepthFile : public TemporaryFolder {
   }
   std::string errorOf(const std::filesystem::path& file,
                       std::optional<double> scale = std::nullopt) const {
-    try {
-      readDepthFile(file, scale);
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "no error";
+    return messageOf([&] { readDepthFile(file, scale); });
   }
   /// 1 2 3 / 4 5 6
   void expectOneToSix(const cv::Mat1f& depth_m) const {
@@ -68,28 +62,16 @@ class DepthFile : public TemporaryFolder {
   const std::string dictionary_ = "{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }\n";
 };
 
-TEST_F(DepthFile, ReadsFloatTiff) { expectOneToSix(readDepthFile(image("a.tiff", one_to_six_))); }
-
-TEST_F(DepthFile, ReadsPfmFromTheBottomUpwardsInBothByteOrders) {
-  const std::vector<float> upwards = {4, 5, 6, 1, 2, 3};
-  expectOneToSix(readDepthFile(write("a.pfm", "Pf\n3 2\n-1.0\n" + bytesOf(upwards))));
-  expectOneToSix(readDepthFile(write("b.pfm", "Pf\n3 2\n1\n" + bytesOf(upwards, true))));
-}
-
 TEST_F(DepthFile, ReadsNumpyArraysOfBothWidthsAndByteOrders) {
-  const std::vector<float> floats = {1, 2, 3, 4, 5, 6};
-  const std::vector<double> doubles = {1, 2, 3, 4, 5, 6};
-  const auto header = [&](const std::string& type) {
-    return "{'descr': '" + type + "', 'fortran_order': False, 'shape': (2, 3), }\n";
-  };
-  expectOneToSix(parseNpy(npy(header("<f4"), bytesOf(floats))));
-  expectOneToSix(parseNpy(npy(header(">f4"), bytesOf(floats, true))));
-  expectOneToSix(parseNpy(npy(header("<f8"), bytesOf(doubles), 2)));
-  expectOneToSix(parseNpy(npy(header(">f8"), bytesOf(doubles, true), 3)));
-  expectOneToSix(readDepthFile(write("a.npy", npy(header("<f4"), bytesOf(floats)))));
-  // Keys in any order.
-  expectOneToSix(
-      parseNpy(npy("{'shape':(2,3),'fortran_order':False,'descr':'<f4'}", bytesOf(floats))));
+  for (const bool big : {false, true}) {
+    const auto header = [&](const std::string& type) {
+      return "{'descr': '" + std::string(big ? ">" : "<") + type +
+             "', 'fortran_order': False, 'shape': (2, 3), }\n";
+    };
+    const std::string floats = npy(header("f4"), bytesOf<float>({1, 2, 3, 4, 5, 6}, big));
+    expectOneToSix(readDepthFile(write("a.npy", floats)));
+    expectOneToSix(parseNpy(npy(header("f8"), bytesOf<double>({1, 2, 3, 4, 5, 6}, big))));
+  }
 }
 
 TEST_F(DepthFile, ReadsPngOf16BitsByItsScaleInEitherSense) {
@@ -98,13 +80,16 @@ TEST_F(DepthFile, ReadsPngOf16BitsByItsScaleInEitherSense) {
   const auto file = image("a.png", millimetres);
   expectOneToSix(readDepthFile(file, 1000));
   EXPECT_NEAR(readDepthFile(file, 0.001)(1, 2), 6, 1e-6);
+  EXPECT_EQ(readDepthFile(file, 2)(0, 0), 500);
+  EXPECT_EQ(readDepthFile(file, 0.5)(0, 0), 500);
+  EXPECT_THROW(readDepthFile(file, INFINITY), std::invalid_argument);
   EXPECT_EQ(readDepthFile(file, 1)(0, 0), 1000);
   EXPECT_THAT(errorOf(file), AllOf(HasSubstr("a.png"), HasSubstr("--scale")));
   EXPECT_THROW(readDepthFile(file, 0), std::invalid_argument);
   EXPECT_THROW(readDepthFile(file, -1), std::invalid_argument);
 }
 
-TEST_F(DepthFile, DetectsTheFormatByTheContent) {
+TEST_F(DepthFile, DetectsFloatTiffByTheContent) {
   const auto file = image("a.tiff", one_to_six_);
   std::filesystem::rename(file, folder() / "a.depth");
   expectOneToSix(readDepthFile(folder() / "a.depth"));
@@ -114,7 +99,7 @@ TEST_F(DepthFile, WrongKindsOfImagesAreErrorsThatNameTheKind) {
   EXPECT_THAT(errorOf(image("a.png", cv::Mat1b(2, 3, uchar{1})), 1000),
               AllOf(HasSubstr("a.png"), HasSubstr("8-bit, 1 channel")));
   EXPECT_THAT(errorOf(image("b.tiff", cv::Mat1b(2, 3, uchar{1}))), HasSubstr("float32"));
-  EXPECT_THAT(errorOf(image("c.tiff", cv::Mat3f(2, 3))), HasSubstr("3 channels"));
+  EXPECT_THAT(errorOf(image("c.tiff", cv::Mat3f(2, 3))), HasSubstr("float32, 3 channels: must"));
   EXPECT_THAT(errorOf(write("d.pfm", "PF\n1 1\n-1\n" + bytesOf<float>({1, 2, 3}))),
               HasSubstr("Pf"));
   EXPECT_THAT(errorOf(write("e.txt", "hello")), HasSubstr("'hello': expected a TIFF"));
@@ -125,13 +110,22 @@ TEST_F(DepthFile, WrongKindsOfImagesAreErrorsThatNameTheKind) {
 
 TEST_F(DepthFile, WrongHeadersOfPfmAreErrorsThatNameTheLine) {
   const auto refused = [&](const std::string& text) { return errorOf(write("a.pfm", text)); };
-  EXPECT_THAT(refused("Pf\n3\n-1\n"), HasSubstr("line 2"));
-  EXPECT_THAT(refused("Pf\n0 2\n-1\n"), HasSubstr("line 2"));
-  EXPECT_THAT(refused("Pf\n3 99999999\n-1\n"), HasSubstr("line 2"));
-  EXPECT_THAT(refused("Pf\n3 2\n0\n"), HasSubstr("line 3"));
-  EXPECT_THAT(refused("Pf\n3 2\nx\n"), HasSubstr("line 3"));
-  EXPECT_THAT(refused("Pf\n1 1\n-1\n123"), HasSubstr("expected 4"));
-  EXPECT_THAT(refused("Pf\n1 1\n-1\n12345"), HasSubstr("expected 4"));
+  const std::pair<const char*, const char*> cases[] = {
+      {"Pf 2\n3 2\n-1\n", "line 1: expected Pf alone"},
+      {"PF\n3 2\n-1\n", "line 1: expected Pf alone"},
+      {"Pf\n3\n-1\n", "line 2: expected width and height"},
+      {"Pf\n3 2 1\n-1\n", "line 2: expected width and height"},
+      {"Pf\n0 2\n-1\n", "line 2: 0 pixels"},
+      {"Pf\n2 0\n-1\n", "line 2: 0 pixels"},
+      {"Pf\n65536 1\n-1\n", "line 2: 65536 pixels: expected from 1 to 65535"},
+      {"Pf\n65535 1\n-1\n", "0 bytes follow: expected 262140 for 65535x1 float32"},
+      {"Pf\n3 2\n0\n", "line 3: expected one number, the scale"},
+      {"Pf\n3 2\nx\n", "line 3"},
+      {"Pf\n3 2\n1 1\n", "line 3"},
+      {"Pf\n1 1\n-1\n123", "3 bytes follow: expected 4"},
+      {"Pf\n1 1\n-1\n12345", "5 bytes follow: expected 4"}};
+  for (const auto& [text, expected] : cases)
+    EXPECT_THAT(refused(text), HasSubstr(expected)) << text;
 }
 
 TEST_F(DepthFile, WrongHeadersOfNumpyAreErrors) {
@@ -142,15 +136,16 @@ TEST_F(DepthFile, WrongHeadersOfNumpyAreErrors) {
   EXPECT_THAT(refused("{'descr': '<i4', " + order + "'shape': (2, 3), }"), HasSubstr("<i4"));
   EXPECT_THAT(refused("{'descr': '<f4', 'fortran_order': True, 'shape': (2, 3), }"),
               HasSubstr("fortran_order"));
-  for (const char* shape : {"(6,)", "(1, 2, 3)", "()", "(2, x)", "(0, 3)", "(2, 3", "(2, 99999)"}) {
+  for (const char* shape :
+       {"(6,)", "(1, 2, 3)", "()", "(2, x)", "(0, 3)", "(3, 0)", "(2, 65536)"}) {
     EXPECT_THAT(refused("{'descr': '<f4', " + order + "'shape': " + shape + ", }"),
                 HasSubstr("shape"))
         << shape;
   }
-  EXPECT_THAT(refused("{'descr': '<f4', " + order + "}"), HasSubstr("no 'shape'"));
+  EXPECT_THAT(refused("{'descr': '<f4', " + order + "'shape': (1, 65535), }"),
+              HasSubstr("expected 262140 for 65535x1 float32"));
   EXPECT_THAT(refused("{'descr': '<f4', " + order + "'shape': (2, 4), }"),
               HasSubstr("24 bytes follow the array's header: expected 32"));
-  EXPECT_THAT(errorOf(write("a.npy", npy(dictionary_, "", 9))), HasSubstr("version 9"));
 }
 
 TEST_F(DepthFile, TruncatedFilesAreErrors) {
@@ -184,21 +179,6 @@ TEST_F(DepthFile, AMaskSelectsPixelsThatAreNotBlack) {
   }
   EXPECT_THROW(readMaskFile(write("text.png", "text")), std::runtime_error);
   EXPECT_THROW(readMaskFile(write("empty.png", "")), std::runtime_error);
-}
-
-RC_GTEST_PROP(NpyImage, ReadsNoArbitraryBytesBeyondTheirEnd, ()) {
-  const std::string start = *rc::gen::element<std::string>(
-      "", "\x93NUMPY", std::string("\x93NUMPY\x01\0\x20\0", 10),
-      std::string("\x93NUMPY\x01\0\x3a\0{'descr': '<f4', 'fortran_order': False, 'shape': (", 61));
-  const auto rest = *rc::gen::arbitrary<std::string>();
-  try {
-    parseNpy(start + rest);
-  } catch (const std::runtime_error&) {
-  }
-  try {
-    parsePfm("Pf\n" + rest);
-  } catch (const std::runtime_error&) {
-  }
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <fstream>
 
+#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -29,12 +30,7 @@ class DepthSeries : public TemporaryFolder {
     return files;
   }
   std::string errorOf(const std::string& name) const {
-    try {
-      depthSeries(folder() / name, DepthSeriesRole::kTruth);
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "no error";
+    return messageOf([&] { depthSeries(folder() / name, DepthSeriesRole::kTruth); });
   }
 };
 
@@ -61,15 +57,15 @@ TEST_F(DepthSeries, EachRoleReadsTheOnlyKindOfAFolder) {
 }
 
 TEST_F(DepthSeries, ReadsTheTimeFromTheNameWithoutAnIndex) {
-  for (const char* file :
-       {"cam0_2.25.tiff", "1.5.pfm", "0.75.npy", "mask.png", "3.txt", "x_y.tif"}) {
+  for (const char* file : {"cam0_2.25.tiff", "a_b_1.5.pfm", "0.75.npy", "mask.png", "3.txt",
+                           "x_y.tif", "4.tif", "5.png"}) {
     write(std::string("named/") + file);
   }
   const auto series = depthSeries(folder() / "named", DepthSeriesRole::kEstimate);
-  ASSERT_EQ(series.size(), 3U);
-  EXPECT_EQ(series[0].t_ns, 750'000'000);
-  EXPECT_EQ(series[1].file.filename(), "1.5.pfm");
-  EXPECT_EQ(series[2].t_ns, 2'250'000'000);
+  std::vector<std::int64_t> times_ms;
+  for (const TimedFile& file : series) times_ms.push_back(file.t_ns / 1'000'000);
+  EXPECT_THAT(times_ms, ElementsAre(750, 1500, 2250, 4000, 5000));
+  EXPECT_EQ(series[1].file.filename(), "a_b_1.5.pfm");
 }
 
 TEST_F(DepthSeries, AFolderWithoutASeriesIsAnErrorThatNamesIt) {
@@ -79,6 +75,8 @@ TEST_F(DepthSeries, AFolderWithoutASeriesIsAnErrorThatNamesIt) {
   EXPECT_THAT(errorOf("bad"), HasSubstr("index.txt:2: 'soon b.tiff': expected a time"));
   write("none/index.txt", "# nothing\n");
   EXPECT_THAT(errorOf("none"), HasSubstr("lists no depth maps"));
+  write("cut/index.txt", "1\n");
+  EXPECT_THAT(errorOf("cut"), HasSubstr("index.txt:1: '1': expected a time"));
 }
 
 TEST_F(DepthSeries, TheNearestFileIsTheOneWithinTheLimit) {
@@ -89,6 +87,7 @@ TEST_F(DepthSeries, TheNearestFileIsTheOneWithinTheLimit) {
   };
   EXPECT_EQ(nearest(49), "none");
   EXPECT_EQ(nearest(50), "a") << "the limit belongs to it";
+  EXPECT_EQ(nearest(149), "a");
   EXPECT_EQ(nearest(150), "a") << "the earlier of two";
   EXPECT_EQ(nearest(151), "b");
   EXPECT_EQ(nearest(350), "c");

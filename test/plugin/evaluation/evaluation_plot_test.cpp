@@ -8,11 +8,11 @@
 
 #include "plugin/evaluation/cloud_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_plot.h"
-#include "plugin/evaluation/text_table.h"
 #include "plugin/evaluation/trajectory_evaluation_plot.h"
 #include "plugin/pictures/picture_file.h"
-#include "plugin/pictures/picture_grid.h"
 #include "plugin/pictures/value_picture.h"
+#include "test/plugin/message_of.h"
+#include "test/plugin/pictures/sketch.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -21,21 +21,6 @@ namespace {
 using testing::HasSubstr;
 
 const cv::Vec3b kWhite(255, 255, 255);
-
-TEST(PictureGrid, JoinsPicturesOnWhiteWithoutChangingThem) {
-  const cv::Mat3b red(10, 20, cv::Vec3b(0, 0, 255));
-  const cv::Mat3b blue(30, 5, cv::Vec3b(255, 0, 0));
-  const cv::Mat3b row = sideBySide({red, blue});
-  EXPECT_EQ(row.rows, 30);
-  EXPECT_EQ(cv::countNonZero(row.reshape(1) == 0), 2 * (10 * 20 + 30 * 5));
-  EXPECT_EQ(row(29, 0), kWhite);
-  EXPECT_EQ(row(29, row.cols - 1), blue(0, 0));
-  const cv::Mat3b column = oneBelowAnother({red, blue});
-  EXPECT_EQ(column.cols, 20);
-  EXPECT_EQ(column(0, 0), red(0, 0));
-  EXPECT_EQ(column(column.rows - 1, 10), blue(0, 0)) << "in the middle";
-  EXPECT_TRUE(sideBySide({}).empty());
-}
 
 TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
   ValuePicture picture;
@@ -56,64 +41,113 @@ TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
   EXPECT_THROW(drawValues({}), std::invalid_argument);
 }
 
-TEST(TextTable, ColumnsFitTheirCells) {
-  TextTable table;
-  table.add({"a", "long"});
-  table.add({"wide", "1", "x"});
-  table.add({"b"});
-  EXPECT_EQ(table.text(), "a     long\nwide     1  x\nb\n");
-  EXPECT_EQ(fixedText(1.005, 1), "1.0");
-}
-
 class EvaluationPlot : public TemporaryFolder {
  protected:
+  /// A depth map of one depth with a hole, and twice the depth in its lower half.
   std::filesystem::path tiff(const std::string& name, float depth_m) const {
-    cv::imwrite((folder() / name).string(), cv::Mat1f(30, 40, depth_m));
-    return folder() / name;
+    const auto file = folder() / name;
+    std::filesystem::create_directories(file.parent_path());
+    cv::Mat1f depth(30, 40, depth_m);
+    depth.rowRange(15, 30) *= 2;
+    depth(cv::Rect(0, 0, 10, 10)) = 0;
+    cv::imwrite(file.string(), depth);
+    return file;
   }
 };
 
 TEST_F(EvaluationPlot, OfDepthShowsThreeImagesAboveTheCurves) {
-  const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 4), {});
-  const cv::Mat3b plot = evaluationPlot(evaluation, {});
-  EXPECT_GE(plot.cols, 3 * 320);
-  EXPECT_GT(plot.rows, 600);
+  const auto plotOf = [](const auto& estimate, const auto& truth) {
+    return test::sketchOf(evaluationPlot(evaluateDepth(estimate, truth, {}), {}), 50);
+  };
+  EXPECT_NE(plotOf(tiff("a.tiff", 2), folder() / "a.tiff"), "") << "without an error";
+  tiff("out/1/depth.tiff", 2);
+  tiff("out/2/depth.tiff", 2.1F);
+  tiff("out/3/depth.tiff", 2.5F);
+  tiff("data/1.tiff", 2.2F);
+  tiff("data/2.tiff", 2.2F);
+  tiff("data/3.tiff", 2.2F);
+  EXPECT_EQ(plotOf(folder() / "out", folder() / "data"), R"(
+ +yyyyyyyyyyyybcggggg
+  yyyyyyyyyyyybcggggg
+yyyyyyyyyyyyyyggggggg
+bbbbbbbbbbbbbbrrrrrrr
+bbbbbbbbbbbbbbrrrrrrr
+rmmmmbb#+mmbbbmb#yrrr
+    +++ccc    ++++
+ ++   c    +++     rr
+      c    +      r+c
++    c    +++r   rc
++    c      cc+rrc
+     c         cc
+ +ccc
+  +++++       ++++
+260318 px at 535.2, 188.8
+)") << "three maps";
 }
 
-TEST_F(EvaluationPlot, OfDepthWithoutErrorIsDrawn) {
-  const auto evaluation = evaluateDepth(tiff("a.tiff", 2), tiff("b.tiff", 2), {});
-  EXPECT_FALSE(evaluationPlot(evaluation, {}).empty());
-}
-
-TEST_F(EvaluationPlot, OfATrajectoryWithoutErrorIsDrawn) {
+TEST_F(EvaluationPlot, OfATrajectoryShowsItFromItsNarrowestSideAndItsErrors) {
   TrajectoryEvaluation evaluation;
-  evaluation.pairs = {{0, {}, {}}};
-  evaluation.errors = {{0}, {0}};
-  EXPECT_FALSE(evaluationPlot(evaluation).empty());
+  for (int i = 0; i < 20; ++i) {
+    const double t = 0.1 * i;
+    evaluation.pairs.push_back({100'000'000 * i,
+                                {{1, 0, 0, 0}, {t - 1, 0.1, 1.5 * t * t}},
+                                {{1, 0, 0, 0}, {t, 0.01 * t, t * t}}});
+    evaluation.errors.translation_m.push_back(0.2 + 0.1 * t);
+    evaluation.errors.rotation_rad.push_back(0.1 - 0.04 * t);
+  }
+  evaluation.T_world_map.translation = {1, 0, 0};
+  EXPECT_EQ(test::sketchOf(evaluationPlot(evaluation), 40), R"(
+      +++      + ++++++++++
+ +       r++++        ccccc
+ +       r    + cccccc
+ +      r     ++
+ +      r+
+        r+         +
+++      r          +++++
+       r+       c++++++#++
+ +     r+     ++ cccc
+       r      +      ccc
+ +    r+      ++        cccc
+ +   rr        +
+       +           +++++
+35529 px at 574.4, 241.6
+)");
+  TrajectoryEvaluation exact;
+  exact.pairs = {{0, {}, {}}};
+  exact.errors = {{0}, {0}};
+  EXPECT_FALSE(evaluationPlot(exact).empty());
 }
 
 TEST_F(EvaluationPlot, OfACloudDrawsItsDistancesInOrder) {
   CloudEvaluation evaluation;
-  evaluation.errors.steps = {{1, 1, 0, 1, 1}, {0.1, 0.2, 0.8, 0.1, 0.13}};
-  CloudEvaluation sorted = evaluation;
-  std::swap(sorted.errors.steps[0], sorted.errors.steps[1]);
-  EXPECT_EQ(cv::norm(evaluationPlot(evaluation), evaluationPlot(sorted)), 0);
+  evaluation.errors.steps = {
+      {1, 1, 0, 0.9, 0.95}, {0.1, 0.2, 0.8, 0.1, 0.13}, {0.3, 0.6, 0, 0.5, 0.5}};
+  EXPECT_EQ(test::sketchOf(evaluationPlot(evaluation), 40), R"(
+       +++
+ +++++++     cc+
+ +c        cc+y
+ +        ccy
+ +      ccyy
+++    cccy
+++   ccg
+ + ccyy
+ +ccy
+ +yy
+
+        ++
+21621 px at 301.9, 208.5
+)");
 }
 
 TEST_F(EvaluationPlot, IsWrittenAsPngOnly) {
   const cv::Mat3b picture(3, 4, kWhite);
   writePicture(folder() / "a.png", picture);
   EXPECT_EQ(cv::imread((folder() / "a.png").string()).size(), picture.size());
-  const auto errorOf = [&](const std::filesystem::path& file) -> std::string {
-    try {
-      writePicture(file, picture);
-    } catch (const std::runtime_error& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto errorOf = [&](const char* file) {
+    return messageOf([&] { writePicture(folder() / file, picture); });
   };
-  EXPECT_THAT(errorOf(folder() / "a.pdf"), HasSubstr("a.pdf: expected a name that ends in .png"));
-  EXPECT_THAT(errorOf(folder() / "nowhere" / "a.png"), HasSubstr("nowhere"));
+  EXPECT_THAT(errorOf("a.pdf"), HasSubstr("a.pdf: expected a name that ends in .png"));
+  EXPECT_THAT(errorOf("nowhere/a.png"), HasSubstr("nowhere"));
 }
 
 }  // namespace

@@ -72,5 +72,14 @@ TEST_F(FindStereoBaseline, OneCameraHasNoBaseline) {
   EXPECT_FALSE(find("out", "data"));
 }
 
+TEST_F(FindStereoBaseline, IsNotSearchedHigherThanARunHasFolders) {
+  writeReport(R"({"reference_view": {"fx": 200.5}, "baseline_m": 0.1})");
+  EXPECT_TRUE(find("out/a/b/c", "data"));
+  EXPECT_FALSE(find("out/a/b/c/d", "data"));
+  writeCamchain(true);
+  EXPECT_TRUE(find("none", "data/a/b"));
+  EXPECT_FALSE(find("none", "data/a/b/c"));
+}
+
 }  // namespace
 }  // namespace efm

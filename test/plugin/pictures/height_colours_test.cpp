@@ -29,9 +29,6 @@ TEST(ColoursByHeight, HigherIsBrighterAndOutliersDoNotWidenTheRange) {
   EXPECT_EQ(with_outliers[101], colours[0]);
   EXPECT_EQ(with_outliers[102], colours[100]);
   EXPECT_EQ(with_outliers[50], colours[50]);
-}
-
-TEST(ColoursByHeight, CloudsWithoutHeightHaveAColour) {
   EXPECT_TRUE(coloursByHeight(MapCloud(), Eigen::Vector3d::UnitZ()).empty());
   const std::vector<CloudPoint> flat(3, {{1, 2, 3}, 1, 1});
   EXPECT_EQ(coloursByHeight(*mapCloudOf(flat, 0.01), Eigen::Vector3d::UnitZ()).size(), 3U);

@@ -6,6 +6,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 namespace efm {
 namespace {
@@ -23,6 +24,8 @@ TEST(PlotAxis, TicksAreRoundNumbers) {
   EXPECT_THAT(textsOf({0, 102}, 6), ElementsAre("0", "20", "40", "60", "80", "100"));
   EXPECT_THAT(textsOf({-0.7, 2.3}, 5), ElementsAre("0", "1", "2"));
   EXPECT_THAT(textsOf({12.3, 12.9}, 4), ElementsAre("12.4", "12.6", "12.8"));
+  EXPECT_THAT(textsOf({0, 1}, 5), ElementsAre("0", "0.5", "1"));
+  EXPECT_THAT(textsOf({0, 1}, 2), ElementsAre("0", "1"));
 }
 
 TEST(PlotAxis, LogarithmicTicksArePowersOfTenAndValuesBetweenThem) {
@@ -56,15 +59,28 @@ TEST(PlotAxis, AnInverseAxisHasRoundTicksThatLeaveEachOtherSpace) {
   EXPECT_THAT(textsOf({1.05, 1.35, AxisScale::kInverse}, 3), ElementsAre("1.1", "1.2", "1.3"));
 }
 
-TEST(PlotAxis, HasARangeForNoValueAndForOneValue) {
-  for (const AxisScale scale : {AxisScale::kLinear, AxisScale::kLogarithmic}) {
-    for (const std::vector<double>& values :
-         {std::vector<double>{}, std::vector<double>{5}, std::vector<double>{1e300, 1e300},
-          std::vector<double>{NAN, INFINITY}}) {
-      const AxisRange range = rangeAround(values, scale);
-      EXPECT_LT(range.from, range.to) << testing::PrintToString(values);
-    }
+TEST(PlotAxis, HasAMarginOf4PercentAndARangeForNoValueAndForOneValue) {
+  struct Case {
+    std::vector<double> values;
+    AxisScale scale;
+    double from, to;
+  };
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const Case& of :
+       {Case{{3, NAN, 1, kInfinity, 2}, AxisScale::kLinear, 0.92, 3.08},
+        {{}, AxisScale::kLinear, -0.1, 0.1},
+        {{-5}, AxisScale::kLinear, -5.5, -4.5},
+        {{0.2}, AxisScale::kLinear, 0.1, 0.3},
+        {{1e300, 1e300}, AxisScale::kLinear, 0.9e300, 1.1e300},
+        {{1, 100, 0, -1}, AxisScale::kLogarithmic, std::pow(10, -0.08), std::pow(10, 2.08)},
+        {{1, 10}, AxisScale::kInverse, std::pow(10, -0.04), std::pow(10, 1.04)},
+        {{-1}, AxisScale::kLogarithmic, std::pow(10, -0.1), std::pow(10, 0.1)}}) {
+    const AxisRange range = rangeAround(of.values, of.scale);
+    EXPECT_DOUBLE_EQ(range.from, of.from);
+    EXPECT_DOUBLE_EQ(range.to, of.to);
+    EXPECT_EQ(range.scale, of.scale);
   }
+  EXPECT_TRUE(ticksOf({1, 1}, 5).empty());
 }
 
 RC_GTEST_PROP(PlotAxis, ContainsAllValuesAndItsTicks, ()) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
@@ -52,6 +53,9 @@ TEST(PagePoints, PositionsAreOffByHalfAStepAtMost) {
   ASSERT_EQ(page.size(), points.size());
   EXPECT_NEAR(page.step_m().x(), 40.0 / 65535, 1e-5);
   EXPECT_EQ(page.thinned_m(), 0);
+  // Confidences are 1 to 1000: the lowest and the highest percent.
+  EXPECT_EQ(page.lowConfidence(), 10);
+  EXPECT_EQ(page.highConfidence(), 990);
   std::set<std::size_t> found;
   for (std::size_t i = 0; i < page.size(); ++i) {
     const PagePoint quantised = page.at(i);
@@ -82,22 +86,38 @@ TEST(PagePoints, AnyFirstPartCoversTheMap) {
 
 TEST(PagePoints, MoreThanTheLimitAreThinnedToTheBestOfEachCell) {
   std::vector<CloudPoint> points = randomPoints(20000, {0, 0, 0});
-  for (std::size_t i = 0; i < points.size(); ++i) points[i].support = i == 1234 ? 99 : 1;
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].support = 1 + i * 7 % 4;
   const MapCloud::ConstPtr cloud = mapCloudOf(points, 1e-9);
   const PagePoints page(*cloud, 0.01, 1000);
   EXPECT_LE(page.size(), 1000U);
   EXPECT_GE(page.size(), 700U) << "not many fewer than there may be";
   EXPECT_GT(page.thinned_m(), 0.01);
-  std::set<std::tuple<double, double, double>> cells;
-  bool has_best = false;
-  for (std::size_t i = 0; i < page.size(); ++i) {
-    const CloudPoint& point = points[page.at(i).keyframe];
-    has_best = has_best || point.support == 99;
+  // Of each cell the highest support, and of these the highest confidence.
+  std::map<std::tuple<double, double, double>, std::pair<std::uint32_t, float>> best;
+  const auto cell_of = [&](const MapPoint& point) {
     const Eigen::Vector3d cell =
-        ((point.p_world - page.origin_m()) / page.thinned_m()).array().floor();
-    EXPECT_TRUE(cells.insert({cell.x(), cell.y(), cell.z()}).second) << "two points of a cell";
+        ((positionIn(*cloud, point) - page.origin_m()) / page.thinned_m()).array().floor();
+    return std::tuple(cell.x(), cell.y(), cell.z());
+  };
+  for (const MapPoint& point : *cloud) {
+    auto& of_cell = best[cell_of(point)];
+    of_cell = std::max(of_cell, std::pair(point.support, point.intensity));
   }
-  EXPECT_TRUE(has_best);
+  EXPECT_EQ(page.size(), best.size());
+  for (std::size_t i = 0; i < page.size(); ++i) {
+    const MapPoint& point = cloud->at(page.at(i).keyframe);
+    EXPECT_EQ(best[cell_of(point)], std::pair(point.support, point.intensity)) << i;
+  }
+}
+
+/// Eight corners: a cell has one of them or all, no number between.
+TEST(PagePoints, ThinningEndsWhereNoCellGivesTheNumber) {
+  std::vector<CloudPoint> corners;
+  for (int i = 0; i < 8; ++i) corners.push_back({{i % 2 * 1.0, i / 2 % 2 * 1.0, i / 4 * 1.0}, 1});
+  const MapCloud::ConstPtr cloud = mapCloudOf(corners, 0.01);
+  for (const double voxel_m : {0.01, 0.013, 0.017, 0.02, 0.023}) {
+    EXPECT_EQ(PagePoints(*cloud, voxel_m, 4).size(), 1U) << voxel_m;
+  }
 }
 
 TEST(PagePoints, OneOrNoPointAndManyKeyframesFit) {
@@ -107,7 +127,17 @@ TEST(PagePoints, OneOrNoPointAndManyKeyframesFit) {
   const PagePoints page(*one, 0.01);
   ASSERT_EQ(page.size(), 1U);
   EXPECT_EQ(page.origin_m(), Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(page.at(0).keyframe, 200'000 / page.keyframeStep());
+  EXPECT_EQ(page.keyframeStep(), 4U);
+  EXPECT_EQ(page.at(0).keyframe, 50'000);
+  EXPECT_EQ(page.at(0).confidence, 255);
+  EXPECT_EQ(page.at(0).cell[0], 0);
+  for (const std::uint32_t last : {65'535U, 65'536U}) {
+    const MapCloud::ConstPtr two = mapCloudOf({{{0, 0, 0}, 1, 1, 0}, {{1, 0, 0}, 1, 1, last}}, 1);
+    EXPECT_EQ(PagePoints(*two, 0.01).keyframeStep(), last == 65'536 ? 2U : 1U);
+  }
+  std::vector<std::uint8_t> bytes;
+  PagePoint{{0x0102, 3, 0x0405}, 6, 7, 0x0809}.appendTo(bytes);
+  EXPECT_THAT(bytes, testing::ElementsAre(2, 1, 3, 0, 5, 4, 6, 7, 9, 8));
 }
 
 TEST(KeyframePictures, KeepEverySecondOneWhereTheyAreTooLarge) {
@@ -165,8 +195,9 @@ std::string dataOf(const std::string& page, const std::string& id) {
 
 TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
   const std::string mean = "\"'</script><!--<script>alert(1)</ScRiPt>&amp;\\";
-  const MapCloud::ConstPtr points = mapCloudOf(randomPoints(3, {0, 0, 0}), 0.01);
-  const std::vector<StampedPose> trajectory = {{1'500'000'000, {}}};
+  const MapCloud::ConstPtr points =
+      mapCloudOf({{{1, 2, 3}, 4, 1, 0}, {{1, 2, 65538}, 8, 1, 70'000}, {{2, 2, 3}, 2, 1, 1}}, 1e9);
+  const std::vector<StampedPose> trajectory = {{1'500'000'000, {{0.8, 0, 0.6, 0}, {4, 5, 6}}}};
   KeyframePictures pictures({});
   pictures.add(cv::Mat1f(2, 2, 1.0F), cv::Mat_<cv::Vec2i>(2, 2, cv::Vec2i(1, 0)));
   const MapPage page = {mean,
@@ -174,7 +205,7 @@ TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
                         0.01,
                         trajectory,
                         pictures,
-                        ReferenceView{2, 2, 1, 1, 1, 1},
+                        ReferenceView{2, 3, 4, 5, 6, 7},
                         json{{"warnings", {{{"name", mean}, {"text", mean}}}}}.dump()};
   std::ostringstream stream;
   writeMapPage(stream, page);
@@ -182,9 +213,16 @@ TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
   const std::string html = stream.str();
   EXPECT_THAT(html, Not(HasSubstr("alert(1)</")));
   const json map = json::parse(dataOf(html, "map-data"));
-  EXPECT_EQ(map["name"], mean);
-  EXPECT_EQ(map["keyframes"][0]["t"], "1.500000000");
-  EXPECT_EQ(map["keyframes"][0]["q"], json({0.0, 0.0, 0.0, 1.0}));
+  json expected = json::parse(R"({"points": 3, "all_points": 3, "thinned_m": 0.0, "voxel_m": 0.01,
+    "origin_m": [1.0, 2.0, 3.0], "confidence": [2.0, 4.0], "keyframe_step": 2,
+    "up": [0.0, -1.0, 0.0],
+    "keyframes": [{"t": "1.500000000", "p": [4.0, 5.0, 6.0], "q": [0.0, 0.6, 0.0, 0.8]}],
+    "view": {"width": 2, "height": 3, "fx": 4.0, "fy": 5.0, "cx": 6.0, "cy": 7.0}})");
+  expected["name"] = mean;
+  expected["step_m"] = {1.0 / 65535, 0.0, 1.0};
+  expected["depths_m"] = {pictures.limits().min_depth_m, pictures.limits().max_depth_m};
+  EXPECT_EQ(map, expected);
+  EXPECT_THAT(dataOf(html, "map-data"), Not(HasSubstr("\n"))) << "no blanks to read";
   EXPECT_EQ(json::parse(dataOf(html, "report-data"))["warnings"][0]["text"], mean);
   EXPECT_EQ(dataOf(html, "point-data").size(), 40U) << "30 bytes";
   for (const char* kind : {"depth", "events"}) {
@@ -196,18 +234,24 @@ TEST(MapPage, TextsCannotEndTheirPartOfThePage) {
 }
 
 TEST(MapPage, SaysHowManyPointsAreLeftOut) {
-  const MapCloud::ConstPtr points = mapCloudOf(randomPoints(5000, {0, 0, 0}), 0.01);
+  const MapCloud::ConstPtr points = mapCloudOf(randomPoints(15'000, {0, 0, 0}), 0.01);
   const std::vector<StampedPose> trajectory;
   const KeyframePictures pictures({});
-  const MapPage page = {"map", *points, 0.01, trajectory, pictures, {}, "{}", 100};
-  std::ostringstream stream;
-  writeMapPage(stream, page);
-  const json map = json::parse(dataOf(stream.str(), "map-data"));
-  EXPECT_EQ(map["all_points"], 5000);
-  EXPECT_LE(map["points"], 100);
-  EXPECT_GT(map["thinned_m"], 0.01);
-  EXPECT_EQ(dataOf(stream.str(), "point-data").size(),
-            (map["points"].get<std::size_t>() * 10 + 2) / 3 * 4);
+  for (const std::size_t limit : {100U, 15'000U}) {
+    const MapPage page = {"map", *points, 0.01, trajectory, pictures, {}, "{}", limit};
+    std::ostringstream stream;
+    writeMapPage(stream, page);
+    const json map = json::parse(dataOf(stream.str(), "map-data"));
+    const PagePoints shown(*points, 0.01, limit);
+    EXPECT_EQ(map["all_points"], 15'000);
+    EXPECT_EQ(map["points"], shown.size());
+    EXPECT_EQ(shown.size() == 15'000, limit == 15'000) << "as many as there may be";
+    EXPECT_EQ(map["thinned_m"], shown.thinned_m());
+    EXPECT_FALSE(map.contains("view"));
+    std::vector<std::uint8_t> bytes;
+    for (std::size_t i = 0; i < shown.size(); ++i) shown.at(i).appendTo(bytes);
+    EXPECT_EQ(dataOf(stream.str(), "point-data"), base64(bytes));
+  }
 }
 
 }  // namespace

@@ -51,24 +51,6 @@ std::pair<double, double> meanSquares(const std::vector<StampedPose>& poses,
   return {position / count, rotation / count};
 }
 
-TEST(PerturbedPoses, AreTheSameBitForBitByDefault) {
-  const auto poses = windingWay(500);
-  EXPECT_FALSE(PosePerturbationOptions().any());
-  EXPECT_TRUE(sameBits(perturbed(poses, {}), poses));
-}
-
-TEST(PerturbedPoses, AreTheSameForTheSameSeedOnly) {
-  const auto poses = windingWay(300);
-  PosePerturbationOptions options = keyframeNoise();
-  options.noise_m = 0.01;
-  options.noise_rad = 0.01;
-  options.drift = {0.01, 0.01};
-  const auto once = perturbed(poses, options);
-  EXPECT_TRUE(sameBits(perturbed(poses, options), once));
-  options.seed = 4;
-  EXPECT_FALSE(sameBits(perturbed(poses, options), once));
-}
-
 TEST(PerturbedPoses, NoisePerPoseHasTheRequestedStddev) {
   const auto poses = windingWay(20'000);
   PosePerturbationOptions options;
@@ -79,22 +61,6 @@ TEST(PerturbedPoses, NoisePerPoseHasTheRequestedStddev) {
   // root is half of it. The tolerance is five of these.
   EXPECT_NEAR(std::sqrt(position), 0.02, 0.02 * 0.015);
   EXPECT_NEAR(std::sqrt(rotation), 0.005, 0.005 * 0.015);
-}
-
-TEST(PerturbedPoses, NoiseOfNeighboursIsUncorrelated) {
-  const auto poses = windingWay(20'000);
-  PosePerturbationOptions options;
-  options.noise_m = 1;
-  const auto noisy = perturbed(poses, options);
-  double product = 0;
-  for (std::size_t i = 1; i < noisy.size(); ++i) {
-    product +=
-        (noisy[i].T_world_rig.translation - poses[i].T_world_rig.translation)
-            .dot(noisy[i - 1].T_world_rig.translation - poses[i - 1].T_world_rig.translation);
-  }
-  // The stddev of the mean of 60000 products is 1 / sqrt(60000) = 0.004. The tolerance is five of
-  // it.
-  EXPECT_NEAR(product / 60'000, 0, 0.02);
 }
 
 TEST(PerturbedPoses, KeepTheirNoiseWhenOthersAreLost) {
@@ -218,11 +184,14 @@ TEST(PerturbedPoses, DriftInProportionToThePathLength) {
   }
   options.drift = {0, 0.01};
   for (options.seed = 0; options.seed < 5; ++options.seed) {
-    const Rigid3 T_world_rig = perturbed(straight, options).back().T_world_rig;
-    EXPECT_NEAR(angleOf(T_world_rig.rotation), 0.1, 0.1 * 0.1 / 24 * 0.1 + 1e-4);
-    // The path bends by half of the rotation, or less where the axis is along the path.
-    EXPECT_LT((T_world_rig.translation - Eigen::Vector3d(10, 0, 0)).norm(), 0.5 * 0.1 * 10 + 0.01);
-    EXPECT_NEAR(T_world_rig.translation.norm(), 10, 0.01);
+    const auto drifted = perturbed(straight, options);
+    EXPECT_NEAR(angleOf(drifted.back().T_world_rig.rotation), 0.1, 0.1 * 0.1 / 24 * 0.1 + 1e-4);
+    // The heading bends the path.
+    for (std::size_t i = 1; i < drifted.size(); ++i) {
+      const Rigid3& T = drifted[i].T_world_rig;
+      const Eigen::Vector3d step = T.translation - drifted[i - 1].T_world_rig.translation;
+      EXPECT_LT((step - T.rotation * Eigen::Vector3d(0.01, 0, 0)).norm(), 1e-12);
+    }
   }
 }
 
@@ -238,21 +207,6 @@ TEST(PerturbedPoses, RotationNoiseIsAboutTheRigsAxes) {
     EXPECT_LT(
         noisy_turned[i].T_world_rig.rotation.angularDistance(turn * noisy[i].T_world_rig.rotation),
         1e-7);
-  }
-}
-
-TEST(PerturbedPoses, AHeadingThatDriftsBendsThePath) {
-  std::vector<StampedPose> straight;
-  for (int i = 0; i <= 100; ++i) {
-    straight.push_back({i * 1'000'000, {{1, 0, 0, 0}, {0.1 * i, 0, 0}}});
-  }
-  PosePerturbationOptions options;
-  options.drift.rad_per_m = 0.05;
-  const auto drifted = perturbed(straight, options);
-  for (std::size_t i = 1; i < drifted.size(); ++i) {
-    const Rigid3& T_world_rig = drifted[i].T_world_rig;
-    const Eigen::Vector3d step = T_world_rig.translation - drifted[i - 1].T_world_rig.translation;
-    EXPECT_LT((step - T_world_rig.rotation * Eigen::Vector3d(0.1, 0, 0)).norm(), 1e-12);
   }
 }
 
@@ -287,13 +241,6 @@ TEST(PerturbedPoses, OneOptionDoesNotChangeTheRandomNumbersOfAnother) {
   }
 }
 
-TEST(PerturbedPoses, AreReturnedWhenTheSourceHasAPauseBetweenPoses) {
-  const auto poses = windingWay(100);
-  PosePerturbationOptions options = keyframeNoise();
-  PerturbedPoses halting(std::make_unique<HaltingSource>(poses), options);
-  EXPECT_TRUE(sameBits(polled(halting), perturbed(poses, options)));
-}
-
 TEST(PerturbedPoses, ThatAreNotFiniteDoNotChangeOthers) {
   auto poses = windingWay(100);
   poses[40].T_world_rig.translation.x() = std::numeric_limits<double>::quiet_NaN();
@@ -320,20 +267,6 @@ TEST(PerturbedPoses, RefuseInvalidOptions) {
     makeMistake(options);
     EXPECT_THROW(PerturbedPoses(replay({}), options), std::invalid_argument);
   }
-}
-
-TEST(PerturbedPoses, RefusePosesThatAreNotInTimeOrder) {
-  class Backwards : public PoseSource {
-   public:
-    std::optional<StampedPose> next() override { return StampedPose{t_ns_--, {}}; }
-    bool ended() const override { return false; }
-
-   private:
-    std::int64_t t_ns_ = 10;
-  };
-  PerturbedPoses backwards(std::make_unique<Backwards>(), keyframeNoise());
-  EXPECT_TRUE(backwards.next());
-  EXPECT_THROW(backwards.next(), std::invalid_argument);
 }
 
 }  // namespace

@@ -28,13 +28,6 @@ std::set<std::int64_t> timesFrom(PoseSource& source) {
   return times;
 }
 
-TEST(PoseDropouts, AreNoneByDefault) {
-  PoseDropouts source(tracker(), {});
-  EXPECT_FALSE(source.ended());
-  EXPECT_EQ(timesFrom(source).size(), 10'000U);
-  EXPECT_EQ(source.dropped(), 0U);
-}
-
 TEST(PoseDropouts, LoseSinglePosesWithTheirProbability) {
   PoseDropoutOptions options;
   options.drop_probability = 0.2;
@@ -62,18 +55,6 @@ TEST(PoseDropouts, LoseAllPosesOfAGapWithItsBeginAndWithoutItsEnd) {
   EXPECT_EQ(times.count(500 * kMillisecondNs), 0U);
   EXPECT_EQ(times.count(690 * kMillisecondNs), 0U);
   EXPECT_EQ(times.count(700 * kMillisecondNs), 1U);
-}
-
-TEST(PoseDropouts, AGapDoesNotChangeTheLossOfSinglePoses) {
-  PoseDropoutOptions options;
-  options.drop_probability = 0.3;
-  PoseDropouts without(tracker(), options);
-  options.gaps = {{500 * kMillisecondNs, 700 * kMillisecondNs}};
-  PoseDropouts with(tracker(), options);
-  std::set<std::int64_t> expected = timesFrom(without);
-  expected.erase(expected.lower_bound(500 * kMillisecondNs),
-                 expected.lower_bound(700 * kMillisecondNs));
-  EXPECT_EQ(timesFrom(with), expected);
 }
 
 TEST(PoseDropouts, RandomGapsHaveTheirLengthAndRate) {

@@ -44,16 +44,6 @@ TEST(PoseLatency, ReturnsAPoseWhenAnotherIsNewerByTheLatency) {
   EXPECT_FALSE(late.next());
 }
 
-TEST(PoseLatency, ReturnsEveryPoseUnchanged) {
-  const auto poses = windingWay(200);
-  for (const std::int64_t latency_ns : {0L, 1L, 200'000'000L, 10'000'000'000L}) {
-    PoseLatency late(replay(poses), latency_ns);
-    EXPECT_TRUE(sameBits(allOf(late), poses)) << latency_ns;
-    PoseLatency halting(std::make_unique<HaltingSource>(poses), latency_ns);
-    EXPECT_TRUE(sameBits(polled(halting), poses)) << latency_ns;
-  }
-}
-
 TEST(PoseLatency, RefusesAnInvalidLatency) {
   EXPECT_THROW(PoseLatency(nullptr, 0), std::invalid_argument);
   EXPECT_THROW(PoseLatency(replay({}), -1), std::invalid_argument);

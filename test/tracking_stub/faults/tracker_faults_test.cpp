@@ -27,10 +27,14 @@ TrackerFaults everyFault() {
   return faults;
 }
 
-TEST(TrackerFaults, AreNoneByDefault) {
+TEST(TrackerFaults, AreTheSameWhereTheSourceHasAPauseBetweenPoses) {
   const auto poses = windingWay(100);
-  EXPECT_FALSE(TrackerFaults().any());
-  EXPECT_TRUE(sameBits(withFaults(poses, TrackerFaults()), poses));
+  const auto halting = efm::withFaults(std::make_unique<HaltingSource>(poses), everyFault());
+  const auto faulty = withFaults(poses, everyFault());
+  EXPECT_TRUE(sameBits(polled(*halting), faulty));
+  TrackerFaults other = everyFault();
+  other.perturbation.seed = other.dropouts.seed = 9;
+  EXPECT_FALSE(sameBits(withFaults(poses, other), faulty));
 }
 
 TEST(TrackerFaults, OfOneKindDoNotChangeOthers) {

@@ -9,6 +9,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "test/plugin/message_of.h"
+
 namespace efm {
 namespace {
 
@@ -22,12 +24,7 @@ std::vector<StampedPose> read(const std::string& text) {
 }
 
 std::string errorOf(const std::string& text) {
-  try {
-    read(text);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
+  return messageOf([&] { read(text); });
 }
 
 TEST(TumTrajectory, ReadsWrittenPosesExactly) {
@@ -101,12 +98,8 @@ TEST(TumTrajectory, ErrorsContainNoControlSequences) {
 }
 
 TEST(TumTrajectory, NamesTheFileThatIsMissing) {
-  try {
-    readTumTrajectory("no/such/poses.txt");
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("no/such/poses.txt"));
-  }
+  EXPECT_THAT(messageOf([] { readTumTrajectory("no/such/poses.txt"); }),
+              HasSubstr("no/such/poses.txt"));
   EXPECT_THROW(writeTumTrajectory("no/such/poses.txt", {}), std::runtime_error);
 }
 

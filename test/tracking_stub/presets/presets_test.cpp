@@ -6,7 +6,9 @@
 #include <ostream>
 #include <string>
 
+#include "mapping/geometry/trajectory.h"
 #include "test/tracking_stub/presets/visible_depths.h"
+#include "tracking_stub/presets/presets.h"
 #include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm {
@@ -56,6 +58,13 @@ TEST_P(Presets, KeepWhatTheyPromise) {
     EXPECT_LE(depths.farthest, promise.max_depth_m);
     EXPECT_LE(depths.sky, promise.sky);
   }
+  if (promise.preset == "desk_stereo") EXPECT_EQ(simulation.duration_ns, 2'000'000'000);
+  if (promise.preset == "room_stereo") {  // it ends at its first pose
+    const Rigid3 T_begin_end = simulation.motion->poseAt(simulation.start_ns).inverse() *
+                               simulation.motion->poseAt(simulation.endNs());
+    EXPECT_LT(T_begin_end.translation.norm(), 1e-6);
+    EXPECT_LT(T_begin_end.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
+  }
   // In the first 4 ms, sources project to their pixels within half a pixel and the motion of a
   // step.
   simulation.duration_ns = 4'000'000;
@@ -77,14 +86,17 @@ INSTANTIATE_TEST_SUITE_P(All, Presets,
                                            Promise{"trinocular", 3, 640, 480, 0.7, 5}),
                          [](const auto& preset) { return preset.param.preset; });
 
-TEST(RoomStereo, EndsAtItsFirstPose) {
-  SimulationOptions options;
-  options.preset = "room_stereo";
-  const Simulation room = makeSimulation(options);
-  const Rigid3 T_begin_end =
-      room.motion->poseAt(room.start_ns).inverse() * room.motion->poseAt(room.endNs());
-  EXPECT_LT(T_begin_end.translation.norm(), 1e-6);
-  EXPECT_LT(T_begin_end.rotation.angularDistance(Eigen::Quaterniond::Identity()), 1e-6);
+TEST(DeskStereo, PosesInterpolateToFarBelowAHundredthOfAPixel) {
+  const Simulation desk = makeDeskStereo(1);
+  Trajectory trajectory;
+  for (const StampedPose& pose : samplePoses(desk)) trajectory.add(pose);
+  const Eigen::Vector3d p_cam(0.3, 0.2, 0.6);  // at the min depth
+  for (std::int64_t t_ns = desk.start_ns + 500'000; t_ns < desk.endNs(); t_ns += 7'000'000) {
+    const Eigen::Vector3d p_world = desk.motion->poseAt(t_ns) * p_cam;
+    const Eigen::Vector3d p_interpolated = trajectory.poseAt(t_ns)->inverse() * p_world;
+    const CameraModel& model = desk.rig.cameras[0].model;
+    EXPECT_LT((model.project(p_interpolated) - model.project(p_cam)).norm(), 0.002);
+  }
 }
 
 }  // namespace

@@ -17,14 +17,14 @@ struct VisibleDepths {
   double sky = 0;  ///< Fraction of the rays that hit nothing.
 };
 
-/// Casts every fifth ray in x and y, at 51 times.
+/// Casts every fifth ray in x and y, at 11 times.
 inline VisibleDepths visibleDepths(const Simulation& simulation, const RigCamera& camera) {
   VisibleDepths depths;
   const PixelRays rays(camera.model);
   int cast = 0;
   int missed = 0;
-  for (int i = 0; i <= 50; ++i) {
-    const std::int64_t t_ns = simulation.start_ns + simulation.duration_ns * i / 50;
+  for (int i = 0; i <= 10; ++i) {
+    const std::int64_t t_ns = simulation.start_ns + simulation.duration_ns * i / 10;
     const SceneView view(simulation.scene, simulation.motion->poseAt(t_ns) * camera.T_rig_cam,
                          rays.bounds());
     for (int y = 0; y < rays.height(); y += 5) {

@@ -10,21 +10,6 @@
 namespace efm {
 namespace {
 
-TEST(Clutter, IsTheSameForTheSameSeedOnly) {
-  ClutterOptions options;
-  options.seed = 3;
-  const Texture a = paintClutter(options);
-  const Texture b = paintClutter(options);
-  options.seed = 4;
-  const Texture c = paintClutter(options);
-  double difference = 0;
-  for (double u = 0.05; u < 1; u += 0.1) {
-    EXPECT_EQ(a.sample(u, u, 0.002), b.sample(u, u, 0.002));
-    difference += std::abs(a.sample(u, u, 0.002) - c.sample(u, u, 0.002));
-  }
-  EXPECT_GT(difference, 0.1);
-}
-
 TEST(Clutter, HasEdgesOfAllOrientations) {
   ClutterOptions options;
   options.width_m = options.height_m = 2;

@@ -18,29 +18,6 @@ Eigen::Vector3d randomVector(RandomNumbers& random, double size) {
   return {random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size)};
 }
 
-TEST(Scene, ARayHitsAPlaneAtTheComputedPoint) {
-  Scene scene;
-  // The plane z = 2 - x: from the origin towards (1, 0, 1) the hit is at (1, 0, 1).
-  const double r = std::sqrt(0.5);
-  scene.addRectangle({{2, -1, 0}, {-r, 0, r}, {0, 1, 0}, 4, 2}, test::evenPaint(0));
-  const auto hit = castRay(scene, {0, 0, 0}, {3, 0, 3});
-  ASSERT_TRUE(hit.has_value());
-  EXPECT_NEAR(hit->distance_m, std::sqrt(2.0), 1e-15);
-  EXPECT_LT((hit->p_world - Eigen::Vector3d(1, 0, 1)).norm(), 1e-15);
-  EXPECT_FLOAT_EQ(hit->point.v_m, 1);
-  EXPECT_FLOAT_EQ(hit->point.u_m, static_cast<float>(std::sqrt(2.0)));
-}
-
-TEST(Scene, ARectangleEndsAtItsBordersAndHasOneSide) {
-  Scene scene;
-  scene.addRectangle(test::facingWall(2, 1, 1), test::evenPaint(0));
-  EXPECT_TRUE(castRay(scene, {0, 0, 0}, {0.249, 0.249, 1}).has_value());
-  EXPECT_FALSE(castRay(scene, {0, 0, 0}, {0.251, 0, 1}).has_value());
-  EXPECT_FALSE(castRay(scene, {0, 0, 0}, {0, -0.251, 1}).has_value());
-  EXPECT_FALSE(castRay(scene, {0, 0, 4}, {0, 0, -1}).has_value());  // from behind
-  EXPECT_FALSE(castRay(scene, {0, 0, 0}, {0, 0, -1}).has_value());  // looking away
-}
-
 TEST(Scene, ABoxShowsItsNearestFaceFromEverySide) {
   Scene scene;
   Rigid3 T_world_box;

@@ -71,20 +71,5 @@ TEST(EventNoise, DoesNotDependOnTheTimesOfTheCalls) {
   EXPECT_NE(fireAll(other_seed, 1, kSecondNs), whole);
 }
 
-TEST(EventNoise, IsSilentByDefault) {
-  EventNoise noise(10, 10, {}, {1, 0});
-  EXPECT_TRUE(fireAll(noise, 10, 1000 * kSecondNs).empty());
-}
-
-TEST(EventNoise, RefusesRatesAndFractionsOutOfRange) {
-  for (const double bad : {-1.0, 1e6, std::nan("")}) {
-    for (const EventNoiseOptions& options :
-         {EventNoiseOptions{bad, 0, 1000}, EventNoiseOptions{0, bad, 1000},
-          EventNoiseOptions{0, 0, bad}}) {
-      EXPECT_THROW(EventNoise(2, 2, options, {}), std::invalid_argument);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace efm

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "tracking_stub/random/random_numbers.h"
-
 namespace efm {
 namespace {
 
@@ -42,10 +40,6 @@ TEST_F(OnePixel, RemembersItsLastEventAcrossSteps) {
   ASSERT_EQ(darker.size(), 1U);
   EXPECT_FALSE(darker[0].polarity);
   EXPECT_NEAR(static_cast<double>(darker[0].t_ns), 30'000'000, 50'000);
-}
-
-TEST_F(OnePixel, FiresContrastOverThresholdEvents) {
-  EXPECT_EQ(step({0, 1'000'000}, 1.0F, 2.01F).size(), 5U);
 }
 
 TEST_F(OnePixel, FiresAtOnceWhenItStartsAThresholdAwayWithoutAChange) {
@@ -148,33 +142,6 @@ TEST(EventPixels, AreBlindForTheRefractoryPeriodAndThenRememberTheCurrentIntensi
   EXPECT_NEAR(static_cast<double>(events[0].t_ns), 2'000'000, 1'000);
   EXPECT_NEAR(static_cast<double>(events[1].t_ns), 7'000'000, 1'000);
   EXPECT_NEAR(static_cast<double>(events[2].t_ns), 12'000'000, 2'000);
-}
-
-TEST(EventPixels, NeverFireTwiceWithinTheRefractoryPeriod) {
-  EventPixelOptions options{0.05, 0.05};
-  options.refractory_ns = 700'000;
-  EventPixels pixels(1, 1, options);
-  RandomNumbers random(9);
-  cv::Mat1f before(1, 1, 0.0F);
-  pixels.start(before);
-  std::vector<Event> events;
-  for (std::int64_t t_ns = 0; t_ns < 300'000'000; t_ns += 300'000) {
-    const cv::Mat1f after(1, 1, static_cast<float>(random.uniform(-1, 1)));
-    pixels.fireRow(0, {t_ns, t_ns + 300'000}, before, after, events);
-    before = after;
-  }
-  ASSERT_GT(events.size(), 100U);
-  for (std::size_t i = 1; i < events.size(); ++i) {
-    EXPECT_GE(events[i].t_ns - events[i - 1].t_ns, options.refractory_ns - 1'000);
-  }
-}
-
-TEST(EventPixels, RefuseOptionsOutOfRange) {
-  for (const EventPixelOptions& options :
-       {EventPixelOptions{0, 0.2}, EventPixelOptions{0.2, std::nan("")},
-        EventPixelOptions{0.2, 0.2, 0.6}, EventPixelOptions{0.2, 0.2, 0, -1}}) {
-    EXPECT_THROW(EventPixels(4, 4, options), std::invalid_argument);
-  }
 }
 
 }  // namespace

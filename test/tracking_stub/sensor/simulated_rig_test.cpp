@@ -42,8 +42,14 @@ TEST(SimulatedRig, AMovingEdgeFiresAtItsPositionAndTime) {
   ASSERT_EQ(recordings.size(), 1U);
   const CameraModel& model = simulation.rig.cameras[0].model;
   ASSERT_GT(recordings[0].events.size(), 1000U);
+  const std::vector<Event>& events = recordings[0].events;
+  EXPECT_TRUE(std::is_sorted(events.begin(), events.end(), [](const Event& a, const Event& b) {
+    return std::tie(a.t_ns, a.y, a.x) < std::tie(b.t_ns, b.y, b.x);
+  }));
+  EXPECT_GE(events.front().t_ns, simulation.start_ns);
+  EXPECT_LE(events.back().t_ns, simulation.endNs());
   double sum_px = 0;
-  for (const Event& event : recordings[0].events) {
+  for (const Event& event : events) {
     const double edge_x =
         model.cx - model.fx * kSpeed / kDepth * (static_cast<double>(event.t_ns) * 1e-9);
     // With a blur of half a pixel, the edge has an effect up to two pixels away.
@@ -53,30 +59,6 @@ TEST(SimulatedRig, AMovingEdgeFiresAtItsPositionAndTime) {
   }
   // The mean is the edge, except for the lag of a threshold.
   EXPECT_NEAR(sum_px / static_cast<double>(recordings[0].events.size()), 0, 0.1);
-}
-
-TEST(SimulatedRig, TheBrightnessBetweenTwoEventsChangesByTheThreshold) {
-  const Simulation simulation = passingEdge();
-  const auto events = simulateEvents(simulation)[0].events;
-  const CameraModel& model = simulation.rig.cameras[0].model;
-  // The edge under a Gaussian blur of half a pixel.
-  const auto brightness = [&](const Event& event) {
-    const double edge_x =
-        model.cx - model.fx * kSpeed / kDepth * (static_cast<double>(event.t_ns) * 1e-9);
-    return kContrast * 0.5 * (1 + std::erf((event.x - edge_x) / 0.5 / std::sqrt(2.0)));
-  };
-  std::map<std::pair<int, int>, double> last;
-  int compared = 0;
-  for (const Event& event : events) {
-    const auto pixel = std::pair(event.x, event.y);
-    const double now = brightness(event);
-    if (last.count(pixel) > 0 && now > 0.1 && now < 0.9) {
-      EXPECT_NEAR(now - last[pixel], kThreshold, 0.06);
-      ++compared;
-    }
-    last[pixel] = now;
-  }
-  EXPECT_GT(compared, 1000);
 }
 
 TEST(SimulatedRig, EveryPixelOnThePathOfTheEdgeFiresContrastOverThreshold) {
@@ -93,15 +75,6 @@ TEST(SimulatedRig, EveryPixelOnThePathOfTheEdgeFiresContrastOverThreshold) {
   }
   EXPECT_EQ(per_column.count(10), 0U);
   EXPECT_EQ(per_column.count(55), 0U);
-}
-
-TEST(SimulatedRig, SourcesOfEventsLieOnTheEdge) {
-  const Simulation simulation = passingEdge();
-  const auto recording = simulateEvents(simulation)[0];
-  ASSERT_EQ(recording.sources.size(), recording.events.size());
-  for (const SurfacePoint& source : recording.sources) {
-    EXPECT_NEAR(simulation.scene.pointAt(source).x(), 0, 2.5 * kDepth / 50);
-  }
 }
 
 TEST(SimulatedRig, ASilhouetteBelongsToTheSurfaceInFrontAndIsPreciseToAPixel) {
@@ -123,19 +96,9 @@ TEST(SimulatedRig, ASilhouetteBelongsToTheSurfaceInFrontAndIsPreciseToAPixel) {
   }
 }
 
-TEST(SimulatedRig, EventsAreInOrderWithinTheRecording) {
-  const Simulation simulation = passingEdge();
-  const auto events = simulateEvents(simulation)[0].events;
-  EXPECT_TRUE(std::is_sorted(events.begin(), events.end(), [](const Event& a, const Event& b) {
-    return std::tie(a.t_ns, a.y, a.x) < std::tie(b.t_ns, b.y, b.x);
-  }));
-  EXPECT_GE(events.front().t_ns, simulation.start_ns);
-  EXPECT_LE(events.back().t_ns, simulation.endNs());
-}
-
 TEST(SimulatedRig, TheSameSeedGivesTheSameEventsWithAnyNumberOfThreads) {
   SimulationOptions options;
-  options.duration_s = 0.02;
+  options.duration_s = 0.005;
   Simulation desk = makeSimulation(options);
   desk.pixels.mismatch = 0.05;
   desk.pixels.refractory_ns = 500'000;
@@ -146,7 +109,7 @@ TEST(SimulatedRig, TheSameSeedGivesTheSameEventsWithAnyNumberOfThreads) {
     run.threads = threads;
     events.push_back(simulateEvents(desk, run)[1].events);
   }
-  ASSERT_GT(events[0].size(), 1000U);
+  ASSERT_GT(events[0].size(), 200U);
   EXPECT_EQ(events[0], events[1]);
   EXPECT_EQ(events[0], events[2]);
   desk.seed = 2;

@@ -17,14 +17,14 @@ struct Edge {
   Eigen::Vector3d a = Eigen::Vector3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
 };
-using EdgeWorld = std::vector<Edge>;
+using Edges = std::vector<Edge>;
 
 inline ReferenceView smallView() { return {160, 120, 130, 130, 79.5, 59.5}; }
 
 /// Edges of 0.5 to 1.5 m with any direction, 2 to 4 m around the y axis of the world.
-inline EdgeWorld edgesAround(int count, std::mt19937& random) {
+inline Edges edgesAround(int count, std::mt19937& random) {
   std::uniform_real_distribution<double> uniform(-1, 1);
-  EdgeWorld world;
+  Edges world;
   for (int i = 0; i < count; ++i) {
     const double angle = M_PI * uniform(random);
     const double away_m = 3 + uniform(random);
@@ -38,8 +38,8 @@ inline EdgeWorld edgesAround(int count, std::mt19937& random) {
 }
 
 /// Edges along x on one wall.
-inline EdgeWorld stripes() {
-  EdgeWorld world;
+inline Edges stripes() {
+  Edges world;
   for (int y = -4; y <= 4; ++y) world.push_back({{-9, 0.25 * y, 3}, {9, 0.25 * y, 3}});
   return world;
 }
@@ -61,7 +61,7 @@ inline KeyframeDepthMap emptyKeyframe(const ReferenceView& view) {
 
 /// The nearest edge in each pixel of a view. Inverse depths have the error `sigma` (1/m), and state
 /// it as their variance.
-inline KeyframeDepthMap seenFrom(const EdgeWorld& world, const Rigid3& T_world_ref, double sigma,
+inline KeyframeDepthMap seenFrom(const Edges& world, const Rigid3& T_world_ref, double sigma,
                                  std::mt19937& random) {
   KeyframeDepthMap keyframe = emptyKeyframe(smallView());
   keyframe.T_world_ref = T_world_ref;
@@ -100,7 +100,7 @@ inline void keepFirst(int count, KeyframeDepthMap& keyframe) {
   }
 }
 
-inline RegistrationCloud cloudFrom(const EdgeWorld& world, const Rigid3& T_world_ref,
+inline RegistrationCloud cloudFrom(const Edges& world, const Rigid3& T_world_ref,
                                    std::mt19937& random) {
   return {seenFrom(world, T_world_ref, kInverseDepthSigma, random), {}};
 }
