@@ -18,7 +18,7 @@
 #include "test/plugin/bags/bag_bytes.h"
 #include "test/plugin/bags/ros_message_bytes.h"
 #include "test/plugin/formats/files.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -17,7 +17,7 @@
 #include "plugin/readers/pose_file.h"
 #include "plugin/writers/mcap_writer.h"
 #include "test/plugin/formats/files.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

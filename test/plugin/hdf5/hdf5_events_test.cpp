@@ -20,7 +20,7 @@
 #include "plugin/writers/hdf5_writer.h"
 #include "test/paths.h"
 #include "test/plugin/formats/files.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/truth/dataset_writer.h"

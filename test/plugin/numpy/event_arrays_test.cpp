@@ -15,7 +15,7 @@
 #include "test/paths.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/numpy/zip_file.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
 

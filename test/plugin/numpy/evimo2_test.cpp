@@ -11,6 +11,7 @@
 #include "plugin/readers/recording_formats.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/numpy/zip_file.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -40,16 +41,10 @@ class Evimo2 : public TemporaryFolder {
               {"meta.npy", npyArray<double>("|O", "()", {0})}});
     return to;
   }
-  static std::vector<Event> eventsOf(EventStream& stream) {
-    std::vector<Event> all;
-    std::vector<Event> block;
-    while (stream.read(block)) all.insert(all.end(), block.begin(), block.end());
-    return all;
-  }
   std::string errorOfFolder(const std::filesystem::path& path) const {
     return errorOf([&] {
       RecordingParts parts = openEvimo2({path}, {});
-      eventsOf(*parts.cameras[0]);
+      readStream(*parts.cameras[0]);
     });
   }
 };
@@ -61,7 +56,7 @@ TEST_F(Evimo2, HasEventsAndTheCamerasCalibration) {
   RecordingParts parts = openEvimo2({path}, {});
   const std::vector<Event> expected = {
       {16'667'000, 1, 2, true}, {500'000'000, 639, 479, false}, {10'123'456'000, 5, 6, true}};
-  EXPECT_TRUE(eventsOf(*parts.cameras.at(0)) == expected);
+  EXPECT_TRUE(readStream(*parts.cameras.at(0)) == expected);
   ASSERT_TRUE(parts.calibration);
   const CameraModel model = parts.calibration->camera(0, CameraSize{640, 480}).model;
   EXPECT_EQ(model.fy, 501);
@@ -74,8 +69,8 @@ TEST_F(Evimo2, TheSamsungsPolarityIsTheOtherWayAround) {
   RecordingParts parts = openEvimo2({writeThree("samsung_mono"), writeThree("left_camera")}, {});
   ASSERT_EQ(parts.cameras.size(), 2U);
   EXPECT_FALSE(parts.calibration) << "there is no transform between them";
-  EXPECT_FALSE(eventsOf(*parts.cameras[0]).at(0).polarity);
-  EXPECT_TRUE(eventsOf(*parts.cameras[1]).at(0).polarity);
+  EXPECT_FALSE(readStream(*parts.cameras[0]).at(0).polarity);
+  EXPECT_TRUE(readStream(*parts.cameras[1]).at(0).polarity);
 }
 
 TEST_F(Evimo2, PosesAndTheSensorsSizeAreThoseOfFurtherFiles) {
@@ -103,7 +98,7 @@ TEST_F(Evimo2, SeekingLeavesOutNothing) {
   for (const std::int64_t t_ns : {-5L, 1'000'000'000L, 1'999'990'000L, 5'000'000'000L}) {
     RecordingParts parts = openEvimo2({path}, {});
     parts.cameras[0]->seek(t_ns);
-    const std::vector<Event> events = eventsOf(*parts.cameras[0]);
+    const std::vector<Event> events = readStream(*parts.cameras[0]);
     const std::int64_t first = std::clamp<std::int64_t>((t_ns - 10'000'000) / 10'000, 0, kCount);
     ASSERT_NEAR(static_cast<double>(events.size()), static_cast<double>(kCount - first), 1) << t_ns;
     if (t_ns < 2'000'000'000) {

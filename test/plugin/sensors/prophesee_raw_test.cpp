@@ -12,7 +12,7 @@
 #include "test/paths.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/sensors/evt_words.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
