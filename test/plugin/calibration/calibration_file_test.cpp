@@ -47,11 +47,12 @@ TEST_F(CalibrationFile, MayBeACameraChainOfAnyName) {
 
 TEST_F(CalibrationFile, MayBeNineNumbersWhereTheRecordingKnowsTheSize) {
   const Calibration calibration = read("# fx fy\n200 201 120 90 0.1 0 0 0 0\n");
-  const CameraModel model = calibration.camera(0, CameraSize{240, 180}).model;
-  EXPECT_EQ(model.fy, 201);
-  EXPECT_EQ(model.coefficients[0], 0.1);
-  EXPECT_EQ(model.width, 240);
-  EXPECT_EQ(model.height, 180);
+  CameraModel expected{240, 180, 200, 201, 120, 90, DistortionModel::kRadtan, {}};
+  expected.coefficients = {0.1, 0, 0, 0, 0};
+  EXPECT_EQ(calibration.camera(0, CameraSize{240, 180}).model, expected);
+  EXPECT_EQ(readUzhCalibration(folder() / "given.txt", {240, 180}), expected);
+  expected.coefficients[0] = 0;
+  EXPECT_EQ(read("200 201 120 90 0 0 0 0 0").camera(0, CameraSize{240, 180}).model, expected);
   EXPECT_THAT(messageOf([&] { calibration.camera(0, std::nullopt); }),
               HasSubstr("given.txt: no size of the sensor"));
 }
@@ -170,7 +171,10 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"[1, 2]\n", "given.txt: not a calibration: expected a Kalibr camera chain"},
       {"left: {fx: 3}\n", "given.txt: not a calibration: expected a Kalibr camera chain"},
       {std::string("\x89HDF\r\n\x1a\n\0\0", 10), "given.txt"},
-      {"200 200 120\n", "given.txt: 3 numbers: expected 9"},
+      {"200 200 120 90 0 0 0 0\n", "given.txt: 8 numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3"},
+      {"200 200 120 90 0 0 0 0 0 0\n", "given.txt: 10 numbers: expected 9"},
+      {"200 201\n120 \x1b[2J\n", "given.txt:2: '\\x1b[2J': expected a finite number"},
+      {"0 201 120 90 0 0 0 0 0\n", "given.txt: fx = 0: must be finite and above 0"},
       {"200 x 120\n", "given.txt:1: 'x': expected a finite number"},
       {R"({"value0": {}})", "given.txt:1: value0: resolution is missing"},
       {R"({"value0": {"T_imu_marker": {"px": 1}}})", "value0: resolution is missing"},

@@ -11,6 +11,7 @@
 
 #include "plugin/formats/gz_stream.h"
 #include "plugin/formats/rawlog_recording.h"
+#include "plugin/formats/rawlog_signature.h"
 #include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
@@ -34,6 +35,7 @@ using Observations = std::vector<CObservation::Ptr>;
 struct Delivery {
   Observations observations;
   std::string error;
+  std::string again;  // the next error
 };
 
 Delivery read(const std::filesystem::path& file) {
@@ -49,7 +51,7 @@ Delivery read(const std::filesystem::path& file) {
     EXPECT_EQ(progress, 1);
   } catch (const std::exception& error) {
     delivery.error = error.what();
-    EXPECT_EQ(messageOf([&] { recording.next(); }), delivery.error) << "it stays";
+    delivery.again = messageOf([&] { recording.next(); });
   }
   return delivery;
 }
@@ -176,7 +178,8 @@ TEST_F(Rawlog, TruncatedAnywhereIsAnErrorThatNamesTheEntryAfterAllEntriesBeforeI
   std::size_t most = 0;
   // Its last 8 bytes are gzip's checksum and size.
   for (std::size_t size = 0; size < bytes.size();
-       size += size + 8 < bytes.size() ? std::min(1 + bytes.size() / 50, bytes.size() - 8 - size) : 1) {
+       size +=
+       size + 8 < bytes.size() ? std::min(1 + bytes.size() / 50, bytes.size() - 8 - size) : 1) {
     writeBytes(bytes.substr(0, size));
     const Delivery delivery = read(file());
     EXPECT_THAT(
@@ -186,10 +189,41 @@ TEST_F(Rawlog, TruncatedAnywhereIsAnErrorThatNamesTheEntryAfterAllEntriesBeforeI
             HasSubstr("r.rawlog: "), isPlain(),
             EndsWith(size == 0 ? "the file is empty" : "the file ends in the middle of its data")))
         << "cut to " << size << " of " << bytes.size() << " bytes";
+    EXPECT_THAT(delivery.again, StartsWith("stopped at entry "));
     expectBeginningOf(recorded, delivery.observations);
     most = std::max(most, delivery.observations.size());
   }
   EXPECT_EQ(most, recorded.size());
+}
+
+TEST_F(Rawlog, IsKnownByTheNameOfItsFirstObject) {
+  const auto sized = [](char length, std::size_t count) {
+    return length + std::string(count, 'a');
+  };
+  const std::string wide("\3\0\0\0abc", 7);  // as of old versions
+  const std::pair<std::string, const char*> rows[] = {
+      {sized('\x83', 3), nullptr},
+      {sized('\xf8', 120), nullptr},
+      {sized('\x83', 1), nullptr},  // truncated
+      {"\x8c"
+       "a::b<c,d>_9Z",
+       nullptr},
+      {wide, nullptr},
+      {wide.substr(0, 2), nullptr},
+      {sized('\x82', 2), "it begins with '\\x82aa'"},
+      {sized('\xf9', 121), "it begins with '\\xf9aaaaaaaaaaaaaaaaaaaaaaa'"},
+      {std::string("\2\0\0\0ab", 6), "it begins with"},
+      {std::string("\3\0\0\1abc", 7), "it begins with"},
+      {"\x83"
+       "a-c",
+       "it begins with '\\x83a-c'"},
+      {"", "it is empty"},
+  };
+  for (const auto& [bytes, why] : rows) {
+    writeBytes(bytes);
+    EXPECT_EQ(whyNoRawlog(file()).has_value(), why != nullptr) << bytes;
+    EXPECT_THAT(whyNoRawlog(file()).value_or(""), StartsWith(why != nullptr ? why : ""));
+  }
 }
 
 TEST_F(Rawlog, AChangedByteIsAnErrorAfterCorrectEntries) {
@@ -225,8 +259,9 @@ TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
   EXPECT_THAT(error_of("/dev/null"), EndsWith(": not a regular file"));
   EXPECT_THAT(error_of(folder() / "nowhere"), EndsWith(": no such file"));
   // An entry begins with the length of its class's name, with the top bit set.
-  for (const auto& [name, shown] : {std::pair<std::string, std::string>{"CNewObservation", "CNewObse"},
-                                    {"C\x1b[2J", "C\\x1b[2J"}}) {
+  for (const auto& [name, shown] :
+       {std::pair<std::string, std::string>{"CNewObservation", "CNewObse"},
+        {"C\x1b[2J", "C\\x1b[2J"}}) {
     writeBytes(std::string(1, static_cast<char>(0x80 | name.size())) + name + '\0');
     EXPECT_THAT(read(file()).error, AllOf(StartsWith("stopped at entry 0 of"), HasSubstr(shown),
                                           isPlain(), Not(HasSubstr("\x1b"))));
@@ -234,10 +269,12 @@ TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
   writeBytes("0.1 2 3 1\n0.2 2 3 1\n");
   EXPECT_THAT(read(file()).error, AllOf(StartsWith("stopped at entry 0 of"), isPlain()));
   writeObjects(*recorded[0], mrpt::poses::CPose3D(), *recorded[1]);
-  EXPECT_THAT(read(file()).error,
-              AllOf(StartsWith("stopped at entry 1 of"),
-                    EndsWith("an object of class 'CPose3D': expected observations, sensory frames "
-                             "and actions")));
+  EXPECT_THAT(
+      read(file()).error,
+      AllOf(StartsWith("stopped at entry 1 of"),
+            EndsWith(
+                "an object of class 'mrpt::poses::CPose3D': expected observations, sensory frames "
+                "and actions")));
 }
 
 }  // namespace

@@ -4,14 +4,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "maps/io/atomic_file.h"
 #include "plugin/hdf5/hdf5_files.h"
 #include "plugin/hdf5/hdf5_recording.h"
@@ -210,6 +215,16 @@ class Hdf5Events : public TemporaryFolder {
       }
     }
 
+    void addText(const std::string& path, const std::string& text) {
+      const Hdf5Id type(H5Tcopy(H5T_C_S1), H5Tclose);
+      H5Tset_size(type.get(), text.size());
+      const Hdf5Id space(H5Screate(H5S_SCALAR), H5Sclose);
+      const Hdf5Id set(H5Dcreate2(id_.get(), path.c_str(), type.get(), space.get(), H5P_DEFAULT,
+                                  H5P_DEFAULT, H5P_DEFAULT),
+                       H5Dclose);
+      H5Dwrite(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data());
+    }
+
    private:
     template <typename Number>
     static hid_t memoryType() {
@@ -224,6 +239,8 @@ class Hdf5Events : public TemporaryFolder {
     Numbers y = {4, 5, 6};
     Numbers t = {0, 1'500, 2'500};
     Numbers p = {1, 0, 1};
+    std::optional<Numbers> index;
+    Numbers offset;  // a number, if there is one
   };
   /// DSEC's layout.
   void write(const Columns& columns) const {
@@ -232,6 +249,8 @@ class Hdf5Events : public TemporaryFolder {
     writing.add("events/y", H5T_STD_U16LE, columns.y);
     writing.add("events/t", H5T_STD_I64LE, columns.t);
     writing.add("events/p", H5T_STD_I8LE, columns.p);
+    if (columns.index) writing.add("ms_to_idx", H5T_STD_I64LE, *columns.index);
+    if (!columns.offset.empty()) writing.add("t_offset", H5T_STD_I64LE, columns.offset);
   }
   std::string errorOfFile() const {
     return errorOf([&] {
@@ -257,6 +276,86 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
   check(columns, place + "[1]: p = '2': expected polarity 1, 0 or -1", 1);
   columns.t = {5'000'000'000'000'000, 0, 0};
   check(columns, place + "[0]: t = '5000000000000000': expected a time before the year 2116", 0);
+  // Of several wrong ones, the first event's is told; of one event's, that of the first column.
+  columns.t = {0, -5'000'000'000'000'000, 0};
+  check(columns, place + "[1]: t = '-5000000000000000': expected a time before the year 2116", 1);
+  columns.p = {-2, 1, 0};
+  check(columns, place + "[0]: p = '-2': expected polarity 1, 0 or -1", 0);
+  const long long end_us = kEndOfTimeNs / 1'000;
+  for (const int sign : {-1, 1}) {
+    Columns shifted;
+    shifted.offset = {sign * (end_us - 2'500)};
+    shifted.t = {0, 0, sign * 2'500};
+    check(shifted, "no error", 3);
+    shifted.t[2] = sign * 2'501;
+    check(shifted,
+          place + fmt::format("[2]: t = '{}': expected a time bef", shifted.t[2]) +
+              "ore the year 2116",
+          2);
+    shifted.offset = {sign * (end_us + 1)};
+    write(shifted);
+    EXPECT_THAT(errorOfFile(),
+                HasSubstr(fmt::format("/t_offset: {}: expected a time", shifted.offset[0])));
+  }
+}
+
+TEST_F(Hdf5Events, ASeekGoesToTheFirstEventOfItsTimeOrOfItsMillisecondInTheIndex) {
+  Columns columns;
+  columns.t = {0, 500, 999, 1'000, 1'000, 2'500, 2'500, 4'000};  // us
+  columns.x = columns.y = columns.p = Numbers(8, 1);
+  struct Case {
+    std::optional<Numbers> index;
+    std::vector<std::pair<std::int64_t, int>> first_events;  // of times in ns
+  };
+  const std::vector<Case> cases = {
+      {std::nullopt,
+       {{-1'000'000, 0},
+        {0, 0},
+        {1, 1},
+        {500'000, 1},
+        {999'000, 2},
+        {999'001, 3},
+        {1'000'000, 3},
+        {1'000'001, 5},
+        {2'500'000, 5},
+        {2'500'001, 7},
+        {4'000'000, 7},
+        {4'000'001, 8}}},
+      {Numbers{0, 3, 5, 7, 7},
+       {{-1'000'000, 0},
+        {999'999, 0},
+        {1'000'000, 3},
+        {1'999'999, 3},
+        {2'000'000, 5},
+        {3'000'000, 7},
+        {4'000'000, 7},
+        {9'000'000, 7}}},
+      // An index that is too early is used; others are not: the events are searched.
+      {Numbers{0, 1, 3}, {{1'000'000, 1}, {1'000'001, 1}, {3'000'000, 3}}},
+      {Numbers{1, 4, 6}, {{0, 0}, {500'000, 1}, {1'000'000, 3}, {2'500'000, 5}}},
+      {Numbers{8, 8, 8}, {{500'000, 1}, {2'500'000, 5}, {4'000'000, 7}, {4'000'001, 8}}},
+      {Numbers{-1, 9, 99}, {{0, 0}, {1'000'000, 3}, {2'500'000, 5}, {4'000'001, 8}}},
+      {Numbers{}, {{999'000, 2}, {4'000'001, 8}}},
+  };
+  for (const Numbers& offset : {Numbers{}, Numbers{7'000'123}, Numbers{-20'000}}) {
+    columns.offset = offset;
+    const std::int64_t offset_ns = offset.empty() ? 0 : offset[0] * 1'000;
+    for (const auto& [index, first_events] : cases) {
+      columns.index = index;
+      write(columns);
+      for (const auto& [t_ns, first] : first_events) {
+        const RecordingParts parts = openHdf5({file()}, {});
+        parts.cameras[0]->seek(t_ns + offset_ns);
+        std::vector<Event> events;
+        EXPECT_EQ(parts.cameras[0]->read(events), first < 8) << t_ns;
+        ASSERT_EQ(events.size(), static_cast<std::size_t>(8 - first)) << t_ns;
+        if (first == 8) continue;
+        EXPECT_EQ(events[0].t_ns, columns.t[static_cast<std::size_t>(first)] * 1'000 + offset_ns);
+        EXPECT_EQ(parts.cameras[0]->positionOf(0),
+                  fmt::format("{}:/events[{}]", file().string(), first));
+      }
+    }
+  }
 }
 
 TEST_F(Hdf5Events, RealTimesAreSecondsAndKeepTheDigitsThatTheyHold) {
@@ -338,8 +437,14 @@ TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
   options.columns = "t=a/list/time_us x=a/list/u y=a/list/v p=a/list/on";
   EXPECT_THAT(readStream(*openHdf5({file()}, options).cameras.at(0)),
               ElementsAre(Event{5'000, 7, 8, true}));
+  options.time_unit = "ms";
+  EXPECT_EQ(readStream(*openHdf5({file()}, options).cameras.at(0)).at(0).t_ns, 5'000'000)
+      << "before that of the name";
   options.columns = "t=a/list/t x=a/list/u y=a/list/v p=a/list/on";
   EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }), HasSubstr("with a field t"));
+  options.columns = "t=b/list/time_us x=a/list/u y=a/list/v p=a/list/on";
+  EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }),
+              HasSubstr(":/b/list/time_us: expected a field of /a/list"));
   write({});
   EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }),
               HasSubstr("events.h5:/a/list/u: no such data set (--event-columns)"));
@@ -426,44 +531,100 @@ TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
   EXPECT_THAT(errorOfFile(), HasSubstr("expected a complete HDF5 file"));
 }
 
-TEST_F(Hdf5Events, AnIndexThatIsWrongIsNotBelieved) {
-  Columns columns;
-  for (const Numbers& index :
-       {Numbers{0, 3, 3}, Numbers{2, 2, 2}, Numbers{-1, 99, 99}, Numbers{}}) {
-    write(columns);
+/// M3ED's calibration of a camera.
+struct Calib {
+  std::vector<double> resolution = {640, 480};
+  std::vector<double> intrinsics = {500, 501, 320, 240};
+  std::string model = "radtan";
+  std::vector<double> coefficients = {0.1, 0.2, 0.3, 0.4};
+  std::vector<double> T_rig_cam = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+};
+
+TEST_F(Hdf5Events, ACalibrationIsOfTheFirstCamerasRigAndItsErrorsNameTheDataSet) {
+  const auto opened = [&](const std::vector<std::pair<std::string, Calib>>& cameras) {
     {
-      const Hdf5Id id(H5Fopen(file().c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
-      const hsize_t side = index.size();
-      const Hdf5Id space(H5Screate_simple(1, &side, nullptr), H5Sclose);
-      const Hdf5Id set(H5Dcreate2(id.get(), "ms_to_idx", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
-                                  H5P_DEFAULT, H5P_DEFAULT),
-                       H5Dclose);
-      if (side > 0) {
-        H5Dwrite(set.get(), H5T_NATIVE_LLONG, H5S_ALL, H5S_ALL, H5P_DEFAULT, index.data());
+      Writing writing(file());
+      for (const auto& [side, calib] : cameras) {
+        const std::string group = "prophesee/" + side;
+        for (const char* column : {"/x", "/y", "/t", "/p"}) {
+          writing.add((group + column).c_str(), H5T_STD_I32LE, Numbers{1});
+        }
+        const auto add = [&](const char* name, const std::vector<double>& numbers) {
+          writing.add((group + "/calib/" + name).c_str(), H5T_IEEE_F64LE, numbers);
+        };
+        add("resolution", calib.resolution);
+        add("intrinsics", calib.intrinsics);
+        add("distortion_coeffs", calib.coefficients);
+        add("T_to_prophesee_left", calib.T_rig_cam);
+        writing.addText(group + "/calib/distortion_model", calib.model);
       }
     }
-    const RecordingParts parts = openHdf5({file()}, {});
-    parts.cameras[0]->seek(1'200'000);
-    EXPECT_THAT(readStream(*parts.cameras[0]),
-                ElementsAre(Event{1'500'000, 2, 5, false}, Event{2'500'000, 3, 6, true}));
+    return openHdf5({file()}, {});
+  };
+  Calib right;
+  right.resolution = {65'535, 1};
+  right.model = "none";
+  right.T_rig_cam = {0, -1, 0, 0.1, 1, 0, 0, 0.2, 0, 0, 1, 0.3, 0, 0, 0, 1};
+  const RecordingParts both = opened({{"left", {}}, {"right", right}});
+  const Rig rig = both.calibration.value().rig;
+  ASSERT_EQ(rig.cameras.size(), 2U);
+  CameraModel left{640, 480, 500, 501, 320, 240, DistortionModel::kRadtan, {}};
+  left.coefficients = {0.1, 0.2, 0.3, 0.4};
+  EXPECT_EQ(rig.cameras[0].model, left);
+  EXPECT_EQ(rig.cameras[1].model,
+            (CameraModel{65'535, 1, 500, 501, 320, 240, DistortionModel::kNone, {}}));
+  EXPECT_LT((rig.cameras[1].T_rig_cam * Eigen::Vector3d(1, 2, 3) - Eigen::Vector3d(-1.9, 1.2, 3.3))
+                .norm(),
+            1e-12);
+  EXPECT_EQ(both.cameras[1]->size().value().width, 65'535);
+  EXPECT_FALSE(opened({{"right", right}}).calibration) << "without the rig's first camera";
+  const std::tuple<std::vector<double> Calib::*, std::vector<double>, const char*> rows[] = {
+      {&Calib::resolution, {640}, "calib/resolution: expected 2 numbers, width and height"},
+      {&Calib::resolution, {0, 480}, "calib/resolution: 0: expected whole numbers from 1 to 65535"},
+      {&Calib::resolution, {640, 65'536}, "calib/resolution: 65536: expected whole numbers"},
+      {&Calib::resolution, {640, 4.5}, "calib/resolution: 4.5: expected whole numbers"},
+      {&Calib::intrinsics, {1, 2, std::nan(""), 4}, "calib/intrinsics: nan: expected fx fy cx cy"},
+      {&Calib::intrinsics, {-1, 2, 3, 4}, "prophesee/left/calib: fx = -1"},
+      {&Calib::coefficients, {1, 2, 3}, "calib/distortion_coeffs: expected 4 numbers"},
+      {&Calib::T_rig_cam, std::vector<double>(16, 0.5), "T_to_prophesee_left: expected a 4x4 matr"},
+  };
+  for (const auto& [field, numbers, error] : rows) {
+    Calib wrong;
+    wrong.*field = numbers;
+    EXPECT_THAT(errorOf([&, &wrong = wrong] { opened({{"left", wrong}}); }), HasSubstr(error));
   }
+  Calib fov;
+  fov.model = "fov";
+  EXPECT_THAT(errorOf([&] {
+                opened({{"left", fov}});
+              }),
+              HasSubstr("calib/distortion_model: 'fov': expected radtan, equidistant or none"));
 }
 
-TEST_F(Hdf5Events, AFolderOfTwoRecordingsIsRefused) {
+TEST_F(Hdf5Events, FilesOfAFolderAreInTheOrderOfTheirCameras) {
   write({});
-  fs::copy_file(file(), folder() / "a-events_left.h5");
-  fs::rename(file(), folder() / "b-events_left.h5");
-  EXPECT_THAT(errorOf([&] { openHdf5({folder()}, {}); }),
-              AllOf(StartsWith((folder() / "b-events_left.h5").string()),
-                    HasSubstr("a second recording"), HasSubstr("a-events_left.h5")));
-}
-
-TEST_F(Hdf5Events, AFolderWithoutEventsOfHdf5IsNone) {
-  write({});
-  fs::rename(file(), folder() / "rectify_map.h5");
-  writeFile(folder() / "events/left/events.h5", "no HDF5");
-  EXPECT_FALSE(looksLikeHdf5(folder()));
-  EXPECT_FALSE(looksLikeHdf5(folder() / "missing"));
+  const fs::path in = folder() / "in";
+  for (const char* name : {"events/right/events.h5", "events/left/events.h5",
+                           "events/cam2/events.h5", "a_events/b.hdf5", "c.h5", "c.txt", "d/left.h5",
+                           "rectify_map.h5", "events/left/deep_events/e.h5"}) {
+    fs::create_directories((in / name).parent_path());
+    fs::copy_file(file(), in / name);
+  }
+  writeFile(in / "events/left/none.h5", "no HDF5");
+  std::vector<std::string> found;
+  for (const auto& [camera, path] : hdf5FilesIn(in)) {
+    found.push_back(camera + ": " + path.lexically_relative(in).string());
+  }
+  EXPECT_THAT(found, ElementsAre("left: events/left/events.h5", "right: events/right/events.h5",
+                                 ": a_events/b.hdf5", ": c.h5", "cam2: events/cam2/events.h5"));
+  EXPECT_THAT(errorOf([&] { openHdf5({in}, {}); }),
+              AllOf(StartsWith((in / "c.h5").string()), HasSubstr("a second recording"),
+                    HasSubstr("a_events/b.hdf5")));
+  EXPECT_TRUE(looksLikeHdf5(in / "c.txt")) << "by its first bytes";
+  EXPECT_FALSE(looksLikeHdf5(in / "events/left/none.h5"));
+  fs::remove(in / "events/left/events.h5");
+  EXPECT_FALSE(looksLikeHdf5(in / "events/left"));
+  EXPECT_FALSE(looksLikeHdf5(in / "missing"));
 }
 
 /// The writer's folder.

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/text/event_text.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -132,6 +133,13 @@ TEST_F(EventColumnsText, TheUnitIsToldInTheHeaderOrFoundFromTheValues) {
   EventTextStream told(write("t_ns x y p\n5 1 2 0\n"), ReaderOptions{{}, {}, "ms"});
   EXPECT_EQ(readStream(told).at(0).t_ns, 5'000'000) << "the option comes before the header";
   EXPECT_THAT(told.warnings(), testing::IsEmpty());
+  const ReaderOptions seconds{{}, {}, "s"};
+  for (const std::string sign : {"", "-"}) {
+    EventTextStream end(write(sign + "4611686018.427387902 1 2 0\n"), seconds);
+    EXPECT_EQ(std::abs(readStream(end).at(0).t_ns), kEndOfTimeNs - 1);
+    EXPECT_THAT(errorOfText(sign + "4611686018.427387903 1 2 0\n", seconds),
+                HasSubstr("e.txt:1: t = '" + sign + "4611686018.427387903': expected a time"));
+  }
   EXPECT_THAT(errorOfText(linesOf("{t} {x} {y} {p}", 12, 5, 10, 0)),
               HasSubstr("e.txt: all times are whole numbers"));
 }
