@@ -212,7 +212,7 @@ TEST_F(BagRecording, SeekingLeavesOutNothingFromTheTimeOn) {
 TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
   const auto packets = packetsFrom(kStartNs, 1);
   RecordedMessages messages;
-  for (const char* topic : {"/cam10/events", "/cam2/events"}) {
+  for (const char* topic : {"/cama/events", "/cam10/events", "/cam002/events", "/cam2/events"}) {
     messages = together(messages, arraysOf(topic, packets, RosBytes::kCdr));
   }
   messages.push_back({"/cam2/triggers", kPacket, kStartNs,
@@ -232,14 +232,15 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
     std::vector<std::string> cameras;
     std::int64_t pose_ns;  // 0: none
   };
-  const std::vector<std::string> natural = {"/cam2/events", "/cam10/events"};
+  const std::vector<std::string> natural = {"/cam002/events", "/cam2/events", "/cam10/events",
+                                            "/cama/events"};
   for (const Case& each : std::vector<Case>{
            {one, {}, natural, kStartNs + 2},
            {two, {}, natural, 0},
            {two, {"/other/pose"}, natural, kStartNs + 3},
            {two, {"/left/odometry"}, natural, kStartNs + 1},
-           {one, {"/cam10/events", "/cam2/events"}, {natural[1], natural[0]}, kStartNs + 2},
-           {one, {"/left/pose", "/cam10/events"}, {natural[1]}, kStartNs + 2}}) {
+           {one, {"/cam10/events", "/cam2/events"}, {natural[2], natural[1]}, kStartNs + 2},
+           {one, {"/left/pose", "/cam10/events"}, {natural[2]}, kStartNs + 2}}) {
     const RecordingParts recording = open({each.file}, each.topics);
     std::vector<std::string> names;
     for (const auto& camera : recording.cameras) names.push_back(camera->name());
@@ -250,6 +251,9 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
   }
   EXPECT_EQ(open({two}).expected_poses,
             "the choice of one by --topics, of /left/pose, /other/pose");
+  writeFile(folder() / "json.mcap",
+            replaced(mcapBytes(arraysOf("/events", packets, RosBytes::kCdr)), "cdr", "jso"));
+  EXPECT_THAT(open({folder() / "json.mcap"}).cameras, IsEmpty()) << "of another encoding";
   ReaderOptions options;
   options.topics = {"/events/of/another/bag", "/other/pose"};
   EXPECT_EQ(readPoses(two, options).at(0).t_ns, kStartNs + 3);

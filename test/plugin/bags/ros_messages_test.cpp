@@ -174,6 +174,10 @@ TEST(RosMessages, ATimeBaseOrTimeBeyondTheEndOfTimeIsAnError) {
   EXPECT_THAT(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end - 1, events),
               HasSubstr("word 1: t = "));
   EXPECT_EQ(events.size(), 1U);
+  EXPECT_EQ(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end - 2'000'001, events),
+            "no error");
+  EXPECT_THAT(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end - 2'000'000, events),
+              HasSubstr("word 1: t = 4611686018427387903: expected a time"));
   EXPECT_THAT(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end, events),
               HasSubstr("time_base = "));
   EXPECT_THAT(decoded({"libcaer_cmp", decodeLibcaerCmpEvents, "", {}}, end, events),

@@ -46,7 +46,7 @@ TEST_F(CalibrationFile, MayBeACameraChainOfAnyName) {
 }
 
 TEST_F(CalibrationFile, MayBeNineNumbersWhereTheRecordingKnowsTheSize) {
-  const Calibration calibration = read("# fx fy\n200 201 120 90 0.1 0 0 0 0\n");
+  const Calibration calibration = read("#fx fy\n200 201 120 90 0.1 0 0 0 0\n");
   CameraModel expected{240, 180, 200, 201, 120, 90, DistortionModel::kRadtan, {}};
   expected.coefficients = {0.1, 0, 0, 0, 0};
   EXPECT_EQ(calibration.camera(0, CameraSize{240, 180}).model, expected);
@@ -185,6 +185,9 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
        "value0: intrinsics[3]: camera_type = 'kb5': expected"},
       {replaced(replaced(kTumVie, "1.0011", "1"), "kb5", "kb4"),
        "intrinsics[3]: intrinsics: fx is"},
+      {replaced(replaced(kTumVie, "1.0011", "1"),
+                ",\n{\"camera_type\": \"kb5\", \"intrinsics\": {}}", ""),
+       "value0: intrinsics = a list: expected a list of at least 4 items"},
       {replaced(kTumVie, "[64, 48]", "[64, 65536]"),
        ":2: value0: resolution = 65536: expected whole"},
       {replaced(kTumVie, "\"k4\": 4", "\"k4\": \"a\""), "intrinsics: k4 = 'a': expected a finite"},

@@ -46,6 +46,7 @@ TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
               HasSubstr("nowhere: cannot be opened"));
   EXPECT_THAT(errorOfText("cam0: {camera_model: pinhole}\n"),
               HasSubstr("hand_eye.yaml:1: cam0: T_cam_imu is missing"));
+  EXPECT_THAT(errorOfText("cam0: {}\ncam2: {}\n"), HasSubstr("hand_eye.yaml: cam2 without cam1"));
 }
 
 TEST_F(HandEyeFile, OfTheImuIsThatOfTheCameraChain) {

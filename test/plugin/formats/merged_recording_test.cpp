@@ -138,6 +138,7 @@ TEST_F(MergedRecordingTest, OtherPosesReplaceTheRecordingsAndTheirDamageComesLas
                 given.push_back(shortly(*observation));
             }),
             "torn");
+  EXPECT_EQ(recording.position(), "the poses");
   EXPECT_THAT(given,
               ElementsAre("pose@7", "pose@12", "cam0@12:0", "cam0@12:1", "cam0@23:1", "pose@50"));
 }

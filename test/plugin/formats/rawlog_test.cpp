@@ -205,8 +205,8 @@ TEST_F(Rawlog, IsKnownByTheNameOfItsFirstObject) {
       {sized('\x83', 3), nullptr},
       {sized('\xf8', 120), nullptr},
       {sized('\x83', 1), nullptr},  // truncated
-      {"\x8c"
-       "a::b<c,d>_9Z",
+      {"\x8b"
+       "az09AZ_:<>,",
        nullptr},
       {wide, nullptr},
       {wide.substr(0, 2), nullptr},
@@ -224,6 +224,13 @@ TEST_F(Rawlog, IsKnownByTheNameOfItsFirstObject) {
     EXPECT_EQ(whyNoRawlog(file()).has_value(), why != nullptr) << bytes;
     EXPECT_THAT(whyNoRawlog(file()).value_or(""), StartsWith(why != nullptr ? why : ""));
   }
+  for (const char other : std::string("`{@[/;=?- ")) {
+    writeBytes(
+        "\x83"
+        "a" +
+        std::string(1, other) + "a");
+    EXPECT_TRUE(whyNoRawlog(file())) << other;
+  }
 }
 
 TEST_F(Rawlog, AChangedByteIsAnErrorAfterCorrectEntries) {
@@ -237,6 +244,10 @@ TEST_F(Rawlog, AChangedByteIsAnErrorAfterCorrectEntries) {
     EXPECT_THAT(delivery.error, AllOf(StartsWith("stopped at entry "), isPlain())) << "byte " << at;
     expectBeginningOf(recorded, delivery.observations);
   }
+  std::string wrong_checksum = bytes;
+  wrong_checksum[bytes.size() - 6] ^= 1;
+  writeBytes(wrong_checksum);
+  EXPECT_THAT(read(file()).error, EndsWith("r.rawlog: incorrect data check"));
 }
 
 TEST_F(Rawlog, APacketWithAChangedByteIsAnErrorThatSaysSo) {

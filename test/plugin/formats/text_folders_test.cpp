@@ -120,10 +120,10 @@ TEST_F(DatasetFolder, ADamagedListOfTheTruthStopsOnlyWhoAsksForIt) {
   RecordingSource source;
   source.files = {folder()};
   EXPECT_TRUE(openTruth(source).empty());
-  write("depth/index.txt", "# t file\n0.3 a.tiff\n");
+  write("depth/index.txt", "# t file\n10.3 a.tiff\n");
   const std::vector<TruthDepth> truth = openTruth(source);
   ASSERT_EQ(truth.size(), 1U);
-  EXPECT_EQ(truth[0].t_ns, 300'000'000);
+  EXPECT_EQ(truth[0].t_ns, 10'300'000'000);
   EXPECT_EQ(truth[0].file, folder() / "depth" / "a.tiff");
   write("depth/index.txt", "0.3 a.tiff\nsoon b.tiff\n");
   EXPECT_NO_THROW(openAs("folder", folder()));

@@ -270,7 +270,7 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
     EXPECT_EQ(block.size(), events_before);
   };
   Columns columns;
-  columns.x = {1, 2, 65'536};
+  columns.x = {0, 65'535, 65'536};
   check(columns, place + "[2]: x = '65536': expected a whole number from 0 to 65535", 2);
   columns.p = {1, 2, 0};
   check(columns, place + "[1]: p = '2': expected polarity 1, 0 or -1", 1);
@@ -422,6 +422,43 @@ TEST_F(Hdf5Events, TheUnitOfTimesIsToldOrFoundWhereTheLayoutDoesNotSayIt) {
               HasSubstr(":/events/ts" + expected));
   EXPECT_THAT(errorOf([&] { first_of("events/t", H5T_IEEE_F64LE, real, {}); }),
               HasSubstr(":/events/t" + expected));
+  for (long long& t_us : whole) t_us += 1'700'000'000'000'000;  // of our years
+  EXPECT_EQ(first_of("events/ts", H5T_STD_I64LE, whole, {}), 1'700'000'005'000'010'000);
+  EXPECT_EQ(openHdf5({file()}, {}).cameras[0]->warnings().at(0).name, "time-unit");
+  {
+    Writing writing(file());  // MVSEC's are seconds
+    writing.add("davis/left/events", H5T_IEEE_F64LE, std::vector<double>{1, 2, 5, 1, 3, 4, 15, -1},
+                {2, 4});
+  }
+  EXPECT_THAT(readStream(*openHdf5({file()}, ms).cameras.at(0)),
+              ElementsAre(Event{5'000'000'000, 1, 2, true}, Event{15'000'000'000, 3, 4, false}));
+}
+
+TEST_F(Hdf5Events, AChunkMayHoldAPartOfItsRows) {
+  std::vector<double> matrices;  // turned by 90 degrees around z, at (k, 2, 3)
+  for (double k = 0; k < 5; ++k) {
+    for (const double number : {0., -1., 0., k, 1., 0., 0., 2., 0., 0., 1., 3., 0., 0., 0., 1.}) {
+      matrices.push_back(number);
+    }
+  }
+  const std::vector<hsize_t> chunks[] = {{2, 3, 3}, {3, 1, 4}, {5, 4, 4}, {2, 4, 1}};
+  for (const std::vector<hsize_t>& chunk : chunks) {
+    {
+      Writing writing(file());
+      const Hdf5Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+      H5Pset_chunk(creation.get(), 3, chunk.data());
+      H5Pset_deflate(creation.get(), 1);
+      writing.add("davis/left/pose", H5T_IEEE_F64LE, matrices, {5, 4, 4}, creation.get());
+      writing.add("davis/left/pose_ts", H5T_IEEE_F64LE, std::vector<double>{0, 1, 2, 3, 4.5});
+    }
+    const std::vector<StampedPose> poses = openHdf5({file()}, {}).poses;
+    ASSERT_EQ(poses.size(), 5U);
+    EXPECT_EQ(poses[4].t_ns, 4'500'000'000);
+    for (std::size_t k = 0; k < 5; ++k) {
+      const Eigen::Vector3d moved = poses[k].T_world_rig * Eigen::Vector3d(1, 0, 0);
+      EXPECT_LT((moved - Eigen::Vector3d(static_cast<double>(k), 3, 3)).norm(), 1e-12) << chunk[0];
+    }
+  }
 }
 
 TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
@@ -528,7 +565,9 @@ TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
     for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
   }
   writeFile(file(), "x y t p\n");
-  EXPECT_THAT(errorOfFile(), HasSubstr("expected a complete HDF5 file"));
+  EXPECT_EQ(errorOfFile(), file().string() +
+                               ": cannot be opened as HDF5 (file signature not found): "
+                               "expected a complete HDF5 file");
 }
 
 /// M3ED's calibration of a camera.
@@ -541,9 +580,11 @@ struct Calib {
 };
 
 TEST_F(Hdf5Events, ACalibrationIsOfTheFirstCamerasRigAndItsErrorsNameTheDataSet) {
+  int files = 0;
   const auto opened = [&](const std::vector<std::pair<std::string, Calib>>& cameras) {
+    const fs::path calibrated = folder() / (std::to_string(++files) + ".h5");
     {
-      Writing writing(file());
+      Writing writing(calibrated);
       for (const auto& [side, calib] : cameras) {
         const std::string group = "prophesee/" + side;
         for (const char* column : {"/x", "/y", "/t", "/p"}) {
@@ -559,7 +600,7 @@ TEST_F(Hdf5Events, ACalibrationIsOfTheFirstCamerasRigAndItsErrorsNameTheDataSet)
         writing.addText(group + "/calib/distortion_model", calib.model);
       }
     }
-    return openHdf5({file()}, {});
+    return openHdf5({calibrated}, {});
   };
   Calib right;
   right.resolution = {65'535, 1};
@@ -623,6 +664,7 @@ TEST_F(Hdf5Events, FilesOfAFolderAreInTheOrderOfTheirCameras) {
   EXPECT_TRUE(looksLikeHdf5(in / "c.txt")) << "by its first bytes";
   EXPECT_FALSE(looksLikeHdf5(in / "events/left/none.h5"));
   fs::remove(in / "events/left/events.h5");
+  fs::remove_all(in / "events/left/deep_events");
   EXPECT_FALSE(looksLikeHdf5(in / "events/left"));
   EXPECT_FALSE(looksLikeHdf5(in / "missing"));
 }
@@ -659,6 +701,14 @@ TEST_F(Hdf5WriterTest, TheFolderIsReadBack) {
   EXPECT_TRUE(readStream(*parts.cameras[2]).empty());
   EXPECT_THAT(errorOf([&] { Hdf5Writer again(out(), rig); }),
               AllOf(StartsWith(out().string()), HasSubstr("not an empty folder")));
+}
+
+TEST_F(Hdf5WriterTest, ARigWithAnUnknownCameraHasNoCameraChain) {
+  Rig rig = rigOfTwo();
+  rig.cameras[1].model.fx = rig.cameras[1].model.fy = 0;
+  Hdf5Writer(out(), rig).close();
+  EXPECT_TRUE(fs::exists(out() / "events/right/events.h5"));
+  EXPECT_FALSE(fs::exists(out() / "camchain.yaml"));
 }
 
 TEST_F(Hdf5WriterTest, TheIndexIsTheFirstEventOfEachMillisecond) {

@@ -138,6 +138,11 @@ TEST_F(EventArrays, TimesKeepTheDigitsThatTheirTypeHolds) {
   EXPECT_EQ(times_of(real(7, 12.5), "t_us.npy", "ms"), (Times{7'000'000, 12'500'000}));
   EXPECT_EQ(times_of(whole("<i8", {5, 1'700'000'000'000'000'001}), "t.npy", "ns"),
             (Times{5, 1'700'000'000'000'000'001}));
+  EXPECT_EQ(times_of(whole(">i8", {0x0700'0000'0000'0000, 0x0001'0000'0000'0000}), "t.npy", "ns"),
+            (Times{7, 256}));
+  EXPECT_EQ(times_of(npyArray("<u4", "(2,)", std::vector<std::uint32_t>{5, 4'000'000'000}), "t.npy",
+                     "us"),
+            (Times{5'000, 4'000'000'000'000}));
 }
 
 TEST_F(EventArrays, AnErrorNamesTheFileWhatItHasAndWhatWasExpected) {

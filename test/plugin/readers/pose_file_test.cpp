@@ -102,6 +102,15 @@ TEST_F(PoseFile, TheUnitOfWholeNumbersIsToldOrCertain) {
   ReaderOptions options;
   options.time_unit = "us";
   EXPECT_EQ(readPoses(folder() / "small.txt", options)[1].t_ns, 928'219'000);
+  // The first 100 are looked at, and all are read.
+  for (const int count : {99, 100}) {
+    lines.clear();
+    for (int i = 0; i < count; ++i) lines += std::to_string(928'218 + i) + " 1 2 3 0 0 0 1\n";
+    for (int i = 0; i < 40'000; ++i) lines += "930000.5 1 2 3 0.5 -0.5 0.5 -0.5\n";
+    const std::string error = errorOfFile("long.txt", lines);
+    EXPECT_THAT(error, HasSubstr(count == 99 ? "no error" : "all times are whole"));
+  }
+  EXPECT_EQ(readPoses(folder() / "long.txt", options).size(), 40'100U);
   // Decimals are seconds: the option is that of the events. Compressed text is text.
   writeGzip(folder() / "poses.txt.gz", kTum);
   writeZip(folder() / "poses.zip", {{"a/poses.txt", kTum}});

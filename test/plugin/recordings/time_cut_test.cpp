@@ -91,6 +91,16 @@ TEST(TimeCut, AnnouncesTheRigBeforeItsFirstEvent) {
                   250, 1500),
               ElementsAre("cam0 300 () 300", "cam1 300 () 250", "cam2 300 () 1500",
                           "cam0 300 (300) 400", "cam1 500 (500) 900"));
+  EXPECT_THAT(cut({packet(0, 100, 100, {}), packet(1, 100, 200, {}),
+                   packet(1, 100, 400, {100, 300}), packet(0, 200, 900, {200, 500})},
+                  50, 1500),
+              ElementsAre("cam0 100 () 100", "cam1 100 () 100", "cam1 100 (100 300) 400",
+                          "cam0 200 (200 500) 900"));
+}
+
+TEST(TimeCut, HasAPoseOfItsFirstTimeAndTheOneBefore) {
+  EXPECT_THAT(cut({pose(100), pose(200), packet(0, 200, 300, {200}), pose(300)}, 200, 250),
+              ElementsAre("pose 100", "pose 200", "cam0 200 (200) 250", "pose 300"));
 }
 
 TEST(TimeCut, OfNothingIsEmpty) { EXPECT_THAT(cut(threePackets(), 10'000, 20'000), ElementsAre()); }
@@ -109,6 +119,10 @@ TEST(TimeCut, UsesTheTimesOfEventsWhereAPacketHasNone) {
               ElementsAre("pose 600", "cam0 ? (1100 2000) 2100", "pose 1600", "pose 2600"));
   EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 2500, std::nullopt),
               ElementsAre("pose 1600", "cam0 ? (3000) 9900", "pose 2600", "pose 3600"));
+  const CObservation::Ptr across = packet(0, 0, 9000, {900, 2000});
+  across->timestamp = INVALID_TIMESTAMP;
+  EXPECT_THAT(cut({pose(100), across, pose(1100), pose(1300)}, 1200, 2500),
+              ElementsAre("pose 1100", "cam0 ? (2000) 2500", "pose 1300"));
   // MRPT gives an observation the time at which it was made where nobody says another.
   const auto now = mrptTimeFrom(1'700'000'000'000'000'000);
   EXPECT_EQ(cut(threePacketsAt(now), 100, 3000).size(), 8U);

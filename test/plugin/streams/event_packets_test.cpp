@@ -114,9 +114,11 @@ TEST(EventPackets, AnEventBesideTheSensorOrBeyondTheEndOfTimeIsAnError) {
   } rows[] = {
       {{0, 299, 7, true}, "damaged"},  // good
       {{0, 300, 7, true},
-       "block 1, event 1: x = '300': expected a whole number from 0 to 299 (the"},
+       "block 1, event 1: x = '300': expected a whole number from 0 to 299 (the sensor "
+       "has 300x8 pixels; are x and y in this order"},
       {{0, 299, 8, true},
-       "block 1, event 1: y = '8': expected a whole number from 0 to 7 (the sens"},
+       "block 1, event 1: y = '8': expected a whole number from 0 to 7 (the sensor has "
+       "300x8 pixels"},
       {{kEndOfTimeNs - 1, 0, 0, true}, "damaged"},
       {{kEndOfTimeNs, 0, 0, true},
        "block 1, event 1: t = '4611686018427387903': expected a time in"},
