@@ -37,14 +37,6 @@ class CalibrationFile : public TemporaryFolder {
   }
 };
 
-TEST_F(CalibrationFile, MayBeACameraChainOfAnyName) {
-  const Calibration calibration = read(kCamchain);
-  const RigCamera camera = calibration.camera(1, CameraSize{240, 180});
-  EXPECT_EQ(camera.model.fx, 300);
-  EXPECT_NEAR(camera.T_rig_cam.translation.x(), 0.1, 1e-15);
-  EXPECT_EQ(calibration.camera(0, std::nullopt).model.width, 240);
-}
-
 TEST_F(CalibrationFile, MayBeNineNumbersWhereTheRecordingKnowsTheSize) {
   const Calibration calibration = read("#fx fy\n200 201 120 90 0.1 0 0 0 0\n");
   CameraModel expected{240, 180, 200, 201, 120, 90, DistortionModel::kRadtan, {}};

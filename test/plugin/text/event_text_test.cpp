@@ -26,7 +26,6 @@ static std::ostream& operator<<(std::ostream& stream, const Event& event) {
 namespace {
 
 using testing::AllOf;
-using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -128,15 +127,6 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
   }
 }
 
-TEST_F(EventText, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
-  writeFile(file(), "0.020 1 0 0\n0.010 2 0 0\n0.015 3 0 0\n0.020 4 0 0\n0.025 5 0 0\n");
-  EventPackets reader = open(file());
-  EXPECT_THAT(readPackets(reader),
-              ElementsAre(Event{10'000'000, 2}, Event{15'000'000, 3}, Event{20'000'000, 1},
-                          Event{20'000'000, 4}, Event{25'000'000, 5}));
-  EXPECT_EQ(reader.sortedEvents(), 2U);
-}
-
 TEST_F(EventText, AnErrorBehindManyBlocksNamesItsLine) {
   std::string text;
   for (int i = 0; i < 150'000; ++i) text += "1700000000.123456789 12 34 1\n";
@@ -174,13 +164,6 @@ TEST_F(EventText, TheErrorOfABinaryFileHasNoControlCharacters) {
   EXPECT_THAT(errorOfText(std::string(3 << 20, '\x1b')),
               AllOf(StartsWith(line(1)), HasSubstr("\\x1b\\x1b"), HasSubstr("1048576 bytes"),
                     testing::Not(HasSubstr("\x1b"))));
-}
-
-TEST_F(EventText, AMissingFileIsNamed) {
-  EXPECT_THAT(errorOf([&] { open(file()); }),
-              AllOf(StartsWith(file().string()), HasSubstr("cannot be opened")));
-  EXPECT_THAT(errorOf([&] { open(folder()); }),
-              AllOf(StartsWith(folder().string()), HasSubstr("cannot be opened")));
 }
 
 /// For properties, which are no fixtures.
