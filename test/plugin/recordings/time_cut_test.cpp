@@ -101,6 +101,15 @@ TEST(TimeCut, HasAPoseOfItsFirstTimeAndTheOneBefore) {
               ElementsAre("pose 100", "pose 200", "cam0 200 (200) 250", "pose 300"));
 }
 
+/// Three packets of which none says when it begins, but all this.
+std::vector<CObservation::Ptr> threePacketsAt(const mrpt::Clock::time_point& time) {
+  std::vector<CObservation::Ptr> observations = threePackets();
+  for (const auto& observation : observations) {
+    if (IS_CLASS(*observation, CObservationEvents)) observation->timestamp = time;
+  }
+  return observations;
+}
+
 TEST(TimeCut, UsesTheTimesOfEventsWhereAPacketHasNone) {
   EXPECT_THAT(cut(threePacketsAt(INVALID_TIMESTAMP), 1100, 2100),
               ElementsAre("pose 600", "cam0 ? (1100 2000) 2100", "pose 1600", "pose 2600"));
