@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 #include <random>
 #include <string>
 #include <vector>
@@ -18,7 +17,7 @@
 #include "test/plugin/bags/bag_bytes.h"
 #include "test/plugin/bags/ros_message_bytes.h"
 #include "test/plugin/formats/files.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -69,15 +68,15 @@ RecordedMessages arraysOf(const std::string& topic, const std::vector<std::vecto
 }
 
 /// EVT3 packets. The sensor's clock is zero at kStartNs - 3 s; the host is late by 3, 2, 1, 0, …
-/// ms.
+/// ms, and more.
 RecordedMessages evt3Of(const std::string& topic, const std::vector<std::vector<Event>>& packets,
-                        RosBytes kind) {
+                        RosBytes kind, std::int64_t late_ns = 0) {
   RecordedMessages messages;
   for (const auto& packet : packets) {
     std::vector<Event> sensor = packet;
     for (Event& event : sensor) event.t_ns -= kStartNs - 3'000 * kMsNs;
     const auto number = static_cast<std::int64_t>(messages.size());
-    const std::int64_t stamp_ns = packet.front().t_ns + (3 - number % 4) * kMsNs;
+    const std::int64_t stamp_ns = packet.front().t_ns + (3 - number % 4) * kMsNs + late_ns;
     messages.push_back({topic, kPacket, stamp_ns + 12 * kMsNs,
                         eventPacket(kind, stamp_ns, 100 + static_cast<std::uint64_t>(number),
                                     "evt3", evtBytes(EvtEncoding::kEvt3, sensor))});
@@ -148,7 +147,7 @@ TEST_F(BagRecording, EachContainerGivesTheSameEventsAndPoses) {
     }
     messages = together(messages, {{"/imu", "sensor_msgs/Imu", kStartNs, "any bytes"}});
     const std::size_t half = messages.size() / 2;
-    const fs::path whole = write("whole", container, messages);
+    const fs::path whole = write("whole ?#%20", container, messages);
     // In the wrong order: bags are sorted by time.
     const std::vector<fs::path> parts = {
         write("b", container,
@@ -213,7 +212,7 @@ TEST_F(BagRecording, SeekingLeavesOutNothingFromTheTimeOn) {
 TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
   const auto packets = packetsFrom(kStartNs, 1);
   RecordedMessages messages;
-  for (const char* topic : {"/cam10/events", "/cam2/events"}) {
+  for (const char* topic : {"/cama/events", "/cam10/events", "/cam002/events", "/cam2/events"}) {
     messages = together(messages, arraysOf(topic, packets, RosBytes::kCdr));
   }
   messages.push_back({"/cam2/triggers", kPacket, kStartNs,
@@ -233,14 +232,15 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
     std::vector<std::string> cameras;
     std::int64_t pose_ns;  // 0: none
   };
-  const std::vector<std::string> natural = {"/cam2/events", "/cam10/events"};
+  const std::vector<std::string> natural = {"/cam002/events", "/cam2/events", "/cam10/events",
+                                            "/cama/events"};
   for (const Case& each : std::vector<Case>{
            {one, {}, natural, kStartNs + 2},
            {two, {}, natural, 0},
            {two, {"/other/pose"}, natural, kStartNs + 3},
            {two, {"/left/odometry"}, natural, kStartNs + 1},
-           {one, {"/cam10/events", "/cam2/events"}, {natural[1], natural[0]}, kStartNs + 2},
-           {one, {"/left/pose", "/cam10/events"}, {natural[1]}, kStartNs + 2}}) {
+           {one, {"/cam10/events", "/cam2/events"}, {natural[2], natural[1]}, kStartNs + 2},
+           {one, {"/left/pose", "/cam10/events"}, {natural[2]}, kStartNs + 2}}) {
     const RecordingParts recording = open({each.file}, each.topics);
     std::vector<std::string> names;
     for (const auto& camera : recording.cameras) names.push_back(camera->name());
@@ -251,6 +251,9 @@ TEST_F(BagRecording, TopicsAreFoundByTypeOrGiven) {
   }
   EXPECT_EQ(open({two}).expected_poses,
             "the choice of one by --topics, of /left/pose, /other/pose");
+  writeFile(folder() / "json.mcap",
+            replaced(mcapBytes(arraysOf("/events", packets, RosBytes::kCdr)), "cdr", "jso"));
+  EXPECT_THAT(open({folder() / "json.mcap"}).cameras, IsEmpty()) << "of another encoding";
   ReaderOptions options;
   options.topics = {"/events/of/another/bag", "/other/pose"};
   EXPECT_EQ(readPoses(two, options).at(0).t_ns, kStartNs + 3);
@@ -296,39 +299,68 @@ TEST_F(BagRecording, LostPacketsAreCountedAndTheClockGoesOn) {
       messages.erase(messages.begin() + first, messages.begin() + first + count);
       left.erase(left.begin() + first, left.begin() + first + count);
     }
+    // The last one does not say its time.
+    const std::int64_t stamp_ns = kStartNs + 40'000 * kMsNs;
+    messages.push_back({"/events", kPacket, stamp_ns,
+                        eventPacket(bytesOf(container), stamp_ns, 3'110, "evt3",
+                                    evt3Words({0x2002, 0x2003, 0x2004}))});
     RecordingParts recording = open({write("bag", container, messages)});
     EXPECT_TRUE(readStream(*recording.cameras.at(0)) == flat(left));
-    EXPECT_EQ(recording.cameras[0]->lostPackets(), 2'001U);
-    EXPECT_EQ(recording.cameras[0]->undatedEvents(), 0U) << "each packet says its time";
+    EXPECT_EQ(recording.cameras[0]->lostPackets(), 2'011U);
+    EXPECT_EQ(recording.cameras[0]->undatedEvents(), 3U);
   }
 }
 
-TEST_F(BagRecording, EventsWithoutATimeAfterAGapAreCounted) {
-  const auto packets = packetsFrom(kStartNs, 4);
-  RecordedMessages messages = evt3Of("/events", packets, RosBytes::kCdr);
-  const std::int64_t stamp_ns = kStartNs + 100 * kMsNs;
-  messages.push_back(
-      {"/events", kPacket, stamp_ns,
-       eventPacket(RosBytes::kCdr, stamp_ns, 110, "evt3", evt3Words({0x2002, 0x2003, 0x2004}))});
-  RecordingParts recording = open({write("bag", Container::kDb3, messages)});
-  EXPECT_TRUE(readStream(*recording.cameras.at(0)) == flat(packets));
-  EXPECT_EQ(recording.cameras[0]->lostPackets(), 6U);
-  EXPECT_EQ(recording.cameras[0]->undatedEvents(), 3U);
-}
-
-/// As libcaer's driver has them: several rows of a column at a time. Each packet begins with values
-/// that the one before has set otherwise.
-std::vector<Event> columnsOfEvents(std::int64_t from_ns, std::mt19937& random) {
-  std::vector<Event> events;
-  for (std::int64_t t_us = 0; t_us < 10'000; t_us += 1 + random() % 900) {
-    const auto x = static_cast<std::uint16_t>(random() % 640);
-    const bool polarity = random() % 2 != 0;
-    unsigned y = random() % 400;
-    for (unsigned left = 1 + random() % 9; left > 0; --left, y += 1 + random() % 9) {
-      events.push_back({from_ns + t_us * 1'000, x, static_cast<std::uint16_t>(y), polarity});
+TEST_F(BagRecording, CamerasSynchronisedByWireAndBagsOfARecordingKeepTheirCommonClock) {
+  const auto first = packetsFrom(kStartNs, 30);
+  const auto second = packetsFrom(kStartNs + 2'000 * kMsNs, 30);
+  const auto late = [](std::vector<Event> events, std::int64_t late_ns) {
+    for (Event& event : events) event.t_ns += late_ns;
+    return events;
+  };
+  for (const std::int64_t over_ns : {0, 1'000}) {
+    for (const std::int64_t sign : {-1, 1}) {
+      std::int64_t late_ns = sign * (10 * kMsNs + over_ns);
+      RecordingParts cameras =
+          open({write("cameras", Container::kMcap,
+                      together(evt3Of("/a/events", first, RosBytes::kCdr),
+                               evt3Of("/b/events", first, RosBytes::kCdr, late_ns)))});
+      EXPECT_TRUE(readStream(*cameras.cameras.at(1)) ==
+                  late(readStream(*cameras.cameras.at(0)), over_ns > 0 ? late_ns : 0));
+      late_ns = sign * (50 * kMsNs + over_ns);
+      RecordingParts bags = open(
+          {write("one", Container::kMcap, evt3Of("/events", first, RosBytes::kCdr)),
+           write("two", Container::kMcap, evt3Of("/events", second, RosBytes::kCdr, late_ns))});
+      std::vector<Event> expected = flat(first);
+      for (const Event& event : late(flat(second), over_ns > 0 ? late_ns : 0)) {
+        expected.push_back(event);
+      }
+      EXPECT_TRUE(readStream(*bags.cameras.at(0)) == expected) << late_ns;
     }
   }
-  return events;
+}
+
+TEST_F(BagRecording, MonoTimesAreTheHostsOrTheSensorsByTheirFirstOffset) {
+  const auto packets = packetsFrom(kStartNs, 10);
+  constexpr std::int64_t kSecondNs = 1'000 * kMsNs;
+  for (const auto& [behind_ns, is_host] : {std::pair<std::int64_t, bool>{0, true},
+                                           {kSecondNs - 2 * kMsNs, true},
+                                           {kSecondNs + 1, false},
+                                           {kStartNs - 7, false}}) {
+    RecordedMessages messages;
+    for (const auto& packet : packets) {
+      const std::int64_t base_ns = packet.front().t_ns - behind_ns;
+      const std::int64_t stamp_ns = packet.front().t_ns + (messages.empty() ? 0 : 2 * kMsNs);
+      messages.push_back({"/events", kPacket, stamp_ns,
+                          eventPacket(RosBytes::kCdr, stamp_ns, messages.size(), "mono",
+                                      monoWords(packet, packet.front().t_ns),
+                                      static_cast<std::uint64_t>(base_ns))});
+    }
+    const RecordingParts recording = open({write("bag", Container::kDb3, messages)});
+    std::vector<Event> expected = flat(packets);
+    for (Event& event : expected) event.t_ns -= is_host ? behind_ns : 0;
+    EXPECT_TRUE(readStream(*recording.cameras.at(0)) == expected) << behind_ns;
+  }
 }
 
 TEST_F(BagRecording, LibcaersTimesAreTheHostsWhateverTheStamps) {
@@ -336,12 +368,11 @@ TEST_F(BagRecording, LibcaersTimesAreTheHostsWhateverTheStamps) {
   for (const Container container : kContainers) {
     const RosBytes kind = bytesOf(container);
     for (const bool packed : {false, true}) {
-      std::mt19937 random(packed ? 1 : 2);
       RecordedMessages messages;
       std::vector<std::vector<Event>> packets;
       for (std::int64_t i = 0; i < 30; ++i) {
         if (i == 10 || i == 11) continue;  // lost
-        packets.push_back(columnsOfEvents(kStartNs + i * 10 * kMsNs, random));
+        packets.push_back(someEvents(kStartNs + i * 10 * kMsNs, 10 * kMsNs, 30));
         // The 31 bits begin again in packet 20.
         const std::int64_t low_base_ns =
             kStartNs + 205 * kMsNs - kWrapNs + (i > 20 ? kWrapNs : std::int64_t{0});
@@ -401,20 +432,6 @@ TEST_F(BagRecording, AnotherEncodingIsAnErrorThatNamesThoseThatAreRead) {
   }
 }
 
-TEST_F(BagRecording, CamerasSynchronisedByWireKeepTheirCommonClock) {
-  const auto packets = packetsFrom(kStartNs, 30);
-  RecordedMessages messages = evt3Of("/a/events", packets, RosBytes::kCdr);
-  RecordedMessages second = evt3Of("/b/events", packets, RosBytes::kCdr);
-  for (RecordedMessage& message : second) {  // the host receives b 5 ms later
-    std::uint32_t nanoseconds;
-    std::memcpy(&nanoseconds, message.data.data() + 8, 4);
-    nanoseconds += 5 * kMsNs;
-    std::memcpy(message.data.data() + 8, &nanoseconds, 4);
-  }
-  RecordingParts recording = open({write("bag", Container::kMcap, together(messages, second))});
-  EXPECT_TRUE(readStream(*recording.cameras.at(0)) == readStream(*recording.cameras.at(1)));
-}
-
 TEST_F(BagRecording, ACameraThatBeginsAnewIsAnErrorThatNamesTheMessage) {
   RecordedMessages messages = evt3Of("/events", packetsFrom(kStartNs, 110), RosBytes::kCdr);
   messages.push_back({"/events", kPacket, kStartNs + 8'000 * kMsNs,
@@ -449,6 +466,12 @@ TEST_F(BagRecording, WrongFilesAreErrorsThatSayWhatToDo) {
            {"cut_index.bag", bag.substr(0, bag.size() - 5), "the data ends at byte"},
            {"old.bag", "#ROSBAG V1.2\n", "expected a bag of version 2.0"},
            {"packed.bag", packed, "compression = 'zlib': expected 'none', 'bz2', 'lz4'"},
+           {"locked.bag", replaced(bag, "chunk_count=", "encryptor=ab"), "encrypted with 'ab"},
+           {"field.bag", replaced(bag, "conn_count=", "conn_count:"), "expected NAME=VALUE"},
+           {"op.bag", replaced(bag, "op=\3", "op=\2"), "another record: expected the bag's header"},
+           {"chunk.bag", replaced(bag, "op=\5", "op=\4"), "record of op 4: expected a chunk"},
+           {"infos.bag", replaced(bag, "op=\6", "op=\5"),
+            "record of op 5: expected connections an"},
            {"a.db3.zstd", zstd, "a compressed bag: expected an uncompressed one"},
            {"a.mcap.zstd", zstd, "a compressed bag"},
            {"other.db3", std::string("SQLite format 3\0 and other text", 32), "SQLite: "},
@@ -469,19 +492,15 @@ TEST_F(BagRecording, WrongFilesAreErrorsThatSayWhatToDo) {
   writeFile(folder() / "good/metadata.yaml",
             "rosbag2_bagfile_information:\n  relative_file_paths: [good/part.db3]\n");
   EXPECT_EQ(readStream(*open({folder() / "good"}).cameras.at(0)).size(), 150U);
-}
-
-TEST_F(BagRecording, ADatabaseHasTablesNotViews) {
-  const fs::path file = folder() / "bag.db3";
-  writeDb3(file, arraysOf("/events", packetsFrom(kStartNs, 3), RosBytes::kCdr));
+  const fs::path views = folder() / "good/part.db3";  // a view could be a query without an end
   sqlite3* database = nullptr;
-  sqlite3_open(file.c_str(), &database);
+  sqlite3_open(views.c_str(), &database);
   sqlite3_exec(database,
                "ALTER TABLE topics RENAME TO other; CREATE VIEW topics AS SELECT * FROM other",
                nullptr, nullptr, nullptr);
   sqlite3_close(database);
-  EXPECT_THAT(errorOf([&] { open({file}); }),
-              StartsWith(file.string() + ": expected the tables `topics` and `messages`"));
+  EXPECT_THAT(errorOf([&] { open({views}); }),
+              StartsWith(views.string() + ": expected the tables `topics` and `messages`"));
 }
 
 TEST_F(BagRecording, DamagedBagsAreReadOrRefused) {

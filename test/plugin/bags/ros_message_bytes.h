@@ -116,38 +116,13 @@ inline std::string libcaerWords(const std::vector<Event>& events, std::int64_t b
   return bytes;
 }
 
-/// A word of each kind where its value changes; events of the same time, column and polarity in
-/// vectors, of which one follows the other without a word of its own row.
+/// The words of time, column and row of each event.
 inline std::string libcaerCmpWords(const std::vector<Event>& events, std::int64_t base_ns) {
   std::string bytes;
-  const auto put = [&](unsigned code, unsigned value) {
-    putWord(bytes, static_cast<std::uint16_t>(code << 12U | value));
-  };
-  unsigned high = 0;
-  unsigned low = 0;
-  unsigned x = 0;
-  for (std::size_t i = 0; i < events.size();) {
-    const Event& first = events[i];
-    const unsigned polarity = first.polarity ? 0x800 : 0;
-    const auto t_us = static_cast<unsigned>((first.t_ns - base_ns) / 1'000);
-    if (high != t_us >> 12U) put(0, high = t_us >> 12U);
-    if (low != (t_us & 0xfffU)) put(1, low = t_us & 0xfffU);
-    if (x != first.x) put(2, x = first.x);
-    std::vector<unsigned> rows;
-    while (i < events.size() && events[i].t_ns == first.t_ns && events[i].x == first.x &&
-           events[i].polarity == first.polarity && (rows.empty() || events[i].y > rows.back())) {
-      rows.push_back(events[i++].y);
-    }
-    if (rows.size() == 1) {
-      put(3, polarity | first.y);
-      continue;
-    }
-    put(4, polarity | first.y);
-    for (unsigned base = first.y, at = 0; at < rows.size(); base += 8) {
-      unsigned mask = 0;
-      while (at < rows.size() && rows[at] < base + 8) mask |= 1U << (rows[at++] - base);
-      put(5, mask);
-    }
+  for (const Event& event : events) {
+    const auto t_us = static_cast<unsigned>((event.t_ns - base_ns) / 1'000);
+    bytes += evt3Words({t_us >> 12U, 0x1000 | (t_us & 0xfffU), 0x2000U | event.x,
+                        0x3000U | (event.polarity ? 0x800U : 0U) | event.y});
   }
   return bytes;
 }

@@ -33,12 +33,12 @@ BagMessage messageOf(const std::string& bytes, RosBytes kind) {
           kind != RosBytes::kRos1};
 }
 
-/// Calls `decode` for all lengths of a message. Each is an error or a result.
+/// Calls `decode` for all lengths of a message below its own. Each is an error.
 template <typename Decode>
 void cutEverywhere(const std::string& bytes, RosBytes kind, const Decode& decode) {
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     const std::string cut = bytes.substr(0, size);  // of its own, for the sanitizer
-    EXPECT_THAT(errorOf([&] { decode(messageOf(cut, kind)); }), testing::Ne("")) << size;
+    EXPECT_NE(errorOf([&] { decode(messageOf(cut, kind)); }), "no error") << size;
   }
 }
 
@@ -174,6 +174,10 @@ TEST(RosMessages, ATimeBaseOrTimeBeyondTheEndOfTimeIsAnError) {
   EXPECT_THAT(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end - 1, events),
               HasSubstr("word 1: t = "));
   EXPECT_EQ(events.size(), 1U);
+  EXPECT_EQ(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end - 2'000'001, events),
+            "no error");
+  EXPECT_THAT(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end - 2'000'000, events),
+              HasSubstr("word 1: t = 4611686018427387903: expected a time"));
   EXPECT_THAT(decoded({"libcaer", decodeLibcaerEvents, late, {}}, end, events),
               HasSubstr("time_base = "));
   EXPECT_THAT(decoded({"libcaer_cmp", decodeLibcaerCmpEvents, "", {}}, end, events),
@@ -300,16 +304,38 @@ TEST(SensorClock, TheLeastDelayIsTheOffsetForTheWholeRecording) {
   EXPECT_EQ(clock.shiftFor(kUnixNs + 900 * kMs, 800 * kMs), kUnixNs) << "however late the host is";
   EXPECT_EQ(clock.shiftFor(kUnixNs + 3 * kWrapNs + 5 * kMs, 5 * kMs), kUnixNs + 3 * kWrapNs);
   EXPECT_EQ(clock.shiftFor(kUnixNs - kWrapNs + 5 * kMs, 5 * kMs), kUnixNs - kWrapNs);
-  EXPECT_THAT(errorOf([&] { clock.shiftFor(kUnixNs + 5'000 * kMs, 0); }),
-              HasSubstr("5.000000000 s from the sensor's clock"));
+  for (const std::int64_t late_ns :
+       {1'000 * kMs, kWrapNs - 1'000 * kMs, -2 * kWrapNs - 1'000 * kMs}) {
+    EXPECT_EQ((clock.shiftFor(kUnixNs + late_ns, 0) - kUnixNs) % kWrapNs, 0) << late_ns;
+  }
+  EXPECT_THAT(errorOf([&] { clock.shiftFor(kUnixNs + 1'000 * kMs + 1, 0); }),
+              HasSubstr("1.000000001 s from the sensor's clock"));
+  EXPECT_THAT(errorOf([&] { clock.shiftFor(kUnixNs - 1'000 * kMs - 1, 0); }),
+              HasSubstr("-1.000000001 s from the sensor's clock"));
+  SensorClock host(0);  // which does not begin again
+  EXPECT_FALSE(host.isHostClock()) << "it was not observed";
+  for (const auto& [offset_ns, is_host] :
+       {std::make_pair(1'000 * kMs, true), std::make_pair(-1'000 * kMs, true),
+        std::make_pair(1'000 * kMs + 1, false), std::make_pair(-1'000 * kMs - 1, false)}) {
+    SensorClock observed(0);
+    observed.observe(kUnixNs + offset_ns, kUnixNs);
+    EXPECT_EQ(observed.isHostClock(), is_host) << offset_ns;
+  }
 }
 
 TEST(SensorClock, SynchronisedCamerasShareAnOffset) {
   SensorClock first(kWrapNs);
   first.observe(kUnixNs, 0);
+  EXPECT_FALSE(SensorClock(kWrapNs).share(first, 10 * kMs)) << "it was not observed";
+  EXPECT_FALSE(SensorClock(first).share(SensorClock(kWrapNs), 10 * kMs));
   for (const auto& [difference_ns, shared] :
        {std::make_pair(3 * kMs, true), std::make_pair(2 * kWrapNs - 3 * kMs, true),
-        std::make_pair(11 * kMs, false), std::make_pair(5'000 * kMs, false)}) {
+        std::make_pair(10 * kMs, true), std::make_pair(-10 * kMs, true),
+        std::make_pair(-3 * kWrapNs - 10 * kMs, true), std::make_pair(10 * kMs + 1, false),
+        std::make_pair(-10 * kMs - 1, false), std::make_pair(5'000 * kMs, false)}) {
+    SensorClock other_wrap(kWrapNs * 2);
+    other_wrap.observe(kUnixNs + difference_ns, 0);
+    EXPECT_FALSE(other_wrap.share(first, 10 * kMs));
     SensorClock second(kWrapNs);
     second.observe(kUnixNs + difference_ns, 0);
     EXPECT_EQ(second.share(first, 10 * kMs), shared);

@@ -8,7 +8,6 @@
 #include <mrpt/poses/CPose3D.h>
 #include <mrpt/poses/CPose3DQuat.h>
 
-#include "test/plugin/calibration/replaced.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
@@ -38,21 +37,14 @@ class CalibrationFile : public TemporaryFolder {
   }
 };
 
-TEST_F(CalibrationFile, MayBeACameraChainOfAnyName) {
-  const Calibration calibration = read(kCamchain);
-  const RigCamera camera = calibration.camera(1, CameraSize{240, 180});
-  EXPECT_EQ(camera.model.fx, 300);
-  EXPECT_NEAR(camera.T_rig_cam.translation.x(), 0.1, 1e-15);
-  EXPECT_EQ(calibration.camera(0, std::nullopt).model.width, 240);
-}
-
 TEST_F(CalibrationFile, MayBeNineNumbersWhereTheRecordingKnowsTheSize) {
-  const Calibration calibration = read("# fx fy\n200 201 120 90 0.1 0 0 0 0\n");
-  const CameraModel model = calibration.camera(0, CameraSize{240, 180}).model;
-  EXPECT_EQ(model.fy, 201);
-  EXPECT_EQ(model.coefficients[0], 0.1);
-  EXPECT_EQ(model.width, 240);
-  EXPECT_EQ(model.height, 180);
+  const Calibration calibration = read("#fx fy\n200 201 120 90 0.1 0 0 0 0\n");
+  CameraModel expected{240, 180, 200, 201, 120, 90, DistortionModel::kRadtan, {}};
+  expected.coefficients = {0.1, 0, 0, 0, 0};
+  EXPECT_EQ(calibration.camera(0, CameraSize{240, 180}).model, expected);
+  EXPECT_EQ(readUzhCalibration(folder() / "given.txt", {240, 180}), expected);
+  expected.coefficients[0] = 0;
+  EXPECT_EQ(read("200 201 120 90 0 0 0 0 0").camera(0, CameraSize{240, 180}).model, expected);
   EXPECT_THAT(messageOf([&] { calibration.camera(0, std::nullopt); }),
               HasSubstr("given.txt: no size of the sensor"));
 }
@@ -61,11 +53,13 @@ TEST_F(CalibrationFile, MayBeginWithAByteOrderMark) {
   const std::string mark = "\xEF\xBB\xBF";
   EXPECT_EQ(read(mark + "200 201 120 90 0.1 0 0 0 0\n").rig.cameras.at(0).model.fx, 200);
   EXPECT_EQ(read(mark + (kCamchain + 14)).rig.cameras.at(1).model.fx, 300);
-  EXPECT_EQ(read(mark + "[CAMERA]\nresolution = [640 480]\nfx = 300\nfy = 301\ncx = 320\ncy = 240\n"
-                        "dist = [0 0 0 0 0]\n")
+  CameraModel expected{640, 480, 300, 301, 320, 240, DistortionModel::kRadtan, {}};
+  expected.coefficients = {1, 0, 0, 0, 0};
+  EXPECT_EQ(read(mark + "; a\n# b\n// c\n% d\n[CAMERA] ; e\nresolution = [640 480] # f\nfx = 300\n"
+                        "fy = 301 // g\ncx = 320\ncy = 240 % h\ndist = [1 0 0 0 0 0 0]")
                 .rig.cameras.at(0)
-                .model.fx,
-            300);
+                .model,
+            expected);
 }
 
 TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
@@ -75,12 +69,21 @@ TEST_F(CalibrationFile, AnErrorOfOtherCamerasNamesTheFileAndBothCounts) {
                        "each"));
   EXPECT_THAT(messageOf([&] { calibration.requireCameras(3); }),
               EndsWith("given.txt: 2 cameras: expected 3, as the recording has"));
-  EXPECT_THAT(messageOf([&] {
-                calibration.camera(1, CameraSize{640, 480});
-              }),
-              EndsWith("given.txt: camera 1 has 240x180 pixels: expected 640x480 pixels, as the "
-                       "recording has"));
-  EXPECT_NO_THROW(calibration.requireCameras(2));
+  Rig recorded = calibration.rig;
+  EXPECT_NO_THROW(calibration.requireLike(recorded));
+  for (const auto& [width, height] : {std::pair(640, 180), std::pair(240, 480)}) {
+    recorded.cameras[1].model.width = width;
+    recorded.cameras[1].model.height = height;
+    const std::string size = std::to_string(width) + "x" + std::to_string(height);
+    EXPECT_THAT(messageOf([&] { calibration.requireLike(recorded); }),
+                EndsWith("given.txt: camera 1 has 240x180 pixels: expected " + size +
+                         " pixels, as the recording has"));
+  }
+  recorded.cameras[1].model.width = recorded.cameras[1].model.height = 65'535;  // not known
+  EXPECT_NO_THROW(calibration.requireLike(recorded));
+  recorded.cameras.pop_back();
+  EXPECT_THAT(messageOf([&] { calibration.requireLike(recorded); }), EndsWith("expected 1, as the "
+                                                                              "recording has"));
 }
 
 constexpr const char* kCameraInfo =
@@ -139,6 +142,15 @@ TEST_F(CalibrationFile, MayBeAnIniFileOfMrptsCameraCalibration) {
   EXPECT_EQ(one.cameras[0].model, left);
 }
 
+/// TUM-VIE's, without the two frame cameras' values.
+constexpr const char* kTumVie = R"({"value0": {
+"resolution": [[1, 2], [3, 4], [64, 48], [65, 49]],
+"intrinsics": [{}, {},
+{"camera_type": "kb4", "intrinsics": {"fx": 50, "fy": 51, "cx": 32, "cy": 24,
+"k1": 1, "k2": 2, "k3": 3, "k4": 4}},
+{"camera_type": "kb5", "intrinsics": {}}],
+"T_imu_cam": [{}, {}, {"px": 1, "py": 2, "pz": 3, "qx": 0, "qy": 0, "qz": 1.0011, "qw": 0}]}})";
+
 TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
   const std::string ini =
       "; stereo\n[A_LEFT]\nresolution = [64 48]\nfx = 50\nfy = 50\ncx = 32\ncy = 24\n"
@@ -151,18 +163,30 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"[1, 2]\n", "given.txt: not a calibration: expected a Kalibr camera chain"},
       {"left: {fx: 3}\n", "given.txt: not a calibration: expected a Kalibr camera chain"},
       {std::string("\x89HDF\r\n\x1a\n\0\0", 10), "given.txt"},
-      {"200 200 120\n", "given.txt: 3 numbers: expected 9"},
+      {"200 200 120 90 0 0 0 0\n", "given.txt: 8 numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3"},
+      {"200 200 120 90 0 0 0 0 0 0\n", "given.txt: 10 numbers: expected 9"},
+      {"200 201\n120 \x1b[2J\n", "given.txt:2: '\\x1b[2J': expected a finite number"},
+      {"0 201 120 90 0 0 0 0 0\n", "given.txt: fx = 0: must be finite and above 0"},
       {"200 x 120\n", "given.txt:1: 'x': expected a finite number"},
       {R"({"value0": {}})", "given.txt:1: value0: resolution is missing"},
       {R"({"value0": {"T_imu_marker": {"px": 1}}})", "value0: resolution is missing"},
       {R"({"value0": {"resolution": [[1, 2]]}})",
        "value0: resolution = a list: expected 4 rows of 2 numbers"},
+      {kTumVie, "value0: T_imu_cam[2]: qx qy qz qw of length 1.0011: expected a rotation"},
+      {replaced(kTumVie, "1.0011", "1.0009"),
+       "value0: intrinsics[3]: camera_type = 'kb5': expected"},
+      {replaced(replaced(kTumVie, "1.0011", "1"), "kb5", "kb4"),
+       "intrinsics[3]: intrinsics: fx is"},
+      {replaced(replaced(kTumVie, "1.0011", "1"),
+                ",\n{\"camera_type\": \"kb5\", \"intrinsics\": {}}", ""),
+       "value0: intrinsics = a list: expected a list of at least 4 items"},
+      {replaced(kTumVie, "[64, 48]", "[64, 65536]"),
+       ":2: value0: resolution = 65536: expected whole"},
+      {replaced(kTumVie, "\"k4\": 4", "\"k4\": \"a\""), "intrinsics: k4 = 'a': expected a finite"},
       {"intrinsics: {cam0: 3}\nextrinsics: {}\n", "intrinsics: cam0: expected keys and values"},
       {"intrinsics: {}\nextrinsics: {}\n", "intrinsics: cam0 is missing"},
       {replaced(kCameraInfo, "plumb_bob", "rational_polynomial"),
        "given.txt:5: distortion_model = 'rational_polynomial': expected plumb_bob, equidistant"},
-      {replaced(kCameraInfo, "[226, 0,", "[226, 1,"),
-       ":4: camera_matrix: data = a matrix with skew"},
       {replaced(kCameraInfo, "133, 0, 0, 1]", "133, 0, 0]"),
        ":4: camera_matrix: data: 8 numbers: expected 9, fx 0 cx"},
       {replaced(kCameraInfo, "260", "260.5"), "image_height = 260.5: expected whole numbers"},
@@ -176,11 +200,24 @@ TEST_F(CalibrationFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {ini + replaced(ini, "A_LEFT", "B_RIGHT"), "2 sections with fx: expected one camera, or"},
       {ini + replaced(ini, "A_LEFT", "A_RIGHT"), "given.txt: [A_LEFT2RIGHT_POSE] is missing"},
       {ini + replaced(ini, "A_LEFT", "A_RIGHT") +
-           "[A_LEFT2RIGHT_POSE]\npose_quaternion = [1 0 0 2 0 0 0]\n",
-       "[A_LEFT2RIGHT_POSE]: pose_quaternion = a quaternion of length 2: expected a rotation"},
+           "[A_LEFT2RIGHT_POSE]\npose_quaternion = [1 0 0 0 0 1.0011 0]\n",
+       "[A_LEFT2RIGHT_POSE]: pose_quaternion = a quaternion of length 1.0011: expected a rotation"},
+      {replaced(ini, "none", "plumb_bob\ndist = [1 0 0 0 0 0 0 2]"),
+       "number of distortion coefficients = 8: must be 4 or 5"},
   };
   for (const auto& row : cases) EXPECT_THAT(errorOfText(row.text), HasSubstr(row.error));
-  EXPECT_NO_THROW(read(ini));
+  for (const char* matrix :
+       {"226, 1, 173, 0, 227, 133, 0, 0, 1", "226, 0, 173, 1, 227, 133, 0, 0, 1",
+        "226, 0, 173, 0, 227, 133, 1, 0, 1", "226, 0, 173, 0, 227, 133, 0, 1, 1",
+        "226, 0, 173, 0, 227, 133, 0, 0, 2"}) {
+    EXPECT_THAT(errorOfText(replaced(kCameraInfo, "226, 0, 173, 0, 227, 133, 0, 0, 1", matrix)),
+                HasSubstr(":4: camera_matrix: data = a matrix with skew"));
+  }
+  EXPECT_EQ(read(ini).rig.cameras[0].model.distortion, DistortionModel::kNone);
+  const std::string numbers = "200 201 120 90 0.1 0 0 0 0\n";
+  EXPECT_NO_THROW(read(numbers + std::string(10'000'000 - numbers.size(), ' ')));
+  EXPECT_THAT(errorOfText(numbers + std::string(10'000'001 - numbers.size(), ' ')),
+              HasSubstr("given.txt: larger than 10 MB"));
   EXPECT_THAT(errorOf([&] { readCalibration(folder() / "nowhere"); }),
               EndsWith("nowhere: cannot be opened for reading"));
   EXPECT_THAT(errorOf([&] { readCalibration(folder()); }),

@@ -6,7 +6,6 @@
 
 #include <string>
 
-#include "test/plugin/calibration/replaced.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
@@ -52,39 +51,24 @@ class Camchain : public TemporaryFolder {
   }
 };
 
-TEST_F(Camchain, HasEachCamerasModel) {
-  const Rig rig = read(kCam0 + kCam1);
-  ASSERT_EQ(rig.cameras.size(), 2U);
-  CameraModel expected;
-  expected.width = 240;
-  expected.height = 180;
-  expected.fx = 200;
-  expected.fy = 201;
-  expected.cx = 120;
-  expected.cy = 90;
-  expected.distortion = DistortionModel::kRadtan;
-  expected.coefficients = {-0.1, 0.02, 0.001, -0.002};
-  EXPECT_TRUE(rig.cameras[0].model == expected);
-  EXPECT_EQ(rig.cameras[1].model.width, 320);
-  EXPECT_EQ(rig.cameras[1].model.distortion, DistortionModel::kNone);
-}
-
-TEST_F(Camchain, TheRigsFrameIsThatOfCameraZero) {
-  const Rig rig = read(kCam0 + kCam1);
-  EXPECT_TRUE(rig.cameras[0].T_rig_cam.rotation.isApprox(Eigen::Quaterniond::Identity()));
-  EXPECT_TRUE(rig.cameras[0].T_rig_cam.translation.isZero());
-  // T_cn_cnm1 carries camera 0's point (1, 2, 3) to (-2, 1, 3) + (0.1, 0.2, 0.3) in camera 1.
-  const Eigen::Vector3d p_rig = rig.cameras[1].T_rig_cam * Eigen::Vector3d(-1.9, 1.2, 3.3);
-  EXPECT_LT((p_rig - Eigen::Vector3d(1, 2, 3)).norm(), 1e-12) << p_rig.transpose();
-}
-
-TEST_F(Camchain, EachTransformStartsAtTheCameraBefore) {
-  const Rig rig = read(kCam0 + kCam1 + replaced(kCam1, "cam1", "cam2"));
+TEST_F(Camchain, HasEachCamerasModelAndPose) {
+  const Rig rig =
+      read("cam: 1\ncamera: 2\ncam1b: 3\n" + kCam0 +
+           replaced(kCam1, "  distortion_coeffs: []\n", "") + replaced(kCam1, "cam1", "cam2"));
   ASSERT_EQ(rig.cameras.size(), 3U);
-  const Rigid3 T_cam1_rig = rig.cameras[1].T_rig_cam.inverse();
-  const Rigid3 T_cam2_rig = rig.cameras[2].T_rig_cam.inverse();
+  CameraModel expected{240, 180, 200, 201, 120, 90, DistortionModel::kRadtan, {}};
+  expected.coefficients = {-0.1, 0.02, 0.001, -0.002};
+  EXPECT_EQ(rig.cameras[0].model, expected);
+  expected = {320, 240, 210, 211, 121, 91, DistortionModel::kNone, {}};
+  EXPECT_EQ(rig.cameras[1].model, expected);
+  EXPECT_TRUE(isSame(rig.cameras[0].T_rig_cam, Rigid3()));
+  // T_cn_cnm1 carries camera 0's point (1, 2, 3) to (-2, 1, 3) + (0.1, 0.2, 0.3) in camera 1, and
+  // this one to (-1.2, -1.9, 3.3) + (0.1, 0.2, 0.3) in camera 2.
   const Eigen::Vector3d p_rig(1, 2, 3);
-  EXPECT_LT((T_cam2_rig * p_rig - T_cam1_rig * (T_cam1_rig * p_rig)).norm(), 1e-12);
+  const Eigen::Vector3d p_cam1(-1.9, 1.2, 3.3);
+  const Eigen::Vector3d p_cam2(-1.1, -1.7, 3.6);
+  EXPECT_LT((rig.cameras[1].T_rig_cam * p_cam1 - p_rig).norm(), 1e-12);
+  EXPECT_LT((rig.cameras[2].T_rig_cam * p_cam2 - p_rig).norm(), 1e-12);
 }
 
 TEST_F(Camchain, ReadsTheDatasetWritersFilesBack) {
@@ -99,11 +83,6 @@ TEST_F(Camchain, ReadsTheDatasetWritersFilesBack) {
   }
 }
 
-TEST_F(Camchain, DistortionNoneNeedsNoCoefficients) {
-  const Rig rig = read(replaced(kCam0 + kCam1, "  distortion_coeffs: []\n", ""));
-  EXPECT_TRUE(rig.cameras[1].model.coefficients.empty());
-}
-
 TEST_F(Camchain, MakesARoundedRotationExact) {
   const Rig rig = read(replaced(kCam0 + kCam1, "- [0, -1, 0, 0.1]", "- [0.0004, -0.9997, 0, 0.1]"));
   EXPECT_NEAR(rig.cameras[1].T_rig_cam.rotation.norm(), 1, 1e-15);
@@ -112,24 +91,20 @@ TEST_F(Camchain, MakesARoundedRotationExact) {
 TEST_F(Camchain, ATimeOffsetIsTheTimeshiftMinusThatOfCameraZero) {
   const std::string shifted =
       replaced(kCam0, "  rostopic", "  timeshift_cam_imu: 0.00125\n  rostopic");
-  const Rig rig = read(shifted + kCam1 + "  timeshift_cam_imu: -2.5e-4\n");
+  const std::string cam2 = replaced(kCam1, "cam1", "cam2");
+  const Rig rig = read(shifted + kCam1 + "  timeshift_cam_imu: -2.5e-4\n" + cam2 +
+                       "  timeshift_cam_imu: 0.002\n");
   EXPECT_EQ(rig.cameras[0].time_offset_ns, 0);
   EXPECT_EQ(rig.cameras[1].time_offset_ns, -1'500'000);
+  EXPECT_EQ(rig.cameras[2].time_offset_ns, 750'000);
   for (const std::string& half : {shifted + kCam1, kCam0 + kCam1 + "  timeshift_cam_imu: 1\n"}) {
     EXPECT_THAT(errorOfText(half), HasSubstr("cam1: timeshift_cam_imu"));
   }
-  EXPECT_THAT(errorOfText(kCam0 + "  timeshift_cam_imu: 1ms\n"),
-              HasSubstr(":8: cam0: timeshift_cam_imu = '1ms': expected a time in seconds"));
-}
-
-TEST_F(Camchain, TheRigsPoseOnTheImuIsTheInverseOfCameraZeros) {
-  read(kCam0 + kCam1);
-  EXPECT_FALSE(readCamchainImu(file()));
-  read(kCam0 + "  T_cam_imu: [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]\n" + kCam1);
-  const std::optional<Rigid3> T_imu_rig = readCamchainImu(file());
-  ASSERT_TRUE(T_imu_rig);
-  // T_cam_imu carries the IMU's point (5, 6, 7) to (-6, 5, 7) + (1, 2, 3).
-  EXPECT_LT((*T_imu_rig * Eigen::Vector3d(-5, 7, 10) - Eigen::Vector3d(5, 6, 7)).norm(), 1e-12);
+  for (const char* wrong : {"1ms", "-4611686018.427387903"}) {  // kEndOfTimeNs
+    EXPECT_THAT(errorOfText(kCam0 + "  timeshift_cam_imu: " + wrong + "\n"),
+                HasSubstr(":8: cam0: timeshift_cam_imu = '" + std::string(wrong) +
+                          "': expected a time in seconds"));
+  }
 }
 
 TEST_F(Camchain, AnErrorNamesTheFile) {
@@ -174,6 +149,7 @@ TEST_F(Camchain, AnErrorNamesFileLineCameraAndKeyOfAWrongValue) {
       {"[320, 240]", "[320]", ":13: cam1: resolution: 1 numbers: expected 2, width height"},
       {"[320, 240]", "[320, 240.5]", "cam1: resolution = 240.5: expected whole numbers from 1"},
       {"[320, 240]", "[0, 240]", "cam1: resolution = 0: expected whole numbers from 1 to 65535"},
+      {"[320, 240]", "[320, 65536]", "cam1: resolution = 65536: expected whole numbers from 1"},
       {"pinhole", "[pinhole]", ":2: cam0: camera_model: expected a word"},
       {"pinhole", "", ": cam0: camera_model: expected a word"},
       {"pinhole", "omni", ":2: cam0: camera_model = 'omni': expected pinhole"},
@@ -197,6 +173,9 @@ TEST_F(Camchain, AnErrorNamesFileLineCameraAndKeyOfAWrongValue) {
                 AllOf(StartsWith(file().string() + ":"), HasSubstr(row.error)));
   }
   EXPECT_NO_THROW(read(replaced(kCam0, "-0.002]", "-0.002, 0.1]")));
+  const Rig limits = read(replaced(kCam0, "[240, 180]", "[65535, 1]"));
+  EXPECT_EQ(limits.cameras[0].model.width, 65'535);
+  EXPECT_EQ(limits.cameras[0].model.height, 1);
 }
 
 }  // namespace

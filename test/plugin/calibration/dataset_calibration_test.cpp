@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The calibration files of real data sets.
+// The calibration files of real data sets, and those of config/ for them.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <iterator>
+#include <utility>
 
 #include "plugin/calibration/calibration_file.h"
 #include "plugin/calibration/camchain.h"
@@ -17,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 const fs::path kFiles = EFM_SHARED_DATA "/calibration";
+const fs::path kConfig = EFM_SOURCE_DIR "/config/calibration";
 const fs::path kDsec = kFiles / "dsec/zurich_city_04_a_calibration";
 
 class DatasetCalibration : public testing::Test {
@@ -30,6 +33,25 @@ void expectNear(const Rigid3& T_a_b, const Rigid3& expected, double tolerance) {
   const Rigid3 difference = T_a_b.inverse() * expected;
   EXPECT_LT(difference.translation.norm(), tolerance);
   EXPECT_LT(difference.rotation.vec().norm(), tolerance);
+}
+
+TEST_F(DatasetCalibration, OfConfigIsThatOfTheDataSet) {
+  const std::pair<const char*, const char*> pairs[] = {
+      {"mvsec.yaml", "mvsec/calib_in_flying/camchain-imucam-indoor_flying.yaml"},
+      {"dsec.yaml", "dsec/camchain.yaml"},
+      {"tumvie_a.yaml", "tum-vie/camchainA.yaml"},
+      {"tumvie_b.yaml", "tum-vie/camchainB.yaml"}};
+  const auto files = std::distance(fs::directory_iterator(kConfig), fs::directory_iterator());
+  EXPECT_EQ(files, std::distance(std::begin(pairs), std::end(pairs)));
+  for (const auto& [ours, original] : pairs) {
+    const Rig rig = readCamchain(kConfig / ours);
+    const Rig expected = readCamchain(kFiles / original);
+    ASSERT_EQ(rig.cameras.size(), 2U) << ours;
+    for (std::size_t c = 0; c < 2; ++c) {
+      EXPECT_EQ(rig.cameras[c].model, expected.cameras.at(c).model) << ours << c;
+      EXPECT_TRUE(isSame(rig.cameras[c].T_rig_cam, expected.cameras[c].T_rig_cam)) << ours << c;
+    }
+  }
 }
 
 TEST_F(DatasetCalibration, EqualsTheCameraChainBesideIt) {

@@ -46,6 +46,7 @@ TEST_F(HandEyeFile, AnErrorNamesTheFileTheLineAndTheKey) {
               HasSubstr("nowhere: cannot be opened"));
   EXPECT_THAT(errorOfText("cam0: {camera_model: pinhole}\n"),
               HasSubstr("hand_eye.yaml:1: cam0: T_cam_imu is missing"));
+  EXPECT_THAT(errorOfText("cam0: {}\ncam2: {}\n"), HasSubstr("hand_eye.yaml: cam2 without cam1"));
 }
 
 TEST_F(HandEyeFile, OfTheImuIsThatOfTheCameraChain) {
@@ -64,6 +65,8 @@ TEST_F(HandEyeFile, OfADataSetNeedsItsCalibration) {
   EXPECT_THAT(errorOfText(marker), HasSubstr("camera-calibration*.json"));
   EXPECT_THAT(errorOfText(R"({"value0": {"T_imu_marker": {"px": 0}}})"),
               AllOf(HasSubstr("value0: T_imu_marker: q"), HasSubstr(" is missing")));
+  EXPECT_THAT(errorOfText(replaced(marker, R"("qx": 0)", R"("qx": 0.0458)")),  // length 1.00105
+              HasSubstr("T_imu_marker: qx qy qz qw of length 1.00105: expected a rotation"));
 }
 
 }  // namespace

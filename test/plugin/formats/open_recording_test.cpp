@@ -4,20 +4,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "plugin/mrpt/CObservationEvents.h"
+#include "test/plugin/formats/files.h"
+#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
-using testing::IsSupersetOf;
 
 class OpenRecording : public TemporaryFolder {
  protected:
@@ -29,28 +29,13 @@ class OpenRecording : public TemporaryFolder {
     return errorOfSource(source);
   }
   static std::string errorOfSource(const RecordingSource& source) {
-    try {
-      openRecording(source);
-    } catch (const std::exception& error) {
-      return error.what();
-    }
-    return "no error";
+    return messageOf([&] { openRecording(source); });
   }
+  void write(const char* name, const std::string& text) const { writeFile(folder() / name, text); }
 };
-
-TEST_F(OpenRecording, AMissingSourceIsNamed) {
-  EXPECT_THAT(errorOf({folder() / "nowhere"}), HasSubstr("nowhere: no such file or folder"));
-}
-
-TEST_F(OpenRecording, AnotherFolderIsAnErrorThatNamesTheExpectedFiles) {
-  std::ofstream(folder() / "notes.txt") << "nothing";
-  EXPECT_THAT(errorOf({folder()}), AllOf(HasSubstr("not a recording"), HasSubstr("camchain.yaml"),
-                                         HasSubstr("events.txt"), HasSubstr("calib.txt")));
-}
 
 TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
   using namespace std::string_literals;
-  std::filesystem::create_directory(folder() / "bag");
   const std::string other_columns = " (other columns: --event-columns, - for one to ignore)";
   const struct {
     const char* file;
@@ -104,7 +89,7 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
   };
   for (const auto& [name, bytes, error] : rows) {
     const std::filesystem::path file = folder() / name;
-    std::ofstream(file, std::ios::binary) << bytes;
+    writeFile(file, bytes);
     std::string expected = error;
     for (const auto& [word, path] : {std::pair<std::string, std::filesystem::path>{"PATH", file},
                                      {"FOLDER", file.parent_path()}}) {
@@ -113,15 +98,6 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
     }
     EXPECT_EQ(errorOf({file}), file.string() + expected);
   }
-}
-
-TEST_F(OpenRecording, FiveColumnsAreReadWithTheOption) {
-  std::ofstream(folder() / "e.txt") << "0.1 1 2 0 left\n";
-  RecordingSource source;
-  source.files = {folder() / "e.txt"};
-  source.reader.columns = "t x y p -";
-  source.complete = false;
-  EXPECT_NE(openRecording(source)->next(), nullptr);
 }
 
 /// The size of the first camera, and the number of poses and of warnings.
@@ -148,10 +124,10 @@ TEST_F(OpenRecording, TheOnlyCalibrationAndTheOnlyPosesOfAFolderAreTakenAndSaid)
   const std::string camera =
       "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
       "resolution: [346, 260]}\n";
-  std::ofstream(folder() / "events.txt") << "0.1 300 2 0\n0.2 1 2 1\n";
-  std::ofstream(folder() / "imu.txt") << "0.1 1 2 3 4 5 6\n";
-  std::ofstream(folder() / "my rig.yaml") << camera;
-  std::ofstream(folder() / "tracker.csv") << "t_ns,x,y,z,qx,qy,qz,qw\n5,1,2,3,0,0,0,1\n";
+  write("events.txt", "0.1 300 2 0\n0.2 1 2 1\n");
+  write("imu.txt", "0.1 1 2 3 4 5 6\n");
+  write("my rig.yaml", camera);
+  write("tracker.csv", "t_ns,x,y,z,qx,qy,qz,qw\n5,1,2,3,0,0,0,1\n");
   RecordingSource source;
   source.files = {folder()};
   const Opened opened = openedOf(source);
@@ -163,26 +139,26 @@ TEST_F(OpenRecording, TheOnlyCalibrationAndTheOnlyPosesOfAFolderAreTakenAndSaid)
   };
   EXPECT_THAT(opened.warnings, testing::ElementsAre(said("my rig.yaml", "--calibration"),
                                                     said("tracker.csv", "--poses")));
-  std::ofstream(folder() / "other.yaml") << camera;
+  write("other.yaml", camera);
   EXPECT_THAT(
       errorOf({folder()}),
       HasSubstr("no calibration: expected calib.txt (not clear: my rig.yaml, other.yaml), or "
                 "--calibration FILE"));
-  std::ofstream(folder() / "second.txt") << "0.1 1 2 3 0 0 0 1\n";
+  write("second.txt", "0.1 1 2 3 0 0 0 1\n");
   source.calibration = folder() / "other.yaml";
   EXPECT_THAT(
       errorOfSource(source),
       HasSubstr("no poses: expected groundtruth.txt (not clear: second.txt, tracker.csv), or"));
   // Names that the layout knows come first, without a word.
-  std::ofstream(folder() / "groundtruth.txt") << "0.1 1 2 3 0 0 0 1\n0.2 1 2 3 0 0 0 1\n";
+  write("groundtruth.txt", "0.1 1 2 3 0 0 0 1\n0.2 1 2 3 0 0 0 1\n");
   const Opened known = openedOf(source);
   EXPECT_EQ(known.poses, 2);
   EXPECT_THAT(known.warnings, testing::IsEmpty());
 }
 
 TEST_F(OpenRecording, TheSensorsSizeMayBeTold) {
-  std::ofstream(folder() / "e.txt") << "0.1 300 2 0\n0.2 1 2 1\n";
-  std::ofstream(folder() / "calib.txt") << "200 200 120 90 0 0 0 0 0\n";
+  write("e.txt", "0.1 300 2 0\n0.2 1 2 1\n");
+  write("calib.txt", "200 200 120 90 0 0 0 0 0\n");
   RecordingSource source;
   source.files = {folder() / "e.txt"};
   source.reader.sensor_size = CameraSize{320, 240};
@@ -190,19 +166,109 @@ TEST_F(OpenRecording, TheSensorsSizeMayBeTold) {
   EXPECT_EQ(openedOf(source).width, 320);
   source.calibration = folder() / "calib.txt";  // without a size
   EXPECT_EQ(openedOf(source).width, 320);
-  std::ofstream(folder() / "e.txt") << "640 480\n0.1 300 2 0\n0.2 1 2 1\n";
+  write("e.txt", "640 480\n0.1 300 2 0\n0.2 1 2 1\n");
   EXPECT_EQ(errorOfSource(source),
             "--sensor-size 320x240: " + (folder() / "e.txt").string() + " has 640x480 pixels");
 }
 
-TEST_F(OpenRecording, AnUnknownFormatIsNamed) {
-  EXPECT_THAT(errorOf({folder()}, "tape"), HasSubstr("'tape'"));
+TEST_F(OpenRecording, AnIntervalHasRoomForEachCamerasTimeOffsets) {
+  const auto camchain = [](int shift_ms) {
+    std::string text;
+    for (const char* name : {"cam0", "cam1"}) {
+      text += name +
+              std::string(
+                  ":\n  camera_model: pinhole\n  intrinsics: [200, 200, 120, 90]\n"
+                  "  distortion_model: none\n  resolution: [240, 180]\n"
+                  "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+                  "  timeshift_cam_imu: ") +
+              std::to_string(name[3] == '1' ? 1e-3 * shift_ms : 0) + "\n";
+    }
+    return text;
+  };
+  std::string events;  // one each ms
+  for (int i = 1000; i < 2000; ++i) {
+    events += "1." + std::to_string(i).substr(1) + " " + std::to_string(i % 240) + " 1 0\n";
+  }
+  write("cam0/events.txt", events);
+  write("cam1/events.txt", events);
+  write("poses.txt", "1.5 1 2 3 0 0 0 1\n");
+  struct Case {
+    int own_ms;
+    std::optional<int> given_ms;
+    int first_ms;  // of camera 1, whose times are the poses' minus the offset
+    int end_ms;
+  };
+  for (const auto& [own_ms, given_ms, first_ms, end_ms] : {Case{0, {}, 400, 600},
+                                                           {50, {}, 350, 600},
+                                                           {-50, {}, 400, 650},
+                                                           {0, 80, 320, 600},
+                                                           {50, 80, 320, 600},
+                                                           {80, 50, 320, 600},
+                                                           {50, -80, 350, 680},
+                                                           {-50, 80, 320, 650},
+                                                           {-50, -80, 400, 680},
+                                                           {-80, -50, 400, 680}}) {
+    write("camchain.yaml", camchain(own_ms));
+    RecordingSource source;
+    source.files = {folder()};
+    source.start_ns = 1'400'000'000;
+    source.end_ns = 1'600'000'000;
+    if (given_ms) {
+      write("given.yaml", camchain(*given_ms));
+      source.calibration = folder() / "given.yaml";
+    }
+    std::vector<Event> found[2];
+    const auto recording = openRecording(source);
+    while (const auto observation = recording->next()) {
+      const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
+      if (packet == nullptr) continue;
+      std::vector<Event>& camera = found[packet->camera_index];
+      camera.insert(camera.end(), packet->events.begin(), packet->events.end());
+    }
+    ASSERT_EQ(found[0].size(), 200U);
+    EXPECT_EQ(found[0][0].t_ns, *source.start_ns);
+    ASSERT_EQ(found[1].size(), static_cast<std::size_t>(end_ms - first_ms)) << own_ms;
+    EXPECT_EQ(found[1][0].t_ns, (1000 + first_ms) * std::int64_t{1'000'000});
+  }
 }
 
-TEST_F(OpenRecording, FormatsBeginWithAuto) {
-  const std::vector<std::string> names = recordingFormats();
-  EXPECT_EQ(names.front(), "auto");
-  EXPECT_THAT(names, IsSupersetOf({"rawlog", "folder", "uzh"}));
+TEST_F(OpenRecording, SourcesThatDoNotFitTogetherAreErrors) {
+  const std::string camera =
+      "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
+      "resolution: [240, 180]}\n";
+  for (const char* name : {"uzh/events.txt", "a/cam0/events.txt", "b/cam0/events.txt"}) {
+    write(name, "0.1 1 2 0\n");
+  }
+  write("uzh/calib.txt", "200 200 120 90 0 0 0 0 0\n");
+  write("a/camchain.yaml", camera);
+  write("b/camchain.yaml", camera);
+  write("r.rawlog",
+        "\x8d"
+        "CObservationGPS");
+  const auto uzh = folder() / "uzh";
+  const auto a = folder() / "a";
+  EXPECT_EQ(errorOf({uzh, a}), a.string() + ": a second calibration, beside " +
+                                   (uzh / "calib.txt").string() +
+                                   ": expected one of all cameras, or --calibration FILE");
+  EXPECT_EQ(errorOf({a, folder() / "b"}),
+            (folder() / "b").string() + ": 2 sources: expected one, a dataset folder");
+  EXPECT_EQ(
+      errorOf({a, folder() / "r.rawlog"}),
+      (folder() / "r.rawlog").string() + ": a rawlog beside other sources: expected it alone");
+  EXPECT_EQ(errorOf({}), "no source: expected a recording");
+  EXPECT_EQ(errorOf({a}, "tape"), "'tape' is not a known format");
+  RecordingSource rawlog;
+  rawlog.files = {folder() / "r.rawlog"};
+  rawlog.reader.sensor_size = CameraSize{320, 240};
+  EXPECT_THAT(errorOfSource(rawlog), HasSubstr("r.rawlog: a rawlog, which has the size of its"));
+  RecordingSource given;
+  given.files = {a};
+  for (const auto file :
+       {&RecordingSource::poses, &RecordingSource::calibration, &RecordingSource::hand_eye}) {
+    RecordingSource source = given;
+    source.*file = folder() / "none";
+    EXPECT_THAT(errorOfSource(source), HasSubstr("none: no such file"));
+  }
 }
 
 }  // namespace

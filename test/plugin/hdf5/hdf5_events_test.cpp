@@ -4,14 +4,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <random>
 #include <string>
+#include <tuple>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "maps/io/atomic_file.h"
 #include "plugin/hdf5/hdf5_files.h"
 #include "plugin/hdf5/hdf5_recording.h"
@@ -20,7 +25,7 @@
 #include "plugin/writers/hdf5_writer.h"
 #include "test/paths.h"
 #include "test/plugin/formats/files.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/truth/dataset_writer.h"
@@ -126,30 +131,6 @@ TEST_F(Hdf5Layouts, AllHaveTheEventsThatWereWritten) {
   }
 }
 
-TEST_F(Hdf5Layouts, SeekLeavesOutNoEventFromItsTimeOnAndFewBefore) {
-  const std::vector<Event> all = eventsOf(1, kEvents);
-  const std::int64_t first_ns = all.front().t_ns;
-  for (const auto& sources : recordings()) {
-    SCOPED_TRACE(sources.front());
-    for (const std::int64_t t_ns : {first_ns - 5'000'000'000, first_ns, first_ns + 1,
-                                    first_ns + 42'345'678, first_ns + 100'000'000, all.back().t_ns,
-                                    all.back().t_ns + 1, first_ns + 90'000'000'000}) {
-      const auto camera = std::move(openHdf5(sources, {}).cameras.at(1));
-      camera->seek(t_ns);
-      const std::vector<Event> read = readStream(*camera);
-      ASSERT_LE(read.size(), all.size());
-      EXPECT_TRUE(std::equal(read.rbegin(), read.rend(), all.rbegin())) << "the last events";
-      const auto left_out = all.end() - static_cast<std::ptrdiff_t>(read.size());
-      if (left_out != all.begin()) {
-        EXPECT_LT(std::prev(left_out)->t_ns, t_ns);
-      }
-      if (t_ns > first_ns && !read.empty()) {
-        EXPECT_GE(read.front().t_ns, std::min(t_ns, all.back().t_ns) - 1'000'000);
-      }
-    }
-  }
-}
-
 TEST_F(Hdf5Layouts, FilesKnowTheSensorsTheCalibrationAndThePoses) {
   for (const char* name : {"m3ed", "mvsec"}) {
     const RecordingParts parts = openHdf5({folder_ / name}, {});
@@ -162,13 +143,7 @@ TEST_F(Hdf5Layouts, FilesKnowTheSensorsTheCalibrationAndThePoses) {
     }
   }
   const RecordingParts m3ed = openHdf5({folder_ / "m3ed"}, {});
-  const Rig rig = rigOfTwo();
-  for (std::size_t i = 0; i < 2; ++i) {
-    const RigCamera& camera = m3ed.calibration.value().rig.cameras.at(i);
-    EXPECT_EQ(camera.model, rig.cameras[i].model);
-    EXPECT_TRUE(camera.T_rig_cam.translation.isApprox(rig.cameras[i].T_rig_cam.translation, 1e-12));
-    EXPECT_TRUE(camera.T_rig_cam.rotation.isApprox(rig.cameras[i].T_rig_cam.rotation, 1e-12));
-  }
+  EXPECT_EQ(m3ed.calibration.value().rig.cameras.at(1).model, rigOfTwo().cameras[1].model);
   const RecordingParts metavision = openHdf5({folder_ / "metavision/left.h5"}, {});
   EXPECT_EQ(metavision.cameras[0]->size().value().height, 260);
 }
@@ -210,6 +185,16 @@ class Hdf5Events : public TemporaryFolder {
       }
     }
 
+    void addText(const std::string& path, const std::string& text) {
+      const Hdf5Id type(H5Tcopy(H5T_C_S1), H5Tclose);
+      H5Tset_size(type.get(), text.size());
+      const Hdf5Id space(H5Screate(H5S_SCALAR), H5Sclose);
+      const Hdf5Id set(H5Dcreate2(id_.get(), path.c_str(), type.get(), space.get(), H5P_DEFAULT,
+                                  H5P_DEFAULT, H5P_DEFAULT),
+                       H5Dclose);
+      H5Dwrite(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data());
+    }
+
    private:
     template <typename Number>
     static hid_t memoryType() {
@@ -224,6 +209,8 @@ class Hdf5Events : public TemporaryFolder {
     Numbers y = {4, 5, 6};
     Numbers t = {0, 1'500, 2'500};
     Numbers p = {1, 0, 1};
+    std::optional<Numbers> index;
+    Numbers offset;  // a number, if there is one
   };
   /// DSEC's layout.
   void write(const Columns& columns) const {
@@ -232,6 +219,8 @@ class Hdf5Events : public TemporaryFolder {
     writing.add("events/y", H5T_STD_U16LE, columns.y);
     writing.add("events/t", H5T_STD_I64LE, columns.t);
     writing.add("events/p", H5T_STD_I8LE, columns.p);
+    if (columns.index) writing.add("ms_to_idx", H5T_STD_I64LE, *columns.index);
+    if (!columns.offset.empty()) writing.add("t_offset", H5T_STD_I64LE, columns.offset);
   }
   std::string errorOfFile() const {
     return errorOf([&] {
@@ -251,12 +240,92 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
     EXPECT_EQ(block.size(), events_before);
   };
   Columns columns;
-  columns.x = {1, 2, 65'536};
+  columns.x = {0, 65'535, 65'536};
   check(columns, place + "[2]: x = '65536': expected a whole number from 0 to 65535", 2);
   columns.p = {1, 2, 0};
   check(columns, place + "[1]: p = '2': expected polarity 1, 0 or -1", 1);
   columns.t = {5'000'000'000'000'000, 0, 0};
   check(columns, place + "[0]: t = '5000000000000000': expected a time before the year 2116", 0);
+  // Of several wrong ones, the first event's is told; of one event's, that of the first column.
+  columns.t = {0, -5'000'000'000'000'000, 0};
+  check(columns, place + "[1]: t = '-5000000000000000': expected a time before the year 2116", 1);
+  columns.p = {-2, 1, 0};
+  check(columns, place + "[0]: p = '-2': expected polarity 1, 0 or -1", 0);
+  const long long end_us = kEndOfTimeNs / 1'000;
+  for (const int sign : {-1, 1}) {
+    Columns shifted;
+    shifted.offset = {sign * (end_us - 2'500)};
+    shifted.t = {0, 0, sign * 2'500};
+    check(shifted, "no error", 3);
+    shifted.t[2] = sign * 2'501;
+    check(shifted,
+          place + fmt::format("[2]: t = '{}': expected a time bef", shifted.t[2]) +
+              "ore the year 2116",
+          2);
+    shifted.offset = {sign * (end_us + 1)};
+    write(shifted);
+    EXPECT_THAT(errorOfFile(),
+                HasSubstr(fmt::format("/t_offset: {}: expected a time", shifted.offset[0])));
+  }
+}
+
+TEST_F(Hdf5Events, ASeekGoesToTheFirstEventOfItsTimeOrOfItsMillisecondInTheIndex) {
+  Columns columns;
+  columns.t = {0, 500, 999, 1'000, 1'000, 2'500, 2'500, 4'000};  // us
+  columns.x = columns.y = columns.p = Numbers(8, 1);
+  struct Case {
+    std::optional<Numbers> index;
+    std::vector<std::pair<std::int64_t, int>> first_events;  // of times in ns
+  };
+  const std::vector<Case> cases = {
+      {std::nullopt,
+       {{-1'000'000, 0},
+        {0, 0},
+        {1, 1},
+        {500'000, 1},
+        {999'000, 2},
+        {999'001, 3},
+        {1'000'000, 3},
+        {1'000'001, 5},
+        {2'500'000, 5},
+        {2'500'001, 7},
+        {4'000'000, 7},
+        {4'000'001, 8}}},
+      {Numbers{0, 3, 5, 7, 7},
+       {{-1'000'000, 0},
+        {999'999, 0},
+        {1'000'000, 3},
+        {1'999'999, 3},
+        {2'000'000, 5},
+        {3'000'000, 7},
+        {4'000'000, 7},
+        {9'000'000, 7}}},
+      // An index that is too early is used; others are not: the events are searched.
+      {Numbers{0, 1, 3}, {{1'000'000, 1}, {1'000'001, 1}, {3'000'000, 3}}},
+      {Numbers{1, 4, 6}, {{0, 0}, {500'000, 1}, {1'000'000, 3}, {2'500'000, 5}}},
+      {Numbers{8, 8, 8}, {{500'000, 1}, {2'500'000, 5}, {4'000'000, 7}, {4'000'001, 8}}},
+      {Numbers{-1, 9, 99}, {{0, 0}, {1'000'000, 3}, {2'500'000, 5}, {4'000'001, 8}}},
+      {Numbers{}, {{999'000, 2}, {4'000'001, 8}}},
+  };
+  for (const Numbers& offset : {Numbers{}, Numbers{7'000'123}, Numbers{-20'000}}) {
+    columns.offset = offset;
+    const std::int64_t offset_ns = offset.empty() ? 0 : offset[0] * 1'000;
+    for (const auto& [index, first_events] : cases) {
+      columns.index = index;
+      write(columns);
+      for (const auto& [t_ns, first] : first_events) {
+        const RecordingParts parts = openHdf5({file()}, {});
+        parts.cameras[0]->seek(t_ns + offset_ns);
+        std::vector<Event> events;
+        EXPECT_EQ(parts.cameras[0]->read(events), first < 8) << t_ns;
+        ASSERT_EQ(events.size(), static_cast<std::size_t>(8 - first)) << t_ns;
+        if (first == 8) continue;
+        EXPECT_EQ(events[0].t_ns, columns.t[static_cast<std::size_t>(first)] * 1'000 + offset_ns);
+        EXPECT_EQ(parts.cameras[0]->positionOf(0),
+                  fmt::format("{}:/events[{}]", file().string(), first));
+      }
+    }
+  }
 }
 
 TEST_F(Hdf5Events, RealTimesAreSecondsAndKeepTheDigitsThatTheyHold) {
@@ -323,6 +392,43 @@ TEST_F(Hdf5Events, TheUnitOfTimesIsToldOrFoundWhereTheLayoutDoesNotSayIt) {
               HasSubstr(":/events/ts" + expected));
   EXPECT_THAT(errorOf([&] { first_of("events/t", H5T_IEEE_F64LE, real, {}); }),
               HasSubstr(":/events/t" + expected));
+  for (long long& t_us : whole) t_us += 1'700'000'000'000'000;  // of our years
+  EXPECT_EQ(first_of("events/ts", H5T_STD_I64LE, whole, {}), 1'700'000'005'000'010'000);
+  EXPECT_EQ(openHdf5({file()}, {}).cameras[0]->warnings().at(0).name, "time-unit");
+  {
+    Writing writing(file());  // MVSEC's are seconds
+    writing.add("davis/left/events", H5T_IEEE_F64LE, std::vector<double>{1, 2, 5, 1, 3, 4, 15, -1},
+                {2, 4});
+  }
+  EXPECT_THAT(readStream(*openHdf5({file()}, ms).cameras.at(0)),
+              ElementsAre(Event{5'000'000'000, 1, 2, true}, Event{15'000'000'000, 3, 4, false}));
+}
+
+TEST_F(Hdf5Events, AChunkMayHoldAPartOfItsRows) {
+  std::vector<double> matrices;  // turned by 90 degrees around z, at (k, 2, 3)
+  for (double k = 0; k < 5; ++k) {
+    for (const double number : {0., -1., 0., k, 1., 0., 0., 2., 0., 0., 1., 3., 0., 0., 0., 1.}) {
+      matrices.push_back(number);
+    }
+  }
+  const std::vector<hsize_t> chunks[] = {{2, 3, 3}, {3, 1, 4}, {5, 4, 4}, {2, 4, 1}};
+  for (const std::vector<hsize_t>& chunk : chunks) {
+    {
+      Writing writing(file());
+      const Hdf5Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+      H5Pset_chunk(creation.get(), 3, chunk.data());
+      H5Pset_deflate(creation.get(), 1);
+      writing.add("davis/left/pose", H5T_IEEE_F64LE, matrices, {5, 4, 4}, creation.get());
+      writing.add("davis/left/pose_ts", H5T_IEEE_F64LE, std::vector<double>{0, 1, 2, 3, 4.5});
+    }
+    const std::vector<StampedPose> poses = openHdf5({file()}, {}).poses;
+    ASSERT_EQ(poses.size(), 5U);
+    EXPECT_EQ(poses[4].t_ns, 4'500'000'000);
+    for (std::size_t k = 0; k < 5; ++k) {
+      const Eigen::Vector3d moved = poses[k].T_world_rig * Eigen::Vector3d(1, 0, 0);
+      EXPECT_LT((moved - Eigen::Vector3d(static_cast<double>(k), 3, 3)).norm(), 1e-12) << chunk[0];
+    }
+  }
 }
 
 TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
@@ -338,8 +444,14 @@ TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
   options.columns = "t=a/list/time_us x=a/list/u y=a/list/v p=a/list/on";
   EXPECT_THAT(readStream(*openHdf5({file()}, options).cameras.at(0)),
               ElementsAre(Event{5'000, 7, 8, true}));
+  options.time_unit = "ms";
+  EXPECT_EQ(readStream(*openHdf5({file()}, options).cameras.at(0)).at(0).t_ns, 5'000'000)
+      << "before that of the name";
   options.columns = "t=a/list/t x=a/list/u y=a/list/v p=a/list/on";
   EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }), HasSubstr("with a field t"));
+  options.columns = "t=b/list/time_us x=a/list/u y=a/list/v p=a/list/on";
+  EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }),
+              HasSubstr(":/b/list/time_us: expected a field of /a/list"));
   write({});
   EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }),
               HasSubstr("events.h5:/a/list/u: no such data set (--event-columns)"));
@@ -423,47 +535,108 @@ TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
     for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
   }
   writeFile(file(), "x y t p\n");
-  EXPECT_THAT(errorOfFile(), HasSubstr("expected a complete HDF5 file"));
+  EXPECT_EQ(errorOfFile(), file().string() +
+                               ": cannot be opened as HDF5 (file signature not found): "
+                               "expected a complete HDF5 file");
 }
 
-TEST_F(Hdf5Events, AnIndexThatIsWrongIsNotBelieved) {
-  Columns columns;
-  for (const Numbers& index :
-       {Numbers{0, 3, 3}, Numbers{2, 2, 2}, Numbers{-1, 99, 99}, Numbers{}}) {
-    write(columns);
+/// M3ED's calibration of a camera.
+struct Calib {
+  std::vector<double> resolution = {640, 480};
+  std::vector<double> intrinsics = {500, 501, 320, 240};
+  std::string model = "radtan";
+  std::vector<double> coefficients = {0.1, 0.2, 0.3, 0.4};
+  std::vector<double> T_rig_cam = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+};
+
+TEST_F(Hdf5Events, ACalibrationIsOfTheFirstCamerasRigAndItsErrorsNameTheDataSet) {
+  int files = 0;
+  const auto opened = [&](const std::vector<std::pair<std::string, Calib>>& cameras) {
+    const fs::path calibrated = folder() / (std::to_string(++files) + ".h5");
     {
-      const Hdf5Id id(H5Fopen(file().c_str(), H5F_ACC_RDWR, H5P_DEFAULT), H5Fclose);
-      const hsize_t side = index.size();
-      const Hdf5Id space(H5Screate_simple(1, &side, nullptr), H5Sclose);
-      const Hdf5Id set(H5Dcreate2(id.get(), "ms_to_idx", H5T_STD_I64LE, space.get(), H5P_DEFAULT,
-                                  H5P_DEFAULT, H5P_DEFAULT),
-                       H5Dclose);
-      if (side > 0) {
-        H5Dwrite(set.get(), H5T_NATIVE_LLONG, H5S_ALL, H5S_ALL, H5P_DEFAULT, index.data());
+      Writing writing(calibrated);
+      for (const auto& [side, calib] : cameras) {
+        const std::string group = "prophesee/" + side;
+        for (const char* column : {"/x", "/y", "/t", "/p"}) {
+          writing.add((group + column).c_str(), H5T_STD_I32LE, Numbers{1});
+        }
+        const auto add = [&](const char* name, const std::vector<double>& numbers) {
+          writing.add((group + "/calib/" + name).c_str(), H5T_IEEE_F64LE, numbers);
+        };
+        add("resolution", calib.resolution);
+        add("intrinsics", calib.intrinsics);
+        add("distortion_coeffs", calib.coefficients);
+        add("T_to_prophesee_left", calib.T_rig_cam);
+        writing.addText(group + "/calib/distortion_model", calib.model);
       }
     }
-    const RecordingParts parts = openHdf5({file()}, {});
-    parts.cameras[0]->seek(1'200'000);
-    EXPECT_THAT(readStream(*parts.cameras[0]),
-                ElementsAre(Event{1'500'000, 2, 5, false}, Event{2'500'000, 3, 6, true}));
+    return openHdf5({calibrated}, {});
+  };
+  Calib right;
+  right.resolution = {65'535, 1};
+  right.model = "none";
+  right.T_rig_cam = {0, -1, 0, 0.1, 1, 0, 0, 0.2, 0, 0, 1, 0.3, 0, 0, 0, 1};
+  const RecordingParts both = opened({{"left", {}}, {"right", right}});
+  const Rig rig = both.calibration.value().rig;
+  ASSERT_EQ(rig.cameras.size(), 2U);
+  CameraModel left{640, 480, 500, 501, 320, 240, DistortionModel::kRadtan, {}};
+  left.coefficients = {0.1, 0.2, 0.3, 0.4};
+  EXPECT_EQ(rig.cameras[0].model, left);
+  EXPECT_EQ(rig.cameras[1].model,
+            (CameraModel{65'535, 1, 500, 501, 320, 240, DistortionModel::kNone, {}}));
+  EXPECT_LT((rig.cameras[1].T_rig_cam * Eigen::Vector3d(1, 2, 3) - Eigen::Vector3d(-1.9, 1.2, 3.3))
+                .norm(),
+            1e-12);
+  EXPECT_EQ(both.cameras[1]->size().value().width, 65'535);
+  EXPECT_FALSE(opened({{"right", right}}).calibration) << "without the rig's first camera";
+  const std::tuple<std::vector<double> Calib::*, std::vector<double>, const char*> rows[] = {
+      {&Calib::resolution, {640}, "calib/resolution: expected 2 numbers, width and height"},
+      {&Calib::resolution, {0, 480}, "calib/resolution: 0: expected whole numbers from 1 to 65535"},
+      {&Calib::resolution, {640, 65'536}, "calib/resolution: 65536: expected whole numbers"},
+      {&Calib::resolution, {640, 4.5}, "calib/resolution: 4.5: expected whole numbers"},
+      {&Calib::intrinsics, {1, 2, std::nan(""), 4}, "calib/intrinsics: nan: expected fx fy cx cy"},
+      {&Calib::intrinsics, {-1, 2, 3, 4}, "prophesee/left/calib: fx = -1"},
+      {&Calib::coefficients, {1, 2, 3}, "calib/distortion_coeffs: expected 4 numbers"},
+      {&Calib::T_rig_cam, std::vector<double>(16, 0.5), "T_to_prophesee_left: expected a 4x4 matr"},
+  };
+  for (const auto& [field, numbers, error] : rows) {
+    Calib wrong;
+    wrong.*field = numbers;
+    EXPECT_THAT(errorOf([&, &wrong = wrong] { opened({{"left", wrong}}); }), HasSubstr(error));
   }
+  Calib fov;
+  fov.model = "fov";
+  EXPECT_THAT(errorOf([&] {
+                opened({{"left", fov}});
+              }),
+              HasSubstr("calib/distortion_model: 'fov': expected radtan, equidistant or none"));
 }
 
-TEST_F(Hdf5Events, AFolderOfTwoRecordingsIsRefused) {
+TEST_F(Hdf5Events, FilesOfAFolderAreInTheOrderOfTheirCameras) {
   write({});
-  fs::copy_file(file(), folder() / "a-events_left.h5");
-  fs::rename(file(), folder() / "b-events_left.h5");
-  EXPECT_THAT(errorOf([&] { openHdf5({folder()}, {}); }),
-              AllOf(StartsWith((folder() / "b-events_left.h5").string()),
-                    HasSubstr("a second recording"), HasSubstr("a-events_left.h5")));
-}
-
-TEST_F(Hdf5Events, AFolderWithoutEventsOfHdf5IsNone) {
-  write({});
-  fs::rename(file(), folder() / "rectify_map.h5");
-  writeFile(folder() / "events/left/events.h5", "no HDF5");
-  EXPECT_FALSE(looksLikeHdf5(folder()));
-  EXPECT_FALSE(looksLikeHdf5(folder() / "missing"));
+  const fs::path in = folder() / "in";
+  for (const char* name : {"events/right/events.h5", "events/left/events.h5",
+                           "events/cam2/events.h5", "a_events/b.hdf5", "c.h5", "c.txt", "d/left.h5",
+                           "rectify_map.h5", "events/left/deep_events/e.h5"}) {
+    fs::create_directories((in / name).parent_path());
+    fs::copy_file(file(), in / name);
+  }
+  writeFile(in / "events/left/none.h5", "no HDF5");
+  std::vector<std::string> found;
+  for (const auto& [camera, path] : hdf5FilesIn(in)) {
+    found.push_back(camera + ": " + path.lexically_relative(in).string());
+  }
+  EXPECT_THAT(found, ElementsAre("left: events/left/events.h5", "right: events/right/events.h5",
+                                 ": a_events/b.hdf5", ": c.h5", "cam2: events/cam2/events.h5"));
+  EXPECT_THAT(errorOf([&] { openHdf5({in}, {}); }),
+              AllOf(StartsWith((in / "c.h5").string()), HasSubstr("a second recording"),
+                    HasSubstr("a_events/b.hdf5")));
+  EXPECT_TRUE(looksLikeHdf5(in / "c.txt")) << "by its first bytes";
+  EXPECT_FALSE(looksLikeHdf5(in / "events/left/none.h5"));
+  fs::remove(in / "events/left/events.h5");
+  fs::remove_all(in / "events/left/deep_events");
+  EXPECT_FALSE(looksLikeHdf5(in / "events/left"));
+  EXPECT_FALSE(looksLikeHdf5(in / "missing"));
 }
 
 /// The writer's folder.
@@ -498,6 +671,14 @@ TEST_F(Hdf5WriterTest, TheFolderIsReadBack) {
   EXPECT_TRUE(readStream(*parts.cameras[2]).empty());
   EXPECT_THAT(errorOf([&] { Hdf5Writer again(out(), rig); }),
               AllOf(StartsWith(out().string()), HasSubstr("not an empty folder")));
+}
+
+TEST_F(Hdf5WriterTest, ARigWithAnUnknownCameraHasNoCameraChain) {
+  Rig rig = rigOfTwo();
+  rig.cameras[1].model.fx = rig.cameras[1].model.fy = 0;
+  Hdf5Writer(out(), rig).close();
+  EXPECT_TRUE(fs::exists(out() / "events/right/events.h5"));
+  EXPECT_FALSE(fs::exists(out() / "camchain.yaml"));
 }
 
 TEST_F(Hdf5WriterTest, TheIndexIsTheFirstEventOfEachMillisecond) {

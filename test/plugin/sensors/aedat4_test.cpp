@@ -16,7 +16,7 @@
 
 #include "plugin/readers/recording_formats.h"
 #include "test/plugin/formats/files.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -209,31 +209,20 @@ class Aedat4 : public TemporaryFolder {
   }
 };
 
-TEST_F(Aedat4, EachStreamOfEventsIsACamera) {
-  for (int compression = 0; compression <= 4; ++compression) {
-    writeFile(file(), recording(static_cast<Aedat4Compression>(compression), compression % 2 == 0));
+TEST_F(Aedat4, EachStreamOfEventsIsACameraWhereverItsFlatBuffersAreAligned) {
+  for (std::uint32_t skip = 0; skip < 8; ++skip) {
+    const bool with_index = skip % 3 != 1;
+    writeFile(file(), recording(static_cast<Aedat4Compression>(skip % 5), with_index, skip));
     ASSERT_NE(detectFormat(file()), nullptr);
     EXPECT_EQ(detectFormat(file())->name, "aedat4");
     RecordingParts parts = open();
     ASSERT_EQ(parts.cameras.size(), 2U);
-    EXPECT_EQ(parts.cameras[0]->size()->width, 640);
-    EXPECT_EQ(parts.cameras[0]->size()->height, 480);
-    EXPECT_TRUE(readStream(*parts.cameras[0]) == streamEvents(0)) << compression;
-    EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3)) << compression;
-    EXPECT_EQ(parts.cameras[1]->progress(), 1);
-  }
-}
-
-TEST_F(Aedat4, FlatBuffersMayBeAlignedToAnyByte) {
-  for (std::uint32_t skip = 1; skip < 8; ++skip) {
-    const auto compression = static_cast<Aedat4Compression>(skip % 5);
-    writeFile(file(), recording(compression, true, skip));
-    RecordingParts parts = open();
-    ASSERT_EQ(parts.cameras.size(), 2U);
+    EXPECT_EQ(parts.cameras[1]->size()->width, 640);
     EXPECT_EQ(parts.cameras[1]->size()->height, 480);
     EXPECT_TRUE(readStream(*parts.cameras[0]) == streamEvents(0)) << skip;
+    EXPECT_EQ(parts.cameras[0]->progress(), 1);
     parts.cameras[1]->seek((kStartUs + 17'500) * 1000);
-    EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3, 17)) << skip;
+    EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3, with_index ? 17 : 0)) << skip;
   }
 }
 
@@ -272,6 +261,17 @@ TEST_F(Aedat4, StreamsAreChosenByCameraOutputOrNumber) {
   options.topics = {"middle"};
   EXPECT_THAT(errorOf([&] { open(options); }),
               AllOf(HasSubstr("no stream 'middle'"), HasSubstr("0 ('events' of 'left'), 3")));
+}
+
+TEST_F(Aedat4, TheSensorHas65535PixelsAtMost) {
+  for (const auto& [side, known] : {std::pair("1", true), std::pair("65535", true),
+                                    std::pair("0", false), std::pair("65536", false)}) {
+    for (const char* other : {"640", "480"}) {
+      const std::string xml = replaced(streamXml(0, "EVTS", "a"), other, side);
+      writeFile(file(), headerOf(Aedat4Compression::kNone, -1, outInfo(xml)));
+      EXPECT_EQ(open().cameras.at(0)->size().has_value(), known) << side << " for " << other;
+    }
+  }
 }
 
 TEST_F(Aedat4, ASeekStartsAtThePacketOfItsTime) {
@@ -321,6 +321,9 @@ TEST_F(Aedat4, WrongDataAreErrorsThatNameTheirPosition) {
       {headerOf(Aedat4Compression::kNone, -1, "<dv/>"), {"no node 'outInfo'"}},
       {headerOf(Aedat4Compression::kNone, -1, outInfo(streamXml(0, "FRME", "a"))),
        {"no stream of events"}},
+      {headerOf(Aedat4Compression::kNone, -1,
+                outInfo(replaced(streamXml(0, "EVTS", "a"), "name=\"0\"", "name=\"a\""))),
+       {"a stream of events: expected a number as its name"}},
       {wrong_size, {at_packet + "a packet of 2147483647 bytes: expected at most"}},
       {good.substr(0, good.size() - 1), {"a packet of", "expected at most"}},
       {with_packet(Aedat4Compression::kLz4, "not a frame"), {at_packet, "expected an LZ4 frame"}},

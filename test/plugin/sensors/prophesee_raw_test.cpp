@@ -12,7 +12,7 @@
 #include "test/paths.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/sensors/evt_words.h"
-#include "test/plugin/streams/damaged_files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -145,6 +145,16 @@ TEST_F(PropheseeRaw, ThePositionOfAnEventIsThatOfItsWord) {
   EXPECT_EQ(stream.positionOf(0), file().string() + ": byte 16");
   EXPECT_EQ(stream.positionOf(1), file().string() + ": byte 20");
   EXPECT_EQ(stream.positionOf(2), file().string() + ": byte 20");
+}
+
+TEST_F(PropheseeRaw, WordsThatBeginLikeALineAreNoHeader) {
+  std::string words;  // a TIME_HIGH and an event: "% \1\x80\n\0\0\0"
+  for (const std::uint32_t word : {0x8001'2025U, 0x0000'000aU}) putWord(words, word);
+  writeFile(file(), "% evt 2.0\n" + words);
+  PropheseeRawStream stream(file());
+  const std::vector<Event> events = readStream(stream);
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_TRUE((events[0] == Event{0x1'2025 * 64'000LL, 0, 10, false}));
 }
 
 TEST_F(PropheseeRaw, AWrongHeaderIsAnErrorThatNamesItsLine) {

@@ -5,16 +5,16 @@
 #include <gtest/gtest.h>
 
 #include <fmt/format.h>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/text_parsing.h"
 #include "plugin/readers/recording_formats.h"
-#include "plugin/streams/event_packets.h"
 #include "plugin/text/event_text.h"
 #include "test/plugin/formats/files.h"
 #include "test/plugin/numpy/zip_file.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -22,13 +22,6 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
-
-std::vector<Event> allEventsOf(EventStream& stream) {
-  std::vector<Event> all;
-  std::vector<Event> block;
-  while (stream.read(block)) all.insert(all.end(), block.begin(), block.end());
-  return all;
-}
 
 class EventColumnsText : public TemporaryFolder {
  protected:
@@ -39,7 +32,7 @@ class EventColumnsText : public TemporaryFolder {
   std::string errorOfText(const std::string& text, const ReaderOptions& options = {}) const {
     return errorOf([&] {
       EventTextStream stream(write(text), options);
-      allEventsOf(stream);
+      readStream(stream);
     });
   }
 };
@@ -72,7 +65,7 @@ TEST_F(EventColumnsText, OrderUnitAndPolarityAreThoseOfTheHeaderOrTheOptions) {
       {"1e-3 1.2e+01 34 1e0\n2.001e-03 2.39e2 0e+00 -1.0\n", "", ""},
       {"0.001 12 34 True\n0.002001 239 0 false\n", "", ""},
       {"0.001,12,34,ON\n0.002001,239,0,Off\n", "", ""},
-      {"12 34 1 0.001 left\n239 0 0 0.002001 left\n", "x y p t -", ""},
+      {"12 34 1 0.001 left\r\n239 0 0 0.002001 left\r\n", "x y p t -", ""},
       {",x,y,polarity,ts\n0,12,34,True,0.001\n1,239,0,False,0.002001\n", "", ""},
       {"x_pos,y_pos,polarity,time_us\n12,34,1,1000\n239,0,0,2001\n", "", ""},
       {"row,col,on_off,microseconds\n34,12,1,1000\n0,239,0,2001\n", "", ""},
@@ -83,26 +76,13 @@ TEST_F(EventColumnsText, OrderUnitAndPolarityAreThoseOfTheHeaderOrTheOptions) {
     const ReaderOptions options{{}, row.columns, row.time_unit};
     EventTextStream stream(write(row.text), options);
     EXPECT_TRUE(looksLikeEventText(folder() / "e.txt", options)) << row.text;
-    const std::vector<Event> events = allEventsOf(stream);
+    const std::vector<Event> events = readStream(stream);
     EXPECT_TRUE(events == expected) << row.text << events.size();
   }
   EventTextStream sized(write("240 180\n0.001 12 34 1\n"));
   ASSERT_TRUE(sized.size());
   EXPECT_EQ(sized.size()->width, 240);
   EXPECT_EQ(sized.size()->height, 180);
-}
-
-TEST_F(EventColumnsText, TheUnitOfWholeNumbersIsToldOrCertain) {
-  std::string small;
-  std::string large;
-  for (int i = 0; i < 12; ++i) {
-    small += std::to_string(1'000'000 + i) + " 1 2 0\n";
-    large += std::to_string(1'700'000'000'000'000'000 + i) + " 1 2 0\n";
-  }
-  EXPECT_THAT(errorOfText(small),
-              AllOf(HasSubstr("e.txt: all times are whole numbers"), HasSubstr("--time-unit")));
-  EventTextStream stream(write(large));
-  EXPECT_EQ(allEventsOf(stream).at(1).t_ns, 1'700'000'000'000'000'001);
 }
 
 /// Events as a sensor makes them, in any order and unit.
@@ -123,50 +103,45 @@ TEST_F(EventColumnsText, TheOrderThatTheValuesShowIsUsedAndSaid) {
   const std::string usual = linesOf("{t} {x} {y} {p}", 200, 1, 1e-5, 6);
   EventTextStream expected(write(usual, "usual.txt"));
   EXPECT_THAT(expected.warnings(), testing::IsEmpty());
-  const std::vector<Event> events = allEventsOf(expected);
+  const std::vector<Event> events = readStream(expected);
   ASSERT_EQ(events.size(), 200U);
-  for (const char* order : {"x y t p", "x y p t", "p t x y", "t x p y"}) {
-    std::string format;
-    for (const std::string_view word : splitWords(order)) format += "{" + std::string(word) + "} ";
-    EventTextStream stream(write(linesOf(format, 200, 1, 1e-5, 6)));
-    EXPECT_TRUE(allEventsOf(stream) == events) << order;
-    ASSERT_THAT(stream.warnings(), testing::SizeIs(1)) << order;
-    EXPECT_EQ(stream.warnings()[0].name, "event-columns");
-    EXPECT_THAT(stream.warnings()[0].text, HasSubstr(std::string("--event-columns \"") + order));
-    // So few lines may look so by chance.
-    EXPECT_THAT(errorOfText(linesOf(format, 20, 1, 1e-5, 6)),
-                AllOf(HasSubstr("probably "), HasSubstr(order)));
-  }
+  EventTextStream stream(write(linesOf("{x} {y} {p} {t}", 200, 1, 1e-5, 6)));
+  EXPECT_TRUE(readStream(stream) == events);
+  ASSERT_THAT(stream.warnings(), testing::SizeIs(1));
+  EXPECT_EQ(stream.warnings()[0].name, "event-columns");
+  EXPECT_THAT(stream.warnings()[0].text, HasSubstr("--event-columns \"x y p t\""));
+  EXPECT_THAT(
+      errorOfText(linesOf("{x} {y} {p} {t}", 20, 1, 1e-5, 6)),
+      HasSubstr("e.txt: by their values, the columns are probably x y p t: expected t x y"));
   EXPECT_THAT(errorOfText(usual, ReaderOptions{{}, "x y t p", {}}),
               AllOf(HasSubstr("--event-columns 'x y t p'"), HasSubstr("e.txt are t x y p by")));
   EventTextStream swapped(write(usual), ReaderOptions{{}, "t y x p", {}});  // may be so
-  EXPECT_EQ(allEventsOf(swapped).at(1).y, events.at(1).x);
-  // Times that fall now and then, and a polarity that is always 1, are no reason for doubt.
-  for (const std::string& text : {linesOf("{t} {x} {y} 1", 200, 1, 1e-5, 6),
-                                  usual + linesOf("{t} {x} {y} {p}", 200, 0, 1e-5, 6)}) {
-    EventTextStream stream(write(text));
-    EXPECT_THAT(stream.warnings(), testing::IsEmpty());
-    EXPECT_FALSE(allEventsOf(stream).empty());
-  }
+  EXPECT_EQ(readStream(swapped).at(1).y, events.at(1).x);
   EventTextStream named(write("a,b,c,d\n" + linesOf("{t},{x},{y},{p}", 200, 1, 1e-5, 6)));
   ASSERT_THAT(named.warnings(), testing::SizeIs(1));
   EXPECT_THAT(named.warnings()[0].text, HasSubstr("the header 'a,b,c,d' is not understood"));
 }
 
-TEST_F(EventColumnsText, TheUnitThatTheValuesShowIsUsedAndSaidIfItIsCertain) {
-  const auto of = [](double start, double step, int decimals) {
-    return linesOf("{t} {x} {y} {p}", 2000, start, step, decimals);
-  };
-  // 100,000 events per second in all units.
-  EXPECT_THAT(errorOfText(of(5, 10, 0)), HasSubstr("probably us, where 2000 events take 0.02 s"));
-  EXPECT_THAT(errorOfText(of(5, 10'000, 0)), HasSubstr("expected --time-unit ns"));
-  EXPECT_THAT(errorOfText(of(5e6, 10, 1)), HasSubstr("not seconds: probably us"));
-  EXPECT_THAT(errorOfText(of(1.7e12, 0.01, 2)), HasSubstr("not seconds: probably ms"));
-  EventTextStream stream(write(of(1.7e15, 10, 0)));
-  EXPECT_EQ(allEventsOf(stream).at(1).t_ns, 1'700'000'000'000'010'000);
+TEST_F(EventColumnsText, TheUnitIsToldInTheHeaderOrFoundFromTheValues) {
+  const std::string dated = linesOf("{t} {x} {y} {p}", 2000, 1.7e15, 10, 0);
+  EventTextStream stream(write(dated));
+  EXPECT_EQ(readStream(stream).at(1).t_ns, 1'700'000'000'000'010'000);
   ASSERT_THAT(stream.warnings(), testing::SizeIs(1));
   EXPECT_EQ(stream.warnings()[0].name, "time-unit");
-  EXPECT_THAT(stream.warnings()[0].text, HasSubstr("(--time-unit us)"));
+  EventTextStream header(write("t_ns x y p\n" + dated));
+  EXPECT_EQ(readStream(header).at(1).t_ns, 1'700'000'000'000'010);
+  EventTextStream told(write("t_ns x y p\n5 1 2 0\n"), ReaderOptions{{}, {}, "ms"});
+  EXPECT_EQ(readStream(told).at(0).t_ns, 5'000'000) << "the option comes before the header";
+  EXPECT_THAT(told.warnings(), testing::IsEmpty());
+  const ReaderOptions seconds{{}, {}, "s"};
+  for (const std::string sign : {"", "-"}) {
+    EventTextStream end(write(sign + "4611686018.427387902 1 2 0\n"), seconds);
+    EXPECT_EQ(std::abs(readStream(end).at(0).t_ns), kEndOfTimeNs - 1);
+    EXPECT_THAT(errorOfText(sign + "4611686018.427387903 1 2 0\n", seconds),
+                HasSubstr("e.txt:1: t = '" + sign + "4611686018.427387903': expected a time"));
+  }
+  EXPECT_THAT(errorOfText(linesOf("{t} {x} {y} {p}", 12, 5, 10, 0)),
+              HasSubstr("e.txt: all times are whole numbers"));
 }
 
 TEST_F(EventColumnsText, AnErrorNamesTheLineTheColumnAndTheOption) {
@@ -186,7 +161,7 @@ std::string manyLines(int count) {
   std::string text;
   for (int i = 0; i < count; ++i) {
     text += formatSeconds(1'000'000'000 + i * std::int64_t{10'000}) + " " +
-            std::to_string(i % 240) + " 7 1\n";
+            std::to_string(i % 240) + (i % 2 == 0 ? " 7 1\n" : " 7 ON\n");
   }
   return text;
 }
@@ -194,14 +169,14 @@ std::string manyLines(int count) {
 TEST_F(EventColumnsText, CompressedTextHasTheEventsOfTheText) {
   const std::string text = manyLines(100'000);
   EventTextStream plain(write(text));
-  const std::vector<Event> expected = allEventsOf(plain);
+  const std::vector<Event> expected = readStream(plain);
   ASSERT_EQ(expected.size(), 100'000U);
   writeGzip(folder() / "events.txt.gz", text);
   writeZip(folder() / "events.zip", {{"events.txt", text}});
   for (const char* name : {"events.txt.gz", "events.zip"}) {
     EventTextStream stream(folder() / name);
     stream.seek(1'500'000'000);
-    EXPECT_TRUE(allEventsOf(stream) == expected) << name;
+    EXPECT_TRUE(readStream(stream) == expected) << name;
     EXPECT_NEAR(stream.progress(), 1, 0.01) << name;
     ASSERT_NE(detectFormat(folder() / name), nullptr) << name;
     EXPECT_EQ(detectFormat(folder() / name)->name, "text") << name;
@@ -210,22 +185,22 @@ TEST_F(EventColumnsText, CompressedTextHasTheEventsOfTheText) {
                                std::filesystem::file_size(folder() / "events.txt.gz") / 2);
   EXPECT_THAT(errorOf([&] {
                 EventTextStream stream(folder() / "events.txt.gz");
-                allEventsOf(stream);
+                readStream(stream);
               }),
               HasSubstr("events.txt.gz: cannot be unpacked to its end"));
 }
 
 TEST_F(EventColumnsText, SeekingLeavesOutNothingAndReadsLittle) {
-  std::string text = manyLines(400'000);  // 4 s in 7 MB, with comments and late events
+  std::string text = manyLines(200'000);  // 2 s in 4 MB, with comments and late events
   text += "# the end\n4.999900000 1 1 0\n5.000100000 2 2 0\n4.995 3 3 0\n5.0002 4 4 0\n";
   const std::filesystem::path file = write(text);
   EventTextStream whole(file);
-  const std::vector<Event> all = allEventsOf(whole);
+  const std::vector<Event> all = readStream(whole);
   for (const std::int64_t t_ns : {-1'000'000'000L, 1'000'000'000L, 1'000'010'000L, 2'345'678'000L,
                                   4'990'000'000L, 5'000'050'000L, 9'000'000'000L}) {
     EventTextStream stream(file);
     stream.seek(t_ns);
-    const std::vector<Event> found = allEventsOf(stream);
+    const std::vector<Event> found = readStream(stream);
     ASSERT_LE(found.size(), all.size()) << t_ns;
     const auto left_out = static_cast<std::ptrdiff_t>(all.size() - found.size());
     EXPECT_TRUE(std::equal(found.begin(), found.end(), all.begin() + left_out)) << t_ns;
@@ -239,7 +214,7 @@ TEST_F(EventColumnsText, SeekingLeavesOutNothingAndReadsLittle) {
   writeFile(file, text + "5.1 1 2\n");
   EventTextStream damaged(file);
   damaged.seek(4'000'000'000);
-  EXPECT_THAT(errorOf([&] { allEventsOf(damaged); }),
+  EXPECT_THAT(errorOf([&] { readStream(damaged); }),
               AllOf(HasSubstr("e.txt: line "), HasSubstr(" after byte "), HasSubstr("'5.1 1 2'")));
 }
 

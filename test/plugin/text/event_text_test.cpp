@@ -7,12 +7,12 @@
 
 #include <rapidcheck/gtest.h>
 #include <algorithm>
-#include <random>
 #include <string>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/streams/event_packets.h"
 #include "test/plugin/formats/files.h"
+#include "test/plugin/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -26,22 +26,11 @@ static std::ostream& operator<<(std::ostream& stream, const Event& event) {
 namespace {
 
 using testing::AllOf;
-using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::StartsWith;
 
 EventPackets open(const std::filesystem::path& file) {
   return EventPackets(std::make_unique<EventTextStream>(file), {240, 180});
-}
-
-std::vector<Event> readAll(EventPackets& reader) {
-  std::vector<Event> events;
-  for (std::vector<Event> packet = reader.nextPacket(); !packet.empty();
-       packet = reader.nextPacket()) {
-    events.insert(events.end(), packet.begin(), packet.end());
-  }
-  return events;
 }
 
 std::string textOf(const std::vector<Event>& events) {
@@ -60,7 +49,7 @@ class EventText : public TemporaryFolder {
   std::vector<Event> read(const std::string& text) const {
     writeFile(file(), text);
     EventPackets reader = open(file());
-    return readAll(reader);
+    return readPackets(reader);
   }
   std::string errorOfText(const std::string& text) const {
     return errorOf([&] { read(text); });
@@ -69,39 +58,32 @@ class EventText : public TemporaryFolder {
   std::string line(int number) const { return file().string() + ":" + std::to_string(number); }
 };
 
-TEST_F(EventText, HasTimePixelAndPolarityInThisOrder) {
-  EXPECT_THAT(read("0.003811000 96 133 0\n0.003820001 127 171 1\n"),
-              ElementsAre(Event{3'811'000, 96, 133, false}, Event{3'820'001, 127, 171, true}));
-}
-
-TEST_F(EventText, TimesOfTodayAreExact) {
-  EXPECT_THAT(read("1700000000.123456789 0 0 1\n1700000000.123456790 0 0 1\n"),
-              ElementsAre(Event{1'700'000'000'123'456'789, 0, 0, true},
-                          Event{1'700'000'000'123'456'790, 0, 0, true}));
-}
-
-TEST_F(EventText, TimesMayHaveAnyNumberOfDecimalsASignOrAnExponent) {
-  EXPECT_THAT(read("-1.5 0 0 0\n-0 0 0 0\n.5 0 0 0\n1 0 0 0\n1. 0 0 0\n1.25 0 0 0\n"
-                   "1.3333333336 0 0 0\n1.5e0 0 0 0\n00000000002.0 0 0 0\n"),
-              ElementsAre(Event{-1'500'000'000}, Event{0}, Event{500'000'000}, Event{1'000'000'000},
-                          Event{1'000'000'000}, Event{1'250'000'000}, Event{1'333'333'334},
-                          Event{1'500'000'000}, Event{2'000'000'000}));
-}
-
-TEST_F(EventText, BlanksCommentsAndLineEndsAreIgnored) {
-  EXPECT_THAT(read("# t x y p\r\n\r\n\n  0.1\t1  2\t 0 \r\n0.2 3 4 1\r\n0.3 5 6 0 # dust\n \t\n"),
-              ElementsAre(Event{100'000'000, 1, 2, false}, Event{200'000'000, 3, 4, true},
-                          Event{300'000'000, 5, 6, false}));
-}
-
-TEST_F(EventText, TheLastLineNeedsNoNewline) {
-  EXPECT_THAT(read("0.1 1 2 0\n0.2 3 4 1"),
-              ElementsAre(Event{100'000'000, 1, 2, false}, Event{200'000'000, 3, 4, true}));
-}
-
-TEST_F(EventText, AnEmptyFileHasNoEvents) {
-  EXPECT_THAT(read(""), IsEmpty());
-  EXPECT_THAT(read("# nothing\n\n"), IsEmpty());
+TEST_F(EventText, LinesHaveTimePixelAndPolarity) {
+  using Events = std::vector<Event>;
+  const std::pair<const char*, Events> rows[] = {
+      {"0.003811000 96 133 0\n0.003820001 127 171 1\n",
+       {{3'811'000, 96, 133, false}, {3'820'001, 127, 171, true}}},
+      {"1700000000.123456789 0 0 1\n1700000000.123456790 0 0 1\n",
+       {{1'700'000'000'123'456'789, 0, 0, true}, {1'700'000'000'123'456'790, 0, 0, true}}},
+      {"-1.5 0 0 0\n-0 0 0 0\n.5 0 0 0\n1 0 0 0\n1. 0 0 0\n1.25 0 0 0\n1.3333333336 0 0 0\n"
+       "1.5e0 0 0 0\n00000000002.0 0 0 0\n",
+       {{-1'500'000'000},
+        {0},
+        {500'000'000},
+        {1'000'000'000},
+        {1'000'000'000},
+        {1'250'000'000},
+        {1'333'333'334},
+        {1'500'000'000},
+        {2'000'000'000}}},
+      {"# t x y p\r\n\r\n\n  0.1\t1  2\t 0 \r\n0.2 3 4 1\r\n0.3 5 6 0 # dust\n \t\n",
+       {{100'000'000, 1, 2, false}, {200'000'000, 3, 4, true}, {300'000'000, 5, 6, false}}},
+      {"0.1 000239 0000179 0\n0.2 3 4 1",
+       {{100'000'000, 239, 179, false}, {200'000'000, 3, 4, true}}},
+      {"", {}},
+      {"# nothing\n\n", {}},
+  };
+  for (const auto& [text, events] : rows) EXPECT_EQ(read(text), events) << text;
 }
 
 TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
@@ -125,6 +107,7 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
       {"0.1 1 2 0.5\n", 1, {"p = '0.5': expected polarity"}},
       {"0.1 1 0x2 0\n", 1, {"y = '0x2': expected a whole number"}},
       {"0.1 1 2 0\n0.1 240 2 0\n", 2, {"x = '240': expected", "0 to 239", "240x180"}},
+      {"# a\n0.1 1 2 0\n# b\n\n0.1 1 2 0\n#\n0.1 240 2 0\n", 7, {"x = '240': expected"}},
       {"0.1 1 180 0\n", 1, {"y = '180': expected", "0 to 179", "240x180"}},
       {"0.1 -1 0 0\n", 1, {"x = '-1': expected"}},
       {"0.1 65536 0 0\n", 1, {"x = '65536': expected"}},
@@ -142,67 +125,6 @@ TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
     EXPECT_THAT(error, StartsWith(line(wrong.line)));
     for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
   }
-  EXPECT_THAT(read("0.1 239 179 0\n"), ElementsAre(Event{100'000'000, 239, 179, false}));
-}
-
-TEST_F(EventText, EventsUpToTenMillisecondsLateAreSortedAndCounted) {
-  writeFile(file(), "0.020 1 0 0\n0.010 2 0 0\n0.015 3 0 0\n0.020 4 0 0\n0.025 5 0 0\n");
-  EventPackets reader = open(file());
-  EXPECT_THAT(readAll(reader),
-              ElementsAre(Event{10'000'000, 2}, Event{15'000'000, 3}, Event{20'000'000, 1},
-                          Event{20'000'000, 4}, Event{25'000'000, 5}));
-  EXPECT_EQ(reader.sortedEvents(), 2U);
-}
-
-TEST_F(EventText, PacketsAreThePeriodsOfTheGridWithEvents) {
-  writeFile(file(), "-0.001 0 0 0\n0 1 0 0\n0.009999999 2 0 0\n0.01 3 0 0\n7.123 4 0 0\n");
-  EventPackets reader = open(file());
-  EXPECT_EQ(reader.nextTime(), -1'000'000);
-  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{-1'000'000, 0}));
-  EXPECT_EQ(reader.nextTime(), 0);
-  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{0, 1}, Event{9'999'999, 2}));
-  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{10'000'000, 3}));
-  EXPECT_EQ(reader.nextTime(), 7'123'000'000);
-  EXPECT_THAT(reader.nextPacket(), ElementsAre(Event{7'123'000'000, 4}));
-  EXPECT_EQ(reader.nextTime(), std::nullopt);
-  EXPECT_THAT(reader.nextPacket(), IsEmpty());
-  EXPECT_THAT(reader.nextPacket(), IsEmpty());
-}
-
-TEST_F(EventText, ManyBlocksAreReadCompletelyAndOnDemand) {
-  std::vector<Event> events;
-  events.reserve(300'000);
-  for (int i = 0; i < 300'000; ++i) {
-    events.push_back({1'700'000'000'000'000'000 + i * std::int64_t{1'009},
-                      static_cast<std::uint16_t>(i * 7 % 240),
-                      static_cast<std::uint16_t>(i * 11 % 180), i % 3 == 0});
-  }
-  writeFile(file(), textOf(events));  // 9 MB
-  EventPackets reader = open(file());
-  EXPECT_EQ(reader.stream().progress(), 0);
-  std::vector<Event> read = reader.nextPacket();
-  EXPECT_LT(reader.stream().progress(), 0.5);
-  const std::vector<Event> rest = readAll(reader);
-  read.insert(read.end(), rest.begin(), rest.end());
-  EXPECT_TRUE(read == events);
-  EXPECT_EQ(reader.stream().progress(), 1);
-}
-
-TEST_F(EventText, LateEventsAreSortedAcrossBlocksAndStably) {
-  std::vector<Event> events;
-  events.reserve(200'000);
-  std::mt19937 random(1);
-  for (std::int64_t i = 0; i < 200'000; ++i) {  // 2 s in 4 MB
-    const std::int64_t late_ms = random() % 11;
-    events.push_back({(1000 + i / 100 - late_ms) * 1'000'000, static_cast<std::uint16_t>(i % 240),
-                      static_cast<std::uint16_t>(i / 240 % 180), false});
-  }
-  writeFile(file(), textOf(events));
-  EventPackets reader = open(file());
-  const std::vector<Event> read = readAll(reader);
-  std::stable_sort(events.begin(), events.end(),
-                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
-  EXPECT_TRUE(read == events);
 }
 
 TEST_F(EventText, AnErrorBehindManyBlocksNamesItsLine) {
@@ -244,13 +166,6 @@ TEST_F(EventText, TheErrorOfABinaryFileHasNoControlCharacters) {
                     testing::Not(HasSubstr("\x1b"))));
 }
 
-TEST_F(EventText, AMissingFileIsNamed) {
-  EXPECT_THAT(errorOf([&] { open(file()); }),
-              AllOf(StartsWith(file().string()), HasSubstr("cannot be opened")));
-  EXPECT_THAT(errorOf([&] { open(folder()); }),
-              AllOf(StartsWith(folder().string()), HasSubstr("cannot be opened")));
-}
-
 /// For properties, which are no fixtures.
 std::filesystem::path propertyFile() {
   return std::filesystem::temp_directory_path() /
@@ -274,12 +189,7 @@ RC_GTEST_PROP(EventTextProperty, WrittenEventsAreReadBackInTimeOrder, ()) {
   writeFile(propertyFile(), textOf(events));
 
   EventPackets reader = open(propertyFile());
-  std::vector<Event> read;
-  for (std::vector<Event> packet = reader.nextPacket(); !packet.empty();
-       packet = reader.nextPacket()) {
-    RC_ASSERT(packet.back().t_ns - packet.front().t_ns < kPacketPeriodNs);
-    read.insert(read.end(), packet.begin(), packet.end());
-  }
+  const std::vector<Event> read = readPackets(reader);
   std::filesystem::remove(propertyFile());
 
   std::stable_sort(events.begin(), events.end(),

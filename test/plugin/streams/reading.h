@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "plugin/readers/recording_formats.h"
-#include "plugin/streams/event_stream.h"
+#include "plugin/streams/event_packets.h"
 #include "test/plugin/formats/files.h"
 
 namespace efm {
@@ -22,6 +22,15 @@ inline std::vector<Event> readStream(EventStream& stream) {
   std::vector<Event> events;
   std::vector<Event> block;
   while (stream.read(block)) events.insert(events.end(), block.begin(), block.end());
+  return events;
+}
+
+/// The events of all packets.
+inline std::vector<Event> readPackets(EventPackets& packets) {
+  std::vector<Event> events;
+  for (auto packet = packets.nextPacket(); !packet.empty(); packet = packets.nextPacket()) {
+    events.insert(events.end(), packet.begin(), packet.end());
+  }
   return events;
 }
 
