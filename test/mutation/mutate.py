@@ -253,6 +253,8 @@ class Run:
         copy_tree()
         configure()
         names = sorted({name for room in rooms for name in self.rooms[room]})
+        if not build(["event-fusion"]):  # makes the recordings that tests read
+            sys.exit("mutate.py: the tree does not build")
         self.programs = {name: Program(name) for name in names}
         subprocess.run(["ctest", "--preset", "release", "-R", "^(recordings|formats)$"], cwd=TREE, check=True,
                        stdout=subprocess.DEVNULL)
