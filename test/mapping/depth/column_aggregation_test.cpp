@@ -165,30 +165,5 @@ TEST(PlanesPerStep, IsOneUpToAHundredPlanesAndGrowsWithThem) {
   EXPECT_DOUBLE_EQ(planesPerStep(496), 5);
 }
 
-TEST(PixelNeighbours, AreTheMasksPixelsWithinFourRowByRow) {
-  const cv::Mat1b mask = randomMask(13, {40, 30}, 4);
-  const SparseMask sparse(mask);
-  PixelNeighbours neighbours(sparse);
-  for (int y = 0; y < mask.rows; ++y) {
-    for (int x = 0; x < mask.cols; ++x) {
-      std::vector<cv::Point> expected;
-      std::vector<std::size_t> indices;
-      SparseMask(mask).forEach([&](std::size_t i, cv::Point at) {
-        if (std::abs(at.x - x) > 4 || std::abs(at.y - y) > 4) return;
-        expected.push_back(at - cv::Point(x, y));
-        indices.push_back(i);
-      });
-      std::size_t seen = 0;
-      neighbours.forEach({x, y}, [&](std::size_t i, cv::Point offset) {
-        ASSERT_LT(seen, expected.size());
-        ASSERT_EQ(offset, expected[seen]);
-        ASSERT_EQ(i, indices[seen]);
-        ++seen;
-      });
-      ASSERT_EQ(seen, expected.size());
-    }
-  }
-}
-
 }  // namespace
 }  // namespace efm::column_aggregation_test

@@ -142,44 +142,6 @@ TEST(BaselinePolicy, RestAfterARotationMakesOneKeyframeNotOnePerStride) {
   EXPECT_GT(policy.earliestStart(recording), kStart_ns + 2900 * kMs) << "its events are let go";
 }
 
-TEST(BaselinePolicy, IfTheLongestWindowIsNotEnoughTheStartMovesOnByAStride) {
-  BaselinePolicy policy(options(0.5, 0.1), kDepthGuess_m);
-  // Still for a second, then 1 m/s: 0.2 m after 1.2 s.
-  const auto recording = recordingOf(
-      [](std::int64_t t_ns) { return moved(std::max(0.0, secondsSinceStart(t_ns) - 1)); });
-  const auto window = policy.current(recording);
-  ASSERT_TRUE(window);
-  EXPECT_EQ(window->t0_ns, kStart_ns + 700 * kMs)
-      << "the first start whose longest window gets there";
-  EXPECT_EQ(window->t1_ns, kStart_ns + 1200 * kMs);
-  EXPECT_EQ(policy.earliestStart(recording), window->t0_ns);
-}
-
-TEST(BaselinePolicy, WindowsGrowAcrossGapsInThePosesOrStartAfterThem) {
-  // No pose before 0.32 s and none from 0.4 to 0.58 s.
-  const auto recording = recordingOf([](std::int64_t t_ns) -> std::optional<Rigid3> {
-    const double t_s = secondsSinceStart(t_ns);
-    if (t_s < 0.32 || (t_s >= 0.4 && t_s < 0.58)) return std::nullopt;
-    return moved(1.0 * t_s);
-  });
-  BaselinePolicy policy(options(0.5, 0.05), kDepthGuess_m);
-  const auto window = policy.current(recording);
-  ASSERT_TRUE(window);
-  EXPECT_EQ(window->t0_ns, kStart_ns + 350 * kMs) << "the first start with a pose";
-  EXPECT_EQ(window->t1_ns, kStart_ns + 600 * kMs) << "enough since 0.55 s, known since 0.58 s";
-  policy.advance(*window, nullptr);
-  EXPECT_EQ(policy.current(recording)->t0_ns, kStart_ns + 600 * kMs);
-}
-
-TEST(BaselinePolicy, StartsAtTheNextEventAfterAnyGap) {
-  auto recording = recordingOf([](std::int64_t t_ns) { return moved(secondsSinceStart(t_ns)); });
-  recording.events_ns = {kStart_ns + 3'500 * kMs, kStart_ns + 3'501 * kMs};
-  BaselinePolicy policy(options(1.0, 0.05), kDepthGuess_m);
-  EXPECT_EQ(policy.current(recording)->t0_ns, kStart_ns + 3'500 * kMs);
-  policy.advance(*policy.current(recording), nullptr);
-  EXPECT_FALSE(policy.current(recording)) << "no window is without events";
-}
-
 TEST(BaselinePolicy, TheLastWindowGrowsFromTheEndBack) {
   const auto moving =
       recordingOf([](std::int64_t t_ns) { return moved(0.9 * secondsSinceStart(t_ns)); });

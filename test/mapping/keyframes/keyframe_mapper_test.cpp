@@ -42,37 +42,6 @@ KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras
   return keyframe.value_or(KeyframeDepthMap());
 }
 
-void expectNear(const Rigid3& a, const Rigid3& b) {
-  EXPECT_LT((a.translation - b.translation).norm(), 1e-12);
-  EXPECT_LT(a.rotation.angularDistance(b.rotation), 1e-7);  // as good as acos is near 1
-}
-
-TEST(KeyframeMapper, TheReferenceViewIsAtItsCameraAtTheReferenceTime) {
-  const Recording recording(1, 3, 500);
-  for (int reference = 0; reference < 3; ++reference) {
-    KeyframeMapperOptions options = fewPlanes();
-    options.reference_camera = reference;
-    expectNear(map(recording, {0, 1}, options).T_world_ref,
-               *recording.trajectory.poseAt(Recording::kWindow.t_ref_ns) *
-                   recording.rig.cameras[static_cast<std::size_t>(reference)].T_rig_cam);
-  }
-}
-
-TEST(KeyframeMapper, TheOffsetIsAlongTheViewsOwnAxes) {
-  Rig rig;
-  // The rig looks along the world's x axis: its z is x, its x is -y.
-  Eigen::Matrix3d R_world_rig;
-  R_world_rig << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  rig.cameras.push_back({test::smallCamera(), {}, 0});
-  KeyframeMapperOptions options = fewPlanes();
-  options.view.offset_m = {0.1, 0.2, 0.3};
-  const KeyframeMapper mapper(rig, {0}, options);
-  const Rigid3 T_world_ref =
-      mapper.referencePose({Eigen::Quaterniond(R_world_rig), Eigen::Vector3d(7, 8, 9)});
-  EXPECT_LT((T_world_ref.translation - Eigen::Vector3d(7 + 0.3, 8 - 0.1, 9 - 0.2)).norm(), 1e-12);
-  EXPECT_LT((T_world_ref.rotation.toRotationMatrix() - R_world_rig).norm(), 1e-12);
-}
-
 TEST(KeyframeMapper, AnUnselectedReferenceGivesTheViewButNoneOfItsEvents) {
   Recording recording(2, 3, 3000);
   KeyframeMapperOptions options = fewPlanes(2);
