@@ -107,6 +107,17 @@ TEST(KeyframeMapper, OverItsBudgetACameraGivesAnEvenChoiceOfItsEvents) {
   EXPECT_EQ(within.over_budget, 0U);
 }
 
+TEST(KeyframeMapper, ASequenceMaximumThatIsKnownIsTheWhiteLevel) {
+  const Recording recording(14, 2, 4000);
+  KeyframeMapperOptions options = fewPlanes();
+  options.extraction.max_confidence = MaxConfidence::of(30);
+  const KeyframeDepthMap fixed = map(recording, {0, 1}, options);
+  options.extraction.max_confidence.level = WhiteLevel::kSequence;
+  EXPECT_FALSE(same(map(recording, {0, 1}, options).map.depth, fixed.map.depth));
+  options.sequence_maximum = 30;
+  EXPECT_TRUE(same(map(recording, {0, 1}, options).map, fixed.map));
+}
+
 TEST(KeyframeMapper, EventImagesCountEveryEventOfTheWindowWithAPoseOrWithout) {
   Recording recording(4, 2, 3000);
   Trajectory half;  // poses for the first half of the window alone

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -85,12 +86,31 @@ TEST(KeyframePolicy, WindowsThatAreGivenUpPieceByPieceCountOnce) {
   }
 }
 
-TEST(KeyframePolicy, ASingleWindowComesOnce) {
-  const auto policy = makeSingleWindowPolicy({10, 20, 15});
-  ASSERT_TRUE(policy->current(startingAt(kStart_ns)));
-  EXPECT_EQ(policy->current(startingAt(kStart_ns))->t0_ns, 10);
-  policy->advance({10, 20, 15}, nullptr);
-  EXPECT_FALSE(policy->current(startingAt(kStart_ns)));
+TEST(KeyframePolicy, ASingleWindowComesOnceUnlessItIsSkippedOrGivenUp) {
+  const Recording recording = startingAt(kStart_ns);
+  for (const std::int64_t t_ref_ns : {5, 15}) {
+    const Window window{10, 20, t_ref_ns};
+    const auto fresh = [&] { return makeSingleWindowPolicy(window); };
+    auto policy = fresh();
+    EXPECT_EQ(policy->current(recording)->t0_ns, 10);
+    EXPECT_EQ(policy->earliestStart(recording), 10);
+    EXPECT_EQ(policy->earliestLast(recording), 10);
+    EXPECT_EQ(policy->earliestReference(recording), std::min<std::int64_t>(10, t_ref_ns));
+    EXPECT_EQ(policy->advancePast(recording, 19), 0U);
+    EXPECT_EQ(policy->giveUpBefore(recording, 10), 0U);
+    EXPECT_FALSE(policy->last(recording, 20));
+    policy->advance(window, nullptr);
+    EXPECT_FALSE(policy->current(recording));
+    EXPECT_EQ(policy->earliestStart(recording), kMaxTimeNs);
+    EXPECT_EQ(policy->earliestReference(recording), kMaxTimeNs);
+    EXPECT_EQ(policy->advancePast(recording, 99) + policy->giveUpBefore(recording, 99), 0U);
+    policy = fresh();
+    EXPECT_EQ(policy->advancePast(recording, 20), 1U);
+    EXPECT_FALSE(policy->current(recording));
+    policy = fresh();
+    EXPECT_EQ(policy->giveUpBefore(recording, 11), 1U);
+    EXPECT_FALSE(policy->current(recording));
+  }
 }
 
 TEST(KeyframePolicy, OptionsHaveTheirLimits) {
