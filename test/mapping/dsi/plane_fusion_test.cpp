@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/dsi/plane_fusion.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
-#include <stdexcept>
 #include <vector>
 
 #include "test/oracle/naive_mapper.h"
@@ -138,15 +136,6 @@ TEST(PlaneFusion, NothingIsLeftFromThePlaneBefore) {
     ASSERT_EQ(fusion.fused(), fuse(second, options));
     ASSERT_EQ(fusion.ofCamera(0), fuse(second.camera(0), options));
   });
-}
-
-TEST(FusionOrder, NamesGoBothWays) {
-  for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
-    EXPECT_EQ(fusionOrderFromName(nameOf(order)), order);
-  }
-  EXPECT_THAT([] { fusionOrderFromName("both"); },
-              ::testing::ThrowsMessage<std::invalid_argument>(::testing::AllOf(
-                  ::testing::HasSubstr("'both'"), ::testing::HasSubstr("time_then_cameras"))));
 }
 
 }  // namespace

@@ -61,18 +61,6 @@ std::vector<bool> naivelyHot(const std::vector<Event>& events, int width, int he
   return hot;
 }
 
-TEST(HotPixelFilter, NoPixelOfAMovingEdgeIsHot) {
-  HotPixelFilter filter(20, 10, fewEvents());
-  for (int step = 0; step < 60; ++step) {
-    const int x = step % 20;  // to the right border, and again from the left
-    for (int burst = 0; burst < 30; ++burst) {
-      for (int y = 0; y < 10; ++y) {
-        EXPECT_FALSE(filter.isHot(eventAt(1000 * kMs + step * 10 * kMs, x, y))) << x << ", " << y;
-      }
-    }
-  }
-}
-
 TEST(HotPixelFilter, ManyMoreEventsThanFitACountAreStillHot) {
   HotPixelOptions options = fewEvents();
   options.period_s = 100;

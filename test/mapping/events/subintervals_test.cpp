@@ -8,7 +8,6 @@
 #include <map>
 #include <random>
 #include <set>
-#include <stdexcept>
 
 #include "test/mapping/options/refused_option.h"
 
@@ -16,8 +15,6 @@ namespace efm::subintervals_test {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kNow_ns = 1'700'000'000'000'000'003;
 
@@ -158,20 +155,9 @@ TEST(SubintervalShuffle, EveryPermutationComesAboutEquallyOften) {
   for (const auto& [permutation, count] : seen) EXPECT_NEAR(count, 1000, 145);
 }
 
-TEST(Subintervals, InvalidOptionsAndNamesAreNamed) {
+TEST(Subintervals, OptionsHaveTheirLimits) {
   using O = SubintervalOptions;
   test::expectLimits<O>({{"subintervals", &O::count, {1, 1000}, {0, 1001}}});
-  for (const auto split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
-    EXPECT_EQ(subintervalSplitFromName(nameOf(split)), split);
-  }
-  for (const auto shuffle :
-       {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
-    EXPECT_EQ(subintervalShuffleFromName(nameOf(shuffle)), shuffle);
-  }
-  EXPECT_THAT([] { subintervalSplitFromName("size"); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("'size'")));
-  EXPECT_THAT([] { subintervalShuffleFromName("deal"); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("'deal'")));
 }
 
 }  // namespace

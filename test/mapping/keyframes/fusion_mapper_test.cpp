@@ -105,16 +105,6 @@ TEST(FusionMapper, ASilentCameraIsReportedAndDelaysNobodyForLongerThanASecond) {
   EXPECT_EQ(mapper.counts().cameras[1].dropped, 10U) << "those of a window that was mapped";
 }
 
-TEST(FusionMapper, ALongPacketDoesNotMakeTheOtherCameraLate) {
-  Mapper mapper(period(), 2);
-  mapper.addPoses(0, 3000);
-  mapper.addSteady(0, 0, 2500);
-  EXPECT_THAT(mapper.takeAll(), IsEmpty()) << "camera 1's packet may begin as early";
-  mapper.addSteady(1, 0, 2500);
-  EXPECT_EQ(mapper.takeAll().size(), 24U);
-  EXPECT_EQ(mapper.counts().total().dropped, 0U);
-}
-
 TEST(FusionMapper, TheOnlyWindowIsMappedAtTheEndEvenIfItIsNotFull) {
   FusionMapperOptions single = period();
   single.only_window = Window{at(50), at(500), at(60)};
@@ -187,21 +177,6 @@ TEST(FusionMapper, TheReferenceMayStandFarOutsideTheOnlyWindow) {
     EXPECT_EQ(keyframes + mapper.end().size(), 1U);
     EXPECT_EQ(mapper.counts().total().used, 100U);
   }
-}
-
-TEST(FusionMapper, EventsBeforeTheFirstPoseAreWithoutPoseNotDropped) {
-  FusionMapperOptions single = period();
-  single.only_window = Window{at(400), at(500), at(450)};
-  Mapper mapper(single);
-  for (int ms = 0; ms < 600; ms += 10) {
-    if (ms >= 300) mapper.addPoses(ms, ms);
-    mapper.addSteady(0, ms, ms + 10);
-    mapper.takeAll();
-  }
-  mapper.end();
-  EXPECT_EQ(mapper.counts().total().used, 100U);
-  EXPECT_EQ(mapper.counts().total().dropped, 0U);
-  EXPECT_EQ(mapper.counts().total().without_pose, 309U) << "before and after the poses";
 }
 
 TEST(FusionMapper, WindowsWithoutEventsMakeNoKeyframes) {

@@ -12,7 +12,6 @@
 
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/depth/same_image.h"
-#include "test/mapping/geometry/plane_position.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/keyframes/random_recording.h"
 #include "test/mapping/motion/moving_edges.h"
@@ -46,28 +45,6 @@ KeyframeDepthMap map(const Recording& recording, const std::vector<int>& cameras
 KeyframeDepthMap map(const MovingEdges& recording, const KeyframeMapperOptions& options) {
   return map(recording, recording.cameras(), options);
 }
-
-/// How two maps agree.
-struct Agreement {
-  int kept = 0;  ///< In either map.
-  int same = 0;  ///< In both, within a tenth of a plane.
-
-  Agreement(const DepthMap& a, const DepthMap& b) {
-    const DepthPlanes planes(kPlanes);
-    for (int y = 0; y < a.depth.rows; ++y) {
-      for (int x = 0; x < a.depth.cols; ++x) {
-        const float da = a.depth(y, x);
-        const float db = b.depth(y, x);
-        if (da == 0 && db == 0) continue;
-        ++kept;
-        if (da == 0 || db == 0) continue;
-        same += std::abs(test::planePosition(planes, da) - test::planePosition(planes, db)) < 0.1
-                    ? 1
-                    : 0;
-      }
-    }
-  }
-};
 
 class KeyframeDefaultsOn : public ::testing::TestWithParam<VotingKernel> {};
 
@@ -179,23 +156,6 @@ TEST(KeyframeDefaults, WithEveryCameraSilentTheMapIsEmpty) {
       EXPECT_EQ(cv::countNonZero(keyframe.map.depth), 0);
       EXPECT_EQ(keyframe.camera_maps.size(), cameras.size());
     }
-  }
-}
-
-TEST(KeyframeDefaults, ACamerasMapIsThatOfAllItsEventsTogether) {
-  const MovingEdges recording(2);
-  KeyframeMapperOptions options = defaults();
-  const KeyframeDepthMap fused = map(recording, options);
-  EXPECT_THAT(fused.camera_maps, IsEmpty());
-  options.camera_maps = true;
-  const KeyframeDepthMap all = map(recording, options);
-  EXPECT_TRUE(same(all.map, fused.map)) << "beside the fused one, which stays";
-  ASSERT_EQ(all.camera_maps.size(), 2U);
-  options.split = SplitFusionOptions::none();  // groups are summed: only rounding differs
-  for (const CameraDepthMap& camera : all.camera_maps) {
-    const Agreement agreement(camera.map, map(recording, {camera.camera}, options).map);
-    EXPECT_GT(agreement.kept, 400);
-    EXPECT_GE(agreement.same, agreement.kept * 98 / 100) << "camera " << camera.camera;
   }
 }
 

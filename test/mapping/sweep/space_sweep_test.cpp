@@ -150,28 +150,6 @@ TEST_P(SpaceSweepOn, FromEventsTheDsiIsTheOraclesForAllRulesOrdersAndSplits) {
   }
 }
 
-TEST_P(SpaceSweepOn, EveryShuffleAndCountOfSubintervalsIsTheOracles) {
-  const Recording recording(51, 3, 8000);
-  for (const SplitFusionOptions& split : {SplitFusionOptions::none(), {true, 2}}) {
-    for (const auto by : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
-      KeyframeMapperOptions options = exactOptions(split, 4);
-      options.sweep.kernel = GetParam();
-      options.subintervals.split = by;
-      const Parts parts = exactParts(recording, options);
-      std::vector<std::vector<float>> dsis;
-      for (const auto shuffle :
-           {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
-        options.subintervals.shuffle = shuffle;
-        dsis.push_back(dsiOf(recording, options));
-        EXPECT_LE(errorOverMass(dsis.back(), exactDsi(parts, options)),
-                  test::errorOverMassOf(GetParam()))
-            << nameOf(by) << ", " << nameOf(shuffle);
-      }
-      EXPECT_NE(dsis[0], dsis[1]) << "a shift lets other sub-intervals meet";
-    }
-  }
-}
-
 // ---------------------------------------------------------------- other results
 
 /// Rays of all cameras and sub-intervals, as the keyframe mapper makes them, and the oracle's
