@@ -41,21 +41,6 @@ std::vector<float> naiveMedian(const cv::Mat1b& mask, const std::vector<float>& 
   return medians;
 }
 
-TEST(SparseMask, HasThePixelsOfTheMaskRowByRow) {
-  const cv::Mat1b mask = (cv::Mat1b(3, 4) << 0, 1, 0, 255, 0, 0, 0, 0, 1, 0, 0, 1);
-  const SparseMask kept(mask);
-  std::vector<cv::Point> pixels;
-  kept.forEach([&](std::size_t i, cv::Point at) {
-    EXPECT_EQ(i, pixels.size());
-    pixels.push_back(at);
-  });
-  EXPECT_EQ(pixels, (std::vector<cv::Point>{{1, 0}, {3, 0}, {0, 2}, {3, 2}}));
-  EXPECT_EQ(kept.size(), 4U);
-  EXPECT_EQ(kept.rowBegin(1), kept.rowBegin(2)) << "an empty row";
-}
-
-TEST(SparseMask, OfAnEmptyImageIsEmpty) { EXPECT_EQ(SparseMask(cv::Mat1b()).size(), 0U); }
-
 TEST(MaskedMedian, EqualsTheMedianOfTheSortedWindow) {
   std::mt19937 random(1);
   for (int trial = 0; trial < 60; ++trial) {
@@ -73,18 +58,6 @@ TEST(MaskedMedian, EqualsTheMedianOfTheSortedWindow) {
       EXPECT_EQ(maskedMedian(SparseMask(mask), values, window), naiveMedian(mask, values, window))
           << width << "x" << height << ", window " << window;
     }
-  }
-}
-
-TEST(MaskedMedian, OfALargeWindowIsTheMedianOfAll) {
-  const cv::Mat1b mask(100, 120, static_cast<unsigned char>(1));
-  std::mt19937 random(2);
-  std::vector<float> values(12'000);
-  for (float& value : values) value = std::uniform_real_distribution<float>(0, 99)(random);
-  std::vector<float> sorted = values;
-  std::sort(sorted.begin(), sorted.end());
-  for (const float median : maskedMedian(SparseMask(mask), values, 255)) {
-    ASSERT_EQ(median, sorted[(sorted.size() - 1) / 2]);
   }
 }
 

@@ -1,231 +1,169 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Examples worked out by hand; paper_extraction_oracle_test.cpp compares all steps with an oracle.
 #include "mapping/depth/paper_extraction.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 #include <random>
+#include <sstream>
 
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/options/refused_option.h"
+#include "test/oracle/naive_depth.h"
 
 namespace efm::paper_extraction_test {
 namespace {
 
-const DepthPlanes kPlanes({0.5, 5.0, 100, PlaneSpacing::kInverse});
-/// Variance of the peak's errors, as a fraction of the squared width.
-constexpr double kErrorOfWidth = 0.17;
+constexpr int kPlaneCount = 60;
 
-/// Peaks without neighbours, so that each lies exactly on its plane.
-DsiPeaks flatPeaks(int width, int height) {
-  return {cv::Mat1f::zeros(height, width), cv::Mat1i::zeros(height, width),
-          cv::Mat1f(height, width, -1.0F), cv::Mat1f(height, width, -1.0F)};
+DsiPeaks emptyPeaks(cv::Size size) {
+  return {cv::Mat1f::zeros(size), cv::Mat1i::zeros(size), cv::Mat1f(size, -1.0F),
+          cv::Mat1f(size, -1.0F)};
 }
 
-void setPeak(DsiPeaks& peaks, cv::Point pixel, float confidence, int plane) {
-  peaks.confidence(pixel) = confidence;
-  peaks.plane(pixel) = plane;
+/// Fills in the neighbours of a peak as a DSI would: none beyond the first and the last plane.
+void setPeak(DsiPeaks& peaks, cv::Point at, int plane, std::mt19937& random) {
+  const float peak = peaks.confidence(at);
+  const auto below = [&] { return peak * std::uniform_real_distribution<float>(0.5F, 1)(random); };
+  peaks.plane(at) = plane;
+  peaks.before(at) = plane == 0 ? -1.0F : below();
+  peaks.after(at) = plane == kPlaneCount - 1 ? -1.0F : below();
+}
+
+/// Nothing like a scene: every pixel has its own confidence and plane.
+DsiPeaks noisePeaks(cv::Size size, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  DsiPeaks peaks = emptyPeaks(size);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      peaks.confidence(y, x) = std::exponential_distribution<float>(0.2F)(random);
+      setPeak(peaks, {x, y}, static_cast<int>(random() % kPlaneCount), random);
+    }
+  }
+  return peaks;
+}
+
+/// Ridges of votes along slanted edges over a low floor, as a keyframe has them.
+DsiPeaks ridgePeaks(cv::Size size, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  DsiPeaks peaks = emptyPeaks(size);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const double phase = 0.21 * x + 0.08 * y;
+      const double ridge = std::exp(-8 * std::pow(std::sin(phase), 2));
+      // Whole votes, so that some neighbours are equal.
+      peaks.confidence(y, x) =
+          static_cast<float>(std::floor(40 * ridge) + static_cast<double>(random() % 4));
+      const int plane = 20 + static_cast<int>(15 * std::sin(0.05 * x)) +
+                        static_cast<int>(random() % 3) - static_cast<int>(random() % 3);
+      setPeak(peaks, {x, y}, plane, random);
+    }
+  }
+  return peaks;
+}
+
+std::vector<DepthExtractionOptions> manyOptions() {
+  std::vector<DepthExtractionOptions> all;
+  for (const int kernel : {3, 5, 9}) {
+    for (const double c : {-255.0, 0.0, 5.0, 12.5}) {
+      for (const int median : {1, 3, 5, 15, 255}) {
+        DepthExtractionOptions options;
+        options.threshold_kernel = kernel;
+        options.threshold_c = c;
+        options.median_size = median;
+        options.dilate = median == 5 || median == 255;
+        options.subplane = median != 3;
+        if (c == 5) options.max_confidence.level = WhiteLevel::kSequence;
+        if (c == 12.5 && median > 3) options.max_confidence = MaxConfidence::of(17.5);
+        all.push_back(options);
+      }
+    }
+  }
+  return all;
+}
+
+/// Depth extraction against its steps written down one by one: the same, bit for bit.
+void expectSame(const DsiPeaks& peaks, const DepthExtractionOptions& options) {
+  const bool linear = options.threshold_kernel == 5;
+  const DepthPlanes planes(
+      {0.5, 5.0, kPlaneCount, linear ? PlaneSpacing::kLinear : PlaneSpacing::kInverse});
+  const cv::Mat1f confidence = peaks.confidence.clone();
+  for (const auto sequence : {std::optional<double>(), {23.5}}) {
+    EXPECT_TRUE(test::same(extractAsPaper(peaks, planes, options, sequence),
+                           oracle::extractDepth(peaks, planes, options, sequence)));
+    EXPECT_TRUE(test::same(peaks.confidence, confidence)) << "the peaks are left alone";
+  }
+}
+
+std::string described(cv::Size size, const DepthExtractionOptions& options) {
+  std::ostringstream words;
+  words << size << ", kernel " << options.threshold_kernel << ", C " << options.threshold_c
+        << ", median " << options.median_size << (options.dilate ? ", dilated" : "");
+  return words.str();
+}
+
+TEST(PaperExtraction, IsTheOraclesForAnySizeAndOptions) {
+  for (const cv::Size& size : {cv::Size(1, 1), {5, 1}, {1, 6}, {4, 4}, {5, 5}, {17, 9}, {33, 31}}) {
+    for (const DepthExtractionOptions& options : manyOptions()) {
+      SCOPED_TRACE(described(size, options));
+      expectSame(noisePeaks(size, 1), options);
+      expectSame(ridgePeaks(size, 2), options);
+      expectSame(emptyPeaks(size), options);
+    }
+  }
 }
 
 /// One bright pixel in the middle of 9x9.
 DsiPeaks onePeak(int plane, float before, float peak, float after) {
-  DsiPeaks peaks = flatPeaks(9, 9);
-  setPeak(peaks, {4, 4}, peak, plane);
+  DsiPeaks peaks = emptyPeaks({9, 9});
+  peaks.confidence(4, 4) = peak;
+  peaks.plane(4, 4) = plane;
   peaks.before(4, 4) = before;
   peaks.after(4, 4) = after;
   return peaks;
 }
 
-DsiPeaks randomPeaks(int width, int height, unsigned seed) {
-  std::mt19937 random(seed);
-  DsiPeaks peaks = flatPeaks(width, height);
-  for (float& c : peaks.confidence) c = std::exponential_distribution<float>(0.2F)(random);
-  for (int& plane : peaks.plane) plane = std::uniform_int_distribution<int>(0, 99)(random);
-  return peaks;
-}
-
-DepthExtractionOptions plain(bool dilate = false) {
-  DepthExtractionOptions options;
-  options.median_size = 1;
-  options.subplane = false;
-  options.dilate = dilate;
-  return options;
-}
-
-TEST(PaperExtraction, KeepsThePixelsAboveTheGaussianMeanOfTheirSurroundings) {
-  const DsiPeaks peaks = randomPeaks(60, 40, 1);
-  DepthExtractionOptions options = plain();
-  options.threshold_c = 7;
-  const DepthMap map = extractAsPaper(peaks, kPlanes, options);
-
-  const double maximum = *std::max_element(peaks.confidence.begin(), peaks.confidence.end());
-  cv::Mat1f grey(40, 60);
-  for (int y = 0; y < 40; ++y) {
-    for (int x = 0; x < 60; ++x) {
-      grey(y, x) = static_cast<float>(std::nearbyint(255.0 * peaks.confidence(y, x) / maximum));
-    }
-  }
-  // OpenCV's Gaussian of side 5 is the binomial one.
-  const cv::Mat1f weights = (cv::Mat1f(5, 1) << 1, 4, 6, 4, 1) / 16.0F;
-  cv::Mat1f blurred;
-  cv::sepFilter2D(grey, blurred, CV_32F, weights, weights, {-1, -1}, 0, cv::BORDER_REPLICATE);
-  int differing = 0;
-  int kept = 0;
-  for (int y = 2; y < 38; ++y) {
-    for (int x = 2; x < 58; ++x) {
-      const bool expected = grey(y, x) - std::nearbyint(blurred(y, x)) > 7;
-      kept += expected ? 1 : 0;
-      differing += expected != (map.depth(y, x) > 0) ? 1 : 0;
-    }
-  }
-  EXPECT_GT(kept, 200);
-  EXPECT_EQ(differing, 0);
-}
-
-TEST(PaperExtraction, AKeptPixelHasTheDepthOfItsPlaneAndItsVarianceInInverseDepth) {
-  // Inverse depths 0.1 / m apart.
+TEST(PaperExtraction, AKeptPixelHasTheDepthAtItsPeakAndItsVarianceInInverseDepth) {
+  // Inverse depths 0.1 / m apart; the peak is (7 - 6) / (2 (16 - 13)) = 1/6 of a plane off.
   const DepthPlanes planes({1.0, 2.0, 6, PlaneSpacing::kInverse});
-  const DepthMap map = extractAsPaper(onePeak(3, 7, 8, 7), planes, {});
+  const DepthMap map = extractAsPaper(onePeak(3, 6, 8, 7), planes, {});
   EXPECT_EQ(cv::countNonZero(map.depth), 1);
-  EXPECT_EQ(map.depth(4, 4), static_cast<float>(planes.depth(3)));
+  EXPECT_NEAR(map.depth(4, 4), 1 / (0.7 - 0.1 / 6), 1e-6);
   EXPECT_EQ(map.confidence(4, 4), 8.0F);
-  EXPECT_NEAR(map.variance(4, 4), 0.1 * 0.1 * kErrorOfWidth * 4, 1e-8);
+  EXPECT_NEAR(map.variance(4, 4), 0.1 * 0.1 * 0.17 * 8 / 3, 1e-8);
   EXPECT_EQ(cv::countNonZero(map.variance), 1) << "0 where there is no depth";
-}
-
-TEST(PaperExtraction, SubPlanePositionsLieBetweenThePlanes) {
-  // Offset (9 - 8) / (2 * (20 - 17)) = 1/6 of a plane.
-  const DepthMap map = extractAsPaper(onePeak(37, 8, 10, 9), kPlanes, {});
-  EXPECT_NEAR(map.depth(4, 4), kPlanes.depthAt(37 + 1.0 / 6), 1e-6);
-}
-
-TEST(PaperExtraction, MoreThan255PlanesKeepTheirIndex) {
   const DepthPlanes many({0.5, 5.0, 5000, PlaneSpacing::kInverse});
-  const DepthMap map = extractAsPaper(onePeak(4321, -1, 10, -1), many, {});
-  EXPECT_NEAR(map.depth(4, 4), many.depth(4321), 1e-6);
-}
-
-TEST(PaperExtraction, TheMedianIsTheLowerOneOfTheKeptPixelsAlone) {
-  DsiPeaks peaks = flatPeaks(40, 9);
-  // Kept pixels four apart; the others have plane 99.
-  peaks.plane.setTo(99);
-  for (int i = 0; i < 4; ++i) setPeak(peaks, {10 + 4 * i, 4}, 10, 10 + 10 * i);
-  DepthExtractionOptions options;
-  options.subplane = false;
-  options.median_size = 9;  // contains the neighbours on both sides
-  const DepthMap map = extractAsPaper(peaks, kPlanes, options);
-  EXPECT_EQ(map.depth(4, 10), static_cast<float>(kPlanes.depth(10))) << "of {10, 20}";
-  EXPECT_EQ(map.depth(4, 14), static_cast<float>(kPlanes.depth(20))) << "of {10, 20, 30}";
-  EXPECT_EQ(map.depth(4, 18), static_cast<float>(kPlanes.depth(30))) << "of {20, 30, 40}";
-  EXPECT_EQ(map.depth(4, 22), static_cast<float>(kPlanes.depth(30))) << "of {30, 40}";
-}
-
-TEST(PaperExtraction, AFrameOfTwoPixelsIsClearedOnAllFourSides) {
-  const DepthMap map = extractAsPaper(randomPeaks(30, 20, 2), kPlanes, plain());
-  const cv::Rect inner(2, 2, 26, 16);
-  EXPECT_EQ(cv::countNonZero(map.depth), cv::countNonZero(map.depth(inner)));
-  for (const cv::Rect& side : {cv::Rect(2, 2, 26, 1), cv::Rect(2, 17, 26, 1), cv::Rect(2, 2, 1, 16),
-                               cv::Rect(27, 2, 1, 16)}) {
-    EXPECT_GT(cv::countNonZero(map.depth(side)), 0) << "the next pixels have depths";
-  }
-}
-
-TEST(PaperExtraction, AnEmptyDsiGivesAnEmptyMap) {
-  for (const cv::Size& size : {cv::Size(16, 16), {3, 2}}) {
-    const DepthMap map = extractAsPaper(flatPeaks(size.width, size.height), kPlanes, {});
-    EXPECT_EQ(cv::countNonZero(map.depth), 0);
-  }
-}
-
-TEST(PaperExtraction, VarianceWithLinearSpacingDependsOnTheStepsAroundThePeak) {
-  // 1, 1.5, 2, 2.5, 3 m. Around 2 m: from 1.75 to 2.25 m.
-  const DepthPlanes planes({1.0, 3.0, 5, PlaneSpacing::kLinear});
-  const double step = 1 / 1.75 - 1 / 2.25;
-  EXPECT_NEAR(planes.inverseDepthStepAt(2), step, 1e-12);
-  const DepthMap map = extractAsPaper(onePeak(2, 7, 8, 7), planes, {});
-  EXPECT_NEAR(map.variance(4, 4), step * step * kErrorOfWidth * 4, 1e-7);
-}
-
-TEST(PaperExtraction, VarianceIsInfiniteAtTheLimitsOnFlatPeaksAndForASinglePlane) {
-  for (const PlaneSpacing spacing : {PlaneSpacing::kInverse, PlaneSpacing::kLinear}) {
-    const DepthPlanes planes({1.0, 3.0, 5, spacing});
-    for (const auto& peaks : {onePeak(0, -1, 8, 7), onePeak(4, 7, 8, -1), onePeak(2, 8, 8, 8)}) {
-      EXPECT_TRUE(std::isinf(extractAsPaper(peaks, planes, {}).variance(4, 4)));
-    }
-  }
+  EXPECT_NEAR(extractAsPaper(onePeak(4321, -1, 10, -1), many, {}).depth(4, 4), many.depth(4321),
+              1e-6);
   const DepthPlanes single({1.0, 3.0, 1, PlaneSpacing::kInverse});
-  const DepthMap map = extractAsPaper(onePeak(0, -1, 8, -1), single, {});
-  EXPECT_EQ(map.depth(4, 4), 1.0F);
-  EXPECT_TRUE(std::isinf(map.variance(4, 4))) << map.variance(4, 4);
-}
-
-TEST(PaperExtraction, DilationGrowsAPixelIntoItsFourNeighbours) {
-  const DsiPeaks peaks = onePeak(37, 5, 10, 5);
-  const DepthMap kept = extractAsPaper(peaks, kPlanes, plain());
-  const DepthMap map = extractAsPaper(peaks, kPlanes, plain(true));
-  const cv::Mat1b cross = cv::getStructuringElement(cv::MORPH_CROSS, {3, 3});
-  EXPECT_EQ(cv::countNonZero(map.depth), 5);
-  EXPECT_EQ(cv::countNonZero((map.depth(cv::Rect(3, 3, 3, 3)) > 0) != (cross > 0)), 0);
-  for (const cv::Point& adjacent : {cv::Point(3, 4), {5, 4}, {4, 3}, {4, 5}}) {
-    EXPECT_EQ(map.depth(adjacent), kept.depth(4, 4));
-    EXPECT_EQ(map.confidence(adjacent), 10.0F);
-    EXPECT_EQ(map.variance(adjacent), kept.variance(4, 4));
-  }
-}
-
-TEST(PaperExtraction, DilationCopiesTheMostConfidentNeighbourAndOfEqualsTheNearer) {
-  DsiPeaks peaks = flatPeaks(13, 11);
-  setPeak(peaks, {4, 5}, 8, 20);
-  setPeak(peaks, {6, 5}, 10, 60);
-  setPeak(peaks, {8, 5}, 10, 30);
-  const DepthMap map = extractAsPaper(peaks, kPlanes, plain(true));
-  EXPECT_EQ(map.depth(5, 5), static_cast<float>(kPlanes.depth(60))) << "10 before 8";
-  EXPECT_EQ(map.depth(5, 7), static_cast<float>(kPlanes.depth(30))) << "the nearer of two 10s";
+  const DepthMap flat = extractAsPaper(onePeak(0, -1, 8, -1), single, {});
+  EXPECT_EQ(flat.depth(4, 4), 1.0F);
+  EXPECT_TRUE(std::isinf(flat.variance(4, 4))) << flat.variance(4, 4);
 }
 
 TEST(PaperExtraction, AFixedMaximumClipsAndMakesKeyframesComparable) {
   DepthExtractionOptions options;
   const auto kept = [&](double white) {
     options.max_confidence = MaxConfidence::of(white);
-    return cv::countNonZero(extractAsPaper(onePeak(0, -1, 10, -1), kPlanes, options).depth);
+    return cv::countNonZero(extractAsPaper(onePeak(0, -1, 10, -1), DepthPlanes(), options).depth);
   };
   EXPECT_EQ(kept(1000), 0) << "10 of 1000 is 3 grey values of 255: below C = 5";
   EXPECT_EQ(kept(5), 1);
 }
 
-TEST(PaperExtraction, TheSequenceMaximumThresholdsLikeTheSameFixedNumber) {
-  const DsiPeaks peaks = randomPeaks(32, 24, 6);
-  const auto fixed = [&](double white) {
-    DepthExtractionOptions options;
-    options.max_confidence = MaxConfidence::of(white);
-    return extractAsPaper(peaks, kPlanes, options);
-  };
-  DepthExtractionOptions sequence;
-  sequence.max_confidence.level = WhiteLevel::kSequence;
-  for (const double white : {4.0, 11.0, 37.5, 200.0}) {
-    EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, sequence, white), fixed(white))) << white;
-  }
-  const double own = *std::max_element(peaks.confidence.begin(), peaks.confidence.end());
-  EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, sequence), fixed(own)))
-      << "without a sequence maximum, the keyframe's own";
-  EXPECT_TRUE(test::same(extractAsPaper(peaks, kPlanes, {}, 1000.0), fixed(own)))
-      << "the keyframe's own by default";
-}
-
-TEST(PaperExtraction, InvalidOptionsAreNamed) {
-  using Options = DepthExtractionOptions;
-  using test::expectRefused;
-  expectRefused<Options>("threshold_kernel = 4", [](auto& o) { o.threshold_kernel = 4; });
-  expectRefused<Options>("threshold_c = 300", [](auto& o) { o.threshold_c = 300; });
-  expectRefused<Options>("max_confidence = 0",
-                         [](auto& o) { o.max_confidence = MaxConfidence::of(0); });
-  expectRefused<Options>("median_size = 0", [](auto& o) { o.median_size = 0; });
-  expectRefused<Options>("min_local_contrast = 0", [](auto& o) { o.min_local_contrast = 0; });
-  expectRefused<Options>("min_quality = -1", [](auto& o) { o.min_quality = -1; });
+TEST(DepthExtractionOptions, HaveTheirLimits) {
+  using O = DepthExtractionOptions;
+  const auto white = [](O& o, double votes) { o.max_confidence = MaxConfidence::of(votes); };
+  test::expectLimits<O>(
+      {{"threshold_kernel", &O::threshold_kernel, {3, 255}, {1, 2, 4, 256, 257}},
+       {"threshold_c", &O::threshold_c, {-255, 255}, {-255.5, 255.5, NAN}},
+       {"max_confidence", white, {1e-9}, {0, -1, NAN, INFINITY}},
+       {"min_local_contrast", &O::min_local_contrast, {1e-30}, {0, -1, NAN, INFINITY}},
+       {"min_quality", &O::min_quality, {0, 1e6}, {-1e-9, NAN, INFINITY}},
+       {"median_size", &O::median_size, {1, 255}, {-1, 0, 2, 256, 257}}});
 }
 
 }  // namespace

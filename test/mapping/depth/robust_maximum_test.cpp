@@ -14,29 +14,13 @@
 namespace efm::robust_maximum_test {
 namespace {
 
-TEST(RobustMaximum, IsNothingBeforeTheFirstValue) { EXPECT_FALSE(RobustMaximum().value()); }
-
-TEST(RobustMaximum, IsTheMaximumOfFewerThanTwentyValues) {
-  RobustMaximum maximum;
-  for (int i = 1; i <= 19; ++i) {
-    maximum.add(i % 2 == 0 ? i : -i);
-    EXPECT_EQ(*maximum.value(), i == 1 ? -1 : i / 2 * 2);
-  }
-}
-
-TEST(RobustMaximum, OneOutlierInTwentyDoesNotMoveIt) {
-  RobustMaximum maximum;
-  maximum.add(1e9);
-  for (int i = 1; i <= 19; ++i) maximum.add(i);
-  EXPECT_EQ(*maximum.value(), 19);
-}
-
 TEST(RobustMaximum, IsTheSmallestValueThatNinetyFivePercentDoNotExceed) {
   std::mt19937 random(1);
   RobustMaximum maximum;
+  EXPECT_FALSE(maximum.value());
   std::vector<double> values;
   for (int n = 1; n <= 300; ++n) {
-    const double value = static_cast<double>(random() % 100);  // many of them equal
+    const double value = static_cast<double>(random() % 100) - 50;  // many are equal
     maximum.add(value);
     values.push_back(value);
     std::vector<double> sorted = values;

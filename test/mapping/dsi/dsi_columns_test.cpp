@@ -231,24 +231,5 @@ TEST(DsiColumns, AddToAddsTheWeightedColumn) {
                                         {11.0F, 24.0F, 30.0F}));
 }
 
-TEST(DsiColumns, OfATileLieAtItsPositionInTheView) {
-  cv::Mat1f confidence = cv::Mat1f::zeros(2, 2);
-  confidence(1, 0) = 5;
-  TileVolume volume(1, 4);
-  volume.setPlane(0, {0, 0, 5, 0});
-  std::vector<DsiColumns::Tile> tiles = {
-      DsiColumns::select({3, 1, 2, 2}, confidence, volume, 1, 3)};
-  const DsiColumns columns({6, 4}, 1, std::move(tiles));
-  EXPECT_EQ(columns.size(), 1U);
-  ASSERT_TRUE(columns.has({3, 2}));
-  EXPECT_FLOAT_EQ(columns.value({3, 2}, 0), 5);
-}
-
-TEST(DsiColumns, AnEmptyDsiHasNone) {
-  const DsiColumns columns = selectInTiles(cv::Mat1f::zeros(70, 70), 5);
-  EXPECT_EQ(columns.size(), 0U);
-  EXPECT_FALSE(columns.has({35, 35}));
-}
-
 }  // namespace
 }  // namespace efm

@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/dsi/plane_fusion.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
-#include <set>
-#include <stdexcept>
-#include <utility>
 #include <vector>
 
 #include "test/oracle/naive_mapper.h"
@@ -119,17 +115,6 @@ TEST(PlaneFusion, IsTheOraclesSumOfGroupsUnderAllRulesAndOrders) {
   });
 }
 
-TEST(PlaneFusion, IsTheSumOfEachGroupFusedAloneBitForBit) {
-  forEachCase(2, [](const Densities& densities, const FusionOptions& options) {
-    PlaneValues sum(kVoxels, 0.0F);
-    for (int group = 0; group < densities.inputs.groups; ++group) {
-      const PlaneValues alone = fuse(densities.group(group), options);
-      for (std::size_t i = 0; i < kVoxels; ++i) sum[i] += alone[i];
-    }
-    ASSERT_EQ(fuse(densities, options), sum);
-  });
-}
-
 TEST(PlaneFusion, CamerasThatAreKeptAreFusedAcrossTimeAloneAndChangeNothing) {
   forEachCase(3, [](const Densities& densities, const FusionOptions& options) {
     PlaneFusion fusion(options, densities.inputs, kVoxels, PlaneFusion::Keep::kCameras);
@@ -151,37 +136,6 @@ TEST(PlaneFusion, NothingIsLeftFromThePlaneBefore) {
     ASSERT_EQ(fusion.fused(), fuse(second, options));
     ASSERT_EQ(fusion.ofCamera(0), fuse(second.camera(0), options));
   });
-}
-
-TEST(PlaneFusion, DifferentRulesDoNotCommute) {
-  const Densities densities{{2, 2, 1},
-                            {{PlaneValues(kVoxels, 1), PlaneValues(kVoxels, 9)},
-                             {PlaneValues(kVoxels, 4), PlaneValues(kVoxels, 1)}}};
-  const FusionRule h = FusionRule::kHarmonic;
-  const FusionRule a = FusionRule::kArithmetic;
-  // (H(1, 4) + H(9, 1)) / 2 = (1.6 + 1.8) / 2, and H(5, 2.5) = 10 / 3.
-  EXPECT_FLOAT_EQ(fuse(densities, {h, a, FusionOrder::kCamerasThenTime})[0], 1.7F);
-  EXPECT_FLOAT_EQ(fuse(densities, {h, a, FusionOrder::kTimeThenCameras})[0], 10.0F / 3);
-}
-
-TEST(PlaneFusion, EveryInputOfEveryGroupIsAddedOnce) {
-  for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
-    const PlaneFusion fusion({FusionRule::kMin, FusionRule::kMax, order}, {3, 2, 4}, kVoxels);
-    std::set<std::pair<int, int>> inputs;
-    for (const CameraSlot& input : fusion.inputs()) inputs.emplace(input.camera, input.slot);
-    EXPECT_EQ(fusion.inputs().size(), 24U);
-    EXPECT_EQ(inputs.size(), 24U);
-    EXPECT_EQ(*inputs.rbegin(), std::make_pair(2, 7));
-  }
-}
-
-TEST(FusionOrder, NamesGoBothWays) {
-  for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
-    EXPECT_EQ(fusionOrderFromName(nameOf(order)), order);
-  }
-  EXPECT_THAT([] { fusionOrderFromName("both"); },
-              ::testing::ThrowsMessage<std::invalid_argument>(::testing::AllOf(
-                  ::testing::HasSubstr("'both'"), ::testing::HasSubstr("time_then_cameras"))));
 }
 
 }  // namespace

@@ -21,13 +21,6 @@ constexpr VotingKernel kAll[] = {VotingKernel::kPlain,  VotingKernel::kBaseline,
                                  VotingKernel::kSse4,   VotingKernel::kAvx2,
                                  VotingKernel::kAvx512, VotingKernel::kNeon};
 
-TEST(VotingKernel, NamesGoBothWays) {
-  for (const VotingKernel kernel : kAll) EXPECT_EQ(votingKernelFromName(nameOf(kernel)), kernel);
-  EXPECT_THAT([] { votingKernelFromName("gpu"); },
-              ThrowsMessage<std::invalid_argument>(
-                  AllOf(HasSubstr("'gpu'"), HasSubstr("plain"), HasSubstr("avx512"))));
-}
-
 TEST(VotingKernel, PlainIsTheFirstOfTheAvailableOnes) {
   EXPECT_EQ(availableKernels().front(), VotingKernel::kPlain);
   EXPECT_TRUE(std::is_sorted(availableKernels().begin(), availableKernels().end()));

@@ -39,12 +39,18 @@ TEST(EvenChoice, HasNoRegularStep) {
 }
 
 TEST(EvenChoice, WithoutALimitTheEventsAreNotCopied) {
-  const std::vector<Event> events(50);
-  std::vector<Event> buffer;
+  std::vector<Event> events(50);
+  for (std::size_t i = 0; i < events.size(); ++i) events[i].x = static_cast<std::uint16_t>(i);
+  std::vector<Event> buffer(3);
   for (const std::size_t limit : {0U, 50U, 51U}) {
     EXPECT_EQ(chooseEvenly(events, limit, buffer).begin(), events.data());
+    EXPECT_EQ(chosenEvenly(events, limit), events);
   }
-  EXPECT_EQ(chooseEvenly(events, 49, buffer).size(), 49U);
+  const std::vector<Event> chosen = chosenEvenly(events, 9);
+  const EvenChoice choice(50, 9);
+  ASSERT_EQ(chosen.size(), 9U);
+  for (std::size_t k = 0; k < 9; ++k) EXPECT_EQ(chosen[k].x, choice[k]);
+  EXPECT_EQ(chooseEvenly(events, 9, buffer).size(), 9U);
   EXPECT_TRUE(chooseEvenly({}, 1, buffer).empty());
 }
 

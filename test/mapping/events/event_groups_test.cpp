@@ -1,21 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/events/event_groups.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <stdexcept>
-#include <string>
 #include <vector>
 
 #include "test/mapping/keyframes/random_scene.h"
+#include "test/mapping/options/refused_option.h"
 
 namespace efm::event_groups_test {
 namespace {
-
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr Window kWindow{0, 1200, 600};  // every number of sub-intervals below divides it
 
@@ -102,26 +97,10 @@ TEST(EventGroups, InputsMeetInTheSameGroupsAndInTheirShuffledSlots) {
 }
 
 TEST(SplitFusionOptions, AreTwoSlicesOfTwoPolaritiesAndNoneIsOneGroup) {
-  EXPECT_EQ(SplitFusionOptions().polarities(), 2);
-  EXPECT_EQ(SplitFusionOptions().time_slices, 2);
-  EXPECT_EQ(SplitFusionOptions::none().polarities(), 1);
-  EXPECT_EQ(SplitFusionOptions::none().time_slices, 1);
-}
-
-TEST(SplitFusionOptions, SlicesOutOfRangeAreNamed) {
-  for (const int slices : {-1, 0, 1001}) {
-    SplitFusionOptions options;
-    options.time_slices = slices;
-    EXPECT_THAT(
-        [&] { options.validate(); },
-        ThrowsMessage<std::invalid_argument>(HasSubstr("time_slices = " + std::to_string(slices))));
-  }
-  for (const int slices : {1, 1000}) {
-    SplitFusionOptions options;
-    options.time_slices = slices;
-    EXPECT_NO_THROW(options.validate());
-  }
-  EXPECT_NO_THROW(SplitFusionOptions().validate());
+  using O = SplitFusionOptions;
+  EXPECT_EQ(O().polarities() * 10 + O().time_slices, 22);
+  EXPECT_EQ(O::none().polarities() * 10 + O::none().time_slices, 11);
+  test::expectLimits<O>({{"time_slices", &O::time_slices, {1, 1000}, {-1, 0, 1001}}});
 }
 
 }  // namespace

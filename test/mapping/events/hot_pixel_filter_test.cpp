@@ -61,49 +61,13 @@ std::vector<bool> naivelyHot(const std::vector<Event>& events, int width, int he
   return hot;
 }
 
-TEST(HotPixelFilter, APixelThatFiresAloneIsHotFromMinEventsOn) {
-  HotPixelFilter filter(20, 10, fewEvents());
-  for (int i = 1; i <= 40; ++i) {
-    EXPECT_EQ(filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3)), i >= 6) << i;
-  }
-}
-
-TEST(HotPixelFilter, APixelIsNotHotAfterAQuietPeriod) {
-  HotPixelFilter filter(20, 10, fewEvents());
-  for (int i = 0; i < 40; ++i) filter.isHot(eventAt(1000 * kMs + i * kMs, 7, 3));
-  EXPECT_TRUE(filter.isHot(eventAt(1199 * kMs, 7, 3))) << "in the period after";
-  EXPECT_FALSE(filter.isHot(eventAt(1300 * kMs, 7, 3))) << "a whole period of one event later";
-}
-
-TEST(HotPixelFilter, NoPixelOfAMovingEdgeIsHot) {
-  HotPixelFilter filter(20, 10, fewEvents());
-  for (int step = 0; step < 60; ++step) {
-    const int x = step % 20;  // to the right border, and again from the left
-    for (int burst = 0; burst < 30; ++burst) {
-      for (int y = 0; y < 10; ++y) {
-        EXPECT_FALSE(filter.isHot(eventAt(1000 * kMs + step * 10 * kMs, x, y))) << x << ", " << y;
-      }
-    }
-  }
-}
-
-TEST(HotPixelFilter, OnlyTheEndsOfAFlickeringLineAreHot) {
-  HotPixelFilter filter(20, 10, fewEvents());
-  for (int burst = 1; burst <= 100; ++burst) {
-    for (int y = 2; y < 8; ++y) {
-      const bool hot = filter.isHot(eventAt(1000 * kMs + burst * kMs, 7, y));
-      EXPECT_EQ(hot, burst >= 6 && (y == 2 || y == 7)) << "row " << y;
-    }
-  }
-}
-
 TEST(HotPixelFilter, ManyMoreEventsThanFitACountAreStillHot) {
   HotPixelOptions options = fewEvents();
   options.period_s = 100;
   HotPixelFilter filter(4, 4, options);
-  bool hot = false;
-  for (int i = 0; i < 200'000; ++i) hot = filter.isHot(eventAt(1000 * kMs + i, 1, 1));
-  EXPECT_TRUE(hot);
+  for (int i = 0; i < 200'000; ++i) {
+    ASSERT_EQ(filter.isHot(eventAt(1000 * kMs + i, 1, 1)), i >= 5) << i;
+  }
 }
 
 TEST(HotPixelFilter, EqualsTheDefinitionOverTheWholePast) {
@@ -112,17 +76,19 @@ TEST(HotPixelFilter, EqualsTheDefinitionOverTheWholePast) {
     test::RandomScene random(seed);
     CameraModel small = test::smallCamera();
     small.width = seed == 1 ? 1 : 6;
-    small.height = 5;
+    small.height = seed == 2 ? 1 : 5;
     // Also before time 0; few pixels, so that busy ones are adjacent.
     std::vector<Event> events = random.events(small, 900, -300 * kMs, 900 * kMs);
     for (Event& event : events) {
+      event.t_ns -= event.t_ns % (10 * kMs);  // also at the ends of periods
       const double kind = random.uniform(0, 1);
       if (kind < 0.4) event.x = event.y = 0;
-      if (kind > 0.4 && kind < 0.6 && small.width > 1) event.x = 3, event.y = 2;
-      if (kind > 0.6 && kind < 0.7 && small.width > 1) event.x = 4, event.y = 2;
+      if (seed <= 2) continue;
+      if (kind > 0.4 && kind < 0.6) event.x = 3, event.y = 2;
+      if (kind > 0.6 && kind < 0.7) event.x = 4, event.y = 2;
     }
     HotPixelOptions options = fewEvents();
-    options.ratio = random.uniform(2, 6);
+    options.ratio = 2 + seed % 5;
     const std::vector<bool> expected = naivelyHot(events, small.width, small.height, options);
     HotPixelFilter filter(small.width, small.height, options);
     for (std::size_t i = 0; i < events.size(); ++i) {
@@ -133,14 +99,11 @@ TEST(HotPixelFilter, EqualsTheDefinitionOverTheWholePast) {
   EXPECT_GT(found, 1000) << "both answers are there";
 }
 
-TEST(HotPixelOptions, InvalidValuesAreNamed) {
-  test::expectRefused<HotPixelOptions>("hot_pixel_ratio = 1.9", [](auto& o) { o.ratio = 1.9; });
-  test::expectRefused<HotPixelOptions>("hot_pixel_period_s = 0: must be",
-                                       [](auto& o) { o.period_s = 0; });
-  test::expectRefused<HotPixelOptions>("hot_pixel_period_s = nan: must be",
-                                       [](auto& o) { o.period_s = std::nan(""); });
-  test::expectRefused<HotPixelOptions>("hot_pixel_min_events = 1: must be",
-                                       [](auto& o) { o.min_events = 1; });
+TEST(HotPixelOptions, HaveTheirLimits) {
+  using O = HotPixelOptions;
+  test::expectLimits<O>({{"hot_pixel_ratio", &O::ratio, {2, 1000}, {1.9, 1001, NAN}},
+                         {"hot_pixel_period_s", &O::period_s, {0.001, 100}, {0, 0.00099, 101, NAN}},
+                         {"hot_pixel_min_events", &O::min_events, {2, 30'000}, {1, 30'001}}});
 }
 
 }  // namespace

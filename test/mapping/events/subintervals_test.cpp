@@ -8,14 +8,13 @@
 #include <map>
 #include <random>
 #include <set>
-#include <stdexcept>
+
+#include "test/mapping/options/refused_option.h"
 
 namespace efm::subintervals_test {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kNow_ns = 1'700'000'000'000'000'003;
 
@@ -34,12 +33,6 @@ SubintervalOptions into(int count, SubintervalSplit split) {
   options.count = count;
   options.split = split;
   return options;
-}
-
-std::vector<std::size_t> sizesOf(const std::vector<EventSpan>& parts) {
-  std::vector<std::size_t> sizes;
-  for (const EventSpan part : parts) sizes.push_back(part.size());
-  return sizes;
 }
 
 TEST(Subintervals, EveryEventIsInExactlyOnePartAndTheirOrderIsKept) {
@@ -84,16 +77,6 @@ TEST(Subintervals, PartsOfEqualDurationEndWhereTheExactFractionIsRoundedDown) {
   }
 }
 
-TEST(Subintervals, AnEventOnABoundaryBelongsToThePartThatBeginsThere) {
-  const std::int64_t t0_ns = kNow_ns;
-  const std::int64_t t1_ns = kNow_ns + 400'000'000;
-  const std::int64_t boundary_ns = kNow_ns + 100'000'000;
-  const auto events = eventsAt({t0_ns, boundary_ns - 1, boundary_ns, boundary_ns + 1, t1_ns - 1});
-  const auto parts =
-      splitIntoSubintervals(EventSpan(events), t0_ns, t1_ns, into(4, SubintervalSplit::kDuration));
-  EXPECT_THAT(sizesOf(parts), ElementsAre(2, 2, 0, 1));
-}
-
 TEST(Subintervals, AWindowOfAHundredYearsDoesNotOverflow) {
   const std::int64_t century_ns = 3'155'760'000'000'000'000;
   const auto events = eventsAt({0, century_ns / 1000 * 999 - 1, century_ns / 1000 * 999});
@@ -104,27 +87,19 @@ TEST(Subintervals, AWindowOfAHundredYearsDoesNotOverflow) {
   EXPECT_EQ(parts[999].size(), 1U);
 }
 
-TEST(Subintervals, PartsOfEqualCountAreEqualToWithinOne) {
+TEST(Subintervals, PartsOfEqualCountEndWhereTheExactFractionIsRoundedDown) {
   std::mt19937 random(3);
   for (int draw = 0; draw < 300; ++draw) {
-    std::vector<std::int64_t> times_ns(random() % 200, kNow_ns);  // all at once
-    const std::vector<Event> events = eventsAt(times_ns);
-    const int count = static_cast<int>(1 + random() % 30);
-    const auto sizes = sizesOf(splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + 1,
-                                                     into(count, SubintervalSplit::kCount)));
-    const auto [least, most] = std::minmax_element(sizes.begin(), sizes.end());
-    ASSERT_LE(*most - *least, 1U) << events.size() << " into " << count;
-  }
-}
-
-TEST(Subintervals, FewerEventsThanPartsLeavePartsEmpty) {
-  const auto events = eventsAt({kNow_ns, kNow_ns + 1});
-  for (const SubintervalSplit split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
+    const std::size_t size = random() % 200;
+    const std::vector<Event> events = eventsAt(std::vector<std::int64_t>(size, kNow_ns));
+    const std::size_t count = 1 + random() % 30;
     const auto parts =
-        splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + 2, into(8, split));
-    const auto sizes = sizesOf(parts);
-    EXPECT_EQ(std::count(sizes.begin(), sizes.end(), 1U), 2);
-    EXPECT_EQ(std::count(sizes.begin(), sizes.end(), 0U), 6);
+        splitIntoSubintervals(EventSpan(events), kNow_ns, kNow_ns + 1,
+                              into(static_cast<int>(count), SubintervalSplit::kCount));
+    for (std::size_t s = 0; s < count; ++s) {
+      ASSERT_EQ(parts[s].size(), size * (s + 1) / count - size * s / count)
+          << size << " into " << count;
+    }
   }
 }
 
@@ -137,9 +112,6 @@ TEST(SubintervalShuffle, NoneFusesTheSameSubintervals) {
 TEST(SubintervalShuffle, ShiftSpreadsTheCamerasOverTheWindow) {
   SubintervalOptions options = into(4, SubintervalSplit::kDuration);
   options.shuffle = SubintervalShuffle::kShift;
-  const auto two = assignSubintervals(2, options);
-  EXPECT_THAT(two[0], ElementsAre(0, 1, 2, 3));
-  EXPECT_THAT(two[1], ElementsAre(2, 3, 0, 1));
   for (int count = 1; count <= 12; ++count) {
     options.count = count;
     for (int cameras = 1; cameras <= 15; ++cameras) {
@@ -183,22 +155,9 @@ TEST(SubintervalShuffle, EveryPermutationComesAboutEquallyOften) {
   for (const auto& [permutation, count] : seen) EXPECT_NEAR(count, 1000, 145);
 }
 
-TEST(Subintervals, InvalidOptionsAndNamesAreNamed) {
-  EXPECT_THAT([] { into(0, SubintervalSplit::kCount).validate(); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("subintervals = 0")));
-  EXPECT_THAT([] { into(1001, SubintervalSplit::kCount).validate(); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("subintervals = 1001")));
-  for (const auto split : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
-    EXPECT_EQ(subintervalSplitFromName(nameOf(split)), split);
-  }
-  for (const auto shuffle :
-       {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
-    EXPECT_EQ(subintervalShuffleFromName(nameOf(shuffle)), shuffle);
-  }
-  EXPECT_THAT([] { subintervalSplitFromName("size"); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("'size'")));
-  EXPECT_THAT([] { subintervalShuffleFromName("deal"); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("'deal'")));
+TEST(Subintervals, OptionsHaveTheirLimits) {
+  using O = SubintervalOptions;
+  test::expectLimits<O>({{"subintervals", &O::count, {1, 1000}, {0, 1001}}});
 }
 
 }  // namespace

@@ -1,77 +1,64 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/geometry/depth_planes.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <limits>
-#include <stdexcept>
+#include <cmath>
 
-#include "test/mapping/geometry/plane_position.h"
+#include "test/mapping/options/refused_option.h"
 
 namespace efm::depth_planes_test {
 namespace {
 
-using ::testing::HasSubstr;
-using ::testing::ThrowsMessage;
-
-TEST(DepthPlanes, FirstAndLastPlaneAreTheRequestedLimits) {
+TEST(DepthPlanes, AreUniformBetweenExactLimits) {
   for (const PlaneSpacing spacing : {PlaneSpacing::kInverse, PlaneSpacing::kLinear}) {
-    for (const int count : {2, 3, 100, 500}) {
+    const bool inverse = spacing == PlaneSpacing::kInverse;
+    for (const int count : {1, 2, 3, 100, 500}) {
       const DepthPlanes planes({0.47, 2.4, count, spacing});
-      EXPECT_EQ(planes.size(), count);
+      ASSERT_EQ(planes.size(), count);
       EXPECT_EQ(planes.depth(0), 0.47);
-      EXPECT_EQ(planes.depth(count - 1), 2.4);
+      EXPECT_EQ(planes.depth(count - 1), count == 1 ? 0.47 : 2.4);
+      const int last = std::max(1, count - 1);
+      for (double position = 0; position <= count - 1; position += 0.25) {
+        const double way = position / last;
+        const double expected =
+            inverse ? 1 / (1 / 0.47 + way * (1 / 2.4 - 1 / 0.47)) : 0.47 + way * (2.4 - 0.47);
+        EXPECT_NEAR(planes.depthAt(position), expected, 1e-12) << position << " of " << count;
+        if (position == std::floor(position)) {
+          EXPECT_EQ(planes.depth(static_cast<int>(position)), planes.depthAt(position));
+        }
+      }
     }
   }
 }
 
-TEST(DepthPlanes, InverseSpacingIsUniformInInverseDepth) {
-  const DepthPlanes planes({0.5, 4.0, 8, PlaneSpacing::kInverse});
-  const double step = (1 / 0.5 - 1 / 4.0) / 7;
-  EXPECT_NEAR(planes.inverseDepthStep(), step, 1e-15);
-  for (int i = 1; i < planes.size(); ++i) {
-    EXPECT_NEAR(1 / planes.depth(i - 1) - 1 / planes.depth(i), step, 1e-14) << i;
+TEST(DepthPlanes, StepsAreDistancesOfPlanesInInverseDepth) {
+  for (const int count : {2, 100}) {
+    const DepthPlanes inverse({0.5, 5.0, count, PlaneSpacing::kInverse});
+    const double step = (1 / 0.5 - 1 / 5.0) / (count - 1);
+    EXPECT_NEAR(inverse.inverseDepthStep(), step, 1e-15);
+    for (const double way : {0.0, 0.002, 0.005, 0.4, 0.999, 1.0}) {
+      EXPECT_NEAR(inverse.inverseDepthStepAt(way * (count - 1)), step, 1e-12) << way;
+    }
   }
+  // 1, 1.5, 2, 2.5 and 3 m: half a plane to either side, as far as there are planes.
+  const DepthPlanes linear({1.0, 3.0, 5, PlaneSpacing::kLinear});
+  EXPECT_NEAR(linear.inverseDepthStep(), 1 - 1 / 1.5, 1e-15);
+  EXPECT_NEAR(linear.inverseDepthStepAt(0), (1 - 1 / 1.25) / 0.5, 1e-12);
+  EXPECT_NEAR(linear.inverseDepthStepAt(2), 1 / 1.75 - 1 / 2.25, 1e-12);
+  EXPECT_NEAR(linear.inverseDepthStepAt(3.8), (1 / 2.65 - 1.0 / 3) / 0.7, 1e-12);
+  const DepthPlanes one({0.5, 5.0, 1, PlaneSpacing::kInverse});
+  EXPECT_EQ(one.inverseDepthStep(), 0);
+  EXPECT_EQ(one.inverseDepthStepAt(0), 0);
 }
 
-TEST(DepthPlanes, LinearSpacingIsUniformInDepth) {
-  const DepthPlanes planes({1.0, 3.0, 5, PlaneSpacing::kLinear});
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(planes.depth(i), 1.0 + 0.5 * i, 1e-15) << i;
-}
-
-TEST(DepthPlanes, PositionsBetweenPlanesAreUniformLikeThePlanes) {
-  const DepthPlanes inverse({0.5, 5.0, 100, PlaneSpacing::kInverse});
-  const DepthPlanes linear({0.5, 5.0, 100, PlaneSpacing::kLinear});
-  for (const double position : {0.0, 0.25, 17.5, 98.9, 99.0}) {
-    EXPECT_NEAR(test::planePosition(inverse, inverse.depthAt(position)), position, 1e-10);
-    EXPECT_NEAR(linear.depthAt(position), 0.5 + 4.5 * position / 99, 1e-12);
-  }
-}
-
-TEST(DepthPlanes, OnePlaneLiesAtTheNearLimit) {
-  const DepthPlanes planes({0.5, 5.0, 1, PlaneSpacing::kInverse});
-  EXPECT_EQ(planes.size(), 1);
-  EXPECT_EQ(planes.depth(0), 0.5);
-  EXPECT_EQ(planes.depthAt(0), 0.5);
-}
-
-TEST(DepthPlanes, OptionsOutOfRangeAreNamed) {
-  const auto make = [](double near, double far, int count) {
-    return [=] { DepthPlanes({near, far, count, PlaneSpacing::kInverse}); };
-  };
-  EXPECT_THAT(make(0, 1, 10), ThrowsMessage<std::invalid_argument>(HasSubstr("min_depth_m = 0")));
-  EXPECT_THAT(make(2, 1, 10), ThrowsMessage<std::invalid_argument>(HasSubstr("max_depth_m = 1")));
-  EXPECT_THAT(make(1, 2, 0), ThrowsMessage<std::invalid_argument>(HasSubstr("num_planes = 0")));
-  EXPECT_THAT(make(std::numeric_limits<double>::quiet_NaN(), 2, 9),
-              ThrowsMessage<std::invalid_argument>(HasSubstr("min_depth_m = nan")));
-}
-
-TEST(DepthPlanes, StepsOfInverseSpacingAreTheSameEverywhere) {
-  const DepthPlanes planes({0.5, 5.0, 100, PlaneSpacing::kInverse});
-  for (const double position : {0.0, 0.2, 0.5, 41.7, 98.9, 99.0}) {
-    EXPECT_NEAR(planes.inverseDepthStepAt(position), planes.inverseDepthStep(), 1e-12) << position;
-  }
+TEST(DepthPlanes, OptionsHaveTheirLimits) {
+  using O = DepthPlanesOptions;
+  test::expectLimits<O>({{"min_depth_m", &O::min_depth_m, {0.001, 4.999}, {0, -1, 0.000999, NAN}},
+                         {"max_depth_m", &O::max_depth_m, {0.501, 1e6}, {0.5, 0.001, 0, 1'000'001}},
+                         {"max_depth_m", &O::max_depth_m, {}, {INFINITY, NAN}},
+                         {"num_planes", &O::num_planes, {1, 100'000}, {0, 100'001}}});
+  EXPECT_THROW(DepthPlanes({2, 1, 10, PlaneSpacing::kInverse}), std::invalid_argument);
 }
 
 }  // namespace

@@ -86,6 +86,7 @@ const std::vector<Lens> kLenses = {
     {"fisheye", 120, kEquidistant, {-0.048, 0.0113, -0.0554, 0.0215}, false},
     {"fisheye beyond 90 degrees", 100, kEquidistant, {0.05, 0.01, 0, 0}, false},
     {"fisheye that folds over and rises again", 160, kEquidistant, {-0.5, 0.1, 0.02, 0}, false},
+    {"fisheye that folds over twice", 440, kEquidistant, {-0.85, -0.15, 0.65, -0.2}, false},
 };
 
 CameraModel cameraOf(const Lens& lens) {

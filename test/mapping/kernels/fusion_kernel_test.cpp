@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "mapping/kernels/fusion.h"
@@ -83,21 +82,6 @@ TEST(FusionKernel, TheMeanOfTwoIsThatOfTheirSum) {
       // the rounding by.
       ASSERT_NEAR(pair[i], mean[i], 2e-5 * mean[i] + 1e-37)
           << rule.name << " of " << a[i] << " and " << b[i];
-    }
-  }
-}
-
-TEST(FusionKernel, AMeanOfTwoIsNeverBelowTheSmallerNorAboveTheLarger) {
-  std::mt19937 random(4);
-  const std::vector<float> a = randomValues(random, 4000, -37, 18);  // whose square is a float
-  const std::vector<float> b = randomValues(random, 4000, -37, 18);
-  for (const Rule& rule : kRules) {
-    const std::vector<float> pair = pairOf(rule, a, b);
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      // Below the normal floats a mean may be lost; squares are below them from 1e-19 down.
-      const double lost = rule.name == std::string("rms") ? 2e-19 : 2e-38;
-      ASSERT_GE(pair[i], std::min(a[i], b[i]) * (1 - 3e-7) - lost) << rule.name;
-      ASSERT_LE(pair[i], std::max(a[i], b[i]) * (1 + 3e-7) + lost) << rule.name;
     }
   }
 }

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "test/mapping/keyframes/known_recording.h"
@@ -84,27 +86,45 @@ TEST(KeyframePolicy, WindowsThatAreGivenUpPieceByPieceCountOnce) {
   }
 }
 
-TEST(KeyframePolicy, ASingleWindowComesOnce) {
-  const auto policy = makeSingleWindowPolicy({10, 20, 15});
-  ASSERT_TRUE(policy->current(startingAt(kStart_ns)));
-  EXPECT_EQ(policy->current(startingAt(kStart_ns))->t0_ns, 10);
-  policy->advance({10, 20, 15}, nullptr);
-  EXPECT_FALSE(policy->current(startingAt(kStart_ns)));
+TEST(KeyframePolicy, ASingleWindowComesOnceUnlessItIsSkippedOrGivenUp) {
+  const Recording recording = startingAt(kStart_ns);
+  for (const std::int64_t t_ref_ns : {5, 15}) {
+    const Window window{10, 20, t_ref_ns};
+    const auto fresh = [&] { return makeSingleWindowPolicy(window); };
+    auto policy = fresh();
+    EXPECT_EQ(policy->current(recording)->t0_ns, 10);
+    EXPECT_EQ(policy->earliestStart(recording), 10);
+    EXPECT_EQ(policy->earliestLast(recording), 10);
+    EXPECT_EQ(policy->earliestReference(recording), std::min<std::int64_t>(10, t_ref_ns));
+    EXPECT_EQ(policy->advancePast(recording, 19), 0U);
+    EXPECT_EQ(policy->giveUpBefore(recording, 10), 0U);
+    EXPECT_FALSE(policy->last(recording, 20));
+    policy->advance(window, nullptr);
+    EXPECT_FALSE(policy->current(recording));
+    EXPECT_EQ(policy->earliestStart(recording), kMaxTimeNs);
+    EXPECT_EQ(policy->earliestReference(recording), kMaxTimeNs);
+    EXPECT_EQ(policy->advancePast(recording, 99) + policy->giveUpBefore(recording, 99), 0U);
+    policy = fresh();
+    EXPECT_EQ(policy->advancePast(recording, 20), 1U);
+    EXPECT_FALSE(policy->current(recording));
+    policy = fresh();
+    EXPECT_EQ(policy->giveUpBefore(recording, 11), 1U);
+    EXPECT_FALSE(policy->current(recording));
+  }
 }
 
-TEST(KeyframePolicy, OptionsOutOfRangeAreNamed) {
-  test::expectRefused<KeyframePolicyOptions>("window_s = 0", [](auto& o) { o.window_s = 0; });
-  test::expectRefused<KeyframePolicyOptions>("stride_s = -1", [](auto& o) { o.stride_s = -1; });
-  test::expectRefused<KeyframePolicyOptions>("min_baseline_ratio = 0",
-                                             [](auto& o) { o.min_baseline_ratio = 0; });
-  test::expectRefused<KeyframePolicyOptions>("min_visible_fraction = 1.5",
-                                             [](auto& o) { o.min_visible_fraction = 1.5; });
-  test::expectRefused<KeyframePolicyOptions>("window_events = 0",
-                                             [](auto& o) { o.window_events = 0; });
-  KeyframePolicyOptions baseline;
+TEST(KeyframePolicy, OptionsHaveTheirLimits) {
+  using O = KeyframePolicyOptions;
+  const std::vector<double> not_seconds = {0.9e-6, 1'000'001, NAN};
+  test::expectLimits<O>(
+      {{"window_s", &O::window_s, {1e-6, 1e6}, not_seconds},
+       {"stride_s", &O::stride_s, {1e-6, 1e6}, not_seconds},
+       {"window_events", &O::window_events, {1, 1e15}, {0, -1}},
+       {"min_baseline_ratio", &O::min_baseline_ratio, {1e-9, 10}, {0, -1, 10.1, NAN}},
+       {"min_visible_fraction", &O::min_visible_fraction, {0, 1}, {-0.1, 1.1, NAN}}});
+  O baseline;
   baseline.policy = KeyframePolicyKind::kBaseline;
-  test::expectRefused(
-      "stride_s = 0.25", [](auto& o) { o.stride_s = 0.25; }, baseline);
+  test::expectLimits<O>({{"stride_s", &O::stride_s, {0.2}, {0.21}}}, baseline);
   baseline.stride_s = 0.25;
   EXPECT_THROW(makeKeyframePolicy(baseline, kDepthGuess_m), std::invalid_argument);
 }

@@ -180,6 +180,7 @@ Found mapPoints(const ViewCase& view_case) {
   const auto keyframe = mapper.map(window, {events.begin(), events.end()}, moving.trajectory);
   EXPECT_TRUE(keyframe);
   found.keyframe = keyframe.value_or(KeyframeDepthMap());
+  EXPECT_LT((found.keyframe.T_world_ref.translation - T_world_ref.translation).norm(), 1e-12);
   return found;
 }
 

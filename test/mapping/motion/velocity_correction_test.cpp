@@ -37,38 +37,18 @@ TEST(VelocityCorrection, SmallRotationsAreAsExactAsLargeOnes) {
   }
 }
 
-TEST(VelocityCorrection, TheReferencePoseStays) {
-  const RandomRecording recording(1, 1, 10);
-  const Window window = RandomRecording::kWindow;
-  const Trajectory corrected =
-      correctedTrajectory(recording.trajectory, window, {{0.5, 0, 0.1}, {0, 2, 1}});
-  const Rigid3 before = recording.trajectory.poseAt(window.t_ref_ns).value();
-  const Rigid3 after = corrected.poseAt(window.t_ref_ns).value();
-  EXPECT_EQ(before.translation, after.translation);
-  expectNear(before, after, 1e-15);
-}
-
 TEST(VelocityCorrection, PosesMoveByTheDisplacementSinceTheReference) {
   const RandomRecording recording(2, 1, 10);
   const Window window = RandomRecording::kWindow;
   const VelocityCorrection correction{{0.05, -0.03, 0.02}, {0.1, -0.05, 0.08}};
   const Trajectory corrected = correctedTrajectory(recording.trajectory, window, correction);
+  EXPECT_TRUE(isSame(corrected.poseAt(window.t_ref_ns).value(),
+                     recording.trajectory.poseAt(window.t_ref_ns).value()));
   for (std::int64_t t_ns = window.t0_ns; t_ns < window.t1_ns; t_ns += 3 * kMs) {
     const double since_s = 1e-9 * static_cast<double>(t_ns - window.t_ref_ns);
     // Between poses 5 ms apart, rotated by at most 0.01, the line differs a little from the screw.
     expectNear(corrected.poseAt(t_ns).value(),
                recording.trajectory.poseAt(t_ns).value() * correction.displacement(since_s), 2e-6);
-  }
-}
-
-TEST(VelocityCorrection, TimesWithoutAPoseGetNone) {
-  Trajectory trajectory;
-  for (const std::int64_t ms : {0, 40, 60, 500, 520}) trajectory.add({ms * kMs, {}});
-  const Window window{30 * kMs, 510 * kMs, 50 * kMs};
-  const Trajectory corrected = correctedTrajectory(trajectory, window, {{1, 0, 0}, {0, 0, 0}});
-  for (std::int64_t ms = 30; ms < 510; ms += 5) {
-    EXPECT_EQ(trajectory.poseAt(ms * kMs).has_value(), corrected.poseAt(ms * kMs).has_value())
-        << ms << " ms";
   }
 }
 

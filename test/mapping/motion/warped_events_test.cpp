@@ -24,10 +24,10 @@ struct Warping {
   Rigid3 T_world_ref = recording.trajectory.poseAt(window.t_ref_ns).value() * camera.T_rig_cam;
 
   std::vector<WarpedEvent> warp(const cv::Mat1f& depth, const Trajectory& trajectory,
-                                EventSpan events) const {
+                                EventSpan events, std::size_t every = 1) const {
     const NearestDepths depths(depth, 0.5);
     return warpEvents(
-        {0, &camera, &undistortion, events}, 1, trajectory,
+        {0, &camera, &undistortion, events}, every, trajectory,
         {T_world_ref.inverse(), view, inversePlanes(planes), &depths, window.t_ref_ns});
   }
 
@@ -50,17 +50,57 @@ TEST(WarpedEvents, AnEventLiesWhereItsRayMeetsTheDepth) {
   const Warping warping;
   constexpr float kDepth_m = 1.25F;  // between two planes
   int warped = 0;
+  std::vector<Eigen::Vector2f> every_fifth;
+  int index = 0;
   for (const Event& event : warping.recording.events.front()) {
+    ++index;
     const std::vector<Event> one = {event};
     const auto found =
         warping.warp(flat(warping.view, kDepth_m), warping.recording.trajectory, one);
     if (found.empty()) continue;
     ++warped;
+    if (index % 5 == 3) every_fifth.push_back(found.front().pixel);
     const Rigid3 T_world_rig = warping.recording.trajectory.poseAt(event.t_ns).value();
     const Eigen::Vector2d expected = warping.pixelAt(event, kDepth_m, T_world_rig);
     EXPECT_LT((found.front().pixel.cast<double>() - expected).norm(), 1e-4);
   }
   EXPECT_GT(warped, 200);
+  const auto some = warping.warp(flat(warping.view, kDepth_m), warping.recording.trajectory,
+                                 warping.recording.events.front(), 5);
+  ASSERT_EQ(some.size(), every_fifth.size());
+  for (std::size_t i = 0; i < some.size(); ++i) EXPECT_EQ(some[i].pixel, every_fifth[i]);
+}
+
+TEST(WarpedEvents, OfSeveralDepthsOnItsRayAnEventHasTheNearestToAPixelWithIt) {
+  const Warping warping;
+  // A camera 0.2 m to the right: the point of a ray moves by 6.2 px per 1/m to the left.
+  RigCamera beside = warping.camera;
+  beside.T_rig_cam = beside.T_rig_cam * Rigid3{Eigen::Quaterniond::Identity(), {0.2, 0, 0}};
+  const Event event{warping.window.t_ref_ns, 16, 18, true};
+  const Eigen::Vector2d ray = warping.undistortion.ray(event.x, event.y);
+  for (const double right : {1.0, 0.0, -1.0}) {  // the pixel of the nearer depth is off by this
+    cv::Mat1f depth = cv::Mat1f::zeros(36, 48);
+    for (const double depth_m : {0.8, 2.0}) {
+      const Eigen::Vector2d pixel = warping.view.project(
+          Eigen::Vector3d(depth_m * ray.homogeneous()) + Eigen::Vector3d(0.2, 0, 0));
+      const bool near = depth_m < 1;
+      depth(static_cast<int>(std::lround(pixel.y())),
+            static_cast<int>(std::lround(pixel.x() + (near ? right : 0)))) =
+          static_cast<float>(depth_m);
+      if (right == 0 && !near) depth.col(static_cast<int>(std::lround(pixel.x()))) = 0;
+    }
+    const NearestDepths depths(depth, 2.5);
+    const auto found =
+        warpEvents({0, &beside, &warping.undistortion, std::vector<Event>{event}}, 1,
+                   warping.recording.trajectory,
+                   {warping.T_world_ref.inverse(), warping.view, inversePlanes(warping.planes),
+                    &depths, warping.window.t_ref_ns});
+    ASSERT_EQ(found.size(), 1U);
+    const double found_m = right == 0 ? 0.8 : 2.0;
+    const Eigen::Vector2d expected = warping.view.project(
+        Eigen::Vector3d(found_m * ray.homogeneous()) + Eigen::Vector3d(0.2, 0, 0));
+    EXPECT_LT((found.front().pixel.cast<double>() - expected).norm(), 0.01) << right;
+  }
 }
 
 TEST(WarpedEvents, DerivativesAreThoseOfThePlainWarp) {

@@ -37,6 +37,8 @@ TEST(VoteGrid, VotesAreWhereTheRaysOfTheSensorMeetThePlanes) {
       const Eigen::Vector2d exact = view.project(T_ref_cam.translation + along * direction);
       EXPECT_NEAR(votes.x[i], exact.x(), 1e-9 * (10 + exact.squaredNorm()));
       EXPECT_NEAR(votes.y[i], exact.y(), 1e-9 * (10 + exact.squaredNorm()));
+      const bool near = exact.x() >= -48 && exact.x() <= 96 && exact.y() >= -36 && exact.y() <= 72;
+      EXPECT_EQ(votes.near_view[i], near) << "at most its own size away";
     }
   }
 }
@@ -80,34 +82,57 @@ std::optional<VoteDisplacement> accelerated(const std::array<GridVotes, 3>& vote
 }
 
 TEST(VoteDisplacement, IsExactAlongAParabola) {
-  // x(t) = 9.5 t + 0.5 t^2 with t from 0 to 1.
-  const auto x = [](double t) { return 9.5 * t + 0.5 * t * t; };
-  const auto motion =
-      accelerated({votesWithOneAt(x(0), 3), votesWithOneAt(x(0.5), 3), votesWithOneAt(x(1), 3)});
-  ASSERT_TRUE(motion.has_value());
-  EXPECT_TRUE(motion->isEven());
-  EXPECT_NEAR(motion->fromMiddle(), x(1) - x(0.5), 1e-12);
-  EXPECT_NEAR(motion->between(kGridStart_ns, kGridStart_ns + 100'000), 10, 1e-9);
-  EXPECT_NEAR(motion->between(kGridStart_ns + 20'000, kGridStart_ns + 30'000), x(0.3) - x(0.2),
-              1e-9);
+  // 9.5 t + 0.5 t^2 and back again with t from 0 to 1, along either axis.
+  for (const bool along_x : {true, false}) {
+    for (const bool back : {false, true}) {
+      const auto way = [&](double t) {
+        const double from_start = back ? 1 - t : t;
+        return 9.5 * from_start + 0.5 * from_start * from_start;
+      };
+      const auto at = [&](double t) {
+        return along_x ? votesWithOneAt(way(t), 3) : votesWithOneAt(3, way(t));
+      };
+      const auto motion = accelerated({at(0), at(0.5), at(1)});
+      ASSERT_TRUE(motion.has_value());
+      EXPECT_TRUE(motion->isEven());
+      EXPECT_NEAR(motion->fromMiddle(), 9.5 * 0.5 + 0.5 * 0.75, 1e-12);
+      EXPECT_NEAR(motion->between(kGridStart_ns, kGridStart_ns + 100'000), 10, 1e-9);
+      EXPECT_NEAR(motion->between(kGridStart_ns + 20'000, kGridStart_ns + 30'000),
+                  std::abs(way(0.3) - way(0.2)), 1e-9);
+    }
+  }
 }
 
-TEST(VoteDisplacement, IsNotEvenWhereTheSpeedChangesMuch) {
-  const auto motion =
-      accelerated({votesWithOneAt(0, 0), votesWithOneAt(4, 0), votesWithOneAt(10, 0)});
-  ASSERT_TRUE(motion.has_value());
-  EXPECT_FALSE(motion->isEven());
+TEST(VoteDisplacement, IsEvenWhereTheSpeedChangesByATenthOfTheLargerStepAtMost) {
+  for (const double second_px : {10.0, 9.01, 8.99}) {
+    for (const bool back : {false, true}) {
+      const double middle_px = back ? second_px : 10;
+      const auto motion = accelerated(
+          {votesWithOneAt(0, 0), votesWithOneAt(middle_px, 0), votesWithOneAt(10 + second_px, 0)});
+      EXPECT_EQ(motion->isEven(), second_px > 9) << second_px;
+    }
+  }
 }
 
-TEST(VoteDisplacement, OfAVoteThatComesOrGoesIsUnknown) {
-  std::array<GridVotes, 3> votes{votesWithOneAt(0, 0), votesWithOneAt(5, 0), votesWithOneAt(10, 0)};
-  votes[2].in_front[7] = false;
-  EXPECT_FALSE(accelerated(votes).has_value());
+TEST(VoteDisplacement, OfAVoteThatComesOrGoesIsUnknownAndOfOneBehindTheCameraNothing) {
+  const std::array<GridVotes, 3> votes{votesWithOneAt(0, 0), votesWithOneAt(5, 0),
+                                       votesWithOneAt(10, 0)};
+  std::array<GridVotes, 3> behind = votes;
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::array<GridVotes, 3> comes_or_goes = votes;
+    comes_or_goes[i].in_front[7] = false;
+    EXPECT_FALSE(accelerated(comes_or_goes).has_value()) << i;
+    behind[i].in_front[0] = false;
+  }
+  EXPECT_EQ(accelerated(behind)->fromMiddle(), 0);
 }
 
 TEST(VoteDisplacement, FarFromTheViewCountsOnlyWhereNothingIsNearer) {
   std::array<GridVotes, 3> votes{votesWithOneAt(0, 0), votesWithOneAt(5, 0), votesWithOneAt(10, 0)};
-  for (GridVotes& at_one_time : votes) at_one_time.near_view[0] = false;
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(accelerated(votes)->fromMiddle(), 5) << "near at one of the times";
+    votes[i].near_view[0] = false;
+  }
   EXPECT_EQ(accelerated(votes)->fromMiddle(), 0);
   for (GridVotes& at_one_time : votes) at_one_time.near_view.fill(false);
   EXPECT_EQ(accelerated(votes)->fromMiddle(), 5);

@@ -92,10 +92,33 @@ TEST(DepthFollower, PlanesComeBackWithTheScene) {
 TEST(DepthFollower, NoiseChangesNothing) {
   DepthFollower follower(limits(), planesFor(1, 4), 100);
   for (std::uint32_t seed = 0; seed < 20; ++seed) EXPECT_FALSE(follower.follow(scene(1, 4, seed)));
+  EXPECT_EQ(follower.misfits(), 0);
   EXPECT_FALSE(follower.follow(cv::Mat1f(40, 50, 0.0F)));  // an empty keyframe
   cv::Mat1f few(40, 50, 0.0F);
   few.row(0) = 0.2F;  // 50 points
   EXPECT_FALSE(follower.follow(few));
+  EXPECT_EQ(follower.misfits(), 2);
+}
+
+TEST(DepthFollower, ManyPointsAtAnAutomaticLimitAreAMisfit) {
+  const DepthPlanesOptions planes{0.5, 5.0, 100};
+  for (const bool near : {true, false}) {
+    for (const double fraction : {0.055, 0.065}) {  // the limit is 6 %
+      // 2 % of the range of 1.8 / m is near a limit.
+      cv::Mat1f depth(50, 40, 1.0F);
+      const double inverse = near ? 2 - 0.035 : 0.2 + 0.035;
+      for (int i = 0; i < static_cast<int>(fraction * 2000); ++i) {
+        depth(i) = static_cast<float>(1 / inverse);
+      }
+      for (const bool automatic : {true, false}) {
+        AutomaticOptions one;
+        (near ? one.min_depth_m : one.max_depth_m) = automatic;
+        DepthFollower follower(one, planes, 100);
+        follower.follow(depth);
+        EXPECT_EQ(follower.misfits(), automatic && fraction > 0.06 ? 1 : 0) << near << fraction;
+      }
+    }
+  }
 }
 
 TEST(DepthFollower, GivenLimitsStay) {

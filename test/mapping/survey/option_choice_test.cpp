@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
+
 #include "test/mapping/survey/edge_world.h"
 
 namespace efm {
@@ -11,6 +13,8 @@ namespace {
 using test::EdgeWorld;
 
 constexpr AutomaticOptions kAll{true, true, true, true, true};
+
+Rigid3 slow(double t_s) { return {Eigen::Quaterniond::Identity(), {0.02 * t_s, 0, 0}}; }
 
 TEST(OptionChoice, LimitsEncloseTheScene) {
   for (const double factor : {1.0, 3.0}) {
@@ -23,14 +27,76 @@ TEST(OptionChoice, LimitsEncloseTheScene) {
     EXPECT_TRUE(chosen.found_scene);
     EXPECT_EQ(chosen.options.size(), 5U);
     const DepthPlanesOptions& planes = options.keyframe.planes;
-    // The limits are around nearly all edges and less than 10 times apart; the rig moves by 0.25 m.
-    EXPECT_LT(planes.min_depth_m, 0.9 * factor);
-    EXPECT_GT(planes.min_depth_m, 0.3 * factor);
-    EXPECT_GT(planes.max_depth_m, 2.5 * factor);
-    EXPECT_LT(planes.max_depth_m, 9 * factor);
-    EXPECT_LE(options.policy.window_s, 0.5);  // a quarter of the recording
+    // Around the edges from 1 to 3 m, and beyond 9 m the parallax of 0.25 m is too small.
+    EXPECT_NEAR(planes.min_depth_m, factor == 1 ? 0.45 : 1.6, 0.03 * factor);
+    EXPECT_NEAR(planes.max_depth_m, factor == 1 ? 3.8 : 8.9, 0.2 * factor);
+    EXPECT_EQ(planes.num_planes, automaticPlanes(planes, chosen.parallax_px_m));
     EXPECT_EQ(options.policy.stride_s, options.policy.window_s / 2);
   }
+}
+
+TEST(OptionChoice, TheWindowIsBoundByTheRecordingTheMotionAndASecond) {
+  const struct {
+    Rigid3 (*T_world_rig)(double);
+    std::optional<double> duration_s;
+    double window_s;
+    const char* reason;
+  } cases[] = {
+      {slow, 0.3, 0.3, "the recording lasts 0.3 s"},
+      {slow, 1.0, 0.5, "the recording lasts 1 s"},
+      {slow, 3.1, 0.77, "the recording lasts 3.1 s"},
+      {slow, 8.0, 1, "the longest that is chosen: the view moves slowly"},
+      {slow, std::nullopt, 1, "the longest that is chosen: the view moves slowly"},
+      // 0.2 of 160 px are 0.267 rad with 120 px of focal length: 0.533 s, in steps of 1.25.
+      {[](double t_s) {
+         return Rigid3{rotationBy({0, 0, t_s}), {0, 0, 0}};
+       },
+       8.0, 0.5, "the longest in which most of the view stays in sight"},
+      {[](double t_s) {
+         return Rigid3{rotationBy({0, 0, 2 * t_s}), {0, 0, 0}};
+       },
+       1.0, 0.2, "the longest in which most of the view stays in sight"},
+  };
+  const Rig rig = EdgeWorld::rig(2);
+  for (const auto& c : cases) {
+    EdgeWorld world;
+    world.T_world_rig = c.T_world_rig;
+    FusionMapperOptions options;
+    AutomaticOptions window;
+    window.window_s = true;
+    const auto chosen = chooseOptions(window, rig, {world.sample(rig)}, c.duration_s, options);
+    ASSERT_EQ(chosen.options.size(), 1U) << c.reason;
+    EXPECT_EQ(chosen.options[0].reason, c.reason);
+    EXPECT_NEAR(options.policy.window_s, c.window_s, 1e-9) << c.reason;
+  }
+}
+
+TEST(OptionChoice, PlanesAreAPixelOfParallaxApartFrom100To400) {
+  EXPECT_EQ(automaticPlanes({0.5, 5.0}, 100.1), 1 + 181);
+  EXPECT_EQ(automaticPlanes({0.5, 5.0}, 10), 100);
+  EXPECT_EQ(automaticPlanes({0.5, 5.0}, 1000), 400);
+}
+
+TEST(OptionChoice, AutomaticOptionsFitTheGivenOnesUntilTheyAreChosen) {
+  const auto fitted = [](AutomaticOptions automatic, double min_m, double max_m, double window_s) {
+    FusionMapperOptions options;
+    options.keyframe.planes.min_depth_m = min_m;
+    options.keyframe.planes.max_depth_m = max_m;
+    options.policy.window_s = window_s;
+    options.policy.stride_s = 0.3;
+    fitAutomatic(automatic, options);
+    const DepthPlanesOptions& planes = options.keyframe.planes;
+    return std::array<double, 4>{planes.min_depth_m, planes.max_depth_m, options.policy.window_s,
+                                 options.policy.stride_s};
+  };
+  using Values = std::array<double, 4>;
+  EXPECT_EQ(fitted({true, true}, 2, 3, 0.5), (Values{2, 3, 0.5, 0.3}));
+  EXPECT_EQ(fitted({false, true}, 8, 5, 0.5), (Values{8, 80, 0.5, 0.3}));
+  EXPECT_EQ(fitted({true, false}, 8, 8, 0.5), (Values{0.8, 8, 0.5, 0.3}));
+  EXPECT_EQ(fitted({true, false}, 8, 0.005, 0.5), (Values{0.001, 0.005, 0.5, 0.3}));
+  EXPECT_EQ(fitted({}, 8, 5, 0.2), (Values{8, 5, 0.2, 0.3}));
+  EXPECT_EQ(fitted({false, false, false, false, true}, 1, 5, 0.2), (Values{1, 5, 0.2, 0.2}));
+  EXPECT_EQ(fitted({false, false, false, true}, 1, 5, 0.2), (Values{1, 5, 0.3, 0.3}));
 }
 
 TEST(OptionChoice, GivenOptionsStay) {
@@ -61,6 +127,14 @@ TEST(OptionChoice, KeepsTheValuesWhereNothingIsSeen) {
   }
   EXPECT_EQ(options.keyframe.planes.min_depth_m, before.min_depth_m);
   EXPECT_EQ(options.keyframe.planes.max_depth_m, before.max_depth_m);
+  EXPECT_NEAR(chosen.parallax_px_m, 99 / 1.8, 1e-9) << "of 100 planes from 0.5 to 5 m";
+  const auto wide = chooseWideDepths(kAll, options);
+  EXPECT_FALSE(wide.found_scene);
+  EXPECT_EQ(options.keyframe.planes.min_depth_m, 0.3);
+  EXPECT_EQ(options.keyframe.planes.max_depth_m, 100);
+  const FusionMapperOptions survey = surveyOptions(options, 0.7);
+  EXPECT_EQ(survey.policy.window_s, 0.7);
+  EXPECT_EQ(survey.policy.stride_s, 0.7);
 }
 
 }  // namespace

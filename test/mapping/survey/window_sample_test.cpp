@@ -40,6 +40,7 @@ TEST(WindowSample, HasItsEventsWithinAWindowAndAroundItsMiddle) {
   EXPECT_EQ(middle.window.t0_ns, 300);
   EXPECT_EQ(middle.window.t1_ns, 700);
   EXPECT_EQ(middle.events[0].size(), 4U);
+  EXPECT_EQ(middle.window.t_ref_ns, 500);
   EXPECT_EQ(middleOf(sample, 1).events[0].size(), 10U);
 }
 

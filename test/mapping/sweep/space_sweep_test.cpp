@@ -2,7 +2,6 @@
 // From events to the DSI against the oracle, and the other results of a sweep.
 #include "mapping/sweep/space_sweep.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -13,9 +12,11 @@
 #include "mapping/events/event_groups.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/depth/same_image.h"
+#include "test/mapping/dsi/chosen_dsi.h"
 #include "test/mapping/dsi/whole_dsi.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/options/refused_option.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {
@@ -149,78 +150,6 @@ TEST_P(SpaceSweepOn, FromEventsTheDsiIsTheOraclesForAllRulesOrdersAndSplits) {
   }
 }
 
-TEST_P(SpaceSweepOn, EveryShuffleAndCountOfSubintervalsIsTheOracles) {
-  const Recording recording(51, 3, 8000);
-  for (const SplitFusionOptions& split : {SplitFusionOptions::none(), {true, 2}}) {
-    for (const auto by : {SubintervalSplit::kDuration, SubintervalSplit::kCount}) {
-      KeyframeMapperOptions options = exactOptions(split, 4);
-      options.sweep.kernel = GetParam();
-      options.subintervals.split = by;
-      const Parts parts = exactParts(recording, options);
-      std::vector<std::vector<float>> dsis;
-      for (const auto shuffle :
-           {SubintervalShuffle::kNone, SubintervalShuffle::kShift, SubintervalShuffle::kRandom}) {
-        options.subintervals.shuffle = shuffle;
-        dsis.push_back(dsiOf(recording, options));
-        EXPECT_LE(errorOverMass(dsis.back(), exactDsi(parts, options)),
-                  test::errorOverMassOf(GetParam()))
-            << nameOf(by) << ", " << nameOf(shuffle);
-      }
-      EXPECT_NE(dsis[0], dsis[1]) << "a shift lets other sub-intervals meet";
-    }
-  }
-}
-
-/// The events of one polarity in a slice of time.
-Recording partOf(Recording recording, const Window& slice, bool polarity) {
-  for (auto& events : recording.events) {
-    events.erase(std::remove_if(events.begin(), events.end(),
-                                [&](const Event& event) {
-                                  return event.polarity != polarity || event.t_ns < slice.t0_ns ||
-                                         event.t_ns >= slice.t1_ns;
-                                }),
-                 events.end());
-  }
-  return recording;
-}
-
-TEST(SpaceSweep, TheDsiIsTheSumOfThoseOfItsGroupsMappedAlone) {
-  const Recording recording(52, 2, 4000);
-  const std::int64_t middle_ns = kWindow.t0_ns + Recording::kDuration_ns / 2;
-  KeyframeMapperOptions options = exactOptions({true, 2}, 2);
-  options.sweep.kernel = VotingKernel::kPlain;  // which casts each vote by itself
-  const std::vector<float> split = dsiOf(recording, options);
-  options.split = SplitFusionOptions::none();
-  std::vector<float> sum(split.size());
-  for (const Window& slice : {Window{kWindow.t0_ns, middle_ns, kWindow.t_ref_ns},
-                              Window{middle_ns, kWindow.t1_ns, kWindow.t_ref_ns}}) {
-    for (const bool polarity : {false, true}) {
-      const std::vector<float> alone = dsiOf(partOf(recording, slice, polarity), options, slice);
-      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += alone[i];
-    }
-  }
-  EXPECT_GT(*std::max_element(sum.begin(), sum.end()), 0);
-  EXPECT_EQ(split, sum);
-}
-
-TEST(SpaceSweep, ArithmeticAcrossTimeThenHarmonicAcrossCamerasIsAlgorithmOne) {
-  const Recording recording(32, 2, 5000);
-  KeyframeMapperOptions options = exactOptions(SplitFusionOptions::none(), 1);
-  options.sweep.kernel = VotingKernel::kPlain;  // which rounds the votes alike in both
-  const std::vector<float> whole = dsiOf(recording, options);
-  for (const int count : {2, 3, 8}) {
-    options.subintervals.count = count;
-    options.sweep.fusion = {FusionRule::kHarmonic, FusionRule::kArithmetic,
-                            FusionOrder::kTimeThenCameras};
-    const std::vector<float> parts = dsiOf(recording, options);
-    ASSERT_EQ(parts.size(), whole.size());
-    for (std::size_t i = 0; i < whole.size(); ++i) {
-      // Means, not sums: 1/N_s of it. Votes of some 20 events per voxel, summed in another order.
-      ASSERT_NEAR(static_cast<double>(parts[i]) * count, whole[i], 1e-5 * whole[i] + 1e-9);
-    }
-  }
-}
-
 // ---------------------------------------------------------------- other results
 
 /// Rays of all cameras and sub-intervals, as the keyframe mapper makes them, and the oracle's
@@ -279,60 +208,17 @@ TEST_P(SpaceSweepOn, VotesAreCountedAsTheOracleCountsThem) {
   }
 }
 
-TEST_P(SpaceSweepOn, ThePeakAndItsNeighboursAreThoseOfTheDsi) {
+TEST_P(SpaceSweepOn, PeaksAndTheirNeighboursAreThoseOfTheDsi) {
   for (const int planes : {1, 2, 3, 17}) {
     const SweepRays rays = raysOf(Recording(9, 2, 3000), planes, 1);
     SpaceSweepOptions options;
     options.kernel = GetParam();
-    options.threads = 2;
     WholeDsi dsi(rays.planes, rays.view);
     const DsiPeaks peaks = sweepRays(rays, options, {false, &dsi}).fused.peaks;
+    test::ChosenDsi chosen({rays.view.width, rays.view.height}, planes);
     ASSERT_TRUE(dsi.isComplete());
-    for (int y = 0; y < rays.view.height; ++y) {
-      for (int x = 0; x < rays.view.width; ++x) {
-        const auto value = [&](int plane) {
-          if (plane < 0 || plane >= planes) return -1.0F;
-          return dsi.values[static_cast<std::size_t>(
-              (plane * rays.view.height + y) * rays.view.width + x)];
-        };
-        int best = 0;
-        for (int plane = 1; plane < planes; ++plane) {
-          if (value(plane) > value(best)) best = plane;
-        }
-        ASSERT_EQ(peaks.plane(y, x), best) << x << ", " << y << " of " << planes;
-        ASSERT_EQ(peaks.confidence(y, x), value(best));
-        ASSERT_EQ(peaks.before(y, x), value(best - 1));
-        ASSERT_EQ(peaks.after(y, x), value(best + 1));
-      }
-    }
-  }
-}
-
-TEST_P(SpaceSweepOn, TheNumberOfThreadsNeverChangesABitOfAnyPeak) {
-  const tbb::global_control as_if_sixteen_cores(tbb::global_control::max_allowed_parallelism, 16);
-  const Recording recording(33, 3, 3000);
-  for (const int planes : {1, 2, 31, 40}) {
-    const SweepRays rays = raysOf(recording, planes, 4);
-    for (const FusionOrder order : {FusionOrder::kCamerasThenTime, FusionOrder::kTimeThenCameras}) {
-      SpaceSweepOptions options;
-      options.fusion.order = order;
-      options.kernel = GetParam();
-      options.threads = 1;
-      const SweepResult one = sweepRays(rays, options, {true});
-      ASSERT_EQ(one.cameras.size(), 3U);
-      for (const int threads : {2, 3, 16}) {
-        options.threads = threads;
-        EXPECT_EQ(options.threadsOrCores(), threads);
-        const SweepResult many = sweepRays(rays, options, {true});
-        EXPECT_TRUE(same(one.fused.peaks, many.fused.peaks)) << planes << " planes, " << threads;
-        for (std::size_t c = 0; c < 3; ++c) {
-          EXPECT_TRUE(same(one.cameras[c].peaks, many.cameras[c].peaks))
-              << "camera " << c << ", " << planes << " planes, " << threads << " threads";
-          EXPECT_EQ(one.votes[c].total(), many.votes[c].total());
-          EXPECT_EQ(one.votes[c].cast, many.votes[c].cast);
-        }
-      }
-    }
+    chosen.values = dsi.values;
+    EXPECT_TRUE(same(peaks, chosen.swept().peaks)) << planes;
   }
 }
 
@@ -354,34 +240,17 @@ TEST(SpaceSweep, ACamerasPeaksAreThoseOfItsOwnSweep) {
   }
 }
 
-TEST_P(SpaceSweepOn, ASilentCameraOrSubintervalSilencesTheAndLikeRules) {
-  const auto votedPixels = [](const SweepRays& rays, const FusionOptions& fusion) {
-    SpaceSweepOptions options;
-    options.kernel = GetParam();
-    options.fusion = fusion;
-    const DsiPeaks peaks = sweepRays(rays, options).fused.peaks;
-    if (cv::countNonZero(peaks.confidence) == 0) {
-      EXPECT_EQ(cv::countNonZero(peaks.plane), 0) << "the nearest plane";
-    }
-    return cv::countNonZero(peaks.confidence);
-  };
-  const FusionRule h = FusionRule::kHarmonic;
-  const FusionRule a = FusionRule::kArithmetic;
-  SweepRays rays = raysOf(Recording(35, 2, 4000), 5, 2);
-  rays.cameras[1][0] = RayBundle();
-  EXPECT_EQ(votedPixels(rays, {h, h, FusionOrder::kCamerasThenTime}), 0);
-  EXPECT_EQ(votedPixels(rays, {h, h, FusionOrder::kTimeThenCameras}), 0);
-  EXPECT_GT(votedPixels(rays, {h, a, FusionOrder::kCamerasThenTime}), 0);
-  rays.cameras[1][1] = RayBundle();
-  EXPECT_EQ(votedPixels(rays, {h, a}), 0);
-  EXPECT_GT(votedPixels(rays, {a, a}), 0);
-}
-
-TEST(SpaceSweep, ThreadsOutOfRangeAreNamed) {
-  SpaceSweepOptions options;
-  options.threads = 0;
-  EXPECT_THAT([&] { sweepSpace({{RayBundle()}}, DsiGrid(), options); },
-              ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr("threads = 0")));
+TEST(SpaceSweep, OptionsHaveTheirLimits) {
+  using O = SpaceSweepOptions;
+  test::expectLimits<O>({{"threads", &O::threads, {1, 1024}, {0, 1025}}});
+  EXPECT_THROW(sweepSpace({{RayBundle()}}, DsiGrid(), {{}, 0, {}}), std::invalid_argument);
+  const tbb::global_control two_cores(tbb::global_control::max_allowed_parallelism, 2);
+  EXPECT_EQ(O().threadsOrCores(), 2);
+  O three;
+  three.threads = 3;
+  EXPECT_EQ(three.threadsOrCores(), 2) << "never more than there are cores";
+  three.threads = 1;
+  EXPECT_EQ(three.threadsOrCores(), 1);
 }
 
 }  // namespace

@@ -102,16 +102,6 @@ class TileAccumulatorOn : public ::testing::TestWithParam<VotingKernel> {};
 INSTANTIATE_TEST_SUITE_P(Kernels, TileAccumulatorOn, ::testing::ValuesIn(test::fastKernels()),
                          test::nameOfKernel);
 
-TEST_P(TileAccumulatorOn, AVoteIsSharedBilinearlyAmongFourPixels) {
-  const TileVotes votes = voteOnView(GetParam(), {{1.25, 0.5}});
-  EXPECT_EQ(votes.units, kUnitsOfVote);
-  EXPECT_EQ(votes.density[1], 0.375F);
-  EXPECT_EQ(votes.density[2], 0.125F);
-  EXPECT_EQ(votes.density[151], 0.375F);
-  EXPECT_EQ(votes.density[152], 0.125F);
-  EXPECT_EQ(std::accumulate(votes.density.begin(), votes.density.end(), 0.0F), 1.0F);
-}
-
 TEST_P(TileAccumulatorOn, ThousandsOfVotesInOneVoxelAreThePlainKernelsAndAllCounted) {
   // Tiles begin at columns 50 and 100, and at rows 43 and 86.
   for (const auto& corner : Points{{20, 20},
@@ -253,14 +243,6 @@ TEST_P(TileAccumulatorOn, NothingIsLeftOfEarlierTilesAndPlanes) {
     EXPECT_EQ(after.units, alone.units) << "tile " << tile.x << ", " << tile.y;
     EXPECT_EQ(after.density, alone.density) << "tile " << tile.x << ", " << tile.y;
   }
-}
-
-TEST(CellSums, UnpackingFindsEveryField) {
-  const kernels::CellSums sums = kernels::unpack(0xFFFE'8001'0002'7FFDU);
-  EXPECT_EQ(sums.upper_left, 0x7FFDU);
-  EXPECT_EQ(sums.lower_left, 2U);
-  EXPECT_EQ(sums.upper_right, 0x8001U);
-  EXPECT_EQ(sums.lower_right, 0xFFFEU);
 }
 
 }  // namespace

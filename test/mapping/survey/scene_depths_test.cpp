@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/survey/scene_depths.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "mapping/survey/depth_agreement.h"
+#include "mapping/survey/pose_hypotheses.h"
+#include "mapping/survey/sample_piece.h"
+#include "test/mapping/survey/edge_world.h"
+
+namespace efm {
+namespace {
+
+using test::EdgeWorld;
+
+TEST(DenseRange, HasAPartOfThePointsThatIsMoreThanHalfOfItsPartOfTheRange) {
+  // A hundred points, and twenty more, a sixth of all, that much of the range away.
+  for (const auto& [away, joined] : {std::pair{0.31, true}, {0.36, false}}) {
+    for (const bool nearer : {true, false}) {
+      SceneDepths depths;
+      depths.nearest = 4;
+      const double at = nearer ? 1 : 2;
+      for (int i = 0; i < 100; ++i) depths.inverse.push_back(at + 0.001 * i);
+      const double others = nearer ? at + 0.1 + 4 * away : at - 4 * away;
+      for (int i = 0; i < 20; ++i) depths.inverse.push_back(others + 0.0001 * i);
+      std::sort(depths.inverse.begin(), depths.inverse.end());
+      const InverseRange range = denseRange(depths);
+      EXPECT_EQ(range.far, joined && !nearer ? others : at) << away;
+      EXPECT_DOUBLE_EQ(range.near, joined && nearer ? others + 0.0019 : at + 0.099) << away;
+      EXPECT_EQ(depths.median(), depths.inverse[60]);
+    }
+  }
+}
+
+TEST(LimitsAround, AreTenTimesApartUnlessTheSceneIsWide) {
+  // sqrt(10 / 2), and to the power of 0.75.
+  EXPECT_NEAR(limitsAround({0.5, 1}).near, 2.23607, 1e-5);
+  EXPECT_NEAR(limitsAround({0.5, 1}).far, 0.5 / 1.82859, 1e-5);
+  EXPECT_DOUBLE_EQ(limitsAround({0.1, 2}).near, 2.5);
+  EXPECT_DOUBLE_EQ(limitsAround({0.1, 2}).far, 0.08);
+}
+
+TEST(MotionIn, IsTheLargestFromTheMiddleOfTheWindow) {
+  for (const int axis : {0, 1}) {
+    Rig rig = EdgeWorld::rig(3);
+    const Eigen::Vector3d side = Eigen::Vector3d::Unit(axis);
+    for (std::size_t c = 0; c < 3; ++c) {
+      rig.cameras[c].T_rig_cam = {Eigen::Quaterniond::Identity(), 0.15 * double(c) * side};
+    }
+    WindowSample sample;
+    for (int i = 0; i <= 40; ++i) {  // 1 m/s, and faster in the end
+      const double t_s = 0.01 * i;
+      sample.trajectory.add({durationFromSeconds(t_s),
+                             {rotationBy({0, 0, 0.5 * t_s}), (t_s + (i > 25 ? 0.1 : 0)) * side}});
+    }
+    FusionMapperOptions options;
+    options.cameras = {0, 2};
+    const Window window{0, 400'000'000, 200'000'000};
+    const auto motion = motionIn({window, {}, &sample.trajectory}, rig, options);
+    ASSERT_TRUE(motion);
+    EXPECT_NEAR(motion->shift_m, 0.3, 1e-9);
+    EXPECT_NEAR(motion->rotation_rad, 0.1, 1e-9);
+    EXPECT_NEAR(motion->rig_baseline_m, 0.3, 1e-9);
+    // 120 px of focal length, 0.6 m; the second camera is turned with the rig.
+    EXPECT_NEAR(motion->parallax_px_m, 120 * 0.6 * std::cos(0.1), 1e-9);
+    EXPECT_FALSE(motionIn({{0, 1, 900'000'000}, {}, &sample.trajectory}, rig, options));
+  }
+}
+
+TEST(DepthAgreement, HasTheScaleOfPositionsInAWrongUnit) {
+  const Rig rig = EdgeWorld::rig(2);
+  for (const double scale : {1.0, 1.5}) {
+    WindowSample sample = EdgeWorld().sample(rig);
+    sample.trajectory = sample.trajectory.moved(
+        sample.window.t0_ns, sample.window.t1_ns, [&](const StampedPose& pose) {
+          return Rigid3{pose.T_world_rig.rotation, scale * pose.T_world_rig.translation};
+        });
+    const auto agreement = depthAgreement(rig, {sample}, {});
+    ASSERT_TRUE(agreement);
+    EXPECT_NEAR(agreement->scale, scale, 0.1 * scale);
+    EXPECT_GT(agreement->agreeing, 0.6);
+    EXPECT_FALSE(depthAgreement(EdgeWorld::rig(1), {sample}, {}));
+  }
+}
+
+TEST(PoseHypotheses, AreThePosesInvertedTheOtherQuaternionAndAllAxes) {
+  const std::vector<PoseHypothesis> all = poseHypotheses();
+  ASSERT_EQ(all.size(), 25U);
+  const Rigid3 pose{Eigen::Quaterniond(0.1, 0.2, 0.3, 0.9).normalized(), {1, 2, 3}};
+  EXPECT_TRUE(isSame(all[0].T_world_rig(pose), pose.inverse()));
+  // Its x was w, its y x, and so on.
+  const Eigen::Vector4d q = pose.rotation.coeffs();
+  EXPECT_EQ(all[1].T_world_rig(pose).rotation.coeffs(), Eigen::Vector4d(q[1], q[2], q[3], q[0]));
+  for (std::size_t i = 2; i < all.size(); ++i) {
+    const Eigen::Matrix3d& axes = all[i].R_body_rig;
+    EXPECT_EQ(axes.cwiseAbs().sum(), 3);
+    EXPECT_NEAR(axes.determinant(), 1, 1e-12);
+    EXPECT_TRUE(all[i].T_world_rig(pose).rotation.toRotationMatrix().isApprox(
+        pose.rotation.toRotationMatrix() * axes, 1e-12));
+    for (std::size_t j = 2; j < i; ++j) EXPECT_NE(axes, all[j].R_body_rig);
+  }
+}
+
+/// Poses every 5 ms at 1 m/s, with either sign of the quaternion; an event per millisecond.
+WindowSample steadySample(std::int64_t t0_ms, std::int64_t length_ms) {
+  WindowSample sample;
+  sample.window = {t0_ms * 1'000'000, (t0_ms + length_ms) * 1'000'000, 0};
+  for (std::int64_t ms = t0_ms; ms <= t0_ms + length_ms; ms += 5) {
+    StampedPose pose{ms * 1'000'000, {rotationBy({0, 0.2, 0}), {1e-3 * double(ms), 0, 0}}};
+    if (ms % 10 == 0) pose.T_world_rig.rotation.coeffs() *= -1;
+    sample.trajectory.add(pose);
+  }
+  sample.events.resize(2);
+  for (std::int64_t ms = t0_ms + 1; ms < t0_ms + length_ms; ++ms) {
+    sample.events[0].push_back({ms * 1'000'000, 1, 1, true});
+  }
+  return sample;
+}
+
+TEST(SamplePieces, AreFourSpreadEvenlyThoseInTheMiddleFirstWithoutJitter) {
+  const auto startsOf = [](const std::vector<WindowSample>& samples, double length_s) {
+    std::vector<double> starts_ms;
+    for (const SamplePiece& piece : piecesOf(samples, {})) {
+      EXPECT_NEAR(secondsBetween(piece.window.t0_ns, piece.window.t1_ns), length_s, 1e-6);
+      EXPECT_EQ(piece.window.t_ref_ns, (piece.window.t0_ns + piece.window.t1_ns) / 2);
+      for (const Event& event : piece.events.at(0)) EXPECT_TRUE(piece.window.contains(event.t_ns));
+      EXPECT_NEAR(double(piece.events[0].size()), 1e3 * length_s, 1.5);
+      // The mean of the poses of 20 ms.
+      const std::vector<StampedPose>& poses = piece.trajectory.poses();
+      EXPECT_EQ(poses[1].t_ns - poses[0].t_ns, 20'000'000);
+      EXPECT_NEAR(poses[1].T_world_rig.translation.x(), 1e-9 * double(poses[1].t_ns), 1e-9);
+      EXPECT_NEAR(std::abs(poses[1].T_world_rig.rotation.y()), std::sin(0.1), 1e-9);
+      starts_ms.push_back(1e-6 * double(piece.window.t0_ns));
+    }
+    return starts_ms;
+  };
+  using ::testing::DoubleNear;
+  using ::testing::ElementsAre;
+  // From the first mean pose at 7.5 ms to the last: of 1.6 s 0.5 s begin in 1.0925 s.
+  EXPECT_THAT(startsOf({steadySample(0, 1600)}, 0.5),
+              ElementsAre(DoubleNear(417.2, 3), DoubleNear(690.3, 3), DoubleNear(144.1, 3),
+                          DoubleNear(963.4, 3)));
+  // A quarter of a second at least of 0.3 s, and all of less.
+  EXPECT_THAT(startsOf({steadySample(0, 300)}, 0.25),
+              ElementsAre(DoubleNear(23.4, 3), DoubleNear(34.1, 3), DoubleNear(12.8, 3),
+                          DoubleNear(44.7, 3)));
+  std::vector<WindowSample> many;
+  for (int i = 0; i < 6; ++i) many.push_back(steadySample(1000 * i, 800));
+  EXPECT_THAT(startsOf(many, 0.39575), ::testing::SizeIs(4));
+}
+
+}  // namespace
+}  // namespace efm
