@@ -318,24 +318,30 @@ void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
   noted = {std::max(noted.until_ns, missing.until_ns), missing.reason};
 }
 
+/// Until when a camera lacks events, on the trajectory's clock. Nothing where it is not known yet.
+std::optional<std::int64_t> MappingSession::missingUntil(int camera) const {
+  const auto missing = missing_.find(camera);
+  const auto index = static_cast<std::size_t>(camera);
+  if (missing == missing_.end() || index >= mapper_.rig().cameras.size()) return std::nullopt;
+  return trajectoryTime(missing->second.until_ns, mapper_.rig().cameras[index].time_offset_ns);
+}
+
 /// Gives up the windows that lack events of a camera.
 /// @param next_ns no event before this time, on the trajectory's clock, is missing: the camera's
 /// own next data begin earlier.
 void MappingSession::giveUpMissing(int camera, std::int64_t next_ns) {
-  const auto missing = missing_.find(camera);
-  const auto index = static_cast<std::size_t>(camera);
-  if (missing == missing_.end() || index >= mapper_.rig().cameras.size()) return;
-  const std::int64_t offset_ns = mapper_.rig().cameras[index].time_offset_ns;
-  const std::int64_t until_ns = trajectoryTime(missing->second.until_ns, offset_ns);
-  mapper_.giveUpBefore(std::min(until_ns, next_ns), missing->second.reason);
-  missing_.erase(missing);
+  const std::optional<std::int64_t> until_ns = missingUntil(camera);
+  if (!until_ns) return;
+  mapper_.giveUpBefore(std::min(*until_ns, next_ns), missing_.at(camera).reason);
+  missing_.erase(camera);
 }
 
 /// A camera that lacks events may send nothing any more.
 void MappingSession::giveUpOverdue() {
   const std::map<int, MissingEvents> missing = missing_;
   for (const auto& [camera, events] : missing) {
-    if (events.until_ns <= *newest_begin_ns_) giveUpMissing(camera, kMaxTimeNs);
+    const std::optional<std::int64_t> until_ns = missingUntil(camera);
+    if (until_ns && *until_ns <= *newest_begin_ns_) giveUpMissing(camera, kMaxTimeNs);
   }
 }
 

@@ -151,6 +151,7 @@ class MappingSession {
   bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
   bool stretchEnds() const;
   bool beginStretch();
+  std::optional<std::int64_t> missingUntil(int camera) const;
   void giveUpMissing(int camera, std::int64_t next_ns);
   void giveUpOverdue();
   void limitWaits();

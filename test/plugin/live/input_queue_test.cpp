@@ -5,6 +5,11 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <deque>
+#include <map>
+#include <numeric>
+#include <tuple>
+#include <utility>
 
 namespace efm {
 namespace {
@@ -99,37 +104,103 @@ CameraPacket packet(int camera, std::int64_t t_ns, std::size_t events) {
   return {camera, calibration, std::vector<Event>(events, Event{t_ns, 0, 0, true}), std::nullopt};
 }
 
-TEST(InputQueue, DropsTheOldestPacketsAndNoPoseWhereItIsFull) {
+RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllPoses, ()) {
   LiveOptions options;
   options.max_event_rate = 0;
-  options.max_queue_events = 1000;
+  options.max_queue_events = *rc::gen::inRange(1, 200);
+  const std::size_t fit = *rc::gen::inRange<std::size_t>(1, 10);
+  const std::size_t events_that_fit = *rc::gen::inRange<std::size_t>(0, 100);
+  options.max_queue_mb =
+      1e-6 * static_cast<double>(fit * sizeof(CameraPacket) + events_that_fit * sizeof(Event));
   InputQueue queue(options);
-  queue.add(QueuedPose{{1, {}}, {}, {}});
-  queue.add(packet(0, 10, 600));
-  queue.add(packet(1, 20, 300));
-  queue.add(packet(0, 30, 400));   // the first one has to go
-  queue.add(packet(1, 40, 2000));  // and then all: it is too large by itself
-
-  const auto counts = queue.counts();
-  EXPECT_EQ(counts.at(0).dropped, 1000U);
-  EXPECT_EQ(counts.at(1).dropped, 2300U);
-  queue.add(packet(1, 50, 7));
-  const InputQueue::Batch batch = queue.take();
-  EXPECT_EQ(batch.poses.size(), 1U);
-  ASSERT_EQ(batch.packets.size(), 1U);
-  EXPECT_EQ(batch.packets[0].events.size(), 7U);
-  EXPECT_EQ(batch.missing.at(0).until_ns, 31);
-  EXPECT_EQ(batch.missing.at(1).until_ns, 41);
-  EXPECT_TRUE(queue.take().missing.empty());
-  EXPECT_EQ(queue.counts().at(1).taken, 7U);
+  struct Waiting {
+    int camera;
+    std::size_t events;
+    std::int64_t t_ns;
+  };
+  std::deque<Waiting> waiting;
+  std::map<int, std::int64_t> missing_ns;
+  std::map<int, QueueCounts> expected;
+  std::size_t poses = 0;
+  const auto sum = [&](auto of) {
+    return std::accumulate(
+        waiting.begin(), waiting.end(), std::uint64_t{0},
+        [&](std::uint64_t total, const Waiting& one) { return total + of(one); });
+  };
+  const auto events_of = [](const Waiting& one) { return one.events; };
+  const auto bytes_of = [](const Waiting& one) {
+    return sizeof(CameraPacket) + one.events * sizeof(Event);
+  };
+  const auto miss = [&](const Waiting& one) {
+    if (one.events > 0) missing_ns[one.camera] = std::max(missing_ns[one.camera], one.t_ns + 1);
+  };
+  enum { kTake = 8, kPause };
+  const auto steps = *rc::gen::container<std::vector<std::tuple<int, int, int>>>(rc::gen::tuple(
+      rc::gen::inRange(0, kPause + 1), rc::gen::inRange(0, 3), rc::gen::inRange(0, 90)));
+  std::int64_t t_ns = 100;
+  for (const auto& [kind, camera, events] : steps) {
+    const Waiting one{camera, static_cast<std::size_t>(events), kind == 0 ? t_ns - 5 : ++t_ns};
+    QueueCounts& counts = expected[camera];
+    counts.received += kind == kTake ? 0 : one.events;
+    if (kind == kPause) {
+      queue.skip(packet(camera, one.t_ns, one.events));
+      counts.paused += one.events;
+      miss(one);
+    } else if (kind != kTake) {
+      queue.add(packet(camera, one.t_ns, one.events));
+      queue.add(QueuedPose{{t_ns, {}}, {}, {}});
+      ++poses;
+      waiting.push_back(one);
+      while (sum(events_of) > static_cast<std::uint64_t>(options.max_queue_events) ||
+             static_cast<double>(sum(bytes_of)) > options.max_queue_mb * 1e6) {
+        expected[waiting.front().camera].dropped += waiting.front().events;
+        miss(waiting.front());
+        waiting.pop_front();
+      }
+    } else {
+      const InputQueue::Batch batch = queue.take();
+      RC_ASSERT(batch.poses.size() == std::exchange(poses, 0));
+      RC_ASSERT(batch.packets.size() == waiting.size());
+      for (std::size_t i = 0; i < waiting.size(); ++i) {
+        RC_ASSERT(batch.packets[i].camera == waiting[i].camera);
+        RC_ASSERT(batch.packets[i].events.size() == waiting[i].events);
+        expected[waiting[i].camera].taken += waiting[i].events;
+      }
+      RC_ASSERT(batch.missing.size() == missing_ns.size());
+      for (const auto& [index, until_ns] : missing_ns) {
+        RC_ASSERT(batch.missing.at(index).until_ns == until_ns);
+      }
+      waiting.clear();
+      missing_ns.clear();
+    }
+    RC_ASSERT(queue.queuedEvents() == sum(events_of));
+    for (const auto& [index, of] : queue.counts()) {
+      const QueueCounts& other = expected.at(index);
+      RC_ASSERT(of.received == other.received);
+      RC_ASSERT(of.dropped == other.dropped);
+      RC_ASSERT(of.paused == other.paused);
+      RC_ASSERT(of.taken == other.taken);
+      RC_ASSERT(of.queued == of.received - of.dropped - of.paused - of.taken);
+    }
+  }
 }
 
-TEST(InputQueue, CountsItsMemoryToo) {
-  LiveOptions options;
-  options.max_queue_mb = 1;
-  InputQueue queue(options);
-  for (int i = 0; i < 100'000; ++i) queue.add(packet(0, i, 0));
-  EXPECT_LT(queue.take().packets.size(), 1'000'000 / sizeof(CameraPacket) + 1);
+TEST(InputQueue, ExactlyAsMuchAsItsLimitsFits) {
+  for (const bool by_memory : {false, true}) {
+    LiveOptions options;
+    options.max_event_rate = 0;
+    const auto bytes = static_cast<double>(2 * sizeof(CameraPacket) + 70 * sizeof(Event));
+    options.max_queue_events = by_memory ? 1000 : 70;
+    if (by_memory) {
+      options.max_queue_mb = 1e-6 * bytes;
+      ASSERT_EQ(options.max_queue_mb * 1e6, bytes);
+    }
+    InputQueue queue(options);
+    for (const std::size_t events : {30U, 40U}) queue.add(packet(0, 1, events));
+    EXPECT_EQ(queue.queuedEvents(), 70U);
+    queue.add(packet(0, 1, 1));
+    EXPECT_EQ(queue.queuedEvents(), 41U);
+  }
 }
 
 TEST(InputQueue, EndPassesTheHeldEvents) {
@@ -150,6 +221,8 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   EXPECT_EQ(queue.counts().at(0).queued, 0U);
   queue.skip(packet(0, 7, 5));
   EXPECT_EQ(queue.counts().at(0).paused, 5U);
+  EXPECT_EQ(queue.counts().at(0).received, 65U);
+  EXPECT_TRUE(queue.take().missing.empty()) << "after the end";
   queue.add(QueuedPose{{1, {}}, {}, {}});
   EXPECT_EQ(queue.posesAfterEnd(), 1U);
   EXPECT_TRUE(queue.take().poses.empty());

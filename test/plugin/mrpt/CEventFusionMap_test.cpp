@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <mrpt/config/CConfigFileMemory.h>
+#include <mrpt/img/color_maps.h>
 #include <mrpt/maps/CMultiMetricMap.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationComment.h>
@@ -18,6 +19,7 @@
 
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/registration.h"
+#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -29,6 +31,7 @@ using mrpt::maps::CMultiMetricMap;
 using mrpt::maps::CPointsMapXYZI;
 using mrpt::obs::CObservationPointCloud;
 using testing::HasSubstr;
+using Bytes = std::vector<std::uint8_t>;
 
 StoredKeyframe randomKeyframe(unsigned seed, int count = 200) {
   std::mt19937 random(seed);
@@ -68,15 +71,15 @@ void expectSamePoints(const CEventFusionMap& a, const CEventFusionMap& b) {
 }
 
 template <typename Object>
-std::vector<std::uint8_t> bytesOf(const Object& object) {
-  std::vector<std::uint8_t> bytes;
+Bytes bytesOf(const Object& object) {
+  Bytes bytes;
   auto archive = mrpt::serialization::archiveFrom(bytes);
   archive << object;
   return bytes;
 }
 
 template <typename Object>
-std::shared_ptr<Object> objectFrom(const std::vector<std::uint8_t>& bytes) {
+std::shared_ptr<Object> objectFrom(const Bytes& bytes) {
   registerClasses();
   auto archive = mrpt::serialization::archiveFrom(bytes);
   return std::dynamic_pointer_cast<Object>(archive.ReadObject());
@@ -90,15 +93,6 @@ CMultiMetricMap mapsFrom(const std::string& ini) {
   CMultiMetricMap maps;
   maps.setListOfMaps(list);
   return maps;
-}
-
-std::string errorOfMaking(const std::string& ini) {
-  try {
-    mapsFrom("[maps]\neventFusionMap_count = 1\n" + ini);
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 CObservationPointCloud observationOf(const StoredKeyframe& keyframe) {
@@ -126,6 +120,9 @@ TEST(CEventFusionMap, IsMadeByTheMapFactoryWithItsOptions) {
 
 TEST(CEventFusionMap, WrongOptionsAreErrorsThatNameThem) {
   const std::string section = "maps_eventFusionMap_00_insertOpts";
+  const auto errorOfMaking = [](const std::string& ini) {
+    return messageOf([&] { mapsFrom("[maps]\neventFusionMap_count = 1\n" + ini); });
+  };
   const auto with = [&](const std::string& line) {
     return errorOfMaking("[" + section + "]\n" + line + "\n");
   };
@@ -134,7 +131,8 @@ TEST(CEventFusionMap, WrongOptionsAreErrorsThatNameThem) {
   EXPECT_THAT(with("voxel_size = 1"), HasSubstr(section + ": voxel_size: unknown key"));
   EXPECT_THAT(with("min_keyframes = 0"), HasSubstr(section + ": min_keyframes = 0: must be"));
   EXPECT_THAT(errorOfMaking("[maps_eventFusionMap_00_inserts]\nvoxel_size_m = 1\n"),
-              HasSubstr("maps_eventFusionMap_00_inserts: unknown section"));
+              HasSubstr("maps_eventFusionMap_00_inserts: unknown section; known: "
+                        "maps_eventFusionMap_00_insertOpts, maps_eventFusionMap_00_creationOpts"));
   EXPECT_THAT(errorOfMaking("[maps_eventFusionMap_00_creationOpts]\nvoxel_size_m = 1\n"),
               HasSubstr("maps_eventFusionMap_00_creationOpts: voxel_size_m: unknown key"));
 }
@@ -145,6 +143,7 @@ TEST(CEventFusionMap, InsertsCloudsWithIntensitiesAtTheRobotsPose) {
   expected.insertKeyframe(keyframe);
 
   CObservationPointCloud observation = observationOf(keyframe);
+  observation.timestamp = INVALID_TIMESTAMP;
   observation.sensorPose = mrpt::poses::CPose3D(0.1, 0.2, 0.3, 1, 0.2, -0.4);
   const mrpt::poses::CPose3D robot =
       mrptPoseFrom(keyframe.T_world_ref * rigidFrom(observation.sensorPose).inverse());
@@ -157,14 +156,41 @@ TEST(CEventFusionMap, InsertsCloudsWithIntensitiesAtTheRobotsPose) {
   for (std::size_t i = 0; i < points->size(); ++i) {
     EXPECT_EQ(points->at(i).intensity, expected_points->at(i).intensity);
   }
+  keyframe.points->setPointIntensity(0, 7);
+  EXPECT_NE(map.keyframes()[0].points->getPointIntensity(0), 7) << "the map has a copy";
+  EXPECT_EQ(map.keyframes()[0].t_ref_ns, 0) << "the observation has no time";
+  mrpt::maps::CSimpleMap simple;
+  insertInto(simple, randomKeyframe(1));
+  CEventFusionMap filled;
+  filled.loadFromSimpleMap(simple);
+  expectNear(filled.cloud().points(), expected_points, 1e-6);
+  EXPECT_EQ(filled.keyframes()[0].t_ref_ns, 1'700'000'000'123'456'800) << "MRPT's tick";
 }
 
-TEST(CEventFusionMap, DoesNotChangeWithTheCallersCloud) {
-  const StoredKeyframe keyframe = randomKeyframe(1);
-  CEventFusionMap map;
-  map.insertObservation(observationOf(keyframe));
-  keyframe.points->setPointIntensity(0, 7);
-  EXPECT_NE(map.keyframes()[0].points->getPointIntensity(0), 7);
+TEST(CEventFusionMap, AKeyframeThatMovesIsThatOfItsNewPose) {
+  CEventFusionMap map = mapOf(3);
+  EXPECT_EQ(map.getAsSimplePointsMap()->size(), map.cloud().points()->size());
+  const Rigid3 T_world_ref = randomKeyframe(77).T_world_ref;
+  CEventFusionMap expected(bigVoxels());
+  for (unsigned k = 0; k < 3; ++k) {
+    StoredKeyframe keyframe = randomKeyframe(k);
+    if (k == 1) keyframe.T_world_ref = T_world_ref;
+    expected.insertKeyframe(keyframe);
+  }
+  Rigid3 far = T_world_ref;
+  far.translation.x() = 1e19;  // voxels have no numbers there
+  const CEventFusionMap before = map;
+  EXPECT_THROW(map.moveKeyframe(1, far), std::invalid_argument);
+  expectSamePoints(map, before);
+  EXPECT_TRUE(isSame(map.keyframes()[1].T_world_ref, before.keyframes()[1].T_world_ref));
+  map.moveKeyframe(1, T_world_ref);
+  expectSamePoints(map, expected);
+  const auto* simple = map.getAsSimplePointsMap();
+  const MapCloud::ConstPtr points = expected.cloud().points();
+  ASSERT_EQ(simple->size(), points->size());
+  float x = 0, y = 0, z = 0;
+  simple->getPoint(5, x, y, z);
+  EXPECT_EQ(Eigen::Vector3f(x, y, z), positionIn(*points, points->at(5)).cast<float>());
 }
 
 TEST(CEventFusionMap, IgnoresOtherObservations) {
@@ -217,23 +243,79 @@ TEST(CEventFusionMap, StoredAndReadIsTheSameBitForBitAlsoAfterMoreKeyframes) {
   expectSamePoints(*read, map);
 }
 
-TEST(CEventFusionMap, GoesThroughAnArchiveInsideAMultiMetricMap) {
-  CMultiMetricMap maps = mapsFrom("[maps]\neventFusionMap_count = 1\n");
-  const auto map = maps.mapByClass<CEventFusionMap>();
-  for (unsigned k = 0; k < 3; ++k) map->insertKeyframe(randomKeyframe(k));
-
-  const auto read = objectFrom<CMultiMetricMap>(bytesOf(maps));
-
-  ASSERT_TRUE(read && read->mapByClass<CEventFusionMap>());
-  expectSamePoints(*read->mapByClass<CEventFusionMap>(), *map);
+/// As this program's earlier versions stored a map: without a consistency check, without sigmas.
+Bytes storedAs(std::uint8_t version, const CEventFusionMap& map) {
+  Bytes content;
+  auto out = mrpt::serialization::archiveFrom(content);
+  const GlobalCloudOptions& options = map.cloud().options();
+  out << map.genericMapParams << options.voxel_size_m << std::int32_t{options.min_keyframes}
+      << options.outliers.outlier_radius_m << std::int32_t{options.outliers.outlier_min_neighbors};
+  if (version > 0) out << std::string("support") << 0.25 << 3.0 << std::int32_t{4};
+  out << static_cast<std::uint32_t>(map.keyframes().size());
+  for (const StoredKeyframe& keyframe : map.keyframes()) {
+    out << keyframe.t_ref_ns;
+    for (const double value : keyframe.T_world_ref.translation) out << value;
+    for (const double value : keyframe.T_world_ref.rotation.coeffs()) out << value;
+    out << *keyframe.points;
+  }
+  Bytes bytes = bytesOf(map);
+  constexpr std::size_t kVersionAt = sizeof("efm::CEventFusionMap");  // behind length and name
+  bytes.resize(kVersionAt);
+  bytes.push_back(version);
+  bytes.insert(bytes.end(), content.begin(), content.end());
+  bytes.push_back(0x88);  // MRPT's end of an object
+  return bytes;
 }
 
-TEST(CEventFusionMap, DamagedBytesAreAnError) {
-  const std::vector<std::uint8_t> bytes = bytesOf(mapOf(2));
+TEST(CEventFusionMap, EarlierVersionsAreReadLaterAndDamagedOnesAreErrors) {
+  const CEventFusionMap map = mapOf(2);
+  for (const std::uint8_t version : {0, 1}) {
+    const auto read = objectFrom<CEventFusionMap>(storedAs(version, map));
+    ASSERT_TRUE(read) << int{version};
+    const ConsistencyOptions& options = read->cloud().options().consistency;
+    EXPECT_EQ(options.consistency, version == 0 ? Consistency::kNone : Consistency::kSupport);
+    EXPECT_EQ(options.max_contradictions,
+              version == 0 ? ConsistencyOptions().max_contradictions : 4);
+    if (version == 0) {
+      expectSamePoints(*read, map);
+    }
+    EXPECT_TRUE(isSame(read->keyframes()[1].T_world_ref, map.keyframes()[1].T_world_ref));
+  }
+  EXPECT_THAT(messageOf([&] { objectFrom<CEventFusionMap>(storedAs(3, map)); }),
+              HasSubstr("an event fusion map of version 3: this program reads versions 0 to 2"));
+  const Bytes bytes = bytesOf(map);
   for (const std::size_t kept : {bytes.size() / 3, bytes.size() / 2, bytes.size() - 20}) {
-    std::vector<std::uint8_t> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(kept));
+    const Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(kept));
     EXPECT_THROW(objectFrom<CEventFusionMap>(cut), std::exception) << kept;
   }
+}
+
+TEST(CEventFusionMap, IsDrawnInColoursUpToTheNinetyFifthPercentile) {
+  StoredKeyframe keyframe;
+  keyframe.points = CPointsMapXYZI::Create();
+  for (int i = 0; i < 40; ++i) {  // each in a voxel of its own
+    keyframe.points->insertPointFast(static_cast<float>(i), 2, 3);
+    keyframe.points->setPointIntensity(static_cast<std::size_t>(i), static_cast<float>(i + 1));
+  }
+  CEventFusionMap map(bigVoxels());
+  map.insertKeyframe(keyframe);
+  EXPECT_EQ(map.asString(), "event fusion map of 1 keyframes with 40 points in voxels of 0.25 m");
+  const auto drawn = map.getVisualization()->getByClass<mrpt::opengl::CPointCloudColoured>();
+  ASSERT_TRUE(drawn);
+  ASSERT_EQ(drawn->size(), 40U);
+  for (std::size_t i = 0; i < 40; ++i) {
+    const auto point = drawn->getPoint3Df(i);
+    const auto colour = drawn->getPointColor(i);
+    EXPECT_EQ(point.y, 2);
+    EXPECT_EQ(point.z, 3);
+    const auto expected = mrpt::img::colormap(mrpt::img::cmJET,  // the 38th of 40 is the scale
+                                              std::min(1.0F, (point.x + 1) / 38));
+    EXPECT_EQ(colour.R, expected.R) << point.x;
+    EXPECT_EQ(colour.B, expected.B) << point.x;
+  }
+  map.genericMapParams.enableSaveAs3DObject = false;
+  EXPECT_TRUE(map.getVisualization()->empty());
+  EXPECT_EQ(CEventFusionMap().getVisualization()->size(), 1U) << "an empty cloud";
 }
 
 TEST(CEventFusionMap, CopiesAreIndependent) {
@@ -244,34 +326,6 @@ TEST(CEventFusionMap, CopiesAreIndependent) {
   EXPECT_TRUE(map.keyframes().empty());
   expectSamePoints(copy, mapOf(2));
   EXPECT_EQ(map.cloud().options().voxel_size_m, 0.25);
-}
-
-TEST(CEventFusionMap, IsFilledFromASimplemap) {
-  mrpt::maps::CSimpleMap simple;
-  for (unsigned k = 0; k < 3; ++k) insertInto(simple, randomKeyframe(k));
-  CEventFusionMap map(mapOf(0).cloud().options());
-  map.loadFromSimpleMap(simple);
-
-  const auto points = map.cloud().points();
-  const auto expected = mapOf(3).cloud().points();
-  expectNear(points, expected, 1e-6);
-}
-
-TEST(CEventFusionMap, IsDrawnWithAPointForEachOfItsPoints) {
-  CEventFusionMap map = mapOf(2);
-  const auto drawn = map.getVisualization()->getByClass<mrpt::opengl::CPointCloudColoured>();
-  ASSERT_TRUE(drawn);
-  EXPECT_EQ(drawn->size(), map.cloud().points()->size());
-  map.genericMapParams.enableSaveAs3DObject = false;
-  EXPECT_TRUE(map.getVisualization()->empty());
-  EXPECT_EQ(CEventFusionMap().getVisualization()->size(), 1U) << "an empty cloud";
-}
-
-TEST(CEventFusionMap, ReturnsItsPointsAsMrptsSimplestMap) {
-  CEventFusionMap map = mapOf(1);
-  EXPECT_EQ(map.getAsSimplePointsMap()->size(), map.cloud().points()->size());
-  map.insertKeyframe(randomKeyframe(4));
-  EXPECT_EQ(map.getAsSimplePointsMap()->size(), map.cloud().points()->size()) << "after it grew";
 }
 
 TEST(CEventFusionMap, WarnsWhereMrptsFloatsRoundItsPoints) {
@@ -293,11 +347,6 @@ TEST(CEventFusionMap, WarnsWhereMrptsFloatsRoundItsPoints) {
       testing::internal::GetCapturedStdout() + testing::internal::GetCapturedStderr();
   EXPECT_THAT(text, HasSubstr("MRPT's maps have float points"));
   EXPECT_EQ(text.find("MRPT's maps"), text.rfind("MRPT's maps")) << "once";
-}
-
-TEST(CEventFusionMap, IsDescribedByKeyframesAndVoxelSize) {
-  EXPECT_THAT(mapOf(3).asString(), HasSubstr("3 keyframes"));
-  EXPECT_THAT(mapOf(3).asString(), HasSubstr("0.25 m"));
 }
 
 class CEventFusionMapFile : public TemporaryFolder {};

@@ -9,10 +9,13 @@
 #include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "plugin/mrpt/mrpt_time.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/tracker_poses.h"
+#include "test/plugin/message_of.h"
 
 namespace efm {
 namespace {
@@ -66,12 +69,8 @@ TEST(DeadReckoning, AMovementWithoutATimeHasTheTimeOfItsFrame) {
   frame.getObservationByIndex(0)->timestamp = INVALID_TIMESTAMP;
   CActionCollection action = planarAction(0, 1, 0, 0);
   action.get(0)->timestamp = INVALID_TIMESTAMP;
-  try {
-    DeadReckoning().poseAfter(action, frame);
-    ADD_FAILURE() << "no error";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_THAT(error.what(), HasSubstr("a movement has no time stamp"));
-  }
+  EXPECT_THAT(messageOf([&] { DeadReckoning().poseAfter(action, frame); }),
+              HasSubstr("a movement has no time stamp"));
   frame.insert(mrpt::obs::CObservationComment::Create());
   frame.getObservationByIndex(1)->timestamp = mrptTimeFrom(5000);
   EXPECT_EQ(poseIn(DeadReckoning().poseAfter(action, frame)).t_ns, 5000);
@@ -107,6 +106,54 @@ TEST(PoseObservation, ItsNoiseIsTheStandardDeviationOverTheAxes) {
   ASSERT_TRUE(noise);
   EXPECT_NEAR(noise->noise_m, 0.02, 1e-12);
   EXPECT_NEAR(noise->noise_rad, 0.003, 1e-12);
+  for (const int i : {0, 3}) {  // one of both may be 0
+    auto exact = robot;
+    for (int axis = i; axis < i + 3; ++axis) exact.pose.cov(axis, axis) = 0;
+    ASSERT_TRUE(efm::poseIn(exact)->noise);
+    EXPECT_NEAR(efm::poseIn(exact)->noise->noise_m, i == 0 ? 0 : 0.02, 1e-12);
+    EXPECT_NEAR(efm::poseIn(exact)->noise->noise_rad, i == 0 ? 0.003 : 0, 1e-12);
+  }
+  for (int i = 0; i < 6; ++i) {
+    for (const double wrong : {-5.0, double(NAN), double(INFINITY)}) {
+      auto invalid = robot;
+      invalid.pose.cov(i, i) = wrong;
+      EXPECT_FALSE(efm::poseIn(invalid)->noise) << i << ": " << wrong;
+    }
+  }
+}
+
+TEST(TrackerPoses, TheNewestIsThatOfTheSelectedSourceOrOfPosesInTheWorld) {
+  TrackerPoses poses;
+  const auto add = [&](const mrpt::obs::CObservation::Ptr& observation, std::int64_t t_ns) {
+    ObservedPose observed = poseIn(observation);
+    observed.t_ns = t_ns;
+    poses.add(*observation, observed, observed.T_world_body);
+  };
+  const auto x_of = [&](const std::optional<PoseSourceId>& selected) {
+    const auto* newest = poses.newest(selected);
+    return newest ? newest->mean.x() : NAN;
+  };
+  const auto pose_at = [](double x) {
+    return poseObservation({1000, Rigid3{Eigen::Quaterniond::Identity(), {x, 0, 0}}, {}}, "pose");
+  };
+  const auto wheels = mrpt::obs::CObservationOdometry::Create();
+  wheels->sensorLabel = "wheels";
+  wheels->timestamp = mrptTimeFrom(1000);
+  wheels->odometry.x(7);
+  const PoseSourceId odometry{PoseKind::kOdometry, "wheels"};
+  constexpr std::int64_t kS = 1'000'000'000;
+  add(wheels, 10 * kS);
+  EXPECT_TRUE(std::isnan(x_of(std::nullopt))) << "a better one may come";
+  EXPECT_EQ(x_of(odometry), 7);
+  add(pose_at(1), 10 * kS);
+  EXPECT_EQ(x_of(std::nullopt), 1);
+  EXPECT_EQ(x_of(odometry), 7);
+  add(pose_at(2), 10 * kS);
+  EXPECT_EQ(x_of(std::nullopt), 2);
+  for (const std::int64_t late_ns : {std::int64_t{1}, kS}) add(pose_at(3), 10 * kS - late_ns);
+  EXPECT_EQ(x_of(std::nullopt), 2) << "late ones";
+  add(pose_at(4), 9 * kS - 1);
+  EXPECT_EQ(x_of(std::nullopt), 4) << "the clock went back";
 }
 
 TEST(PoseObservation, ReturnsThePoseAndTheRigOnTheBody) {

@@ -6,16 +6,15 @@
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <fstream>
 #include <future>
 #include <new>
 #include <set>
 
 #include "test/plugin/mrpt/live_driver.h"
 #include "test/plugin/session/failing_allocation.h"
-#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
@@ -141,111 +140,36 @@ TEST(LiveBuilder, TheCallerNeverWaitsAndNewestInputWins) {
   for (const std::int64_t t_ns : keyframeTimes(builder)) EXPECT_EQ(all.count(t_ns), 1U);
 }
 
-TEST(LiveBuilder, EventsWaitForPosesOnlySoLong) {
-  const SyntheticRecording recording(3);
-  Observations observations = observationsOf(recording);
-  // The tracker is lost from 0.5 s to 2.2 s.
-  const auto is_lost = [&](const CObservation::Ptr& observation) {
-    const double t_s = 1e-9 * static_cast<double>(nanosecondsFrom(observation->timestamp) -
-                                                  SyntheticRecording::kStartNs);
-    return observation->sensorLabel == "pose" && t_s > 0.5 && t_s < 2.2;
-  };
-  observations.erase(std::remove_if(observations.begin(), observations.end(), is_lost),
-                     observations.end());
-  EventFusionOptions options = liveOptions();
-  options.live.max_pose_wait_s = 0.5;
-  CEventFusionMapBuilder builder(options);
-  playPatiently(builder, observations);
-
-  const SessionStatus status = builder.status();
-  expectSumsAgree(status);
-  EXPECT_GT(status.counts.total().without_pose, status.counts.total().read / 4);
-  EXPECT_GT(*keyframeTimes(builder).rbegin(), recording.poses.back().t_ns - 300'000'000);
-  EXPECT_EQ(status.live->pose_jumps, 0U) << "the rig went on at its speed";
-}
-
-class LiveBuilderWithFiles : public TemporaryFolder {};
-
-TEST_F(LiveBuilderWithFiles, ADeclaredRigWaitsForNoCamera) {
-  const std::string camera =
-      "  camera_model: pinhole\n  intrinsics: [100, 100, 59.5, 44.5]\n"
-      "  distortion_model: none\n  distortion_coeffs: []\n  resolution: [120, 90]\n";
-  std::ofstream(folder() / "rig.yaml")
-      << "cam0:\n"
-      << camera << "cam1:\n"
-      << camera << "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
-  EventFusionOptions options = liveOptions();
-  options.rig.calibration = folder() / "rig.yaml";
-  // Camera 1 begins at 1.6 s: undeclared, it would be an error from 1 s on.
-  Observations observations = observationsOf(SyntheticRecording(3));
-  const auto is_missing = [](const CObservation::Ptr& observation) {
-    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
-    return packet && packet->camera_index == 1 &&
-           nanosecondsFrom(packet->timestamp) < SyntheticRecording::kStartNs + 1'600'000'000;
-  };
-  observations.erase(std::remove_if(observations.begin(), observations.end(), is_missing),
-                     observations.end());
-  CEventFusionMapBuilder builder(options);
-  const auto early = static_cast<std::ptrdiff_t>(observations.size() * 45 / 100);  // 1.5 s
-  feedPatiently(builder, {observations.begin(), observations.begin() + early});
-  EXPECT_EQ(builder.status().rig.cameras.size(), 2U);
-  playPatiently(builder, {observations.begin() + early, observations.end()});
-
-  const SessionStatus status = builder.status();
-  expectSumsAgree(status);
-  EXPECT_EQ(status.live->errors, 0U) << status.live->last_error;
-  EXPECT_GT(status.counts.cameras.at(1).used, 0U);
-  EXPECT_GT(status.silent_keyframes.at(1), 5U) << "counted";
-  EXPECT_LT(status.silent_keyframes.at(1), 18U);
-  EXPECT_GT(builder.trajectory().size(), 24U);
-}
-
-TEST(LiveBuilder, AJumpOfTheTrackerBeginsANewStretch) {
-  const SyntheticRecording recording(2);
-  const std::int64_t jump_ns = SyntheticRecording::kStartNs + 1'050'000'000;
-  const auto move = [&](CObservation& observation) {
-    auto* pose = dynamic_cast<mrpt::obs::CObservationRobotPose*>(&observation);
-    if (pose && nanosecondsFrom(pose->timestamp) >= jump_ns) {
-      pose->pose.mean.x_incr(10);
-    }
-  };
-  const Observations observations = changed(observationsOf(recording), move);
+TEST(LiveBuilder, AJumpBeginsANewStretchUnlessItsNoiseExplainsIt) {
+  const SyntheticRecording recording(1.2);
+  const std::int64_t jump_ns = SyntheticRecording::kStartNs + 650 * kMs;
   CEventFusionMapBuilder playback(syntheticOptions());
   play(playback, observationsOf(recording));
-  const auto all = keyframeTimes(playback);
-  for (const bool refines : {false, true}) {
+  for (const bool is_noise : {false, true}) {
+    const auto move = [&](CObservation& observation) {
+      auto* pose = dynamic_cast<mrpt::obs::CObservationRobotPose*>(&observation);
+      if (pose && nanosecondsFrom(pose->timestamp) >= jump_ns) pose->pose.mean.x_incr(10);
+      if (pose && is_noise) pose->pose.cov.setDiagonal(6, 9);  // 3 m
+    };
     EventFusionOptions options = liveOptions();
-    options.refinement.enabled = refines;
+    options.refinement.enabled = !is_noise;
     CEventFusionMapBuilder builder(options);
-    if (refines) {
-      playPatiently(builder, observations);
-    } else {
-      play(builder, observations);  // the jump waits when the end comes
-    }
-
-    const SessionStatus status = builder.status();
-    EXPECT_EQ(status.live->pose_jumps, 1U);
-    expectSumsAgree(status);
+    builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+    playPatiently(builder, changed(observationsOf(recording), move));
+    EXPECT_EQ(builder.status().live->pose_jumps, is_noise ? 0U : 1U);
+    if (is_noise) continue;
     const auto times = keyframeTimes(builder);
-    for (const std::int64_t t_ns : all) {  // windows of 0.2 s around t_ns
-      const bool spans = t_ns - 100'000'000 < jump_ns && t_ns + 100'000'000 > jump_ns - 10'000'000;
+    for (const std::int64_t t_ns : keyframeTimes(playback)) {  // windows of 0.2 s around t_ns
+      const bool spans = t_ns - 100 * kMs < jump_ns && t_ns + 100 * kMs > jump_ns - 10 * kMs;
       EXPECT_EQ(times.count(t_ns), spans ? 0U : 1U) << t_ns;
     }
     for (const StampedPose& keyframe : builder.trajectory()) {
-      // The rig itself moves by 1.6 m.
+      // The rig itself moves by 1 m.
       EXPECT_EQ(keyframe.T_world_rig.translation.x() > 5, keyframe.t_ns > jump_ns);
     }
-    EXPECT_EQ(status.refinement.has_value(), refines);
-    EXPECT_EQ(status.refinement.value_or(RefinementState{}).failures, 0U);
+    EXPECT_EQ(builder.status().refinement->failures, 0U);
+    expectSumsAgree(builder.status());
   }
-  // A noise that explains it is no jump.
-  const auto doubt = [&](CObservation& observation) {
-    auto* pose = dynamic_cast<mrpt::obs::CObservationRobotPose*>(&observation);
-    if (pose) pose->pose.cov.setDiagonal(6, 9);
-  };
-  CEventFusionMapBuilder doubtful(liveOptions());
-  playPatiently(doubtful, changed(observations, doubt));
-  EXPECT_EQ(doubtful.status().live->pose_jumps, 0U);
 }
 
 TEST(LiveBuilder, PosesWaitForEventsTenMinutes) {
@@ -301,35 +225,9 @@ TEST(LiveBuilder, AfterAnErrorTheNextKeyframeIsTried) {
   expectSumsAgree(status);
 }
 
-TEST(LiveBuilder, RefusedObservationsAreCountedAndTheMapGoesOn) {
-  const SyntheticRecording recording;
-  const Observations observations = observationsOf(recording);
-  CEventFusionMapBuilder builder(liveOptions());
-  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
-  feed(builder, {observations.begin(), observations.begin() + 75});
-  EXPECT_THROW(builder.processObservation(packetOutsideTheSensor(recording)),
-               std::invalid_argument);
-  auto other_lens = packetObservation(recording, 1);
-  other_lens->camera.fx = 99;
-  other_lens->events = {{SyntheticRecording::kStartNs + 250'000'000, 1, 1, true}};
-  EXPECT_THROW(builder.processObservation(other_lens), std::invalid_argument);
-  auto late_pose = changed({observations[2]},
-                           [](CObservation& pose) { pose.timestamp -= std::chrono::seconds(9); });
-  builder.processObservation(late_pose[0]);
-  playPatiently(builder, {observations.begin() + 75, observations.end()});
-
-  const SessionStatus status = builder.status();
-  EXPECT_EQ(status.live->cameras.at(0).refused, 1U);
-  EXPECT_EQ(status.live->cameras.at(1).refused, 1U);
-  EXPECT_EQ(status.live->refused_poses, 1U);
-  EXPECT_THAT(status.live->last_error, HasSubstr("1.0"));
-  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
-  expectSumsAgree(status);
-}
-
 TEST(LiveBuilder, IsDestroyedWhileACallbackUsesIt) {
   const Observations observations = observationsOf(SyntheticRecording(1.5));
-  for (int i = 0; i < 3; ++i) {
+  {
     std::promise<void> within;
     std::atomic<bool> is_first{true};
     {
@@ -436,6 +334,35 @@ TEST_P(BuilderOfBothModes, ThePoseHasTheTrackersCovariance) {
   ASSERT_TRUE(pose);
   EXPECT_NEAR(pose->cov(0, 0), 0.01, 1e-9);
   EXPECT_NEAR(pose->cov(4, 4), 0.04, 1e-9);
+}
+
+TEST_P(BuilderOfBothModes, TellsChoicesOfOptionsAndRoundedPoints) {
+  EventFusionOptions options = this->options();
+  options.automatic = defaultOptions().automatic;
+  for (const bool rests : {false, true}) {  // by its poses: one camera alone sees no scene then
+    SyntheticRecording recording(1.5, rests ? 1 : 2);
+    for (StampedPose& pose : recording.poses) {
+      pose.T_world_rig.translation.x() = 5e6 + (rests ? 0 : pose.T_world_rig.translation.x());
+    }
+    CEventFusionMapBuilder builder(options);
+    builder.logging_enable_console_output = false;
+    std::vector<std::string> told;
+    builder.logRegisterCallback([&](std::string_view text, auto&&...) { told.emplace_back(text); });
+    playPatiently(builder, observationsOf(recording));
+    for (int i = 0; i < 2; ++i) builder.getCurrentlyBuiltMetricMap();
+    const auto times = [&](const std::string& begin) {
+      return static_cast<std::uint64_t>(
+          std::count_if(told.begin(), told.end(),
+                        [&](const std::string& text) { return text.find(begin) == 0; }));
+    };
+    const std::uint64_t choices = builder.status().choices;
+    EXPECT_GE(choices, 1U);
+    EXPECT_EQ(times("options chosen from the data: "), choices);
+    EXPECT_EQ(times("no-scene: "), rests ? choices : 0U);
+    if (rests) continue;
+    EXPECT_FALSE(builder.points()->empty());
+    EXPECT_EQ(times("MRPT's maps have float points"), 1U);
+  }
 }
 
 TEST_P(BuilderOfBothModes, AHostOfMrptAloneEndsItByAComment) {

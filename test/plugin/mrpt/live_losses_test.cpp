@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Live operation with input that cannot be used: nothing else is lost with it, and all is counted.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
-#include <atomic>
+#include <chrono>
 #include <cmath>
-#include <iterator>
 #include <map>
 #include <string>
 
@@ -15,8 +15,6 @@
 
 namespace efm {
 namespace {
-
-using mrpt::obs::CObservation;
 
 TEST(LiveLosses, WhatAHostsCallbacksThrowIsCountedAndToldOnce) {
   SyntheticRecording recording;
@@ -83,6 +81,9 @@ TEST(LiveLosses, OptionsAreChosenFromWhatIsThereWhereTheQueueIsFull) {
       if (option.key == "window_s") window_s = option.value;
       if (option.key == "window_s") reason = option.reason;
     }
+    EXPECT_THAT(reason, testing::StartsWith("no longer one fits into the queue of live operation; "
+                                            "from "));
+    EXPECT_NEAR(window_s, std::stod(reason.substr(reason.find("from ") + 5)) / 2, 0.005);
     EXPECT_GT(window_s, 0.05);
     EXPECT_LT(window_s, is_announced ? 0.35 : 0.55) << "two fit into the queue; " << reason;
     EXPECT_GT(builder.points()->size(), 30U);
@@ -99,106 +100,140 @@ TEST(LiveLosses, OptionsAreChosenFromWhatIsThereWhereTheQueueIsFull) {
   }
 }
 
-TEST(LiveLosses, GivenUpWindowsAreCountedByReasonAndTheirEventsAreLost) {
-  const SyntheticRecording recording(2);
-  const Observations healthy = observationsOf(recording);
-  const auto secondsOf = [](const CObservation& observation) {
-    return 1e-9 * static_cast<double>(nanosecondsFrom(observation.timestamp) -
-                                      SyntheticRecording::kStartNs);
-  };
-  const Observations jumping = changed(healthy, [&](CObservation& observation) {
-    auto* pose = dynamic_cast<mrpt::obs::CObservationRobotPose*>(&observation);
-    if (pose != nullptr && secondsOf(observation) > 1.045) pose->pose.mean.x_incr(10);
-  });
-  Observations lost;
-  for (const auto& observation : healthy) {
-    const double t_s = secondsOf(*observation);
-    if (packetIn(*observation) != nullptr || t_s < 0.905 || t_s > 1.745)
-      lost.push_back(observation);
-  }
-  struct FailingSink : DsiSink {
-    void addPlane(int plane, const float* /*values*/) override {
-      if (plane == 0 && ++keyframes % 4 == 0) throw std::runtime_error("disk full");
-    }
-    std::atomic<int> keyframes{0};
-  } sink;
-  struct Case {
-    GiveUpReason reason;
-    std::uint64_t windows;
-    Observations observations;
-    DsiSink* sink;
-  };
-  // Windows of 0.1 s, one after the other: 19 that are full.
-  const Case cases[] = {{&WindowsGivenUp::jump, 1, jumping, nullptr},
-                        {&WindowsGivenUp::no_pose, 7, lost, nullptr},
-                        {&WindowsGivenUp::error, 4, healthy, &sink}};
-  for (const Case& test : cases) {
+TEST(LiveLosses, AreToldWithTheirNumbers) {
+  const SyntheticRecording recording;
+  EventFusionOptions options = liveOptions();
+  options.live.max_event_rate = 1000;  // 10 in 10 ms
+  CEventFusionMapBuilder builder(options);
+  builder.logging_enable_console_output = false;
+  std::vector<std::string> told;
+  builder.logRegisterCallback([&](std::string_view text, auto&&...) { told.emplace_back(text); });
+  auto packet = packetObservation(recording, 1);
+  packet->timestamp = mrptTimeFrom(SyntheticRecording::kStartNs);
+  for (int i = 0; i < 33; ++i) packet->events.push_back({i, 1, 1, true});
+  packet->events.push_back({20 * kMs, 1, 1, true});
+  feedPatiently(builder, {packetObservation(recording, 0), packet});
+  builder.finish();
+  ASSERT_FALSE(told.empty());
+  EXPECT_EQ(told[0],
+            "so far 0 windows given up; camera 0: 0 dropped, 0 thinned, 0 lost afterwards, of 0 "
+            "events; camera 1: 0 dropped, 23 thinned, 0 lost afterwards, of 34 events");
+}
+
+TEST(LiveLosses, EventsThatWaitAreBoundedInNumberAndMemory) {
+  const SyntheticRecording recording(1.5);
+  const Observations observations = announced(recording, observationsOf(recording));
+  for (const bool by_memory : {false, true}) {
     EventFusionOptions options = liveOptions();
-    options.mapper.policy.window_s = options.mapper.policy.stride_s = 0.1;
-    options.live.max_pose_wait_s = 0.3;
+    options.live.max_pose_wait_s = 3600;
+    (by_memory ? options.live.max_queue_mb : options.live.max_event_rate) = by_memory ? 0.016 : 0;
+    if (!by_memory) options.live.max_queue_events = 1000;
     CEventFusionMapBuilder builder(options);
     builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
-    builder.setDsiSink(test.sink);
-    playPatiently(builder, test.observations);
-
-    const SessionStatus status = builder.status();
-    const WindowsGivenUp& windows = status.counts.windows_given_up;
-    EXPECT_EQ(windows.*test.reason, test.windows) << asText(windows);
-    EXPECT_EQ(windows.total(), test.windows) << asText(windows);
-    const std::uint64_t not_mapped = test.windows + status.counts.keyframes_without_pose;
-    EXPECT_EQ(builder.trajectory().size() + not_mapped, 19U);
-    EXPECT_EQ(status.counts.keyframes, builder.trajectory().size());
-    expectSumsAgree(status);
-    // The motion is even: a window has a twentieth of the events.
-    EXPECT_NEAR(status.live->dropRatio(), 0.05 * static_cast<double>(not_mapped), 0.04)
-        << asText(windows);
-  }
-}
-
-TEST(LiveLosses, DropsAreRememberedUntilTheCamerasNextPacketAndNotLonger) {
-  const SyntheticRecording recording(2.5);
-  const std::int64_t start_ns = SyntheticRecording::kStartNs;
-  constexpr std::int64_t kHourNs = 3'600'000 * kMs;
-  for (const std::int64_t wrong_ns : {std::int64_t{0}, kHourNs, -kHourNs}) {
-    MappingSession session(liveOptions());
-    std::vector<Window> windows;
-    std::vector<std::size_t> begin(2, 0);
-    for (const StampedPose& pose : recording.poses) {
-      session.addPose(pose);
-      for (std::size_t c = 0; c < 2; ++c) {
-        const int camera = static_cast<int>(c);
-        CameraPacket packet{camera, recording.cameras[c], {}, std::nullopt};
-        const std::vector<Event>& events = recording.events[c];
-        for (; begin[c] < events.size() && events[begin[c]].t_ns < pose.t_ns; ++begin[c]) {
-          packet.events.push_back(events[begin[c]]);
-        }
-        // Camera 1 has its first packet after 0.3 s; the one of camera 0 is dropped at 1.25 s.
-        const bool early = c == 1 && pose.t_ns <= start_ns + 300 * kMs;
-        const bool dropped = c == 0 && pose.t_ns == start_ns + 1250 * kMs;
-        if (early || dropped) {
-          session.noteMissing(camera, {pose.t_ns + (dropped ? wrong_ns : 0)});
-        } else {
-          session.addEvents(std::move(packet));
-        }
-      }
-      while (const auto keyframe = session.next()) windows.push_back(keyframe->window);
+    std::uint64_t most = 0;
+    for (const auto& observation : observations) {
+      const std::int64_t t_ns = nanosecondsFrom(observation->timestamp);
+      const bool lost = t_ns > SyntheticRecording::kStartNs + 300 * kMs;
+      if (observation->sensorLabel == "pose" && lost) continue;  // the others wait for it
+      feedPatiently(builder, {observation});
+      const EventCounts all = builder.status().counts.total();
+      most =
+          std::max(most, all.read - all.used - all.without_pose - all.outside_window - all.dropped);
     }
-    session.finish();
-    while (const auto keyframe = session.next()) windows.push_back(keyframe->window);
-
-    ASSERT_FALSE(windows.empty());
-    EXPECT_GE(windows.front().t0_ns, start_ns + 300 * kMs);
-    // Windows of 0.2 s, every 0.1 s: two have the packet. An hour ago is in none.
-    const WindowsGivenUp& given_up = session.status().counts.windows_given_up;
-    EXPECT_EQ(given_up.overload, wrong_ns < 0 ? 0U : 2U) << wrong_ns;
-    EXPECT_EQ(windows.size() + given_up.total(), 20U);
+    EXPECT_GT(most, 900U) << by_memory;
+    EXPECT_LT(most, 1100U) << "and a packet or two: " << by_memory;
+    builder.finish();
+    expectSumsAgree(builder.status());
+    EXPECT_GT(builder.status().counts.windows_given_up.overload, 2U);
+    EXPECT_GT(builder.status().live->dropRatio(), 0.3);
   }
 }
 
-TEST(LiveLosses, InputAfterTheEndIsCounted) {
+/// Each observation may be late, wrong or lost, whatever the schedule of the mapping's thread.
+RC_GTEST_PROP(LiveLosses, EachEventHasOneFate, ()) {
+  static const SyntheticRecording recording(0.7);
+  static const Observations observations = observationsOf(recording);
+  enum { kLate = 1, kOutside, kOtherLens, kOlder, kPaused, kLost, kJump, kTwice, kAhead, kKinds };
+  const auto faults = *rc::gen::container<std::vector<int>>(
+      7, rc::gen::weightedOneOf<int>({{3, rc::gen::just(0)}, {1, rc::gen::inRange(1, +kKinds)}}));
+  EventFusionOptions options = liveOptions();
+  options.mapper.keyframe.planes.num_planes = 4;
+  options.mapper.keyframe.sweep.threads = 1;
+  options.live.max_event_rate = *rc::gen::element(0.0, 1000.0);
+  options.live.max_queue_events = *rc::gen::element(1000, 5'000'000);
+  options.live.max_queue_mb = *rc::gen::element(0.02, 256.0);
+  options.live.max_pose_wait_s = 0.2;
+  options.automatic.window_s = options.automatic.stride_s = *rc::gen::arbitrary<bool>();
+  CEventFusionMapBuilder builder(options);
+  builder.logging_enable_console_output = false;
+  std::map<int, std::uint64_t> fed;
+  double away_m = 0;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const int fault = faults[i % faults.size()];
+    away_m += fault == kJump ? 10 : 0;
+    const auto observation = changed({observations[i]}, [&](mrpt::obs::CObservation& copy) {
+      auto* pose = dynamic_cast<mrpt::obs::CObservationRobotPose*>(&copy);
+      if (pose != nullptr) pose->pose.mean.y_incr(away_m);
+      CObservationEvents* packet = packetIn(copy);
+      if (packet == nullptr) return;
+      const std::int64_t t_ns = nanosecondsFrom(packet->timestamp);
+      if (fault == kLate) packet->events.push_back({t_ns - 30 * kMs, 3, 3, true});
+      if (fault == kOutside) packet->events.push_back({t_ns, 120, 3, true});
+      if (fault == kAhead) packet->events.push_back({t_ns + 3600 * 1000 * kMs, 3, 3, true});
+      if (fault == kOtherLens) packet->camera.fx = 99;
+      if (fault != kOlder) return;
+      packet->covered_until_ns.reset();
+      for (Event& event : packet->events) event.t_ns -= 5000 * kMs;
+    })[0];
+    builder.enableMapUpdating(fault != kPaused);
+    for (int times = fault == kTwice ? 2 : fault == kLost ? 0 : 1; times > 0; --times) {
+      const CObservationEvents* packet = packetIn(*observation);
+      if (packet != nullptr) fed[packet->camera_index] += packet->events.size();
+      messageOf([&] { builder.processObservation(observation); });
+    }
+  }
+  builder.finish();
+  const SessionStatus status = builder.status();
+  expectSumsAgree(status);
+  RC_ASSERT(!testing::Test::HasFailure());
+  std::uint64_t received = 0;
+  std::uint64_t kept = 0;
+  for (const auto& [camera, queue] : status.live->cameras) {
+    RC_ASSERT(queue.received == fed[camera]);
+    RC_ASSERT(queue.held + queue.queued == 0U);
+    const EventCounts& counts = status.counts.cameras.at(static_cast<std::size_t>(camera));
+    received += queue.received;
+    kept += counts.used + counts.outside_window + queue.paused;
+  }
+  RC_ASSERT(std::abs(status.live->dropRatio() * static_cast<double>(received) -
+                     static_cast<double>(received - kept)) < 0.5);
+}
+
+TEST(LiveLosses, EachClockResetStartsTheMappingAnewOnce) {
+  const Observations observations = observationsOf(SyntheticRecording(1.8));
+  CEventFusionMapBuilder builder(liveOptions());
+  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+  for (int round = 0; round < 3; ++round) feedPatiently(builder, observations);
+  builder.finish();
+  const SessionStatus status = builder.status();
+  EXPECT_EQ(status.live->clock_steps, 2U);
+  expectSumsAgree(status);
+  // Windows of 0.2 s, every 0.1 s: 16, and from 1 s on 5 or 6 after a reset.
+  EXPECT_GE(builder.trajectory().size(), 16U + 5U + 5U);
+  EXPECT_LE(builder.trajectory().size(), 16U + 7U + 7U);
+}
+
+TEST(LiveLosses, LatePosesAndInputAfterTheEndAreCounted) {
   const Observations observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(liveOptions());
-  playPatiently(builder, observations);
+  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+  feedPatiently(builder, observations);
+  feedPatiently(builder, changed({observations[2]}, [](mrpt::obs::CObservation& pose) {
+                  pose.timestamp -= std::chrono::seconds(9);
+                }));
+  builder.finish();
+  EXPECT_EQ(builder.status().live->refused_poses, 1U);
+  EXPECT_THAT(builder.status().live->last_error, testing::HasSubstr("the pose at 1.0"));
   const std::size_t points = builder.points()->size();
   std::uint64_t events = 0;
   std::uint64_t poses = 0;
@@ -210,7 +245,7 @@ TEST(LiveLosses, InputAfterTheEndIsCounted) {
   }
   const SessionStatus status = builder.status();
   EXPECT_EQ(status.live->cameras.at(0).after_end + status.live->cameras.at(1).after_end, events);
-  EXPECT_EQ(status.live->refused_poses, poses);
+  EXPECT_EQ(status.live->refused_poses, 1 + poses);
   EXPECT_EQ(builder.points()->size(), points);
   EXPECT_DOUBLE_EQ(status.live->dropRatio(), 0.5);
   expectSumsAgree(status);
@@ -233,106 +268,6 @@ TEST(LiveLosses, OdometryWaitsForEventsTenMinutes) {
   EXPECT_EQ(keyframes, 11U);
   // The one at 1 s before the start was the last that came alone.
   EXPECT_EQ(session.status().poses->first_ns, SyntheticRecording::kStartNs - 601'000 * kMs);
-}
-
-/// Feeds a recording with random faults. @return the events that were fed, by camera.
-std::map<int, std::uint64_t> playWithFaults(CEventFusionMapBuilder& builder,
-                                            const SyntheticRecording& recording,
-                                            const Observations& observations,
-                                            const std::vector<int>& faults) {
-  enum {
-    kLate = 1,
-    kOutside,
-    kOtherLens,
-    kOlder,
-    kPaused,
-    kLost,
-    kJump,
-    kNewCamera,
-    kTwice,
-    kAhead
-  };
-  std::map<int, std::uint64_t> fed;
-  double away_m = 0;
-  for (std::size_t i = 0; i < observations.size(); ++i) {
-    const int fault = faults[i % faults.size()];
-    if (fault == kLost) continue;
-    if (fault == kJump) away_m += 10;
-    const auto observation = changed({observations[i]}, [&](CObservation& copy) {
-      auto* pose = dynamic_cast<mrpt::obs::CObservationRobotPose*>(&copy);
-      if (pose != nullptr) pose->pose.mean.y_incr(away_m);
-      CObservationEvents* packet = packetIn(copy);
-      if (packet == nullptr) return;
-      const std::int64_t t_ns = nanosecondsFrom(packet->timestamp);
-      if (fault == kLate) packet->events.push_back({t_ns - 30 * kMs, 3, 3, true});
-      if (fault == kOutside) packet->events.push_back({t_ns, 120, 3, true});
-      if (fault == kAhead) packet->events.push_back({t_ns + 3600 * 1000 * kMs, 3, 3, true});
-      if (fault == kOtherLens) packet->camera.fx = 99;
-      if (fault == kNewCamera) packet->camera_index = 3;
-      if (fault != kOlder) return;
-      packet->covered_until_ns.reset();
-      for (Event& event : packet->events) event.t_ns -= 5000 * kMs;
-    })[0];
-    builder.enableMapUpdating(fault != kPaused);
-    for (int times = fault == kTwice ? 2 : 1; times > 0; --times) {
-      const CObservationEvents* packet = packetIn(*observation);
-      if (packet != nullptr) fed[packet->camera_index] += packet->events.size();
-      try {
-        builder.processObservation(observation);
-      } catch (const std::invalid_argument&) {
-      }
-    }
-  }
-  try {
-    builder.finish();
-  } catch (const std::invalid_argument&) {  // camera 3 waits for camera 2
-  }
-  const auto late = packetObservation(recording, 0);
-  late->events = recording.events[0];
-  builder.processObservation(late);
-  fed[0] += late->events.size();
-  return fed;
-}
-
-RC_GTEST_PROP(LiveLosses, EachEventHasOneFateWhateverHappens, ()) {
-  static const SyntheticRecording recording(0.7);
-  static const Observations observations = observationsOf(recording);
-  const auto faults = *rc::gen::container<std::vector<int>>(
-      7, rc::gen::weightedOneOf<int>({{3, rc::gen::just(0)}, {1, rc::gen::inRange(0, 11)}}));
-  EventFusionOptions options = liveOptions();
-  options.mapper.keyframe.planes.num_planes = 4;
-  options.mapper.keyframe.sweep.threads = 1;
-  options.live.max_event_rate = *rc::gen::element(0.0, 1000.0);
-  options.live.max_queue_events = *rc::gen::element(1000, 5'000'000);
-  options.live.max_pose_wait_s = 0.2;
-  if (*rc::gen::arbitrary<bool>()) options.automatic.window_s = options.automatic.stride_s = true;
-  CEventFusionMapBuilder builder(options);
-  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
-  builder.logging_enable_console_output = false;
-  const auto fed = playWithFaults(builder, recording, observations, faults);
-
-  const SessionStatus status = builder.status();
-  std::uint64_t received = 0;
-  std::uint64_t kept = 0;
-  for (const auto& [camera, queue] : status.live->cameras) {
-    RC_ASSERT(queue.received == (fed.count(camera) != 0 ? fed.at(camera) : 0));
-    RC_ASSERT(queue.held + queue.queued == 0U);
-    const auto index = static_cast<std::size_t>(camera);
-    const EventCounts counts =
-        index < status.counts.cameras.size() ? status.counts.cameras[index] : EventCounts{};
-    const auto refused = status.refused_events.find(camera);
-    const std::uint64_t refused_events =
-        refused == status.refused_events.end() ? 0 : refused->second;
-    RC_ASSERT(queue.received == queue.thinned + queue.dropped + queue.paused + queue.refused +
-                                    queue.after_end + queue.taken);
-    RC_ASSERT(queue.taken == counts.read + refused_events);
-    RC_ASSERT(counts.read ==
-              counts.used + counts.without_pose + counts.outside_window + counts.dropped);
-    received += queue.received;
-    kept += counts.used + counts.outside_window + queue.paused;
-  }
-  RC_ASSERT(std::abs(status.live->dropRatio() * static_cast<double>(received) -
-                     static_cast<double>(received - kept)) < 0.5);
 }
 
 }  // namespace

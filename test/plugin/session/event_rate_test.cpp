@@ -39,7 +39,20 @@ TEST(EventRate, AnEventBeforeTheFirstCountsAtTheStart) {
   EXPECT_EQ(EventRate().over(0, 1'000, 3), std::vector<double>(3, 0.0));
 }
 
+TEST(EventRate, CountsOfABinAreInProportionToItsOverlap) {
+  EventRate rate;
+  EXPECT_EQ(rate.countIn(0, 5000), 0);
+  for (const std::int64_t t_ns : {0, 1, 2, 3, 1024, 1025}) rate.add(10'000 + t_ns);  // two bins
+  EXPECT_EQ(rate.countIn(10'000, 10'512), 2);
+  EXPECT_EQ(rate.countIn(9'488, 10'512), 2);
+  EXPECT_EQ(rate.countIn(10'512, 11'536), 2 + 1);
+  EXPECT_EQ(rate.countIn(10'256, 20'000), 3 + 2);
+  EXPECT_EQ(rate.countIn(9'000, 10'000), 0);
+  EXPECT_EQ(rate.countIn(12'048, 20'000), 0);
+}
+
 TEST(Sparkline, HasAHeightPerValue) {
+  EXPECT_EQ(sparkline({0.5, 1, 2, 3, 4, 5, 6, 7, 8}), "▁▂▃▄▅▆▇██");
   EXPECT_EQ(sparkline({0, 1, 4, 8}), " ▂▅█");
   EXPECT_EQ(sparkline({0, 0}), "  ");
 }

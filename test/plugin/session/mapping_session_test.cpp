@@ -5,8 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <map>
+#include <regex>
 #include <set>
 #include <string>
 
@@ -31,30 +33,36 @@ void expectEventsAddUp(const SessionStatus& status, std::uint64_t events) {
                             total.filtered + total.outside_lens + total.over_budget);
 }
 
-void expectCountsAddUp(const SessionStatus& status, std::uint64_t events, int planes) {
-  expectEventsAddUp(status, events);
-  EXPECT_EQ(status.counts.votes.total(),
-            status.counts.event_uses * static_cast<std::uint64_t>(planes));
-}
-
-TEST(MappingSession, MapsThePlaneThatTheDotsLieOn) {
-  const SyntheticRecording recording;
-  MappingSession session(syntheticOptions());
-
-  const auto keyframes = mapAll(session, recording);
-
-  EXPECT_EQ(keyframes.size(),
-            3U);  // [0, .2), [.1, .3), [.2, .4); [.3, .5) ends after the last event
+/// The distance of a map's points from the plane of the dots, in steps of 30 planes from 1 to 5 m.
+double medianErrorInSteps(const MappingSession& session) {
   std::vector<DepthPair> pairs;
   const MapCloud::ConstPtr points = session.cloud().points();
   for (const MapPoint& point : *points) {
-    pairs.push_back({point.z, SyntheticRecording::kDepthM});
+    pairs.push_back({positionIn(*points, point).z(), SyntheticRecording::kDepthM});
   }
-  ASSERT_GT(pairs.size(), 30U);
-  // A window sees 8 px of parallax of dots that are rounded to pixels: an error of half a pixel is
-  // 0.5 / 8 of 1 / (2 m), a little over one step of the planes.
-  const double step = (1.0 / 1.0 - 1.0 / 5.0) / 29;
-  EXPECT_LT(depthErrors(pairs).median_inverse, 1.5 * step);
+  if (pairs.empty()) return std::numeric_limits<double>::infinity();
+  return depthErrors(pairs).median_inverse / ((1.0 / 1.0 - 1.0 / 5.0) / 29);
+}
+
+TEST(MappingSession, MapsThePlaneThatTheDotsLieOnAndCountsAdd) {
+  const SyntheticRecording recording;
+  for (const bool live : {false, true}) {
+    EventFusionOptions options = syntheticOptions();
+    options.mapper.fill_last_window =
+        true;  // but for live operation: back from the recording's end
+    options.live.enabled = live;
+    MappingSession session(options);
+    EXPECT_EQ(mapAll(session, recording).size(), live ? 3U : 4U);
+    ASSERT_GT(session.cloud().points()->size(), 30U);
+    // A window sees 8 px of parallax of dots that are rounded to pixels: an error of half a pixel
+    // is 0.5 / 8 of 1 / (2 m), a little over one step of the planes.
+    EXPECT_LT(medianErrorInSteps(session), 1.5);
+    const MapperCounts counts = session.status().counts;
+    expectEventsAddUp(session.status(), recording.totalEvents());
+    EXPECT_EQ(counts.votes.total(), 30 * counts.event_uses);
+    EXPECT_GT(counts.event_uses, counts.total().used) << "windows overlap";
+    EXPECT_EQ(counts.total().outside_window > 100, live);
+  }
 }
 
 EventFusionOptions automaticOptions() {
@@ -101,16 +109,32 @@ TEST(MappingSession, InPlaybackOptionsAreChosenFromTheWholeRecording) {
 
 TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
   const SyntheticRecording recording(3.2);
+  std::vector<std::int64_t> times_ns;
+  for (const auto& events : recording.events) {
+    for (const Event& event : events) times_ns.push_back(event.t_ns);
+  }
+  std::sort(times_ns.begin(), times_ns.end());
+  constexpr double kMaxMb = 0.08;
+  const auto fit = static_cast<std::size_t>(kMaxMb * 1e6) / sizeof(Event);
+  ASSERT_GT(times_ns.size(), fit + 1000);
   for (const bool is_full : {true, false}) {
     EventFusionOptions options = automaticOptions();
-    if (is_full) options.live.max_queue_mb = 0.1;  // some 6000 of 22,000 events
+    if (is_full) options.live.max_queue_mb = kMaxMb;
     MappingSession session(options);
     if (!is_full) session.endSurvey();
     EXPECT_THAT(mapUnfinished(session, recording, 10), Not(IsEmpty())) << is_full;
-    const SessionStatus status = session.status();
-    ASSERT_EQ(status.chosen.size(), 5U);
-    EXPECT_THAT(status.chosen[0].reason, HasSubstr(" s of a stream")) << is_full;
-    EXPECT_EQ(status.chosen[0].reason.find("max_queue_mb") != std::string::npos, is_full);
+    ASSERT_EQ(session.status().chosen.size(), 5U);
+    for (const ChosenOption& option : session.status().chosen) {
+      const std::size_t at = option.reason.find("; from the first ");
+      ASSERT_NE(at, std::string::npos) << option.reason;
+      const double seconds = std::stod(option.reason.substr(at + 17));
+      const double expected =
+          is_full ? secondsBetween(times_ns[0], times_ns[fit]) : 1;  // all cameras are known then
+      EXPECT_NEAR(seconds, expected, 0.03) << "up to a packet of 10 ms: " << option.reason;
+      EXPECT_THAT(option.reason,
+                  testing::EndsWith(is_full ? " s of a stream, 0 MB of events ([live] max_queue_mb)"
+                                            : " s of a stream"));
+    }
   }
 }
 
@@ -125,17 +149,6 @@ TEST(MappingSession, TheFirstLookAtARecordingIsNoLiveOperation) {
   const RecordingSurvey survey = surveyOf(recording, options);
   EXPECT_EQ(survey.samples.size(), 2U);  // of 2 s each
   EXPECT_NEAR(survey.duration_s.value_or(0), 4.2, 0.02);
-}
-
-/// The distance of a map's points from the plane of the dots, in steps of 30 planes from 1 to 5 m.
-double medianErrorInSteps(const MappingSession& session) {
-  std::vector<DepthPair> pairs;
-  const MapCloud::ConstPtr points = session.cloud().points();
-  for (const MapPoint& point : *points) {
-    pairs.push_back({positionIn(*points, point).z(), SyntheticRecording::kDepthM});
-  }
-  if (pairs.empty()) return std::numeric_limits<double>::infinity();
-  return depthErrors(pairs).median_inverse / ((1.0 / 1.0 - 1.0 / 5.0) / 29);
 }
 
 TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
@@ -217,124 +230,116 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
   }
 }
 
-TEST(MappingSession, CountsOfOverlappingWindowsAddUp) {
-  const SyntheticRecording recording;
-  MappingSession session(syntheticOptions());
-
-  mapAll(session, recording);
-
-  const SessionStatus status = session.status();
-  expectCountsAddUp(status, recording.totalEvents(), 30);
-  EXPECT_GT(status.counts.event_uses, status.counts.total().used) << "windows overlap";
-  EXPECT_GT(status.counts.total().outside_window, 0U) << "the last window is not full";
-}
-
-TEST(MappingSession, InPlaybackTheLastWindowIsMovedBackToEndWithTheRecording) {
-  const SyntheticRecording recording;
-  for (const bool live : {false, true}) {
+TEST(MappingSession, WhatDoesNotFitTheRigIsAnErrorThatNamesIt) {
+  const SyntheticRecording recording(1.2);
+  struct Row {
+    const char* error;
+    std::function<void(EventFusionOptions&)> change;
+    std::function<void(MappingSession&)> feed;
+  };
+  const auto none = [](EventFusionOptions&) {};
+  const auto feed_all = [&](MappingSession& session) { mapAll(session, recording); };
+  const auto with = [&](const std::function<void(CameraPacket&)>& change) {
+    return [&recording, change](MappingSession& session) {
+      session.addEvents(packetOf(recording, 0));
+      CameraPacket packet = packetOf(recording, 1);
+      change(packet);
+      session.addEvents(packet);
+    };
+  };
+  const Row rows[] = {
+      {"[rig] cameras = 7: must be a camera of the recording: 0 to 1",
+       [](auto& options) {
+         options.mapper.cameras = {1, 7};
+       },
+       feed_all},
+      {"[rig] cameras = 2: must be a camera of the recording: 0 to 1",
+       [](auto& options) { options.mapper.cameras = {2}; }, feed_all},
+      {"[dsi] reference_camera = 2: must be a camera of the recording: 0 to 1",
+       [](auto& options) { options.mapper.keyframe.reference_camera = 2; }, feed_all},
+      {"[rig] time_offsets_s (how many) = 1: must be one per camera, and there is camera 1",
+       [](auto& options) { options.rig.time_offsets_ns = {0}; }, feed_all},
+      {"[rig] time_offsets_s (how many) = 3: must be one per camera of the recording: 2",
+       [](auto& options) {
+         options.rig.time_offsets_ns = {0, 0, 0};
+       },
+       feed_all},
+      {"the recording has events of camera 1 but none of camera 0", none,
+       [&](MappingSession& session) {
+         session.addEvents(packetOf(recording, 1));
+         session.finish();
+       }},
+      {"camera 1 first appears when the rig is complete: all cameras must be there within a second "
+       "of the first event",
+       none,
+       [&](MappingSession& session) {
+         for (const auto& [begin_s, end_s] : {std::pair{0.0, 1.1}, std::pair{1.1, 1.2}}) {
+           session.addEvents(pieceOf(recording, 0, begin_s, end_s));
+         }
+         session.addEvents(packetOf(recording, 1));
+       }},
+      {"camera -1: must be 0 or above", none, with([](auto& packet) { packet.camera = -1; })},
+      {"camera 1 has no calibration: a map needs --calibration FILE ([rig] calibration)", none,
+       with([](auto& packet) { packet.calibration.model.fy = 0; })},
+      {"camera 0: its calibration or its pose on the rig differs from that of its first packet",
+       none, with([](auto& packet) { packet.camera = 0; })},
+  };
+  for (const Row& row : rows) {
     EventFusionOptions options = syntheticOptions();
-    options.mapper.fill_last_window = true;
-    options.live.enabled = live;
+    row.change(options);
     MappingSession session(options);
-    const auto keyframes = mapAll(session, recording);
-    ASSERT_EQ(keyframes.size(), live ? 3U : 4U);
-    EXPECT_EQ(session.status().counts.total().outside_window > 100, live);
-    if (live) continue;
-    const Window& last = keyframes.back().window;
-    EXPECT_EQ(last.t1_ns - last.t0_ns, 200'000'000);
-    std::int64_t newest_ns = 0;  // of the events before the last pose
-    for (const std::vector<Event>& events : recording.events) {
-      for (const Event& event : events) {
-        if (event.t_ns < recording.poses.back().t_ns) newest_ns = std::max(newest_ns, event.t_ns);
-      }
-    }
-    EXPECT_EQ(last.t1_ns, newest_ns + 1);
-    expectCountsAddUp(session.status(), recording.totalEvents(), 30);
+    EXPECT_EQ(messageOf([&] { row.feed(session); }), row.error);
   }
-}
-
-TEST(MappingSession, EventsOutsideTheTimeLimitsAreInNoWindow) {
-  const SyntheticRecording recording;
-  const std::int64_t start_ns = SyntheticRecording::kStartNs;
-  EventFusionOptions options = syntheticOptions();
-  options.mapper.limits = {start_ns + 100'000'000, start_ns + 350'000'000};
-  MappingSession session(options);
-
-  const auto keyframes = mapAll(session, recording);
-
-  ASSERT_EQ(keyframes.size(), 1U);  // [.1, .3); [.2, .4) reaches beyond the limit
-  EXPECT_GE(keyframes[0].window.t0_ns, start_ns + 100'000'000);
-  expectCountsAddUp(session.status(), recording.totalEvents(), 30);
-}
-
-TEST(MappingSession, OfPosesOfTheSameTimeTheFirstCounts) {
-  const SyntheticRecording recording;
-  MappingSession expected(syntheticOptions());
-  mapAll(expected, recording);
-  MappingSession session(syntheticOptions());
-  for (StampedPose pose : recording.poses) {
-    session.addPose(pose);
-    pose.T_world_rig.translation.z() += 1;
-    session.addPose(pose);
-  }
-  addEvents(session, recording);
-  mapRest(session);
-  EXPECT_EQ(session.status().counts.duplicate_poses, recording.poses.size());
-  expectSameMap(session, expected);
-}
-
-TEST(MappingSession, CamerasThatSeeNothingAreCounted) {
-  SyntheticRecording recording;
-  recording.events[1].clear();
-  MappingSession session(syntheticOptions());
-
-  const auto keyframes = mapAll(session, recording);
-
-  EXPECT_THAT(session.status().silent_keyframes, testing::ElementsAre(0, keyframes.size()));
-}
-
-TEST(MappingSession, AnOptionWithAMissingCameraIsAnError) {
-  const SyntheticRecording recording;
-  EventFusionOptions cameras = syntheticOptions();
-  cameras.mapper.cameras = {1, 7};
-  MappingSession selected(cameras);
-  EXPECT_EQ(messageOf([&] { mapAll(selected, recording); }),
-            "[rig] cameras = 7: must be a camera of the recording: 0 to 1");
-  EventFusionOptions reference = syntheticOptions();
-  reference.mapper.keyframe.reference_camera = 5;
-  MappingSession referred(reference);
-  EXPECT_EQ(messageOf([&] { mapAll(referred, recording); }),
-            "[dsi] reference_camera = 5: must be a camera of the recording: 0 to 1");
-}
-
-TEST(MappingSession, ACameraWithoutTheOneBeforeItIsAnError) {
-  MappingSession session(syntheticOptions());
-  session.addEvents(packetOf(SyntheticRecording(), 1));
-  EXPECT_EQ(messageOf([&] { session.finish(); }),
-            "the recording has events of camera 1 but none of camera 0");
-  EXPECT_FALSE(session.next());
 }
 
 TEST(MappingSession, ACameraWaitsForAMissingOneForASecond) {
   const SyntheticRecording recording(1.5, 3);
   for (const bool zero_is_there : {false, true}) {
     MappingSession session(syntheticOptions());
-    std::size_t refused = 0;
+    std::uint64_t fed = 0;
+    std::uint64_t refused = 0;
+    std::int64_t since_ns = 0;
     for (int i = 0; i < 150; ++i) {
       if (zero_is_there) session.addEvents(pieceOf(recording, 0, 0.01 * i, 0.01 * (i + 1)));
       CameraPacket packet = pieceOf(recording, 2, 0.01 * i, 0.01 * (i + 1));
       if (packet.events.empty()) continue;
-      const std::string refusal = messageOf([&] { session.addEvents(packet); });
-      if (refusal == "no error") continue;
-      EXPECT_GE(i, 100);
-      ++refused;
-      EXPECT_THAT(refusal,
-                  HasSubstr(zero_is_there ? "has events of camera 2 but none of camera 1"
-                                          : "has events of camera 2 but none of camera 0"));
+      if (since_ns == 0) since_ns = packet.events[0].t_ns;
+      const bool is_late = packet.events[0].t_ns - since_ns > 1'000'000'000;
+      EXPECT_EQ(messageOf([&] { session.addEvents(packet); }),
+                !is_late        ? "no error"
+                : zero_is_there ? "the recording has events of camera 2 but none of camera 1"
+                                : "the recording has events of camera 2 but none of camera 0");
+      fed += packet.events.size();
+      if (is_late) refused += packet.events.size();
     }
-    EXPECT_GT(refused, 40U);
+    EXPECT_GT(refused, 200U);
+    EXPECT_EQ(session.status().refused_events.at(2), refused);
     EXPECT_THROW(session.finish(), std::invalid_argument);
+    EXPECT_EQ(session.status().refused_events.at(2), fed) << "all";
   }
+}
+
+TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
+  const SyntheticRecording recording;
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.limits.t0_ns = SyntheticRecording::kStartNs;
+  MappingSession session(options);
+  CameraPacket outside = pieceOf(recording, 1, 0, 0.1);
+  outside.events.front().t_ns =
+      SyntheticRecording::kStartNs - 1000;  // before the limits: not counted either
+  outside.events.back().x = 120;
+  const CameraPacket good = pieceOf(recording, 1, 0.1, 0.5);
+  session.addEvents(outside);
+  session.addEvents(good);
+  EXPECT_FALSE(session.status().events) << "they wait for camera 0";
+  EXPECT_THAT(messageOf([&] { session.addEvents(packetOf(recording, 0)); }),
+              HasSubstr("pixel (120"));
+  const SessionStatus status = session.status();
+  EXPECT_EQ(status.counts.cameras.at(0).read, recording.events[0].size());
+  EXPECT_EQ(status.counts.cameras.at(1).read, good.events.size());
+  EXPECT_EQ(status.refused_events.at(1), outside.events.size());
+  EXPECT_EQ(status.events->first_ns, recording.events[0].front().t_ns);
+  EXPECT_NO_THROW(session.finish());
 }
 
 TEST(MappingSession, CamerasInAnyOrderMakeTheSameMap) {
@@ -354,30 +359,6 @@ TEST(MappingSession, CamerasInAnyOrderMakeTheSameMap) {
   EXPECT_EQ(session.status().counts.cameras.size(), 3U);
   mapRest(session);
   expectSameMap(session, expected);
-}
-
-TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
-  const SyntheticRecording recording;
-  MappingSession session(syntheticOptions());
-  CameraPacket outside = pieceOf(recording, 1, 0, 0.1);
-  outside.events.back().x = 120;
-  session.addEvents(outside);
-  session.addEvents(pieceOf(recording, 1, 0.1, 0.5));
-  EXPECT_THAT(messageOf([&] { session.addEvents(packetOf(recording, 0)); }),
-              HasSubstr("pixel (120"));
-  EXPECT_EQ(session.status().counts.cameras.at(0).read, recording.events[0].size());
-  EXPECT_EQ(session.status().counts.cameras.at(1).read,
-            pieceOf(recording, 1, 0.1, 0.5).events.size());
-  EXPECT_NO_THROW(session.finish());
-}
-
-TEST(MappingSession, ACameraThatAppearsAfterTheFirstSecondIsAnError) {
-  const SyntheticRecording recording(1.2);
-  MappingSession session(syntheticOptions());
-  session.addEvents(pieceOf(recording, 0, 0, 0.6));
-  session.addEvents(pieceOf(recording, 0, 0.6, 1.1));
-  session.addEvents(pieceOf(recording, 0, 1.1, 1.2));
-  EXPECT_THROW(session.addEvents(packetOf(recording, 1)), std::invalid_argument);
 }
 
 TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
@@ -413,97 +394,48 @@ TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
   }
 }
 
-TEST(MappingSession, PacketsMayBeLongerThanASecond) {
-  const SyntheticRecording recording(1.5);
-  MappingSession expected(syntheticOptions());
-  mapPiecewise(expected, recording, 100);
-  MappingSession session(syntheticOptions());
-  mapAll(session, recording);
-  expectSameMap(session, expected);
-}
-
-TEST(MappingSession, ACalibrationThatChangesIsAnError) {
-  const SyntheticRecording recording;
-  MappingSession session(syntheticOptions());
-  session.addEvents(packetOf(recording, 0));
-  CameraPacket other{0, recording.cameras[0], {}, std::nullopt};
-  other.calibration.model.fx += 1;
-  EXPECT_THROW(session.addEvents(other), std::invalid_argument);
-}
-
-TEST(MappingSession, ARefusedPacketLeavesTheCountsAsTheyWere) {
-  const SyntheticRecording recording;
-  EventFusionOptions options = syntheticOptions();
-  options.mapper.limits.t0_ns = SyntheticRecording::kStartNs;
-  MappingSession session(options);
-  CameraPacket packet = packetOf(recording, 0);
-  packet.events.front().t_ns = 0;  // outside the limits
-  packet.events.back().x = 120;    // outside the sensor
-  EXPECT_THROW(session.addEvents(packet), std::invalid_argument);
-  EXPECT_EQ(session.status().counts.total().read, 0U);
-  EXPECT_FALSE(session.status().events);
-}
-
-// --- Windows that are given up -------------------------------------------------------------------
-
-/// Options of live operation with windows of about 0.2 s that do not overlap.
-EventFusionOptions liveOptions(KeyframePolicyKind policy) {
-  EventFusionOptions options = syntheticOptions();
-  options.live.enabled = true;
-  options.mapper.policy.policy = policy;
-  options.mapper.policy.window_events = 400;
-  options.mapper.policy.min_baseline_ratio = 0.05;
-  options.mapper.policy.stride_s = policy == KeyframePolicyKind::kBaseline ? 0.05 : 0.2;
-  return options;
-}
-
-/// Feeds two seconds and does not end them: windows stay to come.
-void feedTwoSeconds(MappingSession& session, const SyntheticRecording& recording) {
-  addPoses(session, recording);
-  for (const double begin_s : {0.0, 1.1}) {  // the second packets make the rig complete
-    for (const int c : {0, 1}) session.addEvents(pieceOf(recording, c, begin_s, begin_s + 1.1));
-  }
-}
-
-/// The starts of the windows, if none of them is mapped.
-std::vector<std::int64_t> startsOfWindows(MappingSession& session) {
-  std::vector<std::int64_t> starts;
-  while (const auto data = session.window()) {
-    starts.push_back(data->window.t0_ns);
-    session.skipWindow(data->window);
-  }
-  return starts;
-}
-
-TEST(MappingSession, AWindowIsGivenUpAsAWholeAndCountedOnceWithEveryPolicy) {
-  const SyntheticRecording recording(2);
-  for (const auto& [policy, at_least] :
-       {std::pair{KeyframePolicyKind::kPeriod, 8U}, std::pair{KeyframePolicyKind::kEvents, 15U},
-        std::pair{KeyframePolicyKind::kBaseline, 6U}}) {
-    MappingSession skipping(liveOptions(policy));
-    feedTwoSeconds(skipping, recording);
-    const std::vector<std::int64_t> expected = startsOfWindows(skipping);
-    ASSERT_GE(expected.size(), at_least);
-    for (const bool for_overload : {false, true}) {  // or for an error
-      MappingSession session(liveOptions(policy));
-      feedTwoSeconds(session, recording);
-      std::vector<std::int64_t> starts;
-      std::size_t given_up = 0;
-      while (const std::optional<Window> window = session.nextWindow()) {
-        starts.push_back(window->t0_ns);
-        if (!for_overload) {
-          AlwaysFailingSink sink;
-          EXPECT_THROW(session.next(&sink, processSeconds), std::runtime_error);
-          ASSERT_TRUE(session.giveUpFailed());
-        } else if (!session.giveUpOldestWindow()) {
-          break;  // no newer events fill another one
-        }
-        ++given_up;
-      }
-      EXPECT_EQ(starts, expected) << nameOf(policy);
-      EXPECT_GE(given_up, expected.size() - 1) << nameOf(policy);
-      EXPECT_EQ(session.status().counts.windows_given_up.total(), given_up) << nameOf(policy);
-    }
+TEST(LiveOptions, HaveLimits) {
+  const auto field = [](auto LiveOptions::*member) {
+    return [member](LiveOptions& options, double value) {
+      options.*member = static_cast<std::decay_t<decltype(options.*member)>>(value);
+    };
+  };
+  struct Row {
+    std::function<void(LiveOptions&, double)> set;
+    std::vector<double> valid;
+    std::vector<double> wrong;
+    const char* error;
+  };
+  const Row rows[] = {
+      {field(&LiveOptions::max_event_rate),
+       {0, 1000, 1e10},
+       {999, -1, 1.1e10},
+       "max_event_rate = -: must be 0 (no limit), or 1000 to 1e10"},
+      {field(&LiveOptions::max_queue_events),
+       {1000},
+       {999},
+       "max_queue_events = -: must be 1000 or above"},
+      {field(&LiveOptions::max_queue_mb),
+       {1, 1e6},
+       {0.9, 1'000'001},
+       "max_queue_mb = -: must be 1 to 1e6"},
+      {field(&LiveOptions::max_pose_wait_s),
+       {0.1, 3600},
+       {0, 3601},
+       "max_pose_wait_s = -: must be above 0, at most 3600"},
+      {field(&LiveOptions::max_keyframes), {1}, {0}, "max_keyframes = -: must be 1 or above"},
+      {field(&LiveOptions::max_speed_m_s), {0.1}, {0}, "max_speed_m_s = -: must be above 0"},
+      {field(&LiveOptions::max_turn_deg_s), {0.1}, {0}, "max_turn_deg_s = -: must be above 0"},
+  };
+  for (const Row& row : rows) {
+    LiveOptions options;
+    const auto error_of = [&](double value) {
+      row.set(options, value);
+      return std::regex_replace(messageOf([&] { options.validate(); }), std::regex("= [^:]*"),
+                                "= -");
+    };
+    for (const double value : row.wrong) EXPECT_EQ(error_of(value), row.error) << value;
+    for (const double value : row.valid) EXPECT_EQ(error_of(value), "no error") << row.error;
   }
 }
 
@@ -539,15 +471,38 @@ TEST_F(CalibratedSession, UsesTheOptionsCalibrationAndCountsDifferentCameras) {
   EXPECT_EQ(both.status().rig.cameras[0].model.cx, recording.cameras[0].model.cx + 1);
 }
 
+TEST_F(CalibratedSession, InLiveOperationADeclaredCameraMayBeginAtAnyTime) {
+  const SyntheticRecording recording(1.8);
+  EventFusionOptions options = optionsOf(recording.cameras);
+  options.live.enabled = true;
+  options.rig.time_offsets_ns = {1000, -2000};
+  MappingSession session(options);
+  EXPECT_EQ(session.status().rig.cameras.size(), 2U);
+  addPoses(session, recording);
+  std::size_t early = 0;
+  for (int i = 0; i < 160; ++i) {
+    session.addEvents(pieceOf(recording, 0, 0.01 * i, 0.01 * (i + 1)));
+    early += mapDue(session).size();
+  }
+  EXPECT_NO_THROW(session.addEvents(pieceOf(recording, 1, 1.6, 1.8)));
+  EXPECT_EQ(session.status().rig.cameras[1].time_offset_ns, -2000);
+  EXPECT_EQ(early, 4U) << "windows of 0.2 s, every 0.1 s, a second after a silent camera";
+
+  options.rig.calibration = folder() / "calib.txt";  // does not say the sensor's size
+  options.rig.time_offsets_ns.clear();
+  std::ofstream(options.rig.calibration) << "100 100 59.5 44.5 0 0 0 0 0\n";
+  EXPECT_EQ(MappingSession(options).status().rig.cameras.size(), 0U);
+}
+
 TEST_F(CalibratedSession, AnotherNumberOfCamerasIsAnError) {
   const SyntheticRecording recording;
-  std::vector<RigCamera> cameras = recording.cameras;
-  cameras.push_back(cameras[1]);
-  MappingSession more(optionsOf(cameras));
-  EXPECT_THAT(messageOf([&] { mapAll(more, recording); }), HasSubstr("3 cameras: expected 2"));
-  cameras.resize(1);
-  MappingSession fewer(optionsOf(cameras));
-  EXPECT_THAT(messageOf([&] { mapAll(fewer, recording); }), HasSubstr("1 camera, but"));
+  for (const auto& [count, error] :
+       {std::pair{3U, "3 cameras: expected 2"}, {1U, "1 camera, but"}}) {
+    std::vector<RigCamera> cameras = recording.cameras;
+    cameras.resize(count, cameras[1]);
+    MappingSession session(optionsOf(cameras));
+    EXPECT_THAT(messageOf([&] { mapAll(session, recording); }), HasSubstr(error));
+  }
 }
 
 }  // namespace

@@ -31,6 +31,24 @@ constexpr double kLengthS = 4;
 // With the focal length below, a centimetre is two pixels.
 constexpr double kDepthM = 1;
 
+Names motionNames(const std::vector<Warning>& warnings) {
+  Names names;
+  for (const Warning& warning : warnings) names.insert(warning.name);
+  return names;
+}
+
+std::vector<Warning> warningsOf(const std::vector<StampedPose>& poses,
+                                const std::vector<Event>& events, double focal_px, double depth_m) {
+  RecordingStatistics statistics;
+  RigCamera camera;
+  camera.model = {120, 90, focal_px, focal_px, 59.5, 44.5, DistortionModel::kNone, {}};
+  for (const StampedPose& pose : poses) {
+    statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
+  }
+  statistics.addEvents(0, "cam", camera, events);
+  return motionWarnings(statistics, depth_m, 0.25);
+}
+
 /// A camera in a hand, its poses and the rate of its events.
 struct Hand {
   double rate_hz = 100;
@@ -110,9 +128,6 @@ struct Hand {
   }
 
   std::vector<Warning> warnings() const {
-    RecordingStatistics statistics;
-    RigCamera camera;
-    camera.model = {120, 90, 200, 200, 59.5, 44.5, DistortionModel::kNone, {}};
     std::vector<Event> all;
     double due = 0;
     for (double t_s = 0; t_s < kLengthS; t_s += 1e-3) {
@@ -120,27 +135,19 @@ struct Hand {
         all.push_back({kBeginNs + std::llround(1e9 * t_s), 5, 5, true});
       }
     }
-    for (const StampedPose& pose : poses) {
-      statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
-    }
-    statistics.addEvents(0, "cam", camera, all);
-    return motionWarnings(statistics, kDepthM, 0.25);
+    return warningsOf(poses, all, 200, kDepthM);
   }
-  Names names() const {
-    Names names;
-    for (const Warning& warning : warnings()) names.insert(warning.name);
-    return names;
-  }
+  Names names() const { return motionNames(warnings()); }
 };
 
-struct Row {
+struct HandRow {
   const char* what;
   Hand hand;
   Names expected;
 };
 
-void expectNames(const std::vector<Row>& rows) {
-  for (const Row& row : rows) EXPECT_EQ(row.hand.names(), row.expected) << row.what;
+void expectNames(const std::vector<HandRow>& rows) {
+  for (const HandRow& row : rows) EXPECT_EQ(row.hand.names(), row.expected) << row.what;
 }
 
 Hand straightHand() { return Hand(100, Hand::straight); }
@@ -173,10 +180,19 @@ TEST(MotionChecks, PosesThatRepeatWhileEventsComeAreFrozen) {
   });
   Hand steps(100, [](double t_s) { return Hand::straight(0.04 * std::floor(t_s / 0.04 + 1e-6)); });
   EXPECT_THAT(steps.names(), testing::Contains("poses-frozen")) << "each pose four times";
-  EXPECT_THAT(straightHand().freeze(1.5, 2, Hand::straight).warnings().at(0).text,
-              AllOf(HasSubstr("the poses repeat for 0.49 s, after 1001.500000000 s (+1.5 s), while "
-                              "events come at 100 % of their mean rate: at the speed "),
-                    HasSubstr("moves by 49 pixels")));
+  for (const bool faster_after : {false, true}) {
+    const auto motion = [&](double t_s) {
+      const double before = faster_after ? 0.25 : 0.5;
+      const double after = faster_after ? 0.5 : 0.25;
+      return Rigid3{Eigen::Quaterniond::Identity(),
+                    {before * std::min(t_s, 2.0) + after * std::max(t_s - 2, 0.0), 0, 0}};
+    };
+    EXPECT_THAT(Hand(100, motion).freeze(1.5, 2, motion).warnings().at(0).text,
+                HasSubstr("the poses repeat for 0.49 s, after 1001.500000000 s (+1.5 s), while "
+                          "events come at 100 % of their mean rate: at the speed " +
+                          std::string(faster_after ? "after" : "before") +
+                          " it the image moves by 49 pixels in this time;"));
+  }
 }
 
 TEST(MotionChecks, MotionThatIsInterpolatedOverMoreThanATenthOfASecondIsSeen) {
@@ -234,25 +250,18 @@ TEST(MotionChecks, AStepThatATrackerOtherwiseDoesNotMakeIsAJump) {
       AllOf(
           HasSubstr("jump by 0.0602 m after 1002.990000000 s (+2.99 s), the largest of 2: 12 pix"),
           HasSubstr("--poses")));
+  EXPECT_THAT(straightHand().turn(2, end, -0.02).warnings().at(0).text,
+              HasSubstr("jump by 1.15 degrees after 1001.990000000 s (+1.99 s): 4 pixels, at 115 "
+                        "degrees/s beside"));
 }
 
-/// The warnings of measured poses at 1.5 m with a steady stream of events.
+/// The warnings of measured poses with a steady stream of events.
 Names namesOf(const std::vector<StampedPose>& poses, double focal_px, double depth_m) {
-  RecordingStatistics statistics;
-  RigCamera camera;
-  camera.model = {120, 90, focal_px, focal_px, 59.5, 44.5, DistortionModel::kNone, {}};
   std::vector<Event> events;
   for (std::int64_t t_ns = poses.front().t_ns; t_ns < poses.back().t_ns; t_ns += 5'000'000) {
     events.push_back({t_ns, 5, 5, true});
   }
-  for (const StampedPose& pose : poses) {
-    statistics.addPose({PoseKind::kPose, "pose"}, pose.t_ns, pose.T_world_rig, {});
-  }
-  statistics.addEvents(0, "cam", camera, events);
-  Names names;
-  for (const Warning& warning : motionWarnings(statistics, depth_m, 0.25))
-    names.insert(warning.name);
-  return names;
+  return motionNames(warningsOf(poses, events, focal_px, depth_m));
 }
 
 TEST(MotionChecks, MeasuredTrajectoriesHaveNoFaultButThoseThatAreMade) {

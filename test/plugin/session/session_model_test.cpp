@@ -42,6 +42,7 @@ Table tableOf(const SessionStatus& status) {
     table[name("outside_window")] = of.outside_window;
     table[name("dropped")] = of.dropped;
     table[name("other")] = of.filtered + of.outside_lens + of.over_budget;
+    table[name("silent in keyframes")] = status.silent_keyframes.at(c);
   }
   for (const auto& [camera, events] : status.refused_events) {
     table[fmt::format("camera {} refused", camera)] = events;
@@ -79,9 +80,11 @@ class Model {
       : window_ns_(std::llround(options.mapper.policy.window_s * 1e9)),
         stride_ns_(std::llround(options.mapper.policy.stride_s * 1e9)),
         pose_wait_ns_(std::llround(options.live.max_pose_wait_s * 1e9)),
-        max_speed_m_s_(options.live.max_speed_m_s) {
+        max_speed_m_s_(options.live.max_speed_m_s),
+        offsets_ns_(options.rig.time_offsets_ns) {
     status.live.emplace();
     status.counts.cameras.resize(kCameras);
+    status.silent_keyframes.resize(kCameras);
   }
 
   SessionStatus status;
@@ -98,8 +101,11 @@ class Model {
     }
   }
 
-  void addEvents(const CameraPacket& packet) {
+  void addEvents(CameraPacket packet) {
     const int c = packet.camera;
+    const std::int64_t offset_ns = offsets_ns_[static_cast<std::size_t>(c)];
+    for (Event& event : packet.events) event.t_ns += offset_ns;
+    if (packet.covered_until_ns) *packet.covered_until_ns += offset_ns;
     Camera& camera = clock_.cameras[static_cast<std::size_t>(c)];
     EventCounts& counts = status.counts.cameras[static_cast<std::size_t>(c)];
     const std::vector<Event>& events = packet.events;
@@ -147,7 +153,8 @@ class Model {
 
   void noteMissing(int camera, const MissingEvents& missing) {
     MissingEvents& noted = clock_.missing[camera];
-    noted = {std::max(noted.until_ns, missing.until_ns), missing.reason};
+    const std::int64_t until_ns = missing.until_ns + offsets_ns_[static_cast<std::size_t>(camera)];
+    noted = {std::max(noted.until_ns, until_ns), missing.reason};
   }
 
   void finish() {
@@ -182,16 +189,32 @@ class Model {
       lose(window.t0_ns, nextStartNs());
     } else if (mapped) {
       ++(outcome == Outcome::kMapped ? counts.keyframes : counts.windows_given_up.error);
-      for (Camera& camera : clock_.cameras) {
-        for (Held& event : camera.held) {
-          event.used = event.used || (window.contains(event.t_ns) && hasPose(event.t_ns));
+      for (std::size_t c = 0; c < kCameras; ++c) {
+        bool silent = true;
+        for (Held& event : clock_.cameras[c].held) {
+          if (!window.contains(event.t_ns) || !hasPose(event.t_ns)) continue;
+          event.used = true;
+          silent = false;
         }
+        if (silent && outcome == Outcome::kMapped) ++status.silent_keyframes[c];
       }
     } else {
       ++(empty ? counts.windows_without_events : counts.keyframes_without_pose);
     }
     release(finished_ ? nextStartNs() : std::min(nextStartNs(), completeNs()));
     return mapped;
+  }
+
+  bool rigIsComplete() const { return rig_complete_; }
+  void giveUpOlderHalf() {
+    std::int64_t oldest_ns = kMaxTimeNs;  // of those that no earlier one can follow
+    for (const Camera& camera : clock_.cameras) {
+      for (const Held& event : camera.held) {
+        if (event.t_ns < completeNs(camera)) oldest_ns = std::min(oldest_ns, event.t_ns);
+      }
+    }
+    if (oldest_ns >= clock_.reached_ns) return;
+    giveUpBefore((oldest_ns + clock_.reached_ns) / 2 + 1, &WindowsGivenUp::overload);
   }
 
   /// No window can be mapped now.
@@ -406,6 +429,7 @@ class Model {
   std::int64_t stride_ns_;
   std::int64_t pose_wait_ns_;
   double max_speed_m_s_;
+  std::vector<std::int64_t> offsets_ns_;
   Clock clock_;
   bool rig_complete_ = false;
   std::vector<StampedPose> waiting_;
@@ -431,6 +455,7 @@ enum Trouble {
   kMappingFails,
   kStoringFails,
   kTooMuchWaits,
+  kFarTooMuchWaits,
   kMemoryFails,  // of an input: not in the model
   kNumTroubles
 };
@@ -530,8 +555,11 @@ class Run {
       for (Event& event : packet.events) event.t_ns -= 5 * kS;
     }
     const std::int64_t now_ns = until_ns + shift_ns_;
+    const std::int64_t offset_ns = options_.rig.time_offsets_ns[index];
     if (fault == kLateEvents) packet.events.push_back({now_ns - 40 * kMs, 1, 1, true});
     if (fault == kBadPackets) packet.events.push_back({now_ns, 120, 1, true});
+    for (Event& event : packet.events) event.t_ns -= offset_ns;
+    if (packet.covered_until_ns) *packet.covered_until_ns -= offset_ns;
     received_[index] += packet.events.size();
     if (fault == kPaused) return queue_.skip(packet);
     try {
@@ -583,6 +611,12 @@ class Run {
     if (batch.ended) {
       session_.finish();
       model_.finish();
+    }
+    const bool knows_rig = !predicts_ || model_.rigIsComplete();
+    if (phase.fault == kFarTooMuchWaits && knows_rig && !session_.nextWindow()) {
+      RC_ASSERT(!predicts_ || !model_.oldestWindow());
+      session_.giveUpOlderHalf();
+      model_.giveUpOlderHalf();
     }
     while (mapNext(phase.fault)) {
     }
@@ -650,8 +684,12 @@ class Run {
       RC_ASSERT(counts.queued == 0U);
       RC_ASSERT(counts.taken == taken_[index]);
       const auto refused = status.refused_events.find(camera);
-      RC_ASSERT(counts.taken == status.counts.cameras.at(index).read +
-                                    (refused == status.refused_events.end() ? 0 : refused->second));
+      const std::uint64_t refused_events =
+          refused == status.refused_events.end() ? 0 : refused->second;
+      const EventCounts& of = status.counts.cameras.at(index);
+      RC_ASSERT(counts.taken == of.read + refused_events);
+      RC_ASSERT(status.live->cameras.at(camera).lost ==
+                refused_events + of.dropped + of.without_pose);
     }
   }
 
@@ -678,7 +716,8 @@ class Run {
 EventFusionOptions someOptions() {
   EventFusionOptions options = syntheticOptions();
   options.live.enabled = true;
-  options.rig.time_offsets_ns = {0, 0};
+  // The second one's clock is ahead, or behind.
+  options.rig.time_offsets_ns = {7 * kMs, *rc::gen::element(0L, -3 * kS, 4 * kS)};
   options.mapper.keyframe.planes.num_planes = 4;
   options.mapper.keyframe.sweep.threads = 1;
   options.live.max_event_rate = 0;

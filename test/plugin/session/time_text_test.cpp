@@ -27,8 +27,9 @@ TEST(TimeText, IsExactAndSaysTheDistanceFromTheStart) {
 
 TEST(TimeText, DurationsAreSecondsMinutesOrHours) {
   const std::pair<double, const char*> cases[] = {
-      {0, "0 s"},        {-1, "0 s"},         {59.4, "59 s"},    {59.6, "1:00 min"},
-      {185, "3:05 min"}, {3599, "59:59 min"}, {4980, "01:23 h"}, {360'000, "100:00 h"}};
+      {0, "0 s"},         {-1, "0 s"},       {59.4, "59 s"},
+      {59.6, "1:00 min"}, {185, "3:05 min"}, {3599, "59:59 min"},
+      {3600, "01:00 h"},  {4980, "01:23 h"}, {360'000, "100:00 h"}};
   for (const auto& [seconds, text] : cases) EXPECT_EQ(durationText(seconds), text);
 }
 
