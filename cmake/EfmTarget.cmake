@@ -14,12 +14,19 @@ endfunction()
 
 # efm_unity_rooms(<target>): where unity builds are on (CMAKE_UNITY_BUILD), the files of a room are
 # compiled together. Kernel files stay alone: Highway includes each once per instruction set.
+# EFM_SPLIT_LIBRARIES: only those of tests are, so that a change of one file compiles no other.
 function(efm_unity_rooms target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
   get_target_property(sources ${target} SOURCES)
+  string(FIND "${CMAKE_CURRENT_SOURCE_DIR}" "${PROJECT_SOURCE_DIR}/test" is_test)
+  if(is_test EQUAL -1)
+    set(is_test FALSE)
+  else()
+    set(is_test TRUE)
+  endif()
   foreach(source IN LISTS sources)
     get_filename_component(room ${source} DIRECTORY)
-    if(room AND NOT room STREQUAL "kernels")
+    if(room AND NOT room STREQUAL "kernels" AND NOT (EFM_SPLIT_LIBRARIES AND NOT is_test))
       set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
     endif()
   endforeach()

@@ -33,11 +33,15 @@ void expectRange(Value Options::*field, std::common_type_t<Value> lowest,
   if constexpr (std::is_floating_point_v<Value>) {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     EXPECT_THAT(errorOf(std::nextafter(lowest, -kInfinity)), refused);
-    if (highest < kInfinity) EXPECT_THAT(errorOf(std::nextafter(highest, kInfinity)), refused);
+    if (highest < kInfinity) {
+      EXPECT_THAT(errorOf(std::nextafter(highest, kInfinity)), refused);
+    }
     EXPECT_THAT(errorOf(std::nan("")), refused);
   } else {
     EXPECT_THAT(errorOf(lowest - 1), refused);
-    if (highest < std::numeric_limits<Value>::max()) EXPECT_THAT(errorOf(highest + 1), refused);
+    if (highest < std::numeric_limits<Value>::max()) {
+      EXPECT_THAT(errorOf(highest + 1), refused);
+    }
   }
 }
 

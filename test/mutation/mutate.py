@@ -146,7 +146,8 @@ def copy_tree():
 def configure():
     data = os.environ.get("EFM_SHARED_DATA", os.path.join(ROOT, "..", "shared", "data"))
     subprocess.run(["cmake", "--preset", "release", "-S", TREE, "-B", BUILD, "-DEFM_BUILD_LONG=OFF",
-                    f"-DEFM_SHARED_DATA={os.path.realpath(data)}"], check=True, stdout=subprocess.DEVNULL)
+                    "-DEFM_SPLIT_LIBRARIES=ON", f"-DEFM_SHARED_DATA={os.path.realpath(data)}"],
+                   check=True, stdout=subprocess.DEVNULL)
 
 
 def build(targets):

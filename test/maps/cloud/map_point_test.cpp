@@ -58,7 +58,9 @@ TEST(MapCloud, IsRelativeToARoundOriginWhereFloatsAreTooCoarse) {
     const auto step_m = coarseStepOf(*cloud, far.resolution_m);
     EXPECT_EQ(step_m.has_value(), !far.origin.isZero());
     // Floats of 24 bits: of 16385 in steps of 2^(14 - 23).
-    if (far.p_world.x() == 16385) EXPECT_EQ(step_m, std::ldexp(1, -9));
+    if (far.p_world.x() == 16385) {
+      EXPECT_EQ(step_m, std::ldexp(1, -9));
+    }
     const auto xyzi = xyziCloudOf(*cloud);
     EXPECT_EQ(xyzi->sensor_origin_, cloud->sensor_origin_);
     EXPECT_EQ(xyzi->at(0).getVector3fMap(), cloud->at(0).getVector3fMap());

@@ -22,7 +22,7 @@ struct SyntheticScene {
   double speed_m_s = 0.8;
   double rest_s = 0;       ///< The rig stands still so long at first.
   int noise_per_step = 0;  ///< Events at random pixels, of each camera.
-  std::vector<Eigen::Vector3d> dots;  ///< In the world; none: random ones in the view.
+  std::vector<Eigen::Vector3d> dots{};  ///< In the world; none: random ones in the view.
 };
 
 /// Bright dots on a plane z = 2 m of the world, seen by a stereo rig that moves along x without
