@@ -89,7 +89,8 @@ class GlobalCloud {
   /// with the voxels of the map, not with its keyframes. The map stays the same, bit for bit. Cost:
   /// linear in the merged voxels.
   /// @param below all keyframes below `below` + `kMaxNumberDifference` are in the map, or never
-  /// will be: `insert` refuses them from now on, `remove` and `replace` those below `below`.
+  /// will be: `insert` refuses them from now on, `remove` and `replace` those below `below`. The
+  /// others of them may be changed, but what they said of merged points stays.
   void settle(std::uint64_t below);
   /// The number of voxels that `settle` merged, and of those that it would merge.
   std::size_t settledVoxels() const { return settled_.size(); }
