@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <regex>
 
 #include "mapping/dsi/voting_kernel.h"
 #include "test/plugin/app/app_test.h"
@@ -14,11 +13,8 @@ namespace efm {
 namespace {
 
 using testing::AllOf;
-using testing::Contains;
-using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using testing::StartsWith;
 
 const std::filesystem::path kSliderDepth = EFM_SHARED_DATA "/slider_depth";
@@ -203,40 +199,7 @@ TEST_F(ImportCommand, InfoTellsTheProcessorAndTestsItsKernelsWithoutARecording) 
   EXPECT_THAT(nothing.err, HasSubstr("SOURCE is required"));
 }
 
-// --- simulate ----------------------------------------------------------------------------------
-
-TEST_F(ImportCommand, ASimulatedRecordingBecomesARawlog) {
-  const Result simulated = run("simulate --preset desk_stereo --duration 0.05 --out desk");
-  ASSERT_EQ(simulated.status, 0) << simulated.err;
-  EXPECT_THAT(simulated.err, IsEmpty());
-  const Result info = run("info desk");
-  EXPECT_EQ(info.status, 0);
-  EXPECT_THAT(info.out, AllOf(HasSubstr("cam0: 346x260"), HasSubstr("cam1: 346x260"),
-                              HasSubstr("51 poses from 1.000000000 s to 1.050000000 s"),
-                              HasSubstr("0 events before the first pose, 0 after the last")));
-  EXPECT_EQ(run("import desk --out desk.rawlog").status, 0);
-
-  const Result again = run("simulate --preset desk_stereo --duration 0.05 --out desk");
-  EXPECT_NE(again.status, 0) << "a folder that is not empty was written over";
-  EXPECT_THAT(again.err, AllOf(StartsWith("event-fusion: error: "), HasSubstr("desk")));
-}
-
 // --- Bad input ---------------------------------------------------------------------------------
-
-TEST_F(ImportCommand, InfoOfATruncatedRawlogPrintsTheContentsBeforeTheErrorAndFails) {
-  writeSmallRecording();
-  ASSERT_EQ(run("import small --out s.rawlog").status, 0);
-  const std::string bytes = contentOf("s.rawlog");
-  write("s.rawlog", bytes.substr(0, bytes.size() - 4));
-  const Result result = run("info s.rawlog");
-  EXPECT_NE(result.status, 0);
-  EXPECT_THAT(result.out, HasSubstr("cam0: 240x180"));
-  EXPECT_TRUE(std::regex_search(
-      result.err,
-      std::regex("^event-fusion: error: stopped at entry [0-9]+ of s.rawlog: the file ends in "
-                 "the middle of its data\n$")))
-      << result.err;
-}
 
 TEST_F(ImportCommand, OutputThatCannotBeWrittenIsAnError) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";

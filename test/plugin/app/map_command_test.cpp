@@ -135,34 +135,6 @@ TEST_F(MapCommand, TimesMayCountFromTheFirstEvent) {
   EXPECT_THAT(errorOf("map rig.ini data --out out --duration -1"), HasSubstr("--duration"));
 }
 
-TEST_F(MapCommand, PosesThatMissTheEventsAreAnErrorThatSaysByHowMuch) {
-  SyntheticRecording recording;
-  for (StampedPose& pose : recording.poses) pose.t_ns += 100'000'000'000;
-  write(recording);
-
-  EXPECT_THAT(errorOf("map rig.ini data --out out"), HasSubstr("they miss each other by 99.5"));
-  EXPECT_EQ(reportIn("out")["keyframes"], 0) << "the report is written all the same";
-  EXPECT_FALSE(exists(folder() / "out" / "map.pcd"));
-}
-
-TEST_F(MapCommand, ATruncatedRawlogIsAnErrorAfterTheMapSoFar) {
-  write(SyntheticRecording());
-  ASSERT_EQ(run("import data --out r.rawlog").status, 0);
-  const auto rawlog = folder() / "r.rawlog";
-  std::filesystem::resize_file(rawlog, std::filesystem::file_size(rawlog) * 7 / 10);
-
-  const Result result = run("map rig.ini r.rawlog --out out");
-
-  EXPECT_NE(result.status, 0);
-  EXPECT_THAT(result.err,
-              AllOf(HasSubstr("stopped at entry"), HasSubstr("of r.rawlog: "),
-                    HasSubstr("ends in the middle of its data; events were read until 10."),
-                    HasSubstr(" s (+0.3")));
-  EXPECT_GE(reportIn("out")["keyframes"], 1);
-  EXPECT_TRUE(exists(folder() / "out" / "map.pcd"));
-  EXPECT_TRUE(exists(folder() / "out" / "trajectory.txt"));
-}
-
 TEST_F(MapCommand, ASignalEndsItWithTheMapSoFar) {
   write(SyntheticRecording(4.0));  // 400 keyframes: it cannot end before the signal
   const Result result = interrupted("map rig.ini data --out out --set keyframes.stride_s=0.01",

@@ -97,11 +97,5 @@ TEST_F(PerturbOption, IsWrittenToARawlogByImport) {
   EXPECT_THAT(run("info data --perturb latency_s=0.2").out, HasSubstr("51 poses from"));
 }
 
-TEST_F(PerturbOption, WorksForOneKeyframe) {
-  ASSERT_EQ(run("depth rig.ini data --out one --t0 10.1 --t1 10.3 --perturb noise_m=0.01").status,
-            0);
-  EXPECT_EQ(reportIn("one")["perturbation"]["noise_m"], 0.01);
-}
-
 }  // namespace
 }  // namespace efm

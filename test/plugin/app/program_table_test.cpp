@@ -105,6 +105,7 @@ struct Row {
   std::string command;
   std::string status_and_error;
   std::set<std::string> files;
+  std::string part_of_out;
 };
 
 /// `MAP` and `KEYFRAME` at the end of a name stand for the files of a map and of `depth`.
@@ -137,7 +138,9 @@ std::vector<Row> readRows() {
   for (std::string line; std::getline(table, line);) {
     if (line.empty() || line[0] == '#') continue;
     if (line[0] == '$') {
-      rows.push_back({line.substr(std::min<std::size_t>(2, line.size())), "", {}});
+      rows.push_back({line.substr(std::min<std::size_t>(2, line.size())), "", {}, ""});
+    } else if (line[0] == '>') {
+      rows.back().part_of_out = line.substr(2);
     } else if (line[0] == '+') {
       rows.back().files = filesOf(line.substr(1));
     } else {
@@ -170,6 +173,7 @@ TEST_F(ProgramTable, EachRowHolds) {
     }
     const std::size_t any = expected.find("…");
     EXPECT_EQ(found.substr(0, any), expected.substr(0, any));
+    EXPECT_THAT(result.out, HasSubstr(row.part_of_out));
     if (result.status == 2) {
       EXPECT_EQ(result.out, "");
     }
