@@ -201,7 +201,7 @@ def run_test(program, limit_s):
     command = ["timeout", "-k", "5", str(limit_s), os.path.join(BUILD, "bin", program), "--gtest_fail_fast",
                "--gtest_brief=1"]
     process = subprocess.run(
-        ["unshare", "-m", "sh", "-c", GUARDED, "sh", *command], cwd=BUILD, env=environment,
+        ["unshare", "-m", "-n", "sh", "-c", GUARDED, "sh", *command], cwd=BUILD, env=environment,
         stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES)))
     if process.returncode == 0:
