@@ -43,6 +43,7 @@ TWINS = [("x", "y"), ("width", "height"), ("rows", "cols"), ("fx", "fy"), ("cx",
          ("first", "second"), ("u", "v"), ("break", "continue"), ("true", "false"), ("begin", "end"),
          ("rotation", "rotation.inverse()"), ("min_depth_m", "max_depth_m"),
          ("T_world_rig", "T_world_rig.inverse()"), ("any_of", "all_of")]
+SYMMETRIC = re.compile(r"\b(?:min|max|minmax|hypot|swap|isSame\w*|areEqual|\w*[dD]istance)$")
 UNITS = [("1e-9", "1e-6"), ("1e9", "1e6"), ("1e-6", "1e-3"), ("1e6", "1e3"), ("1e-3", "1"), ("1000", "1"),
          ("kRadiansPerDegree", "1.0"), ("kNanosecondsPerSecond", "1'000'000"), ("100", "1")]
 
@@ -78,7 +79,7 @@ def changes_in(file, text):
     yield from made("logic", r"(?<![\w!])(!)(?=[\w(])", lambda m: [""])
     yield from made("logic", r"\b(?:if|while) \(()(?=[\w.\->]+(?:\([\w.]*\))?\))", lambda m: ["!"])
     for match in re.finditer(r"\w\(([\w.\->*&\[\]]+), ([\w.\->*&\[\]]+)\)", code):
-        if match[1] != match[2]:
+        if match[1] != match[2] and not SYMMETRIC.search(code[:match.start() + 1]):
             yield Change("swapped arguments", file, match.start(1), match.end(2), f"{match[2]}, {match[1]}")
     yield from made("statement left out", r"^ +([\w.\->\[\]*:]+(?:\([^;{}\n]*\)| [-+*/|&]?= [^;{}\n]*|\+\+)(?=;$))",
                     lambda m: [] if re.match(r"return|using|throw|break", m[1]) else [""])
