@@ -54,35 +54,6 @@ KeyframeDepthMap keyframeThatSaw(double depth_m) {
   return keyframe;
 }
 
-TEST(BaselinePolicy, AWindowEndsWithTheFirstStrideThatMovedFarEnoughForTheLastDepth) {
-  KeyframePolicyOptions at_end = options(1.0, 0.05);
-  at_end.reference = ReferenceTime::kEnd;
-  BaselinePolicy policy(at_end, kDepthGuess_m);
-  auto recording =
-      recordingOf([](std::int64_t t_ns) { return moved(0.9 * secondsSinceStart(t_ns)); });
-  // 10 % of 2 m at 0.9 m/s: after 0.22 s.
-  recording.complete_ns = kStart_ns + 250 * kMs - 1;
-  EXPECT_FALSE(policy.current(recording)) << "not all of its events are known";
-  EXPECT_EQ(policy.earliestStart(recording), kStart_ns);
-  recording.complete_ns = kStart_ns + 4000 * kMs;
-  const auto first = policy.current(recording);
-  ASSERT_TRUE(first);
-  EXPECT_EQ(first->t0_ns, kStart_ns);
-  EXPECT_EQ(first->t1_ns, kStart_ns + 250 * kMs);
-  EXPECT_EQ(first->t_ref_ns, first->t1_ns);
-  EXPECT_EQ(policy.current(recording)->t1_ns, first->t1_ns) << "does not move on by itself";
-  // 10 % of 6 m at 0.9 m/s: after 0.67 s. Half of the pixels have no depth.
-  KeyframeDepthMap far_scene = keyframeThatSaw(6);
-  far_scene.map.depth(cv::Rect(0, 0, 50, 80)) = 0.0F;
-  policy.advance(*first, &far_scene);
-  const auto window = policy.current(recording);
-  EXPECT_EQ(window->t0_ns, kStart_ns + 250 * kMs);
-  EXPECT_EQ(window->t1_ns - window->t0_ns, 700 * kMs);
-  policy.advance(*window, nullptr);
-  EXPECT_EQ(policy.current(recording)->t1_ns - window->t1_ns, 700 * kMs)
-      << "a window without a keyframe changes nothing";
-}
-
 TEST(BaselinePolicy, RotationEndsAWindowOnceTooFewPointsAreInView) {
   KeyframePolicyOptions turning = options(1.0, 0.02);
   const KeyframeDepthMap seen = keyframeThatSaw(2);

@@ -18,9 +18,7 @@ namespace efm::fusion_mapper_test {
 namespace {
 
 using ::testing::AllOf;
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
 
 constexpr std::int64_t kMs = 1'000'000;
@@ -65,12 +63,6 @@ class Mapper : public FusionMapper {
     for (std::int64_t ms = from_ms; ms < to_ms; ++ms) events.push_back(eventAt(at(ms)));
     addEvents(camera, events);
   }
-  /// The same in packets of 10 ms.
-  void addSteadyPackets(int camera, std::int64_t from_ms, std::int64_t to_ms) {
-    for (std::int64_t ms = from_ms; ms < to_ms; ms += 10) {
-      addSteady(camera, ms, std::min(ms + 10, to_ms));
-    }
-  }
   std::vector<KeyframeDepthMap> takeAll() {
     std::vector<KeyframeDepthMap> keyframes;
     while (auto keyframe = next()) keyframes.push_back(std::move(*keyframe));
@@ -89,21 +81,6 @@ class Mapper : public FusionMapper {
     return keyframes;
   }
 };
-
-TEST(FusionMapper, ASilentCameraIsReportedAndDelaysNobodyForLongerThanASecond) {
-  Mapper mapper(period(), 2);
-  mapper.addPoses(0, 2000);
-  mapper.addSteadyPackets(0, 0, 1500);
-  const auto keyframes = mapper.takeAll();
-  EXPECT_EQ(keyframes.size(), 4U) << "those that end a second before the newest packet";
-  ASSERT_FALSE(keyframes.empty());
-  EXPECT_THAT(keyframes[0].silent_cameras, ElementsAre(1));
-  mapper.coverUntil(1, at(1400));
-  EXPECT_EQ(mapper.takeAll().size(), 10U) << "once the camera is known to have no events";
-  mapper.addSteady(1, 1390, 1410);
-  mapper.end();
-  EXPECT_EQ(mapper.counts().cameras[1].dropped, 10U) << "those of a window that was mapped";
-}
 
 TEST(FusionMapper, TheOnlyWindowIsMappedAtTheEndEvenIfItIsNotFull) {
   FusionMapperOptions single = period();
@@ -265,15 +242,6 @@ TEST(FusionMapper, InputThatIsNotValidIsRefusedAndNoneOfIt) {
   wrong.model.fx = 0;
   EXPECT_THROW(mapper.addCamera(wrong), std::invalid_argument);
   EXPECT_EQ(mapper.rig().cameras.size(), 1U);
-}
-
-TEST(FusionMapper, EventsOfOneTimeAreNotLate) {
-  Mapper mapper;
-  mapper.addEvents(0, {eventAt(kStart_ns), eventAt(kStart_ns), eventAt(kStart_ns + 1)});
-  mapper.addEvents(0, {eventAt(kStart_ns + 1)});
-  EXPECT_EQ(mapper.counts().sorted_events, 0U);
-  mapper.addEvents(0, {eventAt(kStart_ns), eventAt(kStart_ns + 1)});
-  EXPECT_EQ(mapper.counts().sorted_events, 1U);
 }
 
 TEST(FusionMapper, ASinglePoseMakesNoWindowExceptTheOnlyWindow) {

@@ -117,7 +117,7 @@ TEST(KeyframeDefaults, OneThreadHasNoWorkersInAnyStep) {
   EXPECT_EQ(workers.count(), 0);
 }
 
-TEST(KeyframeDefaults, ASilentCameraIsNamedAndSilencesTheMap) {
+TEST(KeyframeDefaults, ASilentCameraSilencesTheMapUnlessItIsExcluded) {
   MovingEdges recording(2);
   recording.events[1].clear();
   const KeyframeDepthMap keyframe = map(recording, defaults());
@@ -125,11 +125,7 @@ TEST(KeyframeDefaults, ASilentCameraIsNamedAndSilencesTheMap) {
   EXPECT_EQ(keyframe.max_confidence, 0);
   EXPECT_EQ(cv::countNonZero(keyframe.map.depth), 0);
   EXPECT_EQ(keyframe.silent_subintervals, 0U) << "of the cameras that are not silent";
-}
-
-TEST(KeyframeDefaults, TheSlicesOfASingleRemainingCameraAreFusedLikeCameras) {
-  MovingEdges recording(2);
-  recording.events[1].clear();
+  // Then the slices of the single remaining camera are fused like cameras.
   KeyframeMapperOptions options = defaults();
   options.exclude_silent = true;
   options.camera_maps = true;
@@ -157,17 +153,6 @@ TEST(KeyframeDefaults, WithEveryCameraSilentTheMapIsEmpty) {
       EXPECT_EQ(keyframe.camera_maps.size(), cameras.size());
     }
   }
-}
-
-TEST(KeyframeDefaults, ASingleCamerasMapIsTheFusedOneOfItsSlices) {
-  const MovingEdges recording(1);
-  KeyframeMapperOptions options = defaults();
-  options.camera_maps = true;
-  const KeyframeDepthMap keyframe = map(recording, options);
-  ASSERT_EQ(keyframe.camera_maps.size(), 1U);
-  EXPECT_TRUE(same(keyframe.camera_maps[0].map, keyframe.map));
-  options.split.time_slices = 3;
-  EXPECT_FALSE(same(map(recording, options).map, keyframe.map));
 }
 
 TEST(KeyframeDefaults, SilentSubintervalsAreCountedInAllSlicesButNotByPolarity) {

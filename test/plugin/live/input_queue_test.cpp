@@ -185,24 +185,6 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   }
 }
 
-TEST(InputQueue, ExactlyAsMuchAsItsLimitsFits) {
-  for (const bool by_memory : {false, true}) {
-    LiveOptions options;
-    options.max_event_rate = 0;
-    const auto bytes = static_cast<double>(2 * sizeof(CameraPacket) + 70 * sizeof(Event));
-    options.max_queue_events = by_memory ? 1000 : 70;
-    if (by_memory) {
-      options.max_queue_mb = 1e-6 * bytes;
-      ASSERT_EQ(options.max_queue_mb * 1e6, bytes);
-    }
-    InputQueue queue(options);
-    for (const std::size_t events : {30U, 40U}) queue.add(packet(0, 1, events));
-    EXPECT_EQ(queue.queuedEvents(), 70U);
-    queue.add(packet(0, 1, 1));
-    EXPECT_EQ(queue.queuedEvents(), 41U);
-  }
-}
-
 TEST(InputQueue, EndPassesTheHeldEvents) {
   LiveOptions options;
   options.max_event_rate = 1000;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/CEventFusionMap.h"
-#include "maps/io/point_cloud_file.h"
 #include "plugin/mrpt/points_map.h"
 
 #include <gmock/gmock.h>
@@ -21,7 +20,6 @@
 #include "plugin/mrpt/registration.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
@@ -95,12 +93,6 @@ CMultiMetricMap mapsFrom(const std::string& ini) {
   return maps;
 }
 
-CObservationPointCloud observationOf(const StoredKeyframe& keyframe) {
-  CObservationPointCloud observation;
-  observation.pointcloud = keyframe.points;
-  return observation;
-}
-
 TEST(CEventFusionMap, IsMadeByTheMapFactoryWithItsOptions) {
   const CMultiMetricMap maps = mapsFrom(
       "[maps]\neventFusionMap_count = 2\npointsMap_count = 1\n"
@@ -142,7 +134,8 @@ TEST(CEventFusionMap, InsertsCloudsWithIntensitiesAtTheRobotsPose) {
   CEventFusionMap expected;
   expected.insertKeyframe(keyframe);
 
-  CObservationPointCloud observation = observationOf(keyframe);
+  CObservationPointCloud observation;
+  observation.pointcloud = keyframe.points;
   observation.timestamp = INVALID_TIMESTAMP;
   observation.sensorPose = mrpt::poses::CPose3D(0.1, 0.2, 0.3, 1, 0.2, -0.4);
   const mrpt::poses::CPose3D robot =
@@ -347,18 +340,6 @@ TEST(CEventFusionMap, WarnsWhereMrptsFloatsRoundItsPoints) {
       testing::internal::GetCapturedStdout() + testing::internal::GetCapturedStderr();
   EXPECT_THAT(text, HasSubstr("MRPT's maps have float points"));
   EXPECT_EQ(text.find("MRPT's maps"), text.rfind("MRPT's maps")) << "once";
-}
-
-class CEventFusionMapFile : public TemporaryFolder {};
-
-TEST_F(CEventFusionMapFile, IsSavedAsAPcdFile) {
-  const CEventFusionMap map = mapOf(2);
-  map.saveMetricMapRepresentationToFile((folder() / "saved").string());
-  const auto cloud = readPointCloud(folder() / "saved.pcd").points;
-  const auto points = map.cloud().points();
-  ASSERT_EQ(cloud.size(), points->size());
-  EXPECT_EQ(cloud[1].p_world.x(), points->at(1).x);
-  EXPECT_EQ(cloud[1].confidence, points->at(1).intensity);
 }
 
 }  // namespace

@@ -64,28 +64,6 @@ TEST(LiveBuilder, OldKeyframesLeaveTheSimplemapAndStayInTheMap) {
   expectSameBits(builder.points(), all.points());
 }
 
-TEST(LiveBuilder, ABudgetInSensorTimeGivesTheSameMapAtAnyPace) {
-  const Observations observations = observationsOf(SyntheticRecording());
-  EventFusionOptions options = liveOptions();
-  options.live.max_event_rate = 1000;  // of some 4000
-  std::vector<MapCloud::ConstPtr> maps;
-  for (const bool patient : {true, false}) {
-    CEventFusionMapBuilder builder(options);
-    if (patient) {
-      playPatiently(builder, observations);
-    } else {
-      play(builder, observations);
-    }
-    const SessionStatus status = builder.status();
-    expectSumsAgree(status);
-    EXPECT_GT(status.live->dropRatio(), 0.3);
-    EXPECT_EQ(status.live->cameras.at(0).dropped, 0U);
-    maps.push_back(builder.points());
-  }
-  ASSERT_GT(maps[0]->size(), 0U);
-  expectSameBits(maps[0], maps[1]);
-}
-
 /// Stops the mapping's thread in the callback of its first keyframe.
 class Stop {
  public:

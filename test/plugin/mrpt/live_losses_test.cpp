@@ -209,20 +209,6 @@ RC_GTEST_PROP(LiveLosses, EachEventHasOneFate, ()) {
                      static_cast<double>(received - kept)) < 0.5);
 }
 
-TEST(LiveLosses, EachClockResetStartsTheMappingAnewOnce) {
-  const Observations observations = observationsOf(SyntheticRecording(1.8));
-  CEventFusionMapBuilder builder(liveOptions());
-  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
-  for (int round = 0; round < 3; ++round) feedPatiently(builder, observations);
-  builder.finish();
-  const SessionStatus status = builder.status();
-  EXPECT_EQ(status.live->clock_steps, 2U);
-  expectSumsAgree(status);
-  // Windows of 0.2 s, every 0.1 s: 16, and from 1 s on 5 or 6 after a reset.
-  EXPECT_GE(builder.trajectory().size(), 16U + 5U + 5U);
-  EXPECT_LE(builder.trajectory().size(), 16U + 7U + 7U);
-}
-
 TEST(LiveLosses, LatePosesAndInputAfterTheEndAreCounted) {
   const Observations observations = observationsOf(SyntheticRecording());
   CEventFusionMapBuilder builder(liveOptions());

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 #include <mrpt/poses/CPose3D.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
-#include <mrpt/rtti/CObject.h>
 #include <mrpt/serialization/CArchive.h>
 #include <mrpt/serialization/archiveFrom_std_vector.h>
 #include <mrpt/system/datetime.h>
@@ -16,7 +15,6 @@
 
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
-#include "plugin/mrpt/registration.h"
 
 namespace efm {
 namespace {
@@ -26,14 +24,6 @@ namespace {
 TEST(MrptTime, ZeroIsTheBeginningOf1970) {
   EXPECT_EQ(mrpt::system::dateTimeToString(mrptTimeFrom(0)), "1970/01/01,00:00:00.000000");
   EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(0)), 0);
-}
-
-TEST(MrptTime, IsTheNearestTick) {
-  const std::int64_t today_ns = 1'700'000'000'000'000'000;
-  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(today_ns + 149)), today_ns + 100);
-  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(today_ns + 150)), today_ns + 200);
-  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(-149)), -100);
-  EXPECT_EQ(nanosecondsFrom(mrptTimeFrom(-151)), -200);
 }
 
 RC_GTEST_PROP(MrptTime, IsExactForWholeTicksAndAtMostHalfATickAwayOtherwise, ()) {
@@ -96,17 +86,6 @@ TEST(MrptPoseOf, IsTheSameAfterARoundTripAndAfterAnArchive) {
   }
 }
 
-TEST(MrptPoseOf, TransformsAPointAsOurPoseDoes) {
-  Rigid3 T_a_b;
-  T_a_b.translation = {1, 2, 3};
-  T_a_b.rotation = Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, -1).normalized());
-  const Eigen::Vector3d expected = T_a_b * Eigen::Vector3d(0.5, -0.25, 4);
-  const auto p_a = mrptPoseFrom(T_a_b).composePoint({0.5, -0.25, 4});
-  EXPECT_NEAR(p_a.x, expected.x(), 1e-14);
-  EXPECT_NEAR(p_a.y, expected.y(), 1e-14);
-  EXPECT_NEAR(p_a.z, expected.z(), 1e-14);
-}
-
 Eigen::Vector3d drawn(std::mt19937& random) {
   std::normal_distribution<double> normal;
   const double x = normal(random);
@@ -165,18 +144,6 @@ TEST(MrptPoseOf, ACovarianceIsThatOfManySmallMotions) {
             << "pitch " << pitch << ", element " << i << ", " << j;
       }
     }
-  }
-}
-
-// --- registration.h ----------------------------------------------------------------------------
-
-TEST(Registration, ClassesCanBeMadeByName) {
-  registerClasses();
-  registerClasses();  // may be called again
-  for (const char* name : {"efm::CObservationEvents", "efm::CEventFusionMapBuilder"}) {
-    const mrpt::rtti::CObject::Ptr object = mrpt::rtti::classFactory(name);
-    ASSERT_TRUE(object) << name;
-    EXPECT_STREQ(object->GetRuntimeClass()->className, name);
   }
 }
 

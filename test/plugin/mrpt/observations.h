@@ -83,13 +83,4 @@ inline void play(CEventFusionMapBuilder& builder,
   builder.finish();
 }
 
-/// A packet of camera 0 after the recording's end, with an event outside the sensor.
-inline CObservationEvents::Ptr packetOutsideTheSensor(const SyntheticRecording& recording) {
-  auto packet = packetObservation(recording, 0);
-  const std::int64_t t_ns = recording.poses.back().t_ns + 1;
-  packet->timestamp = mrptTimeFrom(t_ns);
-  packet->events = {{t_ns, 120, 0, true}};
-  return packet;
-}
-
 }  // namespace efm

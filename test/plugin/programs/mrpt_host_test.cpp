@@ -53,18 +53,6 @@ TEST_F(MrptHost, MapsARecordingShorterThanASecond) {
   expectTheMapOfEventFusion();
 }
 
-TEST_F(MrptHost, MapsAllOfALongerRecording) {
-  importRecording(SyntheticRecording(1.5));
-  mapOf("data.rawlog");
-  write("host.ini", optionText());
-
-  const Result result = host("");
-
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.out, HasSubstr("14 keyframes"));
-  expectTheMapOfEventFusion();
-}
-
 TEST_F(MrptHost, WithDefaultOptionsMakesTheMapOfTheProgram) {
   importRecording(SyntheticRecording(3.2));
   ASSERT_EQ(run("map data.rawlog --out out").status, 0);
@@ -84,15 +72,6 @@ TEST_F(MrptHost, WithDefaultOptionsMakesTheMapOfTheProgram) {
   builder.finish();
   writePcd(folder() / "host.pcd", *builder.points());
   EXPECT_EQ(contentOf("host.pcd"), contentOf("out/map.pcd"));
-}
-
-TEST_F(MrptHost, ErrorsNameTheWrongSectionKeyAndValue) {
-  importRecording(SyntheticRecording());
-  write("host.ini", "[mapper_dsi]\nnum_planes = abc\n");
-  EXPECT_THAT(host("mapper").err,
-              HasSubstr("host.ini, section mapper_dsi: num_planes = abc: must be"));
-  write("host.ini", "[mapper_dsy]\nnum_planes = 100\n");
-  EXPECT_THAT(host("mapper").err, HasSubstr("host.ini, section mapper_dsy: unknown section"));
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <sstream>
 
 #include "test/paths.h"
@@ -14,7 +13,6 @@ namespace efm {
 namespace {
 
 using testing::AllOf;
-using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -40,66 +38,29 @@ TEST_F(RawlogEdit, InfoCountsOurObservations) {
                                 Not(HasSubstr("not registered"))));
 }
 
-TEST_F(RawlogEdit, DescribePrintsTheContentsOfAPacket) {
-  const Result result = edit("--describe");
-  EXPECT_EQ(result.status, 0);
-  EXPECT_THAT(result.out, AllOf(HasSubstr("ClassName: efm::CObservationEvents"),
-                                ContainsRegex("Events of camera 1: [1-9]"),
-                                HasSubstr("Sensor: 120x90 pixels, fx 100 fy 100")));
-}
-
-TEST_F(RawlogEdit, ExportedTextHasEveryEventOfACamera) {
-  const Result result = edit("--export-txt");
-  ASSERT_EQ(result.status, 0) << result.err;
-
-  for (int camera = 0; camera < 2; ++camera) {
-    const std::vector<Event>& events = recording_.events[static_cast<std::size_t>(camera)];
+TEST_F(RawlogEdit, ExportedTextHasTheEventsOfEachCamera) {
+  ASSERT_EQ(edit("--export-txt").status, 0);
+  for (const std::size_t camera : {0, 1}) {
     std::istringstream text(contentOf("data_cam" + std::to_string(camera) + ".txt"));
     std::string line;
     std::getline(text, line);
     EXPECT_THAT(line, HasSubstr("NUM_EVENTS"));
-    std::size_t read = 0;
-    while (std::getline(text, line)) {
-      std::istringstream row(line);
-      double packet_time = 0;
-      std::size_t count = 0;
-      ASSERT_TRUE(row >> packet_time >> count) << line;
-      for (std::size_t i = 0; i < count; ++i, ++read) {
-        std::string time;
-        int x = 0;
-        int y = 0;
-        int polarity = 0;
-        ASSERT_TRUE(row >> time >> x >> y >> polarity) << line;
-        ASSERT_LT(read, events.size());
-        const Event& event = events[read];
-        EXPECT_EQ(time, formatSeconds(event.t_ns));
-        EXPECT_EQ(std::make_tuple(x, y, polarity == 1),
-                  std::make_tuple(event.x, event.y, event.polarity));
-      }
-    }
-    EXPECT_EQ(read, events.size());
+    std::size_t events = 0;
+    double time = 0;
+    for (std::size_t count = 0; text >> time >> count && std::getline(text, line);) events += count;
+    EXPECT_EQ(events, recording_.events[camera].size());
   }
 }
 
-TEST_F(RawlogEdit, ACutRawlogIsReadAgain) {
+TEST_F(RawlogEdit, APartOfARawlogIsReadAgain) {
+  const std::string events = std::to_string(recording_.events[0].size()) + " events";
   ASSERT_EQ(edit("--cut --from-time 10.1 --to-time 10.3 -o cut.rawlog").status, 0);
-  const Result result = run("info cut.rawlog");
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr("21 poses from 10.100000000 s to 10.300000000 s"),
-                                HasSubstr("cam0: 120x90"), HasSubstr("cam1: 120x90")));
-}
-
-TEST_F(RawlogEdit, KeepLabelKeepsOneCameraAndThePoses) {
+  EXPECT_THAT(run("info cut.rawlog").out,
+              AllOf(HasSubstr("21 poses from 10.100000000 s to 10.300000000 s"),
+                    HasSubstr("cam0: 120x90"), HasSubstr("cam1: 120x90")));
   ASSERT_EQ(edit("--keep-label cam0,pose -o kept.rawlog").status, 0);
-  const Result result = run("info kept.rawlog");
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.out, AllOf(HasSubstr(std::to_string(recording_.events[0].size()) + " events"),
-                                HasSubstr("51 poses"), Not(HasSubstr("cam1"))));
-}
-
-TEST_F(RawlogEdit, WithoutThePluginTheClassIsUnknown) {
-  const Result result = shell("rawlog-edit -i data.rawlog --info");
-  EXPECT_THAT(result.out + result.err, HasSubstr("efm::CObservationEvents"));
+  EXPECT_THAT(run("info kept.rawlog").out,
+              AllOf(HasSubstr(events), HasSubstr("51 poses"), Not(HasSubstr("cam1"))));
 }
 
 }  // namespace

@@ -71,6 +71,11 @@ void keepStill(SyntheticRecording& recording) {
   for (StampedPose& pose : recording.poses) pose.T_world_rig.translation.setZero();
 }
 
+void turnAtRest(SyntheticRecording& recording, double rate) {
+  keepStill(recording);
+  rotate(recording, rate);
+}
+
 /// Two seconds; some 2,000 events of each camera.
 SyntheticRecording soundRecording() {
   static const SyntheticRecording recording(2.0);
@@ -132,24 +137,11 @@ const std::vector<Fault> kFaults = {
     {"4.99 mm in a second", [](auto& r) { multiply(r, 0.00499 / 0.8); },
      "no-motion: the poses move by at most 0.00499 m and 0 degrees"},
     {"5.01 mm in a second", [](auto& r) { multiply(r, 0.00501 / 0.8); }, ""},
-    {"rotation alone",
-     [](auto& r) {
-       keepStill(r);
-       rotate(r, 0.5);
-     },
+    {"rotation alone", [](auto& r) { turnAtRest(r, 0.5); },
      "rotation-only: the poses move by at most 0 m and 28.6 degrees within a window"},
-    {"under a degree in a second",
-     [](auto& r) {
-       keepStill(r);
-       rotate(r, 0.0174);
-     },
+    {"under a degree in a second", [](auto& r) { turnAtRest(r, 0.0174); },
      "no-motion: the poses move by at most 0 m and 0.997 degrees"},
-    {"over a degree in a second",
-     [](auto& r) {
-       keepStill(r);
-       rotate(r, 0.0176);
-     },
-     "rotation-only: "},
+    {"over a degree in a second", [](auto& r) { turnAtRest(r, 0.0176); }, "rotation-only: "},
     {"positions in millimetres", [](auto& r) { multiply(r, 1000); },
      "speed: the poses move at up to 800 m/s: expected at most 50;"},
     {"49.9 m/s", [](auto& r) { multiply(r, 49.9 / 0.8); }, ""},
@@ -409,8 +401,7 @@ TEST(HealthChecks, CountWithTheOptionsOfTheMap) {
   EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "the clocks differ by this";
 
   recording = soundRecording();
-  keepStill(recording);
-  rotate(recording, 0.5);
+  turnAtRest(recording, 0.5);
   options = {};
   options.T_body_rig = Rigid3{Eigen::Quaterniond::Identity(), {0, 0, 1}};
   EXPECT_THAT(warningsOf(recording, options), IsEmpty()) << "an arm of a metre turns";

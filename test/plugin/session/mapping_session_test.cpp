@@ -8,13 +8,13 @@
 #include <functional>
 #include <limits>
 #include <map>
-#include <regex>
 #include <set>
 #include <string>
 
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
 #include "plugin/session/recording_survey.h"
+#include "test/mapping/options/refused_option.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
@@ -342,25 +342,6 @@ TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
   EXPECT_NO_THROW(session.finish());
 }
 
-TEST(MappingSession, CamerasInAnyOrderMakeTheSameMap) {
-  const SyntheticRecording recording(0.5, 3);
-  MappingSession expected(syntheticOptions());
-  mapAll(expected, recording);
-
-  MappingSession session(syntheticOptions());
-  for (const StampedPose& pose : recording.poses) session.addPose(pose);
-  for (int i = 0; i < 50; ++i) {
-    for (const int camera : {2, 1}) {
-      session.addEvents(pieceOf(recording, camera, 0.01 * i, 0.01 * (i + 1)));
-    }
-  }
-  EXPECT_FALSE(session.status().events);
-  session.addEvents(packetOf(recording, 0));
-  EXPECT_EQ(session.status().counts.cameras.size(), 3U);
-  mapRest(session);
-  expectSameMap(session, expected);
-}
-
 TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
   const SyntheticRecording recording;
   MappingSession expected(syntheticOptions());
@@ -395,48 +376,14 @@ TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
 }
 
 TEST(LiveOptions, HaveLimits) {
-  const auto field = [](auto LiveOptions::*member) {
-    return [member](LiveOptions& options, double value) {
-      options.*member = static_cast<std::decay_t<decltype(options.*member)>>(value);
-    };
-  };
-  struct Row {
-    std::function<void(LiveOptions&, double)> set;
-    std::vector<double> valid;
-    std::vector<double> wrong;
-    const char* error;
-  };
-  const Row rows[] = {
-      {field(&LiveOptions::max_event_rate),
-       {0, 1000, 1e10},
-       {999, -1, 1.1e10},
-       "max_event_rate = -: must be 0 (no limit), or 1000 to 1e10"},
-      {field(&LiveOptions::max_queue_events),
-       {1000},
-       {999},
-       "max_queue_events = -: must be 1000 or above"},
-      {field(&LiveOptions::max_queue_mb),
-       {1, 1e6},
-       {0.9, 1'000'001},
-       "max_queue_mb = -: must be 1 to 1e6"},
-      {field(&LiveOptions::max_pose_wait_s),
-       {0.1, 3600},
-       {0, 3601},
-       "max_pose_wait_s = -: must be above 0, at most 3600"},
-      {field(&LiveOptions::max_keyframes), {1}, {0}, "max_keyframes = -: must be 1 or above"},
-      {field(&LiveOptions::max_speed_m_s), {0.1}, {0}, "max_speed_m_s = -: must be above 0"},
-      {field(&LiveOptions::max_turn_deg_s), {0.1}, {0}, "max_turn_deg_s = -: must be above 0"},
-  };
-  for (const Row& row : rows) {
-    LiveOptions options;
-    const auto error_of = [&](double value) {
-      row.set(options, value);
-      return std::regex_replace(messageOf([&] { options.validate(); }), std::regex("= [^:]*"),
-                                "= -");
-    };
-    for (const double value : row.wrong) EXPECT_EQ(error_of(value), row.error) << value;
-    for (const double value : row.valid) EXPECT_EQ(error_of(value), "no error") << row.error;
-  }
+  using O = LiveOptions;
+  test::expectLimits<O>({{"max_event_rate", &O::max_event_rate, {0, 1000, 1e10}, {999, -1, 1.1e10}},
+                         {"max_queue_events", &O::max_queue_events, {1000}, {999}},
+                         {"max_queue_mb", &O::max_queue_mb, {1, 1e6}, {0.9, 1'000'001}},
+                         {"max_pose_wait_s", &O::max_pose_wait_s, {0.1, 3600}, {0, 3601}},
+                         {"max_keyframes", &O::max_keyframes, {1}, {0}},
+                         {"max_speed_m_s", &O::max_speed_m_s, {0.1}, {0}},
+                         {"max_turn_deg_s", &O::max_turn_deg_s, {0.1}, {0}}});
 }
 
 // --- The options' calibration ------------------------------------------------------------------

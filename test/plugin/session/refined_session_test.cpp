@@ -107,20 +107,6 @@ std::unique_ptr<MappingSession> mapWith(
   return session;
 }
 
-TEST(StatedNoise, NoisyKeyframesMoveAndOthersStay) {
-  constexpr std::size_t kPosesOfAWindow = 10;
-  const auto session = mapWith(noiseOptions(), [](auto& to, const auto& pose, std::size_t i) {
-    const bool certain = i / kPosesOfAWindow % 2 == 0;
-    to.addPose(pose, {}, certain ? PoseNoise{1e-4, 1e-5} : PoseNoise{0.05, 0.02});
-  });
-  double certain_m = 0;
-  double noisy_m = 0;
-  for (std::size_t k = 1; k < session->T_world_ref().size(); ++k) {
-    (k % 2 == 0 ? certain_m : noisy_m) += motionOf(*session, k);
-  }
-  EXPECT_LT(certain_m, 0.2 * noisy_m);
-}
-
 TEST(StatedNoise, CountsOnlyOfTheFirstPoseOfATimeAndItsSource) {
   const PoseNoise wrong{0.5, 0.5};
   const auto map = [&](const Noise& first, const Noise& others) {
