@@ -201,7 +201,7 @@ RC_GTEST_PROP(LiveLosses, EachEventHasOneFate, ()) {
   for (const auto& [camera, queue] : status.live->cameras) {
     RC_ASSERT(queue.received == fed[camera]);
     RC_ASSERT(queue.held + queue.queued == 0U);
-    const EventCounts& counts = status.counts.cameras.at(static_cast<std::size_t>(camera));
+    const EventCounts counts = countsOf(status, camera);
     received += queue.received;
     kept += counts.used + counts.outside_window + queue.paused;
   }
