@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -33,18 +32,12 @@ std::vector<CloudPoint> randomPoints(std::mt19937& random, int count, double ext
   return points;
 }
 
-TEST(GlobalCloud, ErrorsAreCommonWithinAKeyframeAndIndependentBetweenThem) {
-  const Eigen::Vector3d p(0.5, 0.5, 0.5);
+TEST(GlobalCloud, TheErrorOfAPointWithoutOneIsNotKnown) {
   GlobalCloud cloud({1.0, 1});
-  cloud.insert(0, {{p, 1, 1, 0, 0.1F}, {p, 3, 1, 0, 0.3F}});
-  EXPECT_FLOAT_EQ(cloud.points()->at(0).sigma, 0.25F);  // (1 * 0.1 + 3 * 0.3) / 4
-  cloud.insert(1, {{p, 2, 1, 0, 0.6F}});
-  // sqrt((1 * 0.1 + 3 * 0.3)^2 + (2 * 0.6)^2) / 6
-  EXPECT_FLOAT_EQ(cloud.points()->at(0).sigma, 0.26034166F);
-  cloud.insert(2, {{p, 1}});
-  EXPECT_TRUE(std::isnan(cloud.points()->at(0).sigma)) << "of one point it is not known";
+  cloud.insert(1, {{{0.5, 0.5, 0.5}, 2, 1, 0, 0.6F}});
+  cloud.insert(2, {{{0.5, 0.5, 0.5}, 1}});
+  EXPECT_TRUE(std::isnan(cloud.points()->at(0).sigma));
   cloud.remove(2);
-  cloud.remove(0);
   EXPECT_EQ(cloud.points()->at(0).sigma, 0.6F);
 }
 
@@ -144,10 +137,6 @@ TEST(GlobalCloud, SupportIsThatOfTheKeyframesThatRemain) {
   EXPECT_EQ(cloud.points(1)->size(), 2U);
   EXPECT_EQ(cloud.points(1)->at(0).support, 1U);
   EXPECT_EQ(cloud.points(1)->at(0).first_keyframe, 1U);
-
-  cloud.insert(0, {{{5.7, 0.5, 0.5}, 1.0F}});  // refined: it moved by five voxels
-  ASSERT_EQ(cloud.points()->size(), 1U);
-  EXPECT_NEAR(cloud.points()->at(0).x, 5.6, 1e-6);
 }
 
 TEST(GlobalCloud, OutliersOfAKeyframeStayOutsideEvenWhereAnotherKeyframeHasPoints) {

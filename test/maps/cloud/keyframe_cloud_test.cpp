@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/cloud/keyframe_cloud.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace efm {

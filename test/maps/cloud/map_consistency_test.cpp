@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Keyframes check each other's points.
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -105,16 +104,6 @@ TEST(MapConsistency, SupportCountsKeyframesWithAPointInTheVoxelOrNearIt) {
                                  [](const auto& p) { return p.p_world.z() < 2.95; });
   ASSERT_NE(lone, points.end());
   EXPECT_EQ(lone->support, 3U) << "10, 11 and 18; 19 is too far from 10";
-}
-
-TEST(MapConsistency, AKeyframeWithAPointSupportsItOnce) {
-  const std::vector<CloudPoint> point = {{{0.21, 0.01, 2.93}, 1.0F}};
-  GlobalCloud cloud(withConsistency(Consistency::kSupport));
-  for (std::uint64_t keyframe = 0; keyframe < 3; ++keyframe) {
-    cloud.insert(keyframe, point, viewAt(0));
-    ASSERT_EQ(cloud.points()->size(), 1U);
-    EXPECT_EQ(cloud.points()->at(0).support, keyframe + 1);
-  }
 }
 
 TEST(MapConsistency, AKeyframeWithoutAPoseIsCheckedAndChecksNoOther) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/cloud/map_point.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pcl/conversions.h>
 #include <pcl/point_types.h>

@@ -21,30 +21,12 @@ ConsistencyOptions options() {
   return options;
 }
 
-/// A wall at z = 2 m, x and y from -1 to 1 m: every half degree and denser.
-std::vector<CloudPoint> wall() {
-  std::vector<CloudPoint> points;
-  for (int y = -100; y <= 100; ++y) {
-    for (int x = -100; x <= 100; ++x) points.push_back({{0.01 * x, 0.01 * y, 2}, 1.0F});
-  }
-  return points;
-}
-
-TEST(VisibilityGrid, SupportsPointsOnTheWallAndPointsInFrontViolateFreeSpace) {
-  const VisibilityGrid grid(wall(), {}, options());
-  // The tolerance is 0.05 / 2 m = 0.025 / m: support from 1 / 0.525 to 1 / 0.475 m, a violation in
-  // front of 1 / 0.55 m.
-  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 2}), Verdict::kSupports);
-  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.91}), Verdict::kSupports);
-  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 2.10}), Verdict::kSupports);
-  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.89}), Verdict::kUnknown);
-  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.83}), Verdict::kUnknown) << "neither";
-  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 1.81}), Verdict::kFreeSpaceViolation);
-  EXPECT_EQ(grid.verdictOn({0.1, 0.1, 0.3}), Verdict::kFreeSpaceViolation);
-}
-
 TEST(VisibilityGrid, HiddenAndUnseenPointsAreUnknown) {
-  const VisibilityGrid grid(wall(), {}, options());
+  std::vector<CloudPoint> wall;  // x and y from -1 to 1 m: every half degree and denser
+  for (int y = -100; y <= 100; ++y) {
+    for (int x = -100; x <= 100; ++x) wall.push_back({{0.01 * x, 0.01 * y, 2}, 1.0F});
+  }
+  const VisibilityGrid grid(wall, {}, options());
   EXPECT_EQ(grid.verdictOn({0.1, 0.1, 2.2}), Verdict::kUnknown) << "behind the wall";
   EXPECT_EQ(grid.verdictOn({1.2, 0, 1.5}), Verdict::kUnknown) << "outside of it";
   EXPECT_EQ(grid.verdictOn({0.1, 0.1, -2}), Verdict::kUnknown) << "behind the view";
@@ -65,15 +47,6 @@ TEST(VisibilityGrid, HiddenAndUnseenPointsAreUnknown) {
       EXPECT_EQ(verdict_of(outside, outside), Verdict::kUnknown) << side.transpose();
     }
   }
-}
-
-TEST(VisibilityGrid, AnEdgeInFrontOfTheWallIsSupportedInTheSameCell) {
-  std::vector<CloudPoint> points = wall();
-  points.push_back({{0.05, 0, 1}, 1.0F});
-  const VisibilityGrid grid(points, {}, options());
-  EXPECT_EQ(grid.verdictOn({0.05, 0.01, 1}), Verdict::kSupports);
-  EXPECT_EQ(grid.verdictOn({0.10, 0, 2}), Verdict::kSupports) << "the wall in the same cell";
-  EXPECT_EQ(grid.verdictOn({0.06, 0, 1.5}), Verdict::kUnknown) << "hidden by the edge";
 }
 
 RC_GTEST_PROP(VisibilityGrid, DecidesLikeBruteForce, ()) {

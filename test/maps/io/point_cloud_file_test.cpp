@@ -36,10 +36,6 @@ class PointCloudFile : public TemporaryFolder {
     return static_cast<std::size_t>(
         std::distance(std::filesystem::directory_iterator(folder()), {}));
   }
-  /// The error of writing one point, or none.
-  static std::string writeRefusalOf(const std::filesystem::path& path, const CloudPoint& point) {
-    return messageOf([&] { writePcd(path, *mapCloudOf({{{1, 2, 3}, 1.0F}, point}, 0.01)); });
-  }
 };
 
 PointCloudContent parse(const std::filesystem::path& name, const std::string& bytes) {
@@ -511,7 +507,8 @@ TEST_F(PointCloudFile, WithAPointThatAFloatCannotHoldIsNotWritten) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   for (const CloudPoint& point :
        {CloudPoint{{1e39, 0, 0}, 1.0F}, {{0, std::nan(""), 0}, 1.0F}, {{0, 0, 0}, kInfinity}}) {
-    EXPECT_THAT(writeRefusalOf(folder() / "map.pcd", point),
+    const auto cloud = mapCloudOf({{{1, 2, 3}, 1.0F}, point}, 0.01);
+    EXPECT_THAT(messageOf([&] { writePcd(folder() / "map.pcd", *cloud); }),
                 AllOf(HasSubstr("map.pcd: point 1 ("), HasSubstr("expected finite numbers")));
   }
   EXPECT_EQ(filesInFolder(), 0U);

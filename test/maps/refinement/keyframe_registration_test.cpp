@@ -16,7 +16,6 @@ namespace efm {
 namespace {
 
 using test::drawMotion;
-using test::drawPose;
 using test::Edges;
 using test::kInverseDepthSigma;
 using test::metresApart;
@@ -40,15 +39,6 @@ struct Step {
     return registerKeyframe(1, cloud, {{0, &map, T_world_map}}, prior, options);
   }
 };
-
-double errorOfAll(const Registration& registration, const std::vector<MapKeyframe>& map,
-                  const Rigid3& T_world_ref) {
-  double sum = 0;
-  for (const RelativePoseFactor& factor : registration.factors) {
-    sum += std::pow(errorOf(factor, map[factor.from].T_world_ref, T_world_ref), 2);
-  }
-  return sum;
-}
 
 TEST(KeyframeRegistration, FindsAPoseThatThePriorMissesByTwoCentimetresAndADegree) {
   constexpr int kSeeds = 8;
@@ -120,17 +110,9 @@ TEST(KeyframeRegistration, ItsFactorsHaveTheirMinimumAtItsPose) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     std::mt19937 random(seed);
     const Step step(test::edgesAround(150, random), random);
-    const std::vector<MapKeyframe> map = {{0, &step.map, step.T_world_map}};
     const Rigid3 off = step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random);
     // With an uncertain prior the points determine the pose.
     const Registration found = step.from(priorOf(off, 0.5, 0.2));
-    const double least = errorOfAll(found, map, found.T_world_ref);
-    int larger = 0;
-    for (int i = 0; i < 200; ++i) {
-      const Rigid3 nearby = found.T_world_ref * drawMotion(0.01, 0.3 * kRadiansPerDegree, random);
-      if (errorOfAll(found, map, nearby) > least) ++larger;
-    }
-    EXPECT_EQ(larger, 200) << seed;
     // The minimum may be off by the motion of the last round.
     const RelativePoseFactor& factor = found.factors[0];
     const Vector6d minimum = -(factor.sqrt_information.transpose() * factor.sqrt_information +
@@ -139,24 +121,6 @@ TEST(KeyframeRegistration, ItsFactorsHaveTheirMinimumAtItsPose) {
                                   .solve(factor.sqrt_information.transpose() * factor.offset);
     EXPECT_LT(minimum.head<3>().norm(), 0.003) << seed;
     EXPECT_LT(minimum.tail<3>().norm(), 0.1 * kRadiansPerDegree) << seed;
-  }
-}
-
-TEST(KeyframeRegistration, MovesWithTheWorld) {
-  for (const double far_m : {3.0, 5e6}) {
-    std::mt19937 random(5);
-    const Step step(test::edgesAround(150, random), random);
-    const Rigid3 prior = step.T_world_ref * drawMotion(0.02, 1 * kRadiansPerDegree, random);
-    const Registration found = step.from(priorOf(prior, 0.02, 1 * kRadiansPerDegree));
-    const Rigid3 T_other_world = drawPose(far_m, random);
-    const Registration other =
-        registerKeyframe(1, step.cloud, {{0, &step.map, T_other_world * step.T_world_map}},
-                         priorOf(T_other_world * prior, 0.02, 1 * kRadiansPerDegree), {});
-    // Rounding may give a point another neighbour, one of some 800.
-    const Rigid3 back = T_other_world.inverse() * other.T_world_ref;
-    EXPECT_LT(metresApart(back, found.T_world_ref), 1e-4) << far_m;
-    EXPECT_LT(radiansApart(back, found.T_world_ref), 1e-4) << far_m;
-    EXPECT_NEAR(other.inlierRatio(), found.inlierRatio(), 0.01) << far_m;
   }
 }
 
@@ -197,25 +161,6 @@ TEST(KeyframeRegistration, AlongStripesItStaysWithThePrior) {
     const Eigen::Vector3d after = found.T_world_ref.translation - step.T_world_ref.translation;
     EXPECT_NEAR(after.x(), before.x(), 0.01) << seed;
     EXPECT_LT(std::abs(after.y()), 0.006) << seed;
-  }
-}
-
-TEST(KeyframeRegistration, FewPointsDoNotMoveItFarFromThePrior) {
-  for (const int count : {1, 2, 5, 29}) {
-    std::mt19937 random(static_cast<unsigned>(count));
-    const Edges world = test::edgesAround(150, random);
-    Step step(world, random);
-    KeyframeDepthMap sparse = seenFrom(world, step.T_world_ref, kInverseDepthSigma, random);
-    test::keepFirst(count, sparse);
-    step.cloud = RegistrationCloud(sparse, {});
-    ASSERT_EQ(step.cloud.numQueryPoints(), static_cast<std::size_t>(count));
-    const Rigid3 prior = step.T_world_ref * drawMotion(0.005, 0.2 * kRadiansPerDegree, random);
-    const Registration found = step.from(priorOf(prior, 0.005, 0.2 * kRadiansPerDegree));
-    EXPECT_LT(found.from_prior, 5) << count;
-    EXPECT_TRUE(found.T_world_ref.translation.allFinite());
-    for (const RelativePoseFactor& factor : found.factors) {
-      EXPECT_TRUE(factor.sqrt_information.allFinite() && factor.offset.allFinite()) << count;
-    }
   }
 }
 

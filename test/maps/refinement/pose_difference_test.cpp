@@ -62,19 +62,6 @@ RC_GTEST_PROP(PoseDifference, DoesNotDependOnTheSignOfAQuaternion, ()) {
   RC_ASSERT(differenceOf(negated).tail<3>().norm() <= M_PI + 1e-15);
 }
 
-TEST(PoseDifference, OfMoreThanHalfARotationIsTheShorterOne) {
-  const Vector6d difference = differenceOf(rigidFromDifference(rotationOnly({0, 1.5 * M_PI, 0})));
-  EXPECT_LT((difference - rotationOnly({0, -0.5 * M_PI, 0})).norm(), 1e-14);
-}
-
-TEST(SqrtInformation, OfADiagonalHoldsTheInverseStandardDeviations) {
-  Vector6d sigma;
-  sigma << 0.1, 0.2, 0.5, 1, 2, 4;
-  const Matrix6d expected = sigma.cwiseInverse().asDiagonal();
-  const Matrix6d sqrt_information = sqrtInformation(Matrix6d(sigma.cwiseAbs2().asDiagonal()));
-  EXPECT_LT((sqrt_information - expected).norm(), 1e-14);
-}
-
 RC_GTEST_PROP(SqrtInformation, ScalesErrorsToUnitCovariance, ()) {
   std::mt19937 random(*rc::gen::arbitrary<unsigned>());
   Matrix6d factor = drawMatrix<6>(random);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/refinement/pose_refinement.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -216,28 +215,19 @@ TEST(AlignToMap, FindsNothingWhereAPairOrThePriorIsNotFinite) {
   }
 }
 
-TEST(SolvePoseGraph, ARingComesBackFromAPerturbedStart) {
-  const PoseGraph exact = ring(20);
+TEST(SolvePoseGraph, ARingComesBackFromAPerturbedStartAndFixedPosesStay) {
+  PoseGraph exact = ring(20);
+  exact.fixed[5] = exact.fixed[6] = true;
   for (unsigned seed = 1; seed <= 5; ++seed) {
     std::mt19937 random(seed);
     PoseGraph graph = exact;
     perturbFree(graph, 0.2, 0.1, random);
     solvePoseGraph({}, graph);
     EXPECT_LT(mostApart(graph.T_world_node, exact.T_world_node), 1e-6) << seed;
+    for (const std::size_t i : {0, 5, 6}) {
+      EXPECT_TRUE(sameBits(graph.T_world_node[i], exact.T_world_node[i])) << i;
+    }
   }
-}
-
-TEST(SolvePoseGraph, FixedPosesStayBitForBit) {
-  std::mt19937 random(1);
-  PoseGraph graph = ring(12);
-  perturbFree(graph, 0.1, 0.05, random);
-  graph.fixed[5] = graph.fixed[6] = true;
-  const std::vector<Rigid3> before = graph.T_world_node;
-  solvePoseGraph({}, graph);
-  for (const std::size_t i : {0, 5, 6}) {
-    EXPECT_TRUE(sameBits(graph.T_world_node[i], before[i])) << i;
-  }
-  EXPECT_GT(metresApart(graph.T_world_node[3], before[3]), 0.01) << "others move";
 }
 
 TEST(SolvePoseGraph, AnOffsetMovesAFactorsMinimumByAsMuch) {
@@ -258,14 +248,11 @@ TEST(SolvePoseGraph, AWrongRobustFactorMovesNothing) {
     wrong.robust = robust;
     graph.factors.push_back(wrong);
     solvePoseGraph({}, graph);
-    double most_m = 0;
-    for (std::size_t i = 0; i < graph.T_world_node.size(); ++i) {
-      most_m = std::max(most_m, metresApart(graph.T_world_node[i], exact.T_world_node[i]));
-    }
+    const double most = mostApart(graph.T_world_node, exact.T_world_node);
     if (robust) {
-      EXPECT_LT(most_m, 0.02);
+      EXPECT_LT(most, 0.02);
     } else {
-      EXPECT_GT(most_m, 0.1) << "without the loss";
+      EXPECT_GT(most, 0.1) << "without the loss";
     }
   }
 }

@@ -6,12 +6,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
-#include <map>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "test/plugin/formats/files.h"
 #include "test/plugin/sensors/evt_words.h"
 
 namespace efm {

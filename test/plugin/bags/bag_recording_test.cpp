@@ -516,10 +516,8 @@ TEST_F(BagRecording, DamagedBagsAreReadOrRefused) {
   }
 }
 
-fs::path sample(const char* name) { return fs::path(EFM_SHARED_DATA) / name; }
-
 TEST_F(BagRecording, ARealBagOfAPropheseeCameraHasAllEvents) {
-  const fs::path file = sample("raw_formats/event_camera_py_test_events_1.bag");
+  const fs::path file = EFM_SHARED_DATA "/raw_formats/event_camera_py_test_events_1.bag";
   if (!fs::exists(file)) GTEST_SKIP() << file << " is not there";
   RecordingParts recording = open({file});
   EventStream& camera = *recording.cameras.at(0);
@@ -540,16 +538,6 @@ TEST_F(BagRecording, ARealBagOfAPropheseeCameraHasAllEvents) {
   EXPECT_EQ(sum_us, 2'851'601'611'994);
   // The first packet's stamp is 4.0 ms behind the least delay.
   EXPECT_NEAR(static_cast<double>(1'675'956'550'318'674'902 - events.front().t_ns), 4e6, 0.5e6);
-}
-
-TEST_F(BagRecording, ARealBagOfPosesHasAllPoses) {
-  const fs::path file = sample("rosbags/dsec_zurich_city_04_pose.bag");
-  if (!fs::exists(file)) GTEST_SKIP() << file << " is not there";
-  const RecordingParts recording = open({file});
-  EXPECT_THAT(recording.cameras, IsEmpty());
-  ASSERT_EQ(recording.poses.size(), 6'205U);
-  EXPECT_EQ(recording.poses.front().t_ns, 36'339'513'459'000);
-  EXPECT_EQ(recording.poses.back().t_ns, 36'965'248'367'000);
 }
 
 }  // namespace

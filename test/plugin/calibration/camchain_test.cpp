@@ -9,7 +9,6 @@
 #include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
-#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 namespace {
@@ -69,18 +68,6 @@ TEST_F(Camchain, HasEachCamerasModelAndPose) {
   const Eigen::Vector3d p_cam2(-1.1, -1.7, 3.6);
   EXPECT_LT((rig.cameras[1].T_rig_cam * p_cam1 - p_rig).norm(), 1e-12);
   EXPECT_LT((rig.cameras[2].T_rig_cam * p_cam2 - p_rig).norm(), 1e-12);
-}
-
-TEST_F(Camchain, ReadsTheDatasetWritersFilesBack) {
-  const Rig rig = read(kCam0 + kCam1 + replaced(kCam1, "cam1", "cam2"));
-  const Rig again = read(formatCamchain(rig));
-  ASSERT_EQ(again.cameras.size(), rig.cameras.size());
-  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
-    EXPECT_TRUE(again.cameras[i].model == rig.cameras[i].model) << i;
-    const Rigid3 T_again_rig = again.cameras[i].T_rig_cam.inverse() * rig.cameras[i].T_rig_cam;
-    EXPECT_LT(T_again_rig.translation.norm(), 1e-14) << i;
-    EXPECT_LT(T_again_rig.rotation.vec().norm(), 1e-14) << i;
-  }
 }
 
 TEST_F(Camchain, MakesARoundedRotationExact) {

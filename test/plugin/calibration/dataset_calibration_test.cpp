@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The calibration files of real data sets, and those of config/ for them.
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -78,18 +77,6 @@ TEST_F(DatasetCalibration, EqualsTheCameraChainBesideIt) {
   }
 }
 
-TEST_F(DatasetCalibration, CameraInfoOfMvsecHasTheModelsOfItsCameraChain) {
-  const Rig chain = readCamchain(kFiles / "mvsec/camchain.yaml");
-  const char* const names[] = {"left", "right"};
-  for (std::size_t c = 0; c < 2; ++c) {
-    const fs::path file = kFiles / "mvsec/calib_in_flying" /
-                          (std::string("camchain-imucam-indoor_flying_") + names[c] + "_ros.yaml");
-    const Rig rig = readCalibration(file).rig;
-    ASSERT_EQ(rig.cameras.size(), 1U);
-    EXPECT_EQ(rig.cameras[0].model, chain.cameras[c].model) << file;
-  }
-}
-
 TEST_F(DatasetCalibration, DsecsHandEyeTransformTurnsLidarPosesIntoPosesOfTheLeftEventCamera) {
   const Calibration calibration = readCalibration(kDsec / "cam_to_cam.yaml");
   const Rigid3 T_lidar_rig = readHandEye(kDsec / "cam_to_lidar.yaml", &calibration);
@@ -117,15 +104,6 @@ TEST_F(DatasetCalibration, TumViesHandEyeTransformIsThatOfTheMarkerAndTheImu) {
                                    .normalized(),
                                {0.0682395566125301, 0.05484102693333699, 0.06451606289598333}};
   expectNear(T_imu_marker * T_marker_rig, *calibration.T_imu_rig, 1e-12);
-}
-
-TEST_F(DatasetCalibration, MvsecsHandEyeTransformIsTheInverseOfItsCameraOnTheImu) {
-  const fs::path file = kFiles / "mvsec/calib_in_flying/camchain-imucam-indoor_flying.yaml";
-  const Rigid3 T_imu_rig = readHandEye(file);
-  EXPECT_LT((T_imu_rig.inverse().translation -
-             Eigen::Vector3d(-0.002760732198752687, -0.001652095229536009, -0.017829494499329843))
-                .norm(),
-            1e-12);
 }
 
 }  // namespace

@@ -15,7 +15,6 @@
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 
 class EvaluateDepth : public TemporaryFolder {
@@ -54,9 +53,6 @@ TEST_F(EvaluateDepth, PairsFoldersByTimeAndAveragesMaps) {
   const auto json = nlohmann::json::parse(evaluationJson(evaluation));
   EXPECT_EQ(json["maps"].size(), 2U);
   EXPECT_EQ(json["mean"]["mean_abs_m"], 1.5);
-
-  // The inner folders may be given as well.
-  EXPECT_EQ(evaluateDepth(folder() / "out/keyframes", folder() / "data/depth", {}).maps.size(), 2U);
 }
 
 TEST_F(EvaluateDepth, PrecisionAndRecallAreOverAllPixelsOfAllMaps) {
@@ -102,7 +98,6 @@ TEST_F(EvaluateDepth, BadPixelsNeedFocalLengthTimesBaseline) {
     }
   }
   EXPECT_EQ(json["focal_px"], 400);
-  EXPECT_THAT(evaluationTable(evaluation), HasSubstr("bad-pix 5px,5%, %         100.00\n"));
   const auto without = evaluateDepth(folder() / "a.tiff", folder() / "b.tiff", {});
   EXPECT_THAT(evaluationTable(without), HasSubstr("no bad-pix: it needs"));
   EXPECT_FALSE(nlohmann::json::parse(evaluationJson(without))["all"].contains("bad_pix_5px"));
@@ -167,14 +162,6 @@ TEST_F(EvaluateDepth, AWrongInputIsAnErrorThatNamesIt) {
   EXPECT_THAT(errorOf(folder(), a), HasSubstr("two files or two folders"));
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("no depth maps in"));
   EXPECT_THAT(errorOf(a, tiff("wide.tiff", 2, {8, 3})), HasSubstr("wide.tiff"));
-  cv::imwrite((folder() / "grey.png").string(), cv::Mat1b(3, 4, uchar{1}));
-  EXPECT_THAT(errorOf(a, folder() / "grey.png"),
-              HasSubstr("expected 16-bit, 1 channel, or a float32 TIFF"));
-  std::ofstream(folder() / "text.tiff") << "text";
-  EXPECT_THAT(errorOf(a, folder() / "text.tiff"), HasSubstr("cannot read the depth map"));
-
-  std::ofstream(folder() / "index.txt") << "1.0\n";
-  EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("index.txt:1: '1.0': expected"));
   std::ofstream(folder() / "index.txt") << "1.0 a.tiff\n";
   tiff("one/depth.tiff", 1);
   EXPECT_THAT(errorOf(folder() / "one", folder()), HasSubstr("one holds one depth map without"));

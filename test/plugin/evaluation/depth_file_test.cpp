@@ -144,8 +144,6 @@ TEST_F(DepthFile, WrongHeadersOfNumpyAreErrors) {
   }
   EXPECT_THAT(refused("{'descr': '<f4', " + order + "'shape': (1, 65535), }"),
               HasSubstr("expected 262140 for 65535x1 float32"));
-  EXPECT_THAT(refused("{'descr': '<f4', " + order + "'shape': (2, 4), }"),
-              HasSubstr("24 bytes follow the array's header: expected 32"));
 }
 
 TEST_F(DepthFile, TruncatedFilesAreErrors) {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,20 +8,14 @@
 #include "plugin/evaluation/cloud_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_plot.h"
 #include "plugin/evaluation/trajectory_evaluation_plot.h"
-#include "plugin/pictures/picture_file.h"
 #include "plugin/pictures/value_picture.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/pictures/sketch.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
 
-using testing::HasSubstr;
-
-const cv::Vec3b kWhite(255, 255, 255);
-
-TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
+TEST(ValuePicture, NanIsWhiteOrWhatLiesUnder) {
   ValuePicture picture;
   picture.values = (cv::Mat1f(1, 3) << 1, NAN, 3);
   picture.range = {1, 3};
@@ -31,10 +24,7 @@ TEST(ValuePicture, LowAndHighValuesHaveTheColoursOfTheBarAndNanIsWhite) {
   ASSERT_GE(drawn.cols, 300);
   const int middle = 24 + drawn.cols / 6;  // below the title
   const cv::Vec3b low = drawn(middle, drawn.cols / 6);
-  const cv::Vec3b high = drawn(middle, drawn.cols * 5 / 6);
-  EXPECT_EQ(drawn(middle, drawn.cols / 2), kWhite);
-  EXPECT_GT(low[0], low[2]) << "blue";
-  EXPECT_GT(high[2], high[0]) << "red";
+  EXPECT_EQ(drawn(middle, drawn.cols / 2), cv::Vec3b(255, 255, 255));
   picture.under = (cv::Mat1b(1, 3) << 0, 200, 0);
   EXPECT_EQ(drawValues(picture)(middle, drawn.cols / 2), cv::Vec3b(200, 200, 200));
   EXPECT_EQ(drawValues(picture)(middle, drawn.cols / 6), low) << "grey is under the values alone";
@@ -137,17 +127,6 @@ TEST_F(EvaluationPlot, OfACloudDrawsItsDistancesInOrder) {
         ++
 21621 px at 301.9, 208.5
 )");
-}
-
-TEST_F(EvaluationPlot, IsWrittenAsPngOnly) {
-  const cv::Mat3b picture(3, 4, kWhite);
-  writePicture(folder() / "a.png", picture);
-  EXPECT_EQ(cv::imread((folder() / "a.png").string()).size(), picture.size());
-  const auto errorOf = [&](const char* file) {
-    return messageOf([&] { writePicture(folder() / file, picture); });
-  };
-  EXPECT_THAT(errorOf("a.pdf"), HasSubstr("a.pdf: expected a name that ends in .png"));
-  EXPECT_THAT(errorOf("nowhere/a.png"), HasSubstr("nowhere"));
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <tuple>
@@ -150,11 +149,6 @@ TEST_F(EvaluateTrajectory, AWrongInputIsAnErrorThatNamesIt) {
               AllOf(HasSubstr("late.txt"), HasSubstr("within 0.010000 s"), HasSubstr("gt.txt")));
   EXPECT_THAT(errorOf(write("few.txt", {{0, {}}, {100'000'000, {}}}), gt),
               AllOf(HasSubstr("few.txt: cannot be aligned: 2 pairs"), HasSubstr("--align origin")));
-  EXPECT_THAT(errorOf(folder() / "nowhere.txt", gt), HasSubstr("nowhere.txt"));
-  std::ofstream(folder() / "bad.txt") << "0 0 0 0 0 0 0 1\n1 2 3\n";
-  EXPECT_THAT(errorOf(folder() / "bad.txt", gt), HasSubstr("bad.txt:2"));
-  std::ofstream(folder() / "empty.txt") << "# nothing\n";
-  EXPECT_THAT(errorOf(folder() / "empty.txt", gt), HasSubstr("empty.txt"));
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <mrpt/obs/CObservationRobotPose.h>
 
 #include <memory>
 #include <string>
@@ -11,7 +10,6 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"
 #include "plugin/recordings/recording_with_poses.h"
 #include "plugin/text/event_text.h"
@@ -112,19 +110,6 @@ TEST_F(MergedRecordingTest, APacketHasItsCameraAndItsEvents) {
                 open({"", "\n"}, {poseAt(0)});
               }),
               AllOf(HasSubstr("cam0/events.txt, "), HasSubstr("cam1/events.txt: no events")));
-}
-
-TEST_F(MergedRecordingTest, APoseIsTheRigsInTheWorld) {
-  StampedPose pose = poseAt(1'700'000'000'123'456'789);
-  pose.T_world_rig = {Eigen::Quaterniond(0.5, 0.5, -0.5, 0.5), {1, 2, 3}};
-  RecordingWithPoses recording = open({"1700000001 0 0 0\n"}, {pose});
-  const auto observation = recording.next();
-  const auto& robot = dynamic_cast<const mrpt::obs::CObservationRobotPose&>(*observation);
-  EXPECT_EQ(robot.sensorLabel, "pose");
-  EXPECT_EQ(nanosecondsFrom(robot.timestamp), 1'700'000'000'123'456'800);
-  const Rigid3 T_world_rig = rigidFrom(robot.pose.mean);
-  EXPECT_EQ(T_world_rig.translation, Eigen::Vector3d(1, 2, 3));
-  EXPECT_LT(T_world_rig.rotation.angularDistance(pose.T_world_rig.rotation), 1e-12);
 }
 
 TEST_F(MergedRecordingTest, OtherPosesReplaceTheRecordingsAndTheirDamageComesLast) {

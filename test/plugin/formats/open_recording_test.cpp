@@ -62,11 +62,6 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
       {"kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n",
        ":1: '1 0 0 0 0 1 0 0 0 0 1 0': 12 numbers, as poses of KITTI have, which have no times: "
        "expected t tx ty tz qx qy qz qw, or a .npz file with N times and N x 4 x 4 matrices"},
-      {"calib.txt", "200 200 120 90 0 0 0 0 0\n", ": a calibration: expected --calibration PATH"},
-      {"rig.ini", "[dsi]\nnum_planes = 5\n",
-       ": an .ini file among the sources: expected one option file, --config NAME; a calibration "
-       "is "
-       "given with --calibration"},
       {"old.raw", "% date 2020-01-01\n% plugin_name hal\n\0\1\2"s,
        ": a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header: the encoding "
        "of "
@@ -83,9 +78,6 @@ TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
       {"readme", "gain = 5 at 3 of the set\n",
        ": not a recording (it begins with 'gain = 5 at 3 of the set'): expected a rawlog, or a "
        "recording in another format (docs/recordings.md)"},
-      {"my.rawlog", "words\n",
-       ": not a rawlog (it begins with 'words\\x0a'): expected a rawlog, or a recording in another "
-       "format (docs/recordings.md)"},
   };
   for (const auto& [name, bytes, error] : rows) {
     const std::filesystem::path file = folder() / name;

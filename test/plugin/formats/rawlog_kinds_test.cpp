@@ -180,38 +180,6 @@ TEST_F(RawlogKinds, TheBuilderMapsBothAsMrptReadsThem) {
   expectNear(maps[0], maps[1]);
 }
 
-TEST_F(RawlogKinds, OfSeveralSourcesOneIsUsedAndTheOthersAreCounted) {
-  save(observationsOnly(Says::kPoses), "poses.rawlog");
-  const auto map = mapOf("poses.rawlog");
-
-  CRawlog rawlog;
-  std::size_t k = 0;
-  for (const CObservation::Ptr& observation : observationsOf(recording)) {
-    if (IS_CLASS(*observation, CObservationRobotPose)) {
-      StampedPose slipped = recording.poses[k++];
-      slipped.T_world_rig.translation.x() *= 1.5;
-      rawlog.insert(odometryOf(slipped));
-    }
-    rawlog.insert(observation);
-  }
-  save(rawlog, "both.rawlog");
-  const Result result = run("map rig.ini both.rawlog --out out");
-  ASSERT_EQ(result.status, 0) << result.err;
-  EXPECT_THAT(result.err,
-              HasSubstr("warning: unused-poses: 51 poses were not used: odometry 'wheels', beside "
-                        "poses 'pose'"));
-  expectNear(pointsOfMap(), map);
-
-  const auto slipped = mapOf("both.rawlog", "--set rig.pose_source=wheels");
-  ASSERT_FALSE(slipped.empty());
-  EXPECT_GT(readTumTrajectory(folder() / "out/trajectory.txt")[0].T_world_rig.translation.x(), 0.1);
-  writeTumTrajectory(folder() / "given.txt", recording.poses);
-  expectNear(mapOf("both.rawlog", "--poses given.txt --set rig.pose_source=wheels"), map);
-  EXPECT_THAT(run("map rig.ini both.rawlog --out out --set rig.pose_source=gps").err,
-              HasSubstr("the recording has no poses of the source that [rig] pose_source says, but "
-                        "of poses 'pose', odometry 'wheels'"));
-}
-
 TEST_F(RawlogKinds, AHandEyeTransformAppliesToOdometryToo) {
   std::ofstream(folder() / "up.yaml")
       << "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n";

@@ -18,7 +18,6 @@
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 
 class Evimo2 : public TemporaryFolder {

@@ -190,8 +190,6 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
        "bytes follow the array's header: expected"},
       {"a.npy", npyArray<double>("<f8", "(1, 2)", {1, 2}),
        "a.npy: shape (1, 2): expected N rows of 8"},
-      {"a.npy", npyArray<double>("|O", "(1, 8)", {1}), "descr = ''|O'', Python objects"},
-      {"a.npy", npyArray<double>("<f8", "(9007199254740993,)", {1}), "shape = "},
       {"a.npy", npyArray<double>("<f8", "(1, 8)", {1.5, 1, 2, 3, 0, 0, 0, 3}),
        "a.npy: row 0: qx qy qz qw of length 3"},
       {"a.npy", npyArray<double>("<f8", "(1, 8)", {1e300, 1, 2, 3, 0, 0, 0, 1}),

@@ -6,7 +6,6 @@
 #include <mrpt/obs/CObservationOdometry.h>
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
 #include "plugin/mrpt/pose_observation.h"

@@ -7,7 +7,6 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 #include <string>
@@ -285,15 +284,13 @@ TEST_F(Aedat4, ASeekStartsAtThePacketOfItsTime) {
     parts.cameras[1]->seek(t_us * 1000);
     EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3, packet)) << t_us;
   }
-  // Without an index, and with one that does not fit, all is read.
+  // With an index that does not fit, all is read.
   std::string damaged = recording(Aedat4Compression::kZstd, true);
   damaged[damaged.size() - 100] ^= 1;
-  for (const std::string& bytes : {recording(Aedat4Compression::kZstd, false), damaged}) {
-    writeFile(file(), bytes);
-    RecordingParts parts = open();
-    parts.cameras[0]->seek((kStartUs + 17'500) * 1000);
-    EXPECT_TRUE(readStream(*parts.cameras[0]) == streamEvents(0));
-  }
+  writeFile(file(), damaged);
+  RecordingParts parts = open();
+  parts.cameras[0]->seek((kStartUs + 17'500) * 1000);
+  EXPECT_TRUE(readStream(*parts.cameras[0]) == streamEvents(0));
 }
 
 TEST_F(Aedat4, WrongDataAreErrorsThatNameTheirPosition) {

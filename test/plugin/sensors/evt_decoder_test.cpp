@@ -6,7 +6,6 @@
 
 #include <rapidcheck/gtest.h>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "test/plugin/sensors/evt_words.h"
@@ -151,19 +150,6 @@ TEST(EvtDecoder, AfterAGapNothingIsDeliveredUntilTimeAndRowAreKnown) {
   decoder.reset();
   EXPECT_THAT(timesOf(decoded(decoder, evt3Words({0x2000, 0x8001, 0x6000, 0x0000, 0x2000}))),
               ElementsAre(4096));
-}
-
-TEST(EvtDecoder, AScanTellsTheLastTimeHigh) {
-  std::string evt2;
-  for (const std::uint32_t word : {0x8000'0002U, 0x0000'0000U, 0x8000'0003U}) putWord(evt2, word);
-  for (const auto& [encoding, words, high_us] :
-       {std::tuple(EvtEncoding::kEvt2, evt2, std::int64_t{3 * 64}),
-        std::tuple(EvtEncoding::kEvt3, evt3Words({0x8001, 0x6005, 0x8003, 0x6004}),
-                   std::int64_t{3 * 4096})}) {
-    EvtDecoder decoder(encoding);
-    decoder.scanTime(reinterpret_cast<const std::uint8_t*>(words.data()), words.size());
-    EXPECT_EQ(decoder.timeHighNs(), high_us * 1'000);
-  }
 }
 
 TEST(EvtDecoder, Evt2TimeWrapsAndMayStepBack) {
