@@ -308,7 +308,9 @@ TEST_F(PointCloudFile, NumbersOfEachTypeAreRead) {
     for (const char* wrong : {"1 2 3 0.5\n", "1 2 3 1e3\n"}) {
       EXPECT_THROW(parsePcd(pcd + "ascii\n" + wrong), std::runtime_error) << type.pcd;
     }
-    if (type.pcd[0] == 'U') EXPECT_THROW(parsePcd(pcd + "ascii\n1 2 3 -1\n"), std::runtime_error);
+    if (type.pcd[0] == 'U') {
+      EXPECT_THROW(parsePcd(pcd + "ascii\n1 2 3 -1\n"), std::runtime_error);
+    }
   }
 }
 
