@@ -42,6 +42,7 @@ struct Row {
   PoseMistake found;
   bool one_camera;  // finds it, too
   void (*make)(Recorded&);
+  double shift_s = 0;
 };
 
 const Row kRows[] = {
@@ -74,7 +75,16 @@ const Row kRows[] = {
          pose.t_ns += 200'000'000;
          return pose;
        });
-     }},
+     },
+     0.2},
+    {"poses 0.2 s early", PoseMistake::kTimeShift, true,
+     [](Recorded& recorded) {
+       recorded.change([](StampedPose pose) {
+         pose.t_ns -= 200'000'000;
+         return pose;
+       });
+     },
+     -0.2},
     {"cameras exchanged", PoseMistake::kCamerasSwapped, false,
      [](Recorded& recorded) { std::swap(recorded.sample.events[0], recorded.sample.events[1]); }},
     {"the transform between the cameras inverted", PoseMistake::kStereoInverted, false,
@@ -109,7 +119,7 @@ TEST(PoseCheck, FindsEachMistake) {
       }
       if (row.found == PoseMistake::kTimeShift) {
         // Neighbouring times of the search are 3 ms apart, and the events have noise.
-        EXPECT_NEAR(finding->shift_s, 0.2, 0.02);
+        EXPECT_NEAR(finding->shift_s, row.shift_s, 0.02);
       }
     }
   }
