@@ -208,7 +208,7 @@ TEST_F(MapPageInABrowser, AnFStandsUprightInTheColoursOfTheBar) {
       add(0.00125 * i, 1);
     }
     for (int i = 0; i < 40; ++i) add(0.001 * i, 0);  // enough for the low end of the bar
-    Eigen::Matrix3d R_view_cam;  // columns: x right, y down, z forwards
+    Eigen::Matrix3d R_view_cam;                      // columns: x right, y down, z forwards
     R_view_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
     std::vector<StampedPose> trajectory;
     for (int i = 0; i < kKeyframes; ++i) {

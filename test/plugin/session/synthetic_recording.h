@@ -20,8 +20,8 @@ namespace efm {
 struct SyntheticScene {
   double depth_m = 2;
   double speed_m_s = 0.8;
-  double rest_s = 0;       ///< The rig stands still so long at first.
-  int noise_per_step = 0;  ///< Events at random pixels, of each camera.
+  double rest_s = 0;                    ///< The rig stands still so long at first.
+  int noise_per_step = 0;               ///< Events at random pixels, of each camera.
   std::vector<Eigen::Vector3d> dots{};  ///< In the world; none: random ones in the view.
 };
 
