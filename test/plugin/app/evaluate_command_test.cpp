@@ -21,7 +21,6 @@ using nlohmann::json;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 
 /// A plane before two cameras that move along x: mapped to "out" or "one", with its truth.
 class EvaluateCommand : public AppTest {

@@ -12,7 +12,6 @@ namespace {
 
 using nlohmann::json;
 using testing::AnyOf;
-using testing::Contains;
 using testing::Each;
 using testing::HasSubstr;
 using testing::Not;

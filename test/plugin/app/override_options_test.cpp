@@ -9,7 +9,6 @@
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 

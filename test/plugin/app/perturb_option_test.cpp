@@ -8,7 +8,6 @@
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 
 class PerturbOption : public AppTest {

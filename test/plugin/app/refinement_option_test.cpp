@@ -7,9 +7,7 @@
 namespace efm {
 namespace {
 
-using testing::AllOf;
 using testing::Contains;
-using testing::HasSubstr;
 using testing::Not;
 
 const std::string kRefined = " --set refinement.enabled=true";

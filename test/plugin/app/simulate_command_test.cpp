@@ -19,9 +19,6 @@ using testing::HasSubstr;
 
 class SimulateCommand : public AppTest {
  protected:
-  std::string simulateError(const std::string& arguments) const {
-    return errorOf("simulate " + arguments);
-  }
   void simulate(const std::string& arguments) const {
     const Result result = run("simulate " + arguments);
     EXPECT_EQ(result.status, 0) << arguments << "\n" << result.err;
