@@ -35,6 +35,10 @@ class MrptWindow : public MapWindow {
     }
     changed_.notify_all();
     thread_.join();
+    // MRPT destroys the window's scene in a thread that may outlive main(). A texture that is
+    // released then finds MRPT's static tables gone: those go with `scene_`, before.
+    window_.get3DSceneAndLock() = mrpt::opengl::COpenGLScene::Create();
+    window_.unlockAccess3DScene();
   }
 
   bool appears() const { return window_.wait_for_GL_context(5); }
