@@ -14,14 +14,28 @@ endfunction()
 
 # efm_unity_rooms(<target>): where unity builds are on (CMAKE_UNITY_BUILD), the files of a room are
 # compiled together. Kernel files stay alone: Highway includes each once per instruction set.
-# EFM_SPLIT_LIBRARIES: only those of tests are, so that a change of one file compiles no other.
+# EFM_SPLIT_LIBRARIES: only those of tests are, so that a change of one file compiles no other, and
+# the libraries' headers are compiled before.
 function(efm_unity_rooms target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
   get_target_property(sources ${target} SOURCES)
   string(FIND "${CMAKE_CURRENT_SOURCE_DIR}/" "${PROJECT_SOURCE_DIR}/test/" in_test)
+  set(split OFF)
+  if(EFM_SPLIT_LIBRARIES AND in_test LESS 0)
+    set(split ON)
+    target_precompile_headers(${target} PRIVATE
+      <algorithm> <cmath> <deque> <filesystem> <fstream> <functional> <map> <memory> <optional>
+      <set> <sstream> <stdexcept> <string> <vector> <Eigen/Geometry> <opencv2/core.hpp>)
+    if(target STREQUAL "mrpt-event-fusion" OR target STREQUAL "efm_formats")
+      target_precompile_headers(${target} PRIVATE
+        <fmt/format.h> <mrpt/obs/CObservation.h> <mrpt/serialization/CArchive.h>)
+    endif()
+  endif()
   foreach(source IN LISTS sources)
     get_filename_component(room ${source} DIRECTORY)
-    if(room AND NOT room STREQUAL "kernels" AND NOT (EFM_SPLIT_LIBRARIES AND in_test LESS 0))
+    if(room STREQUAL "kernels")  # with options of their own
+      set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+    elseif(room AND NOT split)
       set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
     endif()
   endforeach()
