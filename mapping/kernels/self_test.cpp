@@ -10,12 +10,7 @@
 #include <random>
 
 #include "mapping/kernels/bilinear_vote.h"
-#include "mapping/kernels/columns.h"
 #include "mapping/kernels/fusion.h"
-#include "mapping/kernels/peaks.h"
-#include "mapping/kernels/tile_resolve.h"
-#include "mapping/kernels/tile_scatter.h"
-#include "mapping/kernels/weighted_ranks.h"
 
 namespace efm::kernels {
 namespace {
@@ -76,8 +71,8 @@ using Cells = std::vector<CellTotal>;
 /// The functions of one kernel for a tile, against plain code.
 class TileTest {
  public:
-  TileTest(VotingKernel kernel, std::uint32_t seed)
-      : scatter_(tileFunctions(kernel)), resolve_(resolveFunctions(kernel)), random_(seed) {}
+  TileTest(const TestedFunctions& functions, std::uint32_t seed)
+      : scatter_(functions.tile), resolve_(functions.resolve), random_(seed) {}
 
   std::vector<std::string> run() {
     gather();
@@ -282,7 +277,7 @@ class TileTest {
   void fillCells() {
     size_ = kMaxRays - 3;
     for (std::size_t i = 0; i < size_; ++i) {
-      memory_->x[i] = random_(0, 3, 4096) * kUnit;
+      memory_->x[i] = random_(61, 64, 4096) * kUnit;
       memory_->y[i] = random_(61, 64, 4096) * kUnit;
       memory_->dx[i] = memory_->dy[i] = 0;
     }
@@ -300,7 +295,8 @@ class TileTest {
 };
 
 /// Peaks of some planes with many equal values.
-std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t pixels) {
+std::vector<float> peaksOf(const TestedFunctions& functions, std::uint32_t seed,
+                           std::size_t pixels) {
   RandomNumbers random(seed);
   std::vector<float> best(pixels, -1.0F);
   std::vector<std::int32_t> plane(pixels, -2);
@@ -310,9 +306,8 @@ std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t 
   std::vector<float> values(pixels);
   for (std::int32_t p = 0; p < 12; ++p) {
     for (float& value : values) value = random(0, 2, 4);
-    peakFunctions(kernel).add(
-        {best.data(), plane.data(), before.data(), after.data(), previous.data()}, p, values.data(),
-        pixels);
+    functions.peaks.add({best.data(), plane.data(), before.data(), after.data(), previous.data()},
+                        p, values.data(), pixels);
   }
   std::vector<float> all = best;
   all.insert(all.end(), plane.begin(), plane.end());
@@ -322,7 +317,7 @@ std::vector<float> peaksOf(VotingKernel kernel, std::uint32_t seed, std::size_t 
 }
 
 /// Sums of columns and ranks of positions; arrays with padding.
-std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n) {
+std::vector<float> sumsOf(const TestedFunctions& functions, std::uint32_t seed, std::size_t n) {
   RandomNumbers random(seed);
   std::vector<std::uint8_t> column(n + kColumnPadding);
   std::vector<float> positions(n + kRankPadding);
@@ -334,8 +329,8 @@ std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n
   }
   std::vector<float> sum(n + kColumnPadding, 0.1F);
   std::vector<float> below(n + kRankPadding, 0.0F);
-  columnFunctions(kernel).add(sum.data(), column.data(), n, 0.3F);
-  rankFunctions(kernel).add(below.data(), positions.data(), weights.data(), n);
+  functions.columns.add(sum.data(), column.data(), n, 0.3F);
+  functions.ranks.add(below.data(), positions.data(), weights.data(), n);
   sum.resize(n);
   sum.insert(sum.end(), below.begin(), below.begin() + static_cast<std::ptrdiff_t>(n));
   return sum;
@@ -343,12 +338,22 @@ std::vector<float> sumsOf(VotingKernel kernel, std::uint32_t seed, std::size_t n
 
 }  // namespace
 
-std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed) {
+TestedFunctions TestedFunctions::of(VotingKernel kernel) {
+  TestedFunctions functions{
+      {}, {}, peakFunctions(kernel), columnFunctions(kernel), rankFunctions(kernel)};
+  if (kernel == VotingKernel::kPlain) return functions;
+  functions.tile = tileFunctions(kernel);
+  functions.resolve = resolveFunctions(kernel);
+  return functions;
+}
+
+std::vector<std::string> selfTest(const TestedFunctions& functions, std::uint32_t seed) {
   std::vector<std::string> failures;
-  if (kernel != VotingKernel::kPlain) failures = TileTest(kernel, seed).run();
-  const auto differs = [&](const auto& function) {
+  if (functions.tile.vote) failures = TileTest(functions, seed).run();
+  const TestedFunctions plain = TestedFunctions::of(VotingKernel::kPlain);
+  const auto differs = [&](const auto& results_of) {
     for (const std::size_t n : {1U, 15U, 16U, 101U}) {
-      if (function(kernel, seed, n) != function(VotingKernel::kPlain, seed, n)) return true;
+      if (results_of(functions, seed, n) != results_of(plain, seed, n)) return true;
     }
     return false;
   };

@@ -5,14 +5,29 @@
 #include <string>
 #include <vector>
 
+#include "mapping/kernels/columns.h"
 #include "mapping/kernels/instruction_set.h"
+#include "mapping/kernels/peaks.h"
+#include "mapping/kernels/tile_resolve.h"
+#include "mapping/kernels/tile_scatter.h"
+#include "mapping/kernels/weighted_ranks.h"
 
 namespace efm::kernels {
 
-/// Compares all functions of a kernel with plain code, on a small random input. Takes some
-/// milliseconds.
-/// @param kernel one of `availableKernels`; the plain one is compared with itself.
+/// What a self-test calls.
+struct TestedFunctions {
+  TileFunctions tile;  ///< Null, with `resolve`, for the plain kernel, which has no tiles.
+  ResolveFunctions resolve;
+  PeakFunctions peaks;
+  ColumnFunctions columns;
+  RankFunctions ranks;
+
+  /// @param kernel one of `availableKernels`.
+  static TestedFunctions of(VotingKernel kernel);
+};
+
+/// Compares functions with plain code, on a small random input. Takes some milliseconds.
 /// @return what differs, one line each; empty where nothing does.
-std::vector<std::string> selfTest(VotingKernel kernel, std::uint32_t seed = 1);
+std::vector<std::string> selfTest(const TestedFunctions& functions, std::uint32_t seed = 1);
 
 }  // namespace efm::kernels

@@ -49,7 +49,8 @@ int printSystem() {
              processorName(), SpaceSweepOptions().threadsOrCores(), cacheSizes());
   bool passed = true;
   for (const VotingKernel kernel : availableKernels()) {
-    const std::vector<std::string> failures = kernels::selfTest(kernel);
+    const std::vector<std::string> failures =
+        kernels::selfTest(kernels::TestedFunctions::of(kernel));
     passed = passed && failures.empty();
     fmt::print("kernel {}: self-test {}{}\n", nameOf(kernel),
                failures.empty() ? "passed" : "FAILED",

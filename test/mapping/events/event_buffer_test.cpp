@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <new>
 #include <vector>
+
+#include "mapping/events/window.h"
+#include "test/memory/failing_allocation.h"
 
 namespace efm::event_buffer_test {
 namespace {
@@ -35,6 +39,39 @@ TEST(EventBuffer, SortsLateEventsWithTheirMarksAndFreesReleasedOnes) {
   EXPECT_EQ(buffer.begin, 0U);
   EXPECT_EQ(buffer.events.size(), 4U);
   EXPECT_EQ(buffer.used, (std::vector<bool>{true, false, false, false}));
+}
+
+TEST(EventBuffer, WithoutMemoryItStaysAsItWas) {
+  EventBuffer buffer;
+  buffer.insert(std::vector<Event>{{10, 0, 0}, {20, 1, 0}, {30, 2, 0}});
+  buffer.used[1] = true;
+  const EventBuffer earlier = buffer;
+  const std::vector<Event> late(100, {15, 3, 0});
+  std::size_t failures = 0;
+  for (bool failed = true; failed; failures += failed ? 1 : 0) {
+    failAllocation(Allocating::kThisThread, failures);
+    failed = false;
+    try {
+      buffer.insert(late);
+    } catch (const std::bad_alloc&) {
+      failed = true;
+    }
+    stopFailing();
+    if (!failed) continue;
+    ASSERT_EQ(buffer.events, earlier.events) << failures;
+    ASSERT_EQ(buffer.used, earlier.used) << failures;
+  }
+  EXPECT_GE(failures, 3U) << "events, marks and the sorting need memory";
+  EXPECT_EQ(buffer.events.size(), 103U);
+}
+
+TEST(TimeLimits, AreInOrderWhereBothAreGiven) {
+  using Limits = TimeLimits;
+  for (const Limits& limits : {Limits{}, {5, {}}, {{}, -5}, {-5, {}}, {{}, 5}, {-6, -5}, {5, 6}}) {
+    EXPECT_NO_THROW(limits.validate());
+  }
+  EXPECT_THROW((Limits{5, 5}.validate()), std::invalid_argument);
+  EXPECT_THROW((Limits{6, 5}.validate()), std::invalid_argument);
 }
 
 }  // namespace

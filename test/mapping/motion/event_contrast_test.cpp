@@ -56,27 +56,31 @@ TEST(EventContrast, TheGradientIsTheNumericOne) {
 }
 
 TEST(EventContrast, IsTheSquareOfTheHarmonicMeanOfSmoothImages) {
-  // One, two and three events of three cameras in one place.
+  // One, two and three events of three cameras in one place: inside, and in the corners of the
+  // view.
   WarpedEvent event;
   event.by_velocity.setZero();
   event.by_inverse_depth.setZero();
-  event.pixel = {30.25F, 20.5F};
-  const std::vector<std::vector<WarpedEvent>> events = {
-      {event}, std::vector<WarpedEvent>(2, event), std::vector<WarpedEvent>(3, event)};
-  cv::Mat1f image = cv::Mat1f::zeros(kView);
-  image(20, 30) = image(21, 30) = 0.375F;
-  image(20, 31) = image(21, 31) = 0.125F;
-  for (const double blur_px : {1.0, 2.0}) {
-    EventContrast contrast(events, kView, kPatchPx);
-    contrast.setBlur(blur_px);
-    const int side = blur_px == 1 ? 7 : 13;  // three standard deviations to either side
-    cv::Mat1f smooth;
-    cv::GaussianBlur(image, smooth, {side, side}, blur_px, blur_px, cv::BORDER_CONSTANT);
-    Eigen::VectorXd gradient;
-    const double mean = 3 / (1.0 + 1.0 / 2 + 1.0 / 3);
-    EXPECT_NEAR(contrast.at(Eigen::VectorXd::Zero(contrast.variables()), gradient),
-                mean * mean * smooth.dot(smooth), 1e-3 * smooth.dot(smooth));
-    EXPECT_TRUE(gradient.isZero());
+  for (const cv::Point& pixel : {cv::Point(30, 20), {0, 0}, {kView.width - 2, kView.height - 2}}) {
+    event.pixel = {static_cast<float>(pixel.x) + 0.25F, static_cast<float>(pixel.y) + 0.5F};
+    const std::vector<std::vector<WarpedEvent>> events = {
+        {event}, std::vector<WarpedEvent>(2, event), std::vector<WarpedEvent>(3, event)};
+    cv::Mat1f image = cv::Mat1f::zeros(kView);
+    image.col(pixel.x).rowRange(pixel.y, pixel.y + 2) = 0.375F;
+    image.col(pixel.x + 1).rowRange(pixel.y, pixel.y + 2) = 0.125F;
+    for (const double blur_px : {1.0, 2.0}) {
+      EventContrast contrast(events, kView, kPatchPx);
+      contrast.setBlur(blur_px);
+      const int side = blur_px == 1 ? 7 : 13;  // three standard deviations to either side
+      cv::Mat1f smooth;
+      cv::GaussianBlur(image, smooth, {side, side}, blur_px, blur_px, cv::BORDER_CONSTANT);
+      Eigen::VectorXd gradient;
+      const double mean = 3 / (1.0 + 1.0 / 2 + 1.0 / 3);
+      EXPECT_NEAR(contrast.at(Eigen::VectorXd::Zero(contrast.variables()), gradient),
+                  mean * mean * smooth.dot(smooth), 1e-3 * smooth.dot(smooth))
+          << pixel;
+      EXPECT_TRUE(gradient.isZero());
+    }
   }
 }
 

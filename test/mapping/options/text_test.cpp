@@ -36,6 +36,8 @@ TEST(NearestName, IsTheNameWithTheFewestWrongLetters) {
       {"mix", rules, "min"},                // the first of two at the same distance
       {"harmoic", rules, "harmonic"},       //
       {"mpa", commands, "map"},             // a swap is one edit: a third of three letters
+      {"dxeth", commands, ""},              // no swap: only one of two letters is the other's
+      {"dpxth", commands, ""},              //
       {"pam", commands, ""},                // two edits are two thirds of three letters
       {"nm_plns", keys, "num_planes"},      // three of ten letters: the limit
       {"planes", keys, ""},                 // four

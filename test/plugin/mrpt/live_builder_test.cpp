@@ -13,8 +13,8 @@
 #include <new>
 #include <set>
 
+#include "test/memory/failing_allocation.h"
 #include "test/plugin/mrpt/live_driver.h"
-#include "test/plugin/session/failing_allocation.h"
 
 namespace efm {
 namespace {

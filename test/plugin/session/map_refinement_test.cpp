@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "failing_allocation.h"
+#include "test/memory/failing_allocation.h"
 #include "test/plugin/recordings/shaken_recording.h"
 #include "test/plugin/session/session_driver.h"
 

@@ -14,8 +14,8 @@
 #include <string>
 #include <vector>
 
-#include "failing_allocation.h"
 #include "plugin/live/input_queue.h"
+#include "test/memory/failing_allocation.h"
 #include "test/plugin/session/session_driver.h"
 
 namespace efm {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "failing_allocation.h"
+#include "test/memory/failing_allocation.h"
 
 #include <algorithm>
 #include <array>
