@@ -135,6 +135,16 @@ TEST(OptionChoice, KeepsTheValuesWhereNothingIsSeen) {
   const FusionMapperOptions survey = surveyOptions(options, 0.7);
   EXPECT_EQ(survey.policy.window_s, 0.7);
   EXPECT_EQ(survey.policy.stride_s, 0.7);
+
+  // One camera that stands still sees no depth, whatever moves before it.
+  const Rig one = EdgeWorld::rig(1);
+  WindowSample still = EdgeWorld().sample(one);
+  Trajectory fixed;
+  for (const StampedPose& pose : still.trajectory.poses()) fixed.add({pose.t_ns, Rigid3()});
+  still.trajectory = fixed;
+  FusionMapperOptions of_still;
+  EXPECT_FALSE(chooseOptions(kAll, one, {still}, std::nullopt, of_still).found_scene);
+  EXPECT_EQ(of_still.keyframe.planes.min_depth_m, before.min_depth_m);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "test/mapping/survey/edge_world.h"
@@ -152,16 +153,44 @@ TEST(PoseCheck, AccusesNoRightPoses) {
 }
 
 TEST(PoseCheck, SaysNothingWithoutParallax) {
-  EdgeWorld turning;
-  turning.T_world_rig = [](double t_s) {
-    return Rigid3{EdgeWorld::handHeld(t_s).rotation, Eigen::Vector3d::Zero()};
-  };
-  Recorded inverted = recorded(2, turning);
-  inverted.change([](StampedPose pose) {
-    return StampedPose{pose.t_ns, pose.T_world_rig.inverse()};
-  });
-  EXPECT_FALSE(inverted.check());
+  static double speed_m_s;  // pieces of half a second: 5 mm to either side of their middle
+  for (const double speed : {0.0, 0.01, 0.02}) {
+    speed_m_s = speed;
+    EdgeWorld turning;
+    turning.T_world_rig = [](double t_s) {
+      return Rigid3{EdgeWorld::handHeld(t_s).rotation, {speed_m_s * t_s, 0, 0}};
+    };
+    Recorded inverted = recorded(2, turning);
+    inverted.change([](StampedPose pose) {
+      return StampedPose{pose.t_ns, pose.T_world_rig.inverse()};
+    });
+    EXPECT_EQ(inverted.check().has_value(), speed > 0.015) << speed;
+  }
   EXPECT_FALSE(checkPoses(EdgeWorld::rig(2), {}, {}));
+}
+
+TEST(PoseCheck, CamerasOfOtherSizesAreNotExchanged) {
+  Recorded uneven = recorded(2);
+  CameraModel& model = uneven.rig.cameras[1].model;
+  model.height -= 30;  // the first camera's events would lie outside
+  auto& events = uneven.sample.events[1];
+  events.erase(std::remove_if(events.begin(), events.end(),
+                              [&](const Event& event) { return event.y >= model.height; }),
+               events.end());
+  EXPECT_FALSE(uneven.check());
+}
+
+TEST(PoseCheck, LooksThroughTheCamerasOfTheMapAlone) {
+  Recorded half_mirrored = recorded(2);
+  const int width = half_mirrored.rig.cameras[0].model.width;
+  for (Event& event : half_mirrored.sample.events[0]) {
+    event.x = static_cast<std::uint16_t>(width - 1 - event.x);
+  }
+  EXPECT_TRUE(half_mirrored.check());
+  FusionMapperOptions options;
+  options.cameras = {1};
+  options.keyframe.reference_camera = 1;
+  EXPECT_FALSE(checkPoses(half_mirrored.rig, {half_mirrored.sample}, options));
 }
 
 }  // namespace
