@@ -235,8 +235,8 @@ def read_set_aside():
                 file = line[6:].strip()
             elif line.startswith("- "):
                 old = line[2:].strip()
-            elif line.startswith("+ "):
-                known.add((file, old, line[2:].strip()))
+            elif line.startswith("+"):
+                known.add((file, old, line[1:].strip()))
     return known
 
 

@@ -96,14 +96,16 @@ TEST(MapConsistency, SupportCountsKeyframesWithAPointInTheVoxelOrNearIt) {
   GlobalCloud cloud(withConsistency(Consistency::kSupport));
   cloud.insert(10, {{{0.21, 0.01, 2.93}, 1.0F}}, viewAt(0));
   EXPECT_EQ(cloud.points()->at(0).support, 1U);
-  cloud.insert(11, wallSeenFrom(viewAt(0), 0, random), viewAt(0));
+  for (const std::uint64_t earlier : {1, 2, 11}) {
+    cloud.insert(earlier, wallSeenFrom(viewAt(0), 0, random), viewAt(0));
+  }
   cloud.insert(18, wallSeenFrom(viewAt(0.1), 0, random), viewAt(0.1));
   cloud.insert(19, wallSeenFrom(viewAt(0.1), 0, random), viewAt(0.1));
   const std::vector<CloudPoint> points = test::worldPoints(*cloud.points());
   const auto lone = std::find_if(points.begin(), points.end(),
                                  [](const auto& p) { return p.p_world.z() < 2.95; });
   ASSERT_NE(lone, points.end());
-  EXPECT_EQ(lone->support, 3U) << "10, 11 and 18; 19 is too far from 10";
+  EXPECT_EQ(lone->support, 4U) << "2, 10, 11 and 18; 1 and 19 are too far from 10";
 }
 
 TEST(MapConsistency, AKeyframeWithoutAPoseIsCheckedAndChecksNoOther) {
