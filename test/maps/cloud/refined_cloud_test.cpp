@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/cloud/refined_cloud.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -175,7 +176,12 @@ TEST(RefinedCloud, RefusesToMoveWhatItDoesNotHaveOrHold) {
     EXPECT_THROW(cloud.move({{0, T_world_ref}}), std::invalid_argument) << "an earlier map's";
     cloud.insert({{{0, 0, 2}, 1}}, {});
     const Poses beyond = {{0, T_world_ref}, {1, T_world_ref}};
-    EXPECT_THROW(cloud.move(movable > 0 ? beyond : Poses{{0, T_world_ref}}), std::invalid_argument);
+    EXPECT_THAT(
+        [&] {
+          cloud.move(movable > 0 ? beyond : Poses{{0, T_world_ref}});
+        },
+        testing::ThrowsMessage<std::invalid_argument>(
+            testing::HasSubstr(movable > 0 ? "not in the cloud" : "are fixed")));
     cloud.applyPending(0);
     EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {})) << "nothing was requested";
     EXPECT_THROW(cloud.insertFixed({}, {}), std::invalid_argument);
@@ -218,6 +224,30 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
     same.insert(k + 1, pointsInWorld(keyframes.points[k], T_world_ref), T_world_ref);
   }
   EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *same.points()));
+}
+
+TEST(RefinedCloud, KeyframesThatNeverMoveSettleToo) {
+  GlobalCloudOptions options = optionsOf(Consistency::kNone);
+  options.voxel_size_m = 0.001;
+  const struct { std::size_t movable, of_earlier_map; } cases[] = {{0, 0}, {0, 2}, {3, 20}};
+  for (const auto& [movable, of_earlier_map] : cases) {
+    std::mt19937 random(6);
+    RefinedCloud cloud(options, movable);
+    GlobalCloud same(options);
+    for (std::size_t k = 0; k < 24; ++k) {
+      const std::vector<ViewPoint> points = randomPoints(random, k < 6 ? 42'000 : 500);
+      const Rigid3 T_world_ref = randomPose(random, 0.1, 0.1);
+      const std::vector<CloudPoint> in_world = pointsInWorld(points, T_world_ref);
+      if (k < of_earlier_map) {
+        cloud.insertFixed(in_world, T_world_ref);
+      } else {
+        cloud.insert(points, T_world_ref);
+      }
+      same.insert(k, in_world, T_world_ref);
+    }
+    EXPECT_GT(cloud.cloud().settledVoxels(), 0U) << movable << ", " << of_earlier_map;
+    EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *same.points()));
+  }
 }
 
 TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARefusedMoveItIsAsBefore) {
