@@ -10,6 +10,7 @@
 #include "edges.h"
 #include "mapping/geometry/angle.h"
 #include "maps/refinement/condensed_graph.h"
+#include "maps/refinement/window_graph.h"
 #include "random_poses.h"
 
 namespace efm {
@@ -151,6 +152,23 @@ TEST(KeyframeGraph, RanksKeyframesByOverlapAndByTheDistanceOfWhatTheySee) {
   EXPECT_EQ(graph.bestOverlaps({2, 4}, 0.4, 9), (Numbers{4}));
   graph.places = {0, 1, 2, 3, 4};
   EXPECT_EQ(graph.nearestViews(), (Numbers{1, 3, 4, 2, 0}));
+}
+
+TEST(WindowGraph, TheErrorOfADenoisedPoseIsTheFirstPosesNoiseAndTheDriftSince) {
+  std::vector<RefinedKeyframe> keyframes;
+  for (const double path_length_m : {0.0, 0.7}) {
+    keyframes.push_back({RegistrationCloud(test::emptyKeyframe(test::smallView()), {}), Rigid3{},
+                         Rigid3{}, Rigid3{}, path_length_m});
+  }
+  WindowGraph window(keyframes, 1);
+  TrackerErrors errors;
+  errors.noise_m = 0.02;
+  window.addTracker(errors);
+  ASSERT_TRUE(window.solve({}));
+  const auto covariance = window.denoisedCovariance({}, 1);
+  ASSERT_TRUE(covariance);
+  const Matrix6d expected = errors.noiseCovariance() + errors.driftCovariance(0.7);
+  EXPECT_TRUE(covariance->isApprox(expected, 1e-6)) << *covariance << "\n" << expected;
 }
 
 }  // namespace
