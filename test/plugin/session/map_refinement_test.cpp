@@ -159,6 +159,10 @@ TEST(MapRefinement, AFailureInTheBackgroundIsCountedAndTheNextKeyframeIsRefined)
       const Rigid3& T_odom_ref = keyframes[number].T_world_ref;
       EXPECT_LT((T_world_ref.translation - T_odom_ref.translation).norm(), 0.05) << number;
     }
+    EXPECT_LT(
+        (disturbed.T_world_ref.at(0).translation - keyframes[0].T_world_ref.translation).norm(),
+        1e-9)
+        << "the first keeps its pose by the tracker";
     EXPECT_EQ(disturbed.state.waiting, 0U);
     EXPECT_GE(disturbed.state.counts.registered + 1, undisturbed.state.counts.registered);
     if (disturbed.state.failures == 0) continue;  // the standard library sorts with less memory
