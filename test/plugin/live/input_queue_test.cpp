@@ -98,10 +98,13 @@ TEST(EventBudget, CoverEndsBeforeTheEventsThatAreHeld) {
   EXPECT_EQ(*covered_ns, kIntervalNs);
 }
 
-CameraPacket packet(int camera, std::int64_t t_ns, std::size_t events) {
+/// @param t_ns of the last event; the first one is earlier.
+CameraPacket packet(int camera, std::int64_t t_ns, std::size_t count) {
   RigCamera calibration;
   calibration.model = {120, 90, 100.0, 100.0, 59.5, 44.5, DistortionModel::kNone, {}};
-  return {camera, calibration, std::vector<Event>(events, Event{t_ns, 0, 0, true}), std::nullopt};
+  std::vector<Event> events(count, Event{t_ns, 0, 0, true});
+  if (count > 1) events.front().t_ns -= 3;
+  return {camera, calibration, events, std::nullopt};
 }
 
 RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllPoses, ()) {
