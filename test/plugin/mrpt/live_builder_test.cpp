@@ -64,6 +64,21 @@ TEST(LiveBuilder, OldKeyframesLeaveTheSimplemapAndStayInTheMap) {
   expectSameBits(builder.points(), all.points());
 }
 
+TEST(LiveBuilder, EachSnapshotHasMoreThanTheOneBefore) {
+  CEventFusionMapBuilder builder(liveOptions());
+  std::mutex mutex;
+  std::vector<std::size_t> keyframes;
+  builder.setMapCallback([&](const std::shared_ptr<const MapSnapshot>& map) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    keyframes.push_back(map->trajectory.size());
+  });
+  feedPatiently(builder, observationsOf(SyntheticRecording(2)));
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));  // some dozen times their cost
+  const std::lock_guard<std::mutex> lock(mutex);
+  ASSERT_GT(keyframes.size(), 1U);
+  for (std::size_t i = 1; i < keyframes.size(); ++i) EXPECT_GT(keyframes[i], keyframes[i - 1]);
+}
+
 /// Stops the mapping's thread in the callback of its first keyframe.
 class Stop {
  public:

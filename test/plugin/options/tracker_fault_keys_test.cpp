@@ -51,6 +51,12 @@ TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
   EXPECT_NO_THROW(faults.validate());
 }
 
+TEST(TrackerFaultKeys, ATimeMayBeAsFarAsClocksGo) {
+  for (const char* text : {"4611686018.427387902", "-4611686018.427387902"}) {
+    EXPECT_TRUE(faultsOf({std::string("keyframe_start_s=") + text}).perturbation.keyframe.start_ns);
+  }
+}
+
 TEST(TrackerFaultKeys, AreListedWithValuesThatReadBack) {
   const auto list = listTrackerFaults(faultsOf(kAll));
   EXPECT_EQ(list.size(), kAll.size());
@@ -71,6 +77,8 @@ TEST(TrackerFaultKeys, ErrorsNameKeyValueAndWhatWasExpected) {
       {"latency_s=11", "latency_s = 11: must be a number, 0 to 10"},
       {"keyframe_s=0", "keyframe_s = 0: must be a number, 0.001"},
       {"keyframe_start_s=soon", "must be a time in seconds"},
+      {"keyframe_start_s=4611686018.427387903", "within 4.6e9 s of 0"},  // half of the largest
+      {"keyframe_start_s=-4611686018.427387903", "within 4.6e9 s of 0"},
       {"seed=-2", "seed = -2: must be a whole number from 0"},
       {"seed=1.5", "seed = 1.5: must be a whole number from 0"},
   };

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "test/plugin/message_of.h"
 #include "test/plugin/pictures/sketch.h"
@@ -112,6 +113,16 @@ TEST(CurvePlot, MayBeLogarithmicOrHaveEqualUnits) {
 )");
   EXPECT_EQ(drawCurves({}).size(), cv::Size(640, 480));
   EXPECT_NO_THROW(drawCurves(plotOf({"", {{0, INFINITY}, {1, 1e300}}, CurveStyle::kLine, kRed})));
+}
+
+TEST(CurvePlot, ACurveLeavesThePlotOnItsWayToAPointFarOutside) {
+  Curve steep{"", {{0, 0}, {0.1, 100}}, CurveStyle::kLine, kRed};
+  const cv::Mat3b picture = drawCurves(plotOf(steep));
+  cv::Mat1b red;
+  cv::inRange(picture, kRed, kRed, red);
+  const cv::Rect drawn = cv::boundingRect(red);
+  EXPECT_GT(drawn.height, 100) << "from the foot of the plot to its top";
+  EXPECT_LT(drawn.width, 6);
 }
 
 TEST(CurvePlot, AWrongPlotIsAnErrorThatNamesIt) {

@@ -166,6 +166,8 @@ TEST(KeyframePictures, JoinBlocksOfPixelsToTheNearestDepthAndTheSumOfEvents) {
   depth(0, 11) = 2;
   events(0, 20) = {1, 0};
   events(1, 21) = {0, 2};
+  const int last = KeyframePictures::kMaxWidth - 1;
+  events(1, 2 * last + 1) = {3, 0};
   const DepthPlanesOptions limits;
   KeyframePictures pictures(limits);
   pictures.add(depth, events);
@@ -182,6 +184,7 @@ TEST(KeyframePictures, JoinBlocksOfPixelsToTheNearestDepthAndTheSumOfEvents) {
             depthPicture((cv::Mat1f(1, 1) << 2), limits, Palette::kBrightToDark)(0, 0));
   EXPECT_EQ(depth_picture(0, 10), white);
   EXPECT_EQ(event_picture(0, 10), eventPicture(cv::Mat_<cv::Vec2i>(1, 1, cv::Vec2i(1, 2)))(0, 0));
+  EXPECT_EQ(event_picture(0, last), eventPicture(cv::Mat_<cv::Vec2i>(1, 1, cv::Vec2i(3, 0)))(0, 0));
   EXPECT_EQ(event_picture(0, 5), white);
   EXPECT_THAT(pictures.pictures().at(1).events, IsEmpty());
 }
