@@ -76,11 +76,6 @@ Hdf5File::Hdf5File(std::filesystem::path file) : path_(std::move(file)) {
 
 bool Hdf5File::has(const std::string& path) const {
   const Hdf5Quiet quiet;
-  for (std::size_t end = 0; end != std::string::npos;) {
-    end = path.find('/', end + 1);
-    const std::string prefix = path.substr(0, end);
-    if (prefix != "/" && H5Lexists(id(), prefix.c_str(), H5P_DEFAULT) <= 0) return false;
-  }
   return H5Oexists_by_name(id(), path.c_str(), H5P_DEFAULT) > 0;
 }
 

@@ -279,6 +279,7 @@ TEST_F(Aedat4, ASeekStartsAtThePacketOfItsTime) {
                                      {kStartUs, 0},
                                      {kStartUs + 17'500, 17},
                                      {kStartUs + 17'995, 18},
+                                     {packetEvents(3, 17).back().t_ns / 1000, 17},
                                      {kStartUs + 90'000, kPackets}}) {
     RecordingParts parts = open();
     parts.cameras[1]->seek(t_us * 1000);

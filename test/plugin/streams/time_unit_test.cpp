@@ -56,9 +56,9 @@ TEST(TimeUnit, IsThatOfTheOptionOrOfTheValuesWhereTheyLeaveNoDoubt) {
       {2000, -1.7e18, 1e4, -9, nullptr},
       {2000, 0.5, 1e-5, 0, nullptr},
       {2000, 0.5, 0, 0, nullptr},
-      {1000, 0.5, 1.0 / 31, 0, nullptr},
-      {1000, 0.5, 1.0 / 29, 0,
-       "in e: 1000 events from 0.5 on take 34.4 of a unit that is not seconds: probably ms"},
+      {1000, 0.5, 33.28 / 999, 0, nullptr},  // 30 events in a second
+      {1000, 0.5, 33.32 / 999, 0,
+       "in e: 1000 events from 0.5 on take 33.3 of a unit that is not seconds: probably ms"},
       {999, 0.5, 1.0 / 29, 0, nullptr},
       {5, 4.6e9 + 0.5, 1, 0, nullptr},
       {5, 4.7e9 + 0.5, 1, 0, "not seconds"},
