@@ -135,7 +135,8 @@ TEST_F(PoseFile, ArraysAreVectorsOrMatricesWithTimes) {
   writeZip(folder() / "any_names.npz", {{"b.npy", poses}, {"a.npy", t}});
   writeZip(folder() / "matrices.npz",
            {{"T_world_body.npy", npyArray("<f8", "(2, 4, 4)", matrices)}, {"stamps.npy", t}});
-  writeZip(folder() / "others.npz", {{"other.npy", t},
+  const std::string other = npyArray("<f8", "(2,)", std::vector<double>{3, 4});
+  writeZip(folder() / "others.npz", {{"other.npy", other},
                                      {"poses.npy", poses},
                                      {"timestamps.npy", t},
                                      {"meta.npy", npyArray("|O", "(1,)", std::vector<double>{0})}});
