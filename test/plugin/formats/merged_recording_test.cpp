@@ -164,6 +164,40 @@ TEST_F(MergedRecordingTest, EventsBeforeAWrongLineComeBeforeTheError) {
                                  "pose@17", "pose@90"));
 }
 
+/// A camera whose file tells what is missing.
+class LossyStream : public EventStream {
+ public:
+  explicit LossyStream(std::uint64_t lost) : lost_(lost) {}
+  bool read(std::vector<Event>& events) override {
+    events.clear();
+    return false;
+  }
+  std::string positionOf(std::size_t) const override { return name(); }
+  std::string name() const override { return "lossy"; }
+  double progress() const override { return 1; }
+  std::uint64_t lostPackets() const override { return lost_; }
+  std::uint64_t undatedEvents() const override { return 10 * lost_; }
+  std::vector<Warning> warnings() const override { return {{"time-unit", std::to_string(lost_)}}; }
+
+ private:
+  std::uint64_t lost_;
+};
+
+TEST_F(MergedRecordingTest, ItsLossesAreThoseOfAllCameras) {
+  Rig rig;
+  rig.cameras.resize(2);
+  std::vector<EventPackets> cameras;
+  for (const std::uint64_t lost : {2, 3}) {
+    cameras.emplace_back(std::make_unique<LossyStream>(lost), CameraSize{240, 180});
+  }
+  const MergedRecording recording(std::move(rig), std::move(cameras));
+  const RecordingCounts counts = recording.counts();
+  EXPECT_EQ(counts.lost_packets, 5U);
+  EXPECT_EQ(counts.undated_events, 50U);
+  ASSERT_EQ(counts.warnings.size(), 2U);
+  EXPECT_EQ(counts.warnings[1].text, "3");
+}
+
 TEST_F(MergedRecordingTest, ProgressGoesFromTheBeginningToOne) {
   std::string text;
   for (int i = 0; i < 400'000; ++i) text += std::to_string(i / 1000) + ".5 1 2 0\n";  // 5 MB
