@@ -95,16 +95,16 @@ TEST(EventContrast, CamerasMustMeet) {
 }
 
 TEST(EventContrast, OnlyPatchesWithEventsAreVariables) {
-  auto events = randomEvents(10, 2, 7);
-  const Eigen::Vector2f pixels[] = {{5, 5},   {15.9F, 5}, {16, 5}, {5, 16},
-                                    {-3, -3}, {99, 99},   {59, 44}};
-  for (std::size_t i = 0; i < 7; ++i) {
+  auto events = randomEvents(10, 2, 8);
+  const Eigen::Vector2f pixels[] = {{5, 5},   {15.9F, 5}, {16, 5},  {5, 16},
+                                    {-3, -3}, {99, 99},   {59, 44}, {46, 44}};
+  for (std::size_t i = 0; i < 8; ++i) {
     events[0][i].pixel = pixels[i];
     events[1][i].pixel = {20, 5};
   }
   const EventContrast contrast(events, kView, kPatchPx);
-  EXPECT_EQ(contrast.variables(), 6 + 4);
-  EXPECT_EQ(contrast.eventsInPatch(), (std::vector<std::size_t>{3, 1 + 7, 1, 2}));
+  EXPECT_EQ(contrast.variables(), 6 + 5);
+  EXPECT_EQ(contrast.eventsInPatch(), (std::vector<std::size_t>{3, 1 + 8, 1, 2, 1}));
 }
 
 }  // namespace

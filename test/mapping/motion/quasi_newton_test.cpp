@@ -47,5 +47,15 @@ TEST(QuasiNewton, StaysOnAFlatFunction) {
   EXPECT_EQ(minimise(flat, Eigen::Vector2d(3, 4)), Eigen::VectorXd(Eigen::Vector2d(3, 4)));
 }
 
+TEST(QuasiNewton, GoesOnDownASlopeWithoutCurvature) {
+  const auto slope = [](const Eigen::VectorXd& at, Eigen::VectorXd& gradient) {
+    gradient = Eigen::Vector2d(1, 0);
+    return at.x();
+  };
+  QuasiNewtonOptions options;
+  options.max_evaluations = 10;
+  EXPECT_LT(minimise(slope, Eigen::Vector2d(3, 4), options).x(), 2.5) << "a tenth each time";
+}
+
 }  // namespace
 }  // namespace efm::quasi_newton_test

@@ -107,20 +107,22 @@ TEST(WarpedEvents, ADepthBehindTheCameraIsNotOnItsRay) {
   const Warping warping;
   RigCamera ahead = warping.camera;
   ahead.T_rig_cam = ahead.T_rig_cam * Rigid3{Eigen::Quaterniond::Identity(), {0.2, 0, 1}};
-  const Event event{warping.window.t_ref_ns, 16, 18, true};
+  ReferenceView view = warping.view;
+  view.fy *= 1.6;  // pixels need not be square
+  const Event event{warping.window.t_ref_ns, 16, 30, true};
   const Eigen::Vector2d ray = warping.undistortion.ray(event.x, event.y);
   for (const double from_camera_m : {-0.2, 0.6}) {
-    const Eigen::Vector2d pixel = warping.view.project(
-        Eigen::Vector3d(from_camera_m * ray.homogeneous()) + Eigen::Vector3d(0.2, 0, 1));
+    const Eigen::Vector2d pixel = view.project(Eigen::Vector3d(from_camera_m * ray.homogeneous()) +
+                                               Eigen::Vector3d(0.2, 0, 1));
     cv::Mat1f depth = cv::Mat1f::zeros(36, 48);
     depth(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) =
         static_cast<float>(1 + from_camera_m);
-    const NearestDepths depths(depth, 2.5);
+    const NearestDepths depths(depth, 1.5);
     const auto found =
         warpEvents({0, &ahead, &warping.undistortion, std::vector<Event>{event}}, 1,
                    warping.recording.trajectory,
-                   {warping.T_world_ref.inverse(), warping.view, inversePlanes(warping.planes),
-                    &depths, warping.window.t_ref_ns});
+                   {warping.T_world_ref.inverse(), view, inversePlanes(warping.planes), &depths,
+                    warping.window.t_ref_ns});
     EXPECT_EQ(found.size(), from_camera_m > 0 ? 1U : 0U) << from_camera_m;
   }
 }
