@@ -4,8 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstring>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -23,206 +22,140 @@ TEST(SelfTest, EveryKernelOfThisProcessorPasses) {
   }
 }
 
+/// What a fault changes in the calls of a kernel's functions.
+struct Fault {
+  const char* name = "";
+  std::vector<std::string> said;  ///< By the self-test.
+  std::function<void(MovingRays& rays)> before_vote = [](auto&) {};
+  /// @param end one past the last full cell.
+  std::function<void(std::uint64_t* cells, FullCell* full, FullCell*& end)> after_vote =
+      [](auto*, auto*, auto*&) {};
+  std::function<void(const MovingRays& rays, std::size_t& size)> after_gather = [](auto&, auto&) {};
+  std::function<void(std::uint64_t* cells, float& last, std::uint64_t& units)> after_resolve =
+      [](auto*, auto&, auto&) {};
+  std::function<void(float& last, std::uint64_t units[2])> after_mean = [](auto&, auto*) {};
+  std::function<void(float value, float best, std::int32_t plane, std::int32_t& last)> after_peak =
+      [](auto, auto, auto, auto&) {};
+  float to_column = 0, to_rank = 0;  ///< Added to the last number.
+};
+
 const TestedFunctions& good() {
   static const TestedFunctions kGood = TestedFunctions::of(fastestKernel());
   return kGood;
 }
 
-std::size_t gather(const BinnedRay* bin, std::size_t count, const GatherRequest& request,
-                   const MovingRays& rays) {
-  return good().tile.gather(bin, count, request, rays);
-}
-FullCell* vote(const MovingRays& rays, float to_plane, const CellWindow& window, FullCell* full) {
-  return good().tile.vote(rays, to_plane, window, full);
-}
-std::uint64_t all(std::uint64_t* cells, int width, int height, float* values) {
-  return good().resolve.all(cells, width, height, values);
-}
-constexpr std::uint64_t kTopBit = 0x8000;
+Fault fault;  // of the functions below
 
-/// A function with one fault, and what the self-test says of it.
-struct Fault {
-  const char* name;
-  void (*put)(TestedFunctions& functions);
-  std::vector<std::string> said;
-};
-
-constexpr char kFull[] = "vote: the full cells";
-constexpr char kSums[] = "vote: the sums of the cells";
-constexpr char kCleared[] = "resolve: the cells are cleared";
-constexpr char kWeights[] = "resolve: the weights of two inputs";
-constexpr char kMean[] = "resolve: the mean of two inputs";
-constexpr char kPeaks[] = "peaks: the largest values";
-constexpr char kColumns[] = "columns and ranks: the sums";
-
-/// The mean of two inputs with a fault, by `Steps`: a member of ResolveFunctions.
-template <ResolveFunctions::AddPair ResolveFunctions::*Steps>
-std::vector<Fault> faultsOfMean(const char* name) {
-  return {
-      {name,
-       [](TestedFunctions& functions) {
-         functions.resolve.*Steps = [](const CellBuffer& first, const CellBuffer& second, int width,
-                                       int height, float* sum, std::uint64_t units[2]) {
-           const int pixels = (good().resolve.*Steps)(first, second, width, height, sum, units);
-           ++units[1];
-           return pixels;
-         };
-       },
-       {kWeights}},
-      {name,
-       [](TestedFunctions& functions) {
-         functions.resolve.*Steps = [](const CellBuffer& first, const CellBuffer& second, int width,
-                                       int height, float* sum, std::uint64_t units[2]) {
-           const int pixels = (good().resolve.*Steps)(first, second, width, height, sum, units);
-           sum[width * height - 1] += 1;
-           return pixels;
-         };
-       },
-       {kMean}}};
+template <ResolveFunctions::AddPair ResolveFunctions::*mean>
+int meanWithFault(const CellBuffer& first, const CellBuffer& second, int width, int height,
+                  float* sum, std::uint64_t units[2]) {
+  const int pixels = (good().resolve.*mean)(first, second, width, height, sum, units);
+  fault.after_mean(sum[width * height - 1], units);
+  return pixels;
 }
 
-std::vector<Fault> faults() {
-  std::vector<Fault> faults = {
-      {"the last ray is not gathered",
-       [](TestedFunctions& functions) {
-         functions.tile.gather = [](const BinnedRay* bin, std::size_t count,
-                                    const GatherRequest& request, const MovingRays& rays) {
-           return gather(bin, count, request, rays) - 1;
-         };
-       },
-       {"gather: the number of rays near a tile"}},
-      {"a ray is gathered elsewhere",
-       [](TestedFunctions& functions) {
-         functions.tile.gather = [](const BinnedRay* bin, std::size_t count,
-                                    const GatherRequest& request, const MovingRays& rays) {
-           const std::size_t size = gather(bin, count, request, rays);
-           rays.dy[size - 1] += 1;
-           return size;
-         };
-       },
-       {"gather: the rays near a tile"}},
-      {"the last rays do not vote",
-       [](TestedFunctions& functions) {
-         functions.tile.vote = [](const MovingRays& rays, float to_plane, const CellWindow& window,
-                                  FullCell* full) {
-           const MovingRays fewer{rays.x, rays.y, rays.dx, rays.dy, rays.size - kRayPadding};
-           return vote(fewer, to_plane, window, full);
-         };
-       },
-       {kSums, "resolve: the sum of weights", "resolve: the densities"}},
-      {"a full cell is listed where none is",
-       [](TestedFunctions& functions) {
-         functions.tile.vote = [](const MovingRays& rays, float to_plane, const CellWindow& window,
-                                  FullCell* full) {
-           full = vote(rays, to_plane, window, full);
-           *full++ = {};
-           return full;
-         };
-       },
-       {kFull}},
-      {"a full cell is elsewhere",
-       [](TestedFunctions& functions) {
-         functions.tile.vote = [](const MovingRays& rays, float to_plane, const CellWindow& window,
-                                  FullCell* full) {
-           FullCell* const end = vote(rays, to_plane, window, full);
-           for (FullCell* cell = full; cell != end; ++cell) cell->index = kTileCells * kTileCells;
-           return end;
-         };
-       },
-       {kFull, kSums}},
-      {"the sums of a full cell are wrong",
-       [](TestedFunctions& functions) {
-         functions.tile.vote = [](const MovingRays& rays, float to_plane, const CellWindow& window,
-                                  FullCell* full) {
-           FullCell* const end = vote(rays, to_plane, window, full);
-           if (end != full) ++full->sums;
-           return end;
-         };
-       },
-       {kSums}},
-      {"full cells stay in the tile",  // the sums are right
-       [](TestedFunctions& functions) {
-         functions.tile.vote = [](const MovingRays& rays, float to_plane, const CellWindow& window,
-                                  FullCell* full) {
-           FullCell* end = vote(rays, to_plane, window, full);
-           if (end == full) return end;
-           std::uint64_t& cell = window.tile.cells[(end - 1)->index];
-           if ((cell & kTopBit) != 0 || ((end - 1)->sums & kTopBit) == 0) return end;
-           cell += kTopBit;
-           (end - 1)->sums -= kTopBit;
-           return end;
-         };
-       },
-       {kFull}},
-      {"the sum of weights",
-       [](TestedFunctions& functions) {
-         functions.resolve.all = [](std::uint64_t* cells, int width, int height, float* values) {
-           return all(cells, width, height, values) + 1;
-         };
-       },
-       {"resolve: the sum of weights", kWeights}},
-      {"the last cell is not cleared",
-       [](TestedFunctions& functions) {
-         functions.resolve.all = [](std::uint64_t* cells, int width, int height, float* values) {
-           const std::uint64_t units = all(cells, width, height, values);
-           cells[kTileCells * (kTileCells + 2) - 1] = 1;
-           return units;
-         };
-       },
-       {kCleared}},
-      {"the last density",
-       [](TestedFunctions& functions) {
-         functions.resolve.all = [](std::uint64_t* cells, int width, int height, float* values) {
-           const std::uint64_t units = all(cells, width, height, values);
-           values[width * height - 1] += 0.02F;
-           return units;
-         };
-       },
-       {"resolve: the densities", kMean}},
-      {"of equal peaks the last",
-       [](TestedFunctions& functions) {
-         functions.peaks.add = [](const PeakArrays& peaks, std::int32_t plane, const float* values,
-                                  std::size_t n) {
-           const std::vector<float> best(peaks.best, peaks.best + n);
-           good().peaks.add(peaks, plane, values, n);
-           if (values[n - 1] == best[n - 1]) peaks.plane[n - 1] = plane;
-         };
-       },
-       {kPeaks}},
-      {"the last plane of a column",
-       [](TestedFunctions& functions) {
-         functions.columns.add = [](float* sum, const std::uint8_t* roots, std::size_t planes,
-                                    float unit) {
-           good().columns.add(sum, roots, planes, unit);
-           sum[planes - 1] += 1;
-         };
-       },
-       {kColumns}},
-      {"the weight below the last position",
-       [](TestedFunctions& functions) {
-         functions.ranks.add = [](float* below, const float* positions, const float* weights,
-                                  std::size_t n) {
-           good().ranks.add(below, positions, weights, n);
-           below[n - 1] += 1;
-         };
-       },
-       {kColumns}},
+TestedFunctions withFault() {
+  TestedFunctions functions;
+  functions.tile.gather = [](const BinnedRay* bin, std::size_t count, const GatherRequest& request,
+                             const MovingRays& rays) {
+    std::size_t size = good().tile.gather(bin, count, request, rays);
+    fault.after_gather(rays, size);
+    return size;
   };
-  for (const std::vector<Fault>& more :
-       {faultsOfMean<&ResolveFunctions::addMin>("minimum"),
-        faultsOfMean<&ResolveFunctions::addHarmonic>("harmonic mean"),
-        faultsOfMean<&ResolveFunctions::addGeometric>("geometric mean")}) {
-    faults.insert(faults.end(), more.begin(), more.end());
-  }
+  functions.tile.vote = [](const MovingRays& rays, float to_plane, const CellWindow& window,
+                           FullCell* full) {
+    MovingRays changed = rays;
+    fault.before_vote(changed);
+    FullCell* end = good().tile.vote(changed, to_plane, window, full);
+    fault.after_vote(window.tile.cells, full, end);
+    return end;
+  };
+  functions.resolve.all = [](std::uint64_t* cells, int width, int height, float* values) {
+    std::uint64_t units = good().resolve.all(cells, width, height, values);
+    fault.after_resolve(cells, values[width * height - 1], units);
+    return units;
+  };
+  functions.resolve.addMin = meanWithFault<&ResolveFunctions::addMin>;
+  functions.resolve.addHarmonic = meanWithFault<&ResolveFunctions::addHarmonic>;
+  functions.resolve.addGeometric = meanWithFault<&ResolveFunctions::addGeometric>;
+  functions.peaks.add = [](const PeakArrays& peaks, std::int32_t plane, const float* values,
+                           std::size_t n) {
+    const float best = peaks.best[n - 1];
+    good().peaks.add(peaks, plane, values, n);
+    fault.after_peak(values[n - 1], best, plane, peaks.plane[n - 1]);
+  };
+  functions.columns.add = [](float* sum, const std::uint8_t* roots, std::size_t n, float unit) {
+    good().columns.add(sum, roots, n, unit);
+    sum[n - 1] += fault.to_column;
+  };
+  functions.ranks.add = [](float* below, const float* positions, const float* weights,
+                           std::size_t n) {
+    good().ranks.add(below, positions, weights, n);
+    below[n - 1] += fault.to_rank;
+  };
+  return functions;
+}
+
+std::vector<Fault> allFaults() {
+  const char* const full_cells = "vote: the full cells";
+  const char* const sums = "vote: the sums of the cells";
+  const char* const weights = "resolve: the sum of weights";
+  const char* const densities = "resolve: the densities";
+  const char* const of_two = "resolve: the weights of two inputs";
+  const char* const mean = "resolve: the mean of two inputs";
+  std::vector<Fault> faults;
+  const auto add = [&](const char* name, const std::vector<std::string>& said) -> Fault& {
+    faults.push_back({name, said});
+    return faults.back();
+  };
+  add("none", {});
+  add("the last ray is not gathered", {"gather: the number of rays near a tile"}).after_gather =
+      [](auto&, std::size_t& size) { --size; };
+  add("a ray is gathered elsewhere", {"gather: the rays near a tile"}).after_gather =
+      [](const MovingRays& rays, std::size_t size) { rays.dy[size - 1] += 1; };
+  add("the last rays do not vote", {sums, weights, densities}).before_vote = [](MovingRays& rays) {
+    rays.size -= kRayPadding;
+  };
+  add("a full cell is listed where none is", {full_cells}).after_vote =
+      [](auto*, auto*, FullCell*& end) { *end++ = {}; };
+  add("full cells are elsewhere", {full_cells, sums}).after_vote = [](auto*, FullCell* full,
+                                                                      FullCell* end) {
+    for (; full != end; ++full) full->index = kTileCells * kTileCells;
+  };
+  add("the sums of a full cell are wrong", {sums}).after_vote =
+      [](auto*, FullCell* full, FullCell* end) { full->sums += full == end ? 0 : 1; };
+  add("a full cell stays in the tile", {full_cells}).after_vote =
+      [](std::uint64_t* cells, FullCell* full, FullCell* end) {
+        constexpr std::uint64_t kTopBit = 0x8000;
+        if (full == end || ((end - 1)->sums & kTopBit) == 0) return;
+        cells[(end - 1)->index] += kTopBit;  // the sums are right
+        (end - 1)->sums -= kTopBit;
+      };
+  add("one weight too many", {weights, of_two}).after_resolve =
+      [](auto*, auto&, std::uint64_t& units) { ++units; };
+  add("the last cell is not cleared", {"resolve: the cells are cleared"}).after_resolve =
+      [](std::uint64_t* cells, auto&, auto&) { cells[kTileCells * (kTileCells + 2) - 1] = 1; };
+  add("the last density", {densities, mean}).after_resolve = [](auto*, float& last, auto&) {
+    last += 0.02F;
+  };
+  add("a weight of the second input", {of_two}).after_mean = [](auto&, std::uint64_t units[2]) {
+    ++units[1];
+  };
+  add("the last mean", {mean}).after_mean = [](float& last, auto*) { last += 1; };
+  add("of equal peaks the last", {"peaks: the largest values"}).after_peak =
+      [](float value, float best, std::int32_t plane, std::int32_t& last) {
+        if (value == best) last = plane;
+      };
+  add("a column's last plane", {"columns and ranks: the sums"}).to_column = 1;
+  add("the last rank", {"columns and ranks: the sums"}).to_rank = 1;
   return faults;
 }
 
 TEST(SelfTest, FindsEachFault) {
   if (fastestKernel() == VotingKernel::kPlain) GTEST_SKIP() << "the plain kernel has no tiles";
-  for (const Fault& fault : faults()) {
-    TestedFunctions functions = good();
-    fault.put(functions);
-    EXPECT_THAT(selfTest(functions), ::testing::UnorderedElementsAreArray(fault.said))
+  for (const Fault& each : allFaults()) {
+    fault = each;
+    EXPECT_THAT(selfTest(withFault()), ::testing::UnorderedElementsAreArray(fault.said))
         << fault.name;
   }
 }

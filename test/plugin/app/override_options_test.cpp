@@ -10,7 +10,6 @@ namespace efm {
 namespace {
 
 using testing::HasSubstr;
-using testing::Not;
 
 namespace fs = std::filesystem;
 
@@ -137,25 +136,6 @@ TEST_F(OverrideOptions, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning
       << "there is no other";
 }
 
-TEST_F(OverrideOptions, AnOptionFileThatReplacesAUzhFoldersCalibrationIsAWarning) {
-  fs::create_directory(folder() / "uzh");
-  fs::rename(folder() / "data" / "cam0" / "events.txt", folder() / "uzh" / "events.txt");
-  fs::rename(folder() / "data" / "poses.txt", folder() / "uzh" / "groundtruth.txt");
-  write("uzh/calib.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
-  write("same.txt", "100 100 59.5 44.5 0 0 0 0 0\n");
-  write("other.txt", "100 101 59.5 44.5 0 0 0 0 0\n");
-  const std::string map = "map rig.ini uzh --out out ";
-  const auto warning =
-      HasSubstr("warning: calibration-replaced: other.txt replaced another calibration");
-  EXPECT_THAT(run(map + "--set rig.calibration=same.txt").err, Not(HasSubstr("replaced")));
-  EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, warning);
-  EXPECT_THAT(run(map + "--calibration other.txt").err, Not(HasSubstr("replaced")));
-  ASSERT_EQ(run("import uzh --out r.rawlog").status, 0);
-  EXPECT_THAT(run("map rig.ini r.rawlog --out of_r --set rig.calibration=other.txt").err, warning);
-  fs::remove(folder() / "uzh" / "calib.txt");
-  EXPECT_THAT(run(map + "--set rig.calibration=other.txt").err, Not(HasSubstr("replaced")));
-}
-
 TEST_F(OverrideOptions, TimeOffsetsMoveACamerasEventsToThePosesClock) {
   SyntheticRecording recording;
   write(recording);
@@ -171,27 +151,6 @@ TEST_F(OverrideOptions, TimeOffsetsMoveACamerasEventsToThePosesClock) {
 }
 
 // --- Real recordings -----------------------------------------------------------------------------
-
-TEST_F(OverrideOptions, SliderDepthWithExternalPosesAndCalibrationMakesTheSameMap) {
-  const fs::path slider = kSharedData / "slider_depth";
-  if (!fs::exists(slider)) GTEST_SKIP() << slider << " is not there";
-  fs::create_directory(folder() / "bare");
-  for (const char* name : {"events.txt", "images.txt", "images"}) {
-    fs::create_symlink(fs::canonical(slider / name), folder() / "bare" / name);
-  }
-  const std::string config = EFM_SOURCE_DIR "/config/davis240c_slider.ini";
-  const std::string whole = "'" + slider.string() + "'";
-  const std::string poses = " --poses '" + (slider / "groundtruth.txt").string() + "'";
-  const std::string calibration = " --calibration '" + (slider / "calib.txt").string() + "'";
-
-  EXPECT_THAT(errorOf("map '" + config + "' bare --out out" + calibration),
-              HasSubstr("bare: no poses: expected groundtruth.txt, or --poses FILE"));
-  EXPECT_THAT(errorOf("map '" + config + "' bare --out out" + poses),
-              HasSubstr("bare: no calibration: expected calib.txt, or --calibration FILE"));
-  ASSERT_EQ(run("map '" + config + "' " + whole + " --out whole").status, 0);
-  ASSERT_EQ(run("map '" + config + "' bare --out bare_out" + poses + calibration).status, 0);
-  EXPECT_EQ(contentOf("whole/map.pcd"), contentOf("bare_out/map.pcd"));
-}
 
 TEST_F(OverrideOptions, RealTrajectoriesArePoses) {
   for (const char* name : {"rpg_eccv18_desk.txt", "mvsec_indoor_flying1.txt", "tumvie_desk2.txt",
