@@ -15,7 +15,6 @@
 namespace efm::keyframe_mapper_test {
 namespace {
 
-using test::RandomScene;
 using test::same;
 using ::testing::AllOf;
 using ::testing::ElementsAre;

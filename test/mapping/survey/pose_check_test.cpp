@@ -153,8 +153,8 @@ TEST(PoseCheck, AccusesNoRightPoses) {
 }
 
 TEST(PoseCheck, SaysNothingWithoutParallax) {
-  static double speed_m_s;  // pieces of half a second: 5 mm to either side of their middle
-  for (const double speed : {0.0, 0.01, 0.02}) {
+  static double speed_m_s;
+  for (const double speed : {0.0, 0.01, 0.02}) {  // 5 mm to either side of a piece's middle
     speed_m_s = speed;
     EdgeWorld turning;
     turning.T_world_rig = [](double t_s) {

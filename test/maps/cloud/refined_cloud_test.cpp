@@ -229,8 +229,8 @@ TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
 TEST(RefinedCloud, KeyframesThatNeverMoveSettleToo) {
   GlobalCloudOptions options = optionsOf(Consistency::kNone);
   options.voxel_size_m = 0.001;
-  const struct { std::size_t movable, of_earlier_map; } cases[] = {{0, 0}, {0, 2}, {3, 20}};
-  for (const auto& [movable, of_earlier_map] : cases) {
+  using Case = std::pair<std::size_t, std::size_t>;
+  for (const auto& [movable, of_earlier_map] : {Case{0, 0}, {0, 2}, {3, 20}}) {
     std::mt19937 random(6);
     RefinedCloud cloud(options, movable);
     GlobalCloud same(options);
@@ -238,11 +238,8 @@ TEST(RefinedCloud, KeyframesThatNeverMoveSettleToo) {
       const std::vector<ViewPoint> points = randomPoints(random, k < 6 ? 42'000 : 500);
       const Rigid3 T_world_ref = randomPose(random, 0.1, 0.1);
       const std::vector<CloudPoint> in_world = pointsInWorld(points, T_world_ref);
-      if (k < of_earlier_map) {
-        cloud.insertFixed(in_world, T_world_ref);
-      } else {
-        cloud.insert(points, T_world_ref);
-      }
+      k < of_earlier_map ? cloud.insertFixed(in_world, T_world_ref)
+                         : cloud.insert(points, T_world_ref);
       same.insert(k, in_world, T_world_ref);
     }
     EXPECT_GT(cloud.cloud().settledVoxels(), 0U) << movable << ", " << of_earlier_map;

@@ -3,7 +3,6 @@
 
 #include <regex>
 
-#include "test/paths.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {
@@ -12,8 +11,6 @@ namespace {
 using testing::HasSubstr;
 
 namespace fs = std::filesystem;
-
-const fs::path kSharedData = EFM_SHARED_DATA;
 
 class OverrideOptions : public AppTest {
  protected:
@@ -144,24 +141,8 @@ TEST_F(OverrideOptions, TimeOffsetsMoveACamerasEventsToThePosesClock) {
   write(recording);
   EXPECT_NE(mapOf("data"), map);
   EXPECT_EQ(mapOf("data --set rig.time_offsets_s=0,-0.042"), map);
-  EXPECT_THAT(errorOf("map rig.ini data --out out --set rig.time_offsets_s=0"),
-              HasSubstr("time_offsets_s (how many) = 1: must be one per camera"));
   EXPECT_THAT(errorOf("map rig.ini data --out out --set rig.time_offsets_s=0,0,0"),
               HasSubstr("time_offsets_s (how many) = 3: must be one per camera"));
-}
-
-// --- Real recordings -----------------------------------------------------------------------------
-
-TEST_F(OverrideOptions, RealTrajectoriesArePoses) {
-  for (const char* name : {"rpg_eccv18_desk.txt", "mvsec_indoor_flying1.txt", "tumvie_desk2.txt",
-                           "dsec_zurich_city_04.txt"}) {
-    const fs::path trajectory = kSharedData / "trajectories" / name;
-    if (!fs::exists(trajectory)) GTEST_SKIP() << trajectory << " is not there";
-    const std::size_t poses = readTumTrajectory(trajectory).size();
-    const Result result = run("info data --poses '" + trajectory.string() + "'");
-    EXPECT_EQ(result.status, 0) << result.err;
-    EXPECT_THAT(result.out, HasSubstr(std::to_string(poses) + " poses from"));
-  }
 }
 
 }  // namespace

@@ -241,47 +241,34 @@ TEST_F(Hdf5Events, ASeekGoesToTheFirstEventOfItsTimeOrOfItsMillisecondInTheIndex
   Columns columns;
   columns.t = {0, 500, 999, 1'000, 1'000, 2'500, 2'500, 4'000};  // us
   columns.x = columns.y = columns.p = Numbers(8, 1);
-  struct Case {
+  const struct {
     std::optional<Numbers> index;
-    std::vector<std::pair<std::int64_t, int>> first_events;  // of times in ns
-  };
-  const std::vector<Case> cases = {
+    Numbers times_ns;
+    std::vector<int> first_events;  // of the times
+  } cases[] = {
       {std::nullopt,
-       {{-1'000'000, 0},
-        {0, 0},
-        {1, 1},
-        {500'000, 1},
-        {999'000, 2},
-        {999'001, 3},
-        {1'000'000, 3},
-        {1'000'001, 5},
-        {2'500'000, 5},
-        {2'500'001, 7},
-        {4'000'000, 7},
-        {4'000'001, 8}}},
+       {-1'000'000, 0, 1, 500'000, 999'000, 999'001, 1'000'000, 1'000'001, 2'500'000, 2'500'001,
+        4'000'000, 4'000'001},
+       {0, 0, 1, 1, 2, 3, 3, 5, 5, 7, 7, 8}},
       {Numbers{0, 3, 5, 7, 7},
-       {{-1'000'000, 0},
-        {999'999, 0},
-        {1'000'000, 3},
-        {1'999'999, 3},
-        {2'000'000, 5},
-        {3'000'000, 7},
-        {4'000'000, 7},
-        {9'000'000, 7}}},
+       {-1'000'000, 999'999, 1'000'000, 1'999'999, 2'000'000, 3'000'000, 4'000'000, 9'000'000},
+       {0, 0, 3, 3, 5, 7, 7, 7}},
       // An index that is too early is used; others are not: the events are searched.
-      {Numbers{0, 1, 3}, {{1'000'000, 1}, {1'000'001, 1}, {3'000'000, 3}}},
-      {Numbers{1, 4, 6}, {{0, 0}, {500'000, 1}, {1'000'000, 3}, {2'500'000, 5}}},
-      {Numbers{8, 8, 8}, {{500'000, 1}, {2'500'000, 5}, {4'000'000, 7}, {4'000'001, 8}}},
-      {Numbers{-1, 9, 99}, {{0, 0}, {1'000'000, 3}, {2'500'000, 5}, {4'000'001, 8}}},
-      {Numbers{}, {{999'000, 2}, {4'000'001, 8}}},
+      {Numbers{0, 1, 3}, {1'000'000, 1'000'001, 3'000'000}, {1, 1, 3}},
+      {Numbers{1, 4, 6}, {0, 500'000, 1'000'000, 2'500'000}, {0, 1, 3, 5}},
+      {Numbers{8, 8, 8}, {500'000, 2'500'000, 4'000'000, 4'000'001}, {1, 5, 7, 8}},
+      {Numbers{-1, 9, 99}, {0, 1'000'000, 2'500'000, 4'000'001}, {0, 3, 5, 8}},
+      {Numbers{}, {999'000, 4'000'001}, {2, 8}},
   };
   for (const Numbers& offset : {Numbers{}, Numbers{7'000'123}, Numbers{-20'000}}) {
     columns.offset = offset;
     const std::int64_t offset_ns = offset.empty() ? 0 : offset[0] * 1'000;
-    for (const auto& [index, first_events] : cases) {
+    for (const auto& [index, times_ns, first_events] : cases) {
       columns.index = index;
       write(columns);
-      for (const auto& [t_ns, first] : first_events) {
+      for (std::size_t i = 0; i < times_ns.size(); ++i) {
+        const std::int64_t t_ns = times_ns[i];
+        const int first = first_events[i];
         const RecordingParts parts = openHdf5({file()}, {});
         parts.cameras[0]->seek(t_ns + offset_ns);
         std::vector<Event> events;

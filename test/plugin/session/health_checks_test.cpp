@@ -129,8 +129,7 @@ const std::vector<Fault> kFaults = {
      "clock-overlap: the poses cover 0.0 % of"},
     {"a lost tracker", [](auto& r) { r.poses.erase(r.poses.begin() + 51, r.poses.begin() + 90); },
      "pose-gap: the largest gap between two poses is 0.4 s, after 10.500000000 s (+0.498 s): "
-     "events "
-     "in gaps of more than 0.25 s are not used"},
+     "events in gaps of more than 0.25 s are not used"},
     {"no motion", keepStill,
      "no-motion: the poses move by at most 0 m and 0 degrees within a window: depth needs a shift "
      "of 0.005 m or more for points at 0.5 m;"},

@@ -59,20 +59,6 @@ TEST(ThicknessOf, IsTheStandardDeviationOfNormalNoise) {
   EXPECT_NEAR(thickness.thickness_m, 0.02, 0.0005);
 }
 
-TEST(ThicknessOf, DoesNotSeeAWallThatStandsElsewhereAsAWhole) {
-  const Wall wall = wallFacing(wallsOf(testRoom()), Vector3d::UnitX());
-  const WallThickness thickness = thicknessOf(
-      wall, pointsAcross(wall, [](RandomNumbers& r) { return 0.1 + 0.02 * r.normal(); }));
-  EXPECT_NEAR(thickness.thickness_m, 0.02, 0.0005);
-}
-
-TEST(ThicknessOf, AWallThatStandsTwiceIsAsThickAsHalfTheDistance) {
-  const Wall wall = wallFacing(wallsOf(testRoom()), Vector3d::UnitX());
-  const WallThickness thickness = thicknessOf(
-      wall, pointsAcross(wall, [](RandomNumbers& r) { return r.uniform() < 0.5 ? -0.1 : 0.1; }));
-  EXPECT_NEAR(thickness.thickness_m, 0.1, 1e-9);
-}
-
 TEST(ThicknessOf, LeavesOutWhatIsFarOrAtABorderOrNearestToAnotherSurface) {
   const std::vector<Wall> walls = wallsOf(testRoom());
   const Wall wall = wallFacing(walls, Vector3d::UnitX());
