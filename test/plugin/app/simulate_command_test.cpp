@@ -47,7 +47,7 @@ TEST_F(SimulateCommand, WritesTheGivenRig) {
   writeRigAndTrajectory();
   simulate(
       "--scene room --trajectory walk.txt --calibration rig.yaml --start 0.2 --duration 0.1 "
-      "--noise-hz 20 --mismatch 0.05 --out sim");
+      "--noise-hz 20 --mismatch 0.05 --refractory-us 2000 --out sim");
   const Rig given = readCamchain(folder() / "rig.yaml");
   const Rig written = readCamchain(folder() / "sim/camchain.yaml");
   ASSERT_EQ(written.cameras.size(), 3U);

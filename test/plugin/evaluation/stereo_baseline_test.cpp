@@ -44,7 +44,7 @@ TEST_F(FindStereoBaseline, TheRunsReportComesFirst) {
     const auto base = find(estimate, "data");
     ASSERT_TRUE(base) << estimate;
     EXPECT_EQ(base->focal_px, 200.5);
-    EXPECT_EQ(base->baseline_m, 0.1);
+    EXPECT_NEAR(base->focalBaseline(), 20.05, 1e-12);
     EXPECT_THAT(base->source, HasSubstr("report.json"));
   }
 }
