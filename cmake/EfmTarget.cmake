@@ -33,9 +33,9 @@ function(efm_unity_rooms target)
   endif()
   foreach(source IN LISTS sources)
     get_filename_component(room ${source} DIRECTORY)
-    if(room STREQUAL "kernels")  # with options of their own
+    if(split AND room STREQUAL "kernels")  # with options of their own
       set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
-    elseif(room AND NOT split)
+    elseif(room AND NOT room STREQUAL "kernels" AND NOT split)
       set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
     endif()
   endforeach()

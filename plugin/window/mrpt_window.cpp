@@ -35,8 +35,8 @@ class MrptWindow : public MapWindow {
     }
     changed_.notify_all();
     thread_.join();
-    // MRPT destroys the window's scene in a thread that may outlive main(). A texture that is
-    // released then finds MRPT's static tables gone: those go with `scene_`, before.
+    // MRPT destroys the window's scene in a thread that may outlive main(), when the table of its
+    // textures is gone. So the window gets an empty scene, and `scene_` releases the textures.
     window_.get3DSceneAndLock() = mrpt::opengl::COpenGLScene::Create();
     window_.unlockAccess3DScene();
   }

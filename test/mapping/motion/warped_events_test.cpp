@@ -24,8 +24,9 @@ struct Warping {
   Rigid3 T_world_ref = recording.trajectory.poseAt(window.t_ref_ns).value() * camera.T_rig_cam;
 
   std::vector<WarpedEvent> warp(const cv::Mat1f& depth, const Trajectory& trajectory,
-                                EventSpan events, std::size_t every = 1) const {
-    const NearestDepths depths(depth, 0.5);
+                                EventSpan events, std::size_t every = 1,
+                                double radius_px = 0.5) const {
+    const NearestDepths depths(depth, radius_px);
     return warpEvents(
         {0, &camera, &undistortion, events}, every, trajectory,
         {T_world_ref.inverse(), view, inversePlanes(planes), &depths, window.t_ref_ns});
@@ -104,26 +105,22 @@ TEST(WarpedEvents, OfSeveralDepthsOnItsRayAnEventHasTheNearestToAPixelWithIt) {
 }
 
 TEST(WarpedEvents, ADepthBehindTheCameraIsNotOnItsRay) {
-  const Warping warping;
-  RigCamera ahead = warping.camera;
-  ahead.T_rig_cam = ahead.T_rig_cam * Rigid3{Eigen::Quaterniond::Identity(), {0.2, 0, 1}};
-  ReferenceView view = warping.view;
-  view.fy *= 1.6;  // pixels need not be square
-  const Event event{warping.window.t_ref_ns, 16, 30, true};
-  const Eigen::Vector2d ray = warping.undistortion.ray(event.x, event.y);
+  Warping warping;
+  const Eigen::Vector3d ahead(0.2, 0, 1);
+  Rigid3& T_rig_cam = warping.recording.rig.cameras.front().T_rig_cam;
+  T_rig_cam = T_rig_cam * Rigid3{Eigen::Quaterniond::Identity(), ahead};
+  warping.view.fy *= 1.6;  // pixels need not be square
+  const std::vector<Event> one = {{warping.window.t_ref_ns, 16, 30, true}};
+  const Eigen::Vector2d ray = warping.undistortion.ray(16, 30);
   for (const double from_camera_m : {-0.2, 0.6}) {
-    const Eigen::Vector2d pixel = view.project(Eigen::Vector3d(from_camera_m * ray.homogeneous()) +
-                                               Eigen::Vector3d(0.2, 0, 1));
+    const Eigen::Vector2d pixel =
+        warping.view.project(Eigen::Vector3d(from_camera_m * ray.homogeneous()) + ahead);
     cv::Mat1f depth = cv::Mat1f::zeros(36, 48);
     depth(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) =
         static_cast<float>(1 + from_camera_m);
-    const NearestDepths depths(depth, 1.5);
-    const auto found =
-        warpEvents({0, &ahead, &warping.undistortion, std::vector<Event>{event}}, 1,
-                   warping.recording.trajectory,
-                   {warping.T_world_ref.inverse(), view, inversePlanes(warping.planes), &depths,
-                    warping.window.t_ref_ns});
-    EXPECT_EQ(found.size(), from_camera_m > 0 ? 1U : 0U) << from_camera_m;
+    EXPECT_EQ(warping.warp(depth, warping.recording.trajectory, one, 1, 1.5).size(),
+              from_camera_m > 0 ? 1U : 0U)
+        << from_camera_m;
   }
 }
 
