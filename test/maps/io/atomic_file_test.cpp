@@ -119,6 +119,8 @@ TEST_F(AtomicFileTest, ANewFolderLeavesThoseOfOthers) {
   }
   EXPECT_THAT(names(), testing::ElementsAre(unfinished, "new"));
   EXPECT_EQ(contentOf(folder / "new" / "a.txt"), "text");
+  EXPECT_EQ(fs::status(folder / "new").permissions(),
+            fs::status(folder / unfinished).permissions());
   EXPECT_EQ(contentOf(folder / unfinished / "precious.txt"), "x");
 }
 

@@ -403,7 +403,7 @@ TEST_F(PointCloudFile, ThatIsMalformedSaysWhereAndWhatWasExpected) {
       {"", "line 1: the file ends: expected a line of a PCD header"},
       {"FIELDS x y", "line 1: 'FIELDS x y', then the file ends"},
       {"ply\n", "line 1: 'ply': expected one of VERSION FIELDS"},
-      {pcd + "DATA ascii\n1 2 banana\n", "line 8: z 'banana': expected a number"},
+      {pcd + "DATA ascii\n1 2 3banana\n", "line 8: z '3banana': expected a number"},
       {pcd + "DATA ascii\n1 2\n", "line 8: point 1 has 2 numbers: expected 3"},
       {pcd + "DATA ascii\n1 2 3\n4 5 6\n", "more bytes: expected the end"},
       {pcd + "DATA ascii\n", "line 8: the file ends: expected point 1 of 1"},

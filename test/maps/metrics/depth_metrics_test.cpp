@@ -49,6 +49,7 @@ TEST(DepthErrors, MeanOverMapsCountsEachMapTheSameAndEmptyOnesNot) {
   expectMeasures(valuesOf(mean), expected);
   EXPECT_FALSE(meanOfErrors({a, depthErrors({{1, 1}})}).bad_pix_3px.has_value());
   EXPECT_EQ(meanOfErrors({}).points, 0U);
+  expectMeasures(valuesOf(meanOfErrors({})), valuesOf(depthErrors({})));
 }
 
 TEST(DepthErrors, BadPixelsExceedTheLimitInPixelsAndFivePercent) {

@@ -32,10 +32,10 @@ TEST(PairDepths, TruthFartherThanTheLimitCountsAsNone) {
 }
 
 TEST(PairDepths, ToleranceTakesTheTruthNearestInInverseDepth) {
-  // Around the middle pixel: 1 m and 4 m. |1/2 - 1/1| = 0.5, |1/2 - 1/4| = 0.25, although 1 m is
-  // the nearer one in depth.
-  const cv::Mat1f estimate = (cv::Mat1f(1, 3) << 0, 2, 0);
-  const cv::Mat1f truth = (cv::Mat1f(1, 3) << 1, 9, 4);
+  // Around the pixel: 1 m and 4 m. |1/2 - 1/1| = 0.5, |1/2 - 1/4| = 0.25, although 1 m is the
+  // nearer one in depth. 3 m is at the end of the row before.
+  const cv::Mat1f estimate = (cv::Mat1f(2, 3) << 0, 0, 0, 2, 0, 0);
+  const cv::Mat1f truth = (cv::Mat1f(2, 3) << 1, 0, 3, 9, 4, 0);
 
   EXPECT_EQ(pairDepths(estimate, truth, {0})[0].truth_m, 9);
   EXPECT_EQ(pairDepths(estimate, truth, {1})[0].truth_m, 4);

@@ -101,27 +101,27 @@ TEST(RegistrationCloud, MeasuresCertaintyByDepthNotByItsInverse) {
 TEST(RegistrationCloud, AnEdgeIsLongAlongItselfAndUncertainAlongTheRay) {
   KeyframeDepthMap keyframe = emptyKeyframe(smallView());
   keyframe.view.cy = 60;  // rays of row 60 lie in the plane y = 0
-  const float sigma = 0.004F;
-  for (int x = 10; x < 150; ++x) put(keyframe, x, 60, 2, sigma);
-  RegistrationCloudOptions options;
-  const RegistrationCloud cloud(keyframe, options);
-  int looked_at = 0;
-  for (const RegistrationPoint& point : cloud.points()) {
-    const double column = keyframe.view.project(point.p_ref.cast<double>()).x();
-    if (column < 13 || column > 146) continue;  // ends
-    ++looked_at;
-    // Seven adjacent pixels of 2 m / 130 have a variance of 4. The position has a sigma of half a
-    // pixel; the depth has 6 sigmas of 2 m times 2 m times sigma along the ray.
-    const double pixel_m = 2.0 / 130;
-    Eigen::Matrix3d expected = std::pow(0.5 * pixel_m, 2) * Eigen::Matrix3d::Identity();
-    expected(0, 0) += 4 * pixel_m * pixel_m;
-    expected(0, 0) += std::pow(100 * pixel_m, 2);  // not measured along an edge
-    const Eigen::Vector3d along = point.p_ref.cast<double>() * 6 * 2 * sigma;
-    expected += along * along.transpose();
-    EXPECT_LT((point.covariance.cast<double>() - expected).cwiseAbs().maxCoeff(), 1e-6)
-        << column;  // floats
+  for (const float sigma : {0.004F, 0.0F}) {
+    for (int x = 10; x < 150; ++x) put(keyframe, x, 60, 2, sigma);
+    const RegistrationCloud cloud(keyframe, {});
+    int looked_at = 0;
+    for (const RegistrationPoint& point : cloud.points()) {
+      const double column = keyframe.view.project(point.p_ref.cast<double>()).x();
+      if (column < 13 || column > 146) continue;  // ends
+      ++looked_at;
+      // Seven adjacent pixels of 2 m / 130 have a variance of 4. The position has a sigma of half a
+      // pixel; the depth has 6 sigmas of 2 m times 2 m times sigma along the ray.
+      const double pixel_m = 2.0 / 130;
+      Eigen::Matrix3d expected = std::pow(0.5 * pixel_m, 2) * Eigen::Matrix3d::Identity();
+      expected(0, 0) += 4 * pixel_m * pixel_m;
+      expected(0, 0) += std::pow(100 * pixel_m, 2);  // not measured along an edge
+      const Eigen::Vector3d along = point.p_ref.cast<double>() * 6 * 2 * sigma;
+      expected += along * along.transpose();
+      EXPECT_LT((point.covariance.cast<double>() - expected).cwiseAbs().maxCoeff(), 1e-6)
+          << column;  // floats
+    }
+    EXPECT_EQ(looked_at, 134) << sigma;
   }
-  EXPECT_EQ(looked_at, 134);
 }
 
 TEST(RegistrationCloud, AnEdgeBehindIsNotPartOfANeighbourhood) {

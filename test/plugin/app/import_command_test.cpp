@@ -126,7 +126,7 @@ TEST_F(ImportCommand, TheTruthOfAFolderIsExportedWithIt) {
   write("data/depth/a.tiff", "first");
   write("data/depth/b.tiff", "second");
   EXPECT_THAT(run("info data").out, HasSubstr("truth: 2 depth maps of camera 0"));
-  ASSERT_EQ(run("export data --to folder --out text --t0 10.2").status, 0);
+  ASSERT_EQ(run("export data --to folder --out text --t0 10.3").status, 0);
   EXPECT_EQ(contentOf("text/depth/index.txt"), "10.300000000 cam0_10.300000000.tiff\n");
   EXPECT_EQ(contentOf("text/depth/cam0_10.300000000.tiff"), "second");
   write("data/depth/index.txt", "10.1 a.tiff\nlater b.tiff\n");
