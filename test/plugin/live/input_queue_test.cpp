@@ -192,6 +192,7 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   LiveOptions options;
   options.max_event_rate = 1000;
   InputQueue queue(options);
+  EXPECT_TRUE(queue.wait(InputQueue::Clock::now()).packets.empty()) << "it waits no longer";
   queue.add(packet(0, 5, 30));
   EXPECT_EQ(queue.counts().at(0).held, 30U);
   queue.end();
@@ -201,7 +202,6 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   ASSERT_EQ(batch.packets.size(), 2U);
   EXPECT_EQ(batch.packets[1].events.size(), 10U);
   EXPECT_EQ(queue.counts().at(0).thinned, 20U);
-  EXPECT_EQ(queue.counts().at(0).received, 60U);
   EXPECT_EQ(queue.counts().at(0).after_end, 30U);
   EXPECT_EQ(queue.counts().at(0).queued, 0U);
   queue.skip(packet(0, 7, 5));
