@@ -9,13 +9,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "maps/io/new_folder.h"
+#include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -29,10 +29,6 @@ class AtomicFileTest : public TemporaryFolder {
  protected:
   static void writeText(const fs::path& path, const std::string& text) {
     writeAtomically(path, [&](const fs::path& temporary) { std::ofstream(temporary) << text; });
-  }
-  static std::string contentOf(const fs::path& path) {
-    std::ifstream file(path);
-    return std::string(std::istreambuf_iterator<char>(file), {});
   }
   static std::string errorOf(const fs::path& path) {
     return messageOf([&] { writeText(path, "text"); });
@@ -53,17 +49,17 @@ TEST_F(AtomicFileTest, TheOneBeforeStandsUntilTheNewOneIsWhole) {
   writeText(folder / "a.txt", "one");
   writeAtomically(folder / "a.txt", [&](const fs::path& temporary) {
     std::ofstream(temporary) << "tw";
-    EXPECT_EQ(contentOf(folder / "a.txt"), "one");
+    EXPECT_EQ(readText(folder / "a.txt"), "one");
     std::ofstream(temporary) << "two";
   });
-  EXPECT_EQ(contentOf(folder / "a.txt"), "two");
+  EXPECT_EQ(readText(folder / "a.txt"), "two");
   const auto fail_half_way = [](const fs::path& temporary) {
     std::ofstream(temporary) << "th";
     throw std::runtime_error("the pen is empty");
   };
   EXPECT_THAT(messageOf([&] { writeAtomically(folder / "a.txt", fail_half_way); }),
               HasSubstr("a.txt: the pen is empty"));
-  EXPECT_EQ(contentOf(folder / "a.txt"), "two");
+  EXPECT_EQ(readText(folder / "a.txt"), "two");
   EXPECT_THAT(names(), testing::ElementsAre("a.txt"));
 }
 
@@ -95,12 +91,12 @@ TEST_F(AtomicFileTest, FilesOfOthersStay) {
     std::ofstream(second.temporary()) << "second";
     std::ofstream(first.temporary()) << "first";
     second.replace();
-    EXPECT_EQ(contentOf(folder / "a.txt"), "second");
+    EXPECT_EQ(readText(folder / "a.txt"), "second");
     std::ofstream(folder / ("a.partial-" + own + "-3.txt")) << "of another process, by now";
   }
   first.replace();
-  EXPECT_EQ(contentOf(folder / "a.txt"), "first");
-  for (const std::string& name : others) EXPECT_EQ(contentOf(folder / name), name);
+  EXPECT_EQ(readText(folder / "a.txt"), "first");
+  for (const std::string& name : others) EXPECT_EQ(readText(folder / name), name);
   others.insert(others.end(), {"a.partial-" + own + "-3.txt", "a.txt"});
   EXPECT_THAT(names(), testing::UnorderedElementsAreArray(others));
 }
@@ -118,10 +114,10 @@ TEST_F(AtomicFileTest, ANewFolderLeavesThoseOfOthers) {
     made.finish();
   }
   EXPECT_THAT(names(), testing::ElementsAre(unfinished, "new"));
-  EXPECT_EQ(contentOf(folder / "new" / "a.txt"), "text");
+  EXPECT_EQ(readText(folder / "new" / "a.txt"), "text");
   EXPECT_EQ(fs::status(folder / "new").permissions(),
             fs::status(folder / unfinished).permissions());
-  EXPECT_EQ(contentOf(folder / unfinished / "precious.txt"), "x");
+  EXPECT_EQ(readText(folder / unfinished / "precious.txt"), "x");
 }
 
 TEST_F(AtomicFileTest, AnErrorNamesTheFolderThatCannotBeMade) {
@@ -154,7 +150,7 @@ TEST_F(AtomicFileTest, TheTargetOfALinkIsReplacedAndTheLinkStays) {
   fs::create_symlink("real/a.txt", folder / "relative.txt");  // nothing there yet
   fs::create_symlink(folder / "relative.txt", folder / "absolute.txt");
   writeText(folder / "absolute.txt", "text");
-  EXPECT_EQ(contentOf(folder / "real" / "a.txt"), "text");
+  EXPECT_EQ(readText(folder / "real" / "a.txt"), "text");
   EXPECT_TRUE(fs::is_symlink(folder / "relative.txt"));
   EXPECT_TRUE(fs::is_symlink(folder / "absolute.txt"));
 }

@@ -454,10 +454,9 @@ TEST(OptionReader, AnErrorOfTwoValuesBeginsWithTheOneThatWasGivenLast) {
       "--set dsi.min_depth_m=20: contradicts rig.ini:2: [dsi] max_depth_m = 10, which " + must);
   EXPECT_EQ(error(file, {"dsi.min_depth_m=20", "dsi.max_depth_m=15"}),
             "--set dsi.max_depth_m=15: " + must + " (--set dsi.min_depth_m=20)");
-  EXPECT_EQ(
-      error("[dsi]\nmax_depth_m = 1\nmin_depth_m = 10\n", {"dsi.num_planes=9"}),
-      "rig.ini:3: [dsi] min_depth_m = 10: contradicts rig.ini:2: [dsi] max_depth_m = 1, which " +
-          must);
+  EXPECT_EQ(error("", {"refinement.max_points=7000", "dsi.num_planes=9"}),
+            "--set refinement.max_points=7000: contradicts default: [refinement] max_map_points = "
+            "6000, which must be from max_points to 1000000");
   // Not the other limit, which is auto.
   for (const char* const value : {"-3", "0", "0.0001", "0.001"}) {
     const std::string set = std::string("dsi.max_depth_m=") + value;

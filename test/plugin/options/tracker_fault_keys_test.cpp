@@ -29,7 +29,7 @@ const std::vector<std::string> kAll = {"noise_m=0.01",
                                        "latency_s=0.3",
                                        "drop=0.1",
                                        "gaps_hz=2",
-                                       "gap_s=0.25",
+                                       "gap_s=1e6",
                                        "seed=7"};
 
 TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
@@ -45,7 +45,7 @@ TEST(TrackerFaultKeys, AreMetresDegreesAndSeconds) {
   EXPECT_EQ(faults.latency_ns, 300'000'000);
   EXPECT_EQ(faults.dropouts.drop_probability, 0.1);
   EXPECT_EQ(faults.dropouts.random_gaps_hz, 2);
-  EXPECT_EQ(faults.dropouts.random_gap_s, 0.25);
+  EXPECT_EQ(faults.dropouts.random_gap_s, 1e6);
   EXPECT_EQ(faults.perturbation.seed, 7U);
   EXPECT_EQ(faults.dropouts.seed, 7U);
   EXPECT_NO_THROW(faults.validate());
@@ -58,14 +58,14 @@ TEST(TrackerFaultKeys, ATimeMayBeAsFarAsClocksGo) {
 }
 
 TEST(TrackerFaultKeys, AreListedWithValuesThatReadBack) {
-  const auto list = listTrackerFaults(faultsOf(kAll));
-  EXPECT_EQ(list.size(), kAll.size());
-  TrackerFaults again;
-  for (const auto& [key, value] : list) setTrackerFault(key + "=" + textOf(value), again);
-  EXPECT_EQ(again.perturbation.keyframe.start_ns, 1'700'000'000'123'456'789);
-  EXPECT_NEAR(again.perturbation.noise_rad, faultsOf(kAll).perturbation.noise_rad, 1e-15);
-  EXPECT_EQ(again.latency_ns, 300'000'000);
+  EXPECT_EQ(listTrackerFaults(faultsOf(kAll)).size(), kAll.size());
   EXPECT_EQ(listTrackerFaults({}).size(), kAll.size() - 2) << "without what is not given";
+  for (const TrackerFaults& faults : {faultsOf(kAll), TrackerFaults{}}) {
+    const auto list = listTrackerFaults(faults);
+    TrackerFaults again;
+    for (const auto& [key, value] : list) setTrackerFault(key + "=" + textOf(value), again);
+    EXPECT_EQ(listTrackerFaults(again), list);
+  }
 }
 
 TEST(TrackerFaultKeys, ErrorsNameKeyValueAndWhatWasExpected) {

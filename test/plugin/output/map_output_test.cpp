@@ -11,10 +11,10 @@
 #include <cstring>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 
 #include "maps/io/atomic_file.h"
 #include "plugin/output/npy_file.h"
+#include "test/plugin/formats/files.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
@@ -23,13 +23,6 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-std::string contentOf(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 /// 4 x 3 pixels, one of which has a depth.
 KeyframeDepthMap smallKeyframe(std::int64_t t_ref_ns) {
@@ -69,7 +62,7 @@ TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
   EXPECT_EQ(sizeOf("depth.png"), cv::Size(4, 3));
   EXPECT_EQ(sizeOf("confidence.png"), cv::Size(4, 3));
   output.writeTrajectory("trajectory.txt", {{small.window.t_ref_ns, small.T_world_ref}});
-  EXPECT_THAT(contentOf(folder() / "out" / "trajectory.txt"),
+  EXPECT_THAT(readText(folder() / "out" / "trajectory.txt"),
               HasSubstr("1700000000.123456789 1 2 3 0 0 0 1\n"));
 }
 
@@ -101,13 +94,10 @@ TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
   EXPECT_TRUE(exists(folder() / "map.ply"));
   output.writeReport("{}");
 
-  EXPECT_FALSE(exists(folder() / "map.pcd"));
-  EXPECT_FALSE(exists(folder() / "map.ply"));
-  EXPECT_FALSE(exists(folder() / "map.simplemap"));
-  EXPECT_FALSE(exists(folder() / "map.html"));
-  EXPECT_FALSE(exists(folder() / "map.png"));
-  EXPECT_FALSE(exists(folder() / "overview.png"));
-  EXPECT_FALSE(exists(keyframes / "1.000000000" / "depth.tiff"));
+  for (const char* earlier : {"map.pcd", "map.ply", "map.simplemap", "map.html", "map.png",
+                              "overview.png", "keyframes/1.000000000/depth.tiff"}) {
+    EXPECT_FALSE(exists(folder() / earlier)) << earlier;
+  }
   EXPECT_TRUE(exists(keyframes / "1.000000000" / "notes.txt"));
   EXPECT_TRUE(exists(folder() / "notes.txt"));
   EXPECT_TRUE(exists(keyframes / "2" / "depth.tiff"));
@@ -185,6 +175,7 @@ TEST_F(MapOutputTest, OneRunAtATimeWritesAFolder) {
   const std::string at_work = folder().string() + ": another run is writing its result there";
   EXPECT_THAT(messageOf([&] { MapOutput::earlierResult(folder()); }), HasSubstr(at_work));
   EXPECT_THAT(messageOf([&] { MapOutput(folder(), OutputKind::kMap, {}); }), HasSubstr(at_work));
+  EXPECT_THAT(messageOf([&] { RunMark(folder(), {}); }), HasSubstr(at_work)) << "at the same time";
   kill(other, SIGKILL);
   waitpid(other, nullptr, 0);
 
@@ -230,7 +221,7 @@ TEST_F(NpyFileTest, HoldsPlanesRowsAndColumnsInThatOrder) {
   file.addPlane(0, near.data());
   file.finish();
 
-  const std::string content = contentOf(folder() / "dsi.npy");
+  const std::string content = readText(folder() / "dsi.npy");
   ASSERT_EQ(content.size() % 4, 0U);
   const std::string header = content.substr(0, content.size() - 12 * sizeof(float));
   EXPECT_EQ(header.substr(0, 8), std::string("\x93NUMPY\x01\x00", 8));

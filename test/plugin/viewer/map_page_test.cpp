@@ -82,6 +82,7 @@ TEST(PagePoints, AnyFirstPartCoversTheMap) {
   std::array<int, 10> histogram{};
   for (std::size_t i = 0; i < 1000; ++i) ++histogram.at(page.at(i).cell[0] / 6554);
   EXPECT_THAT(histogram, Each(testing::AllOf(testing::Ge(95), testing::Le(105))));
+  EXPECT_GE(PagePoints(*cloud, 0.01, 1000).size(), 700U) << "thinned as a surface is";
 }
 
 TEST(PagePoints, MoreThanTheLimitAreThinnedToTheBestOfEachCell) {

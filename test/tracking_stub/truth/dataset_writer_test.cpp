@@ -5,13 +5,12 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
-#include <sstream>
 #include <stdexcept>
 
 #include "mapping/geometry/reference_view.h"
+#include "test/plugin/formats/files.h"
 #include "test/plugin/temporary_folder.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
 #include "tracking_stub/poses/tum_trajectory.h"
@@ -23,13 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-std::string contentOf(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream content;
-  content << stream.rdbuf();
-  return content.str();
-}
 
 std::set<std::string> namesIn(const fs::path& folder) {
   std::set<std::string> names;
@@ -63,7 +55,7 @@ TEST_F(DatasetFolder, WritesAllFilesAndNothingElse) {
                                          "gt_edges.ply", "poses.txt"));
   EXPECT_THAT(namesIn(desk / "depth"), ElementsAre("cam0_1.000000000.tiff", "cam0_1.050000000.tiff",
                                                    "cam0_1.100000000.tiff", "index.txt"));
-  EXPECT_EQ(contentOf(desk / "depth/index.txt"),
+  EXPECT_EQ(readText(desk / "depth/index.txt"),
             "1.000000000 cam0_1.000000000.tiff\n1.050000000 cam0_1.050000000.tiff\n"
             "1.100000000 cam0_1.100000000.tiff\n");
 
@@ -86,7 +78,7 @@ TEST_F(DatasetFolder, TruthCloudsLieOnSurfacesAndOnEdgesWithEvents) {
   writeDataset(folder(), simulation, recordings);
   std::map<std::string, std::vector<Eigen::Vector3f>> clouds;
   for (const std::string name : {"gt_cloud.ply", "gt_edges.ply"}) {
-    const std::string content = contentOf(folder() / name);
+    const std::string content = readText(folder() / name);
     const std::size_t begin = content.find("end_header\n") + 11;
     EXPECT_THAT(content, HasSubstr("format binary_little_endian 1.0"));
     clouds[name].resize((content.size() - begin) / 12);
@@ -115,7 +107,7 @@ TEST_F(DatasetFolder, RefusesARigWhoseFrameIsNotCameraZero) {
 TEST_F(DatasetFolder, EventsHaveNineDecimals) {
   writeEvents(folder() / "events.txt",
               {{1'000'004'000, 3, 65535, true}, {1'700'000'000'000'000'000, 0, 0, false}});
-  EXPECT_EQ(contentOf(folder() / "events.txt"),
+  EXPECT_EQ(readText(folder() / "events.txt"),
             "1.000004000 3 65535 1\n1700000000.000000000 0 0 0\n");
 }
 
