@@ -50,8 +50,7 @@ bool isLying(const std::vector<std::uint64_t>& shape, std::size_t columns) {
 /// @param columns of an event, as the option says: 4 or more, or 0 where they have names.
 bool hasEvents(const NpyHeader& header, std::size_t columns) {
   if (header.structured) return !header.fields.empty();
-  return columns > 0 && isMatrix(header) &&
-         (header.shape[1] == columns || isLying(header.shape, columns));
+  return isMatrix(header) && (header.shape[1] == columns || isLying(header.shape, columns));
 }
 
 bool hasPoses(const NpyHeader& header) {
