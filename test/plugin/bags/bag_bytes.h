@@ -96,7 +96,7 @@ inline std::string ros1Time(std::int64_t t_ns) {
          wordBytes(static_cast<std::uint32_t>(t_ns % 1'000'000'000));
 }
 
-/// One chunk for each `per_chunk` messages, not compressed.
+/// A chunk with the first message, and one for each further `per_chunk`, not compressed.
 inline std::string ros1BagBytes(const RecordedMessages& messages, std::size_t per_chunk = 1000) {
   const std::string magic = "#ROSBAG V2.0\n";
   const auto bag_header = [](std::uint64_t index) {
@@ -115,10 +115,10 @@ inline std::string ros1BagBytes(const RecordedMessages& messages, std::size_t pe
     summary += ros1Record({{"op", "\7"}, {"conn", wordBytes(id++)}, {"topic", topic}},
                           sizedText("topic=" + topic) + sizedText("type=" + type));
   }
-  for (std::size_t i = 0; i < messages.size(); i += per_chunk) {
+  for (std::size_t i = 0, end = 0; i < messages.size(); i = end) {
     std::string chunk;
     std::string counts;
-    const std::size_t end = std::min(messages.size(), i + per_chunk);
+    end = std::min(messages.size(), i == 0 ? 1 : i + per_chunk);
     for (std::size_t k = i; k < end; ++k) {
       const std::string connection = wordBytes(topicNumber(messages, messages[k]));
       chunk +=

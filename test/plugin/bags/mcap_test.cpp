@@ -114,11 +114,12 @@ TEST_F(Mcap, ValuesThatRosCannotHoldAreErrors) {
   McapWriter writer(file_, rig_);
   for (const auto& [event, expected] :
        {std::make_pair(Event{-1, 0, 0, true}, "expected 0 to 2147483647"),
-        std::make_pair(Event{std::int64_t{1} << 62, 0, 0, true}, "expected 0 to 2147483647"),
+        std::make_pair(Event{2'147'483'648'000'000'000, 0, 0, true}, "expected 0 to 2147483647"),
         std::make_pair(Event{0, 0, 0x8000, true}, "y = 32768: expected at most 32767")}) {
     EXPECT_THAT(errorOf([&, event = event] { writer.addEvents(0, {event}); }),
                 AllOf(StartsWith(file_.string()), HasSubstr(expected)));
   }
+  EXPECT_NO_THROW(writer.addEvents(0, {{2'147'483'647'999'999'999, 0x7FFF, 0x7FFF, true}}));
 }
 
 TEST_F(Mcap, OfACutFileWhatIsBeforeTheDamageIsRead) {

@@ -360,9 +360,9 @@ TEST_F(Hdf5Events, TheUnitOfTimesIsToldOrFoundWhereTheLayoutDoesNotSayIt) {
 }
 
 TEST_F(Hdf5Events, AChunkMayHoldAPartOfItsRows) {
-  std::vector<double> matrices;  // turned by 90 degrees around z, at (k, 2, 3)
+  std::vector<double> matrices;  // turned by 90 degrees around x, at (k, 2, 3)
   for (double k = 0; k < 5; ++k) {
-    for (const double number : {0., -1., 0., k, 1., 0., 0., 2., 0., 0., 1., 3., 0., 0., 0., 1.}) {
+    for (const double number : {1., 0., 0., k, 0., 0., -1., 2., 0., 1., 0., 3., 0., 0., 0., 1.}) {
       matrices.push_back(number);
     }
   }
@@ -372,6 +372,7 @@ TEST_F(Hdf5Events, AChunkMayHoldAPartOfItsRows) {
       Writing writing(file());
       const Hdf5Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
       H5Pset_chunk(creation.get(), 3, chunk.data());
+      H5Pset_shuffle(creation.get());
       H5Pset_deflate(creation.get(), 1);
       writing.add("davis/left/pose", H5T_IEEE_F64LE, matrices, {5, 4, 4}, creation.get());
       writing.add("davis/left/pose_ts", H5T_IEEE_F64LE, std::vector<double>{0, 1, 2, 3, 4.5});
@@ -380,7 +381,7 @@ TEST_F(Hdf5Events, AChunkMayHoldAPartOfItsRows) {
     ASSERT_EQ(poses.size(), 5U);
     EXPECT_EQ(poses[4].t_ns, 4'500'000'000);
     for (std::size_t k = 0; k < 5; ++k) {
-      const Eigen::Vector3d moved = poses[k].T_world_rig * Eigen::Vector3d(1, 0, 0);
+      const Eigen::Vector3d moved = poses[k].T_world_rig * Eigen::Vector3d(0, 0, -1);
       EXPECT_LT((moved - Eigen::Vector3d(static_cast<double>(k), 3, 3)).norm(), 1e-12) << chunk[0];
     }
   }

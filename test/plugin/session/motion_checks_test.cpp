@@ -243,6 +243,9 @@ TEST(MotionChecks, AStepThatATrackerOtherwiseDoesNotMakeIsAJump) {
       {"of a jittery tracker", Hand().shake(0.003, 0).shift(2, end, 0.3), kJump},
       {"ten a second: a car", Hand(10, Hand::straight).shake(0.005, 0).shift(2, end, 0.5), kJump},
       {"ten a second: as usual", Hand(10, Hand::straight).shake(0.005, 0), {}},
+      {"seven of 36 steps: as usual",
+       Hand(10, [](double t_s) { return Hand::straight(t_s + std::floor(2 * t_s + 1e-6)); }),
+       {}},
       {"before the events", Hand().shift(1, end, 0.05).withEvents(0, 1.5, 0), {}},
   });
   EXPECT_THAT(

@@ -179,6 +179,12 @@ TEST_F(EventColumnsText, CompressedTextHasTheEventsOfTheText) {
     ASSERT_NE(detectFormat(folder() / name), nullptr) << name;
     EXPECT_EQ(detectFormat(folder() / name)->name, "text") << name;
   }
+  const std::string xz(
+      "\3757zXZ\0\0\0\377\022\331A\002\0!\001\014\0\0\0\217\230A\234\001\0\011"
+      "1.5 2 3 1\n\0\0\0\0\001\032\n\356\246~p\006r\236z\001\0\0\0\0\0YZ",
+      60);
+  EventTextStream one(write(xz, "events.txt.xz"));
+  EXPECT_EQ(readStream(one), (std::vector<Event>{{1'500'000'000, 2, 3, true}}));
   std::filesystem::resize_file(folder() / "events.txt.gz",
                                std::filesystem::file_size(folder() / "events.txt.gz") / 2);
   EXPECT_THAT(errorOf([&] {
