@@ -28,7 +28,7 @@ CObservationRobotPose::Ptr poseAt(std::int64_t t_ns, const std::string& label = 
   auto pose = CObservationRobotPose::Create();
   pose->timestamp = mrptTimeFrom(t_ns);
   pose->sensorLabel = label;
-  pose->pose.mean = mrpt::poses::CPose3D(1e-9 * static_cast<double>(t_ns - kStartNs), 2, 3);
+  pose->pose.mean = mrpt::poses::CPose3D(secondsBetween(kStartNs, t_ns), 2, 3, 0.4, 0.5, 0.6);
   pose->pose.cov.setDiagonal(6, 0.25);
   pose->sensorPose = mrpt::poses::CPose3D(0.1, 0.2, 0.3, 0.4, 0.5, 0.6);
   return pose;
@@ -138,7 +138,8 @@ TEST(PerturbedRecording, DelaysPosesAndChangesNone) {
     const std::int64_t t_ns = timeOf(*observation);
     newest_ns = std::max(newest_ns, t_ns);
     if (observation->sensorLabel != "one") continue;
-    EXPECT_EQ(robotPose(observation).pose.mean, poseAt(t_ns)->pose.mean) << "to the bit";
+    EXPECT_EQ(robotPose(observation).pose.mean.asTPose(), poseAt(t_ns)->pose.mean.asTPose())
+        << "to the bit";
     if (t_ns > kStartNs + 300 * kMs) continue;
     EXPECT_GE(newest_ns - t_ns, 98 * kMs);  // with the pose of its time, before that packet
     EXPECT_LE(newest_ns - t_ns, 100 * kMs);
@@ -151,6 +152,11 @@ TEST(PerturbedRecording, DelaysPosesAndChangesNone) {
   for (const auto& pose : fewer) {
     EXPECT_EQ(robotPose(pose).pose.mean, poseAt(timeOf(*pose))->pose.mean);
   }
+  auto listed = std::make_unique<ListedRecording>(twoTrackers());
+  const ListedRecording& source = *listed;
+  PerturbedRecording recording(std::move(listed), {});
+  EXPECT_EQ(timeOf(*recording.next()), kStartNs);
+  EXPECT_EQ(source.read(), 1U) << "nothing is read ahead without noise per keyframe";
 }
 
 TEST(PerturbedRecording, LatePosesBeforeACutAreNotLost) {
