@@ -162,7 +162,7 @@ TEST_F(EventPlayer, TheQueueOfASlowHostHasALimitAndNothingIsLost) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     const Observations queue = taken(*player);
-    ASSERT_FALSE(queue.empty());
+    ASSERT_TRUE(queue.size() >= 8 || dynamic_cast<const CEventPlayer&>(*player).ended());
     EXPECT_LE(queue.size(), 8U + 1) << "and the comment";
     all.insert(all.end(), queue.begin(), queue.end());
   }
