@@ -116,8 +116,8 @@ TEST_F(UnreadFormats, AFolderIsNamedByTheFilesInIt) {
   EXPECT_TRUE(begins(folder_of("0.mcap", "\x89MCAP0\r\n"),
                      "a folder: give its files themselves (0.mcap is a ROS 2 bag"));
   EXPECT_EQ(folder_of("readme", "words"), "");
-  for (const char* name : {"m.png", "b.png", "a", "z.png", "h.png"}) {  // the first that is known
-    writeFile(folder() / "in" / name, name == "a"s ? "words" : "\x89PNG\r\n\x1a\n");
+  for (const char* name : {"m.png", "b.png", "a", "aa", "ab", "ac", "h.png"}) {  // the first known
+    writeFile(folder() / "in" / name, name[0] == 'a' ? "words" : "\x89PNG\r\n\x1a\n");
   }
   EXPECT_TRUE(begins(unreadFormat(folder() / "in").value_or(""), "a folder; b.png in it is a PNG"));
 }
