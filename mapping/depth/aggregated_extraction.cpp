@@ -14,7 +14,7 @@
 namespace efm {
 namespace {
 
-// A step is a hundredth of the depth range (`planesPerStep`).
+// A step: see `planesPerStep`.
 constexpr double kAgreementSteps = 2.5;  ///< Depths within this distance agree.
 constexpr double kMedianSteps = 10;      ///< Distance from the median that divides quality by e.
 constexpr double kSteepness = 1.25;      ///< Exponent of 1 - second peak / peak.
@@ -44,9 +44,9 @@ struct PeakScale {
       0;  ///< Index into `AggregatedPeak::second_peak`: the distance where the peak ends.
 };
 
-PeakScale scaleOf(const std::vector<AggregatedPeak>& peaks, int planes) {
+PeakScale scaleOf(const std::vector<AggregatedPeak>& peaks, double step_planes) {
   PeakScale scale;
-  scale.step_planes = planesPerStep(planes);
+  scale.step_planes = step_planes;
   if (peaks.empty()) return scale;
   std::vector<float> widths_sq;
   for (const AggregatedPeak& peak : peaks) widths_sq.push_back(peak.width_sq);
@@ -81,11 +81,14 @@ double varianceOf(const AggregatedPeak& peak, const LocalAgreement& around) {
 }  // namespace
 
 DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
-                           const DepthExtractionOptions& options) {
+                           const DepthExtractionOptions& options, double parallax_px_m) {
   const cv::Mat1f& confidence = dsi.peaks.confidence;
   const cv::Mat1f contrast = localContrast(confidence, options.threshold_kernel);
   const SparseMask candidates(aboveContrast(contrast, options.min_local_contrast));
-  const std::vector<AggregatedPeak> peaks = aggregateColumns(candidates, dsi.columns);
+  const double range_px =
+      parallax_px_m * (1 / planes.depth(0) - 1 / planes.depth(planes.size() - 1));
+  const double step_planes = planesPerStep(planes.size(), range_px);
+  const std::vector<AggregatedPeak> peaks = aggregateColumns(candidates, dsi.columns, step_planes);
 
   std::vector<float> positions(candidates.size());
   std::vector<float> weights(candidates.size());
@@ -93,21 +96,32 @@ DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
     positions[i] = peaks[i].position;
     weights[i] = contrast(at);
   });
-  const PeakScale scale = scaleOf(peaks, planes.size());
+  const PeakScale scale = scaleOf(peaks, step_planes);
   const std::vector<LocalAgreement> around = localAgreement(
       candidates, positions, weights, static_cast<float>(kAgreementSteps * scale.step_planes));
 
   const bool has_inner_planes = planes.size() > 2;
+  // No depth can be told where all planes lie within a pixel of parallax.
+  const bool all_alike = has_inner_planes && range_px < 1;
   cv::Mat1b mask = cv::Mat1b::zeros(confidence.size());
   std::vector<PlanePosition> found;
+  PixelCounts counts;
+  counts.candidates = candidates.size();
   candidates.forEach([&](std::size_t i, cv::Point at) {
-    if (has_inner_planes && peaks[i].at_end) return;
-    if (!(qualityOf(weights[i], peaks[i], around[i], scale) > options.min_quality)) return;
+    if (has_inner_planes && peaks[i].at_end) {
+      ++(2 * peaks[i].position < float(planes.size()) ? counts.at_nearest : counts.at_farthest);
+      return;
+    }
+    if (all_alike || !(qualityOf(weights[i], peaks[i], around[i], scale) > options.min_quality)) {
+      ++counts.ambiguous;
+      return;
+    }
     mask(at) = 255;
     found.push_back({around[i].median, varianceOf(peaks[i], around[i])});
   });
   const SparseMask sparse(mask);
   DepthMap map = depthMapOf(sparse, found, confidence, planes);
+  map.pixels = counts;
   if (options.dilate) dilate(sparse, mask, map);
   return map;
 }

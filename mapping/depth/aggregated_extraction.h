@@ -19,7 +19,9 @@ namespace efm {
 /// Peaks on the first and the last plane are not kept if there are planes between them: points
 /// beyond the planes peak there.
 /// @param dsi with columns, selected in a window of `threshold_kernel`.
+/// @param parallax_px_m see `KeyframeFacts`.
 DepthMap extractAggregated(const SweptDsi& dsi, const DepthPlanes& planes,
-                           const DepthExtractionOptions& options);
+                           const DepthExtractionOptions& options,
+                           double parallax_px_m = KeyframeFacts{}.parallax_px_m);
 
 }  // namespace efm

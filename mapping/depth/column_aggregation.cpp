@@ -16,14 +16,15 @@ namespace efm {
 namespace {
 
 constexpr float kSigma_px = 1.5F;
+constexpr double kMinFraction = 1.0 / 99;  // of the range of planes: a step
 
 /// Finds the peak of a sum of columns.
 class PeakFinder {
  public:
-  explicit PeakFinder(int planes)
+  PeakFinder(int planes, double step_planes)
       : planes_(planes),
-        step_planes_(planesPerStep(planes)),
-        base_(std::max(1, static_cast<int>(step_planes_ / 4))) {}
+        step_planes_(step_planes),
+        base_(std::max(1, static_cast<int>(step_planes / (isWide() ? 1 : 4)))) {}
 
   AggregatedPeak find(const std::vector<float>& sum) const {
     const auto top = std::max_element(sum.begin(), sum.begin() + planes_);
@@ -51,24 +52,35 @@ class PeakFinder {
   }
 
  private:
+  /// Whether a step is more than a hundredth of the range: the parallax is small.
+  bool isWide() const { return step_planes_ > 1.001 * kMinFraction * (planes_ - 1); }
   static float maximumOf(const std::vector<float>& sum, int begin, int end) {
     return begin >= end ? 0 : *std::max_element(sum.begin() + begin, sum.begin() + end);
   }
 
   int planes_;
   double step_planes_;
-  /// Planes from the peak to the values that its parabola goes through. With over 800 planes, the
-  /// next ones differ by less than a step of their bytes.
+  /// Planes from the peak to the values that its parabola goes through. With over 800 planes, or
+  /// little parallax, the next ones differ by less than a step of their bytes.
   int base_;
 };
 
 }  // namespace
 
-double planesPerStep(int planes) { return std::max(1.0, (planes - 1) / 99.0); }
+double planesPerStep(int planes, double range_px) {
+  constexpr double kStepPx = 0.125;
+  constexpr double kMaxFraction = 1.0 / 24;
+  const double intervals = planes - 1;
+  if (intervals < 2) return 1;
+  const double step = intervals * std::clamp(kStepPx / range_px, kMinFraction, kMaxFraction);
+  // At least a plane, but less where planes are closer than a quarter of a pixel.
+  const double px_per_plane = range_px / intervals;
+  return std::max(step, std::min(1.0, 4 * px_per_plane));
+}
 
 std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
-                                             const DsiColumns& columns) {
-  const PeakFinder finder(columns.planes());
+                                             const DsiColumns& columns, double step_planes) {
+  const PeakFinder finder(columns.planes(), step_planes);
   std::vector<AggregatedPeak> peaks(candidates.size());
   const auto weights = PixelNeighbours::gaussian(kSigma_px);
   tbb::parallel_for(tbb::blocked_range<int>(0, candidates.rows()), [&](const auto& rows) {

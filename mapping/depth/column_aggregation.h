@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "mapping/depth/sparse_mask.h"
@@ -25,12 +26,16 @@ struct AggregatedPeak {
 /// For each pixel of a mask, sums the DSI columns of the mask's pixels in 9x9 pixels around,
 /// weighted by a Gaussian of the distance, and finds the peak of the sum. Columns of other pixels
 /// are not summed: between edges the DSI is noise, which would move the peaks.
-/// @param candidates pixels with columns (asserted).
+/// @param candidates pixels with columns (asserted). @param step_planes see `planesPerStep`.
 /// @return one per pixel. Runs on the threads of the task arena that it is called in.
 std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
-                                             const DsiColumns& columns);
+                                             const DsiColumns& columns, double step_planes);
 
-/// Planes per step: a step is a hundredth of the depth range, but at least one plane.
-double planesPerStep(int planes);
+/// Planes per step, the unit in which peaks and their neighbours are compared. A step is a
+/// hundredth of the range of planes, but at least an eighth of a pixel of parallax: a peak is about
+/// a pixel wide, however many planes lie on it. At least one plane, and at most a 24th of the
+/// range, so that a second peak at 12 steps still lies inside.
+/// @param range_px the parallax between the first and the last plane, pixels.
+double planesPerStep(int planes, double range_px = std::numeric_limits<double>::infinity());
 
 }  // namespace efm

@@ -40,13 +40,12 @@ void DepthExtractionOptions::validate() const {
 bool usesColumns(ExtractionMethod method) { return method == ExtractionMethod::kAggregated; }
 
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
-                      const DepthExtractionOptions& options,
-                      std::optional<double> sequence_maximum) {
+                      const DepthExtractionOptions& options, const KeyframeFacts& facts) {
   options.validate();
   if (options.extraction == ExtractionMethod::kPaper) {
-    return extractAsPaper(dsi.peaks, planes, options, sequence_maximum);
+    return extractAsPaper(dsi.peaks, planes, options, facts.sequence_maximum);
   }
-  return extractAggregated(dsi, planes, options);
+  return extractAggregated(dsi, planes, options, facts.parallax_px_m);
 }
 
 }  // namespace efm

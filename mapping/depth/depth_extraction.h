@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string_view>
 
@@ -62,6 +63,14 @@ struct DepthExtractionOptions {
   void validate() const;
 };
 
+/// What the DSI itself does not tell.
+struct KeyframeFacts {
+  /// The value of `WhiteLevel::kSequence`; not given: the keyframe's maximum.
+  std::optional<double> sequence_maximum;
+  /// The parallax of a unit of inverse depth, pixels per 1/m: see `ViewMotion`.
+  double parallax_px_m = std::numeric_limits<double>::infinity();
+};
+
 /// Selects the pixels with local contrast and finds the depth of each. `kAggregated`: see
 /// `extractAggregated`. `kPaper`:
 /// 1. c8 = round(255 c / max_confidence), clipped;
@@ -70,10 +79,8 @@ struct DepthExtractionOptions {
 /// 4. lower median of the positions of the mask's pixels in the window;
 /// 5. clear a frame of 2 pixels;
 /// 6. where `dilate` is set, see `dilate`.
-/// @param sequence_maximum the value of `WhiteLevel::kSequence`; not given: the keyframe's maximum.
 /// @throws std::invalid_argument where the options are not valid.
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
-                      const DepthExtractionOptions& options,
-                      std::optional<double> sequence_maximum = std::nullopt);
+                      const DepthExtractionOptions& options, const KeyframeFacts& facts = {});
 
 }  // namespace efm

@@ -35,6 +35,14 @@ void fillFromAdjacent(const cv::Mat1b& mask, cv::Point here, DepthMap& map) {
 
 }  // namespace
 
+PixelCounts& PixelCounts::operator+=(const PixelCounts& other) {
+  candidates += other.candidates;
+  at_nearest += other.at_nearest;
+  at_farthest += other.at_farthest;
+  ambiguous += other.ambiguous;
+  return *this;
+}
+
 cv::Rect insideFrame(cv::Size size) {
   return {kFrame, kFrame, std::max(0, size.width - 2 * kFrame),
           std::max(0, size.height - 2 * kFrame)};
@@ -44,7 +52,7 @@ DepthMap depthMapOf(const SparseMask& mask, const std::vector<PlanePosition>& po
                     const cv::Mat1f& confidence, const DepthPlanes& planes) {
   const cv::Size size = confidence.size();
   const cv::Rect inner = insideFrame(size);
-  DepthMap result{cv::Mat1f::zeros(size), confidence, cv::Mat1f::zeros(size)};
+  DepthMap result{cv::Mat1f::zeros(size), confidence, cv::Mat1f::zeros(size), {}};
   mask.forEach([&](std::size_t i, cv::Point at) {
     if (!inner.contains(at)) return;
     const auto [position, variance] = positions[i];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -9,6 +10,16 @@
 
 namespace efm {
 
+/// What became of the pixels with local contrast, which could have a depth.
+struct PixelCounts {
+  std::uint64_t candidates = 0;
+  std::uint64_t at_nearest = 0;   ///< The peak lies on the first plane: no depth.
+  std::uint64_t at_farthest = 0;  ///< The peak lies on the last plane: no depth.
+  std::uint64_t ambiguous = 0;    ///< Below `min_quality`: no depth.
+
+  PixelCounts& operator+=(const PixelCounts& other);
+};
+
 /// A semi-dense depth map in the reference view.
 struct DepthMap {
   cv::Mat1f depth;       ///< z-depth in metres; 0 where there is none.
@@ -16,6 +27,7 @@ struct DepthMap {
   /// Variance of inverse depth, 1/m^2: 0 where there is no depth, infinite where the peak is flat
   /// or lies on the first or last plane.
   cv::Mat1f variance;
+  PixelCounts pixels;  ///< Of `ExtractionMethod::kAggregated`.
 };
 
 /// A position between planes, in planes, and its variance, in planes^2.

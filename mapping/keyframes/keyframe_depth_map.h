@@ -45,6 +45,8 @@ struct KeyframeDepthMap {
   Rigid3 T_world_ref;  ///< Pose of the reference view.
   ReferenceView view;
   DepthMap map;
+  /// The parallax of a unit of inverse depth, pixels per 1/m: see `ViewMotion`.
+  double parallax_px_m = 0;
   double max_confidence = 0;  ///< Over all pixels, with depth or without.
   /// Of the tracker's motion in the window, if there was one.
   std::optional<VelocityCorrection> motion_correction;

@@ -13,6 +13,7 @@
 #include "mapping/events/even_choice.h"
 #include "mapping/events/event_check.h"
 #include "mapping/keyframes/corrected_keyframe.h"
+#include "mapping/keyframes/view_motion.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
@@ -154,6 +155,8 @@ KeyframeDepthMap KeyframeMapper::mapAlong(const WindowInput& input, const Trajec
   keyframe.window = input.window;
   keyframe.T_world_ref = input.T_world_ref;
   keyframe.view = view_;
+  const auto seen = motionIn({input.window, {}, &motion}, rig_, selected_, options_);
+  if (seen) keyframe.parallax_px_m = seen->parallax_px_m;
   keyframe.events.resize(rig_.cameras.size());
   std::vector<WindowRays> cameras;
   {
@@ -202,9 +205,10 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
   keyframe.max_confidence = maximumOf(swept.fused.peaks.confidence);
   RobustMaximum running_maximum = sequence_maximum_;
   running_maximum.add(keyframe.max_confidence);
-  const auto sequence_maximum =
+  KeyframeFacts facts{{}, keyframe.parallax_px_m};
+  facts.sequence_maximum =
       options_.sequence_maximum ? options_.sequence_maximum : running_maximum.value();
-  keyframe.map = extractDepth(swept.fused, planes_, options_.extraction, sequence_maximum);
+  keyframe.map = extractDepth(swept.fused, planes_, options_.extraction, facts);
 
   if (!options_.camera_maps) return;
   if (swept.cameras.empty()) {  // a single camera: its map is the keyframe's
@@ -212,8 +216,9 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
   }
   for (std::size_t c = 0; c < swept.cameras.size(); ++c) {
     // Without the sequence maximum: the ray densities of one camera differ from fused ones.
+    facts.sequence_maximum.reset();
     keyframe.camera_maps.push_back(
-        {cameras[c].camera, extractDepth(swept.cameras[c], planes_, options_.extraction)});
+        {cameras[c].camera, extractDepth(swept.cameras[c], planes_, options_.extraction, facts)});
   }
 }
 

@@ -44,7 +44,11 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
     const auto by_rig = rig_sweep.map(middleOf(sample, kRigS));
     if (!by_rig) continue;
     const auto by_motion = motion_sweep.map(middleOf(sample, kMotionS));
-    if (by_motion) appendRatios(by_motion->map.depth, by_rig->map.depth, ratios);
+    // Most peaks at the farthest plane: the camera sees too little parallax.
+    if (!by_motion || 2 * by_motion->map.pixels.at_farthest > by_motion->map.pixels.candidates) {
+      continue;
+    }
+    appendRatios(by_motion->map.depth, by_rig->map.depth, ratios);
   }
   if (ratios.size() < kMinPixels) return std::nullopt;
   std::sort(ratios.begin(), ratios.end());

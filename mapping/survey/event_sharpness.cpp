@@ -8,7 +8,7 @@ namespace {
 
 // Wider views, more events and finer planes tell hardly more. The paper's extraction is cheaper,
 // and depths are of no use here.
-constexpr Coarseness kCoarseness{128, kMaxPieceEvents, 2, ExtractionMethod::kPaper};
+constexpr Coarseness kCoarseness{128, kMaxPieceEvents, 2, kNearestSceneM, ExtractionMethod::kPaper};
 
 /// The cameras of the map, in a small view.
 FusionMapperOptions sharpnessOptions(const FusionMapperOptions& options) {
@@ -27,7 +27,8 @@ EventSharpness::EventSharpness(const Rig& rig, const FusionMapperOptions& option
     : rig_(rig), options_(sharpnessOptions(options)), sweep_(rig, options_, kCoarseness) {}
 
 double EventSharpness::shiftIn(const SamplePiece& piece) const {
-  const auto motion = motionIn(piece.along(piece.trajectory), rig_, options_);
+  const auto motion = motionIn(piece.along(piece.trajectory), rig_,
+                               selectedCameras(rig_, options_.cameras), options_.keyframe);
   return motion ? motion->shift_m : 0;
 }
 

@@ -17,6 +17,12 @@ namespace {
 
 /// Longer windows have more parallax, and more of the drift of a tracker.
 constexpr double kMaxWindowS = 1;
+/// A scene with less parallax is looked for in a longer window: its depths are mostly noise.
+constexpr double kProvenPx = 2;
+/// Where no window has this much, the scene is taken to be as far away as the parallax tells.
+constexpr double kMinProvenPx = 1;
+/// Windows of a scene with less parallax last longer than others do.
+constexpr double kWantedPx = 2;
 
 double parallaxBetween(const DepthPlanesOptions& limits, double parallax_px_m) {
   return parallax_px_m * (1 / limits.min_depth_m - 1 / limits.max_depth_m);
@@ -89,7 +95,7 @@ double roundedUp(double value, int digits) {
 
 /// The longest window in which most of the view stays in sight, seconds.
 double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
-                   const FusionMapperOptions& options, double inverse_depth) {
+                   const FusionMapperOptions& options, const SceneDepths& depths, double max_s) {
   // The view may move by this fraction of its width to either side.
   constexpr double kMaxMove = 0.2;
   constexpr double kMinWindowS = 0.01;
@@ -97,48 +103,86 @@ double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
   const ReferenceView view =
       makeReferenceView(rig.cameras.at(reference).model, options.keyframe.view);
   const auto moveOf = [&](const ViewMotion& motion) {
-    return (motion.shift_m * inverse_depth + motion.rotation_rad) * view.fx / view.width;
+    return (motion.shift_m * depths.median() + motion.rotation_rad) * view.fx / view.width;
   };
-  double window_s = kMaxWindowS;
+  const std::vector<int> cameras = selectedCameras(rig, options.cameras);
+  double window_s = max_s;
   for (; window_s > kMinWindowS; window_s /= 1.25) {
     std::vector<double> moves;
     for (const WindowSample& sample : samples) {
-      const auto motion = motionIn(middleOf(sample, window_s), rig, options);
+      const auto motion = motionIn(middleOf(sample, window_s), rig, cameras, options.keyframe);
       if (motion) moves.push_back(moveOf(*motion));
     }
     if (moves.empty() || upperMedian(moves) <= kMaxMove) break;
   }
-  return roundedDown(window_s, 1);
+  return window_s < max_s ? roundedDown(window_s, 1) : max_s;
 }
 
-/// @param by_motion_s the longest window that the motion allows.
-void chooseWindow(double by_motion_s, std::optional<double> duration_s, Choice& choice) {
+/// The parallax of a unit of inverse depth in a typical window, pixels per 1/m.
+double parallaxIn(const std::vector<WindowSample>& samples, double window_s, const Rig& rig,
+                  const FusionMapperOptions& options) {
+  const std::vector<int> cameras = selectedCameras(rig, options.cameras);
+  std::vector<double> parallaxes;
+  for (const WindowSample& sample : samples) {
+    const auto motion = motionIn(middleOf(sample, window_s), rig, cameras, options.keyframe);
+    if (motion) parallaxes.push_back(motion->parallax_px_m);
+  }
+  return parallaxes.empty() ? 0 : upperMedian(parallaxes);
+}
+
+/// The longest part of a sample.
+double longestOf(const std::vector<WindowSample>& samples) {
+  double longest_s = 0;
+  for (const WindowSample& sample : samples) {
+    longest_s = std::max(longest_s, secondsBetween(sample.window.t0_ns, sample.window.t1_ns));
+  }
+  return longest_s;
+}
+
+/// A longer window than the others, if the parallax needs it.
+/// @param shortest_s the window that is chosen with enough parallax.
+/// @return nothing if that window has enough.
+std::optional<double> neededWindow(const std::vector<WindowSample>& samples, const Rig& rig,
+                                   const FusionMapperOptions& options, const SceneDepths& depths,
+                                   double shortest_s) {
+  const auto enough = [&](double window_s) {
+    return parallaxIn(samples, window_s, rig, options) * depths.median() >= kWantedPx;
+  };
+  if (enough(shortest_s)) return std::nullopt;
+  const double longest_s =
+      motionLimit(samples, rig, options, depths, std::max(shortest_s, longestOf(samples)));
+  double window_s = shortest_s;
+  while (window_s < longest_s && !enough(window_s)) window_s *= 1.1;
+  return std::max(shortest_s, std::min(window_s, longest_s));
+}
+
+void chooseWindow(const std::vector<WindowSample>& samples, const Rig& rig,
+                  const FusionMapperOptions& options, const SceneDepths& depths,
+                  std::optional<double> duration_s, Choice& choice) {
   constexpr double kShortS = 0.5;  // a recording up to this length is one window
+  const double by_motion_s = motionLimit(samples, rig, options, depths, kMaxWindowS);
   const double by_length_s =
       duration_s ? std::max(*duration_s / 4, std::min(*duration_s, kShortS)) : by_motion_s;
-  if (0 < by_length_s && by_length_s < by_motion_s) {
-    choice.window(roundedDown(by_length_s, 2), "the recording lasts " + number(*duration_s) + " s");
+  const bool by_length = 0 < by_length_s && by_length_s < by_motion_s;
+  const double window_s = by_length ? roundedDown(by_length_s, 2) : by_motion_s;
+  if (const auto needed_s = neededWindow(samples, rig, options, depths, window_s)) {
+    const double most_s = duration_s.value_or(*needed_s);
+    choice.window(std::max(window_s, roundedDown(std::min(*needed_s, most_s), 2)),
+                  "the parallax is small, " +
+                      number(depths.median() * parallaxIn(samples, window_s, rig, options)) +
+                      " pixels in " + number(window_s) + " s");
+  } else if (by_length) {
+    choice.window(window_s, "the recording lasts " + number(*duration_s) + " s");
   } else {
-    choice.window(by_motion_s, by_motion_s < kMaxWindowS
-                                   ? "the longest in which most of the view stays in sight"
-                                   : "the longest that is chosen: the view moves slowly");
+    choice.window(window_s, by_motion_s < kMaxWindowS
+                                ? "the longest in which most of the view stays in sight"
+                                : "the longest that is chosen: the view moves slowly");
   }
 }
 
 double lengthOf(const FusionMapperOptions& options) {
   const auto& window = options.only_window;
   return window ? secondsBetween(window->t0_ns, window->t1_ns) : options.policy.window_s;
-}
-
-/// The parallax of a unit of inverse depth in a typical window, pixels per 1/m.
-double parallaxIn(const std::vector<WindowSample>& samples, double window_s, const Rig& rig,
-                  const FusionMapperOptions& options) {
-  std::vector<double> parallaxes;
-  for (const WindowSample& sample : samples) {
-    const auto motion = motionIn(middleOf(sample, window_s), rig, options);
-    if (motion) parallaxes.push_back(motion->parallax_px_m);
-  }
-  return parallaxes.empty() ? 0 : upperMedian(parallaxes);
 }
 
 void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choice) {
@@ -151,12 +195,19 @@ void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choic
   // that moves little.
   const double accurate_m = 0.1 / 0.25 * parallax_px_m;
   const double most_m = 2 / depths.median();
+  // A limit within the scene would gather wrong depths: its far end is included where it is near.
+  const double end_m = std::min(1.25 / scene.far, 1.5 * accurate_m);
   if (accurate_m < max_m) {
-    max_m = std::max(accurate_m, most_m);
+    max_m = std::min(max_m, std::max({accurate_m, most_m, end_m}));
     reason += ", and the parallax is too small for larger depths";
   }
   const double min_m = std::max(roundedDown(1 / limits.near, 2), kMinDepthM);
   choice.depths(min_m, std::max(roundedUp(max_m, 2), 2 * min_m), reason);
+}
+
+void addFarthest(SceneDepths& depths) {
+  depths.inverse.insert(depths.inverse.end(), depths.farthest.begin(), depths.farthest.end());
+  std::sort(depths.inverse.begin(), depths.inverse.end());
 }
 
 }  // namespace
@@ -177,10 +228,13 @@ void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& option
 }
 
 int automaticPlanes(const DepthPlanesOptions& limits, double parallax_px_m) {
-  constexpr double kMinPlanes = 100;
-  constexpr double kMaxPlanes = 400;
-  return static_cast<int>(
-      std::clamp(1 + std::ceil(parallaxBetween(limits, parallax_px_m)), kMinPlanes, kMaxPlanes));
+  constexpr double kFinestPx = 0.1;
+  constexpr double kFewest = 25;
+  constexpr double kUsual = 100;
+  constexpr double kMost = 400;
+  const double range_px = parallaxBetween(limits, parallax_px_m);
+  const double at_least = std::clamp(1 + std::ceil(range_px / kFinestPx), kFewest, kUsual);
+  return static_cast<int>(std::clamp(1 + std::ceil(range_px), at_least, kMost));
 }
 
 FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s) {
@@ -200,23 +254,33 @@ OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
     return choice.withoutScene(given.min_depth_m, given.max_depth_m,
                                "the default: no event has a pose");
   }
-  CoarseSweep sweep(rig, options);
+  Coarseness coarseness;
+  if (!automatic.min_depth_m) {
+    coarseness.nearest_m = std::min(coarseness.nearest_m, given.min_depth_m);
+  }
+  CoarseSweep sweep(rig, options, coarseness);
   // Longer windows have more parallax; shorter ones keep the view.
   SceneDepths depths;
-  for (const double window_s : {0.2, 0.5, 1.0}) {
-    depths = sceneDepths(sweep, samples, window_s);
-    if (depths.inverse.size() >= kMinScenePoints) break;
+  const double longest_s = longestOf(samples);
+  for (const double window_s : {0.2, 0.5, 1.0, 2.0}) {
+    SceneDepths seen = sceneDepths(sweep, samples, window_s);
+    const bool enough = seen.inverse.size() >= kMinScenePoints;
+    if (enough && seen.parallax_px >= depths.parallax_px) depths = std::move(seen);
+    if ((enough && depths.parallax_px >= kProvenPx) || window_s >= longest_s) break;
   }
+  const bool is_proven = depths.parallax_px >= kMinProvenPx;
+  if (!is_proven) addFarthest(depths);
   if (depths.inverse.size() < kMinScenePoints) {
     return choice.withoutScene(given.min_depth_m, given.max_depth_m,
                                "the default: a coarse sweep found no scene");
   }
   if (!options.only_window) {
-    chooseWindow(motionLimit(samples, rig, options, depths.median()), duration_s, choice);
+    chooseWindow(samples, rig, options, depths, duration_s, choice);
   }
   const double window_s = lengthOf(options);
   const double parallax_px_m = parallaxIn(samples, window_s, rig, options);
   depths = sceneDepths(sweep, samples, window_s);
+  if (!is_proven) addFarthest(depths);
   if (!depths.inverse.empty()) {
     chooseDepths(depths, parallax_px_m, choice);
   }
@@ -224,7 +288,7 @@ OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
   choice.planes(
       automaticPlanes(planes, parallax_px_m),
       number(parallaxBetween(planes, parallax_px_m)) + " pixels of parallax between the limits");
-  return {choice.take(), true, parallax_px_m};
+  return {choice.take(), true, parallax_px_m, is_proven};
 }
 
 OptionChoice chooseWideDepths(const AutomaticOptions& automatic, FusionMapperOptions& options) {

@@ -35,12 +35,15 @@ struct OptionChoice {
   /// The parallax of a unit of inverse depth in a typical window, pixels per 1/m. Without a scene
   /// the one for which the number of planes would be chosen.
   double parallax_px_m = 0;
+  /// Whether the parallax proves the depths of the scene. Otherwise the limits are a guess.
+  bool is_proven = false;
 };
 
 /// Gives automatic options values that fit those of the others, until they are chosen.
 void fitAutomatic(const AutomaticOptions& automatic, FusionMapperOptions& options);
 
-/// 100 planes, and more where they would be more than a pixel of parallax apart, up to 400.
+/// 100 planes; more where they would be more than a pixel of parallax apart, up to 400; fewer where
+/// they would be less than a tenth of a pixel apart, which nothing can tell, down to 25.
 int automaticPlanes(const DepthPlanesOptions& limits, double parallax_px_m);
 
 /// The options of a first pass over a recording: consecutive windows of `window_s`.

@@ -6,6 +6,8 @@
 #include <iterator>
 #include <utility>
 
+#include "mapping/depth/median.h"
+
 namespace efm {
 namespace {
 
@@ -37,69 +39,23 @@ FusionMapperOptions withSmallView(FusionMapperOptions options, const Rig& rig,
   return options;
 }
 
-/// How far a unit of inverse depth (1/m) moves the view of a camera at `p_view` (metres), in
-/// pixels, on average over the view.
-double meanParallax(const ReferenceView& view, const Eigen::Vector3d& p_view) {
-  constexpr int kGrid = 5;
-  double sum = 0;
-  for (int row = 0; row < kGrid; ++row) {
-    for (int column = 0; column < kGrid; ++column) {
-      const Eigen::Vector3d ray =
-          view.pointAt((column + 0.5) / kGrid * view.width, (row + 0.5) / kGrid * view.height, 1);
-      sum += std::hypot(view.fx * (p_view.x() - ray.x() * p_view.z()),
-                        view.fy * (p_view.y() - ray.y() * p_view.z()));
-    }
-  }
-  return sum / (kGrid * kGrid);
-}
-
 }  // namespace
-
-std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
-                                   const FusionMapperOptions& options) {
-  const std::optional<Rigid3> T_world_rig = data.trajectory->poseAt(data.window.t_ref_ns);
-  if (!T_world_rig) return std::nullopt;
-  const auto reference = static_cast<std::size_t>(options.keyframe.reference_camera);
-  const Rigid3& T_rig_view = rig.cameras.at(reference).T_rig_cam;
-  const Rigid3 T_view_world = (*T_world_rig * T_rig_view).inverse();
-  const ReferenceView view =
-      makeReferenceView(rig.cameras.at(reference).model, options.keyframe.view);
-  ViewMotion motion;
-  constexpr int kSteps = 16;
-  for (int step = 0; step <= kSteps; ++step) {
-    const std::int64_t t_ns =
-        data.window.t0_ns + (data.window.t1_ns - data.window.t0_ns) / kSteps * step;
-    const std::optional<Rigid3> T_world_then = data.trajectory->poseAt(t_ns);
-    if (!T_world_then) continue;
-    const Rigid3 T_view_rig = T_view_world * *T_world_then;
-    for (const int camera : selectedCameras(rig, options.cameras)) {
-      const Rigid3& T_rig_cam = rig.cameras.at(static_cast<std::size_t>(camera)).T_rig_cam;
-      motion.rig_baseline_m =
-          std::max(motion.rig_baseline_m, (T_rig_cam.translation - T_rig_view.translation).norm());
-      const double parallax_px_m = meanParallax(view, (T_view_rig * T_rig_cam).translation);
-      motion.parallax_px_m = std::max(motion.parallax_px_m, parallax_px_m);
-    }
-    const Rigid3 T_view_then = T_view_rig * T_rig_view;
-    motion.shift_m = std::max(motion.shift_m, T_view_then.translation.norm());
-    motion.rotation_rad =
-        std::max(motion.rotation_rad, Eigen::AngleAxisd(T_view_then.rotation).angle());
-  }
-  return motion;
-}
 
 CoarseSweep::CoarseSweep(const Rig& rig, const FusionMapperOptions& options,
                          const Coarseness& coarseness)
     : options_(withSmallView(options, rig, coarseness)),
       plane_step_px_(coarseness.plane_step_px),
+      nearest_m_(coarseness.nearest_m),
       mapper_(rig, selectedCameras(rig, options.cameras), options_.keyframe) {}
 
 std::optional<KeyframeDepthMap> CoarseSweep::map(const WindowData& data) {
-  const std::optional<ViewMotion> motion = motionIn(data, mapper_.rig(), options_);
+  const std::optional<ViewMotion> motion = motionIn(
+      data, mapper_.rig(), selectedCameras(mapper_.rig(), options_.cameras), options_.keyframe);
   if (!motion || motion->parallax_px_m <= 0) return std::nullopt;
   const double distance_m = std::max(motion->rig_baseline_m, motion->shift_m);
   const double near_m = distance_m * mapper_.view().fx / mapper_.view().width / kNearestMove;
   DepthPlanesOptions planes;
-  planes.min_depth_m = std::max(near_m, kMinDepthM);
+  planes.min_depth_m = std::max(near_m, nearest_m_);
   planes.max_depth_m =
       std::max(2 * planes.min_depth_m, motion->parallax_px_m / kFarthestParallaxPx);
   planes.num_planes =
@@ -155,15 +111,23 @@ InverseRange limitsAround(const InverseRange& scene) {
 SceneDepths sceneDepths(CoarseSweep& sweep, const std::vector<WindowSample>& samples,
                         double window_s) {
   SceneDepths depths;
+  std::vector<double> parallaxes_px;
   for (const WindowSample& sample : samples) {
     const std::optional<KeyframeDepthMap> keyframe = sweep.map(middleOf(sample, window_s));
     if (!keyframe) continue;
     for (const float depth_m : keyframe->map.depth) {
-      if (depth_m > 0) depths.inverse.push_back(1 / static_cast<double>(depth_m));
+      if (!(depth_m > 0)) continue;
+      depths.inverse.push_back(1 / static_cast<double>(depth_m));
+      parallaxes_px.push_back(keyframe->parallax_px_m * depths.inverse.back());
     }
+    const std::uint64_t at_farthest = keyframe->map.pixels.at_farthest;
+    parallaxes_px.insert(parallaxes_px.end(), at_farthest, 0);
+    depths.farthest.insert(depths.farthest.end(), at_farthest,
+                           1 / sweep.planes().depth(sweep.planes().size() - 1));
     depths.nearest = std::max(depths.nearest, 1 / sweep.planes().depth(0));
   }
   std::sort(depths.inverse.begin(), depths.inverse.end());
+  if (!parallaxes_px.empty()) depths.parallax_px = upperMedian(parallaxes_px);
   return depths;
 }
 

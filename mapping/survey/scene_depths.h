@@ -5,29 +5,20 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
+#include "mapping/keyframes/view_motion.h"
 #include "mapping/survey/window_sample.h"
 
 namespace efm {
 
-/// How far the selected cameras are from the reference view within a window: maxima.
-struct ViewMotion {
-  double rig_baseline_m = 0;  ///< Of any camera at the reference time.
-  double shift_m = 0;         ///< Of the reference camera, at any time.
-  double rotation_rad = 0;    ///< Of the reference camera.
-  /// The parallax of inverse depth, for any camera at any time, averaged over the view: pixels per
-  /// 1/m.
-  double parallax_px_m = 0;
-};
-
-/// @return nothing where the window's reference time has no pose.
-std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
-                                   const FusionMapperOptions& options);
+/// No lens in use focuses on a nearer scene, so one is looked for only where the options name it.
+inline constexpr double kNearestSceneM = 0.1;
 
 /// How coarse a sweep is. The default has enough pixels for the distribution of depths.
 struct Coarseness {
   int width = 240;                 ///< Of the view, pixels, at most.
   std::uint32_t events = 100'000;  ///< Of each camera, at most.
   double plane_step_px = 1;        ///< Parallax between neighbouring planes.
+  double nearest_m = kNearestSceneM;
   ExtractionMethod extraction = ExtractionMethod::kAggregated;
 };
 
@@ -48,6 +39,7 @@ class CoarseSweep {
  private:
   FusionMapperOptions options_;  // with the small view
   double plane_step_px_;
+  double nearest_m_;
   KeyframeMapper mapper_;
 };
 
@@ -55,6 +47,11 @@ class CoarseSweep {
 struct SceneDepths {
   std::vector<double> inverse;  ///< Inverse depths of the points, 1/m, in increasing order.
   double nearest = 0;           ///< The inverse depth of the nearest plane, 1/m.
+  /// The inverse depth of the farthest plane, once per pixel whose peak lies on it.
+  std::vector<double> farthest;
+  /// The median parallax of all these pixels, where that of the farthest plane counts as none.
+  /// Under some pixels, the depths are mostly noise.
+  double parallax_px = 0;
 
   /// The upper median, 1/m. @pre There is a point.
   double median() const { return inverse[inverse.size() / 2]; }

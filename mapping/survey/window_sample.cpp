@@ -15,8 +15,9 @@ WindowSample sampleOf(const WindowData& data) {
   for (const EventSpan& events : data.events) {
     sample.events.push_back(chosenEvenly(events, kMaxSampleEvents));
   }
+  constexpr std::int64_t kMarginNs = kNanosecondsPerSecond / 2;
   sample.trajectory =
-      data.trajectory->moved(data.window.t0_ns, data.window.t1_ns,
+      data.trajectory->moved(data.window.t0_ns - kMarginNs, data.window.t1_ns + kMarginNs,
                              [](const StampedPose& pose) { return pose.T_world_rig; });
   return sample;
 }

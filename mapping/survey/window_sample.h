@@ -18,7 +18,9 @@ struct WindowSample {
   /// Per camera of the rig, in time order, on the trajectory's clock; evenly chosen where a window
   /// has more than `kMaxSampleEvents` of a camera.
   std::vector<std::vector<Event>> events;
-  Trajectory trajectory;  ///< Of the window.
+  /// Of the window, and of half a second before and after it as far as there are poses: other
+  /// clocks are tried.
+  Trajectory trajectory;
 };
 
 inline constexpr std::size_t kMaxSampleEvents = 300'000;

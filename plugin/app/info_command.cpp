@@ -161,7 +161,7 @@ class PatientSurveyor {
     }
     limits.near_depth_m = options.keyframe.planes.min_depth_m;
     limits.far_depth_m = options.keyframe.planes.max_depth_m;
-    return survey.poseWarnings(options);
+    return survey.judgePoses(options).warnings;
   }
 
  private:

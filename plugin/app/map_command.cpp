@@ -101,11 +101,25 @@ bool isWithoutPoints(const MapReport& report) {
 
 void warnOfNoPoints(MapReport& report) {
   if (!isWithoutPoints(report)) return;
+  const PixelCounts& pixels = report.pixels;
+  const std::uint64_t depths =
+      pixels.candidates - pixels.at_nearest - pixels.at_farthest - pixels.ambiguous;
   report.warnings.push_back(
       {"no-points",
-       "the map has no point: keyframes saw too few events, or every point was removed ([depth] "
-       "min_quality, [map] min_keyframes, [dsi] min_depth_m and max_depth_m), or the calibration "
-       "and the poses do not explain the events"});
+       fmt::format(
+           "the map has no point: of {} pixels with contrast, {} fit best to the nearest plane and "
+           "{} to the farthest ([dsi] min_depth_m, max_depth_m), {} are ambiguous (the parallax is "
+           "small: [keyframes] window_s; [depth] min_quality), and {} with a depth were removed "
+           "([map] min_keyframes, outlier_radius_m); or the calibration and the poses do not "
+           "explain the events",
+           pixels.candidates, pixels.at_nearest, pixels.at_farthest, pixels.ambiguous, depths)});
+}
+
+/// Few points are little evidence, however sure each of them is.
+void doubtFewPoints(MapReport& report) {
+  constexpr std::uint64_t kFewPoints = 200;
+  if (report.points >= kFewPoints || report.counts.keyframes == 0) return;
+  report.doubts.push_back(fmt::format("the map has {} points", report.points));
 }
 
 void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
@@ -215,18 +229,26 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJo
   return sequenceMaximum(job, *openRecording(source));
 }
 
-/// A first pass over the recording: warns of poses that do not explain the events, and chooses the
-/// automatic options.
+/// A first pass over the recording: chooses the automatic options, and warns of poses that do not
+/// explain the events.
 void survey(const RecordingSource& source, MappingJob& job) {
   const RecordingSurvey survey = surveyRecording(job, *openRecording(source));
-  const std::vector<Warning> warnings = survey.poseWarnings(job.options.mapper);
-  printWarnings(warnings);
-  job.warnings.insert(job.warnings.end(), warnings.begin(), warnings.end());
-  if (!job.options.automatic.any()) return;
-  job.chosen = chooseOptions(job.options.automatic, survey.rig, survey.samples, survey.duration_s,
-                             job.options.mapper)
-                   .options;
-  job.options.automatic = {};
+  FusionMapperOptions& options = job.options.mapper;
+  if (job.options.automatic.any()) {
+    OptionChoice choice = chooseOptions(job.options.automatic, survey.rig, survey.samples,
+                                        survey.duration_s, options);
+    job.chosen = std::move(choice.options);
+    job.options.automatic = {};
+    if (!choice.is_proven) {
+      job.doubts.push_back(choice.found_scene
+                               ? "the parallax is too small to tell how far the scene is away"
+                               : "no scene was found to choose depth limits from");
+    }
+  }
+  PoseVerdict verdict = survey.judgePoses(options);
+  printWarnings(verdict.warnings);
+  job.warnings.insert(job.warnings.end(), verdict.warnings.begin(), verdict.warnings.end());
+  job.doubts.insert(job.doubts.end(), verdict.doubts.begin(), verdict.doubts.end());
 }
 
 std::unique_ptr<Recording> openWhole(RecordingSource source) {
@@ -370,6 +392,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     warnOfRecalibration(arguments, outcome);
     if (outcome.report.counts.keyframes > 0) write(*output, outcome);
     warnOfNoPoints(outcome.report);
+    doubtFewPoints(outcome.report);
     if (outcome.points) warnOfFarPoints(*outcome.points, outcome.report);
   }
   StageTimes& times = outcome.report.times;

@@ -79,14 +79,25 @@ class Player {
     const FusionMapperOptions& options = job_.options.mapper;
     const DepthPlanesOptions& planes = options.keyframe.planes;
     std::vector<Warning> warnings = efm::healthWarnings(
-        statistics_, {planes.min_depth_m, planes.max_depth_m, options.trajectory.max_pose_gap_s});
+        statistics_, {nearDepth(), planes.max_depth_m, options.trajectory.max_pose_gap_s});
     for (Warning& warning : depths_.warnings()) warnings.push_back(std::move(warning));
     return warnings;
   }
+  const DepthStatistics& depths() const { return depths_; }
   /// The fraction of the recording that was mapped, if a stop was requested.
   std::optional<double> stoppedAt() const { return stopped_at_; }
 
  private:
+  /// The nearest depth that the motion is compared with: a chosen one may follow from wrong poses.
+  double nearDepth() const {
+    const auto& chosen = job_.chosen;
+    const bool automatic =
+        std::any_of(chosen.begin(), chosen.end(),
+                    [](const ChosenOption& option) { return option.key == "min_depth_m"; });
+    const double near_m = job_.options.mapper.keyframe.planes.min_depth_m;
+    return automatic ? std::max(near_m, HealthLimits{}.near_depth_m) : near_m;
+  }
+
   /// Runs a step. @return false if it throws. `error` keeps the first message.
   template <typename Step>
   static bool attempt(Step step, std::optional<std::string>& error) {
@@ -155,7 +166,7 @@ class Player {
   /// An error of writing must not count as an error of reading: it is thrown after the step.
   void deliver(const KeyframeDepthMap& keyframe) {
     if (delivery_error_) return;
-    depths_.add(keyframe.map.depth);
+    depths_.add(keyframe);
     if (job_.verbosity == Verbosity::kVerbose) progress_.print(keyframeLine(keyframe));
     try {
       job_.on_keyframe(keyframe);
@@ -314,6 +325,11 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
     outcome.tracker_trajectory = player.builder().trackerTrajectory();
   }
   describePoints(*outcome.points, outcome.report);
+  outcome.report.pixels = player.depths().pixels();
+  outcome.report.doubts = job.doubts;
+  for (std::string& doubt : player.depths().doubts()) {
+    outcome.report.doubts.push_back(std::move(doubt));
+  }
   if (status.events) {
     outcome.report.recording_s = secondsBetween(status.events->first_ns, status.events->last_ns);
   }

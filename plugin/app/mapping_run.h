@@ -23,6 +23,7 @@ struct MappingJob {
   EventFusionOptions options;
   std::vector<ChosenOption> chosen;  ///< Those of them that were automatic.
   std::vector<Warning> warnings;     ///< Of the first pass; printed already.
+  std::vector<std::string> doubts;   ///< Of the first pass: why the map rests on little evidence.
   Verbosity verbosity = Verbosity::kNormal;
   std::string activity = "mapping";  ///< For the progress.
   /// The value of `max_confidence = sequence`. Default: the running maximum.

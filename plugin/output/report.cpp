@@ -193,6 +193,11 @@ std::string reportJson(const MapReport& report) {
   json["skipped_events"] = report.skipped_events;
   json["duplicate_poses"] = counts.duplicate_poses;
   json["points"] = report.points;
+  const PixelCounts& pixels = report.pixels;
+  json["pixels"] = {{"candidates", pixels.candidates},
+                    {"at_nearest", pixels.at_nearest},
+                    {"at_farthest", pixels.at_farthest},
+                    {"ambiguous", pixels.ambiguous}};
   if (report.extent) json["extent_m"] = asJson(*report.extent);
   if (report.most_extent) json["most_extent_m"] = asJson(*report.most_extent);
   json["recording_seconds"] = report.recording_s;
@@ -208,6 +213,7 @@ std::string reportJson(const MapReport& report) {
   if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
   if (report.live) json["live"] = asJson(*report.live, counts);
   json["warnings"] = asJson(report.warnings);
+  if (!report.doubts.empty()) json["doubtful"] = report.doubts;
   if (report.refinement) json["refinement"] = asJson(*report.refinement);
   if (report.pose_shift) json["refinement"]["moved"] = asJson(*report.pose_shift);
   if (report.faults.any()) json["perturbation"] = asJson(report.faults);

@@ -25,6 +25,7 @@ struct MapReport {
   std::vector<std::uint64_t> silent_keyframes;  ///< Per camera: keyframes without its events.
   std::optional<LiveStatus> live;               ///< Of live operation.
   std::uint64_t points = 0;                     ///< Of the exported map.
+  PixelCounts pixels;                           ///< Of all keyframes.
   std::optional<MapExtent> extent;              ///< Of these points.
   /// Of 0.1 to 99.9 % of them on each axis: a few wrong points lie far from all others.
   std::optional<MapExtent> most_extent;
@@ -46,6 +47,7 @@ struct MapReport {
   std::optional<double> stopped_at;
   std::uint64_t skipped_events = 0;  ///< Bad ones that the reader left out.
   std::vector<Warning> warnings;
+  std::vector<std::string> doubts;  ///< Why the map rests on little evidence; usually none.
 };
 
 /// Enters the number of points and their extents.
@@ -54,9 +56,9 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// The report as indented JSON: events (total and per camera; read = used + without_pose +
 /// outside_window + dropped + filtered + outside_lens + over_budget), event_uses, votes (event_uses
 /// x planes = their sum), keyframes, silent (keyframes per camera, sub-intervals), points, extent_m
-/// (min and max, frame `world`; absent without points), most_extent_m (the same of 0.1 to 99.9 % of
-/// the points on each axis), recording_seconds (from the first event to
-/// the last), seconds (real time), cpu_seconds (processor time: once per run, for events, for
+/// (min and max, frame `world`; absent without points), pixels (see PixelCounts), most_extent_m
+/// (the same of 0.1 to 99.9 % of the points on each axis), recording_seconds (from the first event
+/// to the last), seconds (real time), cpu_seconds (processor time: once per run, for events, for
 /// keyframes), votes_per_second, sorted_events, skipped_events (bad ones that the reader left out),
 /// refinement where poses were refined (registered keyframes, loops, failed_solves: minima that
 /// could not be computed, failures: errors, after which a keyframe keeps the tracker's motion,
@@ -65,10 +67,10 @@ void describePoints(const MapCloud& cloud, MapReport& report);
 /// stopped_at where the run was interrupted (the fraction of the recording that was mapped),
 /// live in live operation (drop_ratio, per camera what became of its events before the mapping,
 /// windows_given_up and for which reason, late_events, pose_jumps, clock_steps, refused_poses,
-/// errors and last_error), warnings (each with name and text), recording (its files), perturbation
-/// (the faults of the poses, if any), chosen (the automatic options: key, value and reason),
-/// options (all of them, with these values) and version. Bytes of names that are not UTF-8 become
-/// U+FFFD.
+/// errors and last_error), warnings (each with name and text), doubtful (why the map rests on
+/// little evidence; absent where it does not), recording (its files), perturbation (the faults of
+/// the poses, if any), chosen (the automatic options: key, value and reason), options (all of them,
+/// with these values) and version. Bytes of names that are not UTF-8 become U+FFFD.
 std::string reportJson(const MapReport& report);
 
 /// The most memory that this process has had so far.

@@ -107,6 +107,9 @@ std::string filesText(const MapReport& report, OutputKind kind,
 std::string summaryOf(const MapReport& report, OutputKind kind,
                       const std::filesystem::path& folder) {
   std::string text;
+  if (!report.doubts.empty()) {
+    text = fmt::format("doubtful: {}\n", fmt::join(report.doubts, "; "));
+  }
   if (kind == OutputKind::kMap) {
     addLine(text, "keyframes", std::to_string(report.counts.keyframes));
   }

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
+#include "mapping/depth/median.h"
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/camera_checks.h"
@@ -159,7 +161,7 @@ std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, boo
   return warnings;
 }
 
-void DepthStatistics::add(const cv::Mat_<float>& depth) {
+void DepthStatistics::add(const KeyframeDepthMap& keyframe) {
   // A depth counts as near a limit within this fraction of the range of inverse depth.
   constexpr double kNear = 0.02;
   const double nearest = 1 / planes_.min_depth_m;
@@ -167,12 +169,84 @@ void DepthStatistics::add(const cv::Mat_<float>& depth) {
   const double margin = kNear * (nearest - farthest);
   const auto near_m = static_cast<float>(1 / (nearest - margin));
   const auto far_m = static_cast<float>(1 / (farthest + margin));
-  for (const float depth_m : depth) {
+  std::vector<float> depths_m;
+  for (const float depth_m : keyframe.map.depth) {
     if (!(depth_m > 0)) continue;
-    ++depths_;
+    depths_m.push_back(depth_m);
     nearest_ += depth_m <= near_m ? 1 : 0;
     farthest_ += depth_m >= far_m ? 1 : 0;
   }
+  depths_ += depths_m.size();
+  compareWithLast(keyframe);
+  last_ = {};
+  last_.map.depth = keyframe.map.depth;
+  last_.view = keyframe.view;
+  last_.T_world_ref = keyframe.T_world_ref;
+  pixels_ += keyframe.map.pixels;
+  if (!depths_m.empty()) {
+    parallaxes_px_.push_back(keyframe.parallax_px_m / upperMedian(depths_m));
+  }
+}
+
+/// Projects the points of the last keyframe into this one, and compares depths.
+void DepthStatistics::compareWithLast(const KeyframeDepthMap& keyframe) {
+  constexpr double kWithin = 0.1;
+  const Rigid3 T_ref_last = keyframe.T_world_ref.inverse() * last_.T_world_ref;
+  const cv::Mat1f& depth = keyframe.map.depth;
+  const cv::Rect view({}, depth.size());
+  for (int v = 0; v < last_.map.depth.rows; ++v) {
+    for (int u = 0; u < last_.map.depth.cols; ++u) {
+      const double last_m = last_.map.depth(v, u);
+      if (!(last_m > 0)) continue;
+      const Eigen::Vector3d p_ref = T_ref_last * last_.view.pointAt(u, v, last_m);
+      if (p_ref.z() <= 0) continue;
+      const Eigen::Vector2d pixel = keyframe.view.project(p_ref);
+      if (!view.contains(cv::Point2d(pixel.x(), pixel.y()))) continue;
+      const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
+      double closest = std::numeric_limits<double>::infinity();
+      for (const float here_m : depth(cv::Rect(at.x - 1, at.y - 1, 3, 3) & view)) {
+        if (here_m > 0) closest = std::min(closest, std::abs(std::log(here_m / p_ref.z())));
+      }
+      if (std::isinf(closest)) continue;
+      ++shared_;
+      agreeing_ += closest < kWithin ? 1 : 0;
+    }
+  }
+}
+
+// Measured on 260 maps of one camera and of two, with clocks up to 50 ms off: of one camera's right
+// maps, keyframes in a row agree in 55 to 95 % of the points that they share, of its wrong ones in
+// less than half; of a rig's, in 84 % and more.
+std::vector<std::string> DepthStatistics::doubts() const {
+  constexpr std::uint64_t kMinShared = 100;
+  constexpr double kMinAgreeing = 0.5;
+  constexpr double kMinParallaxPx = 1.5;
+  constexpr double kAlonePx = 2;  // where hardly a point of another keyframe confirms the depths
+  constexpr std::uint64_t kConfirmed = 1000;
+  constexpr double kMaxAtEnds = 0.4;  // of the pixels with contrast
+  std::vector<std::string> doubts;
+  const double agreeing = static_cast<double>(agreeing_) / static_cast<double>(shared_);
+  if (shared_ >= kMinShared && agreeing < kMinAgreeing) {
+    doubts.push_back(
+        fmt::format("keyframes in a row agree within 10 % in {:.0f} % of the points that they "
+                    "share: the clock, the poses or the calibration may be wrong",
+                    100 * agreeing));
+  }
+  std::vector<double> parallaxes_px = parallaxes_px_;
+  const double parallax_px = parallaxes_px.empty() ? kAlonePx : upperMedian(parallaxes_px);
+  if (parallax_px < (agreeing_ < kConfirmed ? kAlonePx : kMinParallaxPx)) {
+    doubts.push_back(fmt::format("the parallax of the scene is {:.2g} pixels", parallax_px));
+  }
+  const double candidates = static_cast<double>(std::max<std::uint64_t>(1, pixels_.candidates));
+  const double at_nearest = static_cast<double>(pixels_.at_nearest) / candidates;
+  const double at_farthest = static_cast<double>(pixels_.at_farthest) / candidates;
+  if (at_nearest + at_farthest > kMaxAtEnds) {
+    doubts.push_back(fmt::format(
+        "{:.0f} % of the pixels with contrast fit best to the nearest plane, {:g} m, and "
+        "{:.0f} % to the farthest, {:g} m ([dsi] min_depth_m, max_depth_m)",
+        100 * at_nearest, planes_.min_depth_m, 100 * at_farthest, planes_.max_depth_m));
+  }
+  return doubts;
 }
 
 std::vector<Warning> DepthStatistics::warnings() const {

@@ -3,13 +3,13 @@
 
 #include <cstdint>
 #include <map>
-#include <opencv2/core.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mapping/geometry/camera.h"
 #include "mapping/geometry/depth_planes.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/options/warning.h"
 #include "mapping/survey/option_choice.h"
 #include "plugin/session/event_fusion_options.h"
@@ -35,20 +35,29 @@ std::vector<Warning> missingParts(const RecordingStatistics& recording);
 std::vector<Warning> missingParts(const std::map<int, CameraModel>& cameras, bool has_events,
                                   bool has_poses);
 
-/// Counts the depths of keyframes near the limits.
+/// Counts what became of the pixels of keyframes, and depths near the limits.
 class DepthStatistics {
  public:
   /// @param chosen the options that were automatic: their limits are not the user's.
   explicit DepthStatistics(const DepthPlanesOptions& planes, std::vector<ChosenOption> chosen = {})
       : planes_(planes), chosen_(std::move(chosen)) {}
 
-  /// @param depth in metres, 0 where there is none.
-  void add(const cv::Mat_<float>& depth);
+  void add(const KeyframeDepthMap& keyframe);
   std::vector<Warning> warnings() const;
+  const PixelCounts& pixels() const { return pixels_; }
+  /// Why the depths rest on little evidence; empty where they do not.
+  std::vector<std::string> doubts() const;
 
  private:
   DepthPlanesOptions planes_;
   std::vector<ChosenOption> chosen_;
+  PixelCounts pixels_;
+  void compareWithLast(const KeyframeDepthMap& keyframe);
+
+  KeyframeDepthMap last_;
+  std::uint64_t shared_ = 0;           // points that two keyframes in a row have
+  std::uint64_t agreeing_ = 0;         // with the same depth
+  std::vector<double> parallaxes_px_;  // of the median depth of each keyframe
   std::uint64_t depths_ = 0;
   std::uint64_t nearest_ = 0;   // near the nearest plane
   std::uint64_t farthest_ = 0;  // near the farthest plane

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "mapping/geometry/timestamp.h"
@@ -91,6 +92,11 @@ std::string remedyOf(const PoseFinding& finding, const Rig& rig) {
   return "";
 }
 
+std::string gainText(double gain) {
+  if (gain < 1.15) return fmt::format("{:.0f} % sharper", 100 * (gain - 1));
+  return fmt::format("{:.1f} times as sharp", gain);
+}
+
 /// A mistake beside the one that the warning's name says; two mistakes share a name.
 std::string alternativeText(PoseMistake mistake) {
   switch (mistake) {
@@ -116,7 +122,7 @@ Warning poseWarning(const PoseFinding& finding, const Rig& rig) {
     return warning;
   }
   warning.text =
-      fmt::format("the events are {:.1f} times as sharp {}", finding.gain, remedyOf(finding, rig));
+      fmt::format("the events are {} {}", gainText(finding.gain), remedyOf(finding, rig));
   for (const PoseMistake other : finding.alternatives) {
     warning.text += fmt::format("; or {}, which explains them as well", alternativeText(other));
   }
@@ -146,6 +152,19 @@ std::optional<Warning> agreementWarning(const DepthAgreement& agreement) {
                   "the positions of the poses or the distance of the cameras have another unit or "
                   "scale; both must be in metres (--poses, --calibration)",
                   agreement.scale)};
+}
+
+std::optional<Warning> sensitivityWarning(const DepthSensitivity& sensitivity) {
+  constexpr double kMinChange = 0.01;
+  if (sensitivity.per_10_ms < std::max(kMinChange, sensitivity.sigma)) return std::nullopt;
+  return Warning{
+      "depths-sensitive",
+      fmt::format(
+          "the depths change by {:.2g} % where the clock of the poses is off by 10 ms, and by "
+          "{:.2g} % per percent of travel; their own standard deviation is {:.2g} %: are "
+          "clocks and poses as exact as that? ([rig] time_offsets_s, --poses)",
+          100 * sensitivity.per_10_ms, 100 * sensitivity.per_percent_travel,
+          100 * sensitivity.sigma)};
 }
 
 }  // namespace efm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/recording_survey.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <exception>
 #include <stdexcept>
@@ -9,6 +11,7 @@
 #include "mapping/events/even_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/depth_agreement.h"
+#include "mapping/survey/depth_sensitivity.h"
 #include "plugin/session/pose_warning.h"
 
 namespace efm {
@@ -36,20 +39,38 @@ EventFusionOptions surveyOptions(EventFusionOptions options) {
   return options;
 }
 
+/// A mistake that is named says more than that depths disagree.
+std::optional<Warning> mistakeIn(const RecordingSurvey& survey,
+                                 const FusionMapperOptions& options) {
+  const auto finding = checkPoses(survey.rig, survey.samples, options);
+  if (finding && finding->mistake != PoseMistake::kUnknown) {
+    return poseWarning(*finding, survey.rig);
+  }
+  if (const auto agreement = depthAgreement(survey.rig, survey.samples, options)) {
+    if (const auto warning = agreementWarning(*agreement)) return warning;
+  }
+  if (finding) return poseWarning(*finding, survey.rig);
+  return std::nullopt;
+}
+
 }  // namespace
 
-std::vector<Warning> RecordingSurvey::poseWarnings(const FusionMapperOptions& options) const {
+PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) const {
+  constexpr double kMaxChange = 0.08;  // of depths that are believed
+  PoseVerdict verdict;
   try {
-    // A mistake that is named says more than that depths disagree.
-    const auto finding = checkPoses(rig, samples, options);
-    if (finding && finding->mistake != PoseMistake::kUnknown) return {poseWarning(*finding, rig)};
-    if (const auto agreement = depthAgreement(rig, samples, options)) {
-      if (const auto warning = agreementWarning(*agreement)) return {*warning};
+    if (const auto warning = mistakeIn(*this, options)) verdict.warnings.push_back(*warning);
+    const auto sensitivity = depthSensitivity(rig, samples, options);
+    if (!sensitivity) return verdict;
+    if (const auto warning = sensitivityWarning(*sensitivity)) verdict.warnings.push_back(*warning);
+    if (sensitivity->per_10_ms > kMaxChange) {
+      verdict.doubts.push_back(
+          fmt::format("a clock of the poses that is off by 10 ms changes the depths by {:.2g} %",
+                      100 * sensitivity->per_10_ms));
     }
-    if (finding) return {poseWarning(*finding, rig)};
   } catch (const std::invalid_argument&) {
   }
-  return {};
+  return verdict;
 }
 
 RecordingSurveyor::RecordingSurveyor(const EventFusionOptions& options)

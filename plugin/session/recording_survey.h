@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mapping/options/warning.h"
@@ -10,6 +11,12 @@
 
 namespace efm {
 
+/// What a first look says of the poses.
+struct PoseVerdict {
+  std::vector<Warning> warnings;
+  std::vector<std::string> doubts;  ///< Why a map rests on little evidence.
+};
+
 /// What a first pass over a recording found: its cameras and some of its windows, evenly spread.
 struct RecordingSurvey {
   Rig rig;
@@ -17,8 +24,10 @@ struct RecordingSurvey {
   /// The time from the first to the last event with a pose; nothing without such events.
   std::optional<double> duration_s;
 
-  /// Whether the poses explain the events. An error is left to the pass that maps.
-  std::vector<Warning> poseWarnings(const FusionMapperOptions& options) const;
+  /// Whether the poses explain the events, and how much depends on them. An error is left to the
+  /// pass that maps.
+  /// @param options with the window of the map.
+  PoseVerdict judgePoses(const FusionMapperOptions& options) const;
 };
 
 /// Surveys a recording in one pass, from the same calls as a MappingSession. Memory does not grow

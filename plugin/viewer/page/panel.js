@@ -50,8 +50,10 @@ function showNumbers() {
   }
   addRow("report", "version", report.version);
 
-  element("warning-section").hidden = report.warnings.length === 0;
-  for (const warning of report.warnings) {
+  const doubts = (report.doubtful || []).map((text) => ({ name: "doubtful", text }));
+  const warnings = doubts.concat(report.warnings);
+  element("warning-section").hidden = warnings.length === 0;
+  for (const warning of warnings) {
     for (const [tag, text] of [["dt", warning.name], ["dd", warning.text]]) {
       element("warnings").appendChild(document.createElement(tag)).textContent = text;
     }

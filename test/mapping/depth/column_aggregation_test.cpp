@@ -52,7 +52,7 @@ cv::Mat1b randomMask(std::uint32_t seed, const cv::Size& size, int one_of) {
 
 std::vector<AggregatedPeak> aggregate(const ChosenDsi& dsi, const cv::Mat1b& mask) {
   const SweptDsi swept = dsi.swept();
-  return aggregateColumns(SparseMask(mask), swept.columns);
+  return aggregateColumns(SparseMask(mask), swept.columns, planesPerStep(swept.columns.planes()));
 }
 
 /// The sum of the rays of the chosen pixels in 9x9, in double.

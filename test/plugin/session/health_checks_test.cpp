@@ -507,7 +507,9 @@ TEST(HealthChecks, DepthsAtALimitAreSeen) {
       depth(i / 50, i % 50) = i * 100 < percent * depths ? depth_m : 1.0F;
     }
     DepthStatistics statistics(planes, chosen);
-    statistics.add(depth);
+    KeyframeDepthMap keyframe;
+    keyframe.map.depth = depth;
+    statistics.add(keyframe);
     return statistics.warnings();
   };
   EXPECT_THAT(warningsAt(0.508F, 10).at(0).text,
