@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "mapping/depth/median.h"
 #include "mapping/geometry/timestamp.h"
@@ -13,39 +12,10 @@ namespace efm {
 namespace {
 
 constexpr std::size_t kMaxWindows = 3;
-constexpr std::size_t kMinRatios = 50;
+constexpr std::size_t kMinDepths = 50;
 constexpr std::int64_t kClockNs = 5'000'000;  // to either side: 10 ms between them
 constexpr double kTravel = 0.05;
 constexpr Coarseness kSmallSweep{160, 40'000, 1.5, kNearestSceneM, ExtractionMethod::kAggregated};
-
-/// The median of ln(a / b) over the pixels that both maps have.
-std::optional<double> medianLogRatio(const std::optional<KeyframeDepthMap>& a,
-                                     const std::optional<KeyframeDepthMap>& b) {
-  std::vector<double> logs;
-  if (!a || !b) return std::nullopt;
-  for (int y = 0; y < a->map.depth.rows; ++y) {
-    for (int x = 0; x < a->map.depth.cols; ++x) {
-      const double a_m = a->map.depth(y, x);
-      const double b_m = b->map.depth(y, x);
-      if (a_m > 0 && b_m > 0) logs.push_back(std::log(a_m / b_m));
-    }
-  }
-  if (logs.size() < kMinRatios) return std::nullopt;
-  return upperMedian(logs);
-}
-
-/// The median of the depths' standard deviations, as fractions of the depth.
-double medianSigma(const DepthMap& map) {
-  std::vector<double> sigmas;
-  for (int y = 0; y < map.depth.rows; ++y) {
-    for (int x = 0; x < map.depth.cols; ++x) {
-      if (map.depth(y, x) > 0) {
-        sigmas.push_back(map.depth(y, x) * std::sqrt(double{map.variance(y, x)}));
-      }
-    }
-  }
-  return sigmas.empty() ? 0 : upperMedian(sigmas);
-}
 
 }  // namespace
 
@@ -53,35 +23,42 @@ std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
                                                  const std::vector<WindowSample>& samples,
                                                  const FusionMapperOptions& options) {
   CoarseSweep sweep(rig, options, kSmallSweep);
-  std::vector<double> by_clock, by_travel, sigmas;
+  std::vector<double> by_clock, by_travel, sigmas;  // of the windows
   const std::size_t count = std::min(kMaxWindows, samples.size());
   for (std::size_t i = 0; i < count; ++i) {
     const WindowSample& sample = samples[(2 * i + 1) * samples.size() / (2 * count)];
     WindowData data = middleOf(sample, options.policy.window_s);
-    const auto map = [&](const Trajectory& trajectory) {
-      data.trajectory = &trajectory;
-      return sweep.map(data);
-    };
-    const auto shifted = [&](std::int64_t shift_ns) {
+    const auto depthsWith = [&](std::int64_t shift_ns, double travel, cv::Mat1f* variance) {
       Trajectory moved(options.trajectory);
-      for (const StampedPose& pose : sample.trajectory.poses()) {
-        moved.add({pose.t_ns + shift_ns, pose.T_world_rig});
+      for (const auto& [t_ns, pose] : sample.trajectory.poses()) {
+        moved.add({t_ns + shift_ns, {pose.rotation, travel * pose.translation}});
       }
-      return map(moved);
+      data.trajectory = &moved;
+      const auto keyframe = sweep.map(data);
+      if (keyframe && variance) *variance = keyframe->map.variance;
+      return keyframe ? keyframe->map.depth : cv::Mat1f();
     };
-    const auto clock = medianLogRatio(shifted(-kClockNs), shifted(kClockNs));
-    if (clock) by_clock.push_back(std::abs(*clock));
-    const auto as_given = map(sample.trajectory);
-    if (as_given) sigmas.push_back(medianSigma(as_given->map));
-    Trajectory longer(options.trajectory);
-    for (StampedPose pose : sample.trajectory.poses()) {
-      pose.T_world_rig.translation *= 1 + kTravel;
-      longer.add(pose);
+    cv::Mat1f variance;
+    const cv::Mat1f given = depthsWith(0, 1, &variance);
+    const cv::Mat1f early = depthsWith(-kClockNs, 1, nullptr);
+    const cv::Mat1f late = depthsWith(kClockNs, 1, nullptr);
+    const cv::Mat1f farther = depthsWith(0, 1 + kTravel, nullptr);
+    if (given.empty() || early.empty() || late.empty() || farther.empty()) continue;
+    std::vector<double> clock, travel, sigma;  // of the pixels
+    for (int y = 0; y < given.rows; ++y) {
+      for (int x = 0; x < given.cols; ++x) {
+        if (early(y, x) > 0 && late(y, x) > 0) clock.push_back(std::log(early(y, x) / late(y, x)));
+        if (!(given(y, x) > 0)) continue;
+        sigma.push_back(given(y, x) * std::sqrt(double{variance(y, x)}));
+        if (farther(y, x) > 0) travel.push_back(std::log(farther(y, x) / given(y, x)));
+      }
     }
-    const auto travel = medianLogRatio(map(longer), as_given);
-    if (travel) by_travel.push_back(std::abs(*travel) / std::log1p(kTravel));
+    if (std::min({clock.size(), travel.size(), sigma.size()}) < kMinDepths) continue;
+    by_clock.push_back(std::abs(upperMedian(clock)));
+    by_travel.push_back(std::abs(upperMedian(travel)) / std::log1p(kTravel));
+    sigmas.push_back(upperMedian(sigma));
   }
-  if (by_clock.empty() || by_travel.empty() || sigmas.empty()) return std::nullopt;
+  if (sigmas.empty()) return std::nullopt;
   return DepthSensitivity{upperMedian(by_clock), 0.01 * upperMedian(by_travel),
                           upperMedian(sigmas)};
 }

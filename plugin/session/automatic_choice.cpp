@@ -174,7 +174,7 @@ void MappingSession::use(OptionChoice choice, const FusionMapperOptions& chosen)
   }
   mapper_.configure(chosen.policy, planes);
   status_.chosen = std::move(choice.options);
-  status_.scene_unknown = !choice.found_scene;
+  status_.scene_unknown = !choice.is_proven;
   ++status_.choices;
   look_interval_ns_ = std::clamp(2 * look_interval_ns_, kLookIntervalNs, kMaxLookIntervalNs);
 }

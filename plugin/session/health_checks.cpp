@@ -235,7 +235,8 @@ std::vector<std::string> DepthStatistics::doubts() const {
   std::vector<double> parallaxes_px = parallaxes_px_;
   const double parallax_px = parallaxes_px.empty() ? kAlonePx : upperMedian(parallaxes_px);
   if (parallax_px < (agreeing_ < kConfirmed ? kAlonePx : kMinParallaxPx)) {
-    doubts.push_back(fmt::format("the parallax of the scene is {:.2g} pixels", parallax_px));
+    doubts.push_back(
+        fmt::format("the parallax of the scene is {:.2g} px in a window", parallax_px));
   }
   const double candidates = static_cast<double>(std::max<std::uint64_t>(1, pixels_.candidates));
   const double at_nearest = static_cast<double>(pixels_.at_nearest) / candidates;

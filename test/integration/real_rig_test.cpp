@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A real rig's calibration on its real, smoothed trajectory through a simulated room, as a user
 // runs it: simulate, map with the rig's own option file, compare with the exact truth.
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "mapping/geometry/depth_planes.h"
@@ -48,6 +51,53 @@ TEST_F(RealRig, MvsecsDroneMapsASimulatedRoom) {
             << evaluation.all.points << " points\n";
   // Half the points within one plane: what the planes can tell.
   EXPECT_LE(error_steps, 1);
+}
+
+/// Small real recordings of one camera, without options.
+class RealRecording : public RealRig {
+ protected:
+  /// @return what the program printed; empty without the recording.
+  std::string map(const std::string& name, const std::string& events,
+                  const std::string& options = "") const {
+    const auto data = std::filesystem::path(EFM_SHARED_DATA) / "real_small" / name;
+    if (!exists(data)) return "";
+    EXPECT_EQ(run("map '" + (data / events).string() + "' --poses '" +
+                  (data / "poses.txt").string() + "' --calibration '" +
+                  (data / "calibration.yaml").string() + "' --out out --force " + options),
+              0);
+    std::ifstream output(folder() / "output.txt");
+    return {std::istreambuf_iterator<char>(output), {}};
+  }
+};
+
+TEST_F(RealRecording, APanTiltHeadMapsItsDeskWithAnyNumberOfPlanes) {
+  for (const char* name : {"evbench_seq2", "evbench_seq3"}) {
+    for (const char* planes : {"auto", "20", "50", "100", "200"}) {
+      const std::string output =
+          map(name, "events.txt.gz", std::string("--set dsi.num_planes=") + planes);
+      if (output.empty()) GTEST_SKIP() << "there is no recording " << name;
+      // The desk and the board behind it are 0.8 to 1.4 m away.
+      int depths = 0, on_the_desk = 0;
+      for (const auto& entry : std::filesystem::directory_iterator(folder() / "out/keyframes")) {
+        const cv::Mat1f depth =
+            cv::imread((entry.path() / "depth.tiff").string(), cv::IMREAD_UNCHANGED);
+        for (const float depth_m : depth) {
+          depths += depth_m > 0 ? 1 : 0;
+          on_the_desk += depth_m > 0.7F && depth_m < 1.6F ? 1 : 0;
+        }
+      }
+      EXPECT_GE(depths, 300) << name << ", planes: " << planes << "\n" << output;
+      EXPECT_GE(on_the_desk, 0.85 * depths) << name << ", planes: " << planes;
+    }
+  }
+}
+
+TEST_F(RealRecording, AClockThatIsOffIsNamedAndItsMapDoubted) {
+  const std::string output = map("mvsec_indoor_flying1_24s", "events.txt");
+  if (output.empty()) GTEST_SKIP() << "there is no such recording";
+  EXPECT_THAT(output, testing::HasSubstr("warning: time-shift: "));
+  EXPECT_THAT(output, testing::HasSubstr("doubtful: "));
+  EXPECT_THAT(output, testing::HasSubstr("warning: depths-sensitive: "));
 }
 
 }  // namespace

@@ -24,8 +24,8 @@ struct Pixel {
 
 class NaiveAggregation {
  public:
-  NaiveAggregation(const std::vector<float>& dsi, const cv::Size& size, int planes)
-      : dsi_(dsi), size_(size), planes_(planes), place_(std::max(1.0, (planes - 1) / 99.0)) {}
+  NaiveAggregation(const std::vector<float>& dsi, const cv::Size& size, int planes, double step)
+      : dsi_(dsi), size_(size), planes_(planes), place_(step) {}
 
   DepthMap run(const DepthPlanes& depths, const DepthExtractionOptions& options) {
     cv::Mat1f confidence(size_);
@@ -214,8 +214,9 @@ class NaiveAggregation {
 }  // namespace
 
 DepthMap extractAggregated(const std::vector<float>& dsi, const cv::Size& size,
-                           const DepthPlanes& planes, const DepthExtractionOptions& options) {
-  return NaiveAggregation(dsi, size, planes.size()).run(planes, options);
+                           const DepthPlanes& planes, const DepthExtractionOptions& options,
+                           double step_planes) {
+  return NaiveAggregation(dsi, size, planes.size(), step_planes).run(planes, options);
 }
 
 }  // namespace efm::oracle

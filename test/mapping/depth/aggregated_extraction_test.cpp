@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <random>
 
@@ -86,7 +87,21 @@ ChosenDsi randomEdges(std::uint32_t seed, const cv::Size& size, int planes) {
 TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
   int kept = 0;
   int differing = 0;
-  for (const int planes : {1, 2, 3, 40, 100, 250}) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  const struct {
+    int planes;
+    double parallax_px_m;
+    double step_planes;
+  } cases[] = {{1, kFar, 1},
+               {2, kFar, 1},
+               {3, kFar, 1},
+               {40, kFar, 1},
+               {100, kFar, 1},
+               {250, kFar, 249 / 99.0},
+               // 6.3 and 9 pixels of parallax between the limits: an eighth of a pixel.
+               {40, 3.5, 39 * 0.125 / 6.3},
+               {100, 5, 99 * 0.125 / 9}};
+  for (const auto& [planes, parallax_px_m, step_planes] : cases) {
     for (const int window : {3, 5, 11}) {
       const cv::Size size(64, 37);
       const ChosenDsi dsi = randomEdges(static_cast<std::uint32_t>(planes + window), size, planes);
@@ -94,8 +109,9 @@ TEST(AggregatedExtraction, EqualsTheOracleOnRandomEdges) {
       DepthExtractionOptions options;
       options.threshold_kernel = window;
       options.min_quality = 0.03 * window;
-      const DepthMap found = extract(dsi, options);
-      const DepthMap exact = oracle::extractAggregated(dsi.rounded().values, size, depths, options);
+      const DepthMap found = extractAggregated(dsi.swept(), depths, options, parallax_px_m);
+      const DepthMap exact =
+          oracle::extractAggregated(dsi.rounded().values, size, depths, options, step_planes);
       EXPECT_TRUE(test::same(found.confidence, dsi.swept().peaks.confidence));
       const int kept_before = kept;
       for (int y = 0; y < size.height; ++y) {
@@ -164,6 +180,27 @@ TEST(AggregatedExtraction, TheContrastThresholdAndDilationAreThoseOfTheOptions) 
   EXPECT_EQ(cv::countNonZero((grown.depth != kept.depth) & (kept.depth > 0)), 0);
   options.min_local_contrast = 1e6;
   EXPECT_EQ(cv::countNonZero(extract(dsi, options).depth), 0);
+}
+
+TEST(AggregatedExtraction, MorePlanesThanTheParallaxTellsApartLoseNoPoints) {
+  // A peak of a pixel, of three pixels between the limits.
+  std::vector<int> points;
+  for (const int planes : {20, 50, 100, 200, 400}) {
+    const double px = (planes - 1) / 3.0;
+    const ChosenDsi dsi = edges({60, 40}, planes, [&](int plane) {
+      return 20 * ridge(plane, 0.4 * (planes - 1), 0.6 * px);
+    });
+    const DepthMap map = extractAggregated(dsi.swept(), planesOf(planes), {}, 3 / 1.8);
+    points.push_back(cv::countNonZero(map.depth));
+    const PixelCounts& pixels = map.pixels;
+    EXPECT_EQ(pixels.candidates, pixels.at_nearest + pixels.at_farthest + pixels.ambiguous +
+                                     static_cast<std::uint64_t>(points.back()));
+    // The whole range within half of a pixel tells nothing.
+    EXPECT_EQ(
+        cv::countNonZero(extractAggregated(dsi.swept(), planesOf(planes), {}, 0.5 / 1.8).depth), 0);
+  }
+  EXPECT_GT(points[0], 100);
+  for (const int count : points) EXPECT_GE(count, 0.95 * points[0]);
 }
 
 }  // namespace

@@ -160,6 +160,11 @@ TEST(PlanesPerStep, IsOneUpToAHundredPlanesAndGrowsWithThem) {
   for (const int planes : {1, 2, 50, 100}) EXPECT_EQ(planesPerStep(planes), 1);
   EXPECT_DOUBLE_EQ(planesPerStep(199), 2);
   EXPECT_DOUBLE_EQ(planesPerStep(496), 5);
+  // An eighth of a pixel of little parallax; at most a 24th of the range.
+  EXPECT_DOUBLE_EQ(planesPerStep(101, 10), 1.25);
+  EXPECT_DOUBLE_EQ(planesPerStep(241, 1), 10);
+  EXPECT_DOUBLE_EQ(planesPerStep(11, 1), 10 / 24.0);
+  EXPECT_DOUBLE_EQ(planesPerStep(11, 100), 1);
 }
 
 }  // namespace

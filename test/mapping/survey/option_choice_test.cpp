@@ -5,6 +5,7 @@
 
 #include <array>
 
+#include "mapping/survey/depth_sensitivity.h"
 #include "test/mapping/survey/edge_world.h"
 
 namespace efm {
@@ -72,10 +73,59 @@ TEST(OptionChoice, TheWindowIsBoundByTheRecordingTheMotionAndASecond) {
   }
 }
 
-TEST(OptionChoice, PlanesAreAPixelOfParallaxApartFrom100To400) {
+/// A pan-tilt head: 10 degrees a second, and a lever of some centimetres.
+template <int kLeverMm>
+Rigid3 panning(double t_s) {
+  const Eigen::Quaterniond rotation = rotationBy({0.02 * std::sin(5 * t_s), 0.17 * t_s, 0});
+  return {rotation, rotation * Eigen::Vector3d{0, 0, 1e-3 * kLeverMm}};
+}
+
+TEST(OptionChoice, LittleParallaxIsGivenALongWindowAndNeverANearScene) {
+  const struct {
+    Rigid3 (*T_world_rig)(double);
+    bool is_proven;
+    double window_s;  // at least
+  } cases[] = {{panning<40>, false, 0.9}, {panning<200>, true, 0.6}};
+  const Rig rig = EdgeWorld::rig(1);
+  for (const auto& c : cases) {
+    EdgeWorld world;
+    world.T_world_rig = c.T_world_rig;
+    world.edges = 80;
+    FusionMapperOptions options;
+    const auto chosen = chooseOptions(kAll, rig, {world.sample(rig)}, 1.6, options);
+    EXPECT_EQ(chosen.is_proven, c.is_proven) << c.window_s;
+    EXPECT_GE(options.policy.window_s, c.window_s);
+    EXPECT_GT(options.keyframe.planes.max_depth_m, 1) << "the nearest edge";
+    EXPECT_GT(options.keyframe.planes.min_depth_m, 0.1);
+    EXPECT_LT(options.keyframe.planes.num_planes, 100);
+  }
+}
+
+TEST(DepthSensitivity, IsThatOfTheSpeedAndOfTheTravel) {
+  // 0.32 m/s in the middle, 0.004 m/s faster after 10 ms.
+  EdgeWorld world;
+  world.T_world_rig = [](double t_s) {
+    return Rigid3{Eigen::Quaterniond::Identity(), {0.2 * t_s * t_s, 0, 0}};
+  };
+  FusionMapperOptions options;
+  options.policy.window_s = 0.4;
+  for (const std::size_t cameras : {1, 2}) {
+    const Rig rig = EdgeWorld::rig(cameras);
+    const auto sensitivity = depthSensitivity(rig, {world.sample(rig)}, options);
+    ASSERT_TRUE(sensitivity);
+    const bool one = cameras == 1;
+    EXPECT_NEAR(sensitivity->per_10_ms, one ? 0.0125 : 0.003, 0.004);
+    EXPECT_NEAR(sensitivity->per_percent_travel, one ? 0.01 : 0.003, 0.003);
+    EXPECT_GT(sensitivity->sigma, 0);
+  }
+}
+
+TEST(OptionChoice, PlanesAreAPixelOfParallaxApartFrom25To400) {
   EXPECT_EQ(automaticPlanes({0.5, 5.0}, 100.1), 1 + 181);
   EXPECT_EQ(automaticPlanes({0.5, 5.0}, 10), 100);
   EXPECT_EQ(automaticPlanes({0.5, 5.0}, 1000), 400);
+  EXPECT_EQ(automaticPlanes({0.5, 5.0}, 2.5), 1 + 45) << "a tenth of a pixel apart";
+  EXPECT_EQ(automaticPlanes({0.5, 5.0}, 0.5), 25);
 }
 
 TEST(OptionChoice, AutomaticOptionsFitTheGivenOnesUntilTheyAreChosen) {
