@@ -139,23 +139,6 @@ double longestOf(const std::vector<WindowSample>& samples) {
   return longest_s;
 }
 
-/// A longer window than the others, if the parallax needs it.
-/// @param shortest_s the window that is chosen with enough parallax.
-/// @return nothing if that window has enough.
-std::optional<double> neededWindow(const std::vector<WindowSample>& samples, const Rig& rig,
-                                   const FusionMapperOptions& options, const SceneDepths& depths,
-                                   double shortest_s) {
-  const auto enough = [&](double window_s) {
-    return parallaxIn(samples, window_s, rig, options) * depths.median() >= kWantedPx;
-  };
-  if (enough(shortest_s)) return std::nullopt;
-  const double longest_s =
-      motionLimit(samples, rig, options, depths, std::max(shortest_s, longestOf(samples)));
-  double window_s = shortest_s;
-  while (window_s < longest_s && !enough(window_s)) window_s *= 1.1;
-  return std::max(shortest_s, std::min(window_s, longest_s));
-}
-
 void chooseWindow(const std::vector<WindowSample>& samples, const Rig& rig,
                   const FusionMapperOptions& options, const SceneDepths& depths,
                   std::optional<double> duration_s, Choice& choice) {
@@ -163,21 +146,28 @@ void chooseWindow(const std::vector<WindowSample>& samples, const Rig& rig,
   const double by_motion_s = motionLimit(samples, rig, options, depths, kMaxWindowS);
   const double by_length_s =
       duration_s ? std::max(*duration_s / 4, std::min(*duration_s, kShortS)) : by_motion_s;
-  const bool by_length = 0 < by_length_s && by_length_s < by_motion_s;
-  const double window_s = by_length ? roundedDown(by_length_s, 2) : by_motion_s;
-  if (const auto needed_s = neededWindow(samples, rig, options, depths, window_s)) {
-    const double most_s = duration_s.value_or(*needed_s);
-    choice.window(std::max(window_s, roundedDown(std::min(*needed_s, most_s), 2)),
-                  "the parallax is small, " +
-                      number(depths.median() * parallaxIn(samples, window_s, rig, options)) +
-                      " pixels in " + number(window_s) + " s");
-  } else if (by_length) {
-    choice.window(window_s, "the recording lasts " + number(*duration_s) + " s");
-  } else {
-    choice.window(window_s, by_motion_s < kMaxWindowS
-                                ? "the longest in which most of the view stays in sight"
-                                : "the longest that is chosen: the view moves slowly");
+  double window_s = by_motion_s;
+  std::string reason = by_motion_s < kMaxWindowS
+                           ? "the longest in which most of the view stays in sight"
+                           : "the longest that is chosen: the view moves slowly";
+  if (0 < by_length_s && by_length_s < by_motion_s) {
+    window_s = roundedDown(by_length_s, 2);
+    reason = "the recording lasts " + number(*duration_s) + " s";
   }
+  const auto parallax = [&] {
+    return parallaxIn(samples, window_s, rig, options) * depths.median();
+  };
+  if (parallax() < kWantedPx) {
+    reason =
+        "the parallax is small, " + number(parallax()) + " pixels in " + number(window_s) + " s";
+    const double whole_s = std::min(longestOf(samples), duration_s.value_or(longestOf(samples)));
+    const double longest_s = motionLimit(samples, rig, options, depths, whole_s);
+    while (window_s < longest_s && parallax() < kWantedPx) {
+      window_s = std::min(1.1 * window_s, longest_s);
+    }
+    window_s = roundedDown(window_s, 2);
+  }
+  choice.window(window_s, reason);
 }
 
 double lengthOf(const FusionMapperOptions& options) {
