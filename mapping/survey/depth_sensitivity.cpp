@@ -15,7 +15,7 @@ constexpr std::size_t kMaxWindows = 3;
 constexpr std::size_t kMinDepths = 50;
 constexpr std::int64_t kClockNs = 5'000'000;  // to either side: 10 ms between them
 constexpr double kTravel = 0.05;
-constexpr Coarseness kSmallSweep{160, 40'000, 1.5, kNearestSceneM, ExtractionMethod::kAggregated};
+constexpr Coarseness kSmallSweep{160, 20'000, 1.5, kNearestSceneM, ExtractionMethod::kAggregated};
 
 }  // namespace
 

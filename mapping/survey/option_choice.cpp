@@ -184,11 +184,11 @@ void chooseDepths(const SceneDepths& depths, double parallax_px_m, Choice& choic
   // Where a quarter of a pixel of parallax is a tenth of the depth. It matters for a single camera
   // that moves little.
   const double accurate_m = 0.1 / 0.25 * parallax_px_m;
-  const double most_m = 2 / depths.median();
-  // A limit within the scene would gather wrong depths: its far end is included where it is near.
-  const double end_m = std::min(1.25 / scene.far, 1.5 * accurate_m);
+  double most_m = std::max(accurate_m, 2 / depths.median());
+  // A limit right before the scene's far end would gather its depths.
+  if (1 / scene.far < 1.1 * most_m) most_m = std::max(most_m, 1.25 / scene.far);
   if (accurate_m < max_m) {
-    max_m = std::min(max_m, std::max({accurate_m, most_m, end_m}));
+    max_m = std::min(max_m, most_m);
     reason += ", and the parallax is too small for larger depths";
   }
   const double min_m = std::max(roundedDown(1 / limits.near, 2), kMinDepthM);

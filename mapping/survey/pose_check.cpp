@@ -186,7 +186,9 @@ class PoseCheck {
     }
     if (best.gains.mean() < kPromising) return;
     best.gains = gainsOfShift(best.finding.shift_s, pieces_.size());
-    for (double step_s = kTimeStepS / 2; step_s >= kFinestTimeStepS; step_s /= 2) {
+    // Half of the distance to the next shift that was tried.
+    double step_s = std::min(kTimeStepS, std::abs(best.finding.shift_s)) / 2;
+    for (; step_s >= kFinestTimeStepS; step_s /= 2) {
       const double middle_s = best.finding.shift_s;
       attempt(middle_s - step_s, pieces_.size());
       attempt(middle_s + step_s, pieces_.size());

@@ -29,9 +29,9 @@ TEST(OptionChoice, LimitsEncloseTheScene) {
     EXPECT_EQ(chosen.options.size(), 5U);
     const DepthPlanesOptions& planes = options.keyframe.planes;
     // Around the edges from 1 to 3 m; of those from 3 to 9 m the limit is near the far end, because
-    // the parallax of 0.25 m is too small beyond.
+    // the parallax is too small beyond.
     EXPECT_NEAR(planes.min_depth_m, factor == 1 ? 0.45 : 1.6, 0.03 * factor);
-    EXPECT_NEAR(planes.max_depth_m, factor == 1 ? 3.8 : 9.6, 0.2 * factor);
+    EXPECT_NEAR(planes.max_depth_m, factor == 1 ? 3.8 : 12, 0.2 * factor);
     EXPECT_EQ(planes.num_planes, automaticPlanes(planes, chosen.parallax_px_m));
     EXPECT_EQ(options.policy.stride_s, options.policy.window_s / 2);
   }
