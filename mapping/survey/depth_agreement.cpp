@@ -2,8 +2,10 @@
 #include "mapping/survey/depth_agreement.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include "mapping/depth/median.h"
 #include "mapping/survey/scene_depths.h"
 
 namespace efm {
@@ -30,6 +32,13 @@ void appendRatios(const cv::Mat1f& by_motion_m, const cv::Mat1f& by_rig_m,
     }
   }
 }
+
+// Of the sensitivity.
+constexpr std::size_t kMaxWindows = 3;
+constexpr std::size_t kMinDepths = 50;
+constexpr std::int64_t kClockNs = 5'000'000;  // to either side: 10 ms between them
+constexpr double kTravel = 0.05;
+constexpr Coarseness kSmallSweep{160, 20'000, 1.5, kNearestSceneM, ExtractionMethod::kAggregated};
 
 }  // namespace
 
@@ -59,6 +68,50 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
   });
   agreement.agreeing = static_cast<double>(within) / static_cast<double>(ratios.size());
   return agreement;
+}
+
+std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
+                                                 const std::vector<WindowSample>& samples,
+                                                 const FusionMapperOptions& options) {
+  CoarseSweep sweep(rig, options, kSmallSweep);
+  std::vector<double> by_clock, by_travel, sigmas;  // of the windows
+  const std::size_t count = std::min(kMaxWindows, samples.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const WindowSample& sample = samples[(2 * i + 1) * samples.size() / (2 * count)];
+    WindowData data = middleOf(sample, options.policy.window_s);
+    const auto depthsWith = [&](std::int64_t shift_ns, double travel, cv::Mat1f* variance) {
+      Trajectory moved(options.trajectory);
+      for (const auto& [t_ns, pose] : sample.trajectory.poses()) {
+        moved.add({t_ns + shift_ns, {pose.rotation, travel * pose.translation}});
+      }
+      data.trajectory = &moved;
+      const auto keyframe = sweep.map(data);
+      if (keyframe && variance) *variance = keyframe->map.variance;
+      return keyframe ? keyframe->map.depth : cv::Mat1f();
+    };
+    cv::Mat1f variance;
+    const cv::Mat1f given = depthsWith(0, 1, &variance);
+    const cv::Mat1f early = depthsWith(-kClockNs, 1, nullptr);
+    const cv::Mat1f late = depthsWith(kClockNs, 1, nullptr);
+    const cv::Mat1f farther = depthsWith(0, 1 + kTravel, nullptr);
+    if (given.empty() || early.empty() || late.empty() || farther.empty()) continue;
+    std::vector<double> clock, travel, sigma;  // of the pixels
+    for (int y = 0; y < given.rows; ++y) {
+      for (int x = 0; x < given.cols; ++x) {
+        if (early(y, x) > 0 && late(y, x) > 0) clock.push_back(std::log(early(y, x) / late(y, x)));
+        if (!(given(y, x) > 0)) continue;
+        sigma.push_back(given(y, x) * std::sqrt(double{variance(y, x)}));
+        if (farther(y, x) > 0) travel.push_back(std::log(farther(y, x) / given(y, x)));
+      }
+    }
+    if (std::min({clock.size(), travel.size(), sigma.size()}) < kMinDepths) continue;
+    by_clock.push_back(std::abs(upperMedian(clock)));
+    by_travel.push_back(std::abs(upperMedian(travel)) / std::log1p(kTravel));
+    sigmas.push_back(upperMedian(sigma));
+  }
+  if (sigmas.empty()) return std::nullopt;
+  return DepthSensitivity{upperMedian(by_clock), 0.01 * upperMedian(by_travel),
+                          upperMedian(sigmas)};
 }
 
 }  // namespace efm

@@ -27,4 +27,20 @@ std::optional<DepthAgreement> depthAgreement(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options);
 
+/// How much the depths change with small errors of the poses, as fractions of the depth: the median
+/// over some windows of the median over the pixels.
+struct DepthSensitivity {
+  double per_10_ms = 0;           ///< By a clock that is 10 ms off.
+  double per_percent_travel = 0;  ///< By positions that are scaled by 1 %.
+  double sigma = 0;               ///< The standard deviation that the depths state.
+};
+
+/// Maps windows of up to three samples coarsely: as they are, with other clocks, with more travel.
+/// @param options with the window of the map.
+/// @return nothing where too few pixels have depths.
+/// @throws std::invalid_argument where the options do not fit the rig.
+std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
+                                                 const std::vector<WindowSample>& samples,
+                                                 const FusionMapperOptions& options);
+
 }  // namespace efm

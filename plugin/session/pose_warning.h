@@ -6,7 +6,6 @@
 #include "mapping/geometry/rig.h"
 #include "mapping/options/warning.h"
 #include "mapping/survey/depth_agreement.h"
-#include "mapping/survey/depth_sensitivity.h"
 #include "mapping/survey/pose_check.h"
 
 namespace efm {

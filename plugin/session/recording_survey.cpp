@@ -11,7 +11,6 @@
 #include "mapping/events/even_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/depth_agreement.h"
-#include "mapping/survey/depth_sensitivity.h"
 #include "plugin/session/pose_warning.h"
 
 namespace efm {

@@ -5,7 +5,7 @@
 
 #include <array>
 
-#include "mapping/survey/depth_sensitivity.h"
+#include "mapping/survey/depth_agreement.h"
 #include "test/mapping/survey/edge_world.h"
 
 namespace efm {
