@@ -120,6 +120,9 @@ std::string summaryOf(const MapReport& report, OutputKind kind,
   addLine(text, "time", timeLine(report));
   if (report.pose_shift) addLine(text, "refinement", shiftText(*report.pose_shift));
   if (!report.chosen.empty()) addLine(text, "chosen", chosenText(report.chosen));
+  for (const Warning& warning : report.warnings) {
+    if (warning.name == "depths-sensitive") addLine(text, "sensitive", warning.text);
+  }
   if (!report.warnings.empty()) {
     addLine(text, "warnings",
             fmt::format("{}, on stderr and in report.json", report.warnings.size()));
