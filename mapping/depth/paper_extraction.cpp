@@ -64,6 +64,7 @@ DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
     found[i] = {medians[i], peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at))};
   });
   DepthMap map = depthMapOf(sparse, found, peaks.confidence, planes);
+  map.pixels.candidates = sparse.size();
   if (options.dilate) dilate(sparse, mask, map);
   return map;
 }

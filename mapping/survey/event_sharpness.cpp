@@ -27,8 +27,7 @@ EventSharpness::EventSharpness(const Rig& rig, const FusionMapperOptions& option
     : rig_(rig), options_(sharpnessOptions(options)), sweep_(rig, options_, kCoarseness) {}
 
 double EventSharpness::shiftIn(const SamplePiece& piece) const {
-  const auto motion = motionIn(piece.along(piece.trajectory), rig_,
-                               selectedCameras(rig_, options_.cameras), options_.keyframe);
+  const auto motion = motionIn(piece.along(piece.trajectory), rig_, options_);
   return motion ? motion->shift_m : 0;
 }
 

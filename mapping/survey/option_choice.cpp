@@ -105,12 +105,11 @@ double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
   const auto moveOf = [&](const ViewMotion& motion) {
     return (motion.shift_m * depths.median() + motion.rotation_rad) * view.fx / view.width;
   };
-  const std::vector<int> cameras = selectedCameras(rig, options.cameras);
   double window_s = max_s;
   for (; window_s > kMinWindowS; window_s /= 1.25) {
     std::vector<double> moves;
     for (const WindowSample& sample : samples) {
-      const auto motion = motionIn(middleOf(sample, window_s), rig, cameras, options.keyframe);
+      const auto motion = motionIn(middleOf(sample, window_s), rig, options);
       if (motion) moves.push_back(moveOf(*motion));
     }
     if (moves.empty() || upperMedian(moves) <= kMaxMove) break;
@@ -121,10 +120,9 @@ double motionLimit(const std::vector<WindowSample>& samples, const Rig& rig,
 /// The parallax of a unit of inverse depth in a typical window, pixels per 1/m.
 double parallaxIn(const std::vector<WindowSample>& samples, double window_s, const Rig& rig,
                   const FusionMapperOptions& options) {
-  const std::vector<int> cameras = selectedCameras(rig, options.cameras);
   std::vector<double> parallaxes;
   for (const WindowSample& sample : samples) {
-    const auto motion = motionIn(middleOf(sample, window_s), rig, cameras, options.keyframe);
+    const auto motion = motionIn(middleOf(sample, window_s), rig, options);
     if (motion) parallaxes.push_back(motion->parallax_px_m);
   }
   return parallaxes.empty() ? 0 : upperMedian(parallaxes);

@@ -49,8 +49,7 @@ CoarseSweep::CoarseSweep(const Rig& rig, const FusionMapperOptions& options,
       mapper_(rig, selectedCameras(rig, options.cameras), options_.keyframe) {}
 
 std::optional<KeyframeDepthMap> CoarseSweep::map(const WindowData& data) {
-  const std::optional<ViewMotion> motion = motionIn(
-      data, mapper_.rig(), selectedCameras(mapper_.rig(), options_.cameras), options_.keyframe);
+  const std::optional<ViewMotion> motion = motionIn(data, mapper_.rig(), options_);
   if (!motion || motion->parallax_px_m <= 0) return std::nullopt;
   const double distance_m = std::max(motion->rig_baseline_m, motion->shift_m);
   const double near_m = distance_m * mapper_.view().fx / mapper_.view().width / kNearestMove;

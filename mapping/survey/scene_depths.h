@@ -10,6 +10,12 @@
 
 namespace efm {
 
+/// Of the cameras that the options select.
+inline std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
+                                          const FusionMapperOptions& options) {
+  return motionIn(data, rig, selectedCameras(rig, options.cameras), options.keyframe);
+}
+
 /// No lens in use focuses on a nearer scene, so one is looked for only where the options name it.
 inline constexpr double kNearestSceneM = 0.1;
 

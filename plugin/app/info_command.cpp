@@ -159,7 +159,7 @@ class PatientSurveyor {
         fmt::print("  {} = {:g}: {}\n", option.key, option.value, option.reason);
       }
     }
-    limits.near_depth_m = options.keyframe.planes.min_depth_m;
+    limits.near_depth_m = motionDepth(options.keyframe.planes, chosen);
     limits.far_depth_m = options.keyframe.planes.max_depth_m;
     return survey.judgePoses(options).warnings;
   }

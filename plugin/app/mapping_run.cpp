@@ -79,7 +79,8 @@ class Player {
     const FusionMapperOptions& options = job_.options.mapper;
     const DepthPlanesOptions& planes = options.keyframe.planes;
     std::vector<Warning> warnings = efm::healthWarnings(
-        statistics_, {nearDepth(), planes.max_depth_m, options.trajectory.max_pose_gap_s});
+        statistics_,
+        {motionDepth(planes, job_.chosen), planes.max_depth_m, options.trajectory.max_pose_gap_s});
     for (Warning& warning : depths_.warnings()) warnings.push_back(std::move(warning));
     return warnings;
   }
@@ -88,16 +89,6 @@ class Player {
   std::optional<double> stoppedAt() const { return stopped_at_; }
 
  private:
-  /// The nearest depth that the motion is compared with: a chosen one may follow from wrong poses.
-  double nearDepth() const {
-    const auto& chosen = job_.chosen;
-    const bool automatic =
-        std::any_of(chosen.begin(), chosen.end(),
-                    [](const ChosenOption& option) { return option.key == "min_depth_m"; });
-    const double near_m = job_.options.mapper.keyframe.planes.min_depth_m;
-    return automatic ? std::max(near_m, HealthLimits{}.near_depth_m) : near_m;
-  }
-
   /// Runs a step. @return false if it throws. `error` keeps the first message.
   template <typename Step>
   static bool attempt(Step step, std::optional<std::string>& error) {

@@ -25,6 +25,10 @@ struct HealthLimits {
   double max_pose_gap_s = 0.25;
 };
 
+/// The nearest depth that the motion is compared with, metres: a chosen one may follow from wrong
+/// poses.
+double motionDepth(const DepthPlanesOptions& planes, const std::vector<ChosenOption>& chosen);
+
 /// Checks the calibration, the clocks, the motion and the events of a recording.
 std::vector<Warning> healthWarnings(const RecordingStatistics& recording,
                                     const HealthLimits& limits);
@@ -49,12 +53,12 @@ class DepthStatistics {
   std::vector<std::string> doubts() const;
 
  private:
+  void compareWithLast(const KeyframeDepthMap& keyframe);
+
   DepthPlanesOptions planes_;
   std::vector<ChosenOption> chosen_;
   PixelCounts pixels_;
-  void compareWithLast(const KeyframeDepthMap& keyframe);
-
-  KeyframeDepthMap last_;
+  KeyframeDepthMap last_;              // depths, view and pose
   std::uint64_t shared_ = 0;           // points that two keyframes in a row have
   std::uint64_t agreeing_ = 0;         // with the same depth
   std::vector<double> parallaxes_px_;  // of the median depth of each keyframe

@@ -12,7 +12,7 @@ namespace efm::oracle {
 /// `extractAggregated` written down as simply as possible, in double precision and from the whole
 /// DSI: every step looks at every pixel, no ray is rounded and none is left out.
 /// @param dsi [plane][row][column]. Without dilation.
-/// @param step_planes the unit of distances between peaks, under 2: their parabolas are of a plane.
+/// @param step_planes the unit of distances between peaks; parabolas go through the next planes.
 DepthMap extractAggregated(const std::vector<float>& dsi, const cv::Size& size,
                            const DepthPlanes& planes, const DepthExtractionOptions& options,
                            double step_planes);

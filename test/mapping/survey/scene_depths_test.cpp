@@ -56,16 +56,17 @@ TEST(MotionIn, IsTheLargestFromTheMiddleOfTheWindow) {
       sample.trajectory.add({durationFromSeconds(t_s),
                              {rotationBy({0, 0, 0.5 * t_s}), (t_s + (i > 25 ? 0.1 : 0)) * side}});
     }
-    const KeyframeMapperOptions options;
+    FusionMapperOptions options;
+    options.cameras = {0, 2};
     const Window window{0, 400'000'000, 200'000'000};
-    const auto motion = motionIn({window, {}, &sample.trajectory}, rig, {0, 2}, options);
+    const auto motion = motionIn({window, {}, &sample.trajectory}, rig, options);
     ASSERT_TRUE(motion);
     EXPECT_NEAR(motion->shift_m, 0.3, 1e-9);
     EXPECT_NEAR(motion->rotation_rad, 0.1, 1e-9);
     EXPECT_NEAR(motion->rig_baseline_m, 0.3, 1e-9);
     // 120 px of focal length, 0.6 m; the second camera is turned with the rig.
     EXPECT_NEAR(motion->parallax_px_m, 120 * 0.6 * std::cos(0.1), 1e-9);
-    EXPECT_FALSE(motionIn({{0, 1, 900'000'000}, {}, &sample.trajectory}, rig, {0}, options));
+    EXPECT_FALSE(motionIn({{0, 1, 900'000'000}, {}, &sample.trajectory}, rig, options));
   }
 }
 
