@@ -44,6 +44,7 @@ struct FusionMapperOptions {
 /// Windows that were given up, by reason.
 struct WindowsGivenUp {
   std::uint64_t overload = 0;     ///< Too much input waited, or input was dropped.
+  std::uint64_t too_large = 0;    ///< They have more events than the queue of live operation holds.
   std::uint64_t jump = 0;         ///< The tracker jumped within them.
   std::uint64_t no_pose = 0;      ///< Their poses did not come in time.
   std::uint64_t no_scene = 0;     ///< They showed no scene to choose automatic options from.
@@ -63,6 +64,7 @@ struct NamedReason {
 };
 inline constexpr NamedReason kGiveUpReasons[] = {
     {&WindowsGivenUp::overload, "overload", "for overload"},
+    {&WindowsGivenUp::too_large, "too_large", "larger than the queue"},
     {&WindowsGivenUp::jump, "jump", "across a jump of the tracker"},
     {&WindowsGivenUp::no_pose, "no_pose", "without poses"},
     {&WindowsGivenUp::no_scene, "no_scene", "without a scene"},

@@ -237,6 +237,10 @@ void survey(const RecordingSource& source, MappingJob& job) {
   if (job.options.automatic.any()) {
     OptionChoice choice = chooseOptions(job.options.automatic, survey.rig, survey.samples,
                                         survey.duration_s, options);
+    const LiveOptions& live = job.options.live;
+    const double passed = live.max_event_rate * static_cast<double>(survey.rig.cameras.size());
+    const double most = survey.most_events_per_s;
+    fitIntoQueue(live, passed > 0 ? std::min(passed, most) : most, options.policy, choice.options);
     job.chosen = std::move(choice.options);
     job.options.automatic = {};
     if (!choice.is_proven) {

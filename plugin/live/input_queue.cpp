@@ -9,12 +9,25 @@
 #include <utility>
 
 #include "mapping/events/event_check.h"
+#include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
 
 std::uint64_t bytesOf(const CameraPacket& packet) {
   return sizeof(CameraPacket) + packet.events.capacity() * sizeof(Event);
+}
+
+/// Without overflow: times are not checked yet.
+bool isOverASecondAfter(std::int64_t t_ns, std::int64_t other_ns) {
+  return t_ns > other_ns &&
+         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) >
+             static_cast<std::uint64_t>(kNanosecondsPerSecond);
+}
+
+/// The newest time of a stream, whose clock may go back.
+void follow(std::optional<std::int64_t>& reached_ns, std::int64_t t_ns) {
+  if (!reached_ns || t_ns > *reached_ns || isOverASecondAfter(*reached_ns, t_ns)) reached_ns = t_ns;
 }
 
 CameraPacket withoutEvents(const CameraPacket& packet) {
@@ -49,9 +62,55 @@ void InputQueue::add(CameraPacket packet) {
     camera.counts.refused += packet.events.size();
     throw;
   }
+  takeAhead(camera, packet);
+  pass(camera, std::move(packet));
+}
+
+void InputQueue::pass(Camera& camera, CameraPacket packet) {
   packet.events = camera.budget.pass(std::move(packet.events), packet.covered_until_ns);
   camera.last = withoutEvents(packet);
   push(std::move(packet));
+}
+
+/// Refuses each event that is far ahead of those before and after it. One at the end of the packet
+/// waits; this packet decides about the one that waited.
+void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
+  std::vector<Event>& events = packet.events;
+  const std::optional<std::int64_t> begin_ns =
+      events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
+  if (camera.ahead && begin_ns) {
+    const std::int64_t ahead_ns = camera.ahead->events.front().t_ns;
+    if (!isOverASecondAfter(ahead_ns, *begin_ns)) {
+      follow(camera.reached_ns, ahead_ns);
+      pass(camera, *std::exchange(camera.ahead, std::nullopt));
+    } else if (!events.empty()) {
+      ++camera.counts.refused;
+      camera.ahead.reset();
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const Event event = events[i];
+    if (camera.reached_ns && isOverASecondAfter(event.t_ns, *camera.reached_ns)) {
+      if (i + 1 == events.size()) {
+        camera.ahead = withoutEvents(packet);
+        camera.ahead->covered_until_ns.reset();
+        camera.ahead->events = {event};
+        if (packet.covered_until_ns) {  // it may end with this event
+          packet.covered_until_ns = std::min(*packet.covered_until_ns, *camera.reached_ns);
+        }
+        continue;
+      }
+      if (isOverASecondAfter(event.t_ns, events[i + 1].t_ns)) {
+        ++camera.counts.refused;
+        continue;
+      }
+    }
+    follow(camera.reached_ns, event.t_ns);
+    events[kept++] = event;
+  }
+  events.resize(kept);
+  if (packet.covered_until_ns) follow(camera.reached_ns, *packet.covered_until_ns);
 }
 
 void InputQueue::push(CameraPacket packet) {
@@ -96,10 +155,25 @@ void InputQueue::skip(const CameraPacket& packet) {
 void InputQueue::add(QueuedPose pose) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (ended_) {
-    ++poses_after_end_;
+    ++refused_poses_;
     return;
   }
-  poses_.push_back(std::move(pose));
+  PoseStream& stream = pose_streams_[pose.source];
+  if (const auto waiting = std::exchange(stream.ahead, std::nullopt)) {
+    const std::int64_t ahead_ns = waiting->pose.t_ns;
+    if (isOverASecondAfter(ahead_ns, pose.pose.t_ns)) {
+      ++refused_poses_;
+    } else {
+      follow(stream.reached_ns, ahead_ns);
+      poses_.push_back(*waiting);
+    }
+  }
+  if (stream.reached_ns && isOverASecondAfter(pose.pose.t_ns, *stream.reached_ns)) {
+    stream.ahead = std::move(pose);
+  } else {
+    follow(stream.reached_ns, pose.pose.t_ns);
+    poses_.push_back(std::move(pose));
+  }
   changed_.notify_one();
 }
 
@@ -108,10 +182,16 @@ void InputQueue::end() {
   if (ended_) return;
   ended_ = true;
   for (auto& [index, camera] : cameras_) {
+    if (camera.ahead) ++camera.counts.refused;
+    camera.ahead.reset();
     if (!camera.last) continue;
     CameraPacket rest = *camera.last;
     rest.events = camera.budget.finish();
     if (!rest.events.empty()) push(std::move(rest));
+  }
+  for (auto& [source, stream] : pose_streams_) {
+    if (stream.ahead) ++refused_poses_;
+    stream.ahead.reset();
   }
   changed_.notify_one();
 }
@@ -161,9 +241,9 @@ std::uint64_t InputQueue::queuedEvents() const {
   return events_;
 }
 
-std::uint64_t InputQueue::posesAfterEnd() const {
+std::uint64_t InputQueue::refusedPoses() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return poses_after_end_;
+  return refused_poses_;
 }
 
 std::map<int, QueueCounts> InputQueue::counts() const {
@@ -173,7 +253,7 @@ std::map<int, QueueCounts> InputQueue::counts() const {
     QueueCounts& of_camera = counts[index];
     of_camera = camera.counts;
     of_camera.thinned = camera.budget.thinned();
-    of_camera.held = camera.budget.held();
+    of_camera.held = camera.budget.held() + (camera.ahead ? 1 : 0);
     of_camera.queued = of_camera.received - of_camera.thinned - of_camera.held - of_camera.dropped -
                        of_camera.paused - of_camera.refused - of_camera.after_end - of_camera.taken;
   }

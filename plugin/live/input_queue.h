@@ -26,6 +26,9 @@ struct QueuedPose {
 /// The input of a mapping that runs in another thread: thinned to the budget, and bounded in events
 /// and in bytes. Where it is full, the oldest packets are dropped, never poses. Any thread adds;
 /// one takes. Adding never waits for the mapping.
+///
+/// An event, or a pose, that is over a second ahead of its stream waits for the next one: where
+/// that is back, the one ahead is refused alone.
 class InputQueue {
  public:
   explicit InputQueue(const LiveOptions& options);
@@ -57,17 +60,22 @@ class InputQueue {
 
   std::uint64_t queuedEvents() const;
   std::map<int, QueueCounts> counts() const;
-  std::uint64_t posesAfterEnd() const;
+  /// Poses that came after the end, or were far ahead of their source.
+  std::uint64_t refusedPoses() const;
 
  private:
   struct Camera {
     explicit Camera(double max_rate) : budget(max_rate) {}
     EventBudget budget;
-    std::optional<CameraPacket> last;  // without events
+    std::optional<CameraPacket> last;        // without events
+    std::optional<std::int64_t> reached_ns;  // its newest event or cover that is not ahead
+    std::optional<CameraPacket> ahead;       // one event, until the next one confirms its time
     QueueCounts counts;
   };
 
   Camera& cameraOf(int index);
+  void takeAhead(Camera& camera, CameraPacket& packet);
+  void pass(Camera& camera, CameraPacket packet);
   void push(CameraPacket packet);
   void dropOldest();
   void noteMissing(const CameraPacket& packet, GiveUpReason reason);
@@ -81,7 +89,12 @@ class InputQueue {
   std::map<int, Camera> cameras_;
   std::deque<CameraPacket> packets_;
   std::vector<QueuedPose> poses_;
-  std::uint64_t poses_after_end_ = 0;
+  struct PoseStream {
+    std::optional<std::int64_t> reached_ns;
+    std::optional<QueuedPose> ahead;  // until the next one confirms its time
+  };
+  std::map<PoseSourceId, PoseStream> pose_streams_;
+  std::uint64_t refused_poses_ = 0;
   std::map<int, MissingEvents> missing_;
   std::uint64_t events_ = 0;  // in packets_
   std::uint64_t bytes_ = 0;

@@ -193,8 +193,7 @@ bool LiveMapping::mapNext() {
 void LiveMapping::giveUpExcess() {
   const auto is_excess = [this] {
     const std::uint64_t events = session_->heldEvents() + queue_.queuedEvents();
-    return events > static_cast<std::uint64_t>(options_.max_queue_events) ||
-           static_cast<double>(events * sizeof(Event)) > options_.max_queue_mb * 1e6;
+    return static_cast<double>(events) > options_.queueEvents();
   };
   if (is_excess() && session_->chooseFromSoFar(0)) return;
   while (is_excess() && session_->giveUpOldestWindow()) {
@@ -270,9 +269,9 @@ void LiveMapping::publishMap(bool at_once) {
   map_cost_ = map_renewed_ - begin;
   map_changed_ = false;
   if (const auto warning = roundingWarning(*made->points, session_->cloud().options().voxel_size_m);
-      warning && !warned_of_rounding_ && callbacks_.warn) {
+      warning && !warned_of_rounding_) {
     warned_of_rounding_ = true;
-    callbacks_.warn(*warning);
+    warn(*warning);
   }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -330,9 +329,10 @@ void LiveMapping::warnOfLosses() {
   std::string text;
   const SessionStatus status = this->status();
   for (const auto& [camera, counts] : status.live->cameras) {
-    losses += counts.dropped + counts.thinned + counts.lost;
-    text += fmt::format("; camera {}: {} dropped, {} thinned, {} lost afterwards, of {} events",
-                        camera, counts.dropped, counts.thinned, counts.lost, counts.received);
+    losses += counts.dropped + counts.thinned + counts.refused + counts.lost;
+    text += fmt::format(
+        "; camera {}: {} dropped, {} thinned, {} refused, {} lost afterwards, of {} events", camera,
+        counts.dropped, counts.thinned, counts.refused, counts.lost, counts.received);
   }
   const WindowsGivenUp& given_up = status.counts.windows_given_up;
   if (losses == warned_losses_ && given_up.total() == warned_given_up_) return;
@@ -362,7 +362,7 @@ void LiveMapping::setClock(ProcessorClock clock) {
 
 SessionStatus LiveMapping::status() const {
   std::map<int, QueueCounts> cameras = queue_.counts();
-  const std::uint64_t poses_after_end = queue_.posesAfterEnd();
+  const std::uint64_t refused_poses = queue_.refusedPoses();
   const std::lock_guard<std::mutex> lock(mutex_);
   SessionStatus status = status_;
   const LiveStatus of_session = *status.live;
@@ -370,8 +370,9 @@ SessionStatus LiveMapping::status() const {
   status.live = live_;
   status.live->cameras = std::move(cameras);
   status.live->pose_jumps = of_session.pose_jumps;
-  status.live->refused_poses += of_session.refused_poses + poses_after_end;
+  status.live->refused_poses += of_session.refused_poses + refused_poses;
   status.live->clock_steps = of_session.clock_steps;
+  status.live->too_large = of_session.too_large;
   return status;
 }
 

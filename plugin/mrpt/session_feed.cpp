@@ -22,8 +22,9 @@ void addTo(RecordingSurveyor& surveyor, const mrpt::obs::CObservation& observati
   if (const auto* events = dynamic_cast<const CObservationEvents*>(&observation)) {
     surveyor.addEvents(packetOf(*events));
   } else if (const std::optional<ObservedPose> observed = poseIn(observation)) {
-    surveyor.addPose({observed->t_ns, rigPose(*observed, surveyor.setup().T_body_rig)},
-                     *poseSourceOf(observation));
+    const std::optional<Rigid3>& given = surveyor.setup().T_body_rig;
+    surveyor.addPose({observed->t_ns, rigPose(*observed, given)}, *poseSourceOf(observation),
+                     given.value_or(observed->T_body_rig));
   }
 }
 

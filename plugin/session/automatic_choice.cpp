@@ -16,8 +16,9 @@ namespace {
 /// jump of the tracker it begins at a multiple of the stride.
 constexpr double kFirstWindowS = 1;
 constexpr double kFirstStrideS = 0.1;
-/// What a jump of the tracker leaves of such a window is enough if it is as long as this.
-constexpr double kMinFirstWindowS = 0.5;
+/// What a jump of the tracker or a clock reset leaves of such a window is enough if it is as long
+/// as this.
+constexpr double kMinFirstWindowS = 0.2;
 /// Without a scene, the choice waits so long, and for at most `max_queue_events` events.
 constexpr std::int64_t kMaxSceneWaitNs = 10 * kNanosecondsPerSecond;
 /// After so many keyframes in a row that do not agree with their limits the scene is looked for
@@ -26,6 +27,8 @@ constexpr std::int64_t kMaxSceneWaitNs = 10 * kNanosecondsPerSecond;
 constexpr int kMaxMisfits = 3;
 constexpr std::int64_t kLookIntervalNs = 2 * kNanosecondsPerSecond;
 constexpr std::int64_t kMaxLookIntervalNs = 8 * kNanosecondsPerSecond;
+
+const char* const kBetweenJumps = "no longer one surely fits between two jumps of the tracker";
 
 double lengthOf(const WindowData& data) {
   return secondsBetween(data.window.t0_ns, data.window.t1_ns);
@@ -36,18 +39,6 @@ void noteSource(const WindowData& data, std::vector<ChosenOption>& chosen) {
   for (ChosenOption& option : chosen) {
     option.reason +=
         fmt::format("; from {:.3g} s at {} s", lengthOf(data), formatSeconds(data.window.t0_ns));
-  }
-}
-
-/// Shortens a chosen window, and a chosen stride with it.
-void limitWindow(double max_s, KeyframePolicyOptions& policy, std::vector<ChosenOption>& chosen) {
-  for (ChosenOption& option : chosen) {
-    double* value_s = option.key == "window_s" ? &policy.window_s : nullptr;
-    if (option.key == "stride_s") value_s = &policy.stride_s;
-    const double limit_s = value_s == &policy.stride_s ? policy.window_s / 2 : max_s;
-    if (value_s == nullptr || *value_s <= limit_s) continue;
-    *value_s = option.value = limit_s;
-    option.reason = "no longer one fits into the queue of live operation";
   }
 }
 
@@ -72,17 +63,17 @@ bool MappingSession::chooseAutomatic() {
   const bool is_first = status_.choices == 0;
   while (options_.automatic.any()) {
     const std::optional<WindowData> data = firstLook();
-    if (!data && is_first && beginStretch()) continue;
-    if (!data && !finished_ && !stretchEnds()) return false;
+    if (!data && is_first && pieceEnds() && !looksTooLong() && endPiece()) continue;
+    if (!data && !finished_ && !pieceEnds()) return false;
     std::vector<WindowSample> samples;
-    std::optional<double> duration_s;  // where it is not a whole window
+    std::optional<double> duration_s;  // where all of it is known
     if (data) samples.push_back(sampleOf(*data));
-    if (data && lengthOf(*data) < kFirstWindowS) duration_s = lengthOf(*data);
+    if (data && finished_ && lengthOf(*data) < kFirstWindowS) duration_s = lengthOf(*data);
     FusionMapperOptions chosen = options_.mapper;
     OptionChoice choice =
         chooseOptions(options_.automatic, mapper_.rig(), samples, duration_s, chosen);
     if (data && is_first && !choice.found_scene && skipWithoutScene(*data)) continue;
-    useLook(data, std::move(choice), std::move(chosen), std::nullopt);
+    useLook(data, std::move(choice), std::move(chosen));
   }
   return true;
 }
@@ -95,18 +86,21 @@ bool MappingSession::chooseFromSoFar(double at_least_s) {
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice =
       chooseOptions(options_.automatic, mapper_.rig(), {sampleOf(*data)}, std::nullopt, chosen);
-  useLook(data, std::move(choice), std::move(chosen), lengthOf(*data) / 2);
+  useLook(data, std::move(choice), std::move(chosen));
   return true;
 }
 
 /// Uses what was chosen from a look at live data: without a scene wide limits of depth, or the
 /// options of the first choice.
 void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice choice,
-                             FusionMapperOptions chosen, std::optional<double> max_window_s) {
+                             FusionMapperOptions chosen) {
   if (!choice.found_scene && status_.choices > 0) return keepOptions();
   if (data) {
     if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
-    if (max_window_s) limitWindow(*max_window_s, chosen.policy, choice.options);
+    if (pieceEnds() && lengthOf(*data) < kFirstWindowS) {
+      limitWindow(lengthOf(*data) / 2, kBetweenJumps, chosen.policy, choice.options);
+    }
+    fitIntoQueue(options_.live, eventRate(*data), chosen.policy, choice.options);
     noteSource(*data, choice.options);
   }
   use(std::move(choice), chosen);
@@ -135,12 +129,21 @@ bool MappingSession::chooseFromSurvey() {
   return true;
 }
 
-/// A window to choose from. At a jump of the tracker, what it leaves of the window.
+/// A window to choose from. At a jump of the tracker or a clock reset, what it leaves of the
+/// window.
 std::optional<WindowData> MappingSession::firstLook() {
   std::optional<WindowData> data = mapper_.window();
-  if (data || !stretchEnds()) return data;
+  if (data || !pieceEnds()) return data;
   data = mapper_.rest();
   return data && lengthOf(*data) >= kMinFirstWindowS ? data : std::nullopt;
+}
+
+/// Whether the tracker jumps, or a clock is reset, so often that no window could be looked at for
+/// too long.
+bool MappingSession::looksTooLong() {
+  if (!status_.events) return false;
+  if (!no_scene_since_ns_) no_scene_since_ns_ = status_.events->last_ns;
+  return status_.events->last_ns - *no_scene_since_ns_ >= kMaxSceneWaitNs;
 }
 
 /// Gives up a window that shows no scene, unless that has lasted too long or nothing comes after
@@ -153,9 +156,33 @@ bool MappingSession::skipWithoutScene(const WindowData& data) {
   if (events_without_scene_ > static_cast<std::size_t>(options_.live.max_queue_events)) {
     return false;
   }
-  if (secondsBetween(window.t0_ns, window.t1_ns) < kFirstWindowS) return beginStretch();
+  if (secondsBetween(window.t0_ns, window.t1_ns) < kFirstWindowS) return endPiece();
   mapper_.giveUpBefore(window.t1_ns, &WindowsGivenUp::no_scene);
   return true;
+}
+
+/// Where the windows that were chosen are larger than the queue: chooses shorter ones.
+bool MappingSession::shortenWindows(double events_per_s) {
+  if (!automatic_.window_s || status_.chosen.empty()) return false;
+  fitIntoQueue(options_.live, events_per_s, options_.mapper.policy, status_.chosen);
+  mapper_.configure(options_.mapper.policy, planes());
+  ++status_.choices;
+  return true;
+}
+
+/// Where two stretches in a row between jumps of the tracker were too short for a window that was
+/// chosen: chooses a shorter one.
+void MappingSession::fitIntoStretches(std::int64_t end_ns) {
+  const double length_s = secondsBetween(stretch_.begin_ns, end_ns);
+  const std::uint64_t keyframes = earlier_counts_.keyframes + mapper_.counts().keyframes;
+  const bool fits = keyframes > stretch_.keyframes || length_s < kMinFirstWindowS;
+  stretch_ = {end_ns, keyframes, fits ? 0 : stretch_.too_short + 1};
+  if (stretch_.too_short < 2 || !automatic_.window_s || status_.chosen.empty()) return;
+  KeyframePolicyOptions& policy = options_.mapper.policy;
+  if (options_.automatic.any() || policy.window_s <= length_s / 2) return;
+  limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);
+  mapper_.configure(policy, planes());
+  ++status_.choices;
 }
 
 /// Goes on with the options of the first choice.

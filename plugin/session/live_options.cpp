@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/live_options.h"
 
+#include <algorithm>
+
 #include "mapping/options/option_check.h"
 
 namespace efm {
@@ -15,6 +17,32 @@ void LiveOptions::validate() const {
   requireOption(max_keyframes >= 1, "max_keyframes", max_keyframes, "1 or above");
   requireOption(max_speed_m_s > 0, "max_speed_m_s", max_speed_m_s, "above 0");
   requireOption(max_turn_deg_s > 0, "max_turn_deg_s", max_turn_deg_s, "above 0");
+}
+
+double LiveOptions::queueEvents() const {
+  return std::min(static_cast<double>(max_queue_events), max_queue_mb * 1e6 / sizeof(Event));
+}
+
+void limitWindow(double max_s, const std::string& reason, KeyframePolicyOptions& policy,
+                 std::vector<ChosenOption>& chosen) {
+  for (ChosenOption& option : chosen) {
+    double* value_s = option.key == "window_s" ? &policy.window_s : nullptr;
+    if (option.key == "stride_s") value_s = &policy.stride_s;
+    const double limit_s = value_s == &policy.stride_s ? policy.window_s / 2 : max_s;
+    if (value_s == nullptr || *value_s <= limit_s) continue;
+    *value_s = option.value = limit_s;
+    option.reason = reason;
+  }
+  if (policy.policy == KeyframePolicyKind::kBaseline) {
+    policy.stride_s = std::min(policy.stride_s, policy.window_s);
+  }
+}
+
+void fitIntoQueue(const LiveOptions& live, double events_per_s, KeyframePolicyOptions& policy,
+                  std::vector<ChosenOption>& chosen) {
+  if (!live.enabled || events_per_s <= 0) return;
+  limitWindow(live.queueEvents() / 2 / events_per_s,
+              "no longer one fits into half of the queue of live operation", policy, chosen);
 }
 
 }  // namespace efm

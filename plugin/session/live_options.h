@@ -2,6 +2,10 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
+#include <vector>
+
+#include "mapping/survey/option_choice.h"
 
 namespace efm {
 
@@ -27,8 +31,20 @@ struct LiveOptions {
   double max_speed_m_s = 50;
   double max_turn_deg_s = 1500;
 
+  /// The events that may wait, by both limits.
+  double queueEvents() const;
   /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
+
+/// Shortens a window that was chosen, and a stride that was chosen with it.
+/// @param reason what `max_s` comes from.
+void limitWindow(double max_s, const std::string& reason, KeyframePolicyOptions& policy,
+                 std::vector<ChosenOption>& chosen);
+/// The same, until a window's events fill at most half of the queue of live operation: the other
+/// half is for the events that come while it is mapped.
+/// @param events_per_s of all cameras together.
+void fitIntoQueue(const LiveOptions& live, double events_per_s, KeyframePolicyOptions& policy,
+                  std::vector<ChosenOption>& chosen);
 
 }  // namespace efm

@@ -76,6 +76,11 @@ MappingSession::MappingSession(const EventFusionOptions& options)
 MappingSession::~MappingSession() = default;
 
 void MappingSession::addEvents(CameraPacket packet) {
+  if (clock_reset_) {
+    later_events_ += packet.events.size();
+    later_.emplace_back([this, packet] { addEvents(packet); });
+    return;
+  }
   if (surveyor_) survey([&] { surveyor_->addEvents(packet); });
   const int camera = packet.camera;
   const std::size_t events = packet.events.size();
@@ -120,7 +125,24 @@ void MappingSession::noteOlder(int sensor, std::int64_t t_ns) {
                      std::any_of(older.others_ns.begin(), older.others_ns.end(), [&](auto& other) {
                        return other.second - t_ns > kNanosecondsPerSecond;
                      });
-  if (!alone && t_ns - older.since_ns >= kNanosecondsPerSecond) startAnew();
+  if (alone || t_ns - older.since_ns < kNanosecondsPerSecond) return;
+  clock_reset_ = true;
+  if (!rig_.isComplete()) beginClock();
+}
+
+/// Goes on to the clock after a reset, once the complete windows before it are mapped.
+/// @return whether it did.
+bool MappingSession::beginClock() {
+  if (!clock_reset_) return false;
+  startAnew();
+  for (const std::function<void()>& call : std::exchange(later_, {})) {
+    try {
+      call();
+    } catch (...) {  // it is counted
+    }
+  }
+  if (finished_ && !clock_reset_ && next_stretch_.empty()) mapper_.finish();
+  return true;
 }
 
 /// The sensor's newest data are no older than those before.
@@ -138,6 +160,8 @@ void MappingSession::startAnew() {
   mapper_.giveUpAll(&WindowsGivenUp::clock_reset);
   earlier_counts_ += mapper_.counts();
   mapper_ = std::move(anew);
+  clock_reset_ = false;
+  later_events_ = 0;
   ++status_.live->clock_steps;
   status_.events.reset();
   newest_begin_ns_.reset();
@@ -182,13 +206,22 @@ void MappingSession::feed(CameraPacket packet) {
   giveUpOverdue();
   // Without a wait where neither another camera nor a better source of poses can come.
   const bool known = rig_.isKnown() && pose_source_.selected();
-  if (known || seenFor(kRigCompletesNs)) completeRig();
+  if (known || seenFor(kRigCompletesNs) || fillsQueue()) completeRig();
 }
 
 /// Whether a packet began this long after the first event: by then every camera has sent one,
 /// whatever the length of packets.
 bool MappingSession::seenFor(std::int64_t duration_ns) const {
   return newest_begin_ns_ && *newest_begin_ns_ - status_.events->first_ns > duration_ns;
+}
+
+/// In live operation: whether as much waits as the events of a window may be, so that no further
+/// camera is waited for.
+bool MappingSession::fillsQueue() const {
+  if (!options_.live.enabled || rig_.isComplete()) return false;
+  std::uint64_t events = mapper_.heldEvents();
+  for (const auto& [camera, waiting] : rig_.waitingEvents()) events += waiting;
+  return static_cast<double>(events) > options_.live.queueEvents() / 2;
 }
 
 void MappingSession::completeRig() {
@@ -200,7 +233,17 @@ void MappingSession::completeRig() {
 
 void MappingSession::addPose(const StampedPose& pose, const PoseSourceId& source,
                              const std::optional<PoseNoise>& noise) {
-  if (surveyor_) survey([&] { surveyor_->addPose(pose, source); });
+  if (clock_reset_) {
+    later_.emplace_back([=] {
+      try {
+        addPose(pose, source, noise);
+      } catch (const std::invalid_argument&) {
+        ++status_.live->refused_poses;
+      }
+    });
+    return;
+  }
+  if (surveyor_) survey([&] { surveyor_->addPose(pose, source, {}); });
   const std::vector<StampedPose> poses = pose_source_.add(source, pose);
   try {
     usePoses(poses, noise);
@@ -274,6 +317,7 @@ bool MappingSession::beginStretch() {
   if (!stretchEnds()) return false;
   ++status_.live->pose_jumps;
   mapper_.giveUpBefore(next_stretch_.front().first.t_ns, &WindowsGivenUp::jump);
+  fitIntoStretches(next_stretch_.front().first.t_ns);
   newest_pose_.reset();
   for (const auto& [pose, noise] : std::exchange(next_stretch_, {})) useWaiting(pose, noise);
   if (finished_ && next_stretch_.empty()) mapper_.finish();
@@ -314,6 +358,10 @@ void MappingSession::skipEvents(const CameraPacket& packet) {
 }
 
 void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
+  if (clock_reset_) {
+    later_.emplace_back([=] { noteMissing(camera, missing); });
+    return;
+  }
   MissingEvents& noted = missing_[camera];
   noted = {std::max(noted.until_ns, missing.until_ns), missing.reason};
 }
@@ -355,10 +403,24 @@ bool MappingSession::giveUpOldestWindow() {
 
 void MappingSession::giveUpOlderHalf() {
   const std::int64_t oldest_ns = mapper_.oldestHeldNs();
-  if (status_.events && oldest_ns < status_.events->last_ns) {
-    mapper_.giveUpBefore(oldest_ns + (status_.events->last_ns - oldest_ns) / 2 + 1,
-                         &WindowsGivenUp::overload);
-  }
+  if (!status_.events || oldest_ns >= status_.events->last_ns) return;
+  const std::int64_t held_ns = status_.events->last_ns - oldest_ns;
+  const double rate =
+      static_cast<double>(mapper_.heldEvents()) / (1e-9 * static_cast<double>(held_ns));
+  const double needed = rate * options_.mapper.policy.window_s;
+  const bool too_large =
+      rig_.isComplete() && !options_.automatic.any() && needed > options_.live.queueEvents();
+  if (too_large && shortenWindows(rate)) return;
+  mapper_.giveUpBefore(oldest_ns + held_ns / 2 + 1,
+                       too_large ? &WindowsGivenUp::too_large : &WindowsGivenUp::overload);
+  constexpr double kNews = 1.2;  // one that is that much larger is told again
+  if (!too_large || needed < kNews * told_needed_) return;
+  told_needed_ = needed;
+  status_.live->too_large = fmt::format(
+      "a window needs {:.0f} events, the queue holds {:.0f}: expected a shorter [keyframes] "
+      "window_s, or a larger [live] max_queue_events and max_queue_mb",
+      needed, options_.live.queueEvents());
+  throw std::invalid_argument(status_.live->too_large);
 }
 
 bool MappingSession::giveUpFailed() {
@@ -386,7 +448,8 @@ void MappingSession::finish() {
     status_.refused_events[camera] += events;
   }
   for (const StampedPose& pose : pose_source_.select()) useWaiting(pose, std::nullopt);
-  if (next_stretch_.empty()) mapper_.finish();  // otherwise after the windows before the jump
+  // Otherwise after the windows before the jump, or the reset.
+  if (next_stretch_.empty() && !clock_reset_) mapper_.finish();
   completeRig();
   rig_.requireNoneWaits();
 }
@@ -400,7 +463,7 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
   }
   StageTimer timer(status_.times, clock);
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
-  while (!keyframe && beginStretch()) keyframe = mapper_.next(sink, &timer);
+  while (!keyframe && endPiece()) keyframe = mapper_.next(sink, &timer);
   if (!keyframe) limitWaits();
   if (keyframe) {
     try {

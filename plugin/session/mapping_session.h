@@ -104,10 +104,12 @@ class MappingSession {
   /// Gives up the oldest window that could be mapped, if newer events fill another one.
   /// @return whether it did.
   bool giveUpOldestWindow();
-  /// Gives up the windows of the older half of the events.
+  /// Gives up the windows of the older half of the events. Where a window is larger than the queue
+  /// of live operation, a chosen one is shortened instead.
+  /// @throws std::invalid_argument where a given one is so large, the first time.
   void giveUpOlderHalf();
   /// Where automatic options wait for their first window: chooses them from the data so far, if
-  /// these last at least so long. Their windows last at most half as long as these data.
+  /// these last at least so long.
   /// @return whether it chose.
   /// @throws std::invalid_argument where the options do not fit the rig.
   bool chooseFromSoFar(double at_least_s);
@@ -117,7 +119,7 @@ class MappingSession {
   /// @return whether it goes on to another window. Otherwise it was none that failed.
   bool giveUpFailed();
   /// The events that windows may still need.
-  std::size_t heldEvents() const { return mapper_.heldEvents(); }
+  std::size_t heldEvents() const { return mapper_.heldEvents() + later_events_; }
 
   /// Moves all keyframes in the cloud to their refined poses.
   void applyPending();
@@ -142,6 +144,7 @@ class MappingSession {
   static FusionMapperOptions mapperOptions(const EventFusionOptions& options);
   void feed(CameraPacket packet);
   bool seenFor(std::int64_t duration_ns) const;
+  bool fillsQueue() const;
   void completeRig();
   void noteOlder(int sensor, std::int64_t t_ns);
   void noteInTime(int sensor, std::int64_t t_ns);
@@ -151,6 +154,10 @@ class MappingSession {
   bool isJump(const StampedPose& pose, const PoseNoise& noise) const;
   bool stretchEnds() const;
   bool beginStretch();
+  bool beginClock();
+  /// No more data of the current poses, or of the current clock, will come.
+  bool pieceEnds() const { return stretchEnds() || clock_reset_; }
+  bool endPiece() { return beginStretch() || beginClock(); }
   std::optional<std::int64_t> missingUntil(int camera) const;
   void giveUpMissing(int camera, std::int64_t next_ns);
   void giveUpOverdue();
@@ -160,10 +167,13 @@ class MappingSession {
   bool chooseAutomatic();
   bool chooseFromSurvey();
   void useLook(const std::optional<WindowData>& data, OptionChoice choice,
-               FusionMapperOptions chosen, std::optional<double> max_window_s);
+               FusionMapperOptions chosen);
   void use(OptionChoice choice, const FusionMapperOptions& chosen);
   std::optional<WindowData> firstLook();
+  bool looksTooLong();
   bool skipWithoutScene(const WindowData& data);
+  bool shortenWindows(double events_per_s);
+  void fitIntoStretches(std::int64_t end_ns);
   void keepOptions();
   void lookAgain(const Window& window);
 
@@ -195,6 +205,13 @@ class MappingSession {
   std::optional<StampedPose> newest_pose_;
   // Poses after a jump with their stated noise, until those before it are used up.
   std::vector<std::pair<StampedPose, std::optional<PoseNoise>>> next_stretch_;
+  /// The poses between two jumps.
+  struct Stretch {
+    std::int64_t begin_ns = kMaxTimeNs;  // at first not known
+    std::uint64_t keyframes = 0;         // before it
+    int too_short = 0;                   // those before it that no window fitted into, in a row
+  };
+  Stretch stretch_;
   /// A sensor that sends older data than before.
   struct Older {
     std::int64_t since_ns;
@@ -202,7 +219,12 @@ class MappingSession {
   };
   std::map<int, Older> older_;            // by camera, or the tracker
   std::map<int, MissingEvents> missing_;  // by camera
-  SessionStatus status_;                  // incomplete: see status()
+  /// A clock went back: what came afterwards waits until the complete windows before are mapped.
+  bool clock_reset_ = false;
+  std::vector<std::function<void()>> later_;
+  std::size_t later_events_ = 0;
+  double told_needed_ = 0;  // the events of a window that was too large
+  SessionStatus status_;    // incomplete: see status()
 };
 
 }  // namespace efm

@@ -61,6 +61,7 @@ std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions
     return fmt::format("{}: they miss each other by {} s", spans,
                        formatSeconds(first_ns - last_ns));
   }
+  if (status.live && !status.live->too_large.empty()) return status.live->too_large;
   const EventCounts counts = status.counts.total();
   if (counts.filtered > 0 && counts.used == 0 && counts.filtered + counts.dropped == counts.read) {
     return fmt::format(

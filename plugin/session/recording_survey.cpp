@@ -56,7 +56,16 @@ std::optional<Warning> mistakeIn(const RecordingSurvey& survey,
 
 PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) const {
   constexpr double kMaxChange = 0.08;  // of depths that are believed
+  constexpr double kMaxLeverM = 20;
   PoseVerdict verdict;
+  if (lever_m > kMaxLeverM) {  // what follows from it would blame the poses
+    verdict.warnings.push_back(
+        {"long-lever",
+         fmt::format("the rig is {:.4g} m from the tracked body: expected at most {:g}; is the "
+                     "translation of T_body_rig in metres (--hand-eye)?",
+                     lever_m, kMaxLeverM)});
+    return verdict;
+  }
   try {
     if (const auto warning = mistakeIn(*this, options)) verdict.warnings.push_back(*warning);
     const auto sensitivity = depthSensitivity(rig, samples, options);
@@ -72,37 +81,54 @@ PoseVerdict RecordingSurvey::judgePoses(const FusionMapperOptions& options) cons
   return verdict;
 }
 
+double eventRate(const WindowData& data) {
+  std::size_t events = 0;
+  for (const EventSpan& span : data.events) events += span.size();
+  return static_cast<double>(events) / secondsBetween(data.window.t0_ns, data.window.t1_ns);
+}
+
 RecordingSurveyor::RecordingSurveyor(const EventFusionOptions& options)
     : session_(surveyOptions(options)) {}
 
 void RecordingSurveyor::addEvents(CameraPacket packet) {
+  received_ += packet.events.size();
   thinOut(packet);
   session_.addEvents(std::move(packet));
   takeWindows();
 }
 
-void RecordingSurveyor::addPose(const StampedPose& pose, const PoseSourceId& source) {
+void RecordingSurveyor::addPose(const StampedPose& pose, const PoseSourceId& source,
+                                const Rigid3& T_body_rig) {
+  lever_m_ = std::max(lever_m_, T_body_rig.translation.norm());
   session_.addPose(pose, source);
   takeWindows();
 }
 
 void RecordingSurveyor::takeWindows() {
   while (const std::optional<WindowData> data = session_.window()) {
-    samples_.add(*data);
+    take(*data);
     session_.skipWindow(data->window);
   }
+}
+
+void RecordingSurveyor::take(const WindowData& data) {
+  samples_.add(data);
+  most_events_per_s_ = std::max(most_events_per_s_, eventRate(data));
 }
 
 RecordingSurvey RecordingSurveyor::finish() {
   try {
     session_.finish();
     if (samples_.samples().empty()) {
-      if (const std::optional<WindowData> rest = session_.window()) samples_.add(*rest);
+      if (const std::optional<WindowData> rest = session_.window()) take(*rest);
     }
   } catch (const std::exception&) {
   }
   const SessionStatus status = session_.status();
-  RecordingSurvey result{status.rig, samples_.take(), std::nullopt};
+  RecordingSurvey result{status.rig, samples_.take(), std::nullopt, most_events_per_s_, lever_m_};
+  if (const std::uint64_t chosen = status.counts.total().read) {
+    result.most_events_per_s *= static_cast<double>(received_) / static_cast<double>(chosen);
+  }
   if (status.events && status.poses) {
     result.duration_s = secondsBetween(std::max(status.events->first_ns, status.poses->first_ns),
                                        std::min(status.events->last_ns, status.poses->last_ns));

@@ -17,12 +17,18 @@ struct PoseVerdict {
   std::vector<std::string> doubts;  ///< Why a map rests on little evidence.
 };
 
+/// Events per second of all cameras together.
+double eventRate(const WindowData& data);
+
 /// What a first pass over a recording found: its cameras and some of its windows, evenly spread.
 struct RecordingSurvey {
   Rig rig;
   std::vector<WindowSample> samples;
   /// The time from the first to the last event with a pose; nothing without such events.
   std::optional<double> duration_s;
+  /// In the window with the most, of all cameras together.
+  double most_events_per_s = 0;
+  double lever_m = 0;  ///< The longest one from the tracked body to the rig.
 
   /// Whether the poses explain the events, and how much depends on them. An error is left to the
   /// pass that maps.
@@ -39,7 +45,8 @@ class RecordingSurveyor {
 
   /// @throws std::exception where a MappingSession does; then nothing more may be added.
   void addEvents(CameraPacket packet);
-  void addPose(const StampedPose& pose, const PoseSourceId& source);
+  /// @param T_body_rig that the pose was made with.
+  void addPose(const StampedPose& pose, const PoseSourceId& source, const Rigid3& T_body_rig);
   /// Once: after the last data, or after an error.
   RecordingSurvey finish();
 
@@ -48,9 +55,13 @@ class RecordingSurveyor {
 
  private:
   void takeWindows();
+  void take(const WindowData& data);
 
   MappingSession session_;
   SpreadSamples samples_;
+  std::uint64_t received_ = 0;
+  double lever_m_ = 0;
+  double most_events_per_s_ = 0;  // of those that were chosen
 };
 
 }  // namespace efm

@@ -27,11 +27,12 @@ struct TimeSpan {
 struct QueueCounts {
   std::uint64_t received = 0;
   std::uint64_t thinned = 0;  ///< By the budget in sensor time.
-  std::uint64_t held = 0;     ///< Until the end of their 10 ms.
+  std::uint64_t held = 0;     ///< Until the end of their 10 ms, or the next event confirms them.
   std::uint64_t queued = 0;
-  std::uint64_t dropped = 0;    ///< The queue was full.
-  std::uint64_t paused = 0;     ///< Map updating was disabled.
-  std::uint64_t refused = 0;    ///< In a packet that contradicts its camera.
+  std::uint64_t dropped = 0;  ///< The queue was full.
+  std::uint64_t paused = 0;   ///< Map updating was disabled.
+  /// In a packet that contradicts its camera, or over a second ahead of those before and after.
+  std::uint64_t refused = 0;
   std::uint64_t after_end = 0;  ///< Came after the end.
   std::uint64_t taken = 0;      ///< By the mapping: `EventCounts::read`, or `refused_events`.
   /// Of those taken: refused, dropped or without a pose. Not counted for a camera that takes no
@@ -46,10 +47,12 @@ struct LiveStatus {
   std::map<int, QueueCounts> cameras;
   std::uint64_t pose_jumps = 0;   ///< New stretches of poses.
   std::uint64_t clock_steps = 0;  ///< The clock went back, and the mapping started anew.
-  /// Over a second older than the newest, not valid, or after the end.
+  /// Over a second older than the newest, or ahead of those before and after; not valid; after the
+  /// end.
   std::uint64_t refused_poses = 0;
   std::uint64_t errors = 0;  ///< Of the mapping and callbacks; see `RefinementState`, too.
   std::string last_error;    ///< Of these and of refused observations; empty: none.
+  std::string too_large;     ///< Why the queue holds no window; empty: it does.
   bool failing = false;      ///< The last keyframe could not be made.
 
   /// The part of the received events that is lost, 0 to 1: thinned, dropped, refused, after the

@@ -91,15 +91,20 @@ void addLosses(const SessionStatus& status, WarningList& warnings) {
   if (!status.live) return;
   const WindowsGivenUp& given_up = status.counts.windows_given_up;
   if (status.live->dropRatio() > 0 || given_up.total() > 0) {
+    std::uint64_t thinned = 0;
     bool overload = given_up.overload > 0;
     for (const auto& [index, camera] : status.live->cameras) {
-      overload = overload || camera.thinned + camera.dropped > 0;
+      overload = overload || camera.dropped > 0;
+      thinned += camera.thinned;
     }
+    std::string why;
+    if (thinned > 0) {
+      why += fmt::format("; {} events were more than [live] max_event_rate lets pass", thinned);
+    }
+    if (overload) why += "; the machine is too slow for more ([live] max_queue_events)";
+    if (!status.live->too_large.empty()) why += "; " + status.live->too_large;
     warnings.add("events-lost", "{:.1f} % of the events were lost; {}{}",
-                 100 * status.live->dropRatio(), asText(given_up),
-                 overload ? "; the machine is too slow for more ([live] max_event_rate, "
-                            "max_queue_events)"
-                          : "");
+                 100 * status.live->dropRatio(), asText(given_up), why);
   }
   if (status.live->errors > 0) {
     warnings.add("mapping-errors", "{} errors while mapping, the last one: {}", status.live->errors,

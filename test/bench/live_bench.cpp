@@ -42,11 +42,14 @@ struct Arguments {
   double seconds = 0;
   double speed = 1;
   int rate = 1;
-  std::vector<double> lost;    // the tracker is silent from, to
-  std::vector<double> silent;  // camera 1 is silent from, to
-  std::vector<double> jumps;   // the tracker jumps at these times
-  bool late = false;           // an event of each packet of camera 1 comes 20 ms late
-  bool throwing_log = false;   // the host's log throws
+  std::vector<double> lost;         // the tracker is silent from, to
+  std::vector<double> silent;       // camera 1 is silent from, to
+  std::vector<double> jumps;        // the tracker jumps at these times
+  std::vector<double> ahead;        // an event comes 100 s ahead at these times
+  std::vector<double> ahead_poses;  // a pose does
+  std::vector<double> back;         // all clocks go back by 100 s
+  bool late = false;                // an event of each packet of camera 1 comes 20 ms late
+  bool throwing_log = false;        // the host's log throws
 };
 
 double millisecondsSince(Clock::time_point begin) {
@@ -247,6 +250,8 @@ void run(const Arguments& arguments) {
     of_keyframes.add(millisecondsSince(fed.front().second));
   });
 
+  std::size_t ahead = 0;
+  std::size_t ahead_poses = 0;
   Latencies of_observations;
   double next_memory_s = 0;
   {
@@ -274,6 +279,25 @@ void run(const Arguments& arguments) {
         const auto jumps = std::count_if(arguments.jumps.begin(), arguments.jumps.end(),
                                          [&](double jump_s) { return t_s >= jump_s; });
         pose->pose.mean.y_incr(10 * static_cast<double>(jumps));
+      }
+      constexpr std::int64_t kFarNs = 100 * kNanosecondsPerSecond;
+      if (packet && !packet->events.empty() && ahead < arguments.ahead.size() &&
+          t_s >= arguments.ahead[ahead]) {
+        ++ahead;
+        packet->events.push_back(packet->events.back());
+        packet->events.back().t_ns += kFarNs;
+      }
+      const bool pose_ahead = !packet && ahead_poses < arguments.ahead_poses.size() &&
+                              t_s >= arguments.ahead_poses[ahead_poses];
+      if (pose_ahead) {
+        ++ahead_poses;
+        observation->timestamp = mrptTimeFrom(t_ns + kFarNs);
+      }
+      for (const double back_s : arguments.back) {
+        if (t_s < back_s) continue;
+        observation->timestamp = mrptTimeFrom(nanosecondsFrom(observation->timestamp) - kFarNs);
+        if (!packet) continue;
+        for (Event& event : packet->events) event.t_ns -= kFarNs;
       }
       if (arguments.speed > 0) {
         std::this_thread::sleep_until(begin +
@@ -323,6 +347,9 @@ int main(int argc, char** argv) {
   app.add_option("--lost", arguments.lost, "The tracker is silent FROM TO, seconds")->expected(2);
   app.add_option("--silent", arguments.silent, "Camera 1 is silent FROM TO, seconds")->expected(2);
   app.add_option("--jumps", arguments.jumps, "The tracker jumps by 10 m at these times, seconds");
+  app.add_option("--ahead", arguments.ahead, "An event comes 100 s ahead at these times, seconds");
+  app.add_option("--ahead-poses", arguments.ahead_poses, "A pose comes 100 s ahead");
+  app.add_option("--back", arguments.back, "All clocks go back by 100 s at these times, seconds");
   app.add_flag("--late", arguments.late, "An event of each packet of camera 1 comes 20 ms late");
   app.add_flag("--throwing-log", arguments.throwing_log, "The host's log throws");
   app.add_option("--pcd", arguments.pcd, "Writes the map");

@@ -112,6 +112,21 @@ TEST_F(OverrideOptions, TheCommandLineOverridesTheOptionFile) {
   EXPECT_THAT(errorOf(map + " --set rig.calibration="), HasSubstr("data: no calibration"));
 }
 
+TEST_F(OverrideOptions, AHandEyeTransformInMillimetresIsSaidFirst) {
+  mapOf("data");
+  writePosesOfTheBody();
+  write("mm.yaml", "T_body_rig: [[1, 0, 0, 40], [0, 1, 0, 30], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
+  for (const std::string command : {"map rig.ini data --out out", "info data --quiet"}) {
+    const std::string told = run(command + " --poses body.txt --hand-eye mm.yaml").err;
+    const std::size_t first = told.find("warning: ");
+    ASSERT_NE(first, std::string::npos) << command;
+    EXPECT_THAT(told.substr(first),
+                testing::StartsWith("warning: long-lever: the rig is 50 m from the tracked body: "
+                                    "expected at most 20; is the translation of T_body_rig in "
+                                    "metres (--hand-eye)?"));
+  }
+}
+
 TEST_F(OverrideOptions, AnOptionFileThatReplacesARecordingsCalibrationIsAWarning) {
   ASSERT_EQ(run("import data --out r.rawlog").status, 0);
   fs::copy_file(folder() / "data" / "camchain.yaml", folder() / "same.yaml");

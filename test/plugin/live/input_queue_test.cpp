@@ -188,6 +188,48 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   }
 }
 
+/// A stream with pauses, in any packets. Some events, and poses, are followed by one far ahead.
+RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
+  LiveOptions options;
+  options.max_event_rate = *rc::gen::element(0.0, 1e9);
+  InputQueue queue(options);
+  const auto steps = *rc::gen::container<std::vector<std::tuple<std::int64_t, bool, bool>>>(
+      rc::gen::tuple(rc::gen::element<std::int64_t>(1, 3'000'000'000), rc::gen::arbitrary<bool>(),
+                     rc::gen::arbitrary<bool>()));
+  CameraPacket next = packet(0, 0, 0);
+  std::vector<std::int64_t> expected{0};
+  std::uint64_t wrong = 0;
+  const auto add = [&](std::int64_t t_ns) {
+    next.events.push_back({t_ns, 0, 0, true});
+    queue.add(QueuedPose{{t_ns, {}}, {}, {}});
+  };
+  add(0);
+  for (const auto& [gap_ns, ends_packet, ahead] : steps) {
+    expected.push_back(expected.back() + gap_ns);
+    add(expected.back());
+    if (ahead) add(expected.back() + 100'000'000'000);
+    wrong += ahead ? 1 : 0;
+    if (ends_packet) queue.add(std::exchange(next, packet(0, 0, 0)));
+  }
+  for (int i = 0; i < 2; ++i) {  // the last ones are confirmed, too
+    expected.push_back(expected.back() + 1);
+    add(expected.back());
+  }
+  queue.add(next);
+  queue.end();
+  const InputQueue::Batch batch = queue.take();
+  std::vector<std::int64_t> events_ns;
+  std::vector<std::int64_t> poses_ns;
+  for (const CameraPacket& one : batch.packets) {
+    for (const Event& event : one.events) events_ns.push_back(event.t_ns);
+  }
+  for (const QueuedPose& pose : batch.poses) poses_ns.push_back(pose.pose.t_ns);
+  RC_ASSERT(events_ns == expected);
+  RC_ASSERT(poses_ns == expected);
+  RC_ASSERT(queue.counts().at(0).refused == wrong);
+  RC_ASSERT(queue.refusedPoses() == wrong);
+}
+
 TEST(InputQueue, EndPassesTheHeldEvents) {
   LiveOptions options;
   options.max_event_rate = 1000;
@@ -209,7 +251,7 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   EXPECT_EQ(queue.counts().at(0).received, 65U);
   EXPECT_TRUE(queue.take().missing.empty()) << "after the end";
   queue.add(QueuedPose{{1, {}}, {}, {}});
-  EXPECT_EQ(queue.posesAfterEnd(), 1U);
+  EXPECT_EQ(queue.refusedPoses(), 1U);
   EXPECT_TRUE(queue.take().poses.empty());
 }
 

@@ -175,7 +175,8 @@ TEST(LiveBuilder, PosesWaitForEventsTenMinutes) {
     for (const auto& observation : observations) {
       (observation->sensorLabel == "pose" ? poses : packets).push_back(observation);
     }
-    const auto newest = changed({poses.back()}, [&](CObservation& pose) {
+    // Two: one alone would be refused.
+    const auto newest = changed({poses.back(), poses.back()}, [&](CObservation& pose) {
       pose.timestamp +=
           std::chrono::duration_cast<mrpt::Clock::duration>(std::chrono::duration<double>(wait_s));
     });

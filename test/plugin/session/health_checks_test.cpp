@@ -646,7 +646,16 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
        }),
        "events-lost: 6.5 % of the events were lost; 3 windows given up: 3 "},
       {live([](auto& s) { s.live->cameras[1].thinned = 1; }),
-       "events-lost: 0.5 % of the events were lost; 0 windows given up; the machine is too slow"},
+       "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
+       "[live] "
+       "max_event_rate lets pass"},
+      {live([](auto& s) {
+         s.live->cameras[1].thinned = 1;
+         s.live->too_large = "a window needs 5 events";
+       }),
+       "events-lost: 0.5 % of the events were lost; 0 windows given up; 1 events were more than "
+       "[live] "
+       "max_event_rate lets pass; a window needs 5 events"},
       {live([](auto& s) { s.live->cameras[1].dropped = 3; }),
        "events-lost: 1.5 % of the events were lost; 0 windows given up; the machine is too slow"},
       {live([](auto& s) {

@@ -73,7 +73,7 @@ EventFusionOptions automaticOptions() {
 
 RecordingSurvey surveyOf(const SyntheticRecording& recording, const EventFusionOptions& options) {
   RecordingSurveyor surveyor(options);
-  for (const StampedPose& pose : recording.poses) surveyor.addPose(pose, {});
+  for (const StampedPose& pose : recording.poses) surveyor.addPose(pose, {}, {});
   for (double begin_s = 0; begin_s < 5; begin_s += 0.1) {
     for (const int c : {0, 1}) surveyor.addEvents(pieceOf(recording, c, begin_s, begin_s + 0.1));
   }
@@ -151,6 +151,46 @@ TEST(MappingSession, TheFirstLookAtARecordingIsNoLiveOperation) {
   EXPECT_NEAR(survey.duration_s.value_or(0), 4.2, 0.02);
 }
 
+/// On a machine that is too slow to map before the clock goes back.
+TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
+  const SyntheticRecording recording(1.3);
+  SyntheticRecording later = recording;  // of an earlier time: for 1 s it may only be late
+  constexpr std::int64_t kBackNs = 100 * kNanosecondsPerSecond;
+  for (StampedPose& pose : later.poses) pose.t_ns -= kBackNs;
+  for (auto& events : later.events) {
+    for (Event& event : events) event.t_ns -= kBackNs;
+  }
+  const auto feed = [](MappingSession& session, const SyntheticRecording& part, double shift_s) {
+    for (const StampedPose& pose : part.poses) messageOf([&] { session.addPose(pose); });
+    for (int i = 0; i < 131; ++i) {
+      for (int c = 0; c < 2; ++c) {
+        CameraPacket packet = pieceOf(part, c, shift_s + 0.01 * i, shift_s + 0.01 * (i + 1));
+        messageOf([&] { session.addEvents(std::move(packet)); });
+      }
+    }
+  };
+  for (const bool is_automatic : {false, true}) {
+    EventFusionOptions options = is_automatic ? automaticOptions() : syntheticOptions();
+    options.live.enabled = true;
+    MappingSession healthy(options);
+    feed(healthy, recording, 0);
+    const std::size_t complete = mapDue(healthy).size();
+    EXPECT_GT(complete, is_automatic ? 0U : 8U);
+
+    MappingSession session(options);
+    feed(session, recording, 0);
+    feed(session, later, -100);
+    EXPECT_EQ(session.status().live->clock_steps, 0U) << "not yet";
+    const std::size_t made = mapRest(session).size();
+    EXPECT_EQ(session.status().live->clock_steps, 1U);
+    EXPECT_GE(made, complete + (is_automatic ? 0 : 1)) << "those before it, and some after it";
+    EXPECT_EQ(session.heldEvents(), 0U);
+    std::uint64_t refused = 0;
+    for (const auto& [camera, events] : session.status().refused_events) refused += events;
+    expectEventsAddUp(session.status(), recording.totalEvents() + later.totalEvents() - refused);
+  }
+}
+
 TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
   struct Row {
     double duration_s;
@@ -159,9 +199,10 @@ TEST(MappingSession, JumpsBeforeTheChoiceOfOptionsLoseNoStretch) {
     bool before_the_end;
   };
   const Row rows[] = {
-      {2.4, {0.3, 0.6}, {3}, true},             // the choice waits for the third stretch
-      {3.2, {0.3, 1.2, 2.0}, {2, 3, 4}, true},  // chosen in the second one, which lasts 0.9 s
-      {0.9, {0.2}, {2}, false},                 // what the end leaves is chosen from
+      {2.4, {0.15, 0.3}, {3}, true},                 // the choice waits for the third stretch
+      {2.4, {0.4, 0.8, 1.2}, {1, 2, 3, 4}, true},    // chosen in the first one
+      {4.4, {1.5, 2.1, 2.7, 3.3}, {1, 4, 5}, true},  // shorter after two without a window
+      {0.9, {0.15}, {2}, false},                     // what the end leaves is chosen from
   };
   for (const Row& row : rows) {
     SyntheticRecording recording(row.duration_s);

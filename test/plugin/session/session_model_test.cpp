@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -81,6 +82,7 @@ class Model {
         stride_ns_(std::llround(options.mapper.policy.stride_s * 1e9)),
         pose_wait_ns_(std::llround(options.live.max_pose_wait_s * 1e9)),
         max_speed_m_s_(options.live.max_speed_m_s),
+        queue_events_(static_cast<double>(options.live.max_queue_events)),
         offsets_ns_(options.rig.time_offsets_ns) {
     status.live.emplace();
     status.counts.cameras.resize(kCameras);
@@ -90,6 +92,7 @@ class Model {
   SessionStatus status;
 
   void addPose(const StampedPose& pose, bool is_odometry) {
+    if (clock_reset_) return later_.push_back([=] { addPose(pose, is_odometry); });
     if (!rig_complete_ && is_odometry) {
       waiting_.push_back(pose);  // for a better source
     } else if (!use(pose)) {
@@ -102,6 +105,7 @@ class Model {
   }
 
   void addEvents(CameraPacket packet) {
+    if (clock_reset_) return later_.push_back([=] { addEvents(packet); });
     const int c = packet.camera;
     const std::int64_t offset_ns = offsets_ns_[static_cast<std::size_t>(c)];
     for (Event& event : packet.events) event.t_ns += offset_ns;
@@ -148,10 +152,12 @@ class Model {
     }
     clock_.first_ns = std::min(clock_.first_ns, first_ns);
     const bool known = !clock_.poses_ns.empty() || !clock_.next_stretch.empty();
-    if (known || clock_.newest_begin_ns - clock_.first_ns > kS) completeRig();
+    const bool fills_queue = static_cast<double>(heldEvents()) > queue_events_ / 2;
+    if (known || fills_queue || clock_.newest_begin_ns - clock_.first_ns > kS) completeRig();
   }
 
   void noteMissing(int camera, const MissingEvents& missing) {
+    if (clock_reset_) return later_.push_back([=] { noteMissing(camera, missing); });
     MissingEvents& noted = clock_.missing[camera];
     const std::int64_t until_ns = missing.until_ns + offsets_ns_[static_cast<std::size_t>(camera)];
     noted = {std::max(noted.until_ns, until_ns), missing.reason};
@@ -168,7 +174,7 @@ class Model {
     if (!rig_complete_) return std::nullopt;
     do {
       if (const std::optional<Window> window = windowOfStretch()) return window;
-    } while (beginStretch());
+    } while (beginStretch() || beginClock());
     return std::nullopt;
   }
 
@@ -214,7 +220,12 @@ class Model {
       }
     }
     if (oldest_ns >= clock_.reached_ns) return;
-    giveUpBefore((oldest_ns + clock_.reached_ns) / 2 + 1, &WindowsGivenUp::overload);
+    const auto held_ns = static_cast<double>(clock_.reached_ns - oldest_ns);
+    const double needed =
+        static_cast<double>(heldEvents()) * static_cast<double>(window_ns_) / held_ns;
+    const bool too_large = rig_complete_ && needed > queue_events_;
+    giveUpBefore((oldest_ns + clock_.reached_ns) / 2 + 1,
+                 too_large ? &WindowsGivenUp::too_large : &WindowsGivenUp::overload);
   }
 
   /// No window can be mapped now.
@@ -276,6 +287,9 @@ class Model {
     std::map<int, Older> older;
   };
 
+  std::size_t heldEvents() const {
+    return clock_.cameras[0].held.size() + clock_.cameras[1].held.size();
+  }
   bool hasPose(std::int64_t t_ns) const {
     constexpr std::int64_t kMaxGapNs = 250 * kMs;
     const auto after = clock_.poses_ns.lower_bound(t_ns);
@@ -420,18 +434,30 @@ class Model {
       if (sensor != kTracker && other_ns - t_ns > kS) return;
     }
     if (t_ns - older.since_ns < kS) return;
+    clock_reset_ = true;
+    if (!rig_complete_) beginClock();
+  }
+  /// Once the complete windows before are mapped.
+  bool beginClock() {
+    if (!clock_reset_) return false;
     giveUpBefore(clock_.reached_ns + 1, &WindowsGivenUp::clock_reset);
     clock_ = {};
     ++status.live->clock_steps;
+    clock_reset_ = false;
+    for (const auto& call : std::exchange(later_, {})) call();
+    return true;
   }
 
   std::int64_t window_ns_;
   std::int64_t stride_ns_;
   std::int64_t pose_wait_ns_;
   double max_speed_m_s_;
+  double queue_events_;
   std::vector<std::int64_t> offsets_ns_;
   Clock clock_;
   bool rig_complete_ = false;
+  bool clock_reset_ = false;
+  std::vector<std::function<void()>> later_;
   std::vector<StampedPose> waiting_;
   bool finished_ = false;
 };
@@ -496,7 +522,7 @@ class Run {
     queue_.add(QueuedPose{recording_.poses[0], {}, {}});
     queue_.add(CameraPacket{0, recording_.cameras[0], {{0, 1, 1, true}}, {}});
     RC_ASSERT(queue_.counts().at(0).after_end == 1U);
-    RC_ASSERT(queue_.posesAfterEnd() == 1U);
+    RC_ASSERT(queue_.refusedPoses() >= 1U);
   }
 
  private:
@@ -615,7 +641,7 @@ class Run {
     const bool knows_rig = !predicts_ || model_.rigIsComplete();
     if (phase.fault == kFarTooMuchWaits && knows_rig && !session_.nextWindow()) {
       RC_ASSERT(!predicts_ || !model_.oldestWindow());
-      session_.giveUpOlderHalf();
+      messageOf([&] { session_.giveUpOlderHalf(); });
       model_.giveUpOlderHalf();
     }
     while (mapNext(phase.fault)) {
