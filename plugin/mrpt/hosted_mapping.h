@@ -63,9 +63,10 @@ class HostedMapping {
   virtual void addPose(const QueuedPose& pose) = 0;
   /// Maps the rest.
   virtual void finish() = 0;
-  /// Ends without mapping the rest: input is lost from now on. @pre mayStopHere()
+  /// Ends without mapping the rest: input is lost from now on, and no callback comes after the
+  /// current one.
   virtual void stop() = 0;
-  /// False in a thread of the mapping's own: within a callback.
+  /// False in a thread of the mapping's own: within a callback. `stop` does not wait there.
   virtual bool mayStopHere() const { return true; }
 
   virtual void setSink(DsiSink* sink) = 0;

@@ -53,14 +53,22 @@ LiveMapping::LiveMapping(const EventFusionOptions& options, std::vector<StoredKe
   }
   publishMap(true);
   publishState();
-  thread_ = std::thread([this] { run(); });
+  thread_ = std::thread([this] {
+    run();
+    const auto last = std::move(alone_);
+  });
 }
 
 LiveMapping::~LiveMapping() { LiveMapping::stop(); }
 
 void LiveMapping::stop() {
   queue_.stop();
-  if (thread_.joinable()) thread_.join();
+  if (runsHere()) {
+    alone_ = shared_from_this();
+    thread_.detach();
+  } else if (thread_.joinable()) {
+    thread_.join();
+  }
 }
 
 void LiveMapping::run() {
@@ -284,6 +292,7 @@ void LiveMapping::publishMap(bool at_once) {
 /// What a host's callback throws is counted, and told the first time.
 template <typename Call>
 void LiveMapping::callBack(const char* name, Call call) {
+  if (alone_) return;
   try {
     call();
   } catch (...) {

@@ -35,7 +35,7 @@ namespace efm {
 ///
 /// An error of the mapping, the refinement or a callback is counted and logged; its window is given
 /// up and the next one is tried.
-class LiveMapping : public HostedMapping {
+class LiveMapping : public HostedMapping, public std::enable_shared_from_this<LiveMapping> {
  public:
   /// @param earlier keyframes of an initial map.
   /// @throws std::runtime_error naming a file of the options that cannot be read.
@@ -46,7 +46,8 @@ class LiveMapping : public HostedMapping {
   LiveMapping(const LiveMapping&) = delete;
   LiveMapping& operator=(const LiveMapping&) = delete;
 
-  /// The same, waiting for the current keyframe. One thread at a time.
+  /// The same, waiting for the current keyframe. One thread at a time. Within a callback it does
+  /// not wait: the mapping's thread ends, and this object with it, once the callback returns.
   void stop() override;
   bool mayStopHere() const override { return !runsHere(); }
 
@@ -112,6 +113,7 @@ class LiveMapping : public HostedMapping {
   std::uint64_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;
   bool warned_of_rounding_ = false;
+  std::shared_ptr<LiveMapping> alone_;  // after `stop` within a callback, whose owner may be gone
   std::uint64_t told_choices_ = 0;
 
   mutable std::mutex mutex_;  // of the members below; held for copies alone

@@ -7,7 +7,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <future>
 #include <map>
+#include <memory>
 #include <string>
 
 #include "test/plugin/mrpt/live_driver.h"
@@ -58,6 +60,35 @@ TEST(LiveLosses, WhatAHostsCallbacksThrowIsCountedAndToldOnce) {
     EXPECT_EQ(times("the callback of a keyframe: "), 1);
     EXPECT_EQ(times("the callback of the map: an exception of another type"), 1);
     EXPECT_EQ(times("the callback of the log: the log is full"), log_throws ? 1 : 0);
+  }
+}
+
+TEST(LiveLosses, AHostMayDropItsLastReferenceInACallback) {
+  const SyntheticRecording recording;
+  const Observations observations = announced(recording, observationsOf(recording));
+  for (const bool by_map : {false, true}) {
+    auto builder = std::make_shared<CEventFusionMapBuilder>(liveOptions());
+    builder->setVerbosityLevel(mrpt::system::LVL_ERROR);
+    std::promise<void> fed;
+    std::promise<void> dropped;
+    std::shared_ptr<CEventFusionMapBuilder> last;
+    int calls = 0;
+    const auto drop = [&, may_drop = fed.get_future().share()] {
+      if (++calls > 1) return;
+      may_drop.wait();
+      last.reset();
+      dropped.set_value();
+    };
+    if (by_map) {
+      builder->setMapCallback([&](const auto&) { drop(); });
+    } else {
+      builder->setKeyframeCallback([&](const auto&) { drop(); });
+    }
+    for (const auto& observation : observations) builder->processObservation(observation);
+    last = std::move(builder);
+    fed.set_value();
+    dropped.get_future().wait();
+    EXPECT_EQ(last, nullptr);
   }
 }
 
