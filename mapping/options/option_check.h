@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <sstream>
 #include <stdexcept>
 #include <string_view>
+
+#include "mapping/options/number_text.h"
 
 namespace efm {
 
@@ -14,8 +15,7 @@ template <typename Value>
 void requireOption(bool holds, std::string_view key, const Value& value,
                    std::string_view expected) {
   if (holds) return;
-  std::ostringstream message;
-  message.precision(15);  // as typed: 0.1, not 0.10000000000000001
+  NumberText message(15);  // as typed: 0.1, not 0.10000000000000001
   message << key << " = " << value << ": must be " << expected;
   throw std::invalid_argument(message.str());
 }

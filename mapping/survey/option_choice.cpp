@@ -2,14 +2,13 @@
 #include "mapping/survey/option_choice.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <iterator>
 #include <utility>
 
 #include "mapping/depth/median.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/number_text.h"
 #include "mapping/survey/scene_depths.h"
 
 namespace efm {
@@ -78,9 +77,9 @@ class Choice {
 };
 
 std::string number(double value) {
-  std::array<char, 32> digits{};
-  std::snprintf(digits.data(), digits.size(), "%.3g", value);
-  return digits.data();
+  NumberText text(3);
+  text << value;
+  return text.str();
 }
 
 /// A number with this many significant digits, for people to read; not above the value.

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
+#include "mapping/options/number_text.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "maps/io/little_endian.h"
@@ -163,8 +163,7 @@ PointCloudContent readCompressed(TextScanner& scanner, std::vector<RecordField> 
 }  // namespace
 
 void writePcdTo(std::ostream& stream, const MapCloud& cloud) {
-  std::ostringstream header;
-  header.precision(17);
+  NumberText header;
   header << "# .PCD v0.7 - Point Cloud Data file format\n"
             "VERSION 0.7\nFIELDS x y z intensity support sigma\nSIZE 4 4 4 4 4 4\n"
             "TYPE F F F F U F\nCOUNT 1 1 1 1 1 1\nWIDTH "

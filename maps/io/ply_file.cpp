@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "mapping/options/number_text.h"
 #include "mapping/options/quoted_text.h"
 #include "maps/io/little_endian.h"
 #include "maps/io/point_record.h"
@@ -124,10 +125,12 @@ void skip(TextScanner& scanner, const PlyElement& element, bool is_text) {
 void writePlyTo(std::ostream& stream, const MapCloud& cloud,
                 const std::vector<PointColour>& colours) {
   assert(colours.size() == cloud.size());
-  stream << "ply\nformat binary_little_endian 1.0\nelement vertex " << cloud.size()
+  NumberText header;
+  header << "ply\nformat binary_little_endian 1.0\nelement vertex " << cloud.size()
          << "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\n"
             "property uchar green\nproperty uchar blue\nproperty float confidence\n"
             "property uint support\nend_header\n";
+  stream << header.str();
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const MapPoint& point = cloud[i];
     const Eigen::Vector3d p_world = positionIn(cloud, point);

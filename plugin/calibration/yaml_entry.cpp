@@ -5,18 +5,25 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <cmath>
-#include <limits>
+#include <optional>
 #include <utility>
 
 #include "mapping/geometry/rounded_rotation.h"
 #include "mapping/options/quoted_text.h"
+#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {
 
 std::string placeOf(const std::string& file, const YAML::Mark& mark) {
   return mark.is_null() ? file : fmt::format("{}:{}", file, mark.line + 1);
+}
+
+/// yaml-cpp would read it as the locale of the host program has it.
+std::optional<double> finiteIn(const YAML::Node& node) {
+  std::string_view text = node.Scalar();
+  if (text.substr(0, 1) == "+" && text.substr(1, 1) != "-") text.remove_prefix(1);
+  return parseFinite(text);
 }
 
 }  // namespace
@@ -39,10 +46,8 @@ std::vector<double> YamlEntry::numbers(const char* key, std::size_t count,
 
 double YamlEntry::number(const char* key) const {
   const YAML::Node value = find(key);
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  const double number = value.IsScalar() ? value.as<double>(kNone) : kNone;
-  if (!std::isfinite(number)) throw failNode(value, key, "a finite number");
-  return number;
+  if (const auto number = finiteIn(value)) return *number;
+  throw failNode(value, key, "a finite number");
 }
 
 Eigen::MatrixXd YamlEntry::matrix(const char* key, int rows, int columns) const {
@@ -110,8 +115,9 @@ std::vector<double> YamlEntry::numbersIn(const YAML::Node& list, const char* key
   if (!list.IsSequence()) throw failNode(list, key, expected);
   std::vector<double> values;
   for (const YAML::Node& item : list) {
-    values.push_back(item.as<double>(std::numeric_limits<double>::quiet_NaN()));
-    if (!std::isfinite(values.back())) throw failNode(item, key, "finite numbers");
+    const auto number = finiteIn(item);
+    if (!number) throw failNode(item, key, "finite numbers");
+    values.push_back(*number);
   }
   if (count == 0 || values.size() == count) return values;
   throw fail(list, fmt::format("{}: {} numbers: expected {}", key, values.size(), expected));

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/pictures/plot_axis.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 namespace efm {
@@ -12,11 +12,7 @@ namespace {
 
 constexpr double kMargin = 0.04;
 
-std::string shortText(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
+std::string shortText(double value) { return fmt::format("{:.6g}", value); }
 
 /// The smallest of 1, 2, 5 times a power of ten that is `min_step` or more.
 double roundStep(double min_step) {

@@ -5,14 +5,13 @@
 #include <cmath>
 #include <cstddef>
 #include <fstream>
-#include <iomanip>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
 #include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/number_text.h"
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 
@@ -38,7 +37,7 @@ std::runtime_error quaternionError(const std::vector<std::string_view>& fields, 
   for (std::size_t field = 4; field < fields.size(); ++field) {
     values += (values.empty() ? "" : " ") + std::string(fields[field]);
   }
-  std::ostringstream text;
+  NumberText text(6);
   text << "qx qy qz qw = " << inQuotes(values) << ", of length " << norm
        << ": expected a rotation, of length 1 within 1 %";
   double squares = 0;
@@ -119,8 +118,10 @@ void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& po
 void writeTumPose(std::ostream& stream, const StampedPose& pose) {
   const Eigen::Vector3d& p = pose.T_world_rig.translation;
   const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
-  stream << std::setprecision(17) << formatSeconds(pose.t_ns) << ' ' << p.x() << ' ' << p.y() << ' '
-         << p.z() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+  NumberText line;
+  line << formatSeconds(pose.t_ns) << ' ' << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << q.x()
+       << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+  stream << line.str();
 }
 
 }  // namespace efm

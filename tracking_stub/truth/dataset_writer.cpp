@@ -7,15 +7,14 @@
 #include <cstddef>
 #include <cstring>
 #include <fstream>
-#include <iomanip>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/options/number_text.h"
 #include "mapping/options/option_check.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/rendering/depth_rendering.h"
@@ -159,8 +158,7 @@ void writeEvents(const fs::path& file, const std::vector<Event>& events) {
 }
 
 std::string formatCamchain(const Rig& rig) {
-  std::ostringstream text;
-  text << std::setprecision(17);
+  NumberText text;
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const CameraModel& model = rig.cameras[i].model;
     text << "cam" << i << ":\n";
@@ -180,9 +178,11 @@ std::string formatCamchain(const Rig& rig) {
 }
 
 void writePly(const fs::path& file, const std::vector<Eigen::Vector3f>& points) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size()
+  NumberText header;
+  header << "ply\nformat binary_little_endian 1.0\nelement vertex " << points.size()
          << "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
+  std::ofstream stream(file, std::ios::binary);
+  stream << header.str();
   static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
   stream.write(reinterpret_cast<const char*>(points.data()),
                static_cast<std::streamsize>(points.size() * sizeof(Eigen::Vector3f)));
