@@ -82,6 +82,18 @@ AtomicFile::~AtomicFile() {
   if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
 }
 
+void AtomicFile::fill(
+    const std::function<void(const std::filesystem::path& temporary)>& write) const {
+  errno = 0;
+  try {
+    write(temporary_);
+  } catch (const std::exception& error) {
+    const std::string why = reasonNotWritten(errno);
+    throw std::runtime_error("cannot write " + path_.string() + ": " +
+                             (why.empty() ? error.what() : why));
+  }
+}
+
 void AtomicFile::replace(DiskSync sync) {
   if (sync == DiskSync::kNow) syncToDisk(temporary_);
   std::filesystem::rename(temporary_, path_);
@@ -104,15 +116,10 @@ void writeAtomically(const std::filesystem::path& path,
                      const std::function<void(const std::filesystem::path& temporary)>& write,
                      DiskSync sync) {
   AtomicFile file(path);
-  errno = 0;
-  try {
-    write(file.temporary());
+  file.fill([&](const std::filesystem::path& temporary) {
+    write(temporary);
     file.replace(sync);
-  } catch (const std::exception& error) {
-    const std::string why = reasonNotWritten(errno);
-    throw std::runtime_error("cannot write " + path.string() + ": " +
-                             (why.empty() ? error.what() : why));
-  }
+  });
 }
 
 std::string readBytes(const std::filesystem::path& path) {

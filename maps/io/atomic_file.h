@@ -35,6 +35,10 @@ class AtomicFile {
   const std::filesystem::path& path() const { return path_; }
   /// The file to write: empty, with the extension of `path`.
   const std::filesystem::path& temporary() const { return temporary_; }
+  /// @param write fills the file at the path that it receives.
+  /// @throws std::runtime_error naming `path`, with the message of `write`, or that the disk is
+  /// full.
+  void fill(const std::function<void(const std::filesystem::path& temporary)>& write) const;
   /// Gives the complete temporary file its name. With `kNow` it is on the disk before.
   /// @throws std::filesystem::filesystem_error.
   void replace(DiskSync sync = DiskSync::kNow);

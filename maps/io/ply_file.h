@@ -9,7 +9,9 @@
 
 namespace efm {
 
-/// Writes a binary little-endian file of the Stanford polygon format, version 1.0.
+/// Writes a binary little-endian file of the Stanford polygon format, version 1.0, for viewers. Per
+/// vertex: x, y, z (double: maps may lie far from the origin), red, green, blue (uchar), confidence
+/// (float) and support (uint).
 /// @param colours one per point.
 /// @throws std::runtime_error naming a point that is not finite.
 void writePlyTo(std::ostream& stream, const MapCloud& cloud,

@@ -14,28 +14,13 @@
 
 namespace efm {
 
-namespace {
-
-/// @param write puts the content into the stream.
-template <typename Write>
-void writeBinary(const std::filesystem::path& path, Write write) {
+void writePcd(const std::filesystem::path& path, const MapCloud& cloud) {
   writeAtomically(path, [&](const std::filesystem::path& temporary) {
     std::ofstream file(temporary, std::ios::binary);
-    write(file);
+    writePcdTo(file, cloud);
     file.close();
     if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
   });
-}
-
-}  // namespace
-
-void writePcd(const std::filesystem::path& path, const MapCloud& cloud) {
-  writeBinary(path, [&](std::ostream& stream) { writePcdTo(stream, cloud); });
-}
-
-void writeColouredPly(const std::filesystem::path& path, const MapCloud& cloud,
-                      const std::vector<PointColour>& colours) {
-  writeBinary(path, [&](std::ostream& stream) { writePlyTo(stream, cloud, colours); });
 }
 
 PointCloudContent readPointCloud(const std::filesystem::path& path) {

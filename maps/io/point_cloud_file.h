@@ -20,14 +20,6 @@ void writePcd(const std::filesystem::path& path, const MapCloud& cloud);
 /// Red, green and blue.
 using PointColour = std::array<std::uint8_t, 3>;
 
-/// Writes a binary PLY file for viewers, whatever the extension of the path. Per vertex: x, y, z
-/// (double: maps may lie far from the origin), red, green, blue (uchar), confidence (float) and
-/// support (uint). The file appears when it is complete (AtomicFile).
-/// @param colours one per point.
-/// @throws std::runtime_error naming the path where it cannot be written or a point is not finite.
-void writeColouredPly(const std::filesystem::path& path, const MapCloud& cloud,
-                      const std::vector<PointColour>& colours);
-
 struct PointCloudContent {
   std::vector<CloudPoint> points;  ///< In the order of the file.
   std::uint64_t non_finite = 0;    ///< Points with a coordinate that is not finite: left out.

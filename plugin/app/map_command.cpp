@@ -142,6 +142,7 @@ void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void(
       write();
     } catch (const std::exception& error) {
       if (!outcome.error) outcome.error = inWords(error);
+      outcome.misses_file = true;
     }
   }
 }
@@ -176,6 +177,10 @@ void writePage(MappingOutcome& outcome, MapOutput& output, const KeyframePicture
   report.times.cpu.total += cpu_s;
 }
 
+std::string stays(const MapOutput& output) {
+  return fmt::format("; the earlier result in {} stays", output.folder().string());
+}
+
 /// Writes the page of a map and the report; prints warnings, summary and error. @return the exit
 /// status.
 int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
@@ -185,16 +190,18 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
     writePage(outcome, output, pictures);
     outcome.report.peak_memory_bytes = peakMemoryBytes();
   }
-  // A run without a keyframe leaves the results of an earlier run as they are.
-  if (outcome.report.counts.keyframes > 0 ||
-      !std::filesystem::exists(output.folder() / "report.json")) {
+  // A run without a keyframe, or one that cannot write a file, leaves the result of an earlier run.
+  const bool replaces =
+      outcome.report.counts.keyframes > 0 && !(output.keepsEarlier() && outcome.misses_file);
+  if (replaces || !std::filesystem::exists(output.folder() / "report.json")) {
     writeAll(outcome, {[&] { output.writeReport(reportJson(outcome.report)); }});
   }
+  if (output.keepsEarlier()) *outcome.error += stays(output);
   const std::vector<Warning>& warnings = outcome.report.warnings;
   printWarnings(
       {warnings.begin() + static_cast<std::ptrdiff_t>(outcome.told_warnings), warnings.end()});
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
-  if (outcome.report.counts.keyframes > 0 && !quiet)
+  if (outcome.report.counts.keyframes > 0 && !quiet && !output.keepsEarlier())
     std::cout << summaryOf(outcome.report, kind, output.folder());
   if (outcome.error) {
     const OptionReader reader = readerOf(arguments);
@@ -381,6 +388,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
       refuseOption(arguments, error);
       throw;
     } catch (const std::runtime_error& error) {
+      if (output->keepsEarlier()) throw std::runtime_error(inWords(error) + stays(*output));
       if (written == 0) throw;
       throw std::runtime_error(fmt::format("{}; {} keyframes before it are written to {}",
                                            inWords(error), written.load(), folder.string()));
@@ -505,7 +513,7 @@ int runDepth(const DepthArguments& arguments) {
     describePoints(*points, outcome.report);
     writeAll(outcome, {[&] { output.writeCloud("points.pcd", *points); },
                        [&] {
-                         if (dsi) dsi->finish();
+                         if (dsi) output.add(dsi->finish());
                        }});
   };
   return runJob(arguments, job, OutputKind::kDepth, take, write);

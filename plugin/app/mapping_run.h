@@ -55,6 +55,7 @@ struct MappingOutcome {
   std::size_t recalibrated_cameras = 0;  ///< Their recorded calibrations differ from the options'.
   /// Why the recording was not read to its end or has no keyframe.
   std::optional<std::string> error;
+  bool misses_file = false;  ///< A file of the result could not be written.
 };
 
 /// Plays a recording through a map builder, with progress on stderr. If reading stops with an

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/output/map_output.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -15,8 +17,8 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "maps/io/atomic_file.h"
-#include "maps/io/point_cloud_file.h"
+#include "maps/io/pcd_file.h"
+#include "maps/io/ply_file.h"
 #include "plugin/pictures/depth_picture.h"
 #include "plugin/pictures/height_colours.h"
 #include "tracking_stub/poses/tum_trajectory.h"
@@ -28,7 +30,7 @@ namespace {
 constexpr std::array<std::string_view, 4> kImages = {"depth.tiff", "confidence.tiff", "depth.png",
                                                      "confidence.png"};
 constexpr std::string_view kEventImage = "events.png";
-// Removed first: without it, what is left of an earlier result does not look complete.
+// Removed first: without it, the rest of an earlier result does not look complete.
 constexpr const char* kReport = "report.json";
 constexpr const char* kKeyframes = "keyframes";
 constexpr std::array<std::string_view, 8> kMapFiles = {
@@ -148,36 +150,29 @@ std::optional<EarlierResult> readReport(const std::filesystem::path& file) {
   }
 }
 
-void writeImageFile(const std::filesystem::path& path, const cv::Mat& image) {
-  const auto write = [&](const std::filesystem::path& temporary) {
-    // Not imwrite: where the disk is full, the libraries of pictures print that to stderr.
-    std::vector<std::uint8_t> bytes;
-    // Matching beside run lengths: a third of the size of OpenCV's default, in the same time.
-    const std::vector<int> quick = {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY,
-                                    cv::IMWRITE_PNG_STRATEGY_DEFAULT};
-    const std::string extension = path.extension().string();
-    const std::vector<int> parameters = extension == ".png" ? quick : std::vector<int>();
-    if (!cv::imencode(extension, image, bytes, parameters)) {
-      throw std::runtime_error("no picture can be made of it");
-    }
-    std::ofstream file(temporary, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
-    file.close();
-    if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
-  };
-  writeAtomically(path, write, DiskSync::kLater);
-}
-
-/// @param write puts the content into the stream.
-template <typename Write>
-void writeText(const std::filesystem::path& path, Write write) {
-  writeAtomically(path, [&](const std::filesystem::path& temporary) {
-    std::ofstream file(temporary, std::ios::binary);
+/// Writes a file by a function that puts the content into a stream.
+std::function<void(const std::filesystem::path&)> byStream(
+    std::function<void(std::ostream&)> write) {
+  return [write = std::move(write)](const std::filesystem::path& path) {
+    std::ofstream file(path, std::ios::binary);
     write(file);
     file.close();
     if (!file) throw std::runtime_error("the file cannot be created or the disk is full");
-  });
+  };
+}
+
+void writePictureTo(std::ostream& stream, const std::string& extension, const cv::Mat& image) {
+  // Not imwrite: where the disk is full, the libraries of pictures print that to stderr.
+  std::vector<std::uint8_t> bytes;
+  // Matching beside run lengths: a third of the size of OpenCV's default, in the same time.
+  const std::vector<int> quick = {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY,
+                                  cv::IMWRITE_PNG_STRATEGY_DEFAULT};
+  const std::vector<int> parameters = extension == ".png" ? quick : std::vector<int>();
+  if (!cv::imencode(extension, image, bytes, parameters)) {
+    throw std::runtime_error("no picture can be made of it");
+  }
+  stream.write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
 }
 
 }  // namespace
@@ -198,10 +193,11 @@ MapOutput::MapOutput(std::filesystem::path folder, OutputKind kind,
       style_(style),
       recording_(std::move(recording)) {
   makeFolder(folder_);
-  // Before the first file of this run: one may be under way when `removeEarlier` runs (dsi.npy).
+  // Before the first file of this run: one may be under way when `begin` runs (dsi.npy).
   const auto killed = RunMark::ofKilledRun(folder_);
   if (!killed) return;
   removeTemporaryFiles(folder_, killed->process);
+  for (const auto& empty : keyframeFolders(folder_ / kKeyframes)) ::rmdir(empty.c_str());
   // The mark stays where nothing else tells that the folder is a result's.
   if (readReport(folder_ / kReport)) removeFile(folder_ / RunMark::kName);
 }
@@ -222,25 +218,57 @@ bool MapOutput::holdsFilesOf(OutputKind kind, const std::filesystem::path& folde
          std::any_of(kImages.begin(), kImages.end(), has);
 }
 
-/// A map of five keyframes must not show two of an earlier map of seven.
-void MapOutput::removeEarlier() {
+MapOutput::~MapOutput() {
+  if (!keeps_earlier_) return;
+  waiting_.clear();
+  // Leaves files, and folders that hold some.
+  for (auto path = not_on_disk_.rbegin(); path != not_on_disk_.rend(); ++path) {
+    ::rmdir(path->c_str());
+  }
+  ::unlink((folder_ / RunMark::kName).c_str());
+}
+
+/// Before the first file.
+void MapOutput::begin() {
   if (mark_) return;
-  const bool replaces_both = earlierResult(folder_).has_value();
+  const std::optional<EarlierResult> earlier = earlierResult(folder_);
   mark_ = std::make_unique<RunMark>(folder_, recording_);
+  keeps_earlier_ = earlier && earlier->complete;
+  if (!keeps_earlier_) removeEarlier(earlier.has_value());
+}
+
+/// A map of five keyframes must not show two of an earlier map of seven.
+void MapOutput::removeEarlier(bool of_both_kinds) {
   removeFiles(folder_, std::array{kReport});
-  if (replaces_both || kind_ == OutputKind::kMap) {
+  if (of_both_kinds || kind_ == OutputKind::kMap) {
     removeFiles(folder_, kMapFiles);
     removeKeyframes(folder_ / kKeyframes);
   }
-  if (replaces_both || kind_ == OutputKind::kDepth) {
+  if (of_both_kinds || kind_ == OutputKind::kDepth) {
     removeFiles(folder_, kDepthFiles);
     removeImages(folder_);
   }
   syncToDisk(folder_);
 }
 
+void MapOutput::write(const std::filesystem::path& path,
+                      const std::function<void(const std::filesystem::path&)>& fill,
+                      DiskSync sync) {
+  begin();
+  if (!keeps_earlier_) return writeAtomically(path, fill, sync);
+  auto file = std::make_unique<AtomicFile>(path);
+  file->fill(fill);
+  waiting_.push_back(std::move(file));
+}
+
+void MapOutput::add(std::unique_ptr<AtomicFile> file) {
+  begin();
+  if (!keeps_earlier_) return file->replace();
+  waiting_.push_back(std::move(file));
+}
+
 void MapOutput::writeKeyframe(const KeyframeDepthMap& keyframe) {
-  removeEarlier();
+  begin();
   const std::filesystem::path folder =
       folder_ / kKeyframes / formatSeconds(keyframe.window.t_ref_ns);
   makeFolder(folder);
@@ -248,7 +276,7 @@ void MapOutput::writeKeyframe(const KeyframeDepthMap& keyframe) {
 }
 
 void MapOutput::writeImages(const KeyframeDepthMap& keyframe) {
-  removeEarlier();
+  begin();
   writeImagesTo(folder_, keyframe);
 }
 
@@ -269,12 +297,14 @@ void MapOutput::writeImagesTo(const std::filesystem::path& folder,
 
 /// Pictures wait for the disk together, before the report: four files per keyframe would each wait.
 void MapOutput::writeImage(const std::filesystem::path& path, const cv::Mat& image) {
-  writeImageFile(path, image);
   const std::size_t folder = folder_.native().size();
   for (std::filesystem::path part = path; part.native().size() > folder;) {
     not_on_disk_.insert(part);
     part = part.parent_path();
   }
+  const std::string extension = path.extension().string();
+  write(path, byStream([&](std::ostream& file) { writePictureTo(file, extension, image); }),
+        DiskSync::kLater);
 }
 
 void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& map) {
@@ -291,41 +321,43 @@ void MapOutput::writeMap(const std::filesystem::path& folder, const DepthMap& ma
 }
 
 void MapOutput::writeTrajectory(const std::string& name, const std::vector<StampedPose>& poses) {
-  removeEarlier();
-  writeText(folder_ / name, [&](std::ostream& stream) { writeTumTrajectory(stream, poses); });
+  write(folder_ / name, byStream([&](std::ostream& file) { writeTumTrajectory(file, poses); }));
 }
 
 void MapOutput::writeCloud(const std::string& name, const MapCloud& cloud) {
-  removeEarlier();
-  writePcd(folder_ / name, cloud);
+  write(folder_ / name, byStream([&](std::ostream& file) { writePcdTo(file, cloud); }));
 }
 
 void MapOutput::writeColouredCloud(const MapCloud& cloud, const Eigen::Vector3d& upward) {
-  removeEarlier();
-  writeColouredPly(folder_ / "map.ply", cloud, coloursByHeight(cloud, upward));
+  const std::vector<PointColour> colours = coloursByHeight(cloud, upward);
+  write(folder_ / "map.ply",
+        byStream([&](std::ostream& file) { writePlyTo(file, cloud, colours); }));
 }
 
 void MapOutput::writeFile(const std::string& name,
                           const std::function<void(const std::filesystem::path&)>& write) {
-  removeEarlier();
-  writeAtomically(folder_ / name, write);
+  this->write(folder_ / name, write);
 }
 
 void MapOutput::writePicture(const std::string& name, const cv::Mat3b& picture) {
-  removeEarlier();
   writeImage(folder_ / name, picture);
 }
 
 void MapOutput::writePage(const std::function<void(std::ostream&)>& write) {
-  removeEarlier();
-  writeText(folder_ / "map.html", write);
+  this->write(folder_ / "map.html", byStream(write));
 }
 
 void MapOutput::writeReport(const std::string& json) {
-  removeEarlier();
-  for (const std::filesystem::path& path : not_on_disk_) syncToDisk(path);
-  not_on_disk_.clear();
-  writeText(folder_ / kReport, [&](std::ostream& stream) { stream << json; });
+  begin();
+  writeAtomically(folder_ / kReport, [&](const std::filesystem::path& temporary) {
+    byStream([&](std::ostream& file) { file << json; })(temporary);
+    for (const auto& file : waiting_) syncToDisk(file->temporary());
+    if (std::exchange(keeps_earlier_, false)) removeEarlier(true);
+    for (const auto& file : waiting_) file->replace(DiskSync::kLater);
+    waiting_.clear();
+    for (const std::filesystem::path& path : not_on_disk_) syncToDisk(path);
+    not_on_disk_.clear();
+  });
   removeFile(folder_ / RunMark::kName);
 }
 

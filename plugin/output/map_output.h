@@ -15,6 +15,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/map_point.h"
+#include "maps/io/atomic_file.h"
 #include "plugin/output/run_mark.h"
 
 namespace efm {
@@ -43,10 +44,13 @@ struct EarlierResult {
   bool isOf(const std::vector<std::string>& files) const;
 };
 
-/// The folder that a map is written to. A file appears under its name when it is complete. Of an
-/// earlier result report.json is removed first, and the caller writes it last: a folder with a
-/// report.json is complete, and all its files are of one run. A std::runtime_error names a file
-/// that cannot be written.
+/// The folder that a map is written to. A file appears under its name when it is complete. The
+/// caller writes report.json last: a folder with a report.json is complete, and all its files are
+/// of one run. A std::runtime_error names a file that cannot be written.
+///
+/// An earlier result with a report stays until the new report is written: until then the new files
+/// have temporary names, and without a report they are removed. What else an earlier run left is
+/// removed right before the first file.
 ///
 /// Until then the folder has a RunMark, by which the next run knows that it may replace what a
 /// killed run left.
@@ -58,15 +62,17 @@ struct EarlierResult {
 ///     keyframes/<t_ref>/camN/{the same of one camera, events.png}   by option
 class MapOutput {
  public:
-  /// Creates the folder. Right before the first file is written, the files of an earlier run are
-  /// removed, those of the other kind only where it is an `earlierResult`: a run that writes
-  /// nothing leaves them.
+  /// Creates the folder. Files of the other kind are removed only where they are an
+  /// `earlierResult`.
   /// @param limits the colours of depth.png run between its depths.
   /// @param recording its files, for the next run.
   /// @throws std::runtime_error where the folder cannot be made, or another run writes its result
   /// there; so do the functions that write.
   MapOutput(std::filesystem::path folder, OutputKind kind, const DepthPlanesOptions& limits,
             PictureStyle style = PictureStyle::kFigure, std::vector<std::string> recording = {});
+
+  /// Removes the files that wait for the report.
+  ~MapOutput();
 
   /// The result of either kind in a folder: a report, or the mark of a run that was killed.
   /// @throws std::runtime_error where another run is writing its result there.
@@ -94,12 +100,22 @@ class MapOutput {
   void writePicture(const std::string& name, const cv::Mat3b& picture);
   /// map.html.
   void writePage(const std::function<void(std::ostream&)>& write);
+  /// Gives a complete file of the folder its name.
+  void add(std::unique_ptr<AtomicFile> file);
+  /// All other files are complete: replaces an earlier result.
   void writeReport(const std::string& json);
+
+  /// Whether an earlier result stays until the report is written.
+  bool keepsEarlier() const { return keeps_earlier_; }
 
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
-  void removeEarlier();
+  void begin();
+  void removeEarlier(bool of_both_kinds);
+  void write(const std::filesystem::path& path,
+             const std::function<void(const std::filesystem::path&)>& fill,
+             DiskSync sync = DiskSync::kNow);
   void writeImagesTo(const std::filesystem::path& folder, const KeyframeDepthMap& keyframe);
   void writeImage(const std::filesystem::path& path, const cv::Mat& image);
   void writeMap(const std::filesystem::path& folder, const DepthMap& map);
@@ -109,8 +125,10 @@ class MapOutput {
   DepthPlanesOptions limits_;
   PictureStyle style_;
   std::vector<std::string> recording_;
-  std::unique_ptr<RunMark> mark_;                // from the first file on
-  std::set<std::filesystem::path> not_on_disk_;  // pictures and their folders
+  std::unique_ptr<RunMark> mark_;  // from the first file on
+  bool keeps_earlier_ = false;
+  std::vector<std::unique_ptr<AtomicFile>> waiting_;  // for the report
+  std::set<std::filesystem::path> not_on_disk_;       // pictures and their folders
 };
 
 }  // namespace efm

@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace efm {
 namespace {
@@ -30,13 +31,13 @@ std::string npyHeader(int planes, const ReferenceView& view) {
 }  // namespace
 
 NpyDsiFile::NpyDsiFile(const std::filesystem::path& path, int planes, const ReferenceView& view)
-    : target_(path),
+    : target_(std::make_unique<AtomicFile>(path)),
       plane_bytes_(static_cast<std::streamoff>(view.pixels() * sizeof(float))),
-      file_(target_.temporary(), std::ios::binary | std::ios::trunc) {
+      file_(target_->temporary(), std::ios::binary | std::ios::trunc) {
   const std::string header = npyHeader(planes, view);
   header_bytes_ = static_cast<std::streamoff>(header.size());
   file_.write(header.data(), header_bytes_);
-  if (!file_) throw std::runtime_error("cannot write " + target_.path().string());
+  if (!file_) throw std::runtime_error("cannot write " + target_->path().string());
 }
 
 void NpyDsiFile::addPlane(int plane, const float* values) {
@@ -45,12 +46,12 @@ void NpyDsiFile::addPlane(int plane, const float* values) {
   file_.write(reinterpret_cast<const char*>(values), plane_bytes_);
 }
 
-void NpyDsiFile::finish() {
+std::unique_ptr<AtomicFile> NpyDsiFile::finish() {
   file_.close();
   if (!file_) {
-    throw std::runtime_error("cannot write " + target_.path().string() + ": the disk may be full");
+    throw std::runtime_error("cannot write " + target_->path().string() + ": the disk may be full");
   }
-  target_.replace();
+  return std::move(target_);
 }
 
 }  // namespace efm

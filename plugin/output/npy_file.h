@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <mutex>
 
 #include "mapping/geometry/reference_view.h"
@@ -13,8 +14,7 @@
 namespace efm {
 
 /// Writes the whole DSI to a NumPy file (.npy, format 1.0): float32, [plane][row][column]. Each
-/// plane goes to disk at once: memory is that of one plane. `finish` gives the file its name;
-/// without it no file stays.
+/// plane goes to disk at once: memory is that of one plane.
 class NpyDsiFile : public DsiSink {
  public:
   /// @throws std::runtime_error naming the path where it cannot be created.
@@ -22,11 +22,12 @@ class NpyDsiFile : public DsiSink {
 
   /// Thread-safe. Errors of the disk are kept for `finish`.
   void addPlane(int plane, const float* values) override;
+  /// @return the complete file. Only its `replace` gives it its name; without that no file stays.
   /// @throws std::runtime_error naming the path where it could not be written.
-  void finish();
+  std::unique_ptr<AtomicFile> finish();
 
  private:
-  AtomicFile target_;
+  std::unique_ptr<AtomicFile> target_;
   std::streamoff plane_bytes_;
   std::streamoff header_bytes_ = 0;
   std::mutex mutex_;  // of file_

@@ -32,9 +32,9 @@ class AppTest : public ProgramTest {
     return resultOf(status);
   }
 
-  /// Runs event-fusion and sends it SIGINT as soon as `ready` holds, unless it ends before.
+  /// Runs event-fusion and sends it a signal as soon as `ready` holds, unless it ends before.
   template <typename Ready>
-  Result interrupted(const std::string& arguments, Ready ready) const {
+  Result interrupted(const std::string& arguments, Ready ready, int signal = SIGINT) const {
     std::cout.flush();
     std::fflush(nullptr);
     const pid_t child = fork();
@@ -42,7 +42,7 @@ class AppTest : public ProgramTest {
     int status = -1;
     while (waitpid(child, &status, WNOHANG) == 0) {
       if (ready()) {
-        kill(child, SIGINT);
+        kill(child, signal);
         EXPECT_EQ(waitpid(child, &status, 0), child);
         break;
       }

@@ -73,6 +73,28 @@ TEST_F(Interrupted, AnInputNamedLikeATemporaryFileStays) {
   EXPECT_FALSE(anyNameHas("partial-"));
 }
 
+TEST_F(Interrupted, AStoppedRunReplacesAnEarlierResultAndAKilledOneDoesNot) {
+  write(SyntheticRecording(4.0));
+  const std::string map = "map rig.ini data --out out";
+  const std::string slow = map + " --set keyframes.stride_s=0.01";
+  const auto writes = [this] { return anyNameHas("depth.partial-"); };
+  ASSERT_EQ(run(map).status, 0);
+  const std::size_t whole = reportIn("out")["keyframes"];
+  ASSERT_EQ(interrupted(slow, writes).status, 130);
+  const nlohmann::json report = reportIn("out");
+  EXPECT_TRUE(report.contains("stopped_at"));
+  const auto files = filesIn("out");
+  EXPECT_EQ(files.size(), 7 + 4 * report["keyframes"].get<std::size_t>());
+
+  const std::string earlier = contentOf("out/map.pcd");
+  EXPECT_EQ(interrupted(slow, writes, SIGKILL).status, -1);
+  EXPECT_THAT(filesIn("out"), testing::IsSupersetOf(files));
+  EXPECT_EQ(contentOf("out/map.pcd"), earlier);
+  EXPECT_EQ(reportIn("out"), report);
+  ASSERT_EQ(run(map).status, 0);
+  EXPECT_EQ(filesIn("out").size(), 7 + 4 * whole) << "nothing of the killed run";
+}
+
 TEST_F(Interrupted, AResultThatIsReplacedIsNamed) {
   importRecording(SyntheticRecording());
   const std::string place = std::filesystem::canonical(folder()).string();

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -163,6 +164,53 @@ TEST_F(MapCommand, ARunWithoutKeyframesKeepsTheEarlierMap) {
     EXPECT_EQ(filesIn("out"), files) << arguments;
     EXPECT_EQ(reportIn("out")["keyframes"], 4) << arguments;
   }
+}
+
+TEST_F(MapCommand, ARunThatCannotWriteItsResultLeavesTheEarlierOne) {
+  write(SyntheticRecording());
+  const auto contents = [this](const std::string& out) {
+    std::map<std::string, std::string> files;
+    for (const std::string& file : filesIn(out)) files[file] = contentOf(out + "/" + file);
+    return files;
+  };
+  const std::string map = "map rig.ini data --out map --set keyframes.stride_s=";
+  const std::string depth = "depth rig.ini data --out depth --save-dsi --t0 10.1 --t1 10.";
+  ASSERT_EQ(run(map + "0.1").status, 0);
+  ASSERT_EQ(run(depth + "3").status, 0);
+  const auto earlier_map = contents("map");
+  const auto earlier_depth = contents("depth");
+  const auto keeps = [&](const std::string& command, const std::string& limit) {
+    const Result result = shell(limit + "'" EFM_EVENT_FUSION "' " + command);
+    EXPECT_EQ(result.status, 1) << command;
+    EXPECT_EQ(result.out, "") << command;
+    const bool is_map = command.rfind("map", 0) == 0;
+    EXPECT_THAT(result.err, HasSubstr("; the earlier result in " +
+                                      std::string(is_map ? "map" : "depth") + " stays\n"));
+    EXPECT_TRUE(contents("map") == earlier_map) << testing::PrintToString(filesIn("map"));
+    EXPECT_TRUE(contents("depth") == earlier_depth) << testing::PrintToString(filesIn("depth"));
+    const auto folders = std::filesystem::directory_iterator(folder() / "map" / "keyframes");
+    EXPECT_EQ(std::distance(begin(folders), end(folders)), 4) << command;
+    return result.err;
+  };
+  // Units of 512 bytes. The first picture, and one of the last files.
+  EXPECT_THAT(keeps(map + "0.05", "ulimit -f 4; "), HasSubstr(".tiff: the file would be larger"));
+  EXPECT_THAT(keeps(map + "0.05", "ulimit -f 128; "), HasSubstr("map.png: the file would be"));
+  EXPECT_THAT(keeps(depth + "4", "ulimit -f 4; "), HasSubstr(".tiff: the file would be larger"));
+  EXPECT_THAT(keeps(depth + "4", "ulimit -f 128; "), HasSubstr("dsi.npy"));
+
+  ASSERT_EQ(run(map + "0.05").status, 0);
+  EXPECT_EQ(reportIn("map")["keyframes"], 7);
+  EXPECT_EQ(filesIn("map").size(), 7U + 4 * 7);
+  ASSERT_EQ(run(depth + "4").status, 0);
+  EXPECT_NE(contentOf("depth/dsi.npy"), earlier_depth.at("dsi.npy"));
+  EXPECT_EQ(filesIn("depth").size(), 7U);
+
+  // A folder that it cannot write to.
+  std::filesystem::remove_all(folder() / "map" / "keyframes");
+  write("map/keyframes", "mine");
+  const auto without_keyframes = contents("map");
+  EXPECT_THAT(errorOf(map + "0.1"), HasSubstr("map/keyframes"));
+  EXPECT_TRUE(contents("map") == without_keyframes) << testing::PrintToString(filesIn("map"));
 }
 
 TEST_F(MapCommand, AFolderHoldsTheFilesOfOneRun) {

@@ -114,11 +114,12 @@ TEST_F(MapOutputTest, AResultReplacesOneOfTheOtherKindAndNoFilesOfOthers) {
     EXPECT_EQ(MapOutput::holdsFilesOf(OutputKind::kMap, folder()), of_map);
     EXPECT_EQ(MapOutput::holdsFilesOf(OutputKind::kDepth, folder()), of_depth);
   };
-  const auto writeMap = [&] {
+  const auto writeMap = [&](const std::string& report = "") {
     MapOutput map(folder(), OutputKind::kMap, {});
     map.writeKeyframe(smallKeyframe(1'000'000'000));
     map.writeTrajectory("trajectory.txt", {});
     map.writeCloud("map.pcd", {});
+    if (!report.empty()) map.writeReport(report);
   };
   const auto writeDepth = [&](const std::string& report) {
     MapOutput depth(folder(), OutputKind::kDepth, {});
@@ -143,8 +144,11 @@ TEST_F(MapOutputTest, AResultReplacesOneOfTheOtherKindAndNoFilesOfOthers) {
   EXPECT_FALSE(result->isOf({"a"}));
   expectFiles(false, true);
   writeMap();
+  expectFiles(false, true);  // a run without a report leaves it, and nothing else
+  EXPECT_FALSE(exists(mark));
+  EXPECT_FALSE(exists(folder() / "keyframes"));
+  writeMap("{}");
   expectFiles(true, false);
-  std::filesystem::remove(mark);
   for (const char* foreign : {"", "{}", "[1]", R"({"version": "1", "options": {}})", "text"}) {
     std::ofstream(folder() / "report.json") << foreign;
     EXPECT_FALSE(MapOutput::earlierResult(folder())) << foreign;
@@ -219,7 +223,7 @@ TEST_F(NpyFileTest, HoldsPlanesRowsAndColumnsInThatOrder) {
   file.addPlane(1, far.data());
   EXPECT_FALSE(exists(folder() / "dsi.npy")) << "not complete";
   file.addPlane(0, near.data());
-  file.finish();
+  file.finish()->replace();
 
   const std::string content = readText(folder() / "dsi.npy");
   ASSERT_EQ(content.size() % 4, 0U);
