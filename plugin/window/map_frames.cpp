@@ -7,7 +7,7 @@
 #include <cctype>
 #include <stdexcept>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "maps/io/atomic_file.h"
 
@@ -29,7 +29,8 @@ bool isFrame(const fs::path& file) {
          (name.size() == 16 || name.compare(12, 9, ".partial-") == 0);
 }
 
-void prepareFolder(const fs::path& folder, bool force) {
+/// @return the frames of an earlier run.
+std::vector<fs::path> prepareFolder(const fs::path& folder, bool force) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw std::runtime_error(folder.string() + ": " + error.message());
@@ -43,7 +44,7 @@ void prepareFolder(const fs::path& folder, bool force) {
                                "one, one of earlier frames, or --force");
     }
   }
-  for (const fs::path& file : earlier) fs::remove(file);
+  return earlier;
 }
 
 }  // namespace
@@ -56,10 +57,11 @@ MapFrames::MapFrames(const fs::path& folder, bool force) : folder_(folder) {
         "--record-frames: nothing can be rendered here: expected EGL and OpenGL, for instance the "
         "Debian packages libegl1 and libgl1-mesa-dri");
   }
-  prepareFolder(folder, force);
+  earlier_ = prepareFolder(folder, force);
 }
 
 void MapFrames::show(WatchedMap snapshot) {
+  for (const fs::path& file : std::exchange(earlier_, {})) fs::remove(file);
   scene_.show(snapshot);
   const auto scene = scene_.scene();
   renderer_->setCamera(*scene, scene->getViewport()->getCamera());

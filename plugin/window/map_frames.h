@@ -5,6 +5,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "plugin/window/map_scene.h"
 
@@ -14,7 +15,8 @@ namespace efm {
 /// keyframe. It draws in the thread that made it.
 class MapFrames : public MapWatcher {
  public:
-  /// @param folder is made if it is missing; frames of an earlier run are removed.
+  /// @param folder is made if it is missing; frames of an earlier run are removed
+  /// before the first one.
   /// @param force write into a folder that holds other files.
   /// @throws std::runtime_error naming the folder if it holds other files or cannot be made, or if
   /// nothing can be rendered on this machine.
@@ -26,6 +28,7 @@ class MapFrames : public MapWatcher {
 
  private:
   std::filesystem::path folder_;
+  std::vector<std::filesystem::path> earlier_;
   MapScene scene_;
   std::unique_ptr<mrpt::opengl::CFBORender> renderer_;
   int frames_ = 0;

@@ -83,6 +83,8 @@ TEST_F(GrowingMap, HasAFrameForEachKeyframeAndTheSameResult) {
   EXPECT_GT(cloudPixelsIn("new/frames/frame_000004.png"), first);
 
   write("new/frames/frame_000009.png", "of an earlier run");
+  EXPECT_EQ(shell(frames + "--record-frames new/frames --t0 1000 --t1 1001").status, 1);
+  EXPECT_EQ(filesIn("new/frames").size(), 5U) << "no frame takes their place";
   EXPECT_EQ(shell(frames + "--record-frames new/frames").status, 0);
   EXPECT_EQ(filesIn("new/frames").size(), 4U);
 }
