@@ -7,14 +7,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/geometry/timestamp.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
 
 EventPackets::EventPackets(std::unique_ptr<EventStream> stream, CameraSize size,
                            std::int64_t period_ns)
-    : stream_(std::move(stream)), size_(size), period_ns_(period_ns), newest_ns_(-kEndOfTimeNs) {
+    : stream_(std::move(stream)), size_(size), period_ns_(period_ns) {
   requireOption(period_ns > 0, "packet period (ns)", period_ns, "above 0");
 }
 
@@ -35,8 +34,9 @@ std::vector<Event> EventPackets::nextPacket() {
     return {};
   }
   const auto begin = events_.begin() + static_cast<std::ptrdiff_t>(first_);
+  const std::size_t most = std::min(events_.size() - first_, kMaxPacketEvents);
   const auto end = std::partition_point(
-      begin, events_.end(),
+      begin, begin + static_cast<std::ptrdiff_t>(most),
       [end_ns = periodEnd(begin->t_ns)](const Event& event) { return event.t_ns < end_ns; });
   first_ = static_cast<std::size_t>(end - events_.begin());
   return {begin, end};
@@ -68,8 +68,12 @@ std::int64_t EventPackets::periodEnd(std::int64_t t_ns) const {
 
 /// Whether no further event can belong to the first packet.
 bool EventPackets::packetIsComplete() const {
-  return first_ < events_.size() &&
-         newest_ns_ - kMaxEventDelayNs >= periodEnd(events_[first_].t_ns);
+  if (first_ == events_.size()) return false;
+  std::int64_t end_ns = periodEnd(events_[first_].t_ns);
+  if (events_.size() - first_ >= kMaxPacketEvents) {
+    end_ns = std::min(end_ns, events_[first_ + kMaxPacketEvents - 1].t_ns);
+  }
+  return newest_ns_ - kMaxEventDelayNs >= end_ns;
 }
 
 /// An error comes after the events before it.
@@ -82,6 +86,13 @@ void EventPackets::readBlock() {
   }
   try {
     takeBlock();
+    if (ahead_ && (ended_ || damaged)) {
+      constexpr std::int64_t kMaxLastPauseNs = 10'000'000'000;
+      const std::int64_t t_ns = ahead_->t_ns;
+      const bool bad =
+          ended_ && t_ns - kMaxEventDelayNs < stop_ns_ && t_ns - newest_ns_ > kMaxLastPauseNs;
+      settleAhead(bad ? newest_ns_ : t_ns);
+    }
   } catch (const std::runtime_error&) {
     error_ = std::current_exception();
   }
@@ -110,34 +121,70 @@ std::string EventPackets::problemOf(std::size_t i) const {
   if (event.t_ns >= kEndOfTimeNs) {
     return problem("t", event.t_ns, "a time in ns before the year 2116");
   }
-  return problem("t", formatSeconds(event.t_ns),
-                 fmt::format("events in time order, at most 10 ms before the newest ({})",
-                             formatSeconds(newest_ns_)));
+  const char* const expected =
+      event.t_ns > newest_ns_
+          ? "a time near those of the events beside it, of which the one before is at {}"
+          : "events in time order, at most 10 ms before the newest ({})";
+  return problem("t", formatSeconds(event.t_ns), fmt::format(expected, formatSeconds(newest_ns_)));
+}
+
+void EventPackets::take(const Event& event) {
+  if (event.t_ns >= newest_ns_) {
+    newest_ns_ = event.t_ns;
+    ended_ = newest_ns_ - kMaxEventDelayNs >= stop_ns_;
+    if (ended_) return;
+  } else {
+    disordered_ = true;
+    ++sorted_events_;
+  }
+  if (event.t_ns >= start_ns_ && event.t_ns < stop_ns_) events_.push_back(event);
 }
 
 void EventPackets::takeBlock() {
-  const std::int64_t end_ns =
-      std::min(stop_ns_.value_or(kEndOfTimeNs), kEndOfTimeNs - kMaxEventDelayNs) + kMaxEventDelayNs;
+  constexpr std::int64_t kFarAheadNs = 1'000'000'000;
   events_.reserve(events_.size() + block_.size());
   for (std::size_t i = 0; i < block_.size(); ++i) {
     const Event& event = block_[i];
+    if (ahead_) settleAhead(event.t_ns);
+    if (ended_) return;  // also from errors behind it
     if (!isGood(event)) {
-      const std::string problem = problemOf(i);
-      if (bad_ == nullptr) throw std::runtime_error(problem);
-      bad_->skip(problem);
-      continue;
-    }
-    if (event.t_ns >= newest_ns_) {
-      newest_ns_ = event.t_ns;
-      ended_ = newest_ns_ >= end_ns;
-      if (ended_) return;  // also from errors behind it
+      refuse(problemOf(i));
+    } else if (event.t_ns - newest_ns_ <= kFarAheadNs || newest_ns_ == -kEndOfTimeNs) {
+      take(event);
     } else {
-      disordered_ = true;
-      ++sorted_events_;
+      ahead_ = event;
+      ahead_problem_ = problemOf(i);
     }
-    if (start_ns_ && event.t_ns < *start_ns_) continue;
-    if (!stop_ns_ || event.t_ns < *stop_ns_) events_.push_back(event);
   }
+  refuseEqualTimes();
+}
+
+/// Counts in whole blocks, which costs nothing: so many events of one time fill some.
+void EventPackets::refuseEqualTimes() {
+  constexpr std::int64_t kMaxPixels = std::int64_t{1} << 21;  // where the sensor is not known
+  const auto pixels = std::min(kMaxPixels, std::int64_t{1} * size_.width * size_.height);
+  const bool equal = !block_.empty() && block_.front().t_ns == block_.back().t_ns &&
+                     block_.front().t_ns == newest_ns_;
+  equal_times_ = equal ? equal_times_ + static_cast<std::int64_t>(block_.size()) : 0;
+  if (equal_times_ <= 4 * pixels) return;
+  throw std::runtime_error(fmt::format(
+      "{}: t = '{}': {} events have this time, over 4 a pixel: expected times that differ (are the "
+      "column and the unit of the times right, and are they no float32?)",
+      stream_->positionOf(block_.size() - 1), formatSeconds(newest_ns_), equal_times_));
+}
+
+/// Takes the event far ahead, or refuses it where the next one is back in the order without it.
+void EventPackets::settleAhead(std::int64_t next_ns) {
+  const Event ahead = *std::exchange(ahead_, std::nullopt);
+  const bool back = next_ns < ahead.t_ns - kMaxEventDelayNs;
+  if (back && next_ns >= newest_ns_ - kMaxEventDelayNs) return refuse(ahead_problem_);
+  take(ahead);
+}
+
+/// Leaves out a wrong event.
+void EventPackets::refuse(const std::string& problem) {
+  if (bad_ == nullptr) throw std::runtime_error(problem);
+  bad_->skip(problem);
 }
 
 void EventPackets::sortEvents() {

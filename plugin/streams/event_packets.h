@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/timestamp.h"
 #include "plugin/streams/event_stream.h"
 
 namespace efm {
@@ -16,10 +17,15 @@ namespace efm {
 /// The default period of the grid of packets: packet k has the events of [k·10 ms, (k+1)·10 ms).
 inline constexpr std::int64_t kPacketPeriodNs = 10'000'000;
 
+/// The most events of a packet: 10 ms of the fastest sensors.
+inline constexpr std::size_t kMaxPacketEvents = std::size_t{1} << 20;
+
 /// Checks the events of a camera, sorts those that are up to 10 ms late and divides them into
 /// packets on a grid of time. Reads on demand: memory holds a block and the events of a packet and
-/// 10 ms. A wrong event is a std::runtime_error that names the position, the value and the expected
-/// one. It is thrown after the packets of the events before it, and again by every further call.
+/// 10 ms. More than 4 events a pixel at one time are an error. An event over 1 s ahead of both its
+/// neighbours, or 10 s ahead at the end, is a wrong one. A wrong event is a std::runtime_error that
+/// names the position, the value and the expected one. It is thrown after the packets of the events
+/// before it, and again by every further call.
 class EventPackets {
  public:
   /// @param size pixels beyond it are wrong.
@@ -36,7 +42,8 @@ class EventPackets {
   void stopAt(std::int64_t t_ns) { stop_ns_ = t_ns; }
 
   /// The events of the next period of the grid with events, in time order; events of equal time in
-  /// the order of the file. Empty at the end.
+  /// the order of the file. More than `kMaxPacketEvents` are several packets, also those of one
+  /// time. Empty at the end.
   /// @throws std::runtime_error at a wrong event.
   std::vector<Event> nextPacket();
   /// The first time of the next packet; nothing at the end. If the next call of `nextPacket`
@@ -54,6 +61,10 @@ class EventPackets {
   std::int64_t periodEnd(std::int64_t t_ns) const;
   void readBlock();
   void takeBlock();
+  void take(const Event& event);
+  void settleAhead(std::int64_t next_ns);
+  void refuseEqualTimes();
+  void refuse(const std::string& problem);
   bool isGood(const Event& event) const;
   std::string problemOf(std::size_t i) const;
   void sortEvents();
@@ -62,15 +73,18 @@ class EventPackets {
   CameraSize size_;
   std::int64_t period_ns_;
   BadEvents* bad_ = nullptr;
-  std::optional<std::int64_t> start_ns_;
-  std::optional<std::int64_t> stop_ns_;
+  std::int64_t start_ns_ = -kEndOfTimeNs;
+  std::int64_t stop_ns_ = kEndOfTimeNs;
   bool ended_ = false;
   std::exception_ptr error_;  // of the wrong event
 
   std::vector<Event> block_;
   std::vector<Event> events_;  // sorted between calls; returned before first_
   std::size_t first_ = 0;
-  std::int64_t newest_ns_;
+  std::int64_t newest_ns_ = -kEndOfTimeNs;
+  std::int64_t equal_times_ = 0;  // number of events with it, in the last blocks
+  std::optional<Event> ahead_;    // good or bad: the next event says it
+  std::string ahead_problem_;
   bool disordered_ = false;
   std::uint64_t sorted_events_ = 0;
 };

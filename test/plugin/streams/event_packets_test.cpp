@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -135,6 +136,89 @@ TEST(EventPackets, AnEventBesideTheSensorOrBeyondTheEndOfTimeIsAnError) {
   std::int64_t unused_ns = 0;
   EventPackets none(std::make_unique<ListedStream>(ListedStream::Blocks{}, unused_ns), {1, 1});
   EXPECT_EQ(errorOf([&] { none.nextTime(); }), "damaged") << "there is no event before it";
+}
+
+TEST(EventPackets, OfOneTimeAreDividedAndUntilThenItIsNotComplete) {
+  const std::vector<Event> all(kMaxPacketEvents + 5, Event{7});
+  std::int64_t unused_ns = 0;
+  EventPackets packets(
+      std::make_unique<ListedStream>(ListedStream::Blocks{all, {{7 + 30 * kMs}}}, unused_ns),
+      {1280, 720});
+  EXPECT_EQ(packets.nextPacket().size(), kMaxPacketEvents);
+  EXPECT_EQ(packets.nextTime(), 7);
+  EXPECT_EQ(packets.nextPacket().size(), 5U);
+  EXPECT_EQ(packets.nextTime(), 7 + 30 * kMs);
+}
+
+TEST(EventPackets, MoreThanFourEventsAPixelAtOneTimeAreAnErrorOfAllTimes) {
+  for (const int count : {8, 9}) {
+    std::int64_t unused_ns = 0;
+    const auto events = static_cast<std::size_t>(count);
+    EventPackets packets(std::make_unique<ListedStream>(
+                             ListedStream::Blocks{std::vector<Event>(events, {kMs})}, unused_ns),
+                         {2, 1});
+    BadEvents bad(100);
+    packets.skipBadEvents(bad);
+    EXPECT_THAT(errorOf([&] { readPackets(packets); }),
+                HasSubstr(count == 8 ? "damaged"
+                                     : "block 1, event 8: t = '0.001000000': 9 events have this "
+                                       "time, over 4 a pixel: expected times that differ"));
+    EXPECT_EQ(bad.count(), 0U);
+  }
+}
+
+/// Blocks of one event each, up to the end of the file.
+class EndingStream : public ListedStream {
+ public:
+  using ListedStream::ListedStream;
+  bool read(std::vector<Event>& events) override {
+    try {
+      return ListedStream::read(events);
+    } catch (const std::runtime_error&) {
+      return false;
+    }
+  }
+};
+
+TEST(EventPackets, AnEventFarAheadOfBothNeighboursIsTheBadOne) {
+  const struct {
+    std::vector<int> times_ms;
+    std::vector<int> good_ms;
+    std::optional<int> stop_ms{};
+    const char* error =
+        "expected a time near those of the events beside it, of which the one "
+        "before is at 0.001000000";
+  } rows[] = {
+      {{0, 1, 100'000, 2, 3}, {0, 1, 2, 3}},
+      {{0, 1, 100'000, 2}, {0, 1, 2}, 50},
+      {{0, 1, 100'000}, {0, 1}},                    // the last one
+      {{0, 1, 100'000}, {0, 1}, 50, nullptr},       // is not of the interval
+      {{0, 1, 9'000}, {0, 1, 9'000}, {}, nullptr},  // may be noise after a pause
+      {{0, 1, 1'001, 2}, {0, 1, 1'001}, {}, "at most 10 ms before the newest (1.001000000)"},
+      {{0, 1, 1'002, 2}, {0, 1, 2}},
+      {{0, 1, 5'000, 4'990, 5'001}, {0, 1, 4'990, 5'000, 5'001}, {}, nullptr},  // a pause
+      {{0, 1, 5'000, 9'000, 13'000}, {0, 1, 5'000, 9'000, 13'000}, {}, nullptr},
+      {{1'000, 5'000, 0, 5'001}, {1'000, 5'000, 5'001}, {}, "the newest (5.000000000)"},
+  };
+  for (const bool blocks : {true, false}) {
+    for (const auto& [times_ms, good_ms, stop_ms, error] : rows) {
+      ListedStream::Blocks of_one;
+      for (const int t_ms : times_ms) of_one.push_back({{t_ms * kMs}});
+      ListedStream::Blocks all = {{}};
+      for (const auto& block : of_one) all.front().push_back(block.front());
+      std::vector<std::int64_t> expected;
+      for (const int t_ms : good_ms) expected.push_back(t_ms * kMs);
+      std::int64_t unused_ns = 0;
+      EventPackets packets(std::make_unique<EndingStream>(blocks ? of_one : all, unused_ns),
+                           {1, 1});
+      BadEvents bad(1);
+      packets.skipBadEvents(bad);
+      if (stop_ms) packets.stopAt(*stop_ms * kMs);
+      EXPECT_EQ(timesOf(readPackets(packets)), expected);
+      EXPECT_EQ(bad.count(), error == nullptr ? 0U : 1U);
+      EXPECT_THAT(bad.first(), HasSubstr(error == nullptr ? "" : error));
+    }
+  }
 }
 
 class PacketsOfText : public TemporaryFolder {};
