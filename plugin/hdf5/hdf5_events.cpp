@@ -183,7 +183,7 @@ void Hdf5EventStream::append(std::vector<Event>& events) {
   const char* const any_pixel = "a whole number from 0 to 65535";
   setEvents(columns_[kX], next_, count, added, "x", any_pixel, refused, pixel(&Event::x));
   setEvents(columns_[kY], next_, count, added, "y", any_pixel, refused, pixel(&Event::y));
-  setEvents(columns_[kT], next_, count, added, "t", "a time before the year 2116", refused,
+  setEvents(columns_[kT], next_, count, added, "t", kExpectedTime, refused,
             [unit_ns = unit_ns_, offset_ns = offset_ns_](Event& event, auto number) {
               const auto t_ns = nanoseconds(number, unit_ns);
               event.t_ns = t_ns.value_or(0) + offset_ns;
@@ -207,7 +207,7 @@ std::int64_t Hdf5EventStream::timeAt(std::uint64_t index) const {
     t_ns = nanoseconds(number, unit_ns_);
     return true;
   });
-  if (!t_ns) throw std::runtime_error(positionInFile(index) + ": t: expected a time");
+  if (!t_ns) throw std::runtime_error(positionInFile(index) + ": t: expected " + kExpectedTime);
   return *t_ns + offset_ns_;
 }
 

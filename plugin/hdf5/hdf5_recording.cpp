@@ -70,7 +70,7 @@ std::vector<StampedPose> readPoses(const std::shared_ptr<const Hdf5File>& file,
     StampedPose pose;
     time.forEach(i, 1, [&](std::size_t, auto number) {
       const auto t_ns = nanoseconds(number, poses.time_unit_ns);
-      if (!t_ns) throw times->failAt(i, fmt::format("{}: expected a time", number));
+      if (!t_ns) throw times->failAt(i, fmt::format("{}: expected {}", number, kExpectedTime));
       pose.t_ns = *t_ns;
       return true;
     });

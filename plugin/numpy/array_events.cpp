@@ -108,8 +108,8 @@ Event ArrayEvents::eventAt(std::size_t row) const {
   const NpyColumn& t = columns_.t;
   const std::optional<std::int64_t> t_ns = t.array->time(row, t.index, time_exponent_);
   if (!t_ns) {
-    throw t.array->failure(begin_ + row, fmt::format("t = {}: expected a time before the year 2116",
-                                                     t.array->number(row, t.index)));
+    throw t.array->failure(begin_ + row, fmt::format("t = {}: expected {}",
+                                                     t.array->number(row, t.index), kExpectedTime));
   }
   const double polarity = columns_.p.array->number(row, columns_.p.index);
   if (polarity != 0 && std::abs(polarity) != 1) {

@@ -13,6 +13,7 @@
 #include "plugin/numpy/npy_array.h"
 #include "plugin/readers/pose_file.h"
 #include "plugin/streams/file_content.h"
+#include "plugin/streams/number_checks.h"
 #include "plugin/streams/time_unit.h"
 
 namespace efm {
@@ -167,9 +168,8 @@ std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
     for (std::size_t row = 0; row < rows; ++row) {
       const std::optional<std::int64_t> t_ns = times.time(row, 0, *exponent);
       if (!t_ns) {
-        throw times.failure(
-            result.size(),
-            fmt::format("t = {}: expected a time before the year 2116", times.number(row)));
+        throw times.failure(result.size(),
+                            fmt::format("t = {}: expected {}", times.number(row), kExpectedTime));
       }
       try {
         result.push_back({*t_ns, poseOf(poses, row, arrays.times ? 0 : 1)});

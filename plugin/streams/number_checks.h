@@ -42,17 +42,28 @@ std::optional<std::int64_t> wholeNumber(Number number, std::int64_t min, std::in
   return static_cast<std::int64_t>(number);
 }
 
-/// A time of a file in nanoseconds; nothing beyond `kEndOfTimeNs`. A real number is rounded to the
-/// finest of 1, 10, 100 and 1000 ns that its type resolves there. So decimals that were written
-/// come back, and none is invented. A double resolves seconds to 1 ns up to 97 days, and today's
-/// Unix time to 240 ns.
+/// How far apart the numbers of a real type are at a number.
+template <typename Number>
+double stepAt(Number number) {
+  const Number size = std::abs(number);
+  return static_cast<double>(std::nextafter(size, std::numeric_limits<Number>::infinity()) - size);
+}
+
+/// Times that are farther apart are no times of events or poses: float32 seconds from 16,384 s on.
+inline constexpr double kMaxTimeStepNs = 1e6;
+inline constexpr const char* kExpectedTime =
+    "a time before the year 2116, and no float32 number that is over 1 ms from the next one";
+
+/// A time of a file in nanoseconds; nothing beyond `kEndOfTimeNs`, and where the numbers of its
+/// type are over `kMaxTimeStepNs` apart. A real number is rounded to the finest of 1, 10, 100 and
+/// 1000 ns that its type resolves there. So decimals that were written come back, and none is
+/// invented. A double resolves seconds to 1 ns up to 97 days, and today's Unix time to 240 ns.
 /// @param unit_ns of the number: a power of ten.
 template <typename Number>
 std::optional<std::int64_t> nanoseconds(Number time, std::int64_t unit_ns) {
   if constexpr (std::is_floating_point_v<Number>) {
-    const Number size = std::abs(time);
-    const Number step = std::nextafter(size, std::numeric_limits<Number>::infinity()) - size;
-    const double step_ns = static_cast<double>(step) * static_cast<double>(unit_ns);
+    const double step_ns = stepAt(time) * static_cast<double>(unit_ns);
+    if (step_ns > kMaxTimeStepNs) return std::nullopt;
     std::int64_t grid_ns = 1;
     while (grid_ns < kNanosecondsPerMicrosecond && static_cast<double>(grid_ns) < step_ns) {
       grid_ns *= 10;

@@ -11,6 +11,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/options/text_parsing.h"
+#include "plugin/streams/number_checks.h"
 
 namespace efm {
 
@@ -116,6 +117,7 @@ void TimeSample::add(double t, bool is_whole) {
   latest = count == 0 ? t : std::max(latest, t);
   ++count;
   whole = whole && is_whole;
+  float32 = float32 && static_cast<double>(static_cast<float>(t)) == t;
   max = std::max(max, std::abs(t));
 }
 
@@ -130,6 +132,14 @@ TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
   constexpr double kFarTooRare = 0.03;  // a sensor at rest has noise
   constexpr double kEndOfTimeUs = static_cast<double>(kEndOfTimeNs) * 1e-3;
   if (!options.time_unit.empty()) return {timeExponentOf(options.time_unit).value_or(0), {}};
+  const int exponent = sample.whole ? datedExponent(sample).value_or(-9) : 0;
+  const double step_s = stepAt(static_cast<float>(sample.max)) * std::pow(10.0, exponent);
+  if (sample.float32 && sample.count >= kEnough && step_s > 1e-9 * kMaxTimeStepNs) {
+    throw std::runtime_error(
+        fmt::format("{}: the times are float32 numbers, which are {:.3g} s apart at {:.16g}: "
+                    "expected float64, or whole numbers of us or ns",
+                    where, step_s, sample.max));
+  }
   if (sample.max >= kEndOfTimeUs) return {-9, {}};
   if (!sample.whole) {
     const bool too_rare = sample.count >= kMany && sample.latest > sample.earliest &&

@@ -29,6 +29,7 @@ std::optional<double> metresOf(std::string_view unit);
 struct TimeSample {
   int count = 0;
   bool whole = true;    ///< Without decimals.
+  bool float32 = true;  ///< All are numbers that a float32 holds.
   double max = 0;       ///< The largest absolute value.
   double earliest = 0;  ///< Of the times.
   double latest = 0;
@@ -59,7 +60,8 @@ struct TimeUnit {
 ///   a unit in which they are of the years 2000 to 2050, and their rate is usual: with a warning.
 /// @param where for errors.
 /// @throws std::runtime_error naming the option and the likely unit, where it is not certain: other
-/// whole numbers, and decimals that are far too rare for seconds.
+/// whole numbers, decimals that are far too rare for seconds, and times that were float32 and are
+/// over 1 ms apart.
 TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
                       const UsualRate& usual, const std::string& where);
 

@@ -20,6 +20,7 @@
 #include "plugin/hdf5/hdf5_files.h"
 #include "plugin/hdf5/hdf5_recording.h"
 #include "plugin/readers/recording_formats.h"
+#include "plugin/streams/number_checks.h"
 #include "plugin/writers/hdf5_writer.h"
 #include "test/paths.h"
 #include "test/plugin/formats/files.h"
@@ -179,13 +180,14 @@ class Hdf5Events : public TemporaryFolder {
     Numbers p = {1, 0, 1};
     std::optional<Numbers> index;
     Numbers offset;  // a number, if there is one
+    hid_t t_type = H5T_STD_I64LE;
   };
   /// DSEC's layout.
   void write(const Columns& columns) const {
     Writing writing(file());
     writing.add("events/x", H5T_STD_U32LE, columns.x);
     writing.add("events/y", H5T_STD_U16LE, columns.y);
-    writing.add("events/t", H5T_STD_I64LE, columns.t);
+    writing.add("events/t", columns.t_type, columns.t);
     writing.add("events/p", H5T_STD_I8LE, columns.p);
     if (columns.index) writing.add("ms_to_idx", H5T_STD_I64LE, *columns.index);
     if (!columns.offset.empty()) writing.add("t_offset", H5T_STD_I64LE, columns.offset);
@@ -213,12 +215,16 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
   columns.p = {1, 2, 0};
   check(columns, place + "[1]: p = '2': expected polarity 1, 0 or -1", 1);
   columns.t = {5'000'000'000'000'000, 0, 0};
-  check(columns, place + "[0]: t = '5000000000000000': expected a time before the year 2116", 0);
+  check(columns, place + "[0]: t = '5000000000000000': expected " + kExpectedTime, 0);
   // Of several wrong ones, the first event's is told; of one event's, that of the first column.
   columns.t = {0, -5'000'000'000'000'000, 0};
-  check(columns, place + "[1]: t = '-5000000000000000': expected a time before the year 2116", 1);
+  check(columns, place + "[1]: t = '-5000000000000000': expected " + kExpectedTime, 1);
   columns.p = {-2, 1, 0};
   check(columns, place + "[0]: p = '-2': expected polarity 1, 0 or -1", 0);
+  Columns real;
+  real.t_type = H5T_IEEE_F32LE;
+  real.t = {0, 16'383, 16'384};  // s
+  check(real, place + "[2]: t = '16384': expected " + kExpectedTime, 2);
   const long long end_us = kEndOfTimeNs / 1'000;
   for (const int sign : {-1, 1}) {
     Columns shifted;
@@ -226,9 +232,7 @@ TEST_F(Hdf5Events, WrongNumbersAreErrorsAfterTheEventsBeforeThem) {
     shifted.t = {0, 0, sign * 2'500};
     check(shifted, "no error", 3);
     shifted.t[2] = sign * 2'501;
-    check(shifted,
-          place + fmt::format("[2]: t = '{}': expected a time bef", shifted.t[2]) +
-              "ore the year 2116",
+    check(shifted, place + fmt::format("[2]: t = '{}': expected {}", shifted.t[2], kExpectedTime),
           2);
     shifted.offset = {sign * (end_us + 1)};
     write(shifted);

@@ -174,6 +174,10 @@ TEST_F(EventArrays, AnErrorNamesTheFileWhatItHasAndWhatWasExpected) {
        ": row 1: x = 1.5: expected a whole number", 1},
       {npyArray("<f8", "(2, 4)", std::vector<double>{0.5, 1, 2, 2, 0.6, 1, 2, 1}),
        ": row 0: p = 2: expected polarity 0 or 1, or -1 or 1"},
+      {npyArray("<f4", "(2, 4)", std::vector<float>{16'383.5F, 1, 2, 1, 16'384, 1, 2, 1}),
+       ": row 1: t = 16384: expected a time before the year 2116, and no float32 number that", 1},
+      {npyArray("<f4", "(10, 4)", std::vector<float>(40, 1.7e9F)),
+       "the times are float32 numbers, which are 128 s apart at 1700000000: expected float64"},
   };
   for (const auto& row : rows) {
     const fs::path file = write("e.npy", row.bytes);

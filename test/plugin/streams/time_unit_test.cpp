@@ -62,6 +62,12 @@ TEST(TimeUnit, IsThatOfTheOptionOrOfTheValuesWhereTheyLeaveNoDoubt) {
       {999, 0.5, 1.0 / 29, 0, nullptr},
       {5, 4.6e9 + 0.5, 1, 0, nullptr},
       {5, 4.7e9 + 0.5, 1, 0, "not seconds"},
+      {2000, 16'384.5, 1.0 / 512, 0,
+       "in e: the times are float32 numbers, which are 0.00195 s apart at 16388.40"},
+      {2000, 16'384.5, 1.0 / 1024, 0, nullptr},
+      {2000, 8'192.5, 1.0 / 1024, 0, nullptr},
+      {2000, 1.7e9, 0, 0, "are 128 s apart at 1700000000: expected float64"},
+      {2000, 1.7e15F, 0, 0, "are 134 s apart at 16999999"},
   };
   for (const auto& row : rows) {
     SCOPED_TRACE(testing::Message() << row.count << " from " << row.first << " by " << row.step);
