@@ -53,6 +53,7 @@ const RecordingFormat* formatOf(const Path& path, const RecordingSource& source)
   if (!std::filesystem::exists(path)) {
     throw std::runtime_error(path.string() + ": no such file or folder");
   }
+  requireNoPipe(path);
   if (name == kRawlog) return nullptr;
   if (name != "auto") return formatNamed(name);
   const RecordingFormat* format = detectFormat(path);
@@ -322,7 +323,8 @@ std::unique_ptr<Recording> openOwn(const RecordingSource& source, const Calibrat
 
 /// @param given how the user gave the file; empty: as the value of `option`.
 void requireGivenFile(const Path& file, const char* option, const std::string& given) {
-  if (file.empty() || std::filesystem::exists(file)) return;
+  if (std::filesystem::exists(file)) return requireNoPipe(file);
+  if (file.empty()) return;
   throw std::runtime_error(
       fmt::format("{}: no such file", given.empty() ? option + (" " + file.string()) : given));
 }

@@ -56,6 +56,7 @@ std::vector<StampedPose> readAnyPoses(const fs::path& file, const ReaderOptions&
   if (fs::is_directory(file, ignored)) return posesOfRecording(file, options);
   if (looksLikeNumpy(file)) return readPoseArrays(file, options);
   const std::string start = firstBytes(file);
+  requireTextLines(start, file.string());
   if (start.find('\0') != std::string::npos) return posesOfRecording(file, options);
   if (start.compare(0, 8, "#ROSBAG ") == 0) return posesOfRecording(file, options);
   refuseUnread(file);

@@ -125,6 +125,7 @@ EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions
   carried_ = content_.read(block_.data(), kFirstBytes);
   ended_ = carried_ < kFirstBytes;
   const std::string_view first = withoutByteOrderMark({block_.data(), carried_});
+  requireTextLines(first, name());
   columns_ = findEventColumns(wholeLines(first, ended_), options, name());
   usual_ = columns_.isUsual();
 }
@@ -340,6 +341,7 @@ std::string beginningOfText(const std::filesystem::path& file) {
   FileContent content(file);
   bytes.resize(content.read(bytes.data(), kBytes));
   const std::string_view text = withoutByteOrderMark(bytes);
+  requireTextLines(text, file.string());
   return std::string(wholeLines(text, bytes.size() < kBytes));
 }
 

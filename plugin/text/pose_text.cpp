@@ -14,6 +14,7 @@
 #include "mapping/options/quoted_text.h"
 #include "mapping/options/text_parsing.h"
 #include "plugin/streams/file_content.h"
+#include "plugin/streams/source_files.h"
 #include "plugin/streams/time_unit.h"
 #include "tracking_stub/poses/tum_trajectory.h"
 
@@ -182,6 +183,7 @@ int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
 
 std::vector<StampedPose> posesOf(std::string_view text, const std::filesystem::path& file,
                                  const ReaderOptions& options) {
+  requireTextLines(text, file.string());
   PoseColumns columns;
   const std::vector<PoseLine> lines = poseLines(withoutByteOrderMark(text), columns, file.string());
   const int exponent = exponentOf(lines, columns, file, options);

@@ -72,6 +72,19 @@ class ProgramTable : public AppTest {
     write("empty.rawlog", "");
     write("picture.png", "\x89PNG\r\n\x1a\n");
     write("short", "\x97");
+    std::string utf16 = "\xff\xfe";
+    for (const char c : events.substr(0, 5000)) utf16 += {c, '\0'};
+    write("utf16.txt", utf16);
+    write("utf16le.txt", utf16.substr(2));
+    std::string cr = events;
+    std::replace(cr.begin(), cr.end(), '\n', '\r');
+    write("cr.txt", cr);
+    copyOfData("cr_folder",
+               [&](const fs::path& copy) { std::ofstream(copy / "cam0/events.txt") << cr; });
+    ASSERT_EQ(shell("tr '\\n' '\\r' <data/poses.txt >poses_cr.txt && iconv -f UTF-8 -t UTF-16BE "
+                    "data/poses.txt >poses16.txt && mkfifo pipe")
+                  .status,
+              0);
     write("words.bin", std::string("\x05\0\0\0a b c", 9));
 
     write("wrong.ini", "[dsi]\nnum_planes = 0\n");
@@ -94,7 +107,8 @@ class ProgramTable : public AppTest {
   std::map<std::string, std::string> allFiles() const {
     std::map<std::string, std::string> files;
     for (const std::string& file : filesIn(".")) {
-      if (file != "stdout.txt" && file != "stderr.txt") files[file] = contentOf(file);
+      if (file == "stdout.txt" || file == "stderr.txt" || file == "pipe") continue;
+      files[file] = contentOf(file);
     }
     return files;
   }
