@@ -37,6 +37,11 @@ void milliseconds(const Event& event, std::string& text) {
   fmt::format_to(std::back_inserter(text), "{:.6f} {} {} {}\n",
                  1e-6 * static_cast<double>(event.t_ns), event.x, event.y, event.polarity ? 1 : 0);
 }
+void float32Seconds(const Event& event, std::string& text) {
+  fmt::format_to(std::back_inserter(text), "{:.6f} {} {} {}\n",
+                 static_cast<float>(200'000 + 1e-9 * static_cast<double>(event.t_ns)), event.x,
+                 event.y, event.polarity ? 1 : 0);
+}
 void timeLast(const Event& event, std::string& text) {
   fmt::format_to(std::back_inserter(text), "{} {} {} {}\n", event.x, event.y,
                  event.polarity ? 1 : 0, formatSeconds(event.t_ns));
@@ -193,6 +198,25 @@ std::vector<Mistake> eventMistakes() {
        "",
        kFine,
        {"warning: sorted-events: 500 events came later than newer ones and were sorted"}},
+      {"an event 100 s ahead",
+       [](Draft& draft) { draft.events[0][100'000].t_ns += 100'000'000'000; },
+       "",
+       kJobError,
+       {"error: data/cam0/events.txt:100001: t = '101.592764000': expected a time near those of "
+        "the events beside it"}},
+      {"an event 100 s ahead, skipped",
+       [](Draft& draft) { draft.events[0][100'000].t_ns += 100'000'000'000; },
+       "--skip-bad-events 1",
+       kFine,
+       {"warning: skipped-events: 1 bad events were left out, the first one found: "
+        "data/cam0/events.txt:100001: t = '101.592764000': expected a time near those of the "
+        "events beside it"}},
+      {"times of float32",
+       lines(float32Seconds),
+       "",
+       kJobError,
+       {"error: data/cam0/events.txt: the times are float32 numbers, which are 0.0156 s apart at "
+        "200001."}},
       {"a truncated file",
        [](Draft& draft) {
          const std::string text = draft.eventText(0);
