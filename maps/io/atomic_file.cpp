@@ -4,7 +4,9 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <fstream>
 #include <stdexcept>
@@ -31,6 +33,7 @@ std::filesystem::path replaceableFile(const std::filesystem::path& path) {
     if (error) throw refuse(error.message());
   }
   const std::filesystem::file_status status = std::filesystem::status(file, error);
+  if (error == std::errc::filename_too_long) throw refuse(error.message());
   if (std::filesystem::is_directory(status) || !file.has_filename()) throw refuse("it is a folder");
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
     throw refuse("it is there and not a regular file");
@@ -71,9 +74,12 @@ std::filesystem::path AtomicFile::temporaryName(const std::filesystem::path& pat
                                                 int trial) {
   const std::string number =
       std::to_string(process) + (trial == 0 ? "" : "-" + std::to_string(trial));
+  const std::string end = ".partial-" + number + path.extension().string();
+  std::string begin = path.stem().string();
+  // Two long names may begin alike: then `trial` tells them apart.
+  begin.resize(std::min(begin.size(), NAME_MAX - std::min<std::size_t>(end.size(), NAME_MAX)));
   std::filesystem::path temporary = path;
-  temporary.replace_filename(path.stem().string() + ".partial-" + number +
-                             path.extension().string());
+  temporary.replace_filename(begin + end);
   return temporary;
 }
 

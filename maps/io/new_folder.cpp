@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <climits>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -30,8 +31,9 @@ NewFolder::NewFolder(fs::path folder) : folder_(std::move(folder)) {
   const fs::path parent = folder_.parent_path();
   fs::create_directories(parent, error);
   if (error) throw std::runtime_error(parent.string() + ": cannot be made: " + error.message());
-  const std::string name =
-      "." + folder_.filename().string() + ".unfinished-" + std::to_string(getpid());
+  constexpr std::size_t kMostOfName = NAME_MAX - 40;  // the rest is room for the numbers
+  const std::string name = "." + folder_.filename().string().substr(0, kMostOfName) +
+                           ".unfinished-" + std::to_string(getpid());
   for (int trial = 0;; ++trial) {
     const fs::path unfinished = parent / (name + (trial == 0 ? "" : "-" + std::to_string(trial)));
     if (::mkdir(unfinished.c_str(), 0777) == 0) {

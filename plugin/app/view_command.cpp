@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "plugin/output/run_mark.h"
+
 namespace efm {
 namespace {
 
@@ -25,7 +27,9 @@ std::filesystem::path pageIn(const std::filesystem::path& path) {
   }
   if (fs::exists(path / "map.html")) return fs::absolute(path / "map.html").lexically_normal();
   const char* const why =
-      fs::exists(path / "map.pcd")
+      fs::exists(path / RunMark::kName)
+          ? ": the run that writes it was killed, or is not at its end yet"
+      : fs::exists(path / "map.pcd")
           ? ": an earlier version made this map, or it was not written to its end; map it again"
           : ": expected the page that `map` writes into its folder";
   throw std::runtime_error((path / "map.html").string() + why);

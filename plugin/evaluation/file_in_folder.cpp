@@ -14,7 +14,10 @@ std::filesystem::path fileInFolder(const std::filesystem::path& path,
     if (std::filesystem::is_regular_file(path / name)) return path / name;
     expected += (expected.empty() ? "" : " or ") + std::string(name);
   }
-  throw std::runtime_error(path.string() + ": a folder without " + expected);
+  const bool killed = std::filesystem::exists(path / "report.partial.json");
+  throw std::runtime_error(
+      path.string() + ": a folder without " + expected +
+      (killed ? ": the run that writes it was killed, or is not at its end yet" : ""));
 }
 
 }  // namespace efm

@@ -122,12 +122,14 @@ std::vector<std::filesystem::path> keyframeFolders(const std::filesystem::path& 
   return folders;
 }
 
+void removeKeyframe(const std::filesystem::path& keyframe) {
+  removeImages(keyframe);
+  if (std::filesystem::is_empty(keyframe)) std::filesystem::remove(keyframe);
+}
+
 void removeKeyframes(const std::filesystem::path& keyframes) {
   if (!std::filesystem::is_directory(keyframes)) return;
-  for (const std::filesystem::path& keyframe : keyframeFolders(keyframes)) {
-    removeImages(keyframe);
-    if (std::filesystem::is_empty(keyframe)) std::filesystem::remove(keyframe);
-  }
+  for (const auto& keyframe : keyframeFolders(keyframes)) removeKeyframe(keyframe);
   if (!std::filesystem::is_symlink(keyframes) && std::filesystem::is_empty(keyframes)) {
     std::filesystem::remove(keyframes);
   }
@@ -272,7 +274,12 @@ void MapOutput::writeKeyframe(const KeyframeDepthMap& keyframe) {
   const std::filesystem::path folder =
       folder_ / kKeyframes / formatSeconds(keyframe.window.t_ref_ns);
   makeFolder(folder);
-  writeImagesTo(folder, keyframe);
+  try {
+    writeImagesTo(folder, keyframe);
+  } catch (...) {
+    if (!keeps_earlier_) removeKeyframe(folder);  // half of one is none
+    throw;
+  }
 }
 
 void MapOutput::writeImages(const KeyframeDepthMap& keyframe) {

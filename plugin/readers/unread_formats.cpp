@@ -150,6 +150,9 @@ const char* ownResult(const fs::path& source) {
   if (isFile(source / "report.json") && isReport(source / "report.json")) {
     return "the result of an earlier run";
   }
+  if (isFile(source / "report.partial.json")) {
+    return "the result of a run that was killed, or is not at its end yet";
+  }
   if (!isFile(source)) return nullptr;
   const std::string bytes = rawBeginning(source);
   if (bytes.find("name=\"generator\" content=\"event-fusion\"") != std::string::npos) {

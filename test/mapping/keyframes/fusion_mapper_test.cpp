@@ -394,6 +394,7 @@ std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
           counts.keyframes_without_pose,
           counts.windows_without_events,
           w.overload,
+          w.too_large,
           w.jump,
           w.no_pose,
           w.no_scene,
@@ -407,14 +408,14 @@ std::vector<std::uint64_t> numbersOf(const MapperCounts& counts) {
 }
 
 TEST(MapperCounts, AddUpNumberByNumber) {
-  const MapperCounts counts{{{1, 2, 3, 4, 5, 6, 7, 8}},   9,  {10, 11, 12}, 13, 14, 15,
-                            {16, 17, 18, 19, 20, 21, 22}, 23, 24,           25, 26};
+  const MapperCounts counts{{{1, 2, 3, 4, 5, 6, 7, 8}},       9,  {10, 11, 12}, 13, 14, 15,
+                            {16, 17, 18, 19, 20, 21, 22, 23}, 24, 25,           26, 27};
   MapperCounts sum = counts;
   sum += counts;
   const std::vector<std::uint64_t> numbers = numbersOf(sum);
-  ASSERT_EQ(numbers.size(), 26U);
+  ASSERT_EQ(numbers.size(), 27U);
   for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(numbers[i], 2 * (i + 1));
-  EXPECT_EQ(counts.windows_given_up.total(), 16U + 17 + 18 + 19 + 20 + 21 + 22);
+  EXPECT_EQ(counts.windows_given_up.total(), 16U + 17 + 18 + 19 + 20 + 21 + 22 + 23);
   sum.cameras.resize(2);
   sum += {{{}, {1, 1, 1, 1, 1, 1, 1, 1}}, 0, {}, 0, 0, 0, {}, 0, 0, 0, 0};
   EXPECT_EQ(sum.total().over_budget, 17U);

@@ -101,6 +101,19 @@ TEST_F(AtomicFileTest, FilesOfOthersStay) {
   EXPECT_THAT(names(), testing::UnorderedElementsAreArray(others));
 }
 
+TEST_F(AtomicFileTest, TheLongestNamesThatTheSystemTakesAreWritten) {
+  for (const std::size_t length : {234U, 255U}) {
+    const std::string name(length - 4, 'n');
+    AtomicFile first(folder / (name + ".txt"));  // its temporary name is that of the next, cut
+    writeAtomically(folder / (name + ".txt"), [](const auto& file) { std::ofstream(file) << "x"; });
+    EXPECT_EQ(readText(folder / (name + ".txt")), "x");
+    NewFolder made(folder / std::string(length, 'f'));
+    made.finish();
+    EXPECT_TRUE(fs::is_directory(folder / std::string(length, 'f')));
+  }
+  EXPECT_THROW(AtomicFile(folder / std::string(256, 'n')), std::runtime_error);
+}
+
 TEST_F(AtomicFileTest, ANewFolderLeavesThoseOfOthers) {
   const std::string unfinished = ".new.unfinished-" + std::to_string(getpid());
   fs::create_directory(folder / unfinished);

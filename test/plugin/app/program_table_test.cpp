@@ -92,6 +92,7 @@ class ProgramTable : public AppTest {
     write("calibration.ini", "[rig]\ncalibration = none.yaml\n");
     write("walk.txt", "0 0 0 0 0 0 0 1\n0.5 0 0 0.4 0 0 0 1\n");
     write("earlier/map.pcd", "a cloud");
+    write("killed/report.partial.json", "{\"process\": 4000000, \"recording\": []}");
     write("thesis/notes.txt", "mine");
     fs::create_directory(folder() / "taken");
     cv::imwrite((folder() / "plane.tiff").string(), cv::Mat1f(90, 120, 2.0F));

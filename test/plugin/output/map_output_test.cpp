@@ -66,6 +66,17 @@ TEST_F(MapOutputTest, AKeyframeIsWrittenBelowItsTime) {
               HasSubstr("1700000000.123456789 1 2 3 0 0 0 1\n"));
 }
 
+TEST_F(MapOutputTest, OfAKeyframeThatCannotBeWrittenNothingStays) {
+  const auto keyframe = folder() / "out" / "keyframes" / "1.000000000";
+  MapOutput output(folder() / "out", OutputKind::kMap, {});
+  std::filesystem::create_directories(keyframe / "points.png");  // where a later file belongs
+  std::filesystem::create_directories(keyframe / "depth.png");
+  EXPECT_ANY_THROW(output.writeKeyframe(smallKeyframe(1'000'000'000)));
+  for (const auto& entry : std::filesystem::directory_iterator(keyframe)) {
+    EXPECT_TRUE(entry.is_directory()) << entry.path();
+  }
+}
+
 TEST_F(MapOutputTest, TheFirstFileRemovesAnEarlierMapAlone) {
   {
     MapOutput earlier(folder(), OutputKind::kMap, {});
