@@ -162,10 +162,13 @@ bool MappingSession::skipWithoutScene(const WindowData& data) {
 }
 
 /// Where the windows that were chosen are larger than the queue: chooses shorter ones.
+/// @return whether it did.
 bool MappingSession::shortenWindows(double events_per_s) {
-  if (!automatic_.window_s || status_.chosen.empty()) return false;
-  fitIntoQueue(options_.live, events_per_s, options_.mapper.policy, status_.chosen);
-  mapper_.configure(options_.mapper.policy, planes());
+  KeyframePolicyOptions& policy = options_.mapper.policy;
+  const double former_s = policy.window_s;
+  fitIntoQueue(options_.live, events_per_s, policy, status_.chosen);
+  if (policy.policy == KeyframePolicyKind::kEvents || policy.window_s == former_s) return false;
+  mapper_.configure(policy, planes());
   ++status_.choices;
   return true;
 }
@@ -177,10 +180,11 @@ void MappingSession::fitIntoStretches(std::int64_t end_ns) {
   const std::uint64_t keyframes = earlier_counts_.keyframes + mapper_.counts().keyframes;
   const bool fits = keyframes > stretch_.keyframes || length_s < kMinFirstWindowS;
   stretch_ = {end_ns, keyframes, fits ? 0 : stretch_.too_short + 1};
-  if (stretch_.too_short < 2 || !automatic_.window_s || status_.chosen.empty()) return;
   KeyframePolicyOptions& policy = options_.mapper.policy;
-  if (options_.automatic.any() || policy.window_s <= length_s / 2) return;
+  const double former_s = policy.window_s;
+  if (stretch_.too_short < 2 || options_.automatic.any()) return;
   limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);
+  if (policy.window_s == former_s) return;
   mapper_.configure(policy, planes());
   ++status_.choices;
 }

@@ -407,7 +407,10 @@ void MappingSession::giveUpOlderHalf() {
   const std::int64_t held_ns = status_.events->last_ns - oldest_ns;
   const double rate =
       static_cast<double>(mapper_.heldEvents()) / (1e-9 * static_cast<double>(held_ns));
-  const double needed = rate * options_.mapper.policy.window_s;
+  const KeyframePolicyOptions& policy = options_.mapper.policy;
+  const double needed = policy.policy == KeyframePolicyKind::kEvents
+                            ? static_cast<double>(policy.window_events)
+                            : rate * policy.window_s;
   const bool too_large =
       rig_.isComplete() && !options_.automatic.any() && needed > options_.live.queueEvents();
   if (too_large && shortenWindows(rate)) return;
@@ -417,8 +420,8 @@ void MappingSession::giveUpOlderHalf() {
   if (!too_large || needed < kNews * told_needed_) return;
   told_needed_ = needed;
   status_.live->too_large = fmt::format(
-      "a window needs {:.0f} events, the queue holds {:.0f}: expected a shorter [keyframes] "
-      "window_s, or a larger [live] max_queue_events and max_queue_mb",
+      "a window needs {:.0f} events, the queue holds {:.0f}: expected smaller windows ([keyframes] "
+      "window_s, window_events), or a larger [live] max_queue_events and max_queue_mb",
       needed, options_.live.queueEvents());
   throw std::invalid_argument(status_.live->too_large);
 }

@@ -207,9 +207,9 @@ class MappingSession {
   std::vector<std::pair<StampedPose, std::optional<PoseNoise>>> next_stretch_;
   /// The poses between two jumps.
   struct Stretch {
-    std::int64_t begin_ns = kMaxTimeNs;  // at first not known
-    std::uint64_t keyframes = 0;         // before it
-    int too_short = 0;                   // those before it that no window fitted into, in a row
+    std::int64_t begin_ns = kEndOfTimeNs;  // at first not known
+    std::uint64_t keyframes = 0;           // before it
+    int too_short = 0;                     // those before it that no window fitted into, in a row
   };
   Stretch stretch_;
   /// A sensor that sends older data than before.
