@@ -196,7 +196,7 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
   if (replaces || !std::filesystem::exists(output.folder() / "report.json")) {
     writeAll(outcome, {[&] { output.writeReport(reportJson(outcome.report)); }});
   }
-  if (output.keepsEarlier()) *outcome.error += stays(output);
+  if (output.keepsEarlier() && outcome.error) *outcome.error += stays(output);
   const std::vector<Warning>& warnings = outcome.report.warnings;
   printWarnings(
       {warnings.begin() + static_cast<std::ptrdiff_t>(outcome.told_warnings), warnings.end()});

@@ -18,16 +18,19 @@ std::uint64_t bytesOf(const CameraPacket& packet) {
   return sizeof(CameraPacket) + packet.events.capacity() * sizeof(Event);
 }
 
+/// The last event, or pose, may come after a longer pause: nothing comes that confirms it.
+constexpr std::uint64_t kMaxLastPauseNs = 10 * kNanosecondsPerSecond;
+
 /// Without overflow: times are not checked yet.
-bool isOverASecondAfter(std::int64_t t_ns, std::int64_t other_ns) {
+bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns,
+                std::uint64_t limit_ns = kNanosecondsPerSecond) {
   return t_ns > other_ns &&
-         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) >
-             static_cast<std::uint64_t>(kNanosecondsPerSecond);
+         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) > limit_ns;
 }
 
 /// The newest time of a stream, whose clock may go back.
 void follow(std::optional<std::int64_t>& reached_ns, std::int64_t t_ns) {
-  if (!reached_ns || t_ns > *reached_ns || isOverASecondAfter(*reached_ns, t_ns)) reached_ns = t_ns;
+  if (!reached_ns || t_ns > *reached_ns || isFarAfter(*reached_ns, t_ns)) reached_ns = t_ns;
 }
 
 CameraPacket withoutEvents(const CameraPacket& packet) {
@@ -80,7 +83,7 @@ void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
       events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
   if (camera.ahead && begin_ns) {
     const std::int64_t ahead_ns = camera.ahead->events.front().t_ns;
-    if (!isOverASecondAfter(ahead_ns, *begin_ns)) {
+    if (!isFarAfter(ahead_ns, *begin_ns)) {
       follow(camera.reached_ns, ahead_ns);
       pass(camera, *std::exchange(camera.ahead, std::nullopt));
     } else if (!events.empty()) {
@@ -91,7 +94,7 @@ void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < events.size(); ++i) {
     const Event event = events[i];
-    if (camera.reached_ns && isOverASecondAfter(event.t_ns, *camera.reached_ns)) {
+    if (camera.reached_ns && isFarAfter(event.t_ns, *camera.reached_ns)) {
       if (i + 1 == events.size()) {
         camera.ahead = withoutEvents(packet);
         camera.ahead->covered_until_ns.reset();
@@ -101,7 +104,7 @@ void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
         }
         continue;
       }
-      if (isOverASecondAfter(event.t_ns, events[i + 1].t_ns)) {
+      if (isFarAfter(event.t_ns, events[i + 1].t_ns)) {
         ++camera.counts.refused;
         continue;
       }
@@ -161,14 +164,14 @@ void InputQueue::add(QueuedPose pose) {
   PoseStream& stream = pose_streams_[pose.source];
   if (const auto waiting = std::exchange(stream.ahead, std::nullopt)) {
     const std::int64_t ahead_ns = waiting->pose.t_ns;
-    if (isOverASecondAfter(ahead_ns, pose.pose.t_ns)) {
+    if (isFarAfter(ahead_ns, pose.pose.t_ns)) {
       ++refused_poses_;
     } else {
       follow(stream.reached_ns, ahead_ns);
       poses_.push_back(*waiting);
     }
   }
-  if (stream.reached_ns && isOverASecondAfter(pose.pose.t_ns, *stream.reached_ns)) {
+  if (stream.reached_ns && isFarAfter(pose.pose.t_ns, *stream.reached_ns)) {
     stream.ahead = std::move(pose);
   } else {
     follow(stream.reached_ns, pose.pose.t_ns);
@@ -182,16 +185,27 @@ void InputQueue::end() {
   if (ended_) return;
   ended_ = true;
   for (auto& [index, camera] : cameras_) {
-    if (camera.ahead) ++camera.counts.refused;
-    camera.ahead.reset();
+    if (auto last = std::exchange(camera.ahead, std::nullopt)) {
+      const std::int64_t last_ns = last->events.front().t_ns;
+      if (isFarAfter(last_ns, *camera.reached_ns, kMaxLastPauseNs)) {
+        ++camera.counts.refused;
+      } else {
+        pass(camera, std::move(*last));
+      }
+    }
     if (!camera.last) continue;
     CameraPacket rest = *camera.last;
     rest.events = camera.budget.finish();
     if (!rest.events.empty()) push(std::move(rest));
   }
   for (auto& [source, stream] : pose_streams_) {
-    if (stream.ahead) ++refused_poses_;
-    stream.ahead.reset();
+    const auto last = std::exchange(stream.ahead, std::nullopt);
+    if (!last) continue;
+    if (isFarAfter(last->pose.t_ns, *stream.reached_ns, kMaxLastPauseNs)) {
+      ++refused_poses_;
+    } else {
+      poses_.push_back(*last);
+    }
   }
   changed_.notify_one();
 }

@@ -67,8 +67,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// Receives each keyframe once, after it is inserted into the map and before the next one is
   /// made. A later refinement may change its pose: see `trajectory`. Runs in the thread that feeds
   /// the builder. With one such thread, keyframes come in the order of their
-  /// windows. May use the builder, whose map then ends with this keyframe, and may drop the last
-  /// reference to it. A callback of the log may not.
+  /// windows. May use the builder, whose map then ends with this keyframe, and in live
+  /// operation it may drop the last reference to it. A callback of the log may not.
   using KeyframeCallback = std::function<void(const KeyframeDepthMap&)>;
   /// Live operation: receives each new snapshot of the map, in the mapping's thread.
   using MapCallback = std::function<void(const std::shared_ptr<const MapSnapshot>&)>;

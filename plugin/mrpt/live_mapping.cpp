@@ -169,6 +169,10 @@ bool LiveMapping::mapNext() {
   const std::size_t kept_frames = keyframes_.size();
   try {
     giveUpExcess();
+  } catch (...) {
+    noteError("the input that waits", Fault::kMapping);
+  }
+  try {
     keyframe = session_->next(sink, clock, [this](const KeyframeDepthMap& made) {
       keep(storedKeyframe(made, session_->pointsOf(made)));
     });

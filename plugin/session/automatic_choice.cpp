@@ -97,8 +97,10 @@ void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice
   if (!choice.found_scene && status_.choices > 0) return keepOptions();
   if (data) {
     if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
-    if (pieceEnds() && lengthOf(*data) < kFirstWindowS) {
-      limitWindow(lengthOf(*data) / 2, kBetweenJumps, chosen.policy, choice.options);
+    const std::int64_t begin_ns = std::min(stretch_.begin_ns, data->window.t0_ns);
+    const double stretch_s = secondsBetween(begin_ns, data->window.t1_ns);
+    if (stretchEnds() && stretch_s < kFirstWindowS) {
+      limitWindow(stretch_s / 2, kBetweenJumps, chosen.policy, choice.options);
     }
     fitIntoQueue(options_.live, eventRate(*data), chosen.policy, choice.options);
     noteSource(*data, choice.options);
@@ -138,8 +140,7 @@ std::optional<WindowData> MappingSession::firstLook() {
   return data && lengthOf(*data) >= kMinFirstWindowS ? data : std::nullopt;
 }
 
-/// Whether the tracker jumps, or a clock is reset, so often that no window could be looked at for
-/// too long.
+/// Whether the tracker jumps so often that no window could be looked at for too long.
 bool MappingSession::looksTooLong() {
   if (!status_.events) return false;
   if (!no_scene_since_ns_) no_scene_since_ns_ = status_.events->last_ns;

@@ -77,8 +77,10 @@ MappingSession::~MappingSession() = default;
 
 void MappingSession::addEvents(CameraPacket packet) {
   if (clock_reset_) {
-    later_events_ += packet.events.size();
-    later_.emplace_back([this, packet] { addEvents(packet); });
+    const std::size_t put_off = packet.events.size();
+    later_.emplace_back(
+        [this, packet = std::move(packet)]() mutable { addEvents(std::move(packet)); });
+    later_events_ += put_off;
     return;
   }
   if (surveyor_) survey([&] { surveyor_->addEvents(packet); });
@@ -130,18 +132,23 @@ void MappingSession::noteOlder(int sensor, std::int64_t t_ns) {
   if (!rig_.isComplete()) beginClock();
 }
 
+/// Not before the poses after a jump, and the data after a reset, are in.
+void MappingSession::finishMapper() {
+  if (finished_ && !clock_reset_ && next_stretch_.empty()) mapper_.finish();
+}
+
 /// Goes on to the clock after a reset, once the complete windows before it are mapped.
 /// @return whether it did.
 bool MappingSession::beginClock() {
   if (!clock_reset_) return false;
   startAnew();
-  for (const std::function<void()>& call : std::exchange(later_, {})) {
+  for (std::function<void()>& call : std::vector(std::exchange(later_, {}))) {
     try {
       call();
-    } catch (...) {  // it is counted
+    } catch (...) {  // its events are counted
     }
   }
-  if (finished_ && !clock_reset_ && next_stretch_.empty()) mapper_.finish();
+  finishMapper();
   return true;
 }
 
@@ -162,6 +169,7 @@ void MappingSession::startAnew() {
   mapper_ = std::move(anew);
   clock_reset_ = false;
   later_events_ = 0;
+  stretch_ = {};
   ++status_.live->clock_steps;
   status_.events.reset();
   newest_begin_ns_.reset();
@@ -200,6 +208,7 @@ void MappingSession::feed(CameraPacket packet) {
   giveUpMissing(packet.camera, std::max(first_ns, last_ns) + camera.time_offset_ns);
   const std::int64_t begin_ns = first_ns + camera.time_offset_ns;
   noteInTime(packet.camera, begin_ns);
+  if (!status_.events && options_.live.enabled) stretch_.begin_ns = begin_ns;
   extend(status_.events, begin_ns);
   extend(status_.events, last_ns + camera.time_offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
@@ -320,7 +329,7 @@ bool MappingSession::beginStretch() {
   fitIntoStretches(next_stretch_.front().first.t_ns);
   newest_pose_.reset();
   for (const auto& [pose, noise] : std::exchange(next_stretch_, {})) useWaiting(pose, noise);
-  if (finished_ && next_stretch_.empty()) mapper_.finish();
+  finishMapper();
   return true;
 }
 
@@ -411,8 +420,10 @@ void MappingSession::giveUpOlderHalf() {
   const double needed = policy.policy == KeyframePolicyKind::kEvents
                             ? static_cast<double>(policy.window_events)
                             : rate * policy.window_s;
-  const bool too_large =
-      rig_.isComplete() && !options_.automatic.any() && needed > options_.live.queueEvents();
+  const double queue_events = options_.live.queueEvents();
+  const bool too_large =  // by its own rate, not by what waits elsewhere
+      rig_.isComplete() && !options_.automatic.any() && needed > queue_events &&
+      static_cast<double>(mapper_.heldEvents()) > queue_events / 2;
   if (too_large && shortenWindows(rate)) return;
   mapper_.giveUpBefore(oldest_ns + held_ns / 2 + 1,
                        too_large ? &WindowsGivenUp::too_large : &WindowsGivenUp::overload);
@@ -422,7 +433,7 @@ void MappingSession::giveUpOlderHalf() {
   status_.live->too_large = fmt::format(
       "a window needs {:.0f} events, the queue holds {:.0f}: expected smaller windows ([keyframes] "
       "window_s, window_events), or a larger [live] max_queue_events and max_queue_mb",
-      needed, options_.live.queueEvents());
+      needed, queue_events);
   throw std::invalid_argument(status_.live->too_large);
 }
 
@@ -451,8 +462,7 @@ void MappingSession::finish() {
     status_.refused_events[camera] += events;
   }
   for (const StampedPose& pose : pose_source_.select()) useWaiting(pose, std::nullopt);
-  // Otherwise after the windows before the jump, or the reset.
-  if (next_stretch_.empty() && !clock_reset_) mapper_.finish();
+  finishMapper();
   completeRig();
   rig_.requireNoneWaits();
 }

@@ -50,7 +50,8 @@ class MappingSession {
 
   /// The rig is complete with the first event if its cameras are known (RigAssembly::isKnown) and
   /// the source of poses is selected; otherwise once a packet begins more than a second after the
-  /// recording's first event, whatever the length of packets.
+  /// recording's first event, whatever the length of packets, and in live operation before half of
+  /// the queue is full.
   /// @throws std::invalid_argument where the packet contradicts its sensor or earlier packets;
   /// where its camera first appears in a complete rig, or waits for one of a lower index for more
   /// than a second of events; where the options name a camera that the rig does not have.
@@ -106,7 +107,8 @@ class MappingSession {
   bool giveUpOldestWindow();
   /// Gives up the windows of the older half of the events. Where a window is larger than the queue
   /// of live operation, a chosen one is shortened instead.
-  /// @throws std::invalid_argument where a given one is so large, the first time.
+  /// @throws std::invalid_argument where a given one is so large: the first time, and where it is
+  /// much larger than when it was told last.
   void giveUpOlderHalf();
   /// Where automatic options wait for their first window: chooses them from the data so far, if
   /// these last at least so long.
@@ -155,6 +157,7 @@ class MappingSession {
   bool stretchEnds() const;
   bool beginStretch();
   bool beginClock();
+  void finishMapper();
   /// No more data of the current poses, or of the current clock, will come.
   bool pieceEnds() const { return stretchEnds() || clock_reset_; }
   bool endPiece() { return beginStretch() || beginClock(); }
@@ -207,7 +210,7 @@ class MappingSession {
   std::vector<std::pair<StampedPose, std::optional<PoseNoise>>> next_stretch_;
   /// The poses between two jumps.
   struct Stretch {
-    std::int64_t begin_ns = kEndOfTimeNs;  // at first not known
+    std::int64_t begin_ns = kEndOfTimeNs;  // before the first event: not known
     std::uint64_t keyframes = 0;           // before it
     int too_short = 0;                     // those before it that no window fitted into, in a row
   };

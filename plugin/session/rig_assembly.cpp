@@ -143,7 +143,7 @@ void RigAssembly::requireIncomplete(int camera) const {
   if (!complete_) return;
   throw std::invalid_argument(fmt::format(
       "camera {} first appears when the rig is complete: all cameras must be there within a second "
-      "of the first event",
+      "of the first event, in live operation also before the queue is half full",
       camera));
 }
 

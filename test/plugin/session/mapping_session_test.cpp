@@ -311,7 +311,7 @@ TEST(MappingSession, WhatDoesNotFitTheRigIsAnErrorThatNamesIt) {
          session.finish();
        }},
       {"camera 1 first appears when the rig is complete: all cameras must be there within a second "
-       "of the first event",
+       "of the first event, in live operation also before the queue is half full",
        none,
        [&](MappingSession& session) {
          for (const auto& [begin_s, end_s] : {std::pair{0.0, 1.1}, std::pair{1.1, 1.2}}) {

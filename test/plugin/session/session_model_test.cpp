@@ -223,7 +223,8 @@ class Model {
     const auto held_ns = static_cast<double>(clock_.reached_ns - oldest_ns);
     const double needed =
         static_cast<double>(heldEvents()) * static_cast<double>(window_ns_) / held_ns;
-    const bool too_large = rig_complete_ && needed > queue_events_;
+    const bool too_large = rig_complete_ && needed > queue_events_ &&
+                           static_cast<double>(heldEvents()) > queue_events_ / 2;
     giveUpBefore((oldest_ns + clock_.reached_ns) / 2 + 1,
                  too_large ? &WindowsGivenUp::too_large : &WindowsGivenUp::overload);
   }
@@ -298,7 +299,7 @@ class Model {
     return after != clock_.poses_ns.begin() && *after - *std::prev(after) <= kMaxGapNs;
   }
   std::int64_t completeNs(const Camera& camera) const {
-    if (finished_) return kMaxTimeNs;
+    if (finished_ && !clock_reset_) return kMaxTimeNs;
     std::int64_t complete_ns = camera.covered_ns;
     if (camera.newest_ns) complete_ns = std::max(complete_ns, *camera.newest_ns - kTickNs);
     const bool any = clock_.newest_begin_ns != kMinTimeNs;
@@ -337,7 +338,7 @@ class Model {
   }
   bool beginStretch() {
     if (clock_.next_stretch.empty()) return false;
-    if (eventsCompleteNs() < clock_.newest_pose->t_ns) return false;
+    if (!finished_ && eventsCompleteNs() < clock_.newest_pose->t_ns) return false;
     ++status.live->pose_jumps;
     giveUpBefore(clock_.next_stretch.front().t_ns, &WindowsGivenUp::jump);
     clock_.newest_pose.reset();
