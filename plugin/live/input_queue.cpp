@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "mapping/events/event_check.h"
-#include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {
@@ -18,19 +17,11 @@ std::uint64_t bytesOf(const CameraPacket& packet) {
   return sizeof(CameraPacket) + packet.events.capacity() * sizeof(Event);
 }
 
-/// The last event, or pose, may come after a longer pause: nothing comes that confirms it.
-constexpr std::uint64_t kMaxLastPauseNs = 10 * kNanosecondsPerSecond;
-
 /// Without overflow: times are not checked yet.
-bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns,
-                std::uint64_t limit_ns = kNanosecondsPerSecond) {
+bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns = kFarAheadNs) {
   return t_ns > other_ns &&
-         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) > limit_ns;
-}
-
-/// The newest time of a stream, whose clock may go back.
-void follow(std::optional<std::int64_t>& reached_ns, std::int64_t t_ns) {
-  if (!reached_ns || t_ns > *reached_ns || isFarAfter(*reached_ns, t_ns)) reached_ns = t_ns;
+         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) >
+             static_cast<std::uint64_t>(limit_ns);
 }
 
 CameraPacket withoutEvents(const CameraPacket& packet) {
@@ -38,6 +29,28 @@ CameraPacket withoutEvents(const CameraPacket& packet) {
 }
 
 }  // namespace
+
+template <typename Input>
+void InputQueue::Stream<Input>::follow(std::int64_t t_ns) {
+  if (!reached_ns || t_ns > *reached_ns || isFarAfter(*reached_ns, t_ns)) reached_ns = t_ns;
+}
+
+template <typename Input>
+std::optional<Input> InputQueue::Stream<Input>::settle(bool is_right, std::uint64_t& refused) {
+  std::optional<Input> waited = std::exchange(ahead, std::nullopt);
+  if (!waited) return std::nullopt;
+  if (!is_right) {
+    ++refused;
+    return std::nullopt;
+  }
+  follow(ahead_ns);
+  return waited;
+}
+
+template <typename Input>
+std::optional<Input> InputQueue::Stream<Input>::settleLast(std::uint64_t& refused) {
+  return settle(reached_ns && !isFarAfter(ahead_ns, *reached_ns, kMaxLastPauseNs), refused);
+}
 
 InputQueue::InputQueue(const LiveOptions& options) : options_(options) {}
 
@@ -79,28 +92,24 @@ void InputQueue::pass(Camera& camera, CameraPacket packet) {
 /// waits; this packet decides about the one that waited.
 void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
   std::vector<Event>& events = packet.events;
+  Stream<CameraPacket>& stream = camera.stream;
   const std::optional<std::int64_t> begin_ns =
       events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
-  if (camera.ahead && begin_ns) {
-    const std::int64_t ahead_ns = camera.ahead->events.front().t_ns;
-    if (!isFarAfter(ahead_ns, *begin_ns)) {
-      follow(camera.reached_ns, ahead_ns);
-      pass(camera, *std::exchange(camera.ahead, std::nullopt));
-    } else if (!events.empty()) {
-      ++camera.counts.refused;
-      camera.ahead.reset();
+  const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
+  if (confirms || !events.empty()) {  // a cover alone refuses nothing
+    if (auto waited = stream.settle(confirms, camera.counts.refused)) {
+      pass(camera, std::move(*waited));
     }
   }
   std::size_t kept = 0;
   for (std::size_t i = 0; i < events.size(); ++i) {
     const Event event = events[i];
-    if (camera.reached_ns && isFarAfter(event.t_ns, *camera.reached_ns)) {
+    if (stream.reached_ns && isFarAfter(event.t_ns, *stream.reached_ns)) {
       if (i + 1 == events.size()) {
-        camera.ahead = withoutEvents(packet);
-        camera.ahead->covered_until_ns.reset();
-        camera.ahead->events = {event};
+        stream.ahead = CameraPacket{packet.camera, packet.calibration, {event}, std::nullopt};
+        stream.ahead_ns = event.t_ns;
         if (packet.covered_until_ns) {  // it may end with this event
-          packet.covered_until_ns = std::min(*packet.covered_until_ns, *camera.reached_ns);
+          packet.covered_until_ns = std::min(*packet.covered_until_ns, *stream.reached_ns);
         }
         continue;
       }
@@ -109,11 +118,11 @@ void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
         continue;
       }
     }
-    follow(camera.reached_ns, event.t_ns);
+    stream.follow(event.t_ns);
     events[kept++] = event;
   }
   events.resize(kept);
-  if (packet.covered_until_ns) follow(camera.reached_ns, *packet.covered_until_ns);
+  if (packet.covered_until_ns) stream.follow(*packet.covered_until_ns);
 }
 
 void InputQueue::push(CameraPacket packet) {
@@ -161,20 +170,16 @@ void InputQueue::add(QueuedPose pose) {
     ++refused_poses_;
     return;
   }
-  PoseStream& stream = pose_streams_[pose.source];
-  if (const auto waiting = std::exchange(stream.ahead, std::nullopt)) {
-    const std::int64_t ahead_ns = waiting->pose.t_ns;
-    if (isFarAfter(ahead_ns, pose.pose.t_ns)) {
-      ++refused_poses_;
-    } else {
-      follow(stream.reached_ns, ahead_ns);
-      poses_.push_back(*waiting);
-    }
+  Stream<QueuedPose>& stream = pose_streams_[pose.source];
+  const std::int64_t t_ns = pose.pose.t_ns;
+  if (auto waited = stream.settle(!isFarAfter(stream.ahead_ns, t_ns), refused_poses_)) {
+    poses_.push_back(std::move(*waited));
   }
-  if (stream.reached_ns && isFarAfter(pose.pose.t_ns, *stream.reached_ns)) {
+  if (stream.reached_ns && isFarAfter(t_ns, *stream.reached_ns)) {
     stream.ahead = std::move(pose);
+    stream.ahead_ns = t_ns;
   } else {
-    follow(stream.reached_ns, pose.pose.t_ns);
+    stream.follow(t_ns);
     poses_.push_back(std::move(pose));
   }
   changed_.notify_one();
@@ -185,13 +190,8 @@ void InputQueue::end() {
   if (ended_) return;
   ended_ = true;
   for (auto& [index, camera] : cameras_) {
-    if (auto last = std::exchange(camera.ahead, std::nullopt)) {
-      const std::int64_t last_ns = last->events.front().t_ns;
-      if (isFarAfter(last_ns, *camera.reached_ns, kMaxLastPauseNs)) {
-        ++camera.counts.refused;
-      } else {
-        pass(camera, std::move(*last));
-      }
+    if (auto last = camera.stream.settleLast(camera.counts.refused)) {
+      pass(camera, std::move(*last));
     }
     if (!camera.last) continue;
     CameraPacket rest = *camera.last;
@@ -199,13 +199,7 @@ void InputQueue::end() {
     if (!rest.events.empty()) push(std::move(rest));
   }
   for (auto& [source, stream] : pose_streams_) {
-    const auto last = std::exchange(stream.ahead, std::nullopt);
-    if (!last) continue;
-    if (isFarAfter(last->pose.t_ns, *stream.reached_ns, kMaxLastPauseNs)) {
-      ++refused_poses_;
-    } else {
-      poses_.push_back(*last);
-    }
+    if (auto last = stream.settleLast(refused_poses_)) poses_.push_back(std::move(*last));
   }
   changed_.notify_one();
 }
@@ -267,7 +261,7 @@ std::map<int, QueueCounts> InputQueue::counts() const {
     QueueCounts& of_camera = counts[index];
     of_camera = camera.counts;
     of_camera.thinned = camera.budget.thinned();
-    of_camera.held = camera.budget.held() + (camera.ahead ? 1 : 0);
+    of_camera.held = camera.budget.held() + (camera.stream.ahead ? 1 : 0);
     of_camera.queued = of_camera.received - of_camera.thinned - of_camera.held - of_camera.dropped -
                        of_camera.paused - of_camera.refused - of_camera.after_end - of_camera.taken;
   }

@@ -64,12 +64,26 @@ class InputQueue {
   std::uint64_t refusedPoses() const;
 
  private:
+  /// How far a stream of input has come.
+  template <typename Input>
+  struct Stream {
+    std::optional<std::int64_t> reached_ns;  // the newest time that is not ahead
+    std::optional<Input> ahead;              // until the next one confirms its time
+    std::int64_t ahead_ns = 0;
+
+    /// The newest time, of a clock that may go back.
+    void follow(std::int64_t t_ns);
+    /// Ends the wait. @return what waited, if its time is right; otherwise it counts as refused.
+    std::optional<Input> settle(bool is_right, std::uint64_t& refused);
+    /// At the end of the input.
+    std::optional<Input> settleLast(std::uint64_t& refused);
+  };
+
   struct Camera {
     explicit Camera(double max_rate) : budget(max_rate) {}
     EventBudget budget;
-    std::optional<CameraPacket> last;        // without events
-    std::optional<std::int64_t> reached_ns;  // its newest event or cover that is not ahead
-    std::optional<CameraPacket> ahead;       // one event, until the next one confirms its time
+    std::optional<CameraPacket> last;  // without events
+    Stream<CameraPacket> stream;       // of events and covers; one event may wait
     QueueCounts counts;
   };
 
@@ -89,11 +103,7 @@ class InputQueue {
   std::map<int, Camera> cameras_;
   std::deque<CameraPacket> packets_;
   std::vector<QueuedPose> poses_;
-  struct PoseStream {
-    std::optional<std::int64_t> reached_ns;
-    std::optional<QueuedPose> ahead;  // until the next one confirms its time
-  };
-  std::map<PoseSourceId, PoseStream> pose_streams_;
+  std::map<PoseSourceId, Stream<QueuedPose>> pose_streams_;
   std::uint64_t refused_poses_ = 0;
   std::map<int, MissingEvents> missing_;
   std::uint64_t events_ = 0;  // in packets_

@@ -162,16 +162,21 @@ bool MappingSession::skipWithoutScene(const WindowData& data) {
   return true;
 }
 
+/// Goes on with the window of the options, where it was shortened. @return whether it was.
+bool MappingSession::useShorter(double former_s) {
+  if (options_.mapper.policy.window_s == former_s) return false;
+  mapper_.configure(options_.mapper.policy, planes());
+  ++status_.choices;
+  return true;
+}
+
 /// Where the windows that were chosen are larger than the queue: chooses shorter ones.
 /// @return whether it did.
 bool MappingSession::shortenWindows(double events_per_s) {
   KeyframePolicyOptions& policy = options_.mapper.policy;
   const double former_s = policy.window_s;
   fitIntoQueue(options_.live, events_per_s, policy, status_.chosen);
-  if (policy.policy == KeyframePolicyKind::kEvents || policy.window_s == former_s) return false;
-  mapper_.configure(policy, planes());
-  ++status_.choices;
-  return true;
+  return useShorter(former_s);
 }
 
 /// Where two stretches in a row between jumps of the tracker were too short for a window that was
@@ -181,13 +186,11 @@ void MappingSession::fitIntoStretches(std::int64_t end_ns) {
   const std::uint64_t keyframes = earlier_counts_.keyframes + mapper_.counts().keyframes;
   const bool fits = keyframes > stretch_.keyframes || length_s < kMinFirstWindowS;
   stretch_ = {end_ns, keyframes, fits ? 0 : stretch_.too_short + 1};
+  if (stretch_.too_short < 2 || options_.automatic.any()) return;
   KeyframePolicyOptions& policy = options_.mapper.policy;
   const double former_s = policy.window_s;
-  if (stretch_.too_short < 2 || options_.automatic.any()) return;
   limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);
-  if (policy.window_s == former_s) return;
-  mapper_.configure(policy, planes());
-  ++status_.choices;
+  useShorter(former_s);
 }
 
 /// Goes on with the options of the first choice.

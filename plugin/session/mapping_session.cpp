@@ -142,7 +142,8 @@ void MappingSession::finishMapper() {
 bool MappingSession::beginClock() {
   if (!clock_reset_) return false;
   startAnew();
-  for (std::function<void()>& call : std::vector(std::exchange(later_, {}))) {
+  std::vector<std::function<void()>> calls = std::exchange(later_, {});  // may put off others
+  for (const std::function<void()>& call : calls) {
     try {
       call();
     } catch (...) {  // its events are counted
@@ -424,7 +425,7 @@ void MappingSession::giveUpOlderHalf() {
   const bool too_large =  // by its own rate, not by what waits elsewhere
       rig_.isComplete() && !options_.automatic.any() && needed > queue_events &&
       static_cast<double>(mapper_.heldEvents()) > queue_events / 2;
-  if (too_large && shortenWindows(rate)) return;
+  if (too_large && policy.policy != KeyframePolicyKind::kEvents && shortenWindows(rate)) return;
   mapper_.giveUpBefore(oldest_ns + held_ns / 2 + 1,
                        too_large ? &WindowsGivenUp::too_large : &WindowsGivenUp::overload);
   constexpr double kNews = 1.2;  // one that is that much larger is told again

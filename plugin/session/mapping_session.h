@@ -175,6 +175,7 @@ class MappingSession {
   std::optional<WindowData> firstLook();
   bool looksTooLong();
   bool skipWithoutScene(const WindowData& data);
+  bool useShorter(double former_s);
   bool shortenWindows(double events_per_s);
   void fitIntoStretches(std::int64_t end_ns);
   void keepOptions();

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/events/event_check.h"
 #include "mapping/options/option_check.h"
 
 namespace efm {
@@ -87,7 +88,6 @@ void EventPackets::readBlock() {
   try {
     takeBlock();
     if (ahead_ && (ended_ || damaged)) {
-      constexpr std::int64_t kMaxLastPauseNs = 10'000'000'000;
       const std::int64_t t_ns = ahead_->t_ns;
       const bool bad =
           ended_ && t_ns - kMaxEventDelayNs < stop_ns_ && t_ns - newest_ns_ > kMaxLastPauseNs;
@@ -141,7 +141,6 @@ void EventPackets::take(const Event& event) {
 }
 
 void EventPackets::takeBlock() {
-  constexpr std::int64_t kFarAheadNs = 1'000'000'000;
   events_.reserve(events_.size() + block_.size());
   for (std::size_t i = 0; i < block_.size(); ++i) {
     const Event& event = block_[i];
