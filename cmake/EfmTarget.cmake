@@ -12,11 +12,11 @@ function(efm_target_defaults target)
     $<$<BOOL:${EFM_WARNINGS_AS_ERRORS}>:-Werror>)
 endfunction()
 
-# efm_unity_rooms(<target>): where unity builds are on (CMAKE_UNITY_BUILD), the files of a room are
+# efm_unity_folders(<target>): where unity builds are on (CMAKE_UNITY_BUILD), the files of a folder are
 # compiled together. Kernel files stay alone: Highway includes each once per instruction set.
 # EFM_SPLIT_LIBRARIES: only those of tests are, so that a change of one file compiles no other, and
 # the libraries' headers are compiled before.
-function(efm_unity_rooms target)
+function(efm_unity_folders target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD_MODE GROUP)
   get_target_property(sources ${target} SOURCES)
   string(FIND "${CMAKE_CURRENT_SOURCE_DIR}/" "${PROJECT_SOURCE_DIR}/test/" in_test)
@@ -32,17 +32,18 @@ function(efm_unity_rooms target)
     endif()
   endif()
   foreach(source IN LISTS sources)
-    get_filename_component(room ${source} DIRECTORY)
-    if(split AND room STREQUAL "kernels")  # with options of their own
+    get_filename_component(folder ${source} DIRECTORY)
+    if(split AND folder STREQUAL "kernels")  # with options of their own
       set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
-    elseif(room AND NOT room STREQUAL "kernels" AND NOT split)
-      set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room})
+    elseif(folder AND NOT folder STREQUAL "kernels" AND NOT split)
+      string(REPLACE "/" "_" group "${folder}")
+      set_source_files_properties(${source} PROPERTIES UNITY_GROUP "${group}")
     endif()
   endforeach()
 endfunction()
 
 # efm_library(<name> SOURCES … HEADERS …): a static library efm_<name> with the alias efm::<name>,
-# included as "<folder>/<room>/<header>.h" from the project's root. Headers are verified to be
+# included as "<folder>/<header>.h" from the project's root. Headers are verified to be
 # self-contained by the target all_verify_interface_header_sets.
 function(efm_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HEADERS")
@@ -53,5 +54,5 @@ function(efm_library name)
     FILE_SET HEADERS BASE_DIRS "${PROJECT_SOURCE_DIR}" FILES ${arg_HEADERS})
   set_target_properties(${target} PROPERTIES VERIFY_INTERFACE_HEADER_SETS ON)
   efm_target_defaults(${target})
-  efm_unity_rooms(${target})
+  efm_unity_folders(${target})
 endfunction()

@@ -3,10 +3,10 @@
 
 #include <cmath>
 
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 #include "mapping/depth/aggregated_extraction.h"
 #include "mapping/depth/paper_extraction.h"
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -5,8 +5,8 @@
 #include <cassert>
 #include <stdexcept>
 
+#include "mapping/base/named_choice.h"
 #include "mapping/kernels/fusion.h"
-#include "mapping/options/named_choice.h"
 
 namespace efm {
 namespace {

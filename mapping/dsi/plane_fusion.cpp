@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cassert>
 
-#include "mapping/options/named_choice.h"
+#include "mapping/base/named_choice.h"
 
 namespace efm {
 namespace {

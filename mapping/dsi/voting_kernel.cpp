@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "mapping/options/named_choice.h"
+#include "mapping/base/named_choice.h"
 
 namespace efm {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 

@@ -6,8 +6,8 @@
 #include <random>
 #include <utility>
 
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -7,8 +7,8 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <string>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/angle.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "mapping/options/text_parsing.h"
+#include "mapping/base/text_parsing.h"
 
 namespace efm {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -10,11 +10,11 @@
 #include <string>
 #include <utility>
 
+#include "mapping/base/option_check.h"
 #include "mapping/events/even_choice.h"
 #include "mapping/events/event_check.h"
 #include "mapping/keyframes/corrected_keyframe.h"
 #include "mapping/keyframes/view_motion.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <utility>
 
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/baseline_policy.h"
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -9,10 +9,10 @@
 #include <limits>
 #include <numeric>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/angle.h"
 #include "mapping/motion/nearest_depths.h"
 #include "mapping/motion/quasi_newton.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <optional>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/camera_motion.h"
-#include "mapping/options/option_check.h"
 #include "mapping/rays/vote_displacement.h"
 
 namespace efm {

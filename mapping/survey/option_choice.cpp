@@ -6,9 +6,9 @@
 #include <iterator>
 #include <utility>
 
+#include "mapping/base/number_text.h"
 #include "mapping/depth/median.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/number_text.h"
 #include "mapping/survey/scene_depths.h"
 
 namespace efm {

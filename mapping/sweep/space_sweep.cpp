@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 #include "mapping/sweep/plane_sweep.h"
 #include "mapping/sweep/tiled_sweep.h"
 

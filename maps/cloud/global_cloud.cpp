@@ -10,7 +10,7 @@
 #include <tuple>
 #include <utility>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/cloud/keyframe_consistency.h"
 
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

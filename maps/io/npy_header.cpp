@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/options/quoted_text.h"
-#include "mapping/options/text_parsing.h"
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
 
 namespace efm {
 namespace {

@@ -9,9 +9,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/options/number_text.h"
-#include "mapping/options/quoted_text.h"
-#include "maps/io/little_endian.h"
+#include "mapping/base/little_endian.h"
+#include "mapping/base/number_text.h"
+#include "mapping/base/quoted_text.h"
 #include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
 

@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/options/quoted_text.h"
-#include "maps/io/atomic_file.h"
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/quoted_text.h"
 #include "maps/io/pcd_file.h"
 #include "maps/io/ply_file.h"
 

@@ -4,8 +4,8 @@
 #include <optional>
 #include <stdexcept>
 
-#include "mapping/options/quoted_text.h"
-#include "mapping/options/text_parsing.h"
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
 
 namespace efm {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 #include "maps/cloud/point_search.h"
 
 namespace efm {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 #include "maps/metrics/sample_statistics.h"
 
 namespace efm {

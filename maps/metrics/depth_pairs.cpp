@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -9,8 +9,8 @@
 #include <optional>
 #include <stdexcept>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

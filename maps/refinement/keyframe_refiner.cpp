@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 #include "maps/refinement/keyframe_registration.h"
 
 namespace efm {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mapping/base/option_check.h"
 #include "mapping/depth/median.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -15,7 +15,7 @@
 #include <array>
 #include <utility>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/angle.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

@@ -8,8 +8,8 @@
 #include <optional>
 #include <string>
 
+#include "mapping/base/quoted_text.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/quoted_text.h"
 #include "plugin/app/argument_checks.h"
 #include "plugin/app/command.h"
 #include "plugin/app/evaluate_arguments.h"

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "mapping/options/text_parsing.h"
-#include "maps/io/atomic_file.h"
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/text_parsing.h"
 
 namespace efm {
 namespace {

@@ -17,10 +17,10 @@
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/writers/folder_writer.h"
-#include "plugin/writers/mcap_writer.h"
+#include "plugin/recordings/writers/folder_writer.h"
+#include "plugin/recordings/writers/mcap_writer.h"
 #ifdef EFM_WITH_HDF5
-#include "plugin/writers/hdf5_writer.h"
+#include "plugin/recordings/writers/hdf5_writer.h"
 #endif
 
 namespace efm {

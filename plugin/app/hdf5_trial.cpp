@@ -12,8 +12,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include "plugin/hdf5/hdf5_files.h"
-#include "plugin/hdf5/hdf5_recording.h"
+#include "plugin/recordings/columns/hdf5_files.h"
+#include "plugin/recordings/columns/hdf5_recording.h"
 
 namespace efm {
 

@@ -5,8 +5,8 @@
 
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
-#include "plugin/formats/open_recording.h"
-#include "plugin/formats/rawlog_writer.h"
+#include "plugin/recordings/open/open_recording.h"
+#include "plugin/recordings/open/rawlog_writer.h"
 
 namespace efm {
 

@@ -8,7 +8,7 @@
 
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
-#include "plugin/formats/open_recording.h"
+#include "plugin/recordings/open/open_recording.h"
 
 namespace efm {
 

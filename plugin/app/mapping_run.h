@@ -11,10 +11,10 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/app/progress.h"
+#include "plugin/mrpt/window/watched_map.h"
 #include "plugin/options/option_file.h"
-#include "plugin/output/report.h"
-#include "plugin/recordings/recording.h"
-#include "plugin/window/watched_map.h"
+#include "plugin/recordings/open/recording.h"
+#include "plugin/results/output/report.h"
 
 namespace efm {
 

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "plugin/formats/open_recording.h"
+#include "plugin/recordings/open/open_recording.h"
 
 namespace efm {
 

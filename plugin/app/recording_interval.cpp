@@ -12,7 +12,7 @@
 #include "plugin/app/exit_status.h"
 #include "plugin/app/observed_statistics.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/recordings/time_cut.h"
+#include "plugin/recordings/open/time_cut.h"
 #include "plugin/session/time_text.h"
 
 namespace efm {

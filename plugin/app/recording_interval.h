@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "mapping/events/window.h"
-#include "plugin/formats/open_recording.h"
+#include "plugin/recordings/open/open_recording.h"
 #include "plugin/session/health_checks.h"
 
 namespace efm {

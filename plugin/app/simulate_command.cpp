@@ -7,14 +7,14 @@
 #include <stdexcept>
 #include <vector>
 
+#include "mapping/base/new_folder.h"
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
-#include "maps/io/new_folder.h"
+#include "mapping/geometry/tum_trajectory.h"
 #include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
-#include "plugin/calibration/camchain.h"
-#include "tracking_stub/poses/tum_trajectory.h"
+#include "plugin/recordings/calibration/camchain.h"
 #include "tracking_stub/presets/simulation_preset.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 #include "tracking_stub/sensor/simulated_rig.h"

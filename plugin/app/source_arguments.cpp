@@ -5,11 +5,11 @@
 #include <stdexcept>
 #include <vector>
 
+#include "mapping/base/quoted_text.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/quoted_text.h"
 #include "plugin/app/argument_checks.h"
 #include "plugin/options/tracker_fault_keys.h"
-#include "plugin/streams/number_checks.h"
+#include "plugin/recordings/streams/number_checks.h"
 
 namespace efm {
 namespace {

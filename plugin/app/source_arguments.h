@@ -7,7 +7,7 @@
 #include <string>
 
 #include "plugin/app/recording_interval.h"
-#include "plugin/formats/open_recording.h"
+#include "plugin/recordings/open/open_recording.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm {

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 
 namespace efm {
 cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation) {

@@ -14,9 +14,9 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/depth_file.h"
-#include "plugin/pictures/curve_plot.h"
-#include "plugin/pictures/picture_grid.h"
-#include "plugin/pictures/value_picture.h"
+#include "plugin/results/pictures/curve_plot.h"
+#include "plugin/results/pictures/picture_grid.h"
+#include "plugin/results/pictures/value_picture.h"
 
 namespace efm {
 namespace {

@@ -11,9 +11,9 @@
 #include <string>
 #include <string_view>
 
-#include "mapping/options/option_check.h"
-#include "mapping/options/quoted_text.h"
-#include "maps/io/atomic_file.h"
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/option_check.h"
+#include "mapping/base/quoted_text.h"
 #include "maps/io/npy_header.h"
 #include "plugin/evaluation/npy_image.h"
 #include "plugin/evaluation/pfm_image.h"

@@ -12,8 +12,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "mapping/base/quoted_text.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/quoted_text.h"
 
 namespace efm {
 namespace {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mapping/geometry/rig.h"
-#include "plugin/calibration/camchain.h"
+#include "plugin/recordings/calibration/camchain.h"
 
 namespace efm {
 namespace {

@@ -9,9 +9,9 @@
 
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
+#include "mapping/geometry/tum_trajectory.h"
 #include "plugin/evaluation/file_in_folder.h"
 #include "plugin/evaluation/text_table.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

@@ -11,8 +11,8 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/text_table.h"
-#include "plugin/pictures/curve_plot.h"
-#include "plugin/pictures/picture_grid.h"
+#include "plugin/results/pictures/curve_plot.h"
+#include "plugin/results/pictures/picture_grid.h"
 
 namespace efm {
 namespace {

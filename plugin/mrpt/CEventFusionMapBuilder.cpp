@@ -12,8 +12,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/base/atomic_file.h"
 #include "mapping/geometry/timestamp.h"
-#include "maps/io/atomic_file.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/exception_of.h"
 #include "plugin/mrpt/host_options.h"
@@ -23,7 +23,7 @@
 #include "plugin/mrpt/playback_mapping.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/session_feed.h"
-#include "plugin/pictures/depth_picture.h"
+#include "plugin/results/pictures/depth_picture.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 

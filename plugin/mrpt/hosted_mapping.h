@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "maps/cloud/map_point.h"
-#include "plugin/live/input_queue.h"
+#include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
 
 namespace efm {

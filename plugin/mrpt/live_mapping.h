@@ -18,9 +18,9 @@
 #include <thread>
 #include <vector>
 
-#include "plugin/live/input_queue.h"
 #include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/mrpt/stored_keyframe.h"
+#include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
 
 namespace efm {

@@ -10,9 +10,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/options/nearest_name.h"
-#include "mapping/options/quoted_text.h"
-#include "mapping/options/text_parsing.h"
+#include "mapping/base/nearest_name.h"
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
 
 namespace efm {
 namespace {

@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "mapping/base/text_parsing.h"
 #include "mapping/geometry/angle.h"
-#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {

@@ -8,9 +8,9 @@
 #include <optional>
 #include <stdexcept>
 
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/quoted_text.h"
-#include "mapping/options/text_parsing.h"
 
 namespace efm {
 namespace {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/mrpt_time.h"
 #include "plugin/mrpt/registration.h"
+#include "plugin/recordings/open/open_recording.h"
 
 IMPLEMENTS_GENERIC_SENSOR(CEventPlayer, efm)
 

@@ -12,11 +12,11 @@
 #include <string_view>
 #include <vector>
 
+#include "mapping/base/named_choice.h"
+#include "mapping/base/nearest_name.h"
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/named_choice.h"
-#include "mapping/options/nearest_name.h"
-#include "mapping/options/quoted_text.h"
-#include "mapping/options/text_parsing.h"
 #include "plugin/mrpt/host_options.h"
 #include "plugin/options/option_file.h"
 #include "plugin/options/tracker_fault_keys.h"

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "plugin/formats/open_recording.h"
+#include "plugin/recordings/open/open_recording.h"
 
 namespace efm {
 

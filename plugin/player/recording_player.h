@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "plugin/recordings/recording.h"
+#include "plugin/recordings/open/recording.h"
 
 namespace efm {
 

@@ -7,10 +7,10 @@
 #include <utility>
 #include <vector>
 
+#include "mapping/base/warning.h"
 #include "mapping/geometry/camera.h"
 #include "mapping/geometry/depth_planes.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
-#include "mapping/options/warning.h"
 #include "mapping/survey/option_choice.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/recording_statistics.h"

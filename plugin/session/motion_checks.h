@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mapping/options/warning.h"
+#include "mapping/base/warning.h"
 #include "plugin/session/recording_statistics.h"
 
 namespace efm {

@@ -3,8 +3,8 @@
 
 #include <optional>
 
+#include "mapping/base/warning.h"
 #include "mapping/geometry/rig.h"
-#include "mapping/options/warning.h"
 #include "mapping/survey/depth_agreement.h"
 #include "mapping/survey/pose_check.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/options/warning.h"
+#include "mapping/base/warning.h"
 #include "mapping/survey/window_sample.h"
 #include "plugin/session/mapping_session.h"
 

@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
-#include "plugin/calibration/calibration_file.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/session/camera_view.h"
 
 namespace efm {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/session/rig_setup.h"
 
-#include "plugin/calibration/hand_eye_file.h"
+#include "plugin/recordings/calibration/hand_eye_file.h"
 
 namespace efm {
 

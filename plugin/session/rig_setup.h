@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/calibration/calibration_file.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 
 namespace efm {
 

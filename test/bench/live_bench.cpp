@@ -22,11 +22,11 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "maps/io/point_cloud_file.h"
-#include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_time.h"
 #include "plugin/options/option_file.h"
+#include "plugin/recordings/open/open_recording.h"
 
 namespace efm {
 namespace {

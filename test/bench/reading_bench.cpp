@@ -14,15 +14,15 @@
 #include <system_error>
 #include <vector>
 
-#include "plugin/formats/open_recording.h"
-#include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/readers/recording_formats.h"
+#include "plugin/recordings/open/open_recording.h"
+#include "plugin/recordings/open/rawlog_writer.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
-#include "test/plugin/sensors/evt_words.h"
+#include "test/plugin/recordings/sensors/evt_words.h"
 #ifdef EFM_WITH_HDF5
-#include "plugin/writers/hdf5_writer.h"
+#include "plugin/recordings/writers/hdf5_writer.h"
 #endif
 
 namespace efm::bench {

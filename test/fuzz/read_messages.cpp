@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/bags/bag_events.h"
-#include "plugin/bags/ros_messages.h"
+#include "plugin/recordings/bags/bag_events.h"
+#include "plugin/recordings/bags/ros_messages.h"
 #include "test/fuzz/reading.h"
 
 namespace {

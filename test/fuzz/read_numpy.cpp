@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/numpy/event_arrays.h"
-#include "plugin/numpy/npy_array.h"
-#include "plugin/readers/pose_file.h"
-#include "plugin/streams/file_content.h"
+#include "plugin/recordings/columns/event_arrays.h"
+#include "plugin/recordings/columns/npy_array.h"
+#include "plugin/recordings/open/pose_file.h"
+#include "plugin/recordings/streams/file_content.h"
 #include "test/fuzz/reading.h"
 
 namespace {

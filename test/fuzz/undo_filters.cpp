@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "plugin/hdf5/chunk_filters.h"
+#include "plugin/recordings/columns/chunk_filters.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   constexpr std::size_t kHeaderBytes = 4;

@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/text/event_text.h"
-#include "tracking_stub/poses/tum_trajectory.h"
+#include "mapping/geometry/tum_trajectory.h"
+#include "plugin/recordings/text/event_text.h"
 
 namespace efm {
 namespace {

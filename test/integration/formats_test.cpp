@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/recordings/open/open_recording.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {

@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/tum_trajectory.h"
 #include "test/integration/letter_f.h"
 #include "test/plugin/program_test.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

@@ -18,10 +18,10 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
+#include "mapping/geometry/tum_trajectory.h"
 #include "maps/io/point_cloud_file.h"
 #include "test/paths.h"
 #include "test/plugin/temporary_folder.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "mapping/geometry/angle.h"
-#include "plugin/viewer/map_page.h"
+#include "plugin/results/viewer/map_page.h"
 #include "test/integration/letter_f.h"
 #include "test/paths.h"
 #include "test/plugin/program_test.h"

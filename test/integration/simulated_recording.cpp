@@ -7,8 +7,8 @@
 
 #include "mapping/depth/median.h"
 #include "maps/cloud/keyframe_cloud.h"
-#include "plugin/formats/open_recording.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/recordings/open/open_recording.h"
 #include "test/paths.h"
 #include "test/tracking_stub/truth/nearest_surface.h"
 #include "tracking_stub/rendering/depth_rendering.h"

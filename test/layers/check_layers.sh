@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Compares every #include of the project with the table of layers (CONTRIBUTING.md, "Layers") and
-# the table of rooms (rooms.txt): who may include whom, and which library may appear where. Prints
+# the table of folders (folders.txt): who may include whom, and which library may appear where. Prints
 # each line that breaks them.
 #   check_layers.sh ROOT
 set -euo pipefail
@@ -42,38 +42,38 @@ forbid tracking_stub "$mrpt|$pcl|$ceres|$recordings|$front" "may use what mappin
 forbid plugin "(test|plugin/app)/" "never includes the application or the tests" '^plugin/app/'
 forbid plugin "$pcl" "PCL stays in maps/ (map_point.h is its header) and cloud_alignment" '^plugin/evaluation/cloud_alignment\.cpp:'
 forbid plugin "$ceres" "refinement is reached through maps/"
-forbid plugin "$recordings" "HDF5 stays in plugin/hdf5/ and plugin/writers/" '^plugin/(hdf5|writers)/'
+forbid plugin "$recordings" "HDF5 stays in plugin/recordings/columns/ and writers/" '^plugin/recordings/(columns|writers)/'
 
-forbid plugin "$mrpt" "MRPT stays in mrpt/, recordings/, formats/, player/, window/ and app/" \
-  '^plugin/(mrpt|recordings|formats|player|window|app)/'
+forbid plugin "$mrpt" "MRPT stays in mrpt/, recordings/open/, player/ and app/" \
+  '^plugin/(mrpt|recordings/open|player|app)/'
 
-# Every room is in the table, and includes only the rooms that the table allows it.
-rooms=$(awk '
+# Every folder is in the table, and includes only the folders that the table allows it.
+folders=$(awk '
+  function folder_of(path) { sub(/\/[^\/]*$/, "", path); return path }
+  function top_of(path) { sub(/\/.*/, "", path); return path }
   FNR == NR {
     if ($0 ~ /^#/ || NF == 0) next
-    room = $1; sub(/:$/, "", room)
-    folder = room; sub(/\/.*/, "", folder)
-    known[room] = 1
+    folder = $1; sub(/:$/, "", folder)
+    top = top_of(folder)
+    known[folder] = 1
     for (i = 2; i <= NF; ++i) {
-      if ($i != "*") { allowed[room, folder "/" $i] = 1; continue }
-      for (other in known) if (index(other, folder "/") == 1) allowed[room, other] = 1
+      if ($i != "*") { allowed[folder, top "/" $i] = 1; continue }
+      for (other in known) if (index(other, top "/") == 1) allowed[folder, other] = 1
     }
     next
   }
   {
     split($0, parts, ":")
-    split(parts[1], path, "/")
-    room = path[1] "/" path[2]
+    folder = folder_of(parts[1])
     match($0, /"[^"]+"/)
-    split(substr($0, RSTART + 1, RLENGTH - 2), included, "/")
-    other = included[1] "/" included[2]
-    if (!(room in known)) print $0 ": " room " is no room of rooms.txt"
-    else if (included[1] == path[1] && room != other && !((room, other) in allowed))
-      print $0 ": " room " may not include " other
-  }' "$tables/rooms.txt" <(grep -rnE --include='*.h' --include='*.cpp' \
+    other = folder_of(substr($0, RSTART + 1, RLENGTH - 2))
+    if (!(folder in known)) print $0 ": " folder " is no folder of folders.txt"
+    else if (top_of(other) == top_of(folder) && folder != other && !((folder, other) in allowed))
+      print $0 ": " folder " may not include " other
+  }' "$tables/folders.txt" <(grep -rnE --include='*.h' --include='*.cpp' \
     '^[[:space:]]*#[[:space:]]*include[[:space:]]+"' mapping maps tracking_stub plugin))
-if [ -n "$rooms" ]; then
-  printf 'rooms:\n%s\n' "$rooms"
+if [ -n "$folders" ]; then
+  printf 'folders:\n%s\n' "$folders"
   broken=1
 fi
 

@@ -104,17 +104,17 @@ def line_of(text, change):
     return text.count("\n", 0, change.begin) + 1, text[begin:end].strip(), after.strip()
 
 
-def changes_of_room(room, seed):
-    """All changes of a room in random order: first a kind, then one of it, each as likely as another."""
+def changes_of_folder(folder, seed):
+    """All changes of a folder in random order: first a kind, then one of it, each as likely as another."""
     kinds = collections.defaultdict(list)
-    for name in sorted(os.listdir(os.path.join(ROOT, room))):
+    for name in sorted(os.listdir(os.path.join(ROOT, folder))):
         if name.endswith((".h", ".cpp")):
-            file = f"{room}/{name}"
+            file = f"{folder}/{name}"
             with open(os.path.join(ROOT, file)) as source:
                 text = source.read()
             for change in changes_in(file, text):
                 kinds[change.kind].append(change)
-    order = random.Random(f"{seed} {room}")
+    order = random.Random(f"{seed} {folder}")
     for changes in kinds.values():
         order.shuffle(changes)
     while kinds:
@@ -213,15 +213,15 @@ def run_test(program, limit_s):
     return failed[1] if failed else f"a crash of {program}"
 
 
-def read_rooms():
-    """The test programs of each room, in the order in which they run."""
-    rooms = {}
-    with open(os.path.join(HERE, "rooms.txt")) as table:
+def read_folders():
+    """The test programs of each folder, in the order in which they run."""
+    folders = {}
+    with open(os.path.join(HERE, "folders.txt")) as table:
         for line in table:
             if line.strip() and not line.startswith("#"):
-                room, programs = line.split(":")
-                rooms[room] = programs.split()
-    return rooms
+                folder, programs = line.split(":")
+                folders[folder] = programs.split()
+    return folders
 
 
 def read_set_aside():
@@ -245,16 +245,16 @@ def read_set_aside():
 class Run:
     def __init__(self, arguments):
         self.arguments = arguments
-        self.rooms = read_rooms()
+        self.folders = read_folders()
         self.set_aside = read_set_aside()
         self.programs = {}
         self.limits_s = {}
         self.results = []
 
-    def prepare(self, rooms):
+    def prepare(self, folders):
         copy_tree()
         configure()
-        names = sorted({name for room in rooms for name in self.rooms[room]})
+        names = sorted({name for folder in folders for name in self.folders[folder]})
         if not build(["event-fusion"]):  # makes the recordings that tests read
             sys.exit("mutate.py: the tree does not build")
         self.programs = {name: Program(name) for name in names}
@@ -267,14 +267,14 @@ class Run:
                 sys.exit(f"mutate.py: {failed} fails without a change")
             self.limits_s[program] = int(3 * (time.monotonic() - begin)) + 20
 
-    def outcome(self, room, change, text):
+    def outcome(self, folder, change, text):
         """(outcome, who noticed it)"""
         path = os.path.join(TREE, change.file)
         with open(path, "w") as file:
             file.write(text[:change.begin] + change.text + text[change.end:])
         outcome = "same program"
         try:
-            for program in (self.programs[name] for name in self.rooms[room]):
+            for program in (self.programs[name] for name in self.folders[folder]):
                 if not build(program.targets):
                     return "did not build", ""
                 if program.bytes() == program.unchanged:
@@ -288,14 +288,14 @@ class Run:
             with open(path, "w") as file:
                 file.write(text)
 
-    def try_change(self, room, change):
+    def try_change(self, folder, change):
         with open(os.path.join(ROOT, change.file)) as source:
             text = source.read()
         number, old, new = line_of(text, change)
-        outcome, noticed = self.outcome(room, change, text)
+        outcome, noticed = self.outcome(folder, change, text)
         if outcome == "survived" and (change.file, old, new) in self.set_aside:
             outcome = "set aside"
-        result = {"room": room, "kind": change.kind, "file": change.file, "line": number, "old": old, "new": new,
+        result = {"folder": folder, "kind": change.kind, "file": change.file, "line": number, "old": old, "new": new,
                   "outcome": outcome, "noticed": noticed}
         self.results.append(result)
         with open(os.path.join(TREE, "build", "results.jsonl"), "a") as log:
@@ -304,19 +304,19 @@ class Run:
             print(f"{outcome}: {change.file}:{number} ({change.kind}) {noticed}\n  - {old}\n  + {new}", flush=True)
         return outcome
 
-    def run_room(self, room):
+    def run_folder(self, folder):
         counted = 0
-        for change in changes_of_room(room, self.arguments.seed):
+        for change in changes_of_folder(folder, self.arguments.seed):
             if counted == self.arguments.count:
                 return
-            counted += self.try_change(room, change) in ("caught", "survived")
+            counted += self.try_change(folder, change) in ("caught", "survived")
 
     def repeat(self, path):
         """The survivors of an earlier run, where their lines are still there."""
         with open(path) as log:
             earlier = [json.loads(line) for line in log]
         for result in earlier:
-            if result["outcome"] != "survived" or result["room"] not in self.rooms:
+            if result["outcome"] != "survived" or result["folder"] not in self.folders:
                 continue
             with open(os.path.join(ROOT, result["file"])) as source:
                 text = source.read()
@@ -325,48 +325,48 @@ class Run:
             if not same:
                 print(f"gone: {result['file']}:{result['line']}: {result['old']}")
                 continue
-            self.try_change(result["room"], min(
+            self.try_change(result["folder"], min(
                 same, key=lambda change: abs(line_of(text, change)[0] - result["line"])))
 
     def print_table(self):
         columns = ("caught", "survived", "set aside", "same program", "did not build")
-        print(f"\n| room | noticed | {' | '.join(columns)} |\n{'|---' * (len(columns) + 2)}|")
-        rooms = list(dict.fromkeys(result["room"] for result in self.results))
-        for room in [*rooms, "all"]:
+        print(f"\n| folder | noticed | {' | '.join(columns)} |\n{'|---' * (len(columns) + 2)}|")
+        folders = list(dict.fromkeys(result["folder"] for result in self.results))
+        for folder in [*folders, "all"]:
             counts = collections.Counter(
-                result["outcome"] for result in self.results if room in ("all", result["room"]))
+                result["outcome"] for result in self.results if folder in ("all", result["folder"]))
             made = counts["caught"] + counts["survived"]
             share = f"{100 * counts['caught'] / made:.0f} %" if made else "-"
-            print(f"| {room} | {share} | " + " | ".join(str(counts[column]) for column in columns) + " |")
+            print(f"| {folder} | {share} | " + " | ".join(str(counts[column]) for column in columns) + " |")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--room", action="append", default=[], help="mapping/sweep, or a folder of rooms: plugin")
-    parser.add_argument("--count", type=int, default=10, help="changes of a room that are caught or survive")
+    parser.add_argument("--folder", action="append", default=[], help="mapping/sweep, or a folder of folders: plugin")
+    parser.add_argument("--count", type=int, default=10, help="changes of a folder that are caught or survive")
     parser.add_argument("--seed", default="1")
     parser.add_argument("--again", metavar="RESULTS", help="the survivors of an earlier run's results.jsonl alone")
-    parser.add_argument("--list", action="store_true", help="the first changes of each room, without making them")
+    parser.add_argument("--list", action="store_true", help="the first changes of each folder, without making them")
     arguments = parser.parse_args()
     run = Run(arguments)
-    rooms = [room for room in run.rooms
-             if not arguments.room or any(room == r or room.startswith(r + "/") for r in arguments.room)]
-    if not rooms:
-        sys.exit("mutate.py: no such room")
+    folders = [folder for folder in run.folders
+             if not arguments.folder or any(folder == r or folder.startswith(r + "/") for r in arguments.folder)]
+    if not folders:
+        sys.exit("mutate.py: no such folder")
     if arguments.list:
-        for room in rooms:
-            for _, change in zip(range(arguments.count), changes_of_room(room, arguments.seed)):
+        for folder in folders:
+            for _, change in zip(range(arguments.count), changes_of_folder(folder, arguments.seed)):
                 with open(os.path.join(ROOT, change.file)) as source:
                     number, old, new = line_of(source.read(), change)
                 print(f"{change.file}:{number} ({change.kind})\n  - {old}\n  + {new}")
         return
-    run.prepare(rooms)
+    run.prepare(folders)
     if arguments.again:
-        run.rooms = {room: run.rooms[room] for room in rooms}
+        run.folders = {folder: run.folders[folder] for folder in folders}
         run.repeat(arguments.again)
     else:
-        for room in rooms:
-            run.run_room(room)
+        for folder in folders:
+            run.run_folder(folder)
     run.print_table()
 
 

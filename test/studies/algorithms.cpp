@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/pictures/depth_picture.h"
+#include "plugin/results/pictures/depth_picture.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/error_table.h"

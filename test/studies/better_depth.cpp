@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/methods/depth_curve.h"
 #include "test/studies/methods/method_comparison.h"

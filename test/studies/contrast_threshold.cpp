@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "plugin/pictures/curve_plot.h"
-#include "plugin/pictures/depth_picture.h"
+#include "plugin/results/pictures/curve_plot.h"
+#include "plugin/results/pictures/depth_picture.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/error_table.h"

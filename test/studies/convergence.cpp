@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 #include "test/studies/figures/dsi_projections.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/methods/error_figures.h"

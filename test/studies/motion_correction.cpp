@@ -10,7 +10,7 @@
 
 #include "mapping/geometry/angle.h"
 #include "mapping/motion/velocity_correction.h"
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/recordings/recording_errors.h"

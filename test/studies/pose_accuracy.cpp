@@ -8,7 +8,7 @@
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/error_table.h"
 #include "test/studies/methods/method_comparison.h"

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "plugin/pictures/curve_plot.h"
-#include "plugin/pictures/depth_picture.h"
+#include "plugin/results/pictures/curve_plot.h"
+#include "plugin/results/pictures/depth_picture.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/frames/edge_kinds.h"
 #include "test/studies/frames/rendered_frames.h"

@@ -13,7 +13,7 @@
 
 #include "mapping/dsi/voting_kernel.h"
 #include "mapping/keyframes/keyframe_mapper.h"
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 #include "test/bench/stage_clock.h"
 #include "test/bench/synthetic_window.h"
 #include "test/studies/methods/error_figures.h"

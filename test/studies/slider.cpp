@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/pictures/depth_picture.h"
+#include "plugin/results/pictures/depth_picture.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/frames/rendered_frames.h"
 #include "test/studies/frames/slider_keyframe.h"

@@ -4,9 +4,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm {

@@ -9,7 +9,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "tracking_stub/faults/keyframe_noise.h"
 #include "tracking_stub/faults/pose_drift.h"
-#include "tracking_stub/poses/pose_source.h"
+#include "tracking_stub/faults/pose_source.h"
 
 namespace efm {
 

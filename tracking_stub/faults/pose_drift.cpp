@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/faults/pose_drift.h"
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/rigid3.h"
-#include "mapping/options/option_check.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm {

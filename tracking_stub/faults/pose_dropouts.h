@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "tracking_stub/poses/pose_source.h"
+#include "tracking_stub/faults/pose_source.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm {

@@ -5,7 +5,7 @@
 #include <deque>
 #include <memory>
 
-#include "tracking_stub/poses/pose_source.h"
+#include "tracking_stub/faults/pose_source.h"
 
 namespace efm {
 

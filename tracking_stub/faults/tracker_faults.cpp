@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 #include "tracking_stub/faults/pose_latency.h"
 
 namespace efm {

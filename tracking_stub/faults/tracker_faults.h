@@ -6,7 +6,7 @@
 
 #include "tracking_stub/faults/perturbed_poses.h"
 #include "tracking_stub/faults/pose_dropouts.h"
-#include "tracking_stub/poses/pose_source.h"
+#include "tracking_stub/faults/pose_source.h"
 
 namespace efm {
 

@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/base/option_check.h"
 #include "mapping/depth/median.h"
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

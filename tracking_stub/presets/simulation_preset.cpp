@@ -3,9 +3,9 @@
 
 #include <string_view>
 
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
 #include "tracking_stub/presets/presets.h"
 
 namespace efm {

@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/base/named_choice.h"
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/named_choice.h"
-#include "mapping/options/option_check.h"
 #include "tracking_stub/motion/smoothed_trajectory.h"
 #include "tracking_stub/scenes/poles_scene.h"
 #include "tracking_stub/scenes/room_scene.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/lens_inverse.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/angle.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
 
 namespace efm {
 namespace {

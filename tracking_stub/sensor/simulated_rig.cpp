@@ -12,8 +12,8 @@
 #include <tuple>
 #include <utility>
 
+#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/options/option_check.h"
 #include "tracking_stub/rendering/frame_renderer.h"
 #include "tracking_stub/rendering/scene_view.h"
 

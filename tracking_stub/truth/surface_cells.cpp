@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "mapping/options/option_check.h"
+#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -10,8 +10,8 @@
 #include <random>
 #include <sstream>
 
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
-#include "test/mapping/options/refused_option.h"
 #include "test/oracle/naive_depth.h"
 
 namespace efm::paper_extraction_test {

@@ -8,9 +8,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/played_recording.h"
-#include "test/mapping/options/refused_option.h"
 
 namespace efm::event_filter_test {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
-#include "test/mapping/options/refused_option.h"
 
 namespace efm::event_groups_test {
 namespace {

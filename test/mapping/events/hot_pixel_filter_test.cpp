@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
-#include "test/mapping/options/refused_option.h"
 
 namespace efm::hot_pixel_filter_test {
 namespace {

@@ -9,7 +9,7 @@
 #include <random>
 #include <set>
 
-#include "test/mapping/options/refused_option.h"
+#include "test/mapping/base/refused_option.h"
 
 namespace efm::subintervals_test {
 namespace {

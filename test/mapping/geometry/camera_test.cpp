@@ -13,7 +13,7 @@
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/undistortion.h"
-#include "test/mapping/options/refused_option.h"
+#include "test/mapping/base/refused_option.h"
 
 namespace efm::camera_test {
 namespace {

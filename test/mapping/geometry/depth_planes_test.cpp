@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "test/mapping/options/refused_option.h"
+#include "test/mapping/base/refused_option.h"
 
 namespace efm::depth_planes_test {
 namespace {

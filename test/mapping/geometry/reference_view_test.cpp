@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "mapping/geometry/angle.h"
-#include "test/mapping/options/refused_option.h"
+#include "test/mapping/base/refused_option.h"
 
 namespace efm::reference_view_test {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "mapping/geometry/rounded_rotation.h"
 #include "mapping/geometry/timestamp.h"
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
-#include "test/mapping/options/refused_option.h"
 
 namespace efm::trajectory_test {
 namespace {

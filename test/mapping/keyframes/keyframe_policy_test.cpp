@@ -7,8 +7,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/known_recording.h"
-#include "test/mapping/options/refused_option.h"
 
 namespace efm::keyframe_policy_test {
 namespace {

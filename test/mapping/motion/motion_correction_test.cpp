@@ -12,10 +12,10 @@
 
 #include "mapping/geometry/angle.h"
 #include "mapping/keyframes/keyframe_mapper.h"
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_recording.h"
 #include "test/mapping/motion/moving_edges.h"
-#include "test/mapping/options/refused_option.h"
 
 namespace efm::motion_correction_test {
 namespace {

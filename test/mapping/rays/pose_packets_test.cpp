@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "mapping/rays/vote_displacement.h"
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
-#include "test/mapping/options/refused_option.h"
 
 namespace efm {
 namespace {

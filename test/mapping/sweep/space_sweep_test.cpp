@@ -11,12 +11,12 @@
 
 #include "mapping/events/event_groups.h"
 #include "mapping/keyframes/keyframe_mapper.h"
+#include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/dsi/chosen_dsi.h"
 #include "test/mapping/dsi/whole_dsi.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/keyframes/random_recording.h"
-#include "test/mapping/options/refused_option.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {

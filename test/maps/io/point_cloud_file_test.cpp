@@ -14,7 +14,7 @@
 #include <set>
 #include <sstream>
 
-#include "maps/io/atomic_file.h"
+#include "mapping/base/atomic_file.h"
 #include "maps/io/pcd_file.h"
 #include "maps/io/ply_file.h"
 #include "test/plugin/message_of.h"

@@ -13,9 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "mapping/geometry/tum_trajectory.h"
 #include "plugin/app/program.h"
 #include "test/plugin/program_test.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 

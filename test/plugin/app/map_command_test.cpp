@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "mapping/geometry/tum_trajectory.h"
 #include "test/plugin/app/app_test.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
-#include "maps/io/atomic_file.h"
+#include "mapping/base/atomic_file.h"
 #include "plugin/evaluation/npy_image.h"
 #include "plugin/evaluation/pfm_image.h"
 #include "test/plugin/message_of.h"

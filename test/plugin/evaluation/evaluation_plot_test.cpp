@@ -8,8 +8,8 @@
 #include "plugin/evaluation/cloud_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_plot.h"
 #include "plugin/evaluation/trajectory_evaluation_plot.h"
-#include "plugin/pictures/value_picture.h"
-#include "test/plugin/pictures/sketch.h"
+#include "plugin/results/pictures/value_picture.h"
+#include "test/plugin/results/pictures/sketch.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -9,9 +9,9 @@
 #include <sstream>
 #include <tuple>
 
+#include "mapping/geometry/tum_trajectory.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

@@ -13,12 +13,12 @@
 #include <functional>
 #include <thread>
 
-#include "plugin/formats/rawlog_writer.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_time.h"
-#include "test/plugin/formats/dataset_of.h"
+#include "plugin/recordings/open/rawlog_writer.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
+#include "test/plugin/recordings/open/dataset_of.h"
 #include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -8,10 +8,10 @@
 #include <algorithm>
 #include <set>
 
-#include "plugin/recordings/perturbed_recording.h"
+#include "plugin/recordings/open/perturbed_recording.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/recordings/listed_recording.h"
+#include "test/plugin/recordings/open/listed_recording.h"
 
 namespace efm {
 namespace {

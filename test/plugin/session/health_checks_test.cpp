@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "mapping/geometry/angle.h"
-#include "plugin/calibration/camchain.h"
+#include "plugin/recordings/calibration/camchain.h"
 #include "plugin/session/camera_checks.h"
 #include "plugin/session/pose_warning.h"
 #include "plugin/session/session_warnings.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "test/memory/failing_allocation.h"
-#include "test/plugin/recordings/shaken_recording.h"
+#include "test/plugin/recordings/open/shaken_recording.h"
 #include "test/plugin/session/session_driver.h"
 
 namespace efm {

@@ -14,7 +14,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
 #include "plugin/session/recording_survey.h"
-#include "test/mapping/options/refused_option.h"
+#include "test/mapping/base/refused_option.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"

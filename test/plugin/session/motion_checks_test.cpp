@@ -15,8 +15,8 @@
 #include "mapping/geometry/angle.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
+#include "mapping/geometry/tum_trajectory.h"
 #include "test/paths.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 
 namespace efm {
 namespace {

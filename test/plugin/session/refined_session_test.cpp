@@ -7,7 +7,7 @@
 #include <functional>
 #include <memory>
 
-#include "test/plugin/recordings/shaken_recording.h"
+#include "test/plugin/recordings/open/shaken_recording.h"
 #include "test/plugin/session/session_driver.h"
 
 namespace efm {

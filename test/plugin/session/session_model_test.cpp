@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/live/input_queue.h"
+#include "plugin/session/input_queue.h"
 #include "test/memory/failing_allocation.h"
 #include "test/plugin/session/session_driver.h"
 

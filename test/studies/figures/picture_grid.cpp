@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "plugin/pictures/depth_picture.h"
+#include "plugin/results/pictures/depth_picture.h"
 
 namespace efm::studies {
 namespace {

@@ -7,10 +7,10 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "mapping/base/option_check.h"
 #include "mapping/depth/depth_extraction.h"
 #include "mapping/depth/median.h"
 #include "mapping/depth/peak_fit.h"
-#include "mapping/options/option_check.h"
 #include "test/studies/frames/edge_kinds.h"
 #include "test/studies/frames/frame_sweep.h"
 

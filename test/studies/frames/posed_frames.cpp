@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "mapping/geometry/trajectory.h"
+#include "mapping/geometry/tum_trajectory.h"
 #include "plugin/evaluation/depth_series.h"
-#include "plugin/text/uzh_text.h"
-#include "tracking_stub/poses/tum_trajectory.h"
+#include "plugin/recordings/text/uzh_text.h"
 
 namespace efm::studies {
 namespace {

@@ -5,11 +5,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "mapping/geometry/tum_trajectory.h"
 #include "mapping/keyframes/keyframe_policy.h"
-#include "plugin/streams/event_packets.h"
-#include "plugin/text/event_text.h"
-#include "plugin/text/uzh_text.h"
-#include "tracking_stub/poses/tum_trajectory.h"
+#include "plugin/recordings/streams/event_packets.h"
+#include "plugin/recordings/text/event_text.h"
+#include "plugin/recordings/text/uzh_text.h"
 
 namespace efm::studies {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 #include "test/studies/methods/method_comparison.h"
 
 namespace efm::studies {

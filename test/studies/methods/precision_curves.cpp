@@ -4,7 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "plugin/pictures/curve_plot.h"
+#include "plugin/results/pictures/curve_plot.h"
 
 namespace efm::studies {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "plugin/calibration/camchain.h"
-#include "tracking_stub/poses/tum_trajectory.h"
+#include "mapping/geometry/tum_trajectory.h"
+#include "plugin/recordings/calibration/camchain.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 
 namespace efm::studies {

@@ -14,7 +14,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/refinement/registration_cloud.h"
 #include "plugin/session/mapping_session.h"
-#include "test/tracking_stub/poses/tum_replay.h"
+#include "test/tracking_stub/faults/tum_replay.h"
 
 namespace efm::studies {
 namespace {

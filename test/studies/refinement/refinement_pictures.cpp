@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "plugin/pictures/curve_plot.h"
-#include "plugin/pictures/picture_grid.h"
+#include "plugin/results/pictures/curve_plot.h"
+#include "plugin/results/pictures/picture_grid.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/figures/top_view.h"
 

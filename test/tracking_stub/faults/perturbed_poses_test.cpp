@@ -10,7 +10,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "test/tracking_stub/poses/pose_lists.h"
+#include "test/tracking_stub/faults/pose_lists.h"
 
 namespace efm {
 namespace {

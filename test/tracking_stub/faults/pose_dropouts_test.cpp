@@ -6,7 +6,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "test/tracking_stub/poses/tum_replay.h"
+#include "test/tracking_stub/faults/tum_replay.h"
 
 namespace efm {
 namespace {

@@ -7,7 +7,7 @@
 
 #include <stdexcept>
 
-#include "test/tracking_stub/poses/pose_lists.h"
+#include "test/tracking_stub/faults/pose_lists.h"
 
 namespace efm {
 namespace {

@@ -10,10 +10,10 @@
 #include <stdexcept>
 
 #include "mapping/geometry/reference_view.h"
-#include "test/plugin/formats/files.h"
+#include "mapping/geometry/tum_trajectory.h"
+#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
-#include "tracking_stub/poses/tum_trajectory.h"
 #include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm {

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/base/atomic_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <cstring>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+namespace efm {
+namespace {
+
+std::runtime_error cannotWrite(const std::filesystem::path& path, const std::string& why) {
+  return std::runtime_error("cannot write '" + path.string() + "': " + why);
+}
+
+/// The path itself, or the file at the end of its symbolic links.
+std::filesystem::path replaceableFile(const std::filesystem::path& path) {
+  constexpr int kMaxLinks = 40;  // as Linux has it
+  const auto refuse = [&](const std::string& why) { return cannotWrite(path, why); };
+  if (path.empty()) throw refuse("expected the name of a file");
+  std::error_code error;
+  std::filesystem::path file = path;
+  for (int links = 0; std::filesystem::is_symlink(file, error); ++links) {
+    if (links == kMaxLinks) throw refuse("too many symbolic links");
+    file = file.parent_path() / std::filesystem::read_symlink(file, error);
+    if (error) throw refuse(error.message());
+  }
+  const std::filesystem::file_status status = std::filesystem::status(file, error);
+  if (error == std::errc::filename_too_long) throw refuse(error.message());
+  if (std::filesystem::is_directory(status) || !file.has_filename()) throw refuse("it is a folder");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    throw refuse("it is there and not a regular file");
+  }
+  return file;
+}
+
+}  // namespace
+
+std::string reasonNotWritten(int error_number) {
+  switch (error_number) {
+    case ENOSPC:
+      return "the disk is full";
+    case EDQUOT:
+      return "the disk quota is used up";
+    case EFBIG:
+      return "the file would be larger than the system allows (ulimit -f)";
+    default:
+      return "";
+  }
+}
+
+AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(replaceableFile(path)) {
+  for (int trial = 0;; ++trial) {
+    temporary_ = temporaryName(path_, getpid(), trial);
+    const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file >= 0) {
+      ::close(file);
+      return;
+    }
+    if (errno == EEXIST) continue;
+    const std::string why = reasonNotWritten(errno);
+    throw cannotWrite(path, why.empty() ? std::strerror(errno) : why);
+  }
+}
+
+std::filesystem::path AtomicFile::temporaryName(const std::filesystem::path& path, pid_t process,
+                                                int trial) {
+  const std::string number =
+      std::to_string(process) + (trial == 0 ? "" : "-" + std::to_string(trial));
+  const std::string end = ".partial-" + number + path.extension().string();
+  std::string begin = path.stem().string();
+  // Two long names may begin alike: then `trial` tells them apart.
+  begin.resize(std::min(begin.size(), NAME_MAX - std::min<std::size_t>(end.size(), NAME_MAX)));
+  std::filesystem::path temporary = path;
+  temporary.replace_filename(begin + end);
+  return temporary;
+}
+
+AtomicFile::~AtomicFile() {
+  std::error_code ignored;
+  if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
+}
+
+void AtomicFile::fill(
+    const std::function<void(const std::filesystem::path& temporary)>& write) const {
+  errno = 0;
+  try {
+    write(temporary_);
+  } catch (const std::exception& error) {
+    const std::string why = reasonNotWritten(errno);
+    throw std::runtime_error("cannot write " + path_.string() + ": " +
+                             (why.empty() ? error.what() : why));
+  }
+}
+
+void AtomicFile::replace(DiskSync sync) {
+  if (sync == DiskSync::kNow) syncToDisk(temporary_);
+  std::filesystem::rename(temporary_, path_);
+  temporary_.clear();  // the name may be another process's file from now on
+  if (sync == DiskSync::kNow) syncToDisk(path_.has_parent_path() ? path_.parent_path() : ".");
+}
+
+void syncToDisk(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return;  // a folder that may be written to, but not read
+  const int error = ::fsync(file) == 0 ? 0 : errno;
+  ::close(file);
+  if (error == 0 || error == EINVAL || error == ENOSYS || error == EOPNOTSUPP) return;
+  errno = error;
+  throw std::filesystem::filesystem_error("cannot be written to the disk", path,
+                                          std::error_code(error, std::generic_category()));
+}
+
+void writeAtomically(const std::filesystem::path& path,
+                     const std::function<void(const std::filesystem::path& temporary)>& write,
+                     DiskSync sync) {
+  AtomicFile file(path);
+  file.fill([&](const std::filesystem::path& temporary) {
+    write(temporary);
+    file.replace(sync);
+  });
+}
+
+std::string readBytes(const std::filesystem::path& path) {
+  if (!std::filesystem::exists(path)) throw std::runtime_error("there is no such file");
+  if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("it is not a regular file");
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  const auto end = file.tellg();
+  if (!file || end < 0) throw std::runtime_error("the file cannot be opened");
+  std::string bytes(static_cast<std::size_t>(end), '\0');
+  file.seekg(0);
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (!file) throw std::runtime_error("the file cannot be read to its end");
+  return bytes;
+}
+
+}  // namespace efm

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/bags/mcap_bag.h"
+
+#include <fmt/format.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <exception>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "mapping/base/byte_reader.h"
+#include "mapping/base/quoted_text.h"
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/bags/bag_chunks.h"
+#include "plugin/recordings/bags/mcap_format.h"
+
+namespace efm {
+namespace {
+
+struct McapRecord {
+  McapOp op;
+  ByteReader content;
+};
+
+McapRecord takeMcapRecord(ByteReader& bytes) {
+  const auto op = static_cast<McapOp>(bytes.number<std::uint8_t>());
+  const std::uint64_t size = bytes.number<std::uint64_t>();
+  return {op, ByteReader(bytes.take(size), size)};
+}
+
+std::string_view takeText(ByteReader& bytes) { return bytes.text(bytes.number<std::uint32_t>()); }
+
+std::int64_t takeTime(ByteReader& bytes) {
+  const std::uint64_t t_ns = bytes.number<std::uint64_t>();
+  if (t_ns < static_cast<std::uint64_t>(kEndOfTimeNs)) return static_cast<std::int64_t>(t_ns);
+  throw std::runtime_error(
+      fmt::format("log time {}: expected a time in ns before the year 2116", t_ns));
+}
+
+void requireChecksum(std::uint32_t claimed, const std::uint8_t* data, std::size_t size) {
+  if (claimed == 0) return;
+  const auto found = static_cast<std::uint32_t>(crc32_z(0, data, size));
+  if (found == claimed) return;
+  throw std::runtime_error(
+      fmt::format("damaged data of checksum {:08x}: expected {:08x}", found, claimed));
+}
+
+class McapBag : public ChunkedBag {
+ public:
+  explicit McapBag(const std::filesystem::path& file)
+      : ChunkedBag(file, " (`mcap recover` writes a file of what is intact)") {
+    if (!readSummary()) scanFile();
+  }
+
+ protected:
+  ChunkMessages readChunk(const BagChunk& chunk) override;
+
+ private:
+  bool readSummary();
+  void scanFile();
+  static void takeTimes(const ChunkMessages& found, BagChunk& chunk);
+  void addMessages(ByteReader records, ChunkMessages& chunk);
+  void takeSchemaOrChannel(McapRecord& record);
+  BagChunk chunkOfIndex(ByteReader content) const;
+
+  struct Channel {
+    std::size_t topic;
+    bool cdr;
+  };
+  std::map<std::uint16_t, std::string> types_;  // by schema
+  std::map<std::uint16_t, Channel> channels_;
+};
+
+/// @return whether the file has an index of its chunks and names their channels there.
+bool McapBag::readSummary() {
+  const std::uint64_t magic = kMcapMagic.size();
+  const std::uint64_t tail_size = kMcapRecordHead + kMcapFooterContent + magic;
+  if (fileSize() < magic + tail_size) return false;
+  const std::uint64_t footer = fileSize() - tail_size;
+  const auto tail = readBytes(footer, tail_size);
+  ByteReader bytes(tail.get(), tail_size);
+  const auto op = static_cast<McapOp>(bytes.number<std::uint8_t>());
+  const std::uint64_t size = bytes.number<std::uint64_t>();
+  const std::uint64_t summary = bytes.number<std::uint64_t>();
+  bytes.number<std::uint64_t>();  // summary offsets
+  const std::uint32_t checksum = bytes.number<std::uint32_t>();
+  if (op != McapOp::kFooter || size != kMcapFooterContent || bytes.text(magic) != kMcapMagic) {
+    return false;  // the recording was cut off
+  }
+  if (summary == 0) return false;
+  if (summary < magic || summary > footer) {
+    throw errorAt(footer, fmt::format("summary at byte {}: expected it between {} and {}", summary,
+                                      magic, footer));
+  }
+
+  const auto section = readBytes(summary, fileSize() - summary);
+  located(summary, [&] {
+    requireChecksum(checksum, section.get(),
+                    footer - summary + kMcapRecordHead + kMcapFooterContent - sizeof(checksum));
+  });
+  // Chunks refer to channels, which may come behind them.
+  std::vector<std::pair<std::uint64_t, ByteReader>> indexes;
+  bool has_channels = false;
+  ByteReader records(section.get(), footer - summary);
+  while (records.remaining() > 0) {
+    const std::uint64_t at = summary + records.position();
+    located(at, [&] {
+      McapRecord record = takeMcapRecord(records);
+      if (record.op == McapOp::kChunkIndex) indexes.emplace_back(at, record.content);
+      has_channels = has_channels || record.op == McapOp::kChannel;
+      takeSchemaOrChannel(record);
+    });
+  }
+  if (indexes.empty() || !has_channels) return false;
+  std::vector<BagChunk> chunks;
+  for (const auto& [at, content] : indexes) {
+    located(at, [&, index = content] { chunks.push_back(chunkOfIndex(index)); });
+  }
+  std::sort(chunks.begin(), chunks.end(),
+            [](const BagChunk& a, const BagChunk& b) { return a.offset < b.offset; });
+  for (std::size_t i = 1; i < chunks.size(); ++i) {
+    const BagChunk& before = chunks[i - 1];
+    if (before.size <= chunks[i].offset - before.offset) continue;
+    throw errorAt(before.offset, fmt::format("a chunk of {} bytes: expected its end before the "
+                                             "next one, which begins at byte {}",
+                                             before.size, chunks[i].offset));
+  }
+  setChunks(std::move(chunks));
+  return true;
+}
+
+BagChunk McapBag::chunkOfIndex(ByteReader content) const {
+  BagChunk chunk;
+  chunk.first_log_ns = takeTime(content);
+  chunk.last_log_ns = takeTime(content);
+  chunk.offset = content.number<std::uint64_t>();
+  chunk.size = content.number<std::uint64_t>();
+  const std::uint32_t size = content.number<std::uint32_t>();
+  ByteReader indexes(content.take(size), size);
+  if (size > 0) chunk.topics = 0;  // else it is not known
+  while (indexes.remaining() > 0) {
+    const auto channel = channels_.find(indexes.number<std::uint16_t>());
+    indexes.number<std::uint64_t>();
+    if (channel != channels_.end()) chunk.topics |= topicBit(channel->second.topic);
+  }
+  return chunk;
+}
+
+void McapBag::takeSchemaOrChannel(McapRecord& record) {
+  ByteReader& content = record.content;
+  if (record.op == McapOp::kSchema) {
+    const std::uint16_t id = content.number<std::uint16_t>();
+    types_[id] = typeWithoutMsg(std::string(takeText(content)));
+  } else if (record.op == McapOp::kChannel) {
+    const std::uint16_t id = content.number<std::uint16_t>();
+    const auto type = types_.find(content.number<std::uint16_t>());
+    const std::string name(takeText(content));
+    const std::string_view encoding = takeText(content);
+    if (type == types_.end() || (encoding != "cdr" && encoding != "ros1")) return;
+    channels_[id] = {addTopic({name, type->second}), encoding == "cdr"};
+  }
+}
+
+/// Finds channels, chunks, and messages outside chunks, of which many make one chunk here. Where
+/// the data are damaged or cut off, reading the last chunk is the error, after those before it.
+void McapBag::scanFile() {
+  constexpr std::uint64_t kLooseBytes = 1 << 20;
+  std::vector<BagChunk> chunks;
+  BagChunk loose;  // messages outside chunks
+  std::exception_ptr damage;
+  const auto add = [&](BagChunk& chunk) {
+    if (chunk.size == 0) return;
+    if (!chunks.empty()) chunk.first_log_ns = chunk.last_log_ns = chunks.back().last_log_ns;
+    try {
+      takeTimes(readChunk(chunk), chunk);
+    } catch (const std::runtime_error&) {
+      damage = std::current_exception();
+      chunk.topics = ~std::uint64_t{0};
+    }
+    chunks.push_back(chunk);
+    chunk.size = 0;
+  };
+  for (std::uint64_t offset = kMcapMagic.size(); offset < fileSize();) {
+    BagChunk record;
+    record.offset = offset;
+    record.size = fileSize() - offset + 1;  // more than there is
+    McapOp op = McapOp::kChunk;
+    if (fileSize() - offset >= kMcapRecordHead) {
+      const auto head = readBytes(offset, kMcapRecordHead);
+      ByteReader bytes(head.get(), kMcapRecordHead);
+      op = static_cast<McapOp>(bytes.number<std::uint8_t>());
+      if (op == McapOp::kDataEnd || op == McapOp::kFooter) break;
+      const std::uint64_t size = bytes.number<std::uint64_t>();
+      // A file that was not written to its end may end in zeros, which are no records.
+      if (op != McapOp() && size < record.size - kMcapRecordHead) {
+        record.size = kMcapRecordHead + size;
+      }
+    }
+    const std::uint64_t next = offset + record.size;
+    if (next > fileSize()) op = McapOp::kChunk;
+    if (op == McapOp::kMessage) {
+      if (loose.size == 0) loose.offset = offset;
+      loose.size = next - loose.offset;
+    }
+    if (op != McapOp::kMessage || loose.size >= kLooseBytes) add(loose);
+    if (op == McapOp::kChunk) add(record);
+    if (op == McapOp::kSchema || op == McapOp::kChannel) {
+      const auto content = readBytes(offset, record.size);
+      located(offset, [&] {
+        ByteReader bytes(content.get(), record.size);
+        McapRecord taken = takeMcapRecord(bytes);
+        takeSchemaOrChannel(taken);
+      });
+    }
+    offset = next;
+  }
+  add(loose);
+  if (damage && topics().empty()) std::rethrow_exception(damage);  // else nobody would say it
+  setChunks(std::move(chunks));
+}
+
+void McapBag::takeTimes(const ChunkMessages& found, BagChunk& chunk) {
+  chunk.topics = 0;
+  for (const ChunkMessages::Message& message : found.messages) {
+    const bool first = chunk.topics == 0;
+    chunk.first_log_ns = first ? message.log_ns : std::min(chunk.first_log_ns, message.log_ns);
+    chunk.last_log_ns = first ? message.log_ns : std::max(chunk.last_log_ns, message.log_ns);
+    chunk.topics |= topicBit(message.topic);
+  }
+}
+
+ChunkMessages McapBag::readChunk(const BagChunk& chunk) {
+  auto file = readBytes(chunk.offset, chunk.size);
+  return located(chunk.offset, [&] {
+    ChunkMessages messages;
+    ByteReader bytes(file.get(), chunk.size);
+    if (chunk.size > 0 && static_cast<McapOp>(*file.get()) == McapOp::kMessage) {
+      messages.bytes = std::move(file);
+      messages.size = chunk.size;
+      addMessages(bytes, messages);
+      return messages;
+    }
+    McapRecord record = takeMcapRecord(bytes);
+    if (record.op != McapOp::kChunk) {
+      throw std::runtime_error(
+          fmt::format("record of op {}: expected a chunk", static_cast<int>(record.op)));
+    }
+    ByteReader& content = record.content;
+    content.take(8 + 8);  // first and last log time
+    const std::uint64_t size = content.number<std::uint64_t>();
+    const std::uint32_t checksum = content.number<std::uint32_t>();
+    const ChunkCompression compression = chunkCompression(takeText(content), {"", "lz4", "zstd"});
+    const std::uint64_t packed = content.number<std::uint64_t>();
+    const std::uint8_t* const data = content.take(packed);
+    const std::uint8_t* const records =
+        unpackChunk(compression, {std::move(file), data, packed}, size, messages.bytes);
+    messages.size = size;
+    requireChecksum(checksum, records, size);
+    addMessages(ByteReader(records, size), messages);
+    return messages;
+  });
+}
+
+void McapBag::addMessages(ByteReader records, ChunkMessages& chunk) {
+  while (records.remaining() > 0) {
+    McapRecord record = takeMcapRecord(records);
+    takeSchemaOrChannel(record);
+    if (record.op != McapOp::kMessage) continue;
+    ByteReader& content = record.content;
+    const auto channel = channels_.find(content.number<std::uint16_t>());
+    content.number<std::uint32_t>();  // sequence
+    const std::int64_t log_ns = takeTime(content);
+    content.number<std::uint64_t>();  // publish time
+    if (channel == channels_.end()) continue;
+    const std::size_t size = content.remaining();
+    chunk.messages.push_back(
+        {channel->second.topic, log_ns, content.take(size), size, channel->second.cdr});
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<BagSource> openMcap(const std::filesystem::path& file) {
+  return std::make_unique<McapBag>(file);
+}
+
+}  // namespace efm

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/bags/ros_messages.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+
+#include "mapping/base/byte_reader.h"
+#include "mapping/base/quoted_text.h"
+#include "mapping/geometry/rounded_rotation.h"
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/number_checks.h"
+
+namespace efm {
+namespace {
+
+struct NamedRosType {
+  std::string_view name;
+  RosType type;
+};
+constexpr NamedRosType kRosTypes[] = {
+    {"dvs_msgs/EventArray", RosType::kEventArray},
+    {"prophesee_event_msgs/EventArray", RosType::kEventArray},
+    {"event_camera_msgs/EventPacket", RosType::kEventPacket},
+    {"event_array_msgs/EventArray", RosType::kEventPacket},
+    {"geometry_msgs/PoseStamped", RosType::kPose},
+    {"geometry_msgs/PoseWithCovarianceStamped", RosType::kPoseWithCovariance},
+    {"geometry_msgs/TransformStamped", RosType::kTransform},
+    {"nav_msgs/Odometry", RosType::kOdometry},
+    {"sensor_msgs/CameraInfo", RosType::kCameraInfo},
+};
+
+/// The fields of a message, in either serialisation.
+class MessageFields {
+ public:
+  explicit MessageFields(const BagMessage& message)
+      : bytes_(message.data, message.size), cdr_(message.cdr) {
+    if (!cdr_) return;
+    constexpr int kBigEndian = 0;
+    constexpr int kLittleEndian = 1;
+    const int zero = bytes_.number<std::uint8_t>();
+    const int kind = bytes_.number<std::uint8_t>();
+    if (zero != 0 || kind > kLittleEndian) {
+      throw std::runtime_error(fmt::format(
+          "CDR header = {} {}: expected 0 0 or 0 1, plain CDR of version 1", zero, kind));
+    }
+    bytes_.number<std::uint16_t>();  // options
+    bytes_.setBigEndian(kind == kBigEndian);
+    bytes_.alignFromHere();
+  }
+
+  ByteReader& bytes() { return bytes_; }
+  template <typename T>
+  T number() {
+    return bytes_.number<T>();
+  }
+  std::int64_t time() {
+    // The seconds of ROS 1 have no sign.
+    const std::int64_t seconds = cdr_ ? std::int64_t{bytes_.number<std::int32_t>()}
+                                      : std::int64_t{bytes_.number<std::uint32_t>()};
+    const std::uint32_t nanoseconds = bytes_.number<std::uint32_t>();
+    return seconds * kNanosecondsPerSecond + nanoseconds;
+  }
+  std::string_view text() {
+    const std::uint32_t size = bytes_.number<std::uint32_t>();
+    const std::string_view text = bytes_.text(size);
+    return cdr_ && !text.empty() ? text.substr(0, text.size() - 1) : text;  // a zero at the end
+  }
+  /// @return the stamp.
+  std::int64_t header() {
+    if (!cdr_) bytes_.number<std::uint32_t>();  // seq
+    const std::int64_t t_ns = time();
+    text();  // frame_id
+    return t_ns;
+  }
+  CameraSize size() {
+    const auto side = [this](const char* name) {
+      constexpr std::uint32_t kMaxSide = 65'535;
+      const std::uint32_t value = bytes_.number<std::uint32_t>();
+      if (value <= kMaxSide) return static_cast<int>(value);
+      throw std::runtime_error(fmt::format("{} = {}: expected 0 to {}", name, value, kMaxSide));
+    };
+    const int height = side("height");
+    const int width = side("width");
+    return {width, height};
+  }
+  double finite(const char* name) {
+    const double value = bytes_.number<double>();
+    if (std::isfinite(value)) return value;
+    throw std::runtime_error(fmt::format("{} = {}: expected a finite number", name, value));
+  }
+
+ private:
+  ByteReader bytes_;
+  bool cdr_;
+};
+
+/// An event of an EventArray: x, y (16 bits), seconds, nanoseconds (32 bits), polarity (8 bits).
+constexpr std::size_t kRosEventBytes = 13;
+
+/// The event at `bytes`, whose seconds are at `time`. Little-endian.
+Event eventAt(const std::uint8_t* bytes, const std::uint8_t* time) {
+  Event event;
+  std::uint32_t seconds;
+  std::uint32_t nanoseconds;
+  std::memcpy(&event.x, bytes, 2);
+  std::memcpy(&event.y, bytes + 2, 2);
+  std::memcpy(&seconds, time, 4);
+  std::memcpy(&nanoseconds, time + 4, 4);
+  event.t_ns = std::int64_t{seconds} * kNanosecondsPerSecond + nanoseconds;
+  event.polarity = time[8] != 0;
+  return event;
+}
+
+template <typename Time>
+std::string notATime(const char* name, Time t_ns) {
+  return fmt::format("{} = {}: expected a time in ns before the year 2116", name, t_ns);
+}
+
+std::int64_t timeBaseOf(const EventPacketMessage& packet) {
+  if (packet.time_base < static_cast<std::uint64_t>(kEndOfTimeNs)) {
+    return static_cast<std::int64_t>(packet.time_base);
+  }
+  throw std::runtime_error(notATime("time_base", packet.time_base));
+}
+
+/// Calls `take` for the words of a packet's events. Its errors become those of a word.
+template <typename Word, typename Take>
+void forWords(const EventPacketMessage& packet, const Take& take) {
+  const std::size_t count = packet.data_size / sizeof(Word);
+  for (std::size_t i = 0; i < count; ++i) {
+    Word word;
+    std::memcpy(&word, packet.data + i * sizeof(Word), sizeof(Word));
+    try {
+      take(word);
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(
+          fmt::format("{} events: word {}: {}", packet.encoding, i, error.what()));
+    }
+  }
+  if (packet.data_size % sizeof(Word) == 0) return;
+  throw std::runtime_error(fmt::format("{} bytes of {} events: expected a multiple of {}",
+                                       packet.data_size, packet.encoding, sizeof(Word)));
+}
+
+}  // namespace
+
+RosType rosTypeOf(std::string_view type) {
+  for (const NamedRosType& known : kRosTypes) {
+    if (known.name == type) return known.type;
+  }
+  return RosType::kOther;
+}
+
+bool hasEvents(RosType type) {
+  return type == RosType::kEventArray || type == RosType::kEventPacket;
+}
+
+bool hasPoses(RosType type) {
+  return type == RosType::kPose || type == RosType::kPoseWithCovariance ||
+         type == RosType::kTransform || type == RosType::kOdometry;
+}
+
+CameraSize decodeEventArray(const BagMessage& message, std::vector<Event>& events) {
+  MessageFields fields(message);
+  fields.header();
+  const CameraSize size = fields.size();
+  const std::uint32_t count = fields.number<std::uint32_t>();
+  ByteReader& bytes = fields.bytes();
+  if (count > bytes.remaining() / kRosEventBytes) {
+    throw std::runtime_error(fmt::format("{} events in {} bytes: expected at most {}", count,
+                                         bytes.remaining(), bytes.remaining() / kRosEventBytes));
+  }
+  events.reserve(events.size() + count);
+  if (!message.cdr) {
+    const std::uint8_t* event = bytes.take(count * kRosEventBytes);
+    for (std::uint32_t i = 0; i < count; ++i, event += kRosEventBytes) {
+      events.push_back(eventAt(event, event + 4));
+    }
+    return size;
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    Event event;
+    event.x = fields.number<std::uint16_t>();
+    event.y = fields.number<std::uint16_t>();
+    event.t_ns = fields.time();
+    event.polarity = fields.number<std::uint8_t>() != 0;
+    events.push_back(event);
+  }
+  return size;
+}
+
+EventPacketMessage decodeEventPacket(const BagMessage& message) {
+  MessageFields fields(message);
+  EventPacketMessage packet;
+  packet.stamp_ns = fields.header();
+  packet.size = fields.size();
+  packet.sequence = fields.number<std::uint64_t>();
+  packet.time_base = fields.number<std::uint64_t>();
+  packet.encoding = fields.text();
+  if (fields.number<std::uint8_t>() != 0) {
+    throw std::runtime_error("is_bigendian = 1: expected 0, events in little-endian words");
+  }
+  packet.data_size = fields.number<std::uint32_t>();
+  packet.data = fields.bytes().take(packet.data_size);
+  return packet;
+}
+
+void decodeMonoEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
+  const std::int64_t base_ns = timeBaseOf(packet);
+  events.reserve(events.size() + packet.data_size / sizeof(std::uint64_t));
+  forWords<std::uint64_t>(packet, [&](std::uint64_t word) {
+    events.push_back({base_ns + static_cast<std::int64_t>(word & 0xffff'ffffU),
+                      static_cast<std::uint16_t>(word >> 32),
+                      static_cast<std::uint16_t>(word >> 48 & 0x7fffU), word >> 63 != 0});
+  });
+}
+
+void decodeLibcaerEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
+  constexpr std::int64_t kRangeUs = std::int64_t{1} << 31;
+  const std::int64_t base_ns = timeBaseOf(packet);
+  std::int64_t wraps_us = 0;
+  std::int64_t last_us = 0;
+  events.reserve(events.size() + packet.data_size / sizeof(std::uint64_t));
+  forWords<std::uint64_t>(packet, [&](std::uint64_t word) {
+    const std::int64_t t_us = static_cast<std::int32_t>(word >> 32);
+    if (t_us < 0) throw std::runtime_error(fmt::format("t = {} µs: expected 0 or more", t_us));
+    if (last_us - t_us > kRangeUs / 2) wraps_us += kRangeUs;
+    last_us = t_us;
+    const std::int64_t t_ns = base_ns + (wraps_us + t_us) * kNanosecondsPerMicrosecond;
+    if (t_ns >= kEndOfTimeNs) throw std::runtime_error(notATime("t", t_ns));
+    events.push_back({t_ns, static_cast<std::uint16_t>(word >> 17 & 0x7fffU),
+                      static_cast<std::uint16_t>(word >> 2 & 0x7fffU), (word >> 1 & 1U) != 0});
+  });
+}
+
+void decodeLibcaerCmpEvents(const EventPacketMessage& packet, std::vector<Event>& events) {
+  enum Code { kTimeHigh, kTimeLow, kColumn, kRow, kVectorRow, kVector };
+  constexpr unsigned kVectorRows = 8;
+  constexpr unsigned kEndRow = 0x1'0000;  // no event has it
+  const std::int64_t base_us = timeBaseOf(packet) / kNanosecondsPerMicrosecond;
+  unsigned high_us = 0;
+  unsigned low_us = 0;
+  unsigned column = 0;
+  unsigned vector_row = 0;
+  bool vector_polarity = false;
+  const auto add = [&](unsigned row, bool polarity) {
+    events.push_back({(base_us + (high_us | low_us)) * kNanosecondsPerMicrosecond,
+                      static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row),
+                      polarity});
+  };
+  forWords<std::uint16_t>(packet, [&](std::uint16_t word) {
+    const unsigned time = word & 0xfffU;
+    const unsigned address = word & 0x7ffU;
+    const bool polarity = (word & 0x800U) != 0;
+    switch (const int code = word >> 12U; code) {
+      case kTimeHigh:
+        high_us = time << 12U;
+        break;
+      case kTimeLow:
+        low_us = time;
+        break;
+      case kColumn:
+        column = address;
+        break;
+      case kRow:
+        add(address, polarity);
+        break;
+      case kVectorRow:
+        vector_row = address;
+        vector_polarity = polarity;
+        break;
+      case kVector:
+        for (unsigned i = 0; i < kVectorRows; ++i) {
+          if ((word >> i & 1U) != 0) add(vector_row + i, vector_polarity);
+        }
+        // Stays beyond every sensor instead of wrapping to row 0.
+        vector_row = std::min(vector_row, kEndRow - 2 * kVectorRows) + kVectorRows;
+        break;
+      default:
+        throw std::runtime_error(fmt::format("code {}: expected 0 to {}", code, int{kVector}));
+    }
+  });
+}
+
+StampedPose decodePose(const BagMessage& message, RosType type) {
+  MessageFields fields(message);
+  StampedPose pose;
+  pose.t_ns = fields.header();
+  if (type == RosType::kTransform || type == RosType::kOdometry) fields.text();  // child_frame_id
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    pose.T_world_rig.translation[axis] = fields.finite("position");
+  }
+  Eigen::Quaterniond numbers;
+  for (Eigen::Index i = 0; i < 4; ++i) numbers.coeffs()[i] = fields.finite("orientation");
+  const auto rotation = rotationNear(numbers);
+  if (!rotation) {
+    throw std::runtime_error(
+        fmt::format("orientation of length {:g}: expected 1 within 1 %, a rotation",
+                    numbers.coeffs().stableNorm()));
+  }
+  pose.T_world_rig.rotation = *rotation;
+  return pose;
+}
+
+CameraModel decodeCameraInfo(const BagMessage& message) {
+  constexpr std::uint32_t kMaxCoefficients = 14;
+  MessageFields fields(message);
+  fields.header();
+  const CameraSize size = fields.size();
+  CameraModel model;
+  model.width = size.width;
+  model.height = size.height;
+  const std::string name(fields.text());
+  const std::uint32_t count = fields.number<std::uint32_t>();
+  if (count > kMaxCoefficients) {
+    throw std::runtime_error(
+        fmt::format("{} distortion coefficients: expected at most {}", count, kMaxCoefficients));
+  }
+  for (std::uint32_t i = 0; i < count; ++i) model.coefficients.push_back(fields.finite("D"));
+  std::array<double, 9> matrix;  // fx 0 cx, 0 fy cy, 0 0 1
+  for (double& value : matrix) value = fields.finite("K");
+  model.fx = matrix[0];
+  model.cx = matrix[2];
+  model.fy = matrix[4];
+  model.cy = matrix[5];
+  if (name == "equidistant" || name == "fisheye") {
+    model.distortion = DistortionModel::kEquidistant;
+  } else if (name == "plumb_bob" && count > 0) {
+    model.distortion = DistortionModel::kRadtan;
+  } else if (std::all_of(model.coefficients.begin(), model.coefficients.end(),
+                         [](double value) { return value == 0; })) {
+    model.coefficients.clear();
+  } else {
+    throw std::runtime_error(fmt::format(
+        "distortion_model = {}: expected plumb_bob, equidistant or fisheye", inQuotes(name)));
+  }
+  return model;
+}
+
+}  // namespace efm

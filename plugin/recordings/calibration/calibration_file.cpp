@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/calibration/calibration_file.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
+#include "plugin/recordings/calibration/camchain.h"
+#include "plugin/recordings/calibration/camera_info_file.h"
+#include "plugin/recordings/calibration/dsec_calibration.h"
+#include "plugin/recordings/calibration/mrpt_camera_file.h"
+#include "plugin/recordings/calibration/tumvie_calibration.h"
+#include "plugin/recordings/calibration/yaml_entry.h"
+
+namespace efm {
+namespace {
+
+std::string camerasInWords(std::size_t count) {
+  return fmt::format("{} camera{}", count, count == 1 ? "" : "s");
+}
+
+/// @throws std::runtime_error where it cannot be read, or is too large for a calibration.
+std::string readText(const std::filesystem::path& file) {
+  constexpr std::uintmax_t kMaxBytes = 10'000'000;
+  std::error_code error;
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || std::filesystem::is_directory(file, error)) {
+    throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  }
+  if (std::filesystem::file_size(file, error) > kMaxBytes && !error) {
+    throw std::runtime_error(
+        fmt::format("{}: larger than 10 MB: expected {}", file.string(), kCalibrationFiles));
+  }
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return std::string(withoutByteOrderMark(text.str()));
+}
+
+/// The first word outside comments; empty where there is none.
+std::string firstWord(const std::string& text) {
+  std::istringstream stream(text);
+  std::string word;
+  while (stream >> word && word.front() == '#') {
+    std::getline(stream, word);
+    word.clear();
+  }
+  return word;
+}
+
+Calibration readYamlCalibration(const std::filesystem::path& file) {
+  const YAML::Node root = loadYaml(file.string());
+  if (root.IsMap()) {
+    const YamlEntry entry(file.string(), "", root);
+    if (entry.has("cam0")) return {file, readCamchain(file), readCamchainImu(file)};
+    if (entry.has("intrinsics") && entry.has("extrinsics")) return readDsecCalibration(entry, file);
+    if (entry.has("value0")) return readTumVieCalibration(entry, file);
+    if (entry.has("camera_matrix")) return {file, {{{readCameraInfo(entry), {}, 0}}}};
+  }
+  throw std::runtime_error(
+      fmt::format("{}: not a calibration: expected {}", file.string(), kCalibrationFiles));
+}
+
+std::vector<double> readNumbers(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::vector<double> numbers;
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const std::string_view content = number == 1 ? withoutByteOrderMark(line) : line;
+    for (const std::string_view word : splitWords(content.substr(0, content.find('#')))) {
+      const std::optional<double> value = parseFinite(word);
+      if (!value) {
+        throw std::runtime_error(fmt::format("{}:{}: {}: expected a finite number", file.string(),
+                                             number, inQuotes(word)));
+      }
+      numbers.push_back(*value);
+    }
+  }
+  if (!stream.eof()) throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  return numbers;
+}
+
+}  // namespace
+
+RigCamera Calibration::camera(std::size_t index, const std::optional<CameraSize>& sensor) const {
+  if (index >= rig.cameras.size()) {
+    throw std::invalid_argument(
+        fmt::format("{}: {}, but the recording has camera {}: expected one for each", file.string(),
+                    camerasInWords(rig.cameras.size()), index));
+  }
+  RigCamera camera = rig.cameras[index];
+  const CameraSize size = {camera.model.width, camera.model.height};
+  if (size.width == 0) {
+    if (!sensor) {
+      throw std::invalid_argument(file.string() +
+                                  ": no size of the sensor, and the recording does not say it: "
+                                  "expected a camera chain with resolution");
+    }
+    camera.model.width = sensor->width;
+    camera.model.height = sensor->height;
+  } else if (sensor && (sensor->width != size.width || sensor->height != size.height)) {
+    throw std::invalid_argument(
+        fmt::format("{}: camera {} has {}x{} pixels: expected {}x{} pixels, as the recording has",
+                    file.string(), index, size.width, size.height, sensor->width, sensor->height));
+  }
+  return camera;
+}
+
+void Calibration::requireCameras(std::size_t count) const {
+  if (rig.cameras.size() == count) return;
+  throw std::invalid_argument(fmt::format("{}: {}: expected {}, as the recording has",
+                                          file.string(), camerasInWords(rig.cameras.size()),
+                                          count));
+}
+
+void Calibration::requireLike(const Rig& recorded) const {
+  for (std::size_t i = 0; i < recorded.cameras.size(); ++i) {
+    camera(i, knownSize(recorded.cameras[i].model));
+  }
+  requireCameras(recorded.cameras.size());
+}
+
+Calibration readCalibration(const std::filesystem::path& file) {
+  const std::string text = readText(file);
+  if (looksLikeIni(text)) return {file, readMrptCameras(text, file)};
+  if (!parseNumber<double>(firstWord(text))) return readYamlCalibration(file);
+  return readUzhCalibration(file);
+}
+
+CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size) {
+  const std::vector<double> numbers = readNumbers(file);
+  if (numbers.size() != 9) {
+    throw std::runtime_error(fmt::format("{}: {} numbers: expected 9, fx fy cx cy k1 k2 p1 p2 k3",
+                                         file.string(), numbers.size()));
+  }
+  CameraModel model;
+  model.width = size.width;
+  model.height = size.height;
+  model.fx = numbers[0];
+  model.fy = numbers[1];
+  model.cx = numbers[2];
+  model.cy = numbers[3];
+  model.distortion = DistortionModel::kRadtan;
+  model.coefficients.assign(numbers.begin() + 4, numbers.end());
+  try {
+    model.validate();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(file.string() + ": " + error.what());
+  }
+  return model;
+}
+
+Calibration readUzhCalibration(const std::filesystem::path& file) {
+  CameraModel model = readUzhCalibration(file, {1, 1});  // any size: it is not in the file
+  model.width = 0;
+  model.height = 0;
+  return {file, {{{model, {}, 0}}}};
+}
+
+}  // namespace efm

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/calibration/yaml_entry.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
+#include <utility>
+
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
+#include "mapping/geometry/rounded_rotation.h"
+
+namespace efm {
+namespace {
+
+std::string placeOf(const std::string& file, const YAML::Mark& mark) {
+  return mark.is_null() ? file : fmt::format("{}:{}", file, mark.line + 1);
+}
+
+/// yaml-cpp would read it as the locale of the host program has it.
+std::optional<double> finiteIn(const YAML::Node& node) {
+  std::string_view text = node.Scalar();
+  if (text.substr(0, 1) == "+" && text.substr(1, 1) != "-") text.remove_prefix(1);
+  return parseFinite(text);
+}
+
+}  // namespace
+
+YamlEntry::YamlEntry(std::string file, std::string name, const YAML::Node& node)
+    : file_(std::move(file)), name_(std::move(name)), node_(node) {
+  if (!node_.IsMap()) throw fail("expected keys and values");
+}
+
+std::string YamlEntry::text(const char* key) const {
+  const YAML::Node value = find(key);
+  if (!value.IsScalar()) throw fail(value, fmt::format("{}: expected a word", key));
+  return value.Scalar();
+}
+
+std::vector<double> YamlEntry::numbers(const char* key, std::size_t count,
+                                       const char* expected) const {
+  return numbersIn(find(key), key, count, expected);
+}
+
+double YamlEntry::number(const char* key) const {
+  const YAML::Node value = find(key);
+  if (const auto number = finiteIn(value)) return *number;
+  throw failNode(value, key, "a finite number");
+}
+
+Eigen::MatrixXd YamlEntry::matrix(const char* key, int rows, int columns) const {
+  const std::string expected =
+      fmt::format("{}rows of {} numbers", rows == 0 ? "" : fmt::format("{} ", rows), columns);
+  const YAML::Node list = find(key);
+  if (!list.IsSequence() || (rows != 0 && list.size() != static_cast<std::size_t>(rows))) {
+    throw failNode(list, key, expected);
+  }
+  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(list.size()), columns);
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    const std::vector<double> values =
+        numbersIn(list[static_cast<std::size_t>(row)], key, static_cast<std::size_t>(columns),
+                  expected.c_str());
+    matrix.row(row) = Eigen::RowVectorXd::Map(values.data(), columns);
+  }
+  return matrix;
+}
+
+Eigen::Quaterniond YamlEntry::rotationIn(const Eigen::Matrix3d& matrix, const char* key) const {
+  if (const auto rotation = rotationNear(matrix)) return *rotation;
+  const double error =
+      (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  const std::string found =
+      error > 1e-3 ? fmt::format("a matrix whose columns are off orthonormal by {:f}", error)
+                   : "a reflection";
+  throw failKey(key, found, "a rotation, to 0.001");
+}
+
+Eigen::Quaterniond YamlEntry::rotation(const char* key) const {
+  return rotationIn(matrix(key, 3, 3), key);
+}
+
+Rigid3 YamlEntry::transform(const char* key) const {
+  const Eigen::Matrix4d T_a_b = matrix(key, 4, 4);
+  const Eigen::Quaterniond rotation = rotationIn(T_a_b.topLeftCorner<3, 3>(), key);
+  if (T_a_b.row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+    throw failKey(key, "a matrix with another last row", "0 0 0 1 there");
+  }
+  return {rotation, T_a_b.topRightCorner<3, 1>()};
+}
+
+std::string YamlEntry::nameOf(const std::string& part) const {
+  return name_.empty() ? part : fmt::format("{}: {}", name_, part);
+}
+
+YamlEntry YamlEntry::section(const char* key) const { return {file_, nameOf(key), find(key)}; }
+
+YamlEntry YamlEntry::item(const char* key, std::size_t index) const {
+  const YAML::Node list = find(key);
+  if (!list.IsSequence() || list.size() <= index) {
+    throw failNode(list, key, fmt::format("a list of at least {} items", index + 1));
+  }
+  return {file_, nameOf(fmt::format("{}[{}]", key, index)), list[index]};
+}
+
+YAML::Node YamlEntry::find(const char* key) const {
+  const YAML::Node value = node_[key];
+  if (!value) throw fail(fmt::format("{} is missing", key));
+  return value;
+}
+
+std::vector<double> YamlEntry::numbersIn(const YAML::Node& list, const char* key, std::size_t count,
+                                         const char* expected) const {
+  if (!list.IsSequence()) throw failNode(list, key, expected);
+  std::vector<double> values;
+  for (const YAML::Node& item : list) {
+    const auto number = finiteIn(item);
+    if (!number) throw failNode(item, key, "finite numbers");
+    values.push_back(*number);
+  }
+  if (count == 0 || values.size() == count) return values;
+  throw fail(list, fmt::format("{}: {} numbers: expected {}", key, values.size(), expected));
+}
+
+std::runtime_error YamlEntry::failKey(const char* key, std::string_view found,
+                                      std::string_view expected) const {
+  return fail(find(key), fmt::format("{} = {}: expected {}", key, found, expected));
+}
+
+std::runtime_error YamlEntry::failNode(const YAML::Node& node, const char* key,
+                                       std::string_view expected) const {
+  const std::string found = node.IsScalar()     ? inQuotes(node.Scalar())
+                            : node.IsSequence() ? "a list"
+                            : node.IsMap()      ? "keys"
+                                                : "nothing";
+  return fail(node, fmt::format("{} = {}: expected {}", key, found, expected));
+}
+
+std::runtime_error YamlEntry::fail(const YAML::Node& node, std::string_view what) const {
+  return std::runtime_error(fmt::format("{}: {}{}{}", placeOf(file_, node.Mark()), name_,
+                                        name_.empty() ? "" : ": ", what));
+}
+
+YAML::Node loadYaml(const std::string& file) {
+  try {
+    return YAML::LoadFile(file);
+  } catch (const YAML::BadFile&) {
+    throw std::runtime_error(file + ": cannot be opened for reading");
+  } catch (const YAML::Exception& error) {
+    throw std::runtime_error(fmt::format("{}: not YAML: {}", placeOf(file, error.mark), error.msg));
+  }
+}
+
+}  // namespace efm

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/columns/evimo2.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "mapping/geometry/tum_trajectory.h"
+#include "plugin/recordings/columns/array_events.h"
+#include "plugin/recordings/streams/source_files.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr CameraSize kEvimo2Size = {640, 480};
+
+/// The data set's layout is CAMERA/CATEGORY/SUBCATEGORY/SEQUENCE.
+bool isSamsung(const fs::path& folder) {
+  std::error_code ignored;
+  const fs::path absolute = fs::absolute(folder, ignored);
+  return std::any_of(absolute.begin(), absolute.end(),
+                     [](const fs::path& part) { return part.string().rfind("samsung", 0) == 0; });
+}
+
+/// The size of the first array of dataset_depth.npz.
+std::optional<CameraSize> sizeOfDepth(const fs::path& folder) {
+  const fs::path file = folder / "dataset_depth.npz";
+  if (!isFile(file)) return std::nullopt;
+  const std::vector<std::string> members = membersOf(file);
+  if (members.empty()) return std::nullopt;
+  const NpyArray array(file, members.front());
+  const std::vector<std::uint64_t>& shape = array.header().shape;
+  if (shape.size() != 2 || shape[0] - 1 >= 65'535 || shape[1] - 1 >= 65'535) return std::nullopt;
+  return CameraSize{static_cast<int>(shape[1]), static_cast<int>(shape[0])};
+}
+
+std::vector<double> numbersOf(NpyArray array, std::size_t max_count) {
+  if (array.header().count() > max_count) {
+    throw std::runtime_error(fmt::format("{}: {} numbers: expected at most {}", array.name(),
+                                         array.header().count(), max_count));
+  }
+  std::vector<double> numbers;
+  const std::size_t rows = array.readRows(max_count);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < array.columns(); ++column) {
+      numbers.push_back(array.number(row, column));
+    }
+  }
+  return numbers;
+}
+
+/// The camera's model, without the sensor's size.
+CameraModel modelOf(const fs::path& info) {
+  const std::vector<double> k = numbersOf(NpyArray(info, "K.npy"), 9);
+  if (k.size() != 9) throw std::runtime_error(info.string() + "/K.npy: expected 3 x 3 numbers");
+  CameraModel model;
+  model.width = kEvimo2Size.width;
+  model.height = kEvimo2Size.height;
+  model.fx = k[0];
+  model.cx = k[2];
+  model.fy = k[4];
+  model.cy = k[5];
+  model.distortion = DistortionModel::kRadtan;
+  model.coefficients = numbersOf(NpyArray(info, "D.npy"), 5);
+  try {
+    model.validate();
+  } catch (const std::invalid_argument& error) {
+    throw std::runtime_error(fmt::format("{}: {}", info.string(), error.what()));
+  }
+  model.width = 0;
+  model.height = 0;
+  return model;
+}
+
+std::unique_ptr<EventStream> eventsOf(const fs::path& folder, const ReaderOptions& options) {
+  const auto t = std::make_shared<NpyArray>(folder / "dataset_events_t.npy");
+  const auto xy = std::make_shared<NpyArray>(folder / "dataset_events_xy.npy");
+  const auto p = std::make_shared<NpyArray>(folder / "dataset_events_p.npy");
+  const auto require_shape = [&](const NpyArray& array, std::size_t columns) {
+    if (array.rows() == t->rows() && (array.columns() == columns || array.rows() == 0)) return;
+    throw std::runtime_error(fmt::format("{}: {} rows of {} numbers: expected {} of {}",
+                                         array.name(), array.rows(), array.columns(), t->rows(),
+                                         columns));
+  };
+  require_shape(*t, 1);
+  require_shape(*xy, 2);
+  require_shape(*p, 1);
+  NpyEventColumns columns = {{t, 0}, {xy, 0}, {xy, 1}, {p, 0}, {}, false, {}, {}};
+  if (t->isReal()) columns.time_exponent = 0;
+  columns.inverted = isSamsung(folder);
+  columns.size = sizeOfDepth(folder);
+  return std::make_unique<ArrayEvents>(std::move(columns), options);
+}
+
+}  // namespace
+
+bool looksLikeEvimo2(const fs::path& folder) { return isFile(folder / "dataset_events_t.npy"); }
+
+RecordingParts openEvimo2(const std::vector<fs::path>& folders, const ReaderOptions& options) {
+  RecordingParts parts;
+  parts.default_size = kEvimo2Size;
+  parts.expected_poses = "poses.txt, from dataset_info.npz (docs/recordings.md)";
+  for (const fs::path& folder : folders) {
+    parts.cameras.push_back(eventsOf(folder, options));
+    if (parts.poses.empty() && isFile(folder / "poses.txt")) {
+      parts.poses = readPosesFile(folder / "poses.txt");
+    }
+  }
+  const fs::path info = folders.front() / "dataset_info.npz";
+  if (folders.size() == 1 && isFile(info)) {
+    parts.calibration = Calibration{info, {{{modelOf(info), {}, 0}}}};
+  } else {
+    parts.expected_calibration =
+        folders.size() == 1 ? "dataset_info.npz" : "one of all cameras (docs/recordings.md)";
+  }
+  return parts;
+}
+
+}  // namespace efm

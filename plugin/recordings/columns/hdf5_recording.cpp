@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/columns/hdf5_recording.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "mapping/base/quoted_text.h"
+#include "mapping/geometry/rounded_rotation.h"
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/columns/hdf5_events.h"
+#include "plugin/recordings/columns/hdf5_files.h"
+#include "plugin/recordings/streams/number_checks.h"
+#include "plugin/recordings/streams/time_unit.h"
+#include "plugin/recordings/text/dataset_folder.h"
+#include "plugin/recordings/text/event_columns.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Poses in HDF5: 4x4 matrices and their times.
+struct Hdf5Poses {
+  const char* matrices;
+  const char* times;
+  std::int64_t time_unit_ns;
+  bool inverse;  ///< The matrices are T_body_world.
+};
+
+constexpr Hdf5Poses kPoses[] = {
+    {"/davis/left/pose", "/davis/left/pose_ts", kNanosecondsPerSecond, false},
+    {"/Cn_T_C0", "/ts", kNanosecondsPerMicrosecond, true},
+};
+
+constexpr std::size_t kMatrixNumbers = 16;
+
+/// A transform from the rows of a 4x4 matrix; nothing if it is none.
+std::optional<Rigid3> transformOf(const double* rows) {
+  return transformNear(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(rows));
+}
+
+constexpr const char* kExpectedRigid = "a 4x4 matrix of a rotation and a translation";
+
+std::vector<StampedPose> readPoses(const std::shared_ptr<const Hdf5File>& file,
+                                   const Hdf5Poses& poses) {
+  const auto matrices = std::make_shared<Hdf5Rows>(file, poses.matrices);
+  const auto times = std::make_shared<Hdf5Rows>(file, poses.times);
+  if (matrices->rowNumbers() != kMatrixNumbers || matrices->size() != times->size()) {
+    throw matrices->fail(
+        fmt::format("{} rows of {} numbers: expected {} matrices of 4x4 numbers, "
+                    "as many as {} has",
+                    matrices->size(), matrices->rowNumbers(), times->size(), poses.times));
+  }
+  const Hdf5Column time = Hdf5Column::ofMatrix(times, 0);
+  std::vector<Hdf5Column> numbers;
+  for (std::size_t k = 0; k < kMatrixNumbers; ++k) {
+    numbers.push_back(Hdf5Column::ofMatrix(matrices, k));
+  }
+  std::vector<StampedPose> read;
+  for (std::uint64_t i = 0; i < times->size(); ++i) {
+    StampedPose pose;
+    time.forEach(i, 1, [&](std::size_t, auto number) {
+      const auto t_ns = nanoseconds(number, poses.time_unit_ns);
+      if (!t_ns) throw times->failAt(i, fmt::format("{}: expected {}", number, kExpectedTime));
+      pose.t_ns = *t_ns;
+      return true;
+    });
+    double rows[kMatrixNumbers];
+    for (std::size_t k = 0; k < kMatrixNumbers; ++k) {
+      numbers[k].forEach(i, 1, [&](std::size_t, auto number) {
+        rows[k] = static_cast<double>(number);
+        return true;
+      });
+    }
+    const std::optional<Rigid3> transform = transformOf(rows);
+    if (!transform) throw matrices->failAt(i, fmt::format("expected {}", kExpectedRigid));
+    pose.T_world_rig = poses.inverse ? transform->inverse() : *transform;
+    read.push_back(pose);
+  }
+  return read;
+}
+
+/// M3ED's calibration of a camera.
+RigCamera readCalib(const Hdf5File& file, const std::string& group) {
+  RigCamera camera;
+  CameraModel& model = camera.model;
+  const std::vector<double> resolution = file.numbers(group + "/resolution", 2, "width and height");
+  for (const double side : resolution) {
+    if (side < 1 || side > 65'535 || std::floor(side) != side) {
+      throw file.fail(group + "/resolution",
+                      fmt::format("{}: expected whole numbers from 1 to 65535", side));
+    }
+  }
+  model.width = static_cast<int>(resolution[0]);
+  model.height = static_cast<int>(resolution[1]);
+  const std::vector<double> intrinsics = file.numbers(group + "/intrinsics", 4, "fx fy cx cy");
+  model.fx = intrinsics[0];
+  model.fy = intrinsics[1];
+  model.cx = intrinsics[2];
+  model.cy = intrinsics[3];
+  const std::string distortion = file.text(group + "/distortion_model");
+  try {
+    model.distortion = distortionModelFromName(distortion);
+  } catch (const std::invalid_argument&) {
+    throw file.fail(group + "/distortion_model",
+                    inQuotes(distortion) + ": expected radtan, equidistant or none");
+  }
+  if (model.distortion != DistortionModel::kNone) {
+    model.coefficients = file.numbers(group + "/distortion_coeffs", 4, "k1 k2 and two more");
+  }
+  const std::string transform = group + "/T_to_prophesee_left";
+  const std::optional<Rigid3> T_rig_cam =
+      transformOf(file.numbers(transform, kMatrixNumbers, kExpectedRigid).data());
+  if (!T_rig_cam) throw file.fail(transform, fmt::format("expected {}", kExpectedRigid));
+  camera.T_rig_cam = *T_rig_cam;
+  try {
+    camera.validate();
+  } catch (const std::invalid_argument& error) {
+    throw file.fail(group, error.what());
+  }
+  return camera;
+}
+
+/// Metavision's attribute.
+std::optional<CameraSize> sizeOfAttribute(const Hdf5File& file) {
+  const std::optional<std::string> text = file.attribute("geometry");
+  return text ? cameraSizeOf(*text) : std::nullopt;
+}
+
+/// Adds the cameras of a layout. @return whether the file has any.
+bool addCameras(const std::shared_ptr<const Hdf5File>& file, const Hdf5Layout& layout,
+                const ReaderOptions& options, RecordingParts& parts) {
+  Calibration calibration{file->path(), {}};
+  std::size_t count = 0;
+  for (const std::string& camera : layout.cameras) {
+    if (!file->has(camera + layout.signature())) continue;
+    std::optional<CameraSize> size = layout.size ? layout.size : sizeOfAttribute(*file);
+    if (const std::string calib = camera + "/calib"; file->has(calib)) {
+      const RigCamera calibrated = readCalib(*file, calib);
+      size = CameraSize{calibrated.model.width, calibrated.model.height};
+      calibration.rig.cameras.push_back(calibrated);
+    }
+    parts.cameras.push_back(std::make_unique<Hdf5EventStream>(file, layout, camera, size, options));
+    ++count;
+  }
+  // Without the first camera, T_rig_cam of the others has another rig.
+  if (count > 0 && calibration.rig.cameras.size() == count && !parts.calibration &&
+      isSame(calibration.rig.cameras.front().T_rig_cam, Rigid3())) {
+    parts.calibration = std::move(calibration);
+  }
+  return count > 0;
+}
+
+/// The layout of the data sets, or of the fields of a compound data set, with given names.
+Hdf5Layout namedLayout(const Hdf5File& file, const EventNames& names) {
+  Hdf5Layout layout = {"--event-columns", {""}, "", {}, 0, "", "", std::nullopt};
+  const std::string* const all[] = {&names.x, &names.y, &names.t, &names.p};
+  for (std::size_t i = 0; i < layout.columns.size(); ++i) {
+    layout.columns[i] = (all[i]->front() == '/' ? "" : "/") + *all[i];
+  }
+  const std::string parent = fs::path(layout.columns[0]).parent_path().string();
+  if (file.has(layout.columns[0]) || !file.has(parent)) return layout;
+  layout.events = parent;
+  for (std::string& column : layout.columns) {
+    const fs::path path = column;
+    if (path.parent_path() != parent) throw file.fail(column, "expected a field of " + parent);
+    column = path.filename().string();
+  }
+  return layout;
+}
+
+/// Adds the cameras of the layout that the option names, or of the known layouts.
+bool addEvents(const std::shared_ptr<const Hdf5File>& file, const ReaderOptions& options,
+               RecordingParts& parts) {
+  const std::optional<EventNames> names = eventNamesOf(options.columns);
+  if (names) {
+    const Hdf5Layout layout = namedLayout(*file, *names);
+    ReaderOptions named = options;
+    const auto exponent = headerWord(fs::path(names->t).filename().string()).time_exponent;
+    if (named.time_unit.empty() && exponent) named.time_unit = timeUnitOf(*exponent);
+    if (addCameras(file, layout, named, parts)) return true;
+  }
+  bool any = false;
+  for (const Hdf5Layout& layout : hdf5Layouts()) {
+    any = addCameras(file, layout, options, parts) || any;
+  }
+  if (any && names) throw file->fail("/" + names->x, "no such data set (--event-columns)");
+  return any;
+}
+
+/// @return whether the file has events or poses.
+bool addFile(const fs::path& path, const ReaderOptions& options, RecordingParts& parts) {
+  const auto file = std::make_shared<const Hdf5File>(path);
+  bool any = addEvents(file, options, parts);
+  for (const Hdf5Poses& poses : kPoses) {
+    if (!file->has(poses.matrices)) continue;
+    any = true;
+    // M3ED repeats the poses in the file of the depth maps.
+    if (parts.poses.empty()) parts.poses = readPoses(file, poses);
+  }
+  return any;
+}
+
+[[noreturn]] void refuse(const fs::path& path) {
+  std::string expected;
+  for (const Hdf5Layout& layout : hdf5Layouts()) {
+    expected += fmt::format("{}{} ({}), ", layout.cameras.front(), layout.signature(), layout.name);
+  }
+  throw std::runtime_error(
+      fmt::format("{}: an HDF5 file without events or poses: expected {}others by "
+                  "--event-columns \"t=PATH x=PATH y=PATH p=PATH\", or poses, {} (MVSEC) or {} "
+                  "(M3ED)",
+                  path.string(), expected, kPoses[0].matrices, kPoses[1].matrices));
+}
+
+void addFolder(const fs::path& folder, const ReaderOptions& options, RecordingParts& parts) {
+  bool any = false;
+  std::map<std::string, fs::path> files;  // with events, of each side
+  for (const auto& [side, file] : hdf5FilesIn(folder)) {
+    const std::size_t cameras = parts.cameras.size();
+    any = addFile(file, options, parts) || any;
+    if (parts.cameras.size() == cameras) continue;
+    const auto [other, is_new] = files.emplace(side, file);
+    if (!is_new) {
+      throw std::runtime_error(
+          fmt::format("{}: events of a second recording, beside {}: expected "
+                      "a folder of one recording",
+                      file.string(), other->second.string()));
+    }
+  }
+  if (!any) refuse(folder);
+  addFolderFiles(folder, options, parts);
+}
+
+}  // namespace
+
+RecordingParts openHdf5(const std::vector<fs::path>& sources, const ReaderOptions& options) {
+  RecordingParts parts;
+  for (const fs::path& source : sources) {
+    std::error_code ignored;
+    if (!fs::is_directory(source, ignored)) {
+      if (!addFile(source, options, parts)) refuse(source);
+      continue;
+    }
+    addFolder(source, options, parts);
+  }
+  return parts;
+}
+
+}  // namespace efm

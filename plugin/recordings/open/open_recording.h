@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/streams/event_packets.h"
+#include "plugin/recordings/streams/recording_parts.h"
+#include "tracking_stub/faults/tracker_faults.h"
+
+namespace efm {
+
+/// A recording, and files that replace its poses, calibration or hand-eye transform. The recording
+/// needs none of its own then.
+struct RecordingSource {
+  std::vector<std::filesystem::path> files;  ///< Files and folders of one recording.
+  std::string format = "auto";               ///< One of `recordingFormats`. "auto": detected.
+  std::filesystem::path poses;               ///< See `readPoses`. Empty: the recording's.
+  std::filesystem::path calibration;         ///< See `readCalibration`. Empty: the recording's.
+  std::filesystem::path hand_eye;            ///< See `readHandEye`. Empty: the recording's.
+  /// Where and how these two were given, for errors. Empty: as --calibration and --hand-eye.
+  std::string calibration_given;
+  std::string hand_eye_given;
+  TrackerFaults faults;  ///< Of the poses (CObservationRobotPose).
+  /// Calibration and hand-eye transform replace those of the observations. Otherwise they are used
+  /// only if the recording has none, and a map builder's options replace the others.
+  bool override_rig = true;
+
+  ReaderOptions reader;
+  /// The number of bad events of the whole recording that are left out. One more is an error.
+  std::uint64_t skip_bad_events = 0;
+  std::int64_t packet_ns = kPacketPeriodNs;  ///< Length of the packets of events, above 0.
+  /// Events outside [start_ns, end_ns) are left out, most of them without being read. A rawlog has
+  /// no index and is read whole.
+  std::optional<std::int64_t> start_ns;
+  std::optional<std::int64_t> end_ns;
+  /// Whether the only source may be a named pipe, from which a rawlog is read once. To open it
+  /// waits for the program that writes.
+  bool allow_pipe = false;
+  /// Whether missing poses, or a missing calibration, are an error. Cameras without a calibration
+  /// have a model without a focal length.
+  bool complete = true;
+};
+
+/// The names of all formats, "auto" first.
+std::vector<std::string> recordingFormats();
+
+/// Opens a recording: a rawlog, or the files and folders of `readerFormats`, whose cameras and
+/// poses are put together in the order of the files.
+/// @throws std::runtime_error naming the missing or wrong file and the expected ones;
+/// std::invalid_argument if the calibration is of other cameras or the faults are not valid.
+std::unique_ptr<Recording> openRecording(const RecordingSource& source);
+
+/// The depth maps of the recording's truth, if it has any that is read: that of the formats with
+/// `RecordingFormat::truth`. Opens no events.
+/// @throws std::runtime_error naming the file and the line that is wrong.
+std::vector<TruthDepth> openTruth(const RecordingSource& source);
+
+}  // namespace efm

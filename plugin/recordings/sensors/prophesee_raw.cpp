@@ -1,0 +1,299 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/sensors/prophesee_raw.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
+#include "plugin/recordings/streams/source_files.h"
+
+namespace efm {
+namespace {
+
+constexpr std::size_t kRawBlockBytes = std::size_t{1} << 18U;  // whole words of every encoding
+constexpr std::size_t kMaxRawHeaderBytes = std::size_t{1} << 16U;
+/// The EVT 3.0 clock is at most two periods ahead of a TIME_HIGH, also if the next one is late.
+constexpr std::int64_t kMaxAheadNs = 2 * 4'096'000;
+
+/// A side of the sensor in pixels.
+std::optional<int> sideOf(std::string_view text) {
+  constexpr int kMaxSide = 65'535;
+  const std::optional<int> side = parseNumber<int>(text);
+  return side && *side > 0 && *side <= kMaxSide ? side : std::nullopt;
+}
+
+/// Cameras by the beginning of a value in the header: of a generation, or of one system.
+struct KnownCamera {
+  std::string_view key;
+  std::string_view value;
+  CameraSize size;
+};
+constexpr KnownCamera kKnownCameras[] = {
+    {"plugin_name", "hal_plugin_gen3_", {640, 480}},
+    {"plugin_name", "hal_plugin_gen31_", {640, 480}},
+    {"plugin_name", "hal_plugin_gen4_", {1280, 720}},
+    {"plugin_name", "hal_plugin_gen41_", {1280, 720}},
+    {"system_ID", "21", {640, 480}},
+    {"system_ID", "48", {1280, 720}},
+};
+
+std::optional<CameraSize> sizeOfCamera(std::string_view key, std::string_view value) {
+  for (const KnownCamera& camera : kKnownCameras) {
+    const bool generation = camera.value.back() == '_';
+    if (key == camera.key &&
+        (generation ? value.substr(0, camera.value.size()) : value) == camera.value) {
+      return camera.size;
+    }
+  }
+  return std::nullopt;
+}
+
+/// The first bytes of a file, of at most the size of a header.
+std::string beginningOf(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  std::string text(kMaxRawHeaderBytes, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return text;
+}
+
+/// Parses the lines of a header one after the other.
+class RawHeaderParser {
+ public:
+  RawHeaderParser(const std::filesystem::path& file, std::string_view text)
+      : file_(file), text_(text) {}
+
+  RawHeader parse() {
+    RawHeader header;
+    while (nextLine()) {
+      const std::size_t blank = line_.find(' ');
+      const std::string_view key = line_.substr(0, blank);
+      const std::string_view value =
+          blank == std::string_view::npos ? std::string_view() : trimmed(line_.substr(blank));
+      if (key == "end") break;
+      if (key == "evt") takeVersion(value);
+      if (key == "format") takeFormat(value, header);
+      if (key == "geometry") takeGeometry(value, header);
+      if (key == "endianness") takeOrder(value);
+      if (!camera_size_) camera_size_ = sizeOfCamera(key, value);
+    }
+    if (!header.size) header.size = camera_size_;
+    if (!encoding_) {
+      throw std::runtime_error(
+          fmt::format("{}: no encoding: expected a RAW file with a line '% evt 3.0', 2.0 or 2.1 in "
+                      "its header",
+                      file_.string()));
+    }
+    header.encoding =
+        *encoding_ == EvtEncoding::kEvt21 && legacy_order_ ? EvtEncoding::kEvt21Legacy : *encoding_;
+    header.bytes = at_;
+    return header;
+  }
+
+ private:
+  /// A line of a header begins with "% " and is text; words of events that begin so are neither.
+  bool nextLine() {
+    if (text_.substr(at_, 2) != "% ") return false;
+    const std::size_t newline = text_.find('\n', at_);
+    if (newline == std::string_view::npos) return false;
+    line_ = trimmed(text_.substr(at_ + 2, newline - at_ - 2));
+    const auto is_control = [](char c) { return static_cast<unsigned char>(c) < 32 && c != '\t'; };
+    if (std::any_of(line_.begin(), line_.end(), is_control)) return false;
+    at_ = newline + 1;
+    ++number_;
+    return true;
+  }
+
+  void takeVersion(std::string_view value) {
+    constexpr std::array<std::pair<std::string_view, EvtEncoding>, 3> kVersions = {
+        {{"2.0", EvtEncoding::kEvt2}, {"2.1", EvtEncoding::kEvt21}, {"3.0", EvtEncoding::kEvt3}}};
+    takeNamed(kVersions, "evt", value, "2.0, 2.1 or 3.0");
+  }
+
+  /// "EVT3;height=720;width=1280"
+  void takeFormat(std::string_view value, RawHeader& header) {
+    constexpr std::array<std::pair<std::string_view, EvtEncoding>, 3> kFormats = {
+        {{"EVT2", EvtEncoding::kEvt2},
+         {"EVT21", EvtEncoding::kEvt21},
+         {"EVT3", EvtEncoding::kEvt3}}};
+    const std::vector<std::string_view> parts = splitWords(value, ";");
+    takeNamed(kFormats, "format", parts.empty() ? value : parts.front(), "EVT2, EVT21 or EVT3");
+    CameraSize size;
+    for (const std::string_view part : parts) {
+      const std::size_t equal = part.find('=');
+      if (equal == std::string_view::npos) continue;
+      const std::string_view key = part.substr(0, equal);
+      const std::string_view number = part.substr(equal + 1);
+      if (key == "endianness") takeOrder(number);
+      if (key == "width" || key == "height") {
+        const std::optional<int> side = sideOf(number);
+        if (!side) throw fail(key, number, "a number of pixels from 1 to 65535");
+        (key == "width" ? size.width : size.height) = *side;
+      }
+    }
+    if (size.width > 0 && size.height > 0) header.size = size;
+  }
+
+  void takeGeometry(std::string_view value, RawHeader& header) {
+    const std::size_t cross = value.find('x');
+    const std::optional<int> width = sideOf(value.substr(0, cross));
+    const std::optional<int> height =
+        cross == std::string_view::npos ? std::nullopt : sideOf(value.substr(cross + 1));
+    if (!width || !height) throw fail("geometry", value, "WIDTHxHEIGHT in pixels");
+    header.size = CameraSize{*width, *height};
+  }
+
+  void takeOrder(std::string_view value) {
+    if (value != "little" && value != "legacy") {
+      throw fail("endianness", value, "little or legacy");
+    }
+    legacy_order_ = value == "legacy";
+  }
+
+  template <typename Names>
+  void takeNamed(const Names& names, std::string_view key, std::string_view value,
+                 const char* expected) {
+    const auto found = std::find_if(names.begin(), names.end(),
+                                    [&](const auto& named) { return named.first == value; });
+    if (found == names.end()) throw fail(key, value, expected);
+    encoding_ = found->second;
+  }
+
+  std::runtime_error fail(std::string_view key, std::string_view value,
+                          const char* expected) const {
+    return std::runtime_error(fmt::format("{}:{}: {} = {}: expected {}", file_.string(), number_,
+                                          key, inQuotes(value), expected));
+  }
+
+  const std::filesystem::path& file_;
+  std::string_view text_;
+  std::size_t at_ = 0;
+  std::string_view line_;
+  int number_ = 0;
+  std::optional<EvtEncoding> encoding_;
+  bool legacy_order_ = false;
+  std::optional<CameraSize> camera_size_;  // of a camera that the header names
+};
+
+std::ifstream openRaw(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream || !isFile(file)) {
+    throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  }
+  return stream;
+}
+
+}  // namespace
+
+PropheseeRawStream::PropheseeRawStream(std::filesystem::path file)
+    : file_(std::move(file)),
+      stream_(openRaw(file_)),
+      bytes_total_(std::filesystem::file_size(file_)),
+      header_(RawHeaderParser(file_, beginningOf(file_)).parse()),
+      decoder_(header_.encoding),
+      at_block_(decoder_),
+      block_byte_(header_.bytes) {
+  stream_.seekg(static_cast<std::streamoff>(header_.bytes));
+}
+
+/// Reads the block behind the current one. @return false at the end.
+bool PropheseeRawStream::readBlock() {
+  block_byte_ += block_.size();
+  block_.resize(
+      std::min<std::uint64_t>(kRawBlockBytes, bytes_total_ - std::min(block_byte_, bytes_total_)));
+  stream_.read(reinterpret_cast<char*>(block_.data()), static_cast<std::streamsize>(block_.size()));
+  block_.resize(static_cast<std::size_t>(stream_.gcount()));
+  if (stream_.bad()) throw std::runtime_error(file_.string() + ": cannot be read to its end");
+  return !block_.empty();
+}
+
+bool PropheseeRawStream::read(std::vector<Event>& events) {
+  events.clear();
+  at_block_ = decoder_;
+  if (readBlock()) {
+    decoder_.decode(block_.data(), block_.size(), events);
+    return true;
+  }
+  if (decoder_.incompleteBytes() > 0) {
+    throw std::runtime_error(
+        fmt::format("{}{} bytes of a word: expected all {}, but the file ends within it",
+                    place(block_byte_ - decoder_.incompleteBytes()), decoder_.incompleteBytes(),
+                    decoder_.wordBytes()));
+  }
+  if (!decoder_.hasTime() && decoder_.undatedEvents() > 0) {
+    throw std::runtime_error(
+        fmt::format("{}{} events without a time: expected words TIME_HIGH before them",
+                    place(block_byte_), decoder_.undatedEvents()));
+  }
+  return false;
+}
+
+void PropheseeRawStream::seek(std::int64_t t_ns) {
+  // `scan` reaches the time in the current block. Decoding starts a block earlier: what an event
+  // needs beside the TIME_HIGH words, its row for instance, comes from there.
+  EvtDecoder scan(header_.encoding);
+  EvtDecoder at_last = scan;
+  std::uint64_t last_byte = header_.bytes;
+  std::uint64_t start_byte = header_.bytes;
+  while (readBlock()) {
+    decoder_ = std::exchange(at_last, scan);
+    start_byte = std::exchange(last_byte, block_byte_);
+    scan.scanTime(block_.data(), block_.size());
+    if (scan.timeHighNs() + kMaxAheadNs >= t_ns) break;
+  }
+  from_beginning_ = false;
+  stream_.clear();
+  stream_.seekg(static_cast<std::streamoff>(start_byte));
+  block_.clear();
+  block_byte_ = start_byte;
+}
+
+std::string PropheseeRawStream::positionOf(std::size_t index) const {
+  EvtDecoder decoder = at_block_;
+  std::vector<Event> events;
+  std::size_t at = 0;
+  while (at < block_.size()) {
+    const std::size_t word = std::min(decoder.wordBytes(), block_.size() - at);
+    decoder.decode(block_.data() + at, word, events);
+    if (events.size() > index) break;
+    at += word;
+  }
+  return fmt::format("{}: byte {}", file_.string(), block_byte_ + at);
+}
+
+double PropheseeRawStream::progress() const {
+  if (bytes_total_ == 0) return 0;
+  return static_cast<double>(block_byte_ + block_.size()) / static_cast<double>(bytes_total_);
+}
+
+std::string PropheseeRawStream::place(std::uint64_t byte) const {
+  return fmt::format("{}: byte {}: ", file_.string(), byte);
+}
+
+bool looksLikePropheseeRaw(const std::filesystem::path& file) {
+  if (!isFile(file)) return false;
+  const std::string text = beginningOf(file);
+  const std::size_t lines_end = text.rfind('\n');
+  const std::string_view lines = std::string_view(text).substr(0, lines_end);
+  return lines.substr(0, 2) == "% " && (lines.find("% evt ") != std::string_view::npos ||
+                                        lines.find("% format EVT") != std::string_view::npos);
+}
+
+RecordingParts openPropheseeRaw(const std::vector<std::filesystem::path>& files,
+                                const ReaderOptions&) {
+  RecordingParts parts;
+  for (const std::filesystem::path& file : files) {
+    parts.cameras.push_back(std::make_unique<PropheseeRawStream>(file));
+  }
+  return parts;
+}
+
+}  // namespace efm

@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/streams/time_unit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <stdexcept>
+
+#include "mapping/base/text_parsing.h"
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/number_checks.h"
+
+namespace efm {
+
+namespace {
+
+constexpr std::array<int, 4> kExponents = {0, -3, -6, -9};
+
+/// The number of things in a second, if the times count 10^exponent seconds; 0 where it is not
+/// known.
+double rateOf(const TimeSample& sample, int exponent) {
+  const double seconds = (sample.latest - sample.earliest) * std::pow(10.0, exponent);
+  return seconds > 0 ? (sample.count - 1) / seconds : 0;
+}
+
+bool fitsTime(const TimeSample& sample, int exponent) {
+  return sample.max * std::pow(10.0, exponent) < 1e-9 * static_cast<double>(kEndOfTimeNs);
+}
+
+/// The unit with a usual rate; of several, the one in the middle of the usual rates.
+std::optional<int> likelyExponent(const TimeSample& sample, const UsualRate& usual) {
+  std::optional<int> likely;
+  double least = std::log(usual.max / usual.min) / 2;
+  for (const int exponent : kExponents) {
+    const double rate = rateOf(sample, exponent);
+    if (rate <= 0 || !fitsTime(sample, exponent)) continue;
+    const double distance = std::abs(std::log(rate / std::sqrt(usual.min * usual.max)));
+    if (distance > least) continue;
+    least = distance;
+    likely = exponent;
+  }
+  return likely;
+}
+
+/// The unit in which the times are of today's dates; the numbers of two units are 1000 apart.
+std::optional<int> datedExponent(const TimeSample& sample) {
+  constexpr double kYear2000S = 946'684'800;
+  constexpr double kYear2050S = 2'524'608'000;
+  for (const int exponent : kExponents) {
+    const double seconds = sample.max * std::pow(10.0, exponent);
+    if (seconds >= kYear2000S && seconds < kYear2050S) return exponent;
+  }
+  return std::nullopt;
+}
+
+/// "probably us, where 1000 events take 0.01 s"
+std::string guessOf(const TimeSample& sample, const UsualRate& usual) {
+  const std::optional<int> likely = likelyExponent(sample, usual);
+  if (!likely) return "expected decimal seconds, or --time-unit s, ms, us or ns";
+  const double seconds = (sample.latest - sample.earliest) * std::pow(10.0, *likely);
+  const std::string unit = timeUnitOf(*likely);
+  return fmt::format(
+      "probably {}, where {} {} take {:.2g} s: expected --time-unit {}, or the right one of s, ms, "
+      "us and ns",
+      unit, sample.count, usual.things, seconds, unit);
+}
+
+}  // namespace
+
+std::optional<int> timeExponentOf(std::string_view unit) {
+  constexpr struct {
+    std::string_view name;
+    int exponent;
+  } kUnits[] = {{"s", 0},
+                {"sec", 0},
+                {"secs", 0},
+                {"second", 0},
+                {"seconds", 0},
+                {"ms", -3},
+                {"msec", -3},
+                {"msecs", -3},
+                {"millisecond", -3},
+                {"milliseconds", -3},
+                {"us", -6},
+                {"µs", -6},
+                {"μs", -6},
+                {"usec", -6},
+                {"usecs", -6},
+                {"microsecond", -6},
+                {"microseconds", -6},
+                {"ns", -9},
+                {"nsec", -9},
+                {"nsecs", -9},
+                {"nanosecond", -9},
+                {"nanoseconds", -9}};
+  for (const auto& [name, exponent] : kUnits) {
+    if (unit == name) return exponent;
+  }
+  return std::nullopt;
+}
+
+std::string timeUnitOf(int exponent) {
+  return exponent == 0 ? "s" : exponent == -3 ? "ms" : exponent == -6 ? "us" : "ns";
+}
+
+std::int64_t nanosecondsPer(int exponent) {
+  std::int64_t unit_ns = 1;
+  for (int k = exponent; k > -9; --k) unit_ns *= 10;
+  return unit_ns;
+}
+
+void TimeSample::add(double t, bool is_whole) {
+  earliest = count == 0 ? t : std::min(earliest, t);
+  latest = count == 0 ? t : std::max(latest, t);
+  ++count;
+  whole = whole && is_whole;
+  float32 = float32 && static_cast<double>(static_cast<float>(t)) == t;
+  max = std::max(max, std::abs(t));
+}
+
+void TimeSample::add(double t) {
+  if (std::isfinite(t)) add(t, std::floor(t) == t);
+}
+
+TimeUnit findTimeUnit(const ReaderOptions& options, const TimeSample& sample,
+                      const UsualRate& usual, const std::string& where) {
+  constexpr int kEnough = 10;
+  constexpr int kMany = 1000;
+  constexpr double kFarTooRare = 0.03;  // a sensor at rest has noise
+  constexpr double kEndOfTimeUs = static_cast<double>(kEndOfTimeNs) * 1e-3;
+  if (!options.time_unit.empty()) return {timeExponentOf(options.time_unit).value_or(0), {}};
+  const int exponent = sample.whole ? datedExponent(sample).value_or(-9) : 0;
+  const double step_s = stepAt(static_cast<float>(sample.max)) * std::pow(10.0, exponent);
+  if (sample.float32 && sample.count >= kEnough && step_s > 1e-9 * kMaxTimeStepNs) {
+    throw std::runtime_error(
+        fmt::format("{}: the times are float32 numbers, which are {:.3g} s apart at {:.16g}: "
+                    "expected float64, or whole numbers of us or ns",
+                    where, step_s, sample.max));
+  }
+  if (sample.max >= kEndOfTimeUs) return {-9, {}};
+  if (!sample.whole) {
+    const bool too_rare = sample.count >= kMany && sample.latest > sample.earliest &&
+                          rateOf(sample, 0) < kFarTooRare * usual.min;
+    if (!too_rare && fitsTime(sample, 0)) return {0, {}};
+    throw std::runtime_error(
+        fmt::format("{}: {} {} from {:.17g} on take {:.3g} of a unit that is "
+                    "not seconds: {}",
+                    where, sample.count, usual.things, sample.earliest,
+                    sample.latest - sample.earliest, guessOf(sample, usual)));
+  }
+  if (sample.count < kEnough) return {0, {}};
+  const std::optional<int> dated = datedExponent(sample);
+  if (dated && dated == likelyExponent(sample, usual)) {
+    const std::string unit = timeUnitOf(*dated);
+    return {*dated,
+            Warning{"time-unit",
+                    fmt::format("{}: the times are whole numbers without a unit; as {} they are of "
+                                "our years and their rate is usual (--time-unit {})",
+                                where, unit, unit)}};
+  }
+  throw std::runtime_error(fmt::format("{}: all times are whole numbers, of an unknown unit: {}",
+                                       where, guessOf(sample, usual)));
+}
+
+int poseTimeExponent(const ReaderOptions& options, const TimeSample& sample,
+                     const std::string& where) {
+  const TimeUnit unit = findTimeUnit(options, sample, kUsualPoseRate, where);
+  if (unit.warning) throw std::runtime_error(unit.warning->text);
+  return unit.exponent;
+}
+
+bool HeaderWord::isTime() const {
+  constexpr std::string_view kNames[] = {"t",          "ts",         "time",  "times",
+                                         "timestamp",  "timestamps", "stamp", "time_stamp",
+                                         "time stamp", "event_time"};
+  return std::find(std::begin(kNames), std::end(kNames), name) != std::end(kNames);
+}
+
+std::optional<double> metresOf(std::string_view unit) {
+  if (unit == "m") return 1;
+  if (unit == "cm") return 0.01;
+  if (unit == "mm") return 0.001;
+  return std::nullopt;
+}
+
+HeaderWord headerWord(std::string_view text) {
+  std::string lower;
+  for (const char c : text) {
+    if (c != '"' && c != '\'' && c != '#') {
+      lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    }
+  }
+  HeaderWord word;
+  const std::string_view content = trimmed(lower);
+  const std::size_t bracket = content.find_first_of("[(");
+  word.name = std::string(trimmed(content.substr(0, bracket)));
+  if (bracket != std::string_view::npos) {
+    const std::size_t end = content.find_first_of("])", bracket);
+    const std::size_t length = std::min(end, content.size()) - bracket - 1;
+    word.unit = std::string(trimmed(content.substr(bracket + 1, length)));
+    word.time_exponent = timeExponentOf(word.unit);
+    return word;
+  }
+  // "us": a unit alone. "s" may be another thing.
+  if (const auto unit = word.name.size() > 1 ? timeExponentOf(word.name) : std::nullopt) {
+    return {"t", word.name, unit};
+  }
+  const std::size_t underscore = word.name.rfind('_');
+  if (underscore != std::string::npos) {
+    const std::string unit = word.name.substr(underscore + 1);
+    word.time_exponent = timeExponentOf(unit);
+    if (word.time_exponent || metresOf(unit)) {
+      word.unit = unit;
+      word.name.resize(underscore);
+    }
+  }
+  return word;
+}
+
+}  // namespace efm

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/text/dataset_folder.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/text/event_text.h"
+#include "plugin/recordings/text/pose_text.h"
+
+namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path eventsOf(const fs::path& folder, std::size_t camera) {
+  return eventFileIn(folder / ("cam" + std::to_string(camera)));
+}
+
+std::size_t countCameras(const fs::path& folder) {
+  std::size_t count = 0;
+  while (isFile(eventsOf(folder, count))) ++count;
+  return count;
+}
+
+}  // namespace
+
+bool looksLikeDatasetFolder(const fs::path& folder) {
+  return isFile(folder / "camchain.yaml") || isFile(eventsOf(folder, 0));
+}
+
+RecordingParts openDatasetFolder(const std::vector<fs::path>& folders,
+                                 const ReaderOptions& options) {
+  const fs::path& folder = onlySource(folders, "a dataset folder");
+  RecordingParts parts;
+  parts.expected_calibration = "camchain.yaml";
+  parts.expected_poses = "poses.txt or groundtruth.txt";
+  addFolderFiles(folder, options, parts);
+  const std::size_t with_events = countCameras(folder);
+  const std::size_t count = parts.calibration ? parts.calibration->rig.cameras.size() : with_events;
+  if (count < with_events) {
+    throw std::runtime_error(
+        fmt::format("{}: {} cameras: expected {}, because the folder has events of cam0 to cam{}",
+                    parts.calibration->file.string(), count, with_events, with_events - 1));
+  }
+  for (std::size_t camera = 0; camera < count; ++camera) {
+    parts.cameras.push_back(std::make_unique<EventTextStream>(eventsOf(folder, camera), options));
+  }
+  return parts;
+}
+
+void addFolderFiles(const fs::path& folder, const ReaderOptions& options, RecordingParts& parts) {
+  const fs::path camchain = folder / "camchain.yaml";
+  if (!parts.calibration && isFile(camchain)) parts.calibration = readCalibration(camchain);
+  for (const char* name : {"poses.txt", "groundtruth.txt"}) {
+    std::error_code ignored;
+    if (!parts.poses.empty() || !fs::exists(folder / name, ignored)) continue;
+    parts.poses = requirePoseText(folder / name, options);
+  }
+}
+
+std::vector<TruthDepth> truthOfFolder(const fs::path& folder) {
+  const fs::path index = folder / "depth" / "index.txt";
+  std::vector<TruthDepth> truth;
+  std::ifstream stream(index);
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const auto words = splitWords(std::string_view(line).substr(0, line.find('#')));
+    if (words.empty()) continue;
+    const auto t_ns = parseSeconds(words[0]);
+    if (!t_ns || words.size() != 2) {
+      throw std::runtime_error(fmt::format("{}:{}: {}: expected a time and the name of a file",
+                                           index.string(), number, inQuotes(line)));
+    }
+    truth.push_back({*t_ns, index.parent_path() / words[1]});
+  }
+  return truth;
+}
+
+}  // namespace efm

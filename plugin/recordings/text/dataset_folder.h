@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "plugin/recordings/streams/recording_parts.h"
+
+namespace efm {
+
+/// The project's own text layout, which `event-fusion simulate` writes:
+///   camchain.yaml     the rig
+///   camN/events.txt   t x y p, for each camera of the rig; empty for a silent camera; other names
+///                     and columns: `eventFileIn`, `findEventColumns`
+///   poses.txt         or groundtruth.txt: t tx ty tz qx qy qz qw, T_world_cam0 (`readPoseText`)
+///   depth/index.txt   with truth: t file, depth maps of camera 0 (see TruthDepth)
+/// Other files are ignored, but events of a further camera than those of camchain.yaml are an error.
+
+/// Whether the folder has a camchain.yaml, or events in cam0.
+bool looksLikeDatasetFolder(const std::filesystem::path& folder);
+
+/// Without camchain.yaml, the cameras are cam0, cam1, … without gaps.
+/// @throws std::runtime_error naming the file (and line) that is missing or wrong.
+RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folders,
+                                 const ReaderOptions& options);
+
+/// Adds the folder's calibration (camchain.yaml) and poses (poses.txt or groundtruth.txt), where
+/// the parts have none.
+/// @throws std::runtime_error naming the file and the line that is wrong.
+void addFolderFiles(const std::filesystem::path& folder, const ReaderOptions& options,
+                    RecordingParts& parts);
+
+/// The depth maps that the folder's depth/index.txt lists, a line `t file` each; none without it.
+/// @throws std::runtime_error naming the file and the line that is wrong.
+std::vector<TruthDepth> truthOfFolder(const std::filesystem::path& folder);
+
+}  // namespace efm

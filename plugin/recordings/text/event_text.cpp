@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/text/event_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/number_checks.h"
+#include "plugin/recordings/streams/source_files.h"
+
+namespace efm {
+namespace {
+
+constexpr std::size_t kBlockBytes = std::size_t{1} << 20;
+constexpr std::size_t kFirstBytes = std::size_t{1} << 16;
+
+bool isDigit(char c) { return c >= '0' && c <= '9'; }
+bool isBlank(char c) { return c == ' ' || c == '\t'; }
+
+struct Digits {
+  std::uint64_t value;  // of at most 19 digits; wrapped beyond
+  std::ptrdiff_t count;
+};
+
+/// Reads digits and moves `text` behind them.
+Digits takeDigits(const char*& text) {
+  const char* const begin = text;
+  std::uint64_t value = 0;
+  for (; isDigit(*text); ++text) value = value * 10 + static_cast<std::uint64_t>(*text - '0');
+  return {value, text - begin};
+}
+
+/// Moves `text` behind blanks. @return whether there were any.
+bool takeBlanks(const char*& text) {
+  const bool any = isBlank(*text);
+  while (isBlank(*text)) ++text;
+  return any;
+}
+
+/// Moves `text` behind a separator and the blanks around it. @return whether there was one.
+bool takeSeparator(const char*& text, char separator) {
+  const bool any = takeBlanks(text);
+  if (separator == ' ') return any;
+  if (*text != separator) return false;
+  ++text;
+  takeBlanks(text);
+  return true;
+}
+
+/// @param decimals_of_ns 9 where times count seconds, 0 where they count nanoseconds.
+/// @return false if `parseLine` must parse the line.
+inline bool takeTime(const char*& text, int decimals_of_ns, Event& event) {
+  constexpr std::array<std::uint64_t, 10> kPowers = {
+      1, 10, 100, 1'000, 10'000, 100'000, 1'000'000, 10'000'000, 100'000'000, 1'000'000'000};
+  constexpr int kMaxDigits = 19;
+  const Digits whole = takeDigits(text);
+  if (whole.count < 1 || whole.count > kMaxDigits - decimals_of_ns) return false;
+  std::uint64_t t_ns = whole.value * kPowers[static_cast<std::size_t>(decimals_of_ns)];
+  if (*text == '.') {
+    const Digits decimals = takeDigits(++text);
+    if (decimals.count > decimals_of_ns) return false;
+    t_ns += decimals.value * kPowers[static_cast<std::size_t>(decimals_of_ns - decimals.count)];
+  }
+  if (t_ns >= static_cast<std::uint64_t>(kEndOfTimeNs)) return false;
+  event.t_ns = static_cast<std::int64_t>(t_ns);
+  return true;
+}
+
+/// Moves `text` behind a point and zeros: 96.0 is a pixel.
+inline void takeZeroDecimals(const char*& text) {
+  if (*text != '.') return;
+  do {
+    ++text;
+  } while (*text == '0');
+}
+
+inline bool takePixel(const char*& text, std::uint16_t& pixel) {
+  constexpr int kMaxPixelDigits = 5;
+  const Digits digits = takeDigits(text);
+  if (digits.count < 1 || digits.count > kMaxPixelDigits ||
+      digits.value > std::numeric_limits<std::uint16_t>::max()) {
+    return false;
+  }
+  pixel = static_cast<std::uint16_t>(digits.value);
+  takeZeroDecimals(text);
+  return true;
+}
+
+inline bool takePolarity(const char*& text, bool& polarity) {
+  const bool negative = *text == '-';
+  text += negative ? 1 : 0;
+  polarity = *text == '1' && !negative;
+  if (*text != '1' && (*text != '0' || negative)) return false;
+  ++text;
+  takeZeroDecimals(text);
+  return true;
+}
+
+bool takeIgnored(const char*& text, char separator) {
+  const char* const begin = text;
+  while (*text != separator && !isBlank(*text) && *text != '\n' && *text != '\r' && *text != '#') {
+    ++text;
+  }
+  return text != begin;
+}
+
+/// The whole lines at the beginning of a text.
+std::string_view wholeLines(std::string_view text, bool ended) {
+  return ended ? text : text.substr(0, text.rfind('\n') + 1);
+}
+
+}  // namespace
+
+EventTextStream::EventTextStream(std::filesystem::path file, const ReaderOptions& options)
+    : content_(std::move(file)), block_(kFirstBytes) {
+  carried_ = content_.read(block_.data(), kFirstBytes);
+  ended_ = carried_ < kFirstBytes;
+  const std::string_view first = withoutByteOrderMark({block_.data(), carried_});
+  requireTextLines(first, name());
+  columns_ = findEventColumns(wholeLines(first, ended_), options, name());
+  usual_ = columns_.isUsual();
+}
+
+bool EventTextStream::read(std::vector<Event>& events) {
+  events.clear();
+  lines_.clear();
+  if (started_ && ended_) return false;
+  started_ = true;
+  block_.resize(kBlockBytes);
+  if (!ended_) {
+    const std::size_t wanted = kBlockBytes - carried_;
+    const std::size_t count = content_.read(block_.data() + carried_, wanted);
+    ended_ = count < wanted;
+    carried_ += count;
+  }
+
+  std::string_view text(block_.data(), carried_);
+  if (first_byte_ == 0 && line_ == 0) text = withoutByteOrderMark(text);
+  const std::size_t newline = text.rfind('\n');
+  const std::size_t whole = newline == std::string_view::npos ? 0 : newline + 1;
+  takeLines(text.data(), text.data() + whole, events);
+  carried_ = text.size() - whole;
+  if (ended_ && carried_ > 0) {
+    ++line_;
+    takeLine(text.substr(whole), true, events);
+  } else if (carried_ == kBlockBytes) {
+    ++line_;
+    throw std::runtime_error(fmt::format("{}: {}: expected t x y p, not a line of over {} bytes",
+                                         place(line_), inQuotes(text), kBlockBytes));
+  }
+  std::copy(text.begin() + static_cast<std::ptrdiff_t>(whole), text.end(), block_.begin());
+  return true;
+}
+
+void EventTextStream::takeLines(const char* begin, const char* end, std::vector<Event>& events) {
+  assert(begin == end || end[-1] == '\n');
+  lines_.emplace_back(events.size(), line_ + 1);
+  Event event;
+  while (begin != end) {
+    ++line_;
+    if (const char* const next = parsePlainLine(begin, event)) {
+      events.push_back(event);
+      begin = next;
+    } else {
+      const char* const newline = std::find(begin, end, '\n');
+      takeLine({begin, static_cast<std::size_t>(newline - begin)}, false, events);
+      begin = newline + 1;
+    }
+  }
+}
+
+void EventTextStream::takeLine(std::string_view line, bool unterminated,
+                               std::vector<Event>& events) {
+  const bool header = first_byte_ == 0 && line_ <= columns_.header_lines;
+  if (const auto event = header ? std::nullopt : parseOrSkip(line, unterminated)) {
+    events.push_back(*event);
+  } else {
+    lines_.emplace_back(events.size(), line_ + 1);
+  }
+}
+
+/// The fast path for a plain line. Each step stops at the newline at the latest.
+/// @return the next line; null if `parseLine` must parse this line.
+const char* EventTextStream::parsePlainLine(const char* text, Event& event) const {
+  if (usual_) {
+    if (!takeTime(text, 9, event) || !takeBlanks(text) || !takePixel(text, event.x) ||
+        !takeBlanks(text) || !takePixel(text, event.y) || !takeBlanks(text) ||
+        !takePolarity(text, event.polarity)) {
+      return nullptr;
+    }
+  } else {
+    const int decimals_of_ns = 9 + columns_.time_exponent;
+    for (std::size_t k = 0; k < columns_.order.size(); ++k) {
+      if (k > 0 && !takeSeparator(text, columns_.separator)) return nullptr;
+      const char column = columns_.order[k];
+      const bool taken = column == 't'   ? takeTime(text, decimals_of_ns, event)
+                         : column == 'x' ? takePixel(text, event.x)
+                         : column == 'y' ? takePixel(text, event.y)
+                         : column == 'p' ? takePolarity(text, event.polarity)
+                                         : takeIgnored(text, columns_.separator);
+      if (!taken) return nullptr;
+    }
+  }
+  if (*text == '\r') ++text;
+  return *text == '\n' ? text + 1 : nullptr;
+}
+
+std::optional<Event> EventTextStream::parseLine(std::string_view line, bool unterminated) const {
+  const std::string_view content = line.substr(0, line.find('#'));
+  const std::vector<std::string_view> fields = eventFields(trimmed(content), columns_.separator);
+  if (fields.empty()) return std::nullopt;
+  const auto names = [&] { return fmt::join(columns_.order, " "); };
+  const std::size_t count = columns_.order.size();
+  if (fields.size() < count && unterminated) {
+    throw std::runtime_error(fmt::format("{}: {}: expected {}, but the file ends within the line",
+                                         place(line_), inQuotes(content), names()));
+  }
+  if (fields.size() != count) {
+    throw std::runtime_error(fmt::format(
+        "{}: {}: expected {} fields, {}, not {} (other columns: --event-columns, - for one to "
+        "ignore)",
+        place(line_), inQuotes(content), count, names(), fields.size()));
+  }
+
+  const auto fail = [&](const char* name, std::string_view value, const std::string& expected) {
+    return std::runtime_error(
+        fmt::format("{}: {} = {}: expected {}", place(line_), name, inQuotes(value), expected));
+  };
+  const auto field_of = [&](char column) { return fields[columns_.order.find(column)]; };
+  const auto pixel_of = [&](const char* name) {
+    const std::optional<double> number = parseFinite(field_of(name[0]));
+    const auto pixel = number ? wholeNumber(*number, 0, 65'535) : std::nullopt;
+    if (pixel) return static_cast<std::uint16_t>(*pixel);
+    throw fail(name, field_of(name[0]),
+               "a whole number from 0 to 65535 (columns in another order: --event-columns)");
+  };
+  const std::string_view time = field_of('t');
+  const std::optional<std::int64_t> t_ns = parseTimeIn(time, columns_.time_exponent);
+  if (!t_ns || *t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
+    throw fail("t", time,
+               columns_.time_exponent == 0 ? "a time in decimal seconds" : "a decimal time");
+  }
+  Event event;
+  event.t_ns = *t_ns;
+  event.x = pixel_of("x");
+  event.y = pixel_of("y");
+  const std::optional<int> polarity = polarityOf(field_of('p'));
+  if (!polarity) {
+    throw fail("p", field_of('p'),
+               std::string(kExpectedPolarity) + " (columns in another order: --event-columns)");
+  }
+  event.polarity = *polarity == 1;
+  return event;
+}
+
+/// The event of a line; nothing where it has none, or a bad one that is left out.
+std::optional<Event> EventTextStream::parseOrSkip(std::string_view line, bool unterminated) {
+  try {
+    return parseLine(line, unterminated);
+  } catch (const std::runtime_error& error) {
+    if (bad_ == nullptr) throw;
+    bad_->skip(error.what());
+    return std::nullopt;
+  }
+}
+
+/// The first event of the lines that begin after a byte: the byte of its line, and its time.
+/// Nothing if the next bytes have none.
+std::optional<std::pair<std::uint64_t, std::int64_t>> EventTextStream::firstEventAfter(
+    std::uint64_t byte) {
+  std::array<char, 4096> bytes{};
+  content_.seek(byte);
+  const std::string_view text(bytes.data(), content_.read(bytes.data(), bytes.size()));
+  for (std::size_t begin = text.find('\n'); begin != std::string_view::npos;) {
+    ++begin;
+    const std::size_t newline = text.find('\n', begin);
+    if (newline == std::string_view::npos) break;
+    Event event;
+    if (parsePlainLine(text.data() + begin, event) != nullptr) {
+      return std::pair(byte + begin, event.t_ns);
+    }
+    try {
+      const auto parsed = parseLine(text.substr(begin, newline - begin), false);
+      if (parsed) return std::pair(byte + begin, parsed->t_ns);
+    } catch (const std::runtime_error&) {
+      return std::nullopt;  // `read` reports it where it comes to it
+    }
+    begin = newline;
+  }
+  return std::nullopt;
+}
+
+void EventTextStream::seek(std::int64_t t_ns) {
+  constexpr std::uint64_t kCloseBytes = std::uint64_t{1} << 16;
+  // An event that is more than 10 ms older than another one before it is an error: no event of t_ns
+  // or later is before one that is 10 ms older.
+  const std::int64_t before_ns = t_ns - kMaxEventDelayNs;
+  std::uint64_t low = 0;
+  std::uint64_t high = content_.seekableBytes();
+  if (high <= kFirstBytes) return;
+  while (high > low + kCloseBytes) {
+    const std::uint64_t middle = low + (high - low) / 2;
+    const auto event = firstEventAfter(middle);
+    if (event && event->second < before_ns) {
+      low = event->first;
+    } else {
+      high = middle;
+    }
+  }
+  content_.seek(low);
+  carried_ = 0;
+  ended_ = false;
+  first_byte_ = low;
+}
+
+std::string EventTextStream::positionOf(std::size_t index) const {
+  const auto after =
+      std::upper_bound(lines_.begin(), lines_.end(), index,
+                       [](std::size_t i, const auto& entry) { return i < entry.first; });
+  const auto& [first, line] = *std::prev(after);
+  return place(line + (index - first));
+}
+
+std::string EventTextStream::place(std::uint64_t line) const {
+  if (first_byte_ == 0) return fmt::format("{}:{}", name(), line);
+  return fmt::format("{}: line {} after byte {}", name(), line, first_byte_);
+}
+
+std::string beginningOfText(const std::filesystem::path& file) {
+  constexpr std::size_t kBytes = 4096;
+  std::string bytes(kBytes, '\0');
+  FileContent content(file);
+  bytes.resize(content.read(bytes.data(), kBytes));
+  const std::string_view text = withoutByteOrderMark(bytes);
+  requireTextLines(text, file.string());
+  return std::string(wholeLines(text, bytes.size() < kBytes));
+}
+
+bool looksLikeEventText(const std::filesystem::path& file) {
+  return looksLikeEventText(file, ReaderOptions());
+}
+
+bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options) {
+  try {
+    return isFile(file) && looksLikeEventLines(beginningOfText(file), options.columns);
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+RecordingParts openEventText(const std::vector<std::filesystem::path>& files,
+                             const ReaderOptions& options) {
+  RecordingParts parts;
+  for (const std::filesystem::path& file : files) {
+    parts.cameras.push_back(std::make_unique<EventTextStream>(file, options));
+  }
+  return parts;
+}
+
+std::filesystem::path eventFileIn(const std::filesystem::path& folder) {
+  for (const char* name :
+       {"events.txt", "events.csv", "events.txt.gz", "events.csv.gz", "events.zip"}) {
+    if (isFile(folder / name)) return folder / name;
+  }
+  return folder / "events.txt";
+}
+
+}  // namespace efm

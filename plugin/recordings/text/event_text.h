@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "plugin/recordings/streams/event_stream.h"
+#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/text/event_columns.h"
+
+namespace efm {
+
+/// Events from text, also compressed, with a line per event: t x y p, or other columns
+/// (`findEventColumns`); exact decimal times, pixel (also as 96.0), polarity (`polarityOf`). Blank
+/// lines, text after a `#`, repeated blanks, tabs, CRLF and a byte order mark are ignored.
+class EventTextStream : public EventStream {
+ public:
+  /// @throws std::runtime_error if the file cannot be opened, or its columns are not clear.
+  explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {});
+
+  bool read(std::vector<Event>& events) override;
+  void skipBadEvents(BadEvents& bad) override { bad_ = &bad; }
+  /// By bisection, to 64 KiB. A compressed file stays at its beginning.
+  void seek(std::int64_t t_ns) override;
+  std::string positionOf(std::size_t index) const override;
+  std::string name() const override { return content_.file().string(); }
+  double progress() const override { return started_ ? content_.progress() : 0; }
+  /// Of a first line `width height`.
+  std::optional<CameraSize> size() const override { return columns_.size; }
+  std::vector<Warning> warnings() const override { return columns_.warnings; }
+
+ private:
+  void takeLines(const char* begin, const char* end, std::vector<Event>& events);
+  void takeLine(std::string_view line, bool unterminated, std::vector<Event>& events);
+  const char* parsePlainLine(const char* text, Event& event) const;
+  std::optional<Event> parseLine(std::string_view line, bool unterminated) const;
+  std::optional<Event> parseOrSkip(std::string_view line, bool unterminated);
+  std::optional<std::pair<std::uint64_t, std::int64_t>> firstEventAfter(std::uint64_t byte);
+  std::string place(std::uint64_t line) const;
+
+  FileContent content_;
+  EventColumns columns_;
+  BadEvents* bad_ = nullptr;
+  bool usual_ = true;  // columns_.isUsual()
+  bool started_ = false;
+  bool ended_ = false;
+
+  std::vector<char> block_;       // text
+  std::size_t carried_ = 0;       // bytes of an incomplete line at its beginning
+  std::uint64_t first_byte_ = 0;  // of the first line, which is line 1
+  std::uint64_t line_ = 0;        // number of the current line
+  /// The line of an event of the last block, where it is not the line after that of the event
+  /// before.
+  std::vector<std::pair<std::size_t, std::uint64_t>> lines_;
+};
+
+/// Whether a file, which may be compressed, has lines of events. Never throws.
+bool looksLikeEventText(const std::filesystem::path& file);
+/// The same of the columns that an option names.
+bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options);
+
+/// The whole lines at the beginning of a text, which may be compressed.
+/// @throws std::runtime_error naming the file that cannot be read.
+std::string beginningOfText(const std::filesystem::path& file);
+
+/// A camera per file.
+/// @throws std::runtime_error as `EventTextStream`.
+RecordingParts openEventText(const std::vector<std::filesystem::path>& files,
+                             const ReaderOptions& options);
+
+/// The file of events in a folder: events.txt, .csv, .txt.gz, .csv.gz or .zip, the first that is
+/// there; else events.txt.
+std::filesystem::path eventFileIn(const std::filesystem::path& folder);
+
+}  // namespace efm

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/text/pose_text.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include "mapping/base/quoted_text.h"
+#include "mapping/base/text_parsing.h"
+#include "mapping/geometry/tum_trajectory.h"
+#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/time_unit.h"
+
+namespace efm {
+namespace {
+
+constexpr std::size_t kPoseFields = 8;  // t tx ty tz qx qy qz qw
+constexpr std::array<const char*, kPoseFields> kPoseFieldNames = {"t",  "tx", "ty", "tz",
+                                                                  "qx", "qy", "qz", "qw"};
+
+/// The fields of a line: commas or semicolons separate them if there are any, else blanks.
+std::vector<std::string_view> poseFields(std::string_view line) {
+  if (line.find_first_of(",;") == std::string_view::npos) return splitWords(line);
+  std::vector<std::string_view> fields;
+  for (std::size_t begin = 0; begin <= line.size();) {
+    const std::size_t end = std::min(line.find_first_of(",;", begin), line.size());
+    fields.push_back(trimmed(line.substr(begin, end - begin)));
+    begin = end + 1;
+  }
+  if (fields.back().empty()) fields.pop_back();  // a comma at the end
+  return fields;
+}
+
+bool startsWithAny(std::string_view text, std::initializer_list<std::string_view> starts) {
+  return std::any_of(starts.begin(), starts.end(),
+                     [&](std::string_view start) { return text.substr(0, start.size()) == start; });
+}
+
+/// The field of t tx ty tz qx qy qz qw that a header's word names.
+std::optional<std::size_t> poseFieldOf(const HeaderWord& word) {
+  if (word.isTime()) return 0;
+  if (word.name.empty()) return std::nullopt;
+  const std::size_t axis = std::string_view("xyzw").find(word.name.back());
+  if (axis == std::string_view::npos) return std::nullopt;
+  std::string_view stem = std::string_view(word.name).substr(0, word.name.size() - 1);
+  while (!stem.empty() && (stem.back() == '_' || stem.back() == '.')) stem.remove_suffix(1);
+  if (stem == "q" || startsWithAny(stem, {"q_", "quat", "orient", "rot"})) return 4 + axis;
+  const bool position = stem.empty() || stem == "p" || stem == "t" ||
+                        startsWithAny(stem, {"p_", "t_", "pos", "trans"});
+  return position && axis < 3 ? std::optional(1 + axis) : std::nullopt;
+}
+
+/// Where the fields of a pose stand in a line.
+struct PoseColumns {
+  std::array<std::size_t, kPoseFields> column = {0, 1, 2, 3, 4, 5, 6, 7};
+  std::size_t count = kPoseFields;  // of a line
+  bool named = false;
+  std::optional<int> time_exponent;
+  Eigen::Vector3d metres = Eigen::Vector3d::Ones();  // in the unit of tx, ty and tz
+
+  /// Takes the unit that a header gives to a field; rotations have none.
+  /// @throws std::runtime_error for an unknown unit of a position.
+  void setUnit(std::size_t field, const HeaderWord& word) {
+    if (field == 0) time_exponent = word.time_exponent;
+    if (field == 0 || field > 3 || word.unit.empty()) return;
+    const std::optional<double> unit_m = metresOf(word.unit);
+    if (!unit_m) {
+      throw std::runtime_error(fmt::format("the unit {} of {}: expected m, cm or mm",
+                                           inQuotes(word.unit), kPoseFieldNames[field]));
+    }
+    metres[static_cast<Eigen::Index>(field) - 1] = *unit_m;
+  }
+};
+
+/// The columns that a header names; nothing where the line is no header.
+std::optional<PoseColumns> poseColumnsOf(std::string_view line) {
+  std::vector<std::string_view> words = poseFields(line);
+  // "# timestamp …": the mark is no column. "t [us]" with blanks: the unit is none, either.
+  if (!words.empty() && words.front() == "#") words.erase(words.begin());
+  PoseColumns columns;
+  columns.named = true;
+  columns.count = 0;
+  std::array<bool, kPoseFields> found{};
+  bool angles = false;
+  std::optional<std::size_t> field;
+  for (const std::string_view text : words) {
+    const HeaderWord word = headerWord(text);
+    if (word.name.empty()) {
+      if (field) columns.setUnit(*field, word);
+      continue;
+    }
+    field = poseFieldOf(word);
+    angles = angles || startsWithAny(word.name, {"roll", "pitch", "yaw", "euler"});
+    if (field && !found[*field]) {
+      found[*field] = true;
+      columns.column[*field] = columns.count;
+      columns.setUnit(*field, word);
+    }
+    ++columns.count;
+  }
+  if (!found[0] || std::count(found.begin(), found.end(), true) < 4) return std::nullopt;
+  if (angles && !found[4]) {
+    throw std::runtime_error(
+        inQuotes(line) +
+        ": angles are not read, because their order and axes differ between tools: expected a "
+        "quaternion, qx qy qz qw");
+  }
+  for (std::size_t expected = 0; expected < kPoseFields; ++expected) {
+    if (found[expected]) continue;
+    throw std::runtime_error(
+        fmt::format("{}: there is no column {}: expected t tx ty tz qx qy qz qw", inQuotes(line),
+                    kPoseFieldNames[expected]));
+  }
+  return columns;
+}
+
+struct PoseLine {
+  std::size_t number;
+  std::string_view text;
+};
+
+/// Splits the text into lines with a pose, and finds its columns.
+std::vector<PoseLine> poseLines(std::string_view text, PoseColumns& columns,
+                                const std::string& file) {
+  std::vector<PoseLine> lines;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = trimmed(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (line.empty()) continue;
+    const bool comment = line.front() == '#';
+    const bool number_first = !comment && parseNumber<double>(poseFields(line).front());
+    if (number_first || (comment && !lines.empty())) {
+      const std::string_view content = trimmed(line.substr(0, line.find('#')));
+      if (!content.empty()) lines.push_back({number, content});
+      continue;
+    }
+    try {
+      const auto named = lines.empty() ? poseColumnsOf(line) : std::nullopt;
+      if (named) {
+        columns = *named;
+      } else if (!comment) {
+        throw std::runtime_error(
+            inQuotes(line) +
+            ": expected t tx ty tz qx qy qz qw, or a header with the columns' names");
+      }
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(fmt::format("{}:{}: {}", file, number, error.what()));
+    }
+  }
+  return lines;
+}
+
+/// @param columns of the lines, with the unit of the header.
+int exponentOf(const std::vector<PoseLine>& lines, const PoseColumns& columns,
+               const std::filesystem::path& file, const ReaderOptions& options) {
+  if (columns.time_exponent) return *columns.time_exponent;
+  constexpr std::size_t kSample = 100;
+  TimeSample sample;
+  for (std::size_t i = 0; i < std::min(lines.size(), kSample); ++i) {
+    const std::vector<std::string_view> fields = poseFields(lines[i].text);
+    if (!columns.named && fields.size() == 12) {
+      throw std::runtime_error(
+          fmt::format("{}:{}: {}", file.string(), lines[i].number, kPosesWithoutTimes));
+    }
+    if (fields.size() <= columns.column[0]) continue;
+    const std::string_view t = fields[columns.column[0]];
+    if (const auto value = parseFinite(t)) {
+      sample.add(*value, t.find_first_of(".eE") == std::string_view::npos);
+    }
+  }
+  if (!sample.whole) return 0;  // the option is that of the events
+  if (columns.named && file.filename().string().find("mocap_data") != std::string::npos) return -6;
+  return poseTimeExponent(options, sample, file.string());
+}
+
+std::vector<StampedPose> posesOf(std::string_view text, const std::filesystem::path& file,
+                                 const ReaderOptions& options) {
+  requireTextLines(text, file.string());
+  PoseColumns columns;
+  const std::vector<PoseLine> lines = poseLines(withoutByteOrderMark(text), columns, file.string());
+  const int exponent = exponentOf(lines, columns, file, options);
+  std::vector<StampedPose> poses;
+  poses.reserve(lines.size());
+  for (const PoseLine& line : lines) {
+    try {
+      std::vector<std::string_view> fields = poseFields(line.text);
+      if (columns.named) {
+        if (fields.size() != columns.count) {
+          throw std::runtime_error(fmt::format("{} fields: expected {}, as in the header",
+                                               fields.size(), columns.count));
+        }
+        std::vector<std::string_view> ordered;
+        for (const std::size_t column : columns.column) ordered.push_back(fields[column]);
+        fields = std::move(ordered);
+      } else if (line.text.find(',') != std::string_view::npos) {
+        throw std::runtime_error(
+            "commas without a header: expected a header with the columns' names");
+      }
+      poses.push_back(parseTumPose(fields, exponent));
+      poses.back().T_world_rig.translation.array() *= columns.metres.array();
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(fmt::format("{}:{}: {}", file.string(), line.number, error.what()));
+    }
+  }
+  return poses;
+}
+
+}  // namespace
+
+std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
+                                      const ReaderOptions& options) {
+  constexpr std::size_t kMaxBytes = 2'000'000'000;
+  return posesOf(FileContent(file).readAll(kMaxBytes), file, options);
+}
+
+bool looksLikePoseLines(std::string_view beginning) {
+  ReaderOptions options;
+  options.time_unit = "ns";  // any: the values say nothing of it
+  try {
+    return !posesOf(beginning, {}, options).empty();
+  } catch (const std::runtime_error&) {
+    return false;
+  }
+}
+
+std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
+                                         const ReaderOptions& options) {
+  std::vector<StampedPose> poses = readPoseText(file, options);
+  if (!poses.empty()) return poses;
+  throw std::runtime_error(file.string() +
+                           ": no poses: expected at least one line t tx ty tz qx qy qz qw");
+}
+
+}  // namespace efm

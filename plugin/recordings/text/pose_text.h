@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "mapping/geometry/trajectory.h"
+#include "plugin/recordings/streams/recording_parts.h"
+
+namespace efm {
+
+/// What is said of a line of 12 numbers: KITTI's poses are the first three rows of a matrix.
+inline constexpr const char* kPosesWithoutTimes =
+    "12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz qx qy qz qw, or "
+    "a "
+    ".npz file with N times and N x 4 x 4 matrices";
+
+/// Reads text, also compressed, with a line per pose T_world_body:
+///   t tx ty tz qx qy qz qw    decimal seconds, metres: the format of the TUM RGB-D benchmark;
+///   columns in any order      if a header names them: EuRoC's CSV (#timestamp [ns], p_RS_R_x [m],
+///                             …, q_RS_w [], …), TUM-VIE's mocap_data.txt (microseconds).
+/// The header may begin with a `#`; blanks or commas separate the fields. Times are exact. Whole
+/// numbers without a unit in the header have that of the option, see `findTimeUnit`.
+/// @return the poses in the order of the file; there may be none.
+/// @throws std::runtime_error naming file, line, value and what was expected.
+std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
+                                      const ReaderOptions& options);
+
+/// Whether the whole lines at the beginning of a file are poses.
+bool looksLikePoseLines(std::string_view beginning);
+
+/// The same for the poses of a recording: at least one.
+/// @throws std::runtime_error as `readPoseText`; naming the file that has no pose.
+std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
+                                         const ReaderOptions& options);
+
+}  // namespace efm

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/results/output/report.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <variant>
+
+#include "mapping/geometry/angle.h"
+#include "plugin/options/tracker_fault_keys.h"
+
+namespace efm {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json asJson(const EventCounts& counts) {
+  return {{"read", counts.read},
+          {"used", counts.used},
+          {"without_pose", counts.without_pose},
+          {"outside_window", counts.outside_window},
+          {"dropped", counts.dropped},
+          {"filtered", counts.filtered},
+          {"outside_lens", counts.outside_lens},
+          {"over_budget", counts.over_budget}};
+}
+
+Json asJson(const StageSeconds& seconds) {
+  return {{"total", seconds.total}, {"read", seconds.read},     {"sweep", seconds.sweep},
+          {"depth", seconds.depth}, {"refine", seconds.refine}, {"map", seconds.map}};
+}
+
+/// Processor time: what a run costs once, and what grows with its events and its keyframes.
+Json byGrowth(const StageSeconds& cpu) {
+  const double measured = cpu.start + cpu.tables + cpu.output + cpu.read + cpu.filter + cpu.sweep +
+                          cpu.depth + cpu.refine + cpu.map + cpu.images;
+  return {{"total", cpu.total},
+          {"once", {{"start", cpu.start}, {"tables", cpu.tables}, {"output", cpu.output}}},
+          {"events", {{"read", cpu.read}, {"filter", cpu.filter}}},
+          {"keyframes",
+           {{"sweep", cpu.sweep},
+            {"depth", cpu.depth},
+            {"refine", cpu.refine},
+            {"map", cpu.map},
+            {"images", cpu.images}}},
+          {"other", std::max(0.0, cpu.total - measured)}};
+}
+
+Json asJson(const EventFusionOptions& options) {
+  Json json = Json::object();
+  for (const NamedOption& option : listOptions(options)) {
+    std::visit(
+        [&](const auto& value) {
+          json[std::string(option.section)][std::string(option.key)] = value;
+        },
+        option.value);
+  }
+  return json;
+}
+
+Json asJson(const TrackerFaults& faults) {
+  Json json = Json::object();
+  for (const auto& named : listTrackerFaults(faults)) {
+    std::visit([&](const auto& value) { json[named.first] = value; }, named.second);
+  }
+  return json;
+}
+
+Json asJson(const MapExtent& extent) {
+  const auto list = [](const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); };
+  return {{"min", list(extent.min_m)}, {"max", list(extent.max_m)}};
+}
+
+Json asJson(const PoseShift& shift) {
+  return {{"median_m", shift.median_m},
+          {"max_m", shift.max_m},
+          {"median_deg", shift.median_rad / kRadiansPerDegree},
+          {"max_deg", shift.max_rad / kRadiansPerDegree}};
+}
+
+Json asJson(const RefinementState& refinement) {
+  const RefinementCounts& counts = refinement.counts;
+  const TrackerErrors& tracker = refinement.tracker;
+  return {{"registered", counts.registered},
+          {"loop_checks", counts.loop_checks},
+          {"loops", counts.loops},
+          {"loops_dropped", counts.loops_dropped},
+          {"failed_solves", counts.failed_solves},
+          {"failures", refinement.failures},
+          {"last_error", refinement.last_error},
+          {"tracker",
+           {{"noise_m", tracker.noise_m},
+            {"noise_deg", tracker.noise_rad / kRadiansPerDegree},
+            {"drift", tracker.drift_m},
+            {"drift_deg_per_m", tracker.drift_rad / kRadiansPerDegree}}}};
+}
+
+Json asJson(const WindowsGivenUp& windows) {
+  Json json = Json::object();
+  for (const NamedReason& reason : kGiveUpReasons) json[reason.name] = windows.*reason.count;
+  return json;
+}
+
+Json asJson(const LiveStatus& live, const MapperCounts& counts) {
+  Json cameras = Json::array();
+  for (const auto& [index, camera] : live.cameras) {
+    cameras.push_back({{"camera", index},
+                       {"received", camera.received},
+                       {"thinned", camera.thinned},
+                       {"dropped", camera.dropped},
+                       {"refused", camera.refused},
+                       {"paused", camera.paused},
+                       {"after_end", camera.after_end},
+                       {"taken", camera.taken},
+                       {"lost", camera.lost}});
+  }
+  return {{"drop_ratio", live.dropRatio()},
+          {"cameras", cameras},
+          {"windows_given_up", counts.windows_given_up.total()},
+          {"windows_given_up_for", asJson(counts.windows_given_up)},
+          {"late_events", counts.late_events},
+          {"pose_jumps", live.pose_jumps},
+          {"clock_steps", live.clock_steps},
+          {"refused_poses", live.refused_poses},
+          {"errors", live.errors},
+          {"last_error", live.last_error}};
+}
+
+Json asJson(const ReferenceView& view) {
+  return {{"width", view.width}, {"height", view.height}, {"fx", view.fx},
+          {"fy", view.fy},       {"cx", view.cx},         {"cy", view.cy}};
+}
+
+Json asJson(const std::vector<ChosenOption>& chosen) {
+  Json json = Json::array();
+  for (const ChosenOption& option : chosen) {
+    json.push_back({{"key", option.key}, {"value", option.value}, {"reason", option.reason}});
+  }
+  return json;
+}
+
+Json asJson(const std::vector<Warning>& warnings) {
+  Json json = Json::array();
+  for (const Warning& warning : warnings) {
+    json.push_back({{"name", warning.name}, {"text", warning.text}});
+  }
+  return json;
+}
+
+}  // namespace
+
+std::uint64_t peakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;  // Linux counts in kibibytes
+}
+
+double votesPerSecond(const MapReport& report) {
+  const double sweep_s = report.times.real.sweep;
+  return sweep_s > 0 ? static_cast<double>(report.counts.votes.total()) / sweep_s : 0;
+}
+
+void describePoints(const MapCloud& cloud, MapReport& report) {
+  constexpr double kFar = 0.001;
+  report.points = cloud.size();
+  report.extent = extentOf(cloud);
+  report.most_extent = extentOf(cloud, kFar);
+}
+
+std::string reportJson(const MapReport& report) {
+  const MapperCounts& counts = report.counts;
+  const SpaceSweepOptions& sweep = report.options.mapper.keyframe.sweep;
+
+  Json events = asJson(counts.total());
+  events["cameras"] = Json::array();
+  for (const EventCounts& camera : counts.cameras) events["cameras"].push_back(asJson(camera));
+
+  Json json;
+  json["version"] = EFM_VERSION;
+  if (!report.recording.empty()) json["recording"] = report.recording;
+  json["events"] = events;
+  json["event_uses"] = counts.event_uses;
+  json["votes"] = {{"cast", counts.votes.cast},
+                   {"outside_view", counts.votes.outside_view},
+                   {"behind_camera", counts.votes.behind_camera}};
+  json["keyframes"] = counts.keyframes;
+  json["keyframes_without_pose"] = counts.keyframes_without_pose;
+  json["windows_without_events"] = counts.windows_without_events;
+  json["silent"] = {{"keyframes", report.silent_keyframes},
+                    {"subintervals", counts.silent_subintervals}};
+  json["sorted_events"] = counts.sorted_events;
+  json["skipped_events"] = report.skipped_events;
+  json["duplicate_poses"] = counts.duplicate_poses;
+  json["points"] = report.points;
+  const PixelCounts& pixels = report.pixels;
+  json["pixels"] = {{"candidates", pixels.candidates},
+                    {"at_nearest", pixels.at_nearest},
+                    {"at_farthest", pixels.at_farthest},
+                    {"ambiguous", pixels.ambiguous}};
+  if (report.extent) json["extent_m"] = asJson(*report.extent);
+  if (report.most_extent) json["most_extent_m"] = asJson(*report.most_extent);
+  json["recording_seconds"] = report.recording_s;
+  json["seconds"] = asJson(report.times.real);
+  json["cpu_seconds"] = byGrowth(report.times.cpu);
+  json["votes_per_second"] = votesPerSecond(report);
+  json["kernel"] = std::string(nameOf(sweep.kernelOrFastest()));
+  json["threads"] = sweep.threadsOrCores();
+  json["peak_memory_bytes"] = report.peak_memory_bytes;
+  if (report.sequence_maximum) json["sequence_maximum"] = *report.sequence_maximum;
+  if (report.view) json["reference_view"] = asJson(*report.view);
+  if (report.baseline_m) json["baseline_m"] = *report.baseline_m;
+  if (report.stopped_at) json["stopped_at"] = *report.stopped_at;
+  if (report.live) json["live"] = asJson(*report.live, counts);
+  json["warnings"] = asJson(report.warnings);
+  if (!report.doubts.empty()) json["doubtful"] = report.doubts;
+  if (report.refinement) json["refinement"] = asJson(*report.refinement);
+  if (report.pose_shift) json["refinement"]["moved"] = asJson(*report.pose_shift);
+  if (report.faults.any()) json["perturbation"] = asJson(report.faults);
+  if (!report.chosen.empty()) json["chosen"] = asJson(report.chosen);
+  json["options"] = asJson(report.options);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace efm

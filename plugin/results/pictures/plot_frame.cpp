@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/results/pictures/plot_frame.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace efm {
+namespace {
+
+constexpr int kPlotFont = cv::FONT_HERSHEY_SIMPLEX;
+
+/// Of the strokes of a text, in pixels.
+int thicknessOf(double scale) { return std::max(1, cvRound(1.7 * scale)); }
+
+AxisRange rangeOf(const CurvePlot& plot, const PlotAxis& axis, bool is_x) {
+  std::vector<double> values;
+  for (const Curve& curve : plot.curves) {
+    for (const cv::Point2d& point : curve.points) values.push_back(is_x ? point.x : point.y);
+  }
+  // The range includes a given end, so that the margin at the other end is right.
+  for (const auto& end : {axis.from, axis.to}) {
+    if (end) values.push_back(*end);
+  }
+  AxisRange range = rangeAround(values, axis.scale);
+  if (axis.from) range.from = *axis.from;
+  if (axis.to) range.to = *axis.to;
+  const bool fits = std::isfinite(range.from) && std::isfinite(range.to) && range.from < range.to &&
+                    (axis.scale == AxisScale::kLinear || range.from > 0);
+  if (!fits) {
+    throw std::invalid_argument("the plot '" + plot.title + "': the axis '" + axis.label +
+                                "' from " + std::to_string(range.from) + " to " +
+                                std::to_string(range.to) +
+                                ": expected ends in this order, above 0 where it is logarithmic");
+  }
+  return range;
+}
+
+/// Widens the range with more pixels per unit.
+void makeUnitsEqual(AxisRange& x, AxisRange& y, cv::Size pixels) {
+  const double per_pixel =
+      std::max((x.to - x.from) / pixels.width, (y.to - y.from) / pixels.height);
+  const auto widen = [&](AxisRange& range, int length) {
+    const double middle = 0.5 * (range.from + range.to);
+    range.from = middle - 0.5 * per_pixel * length;
+    range.to = middle + 0.5 * per_pixel * length;
+  };
+  widen(x, pixels.width);
+  widen(y, pixels.height);
+}
+
+int maxTicksX(const cv::Rect& area) { return std::max(2, area.width / 55); }
+int maxTicksY(const cv::Rect& area) { return std::max(2, area.height / 36); }
+
+/// Writes a text rotated to the left, around its centre.
+void writeTextUpwards(cv::Mat3b& picture, const std::string& text, cv::Point centre) {
+  const cv::Size size = plotTextSize(text) + cv::Size(2, 2);
+  cv::Mat3b horizontal(size, cv::Vec3b(255, 255, 255));
+  writeText(horizontal, text, {0, size.height - 6});
+  cv::Mat3b upright;
+  cv::rotate(horizontal, upright, cv::ROTATE_90_COUNTERCLOCKWISE);
+  const cv::Rect target(centre - cv::Point(upright.cols / 2, upright.rows / 2), upright.size());
+  const cv::Rect visible = target & cv::Rect({}, picture.size());
+  upright(visible - target.tl()).copyTo(picture(visible));
+}
+
+}  // namespace
+
+PlotFrame layOut(const CurvePlot& plot) {
+  PlotFrame frame;
+  frame.x = rangeOf(plot, plot.x, true);
+  frame.y = rangeOf(plot, plot.y, false);
+  const int line = plotTextSize("0").height;
+  const auto area_with = [&](int tick_width) {
+    const int left =
+        2 * kPlotGap + (plot.y.label.empty() ? 0 : line + kPlotGap) + tick_width + kPlotGap;
+    const int top = plot.title.empty() ? 2 * kPlotGap : line + 3 * kPlotGap;
+    const int bottom = 2 * kPlotGap + line + (plot.x.label.empty() ? 0 : line + kPlotGap);
+    return cv::Rect(left, top, plot.size.width - left - 3 * kPlotGap,
+                    plot.size.height - top - bottom);
+  };
+  frame.area = area_with(0);
+  if (plot.equal_units) makeUnitsEqual(frame.x, frame.y, frame.area.size());
+  int tick_width = 0;
+  for (const AxisTick& tick : ticksOf(frame.y, maxTicksY(frame.area))) {
+    tick_width = std::max(tick_width, plotTextSize(tick.text).width);
+  }
+  frame.area = area_with(tick_width);
+  if (plot.equal_units) makeUnitsEqual(frame.x, frame.y, frame.area.size());
+  return frame;
+}
+
+void drawAxes(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& frame) {
+  const cv::Rect& area = frame.area;
+  const int bottom = area.br().y - 1;
+  const int right = area.br().x - 1;
+  for (const AxisTick& tick : ticksOf(frame.x, maxTicksX(area))) {
+    const int x = cvRound(frame.pixelOf({tick.value, frame.y.from}).x);
+    cv::line(picture, {x, area.y}, {x, bottom}, kPlotGrid);
+    cv::line(picture, {x, bottom}, {x, bottom + 3}, kPlotInk);
+    const cv::Size size = plotTextSize(tick.text);
+    writeText(picture, tick.text, {x - size.width / 2, bottom + kPlotGap + size.height - 3});
+  }
+  for (const AxisTick& tick : ticksOf(frame.y, maxTicksY(area))) {
+    const int y = cvRound(frame.pixelOf({frame.x.from, tick.value}).y);
+    cv::line(picture, {area.x, y}, {right, y}, kPlotGrid);
+    cv::line(picture, {area.x - 3, y}, {area.x, y}, kPlotInk);
+    writeText(picture, tick.text, {area.x - kPlotGap - plotTextSize(tick.text).width, y + 4});
+  }
+  cv::rectangle(picture, area, kPlotInk);
+
+  const int middle = area.x + area.width / 2;
+  writeText(picture, plot.x.label,
+            {middle - plotTextSize(plot.x.label).width / 2, picture.rows - 2 * kPlotGap + 2});
+  if (!plot.y.label.empty()) {
+    writeTextUpwards(picture, plot.y.label, {2 * kPlotGap, area.y + area.height / 2});
+  }
+  writeText(picture, plot.title,
+            {std::max(kPlotGap, middle - plotTextSize(plot.title, kPlotTitleScale).width / 2),
+             area.y - kPlotGap - 2},
+            kPlotTitleScale);
+}
+
+cv::Size plotTextSize(const std::string& text, double scale) {
+  int baseline = 0;
+  const cv::Size size = cv::getTextSize(text, kPlotFont, scale, thicknessOf(scale), &baseline);
+  return {size.width, size.height + baseline};
+}
+
+void writeText(cv::Mat3b& picture, const std::string& text, cv::Point at, double scale) {
+  cv::putText(picture, text, at, kPlotFont, scale, kPlotInk, thicknessOf(scale), cv::LINE_AA);
+}
+
+}  // namespace efm

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/input_queue.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/events/event_check.h"
+
+namespace efm {
+namespace {
+
+std::uint64_t bytesOf(const CameraPacket& packet) {
+  return sizeof(CameraPacket) + packet.events.capacity() * sizeof(Event);
+}
+
+/// Without overflow: times are not checked yet.
+bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns = kFarAheadNs) {
+  return t_ns > other_ns &&
+         static_cast<std::uint64_t>(t_ns) - static_cast<std::uint64_t>(other_ns) >
+             static_cast<std::uint64_t>(limit_ns);
+}
+
+CameraPacket withoutEvents(const CameraPacket& packet) {
+  return {packet.camera, packet.calibration, {}, packet.covered_until_ns};
+}
+
+}  // namespace
+
+template <typename Input>
+void InputQueue::Stream<Input>::follow(std::int64_t t_ns) {
+  if (!reached_ns || t_ns > *reached_ns || isFarAfter(*reached_ns, t_ns)) reached_ns = t_ns;
+}
+
+template <typename Input>
+std::optional<Input> InputQueue::Stream<Input>::settle(bool is_right, std::uint64_t& refused) {
+  std::optional<Input> waited = std::exchange(ahead, std::nullopt);
+  if (!waited) return std::nullopt;
+  if (!is_right) {
+    ++refused;
+    return std::nullopt;
+  }
+  follow(ahead_ns);
+  return waited;
+}
+
+template <typename Input>
+std::optional<Input> InputQueue::Stream<Input>::settleLast(std::uint64_t& refused) {
+  return settle(reached_ns && !isFarAfter(ahead_ns, *reached_ns, kMaxLastPauseNs), refused);
+}
+
+InputQueue::InputQueue(const LiveOptions& options) : options_(options) {}
+
+InputQueue::Camera& InputQueue::cameraOf(int index) {
+  return cameras_.try_emplace(index, options_.max_event_rate).first->second;
+}
+
+void InputQueue::add(CameraPacket packet) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  Camera& camera = cameraOf(packet.camera);
+  camera.counts.received += packet.events.size();
+  if (ended_) {
+    camera.counts.after_end += packet.events.size();
+    return;
+  }
+  try {
+    requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
+    if (camera.last && !isSame(camera.last->calibration, packet.calibration)) {
+      throw std::invalid_argument(
+          fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "
+                      "earlier packets",
+                      packet.camera));
+    }
+  } catch (const std::invalid_argument&) {
+    camera.counts.refused += packet.events.size();
+    throw;
+  }
+  takeAhead(camera, packet);
+  pass(camera, std::move(packet));
+}
+
+void InputQueue::pass(Camera& camera, CameraPacket packet) {
+  packet.events = camera.budget.pass(std::move(packet.events), packet.covered_until_ns);
+  camera.last = withoutEvents(packet);
+  push(std::move(packet));
+}
+
+/// Refuses each event that is far ahead of those before and after it. One at the end of the packet
+/// waits; this packet decides about the one that waited.
+void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
+  std::vector<Event>& events = packet.events;
+  Stream<CameraPacket>& stream = camera.stream;
+  const std::optional<std::int64_t> begin_ns =
+      events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
+  const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
+  if (confirms || !events.empty()) {  // a cover alone refuses nothing
+    if (auto waited = stream.settle(confirms, camera.counts.refused)) {
+      pass(camera, std::move(*waited));
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const Event event = events[i];
+    if (stream.reached_ns && isFarAfter(event.t_ns, *stream.reached_ns)) {
+      if (i + 1 == events.size()) {
+        stream.ahead = CameraPacket{packet.camera, packet.calibration, {event}, std::nullopt};
+        stream.ahead_ns = event.t_ns;
+        if (packet.covered_until_ns) {  // it may end with this event
+          packet.covered_until_ns = std::min(*packet.covered_until_ns, *stream.reached_ns);
+        }
+        continue;
+      }
+      if (isFarAfter(event.t_ns, events[i + 1].t_ns)) {
+        ++camera.counts.refused;
+        continue;
+      }
+    }
+    stream.follow(event.t_ns);
+    events[kept++] = event;
+  }
+  events.resize(kept);
+  if (packet.covered_until_ns) stream.follow(*packet.covered_until_ns);
+}
+
+void InputQueue::push(CameraPacket packet) {
+  events_ += packet.events.size();
+  bytes_ += bytesOf(packet);
+  packets_.push_back(std::move(packet));
+  while (isFull() && !packets_.empty()) dropOldest();
+  changed_.notify_one();
+}
+
+bool InputQueue::isFull() const {
+  return events_ > static_cast<std::uint64_t>(options_.max_queue_events) ||
+         static_cast<double>(bytes_) > options_.max_queue_mb * 1e6;
+}
+
+void InputQueue::dropOldest() {
+  const CameraPacket& oldest = packets_.front();
+  events_ -= oldest.events.size();
+  bytes_ -= bytesOf(oldest);
+  cameraOf(oldest.camera).counts.dropped += oldest.events.size();
+  noteMissing(oldest, &WindowsGivenUp::overload);
+  packets_.pop_front();
+}
+
+void InputQueue::noteMissing(const CameraPacket& packet, GiveUpReason reason) {
+  if (packet.events.empty()) return;
+  MissingEvents& missing = missing_[packet.camera];
+  missing.until_ns = std::max(missing.until_ns, packet.events.back().t_ns + 1);
+  missing.reason = reason;
+}
+
+void InputQueue::skip(const CameraPacket& packet) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  QueueCounts& counts = cameraOf(packet.camera).counts;
+  counts.received += packet.events.size();
+  counts.paused += packet.events.size();
+  if (ended_) return;
+  noteMissing(packet, &WindowsGivenUp::paused);
+  changed_.notify_one();
+}
+
+void InputQueue::add(QueuedPose pose) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (ended_) {
+    ++refused_poses_;
+    return;
+  }
+  Stream<QueuedPose>& stream = pose_streams_[pose.source];
+  const std::int64_t t_ns = pose.pose.t_ns;
+  if (auto waited = stream.settle(!isFarAfter(stream.ahead_ns, t_ns), refused_poses_)) {
+    poses_.push_back(std::move(*waited));
+  }
+  if (stream.reached_ns && isFarAfter(t_ns, *stream.reached_ns)) {
+    stream.ahead = std::move(pose);
+    stream.ahead_ns = t_ns;
+  } else {
+    stream.follow(t_ns);
+    poses_.push_back(std::move(pose));
+  }
+  changed_.notify_one();
+}
+
+void InputQueue::end() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (ended_) return;
+  ended_ = true;
+  for (auto& [index, camera] : cameras_) {
+    if (auto last = camera.stream.settleLast(camera.counts.refused)) {
+      pass(camera, std::move(*last));
+    }
+    if (!camera.last) continue;
+    CameraPacket rest = *camera.last;
+    rest.events = camera.budget.finish();
+    if (!rest.events.empty()) push(std::move(rest));
+  }
+  for (auto& [source, stream] : pose_streams_) {
+    if (auto last = stream.settleLast(refused_poses_)) poses_.push_back(std::move(*last));
+  }
+  changed_.notify_one();
+}
+
+void InputQueue::stop() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  stopped_ = true;
+  changed_.notify_one();
+}
+
+InputQueue::Batch InputQueue::wait(std::optional<Clock::time_point> until) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const auto has_input = [this] {
+    return stopped_ || ended_ || !packets_.empty() || !poses_.empty() || !missing_.empty();
+  };
+  if (until) {
+    changed_.wait_until(lock, *until, has_input);
+  } else {
+    changed_.wait(lock, has_input);
+  }
+  return takeLocked();
+}
+
+InputQueue::Batch InputQueue::take() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return takeLocked();
+}
+
+InputQueue::Batch InputQueue::takeLocked() {
+  Batch batch;
+  batch.poses = std::exchange(poses_, {});
+  batch.packets.assign(std::move_iterator(packets_.begin()), std::move_iterator(packets_.end()));
+  packets_.clear();
+  for (const CameraPacket& packet : batch.packets) {
+    cameraOf(packet.camera).counts.taken += packet.events.size();
+  }
+  batch.missing = std::exchange(missing_, {});
+  events_ = 0;
+  bytes_ = 0;
+  batch.ended = ended_;
+  batch.stopped = stopped_;
+  return batch;
+}
+
+std::uint64_t InputQueue::queuedEvents() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return events_;
+}
+
+std::uint64_t InputQueue::refusedPoses() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return refused_poses_;
+}
+
+std::map<int, QueueCounts> InputQueue::counts() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::map<int, QueueCounts> counts;
+  for (const auto& [index, camera] : cameras_) {
+    QueueCounts& of_camera = counts[index];
+    of_camera = camera.counts;
+    of_camera.thinned = camera.budget.thinned();
+    of_camera.held = camera.budget.held() + (camera.stream.ahead ? 1 : 0);
+    of_camera.queued = of_camera.received - of_camera.thinned - of_camera.held - of_camera.dropped -
+                       of_camera.paused - of_camera.refused - of_camera.after_end - of_camera.taken;
+  }
+  return counts;
+}
+
+}  // namespace efm

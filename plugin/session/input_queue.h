@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "plugin/session/event_budget.h"
+#include "plugin/session/live_options.h"
+#include "plugin/session/mapping_session.h"
+
+namespace efm {
+
+/// A pose on its way to a session.
+struct QueuedPose {
+  StampedPose pose;
+  PoseSourceId source;
+  std::optional<PoseNoise> noise;
+};
+
+/// The input of a mapping that runs in another thread: thinned to the budget, and bounded in events
+/// and in bytes. Where it is full, the oldest packets are dropped, never poses. Any thread adds;
+/// one takes. Adding never waits for the mapping.
+///
+/// An event, or a pose, that is over a second ahead of its stream waits for the next one: where
+/// that is back, the one ahead is refused alone.
+class InputQueue {
+ public:
+  explicit InputQueue(const LiveOptions& options);
+
+  /// @throws std::invalid_argument where an event lies outside the sensor, or the calibration is
+  /// not that of the camera's earlier packets: the packet is refused.
+  void add(CameraPacket packet);
+  void add(QueuedPose pose);
+  /// Counts a packet that is not to be mapped.
+  void skip(const CameraPacket& packet);
+  /// No more input will come. Packets and poses that are added afterwards are counted.
+  void end();
+  /// Wakes up the taking thread for good.
+  void stop();
+
+  struct Batch {
+    std::vector<QueuedPose> poses;  ///< In the order they came.
+    std::vector<CameraPacket> packets;
+    /// The cameras with dropped or skipped packets.
+    std::map<int, MissingEvents> missing;
+    bool ended = false;
+    bool stopped = false;
+  };
+  using Clock = std::chrono::steady_clock;
+  /// Waits for input, at most until then.
+  Batch wait(std::optional<Clock::time_point> until = std::nullopt);
+  /// The input that is there.
+  Batch take();
+
+  std::uint64_t queuedEvents() const;
+  std::map<int, QueueCounts> counts() const;
+  /// Poses that came after the end, or were far ahead of their source.
+  std::uint64_t refusedPoses() const;
+
+ private:
+  /// How far a stream of input has come.
+  template <typename Input>
+  struct Stream {
+    std::optional<std::int64_t> reached_ns;  // the newest time that is not ahead
+    std::optional<Input> ahead;              // until the next one confirms its time
+    std::int64_t ahead_ns = 0;
+
+    /// The newest time, of a clock that may go back.
+    void follow(std::int64_t t_ns);
+    /// Ends the wait. @return what waited, if its time is right; otherwise it counts as refused.
+    std::optional<Input> settle(bool is_right, std::uint64_t& refused);
+    /// At the end of the input.
+    std::optional<Input> settleLast(std::uint64_t& refused);
+  };
+
+  struct Camera {
+    explicit Camera(double max_rate) : budget(max_rate) {}
+    EventBudget budget;
+    std::optional<CameraPacket> last;  // without events
+    Stream<CameraPacket> stream;       // of events and covers; one event may wait
+    QueueCounts counts;
+  };
+
+  Camera& cameraOf(int index);
+  void takeAhead(Camera& camera, CameraPacket& packet);
+  void pass(Camera& camera, CameraPacket packet);
+  void push(CameraPacket packet);
+  void dropOldest();
+  void noteMissing(const CameraPacket& packet, GiveUpReason reason);
+  bool isFull() const;
+  Batch takeLocked();
+
+  const LiveOptions options_;
+
+  mutable std::mutex mutex_;  // of the members below
+  std::condition_variable changed_;
+  std::map<int, Camera> cameras_;
+  std::deque<CameraPacket> packets_;
+  std::vector<QueuedPose> poses_;
+  std::map<PoseSourceId, Stream<QueuedPose>> pose_streams_;
+  std::uint64_t refused_poses_ = 0;
+  std::map<int, MissingEvents> missing_;
+  std::uint64_t events_ = 0;  // in packets_
+  std::uint64_t bytes_ = 0;
+  bool ended_ = false;
+  bool stopped_ = false;
+};
+
+}  // namespace efm

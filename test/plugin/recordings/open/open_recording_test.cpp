@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/open_recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plugin/mrpt/CObservationEvents.h"
+#include "test/plugin/message_of.h"
+#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+
+class OpenRecording : public TemporaryFolder {
+ protected:
+  static std::string errorOf(const std::vector<std::filesystem::path>& sources,
+                             const std::string& format = "auto") {
+    RecordingSource source;
+    source.files = sources;
+    source.format = format;
+    return errorOfSource(source);
+  }
+  static std::string errorOfSource(const RecordingSource& source) {
+    return messageOf([&] { openRecording(source); });
+  }
+  void write(const char* name, const std::string& text) const { writeFile(folder() / name, text); }
+};
+
+TEST_F(OpenRecording, AFileThatNobodyReadsIsAnErrorOfTheReaderThatFitsBest) {
+  using namespace std::string_literals;
+  const std::string other_columns = " (other columns: --event-columns, - for one to ignore)";
+  const struct {
+    const char* file;
+    std::string bytes;
+    std::string error;  // behind the name
+  } rows[] = {
+      {"e.txt", "0.1 1 2 up\n",
+       ":1: '0.1 1 2 up': p = 'up': expected polarity 0 or 1, or -1 or 1, or True or False, or ON "
+       "or "
+       "OFF"},
+      {"e.txt", "# events\n\n0.1 1 b 0\n", ":3: '0.1 1 b 0': y = 'b': expected a number"},
+      {"e.txt", "0,1 1 2 0\n",
+       ":1: '0,1 1 2 0': decimal commas: expected decimal points (tr , . <FILE >NEW)"},
+      {"e.csv", "t;x;y;p\n0,1;1;2;0\n",
+       ":2: '0,1;1;2;0': decimal commas: expected decimal points (tr , . <FILE >NEW)"},
+      {"e.txt", "0.1 1 2 0 7\n",
+       ":1: '0.1 1 2 0 7': expected 4 fields, t x y p, not 5" + other_columns},
+      {"e.csv", "x,y,p,t\n1,2,0\n",
+       ":2: '1,2,0': expected 4 fields, x y p t, not 3" + other_columns},
+      {"poses.txt",
+       "\xEF\xBB\xBF"
+       "0.1 1 2 3 0 0 0 1\n",
+       ": poses: expected --poses PATH"},
+      {"kitti.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n",
+       ":1: '1 0 0 0 0 1 0 0 0 0 1 0': 12 numbers, as poses of KITTI have, which have no times: "
+       "expected t tx ty tz qx qy qz qw, or a .npz file with N times and N x 4 x 4 matrices"},
+      {"old.raw", "% date 2020-01-01\n% plugin_name hal\n\0\1\2"s,
+       ": a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header: the encoding "
+       "of "
+       "its events is not known; give the RAW file as it was recorded (docs/recordings.md)"},
+      {"a.es", "Event Stream\2\0\0\1"s,
+       ": an Event Stream file (.es): it is not read; save the t, x, y and on that the Python "
+       "package "
+       "event_stream reads as a NumPy array, and give --time-unit us (docs/recordings.md)"},
+      {"bag/metadata.yaml", "rosbag2_bagfile_information:\n  version: 5\n",
+       ": the description of a ROS 2 bag: expected its folder, FOLDER (docs/recordings.md)"},
+      {"notes.txt", "words\n",
+       ": not a recording (it begins with 'words\\x0a'): expected a rawlog, or a recording in "
+       "another format (docs/recordings.md)"},
+      {"readme", "gain = 5 at 3 of the set\n",
+       ": not a recording (it begins with 'gain = 5 at 3 of the set'): expected a rawlog, or a "
+       "recording in another format (docs/recordings.md)"},
+  };
+  for (const auto& [name, bytes, error] : rows) {
+    const std::filesystem::path file = folder() / name;
+    writeFile(file, bytes);
+    std::string expected = error;
+    for (const auto& [word, path] : {std::pair<std::string, std::filesystem::path>{"PATH", file},
+                                     {"FOLDER", file.parent_path()}}) {
+      const std::size_t at = expected.find(word);
+      if (at != std::string::npos) expected.replace(at, word.size(), path.string());
+    }
+    EXPECT_EQ(errorOf({file}), file.string() + expected);
+  }
+}
+
+/// The size of the first camera, and the number of poses and of warnings.
+struct Opened {
+  int width = 0;
+  int poses = 0;
+  std::vector<std::string> warnings;
+};
+Opened openedOf(const RecordingSource& source) {
+  Opened opened;
+  const auto recording = openRecording(source);
+  while (const auto observation = recording->next()) {
+    const auto* events = dynamic_cast<const CObservationEvents*>(observation.get());
+    if (events != nullptr) opened.width = static_cast<int>(events->camera.width);
+    if (events == nullptr) ++opened.poses;
+  }
+  for (const Warning& warning : recording->counts().warnings) {
+    opened.warnings.push_back(warning.name + ": " + warning.text);
+  }
+  return opened;
+}
+
+TEST_F(OpenRecording, TheOnlyCalibrationAndTheOnlyPosesOfAFolderAreTakenAndSaid) {
+  const std::string camera =
+      "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
+      "resolution: [346, 260]}\n";
+  write("events.txt", "0.1 300 2 0\n0.2 1 2 1\n");
+  write("imu.txt", "0.1 1 2 3 4 5 6\n");
+  write("my rig.yaml", camera);
+  write("tracker.csv", "t_ns,x,y,z,qx,qy,qz,qw\n5,1,2,3,0,0,0,1\n");
+  RecordingSource source;
+  source.files = {folder()};
+  const Opened opened = openedOf(source);
+  EXPECT_EQ(opened.width, 346);
+  EXPECT_EQ(opened.poses, 1);
+  const auto said = [&](const char* name, const char* option) {
+    return "found-file: " + (folder() / name).string() +
+           ": taken, as the only one in the folder (" + option + ")";
+  };
+  EXPECT_THAT(opened.warnings, testing::ElementsAre(said("my rig.yaml", "--calibration"),
+                                                    said("tracker.csv", "--poses")));
+  write("other.yaml", camera);
+  EXPECT_THAT(
+      errorOf({folder()}),
+      HasSubstr("no calibration: expected calib.txt (not clear: my rig.yaml, other.yaml), or "
+                "--calibration FILE"));
+  write("second.txt", "0.1 1 2 3 0 0 0 1\n");
+  source.calibration = folder() / "other.yaml";
+  EXPECT_THAT(
+      errorOfSource(source),
+      HasSubstr("no poses: expected groundtruth.txt (not clear: second.txt, tracker.csv), or"));
+  // Names that the layout knows come first, without a word.
+  write("groundtruth.txt", "0.1 1 2 3 0 0 0 1\n0.2 1 2 3 0 0 0 1\n");
+  const Opened known = openedOf(source);
+  EXPECT_EQ(known.poses, 2);
+  EXPECT_THAT(known.warnings, testing::IsEmpty());
+}
+
+TEST_F(OpenRecording, TheSensorsSizeMayBeTold) {
+  write("e.txt", "0.1 300 2 0\n0.2 1 2 1\n");
+  write("calib.txt", "200 200 120 90 0 0 0 0 0\n");
+  RecordingSource source;
+  source.files = {folder() / "e.txt"};
+  source.reader.sensor_size = CameraSize{320, 240};
+  source.complete = false;
+  EXPECT_EQ(openedOf(source).width, 320);
+  source.calibration = folder() / "calib.txt";  // without a size
+  EXPECT_EQ(openedOf(source).width, 320);
+  write("e.txt", "640 480\n0.1 300 2 0\n0.2 1 2 1\n");
+  EXPECT_EQ(errorOfSource(source),
+            "--sensor-size 320x240: " + (folder() / "e.txt").string() + " has 640x480 pixels");
+}
+
+TEST_F(OpenRecording, AnIntervalHasRoomForEachCamerasTimeOffsets) {
+  const auto camchain = [](int shift_ms) {
+    std::string text;
+    for (const char* name : {"cam0", "cam1"}) {
+      text += name +
+              std::string(
+                  ":\n  camera_model: pinhole\n  intrinsics: [200, 200, 120, 90]\n"
+                  "  distortion_model: none\n  resolution: [240, 180]\n"
+                  "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+                  "  timeshift_cam_imu: ") +
+              std::to_string(name[3] == '1' ? 1e-3 * shift_ms : 0) + "\n";
+    }
+    return text;
+  };
+  std::string events;  // one each ms
+  for (int i = 1000; i < 2000; ++i) {
+    events += "1." + std::to_string(i).substr(1) + " " + std::to_string(i % 240) + " 1 0\n";
+  }
+  write("cam0/events.txt", events);
+  write("cam1/events.txt", events);
+  write("poses.txt", "1.5 1 2 3 0 0 0 1\n");
+  struct Case {
+    int own_ms;
+    std::optional<int> given_ms;
+    int first_ms;  // of camera 1, whose times are the poses' minus the offset
+    int end_ms;
+  };
+  for (const auto& [own_ms, given_ms, first_ms, end_ms] : {Case{0, {}, 400, 600},
+                                                           {50, {}, 350, 600},
+                                                           {-50, {}, 400, 650},
+                                                           {0, 80, 320, 600},
+                                                           {50, 80, 320, 600},
+                                                           {80, 50, 320, 600},
+                                                           {50, -80, 350, 680},
+                                                           {-50, 80, 320, 650},
+                                                           {-50, -80, 400, 680},
+                                                           {-80, -50, 400, 680}}) {
+    write("camchain.yaml", camchain(own_ms));
+    RecordingSource source;
+    source.files = {folder()};
+    source.start_ns = 1'400'000'000;
+    source.end_ns = 1'600'000'000;
+    if (given_ms) {
+      write("given.yaml", camchain(*given_ms));
+      source.calibration = folder() / "given.yaml";
+    }
+    std::vector<Event> found[2];
+    const auto recording = openRecording(source);
+    while (const auto observation = recording->next()) {
+      const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
+      if (packet == nullptr) continue;
+      std::vector<Event>& camera = found[packet->camera_index];
+      camera.insert(camera.end(), packet->events.begin(), packet->events.end());
+    }
+    ASSERT_EQ(found[0].size(), 200U);
+    EXPECT_EQ(found[0][0].t_ns, *source.start_ns);
+    ASSERT_EQ(found[1].size(), static_cast<std::size_t>(end_ms - first_ms)) << own_ms;
+    EXPECT_EQ(found[1][0].t_ns, (1000 + first_ms) * std::int64_t{1'000'000});
+  }
+}
+
+TEST_F(OpenRecording, SourcesThatDoNotFitTogetherAreErrors) {
+  const std::string camera =
+      "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
+      "resolution: [240, 180]}\n";
+  for (const char* name : {"uzh/events.txt", "a/cam0/events.txt", "b/cam0/events.txt"}) {
+    write(name, "0.1 1 2 0\n");
+  }
+  write("uzh/calib.txt", "200 200 120 90 0 0 0 0 0\n");
+  write("a/camchain.yaml", camera);
+  write("b/camchain.yaml", camera);
+  write("r.rawlog",
+        "\x8d"
+        "CObservationGPS");
+  const auto uzh = folder() / "uzh";
+  const auto a = folder() / "a";
+  EXPECT_EQ(errorOf({uzh, a}), a.string() + ": a second calibration, beside " +
+                                   (uzh / "calib.txt").string() +
+                                   ": expected one of all cameras, or --calibration FILE");
+  EXPECT_EQ(errorOf({a, folder() / "b"}),
+            (folder() / "b").string() + ": 2 sources: expected one, a dataset folder");
+  EXPECT_EQ(
+      errorOf({a, folder() / "r.rawlog"}),
+      (folder() / "r.rawlog").string() + ": a rawlog beside other sources: expected it alone");
+  EXPECT_EQ(errorOf({}), "no source: expected a recording");
+  EXPECT_EQ(errorOf({a}, "tape"), "'tape' is not a known format");
+  RecordingSource rawlog;
+  rawlog.files = {folder() / "r.rawlog"};
+  rawlog.reader.sensor_size = CameraSize{320, 240};
+  EXPECT_THAT(errorOfSource(rawlog), HasSubstr("r.rawlog: a rawlog, which has the size of its"));
+  RecordingSource given;
+  given.files = {a};
+  for (const auto file :
+       {&RecordingSource::poses, &RecordingSource::calibration, &RecordingSource::hand_eye}) {
+    RecordingSource source = given;
+    source.*file = folder() / "none";
+    EXPECT_THAT(errorOfSource(source), HasSubstr("none: no such file"));
+  }
+}
+
+}  // namespace
+}  // namespace efm

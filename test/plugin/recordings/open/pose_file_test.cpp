@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/pose_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "test/plugin/recordings/columns/zip_file.h"
+#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class PoseFile : public TemporaryFolder {
+ protected:
+  /// Two poses: at t0 and t1, at (1, 2, 3) and (4, 5, 6), turned by (0.5, 0.5, 0.5, 0.5) and
+  /// (0.8, 0, 0, 0.6), x y z w.
+  static void expectTwo(const std::vector<StampedPose>& poses, std::int64_t t0_ns,
+                        std::int64_t t1_ns, const std::string& what) {
+    ASSERT_EQ(poses.size(), 2U) << what;
+    EXPECT_EQ(poses[0].t_ns, t0_ns) << what;
+    EXPECT_EQ(poses[1].t_ns, t1_ns) << what;
+    EXPECT_EQ(poses[0].T_world_rig.translation, Eigen::Vector3d(1, 2, 3)) << what;
+    EXPECT_EQ(poses[1].T_world_rig.translation, Eigen::Vector3d(4, 5, 6)) << what;
+    const Eigen::Vector4d q0 = poses[0].T_world_rig.rotation.coeffs();
+    const Eigen::Vector4d q1 = poses[1].T_world_rig.rotation.coeffs();
+    EXPECT_LT(std::min((q0 - Eigen::Vector4d(0.5, 0.5, 0.5, 0.5)).norm(),
+                       (q0 + Eigen::Vector4d(0.5, 0.5, 0.5, 0.5)).norm()),
+              1e-12)
+        << what;
+    EXPECT_LT((q1 - Eigen::Vector4d(0.8, 0, 0, 0.6)).norm(), 1e-12) << what;
+  }
+  std::filesystem::path write(const std::string& name, const std::string& bytes) const {
+    writeFile(folder() / name, bytes);
+    return folder() / name;
+  }
+  std::string errorOfFile(const std::string& name, const std::string& bytes) const {
+    write(name, bytes);
+    return errorOf([&] { readPoses(folder() / name); });
+  }
+};
+
+constexpr const char* kTum =
+    "# the rig\n1.000000001 1 2 3 0.5 0.5 0.5 0.5\n\n1700000000.123456789 4 5 6 0.8 0 0 0.6\n";
+
+TEST_F(PoseFile, TextHasTheColumnsOfTheTumBenchmarkOrOfItsHeader) {
+  const struct {
+    const char* name;
+    std::string text;
+    std::int64_t t0_ns;
+    std::int64_t t1_ns;
+  } rows[] = {
+      {"poses.txt", kTum, 1'000'000'001, 1'700'000'000'123'456'789},
+      {"mocap_data.txt",
+       "# timestamp px py pz qx qy qz qw\n928218 1 2 3 0.5 0.5 0.5 0.5\n936552 4 5 6 0.8 0 0 0.6\n",
+       928'218'000, 936'552'000},
+      {"header.txt",
+       "timestamp[us] tx ty tz qx qy qz qw\n1700000000123456 1 2 3 0.5 0.5 0.5 0.5\n"
+       "1700000000123457.5 4 5 6 0.8 0 0 0.6\n",
+       1'700'000'000'123'456'000, 1'700'000'000'123'457'500},
+      {"blank_unit.txt",
+       "# time [ms] x y z qx qy qz qw\n7 1 2 3 .5 .5 .5 .5\n8.5 4 5 6 0.8 0 0 0.6\n", 7'000'000,
+       8'500'000},
+      {"mark.txt", std::string("\xEF\xBB\xBF") + kTum, 1'000'000'001, 1'700'000'000'123'456'789},
+      {"mark.csv", "\xEF\xBB\xBFt_ns,x,y,z,qx,qy,qz,qw\n5,1,2,3,.5,.5,.5,.5\n7,4,5,6,.8,0,0,.6\n",
+       5, 7},
+      {"data.csv",
+       "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], "
+       "q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\r\n"
+       "1403636580838555648,1,2,3,0.5,0.5,0.5,0.5,9\r\n1403636580838555649,4,5,6,0.6,0.8,0,0,9\r\n",
+       1'403'636'580'838'555'648, 1'403'636'580'838'555'649},
+      {"other.csv",
+       "\"qw\";\"qx\";\"qy\";\"qz\";\"pos_x\";\"pos_y\";\"pos_z\";\"t_ns\"\n0.5;0.5;0.5;0.5;1;2;3;"
+       "5\n"
+       "0.6;0.8;0;0;4;5;6;7\n",
+       5, 7},
+      {"millimetres.csv",
+       "t_ns,qw,qx,qy,qz,x_mm,y_cm,z [m]\n5,0.5,0.5,0.5,0.5,1000,200,3\n"
+       "7,0.6,0.8,0,0,4000,500,6\n",
+       5, 7},
+      {"blank_millimetres.txt",
+       "# t [s] tx [mm] ty [mm] tz [mm] qx qy qz qw\n1.5 1000 2000 3000 0.5 0.5 0.5 0.5\n"
+       "2.5 4000 5000 6000 0.8 0 0 0.6\n",
+       1'500'000'000, 2'500'000'000},
+  };
+  for (const auto& row : rows) {
+    expectTwo(readPoses(write(row.name, row.text)), row.t0_ns, row.t1_ns, row.name);
+  }
+}
+
+TEST_F(PoseFile, TheUnitOfWholeNumbersIsToldOrCertain) {
+  std::string lines;
+  for (int i = 0; i < 12; ++i) lines += std::to_string(928'218 + i) + " 1 2 3 0 0 0 1\n";
+  EXPECT_THAT(errorOfFile("small.txt", lines),
+              AllOf(HasSubstr("small.txt: all times are whole"), HasSubstr("--time-unit ms")));
+  ReaderOptions options;
+  options.time_unit = "us";
+  EXPECT_EQ(readPoses(folder() / "small.txt", options)[1].t_ns, 928'219'000);
+  // The first 100 are looked at, and all are read.
+  for (const int count : {99, 100}) {
+    lines.clear();
+    for (int i = 0; i < count; ++i) lines += std::to_string(928'218 + i) + " 1 2 3 0 0 0 1\n";
+    for (int i = 0; i < 40'000; ++i) lines += "930000.5 1 2 3 0.5 -0.5 0.5 -0.5\n";
+    const std::string error = errorOfFile("long.txt", lines);
+    EXPECT_THAT(error, HasSubstr(count == 99 ? "no error" : "all times are whole"));
+  }
+  EXPECT_EQ(readPoses(folder() / "long.txt", options).size(), 40'100U);
+  // Decimals are seconds: the option is that of the events. Compressed text is text.
+  writeGzip(folder() / "poses.txt.gz", kTum);
+  writeZip(folder() / "poses.zip", {{"a/poses.txt", kTum}});
+  for (const auto& file :
+       {write("poses.txt", kTum), folder() / "poses.txt.gz", folder() / "poses.zip"}) {
+    expectTwo(readPoses(file, options), 1'000'000'001, 1'700'000'000'123'456'789, file.string());
+  }
+}
+
+TEST_F(PoseFile, ArraysAreVectorsOrMatricesWithTimes) {
+  const std::vector<double> seconds = {1.25, 1700000000.123456};
+  const std::vector<double> vectors = {1, 2, 3, 0.5, 0.5, 0.5, 0.5, 4, 5, 6, 0.8, 0, 0, 0.6};
+  const std::vector<double> matrices = {0,     0, 1, 1,    1,     0, 0, 2, 0, 1, 0,
+                                        3,     0, 0, 0,    1,     1, 0, 0, 4, 0, -0.28,
+                                        -0.96, 5, 0, 0.96, -0.28, 6, 0, 0, 0, 1};
+  const std::vector<double> eight = {1.25, 1, 2, 3,   0.5, 0.5, 0.5, 0.5, 1700000000.123456,
+                                     4,    5, 6, 0.8, 0,   0,   0.6};
+  const std::string t = npyArray("<f8", "(2,)", seconds);
+  const std::string poses = npyArray("<f8", "(2, 7)", vectors);
+  write("eight.npy", npyArray("<f8", "(2, 8)", eight));
+  writeZip(folder() / "vectors.npz", {{"t.npy", t}, {"poses.npy", poses}});
+  writeZip(folder() / "any_names.npz", {{"b.npy", poses}, {"a.npy", t}});
+  writeZip(folder() / "matrices.npz",
+           {{"T_world_body.npy", npyArray("<f8", "(2, 4, 4)", matrices)}, {"stamps.npy", t}});
+  const std::string other = npyArray("<f8", "(2,)", std::vector<double>{3, 4});
+  writeZip(folder() / "others.npz", {{"other.npy", other},
+                                     {"poses.npy", poses},
+                                     {"timestamps.npy", t},
+                                     {"meta.npy", npyArray("|O", "(1,)", std::vector<double>{0})}});
+  for (const char* name :
+       {"eight.npy", "vectors.npz", "any_names.npz", "matrices.npz", "others.npz"}) {
+    expectTwo(readPoses(folder() / name), 1'250'000'000, 1'700'000'000'123'456'000, name);
+  }
+  const std::vector<std::int64_t> ns = {1'700'000'000'000'000'001, 1'700'000'000'000'000'003};
+  writeZip(folder() / "ns.npz", {{"t.npy", npyArray("<i8", "(2, 1)", ns)}, {"p.npy", poses}});
+  expectTwo(readPoses(folder() / "ns.npz"), ns[0], ns[1], "ns.npz");
+  const std::vector<std::int64_t> small = {1, 3};
+  writeZip(folder() / "us.npz", {{"t_us.npy", npyArray("<i8", "(2,)", small)}, {"p.npy", poses}});
+  expectTwo(readPoses(folder() / "us.npz"), 1'000, 3'000, "us.npz");
+}
+
+TEST_F(PoseFile, AFolderAndARecordingHaveTheirOwnPoses) {
+  write("events.txt", "0.1 1 2 0\n");
+  write("groundtruth.txt", kTum);
+  expectTwo(readPoses(folder()), 1'000'000'001, 1'700'000'000'123'456'789, "folder");
+  write("groundtruth.txt",
+        "#timestamp [us],qw,qx,qy,qz,px,py,pz\n1000000.001,.5,.5,.5,.5,1,2,3\n"
+        "1700000000123456.789,.6,.8,0,0,4,5,6\n");
+  expectTwo(readPoses(folder()), 1'000'000'001, 1'700'000'000'123'456'789, "with a header");
+}
+
+TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
+  const std::string header = "#t [us], tx, ty, tz, qx, qy, qz, qw\n";
+  const struct {
+    const char* name;
+    std::string bytes;
+    const char* error;
+  } cases[] = {
+      {"a.txt", "", "a.txt: an empty file"},
+      {"a.txt", "# nothing\n", "a.txt: no poses"},
+      {"a.txt", "1 2 3\n", "a.txt:1: 3 fields: expected 8, t tx ty"},
+      {"a.txt", "# x\n1.5 1 2 3 0 0 0 2\n", "a.txt:2: qx qy qz qw = '0 0 0 2', of length 2"},
+      {"a.txt", "1.5 1 2 3 0 0 0 1\nabc 1 2 3 0 0 0 1\n", "a.txt:2: 'abc 1 2 3 0 0 0 1': expected"},
+      {"a.txt", "1.5,1,2,3,0,0,0,1\n", "a.txt:1: commas without a header"},
+      {"a.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 9 0 1 0 0 0 0 1 0\n",
+       "a.txt:1: 12 numbers, as poses of KITTI have, which have no times: expected t tx ty tz"},
+      {"a.csv", "#t [us], tx, ty, tz, qx, qy, qz\n", "there is no column qw"},
+      {"a.csv", "t_us,x [ft],y [ft],z [ft],qx,qy,qz,qw\n",
+       "a.csv:1: the unit 'ft' of tx: expected"},
+      {"a.csv", "t_us,x,y,z,roll,pitch,yaw\n", "angles are not read, because"},
+      {"a.txt", "1.5 1 2 3 10 20 30\n", "7 fields: expected 8, t tx ty tz qx qy qz qw (angles are"},
+      {"a.txt", "1.5 1 0 0 0 1 2 3\n", "is the order t qx qy qz qw tx ty tz? A header names"},
+      {"a.txt", "1.5 1 2 3 0 45 0 0\n", "are the columns t tx ty tz qx qy qz qw? A header names"},
+      {"a.csv", header + "1,1,2,3,0,0,0\n", "a.csv:2: 7 fields: expected 8, as in the header"},
+      {"a.csv", header + "1,1,2,3,0,0,0,z\n", "a.csv:2: qw = 'z': expected a finite number"},
+      {"a.bin", std::string("\x7f\0ELF", 5), "a.bin: not a file of poses: expected text"},
+      {"a.npy", npyArray<double>("<f8", "(2, 7)", {1}),
+       "bytes follow the array's header: expected"},
+      {"a.npy", npyArray<double>("<f8", "(1, 2)", {1, 2}),
+       "a.npy: shape (1, 2): expected N rows of 8"},
+      {"a.npy", npyArray<double>("<f8", "(1, 8)", {1.5, 1, 2, 3, 0, 0, 0, 3}),
+       "a.npy: row 0: qx qy qz qw of length 3"},
+      {"a.npy", npyArray<double>("<f8", "(1, 8)", {1e300, 1, 2, 3, 0, 0, 0, 1}),
+       "row 0: t = 1e+300"},
+      {"a.npy", npyArray<double>("<f8", "(1, 8)", {1.5, NAN, 2, 3, 0, 0, 0, 1}), "is not finite"},
+      {"a.gz", "\x1f\x8b garbage", "a.gz: cannot be unpacked"},
+      {"a.zip", "PK\x03\x04 garbage", "a.zip: cannot be unpacked"},
+  };
+  for (const auto& row : cases) {
+    EXPECT_THAT(errorOfFile(row.name, row.bytes), HasSubstr(row.error)) << row.name;
+  }
+  writeZip(folder() / "b.npz", {{"x.npy", npyArray<double>("<f8", "(2,)", {1, 2})}});
+  EXPECT_THAT(errorOf([&] { readPoses(folder() / "b.npz"); }),
+              AllOf(HasSubstr("b.npz: has x.npy (2)"), HasSubstr("N x 7")));
+  writeZip(folder() / "c.npz",
+           {{"t.npy", npyArray<double>("<f8", "(1,)", {1})},
+            {"p.npy", npyArray<double>("<f8", "(2, 7)", std::vector<double>(14))}});
+  EXPECT_THAT(errorOf([&] { readPoses(folder() / "c.npz"); }),
+              HasSubstr("c.npz/t.npy: 1 rows: expected 2"));
+  writeZip(folder() / "d.zip", {{"a.txt", kTum}, {"b.txt", kTum}});
+  EXPECT_THAT(errorOf([&] { readPoses(folder() / "d.zip"); }), HasSubstr("several files in it"));
+  EXPECT_THAT(errorOf([&] { readPoses(folder() / "nowhere"); }),
+              HasSubstr("nowhere: cannot be opened for reading"));
+}
+
+}  // namespace
+}  // namespace efm

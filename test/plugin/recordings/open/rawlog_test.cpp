@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/obs/CActionCollection.h>
+#include <mrpt/obs/CActionRobotMovement2D.h>
+#include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationGPS.h>
+#include <mrpt/obs/CRawlog.h>
+#include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/serialization/CArchive.h>
+
+#include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/registration.h"
+#include "plugin/recordings/open/gz_stream.h"
+#include "plugin/recordings/open/rawlog_recording.h"
+#include "plugin/recordings/open/rawlog_signature.h"
+#include "plugin/recordings/open/rawlog_writer.h"
+#include "test/plugin/message_of.h"
+#include "test/plugin/mrpt/observations.h"
+#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using mrpt::obs::CObservation;
+using testing::AllOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+using Observations = std::vector<CObservation::Ptr>;
+
+/// The observations of a recording and its error, if there is one.
+struct Delivery {
+  Observations observations;
+  std::string error;
+  std::string again;  // the next error
+};
+
+Delivery read(const std::filesystem::path& file) {
+  Delivery delivery;
+  RawlogRecording recording(file);
+  double progress = 0;
+  try {
+    while (auto observation = recording.next()) {
+      delivery.observations.push_back(observation);
+      EXPECT_GE(recording.progress(), progress);
+      progress = recording.progress();
+    }
+    EXPECT_EQ(progress, 1);
+  } catch (const std::exception& error) {
+    delivery.error = error.what();
+    delivery.again = messageOf([&] { recording.next(); });
+  }
+  return delivery;
+}
+
+void expectSame(const CObservation& a, const CObservation& b) {
+  EXPECT_EQ(a.GetRuntimeClass(), b.GetRuntimeClass());
+  EXPECT_EQ(a.sensorLabel, b.sensorLabel);
+  EXPECT_EQ(a.timestamp, b.timestamp);
+  if (const auto* events = dynamic_cast<const CObservationEvents*>(&a)) {
+    EXPECT_TRUE(events->events == dynamic_cast<const CObservationEvents&>(b).events);
+  }
+}
+
+void expectBeginningOf(const Observations& all, const Observations& some) {
+  ASSERT_LE(some.size(), all.size());
+  for (std::size_t i = 0; i < some.size(); ++i) expectSame(*all[i], *some[i]);
+}
+
+/// One line without MRPT's decoration.
+testing::Matcher<std::string> isPlain() {
+  return AllOf(Not(HasSubstr("xception")), Not(HasSubstr("Location")), Not(HasSubstr("Message")),
+               Not(HasSubstr("\n")), Not(EndsWith("unreadable")));
+}
+
+class Rawlog : public TemporaryFolder {
+ protected:
+  Rawlog() { registerClasses(); }
+
+  std::filesystem::path file() const { return folder() / "r.rawlog"; }
+
+  void write(const Observations& observations) const {
+    RawlogWriter writer(file());
+    for (const auto& observation : observations) writer.write(*observation);
+    writer.close();
+  }
+
+  void writeBytes(const std::string& bytes) const { writeFile(file(), bytes); }
+
+  /// The uncompressed content.
+  std::string plainContent() const {
+    GzInputStream stream(file());
+    std::string plain;
+    char byte = 0;
+    while (stream.Read(&byte, 1) == 1) plain += byte;
+    return plain;
+  }
+
+  /// Any objects, as other programs may store them.
+  template <typename... Objects>
+  void writeObjects(const Objects&... objects) const {
+    GzOutputStream stream(file());
+    auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream);
+    (archive << ... << objects);
+    stream.close();
+  }
+
+  const Observations recorded = observationsOf(SyntheticRecording(0.2));
+};
+
+TEST_F(Rawlog, IsReadByMrptAndBackAlsoWithoutCompression) {
+  write(recorded);
+  mrpt::obs::CRawlog rawlog;
+  ASSERT_TRUE(rawlog.loadFromRawLogFile(file().string()));
+  ASSERT_EQ(rawlog.size(), recorded.size());
+  expectSame(*rawlog.getAsObservation(0), *recorded[0]);
+  const std::string plain = plainContent();
+  ASSERT_LT(readText(file()).size(), plain.size());
+  for (const bool compressed : {true, false}) {
+    if (!compressed) writeBytes(plain);
+    const Delivery delivery = read(file());
+    EXPECT_EQ(delivery.error, "");
+    EXPECT_EQ(delivery.observations.size(), recorded.size());
+    expectBeginningOf(recorded, delivery.observations);
+  }
+  writeBytes(plain.substr(0, plain.size() - 1));
+  const Delivery cut = read(file());
+  EXPECT_THAT(cut.error,
+              AllOf(StartsWith("stopped at entry " + std::to_string(recorded.size() - 1)),
+                    EndsWith("r.rawlog: the file ends in the middle of its data")));
+  EXPECT_EQ(cut.observations.size(), recorded.size() - 1);
+}
+
+TEST_F(Rawlog, ObservationsOfFramesComeOneByOneWithoutActionsAndComments) {
+  mrpt::obs::CSensoryFrame frame;
+  frame.insert(recorded[0]);
+  frame.insert(recorded[1]);
+  writeObjects(mrpt::obs::CObservationGPS(), mrpt::obs::CActionCollection(), frame,
+               mrpt::obs::CObservationComment(), mrpt::obs::CActionCollection(), frame);
+  const Delivery delivery = read(file());
+  EXPECT_EQ(delivery.error, "");
+  ASSERT_EQ(delivery.observations.size(), 5);
+  for (const std::size_t i : {1, 2, 3, 4}) {
+    expectSame(*delivery.observations[i], *recorded[(i - 1) % 2]);
+  }
+}
+
+TEST_F(Rawlog, OfMovementsWithoutATimeTheLastPoseIsThatOfTheFrame) {
+  mrpt::obs::CActionRobotMovement2D movement;
+  movement.timestamp = INVALID_TIMESTAMP;
+  movement.computeFromOdometry(mrpt::poses::CPose2D(1, 0, 0), {});
+  const mrpt::obs::CActionCollection action(movement);
+  mrpt::obs::CSensoryFrame frame;
+  frame.insert(recorded[0]);
+  mrpt::obs::CSensoryFrame later;
+  later.insert(recorded[30]);
+  writeObjects(action, action, action, frame, action, later);
+
+  const Delivery delivery = read(file());
+  EXPECT_EQ(delivery.error, "");
+  ASSERT_EQ(delivery.observations.size(), 4);
+  const auto first = poseIn(*delivery.observations[0]);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(delivery.observations[0]->timestamp, recorded[0]->timestamp);
+  EXPECT_NEAR(first->T_world_body.translation.x(), 3, 1e-12);
+  const auto second = poseIn(*delivery.observations[2]);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(delivery.observations[2]->timestamp, recorded[30]->timestamp);
+  EXPECT_NEAR(second->T_world_body.translation.x(), 4, 1e-12);
+}
+
+TEST_F(Rawlog, TruncatedAnywhereIsAnErrorThatNamesTheEntryAfterAllEntriesBeforeIt) {
+  write(recorded);
+  const std::string bytes = readText(file());
+  std::size_t most = 0;
+  // Its last 8 bytes are gzip's checksum and size.
+  for (std::size_t size = 0; size < bytes.size();
+       size +=
+       size + 8 < bytes.size() ? std::min(1 + bytes.size() / 50, bytes.size() - 8 - size) : 1) {
+    writeBytes(bytes.substr(0, size));
+    const Delivery delivery = read(file());
+    EXPECT_THAT(
+        delivery.error,
+        AllOf(
+            StartsWith("stopped at entry " + std::to_string(delivery.observations.size()) + " of "),
+            HasSubstr("r.rawlog: "), isPlain(),
+            EndsWith(size == 0 ? "the file is empty" : "the file ends in the middle of its data")))
+        << "cut to " << size << " of " << bytes.size() << " bytes";
+    EXPECT_THAT(delivery.again, StartsWith("stopped at entry "));
+    expectBeginningOf(recorded, delivery.observations);
+    most = std::max(most, delivery.observations.size());
+  }
+  EXPECT_EQ(most, recorded.size());
+}
+
+TEST_F(Rawlog, IsKnownByTheNameOfItsFirstObject) {
+  const auto sized = [](char length, std::size_t count) {
+    return length + std::string(count, 'a');
+  };
+  const std::string wide("\3\0\0\0abc", 7);  // as of old versions
+  const std::pair<std::string, const char*> rows[] = {
+      {sized('\x83', 3), nullptr},
+      {sized('\xf8', 120), nullptr},
+      {sized('\x83', 1), nullptr},  // truncated
+      {"\x8b"
+       "az09AZ_:<>,",
+       nullptr},
+      {wide, nullptr},
+      {wide.substr(0, 2), nullptr},
+      {sized('\x82', 2), "it begins with '\\x82aa'"},
+      {sized('\xf9', 121), "it begins with '\\xf9aaaaaaaaaaaaaaaaaaaaaaa'"},
+      {std::string("\2\0\0\0ab", 6), "it begins with"},
+      {std::string("\3\0\0\1abc", 7), "it begins with"},
+      {"\x83"
+       "a-c",
+       "it begins with '\\x83a-c'"},
+      {"", "it is empty"},
+  };
+  for (const auto& [bytes, why] : rows) {
+    writeBytes(bytes);
+    EXPECT_EQ(whyNoRawlog(file()).has_value(), why != nullptr) << bytes;
+    EXPECT_THAT(whyNoRawlog(file()).value_or(""), StartsWith(why != nullptr ? why : ""));
+  }
+  for (const char other : std::string("`{@[/;=?- ")) {
+    writeBytes(
+        "\x83"
+        "a" +
+        std::string(1, other) + "a");
+    EXPECT_TRUE(whyNoRawlog(file())) << other;
+  }
+}
+
+TEST_F(Rawlog, AChangedByteIsAnErrorAfterCorrectEntries) {
+  write(recorded);
+  const std::string bytes = readText(file());
+  for (std::size_t at = 20; at < bytes.size(); at += 1 + bytes.size() / 40) {
+    std::string damaged = bytes;
+    damaged[at] = static_cast<char>(damaged[at] ^ 0x08);
+    writeBytes(damaged);
+    const Delivery delivery = read(file());
+    EXPECT_THAT(delivery.error, AllOf(StartsWith("stopped at entry "), isPlain())) << "byte " << at;
+    expectBeginningOf(recorded, delivery.observations);
+  }
+  std::string wrong_checksum = bytes;
+  wrong_checksum[bytes.size() - 6] ^= 1;
+  writeBytes(wrong_checksum);
+  EXPECT_THAT(read(file()).error, EndsWith("r.rawlog: incorrect data check"));
+}
+
+TEST_F(Rawlog, APacketWithAChangedByteIsAnErrorThatSaysSo) {
+  CObservationEvents packet;
+  packet.camera = SyntheticRecording().cameras[0].model;
+  packet.events = SyntheticRecording().events[0];
+  writeObjects(packet);
+  std::string plain = plainContent();
+  plain[plain.size() / 2] = static_cast<char>(plain[plain.size() / 2] ^ 0x08);
+  writeBytes(plain);
+  EXPECT_THAT(read(file()).error,
+              EndsWith("r.rawlog: a packet of events is damaged: its checksum is wrong"));
+}
+
+TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
+  const auto error_of = [](const std::filesystem::path& path) {
+    return messageOf([&] { RawlogRecording recording(path); });
+  };
+  EXPECT_THAT(error_of(folder()), EndsWith(": a folder: expected a file"));
+  EXPECT_THAT(error_of("/dev/null"), EndsWith(": not a regular file"));
+  EXPECT_THAT(error_of(folder() / "nowhere"), EndsWith(": no such file"));
+  // An entry begins with the length of its class's name, with the top bit set.
+  for (const auto& [name, shown] :
+       {std::pair<std::string, std::string>{"CNewObservation", "CNewObse"},
+        {"C\x1b[2J", "C\\x1b[2J"}}) {
+    writeBytes(std::string(1, static_cast<char>(0x80 | name.size())) + name + '\0');
+    EXPECT_THAT(read(file()).error, AllOf(StartsWith("stopped at entry 0 of"), HasSubstr(shown),
+                                          isPlain(), Not(HasSubstr("\x1b"))));
+  }
+  writeBytes("0.1 2 3 1\n0.2 2 3 1\n");
+  EXPECT_THAT(read(file()).error, AllOf(StartsWith("stopped at entry 0 of"), isPlain()));
+  writeObjects(*recorded[0], mrpt::poses::CPose3D(), *recorded[1]);
+  EXPECT_THAT(
+      read(file()).error,
+      AllOf(StartsWith("stopped at entry 1 of"),
+            EndsWith(
+                "an object of class 'mrpt::poses::CPose3D': expected observations, sensory frames "
+                "and actions")));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/sensors/prophesee_raw.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <string>
+
+#include "plugin/recordings/open/recording_formats.h"
+#include "test/paths.h"
+#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/recordings/sensors/evt_words.h"
+#include "test/plugin/recordings/streams/reading.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+struct RawKind {
+  EvtEncoding encoding;
+  std::string header;
+};
+
+const std::vector<RawKind>& rawKinds() {
+  static const std::vector<RawKind> all = {
+      {EvtEncoding::kEvt2, "% evt 2.0\n% geometry 640x480\n"},
+      {EvtEncoding::kEvt21, "% format EVT21;height=480;width=640\n% end\n"},
+      {EvtEncoding::kEvt21Legacy,
+       "% evt 2.1\n% format EVT21;endianness=legacy;height=480;width=640\n% end\n"},
+      {EvtEncoding::kEvt3,
+       "% date 2023-03-29 16:37:46\n% evt 3.0\n"
+       "% format EVT3;height=480;width=640\n% geometry 640x480\n% end\n"}};
+  return all;
+}
+
+/// 70 s, with rows of several events and silences of up to 9 s: the clock of EVT 3.0 wraps.
+std::vector<Event> longRecording() {
+  std::mt19937 random(1);
+  std::vector<Event> events;
+  std::int64_t t_us = 5'000'000;
+  while (t_us < 75'000'000) {
+    t_us += random() % 40'000 == 0 ? 9'000'000 : random() % 1'800;
+    const auto y = static_cast<std::uint16_t>(random() % 480);
+    unsigned x = random() % 600;
+    for (unsigned left = 1 + random() % 6; left > 0; --left, x += 1 + random() % 5) {
+      events.push_back({t_us * 1000, static_cast<std::uint16_t>(x), y, (t_us & 1) != 0});
+    }
+  }
+  return events;
+}
+
+class PropheseeRaw : public TemporaryFolder {
+ protected:
+  std::filesystem::path file() const { return folder() / "recording.raw"; }
+};
+
+TEST_F(PropheseeRaw, EachEncodingIsReadAndFoundByItsHeader) {
+  const std::vector<Event> events = longRecording();
+  for (const RawKind& kind : rawKinds()) {
+    writeFile(file(), kind.header + evtBytes(kind.encoding, events));
+    ASSERT_NE(detectFormat(file()), nullptr) << kind.header;
+    EXPECT_EQ(detectFormat(file())->name, "raw");
+    PropheseeRawStream stream(file());
+    ASSERT_TRUE(stream.size()) << kind.header;
+    EXPECT_EQ(stream.size()->width, 640);
+    EXPECT_EQ(stream.size()->height, 480);
+    EXPECT_TRUE(readStream(stream) == events) << kind.header;
+    EXPECT_EQ(stream.progress(), 1);
+  }
+}
+
+TEST_F(PropheseeRaw, WithoutGeometryTheSizeIsThatOfTheCamera) {
+  struct Case {
+    std::string lines;
+    int width;  // 0: not known
+    int height;
+  };
+  for (const Case& each : std::vector<Case>{
+           {"% plugin_name hal_plugin_gen3_fx3\n% system_ID 21\n", 640, 480},
+           {"% plugin_name hal_plugin_gen31_evk3\n", 640, 480},
+           {"% plugin_name hal_plugin_gen4_evk2\n", 1280, 720},
+           {"% plugin_name hal_plugin_gen41_evk3\n% system_ID 48\n", 1280, 720},
+           {"% system_ID 21\n", 640, 480},
+           {"% system_ID 48\n", 1280, 720},
+           {"% system_ID 4\n", 0, 0},
+           {"% system_ID 210\n", 0, 0},
+           {"% plugin_name hal_plugin_gen5_evk4\n% system_ID 99\n", 0, 0},
+           {"% plugin_name hal_plugin_gen42\n% serial_number 21\n", 0, 0},
+           {"% system_ID 48\n% geometry 320x240\n% plugin_name hal_plugin_gen3_fx3\n", 320, 240}}) {
+    writeFile(file(), "% Date 2020-09-25 07:48:31\n" + each.lines + "% evt 2.0\n");
+    const std::optional<CameraSize> size = PropheseeRawStream(file()).size();
+    EXPECT_EQ(size.has_value(), each.width > 0) << each.lines;
+    EXPECT_EQ(size.value_or(CameraSize{}).width, each.width) << each.lines;
+    EXPECT_EQ(size.value_or(CameraSize{}).height, each.height) << each.lines;
+  }
+}
+
+TEST_F(PropheseeRaw, ASeekLeavesOutNothingFromItsTimeOnAndMostBeforeIt) {
+  const std::vector<Event> events = longRecording();
+  for (const RawKind& kind : rawKinds()) {
+    writeFile(file(), kind.header + evtBytes(kind.encoding, events));
+    const double bytes_per_event = static_cast<double>(std::filesystem::file_size(file())) /
+                                   static_cast<double>(events.size());
+    for (const std::int64_t t_ns :
+         {std::int64_t{-1}, std::int64_t{0}, std::int64_t{20'000'000'000},
+          std::int64_t{33'554'432'000}, events.back().t_ns, std::int64_t{900'000'000'000}}) {
+      PropheseeRawStream stream(file());
+      stream.seek(t_ns);
+      const std::vector<Event> read = readStream(stream);
+      const auto from = [&](const std::vector<Event>& all) {
+        return std::vector<Event>(
+            std::find_if(all.begin(), all.end(), [&](const Event& e) { return e.t_ns >= t_ns; }),
+            all.end());
+      };
+      EXPECT_TRUE(from(read) == from(events)) << kind.header << t_ns;
+      EXPECT_LT(static_cast<double>(read.size() - from(read).size()) * bytes_per_event,
+                2.2 * 256 * 1024)
+          << "two blocks";
+    }
+  }
+}
+
+TEST_F(PropheseeRaw, EventsBeforeTheFirstTimeAreCountedUnlessTheyLieBeforeTheSoughtTime) {
+  writeFile(file(), "% evt 3.0\n" + evt3Words({0x0001, 0x2002, 0x2003, 0x8001, 0x6000, 0x2004}) +
+                        evtBytes(EvtEncoding::kEvt3, longRecording()));
+  PropheseeRawStream whole(file());
+  EXPECT_EQ(readStream(whole).front().x, 4);
+  EXPECT_EQ(whole.undatedEvents(), 2U);
+  PropheseeRawStream end(file());
+  end.seek(20'000'000'000);
+  readStream(end);
+  EXPECT_EQ(end.undatedEvents(), 0U);
+}
+
+TEST_F(PropheseeRaw, ThePositionOfAnEventIsThatOfItsWord) {
+  const std::string header = "% evt 3.0\n";
+  // The fourth word has one event, the sixth two.
+  writeFile(file(), header + evt3Words({0x8001, 0x6000, 0x0005, 0x2001, 0x3000, 0x4003}));
+  PropheseeRawStream stream(file());
+  std::vector<Event> events;
+  ASSERT_TRUE(stream.read(events));
+  ASSERT_EQ(events.size(), 3U);
+  EXPECT_EQ(stream.positionOf(0), file().string() + ": byte 16");
+  EXPECT_EQ(stream.positionOf(1), file().string() + ": byte 20");
+  EXPECT_EQ(stream.positionOf(2), file().string() + ": byte 20");
+}
+
+TEST_F(PropheseeRaw, WordsThatBeginLikeALineAreNoHeader) {
+  std::string words;  // a TIME_HIGH and an event: "% \1\x80\n\0\0\0"
+  for (const std::uint32_t word : {0x8001'2025U, 0x0000'000aU}) putWord(words, word);
+  writeFile(file(), "% evt 2.0\n" + words);
+  PropheseeRawStream stream(file());
+  const std::vector<Event> events = readStream(stream);
+  ASSERT_EQ(events.size(), 1U);
+  EXPECT_TRUE((events[0] == Event{0x1'2025 * 64'000LL, 0, 10, false}));
+}
+
+TEST_F(PropheseeRaw, AWrongHeaderIsAnErrorThatNamesItsLine) {
+  struct Case {
+    std::string header;
+    std::vector<std::string> parts;
+  };
+  const std::vector<Case> cases = {
+      {"% evt 4.0\n", {":1: evt = '4.0': expected 2.0, 2.1 or 3.0"}},
+      {"% date x\n% format HISTO3D;height=1\n", {":2: format = 'HISTO3D': expected EVT2"}},
+      {"% evt 3.0\n% geometry 640\n", {":2: geometry = '640': expected WIDTHxHEIGHT"}},
+      {"% evt 3.0\n% geometry 0x480\n", {"geometry = '0x480'"}},
+      {"% format EVT3;height=-1;width=2\n", {"height = '-1': expected", "1 to 65535"}},
+      {"% evt 3.0\n% endianness big\n", {":2: endianness = 'big': expected little or legacy"}},
+      {"% geometry 640x480\n", {": no encoding: expected", "% evt 3.0"}},
+      {"", {": no encoding"}}};
+  for (const Case& wrong : cases) {
+    writeFile(file(), wrong.header);
+    const std::string error = errorOf([&] { PropheseeRawStream stream(file()); });
+    EXPECT_THAT(error, StartsWith(file().string()));
+    for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
+  }
+  EXPECT_THAT(errorOf([&] { PropheseeRawStream stream(folder()); }), HasSubstr("cannot be opened"));
+}
+
+TEST_F(PropheseeRaw, AnEndWithinAWordAndEventsWithoutTimeAreErrors) {
+  writeFile(file(), "% evt 2.0\n" + std::string("\0\0\0\x80\1\2\3", 7));
+  PropheseeRawStream cut(file());
+  EXPECT_THAT(errorOf([&] { readStream(cut); }),
+              AllOf(HasSubstr("byte 14: 3 bytes of a word"), HasSubstr("all 4")));
+  writeFile(file(), "% evt 3.0\n" + evt3Words({0x0001, 0x2002, 0x2003}));
+  PropheseeRawStream undated(file());
+  EXPECT_THAT(errorOf([&] { readStream(undated); }),
+              AllOf(HasSubstr("2 events without a time"), HasSubstr("TIME_HIGH")));
+}
+
+TEST_F(PropheseeRaw, OtherFilesAreNotTakenForIt) {
+  for (const std::string text : {"", "% ", "% Data file containing CD events\n% Version 2\n",
+                                 "0.1 1 2 1\n", "% no evt here\n"}) {
+    writeFile(file(), text);
+    EXPECT_FALSE(looksLikePropheseeRaw(file())) << text;
+  }
+  EXPECT_FALSE(looksLikePropheseeRaw(folder()));
+  EXPECT_FALSE(looksLikePropheseeRaw(folder() / "absent"));
+}
+
+TEST_F(PropheseeRaw, DamagedFilesAreReadOrRefused) {
+  std::vector<Event> events = longRecording();
+  events.resize(2000);
+  for (const RawKind& kind : rawKinds()) {
+    readDamaged(kind.header + evtBytes(kind.encoding, events), file(), "raw");
+  }
+}
+
+TEST_F(PropheseeRaw, ARealEvt2RecordingHasTheEventsThatNumPyFinds) {
+  const std::filesystem::path real =
+      std::filesystem::path(EFM_SHARED_DATA) / "raw_formats/faery_evt2.raw";
+  if (!std::filesystem::exists(real)) GTEST_SKIP() << real << " is absent";
+  PropheseeRawStream stream(real);
+  EXPECT_EQ(stream.size().value_or(CameraSize{}).height, 480) << "a camera of generation 3";
+  const std::vector<Event> events = readStream(stream);
+  // Counted with numpy.frombuffer(…, '<u4') behind the 166 bytes of the header: words of type 0 and
+  // 1; the time is 64 times the last word of type 8 before them, plus the bits 22 to 27.
+  ASSERT_EQ(events.size(), 521'252U);
+  std::int64_t on = 0;
+  std::int64_t sum_us = 0;
+  for (const Event& event : events) {
+    on += event.polarity ? 1 : 0;
+    sum_us += event.t_ns / 1000;
+  }
+  EXPECT_EQ(on, 185'861);
+  EXPECT_EQ(events.front().t_ns, 913'716'224'000);
+  EXPECT_EQ(events.back().t_ns, 913'812'095'000);
+  EXPECT_EQ(sum_us, 476'298'094'656'969);
+}
+
+}  // namespace
+}  // namespace efm

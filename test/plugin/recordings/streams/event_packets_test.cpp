@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/streams/event_packets.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/text/event_text.h"
+#include "test/plugin/message_of.h"
+#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/recordings/streams/reading.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr std::int64_t kMs = 1'000'000;
+
+/// Blocks of events behind which the data are damaged.
+class ListedStream : public EventStream {
+ public:
+  using Blocks = std::vector<std::vector<Event>>;
+  ListedStream(Blocks blocks, std::int64_t& sought_ns)
+      : blocks_(std::move(blocks)), sought_ns_(sought_ns) {}
+  bool read(std::vector<Event>& events) override {
+    events.clear();
+    if (next_ == blocks_.size()) throw std::runtime_error("damaged");
+    events = blocks_[next_++];
+    return true;
+  }
+  void seek(std::int64_t t_ns) override { sought_ns_ = t_ns; }
+  std::string positionOf(std::size_t index) const override {
+    return "block " + std::to_string(next_) + ", event " + std::to_string(index);
+  }
+  std::string name() const override { return "list"; }
+  double progress() const override { return 0; }
+
+ private:
+  Blocks blocks_;
+  std::int64_t& sought_ns_;
+  std::size_t next_ = 0;
+};
+
+std::vector<std::int64_t> timesOf(const std::vector<Event>& events) {
+  std::vector<std::int64_t> times_ns;
+  for (const Event& event : events) times_ns.push_back(event.t_ns);
+  return times_ns;
+}
+
+TEST(EventPackets, AnIntervalIsReadAsFarAsLateEventsOfItMayCome) {
+  constexpr std::int64_t kBegin = 5 * kMs;
+  constexpr std::int64_t kEnd = 20 * kMs;
+  const std::int64_t last = kEnd + kMaxEventDelayNs - 1;
+  for (const bool whole : {true, false}) {
+    std::int64_t sought_ns = 0;
+    ListedStream::Blocks blocks = {{{kBegin - 1}, {kBegin}}, {{kEnd}, {last}}, {{kEnd - 1}}};
+    if (whole) blocks.push_back({{last + 1}, {-kMs}});  // what follows is not looked at
+    EventPackets packets(std::make_unique<ListedStream>(blocks, sought_ns), {1, 1});
+    packets.startAt(kBegin);
+    packets.stopAt(kEnd);
+    EXPECT_EQ(sought_ns, kBegin - kMaxEventDelayNs);
+    EXPECT_THAT(timesOf(packets.nextPacket()), ElementsAre(kBegin));
+    EXPECT_THAT(timesOf(packets.nextPacket()), ElementsAre(kEnd - 1));
+    EXPECT_EQ(
+        errorOf([&] { EXPECT_EQ(packets.nextTime(), whole ? std::nullopt : std::optional(last)); }),
+        "no error");
+    EXPECT_EQ(errorOf([&] { EXPECT_THAT(packets.nextPacket(), IsEmpty()); }),
+              whole ? "no error" : "damaged");
+    EXPECT_EQ(packets.sortedEvents(), 1U);
+  }
+}
+
+TEST(EventPackets, ArePeriodsOfTheGridAroundZero) {
+  struct Case {
+    std::int64_t period_ns;
+    std::vector<std::vector<std::int64_t>> packets;
+  };
+  for (const auto& [period_ns, expected] :
+       std::vector<Case>{{kPacketPeriodNs, {{-1}, {0, 7, 9'999'999}, {10'000'000}, {7'123 * kMs}}},
+                         {7, {{-14, -8}, {-7, -1}, {0, 6}, {7, 13}, {700}}}}) {
+    std::vector<Event> all;
+    for (const auto& packet : expected) {
+      for (const std::int64_t t_ns : packet) all.push_back({t_ns});
+    }
+    std::int64_t unused_ns = 0;
+    EventPackets packets(std::make_unique<ListedStream>(ListedStream::Blocks{all}, unused_ns),
+                         {1, 1}, period_ns);
+    for (const auto& packet : expected) {
+      EXPECT_EQ(packets.nextTime(), packet.front());
+      EXPECT_EQ(timesOf(packets.nextPacket()), packet);
+    }
+    EXPECT_EQ(packets.nextTime(), all.back().t_ns) << "the newest before the damage";
+    for (int i = 0; i < 2; ++i) EXPECT_EQ(errorOf([&] { packets.nextPacket(); }), "damaged");
+  }
+  EXPECT_THAT(messageOf([] { EventPackets(nullptr, {1, 1}, 0); }), HasSubstr("packet period (ns)"));
+}
+
+TEST(EventPackets, AnEventBesideTheSensorOrBeyondTheEndOfTimeIsAnError) {
+  const struct {
+    Event event;
+    const char* error;
+  } rows[] = {
+      {{0, 299, 7, true}, "damaged"},  // good
+      {{0, 300, 7, true},
+       "block 1, event 1: x = '300': expected a whole number from 0 to 299 (the sensor "
+       "has 300x8 pixels; are x and y in this order"},
+      {{0, 299, 8, true},
+       "block 1, event 1: y = '8': expected a whole number from 0 to 7 (the sensor has "
+       "300x8 pixels"},
+      {{kEndOfTimeNs - 1, 0, 0, true}, "damaged"},
+      {{kEndOfTimeNs, 0, 0, true},
+       "block 1, event 1: t = '4611686018427387903': expected a time in"},
+      {{-1 - kMaxEventDelayNs, 0, 0, true},
+       "t = '-0.010000001': expected events in time order, at"},
+  };
+  for (const auto& [event, expected] : rows) {
+    std::int64_t unused_ns = 0;
+    EventPackets packets(
+        std::make_unique<ListedStream>(ListedStream::Blocks{{Event{0}, event}}, unused_ns),
+        {300, 8});
+    EXPECT_THAT(errorOf([&] { readPackets(packets); }), HasSubstr(expected));
+  }
+  std::int64_t unused_ns = 0;
+  EventPackets none(std::make_unique<ListedStream>(ListedStream::Blocks{}, unused_ns), {1, 1});
+  EXPECT_EQ(errorOf([&] { none.nextTime(); }), "damaged") << "there is no event before it";
+}
+
+TEST(EventPackets, OfOneTimeAreDividedAndUntilThenItIsNotComplete) {
+  const std::vector<Event> all(kMaxPacketEvents + 5, Event{7});
+  std::int64_t unused_ns = 0;
+  EventPackets packets(
+      std::make_unique<ListedStream>(ListedStream::Blocks{all, {{7 + 30 * kMs}}}, unused_ns),
+      {1280, 720});
+  EXPECT_EQ(packets.nextPacket().size(), kMaxPacketEvents);
+  EXPECT_EQ(packets.nextTime(), 7);
+  EXPECT_EQ(packets.nextPacket().size(), 5U);
+  EXPECT_EQ(packets.nextTime(), 7 + 30 * kMs);
+}
+
+TEST(EventPackets, MoreThanFourEventsAPixelAtOneTimeAreAnErrorOfAllTimes) {
+  for (const int count : {8, 9}) {
+    std::int64_t unused_ns = 0;
+    const auto events = static_cast<std::size_t>(count);
+    EventPackets packets(std::make_unique<ListedStream>(
+                             ListedStream::Blocks{std::vector<Event>(events, {kMs})}, unused_ns),
+                         {2, 1});
+    BadEvents bad(100);
+    packets.skipBadEvents(bad);
+    EXPECT_THAT(errorOf([&] { readPackets(packets); }),
+                HasSubstr(count == 8 ? "damaged"
+                                     : "block 1, event 8: t = '0.001000000': 9 events have this "
+                                       "time, over 4 a pixel: expected times that differ"));
+    EXPECT_EQ(bad.count(), 0U);
+  }
+}
+
+/// Blocks of one event each, up to the end of the file.
+class EndingStream : public ListedStream {
+ public:
+  using ListedStream::ListedStream;
+  bool read(std::vector<Event>& events) override {
+    try {
+      return ListedStream::read(events);
+    } catch (const std::runtime_error&) {
+      return false;
+    }
+  }
+};
+
+TEST(EventPackets, AnEventFarAheadOfBothNeighboursIsTheBadOne) {
+  const struct {
+    std::vector<int> times_ms;
+    std::vector<int> good_ms;
+    std::optional<int> stop_ms{};
+    const char* error =
+        "expected a time near those of the events beside it, of which the one "
+        "before is at 0.001000000";
+  } rows[] = {
+      {{0, 1, 100'000, 2, 3}, {0, 1, 2, 3}},
+      {{0, 1, 100'000, 2}, {0, 1, 2}, 50},
+      {{0, 1, 100'000}, {0, 1}},                    // the last one
+      {{0, 1, 100'000}, {0, 1}, 50, nullptr},       // is not of the interval
+      {{0, 1, 9'000}, {0, 1, 9'000}, {}, nullptr},  // may be noise after a pause
+      {{0, 1, 1'001, 2}, {0, 1, 1'001}, {}, "at most 10 ms before the newest (1.001000000)"},
+      {{0, 1, 1'002, 2}, {0, 1, 2}},
+      {{0, 1, 5'000, 4'990, 5'001}, {0, 1, 4'990, 5'000, 5'001}, {}, nullptr},  // a pause
+      {{0, 1, 5'000, 9'000, 13'000}, {0, 1, 5'000, 9'000, 13'000}, {}, nullptr},
+      {{1'000, 5'000, 0, 5'001}, {1'000, 5'000, 5'001}, {}, "the newest (5.000000000)"},
+  };
+  for (const bool blocks : {true, false}) {
+    for (const auto& [times_ms, good_ms, stop_ms, error] : rows) {
+      ListedStream::Blocks of_one;
+      for (const int t_ms : times_ms) of_one.push_back({{t_ms * kMs}});
+      ListedStream::Blocks all = {{}};
+      for (const auto& block : of_one) all.front().push_back(block.front());
+      std::vector<std::int64_t> expected;
+      for (const int t_ms : good_ms) expected.push_back(t_ms * kMs);
+      std::int64_t unused_ns = 0;
+      EventPackets packets(std::make_unique<EndingStream>(blocks ? of_one : all, unused_ns),
+                           {1, 1});
+      BadEvents bad(1);
+      packets.skipBadEvents(bad);
+      if (stop_ms) packets.stopAt(*stop_ms * kMs);
+      EXPECT_EQ(timesOf(readPackets(packets)), expected);
+      EXPECT_EQ(bad.count(), error == nullptr ? 0U : 1U);
+      EXPECT_THAT(bad.first(), HasSubstr(error == nullptr ? "" : error));
+    }
+  }
+}
+
+class PacketsOfText : public TemporaryFolder {};
+
+TEST_F(PacketsOfText, AnIntervalHasItsEventsInOrderThoughTheyComeLate) {
+  constexpr int kEvents = 100'000;  // one each 10 us: several blocks of text
+  std::mt19937 random(1);
+  std::vector<std::pair<std::int64_t, int>> order;  // of arrival, up to 9.9 ms late
+  for (int i = 0; i < kEvents; ++i) {
+    order.emplace_back(i * 10'000 + static_cast<std::int64_t>(random() % (99 * kMs / 10)), i);
+  }
+  std::sort(order.begin(), order.end());
+  std::string lines;
+  for (const auto& [arrival_ns, i] : order) {
+    const std::string number = std::to_string(i * 10);
+    lines += "0." + std::string(6 - number.size(), '0') + number + " " + std::to_string(i % 300) +
+             " 7 1\n";
+  }
+  writeFile(folder() / "events.txt", lines);
+  for (const auto& [first, end] : {std::pair(0, kEvents), std::pair(30'100, 30'200),
+                                   std::pair(50'000, 73'000), std::pair(99'500, kEvents)}) {
+    EventPackets packets(std::make_unique<EventTextStream>(folder() / "events.txt"), {300, 8});
+    packets.startAt(first == 0 ? -5 * kMs : first * std::int64_t{10'000});
+    packets.stopAt(end * std::int64_t{10'000});
+    std::vector<Event> expected;
+    for (int i = first; i < end; ++i) {
+      expected.push_back({i * std::int64_t{10'000}, static_cast<std::uint16_t>(i % 300), 7, true});
+    }
+    EXPECT_TRUE(readPackets(packets) == expected) << first;
+  }
+}
+
+TEST_F(PacketsOfText, BadEventsAreLeftOutUpToTheLimitOfAllCameras) {
+  const std::string good = "0.1 1 2 0\n0.2 3 4 1\n";
+  const std::string bad = "0.2 3 4\nnan 3 4 1\n0.2 300 4 1\n0.2 3 8 1\n0.18 3 4 1\n";
+  for (const char* name : {"cam0.txt", "cam1.txt"}) {
+    writeFile(folder() / name, good + bad + "0.3 5 6 0\n0.4 5");
+  }
+  const auto read_both = [&](BadEvents& events) {
+    std::size_t count = 0;
+    for (const char* name : {"cam0.txt", "cam1.txt"}) {
+      EventPackets packets(std::make_unique<EventTextStream>(folder() / name), {300, 8});
+      packets.skipBadEvents(events);
+      count += readPackets(packets).size();
+    }
+    return count;
+  };
+  BadEvents twelve(12);
+  EXPECT_EQ(read_both(twelve), 6U);
+  EXPECT_EQ(twelve.count(), 12U);
+  EXPECT_THAT(twelve.first(), HasSubstr("cam0.txt:3: '0.2 3 4': expected 4 fields"));
+  BadEvents eleven(11);
+  EXPECT_THAT(errorOf([&] { read_both(eleven); }),
+              AllOf(HasSubstr("cam1.txt:7: t = '0.18"),
+                    HasSubstr("(11 bad events before it were left out")));
+  BadEvents none(0);
+  EXPECT_THAT(
+      errorOf([&] { read_both(none); }),
+      AllOf(HasSubstr("cam0.txt:3: "), HasSubstr("(--skip-bad-events N leaves out up to N")));
+}
+
+}  // namespace
+}  // namespace efm

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/text/event_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <rapidcheck/gtest.h>
+#include <algorithm>
+#include <string>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/streams/event_packets.h"
+#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/recordings/streams/reading.h"
+#include "test/plugin/temporary_folder.h"
+
+namespace efm {
+
+// Where GoogleTest looks for it.
+static std::ostream& operator<<(std::ostream& stream, const Event& event) {
+  return stream << formatSeconds(event.t_ns) << " " << event.x << " " << event.y << " "
+                << event.polarity;
+}
+
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+EventPackets open(const std::filesystem::path& file) {
+  return EventPackets(std::make_unique<EventTextStream>(file), {240, 180});
+}
+
+std::string textOf(const std::vector<Event>& events) {
+  std::string text;
+  for (const Event& event : events) {
+    text += formatSeconds(event.t_ns) + " " + std::to_string(event.x) + " " +
+            std::to_string(event.y) + (event.polarity ? " 1\n" : " 0\n");
+  }
+  return text;
+}
+
+class EventText : public TemporaryFolder {
+ protected:
+  std::filesystem::path file() const { return folder() / "events.txt"; }
+
+  std::vector<Event> read(const std::string& text) const {
+    writeFile(file(), text);
+    EventPackets reader = open(file());
+    return readPackets(reader);
+  }
+  std::string errorOfText(const std::string& text) const {
+    return errorOf([&] { read(text); });
+  }
+  /// What an error about a line begins with.
+  std::string line(int number) const { return file().string() + ":" + std::to_string(number); }
+};
+
+TEST_F(EventText, LinesHaveTimePixelAndPolarity) {
+  using Events = std::vector<Event>;
+  const std::pair<const char*, Events> rows[] = {
+      {"0.003811000 96 133 0\n0.003820001 127 171 1\n",
+       {{3'811'000, 96, 133, false}, {3'820'001, 127, 171, true}}},
+      {"1700000000.123456789 0 0 1\n1700000000.123456790 0 0 1\n",
+       {{1'700'000'000'123'456'789, 0, 0, true}, {1'700'000'000'123'456'790, 0, 0, true}}},
+      {"-1.5 0 0 0\n-0 0 0 0\n.5 0 0 0\n1 0 0 0\n1. 0 0 0\n1.25 0 0 0\n1.3333333336 0 0 0\n"
+       "1.5e0 0 0 0\n00000000002.0 0 0 0\n",
+       {{-1'500'000'000},
+        {0},
+        {500'000'000},
+        {1'000'000'000},
+        {1'000'000'000},
+        {1'250'000'000},
+        {1'333'333'334},
+        {1'500'000'000},
+        {2'000'000'000}}},
+      {"# t x y p\r\n\r\n\n  0.1\t1  2\t 0 \r\n0.2 3 4 1\r\n0.3 5 6 0 # dust\n \t\n",
+       {{100'000'000, 1, 2, false}, {200'000'000, 3, 4, true}, {300'000'000, 5, 6, false}}},
+      {"0.1 000239 0000179 0\n0.2 3 4 1",
+       {{100'000'000, 239, 179, false}, {200'000'000, 3, 4, true}}},
+      {"", {}},
+      {"# nothing\n\n", {}},
+  };
+  for (const auto& [text, events] : rows) EXPECT_EQ(read(text), events) << text;
+}
+
+TEST_F(EventText, WrongLinesAreErrorsThatNameTheLineTheValueAndTheExpectedOne) {
+  struct Case {
+    const char* text;
+    int line;
+    std::vector<std::string> parts;
+  };
+  const Case cases[] = {
+      {"0.1 1 2 0\n0.2 3 4", 2, {"'0.2 3 4'", "expected t x y p", "the file ends within the line"}},
+      {"0.", 1, {"the file ends"}},
+      {"0.1 1 2 0\n\n0.2 3 1\n", 3, {"'0.2 3 1': expected 4 fields", "not 3"}},
+      {"0.1 1 2 0\nabc 1 2 0\n", 2, {"t = 'abc': expected a time"}},
+      {"0.1s 1 2 0\n", 1, {"t = '0.1s': expected a time"}},
+      {"nan 1 2 0\n", 1, {"t = 'nan': expected a time"}},
+      {"99999999999 1 2 0\n", 1, {"t = '99999999999': expected a time"}},
+      {"0.1 1.5 2 0\n", 1, {"x = '1.5': expected a whole number"}},
+      {"0.1 96.0 2 0\n0.2 96.5 2 0\n", 2, {"x = '96.5': expected a whole number"}},
+      {"0.1 96.000001 2 0\n", 1, {"x = '96.000001': expected a whole number"}},
+      {"0.1 1 2 0.5\n", 1, {"p = '0.5': expected polarity"}},
+      {"0.1 1 0x2 0\n", 1, {"y = '0x2': expected a whole number"}},
+      {"0.1 1 2 0\n0.1 240 2 0\n", 2, {"x = '240': expected", "0 to 239", "240x180"}},
+      {"# a\n0.1 1 2 0\n# b\n\n0.1 1 2 0\n#\n0.1 240 2 0\n", 7, {"x = '240': expected"}},
+      {"0.1 1 180 0\n", 1, {"y = '180': expected", "0 to 179", "240x180"}},
+      {"0.1 -1 0 0\n", 1, {"x = '-1': expected"}},
+      {"0.1 65536 0 0\n", 1, {"x = '65536': expected"}},
+      {"0.1 4294967296 0 0\n", 1, {"x = '4294967296': expected"}},
+      {"0.1 1 2 2\n", 1, {"p = '2'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 -0\n", 1, {"p = '-0'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 01\n", 1, {"p = '01'", "expected polarity 0 or 1"}},
+      {"0.1 1 2 10\n", 1, {"p = '10'", "expected polarity 0 or 1"}},
+      {"0.020 1 0 0\n0.009999999 2 0 0\n",
+       2,
+       {"t = '0.009999999': expected", "at most 10 ms", "0.020000000"}}};
+  for (const Case& wrong : cases) {
+    const std::string error = errorOfText(wrong.text);
+    EXPECT_THAT(error, StartsWith(line(wrong.line)));
+    for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
+  }
+}
+
+TEST_F(EventText, EventsAboveAWrongLineComeBeforeTheError) {
+  std::vector<Event> events;
+  for (std::int64_t i = 0; i < 5000; ++i) {  // 5 s; disorder that is sorted, too
+    const std::int64_t late_ms = i % 7 == 0 ? 3 : 0;
+    events.push_back({(i - late_ms) * 1'000'000, static_cast<std::uint16_t>(i % 240), 7, true});
+  }
+  const std::string good = textOf(events);
+  std::stable_sort(events.begin(), events.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  for (const std::string& bad :
+       {std::string("garbage\n"), std::string("0.0 1 2 1\n"), std::string("5.1 1"),
+        std::string("5.1 240 2 1\n5.2 1 2 1\n"), std::string(3 << 20, 'x')}) {
+    writeFile(file(), good + bad);
+    EventPackets reader = open(file());
+    std::vector<Event> given;
+    const std::string error = errorOf([&] {
+      while (reader.nextTime()) {
+        for (const Event& event : reader.nextPacket()) given.push_back(event);
+      }
+    });
+    EXPECT_TRUE(given == events) << given.size() << " of " << events.size() << " events";
+    EXPECT_THAT(error, StartsWith(line(5001)));
+    EXPECT_EQ(errorOf([&] { reader.nextPacket(); }), error) << "it stays";
+  }
+}
+
+TEST_F(EventText, TheErrorOfABinaryFileHasNoControlCharacters) {
+  EXPECT_THAT(errorOfText(std::string(3 << 20, '\x1b')),
+              AllOf(StartsWith(line(1)), HasSubstr("\\x1b\\x1b"), HasSubstr("1048576 bytes"),
+                    testing::Not(HasSubstr("\x1b"))));
+}
+
+/// For properties, which are no fixtures.
+std::filesystem::path propertyFile() {
+  return std::filesystem::temp_directory_path() /
+         ("efm_event_text_" + std::to_string(getpid()) + ".txt");
+}
+
+RC_GTEST_PROP(EventTextProperty, WrittenEventsAreReadBackInTimeOrder, ()) {
+  std::int64_t t_ns = *rc::gen::inRange<std::int64_t>(-1'000'000'000, 1'800'000'000'000'000'000);
+  std::vector<Event> events;
+  const int count = *rc::gen::inRange(1, 200);
+  std::int64_t newest_ns = t_ns;
+  std::uint64_t late = 0;
+  for (int i = 0; i < count; ++i) {
+    t_ns = newest_ns + *rc::gen::inRange<std::int64_t>(-kMaxEventDelayNs, 20'000'000);
+    if (i == 0) newest_ns = t_ns;
+    late += t_ns < newest_ns ? 1 : 0;
+    newest_ns = std::max(newest_ns, t_ns);
+    events.push_back({t_ns, *rc::gen::inRange<std::uint16_t>(0, 240),
+                      *rc::gen::inRange<std::uint16_t>(0, 180), *rc::gen::arbitrary<bool>()});
+  }
+  writeFile(propertyFile(), textOf(events));
+
+  EventPackets reader = open(propertyFile());
+  const std::vector<Event> read = readPackets(reader);
+  std::filesystem::remove(propertyFile());
+
+  std::stable_sort(events.begin(), events.end(),
+                   [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
+  RC_ASSERT(read == events);
+  RC_ASSERT(reader.sortedEvents() == late);
+}
+
+}  // namespace
+}  // namespace efm

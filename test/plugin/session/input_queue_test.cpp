@@ -1,0 +1,259 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/input_queue.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <deque>
+#include <map>
+#include <numeric>
+#include <tuple>
+#include <utility>
+
+namespace efm {
+namespace {
+
+constexpr std::int64_t kIntervalNs = 10'000'000;
+
+/// Events of camera 0, at these times; x tells them apart.
+std::vector<Event> eventsAt(const std::vector<std::int64_t>& times_ns) {
+  std::vector<Event> events;
+  for (const std::int64_t t_ns : times_ns) {
+    events.push_back({t_ns, static_cast<std::uint16_t>(events.size()), 0, true});
+  }
+  return events;
+}
+
+/// Passes events in packets that end at these indices, each covered until its last event.
+std::vector<Event> passed(EventBudget& budget, const std::vector<Event>& events,
+                          std::vector<std::size_t> ends, bool covered) {
+  std::vector<Event> result;
+  std::sort(ends.begin(), ends.end());
+  ends.push_back(events.size());
+  std::size_t begin = 0;
+  for (const std::size_t end : ends) {
+    std::optional<std::int64_t> until_ns;
+    if (covered && end > begin) until_ns = events[end - 1].t_ns;
+    std::vector<Event> packet(events.begin() + static_cast<std::ptrdiff_t>(begin),
+                              events.begin() + static_cast<std::ptrdiff_t>(end));
+    for (const Event& event : budget.pass(std::move(packet), until_ns)) result.push_back(event);
+    begin = end;
+  }
+  for (const Event& event : budget.finish()) result.push_back(event);
+  return result;
+}
+
+RC_GTEST_PROP(EventBudget, KeepsAtMostTheBudgetOfEach10MsWhateverThePackets, ()) {
+  auto times_ns = *rc::gen::container<std::vector<std::int64_t>>(
+      rc::gen::inRange<std::int64_t>(-5 * kIntervalNs, 5 * kIntervalNs));
+  std::sort(times_ns.begin(), times_ns.end());
+  const std::vector<Event> events = eventsAt(times_ns);
+  const auto ends = *rc::gen::container<std::vector<std::size_t>>(
+      rc::gen::inRange<std::size_t>(0, events.size() + 1));
+  const std::size_t max = *rc::gen::inRange<std::size_t>(1, 8);
+  const double rate = 100.0 * static_cast<double>(max);
+
+  EventBudget whole(rate);
+  const std::vector<Event> expected = passed(whole, events, {}, false);
+  EventBudget budget(rate);
+  const std::vector<Event> result = passed(budget, events, ends, *rc::gen::arbitrary<bool>());
+
+  RC_ASSERT(result == expected);
+  RC_ASSERT(budget.thinned() + result.size() == events.size());
+  const auto in_interval = [](const std::vector<Event>& all, std::int64_t k) {
+    return static_cast<std::size_t>(std::count_if(all.begin(), all.end(), [k](const Event& event) {
+      return event.t_ns >= k * kIntervalNs && event.t_ns < (k + 1) * kIntervalNs;
+    }));
+  };
+  for (std::int64_t k = -5; k < 5; ++k) {
+    RC_ASSERT(in_interval(result, k) == std::min(max, in_interval(events, k)));
+  }
+}
+
+TEST(EventBudget, AStepOfTheClockBackHoldsNothingForGood) {
+  EventBudget budget(100);
+  std::optional<std::int64_t> none;
+  budget.pass(eventsAt({100 * kIntervalNs}), none);
+  const auto after = budget.pass(eventsAt({0, 1 * kIntervalNs, 2 * kIntervalNs}), none);
+  EXPECT_EQ(after.size(), 3U) << "the one before the step, and two after it";
+  EXPECT_EQ(budget.held(), 1U);
+}
+
+TEST(EventBudget, LateEventsCountForTheCurrent10Ms) {
+  std::vector<std::int64_t> times_ns;
+  for (std::int64_t i = 0; i < 60; ++i) {  // twenty of each 10 ms, and as many from 20 ms before
+    times_ns.push_back((100 + i / 20) * kIntervalNs + i % 20);
+    times_ns.push_back(times_ns.back() - 2 * kIntervalNs);
+  }
+  EventBudget budget(500);
+  EXPECT_EQ(passed(budget, eventsAt(times_ns), {}, false).size(), 15U);
+  EXPECT_EQ(budget.thinned(), 105U);
+}
+
+TEST(EventBudget, CoverEndsBeforeTheEventsThatAreHeld) {
+  EventBudget budget(100);
+  std::optional<std::int64_t> covered_ns = kIntervalNs + 5;
+  EXPECT_EQ(budget.pass(eventsAt({3, 4, kIntervalNs + 1}), covered_ns).size(), 1U);
+  EXPECT_EQ(*covered_ns, kIntervalNs);
+}
+
+/// @param t_ns of the last event; the first one is earlier.
+CameraPacket packet(int camera, std::int64_t t_ns, std::size_t count) {
+  RigCamera calibration;
+  calibration.model = {120, 90, 100.0, 100.0, 59.5, 44.5, DistortionModel::kNone, {}};
+  std::vector<Event> events(count, Event{t_ns, 0, 0, true});
+  if (count > 1) events.front().t_ns -= 3;
+  return {camera, calibration, events, std::nullopt};
+}
+
+RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllPoses, ()) {
+  LiveOptions options;
+  options.max_event_rate = 0;
+  options.max_queue_events = *rc::gen::inRange(1, 200);
+  const std::size_t fit = *rc::gen::inRange<std::size_t>(1, 10);
+  const std::size_t events_that_fit = *rc::gen::inRange<std::size_t>(0, 100);
+  options.max_queue_mb =
+      1e-6 * static_cast<double>(fit * sizeof(CameraPacket) + events_that_fit * sizeof(Event));
+  InputQueue queue(options);
+  struct Waiting {
+    int camera;
+    std::size_t events;
+    std::int64_t t_ns;
+  };
+  std::deque<Waiting> waiting;
+  std::map<int, std::int64_t> missing_ns;
+  std::map<int, QueueCounts> expected;
+  std::size_t poses = 0;
+  const auto sum = [&](auto of) {
+    return std::accumulate(
+        waiting.begin(), waiting.end(), std::uint64_t{0},
+        [&](std::uint64_t total, const Waiting& one) { return total + of(one); });
+  };
+  const auto events_of = [](const Waiting& one) { return one.events; };
+  const auto bytes_of = [](const Waiting& one) {
+    return sizeof(CameraPacket) + one.events * sizeof(Event);
+  };
+  const auto miss = [&](const Waiting& one) {
+    if (one.events > 0) missing_ns[one.camera] = std::max(missing_ns[one.camera], one.t_ns + 1);
+  };
+  enum { kTake = 8, kPause };
+  const auto steps = *rc::gen::container<std::vector<std::tuple<int, int, int>>>(rc::gen::tuple(
+      rc::gen::inRange(0, kPause + 1), rc::gen::inRange(0, 3), rc::gen::inRange(0, 90)));
+  std::int64_t t_ns = 100;
+  for (const auto& [kind, camera, events] : steps) {
+    const Waiting one{camera, static_cast<std::size_t>(events), kind == 0 ? t_ns - 5 : ++t_ns};
+    QueueCounts& counts = expected[camera];
+    counts.received += kind == kTake ? 0 : one.events;
+    if (kind == kPause) {
+      queue.skip(packet(camera, one.t_ns, one.events));
+      counts.paused += one.events;
+      miss(one);
+    } else if (kind != kTake) {
+      queue.add(packet(camera, one.t_ns, one.events));
+      queue.add(QueuedPose{{t_ns, {}}, {}, {}});
+      ++poses;
+      waiting.push_back(one);
+      while (sum(events_of) > static_cast<std::uint64_t>(options.max_queue_events) ||
+             static_cast<double>(sum(bytes_of)) > options.max_queue_mb * 1e6) {
+        expected[waiting.front().camera].dropped += waiting.front().events;
+        miss(waiting.front());
+        waiting.pop_front();
+      }
+    } else {
+      const InputQueue::Batch batch = queue.take();
+      RC_ASSERT(batch.poses.size() == std::exchange(poses, 0));
+      RC_ASSERT(batch.packets.size() == waiting.size());
+      for (std::size_t i = 0; i < waiting.size(); ++i) {
+        RC_ASSERT(batch.packets[i].camera == waiting[i].camera);
+        RC_ASSERT(batch.packets[i].events.size() == waiting[i].events);
+        expected[waiting[i].camera].taken += waiting[i].events;
+      }
+      RC_ASSERT(batch.missing.size() == missing_ns.size());
+      for (const auto& [index, until_ns] : missing_ns) {
+        RC_ASSERT(batch.missing.at(index).until_ns == until_ns);
+      }
+      waiting.clear();
+      missing_ns.clear();
+    }
+    RC_ASSERT(queue.queuedEvents() == sum(events_of));
+    for (const auto& [index, of] : queue.counts()) {
+      const QueueCounts& other = expected.at(index);
+      RC_ASSERT(of.received == other.received);
+      RC_ASSERT(of.dropped == other.dropped);
+      RC_ASSERT(of.paused == other.paused);
+      RC_ASSERT(of.taken == other.taken);
+      RC_ASSERT(of.queued == of.received - of.dropped - of.paused - of.taken);
+    }
+  }
+}
+
+/// A stream with pauses, in any packets. Some events, and poses, are followed by one far ahead.
+RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
+  LiveOptions options;
+  options.max_event_rate = *rc::gen::element(0.0, 1e9);
+  InputQueue queue(options);
+  const auto steps = *rc::gen::container<std::vector<std::tuple<std::int64_t, bool, bool>>>(
+      rc::gen::tuple(rc::gen::element<std::int64_t>(1, 3'000'000'000), rc::gen::arbitrary<bool>(),
+                     rc::gen::arbitrary<bool>()));
+  CameraPacket next = packet(0, 0, 0);
+  std::vector<std::int64_t> expected{0};
+  std::uint64_t wrong = 0;
+  const auto add = [&](std::int64_t t_ns) {
+    next.events.push_back({t_ns, 0, 0, true});
+    queue.add(QueuedPose{{t_ns, {}}, {}, {}});
+  };
+  add(0);
+  for (const auto& [gap_ns, ends_packet, ahead] : steps) {
+    expected.push_back(expected.back() + gap_ns);
+    add(expected.back());
+    if (ahead) add(expected.back() + 100'000'000'000);
+    wrong += ahead ? 1 : 0;
+    if (ends_packet) queue.add(std::exchange(next, packet(0, 0, 0)));
+  }
+  for (int i = 0; i < 2; ++i) {  // the last ones are confirmed, too
+    expected.push_back(expected.back() + 1);
+    add(expected.back());
+  }
+  queue.add(next);
+  queue.end();
+  const InputQueue::Batch batch = queue.take();
+  std::vector<std::int64_t> events_ns;
+  std::vector<std::int64_t> poses_ns;
+  for (const CameraPacket& one : batch.packets) {
+    for (const Event& event : one.events) events_ns.push_back(event.t_ns);
+  }
+  for (const QueuedPose& pose : batch.poses) poses_ns.push_back(pose.pose.t_ns);
+  RC_ASSERT(events_ns == expected);
+  RC_ASSERT(poses_ns == expected);
+  RC_ASSERT(queue.counts().at(0).refused == wrong);
+  RC_ASSERT(queue.refusedPoses() == wrong);
+}
+
+TEST(InputQueue, EndPassesTheHeldEvents) {
+  LiveOptions options;
+  options.max_event_rate = 1000;
+  InputQueue queue(options);
+  EXPECT_TRUE(queue.wait(InputQueue::Clock::now()).packets.empty()) << "it waits no longer";
+  queue.add(packet(0, 5, 30));
+  EXPECT_EQ(queue.counts().at(0).held, 30U);
+  queue.end();
+  queue.add(packet(0, 6, 30));  // too late
+  const InputQueue::Batch batch = queue.wait();
+  EXPECT_TRUE(batch.ended);
+  ASSERT_EQ(batch.packets.size(), 2U);
+  EXPECT_EQ(batch.packets[1].events.size(), 10U);
+  EXPECT_EQ(queue.counts().at(0).thinned, 20U);
+  EXPECT_EQ(queue.counts().at(0).after_end, 30U);
+  EXPECT_EQ(queue.counts().at(0).queued, 0U);
+  queue.skip(packet(0, 7, 5));
+  EXPECT_EQ(queue.counts().at(0).paused, 5U);
+  EXPECT_EQ(queue.counts().at(0).received, 65U);
+  EXPECT_TRUE(queue.take().missing.empty()) << "after the end";
+  queue.add(QueuedPose{{1, {}}, {}, {}});
+  EXPECT_EQ(queue.refusedPoses(), 1U);
+  EXPECT_TRUE(queue.take().poses.empty());
+}
+
+}  // namespace
+}  // namespace efm
