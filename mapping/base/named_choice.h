@@ -1,14 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "mapping/base/nearest_name.h"
+#include "mapping/base/text.h"
 
 namespace efm {
+
+/// The known name that was probably meant by a mistyped one: the one with the fewest letters
+/// missing, added, replaced or swapped with the next one; the first of several. At most a third of
+/// the longer name's letters, and at least one, may differ. Capitals, '-' and '_' do not count.
+std::optional<std::string> nearestName(std::string_view typed,
+                                       const std::vector<std::string>& known);
+
+/// What an error about an unknown name says of the known ones: "did you mean rms? One of: min, rms"
+/// or "expected one of min, rms". A long list is left out where one of its names is near.
+std::string expectedName(std::string_view typed, const std::vector<std::string>& known);
 
 /// One enumerator and its name in option files and messages.
 template <typename Enum>
@@ -37,6 +48,18 @@ Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
   }
   throw std::invalid_argument("'" + std::string(name) +
                               "' is unknown: " + expectedName(name, known));
+}
+
+/// Refuses an option whose value is out of range.
+/// @param holds the condition of a valid value, so that NaN is refused too.
+/// @throws std::invalid_argument "key = value: must be expected".
+template <typename Value>
+void requireOption(bool holds, std::string_view key, const Value& value,
+                   std::string_view expected) {
+  if (holds) return;
+  NumberText message(15);  // as typed: 0.1, not 0.10000000000000001
+  message << key << " = " << value << ": must be " << expected;
+  throw std::invalid_argument(message.str());
 }
 
 }  // namespace efm

@@ -1,17 +1,192 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/depth/aggregated_extraction.h"
 
-#include <algorithm>
-#include <cmath>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
 #include <vector>
 
-#include "mapping/depth/column_aggregation.h"
-#include "mapping/depth/local_agreement.h"
-#include "mapping/depth/median.h"
-#include "mapping/depth/sparse_mask.h"
+#include "mapping/depth/depth_map.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/dsi/dsi_grid.h"
+#include "mapping/kernels/kernels.h"
 
 namespace efm {
+namespace {
+
+constexpr float kSigma_px = 1.5F;
+constexpr double kMinFraction = 1.0 / 99;  // of the range of planes: a step
+
+/// Finds the peak of a sum of columns.
+class PeakFinder {
+ public:
+  PeakFinder(int planes, double step_planes)
+      : planes_(planes),
+        step_planes_(step_planes),
+        base_(std::max(1, static_cast<int>(step_planes / (isWide() ? 1 : 4)))) {}
+
+  AggregatedPeak find(const std::vector<float>& sum) const {
+    const auto top = std::max_element(sum.begin(), sum.begin() + planes_);
+    const auto plane = static_cast<int>(top - sum.begin());
+    const float before = plane >= base_ ? sum[static_cast<std::size_t>(plane - base_)] : -1;
+    const float after = plane < planes_ - base_ ? sum[static_cast<std::size_t>(plane + base_)] : -1;
+    AggregatedPeak peak;
+    peak.at_end = before < 0 || after < 0;
+    peak.position = static_cast<float>(plane + base_ * peakPosition(0, before, *top, after));
+    peak.width_sq = static_cast<float>(base_ * base_) * peakWidthSquared(before, *top, after);
+    // From the largest distance to the smallest: each step adds the planes between.
+    float second = 0;
+    int left = 0;
+    int right = planes_;
+    for (std::size_t i = peak.second_peak.size(); i-- > 0;) {
+      const double steps = AggregatedPeak::kMinSteps + static_cast<double>(i);
+      const auto distance = static_cast<int>(std::lround(steps * step_planes_));
+      second = std::max({second, maximumOf(sum, left, plane - distance),
+                         maximumOf(sum, plane + distance + 1, right)});
+      left = std::max(left, plane - distance);
+      right = std::min(right, plane + distance + 1);
+      peak.second_peak[i] = *top > 0 ? second / *top : 1;
+    }
+    return peak;
+  }
+
+ private:
+  /// Whether a step is more than a hundredth of the range: the parallax is small.
+  bool isWide() const { return step_planes_ > 1.001 * kMinFraction * (planes_ - 1); }
+  static float maximumOf(const std::vector<float>& sum, int begin, int end) {
+    return begin >= end ? 0 : *std::max_element(sum.begin() + begin, sum.begin() + end);
+  }
+
+  int planes_;
+  double step_planes_;
+  /// Planes from the peak to the values that its parabola goes through. With over 800 planes, or
+  /// little parallax, the next ones differ by less than a step of their bytes.
+  int base_;
+};
+
+}  // namespace
+
+double planesPerStep(int planes, double range_px) {
+  constexpr double kStepPx = 0.125;
+  constexpr double kMaxFraction = 1.0 / 24;
+  const double intervals = planes - 1;
+  if (intervals < 2) return 1;
+  const double step = intervals * std::clamp(kStepPx / range_px, kMinFraction, kMaxFraction);
+  // At least a plane, but less where planes are closer than a quarter of a pixel.
+  const double px_per_plane = range_px / intervals;
+  return std::max(step, std::min(1.0, 4 * px_per_plane));
+}
+
+std::vector<AggregatedPeak> aggregateColumns(const SparseMask& candidates,
+                                             const DsiColumns& columns, double step_planes) {
+  const PeakFinder finder(columns.planes(), step_planes);
+  std::vector<AggregatedPeak> peaks(candidates.size());
+  const auto weights = PixelNeighbours::gaussian(kSigma_px);
+  tbb::parallel_for(tbb::blocked_range<int>(0, candidates.rows()), [&](const auto& rows) {
+    PixelNeighbours neighbours(candidates);
+    std::vector<float> sum(static_cast<std::size_t>(columns.planes()) + kernels::kColumnPadding);
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      for (std::size_t i = candidates.rowBegin(y); i < candidates.rowBegin(y + 1); ++i) {
+        const cv::Point pixel(candidates.column(i), y);
+        assert(columns.has(pixel));
+        std::fill(sum.begin(), sum.end(), 0.0F);
+        neighbours.forEach(pixel, [&](std::size_t, cv::Point offset) {
+          columns.addTo(sum.data(), pixel + offset,
+                        weights[static_cast<std::size_t>(offset.dot(offset))]);
+        });
+        peaks[i] = finder.find(sum);
+      }
+    }
+  });
+  return peaks;
+}
+
+namespace {
+
+/// Of the weight of other pixels by their distance.
+constexpr float kDistanceSigma_px = 2;
+
+/// The pixels around one pixel.
+class Surroundings {
+ public:
+  void clear() {
+    size_ = 0;
+    total_ = 0;
+  }
+  void add(float position, float weight) {
+    positions_[size_] = position;
+    weights_[size_++] = weight;
+    total_ += weight;
+  }
+
+  /// The smallest position with at least half of the weight at or below it.
+  float weightedMedian() { return smallestWith(0.5F * total_); }
+
+  /// Median distance from a position, the larger one of two. Positions are distances afterwards,
+  /// with equal weights.
+  float medianDistance(float from) {
+    for (std::size_t i = 0; i < size_; ++i) positions_[i] = std::abs(positions_[i] - from);
+    std::fill_n(weights_.begin(), size_, 1.0F);
+    return smallestWith(static_cast<float>(size_ / 2 + 1));
+  }
+
+ private:
+  /// The smallest position with at least this weight at or below it.
+  float smallestWith(float min_weight) {
+    std::fill_n(below_.begin(), size_, 0.0F);
+    ranks_.add(below_.data(), positions_.data(), weights_.data(), size_);
+    float smallest = std::numeric_limits<float>::infinity();
+    for (std::size_t i = 0; i < size_; ++i) {
+      if (below_[i] >= min_weight) smallest = std::min(smallest, positions_[i]);
+    }
+    return smallest;
+  }
+
+  using Values = std::array<float, PixelNeighbours::kMaxPixels + kernels::kRankPadding>;
+  const kernels::RankFunctions& ranks_ = kernels::rankFunctions(fastestKernel());
+  Values positions_{}, weights_{}, below_{};
+  std::size_t size_ = 0;
+  float total_ = 0;  // weight
+};
+
+}  // namespace
+
+std::vector<LocalAgreement> localAgreement(const SparseMask& mask,
+                                           const std::vector<float>& positions,
+                                           const std::vector<float>& weights, float near) {
+  auto by_distance = PixelNeighbours::gaussian(kDistanceSigma_px);
+  by_distance[0] = 0;  // the pixel itself
+  std::vector<LocalAgreement> agreement(mask.size());
+  tbb::parallel_for(tbb::blocked_range<int>(0, mask.rows()), [&](const auto& rows) {
+    PixelNeighbours neighbours(mask);
+    Surroundings around;
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      for (std::size_t i = mask.rowBegin(y); i < mask.rowBegin(y + 1); ++i) {
+        around.clear();
+        float agreeing = 0;
+        float others = 0;
+        neighbours.forEach({mask.column(i), y}, [&](std::size_t j, cv::Point offset) {
+          around.add(positions[j], weights[j]);
+          const float weight =
+              weights[j] * by_distance[static_cast<std::size_t>(offset.dot(offset))];
+          others += weight;
+          agreeing += std::abs(positions[j] - positions[i]) < near ? weight : 0.0F;
+        });
+        agreement[i].median = around.weightedMedian();
+        agreement[i].spread = around.medianDistance(agreement[i].median);
+        agreement[i].agreeing_fraction = others > 0 ? agreeing / others : 0;
+      }
+    }
+  });
+  return agreement;
+}
+
 namespace {
 
 // A step: see `planesPerStep`.

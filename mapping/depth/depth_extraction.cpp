@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/depth/depth_extraction.h"
 
+#include <opencv2/imgproc.hpp>
+
 #include <cmath>
+#include <vector>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/option_check.h"
 #include "mapping/depth/aggregated_extraction.h"
-#include "mapping/depth/paper_extraction.h"
+#include "mapping/depth/depth_map.h"
+#include "mapping/depth/peak_fit.h"
 
 namespace efm {
 namespace {
@@ -46,6 +49,66 @@ DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
     return extractAsPaper(dsi.peaks, planes, options, facts.sequence_maximum);
   }
   return extractAggregated(dsi, planes, options, facts.parallax_px_m);
+}
+
+namespace {
+
+/// The confidence that becomes 255.
+double whiteOf(const cv::Mat1f& confidence, const MaxConfidence& option,
+               std::optional<double> sequence_maximum) {
+  if (option.level == WhiteLevel::kFixed) return option.fixed;
+  if (option.level == WhiteLevel::kSequence && sequence_maximum) return *sequence_maximum;
+  double maximum = 0;
+  cv::minMaxLoc(confidence, nullptr, &maximum);
+  return maximum;
+}
+
+/// Grey values of the confidence: 255 at `white`.
+cv::Mat1b quantise(const cv::Mat1f& confidence, double white) {
+  cv::Mat1b grey = cv::Mat1b::zeros(confidence.size());
+  if (white > 0) confidence.convertTo(grey, CV_8U, 255.0 / white);  // rounds and clips
+  return grey;
+}
+
+/// Adaptive Gaussian thresholding: non-zero where a pixel is above its surroundings by more than C.
+cv::Mat1b adaptiveThreshold(const cv::Mat1b& grey, const DepthExtractionOptions& options) {
+  cv::Mat1b mask;
+  cv::adaptiveThreshold(grey, mask, 1, cv::ADAPTIVE_THRESH_GAUSSIAN_C, cv::THRESH_BINARY,
+                        options.threshold_kernel, -options.threshold_c);
+  return mask;
+}
+
+/// Positions of the peaks between planes.
+std::vector<float> positionsOf(const DsiPeaks& peaks, const SparseMask& mask, bool subplane) {
+  std::vector<float> positions(mask.size());
+  mask.forEach([&](std::size_t i, cv::Point at) {
+    const int plane = peaks.plane(at);
+    positions[i] = static_cast<float>(
+        subplane ? peakPosition(plane, peaks.before(at), peaks.confidence(at), peaks.after(at))
+                 : plane);
+  });
+  return positions;
+}
+
+}  // namespace
+
+DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
+                        const DepthExtractionOptions& options,
+                        std::optional<double> sequence_maximum) {
+  options.validate();
+  const double white = whiteOf(peaks.confidence, options.max_confidence, sequence_maximum);
+  const cv::Mat1b mask = adaptiveThreshold(quantise(peaks.confidence, white), options);
+  const SparseMask sparse(mask);
+  const std::vector<float> positions = positionsOf(peaks, sparse, options.subplane);
+  const std::vector<float> medians = maskedMedian(sparse, positions, options.median_size);
+  std::vector<PlanePosition> found(sparse.size());
+  sparse.forEach([&](std::size_t i, cv::Point at) {
+    found[i] = {medians[i], peakVariance(peaks.before(at), peaks.confidence(at), peaks.after(at))};
+  });
+  DepthMap map = depthMapOf(sparse, found, peaks.confidence, planes);
+  map.pixels.candidates = sparse.size();
+  if (options.dilate) dilate(sparse, mask, map);
+  return map;
 }
 
 }  // namespace efm

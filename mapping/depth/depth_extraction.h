@@ -7,7 +7,7 @@
 
 #include "mapping/depth/depth_map.h"
 #include "mapping/dsi/dsi_columns.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 
 namespace efm {
 
@@ -82,5 +82,11 @@ struct KeyframeFacts {
 /// @throws std::invalid_argument where the options are not valid.
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
                       const DepthExtractionOptions& options, const KeyframeFacts& facts = {});
+
+/// `ExtractionMethod::kPaper`: see `extractDepth`.
+/// @throws std::invalid_argument where the options are not valid.
+DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
+                        const DepthExtractionOptions& options,
+                        std::optional<double> sequence_maximum = std::nullopt);
 
 }  // namespace efm

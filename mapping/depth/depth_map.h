@@ -1,14 +1,99 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
 #include <opencv2/core.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
-#include "mapping/depth/sparse_mask.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 
 namespace efm {
+
+/// The non-zero pixels of a mask, row by row, from left to right. A semi-dense depth map uses a few
+/// percent of the pixels; work on a sparse mask skips the others.
+class SparseMask {
+ public:
+  explicit SparseMask(const cv::Mat1b& mask);
+
+  std::size_t size() const { return columns_.size(); }
+  int rows() const { return static_cast<int>(row_begin_.size()) - 1; }
+  /// The pixels of row `y` have indices [rowBegin(y), rowBegin(y + 1)).
+  std::size_t rowBegin(int y) const { return row_begin_[static_cast<std::size_t>(y)]; }
+  int column(std::size_t pixel) const { return columns_[pixel]; }
+
+  /// Calls `visit(index, position)` for each pixel.
+  template <typename Visit>
+  void forEach(Visit visit) const {
+    for (int y = 0; y < rows(); ++y) {
+      for (std::size_t i = rowBegin(y); i < rowBegin(y + 1); ++i)
+        visit(i, cv::Point(columns_[i], y));
+    }
+  }
+
+ private:
+  std::vector<int> columns_;
+  std::vector<std::size_t> row_begin_;  // one more than rows
+};
+
+/// Finds the pixels of a sparse mask in the window of 9x9 pixels around a pixel, itself included.
+/// Remembers where the last window was: fast for pixels from left to right.
+class PixelNeighbours {
+ public:
+  static constexpr int kRadius_px = 4;
+  static constexpr int kRows = 2 * kRadius_px + 1;
+  static constexpr std::size_t kMaxPixels = kRows * kRows;
+
+  /// Gaussian weights by the square of the distance.
+  using Weights = std::array<float, 2 * kRadius_px * kRadius_px + 1>;
+  static Weights gaussian(float sigma_px) {
+    Weights weights{};
+    for (std::size_t distance_sq = 0; distance_sq < weights.size(); ++distance_sq) {
+      weights[distance_sq] = std::exp(-static_cast<float>(distance_sq) / (2 * sigma_px * sigma_px));
+    }
+    return weights;
+  }
+
+  /// @param mask outlives this object.
+  explicit PixelNeighbours(const SparseMask& mask) : mask_(&mask) {}
+
+  /// Calls `visit(index, offset)` for each, row by row.
+  template <typename Visit>
+  void forEach(cv::Point pixel, Visit visit) {
+    if (pixel.y != last_.y || pixel.x < last_.x) begins_ = rowBegins(pixel.y);
+    last_ = pixel;
+    const int first = std::max(0, pixel.y - kRadius_px);
+    const int last = std::min(mask_->rows() - 1, pixel.y + kRadius_px);
+    for (int y = first; y <= last; ++y) {
+      std::size_t& begin = begins_[static_cast<std::size_t>(y - pixel.y + kRadius_px)];
+      const std::size_t end = mask_->rowBegin(y + 1);
+      while (begin < end && mask_->column(begin) < pixel.x - kRadius_px) ++begin;
+      for (std::size_t i = begin; i < end && mask_->column(i) <= pixel.x + kRadius_px; ++i) {
+        visit(i, cv::Point(mask_->column(i), y) - pixel);
+      }
+    }
+  }
+
+ private:
+  using Begins = std::array<std::size_t, kRows>;  // by row of the window
+
+  Begins rowBegins(int y) const {
+    Begins begins{};
+    for (int row = 0; row < kRows; ++row) {
+      const int of_mask = std::clamp(y - kRadius_px + row, 0, mask_->rows());
+      begins[static_cast<std::size_t>(row)] = mask_->rowBegin(of_mask);
+    }
+    return begins;
+  }
+
+  const SparseMask* mask_;
+  cv::Point last_{0, -1};
+  Begins begins_{};
+};
 
 /// What became of the pixels with local contrast, which could have a depth.
 struct PixelCounts {

@@ -1,7 +1,39 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "mapping/depth/depth_map.h"
+
 namespace efm {
+
+/// Of n values in order the one with index n / 2: the larger middle one where n is even.
+/// @param values at least one; they are reordered. Cost: linear on average.
+template <typename Value, typename Less = std::less<Value>>
+const Value& upperMedian(std::vector<Value>& values, Less less = {}) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end(), less);
+  return *middle;
+}
+
+/// For each pixel of the mask, the lower median of the values in the window around it, itself
+/// included: of n values in order, the one with index (n - 1) / 2. Pixels outside the mask have no
+/// value.
+///
+/// Of an even number of depths this is the nearer middle one, as in the paper's extraction. The
+/// farther one changes F1 by 0.02 points on average over the simulated scenes (-0.3 to +0.7); on
+/// the real slider, with one camera, F1 rises from 67.9 to 69.8.
+///
+/// Cost: per pixel of the mask, the side of the window, not its area. Memory: 10 bytes per pixel of
+/// the mask, temporarily.
+/// @param values one per pixel of the mask, not NaN.
+/// @param window side in pixels, odd.
+std::vector<float> maskedMedian(const SparseMask& mask, const std::vector<float>& values,
+                                int window);
 
 /// The parabola through the values of a DSI column at its peak, on the plane before it and on the
 /// plane after it. A negative value says that there is no such plane: the peak lies on the first or
@@ -17,5 +49,18 @@ float peakWidthSquared(float before, float peak, float after);
 
 /// Variance of the errors of the peak's position, planes^2: a fraction of the squared width.
 double peakVariance(float before, float peak, float after);
+
+/// A maximum that is robust to a few outliers: the 95th percentile (nearest rank). Of fewer than
+/// twenty values it is the maximum itself.
+class RobustMaximum {
+ public:
+  /// @param value finite. Cost: linear in the number of values, 8 bytes each.
+  void add(double value);
+  /// Nothing before the first value.
+  std::optional<double> value() const;
+
+ private:
+  std::vector<double> values_;  // in increasing order
+};
 
 }  // namespace efm

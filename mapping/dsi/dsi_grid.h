@@ -1,15 +1,71 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "mapping/geometry/depth_planes.h"
+#include <tbb/cache_aligned_allocator.h>
+#include <opencv2/core.hpp>
+
+#include <algorithm>
+#include <cassert>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
 #include "mapping/geometry/reference_view.h"
+#include "mapping/kernels/kernels.h"
 
 namespace efm {
+
+/// One value per pixel of a plane or of a tile of it, row-major. Begins on a cache line, so that
+/// no vector lies in two lines.
+template <typename Value>
+using PixelValues = std::vector<Value, tbb::cache_aligned_allocator<Value>>;
+using PlaneValues = PixelValues<float>;
+
+/// Writes the values of a tile into its part of an image.
+template <typename Value>
+void writeTo(cv::Mat_<Value> part, const PixelValues<Value>& values) {
+  assert(values.size() == part.total());
+  auto row = values.begin();
+  for (int y = 0; y < part.rows; ++y, row += part.cols) std::copy_n(row, part.cols, part[y]);
+}
+
+/// Counts of votes. One vote is one used event on one plane:
+/// cast + outside_view + behind_camera = events x planes.
+struct VoteCounts {
+  std::uint64_t cast = 0;
+  std::uint64_t outside_view = 0;   ///< Not all four neighbouring pixels lie inside the view.
+  std::uint64_t behind_camera = 0;  ///< The plane point is behind the camera that saw the event.
+
+  std::uint64_t total() const { return cast + outside_view + behind_camera; }
+  VoteCounts& operator+=(const VoteCounts& other) {
+    cast += other.cast;
+    outside_view += other.outside_view;
+    behind_camera += other.behind_camera;
+    return *this;
+  }
+};
 
 /// The voxels of a DSI: the pixels of the reference view on each depth plane.
 struct DsiGrid {
   ReferenceView view;
   DepthPlanes planes;
 };
+
+/// "plain", "baseline", "sse4", "avx2", "avx512", "neon".
+std::string_view nameOf(VotingKernel kernel);
+/// Accepts kernels that this processor lacks.
+/// @throws std::invalid_argument naming the value and the known names.
+VotingKernel votingKernelFromName(std::string_view name);
+
+/// The kernels that this build has and this processor can run, plain first.
+const std::vector<VotingKernel>& availableKernels();
+bool isAvailable(VotingKernel kernel);
+
+/// The fastest of some kernels, plain among them. Measured, as a multiple of plain's speed:
+/// baseline 0.6 to 1, SSE4 2 to 2.2, AVX2 2.2 to 2.6, AVX-512 3.2 to 4.6 (docs/performance.md).
+/// NEON has not been measured: its vectors are as long as SSE4's, and the code is the same.
+VotingKernel fastestOf(const std::vector<VotingKernel>& kernels);
+/// Of `availableKernels`.
+VotingKernel fastestKernel();
 
 }  // namespace efm

@@ -2,11 +2,83 @@
 #include "mapping/events/event_filter.h"
 
 #include <algorithm>
+#include <array>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
+
+BackgroundActivityFilter::BackgroundActivityFilter(int width, int height, std::int64_t support_ns)
+    : support_ns_(support_ns),
+      stride_(static_cast<std::size_t>(width) + 2),
+      newest_ns_(stride_ * (static_cast<std::size_t>(height) + 2), kMinTimeNs) {}
+
+bool BackgroundActivityFilter::isIsolated(const Event& event) {
+  std::int64_t* pixel = newest_ns_.data() + (std::size_t{event.y} + 1) * stride_ + event.x + 1;
+  *pixel = event.t_ns;
+  const std::int64_t from_ns = event.t_ns - support_ns_;
+  const auto row = static_cast<std::ptrdiff_t>(stride_);
+  const std::array<std::ptrdiff_t, 8> neighbors = {-1,      1,        -row,    row,
+                                                   row - 1, -row + 1, row + 1, -row - 1};
+  return std::none_of(neighbors.begin(), neighbors.end(),
+                      [&](std::ptrdiff_t offset) { return pixel[offset] >= from_ns; });
+}
+
+void HotPixelOptions::validate() const {
+  requireOption(ratio >= 2 && ratio <= 1000, "hot_pixel_ratio", ratio, "from 2 to 1000");
+  requireOption(period_s >= 0.001 && period_s <= 100, "hot_pixel_period_s", period_s,
+                "from 0.001 to 100 (seconds)");
+  requireOption(min_events >= 2 && min_events <= 30'000, "hot_pixel_min_events", min_events,
+                "from 2 to 30000");
+}
+
+HotPixelFilter::HotPixelFilter(int width, int height, const HotPixelOptions& options)
+    : ratio_(options.ratio),
+      min_events_(static_cast<std::uint32_t>(options.min_events)),
+      width_(width),
+      height_(height),
+      stride_(static_cast<std::size_t>(width) + 2) {
+  options.validate();
+  period_ns_ = durationFromSeconds(options.period_s);
+  row_periods_.resize(static_cast<std::size_t>(height) + 2);
+  counts_.resize(stride_ * row_periods_.size());
+}
+
+void HotPixelFilter::enterPeriodOf(std::int64_t t_ns) {
+  std::int64_t index = t_ns / period_ns_;
+  if (index * period_ns_ > t_ns) --index;  // times may be negative
+  period_ = static_cast<std::uint32_t>(index);
+  period_begin_ns_ = index * period_ns_;
+  period_end_ns_ = period_begin_ns_ + period_ns_;
+}
+
+void HotPixelFilter::startPeriod(std::size_t row) {
+  const bool counted_before = row_periods_[row] + 1 == period_;
+  row_periods_[row] = period_;
+  const auto begin = counts_.begin() + static_cast<std::ptrdiff_t>(row * stride_);
+  std::transform(begin, begin + static_cast<std::ptrdiff_t>(stride_), begin,
+                 [&](std::uint32_t counts) { return counted_before ? counts >> kHalf : 0; });
+}
+
+/// Whether a pixel with enough events fires too often beside its neighbours.
+bool HotPixelFilter::isBusiest(const Event& event) {
+  if (width_ == 1 || height_ == 1) return false;
+  bringUpToDate(event.y);
+  bringUpToDate(event.y + std::size_t{2});
+  const std::uint32_t* pixel = &counts_[indexOf(event)];
+  const std::uint32_t own = eventsIn(*pixel);
+  const auto row = static_cast<std::ptrdiff_t>(stride_);
+  const std::array<std::ptrdiff_t, 8> neighbors = {-1,      1,        -row,    row,
+                                                   row - 1, -row + 1, row + 1, -row - 1};
+  const bool on_border =
+      event.x == 0 || event.y == 0 || event.x + 1 == width_ || event.y + 1 == height_;
+  int busy_ones_left = on_border ? 1 : 2;
+  for (const std::ptrdiff_t offset : neighbors) {
+    if (ratio_ * eventsIn(pixel[offset]) >= own && --busy_ones_left == 0) return false;
+  }
+  return true;
+}
 
 void EventFilterOptions::validate() const {
   hot_pixel.validate();

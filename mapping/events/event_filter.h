@@ -1,16 +1,111 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <utility>
+#include <vector>
 
-#include "mapping/events/background_activity_filter.h"
 #include "mapping/events/event.h"
-#include "mapping/events/event_buffer.h"
-#include "mapping/events/hot_pixel_filter.h"
 
 namespace efm {
+
+/// Finds isolated events. An edge fires in neighbouring pixels within a short time; noise of a
+/// pixel comes alone (Delbruck, "Frame-free dynamic digital vision", Proc. Intl. Symp. on
+/// Secure-Life Electronics, 2008). The first event of an edge in a quiet part of the image is
+/// isolated, too.
+class BackgroundActivityFilter {
+ public:
+  /// @param support_ns an event is isolated if none of its eight neighbours fired in this time
+  /// before it. Above 0; an edge crosses a pixel in about 1 / (pixels per second).
+  BackgroundActivityFilter(int width, int height, std::int64_t support_ns);
+
+  /// @param event the next one of the camera, in time order, inside the sensor. It supports later
+  /// ones, isolated or not. Constant cost.
+  bool isIsolated(const Event& event);
+
+ private:
+  std::int64_t support_ns_;
+  std::size_t stride_;
+  std::vector<std::int64_t> newest_ns_;  // per pixel, row-major, with a frame of one silent pixel
+};
+
+struct HotPixelOptions {
+  /// A pixel is hot while it fires this many times as often as the second busiest of its eight
+  /// neighbours. 2 to 1000. An edge of any contrast and speed passes several pixels, so a normal
+  /// pixel has neighbours that fire as often.
+  double ratio = 5;
+  /// Rates are counted over the last one to two periods of this length. Seconds, 0.001 to 100. Long
+  /// enough that edges pass the neighbours, too, and that a hot pixel fires `min_events`.
+  double period_s = 0.5;
+  /// A pixel with fewer events in that time is not judged. 2 to 30,000. More than a single edge
+  /// causes: from black to white is some 20 contrast thresholds.
+  int min_events = 50;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// Finds events of hot pixels, which fire all the time, independent of the scene. A hot pixel votes
+/// for the same ray from every pose of the window. Where such rays of two cameras meet each other
+/// or an edge, they make a false point.
+///
+/// A pixel is compared with its neighbours, not with a fixed rate, because rates depend on the
+/// sensor, the scene and the motion. The second busiest neighbour serves, so that two adjacent hot
+/// pixels are found, too. The two ends of a line that flickers in place have one busy neighbour
+/// each: they are taken for hot. On the sensor's border, where edges end and neighbours are
+/// missing, the busiest neighbour serves. Counts are per period of the clock, so the result depends
+/// on the events and their order alone.
+class HotPixelFilter {
+ public:
+  /// @throws std::invalid_argument where the options are not valid.
+  HotPixelFilter(int width, int height, const HotPixelOptions& options);
+
+  /// @param event the next one of the camera, inside the sensor. Constant cost: most pixels have
+  /// fewer than `min_events`, so that their neighbours do not matter. On a sensor that is one pixel
+  /// wide or high, pixels have too few neighbours: none is hot.
+  bool isHot(const Event& event) {
+    if (event.t_ns < period_begin_ns_ || event.t_ns >= period_end_ns_) enterPeriodOf(event.t_ns);
+    bringUpToDate(event.y + std::size_t{1});
+    std::uint32_t& counts = counts_[indexOf(event)];
+    if (counts < kNewestFull) counts += kOneNewest;
+    return eventsIn(counts) >= min_events_ && isBusiest(event);
+  }
+
+ private:
+  // A pixel's events in the period of its row (the high half) and in the one before (the low half).
+  static constexpr unsigned kHalf = 16;
+  static constexpr std::uint32_t kOneNewest = 1U << kHalf;
+  static constexpr std::uint32_t kNewestFull = (kOneNewest - 1) << kHalf;
+  static std::uint32_t eventsIn(std::uint32_t counts) {
+    return (counts >> kHalf) + counts % kOneNewest;
+  }
+
+  void enterPeriodOf(std::int64_t t_ns);
+  /// Takes a row's counts to the clock's period.
+  void bringUpToDate(std::size_t row) {
+    if (row_periods_[row] != period_) startPeriod(row);
+  }
+  void startPeriod(std::size_t row);
+  bool isBusiest(const Event& event);
+  /// In the counts, which have a frame of one silent pixel.
+  std::size_t indexOf(const Event& event) const {
+    return (std::size_t{event.y} + 1) * stride_ + event.x + 1;
+  }
+
+  double ratio_;
+  std::uint32_t min_events_;
+  int width_;
+  int height_;
+  std::int64_t period_ns_;
+  std::int64_t period_begin_ns_ = 0;
+  std::int64_t period_end_ns_ = 0;
+  std::uint32_t period_ = 0;  // of the clock, modulo 2^32
+  std::size_t stride_;
+  std::vector<std::uint32_t> counts_;       // row-major
+  std::vector<std::uint32_t> row_periods_;  // the period of a row's counts
+};
 
 /// The filters that remove noise before events get into a window.
 struct EventFilterOptions {

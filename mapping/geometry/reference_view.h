@@ -2,12 +2,60 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <cstddef>
 #include <optional>
+#include <string_view>
+#include <vector>
 
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 
 namespace efm {
+
+enum class PlaneSpacing {
+  kInverse,  ///< Uniform in inverse depth: equal steps of disparity.
+  kLinear,   ///< Uniform in depth.
+};
+
+std::string_view nameOf(PlaneSpacing spacing);
+/// @throws std::invalid_argument naming the value and the known names.
+PlaneSpacing planeSpacingFromName(std::string_view name);
+
+/// The nearest plane is at least this far, metres.
+inline constexpr double kMinDepthM = 1e-3;
+
+struct DepthPlanesOptions {
+  double min_depth_m = 0.5;  ///< Depth of the nearest plane, above 0.
+  double max_depth_m = 5.0;  ///< Depth of the farthest plane, above `min_depth_m`.
+  int num_planes = 100;      ///< At least 1; a single plane lies at `min_depth_m`.
+  PlaneSpacing spacing = PlaneSpacing::kInverse;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// The planes of the DSI, parallel to the image of the reference view. Plane 0 is the nearest; the
+/// first and the last plane are exactly the two limits.
+class DepthPlanes {
+ public:
+  /// @throws std::invalid_argument where the options are not valid.
+  explicit DepthPlanes(const DepthPlanesOptions& options = {});
+
+  int size() const { return static_cast<int>(depths_.size()); }
+  /// Depth of a plane in metres.
+  double depth(int plane) const { return depths_[static_cast<std::size_t>(plane)]; }
+  /// Depth at a position between planes: 0 is the nearest plane, size() - 1 the farthest.
+  double depthAt(double position) const;
+  /// Distance of the two nearest planes in inverse depth, 1/m. Inverse spacing has the same
+  /// distance everywhere. 0 with one plane.
+  double inverseDepthStep() const;
+  /// Distance of neighbouring planes around a position, 1/m. @param position 0 to size() - 1.
+  double inverseDepthStepAt(double position) const;
+
+ private:
+  DepthPlanesOptions options_;
+  std::vector<double> depths_;
+};
 
 /// The undistorted pinhole view of a keyframe's DSI and depth map. Frame `ref`: x right, y down, z
 /// forward. Images are row-major, width x height; integer coordinates are pixel centres.
@@ -53,5 +101,28 @@ struct ReferenceViewOptions {
 /// without a field of view keeps the camera's: the same image at another resolution.
 /// @throws std::invalid_argument where the options are not valid.
 ReferenceView makeReferenceView(const CameraModel& model, const ReferenceViewOptions& options);
+
+/// Rays from one camera centre that all run forward or all run backward along the reference view's
+/// z axis: the events of a pose packet.
+struct RayPacket {
+  std::size_t begin = 0;                                 ///< Index of the first ray.
+  std::size_t end = 0;                                   ///< One past the index of the last ray.
+  Eigen::Vector3d center_ref = Eigen::Vector3d::Zero();  ///< Camera centre C, frame `ref`, metres.
+  bool forward = true;                                   ///< The rays run towards larger z.
+};
+
+/// Where a packet's rays meet one plane: x = scale * x_inf + offset_x, likewise y. (x_inf, y_inf)
+/// is the pixel where a ray meets the plane at infinity.
+struct PlaneTransfer {
+  double scale = 0;
+  double offset_x = 0;
+  double offset_y = 0;
+  bool in_front = false;  ///< The plane lies before the event camera, along its rays.
+};
+
+/// The transfer of a packet's rays to the plane at depth `depth_m`: the second step of Rebecq et
+/// al. (IJCV 2018, Eq. 15) with the plane at infinity as Z0, x(Z) = (1 - C_z/Z) x_inf + (f C_x + c
+/// C_z) / Z.
+PlaneTransfer transferToPlane(const RayPacket& packet, const ReferenceView& view, double depth_m);
 
 }  // namespace efm

@@ -1,13 +1,47 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
-#include "mapping/geometry/camera.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
+
+/// Distortion of the lens. Coefficients are OpenCV's, in OpenCV's order.
+enum class DistortionModel {
+  kNone,         ///< No coefficients.
+  kRadtan,       ///< Brown-Conrady: k1 k2 p1 p2 [k3], 4 or 5 coefficients.
+  kEquidistant,  ///< Kannala-Brandt fisheye: k1 k2 k3 k4.
+};
+
+/// "none", "radtan" or "equidistant": Kalibr's names.
+std::string_view nameOf(DistortionModel model);
+/// @throws std::invalid_argument naming the value and the known names.
+DistortionModel distortionModelFromName(std::string_view name);
+
+/// Intrinsic calibration of one camera: frame `cam` has x right, y down, z forward; integer pixel
+/// coordinates are pixel centres.
+struct CameraModel {
+  int width = 0;          ///< Pixels, 1 to 65,535.
+  int height = 0;         ///< Pixels, 1 to 65,535.
+  double fx = 0, fy = 0;  ///< Focal lengths in pixels, above 0.
+  double cx = 0, cy = 0;  ///< Principal point in pixels.
+  DistortionModel distortion = DistortionModel::kNone;
+  std::vector<double> coefficients;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+
+  /// Raw (distorted) pixel of a point of frame `cam` with z > 0.
+  Eigen::Vector2d project(const Eigen::Vector3d& p_cam) const;
+
+  friend bool operator==(const CameraModel& a, const CameraModel& b);
+  friend bool operator!=(const CameraModel& a, const CameraModel& b) { return !(a == b); }
+};
 
 /// One camera of the rig. In imported recordings the rig's frame is that of camera 0.
 struct RigCamera {

@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <optional>
+
 namespace efm {
+
+inline constexpr double kPi = 3.14159265358979323846;
+
+/// Angles are radians everywhere but in files and option keys (`_deg`).
+inline constexpr double kRadiansPerDegree = kPi / 180;
 
 /// A rigid transform T_a_b of space: p_a = T_a_b * p_b = rotation * p_b + translation.
 /// Neighbouring letters match in every product: T_a_c = T_a_b * T_b_c.
@@ -45,5 +53,16 @@ inline Eigen::Quaterniond rotationBy(const Eigen::Vector3d& rotation_vector) {
   if (angle <= 0) return Eigen::Quaterniond::Identity();
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle, rotation_vector / angle));
 }
+
+/// Rotations and transforms from the numbers of files, which are rounded.
+
+/// The rotation nearest to a matrix R. R * R^T may differ from the identity by 1e-3 in a number.
+/// @return nothing for other matrices, reflections and numbers that are not finite.
+std::optional<Eigen::Quaterniond> rotationNear(const Eigen::Matrix3d& R_a_b);
+/// The transform nearest to a matrix: its rotation as above. The last row may differ from 0 0 0 1
+/// by 1e-3 in a number.
+std::optional<Rigid3> transformNear(const Eigen::Matrix4d& T_a_b);
+/// The rotation of a quaternion whose length is 1 within 1 %; nothing for other lengths.
+std::optional<Eigen::Quaterniond> rotationNear(const Eigen::Quaterniond& rotation);
 
 }  // namespace efm

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

@@ -2,9 +2,18 @@
 #include "mapping/geometry/trajectory.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <fstream>
+#include <limits>
+#include <optional>
 #include <stdexcept>
+#include <string_view>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
@@ -115,6 +124,149 @@ std::optional<TrajectorySegment> Trajectory::segmentAt(std::int64_t t_ns,
   }
   if (first.t_ns == t_ns) return TrajectorySegment{first, first};
   return std::nullopt;
+}
+
+CameraMotion::CameraMotion(const TrajectorySegment& segment, const Rigid3& T_ref_world,
+                           const Rigid3& T_rig_cam)
+    : first_ns_(segment.first.t_ns) {
+  const std::int64_t length_ns = segment.last.t_ns - first_ns_;
+  if (length_ns > 0) per_ns_ = 1.0 / static_cast<double>(length_ns);
+  const Rigid3 T_ref_rig0 = T_ref_world * segment.first.T_world_rig;
+  const Rigid3 T_ref_rig1 = T_ref_world * segment.last.T_world_rig;
+  R_ref_cam0_ = (T_ref_rig0.rotation * T_rig_cam.rotation).normalized();
+  R_ref_cam1_ = (T_ref_rig1.rotation * T_rig_cam.rotation).normalized();
+  rig0_ref_ = T_ref_rig0.translation;
+  step_ref_ = T_ref_rig1.translation - rig0_ref_;
+  lever_cam_ = T_rig_cam.rotation.conjugate() * T_rig_cam.translation;
+
+  double cosine = R_ref_cam0_.dot(R_ref_cam1_);
+  if (cosine < 0) {
+    R_ref_cam1_.coeffs() = -R_ref_cam1_.coeffs();
+    cosine = -cosine;
+  }
+  if (cosine >= 1 - std::numeric_limits<double>::epsilon()) return;
+  angle_ = std::acos(cosine);
+  sine_ = std::sin(angle_);
+}
+
+Rigid3 CameraMotion::poseAt(std::int64_t t_ns) const {
+  const double fraction = per_ns_ * static_cast<double>(t_ns - first_ns_);
+  const bool rotates = sine_ > 0;
+  const double weight0 = rotates ? std::sin((1 - fraction) * angle_) / sine_ : 1 - fraction;
+  const double weight1 = rotates ? std::sin(fraction * angle_) / sine_ : fraction;
+  Rigid3 T_ref_cam;
+  T_ref_cam.rotation.coeffs() = weight0 * R_ref_cam0_.coeffs() + weight1 * R_ref_cam1_.coeffs();
+  T_ref_cam.rotation.normalize();
+  T_ref_cam.translation = rig0_ref_ + fraction * step_ref_ + T_ref_cam.rotation * lever_cam_;
+  return T_ref_cam;
+}
+
+namespace {
+
+constexpr std::array<std::string_view, 8> kFieldNames = {"t",  "tx", "ty", "tz",
+                                                         "qx", "qy", "qz", "qw"};
+
+std::runtime_error fieldError(std::size_t field, std::string_view text, const char* expected) {
+  return std::runtime_error(std::string(kFieldNames[field]) + " = " + inQuotes(text) +
+                            ": expected " + expected);
+}
+
+double numberIn(const std::vector<std::string_view>& fields, std::size_t field) {
+  const std::optional<double> value = parseFinite(fields[field]);
+  if (!value) throw fieldError(field, fields[field], "a finite number");
+  return *value;
+}
+
+std::runtime_error quaternionError(const std::vector<std::string_view>& fields, double norm) {
+  std::string values;
+  for (std::size_t field = 4; field < fields.size(); ++field) {
+    values += (values.empty() ? "" : " ") + std::string(fields[field]);
+  }
+  NumberText text(6);
+  text << "qx qy qz qw = " << inQuotes(values) << ", of length " << norm
+       << ": expected a rotation, of length 1 within 1 %";
+  double squares = 0;
+  for (std::size_t field = 1; field <= 4; ++field) squares += std::pow(numberIn(fields, field), 2);
+  text << (std::abs(squares - 1) < 0.01
+               ? "; tx ty tz qx has length 1: is the order t qx qy qz qw tx ty tz? "
+               : "; are the columns t tx ty tz qx qy qz qw? ")
+       << "A header names other ones";
+  return std::runtime_error(text.str());
+}
+
+}  // namespace
+
+StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_exponent) {
+  if (fields.size() != kFieldNames.size()) {
+    throw std::runtime_error(std::to_string(fields.size()) +
+                             " fields: expected 8, t tx ty tz qx qy qz qw" +
+                             (fields.size() == 7 ? " (angles are not read)" : ""));
+  }
+  const std::optional<std::int64_t> t_ns = parseTimeIn(fields[0], time_exponent);
+  if (!t_ns) throw fieldError(0, fields[0], "a time in decimal seconds");
+  if (*t_ns >= kEndOfTimeNs || *t_ns <= -kEndOfTimeNs) {
+    throw fieldError(0, fields[0], "a time within 4.6e9 s of 0");
+  }
+  StampedPose pose;
+  pose.t_ns = *t_ns;
+  pose.T_world_rig.translation = {numberIn(fields, 1), numberIn(fields, 2), numberIn(fields, 3)};
+  const Eigen::Quaterniond numbers(numberIn(fields, 7), numberIn(fields, 4), numberIn(fields, 5),
+                                   numberIn(fields, 6));
+  const auto rotation = rotationNear(numbers);
+  if (!rotation) throw quaternionError(fields, numbers.coeffs().stableNorm());
+  pose.T_world_rig.rotation = *rotation;
+  return pose;
+}
+
+std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be opened for reading");
+  return readTumTrajectory(stream, file.string());
+}
+
+std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::string& name) {
+  std::vector<StampedPose> poses;
+  std::string line;
+  for (std::size_t number = 1; std::getline(stream, line); ++number) {
+    const std::string_view content = number == 1 ? withoutByteOrderMark(line) : line;
+    const std::vector<std::string_view> fields = splitWords(content.substr(0, content.find('#')));
+    if (fields.empty()) continue;
+    try {
+      poses.push_back(parseTumPose(fields));
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(name + ":" + std::to_string(number) + ": " + error.what());
+    }
+  }
+  if (stream.bad()) throw std::runtime_error(name + ": cannot be read to its end");
+  return poses;
+}
+
+std::vector<StampedPose> readPosesFile(const std::filesystem::path& file) {
+  std::vector<StampedPose> poses = readTumTrajectory(file);
+  if (!poses.empty()) return poses;
+  throw std::runtime_error(file.string() +
+                           ": no poses: expected at least one line t tx ty tz qx qy qz qw");
+}
+
+void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses) {
+  std::ofstream stream(file);
+  writeTumTrajectory(stream, poses);
+  stream.close();
+  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses) {
+  stream << "# t tx ty tz qx qy qz qw\n";
+  for (const StampedPose& pose : poses) writeTumPose(stream, pose);
+}
+
+void writeTumPose(std::ostream& stream, const StampedPose& pose) {
+  const Eigen::Vector3d& p = pose.T_world_rig.translation;
+  const Eigen::Quaterniond& q = pose.T_world_rig.rotation;
+  NumberText line;
+  line << formatSeconds(pose.t_ns) << ' ' << p.x() << ' ' << p.y() << ' ' << p.z() << ' ' << q.x()
+       << ' ' << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+  stream << line.str();
 }
 
 }  // namespace efm

@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
+
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
+#include <istream>
 #include <optional>
+#include <ostream>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
@@ -74,5 +81,61 @@ class Trajectory {
   std::int64_t max_gap_ns_;
   std::vector<StampedPose> poses_;  // strictly increasing times
 };
+
+/// The motion of one camera in the reference view during one segment of the trajectory. Terms that
+/// do not depend on time are computed once, because a segment is asked for thousands of poses.
+///
+/// Slerp commutes with fixed rotations on both sides, so it runs between the camera's own
+/// rotations. The camera's position is that of the rig, which moves on a line, plus the rotated
+/// lever arm.
+class CameraMotion {
+ public:
+  CameraMotion(const TrajectorySegment& segment, const Rigid3& T_ref_world,
+               const Rigid3& T_rig_cam);
+
+  /// T_ref_cam = T_ref_world * segment.poseAt(t_ns) * T_rig_cam up to rounding. `t_ns` lies inside
+  /// the segment.
+  Rigid3 poseAt(std::int64_t t_ns) const;
+
+ private:
+  std::int64_t first_ns_;
+  double per_ns_ = 0;  // 1 / length of the segment; 0 for the segment of a single pose
+  Eigen::Quaterniond R_ref_cam0_;
+  Eigen::Quaterniond R_ref_cam1_;  // its sign is the one nearer to R_ref_cam0_
+  double angle_ = 0;               // between the two unit quaternions: half the rotation angle
+  double sine_ = 0;                // of `angle_`; 0 where it is too small to divide by
+  Eigen::Vector3d rig0_ref_;       // position of the rig at the first pose
+  Eigen::Vector3d step_ref_;       // from there to the rig's position at the last pose
+  Eigen::Vector3d lever_cam_;      // from the rig to the camera
+};
+
+/// Trajectories in the text format of the TUM RGB-D benchmark: a line `t tx ty tz qx qy qz qw` for
+/// each pose, in metres and decimal seconds. Blank lines and comments after `#` are skipped.
+
+/// Reads the poses T_world_rig in the order of the file. Times are exact. Quaternions are
+/// normalised, because files have few digits. A length that differs from 1 by more than 1 % is an
+/// error.
+/// @throws std::runtime_error naming file, line, value and the expected value.
+std::vector<StampedPose> readTumTrajectory(const std::filesystem::path& file);
+/// @param name of the stream, for errors.
+std::vector<StampedPose> readTumTrajectory(std::istream& stream, const std::string& name);
+
+/// The same for the poses of a recording: at least one.
+/// @throws std::runtime_error naming the file that has no pose.
+std::vector<StampedPose> readPosesFile(const std::filesystem::path& file);
+
+/// The pose of a line.
+/// @param fields t tx ty tz qx qy qz qw.
+/// @param time_exponent of the unit of t: 10^time_exponent seconds, -9 to 0.
+/// @throws std::runtime_error naming the field, its value and the expected value.
+StampedPose parseTumPose(const std::vector<std::string_view>& fields, int time_exponent = 0);
+
+/// Writes times with nine decimals and other numbers with 17 significant digits: the file is read
+/// back exactly, up to the rounding of the normalisation.
+/// @throws std::runtime_error naming the file that cannot be written.
+void writeTumTrajectory(const std::filesystem::path& file, const std::vector<StampedPose>& poses);
+void writeTumTrajectory(std::ostream& stream, const std::vector<StampedPose>& poses);
+/// Writes the line of a pose.
+void writeTumPose(std::ostream& stream, const StampedPose& pose);
 
 }  // namespace efm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/kernels/fusion.h"
+#include "mapping/kernels/kernels.h"
 
 #include <algorithm>
 #include <cmath>

@@ -45,7 +45,7 @@
 #include <cassert>
 #include <cstddef>
 
-#include "mapping/kernels/instruction_set.h"
+#include "mapping/kernels/kernels.h"
 
 #if HWY_TARGETS & HWY_SCALAR
 #define EFM_BASELINE_OF(name) &N_SCALAR::name

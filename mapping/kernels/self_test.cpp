@@ -9,8 +9,7 @@
 #include <memory>
 #include <random>
 
-#include "mapping/kernels/bilinear_vote.h"
-#include "mapping/kernels/fusion.h"
+#include "mapping/kernels/kernels.h"
 
 namespace efm::kernels {
 namespace {

@@ -5,12 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "mapping/kernels/columns.h"
-#include "mapping/kernels/instruction_set.h"
-#include "mapping/kernels/peaks.h"
-#include "mapping/kernels/tile_resolve.h"
+#include "mapping/kernels/kernels.h"
 #include "mapping/kernels/tile_scatter.h"
-#include "mapping/kernels/weighted_ranks.h"
 
 namespace efm::kernels {
 

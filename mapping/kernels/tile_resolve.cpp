@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/kernels/tile_resolve.h"
+#include "mapping/kernels/tile_scatter.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "mapping/kernels/highway_targets.h"
-#include "mapping/kernels/tile_scatter.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "mapping/kernels/tile_resolve.cpp"

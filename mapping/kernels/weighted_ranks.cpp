@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/kernels/weighted_ranks.h"
+#include "mapping/kernels/kernels.h"
 
 #include "mapping/kernels/highway_targets.h"
 

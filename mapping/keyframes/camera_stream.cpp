@@ -6,8 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/events/even_choice.h"
-#include "mapping/events/event_check.h"
+#include "mapping/events/event.h"
 
 namespace efm {
 namespace {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "mapping/events/event.h"
-#include "mapping/events/event_buffer.h"
 #include "mapping/events/event_filter.h"
 #include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"

@@ -8,18 +8,17 @@
 #include <optional>
 #include <vector>
 
-#include "mapping/dsi/vote_counts.h"
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/events/event.h"
 #include "mapping/events/event_filter.h"
 #include "mapping/events/window.h"
-#include "mapping/events/window_data.h"
+#include "mapping/geometry/lens.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
-#include "mapping/geometry/undistortion.h"
 #include "mapping/keyframes/camera_stream.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "mapping/keyframes/keyframe_policy.h"
-#include "mapping/keyframes/stage.h"
 
 namespace efm {
 

@@ -5,18 +5,107 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
-#include "mapping/base/option_check.h"
-#include "mapping/events/even_choice.h"
-#include "mapping/events/event_check.h"
-#include "mapping/keyframes/corrected_keyframe.h"
-#include "mapping/keyframes/view_motion.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/events/event.h"
 
 namespace efm {
+
+WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
+                  const Trajectory& trajectory, const EventGroups& groups,
+                  const PosePacketsOptions& options) {
+  const DepthPlanes& planes = input.planes;
+  const PacketGeometry geometry{input.T_world_ref.inverse(), input.view, planes.depth(0),
+                                planes.depth(planes.size() - 1)};
+  WindowRays result;
+  result.camera = camera.camera;
+  std::vector<std::size_t> rays_in(groups.subintervals());
+  PolaritySplit split;
+  for (const EventPart& part : groups.partsOf(camera.events, input.window)) {
+    const EventSpan events = part.select(split);
+    const PosePackets packets = splitIntoPosePackets(
+        events, *camera.calibration, *camera.undistortion, trajectory, geometry, options);
+    const RayBundle& rays =
+        result.rays.emplace_back(backProject(events, packets, *camera.undistortion, input.view));
+    result.events += rays.size();
+    result.without_pose += packets.without_pose;
+    result.outside_lens += events.size() - packets.without_pose - rays.size();
+    rays_in[part.subinterval] += rays.size();
+  }
+  result.silent_subintervals =
+      static_cast<std::uint64_t>(std::count(rays_in.begin(), rays_in.end(), std::size_t{0}));
+  return result;
+}
+
+void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyframe) {
+  for (const WindowRays& camera : cameras) {
+    keyframe.events[static_cast<std::size_t>(camera.camera)] = camera.events;
+    keyframe.without_pose += camera.without_pose;
+    keyframe.outside_lens += camera.outside_lens;
+    if (camera.events == 0) {
+      keyframe.silent_cameras.push_back(camera.camera);
+    } else {
+      keyframe.silent_subintervals += camera.silent_subintervals;
+    }
+  }
+}
+
+void removeSilent(std::vector<WindowRays>& cameras) {
+  const auto silent = [](const WindowRays& camera) { return camera.events == 0; };
+  if (std::all_of(cameras.begin(), cameras.end(), silent)) return;
+  cameras.erase(std::remove_if(cameras.begin(), cameras.end(), silent), cameras.end());
+}
+
+std::vector<CameraRays> inputsOf(std::vector<WindowRays>& cameras, const FusionLayout& layout) {
+  std::vector<CameraRays> inputs;
+  for (const auto& slots : layout.inputs) {
+    CameraRays& input = inputs.emplace_back();
+    for (const auto& slot : slots) input.push_back(std::move(cameras[slot.camera].rays[slot.part]));
+  }
+  return inputs;
+}
+
+namespace {
+
+/// The contrast of the fused DSI along its peaks: large where the events of all cameras meet.
+double sharpnessOf(const KeyframeDepthMap& keyframe) {
+  return keyframe.map.confidence.dot(keyframe.map.confidence);
+}
+
+}  // namespace
+
+KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along) {
+  const MotionCorrectionOptions& options = window.options;
+  KeyframeDepthMap keyframe = map_along(window.tracked, nullptr);
+  Trajectory motion = window.tracked;
+  for (int round = 0; round < options.motion_rounds; ++round) {
+    const VelocityCorrection current = keyframe.motion_correction.value_or(VelocityCorrection{});
+    VelocityCorrection correction;
+    {
+      const StageScope scope(window.stages, Stage::kSweep);
+      correction = findCorrection(window.input, motion, keyframe.map.depth, current, options);
+    }
+    Trajectory corrected = correctedTrajectory(window.tracked, window.input.window, correction);
+    KeyframeDepthMap sharper = map_along(corrected, nullptr);
+    const double min_gain = keyframe.motion_correction ? 0 : options.min_gain;
+    if (!(sharpnessOf(sharper) > (1 + min_gain) * sharpnessOf(keyframe))) break;
+    motion = std::move(corrected);
+    keyframe = std::move(sharper);
+    keyframe.motion_correction = correction;
+  }
+  if (window.sink == nullptr) return keyframe;
+  const std::optional<VelocityCorrection> correction = keyframe.motion_correction;
+  keyframe = map_along(motion, window.sink);
+  keyframe.motion_correction = correction;
+  return keyframe;
+}
+
 namespace {
 
 void requireCamera(const Rig& rig, int camera, const char* key) {
@@ -220,6 +309,58 @@ void KeyframeMapper::extract(const SweepResult& swept, const std::vector<WindowR
     keyframe.camera_maps.push_back(
         {cameras[c].camera, extractDepth(swept.cameras[c], planes_, options_.extraction, facts)});
   }
+}
+
+namespace {
+
+/// How far a unit of inverse depth (1/m) moves the view of a camera at `p_view` (metres), in
+/// pixels, on average over the view.
+double meanParallax(const ReferenceView& view, const Eigen::Vector3d& p_view) {
+  constexpr int kGrid = 5;
+  double sum = 0;
+  for (int row = 0; row < kGrid; ++row) {
+    for (int column = 0; column < kGrid; ++column) {
+      const Eigen::Vector3d ray =
+          view.pointAt((column + 0.5) / kGrid * view.width, (row + 0.5) / kGrid * view.height, 1);
+      sum += std::hypot(view.fx * (p_view.x() - ray.x() * p_view.z()),
+                        view.fy * (p_view.y() - ray.y() * p_view.z()));
+    }
+  }
+  return sum / (kGrid * kGrid);
+}
+
+}  // namespace
+
+std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
+                                   const std::vector<int>& cameras,
+                                   const KeyframeMapperOptions& options) {
+  const std::optional<Rigid3> T_world_rig = data.trajectory->poseAt(data.window.t_ref_ns);
+  if (!T_world_rig) return std::nullopt;
+  const auto reference = static_cast<std::size_t>(options.reference_camera);
+  const Rigid3& T_rig_view = rig.cameras.at(reference).T_rig_cam;
+  const Rigid3 T_view_world = (*T_world_rig * T_rig_view).inverse();
+  const ReferenceView view = makeReferenceView(rig.cameras.at(reference).model, options.view);
+  ViewMotion motion;
+  constexpr int kSteps = 16;
+  for (int step = 0; step <= kSteps; ++step) {
+    const std::int64_t t_ns =
+        data.window.t0_ns + (data.window.t1_ns - data.window.t0_ns) / kSteps * step;
+    const std::optional<Rigid3> T_world_then = data.trajectory->poseAt(t_ns);
+    if (!T_world_then) continue;
+    const Rigid3 T_view_rig = T_view_world * *T_world_then;
+    for (const int camera : cameras) {
+      const Rigid3& T_rig_cam = rig.cameras.at(static_cast<std::size_t>(camera)).T_rig_cam;
+      motion.rig_baseline_m =
+          std::max(motion.rig_baseline_m, (T_rig_cam.translation - T_rig_view.translation).norm());
+      const double parallax_px_m = meanParallax(view, (T_view_rig * T_rig_cam).translation);
+      motion.parallax_px_m = std::max(motion.parallax_px_m, parallax_px_m);
+    }
+    const Rigid3 T_view_then = T_view_rig * T_rig_view;
+    motion.shift_m = std::max(motion.shift_m, T_view_then.translation.norm());
+    motion.rotation_rad =
+        std::max(motion.rotation_rad, Eigen::AngleAxisd(T_view_then.rotation).angle());
+  }
+  return motion;
 }
 
 }  // namespace efm

@@ -2,22 +2,62 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
 #include "mapping/depth/depth_extraction.h"
-#include "mapping/depth/robust_maximum.h"
-#include "mapping/events/event_groups.h"
-#include "mapping/events/subintervals.h"
-#include "mapping/events/window_input.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/events/window.h"
+#include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
-#include "mapping/keyframes/stage.h"
-#include "mapping/keyframes/window_rays.h"
 #include "mapping/motion/motion_correction.h"
+#include "mapping/rays/rays.h"
 #include "mapping/sweep/space_sweep.h"
 
 namespace efm {
+
+/// The rays of one camera's events of a window, and counts of its events.
+struct WindowRays {
+  int camera = 0;                         ///< Index in the rig.
+  CameraRays rays;                        ///< One bundle per part of `EventGroups`.
+  std::uint64_t events = 0;               ///< With a ray.
+  std::uint64_t without_pose = 0;         ///< Without a ray.
+  std::uint64_t outside_lens = 0;         ///< Without a ray, with a pose.
+  std::uint64_t silent_subintervals = 0;  ///< Sub-intervals (of all slices) without a ray.
+};
+
+/// Back-projects one camera's events along a trajectory, part by part (Ghosh and Gallego 2022,
+/// Algorithm 2, line 3).
+/// @param camera one of the input's cameras.
+WindowRays raysOf(const CameraEvents& camera, const WindowInput& input,
+                  const Trajectory& trajectory, const EventGroups& groups,
+                  const PosePacketsOptions& packets);
+
+/// Counts the events of all cameras of a keyframe.
+void countEvents(const std::vector<WindowRays>& cameras, KeyframeDepthMap& keyframe);
+/// Removes the cameras without rays, unless no camera has any.
+void removeSilent(std::vector<WindowRays>& cameras);
+/// The inputs of the fusion; consumes the cameras' rays.
+std::vector<CameraRays> inputsOf(std::vector<WindowRays>& cameras, const FusionLayout& layout);
+
+/// A window that is mapped with correction of its motion. Owns nothing.
+struct CorrectedWindow {
+  const WindowInput& input;
+  const Trajectory& tracked;
+  const MotionCorrectionOptions& options;
+  DsiSink* sink = nullptr;      ///< May be null; receives the DSI of the result alone.
+  StageHook* stages = nullptr;  ///< May be null.
+};
+
+/// Maps the window along a motion; the sink may be null.
+using MapAlong = std::function<KeyframeDepthMap(const Trajectory& motion, DsiSink* sink)>;
+
+/// Maps the window along the tracker's motion, then finds the correction of the motion from the
+/// depth and maps again along the corrected motion, as long as the fused DSI becomes sharper.
+/// @return the sharpest keyframe, with its correction if there is one.
+KeyframeDepthMap mapCorrected(const CorrectedWindow& window, const MapAlong& map_along);
 
 struct KeyframeMapperOptions {
   DepthPlanesOptions planes;
@@ -95,5 +135,21 @@ class KeyframeMapper {
   std::vector<UndistortionTable> undistortion_;  // per selected camera
   RobustMaximum sequence_maximum_;
 };
+
+/// How far the selected cameras are from the reference view within a window: maxima.
+struct ViewMotion {
+  double rig_baseline_m = 0;  ///< Of any camera at the reference time.
+  double shift_m = 0;         ///< Of the reference camera, at any time.
+  double rotation_rad = 0;    ///< Of the reference camera.
+  /// The parallax of inverse depth, for any camera at any time, averaged over the view: pixels per
+  /// 1/m.
+  double parallax_px_m = 0;
+};
+
+/// @param cameras the selected ones, as indices of the rig.
+/// @return nothing where the window's reference time has no pose.
+std::optional<ViewMotion> motionIn(const WindowData& data, const Rig& rig,
+                                   const std::vector<int>& cameras,
+                                   const KeyframeMapperOptions& options);
 
 }  // namespace efm

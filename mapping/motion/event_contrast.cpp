@@ -2,12 +2,185 @@
 #include "mapping/motion/event_contrast.h"
 
 #include <tbb/parallel_for.h>
+#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "mapping/geometry/timestamp.h"
 
 namespace efm {
+
+Rigid3 VelocityCorrection::displacement(double since_s) const {
+  const Eigen::Vector3d rotation = since_s * angular_rad_s;
+  const Eigen::Vector3d path = since_s * linear_m_s;
+  const double angle = rotation.norm();
+  constexpr double kSmallAngle = 1e-4;  // below it the series is exact to rounding
+  const double square = angle * angle;
+  const bool small = angle < kSmallAngle;
+  const double sine = small ? 1 - square / 6 : std::sin(angle) / angle;
+  const double cosine = small ? 0.5 - square / 24 : (1 - std::cos(angle)) / square;
+  const double rest = small ? 1.0 / 6 - square / 120 : (1 - sine) / square;
+  Rigid3 T_rig_true;
+  const double half = small ? 0.5 - square / 48 : std::sin(angle / 2) / angle;
+  T_rig_true.rotation.w() = std::cos(angle / 2);
+  T_rig_true.rotation.vec() = half * rotation;
+  T_rig_true.rotation.normalize();
+  T_rig_true.translation =
+      sine * path + cosine * rotation.cross(path) + rest * rotation.dot(path) * rotation;
+  return T_rig_true;
+}
+
+Trajectory correctedTrajectory(const Trajectory& trajectory, const Window& window,
+                               const VelocityCorrection& correction) {
+  const std::int64_t from_ns = std::min(window.t0_ns, window.t_ref_ns);
+  const std::int64_t to_ns = std::max(window.t1_ns, window.t_ref_ns);
+  Trajectory corrected = trajectory.moved(from_ns, to_ns, [&](const StampedPose& pose) {
+    const double since_s = secondsBetween(window.t_ref_ns, pose.t_ns);
+    return pose.T_world_rig * correction.displacement(since_s);
+  });
+  // Between two moved poses, interpolation misses the tracker's pose by a term of second order.
+  corrected.add({window.t_ref_ns, trajectory.poseAt(window.t_ref_ns).value()});
+  return corrected;
+}
+
+NearestDepths::NearestDepths(const cv::Mat1f& depth, double radius_px)
+    : empty_(cv::countNonZero(depth) == 0),
+      inverse_(cv::Mat1f::zeros(depth.size())),
+      distance_(cv::Mat1f::zeros(depth.size())) {
+  if (empty_) return;
+  cv::Mat1i nearest;  // label of the nearest pixel that has a depth
+  cv::distanceTransform(depth == 0, distance_, nearest, cv::DIST_L2, cv::DIST_MASK_5,
+                        cv::DIST_LABEL_PIXEL);
+  std::vector<float> inverse_of(depth.total() + 1);
+  depth.forEach([&](float metres, const int* at) {
+    if (metres > 0) inverse_of[static_cast<std::size_t>(nearest(at[0], at[1]))] = 1 / metres;
+  });
+  inverse_.forEach([&](float& inverse, const int* at) {
+    if (distance_(at[0], at[1]) > radius_px) return;
+    inverse = inverse_of[static_cast<std::size_t>(nearest(at[0], at[1]))];
+  });
+}
+
+namespace {
+
+/// The rays of one event camera at one time, in the reference view.
+class EventRays {
+ public:
+  EventRays(const Rigid3& T_ref_rig, const Rigid3& T_rig_cam, const WarpTarget& target)
+      : R_ref_rig_(T_ref_rig.rotation.toRotationMatrix()),
+        T_ref_rig_(T_ref_rig),
+        T_rig_cam_(T_rig_cam),
+        target_(target) {}
+
+  /// @param since_s from the reference time to the event.
+  std::optional<WarpedEvent> warp(const Eigen::Vector2d& ray_cam, double since_s) const {
+    const Eigen::Vector3d ray_rig = T_rig_cam_.rotation * ray_cam.homogeneous();
+    const Eigen::Vector3d center_ref = T_ref_rig_ * T_rig_cam_.translation;
+    const Eigen::Vector3d ray_ref = R_ref_rig_ * ray_rig;
+    const std::optional<double> depth_m = depthAlong(center_ref, ray_ref);
+    if (!depth_m) return std::nullopt;
+
+    const double length = (*depth_m - center_ref.z()) / ray_ref.z();
+    const Eigen::Vector3d p_ref = center_ref + length * ray_ref;
+    const Eigen::Vector3d p_rig = T_rig_cam_.translation + length * ray_rig;
+    const ReferenceView& view = target_.view;
+    // A point fixed to the rig moves by v + w x p_rig; the moved ray then meets the plane again.
+    Eigen::Matrix<double, 2, 3> pixel_by_point;
+    pixel_by_point << view.fx, 0, -view.fx * ray_ref.x() / ray_ref.z(), 0, view.fy,
+        -view.fy * ray_ref.y() / ray_ref.z();
+    Eigen::Matrix<double, 3, 6> point_by_velocity;
+    point_by_velocity << Eigen::Matrix3d::Identity(), -crossMatrix(p_rig);
+    WarpedEvent event;
+    event.pixel = view.project(p_ref).cast<float>();
+    event.by_velocity =
+        (since_s / *depth_m * pixel_by_point * R_ref_rig_ * point_by_velocity).cast<float>();
+    event.by_inverse_depth =
+        Eigen::Vector2d(view.fx * (center_ref.x() - center_ref.z() * ray_ref.x() / ray_ref.z()),
+                        view.fy * (center_ref.y() - center_ref.z() * ray_ref.y() / ray_ref.z()))
+            .cast<float>();
+    return event;
+  }
+
+ private:
+  static Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
+    Eigen::Matrix3d cross;
+    cross << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+    return cross;
+  }
+
+  /// Depth at which the ray is nearest to a pixel of the same depth, to half a plane.
+  std::optional<double> depthAlong(const Eigen::Vector3d& center_ref,
+                                   const Eigen::Vector3d& ray_ref) const {
+    // The pixel of a ray is linear in inverse depth.
+    const ReferenceView& view = target_.view;
+    const double right = ray_ref.x() / ray_ref.z();
+    const double down = ray_ref.y() / ray_ref.z();
+    const auto x_inf = static_cast<float>(view.fx * right + view.cx);
+    const auto y_inf = static_cast<float>(view.fy * down + view.cy);
+    const auto x_gradient = static_cast<float>(view.fx * (center_ref.x() - center_ref.z() * right));
+    const auto y_gradient = static_cast<float>(view.fy * (center_ref.y() - center_ref.z() * down));
+    const auto width = static_cast<float>(view.width);
+    const auto height = static_cast<float>(view.height);
+    float nearest_px = std::numeric_limits<float>::infinity();
+    std::optional<double> found_m;
+    for (const InversePlane& plane : target_.planes) {
+      if ((1 / plane.inverse_depth - center_ref.z()) * ray_ref.z() <= 0) continue;
+      const float x = x_inf + plane.inverse_depth * x_gradient + 0.5F;
+      const float y = y_inf + plane.inverse_depth * y_gradient + 0.5F;
+      if (!(x >= 0 && x < width && y >= 0 && y < height)) continue;
+      const cv::Point pixel(static_cast<int>(x), static_cast<int>(y));
+      const float inverse_depth = target_.depths->inverseDepth(pixel);
+      if (std::abs(inverse_depth - plane.inverse_depth) > plane.half_step) continue;
+      const float distance_px = target_.depths->distancePx(pixel);
+      if (distance_px >= nearest_px) continue;
+      nearest_px = distance_px;
+      found_m = 1 / double{inverse_depth};
+    }
+    return found_m;
+  }
+
+  Eigen::Matrix3d R_ref_rig_;
+  Rigid3 T_ref_rig_;
+  Rigid3 T_rig_cam_;
+  const WarpTarget& target_;
+};
+
+}  // namespace
+
+std::vector<InversePlane> inversePlanes(const DepthPlanes& planes) {
+  std::vector<InversePlane> result;
+  result.reserve(static_cast<std::size_t>(planes.size()));
+  for (int plane = 0; plane < planes.size(); ++plane) {
+    result.push_back({static_cast<float>(1 / planes.depth(plane)),
+                      static_cast<float>(0.5 * planes.inverseDepthStepAt(plane))});
+  }
+  return result;
+}
+
+std::vector<WarpedEvent> warpEvents(const CameraEvents& camera, std::size_t every,
+                                    const Trajectory& trajectory, const WarpTarget& target) {
+  const EventSpan events = camera.events;
+  std::vector<WarpedEvent> warped;
+  warped.reserve(events.size() / every + 1);
+  std::size_t cursor = 0;
+  for (std::size_t i = every / 2; i < events.size(); i += every) {
+    const Event& event = events[i];
+    if (!camera.undistortion->hasRay(event.x, event.y)) continue;
+    const auto segment = trajectory.segmentAt(event.t_ns, cursor);
+    if (!segment) continue;
+    const Rigid3 T_ref_rig = target.T_ref_world * segment->poseAt(event.t_ns);
+    const EventRays rays(T_ref_rig, camera.calibration->T_rig_cam, target);
+    const auto found = rays.warp(camera.undistortion->ray(event.x, event.y),
+                                 secondsBetween(target.t_ref_ns, event.t_ns));
+    if (found) warped.push_back(*found);
+  }
+  return warped;
+}
+
 namespace {
 
 /// The sum of the squares of the images' harmonic mean. Replaces each image by the derivative by

@@ -2,16 +2,52 @@
 #include "mapping/survey/pose_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <utility>
 
-#include "mapping/depth/median.h"
+#include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/survey/event_sharpness.h"
-#include "mapping/survey/sample_piece.h"
+#include "mapping/survey/depth_agreement.h"
+#include "mapping/survey/scene_depths.h"
 
 namespace efm {
+namespace {
+
+/// All 23 rotations other than none that map axes to axes.
+std::vector<Eigen::Matrix3d> axisRotations() {
+  std::vector<Eigen::Matrix3d> rotations;
+  std::array<int, 3> order{0, 1, 2};
+  do {
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      Eigen::Matrix3d rotation = Eigen::Matrix3d::Zero();
+      for (int row = 0; row < 3; ++row) {
+        rotation(row, order[static_cast<std::size_t>(row)]) = (signs >> row) % 2 == 0 ? 1 : -1;
+      }
+      if (rotation.determinant() > 0 && !rotation.isIdentity()) rotations.push_back(rotation);
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  return rotations;
+}
+
+}  // namespace
+
+std::vector<PoseHypothesis> poseHypotheses() {
+  std::vector<PoseHypothesis> all;
+  all.push_back({PoseMistake::kInverted, [](const Rigid3& pose) { return pose.inverse(); }});
+  all.push_back({PoseMistake::kQuaternionOrder, [](const Rigid3& pose) {
+                   const Eigen::Quaterniond& q = pose.rotation;
+                   return Rigid3{{q.x(), q.y(), q.z(), q.w()}, pose.translation};
+                 }});
+  for (const Eigen::Matrix3d& rotation : axisRotations()) {
+    const Rigid3 T_body_rig{Eigen::Quaterniond(rotation), Eigen::Vector3d::Zero()};
+    all.push_back({PoseMistake::kAxes,
+                   [T_body_rig](const Rigid3& pose) { return pose * T_body_rig; }, rotation});
+  }
+  return all;
+}
+
 namespace {
 
 // Measured on six simulated recordings and a real one, right and with each mistake: the figures are

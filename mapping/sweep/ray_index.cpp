@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/sweep/ray_index.h"
+#include "mapping/sweep/ray_bins.h"
 
 #include <algorithm>
 #include <cmath>

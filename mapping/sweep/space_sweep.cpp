@@ -1,16 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/sweep/space_sweep.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
+#include <opencv2/core.hpp>
 
 #include <algorithm>
 #include <cassert>
+#include <cstdint>
 #include <string>
 #include <utility>
 
-#include "mapping/base/option_check.h"
-#include "mapping/sweep/plane_sweep.h"
-#include "mapping/sweep/tiled_sweep.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/kernels/kernels.h"
+#include "mapping/sweep/ray_bins.h"
+#include "mapping/sweep/tiles.h"
 
 namespace efm {
 namespace {
@@ -54,6 +63,265 @@ SweepResult sweepSpace(std::vector<CameraRays> cameras, const DsiGrid& grid,
   return options.kernelOrFastest() == VotingKernel::kPlain
              ? sweepPlanes(cameras, grid, options, request)
              : sweepTiles(std::move(cameras), grid, options, request);
+}
+
+namespace {
+
+/// Votes one camera's rays on one plane; `votes` is cleared first.
+VoteCounts votePlane(const RayBundle& rays, const ReferenceView& view, double depth_m,
+                     PlaneValues& votes) {
+  std::fill(votes.begin(), votes.end(), 0.0F);
+  const kernels::VotePlane plane{votes.data(), view.width, view.height};
+  VoteCounts counts;
+  for (const RayPacket& packet : rays.packets) {
+    const std::uint64_t size = packet.end - packet.begin;
+    const PlaneTransfer transfer = transferToPlane(packet, view, depth_m);
+    if (!transfer.in_front) {
+      counts.behind_camera += size;
+      continue;
+    }
+    const std::uint64_t cast = kernels::voteBilinear(
+        {rays.x_inf.data(), rays.y_inf.data()},
+        {packet.begin, packet.end, static_cast<float>(transfer.scale),
+         static_cast<float>(transfer.offset_x), static_cast<float>(transfer.offset_y)},
+        plane);
+    counts.cast += cast;
+    counts.outside_view += size - cast;
+  }
+  return counts;
+}
+
+/// One plane at a time, on one thread.
+struct PlaneScratch {
+  PlaneFusion fusion;
+  std::vector<VoteCounts> votes;  // per camera, of all planes so far
+};
+
+void sweepPlane(const std::vector<CameraRays>& cameras, const ReferenceView& view, double depth_m,
+                PlaneScratch& scratch) {
+  PlaneFusion& fusion = scratch.fusion;
+  fusion.begin();
+  for (const CameraSlot& input : fusion.inputs()) {
+    const auto camera = static_cast<std::size_t>(input.camera);
+    scratch.votes[camera] += votePlane(cameras[camera][static_cast<std::size_t>(input.slot)], view,
+                                       depth_m, fusion.next());
+    fusion.add(input);
+  }
+}
+
+}  // namespace
+
+SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const DsiGrid& grid,
+                        const SpaceSweepOptions& options, const SweepRequest& request) {
+  const int planes = grid.planes.size();
+  const int threads = std::min(options.threadsOrCores(), planes);
+  const std::size_t own_peaks = request.camera_peaks ? cameras.size() : 0;
+  const auto keep =
+      request.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
+  std::vector<PlaneScratch> scratches(
+      static_cast<std::size_t>(threads),
+      {PlaneFusion(options.fusion, fusionInputs(cameras, request.groups), grid.view.pixels(), keep),
+       std::vector<VoteCounts>(cameras.size())});
+  // The view is one tile.
+  const cv::Rect tile(0, 0, grid.view.width, grid.view.height);
+  std::vector<TilePeaks> peaks(1 + own_peaks,
+                               TilePeaks(planes, request.column_window, grid.view.pixels()));
+  for (TilePeaks& of_dsi : peaks) of_dsi.moveTo(tile, VotingKernel::kPlain);
+
+  tbb::task_arena arena(threads);
+  for (int begin = 0; begin < planes; begin += threads) {
+    const int count = std::min(threads, planes - begin);
+    arena.execute([&] {
+      tbb::parallel_for(0, count, [&](int i) {
+        sweepPlane(cameras, grid.view, grid.planes.depth(begin + i),
+                   scratches[static_cast<std::size_t>(i)]);
+      });
+    });
+    for (int i = 0; i < count; ++i) {
+      const PlaneFusion& fusion = scratches[static_cast<std::size_t>(i)].fusion;
+      peaks[0].add(begin + i, fusion.fused());
+      for (std::size_t c = 0; c < own_peaks; ++c) {
+        peaks[1 + c].add(begin + i, fusion.ofCamera(static_cast<int>(c)));
+      }
+      if (request.sink != nullptr) request.sink->addPlane(begin + i, fusion.fused().data());
+    }
+  }
+
+  const auto swept = [&](const TilePeaks& of_dsi) {
+    ViewPeaks view(grid, request.column_window, 1);
+    of_dsi.writeTo(view, 0);
+    return view.sweptDsi();
+  };
+  SweepResult result{swept(peaks[0]), {}, std::vector<VoteCounts>(cameras.size())};
+  for (std::size_t c = 0; c < own_peaks; ++c) result.cameras.push_back(swept(peaks[1 + c]));
+  for (const PlaneScratch& scratch : scratches) {
+    for (std::size_t c = 0; c < cameras.size(); ++c) result.votes[c] += scratch.votes[c];
+  }
+  return result;
+}
+
+namespace {
+
+/// The first pixels of the parts of a side, and its end.
+std::vector<int> cut(int side, int max_pixels) {
+  const int parts = (side + max_pixels - 1) / max_pixels;
+  std::vector<int> cuts;
+  for (int i = 0; i <= parts; ++i) {
+    cuts.push_back(static_cast<int>(std::int64_t{side} * i / parts));
+  }
+  return cuts;
+}
+
+/// The buffers of one thread, reused from tile to tile.
+struct Scratch {
+  std::vector<TileRays> rays;  // by input
+  TileFusion fusion;
+  TilePeaks fused;
+  std::vector<TilePeaks> cameras;  // where asked for
+};
+
+/// The whole DSI for a sink.
+class WholePlanes {
+ public:
+  WholePlanes(DsiSink* sink, const DsiGrid& grid) : sink_(sink) {
+    planes_.resize(sink == nullptr ? 0 : static_cast<std::size_t>(grid.planes.size()));
+    for (cv::Mat1f& plane : planes_) plane.create(grid.view.height, grid.view.width);
+  }
+
+  /// Several threads may write different tiles.
+  void write(int plane, const cv::Rect& tile, const PlaneValues& values) {
+    if (sink_ != nullptr) writeTo(planes_[static_cast<std::size_t>(plane)](tile), values);
+  }
+  void deliver() {
+    for (std::size_t plane = 0; plane < planes_.size(); ++plane) {
+      sink_->addPlane(static_cast<int>(plane), planes_[plane][0]);
+    }
+  }
+
+ private:
+  DsiSink* sink_;
+  std::vector<cv::Mat1f> planes_;
+};
+
+class TiledSweep {
+ public:
+  TiledSweep(std::vector<CameraRays> cameras, const DsiGrid& grid, const SpaceSweepOptions& options,
+             const SweepRequest& request)
+      : grid_(grid),
+        options_(options),
+        request_(request),
+        kernel_(options.kernelOrFastest()),
+        inputs_(fusionInputs(cameras, request.groups)),
+        tiles_(tilesOf(grid.view, TileCells::kMaxPixels)),
+        rays_(std::move(cameras), grid, kernel_),
+        whole_planes_(request.sink, grid),
+        fused_(grid, request.column_window, tiles_.size()) {
+    for (int c = 0; request.camera_peaks && c < inputs_.cameras; ++c) {
+      cameras_.emplace_back(grid, request.column_window, tiles_.size());
+    }
+  }
+
+  /// On the threads of the task arena that it is called in.
+  SweepResult run() {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, tiles_.size()),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          Scratch& scratch = scratches_.local();
+          for (std::size_t t = range.begin(); t < range.end(); ++t) sweepTile(t, scratch);
+        },
+        tbb::simple_partitioner());
+    rays_.release();
+    whole_planes_.deliver();
+    return result();
+  }
+
+ private:
+  Scratch newScratch() const {
+    const TilePeaks peaks(grid_.planes.size(), request_.column_window,
+                          TileCells::kMaxPixels * TileCells::kMaxPixels);
+    const auto keep =
+        request_.camera_peaks ? PlaneFusion::Keep::kCameras : PlaneFusion::Keep::kFusedOnly;
+    return {std::vector<TileRays>(rays_.inputs()),
+            TileFusion(options_.fusion, inputs_, keep, kernel_), peaks,
+            std::vector<TilePeaks>(cameras_.size(), peaks)};
+  }
+
+  /// All planes on one tile.
+  void sweepTile(std::size_t t, Scratch& scratch) {
+    const TileCells tile(tiles_[t], grid_.view);
+    scratch.fusion.moveTo(tile);
+    scratch.fused.moveTo(tile.tile, kernel_);
+    for (TilePeaks& camera : scratch.cameras) camera.moveTo(tile.tile, kernel_);
+    for (std::size_t group = 0; group < rays_.groups().size(); ++group) {
+      for (std::size_t input = 0; input < rays_.inputs(); ++input) {
+        rays_.gather(group, input, tile, scratch.rays[input]);
+      }
+      const PlaneRange& planes = rays_.groups()[group];
+      for (int plane = planes.begin; plane < planes.end; ++plane) {
+        for (std::size_t input = 0; input < rays_.inputs(); ++input) {
+          rays_.gatherOn(plane, group, input, tile, scratch.rays[input]);
+        }
+        sweepPlane(plane, rays_.fromPixels(plane), tile.tile, scratch);
+      }
+    }
+    scratch.fused.writeTo(fused_, t);
+    for (std::size_t c = 0; c < cameras_.size(); ++c) scratch.cameras[c].writeTo(cameras_[c], t);
+  }
+
+  void sweepPlane(int plane, double from_pixels, const cv::Rect& tile, Scratch& scratch) {
+    const PlaneValues& fused = scratch.fusion.fuse(scratch.rays, from_pixels);
+    scratch.fused.add(plane, fused);
+    for (std::size_t c = 0; c < scratch.cameras.size(); ++c) {
+      scratch.cameras[c].add(plane, scratch.fusion.ofCamera(static_cast<int>(c)));
+    }
+    whole_planes_.write(plane, tile, fused);
+  }
+
+  SweepResult result() {
+    SweepResult result{fused_.sweptDsi(), {}, rays_.notCast()};
+    for (ViewPeaks& camera : cameras_) result.cameras.push_back(camera.sweptDsi());
+    for (std::size_t c = 0; c < result.votes.size(); ++c) {
+      std::uint64_t units = 0;
+      for (const Scratch& scratch : scratches_) units += scratch.fusion.units()[c];
+      const std::uint64_t cast = units >> kernels::kWeightBits;
+      result.votes[c].cast += cast;
+      result.votes[c].outside_view -= cast;
+    }
+    return result;
+  }
+
+  DsiGrid grid_;
+  SpaceSweepOptions options_;
+  SweepRequest request_;
+  VotingKernel kernel_;
+  FusionInputs inputs_;
+  std::vector<cv::Rect> tiles_;
+  RayIndex rays_;
+  WholePlanes whole_planes_;
+  ViewPeaks fused_;
+  std::vector<ViewPeaks> cameras_;  // where asked for
+  tbb::enumerable_thread_specific<Scratch> scratches_{[this] { return newScratch(); }};
+};
+
+}  // namespace
+
+std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels) {
+  const std::vector<int> columns = cut(view.width, max_pixels);
+  const std::vector<int> rows = cut(view.height, max_pixels);
+  std::vector<cv::Rect> tiles;
+  for (std::size_t r = 0; r + 1 < rows.size(); ++r) {
+    for (std::size_t c = 0; c + 1 < columns.size(); ++c) {
+      tiles.emplace_back(cv::Point(columns[c], rows[r]), cv::Point(columns[c + 1], rows[r + 1]));
+    }
+  }
+  return tiles;
+}
+
+SweepResult sweepTiles(std::vector<CameraRays> cameras, const DsiGrid& grid,
+                       const SpaceSweepOptions& options, const SweepRequest& request) {
+  tbb::task_arena arena(options.threadsOrCores());
+  return arena.execute(
+      [&] { return TiledSweep(std::move(cameras), grid, options, request).run(); });
 }
 
 }  // namespace efm

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <opencv2/core/types.hpp>
+
 #include <optional>
 #include <vector>
 
 #include "mapping/dsi/dsi_columns.h"
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/dsi/plane_fusion.h"
-#include "mapping/dsi/vote_counts.h"
-#include "mapping/dsi/voting_kernel.h"
-#include "mapping/rays/back_projection.h"
+#include "mapping/rays/rays.h"
 
 namespace efm {
 
@@ -65,5 +65,26 @@ struct SweepResult {
 /// @throws std::invalid_argument where the options are not valid.
 SweepResult sweepSpace(std::vector<CameraRays> cameras, const DsiGrid& grid,
                        const SpaceSweepOptions& options = {}, const SweepRequest& request = {});
+
+/// The sweep with the plain kernel, the specification: whole planes, one per thread at a time.
+/// Memory: O(threads * width * height), for any number of planes, cameras and sub-intervals.
+SweepResult sweepPlanes(const std::vector<CameraRays>& cameras, const DsiGrid& grid,
+                        const SpaceSweepOptions& options, const SweepRequest& request);
+
+/// Cuts the view into rectangles of nearly the same size, at most `max_pixels` on a side: row by
+/// row, without gap or overlap.
+std::vector<cv::Rect> tilesOf(const ReferenceView& view, int max_pixels);
+
+/// The sweep with the fast kernels, tile by tile. A tile is a small rectangle of the view: its
+/// votes on one plane, their fusion and the running peaks stay in the first two levels of cache,
+/// and no plane exists as a whole. Planes come in groups; a tile gathers its rays once per group.
+/// Memory besides the rays: O(width * height), for any number of planes, cameras, sub-intervals and
+/// threads.
+///
+/// Tiles share nothing, and a tile's votes have an order: the result has the same bits for any
+/// number of threads.
+/// @param cameras consumed: each bundle is freed when it is sorted into bins.
+SweepResult sweepTiles(std::vector<CameraRays> cameras, const DsiGrid& grid,
+                       const SpaceSweepOptions& options, const SweepRequest& request);
 
 }  // namespace efm

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/cloud/cloud_point.h"
 
-#include "mapping/base/number_text.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 

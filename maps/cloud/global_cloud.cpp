@@ -10,7 +10,7 @@
 #include <tuple>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 
 namespace efm {
 namespace {

@@ -2,7 +2,6 @@
 #include "maps/cloud/keyframe_consistency.h"
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/option_check.h"
 
 namespace efm {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/cloud/outlier_removal.h"
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "maps/cloud/point_search.h"
 
 namespace efm {

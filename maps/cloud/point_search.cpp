@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "mapping/depth/median.h"
+#include "mapping/depth/peak_fit.h"
 
 namespace efm {
 namespace {

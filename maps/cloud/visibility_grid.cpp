@@ -5,7 +5,7 @@
 #include <cmath>
 #include <iterator>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

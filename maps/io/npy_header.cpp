@@ -6,8 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

@@ -9,10 +9,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/base/little_endian.h"
-#include "mapping/base/number_text.h"
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/number_bytes.h"
+#include "mapping/base/text.h"
 #include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
 

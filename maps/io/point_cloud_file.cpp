@@ -8,7 +8,7 @@
 #include <string>
 
 #include "mapping/base/atomic_file.h"
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "maps/io/pcd_file.h"
 #include "maps/io/ply_file.h"
 

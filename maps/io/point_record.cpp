@@ -10,8 +10,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

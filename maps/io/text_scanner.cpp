@@ -4,8 +4,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "maps/cloud/point_search.h"
 
 namespace efm {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "maps/metrics/sample_statistics.h"
 
 namespace efm {

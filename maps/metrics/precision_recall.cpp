@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 
 namespace efm {
 namespace {

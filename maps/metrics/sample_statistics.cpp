@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "mapping/base/option_check.h"
-#include "mapping/depth/median.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/depth/peak_fit.h"
 
 namespace efm {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

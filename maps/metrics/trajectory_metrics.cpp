@@ -9,7 +9,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "maps/refinement/keyframe_registration.h"
 
 namespace efm {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/base/option_check.h"
-#include "mapping/depth/median.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/depth/peak_fit.h"
 
 namespace efm {
 namespace {

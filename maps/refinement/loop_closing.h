@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "maps/refinement/keyframe_registration.h"
 #include "maps/refinement/tracker_errors.h"
 

@@ -15,7 +15,7 @@
 #include <array>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 
 namespace efm {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "maps/refinement/refinement_options.h"
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 
 namespace efm {
 

@@ -8,8 +8,8 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "mapping/base/option_check.h"
-#include "mapping/depth/median.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/depth/peak_fit.h"
 #include "maps/refinement/small_matrices.h"
 
 namespace efm {

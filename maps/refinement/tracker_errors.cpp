@@ -5,8 +5,8 @@
 #include <array>
 #include <cmath>
 
-#include "mapping/base/option_check.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

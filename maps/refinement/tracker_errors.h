@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "maps/refinement/small_matrices.h"
 
 namespace efm {

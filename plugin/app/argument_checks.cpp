@@ -6,9 +6,8 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 
-#include "mapping/base/nearest_name.h"
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/argument_checks.h"
 #include "plugin/app/command.h"

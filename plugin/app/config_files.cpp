@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <system_error>
 
-#include "mapping/base/nearest_name.h"
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
 #include "plugin/app/exit_status.h"
 
 namespace efm {

@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "mapping/base/atomic_file.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

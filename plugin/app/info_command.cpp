@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/exit_status.h"
 #include "plugin/app/observed_statistics.h"

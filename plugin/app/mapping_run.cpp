@@ -14,7 +14,7 @@
 #include <thread>
 #include <utility>
 
-#include "mapping/depth/robust_maximum.h"
+#include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/error_words.h"
 #include "plugin/app/observed_statistics.h"

@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include "mapping/base/new_folder.h"
-#include "mapping/base/option_check.h"
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/argument_checks.h"
 #include "plugin/options/tracker_fault_keys.h"

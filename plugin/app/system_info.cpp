@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/dsi/voting_kernel.h"
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/kernels/self_test.h"
 #include "mapping/sweep/space_sweep.h"
 

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/depth/median.h"
+#include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/depth_file.h"

@@ -12,8 +12,8 @@
 #include <string_view>
 
 #include "mapping/base/atomic_file.h"
-#include "mapping/base/option_check.h"
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
 #include "maps/io/npy_header.h"
 #include "plugin/evaluation/npy_image.h"
 #include "plugin/evaluation/pfm_image.h"

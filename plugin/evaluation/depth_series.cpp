@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "maps/io/point_record.h"
 #include "maps/io/text_scanner.h"
 #include "plugin/evaluation/npy_image.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/text_table.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "mapping/events/event.h"
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 #include "plugin/mrpt/event_encoding.h"
 
 // Visualizable's destructor is not virtual. Nobody deletes an observation through it.

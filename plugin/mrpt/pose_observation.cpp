@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "plugin/mrpt/dead_reckoning.h"
 #include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/mrpt_time.h"

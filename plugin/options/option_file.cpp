@@ -10,9 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/nearest_name.h"
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

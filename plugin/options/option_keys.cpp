@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "mapping/base/text_parsing.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

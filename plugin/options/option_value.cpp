@@ -8,8 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "mapping/depth/depth_extraction.h"
-#include "mapping/events/subintervals.h"
+#include "mapping/events/window.h"
 #include "mapping/keyframes/keyframe_policy.h"
 #include "mapping/sweep/space_sweep.h"
 #include "maps/cloud/keyframe_consistency.h"

@@ -8,10 +8,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "mapping/base/nearest_name.h"
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -13,9 +13,7 @@
 #include <vector>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/nearest_name.h"
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/host_options.h"
 #include "plugin/options/option_file.h"

@@ -10,8 +10,8 @@
 #include <numeric>
 #include <utility>
 
-#include "mapping/geometry/angle.h"
-#include "mapping/geometry/lens_inverse.h"
+#include "mapping/geometry/lens.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/camera_view.h"
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "mapping/base/warning.h"
+#include "mapping/base/text.h"
 #include "plugin/session/recording_statistics.h"
 
 namespace efm {

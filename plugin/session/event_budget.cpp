@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/events/even_choice.h"
+#include "mapping/events/event.h"
 
 namespace efm {
 namespace {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <utility>
 
-#include "mapping/depth/median.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/camera_checks.h"
 #include "plugin/session/camera_view.h"

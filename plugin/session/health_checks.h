@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/base/warning.h"
-#include "mapping/geometry/camera.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rig.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/survey/option_choice.h"
 #include "plugin/session/event_fusion_options.h"

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/events/event_check.h"
+#include "mapping/events/event.h"
 
 namespace efm {
 namespace {

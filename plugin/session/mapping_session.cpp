@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/recording_survey.h"
 

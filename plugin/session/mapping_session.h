@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "mapping/keyframes/fusion_mapper.h"
-#include "mapping/survey/depth_follower.h"
+#include "mapping/survey/option_choice.h"
 #include "maps/cloud/global_cloud.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/refined_cloud.h"

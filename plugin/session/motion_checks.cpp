@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/camera_view.h"
 #include "plugin/session/time_text.h"

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 

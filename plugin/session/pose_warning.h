@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "mapping/base/warning.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/survey/depth_agreement.h"
 #include "mapping/survey/pose_check.h"

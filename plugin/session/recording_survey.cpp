@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/events/even_choice.h"
+#include "mapping/events/event.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/depth_agreement.h"
 #include "plugin/session/pose_warning.h"
@@ -16,7 +16,7 @@
 namespace efm {
 namespace {
 
-/// Poses reach this far around the middle of a sample: see `window_sample.h`.
+/// Poses reach this far around the middle of a sample: see `scene_depths.h`.
 constexpr double kWindowS = 2;
 constexpr double kMaxEventsPerSecond = 1e6;
 

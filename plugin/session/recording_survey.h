@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/warning.h"
-#include "mapping/survey/window_sample.h"
+#include "mapping/base/text.h"
+#include "mapping/survey/scene_depths.h"
 #include "plugin/session/mapping_session.h"
 
 namespace efm {

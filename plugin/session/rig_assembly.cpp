@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/session/camera_view.h"

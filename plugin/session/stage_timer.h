@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "mapping/keyframes/stage.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 
 namespace efm {
 

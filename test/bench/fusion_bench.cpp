@@ -6,11 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/depth/paper_extraction.h"
-#include "mapping/dsi/dsi_peaks.h"
-#include "mapping/dsi/fusion_rule.h"
-#include "mapping/dsi/plane_values.h"
-#include "mapping/dsi/voting_kernel.h"
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/dsi/dsi_columns.h"
+#include "mapping/dsi/dsi_grid.h"
+#include "mapping/dsi/plane_fusion.h"
 #include "mapping/sweep/space_sweep.h"
 #include "test/bench/benches.h"
 #include "test/bench/sweep_input.h"

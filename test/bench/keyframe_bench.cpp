@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/dsi/voting_kernel.h"
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/bench/benches.h"
 #include "test/bench/stage_clock.h"

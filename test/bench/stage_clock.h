@@ -3,7 +3,7 @@
 
 #include <ctime>
 
-#include "mapping/keyframes/stage.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 
 namespace efm::bench {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "mapping/geometry/undistortion.h"
+#include "mapping/geometry/lens.h"
 #include "test/bench/sweep_input.h"
 #include "test/bench/synthetic_window.h"
 #include "test/mapping/kernels/fast_kernels.h"

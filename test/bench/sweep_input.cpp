@@ -3,8 +3,8 @@
 
 #include <cstddef>
 
-#include "mapping/geometry/undistortion.h"
-#include "mapping/rays/back_projection.h"
+#include "mapping/geometry/lens.h"
+#include "mapping/rays/rays.h"
 
 namespace efm::bench {
 

@@ -3,9 +3,8 @@
 
 #include <vector>
 
-#include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/reference_view.h"
-#include "mapping/rays/pose_packets.h"
+#include "mapping/rays/rays.h"
 #include "mapping/sweep/space_sweep.h"
 #include "test/bench/synthetic_window.h"
 

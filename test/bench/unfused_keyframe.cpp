@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "mapping/depth/paper_extraction.h"
-#include "mapping/kernels/bilinear_vote.h"
-#include "mapping/rays/back_projection.h"
-#include "mapping/rays/pose_packets.h"
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/kernels/kernels.h"
+#include "mapping/rays/rays.h"
 
 namespace efm::bench {
 

@@ -7,13 +7,12 @@
 #include "mapping/depth/depth_extraction.h"
 #include "mapping/events/event.h"
 #include "mapping/events/window.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/lens.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
-#include "mapping/geometry/undistortion.h"
+#include "mapping/keyframes/keyframe_depth_map.h"
 #include "mapping/keyframes/keyframe_mapper.h"
-#include "mapping/keyframes/stage.h"
 
 namespace efm::bench {
 

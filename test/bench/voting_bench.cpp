@@ -4,14 +4,12 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/dsi/voting_kernel.h"
-#include "mapping/kernels/bilinear_vote.h"
-#include "mapping/rays/back_projection.h"
-#include "mapping/sweep/ray_index.h"
+#include "mapping/dsi/dsi_grid.h"
+#include "mapping/kernels/kernels.h"
+#include "mapping/rays/rays.h"
+#include "mapping/sweep/ray_bins.h"
 #include "mapping/sweep/space_sweep.h"
-#include "mapping/sweep/tile_accumulator.h"
-#include "mapping/sweep/tile_rays.h"
-#include "mapping/sweep/tiled_sweep.h"
+#include "mapping/sweep/tiles.h"
 #include "test/bench/benches.h"
 #include "test/bench/sweep_input.h"
 

@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/text/event_text.h"
 
 namespace efm {

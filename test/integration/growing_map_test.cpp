@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "test/integration/letter_f.h"
 #include "test/plugin/program_test.h"
 

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "maps/io/point_cloud_file.h"
 #include "test/paths.h"
 #include "test/plugin/temporary_folder.h"

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/results/viewer/map_page.h"
 #include "test/integration/letter_f.h"
 #include "test/paths.h"

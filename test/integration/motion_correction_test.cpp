@@ -6,10 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "mapping/depth/median.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/keyframes/keyframe_mapper.h"
-#include "mapping/motion/velocity_correction.h"
+#include "mapping/motion/event_contrast.h"
 #include "test/integration/simulated_recording.h"
 #include "test/mapping/depth/same_image.h"
 

@@ -11,7 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "test/paths.h"
 #include "test/plugin/temporary_folder.h"

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "mapping/depth/median.h"
+#include "mapping/depth/peak_fit.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/open/open_recording.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "mapping/depth/depth_extraction.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 
 namespace efm::oracle {
 

@@ -6,16 +6,14 @@
 #include <optional>
 #include <vector>
 
-#include "mapping/dsi/fusion_rule.h"
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/dsi/plane_fusion.h"
-#include "mapping/dsi/vote_counts.h"
 #include "mapping/events/event.h"
-#include "mapping/events/subintervals.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/events/window.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
-#include "mapping/rays/pose_packets.h"
+#include "mapping/rays/rays.h"
 
 namespace efm::oracle {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "test/studies/figures/picture_grid.h"

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
-#include "mapping/motion/velocity_correction.h"
+#include "mapping/geometry/rigid3.h"
+#include "mapping/motion/event_contrast.h"
 #include "plugin/results/pictures/curve_plot.h"
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/method_comparison.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
 #include "plugin/results/pictures/curve_plot.h"

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/dsi/voting_kernel.h"
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "plugin/results/pictures/curve_plot.h"
 #include "test/bench/stage_clock.h"

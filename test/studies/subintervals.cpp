@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/depth/median.h"
+#include "mapping/depth/peak_fit.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/methods/error_figures.h"
 #include "test/studies/methods/error_table.h"

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_numbers.h"

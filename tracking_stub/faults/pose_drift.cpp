@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/faults/pose_drift.h"
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/rigid3.h"
 #include "tracking_stub/random/random_numbers.h"
 

@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "tracking_stub/faults/pose_latency.h"
 
 namespace efm {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

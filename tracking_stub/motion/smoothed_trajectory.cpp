@@ -7,9 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/option_check.h"
-#include "mapping/depth/median.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

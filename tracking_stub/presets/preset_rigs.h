@@ -4,8 +4,8 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 
-#include "mapping/geometry/angle.h"
 #include "mapping/geometry/rig.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 

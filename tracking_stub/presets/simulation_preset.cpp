@@ -4,7 +4,6 @@
 #include <string_view>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/presets/presets.h"
 

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/option_check.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/motion/smoothed_trajectory.h"
 #include "tracking_stub/scenes/poles_scene.h"

@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 #include "tracking_stub/rendering/pixel_rays.h"
 #include "tracking_stub/rendering/scene_view.h"
 #include "tracking_stub/scenes/scene.h"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <limits>
 
-#include "mapping/base/option_check.h"
-#include "mapping/geometry/lens_inverse.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/geometry/lens.h"
 
 namespace efm {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 #include "tracking_stub/rendering/scene_view.h"
 
 namespace efm {

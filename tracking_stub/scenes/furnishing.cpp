@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

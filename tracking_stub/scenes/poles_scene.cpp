@@ -3,7 +3,7 @@
 
 #include <Eigen/Geometry>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/scenes/furnishing.h"
 #include "tracking_stub/scenes/painting.h"

@@ -4,8 +4,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 
-#include "mapping/base/option_check.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/geometry/rigid3.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/scenes/furnishing.h"
 #include "tracking_stub/scenes/painting.h"

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "mapping/base/option_check.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_numbers.h"
 

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/rendering/frame_renderer.h"
 #include "tracking_stub/rendering/scene_view.h"

@@ -12,11 +12,11 @@
 #include <system_error>
 #include <utility>
 
-#include "mapping/base/number_text.h"
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "tracking_stub/rendering/depth_rendering.h"
 #include "tracking_stub/truth/truth_clouds.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 
 namespace efm {
 namespace {

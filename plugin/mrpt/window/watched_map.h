@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
 #include "maps/cloud/map_point.h"

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

@@ -8,7 +8,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

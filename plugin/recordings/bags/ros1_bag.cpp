@@ -11,8 +11,8 @@
 #include <string_view>
 #include <utility>
 
-#include "mapping/base/byte_reader.h"
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/number_bytes.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_chunks.h"
 

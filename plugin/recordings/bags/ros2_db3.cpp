@@ -12,7 +12,7 @@
 #include <system_error>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

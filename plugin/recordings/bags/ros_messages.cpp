@@ -10,9 +10,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "mapping/base/byte_reader.h"
-#include "mapping/base/quoted_text.h"
-#include "mapping/geometry/rounded_rotation.h"
+#include "mapping/base/number_bytes.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/number_checks.h"
 

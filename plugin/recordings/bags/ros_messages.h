@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "mapping/events/event.h"
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/bags/bag_source.h"
 #include "plugin/recordings/calibration/calibration_file.h"

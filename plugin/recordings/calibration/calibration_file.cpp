@@ -12,8 +12,7 @@
 #include <system_error>
 #include <vector>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/calibration/camchain.h"
 #include "plugin/recordings/calibration/camera_info_file.h"
 #include "plugin/recordings/calibration/dsec_calibration.h"

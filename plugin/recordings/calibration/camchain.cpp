@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/calibration/camera_entry.h"
 #include "plugin/recordings/calibration/yaml_entry.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 

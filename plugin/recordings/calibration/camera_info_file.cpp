@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/calibration/camera_entry.h"
 
 namespace efm {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 #include "plugin/recordings/calibration/yaml_entry.h"
 
 namespace efm {

@@ -11,8 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/calibration/camera_entry.h"
 
 namespace efm {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/calibration/camera_entry.h"
 
 namespace efm {

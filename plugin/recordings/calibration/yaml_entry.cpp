@@ -8,9 +8,8 @@
 #include <optional>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
-#include "mapping/geometry/rounded_rotation.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/columns/array_events.h"
 #include "plugin/recordings/streams/source_files.h"
 

@@ -13,8 +13,8 @@
 #include <system_error>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/geometry/rounded_rotation.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/columns/hdf5_events.h"
 #include "plugin/recordings/columns/hdf5_files.h"

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_pose.h"

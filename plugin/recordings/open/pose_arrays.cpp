@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-#include "mapping/geometry/rounded_rotation.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/columns/npy_array.h"
 #include "plugin/recordings/open/pose_file.h"
 #include "plugin/recordings/streams/file_content.h"

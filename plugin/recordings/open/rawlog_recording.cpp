@@ -14,7 +14,7 @@
 #include <string_view>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "mapping/base/quoted_text.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/open/gz_stream.h"
 #include "plugin/recordings/streams/file_content.h"
 

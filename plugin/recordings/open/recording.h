@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/warning.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 

@@ -15,7 +15,7 @@
 #include <string_view>
 #include <utility>
 
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/streams/source_files.h"
 
 namespace efm {

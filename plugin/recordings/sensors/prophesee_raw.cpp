@@ -11,8 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/streams/source_files.h"
 
 namespace efm {

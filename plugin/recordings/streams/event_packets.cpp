@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/option_check.h"
-#include "mapping/events/event_check.h"
+#include "mapping/base/named_choice.h"
+#include "mapping/events/event.h"
 
 namespace efm {
 

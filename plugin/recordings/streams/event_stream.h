@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/warning.h"
+#include "mapping/base/text.h"
 #include "mapping/events/event.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/streams/bad_events.h"

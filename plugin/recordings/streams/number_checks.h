@@ -8,7 +8,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/number_checks.h"
 

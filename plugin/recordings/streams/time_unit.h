@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "mapping/base/warning.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {

@@ -9,8 +9,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/source_files.h"
 #include "plugin/recordings/text/event_text.h"

@@ -9,8 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "plugin/recordings/text/pose_text.h"
 
 namespace efm {

@@ -11,8 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/number_checks.h"
 #include "plugin/recordings/streams/source_files.h"

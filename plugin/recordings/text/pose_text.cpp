@@ -11,9 +11,8 @@
 #include <string>
 #include <string_view>
 
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/base/text.h"
+#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/streams/file_content.h"
 #include "plugin/recordings/streams/source_files.h"
 #include "plugin/recordings/streams/time_unit.h"

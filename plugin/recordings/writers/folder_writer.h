@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "mapping/base/new_folder.h"
+#include "mapping/base/atomic_file.h"
 #include "plugin/recordings/writers/recording_writer.h"
 #include "plugin/recordings/writers/text_file.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/new_folder.h"
+#include "mapping/base/atomic_file.h"
 #include "plugin/recordings/columns/hdf5_file.h"
 #include "plugin/recordings/writers/recording_writer.h"
 #include "plugin/recordings/writers/text_file.h"

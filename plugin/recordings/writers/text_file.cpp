@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "mapping/base/atomic_file.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {

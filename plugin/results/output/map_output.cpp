@@ -17,7 +17,7 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "maps/io/pcd_file.h"
 #include "maps/io/ply_file.h"
 #include "plugin/results/pictures/depth_picture.h"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "mapping/base/atomic_file.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/map_point.h"

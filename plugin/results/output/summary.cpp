@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/session/time_text.h"
 
 namespace efm {

@@ -4,7 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "mapping/depth/depth_map.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 #include "plugin/results/pictures/palette.h"
 #include "plugin/results/pictures/plot_axis.h"
 

@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 
 namespace efm {
 

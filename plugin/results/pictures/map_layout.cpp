@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/results/pictures/upward.h"
 
 namespace efm {

@@ -8,8 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "mapping/depth/median.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/results/pictures/map_layout.h"
 #include "plugin/results/pictures/plot_frame.h"
 #include "plugin/results/pictures/value_picture.h"

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 

@@ -14,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/base/new_folder.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"

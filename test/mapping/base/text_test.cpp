@@ -6,10 +6,7 @@
 #include <limits>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/base/nearest_name.h"
-#include "mapping/base/option_check.h"
-#include "mapping/base/quoted_text.h"
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/depth/column_aggregation.h"
+#include "mapping/depth/aggregated_extraction.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <vector>
 
-#include "mapping/depth/sparse_mask.h"
+#include "mapping/depth/depth_map.h"
 #include "test/mapping/dsi/chosen_dsi.h"
 
 namespace efm::column_aggregation_test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/depth/local_agreement.h"
+#include "mapping/depth/aggregated_extraction.h"
 
 #include <gtest/gtest.h>
 

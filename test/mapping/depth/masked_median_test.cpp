@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/depth/masked_median.h"
+#include "mapping/depth/peak_fit.h"
 
 #include <gtest/gtest.h>
 

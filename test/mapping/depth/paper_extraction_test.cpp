@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/depth/paper_extraction.h"
+#include "mapping/depth/depth_extraction.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

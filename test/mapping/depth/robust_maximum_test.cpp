@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/depth/robust_maximum.h"
-#include "mapping/depth/paper_extraction.h"
+#include "mapping/depth/depth_extraction.h"
+#include "mapping/depth/peak_fit.h"
 
 #include <gtest/gtest.h>
 

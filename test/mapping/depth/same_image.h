@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "mapping/depth/depth_extraction.h"
-#include "mapping/dsi/dsi_peaks.h"
+#include "mapping/dsi/dsi_columns.h"
 
 namespace efm::test {
 

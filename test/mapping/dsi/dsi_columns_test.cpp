@@ -11,8 +11,8 @@
 #include <random>
 #include <vector>
 
-#include "mapping/kernels/columns.h"
-#include "mapping/sweep/tiled_sweep.h"
+#include "mapping/kernels/kernels.h"
+#include "mapping/sweep/space_sweep.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/rays/random_rays.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/dsi/dsi_peaks.h"
+#include "mapping/dsi/dsi_columns.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/kernels/peaks.h"
+#include "mapping/kernels/kernels.h"
 #include "test/mapping/depth/same_image.h"
 
 namespace efm {

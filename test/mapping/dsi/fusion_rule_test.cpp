@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/dsi/fusion_rule.h"
+#include "mapping/dsi/plane_fusion.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/dsi/voting_kernel.h"
+#include "mapping/dsi/dsi_grid.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/events/background_activity_filter.h"
+#include "mapping/events/event_filter.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/events/event_buffer.h"
+#include "mapping/events/event.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/events/event_groups.h"
+#include "mapping/events/window.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/events/subintervals.h"
+#include "mapping/events/window.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

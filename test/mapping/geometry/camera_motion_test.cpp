@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/geometry/camera_motion.h"
+#include "mapping/geometry/trajectory.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,9 +10,8 @@
 #include <functional>
 #include <string>
 
-#include "mapping/geometry/rig.h"
+#include "mapping/geometry/lens.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/undistortion.h"
 #include "test/mapping/base/refused_option.h"
 
 namespace efm::camera_test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/geometry/lens_inverse.h"
+#include "mapping/geometry/lens.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,8 +12,6 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include "mapping/geometry/undistortion.h"
 
 namespace efm::lens_inverse_test {
 namespace {

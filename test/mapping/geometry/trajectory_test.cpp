@@ -9,7 +9,7 @@
 #include <set>
 #include <stdexcept>
 
-#include "mapping/geometry/rounded_rotation.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

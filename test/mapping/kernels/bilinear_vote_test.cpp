@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "mapping/kernels/bilinear_vote.h"
+#include "mapping/kernels/kernels.h"
 
 namespace efm::kernels {
 namespace {

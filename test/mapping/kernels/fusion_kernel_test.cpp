@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "mapping/kernels/fusion.h"
+#include "mapping/kernels/kernels.h"
 
 namespace efm::kernels {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/dsi/voting_kernel.h"
+#include "mapping/dsi/dsi_grid.h"
 
 namespace efm::kernels {
 namespace {

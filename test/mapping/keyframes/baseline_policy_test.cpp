@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/keyframes/baseline_policy.h"
+#include "mapping/keyframes/keyframe_policy.h"
 
 #include <gtest/gtest.h>
 

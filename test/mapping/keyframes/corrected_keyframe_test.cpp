@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Which of the keyframes along corrected motions is taken; `MotionCorrection` tests the correction.
-#include "mapping/keyframes/corrected_keyframe.h"
+#include "mapping/keyframes/keyframe_mapper.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/keyframes/random_recording.h"
 
 namespace efm::corrected_keyframe_test {

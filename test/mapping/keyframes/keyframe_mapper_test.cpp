@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
-#include "mapping/events/even_choice.h"
+#include "mapping/events/event.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/random_recording.h"
 

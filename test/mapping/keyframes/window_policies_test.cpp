@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "mapping/events/even_choice.h"
+#include "mapping/events/event.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/keyframes/played_recording.h"
 

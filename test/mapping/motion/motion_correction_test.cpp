@@ -10,7 +10,7 @@
 #include <mutex>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"

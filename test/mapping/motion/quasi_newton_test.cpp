@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/motion/quasi_newton.h"
+#include "mapping/motion/motion_correction.h"
 
 #include <gtest/gtest.h>
 

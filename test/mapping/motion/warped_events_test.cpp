@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/motion/warped_events.h"
+#include "mapping/motion/event_contrast.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/rays/back_projection.h"
+#include "mapping/rays/rays.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "mapping/geometry/reference_view.h"
-#include "mapping/rays/back_projection.h"
+#include "mapping/rays/rays.h"
 
 namespace efm::test {
 

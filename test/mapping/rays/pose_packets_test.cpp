@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/rays/pose_packets.h"
+#include "mapping/rays/rays.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "mapping/rays/vote_displacement.h"
 #include "test/mapping/base/refused_option.h"
 #include "test/mapping/keyframes/random_scene.h"
 

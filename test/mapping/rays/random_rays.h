@@ -6,9 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/reference_view.h"
-#include "mapping/rays/back_projection.h"
+#include "mapping/rays/rays.h"
 #include "test/mapping/rays/chosen_rays.h"
 
 namespace efm::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/survey/depth_follower.h"
+#include "mapping/survey/option_choice.h"
 
 #include <gmock/gmock.h>
 

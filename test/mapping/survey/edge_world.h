@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "mapping/events/window_data.h"
+#include "mapping/events/window.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/survey/window_sample.h"
+#include "mapping/survey/scene_depths.h"
 
 namespace efm::test {
 

@@ -7,8 +7,7 @@
 #include <algorithm>
 
 #include "mapping/survey/depth_agreement.h"
-#include "mapping/survey/pose_hypotheses.h"
-#include "mapping/survey/sample_piece.h"
+#include "mapping/survey/pose_check.h"
 #include "test/mapping/survey/edge_world.h"
 
 namespace efm {

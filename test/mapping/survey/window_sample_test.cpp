@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/survey/window_sample.h"
+#include "mapping/survey/scene_depths.h"
 
 #include <gmock/gmock.h>
 

@@ -11,8 +11,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/sweep/tile_rays.h"
-#include "mapping/sweep/tiled_sweep.h"
+#include "mapping/sweep/space_sweep.h"
+#include "mapping/sweep/tiles.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/rays/chosen_rays.h"

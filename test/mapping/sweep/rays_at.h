@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-#include "mapping/sweep/tile_rays.h"
+#include "mapping/sweep/tiles.h"
 
 namespace efm::test {
 

@@ -9,7 +9,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/events/event_groups.h"
+#include "mapping/events/window.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"

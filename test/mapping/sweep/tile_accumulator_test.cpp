@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/sweep/tile_accumulator.h"
+#include "mapping/sweep/tiles.h"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "mapping/kernels/bilinear_vote.h"
-#include "mapping/sweep/tiled_sweep.h"
+#include "mapping/kernels/kernels.h"
+#include "mapping/sweep/space_sweep.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/sweep/rays_at.h"
 

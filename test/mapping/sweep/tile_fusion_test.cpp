@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/sweep/tile_fusion.h"
+#include "mapping/sweep/tiles.h"
 
 #include <gtest/gtest.h>
 

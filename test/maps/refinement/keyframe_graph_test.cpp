@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "edges.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "maps/refinement/condensed_graph.h"
 #include "maps/refinement/window_graph.h"
 #include "random_poses.h"

@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "edges.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"
 

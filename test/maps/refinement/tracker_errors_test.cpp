@@ -9,7 +9,7 @@
 #include <random>
 
 #include "edges.h"
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "maps/refinement/tracker_model.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"

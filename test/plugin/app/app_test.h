@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "plugin/app/program.h"
 #include "test/plugin/program_test.h"
 

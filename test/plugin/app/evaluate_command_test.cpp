@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "maps/io/point_cloud_file.h"
 #include "test/plugin/app/app_test.h"
 #include "tracking_stub/truth/dataset_writer.h"

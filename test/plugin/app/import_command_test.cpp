@@ -6,7 +6,7 @@
 
 #include <cstdlib>
 
-#include "mapping/dsi/voting_kernel.h"
+#include "mapping/dsi/dsi_grid.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {

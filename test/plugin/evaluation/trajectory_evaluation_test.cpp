@@ -9,7 +9,7 @@
 #include <sstream>
 #include <tuple>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -10,7 +10,7 @@
 #include <set>
 #include <sstream>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/paths.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"

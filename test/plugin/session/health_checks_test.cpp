@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/calibration/camchain.h"
 #include "plugin/session/camera_checks.h"
 #include "plugin/session/pose_warning.h"

@@ -12,10 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
-#include "mapping/geometry/tum_trajectory.h"
 #include "test/paths.h"
 
 namespace efm {

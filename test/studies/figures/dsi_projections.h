@@ -4,7 +4,6 @@
 #include <mutex>
 #include <opencv2/core.hpp>
 
-#include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/sweep/space_sweep.h"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "mapping/depth/depth_map.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 
 namespace efm::studies {
 

@@ -7,9 +7,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "mapping/base/option_check.h"
+#include "mapping/base/named_choice.h"
 #include "mapping/depth/depth_extraction.h"
-#include "mapping/depth/median.h"
 #include "mapping/depth/peak_fit.h"
 #include "test/studies/frames/edge_kinds.h"
 #include "test/studies/frames/frame_sweep.h"

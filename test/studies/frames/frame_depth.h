@@ -5,7 +5,6 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/geometry/depth_planes.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rigid3.h"
 #include "test/studies/frames/posed_frames.h"

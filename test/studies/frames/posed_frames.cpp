@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "mapping/geometry/trajectory.h"
-#include "mapping/geometry/tum_trajectory.h"
 #include "plugin/evaluation/depth_series.h"
 #include "plugin/recordings/text/uzh_text.h"
 

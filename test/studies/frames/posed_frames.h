@@ -7,8 +7,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "mapping/geometry/camera.h"
 #include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/rig.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm::studies {

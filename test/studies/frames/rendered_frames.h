@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mapping/geometry/camera.h"
+#include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 #include "test/studies/frames/posed_frames.h"
 #include "tracking_stub/scenes/scene.h"

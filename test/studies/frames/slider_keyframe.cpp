@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_policy.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "plugin/recordings/text/event_text.h"

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "mapping/depth/median.h"
+#include "mapping/depth/peak_fit.h"
 #include "maps/metrics/depth_metrics.h"
 #include "test/studies/frames/posed_frames.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "mapping/depth/median.h"
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/depth/peak_fit.h"
+#include "mapping/geometry/reference_view.h"
 #include "maps/metrics/depth_metrics.h"
 #include "test/studies/methods/visible_edges.h"
 

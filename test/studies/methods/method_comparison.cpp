@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/depth/robust_maximum.h"
+#include "mapping/depth/peak_fit.h"
 #include "tracking_stub/rendering/depth_rendering.h"
 
 namespace efm::studies {

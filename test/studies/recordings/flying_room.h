@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "mapping/geometry/depth_planes.h"
+#include "mapping/geometry/reference_view.h"
 #include "test/studies/methods/method_comparison.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/calibration/camchain.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/studies/recordings/recording_cache.h"
 #include "tracking_stub/sensor/event_noise.h"
 

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <optional>
 
-#include "mapping/geometry/angle.h"
 #include "mapping/geometry/rigid3.h"
 #include "test/studies/refinement/pose_refinement_run.h"
 #include "tracking_stub/random/random_numbers.h"

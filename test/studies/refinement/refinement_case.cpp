@@ -6,7 +6,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/studies/recordings/real_rigs.h"
 #include "test/studies/recordings/room_loop.h"
 #include "test/studies/refinement/pose_refinement_run.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "test/studies/refinement/refinement_case.h"
 #include "test/studies/report/study_section.h"
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 
 namespace efm {
 

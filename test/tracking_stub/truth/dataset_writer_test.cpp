@@ -10,7 +10,7 @@
 #include <stdexcept>
 
 #include "mapping/geometry/reference_view.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 #include "test/tracking_stub/scenes/edge_scene.h"

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/base/byte_reader.h"
+#include "mapping/base/number_bytes.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/bags/bag_recording.h"
 #include "plugin/recordings/bags/mcap_format.h"

@@ -17,7 +17,7 @@
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/columns/hdf5_files.h"
 #include "plugin/recordings/columns/hdf5_recording.h"
 #include "plugin/recordings/open/recording_formats.h"

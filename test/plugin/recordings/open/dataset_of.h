@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "mapping/geometry/tum_trajectory.h"
+#include "mapping/geometry/trajectory.h"
 #include "test/plugin/session/synthetic_recording.h"
 #include "tracking_stub/truth/dataset_writer.h"
 

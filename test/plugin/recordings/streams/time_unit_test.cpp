@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "mapping/base/text_parsing.h"
+#include "mapping/base/text.h"
 #include "test/plugin/recordings/open/files.h"
 
 namespace efm {

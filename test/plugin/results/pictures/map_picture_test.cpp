@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
-#include "mapping/geometry/angle.h"
+#include "mapping/geometry/rigid3.h"
 #include "plugin/results/pictures/keyframe_sheet.h"
 #include "plugin/results/pictures/map_layout.h"
 #include "plugin/results/pictures/upward.h"
