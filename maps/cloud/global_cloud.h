@@ -9,10 +9,8 @@
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
-#include "maps/cloud/cloud_point.h"
-#include "maps/cloud/keyframe_consistency.h"
+#include "maps/cloud/cloud_points.h"
 #include "maps/cloud/map_point.h"
-#include "maps/cloud/outlier_removal.h"
 #include "maps/cloud/visibility_grid.h"
 
 namespace efm {

@@ -2,12 +2,16 @@
 #pragma once
 
 #include <Eigen/Core>
+
+#include <cstddef>
 #include <limits>
+#include <map>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/cloud_points.h"
+#include "maps/cloud/global_cloud.h"
 #include "maps/cloud/map_point.h"
 
 namespace efm {
@@ -40,5 +44,62 @@ std::vector<CloudPoint> pointsInWorld(const std::vector<ViewPoint>& points,
 /// `viewPoints` in the world, as a cloud of PCL.
 /// @param resolution_m see `mapCloudOf`.
 MapCloud::ConstPtr keyframeCloud(const KeyframeDepthMap& keyframe, double resolution_m = 0.01);
+
+/// The global cloud with keyframes that move. Each keyframe keeps its points in its own view; it is
+/// removed and inserted again with its new pose. The cost of a move does not grow with the map.
+/// Keyframes that cannot move any more are merged into the map for good. Not thread-safe.
+class RefinedCloud {
+ public:
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+
+  /// @param movable how many of the newest keyframes may move, at least; 0: none may. Their points
+  /// are kept, 20 bytes each.
+  /// @throws std::invalid_argument where the options are not valid.
+  RefinedCloud(const GlobalCloudOptions& options, std::size_t movable)
+      : cloud_(options), movable_(movable) {}
+
+  /// Inserts a keyframe of an earlier map. It never moves.
+  /// @throws std::invalid_argument as GlobalCloud::insert does, and after an `insert`.
+  void insertFixed(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
+  /// Inserts the next keyframe. @throws as `insertFixed`. The cloud is unchanged after any error.
+  void insert(std::vector<ViewPoint> points, const Rigid3& T_world_ref);
+  /// Removes the keyframe that was inserted last, if there is one.
+  void removeNewest();
+
+  /// Requests new poses for keyframes, by their numbers. `applyPending` moves them. A request for a
+  /// keyframe that cannot move any more is dropped: it keeps its last pose.
+  /// @throws std::invalid_argument where a keyframe was not inserted, or keyframes are not movable.
+  /// Nothing is requested then.
+  void move(std::map<std::size_t, Rigid3> T_world_ref);
+  /// Moves keyframes to their requested poses where a point is off by more than the tolerance: the
+  /// oldest first, and at most `max_count` of them. A tolerance of 0 moves all, bit for bit.
+  /// @throws std::invalid_argument as GlobalCloud::insert does. That keyframe keeps its old pose,
+  /// and its request is dropped.
+  void applyPending(double tolerance_m,
+                    std::size_t max_count = std::numeric_limits<std::size_t>::max());
+
+  const GlobalCloud& cloud() const { return cloud_; }
+  /// The poses of the keyframes in the cloud, without those of an earlier map.
+  const std::vector<Rigid3>& T_world_ref() const { return T_world_ref_; }
+
+ private:
+  void put(std::size_t keyframe, const Rigid3& T_world_ref);
+  void forgetNewest();
+  void settle();
+  void freeze(std::size_t below);
+
+  struct KeptPoints {
+    std::vector<ViewPoint> points;
+    double radius_m = 0;  // the maximum distance of a point from the view
+  };
+
+  GlobalCloud cloud_;
+  std::size_t movable_;
+  std::size_t fixed_ = 0;   // keyframes of an earlier map
+  std::size_t frozen_ = 0;  // the first keyframes, which cannot move any more
+  std::vector<Rigid3> T_world_ref_;
+  std::vector<KeptPoints> kept_;  // one per T_world_ref_ where keyframes move; frozen: none
+  std::map<std::size_t, Rigid3> pending_;  // requested poses
+};
 
 }  // namespace efm

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "maps/cloud/point_search.h"
+#include "maps/cloud/cloud_points.h"
 
 namespace efm {
 namespace {

@@ -10,7 +10,7 @@
 #include <optional>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/cloud_points.h"
 
 namespace pcl {
 struct PointXYZI;

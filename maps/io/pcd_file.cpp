@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/io/pcd_file.h"
+#include "maps/io/point_cloud_file.h"
 
 #include <liblzf/lzf.h>
 
@@ -12,7 +12,6 @@
 #include "mapping/base/number_bytes.h"
 #include "mapping/base/text.h"
 #include "maps/io/point_record.h"
-#include "maps/io/text_scanner.h"
 
 namespace efm {
 namespace {

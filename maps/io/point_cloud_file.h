@@ -4,9 +4,11 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <ostream>
+#include <string_view>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/cloud_points.h"
 #include "maps/cloud/map_point.h"
 
 namespace efm {
@@ -33,5 +35,24 @@ struct PointCloudContent {
 /// @throws std::runtime_error naming the path, the line or byte, the value and the expected one
 /// where the content does not match its header.
 PointCloudContent readPointCloud(const std::filesystem::path& path);
+
+/// Writes a binary PCD file, version 0.7.
+/// @throws std::runtime_error naming a point that is not finite.
+void writePcdTo(std::ostream& stream, const MapCloud& cloud);
+
+/// @throws std::runtime_error naming the line or byte, the value and the expected one.
+PointCloudContent parsePcd(std::string_view bytes);
+
+/// Writes a binary little-endian file of the Stanford polygon format, version 1.0, for viewers. Per
+/// vertex: x, y, z (double: maps may lie far from the origin), red, green, blue (uchar), confidence
+/// (float) and support (uint).
+/// @param colours one per point.
+/// @throws std::runtime_error naming a point that is not finite.
+void writePlyTo(std::ostream& stream, const MapCloud& cloud,
+                const std::vector<PointColour>& colours);
+
+/// Parses the Stanford polygon format, version 1.0. The element `vertex` is the cloud.
+/// @throws std::runtime_error naming the line or byte, the value and the expected one.
+PointCloudContent parsePly(std::string_view bytes);
 
 }  // namespace efm

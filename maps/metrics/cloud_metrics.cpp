@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "mapping/base/named_choice.h"
-#include "maps/cloud/point_search.h"
+#include "maps/cloud/cloud_points.h"
 
 namespace efm {
 namespace {

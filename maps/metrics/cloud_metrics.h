@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/cloud_points.h"
 #include "maps/metrics/sample_statistics.h"
 
 namespace efm {

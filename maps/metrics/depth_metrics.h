@@ -1,14 +1,63 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <opencv2/core.hpp>
+
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
-#include "maps/metrics/depth_pairs.h"
-
 namespace efm {
+
+/// The estimate and the truth of a pixel, z-depths in metres.
+struct DepthPair {
+  double estimate_m = 0;
+  double truth_m = 0;
+};
+
+struct DepthPairingOptions {
+  /// The truth of a pixel is the one nearest in inverse depth within this number of columns and
+  /// rows. 1 tolerates silhouettes, where an edge pixel may fall on the far background. Range: 0 to
+  /// 100.
+  int tolerance_px = 0;
+  /// Farther truths are ignored. Above 0.
+  double max_depth_m = std::numeric_limits<double>::infinity();
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// Whether a pixel of a depth map (metres) has a depth: finite and above 0.
+inline bool isDepth(float depth_m) { return std::isfinite(depth_m) && depth_m > 0; }
+
+/// A depth map and its truth, of the same size, metres.
+struct ComparedDepths {
+  cv::Mat1f estimate;
+  cv::Mat1f truth;
+  cv::Mat1b mask;  ///< Pixels that are evaluated: not 0. Empty: all.
+
+  bool counts(int y, int x) const { return mask.empty() || mask(y, x) != 0; }
+  bool hasEstimate(int y, int x) const { return counts(y, x) && isDepth(estimate(y, x)); }
+  bool hasTruth(int y, int x, const DepthPairingOptions& options) const {
+    return counts(y, x) && isDepth(truth(y, x)) && truth(y, x) <= options.max_depth_m;
+  }
+  /// @throws std::invalid_argument where the maps or the mask differ in size.
+  void validate() const;
+};
+
+/// The truth that the estimate at a pixel is compared with, metres; 0 where there is none within
+/// the tolerance.
+double bestTruth(const ComparedDepths& depths, cv::Point pixel, const DepthPairingOptions& options);
+
+/// The pairs of all pixels where both maps have a depth, row by row.
+/// @throws std::invalid_argument where the maps differ in size or the options are not valid.
+std::vector<DepthPair> pairDepths(const ComparedDepths& depths,
+                                  const DepthPairingOptions& options = {});
+std::vector<DepthPair> pairDepths(const cv::Mat1f& estimate, const cv::Mat1f& truth,
+                                  const DepthPairingOptions& options = {});
 
 /// Errors over a set of pixels. Z is the estimate, Z_true the truth, d = ln Z - ln Z_true. All are
 /// 0 without points.
@@ -47,5 +96,45 @@ DepthErrors depthErrors(const std::vector<DepthPair>& pairs,
 /// The mean of each field over the maps with points, with equal weights. `points` is their sum. A
 /// field that a map lacks is empty.
 DepthErrors meanOfErrors(const std::vector<DepthErrors>& maps);
+
+/// Precision (the fraction of the estimates that are correct) and recall (the fraction of the truth
+/// that was found) over a list of allowed errors (Pizzoli et al., ICRA 2014; Ghosh and Gallego
+/// 2022, Sec. 4, "Metrics"). Stored as counts, which can be added over maps.
+struct PrecisionRecall {
+  /// The counts at one allowed error.
+  struct Step {
+    double threshold_m = 0;
+    std::uint64_t correct_estimates = 0;
+    std::uint64_t found_truths = 0;
+  };
+  std::vector<Step> steps;
+  std::uint64_t estimates = 0;  ///< Pixels with an estimate and a truth.
+  std::uint64_t truths = 0;     ///< Pixels with a truth.
+  /// Pixels with an estimate and no truth: in none of the other counts.
+  std::uint64_t estimates_without_truth = 0;
+
+  /// Fraction of the estimates within the threshold of the truth; 0 without estimates.
+  double precision(std::size_t step) const;
+  /// Fraction of the truths with an estimate within the threshold; 0 without truths.
+  double recall(std::size_t step) const;
+  /// The harmonic mean of the two; 0 where both are 0.
+  double f1(std::size_t step) const;
+
+  /// Adds the counts of another map.
+  /// @throws std::invalid_argument where its thresholds differ.
+  void add(const PrecisionRecall& other);
+};
+
+/// 1 cm to 5 m, about even in the logarithm, for rooms and streets.
+std::vector<double> defaultDepthThresholds();
+
+/// Counts |Z - Z_true| <= threshold. An estimate is compared with its truth in `pairDepths`. A
+/// truth is compared with the estimate of the nearest depth within the tolerance.
+/// @param thresholds_m above 0, in any order; the steps have the same order.
+/// @throws std::invalid_argument where a threshold is not above 0, the maps differ in size or the
+/// options are not valid.
+PrecisionRecall precisionRecall(const ComparedDepths& depths,
+                                const std::vector<double>& thresholds_m,
+                                const DepthPairingOptions& options = {});
 
 }  // namespace efm

@@ -3,14 +3,48 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "maps/refinement/pose_refinement.h"
-#include "maps/refinement/refined_keyframe.h"
 #include "maps/refinement/tracker_model.h"
-#include "maps/refinement/window_graph.h"
 
 namespace efm {
+
+/// The pose graph of the keyframes from `first_free` on, and of the earlier ones that factors
+/// connect with them. Each keyframe has two poses: T_world_ref and T_world_ref_denoised. The motion
+/// of the tracker, with its drift, connects consecutive denoised poses. The noise connects the two
+/// poses of a keyframe. So noise averages out over the window, and drift follows the points.
+class WindowGraph {
+ public:
+  /// @param first_free the keyframes before it are fixed. At least 1.
+  /// @param keyframes must outlive the graph.
+  WindowGraph(const std::vector<RefinedKeyframe>& keyframes, std::size_t first_free);
+
+  /// Adds a factor between keyframes, unless both are fixed.
+  void add(RelativePoseFactor factor);
+  /// Adds the factors of the tracker: its motions and its noise.
+  void addTracker(const TrackerErrors& errors);
+  /// As `solvePoseGraph`.
+  bool solve(const PoseGraphOptions& options) { return solvePoseGraph(options, graph_); }
+
+  bool has(std::size_t keyframe) const { return node_[keyframe].has_value(); }
+  /// The poses of a keyframe in the graph.
+  const Rigid3& T_world_ref(std::size_t keyframe) const;
+  const Rigid3& T_world_ref_denoised(std::size_t keyframe) const;
+  /// `poseCovariance` of T_world_ref_denoised.
+  std::optional<Matrix6d> denoisedCovariance(const PoseGraphOptions& options,
+                                             std::size_t keyframe) const;
+
+ private:
+  std::size_t refNode(std::size_t keyframe);
+  std::size_t denoisedNode(std::size_t keyframe) { return refNode(keyframe) + 1; }
+
+  const std::vector<RefinedKeyframe>& keyframes_;
+  std::size_t first_free_;
+  std::vector<std::optional<std::size_t>> node_;  // of T_world_ref; the denoised one is next
+  PoseGraph graph_;
+};
 
 /// All keyframes, and the factors between them.
 struct KeyframeGraph {
@@ -43,5 +77,17 @@ struct KeyframeGraph {
  private:
   std::size_t mostRedundant() const;
 };
+
+/// Above this number of free keyframes, loops are solved by `solveCondensed`.
+constexpr std::size_t kMaxSolvedTogether = 500;
+
+/// Solves loops over any number of keyframes with at most `kMaxSolvedTogether` free poses: those of
+/// anchors, which are keyframes at equal distances in number. Between two anchors the motion is the
+/// current one, with the drift of the tracker; a loop counts between the anchors before its
+/// keyframes, at most a few per anchor. The other keyframes follow the anchors around them. So the
+/// cost hardly grows with the number of keyframes, and small errors between anchors stay.
+/// @param first_free the keyframes before it are fixed. At least 1, and below the newest keyframe.
+/// Counts in `failed_solves`, and moves nothing, where the minimum cannot be computed.
+void solveCondensed(KeyframeGraph& graph, std::size_t first_free, const PoseGraphOptions& options);
 
 }  // namespace efm

@@ -5,13 +5,69 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/keyframe_graph.h"
-#include "maps/refinement/loop_closer.h"
-#include "maps/refinement/refinement_options.h"
+#include "maps/refinement/keyframe_registration.h"
+#include "maps/refinement/loop_closing.h"
+#include "maps/refinement/pose_refinement.h"
+#include "maps/refinement/registration_points.h"
+#include "maps/refinement/tracker_model.h"
 
 namespace efm {
+
+struct RefinementOptions {
+  TrackerErrors tracker;      ///< The expected errors of the incoming poses.
+  bool adapt_tracker = true;  ///< Learn these errors from the keyframes.
+  RegistrationCloudOptions points;
+  KeyframeRegistrationOptions registration;
+  /// Number of last keyframes that are solved together. Earlier ones stay until a loop is closed.
+  /// Range: 1 to 1000.
+  int window = 10;
+  /// Number of these keyframes that a new one is registered with: those with the largest overlap.
+  /// Range: 1 to 100.
+  int map_keyframes = 3;
+  LoopOptions loop;
+  PoseGraphOptions graph;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+struct LoopCounts {
+  std::uint64_t checked = 0;   ///< Candidates that were registered.
+  std::uint64_t verified = 0;  ///< Candidates that became factors.
+  std::uint64_t dropped = 0;   ///< Of these, the ones that other factors contradicted.
+};
+
+/// Finds loops, verifies them, and solves the keyframes since the oldest new loop.
+class LoopCloser {
+ public:
+  explicit LoopCloser(const RefinementOptions& options) : options_(options) {}
+
+  /// Checks the earlier keyframes with the largest overlap with the newest one.
+  void search(KeyframeGraph& graph);
+  /// Registers the keyframes of a candidate with each other, and adds a factor where they agree.
+  /// @return whether they agree.
+  bool check(KeyframeGraph& graph, const LoopCandidate& candidate);
+  /// Solves new loops where the path has grown enough since the last time.
+  /// @return the solved graph, or nothing.
+  std::optional<WindowGraph> solveWhenDue(KeyframeGraph& graph);
+  /// Solves all keyframes.
+  /// @param graph at least two keyframes.
+  WindowGraph solveAll(KeyframeGraph& graph);
+
+  const LoopCounts& counts() const { return counts_; }
+
+ private:
+  WindowGraph solve(KeyframeGraph& graph, std::size_t first_free);
+
+  RefinementOptions options_;
+  LoopCounts counts_;
+  std::optional<std::size_t> oldest_unsolved_;  // the oldest keyframe of the new loops
+  std::size_t solved_at_ = 0;                   // the newest keyframe of that time
+};
 
 struct RefinementCounts {
   std::uint64_t registered = 0;   ///< Keyframes that were registered with earlier ones.

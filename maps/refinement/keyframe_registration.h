@@ -6,9 +6,8 @@
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
-#include "maps/refinement/pose_difference.h"
 #include "maps/refinement/pose_refinement.h"
-#include "maps/refinement/registration_cloud.h"
+#include "maps/refinement/registration_points.h"
 
 namespace efm {
 

@@ -7,7 +7,7 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/keyframe_registration.h"
-#include "maps/refinement/tracker_errors.h"
+#include "maps/refinement/tracker_model.h"
 
 namespace efm {
 

@@ -2,14 +2,50 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <cstddef>
 #include <optional>
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
-#include "maps/refinement/pose_difference.h"
 
 namespace efm {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// Decompositions of small symmetric matrices. They are compiled here once, because each takes the
+// compiler seconds.
+
+/// The lower triangular L with covariance = L L^T.
+/// @param covariance positive definite.
+Matrix6d choleskyFactor(const Matrix6d& covariance);
+
+/// L^-1, where covariance = L L^T: it scales errors with this covariance to unit covariance.
+/// @param covariance positive definite.
+Matrix6d sqrtInformation(const Matrix6d& covariance);
+Eigen::Matrix3d sqrtInformation(const Eigen::Matrix3d& covariance);
+
+bool isPositiveDefinite(const Eigen::Matrix3d& matrix);
+
+/// @param matrix not singular.
+Matrix6d inverseOf(const Matrix6d& matrix);
+
+/// matrix = vectors * diag(values) * vectors^T; values ascending.
+struct EigenDecomposition {
+  Vector6d values;
+  Matrix6d vectors;
+};
+EigenDecomposition eigenDecomposition(const Matrix6d& matrix);
+
+double maxEigenvalue(const Eigen::Matrix3d& matrix);
+
+/// The motion T_a_b as six numbers: the translation in metres, then the rotation vector (axis times
+/// angle, at most pi) in radians. Covariances and informations of poses have the same order.
+Vector6d differenceOf(const Rigid3& T_a_b);
+
+/// The inverse of `differenceOf`.
+Rigid3 rigidFromDifference(const Vector6d& difference);
 
 // All uses of Ceres. Poses change on the manifold of rotations and translations, Jacobians are
 // automatic, and one thread solves: results do not depend on the machine.

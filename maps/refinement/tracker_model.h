@@ -1,14 +1,76 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <deque>
 #include <optional>
+#include <vector>
 
+#include "mapping/geometry/rigid3.h"
 #include "maps/refinement/pose_refinement.h"
-#include "maps/refinement/refined_keyframe.h"
-#include "maps/refinement/tracker_errors.h"
+#include "maps/refinement/registration_points.h"
 
 namespace efm {
+
+/// The noise of one pose as a tracker states it: standard deviations on each axis, metres and
+/// radians.
+struct PoseNoise {
+  double noise_m = 0;
+  double noise_rad = 0;
+};
+
+/// The noise of one pose as a ratio to the expected noise of the tracker: without a unit, 1 where
+/// the tracker states nothing.
+struct NoiseScale {
+  double translation = 1;
+  double rotation = 1;
+};
+
+/// The errors of the poses of a tracker: noise, independent for each keyframe, and drift, which
+/// grows along the path: as a random walk up to one metre, in proportion to the path length beyond.
+/// All are standard deviations on each axis, 0 to 1e3. The defaults are those of good
+/// visual-inertial odometry.
+struct TrackerErrors {
+  double noise_m = 0.01;
+  double noise_rad = 0.5 * kRadiansPerDegree;
+  double drift_m = 0.01;  ///< Per metre of path.
+  double drift_rad = 0.5 * kRadiansPerDegree;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+  /// The covariance of a pose relative to the pose without noise. Never singular.
+  Matrix6d noiseCovariance(const NoiseScale& scale = {}) const;
+  /// The covariance of the motion without noise along a path. Never singular.
+  Matrix6d driftCovariance(double path_length_m) const;
+};
+
+/// A motion between two keyframes by the tracker, compared with the motion by their points.
+struct MotionSample {
+  Vector6d difference = Vector6d::Zero();
+  Matrix6d covariance = Matrix6d::Identity();  ///< Of the motion by points. Not singular.
+  double path_length_m = 0;                    ///< Between the two.
+  NoiseScale from = {};
+  NoiseScale to = {};
+};
+
+/// The most likely errors, given the samples and the expected errors. Their prior is lognormal: one
+/// standard deviation is a factor of ten for noise, and of two for drift. The prior of drift is
+/// tighter because few samples do not show drift, and a drift of 0 would bend every loop. Few
+/// samples change little. Cost: a few hundred 6 x 6 decompositions per sample.
+TrackerErrors estimateTrackerErrors(const std::vector<MotionSample>& samples,
+                                    const TrackerErrors& expected);
+
+/// A keyframe with a refined pose.
+struct RefinedKeyframe {
+  RegistrationCloud cloud;
+  Rigid3 T_odom_ref;             ///< By the tracker; its world may drift.
+  Rigid3 T_world_ref;            ///< Refined.
+  Rigid3 T_world_ref_denoised;   ///< The pose of the tracker without noise, in the refined world.
+  double path_length_m = 0;      ///< From the first keyframe, by the tracker.
+  NoiseScale noise_scale = {};   ///< Of its pose by the tracker.
+  std::size_t first_factor = 0;  ///< No factor before this index has the keyframe.
+  bool moved = true;             ///< Since `takeMoved`.
+};
 
 /// The errors of the tracker, learnt from the registrations of its keyframes.
 class TrackerModel {

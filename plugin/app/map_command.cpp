@@ -15,8 +15,8 @@
 #include <system_error>
 
 #include "mapping/geometry/timestamp.h"
+#include "maps/cloud/cloud_points.h"
 #include "maps/cloud/keyframe_cloud.h"
-#include "maps/cloud/outlier_removal.h"
 #include "plugin/app/config_files.h"
 #include "plugin/app/error_words.h"
 #include "plugin/app/exit_status.h"

@@ -16,7 +16,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "maps/cloud/point_search.h"
+#include "maps/cloud/cloud_points.h"
 
 namespace efm {
 namespace {

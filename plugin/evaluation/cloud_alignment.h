@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/cloud_points.h"
 
 namespace efm {
 

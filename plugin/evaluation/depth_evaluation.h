@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "maps/metrics/depth_metrics.h"
-#include "maps/metrics/precision_recall.h"
 
 namespace efm {
 

@@ -7,7 +7,6 @@
 
 #include "mapping/base/text.h"
 #include "maps/io/point_record.h"
-#include "maps/io/text_scanner.h"
 #include "plugin/evaluation/npy_image.h"
 
 namespace efm {

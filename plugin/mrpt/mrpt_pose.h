@@ -2,7 +2,7 @@
 #pragma once
 
 #include "mapping/geometry/rigid3.h"
-#include "maps/refinement/pose_difference.h"
+#include "maps/refinement/pose_refinement.h"
 
 namespace mrpt::poses {
 class CPose3D;

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "maps/refinement/tracker_errors.h"
+#include "maps/refinement/tracker_model.h"
 #include "plugin/session/pose_source_selector.h"
 
 namespace efm {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
-#include "maps/cloud/cloud_point.h"
+#include "maps/cloud/cloud_points.h"
 #include "maps/cloud/keyframe_cloud.h"
 #include "plugin/mrpt/mrpt_point_maps.h"
 

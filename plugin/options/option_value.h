@@ -14,7 +14,7 @@
 #include "mapping/events/window.h"
 #include "mapping/keyframes/keyframe_policy.h"
 #include "mapping/sweep/space_sweep.h"
-#include "maps/cloud/keyframe_consistency.h"
+#include "maps/cloud/visibility_grid.h"
 
 namespace efm {
 

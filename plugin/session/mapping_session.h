@@ -13,7 +13,6 @@
 #include "mapping/survey/option_choice.h"
 #include "maps/cloud/global_cloud.h"
 #include "maps/cloud/keyframe_cloud.h"
-#include "maps/cloud/refined_cloud.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/pose_source_selector.h"

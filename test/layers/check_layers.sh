@@ -35,7 +35,7 @@ forbid mapping/kernels "mapping/[^k]" "may include mapping/kernels/ alone"
 forbid maps "(tracking_stub|plugin|test)/" "may include mapping/ and maps/"
 forbid maps "$mrpt|$recordings|$front" "may use PCL, Ceres and what mapping/ uses"
 forbid maps "$ceres" "Ceres stays in one pair of files" '^maps/refinement/pose_refinement\.(h|cpp):'
-forbid maps "$pcl" "PCL stays in cloud/, at its point type and its searches" '^maps/cloud/(map_point|point_search)\.(h|cpp):'
+forbid maps "$pcl" "PCL stays in cloud/, at its point type and its searches" '^maps/cloud/(map_point|cloud_points)\.(h|cpp):'
 forbid maps "liblzf" "liblzf stays in pcd_file" '^maps/io/pcd_file\.cpp:'
 forbid tracking_stub "(maps|plugin|test)/" "may include mapping/ and tracking_stub/"
 forbid tracking_stub "$mrpt|$pcl|$ceres|$recordings|$front" "may use what mapping/ uses"

@@ -18,8 +18,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
-#include "maps/io/pcd_file.h"
-#include "maps/io/ply_file.h"
+#include "maps/io/point_cloud_file.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/height_colours.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/cloud/outlier_removal.h"
+#include "maps/cloud/cloud_points.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

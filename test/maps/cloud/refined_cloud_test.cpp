@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/cloud/refined_cloud.h"
+#include "maps/cloud/keyframe_cloud.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/metrics/precision_recall.h"
+#include "maps/metrics/depth_metrics.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/metrics/trajectory_association.h"
+#include "maps/metrics/trajectory_metrics.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

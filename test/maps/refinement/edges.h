@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mapping/keyframes/keyframe_depth_map.h"
-#include "maps/refinement/registration_cloud.h"
+#include "maps/refinement/registration_points.h"
 
 namespace efm::test {
 

@@ -9,8 +9,6 @@
 
 #include "edges.h"
 #include "mapping/geometry/rigid3.h"
-#include "maps/refinement/condensed_graph.h"
-#include "maps/refinement/window_graph.h"
 #include "random_poses.h"
 
 namespace efm {

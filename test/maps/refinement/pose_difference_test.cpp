@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/refinement/pose_difference.h"
+#include "maps/refinement/pose_refinement.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -5,7 +5,6 @@
 #include <random>
 
 #include "mapping/geometry/rigid3.h"
-#include "maps/refinement/pose_difference.h"
 #include "maps/refinement/pose_refinement.h"
 
 namespace efm::test {

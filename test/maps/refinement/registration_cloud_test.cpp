@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/refinement/registration_cloud.h"
+#include "maps/refinement/registration_points.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/refinement/tracker_errors.h"
+#include "maps/refinement/tracker_model.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,6 @@
 
 #include "edges.h"
 #include "mapping/geometry/rigid3.h"
-#include "maps/refinement/tracker_model.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"
 

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "maps/metrics/depth_pairs.h"
+#include "maps/metrics/depth_metrics.h"
 #include "test/paths.h"
 #include "test/studies/frames/rendered_frames.h"
 #include "tracking_stub/rendering/depth_rendering.h"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "maps/metrics/precision_recall.h"
+#include "maps/metrics/depth_metrics.h"
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/report/study_section.h"
 

@@ -12,7 +12,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "maps/cloud/keyframe_cloud.h"
-#include "maps/refinement/registration_cloud.h"
+#include "maps/refinement/registration_points.h"
 #include "plugin/session/mapping_session.h"
 #include "test/tracking_stub/faults/tum_replay.h"
 

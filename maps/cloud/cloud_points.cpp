@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/cloud/point_search.h"
+#include "maps/cloud/cloud_points.h"
 
 #include <pcl/filters/radius_outlier_removal.h>
 #include <pcl/kdtree/kdtree_flann.h>
@@ -9,9 +9,44 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "mapping/base/named_choice.h"
+#include "mapping/base/text.h"
 #include "mapping/depth/peak_fit.h"
 
 namespace efm {
+
+std::string positionText(const CloudPoint& point) {
+  NumberText text;
+  text << "(" << point.p_world.x() << ", " << point.p_world.y() << ", " << point.p_world.z() << ")";
+  return text.str();
+}
+
+std::string pointText(const CloudPoint& point) {
+  NumberText text;
+  text << positionText(point) << " with confidence " << point.confidence;
+  return text.str();
+}
+
+void OutlierRemovalOptions::validate() const {
+  requireOption(outlier_radius_m == 0 || (outlier_radius_m >= 1e-6 && outlier_radius_m <= 1e6),
+                "outlier_radius_m", outlier_radius_m, "0 or from 1e-6 to 1e6 (metres)");
+  requireOption(outlier_min_neighbors >= 1 && outlier_min_neighbors <= 10000,
+                "outlier_min_neighbors", outlier_min_neighbors, "from 1 to 10000");
+}
+
+std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
+                                       const OutlierRemovalOptions& options) {
+  options.validate();
+  if (options.outlier_radius_m == 0 || points.empty()) return points;
+  const auto offsets = offsetsFrom(medianPosition(points), points);
+  std::vector<CloudPoint> inliers;
+  for (const std::size_t index :
+       indicesWithNeighbors(offsets, options.outlier_radius_m, options.outlier_min_neighbors)) {
+    inliers.push_back(points[index]);
+  }
+  return inliers;
+}
+
 namespace {
 
 void requireFinite(const CloudPoint& point) {

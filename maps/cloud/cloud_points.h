@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Core>
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace efm {
+
+/// A point on its way into a map, or from a file of any origin. Double, because maps may lie far
+/// from the origin of the world. A map gives its points as a cloud of PCL (`MapPoint`).
+struct CloudPoint {
+  Eigen::Vector3d p_world = Eigen::Vector3d::Zero();  ///< Metres, frame `world`.
+  float confidence = 0;                               ///< Fused ray density at the point, above 0.
+  std::uint32_t support = 1;                          ///< Number of keyframes that saw it.
+  /// Of a global cloud: the lowest number of a keyframe that saw it.
+  std::uint64_t first_keyframe = 0;
+  /// Standard deviation of depth, metres; NaN where it is not known.
+  float sigma = std::numeric_limits<float>::quiet_NaN();
+};
+
+/// For messages, with all digits: "(1, 2.5, -3)".
+std::string positionText(const CloudPoint& point);
+/// For messages, with all digits: "(1, 2.5, -3) with confidence 7".
+std::string pointText(const CloudPoint& point);
+
+struct OutlierRemovalOptions {
+  /// Points with too few others within this distance are removed. Metres; 0 (no point is removed)
+  /// or 1e-6 to 1e6. There is no default distance, because it depends on the depth of the scene.
+  double outlier_radius_m = 0;
+  /// A point is kept with at least this number of others within the radius. Range: 1 to 10000. The
+  /// default is that of the published code of EMVS (Rebecq et al., IJCV 2018).
+  int outlier_min_neighbors = 3;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// The points that are not isolated, in the same order. Use it on the cloud of one keyframe before
+/// it is merged with others: no edge of its depth map supports an isolated point.
+///
+/// Distances are computed in float, relative to the median position: they are exact to 1e-7 of the
+/// extent of the cloud at any distance from the origin of the world.
+/// @throws std::invalid_argument where the options are not valid, or a point is not finite or
+/// too far from the others for floats.
+std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
+                                       const OutlierRemovalOptions& options);
+
+// The searches of PCL. They work on floats, which are precise near the origin only.
+
+/// The median of each coordinate. Few points far away do not move it, unlike the mean.
+/// @param points at least one.
+/// @throws std::invalid_argument naming a point that is not finite.
+Eigen::Vector3d medianPosition(const std::vector<CloudPoint>& points);
+
+/// The positions relative to `origin`, in the same order.
+/// @throws std::invalid_argument naming a point that is not finite, or so far from the origin that
+/// a float cannot hold the square of the distance.
+std::vector<Eigen::Vector3f> offsetsFrom(const Eigen::Vector3d& origin,
+                                         const std::vector<CloudPoint>& points);
+
+/// A k-d tree.
+class PointTree {
+ public:
+  struct Neighbor {
+    std::size_t index = 0;
+    float squared_distance = 0;
+  };
+
+  /// @param points at least one, all finite.
+  explicit PointTree(const std::vector<Eigen::Vector3f>& points);
+  ~PointTree();
+
+  /// @param point finite.
+  Neighbor nearest(const Eigen::Vector3f& point) const;
+
+ private:
+  struct Tree;
+  std::unique_ptr<Tree> tree_;
+};
+
+/// The ascending indices of the points that have at least `min_neighbors` others within the radius.
+std::vector<std::size_t> indicesWithNeighbors(const std::vector<Eigen::Vector3f>& points,
+                                              double radius, int min_neighbors);
+
+}  // namespace efm
