@@ -7,7 +7,7 @@
 #include "plugin/app/argument_checks.h"
 #include "plugin/app/simulate_command.h"
 #include "plugin/app/source_arguments.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 
 namespace efm {

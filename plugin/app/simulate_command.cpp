@@ -15,7 +15,7 @@
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
 #include "plugin/recordings/calibration/camchain.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 #include "tracking_stub/truth/dataset_writer.h"

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "plugin/app/progress.h"
-#include "tracking_stub/sensor/event_noise.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm {
 

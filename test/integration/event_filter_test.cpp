@@ -9,8 +9,8 @@
 
 #include "mapping/keyframes/fusion_mapper.h"
 #include "maps/metrics/depth_metrics.h"
-#include "tracking_stub/presets/simulation_preset.h"
-#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/presets/presets.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm {
 namespace {

@@ -11,7 +11,7 @@
 #include "plugin/recordings/open/open_recording.h"
 #include "test/paths.h"
 #include "test/tracking_stub/truth/nearest_surface.h"
-#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm::test {
 

@@ -7,7 +7,7 @@
 #include "maps/cloud/global_cloud.h"
 #include "maps/cloud/map_point.h"
 #include "maps/metrics/depth_metrics.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm::test {
 

@@ -14,7 +14,7 @@
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/recordings/real_rigs.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {
 namespace {

@@ -13,7 +13,7 @@
 #include "test/studies/methods/depth_curve.h"
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {
 namespace {

@@ -15,7 +15,7 @@
 #include "test/studies/methods/method_comparison.h"
 #include "test/studies/recordings/recording_errors.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm::studies {

@@ -15,7 +15,7 @@
 #include "test/studies/recordings/real_rigs.h"
 #include "test/studies/recordings/recording_errors.h"
 #include "test/studies/studies.h"
-#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm::studies {
 namespace {

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <memory>
+#include <vector>
 
 #include "mapping/geometry/rigid3.h"
+#include "mapping/geometry/trajectory.h"
 
 namespace efm {
 
@@ -13,6 +17,92 @@ class Motion {
   virtual ~Motion() = default;
   /// T_world_rig. Thread-safe.
   virtual Rigid3 poseAt(std::int64_t t_ns) const = 0;
+};
+
+struct LoopMotionOptions {
+  std::int64_t start_ns = 0;  ///< The rig is on the +x axis of the ellipse then.
+  double period_s = 8;        ///< Of one loop, above 0.
+  double radius_x_m = 1;      ///< Half axes of the ellipse.
+  double radius_y_m = 1;
+  double height_m = 1.2;  ///< Above the origin.
+  /// Viewing direction, counter-clockwise from above: 0 is outwards, pi/2 is forwards.
+  double heading_rad = 0;
+  /// Added motion, in the frame of the camera on the loop. Optional.
+  std::shared_ptr<const Motion> sway;
+};
+
+/// Goes around the world's z axis on an ellipse, counter-clockwise and at a constant rate. Each
+/// loop ends at its first pose. The camera (x right, y down, z forward) is level without the sway.
+class LoopMotion : public Motion {
+ public:
+  explicit LoopMotion(const LoopMotionOptions& options);
+  Rigid3 poseAt(std::int64_t t_ns) const override;
+
+ private:
+  LoopMotionOptions options_;
+};
+
+/// amplitude * sin(2 pi frequency t + phase).
+struct Sine {
+  double amplitude = 0;  ///< Metres or radians.
+  double frequency_hz = 0;
+  double phase_rad = 0;
+};
+
+struct SmoothMotionOptions {
+  std::int64_t start_ns = 0;                           ///< t = 0 of the sines.
+  Rigid3 T_world_center;                               ///< The rig moves around this pose.
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< Along the axes of `center`, m/s.
+  std::array<std::vector<Sine>, 3> translation;        ///< Along the axes of `center`, metres.
+  std::array<std::vector<Sine>, 3> rotation;           ///< A rotation vector in `center`, radians.
+};
+
+/// Hand-held motion: a constant velocity and, in each of the six degrees of freedom, a sum of
+/// sines.
+class SmoothMotion : public Motion {
+ public:
+  explicit SmoothMotion(const SmoothMotionOptions& options) : options_(options) {}
+  Rigid3 poseAt(std::int64_t t_ns) const override;
+
+ private:
+  SmoothMotionOptions options_;
+};
+
+struct SmoothingOptions {
+  /// Cutoff frequency of the low-pass filter, Hz, above 0. At most 0.4 times the rate of the poses
+  /// is used: above half of that rate there are only artefacts of interpolation.
+  double cutoff_hz = 10;
+  std::int64_t period_ns = 5'000'000;  ///< Of the result; at most a quarter of 1 / cutoff.
+  double max_gap_s = 1;                ///< Longer gaps are errors.
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// Smooths measured poses. A single pose that jumps is removed: its distance from the line between
+/// its neighbours is over 8 times the median. The others are resampled evenly, also across gaps,
+/// and filtered without delay by a windowed sinc: positions, and rotations in the tangent space at
+/// each sample. Poses may be in any order; of equal times the first counts.
+/// @throws std::invalid_argument where there are fewer than two poses, or naming a gap.
+std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses,
+                                          const SmoothingOptions& options = {});
+
+/// The first time from which a recording moves, over half a second, with at least half of its mean
+/// speed. The time of the first pose where it never moves.
+/// @param poses in order of time, at least one.
+std::int64_t startOfMotion(const std::vector<StampedPose>& poses);
+
+/// The motion through evenly spaced poses: linear in position, slerp in rotation, and at rest
+/// before the first pose and after the last.
+class SampledMotion : public Motion {
+ public:
+  /// @throws std::invalid_argument where there are fewer than two poses or uneven periods.
+  explicit SampledMotion(std::vector<StampedPose> poses);
+  Rigid3 poseAt(std::int64_t t_ns) const override;
+
+ private:
+  std::vector<StampedPose> poses_;
+  std::int64_t period_ns_;
 };
 
 }  // namespace efm

@@ -1,11 +1,66 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstdint>
+#include <Eigen/Geometry>
 
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mapping/geometry/rig.h"
+#include "mapping/geometry/rigid3.h"
+#include "mapping/geometry/timestamp.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm {
+
+/// Parts of presets: rigs and motions.
+
+/// The start of every preset.
+inline constexpr std::int64_t kPresetStartNs = kNanosecondsPerSecond;
+
+inline double radians(double deg) { return deg * kPi / 180; }
+
+/// R_world_cam of a level camera (x right, y down, z forward) that looks along y in a world whose z
+/// is up.
+inline Eigen::Quaterniond lookingAlongY() {
+  Eigen::Matrix3d R_world_cam;
+  R_world_cam << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  return Eigen::Quaterniond(R_world_cam);
+}
+
+/// No distortion, the principal point in the middle.
+inline CameraModel makePinhole(int width, int height, double focal_px) {
+  CameraModel model;
+  model.width = width;
+  model.height = height;
+  model.fx = model.fy = focal_px;
+  model.cx = 0.5 * width;
+  model.cy = 0.5 * height;
+  return model;
+}
+
+/// Two equal cameras, the second `baseline_m` to the right of the first. The rig's frame is the
+/// first.
+inline Rig makeStereoRig(const CameraModel& model, double baseline_m) {
+  Rig rig;
+  rig.cameras.resize(2);
+  rig.cameras[0].model = rig.cameras[1].model = model;
+  rig.cameras[1].T_rig_cam.translation = {baseline_m, 0, 0};
+  return rig;
+}
+
+/// A preset without scene, rig and motion.
+/// @param threshold contrast threshold of both polarities.
+inline Simulation emptyPreset(double duration_s, double threshold, std::uint64_t seed) {
+  Simulation simulation;
+  simulation.start_ns = kPresetStartNs;
+  simulation.duration_ns = durationFromSeconds(duration_s);
+  simulation.pixels.threshold_on = simulation.pixels.threshold_off = threshold;
+  simulation.seed = seed;
+  return simulation;
+}
 
 /// The presets: simulations that are ready to run. Each starts at t = 1 s. README.md has a table of
 /// their cameras, durations and depths.
@@ -40,5 +95,22 @@ Simulation makeSlider(std::uint64_t seed);
 /// other two, tilted down, and rotated by 90 degrees about its axis. All see the middle of camera
 /// 0's view. World: z up.
 Simulation makeTrinocular(std::uint64_t seed);
+
+struct SimulationOptions {
+  std::string preset = "desk_stereo";  ///< One of `simulationPresets`.
+  /// Seconds, 0.001 to 600. Default: the preset's duration.
+  std::optional<double> duration_s;
+  /// Seed of everything random: the paintings and the initial memory of the pixels.
+  std::uint64_t seed = 1;
+
+  /// @throws std::invalid_argument naming the field, its value and the allowed values.
+  void validate() const;
+};
+
+std::vector<std::string> simulationPresets();
+
+/// Scene, rig and motion of a preset.
+/// @throws std::invalid_argument where the options are not valid.
+Simulation makeSimulation(const SimulationOptions& options = {});
 
 }  // namespace efm

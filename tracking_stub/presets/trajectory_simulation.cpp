@@ -10,10 +10,8 @@
 
 #include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/motion/smoothed_trajectory.h"
-#include "tracking_stub/scenes/poles_scene.h"
-#include "tracking_stub/scenes/room_scene.h"
-#include "tracking_stub/scenes/street_scene.h"
+#include "tracking_stub/motion/motion.h"
+#include "tracking_stub/scenes/scenes.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/scenes/street_scene.h"
+#include "tracking_stub/scenes/scenes.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,7 +10,6 @@
 #include "mapping/geometry/rigid3.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/scenes/furnishing.h"
-#include "tracking_stub/scenes/painting.h"
 
 namespace efm {
 namespace {

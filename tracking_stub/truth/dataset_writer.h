@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -8,9 +11,46 @@
 
 #include "mapping/events/event.h"
 #include "mapping/geometry/rig.h"
+#include "tracking_stub/scenes/scene.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm {
+
+/// Counters on a fine grid over every surface of a scene.
+class SurfaceCells {
+ public:
+  /// @param scene outlives the cells.
+  /// @param cell_m side of a cell. Each surface rounds it to a divisor of its sides.
+  SurfaceCells(const Scene& scene, double cell_m);
+
+  /// Adds one to the cell of a point. A point without a surface is ignored.
+  void add(const SurfacePoint& point);
+
+  /// Centres of the cells with at least this count, frame `world`.
+  std::vector<Eigen::Vector3f> centers(std::uint32_t min_count) const;
+
+ private:
+  struct Grid {
+    int columns = 1;
+    int rows = 1;
+    std::vector<std::uint32_t> counts;  // row-major
+  };
+
+  const Scene* scene_;
+  std::vector<Grid> grids_;  // per surface
+};
+
+/// The truth for maps of a simulated recording: a point per cell of about
+/// `Simulation::truth_cell_m` on the true surfaces, frame `world`.
+struct TruthClouds {
+  std::vector<Eigen::Vector3f> surfaces;  ///< All cells that a pixel saw.
+  /// The cells with at least 3 events: a semi-dense map should contain them.
+  std::vector<Eigen::Vector3f> edges;
+};
+
+/// @param recordings of this simulation, one per camera.
+TruthClouds makeTruthClouds(const Simulation& simulation,
+                            const std::vector<CameraRecording>& recordings);
 
 /// Writes a simulated recording as a dataset:
 ///   camN/events.txt        a line `t x y p` per event

@@ -11,8 +11,8 @@
 #include "maps/metrics/depth_metrics.h"
 #include "test/paths.h"
 #include "test/studies/frames/rendered_frames.h"
-#include "tracking_stub/rendering/depth_rendering.h"
-#include "tracking_stub/scenes/painting.h"
+#include "tracking_stub/rendering/frame_renderer.h"
+#include "tracking_stub/scenes/furnishing.h"
 
 namespace efm::studies {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "mapping/depth/peak_fit.h"
-#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm::studies {
 namespace {

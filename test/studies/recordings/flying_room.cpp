@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/presets/preset_rigs.h"
 #include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {

@@ -6,7 +6,7 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "test/studies/recordings/recording_cache.h"
-#include "tracking_stub/sensor/event_noise.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::studies {
 

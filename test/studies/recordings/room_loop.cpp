@@ -4,9 +4,7 @@
 #include <memory>
 
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/motion/loop_motion.h"
-#include "tracking_stub/motion/smooth_motion.h"
-#include "tracking_stub/presets/preset_rigs.h"
+#include "tracking_stub/motion/motion.h"
 #include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {

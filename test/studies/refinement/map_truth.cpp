@@ -6,7 +6,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/metrics/sample_statistics.h"
 #include "maps/metrics/trajectory_metrics.h"
-#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm::studies {
 

@@ -10,7 +10,7 @@
 #include "test/studies/recordings/real_rigs.h"
 #include "test/studies/recordings/room_loop.h"
 #include "test/studies/refinement/pose_refinement_run.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm::studies {
 namespace {

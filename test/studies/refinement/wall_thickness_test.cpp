@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tracking_stub/random/random_numbers.h"
-#include "tracking_stub/scenes/room_scene.h"
+#include "tracking_stub/scenes/scenes.h"
 
 namespace efm::studies {
 namespace {

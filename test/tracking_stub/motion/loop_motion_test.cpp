@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/motion/loop_motion.h"
+#include "tracking_stub/motion/motion.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <stdexcept>
-
-#include "tracking_stub/motion/smooth_motion.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/motion/smooth_motion.h"
+#include "tracking_stub/motion/motion.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/motion/smoothed_trajectory.h"
+#include "tracking_stub/motion/motion.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

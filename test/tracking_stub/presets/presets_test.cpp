@@ -9,7 +9,6 @@
 #include "mapping/geometry/trajectory.h"
 #include "test/tracking_stub/presets/visible_depths.h"
 #include "tracking_stub/presets/presets.h"
-#include "tracking_stub/presets/simulation_preset.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

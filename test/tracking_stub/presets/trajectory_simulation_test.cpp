@@ -11,7 +11,7 @@
 #include "test/tracking_stub/presets/visible_depths.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
 #include "test/tracking_stub/scenes/ray_cast.h"
-#include "tracking_stub/presets/preset_rigs.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm {
 namespace {

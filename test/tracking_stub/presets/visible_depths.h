@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "tracking_stub/rendering/pixel_rays.h"
-#include "tracking_stub/rendering/scene_view.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm::test {

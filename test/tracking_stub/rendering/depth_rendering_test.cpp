@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 #include <gtest/gtest.h>
 

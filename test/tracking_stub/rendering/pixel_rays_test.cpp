@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/rendering/pixel_rays.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "test/tracking_stub/scenes/edge_scene.h"
-#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm {
 namespace {

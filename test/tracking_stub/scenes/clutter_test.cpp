@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/scenes/clutter.h"
+#include "tracking_stub/scenes/furnishing.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include "test/tracking_stub/scenes/edge_scene.h"
 #include "test/tracking_stub/scenes/ray_cast.h"
 #include "tracking_stub/random/random_numbers.h"
-#include "tracking_stub/rendering/scene_view.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm {
 namespace {

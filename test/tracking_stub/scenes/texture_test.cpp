@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/scenes/texture.h"
+#include "tracking_stub/scenes/scene.h"
 
 #include <gtest/gtest.h>
 

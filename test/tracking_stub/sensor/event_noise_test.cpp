@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/sensor/event_noise.h"
+#include "tracking_stub/sensor/simulated_rig.h"
 
 #include <gtest/gtest.h>
 

@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "test/tracking_stub/scenes/edge_scene.h"
-#include "tracking_stub/presets/simulation_preset.h"
+#include "tracking_stub/presets/presets.h"
 
 namespace efm {
 namespace {

@@ -14,7 +14,7 @@
 #include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
-#include "tracking_stub/rendering/depth_rendering.h"
+#include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/truth/surface_cells.h"
+#include "tracking_stub/truth/dataset_writer.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/motion/smoothed_trajectory.h"
+#include "tracking_stub/motion/motion.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +13,50 @@
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {
+
+LoopMotion::LoopMotion(const LoopMotionOptions& options) : options_(options) {
+  requireOption(options_.period_s > 0, "period_s", options_.period_s, "above 0");
+}
+
+Rigid3 LoopMotion::poseAt(std::int64_t t_ns) const {
+  constexpr double kTwoPi = 6.283185307179586476925;
+  const double phase = kTwoPi * secondsBetween(options_.start_ns, t_ns) / options_.period_s;
+  Eigen::Matrix3d R_outward_cam;  // outward: x out, y left, z up
+  R_outward_cam << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  Rigid3 T_world_cam;
+  T_world_cam.translation = {options_.radius_x_m * std::cos(phase),
+                             options_.radius_y_m * std::sin(phase), options_.height_m};
+  T_world_cam.rotation = Eigen::AngleAxisd(phase + options_.heading_rad, Eigen::Vector3d::UnitZ()) *
+                         Eigen::Quaterniond(R_outward_cam);
+  return options_.sway ? T_world_cam * options_.sway->poseAt(t_ns) : T_world_cam;
+}
+
+namespace {
+
+constexpr double kTwoPi = 6.283185307179586476925;
+
+double valueAt(const std::vector<Sine>& sines, double t_s) {
+  double sum = 0;
+  for (const Sine& sine : sines) {
+    sum += sine.amplitude * std::sin(kTwoPi * sine.frequency_hz * t_s + sine.phase_rad);
+  }
+  return sum;
+}
+
+Eigen::Vector3d valueAt(const std::array<std::vector<Sine>, 3>& axes, double t_s) {
+  return {valueAt(axes[0], t_s), valueAt(axes[1], t_s), valueAt(axes[2], t_s)};
+}
+
+}  // namespace
+
+Rigid3 SmoothMotion::poseAt(std::int64_t t_ns) const {
+  const double t_s = secondsBetween(options_.start_ns, t_ns);
+  Rigid3 T_center_rig;
+  T_center_rig.translation = valueAt(options_.translation, t_s) + options_.velocity * t_s;
+  T_center_rig.rotation = rotationBy(valueAt(options_.rotation, t_s));
+  return options_.T_world_center * T_center_rig;
+}
+
 namespace {
 
 using Poses = std::vector<StampedPose>;
