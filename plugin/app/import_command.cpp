@@ -24,7 +24,7 @@
 #include "plugin/recordings/open/rawlog_signature.h"
 #include "plugin/recordings/open/rawlog_writer.h"
 #include "plugin/session/health_checks.h"
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

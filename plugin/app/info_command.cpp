@@ -21,10 +21,9 @@
 #include "plugin/mrpt/session_feed.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/session/camera_view.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/recording_survey.h"
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

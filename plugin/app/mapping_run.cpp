@@ -22,9 +22,8 @@
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/mrpt_time.h"
-#include "plugin/session/no_keyframe.h"
-#include "plugin/session/session_warnings.h"
-#include "plugin/session/time_text.h"
+#include "plugin/session/health_checks.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

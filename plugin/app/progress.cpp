@@ -11,7 +11,7 @@
 #include <iostream>
 #include <utility>
 
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

@@ -13,7 +13,7 @@
 #include "plugin/app/observed_statistics.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/open/time_cut.h"
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/hosted_mapping.h"
 
-#include "plugin/session/session_warnings.h"
+#include "plugin/session/health_checks.h"
 
 namespace efm {
 

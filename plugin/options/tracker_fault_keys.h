@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/options/option_value.h"
+#include "plugin/options/option_keys.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/camera_checks.h"
+#include "plugin/session/health_checks.h"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,6 @@
 #include "mapping/geometry/lens.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/camera_view.h"
 
 namespace efm {
 namespace {

@@ -1,14 +1,74 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
 #include "mapping/keyframes/fusion_mapper.h"
 #include "mapping/survey/option_choice.h"
 #include "maps/cloud/global_cloud.h"
-#include "plugin/session/live_options.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/session/map_refinement.h"
-#include "plugin/session/rig_setup.h"
 
 namespace efm {
+
+/// Options of the rig, in place of the recording's own.
+struct RigOptions {
+  std::filesystem::path calibration;          ///< Empty: from the recording.
+  std::filesystem::path hand_eye;             ///< Empty: from the recording.
+  std::vector<std::int64_t> time_offsets_ns;  ///< One per camera; empty: none.
+  std::string pose_source;  ///< The label of the source's sensor; empty: the best source.
+};
+
+/// The content of the files that RigOptions name.
+struct RigSetup {
+  std::optional<Calibration> calibration;
+  std::optional<Rigid3> T_body_rig;  ///< Pose of the rig on the tracked body.
+};
+
+/// @throws std::runtime_error naming a file that cannot be read or understood.
+RigSetup readRigSetup(const RigOptions& options);
+
+/// Live operation: mapping in a thread of its own beside a sensor that does not wait.
+struct LiveOptions {
+  /// false: playback. Each observation is mapped before the next one is taken, and the same
+  /// observations make the same map.
+  bool enabled = false;
+  /// Events per second of sensor time and camera; more are thinned evenly. 0: no limit. Depends on
+  /// the events alone, so that the same input gives the same map however loaded the machine is.
+  double max_event_rate = 1'000'000;
+  /// Input that waits for the mapping: its events of all cameras, and their memory. Beyond either
+  /// one the oldest windows are given up. At least 1000 events, 1 MB.
+  std::int64_t max_queue_events = 5'000'000;
+  double max_queue_mb = 256;
+  /// Events wait this long for poses. Seconds, above 0, at most 3600.
+  double max_pose_wait_s = 2;
+  /// Keyframes with their own clouds, for MRPT's simplemaps and for the refinement to move: the
+  /// newest ones. At least 1. The points of all stay in the map.
+  int max_keyframes = 1000;
+  /// A pose that is farther from the one before it, even by five standard deviations less, begins a
+  /// new stretch: no window spans both. Metres per second, degrees per second, above 0.
+  double max_speed_m_s = 50;
+  double max_turn_deg_s = 1500;
+
+  /// The events that may wait, by both limits.
+  double queueEvents() const;
+  /// @throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+/// Shortens a window that was chosen, and a stride that was chosen with it.
+/// @param reason what `max_s` comes from.
+void limitWindow(double max_s, const std::string& reason, KeyframePolicyOptions& policy,
+                 std::vector<ChosenOption>& chosen);
+/// The same, until a window's events fill at most half of the queue of live operation: the other
+/// half is for the events that come while it is mapped.
+/// @param events_per_s of all cameras together.
+void fitIntoQueue(const LiveOptions& live, double events_per_s, KeyframePolicyOptions& policy,
+                  std::vector<ChosenOption>& chosen);
 
 /// All options of an option file.
 struct EventFusionOptions {

@@ -10,12 +10,22 @@
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/camera_checks.h"
-#include "plugin/session/camera_view.h"
-#include "plugin/session/motion_checks.h"
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
+
+bool isCalibrated(const CameraModel& model) { return model.fx > 0 && model.fy > 0; }
+
+Eigen::Vector2d fieldOfView(const CameraModel& model) {
+  const Eigen::Vector2d half{0.5 * model.width / model.fx, 0.5 * model.height / model.fy};
+  if (model.distortion == DistortionModel::kEquidistant) return 2 * half;
+  return {2 * std::atan(half.x()), 2 * std::atan(half.y())};
+}
+
+double baselineOf(const RigCamera& a, const RigCamera& b) {
+  return (a.T_rig_cam.translation - b.T_rig_cam.translation).norm();
+}
+
 namespace {
 
 using Warnings = std::vector<Warning>;

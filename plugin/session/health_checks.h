@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,13 +13,27 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rig.h"
+#include "mapping/keyframes/fusion_mapper.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
+#include "mapping/survey/depth_agreement.h"
 #include "mapping/survey/option_choice.h"
+#include "mapping/survey/pose_check.h"
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/recording_statistics.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
+
+/// Whether a recording knows the camera's calibration. Without one, the focal length is 0.
+bool isCalibrated(const CameraModel& model);
+
+/// Horizontal and vertical field of view, radians: of the pinhole, or, for a fisheye lens, of its
+/// angles in proportion to the distance from the centre. The distortion is left out, so it is
+/// defined for any coefficients.
+Eigen::Vector2d fieldOfView(const CameraModel& model);
+
+/// Distance of two cameras on the rig, metres.
+double baselineOf(const RigCamera& a, const RigCamera& b);
 
 /// What is compared with the options of a map; without a map, the defaults serve.
 struct HealthLimits {
@@ -66,5 +83,41 @@ class DepthStatistics {
   std::uint64_t nearest_ = 0;   // near the nearest plane
   std::uint64_t farthest_ = 0;  // near the farthest plane
 };
+
+/// What is implausible about the cameras: their calibration, and their events. A part of
+/// `healthWarnings`.
+std::vector<Warning> cameraWarnings(const RecordingStatistics& recording);
+
+/// What is implausible about the motion of the poses beside the events: poses that repeat
+/// (`poses-frozen`), steps that the tracker otherwise does not make (`pose-jump`), and motion that
+/// is interpolated over more than 0.1 s (`pose-interpolation`). A part of `healthWarnings`.
+/// Nothing without poses, events or a calibrated camera.
+/// @param depth_m at which motion is seen: a middle one of the scene.
+/// @param max_pose_gap_s events in longer gaps are not used.
+std::vector<Warning> motionWarnings(const RecordingStatistics& recording, double depth_m,
+                                    double max_pose_gap_s);
+
+/// What a finished session did not use, and where its map has holes.
+std::vector<Warning> sessionWarnings(const SessionStatus& status,
+                                     const FusionMapperOptions& options);
+
+/// Automatic options were chosen without a scene.
+Warning noSceneWarning();
+
+/// Says in a sentence why a finished session made no keyframe: no events, no poses, poses and
+/// events that miss each other (by how much), noise alone, or too few of both for one window.
+std::string whyNoKeyframe(const SessionStatus& status, const FusionMapperOptions& options);
+
+/// Says what is wrong about the poses, and the option or file that would mend it.
+/// @param rig with which it was found.
+Warning poseWarning(const PoseFinding& finding, const Rig& rig);
+
+/// Says how the depths of the rig and those of its motion differ: `scale` or `depths-disagree`.
+/// @return nothing where they agree.
+std::optional<Warning> agreementWarning(const DepthAgreement& agreement);
+
+/// Says how much the depths change with the clock and the travel of the poses: `depths-sensitive`.
+/// @return nothing where 10 ms change less than the depths' standard deviation.
+std::optional<Warning> sensitivityWarning(const DepthSensitivity& sensitivity);
 
 }  // namespace efm

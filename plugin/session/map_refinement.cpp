@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "plugin/session/stage_timer.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

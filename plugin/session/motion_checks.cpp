@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/motion_checks.h"
+#include "plugin/session/health_checks.h"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,7 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/camera_view.h"
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

@@ -11,7 +11,7 @@
 #include "mapping/events/event.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/depth_agreement.h"
-#include "plugin/session/pose_warning.h"
+#include "plugin/session/health_checks.h"
 
 namespace efm {
 namespace {

@@ -11,7 +11,7 @@
 #include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/calibration/calibration_file.h"
-#include "plugin/session/camera_view.h"
+#include "plugin/session/health_checks.h"
 
 namespace efm {
 namespace {

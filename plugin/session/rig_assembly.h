@@ -12,7 +12,6 @@
 #include "mapping/geometry/rig.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "plugin/session/event_fusion_options.h"
-#include "plugin/session/rig_setup.h"
 
 namespace efm {
 

@@ -25,7 +25,7 @@
 #include "plugin/recordings/text/event_columns.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
-#include "plugin/session/rig_setup.h"
+#include "plugin/session/event_fusion_options.h"
 
 namespace efm {
 namespace {

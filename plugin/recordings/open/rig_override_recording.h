@@ -7,7 +7,7 @@
 
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/open/recording.h"
-#include "plugin/session/rig_setup.h"
+#include "plugin/session/event_fusion_options.h"
 
 namespace efm {
 

@@ -9,7 +9,7 @@
 #include <iterator>
 #include <utility>
 
-#include "plugin/session/stage_timer.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

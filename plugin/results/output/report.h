@@ -13,7 +13,6 @@
 #include "plugin/session/health_checks.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/session_status.h"
-#include "plugin/session/stage_timer.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm {

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "mapping/geometry/rigid3.h"
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/event_rate.h"
+#include "plugin/session/recording_statistics.h"
 
 #include <gtest/gtest.h>
 

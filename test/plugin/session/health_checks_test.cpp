@@ -14,9 +14,6 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/calibration/camchain.h"
-#include "plugin/session/camera_checks.h"
-#include "plugin/session/pose_warning.h"
-#include "plugin/session/session_warnings.h"
 #include "test/paths.h"
 #include "test/plugin/session/synthetic_recording.h"
 

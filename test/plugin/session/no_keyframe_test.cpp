@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/no_keyframe.h"
+#include "plugin/session/health_checks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/time_text.h"
+#include "plugin/session/session_status.h"
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/live_options.h"
+#include "plugin/session/event_fusion_options.h"
 
 #include <algorithm>
 
 #include "mapping/base/named_choice.h"
+#include "plugin/recordings/calibration/hand_eye_file.h"
 
 namespace efm {
+
+RigSetup readRigSetup(const RigOptions& options) {
+  RigSetup setup;
+  if (!options.calibration.empty()) setup.calibration = readCalibration(options.calibration);
+  if (!options.hand_eye.empty()) {
+    setup.T_body_rig =
+        readHandEye(options.hand_eye, setup.calibration ? &*setup.calibration : nullptr);
+  }
+  return setup;
+}
 
 void LiveOptions::validate() const {
   requireOption(max_event_rate == 0 || (max_event_rate >= 1000 && max_event_rate <= 1e10),
