@@ -13,7 +13,7 @@
 #include "plugin/evaluation/depth_evaluation_text.h"
 #include "plugin/evaluation/stereo_baseline.h"
 #include "plugin/evaluation/trajectory_evaluation_plot.h"
-#include "plugin/results/pictures/picture_file.h"
+#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

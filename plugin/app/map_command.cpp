@@ -29,11 +29,10 @@
 #include "plugin/mrpt/window/map_window.h"
 #include "plugin/results/output/keyframe_writer.h"
 #include "plugin/results/output/map_output.h"
-#include "plugin/results/output/npy_file.h"
-#include "plugin/results/output/summary.h"
-#include "plugin/results/pictures/keyframe_sheet.h"
+#include "plugin/results/output/report.h"
+#include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/map_picture.h"
-#include "plugin/results/pictures/upward.h"
+#include "plugin/results/pictures/picture.h"
 #include "plugin/results/viewer/map_page.h"
 
 namespace efm {

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "plugin/results/output/run_mark.h"
+#include "plugin/results/output/keyframe_writer.h"
 
 namespace efm {
 namespace {

@@ -15,8 +15,8 @@
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/depth_file.h"
 #include "plugin/results/pictures/curve_plot.h"
-#include "plugin/results/pictures/picture_grid.h"
-#include "plugin/results/pictures/value_picture.h"
+#include "plugin/results/pictures/depth_picture.h"
+#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

@@ -12,7 +12,7 @@
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/evaluation/text_table.h"
 #include "plugin/results/pictures/curve_plot.h"
-#include "plugin/results/pictures/picture_grid.h"
+#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

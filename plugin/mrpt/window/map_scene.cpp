@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "plugin/results/pictures/depth_picture.h"
-#include "plugin/results/pictures/upward.h"
+#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

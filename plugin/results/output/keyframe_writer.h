@@ -1,18 +1,81 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <sys/types.h>
+
 #include <condition_variable>
 #include <csignal>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <exception>
+#include <filesystem>
+#include <fstream>
 #include <functional>
+#include <memory>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <thread>
+#include <vector>
 
+#include "mapping/base/atomic_file.h"
+#include "mapping/geometry/reference_view.h"
 #include "mapping/keyframes/keyframe_depth_map.h"
+#include "mapping/sweep/space_sweep.h"
 
 namespace efm {
+
+/// Writes the whole DSI to a NumPy file (.npy, format 1.0): float32, [plane][row][column]. Each
+/// plane goes to disk at once: memory is that of one plane.
+class NpyDsiFile : public DsiSink {
+ public:
+  /// @throws std::runtime_error naming the path where it cannot be created.
+  NpyDsiFile(const std::filesystem::path& path, int planes, const ReferenceView& view);
+
+  /// Thread-safe. Errors of the disk are kept for `finish`.
+  void addPlane(int plane, const float* values) override;
+  /// @return the complete file. Only its `replace` gives it its name; without that no file stays.
+  /// @throws std::runtime_error naming the path where it could not be written.
+  std::unique_ptr<AtomicFile> finish();
+
+ private:
+  std::unique_ptr<AtomicFile> target_;
+  std::streamoff plane_bytes_;
+  std::streamoff header_bytes_ = 0;
+  std::mutex mutex_;  // of file_
+  std::ofstream file_;
+};
+
+/// A run that has begun to write a folder and has no report.json yet.
+struct UnfinishedRun {
+  std::vector<std::string> recording;  ///< Its files.
+  pid_t process = 0;
+};
+
+/// The mark of an unfinished run in its folder: the file report.partial.json, with the content of
+/// UnfinishedRun. The run holds a lock on it, which ends with the process: so a run that was killed
+/// differs from one that is at work.
+class RunMark {
+ public:
+  static constexpr const char* kName = "report.partial.json";
+
+  /// Makes the mark of this process, instead of that of a killed one.
+  /// @throws std::runtime_error naming the folder where another run is at work in it, or the mark
+  /// cannot be made.
+  RunMark(const std::filesystem::path& folder, const std::vector<std::string>& recording);
+  /// Leaves the mark.
+  ~RunMark();
+  RunMark(const RunMark&) = delete;
+  RunMark& operator=(const RunMark&) = delete;
+
+  /// The mark of a killed run, if the folder has one.
+  /// @throws std::runtime_error naming the folder where another run is at work in it.
+  static std::optional<UnfinishedRun> ofKilledRun(const std::filesystem::path& folder);
+
+ private:
+  int file_ = -1;
+};
 
 /// Writes keyframes in a thread of its own, in order, beside the making of the next ones. At most
 /// one keyframe waits while another is written: memory stays bounded. After an error nothing more

@@ -20,7 +20,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "maps/io/point_cloud_file.h"
 #include "plugin/results/pictures/depth_picture.h"
-#include "plugin/results/pictures/height_colours.h"
+#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

@@ -16,7 +16,7 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/map_point.h"
-#include "plugin/results/output/run_mark.h"
+#include "plugin/results/output/keyframe_writer.h"
 
 namespace efm {
 

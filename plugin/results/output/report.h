@@ -1,21 +1,49 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Core>
+
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "mapping/geometry/reference_view.h"
+#include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/fusion_mapper.h"
+#include "maps/cloud/map_point.h"
 #include "plugin/options/option_file.h"
-#include "plugin/results/output/map_measures.h"
+#include "plugin/results/output/map_output.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/map_refinement.h"
 #include "plugin/session/session_status.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm {
+
+/// A box around points of a map, in metres, frame `world`.
+struct MapExtent {
+  Eigen::Vector3d min_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d max_m = Eigen::Vector3d::Zero();
+};
+
+/// @param outside the fraction of the points that lie outside, at each end of each axis; 0 for the
+/// box around all of them.
+/// @return nothing without points.
+std::optional<MapExtent> extentOf(const MapCloud& cloud, double outside = 0);
+
+/// How far the refinement moved the keyframes' poses.
+struct PoseShift {
+  double median_m = 0;
+  double max_m = 0;
+  double median_rad = 0;
+  double max_rad = 0;
+};
+
+/// @param before and `after`: poses of the same keyframes, in the same order.
+PoseShift shiftBetween(const std::vector<StampedPose>& before,
+                       const std::vector<StampedPose>& after);
 
 /// The counts, times and options of a run: the content of report.json.
 struct MapReport {
@@ -77,5 +105,12 @@ std::uint64_t peakMemoryBytes();
 
 /// Votes (used events times planes) over the sweep's seconds; 0 without a sweep.
 double votesPerSecond(const MapReport& report);
+
+/// The result of a run in plain words, for the user: a line per fact, under 20 lines. A fact that
+/// is not known or does not apply has no line.
+/// @param kind `kDepth`: of one keyframe.
+/// @param folder with the results.
+std::string summaryOf(const MapReport& report, OutputKind kind,
+                      const std::filesystem::path& folder);
 
 }  // namespace efm

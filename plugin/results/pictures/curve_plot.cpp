@@ -8,8 +8,6 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "plugin/results/pictures/plot_frame.h"
-
 namespace efm {
 namespace {
 

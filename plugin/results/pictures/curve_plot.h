@@ -2,13 +2,50 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "plugin/results/pictures/plot_axis.h"
-
 namespace efm {
+
+enum class AxisScale {
+  kLinear,
+  kLogarithmic,  ///< Shows values above 0 only.
+  kInverse,      ///< Linear in 1 / value: for depth. Shows values above 0 only.
+};
+
+/// The interval of an axis. `rangeAround` ensures that both ends are finite, that from < to, and
+/// that both are above 0 on a logarithmic or inverse axis.
+struct AxisRange {
+  double from = 0;
+  double to = 1;
+  AxisScale scale = AxisScale::kLinear;
+
+  /// The position of a value on the axis: 0 at `from`, 1 at `to`. NaN if the axis cannot show
+  /// the value.
+  double fractionAlong(double value) const;
+};
+
+/// The range of all values that an axis of this scale can show, with a margin of 4 % of its length
+/// at both ends (of its logarithm unless it is linear). Without a value: a range around 0, or
+/// around
+/// 1. With one
+/// value: a range around it.
+AxisRange rangeAround(const std::vector<double>& values, AxisScale scale);
+
+/// A mark on an axis.
+struct AxisTick {
+  double value = 0;
+  std::string text;
+};
+
+/// Round values inside the range. On a linear axis their spacing is 1, 2 or 5 times a power of ten.
+/// On a logarithmic axis they are the powers of ten; if these are few, also 2 and 5 times them; if
+/// even these are fewer than three, the ticks of a linear axis. On an inverse axis the roundest
+/// values that have space.
+/// @param max_ticks at least 2. A logarithmic axis may have one or two more.
+std::vector<AxisTick> ticksOf(const AxisRange& range, int max_ticks);
 
 enum class CurveStyle {
   kLine,
@@ -52,5 +89,41 @@ cv::Mat3b drawCurves(const CurvePlot& plot);
 /// Colour (BGR) of curve 0, 1, …: seven colours that colour-blind readers can distinguish (Okabe
 /// and Ito 2008), then the same again.
 cv::Vec3b curveColour(std::size_t index);
+
+/// The rectangle that curves are drawn in, and the values at its edges.
+struct PlotFrame {
+  cv::Rect area;  ///< Pixels of the picture.
+  AxisRange x;
+  AxisRange y;
+
+  /// The pixel of a point in the picture. NaN for a value that a logarithmic axis cannot show.
+  cv::Point2d pixelOf(const cv::Point2d& point) const {
+    return {area.x + x.fractionAlong(point.x) * (area.width - 1),
+            area.br().y - 1 - y.fractionAlong(point.y) * (area.height - 1)};
+  }
+};
+
+/// Computes the frame of a plot: the picture without its labels; the ends of the axes fit the
+/// curves.
+/// @throws std::invalid_argument naming the plot if an end of an axis does not fit.
+PlotFrame layOut(const CurvePlot& plot);
+
+/// Draws grid, axes, ticks, labels and title.
+void drawAxes(cv::Mat3b& picture, const CurvePlot& plot, const PlotFrame& frame);
+
+// What all parts of a plot share. Text is ASCII.
+
+inline constexpr int kPlotGap = 6;  ///< Pixels between two parts.
+inline constexpr double kPlotTextScale = 0.42;
+inline constexpr double kPlotTitleScale = 0.5;
+inline const cv::Scalar kPlotInk = cv::Scalar::all(40);    ///< Text and axes.
+inline const cv::Scalar kPlotGrid = cv::Scalar::all(225);  ///< Grid lines.
+
+/// Width and height of a text in pixels, with the parts of letters below the line.
+cv::Size plotTextSize(const std::string& text, double scale = kPlotTextScale);
+
+/// @param at the lower left corner of the text.
+void writeText(cv::Mat3b& picture, const std::string& text, cv::Point at,
+               double scale = kPlotTextScale);
 
 }  // namespace efm

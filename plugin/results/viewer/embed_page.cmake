@@ -8,6 +8,6 @@ foreach(name page.css data.js camera.js draw.js keyframes.js panel.js)
   string(REPLACE "<!-- ${name} -->" "${content}" html "${html}")
 endforeach()
 # One raw string: compilers must take 65536 characters, the page has some 50,000.
-file(WRITE "${OUT}" "#include \"plugin/results/viewer/page_source.h\"\n
+file(WRITE "${OUT}" "#include \"plugin/results/viewer/map_page.h\"\n
 const std::string_view efm::kPageSource =
     R\"page(${html})page\";\n")

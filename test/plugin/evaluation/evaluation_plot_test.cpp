@@ -8,7 +8,7 @@
 #include "plugin/evaluation/cloud_evaluation_plot.h"
 #include "plugin/evaluation/depth_evaluation_plot.h"
 #include "plugin/evaluation/trajectory_evaluation_plot.h"
-#include "plugin/results/pictures/value_picture.h"
+#include "plugin/results/pictures/depth_picture.h"
 #include "test/plugin/results/pictures/sketch.h"
 #include "test/plugin/temporary_folder.h"
 

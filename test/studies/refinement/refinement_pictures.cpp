@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "plugin/results/pictures/curve_plot.h"
-#include "plugin/results/pictures/picture_grid.h"
+#include "plugin/results/pictures/picture.h"
 #include "test/studies/figures/picture_grid.h"
 #include "test/studies/figures/top_view.h"
 

@@ -13,7 +13,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "mapping/base/atomic_file.h"
-#include "plugin/results/output/npy_file.h"
+#include "plugin/results/output/keyframe_writer.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/results/output/summary.h"
+#include "plugin/results/output/report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -7,8 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/results/pictures/palette.h"
-#include "plugin/results/pictures/value_picture.h"
+#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

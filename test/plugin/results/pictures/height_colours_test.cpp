@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/results/pictures/height_colours.h"
+#include "plugin/results/pictures/picture.h"
 
 #include <gtest/gtest.h>
 

@@ -7,9 +7,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "mapping/geometry/rigid3.h"
-#include "plugin/results/pictures/keyframe_sheet.h"
-#include "plugin/results/pictures/map_layout.h"
-#include "plugin/results/pictures/upward.h"
+#include "plugin/results/pictures/depth_picture.h"
+#include "plugin/results/pictures/picture.h"
 #include "test/plugin/results/pictures/sketch.h"
 
 namespace efm {

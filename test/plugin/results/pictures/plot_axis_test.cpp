@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/results/pictures/plot_axis.h"
+#include "plugin/results/pictures/curve_plot.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

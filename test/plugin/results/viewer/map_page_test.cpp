@@ -15,7 +15,6 @@
 #include <sstream>
 
 #include "plugin/results/pictures/depth_picture.h"
-#include "plugin/results/viewer/base64.h"
 
 namespace efm {
 namespace {
