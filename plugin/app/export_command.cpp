@@ -15,7 +15,6 @@
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/writers/folder_writer.h"
 #include "plugin/recordings/writers/mcap_writer.h"

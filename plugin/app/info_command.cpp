@@ -18,7 +18,7 @@
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/app/system_info.h"
-#include "plugin/mrpt/session_feed.h"
+#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/session/health_checks.h"

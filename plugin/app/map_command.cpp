@@ -25,7 +25,7 @@
 #include "plugin/app/observed_statistics.h"
 #include "plugin/app/output_checks.h"
 #include "plugin/app/recording_survey.h"
-#include "plugin/mrpt/window/map_frames.h"
+#include "plugin/mrpt/window/map_scene.h"
 #include "plugin/mrpt/window/map_window.h"
 #include "plugin/results/output/keyframe_writer.h"
 #include "plugin/results/output/map_output.h"

@@ -21,7 +21,7 @@
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/session_status.h"
 

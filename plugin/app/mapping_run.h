@@ -11,7 +11,7 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/app/progress.h"
-#include "plugin/mrpt/window/watched_map.h"
+#include "plugin/mrpt/window/map_window.h"
 #include "plugin/options/option_file.h"
 #include "plugin/recordings/open/recording.h"
 #include "plugin/results/output/report.h"

@@ -7,7 +7,6 @@
 
 #include "plugin/app/exit_status.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
 
 namespace efm {

@@ -5,7 +5,7 @@
 
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
-#include "plugin/mrpt/session_feed.h"
+#include "plugin/mrpt/hosted_mapping.h"
 
 namespace efm {
 

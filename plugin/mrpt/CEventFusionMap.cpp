@@ -3,30 +3,138 @@
 
 #include <fmt/format.h>
 #include <mrpt/img/color_maps.h>
+#include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/opengl/CPointCloudColoured.h>
 #include <mrpt/opengl/CSetOfObjects.h>
 #include <mrpt/poses/CPose3D.h>
+#include <mrpt/poses/CPose3DPDFGaussian.h>
 #include <mrpt/serialization/CArchive.h>
 #include <mrpt/serialization/stl_serialization.h>
 #include <mrpt/system/COutputLogger.h>
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <ostream>
 #include <stdexcept>
+#include <string>
 #include <string_view>
 #include <utility>
 
 #include "maps/io/point_cloud_file.h"
 #include "plugin/mrpt/host_options.h"
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/points_map.h"
+#include "plugin/mrpt/pose_observation.h"
 
 MAP_DEFINITION_REGISTER("efm::CEventFusionMap,eventFusionMap", efm::CEventFusionMap)
 
 IMPLEMENTS_SERIALIZABLE(CEventFusionMap, CMetricMap, efm)
 
 namespace efm {
+
+mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const MapCloud& cloud) {
+  auto map = mrpt::maps::CPointsMapXYZI::Create();
+  map->resize(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Eigen::Vector3f p_world = positionIn(cloud, cloud[i]).cast<float>();
+    map->setPointFast(i, p_world.x(), p_world.y(), p_world.z());
+    map->setPointIntensity(i, cloud[i].intensity);
+  }
+  map->mark_as_modified();
+  return map;
+}
+
+std::optional<std::string> roundingWarning(const MapCloud& cloud, double voxel_size_m) {
+  const auto step_m = coarseStepOf(cloud, voxel_size_m);
+  if (!step_m) return std::nullopt;
+  return fmt::format(
+      "MRPT's maps have float points, whose steps at the map's coordinates are {:.2g} m, over a "
+      "tenth of a voxel of {:g} m: let poses begin nearer to the origin of the world",
+      *step_m, voxel_size_m);
+}
+
+using mrpt::maps::CPointsMapXYZI;
+using mrpt::obs::CObservationPointCloud;
+
+StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
+                              const std::vector<ViewPoint>& points) {
+  auto cloud = CPointsMapXYZI::Create();
+  cloud->resize(points.size());
+  std::vector<float> sigma(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f& p_ref = points[i].p_ref;
+    cloud->setPointFast(i, p_ref.x(), p_ref.y(), p_ref.z());
+    cloud->setPointIntensity(i, points[i].confidence);
+    sigma[i] = points[i].sigma;
+  }
+  cloud->mark_as_modified();
+  return {keyframe.window.t_ref_ns, keyframe.T_world_ref, std::move(cloud),
+          std::make_shared<std::vector<float>>(std::move(sigma))};
+}
+
+std::vector<ViewPoint> viewPointsOf(const StoredKeyframe& keyframe) {
+  const CPointsMapXYZI& cloud = *keyframe.points;
+  const auto& x = cloud.getPointsBufferRef_x();
+  const auto& y = cloud.getPointsBufferRef_y();
+  const auto& z = cloud.getPointsBufferRef_z();
+  const auto& confidence = cloud.getPointsBufferRef_intensity();
+  std::vector<ViewPoint> points;
+  points.reserve(cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (confidence[i] == 0) continue;
+    points.push_back({{x[i], y[i], z[i]}, confidence[i]});
+    if (keyframe.sigma) points.back().sigma = keyframe.sigma->at(i);
+  }
+  return points;
+}
+
+std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe) {
+  return pointsInWorld(viewPointsOf(keyframe), keyframe.T_world_ref);
+}
+
+std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,
+                                           const Rigid3& T_world_rig) {
+  const auto* seen = dynamic_cast<const CObservationPointCloud*>(&observation);
+  if (!seen) return std::nullopt;
+  seen->load();  // its points may be in an external file
+  const auto cloud = std::dynamic_pointer_cast<CPointsMapXYZI>(seen->pointcloud);
+  if (!cloud) return std::nullopt;
+  const std::int64_t t_ns =
+      seen->timestamp == INVALID_TIMESTAMP ? 0 : nanosecondsFrom(seen->timestamp);
+  return StoredKeyframe{t_ns, T_world_rig * rigidFrom(seen->sensorPose), cloud};
+}
+
+void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe) {
+  auto observation = CObservationPointCloud::Create();
+  observation->sensorLabel = "keyframe";
+  observation->timestamp = mrptTimeFrom(keyframe.t_ref_ns);
+  observation->pointcloud = keyframe.points;
+  auto frame = mrpt::obs::CSensoryFrame::Create();
+  frame->insert(observation);
+  auto pose = mrpt::poses::CPose3DPDFGaussian::Create();
+  pose->mean = mrptPoseFrom(keyframe.T_world_ref);
+  map.insert(pose, frame);
+}
+
+std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map) {
+  std::vector<StoredKeyframe> keyframes;
+  std::size_t index = 0;
+  for (const auto& [pose, frame] : map) {
+    const Rigid3 T_world_rig = rigidFrom(pose->getMeanVal());
+    const std::size_t before = keyframes.size();
+    for (const mrpt::obs::CObservation::Ptr& observation : *frame) {
+      if (auto keyframe = keyframeFrom(*observation, T_world_rig)) keyframes.push_back(*keyframe);
+    }
+    if (keyframes.size() == before) {
+      throw std::invalid_argument(
+          fmt::format("frame {} of the simplemap holds no point cloud with intensities: it is no "
+                      "keyframe of a map",
+                      index));
+    }
+    ++index;
+  }
+  return keyframes;
+}
+
 namespace {
 
 /// MRPT reads these keys for every map, from a section of its own.
@@ -66,7 +174,6 @@ void readSigma(mrpt::serialization::CArchive& in, StoredKeyframe& keyframe) {
 
 }  // namespace
 
-using mrpt::maps::CPointsMapXYZI;
 using mrpt::maps::CSimplePointsMap;
 using mrpt::serialization::CArchive;
 

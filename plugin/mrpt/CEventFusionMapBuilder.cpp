@@ -15,14 +15,10 @@
 #include "mapping/base/atomic_file.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/exception_of.h"
 #include "plugin/mrpt/host_options.h"
+#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/mrpt/live_mapping.h"
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/mrpt_time.h"
-#include "plugin/mrpt/playback_mapping.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/mrpt/session_feed.h"
 #include "plugin/results/pictures/depth_picture.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)

@@ -16,10 +16,8 @@
 
 #include "maps/cloud/map_point.h"
 #include "plugin/mrpt/CEventFusionMap.h"
-#include "plugin/mrpt/dead_reckoning.h"
 #include "plugin/mrpt/hosted_mapping.h"
-#include "plugin/mrpt/stored_keyframe.h"
-#include "plugin/mrpt/tracker_poses.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/options/option_file.h"
 #include "plugin/session/mapping_session.h"
 
@@ -146,7 +144,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void processActionObservation(mrpt::obs::CActionCollection& action,
                                 mrpt::obs::CSensoryFrame& observations) override;
   /// One entry per keyframe: the pose of its reference view and a frame with its cloud; see
-  /// `insertInto` in plugin/mrpt/stored_keyframe.h. The builder shares the frames and their
+  /// `insertInto` in plugin/mrpt/CEventFusionMap.h. The builder shares the frames and their
   /// clouds: do not change them.
   void getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const override;
   /// The number of keyframes.

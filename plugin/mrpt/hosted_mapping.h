@@ -3,21 +3,48 @@
 
 #include <mrpt/maps/CMultiMetricMap.h>
 #include <mrpt/maps/CSimpleMap.h>
+#include <mrpt/obs/CObservation.h>
 #include <mrpt/poses/CPose3DPDF.h>
+#include <opencv2/core.hpp>
 
+#include <exception>
 #include <functional>
 #include <memory>
-#include <opencv2/core.hpp>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "maps/cloud/map_point.h"
+#include "plugin/mrpt/CEventFusionMap.h"
+#include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
+#include "plugin/session/recording_survey.h"
 
 namespace efm {
+
+/// The exception of a step; null if it throws none.
+template <typename Step>
+std::exception_ptr exceptionOf(const Step& step) {
+  try {
+    step();
+  } catch (...) {
+    return std::current_exception();
+  }
+  return nullptr;
+}
+
+/// The events of an observation, with their camera.
+CameraPacket packetOf(const CObservationEvents& observation);
+
+/// Adds the events or the pose of an observation to a survey: T_world_rig = T_world_body *
+/// T_body_rig, with the options' T_body_rig if they have one. Ignores other observations.
+/// @throws std::exception where the survey does, or where the pose is not valid.
+void addTo(RecordingSurveyor& surveyor, const mrpt::obs::CObservation& observation);
 
 /// A keyframe of a simplemap. Shared with those who asked for the map: never changed.
 struct SimpleMapFrame {
@@ -90,5 +117,65 @@ class HostedMapping {
 
 /// Logs the automatic options and why. Where no scene was found, as a warning.
 void tellChoice(const SessionStatus& status, const HostedMapping::Callbacks& callbacks);
+
+/// Maps in the thread that adds the input: a call returns after the windows that became complete
+/// are mapped. One mutex is held while a keyframe is made, and not while it is delivered.
+///
+/// If mapping fails (no memory, a sink that throws), the caller who adds input gets the error, and
+/// so does each later one until mapping succeeds. Of two errors, the first is thrown.
+class PlaybackMapping : public HostedMapping {
+ public:
+  /// @param earlier keyframes of an initial map.
+  /// @throws std::runtime_error naming a file of the options that cannot be read.
+  PlaybackMapping(const EventFusionOptions& options, std::vector<StoredKeyframe> earlier,
+                  Callbacks callbacks);
+
+  void addEvents(CameraPacket packet) override;
+  void skipEvents(const CameraPacket& packet) override;
+  void addPose(const QueuedPose& pose) override;
+  /// Input afterwards is an error (std::logic_error).
+  void finish() override;
+  void stop() override;
+
+  void setSink(DsiSink* sink) override;
+  void setClock(ProcessorClock clock) override;
+
+  std::optional<Rigid3> T_body_rig() const override { return session_.setup().T_body_rig; }
+  SessionStatus status() const override;
+  MapCloud::ConstPtr points() override;
+  KeyframePoses keyframePoses() override;
+  std::size_t simpleMapSize() const override;
+  void copyTo(mrpt::maps::CSimpleMap& map) override;
+  /// A CEventFusionMap, and its exported points as a CPointsMapXYZI.
+  const mrpt::maps::CMultiMetricMap* metricMap() override;
+  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const override;
+
+ private:
+  void advance(const std::function<void()>& feed);
+  void mapComplete();
+  void tellChoice();
+  std::optional<KeyframeDepthMap> mapNext();
+  void deliver(const KeyframeDepthMap& keyframe);
+  void applyPending();
+  void updateMetricMap(std::optional<std::string>& warning);
+  void followRefinement();
+
+  const GlobalCloudOptions cloud_options_;
+  const Callbacks callbacks_;
+
+  mutable std::mutex mutex_;  // protects all members below
+  MappingSession session_;
+  DsiSink* sink_ = nullptr;
+  ProcessorClock clock_ = processSeconds;
+  bool finished_ = false;
+  bool stopped_ = false;
+  std::uint64_t told_choices_ = 0;
+  std::vector<StoredKeyframe> keyframes_;  // the initial map's first
+  cv::Mat1f newest_depth_;
+  std::set<std::thread::id> delivering_;  // threads within a callback
+  mrpt::maps::CMultiMetricMap metric_map_;
+  CEventFusionMap::Ptr event_map_;  // in metric_map_
+  bool warned_of_rounding_ = false;
+};
 
 }  // namespace efm

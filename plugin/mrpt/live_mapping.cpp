@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/points_map.h"
+#include "plugin/mrpt/CEventFusionMap.h"
+#include "plugin/mrpt/pose_observation.h"
 
 namespace efm {
 namespace {

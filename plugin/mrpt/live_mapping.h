@@ -18,8 +18,8 @@
 #include <thread>
 #include <vector>
 
+#include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/hosted_mapping.h"
-#include "plugin/mrpt/stored_keyframe.h"
 #include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
 

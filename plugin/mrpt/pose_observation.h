@@ -1,15 +1,77 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <mrpt/core/Clock.h>
+#include <mrpt/obs/CActionCollection.h>
 #include <mrpt/obs/CObservation.h>
+#include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/poses/CPose3DPDFGaussian.h>
 
+#include <cstdint>
+#include <limits>
+#include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
+#include "mapping/geometry/rigid3.h"
+#include "maps/refinement/pose_refinement.h"
 #include "maps/refinement/tracker_model.h"
 #include "plugin/session/pose_source_selector.h"
 
 namespace efm {
+
+/// MRPT's clock counts ticks of 100 ns since 1601. The recording's clock counts as Unix time.
+inline constexpr std::int64_t kMrptTickNs = 100;
+inline constexpr std::int64_t kMrptTicksAtUnixEpoch = 116'444'736'000'000'000;
+
+/// The nearest tick, at most 50 ns away.
+inline mrpt::Clock::time_point mrptTimeFrom(std::int64_t t_ns) {
+  std::int64_t ticks = t_ns / kMrptTickNs;
+  const std::int64_t rest_ns = t_ns % kMrptTickNs;
+  if (2 * rest_ns >= kMrptTickNs) ++ticks;
+  if (2 * rest_ns < -kMrptTickNs) --ticks;
+  return mrpt::Clock::time_point(mrpt::Clock::duration(ticks + kMrptTicksAtUnixEpoch));
+}
+
+/// Exact. @return nothing for INVALID_TIMESTAMP (0 ticks) and outside the range of nanoseconds:
+/// before 1677 or after 2262.
+inline std::optional<std::int64_t> nanosecondsIfKnown(const mrpt::Clock::time_point& time) {
+  constexpr std::int64_t kMaxTicks = std::numeric_limits<std::int64_t>::max() / kMrptTickNs;
+  const std::int64_t ticks = time.time_since_epoch().count();
+  if (ticks < kMrptTicksAtUnixEpoch - kMaxTicks || ticks > kMrptTicksAtUnixEpoch + kMaxTicks) {
+    return std::nullopt;
+  }
+  return (ticks - kMrptTicksAtUnixEpoch) * kMrptTickNs;
+}
+
+/// Exact. @throws std::invalid_argument if `nanosecondsIfKnown` returns nothing.
+inline std::int64_t nanosecondsFrom(const mrpt::Clock::time_point& time) {
+  const std::optional<std::int64_t> t_ns = nanosecondsIfKnown(time);
+  if (!t_ns) throw std::invalid_argument("a time stamp is missing or not between 1678 and 2261");
+  return *t_ns;
+}
+
+}  // namespace efm
+
+namespace mrpt::poses {
+
+class CPose3D;
+class CPose3DPDFGaussian;
+
+}  // namespace mrpt::poses
+
+namespace efm {
+
+/// Converts to and from MRPT's poses, exact to about 1e-15 at any rotation: through MRPT's rotation
+/// matrix and quaternion, not through its angles.
+Rigid3 rigidFrom(const mrpt::poses::CPose3D& pose);
+mrpt::poses::CPose3D mrptPoseFrom(const Rigid3& T_a_b);
+
+/// A pose with covariance. MRPT's covariance is of x, y, z, yaw, pitch and roll.
+/// @param covariance of a small motion of the pose: a translation along the axes of a, then a
+/// rotation vector about them, as `poseCovariance` returns it.
+mrpt::poses::CPose3DPDFGaussian mrptPoseFrom(const Rigid3& T_a_b, const Matrix6d& covariance);
 
 /// The pose of an observation.
 struct ObservedPose {
@@ -36,5 +98,49 @@ mrpt::obs::CObservation::Ptr poseObservation(const ObservedPose& pose, const std
 /// Replaces the pose of the rig on the tracked body. CObservationOdometry has none and stays as it
 /// is.
 void setBodyToRig(mrpt::obs::CObservation& pose, const Rigid3& T_body_rig);
+
+/// The label of poses that are composed from actions; see `poseSourceOf`.
+inline constexpr const char* kActionsLabel = "actions";
+
+/// Composes the movements of actions to a pose, starting at the identity.
+class DeadReckoning {
+ public:
+  /// Adds the mean pose change of the first CActionRobotMovement2D or 3D. Other actions have no
+  /// effect.
+  /// @param frame the observations after the movement. Its time is used if the movement has none.
+  /// @return the pose after the movement, a CObservationRobotPose labelled "actions"; null without
+  /// a movement.
+  /// @throws std::invalid_argument if neither has a time.
+  mrpt::obs::CObservation::Ptr poseAfter(const mrpt::obs::CActionCollection& action,
+                                         const mrpt::obs::CSensoryFrame& frame);
+
+ private:
+  Rigid3 T_world_body_;
+};
+
+/// T_world_rig of an observed pose: T_world_body * T_body_rig, with the options' T_body_rig if they
+/// have one.
+Rigid3 rigPose(const ObservedPose& observed, const std::optional<Rigid3>& T_body_rig);
+
+/// The newest pose of the rig from each source, with the covariance that the tracker states.
+class TrackerPoses {
+ public:
+  /// @param observation a pose, with the content `observed`.
+  void add(const mrpt::obs::CObservation& observation, const ObservedPose& observed,
+           const Rigid3& T_world_rig);
+  /// @param selected the source that is used; before it is selected, the first one with poses in
+  /// the
+  ///   world counts.
+  /// @return null before its first pose.
+  const mrpt::poses::CPose3DPDFGaussian* newest(const std::optional<PoseSourceId>& selected) const;
+  void clear() { newest_.clear(); }
+
+ private:
+  struct Newest {
+    std::int64_t t_ns = 0;
+    mrpt::poses::CPose3DPDFGaussian pose;
+  };
+  std::map<PoseSourceId, Newest> newest_;
+};
 
 }  // namespace efm

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
 #include "plugin/recordings/open/open_recording.h"
 

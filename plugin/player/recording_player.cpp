@@ -10,7 +10,6 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_time.h"
 #include "plugin/mrpt/pose_observation.h"
 
 namespace efm {

@@ -24,7 +24,7 @@
 #include "maps/io/point_cloud_file.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/options/option_file.h"
 #include "plugin/recordings/open/open_recording.h"
 

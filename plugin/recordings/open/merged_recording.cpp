@@ -9,8 +9,7 @@
 #include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 
 namespace efm {
 MergedRecording::MergedRecording(Rig rig, std::vector<EventPackets> cameras,

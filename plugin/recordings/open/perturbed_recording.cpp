@@ -8,8 +8,6 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/mrpt_time.h"
 #include "plugin/mrpt/pose_observation.h"
 
 namespace efm {

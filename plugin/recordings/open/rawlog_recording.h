@@ -4,7 +4,7 @@
 #include <deque>
 #include <filesystem>
 
-#include "plugin/mrpt/dead_reckoning.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/open/gz_stream.h"
 #include "plugin/recordings/open/recording.h"
 

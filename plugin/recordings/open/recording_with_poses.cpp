@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "plugin/mrpt/mrpt_time.h"
 #include "plugin/mrpt/pose_observation.h"
 
 namespace efm {

@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "plugin/mrpt/mrpt_pose.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 

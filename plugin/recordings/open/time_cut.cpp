@@ -6,7 +6,6 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/fusion_mapper.h"
-#include "plugin/mrpt/mrpt_time.h"
 #include "plugin/mrpt/pose_observation.h"
 
 namespace efm {

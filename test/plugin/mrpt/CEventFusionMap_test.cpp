@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/CEventFusionMap.h"
-#include "plugin/mrpt/points_map.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,7 +15,7 @@
 
 #include <random>
 
-#include "plugin/mrpt/mrpt_pose.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"

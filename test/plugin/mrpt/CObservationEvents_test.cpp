@@ -11,8 +11,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/event_encoding.h"
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
 #include "test/plugin/message_of.h"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/mrpt/dead_reckoning.h"
+#include "plugin/mrpt/pose_observation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,9 +12,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "plugin/mrpt/mrpt_time.h"
-#include "plugin/mrpt/pose_observation.h"
-#include "plugin/mrpt/tracker_poses.h"
 #include "test/plugin/message_of.h"
 
 namespace efm {

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/mrpt/event_drawing.h"
+#include "plugin/mrpt/CObservationEvents.h"
 
 #include <gtest/gtest.h>
 #include <mrpt/opengl/CPointCloudColoured.h>
 #include <mrpt/opengl/CSetOfLines.h>
 #include <mrpt/opengl/CSetOfObjects.h>
-
-#include "plugin/mrpt/CObservationEvents.h"
 
 namespace efm {
 namespace {

@@ -13,13 +13,13 @@
 #include <random>
 #include <stdexcept>
 
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 
 namespace efm {
 namespace {
 
-// --- mrpt_time.h -------------------------------------------------------------------------------
+// --- pose_observation.h
+// -------------------------------------------------------------------------------
 
 TEST(MrptTime, ZeroIsTheBeginningOf1970) {
   EXPECT_EQ(mrpt::system::dateTimeToString(mrptTimeFrom(0)), "1970/01/01,00:00:00.000000");
@@ -46,7 +46,8 @@ TEST(MrptTime, AMissingTimeAndATimeOutOfRangeAreErrors) {
   }
 }
 
-// --- mrpt_pose.h -------------------------------------------------------------------------------
+// --- pose_observation.h
+// -------------------------------------------------------------------------------
 
 double angleBetween(const Rigid3& a, const Rigid3& b) {
   return 2 * (a.rotation.conjugate() * b.rotation).vec().norm();

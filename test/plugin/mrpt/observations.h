@@ -8,8 +8,7 @@
 
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_pose.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "test/maps/cloud/cloud_points.h"
 #include "test/plugin/session/synthetic_recording.h"
 

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/mrpt_time.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/open/rawlog_writer.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
