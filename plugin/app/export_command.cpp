@@ -16,8 +16,8 @@
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/writers/folder_writer.h"
 #include "plugin/recordings/writers/mcap_writer.h"
+#include "plugin/recordings/writers/recording_writer.h"
 #ifdef EFM_WITH_HDF5
 #include "plugin/recordings/writers/hdf5_writer.h"
 #endif

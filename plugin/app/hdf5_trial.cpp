@@ -13,7 +13,6 @@
 #include <thread>
 
 #include "plugin/recordings/columns/hdf5_files.h"
-#include "plugin/recordings/columns/hdf5_recording.h"
 
 namespace efm {
 

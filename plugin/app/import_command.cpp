@@ -21,8 +21,7 @@
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/recordings/open/rawlog_signature.h"
-#include "plugin/recordings/open/rawlog_writer.h"
+#include "plugin/recordings/open/rawlog.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/session_status.h"
 

@@ -6,7 +6,7 @@
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/recordings/open/rawlog_writer.h"
+#include "plugin/recordings/open/rawlog.h"
 
 namespace efm {
 

@@ -13,7 +13,7 @@
 #include "plugin/app/progress.h"
 #include "plugin/mrpt/window/map_window.h"
 #include "plugin/options/option_file.h"
-#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/open/merged_recording.h"
 #include "plugin/results/output/report.h"
 
 namespace efm {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "plugin/app/mapping_run.h"
-#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/open/merged_recording.h"
 #include "plugin/session/recording_survey.h"
 
 namespace efm {

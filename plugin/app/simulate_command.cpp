@@ -14,7 +14,7 @@
 #include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/progress.h"
-#include "plugin/recordings/calibration/camchain.h"
+#include "plugin/recordings/calibration/calibration_formats.h"
 #include "tracking_stub/presets/presets.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 #include "tracking_stub/sensor/simulated_rig.h"

@@ -9,7 +9,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/argument_checks.h"
 #include "plugin/options/tracker_fault_keys.h"
-#include "plugin/recordings/streams/number_checks.h"
+#include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {
 namespace {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mapping/geometry/rig.h"
-#include "plugin/recordings/calibration/camchain.h"
+#include "plugin/recordings/calibration/calibration_formats.h"
 
 namespace efm {
 namespace {

@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/open/merged_recording.h"
 
 namespace efm {
 

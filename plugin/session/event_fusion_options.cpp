@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "mapping/base/named_choice.h"
-#include "plugin/recordings/calibration/hand_eye_file.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 
 namespace efm {
 

@@ -16,7 +16,7 @@
 
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/recordings/open/rawlog_writer.h"
+#include "plugin/recordings/open/rawlog.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"

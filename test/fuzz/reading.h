@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/recordings/streams/event_stream.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 /// What the harnesses share.
 namespace efm::fuzz {

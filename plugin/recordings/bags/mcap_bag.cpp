@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/bags/mcap_bag.h"
+#include "plugin/recordings/bags/bag_source.h"
 
 #include <fmt/format.h>
 #include <zlib.h>
@@ -16,7 +16,6 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_chunks.h"
-#include "plugin/recordings/bags/mcap_format.h"
 
 namespace efm {
 namespace {

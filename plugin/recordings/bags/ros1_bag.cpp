@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/bags/ros1_bag.h"
+#include "plugin/recordings/bags/bag_source.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/bags/ros2_db3.h"
+#include "plugin/recordings/bags/bag_source.h"
 
 #include <fmt/format.h>
 #include <sqlite3.h>

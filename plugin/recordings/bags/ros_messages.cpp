@@ -14,7 +14,7 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/streams/number_checks.h"
+#include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/columns/evimo2.h"
+#include "plugin/recordings/columns/event_arrays.h"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,7 @@
 #include <utility>
 
 #include "mapping/geometry/trajectory.h"
-#include "plugin/recordings/columns/array_events.h"
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

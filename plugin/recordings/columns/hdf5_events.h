@@ -9,9 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/recordings/columns/hdf5_column.h"
 #include "plugin/recordings/columns/hdf5_file.h"
-#include "plugin/recordings/streams/event_stream.h"
 #include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {

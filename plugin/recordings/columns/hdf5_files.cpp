@@ -7,7 +7,7 @@
 #include <system_error>
 #include <utility>
 
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/columns/hdf5_recording.h"
+#include "plugin/recordings/columns/hdf5_files.h"
 
 #include <fmt/format.h>
 
@@ -17,8 +17,6 @@
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/columns/hdf5_events.h"
-#include "plugin/recordings/columns/hdf5_files.h"
-#include "plugin/recordings/streams/number_checks.h"
 #include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_columns.h"

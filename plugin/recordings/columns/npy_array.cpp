@@ -9,7 +9,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "plugin/recordings/streams/number_checks.h"
 #include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {

@@ -10,8 +10,67 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 
 namespace efm {
+
+RigOverrideRecording::RigOverrideRecording(std::unique_ptr<Recording> recording, RigSetup setup)
+    : recording_(std::move(recording)), setup_(std::move(setup)) {}
+
+mrpt::obs::CObservation::Ptr RigOverrideRecording::next() {
+  mrpt::obs::CObservation::Ptr observation = recording_->next();
+  if (!observation) {
+    if (setup_.calibration && !cameras_.empty())
+      setup_.calibration->requireCameras(cameras_.size());
+  } else if (const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
+    cameras_.insert(packet->camera_index);
+    if (setup_.calibration) {
+      const RigCamera camera = setup_.calibration->camera(
+          static_cast<std::size_t>(packet->camera_index), knownSize(packet->camera));
+      packet->camera = camera.model;
+      packet->camera_pose = mrptPoseFrom(camera.T_rig_cam);
+      packet->time_offset_ns = camera.time_offset_ns;
+    }
+  } else if (setup_.T_body_rig && poseSourceOf(*observation)) {
+    setBodyToRig(*observation, *setup_.T_body_rig);
+  }
+  return observation;
+}
+
+RecordingWithPoses::RecordingWithPoses(std::unique_ptr<Recording> recording,
+                                       std::vector<StampedPose> poses, std::string damage)
+    : recording_(std::move(recording)), poses_(std::move(poses)), damage_(std::move(damage)) {
+  std::stable_sort(poses_.begin(), poses_.end(),
+                   [](const StampedPose& a, const StampedPose& b) { return a.t_ns < b.t_ns; });
+}
+
+mrpt::obs::CObservation::Ptr RecordingWithPoses::next() {
+  readAhead();
+  const bool poses_left = next_pose_ < poses_.size();
+  if (poses_left && (ended_ || mrptTimeFrom(poses_[next_pose_].t_ns) <= ahead_->timestamp)) {
+    position_ = "the poses";
+    const StampedPose& pose = poses_[next_pose_++];
+    return poseObservation({pose.t_ns, pose.T_world_rig, {}}, "pose");
+  }
+  if (error_) std::rethrow_exception(error_);
+  if (ended_ && !damage_.empty()) throw std::runtime_error(damage_);
+  if (ended_) return nullptr;
+  position_ = recording_->position();
+  return std::exchange(ahead_, nullptr);
+}
+
+void RecordingWithPoses::readAhead() {
+  while (!ahead_ && !ended_) {
+    try {
+      ahead_ = recording_->next();
+    } catch (const std::exception&) {
+      error_ = std::current_exception();
+    }
+    ended_ = ahead_ == nullptr;
+    if (ahead_ && poseSourceOf(*ahead_)) ahead_ = nullptr;
+  }
+}
+
 MergedRecording::MergedRecording(Rig rig, std::vector<EventPackets> cameras,
                                  std::uint64_t skip_bad_events)
     : rig_(std::move(rig)),

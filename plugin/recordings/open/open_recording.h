@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/open/merged_recording.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "plugin/recordings/streams/recording_parts.h"
 #include "tracking_stub/faults/tracker_faults.h"

@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/open/merged_recording.h"
 #include "plugin/session/pose_source_selector.h"
 #include "tracking_stub/faults/tracker_faults.h"
 

@@ -11,9 +11,8 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/columns/npy_array.h"
-#include "plugin/recordings/open/pose_file.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/file_content.h"
-#include "plugin/recordings/streams/number_checks.h"
 #include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/open/pose_file.h"
+#include "plugin/recordings/open/recording_formats.h"
 
 #include <fmt/format.h>
 
@@ -8,10 +8,8 @@
 #include <system_error>
 
 #include "plugin/recordings/columns/event_arrays.h"
-#include "plugin/recordings/open/recording_formats.h"
-#include "plugin/recordings/open/unread_formats.h"
 #include "plugin/recordings/streams/file_content.h"
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/pose_text.h"
 
 namespace efm {

@@ -1,21 +1,228 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/recordings/open/recording_formats.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <exception>
+#include <fstream>
 #include <stdexcept>
+#include <string_view>
+#include <vector>
 
 #include "plugin/recordings/bags/bag_recording.h"
 #include "plugin/recordings/columns/event_arrays.h"
-#include "plugin/recordings/columns/evimo2.h"
 #include "plugin/recordings/columns/hdf5_files.h"
-#include "plugin/recordings/columns/hdf5_recording.h"
 #include "plugin/recordings/sensors/aedat4.h"
 #include "plugin/recordings/sensors/prophesee_raw.h"
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_text.h"
-#include "plugin/recordings/text/uzh_text.h"
 
 namespace efm {
+namespace {
+
+namespace fs = std::filesystem;
+using std::string_view_literals::operator""sv;
+
+constexpr std::size_t kBeginning = 512;  // a tar archive's magic is at byte 257
+
+constexpr const char* kOwnResult =
+    "expected a recording; `event-fusion view` shows a map, `event-fusion evaluate` compares it "
+    "with "
+    "the truth";
+
+struct UnreadFormat {
+  std::string_view magic;
+  const char* name;
+  const char* instead;
+  std::size_t at = 0;  // the byte at which the magic begins
+};
+
+constexpr std::string_view kBagDescription = "rosbag2_bagfile_information";
+
+constexpr const char* kUnpack = "unpack it, and give the recording in it";
+constexpr const char* kNoEvents = "expected events; pictures and videos have none";
+constexpr const char* kAsText = "write its events as text, a line t x y p each, or as HDF5";
+constexpr const char* kIncomplete = "copy or download it again";
+constexpr const char* kConvert = "convert it to AEDAT4, or to text, a line t x y p each";
+
+constexpr UnreadFormat kUnreadFormats[] = {
+    {"version https://git-lfs"sv, "a pointer of git-LFS, not the file itself", "run git lfs pull"},
+    {"% Data file"sv, "a DAT file of Prophesee",
+     "give the RAW file, or convert it to HDF5 with Metavision's tools"},
+    {"% "sv, "a file of Prophesee without a line '% evt 3.0' (or 2.0, 2.1) in its header",
+     "the encoding of its events is not known; give the RAW file as it was recorded"},
+    {"Event Stream"sv, "an Event Stream file (.es)",
+     "it is not read; save the t, x, y and on that the Python package event_stream reads as a "
+     "NumPy array, and give --time-unit us"},
+    {"#!AER-DAT1"sv, "an AEDAT 1 file", kConvert},
+    {"#!AER-DAT2"sv, "an AEDAT 2 file", kConvert},
+    {"#!AER-DAT3"sv, "an AEDAT 3 file", kConvert},
+    {"\xd4\xc3\xb2\xa1"sv, "a network capture (PCAP)", "expected events"},
+    {"\xa1\xb2\xc3\xd4"sv, "a network capture (PCAP)", "expected events"},
+    {"\x4d\x3c\xb2\xa1"sv, "a network capture (PCAP)", "expected events"},
+    {"\x0a\x0d\x0d\x0a"sv, "a network capture (PCAPNG)", "expected events"},
+    {"\x89PNG\r\n"sv, "a PNG picture", kNoEvents},
+    {"\xff\xd8\xff"sv, "a JPEG picture", kNoEvents},
+    {"II*\0"sv, "a TIFF picture", kNoEvents},
+    {"MM\0*"sv, "a TIFF picture", kNoEvents},
+    {"AVI "sv, "an AVI video", kNoEvents, 8},
+    {"ftyp"sv, "an MP4 video", kNoEvents, 4},
+    {"\x1a\x45\xdf\xa3"sv, "a Matroska video", kNoEvents},
+    {"7z\xbc\xaf\x27\x1c"sv, "a 7z archive", kUnpack},
+    {"Rar!\x1a\x07"sv, "a RAR archive", kUnpack},
+    {"PK\x03\x04"sv, "a zip archive", kUnpack},
+    {"ustar"sv, "a tar archive", kUnpack, 257},
+    {"PAR1"sv, "a Parquet file", kAsText},
+    {"MATLAB 5.0"sv, "a MATLAB file", kAsText},
+    {"MATLAB 7.3"sv, "a MATLAB file", kAsText},
+    {"\x80\x02"sv, "a pickle of Python objects", kAsText},
+    {"\x80\x03"sv, "a pickle of Python objects", kAsText},
+    {"\x80\x04"sv, "a pickle of Python objects", kAsText},
+    {"\x80\x05"sv, "a pickle of Python objects", kAsText},
+    {"\x7f\x45LF"sv, "a program (ELF)", "expected a recording"},
+    {"%PDF-"sv, "a PDF document", "expected a recording"},
+    {"ply\n"sv, "a point cloud (PLY)", kOwnResult},
+    {"# .PCD"sv, "a point cloud (PCD)", kOwnResult},
+    {"<!doctype html"sv, "an HTML page", "the download failed or needs a login"},
+    {"<html"sv, "an HTML page", "the download failed or needs a login"},
+    {"<?xml"sv, "an XML document", "the download failed, or it is no recording"},
+};
+
+/// Formats of recordings that are read, but not while the file is compressed.
+constexpr UnreadFormat kReadUnpacked[] = {
+    {"#ROSBAG V"sv, "a compressed ROS 1 bag", kUnpack},
+    {"\x89MCAP"sv, "a compressed MCAP file", kUnpack},
+    {"SQLite format 3"sv, "a compressed ROS 2 bag", kUnpack},
+    {"\x89HDF\r\n"sv, "a compressed HDF5 file", kUnpack},
+    {"% "sv, "a compressed file of Prophesee", kUnpack},
+    {"#!AER-DAT4"sv, "a compressed AEDAT4 file", kUnpack},
+};
+
+/// Text from its first character that is no blank, in small letters.
+std::string asMarkup(std::string_view text) {
+  std::string small;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (small.empty() && std::isspace(byte) != 0) continue;
+    small += static_cast<char>(std::tolower(byte));
+  }
+  return small;
+}
+
+template <std::size_t N>
+std::optional<std::string> nameIn(const UnreadFormat (&table)[N], const std::string& bytes) {
+  const std::string markup = asMarkup(bytes);
+  for (const UnreadFormat& format : table) {
+    const std::string& text = format.magic.front() == '<' ? markup : bytes;
+    if (text.compare(std::min(format.at, text.size()), format.magic.size(), format.magic) != 0) {
+      continue;
+    }
+    return fmt::format("{}: {}", format.name, format.instead);
+  }
+  return std::nullopt;
+}
+
+std::string rawBeginning(const fs::path& file) {
+  std::string bytes(kBeginning, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return bytes;
+}
+
+/// Of the only file in a compressed one; empty where there are several.
+std::string unpackedBeginning(const fs::path& file) {
+  std::string bytes(kBeginning, '\0');
+  FileContent content(file);
+  bytes.resize(content.read(bytes.data(), bytes.size()));
+  return bytes;
+}
+
+/// Whether a file is the report.json of a run.
+bool isReport(const fs::path& file) {
+  constexpr std::size_t kMostBytes = 1 << 20;
+  std::string text(kMostBytes, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  return text.compare(0, 1, "{") == 0 && text.find("\"votes_per_second\"") != std::string::npos;
+}
+
+/// The name of a file or folder that this program writes.
+const char* ownResult(const fs::path& source) {
+  if (isFile(source / "report.json") && isReport(source / "report.json")) {
+    return "the result of an earlier run";
+  }
+  if (isFile(source / "report.partial.json")) {
+    return "the result of a run that was killed, or is not at its end yet";
+  }
+  if (!isFile(source)) return nullptr;
+  const std::string bytes = rawBeginning(source);
+  if (bytes.find("name=\"generator\" content=\"event-fusion\"") != std::string::npos) {
+    return "the page of a map";
+  }
+  return isReport(source) ? "the report of an earlier run" : nullptr;
+}
+
+std::optional<std::string> unreadFile(const fs::path& file) {
+  const std::string bytes = rawBeginning(file);
+  if (bytes.empty()) return fmt::format("an empty file: {}", kIncomplete);
+  if (bytes.size() == kBeginning && bytes.find_first_not_of('\0') == std::string::npos) {
+    return fmt::format("a file of zeros: {}", kIncomplete);
+  }
+  if (bytes.compare(0, kBagDescription.size(), kBagDescription) == 0) {
+    const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+    return "the description of a ROS 2 bag: expected its folder, " + folder.string();
+  }
+  if (isCompressed(file)) {
+    try {
+      const std::string content = unpackedBeginning(file);
+      if (auto name = nameIn(kReadUnpacked, content)) return name;
+      if (auto name = nameIn(kUnreadFormats, content)) return name;
+    } catch (const std::exception&) {  // several files, or a damaged one
+    }
+  }
+  return nameIn(kUnreadFormats, bytes);
+}
+
+/// A folder is named by the first file that is known.
+std::optional<std::string> unreadFolder(const fs::path& folder) {
+  constexpr std::size_t kMost = 100;  // of a folder of pictures, some are enough
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (isFile(entry.path()) && files.size() < kMost) files.push_back(entry.path());
+  }
+  if (fs::is_empty(folder)) return "an empty folder: expected a recording";
+  std::sort(files.begin(), files.end());
+  for (const fs::path& file : files) {
+    const std::string name = file.filename().string();
+    if (const RecordingFormat* const format = detectFormat(file)) {
+      return fmt::format("a folder: give its files themselves ({} is {})", name,
+                         format->description);
+    }
+  }
+  for (const fs::path& file : files) {
+    const auto unread = unreadFile(file);
+    if (unread) return fmt::format("a folder; {} in it is {}", file.filename().string(), *unread);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::string> unreadFormat(const fs::path& source) {
+  try {
+    if (const char* const own = ownResult(source)) return fmt::format("{}: {}", own, kOwnResult);
+    if (fs::is_directory(source)) return unreadFolder(source);
+    return isFile(source) ? unreadFile(source) : std::nullopt;  // a pipe can be read only once
+  } catch (const std::exception&) {                             // the folder cannot be listed
+    return std::nullopt;
+  }
+}
 
 bool looksLikeAedat4(const std::filesystem::path& file) { return beginsWith(file, kAedat4Magic); }
 

@@ -2,11 +2,19 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
+
+/// What a file or folder is that no reader takes, and what to do instead: "a PNG picture: expected
+/// events". Nothing where it is not known, too. Known formats are found by their first bytes, also
+/// within compressed files. Never throws.
+std::optional<std::string> unreadFormat(const std::filesystem::path& source);
 
 /// The formats that this build reads, in the order in which they are tried. Rawlogs are not among
 /// them: they hold observations, not parts.
@@ -14,5 +22,25 @@ const std::vector<RecordingFormat>& readerFormats();
 
 /// The format of a file or folder by its content; null if it is none of `readerFormats`.
 const RecordingFormat* detectFormat(const std::filesystem::path& source);
+
+/// Reads poses T_world_body from a file, whose kind is found by its content:
+///   text, also compressed   see `readPoseText` (text/)
+///   NumPy arrays            see `readPoseArrays`
+///   a recording with poses  a bag, an HDF5 file, a folder: `detectFormat`
+/// @return at least one pose, in the order of the file.
+/// @throws std::runtime_error naming the file, the place, the value and what was expected.
+std::vector<StampedPose> readPoses(const std::filesystem::path& file,
+                                   const ReaderOptions& options = {});
+
+/// Reads the poses of NumPy arrays:
+///   one array N x 8           t tx ty tz qx qy qz qw
+///   a .npz file with N times  and an array N x 7 (tx ty tz qx qy qz qw) or N x 4 x 4
+///   (T_world_body).
+/// Where several arrays of a .npz file have these shapes, those named t, time, timestamps … and
+/// poses, pose, T_world_body, trajectory. A name may say the unit: t_ns, timestamps_us. Real times
+/// are rounded to microseconds.
+/// @throws std::runtime_error naming file, array, row, value and what was expected.
+std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
+                                        const ReaderOptions& options);
 
 }  // namespace efm

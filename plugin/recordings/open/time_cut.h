@@ -10,7 +10,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/open/merged_recording.h"
 #include "plugin/session/pose_source_selector.h"
 
 namespace efm {

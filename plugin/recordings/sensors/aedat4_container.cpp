@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/sensors/aedat4_container.h"
+#include "plugin/recordings/sensors/aedat4.h"
 
 #include <fmt/format.h>
 #include <lz4frame.h>
@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "mapping/base/text.h"
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

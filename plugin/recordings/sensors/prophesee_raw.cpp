@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "mapping/base/text.h"
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

@@ -9,8 +9,20 @@
 
 #include "mapping/base/named_choice.h"
 #include "mapping/events/event.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
+
+void BadEvents::skip(const std::string& error) {
+  if (count_ == limit_) {
+    throw std::runtime_error(limit_ == 0
+                                 ? error + " (--skip-bad-events N leaves out up to N bad events)"
+                                 : fmt::format("{} ({} bad events before it were left out, as "
+                                               "--skip-bad-events allows)",
+                                               error, count_));
+  }
+  if (count_++ == 0) first_ = error;
+}
 
 EventPackets::EventPackets(std::unique_ptr<EventStream> stream, CameraSize size,
                            std::int64_t period_ns)

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/streams/event_stream.h"
+#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 

@@ -1,18 +1,87 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <fmt/format.h>
+
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
+#include "mapping/base/text.h"
+#include "mapping/events/event.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/calibration/calibration_file.h"
-#include "plugin/recordings/streams/event_stream.h"
 
 namespace efm {
+
+/// Counts the bad events of a recording that are left out, over all its cameras, up to a limit.
+class BadEvents {
+ public:
+  /// @param limit of `--skip-bad-events`.
+  explicit BadEvents(std::uint64_t limit) : limit_(limit) {}
+
+  /// Leaves out one more bad event.
+  /// @param error the position, the value and what was expected.
+  /// @throws std::runtime_error: the error and the option, where there are more than the limit.
+  void skip(const std::string& error);
+
+  std::uint64_t count() const { return count_; }
+  /// The error of the first one that was found: lines that are none are found before the wrong
+  /// events of their block.
+  const std::string& first() const { return first_; }
+
+ private:
+  std::uint64_t limit_;
+  std::uint64_t count_ = 0;
+  std::string first_;
+};
+
+/// The events of one camera as a file stores them, read block by block. `EventPackets` checks and
+/// sorts them: a stream only decodes.
+class EventStream {
+ public:
+  virtual ~EventStream() = default;
+
+  /// Replaces `events` by the next events, in the order of the file. Memory is that of a block:
+  /// some ten or hundred thousand events, whatever the size of the file.
+  /// @return false at the end; `events` is empty then.
+  /// @throws std::runtime_error at damaged data, naming file, position, value and what was
+  /// expected. `events` has the events before it. The stream is not read again.
+  virtual bool read(std::vector<Event>& events) = 0;
+
+  /// From now on a damaged event is given to `bad`, and left out, where the rest of the data can be
+  /// read without it. Others do as before. `bad` outlives the stream.
+  virtual void skipBadEvents(BadEvents& bad) { static_cast<void>(bad); }
+
+  /// Continues near a time: the next block may begin with any event, but none of this time or later
+  /// is left out. Called before `read`. Without an index, a stream stays at its beginning.
+  virtual void seek(std::int64_t t_ns) { static_cast<void>(t_ns); }
+
+  /// The position of an event of the last block, for errors: "cam0/events.txt:17".
+  virtual std::string positionOf(std::size_t index) const = 0;
+  /// The name of the file, for errors.
+  virtual std::string name() const = 0;
+  /// The fraction of the stream that has been read, 0 to 1.
+  virtual double progress() const = 0;
+  /// The sensor's pixels, if the file knows them.
+  virtual std::optional<CameraSize> size() const { return std::nullopt; }
+  /// The gaps in the numbers of the file's packets: how many are missing, as far as known.
+  virtual std::uint64_t lostPackets() const { return 0; }
+  /// Events that were left out because their time or row is not known: those before the sensor's
+  /// first words of time, and those after a gap. Not those before the time of `seek`.
+  virtual std::uint64_t undatedEvents() const { return 0; }
+  /// What the reader concluded from the values, where the file does not say it: `time-unit`,
+  /// `event-columns`.
+  virtual std::vector<Warning> warnings() const { return {}; }
+};
 
 /// A depth map of the truth.
 struct TruthDepth {
@@ -70,5 +139,56 @@ struct RecordingFormat {
   /// @throws std::runtime_error naming the file and the line that is wrong.
   std::vector<TruthDepth> (*truth)(const std::filesystem::path& source) = nullptr;
 };
+
+/// Whether it is a regular file, or a link to one. Never throws.
+inline bool isFile(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
+/// Whether a regular file begins with these bytes. Never throws.
+inline bool beginsWith(const std::filesystem::path& file, std::string_view start) {
+  if (!isFile(file)) return false;
+  std::ifstream stream(file, std::ios::binary);
+  std::string found(start.size(), '\0');
+  return stream.read(found.data(), static_cast<std::streamsize>(found.size())) && found == start;
+}
+
+/// @throws std::runtime_error naming the cure, where a text is UTF-16 or has CR alone for line
+/// ends.
+inline void requireTextLines(std::string_view text, const std::string& file) {
+  const auto is_wide = [&](std::size_t i) {  // the characters at i and i + 2, NULs beside them
+    return text.size() > 3 && text[i] >= '\t' && text[i + 2] >= '\t' && text[1 - i] == '\0' &&
+           text[3 - i] == '\0';
+  };
+  const std::string_view mark = text.substr(0, 2);
+  std::string code = is_wide(0) ? "UTF-16LE" : is_wide(1) ? "UTF-16BE" : "";
+  if (mark == "\xff\xfe" || mark == "\xfe\xff") code = "UTF-16";
+  if (!code.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: a text in {}: expected UTF-8 (iconv -f {} -t UTF-8 <FILE >NEW)", file, code, code));
+  }
+  using std::string_view_literals::operator""sv;
+  if (text.find('\r') == text.npos || text.find_first_of("\n\0"sv) != text.npos) return;
+  throw std::runtime_error(
+      file + ": its lines end with CR alone: expected LF or CR LF (tr '\\r' '\\n' <FILE >NEW)");
+}
+
+/// @throws std::runtime_error where it is a pipe.
+inline void requireNoPipe(const std::filesystem::path& path) {
+  if (!std::filesystem::is_fifo(path)) return;
+  throw std::runtime_error(path.string() +
+                           ": a pipe: expected a file, as it is read more than once "
+                           "(cat <PIPE >FILE writes one)");
+}
+
+/// @param what the format, for the error.
+/// @throws std::runtime_error where there are several sources.
+inline const std::filesystem::path& onlySource(const std::vector<std::filesystem::path>& sources,
+                                               const char* what) {
+  if (sources.size() == 1) return sources.front();
+  throw std::runtime_error(fmt::format("{}: {} sources: expected one, {}", sources.at(1).string(),
+                                       sources.size(), what));
+}
 
 }  // namespace efm

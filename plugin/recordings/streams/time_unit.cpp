@@ -11,10 +11,8 @@
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/streams/number_checks.h"
 
 namespace efm {
-
 namespace {
 
 constexpr std::array<int, 4> kExponents = {0, -3, -6, -9};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/text/column_order.h"
+#include "plugin/recordings/text/event_columns.h"
 
 #include <algorithm>
 #include <array>

@@ -13,8 +13,8 @@
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/streams/number_checks.h"
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/recording_parts.h"
+#include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {
 namespace {

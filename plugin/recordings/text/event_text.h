@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/recordings/streams/event_stream.h"
 #include "plugin/recordings/streams/file_content.h"
+#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/event_columns.h"
 
 namespace efm {

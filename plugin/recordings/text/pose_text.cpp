@@ -14,7 +14,7 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/streams/file_content.h"
-#include "plugin/recordings/streams/source_files.h"
+#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {

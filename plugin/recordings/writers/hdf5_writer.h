@@ -11,7 +11,6 @@
 #include "mapping/base/atomic_file.h"
 #include "plugin/recordings/columns/hdf5_file.h"
 #include "plugin/recordings/writers/recording_writer.h"
-#include "plugin/recordings/writers/text_file.h"
 
 namespace efm {
 

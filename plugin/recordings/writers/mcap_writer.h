@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "mapping/base/atomic_file.h"
-#include "plugin/recordings/bags/mcap_format.h"
+#include "plugin/recordings/bags/bag_source.h"
 #include "plugin/recordings/writers/recording_writer.h"
 
 namespace efm {

@@ -4,13 +4,54 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <memory>
+#include <utility>
 #include <vector>
 
+#include "mapping/base/atomic_file.h"
 #include "mapping/events/event.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 
 namespace efm {
+
+/// A text file to write.
+class TextFile {
+ public:
+  /// @throws std::runtime_error naming the file if it cannot be made.
+  explicit TextFile(std::filesystem::path path);
+
+  std::ofstream& stream() { return stream_; }
+  /// @throws std::runtime_error naming the file if it could not be written, and why if the last
+  /// bytes could not.
+  void requireWritten() const;
+  /// @throws std::runtime_error as `requireWritten`.
+  void close();
+
+ private:
+  std::filesystem::path path_;
+  std::ofstream stream_;
+};
+
+/// poses.txt, TUM format. Without a pose there is no file.
+class PoseTextFile {
+ public:
+  explicit PoseTextFile(std::filesystem::path path) : path_(std::move(path)) {}
+
+  /// @throws std::runtime_error naming the file if it cannot be made.
+  void add(const StampedPose& pose);
+  /// @throws std::runtime_error naming the file if it could not be written.
+  void close();
+
+ private:
+  std::filesystem::path path_;
+  std::unique_ptr<TextFile> file_;
+};
+
+/// Writes camchain.yaml, if the cameras are calibrated.
+/// @throws std::runtime_error naming the file if it cannot be written.
+void writeCamchain(const std::filesystem::path& folder, const Rig& rig);
 
 /// Writes a recording in a format of other tools, in constant memory. Results get their names when
 /// `close` is called; without it, nothing is left.
@@ -34,6 +75,26 @@ class RecordingWriter {
   }
   /// Completes the files.
   virtual void close() = 0;
+};
+
+/// Writes a dataset folder: camN/events.txt, camchain.yaml, poses.txt (T_world_cam0);
+/// depth/ with the truth. What the recording lacks is left out.
+class FolderWriter : public RecordingWriter {
+ public:
+  /// @param rig whose frame is that of camera 0.
+  /// @throws std::runtime_error naming the folder if it exists and is not empty, or cannot be made.
+  FolderWriter(const std::filesystem::path& folder, const Rig& rig);
+
+  void addEvents(std::size_t camera, const std::vector<Event>& events) override;
+  void addPose(const StampedPose& pose) override;
+  void addTruth(std::int64_t t_ns, const std::filesystem::path& file) override;
+  void close() override;
+
+ private:
+  NewFolder folder_;
+  std::vector<TextFile> events_;  // per camera
+  PoseTextFile poses_;
+  std::unique_ptr<TextFile> truth_;  // the index, if there is any
 };
 
 }  // namespace efm

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "mapping/geometry/rig.h"
-#include "plugin/recordings/calibration/camchain.h"
+#include "plugin/recordings/calibration/calibration_formats.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {

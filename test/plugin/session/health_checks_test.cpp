@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "mapping/geometry/rigid3.h"
-#include "plugin/recordings/calibration/camchain.h"
+#include "plugin/recordings/calibration/calibration_formats.h"
 #include "test/paths.h"
 #include "test/plugin/session/synthetic_recording.h"
 

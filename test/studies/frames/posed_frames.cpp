@@ -11,7 +11,7 @@
 
 #include "mapping/geometry/trajectory.h"
 #include "plugin/evaluation/depth_series.h"
-#include "plugin/recordings/text/uzh_text.h"
+#include "plugin/recordings/text/dataset_folder.h"
 
 namespace efm::studies {
 namespace {

@@ -8,8 +8,8 @@
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_policy.h"
 #include "plugin/recordings/streams/event_packets.h"
+#include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_text.h"
-#include "plugin/recordings/text/uzh_text.h"
 
 namespace efm::studies {
 

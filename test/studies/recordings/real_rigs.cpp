@@ -4,7 +4,7 @@
 #include <string>
 
 #include "mapping/geometry/trajectory.h"
-#include "plugin/recordings/calibration/camchain.h"
+#include "plugin/recordings/calibration/calibration_formats.h"
 #include "tracking_stub/presets/trajectory_simulation.h"
 
 namespace efm::studies {

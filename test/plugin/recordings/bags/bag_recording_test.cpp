@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/open/pose_file.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "test/paths.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/bags/sensor_clock.h"
+#include "plugin/recordings/bags/bag_events.h"
 #include "test/plugin/recordings/bags/ros_message_bytes.h"
 #include "test/plugin/recordings/open/files.h"
 

@@ -8,8 +8,7 @@
 #include <utility>
 
 #include "plugin/recordings/calibration/calibration_file.h"
-#include "plugin/recordings/calibration/camchain.h"
-#include "plugin/recordings/calibration/hand_eye_file.h"
+#include "plugin/recordings/calibration/calibration_formats.h"
 #include "test/paths.h"
 
 namespace efm {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/calibration/hand_eye_file.h"
+#include "plugin/recordings/calibration/calibration_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/columns/evimo2.h"
+#include "plugin/recordings/columns/event_arrays.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/recordings/open/recording.h"
+#include "plugin/recordings/open/merged_recording.h"
 
 namespace efm {
 

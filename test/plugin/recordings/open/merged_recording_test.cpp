@@ -11,7 +11,6 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/open/recording_with_poses.h"
 #include "plugin/recordings/text/event_text.h"
 #include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"

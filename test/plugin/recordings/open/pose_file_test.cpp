@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/open/pose_file.h"
+#include "plugin/recordings/open/recording_formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -11,10 +11,7 @@
 
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
-#include "plugin/recordings/open/gz_stream.h"
-#include "plugin/recordings/open/rawlog_recording.h"
-#include "plugin/recordings/open/rawlog_signature.h"
-#include "plugin/recordings/open/rawlog_writer.h"
+#include "plugin/recordings/open/rawlog.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/recordings/open/files.h"

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/recordings/open/unread_formats.h"
+#include "plugin/recordings/open/recording_formats.h"
 
 #include <gtest/gtest.h>
 
-#include "plugin/recordings/open/recording_formats.h"
 #include "test/plugin/recordings/columns/zip_file.h"
 #include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
