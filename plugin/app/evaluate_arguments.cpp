@@ -6,7 +6,7 @@
 
 #include "plugin/app/argument_checks.h"
 #include "plugin/app/evaluate_command.h"
-#include "plugin/evaluation/depth_evaluation_text.h"
+#include "plugin/evaluation/depth_evaluation.h"
 
 namespace efm {
 namespace {

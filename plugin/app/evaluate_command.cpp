@@ -8,11 +8,9 @@
 #include <utility>
 
 #include "plugin/app/output_checks.h"
-#include "plugin/evaluation/cloud_evaluation_plot.h"
-#include "plugin/evaluation/depth_evaluation_plot.h"
-#include "plugin/evaluation/depth_evaluation_text.h"
-#include "plugin/evaluation/stereo_baseline.h"
-#include "plugin/evaluation/trajectory_evaluation_plot.h"
+#include "plugin/evaluation/cloud_evaluation.h"
+#include "plugin/evaluation/depth_evaluation.h"
+#include "plugin/evaluation/trajectory_evaluation.h"
 #include "plugin/results/pictures/picture.h"
 
 namespace efm {

@@ -2,14 +2,18 @@
 #include "plugin/evaluation/cloud_evaluation.h"
 
 #include <fmt/format.h>
-
 #include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <array>
 #include <stdexcept>
+#include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/io/point_cloud_file.h"
-#include "plugin/evaluation/file_in_folder.h"
+#include "plugin/evaluation/depth_series.h"
 #include "plugin/evaluation/text_table.h"
+#include "plugin/results/pictures/curve_plot.h"
 
 namespace efm {
 namespace {
@@ -157,6 +161,26 @@ std::string cloudEvaluationKeys() {
          "            4x4 matrix, rows; turns about the origin, then moves), points (of the map,\n"
          "            that were compared with the truth), points_used (of these, in the last\n"
          "            round)\n";
+}
+
+cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation) {
+  std::vector<CloudErrors::Step> steps = evaluation.errors.steps;
+  std::sort(steps.begin(), steps.end(),
+            [](const auto& a, const auto& b) { return a.distance_m < b.distance_m; });
+  std::array<std::vector<cv::Point2d>, 3> points;
+  for (const CloudErrors::Step& step : steps) {
+    points[0].emplace_back(step.distance_m, 100 * step.within);
+    points[1].emplace_back(step.distance_m, 100 * step.completeness);
+    points[2].emplace_back(step.distance_m, 100 * step.f1);
+  }
+  CurvePlot plot;
+  plot.title = "map and truth";
+  plot.x = {"distance [m]", AxisScale::kLogarithmic};
+  plot.y = {"within [%]", AxisScale::kLinear, 0, 102};
+  plot.curves = {{"accuracy: map to truth", points[0], CurveStyle::kMarkedLine},
+                 {"completeness: truth to map", points[1], CurveStyle::kMarkedLine},
+                 {"F1", points[2], CurveStyle::kMarkedLine}};
+  return drawCurves(plot);
 }
 
 }  // namespace efm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <opencv2/core.hpp>
+
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -38,5 +40,8 @@ std::string evaluationTable(const CloudEvaluation& evaluation);
 std::string evaluationJson(const CloudEvaluation& evaluation);
 /// The keys of the JSON, for the program's help.
 std::string cloudEvaluationKeys();
+
+/// Accuracy, completeness and F1 over the distance.
+cv::Mat3b evaluationPlot(const CloudEvaluation& evaluation);
 
 }  // namespace efm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <opencv2/core.hpp>
+
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -47,5 +49,41 @@ struct DepthEvaluation {
 DepthEvaluation evaluateDepth(const std::filesystem::path& estimated,
                               const std::filesystem::path& truth,
                               const DepthEvaluationOptions& options);
+
+/// A rectified stereo pair: the disparity of a depth Z is focal_px * baseline_m / Z pixels.
+struct StereoBaseline {
+  double focal_px = 0;    ///< Above 0.
+  double baseline_m = 0;  ///< Above 0.
+  std::string source;     ///< The file of both values, or "as given". For tables.
+
+  double focalBaseline() const { return focal_px * baseline_m; }
+};
+
+/// Reads the stereo pair from the report.json of the run that wrote the estimate, in `estimate` or
+/// up to three folders above it. Otherwise reads it from the camchain.yaml of the truth's dataset,
+/// in `truth` or up to two folders above it: camera 0's fx and its distance to camera 1.
+/// @return nothing if neither file has it.
+/// @throws std::runtime_error naming a camchain.yaml that cannot be read.
+std::optional<StereoBaseline> findStereoBaseline(const std::filesystem::path& estimate,
+                                                 const std::filesystem::path& truth);
+
+/// Tables of at most 80 columns. Of several maps: a line per map with the main measures. Then a
+/// line per measure, with the mean of the maps and the value of all points; precision, recall and
+/// F1 over the thresholds, the maps without partner, and the focal length and baseline of bad-pix.
+std::string evaluationTable(const DepthEvaluation& evaluation,
+                            const std::optional<StereoBaseline>& stereo = std::nullopt);
+
+/// `depthEvaluationKeys` describes the keys.
+std::string evaluationJson(const DepthEvaluation& evaluation,
+                           const std::optional<StereoBaseline>& stereo = std::nullopt);
+
+/// The keys of the JSON, for the program's help.
+std::string depthEvaluationKeys();
+
+/// Draws estimate, truth and error of one map side by side: of several maps the one with the median
+/// number of points. Below: precision, recall and F1 over the threshold and, for several maps,
+/// their errors over time. Reads the files of the drawn map again.
+/// @throws std::runtime_error as `evaluateDepth` does.
+cv::Mat3b evaluationPlot(const DepthEvaluation& evaluation, const DepthEvaluationOptions& options);
 
 }  // namespace efm

@@ -2,11 +2,11 @@
 #include "plugin/evaluation/depth_file.h"
 
 #include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -15,8 +15,7 @@
 #include "mapping/base/named_choice.h"
 #include "mapping/base/text.h"
 #include "maps/io/npy_header.h"
-#include "plugin/evaluation/npy_image.h"
-#include "plugin/evaluation/pfm_image.h"
+#include "maps/io/point_record.h"
 
 namespace efm {
 namespace {
@@ -117,6 +116,101 @@ cv::Mat1b readMaskFile(const std::filesystem::path& file) {
   } catch (const std::exception& error) {
     throw std::runtime_error("cannot read the mask " + file.string() + ": " + error.what());
   }
+}
+
+namespace {
+
+cv::Size imageSizeOf(const NpyHeader& header) {
+  bool is_image = header.shape.size() == 2;
+  for (const std::uint64_t side : header.shape) {
+    is_image = is_image && side >= 1 && side <= kMaxImageSide;
+  }
+  if (!is_image) {
+    throw std::runtime_error(
+        fmt::format("the array's header: shape = '({})': expected (rows, columns), each from 1 to "
+                    "65535",
+                    fmt::join(header.shape, ", ")));
+  }
+  return {static_cast<int>(header.shape[1]), static_cast<int>(header.shape[0])};
+}
+
+}  // namespace
+
+cv::Mat1f parseNpy(std::string_view bytes) {
+  const NpyHeader header = parseNpyHeader(bytes);
+  requirePlainRows(header);
+  if (header.type != NumberType::kFloat32 && header.type != NumberType::kFloat64) {
+    throw std::runtime_error(
+        fmt::format("the array's header: descr = '{}': expected float32 or float64", header.descr));
+  }
+  const cv::Size size = imageSizeOf(header);
+  const std::string_view data = bytes.substr(header.data_begin);
+  const std::size_t step = sizeOf(header.type);
+  if (data.size() != header.bytes()) {
+    throw std::runtime_error(
+        fmt::format("{} bytes follow the array's header: expected {} for {}x{} float{}",
+                    data.size(), header.bytes(), size.width, size.height, 8 * step));
+  }
+  cv::Mat1f image(size);
+  const char* at = data.data();
+  for (float& value : image) {
+    value = static_cast<float>(numberAt(at, header.type, header.big_endian));
+    at += step;
+  }
+  return image;
+}
+
+namespace {
+
+int side(const WordLine& line, std::size_t word) {
+  const std::uint64_t pixels = line.count(word);
+  if (pixels < 1 || pixels > kMaxImageSide) {
+    line.refuse(fmt::format("{} pixels: expected from 1 to 65535", pixels));
+  }
+  return static_cast<int>(pixels);
+}
+
+double scaleOf(const WordLine& line) {
+  double scale = 0;
+  if (line.words.size() == 1) scale = parseFinite(line.words[0]).value_or(0);
+  if (scale == 0) {
+    line.refuse("expected one number, the scale, below 0 where the data are little endian");
+  }
+  return scale;
+}
+
+}  // namespace
+
+bool looksLikePfm(std::string_view bytes) {
+  return bytes.size() > 2 && bytes[0] == 'P' && (bytes[1] == 'f' || bytes[1] == 'F') &&
+         (bytes[2] == '\n' || bytes[2] == '\r' || bytes[2] == ' ');
+}
+
+cv::Mat1f parsePfm(std::string_view bytes) {
+  TextScanner cursor(bytes);
+  const WordLine kind = wordLine(cursor, "Pf");
+  if (kind.words.size() != 1 || kind.words[0] != "Pf") {
+    kind.refuse("expected Pf alone, a grey float map");
+  }
+  const WordLine sides = wordLine(cursor, "width and height");
+  if (sides.words.size() != 2) sides.refuse("expected width and height");
+  const int width = side(sides, 0);
+  const int height = side(sides, 1);
+  const bool big_endian = scaleOf(wordLine(cursor, "the scale")) > 0;
+
+  cv::Mat1f image(height, width);
+  const std::size_t expected = image.total() * sizeof(float);
+  if (cursor.left() != expected) {
+    cursor.refuse(fmt::format("{} bytes follow: expected {} for {}x{} float32", cursor.left(),
+                              expected, width, height));
+  }
+  const char* at = cursor.take(expected).data();
+  for (float& value : image) {
+    value = static_cast<float>(numberAt(at, NumberType::kFloat32, big_endian));
+    at += sizeof(float);
+  }
+  cv::flip(image, image, 0);
+  return image;
 }
 
 }  // namespace efm

@@ -3,9 +3,15 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <vector>
 
 namespace efm {
+
+/// For a folder: the first of these files that it has. For another path: the path itself.
+/// @throws std::runtime_error naming the folder and the files if it has none of them.
+std::filesystem::path fileInFolder(const std::filesystem::path& path,
+                                   std::initializer_list<const char*> names);
 
 struct TimedFile {
   std::int64_t t_ns = 0;

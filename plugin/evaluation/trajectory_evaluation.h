@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <opencv2/core.hpp>
+
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -56,5 +58,9 @@ std::string evaluationTable(const TrajectoryEvaluation& evaluation);
 std::string evaluationJson(const TrajectoryEvaluation& evaluation);
 /// The keys of the JSON, for the program's help.
 std::string trajectoryEvaluationKeys();
+
+/// Draws both trajectories, with the estimate aligned, and the absolute errors over time. The view
+/// is along the axis of the truth's smallest extent: from above if two are equal.
+cv::Mat3b evaluationPlot(const TrajectoryEvaluation& evaluation);
 
 }  // namespace efm

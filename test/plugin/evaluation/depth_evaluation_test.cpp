@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "plugin/evaluation/depth_evaluation_text.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -10,8 +10,6 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "mapping/base/atomic_file.h"
-#include "plugin/evaluation/npy_image.h"
-#include "plugin/evaluation/pfm_image.h"
 #include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 
-#include "plugin/evaluation/cloud_evaluation_plot.h"
-#include "plugin/evaluation/depth_evaluation_plot.h"
-#include "plugin/evaluation/trajectory_evaluation_plot.h"
+#include "plugin/evaluation/cloud_evaluation.h"
+#include "plugin/evaluation/depth_evaluation.h"
+#include "plugin/evaluation/trajectory_evaluation.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "test/plugin/results/pictures/sketch.h"
 #include "test/plugin/temporary_folder.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/evaluation/stereo_baseline.h"
+#include "plugin/evaluation/depth_evaluation.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
