@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/app/command_line.h"
+#include "plugin/app/commands.h"
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -10,17 +10,8 @@
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/app/argument_checks.h"
-#include "plugin/app/command.h"
-#include "plugin/app/evaluate_arguments.h"
-#include "plugin/app/exit_status.h"
-#include "plugin/app/export_command.h"
-#include "plugin/app/import_command.h"
-#include "plugin/app/info_command.h"
-#include "plugin/app/mapping_arguments.h"
-#include "plugin/app/simulate_arguments.h"
-#include "plugin/app/source_arguments.h"
-#include "plugin/app/view_command.h"
+#include "plugin/app/arguments.h"
+#include "plugin/app/program.h"
 
 namespace efm {
 namespace {

@@ -1,23 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/app/info_command.h"
-
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <exception>
+#include <fstream>
 #include <iterator>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "mapping/dsi/dsi_grid.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/app/exit_status.h"
-#include "plugin/app/observed_statistics.h"
+#include "mapping/kernels/self_test.h"
+#include "mapping/sweep/space_sweep.h"
+#include "plugin/app/commands.h"
+#include "plugin/app/program.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
-#include "plugin/app/system_info.h"
 #include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
@@ -207,6 +210,54 @@ int runInfo(const InfoArguments& arguments) {
   }
   printWarnings(warnings);
   return arguments.strict && failStrictly(warnings) ? kFailedStatus : status;
+}
+
+namespace {
+
+/// The sizes of the data caches, as far as the system tells them.
+std::string cacheSizes() {
+  std::string sizes;
+  for (const auto& [name, key] : {std::pair("L1d", _SC_LEVEL1_DCACHE_SIZE),
+                                  {"L2", _SC_LEVEL2_CACHE_SIZE},
+                                  {"L3", _SC_LEVEL3_CACHE_SIZE}}) {
+    const long bytes = sysconf(key);
+    if (bytes <= 0) continue;
+    sizes += fmt::format("{}{} {} KiB", sizes.empty() ? "" : ", ", name, bytes / 1024);
+  }
+  return sizes.empty() ? "unknown" : sizes;
+}
+
+}  // namespace
+
+std::string processorName() {
+  std::ifstream cpuinfo("/proc/cpuinfo");
+  for (std::string line; std::getline(cpuinfo, line);) {
+    const auto colon = line.find(": ");
+    if (line.rfind("model name", 0) == 0 && colon != std::string::npos) {
+      return line.substr(colon + 2);
+    }
+  }
+  std::string board;
+  std::getline(std::ifstream("/sys/firmware/devicetree/base/model"), board, '\0');
+  return board.empty() ? "unknown" : board;
+}
+
+int printSystem() {
+  fmt::print("event-fusion {}\nprocessor: {}\ncores: {}\ncaches: {}\n", EFM_VERSION,
+             processorName(), SpaceSweepOptions().threadsOrCores(), cacheSizes());
+  bool passed = true;
+  for (const VotingKernel kernel : availableKernels()) {
+    const std::vector<std::string> failures =
+        kernels::selfTest(kernels::TestedFunctions::of(kernel));
+    passed = passed && failures.empty();
+    fmt::print("kernel {}: self-test {}{}\n", nameOf(kernel),
+               failures.empty() ? "passed" : "FAILED",
+               kernel == fastestKernel() ? ", chosen where [performance] kernel = auto" : "");
+    for (const std::string& failure : failures) {
+      fmt::print("  unlike plain code: {}\n", failure);
+    }
+  }
+  return passed ? 0 : 1;
 }
 
 }  // namespace efm

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <exception>
 
-#include "plugin/app/exit_status.h"
-#include "plugin/app/hdf5_trial.h"
 #include "plugin/app/program.h"
 
 int main(int argc, char** argv) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/app/map_command.h"
+#include "plugin/app/commands.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -17,14 +17,11 @@
 #include "mapping/geometry/timestamp.h"
 #include "maps/cloud/cloud_points.h"
 #include "maps/cloud/keyframe_cloud.h"
-#include "plugin/app/config_files.h"
-#include "plugin/app/error_words.h"
-#include "plugin/app/exit_status.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/mapping_run.h"
-#include "plugin/app/observed_statistics.h"
 #include "plugin/app/output_checks.h"
-#include "plugin/app/recording_survey.h"
+#include "plugin/app/program.h"
+#include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/window/map_scene.h"
 #include "plugin/mrpt/window/map_window.h"
 #include "plugin/results/output/keyframe_writer.h"

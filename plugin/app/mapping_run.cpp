@@ -1,26 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/mapping_run.h"
 
-#include <mrpt/obs/CObservation.h>
-
 #include <fmt/format.h>
+#include <mrpt/obs/CObservation.h>
+#include <opencv2/core.hpp>
 
 #include <algorithm>
 #include <chrono>
 #include <exception>
 #include <mutex>
 #include <numeric>
-#include <opencv2/core.hpp>
 #include <thread>
 #include <utility>
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/app/error_words.h"
-#include "plugin/app/observed_statistics.h"
+#include "plugin/app/interruption.h"
+#include "plugin/app/program.h"
+#include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/session_status.h"
@@ -357,6 +358,22 @@ std::optional<double> sequenceMaximum(MappingJob job, Recording& recording) {
   StageTimes ignored;
   Player(job, recording, ignored).play();
   return maximum.value();
+}
+
+RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording) {
+  RecordingSurveyor surveyor(job.options);
+  Progress progress("first look", job.verbosity);
+  try {
+    while (const auto observation = recording.next()) {
+      if (job.stop_requested && job.stop_requested()) throw Interrupted();
+      addTo(surveyor, *observation);
+      progress.show(recording.progress());
+    }
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::exception&) {
+  }
+  return surveyor.finish();
 }
 
 }  // namespace efm

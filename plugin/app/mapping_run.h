@@ -15,6 +15,7 @@
 #include "plugin/options/option_file.h"
 #include "plugin/recordings/open/merged_recording.h"
 #include "plugin/results/output/report.h"
+#include "plugin/session/recording_survey.h"
 
 namespace efm {
 
@@ -71,5 +72,11 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording);
 /// @return nothing if there is no keyframe.
 /// @throws std::invalid_argument if the options are not valid.
 std::optional<double> sequenceMaximum(MappingJob job, Recording& recording);
+
+/// Reads a recording once. An error of the recording ends it: the pass that maps reports the error.
+/// @param job whose receivers are not called.
+/// @throws std::runtime_error naming a file of the options that cannot be read; Interrupted if a
+/// stop was requested.
+RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording);
 
 }  // namespace efm

@@ -2,11 +2,22 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "plugin/recordings/open/open_recording.h"
 
 namespace efm {
+
+/// The option files that come with the program. They lie in the project's config/, or where
+/// `cmake --install` puts them: ../share/event-fusion-mapper/config from the program.
+
+/// Their names without ".ini", sorted: "default", "dsec", …
+std::vector<std::string> configNames();
+
+/// The option file of a name. A path is returned as it is.
+/// @throws UsageError if there is no such file, or naming the known names if it is none of them.
+std::filesystem::path findConfig(const std::string& name_or_path);
 
 /// The files and folders that a recording is read from.
 std::vector<std::filesystem::path> inputsOf(const RecordingSource& source);

@@ -1,22 +1,154 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/app/program.h"
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <opencv2/core.hpp>
+
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <iostream>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <system_error>
+#include <thread>
 
-#include "plugin/app/command_line.h"
-#include "plugin/app/error_words.h"
-#include "plugin/app/exit_status.h"
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/text.h"
+#include "plugin/app/commands.h"
 #include "plugin/app/interruption.h"
 #include "plugin/mrpt/registration.h"
+#include "plugin/recordings/columns/hdf5_files.h"
 
 namespace efm {
+namespace {
+
+constexpr const char* kOutOfMemory =
+    "out of memory: try fewer planes ([dsi] num_planes), a smaller view ([dsi] width and height), "
+    "or a "
+    "shorter interval (--duration)";
+
+/// MRPT's exceptions hold their place, too: "==== MRPT exception ====\nMessage:  TEXT\nLocation:
+/// …".
+std::string withoutPlace(std::string text) {
+  constexpr std::string_view kBegin = "==== MRPT exception ====";
+  constexpr std::string_view kMessage = "Message:";
+  text.erase(std::min(text.find("Call stack backtrace:"), text.size()));
+  const std::size_t begin = text.find(kBegin);
+  if (begin == std::string::npos) return text;
+  text.erase(std::min(text.find("Location:", begin), text.size()));
+  const std::size_t message = text.find(kMessage, begin);
+  const std::size_t end =
+      message == std::string::npos ? begin + kBegin.size() : message + kMessage.size();
+  return text.erase(begin, end - begin);
+}
+
+/// Blanks and ends of lines become one blank each.
+std::string onOneLine(const std::string& text) {
+  std::string line;
+  for (const std::string_view word : splitWords(text, " \t\r\v\f\n")) {
+    line += (line.empty() ? "" : " ") + std::string(word);
+  }
+  return line;
+}
+
+/// The standard library's exceptions, also within the text of another one.
+bool isOutOfMemory(std::string_view text) {
+  for (const std::string_view sign : {"std::bad_alloc", "std::bad_array_new_length",
+                                      "cannot create std::", "vector::", "basic_string::_M"}) {
+    if (text.find(sign) != std::string_view::npos) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::string inWords(const std::exception& error) {
+  if (const auto* file = dynamic_cast<const std::filesystem::filesystem_error*>(&error)) {
+    const std::string to = file->path2().empty() ? "" : " to " + file->path2().string();
+    const std::string why = reasonNotWritten(file->code().value());
+    return file->path1().string() + to + ": " + (why.empty() ? file->code().message() : why);
+  }
+  const auto* opencv = dynamic_cast<const cv::Exception*>(&error);
+  if (opencv != nullptr && opencv->code != cv::Error::StsNoMem) return onOneLine(opencv->err);
+  if (opencv != nullptr || isOutOfMemory(error.what())) return kOutOfMemory;
+  if (const auto* system = dynamic_cast<const std::system_error*>(&error)) {
+    return "the system refuses: " + system->code().message();  // a thread, for instance
+  }
+  const std::string text = withoutPlace(error.what());
+  return text == error.what() ? text : onOneLine(text);
+}
+
+int runHdf5Trial(const std::string& source) {
+  constexpr rlimit kNoCoreFile = {0, 0};
+  setrlimit(RLIMIT_CORE, &kNoCoreFile);
+  try {
+    RecordingParts parts = openHdf5({source}, {});
+    std::vector<Event> events;
+    for (const auto& camera : parts.cameras) camera->read(events);
+  } catch (const std::exception&) {
+    // The first program gets the same one.
+  }
+  return 0;
+}
+
+void tryHdf5(const std::vector<std::string>& arguments) {
+  constexpr std::chrono::seconds kLimit(60);
+  for (const std::string& argument : arguments) {
+    const bool is_option = argument.compare(0, 2, "--") == 0;  // --poses=FILE
+    const std::string source = is_option ? argument.substr(argument.find('=') + 1) : argument;
+    if (!looksLikeHdf5(source)) continue;
+    const auto failure = failureOf({"/proc/self/exe", std::string(kHdf5Trial), source}, kLimit);
+    if (!failure) continue;
+    throw std::runtime_error(
+        fmt::format("{}: the HDF5 library {}: expected a file without damage", source, *failure));
+  }
+}
+
+std::optional<std::string> failureOf(const std::vector<std::string>& command,
+                                     std::chrono::milliseconds limit) {
+  constexpr std::chrono::milliseconds kStep(2);
+  std::vector<std::string> texts = command;
+  std::vector<char*> arguments;
+  for (std::string& text : texts) arguments.push_back(text.data());
+  arguments.push_back(nullptr);
+
+  posix_spawn_file_actions_t files;
+  posix_spawn_file_actions_init(&files);
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    posix_spawn_file_actions_addopen(&files, stream, "/dev/null", O_RDWR, 0);
+  }
+  pid_t process = 0;
+  const int error =
+      posix_spawnp(&process, arguments[0], &files, nullptr, arguments.data(), environ);
+  posix_spawn_file_actions_destroy(&files);
+  if (error != 0) return std::nullopt;
+
+  const auto end = std::chrono::steady_clock::now() + limit;
+  int status = 0;
+  while (waitpid(process, &status, WNOHANG) == 0) {
+    if (std::chrono::steady_clock::now() >= end) {
+      kill(process, SIGKILL);
+      waitpid(process, &status, 0);
+      return fmt::format("does not end within {} s", std::chrono::duration<double>(limit).count());
+    }
+    std::this_thread::sleep_for(kStep);
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return std::nullopt;
+  return "crashes";
+}
+
 namespace {
 
 /// Flushes stdout. @return the status, or a failure if stdout cannot be written.

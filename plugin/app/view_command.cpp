@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/app/view_command.h"
+#include "plugin/app/commands.h"
 
 #include <fcntl.h>
 #include <sys/wait.h>

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "plugin/app/system_info.h"
+#include "plugin/app/commands.h"
 #include "test/bench/benches.h"
 
 int main(int argc, char** argv) {

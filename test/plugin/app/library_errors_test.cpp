@@ -9,8 +9,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "plugin/app/error_words.h"
-#include "plugin/app/hdf5_trial.h"
+#include "plugin/app/program.h"
 #include "test/plugin/app/app_test.h"
 
 namespace efm {

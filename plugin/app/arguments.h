@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <CLI/App.hpp>
+#include <CLI/Validators.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plugin/app/progress.h"
+#include "plugin/app/recording_interval.h"
+#include "plugin/recordings/open/open_recording.h"
+#include "tracking_stub/faults/tracker_faults.h"
+
+namespace efm {
+
+/// Runs a command and returns the process's exit status.
+using Run = std::function<int()>;
+
+/// Makes the arguments of a command. They live as long as the command. If the user chooses the
+/// command, `run` becomes a call of `handler` with them.
+template <typename Arguments>
+std::shared_ptr<Arguments> argumentsOf(CLI::App& command, Run& run,
+                                       int (*handler)(const Arguments&)) {
+  auto arguments = std::make_shared<Arguments>();
+  command.callback([arguments, handler, &run] { run = [=] { return handler(*arguments); }; });
+  return arguments;
+}
+
+/// Adds --quiet and, for a command with keyframes, --verbose.
+void addVerbosity(CLI::App& command, Verbosity& verbosity, bool has_keyframes = false);
+
+/// Checks of an option's value. Their errors show the value and say what was expected.
+
+CLI::Validator oneOf(const std::vector<std::string>& names);
+CLI::Validator aboveZero();
+CLI::Validator zeroOrMore();
+
+/// The error of a wrong command line: one sentence that names what the user typed.
+/// @param app has parsed the command line.
+std::string errorText(const CLI::App& app, const CLI::ParseError& error);
+
+/// Adds SOURCE and the options that replace or perturb a part of the recording.
+void addSource(CLI::App& command, RecordingSource& source);
+
+/// Adds --t0, --t1 and --duration. @return --t0.
+CLI::Option* addTimeLimits(CLI::App& command, TimeArguments& times);
+
+/// Adds an option whose value is a time of the recording.
+CLI::Option* addTime(CLI::App& command, const std::string& name, std::optional<TimeArgument>& time,
+                     const std::string& help);
+
+/// Adds --strict.
+void addStrict(CLI::App& command, bool& strict);
+
+/// A number of seconds, exact to the nanosecond.
+/// @param name of the option, for errors.
+/// @throws CLI::ValidationError naming the option and its value.
+std::int64_t nanosecondsOf(const std::string& text, const std::string& name);
+
+/// For a command without an option file, which has the length of a keyframe.
+/// @throws CLI::ValidationError as `requireKeyframeLength` does.
+void requireKeyframeLengthOf(const TrackerFaults& faults);
+
+void addMap(CLI::App& app, Run& run);
+void addDepth(CLI::App& app, Run& run);
+
+/// Adds `evaluate` and its kinds: depth, map, trajectory.
+void addEvaluate(CLI::App& app, Run& run);
+
+void addSimulate(CLI::App& app, Run& run);
+
+}  // namespace efm

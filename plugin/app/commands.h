@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "plugin/app/progress.h"
+#include "plugin/app/recording_interval.h"
+#include "plugin/evaluation/cloud_evaluation.h"
+#include "plugin/evaluation/depth_evaluation.h"
+#include "plugin/evaluation/trajectory_evaluation.h"
+#include "plugin/recordings/open/open_recording.h"
+#include "plugin/recordings/open/rawlog.h"
+#include "tracking_stub/sensor/simulated_rig.h"
+
+namespace efm {
+
+struct InfoArguments {
+  RecordingSource source;
+  TimeArguments times;
+  bool strict = false;  ///< A warning is an error.
+  bool system = false;  ///< Also print the processor and its kernels; then no recording is needed.
+  Verbosity verbosity = Verbosity::kNormal;
+};
+
+/// `event-fusion info`: prints the contents of a recording; if quiet, only what is wrong with
+/// it.
+/// @return the process's exit status.
+/// @throws std::exception if the recording cannot be read to its end. The contents before the error
+/// have been printed.
+int runInfo(const InfoArguments& arguments);
+
+/// Linux's "model name", or else the name of the board, which Arm processors have instead;
+/// "unknown" where there is neither.
+std::string processorName();
+
+/// Prints the processor, its cores and caches, the kernels that it can run and the one that is
+/// chosen, and tests each of them against the plain one.
+/// @return the process's exit status: 0 if all kernels passed.
+int printSystem();
+
+struct ImportArguments {
+  RecordingSource source;
+  TimeArguments times;
+  std::filesystem::path out;
+  RawlogCompression compression = RawlogCompression::kGzip;
+  Verbosity verbosity = Verbosity::kNormal;
+};
+
+/// `event-fusion import`: writes a recording as a rawlog. Replaces an earlier rawlog, no other
+/// file.
+/// @return the process's exit status.
+/// @throws Interrupted if a signal came; then there is no result.
+/// A recording without poses or calibration will do. Of a damaged one, what came before the damage
+/// is written, and the status is 1.
+/// @throws std::exception if no event can be read or the rawlog cannot be written. Then there is no
+/// rawlog.
+int runImport(const ImportArguments& arguments);
+
+struct ExportArguments {
+  RecordingSource source;
+  TimeArguments times;
+  std::string format;  ///< One of `exportFormats`.
+  std::filesystem::path out;
+  Verbosity verbosity = Verbosity::kNormal;
+};
+
+/// The formats that this build writes.
+std::vector<std::string> exportFormats();
+
+/// `event-fusion export`: writes a recording for other tools. Stamps have the cameras' time offsets
+/// added; poses are those of camera 0, T_world_cam0.
+/// @return the process's exit status.
+/// @throws Interrupted if a signal came; then there is no result.
+/// A recording without poses or calibration will do. Of a damaged one, what came before the damage
+/// is written, and the status is 1.
+/// @throws std::exception if no event can be read or the result cannot be written. Then there is no
+/// result.
+int runExport(const ExportArguments& arguments);
+
+struct ViewArguments {
+  std::filesystem::path path;  ///< The folder of a map, or its map.html.
+};
+
+/// `event-fusion view`: opens map.html with the program that the system has for pages (`xdg-open`,
+/// `open`), and prints its path. Where there is no screen or no such program, stderr says so; that
+/// is no error: the page is there for any browser.
+/// @return the process's exit status.
+/// @throws std::runtime_error where there is no page.
+int runView(const ViewArguments& arguments);
+
+/// The common arguments of `map` and `depth`.
+struct MappingArguments {
+  /// The option file, its name without ".ini" (see `findConfig`), or empty: the defaults.
+  std::string config;
+  RecordingSource source;
+  TimeArguments times;          ///< Of the window, for `depth`.
+  std::filesystem::path out;    ///< Empty: named after the recording, in the working folder.
+  bool force = false;           ///< Write into a folder that holds other files.
+  bool plain_pictures = false;  ///< depth.png and confidence.png without enlargement and bar.
+  bool strict = false;          ///< A warning is an error.
+  Verbosity verbosity = Verbosity::kNormal;
+  std::vector<std::string> sets;  ///< section.key=value
+};
+
+struct MapArguments : MappingArguments {
+  bool view = false;                    ///< Show the growing map in a window.
+  std::filesystem::path record_frames;  ///< Folder for a picture per keyframe; empty: none.
+};
+
+struct DepthArguments : MappingArguments {
+  /// Time of the reference view. Default: middle or end of the window, by the options.
+  std::optional<TimeArgument> t_ref;
+  bool save_dsi = false;
+};
+
+/// `event-fusion map`: plays a recording and writes the map's folder. Prints a summary to stdout,
+/// warnings and errors to stderr.
+/// SIGINT, SIGTERM or SIGHUP ends the run as the end of the recording would; a second one kills it.
+/// In the first look at the recording (automatic options) it ends without a result: Interrupted.
+/// @return the process's exit status: 0 only if the whole recording is mapped, 130 where a signal
+/// stopped it.
+/// @throws std::exception if the options or the recording cannot be read, or a file cannot be
+/// written.
+int runMap(const MapArguments& arguments);
+
+/// `event-fusion depth`: maps one window. SIGINT, SIGTERM or SIGHUP ends it without a result,
+/// unless the keyframe is made: then its files are written.
+/// @throws Interrupted if a signal came before; an earlier result stays.
+int runDepth(const DepthArguments& arguments);
+
+struct SimulateArguments {
+  std::string preset;  ///< Empty: `scene`, `trajectory` and `calibration` are used.
+  std::string scene;
+  std::filesystem::path trajectory;   ///< TUM, T_world_cam0.
+  std::filesystem::path calibration;  ///< Kalibr camera chain.
+  std::optional<std::int64_t> start_ns;
+  std::optional<double> duration_s;
+  std::uint64_t seed = 1;
+  // Default: the preset's pixels, or ideal ones.
+  std::optional<double> threshold_on;
+  std::optional<double> threshold_off;
+  double mismatch = 0;
+  double refractory_us = 0;
+  EventNoiseOptions noise;
+  std::filesystem::path out;
+  Verbosity verbosity = Verbosity::kNormal;
+};
+
+/// `event-fusion simulate`: simulates a recording with exact truth and writes it as a dataset
+/// folder.
+/// @return the process's exit status.
+/// @throws Interrupted if a signal came; then there is no result.
+/// @throws std::exception if the arguments are not valid or something cannot be written.
+int runSimulate(const SimulateArguments& arguments);
+
+struct EvaluationOutput {
+  bool json = false;
+  std::filesystem::path plot;  ///< Empty: no plot.
+};
+
+struct EvaluateDepthArguments {
+  std::filesystem::path estimate;
+  std::filesystem::path truth;
+  std::optional<double> focal_px;
+  std::optional<double> baseline_m;
+  DepthEvaluationOptions options;
+  EvaluationOutput output;
+};
+
+struct EvaluateMapArguments {
+  std::filesystem::path estimate;
+  std::filesystem::path truth;
+  CloudEvaluationOptions options;
+  EvaluationOutput output;
+};
+
+struct EvaluateTrajectoryArguments {
+  std::filesystem::path estimate;
+  std::filesystem::path truth;
+  std::string alignment = "se3";  ///< se3, origin or none.
+  std::vector<double> lengths_m;
+  std::vector<double> deltas_s;
+  std::vector<double> frames;
+  TrajectoryEvaluationOptions options;
+  EvaluationOutput output;
+};
+
+/// `event-fusion evaluate …`: prints the errors of results and draws them if asked for.
+/// @return the process's exit status.
+/// @throws std::exception if something cannot be compared or written.
+int runEvaluateDepth(const EvaluateDepthArguments& arguments);
+int runEvaluateMap(const EvaluateMapArguments& arguments);
+int runEvaluateTrajectory(const EvaluateTrajectoryArguments& arguments);
+
+/// Parses the command line. Prints the help or the version.
+/// @return runs the chosen command, if there is one, and returns the process's exit status.
+/// @throws UsageError if the command line is wrong.
+std::function<int()> parseCommandLine(int argc, char** argv);
+
+}  // namespace efm
