@@ -12,7 +12,7 @@
 #include "mapping/dsi/plane_fusion.h"
 #include "mapping/sweep/space_sweep.h"
 #include "test/bench/benches.h"
-#include "test/bench/sweep_input.h"
+#include "test/bench/synthetic_window.h"
 
 namespace efm::bench {
 namespace {

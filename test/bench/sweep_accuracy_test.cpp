@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "mapping/geometry/lens.h"
-#include "test/bench/sweep_input.h"
 #include "test/bench/synthetic_window.h"
 #include "test/mapping/kernels/fast_kernels.h"
 #include "test/mapping/keyframes/random_scene.h"

@@ -2,15 +2,19 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <cstddef>
 #include <optional>
 #include <vector>
 
 #include "mapping/events/event.h"
 #include "mapping/events/window.h"
+#include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rig.h"
 #include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_mapper.h"
+#include "mapping/rays/rays.h"
+#include "mapping/sweep/space_sweep.h"
 
 namespace efm::bench {
 
@@ -52,5 +56,16 @@ struct SyntheticWindow {
 };
 
 SyntheticWindow makeSyntheticWindow(const SyntheticWindowOptions& options);
+
+/// The input of a sweep: events as rays.
+struct SweepInput {
+  ReferenceView view;
+  DepthPlanes planes;
+  std::vector<CameraRays> cameras;
+  std::vector<PosePackets> packets;  ///< Per camera, of its events.
+};
+
+/// Back-projects the window's cameras into the view of the first.
+SweepInput makeSweepInput(const SyntheticWindow& made, int planes);
 
 }  // namespace efm::bench

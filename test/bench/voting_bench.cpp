@@ -11,7 +11,7 @@
 #include "mapping/sweep/space_sweep.h"
 #include "mapping/sweep/tiles.h"
 #include "test/bench/benches.h"
-#include "test/bench/sweep_input.h"
+#include "test/bench/synthetic_window.h"
 
 namespace efm::bench {
 namespace {

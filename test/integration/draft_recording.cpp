@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "test/integration/draft_recording.h"
+#include "test/integration/mistakes.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

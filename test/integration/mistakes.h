@@ -1,13 +1,48 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
-#include "test/integration/draft_recording.h"
+#include "mapping/events/event.h"
+#include "mapping/geometry/trajectory.h"
 
 namespace efm {
+
+/// A recording as a dataset folder, in memory: for tests that change one thing about it.
+struct DraftRecording {
+  /// Adds a line of text for an event.
+  using EventLine = void (*)(const Event&, std::string& text);
+
+  std::vector<std::vector<Event>> events;  ///< Per camera.
+  std::vector<StampedPose> poses;
+  std::string camchain;
+  EventLine event_line = usualLine;
+  /// Files by their names in the folder, also instead of those that the other fields give.
+  std::map<std::string, std::string> files;
+
+  /// "1.000002000 70 216 0"
+  static void usualLine(const Event& event, std::string& text);
+
+  /// Replaces a part of the camera chain. It is a failure of the test if the chain has no such
+  /// part.
+  void replaceInCamchain(const std::string& part, const std::string& by);
+  /// The events of a camera as text.
+  std::string eventText(std::size_t camera) const;
+  /// The poses as text, in the TUM format.
+  std::string poseText() const;
+};
+
+/// @param folder of two cameras and poses, without depth maps.
+DraftRecording readDraft(const std::filesystem::path& folder);
+
+/// Writes the folder. @param base what `readDraft` read: files without a change become links to its
+/// files.
+void writeDraft(const DraftRecording& draft, const DraftRecording& base,
+                const std::filesystem::path& base_folder, const std::filesystem::path& folder);
 
 /// The exit status of `map`.
 constexpr int kFine = 0;        // with a warning

@@ -9,7 +9,7 @@
 #include <string>
 #include <type_traits>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm::test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "test/oracle/naive_depth.h"
+#include "test/oracle/naive_mapper.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <opencv2/core.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
+#include "mapping/depth/depth_extraction.h"
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/dsi/plane_fusion.h"
 #include "mapping/events/event.h"
@@ -66,5 +69,18 @@ Dsi fuse(const FusionOptions& options, const std::vector<std::vector<Dsi>>& inpu
 std::vector<int> peakPlanes(const Dsi& dsi);
 /// Per pixel the largest value.
 std::vector<double> peakValues(const Dsi& dsi);
+
+/// The steps of `efm::extractDepth` written down one after the other, each over the whole image.
+DepthMap extractDepth(const DsiPeaks& peaks, const DepthPlanes& planes,
+                      const DepthExtractionOptions& options,
+                      std::optional<double> sequence_maximum = std::nullopt);
+
+/// `extractAggregated` written down as simply as possible, in double precision and from the whole
+/// DSI: every step looks at every pixel, no ray is rounded and none is left out.
+/// @param dsi [plane][row][column]. Without dilation.
+/// @param step_planes the unit of distances between peaks; parabolas go through the next planes.
+DepthMap extractAggregated(const std::vector<float>& dsi, const cv::Size& size,
+                           const DepthPlanes& planes, const DepthExtractionOptions& options,
+                           double step_planes);
 
 }  // namespace efm::oracle

@@ -14,7 +14,6 @@
 
 #include "plugin/options/option_file.h"
 #include "test/paths.h"
-#include "test/plugin/recordings/open/dataset_of.h"
 #include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -4,10 +4,25 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <exception>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
 #include <string>
 
 namespace efm {
+
+/// The message of the exception that a call throws.
+template <typename Call>
+std::string messageOf(const Call& call) {
+  try {
+    call();
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+  return "no error";
+}
 
 /// A folder that each test has for itself, empty at first and gone afterwards.
 class TemporaryFolder : public testing::Test {
@@ -30,5 +45,35 @@ class TemporaryFolder : public testing::Test {
  private:
   std::filesystem::path folder_;
 };
+
+inline void writeFile(const std::filesystem::path& file, const std::string& text) {
+  std::filesystem::create_directories(file.parent_path());
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+}
+
+/// The text with another part, which it must contain.
+inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+/// All bytes of a file.
+inline std::string readText(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// The message of the std::runtime_error that a call throws.
+template <typename Call>
+std::string errorOf(Call call) {
+  try {
+    call();
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
 
 }  // namespace efm

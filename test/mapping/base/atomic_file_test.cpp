@@ -14,8 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "test/plugin/message_of.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

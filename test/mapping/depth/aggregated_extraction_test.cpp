@@ -12,7 +12,7 @@
 
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/dsi/chosen_dsi.h"
-#include "test/oracle/naive_aggregation.h"
+#include "test/oracle/naive_mapper.h"
 
 namespace efm::aggregated_extraction_test {
 namespace {

@@ -12,7 +12,7 @@
 
 #include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
-#include "test/oracle/naive_depth.h"
+#include "test/oracle/naive_mapper.h"
 
 namespace efm::paper_extraction_test {
 namespace {

@@ -9,7 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

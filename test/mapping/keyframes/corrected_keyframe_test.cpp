@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/keyframes/random_scene.h"
 
 namespace efm::corrected_keyframe_test {
 namespace {

@@ -13,7 +13,7 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/kernels/fast_kernels.h"
-#include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/keyframes/random_scene.h"
 #include "test/mapping/motion/moving_edges.h"
 
 namespace efm::keyframe_defaults_test {

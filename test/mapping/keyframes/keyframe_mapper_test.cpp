@@ -10,7 +10,7 @@
 
 #include "mapping/events/event.h"
 #include "test/mapping/depth/same_image.h"
-#include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/keyframes/random_scene.h"
 
 namespace efm::keyframe_mapper_test {
 namespace {

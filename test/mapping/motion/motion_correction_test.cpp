@@ -14,7 +14,7 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
-#include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/keyframes/random_scene.h"
 #include "test/mapping/motion/moving_edges.h"
 
 namespace efm::motion_correction_test {

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/keyframes/random_scene.h"
 
 namespace efm::velocity_correction_test {
 namespace {

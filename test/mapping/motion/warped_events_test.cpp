@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/keyframes/random_scene.h"
 
 namespace efm::warped_events_test {
 namespace {

@@ -15,7 +15,6 @@
 #include "mapping/sweep/tiles.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/kernels/fast_kernels.h"
-#include "test/mapping/rays/chosen_rays.h"
 #include "test/mapping/rays/random_rays.h"
 #include "test/mapping/sweep/sweep_case.h"
 

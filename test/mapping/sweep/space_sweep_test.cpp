@@ -14,9 +14,8 @@
 #include "test/mapping/base/refused_option.h"
 #include "test/mapping/depth/same_image.h"
 #include "test/mapping/dsi/chosen_dsi.h"
-#include "test/mapping/dsi/whole_dsi.h"
 #include "test/mapping/kernels/fast_kernels.h"
-#include "test/mapping/keyframes/random_recording.h"
+#include "test/mapping/keyframes/random_scene.h"
 #include "test/oracle/naive_mapper.h"
 
 namespace efm {

@@ -12,7 +12,7 @@
 #include "mapping/kernels/kernels.h"
 #include "mapping/sweep/space_sweep.h"
 #include "test/mapping/kernels/fast_kernels.h"
-#include "test/mapping/sweep/rays_at.h"
+#include "test/mapping/sweep/sweep_case.h"
 
 namespace efm {
 namespace {

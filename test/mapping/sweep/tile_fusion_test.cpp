@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "test/mapping/kernels/fast_kernels.h"
-#include "test/mapping/sweep/rays_at.h"
+#include "test/mapping/sweep/sweep_case.h"
 
 namespace efm {
 namespace {

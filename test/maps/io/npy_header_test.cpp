@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

@@ -15,7 +15,6 @@
 #include <sstream>
 
 #include "mapping/base/atomic_file.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -6,7 +6,7 @@
 
 #include <random>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

@@ -9,7 +9,6 @@
 #include <nlohmann/json.hpp>
 
 #include "maps/io/point_cloud_file.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"
 

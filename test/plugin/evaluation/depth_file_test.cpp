@@ -10,7 +10,6 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "mapping/base/atomic_file.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

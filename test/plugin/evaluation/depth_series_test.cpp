@@ -6,7 +6,6 @@
 
 #include <fstream>
 
-#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

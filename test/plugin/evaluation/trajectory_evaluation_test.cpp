@@ -10,7 +10,6 @@
 #include <tuple>
 
 #include "mapping/geometry/trajectory.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

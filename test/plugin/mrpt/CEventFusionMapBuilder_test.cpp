@@ -17,8 +17,8 @@
 #include <string>
 #include <thread>
 
-#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

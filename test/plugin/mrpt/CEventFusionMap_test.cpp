@@ -17,8 +17,8 @@
 
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

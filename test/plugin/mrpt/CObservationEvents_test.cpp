@@ -13,7 +13,7 @@
 #include "plugin/mrpt/event_encoding.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

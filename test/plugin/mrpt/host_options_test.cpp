@@ -11,7 +11,6 @@
 #include <sstream>
 
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -11,7 +11,7 @@
 
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/recordings/open/shaken_recording.h"
+#include "test/plugin/session/synthetic_recording.h"
 
 namespace efm {
 namespace {

@@ -12,7 +12,6 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "test/paths.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

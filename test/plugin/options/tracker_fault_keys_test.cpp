@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "mapping/geometry/rigid3.h"
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

@@ -16,9 +16,7 @@
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/open/rawlog.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/recordings/open/dataset_of.h"
 #include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 

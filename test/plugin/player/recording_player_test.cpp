@@ -9,9 +9,8 @@
 #include <set>
 
 #include "plugin/recordings/open/perturbed_recording.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/recordings/open/listed_recording.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "test/memory/failing_allocation.h"
-#include "test/plugin/recordings/open/shaken_recording.h"
 #include "test/plugin/session/session_driver.h"
+#include "test/plugin/session/synthetic_recording.h"
 
 namespace efm {
 namespace {

@@ -7,8 +7,8 @@
 #include <functional>
 #include <memory>
 
-#include "test/plugin/recordings/open/shaken_recording.h"
 #include "test/plugin/session/session_driver.h"
+#include "test/plugin/session/synthetic_recording.h"
 
 namespace efm {
 namespace {

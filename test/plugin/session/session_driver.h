@@ -11,8 +11,8 @@
 
 #include "plugin/session/mapping_session.h"
 #include "test/maps/cloud/cloud_points.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/session/synthetic_recording.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 

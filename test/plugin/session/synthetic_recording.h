@@ -2,10 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "mapping/events/event.h"
@@ -13,6 +17,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/options/option_file.h"
+#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 
@@ -118,6 +123,60 @@ inline EventFusionOptions syntheticOptions() {
   options.mapper.fill_last_window = false;  // as in live operation, which is compared with playback
   options.mapper.keyframe.planes = {1, 5, 30, PlaneSpacing::kInverse};
   options.mapper.keyframe.extraction.threshold_c = 60;  // lone dots stand out far
+  return options;
+}
+
+/// Writes a synthetic recording as a dataset folder.
+inline void writeDataset(const SyntheticRecording& recording, const std::filesystem::path& folder) {
+  Rig rig;
+  rig.cameras = recording.cameras;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const auto camera = folder / ("cam" + std::to_string(c));
+    std::filesystem::create_directories(camera);
+    writeEvents(camera / "events.txt", recording.events[c]);
+  }
+  std::ofstream(folder / "camchain.yaml") << formatCamchain(rig);
+  writeTumTrajectory(folder / "poses.txt", recording.poses);
+}
+
+/// What a tracker's poses of the synthetic recording err by: each keyframe's on its own.
+struct Shake {
+  double noise_m = 0.01;
+  double noise_rad = 0.005;
+  unsigned seed = 1;
+};
+inline constexpr std::int64_t kShakenWindowNs = 100'000'000;
+
+/// The recording with poses that err, by the same within each window of 0.1 s.
+inline SyntheticRecording shaken(SyntheticRecording recording, const Shake& shake = {}) {
+  std::mt19937 random(shake.seed);
+  std::normal_distribution<double> normal;
+  const auto draw = [&](double sigma) {
+    const double x = normal(random);
+    const double y = normal(random);
+    return Eigen::Vector3d(sigma * Eigen::Vector3d(x, y, normal(random)));
+  };
+  std::int64_t window = -1;
+  Rigid3 T_rig_shaken;
+  for (StampedPose& pose : recording.poses) {
+    const std::int64_t within = (pose.t_ns - SyntheticRecording::kStartNs) / kShakenWindowNs;
+    if (std::exchange(window, within) != within) {
+      const Eigen::Vector3d turn = draw(shake.noise_rad);
+      T_rig_shaken.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized());
+      T_rig_shaken.translation = draw(shake.noise_m);
+    }
+    pose.T_world_rig = pose.T_world_rig * T_rig_shaken;
+  }
+  return recording;
+}
+
+/// Options that suit it: a keyframe in each window, whose poses are refined.
+inline EventFusionOptions refinedOptions() {
+  EventFusionOptions options = syntheticOptions();
+  options.mapper.policy.window_s = 0.1;
+  options.mapper.policy.stride_s = 0.1;
+  options.cloud.voxel_size_m = 0.02;
+  options.refinement.enabled = true;
   return options;
 }
 

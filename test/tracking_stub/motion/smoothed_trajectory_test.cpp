@@ -9,7 +9,7 @@
 #include <functional>
 #include <stdexcept>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 #include "tracking_stub/random/random_numbers.h"
 
 namespace efm {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

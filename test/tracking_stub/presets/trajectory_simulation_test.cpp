@@ -7,10 +7,10 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 #include "test/tracking_stub/presets/visible_depths.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
-#include "test/tracking_stub/scenes/ray_cast.h"
+#include "test/tracking_stub/truth/nearest_surface.h"
 #include "tracking_stub/presets/presets.h"
 
 namespace efm {

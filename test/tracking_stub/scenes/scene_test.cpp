@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "test/tracking_stub/scenes/edge_scene.h"
-#include "test/tracking_stub/scenes/ray_cast.h"
+#include "test/tracking_stub/truth/nearest_surface.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/rendering/frame_renderer.h"
 

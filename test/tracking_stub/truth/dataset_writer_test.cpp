@@ -11,7 +11,6 @@
 
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/trajectory.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 #include "test/tracking_stub/scenes/edge_scene.h"
 #include "tracking_stub/rendering/frame_renderer.h"

@@ -15,7 +15,6 @@
 #include "test/paths.h"
 #include "test/plugin/recordings/bags/bag_bytes.h"
 #include "test/plugin/recordings/bags/ros_message_bytes.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -15,7 +15,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_events.h"
 #include "test/plugin/recordings/bags/ros_message_bytes.h"
-#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

@@ -8,8 +8,6 @@
 #include <mrpt/poses/CPose3D.h>
 #include <mrpt/poses/CPose3DQuat.h>
 
-#include "test/plugin/message_of.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

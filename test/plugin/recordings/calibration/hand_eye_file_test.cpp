@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

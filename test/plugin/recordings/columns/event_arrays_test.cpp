@@ -14,7 +14,6 @@
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/paths.h"
 #include "test/plugin/recordings/columns/zip_file.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"

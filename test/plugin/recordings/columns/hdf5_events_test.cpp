@@ -23,7 +23,6 @@
 #include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/writers/hdf5_writer.h"
 #include "test/paths.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 #include "tracking_stub/truth/dataset_writer.h"

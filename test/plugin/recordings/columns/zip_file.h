@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 

@@ -12,7 +12,6 @@
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/text/event_text.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

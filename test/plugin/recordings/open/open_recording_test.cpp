@@ -10,8 +10,6 @@
 #include <vector>
 
 #include "plugin/mrpt/CObservationEvents.h"
-#include "test/plugin/message_of.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -10,9 +10,8 @@
 
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/open/time_cut.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/recordings/open/listed_recording.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

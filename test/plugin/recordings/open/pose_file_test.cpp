@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "test/plugin/recordings/columns/zip_file.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -12,9 +12,7 @@
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/registration.h"
 #include "plugin/recordings/open/rawlog.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

@@ -11,7 +11,6 @@
 
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

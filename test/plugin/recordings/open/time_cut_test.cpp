@@ -6,9 +6,8 @@
 #include <mrpt/obs/CObservationComment.h>
 
 #include "plugin/mrpt/pose_observation.h"
-#include "test/plugin/message_of.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/recordings/open/listed_recording.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "test/plugin/recordings/columns/zip_file.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

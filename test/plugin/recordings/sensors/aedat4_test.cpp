@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "plugin/recordings/open/recording_formats.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -10,7 +10,6 @@
 
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/paths.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/sensors/evt_words.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"

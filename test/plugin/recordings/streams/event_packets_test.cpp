@@ -14,8 +14,6 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/text/event_text.h"
-#include "test/plugin/message_of.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 

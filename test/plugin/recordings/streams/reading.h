@@ -13,7 +13,7 @@
 
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/event_packets.h"
-#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 

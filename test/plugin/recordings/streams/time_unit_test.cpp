@@ -8,7 +8,7 @@
 #include <string>
 
 #include "mapping/base/text.h"
-#include "test/plugin/recordings/open/files.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

@@ -13,7 +13,6 @@
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/text/event_text.h"
 #include "test/plugin/recordings/columns/zip_file.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 

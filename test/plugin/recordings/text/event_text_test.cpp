@@ -11,7 +11,6 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/event_packets.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
 

@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "test/plugin/message_of.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {

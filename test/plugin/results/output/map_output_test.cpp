@@ -14,8 +14,6 @@
 
 #include "mapping/base/atomic_file.h"
 #include "plugin/results/output/keyframe_writer.h"
-#include "test/plugin/message_of.h"
-#include "test/plugin/recordings/open/files.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {

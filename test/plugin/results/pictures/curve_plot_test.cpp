@@ -7,8 +7,8 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "test/plugin/message_of.h"
 #include "test/plugin/results/pictures/sketch.h"
+#include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
