@@ -1,16 +1,69 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/geometry/reference_view.h"
-
 #include <gtest/gtest.h>
-
+#include <rapidcheck/gtest.h>
 #include <Eigen/Geometry>
-#include <cmath>
 
+#include <cmath>
+#include <stdexcept>
+
+#include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/rigid3.h"
+#include "mapping/geometry/timestamp.h"
 #include "test/mapping/base/refused_option.h"
 
 namespace efm::reference_view_test {
 namespace {
+
+TEST(DepthPlanes, AreUniformBetweenExactLimits) {
+  for (const PlaneSpacing spacing : {PlaneSpacing::kInverse, PlaneSpacing::kLinear}) {
+    const bool inverse = spacing == PlaneSpacing::kInverse;
+    for (const int count : {1, 2, 3, 100, 500}) {
+      const DepthPlanes planes({0.47, 2.4, count, spacing});
+      ASSERT_EQ(planes.size(), count);
+      EXPECT_EQ(planes.depth(0), 0.47);
+      EXPECT_EQ(planes.depth(count - 1), count == 1 ? 0.47 : 2.4);
+      const int last = std::max(1, count - 1);
+      for (double position = 0; position <= count - 1; position += 0.25) {
+        const double way = position / last;
+        const double expected =
+            inverse ? 1 / (1 / 0.47 + way * (1 / 2.4 - 1 / 0.47)) : 0.47 + way * (2.4 - 0.47);
+        EXPECT_NEAR(planes.depthAt(position), expected, 1e-12) << position << " of " << count;
+        if (position == std::floor(position)) {
+          EXPECT_EQ(planes.depth(static_cast<int>(position)), planes.depthAt(position));
+        }
+      }
+    }
+  }
+}
+
+TEST(DepthPlanes, StepsAreDistancesOfPlanesInInverseDepth) {
+  for (const int count : {2, 100}) {
+    const DepthPlanes inverse({0.5, 5.0, count, PlaneSpacing::kInverse});
+    const double step = (1 / 0.5 - 1 / 5.0) / (count - 1);
+    EXPECT_NEAR(inverse.inverseDepthStep(), step, 1e-15);
+    for (const double way : {0.0, 0.002, 0.005, 0.4, 0.999, 1.0}) {
+      EXPECT_NEAR(inverse.inverseDepthStepAt(way * (count - 1)), step, 1e-12) << way;
+    }
+  }
+  // 1, 1.5, 2, 2.5 and 3 m: half a plane to either side, as far as there are planes.
+  const DepthPlanes linear({1.0, 3.0, 5, PlaneSpacing::kLinear});
+  EXPECT_NEAR(linear.inverseDepthStep(), 1 - 1 / 1.5, 1e-15);
+  EXPECT_NEAR(linear.inverseDepthStepAt(0), (1 - 1 / 1.25) / 0.5, 1e-12);
+  EXPECT_NEAR(linear.inverseDepthStepAt(2), 1 / 1.75 - 1 / 2.25, 1e-12);
+  EXPECT_NEAR(linear.inverseDepthStepAt(3.8), (1 / 2.65 - 1.0 / 3) / 0.7, 1e-12);
+  const DepthPlanes one({0.5, 5.0, 1, PlaneSpacing::kInverse});
+  EXPECT_EQ(one.inverseDepthStep(), 0);
+  EXPECT_EQ(one.inverseDepthStepAt(0), 0);
+}
+
+TEST(DepthPlanes, OptionsHaveTheirLimits) {
+  using O = DepthPlanesOptions;
+  test::expectLimits<O>({{"min_depth_m", &O::min_depth_m, {0.001, 4.999}, {0, -1, 0.000999, NAN}},
+                         {"max_depth_m", &O::max_depth_m, {0.501, 1e6}, {0.5, 0.001, 0, 1'000'001}},
+                         {"max_depth_m", &O::max_depth_m, {}, {INFINITY, NAN}},
+                         {"num_planes", &O::num_planes, {1, 100'000}, {0, 100'001}}});
+  EXPECT_THROW(DepthPlanes({2, 1, 10, PlaneSpacing::kInverse}), std::invalid_argument);
+}
 
 /// Pixels that are not squares, a principal point that is not in the middle.
 const CameraModel kModel{120, 80, 95.0, 90.0, 62.3, 37.1, DistortionModel::kNone, {}};
@@ -91,5 +144,92 @@ TEST(ReferenceView, OptionsHaveTheirLimits) {
   EXPECT_THROW(makeReferenceView(kModel, sized(10'033, {})), std::invalid_argument);
 }
 
+TEST(Timestamp, DecimalTextIsReadToTheNanosecond) {
+  const struct {
+    const char* text;
+    std::int64_t t_ns;
+    int exponent = 0;  // of the unit
+  } cases[] = {
+      {"1700000000.123456789", 1'700'000'000'123'456'789},
+      {"0.003811000", 3'811'000},
+      {"12", 12'000'000'000},
+      {"-0.5", -500'000'000},
+      {"+.25", 250'000'000},
+      {"7.", 7'000'000'000},
+      {"1.5e-3", 1'500'000},
+      {"2E1", 20'000'000'000},
+      {"1.470419093562843323e+09", 1'470'419'093'562'843'323},
+      {"1e-1000", 0},
+      {"0e1000", 0},
+      {"0.0000000014", 1},
+      {"0.0000000015", 2},
+      {"-0.0000000015", -2},
+      {"0.9999999999", 1'000'000'000},
+      {"5e-10", 1},
+      {"4e-10", 0},
+      {"9e-11", 0},
+      {"9223372036.854775807", kMaxTimeNs},
+      {"-9223372036.854775807", -kMaxTimeNs},
+      {"12.5", 12'500, -6},
+      {"-12.5e3", -12'500'000, -6},
+      {"7.5", 8, -9},
+  };
+  for (const auto& c : cases) EXPECT_EQ(parseTimeIn(c.text, c.exponent), c.t_ns) << c.text;
+  EXPECT_EQ(parseSeconds("12.5"), 12'500'000'000);
+}
+
+TEST(Timestamp, TextThatIsNoNumberOrDoesNotFitIsRefused) {
+  for (const char* text : {"",
+                           "-",
+                           "+",
+                           ".",
+                           "abc",
+                           "1,5",
+                           "0x10",
+                           "1.5s",
+                           "1 ",
+                           " 1",
+                           "1e",
+                           "nan",
+                           "inf",
+                           "1.2.3",
+                           "--1",
+                           "1e99999",
+                           "0e1001",
+                           "1e-1001",
+                           "1e+-5",
+                           "1e-+5",
+                           "1e-2147483648",
+                           "1e18",
+                           "9223372036.854775808",
+                           "9223372036.8547758075"}) {
+    EXPECT_EQ(parseSeconds(text), std::nullopt) << "'" << text << "'";
+  }
+}
+
+TEST(Timestamp, FormattingHasNineDecimals) {
+  EXPECT_EQ(formatSeconds(1'700'000'000'123'456'789), "1700000000.123456789");
+  EXPECT_EQ(formatSeconds(-1), "-0.000000001");
+  EXPECT_EQ(formatSeconds(0), "0.000000000");
+  EXPECT_EQ(formatSeconds(kMinTimeNs), "-9223372036.854775808");
+}
+
+RC_GTEST_PROP(Timestamp, ParsingUndoesFormatting, (std::int64_t t_ns)) {
+  RC_PRE(t_ns != kMinTimeNs);
+  RC_ASSERT(parseSeconds(formatSeconds(t_ns)) == t_ns);
+}
+
+TEST(Timestamp, DurationsAreRoundedAndMustFit) {
+  EXPECT_EQ(durationFromSeconds(0.1), 100'000'000);
+  EXPECT_EQ(durationFromSeconds(-1.5), -1'500'000'000);
+  EXPECT_EQ(durationFromSeconds(0.6e-9), 1);
+  EXPECT_EQ(durationFromSeconds(9.1e9), 9'100'000'000'000'000'000);
+  for (const double wrong_s : {9.2e9, -9.2e9, 1e30, std::nan("")}) {
+    EXPECT_THROW(durationFromSeconds(wrong_s), std::invalid_argument) << wrong_s;
+  }
+  EXPECT_EQ(secondsBetween(1'000'000'000, 3'500'000'000), 2.5);
+}
+
 }  // namespace
+
 }  // namespace efm::reference_view_test

@@ -1,7 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/cloud/keyframe_cloud.h"
-
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+#include "maps/cloud/keyframe_cloud.h"
+#include "test/maps/cloud/cloud_points.h"
 
 namespace efm {
 namespace {
@@ -75,5 +83,268 @@ TEST(KeyframeCloud, ImagesOfAnotherSizeThanTheViewAreRefused) {
   }
 }
 
+Rigid3 randomPose(std::mt19937& random, double extent_m, double extent_rad) {
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto draw = [&] {
+    const double x = uniform(random);
+    const double y = uniform(random);
+    return Eigen::Vector3d(x, y, uniform(random));
+  };
+  const Eigen::Vector3d rotation = extent_rad * draw();
+  Rigid3 T_world_ref;
+  T_world_ref.rotation = Eigen::AngleAxisd(rotation.norm(), rotation.normalized());
+  T_world_ref.translation = extent_m * draw();
+  return T_world_ref;
+}
+
+/// Points in front of a view, on a surface that all views share.
+std::vector<ViewPoint> randomPoints(std::mt19937& random, std::size_t count) {
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  std::vector<ViewPoint> points;
+  while (points.size() < count) {
+    const float x = uniform(random);
+    const float y = uniform(random);
+    const float depth_m = 2 + 0.2F * uniform(random);
+    const float confidence = 1 + uniform(random) / 2;
+    points.push_back({{x, y, depth_m}, confidence, 0.01F * confidence});
+  }
+  return points;
+}
+
+GlobalCloudOptions optionsOf(Consistency consistency) {
+  GlobalCloudOptions options;
+  options.voxel_size_m = 0.05;
+  options.consistency.consistency = consistency;
+  return options;
+}
+
+/// Keyframes, and a new map of them.
+struct PosedKeyframes {
+  std::vector<std::vector<ViewPoint>> points;
+  std::vector<Rigid3> T_world_ref;
+
+  MapCloud::ConstPtr pointsOf(const GlobalCloudOptions& options) const {
+    GlobalCloud cloud(options);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      cloud.insert(i, pointsInWorld(points[i], T_world_ref[i]), T_world_ref[i]);
+    }
+    return cloud.points();
+  }
+};
+
+// Keyframes of an earlier map, new ones, motions and `applyPending` in any order.
+RC_GTEST_PROP(RefinedCloud, IsANewMapOfTheSameKeyframes, ()) {
+  const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  RefinedCloud cloud(options, RefinedCloud::kAll);
+  PosedKeyframes keyframes;
+  const std::size_t fixed = random() % 4;
+  for (std::size_t i = 0; i < fixed; ++i) {
+    keyframes.points.push_back(randomPoints(random, random() % 80));
+    keyframes.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
+    cloud.insertFixed(pointsInWorld(keyframes.points[i], keyframes.T_world_ref[i]),
+                      keyframes.T_world_ref[i]);
+  }
+  std::vector<Rigid3> asked = keyframes.T_world_ref;
+  for (int step = 0; step < 40; ++step) {
+    const std::size_t count = keyframes.points.size() - fixed;
+    const unsigned what = random() % 4;
+    if (what == 0 || count == 0) {
+      keyframes.points.push_back(randomPoints(random, random() % 80));
+      keyframes.T_world_ref.push_back(randomPose(random, 0.2, 0.1));
+      asked.push_back(keyframes.T_world_ref.back());
+      cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
+    } else if (what < 3) {
+      const std::size_t moved = random() % count;
+      const double extent = std::pow(10.0, -static_cast<double>(random() % 5));
+      asked[fixed + moved] = asked[fixed + moved] * randomPose(random, extent, extent);
+      cloud.move({{moved, asked[fixed + moved]}});
+    } else {
+      cloud.applyPending(random() % 2 == 0 ? 0 : 0.01, random() % 6);
+    }
+    // The map has the poses that it states, pending or not.
+    for (std::size_t i = 0; i < keyframes.points.size() - fixed; ++i) {
+      keyframes.T_world_ref[fixed + i] = cloud.T_world_ref()[i];
+    }
+    RC_ASSERT(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
+  }
+  cloud.applyPending(0);
+  for (std::size_t i = fixed; i < asked.size(); ++i) {
+    RC_ASSERT(isSame(cloud.T_world_ref()[i - fixed], asked[i]));
+  }
+  keyframes.T_world_ref = asked;
+  RC_ASSERT(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
+}
+
+TEST(RefinedCloud, AKeyframeWithinTheToleranceStays) {
+  std::mt19937 random(2);
+  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
+  for (int i = 0; i < 2; ++i) cloud.insert({{{0, 0, 2}, 1}, {{0, 0, 4}, 1}}, {});
+  Rigid3 T_shifted;
+  T_shifted.translation = {0.003, 0, 0};
+  Rigid3 T_rotated;  // 4 m away: 0.004 m
+  T_rotated.rotation = Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitY());
+  cloud.move({{0, T_shifted}});
+  cloud.move({{1, T_rotated}});
+
+  cloud.applyPending(0.0045);
+  EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {}));
+  EXPECT_TRUE(isSame(cloud.T_world_ref()[1], {}));
+  cloud.applyPending(0.0035);
+  EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {}));
+  EXPECT_TRUE(isSame(cloud.T_world_ref()[1], T_rotated));
+  cloud.applyPending(0.0025);
+  EXPECT_TRUE(isSame(cloud.T_world_ref()[0], T_shifted));
+}
+
+TEST(RefinedCloud, WithoutToleranceTheLastDigitsCount) {
+  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
+  std::mt19937 random(2);
+  for (int i = 0; i < 200; ++i) {
+    const Rigid3 T_world_ref = randomPose(random, 1, 1);
+    Rigid3 T_nearest_ref = T_world_ref;
+    T_nearest_ref.rotation.x() = std::nextafter(T_nearest_ref.rotation.x(), 2);
+    cloud.insert({{{0, 0, 2}, 1}}, T_world_ref);
+    cloud.move({{cloud.T_world_ref().size() - 1, T_nearest_ref}});
+    cloud.applyPending(0);
+    EXPECT_TRUE(isSame(cloud.T_world_ref().back(), T_nearest_ref));
+  }
+}
+
+TEST(RefinedCloud, MovesTheOldestFirstUpToTheMaximum) {
+  RefinedCloud cloud(optionsOf(Consistency::kNone), RefinedCloud::kAll);
+  Rigid3 T_world_ref;
+  T_world_ref.translation = {1, 0, 0};
+  for (std::size_t i = 0; i < 5; ++i) cloud.insert({{{0, 0, 2}, 1}}, {});
+  for (const std::size_t i : {4U, 0U, 2U, 3U}) cloud.move({{i, T_world_ref}});
+  const auto moved = [&] {
+    std::vector<std::size_t> numbers;
+    for (std::size_t i = 0; i < 5; ++i) {
+      if (isSame(cloud.T_world_ref()[i], T_world_ref)) numbers.push_back(i);
+    }
+    return numbers;
+  };
+  cloud.applyPending(0.1, 0);
+  EXPECT_EQ(moved(), (std::vector<std::size_t>{}));
+  cloud.applyPending(0.1, 2);
+  EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2}));
+  cloud.applyPending(0.1, 1);
+  EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2, 3}));
+  cloud.applyPending(0.1);
+  EXPECT_EQ(moved(), (std::vector<std::size_t>{0, 2, 3, 4}));
+}
+
+TEST(RefinedCloud, RefusesToMoveWhatItDoesNotHaveOrHold) {
+  using Poses = std::map<std::size_t, Rigid3>;
+  Rigid3 T_world_ref;
+  T_world_ref.translation = {1, 0, 0};
+  for (const std::size_t movable : {RefinedCloud::kAll, std::size_t{0}}) {
+    RefinedCloud cloud(optionsOf(Consistency::kNone), movable);
+    cloud.insertFixed({{{0, 0, 2}, 1}}, {});
+    EXPECT_THROW(cloud.move({{0, T_world_ref}}), std::invalid_argument) << "an earlier map's";
+    cloud.insert({{{0, 0, 2}, 1}}, {});
+    const Poses beyond = {{0, T_world_ref}, {1, T_world_ref}};
+    EXPECT_THAT(
+        [&] {
+          cloud.move(movable > 0 ? beyond : Poses{{0, T_world_ref}});
+        },
+        testing::ThrowsMessage<std::invalid_argument>(
+            testing::HasSubstr(movable > 0 ? "not in the cloud" : "are fixed")));
+    cloud.applyPending(0);
+    EXPECT_TRUE(isSame(cloud.T_world_ref()[0], {})) << "nothing was requested";
+    EXPECT_THROW(cloud.insertFixed({}, {}), std::invalid_argument);
+  }
+}
+
+TEST(RefinedCloud, OnlyTheNewestKeyframesMoveAndTheMapIsThatOfTheirPoses) {
+  std::mt19937 random(5);
+  GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
+  options.voxel_size_m = 0.001;  // a voxel for almost each point: enough of them settle
+  constexpr std::size_t kMovable = 3;
+  RefinedCloud cloud(options, kMovable);
+  cloud.insertFixed({}, {});
+  PosedKeyframes keyframes;
+  std::size_t stayed = 0;
+  for (std::size_t k = 0; k < 32; ++k) {
+    // Five keyframes make the 200,000 voxels that are worth a merge.
+    keyframes.points.push_back(randomPoints(random, k % 12 < 5 ? 42'000 : 500));
+    cloud.insert(keyframes.points.back(), randomPose(random, 0.1, 0.1));
+    // The newest one, the oldest that may move, and some of all.
+    std::map<std::size_t, Rigid3> moves{{k, randomPose(random, 0.1, 0.1)}};
+    if (k >= kMovable) moves[k - kMovable] = randomPose(random, 0.1, 0.1);
+    for (int i = 0; i < 2; ++i) moves[random() % (k + 1)] = randomPose(random, 0.1, 0.1);
+    cloud.move(moves);
+    if (k % 3 != 2) continue;  // others stay pending while keyframes are settled
+    cloud.applyPending(0);
+    for (const auto& [keyframe, T_world_ref] : moves) {
+      const bool moved = isSame(cloud.T_world_ref()[keyframe], T_world_ref);
+      EXPECT_TRUE(moved || keyframe + kMovable < k) << keyframe << " of " << k;
+      if (!moved) ++stayed;
+    }
+  }
+  EXPECT_GT(cloud.cloud().settledVoxels(), 0U);
+  EXPECT_GT(stayed, 0U);
+  cloud.applyPending(0);
+  GlobalCloud same(options);
+  same.insert(0, {}, Rigid3{});
+  for (std::size_t k = 0; k < keyframes.points.size(); ++k) {
+    const Rigid3& T_world_ref = cloud.T_world_ref()[k];
+    same.insert(k + 1, pointsInWorld(keyframes.points[k], T_world_ref), T_world_ref);
+  }
+  EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *same.points()));
+}
+
+TEST(RefinedCloud, KeyframesThatNeverMoveSettleToo) {
+  GlobalCloudOptions options = optionsOf(Consistency::kNone);
+  options.voxel_size_m = 0.001;
+  using Case = std::pair<std::size_t, std::size_t>;
+  for (const auto& [movable, of_earlier_map] : {Case{0, 0}, {0, 2}, {3, 20}}) {
+    std::mt19937 random(6);
+    RefinedCloud cloud(options, movable);
+    GlobalCloud same(options);
+    for (std::size_t k = 0; k < 24; ++k) {
+      const std::vector<ViewPoint> points = randomPoints(random, k < 6 ? 42'000 : 500);
+      const Rigid3 T_world_ref = randomPose(random, 0.1, 0.1);
+      const std::vector<CloudPoint> in_world = pointsInWorld(points, T_world_ref);
+      k < of_earlier_map ? cloud.insertFixed(in_world, T_world_ref)
+                         : cloud.insert(points, T_world_ref);
+      same.insert(k, in_world, T_world_ref);
+    }
+    EXPECT_GT(cloud.cloud().settledVoxels(), 0U) << movable << ", " << of_earlier_map;
+    EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *same.points()));
+  }
+}
+
+TEST(RefinedCloud, WithoutItsNewestKeyframeOrAfterARefusedMoveItIsAsBefore) {
+  std::mt19937 random(4);
+  const GlobalCloudOptions options = optionsOf(Consistency::kVisibility);
+  RefinedCloud cloud(options, RefinedCloud::kAll);
+  PosedKeyframes keyframes;
+  for (int i = 0; i < 3; ++i) {
+    keyframes.points.push_back(randomPoints(random, 50));
+    keyframes.T_world_ref.push_back(randomPose(random, 0.1, 0.1));
+    cloud.insert(keyframes.points.back(), keyframes.T_world_ref.back());
+  }
+  cloud.insert(randomPoints(random, 50), {});
+  cloud.move({{3, randomPose(random, 1, 1)}});
+  cloud.removeNewest();
+  cloud.applyPending(0);
+  EXPECT_EQ(cloud.T_world_ref().size(), 3U);
+  EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
+  for (const double too_far_m : {1e30, std::numeric_limits<double>::quiet_NaN()}) {
+    Rigid3 T_world_ref;
+    T_world_ref.translation = {too_far_m, 0, 0};
+    cloud.move({{1, T_world_ref}});
+    EXPECT_THROW(cloud.applyPending(0), std::invalid_argument);
+    EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
+    EXPECT_NO_THROW(cloud.applyPending(0)) << "it is not tried again";
+  }
+  keyframes.T_world_ref[1] = randomPose(random, 0.1, 0.1);
+  cloud.move({{1, keyframes.T_world_ref[1]}});
+  cloud.applyPending(0);
+  EXPECT_TRUE(test::sameBits(*cloud.cloud().points(), *keyframes.pointsOf(options)));
+}
+
 }  // namespace
+
 }  // namespace efm

@@ -1,17 +1,178 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Graphs of many keyframes.
-#include "maps/refinement/keyframe_graph.h"
-
 #include <gtest/gtest.h>
+#include <Eigen/Cholesky>
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "edges.h"
 #include "mapping/geometry/rigid3.h"
+#include "maps/refinement/keyframe_graph.h"
+#include "maps/refinement/tracker_model.h"
 #include "random_poses.h"
+#include "test/maps/refusals.h"
 
 namespace efm {
+namespace {
+
+using test::drawVector;
+using test::emptyKeyframe;
+using test::smallView;
+
+/// Samples from the model: a tracker with these errors, and points with 2 mm and 0.1 deg.
+std::vector<MotionSample> drawSamples(const TrackerErrors& truth, int count, double path_length_m,
+                                      std::mt19937& random) {
+  std::vector<MotionSample> samples;
+  for (int i = 0; i < count; ++i) {
+    MotionSample sample;
+    sample.path_length_m = path_length_m * (1 + i % 4);
+    sample.covariance = test::covarianceOf(0.002, 0.1 * kRadiansPerDegree);
+    const Matrix6d all = sample.covariance + 2 * truth.noiseCovariance() +
+                         truth.driftCovariance(sample.path_length_m);
+    Vector6d unit;
+    unit << drawVector(1, random), drawVector(1, random);
+    sample.difference = all.llt().matrixL() * unit;
+    samples.push_back(sample);
+  }
+  return samples;
+}
+
+bool same(const TrackerErrors& a, const TrackerErrors& b) {
+  return a.noise_m == b.noise_m && a.noise_rad == b.noise_rad && a.drift_m == b.drift_m &&
+         a.drift_rad == b.drift_rad;
+}
+
+TEST(TrackerErrors, CovariancesAreWorkedOutByHand) {
+  const TrackerErrors errors{0.03, 0.02, 0.01, 0.005};
+  Vector6d noise;
+  noise << Eigen::Vector3d::Constant(9e-4 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
+  EXPECT_LT((errors.noiseCovariance() - Matrix6d(noise.asDiagonal())).norm(), 1e-15);
+  Vector6d drift;  // a random walk: a quarter of a metre has half of a metre's standard deviation
+  drift << Eigen::Vector3d::Constant(2.5e-5 + 1e-8), Eigen::Vector3d::Constant(6.25e-6 + 1e-10);
+  EXPECT_LT((errors.driftCovariance(0.25) - Matrix6d(drift.asDiagonal())).norm(), 1e-15);
+  Vector6d far;  // always in one direction: 4 m have four times as much
+  far << Eigen::Vector3d::Constant(1.6e-3 + 1e-8), Eigen::Vector3d::Constant(4e-4 + 1e-10);
+  EXPECT_LT((errors.driftCovariance(4) - Matrix6d(far.asDiagonal())).norm(), 1e-15);
+}
+
+/// The logarithm of the probability of errors, by the model that `estimateTrackerErrors` states:
+/// Student's t-distribution of 10 degrees of freedom, two samples as one, lognormal priors.
+double logPosterior(const std::vector<MotionSample>& samples, const TrackerErrors& errors,
+                    const TrackerErrors& expected) {
+  double sum = 0;
+  for (const MotionSample& sample : samples) {
+    const Matrix6d covariance = sample.covariance + errors.noiseCovariance(sample.from) +
+                                errors.noiseCovariance(sample.to) +
+                                errors.driftCovariance(sample.path_length_m);
+    const double squared = sample.difference.dot(covariance.inverse() * sample.difference);
+    sum -= 0.25 * std::log(covariance.determinant()) + 4 * std::log(1 + squared / 10);
+  }
+  const auto prior = [](double error, double expected_error, double factor) {
+    return -0.5 * std::pow(std::log(error / expected_error) / std::log(factor), 2);
+  };
+  return sum + prior(errors.noise_m, expected.noise_m, 10) +
+         prior(errors.noise_rad, expected.noise_rad, 10) +
+         prior(errors.drift_m, expected.drift_m, 2) +
+         prior(errors.drift_rad, expected.drift_rad, 2);
+}
+
+TEST(EstimateTrackerErrors, IsAsLikelyAsItsNeighboursAtLeast) {
+  constexpr double TrackerErrors::*kFields[] = {&TrackerErrors::noise_m, &TrackerErrors::noise_rad,
+                                                &TrackerErrors::drift_m, &TrackerErrors::drift_rad};
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    std::mt19937 random(seed);
+    const TrackerErrors expected{0.02, 0.004, 0.01, 0.003};
+    TrackerErrors truth = expected;
+    truth.*kFields[seed % 4] *= seed % 2 == 0 ? 5 : 0.2;
+    auto samples = drawSamples(truth, 20, 0.3, random);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      samples[i].from = {0.5 + 0.1 * static_cast<double>(i), 2};
+      samples[i].to = {1, 0.3 * static_cast<double>(i)};
+    }
+    if (seed > 3) samples[4].difference << drawVector(1, random), drawVector(1, random);  // failed
+    const TrackerErrors found = estimateTrackerErrors(samples, expected);
+    const double best = logPosterior(samples, found, expected);
+    EXPECT_GT(best, logPosterior(samples, expected, expected)) << seed;
+    for (const auto field : kFields) {
+      for (const double change : {-0.25, 0.25}) {  // the last steps
+        TrackerErrors changed = found;
+        changed.*field *= std::exp(change);
+        EXPECT_LT(logPosterior(samples, changed, expected), best + 1e-9) << seed;
+      }
+    }
+  }
+  EXPECT_TRUE(
+      same(estimateTrackerErrors({}, {0.02, 0.01, 0.03, 0.002}), {0.02, 0.01, 0.03, 0.002}));
+}
+
+TEST(TrackerModel, ScalesStatedNoiseIsCautiousAndIncreasesItsDriftToALimit) {
+  const TrackerErrors expected{0.02, 0.004, 0.01, 0};
+  TrackerModel model(expected, true);
+  const NoiseScale scale = model.scaleOf(PoseNoise{0.06, 0.002});
+  EXPECT_DOUBLE_EQ(scale.translation, 3);
+  EXPECT_DOUBLE_EQ(scale.rotation, 0.5);
+  EXPECT_EQ(model.scaleOf({}).translation, 1);
+  EXPECT_EQ(TrackerModel({0, 0, 0, 0}, true).scaleOf(PoseNoise{0.06, 0.002}).rotation, 1);
+  for (const double factor : {3.0, 9.0, 9.0}) {
+    EXPECT_EQ(model.increaseDrift(), model.inGraph().drift_m < 0.08);
+    EXPECT_NEAR(model.inGraph().drift_m, factor * 0.01, 1e-15);
+    EXPECT_EQ(model.inGraph().noise_m, 0.02);
+  }
+  EXPECT_EQ(model.errors().drift_m, 0.01);
+
+  // Exact motions: the estimate falls, but for registrations to a quarter at most.
+  const auto keyframe = [] {
+    return RefinedKeyframe{RegistrationCloud(emptyKeyframe(smallView()), {}), {}, {}, {}};
+  };
+  const RefinedKeyframe from = keyframe();
+  RefinedKeyframe to = keyframe();
+  to.T_odom_ref.translation = {0.1, 0, 0};
+  to.path_length_m = 0.1;
+  RelativePoseFactor factor{0, 1, to.T_odom_ref};
+  factor.sqrt_information *= 1e4;
+  for (int i = 0; i < 30; ++i) model.addSample(factor, from, to);
+  EXPECT_TRUE(same(model.errors(), expected)) << "until the update";
+  model.update();
+  EXPECT_LT(model.errors().noise_m, 0.004);
+  EXPECT_LT(model.errors().noise_rad, 0.0008);
+  EXPECT_EQ(model.cautious().noise_m, 0.005);
+  EXPECT_EQ(model.cautious().noise_rad, 0.001);
+  TrackerModel fixed(expected, false);
+  fixed.addSample(factor, from, to);
+  fixed.update();
+  EXPECT_TRUE(same(fixed.cautious(), expected));
+}
+
+TEST(EstimateTrackerErrors, StaysFiniteWhateverTheSamplesAre) {
+  std::mt19937 random(4);
+  const TrackerErrors expected;
+  for (const double strange : {0.0, 1e12, 1e200, std::numeric_limits<double>::infinity(),
+                               std::numeric_limits<double>::quiet_NaN()}) {
+    auto samples = drawSamples(expected, 10, 0.1, random);
+    samples[3].difference.setConstant(strange);
+    samples[5].path_length_m = strange;
+    EXPECT_TRUE(same(estimateTrackerErrors(samples, {0, 0, 0, 0}), {0, 0, 0, 0})) << strange;
+    const TrackerErrors found = estimateTrackerErrors(samples, expected);
+    for (const double error : {found.noise_m, found.noise_rad, found.drift_m, found.drift_rad}) {
+      EXPECT_TRUE(std::isfinite(error) && error > 0) << strange;
+      EXPECT_LT(error, 1) << strange;
+    }
+  }
+}
+
+TEST(TrackerErrors, ValuesOutOfRangeAreRefusedByName) {
+  constexpr double kMaxRad = 1000 * kRadiansPerDegree;
+  test::expectRange(&TrackerErrors::noise_m, 0, 1000, "tracker_noise_m");
+  test::expectRange(&TrackerErrors::noise_rad, 0, kMaxRad, "tracker_noise_deg");
+  test::expectRange(&TrackerErrors::drift_m, 0, 1000, "tracker_drift");
+  test::expectRange(&TrackerErrors::drift_rad, 0, kMaxRad, "tracker_drift_deg_per_m");
+}
+
+}  // namespace
+
+// Graphs of many keyframes.
+
 namespace {
 
 using test::covarianceOf;
@@ -170,4 +331,5 @@ TEST(WindowGraph, TheErrorOfADenoisedPoseIsTheFirstPosesNoiseAndTheDriftSince) {
 }
 
 }  // namespace
+
 }  // namespace efm

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "maps/refinement/keyframe_registration.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
+#include <rapidcheck/gtest.h>
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include <array>
 #include <cmath>
+#include <limits>
+#include <random>
 
 #include "edges.h"
 #include "mapping/geometry/rigid3.h"
+#include "maps/refinement/keyframe_registration.h"
+#include "maps/refinement/registration_points.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"
 
@@ -175,5 +180,279 @@ TEST(KeyframeRegistrationOptions, ValuesOutOfRangeAreRefusedByName) {
   EXPECT_THAT(messageOf([&] { options.validate(); }), testing::HasSubstr("max_iterations = 0"));
 }
 
+using test::emptyKeyframe;
+using test::smallView;
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kFloatNan = std::numeric_limits<float>::quiet_NaN();
+
+void put(KeyframeDepthMap& keyframe, int x, int y, float depth, float sigma) {
+  keyframe.map.depth(y, x) = depth;
+  keyframe.map.variance(y, x) = sigma * sigma;
+}
+
+/// A wall 2 m before the view.
+KeyframeDepthMap wall(float sigma) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  keyframe.map.depth = 2;
+  keyframe.map.variance = sigma * sigma;
+  return keyframe;
+}
+
+RegistrationCloudOptions few(int max_points, int max_map_points) {
+  RegistrationCloudOptions options;
+  options.max_points = max_points;
+  options.max_map_points = max_map_points;
+  return options;
+}
+
+/// The pixel of a point.
+cv::Point pixelOf(const RegistrationPoint& point) {
+  const Eigen::Vector2d at = smallView().project(point.p_ref.cast<double>());
+  return {static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))};
+}
+
+TEST(RegistrationCloud, HasAtMostTheRequestedNumberOfPoints) {
+  const KeyframeDepthMap keyframe = wall(0.01F);  // 19,200 points
+  for (const auto& [chosen, all] : {std::pair{10, 10}, {100, 350}, {2000, 6000}}) {
+    const RegistrationCloud cloud(keyframe, few(chosen, all));
+    EXPECT_EQ(cloud.numQueryPoints(), static_cast<std::size_t>(chosen));
+    EXPECT_EQ(cloud.points().size(), static_cast<std::size_t>(all));
+  }
+  const RegistrationCloud everything(keyframe, few(100000, 1000000));
+  EXPECT_EQ(everything.numQueryPoints(), 19200U);
+  EXPECT_EQ(everything.points().size(), 19200U);
+}
+
+TEST(RegistrationCloud, SpreadsItsPointsWhereOneCornerIsTheMostCertain) {
+  KeyframeDepthMap keyframe = wall(0.02F);
+  keyframe.map.variance(cv::Rect(0, 0, 80, 60)) = 1e-6F;
+  const RegistrationCloud cloud(keyframe, few(200, 400));
+  std::array<int, 4> of_quadrant{};
+  for (std::size_t i = 0; i < cloud.numQueryPoints(); ++i) {
+    const cv::Point pixel = pixelOf(cloud.points()[i]);
+    ++of_quadrant[(pixel.x >= 80 ? 1 : 0) + (pixel.y >= 60 ? 2 : 0)];
+  }
+  // 100 cells for 400 points: about 25 for each quadrant. Each cell gives one point; the other
+  // points are the most certain ones.
+  for (const int points : of_quadrant) EXPECT_GE(points, 20);
+}
+
+TEST(RegistrationCloud, SelectsTheMostCertainPointsOfACell) {
+  KeyframeDepthMap keyframe = wall(0.02F);
+  for (int y = 0; y < 120; y += 4) {
+    for (int x = 0; x < 160; x += 4) put(keyframe, x, y, 2, 0.002F);  // 1200 of them
+  }
+  const RegistrationCloud cloud(keyframe, few(100, 400));
+  for (std::size_t i = 0; i < cloud.numQueryPoints(); ++i) {
+    const cv::Point pixel = pixelOf(cloud.points()[i]);
+    EXPECT_EQ(pixel.x % 4, 0);
+    EXPECT_EQ(pixel.y % 4, 0);
+  }
+}
+
+TEST(RegistrationCloud, MeasuresCertaintyByDepthNotByItsInverse) {
+  // The same variance of inverse depth: 1 m is known to 2 mm, 4 m to 3.2 cm.
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  for (int x = 40; x < 60; ++x) put(keyframe, x, 50, x < 50 ? 4.0F : 1.0F, 0.002F);
+  const RegistrationCloud cloud(keyframe, few(10, 10));
+  // Cells are 40 px wide: 20 of these, all in one.
+  for (const RegistrationPoint& point : cloud.points()) EXPECT_EQ(point.p_ref.z(), 1.0F);
+}
+
+TEST(RegistrationCloud, AnEdgeIsLongAlongItselfAndUncertainAlongTheRay) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  keyframe.view.cy = 60;  // rays of row 60 lie in the plane y = 0
+  for (const float sigma : {0.004F, 0.0F}) {
+    for (int x = 10; x < 150; ++x) put(keyframe, x, 60, 2, sigma);
+    const RegistrationCloud cloud(keyframe, {});
+    int looked_at = 0;
+    for (const RegistrationPoint& point : cloud.points()) {
+      const double column = keyframe.view.project(point.p_ref.cast<double>()).x();
+      if (column < 13 || column > 146) continue;  // ends
+      ++looked_at;
+      // Seven adjacent pixels of 2 m / 130 have a variance of 4. The position has a sigma of half a
+      // pixel; the depth has 6 sigmas of 2 m times 2 m times sigma along the ray.
+      const double pixel_m = 2.0 / 130;
+      Eigen::Matrix3d expected = std::pow(0.5 * pixel_m, 2) * Eigen::Matrix3d::Identity();
+      expected(0, 0) += 4 * pixel_m * pixel_m;
+      expected(0, 0) += std::pow(100 * pixel_m, 2);  // not measured along an edge
+      const Eigen::Vector3d along = point.p_ref.cast<double>() * 6 * 2 * sigma;
+      expected += along * along.transpose();
+      EXPECT_LT((point.covariance.cast<double>() - expected).cwiseAbs().maxCoeff(), 1e-6)
+          << column;  // floats
+    }
+    EXPECT_EQ(looked_at, 134) << sigma;
+  }
+}
+
+TEST(RegistrationCloud, AnEdgeBehindIsNotPartOfANeighbourhood) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  for (int x = 10; x < 150; ++x) put(keyframe, x, 60, 2, 0.004F);
+  const RegistrationCloud alone(keyframe, {});
+  for (int x = 10; x < 150; ++x) put(keyframe, x, 61, 3, 0.004F);  // 1/6 farther: 42 sigmas
+  const RegistrationCloud both(keyframe, {});
+  std::size_t compared = 0;
+  for (const RegistrationPoint& point : alone.points()) {
+    for (const RegistrationPoint& other : both.points()) {
+      if (other.p_ref != point.p_ref) continue;
+      EXPECT_EQ(other.covariance, point.covariance);
+      ++compared;
+    }
+  }
+  EXPECT_EQ(compared, 140U);
+}
+
+RC_GTEST_PROP(RegistrationCloud, FindsTheSameNeighbourAsBruteForce, ()) {
+  std::mt19937 random(*rc::gen::arbitrary<unsigned>());
+  const test::Edges world = test::edgesAround(40, random);
+  const RegistrationCloud cloud(test::seenFrom(world, {}, kInverseDepthSigma, random), {});
+  const ReferenceView view = smallView();
+  const auto coordinates = [&](const Eigen::Vector3d& p) {
+    const Eigen::Vector2d pixel = view.project(p);
+    return Eigen::Vector3d(pixel.x(), pixel.y(), 1 / p.z() / kInverseDepthSigma);
+  };
+  std::uniform_real_distribution<double> column(-30, 190);
+  std::uniform_real_distribution<double> row(-30, 150);
+  std::uniform_real_distribution<double> depth(1.5, 5);
+  for (int i = 0; i < 100; ++i) {
+    if (i % 40 == 20) cloud.releaseTree();
+    const Eigen::Vector3d p_ref = view.pointAt(column(random), row(random), depth(random));
+    for (const double within_px : {2.0, 16.0}) {
+      double least = std::numeric_limits<double>::infinity();
+      for (const RegistrationPoint& point : cloud.points()) {
+        least =
+            std::min(least, (coordinates(point.p_ref.cast<double>()) - coordinates(p_ref)).norm());
+      }
+      const auto index = cloud.nearest(p_ref, within_px);
+      constexpr double kFloatPx = 1e-3;  // columns and inverse depths of some hundreds
+      if (least < within_px - kFloatPx) RC_ASSERT(index.has_value());
+      if (least > within_px + kFloatPx) RC_ASSERT(!index.has_value());
+      if (!index) continue;
+      const Eigen::Vector3d found = coordinates(cloud.points()[*index].p_ref.cast<double>());
+      RC_ASSERT((found - coordinates(p_ref)).norm() <= least + kFloatPx);
+    }
+  }
+}
+
+TEST(RegistrationCloud, PointsBehindOrOutsideTheViewHaveNoNeighbour) {
+  const RegistrationCloud cloud(wall(0.01F), {});
+  EXPECT_TRUE(cloud.nearest({0, 0, 2}, 2));
+  EXPECT_FALSE(cloud.nearest({0, 0, -2}, 1e4));
+  EXPECT_FALSE(cloud.nearest({0, 0, 0}, 1e4));
+  EXPECT_FALSE(cloud.nearest({1e9, 0, 1e-9}, 1e4));
+  EXPECT_FALSE(cloud.nearest({3, 0, 2}, 2)) << "115 px to the side";
+  EXPECT_TRUE(cloud.nearest({3, 0, 2}, 120));
+  EXPECT_FALSE(cloud.nearest({kFloatNan, 0, 2}, 2));
+  EXPECT_FALSE(cloud.nearest({0, 0, kFloatNan}, 2));
+  EXPECT_FALSE(cloud.nearest({0, 0, kInfinity}, 2));
+}
+
+TEST(RegistrationCloud, PointsBetweenItsMinAndMaxDepthAreInView) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  put(keyframe, 30, 30, 1, 0.01F);
+  put(keyframe, 50, 70, 4, 0.01F);
+  const RegistrationCloud cloud(keyframe, {});
+  EXPECT_TRUE(cloud.isInView({0, 0, 2}));
+  EXPECT_TRUE(cloud.isInView({0, 0, 1.001}));
+  EXPECT_TRUE(cloud.isInView({0, 0, 3.999}));
+  // Three standard deviations of inverse depth, 0.03 1/m, beyond either.
+  EXPECT_TRUE(cloud.isInView({0, 0, 1 / 1.029}));
+  EXPECT_FALSE(cloud.isInView({0, 0, 1 / 1.031}));
+  EXPECT_TRUE(cloud.isInView({0, 0, 1 / 0.221}));
+  EXPECT_FALSE(cloud.isInView({0, 0, 1 / 0.219}));
+  EXPECT_FALSE(cloud.isInView({0, 0, -2}));
+  // Half the view is 79.5 / 130 = 0.61 to the side, 59.5 / 130 = 0.46 up and down.
+  EXPECT_TRUE(cloud.isInView({1.22, 0, 2}));
+  EXPECT_FALSE(cloud.isInView({1.23, 0, 2}));
+  EXPECT_TRUE(cloud.isInView({0, -0.91, 2}));
+  EXPECT_FALSE(cloud.isInView({0, -0.92, 2}));
+  EXPECT_FALSE(cloud.isInView({kFloatNan, 0, 2}));
+  EXPECT_FALSE(cloud.isInView({0, 0, kFloatNan}));
+  EXPECT_DOUBLE_EQ(cloud.middleInverseDepth(), 0.625);
+}
+
+TEST(RegistrationCloud, IgnoresPixelsWithoutADepthOrAVariance) {
+  KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+  put(keyframe, 30, 30, 2, 0.5F);  // an infinite depth is within three sigmas
+  put(keyframe, 31, 30, 2, kInfinity);
+  put(keyframe, 32, 30, 2, kFloatNan);
+  put(keyframe, 33, 30, kFloatNan, 0.01F);
+  put(keyframe, 29, 30, kInfinity, 0.01F);
+  put(keyframe, 35, 30, -2, 0.01F);
+  put(keyframe, 36, 30, 0, 0.01F);
+  keyframe.map.depth(30, 37) = 2;
+  keyframe.map.variance(30, 37) = -1;
+  const RegistrationCloud cloud(keyframe, {});
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_TRUE(cloud.points()[0].covariance.allFinite());
+}
+
+TEST(RegistrationCloud, AnUncertainDepthHasACovarianceWithinAFloat) {
+  for (const float sigma : {1.0F, 31.0F, 1e4F}) {
+    KeyframeDepthMap keyframe = emptyKeyframe(smallView());
+    for (int x = 3; x < 157; x += 7) put(keyframe, x, 5, 3, sigma);
+    const RegistrationCloud cloud(keyframe, {});
+    EXPECT_EQ(cloud.points().size(), 22U) << sigma;
+    for (const RegistrationPoint& point : cloud.points()) {
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(point.covariance.cast<double>());
+      // The square of a thousandth of its length; the rounding of a float is a twentieth of that.
+      const double least = 1e-6 * eigen.eigenvalues().maxCoeff();
+      EXPECT_NEAR(eigen.eigenvalues().minCoeff(), least, 0.3 * least) << sigma;
+    }
+  }
+}
+
+TEST(RegistrationCloud, WithoutPointsNothingIsInView) {
+  const RegistrationCloud cloud(emptyKeyframe(smallView()), {});
+  EXPECT_TRUE(cloud.points().empty());
+  EXPECT_EQ(cloud.numQueryPoints(), 0U);
+  EXPECT_FALSE(cloud.isInView({0, 0, 2}));
+  EXPECT_FALSE(cloud.nearest({0, 0, 2}, 100));
+  EXPECT_EQ(cloud.middleInverseDepth(), 0);
+  cloud.releaseTree();
+}
+
+TEST(RegistrationCloud, AViewOfOnePixelAndAVarianceOfZeroAreValid) {
+  KeyframeDepthMap keyframe = emptyKeyframe({1, 1, 1, 1, 0, 0});
+  put(keyframe, 0, 0, 2, 0);
+  const RegistrationCloud cloud(keyframe, {});
+  ASSERT_EQ(cloud.points().size(), 1U);
+  EXPECT_TRUE(cloud.points()[0].covariance.allFinite());
+  EXPECT_EQ(cloud.nearest({0, 0, 2}, 1), std::optional<std::size_t>(0));
+  EXPECT_TRUE(cloud.isInView({0, 0, 2}));
+}
+
+TEST(RegistrationCloud, ExtremeDepthsDoNotSpoilTheOthers) {
+  for (const float strange : {1e-42F, 1e-30F, 1e-6F, 1e6F, 1e20F, 3e38F}) {
+    KeyframeDepthMap keyframe = wall(0.01F);
+    put(keyframe, 80, 60, strange, 0.01F);
+    put(keyframe, 5, 5, strange, 0.01F);
+    const RegistrationCloud cloud(keyframe, {});
+    for (const RegistrationPoint& point : cloud.points()) {
+      ASSERT_TRUE(point.p_ref.allFinite()) << strange;
+      ASSERT_TRUE(point.covariance.allFinite()) << strange;
+      const Eigen::LLT<Eigen::Matrix3d> llt(point.covariance.cast<double>());
+      ASSERT_EQ(llt.info(), Eigen::Success) << strange;
+    }
+    EXPECT_TRUE(cloud.nearest({0.3, 0.2, 2}, 5)) << strange;
+    EXPECT_TRUE(std::isfinite(cloud.middleInverseDepth())) << strange;
+  }
+}
+
+TEST(RegistrationCloudOptions, ValuesOutOfRangeAreRefusedByName) {
+  using Options = RegistrationCloudOptions;
+  const Options defaults;
+  test::expectRange(&Options::max_points, 10, defaults.max_map_points, "points");
+  test::expectRange(&Options::max_map_points, defaults.max_points, 1'000'000, "max_map_points");
+  test::expectRange(&Options::pixel_sigma, test::kAboveZero, 100, "pixel_sigma");
+  test::expectRange(&Options::depth_sigmas, 1, 1000, "depth_sigmas");
+  test::expectRange(&Options::neighbourhood_px, 1, 20, "neighbourhood_px");
+  EXPECT_NO_THROW(few(100'000, 1'000'000).validate());
+  EXPECT_THROW(few(100'001, 1'000'000).validate(), std::invalid_argument);
+  EXPECT_THROW(RegistrationCloud(emptyKeyframe(smallView()), few(9, 100)), std::invalid_argument);
+}
+
 }  // namespace
+
 }  // namespace efm

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/evaluation/depth_evaluation.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <fstream>
+
+#include "plugin/evaluation/depth_evaluation.h"
+#include "plugin/evaluation/depth_series.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
@@ -173,5 +173,156 @@ TEST_F(EvaluateDepth, AWrongInputIsAnErrorThatNamesIt) {
   EXPECT_THAT(errorOf(folder(), folder()), HasSubstr("within 1 ms"));
 }
 
+class FindStereoBaseline : public TemporaryFolder {
+ protected:
+  void write(const std::string& file, const std::string& text = "") const {
+    std::filesystem::create_directories((folder() / file).parent_path());
+    std::ofstream(folder() / file) << text;
+  }
+  void writeReport(const std::string& text) const { write("out/report.json", text); }
+  void writeCamchain(bool stereo) const {
+    const std::string camera =
+        "  camera_model: pinhole\n  intrinsics: [300, 301, 50, 40]\n  distortion_model: none\n"
+        "  resolution: [100, 80]\n";
+    write("data/camchain.yaml",
+          "cam0:\n" + camera +
+              (stereo ? "cam1:\n" + camera +
+                            "  T_cn_cnm1: [[1, 0, 0, -0.3], [0, 1, 0, 0], [0, 0, 1, 0.4], "
+                            "[0, 0, 0, 1]]\n"
+                      : ""));
+  }
+  std::optional<StereoBaseline> find(const std::string& estimate, const std::string& truth) const {
+    return findStereoBaseline(folder() / estimate, folder() / truth);
+  }
+};
+
+TEST_F(FindStereoBaseline, TheRunsReportComesFirst) {
+  writeReport(R"({"reference_view": {"fx": 200.5}, "baseline_m": 0.1})");
+  writeCamchain(true);
+  write("out/keyframes/1.5/depth.tiff");
+  for (const char* estimate : {"out", "out/keyframes", "out/keyframes/1.5/depth.tiff"}) {
+    const auto base = find(estimate, "data");
+    ASSERT_TRUE(base) << estimate;
+    EXPECT_EQ(base->focal_px, 200.5);
+    EXPECT_NEAR(base->focalBaseline(), 20.05, 1e-12);
+    EXPECT_THAT(base->source, HasSubstr("report.json"));
+  }
+}
+
+TEST_F(FindStereoBaseline, TheDatasetsCalibrationIsTheSecond) {
+  writeCamchain(true);
+  write("data/depth/a.tiff");
+  // Reports that say nothing of it.
+  for (const char* report : {"{}", "[1]", "{", R"({"reference_view": 3, "baseline_m": 1})",
+                             R"({"reference_view": {"fx": 200}})",
+                             R"({"reference_view": {"fx": 200}, "baseline_m": 0})"}) {
+    writeReport(report);
+    for (const char* truth : {"data", "data/depth", "data/depth/a.tiff"}) {
+      const auto base = find("out", truth);
+      ASSERT_TRUE(base) << truth << " " << report;
+      EXPECT_EQ(base->focal_px, 300);
+      EXPECT_NEAR(base->baseline_m, 0.5, 1e-12);
+    }
+  }
+}
+
+TEST_F(FindStereoBaseline, OneCameraHasNoBaseline) {
+  EXPECT_FALSE(find("out", "data"));
+  writeCamchain(false);
+  EXPECT_FALSE(find("out", "data"));
+}
+
+TEST_F(FindStereoBaseline, IsNotSearchedHigherThanARunHasFolders) {
+  writeReport(R"({"reference_view": {"fx": 200.5}, "baseline_m": 0.1})");
+  EXPECT_TRUE(find("out/a/b/c", "data"));
+  EXPECT_FALSE(find("out/a/b/c/d", "data"));
+  writeCamchain(true);
+  EXPECT_TRUE(find("none", "data/a/b"));
+  EXPECT_FALSE(find("none", "data/a/b/c"));
+}
+
+using testing::ElementsAre;
+
+class DepthSeries : public TemporaryFolder {
+ protected:
+  void write(const std::string& file, const std::string& text = "") const {
+    std::filesystem::create_directories((folder() / file).parent_path());
+    std::ofstream(folder() / file) << text;
+  }
+  /// The files of a series, as paths inside the test's folder.
+  std::vector<std::string> filesOf(const std::string& name, DepthSeriesRole role) const {
+    std::vector<std::string> files;
+    for (const TimedFile& file : depthSeries(folder() / name, role)) {
+      files.push_back(file.file.lexically_relative(folder()).string());
+    }
+    return files;
+  }
+  std::string errorOf(const std::string& name) const {
+    return messageOf([&] { depthSeries(folder() / name, DepthSeriesRole::kTruth); });
+  }
+};
+
+TEST_F(DepthSeries, AFolderWithBothKindsReturnsTheMapsOfTheRole) {
+  write("both/keyframes/10.5/depth.tiff");
+  write("both/keyframes/9.5/depth.tiff");
+  write("both/keyframes/notes/depth.tiff");
+  write("both/keyframes/11.5/confidence.tiff");
+  write("both/depth/index.txt", "# t file\n2 b.tiff\n1 a.tiff # the first\n\n");
+  EXPECT_THAT(filesOf("both", DepthSeriesRole::kEstimate),
+              ElementsAre("both/keyframes/9.5/depth.tiff", "both/keyframes/10.5/depth.tiff"));
+  EXPECT_THAT(filesOf("both", DepthSeriesRole::kTruth),
+              ElementsAre("both/depth/a.tiff", "both/depth/b.tiff"));
+}
+
+TEST_F(DepthSeries, EachRoleReadsTheOnlyKindOfAFolder) {
+  write("map/keyframes/1/depth.tiff");
+  write("data/depth/index.txt", "1 a.tiff\n");
+  EXPECT_THAT(filesOf("map", DepthSeriesRole::kTruth), ElementsAre("map/keyframes/1/depth.tiff"));
+  EXPECT_THAT(filesOf("map/keyframes", DepthSeriesRole::kTruth),
+              ElementsAre("map/keyframes/1/depth.tiff"));
+  EXPECT_THAT(filesOf("data", DepthSeriesRole::kEstimate), ElementsAre("data/depth/a.tiff"));
+  EXPECT_THAT(filesOf("data/depth", DepthSeriesRole::kEstimate), ElementsAre("data/depth/a.tiff"));
+}
+
+TEST_F(DepthSeries, ReadsTheTimeFromTheNameWithoutAnIndex) {
+  for (const char* file : {"cam0_2.25.tiff", "a_b_1.5.pfm", "0.75.npy", "mask.png", "3.txt",
+                           "x_y.tif", "4.tif", "5.png"}) {
+    write(std::string("named/") + file);
+  }
+  const auto series = depthSeries(folder() / "named", DepthSeriesRole::kEstimate);
+  std::vector<std::int64_t> times_ms;
+  for (const TimedFile& file : series) times_ms.push_back(file.t_ns / 1'000'000);
+  EXPECT_THAT(times_ms, ElementsAre(750, 1500, 2250, 4000, 5000));
+  EXPECT_EQ(series[1].file.filename(), "a_b_1.5.pfm");
+}
+
+TEST_F(DepthSeries, AFolderWithoutASeriesIsAnErrorThatNamesIt) {
+  write("empty/notes.txt");
+  EXPECT_THAT(errorOf("empty"), HasSubstr("empty: expected keyframes/<t>/depth.tiff"));
+  write("bad/index.txt", "1 a.tiff\nsoon b.tiff\n");
+  EXPECT_THAT(errorOf("bad"), HasSubstr("index.txt:2: 'soon b.tiff': expected a time"));
+  write("none/index.txt", "# nothing\n");
+  EXPECT_THAT(errorOf("none"), HasSubstr("lists no depth maps"));
+  write("cut/index.txt", "1\n");
+  EXPECT_THAT(errorOf("cut"), HasSubstr("index.txt:1: '1': expected a time"));
+}
+
+TEST_F(DepthSeries, TheNearestFileIsTheOneWithinTheLimit) {
+  const std::vector<TimedFile> series = {{100, "a"}, {200, "b"}, {300, "c"}};
+  const auto nearest = [&](std::int64_t t_ns) {
+    const TimedFile* file = nearestFile(series, t_ns, 50);
+    return file == nullptr ? std::string("none") : file->file.string();
+  };
+  EXPECT_EQ(nearest(49), "none");
+  EXPECT_EQ(nearest(50), "a") << "the limit belongs to it";
+  EXPECT_EQ(nearest(149), "a");
+  EXPECT_EQ(nearest(150), "a") << "the earlier of two";
+  EXPECT_EQ(nearest(151), "b");
+  EXPECT_EQ(nearest(350), "c");
+  EXPECT_EQ(nearest(351), "none");
+  EXPECT_EQ(nearestFile({}, 0, 50), nullptr);
+}
+
 }  // namespace
+
 }  // namespace efm

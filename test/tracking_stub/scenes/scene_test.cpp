@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "tracking_stub/scenes/scene.h"
-
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -10,9 +10,78 @@
 #include "test/tracking_stub/truth/nearest_surface.h"
 #include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/rendering/frame_renderer.h"
+#include "tracking_stub/scenes/furnishing.h"
+#include "tracking_stub/scenes/scene.h"
 
 namespace efm {
 namespace {
+
+/// An edge at u = 1 m, from 0 to 1, on a painting of 2 m x 2 m.
+Texture makeEdge(double texel_m) {
+  const int texels = static_cast<int>(std::lround(2 / texel_m));
+  cv::Mat1f painting(texels, texels, 0.0F);
+  painting.colRange(texels / 2, texels) = 1.0F;
+  return Texture(painting, texel_m);
+}
+
+double blurredStep(double distance, double sigma) {
+  return 0.5 * (1 + std::erf(distance / sigma / std::sqrt(2.0)));
+}
+
+TEST(Texture, ShowsAnEdgeUnderTheRequestedBlur) {
+  const Texture edge = makeEdge(0.01);
+  // Whole levels of the pyramid: 1, 2, 4 and 8 texels.
+  for (const double sigma : {0.01, 0.02, 0.04, 0.08}) {
+    for (double distance = -3 * sigma; distance <= 3 * sigma; distance += sigma / 7) {
+      EXPECT_NEAR(edge.sample(1 + distance, 1, sigma), blurredStep(distance, sigma), 0.05)
+          << "sigma " << sigma << " distance " << distance;
+    }
+  }
+}
+
+TEST(Texture, ChangesSmoothlyWithPositionAndBlur) {
+  const Texture edge = makeEdge(0.01);
+  for (double u = 0.8; u < 1.2; u += 0.0005) {
+    EXPECT_NEAR(edge.sample(u, 1, 0.017), edge.sample(u + 0.0005, 1, 0.017), 0.02);
+  }
+  for (double sigma = 0.005; sigma < 0.3; sigma *= 1.01) {
+    EXPECT_NEAR(edge.sample(1.01, 1, sigma), edge.sample(1.01, 1, 1.01 * sigma), 0.01);
+  }
+}
+
+TEST(Texture, RepeatsItsBorder) {
+  const Texture edge = makeEdge(0.01);
+  EXPECT_EQ(edge.sample(-5, -5, 0.01), 0.0F);
+  EXPECT_EQ(edge.sample(50, 50, 0.01), 1.0F);
+  EXPECT_NEAR(edge.sample(1, 1, 1e6), 0.5, 0.1);
+}
+
+TEST(Texture, RefusesAPaintingWithoutTexels) {
+  EXPECT_THROW(Texture(cv::Mat1f(), 0.01), std::invalid_argument);
+  EXPECT_THROW(Texture(cv::Mat1f(2, 2, 0.0F), 0), std::invalid_argument);
+}
+
+TEST(Clutter, HasEdgesOfAllOrientations) {
+  ClutterOptions options;
+  options.width_m = options.height_m = 2;
+  const Texture texture = paintClutter(options);
+  // Sum of gradients by direction, in bins of 22.5 degrees.
+  std::array<double, 8> strength{};
+  constexpr double kStep = 0.004;
+  for (double v = kStep; v < 2; v += kStep) {
+    for (double u = kStep; u < 2; u += kStep) {
+      const double here = texture.sample(u, v, 0.002);
+      const double gu = texture.sample(u + kStep, v, 0.002) - here;
+      const double gv = texture.sample(u, v + kStep, 0.002) - here;
+      if (std::hypot(gu, gv) < 0.1) continue;
+      const double half_turns = std::fmod(std::atan2(gv, gu) + M_PI, M_PI) / M_PI;
+      strength[std::min<std::size_t>(7, static_cast<std::size_t>(half_turns * 8))] +=
+          std::hypot(gu, gv);
+    }
+  }
+  const auto [weakest, strongest] = std::minmax_element(strength.begin(), strength.end());
+  EXPECT_GT(*weakest, 0.25 * *strongest);
+}
 
 Eigen::Vector3d randomVector(RandomNumbers& random, double size) {
   return {random.uniform(-size, size), random.uniform(-size, size), random.uniform(-size, size)};
@@ -119,4 +188,5 @@ TEST(SceneView, FindsTheHitsOfThePlainRayCast) {
 }
 
 }  // namespace
+
 }  // namespace efm

@@ -1,17 +1,109 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/results/pictures/curve_plot.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include <cmath>
+#include <rapidcheck/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include <cmath>
+#include <limits>
+
+#include "plugin/results/pictures/curve_plot.h"
 #include "test/plugin/results/pictures/sketch.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
+
+using testing::ElementsAre;
+
+std::vector<std::string> textsOf(const AxisRange& range, int max_ticks) {
+  std::vector<std::string> texts;
+  for (const AxisTick& tick : ticksOf(range, max_ticks)) texts.push_back(tick.text);
+  return texts;
+}
+
+TEST(PlotAxis, TicksAreRoundNumbers) {
+  EXPECT_THAT(textsOf({0, 1}, 6), ElementsAre("0", "0.2", "0.4", "0.6", "0.8", "1"));
+  EXPECT_THAT(textsOf({0, 102}, 6), ElementsAre("0", "20", "40", "60", "80", "100"));
+  EXPECT_THAT(textsOf({-0.7, 2.3}, 5), ElementsAre("0", "1", "2"));
+  EXPECT_THAT(textsOf({12.3, 12.9}, 4), ElementsAre("12.4", "12.6", "12.8"));
+  EXPECT_THAT(textsOf({0, 1}, 5), ElementsAre("0", "0.5", "1"));
+  EXPECT_THAT(textsOf({0, 1}, 2), ElementsAre("0", "1"));
+}
+
+TEST(PlotAxis, LogarithmicTicksArePowersOfTenAndValuesBetweenThem) {
+  EXPECT_THAT(textsOf({0.01, 1, AxisScale::kLogarithmic}, 7),
+              ElementsAre("0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"));
+  EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 7),
+              ElementsAre("1", "10", "100", "1000", "10000", "100000", "1e+06"));
+  EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 4),
+              ElementsAre("1", "100", "10000", "1e+06"));
+}
+
+TEST(PlotAxis, AShortLogarithmicAxisHasTicksEvenlyApart) {
+  EXPECT_THAT(textsOf({0.7, 3.2, AxisScale::kLogarithmic}, 5),
+              ElementsAre("1", "1.5", "2", "2.5", "3"));
+}
+
+TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengths) {
+  const AxisRange range{1, 100, AxisScale::kLogarithmic};
+  EXPECT_DOUBLE_EQ(range.fractionAlong(10), 0.5);
+  EXPECT_TRUE(std::isnan(range.fractionAlong(0)));
+  EXPECT_TRUE(std::isnan(range.fractionAlong(-1)));
+}
+
+TEST(PlotAxis, AnInverseAxisHasRoundTicksThatLeaveEachOtherSpace) {
+  const AxisRange range{0.77, 6.4, AxisScale::kInverse};
+  EXPECT_DOUBLE_EQ(range.fractionAlong(0.77), 0);
+  EXPECT_DOUBLE_EQ(range.fractionAlong(6.4), 1);
+  EXPECT_NEAR(range.fractionAlong(2 / (1 / 0.77 + 1 / 6.4)), 0.5, 1e-12);
+  EXPECT_TRUE(std::isnan(range.fractionAlong(0)));
+  EXPECT_THAT(textsOf(range, 6), ElementsAre("0.8", "1", "2", "5"));
+  EXPECT_THAT(textsOf({1.05, 1.35, AxisScale::kInverse}, 3), ElementsAre("1.1", "1.2", "1.3"));
+}
+
+TEST(PlotAxis, HasAMarginOf4PercentAndARangeForNoValueAndForOneValue) {
+  struct Case {
+    std::vector<double> values;
+    AxisScale scale;
+    double from, to;
+  };
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  for (const Case& of :
+       {Case{{3, NAN, 1, kInfinity, 2}, AxisScale::kLinear, 0.92, 3.08},
+        {{}, AxisScale::kLinear, -0.1, 0.1},
+        {{-5}, AxisScale::kLinear, -5.5, -4.5},
+        {{0.2}, AxisScale::kLinear, 0.1, 0.3},
+        {{1e300, 1e300}, AxisScale::kLinear, 0.9e300, 1.1e300},
+        {{1, 100, 0, -1}, AxisScale::kLogarithmic, std::pow(10, -0.08), std::pow(10, 2.08)},
+        {{1, 10}, AxisScale::kInverse, std::pow(10, -0.04), std::pow(10, 1.04)},
+        {{-1}, AxisScale::kLogarithmic, std::pow(10, -0.1), std::pow(10, 0.1)}}) {
+    const AxisRange range = rangeAround(of.values, of.scale);
+    EXPECT_DOUBLE_EQ(range.from, of.from);
+    EXPECT_DOUBLE_EQ(range.to, of.to);
+    EXPECT_EQ(range.scale, of.scale);
+  }
+  EXPECT_TRUE(ticksOf({1, 1}, 5).empty());
+}
+
+RC_GTEST_PROP(PlotAxis, ContainsAllValuesAndItsTicks, ()) {
+  const auto drawn = *rc::gen::nonEmpty<std::vector<int>>();
+  const double unit = std::pow(10.0, *rc::gen::inRange(-12, 12));
+  std::vector<double> values;
+  for (const int value : drawn) values.push_back(value * unit);
+  const AxisRange range = rangeAround(values, AxisScale::kLinear);
+  for (const double value : values) {
+    RC_ASSERT(range.fractionAlong(value) > 0);
+    RC_ASSERT(range.fractionAlong(value) < 1);
+  }
+  const auto ticks = ticksOf(range, 6);
+  RC_ASSERT(!ticks.empty());
+  RC_ASSERT(ticks.size() <= 6U);
+  for (const AxisTick& tick : ticks) {
+    RC_ASSERT(range.fractionAlong(tick.value) > -1e-6);
+    RC_ASSERT(range.fractionAlong(tick.value) < 1 + 1e-6);
+  }
+}
 
 using testing::HasSubstr;
 
@@ -143,4 +235,5 @@ TEST(CurvePlot, AWrongPlotIsAnErrorThatNamesIt) {
 }
 
 }  // namespace
+
 }  // namespace efm

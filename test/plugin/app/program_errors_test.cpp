@@ -1,0 +1,453 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <mrpt/core/exceptions.h>
+#include <opencv2/core.hpp>
+
+#include <chrono>
+#include <clocale>
+#include <locale>
+#include <new>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+#include <system_error>
+
+#include "plugin/app/program.h"
+#include "plugin/app/progress.h"
+#include "test/plugin/app/app_test.h"
+
+namespace efm {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+/// What an exception of `raise` says to the user.
+template <typename Raise>
+std::string wordsOf(const Raise& raise) {
+  try {
+    raise();
+  } catch (const std::exception& error) {
+    return inWords(error);
+  }
+  return "no exception";
+}
+
+TEST(ErrorWords, HaveNothingThatALibraryAddsForItsProgrammers) {
+  EXPECT_EQ(wordsOf([] { throw std::runtime_error("a.txt:3: no number"); }), "a.txt:3: no number");
+  EXPECT_EQ(wordsOf([] { THROW_EXCEPTION("no such map"); }), "no such map");
+  EXPECT_EQ(wordsOf([] {
+              try {
+                THROW_EXCEPTION("cut");
+              } catch (const std::exception& error) {
+                throw std::runtime_error(std::string("r.rawlog: entry 3: ") + error.what());
+              }
+            }),
+            "r.rawlog: entry 3: cut");
+  EXPECT_EQ(wordsOf([] { throw std::runtime_error("full\n\nCall stack backtrace:\n[0 ] 0x7f"); }),
+            "full");
+  EXPECT_THAT(wordsOf([] { CV_Error(cv::Error::StsBadArg, "wrong size"); }), "wrong size");
+  EXPECT_EQ(wordsOf([] { return std::filesystem::file_size("none.txt"); }),
+            "none.txt: No such file or directory");
+  EXPECT_EQ(wordsOf([] {
+              throw std::filesystem::filesystem_error(
+                  "copy", "a", "b", std::error_code(ENOSPC, std::generic_category()));
+            }),
+            "a to b: the disk is full");
+  for (const std::string& text :
+       {wordsOf([] { throw std::bad_alloc(); }), wordsOf([] { throw std::bad_array_new_length(); }),
+        wordsOf([] { std::vector<char>().reserve(SIZE_MAX); }),
+        wordsOf([] { CV_Error(cv::Error::StsNoMem, "Failed to allocate 8 bytes"); }),
+        wordsOf([] { throw std::runtime_error("x.bag: std::bad_alloc"); })}) {
+    EXPECT_THAT(text, StartsWith("out of memory: try fewer planes"));
+  }
+}
+
+TEST(Hdf5Trial, SaysHowAProgramFails) {
+  using std::chrono::milliseconds;
+  constexpr milliseconds kLong(60'000);
+  EXPECT_EQ(failureOf({"true"}, kLong), std::nullopt);
+  EXPECT_EQ(failureOf({"sh", "-c", "kill -s SEGV $$"}, kLong), "crashes");
+  EXPECT_EQ(failureOf({"sh", "-c", "exit 3"}, kLong), "crashes");
+  EXPECT_EQ(failureOf({"sleep", "600"}, milliseconds(50)), "does not end within 0.05 s");
+  EXPECT_EQ(failureOf({"/no/such/program"}, kLong), std::nullopt) << "then it is read all the same";
+}
+
+class Hdf5Trials : public AppTest {};
+
+TEST_F(Hdf5Trials, LeaveTheErrorToTheProgram) {
+  write(SyntheticRecording());
+  ASSERT_EQ(shell("'" EFM_EVENT_FUSION "' export data --to dsec --out good").status, 0);
+  const std::filesystem::path file = "good/events/left/events.h5";
+  write("damaged.h5", contentOf(file).substr(0, 2'000));
+  for (const char* source : {"good", "damaged.h5", "missing.h5"}) {
+    const Result trial = shell(std::string("'" EFM_EVENT_FUSION "' --try-hdf5 ") + source);
+    EXPECT_EQ(trial.status, 0);
+    EXPECT_EQ(trial.out + trial.err, "");
+  }
+  EXPECT_EQ(shell("'" EFM_EVENT_FUSION "' info good").status, 0);
+  EXPECT_THAT(shell("'" EFM_EVENT_FUSION "' info damaged.h5").err,
+              HasSubstr("damaged.h5: cannot be opened as HDF5"));
+}
+
+/// Files above 50 blocks (of 512 or 1024 bytes, by the shell) cannot be written, as if the disk
+/// were full.
+class LimitedFiles : public AppTest {
+ protected:
+  Result runLimited(const std::string& arguments) const {
+    return shell("ulimit -f 50; '" EFM_EVENT_FUSION "' " + arguments);
+  }
+  void SetUp() override {
+    AppTest::SetUp();
+    write(SyntheticRecording());
+    shell("true");  // makes stdout.txt and stderr.txt
+    // Random pixels do not compress.
+    std::string events;
+    std::mt19937 random(1);
+    for (int i = 0; i < 60'000; ++i) {
+      events += "0." + std::to_string(100'000 + i) + " " + std::to_string(random() % 120) + " " +
+                std::to_string(random() % 90) + " " + std::to_string(i % 2) + "\n";
+    }
+    write("many/events.txt", events);
+  }
+};
+
+TEST_F(LimitedFiles, EachWriterSaysWhyAndLeavesNothingIncomplete) {
+  const char* const why = "the file would be larger than the system allows (ulimit -f)\n";
+  const std::string camera = " --calibration data/camchain.yaml --poses data/poses.txt";
+  for (const char* job : {"import many/events.txt many/events.txt --out r.rawlog",
+                          "export many/events.txt many/events.txt --to mcap --out m.mcap",
+#ifdef EFM_WITH_HDF5
+                          "export many/events.txt many/events.txt --to dsec --out h5",
+#endif
+                          "export many/events.txt many/events.txt --to folder --out text"}) {
+    const auto before = filesIn(".");
+    const Result result = runLimited(job + camera);
+    EXPECT_EQ(result.status, 1) << job;
+    EXPECT_THAT(result.err, AllOf(StartsWith("event-fusion: error: "), HasSubstr("larger than"),
+                                  Not(HasSubstr("Call stack")), Not(HasSubstr("errno"))))
+        << job;
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_EQ(filesIn("."), before) << job;
+  }
+  const Result map =
+      runLimited("map rig.ini data --out out --set dsi.width=300 --set dsi.height=300");
+  EXPECT_EQ(map.status, 1);
+  EXPECT_EQ(map.err.substr(map.err.find("tiff: ") + 6), why) << map.err;
+}
+
+}  // namespace
+
+// What a signal leaves of the commands other than `map`: see
+// test/integration/interruption_test.cpp.
+
+namespace {
+
+using testing::AnyOf;
+using testing::HasSubstr;
+
+class Interrupted : public AppTest {
+ protected:
+  /// Files may come and go meanwhile.
+  bool anyNameHas(const std::string& part) const {
+    std::error_code gone;
+    std::filesystem::recursive_directory_iterator entry(folder(), gone);
+    for (; !gone && entry != end(entry); entry.increment(gone)) {
+      if (entry->path().filename().string().find(part) != std::string::npos) return true;
+    }
+    return false;
+  }
+};
+
+TEST_F(Interrupted, CommandsLeaveTheirWholeResultOrNothing) {
+  write(SyntheticRecording(5.0));
+  struct Command {
+    const char* arguments;
+    const char* started;  // a part of the name of the unfinished result
+    const char* result;
+    bool is_long;  // it cannot end before the signal
+  };
+  const Command cases[] = {
+      {"import data --out r.rawlog", "r.partial", "r.rawlog", false},
+      {"export data --to mcap --out m.mcap", "m.partial", "m.mcap", false},
+      {"export data --to folder --out copy", "copy.unfinished", "copy/poses.txt", false},
+      {"simulate --preset desk_stereo --out desk", "desk.unfinished", "desk/poses.txt", true},
+      {"depth rig.ini data --out depth --save-dsi --t0 10.1 --t1 14", "dsi.partial",
+       "depth/report.json", false}};
+  for (const auto& [arguments, started, expected, is_long] : cases) {
+    const Result result = interrupted(arguments, [&, part = started] { return anyNameHas(part); });
+    EXPECT_FALSE(anyNameHas("partial") || anyNameHas("unfinished")) << arguments;
+    ASSERT_TRUE(result.status == 130 || (result.status == 0 && !is_long)) << arguments;
+    EXPECT_EQ(exists(folder() / expected), result.status == 0) << arguments;
+    if (result.status == 130) {
+      EXPECT_THAT(result.err, HasSubstr("event-fusion: stopped by a signal: there is no result"));
+      EXPECT_EQ(result.out, "");
+    }
+  }
+}
+
+TEST_F(Interrupted, AnInputNamedLikeATemporaryFileStays) {
+  importRecording(SyntheticRecording());
+  const std::string rawlog = contentOf("data.rawlog");
+  write("r.partial.rawlog", rawlog);
+  write("other.partial.rawlog", "of another program");
+  ASSERT_EQ(run("import r.partial.rawlog --out r.rawlog").status, 0);
+  EXPECT_EQ(contentOf("r.partial.rawlog"), rawlog);
+  EXPECT_EQ(contentOf("r.rawlog"), rawlog);
+  ASSERT_EQ(run("import data --out other.rawlog").status, 0);
+  EXPECT_EQ(contentOf("other.partial.rawlog"), "of another program");
+  ASSERT_EQ(run("export r.rawlog --to mcap --out m.partial.mcap").status, 0);
+  const std::string mcap = contentOf("m.partial.mcap");
+  ASSERT_EQ(
+      run("export m.partial.mcap --calibration data/camchain.yaml --to mcap --out m.mcap").status,
+      0);
+  EXPECT_EQ(contentOf("m.partial.mcap"), mcap);
+  EXPECT_EQ(contentOf("m.mcap"), mcap);
+  EXPECT_FALSE(anyNameHas("partial-"));
+}
+
+TEST_F(Interrupted, AStoppedRunReplacesAnEarlierResultAndAKilledOneDoesNot) {
+  write(SyntheticRecording(4.0));
+  const std::string map = "map rig.ini data --out out";
+  const std::string slow = map + " --set keyframes.stride_s=0.01";
+  const auto writes = [this] { return anyNameHas("depth.partial-"); };
+  ASSERT_EQ(run(map).status, 0);
+  const std::size_t whole = reportIn("out")["keyframes"];
+  ASSERT_EQ(interrupted(slow, writes).status, 130);
+  const nlohmann::json report = reportIn("out");
+  EXPECT_TRUE(report.contains("stopped_at"));
+  const auto files = filesIn("out");
+  EXPECT_EQ(files.size(), 7 + 4 * report["keyframes"].get<std::size_t>());
+
+  const std::string earlier = contentOf("out/map.pcd");
+  EXPECT_EQ(interrupted(slow, writes, SIGKILL).status, -1);
+  EXPECT_THAT(filesIn("out"), testing::IsSupersetOf(files));
+  EXPECT_EQ(contentOf("out/map.pcd"), earlier);
+  EXPECT_EQ(reportIn("out"), report);
+  ASSERT_EQ(run(map).status, 0);
+  EXPECT_EQ(filesIn("out").size(), 7 + 4 * whole) << "nothing of the killed run";
+}
+
+TEST_F(Interrupted, AResultThatIsReplacedIsNamed) {
+  importRecording(SyntheticRecording());
+  const std::string place = std::filesystem::canonical(folder()).string();
+  const auto warningOf = [&](const std::string& recording) {
+    const Result result = run("map rig.ini " + recording + " --out out");
+    EXPECT_EQ(result.status, 0);
+    const nlohmann::json report = reportIn("out");
+    EXPECT_EQ(report["recording"][0], place + "/" + recording);
+    EXPECT_EQ(report["warnings"].size(), result.err.empty() ? 0U : 1U);
+    return result.err;
+  };
+  const std::string warning = "event-fusion: warning: replaced-result: out holds ";
+  EXPECT_EQ(warningOf("data"), "");
+  EXPECT_EQ(warningOf("data"), "") << "the same recording";
+  EXPECT_EQ(warningOf("data.rawlog"),
+            warning + "the result of " + place + "/data (4 keyframes): this run replaces it\n");
+  std::filesystem::remove(folder() / "out/report.json");
+  std::filesystem::remove_all(
+      std::filesystem::directory_iterator(folder() / "out/keyframes")->path());
+  write("out/report.partial.json", R"({"recording": ["/a.bag", "/b.txt"], "process": 1})");
+  EXPECT_EQ(warningOf("data.rawlog"),
+            warning +
+                "3 keyframes of /a.bag, /b.txt, left by a run that did not end: this run "
+                "replaces them\n");
+}
+
+TEST_F(Interrupted, TwoImportsOfOneNameWriteTheWholeResultOfOne) {
+  importRecording(SyntheticRecording());
+  ASSERT_EQ(run("import data --out cut.rawlog --t1 10.4").status, 0);
+  const std::string import = "'" EFM_EVENT_FUSION "' import data --out r.rawlog";
+  ASSERT_EQ(shell("{ " + import + " & " + import + " --t1 10.4 && wait $!; }").status, 0);
+  EXPECT_THAT(contentOf("r.rawlog"), AnyOf(contentOf("data.rawlog"), contentOf("cut.rawlog")));
+  EXPECT_FALSE(anyNameHas("partial"));
+}
+
+}  // namespace
+
+// A host program may write numbers as 1.234,5: files and results do not follow it.
+
+namespace {
+
+/// 1.234,5
+class Grouping : public std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '.'; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
+/// The locales of C++ and, if it is installed, of C.
+class GroupingLocale {
+ public:
+  GroupingLocale()
+      : before_(std::locale::global(std::locale(std::locale::classic(), new Grouping))) {
+    std::setlocale(LC_NUMERIC, "de_DE.UTF-8");
+  }
+  ~GroupingLocale() {
+    std::locale::global(before_);
+    std::setlocale(LC_NUMERIC, "C");
+  }
+  GroupingLocale(const GroupingLocale&) = delete;
+  GroupingLocale& operator=(const GroupingLocale&) = delete;
+
+ private:
+  std::locale before_;
+};
+
+class NumbersOfFiles : public AppTest {
+ protected:
+  static nlohmann::json withoutTimes(const std::string& text) {
+    auto report = nlohmann::json::parse(text);
+    for (const char* key : {"seconds", "cpu_seconds", "votes_per_second", "peak_memory_bytes"}) {
+      report.erase(key);
+    }
+    return report;
+  }
+};
+
+TEST_F(NumbersOfFiles, DoNotFollowTheLocaleOfTheProgram) {
+  write("rig.ini", "[dsi]\nmin_depth_m = 0.55\n[keyframes]\nwindow_s = 0.125\nstride_s = 0.05\n");
+  const std::string commands[] = {
+      "simulate --preset desk_stereo --duration 25e-2 --out data",
+      "import data --out r.rawlog",
+      "export r.rawlog --to folder --out copy",
+      "export r.rawlog --to mcap --out m.mcap",
+      "info copy --poses copy/poses.txt --calibration copy/camchain.yaml",
+      "map rig.ini copy --out map --set output.ply=true --set refinement.enabled=true",
+      "depth rig.ini copy --out depth --t0 +0 --t1 +0.2 --save-dsi",
+      "evaluate map map/map.pcd data/gt_edges.ply --json",
+      "evaluate map map/map.ply data/gt_edges.ply --json",
+      "evaluate depth depth/depth.tiff data/depth/cam0_1.100000000.tiff --json --plot d.png",
+      "evaluate trajectory map/trajectory.txt data/poses.txt --align none --json --plot t.png"};
+  const auto runAll = [&](const std::string& name) {
+    std::vector<std::string> printed;
+    for (const std::string& command : commands) {
+      const Result result = run(command);
+      EXPECT_EQ(result.status, 0) << command << ": " << result.err;
+      const bool is_timed = command.rfind("map", 0) == 0 || command.rfind("depth", 0) == 0;
+      printed.push_back(is_timed ? "" : result.out);
+    }
+    for (const char* out :
+         {"data", "r.rawlog", "copy", "m.mcap", "map", "depth", "d.png", "t.png"}) {
+      std::filesystem::create_directory(folder() / name);
+      std::error_code missing;
+      std::filesystem::rename(folder() / out, folder() / name / out, missing);
+    }
+    return printed;
+  };
+  const std::vector<std::string> printed = runAll("classic");
+  {
+    const GroupingLocale grouping;
+    EXPECT_EQ(runAll("grouping"), printed);
+  }
+  const std::vector<std::string> files = filesIn("classic");
+  EXPECT_EQ(filesIn("grouping"), files);
+  EXPECT_GT(files.size(), 40U);
+  for (const std::string& file : files) {
+    if (!exists(folder() / "grouping" / file)) continue;
+    const std::string name = std::filesystem::path(file).filename().string();
+    if (name == "map.html") continue;  // it has the times of the report
+    const std::string expected = contentOf("classic/" + file);
+    const std::string content = contentOf("grouping/" + file);
+    if (name == "report.json") {
+      EXPECT_EQ(withoutTimes(content), withoutTimes(expected)) << file;
+    } else {
+      EXPECT_TRUE(content == expected) << file << ": " << content.substr(0, 300);
+    }
+  }
+}
+
+/// A stream, a clock and a terminal that the test sets.
+struct FakeTerminal {
+  std::ostringstream stream;
+  double now_s = 1000;
+  std::optional<int> columns;
+
+  ProgressOutput output() {
+    return {stream, [this] { return columns; }, [this] { return now_s; }};
+  }
+  /// What was written since the last call.
+  std::string written() {
+    std::string text = stream.str();
+    stream.str("");
+    return text;
+  }
+};
+
+TEST(Progress, OnATerminalFillsItsWidthAndFallsBackToTheWordsAlone) {
+  const std::pair<int, std::string> cases[] = {
+      // 59 of 60 columns: the last one stays free.
+      {60, "mapping [=====                  ]  25 %, 30 s left, details"},
+      {200, "mapping [==========                              ]  25 %, 30 s left, details"},
+      {35, "mapping  25 %, 30 s left, details"},
+      {20, "mapping  25 %, 30 s"}};
+  for (const auto& [columns, line] : cases) {
+    FakeTerminal terminal;
+    terminal.columns = columns;
+    Progress progress("mapping", Verbosity::kNormal, terminal.output());
+    progress.show(0.25, "details");
+    EXPECT_EQ(terminal.written(), "") << "due after 0.2 s";
+    terminal.now_s += 10;
+    EXPECT_TRUE(progress.due());
+    progress.show(0.25, "details");
+    EXPECT_EQ(terminal.written(), "\r\033[K" + line);
+    progress.show(0.3);
+    EXPECT_EQ(terminal.written(), "") << "the next line is not due";
+  }
+}
+
+TEST(Progress, TheLineIsRemovedAtTheEndAndBeforeALineThatStays) {
+  FakeTerminal terminal;
+  terminal.columns = 80;
+  {
+    Progress progress("importing", Verbosity::kVerbose, terminal.output());
+    progress.begin("writing");
+    EXPECT_EQ(terminal.written(), "\r\033[Kwriting");
+    progress.print("keyframe 1");
+    EXPECT_EQ(terminal.written(), "\r\033[Kkeyframe 1\n");
+    progress.begin("writing");
+    terminal.written();
+  }
+  EXPECT_EQ(terminal.written(), "\r\033[K");
+}
+
+TEST(Progress, ElsewhereIsAPlainLineNowAndThen) {
+  FakeTerminal terminal;
+  Progress progress("exporting", Verbosity::kNormal, terminal.output());
+  std::vector<int> times_s;
+  for (int second = 1; second <= 300; ++second) {
+    terminal.now_s = 1000 + second;
+    progress.show(second / 400.0);
+    if (!terminal.written().empty()) times_s.push_back(second);
+  }
+  EXPECT_THAT(times_s, testing::ElementsAre(10, 30, 70, 130, 190, 250));
+  terminal.now_s = 1310;
+  progress.show(0.5, "7 keyframes");
+  EXPECT_EQ(terminal.written(), "event-fusion: exporting  50 %, 5:10 min left, 7 keyframes\n");
+  progress.print("keyframe 1");
+  EXPECT_EQ(terminal.written(), "") << "not verbose";
+}
+
+TEST(Progress, IsSilentIfQuiet) {
+  for (const std::optional<int> columns : {std::optional<int>(), std::optional<int>(80)}) {
+    FakeTerminal terminal;
+    terminal.columns = columns;
+    {
+      Progress progress("mapping", Verbosity::kQuiet, terminal.output());
+      terminal.now_s += 1000;
+      EXPECT_FALSE(progress.due());
+      progress.show(0.5);
+      progress.begin("writing");
+      progress.print("keyframe 1");
+    }
+    EXPECT_EQ(terminal.written(), "");
+  }
+}
+
+}  // namespace
+
+}  // namespace efm
