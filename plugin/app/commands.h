@@ -39,9 +39,8 @@ int runInfo(const InfoArguments& arguments);
 std::string processorName();
 
 /// Prints the processor, its cores and caches, the kernels that it can run and the one that is
-/// chosen, and tests each of them against the plain one.
-/// @return the process's exit status: 0 if all kernels passed.
-int printSystem();
+/// chosen.
+void printSystem();
 
 struct ImportArguments {
   RecordingSource source;

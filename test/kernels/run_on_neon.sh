@@ -27,7 +27,7 @@ ln -s "$highway/hwy" "$work/include/hwy"
 # As in mapping/CMakeLists.txt, products are rounded before they are added.
 flags=(-std=c++17 -O2 -ffp-contract=off -Wall -Wextra -Wpedantic -Wshadow -Werror -isystem "$work/include" -I "$root")
 objects=()
-for file in "$root"/mapping/kernels/*.cpp "$root/test/kernels/self_test_main.cpp"; do
+for file in "$root"/mapping/kernels/*.cpp "$root"/test/kernels/self_test{,_main}.cpp; do
   object=$work/$(basename "$file" .cpp).o
   "$compiler" "${flags[@]}" -c "$file" -o "$object"
   objects+=("$object")

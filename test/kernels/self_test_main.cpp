@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "mapping/kernels/self_test.h"
+#include "test/kernels/self_test.h"
 
 namespace {
 

@@ -2,7 +2,6 @@
 // `event-fusion simulate`, `import` and `info`.
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cstdlib>
 
@@ -180,16 +179,15 @@ TEST_F(ImportCommand, ReadsTheRealSliderRecordingCompletely) {
   EXPECT_THAT(info.err, IsEmpty()) << "a sound recording";
 }
 
-TEST_F(ImportCommand, InfoTellsTheProcessorAndTestsItsKernelsWithoutARecording) {
+TEST_F(ImportCommand, InfoTellsTheProcessorAndItsKernelsWithoutARecording) {
   const Result result = run("info --system");
   EXPECT_EQ(result.status, 0);
   EXPECT_THAT(result.err, IsEmpty());
-  EXPECT_THAT(result.out, AllOf(HasSubstr("processor: "), HasSubstr("cores: "),
-                                HasSubstr("kernel plain: self-test passed")));
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("processor: "), HasSubstr("cores: "), HasSubstr("kernel plain\n")));
   for (const VotingKernel kernel : availableKernels()) {
-    EXPECT_THAT(result.out,
-                HasSubstr("kernel " + std::string(nameOf(kernel)) + ": self-test passed" +
-                          (kernel == fastestKernel() ? ", chosen" : "\n")));
+    EXPECT_THAT(result.out, HasSubstr("kernel " + std::string(nameOf(kernel)) +
+                                      (kernel == fastestKernel() ? ": chosen" : "\n")));
   }
   writeSmallRecording();
   EXPECT_THAT(run("info small --system").out,

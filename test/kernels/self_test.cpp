@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "mapping/kernels/self_test.h"
+#include "test/kernels/self_test.h"
 
 #include <algorithm>
 #include <cmath>
