@@ -17,7 +17,9 @@ graph() {
         match($0, /"[^"]+"/); to = folder_of(substr($0, RSTART + 1, RLENGTH - 2))
         if (index(from, top "/") != 1) next
         name[from] = 1
-        if (index(to, top "/") == 1 && to != from) arrow["\"" from "\" -> \"" to "\""] = 1
+        if (index(to, top "/") != 1) next
+        name[to] = 1
+        if (to != from) arrow["\"" from "\" -> \"" to "\""] = 1
       }
       END {
         print "digraph {"

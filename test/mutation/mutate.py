@@ -342,7 +342,7 @@ class Run:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", action="append", default=[], help="mapping/sweep, or a folder of folders: plugin")
+    parser.add_argument("--folder", action="append", default=[], help="mapping/sweep, or all below one: plugin")
     parser.add_argument("--count", type=int, default=10, help="changes of a folder that are caught or survive")
     parser.add_argument("--seed", default="1")
     parser.add_argument("--again", metavar="RESULTS", help="the survivors of an earlier run's results.jsonl alone")
