@@ -84,7 +84,7 @@ class NewFolder {
 
   /// The folder to write into.
   const std::filesystem::path& temporary() const { return unfinished_; }
-  /// Gives the folder its name. @throws std::runtime_error naming it.
+  /// Gives the folder its name.
   void finish();
 
  private:

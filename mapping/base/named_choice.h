@@ -38,7 +38,6 @@ std::string_view nameIn(const NamedChoice<Enum> (&table)[N], Enum value) {
 }
 
 /// The enumerator with a name.
-/// @throws std::invalid_argument naming the value, and the nearest of the known names.
 template <typename Enum, std::size_t N>
 Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
   std::vector<std::string> known;
@@ -52,7 +51,6 @@ Enum valueIn(const NamedChoice<Enum> (&table)[N], std::string_view name) {
 
 /// Refuses an option whose value is out of range.
 /// @param holds the condition of a valid value, so that NaN is refused too.
-/// @throws std::invalid_argument "key = value: must be expected".
 template <typename Value>
 void requireOption(bool holds, std::string_view key, const Value& value,
                    std::string_view expected) {

@@ -21,7 +21,6 @@ enum class ExtractionMethod {
 bool usesColumns(ExtractionMethod method);
 
 std::string_view nameOf(ExtractionMethod method);
-/// @throws std::invalid_argument naming the value and the known names.
 ExtractionMethod extractionMethodFromName(std::string_view name);
 
 /// The confidence that becomes white: 255 in the 8-bit image that is thresholded.
@@ -59,7 +58,6 @@ struct DepthExtractionOptions {
   int median_size = 5;   ///< Side of the median window in pixels; odd, 1 (none) to 255.
   bool subplane = true;  ///< Fit a parabola through the peak and its neighbours.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -79,12 +77,10 @@ struct KeyframeFacts {
 /// 4. lower median of the positions of the mask's pixels in the window;
 /// 5. clear a frame of 2 pixels;
 /// 6. where `dilate` is set, see `dilate`.
-/// @throws std::invalid_argument where the options are not valid.
 DepthMap extractDepth(const SweptDsi& dsi, const DepthPlanes& planes,
                       const DepthExtractionOptions& options, const KeyframeFacts& facts = {});
 
 /// `ExtractionMethod::kPaper`: see `extractDepth`.
-/// @throws std::invalid_argument where the options are not valid.
 DepthMap extractAsPaper(const DsiPeaks& peaks, const DepthPlanes& planes,
                         const DepthExtractionOptions& options,
                         std::optional<double> sequence_maximum = std::nullopt);

@@ -20,7 +20,6 @@ enum class FusionRule { kMin, kHarmonic, kGeometric, kArithmetic, kRms, kMax };
 
 /// "min", "harmonic", "geometric", "arithmetic", "rms", "max".
 std::string_view nameOf(FusionRule rule);
-/// @throws std::invalid_argument naming the value and the known names.
 FusionRule fusionRuleFromName(std::string_view name);
 /// Whether zero in any input makes the mean zero.
 bool isAndLike(FusionRule rule);
@@ -62,7 +61,6 @@ enum class FusionOrder { kCamerasThenTime, kTimeThenCameras };
 
 /// "cameras_then_time", "time_then_cameras".
 std::string_view nameOf(FusionOrder order);
-/// @throws std::invalid_argument naming the value and the known names.
 FusionOrder fusionOrderFromName(std::string_view name);
 
 /// How the DSIs of several cameras and sub-intervals become one (Ghosh and Gallego 2022, Sec. 3.4

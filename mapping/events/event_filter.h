@@ -43,7 +43,6 @@ struct HotPixelOptions {
   /// causes: from black to white is some 20 contrast thresholds.
   int min_events = 50;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -59,7 +58,6 @@ struct HotPixelOptions {
 /// on the events and their order alone.
 class HotPixelFilter {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   HotPixelFilter(int width, int height, const HotPixelOptions& options);
 
   /// @param event the next one of the camera, inside the sensor. Constant cost: most pixels have
@@ -116,14 +114,12 @@ struct EventFilterOptions {
   double background_activity_s = 0;
 
   bool any() const { return hot_pixels || background_activity_s > 0; }
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
 /// The filters of one camera, one after the other: an event of a hot pixel supports no other.
 class EventFilter {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   EventFilter(int width, int height, const EventFilterOptions& options);
 
   /// @param event the next one of the camera, in time order, inside the sensor.

@@ -33,7 +33,6 @@ struct TimeLimits {
   bool contain(std::int64_t t_ns) const {
     return (!t0_ns || t_ns >= *t0_ns) && (!t1_ns || t_ns < *t1_ns);
   }
-  /// @throws std::invalid_argument where t1 is not after t0.
   void validate() const;
 };
 
@@ -52,7 +51,6 @@ enum class SubintervalShuffle {
 
 std::string_view nameOf(SubintervalSplit split);
 std::string_view nameOf(SubintervalShuffle shuffle);
-/// @throws std::invalid_argument naming the value and the known names.
 SubintervalSplit subintervalSplitFromName(std::string_view name);
 SubintervalShuffle subintervalShuffleFromName(std::string_view name);
 
@@ -64,7 +62,6 @@ struct SubintervalOptions {
   SubintervalShuffle shuffle = SubintervalShuffle::kNone;
   std::uint32_t shuffle_seed = 1;  ///< Of `kRandom`.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -119,7 +116,6 @@ struct SplitFusionOptions {
   int time_slices = 2;
 
   int polarities() const { return polarity ? 2 : 1; }
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

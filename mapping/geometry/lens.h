@@ -69,7 +69,6 @@ class RadialInverse {
 /// on, where a ray is longer than 1e4, a pixel has no ray either.
 class LensInverse {
  public:
-  /// @throws std::invalid_argument where the model is not valid.
   explicit LensInverse(const CameraModel& model);
 
   /// (X/Z, Y/Z) of the ray through a raw pixel, frame `cam`. The model projects it back to the
@@ -109,7 +108,6 @@ class UndistortionTable {
  public:
   /// Cost: one inversion of the lens per pixel, some 50 ns of processor time, rows in parallel on
   /// the threads of the caller's task arena; memory: 8 bytes per pixel.
-  /// @throws std::invalid_argument where the model is not valid, or no pixel has a ray.
   explicit UndistortionTable(const CameraModel& model);
 
   int width() const { return width_; }

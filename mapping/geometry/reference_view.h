@@ -18,7 +18,6 @@ enum class PlaneSpacing {
 };
 
 std::string_view nameOf(PlaneSpacing spacing);
-/// @throws std::invalid_argument naming the value and the known names.
 PlaneSpacing planeSpacingFromName(std::string_view name);
 
 /// The nearest plane is at least this far, metres.
@@ -30,7 +29,6 @@ struct DepthPlanesOptions {
   int num_planes = 100;      ///< At least 1; a single plane lies at `min_depth_m`.
   PlaneSpacing spacing = PlaneSpacing::kInverse;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -38,7 +36,6 @@ struct DepthPlanesOptions {
 /// first and the last plane are exactly the two limits.
 class DepthPlanes {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   explicit DepthPlanes(const DepthPlanesOptions& options = {});
 
   int size() const { return static_cast<int>(depths_.size()); }
@@ -93,13 +90,11 @@ struct ReferenceViewOptions {
   /// Shift along the view's own axes (x right, y down, z forward), metres.
   Eigen::Vector3d offset_m = Eigen::Vector3d::Zero();
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
 /// A camera's view without distortion, with the field of view and size of the options. A size
 /// without a field of view keeps the camera's: the same image at another resolution.
-/// @throws std::invalid_argument where the options are not valid.
 ReferenceView makeReferenceView(const CameraModel& model, const ReferenceViewOptions& options);
 
 /// Rays from one camera centre that all run forward or all run backward along the reference view's

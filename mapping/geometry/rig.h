@@ -20,7 +20,6 @@ enum class DistortionModel {
 
 /// "none", "radtan" or "equidistant": Kalibr's names.
 std::string_view nameOf(DistortionModel model);
-/// @throws std::invalid_argument naming the value and the known names.
 DistortionModel distortionModelFromName(std::string_view name);
 
 /// Intrinsic calibration of one camera: frame `cam` has x right, y down, z forward; integer pixel
@@ -33,7 +32,6 @@ struct CameraModel {
   DistortionModel distortion = DistortionModel::kNone;
   std::vector<double> coefficients;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 
   /// Raw (distorted) pixel of a point of frame `cam` with z > 0.

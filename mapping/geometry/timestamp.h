@@ -34,7 +34,6 @@ std::optional<std::int64_t> parseTimeIn(std::string_view text, int exponent);
 std::string formatSeconds(std::int64_t t_ns);
 
 /// A duration in seconds, rounded to nanoseconds. Not for absolute times.
-/// @throws std::invalid_argument where it is not finite or does not fit 64 bits.
 std::int64_t durationFromSeconds(double duration_s);
 
 /// to - from, in seconds.

@@ -36,7 +36,6 @@ struct FusionMapperOptions {
   TimeLimits limits;         ///< Events and windows outside are not used.
   EventFilterOptions filter;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -97,7 +96,6 @@ struct MapperCounts {
 /// call `next` until it returns nothing; at the end `finish`, and `next` again.
 class FusionMapper : private RecordingProgress {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   explicit FusionMapper(const FusionMapperOptions& options);
 
   /// Inverts the lens of a selected camera, pixel by pixel.
@@ -172,10 +170,8 @@ class FusionMapper : private RecordingProgress {
   std::int64_t eventsCompleteNs() const;
   /// Replaces options, as if they had been given at the start. Goes on with the first window whose
   /// events are all held; before the first keyframe those before it are given up.
-  /// @throws std::invalid_argument where they are not valid.
   void configure(const KeyframePolicyOptions& policy, const DepthPlanesOptions& planes);
   /// The depth planes of the keyframes from now on.
-  /// @throws std::invalid_argument where the options are not valid.
   void setPlanes(const DepthPlanesOptions& planes);
 
   /// Complete once `finish` was called and `next` returned nothing.

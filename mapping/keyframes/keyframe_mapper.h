@@ -82,7 +82,6 @@ struct KeyframeMapperOptions {
   bool event_images = false;  ///< Also each camera's events as an image.
   bool view_events = false;   ///< Also the reference camera's events in the view.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -93,7 +92,6 @@ class KeyframeMapper {
  public:
   /// @param selected indices of the rig's cameras whose events take part.
   /// @param undistortion of the selected cameras, in their order, where they are known already.
-  /// @throws std::invalid_argument where the options, a camera or an index is not valid.
   KeyframeMapper(Rig rig, std::vector<int> selected, const KeyframeMapperOptions& options,
                  std::vector<UndistortionTable> undistortion = {});
 
@@ -105,7 +103,7 @@ class KeyframeMapper {
                                       const Trajectory& trajectory, DsiSink* sink = nullptr,
                                       StageHook* stages = nullptr);
 
-  /// The depth planes from now on. @throws std::invalid_argument where they are not valid.
+  /// The depth planes from now on.
   void setPlanes(const DepthPlanesOptions& planes);
 
   /// T_world_ref of the reference view for a pose of the rig.

@@ -30,7 +30,6 @@ enum class ReferenceTime {
 
 std::string_view nameOf(KeyframePolicyKind policy);
 std::string_view nameOf(ReferenceTime reference);
-/// @throws std::invalid_argument naming the value and the known names.
 KeyframePolicyKind keyframePolicyFromName(std::string_view name);
 ReferenceTime referenceTimeFromName(std::string_view name);
 
@@ -52,7 +51,6 @@ struct KeyframePolicyOptions {
   double min_visible_fraction = 0.7;
   ReferenceTime reference = ReferenceTime::kMiddle;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -119,7 +117,6 @@ class KeyframePolicy {
 };
 
 /// @param depth_guess_m mean depth of the scene before the first keyframe.
-/// @throws std::invalid_argument where the options are not valid.
 std::unique_ptr<KeyframePolicy> makeKeyframePolicy(const KeyframePolicyOptions& options,
                                                    double depth_guess_m);
 /// This window alone, whether the recording fills it or not.

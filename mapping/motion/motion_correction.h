@@ -53,7 +53,6 @@ struct MotionCorrectionOptions {
   /// less may be chance. 0 to 1.
   double min_gain = 0.01;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

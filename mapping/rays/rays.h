@@ -84,7 +84,6 @@ struct PosePacketsOptions {
   /// has 23.5 instead of 22.7 % wrong points already with 0.05.
   double packet_error_px = 0.02;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

@@ -22,7 +22,6 @@ struct DepthAgreement {
 
 /// @return nothing for one camera, and where too few pixels have both depths: the camera hardly
 ///   moves.
-/// @throws std::invalid_argument where the options do not fit the rig.
 std::optional<DepthAgreement> depthAgreement(const Rig& rig,
                                              const std::vector<WindowSample>& samples,
                                              const FusionMapperOptions& options);
@@ -38,7 +37,6 @@ struct DepthSensitivity {
 /// Maps windows of up to three samples coarsely: as they are, with other clocks, with more travel.
 /// @param options with the window of the map.
 /// @return nothing where too few pixels have depths.
-/// @throws std::invalid_argument where the options do not fit the rig.
 std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
                                                  const std::vector<WindowSample>& samples,
                                                  const FusionMapperOptions& options);
@@ -49,7 +47,6 @@ std::optional<DepthSensitivity> depthSensitivity(const Rig& rig,
 class EventSharpness {
  public:
   /// @param options of the map: its cameras take part.
-  /// @throws std::invalid_argument where the options do not fit the rig.
   EventSharpness(const Rig& rig, const FusionMapperOptions& options);
 
   /// The largest distance of the reference camera from its position in the middle of the piece,

@@ -62,7 +62,6 @@ FusionMapperOptions surveyOptions(FusionMapperOptions options, double window_s);
 /// @param duration_s of the recording, as far as events have poses; not given: not known yet.
 /// @param options in: with the values for where nothing can be chosen; out: with the choice.
 /// @param samples of the recording; may be empty.
-/// @throws std::invalid_argument where the options do not fit the rig.
 OptionChoice chooseOptions(const AutomaticOptions& automatic, const Rig& rig,
                            const std::vector<WindowSample>& samples,
                            std::optional<double> duration_s, FusionMapperOptions& options);

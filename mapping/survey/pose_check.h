@@ -53,7 +53,6 @@ struct PoseFinding {
 /// direction of the motion alone, and depths can make up for some mistakes: less is found.
 /// @return nothing where the poses explain the events best, where no sample has parallax, and where
 ///   the rig hardly moves.
-/// @throws std::invalid_argument where the options do not fit the rig.
 std::optional<PoseFinding> checkPoses(const Rig& rig, const std::vector<WindowSample>& samples,
                                       const FusionMapperOptions& options);
 

@@ -95,7 +95,6 @@ struct Coarseness {
 /// view.
 class CoarseSweep {
  public:
-  /// @throws std::invalid_argument where the options do not fit the rig.
   CoarseSweep(const Rig& rig, const FusionMapperOptions& options,
               const Coarseness& coarseness = {});
 

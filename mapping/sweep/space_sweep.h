@@ -20,7 +20,6 @@ struct SpaceSweepOptions {
   std::optional<int> threads;          ///< 1 to 1024; the number of cores where not given.
   std::optional<VotingKernel> kernel;  ///< An available one; the fastest of them where not given.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
   /// The number of threads that will run: never more than there are cores.
   int threadsOrCores() const;
@@ -62,7 +61,6 @@ struct SweepResult {
 /// threads. Columns add a byte per plane of a selected pixel, a sink adds four per voxel. The
 /// order of planes and threads never changes the result.
 /// @param cameras the rays of each camera that is fused, at least one; consumed.
-/// @throws std::invalid_argument where the options are not valid.
 SweepResult sweepSpace(std::vector<CameraRays> cameras, const DsiGrid& grid,
                        const SpaceSweepOptions& options = {}, const SweepRequest& request = {});
 

@@ -37,7 +37,6 @@ struct OutlierRemovalOptions {
   /// default is that of the published code of EMVS (Rebecq et al., IJCV 2018).
   int outlier_min_neighbors = 3;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -46,8 +45,6 @@ struct OutlierRemovalOptions {
 ///
 /// Distances are computed in float, relative to the median position: they are exact to 1e-7 of the
 /// extent of the cloud at any distance from the origin of the world.
-/// @throws std::invalid_argument where the options are not valid, or a point is not finite or
-/// too far from the others for floats.
 std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
                                        const OutlierRemovalOptions& options);
 
@@ -55,12 +52,9 @@ std::vector<CloudPoint> removeOutliers(std::vector<CloudPoint> points,
 
 /// The median of each coordinate. Few points far away do not move it, unlike the mean.
 /// @param points at least one.
-/// @throws std::invalid_argument naming a point that is not finite.
 Eigen::Vector3d medianPosition(const std::vector<CloudPoint>& points);
 
 /// The positions relative to `origin`, in the same order.
-/// @throws std::invalid_argument naming a point that is not finite, or so far from the origin that
-/// a float cannot hold the square of the distance.
 std::vector<Eigen::Vector3f> offsetsFrom(const Eigen::Vector3d& origin,
                                          const std::vector<CloudPoint>& points);
 

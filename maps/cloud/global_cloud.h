@@ -26,7 +26,6 @@ struct GlobalCloudOptions {
   /// How keyframes check the points of other keyframes.
   ConsistencyOptions consistency = {};
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -56,7 +55,6 @@ struct GlobalCloudOptions {
 /// 64 bits. Not thread-safe.
 class GlobalCloud {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   explicit GlobalCloud(const GlobalCloudOptions& options = {});
 
   /// Keyframes whose numbers differ by more do not check each other's points.
@@ -80,7 +78,6 @@ class GlobalCloud {
 
   /// Removes a keyframe. The map is as if it had never been inserted, and the number is free again.
   /// Cost: linear in the points of the keyframe and of those that it checked.
-  /// @throws std::invalid_argument where the number is not in the map.
   void remove(std::uint64_t keyframe);
 
   /// Merges the keyframes below a number for good, so that memory and the cost of `points` grow

@@ -28,7 +28,6 @@ struct ViewPoint {
 /// The points of a keyframe, p_ref = Z * K^-1 (x, y, 1)^T: one for each pixel with a depth and a
 /// confidence above 0, row by row. sigma_Z = Z^2 * sigma_(1/Z): Z is the inverse of the inverse
 /// depth, whose variance the keyframe has.
-/// @throws std::invalid_argument where an image does not have the size of the view.
 std::vector<ViewPoint> viewPoints(const KeyframeDepthMap& keyframe);
 
 /// The points of the single cameras of a keyframe, one camera after the other: late fusion, the
@@ -54,7 +53,6 @@ class RefinedCloud {
 
   /// @param movable how many of the newest keyframes may move, at least; 0: none may. Their points
   /// are kept, 20 bytes each.
-  /// @throws std::invalid_argument where the options are not valid.
   RefinedCloud(const GlobalCloudOptions& options, std::size_t movable)
       : cloud_(options), movable_(movable) {}
 

@@ -60,7 +60,6 @@ inline Eigen::Vector3d positionIn(const MapCloud& cloud, const MapPoint& point) 
 /// is the median position, rounded to a power of ten that is fine enough itself: it has few digits,
 /// as PCL's programs write at most six.
 /// @param resolution_m for example the size of a voxel; above 0.
-/// @throws std::invalid_argument naming a point that is not finite.
 MapCloud::Ptr mapCloudOf(const std::vector<CloudPoint>& points, double resolution_m);
 
 /// The step of floats at the world coordinates of a map, where it is more than a tenth of the

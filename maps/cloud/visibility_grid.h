@@ -21,7 +21,6 @@ enum class Consistency {
 };
 
 std::string_view nameOf(Consistency consistency);
-/// @throws std::invalid_argument naming the value and the known names.
 Consistency consistencyFromName(std::string_view name);
 
 struct ConsistencyOptions {
@@ -39,7 +38,6 @@ struct ConsistencyOptions {
   /// A point without support is excluded where it has more free-space violations. Range: 0 to 16.
   int max_contradictions = 0;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

@@ -41,8 +41,6 @@ bool looksLikeNpy(std::string_view bytes);
 
 /// Parses the header of an array of numbers, or of structures with numbers.
 /// @param bytes the beginning of the file; 64 KiB contain any header of an array of numbers.
-/// @throws std::runtime_error "the array's header: …" naming the wrong part, its value and the
-/// expected one: no array, or something else than numbers, such as Python objects.
 NpyHeader parseNpyHeader(std::string_view bytes);
 
 /// @throws std::runtime_error as `parseNpyHeader`, for structures, and for rows that do not stand

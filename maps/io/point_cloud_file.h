@@ -16,7 +16,6 @@ namespace efm {
 /// Writes a binary PCD file, whatever the extension of the path. Its fields are those of MapPoint,
 /// its VIEWPOINT is the cloud's `sensor_origin_`, which `readPointCloud` adds. An empty cloud is a
 /// valid file. The file appears when it is complete (AtomicFile).
-/// @throws std::runtime_error naming the path where it cannot be written or a point is not finite.
 void writePcd(const std::filesystem::path& path, const MapCloud& cloud);
 
 /// Red, green and blue.
@@ -32,12 +31,9 @@ struct PointCloudContent {
 /// intensity may have any numeric type. Doubles keep all their digits. The confidence is the
 /// intensity, or 1 without one; the support is 1. Other fields, other elements and the viewpoint of
 /// a PCD file are ignored.
-/// @throws std::runtime_error naming the path, the line or byte, the value and the expected one
-/// where the content does not match its header.
 PointCloudContent readPointCloud(const std::filesystem::path& path);
 
 /// Writes a binary PCD file, version 0.7.
-/// @throws std::runtime_error naming a point that is not finite.
 void writePcdTo(std::ostream& stream, const MapCloud& cloud);
 
 /// @throws std::runtime_error naming the line or byte, the value and the expected one.
@@ -47,12 +43,10 @@ PointCloudContent parsePcd(std::string_view bytes);
 /// vertex: x, y, z (double: maps may lie far from the origin), red, green, blue (uchar), confidence
 /// (float) and support (uint).
 /// @param colours one per point.
-/// @throws std::runtime_error naming a point that is not finite.
 void writePlyTo(std::ostream& stream, const MapCloud& cloud,
                 const std::vector<PointColour>& colours);
 
 /// Parses the Stanford polygon format, version 1.0. The element `vertex` is the cloud.
-/// @throws std::runtime_error naming the line or byte, the value and the expected one.
 PointCloudContent parsePly(std::string_view bytes);
 
 }  // namespace efm

@@ -48,7 +48,6 @@ struct WordLine {
   /// @throws std::runtime_error naming the line.
   [[noreturn]] void refuse(const std::string& why) const;
   /// The word with this index as a whole number from 0 on.
-  /// @throws std::runtime_error naming the line where the word is missing or no such number.
   std::uint64_t count(std::size_t word) const;
 };
 
@@ -93,8 +92,6 @@ std::size_t bytesOf(const std::vector<RecordField>& fields);
 
 /// Reads `count` points: lines of numbers, blank lines aside, or records of `bytesOf(fields)`
 /// bytes. The rest of the file is left to the caller.
-/// @throws std::runtime_error naming the line or byte where a point is malformed or the file ends,
-/// or where a field x, y or z is missing, is there twice, or has more than one number.
 PointCloudContent readTextRecords(TextScanner& scanner, const std::vector<RecordField>& fields,
                                   std::uint64_t count);
 PointCloudContent readBinaryRecords(TextScanner& scanner, const std::vector<RecordField>& fields,

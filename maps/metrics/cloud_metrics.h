@@ -12,7 +12,6 @@ namespace efm {
 
 /// The distance of each point to the nearest of the others, metres, in the order of the points.
 /// Cost: a k-d tree over the others, and a search per point.
-/// @throws std::invalid_argument where there are no others, or a point is not finite.
 std::vector<double> nearestDistances(const std::vector<CloudPoint>& points,
                                      const std::vector<CloudPoint>& others);
 
@@ -43,8 +42,6 @@ struct CloudErrors {
 std::vector<double> defaultCloudDistances();
 
 /// @param distances_m above 0, in any order; the steps have the same order.
-/// @throws std::invalid_argument where a cloud is empty, a point is not finite or a distance is not
-/// above 0.
 CloudErrors cloudErrors(const std::vector<CloudPoint>& map, const std::vector<CloudPoint>& truth,
                         const std::vector<double>& distances_m);
 /// The same with another truth for completeness: `to_find`, the part of the surfaces that the

@@ -26,7 +26,6 @@ struct DepthPairingOptions {
   /// Farther truths are ignored. Above 0.
   double max_depth_m = std::numeric_limits<double>::infinity();
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -44,7 +43,6 @@ struct ComparedDepths {
   bool hasTruth(int y, int x, const DepthPairingOptions& options) const {
     return counts(y, x) && isDepth(truth(y, x)) && truth(y, x) <= options.max_depth_m;
   }
-  /// @throws std::invalid_argument where the maps or the mask differ in size.
   void validate() const;
 };
 
@@ -53,7 +51,6 @@ struct ComparedDepths {
 double bestTruth(const ComparedDepths& depths, cv::Point pixel, const DepthPairingOptions& options);
 
 /// The pairs of all pixels where both maps have a depth, row by row.
-/// @throws std::invalid_argument where the maps differ in size or the options are not valid.
 std::vector<DepthPair> pairDepths(const ComparedDepths& depths,
                                   const DepthPairingOptions& options = {});
 std::vector<DepthPair> pairDepths(const cv::Mat1f& estimate, const cv::Mat1f& truth,
@@ -89,7 +86,6 @@ struct DepthErrors {
 
 /// @param focal_baseline focal length in pixels times baseline in metres, above 0. The disparity is
 /// focal_baseline / Z.
-/// @throws std::invalid_argument where focal_baseline is not above 0.
 DepthErrors depthErrors(const std::vector<DepthPair>& pairs,
                         std::optional<double> focal_baseline = std::nullopt);
 
@@ -131,8 +127,6 @@ std::vector<double> defaultDepthThresholds();
 /// Counts |Z - Z_true| <= threshold. An estimate is compared with its truth in `pairDepths`. A
 /// truth is compared with the estimate of the nearest depth within the tolerance.
 /// @param thresholds_m above 0, in any order; the steps have the same order.
-/// @throws std::invalid_argument where a threshold is not above 0, the maps differ in size or the
-/// options are not valid.
 PrecisionRecall precisionRecall(const ComparedDepths& depths,
                                 const std::vector<double>& thresholds_m,
                                 const DepthPairingOptions& options = {});

@@ -67,7 +67,6 @@ struct RelativeSpacing {
 /// 2012, Eq. 1). The errors are the length of its translation and the angle of its rotation. They
 /// do not depend on an alignment. In metres and seconds, j is the pair nearest to the spacing (the
 /// first of several), off by less than a fifth of it, as in rpg_trajectory_evaluation.
-/// @throws std::invalid_argument where the spacing is out of its range.
 PoseErrors relativeErrors(const std::vector<PosePair>& pairs, const RelativeSpacing& spacing);
 
 /// The length of the path through the true positions, metres.

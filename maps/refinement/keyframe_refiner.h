@@ -31,7 +31,6 @@ struct RefinementOptions {
   LoopOptions loop;
   PoseGraphOptions graph;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -92,7 +91,6 @@ struct RefinementCounts {
 /// thread-safe.
 class KeyframeRefiner {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   explicit KeyframeRefiner(const RefinementOptions& options);
 
   /// @throws std::invalid_argument where the pose is not finite or beyond a million kilometres, or
@@ -109,7 +107,6 @@ class KeyframeRefiner {
            const std::optional<PoseNoise>& stated = std::nullopt);
   /// Checks a loop that the caller proposes.
   /// @return whether it was verified.
-  /// @throws std::invalid_argument where a keyframe does not exist, or both are the same.
   bool propose(const LoopCandidate& candidate);
   /// Solves all keyframes together, after the last one.
   void finish();

@@ -20,7 +20,6 @@ struct KeyframeRegistrationOptions {
   /// Converged to a thousandth only, because the neighbours change afterwards.
   AlignmentOptions alignment{3, 10, 1e-3};
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

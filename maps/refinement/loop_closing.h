@@ -23,7 +23,6 @@ struct LoopOptions {
   double loop_max_sigma_rad = 0.5 * kRadiansPerDegree;
   int loop_checks = 1;  ///< Candidates that are registered per keyframe, 0 to 100.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

@@ -74,7 +74,6 @@ struct AlignmentOptions {
   /// to 1.
   double min_gain = 1e-8;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -123,7 +122,6 @@ struct PoseGraphOptions {
   double robust_sigmas = 3;  ///< For robust factors, as in AlignmentOptions.
   int max_iterations = 20;   ///< 1 to 1000.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

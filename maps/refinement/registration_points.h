@@ -31,7 +31,6 @@ struct RegistrationCloudOptions {
   /// Half the side of the neighbourhood whose shape a point represents, pixels. Range: 1 to 20.
   int neighbourhood_px = 3;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -52,14 +51,12 @@ struct RegistrationPoints {
 };
 
 /// Selects the most certain points of each cell of the image, and computes their covariances.
-/// @throws std::invalid_argument where the options are not valid.
 RegistrationPoints selectPoints(const KeyframeDepthMap& keyframe,
                                 const RegistrationCloudOptions& options);
 
 /// The points of a keyframe for registrations. 48 bytes a point, and as much for the search tree.
 class RegistrationCloud {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   RegistrationCloud(const KeyframeDepthMap& keyframe, const RegistrationCloudOptions& options);
 
   /// Other keyframes are registered with all points. The first `numQueryPoints` are registered with

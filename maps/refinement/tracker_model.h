@@ -36,7 +36,6 @@ struct TrackerErrors {
   double drift_m = 0.01;  ///< Per metre of path.
   double drift_rad = 0.5 * kRadiansPerDegree;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
   /// The covariance of a pose relative to the pose without noise. Never singular.
   Matrix6d noiseCovariance(const NoiseScale& scale = {}) const;

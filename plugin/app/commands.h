@@ -89,7 +89,6 @@ struct ViewArguments {
 /// `open`), and prints its path. Where there is no screen or no such program, stderr says so; that
 /// is no error: the page is there for any browser.
 /// @return the process's exit status.
-/// @throws std::runtime_error where there is no page.
 int runView(const ViewArguments& arguments);
 
 /// The common arguments of `map` and `depth`.

@@ -70,7 +70,6 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording);
 /// error, and a requested stop ends it.
 /// @param job whose receivers are not called.
 /// @return nothing if there is no keyframe.
-/// @throws std::invalid_argument if the options are not valid.
 std::optional<double> sequenceMaximum(MappingJob job, Recording& recording);
 
 /// Reads a recording once. An error of the recording ends it: the pass that maps reports the error.

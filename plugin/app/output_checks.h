@@ -25,12 +25,10 @@ std::vector<std::filesystem::path> inputsOf(const RecordingSource& source);
 /// Refuses an output that would replace an input. Links are followed, and hard links are found.
 /// @param out the file or the folder to write. A folder must neither be an input nor hold one.
 /// @param inputs those that are empty or do not exist are left out.
-/// @throws std::runtime_error naming the output and the input.
 void refuseToReplace(const std::filesystem::path& out,
                      const std::vector<std::filesystem::path>& inputs);
 
 /// Refuses an existing file in one of the folders that are read.
-/// @throws std::runtime_error naming the file and the folder.
 void refuseFileIn(const std::vector<std::filesystem::path>& folders,
                   const std::filesystem::path& out);
 

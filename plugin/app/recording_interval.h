@@ -58,7 +58,6 @@ std::optional<std::string> readAll(Recording& recording,
                                    const std::function<void(mrpt::obs::CObservation&)>& take);
 
 /// Refuses time limits without events: they may be mistyped. A recording without any event passes.
-/// @throws std::runtime_error naming the times of the recording's events.
 void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& limits);
 
 /// Reports the damage that ended a recording, after all before it was written.

@@ -29,8 +29,6 @@ struct CloudEvaluation {
 
 /// Compares a map with the truth: PCD or PLY files, or a run's folder (its map.pcd or points.pcd)
 /// and a dataset's (its gt_cloud.ply).
-/// @throws std::runtime_error naming a file that cannot be read, has no point or cannot be aligned;
-/// std::invalid_argument if a distance is not above 0.
 CloudEvaluation evaluateCloud(const std::filesystem::path& estimated,
                               const std::filesystem::path& truth,
                               const CloudEvaluationOptions& options);

@@ -44,8 +44,6 @@ struct DepthEvaluation {
 /// Compares two files (`readDepthFile`; a folder with a depth.tiff counts as this file) or two
 /// folders (`depthSeries`). Each map of a folder is paired with the truth nearest in time, within
 /// 1 ms.
-/// @throws std::runtime_error naming the file or folder if it cannot be read, has the wrong kind,
-/// or if nothing can be compared; std::invalid_argument if the options are not valid.
 DepthEvaluation evaluateDepth(const std::filesystem::path& estimated,
                               const std::filesystem::path& truth,
                               const DepthEvaluationOptions& options);
@@ -63,7 +61,6 @@ struct StereoBaseline {
 /// up to three folders above it. Otherwise reads it from the camchain.yaml of the truth's dataset,
 /// in `truth` or up to two folders above it: camera 0's fx and its distance to camera 1.
 /// @return nothing if neither file has it.
-/// @throws std::runtime_error naming a camchain.yaml that cannot be read.
 std::optional<StereoBaseline> findStereoBaseline(const std::filesystem::path& estimate,
                                                  const std::filesystem::path& truth);
 

@@ -16,13 +16,10 @@ namespace efm {
 /// 5000: TUM RGB-D). Below 1: metres per unit.
 /// @return the values of the file. A value that is 0, negative or not finite means no depth
 /// (`isDepth`).
-/// @throws std::runtime_error naming the file and the reason; std::invalid_argument if the scale is
-/// not above 0.
 cv::Mat1f readDepthFile(const std::filesystem::path& file,
                         std::optional<double> png_scale = std::nullopt);
 
 /// Reads a mask from an image of any format that OpenCV reads: 0 for black pixels, 255 for others.
-/// @throws std::runtime_error naming the file that cannot be read.
 cv::Mat1b readMaskFile(const std::filesystem::path& file);
 
 /// The maximum width and height of a PFM or NumPy image. More means a damaged header.
@@ -30,7 +27,6 @@ inline constexpr std::uint64_t kMaxImageSide = 65535;
 
 /// The image of a NumPy array (`parseNpyHeader`): two dimensions, [row][column], float32 or
 /// float64 of either byte order, in C order. Doubles are rounded to float.
-/// @throws std::runtime_error naming the wrong part of the header, its value and the expected one.
 cv::Mat1f parseNpy(std::string_view bytes);
 
 /// Whether these are the first bytes of a PFM ("portable float map", Debevec), grey or coloured.
@@ -39,7 +35,6 @@ bool looksLikePfm(std::string_view bytes);
 /// The image of a grey PFM: lines "Pf", "width height" and "scale", then float32 rows from the
 /// bottom upwards, little endian if the scale is negative. As in stereo benchmarks (Middlebury),
 /// the size of the scale has no effect. (OpenCV's reader divides by it and refuses CRLF line ends.)
-/// @throws std::runtime_error naming the line or byte, the value and the expected one.
 cv::Mat1f parsePfm(std::string_view bytes);
 
 }  // namespace efm

@@ -9,7 +9,6 @@
 namespace efm {
 
 /// For a folder: the first of these files that it has. For another path: the path itself.
-/// @throws std::runtime_error naming the folder and the files if it has none of them.
 std::filesystem::path fileInFolder(const std::filesystem::path& path,
                                    std::initializer_list<const char*> names);
 
@@ -20,7 +19,6 @@ struct TimedFile {
 
 /// Reads a list of files, in its order: a line is `t file`, with t in decimal seconds and the file
 /// relative to the list's folder. A # begins a comment.
-/// @throws std::runtime_error naming the list if it cannot be read, or the wrong line.
 std::vector<TimedFile> timedFilesIn(const std::filesystem::path& list);
 
 /// A folder may hold estimated and true depth maps; the role selects one of them.
@@ -32,7 +30,6 @@ enum class DepthSeriesRole { kEstimate, kTruth };
 ///   depth/index.txt or index.txt                 a dataset's list, as `timedFilesIn` reads it
 ///   <t>.tiff or NAME_<t>.tiff                    or .tif, .pfm, .npy, .png
 /// For truth, the dataset's list comes before the maps of `map`.
-/// @throws std::runtime_error naming the folder without depth maps or the wrong line of a list.
 std::vector<TimedFile> depthSeries(const std::filesystem::path& folder, DepthSeriesRole role);
 
 /// The file nearest in time to `t_ns`; of two equally near files the earlier. Null if none is

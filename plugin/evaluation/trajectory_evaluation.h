@@ -45,8 +45,6 @@ struct TrajectoryEvaluation {
 
 /// Compares a trajectory with the truth: TUM files, or the folder of a run (its trajectory.txt) or
 /// of a dataset (its poses.txt or groundtruth.txt).
-/// @throws std::runtime_error naming the file if it cannot be read, if there is no pair of poses,
-/// or if the pairs cannot be aligned; std::invalid_argument if the options are not valid.
 TrajectoryEvaluation evaluateTrajectory(const std::filesystem::path& estimated,
                                         const std::filesystem::path& truth,
                                         const TrajectoryEvaluationOptions& options);

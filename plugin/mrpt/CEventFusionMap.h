@@ -56,7 +56,6 @@ std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observ
 /// "keyframe", its time t_ref (rounded to MRPT's tick), its sensor pose the identity.
 void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe);
 /// The keyframes of a simplemap. A frame may have several.
-/// @throws std::invalid_argument naming the first frame without a keyframe.
 std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map);
 
 /// The global cloud as a metric map of MRPT. MRPT's map factory makes it from an .ini; it takes the
@@ -78,7 +77,6 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
   DEFINE_SERIALIZABLE(CEventFusionMap, efm)
 
  public:
-  /// @throws std::invalid_argument if the options are not valid.
   explicit CEventFusionMap(const GlobalCloudOptions& options = {});
 
   /// @throws std::invalid_argument if a point is not finite, its confidence is below 0, or it lies
@@ -97,7 +95,6 @@ class CEventFusionMap : public mrpt::maps::CMetricMap {
   /// The exported points, coloured by their confidence.
   void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;
   /// Writes "<prefix>.pcd".
-  /// @throws std::runtime_error naming the file if it cannot be written.
   void saveMetricMapRepresentationToFile(const std::string& prefix) const override;
   /// The exported points. The map owns them, and they change with it. Where floats are too coarse
   /// for them, MRPT's log has a warning.

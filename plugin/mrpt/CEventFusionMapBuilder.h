@@ -71,7 +71,6 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// Live operation: receives each new snapshot of the map, in the mapping's thread.
   using MapCallback = std::function<void(const std::shared_ptr<const MapSnapshot>&)>;
 
-  /// @throws std::invalid_argument if the options are not valid.
   explicit CEventFusionMapBuilder(const EventFusionOptions& builder_options = defaultOptions());
   ~CEventFusionMapBuilder() override;
 
@@ -131,7 +130,6 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// @param initial_map a map of `getCurrentlyBuiltMap`: its keyframes become the first of the new
   /// map.
   /// @param x0 not used: poses come from observations.
-  /// @throws std::invalid_argument if a frame of the initial map is no keyframe.
   void initialize(const mrpt::maps::CSimpleMap& initial_map = mrpt::maps::CSimpleMap(),
                   const mrpt::poses::CPosePDF* x0 = nullptr) override;
   /// The newest pose of the rig; before the first pose, the identity. Without refinement it is the

@@ -126,7 +126,6 @@ void tellChoice(const SessionStatus& status, const HostedMapping::Callbacks& cal
 class PlaybackMapping : public HostedMapping {
  public:
   /// @param earlier keyframes of an initial map.
-  /// @throws std::runtime_error naming a file of the options that cannot be read.
   PlaybackMapping(const EventFusionOptions& options, std::vector<StoredKeyframe> earlier,
                   Callbacks callbacks);
 

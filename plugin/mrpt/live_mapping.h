@@ -38,7 +38,6 @@ namespace efm {
 class LiveMapping : public HostedMapping, public std::enable_shared_from_this<LiveMapping> {
  public:
   /// @param earlier keyframes of an initial map.
-  /// @throws std::runtime_error naming a file of the options that cannot be read.
   LiveMapping(const EventFusionOptions& options, std::vector<StoredKeyframe> earlier,
               Callbacks callbacks);
   /// Ends without mapping the rest.
@@ -51,7 +50,7 @@ class LiveMapping : public HostedMapping, public std::enable_shared_from_this<Li
   void stop() override;
   bool mayStopHere() const override { return !runsHere(); }
 
-  /// Copies the packet. @throws std::invalid_argument as InputQueue::add.
+  /// Copies the packet.
   void addEvents(CameraPacket packet) override { queue_.add(std::move(packet)); }
   void skipEvents(const CameraPacket& packet) override { queue_.skip(packet); }
   void addPose(const QueuedPose& pose) override { queue_.add(pose); }

@@ -110,7 +110,6 @@ class DeadReckoning {
   /// @param frame the observations after the movement. Its time is used if the movement has none.
   /// @return the pose after the movement, a CObservationRobotPose labelled "actions"; null without
   /// a movement.
-  /// @throws std::invalid_argument if neither has a time.
   mrpt::obs::CObservation::Ptr poseAfter(const mrpt::obs::CActionCollection& action,
                                          const mrpt::obs::CSensoryFrame& frame);
 

@@ -28,7 +28,6 @@ using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
 std::string textOf(const OptionValue& value);
 
 /// Reads a field from the text of a file.
-/// @throws std::invalid_argument saying the expected kind: "must be a number".
 void parseInto(std::string_view text, double& field);
 void parseInto(std::string_view text, int& field);
 void parseInto(std::string_view text, std::int64_t& field);

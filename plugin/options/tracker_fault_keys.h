@@ -15,7 +15,6 @@ namespace efm {
 /// meaning of each key. `seed` is the seed of all random draws.
 
 /// Sets one fault from "key=value".
-/// @throws std::invalid_argument naming the key, its value and the expected kind and range.
 void setTrackerFault(std::string_view assignment, TrackerFaults& faults);
 
 /// All keys with their values, except keys without a value. Values read back the same, except for

@@ -26,8 +26,6 @@ struct PlayerOptions {
 /// Reads the options from a sensor's section of a host's .ini; paths are relative to the file, or
 /// to the working folder where the host hides it, as rawlog-grabber does. Checks MRPT's own keys,
 /// too, which CGenericSensor reads as 0 where they are wrong.
-/// @throws std::invalid_argument naming the file, the section, the key, the value and what was
-/// expected: of unknown and missing keys, values of the wrong kind or out of range, missing files.
 PlayerOptions readPlayerOptions(const mrpt::config::CConfigFileBase& source,
                                 const std::string& section);
 

@@ -56,7 +56,6 @@ struct LiveOptions {
 
   /// The events that may wait, by both limits.
   double queueEvents() const;
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 

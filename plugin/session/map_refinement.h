@@ -24,7 +24,6 @@ struct MapRefinementOptions {
   bool background = false;
   RefinementOptions refiner;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const { refiner.validate(); }
 };
 
@@ -57,7 +56,6 @@ Matrix6d covarianceAt(const RefinementState& state, const Rigid3& T_world_rig);
 /// them.
 class MapRefinement {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   explicit MapRefinement(const MapRefinementOptions& options);
   /// Leaves waiting keyframes unrefined.
   ~MapRefinement();

@@ -42,8 +42,6 @@ class RecordingSurveyor;
 /// `next` again.
 class MappingSession {
  public:
-  /// @throws std::invalid_argument where the options are not valid; std::runtime_error naming a
-  /// file of the options that cannot be read.
   explicit MappingSession(const EventFusionOptions& options);
   ~MappingSession();
 
@@ -58,11 +56,9 @@ class MappingSession {
   /// Poses of one source are used: see PoseSourceSelector. The session waits for a better source
   /// until the rig is complete.
   /// @param noise the standard deviations that the tracker states for the pose.
-  /// @throws std::invalid_argument where the pose is not finite.
   void addPose(const StampedPose& pose, const PoseSourceId& source = {},
                const std::optional<PoseNoise>& noise = std::nullopt);
   /// Inserts a keyframe of an earlier map into the cloud, before the first new one.
-  /// @throws std::invalid_argument as GlobalCloud::insert does.
   void insertEarlier(const std::vector<CloudPoint>& points, const Rigid3& T_world_ref);
   /// Chooses automatic options from the data so far.
   void endSurvey() { survey_ends_ = true; }
@@ -112,7 +108,6 @@ class MappingSession {
   /// Where automatic options wait for their first window: chooses them from the data so far, if
   /// these last at least so long.
   /// @return whether it chose.
-  /// @throws std::invalid_argument where the options do not fit the rig.
   bool chooseFromSoFar(double at_least_s);
   /// The next window that is covered, if there is one.
   std::optional<Window> nextWindow();

@@ -65,7 +65,6 @@ struct StatisticsOptions {
 };
 
 /// The options of a map, as far as they are known before it.
-/// @throws std::runtime_error naming a file of the options that cannot be read.
 StatisticsOptions statisticsOptions(const EventFusionOptions& options);
 
 /// Times of events or poses, in the order of the recording, on the trajectory's clock.

@@ -40,7 +40,6 @@ struct RecordingSurvey {
 /// with its length: of more than a million events per second and camera, some are chosen evenly.
 class RecordingSurveyor {
  public:
-  /// @throws std::runtime_error naming a file of the options that cannot be read.
   explicit RecordingSurveyor(const EventFusionOptions& options);
 
   /// @throws std::exception where a MappingSession does; then nothing more may be added.

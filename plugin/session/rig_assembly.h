@@ -29,7 +29,6 @@ struct CameraPacket {
 /// options.
 class RigAssembly {
  public:
-  /// @throws std::runtime_error naming a file of the options that cannot be read.
   explicit RigAssembly(const EventFusionOptions& options);
 
   /// Adds all cameras of the options' calibration to the mapper, if it has their sizes: then none

@@ -19,7 +19,6 @@ struct KeyframeNoiseOptions {
   std::optional<std::int64_t> start_ns;
 
   bool any() const { return noise_m > 0 || noise_rad > 0; }
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -31,7 +30,6 @@ class KeyframeNoise {
     std::int64_t first_pose_ns = 0;
     std::int64_t tick_ns = 1;  ///< Intervals begin at multiples of it, rounded down.
   };
-  /// @throws std::invalid_argument where the options are not valid.
   KeyframeNoise(const KeyframeNoiseOptions& options, const Clock& clock, std::uint64_t seed);
 
   /// Number of the interval that contains a time. May be negative.

@@ -26,7 +26,6 @@ struct PosePerturbationOptions {
   std::uint64_t seed = 0;
 
   bool any() const;  ///< Whether any error is enabled.
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -43,7 +42,6 @@ struct PosePerturbationOptions {
 /// A pose that is not finite, or has a time beyond kEndOfTimeNs, is returned unchanged.
 class PerturbedPoses : public PoseSource {
  public:
-  /// @throws std::invalid_argument where the options are not valid or there is no source.
   PerturbedPoses(std::unique_ptr<PoseSource> source, const PosePerturbationOptions& options);
 
   /// @throws std::invalid_argument where the source's pose is older than the one before it.

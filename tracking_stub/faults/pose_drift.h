@@ -15,7 +15,6 @@ struct PoseDriftOptions {
   double rad_per_m = 0;  ///< Rotation of the heading, 0 to 10.
 
   bool any() const { return fraction > 0 || rad_per_m > 0; }
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -24,7 +23,6 @@ struct PoseDriftOptions {
 /// unit vectors in the world.
 class PoseDrift {
  public:
-  /// @throws std::invalid_argument where the options are not valid.
   PoseDrift(const PoseDriftOptions& options, std::uint64_t seed);
 
   /// The pose with drift. Call it in order of time. The first pose does not change.

@@ -25,14 +25,12 @@ struct PoseDropoutOptions {
   std::uint64_t seed = 0;
 
   bool any() const { return drop_probability > 0 || !gaps.empty() || random_gaps_hz > 0; }
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
 /// A tracker that fails at times: another source without the lost poses.
 class PoseDropouts : public PoseSource {
  public:
-  /// @throws std::invalid_argument where the options are not valid or there is no source.
   PoseDropouts(std::unique_ptr<PoseSource> source, const PoseDropoutOptions& options);
 
   std::optional<StampedPose> next() override;

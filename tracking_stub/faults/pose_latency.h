@@ -16,7 +16,6 @@ class PoseLatency : public PoseSource {
   static constexpr std::int64_t kMaxNs = 10'000'000'000;
 
   /// @param latency_ns 0 to 10 s.
-  /// @throws std::invalid_argument where the latency is not valid or there is no source.
   PoseLatency(std::unique_ptr<PoseSource> source, std::int64_t latency_ns);
 
   std::optional<StampedPose> next() override;

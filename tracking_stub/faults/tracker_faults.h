@@ -17,13 +17,11 @@ struct TrackerFaults {
   std::int64_t latency_ns = 0;  ///< 0 to 1e10, see PoseLatency.
 
   bool any() const;  ///< Whether any fault is enabled.
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
 /// A source with faults. Poses are lost first, so the poses at a jump are never lost; then they are
 /// perturbed, then delayed.
-/// @throws std::invalid_argument where the faults are not valid or there is no source.
 std::unique_ptr<PoseSource> withFaults(std::unique_ptr<PoseSource> source,
                                        const TrackerFaults& faults);
 

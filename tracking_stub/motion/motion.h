@@ -75,7 +75,6 @@ struct SmoothingOptions {
   std::int64_t period_ns = 5'000'000;  ///< Of the result; at most a quarter of 1 / cutoff.
   double max_gap_s = 1;                ///< Longer gaps are errors.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -83,7 +82,6 @@ struct SmoothingOptions {
 /// its neighbours is over 8 times the median. The others are resampled evenly, also across gaps,
 /// and filtered without delay by a windowed sinc: positions, and rotations in the tangent space at
 /// each sample. Poses may be in any order; of equal times the first counts.
-/// @throws std::invalid_argument where there are fewer than two poses, or naming a gap.
 std::vector<StampedPose> smoothTrajectory(const std::vector<StampedPose>& poses,
                                           const SmoothingOptions& options = {});
 
@@ -96,7 +94,6 @@ std::int64_t startOfMotion(const std::vector<StampedPose>& poses);
 /// before the first pose and after the last.
 class SampledMotion : public Motion {
  public:
-  /// @throws std::invalid_argument where there are fewer than two poses or uneven periods.
   explicit SampledMotion(std::vector<StampedPose> poses);
   Rigid3 poseAt(std::int64_t t_ns) const override;
 

@@ -103,14 +103,12 @@ struct SimulationOptions {
   /// Seed of everything random: the paintings and the initial memory of the pixels.
   std::uint64_t seed = 1;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed values.
   void validate() const;
 };
 
 std::vector<std::string> simulationPresets();
 
 /// Scene, rig and motion of a preset.
-/// @throws std::invalid_argument where the options are not valid.
 Simulation makeSimulation(const SimulationOptions& options = {});
 
 }  // namespace efm

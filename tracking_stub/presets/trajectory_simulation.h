@@ -24,7 +24,6 @@ struct TrajectorySimulationOptions {
   std::optional<double> duration_s;
   std::uint64_t seed = 1;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed values.
   void validate() const;
 };
 
@@ -35,7 +34,6 @@ std::vector<std::string> simulationScenes();
 /// and the smoothed trajectory is the truth. The scene is built around the simulated part of the
 /// path. Its vertical is the mean y axis of the cameras.
 /// @param poses T_world_cam0, where camera 0 is the rig's frame.
-/// @throws std::invalid_argument where the options are not valid or do not fit the trajectory.
 Simulation makeTrajectorySimulation(const TrajectorySimulationOptions& options,
                                     const std::vector<StampedPose>& poses, const Rig& rig);
 

@@ -91,8 +91,6 @@ struct PixelRay {
 /// The viewing rays of all pixels of a camera, with distortion.
 class PixelRays {
  public:
-  /// @throws std::invalid_argument where the model is not valid, has fewer than 2x2 pixels, or
-  /// no pixel has a ray.
   explicit PixelRays(const CameraModel& model);
 
   int width() const { return width_; }
@@ -121,7 +119,6 @@ struct Frame {
 /// silhouette, where an adjacent pixel has another surface, a pixel averages over its area.
 class FrameRenderer {
  public:
-  /// @throws std::invalid_argument where the model is not valid.
   explicit FrameRenderer(const CameraModel& model) : rays_(model) {}
 
   const PixelRays& rays() const { return rays_; }

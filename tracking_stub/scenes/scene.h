@@ -78,7 +78,6 @@ class Scene {
 
   /// Adds a rectangle per facet, with u around the pole and v along it. Each end is the union of
   /// rectangles between opposite facets. They overlap, so `paint` must paint them all equally.
-  /// @throws std::invalid_argument where the pole is not valid.
   void addPole(const Pole& pole, const Painter& paint);
 
   /// Moves all surfaces: a point at p goes to T_world_old * p.

@@ -27,7 +27,6 @@ struct EventNoiseOptions {
   double hot_fraction = 0;  ///< Fraction of hot pixels, 0 to 1. They are random.
   double hot_hz = 1000;     ///< Additional rate of a hot pixel, 0 to 1e5.
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -40,7 +39,6 @@ class EventNoise {
     std::uint64_t seed = 0;
     std::int64_t t_ns = 0;  ///< The events begin here.
   };
-  /// @throws std::invalid_argument where the options are not valid.
   EventNoise(int width, int height, const EventNoiseOptions& options, const Start& start);
 
   /// Appends the row's events from the last call to `until_ns`, inclusive, by column and then by
@@ -80,7 +78,6 @@ struct EventPixelOptions {
   /// intensity.
   std::int64_t refractory_ns = 0;
 
-  /// @throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;
 };
 
@@ -89,7 +86,6 @@ struct EventPixelOptions {
 class EventPixels {
  public:
   /// @param seed of the mismatch.
-  /// @throws std::invalid_argument where the options are not valid.
   EventPixels(int width, int height, const EventPixelOptions& options, std::uint64_t seed = 0);
 
   /// Sets the pixels' memory at the start of the recording. With a seed it is random within the
@@ -151,7 +147,6 @@ struct SimulationRun {
 
 /// Moves the rig through the scene and returns a recording per camera. The events do not depend on
 /// the number of threads.
-/// @throws std::invalid_argument where the simulation or the number of threads is not valid.
 std::vector<CameraRecording> simulateEvents(const Simulation& simulation,
                                             const SimulationRun& run = {});
 

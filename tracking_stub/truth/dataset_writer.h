@@ -71,7 +71,6 @@ void writeDataset(
     const std::function<void()>& before_file = [] {});
 
 /// Writes a line `t x y p` per event: seconds with nine decimals, polarity 0 or 1.
-/// @throws std::runtime_error naming the file.
 void writeEvents(const std::filesystem::path& file, const std::vector<Event>& events);
 /// Appends these lines to a text.
 void appendEvents(std::string& text, EventSpan events);
@@ -80,7 +79,6 @@ void appendEvents(std::string& text, EventSpan events);
 std::string formatCamchain(const Rig& rig);
 
 /// Writes a binary little-endian PLY file with float vertices x y z.
-/// @throws std::runtime_error naming the file.
 void writePly(const std::filesystem::path& file, const std::vector<Eigen::Vector3f>& points);
 
 }  // namespace efm

@@ -60,7 +60,6 @@ class MapFrames : public MapWatcher {
   MapFrames(const std::filesystem::path& folder, bool force);
 
   bool due(bool is_last) override { return !is_last; }
-  /// @throws std::runtime_error naming the file if it cannot be written.
   void show(WatchedMap snapshot) override;
 
  private:

@@ -39,7 +39,6 @@ class MapWatcher {
 class MapWindow : public MapWatcher {
  public:
   /// Opens a window. The library with MRPT's windows is loaded by this call alone.
-  /// @throws std::runtime_error if there is no display, or the window does not appear.
   static std::unique_ptr<MapWindow> open();
 
   /// Whether the user has not closed it.

@@ -17,8 +17,6 @@ bool isRos1Bag(const std::filesystem::path& file);
 bool isRos2Bag(const std::filesystem::path& source);
 
 /// The bags of a file, or of a folder's metadata.yaml in its order.
-/// @throws std::runtime_error naming the file, also for a compressed one and for one that this
-/// build does not read.
 std::vector<std::shared_ptr<BagSource>> openBagFiles(const std::filesystem::path& source);
 
 /// Recordings in ROS bags: ROS 1 (.bag) and ROS 2 (.db3, .mcap, or the folder with metadata.yaml).

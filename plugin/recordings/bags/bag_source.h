@@ -33,7 +33,6 @@ class BagCursor {
   virtual ~BagCursor() = default;
   /// The next message in the order of the recording. Its bytes stay valid until the next call.
   /// @return false at the end.
-  /// @throws std::runtime_error at damaged data, naming file, position and what was expected.
   virtual bool next(BagMessage& message) = 0;
 };
 
@@ -97,14 +96,12 @@ inline std::string typeWithoutMsg(std::string type) {
 std::unique_ptr<BagSource> openRos1Bag(const std::filesystem::path& file);
 
 /// Opens a ROS 2 bag in SQLite: tables `topics` and `messages`, of any version of rosbag2.
-/// @throws std::runtime_error naming the file and what was expected.
 std::unique_ptr<BagSource> openDb3(const std::filesystem::path& file);
 
 /// Opens an MCAP file: chunks without compression, lz4 or zstd, or messages without chunks. Of its
 /// channels, those with CDR or ROS 1 messages are topics. Checksums of chunks and of the summary
 /// are compared. A file without a summary, or whose recording was cut off, is read once from its
 /// beginning to its end to find the channels and chunks.
-/// @throws std::runtime_error naming the file, the byte and what was expected.
 std::unique_ptr<BagSource> openMcap(const std::filesystem::path& file);
 
 /// MCAP files (mcap.dev/spec), for the reader and the writer: a magic word, records and the magic

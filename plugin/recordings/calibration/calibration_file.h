@@ -37,16 +37,12 @@ struct Calibration {
 
   /// Camera `index` of the recording.
   /// @param sensor the camera's size, if the recording knows it.
-  /// @throws std::invalid_argument naming the file, where it has no such camera, the camera has
-  /// another size, or the size is unknown.
   RigCamera camera(std::size_t index, const std::optional<CameraSize>& sensor) const;
 
   /// @throws std::invalid_argument naming the file, where it has more or fewer cameras.
   void requireCameras(std::size_t count) const;
 
   /// @param recorded the recording's own cameras.
-  /// @throws std::invalid_argument naming the file, where it has another number of cameras or a
-  /// camera of another size.
   void requireLike(const Rig& recorded) const;
 };
 
@@ -59,12 +55,10 @@ inline constexpr const char* kCalibrationFiles =
 /// Reads a calibration, whose kind is found by its content: see `readCamchain`,
 /// `readDsecCalibration`, `readTumVieCalibration`, `readCameraInfo`, `readMrptCameras` and
 /// `readUzhCalibration`; the last one does not have the sensor's size.
-/// @throws std::runtime_error naming the file, the place, the value and what was expected.
 Calibration readCalibration(const std::filesystem::path& file);
 
 /// Reads the nine numbers fx fy cx cy k1 k2 p1 p2 k3, the UZH data sets' calib.txt: distortion is
 /// radtan with five coefficients, even where all are zero.
-/// @throws std::runtime_error naming the file, the value or the count, and what was expected.
 CameraModel readUzhCalibration(const std::filesystem::path& file, CameraSize size);
 /// The same without the sensor's size, which the file does not have: width and height are 0.
 Calibration readUzhCalibration(const std::filesystem::path& file);
@@ -78,7 +72,6 @@ Calibration readUzhCalibration(const std::filesystem::path& file);
 /// - TUM-VIE's mocap-imu-calibration*.json: the body is the marker, see `readTumVieHandEye`.
 /// Rotations may be off by 1e-3, because of rounding; the nearest rotation is taken.
 /// @param calibration the rig's, which the last two need; null: none is given.
-/// @throws std::runtime_error naming the file, the key, the value and what was expected.
 Rigid3 readHandEye(const std::filesystem::path& file, const Calibration* calibration = nullptr);
 
 }  // namespace efm

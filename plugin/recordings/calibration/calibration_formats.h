@@ -23,13 +23,10 @@ namespace efm {
 /// The rig's frame and clock are camera 0's: a camera's time offset is its timeshift minus that of
 /// camera 0. Other keys are ignored. Rotations may be off by 1e-3, because of
 /// rounding; the nearest rotation is taken.
-/// @throws std::runtime_error naming the file, the camera, the key, the value and what was
-/// expected.
 Rig readCamchain(const std::filesystem::path& file);
 
 /// The pose T_imu_rig of the rig, camera 0, on the IMU: the inverse of camera 0's T_cam_imu (4x4).
 /// @return nothing if the camera chain does not have it.
-/// @throws std::runtime_error as `readCamchain` does.
 std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file);
 
 /// Reads one camera from the YAML of ROS (sensor_msgs/CameraInfo as camera_calibration writes it):
@@ -38,7 +35,6 @@ std::optional<Rigid3> readCamchainImu(const std::filesystem::path& file);
 ///   distortion_model         plumb_bob (radtan) | equidistant | fisheye (the same)
 ///   distortion_coefficients  data: 4 or 5 numbers | 4
 /// Rectification and projection are ignored: events are not rectified.
-/// @throws std::runtime_error naming file, key, value and what was expected.
 CameraModel readCameraInfo(const YamlEntry& root);
 
 /// DSEC (Gehrig et al., RA-L 2021): two event cameras, cam0 left and cam3 right, and between them
@@ -48,13 +44,11 @@ CameraModel readCameraInfo(const YamlEntry& root);
 /// `extrinsics` (T_10, T_21, T_32, R_rect1). Its camera 1 is cam3:
 ///   T_rig_cam1 = (T_32 * T_21 * T_10)^-1.
 /// The calibration has T_camRect1_rig = R_rect1 * T_10, which the hand-eye transform needs.
-/// @throws std::runtime_error naming file, entry, key, value and what was expected.
 Calibration readDsecCalibration(const YamlEntry& root, const std::filesystem::path& file);
 
 /// Reads the pose of the rig on the LiDAR from cam_to_lidar.yaml:
 ///   T_lidar_rig = T_lidar_camRect1 * T_camRect1_rig.
 /// @param calibration of the same rig; null: none is given.
-/// @throws std::runtime_error where the calibration is not DSEC's, or the key is wrong.
 Rigid3 readDsecHandEye(const YamlEntry& root, const Calibration* calibration);
 
 /// TUM-VIE (Klenk et al., IROS 2021): JSON whose keys are below `value0`. Of its four cameras, 2
@@ -63,13 +57,11 @@ Rigid3 readDsecHandEye(const YamlEntry& root, const Calibration* calibration);
 /// Reads the rig of the event cameras from camera-calibration*.json: `intrinsics` (camera_type
 /// kb4, which is equidistant: fx … k4), `resolution`, `T_imu_cam` {px … qw}. T_imu_rig is T_imu_cam
 /// of camera 2.
-/// @throws std::runtime_error naming file, entry, key, value and what was expected.
 Calibration readTumVieCalibration(const YamlEntry& root, const std::filesystem::path& file);
 
 /// Reads the pose of the rig on the motion-capture marker from mocap-imu-calibration*.json:
 ///   T_marker_rig = T_imu_marker^-1 * T_imu_rig.
 /// @param calibration of the same rig; null: none is given.
-/// @throws std::runtime_error where the calibration has no IMU, or a key is wrong.
 Rigid3 readTumVieHandEye(const YamlEntry& root, const Calibration* calibration);
 
 /// Whether a text begins, comments aside, with a section of an .ini file: "[NAME]".
@@ -85,7 +77,6 @@ bool looksLikeIni(std::string_view text);
 /// and of the pose of the right camera on the left one:
 ///   pose_quaternion   [x y z qw qx qy qz]
 /// Other keys and sections are ignored. The left camera is camera 0.
-/// @throws std::runtime_error naming file, section, key, value and what was expected.
 Rig readMrptCameras(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace efm

@@ -71,7 +71,6 @@ std::string hdf5Cause();
 /// An HDF5 file, open for reading. Paths of its objects begin with '/'.
 class Hdf5File {
  public:
-  /// @throws std::runtime_error naming the file if it cannot be opened.
   explicit Hdf5File(std::filesystem::path file);
 
   const std::filesystem::path& path() const { return path_; }
@@ -86,9 +85,9 @@ class Hdf5File {
   /// @throws std::runtime_error naming the file, the data set and `expected`, its meaning.
   std::vector<double> numbers(const std::string& path, std::size_t count,
                               std::string_view expected) const;
-  /// A whole number. @throws std::runtime_error naming the file and the data set.
+  /// A whole number.
   std::int64_t integer(const std::string& path) const;
-  /// The text of a data set. @throws std::runtime_error naming the file and the data set.
+  /// The text of a data set.
   std::string text(const std::string& path) const;
   /// The text of an attribute of the file, if it has this attribute.
   std::optional<std::string> attribute(const char* name) const;
@@ -129,7 +128,6 @@ class Hdf5Rows {
 
   /// The chunk that contains a row.
   /// @param row below `size`.
-  /// @throws std::runtime_error naming the file, the data set and the row if it is damaged.
   const RowBlock& blockAt(std::uint64_t row);
 
   std::runtime_error fail(std::string_view what) const { return file_->fail(path_, what); }
@@ -167,7 +165,6 @@ class Hdf5Rows {
 class Hdf5Column {
  public:
   /// @param index of the number in the row of a matrix.
-  /// @throws std::runtime_error naming the file and the data set if the row has no such number.
   static Hdf5Column ofMatrix(std::shared_ptr<Hdf5Rows> rows, std::size_t index);
   /// @throws std::runtime_error naming the file, the data set and the field if there is no such
   /// field, or it is no number.

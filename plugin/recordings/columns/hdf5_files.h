@@ -39,7 +39,6 @@ bool looksLikeHdf5(const std::filesystem::path& source);
 ///   /davis/left/pose, /davis/left/pose_ts   MVSEC: T_world_cam0, seconds
 ///   /Cn_T_C0, /ts                           M3ED: T_cam0_world, microseconds
 /// M3ED has the calibration in the file: calib/ beside the events of a camera.
-/// @throws std::runtime_error naming the file and the data set that is missing or wrong.
 RecordingParts openHdf5(const std::vector<std::filesystem::path>& sources,
                         const ReaderOptions& options);
 

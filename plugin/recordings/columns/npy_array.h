@@ -15,7 +15,6 @@
 namespace efm {
 
 /// What precedes the numbers of an array in a file of its own, or in a member of a .npz file.
-/// @throws std::runtime_error naming file and member, where it is no array of numbers.
 NpyHeader readNpyHeader(const std::filesystem::path& file, const std::string& member = {});
 
 /// Which numbers of an array are read.
@@ -35,8 +34,6 @@ class NpyArray {
  public:
   /// @param member of a .npz file, with its ".npy"; empty: the file is the array.
   /// @param part without it, an array of numbers in C order is expected.
-  /// @throws std::runtime_error naming file and member, where it is no such array, or the file is
-  /// shorter than its header says.
   explicit NpyArray(const std::filesystem::path& file, const std::string& member = {},
                     const NpyPart& part = {});
 
@@ -50,7 +47,6 @@ class NpyArray {
 
   /// Replaces the block by the next rows; fewer than `max_rows` only at the end.
   /// @return the number of rows.
-  /// @throws std::runtime_error where the file ends inside the array.
   std::size_t readRows(std::size_t max_rows);
   /// The first rows, which the next `readRows` reads again. Called before `readRows`.
   /// @return the number of rows that are there, at most `max_rows`.

@@ -40,7 +40,6 @@ class Recording {
   virtual ~Recording() = default;
 
   /// @return the next observation; null at the end.
-  /// @throws std::runtime_error naming the file and the position of an error.
   virtual mrpt::obs::CObservation::Ptr next() = 0;
 
   /// The position of the last observation that `next` returned: "entry 12 of my.rawlog".

@@ -52,13 +52,10 @@ std::vector<std::string> recordingFormats();
 
 /// Opens a recording: a rawlog, or the files and folders of `readerFormats`, whose cameras and
 /// poses are put together in the order of the files.
-/// @throws std::runtime_error naming the missing or wrong file and the expected ones;
-/// std::invalid_argument if the calibration is of other cameras or the faults are not valid.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
 /// The depth maps of the recording's truth, if it has any that is read: that of the formats with
 /// `RecordingFormat::truth`. Opens no events.
-/// @throws std::runtime_error naming the file and the line that is wrong.
 std::vector<TruthDepth> openTruth(const RecordingSource& source);
 
 }  // namespace efm

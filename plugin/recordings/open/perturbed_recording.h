@@ -26,7 +26,6 @@ namespace efm {
 class PerturbedRecording : public Recording {
  public:
   /// @param faults their tick is replaced by MRPT's.
-  /// @throws std::invalid_argument where the faults are not valid.
   PerturbedRecording(std::unique_ptr<Recording> recording, const TrackerFaults& faults);
   ~PerturbedRecording() override;
 

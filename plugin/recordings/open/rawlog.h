@@ -31,7 +31,6 @@ enum class GzSource { kFile, kPipe };
 class GzInputStream : public mrpt::io::CStream {
  public:
   /// Opening a pipe waits for its writer; reading, for more data.
-  /// @throws std::runtime_error naming the file if it cannot be opened.
   explicit GzInputStream(const std::filesystem::path& file, GzSource source = GzSource::kFile);
 
   /// @throws std::runtime_error if the file is truncated or its compression is damaged.
@@ -61,14 +60,12 @@ class GzInputStream : public mrpt::io::CStream {
 /// A gzip file, with MRPT's compression level, 1, or a plain file, as an MRPT stream for writing.
 class GzOutputStream : public mrpt::io::CStream {
  public:
-  /// @throws std::runtime_error naming the file if it cannot be created.
   explicit GzOutputStream(const std::filesystem::path& file, bool compressed = true);
 
-  /// Completes the file. @throws std::runtime_error if not all bytes could be written.
+  /// Completes the file.
   void close();
 
   std::size_t Read(void* buffer, std::size_t count) override;  ///< Throws: write only.
-  /// @throws std::runtime_error if not all bytes could be written.
   std::size_t Write(const void* buffer, std::size_t count) override;
   std::uint64_t Seek(std::int64_t offset, TSeekOrigin origin) override;  ///< Throws: forward only.
   std::uint64_t getTotalBytesCount() const override { return position_; }
@@ -85,8 +82,6 @@ std::optional<std::string> whyNoRawlog(const std::filesystem::path& file);
 
 /// Checks the first bytes of a rawlog, compressed or not: the name of an object's class, as MRPT
 /// writes it. Does not check for later damage.
-/// @throws std::runtime_error naming the file, its first bytes and the expected kind of file, or if
-/// it cannot be opened.
 void requireRawlog(const std::filesystem::path& file);
 
 /// A rawlog, gzip-compressed or plain, read entry by entry. Its observations, also those in sensory
@@ -95,7 +90,6 @@ void requireRawlog(const std::filesystem::path& file);
 /// actions and comments are ignored.
 class RawlogRecording : public Recording {
  public:
-  /// @throws std::runtime_error naming the file if it cannot be opened.
   explicit RawlogRecording(std::filesystem::path file, GzSource source = GzSource::kFile);
 
   /// @throws std::runtime_error "stopped at entry N of FILE: reason" if the file is truncated or
@@ -127,13 +121,11 @@ class RawlogWriter {
   /// @param file an earlier file of this name is replaced: see AtomicFile.
   /// @param compression gzip for the whole file, MRPT's default; or Zstandard for the events alone,
   /// three times as fast, in a plain file.
-  /// @throws std::runtime_error naming the file if it cannot be created or replaced.
   explicit RawlogWriter(const std::filesystem::path& file,
                         RawlogCompression compression = RawlogCompression::kGzip);
   /// Without `close`, there is no file.
   ~RawlogWriter();
 
-  /// @throws std::runtime_error naming the file if it cannot be written.
   void write(mrpt::obs::CObservation& observation);
   void close();
 

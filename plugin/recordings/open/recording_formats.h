@@ -28,7 +28,6 @@ const RecordingFormat* detectFormat(const std::filesystem::path& source);
 ///   NumPy arrays            see `readPoseArrays`
 ///   a recording with poses  a bag, an HDF5 file, a folder: `detectFormat`
 /// @return at least one pose, in the order of the file.
-/// @throws std::runtime_error naming the file, the place, the value and what was expected.
 std::vector<StampedPose> readPoses(const std::filesystem::path& file,
                                    const ReaderOptions& options = {});
 
@@ -39,7 +38,6 @@ std::vector<StampedPose> readPoses(const std::filesystem::path& file,
 /// Where several arrays of a .npz file have these shapes, those named t, time, timestamps … and
 /// poses, pose, T_world_body, trajectory. A name may say the unit: t_ns, timestamps_us. Real times
 /// are rounded to microseconds.
-/// @throws std::runtime_error naming file, array, row, value and what was expected.
 std::vector<StampedPose> readPoseArrays(const std::filesystem::path& file,
                                         const ReaderOptions& options);
 

@@ -23,7 +23,6 @@ namespace efm {
 class TimeCut : public Recording {
  public:
   /// @param t0_ns, t1_ns nothing: no limit.
-  /// @throws std::invalid_argument where t1 is not after t0.
   TimeCut(std::unique_ptr<Recording> recording, std::optional<std::int64_t> t0_ns,
           std::optional<std::int64_t> t1_ns);
 
@@ -64,7 +63,6 @@ class TimeCut : public Recording {
 };
 
 /// The recording itself where there is no limit.
-/// @throws std::invalid_argument as TimeCut does.
 std::unique_ptr<Recording> cutTime(std::unique_ptr<Recording> recording,
                                    std::optional<std::int64_t> t0_ns,
                                    std::optional<std::int64_t> t1_ns);

@@ -27,8 +27,6 @@ struct RawHeader {
 /// EvtDecoder.
 class PropheseeRawStream : public EventStream {
  public:
-  /// @throws std::runtime_error if the file cannot be opened, or its header names no encoding that
-  /// is known.
   explicit PropheseeRawStream(std::filesystem::path file);
 
   bool read(std::vector<Event>& events) override;
@@ -63,7 +61,6 @@ class PropheseeRawStream : public EventStream {
 bool looksLikePropheseeRaw(const std::filesystem::path& file);
 
 /// Each file is a camera.
-/// @throws std::runtime_error naming the file and line that is wrong.
 RecordingParts openPropheseeRaw(const std::vector<std::filesystem::path>& files,
                                 const ReaderOptions& options);
 

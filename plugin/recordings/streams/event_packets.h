@@ -44,7 +44,6 @@ class EventPackets {
   /// The events of the next period of the grid with events, in time order; events of equal time in
   /// the order of the file. More than `kMaxPacketEvents` are several packets, also those of one
   /// time. Empty at the end.
-  /// @throws std::runtime_error at a wrong event.
   std::vector<Event> nextPacket();
   /// The first time of the next packet; nothing at the end. If the next call of `nextPacket`
   /// throws, the time of the newest event.

@@ -30,7 +30,6 @@ class FileContent {
   FileContent& operator=(FileContent&&) = delete;
 
   /// @return the number of bytes read: fewer than `count` only at the end.
-  /// @throws std::runtime_error naming the file that is damaged or cannot be read.
   std::size_t read(char* to, std::size_t count);
   /// The rest.
   /// @throws std::runtime_error as `read`, and where it is longer than `max_bytes`.

@@ -133,10 +133,8 @@ struct RecordingFormat {
   /// Whether a file or folder has this format, by its content. Never throws.
   bool (*matches)(const std::filesystem::path&);
   /// Opens the files of one recording, at least one. Cameras are in the order of the files.
-  /// @throws std::runtime_error naming the file and what was expected.
   RecordingParts (*open)(const std::vector<std::filesystem::path>& files, const ReaderOptions&);
   /// The depth maps of a source's truth, in the order of its list; null where the format has none.
-  /// @throws std::runtime_error naming the file and the line that is wrong.
   std::vector<TruthDepth> (*truth)(const std::filesystem::path& source) = nullptr;
 };
 
@@ -183,7 +181,6 @@ inline void requireNoPipe(const std::filesystem::path& path) {
 }
 
 /// @param what the format, for the error.
-/// @throws std::runtime_error where there are several sources.
 inline const std::filesystem::path& onlySource(const std::vector<std::filesystem::path>& sources,
                                                const char* what) {
   if (sources.size() == 1) return sources.front();

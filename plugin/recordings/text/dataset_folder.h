@@ -20,18 +20,15 @@ namespace efm {
 bool looksLikeDatasetFolder(const std::filesystem::path& folder);
 
 /// Without camchain.yaml, the cameras are cam0, cam1, … without gaps.
-/// @throws std::runtime_error naming the file (and line) that is missing or wrong.
 RecordingParts openDatasetFolder(const std::vector<std::filesystem::path>& folders,
                                  const ReaderOptions& options);
 
 /// Adds the folder's calibration (camchain.yaml) and poses (poses.txt or groundtruth.txt), where
 /// the parts have none.
-/// @throws std::runtime_error naming the file and the line that is wrong.
 void addFolderFiles(const std::filesystem::path& folder, const ReaderOptions& options,
                     RecordingParts& parts);
 
 /// The depth maps that the folder's depth/index.txt lists, a line `t file` each; none without it.
-/// @throws std::runtime_error naming the file and the line that is wrong.
 std::vector<TruthDepth> truthOfFolder(const std::filesystem::path& folder);
 
 /// The text layout of the UZH event camera dataset (Mueggler et al., IJRR 2017), one camera:
@@ -49,7 +46,6 @@ RecordingParts openUzhFolder(const std::vector<std::filesystem::path>& folders,
 
 /// The size of the first existing image of images.txt. Without one 240x180: the whole dataset was
 /// recorded with a DAVIS240C.
-/// @throws std::runtime_error if the image cannot be read.
 CameraSize uzhSensorSize(const std::filesystem::path& folder);
 
 }  // namespace efm

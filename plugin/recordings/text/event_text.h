@@ -21,7 +21,6 @@ namespace efm {
 /// lines, text after a `#`, repeated blanks, tabs, CRLF and a byte order mark are ignored.
 class EventTextStream : public EventStream {
  public:
-  /// @throws std::runtime_error if the file cannot be opened, or its columns are not clear.
   explicit EventTextStream(std::filesystem::path file, const ReaderOptions& options = {});
 
   bool read(std::vector<Event>& events) override;
@@ -66,11 +65,9 @@ bool looksLikeEventText(const std::filesystem::path& file);
 bool looksLikeEventText(const std::filesystem::path& file, const ReaderOptions& options);
 
 /// The whole lines at the beginning of a text, which may be compressed.
-/// @throws std::runtime_error naming the file that cannot be read.
 std::string beginningOfText(const std::filesystem::path& file);
 
 /// A camera per file.
-/// @throws std::runtime_error as `EventTextStream`.
 RecordingParts openEventText(const std::vector<std::filesystem::path>& files,
                              const ReaderOptions& options);
 

@@ -23,7 +23,6 @@ inline constexpr const char* kPosesWithoutTimes =
 /// The header may begin with a `#`; blanks or commas separate the fields. Times are exact. Whole
 /// numbers without a unit in the header have that of the option, see `findTimeUnit`.
 /// @return the poses in the order of the file; there may be none.
-/// @throws std::runtime_error naming file, line, value and what was expected.
 std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
                                       const ReaderOptions& options);
 
@@ -31,7 +30,7 @@ std::vector<StampedPose> readPoseText(const std::filesystem::path& file,
 bool looksLikePoseLines(std::string_view beginning);
 
 /// The same for the poses of a recording: at least one.
-/// @throws std::runtime_error as `readPoseText`; naming the file that has no pose.
+/// @throws std::runtime_error if the file has no pose.
 std::vector<StampedPose> requirePoseText(const std::filesystem::path& file,
                                          const ReaderOptions& options);
 

@@ -24,7 +24,6 @@ namespace efm {
 class McapWriter : public RecordingWriter {
  public:
   /// @param rig whose frame is that of the poses.
-  /// @throws std::runtime_error naming the file if it cannot be made.
   McapWriter(const std::filesystem::path& file, const Rig& rig);
 
   /// @throws std::runtime_error also for times that a ROS message cannot hold (before 0, or from

@@ -19,7 +19,6 @@ namespace efm {
 /// A text file to write.
 class TextFile {
  public:
-  /// @throws std::runtime_error naming the file if it cannot be made.
   explicit TextFile(std::filesystem::path path);
 
   std::ofstream& stream() { return stream_; }
@@ -39,9 +38,7 @@ class PoseTextFile {
  public:
   explicit PoseTextFile(std::filesystem::path path) : path_(std::move(path)) {}
 
-  /// @throws std::runtime_error naming the file if it cannot be made.
   void add(const StampedPose& pose);
-  /// @throws std::runtime_error naming the file if it could not be written.
   void close();
 
  private:
@@ -50,7 +47,6 @@ class PoseTextFile {
 };
 
 /// Writes camchain.yaml, if the cameras are calibrated.
-/// @throws std::runtime_error naming the file if it cannot be written.
 void writeCamchain(const std::filesystem::path& folder, const Rig& rig);
 
 /// Writes a recording in a format of other tools, in constant memory. Results get their names when
@@ -62,8 +58,6 @@ class RecordingWriter {
   /// @param camera index in the rig.
   /// @param events in time order, not before the camera's earlier ones. Times in ns of the
   /// recording's clock, with the camera's time offset already added.
-  /// @throws std::runtime_error naming the file if it cannot be written, or the format cannot hold
-  /// a value.
   virtual void addEvents(std::size_t camera, const std::vector<Event>& events) = 0;
   /// @param pose T_world_rig; poses come in time order.
   virtual void addPose(const StampedPose& pose) = 0;

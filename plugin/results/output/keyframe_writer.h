@@ -30,13 +30,11 @@ namespace efm {
 /// plane goes to disk at once: memory is that of one plane.
 class NpyDsiFile : public DsiSink {
  public:
-  /// @throws std::runtime_error naming the path where it cannot be created.
   NpyDsiFile(const std::filesystem::path& path, int planes, const ReferenceView& view);
 
   /// Thread-safe. Errors of the disk are kept for `finish`.
   void addPlane(int plane, const float* values) override;
   /// @return the complete file. Only its `replace` gives it its name; without that no file stays.
-  /// @throws std::runtime_error naming the path where it could not be written.
   std::unique_ptr<AtomicFile> finish();
 
  private:

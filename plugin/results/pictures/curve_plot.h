@@ -82,8 +82,6 @@ struct CurvePlot {
 
 /// Draws title, axes, ticks, grid, curves and legend on white. The legend stands where it hides the
 /// smallest part of the curves.
-/// @throws std::invalid_argument naming the plot if an end of an axis does not fit its scale or the
-/// other end, or if the picture is too small.
 cv::Mat3b drawCurves(const CurvePlot& plot);
 
 /// Colour (BGR) of curve 0, 1, …: seven colours that colour-blind readers can distinguish (Okabe
@@ -105,7 +103,6 @@ struct PlotFrame {
 
 /// Computes the frame of a plot: the picture without its labels; the ends of the axes fit the
 /// curves.
-/// @throws std::invalid_argument naming the plot if an end of an axis does not fit.
 PlotFrame layOut(const CurvePlot& plot);
 
 /// Draws grid, axes, ticks, labels and title.

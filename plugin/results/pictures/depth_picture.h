@@ -28,7 +28,6 @@ struct ValuePicture {
 
 /// Text and bar are larger in wide pictures, so that they can be read where the picture is as wide
 /// as a column of a paper.
-/// @throws std::invalid_argument if there are no values.
 cv::Mat3b drawValues(const ValuePicture& picture);
 
 /// The colour bar alone, `width` pixels wide: colours, ticks and the unit on white.

@@ -45,7 +45,6 @@ MapLayout layOutMap(const MapCloud& cloud, const std::vector<StampedPose>& traje
 /// @param cloud may be empty: then the picture has the trajectory alone.
 /// @param trajectory T_world_ref of the keyframes.
 /// @param voxel_size_m of the map: points are drawn no smaller than their voxels.
-/// @throws std::invalid_argument if there is neither a point nor a keyframe.
 cv::Mat3b drawMap(const MapCloud& cloud, const std::vector<StampedPose>& trajectory,
                   double voxel_size_m);
 

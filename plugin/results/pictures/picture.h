@@ -14,7 +14,6 @@
 namespace efm {
 
 /// Writes a picture as PNG. The file appears under its name only when it is complete.
-/// @throws std::runtime_error naming the file if its extension is not .png or it cannot be written.
 void writePicture(const std::filesystem::path& file, const cv::Mat3b& picture);
 
 /// Joins pictures from left to right on white, with their tops in line.
