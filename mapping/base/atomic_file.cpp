@@ -11,7 +11,6 @@
 #include <cstring>
 #include <fstream>
 #include <stdexcept>
-#include <string>
 #include <system_error>
 #include <utility>
 

@@ -6,13 +6,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
-#include <limits>
-#include <vector>
 
-#include "mapping/depth/depth_map.h"
 #include "mapping/depth/peak_fit.h"
 #include "mapping/dsi/dsi_grid.h"
 #include "mapping/kernels/kernels.h"

@@ -8,7 +8,6 @@
 
 #include "mapping/base/named_choice.h"
 #include "mapping/depth/aggregated_extraction.h"
-#include "mapping/depth/depth_map.h"
 #include "mapping/depth/peak_fit.h"
 
 namespace efm {

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/depth/depth_map.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <optional>
 
 namespace efm {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/depth/peak_fit.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <numeric>

@@ -9,9 +9,6 @@
 #include <cmath>
 #include <utility>
 
-#include "mapping/dsi/dsi_grid.h"
-#include "mapping/kernels/kernels.h"
-
 namespace efm {
 namespace {
 

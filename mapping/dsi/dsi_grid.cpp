@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/dsi/dsi_grid.h"
 
-#include <algorithm>
-
 #include "mapping/base/named_choice.h"
 
 namespace efm {

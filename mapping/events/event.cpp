@@ -2,7 +2,6 @@
 #include "mapping/events/event.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <stdexcept>
 #include <utility>
 

@@ -5,10 +5,6 @@
 #include <Eigen/LU>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <limits>
 #include <stdexcept>
 
 namespace efm {

@@ -4,16 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
 #include <fstream>
 #include <limits>
-#include <optional>
 #include <stdexcept>
-#include <string_view>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/text.h"
-#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/kernels/kernels.h"
 
-#include <cstdint>
-
 #include "mapping/kernels/highway_targets.h"
 
 namespace efm::kernels {

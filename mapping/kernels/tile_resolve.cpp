@@ -2,7 +2,6 @@
 #include "mapping/kernels/tile_scatter.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <numeric>

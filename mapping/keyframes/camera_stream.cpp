@@ -6,8 +6,6 @@
 #include <string>
 #include <utility>
 
-#include "mapping/events/event.h"
-
 namespace efm {
 namespace {
 

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {

@@ -11,7 +11,6 @@
 
 #include "mapping/base/named_choice.h"
 #include "mapping/geometry/rigid3.h"
-#include "mapping/motion/event_contrast.h"
 
 namespace efm {
 

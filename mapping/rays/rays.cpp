@@ -3,12 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <optional>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/geometry/reference_view.h"
-#include "mapping/geometry/trajectory.h"
 
 namespace efm {
 namespace {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "mapping/depth/peak_fit.h"
-#include "mapping/survey/scene_depths.h"
 
 namespace efm {
 namespace {

@@ -9,7 +9,6 @@
 #include "mapping/base/text.h"
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/survey/scene_depths.h"
 
 namespace efm {
 namespace {

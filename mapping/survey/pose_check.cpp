@@ -10,7 +10,6 @@
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/survey/depth_agreement.h"
-#include "mapping/survey/scene_depths.h"
 
 namespace efm {
 namespace {

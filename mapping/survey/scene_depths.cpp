@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <utility>
 
 #include "mapping/depth/peak_fit.h"
-#include "mapping/events/event.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

@@ -3,13 +3,10 @@
 
 #include <tbb/parallel_for_each.h>
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <tuple>
-#include <utility>
 
 namespace efm {
 namespace {

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "mapping/sweep/ray_bins.h"
 
-#include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace efm {
 namespace {

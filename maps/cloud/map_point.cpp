@@ -8,8 +8,6 @@
 #include <cmath>
 #include <utility>
 
-#include "maps/cloud/cloud_points.h"
-
 namespace efm {
 namespace {
 

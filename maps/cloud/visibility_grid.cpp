@@ -6,7 +6,6 @@
 #include <iterator>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

@@ -5,7 +5,6 @@
 #include <cassert>
 #include <cctype>
 #include <cmath>
-#include <cstdint>
 #include <fstream>
 #include <map>
 #include <stdexcept>

@@ -8,7 +8,6 @@
 #include <cstring>
 #include <optional>
 #include <stdexcept>
-#include <string_view>
 
 #include "mapping/base/text.h"
 

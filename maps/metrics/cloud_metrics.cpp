@@ -5,7 +5,6 @@
 #include <stdexcept>
 
 #include "mapping/base/named_choice.h"
-#include "maps/cloud/cloud_points.h"
 
 namespace efm {
 namespace {

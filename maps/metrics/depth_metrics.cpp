@@ -2,9 +2,7 @@
 #include "maps/metrics/depth_metrics.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -4,9 +4,7 @@
 #include <algorithm>
 #include <cassert>
 #include <limits>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "maps/refinement/loop_closing.h"
 

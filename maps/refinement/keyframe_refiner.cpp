@@ -9,8 +9,6 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
-#include "maps/refinement/keyframe_graph.h"
-#include "maps/refinement/keyframe_registration.h"
 
 namespace efm {
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

@@ -4,10 +4,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include <optional>
 #include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/text.h"

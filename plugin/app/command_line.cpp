@@ -2,11 +2,7 @@
 #include "plugin/app/commands.h"
 
 #include <CLI/CLI.hpp>
-#include <cstdint>
-#include <functional>
 #include <map>
-#include <optional>
-#include <string>
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"

@@ -6,12 +6,10 @@
 
 #include <algorithm>
 #include <atomic>
-#include <functional>
 #include <initializer_list>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
-#include <string>
 #include <system_error>
 
 #include "mapping/geometry/timestamp.h"
@@ -21,7 +19,6 @@
 #include "plugin/app/mapping_run.h"
 #include "plugin/app/output_checks.h"
 #include "plugin/app/program.h"
-#include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/window/map_scene.h"
 #include "plugin/mrpt/window/map_window.h"
 #include "plugin/results/output/keyframe_writer.h"

@@ -17,7 +17,6 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/interruption.h"
 #include "plugin/app/program.h"
-#include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <string>
 #include <system_error>
 
 #include "mapping/base/named_choice.h"

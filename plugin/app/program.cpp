@@ -14,13 +14,9 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <iostream>
-#include <stdexcept>
-#include <string>
-#include <string_view>
 #include <system_error>
 #include <thread>
 

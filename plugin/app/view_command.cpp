@@ -8,7 +8,6 @@
 #include <cstdlib>
 #include <iostream>
 #include <stdexcept>
-#include <string>
 
 #include "plugin/results/output/keyframe_writer.h"
 

@@ -16,8 +16,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "maps/cloud/cloud_points.h"
-
 namespace efm {
 namespace {
 

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <stdexcept>
-#include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/io/point_cloud_file.h"

@@ -6,10 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/base/named_choice.h"

@@ -7,9 +7,7 @@
 #include <array>
 #include <cmath>
 #include <stdexcept>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"

@@ -14,10 +14,8 @@
 
 #include <algorithm>
 #include <array>
-#include <memory>
 #include <ostream>
 #include <stdexcept>
-#include <string>
 #include <string_view>
 #include <utility>
 

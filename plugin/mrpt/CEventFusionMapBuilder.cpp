@@ -16,9 +16,7 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/host_options.h"
-#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/mrpt/live_mapping.h"
-#include "plugin/mrpt/pose_observation.h"
 #include "plugin/results/pictures/depth_picture.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)

@@ -14,10 +14,8 @@
 #include <array>
 #include <ostream>
 #include <stdexcept>
-#include <string>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/event_encoding.h"
 
 IMPLEMENTS_SERIALIZABLE(CObservationEvents, CObservation, efm)
 

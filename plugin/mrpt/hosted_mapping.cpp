@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/mrpt/hosted_mapping.h"
 
-#include <exception>
 #include <stdexcept>
-#include <utility>
 
-#include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/session/health_checks.h"
 

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/pose_observation.h"
 
 namespace efm {

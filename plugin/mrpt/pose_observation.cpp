@@ -6,13 +6,10 @@
 #include <mrpt/obs/CObservationOdometry.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/poses/CPose3D.h>
-#include <mrpt/poses/CPose3DPDFGaussian.h>
 #include <mrpt/poses/CPose3DQuat.h>
 #include <mrpt/poses/CPose3DQuatPDFGaussian.h>
 
 #include <cmath>
-#include <optional>
-#include <stdexcept>
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"

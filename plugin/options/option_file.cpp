@@ -8,7 +8,6 @@
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
-#include <utility>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/base/text.h"

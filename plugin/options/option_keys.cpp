@@ -9,7 +9,6 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
-#include <type_traits>
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/rigid3.h"

@@ -4,7 +4,6 @@
 #include <mrpt/obs/CObservationRobotPose.h>
 
 #include <algorithm>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 

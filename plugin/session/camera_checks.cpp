@@ -8,7 +8,6 @@
 #include <functional>
 #include <iterator>
 #include <numeric>
-#include <utility>
 
 #include "mapping/geometry/lens.h"
 #include "mapping/geometry/rigid3.h"

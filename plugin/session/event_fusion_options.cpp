@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "mapping/base/named_choice.h"
-#include "plugin/recordings/calibration/calibration_file.h"
 
 namespace efm {
 

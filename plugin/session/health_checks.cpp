@@ -5,12 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "mapping/depth/peak_fit.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/session_status.h"
 
 namespace efm {
 

@@ -9,8 +9,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/events/event.h"
-
 namespace efm {
 namespace {
 

@@ -5,13 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <string>
-#include <utility>
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/session_status.h"
 
 namespace efm {
 namespace {

@@ -6,7 +6,6 @@
 #include <tuple>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/session/event_fusion_options.h"
 
 namespace efm {
 

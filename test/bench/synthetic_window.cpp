@@ -3,12 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <optional>
 #include <random>
 
 #include "mapping/geometry/lens.h"
-#include "mapping/rays/rays.h"
 
 namespace efm::bench {
 namespace {

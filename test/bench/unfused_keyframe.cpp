@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 
-#include "mapping/depth/depth_extraction.h"
 #include "mapping/kernels/kernels.h"
 #include "mapping/rays/rays.h"
 

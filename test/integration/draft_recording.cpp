@@ -9,7 +9,6 @@
 #include <sstream>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/text/event_text.h"
 
 namespace efm {

@@ -9,8 +9,6 @@
 #include <memory>
 #include <random>
 
-#include "mapping/kernels/kernels.h"
-
 namespace efm::kernels {
 namespace {
 

@@ -2,7 +2,6 @@
 #include "tracking_stub/faults/keyframe_noise.h"
 
 #include "mapping/base/named_choice.h"
-#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 #include "tracking_stub/random/random_numbers.h"
 

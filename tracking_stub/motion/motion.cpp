@@ -9,7 +9,6 @@
 
 #include "mapping/base/named_choice.h"
 #include "mapping/depth/peak_fit.h"
-#include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
 
 namespace efm {

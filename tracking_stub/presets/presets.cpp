@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/presets/presets.h"
 
-#include <Eigen/Geometry>
-
 #include <memory>
 #include <string_view>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/geometry/timestamp.h"
 #include "tracking_stub/motion/motion.h"
 #include "tracking_stub/scenes/furnishing.h"
 #include "tracking_stub/scenes/scenes.h"

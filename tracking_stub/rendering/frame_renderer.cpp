@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstddef>
-#include <limits>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/geometry/lens.h"

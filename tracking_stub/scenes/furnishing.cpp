@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "mapping/geometry/rigid3.h"
-#include "tracking_stub/random/random_numbers.h"
 
 namespace efm {
 

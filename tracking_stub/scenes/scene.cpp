@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
-#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 

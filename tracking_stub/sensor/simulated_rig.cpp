@@ -14,7 +14,6 @@
 
 #include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
-#include "tracking_stub/random/random_numbers.h"
 #include "tracking_stub/rendering/frame_renderer.h"
 
 namespace efm {

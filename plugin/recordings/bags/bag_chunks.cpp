@@ -6,10 +6,7 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
-#include <algorithm>
 #include <new>
-#include <stdexcept>
-#include <utility>
 
 #include "mapping/base/text.h"
 

@@ -8,7 +8,6 @@
 #include <cctype>
 #include <fstream>
 #include <iterator>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -17,9 +16,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_events.h"
-#include "plugin/recordings/bags/bag_source.h"
 #include "plugin/recordings/bags/ros_messages.h"
-#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

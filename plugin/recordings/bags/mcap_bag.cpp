@@ -4,13 +4,9 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include <algorithm>
 #include <exception>
 #include <map>
 #include <stdexcept>
-#include <string>
-#include <string_view>
-#include <utility>
 
 #include "mapping/base/number_bytes.h"
 #include "mapping/base/text.h"

@@ -4,13 +4,9 @@
 #include <fmt/format.h>
 #include <sqlite3.h>
 
-#include <algorithm>
 #include <limits>
 #include <stdexcept>
-#include <string>
-#include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"

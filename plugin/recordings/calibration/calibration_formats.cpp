@@ -17,7 +17,6 @@
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/calibration/yaml_entry.h"
 
 namespace efm {
 namespace {

@@ -2,18 +2,13 @@
 #include "plugin/recordings/calibration/yaml_entry.h"
 
 #include <fmt/format.h>
-#include <Eigen/Core>
 #include <Eigen/Geometry>
 
 #include <cmath>
 #include <optional>
-#include <stdexcept>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "mapping/base/text.h"
-#include "mapping/geometry/rigid3.h"
 
 namespace efm {
 namespace {

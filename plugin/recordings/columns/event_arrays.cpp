@@ -6,14 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
-#include <memory>
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/file_content.h"
-#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/text/event_columns.h"
 

@@ -4,13 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <memory>
 #include <stdexcept>
-#include <string>
 #include <utility>
 
 #include "mapping/geometry/trajectory.h"
-#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

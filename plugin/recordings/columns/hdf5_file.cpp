@@ -6,11 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
-#include <optional>
-#include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "mapping/base/atomic_file.h"
 

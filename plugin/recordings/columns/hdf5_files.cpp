@@ -2,12 +2,9 @@
 #include "plugin/recordings/columns/hdf5_files.h"
 
 #include <algorithm>
-#include <string>
 #include <string_view>
 #include <system_error>
 #include <utility>
-
-#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

@@ -3,12 +3,9 @@
 
 #include <algorithm>
 #include <stdexcept>
-#include <string>
-#include <utility>
 
 #include "mapping/base/named_choice.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 

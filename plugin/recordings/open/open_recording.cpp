@@ -4,19 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <iterator>
-#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
 #include "plugin/recordings/calibration/calibration_file.h"
-#include "plugin/recordings/open/merged_recording.h"
 #include "plugin/recordings/open/perturbed_recording.h"
 #include "plugin/recordings/open/rawlog.h"
 #include "plugin/recordings/open/recording_formats.h"
-#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/event_columns.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"

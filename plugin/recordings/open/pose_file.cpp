@@ -4,12 +4,10 @@
 #include <fmt/format.h>
 
 #include <stdexcept>
-#include <string>
 #include <system_error>
 
 #include "plugin/recordings/columns/event_arrays.h"
 #include "plugin/recordings/streams/file_content.h"
-#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/pose_text.h"
 
 namespace efm {

@@ -10,17 +10,13 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstddef>
 #include <cstring>
 #include <exception>
 #include <limits>
-#include <optional>
 #include <stdexcept>
-#include <string>
 #include <string_view>
 #include <utility>
 
-#include "mapping/base/atomic_file.h"
 #include "mapping/base/text.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/streams/file_content.h"

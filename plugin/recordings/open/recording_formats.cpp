@@ -9,7 +9,6 @@
 #include <fstream>
 #include <stdexcept>
 #include <string_view>
-#include <vector>
 
 #include "plugin/recordings/bags/bag_recording.h"
 #include "plugin/recordings/columns/event_arrays.h"
@@ -17,7 +16,6 @@
 #include "plugin/recordings/sensors/aedat4.h"
 #include "plugin/recordings/sensors/prophesee_raw.h"
 #include "plugin/recordings/streams/file_content.h"
-#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/dataset_folder.h"
 #include "plugin/recordings/text/event_text.h"
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "mapping/geometry/timestamp.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "plugin/mrpt/pose_observation.h"
 

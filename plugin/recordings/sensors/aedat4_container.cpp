@@ -8,15 +8,11 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
-#include <memory>
 #include <new>
 #include <stdexcept>
-#include <string_view>
 #include <utility>
 
 #include "mapping/base/text.h"
-#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

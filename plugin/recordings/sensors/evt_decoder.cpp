@@ -2,8 +2,6 @@
 #include "plugin/recordings/sensors/evt_decoder.h"
 
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
 #include <cstring>
 
 namespace efm::evt {

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "mapping/base/text.h"
-#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 namespace {

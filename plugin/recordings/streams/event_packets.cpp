@@ -9,7 +9,6 @@
 
 #include "mapping/base/named_choice.h"
 #include "mapping/events/event.h"
-#include "plugin/recordings/streams/recording_parts.h"
 
 namespace efm {
 

@@ -6,11 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <cmath>
 #include <stdexcept>
-
-#include "mapping/base/text.h"
-#include "mapping/geometry/timestamp.h"
 
 namespace efm {
 namespace {

@@ -12,11 +12,9 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
-#include <vector>
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
 

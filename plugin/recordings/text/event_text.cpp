@@ -9,11 +9,9 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
-#include <utility>
 
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
-#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {

@@ -9,12 +9,9 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 
 #include "mapping/base/text.h"
-#include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/streams/file_content.h"
-#include "plugin/recordings/streams/recording_parts.h"
 #include "plugin/recordings/streams/time_unit.h"
 
 namespace efm {

@@ -5,11 +5,8 @@
 #include <cerrno>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
-#include "mapping/base/atomic_file.h"
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/trajectory.h"
 #include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {

@@ -11,15 +11,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
-#include <csignal>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <stdexcept>
-#include <string>
 #include <utility>
 
-#include "mapping/base/atomic_file.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {

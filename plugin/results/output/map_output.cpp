@@ -6,18 +6,15 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <optional>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/trajectory.h"
 #include "maps/io/point_cloud_file.h"
 #include "plugin/results/pictures/depth_picture.h"
 #include "plugin/results/pictures/picture.h"

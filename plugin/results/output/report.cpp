@@ -11,7 +11,6 @@
 #include "mapping/geometry/rigid3.h"
 #include "maps/metrics/sample_statistics.h"
 #include "plugin/options/tracker_fault_keys.h"
-#include "plugin/session/session_status.h"
 
 namespace efm {
 

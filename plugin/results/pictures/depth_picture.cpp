@@ -6,12 +6,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstdlib>
 #include <stdexcept>
-
-#include "plugin/results/pictures/curve_plot.h"
-#include "plugin/results/pictures/picture.h"
 
 namespace efm {
 namespace {

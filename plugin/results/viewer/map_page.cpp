@@ -6,12 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-#include <string_view>
 #include <tuple>
 #include <unordered_set>
 #include <utility>

@@ -6,9 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
-#include <vector>
 
-#include "mapping/depth/depth_map.h"
 #include "test/mapping/dsi/chosen_dsi.h"
 
 namespace efm::column_aggregation_test {

@@ -8,7 +8,6 @@
 #include <opencv2/core.hpp>
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "mapping/geometry/timestamp.h"
 #include "test/mapping/base/refused_option.h"

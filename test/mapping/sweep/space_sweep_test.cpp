@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <opencv2/core.hpp>
-#include <vector>
 
 #include "mapping/events/window.h"
 #include "mapping/keyframes/keyframe_mapper.h"

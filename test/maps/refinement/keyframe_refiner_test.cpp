@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "edges.h"
-#include "mapping/geometry/rigid3.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"
 

@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "edges.h"
-#include "mapping/geometry/rigid3.h"
 #include "random_poses.h"
 #include "test/maps/refusals.h"
 

@@ -6,7 +6,6 @@
 #include <mrpt/config/CConfigFileMemory.h>
 #include <mrpt/img/color_maps.h>
 #include <mrpt/maps/CMultiMetricMap.h>
-#include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/opengl/CPointCloudColoured.h>
 #include <mrpt/opengl/CSetOfObjects.h>

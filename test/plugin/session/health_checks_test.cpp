@@ -9,8 +9,6 @@
 #include <functional>
 #include <random>
 #include <set>
-#include <string>
-#include <utility>
 
 #include "mapping/geometry/rigid3.h"
 #include "plugin/recordings/calibration/calibration_formats.h"

@@ -5,8 +5,6 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
-#include <deque>
-#include <map>
 #include <numeric>
 #include <tuple>
 #include <utility>

@@ -9,8 +9,6 @@
 #include <functional>
 #include <random>
 #include <set>
-#include <string>
-#include <vector>
 
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"

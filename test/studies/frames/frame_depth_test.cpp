@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <vector>
 
 #include "maps/metrics/depth_metrics.h"
 #include "test/paths.h"

@@ -5,7 +5,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mapping/geometry/trajectory.h"
 #include "mapping/keyframes/keyframe_policy.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "plugin/recordings/text/dataset_folder.h"

@@ -2,7 +2,6 @@
 #include "test/studies/methods/method_comparison.h"
 
 #include <algorithm>
-#include <cstddef>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <optional>

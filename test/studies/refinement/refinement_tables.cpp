@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "test/studies/refinement/refinement_tables.h"
 
-#include "mapping/geometry/rigid3.h"
 #include "maps/metrics/sample_statistics.h"
 #include "test/studies/methods/error_figures.h"
 

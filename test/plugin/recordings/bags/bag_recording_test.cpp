@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <random>
 #include <string>
-#include <vector>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/open/recording_formats.h"

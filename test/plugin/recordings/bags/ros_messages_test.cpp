@@ -10,7 +10,6 @@
 #include <initializer_list>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/bags/bag_events.h"

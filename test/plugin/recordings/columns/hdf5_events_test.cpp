@@ -9,11 +9,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <random>
-#include <string>
 #include <tuple>
-#include <vector>
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/geometry/timestamp.h"

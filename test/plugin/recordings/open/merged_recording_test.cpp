@@ -4,12 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <string>
-#include <utility>
-
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/recordings/text/event_text.h"
 #include "test/plugin/temporary_folder.h"

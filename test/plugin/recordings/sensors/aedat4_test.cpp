@@ -9,9 +9,7 @@
 
 #include <array>
 #include <cstring>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/plugin/recordings/streams/reading.h"

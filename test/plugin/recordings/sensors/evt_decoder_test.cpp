@@ -6,7 +6,6 @@
 
 #include <rapidcheck/gtest.h>
 #include <string>
-#include <vector>
 
 #include "test/plugin/recordings/sensors/evt_words.h"
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <random>
-#include <string>
 
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/paths.h"

@@ -7,7 +7,6 @@
 
 #include <rapidcheck/gtest.h>
 #include <algorithm>
-#include <string>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/streams/event_packets.h"
