@@ -4,7 +4,7 @@
 // The instruction sets that kernels are compiled for, and the table of a kernel's functions. A
 // kernel file `x.cpp` is written once and compiled once per instruction set:
 //
-//   #include "mapping/kernels/x.h"                // struct XFunctions { ... pointers ... };
+//   #include "mapping/kernels/kernels.h"          // struct XFunctions { ... pointers ... };
 //   #include "mapping/kernels/highway_targets.h"  // before anything of Highway
 //
 //   #undef HWY_TARGET_INCLUDE

@@ -82,8 +82,8 @@ void addInfo(CLI::App& app, Run& run) {
   addStrict(command, arguments->strict);
   addVerbosity(command, arguments->verbosity);
   command.add_flag("--system", arguments->system,
-                   "Print the processor and the kernels of the inner loops that it can run, and "
-                   "test them; needs no recording");
+                   "Print the processor and the kernels of the inner loops that it can run; "
+                   "needs no recording");
   command.get_option("SOURCE")->required(false);
   command.parse_complete_callback([arguments] {
     if (!arguments->system && arguments->source.files.empty()) throw CLI::RequiredError("SOURCE");

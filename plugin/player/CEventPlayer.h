@@ -16,7 +16,7 @@ namespace efm {
 
 /// A sensor of MRPT that plays a recording of any format in real time, faster or slower: a live
 /// source for rawlog-grabber and other hosts, which make it by the name "CEventPlayer". The README
-/// of this room has its options.
+/// of this folder has its options.
 ///
 /// The play begins with the first call of `doProcess`. No observation comes before its time; see
 /// RecordingPlayer. When `max_queue_len` observations wait for `getObservations`, the player waits,
