@@ -3,7 +3,6 @@
 // (test/formats).
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>

@@ -2,7 +2,6 @@
 #include "test/kernels/self_test.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <functional>
 

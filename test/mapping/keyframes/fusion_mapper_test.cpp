@@ -2,7 +2,6 @@
 #include "mapping/keyframes/fusion_mapper.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <opencv2/core.hpp>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The keyframe mapper as it comes: split fusion and aggregated depth.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <tbb/task_scheduler_observer.h>
 #include <opencv2/core.hpp>

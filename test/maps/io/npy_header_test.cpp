@@ -2,7 +2,6 @@
 #include "maps/io/npy_header.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "test/plugin/temporary_folder.h"
 

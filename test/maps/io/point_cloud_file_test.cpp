@@ -2,7 +2,6 @@
 #include "maps/io/point_cloud_file.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdlib>

@@ -2,7 +2,6 @@
 #include "maps/refinement/keyframe_refiner.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <cmath>

@@ -2,7 +2,6 @@
 // `event-fusion map` and `depth` as a user runs them.
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>

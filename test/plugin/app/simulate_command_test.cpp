@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `event-fusion simulate` on a trajectory with a calibration, as a user runs it.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 

@@ -2,7 +2,6 @@
 #include "plugin/evaluation/depth_file.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>

@@ -2,7 +2,6 @@
 #include "plugin/mrpt/CEventFusionMap.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <mrpt/config/CConfigFileMemory.h>
 #include <mrpt/img/color_maps.h>
 #include <mrpt/maps/CMultiMetricMap.h>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Live operation with input that cannot be used: nothing else is lost with it, and all is counted.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>

@@ -2,7 +2,6 @@
 #include "plugin/options/option_file.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <fstream>

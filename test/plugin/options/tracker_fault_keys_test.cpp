@@ -2,7 +2,6 @@
 #include "plugin/options/tracker_fault_keys.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "mapping/geometry/rigid3.h"
 #include "test/plugin/temporary_folder.h"

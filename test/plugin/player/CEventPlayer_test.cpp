@@ -2,7 +2,6 @@
 #include "plugin/player/CEventPlayer.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <mrpt/config/CConfigFile.h>
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/obs/CObservationRobotPose.h>

@@ -2,7 +2,6 @@
 #include "plugin/player/recording_player.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <mrpt/obs/CObservationComment.h>
 
 #include <algorithm>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A program that has MRPT alone (mrpt_host.cpp) maps a rawlog with the plugin.
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <mrpt/obs/CRawlog.h>
 
 #include <algorithm>

@@ -2,7 +2,6 @@
 // MRPT's rawlog-grabber with our sensor, which plays a recording.
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "test/paths.h"
 #include "test/plugin/program_test.h"

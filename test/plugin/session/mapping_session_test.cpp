@@ -2,7 +2,6 @@
 #include "plugin/session/mapping_session.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <set>

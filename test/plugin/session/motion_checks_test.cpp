@@ -2,7 +2,6 @@
 #include "plugin/session/health_checks.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>

@@ -2,7 +2,6 @@
 #include "plugin/recordings/bags/bag_recording.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>

@@ -2,7 +2,6 @@
 #include "plugin/recordings/bags/ros_messages.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>

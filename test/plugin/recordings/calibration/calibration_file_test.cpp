@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <mrpt/config/CConfigFile.h>
 #include <mrpt/img/TStereoCamera.h>
 #include <mrpt/poses/CPose3D.h>

@@ -2,7 +2,6 @@
 #include "plugin/recordings/calibration/calibration_formats.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <string>
 

@@ -2,7 +2,6 @@
 #include "plugin/recordings/columns/hdf5_events.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <fmt/format.h>
 

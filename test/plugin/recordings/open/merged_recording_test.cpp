@@ -2,7 +2,6 @@
 #include "plugin/recordings/open/merged_recording.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/pose_observation.h"

@@ -2,7 +2,6 @@
 #include "plugin/recordings/open/perturbed_recording.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <mrpt/obs/CObservationOdometry.h>
 
 #include <algorithm>

@@ -2,7 +2,6 @@
 #include "plugin/recordings/open/time_cut.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <mrpt/obs/CObservationComment.h>
 
 #include "plugin/mrpt/pose_observation.h"

@@ -3,7 +3,6 @@
 
 #include <flatbuffers/flatbuffers.h>
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <lz4frame.h>
 #include <zstd.h>
 

@@ -2,7 +2,6 @@
 #include "plugin/recordings/sensors/evt_decoder.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <rapidcheck/gtest.h>
 #include <string>

@@ -2,7 +2,6 @@
 #include "plugin/recordings/sensors/prophesee_raw.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>

@@ -2,7 +2,6 @@
 #include "plugin/recordings/text/event_text.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <rapidcheck/gtest.h>

@@ -2,7 +2,6 @@
 #include "plugin/results/viewer/map_page.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
