@@ -10,10 +10,6 @@
 
 namespace efm {
 
-/// An event may arrive after a newer one of its camera, late by at most this: it is sorted and
-/// counted.
-inline constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
-
 /// One brightness change at one pixel of an event camera (Ghosh and Gallego 2022, Eq. 1). Pixels
 /// are raw (distorted), their integer coordinates are pixel centres.
 struct Event {
@@ -49,6 +45,10 @@ class EventSpan {
   const Event* begin_ = nullptr;
   const Event* end_ = nullptr;
 };
+
+/// An event may arrive after a newer one of its camera, late by at most this: it is sorted and
+/// counted.
+inline constexpr std::int64_t kMaxEventDelayNs = 10'000'000;
 
 /// An event, or a pose, that is farther ahead of its stream than this is wrong where the next one
 /// is back. The last one, which nothing follows, is wrong after a longer pause alone.

@@ -25,10 +25,6 @@ namespace efm::kernels {
 /// The kernels that this build has and this processor can run, in the order of `VotingKernel`.
 std::vector<VotingKernel> availableKernels();
 
-}  // namespace efm::kernels
-
-namespace efm::kernels {
-
 /// The votes of one camera on one depth plane: row-major, width x height, owned by the caller.
 struct VotePlane {
   float* votes = nullptr;

@@ -117,9 +117,9 @@ const TileFunctions& tileFunctions(VotingKernel kernel);
 /// Vectors may read, and write back, this number of values past the end of a sum.
 inline constexpr std::size_t kSumPadding = 16;
 
-/// From the cells of a tile (`tile_scatter.h`) to its ray densities: the bilinear votes of Ghosh
-/// and Gallego 2022, Eq. 2. A tile's pixels lie right of and below its first cells; it has at most
-/// kTileCells - 1 on a side. All cells are zero afterwards.
+/// From the cells of a tile to its ray densities: the bilinear votes of Ghosh and Gallego 2022,
+/// Eq. 2. A tile's pixels lie right of and below its first cells; it has at most kTileCells - 1 on
+/// a side. All cells are zero afterwards.
 struct ResolveFunctions {
   /// @param values width x height, row-major.
   /// @return the sum of all pixels' weights, in units: 2^kWeightBits are a vote.

@@ -14,8 +14,8 @@ namespace efm {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// Decompositions of small symmetric matrices. They are compiled here once, because each takes the
-// compiler seconds.
+// Decompositions of small symmetric matrices. They are compiled once, in pose_refinement.cpp,
+// because each takes the compiler seconds.
 
 /// The lower triangular L with covariance = L L^T.
 /// @param covariance positive definite.
@@ -47,8 +47,8 @@ Vector6d differenceOf(const Rigid3& T_a_b);
 /// The inverse of `differenceOf`.
 Rigid3 rigidFromDifference(const Vector6d& difference);
 
-// All uses of Ceres. Poses change on the manifold of rotations and translations, Jacobians are
-// automatic, and one thread solves: results do not depend on the machine.
+// The refinement of poses, with Ceres. Poses change on the manifold of rotations and translations,
+// Jacobians are automatic, and one thread solves: results do not depend on the machine.
 
 /// A point of the map and the same point of a keyframe. Its error is
 /// sqrt_information * (p_map - T_map_ref * p_ref).

@@ -63,8 +63,8 @@ std::optional<std::string> failureOf(const std::vector<std::string>& command,
                                      std::chrono::milliseconds limit);
 
 /// The program `event-fusion`: runs the command of the command line. Prints every error to stderr.
-/// @return the process's exit status, see program.h: 0 only if the command has done its job and
-/// stdout took its output.
+/// @return the process's exit status, one of those above: 0 only if the command has done its job
+/// and stdout took its output.
 int runProgram(int argc, char** argv);
 
 }  // namespace efm

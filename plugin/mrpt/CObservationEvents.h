@@ -48,7 +48,7 @@ class CObservationEvents : public mrpt::obs::CObservation, public mrpt::opengl::
   void getSensorPose(mrpt::poses::CPose3D& out_pose) const override { out_pose = camera_pose; }
   void setSensorPose(const mrpt::poses::CPose3D& pose) override { camera_pose = pose; }
   void getDescriptionAsText(std::ostream& stream) const override;
-  /// RawLogViewer's 3D view of the packet: see plugin/mrpt/CObservationEvents.h.
+  /// RawLogViewer's 3D view of the packet: see `drawEvents`.
   void getVisualizationInto(mrpt::opengl::CSetOfObjects& out) const override;
 
   /// For `rawlog-edit --export-txt`, which writes a line per packet: the number of events, then

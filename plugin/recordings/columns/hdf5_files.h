@@ -9,7 +9,7 @@
 
 namespace efm {
 
-/// Finds the HDF5 files of a recording. Needs no HDF5 library.
+/// Finds and opens the HDF5 files of a recording. Finding them needs no HDF5 library.
 
 struct CameraFile {
   std::string camera;  ///< "left", "right", the folder's "camN", or empty: not in the name.
@@ -35,7 +35,7 @@ std::vector<CameraFile> hdf5FilesIn(const std::filesystem::path& folder);
 bool looksLikeHdf5(const std::filesystem::path& source);
 
 /// Opens HDF5 files with events (see hdf5_events.h), poses or both, and folders with them (see
-/// hdf5_files.h). A folder may have camchain.yaml and poses.txt, too. Poses are
+/// `hdf5FilesIn`). A folder may have camchain.yaml and poses.txt, too. Poses are
 ///   /davis/left/pose, /davis/left/pose_ts   MVSEC: T_world_cam0, seconds
 ///   /Cn_T_C0, /ts                           M3ED: T_cam0_world, microseconds
 /// M3ED has the calibration in the file: calib/ beside the events of a camera.

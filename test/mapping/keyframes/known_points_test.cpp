@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The keyframe mapper as it comes: split fusion and aggregated depth.
+// The keyframe mapper as it comes (split fusion and aggregated depth), and on known points.
 #include <gmock/gmock.h>
 #include <tbb/global_control.h>
 #include <tbb/task_scheduler_observer.h>

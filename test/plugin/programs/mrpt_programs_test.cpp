@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A program that has MRPT alone (mrpt_host.cpp) maps a rawlog with the plugin.
+// MRPT's programs, and programs of others, with the plugin. First mrpt_host.cpp, which has MRPT
+// alone.
 #include <gmock/gmock.h>
 #include <mrpt/obs/CRawlog.h>
 

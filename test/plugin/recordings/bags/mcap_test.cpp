@@ -258,7 +258,7 @@ struct Written {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> in_chunk;  // time, position
 };
 
-// The reader above needs only some of it.
+// `McapBag` reads only some of it.
 TEST_F(Mcap, EveryRecordIsAsOtherProgramsReadIt) {
   RigCamera unknown;
   unknown.model.width = unknown.model.height = 65'535;
