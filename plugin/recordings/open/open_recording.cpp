@@ -293,9 +293,6 @@ std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& sou
 std::unique_ptr<Recording> openOwn(const RecordingSource& source, const Calibration* given) {
   if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
   const Path& first = source.files.front();
-  if (source.allow_pipe && source.files.size() == 1 && std::filesystem::is_fifo(first)) {
-    return std::make_unique<RawlogRecording>(first, GzSource::kPipe);
-  }
   if (formatOf(first, source) == nullptr && source.files.size() == 1) {
     if (!isRawlog(first, source)) refuse(first);
     requireRawlog(first);

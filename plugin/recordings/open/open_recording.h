@@ -39,9 +39,6 @@ struct RecordingSource {
   /// no index and is read whole.
   std::optional<std::int64_t> start_ns;
   std::optional<std::int64_t> end_ns;
-  /// Whether the only source may be a named pipe, from which a rawlog is read once. To open it
-  /// waits for the program that writes.
-  bool allow_pipe = false;
   /// Whether missing poses, or a missing calibration, are an error. Cameras without a calibration
   /// have a model without a focal length.
   bool complete = true;

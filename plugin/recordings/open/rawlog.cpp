@@ -25,7 +25,6 @@ namespace efm {
 namespace {
 
 constexpr std::size_t kBufferSize = std::size_t{1} << 18;
-constexpr std::size_t kPipeBufferSize = std::size_t{1} << 13;
 
 [[noreturn]] void refuse(const char* what) { throw std::logic_error(what); }
 
@@ -48,30 +47,27 @@ std::string reasonOf(gzFile file) {
 
 }  // namespace
 
-GzInputStream::GzInputStream(const std::filesystem::path& file, GzSource source)
-    : file_(nullptr, gzclose_r),
-      buffer_size_(source == GzSource::kPipe ? kPipeBufferSize : kBufferSize) {
+GzInputStream::GzInputStream(const std::filesystem::path& file) : file_(nullptr, gzclose_r) {
   const std::filesystem::file_status status = std::filesystem::status(file);
-  const bool is_pipe = source == GzSource::kPipe && std::filesystem::is_fifo(status);
-  if (!is_pipe && !std::filesystem::is_regular_file(status)) {
+  if (!std::filesystem::is_regular_file(status)) {
     const char* const what = std::filesystem::is_directory(status) ? "a folder: expected a file"
                              : std::filesystem::exists(status)     ? "not a regular file"
                                                                    : "no such file";
     throw std::runtime_error(file.string() + ": " + what);
   }
-  if (!is_pipe) file_size_ = std::filesystem::file_size(file);
+  file_size_ = std::filesystem::file_size(file);
   file_.reset(gzopen(file.c_str(), "rb"));
   if (!file_) {
     throw std::runtime_error(file.string() + ": cannot be opened: " + std::strerror(errno));
   }
-  gzbuffer(file_.get(), static_cast<unsigned>(buffer_size_));
+  gzbuffer(file_.get(), static_cast<unsigned>(kBufferSize));
 }
 
 void GzInputStream::fill() {
   if (at_ < buffer_.size()) return;
-  buffer_.resize(buffer_size_);
+  buffer_.resize(kBufferSize);
   at_ = 0;
-  const int count = gzread(file_.get(), buffer_.data(), static_cast<unsigned>(buffer_size_));
+  const int count = gzread(file_.get(), buffer_.data(), static_cast<unsigned>(kBufferSize));
   if (count < 0) {
     buffer_.clear();
     throw std::runtime_error(reasonOf(file_.get()));
@@ -240,8 +236,8 @@ std::string reasonOf(const std::exception& error) {
 
 }  // namespace
 
-RawlogRecording::RawlogRecording(std::filesystem::path file, GzSource source)
-    : file_(std::move(file)), stream_(file_, source) {}
+RawlogRecording::RawlogRecording(std::filesystem::path file)
+    : file_(std::move(file)), stream_(file_) {}
 
 void RawlogRecording::readEntry() {
   auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);

@@ -23,19 +23,15 @@ namespace efm {
 
 using GzFile = std::unique_ptr<gzFile_s, int (*)(gzFile_s*)>;
 
-/// A pipe is read in small pieces, so that what was written to it is there soon.
-enum class GzSource { kFile, kPipe };
-
 /// A gzip file or a plain file as an MRPT stream for reading. A truncated file is an error, which
 /// mrpt::io::CFileGZInputStream does not notice.
 class GzInputStream : public mrpt::io::CStream {
  public:
-  /// Opening a pipe waits for its writer; reading, for more data.
-  explicit GzInputStream(const std::filesystem::path& file, GzSource source = GzSource::kFile);
+  explicit GzInputStream(const std::filesystem::path& file);
 
   /// @throws std::runtime_error if the file is truncated or its compression is damaged.
   bool atEnd();
-  /// The fraction of the file that has been read, 0 to 1; of a pipe, 1.
+  /// The fraction of the file that has been read, 0 to 1.
   double progress() const;
 
   /// @return less than `count` only at the end.
@@ -50,7 +46,6 @@ class GzInputStream : public mrpt::io::CStream {
   void fill();
 
   GzFile file_;
-  std::size_t buffer_size_;
   std::uint64_t file_size_ = 0;
   std::uint64_t position_ = 0;
   std::vector<std::uint8_t> buffer_;
@@ -90,7 +85,7 @@ void requireRawlog(const std::filesystem::path& file);
 /// actions and comments are ignored.
 class RawlogRecording : public Recording {
  public:
-  explicit RawlogRecording(std::filesystem::path file, GzSource source = GzSource::kFile);
+  explicit RawlogRecording(std::filesystem::path file);
 
   /// @throws std::runtime_error "stopped at entry N of FILE: reason" if the file is truncated or
   /// damaged, or has an unknown class. Entries count from 0, as in MRPT's programs. All entries
