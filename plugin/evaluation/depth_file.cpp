@@ -2,7 +2,6 @@
 #include "plugin/evaluation/depth_file.h"
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -11,23 +10,13 @@
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/base/named_choice.h"
+#include "mapping/base/picture_file.h"
 #include "mapping/base/text.h"
 #include "maps/io/npy_header.h"
 #include "maps/io/point_record.h"
 
 namespace efm {
 namespace {
-
-bool beginsWith(std::string_view bytes, std::string_view start) {
-  return bytes.substr(0, start.size()) == start;
-}
-
-bool looksLikeTiff(std::string_view bytes) {
-  using namespace std::string_view_literals;
-  return beginsWith(bytes, "II*\0"sv) || beginsWith(bytes, "MM\0*"sv);
-}
-
-bool looksLikePng(std::string_view bytes) { return beginsWith(bytes, "\x89PNG\r\n\x1a\n"); }
 
 std::string kindOf(const cv::Mat& image) {
   constexpr const char* kDepths[] = {"8-bit",  "signed 8-bit", "16-bit", "signed 16-bit",
@@ -37,21 +26,8 @@ std::string kindOf(const cv::Mat& image) {
                      image.channels() == 1 ? "" : "s");
 }
 
-cv::Mat decoded(const std::string& bytes, int flags) {
-  cv::Mat image;
-  try {
-    image = cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8U,
-                                 const_cast<char*>(bytes.data())),  // it only reads
-                         flags);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty()) throw std::runtime_error("the image is damaged or cut short");
-  return image;
-}
-
 cv::Mat1f parseTiff(const std::string& bytes) {
-  cv::Mat image = decoded(bytes, cv::IMREAD_UNCHANGED);
+  cv::Mat image = decodePicture(bytes);
   if (image.type() != CV_32FC1) {
     throw std::runtime_error("a TIFF image, " + kindOf(image) +
                              ": must be a float32 image of one channel");
@@ -60,7 +36,7 @@ cv::Mat1f parseTiff(const std::string& bytes) {
 }
 
 cv::Mat1f parsePng(const std::string& bytes, std::optional<double> scale) {
-  const cv::Mat image = decoded(bytes, cv::IMREAD_UNCHANGED);
+  const cv::Mat image = decodePicture(bytes);
   if (image.type() != CV_16UC1) {
     throw std::runtime_error("a PNG image, " + kindOf(image) +
                              ": expected 16-bit, 1 channel, or a float32 TIFF");
@@ -100,12 +76,10 @@ cv::Mat1f readDepthFile(const std::filesystem::path& file, std::optional<double>
 
 cv::Mat1b readMaskFile(const std::filesystem::path& file) {
   try {
-    const std::string bytes = readBytes(file);
-    if (bytes.empty()) throw std::runtime_error("it is empty");
     // The maximum of the colours: OpenCV's conversion to grey rounds a dark blue to black.
-    cv::Mat channels = decoded(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH);
+    const cv::Mat channels = decodePicture(readBytes(file));
     cv::Mat1b mask(channels.size(), uchar{0});
-    for (int c = 0; c < channels.channels(); ++c) {
+    for (int c = 0; c < std::min(channels.channels(), 3); ++c) {  // the fourth is opacity
       cv::Mat one;
       cv::extractChannel(channels, one, c);
       mask |= one > 0;

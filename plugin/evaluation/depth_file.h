@@ -19,7 +19,7 @@ namespace efm {
 cv::Mat1f readDepthFile(const std::filesystem::path& file,
                         std::optional<double> png_scale = std::nullopt);
 
-/// Reads a mask from an image of any format that OpenCV reads: 0 for black pixels, 255 for others.
+/// Reads a mask from a PNG or TIFF image (`decodePicture`): 0 for black pixels, 255 for others.
 cv::Mat1b readMaskFile(const std::filesystem::path& file);
 
 /// The maximum width and height of a PFM or NumPy image. More means a damaged header.

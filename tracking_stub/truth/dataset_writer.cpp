@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tracking_stub/truth/dataset_writer.h"
 
-#include <opencv2/imgcodecs.hpp>
-
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
@@ -15,6 +13,7 @@
 #include <utility>
 
 #include "mapping/base/named_choice.h"
+#include "mapping/base/picture_file.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/reference_view.h"
 #include "mapping/geometry/timestamp.h"
@@ -162,16 +161,6 @@ void appendSeconds(std::string& text, std::int64_t t_ns) {
   text.append(decimals, 10);
 }
 
-void writeTiff(const fs::path& file, const cv::Mat1f& image) {
-  bool written = false;
-  try {
-    written = cv::imwrite(file.string(), image);
-  } catch (const cv::Exception&) {
-    // Reported below, with the path.
-  }
-  if (!written) throw cannotWrite(file);
-}
-
 /// Appends the matrix of a transform as YAML, in Kalibr's layout.
 void appendMatrix(std::ostream& text, const Rigid3& T_a_b) {
   const Eigen::Matrix3d rotation = T_a_b.rotation.toRotationMatrix();
@@ -193,7 +182,7 @@ void writeDepthMaps(const fs::path& depth_folder, const Simulation& simulation,
     const std::string name = "cam0_" + formatSeconds(t_ns) + ".tiff";
     const fs::path file = depth_folder / name;
     const Rigid3 T_world_cam0 = simulation.motion->poseAt(t_ns);
-    writeTiff(file, renderDepth(simulation.scene, T_world_cam0, view));
+    writeText(file, encodeTiff(renderDepth(simulation.scene, T_world_cam0, view)));
     index += formatSeconds(t_ns) + " " + name + "\n";
   }
   writeText(depth_folder / "index.txt", index);

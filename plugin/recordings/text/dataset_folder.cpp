@@ -2,7 +2,6 @@
 #include "plugin/recordings/text/dataset_folder.h"
 
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
 
 #include <fstream>
 #include <optional>
@@ -13,6 +12,8 @@
 #include <system_error>
 #include <utility>
 
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/picture_file.h"
 #include "mapping/base/text.h"
 #include "mapping/geometry/timestamp.h"
 #include "plugin/recordings/text/event_text.h"
@@ -103,12 +104,13 @@ std::optional<CameraSize> sizeOfImages(const fs::path& folder) {
     const fs::path file = folder / name;
     std::error_code ignored;
     if (!fs::is_regular_file(file, ignored)) continue;
-    const cv::Mat image = cv::imread(file.string(), cv::IMREAD_UNCHANGED);
-    if (image.empty()) {
-      throw std::runtime_error(file.string() +
-                               ": cannot be read as an image: expected one as large as the sensor");
+    try {
+      const cv::Size size = pictureSize(readBytes(file));
+      return CameraSize{size.width, size.height};
+    } catch (const std::runtime_error& error) {
+      throw std::runtime_error(file.string() + ": cannot be read as an image: " + error.what() +
+                               ", as large as the sensor");
     }
-    return CameraSize{image.cols, image.rows};
   }
   return std::nullopt;
 }

@@ -8,12 +8,12 @@
 #include <cstddef>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
+#include "mapping/base/picture_file.h"
 #include "mapping/geometry/timestamp.h"
 #include "maps/io/point_cloud_file.h"
 #include "plugin/results/pictures/depth_picture.h"
@@ -160,17 +160,7 @@ std::function<void(const std::filesystem::path&)> byStream(
 }
 
 void writePictureTo(std::ostream& stream, const std::string& extension, const cv::Mat& image) {
-  // Not imwrite: where the disk is full, the libraries of pictures print that to stderr.
-  std::vector<std::uint8_t> bytes;
-  // Matching beside run lengths: a third of the size of OpenCV's default, in the same time.
-  const std::vector<int> quick = {cv::IMWRITE_PNG_COMPRESSION, 1, cv::IMWRITE_PNG_STRATEGY,
-                                  cv::IMWRITE_PNG_STRATEGY_DEFAULT};
-  const std::vector<int> parameters = extension == ".png" ? quick : std::vector<int>();
-  if (!cv::imencode(extension, image, bytes, parameters)) {
-    throw std::runtime_error("no picture can be made of it");
-  }
-  stream.write(reinterpret_cast<const char*>(bytes.data()),
-               static_cast<std::streamsize>(bytes.size()));
+  stream << (extension == ".png" ? encodePng(image, PngPacking::kQuick) : encodeTiff(image));
 }
 
 }  // namespace

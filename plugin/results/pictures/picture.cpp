@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/results/pictures/picture.h"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <fstream>
 #include <stdexcept>
 
 #include "mapping/base/atomic_file.h"
+#include "mapping/base/picture_file.h"
 #include "mapping/geometry/rigid3.h"
 
 namespace efm {
@@ -19,9 +20,10 @@ void writePicture(const std::filesystem::path& file, const cv::Mat3b& picture) {
     throw std::runtime_error(file.string() + ": expected a name that ends in .png");
   }
   writeAtomically(file, [&](const std::filesystem::path& temporary) {
-    if (!cv::imwrite(temporary.string(), picture)) {
-      throw std::runtime_error("the file cannot be created or the disk is full");
-    }
+    std::ofstream stream(temporary, std::ios::binary);
+    stream << encodePng(picture, PngPacking::kRuns);
+    stream.close();
+    if (!stream) throw std::runtime_error("the file cannot be created or the disk is full");
   });
 }
 

@@ -40,8 +40,9 @@ class DepthFile : public TemporaryFolder {
     std::ofstream(folder() / name, std::ios::binary) << bytes;
     return folder() / name;
   }
-  std::filesystem::path image(const std::string& name, const cv::Mat& content) const {
-    EXPECT_TRUE(cv::imwrite((folder() / name).string(), content));
+  std::filesystem::path image(const std::string& name, const cv::Mat& content,
+                              const std::vector<int>& parameters = {}) const {
+    EXPECT_TRUE(cv::imwrite((folder() / name).string(), content, parameters));
     return folder() / name;
   }
   std::string errorOf(const std::filesystem::path& file,
@@ -95,7 +96,8 @@ TEST_F(DepthFile, WrongKindsOfImagesAreErrorsThatNameTheKind) {
   EXPECT_THAT(errorOf(image("a.png", cv::Mat1b(2, 3, uchar{1})), 1000),
               AllOf(HasSubstr("a.png"), HasSubstr("8-bit, 1 channel")));
   EXPECT_THAT(errorOf(image("b.tiff", cv::Mat1b(2, 3, uchar{1}))), HasSubstr("float32"));
-  EXPECT_THAT(errorOf(image("c.tiff", cv::Mat3f(2, 3))), HasSubstr("float32, 3 channels: must"));
+  EXPECT_THAT(errorOf(image("c.tiff", cv::Mat3f(2, 3), {cv::IMWRITE_TIFF_COMPRESSION, 1})),
+              HasSubstr("float32, 3 channels: must"));
   EXPECT_THAT(errorOf(write("d.pfm", "PF\n1 1\n-1\n" + bytesOf<float>({1, 2, 3}))),
               HasSubstr("Pf"));
   EXPECT_THAT(errorOf(write("e.txt", "hello")), HasSubstr("'hello': expected a TIFF"));

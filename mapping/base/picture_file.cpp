@@ -1,0 +1,421 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "mapping/base/picture_file.h"
+
+#include <png.h>
+#include <tiffio.h>
+#include <zlib.h>
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cassert>
+#include <csetjmp>
+#include <cstdarg>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <new>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "mapping/base/text.h"
+
+namespace efm {
+namespace {
+
+constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 26U;
+constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30U;
+
+/// Refuses what only a damaged header says, before memory is taken for it. No usual compression
+/// makes a file more than 4096 times smaller.
+void requireBelievable(std::uint64_t width, std::uint64_t height, std::uint64_t bytes_per_row,
+                       std::size_t file_size) {
+  constexpr std::uint64_t kAlways = std::uint64_t{1} << 24U;
+  const bool possible = width >= 1 && height >= 1 && width <= kMaxPixels / height;
+  if (!possible || bytes_per_row > kMaxBytes / height ||
+      std::max(width, bytes_per_row) * height > kAlways + std::uint64_t{4096} * file_size) {
+    throw std::runtime_error("the image's header: " + std::to_string(width) + "x" +
+                             std::to_string(height) + " pixels in a file of " +
+                             std::to_string(file_size) + " bytes");
+  }
+}
+
+/// The bytes that libpng or libtiff reads, if there are any, else those that it writes, and the
+/// first error that it reported.
+struct CodecBytes {
+  std::string_view input;
+  std::string output;
+  std::size_t at = 0;
+  char error[200] = "";
+
+  std::string_view content() const { return input.empty() ? output : input; }
+  /// @return how many bytes there were.
+  std::size_t take(void* to, std::size_t count) {
+    count = std::min(count, content().size() - std::min(content().size(), at));
+    if (count > 0) std::memcpy(to, content().data() + at, count);
+    at += count;
+    return count;
+  }
+  bool put(const void* from, std::size_t count) {
+    try {
+      output.resize(std::max(output.size(), at + count));
+    } catch (const std::exception&) {  // must not pass through C
+      return false;
+    }
+    std::memcpy(output.data() + at, from, count);
+    at += count;
+    return true;
+  }
+  std::runtime_error failed(const std::string& what) const {
+    const std::string why = error[0] == '\0' ? "" : " (" + printable(error, sizeof(error)) + ")";
+    return std::runtime_error(what + why);
+  }
+  std::runtime_error damaged() const { return failed("the image is damaged or cut short"); }
+  std::runtime_error notWritten() const { return failed("no picture can be made"); }
+};
+
+/// The state of libpng.
+class PngCodec {
+ public:
+  explicit PngCodec(CodecBytes& bytes) : reads_(!bytes.input.empty()) {
+    const auto create = reads_ ? png_create_read_struct : png_create_write_struct;
+    png = create(PNG_LIBPNG_VER_STRING, &bytes, fail, [](png_structp, png_const_charp) {});
+    if (png != nullptr) info = png_create_info_struct(png);
+    if (info == nullptr) {
+      destroy();
+      throw std::bad_alloc();
+    }
+    if (reads_) {
+      png_set_read_fn(png, &bytes, [](png_structp self, png_bytep to, std::size_t count) {
+        if (of(self).take(to, count) != count) png_error(self, "its end is missing");
+      });
+    } else {
+      const auto write = [](png_structp self, png_bytep from, std::size_t count) {
+        if (!of(self).put(from, count)) png_error(self, "not enough memory");
+      };
+      png_set_write_fn(png, &bytes, write, [](png_structp) {});
+    }
+  }
+  ~PngCodec() { destroy(); }
+  PngCodec(const PngCodec&) = delete;
+  PngCodec& operator=(const PngCodec&) = delete;
+
+  /// libpng leaves a failed call by longjmp: `calls` must not have objects with destructors.
+  template <typename Calls>
+  bool succeeds(const Calls& calls) {
+    if (setjmp(png_jmpbuf(png)) != 0) return false;
+    calls();
+    return true;
+  }
+
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+
+ private:
+  static CodecBytes& of(png_structp png) {
+    return *static_cast<CodecBytes*>(png_get_error_ptr(png));
+  }
+  static void fail(png_structp png, png_const_charp message) {
+    std::snprintf(of(png).error, sizeof(CodecBytes::error), "%s", message);
+    png_longjmp(png, 1);
+  }
+  void destroy() {
+    if (reads_) {
+      png_destroy_read_struct(&png, &info, nullptr);
+    } else {
+      png_destroy_write_struct(&png, &info);
+    }
+  }
+
+  bool reads_;
+};
+
+std::vector<png_bytep> rowsOf(const cv::Mat& picture) {
+  std::vector<png_bytep> rows(static_cast<std::size_t>(picture.rows));
+  for (int y = 0; y < picture.rows; ++y) {
+    rows[static_cast<std::size_t>(y)] = const_cast<png_bytep>(picture.ptr(y));
+  }
+  return rows;
+}
+
+cv::Mat decodePng(std::string_view input) {
+  CodecBytes bytes;
+  bytes.input = input;
+  PngCodec codec(bytes);
+  png_structp png = codec.png;
+  png_infop info = codec.info;
+  if (!codec.succeeds([&] { png_read_info(png, info); })) throw bytes.damaged();
+  const png_uint_32 width = png_get_image_width(png, info);
+  const png_uint_32 height = png_get_image_height(png, info);
+  requireBelievable(width, height, png_get_rowbytes(png, info), input.size());
+  const bool prepared = codec.succeeds([&] {
+    const int colours = png_get_color_type(png, info);
+    if (colours == PNG_COLOR_TYPE_PALETTE) png_set_palette_to_rgb(png);
+    if (colours == PNG_COLOR_TYPE_GRAY) png_set_expand_gray_1_2_4_to_8(png);
+    if (colours == PNG_COLOR_TYPE_GRAY_ALPHA) png_set_gray_to_rgb(png);
+    if (colours == PNG_COLOR_TYPE_RGB && png_get_valid(png, info, PNG_INFO_tRNS) != 0) {
+      png_set_tRNS_to_alpha(png);
+    }
+    png_set_bgr(png);
+    const std::uint16_t one = 1;
+    if (*reinterpret_cast<const char*>(&one) == 1) png_set_swap(png);
+    png_set_interlace_handling(png);
+    png_read_update_info(png, info);
+  });
+  if (!prepared) throw bytes.damaged();
+  const int depth = png_get_bit_depth(png, info) == 16 ? CV_16U : CV_8U;
+  cv::Mat picture(static_cast<int>(height), static_cast<int>(width),
+                  CV_MAKETYPE(depth, png_get_channels(png, info)));
+  std::vector<png_bytep> rows = rowsOf(picture);
+  const bool complete = codec.succeeds([&] {
+    png_read_image(png, rows.data());
+    png_read_end(png, nullptr);
+  });
+  if (!complete) throw bytes.damaged();
+  return picture;
+}
+
+/// An open TIFF in memory.
+class TiffCodec {
+ public:
+  explicit TiffCodec(CodecBytes& bytes) {
+    TIFFOpenOptions* options = TIFFOpenOptionsAlloc();
+    if (options == nullptr) throw std::bad_alloc();
+    // Nothing is printed where these return 1.
+    TIFFOpenOptionsSetErrorHandlerExtR(options, report, &bytes);
+    TIFFOpenOptionsSetWarningHandlerExtR(
+        options, [](TIFF*, void*, const char*, const char*, std::va_list) { return 1; }, nullptr);
+    TIFFOpenOptionsSetMaxSingleMemAlloc(options, kMaxBytes);
+    tiff = TIFFClientOpenExt(
+        "picture", bytes.input.empty() ? "w" : "r", &bytes,
+        [](thandle_t self, void* to, tmsize_t count) {
+          return static_cast<tmsize_t>(of(self).take(to, static_cast<std::size_t>(count)));
+        },
+        [](thandle_t self, void* from, tmsize_t count) {
+          return of(self).put(from, static_cast<std::size_t>(count)) ? count : tmsize_t{0};
+        },
+        [](thandle_t self, toff_t offset, int whence) -> toff_t {
+          if (whence == SEEK_CUR) offset += of(self).at;
+          if (whence == SEEK_END) offset += of(self).content().size();
+          return of(self).at = offset;
+        },
+        [](thandle_t) { return 0; },
+        [](thandle_t self) -> toff_t { return of(self).content().size(); }, nullptr, nullptr,
+        options);
+    TIFFOpenOptionsFree(options);
+    if (tiff == nullptr) throw bytes.damaged();
+  }
+  ~TiffCodec() { TIFFClose(tiff); }
+  TiffCodec(const TiffCodec&) = delete;
+  TiffCodec& operator=(const TiffCodec&) = delete;
+
+  /// The value of a tag, its default, or 0.
+  template <typename Number>
+  Number tag(std::uint32_t name) const {
+    Number value = 0;
+    return TIFFGetFieldDefaulted(tiff, name, &value) != 0 ? value : Number{0};
+  }
+
+  TIFF* tiff = nullptr;
+
+ private:
+  static CodecBytes& of(thandle_t self) { return *static_cast<CodecBytes*>(self); }
+  static int report(TIFF*, void* self, const char*, const char* format, std::va_list values) {
+    if (of(self).error[0] == '\0') {
+      std::vsnprintf(of(self).error, sizeof(CodecBytes::error), format, values);
+    }
+    return 1;
+  }
+};
+
+bool readStrips(TIFF* tiff, cv::Mat& picture) {
+  if (TIFFScanlineSize64(tiff) != picture.cols * picture.elemSize()) return false;
+  for (int y = 0; y < picture.rows; ++y) {
+    if (TIFFReadScanline(tiff, picture.ptr(y), static_cast<std::uint32_t>(y), 0) < 0) return false;
+  }
+  return true;
+}
+
+bool readTiles(TIFF* tiff, cv::Size size, cv::Mat& picture) {
+  cv::Mat tile(size, picture.type());
+  if (TIFFTileSize64(tiff) != tile.total() * tile.elemSize()) return false;
+  for (int y = 0; y < picture.rows; y += size.height) {
+    for (int x = 0; x < picture.cols; x += size.width) {
+      if (TIFFReadTile(tiff, tile.data, static_cast<std::uint32_t>(x),
+                       static_cast<std::uint32_t>(y), 0, 0) < 0) {
+        return false;
+      }
+      const cv::Rect part = cv::Rect({x, y}, size) & cv::Rect({}, picture.size());
+      tile(cv::Rect({}, part.size())).copyTo(picture(part));
+    }
+  }
+  return true;
+}
+
+/// Turns the stored image as TIFF's orientation, 1 to 8, says.
+void makeUpright(int orientation, cv::Mat& picture) {
+  constexpr int kFlips[] = {1, -1, 0};  // of 2 to 4 and 6 to 8, for cv::flip
+  if (orientation > 4) cv::transpose(picture, picture);
+  const int turn = (orientation - 1) % 4;
+  if (turn > 0) cv::flip(picture, picture, kFlips[turn - 1]);
+}
+
+/// The depth of a matrix of such samples; below 0: none.
+int depthOf(int bits, int format) {
+  if (format == SAMPLEFORMAT_UINT) return bits == 8 ? CV_8U : bits == 16 ? CV_16U : -1;
+  if (format == SAMPLEFORMAT_IEEEFP) return bits == 32 ? CV_32F : bits == 64 ? CV_64F : -1;
+  return -1;
+}
+
+cv::Mat decodeTiff(std::string_view input) {
+  CodecBytes bytes;
+  bytes.input = input;
+  const TiffCodec codec(bytes);
+  TIFF* const tiff = codec.tiff;
+  const auto width = codec.tag<std::uint32_t>(TIFFTAG_IMAGEWIDTH);
+  const auto height = codec.tag<std::uint32_t>(TIFFTAG_IMAGELENGTH);
+  const auto tile_width = codec.tag<std::uint32_t>(TIFFTAG_TILEWIDTH);
+  const auto tile_height = codec.tag<std::uint32_t>(TIFFTAG_TILELENGTH);
+  const bool tiled = TIFFIsTiled(tiff) != 0;
+  requireBelievable(width, height, TIFFScanlineSize64(tiff), input.size());
+  if (tiled) requireBelievable(tile_width, tile_height, TIFFTileRowSize64(tiff), input.size());
+
+  const int bits = codec.tag<std::uint16_t>(TIFFTAG_BITSPERSAMPLE);
+  const int channels = codec.tag<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL);
+  const int colours = codec.tag<std::uint16_t>(TIFFTAG_PHOTOMETRIC);
+  const int depth = depthOf(bits, codec.tag<std::uint16_t>(TIFFTAG_SAMPLEFORMAT));
+  const bool apart =
+      channels > 1 && codec.tag<std::uint16_t>(TIFFTAG_PLANARCONFIG) == PLANARCONFIG_SEPARATE;
+  const bool plain = colours == PHOTOMETRIC_MINISBLACK || colours == PHOTOMETRIC_RGB;
+  if (depth < 0 || (depth == CV_8U && !plain) || channels < 1 || channels > 4 || apart) {
+    throw std::runtime_error("a TIFF image, " + std::to_string(bits) + "-bit, " +
+                             std::to_string(channels) + " channels, PhotometricInterpretation " +
+                             std::to_string(colours) + (apart ? ", in planes" : "") +
+                             ": expected grey or RGB pixels of 8 or 16 bits, float32 or float64");
+  }
+  cv::Mat picture(static_cast<int>(height), static_cast<int>(width), CV_MAKETYPE(depth, channels));
+  const bool complete =
+      tiled ? readTiles(tiff, cv::Size(static_cast<int>(tile_width), static_cast<int>(tile_height)),
+                        picture)
+            : readStrips(tiff, picture);
+  if (!complete) throw bytes.damaged();
+  if (channels == 3) cv::cvtColor(picture, picture, cv::COLOR_RGB2BGR);
+  if (channels == 4) cv::cvtColor(picture, picture, cv::COLOR_RGBA2BGRA);
+  makeUpright(codec.tag<std::uint16_t>(TIFFTAG_ORIENTATION), picture);
+  return picture;
+}
+
+/// Two or four bytes from `at` on, the first one the highest.
+std::uint32_t bigEndian(std::string_view bytes, std::size_t at, std::size_t count) {
+  std::uint32_t number = 0;
+  for (const char byte : bytes.substr(at, count)) {
+    number = number << 8U | static_cast<std::uint8_t>(byte);
+  }
+  return number;
+}
+
+/// From the frame's header, the first one of SOF0 to SOF15.
+cv::Size jpegSize(std::string_view bytes) {
+  std::size_t at = 2;
+  while (at + 9 <= bytes.size() && bytes[at] == '\xFF') {
+    const auto marker = static_cast<std::uint8_t>(bytes[at + 1]);
+    const bool other = marker == 0xC4 || marker == 0xC8 || marker == 0xCC;  // DHT, JPG, DAC
+    if (marker >= 0xC0 && marker <= 0xCF && !other) {
+      return {static_cast<int>(bigEndian(bytes, at + 7, 2)),
+              static_cast<int>(bigEndian(bytes, at + 5, 2))};
+    }
+    at += marker == 0xFF ? 1 : 2 + bigEndian(bytes, at + 2, 2);
+  }
+  return {};
+}
+
+std::string beginning(std::string_view bytes) {
+  return bytes.empty() ? "it is empty" : "it begins with " + inQuotes(bytes.substr(0, 8));
+}
+
+}  // namespace
+
+std::string encodePng(const cv::Mat& picture, PngPacking packing) {
+  assert(picture.type() == CV_8UC1 || picture.type() == CV_8UC3);
+  CodecBytes bytes;
+  PngCodec codec(bytes);
+  png_structp png = codec.png;
+  std::vector<png_bytep> rows = rowsOf(picture);
+  const bool written = codec.succeeds([&] {
+    if (packing == PngPacking::kRuns) {
+      png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+      png_set_compression_strategy(png, Z_RLE);
+    } else {
+      png_set_compression_strategy(png, Z_DEFAULT_STRATEGY);
+    }
+    png_set_compression_level(png, packing == PngPacking::kSmall ? 6 : 1);
+    png_set_IHDR(png, codec.info, static_cast<png_uint_32>(picture.cols),
+                 static_cast<png_uint_32>(picture.rows), 8,
+                 picture.channels() == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB,
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    png_write_info(png, codec.info);
+    png_set_bgr(png);
+    png_write_image(png, rows.data());
+    png_write_end(png, codec.info);
+  });
+  if (!written) throw bytes.notWritten();
+  return std::move(bytes.output);
+}
+
+std::string encodeTiff(const cv::Mat1f& image) {
+  if (image.empty()) throw std::invalid_argument("an image without pixels");
+  constexpr int kStripBytes = 8192;
+  const int strip_rows = kStripBytes / (image.cols * static_cast<int>(sizeof(float)));
+  const std::pair<std::uint32_t, int> tags[] = {
+      {TIFFTAG_IMAGEWIDTH, image.cols},
+      {TIFFTAG_IMAGELENGTH, image.rows},
+      {TIFFTAG_BITSPERSAMPLE, 32},
+      {TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP},
+      {TIFFTAG_SAMPLESPERPIXEL, 1},
+      {TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG},
+      {TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK},
+      {TIFFTAG_COMPRESSION, COMPRESSION_NONE},
+      {TIFFTAG_ROWSPERSTRIP, std::clamp(strip_rows, 1, image.rows)}};
+  CodecBytes bytes;
+  {
+    const TiffCodec codec(bytes);
+    bool written = true;
+    for (const auto& [tag, value] : tags) {
+      written = written && TIFFSetField(codec.tiff, tag, value) != 0;
+    }
+    for (int y = 0; written && y < image.rows; ++y) {
+      // In the machine's order of bytes: no row is changed.
+      written = TIFFWriteScanline(codec.tiff, const_cast<float*>(image[y]),
+                                  static_cast<std::uint32_t>(y), 0) >= 0;
+    }
+    if (!written || TIFFWriteDirectory(codec.tiff) == 0) throw bytes.notWritten();
+  }
+  return std::move(bytes.output);
+}
+
+bool looksLikePng(std::string_view bytes) { return bytes.substr(0, 8) == "\x89PNG\r\n\x1a\n"; }
+
+bool looksLikeTiff(std::string_view bytes) {
+  using namespace std::string_view_literals;
+  const std::string_view start = bytes.substr(0, 4);
+  return start == "II*\0"sv || start == "MM\0*"sv || start == "II+\0"sv || start == "MM\0+"sv;
+}
+
+cv::Mat decodePicture(std::string_view bytes) {
+  if (looksLikePng(bytes)) return decodePng(bytes);
+  if (looksLikeTiff(bytes)) return decodeTiff(bytes);
+  throw std::runtime_error(beginning(bytes) + ": expected a PNG or TIFF image");
+}
+
+cv::Size pictureSize(std::string_view bytes) {
+  cv::Size size;
+  if (looksLikePng(bytes) && bytes.size() >= 24) {
+    size = {static_cast<int>(bigEndian(bytes, 16, 4)), static_cast<int>(bigEndian(bytes, 20, 4))};
+  } else if (bytes.substr(0, 2) == "\xFF\xD8") {
+    size = jpegSize(bytes);
+  }
+  if (size.width >= 1 && size.height >= 1) return size;
+  throw std::runtime_error(beginning(bytes) + ": expected a PNG or JPEG image");
+}
+
+}  // namespace efm
