@@ -26,7 +26,7 @@ function(efm_unity_folders target)
     target_precompile_headers(${target} PRIVATE
       <algorithm> <cmath> <deque> <filesystem> <fstream> <functional> <map> <memory> <optional>
       <set> <sstream> <stdexcept> <string> <vector> <Eigen/Geometry> <opencv2/core.hpp>)
-    if(target STREQUAL "mrpt-event-fusion" OR target STREQUAL "efm_formats")
+    if(target STREQUAL "mrpt-event-fusion")
       target_precompile_headers(${target} PRIVATE
         <fmt/format.h> <mrpt/obs/CObservation.h> <mrpt/serialization/CArchive.h>)
     endif()

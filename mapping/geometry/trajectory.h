@@ -24,6 +24,13 @@ struct StampedPose {
   Rigid3 T_world_rig;
 };
 
+/// The noise of one pose as a tracker states it: standard deviations on each axis, metres and
+/// radians.
+struct PoseNoise {
+  double noise_m = 0;
+  double noise_rad = 0;
+};
+
 struct TrajectoryOptions {
   /// Between two neighbouring poses with a longer gap there is no pose. Above 0. Real recordings
   /// have gaps up to 0.13 s that interpolation still bridges well.

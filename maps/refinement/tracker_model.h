@@ -12,13 +12,6 @@
 
 namespace efm {
 
-/// The noise of one pose as a tracker states it: standard deviations on each axis, metres and
-/// radians.
-struct PoseNoise {
-  double noise_m = 0;
-  double noise_rad = 0;
-};
-
 /// The noise of one pose as a ratio to the expected noise of the tracker: without a unit, 1 where
 /// the tracker states nothing.
 struct NoiseScale {

@@ -13,8 +13,8 @@
 #include "plugin/evaluation/cloud_evaluation.h"
 #include "plugin/evaluation/depth_evaluation.h"
 #include "plugin/evaluation/trajectory_evaluation.h"
+#include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/recordings/open/rawlog.h"
 #include "tracking_stub/sensor/simulated_rig.h"
 
 namespace efm {

@@ -17,10 +17,9 @@
 #include "plugin/app/output_checks.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
-#include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/pose_observation.h"
+#include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/recordings/open/rawlog.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/writers/mcap_writer.h"
 #include "plugin/recordings/writers/recording_writer.h"
 #include "plugin/session/health_checks.h"
@@ -44,10 +43,11 @@ int runImport(const ImportArguments& arguments) {
   refuseToDestroy(arguments);
   RecordingSource source = arguments.source;
   source.complete = false;
-  const TimeLimits limits = resolve(arguments.times, source);
-  const std::unique_ptr<Recording> recording = openInterval(source, limits);
+  source.rounded = false;
+  source.limits = resolve(arguments.times, source);
+  const std::unique_ptr<Recording> recording = openRecording(source);
   const Interruption interruption;
-  RawlogWriter writer(arguments.out, arguments.compression);
+  const auto writer = mrptLibrary().writeRawlog(arguments.out, arguments.compression);
   std::map<std::string, std::uint64_t> events;  // per label
   std::uint64_t all_events = 0;
   std::uint64_t poses = 0;
@@ -57,27 +57,27 @@ int runImport(const ImportArguments& arguments) {
   std::optional<std::string> damage;
   {
     Progress progress("importing", arguments.verbosity);
-    damage = readAll(*recording, [&](mrpt::obs::CObservation& observation) {
+    damage = readAll(*recording, [&](Sample sample) {
       interruption.check();
-      writer.write(observation);
-      if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
-        cameras.emplace(packet->camera_index, packet->camera);
-        events[packet->sensorLabel] += packet->events.size();
+      if (const auto* packet = std::get_if<EventPacket>(&sample)) {
+        cameras.emplace(packet->camera, packet->calibration.model);
+        events[packet->label] += packet->events.size();
         all_events += packet->events.size();
-      } else if (const auto poses_of = poseSourceOf(observation)) {
+      } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
         ++poses;
-        if (poses_of->kind == PoseKind::kOdometry) ++odometry;
+        if (pose->source.kind == PoseKind::kOdometry) ++odometry;
       } else {
         ++others;
       }
+      writer->write(std::move(sample));
       progress.show(recording->progress());
     });
     if (all_events == 0 && damage) throw std::runtime_error(*damage);
-    if (all_events == 0) refuseLimitsWithoutEvents(source, limits);
+    if (all_events == 0) refuseLimitsWithoutEvents(source);
     if (all_events + poses + others == 0) {
-      throw std::runtime_error("the recording holds nothing " + limitsText(limits));
+      throw std::runtime_error("the recording holds nothing " + limitsText(source.limits));
     }
-    writer.close();
+    writer->close();
   }
   printWarnings(missingParts(cameras, all_events > 0, poses > 0));
   warnOfLosses(recording->counts());
@@ -122,53 +122,7 @@ const std::vector<ExportFormat>& formats() {
   return all;
 }
 
-RigCamera cameraOf(const CObservationEvents& packet) {
-  return {packet.camera, rigidFrom(packet.camera_pose), 0};
-}
-
-/// The rig of a recording. One that announces its cameras is read up to its first event, another to
-/// its end or its damage.
-/// @throws std::runtime_error if a camera is missing, or there is none.
-Rig rigOf(const RecordingSource& source, const TimeLimits& limits) {
-  const std::unique_ptr<Recording> recording = openInterval(source, limits);
-  std::map<int, RigCamera> cameras;
-  std::map<int, std::int64_t> announced_ns;
-  while (true) {
-    mrpt::obs::CObservation::Ptr observation;
-    try {
-      observation = recording->next();
-    } catch (const std::exception&) {
-      if (cameras.empty()) throw;
-    }
-    if (!observation) break;
-    const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
-    if (packet == nullptr) continue;
-    cameras.emplace(packet->camera_index, cameraOf(*packet));
-    if (!packet->events.empty()) {
-      const auto announcement = announced_ns.find(packet->camera_index);
-      if (announcement != announced_ns.end() &&
-          announcement->second == packet->events.front().t_ns) {
-        break;
-      }
-      announced_ns.clear();
-    } else if (packet->covered_until_ns) {
-      announced_ns.emplace(packet->camera_index, *packet->covered_until_ns);
-    }
-  }
-  Rig rig;
-  for (const auto& [index, camera] : cameras) {
-    if (index != static_cast<int>(rig.cameras.size())) {
-      throw std::runtime_error(fmt::format("the recording has events of camera {} but none of {}",
-                                           index, rig.cameras.size()));
-    }
-    rig.cameras.push_back(camera);
-  }
-  if (rig.cameras.empty()) refuseLimitsWithoutEvents(source, limits);
-  if (rig.cameras.empty()) throw std::runtime_error("the recording has no events");
-  return rig;
-}
-
-/// Writes observations, and counts them.
+/// Writes samples, and counts them.
 class Export {
  public:
   /// @param rig of the recording; the results' rig has camera 0's frame.
@@ -188,23 +142,23 @@ class Export {
     if (!writer_) throw std::runtime_error("'" + arguments.format + "' is not a known format");
   }
 
-  void add(const mrpt::obs::CObservation& observation) {
-    if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
-      std::vector<Event> shifted = packet->events;
-      for (Event& event : shifted) event.t_ns += packet->time_offset_ns;
-      writer_->addEvents(static_cast<std::size_t>(packet->camera_index), shifted);
-      events_ += shifted.size();
-    } else if (const auto source = poseSourceOf(observation)) {
-      if (!pose_source_) pose_source_ = source;
-      if (*source < *pose_source_ || *pose_source_ < *source) {
+  void add(Sample sample) {
+    if (auto* packet = std::get_if<EventPacket>(&sample)) {
+      for (Event& event : packet->events) event.t_ns += packet->calibration.time_offset_ns;
+      writer_->addEvents(static_cast<std::size_t>(packet->camera), packet->events);
+      events_ += packet->events.size();
+    } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
+      if (!pose_source_) pose_source_ = pose->source;
+      if (!(pose->source == *pose_source_)) {
         ++other_poses_;
         return;
       }
-      const ObservedPose pose = *poseIn(observation);
-      writer_->addPose({pose.t_ns, pose.T_world_body * pose.T_body_rig * T_rig_cam0_});
+      writer_->addPose({pose->t_ns, rigPose(*pose, {}) * T_rig_cam0_});
       ++poses_;
     }
   }
+
+  std::uint64_t events() const { return events_; }
 
   void add(const TruthDepth& truth) { writer_->addTruth(truth.t_ns, truth.file); }
 
@@ -251,25 +205,26 @@ int runExport(const ExportArguments& arguments) {
   refuseExisting(arguments.out);
   RecordingSource source = arguments.source;
   source.complete = false;
-  const TimeLimits limits = resolve(arguments.times, source);
-  const Rig rig = rigOf(source, limits);
+  source.limits = resolve(arguments.times, source);
+  const std::unique_ptr<Recording> recording = openRecording(source);
+  Rig rig = recording->rig();
+  if (rig.cameras.empty()) throw std::runtime_error("the recording has no events");
+  for (RigCamera& camera : rig.cameras) camera.time_offset_ns = 0;  // added to the stamps
   const Interruption interruption;
   Export result(arguments, rig);
-  const std::unique_ptr<Recording> recording = openInterval(source, limits);
   std::optional<std::string> damage;
   {
     Progress progress("exporting", arguments.verbosity);
-    damage = readAll(*recording, [&](const mrpt::obs::CObservation& observation) {
+    damage = readAll(*recording, [&](Sample sample) {
       interruption.check();
-      result.add(observation);
+      result.add(std::move(sample));
       progress.show(recording->progress());
     });
   }
+  if (!damage && result.events() == 0) refuseLimitsWithoutEvents(source);
   for (const TruthDepth& truth : openTruth(source)) {
-    const bool inside = truth.t_ns >= limits.t0_ns.value_or(kMinTimeNs) &&
-                        truth.t_ns < limits.t1_ns.value_or(kMaxTimeNs);
     interruption.check();
-    if (inside) result.add(truth);
+    if (source.limits.contain(truth.t_ns)) result.add(truth);
   }
   warnOfLosses(recording->counts());
   return result.close(arguments.out, damage);

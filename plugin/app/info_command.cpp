@@ -20,7 +20,6 @@
 #include "plugin/app/program.h"
 #include "plugin/app/progress.h"
 #include "plugin/app/recording_interval.h"
-#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "plugin/session/health_checks.h"
@@ -36,10 +35,9 @@ struct Contents {
   RecordingStatistics statistics;
   std::map<std::string, std::uint64_t> others;  // by class
 
-  void add(const mrpt::obs::CObservation& observation) {
+  void add(const Sample& sample) {
     ++observations;
-    if (addObservation(observation, statistics)) return;
-    ++others[observation.GetRuntimeClass()->className];
+    if (!statistics.add(sample)) ++others[std::get<OtherSample>(sample).type];
   }
 };
 
@@ -130,16 +128,16 @@ std::vector<Warning> warningsOf(const Contents& contents, const HealthLimits& li
   return warnings;
 }
 
-/// Gives a survey the observations of a recording, as long as it takes them: a recording may lack
+/// Gives a survey the samples of a recording, as long as it takes them: a recording may lack
 /// what a map needs.
 class PatientSurveyor {
  public:
   explicit PatientSurveyor(const EventFusionOptions& options) : options_(options) {}
 
-  void add(const mrpt::obs::CObservation& observation) {
+  void add(const Sample& sample) {
     if (!surveyor_) return;
     try {
-      addTo(*surveyor_, observation);
+      surveyor_->add(sample);
     } catch (const std::exception&) {
       surveyor_.reset();
     }
@@ -178,17 +176,17 @@ int runInfo(const InfoArguments& arguments) {
   RecordingSource source = arguments.source;
   source.faults.latency_ns = 0;  // latency changes no time stamp
   source.complete = false;
-  const TimeLimits limits = resolve(arguments.times, source);
-  const std::unique_ptr<Recording> recording = openInterval(source, limits);
+  source.limits = resolve(arguments.times, source);
+  const std::unique_ptr<Recording> recording = openRecording(source);
   Contents contents;
   PatientSurveyor surveyor(defaultOptions());
   std::exception_ptr stopped;
   {
     Progress progress("reading", arguments.verbosity);
     try {
-      while (const auto observation = recording->next()) {
-        contents.add(*observation);
-        surveyor.add(*observation);
+      while (const std::optional<Sample> sample = recording->next()) {
+        contents.add(*sample);
+        surveyor.add(*sample);
         progress.show(recording->progress());
       }
     } catch (const std::exception&) {
@@ -201,7 +199,7 @@ int runInfo(const InfoArguments& arguments) {
     fmt::print("truth: {} depth maps of camera 0\n", truth.size());
   }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
-  if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source, limits);
+  if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source);
   HealthLimits health;
   std::vector<Warning> warnings = surveyor.finish(quiet, health);
   for (Warning& warning : warningsOf(contents, health, recording->counts())) {

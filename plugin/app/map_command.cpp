@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdlib>
 #include <initializer_list>
 #include <iostream>
 #include <memory>
@@ -19,8 +20,7 @@
 #include "plugin/app/mapping_run.h"
 #include "plugin/app/output_checks.h"
 #include "plugin/app/program.h"
-#include "plugin/mrpt/window/map_scene.h"
-#include "plugin/mrpt/window/map_window.h"
+#include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/results/output/keyframe_writer.h"
 #include "plugin/results/output/map_output.h"
 #include "plugin/results/output/report.h"
@@ -60,21 +60,16 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
     source.calibration_given = reader.given("rig", "calibration");
   }
   if (arguments.source.hand_eye.empty()) source.hand_eye_given = reader.given("rig", "hand_eye");
-  source.override_rig = false;  // the builder's options do
+  source.setup = options.rig.setup;
+  source.time_offsets_ns = options.rig.time_offsets_ns;
+  source.override_rig = false;  // the mapping's options do
   PosePerturbationOptions& perturbation = source.faults.perturbation;
   perturbation.max_pose_gap_s = options.mapper.trajectory.max_pose_gap_s;
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
     perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.policy.stride_s);
   }
-  // A stamp and its camera's time offset: the time that limits and windows speak of.
-  const auto& offsets_ns = options.rig.time_offsets_ns;
-  const std::int64_t none_ns = 0;
-  const auto [least, most] = std::minmax_element(offsets_ns.begin(), offsets_ns.end());
   const auto& window = options.mapper.only_window;
-  const TimeLimits limits =
-      window ? TimeLimits{window->t0_ns, window->t1_ns} : options.mapper.limits;
-  if (limits.t0_ns) source.start_ns = *limits.t0_ns - (offsets_ns.empty() ? none_ns : *most);
-  if (limits.t1_ns) source.end_ns = *limits.t1_ns - (offsets_ns.empty() ? none_ns : *least);
+  source.limits = window ? TimeLimits{window->t0_ns, window->t1_ns} : options.mapper.limits;
   return source;
 }
 
@@ -140,11 +135,38 @@ void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void(
   }
 }
 
-std::function<void(const std::filesystem::path&)> saverOf(const mrpt::maps::CSimpleMap& map) {
-  return [&map](const std::filesystem::path& file) {
-    if (map.saveToFile(file.string())) return;
-    throw std::runtime_error("the file cannot be created or the disk is full");
-  };
+/// Not where MRPT is missing: a note says so.
+void writeSimpleMap(MapOutput& output, const std::vector<StoredKeyframe>& keyframes) {
+  const MrptLibrary* library = nullptr;
+  try {
+    library = &mrptLibrary();
+  } catch (const std::runtime_error& error) {
+    std::cerr << "event-fusion: note: map.simplemap is not written: " << error.what() << "\n";
+    return;
+  }
+  output.writeFile("map.simplemap", [&](const std::filesystem::path& file) {
+    library->writeSimpleMap(file, keyframes);
+  });
+}
+
+/// Opens a window. The library with MRPT's windows is loaded by this call alone.
+std::unique_ptr<MapWindow> openWindow() {
+  const char* const display = std::getenv("DISPLAY");
+  if (!display || *display == '\0') {
+    throw std::runtime_error(
+        "--view needs a display: DISPLAY is not set; --record-frames DIR renders without a screen");
+  }
+  using Open = MapWindow* (*)();
+  void* open = nullptr;
+  try {
+    open = symbolOf("libevent-fusion-window.so", "efmOpenMapWindow");
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error(std::string("--view: ") + error.what());
+  }
+  std::unique_ptr<MapWindow> window(reinterpret_cast<Open>(open)());
+  if (window) return window;
+  throw std::runtime_error(std::string("--view: no window appears on the display ") + display +
+                           "; --record-frames DIR renders without a screen");
 }
 
 /// Writes map.html, which shows the report, and adds its time to the report's.
@@ -231,8 +253,11 @@ std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJo
 
 /// A first pass over the recording: chooses the automatic options, and warns of poses that do not
 /// explain the events.
-void survey(const RecordingSource& source, MappingJob& job) {
-  const RecordingSurvey survey = surveyRecording(job, *openRecording(source));
+/// @return the recording again, if its events fit into `[live] max_queue_mb`.
+std::unique_ptr<Recording> survey(const RecordingSource& source, MappingJob& job) {
+  std::unique_ptr<Recording> recording = openRecording(source);
+  HeldSamples held(job.options.live.max_queue_mb);
+  const RecordingSurvey survey = surveyRecording(job, *recording, held);
   FusionMapperOptions& options = job.options.mapper;
   if (job.options.automatic.any()) {
     OptionChoice choice = chooseOptions(job.options.automatic, survey.rig, survey.samples,
@@ -253,11 +278,11 @@ void survey(const RecordingSource& source, MappingJob& job) {
   printWarnings(verdict.warnings);
   job.warnings.insert(job.warnings.end(), verdict.warnings.begin(), verdict.warnings.end());
   job.doubts.insert(job.doubts.end(), verdict.doubts.begin(), verdict.doubts.end());
+  return std::move(held).recording(std::move(recording));
 }
 
 std::unique_ptr<Recording> openWhole(RecordingSource source) {
-  source.start_ns.reset();
-  source.end_ns.reset();
+  source.limits = {};
   return openRecording(source);
 }
 
@@ -344,19 +369,23 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
     RecordingSource source = sourceOf(arguments, job.options);
+    job.options.rig.setup = std::make_shared<RigSetup>(readRigSetup(source));
+    source.setup = job.options.rig.setup;
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseOutputFolder(folder, kind, arguments, source);
     job.warnings = replacementWarnings(folder, source);
     printWarnings(job.warnings);
+    std::unique_ptr<Recording> recording;
     try {
-      survey(source, job);
+      recording = survey(source, job);
     } catch (const std::invalid_argument& error) {
       refuseOption(arguments, error);
       throw;
     }
     source = sourceOf(arguments, job.options);  // the stride may have been chosen
     job.sequence_maximum = sequenceMaximumOf(source, job);
-    const std::unique_ptr<Recording> recording = openRecording(source);
+    const bool changes = source.faults.perturbation.keyframe.any();  // by the stride
+    if (!recording || changes) recording = openRecording(source);
     output.emplace(folder, kind, job.options.mapper.keyframe.planes,
                    arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure,
                    namesOf(source));
@@ -387,7 +416,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
                                            inWords(error), written.load(), folder.string()));
     }
     whole.cpu.images = writer.cpuSeconds();
-    const bool limited = source.start_ns || source.end_ns;
+    const bool limited = source.limits.t0_ns || source.limits.t1_ns;
     if (outcome.report.counts.keyframes == 0 && limited && !outcome.report.stopped_at) {
       outcome = runMapping(job, *openWhole(source));  // for the error, which says all its times
       writer.finish();  // without an error: the events after the end filled the window
@@ -421,16 +450,16 @@ int runMap(const MapArguments& arguments) {
   job.stop_requested = [&] { return interruption.requested(); };
   std::unique_ptr<MapWindow> window;
   if (arguments.view) {
-    window = MapWindow::open();
+    window = openWindow();
     job.watchers.push_back(window.get());
   }
-  std::optional<MapFrames> frames;
+  std::unique_ptr<MapWatcher> frames;
   if (!arguments.record_frames.empty()) {
     std::vector<std::filesystem::path> inputs = inputsOf(sourceOf(arguments, job.options));
     if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
     refuseToReplace(arguments.record_frames, inputs);
-    frames.emplace(arguments.record_frames, arguments.force);
-    job.watchers.push_back(&*frames);
+    frames = mrptLibrary().recordFrames(arguments.record_frames, arguments.force);
+    job.watchers.push_back(frames.get());
   }
   const bool refined = job.options.refinement.enabled;
   KeyframeSheet sheet;
@@ -448,7 +477,7 @@ int runMap(const MapArguments& arguments) {
                 if (!job.options.ply) return;
                 output.writeColouredCloud(*outcome.points, upwardOf(outcome.trajectory));
               },
-              [&] { output.writeFile("map.simplemap", saverOf(outcome.keyframes)); },
+              [&] { writeSimpleMap(output, outcome.keyframes); },
               [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },
               [&] {
                 if (!refined) return;

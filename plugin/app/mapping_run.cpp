@@ -2,7 +2,6 @@
 #include "plugin/app/mapping_run.h"
 
 #include <fmt/format.h>
-#include <mrpt/obs/CObservation.h>
 #include <opencv2/core.hpp>
 
 #include <algorithm>
@@ -18,10 +17,6 @@
 #include "plugin/app/interruption.h"
 #include "plugin/app/program.h"
 #include "plugin/app/recording_interval.h"
-#include "plugin/mrpt/CEventFusionMapBuilder.h"
-#include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/hosted_mapping.h"
-#include "plugin/mrpt/pose_observation.h"
 #include "plugin/session/health_checks.h"
 #include "plugin/session/session_status.h"
 
@@ -39,17 +34,20 @@ class Player {
         progress_(job.activity, job.verbosity) {
     EventFusionOptions options = job.options;
     options.mapper.keyframe.sequence_maximum = job.sequence_maximum;
-    builder_.setOptions(options);
+    options.validate();
     statistics_ = RecordingStatistics(statisticsOptions(options));
-    builder_.setMinLoggingLevel(
-        mrpt::system::LVL_ERROR);  // sessionWarnings summarises its warnings
-    if (job.processor_clock) builder_.setProcessorClock(job.processor_clock);
-    builder_.setKeyframeCallback([this](const KeyframeDepthMap& keyframe) {
+    HostedMapping::Callbacks callbacks;  // sessionWarnings summarises what the others say
+    callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
       if (!job_.options.live.enabled) return deliver(keyframe);
       const std::lock_guard<std::mutex> lock(made_mutex_);  // the mapping's own thread
       made_.push_back(keyframe);
-    });
+    };
+    mapping_ = hostMapping(options, {}, std::move(callbacks));
+    if (job.processor_clock) mapping_->setClock(job.processor_clock);
   }
+  ~Player() { mapping_->stop(); }
+  Player(const Player&) = delete;
+  Player& operator=(const Player&) = delete;
 
   /// @return the error that stopped it before the recording's end, if there was one.
   std::optional<std::string> play() {
@@ -64,14 +62,14 @@ class Player {
       if (delivery_error_) std::rethrow_exception(delivery_error_);
       if (progress_.due()) showProgress();
     }
-    attempt([this] { return builder_.finish(), false; }, error);
+    attempt([this] { return mapping_->finish(), false; }, error);
     deliverMade();
     if (delivery_error_) std::rethrow_exception(delivery_error_);
     showWatchers(true);
     return error;
   }
 
-  const CEventFusionMapBuilder& builder() const { return builder_; }
+  HostedMapping& mapping() const { return *mapping_; }
   /// What is implausible about the recording and its depths. @param rig as it was used.
   std::vector<Warning> healthWarnings(const Rig& rig) {
     statistics_.setCameras(rig.cameras);
@@ -101,30 +99,33 @@ class Player {
 
   /// @return false at the recording's end.
   bool playOne() {
-    mrpt::obs::CObservation::Ptr observation;
+    std::optional<Sample> sample;
     {
       const SecondsScope scope(times_.real.read, times_.cpu.read);
-      observation = recording_.next();
+      sample = recording_.next();
     }
-    if (!observation) return false;
-    offerDsiSink(*observation);
-    if (job_.options.live.enabled) waitForTimeOf(*observation);
+    if (!sample) return false;
+    auto* const packet = std::get_if<EventPacket>(&*sample);
+    const auto* const pose = std::get_if<PoseSample>(&*sample);
+    if (packet) offerDsiSink(*packet);
+    if (job_.options.live.enabled) waitForTimeOf(packet, pose);
+    statistics_.add(*sample);
     try {
-      builder_.processObservation(observation);
+      if (packet) mapping_->addEvents(std::move(*packet));
+      if (pose) mapping_->addPose(*pose);
     } catch (const std::invalid_argument& error) {
       throw std::invalid_argument(recording_.position() + ": " + error.what());
     }
-    addObservation(*observation, statistics_);  // valid: the builder took it
     return true;
   }
 
   /// Live operation plays the recording at the speed of the sensor.
-  void waitForTimeOf(const mrpt::obs::CObservation& observation) {
+  void waitForTimeOf(const EventPacket* packet, const PoseSample* pose) {
     using Clock = std::chrono::steady_clock;
-    const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
-    const std::int64_t t_ns = events && !events->events.empty()
-                                  ? events->events.back().t_ns
-                                  : nanosecondsFrom(observation.timestamp);
+    if (!packet && !pose) return;
+    const std::int64_t t_ns = pose                     ? pose->t_ns
+                              : packet->events.empty() ? packet->t_ns.value_or(kMinTimeNs)
+                                                       : packet->events.back().t_ns;
     if (!first_ns_) {
       first_ns_ = t_ns;
       began_ = Clock::now();
@@ -143,14 +144,13 @@ class Player {
   }
 
   /// The first packet of the reference camera tells the size of the DSI's planes.
-  void offerDsiSink(const mrpt::obs::CObservation& observation) {
+  void offerDsiSink(const EventPacket& packet) {
     if (sink_offered_ || !job_.make_dsi_sink) return;
-    const auto* events = dynamic_cast<const CObservationEvents*>(&observation);
     const KeyframeMapperOptions& keyframe = job_.options.mapper.keyframe;
-    if (!events || events->camera_index != keyframe.reference_camera) return;
+    if (packet.camera != keyframe.reference_camera) return;
     sink_offered_ = true;
-    builder_.setDsiSink(job_.make_dsi_sink(makeReferenceView(events->camera, keyframe.view),
-                                           keyframe.planes.num_planes));
+    mapping_->setSink(job_.make_dsi_sink(makeReferenceView(packet.calibration.model, keyframe.view),
+                                         keyframe.planes.num_planes));
   }
 
   /// An error of writing must not count as an error of reading: it is thrown after the step.
@@ -178,12 +178,12 @@ class Player {
 
   /// The map so far, with the rates of the mapping: without the time that the watchers took.
   WatchedMap snapshotOf(const KeyframeDepthMap& keyframe) const {
-    const SessionStatus status = builder_.status();
+    const SessionStatus status = mapping_->status();
     const double seconds = std::max(progress_.seconds() - watched_s_, 1e-3);
     WatchedMap snapshot{keyframe,
                         job_.options.mapper.keyframe.planes,
-                        builder_.points(),
-                        builder_.trajectory(),
+                        mapping_->points(),
+                        mapping_->keyframePoses().in_map,
                         {}};
     const double keyframes = static_cast<double>(status.counts.keyframes);
     const double read = static_cast<double>(status.counts.total().read);
@@ -200,7 +200,7 @@ class Player {
   }
 
   void showProgress() {
-    const SessionStatus status = builder_.status();
+    const SessionStatus status = mapping_->status();
     const double seconds = std::max(progress_.seconds(), 1e-3);
     std::string details =
         fmt::format("{} keyframes, {:.2g} M events/s", status.counts.keyframes,
@@ -216,7 +216,7 @@ class Player {
   /// The fraction of the work that is done: of the events' time if its end is known, otherwise of
   /// the input.
   double fraction() const {
-    const std::optional<TimeSpan> events = builder_.status().events;
+    const std::optional<TimeSpan> events = mapping_->status().events;
     const auto& window = job_.options.mapper.only_window;
     const TimeLimits limits =
         window ? TimeLimits{window->t0_ns, window->t1_ns} : job_.options.mapper.limits;
@@ -230,7 +230,7 @@ class Player {
 
   /// For --verbose: what a keyframe has, and the time that its stages took.
   std::string keyframeLine(const KeyframeDepthMap& keyframe) {
-    const SessionStatus status = builder_.status();
+    const SessionStatus status = mapping_->status();
     const StageSeconds& now = status.times.real;
     const StageSeconds before = std::exchange(told_, now);
     std::optional<std::int64_t> start_ns;
@@ -260,7 +260,7 @@ class Player {
   double watched_s_ = 0;                    // in the watchers
   StageSeconds told_;                       // until the last keyframe
   Progress progress_;
-  CEventFusionMapBuilder builder_;  // last: its thread uses the others
+  std::shared_ptr<HostedMapping> mapping_;  // never null; its thread uses the others
 };
 
 /// Reports the reference view and the shortest baseline, for disparities.
@@ -286,7 +286,7 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   Player player(job, recording, reading);
   outcome.error = player.play();
 
-  SessionStatus status = player.builder().status();
+  SessionStatus status = player.mapping().status();
   if (outcome.error && status.events) {
     *outcome.error +=
         "; events were read until " + timeText(status.events->last_ns, status.events->first_ns);
@@ -309,10 +309,11 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording) {
   times.cpu.read = reading.cpu.read;
   {
     const SecondsScope scope(times.real.map, times.cpu.output);
-    outcome.points = player.builder().points();
-    player.builder().getCurrentlyBuiltMap(outcome.keyframes);
-    outcome.trajectory = player.builder().trajectory();
-    outcome.tracker_trajectory = player.builder().trackerTrajectory();
+    outcome.points = player.mapping().points();
+    outcome.keyframes = player.mapping().keyframes();
+    KeyframePoses poses = player.mapping().keyframePoses();
+    outcome.trajectory = std::move(poses.in_map);
+    outcome.tracker_trajectory = std::move(poses.by_tracker);
   }
   describePoints(*outcome.points, outcome.report);
   outcome.report.pixels = player.depths().pixels();
@@ -359,19 +360,83 @@ std::optional<double> sequenceMaximum(MappingJob job, Recording& recording) {
   return maximum.value();
 }
 
-RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording) {
+/// Plays held samples.
+class HeldSamples::HeldRecording : public Recording {
+ public:
+  HeldRecording(HeldSamples held, std::unique_ptr<Recording> read)
+      : held_(std::move(held)), read_(std::move(read)), size_(held_.samples_.size()) {}
+
+  std::optional<Sample> next() override {
+    if (held_.samples_.empty()) {
+      if (held_.error_) std::rethrow_exception(held_.error_);
+      return std::nullopt;
+    }
+    Held next = std::move(held_.samples_.front());
+    held_.samples_.pop_front();
+    position_ = std::move(next.position);
+    return std::move(next.sample);
+  }
+  const Rig& rig() const override { return read_->rig(); }
+  std::string position() const override { return position_; }
+  double progress() const override {
+    return 1 - static_cast<double>(held_.samples_.size()) / static_cast<double>(size_);
+  }
+  RecordingCounts counts() const override { return read_->counts(); }
+
+ private:
+  HeldSamples held_;
+  std::unique_ptr<Recording> read_;
+  std::size_t size_;
+  std::string position_;
+};
+
+bool HeldSamples::add(Sample sample, std::string position) {
+  bytes_left_ -= sizeof(Held);
+  if (const auto* packet = std::get_if<EventPacket>(&sample)) {
+    bytes_left_ -= static_cast<double>(packet->events.size() * sizeof(Event));
+  }
+  if (bytes_left_ < 0) {
+    samples_.clear();
+  } else {
+    samples_.push_back({std::move(sample), std::move(position)});
+  }
+  return bytes_left_ >= 0;
+}
+
+void HeldSamples::end(std::exception_ptr error) {
+  error_ = std::move(error);
+  ended_ = true;
+}
+
+std::unique_ptr<Recording> HeldSamples::recording(std::unique_ptr<Recording> read) && {
+  if (!ended_ || bytes_left_ < 0) return nullptr;
+  return std::make_unique<HeldRecording>(std::move(*this), std::move(read));
+}
+
+RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording, HeldSamples& held) {
   RecordingSurveyor surveyor(job.options);
   Progress progress("first look", job.verbosity);
-  try {
-    while (const auto observation = recording.next()) {
-      if (job.stop_requested && job.stop_requested()) throw Interrupted();
-      addTo(surveyor, *observation);
-      progress.show(recording.progress());
+  std::exception_ptr error;
+  bool looks = true;  // until the survey refuses a sample: the mapping reports it
+  while (true) {
+    if (job.stop_requested && job.stop_requested()) throw Interrupted();
+    std::optional<Sample> sample;
+    try {
+      sample = recording.next();
+    } catch (const std::exception&) {
+      error = std::current_exception();
     }
-  } catch (const Interrupted&) {
-    throw;
-  } catch (const std::exception&) {
+    if (!sample) break;
+    try {
+      if (looks) surveyor.add(*sample);
+    } catch (const std::exception&) {
+      looks = false;
+    }
+    const bool fits = held.add(std::move(*sample), recording.position());
+    if (!looks && !fits) break;
+    progress.show(recording.progress());
   }
+  held.end(error);
   return surveyor.finish();
 }
 

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mrpt/maps/CSimpleMap.h>
-
+#include <deque>
+#include <exception>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,11 +12,12 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/app/progress.h"
-#include "plugin/mrpt/window/map_window.h"
 #include "plugin/options/option_file.h"
-#include "plugin/recordings/open/merged_recording.h"
 #include "plugin/results/output/report.h"
+#include "plugin/session/hosted_mapping.h"
+#include "plugin/session/map_watcher.h"
 #include "plugin/session/recording_survey.h"
+#include "plugin/session/sample.h"
 
 namespace efm {
 
@@ -48,7 +50,7 @@ struct MappingJob {
 struct MappingOutcome {
   MapReport report;  ///< Without the times of the whole run.
   MapCloud::ConstPtr points;
-  mrpt::maps::CSimpleMap keyframes;  ///< Their clouds and poses.
+  std::vector<StoredKeyframe> keyframes;
   /// T_world_ref of the keyframes at t_ref: in the map, and of the tracker.
   std::vector<StampedPose> trajectory;
   std::vector<StampedPose> tracker_trajectory;
@@ -59,7 +61,7 @@ struct MappingOutcome {
   bool misses_file = false;  ///< A file of the result could not be written.
 };
 
-/// Plays a recording through a map builder, with progress on stderr. If reading stops with an
+/// Maps a recording, with progress on stderr. If reading stops with an
 /// error, the data before it are mapped.
 /// @throws std::invalid_argument if the options are not valid; the exceptions of `on_keyframe`, of
 /// `make_dsi_sink` and of the watchers.
@@ -72,10 +74,37 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording);
 /// @return nothing if there is no keyframe.
 std::optional<double> sequenceMaximum(MappingJob job, Recording& recording);
 
+/// The samples of a recording, as long as their events fit into some memory: then it is opened once
+/// for several passes.
+class HeldSamples {
+ public:
+  explicit HeldSamples(double max_mb) : bytes_left_(max_mb * 1e6) {}
+
+  /// @return whether all fit so far.
+  bool add(Sample sample, std::string position);
+  /// @param error that ended the recording; null: it was read to its end.
+  void end(std::exception_ptr error);
+
+  /// The recording again. @param read that was read. Null where it does not fit.
+  std::unique_ptr<Recording> recording(std::unique_ptr<Recording> read) &&;
+
+ private:
+  class HeldRecording;
+  struct Held {
+    Sample sample;
+    std::string position;
+  };
+  double bytes_left_;
+  std::deque<Held> samples_;
+  std::exception_ptr error_;
+  bool ended_ = false;
+};
+
 /// Reads a recording once. An error of the recording ends it: the pass that maps reports the error.
 /// @param job whose receivers are not called.
+/// @param held receives the samples.
 /// @throws std::runtime_error naming a file of the options that cannot be read; Interrupted if a
 /// stop was requested.
-RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording);
+RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording, HeldSamples& held);
 
 }  // namespace efm

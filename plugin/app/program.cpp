@@ -24,7 +24,6 @@
 #include "mapping/base/text.h"
 #include "plugin/app/commands.h"
 #include "plugin/app/interruption.h"
-#include "plugin/mrpt/registration.h"
 #include "plugin/recordings/columns/hdf5_files.h"
 
 namespace efm {
@@ -169,7 +168,6 @@ int runProgram(int argc, char** argv) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file above `ulimit -f` is an error of writing
   try {
     const std::function<int()> run = parseCommandLine(argc, argv);
-    registerClasses();
     return finished(run());
   } catch (const UsageError& error) {
     return fail(error.what(), kUsageStatus);

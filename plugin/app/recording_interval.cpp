@@ -10,25 +10,9 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/app/program.h"
-#include "plugin/mrpt/CObservationEvents.h"
-#include "plugin/mrpt/pose_observation.h"
-#include "plugin/recordings/open/time_cut.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
-
-bool addObservation(const mrpt::obs::CObservation& observation, RecordingStatistics& statistics) {
-  if (const auto* packet = dynamic_cast<const CObservationEvents*>(&observation)) {
-    const RigCamera camera{packet->camera, rigidFrom(packet->camera_pose), packet->time_offset_ns};
-    statistics.addEvents(packet->camera_index, packet->sensorLabel, camera, packet->events);
-    return true;
-  }
-  const auto source = poseSourceOf(observation);
-  if (!source) return false;
-  const auto observed = poseIn(observation);
-  statistics.addPose(*source, observed->t_ns, observed->T_world_body, observed->T_body_rig);
-  return true;
-}
 
 void printWarnings(const std::vector<Warning>& warnings) {
   for (const Warning& warning : warnings) {
@@ -45,11 +29,12 @@ bool failStrictly(const std::vector<Warning>& warnings) {
 namespace {
 
 /// Times of the first and the last event of the whole recording.
-std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(const RecordingSource& source) {
+std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(RecordingSource source) {
+  source.limits = {};
   const std::unique_ptr<Recording> recording = openRecording(source);
   std::optional<std::pair<std::int64_t, std::int64_t>> span_ns;
-  while (const auto observation = recording->next()) {
-    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+  while (const std::optional<Sample> sample = recording->next()) {
+    const auto* packet = std::get_if<EventPacket>(&*sample);
     if (!packet || packet->events.empty()) continue;
     const std::int64_t first_ns = packet->events.front().t_ns;
     const std::int64_t last_ns = packet->events.back().t_ns;
@@ -70,8 +55,8 @@ std::int64_t startOf(const RecordingSource& source) {
   events.skip_bad_events = source.skip_bad_events;
   events.complete = false;
   const std::unique_ptr<Recording> recording = openRecording(events);
-  while (const auto observation = recording->next()) {
-    const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
+  while (const std::optional<Sample> sample = recording->next()) {
+    const auto* packet = std::get_if<EventPacket>(&*sample);
     if (packet != nullptr && !packet->events.empty()) return packet->events.front().t_ns;
   }
   throw std::runtime_error("a time from the recording's start: it has no events");
@@ -99,27 +84,21 @@ TimeLimits resolve(const TimeArguments& times, const RecordingSource& source) {
   return limits;
 }
 
-std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits) {
-  source.start_ns = limits.t0_ns;
-  source.end_ns = limits.t1_ns;
-  return cutTime(openRecording(source), limits.t0_ns, limits.t1_ns);
-}
-
-std::optional<std::string> readAll(Recording& recording,
-                                   const std::function<void(mrpt::obs::CObservation&)>& take) {
+std::optional<std::string> readAll(Recording& recording, const std::function<void(Sample)>& take) {
   while (true) {
-    mrpt::obs::CObservation::Ptr observation;
+    std::optional<Sample> sample;
     try {
-      observation = recording.next();
+      sample = recording.next();
     } catch (const std::exception& error) {
       return inWords(error);
     }
-    if (!observation) return std::nullopt;
-    take(*observation);
+    if (!sample) return std::nullopt;
+    take(std::move(*sample));
   }
 }
 
-void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& limits) {
+void refuseLimitsWithoutEvents(const RecordingSource& source) {
+  const TimeLimits& limits = source.limits;
   if (!limits.t0_ns && !limits.t1_ns) return;
   const auto span_ns = eventSpan(source);
   if (!span_ns) return;  // a recording without events may have other observations

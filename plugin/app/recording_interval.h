@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mrpt/obs/CObservation.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -16,9 +14,6 @@
 #include "plugin/session/health_checks.h"
 
 namespace efm {
-
-/// Counts the events or the pose of an observation. @return false for other observations.
-bool addObservation(const mrpt::obs::CObservation& observation, RecordingStatistics& statistics);
 
 /// Prints a line per warning to stderr: "event-fusion: warning: NAME: text".
 void printWarnings(const std::vector<Warning>& warnings);
@@ -47,18 +42,13 @@ std::int64_t startOf(const RecordingSource& source);
 std::int64_t resolve(const TimeArgument& time, const RecordingSource& source);
 TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
 
-/// Opens an interval of a recording: its events, and the poses around them (see TimeCut). Most
-/// events outside are not read, where the format has an index.
-std::unique_ptr<Recording> openInterval(RecordingSource source, const TimeLimits& limits);
-
 /// Reads a recording to its end, or to its damage.
-/// @param take receives each observation; what it throws ends the reading.
+/// @param take receives each sample; what it throws ends the reading.
 /// @return the error of the recording, if it was not read to its end.
-std::optional<std::string> readAll(Recording& recording,
-                                   const std::function<void(mrpt::obs::CObservation&)>& take);
+std::optional<std::string> readAll(Recording& recording, const std::function<void(Sample)>& take);
 
 /// Refuses time limits without events: they may be mistyped. A recording without any event passes.
-void refuseLimitsWithoutEvents(const RecordingSource& source, const TimeLimits& limits);
+void refuseLimitsWithoutEvents(const RecordingSource& source);
 
 /// Reports the damage that ended a recording, after all before it was written.
 /// @return the process's exit status.

@@ -53,40 +53,33 @@ std::optional<std::string> roundingWarning(const MapCloud& cloud, double voxel_s
 using mrpt::maps::CPointsMapXYZI;
 using mrpt::obs::CObservationPointCloud;
 
-StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
-                              const std::vector<ViewPoint>& points) {
+CPointsMapXYZI::Ptr cloudOf(const StoredKeyframe& keyframe) {
+  const std::vector<ViewPoint>& points = *keyframe.points;
   auto cloud = CPointsMapXYZI::Create();
   cloud->resize(points.size());
-  std::vector<float> sigma(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3f& p_ref = points[i].p_ref;
     cloud->setPointFast(i, p_ref.x(), p_ref.y(), p_ref.z());
     cloud->setPointIntensity(i, points[i].confidence);
-    sigma[i] = points[i].sigma;
   }
   cloud->mark_as_modified();
-  return {keyframe.window.t_ref_ns, keyframe.T_world_ref, std::move(cloud),
-          std::make_shared<std::vector<float>>(std::move(sigma))};
+  return cloud;
 }
 
-std::vector<ViewPoint> viewPointsOf(const StoredKeyframe& keyframe) {
-  const CPointsMapXYZI& cloud = *keyframe.points;
+std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const CPointsMapXYZI& cloud,
+                                                           const std::vector<float>& sigma) {
   const auto& x = cloud.getPointsBufferRef_x();
   const auto& y = cloud.getPointsBufferRef_y();
   const auto& z = cloud.getPointsBufferRef_z();
   const auto& confidence = cloud.getPointsBufferRef_intensity();
-  std::vector<ViewPoint> points;
-  points.reserve(cloud.size());
+  auto points = std::make_shared<std::vector<ViewPoint>>();
+  points->reserve(cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (confidence[i] == 0) continue;
-    points.push_back({{x[i], y[i], z[i]}, confidence[i]});
-    if (keyframe.sigma) points.back().sigma = keyframe.sigma->at(i);
+    points->push_back({{x[i], y[i], z[i]}, confidence[i]});
+    if (!sigma.empty()) points->back().sigma = sigma.at(i);
   }
   return points;
-}
-
-std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe) {
-  return pointsInWorld(viewPointsOf(keyframe), keyframe.T_world_ref);
 }
 
 std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observation,
@@ -98,14 +91,15 @@ std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observ
   if (!cloud) return std::nullopt;
   const std::int64_t t_ns =
       seen->timestamp == INVALID_TIMESTAMP ? 0 : nanosecondsFrom(seen->timestamp);
-  return StoredKeyframe{t_ns, T_world_rig * rigidFrom(seen->sensorPose), cloud};
+  return StoredKeyframe{t_ns, T_world_rig * rigidFrom(seen->sensorPose), viewPointsOf(*cloud)};
 }
 
-void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe) {
+void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe,
+                const CPointsMapXYZI::Ptr& cloud) {
   auto observation = CObservationPointCloud::Create();
   observation->sensorLabel = "keyframe";
   observation->timestamp = mrptTimeFrom(keyframe.t_ref_ns);
-  observation->pointcloud = keyframe.points;
+  observation->pointcloud = cloud;
   auto frame = mrpt::obs::CSensoryFrame::Create();
   frame->insert(observation);
   auto pose = mrpt::poses::CPose3DPDFGaussian::Create();
@@ -131,6 +125,14 @@ std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map) {
     ++index;
   }
   return keyframes;
+}
+
+void writeSimpleMap(const std::filesystem::path& file,
+                    const std::vector<StoredKeyframe>& keyframes) {
+  mrpt::maps::CSimpleMap map;
+  for (const StoredKeyframe& keyframe : keyframes) insertInto(map, keyframe, cloudOf(keyframe));
+  if (map.saveToFile(file.string())) return;
+  throw std::runtime_error("the file cannot be created or the disk is full");
 }
 
 namespace {
@@ -159,15 +161,17 @@ void readConsistency(mrpt::serialization::CArchive& in, std::uint8_t version,
 }
 
 /// Maps of versions 0 and 1 had no sigma.
-void readSigma(mrpt::serialization::CArchive& in, StoredKeyframe& keyframe) {
+std::shared_ptr<const std::vector<ViewPoint>> readPoints(mrpt::serialization::CArchive& in,
+                                                         std::uint8_t version) {
+  CPointsMapXYZI cloud;
+  in >> cloud;
   std::vector<float> sigma;
-  in >> sigma;
-  if (sigma.empty()) return;
-  if (sigma.size() != keyframe.points->size()) {
+  if (version >= 2) in >> sigma;
+  if (!sigma.empty() && sigma.size() != cloud.size()) {
     throw std::runtime_error(fmt::format("an event fusion map with {} sigmas for {} points",
-                                         sigma.size(), keyframe.points->size()));
+                                         sigma.size(), cloud.size()));
   }
-  keyframe.sigma = std::make_shared<std::vector<float>>(std::move(sigma));
+  return viewPointsOf(cloud, sigma);
 }
 
 }  // namespace
@@ -242,8 +246,6 @@ bool CEventFusionMap::internal_insertObservation(
   const Rigid3 T_world_rig = robot_pose ? rigidFrom(*robot_pose) : Rigid3{};
   std::optional<StoredKeyframe> keyframe = keyframeFrom(observation, T_world_rig);
   if (!keyframe) return false;
-  // A copy: the caller may change its cloud.
-  keyframe->points = std::make_shared<CPointsMapXYZI>(*keyframe->points);
   insertKeyframe(*keyframe);
   return true;
 }
@@ -267,6 +269,21 @@ double CEventFusionMap::internal_computeObservationLikelihood(
 
 // --- Storing ---------------------------------------------------------------------------------
 
+namespace {
+
+/// Empty where none is known: a simplemap has no place for it.
+std::vector<float> sigmaOf(const std::vector<ViewPoint>& points) {
+  std::vector<float> sigma;
+  bool is_known = false;
+  for (const ViewPoint& point : points) {
+    sigma.push_back(point.sigma);
+    is_known = is_known || point.sigma == point.sigma;
+  }
+  return is_known ? sigma : std::vector<float>();
+}
+
+}  // namespace
+
 std::uint8_t CEventFusionMap::serializeGetVersion() const { return 2; }
 
 void CEventFusionMap::serializeTo(CArchive& out) const {
@@ -284,7 +301,7 @@ void CEventFusionMap::serializeTo(CArchive& out) const {
     const Eigen::Vector3d& t = keyframe.T_world_ref.translation;
     const Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
     out << keyframe.t_ref_ns << t.x() << t.y() << t.z() << q.x() << q.y() << q.z() << q.w()
-        << *keyframe.points << (keyframe.sigma ? *keyframe.sigma : std::vector<float>());
+        << *cloudOf(keyframe) << sigmaOf(*keyframe.points);
   }
 }
 
@@ -306,9 +323,7 @@ void CEventFusionMap::serializeFrom(CArchive& in, std::uint8_t version) {
     Eigen::Vector3d& t = keyframe.T_world_ref.translation;
     Eigen::Quaterniond& q = keyframe.T_world_ref.rotation;
     in >> keyframe.t_ref_ns >> t.x() >> t.y() >> t.z() >> q.x() >> q.y() >> q.z() >> q.w();
-    keyframe.points = CPointsMapXYZI::Create();
-    in >> *keyframe.points;
-    if (version >= 2) readSigma(in, keyframe);
+    keyframe.points = readPoints(in, version);
     read.insertKeyframe(keyframe);
   }
   keyframes_ = std::move(read.keyframes_);

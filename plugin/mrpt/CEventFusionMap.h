@@ -5,6 +5,7 @@
 #include <mrpt/maps/CSimpleMap.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/mrpt/mrpt_point_maps.h"
+#include "plugin/session/hosted_mapping.h"
 
 namespace efm {
 
@@ -25,26 +27,12 @@ mrpt::maps::CPointsMapXYZI::Ptr pointsMapOf(const MapCloud& cloud);
 /// A warning where this rounds them by more than a tenth of a voxel.
 std::optional<std::string> roundingWarning(const MapCloud& cloud, double voxel_size_m);
 
-/// The points of a keyframe in its reference view, and the pose of the view. 20 bytes a point.
-/// Transformed to the world, they are the points of the map again, bit for bit.
-struct StoredKeyframe {
-  std::int64_t t_ref_ns = 0;
-  Rigid3 T_world_ref;
-  /// In frame `ref`, float, intensity = confidence. Never null; shared and never changed.
-  mrpt::maps::CPointsMapXYZI::Ptr points;
-  /// Standard deviation of depth of each point, metres; null where it is not known: a simplemap has
-  /// no place for it.
-  std::shared_ptr<const std::vector<float>> sigma = nullptr;
-};
-
-/// @param points the keyframe's points in the map.
-StoredKeyframe storedKeyframe(const KeyframeDepthMap& keyframe,
-                              const std::vector<ViewPoint>& points);
-
-/// The points of a keyframe with a confidence. (MRPT's clouds may have points of intensity 0.)
-std::vector<ViewPoint> viewPointsOf(const StoredKeyframe& keyframe);
-/// p_world = T_world_ref * p_ref.
-std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe);
+/// The points of a keyframe in frame `ref`, float, intensity = confidence.
+mrpt::maps::CPointsMapXYZI::Ptr cloudOf(const StoredKeyframe& keyframe);
+/// The points of a cloud with a confidence. (MRPT's clouds may have points of intensity 0.)
+/// @param sigma standard deviation of depth of each point, metres; empty: not known.
+std::shared_ptr<const std::vector<ViewPoint>> viewPointsOf(const mrpt::maps::CPointsMapXYZI& cloud,
+                                                           const std::vector<float>& sigma = {});
 
 /// A keyframe from an observation of a point cloud with intensities.
 /// @return nothing for other observations.
@@ -54,9 +42,14 @@ std::optional<StoredKeyframe> keyframeFrom(const mrpt::obs::CObservation& observ
 /// Adds the keyframe to a simplemap in MRPT's own classes, for any MRPT program: the view's pose in
 /// the world without covariance, and a frame with one CObservationPointCloud. Its label is
 /// "keyframe", its time t_ref (rounded to MRPT's tick), its sensor pose the identity.
-void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe);
+/// @param cloud see `cloudOf`.
+void insertInto(mrpt::maps::CSimpleMap& map, const StoredKeyframe& keyframe,
+                const mrpt::maps::CPointsMapXYZI::Ptr& cloud);
 /// The keyframes of a simplemap. A frame may have several.
 std::vector<StoredKeyframe> keyframesOf(const mrpt::maps::CSimpleMap& map);
+/// Writes a simplemap of keyframes.
+void writeSimpleMap(const std::filesystem::path& file,
+                    const std::vector<StoredKeyframe>& keyframes);
 
 /// The global cloud as a metric map of MRPT. MRPT's map factory makes it from an .ini; it takes the
 /// keyframes' clouds of a simplemap, and it can be stored and drawn. Not thread-safe.

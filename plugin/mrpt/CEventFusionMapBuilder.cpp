@@ -16,13 +16,27 @@
 #include "mapping/geometry/timestamp.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/host_options.h"
-#include "plugin/mrpt/live_mapping.h"
+#include "plugin/mrpt/pose_observation.h"
 #include "plugin/results/pictures/depth_picture.h"
 
 IMPLEMENTS_MRPT_OBJECT(CEventFusionMapBuilder, mrpt::rtti::CObject, efm)
 
 namespace efm {
 namespace {
+
+/// Moves and inserts keyframes of a map until they equal `keyframes`. @return whether it changed.
+bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
+  bool changed = map.keyframes().size() < keyframes.size();
+  for (std::size_t i = 0; i < map.keyframes().size(); ++i) {
+    if (isSame(map.keyframes()[i].T_world_ref, keyframes[i].T_world_ref)) continue;
+    map.moveKeyframe(i, keyframes[i].T_world_ref);
+    changed = true;
+  }
+  for (std::size_t i = map.keyframes().size(); i < keyframes.size(); ++i) {
+    map.insertKeyframe(keyframes[i]);
+  }
+  return changed;
+}
 
 /// A host that knows MRPT alone ends the recording by this.
 bool isFinish(const mrpt::obs::CObservation& observation) {
@@ -55,12 +69,7 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
-  std::shared_ptr<HostedMapping> next;
-  if (builder_options.live.enabled) {
-    next = std::make_shared<LiveMapping>(builder_options, std::move(earlier), callbacks());
-  } else {
-    next = std::make_shared<PlaybackMapping>(builder_options, std::move(earlier), callbacks());
-  }
+  auto next = hostMapping(builder_options, std::move(earlier), callbacks());
   // Without the lock: its thread may run a callback that uses the builder.
   if (const auto former = mapping()) former->stop();
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -72,13 +81,16 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   ignored_observations_ = 0;
   reckoning_ = {};
   silent_cameras_.clear();
+  const std::lock_guard<std::mutex> made_lock(made_mutex_);
+  clouds_.clear();
+  metric_map_ = nullptr;
+  shown_points_ = nullptr;
+  event_map_ = nullptr;
+  warned_of_rounding_ = false;
 }
 
 void CEventFusionMapBuilder::setOptions(const EventFusionOptions& builder_options) {
-  builder_options.mapper.validate();
-  builder_options.cloud.validate();
-  builder_options.refinement.validate();
-  builder_options.live.validate();
+  builder_options.validate();
   restart(builder_options);
 }
 
@@ -120,6 +132,7 @@ HostedMapping::Callbacks CEventFusionMapBuilder::callbacks() {
       const std::lock_guard<std::mutex> lock(mutex_);
       callback = map_callback_;
     }
+    warnOfRounding(*map->points);
     if (callback) callback(map);
   };
   callbacks.info = [this](const std::string& text) { MRPT_LOG_INFO(text); };
@@ -154,7 +167,13 @@ std::vector<std::string> CEventFusionMapBuilder::warningsOfSilence(
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
   if (!observation) throw std::invalid_argument("the builder was given no observation (null)");
   if (const auto events = std::dynamic_pointer_cast<CObservationEvents>(observation)) {
-    addEvents(packetOf(*events));
+    EventPacket packet{events->camera_index, calibrationOf(*events), events->events,
+                       events->covered_until_ns};
+    if (options.enableMapUpdating) {  // MRPT's, of every map builder
+      mapping()->addEvents(std::move(packet));
+    } else {
+      mapping()->skipEvents(packet);
+    }
   } else if (poseSourceOf(*observation)) {
     addPose(*observation);
   } else if (isFinish(*observation)) {
@@ -165,23 +184,15 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
   }
 }
 
-void CEventFusionMapBuilder::addEvents(CameraPacket packet) {
-  if (options.enableMapUpdating) {  // MRPT's, of every map builder
-    mapping()->addEvents(std::move(packet));
-  } else {
-    mapping()->skipEvents(packet);
-  }
-}
-
 void CEventFusionMapBuilder::addPose(const mrpt::obs::CObservation& observation) {
   const auto mapping = this->mapping();
-  const std::optional<ObservedPose> observed = poseIn(observation);
-  const Rigid3 T_world_rig = rigPose(*observed, mapping->T_body_rig());
+  const PoseSample pose = *poseIn(observation);
   {
+    const Rigid3 T_world_rig = rigPose(pose, mapping->T_body_rig());
     const std::lock_guard<std::mutex> lock(mutex_);
-    tracker_poses_.add(observation, *observed, T_world_rig);
+    tracker_poses_.add(observation, pose, T_world_rig);
   }
-  mapping->addPose({{observed->t_ns, T_world_rig}, *poseSourceOf(observation), observed->noise});
+  mapping->addPose(pose);
 }
 
 void CEventFusionMapBuilder::finish() { mapping()->finish(); }
@@ -225,11 +236,7 @@ void CEventFusionMapBuilder::saveToConfigFile(mrpt::config::CConfigFileBase& tar
 
 void CEventFusionMapBuilder::initialize(const mrpt::maps::CSimpleMap& initial_map,
                                         const mrpt::poses::CPosePDF* /*x0*/) {
-  std::vector<StoredKeyframe> earlier = keyframesOf(initial_map);
-  for (StoredKeyframe& keyframe : earlier) {  // the host may change its clouds
-    keyframe.points = std::make_shared<mrpt::maps::CPointsMapXYZI>(*keyframe.points);
-  }
-  restart(usedOptions(), std::move(earlier));
+  restart(usedOptions(), keyframesOf(initial_map));
 }
 
 mrpt::poses::CPose3DPDF::Ptr CEventFusionMapBuilder::getCurrentPoseEstimation() const {
@@ -265,15 +272,60 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
 
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
   out_map.clear();
-  mapping()->copyTo(out_map);
+  const std::vector<StoredKeyframe> keyframes = mapping()->keyframes();
+  const std::lock_guard<std::mutex> lock(made_mutex_);
+  decltype(clouds_) clouds;  // without those of keyframes that are forgotten
+  for (const StoredKeyframe& keyframe : keyframes) {
+    auto& cloud = clouds[keyframe.points];
+    const auto known = clouds_.find(keyframe.points);
+    cloud = known != clouds_.end() ? known->second : cloudOf(keyframe);
+    insertInto(out_map, keyframe, cloud);
+  }
+  clouds_ = std::move(clouds);
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
-  return static_cast<unsigned int>(mapping()->simpleMapSize());
+  return static_cast<unsigned int>(mapping()->numKeyframes());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
-  return mapping()->metricMap();
+  const auto mapping = this->mapping();
+  const GlobalCloudOptions cloud_options = usedOptions().cloud;
+  const auto snapshot = mapping->snapshot();
+  const std::vector<StoredKeyframe> keyframes =
+      snapshot ? std::vector<StoredKeyframe>() : mapping->keyframes();
+  std::unique_lock<std::mutex> lock(made_mutex_);
+  MapCloud::ConstPtr points = snapshot ? snapshot->points : shown_points_;
+  if (!snapshot) {
+    if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(cloud_options);
+    const bool changed = bringUpToDate(*event_map_, keyframes);
+    if (changed || !points) points = event_map_->cloud().points();
+  }
+  if (!metric_map_ || points != shown_points_) {
+    metric_map_ = std::make_shared<mrpt::maps::CMultiMetricMap>();
+    if (event_map_) metric_map_->maps.push_back(event_map_);
+    metric_map_->maps.push_back(pointsMapOf(*points));
+    shown_points_ = points;
+  }
+  const mrpt::maps::CMultiMetricMap* const map = metric_map_.get();
+  lock.unlock();
+  warnOfRounding(*points);
+  return map;
+}
+
+/// Once.
+void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
+  {
+    const std::lock_guard<std::mutex> lock(made_mutex_);
+    if (warned_of_rounding_) return;
+  }
+  const auto warning = roundingWarning(points, usedOptions().cloud.voxel_size_m);
+  if (!warning) return;
+  {
+    const std::lock_guard<std::mutex> lock(made_mutex_);
+    if (std::exchange(warned_of_rounding_, true)) return;
+  }
+  MRPT_LOG_WARN(*warning);
 }
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,

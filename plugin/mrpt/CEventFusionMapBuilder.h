@@ -2,12 +2,14 @@
 #pragma once
 
 #include <mrpt/config/CLoadableOptions.h>
+#include <mrpt/maps/CMultiMetricMap.h>
 #include <mrpt/obs/CObservation.h>
 #include <mrpt/rtti/CObject.h>
 #include <mrpt/slam/CMetricMapBuilder.h>
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -16,10 +18,9 @@
 
 #include "maps/cloud/map_point.h"
 #include "plugin/mrpt/CEventFusionMap.h"
-#include "plugin/mrpt/hosted_mapping.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/options/option_file.h"
-#include "plugin/session/mapping_session.h"
+#include "plugin/session/hosted_mapping.h"
 
 namespace efm {
 
@@ -161,8 +162,8 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   void restart(const EventFusionOptions& builder_options, std::vector<StoredKeyframe> earlier = {});
   std::shared_ptr<HostedMapping> mapping() const;
   HostedMapping::Callbacks callbacks();
-  void addEvents(CameraPacket packet);
   void addPose(const mrpt::obs::CObservation& observation);
+  void warnOfRounding(const MapCloud& points) const;
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
 
   std::mutex restart_mutex_;  // one at a time starts over
@@ -178,6 +179,13 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   DeadReckoning reckoning_;                 // of the actions
   std::set<int> silent_cameras_;            // with a warning in the log
   std::shared_ptr<HostedMapping> mapping_;  // never null; used without the lock
+  mutable std::mutex made_mutex_;           // of what was made of the map for MRPT's getters, below
+  mutable std::map<std::shared_ptr<const std::vector<ViewPoint>>, mrpt::maps::CPointsMapXYZI::Ptr>
+      clouds_;
+  mutable std::shared_ptr<mrpt::maps::CMultiMetricMap> metric_map_;
+  mutable MapCloud::ConstPtr shown_points_;  // in metric_map_
+  mutable CEventFusionMap::Ptr event_map_;   // in metric_map_, in playback
+  mutable bool warned_of_rounding_ = false;
 };
 
 }  // namespace efm

@@ -16,6 +16,7 @@
 #include <stdexcept>
 
 #include "mapping/geometry/timestamp.h"
+#include "plugin/mrpt/pose_observation.h"
 
 IMPLEMENTS_SERIALIZABLE(CObservationEvents, CObservation, efm)
 
@@ -216,6 +217,10 @@ mrpt::opengl::CRenderizable::Ptr pointsOf(const CObservationEvents& packet,
 }
 
 }  // namespace
+
+RigCamera calibrationOf(const CObservationEvents& packet) {
+  return {packet.camera, rigidFrom(packet.camera_pose), packet.time_offset_ns};
+}
 
 void drawEvents(const CObservationEvents& packet, mrpt::opengl::CSetOfObjects& out) {
   auto camera = mrpt::opengl::CSetOfObjects::Create();

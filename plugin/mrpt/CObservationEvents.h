@@ -74,6 +74,8 @@ class CSetOfObjects;
 
 namespace efm {
 
+RigCamera calibrationOf(const CObservationEvents& packet);
+
 /// The maximum number of drawn events of a packet. Of more events, an even selection is drawn.
 inline constexpr std::size_t kMaxDrawnEvents = 50'000;
 /// The distance of the drawn image plane, for a viewer whose first view spans some twenty metres.

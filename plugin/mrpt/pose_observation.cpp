@@ -84,7 +84,7 @@ std::optional<PoseSourceId> poseSourceOf(const mrpt::obs::CObservation& observat
   return std::nullopt;
 }
 
-std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation) {
+std::optional<PoseSample> poseIn(const mrpt::obs::CObservation& observation) {
   const auto* robot = dynamic_cast<const CObservationRobotPose*>(&observation);
   const auto* odometry = dynamic_cast<const CObservationOdometry*>(&observation);
   if (robot == nullptr && odometry == nullptr) return std::nullopt;
@@ -94,23 +94,20 @@ std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation) {
   }
   const std::int64_t t_ns = nanosecondsFrom(observation.timestamp);
   if (robot == nullptr) {
-    return ObservedPose{t_ns, rigidFrom(mrpt::poses::CPose3D(odometry->odometry)), {}};
+    return PoseSample{
+        *poseSourceOf(observation), t_ns, rigidFrom(mrpt::poses::CPose3D(odometry->odometry)), {}};
   }
-  return ObservedPose{t_ns, rigidFrom(robot->pose.mean), rigidFrom(robot->sensorPose).inverse(),
-                      noiseOf(robot->pose)};
+  return PoseSample{*poseSourceOf(observation), t_ns, rigidFrom(robot->pose.mean),
+                    rigidFrom(robot->sensorPose).inverse(), noiseOf(robot->pose)};
 }
 
-mrpt::obs::CObservation::Ptr poseObservation(const ObservedPose& pose, const std::string& label) {
+mrpt::obs::CObservation::Ptr poseObservation(const PoseSample& pose) {
   auto observation = CObservationRobotPose::Create();
-  observation->sensorLabel = label;
+  observation->sensorLabel = pose.source.label;
   observation->timestamp = mrptTimeFrom(pose.t_ns);
   observation->pose.mean = mrptPoseFrom(pose.T_world_body);
   observation->sensorPose = mrptPoseFrom(pose.T_body_rig.inverse());
   return observation;
-}
-
-void setBodyToRig(mrpt::obs::CObservation& pose, const Rigid3& T_body_rig) {
-  pose.setSensorPose(mrptPoseFrom(T_body_rig.inverse()));
 }
 
 namespace {
@@ -155,28 +152,23 @@ mrpt::obs::CObservation::Ptr DeadReckoning::poseAfter(const mrpt::obs::CActionCo
   const bool timed = movement->time != INVALID_TIMESTAMP;
   const std::int64_t t_ns = nanosecondsFrom(timed ? movement->time : timeOf(frame));
   T_world_body_ = T_world_body_ * movement->T_before_after;
-  return poseObservation({t_ns, T_world_body_, {}}, kActionsLabel);
+  return poseObservation({{PoseKind::kActions, kActionsLabel}, t_ns, T_world_body_, {}});
 }
 
-Rigid3 rigPose(const ObservedPose& observed, const std::optional<Rigid3>& T_body_rig) {
-  return observed.T_world_body * T_body_rig.value_or(observed.T_body_rig);
-}
-
-void TrackerPoses::add(const mrpt::obs::CObservation& observation, const ObservedPose& observed,
+void TrackerPoses::add(const mrpt::obs::CObservation& observation, const PoseSample& pose,
                        const Rigid3& T_world_rig) {
-  const auto [at, is_new] = newest_.try_emplace(*poseSourceOf(observation));
+  const auto [at, is_new] = newest_.try_emplace(pose.source);
   Newest& newest = at->second;
   // One that is much older than the newest says that its time was wrong, or the clock went back.
-  if (!is_new && observed.t_ns < newest.t_ns &&
-      newest.t_ns - observed.t_ns <= kNanosecondsPerSecond) {
+  if (!is_new && pose.t_ns < newest.t_ns && newest.t_ns - pose.t_ns <= kNanosecondsPerSecond) {
     return;
   }
-  newest.t_ns = observed.t_ns;
+  newest.t_ns = pose.t_ns;
   newest.pose = {};
   if (const auto* robot = dynamic_cast<const mrpt::obs::CObservationRobotPose*>(&observation)) {
     // MRPT moves the covariance from the body to the rig.
     newest.pose = robot->pose;
-    newest.pose += mrptPoseFrom(observed.T_world_body.inverse() * T_world_rig);
+    newest.pose += mrptPoseFrom(pose.T_world_body.inverse() * T_world_rig);
   }
   newest.pose.mean = mrptPoseFrom(T_world_rig);
 }

@@ -16,33 +16,28 @@
 
 #include "mapping/geometry/rigid3.h"
 #include "maps/refinement/pose_refinement.h"
-#include "maps/refinement/tracker_model.h"
-#include "plugin/session/pose_source_selector.h"
+#include "plugin/session/sample.h"
 
 namespace efm {
 
 /// MRPT's clock counts ticks of 100 ns since 1601. The recording's clock counts as Unix time.
-inline constexpr std::int64_t kMrptTickNs = 100;
 inline constexpr std::int64_t kMrptTicksAtUnixEpoch = 116'444'736'000'000'000;
 
 /// The nearest tick, at most 50 ns away.
 inline mrpt::Clock::time_point mrptTimeFrom(std::int64_t t_ns) {
-  std::int64_t ticks = t_ns / kMrptTickNs;
-  const std::int64_t rest_ns = t_ns % kMrptTickNs;
-  if (2 * rest_ns >= kMrptTickNs) ++ticks;
-  if (2 * rest_ns < -kMrptTickNs) --ticks;
-  return mrpt::Clock::time_point(mrpt::Clock::duration(ticks + kMrptTicksAtUnixEpoch));
+  return mrpt::Clock::time_point(
+      mrpt::Clock::duration(nearestTick(t_ns) / kTickNs + kMrptTicksAtUnixEpoch));
 }
 
 /// Exact. @return nothing for INVALID_TIMESTAMP (0 ticks) and outside the range of nanoseconds:
 /// before 1677 or after 2262.
 inline std::optional<std::int64_t> nanosecondsIfKnown(const mrpt::Clock::time_point& time) {
-  constexpr std::int64_t kMaxTicks = std::numeric_limits<std::int64_t>::max() / kMrptTickNs;
+  constexpr std::int64_t kMaxTicks = std::numeric_limits<std::int64_t>::max() / kTickNs;
   const std::int64_t ticks = time.time_since_epoch().count();
   if (ticks < kMrptTicksAtUnixEpoch - kMaxTicks || ticks > kMrptTicksAtUnixEpoch + kMaxTicks) {
     return std::nullopt;
   }
-  return (ticks - kMrptTicksAtUnixEpoch) * kMrptTickNs;
+  return (ticks - kMrptTicksAtUnixEpoch) * kTickNs;
 }
 
 /// Exact. @throws std::invalid_argument if `nanosecondsIfKnown` returns nothing.
@@ -73,16 +68,6 @@ mrpt::poses::CPose3D mrptPoseFrom(const Rigid3& T_a_b);
 /// rotation vector about them, as `poseCovariance` returns it.
 mrpt::poses::CPose3DPDFGaussian mrptPoseFrom(const Rigid3& T_a_b, const Matrix6d& covariance);
 
-/// The pose of an observation.
-struct ObservedPose {
-  std::int64_t t_ns = 0;
-  Rigid3 T_world_body;  ///< Of the tracked body.
-  Rigid3 T_body_rig;    ///< The identity if the observation does not have it.
-  /// The mean standard deviations of the tracker's covariance. None if the covariance is zero or
-  /// not valid.
-  std::optional<PoseNoise> noise = std::nullopt;
-};
-
 /// The source of a pose: a CObservationRobotPose (with the label "actions": composed from actions)
 /// or a CObservationOdometry. @return nothing for other observations.
 std::optional<PoseSourceId> poseSourceOf(const mrpt::obs::CObservation& observation);
@@ -90,14 +75,11 @@ std::optional<PoseSourceId> poseSourceOf(const mrpt::obs::CObservation& observat
 /// The pose of an observation: T_world_body is its pose, T_body_rig the inverse of its sensor's
 /// pose on the robot. Odometry is a pose in the plane z = 0.
 /// @return nothing for other observations. @throws std::invalid_argument if it has no time.
-std::optional<ObservedPose> poseIn(const mrpt::obs::CObservation& observation);
+std::optional<PoseSample> poseIn(const mrpt::obs::CObservation& observation);
 
-/// Makes a CObservationRobotPose. MRPT rounds its time to 100 ns: 1.5e-5 px at 300 px/s.
-mrpt::obs::CObservation::Ptr poseObservation(const ObservedPose& pose, const std::string& label);
-
-/// Replaces the pose of the rig on the tracked body. CObservationOdometry has none and stays as it
-/// is.
-void setBodyToRig(mrpt::obs::CObservation& pose, const Rigid3& T_body_rig);
+/// Makes a CObservationRobotPose with the label of the source. MRPT rounds its time: see
+/// `nearestTick`.
+mrpt::obs::CObservation::Ptr poseObservation(const PoseSample& pose);
 
 /// The label of poses that are composed from actions; see `poseSourceOf`.
 inline constexpr const char* kActionsLabel = "actions";
@@ -117,15 +99,11 @@ class DeadReckoning {
   Rigid3 T_world_body_;
 };
 
-/// T_world_rig of an observed pose: T_world_body * T_body_rig, with the options' T_body_rig if they
-/// have one.
-Rigid3 rigPose(const ObservedPose& observed, const std::optional<Rigid3>& T_body_rig);
-
 /// The newest pose of the rig from each source, with the covariance that the tracker states.
 class TrackerPoses {
  public:
-  /// @param observation a pose, with the content `observed`.
-  void add(const mrpt::obs::CObservation& observation, const ObservedPose& observed,
+  /// @param observation a pose, with the content `pose`.
+  void add(const mrpt::obs::CObservation& observation, const PoseSample& pose,
            const Rigid3& T_world_rig);
   /// @param selected the source that is used; before it is selected, the first one with poses in
   /// the

@@ -8,6 +8,7 @@
 namespace efm {
 
 RigSetup readRigSetup(const RigOptions& options) {
+  if (options.setup) return *options.setup;
   RigSetup setup;
   if (!options.calibration.empty()) setup.calibration = readCalibration(options.calibration);
   if (!options.hand_eye.empty()) {
@@ -15,6 +16,13 @@ RigSetup readRigSetup(const RigOptions& options) {
         readHandEye(options.hand_eye, setup.calibration ? &*setup.calibration : nullptr);
   }
   return setup;
+}
+
+void EventFusionOptions::validate() const {
+  mapper.validate();
+  cloud.validate();
+  refinement.validate();
+  live.validate();
 }
 
 void LiveOptions::validate() const {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,18 +16,20 @@
 
 namespace efm {
 
+/// The content of the files that RigOptions name.
+struct RigSetup {
+  std::optional<Calibration> calibration;
+  std::optional<Rigid3> T_body_rig;  ///< Pose of the rig on the tracked body.
+};
+
 /// Options of the rig, in place of the recording's own.
 struct RigOptions {
   std::filesystem::path calibration;          ///< Empty: from the recording.
   std::filesystem::path hand_eye;             ///< Empty: from the recording.
   std::vector<std::int64_t> time_offsets_ns;  ///< One per camera; empty: none.
   std::string pose_source;  ///< The label of the source's sensor; empty: the best source.
-};
-
-/// The content of the files that RigOptions name.
-struct RigSetup {
-  std::optional<Calibration> calibration;
-  std::optional<Rigid3> T_body_rig;  ///< Pose of the rig on the tracked body.
+  std::shared_ptr<const RigSetup> setup =
+      nullptr;  ///< Of the two files, if they were read already.
 };
 
 /// @throws std::runtime_error naming a file that cannot be read or understood.
@@ -82,6 +85,8 @@ struct EventFusionOptions {
   RigOptions rig;
   LiveOptions live;
   bool ply = false;  ///< `map` also writes map.ply, coloured by height.
+
+  void validate() const;
 };
 
 /// The options of a program that was told nothing: what can be chosen from the data is.

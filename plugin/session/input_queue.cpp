@@ -64,8 +64,8 @@ void EventBudget::endInterval(std::vector<Event>& passed) {
 
 namespace {
 
-std::uint64_t bytesOf(const CameraPacket& packet) {
-  return sizeof(CameraPacket) + packet.events.capacity() * sizeof(Event);
+std::uint64_t bytesOf(const EventPacket& packet) {
+  return sizeof(EventPacket) + packet.events.capacity() * sizeof(Event);
 }
 
 /// Without overflow: times are not checked yet.
@@ -75,7 +75,7 @@ bool isFarAfter(std::int64_t t_ns, std::int64_t other_ns, std::int64_t limit_ns 
              static_cast<std::uint64_t>(limit_ns);
 }
 
-CameraPacket withoutEvents(const CameraPacket& packet) {
+EventPacket withoutEvents(const EventPacket& packet) {
   return {packet.camera, packet.calibration, {}, packet.covered_until_ns};
 }
 
@@ -109,7 +109,7 @@ InputQueue::Camera& InputQueue::cameraOf(int index) {
   return cameras_.try_emplace(index, options_.max_event_rate).first->second;
 }
 
-void InputQueue::add(CameraPacket packet) {
+void InputQueue::add(EventPacket packet) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Camera& camera = cameraOf(packet.camera);
   camera.counts.received += packet.events.size();
@@ -133,7 +133,7 @@ void InputQueue::add(CameraPacket packet) {
   pass(camera, std::move(packet));
 }
 
-void InputQueue::pass(Camera& camera, CameraPacket packet) {
+void InputQueue::pass(Camera& camera, EventPacket packet) {
   packet.events = camera.budget.pass(std::move(packet.events), packet.covered_until_ns);
   camera.last = withoutEvents(packet);
   push(std::move(packet));
@@ -141,9 +141,9 @@ void InputQueue::pass(Camera& camera, CameraPacket packet) {
 
 /// Refuses each event that is far ahead of those before and after it. One at the end of the packet
 /// waits; this packet decides about the one that waited.
-void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
+void InputQueue::takeAhead(Camera& camera, EventPacket& packet) {
   std::vector<Event>& events = packet.events;
-  Stream<CameraPacket>& stream = camera.stream;
+  Stream<EventPacket>& stream = camera.stream;
   const std::optional<std::int64_t> begin_ns =
       events.empty() ? packet.covered_until_ns : std::optional(events.front().t_ns);
   const bool confirms = begin_ns && !isFarAfter(stream.ahead_ns, *begin_ns);
@@ -157,7 +157,7 @@ void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
     const Event event = events[i];
     if (stream.reached_ns && isFarAfter(event.t_ns, *stream.reached_ns)) {
       if (i + 1 == events.size()) {
-        stream.ahead = CameraPacket{packet.camera, packet.calibration, {event}, std::nullopt};
+        stream.ahead = EventPacket{packet.camera, packet.calibration, {event}, std::nullopt};
         stream.ahead_ns = event.t_ns;
         if (packet.covered_until_ns) {  // it may end with this event
           packet.covered_until_ns = std::min(*packet.covered_until_ns, *stream.reached_ns);
@@ -176,7 +176,7 @@ void InputQueue::takeAhead(Camera& camera, CameraPacket& packet) {
   if (packet.covered_until_ns) stream.follow(*packet.covered_until_ns);
 }
 
-void InputQueue::push(CameraPacket packet) {
+void InputQueue::push(EventPacket packet) {
   events_ += packet.events.size();
   bytes_ += bytesOf(packet);
   packets_.push_back(std::move(packet));
@@ -190,7 +190,7 @@ bool InputQueue::isFull() const {
 }
 
 void InputQueue::dropOldest() {
-  const CameraPacket& oldest = packets_.front();
+  const EventPacket& oldest = packets_.front();
   events_ -= oldest.events.size();
   bytes_ -= bytesOf(oldest);
   cameraOf(oldest.camera).counts.dropped += oldest.events.size();
@@ -198,14 +198,14 @@ void InputQueue::dropOldest() {
   packets_.pop_front();
 }
 
-void InputQueue::noteMissing(const CameraPacket& packet, GiveUpReason reason) {
+void InputQueue::noteMissing(const EventPacket& packet, GiveUpReason reason) {
   if (packet.events.empty()) return;
   MissingEvents& missing = missing_[packet.camera];
   missing.until_ns = std::max(missing.until_ns, packet.events.back().t_ns + 1);
   missing.reason = reason;
 }
 
-void InputQueue::skip(const CameraPacket& packet) {
+void InputQueue::skip(const EventPacket& packet) {
   const std::lock_guard<std::mutex> lock(mutex_);
   QueueCounts& counts = cameraOf(packet.camera).counts;
   counts.received += packet.events.size();
@@ -245,7 +245,7 @@ void InputQueue::end() {
       pass(camera, std::move(*last));
     }
     if (!camera.last) continue;
-    CameraPacket rest = *camera.last;
+    EventPacket rest = *camera.last;
     rest.events = camera.budget.finish();
     if (!rest.events.empty()) push(std::move(rest));
   }
@@ -284,7 +284,7 @@ InputQueue::Batch InputQueue::takeLocked() {
   batch.poses = std::exchange(poses_, {});
   batch.packets.assign(std::move_iterator(packets_.begin()), std::move_iterator(packets_.end()));
   packets_.clear();
-  for (const CameraPacket& packet : batch.packets) {
+  for (const EventPacket& packet : batch.packets) {
     cameraOf(packet.camera).counts.taken += packet.events.size();
   }
   batch.missing = std::exchange(missing_, {});

@@ -68,10 +68,10 @@ class InputQueue {
 
   /// @throws std::invalid_argument where an event lies outside the sensor, or the calibration is
   /// not that of the camera's earlier packets: the packet is refused.
-  void add(CameraPacket packet);
+  void add(EventPacket packet);
   void add(QueuedPose pose);
   /// Counts a packet that is not to be mapped.
-  void skip(const CameraPacket& packet);
+  void skip(const EventPacket& packet);
   /// No more input will come. Packets and poses that are added afterwards are counted.
   void end();
   /// Wakes up the taking thread for good.
@@ -79,7 +79,7 @@ class InputQueue {
 
   struct Batch {
     std::vector<QueuedPose> poses;  ///< In the order they came.
-    std::vector<CameraPacket> packets;
+    std::vector<EventPacket> packets;
     /// The cameras with dropped or skipped packets.
     std::map<int, MissingEvents> missing;
     bool ended = false;
@@ -115,17 +115,17 @@ class InputQueue {
   struct Camera {
     explicit Camera(double max_rate) : budget(max_rate) {}
     EventBudget budget;
-    std::optional<CameraPacket> last;  // without events
-    Stream<CameraPacket> stream;       // of events and covers; one event may wait
+    std::optional<EventPacket> last;  // without events
+    Stream<EventPacket> stream;       // of events and covers; one event may wait
     QueueCounts counts;
   };
 
   Camera& cameraOf(int index);
-  void takeAhead(Camera& camera, CameraPacket& packet);
-  void pass(Camera& camera, CameraPacket packet);
-  void push(CameraPacket packet);
+  void takeAhead(Camera& camera, EventPacket& packet);
+  void pass(Camera& camera, EventPacket packet);
+  void push(EventPacket packet);
   void dropOldest();
-  void noteMissing(const CameraPacket& packet, GiveUpReason reason);
+  void noteMissing(const EventPacket& packet, GiveUpReason reason);
   bool isFull() const;
   Batch takeLocked();
 
@@ -134,7 +134,7 @@ class InputQueue {
   mutable std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
   std::map<int, Camera> cameras_;
-  std::deque<CameraPacket> packets_;
+  std::deque<EventPacket> packets_;
   std::vector<QueuedPose> poses_;
   std::map<PoseSourceId, Stream<QueuedPose>> pose_streams_;
   std::uint64_t refused_poses_ = 0;

@@ -74,7 +74,7 @@ MappingSession::MappingSession(const EventFusionOptions& options)
 
 MappingSession::~MappingSession() = default;
 
-void MappingSession::addEvents(CameraPacket packet) {
+void MappingSession::addEvents(EventPacket packet) {
   if (clock_reset_) {
     const std::size_t put_off = packet.events.size();
     later_.emplace_back(
@@ -85,7 +85,7 @@ void MappingSession::addEvents(CameraPacket packet) {
   if (surveyor_) survey([&] { surveyor_->addEvents(packet); });
   const int camera = packet.camera;
   const std::size_t events = packet.events.size();
-  std::vector<CameraPacket> packets;
+  std::vector<EventPacket> packets;
   try {
     const SecondsScope scope(status_.times.real.tables, status_.times.cpu.tables, processSeconds);
     packets = rig_.add(std::move(packet), mapper_);
@@ -95,7 +95,7 @@ void MappingSession::addEvents(CameraPacket packet) {
   }
   // A refused packet takes no other one with it.
   std::exception_ptr refusal;
-  for (CameraPacket& ready : packets) {
+  for (EventPacket& ready : packets) {
     const int ready_camera = ready.camera;
     const std::uint64_t complete = mapper_.readEvents() + ready.events.size();
     std::optional<std::int64_t> older_ns;
@@ -183,7 +183,7 @@ void MappingSession::startAnew() {
   look_again_ns_ = kMinTimeNs;
 }
 
-void MappingSession::feed(CameraPacket packet) {
+void MappingSession::feed(EventPacket packet) {
   const RigCamera& camera = mapper_.rig().cameras[static_cast<std::size_t>(packet.camera)];
   if (!isSame(camera, packet.calibration)) {
     throw std::invalid_argument(
@@ -360,7 +360,7 @@ void MappingSession::limitWaits() {
   }
 }
 
-void MappingSession::skipEvents(const CameraPacket& packet) {
+void MappingSession::skipEvents(const EventPacket& packet) {
   if (packet.events.empty()) return;
   status_.paused_events[packet.camera] += packet.events.size();
   noteMissing(packet.camera, {packet.events.back().t_ns + 1, &WindowsGivenUp::paused});

@@ -52,7 +52,7 @@ class MappingSession {
   /// @throws std::invalid_argument where the packet contradicts its sensor or earlier packets;
   /// where its camera first appears in a complete rig, or waits for one of a lower index for more
   /// than a second of events; where the options name a camera that the rig does not have.
-  void addEvents(CameraPacket packet);
+  void addEvents(EventPacket packet);
   /// Poses of one source are used: see PoseSourceSelector. The session waits for a better source
   /// until the rig is complete.
   /// @param noise the standard deviations that the tracker states for the pose.
@@ -93,7 +93,7 @@ class MappingSession {
   void skipWindow(const Window& window) { mapper_.skipWindow(window); }
 
   /// Counts a packet that is not to be mapped, and gives up its windows.
-  void skipEvents(const CameraPacket& packet);
+  void skipEvents(const EventPacket& packet);
   /// Says that events of a camera are missing: the windows that lack them are given up once the
   /// next data are there, which also tell where a time was wrong.
   void noteMissing(int camera, const MissingEvents& missing);
@@ -138,7 +138,7 @@ class MappingSession {
 
  private:
   static FusionMapperOptions mapperOptions(const EventFusionOptions& options);
-  void feed(CameraPacket packet);
+  void feed(EventPacket packet);
   bool seenFor(std::int64_t duration_ns) const;
   bool fillsQueue() const;
   void completeRig();

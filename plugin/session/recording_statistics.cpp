@@ -147,6 +147,17 @@ void PoseStatistics::add(const StampedPose& pose, std::int64_t window_ns) {
   if (pose.t_ns - window_begin_->t_ns >= window_ns) window_begin_ = pose;
 }
 
+bool RecordingStatistics::add(const Sample& sample) {
+  if (const auto* packet = std::get_if<EventPacket>(&sample)) {
+    addEvents(packet->camera, packet->label, packet->calibration, packet->events);
+    return true;
+  }
+  const auto* pose = std::get_if<PoseSample>(&sample);
+  if (pose == nullptr) return false;
+  addPose(pose->source, pose->t_ns, pose->T_world_body, pose->T_body_rig);
+  return true;
+}
+
 void RecordingStatistics::addEvents(int index, const std::string& label, const RigCamera& camera,
                                     const std::vector<Event>& events) {
   const auto& selected = options_.cameras;

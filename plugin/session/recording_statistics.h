@@ -18,6 +18,7 @@
 #include "plugin/session/event_fusion_options.h"
 #include "plugin/session/pose_motion.h"
 #include "plugin/session/pose_source_selector.h"
+#include "plugin/session/sample.h"
 
 namespace efm {
 
@@ -121,6 +122,8 @@ class RecordingStatistics {
 
   explicit RecordingStatistics(StatisticsOptions options = {}) : options_(std::move(options)) {}
 
+  /// @return false for a sample that is neither events nor a pose.
+  bool add(const Sample& sample);
   /// @param events in time order.
   void addEvents(int index, const std::string& label, const RigCamera& camera,
                  const std::vector<Event>& events);

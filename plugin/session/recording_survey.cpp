@@ -20,13 +20,14 @@ namespace {
 constexpr double kWindowS = 2;
 constexpr double kMaxEventsPerSecond = 1e6;
 
-void thinOut(CameraPacket& packet) {
-  if (packet.events.size() < 2) return;
-  const double length_s = secondsBetween(packet.events.front().t_ns, packet.events.back().t_ns);
+EventPacket thinnedOut(const EventPacket& packet) {
+  double length_s = 0;
+  if (!packet.events.empty()) {
+    length_s = secondsBetween(packet.events.front().t_ns, packet.events.back().t_ns);
+  }
   const auto limit = static_cast<std::size_t>(std::max(1e3, kMaxEventsPerSecond * length_s));
-  std::vector<Event> chosen;
-  chooseEvenly(packet.events, limit, chosen);
-  if (!chosen.empty()) packet.events = std::move(chosen);
+  return {packet.camera, packet.calibration, chosenEvenly(packet.events, limit),
+          packet.covered_until_ns};
 }
 
 /// Not in live operation, which maps windows and forgets them.
@@ -90,10 +91,18 @@ double eventRate(const WindowData& data) {
 RecordingSurveyor::RecordingSurveyor(const EventFusionOptions& options)
     : session_(surveyOptions(options)) {}
 
-void RecordingSurveyor::addEvents(CameraPacket packet) {
+void RecordingSurveyor::add(const Sample& sample) {
+  if (const auto* packet = std::get_if<EventPacket>(&sample)) {
+    addEvents(*packet);
+  } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
+    const std::optional<Rigid3>& given = session_.setup().T_body_rig;
+    addPose({pose->t_ns, rigPose(*pose, given)}, pose->source, given.value_or(pose->T_body_rig));
+  }
+}
+
+void RecordingSurveyor::addEvents(const EventPacket& packet) {
   received_ += packet.events.size();
-  thinOut(packet);
-  session_.addEvents(std::move(packet));
+  session_.addEvents(thinnedOut(packet));
   takeWindows();
 }
 

@@ -43,14 +43,12 @@ class RecordingSurveyor {
   explicit RecordingSurveyor(const EventFusionOptions& options);
 
   /// @throws std::exception where a MappingSession does; then nothing more may be added.
-  void addEvents(CameraPacket packet);
+  void add(const Sample& sample);
+  void addEvents(const EventPacket& packet);
   /// @param T_body_rig that the pose was made with.
   void addPose(const StampedPose& pose, const PoseSourceId& source, const Rigid3& T_body_rig);
   /// Once: after the last data, or after an error.
   RecordingSurvey finish();
-
-  /// The files of the options.
-  const RigSetup& setup() const { return session_.setup(); }
 
  private:
   void takeWindows();

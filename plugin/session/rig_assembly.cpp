@@ -44,13 +44,13 @@ void RigAssembly::declare(FusionMapper& mapper) {
   }
 }
 
-std::vector<CameraPacket> RigAssembly::add(CameraPacket packet, FusionMapper& mapper) {
+std::vector<EventPacket> RigAssembly::add(EventPacket packet, FusionMapper& mapper) {
   if (packet.camera < 0) {
     throw std::invalid_argument(fmt::format("camera {}: must be 0 or above", packet.camera));
   }
   applyOptions(packet);
   noteAnnouncement(packet);
-  std::vector<CameraPacket> ready;
+  std::vector<EventPacket> ready;
   if (packet.camera > num_cameras_) {
     letWait(std::move(packet));
     return ready;
@@ -70,7 +70,7 @@ std::vector<CameraPacket> RigAssembly::add(CameraPacket packet, FusionMapper& ma
   return ready;
 }
 
-void RigAssembly::applyOptions(CameraPacket& packet) {
+void RigAssembly::applyOptions(EventPacket& packet) {
   const auto camera = static_cast<std::size_t>(packet.camera);
   RigCamera& recorded = packet.calibration;
   if (setup_.calibration) {
@@ -92,7 +92,7 @@ void RigAssembly::applyOptions(CameraPacket& packet) {
   recorded.time_offset_ns = time_offsets_ns_[camera];
 }
 
-void RigAssembly::noteAnnouncement(const CameraPacket& packet) {
+void RigAssembly::noteAnnouncement(const EventPacket& packet) {
   if (announced_) return;
   if (packet.events.empty()) {
     if (packet.covered_until_ns) announced_ns_[packet.camera] = *packet.covered_until_ns;
@@ -116,7 +116,7 @@ void RigAssembly::addCamera(const RigCamera& camera, FusionMapper& mapper) {
   ++num_cameras_;
 }
 
-void RigAssembly::letWait(CameraPacket packet) {
+void RigAssembly::letWait(EventPacket packet) {
   constexpr std::int64_t kMaxWaitNs = kNanosecondsPerSecond;
   const int camera = packet.camera;
   if (complete_ && waiting_.count(camera) != 0) refuseWithoutNext(camera);
@@ -165,7 +165,7 @@ void RigAssembly::requireOptionsFit() const {
 std::map<int, std::uint64_t> RigAssembly::waitingEvents() const {
   std::map<int, std::uint64_t> events;
   for (const auto& [camera, packets] : waiting_) {
-    for (const CameraPacket& packet : packets) events[camera] += packet.events.size();
+    for (const EventPacket& packet : packets) events[camera] += packet.events.size();
   }
   return events;
 }

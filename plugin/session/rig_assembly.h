@@ -8,21 +8,11 @@
 #include <set>
 #include <vector>
 
-#include "mapping/events/event.h"
-#include "mapping/geometry/rig.h"
 #include "mapping/keyframes/fusion_mapper.h"
 #include "plugin/session/event_fusion_options.h"
+#include "plugin/session/sample.h"
 
 namespace efm {
-
-/// An interval of one camera's recording.
-struct CameraPacket {
-  int camera = 0;         ///< Index in the rig.
-  RigCamera calibration;  ///< The same in all packets of a camera; the options may replace it.
-  std::vector<Event> events;
-  /// All events of the camera before this time (its own clock) are in this packet or earlier ones.
-  std::optional<std::int64_t> covered_until_ns;
-};
 
 /// Puts the rig together as its cameras appear in any order: packets of a camera wait until all
 /// cameras of lower indices are there. Gives cameras the calibration and the time offset of the
@@ -40,7 +30,7 @@ class RigAssembly {
   /// @throws std::invalid_argument where the packet contradicts the options' calibration, the rig
   /// is complete without its camera, or it has waited for a camera for more than a second of
   /// events.
-  std::vector<CameraPacket> add(CameraPacket packet, FusionMapper& mapper);
+  std::vector<EventPacket> add(EventPacket packet, FusionMapper& mapper);
 
   /// @throws std::invalid_argument where the options name a camera that the rig does not have, or
   /// its calibration or time offsets have another number of cameras.
@@ -65,10 +55,10 @@ class RigAssembly {
   std::size_t recalibratedCameras() const { return recalibrated_.size(); }
 
  private:
-  void applyOptions(CameraPacket& packet);
-  void noteAnnouncement(const CameraPacket& packet);
+  void applyOptions(EventPacket& packet);
+  void noteAnnouncement(const EventPacket& packet);
   void addCamera(const RigCamera& camera, FusionMapper& mapper);
-  void letWait(CameraPacket packet);
+  void letWait(EventPacket packet);
   [[noreturn]] void refuseWithoutNext(int camera) const;
   void requireIncomplete(int camera) const;
 
@@ -82,8 +72,8 @@ class RigAssembly {
   std::map<int, std::int64_t> announced_ns_;  // the end of each camera's empty packets
   std::optional<bool> announced_;             // all cameras; known from the first event on
   std::set<int> recalibrated_;
-  std::map<int, std::vector<CameraPacket>> waiting_;  // by camera
-  std::optional<std::int64_t> waiting_since_ns_;      // begin of their first event
+  std::map<int, std::vector<EventPacket>> waiting_;  // by camera
+  std::optional<std::int64_t> waiting_since_ns_;     // begin of their first event
 };
 
 }  // namespace efm

@@ -25,6 +25,7 @@
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/rawlog.h"
 #include "plugin/options/option_file.h"
 #include "plugin/recordings/open/open_recording.h"
 
@@ -155,9 +156,7 @@ std::vector<CObservation::Ptr> readAll(const std::string& path) {
   source.files = {path};
   const std::unique_ptr<Recording> recording = openRecording(source);
   std::vector<CObservation::Ptr> observations;
-  while (CObservation::Ptr observation = recording->next()) {
-    observations.push_back(std::move(observation));
-  }
+  while (auto sample = recording->next()) observations.push_back(observationOf(std::move(*sample)));
   return observations;
 }
 

@@ -17,9 +17,8 @@
 #include "mapping/keyframes/keyframe_mapper.h"
 #include "maps/cloud/global_cloud.h"
 #include "maps/cloud/keyframe_cloud.h"
-#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/open_recording.h"
-#include "plugin/recordings/open/rawlog.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "test/bench/benches.h"
 #include "test/bench/synthetic_window.h"
@@ -134,9 +133,9 @@ void writeRawlog(const fs::path& file, const fs::path& folder) {
   RecordingSource source;
   source.files = {folder};
   const std::unique_ptr<Recording> recording = openRecording(source);
-  RawlogWriter writer(file);
-  while (const auto observation = recording->next()) writer.write(*observation);
-  writer.close();
+  const auto writer = mrptLibrary().writeRawlog(file, RawlogCompression::kGzip);
+  while (const auto sample = recording->next()) writer->write(*sample);
+  writer->close();
 }
 
 /// Reads a recording from beginning to end.
@@ -147,8 +146,8 @@ void readAll(benchmark::State& state, const fs::path& path) {
   for (auto _ : state) {
     events = 0;
     const std::unique_ptr<Recording> recording = openRecording(source);
-    while (const auto observation = recording->next()) {
-      const auto* packet = dynamic_cast<const CObservationEvents*>(observation.get());
+    while (const auto sample = recording->next()) {
+      const auto* packet = std::get_if<EventPacket>(&*sample);
       if (packet != nullptr) events += packet->events.size();
     }
   }

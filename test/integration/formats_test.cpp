@@ -2,6 +2,7 @@
 // One recording in every format gives one depth map. Independent programs wrote the formats
 // (test/formats).
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -14,7 +15,6 @@
 #include <utility>
 #include <vector>
 
-#include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "test/plugin/app/app_test.h"
 
@@ -63,26 +63,51 @@ class Formats : public FormatsByOption, public testing::WithParamInterface<Recor
     if (lacks("poses")) source.poses = folderRecording() + "/poses.txt";
     return source;
   }
+
+  /// The same on the command line.
+  static std::string arguments() {
+    const RecordingSource recording = source();
+    std::string arguments;
+    for (const fs::path& file : recording.files) arguments += " " + file.string();
+    if (!recording.calibration.empty())
+      arguments += " --calibration " + recording.calibration.string();
+    if (!recording.poses.empty()) arguments += " --poses " + recording.poses.string();
+    return arguments;
+  }
 };
 
 TEST_P(Formats, GivesTheDepthMapOfTheTextFolder) {
-  const RecordingSource recording = source();
-  std::string arguments;
-  for (const fs::path& file : recording.files) arguments += " " + file.string();
-  if (!recording.calibration.empty())
-    arguments += " --calibration " + recording.calibration.string();
-  if (!recording.poses.empty()) arguments += " --poses " + recording.poses.string();
-  EXPECT_TRUE(mapsOf(arguments) == mapsOfFolder());
+  EXPECT_TRUE(mapsOf(arguments()) == mapsOfFolder());
+}
+
+/// The options are chosen from the interval alone.
+TEST_P(Formats, TheMapOfAnIntervalIsThatOfARecordingCutThere) {
+  const auto map_of = [&](const std::string& recording) {
+    const Result result = run("map " + recording + " --out out");
+    EXPECT_EQ(result.status, 0) << recording << "\n" << result.err;
+    const nlohmann::json counts = reportIn("out")["events"];
+    EXPECT_EQ(counts["outside_window"], 0) << "events outside are not read";
+    return contentOf("out/map.pcd");
+  };
+  std::mt19937 random(1);
+  const double t0_s = 1.4 + 0.04 * static_cast<double>(random() % 1000) / 1000;
+  const std::string interval = fmt::format(" --t0 {:.9f} --duration 0.18", t0_s);
+  const std::string map = map_of(arguments() + interval);
+  EXPECT_GT(map.size(), 10'000U);
+  ASSERT_EQ(run("import " + arguments() + interval + " --out cut.rawlog").status, 0);
+  EXPECT_TRUE(map_of("cut.rawlog") == map);
+  ASSERT_EQ(run("import " + arguments() + " --out whole.rawlog").status, 0);
+  EXPECT_TRUE(map_of("whole.rawlog" + interval) == map);
 }
 
 /// The events of each camera.
 std::map<int, std::vector<Event>> eventsOf(const RecordingSource& source) {
   std::map<int, std::vector<Event>> events;
   const std::unique_ptr<Recording> recording = openRecording(source);
-  while (const auto observation = recording->next()) {
-    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+  while (const auto sample = recording->next()) {
+    const auto* packet = std::get_if<EventPacket>(&*sample);
     if (!packet) continue;
-    std::vector<Event>& camera = events[packet->camera_index];
+    std::vector<Event>& camera = events[packet->camera];
     camera.insert(camera.end(), packet->events.begin(), packet->events.end());
   }
   return events;
@@ -98,8 +123,7 @@ TEST_P(Formats, APartIsWhatTheWholeHasThere) {
     std::array<std::int64_t, 2> limits{};  // times of events: each limit is seen to be exact
     for (std::int64_t& limit : limits) limit = camera[random() % camera.size()].t_ns;
     const auto [start_ns, end_ns] = std::minmax({limits[0], limits[1] + trial});
-    part.start_ns = start_ns;
-    part.end_ns = end_ns;
+    part.limits = {start_ns, end_ns};
     std::map<int, std::vector<Event>> expected;
     for (const auto& [index, events] : whole) {
       for (const Event& event : events) {

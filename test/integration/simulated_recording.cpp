@@ -7,7 +7,6 @@
 
 #include "mapping/depth/peak_fit.h"
 #include "maps/cloud/keyframe_cloud.h"
-#include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/open/open_recording.h"
 #include "test/paths.h"
 #include "test/tracking_stub/truth/nearest_surface.h"
@@ -31,10 +30,10 @@ SimulatedRecording SimulatedRecording::desk() {
   RecordingSource source;
   source.files = {EFM_RECORDINGS "/desk_stereo"};
   const auto recording = openRecording(source);
-  while (const auto observation = recording->next()) {
-    const auto packet = std::dynamic_pointer_cast<CObservationEvents>(observation);
+  while (const auto sample = recording->next()) {
+    const auto* packet = std::get_if<EventPacket>(&*sample);
     if (!packet) continue;
-    auto& events = desk.events_.at(static_cast<std::size_t>(packet->camera_index));
+    auto& events = desk.events_.at(static_cast<std::size_t>(packet->camera));
     events.insert(events.end(), packet->events.begin(), packet->events.end());
   }
   return desk;

@@ -2,27 +2,97 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <optional>
+#include <vector>
 
-#include "tracking_stub/faults/perturbed_poses.h"
-#include "tracking_stub/faults/pose_dropouts.h"
-#include "tracking_stub/faults/pose_source.h"
+#include "mapping/geometry/trajectory.h"
 
 namespace efm {
 
-/// All faults of a tracker. The default is none.
-struct TrackerFaults {
-  PosePerturbationOptions perturbation;
-  PoseDropoutOptions dropouts;
-  std::int64_t latency_ns = 0;  ///< 0 to 1e10, see PoseLatency.
+/// Noise that is constant within a time interval, the window of a keyframe. The default is none.
+///
+/// It moves all poses of an interval rigidly. The depth map of a window inside the interval does
+/// not change. Where an interval begins, two interpolated poses are inserted: one a tick before the
+/// jump and one after it. So interpolation does not carry the jump into an interval.
+struct KeyframeNoiseOptions {
+  double noise_m = 0;    ///< Standard deviation on each axis, 0 to 1e3.
+  double noise_rad = 0;  ///< Standard deviation on each axis, 0 to 3.2.
+  /// Length of the intervals, 1e6 to 1e15. Required where there is noise.
+  std::optional<std::int64_t> length_ns;
+  /// Start of interval 0. Default: the time of the first pose.
+  std::optional<std::int64_t> start_ns;
 
-  bool any() const;  ///< Whether any fault is enabled.
+  bool any() const { return noise_m > 0 || noise_rad > 0; }
   void validate() const;
 };
 
-/// A source with faults. Poses are lost first, so the poses at a jump are never lost; then they are
-/// perturbed, then delayed.
-std::unique_ptr<PoseSource> withFaults(std::unique_ptr<PoseSource> source,
-                                       const TrackerFaults& faults);
+/// Drift of odometry. The default is none.
+///
+/// The heading rotates about one axis and the position moves in one direction, both in proportion
+/// to the path length so far. Axis and direction are random unit vectors in the world.
+struct PoseDriftOptions {
+  double fraction = 0;   ///< Of the path length: metres per metre, 0 to 1.
+  double rad_per_m = 0;  ///< Rotation of the heading, 0 to 10.
+
+  bool any() const { return fraction > 0 || rad_per_m > 0; }
+  void validate() const;
+};
+
+/// Errors of a tracker's poses. The default is none.
+///
+/// Drift, noise per keyframe and noise per pose are added in this order. Each has its own random
+/// numbers. Noise per pose is drawn by stamp: a pose keeps its noise when other poses are lost. The
+/// noise of a position is in the world frame, that of a rotation about the rig's axes.
+struct PosePerturbationOptions {
+  /// Independent noise of each pose: standard deviation on each axis.
+  double noise_m = 0;    ///< Of the position, 0 to 1e3.
+  double noise_rad = 0;  ///< Of the rotation, 0 to 3.2.
+  KeyframeNoiseOptions keyframe;
+  PoseDriftOptions drift;
+  /// Poses are not interpolated across longer gaps. See TrajectoryOptions.
+  double max_pose_gap_s = TrajectoryOptions().max_pose_gap_s;
+  std::int64_t tick_ns = 1;  ///< Stamps are multiples of it, 1 to 999999.
+  std::uint64_t seed = 0;
+
+  bool any() const { return noise_m > 0 || noise_rad > 0 || keyframe.any() || drift.any(); }
+  void validate() const;
+};
+
+/// A time interval [begin, end).
+struct TimeGap {
+  std::int64_t begin_ns = 0;
+  std::int64_t end_ns = 0;
+};
+
+/// Poses that a tracker loses. The default is none.
+struct PoseDropoutOptions {
+  double drop_probability = 0;  ///< Of each pose, 0 to 1.
+  std::vector<TimeGap> gaps;    ///< All poses in these are lost. In any order.
+  double random_gaps_hz = 0;    ///< Random gaps per second of tracking, 0 or more.
+  double random_gap_s = 0.5;    ///< Length of a random gap, above 0, at most 1e6.
+  std::uint64_t seed = 0;
+
+  bool any() const { return drop_probability > 0 || !gaps.empty() || random_gaps_hz > 0; }
+  void validate() const;
+};
+
+/// All faults of a tracker. The default is none.
+struct TrackerFaults {
+  static constexpr std::int64_t kMaxLatencyNs = 10'000'000'000;
+
+  PosePerturbationOptions perturbation;
+  PoseDropoutOptions dropouts;
+  std::int64_t latency_ns = 0;  ///< Between a pose's stamp and its arrival, 0 to 1e10.
+
+  bool any() const { return perturbation.any() || dropouts.any() || latency_ns > 0; }
+  void validate() const;
+};
+
+/// The poses of a tracker with faults, in their order: lost poses are left out, then the others are
+/// moved, and jumps are marked by inserted poses. Latency changes no pose: who merges poses and
+/// events delays them. A pose that is not finite, or has a time beyond kEndOfTimeNs, is not moved.
+/// @throws std::invalid_argument where a pose to move is older than the one before it.
+std::vector<StampedPose> withFaults(const std::vector<StampedPose>& poses,
+                                    const TrackerFaults& faults);
 
 }  // namespace efm

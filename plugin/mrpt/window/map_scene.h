@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "plugin/mrpt/window/map_window.h"
+#include "plugin/session/map_watcher.h"
 
 namespace efm {
 

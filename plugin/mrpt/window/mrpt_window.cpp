@@ -16,7 +16,7 @@
 #include <utility>
 
 #include "plugin/mrpt/window/map_scene.h"
-#include "plugin/mrpt/window/map_window.h"
+#include "plugin/session/map_watcher.h"
 
 namespace efm {
 namespace {

@@ -5,18 +5,18 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
 #include "plugin/recordings/calibration/calibration_file.h"
-#include "plugin/recordings/open/perturbed_recording.h"
-#include "plugin/recordings/open/rawlog.h"
+#include "plugin/recordings/open/joined_recording.h"
+#include "plugin/recordings/open/mrpt_library.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/text/event_columns.h"
 #include "plugin/recordings/text/event_text.h"
 #include "plugin/recordings/text/pose_text.h"
-#include "plugin/session/event_fusion_options.h"
 
 namespace efm {
 namespace {
@@ -38,14 +38,29 @@ const RecordingFormat* formatNamed(const std::string& name) {
   throw std::runtime_error(path.string() + ": not a recording; expected " + expected);
 }
 
-/// The format of a source; null for a rawlog, and for a file of no format.
+/// Whether the user calls a file of no other format a rawlog, or it is one.
+bool isRawlog(const Path& path) {
+  return path.filename().string().find(".rawlog") != std::string::npos || !whyNoRawlog(path);
+}
+
+RecordingParts openRawlog(const std::vector<Path>& files, const ReaderOptions& options) {
+  requireRawlog(files.front());
+  return mrptLibrary().openRawlog(files.front(), options);
+}
+
+const RecordingFormat& rawlogFormat() {
+  static const RecordingFormat format = {kRawlog, "a rawlog", isRawlog, openRawlog};
+  return format;
+}
+
+/// The format of a source; null for a file of no format.
 const RecordingFormat* formatOf(const Path& path, const RecordingSource& source) {
   const std::string& name = source.format;
   if (!std::filesystem::exists(path)) {
     throw std::runtime_error(path.string() + ": no such file or folder");
   }
   requireNoPipe(path);
-  if (name == kRawlog) return nullptr;
+  if (name == kRawlog) return &rawlogFormat();
   if (name != "auto") return formatNamed(name);
   const RecordingFormat* format = detectFormat(path);
   if (format != nullptr) return format;
@@ -54,7 +69,7 @@ const RecordingFormat* formatOf(const Path& path, const RecordingSource& source)
     throw std::runtime_error(fmt::format("{}: {} (docs/recordings.md)", path.string(), *unread));
   }
   if (!isFile(path)) refuseUnknown(path);
-  return nullptr;
+  return isRawlog(path) ? &rawlogFormat() : nullptr;
 }
 
 std::string sourceNames(const std::vector<Path>& sources) {
@@ -113,21 +128,14 @@ bool isPoses(const Path& path) {
   if (isCalibration(path)) {
     throw std::runtime_error(name + ": a calibration: expected --calibration " + name);
   }
-  const std::optional<std::string> why = whyNoRawlog(path);
-  if (!why) throw std::runtime_error(name + ": a rawlog beside other sources: expected it alone");
+  const std::string why = whyNoRawlog(path).value_or("it looks like a rawlog");
   if (const auto line = whyNoEventLines(beginningOfText(path))) {
     throw std::runtime_error(name + ":" + *line);
   }
   throw std::runtime_error(
       fmt::format("{}: not a recording ({}): expected a rawlog, or a recording in another format "
                   "(docs/recordings.md)",
-                  name, *why));
-}
-
-/// Whether the user calls a file of no other format a rawlog, or it is one.
-bool isRawlog(const Path& path, const RecordingSource& source) {
-  return source.format == kRawlog ||
-         path.filename().string().find(".rawlog") != std::string::npos || !whyNoRawlog(path);
+                  name, why));
 }
 
 /// The only file of a folder that has a part of the recording which its format did not find. Others
@@ -182,6 +190,10 @@ RecordingParts openParts(const RecordingSource& source) {
   for (std::size_t i = 0; i < source.files.size();) {
     const RecordingFormat* const format = formatOf(source.files[i], source);
     if (format == nullptr) refuse(source.files[i]);
+    if (format == &rawlogFormat() && source.files.size() > 1) {
+      throw std::runtime_error(source.files[i].string() +
+                               ": a rawlog beside other sources: expected it alone");
+    }
     std::vector<Path> files = {source.files[i++]};
     while (i < source.files.size() && formatOf(source.files[i], source) == format) {
       files.push_back(source.files[i++]);
@@ -226,8 +238,8 @@ std::optional<CameraSize> sizeOf(const RecordingParts& parts, std::size_t camera
   return known;
 }
 
-/// The recording's own rig if it has one. Then the caller replaces it by a given one and counts the
-/// difference.
+/// The recording's own rig if it has one and it is not replaced: then a mapping replaces it, and
+/// counts the difference.
 Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Calibration* given) {
   const std::size_t count = parts.cameras.size();
   const Calibration* const own = parts.calibration ? &*parts.calibration : nullptr;
@@ -248,65 +260,91 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
     }
   }
   if (given != nullptr) given->requireLike(rig);
+  const bool replaced = given != nullptr && (own == nullptr || source.override_rig);
+  for (std::size_t camera = 0; camera < count; ++camera) {
+    RigCamera& of_rig = rig.cameras[camera];
+    if (replaced) of_rig = given->camera(camera, knownSize(of_rig.model));
+    const bool is_rounded = parts.rounded && !replaced;
+    if (source.rounded && !is_rounded) of_rig.T_rig_cam = roundedPose(of_rig.T_rig_cam);
+  }
   return rig;
 }
 
-/// The least and the greatest time offset that a camera may have: none, the recording's own, the
-/// given one.
-std::pair<std::int64_t, std::int64_t> offsetsOf(const Rig& rig, std::size_t camera,
-                                                const Calibration* given) {
-  const std::int64_t own_ns = rig.cameras[camera].time_offset_ns;
-  const std::int64_t given_ns = given == nullptr ? 0 : given->rig.cameras[camera].time_offset_ns;
-  return std::minmax({std::int64_t{0}, own_ns, given_ns});
+/// The time offsets that a map uses.
+std::vector<std::int64_t> offsetsOf(const Rig& rig, const RecordingSource& source,
+                                    const Calibration* given) {
+  if (source.time_offsets_ns.size() == rig.cameras.size()) return source.time_offsets_ns;
+  std::vector<std::int64_t> offsets_ns;
+  for (const RigCamera& camera : (given != nullptr ? given->rig : rig).cameras) {
+    offsets_ns.push_back(camera.time_offset_ns);
+  }
+  return offsets_ns;
 }
 
-std::unique_ptr<Recording> join(RecordingParts parts, const RecordingSource& source,
-                                const Calibration* given) {
-  if (parts.cameras.empty() && source.complete) {
-    throw std::runtime_error(sourceNames(source.files) + ": no events: expected some");
+/// Of a reader's or a file's poses.
+std::vector<PoseSample> samplesOf(std::vector<StampedPose> poses, bool rounded) {
+  std::vector<PoseSample> samples;
+  samples.reserve(poses.size());
+  for (const StampedPose& pose : poses) {
+    samples.push_back({{PoseKind::kPose, "pose"},
+                       nearestTick(pose.t_ns),
+                       rounded ? roundedPose(pose.T_world_rig) : pose.T_world_rig,
+                       {}});
   }
-  Rig rig = parts.cameras.empty() ? Rig() : rigOf(parts, source, given);
-  std::vector<EventPackets> cameras;
-  for (std::size_t i = 0; i < parts.cameras.size(); ++i) {
-    const CameraModel& model = rig.cameras[i].model;
-    cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
-                         source.packet_ns);
-    const auto [earliest_ns, latest_ns] = offsetsOf(rig, i, given);
-    if (source.start_ns) cameras.back().startAt(*source.start_ns - latest_ns);
-    if (source.end_ns) cameras.back().stopAt(*source.end_ns - earliest_ns);
+  return samples;
+}
+
+/// The poses of each tracker with the faults. An inserted pose is a copy of the one after it, but
+/// for time and T_world_body.
+std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFaults faults,
+                                   bool rounded) {
+  faults.perturbation.tick_ns = kTickNs;
+  std::stable_sort(samples.begin(), samples.end(),
+                   [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
+  std::map<PoseSourceId, std::vector<PoseSample>> trackers;
+  std::vector<PoseSample> all;
+  for (PoseSample& sample : samples) {
+    auto& to = sample.source.kind == PoseKind::kPose ? trackers[sample.source] : all;
+    to.push_back(std::move(sample));
   }
-  const bool has_limits = source.start_ns || source.end_ns;
-  auto events =
-      std::make_unique<MergedRecording>(std::move(rig), std::move(cameras), source.skip_bad_events);
-  if (!has_limits) events->requireEvents();
-  events->addWarnings(std::move(parts.warnings));
-  std::unique_ptr<Recording> recording = std::move(events);
-  if (!source.poses.empty()) return recording;
-  if (parts.poses.empty() && source.complete) {
+  for (const auto& [source, tracked] : trackers) {
+    std::vector<StampedPose> poses;
+    for (const PoseSample& sample : tracked) poses.push_back({sample.t_ns, sample.T_world_body});
+    auto next = tracked.begin();
+    for (const StampedPose& pose : efm::withFaults(poses, faults)) {
+      while (next->t_ns < pose.t_ns) ++next;  // lost, or used
+      PoseSample& sample = all.emplace_back(*next);
+      if (next->t_ns == pose.t_ns) ++next;
+      sample.t_ns = pose.t_ns;
+      if (!faults.perturbation.any() || !pose.T_world_rig.translation.allFinite()) continue;
+      sample.T_world_body = rounded ? roundedPose(pose.T_world_rig) : pose.T_world_rig;
+    }
+  }
+  return all;
+}
+
+/// The poses of the file, or the recording's own; with the faults.
+std::vector<PoseSample> posesOf(RecordingParts& parts, std::vector<StampedPose> given,
+                                const RecordingSource& source, const RigSetup& setup) {
+  const bool replaced = !source.poses.empty();
+  if (!replaced && parts.poses.empty() && parts.pose_samples.empty() && source.complete) {
     throw std::runtime_error(fmt::format("{}: no poses: expected {}, or --poses FILE",
                                          sourceNames(source.files), parts.expected_poses));
   }
-  return std::make_unique<RecordingWithPoses>(std::move(recording), std::move(parts.poses),
-                                              std::move(parts.poses_damage));
-}
-
-std::unique_ptr<Recording> openOwn(const RecordingSource& source, const Calibration* given) {
-  if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
-  const Path& first = source.files.front();
-  if (formatOf(first, source) == nullptr && source.files.size() == 1) {
-    if (!isRawlog(first, source)) refuse(first);
-    requireRawlog(first);
-    if (source.reader.sensor_size) {
-      throw std::runtime_error(
-          first.string() +
-          ": a rawlog, which has the size of its cameras: --sensor-size has no "
-          "use");
-    }
-    return std::make_unique<RawlogRecording>(first);
+  const bool moved = source.faults.perturbation.any();
+  std::vector<PoseSample> samples = std::move(parts.pose_samples);
+  if (replaced || samples.empty()) {
+    samples = samplesOf(std::move(replaced ? given : parts.poses), source.rounded || moved);
   }
-  RecordingParts parts = openParts(source);
-  takeFilesOfFolder(source, parts);
-  return join(std::move(parts), source, given);
+  if (source.faults.any()) samples = withFaults(std::move(samples), source.faults, source.rounded);
+  if (source.override_rig && setup.T_body_rig) {
+    const Rigid3 T_body_rig =
+        source.rounded ? roundedPose(setup.T_body_rig->inverse()).inverse() : *setup.T_body_rig;
+    for (PoseSample& sample : samples) {
+      if (sample.source.kind != PoseKind::kOdometry) sample.T_body_rig = T_body_rig;
+    }
+  }
+  return samples;
 }
 
 /// @param given how the user gave the file; empty: as the value of `option`.
@@ -325,26 +363,45 @@ std::vector<std::string> recordingFormats() {
   return names;
 }
 
-std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
-  requireGivenFile(source.poses, "--poses", {});
+RigSetup readRigSetup(const RecordingSource& source) {
+  if (source.setup) return *source.setup;
   requireGivenFile(source.calibration, "--calibration", source.calibration_given);
   requireGivenFile(source.hand_eye, "--hand-eye", source.hand_eye_given);
-  const RigSetup setup = readRigSetup({source.calibration, source.hand_eye, {}, {}});
+  RigOptions files;
+  files.calibration = source.calibration;
+  files.hand_eye = source.hand_eye;
+  return readRigSetup(files);
+}
+
+std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
+  requireGivenFile(source.poses, "--poses", {});
+  const RigSetup setup = readRigSetup(source);
+  const Calibration* const given = setup.calibration ? &*setup.calibration : nullptr;
   std::vector<StampedPose> poses;
   if (!source.poses.empty()) poses = readPoses(source.poses, source.reader);
+  if (source.files.empty()) throw std::runtime_error("no source: expected a recording");
+  RecordingParts parts = openParts(source);
+  takeFilesOfFolder(source, parts);
+  if (parts.cameras.empty() && source.complete) {
+    throw std::runtime_error(sourceNames(source.files) + ": no events: expected some");
+  }
 
-  std::unique_ptr<Recording> recording =
-      openOwn(source, setup.calibration ? &*setup.calibration : nullptr);
-  if (!source.poses.empty()) {
-    recording = std::make_unique<RecordingWithPoses>(std::move(recording), std::move(poses));
+  JoinedParts joined;
+  if (!parts.cameras.empty()) joined.rig = rigOf(parts, source, given);
+  joined.offsets_ns = offsetsOf(joined.rig, source, given);
+  for (std::size_t i = 0; i < parts.cameras.size(); ++i) {
+    const CameraModel& model = joined.rig.cameras[i].model;
+    joined.cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
+                                source.packet_ns);
   }
-  if (source.faults.any()) {
-    recording = std::make_unique<PerturbedRecording>(std::move(recording), source.faults);
-  }
-  if (source.override_rig && (setup.calibration || setup.T_body_rig)) {
-    recording = std::make_unique<RigOverrideRecording>(std::move(recording), setup);
-  }
-  return recording;
+  joined.poses = posesOf(parts, std::move(poses), source, setup);
+  if (source.poses.empty()) joined.poses_damage = std::move(parts.poses_damage);
+  if (!source.complete) joined.others = std::move(parts.others);
+  joined.all_poses = source.complete;
+  joined.latency_ns = source.faults.latency_ns;
+  joined.skip_bad_events = source.skip_bad_events;
+  joined.warnings = std::move(parts.warnings);
+  return join(std::move(joined), source.limits);
 }
 
 std::vector<TruthDepth> openTruth(const RecordingSource& source) {

@@ -8,9 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "plugin/recordings/open/merged_recording.h"
+#include "mapping/events/window.h"
 #include "plugin/recordings/streams/event_packets.h"
 #include "plugin/recordings/streams/recording_parts.h"
+#include "plugin/session/event_fusion_options.h"
+#include "plugin/session/sample.h"
 #include "tracking_stub/faults/tracker_faults.h"
 
 namespace efm {
@@ -26,29 +28,36 @@ struct RecordingSource {
   /// Where and how these two were given, for errors. Empty: as --calibration and --hand-eye.
   std::string calibration_given;
   std::string hand_eye_given;
-  TrackerFaults faults;  ///< Of the poses (CObservationRobotPose).
-  /// Calibration and hand-eye transform replace those of the observations. Otherwise they are used
-  /// only if the recording has none, and a map builder's options replace the others.
+  /// The content of these two, if it was read already.
+  std::shared_ptr<const RigSetup> setup = nullptr;
+  TrackerFaults faults;  ///< Of the poses of trackers (PoseKind::kPose).
+  /// Calibration and hand-eye transform replace those of the samples. Otherwise they are used
+  /// only if the recording has none, and a mapping's options replace the others.
   bool override_rig = true;
+  /// Poses of trackers and cameras as `roundedPose` has them. A writer of rawlogs rounds itself.
+  bool rounded = true;
 
   ReaderOptions reader;
   /// The number of bad events of the whole recording that are left out. One more is an error.
   std::uint64_t skip_bad_events = 0;
   std::int64_t packet_ns = kPacketPeriodNs;  ///< Length of the packets of events, above 0.
-  /// Events outside [start_ns, end_ns) are left out, most of them without being read. A rawlog has
-  /// no index and is read whole.
-  std::optional<std::int64_t> start_ns;
-  std::optional<std::int64_t> end_ns;
+  TimeLimits limits;                         ///< See `join`.
+  /// Time offsets of the cameras, in place of the calibration's where `limits` cut; empty: none.
+  std::vector<std::int64_t> time_offsets_ns;
   /// Whether missing poses, or a missing calibration, are an error. Cameras without a calibration
   /// have a model without a focal length.
   bool complete = true;
 };
 
+/// Reads calibration and hand-eye transform.
+/// @throws std::runtime_error naming how a missing file was given.
+RigSetup readRigSetup(const RecordingSource& source);
+
 /// The names of all formats, "auto" first.
 std::vector<std::string> recordingFormats();
 
-/// Opens a recording: a rawlog, or the files and folders of `readerFormats`, whose cameras and
-/// poses are put together in the order of the files.
+/// Opens a recording: the files and folders of `readerFormats`, whose cameras and poses are put
+/// together in the order of the files, or a rawlog.
 std::unique_ptr<Recording> openRecording(const RecordingSource& source);
 
 /// The depth maps of the recording's truth, if it has any that is read: that of the formats with

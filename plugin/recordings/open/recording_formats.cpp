@@ -2,6 +2,7 @@
 #include "plugin/recordings/open/recording_formats.h"
 
 #include <fmt/format.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <cctype>
@@ -260,6 +261,65 @@ const std::vector<RecordingFormat>& readerFormats() {
        openEventText},
   };
   return all;
+}
+
+namespace {
+
+bool isNameCharacter(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+         c == ':' || c == '<' || c == '>' || c == ',';
+}
+
+/// Whether these are the first bytes of an object: the length of its class's name, the name, the
+/// content. The length is a byte with the top bit set, or (before MRPT 0.5.5) four bytes, the
+/// lowest first. A truncated file may have fewer bytes.
+bool beginsAnObject(std::string_view bytes) {
+  constexpr std::size_t kShortestName = 3;
+  constexpr std::size_t kLongestName = 120;
+  constexpr unsigned kTopBit = 0x80;
+  const unsigned first = static_cast<unsigned char>(bytes.front());
+  const bool short_form = (first & kTopBit) != 0;
+  const std::size_t length = first & ~kTopBit;
+  if (length < kShortestName || length > kLongestName) return false;
+  bytes.remove_prefix(1);
+  if (!short_form) {
+    const std::string_view zeros = bytes.substr(0, 3);
+    if (!std::all_of(zeros.begin(), zeros.end(), [](char c) { return c == '\0'; })) return false;
+    bytes.remove_prefix(zeros.size());
+  }
+  const std::string_view name = bytes.substr(0, length);
+  return std::all_of(name.begin(), name.end(), isNameCharacter);
+}
+
+}  // namespace
+
+std::optional<std::string> whyNoRawlog(const std::filesystem::path& file) {
+  constexpr std::size_t kBytes = 128;
+  constexpr std::size_t kShown = 24;
+  if (!isFile(file)) return "it is no file";
+  const std::unique_ptr<gzFile_s, int (*)(gzFile_s*)> stream(gzopen(file.c_str(), "rb"), gzclose_r);
+  std::string bytes(kBytes, '\0');
+  const int count = stream ? gzread(stream.get(), bytes.data(), kBytes) : -1;
+  int code = Z_OK;
+  if (stream) gzerror(stream.get(), &code);
+  if (count < 0 || code != Z_OK) return std::nullopt;  // damaged: the reader reports it
+  bytes.resize(static_cast<std::size_t>(count));
+  if (bytes.empty()) return "it is empty";
+  if (beginsAnObject(bytes)) return std::nullopt;
+  return "it begins with " + inQuotes(bytes.substr(0, kShown));
+}
+
+void requireRawlog(const std::filesystem::path& file) {
+  std::optional<std::string> why = whyNoRawlog(file);
+  if (!why) return;
+#ifndef EFM_WITH_ARCHIVES
+  if (isCompressed(file)) {
+    *why += "; this build does not read other compressed files, EFM_READ_ARCHIVES";
+  }
+#endif
+  throw std::runtime_error(
+      file.string() + ": not a rawlog (" + *why +
+      "): expected a rawlog, or a recording in another format (docs/recordings.md)");
 }
 
 const RecordingFormat* detectFormat(const std::filesystem::path& source) {

@@ -16,12 +16,20 @@ namespace efm {
 /// within compressed files. Never throws.
 std::optional<std::string> unreadFormat(const std::filesystem::path& source);
 
-/// The formats that this build reads, in the order in which they are tried. Rawlogs are not among
-/// them: they hold observations, not parts.
+/// The formats that this build reads, in the order in which they are tried; a rawlog comes after
+/// them.
 const std::vector<RecordingFormat>& readerFormats();
 
 /// The format of a file or folder by its content; null if it is none of `readerFormats`.
 const RecordingFormat* detectFormat(const std::filesystem::path& source);
+
+/// Why the first bytes are not those of a rawlog: "it begins with …"; std::nullopt if they are, and
+/// for a damaged gzip file.
+std::optional<std::string> whyNoRawlog(const std::filesystem::path& file);
+
+/// Checks the first bytes of a rawlog, compressed or not: the name of an object's class, as MRPT
+/// writes it. Does not check for later damage.
+void requireRawlog(const std::filesystem::path& file);
 
 /// Reads poses T_world_body from a file, whose kind is found by its content:
 ///   text, also compressed   see `readPoseText` (text/)

@@ -19,6 +19,7 @@
 #include "mapping/events/event.h"
 #include "mapping/geometry/trajectory.h"
 #include "plugin/recordings/calibration/calibration_file.h"
+#include "plugin/session/sample.h"
 
 namespace efm {
 
@@ -71,6 +72,13 @@ class EventStream {
   virtual std::string name() const = 0;
   /// The fraction of the stream that has been read, 0 to 1.
   virtual double progress() const = 0;
+  /// The error of damage that all streams of the file end at, so that `read` returns false there:
+  /// thrown at the recording's end. Empty: it was not reached.
+  virtual std::string damage() const { return {}; }
+  /// The sensor's name, if the file knows it.
+  virtual std::string label() const { return {}; }
+  /// See `EventPacket`.
+  virtual std::shared_ptr<const void> original() const { return nullptr; }
   /// The sensor's pixels, if the file knows them.
   virtual std::optional<CameraSize> size() const { return std::nullopt; }
   /// The gaps in the numbers of the file's packets: how many are missing, as far as known.
@@ -89,6 +97,14 @@ struct TruthDepth {
   std::filesystem::path file;  ///< float32 TIFF: z-depth in metres in camera 0's undistorted view.
 };
 
+/// What a rawlog holds beside events and poses.
+class OtherStream {
+ public:
+  virtual ~OtherStream() = default;
+  /// @return std::nullopt at the end, or at damage: the events' streams have the error.
+  virtual std::optional<OtherSample> next() = 0;
+};
+
 /// What a reader finds in the files of a recording. All parts may be missing: other sources, or
 /// files of their own, may have them.
 struct RecordingParts {
@@ -98,7 +114,11 @@ struct RecordingParts {
   /// The sensors' size where neither the stream nor a calibration knows it.
   std::optional<CameraSize> default_size;
 
-  std::vector<StampedPose> poses;  ///< T_world_body, in any order.
+  std::vector<StampedPose> poses;        ///< T_world_body, in any order.
+  std::vector<PoseSample> pose_samples;  ///< In place of `poses`, of a rawlog.
+  /// Poses and calibration went through MRPT's classes: see `roundedPose`.
+  bool rounded = false;
+  std::unique_ptr<OtherStream> others;  ///< Of a rawlog; null: none.
   /// The error of the damage behind `poses`; empty: they are all.
   std::string poses_damage;
 

@@ -38,14 +38,14 @@ StoredKeyframe randomKeyframe(unsigned seed, int count = 200) {
   const Eigen::Vector3d axis(draw(-1, 1), draw(-1, 1), draw(-1, 1));
   keyframe.T_world_ref.rotation = Eigen::AngleAxisd(draw(0, 3), axis.normalized());
   keyframe.T_world_ref.translation = {draw(-5, 5), draw(-5, 5), draw(-5, 5)};
-  keyframe.points = CPointsMapXYZI::Create();
+  std::vector<ViewPoint> points;
   for (int i = 0; i < count; ++i) {
-    keyframe.points->insertPointFast(static_cast<float>(draw(-1, 1)),
-                                     static_cast<float>(draw(-1, 1)),
-                                     static_cast<float>(draw(0.5, 3)));
-    keyframe.points->setPointIntensity(static_cast<std::size_t>(i),
-                                       static_cast<float>(draw(0.001, 1000)));
+    const auto x = static_cast<float>(draw(-1, 1));
+    const auto y = static_cast<float>(draw(-1, 1));
+    const auto z = static_cast<float>(draw(0.5, 3));
+    points.push_back({{x, y, z}, static_cast<float>(draw(0.001, 1000))});
   }
+  keyframe.points = std::make_shared<std::vector<ViewPoint>>(std::move(points));
   return keyframe;
 }
 
@@ -132,7 +132,8 @@ TEST(CEventFusionMap, InsertsCloudsWithIntensitiesAtTheRobotsPose) {
   expected.insertKeyframe(keyframe);
 
   CObservationPointCloud observation;
-  observation.pointcloud = keyframe.points;
+  const CPointsMapXYZI::Ptr cloud = cloudOf(keyframe);
+  observation.pointcloud = cloud;
   observation.timestamp = INVALID_TIMESTAMP;
   observation.sensorPose = mrpt::poses::CPose3D(0.1, 0.2, 0.3, 1, 0.2, -0.4);
   const mrpt::poses::CPose3D robot =
@@ -146,11 +147,11 @@ TEST(CEventFusionMap, InsertsCloudsWithIntensitiesAtTheRobotsPose) {
   for (std::size_t i = 0; i < points->size(); ++i) {
     EXPECT_EQ(points->at(i).intensity, expected_points->at(i).intensity);
   }
-  keyframe.points->setPointIntensity(0, 7);
-  EXPECT_NE(map.keyframes()[0].points->getPointIntensity(0), 7) << "the map has a copy";
+  cloud->setPointIntensity(0, 7);
+  EXPECT_NE(map.keyframes()[0].points->at(0).confidence, 7) << "the map has a copy";
   EXPECT_EQ(map.keyframes()[0].t_ref_ns, 0) << "the observation has no time";
   mrpt::maps::CSimpleMap simple;
-  insertInto(simple, randomKeyframe(1));
+  insertInto(simple, keyframe, cloudOf(keyframe));
   CEventFusionMap filled;
   filled.loadFromSimpleMap(simple);
   expectNear(filled.cloud().points(), expected_points, 1e-6);
@@ -198,8 +199,10 @@ TEST(CEventFusionMap, IgnoresOtherObservations) {
 TEST(CEventFusionMap, RefusesAnInvalidPointAndDoesNotChange) {
   CEventFusionMap map = mapOf(2);
   const CEventFusionMap before = map;
-  const StoredKeyframe wrong = randomKeyframe(5);
-  wrong.points->setPointIntensity(3, -1);
+  StoredKeyframe wrong = randomKeyframe(5);
+  std::vector<ViewPoint> points = *wrong.points;
+  points[3].confidence = -1;
+  wrong.points = std::make_shared<std::vector<ViewPoint>>(points);
   EXPECT_THROW(map.insertKeyframe(wrong), std::invalid_argument);
   expectSamePoints(map, before);
   EXPECT_EQ(map.keyframes().size(), 2U);
@@ -246,7 +249,7 @@ Bytes storedAs(std::uint8_t version, const CEventFusionMap& map) {
     out << keyframe.t_ref_ns;
     for (const double value : keyframe.T_world_ref.translation) out << value;
     for (const double value : keyframe.T_world_ref.rotation.coeffs()) out << value;
-    out << *keyframe.points;
+    out << *cloudOf(keyframe);
   }
   Bytes bytes = bytesOf(map);
   constexpr std::size_t kVersionAt = sizeof("efm::CEventFusionMap");  // behind length and name
@@ -282,11 +285,11 @@ TEST(CEventFusionMap, EarlierVersionsAreReadLaterAndDamagedOnesAreErrors) {
 
 TEST(CEventFusionMap, IsDrawnInColoursUpToTheNinetyFifthPercentile) {
   StoredKeyframe keyframe;
-  keyframe.points = CPointsMapXYZI::Create();
+  std::vector<ViewPoint> points;
   for (int i = 0; i < 40; ++i) {  // each in a voxel of its own
-    keyframe.points->insertPointFast(static_cast<float>(i), 2, 3);
-    keyframe.points->setPointIntensity(static_cast<std::size_t>(i), static_cast<float>(i + 1));
+    points.push_back({{static_cast<float>(i), 2, 3}, static_cast<float>(i + 1)});
   }
+  keyframe.points = std::make_shared<std::vector<ViewPoint>>(points);
   CEventFusionMap map(bigVoxels());
   map.insertKeyframe(keyframe);
   EXPECT_EQ(map.asString(), "event fusion map of 1 keyframes with 40 points in voxels of 0.25 m");

@@ -97,7 +97,7 @@ TEST(EventBudget, CoverEndsBeforeTheEventsThatAreHeld) {
 }
 
 /// @param t_ns of the last event; the first one is earlier.
-CameraPacket packet(int camera, std::int64_t t_ns, std::size_t count) {
+EventPacket packet(int camera, std::int64_t t_ns, std::size_t count) {
   RigCamera calibration;
   calibration.model = {120, 90, 100.0, 100.0, 59.5, 44.5, DistortionModel::kNone, {}};
   std::vector<Event> events(count, Event{t_ns, 0, 0, true});
@@ -112,7 +112,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   const std::size_t fit = *rc::gen::inRange<std::size_t>(1, 10);
   const std::size_t events_that_fit = *rc::gen::inRange<std::size_t>(0, 100);
   options.max_queue_mb =
-      1e-6 * static_cast<double>(fit * sizeof(CameraPacket) + events_that_fit * sizeof(Event));
+      1e-6 * static_cast<double>(fit * sizeof(EventPacket) + events_that_fit * sizeof(Event));
   InputQueue queue(options);
   struct Waiting {
     int camera;
@@ -130,7 +130,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
   };
   const auto events_of = [](const Waiting& one) { return one.events; };
   const auto bytes_of = [](const Waiting& one) {
-    return sizeof(CameraPacket) + one.events * sizeof(Event);
+    return sizeof(EventPacket) + one.events * sizeof(Event);
   };
   const auto miss = [&](const Waiting& one) {
     if (one.events > 0) missing_ns[one.camera] = std::max(missing_ns[one.camera], one.t_ns + 1);
@@ -194,7 +194,7 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   const auto steps = *rc::gen::container<std::vector<std::tuple<std::int64_t, bool, bool>>>(
       rc::gen::tuple(rc::gen::element<std::int64_t>(1, 3'000'000'000), rc::gen::arbitrary<bool>(),
                      rc::gen::arbitrary<bool>()));
-  CameraPacket next = packet(0, 0, 0);
+  EventPacket next = packet(0, 0, 0);
   std::vector<std::int64_t> expected{0};
   std::uint64_t wrong = 0;
   const auto add = [&](std::int64_t t_ns) {
@@ -218,7 +218,7 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   const InputQueue::Batch batch = queue.take();
   std::vector<std::int64_t> events_ns;
   std::vector<std::int64_t> poses_ns;
-  for (const CameraPacket& one : batch.packets) {
+  for (const EventPacket& one : batch.packets) {
     for (const Event& event : one.events) events_ns.push_back(event.t_ns);
   }
   for (const QueuedPose& pose : batch.poses) poses_ns.push_back(pose.pose.t_ns);

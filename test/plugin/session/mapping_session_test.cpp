@@ -160,7 +160,7 @@ TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
     for (const StampedPose& pose : part.poses) messageOf([&] { session.addPose(pose); });
     for (int i = 0; i < 131; ++i) {
       for (int c = 0; c < 2; ++c) {
-        CameraPacket packet = pieceOf(part, c, shift_s + 0.01 * i, shift_s + 0.01 * (i + 1));
+        EventPacket packet = pieceOf(part, c, shift_s + 0.01 * i, shift_s + 0.01 * (i + 1));
         messageOf([&] { session.addEvents(std::move(packet)); });
       }
     }
@@ -276,10 +276,10 @@ TEST(MappingSession, WhatDoesNotFitTheRigIsAnErrorThatNamesIt) {
   };
   const auto none = [](EventFusionOptions&) {};
   const auto feed_all = [&](MappingSession& session) { mapAll(session, recording); };
-  const auto with = [&](const std::function<void(CameraPacket&)>& change) {
+  const auto with = [&](const std::function<void(EventPacket&)>& change) {
     return [&recording, change](MappingSession& session) {
       session.addEvents(packetOf(recording, 0));
-      CameraPacket packet = packetOf(recording, 1);
+      EventPacket packet = packetOf(recording, 1);
       change(packet);
       session.addEvents(packet);
     };
@@ -338,7 +338,7 @@ TEST(MappingSession, ACameraWaitsForAMissingOneForASecond) {
     std::int64_t since_ns = 0;
     for (int i = 0; i < 150; ++i) {
       if (zero_is_there) session.addEvents(pieceOf(recording, 0, 0.01 * i, 0.01 * (i + 1)));
-      CameraPacket packet = pieceOf(recording, 2, 0.01 * i, 0.01 * (i + 1));
+      EventPacket packet = pieceOf(recording, 2, 0.01 * i, 0.01 * (i + 1));
       if (packet.events.empty()) continue;
       if (since_ns == 0) since_ns = packet.events[0].t_ns;
       const bool is_late = packet.events[0].t_ns - since_ns > 1'000'000'000;
@@ -361,11 +361,11 @@ TEST(MappingSession, ARefusedPacketTakesNoOtherWithIt) {
   EventFusionOptions options = syntheticOptions();
   options.mapper.limits.t0_ns = SyntheticRecording::kStartNs;
   MappingSession session(options);
-  CameraPacket outside = pieceOf(recording, 1, 0, 0.1);
+  EventPacket outside = pieceOf(recording, 1, 0, 0.1);
   outside.events.front().t_ns =
       SyntheticRecording::kStartNs - 1000;  // before the limits: not counted either
   outside.events.back().x = 120;
-  const CameraPacket good = pieceOf(recording, 1, 0.1, 0.5);
+  const EventPacket good = pieceOf(recording, 1, 0.1, 0.5);
   session.addEvents(outside);
   session.addEvents(good);
   EXPECT_FALSE(session.status().events) << "they wait for camera 0";
@@ -393,7 +393,7 @@ TEST(MappingSession, ARecordingThatAnnouncesItsCamerasIsMappedWithoutAWait) {
       if (start != Start::kNoPoses) addPoses(session, recording);
       for (int c = 0; c < cameras; ++c) {
         const auto index = static_cast<std::size_t>(c);
-        CameraPacket empty{c, recording.cameras[index], {}, recording.events[index].front().t_ns};
+        EventPacket empty{c, recording.cameras[index], {}, recording.events[index].front().t_ns};
         if (start == Start::kOffsets || start == Start::kInexact) --*empty.covered_until_ns;
         session.addEvents(empty);
       }

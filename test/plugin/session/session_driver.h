@@ -17,15 +17,15 @@
 namespace efm {
 
 /// All events of a camera in one packet.
-inline CameraPacket packetOf(const SyntheticRecording& recording, int camera) {
+inline EventPacket packetOf(const SyntheticRecording& recording, int camera) {
   const auto index = static_cast<std::size_t>(camera);
   return {camera, recording.cameras[index], recording.events[index], std::nullopt};
 }
 
 /// The events of a camera in [begin, end), seconds since the recording's start.
-inline CameraPacket pieceOf(const SyntheticRecording& recording, int camera, double begin_s,
-                            double end_s) {
-  CameraPacket packet = packetOf(recording, camera);
+inline EventPacket pieceOf(const SyntheticRecording& recording, int camera, double begin_s,
+                           double end_s) {
+  EventPacket packet = packetOf(recording, camera);
   auto& events = packet.events;
   const auto outside = [&](const Event& event) {
     const double t_s = 1e-9 * static_cast<double>(event.t_ns - SyntheticRecording::kStartNs);
@@ -85,7 +85,7 @@ inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
     const std::int64_t passed_ms = (until_ns - SyntheticRecording::kStartNs) / 1'000'000;
     if (passed_ms % packet_ms != 0 && !last) continue;
     for (std::size_t c = recording.cameras.size(); c-- > 0;) {
-      CameraPacket packet{static_cast<int>(c), recording.cameras[c], {}, std::nullopt};
+      EventPacket packet{static_cast<int>(c), recording.cameras[c], {}, std::nullopt};
       if (!last) packet.covered_until_ns = until_ns;
       const std::vector<Event>& events = recording.events[c];
       for (; begin[c] < events.size() && (last || events[begin[c]].t_ns < until_ns); ++begin[c]) {

@@ -104,7 +104,7 @@ class Model {
     }
   }
 
-  void addEvents(CameraPacket packet) {
+  void addEvents(EventPacket packet) {
     if (clock_reset_) return later_.push_back([=] { addEvents(packet); });
     const int c = packet.camera;
     const std::int64_t offset_ns = offsets_ns_[static_cast<std::size_t>(c)];
@@ -521,7 +521,7 @@ class Run {
     const RefinementState refinement = session_.status().refinement.value_or(RefinementState{});
     RC_ASSERT(refinement.waiting + refinement.failures == 0U);
     queue_.add(QueuedPose{recording_.poses[0], {}, {}});
-    queue_.add(CameraPacket{0, recording_.cameras[0], {{0, 1, 1, true}}, {}});
+    queue_.add(EventPacket{0, recording_.cameras[0], {{0, 1, 1, true}}, {}});
     RC_ASSERT(queue_.counts().at(0).after_end == 1U);
     RC_ASSERT(queue_.refusedPoses() >= 1U);
   }
@@ -560,7 +560,7 @@ class Run {
 
   void addPacket(int c, int fault, bool last) {
     const auto index = static_cast<std::size_t>(c);
-    CameraPacket packet{c, recording_.cameras[index], {}, {}};
+    EventPacket packet{c, recording_.cameras[index], {}, {}};
     const std::int64_t until_ns = recording_.poses[tick_].t_ns;
     std::size_t& begin = begin_[index];
     const std::vector<Event>& events = recording_.events[index];
@@ -570,7 +570,7 @@ class Run {
     }
     packet.covered_until_ns = until_ns + shift_ns_;
     if (fault == kCameraSilent) return;
-    CameraPacket& waiting = late_[index];
+    EventPacket& waiting = late_[index];
     packet.events.insert(packet.events.begin(), waiting.events.begin(), waiting.events.end());
     waiting.events.clear();
     if (fault == kCameraLate && !last) {
@@ -629,9 +629,9 @@ class Run {
       session_.noteMissing(camera, missing);
       model_.noteMissing(camera, missing);
     }
-    for (const CameraPacket& packet : batch.packets) {
+    for (const EventPacket& packet : batch.packets) {
       taken_[std::size_t(packet.camera)] += packet.events.size();
-      CameraPacket copy = packet;
+      EventPacket copy = packet;
       add([&] { session_.addEvents(std::move(copy)); });
       model_.addEvents(packet);
     }
@@ -729,7 +729,7 @@ class Run {
   Model model_{options_};
   std::size_t tick_ = 0;
   std::array<std::size_t, kCameras> begin_{};
-  std::array<CameraPacket, kCameras> late_;
+  std::array<EventPacket, kCameras> late_;
   std::array<std::uint64_t, kCameras> received_{};
   std::array<std::uint64_t, kCameras> taken_{};
   std::int64_t shift_ns_ = 0;

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <ctime>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -14,7 +13,6 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/refinement/registration_points.h"
 #include "plugin/session/mapping_session.h"
-#include "test/tracking_stub/faults/tum_replay.h"
 
 namespace efm::studies {
 namespace {
@@ -47,17 +45,14 @@ PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOption
   const std::int64_t first_window_ns = firstEventNs(recording);
   faults.perturbation.keyframe.start_ns = first_window_ns;
   faults.perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.policy.window_s);
-  const std::unique_ptr<PoseSource> tracker =
-      withFaults(std::make_unique<TumReplay>(samplePoses(simulation, kPosePeriodNs)), faults);
+  const std::vector<StampedPose> poses = withFaults(samplePoses(simulation, kPosePeriodNs), faults);
 
   PoseRefinementRun run;
   MappingSession session(options);
-  std::optional<StampedPose> pose = tracker->next();
+  auto pose = poses.begin();
   for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs(); t_ns += kPacketNs) {
     const Window packet{t_ns, t_ns + kPacketNs, t_ns};
-    for (; pose && pose->t_ns < packet.t1_ns; pose = tracker->next()) {
-      session.addPose(*pose);
-    }
+    for (; pose != poses.end() && pose->t_ns < packet.t1_ns; ++pose) session.addPose(*pose);
     for (std::size_t c = 0; c < recording.events.size(); ++c) {
       const EventSpan events = recording.eventsOf(c, packet);
       session.addEvents({static_cast<int>(c),

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "mapping/base/number_bytes.h"
-#include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/recordings/bags/bag_recording.h"
 #include "plugin/recordings/bags/bag_source.h"
 #include "plugin/recordings/open/open_recording.h"
@@ -174,9 +173,8 @@ TEST_F(Mcap, DamageAmongThePosesIsToldAfterAllEvents) {
   std::size_t events = 0;
   std::size_t poses = 0;
   EXPECT_THAT(errorOf([&] {
-                while (const auto observation = recording->next()) {
-                  const auto packet =
-                      std::dynamic_pointer_cast<const CObservationEvents>(observation);
+                while (const auto sample = recording->next()) {
+                  const auto* packet = std::get_if<EventPacket>(&*sample);
                   packet ? events += packet->events.size() : ++poses;
                 }
               }),

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <mrpt/io/CFileGZInputStream.h>
 #include <mrpt/obs/CActionCollection.h>
@@ -15,8 +16,10 @@
 
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/pose_observation.h"
+#include "plugin/mrpt/rawlog.h"
 #include "plugin/mrpt/registration.h"
-#include "plugin/recordings/open/rawlog.h"
+#include "plugin/recordings/open/open_recording.h"
+#include "plugin/recordings/open/recording_formats.h"
 #include "test/plugin/mrpt/observations.h"
 #include "test/plugin/program_test.h"
 #include "test/plugin/temporary_folder.h"
@@ -32,43 +35,71 @@ using testing::Not;
 using testing::StartsWith;
 using Observations = std::vector<CObservation::Ptr>;
 
-/// The observations of a recording and its error, if there is one.
-struct Delivery {
-  Observations observations;
+/// What a rawlog holds, and its error, if there is one.
+struct Contents {
+  std::vector<std::vector<Event>> events{2};  // of each camera
+  std::vector<PoseSample> poses;
+  std::vector<std::string> others;
   std::string error;
-  std::string again;  // the next error
+
+  std::size_t numEvents() const { return events[0].size() + events[1].size(); }
 };
 
-Delivery read(const std::filesystem::path& file) {
-  Delivery delivery;
-  RawlogRecording recording(file);
+Contents read(const std::filesystem::path& file) {
+  Contents contents;
+  RecordingSource source;
+  source.files = {file};
+  source.format = "rawlog";
+  source.complete = false;
   double progress = 0;
   try {
-    while (auto observation = recording.next()) {
-      delivery.observations.push_back(observation);
-      EXPECT_GE(recording.progress(), progress);
-      progress = recording.progress();
+    const auto recording = openRecording(source);
+    while (const auto sample = recording->next()) {
+      EXPECT_GE(recording->progress(), progress);
+      progress = recording->progress();
+      if (const auto* packet = std::get_if<EventPacket>(&*sample)) {
+        auto& events = contents.events.at(static_cast<std::size_t>(packet->camera));
+        events.insert(events.end(), packet->events.begin(), packet->events.end());
+      } else if (const auto* pose = std::get_if<PoseSample>(&*sample)) {
+        contents.poses.push_back(*pose);
+      } else {
+        contents.others.push_back(std::get<OtherSample>(*sample).type);
+      }
     }
-    EXPECT_EQ(progress, 1);
   } catch (const std::exception& error) {
-    delivery.error = error.what();
-    delivery.again = messageOf([&] { recording.next(); });
+    contents.error = error.what();
   }
-  return delivery;
+  return contents;
 }
 
-void expectSame(const CObservation& a, const CObservation& b) {
-  EXPECT_EQ(a.GetRuntimeClass(), b.GetRuntimeClass());
-  EXPECT_EQ(a.sensorLabel, b.sensorLabel);
-  EXPECT_EQ(a.timestamp, b.timestamp);
-  if (const auto* events = dynamic_cast<const CObservationEvents*>(&a)) {
-    EXPECT_TRUE(events->events == dynamic_cast<const CObservationEvents&>(b).events);
+/// What the first entries hold.
+Contents contentsOf(const Observations& observations, std::size_t entries) {
+  Contents contents;
+  for (std::size_t i = 0; i < entries; ++i) {
+    if (const auto* packet = dynamic_cast<const CObservationEvents*>(observations[i].get())) {
+      auto& events = contents.events.at(static_cast<std::size_t>(packet->camera_index));
+      events.insert(events.end(), packet->events.begin(), packet->events.end());
+    } else {
+      contents.poses.push_back(*efm::poseIn(*observations[i]));
+    }
+  }
+  return contents;
+}
+
+void expectSame(const Contents& a, const Contents& b) {
+  EXPECT_EQ(a.events, b.events);
+  ASSERT_EQ(a.poses.size(), b.poses.size());
+  for (std::size_t i = 0; i < a.poses.size(); ++i) {
+    EXPECT_EQ(a.poses[i].t_ns, b.poses[i].t_ns);
+    EXPECT_TRUE(isSame(a.poses[i].T_world_body, b.poses[i].T_world_body));
   }
 }
 
-void expectBeginningOf(const Observations& all, const Observations& some) {
-  ASSERT_LE(some.size(), all.size());
-  for (std::size_t i = 0; i < some.size(); ++i) expectSame(*all[i], *some[i]);
+/// The number in "stopped at entry N of".
+std::size_t entryIn(const std::string& error) {
+  const std::string begin = "stopped at entry ";
+  EXPECT_THAT(error, StartsWith(begin));
+  return error.size() > begin.size() ? std::stoul(error.substr(begin.size())) : 0;
 }
 
 /// One line without MRPT's decoration.
@@ -84,9 +115,10 @@ class Rawlog : public TemporaryFolder {
   std::filesystem::path file() const { return folder() / "r.rawlog"; }
 
   void write(const Observations& observations) const {
-    RawlogWriter writer(file());
-    for (const auto& observation : observations) writer.write(*observation);
-    writer.close();
+    GzOutputStream stream(file());
+    auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream);
+    for (const auto& observation : observations) archive << *observation;
+    stream.close();
   }
 
   void writeBytes(const std::string& bytes) const { writeFile(file(), bytes); }
@@ -117,36 +149,33 @@ TEST_F(Rawlog, IsReadByMrptAndBackAlsoWithoutCompression) {
   mrpt::obs::CRawlog rawlog;
   ASSERT_TRUE(rawlog.loadFromRawLogFile(file().string()));
   ASSERT_EQ(rawlog.size(), recorded.size());
-  expectSame(*rawlog.getAsObservation(0), *recorded[0]);
   const std::string plain = plainContent();
   ASSERT_LT(readText(file()).size(), plain.size());
   for (const bool compressed : {true, false}) {
     if (!compressed) writeBytes(plain);
-    const Delivery delivery = read(file());
-    EXPECT_EQ(delivery.error, "");
-    EXPECT_EQ(delivery.observations.size(), recorded.size());
-    expectBeginningOf(recorded, delivery.observations);
+    const Contents contents = read(file());
+    EXPECT_EQ(contents.error, "");
+    expectSame(contents, contentsOf(recorded, recorded.size()));
   }
   writeBytes(plain.substr(0, plain.size() - 1));
-  const Delivery cut = read(file());
-  EXPECT_THAT(cut.error,
-              AllOf(StartsWith("stopped at entry " + std::to_string(recorded.size() - 1)),
-                    EndsWith("r.rawlog: the file ends in the middle of its data")));
-  EXPECT_EQ(cut.observations.size(), recorded.size() - 1);
+  const Contents cut = read(file());
+  EXPECT_THAT(cut.error, EndsWith("r.rawlog: the file ends in the middle of its data"));
+  EXPECT_EQ(entryIn(cut.error), recorded.size() - 1);
+  expectSame(cut, contentsOf(recorded, recorded.size() - 1));
 }
 
 TEST_F(Rawlog, ObservationsOfFramesComeOneByOneWithoutActionsAndComments) {
   mrpt::obs::CSensoryFrame frame;
   frame.insert(recorded[0]);
   frame.insert(recorded[1]);
+  mrpt::obs::CSensoryFrame later;
+  later.insert(recorded[3]);
   writeObjects(mrpt::obs::CObservationGPS(), mrpt::obs::CActionCollection(), frame,
-               mrpt::obs::CObservationComment(), mrpt::obs::CActionCollection(), frame);
-  const Delivery delivery = read(file());
-  EXPECT_EQ(delivery.error, "");
-  ASSERT_EQ(delivery.observations.size(), 5);
-  for (const std::size_t i : {1, 2, 3, 4}) {
-    expectSame(*delivery.observations[i], *recorded[(i - 1) % 2]);
-  }
+               mrpt::obs::CObservationComment(), mrpt::obs::CActionCollection(), later);
+  const Contents contents = read(file());
+  EXPECT_EQ(contents.error, "");
+  expectSame(contents, contentsOf(Observations{recorded[0], recorded[1], recorded[3]}, 3));
+  EXPECT_THAT(contents.others, testing::ElementsAre("mrpt::obs::CObservationGPS"));
 }
 
 TEST_F(Rawlog, OfMovementsWithoutATimeTheLastPoseIsThatOfTheFrame) {
@@ -160,17 +189,13 @@ TEST_F(Rawlog, OfMovementsWithoutATimeTheLastPoseIsThatOfTheFrame) {
   later.insert(recorded[30]);
   writeObjects(action, action, action, frame, action, later);
 
-  const Delivery delivery = read(file());
-  EXPECT_EQ(delivery.error, "");
-  ASSERT_EQ(delivery.observations.size(), 4);
-  const auto first = poseIn(*delivery.observations[0]);
-  ASSERT_TRUE(first);
-  EXPECT_EQ(delivery.observations[0]->timestamp, recorded[0]->timestamp);
-  EXPECT_NEAR(first->T_world_body.translation.x(), 3, 1e-12);
-  const auto second = poseIn(*delivery.observations[2]);
-  ASSERT_TRUE(second);
-  EXPECT_EQ(delivery.observations[2]->timestamp, recorded[30]->timestamp);
-  EXPECT_NEAR(second->T_world_body.translation.x(), 4, 1e-12);
+  const Contents contents = read(file());
+  EXPECT_EQ(contents.error, "");
+  ASSERT_EQ(contents.poses.size(), 2U);
+  EXPECT_EQ(contents.poses[0].t_ns, nanosecondsFrom(recorded[0]->timestamp));
+  EXPECT_NEAR(contents.poses[0].T_world_body.translation.x(), 3, 1e-12);
+  EXPECT_EQ(contents.poses[1].t_ns, nanosecondsFrom(recorded[30]->timestamp));
+  EXPECT_NEAR(contents.poses[1].T_world_body.translation.x(), 4, 1e-12);
 }
 
 TEST_F(Rawlog, TruncatedAnywhereIsAnErrorThatNamesTheEntryAfterAllEntriesBeforeIt) {
@@ -178,21 +203,17 @@ TEST_F(Rawlog, TruncatedAnywhereIsAnErrorThatNamesTheEntryAfterAllEntriesBeforeI
   const std::string bytes = readText(file());
   std::size_t most = 0;
   // Its last 8 bytes are gzip's checksum and size.
-  for (std::size_t size = 0; size < bytes.size();
+  for (std::size_t size = 1; size < bytes.size();
        size +=
        size + 8 < bytes.size() ? std::min(1 + bytes.size() / 50, bytes.size() - 8 - size) : 1) {
     writeBytes(bytes.substr(0, size));
-    const Delivery delivery = read(file());
-    EXPECT_THAT(
-        delivery.error,
-        AllOf(
-            StartsWith("stopped at entry " + std::to_string(delivery.observations.size()) + " of "),
-            HasSubstr("r.rawlog: "), isPlain(),
-            EndsWith(size == 0 ? "the file is empty" : "the file ends in the middle of its data")))
-        << "cut to " << size << " of " << bytes.size() << " bytes";
-    EXPECT_THAT(delivery.again, StartsWith("stopped at entry "));
-    expectBeginningOf(recorded, delivery.observations);
-    most = std::max(most, delivery.observations.size());
+    const Contents contents = read(file());
+    SCOPED_TRACE(fmt::format("cut to {} of {} bytes", size, bytes.size()));
+    EXPECT_THAT(contents.error, AllOf(HasSubstr("r.rawlog: "), isPlain(),
+                                      EndsWith("the file ends in the middle of its data")));
+    const std::size_t entry = entryIn(contents.error);
+    expectSame(contents, contentsOf(recorded, entry));
+    most = std::max(most, entry);
   }
   EXPECT_EQ(most, recorded.size());
 }
@@ -241,9 +262,10 @@ TEST_F(Rawlog, AChangedByteIsAnErrorAfterCorrectEntries) {
     std::string damaged = bytes;
     damaged[at] = static_cast<char>(damaged[at] ^ 0x08);
     writeBytes(damaged);
-    const Delivery delivery = read(file());
-    EXPECT_THAT(delivery.error, AllOf(StartsWith("stopped at entry "), isPlain())) << "byte " << at;
-    expectBeginningOf(recorded, delivery.observations);
+    SCOPED_TRACE(fmt::format("byte {}", at));
+    const Contents contents = read(file());
+    EXPECT_THAT(contents.error, isPlain());
+    expectSame(contents, contentsOf(recorded, entryIn(contents.error)));
   }
   std::string wrong_checksum = bytes;
   wrong_checksum[bytes.size() - 6] ^= 1;
@@ -265,7 +287,7 @@ TEST_F(Rawlog, APacketWithAChangedByteIsAnErrorThatSaysSo) {
 
 TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
   const auto error_of = [](const std::filesystem::path& path) {
-    return messageOf([&] { RawlogRecording recording(path); });
+    return messageOf([&] { GzInputStream stream(path); });
   };
   EXPECT_THAT(error_of(folder()), EndsWith(": a folder: expected a file"));
   EXPECT_THAT(error_of("/dev/null"), EndsWith(": not a regular file"));
@@ -275,11 +297,13 @@ TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
        {std::pair<std::string, std::string>{"CNewObservation", "CNewObse"},
         {"C\x1b[2J", "C\\x1b[2J"}}) {
     writeBytes(std::string(1, static_cast<char>(0x80 | name.size())) + name + '\0');
-    EXPECT_THAT(read(file()).error, AllOf(StartsWith("stopped at entry 0 of"), HasSubstr(shown),
-                                          isPlain(), Not(HasSubstr("\x1b"))));
+    EXPECT_THAT(messageOf([&] { openRawlog(file(), {}); }),
+                AllOf(StartsWith("stopped at entry 0 of"), HasSubstr(shown), isPlain(),
+                      Not(HasSubstr("\x1b"))));
   }
   writeBytes("0.1 2 3 1\n0.2 2 3 1\n");
-  EXPECT_THAT(read(file()).error, AllOf(StartsWith("stopped at entry 0 of"), isPlain()));
+  EXPECT_THAT(messageOf([&] { openRawlog(file(), {}); }),
+              AllOf(StartsWith("stopped at entry 0 of"), isPlain()));
   writeObjects(*recorded[0], mrpt::poses::CPose3D(), *recorded[1]);
   EXPECT_THAT(
       read(file()).error,

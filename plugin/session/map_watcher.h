@@ -38,9 +38,6 @@ class MapWatcher {
 /// The mouse turns the view, moves and zooms it; from then on the view follows the map no more.
 class MapWindow : public MapWatcher {
  public:
-  /// Opens a window. The library with MRPT's windows is loaded by this call alone.
-  static std::unique_ptr<MapWindow> open();
-
   /// Whether the user has not closed it.
   virtual bool isOpen() = 0;
   /// Draws the last snapshot and returns when the user closes the window or presses a key in it, or

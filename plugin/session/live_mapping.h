@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mrpt/maps/CMultiMetricMap.h>
-#include <mrpt/obs/CSensoryFrame.h>
-#include <mrpt/poses/CPose3DPDF.h>
-
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <exception>
 #include <functional>
 #include <memory>
@@ -18,8 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "plugin/mrpt/CEventFusionMap.h"
-#include "plugin/mrpt/hosted_mapping.h"
+#include "plugin/session/hosted_mapping.h"
 #include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
 
@@ -51,8 +45,8 @@ class LiveMapping : public HostedMapping, public std::enable_shared_from_this<Li
   bool mayStopHere() const override { return !runsHere(); }
 
   /// Copies the packet.
-  void addEvents(CameraPacket packet) override { queue_.add(std::move(packet)); }
-  void skipEvents(const CameraPacket& packet) override { queue_.skip(packet); }
+  void addEvents(EventPacket packet) override { queue_.add(std::move(packet)); }
+  void skipEvents(const EventPacket& packet) override { queue_.skip(packet); }
   void addPose(const QueuedPose& pose) override { queue_.add(pose); }
   /// Maps the rest of the input and waits for it.
   /// @throws std::logic_error in the mapping's own thread; the error of the rig: a camera or an
@@ -66,9 +60,8 @@ class LiveMapping : public HostedMapping, public std::enable_shared_from_this<Li
   SessionStatus status() const override;
   MapCloud::ConstPtr points() override { return snapshot()->points; }
   KeyframePoses keyframePoses() override;
-  std::size_t simpleMapSize() const override { return snapshot()->frames.size(); }
-  void copyTo(mrpt::maps::CSimpleMap& map) override;
-  const mrpt::maps::CMultiMetricMap* metricMap() override;
+  std::vector<StoredKeyframe> keyframes() override { return snapshot()->keyframes; }
+  std::size_t numKeyframes() const override { return snapshot()->keyframes.size(); }
   /// Never null.
   std::shared_ptr<const MapSnapshot> snapshot() const override;
   std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const override;
@@ -99,9 +92,8 @@ class LiveMapping : public HostedMapping, public std::enable_shared_from_this<Li
   InputQueue queue_;
 
   // Of the mapping's thread.
-  std::deque<StoredKeyframe> keyframes_;  // the newest ones
   std::unique_ptr<MappingSession> session_;
-  MapSnapshot next_map_;  // the keyframes so far
+  MapSnapshot next_map_;  // the keyframes so far, without their points
   bool map_changed_ = false;
   std::chrono::steady_clock::time_point map_renewed_;
   std::chrono::steady_clock::duration map_cost_{};
@@ -111,7 +103,6 @@ class LiveMapping : public HostedMapping, public std::enable_shared_from_this<Li
   std::uint64_t warned_losses_ = 0;
   std::uint64_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;
-  bool warned_of_rounding_ = false;
   std::shared_ptr<LiveMapping> alone_;  // after `stop` within a callback, whose owner may be gone
   std::uint64_t told_choices_ = 0;
 
@@ -122,7 +113,6 @@ class LiveMapping : public HostedMapping, public std::enable_shared_from_this<Li
   SessionStatus status_;
   LiveStatus live_;
   std::shared_ptr<const MapSnapshot> map_;
-  std::shared_ptr<const MapSnapshot> handed_out_;  // whose metric map was returned last
   cv::Mat1f newest_depth_;
   DepthPlanesOptions planes_;
   bool finished_ = false;

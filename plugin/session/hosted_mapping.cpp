@@ -1,32 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/mrpt/hosted_mapping.h"
+#include "plugin/session/hosted_mapping.h"
 
 #include <stdexcept>
 
-#include "plugin/mrpt/pose_observation.h"
 #include "plugin/session/health_checks.h"
+#include "plugin/session/live_mapping.h"
 
 namespace efm {
 
-CameraPacket packetOf(const CObservationEvents& observation) {
-  CameraPacket packet;
-  packet.camera = observation.camera_index;
-  packet.calibration.model = observation.camera;
-  packet.calibration.T_rig_cam = rigidFrom(observation.camera_pose);
-  packet.calibration.time_offset_ns = observation.time_offset_ns;
-  packet.events = observation.events;
-  packet.covered_until_ns = observation.covered_until_ns;
-  return packet;
+std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe) {
+  return pointsInWorld(*keyframe.points, keyframe.T_world_ref);
 }
 
-void addTo(RecordingSurveyor& surveyor, const mrpt::obs::CObservation& observation) {
-  if (const auto* events = dynamic_cast<const CObservationEvents*>(&observation)) {
-    surveyor.addEvents(packetOf(*events));
-  } else if (const std::optional<ObservedPose> observed = poseIn(observation)) {
-    const std::optional<Rigid3>& given = surveyor.setup().T_body_rig;
-    surveyor.addPose({observed->t_ns, rigPose(*observed, given)}, *poseSourceOf(observation),
-                     given.value_or(observed->T_body_rig));
+std::shared_ptr<HostedMapping> hostMapping(const EventFusionOptions& options,
+                                           std::vector<StoredKeyframe> earlier,
+                                           HostedMapping::Callbacks callbacks) {
+  if (options.live.enabled) {
+    return std::make_shared<LiveMapping>(options, std::move(earlier), std::move(callbacks));
   }
+  return std::make_shared<PlaybackMapping>(options, std::move(earlier), std::move(callbacks));
 }
 
 KeyframePoses keyframePoses(std::vector<StampedPose> in_map,
@@ -46,40 +38,19 @@ void tellChoice(const SessionStatus& status, const HostedMapping::Callbacks& cal
   callbacks.warn(warning.name + ": " + warning.text);
 }
 
-namespace {
-
-/// Moves and inserts keyframes of a map until they equal `keyframes`. @return whether it changed.
-bool bringUpToDate(CEventFusionMap& map, const std::vector<StoredKeyframe>& keyframes) {
-  bool changed = map.keyframes().size() < keyframes.size();
-  for (std::size_t i = 0; i < map.keyframes().size(); ++i) {
-    if (isSame(map.keyframes()[i].T_world_ref, keyframes[i].T_world_ref)) continue;
-    map.moveKeyframe(i, keyframes[i].T_world_ref);
-    changed = true;
-  }
-  for (std::size_t i = map.keyframes().size(); i < keyframes.size(); ++i) {
-    map.insertKeyframe(keyframes[i]);
-  }
-  return changed;
-}
-
-}  // namespace
-
 PlaybackMapping::PlaybackMapping(const EventFusionOptions& options,
                                  std::vector<StoredKeyframe> earlier, Callbacks callbacks)
-    : cloud_options_(options.cloud),
-      callbacks_(std::move(callbacks)),
-      session_(options),
-      keyframes_(std::move(earlier)) {
+    : callbacks_(std::move(callbacks)), session_(options), keyframes_(std::move(earlier)) {
   for (const StoredKeyframe& keyframe : keyframes_) {
     session_.insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
   }
 }
 
-void PlaybackMapping::addEvents(CameraPacket packet) {
+void PlaybackMapping::addEvents(EventPacket packet) {
   advance([&] { session_.addEvents(std::move(packet)); });
 }
 
-void PlaybackMapping::skipEvents(const CameraPacket& packet) {
+void PlaybackMapping::skipEvents(const EventPacket& packet) {
   if (packet.events.empty()) return;
   advance([&] { session_.endSurvey(); });  // maps what is complete so far
   advance([&] { session_.skipEvents(packet); });
@@ -151,7 +122,8 @@ std::optional<KeyframeDepthMap> PlaybackMapping::mapNext() {
   std::optional<KeyframeDepthMap> keyframe;
   try {
     keyframe = session_.next(sink_, clock_, [this](const KeyframeDepthMap& made) {
-      keyframes_.push_back(storedKeyframe(made, session_.pointsOf(made)));
+      keyframes_.push_back({made.window.t_ref_ns, made.T_world_ref,
+                            std::make_shared<std::vector<ViewPoint>>(session_.pointsOf(made))});
     });
   } catch (...) {
     keyframes_.resize(kept);
@@ -223,38 +195,15 @@ KeyframePoses PlaybackMapping::keyframePoses() {
   return efm::keyframePoses(std::move(poses), session_.T_odom_ref());
 }
 
-std::size_t PlaybackMapping::simpleMapSize() const {
+std::size_t PlaybackMapping::numKeyframes() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return keyframes_.size();
 }
 
-void PlaybackMapping::copyTo(mrpt::maps::CSimpleMap& map) {
+std::vector<StoredKeyframe> PlaybackMapping::keyframes() {
   const std::lock_guard<std::mutex> lock(mutex_);
   applyPending();
-  for (const StoredKeyframe& keyframe : keyframes_) insertInto(map, keyframe);
-}
-
-const mrpt::maps::CMultiMetricMap* PlaybackMapping::metricMap() {
-  std::optional<std::string> warning;
-  updateMetricMap(warning);
-  if (warning && callbacks_.warn) callbacks_.warn(*warning);  // without the lock
-  return &metric_map_;
-}
-
-/// @param warning is set the first time that the points are rounded.
-void PlaybackMapping::updateMetricMap(std::optional<std::string>& warning) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  applyPending();
-  if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(cloud_options_);
-  const bool changed = bringUpToDate(*event_map_, keyframes_);
-  if (metric_map_.maps.empty() || changed) {
-    metric_map_.maps.clear();
-    metric_map_.maps.push_back(event_map_);
-    const MapCloud::ConstPtr points = event_map_->cloud().points();
-    metric_map_.maps.push_back(pointsMapOf(*points));
-    if (!warned_of_rounding_) warning = roundingWarning(*points, cloud_options_.voxel_size_m);
-    warned_of_rounding_ = warned_of_rounding_ || warning;
-  }
+  return keyframes_;
 }
 
 std::pair<cv::Mat1f, DepthPlanesOptions> PlaybackMapping::newestDepth() const {

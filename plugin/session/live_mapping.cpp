@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/mrpt/live_mapping.h"
+#include "plugin/session/live_mapping.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "mapping/geometry/timestamp.h"
-#include "plugin/mrpt/pose_observation.h"
 
 namespace efm {
 namespace {
@@ -26,14 +25,6 @@ std::string errorText() {
   } catch (...) {
     return "an exception of another type";
   }
-}
-
-SimpleMapFrame simpleMapFrameOf(const StoredKeyframe& keyframe) {
-  mrpt::maps::CSimpleMap map;
-  insertInto(map, keyframe);
-  SimpleMapFrame frame;
-  map.get(0, frame.pose, frame.frame);
-  return frame;
 }
 
 }  // namespace
@@ -113,7 +104,7 @@ bool LiveMapping::feed(InputQueue::Batch batch) {
   }
   chooseBefore(batch);
   for (const auto& [camera, missing] : batch.missing) session_->noteMissing(camera, missing);
-  for (CameraPacket& packet : batch.packets) {
+  for (EventPacket& packet : batch.packets) {
     try {
       session_->addEvents(std::move(packet));
     } catch (...) {  // refused, or no memory
@@ -165,7 +156,7 @@ bool LiveMapping::mapNext() {
   }
   std::optional<KeyframeDepthMap> keyframe;
   const std::size_t kept = next_map_.trajectory.size();
-  const std::size_t kept_frames = keyframes_.size();
+  const std::size_t kept_keyframes = next_map_.keyframes.size();
   try {
     giveUpExcess();
   } catch (...) {
@@ -173,13 +164,13 @@ bool LiveMapping::mapNext() {
   }
   try {
     keyframe = session_->next(sink, clock, [this](const KeyframeDepthMap& made) {
-      keep(storedKeyframe(made, session_->pointsOf(made)));
+      keep({made.window.t_ref_ns, made.T_world_ref,
+            std::make_shared<std::vector<ViewPoint>>(session_->pointsOf(made))});
     });
   } catch (...) {
     // The session does not have this keyframe.
     next_map_.trajectory.resize(kept);
-    next_map_.frames.resize(std::min(next_map_.frames.size(), kept_frames));
-    keyframes_.resize(std::min(keyframes_.size(), kept_frames));
+    next_map_.keyframes.resize(std::min(next_map_.keyframes.size(), kept_keyframes));
     noteError("a keyframe", Fault::kMapping);
     return session_->giveUpFailed();
   }
@@ -215,14 +206,14 @@ void LiveMapping::giveUpExcess() {
 
 void LiveMapping::keep(StoredKeyframe keyframe) {
   next_map_.trajectory.push_back({keyframe.t_ref_ns, keyframe.T_world_ref});
-  next_map_.frames.push_back(simpleMapFrameOf(keyframe));
-  keyframes_.push_back(std::move(keyframe));
+  next_map_.keyframes.push_back(std::move(keyframe));
 }
 
 void LiveMapping::forgetOldest() {
-  if (keyframes_.size() <= static_cast<std::size_t>(options_.max_keyframes)) return;
-  keyframes_.pop_front();
-  next_map_.frames.erase(next_map_.frames.begin());
+  std::vector<StoredKeyframe>& keyframes = next_map_.keyframes;
+  if (keyframes.size() > static_cast<std::size_t>(options_.max_keyframes)) {
+    keyframes.erase(keyframes.begin());
+  }
 }
 
 void LiveMapping::publishState() {
@@ -253,22 +244,15 @@ void LiveMapping::publishMap(bool at_once) {
     const std::vector<Rigid3>& T_world_ref = session_->T_world_ref();
     std::vector<StampedPose>& trajectory = next_map_.trajectory;
     const std::size_t earlier = trajectory.size() - T_world_ref.size();
-    const std::size_t forgotten = trajectory.size() - keyframes_.size();
+    const std::size_t forgotten = trajectory.size() - next_map_.keyframes.size();
     for (std::size_t i = earlier; i < trajectory.size(); ++i) {
       if (isSame(trajectory[i].T_world_rig, T_world_ref[i - earlier])) continue;
-      if (i >= forgotten) {
-        StoredKeyframe moved = keyframes_[i - forgotten];
-        moved.T_world_ref = T_world_ref[i - earlier];
-        next_map_.frames[i - forgotten] = simpleMapFrameOf(moved);
-        keyframes_[i - forgotten] = std::move(moved);
-      }
-      trajectory[i].T_world_rig =
-          T_world_ref[i - earlier];  // last: without memory it is tried again
+      if (i >= forgotten) next_map_.keyframes[i - forgotten].T_world_ref = T_world_ref[i - earlier];
+      trajectory[i].T_world_rig = T_world_ref[i - earlier];
     }
     next_map_.T_odom_ref = session_->T_odom_ref();
     auto map = std::make_shared<MapSnapshot>(next_map_);
     map->points = session_->cloud().points();
-    map->metric_map.maps.push_back(pointsMapOf(*map->points));
     made = std::move(map);
   } catch (...) {
     noteError("the snapshot of the map", Fault::kMapping);
@@ -279,11 +263,6 @@ void LiveMapping::publishMap(bool at_once) {
   map_renewed_ = Clock::now();
   map_cost_ = map_renewed_ - begin;
   map_changed_ = false;
-  if (const auto warning = roundingWarning(*made->points, session_->cloud().options().voxel_size_m);
-      warning && !warned_of_rounding_) {
-    warned_of_rounding_ = true;
-    warn(*warning);
-  }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     map_ = made;
@@ -391,21 +370,6 @@ SessionStatus LiveMapping::status() const {
 KeyframePoses LiveMapping::keyframePoses() {
   const auto map = snapshot();
   return efm::keyframePoses(map->trajectory, map->T_odom_ref);
-}
-
-void LiveMapping::copyTo(mrpt::maps::CSimpleMap& map) {
-  for (const SimpleMapFrame& frame : snapshot()->frames) {
-    // A host may move its map.
-    map.insert(
-        std::dynamic_pointer_cast<mrpt::poses::CPose3DPDF>(frame.pose->duplicateGetSmartPtr()),
-        frame.frame);
-  }
-}
-
-const mrpt::maps::CMultiMetricMap* LiveMapping::metricMap() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  handed_out_ = map_;
-  return &handed_out_->metric_map;
 }
 
 std::shared_ptr<const MapSnapshot> LiveMapping::snapshot() const {

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <mrpt/maps/CMultiMetricMap.h>
-#include <mrpt/maps/CSimpleMap.h>
-#include <mrpt/obs/CObservation.h>
-#include <mrpt/poses/CPose3DPDF.h>
 #include <opencv2/core.hpp>
 
 #include <exception>
@@ -18,12 +14,11 @@
 #include <utility>
 #include <vector>
 
+#include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
-#include "plugin/mrpt/CEventFusionMap.h"
-#include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/session/input_queue.h"
 #include "plugin/session/mapping_session.h"
-#include "plugin/session/recording_survey.h"
+#include "plugin/session/sample.h"
 
 namespace efm {
 
@@ -38,27 +33,23 @@ std::exception_ptr exceptionOf(const Step& step) {
   return nullptr;
 }
 
-/// The events of an observation, with their camera.
-CameraPacket packetOf(const CObservationEvents& observation);
-
-/// Adds the events or the pose of an observation to a survey: T_world_rig = T_world_body *
-/// T_body_rig, with the options' T_body_rig if they have one. Ignores other observations.
-/// @throws std::exception where the survey does, or where the pose is not valid.
-void addTo(RecordingSurveyor& surveyor, const mrpt::obs::CObservation& observation);
-
-/// A keyframe of a simplemap. Shared with those who asked for the map: never changed.
-struct SimpleMapFrame {
-  mrpt::poses::CPose3DPDF::Ptr pose;
-  mrpt::obs::CSensoryFrame::Ptr frame;
+/// The points of a keyframe in its reference view, and the pose of the view. 20 bytes a point.
+/// Transformed to the world, they are the points of the map again, bit for bit.
+struct StoredKeyframe {
+  std::int64_t t_ref_ns = 0;
+  Rigid3 T_world_ref;
+  std::shared_ptr<const std::vector<ViewPoint>> points;  ///< Never null; shared, never changed.
 };
+
+/// p_world = T_world_ref * p_ref.
+std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe);
 
 /// The map as it was at one moment.
 struct MapSnapshot {
-  std::vector<StampedPose> trajectory;     ///< Of all keyframes, those of the initial map first.
-  std::vector<Rigid3> T_odom_ref;          ///< Of the others: by the tracker.
-  std::vector<SimpleMapFrame> frames;      ///< The newest keyframes, as those of a simplemap.
-  MapCloud::ConstPtr points;               ///< The exported points.
-  mrpt::maps::CMultiMetricMap metric_map;  ///< The points as a CPointsMapXYZI.
+  std::vector<StampedPose> trajectory;    ///< Of all keyframes, those of the initial map first.
+  std::vector<Rigid3> T_odom_ref;         ///< Of the others: by the tracker.
+  std::vector<StoredKeyframe> keyframes;  ///< In playback all, in live operation the newest.
+  MapCloud::ConstPtr points;              ///< The exported points.
 };
 
 /// The poses T_world_ref of all keyframes at t_ref, those of the initial map first.
@@ -69,7 +60,7 @@ struct KeyframePoses {
 /// @param T_odom_ref of the last keyframes by the tracker.
 KeyframePoses keyframePoses(std::vector<StampedPose> in_map, const std::vector<Rigid3>& T_odom_ref);
 
-/// A mapping session as the map builder hosts it: in the caller's thread (PlaybackMapping) or in a
+/// A mapping session as a program hosts it: in the caller's thread (PlaybackMapping) or in a
 /// thread of its own (LiveMapping). Thread-safe.
 class HostedMapping {
  public:
@@ -84,9 +75,9 @@ class HostedMapping {
   virtual ~HostedMapping() = default;
 
   /// @throws std::invalid_argument where the packet is refused.
-  virtual void addEvents(CameraPacket packet) = 0;
+  virtual void addEvents(EventPacket packet) = 0;
   /// Counts a packet that is not to be mapped, and gives up its windows.
-  virtual void skipEvents(const CameraPacket& packet) = 0;
+  virtual void skipEvents(const EventPacket& packet) = 0;
   virtual void addPose(const QueuedPose& pose) = 0;
   /// Maps the rest.
   virtual void finish() = 0;
@@ -96,6 +87,11 @@ class HostedMapping {
   /// False in a thread of the mapping's own: within a callback. `stop` does not wait there.
   virtual bool mayStopHere() const { return true; }
 
+  /// T_world_rig = T_world_body * T_body_rig, with the options' T_body_rig if they have one.
+  void addPose(const PoseSample& pose) {
+    addPose({{pose.t_ns, rigPose(pose, T_body_rig())}, pose.source, pose.noise});
+  }
+
   virtual void setSink(DsiSink* sink) = 0;
   virtual void setClock(ProcessorClock clock) = 0;
 
@@ -104,16 +100,21 @@ class HostedMapping {
   virtual SessionStatus status() const = 0;
   virtual MapCloud::ConstPtr points() = 0;
   virtual KeyframePoses keyframePoses() = 0;
-  /// The keyframes of a simplemap.
-  virtual std::size_t simpleMapSize() const = 0;
-  virtual void copyTo(mrpt::maps::CSimpleMap& map) = 0;
-  /// Valid until the next call, or the end of this object.
-  virtual const mrpt::maps::CMultiMetricMap* metricMap() = 0;
+  /// The keyframes: in live operation the newest ones.
+  virtual std::vector<StoredKeyframe> keyframes() = 0;
+  virtual std::size_t numKeyframes() const = 0;
   /// Null where the mapping makes none.
   virtual std::shared_ptr<const MapSnapshot> snapshot() const { return nullptr; }
   /// The newest keyframe's depth map, empty before the first one, and its planes.
   virtual std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const = 0;
 };
+
+/// Hosts a mapping: by option live, or in playback.
+/// @param earlier keyframes of an initial map.
+/// @throws std::runtime_error if a file in the options cannot be read.
+std::shared_ptr<HostedMapping> hostMapping(const EventFusionOptions& options,
+                                           std::vector<StoredKeyframe> earlier,
+                                           HostedMapping::Callbacks callbacks);
 
 /// Logs the automatic options and why. Where no scene was found, as a warning.
 void tellChoice(const SessionStatus& status, const HostedMapping::Callbacks& callbacks);
@@ -129,8 +130,8 @@ class PlaybackMapping : public HostedMapping {
   PlaybackMapping(const EventFusionOptions& options, std::vector<StoredKeyframe> earlier,
                   Callbacks callbacks);
 
-  void addEvents(CameraPacket packet) override;
-  void skipEvents(const CameraPacket& packet) override;
+  void addEvents(EventPacket packet) override;
+  void skipEvents(const EventPacket& packet) override;
   void addPose(const QueuedPose& pose) override;
   /// Input afterwards is an error (std::logic_error).
   void finish() override;
@@ -143,10 +144,8 @@ class PlaybackMapping : public HostedMapping {
   SessionStatus status() const override;
   MapCloud::ConstPtr points() override;
   KeyframePoses keyframePoses() override;
-  std::size_t simpleMapSize() const override;
-  void copyTo(mrpt::maps::CSimpleMap& map) override;
-  /// A CEventFusionMap, and its exported points as a CPointsMapXYZI.
-  const mrpt::maps::CMultiMetricMap* metricMap() override;
+  std::vector<StoredKeyframe> keyframes() override;
+  std::size_t numKeyframes() const override;
   std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const override;
 
  private:
@@ -156,10 +155,8 @@ class PlaybackMapping : public HostedMapping {
   std::optional<KeyframeDepthMap> mapNext();
   void deliver(const KeyframeDepthMap& keyframe);
   void applyPending();
-  void updateMetricMap(std::optional<std::string>& warning);
   void followRefinement();
 
-  const GlobalCloudOptions cloud_options_;
   const Callbacks callbacks_;
 
   mutable std::mutex mutex_;  // protects all members below
@@ -172,9 +169,6 @@ class PlaybackMapping : public HostedMapping {
   std::vector<StoredKeyframe> keyframes_;  // the initial map's first
   cv::Mat1f newest_depth_;
   std::set<std::thread::id> delivering_;  // threads within a callback
-  mrpt::maps::CMultiMetricMap metric_map_;
-  CEventFusionMap::Ptr event_map_;  // in metric_map_
-  bool warned_of_rounding_ = false;
 };
 
 }  // namespace efm

@@ -1,0 +1,489 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/rawlog.h"
+
+#include <fmt/format.h>
+#include <mrpt/obs/CActionCollection.h>
+#include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationRobotPose.h>
+#include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/serialization/CArchive.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <deque>
+#include <exception>
+#include <limits>
+#include <map>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "mapping/base/atomic_file.h"
+#include "mapping/base/text.h"
+#include "plugin/mrpt/CObservationEvents.h"
+#include "plugin/mrpt/pose_observation.h"
+#include "plugin/session/health_checks.h"
+
+namespace efm {
+namespace {
+
+constexpr std::size_t kBufferSize = std::size_t{1} << 18;
+
+[[noreturn]] void refuse(const char* what) { throw std::logic_error(what); }
+
+std::string systemReason() {
+  const int number = errno;
+  const std::string why = reasonNotWritten(number);
+  return why.empty() ? std::strerror(number) : why;
+}
+
+std::string reasonOf(gzFile file) {
+  int code = Z_OK;
+  const char* message = gzerror(file, &code);
+  if (code == Z_BUF_ERROR) return "the file ends in the middle of its data";
+  if (code == Z_ERRNO) return systemReason();
+  if (message == nullptr || *message == '\0') return "unknown error";
+  const std::string text = message;  // "<path>: <reason>"; the caller names the file
+  const auto colon = text.rfind(": ");
+  return colon == std::string::npos ? text : text.substr(colon + 2);
+}
+
+}  // namespace
+
+GzInputStream::GzInputStream(const std::filesystem::path& file) : file_(nullptr, gzclose_r) {
+  const std::filesystem::file_status status = std::filesystem::status(file);
+  if (!std::filesystem::is_regular_file(status)) {
+    const char* const what = std::filesystem::is_directory(status) ? "a folder: expected a file"
+                             : std::filesystem::exists(status)     ? "not a regular file"
+                                                                   : "no such file";
+    throw std::runtime_error(file.string() + ": " + what);
+  }
+  file_size_ = std::filesystem::file_size(file);
+  file_.reset(gzopen(file.c_str(), "rb"));
+  if (!file_) {
+    throw std::runtime_error(file.string() + ": cannot be opened: " + std::strerror(errno));
+  }
+  gzbuffer(file_.get(), static_cast<unsigned>(kBufferSize));
+}
+
+void GzInputStream::fill() {
+  if (at_ < buffer_.size()) return;
+  buffer_.resize(kBufferSize);
+  at_ = 0;
+  const int count = gzread(file_.get(), buffer_.data(), static_cast<unsigned>(kBufferSize));
+  if (count < 0) {
+    buffer_.clear();
+    throw std::runtime_error(reasonOf(file_.get()));
+  }
+  buffer_.resize(static_cast<std::size_t>(count));
+  if (count > 0) return;
+  int code = Z_OK;
+  gzerror(file_.get(), &code);  // a truncated file ends with 0 bytes and this code
+  if (code != Z_OK) throw std::runtime_error(reasonOf(file_.get()));
+}
+
+bool GzInputStream::atEnd() {
+  fill();
+  return buffer_.empty();
+}
+
+double GzInputStream::progress() const {
+  const auto offset = static_cast<double>(gzoffset(file_.get()));
+  return file_size_ == 0 ? 1.0 : std::clamp(offset / static_cast<double>(file_size_), 0.0, 1.0);
+}
+
+std::size_t GzInputStream::Read(void* buffer, std::size_t count) {
+  auto* to = static_cast<std::uint8_t*>(buffer);
+  std::size_t done = 0;
+  while (done < count && !atEnd()) {
+    const std::size_t piece = std::min(count - done, buffer_.size() - at_);
+    std::memcpy(to + done, buffer_.data() + at_, piece);
+    at_ += piece;
+    done += piece;
+  }
+  position_ += done;
+  return done;
+}
+
+std::size_t GzInputStream::Write(const void*, std::size_t) { refuse("a stream to read from"); }
+std::uint64_t GzInputStream::Seek(std::int64_t, TSeekOrigin) { refuse("a stream goes forward"); }
+std::uint64_t GzInputStream::getTotalBytesCount() const { refuse("a stream has no known size"); }
+
+GzOutputStream::GzOutputStream(const std::filesystem::path& file, bool compressed)
+    : file_(gzopen(file.c_str(), compressed ? "wb1" : "wbT"), gzclose_w) {
+  if (!file_) {
+    throw std::runtime_error(file.string() + ": cannot be made: " + std::strerror(errno));
+  }
+  gzbuffer(file_.get(), kBufferSize);
+}
+
+std::size_t GzOutputStream::Write(const void* buffer, std::size_t count) {
+  const auto* from = static_cast<const std::uint8_t*>(buffer);
+  constexpr std::size_t kMost = std::numeric_limits<int>::max();
+  for (std::size_t done = 0; done < count;) {
+    const std::size_t piece = std::min(kMost, count - done);
+    const int written = gzwrite(file_.get(), from + done, static_cast<unsigned>(piece));
+    if (written <= 0) throw std::runtime_error(reasonOf(file_.get()));
+    done += static_cast<std::size_t>(written);
+  }
+  position_ += count;
+  return count;
+}
+
+void GzOutputStream::close() {
+  gzFile handle = file_.release();
+  if (handle != nullptr && gzclose_w(handle) != Z_OK) {
+    throw std::runtime_error("cannot be completed: " + systemReason());
+  }
+}
+
+std::size_t GzOutputStream::Read(void*, std::size_t) { refuse("a stream to write to"); }
+std::uint64_t GzOutputStream::Seek(std::int64_t, TSeekOrigin) { refuse("a stream goes forward"); }
+
+namespace {
+
+/// Removes the text up to the end of the last occurrence of a word.
+void dropThrough(std::string_view& text, std::string_view last) {
+  const auto at = text.rfind(last);
+  if (at != std::string_view::npos) text.remove_prefix(at + last.size());
+}
+
+/// The reason of an error without MRPT's decoration. Each object around the damaged one adds
+///
+///     ==== MRPT exception ====
+///     Message:  Exception while parsing typed object '…' from …
+///     Original exception:
+///     <the same of the inner object, or the reason>
+///     Location: <source file, line, function>
+///     Call stack backtrace: …
+std::string reasonOf(const std::exception& error) {
+  constexpr std::size_t kMaxCharacters = 400;
+  constexpr std::string_view kHeading = "==== MRPT exception ====";
+  std::string_view text = error.what();
+  dropThrough(text, "Original exception:");
+  text = text.substr(0, text.find("\nLocation:"));
+
+  std::string reason;  // the message of an inner error may come before MRPT's heading
+  const auto heading = text.find(kHeading);
+  if (heading != std::string_view::npos) {
+    reason = text.substr(0, heading);
+    text.remove_prefix(heading + kHeading.size());
+  }
+  dropThrough(text, "Message:");
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  text = text.substr(0, text.find_first_of("\r\n"));
+  // "[/path/file.cpp, line 12, function] message"
+  if (!text.empty() && text.front() == '[') dropThrough(text, "] ");
+  reason += text;
+  reason.erase(0, reason.find_first_not_of(" \t\r\n"));
+  return reason.empty() ? "unreadable" : printable(reason, kMaxCharacters);
+}
+
+}  // namespace
+
+namespace {
+
+using mrpt::obs::CObservation;
+using mrpt::obs::CObservationRobotPose;
+
+/// The observations of a rawlog, one by one, also those in sensory frames.
+class RawlogReader {
+ public:
+  explicit RawlogReader(std::filesystem::path file) : file_(std::move(file)), stream_(file_) {}
+
+  /// @return null at the end.
+  CObservation::Ptr next() {
+    while (pending_.empty()) {
+      try {
+        if (stream_.atEnd()) {
+          if (entries_ == 0) throw std::runtime_error("the file is empty");
+          takeActions({});
+          if (pending_.empty()) return nullptr;
+          break;
+        }
+        readEntry();
+      } catch (const std::exception& error) {
+        throw std::runtime_error(fmt::format("stopped at entry {} of {}: {}", entries_,
+                                             file_.string(), whyStopped(error)));
+      }
+      ++entries_;
+    }
+    CObservation::Ptr observation = std::move(pending_.front());
+    pending_.pop_front();
+    return observation;
+  }
+
+  /// The entry of the last observation.
+  std::string position() const {
+    return fmt::format("entry {} of {}", entries_ == 0 ? 0 : entries_ - 1, file_.string());
+  }
+  double progress() const { return stream_.progress(); }
+  const std::filesystem::path& file() const { return file_; }
+
+ private:
+  void readEntry() {
+    auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);
+    const mrpt::serialization::CSerializable::Ptr entry = archive.ReadObject();
+    if (!entry) throw std::runtime_error("an empty object");
+    if (auto action = std::dynamic_pointer_cast<mrpt::obs::CActionCollection>(entry)) {
+      actions_.push_back(action);
+    } else if (auto observation = std::dynamic_pointer_cast<CObservation>(entry)) {
+      takeActions({});
+      if (!IS_CLASS(*observation, mrpt::obs::CObservationComment)) pending_.push_back(observation);
+    } else if (auto frame = std::dynamic_pointer_cast<mrpt::obs::CSensoryFrame>(entry)) {
+      takeActions(*frame);
+      for (const auto& seen : *frame) pending_.push_back(seen);
+    } else {
+      throw std::runtime_error(std::string("an object of class '") +
+                               entry->GetRuntimeClass()->className +
+                               "': expected observations, sensory frames and actions");
+    }
+  }
+
+  /// Composes the actions so far to poses, with the frame's time if they have none. Of several
+  /// poses of one time, only the last has all movements before the frame.
+  void takeActions(const mrpt::obs::CSensoryFrame& frame) {
+    CObservation::Ptr newest;
+    while (!actions_.empty()) {
+      const auto action = actions_.front();
+      actions_.pop_front();
+      const auto pose = reckoning_.poseAfter(*action, frame);
+      if (!pose) continue;
+      if (newest && newest->timestamp == pose->timestamp) pending_.pop_back();
+      pending_.push_back(pose);
+      newest = pose;
+    }
+  }
+
+  /// MRPT treats every exception of a stream before an object's name as the end of the file.
+  std::string whyStopped(const std::exception& error) {
+    std::string reason = reasonOf(error);
+    if (reason.find("Assert condition failed") != std::string::npos) {
+      return "the data are damaged: they are no object that MRPT wrote";
+    }
+    if (reason.find("EOF") == std::string::npos) return reason;
+    try {
+      stream_.atEnd();  // throws the same exception again
+    } catch (const std::exception& cause) {
+      return reasonOf(cause);
+    }
+    return "the file ends in the middle of its data";
+  }
+
+  std::filesystem::path file_;
+  GzInputStream stream_;
+  std::uint64_t entries_ = 0;  // read so far
+  std::deque<CObservation::Ptr> pending_;
+  std::deque<mrpt::obs::CActionCollection::Ptr> actions_;  // before the next frame
+  DeadReckoning reckoning_;
+};
+
+CObservationEvents::Ptr asPacket(const CObservation::Ptr& observation) {
+  return std::dynamic_pointer_cast<CObservationEvents>(observation);
+}
+
+/// The events of one camera.
+class RawlogEvents : public EventStream {
+ public:
+  /// @param first the camera's first packet, without its events.
+  RawlogEvents(const std::filesystem::path& file, CObservationEvents::Ptr first)
+      : reader_(file), first_(std::move(first)) {}
+
+  bool read(std::vector<Event>& events) override {
+    events.clear();
+    try {
+      while (const CObservation::Ptr observation = reader_.next()) {
+        const auto packet = asPacket(observation);
+        if (!packet || packet->camera_index != first_->camera_index) continue;
+        if (packet->events.empty()) continue;
+        events = std::move(packet->events);
+        return true;
+      }
+    } catch (const std::runtime_error& error) {
+      damage_ = error.what();
+    }
+    return false;
+  }
+  std::string damage() const override { return damage_; }
+  std::string positionOf(std::size_t /*index*/) const override { return reader_.position(); }
+  std::string name() const override { return reader_.file().string(); }
+  double progress() const override { return reader_.progress(); }
+  std::optional<CameraSize> size() const override {
+    return CameraSize{first_->camera.width, first_->camera.height};
+  }
+  std::string label() const override { return first_->sensorLabel; }
+  std::shared_ptr<const void> original() const override { return first_; }
+
+ private:
+  RawlogReader reader_;
+  CObservationEvents::Ptr first_;
+  std::string damage_;
+};
+
+/// Neither events nor poses. Its damage is that of the events.
+class RawlogOthers : public OtherStream {
+ public:
+  explicit RawlogOthers(const std::filesystem::path& file) : reader_(file) {}
+
+  std::optional<OtherSample> next() override {
+    try {
+      while (CObservation::Ptr observation = reader_.next()) {
+        if (asPacket(observation) || poseSourceOf(*observation)) continue;
+        return OtherSample{observation->GetRuntimeClass()->className,
+                           nanosecondsIfKnown(observation->timestamp), std::move(observation)};
+      }
+    } catch (const std::exception&) {
+    }
+    return std::nullopt;
+  }
+
+ private:
+  RawlogReader reader_;
+};
+
+/// @throws std::invalid_argument where a camera changes.
+void addPacket(const CObservationEvents::Ptr& packet,
+               std::map<int, CObservationEvents::Ptr>& cameras) {
+  packet->events = {};
+  const auto [known, is_new] = cameras.emplace(packet->camera_index, packet);
+  if (is_new || isSame(calibrationOf(*known->second), calibrationOf(*packet))) return;
+  throw std::invalid_argument(
+      fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "
+                  "first packet",
+                  packet->camera_index));
+}
+
+}  // namespace
+
+RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& /*options*/) {
+  RecordingParts parts;
+  parts.rounded = true;
+  std::map<int, CObservationEvents::Ptr> cameras;
+  bool has_others = false;
+  RawlogReader reader(file);
+  try {
+    while (const CObservation::Ptr observation = reader.next()) {
+      if (const auto packet = asPacket(observation)) {
+        addPacket(packet, cameras);
+      } else if (auto pose = poseIn(*observation)) {
+        pose->original = observation;
+        parts.pose_samples.push_back(std::move(*pose));
+      } else {
+        has_others = true;
+      }
+    }
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(reader.position() + ": " + error.what());
+  } catch (const std::runtime_error& error) {
+    if (cameras.empty() && parts.pose_samples.empty() && !has_others) throw;
+    if (cameras.empty()) parts.poses_damage = error.what();
+  }
+  Calibration calibration{file, {}};
+  bool is_calibrated = !cameras.empty();
+  for (const auto& [index, first] : cameras) {
+    if (index != static_cast<int>(calibration.rig.cameras.size())) {
+      throw std::runtime_error(
+          fmt::format("{}: the recording has events of camera {} but none of camera {}",
+                      file.string(), index, calibration.rig.cameras.size()));
+    }
+    calibration.rig.cameras.push_back(calibrationOf(*first));
+    is_calibrated = is_calibrated && isCalibrated(first->camera);
+    parts.cameras.push_back(std::make_unique<RawlogEvents>(file, first));
+  }
+  if (is_calibrated) parts.calibration = std::move(calibration);
+  if (has_others) parts.others = std::make_unique<RawlogOthers>(file);
+  return parts;
+}
+
+namespace {
+
+CObservation::Ptr packetOf(EventPacket packet) {
+  const auto original = std::static_pointer_cast<const CObservationEvents>(packet.original);
+  const RigCamera& camera = packet.calibration;
+  auto observation = CObservationEvents::Create();
+  observation->sensorLabel = packet.label;
+  observation->timestamp = packet.t_ns ? mrptTimeFrom(*packet.t_ns) : INVALID_TIMESTAMP;
+  observation->camera_index = packet.camera;
+  observation->camera = camera.model;
+  // A second conversion would change the last digits.
+  const bool is_original = original && isSame(rigidFrom(original->camera_pose), camera.T_rig_cam);
+  observation->camera_pose = is_original ? original->camera_pose : mrptPoseFrom(camera.T_rig_cam);
+  observation->time_offset_ns = camera.time_offset_ns;
+  observation->events = std::move(packet.events);
+  observation->covered_until_ns = packet.covered_until_ns;
+  return observation;
+}
+
+CObservation::Ptr poseOf(const PoseSample& pose) {
+  if (!pose.original) return poseObservation(pose);
+  const auto original = std::static_pointer_cast<const CObservation>(pose.original);
+  auto observation = std::dynamic_pointer_cast<CObservation>(original->duplicateGetSmartPtr());
+  const PoseSample before = *poseIn(*original);
+  observation->timestamp = mrptTimeFrom(pose.t_ns);
+  if (!isSame(before.T_body_rig, pose.T_body_rig)) {
+    observation->setSensorPose(mrptPoseFrom(pose.T_body_rig.inverse()));
+  }
+  const auto robot = std::dynamic_pointer_cast<CObservationRobotPose>(observation);
+  if (robot && !isSame(before.T_world_body, pose.T_world_body)) {
+    robot->pose.mean = mrptPoseFrom(pose.T_world_body);
+  }
+  return observation;
+}
+
+}  // namespace
+
+CObservation::Ptr observationOf(Sample sample) {
+  if (auto* packet = std::get_if<EventPacket>(&sample)) return packetOf(std::move(*packet));
+  if (const auto* pose = std::get_if<PoseSample>(&sample)) return poseOf(*pose);
+  return std::const_pointer_cast<CObservation>(
+      std::static_pointer_cast<const CObservation>(std::get<OtherSample>(sample).original));
+}
+
+namespace {
+
+class GzRawlogWriter : public RawlogWriter {
+ public:
+  GzRawlogWriter(const std::filesystem::path& file, RawlogCompression compression)
+      : file_(file),
+        compression_(compression == RawlogCompression::kZstd ? EventCompression::kZstd
+                                                             : EventCompression::kNone),
+        stream_(std::make_unique<GzOutputStream>(file_.temporary(),
+                                                 compression == RawlogCompression::kGzip)) {}
+
+  void write(Sample sample) override {
+    const CObservation::Ptr observation = observationOf(std::move(sample));
+    if (const auto packet = asPacket(observation)) packet->compression = compression_;
+    try {
+      auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(*stream_);
+      archive << *observation;
+    } catch (const std::exception& error) {
+      throw std::runtime_error(file_.path().string() + ": cannot be written: " + error.what());
+    }
+  }
+
+  void close() override {
+    try {
+      stream_->close();
+      file_.replace();
+      stream_.reset();
+    } catch (const std::exception& error) {
+      throw std::runtime_error(file_.path().string() + ": " + error.what());
+    }
+  }
+
+ private:
+  AtomicFile file_;
+  EventCompression compression_;
+  std::unique_ptr<GzOutputStream> stream_;
+};
+
+}  // namespace
+
+std::unique_ptr<RawlogWriter> writeRawlog(const std::filesystem::path& file,
+                                          RawlogCompression compression) {
+  return std::make_unique<GzRawlogWriter>(file, compression);
+}
+
+}  // namespace efm

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/joined_recording.h"
+
+#include <algorithm>
+#include <exception>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "mapping/base/named_choice.h"
+#include "mapping/geometry/timestamp.h"
+
+namespace efm {
+namespace {
+
+/// @param poses in the order of time.
+void cutPoses(const TimeLimits& limits, std::vector<PoseSample>& poses) {
+  if (!limits.t0_ns && !limits.t1_ns) return;
+  std::set<PoseSourceId> has_before, has_after;
+  const auto keep = [&](const PoseSample& pose) {
+    if (limits.t0_ns && pose.t_ns < *limits.t0_ns) return has_before.insert(pose.source).second;
+    if (limits.t1_ns && pose.t_ns >= *limits.t1_ns) return has_after.insert(pose.source).second;
+    return true;
+  };
+  std::vector<PoseSample> kept;
+  const auto begin = std::find_if(poses.begin(), poses.end(), [&](const PoseSample& pose) {
+    return !limits.t0_ns || pose.t_ns >= *limits.t0_ns;
+  });
+  for (auto pose = begin; pose != poses.begin();) {  // the newest before t0
+    if (keep(*--pose)) kept.push_back(std::move(*pose));
+  }
+  std::reverse(kept.begin(), kept.end());
+  for (auto pose = begin; pose != poses.end(); ++pose) {
+    if (keep(*pose)) kept.push_back(std::move(*pose));
+  }
+  poses = std::move(kept);
+}
+
+class JoinedRecording : public Recording {
+ public:
+  JoinedRecording(JoinedParts parts, const TimeLimits& limits)
+      : parts_(std::move(parts)),
+        limits_(limits),
+        bad_(std::make_unique<BadEvents>(parts_.skip_bad_events)) {
+    limits.validate();
+    requireOption(parts_.cameras.size() == parts_.rig.cameras.size(), "event streams",
+                  parts_.cameras.size(), "one per camera");
+    for (std::size_t i = 0; i < parts_.cameras.size(); ++i) {
+      const std::int64_t offset_ns = parts_.offsets_ns[i];
+      parts_.cameras[i].skipBadEvents(*bad_);
+      if (limits.t0_ns) parts_.cameras[i].startAt(*limits.t0_ns - offset_ns);
+      if (limits.t1_ns) parts_.cameras[i].stopAt(*limits.t1_ns - offset_ns);
+    }
+    std::stable_sort(parts_.poses.begin(), parts_.poses.end(),
+                     [](const auto& a, const auto& b) { return a.t_ns < b.t_ns; });
+    if (!parts_.all_poses) cutPoses(limits, parts_.poses);
+    if (!limits.t0_ns && !limits.t1_ns) requireEvents();
+  }
+
+  std::optional<Sample> next() override {
+    readAhead();
+    if (next_pose_ < parts_.poses.size()) {
+      PoseSample& pose = parts_.poses[next_pose_];
+      if (isDue(pose.t_ns + parts_.latency_ns)) {
+        position_ = "the poses";
+        ++next_pose_;
+        return std::move(pose);
+      }
+    }
+    if (other_ && (!other_->t_ns || isDue(*other_->t_ns))) {
+      return *std::exchange(other_, std::nullopt);
+    }
+    if (error_) std::rethrow_exception(error_);
+    if (!packet_) {
+      if (const std::string error = damage(); !error.empty()) throw std::runtime_error(error);
+      return std::nullopt;
+    }
+    position_ = packet_position_;
+    return *std::exchange(packet_, std::nullopt);
+  }
+
+  const Rig& rig() const override { return parts_.rig; }
+  std::string position() const override { return position_; }
+
+  double progress() const override {
+    double least = 1;
+    for (const EventPackets& camera : parts_.cameras) {
+      least = std::min(least, camera.stream().progress());
+    }
+    return least;
+  }
+
+  RecordingCounts counts() const override {
+    RecordingCounts counts;
+    counts.warnings = parts_.warnings;
+    counts.skipped_events = bad_->count();
+    counts.first_skipped = bad_->first();
+    for (const EventPackets& camera : parts_.cameras) {
+      counts.sorted_events += camera.sortedEvents();
+      counts.lost_packets += camera.stream().lostPackets();
+      counts.undated_events += camera.stream().undatedEvents();
+      for (Warning& warning : camera.stream().warnings()) {
+        counts.warnings.push_back(std::move(warning));
+      }
+    }
+    return counts;
+  }
+
+ private:
+  void requireEvents() {
+    if (parts_.cameras.empty() || nextCamera()) return;
+    std::string names;
+    for (const EventPackets& camera : parts_.cameras) {
+      names += (names.empty() ? "" : ", ") + camera.stream().name();
+    }
+    if (!damage().empty()) return;  // it comes after the poses
+    throw std::runtime_error(names + ": no events: expected at least one");
+  }
+
+  /// Empty: there is none so far.
+  std::string damage() const {
+    std::string damage = parts_.poses_damage;
+    for (const EventPackets& camera : parts_.cameras) {
+      if (damage.empty()) damage = camera.stream().damage();
+    }
+    return damage;
+  }
+
+  /// Whether the next packet begins no earlier, or there is none.
+  bool isDue(std::int64_t t_ns) const {
+    return !packet_ || nearestTick(t_ns) <= nearestTick(*packet_->t_ns);
+  }
+
+  /// An error of the events comes after all poses.
+  void readAhead() {
+    try {
+      if (!packet_ && !error_) packet_ = nextPacket();
+      while (parts_.others && !other_ && !error_) {
+        other_ = parts_.others->next();
+        if (!other_) parts_.others.reset();
+        if (other_ && other_->t_ns && !limits_.contain(*other_->t_ns)) other_.reset();
+      }
+    } catch (const std::exception&) {
+      error_ = std::current_exception();
+    }
+  }
+
+  /// The camera with the earliest next packet; of several the first one.
+  std::optional<std::size_t> nextCamera() {
+    std::optional<std::size_t> first;
+    std::int64_t first_ns = kEndOfTimeNs;
+    for (std::size_t camera = 0; camera < parts_.cameras.size(); ++camera) {
+      const std::int64_t t_ns = parts_.cameras[camera].nextTime().value_or(kEndOfTimeNs);
+      if (t_ns >= first_ns) continue;
+      first_ns = t_ns;
+      first = camera;
+    }
+    return first;
+  }
+
+  std::optional<EventPacket> nextPacket() {
+    const std::optional<std::size_t> next = nextCamera();
+    if (!next) return std::nullopt;
+    packet_position_ = parts_.cameras[*next].stream().name();
+    const bool announces = announced_ < parts_.cameras.size();
+    const std::size_t camera = announces ? announced_++ : *next;
+    EventPackets& stream = parts_.cameras[camera];
+    EventPacket packet{static_cast<int>(camera), parts_.rig.cameras[camera], {}};
+    packet.t_ns = parts_.cameras[*next].nextTime();
+    packet.label = stream.stream().label();
+    if (packet.label.empty()) packet.label = "cam" + std::to_string(camera);
+    packet.original = stream.stream().original();
+    if (!announces) packet.events = stream.nextPacket();
+    if (nextCamera()) packet.covered_until_ns = stream.nextTime().value_or(kEndOfTimeNs);
+    return packet;
+  }
+
+  JoinedParts parts_;
+  TimeLimits limits_;
+  std::unique_ptr<BadEvents> bad_;  // the cameras refer to it
+  std::size_t announced_ = 0;       // number of empty packets so far
+  std::size_t next_pose_ = 0;
+  std::optional<EventPacket> packet_;  // the next one
+  std::optional<OtherSample> other_;   // the next one
+  std::exception_ptr error_;           // the error that ended the events or the others
+  std::string packet_position_;
+  std::string position_ = "the recording";
+};
+
+}  // namespace
+
+std::unique_ptr<Recording> join(JoinedParts parts, const TimeLimits& limits) {
+  return std::make_unique<JoinedRecording>(std::move(parts), limits);
+}
+
+}  // namespace efm

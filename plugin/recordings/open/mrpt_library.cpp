@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/recordings/open/mrpt_library.h"
+
+#include <dlfcn.h>
+
+#include <stdexcept>
+
+namespace efm {
+namespace {
+
+/// The folder of the library, or of the program, that has this code.
+std::filesystem::path ownFolder() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<void*>(&ownFolder), &info) == 0) return {};
+  return std::filesystem::path(info.dli_fname).parent_path();
+}
+
+}  // namespace
+
+void* symbolOf(const std::string& library, const std::string& symbol) {
+  const std::filesystem::path beside = ownFolder() / library;
+  std::error_code ignored;
+  const bool is_beside = std::filesystem::exists(beside, ignored);
+  void* const handle =
+      dlopen((is_beside ? beside.string() : library).c_str(), RTLD_NOW | RTLD_LOCAL);
+  void* const found = handle != nullptr ? dlsym(handle, symbol.c_str()) : nullptr;
+  if (found != nullptr) return found;
+  const char* const why = dlerror();
+  throw std::runtime_error(library + " cannot be loaded: " + (why ? why : "no reason given"));
+}
+
+const MrptLibrary& mrptLibrary() {
+  static const auto& library =
+      *static_cast<const MrptLibrary*>(symbolOf("libmrpt-event-fusion.so", "efmMrptLibrary"));
+  return library;
+}
+
+}  // namespace efm

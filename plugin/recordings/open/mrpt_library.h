@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "plugin/recordings/streams/recording_parts.h"
+#include "plugin/session/hosted_mapping.h"
+#include "plugin/session/map_watcher.h"
+#include "plugin/session/sample.h"
+
+namespace efm {
+
+/// Writes a recording as a rawlog.
+class RawlogWriter {
+ public:
+  virtual ~RawlogWriter() = default;
+  virtual void write(Sample sample) = 0;
+  /// Completes the file. Without it there is none.
+  virtual void close() = 0;
+};
+
+enum class RawlogCompression { kGzip, kZstd, kNone };
+
+/// What needs MRPT's classes: libmrpt-event-fusion.so (plugin/mrpt/), which is loaded when it is
+/// used.
+struct MrptLibrary {
+  RecordingParts (*openRawlog)(const std::filesystem::path& file, const ReaderOptions& options);
+  /// @param file an earlier file of this name is replaced: see AtomicFile.
+  /// @param compression gzip for the whole file, MRPT's default; or Zstandard for the events alone,
+  /// three times as fast, in a plain file.
+  std::unique_ptr<RawlogWriter> (*writeRawlog)(const std::filesystem::path& file,
+                                               RawlogCompression compression);
+  void (*writeSimpleMap)(const std::filesystem::path& file,
+                         const std::vector<StoredKeyframe>& keyframes);
+  /// See MapFrames (plugin/mrpt/window/map_scene.h).
+  std::unique_ptr<MapWatcher> (*recordFrames)(const std::filesystem::path& folder, bool force);
+};
+
+/// Loads the library: from the folder of libevent-fusion.so, then as the system's loader finds it.
+/// @throws std::runtime_error naming the library and why it cannot be loaded.
+const MrptLibrary& mrptLibrary();
+
+/// A symbol of a library that is found in the same way. The library is never closed.
+void* symbolOf(const std::string& library, const std::string& symbol);
+
+}  // namespace efm
