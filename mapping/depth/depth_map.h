@@ -112,7 +112,7 @@ struct DepthMap {
   /// Variance of inverse depth, 1/m^2: 0 where there is no depth, infinite where the peak is flat
   /// or lies on the first or last plane.
   cv::Mat1f variance;
-  PixelCounts pixels;  ///< `ExtractionMethod::kPaper` keeps every candidate.
+  PixelCounts pixels = {};  ///< `ExtractionMethod::kPaper` keeps every candidate.
 };
 
 /// A position between planes, in planes, and its variance, in planes^2.

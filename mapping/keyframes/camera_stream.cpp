@@ -65,7 +65,7 @@ CameraStream::CameraStream(int index, const RigCamera& camera, bool selected,
   if (filter.any()) filter_.emplace(EventFilter(model_.width, model_.height, filter));
 }
 
-void CameraStream::requireValid(const std::vector<Event>& events) const {
+void CameraStream::requireValid(EventSpan events) const {
   requireInsideSensor(events, index_, model_);
   std::int64_t late_before_ns = lateBefore();
   for (const Event& event : events) {

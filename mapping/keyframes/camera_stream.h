@@ -43,7 +43,7 @@ class CameraStream {
 
   /// @throws std::invalid_argument where an event lies outside the sensor, or comes more than 10 ms
   /// after a newer one.
-  void requireValid(const std::vector<Event>& events) const;
+  void requireValid(EventSpan events) const;
   /// See FusionMapper::isOlder.
   bool isOlder(const std::vector<Event>& events) const;
   /// See FusionMapper::dropLate.

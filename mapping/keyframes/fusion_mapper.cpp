@@ -115,10 +115,11 @@ void FusionMapper::addPose(const StampedPose& pose) {
   if (!trajectory_.add(pose)) ++counts_.duplicate_poses;
 }
 
-void FusionMapper::addEvents(int camera, std::vector<Event> events) {
+void FusionMapper::addEvents(int camera, std::vector<Event> events, bool checked) {
   CameraStream& stream = cameras_.at(static_cast<std::size_t>(camera));
   if (events.empty()) return;
-  stream.requireValid(events);
+  const Event ends[] = {events.front(), events.back()};  // of all times
+  stream.requireValid(checked ? EventSpan(ends, ends + 2) : EventSpan(events));
   const std::int64_t begin_ns = stream.onTrajectoryClock(events.front().t_ns);
   packet_ns_ = std::max(packet_ns_.value_or(begin_ns), begin_ns);
   counts_.sorted_events += stream.add(std::move(events), options_.limits, released_ns_);

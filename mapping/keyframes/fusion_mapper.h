@@ -110,7 +110,8 @@ class FusionMapper : private RecordingProgress {
   /// counted.
   /// @throws std::invalid_argument where an event is later than that, or lies outside the sensor;
   /// then no event of this call is taken.
-  void addEvents(int camera, std::vector<Event> events);
+  /// @param checked the events lie inside the sensor, and are in the order of time.
+  void addEvents(int camera, std::vector<Event> events, bool checked = false);
   /// Whether a camera's clock may have gone back: the events are in order, and each one comes more
   /// than 10 ms after a newer one of earlier calls.
   bool isOlder(int camera, const std::vector<Event>& events) const {

@@ -47,7 +47,8 @@ int runImport(const ImportArguments& arguments) {
   source.limits = resolve(arguments.times, source);
   const std::unique_ptr<Recording> recording = openRecording(source);
   const Interruption interruption;
-  const auto writer = mrptLibrary().writeRawlog(arguments.out, arguments.compression);
+  const auto writer = mrptLibrary(arguments.out.string() + ": a rawlog")
+                          .writeRawlog(arguments.out, arguments.compression);
   std::map<std::string, std::uint64_t> events;  // per label
   std::uint64_t all_events = 0;
   std::uint64_t poses = 0;

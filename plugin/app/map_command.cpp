@@ -139,9 +139,9 @@ void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void(
 void writeSimpleMap(MapOutput& output, const std::vector<StoredKeyframe>& keyframes) {
   const MrptLibrary* library = nullptr;
   try {
-    library = &mrptLibrary();
+    library = &mrptLibrary("map.simplemap");
   } catch (const std::runtime_error& error) {
-    std::cerr << "event-fusion: note: map.simplemap is not written: " << error.what() << "\n";
+    std::cerr << "event-fusion: note: " << error.what() << "; the file is left out\n";
     return;
   }
   output.writeFile("map.simplemap", [&](const std::filesystem::path& file) {
@@ -157,12 +157,7 @@ std::unique_ptr<MapWindow> openWindow() {
         "--view needs a display: DISPLAY is not set; --record-frames DIR renders without a screen");
   }
   using Open = MapWindow* (*)();
-  void* open = nullptr;
-  try {
-    open = symbolOf("libevent-fusion-window.so", "efmOpenMapWindow");
-  } catch (const std::runtime_error& error) {
-    throw std::runtime_error(std::string("--view: ") + error.what());
-  }
+  void* const open = symbolOf("libevent-fusion-window.so", "efmOpenMapWindow", "--view");
   std::unique_ptr<MapWindow> window(reinterpret_cast<Open>(open)());
   if (window) return window;
   throw std::runtime_error(std::string("--view: no window appears on the display ") + display +
@@ -458,7 +453,7 @@ int runMap(const MapArguments& arguments) {
     std::vector<std::filesystem::path> inputs = inputsOf(sourceOf(arguments, job.options));
     if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
     refuseToReplace(arguments.record_frames, inputs);
-    frames = mrptLibrary().recordFrames(arguments.record_frames, arguments.force);
+    frames = mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force);
     job.watchers.push_back(frames.get());
   }
   const bool refined = job.options.refinement.enabled;

@@ -75,7 +75,6 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   const std::lock_guard<std::mutex> lock(mutex_);
   mapping_ = std::move(next);
   mapping_->setSink(sink_);
-  mapping_->setClock(clock_);
   tracker_poses_.clear();
   options_ = builder_options;
   ignored_observations_ = 0;
@@ -144,12 +143,6 @@ void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
   mapping_->setSink(sink);
-}
-
-void CEventFusionMapBuilder::setProcessorClock(ProcessorClock clock) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  clock_ = std::move(clock);
-  mapping_->setClock(clock_);
 }
 
 /// One warning per camera. `status` counts the silent keyframes.

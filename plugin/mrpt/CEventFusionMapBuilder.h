@@ -86,9 +86,6 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   /// of the sweep call it while the mutex is held: it must not use the builder. In live operation a
   /// keyframe that is being made still uses the former sink: it must live until the next keyframe.
   void setDsiSink(DsiSink* sink);
-  /// @param clock measures the stages of `status().times`: the processor time of the threads that
-  /// map. By default that of the whole process.
-  void setProcessorClock(ProcessorClock clock);
 
   /// Feeds events and poses (CObservationRobotPose, CObservationOdometry). Poses of one source are
   /// used: see PoseSourceSelector. Other observations are counted and ignored. A
@@ -173,7 +170,6 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   KeyframeCallback callback_;
   MapCallback map_callback_;
   DsiSink* sink_ = nullptr;
-  ProcessorClock clock_ = processSeconds;
   std::uint64_t ignored_observations_ = 0;
   TrackerPoses tracker_poses_;
   DeadReckoning reckoning_;                 // of the actions

@@ -14,7 +14,6 @@
 #include <cstring>
 #include <deque>
 #include <exception>
-#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -28,10 +27,6 @@
 
 namespace efm {
 namespace {
-
-constexpr std::size_t kBufferSize = std::size_t{1} << 18;
-
-[[noreturn]] void refuse(const char* what) { throw std::logic_error(what); }
 
 std::string systemReason() {
   const int number = errno;
@@ -52,95 +47,68 @@ std::string reasonOf(gzFile file) {
 
 }  // namespace
 
-GzInputStream::GzInputStream(const std::filesystem::path& file) : file_(nullptr, gzclose_r) {
+GzStream::GzStream(const std::filesystem::path& file, Mode mode) : file_(nullptr, gzclose) {
+  constexpr unsigned kBufferSize = 1U << 18U;
   const std::filesystem::file_status status = std::filesystem::status(file);
-  if (!std::filesystem::is_regular_file(status)) {
+  if (mode == Mode::kRead && !std::filesystem::is_regular_file(status)) {
     const char* const what = std::filesystem::is_directory(status) ? "a folder: expected a file"
                              : std::filesystem::exists(status)     ? "not a regular file"
                                                                    : "no such file";
     throw std::runtime_error(file.string() + ": " + what);
   }
-  file_size_ = std::filesystem::file_size(file);
-  file_.reset(gzopen(file.c_str(), "rb"));
-  if (!file_) {
-    throw std::runtime_error(file.string() + ": cannot be opened: " + std::strerror(errno));
-  }
-  gzbuffer(file_.get(), static_cast<unsigned>(kBufferSize));
+  if (mode == Mode::kRead) file_size_ = std::filesystem::file_size(file);
+  file_.reset(gzopen(file.c_str(), mode == Mode::kRead    ? "rb"
+                                   : mode == Mode::kWrite ? "wb1"
+                                                          : "wbT"));
+  if (!file_) throw std::runtime_error(file.string() + ": cannot be opened: " + systemReason());
+  gzbuffer(file_.get(), kBufferSize);
 }
 
-void GzInputStream::fill() {
-  if (at_ < buffer_.size()) return;
-  buffer_.resize(kBufferSize);
-  at_ = 0;
-  const int count = gzread(file_.get(), buffer_.data(), static_cast<unsigned>(kBufferSize));
-  if (count < 0) {
-    buffer_.clear();
-    throw std::runtime_error(reasonOf(file_.get()));
+bool GzStream::atEnd() {
+  const int byte = gzgetc(file_.get());
+  if (byte >= 0) {
+    gzungetc(byte, file_.get());
+    return false;
   }
-  buffer_.resize(static_cast<std::size_t>(count));
-  if (count > 0) return;
   int code = Z_OK;
-  gzerror(file_.get(), &code);  // a truncated file ends with 0 bytes and this code
+  gzerror(file_.get(), &code);  // also of a truncated file
   if (code != Z_OK) throw std::runtime_error(reasonOf(file_.get()));
+  return true;
 }
 
-bool GzInputStream::atEnd() {
-  fill();
-  return buffer_.empty();
-}
-
-double GzInputStream::progress() const {
+double GzStream::progress() const {
   const auto offset = static_cast<double>(gzoffset(file_.get()));
   return file_size_ == 0 ? 1.0 : std::clamp(offset / static_cast<double>(file_size_), 0.0, 1.0);
 }
 
-std::size_t GzInputStream::Read(void* buffer, std::size_t count) {
-  auto* to = static_cast<std::uint8_t*>(buffer);
-  std::size_t done = 0;
-  while (done < count && !atEnd()) {
-    const std::size_t piece = std::min(count - done, buffer_.size() - at_);
-    std::memcpy(to + done, buffer_.data() + at_, piece);
-    at_ += piece;
-    done += piece;
-  }
-  position_ += done;
-  return done;
-}
-
-std::size_t GzInputStream::Write(const void*, std::size_t) { refuse("a stream to read from"); }
-std::uint64_t GzInputStream::Seek(std::int64_t, TSeekOrigin) { refuse("a stream goes forward"); }
-std::uint64_t GzInputStream::getTotalBytesCount() const { refuse("a stream has no known size"); }
-
-GzOutputStream::GzOutputStream(const std::filesystem::path& file, bool compressed)
-    : file_(gzopen(file.c_str(), compressed ? "wb1" : "wbT"), gzclose_w) {
-  if (!file_) {
-    throw std::runtime_error(file.string() + ": cannot be made: " + std::strerror(errno));
-  }
-  gzbuffer(file_.get(), kBufferSize);
-}
-
-std::size_t GzOutputStream::Write(const void* buffer, std::size_t count) {
-  const auto* from = static_cast<const std::uint8_t*>(buffer);
-  constexpr std::size_t kMost = std::numeric_limits<int>::max();
-  for (std::size_t done = 0; done < count;) {
-    const std::size_t piece = std::min(kMost, count - done);
-    const int written = gzwrite(file_.get(), from + done, static_cast<unsigned>(piece));
-    if (written <= 0) throw std::runtime_error(reasonOf(file_.get()));
-    done += static_cast<std::size_t>(written);
-  }
-  position_ += count;
-  return count;
-}
-
-void GzOutputStream::close() {
-  gzFile handle = file_.release();
-  if (handle != nullptr && gzclose_w(handle) != Z_OK) {
+void GzStream::close() {
+  if (file_ && gzclose(file_.release()) != Z_OK) {
     throw std::runtime_error("cannot be completed: " + systemReason());
   }
 }
 
-std::size_t GzOutputStream::Read(void*, std::size_t) { refuse("a stream to write to"); }
-std::uint64_t GzOutputStream::Seek(std::int64_t, TSeekOrigin) { refuse("a stream goes forward"); }
+std::size_t GzStream::Read(void* buffer, std::size_t count) {
+  const std::size_t done = gzfread(buffer, 1, count, file_.get());
+  if (done < count) atEnd();
+  return done;
+}
+
+std::size_t GzStream::Write(const void* buffer, std::size_t count) {
+  if (gzfwrite(buffer, 1, count, file_.get()) != count) {
+    throw std::runtime_error(reasonOf(file_.get()));
+  }
+  return count;
+}
+
+std::uint64_t GzStream::Seek(std::int64_t, TSeekOrigin) {
+  throw std::logic_error("a stream goes forward");
+}
+std::uint64_t GzStream::getTotalBytesCount() const {
+  throw std::logic_error("a stream has no known size");
+}
+std::uint64_t GzStream::getPosition() const {
+  return static_cast<std::uint64_t>(gztell(file_.get()));
+}
 
 namespace {
 
@@ -273,7 +241,7 @@ class RawlogReader {
   }
 
   std::filesystem::path file_;
-  GzInputStream stream_;
+  GzStream stream_;
   std::uint64_t entries_ = 0;  // read so far
   std::deque<CObservation::Ptr> pending_;
   std::deque<mrpt::obs::CActionCollection::Ptr> actions_;  // before the next frame
@@ -449,14 +417,15 @@ class GzRawlogWriter : public RawlogWriter {
       : file_(file),
         compression_(compression == RawlogCompression::kZstd ? EventCompression::kZstd
                                                              : EventCompression::kNone),
-        stream_(std::make_unique<GzOutputStream>(file_.temporary(),
-                                                 compression == RawlogCompression::kGzip)) {}
+        stream_(file_.temporary(), compression == RawlogCompression::kGzip
+                                       ? GzStream::Mode::kWrite
+                                       : GzStream::Mode::kWritePlain) {}
 
   void write(Sample sample) override {
     const CObservation::Ptr observation = observationOf(std::move(sample));
     if (const auto packet = asPacket(observation)) packet->compression = compression_;
     try {
-      auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(*stream_);
+      auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);
       archive << *observation;
     } catch (const std::exception& error) {
       throw std::runtime_error(file_.path().string() + ": cannot be written: " + error.what());
@@ -465,9 +434,8 @@ class GzRawlogWriter : public RawlogWriter {
 
   void close() override {
     try {
-      stream_->close();
+      stream_.close();
       file_.replace();
-      stream_.reset();
     } catch (const std::exception& error) {
       throw std::runtime_error(file_.path().string() + ": " + error.what());
     }
@@ -476,7 +444,7 @@ class GzRawlogWriter : public RawlogWriter {
  private:
   AtomicFile file_;
   EventCompression compression_;
-  std::unique_ptr<GzOutputStream> stream_;
+  GzStream stream_;
 };
 
 }  // namespace

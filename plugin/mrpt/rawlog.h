@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
-#include <vector>
 
 #include "plugin/recordings/open/mrpt_library.h"
 
@@ -16,54 +15,31 @@ struct gzFile_s;  // of zlib
 
 namespace efm {
 
-using GzFile = std::unique_ptr<gzFile_s, int (*)(gzFile_s*)>;
-
-/// A gzip file or a plain file as an MRPT stream for reading. A truncated file is an error, which
-/// mrpt::io::CFileGZInputStream does not notice.
-class GzInputStream : public mrpt::io::CStream {
+/// A gzip file, with MRPT's compression level, 1, or a plain file, as an MRPT stream. A truncated
+/// file is an error, and so is a full disk: mrpt::io's own streams notice neither.
+class GzStream : public mrpt::io::CStream {
  public:
-  explicit GzInputStream(const std::filesystem::path& file);
+  enum class Mode { kRead, kWrite, kWritePlain };
+  explicit GzStream(const std::filesystem::path& file, Mode mode = Mode::kRead);
 
   /// @throws std::runtime_error if the file is truncated or its compression is damaged.
   bool atEnd();
   /// The fraction of the file that has been read, 0 to 1.
   double progress() const;
+  /// Completes a file that is written.
+  void close();
 
   /// @return less than `count` only at the end.
   /// @throws std::runtime_error as `atEnd`.
   std::size_t Read(void* buffer, std::size_t count) override;
-  std::size_t Write(const void* buffer, std::size_t count) override;     ///< Throws: read only.
-  std::uint64_t Seek(std::int64_t offset, TSeekOrigin origin) override;  ///< Throws: forward only.
-  std::uint64_t getTotalBytesCount() const override;                     ///< Throws: not known.
-  std::uint64_t getPosition() const override { return position_; }
-
- private:
-  void fill();
-
-  GzFile file_;
-  std::uint64_t file_size_ = 0;
-  std::uint64_t position_ = 0;
-  std::vector<std::uint8_t> buffer_;
-  std::size_t at_ = 0;  // in the buffer
-};
-
-/// A gzip file, with MRPT's compression level, 1, or a plain file, as an MRPT stream for writing.
-class GzOutputStream : public mrpt::io::CStream {
- public:
-  explicit GzOutputStream(const std::filesystem::path& file, bool compressed = true);
-
-  /// Completes the file.
-  void close();
-
-  std::size_t Read(void* buffer, std::size_t count) override;  ///< Throws: write only.
   std::size_t Write(const void* buffer, std::size_t count) override;
   std::uint64_t Seek(std::int64_t offset, TSeekOrigin origin) override;  ///< Throws: forward only.
-  std::uint64_t getTotalBytesCount() const override { return position_; }
-  std::uint64_t getPosition() const override { return position_; }
+  std::uint64_t getTotalBytesCount() const override;                     ///< Throws: not known.
+  std::uint64_t getPosition() const override;
 
  private:
-  GzFile file_;
-  std::uint64_t position_ = 0;
+  std::unique_ptr<gzFile_s, int (*)(gzFile_s*)> file_;
+  std::uint64_t file_size_ = 0;  // of one that is read
 };
 
 /// Reads a rawlog, gzip-compressed or plain. Cameras are in the order of their indices. The

@@ -118,7 +118,9 @@ void InputQueue::add(EventPacket packet) {
     return;
   }
   try {
-    requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
+    if (!packet.checked) {
+      requireInsideSensor(packet.events, packet.camera, packet.calibration.model);
+    }
     if (camera.last && !isSame(camera.last->calibration, packet.calibration)) {
       throw std::invalid_argument(
           fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "

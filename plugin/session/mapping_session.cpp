@@ -196,7 +196,7 @@ void MappingSession::feed(EventPacket packet) {
   const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns;
   {
     const SecondsScope scope(status_.times.real.filter, status_.times.cpu.filter);
-    mapper_.addEvents(packet.camera, std::move(packet.events));
+    mapper_.addEvents(packet.camera, std::move(packet.events), packet.checked);
   }
   if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
   if (empty) {

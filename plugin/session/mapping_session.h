@@ -132,8 +132,6 @@ class MappingSession {
   const RigSetup& setup() const { return rig_.setup(); }
   /// See SessionStatus.
   std::uint64_t choices() const { return status_.choices; }
-  /// The newest pose of the selected source, as the tracker has it.
-  const std::optional<StampedPose>& newestPose() const { return newest_pose_; }
   SessionStatus status() const;
 
  private:
@@ -200,7 +198,7 @@ class MappingSession {
   bool keyframe_lost_ = false;  // the last call of `next` made one and threw
   bool all_refined_ = false;
   std::optional<std::int64_t> newest_begin_ns_;  // of packets with events
-  std::optional<StampedPose> newest_pose_;
+  std::optional<StampedPose> newest_pose_;       // of the selected source, as the tracker has it
   // Poses after a jump with their stated noise, until those before it are used up.
   std::vector<std::pair<StampedPose, std::optional<PoseNoise>>> next_stretch_;
   /// The poses between two jumps.

@@ -26,8 +26,8 @@ EventPacket thinnedOut(const EventPacket& packet) {
     length_s = secondsBetween(packet.events.front().t_ns, packet.events.back().t_ns);
   }
   const auto limit = static_cast<std::size_t>(std::max(1e3, kMaxEventsPerSecond * length_s));
-  return {packet.camera, packet.calibration, chosenEvenly(packet.events, limit),
-          packet.covered_until_ns};
+  return {packet.camera,           packet.calibration, chosenEvenly(packet.events, limit),
+          packet.covered_until_ns, packet.t_ns,        packet.checked};
 }
 
 /// Not in live operation, which maps windows and forgets them.

@@ -26,7 +26,9 @@ struct EventPacket {
   /// So an empty packet with this time says that there was no event.
   std::optional<std::int64_t> covered_until_ns = std::nullopt;
   std::optional<std::int64_t> t_ns = std::nullopt;  ///< Begin; of an empty packet, its own time.
-  std::string label = {};                           ///< The sensor's name; empty: not known.
+  /// EventPackets has checked the events: they lie inside the sensor, in the order of time.
+  bool checked = false;
+  std::string label = {};  ///< The sensor's name; empty: not known.
   /// A packet of this camera from a rawlog, for a writer of rawlogs; null: there is none.
   std::shared_ptr<const void> original = nullptr;
 };

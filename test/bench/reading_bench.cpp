@@ -133,7 +133,7 @@ void writeRawlog(const fs::path& file, const fs::path& folder) {
   RecordingSource source;
   source.files = {folder};
   const std::unique_ptr<Recording> recording = openRecording(source);
-  const auto writer = mrptLibrary().writeRawlog(file, RawlogCompression::kGzip);
+  const auto writer = mrptLibrary("rawlog").writeRawlog(file, RawlogCompression::kGzip);
   while (const auto sample = recording->next()) writer->write(*sample);
   writer->close();
 }

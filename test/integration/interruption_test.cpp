@@ -181,7 +181,9 @@ TEST_F(Interruption, AKilledMapLooksCompleteOnlyIfItIs) {
                  << trial << ": after " << delay.count() << " s of " << whole.count());
     const bool replaces = trial % 2 == 1;
     fs::remove_all(out());
-    if (replaces) ASSERT_EQ(run(mapArguments(kStride[0], false)), 0);
+    if (replaces) {
+      ASSERT_EQ(run(mapArguments(kStride[0], false)), 0);
+    }
     const std::set<std::string> earlier = files();
     const pid_t child = start(mapArguments(kStride[1], trial % 4 < 2));
     std::this_thread::sleep_for(delay);

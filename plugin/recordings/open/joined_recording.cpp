@@ -166,6 +166,7 @@ class JoinedRecording : public Recording {
     const std::size_t camera = announces ? announced_++ : *next;
     EventPackets& stream = parts_.cameras[camera];
     EventPacket packet{static_cast<int>(camera), parts_.rig.cameras[camera], {}};
+    packet.checked = true;
     packet.t_ns = parts_.cameras[*next].nextTime();
     packet.label = stream.stream().label();
     if (packet.label.empty()) packet.label = "cam" + std::to_string(camera);

@@ -17,7 +17,7 @@ std::filesystem::path ownFolder() {
 
 }  // namespace
 
-void* symbolOf(const std::string& library, const std::string& symbol) {
+void* symbolOf(const std::string& library, const std::string& symbol, const std::string& for_what) {
   const std::filesystem::path beside = ownFolder() / library;
   std::error_code ignored;
   const bool is_beside = std::filesystem::exists(beside, ignored);
@@ -26,13 +26,13 @@ void* symbolOf(const std::string& library, const std::string& symbol) {
   void* const found = handle != nullptr ? dlsym(handle, symbol.c_str()) : nullptr;
   if (found != nullptr) return found;
   const char* const why = dlerror();
-  throw std::runtime_error(library + " cannot be loaded: " + (why ? why : "no reason given"));
+  throw std::runtime_error(for_what + " needs MRPT: " + library +
+                           " cannot be loaded: " + (why ? why : "no reason given"));
 }
 
-const MrptLibrary& mrptLibrary() {
-  static const auto& library =
-      *static_cast<const MrptLibrary*>(symbolOf("libmrpt-event-fusion.so", "efmMrptLibrary"));
-  return library;
+const MrptLibrary& mrptLibrary(const std::string& for_what) {
+  return *static_cast<const MrptLibrary*>(
+      symbolOf("libmrpt-event-fusion.so", "efmMrptLibrary", for_what));
 }
 
 }  // namespace efm

@@ -40,10 +40,11 @@ struct MrptLibrary {
 };
 
 /// Loads the library: from the folder of libevent-fusion.so, then as the system's loader finds it.
-/// @throws std::runtime_error naming the library and why it cannot be loaded.
-const MrptLibrary& mrptLibrary();
+/// @param for_what the file or option that needs it, for the error.
+/// @throws std::runtime_error naming these, the library and why it cannot be loaded.
+const MrptLibrary& mrptLibrary(const std::string& for_what);
 
 /// A symbol of a library that is found in the same way. The library is never closed.
-void* symbolOf(const std::string& library, const std::string& symbol);
+void* symbolOf(const std::string& library, const std::string& symbol, const std::string& for_what);
 
 }  // namespace efm

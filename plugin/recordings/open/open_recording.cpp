@@ -45,7 +45,7 @@ bool isRawlog(const Path& path) {
 
 RecordingParts openRawlog(const std::vector<Path>& files, const ReaderOptions& options) {
   requireRawlog(files.front());
-  return mrptLibrary().openRawlog(files.front(), options);
+  return mrptLibrary(files.front().string() + ": a rawlog").openRawlog(files.front(), options);
 }
 
 const RecordingFormat& rawlogFormat() {
@@ -286,10 +286,10 @@ std::vector<PoseSample> samplesOf(std::vector<StampedPose> poses, bool rounded) 
   std::vector<PoseSample> samples;
   samples.reserve(poses.size());
   for (const StampedPose& pose : poses) {
-    samples.push_back({{PoseKind::kPose, "pose"},
-                       nearestTick(pose.t_ns),
-                       rounded ? roundedPose(pose.T_world_rig) : pose.T_world_rig,
-                       {}});
+    PoseSample& sample = samples.emplace_back();
+    sample.source.label = "pose";
+    sample.t_ns = nearestTick(pose.t_ns);
+    sample.T_world_body = rounded ? roundedPose(pose.T_world_rig) : pose.T_world_rig;
   }
   return samples;
 }

@@ -115,7 +115,7 @@ class Rawlog : public TemporaryFolder {
   std::filesystem::path file() const { return folder() / "r.rawlog"; }
 
   void write(const Observations& observations) const {
-    GzOutputStream stream(file());
+    GzStream stream(file(), GzStream::Mode::kWrite);
     auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream);
     for (const auto& observation : observations) archive << *observation;
     stream.close();
@@ -125,7 +125,7 @@ class Rawlog : public TemporaryFolder {
 
   /// The uncompressed content.
   std::string plainContent() const {
-    GzInputStream stream(file());
+    GzStream stream(file());
     std::string plain;
     char byte = 0;
     while (stream.Read(&byte, 1) == 1) plain += byte;
@@ -135,7 +135,7 @@ class Rawlog : public TemporaryFolder {
   /// Any objects, as other programs may store them.
   template <typename... Objects>
   void writeObjects(const Objects&... objects) const {
-    GzOutputStream stream(file());
+    GzStream stream(file(), GzStream::Mode::kWrite);
     auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream);
     (archive << ... << objects);
     stream.close();
@@ -287,7 +287,7 @@ TEST_F(Rawlog, APacketWithAChangedByteIsAnErrorThatSaysSo) {
 
 TEST_F(Rawlog, AnotherFileIsAnErrorThatSaysSo) {
   const auto error_of = [](const std::filesystem::path& path) {
-    return messageOf([&] { GzInputStream stream(path); });
+    return messageOf([&] { GzStream stream(path); });
   };
   EXPECT_THAT(error_of(folder()), EndsWith(": a folder: expected a file"));
   EXPECT_THAT(error_of("/dev/null"), EndsWith(": not a regular file"));

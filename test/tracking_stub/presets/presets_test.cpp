@@ -102,7 +102,9 @@ TEST_P(Presets, KeepWhatTheyPromise) {
     EXPECT_LE(depths.farthest, promise.max_depth_m);
     EXPECT_LE(depths.sky, promise.sky);
   }
-  if (promise.preset == "desk_stereo") EXPECT_EQ(simulation.duration_ns, 2'000'000'000);
+  if (promise.preset == "desk_stereo") {
+    EXPECT_EQ(simulation.duration_ns, 2'000'000'000);
+  }
   if (promise.preset == "room_stereo") {  // it ends at its first pose
     const Rigid3 T_begin_end = simulation.motion->poseAt(simulation.start_ns).inverse() *
                                simulation.motion->poseAt(simulation.endNs());
@@ -227,7 +229,9 @@ TEST(TrajectorySimulation, ScenesAreUprightAroundThePath) {
     // Down is +z, and ahead +x.
     const Vector3d begin = simulation.motion->poseAt(simulation.start_ns).translation;
     const auto floor = castRay(simulation.scene, begin, {0, 0, 1});
-    if (of.floor_m > 0) EXPECT_NEAR(floor.value().distance_m, of.floor_m, 1e-6) << of.scene;
+    if (of.floor_m > 0) {
+      EXPECT_NEAR(floor.value().distance_m, of.floor_m, 1e-6) << of.scene;
+    }
     EXPECT_TRUE(castRay(simulation.scene, begin - Vector3d(0, 0, 0.5), {1, 0, 0})) << of.scene;
     const test::VisibleDepths depths = test::visibleDepths(simulation, simulation.rig.cameras[0]);
     EXPECT_GE(depths.nearest, of.min_depth_m) << of.scene;
