@@ -43,7 +43,8 @@ int runImport(const ImportArguments& arguments) {
   refuseToDestroy(arguments);
   RecordingSource source = arguments.source;
   source.complete = false;
-  source.rounded = false;
+  source.rounded = false;  // the writer rounds
+  source.reader.keep_originals = true;
   source.limits = resolve(arguments.times, source);
   const std::unique_ptr<Recording> recording = openRecording(source);
   const Interruption interruption;

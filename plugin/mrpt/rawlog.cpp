@@ -325,7 +325,7 @@ void addPacket(const CObservationEvents::Ptr& packet,
 
 }  // namespace
 
-RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& /*options*/) {
+RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions& options) {
   RecordingParts parts;
   parts.rounded = true;
   std::map<int, CObservationEvents::Ptr> cameras;
@@ -336,7 +336,7 @@ RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions
       if (const auto packet = asPacket(observation)) {
         addPacket(packet, cameras);
       } else if (auto pose = poseIn(*observation)) {
-        pose->original = observation;
+        if (options.keep_originals) pose->original = observation;
         parts.pose_samples.push_back(std::move(*pose));
       } else {
         has_others = true;

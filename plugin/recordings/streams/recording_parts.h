@@ -142,6 +142,7 @@ struct ReaderOptions {
   std::string time_unit;
   /// The pixels of all sensors, where neither the recording nor a calibration has them.
   std::optional<CameraSize> sensor_size{};
+  bool keep_originals = false;  ///< Whether poses of a rawlog have theirs: see PoseSample.
   /// Whether `topics` may have names of other files. Otherwise an unknown name is an error.
   bool topics_of_other_files = false;
 };

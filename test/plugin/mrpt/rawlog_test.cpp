@@ -478,6 +478,47 @@ TEST_F(RawlogKinds, TheBuilderMapsBothAsMrptReadsThem) {
   expectNear(maps[0], maps[1]);
 }
 
+TEST_F(RawlogKinds, ARawlogThatIsImportedKeepsLabelsDigitsCovariancesAndAllElse) {
+  CRawlog rawlog;
+  const auto gps = mrpt::obs::CObservationGPS::Create();
+  gps->timestamp = mrptTimeFrom(recording.poses[3].t_ns);
+  rawlog.insert(gps);
+  for (const CObservation::Ptr& observation : observationsOf(recording)) {
+    const auto turned = mrpt::poses::CPose3D(0.1, 0.2, 0.3, 0.4, 0.5, 0.6);
+    if (auto* const pose = dynamic_cast<CObservationRobotPose*>(observation.get())) {
+      pose->sensorLabel = "tracker";
+      pose->pose.mean = turned;
+      pose->pose.cov(1, 0) = pose->pose.cov(0, 1) = 0.25;
+      pose->sensorPose = turned;
+    } else {
+      observation->sensorLabel = "left";
+      observation->setSensorPose(turned);
+    }
+    rawlog.insert(observation);
+  }
+  save(rawlog, "given.rawlog");
+  ASSERT_EQ(run("import given.rawlog --out r.rawlog --t0 10.1 --perturb latency_s=0.01").status, 0);
+  CRawlog copy;
+  ASSERT_TRUE(copy.loadFromRawLogFile((folder() / "r.rawlog").string()));
+  std::map<std::string, int> labels;
+  const auto given = std::dynamic_pointer_cast<CObservationRobotPose>(rawlog.getAsObservation(3));
+  ASSERT_TRUE(given);
+  for (std::size_t i = 0; i < copy.size(); ++i) {
+    const CObservation::Ptr observation = copy.getAsObservation(i);
+    ++labels[observation->sensorLabel];
+    EXPECT_EQ(observation->sensorPose(), given->sensorPose.asTPose()) << "to the bit";
+    const auto pose = std::dynamic_pointer_cast<CObservationRobotPose>(observation);
+    if (!pose) continue;
+    EXPECT_EQ(pose->pose.mean, given->pose.mean) << "to the bit";
+    EXPECT_TRUE(pose->pose.cov == given->pose.cov);
+  }
+  EXPECT_EQ(labels.at("tracker"), 42);
+  EXPECT_GT(labels.at("left"), 40);
+  ASSERT_EQ(run("import given.rawlog --out whole.rawlog").status, 0);
+  EXPECT_THAT(run("info whole.rawlog").out,
+              HasSubstr("mrpt::obs::CObservationGPS: 1 observations"));
+}
+
 TEST_F(RawlogKinds, AHandEyeTransformAppliesToOdometryToo) {
   std::ofstream(folder() / "up.yaml")
       << "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
