@@ -25,7 +25,7 @@ void addPacketLength(CLI::App& command, std::int64_t& packet_ns) {
             }
             packet_ns = *length_ns;
           },
-          "Length of a packet of events; of a rawlog, packets stay as they are (default 0.01)")
+          "Length of a packet of events (default 0.01)")
       ->type_name("SECONDS");
 }
 

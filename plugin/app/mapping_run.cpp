@@ -379,6 +379,7 @@ class HeldSamples::HeldRecording : public Recording {
   const Rig& rig() const override { return read_->rig(); }
   std::string position() const override { return position_; }
   double progress() const override {
+    if (size_ == 0) return 1;
     return 1 - static_cast<double>(held_.samples_.size()) / static_cast<double>(size_);
   }
   RecordingCounts counts() const override { return read_->counts(); }
@@ -390,7 +391,7 @@ class HeldSamples::HeldRecording : public Recording {
   std::string position_;
 };
 
-bool HeldSamples::add(Sample sample, std::string position) {
+void HeldSamples::add(Sample sample, std::string position) {
   bytes_left_ -= sizeof(Held);
   if (const auto* packet = std::get_if<EventPacket>(&sample)) {
     bytes_left_ -= static_cast<double>(packet->events.size() * sizeof(Event));
@@ -400,7 +401,6 @@ bool HeldSamples::add(Sample sample, std::string position) {
   } else {
     samples_.push_back({std::move(sample), std::move(position)});
   }
-  return bytes_left_ >= 0;
 }
 
 void HeldSamples::end(std::exception_ptr error) {
@@ -417,7 +417,6 @@ RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording, Hel
   RecordingSurveyor surveyor(job.options);
   Progress progress("first look", job.verbosity);
   std::exception_ptr error;
-  bool looks = true;  // until the survey refuses a sample: the mapping reports it
   while (true) {
     if (job.stop_requested && job.stop_requested()) throw Interrupted();
     std::optional<Sample> sample;
@@ -428,12 +427,11 @@ RecordingSurvey surveyRecording(const MappingJob& job, Recording& recording, Hel
     }
     if (!sample) break;
     try {
-      if (looks) surveyor.add(*sample);
-    } catch (const std::exception&) {
-      looks = false;
+      surveyor.add(*sample);
+    } catch (const std::exception&) {  // the mapping reports it
+      return surveyor.finish();
     }
-    const bool fits = held.add(std::move(*sample), recording.position());
-    if (!looks && !fits) break;
+    held.add(std::move(*sample), recording.position());
     progress.show(recording.progress());
   }
   held.end(error);

@@ -80,8 +80,7 @@ class HeldSamples {
  public:
   explicit HeldSamples(double max_mb) : bytes_left_(max_mb * 1e6) {}
 
-  /// @return whether all fit so far.
-  bool add(Sample sample, std::string position);
+  void add(Sample sample, std::string position);
   /// @param error that ended the recording; null: it was read to its end.
   void end(std::exception_ptr error);
 

@@ -80,11 +80,6 @@ void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
   ignored_observations_ = 0;
   reckoning_ = {};
   silent_cameras_.clear();
-  const std::lock_guard<std::mutex> made_lock(made_mutex_);
-  clouds_.clear();
-  metric_map_ = nullptr;
-  shown_points_ = nullptr;
-  event_map_ = nullptr;
   warned_of_rounding_ = false;
 }
 
@@ -263,10 +258,22 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
   if (error) std::rethrow_exception(error);
 }
 
+/// Forgets what was made of another mapping. Under made_mutex_.
+std::shared_ptr<HostedMapping> CEventFusionMapBuilder::mappingOfMade() const {
+  const auto mapping = this->mapping();
+  if (made_of_.lock() == mapping) return mapping;
+  made_of_ = mapping;
+  clouds_.clear();
+  metric_map_ = nullptr;
+  shown_points_ = nullptr;
+  event_map_ = nullptr;
+  return mapping;
+}
+
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
   out_map.clear();
-  const std::vector<StoredKeyframe> keyframes = mapping()->keyframes();
   const std::lock_guard<std::mutex> lock(made_mutex_);
+  const std::vector<StoredKeyframe> keyframes = mappingOfMade()->keyframes();
   decltype(clouds_) clouds;  // without those of keyframes that are forgotten
   for (const StoredKeyframe& keyframe : keyframes) {
     auto& cloud = clouds[keyframe.points];
@@ -282,12 +289,12 @@ unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
-  const auto mapping = this->mapping();
+  std::unique_lock<std::mutex> lock(made_mutex_);
+  const auto mapping = mappingOfMade();
   const GlobalCloudOptions cloud_options = usedOptions().cloud;
   const auto snapshot = mapping->snapshot();
   const std::vector<StoredKeyframe> keyframes =
       snapshot ? std::vector<StoredKeyframe>() : mapping->keyframes();
-  std::unique_lock<std::mutex> lock(made_mutex_);
   MapCloud::ConstPtr points = snapshot ? snapshot->points : shown_points_;
   if (!snapshot) {
     if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(cloud_options);
@@ -308,17 +315,9 @@ const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetr
 
 /// Once.
 void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
-  {
-    const std::lock_guard<std::mutex> lock(made_mutex_);
-    if (warned_of_rounding_) return;
-  }
+  if (warned_of_rounding_) return;
   const auto warning = roundingWarning(points, usedOptions().cloud.voxel_size_m);
-  if (!warning) return;
-  {
-    const std::lock_guard<std::mutex> lock(made_mutex_);
-    if (std::exchange(warned_of_rounding_, true)) return;
-  }
-  MRPT_LOG_WARN(*warning);
+  if (warning && !warned_of_rounding_.exchange(true)) MRPT_LOG_WARN(*warning);
 }
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,

@@ -7,6 +7,7 @@
 #include <mrpt/rtti/CObject.h>
 #include <mrpt/slam/CMetricMapBuilder.h>
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -161,6 +162,7 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   HostedMapping::Callbacks callbacks();
   void addPose(const mrpt::obs::CObservation& observation);
   void warnOfRounding(const MapCloud& points) const;
+  std::shared_ptr<HostedMapping> mappingOfMade() const;
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
 
   std::mutex restart_mutex_;  // one at a time starts over
@@ -175,13 +177,14 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   DeadReckoning reckoning_;                 // of the actions
   std::set<int> silent_cameras_;            // with a warning in the log
   std::shared_ptr<HostedMapping> mapping_;  // never null; used without the lock
-  mutable std::mutex made_mutex_;           // of what was made of the map for MRPT's getters, below
+  mutable std::mutex made_mutex_;  // locked before mutex_; protects what MRPT's getters have made:
+  mutable std::weak_ptr<HostedMapping> made_of_;
   mutable std::map<std::shared_ptr<const std::vector<ViewPoint>>, mrpt::maps::CPointsMapXYZI::Ptr>
       clouds_;
   mutable std::shared_ptr<mrpt::maps::CMultiMetricMap> metric_map_;
   mutable MapCloud::ConstPtr shown_points_;  // in metric_map_
   mutable CEventFusionMap::Ptr event_map_;   // in metric_map_, in playback
-  mutable bool warned_of_rounding_ = false;
+  mutable std::atomic<bool> warned_of_rounding_ = false;
 };
 
 }  // namespace efm

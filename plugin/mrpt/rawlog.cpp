@@ -265,6 +265,12 @@ class RawlogEvents : public EventStream {
       while (const CObservation::Ptr observation = reader_.next()) {
         const auto packet = asPacket(observation);
         if (!packet || packet->camera_index != first_->camera_index) continue;
+        if (!isSame(calibrationOf(*packet), calibrationOf(*first_))) {
+          throw std::runtime_error(fmt::format(
+              "{}: camera {}: its calibration or its pose on the rig differs from that of its "
+              "first packet",
+              reader_.position(), packet->camera_index));
+        }
         if (packet->events.empty()) continue;
         events = std::move(packet->events);
         return true;
@@ -290,7 +296,7 @@ class RawlogEvents : public EventStream {
   std::string damage_;
 };
 
-/// Neither events nor poses. Its damage is that of the events.
+/// The observations that are neither events nor poses. Its damage is that of the events.
 class RawlogOthers : public OtherStream {
  public:
   explicit RawlogOthers(const std::filesystem::path& file) : reader_(file) {}
@@ -311,16 +317,19 @@ class RawlogOthers : public OtherStream {
   RawlogReader reader_;
 };
 
-/// @throws std::invalid_argument where a camera changes.
-void addPacket(const CObservationEvents::Ptr& packet,
-               std::map<int, CObservationEvents::Ptr>& cameras) {
-  packet->events = {};
-  const auto [known, is_new] = cameras.emplace(packet->camera_index, packet);
-  if (is_new || isSame(calibrationOf(*known->second), calibrationOf(*packet))) return;
-  throw std::invalid_argument(
-      fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "
-                  "first packet",
-                  packet->camera_index));
+}  // namespace
+
+namespace {
+
+/// A pose that cannot be used is an error at the recording's end.
+void addPose(const CObservation::Ptr& observation, const std::string& position,
+             const ReaderOptions& options, RecordingParts& parts) {
+  try {
+    PoseSample& pose = parts.pose_samples.emplace_back(*poseIn(*observation));
+    if (options.keep_originals) pose.original = observation;
+  } catch (const std::invalid_argument& error) {
+    if (parts.poses_damage.empty()) parts.poses_damage = position + ": " + error.what();
+  }
 }
 
 }  // namespace
@@ -334,22 +343,20 @@ RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions
   try {
     while (const CObservation::Ptr observation = reader.next()) {
       if (const auto packet = asPacket(observation)) {
-        addPacket(packet, cameras);
-      } else if (auto pose = poseIn(*observation)) {
-        if (options.keep_originals) pose->original = observation;
-        parts.pose_samples.push_back(std::move(*pose));
+        packet->events = {};
+        cameras.emplace(packet->camera_index, packet);
+      } else if (poseSourceOf(*observation)) {
+        addPose(observation, reader.position(), options, parts);
       } else {
         has_others = true;
       }
     }
-  } catch (const std::invalid_argument& error) {
-    throw std::invalid_argument(reader.position() + ": " + error.what());
   } catch (const std::runtime_error& error) {
     if (cameras.empty() && parts.pose_samples.empty() && !has_others) throw;
     if (cameras.empty()) parts.poses_damage = error.what();
   }
   Calibration calibration{file, {}};
-  bool is_calibrated = !cameras.empty();
+  bool is_calibrated = false;  // at least one camera: of another one, the mapping says it
   for (const auto& [index, first] : cameras) {
     if (index != static_cast<int>(calibration.rig.cameras.size())) {
       throw std::runtime_error(
@@ -357,7 +364,7 @@ RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions
                       file.string(), index, calibration.rig.cameras.size()));
     }
     calibration.rig.cameras.push_back(calibrationOf(*first));
-    is_calibrated = is_calibrated && isCalibrated(first->camera);
+    is_calibrated = is_calibrated || isCalibrated(first->camera);
     parts.cameras.push_back(std::make_unique<RawlogEvents>(file, first));
   }
   if (is_calibrated) parts.calibration = std::move(calibration);

@@ -44,7 +44,6 @@ class LiveMapping : public HostedMapping, public std::enable_shared_from_this<Li
   void stop() override;
   bool mayStopHere() const override { return !runsHere(); }
 
-  /// Copies the packet.
   void addEvents(EventPacket packet) override { queue_.add(std::move(packet)); }
   void skipEvents(const EventPacket& packet) override { queue_.skip(packet); }
   void addPose(const QueuedPose& pose) override { queue_.add(pose); }

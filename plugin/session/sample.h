@@ -25,11 +25,12 @@ struct EventPacket {
   /// All events of the camera before this time (its own clock) are in this packet or earlier ones.
   /// So an empty packet with this time says that there was no event.
   std::optional<std::int64_t> covered_until_ns = std::nullopt;
-  std::optional<std::int64_t> t_ns = std::nullopt;  ///< Begin; of an empty packet, its own time.
+  std::optional<std::int64_t> t_ns =
+      std::nullopt;  ///< Of the first event; an empty packet has its own.
   /// EventPackets has checked the events: they lie inside the sensor, in the order of time.
   bool checked = false;
   std::string label = {};  ///< The sensor's name; empty: not known.
-  /// A packet of this camera from a rawlog, for a writer of rawlogs; null: there is none.
+  /// The camera's first packet in the rawlog (a CObservationEvents); null for other formats.
   std::shared_ptr<const void> original = nullptr;
 };
 
@@ -41,7 +42,8 @@ struct PoseSample {
   Rigid3 T_body_rig;  ///< The pose of the rig on the tracked body.
   /// The standard deviations that the tracker states.
   std::optional<PoseNoise> noise = std::nullopt;
-  std::shared_ptr<const void> original = nullptr;  ///< As of a packet.
+  std::shared_ptr<const void> original =
+      nullptr;  ///< The observation in the rawlog; null: not kept.
 };
 
 /// Anything else that a rawlog holds.
@@ -63,8 +65,8 @@ using Sample = std::variant<EventPacket, PoseSample, OtherSample>;
 inline constexpr std::int64_t kTickNs = 100;
 std::int64_t nearestTick(std::int64_t t_ns);
 /// The pose that a host gives to the mapping after MRPT's classes held it: the rotation becomes a
-/// matrix there. Changes the last digits. With it a recording gives the same map, bit for bit, as
-/// text, as a rawlog and through a host.
+/// matrix there, which changes the last digits. With it a recording gives the same map, bit for
+/// bit, as text, as a rawlog and through a host.
 Rigid3 roundedPose(const Rigid3& T_a_b);
 
 /// Oddities of a recording that could be read.

@@ -21,12 +21,12 @@ struct JoinedParts {
   std::vector<PoseSample> poses;         ///< In any order; poses of equal time keep theirs.
   std::string poses_damage;  ///< The error that ended the poses: thrown at the recording's end.
   std::unique_ptr<OtherStream> others;  ///< May be null.
-  bool all_poses = false;       ///< Also those outside an interval: a mapping looks around it.
-  std::int64_t latency_ns = 0;  ///< Poses come so much later than their times.
+  bool all_poses = false;  ///< Poses outside the interval are kept, too: a mapping looks at those.
+  std::int64_t latency_ns = 0;  ///< A pose comes this long after its time.
   /// The number of bad events that are left out, of all cameras together; a further one is an
   /// error.
   std::uint64_t skip_bad_events = 0;
-  std::vector<Warning> warnings;  ///< Of `RecordingCounts`.
+  std::vector<Warning> warnings;  ///< The first of those in `RecordingCounts`.
 };
 
 /// Puts the parts in the order of time. Of an interval [t0, t1) on the clock of the poses, there

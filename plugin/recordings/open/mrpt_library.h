@@ -24,8 +24,7 @@ class RawlogWriter {
 
 enum class RawlogCompression { kGzip, kZstd, kNone };
 
-/// What needs MRPT's classes: libmrpt-event-fusion.so (plugin/mrpt/), which is loaded when it is
-/// used.
+/// The functions of libmrpt-event-fusion.so (plugin/mrpt/). The library is loaded at the first use.
 struct MrptLibrary {
   RecordingParts (*openRawlog)(const std::filesystem::path& file, const ReaderOptions& options);
   /// @param file an earlier file of this name is replaced: see AtomicFile.

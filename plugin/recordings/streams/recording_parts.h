@@ -72,8 +72,8 @@ class EventStream {
   virtual std::string name() const = 0;
   /// The fraction of the stream that has been read, 0 to 1.
   virtual double progress() const = 0;
-  /// The error of damage that all streams of the file end at, so that `read` returns false there:
-  /// thrown at the recording's end. Empty: it was not reached.
+  /// Where damage ends all streams of the file, `read` returns false, and this is the error: it is
+  /// thrown at the recording's end. Empty: there is no damage so far.
   virtual std::string damage() const { return {}; }
   /// The sensor's name, if the file knows it.
   virtual std::string label() const { return {}; }
