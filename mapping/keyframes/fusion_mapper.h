@@ -36,6 +36,10 @@ struct FusionMapperOptions {
   TimeLimits limits;         ///< Events and windows outside are not used.
   EventFilterOptions filter;
 
+  /// The time of the events that are used.
+  TimeLimits interval() const {
+    return only_window ? TimeLimits{only_window->t0_ns, only_window->t1_ns} : limits;
+  }
   void validate() const;
 };
 

@@ -45,7 +45,7 @@ int runImport(const ImportArguments& arguments) {
   source.complete = false;
   source.rounded = false;  // the writer rounds
   source.reader.keep_originals = true;
-  source.limits = resolve(arguments.times, source);
+  source.limits = RecordingTimes(source).resolve(arguments.times);
   const std::unique_ptr<Recording> recording = openRecording(source);
   const Interruption interruption;
   const auto writer = mrptLibrary(arguments.out.string() + ": a rawlog")
@@ -207,7 +207,7 @@ int runExport(const ExportArguments& arguments) {
   refuseExisting(arguments.out);
   RecordingSource source = arguments.source;
   source.complete = false;
-  source.limits = resolve(arguments.times, source);
+  source.limits = RecordingTimes(source).resolve(arguments.times);
   const std::unique_ptr<Recording> recording = openRecording(source);
   Rig rig = recording->rig();
   if (rig.cameras.empty()) throw std::runtime_error("the recording has no events");

@@ -176,7 +176,7 @@ int runInfo(const InfoArguments& arguments) {
   RecordingSource source = arguments.source;
   source.faults.latency_ns = 0;  // latency changes no time stamp
   source.complete = false;
-  source.limits = resolve(arguments.times, source);
+  source.limits = RecordingTimes(source).resolve(arguments.times);
   const std::unique_ptr<Recording> recording = openRecording(source);
   Contents contents;
   PatientSurveyor surveyor(defaultOptions());

@@ -41,21 +41,13 @@ OptionReader readerOf(const MappingArguments& arguments) {
   });
 }
 
-EventFusionOptions optionsOf(const MappingArguments& arguments) {
-  EventFusionOptions options = asUsage([&] { return readerOf(arguments).options(); });
-  if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
-  if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // the only source
-  if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
-  return options;
-}
-
 /// The recording with the options' calibration and hand-eye transform, and with their stride for
 /// tracker noise that is constant over a keyframe.
-RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOptions& options) {
+RecordingSource sourceOf(const MappingArguments& arguments, const OptionReader& reader,
+                         const EventFusionOptions& options) {
   RecordingSource source = arguments.source;
   source.calibration = options.rig.calibration;
   source.hand_eye = options.rig.hand_eye;
-  const OptionReader reader = readerOf(arguments);
   if (arguments.source.calibration.empty()) {
     source.calibration_given = reader.given("rig", "calibration");
   }
@@ -68,9 +60,19 @@ RecordingSource sourceOf(const MappingArguments& arguments, const EventFusionOpt
   if (perturbation.keyframe.any() && !perturbation.keyframe.length_ns) {
     perturbation.keyframe.length_ns = durationFromSeconds(options.mapper.policy.stride_s);
   }
-  const auto& window = options.mapper.only_window;
-  source.limits = window ? TimeLimits{window->t0_ns, window->t1_ns} : options.mapper.limits;
+  source.limits = options.mapper.interval();
   return source;
+}
+
+/// With the content of the files that they name, which are read once.
+EventFusionOptions optionsOf(const MappingArguments& arguments, const OptionReader& reader) {
+  EventFusionOptions options = asUsage([&] { return reader.options(); });
+  if (!arguments.source.calibration.empty()) options.rig.calibration = arguments.source.calibration;
+  if (!arguments.source.poses.empty()) options.rig.pose_source.clear();  // the only source
+  if (!arguments.source.hand_eye.empty()) options.rig.hand_eye = arguments.source.hand_eye;
+  options.rig.setup =
+      std::make_shared<RigSetup>(readRigSetup(sourceOf(arguments, reader, options)));
+  return options;
 }
 
 /// Warns if the option file replaced the recording's own calibration, which may be the better one.
@@ -194,7 +196,8 @@ std::string stays(const MapOutput& output) {
 /// Writes the page of a map and the report; prints warnings, summary and error. @return the exit
 /// status.
 int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
-             const KeyframePictures& pictures, const MappingArguments& arguments) {
+             const KeyframePictures& pictures, const MappingArguments& arguments,
+             const OptionReader& reader) {
   outcome.report.peak_memory_bytes = peakMemoryBytes();
   if (kind == OutputKind::kMap && outcome.report.counts.keyframes > 0) {
     writePage(outcome, output, pictures);
@@ -214,7 +217,6 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
   if (outcome.report.counts.keyframes > 0 && !quiet && !output.keepsEarlier())
     std::cout << summaryOf(outcome.report, kind, output.folder());
   if (outcome.error) {
-    const OptionReader reader = readerOf(arguments);
     if (const auto wrong = reader.wrongOption(*outcome.error)) return fail(*wrong, kUsageStatus);
     return fail(reader.withOrigins(*outcome.error));
   }
@@ -228,10 +230,12 @@ int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
   return kInterruptedStatus;
 }
 
-Window windowOf(const DepthArguments& arguments, ReferenceTime reference) {
-  const TimeLimits limits = resolve(arguments.times, arguments.source);
+Window windowOf(const DepthArguments& arguments, const RecordingSource& source,
+                ReferenceTime reference) {
+  RecordingTimes times(source);
+  const TimeLimits limits = times.resolve(arguments.times);
   Window window = windowOf(*limits.t0_ns, *limits.t1_ns, reference);
-  if (arguments.t_ref) window.t_ref_ns = resolve(*arguments.t_ref, arguments.source);
+  if (arguments.t_ref) window.t_ref_ns = times.resolve(*arguments.t_ref);
   return window;
 }
 
@@ -345,16 +349,16 @@ void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
 }
 
 /// Throws a UsageError where an error is about an option that was given.
-void refuseOption(const MappingArguments& arguments, const std::invalid_argument& error) {
-  if (const auto wrong = readerOf(arguments).wrongOption(error.what())) throw UsageError(*wrong);
+void refuseOption(const OptionReader& reader, const std::invalid_argument& error) {
+  if (const auto wrong = reader.wrongOption(error.what())) throw UsageError(*wrong);
 }
 
 /// Runs a job and writes its results.
 /// @param kind of the output folder.
 /// @param take receives each keyframe, in order, in a thread of its own.
 /// @param write writes the results after the last keyframe, if there is one.
-int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
-           const std::function<void(MapOutput&, const KeyframeDepthMap&)>& take,
+int runJob(const MappingArguments& arguments, const OptionReader& reader, MappingJob job,
+           OutputKind kind, const std::function<void(MapOutput&, const KeyframeDepthMap&)>& take,
            const std::function<void(MapOutput&, MappingOutcome&)>& write) {
   StageTimes whole;
   whole.cpu.start = processSeconds();
@@ -363,9 +367,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   std::optional<KeyframePictures> pictures;
   {
     const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
-    RecordingSource source = sourceOf(arguments, job.options);
-    job.options.rig.setup = std::make_shared<RigSetup>(readRigSetup(source));
-    source.setup = job.options.rig.setup;
+    RecordingSource source = sourceOf(arguments, reader, job.options);
     const std::filesystem::path folder = outputFolder(arguments, kind);
     refuseOutputFolder(folder, kind, arguments, source);
     job.warnings = replacementWarnings(folder, source);
@@ -374,10 +376,10 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     try {
       recording = survey(source, job);
     } catch (const std::invalid_argument& error) {
-      refuseOption(arguments, error);
+      refuseOption(reader, error);
       throw;
     }
-    source = sourceOf(arguments, job.options);  // the stride may have been chosen
+    source = sourceOf(arguments, reader, job.options);  // the stride may have been chosen
     job.sequence_maximum = sequenceMaximumOf(source, job);
     const bool changes = source.faults.perturbation.keyframe.any();  // by the stride
     if (!recording || changes) recording = openRecording(source);
@@ -402,7 +404,7 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
     } catch (const Interrupted&) {
       throw;
     } catch (const std::invalid_argument& error) {
-      refuseOption(arguments, error);
+      refuseOption(reader, error);
       throw;
     } catch (const std::runtime_error& error) {
       if (output->keepsEarlier()) throw std::runtime_error(inWords(error) + stays(*output));
@@ -429,16 +431,18 @@ int runJob(const MappingArguments& arguments, MappingJob job, OutputKind kind,
   times.cpu.start = whole.cpu.start;
   times.cpu.images = whole.cpu.images;
   times.cpu.total = whole.cpu.start + whole.cpu.total;
-  return conclude(outcome, kind, *output, *pictures, arguments);
+  return conclude(outcome, kind, *output, *pictures, arguments, reader);
 }
 
 }  // namespace
 
 int runMap(const MapArguments& arguments) {
+  const OptionReader reader = readerOf(arguments);
   MappingJob job;
-  job.options = optionsOf(arguments);
+  job.options = optionsOf(arguments, reader);
   job.verbosity = arguments.verbosity;
-  job.options.mapper.limits = resolve(arguments.times, arguments.source);
+  job.options.mapper.limits =
+      RecordingTimes(sourceOf(arguments, reader, job.options)).resolve(arguments.times);
   asUsage([&] { job.options.mapper.limits.validate(); });
   job.options.mapper.keyframe.view_events = true;  // the page shows them
   const Interruption interruption;
@@ -450,7 +454,7 @@ int runMap(const MapArguments& arguments) {
   }
   std::unique_ptr<MapWatcher> frames;
   if (!arguments.record_frames.empty()) {
-    std::vector<std::filesystem::path> inputs = inputsOf(sourceOf(arguments, job.options));
+    std::vector<std::filesystem::path> inputs = inputsOf(sourceOf(arguments, reader, job.options));
     if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
     refuseToReplace(arguments.record_frames, inputs);
     frames = mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force);
@@ -485,7 +489,7 @@ int runMap(const MapArguments& arguments) {
                 output.writePicture("overview.png", sheet.draw(limits));
               }});
   };
-  const int status = runJob(arguments, job, OutputKind::kMap, take, write);
+  const int status = runJob(arguments, reader, job, OutputKind::kMap, take, write);
   const bool interactive = isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1;
   if (window && interactive && window->isOpen()) {
     std::cerr << "event-fusion: the window stays until it is closed or a key is pressed in it\n";
@@ -496,10 +500,12 @@ int runMap(const MapArguments& arguments) {
 
 int runDepth(const DepthArguments& arguments) {
   const Interruption interruption;
+  const OptionReader reader = readerOf(arguments);
   MappingJob job;
-  job.options = optionsOf(arguments);
+  job.options = optionsOf(arguments, reader);
   job.verbosity = arguments.verbosity;
-  job.options.mapper.only_window = windowOf(arguments, job.options.mapper.policy.reference);
+  job.options.mapper.only_window = windowOf(arguments, sourceOf(arguments, reader, job.options),
+                                            job.options.mapper.policy.reference);
   asUsage([&] { job.options.mapper.validate(); });
   const EventFusionOptions options = job.options;
   std::unique_ptr<NpyDsiFile> dsi;
@@ -533,7 +539,7 @@ int runDepth(const DepthArguments& arguments) {
                          if (dsi) output.add(dsi->finish());
                        }});
   };
-  return runJob(arguments, job, OutputKind::kDepth, take, write);
+  return runJob(arguments, reader, job, OutputKind::kDepth, take, write);
 }
 
 }  // namespace efm

@@ -45,9 +45,6 @@ class Player {
     mapping_ = hostMapping(options, {}, std::move(callbacks));
     if (job.processor_clock) mapping_->setClock(job.processor_clock);
   }
-  ~Player() { mapping_->stop(); }
-  Player(const Player&) = delete;
-  Player& operator=(const Player&) = delete;
 
   /// @return the error that stopped it before the recording's end, if there was one.
   std::optional<std::string> play() {
@@ -217,9 +214,7 @@ class Player {
   /// the input.
   double fraction() const {
     const std::optional<TimeSpan> events = mapping_->status().events;
-    const auto& window = job_.options.mapper.only_window;
-    const TimeLimits limits =
-        window ? TimeLimits{window->t0_ns, window->t1_ns} : job_.options.mapper.limits;
+    const TimeLimits limits = job_.options.mapper.interval();
     if (!limits.t1_ns) return recording_.progress();
     if (!events) return 0;
     const std::int64_t first_ns = limits.t0_ns.value_or(events->first_ns);
@@ -260,7 +255,7 @@ class Player {
   double watched_s_ = 0;                    // in the watchers
   StageSeconds told_;                       // until the last keyframe
   Progress progress_;
-  std::shared_ptr<HostedMapping> mapping_;  // never null; its thread uses the others
+  std::shared_ptr<HostedMapping> mapping_;  // last, never null: its thread uses the others
 };
 
 /// Reports the reference view and the shortest baseline, for disparities.

@@ -32,7 +32,7 @@ struct MappingJob {
   /// The value of `max_confidence = sequence`. Default: the running maximum.
   std::optional<double> sequence_maximum;
 
-  /// Asked before each observation; where it says true, the rest of the recording is not mapped.
+  /// Asked before each sample; where it says true, the rest of the recording is not mapped.
   /// May be empty.
   std::function<bool()> stop_requested;
   /// Receives each keyframe, in order.
@@ -61,8 +61,8 @@ struct MappingOutcome {
   bool misses_file = false;  ///< A file of the result could not be written.
 };
 
-/// Maps a recording, with progress on stderr. If reading stops with an
-/// error, the data before it are mapped.
+/// Maps a recording, with progress on stderr. If reading stops with an error, the data before it
+/// are mapped.
 /// @throws std::invalid_argument if the options are not valid; the exceptions of `on_keyframe`, of
 /// `make_dsi_sink` and of the watchers.
 MappingOutcome runMapping(const MappingJob& job, Recording& recording);
@@ -74,8 +74,8 @@ MappingOutcome runMapping(const MappingJob& job, Recording& recording);
 /// @return nothing if there is no keyframe.
 std::optional<double> sequenceMaximum(MappingJob job, Recording& recording);
 
-/// The samples of a recording, as long as their events fit into some memory: then it is opened once
-/// for several passes.
+/// The samples of a recording whose events fit into some memory. Then the recording is opened once
+/// for two passes.
 class HeldSamples {
  public:
   explicit HeldSamples(double max_mb) : bytes_left_(max_mb * 1e6) {}
@@ -84,7 +84,8 @@ class HeldSamples {
   /// @param error that ended the recording; null: it was read to its end.
   void end(std::exception_ptr error);
 
-  /// The recording again. @param read that was read. Null where it does not fit.
+  /// The recording again; null if it was not read to its end, or does not fit.
+  /// @param read the recording that the samples come from.
   std::unique_ptr<Recording> recording(std::unique_ptr<Recording> read) &&;
 
  private:

@@ -46,38 +46,34 @@ std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(RecordingSource s
 
 }  // namespace
 
-std::int64_t startOf(const RecordingSource& source) {
+std::int64_t RecordingTimes::start() {
+  if (start_ns_) return *start_ns_;
   RecordingSource events;  // their times need no pose and no transform
-  events.files = source.files;
-  events.format = source.format;
-  events.calibration = source.calibration;
-  events.reader = source.reader;
-  events.skip_bad_events = source.skip_bad_events;
+  events.files = source_.files;
+  events.format = source_.format;
+  events.calibration = source_.calibration;
+  events.setup = source_.setup;
+  events.reader = source_.reader;
+  events.skip_bad_events = source_.skip_bad_events;
   events.complete = false;
   const std::unique_ptr<Recording> recording = openRecording(events);
   while (const std::optional<Sample> sample = recording->next()) {
     const auto* packet = std::get_if<EventPacket>(&*sample);
-    if (packet != nullptr && !packet->events.empty()) return packet->events.front().t_ns;
+    if (packet == nullptr || packet->events.empty()) continue;
+    start_ns_ = packet->events.front().t_ns;
+    return *start_ns_;
   }
   throw std::runtime_error("a time from the recording's start: it has no events");
 }
 
-std::int64_t resolve(const TimeArgument& time, const RecordingSource& source) {
-  return time.from_start ? startOf(source) + time.ns : time.ns;
+std::int64_t RecordingTimes::resolve(const TimeArgument& time) {
+  return time.from_start ? start() + time.ns : time.ns;
 }
 
-TimeLimits resolve(const TimeArguments& times, const RecordingSource& source) {
-  std::optional<std::int64_t> start_ns;
-  const auto start = [&] {
-    if (!start_ns) start_ns = startOf(source);
-    return *start_ns;
-  };
-  const auto at = [&](const TimeArgument& time) {
-    return time.from_start ? start() + time.ns : time.ns;
-  };
+TimeLimits RecordingTimes::resolve(const TimeArguments& times) {
   TimeLimits limits;
-  if (times.t0) limits.t0_ns = at(*times.t0);
-  if (times.t1) limits.t1_ns = at(*times.t1);
+  if (times.t0) limits.t0_ns = resolve(*times.t0);
+  if (times.t1) limits.t1_ns = resolve(*times.t1);
   if (times.duration_ns) {
     limits.t1_ns = (limits.t0_ns ? *limits.t0_ns : start()) + *times.duration_ns;
   }

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mapping/events/window.h"
@@ -34,13 +35,22 @@ struct TimeArguments {
   std::optional<std::int64_t> duration_ns;  ///< From t0, or from the first event.
 };
 
-/// The time of the recording's first event.
-/// @throws std::runtime_error if it has none; the errors of `openRecording`.
-std::int64_t startOf(const RecordingSource& source);
+/// The times of the command line on the recording's clock. The recording is opened at most once,
+/// and only if a time counts from its first event.
+class RecordingTimes {
+ public:
+  explicit RecordingTimes(RecordingSource source) : source_(std::move(source)) {}
 
-/// The time on the recording's clock. Opens the recording only if it must.
-std::int64_t resolve(const TimeArgument& time, const RecordingSource& source);
-TimeLimits resolve(const TimeArguments& times, const RecordingSource& source);
+  /// @throws std::runtime_error if the recording has no event; the errors of `openRecording`.
+  std::int64_t resolve(const TimeArgument& time);
+  TimeLimits resolve(const TimeArguments& times);
+
+ private:
+  std::int64_t start();
+
+  RecordingSource source_;
+  std::optional<std::int64_t> start_ns_;  // of the first event, once it is known
+};
 
 /// Reads a recording to its end, or to its damage.
 /// @param take receives each sample; what it throws ends the reading.

@@ -25,6 +25,9 @@ namespace {
 
 using mrpt::serialization::CArchive;
 
+/// The camera of `ReadEventsOf`.
+thread_local std::optional<int> read_camera;
+
 /// The maximum size of a packet: MRPT's archives in memory count bytes in int.
 constexpr std::size_t kMaxContentBytes = std::size_t{1} << 30;
 
@@ -123,8 +126,11 @@ void CObservationEvents::readContent(CArchive& in, std::uint8_t version) {
   const auto count = in.ReadAs<std::uint32_t>();
   std::vector<std::uint8_t> bytes;
   in >> bytes;
-  events = decodeEvents(bytes, count);
+  if (read_camera.value_or(camera_index) == camera_index) events = decodeEvents(bytes, count);
 }
+
+ReadEventsOf::ReadEventsOf(int camera) { read_camera = camera; }
+ReadEventsOf::~ReadEventsOf() { read_camera.reset(); }
 
 void CObservationEvents::getDescriptionAsText(std::ostream& stream) const {
   mrpt::obs::CObservation::getDescriptionAsText(stream);

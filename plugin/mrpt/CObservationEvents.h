@@ -76,6 +76,17 @@ namespace efm {
 
 RigCamera calibrationOf(const CObservationEvents& packet);
 
+/// While it lives, this thread reads the events of one camera's packets alone: other packets have
+/// none. To decode the events takes most of the time of reading.
+class ReadEventsOf {
+ public:
+  /// @param camera its index; below 0: no camera's.
+  explicit ReadEventsOf(int camera);
+  ~ReadEventsOf();
+  ReadEventsOf(const ReadEventsOf&) = delete;
+  ReadEventsOf& operator=(const ReadEventsOf&) = delete;
+};
+
 /// The maximum number of drawn events of a packet. Of more events, an even selection is drawn.
 inline constexpr std::size_t kMaxDrawnEvents = 50'000;
 /// The distance of the drawn image plane, for a viewer whose first view spans some twenty metres.

@@ -5,6 +5,7 @@
 #include <mrpt/obs/CActionCollection.h>
 #include <mrpt/obs/CObservation.h>
 #include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/poses/CPose3D.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
 
 #include <cstdint>
@@ -46,17 +47,6 @@ inline std::int64_t nanosecondsFrom(const mrpt::Clock::time_point& time) {
   if (!t_ns) throw std::invalid_argument("a time stamp is missing or not between 1678 and 2261");
   return *t_ns;
 }
-
-}  // namespace efm
-
-namespace mrpt::poses {
-
-class CPose3D;
-class CPose3DPDFGaussian;
-
-}  // namespace mrpt::poses
-
-namespace efm {
 
 /// Converts to and from MRPT's poses, exact to about 1e-15 at any rotation: through MRPT's rotation
 /// matrix and quaternion, not through its angles.

@@ -159,7 +159,9 @@ using mrpt::obs::CObservationRobotPose;
 /// The observations of a rawlog, one by one, also those in sensory frames.
 class RawlogReader {
  public:
-  explicit RawlogReader(std::filesystem::path file) : file_(std::move(file)), stream_(file_) {}
+  /// @param camera see `ReadEventsOf`.
+  explicit RawlogReader(std::filesystem::path file, int camera = -1)
+      : file_(std::move(file)), camera_(camera), stream_(file_) {}
 
   /// @return null at the end.
   CObservation::Ptr next() {
@@ -192,6 +194,7 @@ class RawlogReader {
 
  private:
   void readEntry() {
+    const ReadEventsOf events_of(camera_);
     auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(stream_);
     const mrpt::serialization::CSerializable::Ptr entry = archive.ReadObject();
     if (!entry) throw std::runtime_error("an empty object");
@@ -241,6 +244,7 @@ class RawlogReader {
   }
 
   std::filesystem::path file_;
+  int camera_;
   GzStream stream_;
   std::uint64_t entries_ = 0;  // read so far
   std::deque<CObservation::Ptr> pending_;
@@ -255,9 +259,9 @@ CObservationEvents::Ptr asPacket(const CObservation::Ptr& observation) {
 /// The events of one camera.
 class RawlogEvents : public EventStream {
  public:
-  /// @param first the camera's first packet, without its events.
+  /// @param first the camera's first packet, without events.
   RawlogEvents(const std::filesystem::path& file, CObservationEvents::Ptr first)
-      : reader_(file), first_(std::move(first)) {}
+      : reader_(file, first->camera_index), first_(std::move(first)) {}
 
   bool read(std::vector<Event>& events) override {
     events.clear();
@@ -343,7 +347,6 @@ RecordingParts openRawlog(const std::filesystem::path& file, const ReaderOptions
   try {
     while (const CObservation::Ptr observation = reader.next()) {
       if (const auto packet = asPacket(observation)) {
-        packet->events = {};
         cameras.emplace(packet->camera_index, packet);
       } else if (poseSourceOf(*observation)) {
         addPose(observation, reader.position(), options, parts);

@@ -92,13 +92,12 @@ double angleOf(const Rigid3& T_world_a, const Rigid3& T_world_b) {
 StatisticsOptions statisticsOptions(const EventFusionOptions& options) {
   StatisticsOptions statistics;
   const FusionMapperOptions& mapper = options.mapper;
-  statistics.limits = mapper.limits;
+  statistics.limits = mapper.interval();
   statistics.cameras = mapper.cameras;
   statistics.time_offsets_ns = options.rig.time_offsets_ns;
   statistics.T_body_rig = readRigSetup(options.rig).T_body_rig;
   statistics.pose_source = options.rig.pose_source;
   if (mapper.only_window) {
-    statistics.limits = {mapper.only_window->t0_ns, mapper.only_window->t1_ns};
     statistics.window_s = secondsBetween(mapper.only_window->t0_ns, mapper.only_window->t1_ns);
   } else if (mapper.policy.policy != KeyframePolicyKind::kEvents) {
     statistics.window_s = mapper.policy.window_s;

@@ -270,7 +270,7 @@ Rig rigOf(const RecordingParts& parts, const RecordingSource& source, const Cali
   return rig;
 }
 
-/// The time offsets that a map uses.
+/// The time offsets of the cameras that a mapping uses.
 std::vector<std::int64_t> offsetsOf(const Rig& rig, const RecordingSource& source,
                                     const Calibration* given) {
   if (source.time_offsets_ns.size() == rig.cameras.size()) return source.time_offsets_ns;
@@ -281,8 +281,8 @@ std::vector<std::int64_t> offsetsOf(const Rig& rig, const RecordingSource& sourc
   return offsets_ns;
 }
 
-/// Of a reader's or a file's poses.
-std::vector<PoseSample> samplesOf(std::vector<StampedPose> poses, bool rounded) {
+/// The poses of a file that has no more than these.
+std::vector<PoseSample> samplesOf(const std::vector<StampedPose>& poses, bool rounded) {
   std::vector<PoseSample> samples;
   samples.reserve(poses.size());
   for (const StampedPose& pose : poses) {
@@ -324,7 +324,7 @@ std::vector<PoseSample> withFaults(std::vector<PoseSample> samples, TrackerFault
 }
 
 /// The poses of the file, or the recording's own; with the faults.
-std::vector<PoseSample> posesOf(RecordingParts& parts, std::vector<StampedPose> given,
+std::vector<PoseSample> posesOf(RecordingParts& parts, const std::vector<StampedPose>& given,
                                 const RecordingSource& source, const RigSetup& setup) {
   const bool replaced = !source.poses.empty();
   if (!replaced && parts.poses.empty() && parts.pose_samples.empty() && source.complete) {
@@ -334,7 +334,7 @@ std::vector<PoseSample> posesOf(RecordingParts& parts, std::vector<StampedPose> 
   const bool moved = source.faults.perturbation.any();
   std::vector<PoseSample> samples = std::move(parts.pose_samples);
   if (replaced || samples.empty()) {
-    samples = samplesOf(std::move(replaced ? given : parts.poses), source.rounded || moved);
+    samples = samplesOf(replaced ? given : parts.poses, source.rounded || moved);
   }
   if (source.faults.any()) samples = withFaults(std::move(samples), source.faults, source.rounded);
   if (source.override_rig && setup.T_body_rig) {
@@ -394,7 +394,7 @@ std::unique_ptr<Recording> openRecording(const RecordingSource& source) {
     joined.cameras.emplace_back(std::move(parts.cameras[i]), CameraSize{model.width, model.height},
                                 source.packet_ns);
   }
-  joined.poses = posesOf(parts, std::move(poses), source, setup);
+  joined.poses = posesOf(parts, poses, source, setup);
   if (source.poses.empty()) joined.poses_damage = std::move(parts.poses_damage);
   if (!source.complete) joined.others = std::move(parts.others);
   joined.all_poses = source.complete;
