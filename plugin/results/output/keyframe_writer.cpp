@@ -8,11 +8,9 @@
 #include <unistd.h>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <cerrno>
-#include <chrono>
+#include <cstdint>
 #include <cstring>
-#include <iterator>
 #include <stdexcept>
 #include <utility>
 
@@ -132,28 +130,8 @@ std::optional<UnfinishedRun> RunMark::ofKilledRun(const std::filesystem::path& f
   }
 }
 
-namespace {
-
-constexpr std::size_t kMaxWaiting = 1;
-/// A signal waits for the idle writer at most this long.
-constexpr std::chrono::milliseconds kMaxIdle{50};
-
-constexpr int kEndingSignals[] = {SIGINT, SIGTERM, SIGHUP};
-
-sigset_t endingSignals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  for (const int signal : kEndingSignals) sigaddset(&signals, signal);
-  return signals;
-}
-
-}  // namespace
-
-KeyframeWriter::KeyframeWriter(Write write) : write_(std::move(write)) {
-  const sigset_t ending = endingSignals();
-  pthread_sigmask(SIG_BLOCK, &ending, &callers_signals_);
-  thread_ = std::thread([this] { run(); });
-}
+KeyframeWriter::KeyframeWriter(Write write)
+    : write_(std::move(write)), thread_([this] { run(); }) {}
 
 KeyframeWriter::~KeyframeWriter() {
   {
@@ -162,22 +140,19 @@ KeyframeWriter::~KeyframeWriter() {
   }
   changed_.notify_all();
   thread_.join();
-  pthread_sigmask(SIG_SETMASK, &callers_signals_, nullptr);
 }
 
 void KeyframeWriter::add(const KeyframeDepthMap& keyframe) {
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [this] { return error_ || waiting_.size() < kMaxWaiting; });
+  changed_.wait(lock, [this] { return error_ || !waiting_; });
   if (error_) std::rethrow_exception(error_);
-  waiting_.push_back(keyframe);
+  waiting_ = keyframe;
   changed_.notify_all();
-  // The program ends when the writer is idle: give it nothing more.
-  changed_.wait(lock, [this] { return error_ || !endIsPending(); });
 }
 
 void KeyframeWriter::finish() {
   std::unique_lock<std::mutex> lock(mutex_);
-  changed_.wait(lock, [this] { return error_ || (waiting_.empty() && !busy_); });
+  changed_.wait(lock, [this] { return error_ || (!waiting_ && !busy_); });
   if (error_) std::rethrow_exception(error_);
 }
 
@@ -188,33 +163,12 @@ double KeyframeWriter::cpuSeconds() const {
   return secondsOf(clock);
 }
 
-/// Under the lock, so that no keyframe waits. Returns where the program ignores the signal.
-void KeyframeWriter::acceptSignals() {
-  const sigset_t ending = endingSignals();
-  pthread_sigmask(SIG_SETMASK, &callers_signals_, nullptr);
-  pthread_sigmask(SIG_BLOCK, &ending, nullptr);
-  changed_.notify_all();
-}
-
-bool KeyframeWriter::endIsPending() const {
-  sigset_t pending;
-  sigpending(&pending);
-  return std::any_of(std::begin(kEndingSignals), std::end(kEndingSignals), [&](int signal) {
-    return sigismember(&pending, signal) == 1 && sigismember(&callers_signals_, signal) == 0;
-  });
-}
-
 void KeyframeWriter::run() {
   std::unique_lock<std::mutex> lock(mutex_);
   while (true) {
-    changed_.wait_for(lock, kMaxIdle, [this] { return stop_ || !waiting_.empty(); });
-    if (waiting_.empty()) {
-      if (stop_) return;
-      acceptSignals();
-      continue;
-    }
-    const KeyframeDepthMap keyframe = std::move(waiting_.front());
-    waiting_.pop_front();
+    changed_.wait(lock, [this] { return stop_ || waiting_; });
+    if (!waiting_) return;
+    const KeyframeDepthMap keyframe = *std::exchange(waiting_, std::nullopt);
     busy_ = true;
     changed_.notify_all();
     lock.unlock();
@@ -228,7 +182,7 @@ void KeyframeWriter::run() {
     busy_ = false;
     if (error) {
       error_ = error;
-      waiting_.clear();
+      waiting_.reset();
     }
     changed_.notify_all();
   }

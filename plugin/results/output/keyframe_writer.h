@@ -4,10 +4,6 @@
 #include <sys/types.h>
 
 #include <condition_variable>
-#include <csignal>
-#include <cstddef>
-#include <cstdint>
-#include <deque>
 #include <exception>
 #include <filesystem>
 #include <fstream>
@@ -75,20 +71,16 @@ class RunMark {
   int file_ = -1;
 };
 
-/// Writes keyframes in a thread of its own, in order, beside the making of the next ones. At most
-/// one keyframe waits while another is written: memory stays bounded. After an error nothing more
-/// is written. One thread calls it.
-///
-/// A signal that ends the program (SIGINT, SIGTERM, SIGHUP) takes effect once no keyframe waits:
-/// the caller's thread and those that it starts block it, and the writer's accepts it when it is
-/// idle.
+/// Writes keyframes in order, in a thread of its own, while its caller makes the next ones. At most
+/// one keyframe waits while another is written: memory stays bounded. After an error it writes no
+/// further keyframe. One thread calls it.
 class KeyframeWriter {
  public:
   using Write = std::function<void(const KeyframeDepthMap&)>;
 
   /// @param write runs in the writer's thread until `finish` returns or this object is destroyed.
   explicit KeyframeWriter(Write write);
-  /// Writes the waiting keyframes: an error elsewhere loses none.
+  /// Writes the waiting keyframe: an error elsewhere loses none.
   ~KeyframeWriter();
   KeyframeWriter(const KeyframeWriter&) = delete;
   KeyframeWriter& operator=(const KeyframeWriter&) = delete;
@@ -103,20 +95,15 @@ class KeyframeWriter {
 
  private:
   void run();
-  void acceptSignals();
-  bool endIsPending() const;
 
   Write write_;
-
-  mutable std::mutex mutex_;  // of the members below
+  std::mutex mutex_;  // of the members below
   std::condition_variable changed_;
-  std::deque<KeyframeDepthMap> waiting_;
+  std::optional<KeyframeDepthMap> waiting_;
   bool busy_ = false;
   bool stop_ = false;
   std::exception_ptr error_;
-
-  sigset_t callers_signals_{};  // blocked before
-  std::thread thread_;          // last: it uses the others
+  std::thread thread_;  // last: it uses the others
 };
 
 }  // namespace efm

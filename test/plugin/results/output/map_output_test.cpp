@@ -6,14 +6,11 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <atomic>
-#include <chrono>
 #include <csignal>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <future>
-#include <iostream>
 #include <stdexcept>
 #include <thread>
 #include <vector>
@@ -346,24 +343,6 @@ TEST(KeyframeWriter, AnErrorReachesTheCallerAndNothingMoreIsWritten) {
   EXPECT_EQ(message, "keyframe 13 cannot be written");
   EXPECT_EQ(messageOf([&] { writer.finish(); }), message);
   EXPECT_THAT(gate.written, ElementsAre(12));
-}
-
-TEST(KeyframeWriter, ASignalEndsTheProgramOnceTheWaitingKeyframesAreWritten) {
-  const auto interrupted = [](void (*handler)(int)) {
-    std::signal(SIGINT, handler);
-    KeyframeWriter writer([](const KeyframeDepthMap& keyframe) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-      std::cerr << "written " << keyframe.window.t_ref_ns << ";";
-    });
-    writer.add(keyframeAt(1));
-    writer.add(keyframeAt(2));
-    kill(getpid(), SIGINT);
-    for (const int t : {3, 4}) writer.add(keyframeAt(t));
-    writer.finish();
-    std::exit(0);
-  };
-  EXPECT_EXIT(interrupted(SIG_DFL), testing::KilledBySignal(SIGINT), "1;written 2;written 3;$");
-  EXPECT_EXIT(interrupted(SIG_IGN), testing::ExitedWithCode(0), "2;written 3;written 4;$");
 }
 
 TEST(KeyframeWriter, WritesTheWaitingKeyframesWhenItIsDestroyed) {
