@@ -336,11 +336,11 @@ std::runtime_error Hdf5Rows::failAt(std::uint64_t row, std::string_view what) co
 
 Hdf5Column::Type Hdf5Column::typeOf(const Hdf5Rows& rows, hid_t type) {
   const H5T_class_t kind = H5Tget_class(type);
+  const std::size_t bytes = H5Tget_size(type);
   if (kind == H5T_ENUM) {  // h5py's bool
     const Hdf5Id super(H5Tget_super(type), H5Tclose);
-    return typeOf(rows, super.get());
+    if (H5Tget_size(super.get()) == bytes) return typeOf(rows, super.get());
   }
-  const std::size_t bytes = H5Tget_size(type);
   const bool little = bytes == 1 || H5Tget_order(type) == H5T_ORDER_LE;
   if (kind == H5T_FLOAT && little && bytes == sizeof(float)) return Type::kFloat;
   if (kind == H5T_FLOAT && little && bytes == sizeof(double)) return Type::kDouble;
@@ -380,6 +380,12 @@ Hdf5Column Hdf5Column::ofField(std::shared_ptr<Hdf5Rows> rows, const std::string
   const Hdf5Id member_type(H5Tget_member_type(rows->type(), member), H5Tclose);
   const Type type = typeOf(*rows, member_type.get());
   const std::size_t offset = H5Tget_member_offset(rows->type(), member);
+  // The library does not compare them.
+  const std::size_t bytes = rows->rowBytes();
+  if (offset > bytes || H5Tget_size(member_type.get()) > bytes - offset) {
+    throw rows->fail(fmt::format("field {} at byte {}: expected a field inside a row of {} bytes",
+                                 field, offset, bytes));
+  }
   return {std::move(rows), offset, type};
 }
 

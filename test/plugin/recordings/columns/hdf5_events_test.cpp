@@ -401,6 +401,12 @@ TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
   options.time_unit = "ms";
   EXPECT_EQ(readStream(*openHdf5({file()}, options).cameras.at(0)).at(0).t_ns, 5'000'000)
       << "before that of the name";
+  std::string bytes = readBytes(file());
+  bytes.at(bytes.find("time_us") + sizeof("time_us") + 2) = 1;  // the third byte of its offset
+  writeFile(file(), bytes);
+  EXPECT_THAT(
+      errorOf([&] { openHdf5({file()}, options); }),
+      HasSubstr(":/a/list: field time_us at byte 65536: expected a field inside a row of 13"));
   options.columns = "t=a/list/t x=a/list/u y=a/list/v p=a/list/on";
   EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }), HasSubstr("with a field t"));
   options.columns = "t=b/list/time_us x=a/list/u y=a/list/v p=a/list/on";
