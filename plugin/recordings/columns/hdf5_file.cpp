@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "mapping/base/atomic_file.h"
+#include "plugin/recordings/columns/hdf5_crash_note.h"
 
 namespace efm {
 namespace {
@@ -235,6 +236,7 @@ void Hdf5Rows::readFilters(hid_t creation) {
 
 const RowBlock& Hdf5Rows::blockAt(std::uint64_t row) {
   if (row >= block_.first && row < block_.end) return block_;
+  const Hdf5CrashNote note(file_->path());
   const Hdf5Quiet quiet;
   block_ = {};
   const std::uint64_t first = row - row % chunk_sides_[0];

@@ -15,6 +15,7 @@
 #include "mapping/base/text.h"
 #include "mapping/geometry/rigid3.h"
 #include "mapping/geometry/timestamp.h"
+#include "plugin/recordings/columns/hdf5_crash_note.h"
 #include "plugin/recordings/columns/hdf5_events.h"
 #include "plugin/recordings/streams/time_unit.h"
 #include "plugin/recordings/text/dataset_folder.h"
@@ -196,6 +197,8 @@ bool addEvents(const std::shared_ptr<const Hdf5File>& file, const ReaderOptions&
 
 /// @return whether the file has events or poses.
 bool addFile(const fs::path& path, const ReaderOptions& options, RecordingParts& parts) {
+  constexpr unsigned kLimitS = 60;
+  const Hdf5CrashNote note(path, kLimitS);
   const auto file = std::make_shared<const Hdf5File>(path);
   bool any = addEvents(file, options, parts);
   for (const Hdf5Poses& poses : kPoses) {

@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "plugin/recordings/columns/hdf5_events.h"
 
+#include <alloca.h>
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <random>
+#include <thread>
 #include <tuple>
 
 #include "mapping/base/atomic_file.h"
 #include "mapping/geometry/timestamp.h"
 #include "mapping/geometry/trajectory.h"
+#include "plugin/recordings/columns/hdf5_crash_note.h"
 #include "plugin/recordings/columns/hdf5_files.h"
 #include "plugin/recordings/open/recording_formats.h"
 #include "plugin/recordings/streams/time_unit.h"
@@ -415,6 +420,29 @@ TEST_F(Hdf5Events, NamesOfTheOptionAreDataSetsOrFields) {
   write({});
   EXPECT_THAT(errorOf([&] { openHdf5({file()}, options); }),
               HasSubstr("events.h5:/a/list/u: no such data set (--event-columns)"));
+}
+
+TEST(Hdf5CrashNote, EndsAProgramWithTheNameOfTheFileAndNoHost) {
+  const auto call = [](bool in_program, const std::function<void()>& library) {
+    if (in_program) Hdf5CrashNote::enable();
+    const Hdf5CrashNote note("a.h5", 1);
+    { const Hdf5CrashNote inner("b.h5"); }
+    library();
+  };
+  const auto overflow = [] {
+    while (true) *static_cast<volatile char*>(alloca(4096)) = 1;
+  };
+  const testing::ExitedWithCode noted(1);
+  const std::string crashes =
+      "^event-fusion: error: a.h5: the HDF5 library crashes on it: expected a file without "
+      "damage\n$";
+  EXPECT_EXIT(call(true, std::abort), noted, crashes);
+  EXPECT_EXIT(call(true, overflow), noted, crashes);
+  EXPECT_EXIT(call(true, pause), noted, "the HDF5 library does not come back from it within 1 s: ");
+  const testing::KilledBySignal aborted(SIGABRT);
+  EXPECT_EXIT(call(true, [] { std::thread(std::abort).join(); }), aborted, "^$");
+  EXPECT_EXIT((call(true, [] {}), std::abort()), aborted, "^$") << "after the note";
+  EXPECT_EXIT(call(false, std::abort), aborted, "^$");
 }
 
 TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
