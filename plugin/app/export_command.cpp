@@ -75,7 +75,7 @@ int runImport(const ImportArguments& arguments) {
       progress.show(recording->progress());
     });
     if (all_events == 0 && damage) throw std::runtime_error(*damage);
-    if (all_events == 0) refuseLimitsWithoutEvents(source);
+    if (all_events == 0) refuseLimitsWithoutEvents(source.limits, *recording);
     if (all_events + poses + others == 0) {
       throw std::runtime_error("the recording holds nothing " + limitsText(source.limits));
     }
@@ -223,7 +223,7 @@ int runExport(const ExportArguments& arguments) {
       progress.show(recording->progress());
     });
   }
-  if (!damage && result.events() == 0) refuseLimitsWithoutEvents(source);
+  if (!damage && result.events() == 0) refuseLimitsWithoutEvents(source.limits, *recording);
   for (const TruthDepth& truth : openTruth(source)) {
     interruption.check();
     if (source.limits.contain(truth.t_ns)) result.add(truth);

@@ -22,8 +22,8 @@
 #include "plugin/app/recording_interval.h"
 #include "plugin/recordings/calibration/calibration_file.h"
 #include "plugin/recordings/open/open_recording.h"
+#include "plugin/session/first_look.h"
 #include "plugin/session/health_checks.h"
-#include "plugin/session/recording_survey.h"
 #include "plugin/session/session_status.h"
 
 namespace efm {
@@ -165,7 +165,7 @@ class PatientSurveyor {
 
  private:
   EventFusionOptions options_;
-  std::optional<RecordingSurveyor> surveyor_{options_};
+  std::optional<FirstLook> surveyor_{options_};
 };
 
 }  // namespace
@@ -199,7 +199,7 @@ int runInfo(const InfoArguments& arguments) {
     fmt::print("truth: {} depth maps of camera 0\n", truth.size());
   }
   if (stopped) std::rethrow_exception(stopped);  // what is missing says nothing then
-  if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source);
+  if (!contents.statistics.eventSpan()) refuseLimitsWithoutEvents(source.limits, *recording);
   HealthLimits health;
   std::vector<Warning> warnings = surveyor.finish(quiet, health);
   for (Warning& warning : warningsOf(contents, health, recording->counts())) {

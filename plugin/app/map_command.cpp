@@ -75,16 +75,6 @@ EventFusionOptions optionsOf(const MappingArguments& arguments, const OptionRead
   return options;
 }
 
-/// Warns if the option file replaced the recording's own calibration, which may be the better one.
-void warnOfRecalibration(const MappingArguments& arguments, MappingOutcome& outcome) {
-  if (outcome.recalibrated_cameras == 0) return;
-  if (!arguments.source.calibration.empty()) return;  // --calibration is intended
-  outcome.report.warnings.push_back(
-      {"calibration-replaced", outcome.report.options.rig.calibration.string() +
-                                   " replaced another calibration, the recording's own; --set "
-                                   "rig.calibration= keeps that"});
-}
-
 bool isWithoutPoints(const MapReport& report) {
   return report.counts.keyframes > 0 && report.points == 0;
 }
@@ -125,18 +115,6 @@ void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
                    *step_m, origin.x(), origin.y(), origin.z())});
 }
 
-/// Writes all files, even if one fails. The outcome has the first error.
-void writeAll(MappingOutcome& outcome, std::initializer_list<std::function<void()>> files) {
-  for (const auto& write : files) {
-    try {
-      write();
-    } catch (const std::exception& error) {
-      if (!outcome.error) outcome.error = inWords(error);
-      outcome.misses_file = true;
-    }
-  }
-}
-
 /// Not where MRPT is missing: a note says so.
 void writeSimpleMap(MapOutput& output, const std::vector<StoredKeyframe>& keyframes) {
   const MrptLibrary* library = nullptr;
@@ -166,70 +144,6 @@ std::unique_ptr<MapWindow> openWindow() {
                            "; --record-frames DIR renders without a screen");
 }
 
-/// Writes map.html, which shows the report, and adds its time to the report's.
-void writePage(MappingOutcome& outcome, MapOutput& output, const KeyframePictures& pictures) {
-  MapReport& report = outcome.report;
-  double real_s = 0, cpu_s = 0;
-  {
-    const SecondsScope scope(real_s, cpu_s);
-    const std::filesystem::path folder = std::filesystem::absolute(output.folder() / "");
-    const MapPage page = {folder.lexically_normal().parent_path().filename().string(),
-                          *outcome.points,
-                          report.options.cloud.voxel_size_m,
-                          outcome.trajectory,
-                          pictures,
-                          report.view,
-                          reportJson(report)};
-    writeAll(outcome,
-             {[&] { output.writePage([&](std::ostream& file) { writeMapPage(file, page); }); }});
-  }
-  report.times.real.map += real_s;
-  report.times.real.total += real_s;
-  report.times.cpu.output += cpu_s;
-  report.times.cpu.total += cpu_s;
-}
-
-std::string stays(const MapOutput& output) {
-  return fmt::format("; the earlier result in {} stays", output.folder().string());
-}
-
-/// Writes the page of a map and the report; prints warnings, summary and error. @return the exit
-/// status.
-int conclude(MappingOutcome& outcome, OutputKind kind, MapOutput& output,
-             const KeyframePictures& pictures, const MappingArguments& arguments,
-             const OptionReader& reader) {
-  outcome.report.peak_memory_bytes = peakMemoryBytes();
-  if (kind == OutputKind::kMap && outcome.report.counts.keyframes > 0) {
-    writePage(outcome, output, pictures);
-    outcome.report.peak_memory_bytes = peakMemoryBytes();
-  }
-  // A run without a keyframe, or one that cannot write a file, leaves the result of an earlier run.
-  const bool replaces =
-      outcome.report.counts.keyframes > 0 && !(output.keepsEarlier() && outcome.misses_file);
-  if (replaces || !std::filesystem::exists(output.folder() / "report.json")) {
-    writeAll(outcome, {[&] { output.writeReport(reportJson(outcome.report)); }});
-  }
-  if (output.keepsEarlier() && outcome.error) *outcome.error += stays(output);
-  const std::vector<Warning>& warnings = outcome.report.warnings;
-  printWarnings(
-      {warnings.begin() + static_cast<std::ptrdiff_t>(outcome.told_warnings), warnings.end()});
-  const bool quiet = arguments.verbosity == Verbosity::kQuiet;
-  if (outcome.report.counts.keyframes > 0 && !quiet && !output.keepsEarlier())
-    std::cout << summaryOf(outcome.report, kind, output.folder());
-  if (outcome.error) {
-    if (const auto wrong = reader.wrongOption(*outcome.error)) return fail(*wrong, kUsageStatus);
-    return fail(reader.withOrigins(*outcome.error));
-  }
-  if (!outcome.report.stopped_at) {
-    const bool strict = arguments.strict && failStrictly(warnings);
-    if (isWithoutPoints(outcome.report)) return fail("the map has no point; its files are written");
-    return strict ? kFailedStatus : 0;
-  }
-  std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
-                           100 * *outcome.report.stopped_at);
-  return kInterruptedStatus;
-}
-
 Window windowOf(const DepthArguments& arguments, const RecordingSource& source,
                 ReferenceTime reference) {
   RecordingTimes times(source);
@@ -237,52 +151,6 @@ Window windowOf(const DepthArguments& arguments, const RecordingSource& source,
   Window window = windowOf(*limits.t0_ns, *limits.t1_ns, reference);
   if (arguments.t_ref) window.t_ref_ns = times.resolve(*arguments.t_ref);
   return window;
-}
-
-/// The first pass over the recording, for max_confidence = sequence.
-std::optional<double> sequenceMaximumOf(const RecordingSource& source, MappingJob job) {
-  EventFusionOptions& options = job.options;
-  if (options.mapper.keyframe.extraction.max_confidence.level != WhiteLevel::kSequence) {
-    return std::nullopt;
-  }
-  options.mapper.only_window.reset();
-  options.refinement.enabled = false;  // changes no confidence
-  return sequenceMaximum(job, *openRecording(source));
-}
-
-/// A first pass over the recording: chooses the automatic options, and warns of poses that do not
-/// explain the events.
-/// @return the recording again, if its events fit into `[live] max_queue_mb`.
-std::unique_ptr<Recording> survey(const RecordingSource& source, MappingJob& job) {
-  std::unique_ptr<Recording> recording = openRecording(source);
-  HeldSamples held(job.options.live.max_queue_mb);
-  const RecordingSurvey survey = surveyRecording(job, *recording, held);
-  FusionMapperOptions& options = job.options.mapper;
-  if (job.options.automatic.any()) {
-    OptionChoice choice = chooseOptions(job.options.automatic, survey.rig, survey.samples,
-                                        survey.duration_s, options);
-    const LiveOptions& live = job.options.live;
-    const double passed = live.max_event_rate * static_cast<double>(survey.rig.cameras.size());
-    const double most = survey.most_events_per_s;
-    fitIntoQueue(live, passed > 0 ? std::min(passed, most) : most, options.policy, choice.options);
-    job.chosen = std::move(choice.options);
-    job.options.automatic = {};
-    if (!choice.is_proven) {
-      job.doubts.push_back(choice.found_scene
-                               ? "the parallax is too small to tell how far the scene is away"
-                               : "no scene was found to choose depth limits from");
-    }
-  }
-  PoseVerdict verdict = survey.judgePoses(options);
-  printWarnings(verdict.warnings);
-  job.warnings.insert(job.warnings.end(), verdict.warnings.begin(), verdict.warnings.end());
-  job.doubts.insert(job.doubts.end(), verdict.doubts.begin(), verdict.doubts.end());
-  return std::move(held).recording(std::move(recording));
-}
-
-std::unique_ptr<Recording> openWhole(RecordingSource source) {
-  source.limits = {};
-  return openRecording(source);
 }
 
 /// "NAME_map" or "NAME_depth" in the working folder, after the first source.
@@ -348,198 +216,435 @@ void refuseOutputFolder(const std::filesystem::path& folder, OutputKind kind,
   }
 }
 
-/// Throws a UsageError where an error is about an option that was given.
-void refuseOption(const OptionReader& reader, const std::invalid_argument& error) {
-  if (const auto wrong = reader.wrongOption(error.what())) throw UsageError(*wrong);
+/// What `map` and `depth` do before and after their loop over a recording: the options and the
+/// recording, the first look, the folder of the result, its report and the exit status.
+class MapCommand {
+ public:
+  MapCommand(const MappingArguments& given, OutputKind output_kind)
+      : arguments(given), kind(output_kind), reader(readerOf(given)) {
+    options = optionsOf(arguments, reader);
+  }
+
+  const MappingArguments& arguments;
+  const OutputKind kind;
+  const OptionReader reader;
+  const Interruption interruption{};
+  EventFusionOptions options;
+  std::vector<ChosenOption> chosen;  ///< Those of the options that were automatic.
+  std::unique_ptr<Recording> recording;
+  std::optional<MapOutput> output;
+  MapReport report;
+
+  /// With the options so far: the stride may be chosen later.
+  RecordingSource source() const { return sourceOf(arguments, reader, options); }
+
+  /// Checks the folder of the result, takes the first look and opens the recording to map it.
+  void begin();
+  /// Writes a file of the result. An error keeps no other file from being written.
+  void write(const std::function<void()>& file);
+  /// Fills in the report, but for its points. @return the map.
+  std::shared_ptr<const MapSnapshot> describe(MappingRun& run, bool stopped);
+  /// Warns if the map has no points, few, or some so far away that floats are too coarse.
+  void judgePoints(const MapCloud& points);
+  /// Ends the measured time of the mapping and its files.
+  void endTimes(const KeyframeWriter& writer);
+  /// Writes the report, and prints the warnings, the summary and the error.
+  /// @return the exit status.
+  int conclude(std::optional<std::string> error);
+  /// Within a handler: throws the error again, in the words of the user.
+  /// @param written the keyframes that are in the folder.
+  [[noreturn]] void rethrow(int written) const;
+
+ private:
+  std::unique_ptr<Recording> firstLook();
+  std::optional<double> sequenceMaximum();
+  std::string stays() const;
+
+  std::size_t told_warnings_ = 0;
+  std::optional<std::string> write_error_;
+  const double start_cpu_s_ = processSeconds();
+  std::chrono::steady_clock::time_point began_;
+};
+
+void MapCommand::begin() {
+  began_ = std::chrono::steady_clock::now();
+  const std::filesystem::path folder = outputFolder(arguments, kind);
+  const RecordingSource first = source();
+  refuseOutputFolder(folder, kind, arguments, first);
+  report.warnings = replacementWarnings(folder, first);
+  printWarnings(report.warnings);
+  recording = firstLook();
+  options.mapper.keyframe.sequence_maximum = sequenceMaximum();
+  const bool changes = source().faults.perturbation.keyframe.any();  // by the chosen stride
+  if (!recording || changes) recording = openRecording(source());
+  output.emplace(folder, kind, options.mapper.keyframe.planes,
+                 arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure,
+                 namesOf(first));
+  told_warnings_ = report.warnings.size();
 }
 
-/// Runs a job and writes its results.
-/// @param kind of the output folder.
-/// @param take receives each keyframe, in order, in a thread of its own.
-/// @param write writes the results after the last keyframe, if there is one.
-int runJob(const MappingArguments& arguments, const OptionReader& reader, MappingJob job,
-           OutputKind kind, const std::function<void(MapOutput&, const KeyframeDepthMap&)>& take,
-           const std::function<void(MapOutput&, MappingOutcome&)>& write) {
-  StageTimes whole;
-  whole.cpu.start = processSeconds();
-  MappingOutcome outcome;
-  std::optional<MapOutput> output;
-  std::optional<KeyframePictures> pictures;
-  {
-    const SecondsScope total(whole.real.total, whole.cpu.total, processSeconds);
-    RecordingSource source = sourceOf(arguments, reader, job.options);
-    const std::filesystem::path folder = outputFolder(arguments, kind);
-    refuseOutputFolder(folder, kind, arguments, source);
-    job.warnings = replacementWarnings(folder, source);
-    printWarnings(job.warnings);
-    std::unique_ptr<Recording> recording;
+/// Chooses the automatic options, and warns of poses that do not explain the events.
+/// @return the recording again, if its events fit into `[live] max_queue_mb`.
+std::unique_ptr<Recording> MapCommand::firstLook() {
+  auto held = std::make_unique<HeldRecording>(openRecording(source()), options.live.max_queue_mb);
+  FirstLook look(options);
+  Progress progress("first look", arguments.verbosity);
+  std::exception_ptr damage;  // the mapping reports it
+  const auto next = [&]() -> std::optional<Sample> {
+    if (interruption.requested()) throw Interrupted();
     try {
-      recording = survey(source, job);
-    } catch (const std::invalid_argument& error) {
-      refuseOption(reader, error);
-      throw;
+      return held->read().next();
+    } catch (const std::exception&) {
+      damage = std::current_exception();
+      return std::nullopt;
     }
-    source = sourceOf(arguments, reader, job.options);  // the stride may have been chosen
-    job.sequence_maximum = sequenceMaximumOf(source, job);
-    const bool changes = source.faults.perturbation.keyframe.any();  // by the stride
-    if (!recording || changes) recording = openRecording(source);
-    output.emplace(folder, kind, job.options.mapper.keyframe.planes,
-                   arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure,
-                   namesOf(source));
-    pictures.emplace(job.options.mapper.keyframe.planes);
-    std::atomic<int> written = 0;
-    KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
-      take(*output, keyframe);
-      if (kind == OutputKind::kMap) pictures->add(keyframe.map.depth, keyframe.view_events);
-      ++written;
-    });
-    job.on_keyframe = [&, note = job.on_keyframe](const KeyframeDepthMap& keyframe) {
-      if (note) note(keyframe);
-      writer.add(keyframe);
-    };
-    job.processor_clock = [&] { return processSeconds() - writer.cpuSeconds(); };
+  };
+  bool takes = true;
+  while (std::optional<Sample> sample = takes ? next() : std::nullopt) {
     try {
-      outcome = runMapping(job, *recording);
-      writer.finish();
-    } catch (const Interrupted&) {
-      throw;
-    } catch (const std::invalid_argument& error) {
-      refuseOption(reader, error);
-      throw;
-    } catch (const std::runtime_error& error) {
-      if (output->keepsEarlier()) throw std::runtime_error(inWords(error) + stays(*output));
-      if (written == 0) throw;
-      throw std::runtime_error(fmt::format("{}; {} keyframes before it are written to {}",
-                                           inWords(error), written.load(), folder.string()));
+      look.add(*sample);
+    } catch (const std::exception&) {  // the mapping reports it
+      takes = false;
     }
-    whole.cpu.images = writer.cpuSeconds();
-    const bool limited = source.limits.t0_ns || source.limits.t1_ns;
-    if (outcome.report.counts.keyframes == 0 && limited && !outcome.report.stopped_at) {
-      outcome = runMapping(job, *openWhole(source));  // for the error, which says all its times
-      writer.finish();  // without an error: the events after the end filled the window
-    }
-    outcome.report.recording = namesOf(source);
-    outcome.report.faults = source.faults;
-    warnOfRecalibration(arguments, outcome);
-    if (outcome.report.counts.keyframes > 0) write(*output, outcome);
-    warnOfNoPoints(outcome.report);
-    doubtFewPoints(outcome.report);
-    if (outcome.points) warnOfFarPoints(*outcome.points, outcome.report);
+    held->hold(std::move(*sample));
+    progress.show(held->read().progress());
   }
-  StageTimes& times = outcome.report.times;
-  times.real.total = whole.real.total;
-  times.cpu.start = whole.cpu.start;
-  times.cpu.images = whole.cpu.images;
-  times.cpu.total = whole.cpu.start + whole.cpu.total;
-  return conclude(outcome, kind, *output, *pictures, arguments, reader);
+  if (takes) held->end(damage);
+  const RecordingSurvey survey = look.finish();
+  if (options.automatic.any()) {
+    OptionChoice choice = chooseOptions(options.automatic, survey.rig, survey.samples,
+                                        survey.duration_s, options.mapper);
+    const double passed =
+        options.live.max_event_rate * static_cast<double>(survey.rig.cameras.size());
+    const double most = survey.most_events_per_s;
+    fitIntoQueue(options.live, passed > 0 ? std::min(passed, most) : most, options.mapper.policy,
+                 choice.options);
+    chosen = std::move(choice.options);
+    options.automatic = {};
+    if (!choice.is_proven) {
+      report.doubts.push_back(choice.found_scene
+                                  ? "the parallax is too small to tell how far the scene is away"
+                                  : "no scene was found to choose depth limits from");
+    }
+  }
+  PoseVerdict verdict = survey.judgePoses(options.mapper);
+  printWarnings(verdict.warnings);
+  report.warnings.insert(report.warnings.end(), verdict.warnings.begin(), verdict.warnings.end());
+  report.doubts.insert(report.doubts.end(), verdict.doubts.begin(), verdict.doubts.end());
+  if (!held->isWhole()) return nullptr;
+  return held;
+}
+
+/// A pass over the recording for max_confidence = sequence: the robust maximum of the keyframes'
+/// confidences. It costs as much as the mapping. @return std::nullopt if there is no keyframe.
+std::optional<double> MapCommand::sequenceMaximum() {
+  if (options.mapper.keyframe.extraction.max_confidence.level != WhiteLevel::kSequence) {
+    return std::nullopt;
+  }
+  EventFusionOptions first = options;
+  first.mapper.only_window.reset();
+  first.refinement.enabled = false;  // changes no confidence
+  first.live.enabled = false;
+  RobustMaximum maximum;
+  const std::unique_ptr<Recording> all = openRecording(source());
+  MappingRun pass(
+      *all, first, chosen, std::min(arguments.verbosity, Verbosity::kNormal),
+      [&](const KeyframeDepthMap& keyframe, const MappingRun&) {
+        maximum.add(keyframe.max_confidence);
+      },
+      "first pass");
+  while (!interruption.requested() && pass.mapNext()) {
+  }
+  pass.finish();
+  return maximum.value();
+}
+
+void MapCommand::write(const std::function<void()>& file) {
+  try {
+    file();
+  } catch (const std::exception& error) {
+    if (!write_error_) write_error_ = inWords(error);
+  }
+}
+
+std::shared_ptr<const MapSnapshot> MapCommand::describe(MappingRun& run, bool stopped) {
+  run.describe(report, stopped);
+  report.recording = namesOf(arguments.source);
+  report.faults = source().faults;
+  const std::string calibration = options.rig.calibration.string();
+  // The recording's own calibration may be the better one. --calibration is intended.
+  if (run.mapper().status().recalibrated_cameras > 0 && arguments.source.calibration.empty()) {
+    report.warnings.push_back({"calibration-replaced",
+                               calibration + " replaced another calibration, the recording's own; "
+                                             "--set rig.calibration= keeps that"});
+  }
+  std::shared_ptr<const MapSnapshot> map;
+  {
+    const SecondsScope scope(report.times.real.map, report.times.cpu.output);
+    map = run.mapper().snapshot();
+  }
+  describePoints(*map->points, report);
+  if (report.refinement && !map->trajectory.empty()) {
+    report.pose_shift = shiftBetween(map->tracker_trajectory, map->trajectory);
+  }
+  return map;
+}
+
+void MapCommand::judgePoints(const MapCloud& points) {
+  warnOfNoPoints(report);
+  doubtFewPoints(report);
+  warnOfFarPoints(points, report);
+}
+
+void MapCommand::endTimes(const KeyframeWriter& writer) {
+  StageTimes& times = report.times;
+  times.real.total =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+  times.cpu.start = start_cpu_s_;
+  times.cpu.images = writer.cpuSeconds();
+  times.cpu.total = processSeconds();
+}
+
+std::string MapCommand::stays() const {
+  return fmt::format("; the earlier result in {} stays", output->folder().string());
+}
+
+int MapCommand::conclude(std::optional<std::string> error) {
+  if (!error) error = write_error_;
+  report.peak_memory_bytes = peakMemoryBytes();
+  // A run without a keyframe, or one that cannot write a file, leaves the result of an earlier run.
+  const bool replaces = report.counts.keyframes > 0 && !(output->keepsEarlier() && write_error_);
+  if (replaces || !std::filesystem::exists(output->folder() / "report.json")) {
+    write([&] { output->writeReport(reportJson(report)); });
+    if (!error) error = write_error_;
+  }
+  if (output->keepsEarlier() && error) *error += stays();
+  printWarnings({report.warnings.begin() + static_cast<std::ptrdiff_t>(told_warnings_),
+                 report.warnings.end()});
+  const bool quiet = arguments.verbosity == Verbosity::kQuiet;
+  if (report.counts.keyframes > 0 && !quiet && !output->keepsEarlier()) {
+    std::cout << summaryOf(report, kind, output->folder());
+  }
+  if (error) {
+    if (const auto wrong = reader.wrongOption(*error)) return fail(*wrong, kUsageStatus);
+    return fail(reader.withOrigins(*error));
+  }
+  if (report.stopped_at) {
+    std::cerr << fmt::format("event-fusion: stopped at {:.0f} % of the recording\n",
+                             100 * *report.stopped_at);
+    return kInterruptedStatus;
+  }
+  const bool strict = arguments.strict && failStrictly(report.warnings);
+  if (isWithoutPoints(report)) return fail("the map has no point; its files are written");
+  return strict ? kFailedStatus : 0;
+}
+
+void MapCommand::rethrow(int written) const {
+  try {
+    throw;
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const std::invalid_argument& error) {  // it may be about an option that was given
+    if (const auto wrong = reader.wrongOption(error.what())) throw UsageError(*wrong);
+    throw;
+  } catch (const std::runtime_error& error) {
+    if (output && output->keepsEarlier()) throw std::runtime_error(inWords(error) + stays());
+    if (written == 0) throw;
+    throw std::runtime_error(fmt::format("{}; {} keyframes before it are written to {}",
+                                         inWords(error), written, output->folder().string()));
+  }
+}
+
+/// Those who see the map after each keyframe: a window, and a folder of frames.
+class Watchers {
+ public:
+  Watchers(const MapArguments& arguments, const MapCommand& command) {
+    if (arguments.view) all_.push_back(window_ = openWindow());
+    if (arguments.record_frames.empty()) return;
+    std::vector<std::filesystem::path> inputs = inputsOf(command.source());
+    if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
+    refuseToReplace(arguments.record_frames, inputs);
+    all_.push_back(
+        mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force));
+  }
+
+  void add(const MappingRun& run, const KeyframeDepthMap& keyframe) {
+    if (!all_.empty()) newest_ = keyframe;
+    show(run, false);
+  }
+  void show(const MappingRun& run, bool is_last) {
+    if (!newest_) return;
+    const double start_s = run.seconds();
+    for (const auto& watcher : all_) {
+      if (watcher->due(is_last)) watcher->show(run.watched(*newest_, watched_s_));
+    }
+    watched_s_ += run.seconds() - start_s;
+  }
+  /// The window stays until the user closes it, if there is a user.
+  void wait(const Interruption& interruption) {
+    const bool interactive = isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1;
+    if (!window_ || !interactive || !window_->isOpen()) return;
+    std::cerr << "event-fusion: the window stays until it is closed or a key is pressed in it\n";
+    window_->wait([&] { return interruption.requested(); });
+  }
+
+ private:
+  std::vector<std::shared_ptr<MapWatcher>> all_;
+  std::shared_ptr<MapWindow> window_;
+  std::optional<KeyframeDepthMap> newest_;
+  double watched_s_ = 0;
+};
+
+/// The file of the whole DSI, if it is asked for.
+std::unique_ptr<NpyDsiFile> dsiFile(const MapCommand& command, const DepthArguments& arguments) {
+  const KeyframeMapperOptions& keyframe = command.options.mapper.keyframe;
+  const auto reference = static_cast<std::size_t>(keyframe.reference_camera);
+  const std::vector<RigCamera>& cameras = command.recording->rig().cameras;
+  if (!arguments.save_dsi || reference >= cameras.size()) return nullptr;
+  return std::make_unique<NpyDsiFile>(command.output->folder() / "dsi.npy",
+                                      keyframe.planes.num_planes,
+                                      makeReferenceView(cameras[reference].model, keyframe.view));
+}
+
+/// Writes the files of a map, but for its page and its report.
+void writeMap(MapCommand& command, const MapSnapshot& map, const KeyframeSheet& sheet) {
+  MapOutput& output = *command.output;
+  const EventFusionOptions& options = command.options;
+  StageTimes& times = command.report.times;
+  const SecondsScope scope(times.real.map, times.cpu.output);
+  command.write([&] { output.writeCloud("map.pcd", *map.points); });
+  if (options.ply) {
+    command.write([&] { output.writeColouredCloud(*map.points, upwardOf(map.trajectory)); });
+  }
+  command.write([&] { writeSimpleMap(output, map.keyframes); });
+  command.write([&] { output.writeTrajectory("trajectory.txt", map.trajectory); });
+  if (options.refinement.enabled) {
+    command.write(
+        [&] { output.writeTrajectory("trajectory_tracker.txt", map.tracker_trajectory); });
+  }
+  command.write([&] {
+    output.writePicture("map.png",
+                        drawMap(*map.points, map.trajectory, options.cloud.voxel_size_m));
+    output.writePicture("overview.png", sheet.draw(options.mapper.keyframe.planes));
+  });
+}
+
+/// Writes map.html, which shows the report, and adds its time to the report's.
+void writePage(MapCommand& command, const MapSnapshot& map, const KeyframePictures& pictures) {
+  MapReport& report = command.report;
+  double real_s = 0, cpu_s = 0;
+  report.peak_memory_bytes = peakMemoryBytes();
+  {
+    const SecondsScope scope(real_s, cpu_s);
+    MapOutput& output = *command.output;
+    const std::filesystem::path folder = std::filesystem::absolute(output.folder() / "");
+    const MapPage page = {folder.lexically_normal().parent_path().filename().string(),
+                          *map.points,
+                          report.options.cloud.voxel_size_m,
+                          map.trajectory,
+                          pictures,
+                          report.view,
+                          reportJson(report)};
+    command.write([&] { output.writePage([&](std::ostream& file) { writeMapPage(file, page); }); });
+  }
+  report.times.real.map += real_s;
+  report.times.real.total += real_s;
+  report.times.cpu.output += cpu_s;
+  report.times.cpu.total += cpu_s;
 }
 
 }  // namespace
 
 int runMap(const MapArguments& arguments) {
-  const OptionReader reader = readerOf(arguments);
-  MappingJob job;
-  job.options = optionsOf(arguments, reader);
-  job.verbosity = arguments.verbosity;
-  job.options.mapper.limits =
-      RecordingTimes(sourceOf(arguments, reader, job.options)).resolve(arguments.times);
-  asUsage([&] { job.options.mapper.limits.validate(); });
-  job.options.mapper.keyframe.view_events = true;  // the page shows them
-  const Interruption interruption;
-  job.stop_requested = [&] { return interruption.requested(); };
-  std::unique_ptr<MapWindow> window;
-  if (arguments.view) {
-    window = openWindow();
-    job.watchers.push_back(window.get());
+  MapCommand command(arguments, OutputKind::kMap);
+  FusionMapperOptions& options = command.options.mapper;
+  options.limits = RecordingTimes(command.source()).resolve(arguments.times);
+  asUsage([&] { options.limits.validate(); });
+  options.keyframe.view_events = true;  // the page shows them
+  Watchers watchers(arguments, command);
+  std::atomic<int> written = 0;
+  try {
+    command.begin();
+    KeyframeSheet sheet;
+    KeyframePictures pictures(options.keyframe.planes);
+    KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
+      command.output->writeKeyframe(keyframe);
+      sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
+      pictures.add(keyframe.map.depth, keyframe.view_events);
+      ++written;
+    });
+    MappingRun run(*command.recording, command.options, command.chosen, arguments.verbosity,
+                   [&](const KeyframeDepthMap& keyframe, const MappingRun& so_far) {
+                     writer.add(keyframe);
+                     watchers.add(so_far, keyframe);
+                   });
+    run.mapper().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
+    bool stopped = false;
+    while (!stopped && run.mapNext()) stopped = command.interruption.requested();
+    run.finish();
+    watchers.show(run, true);
+    writer.finish();
+
+    const auto map = command.describe(run, stopped);
+    const bool has_keyframes = command.report.counts.keyframes > 0;
+    if (has_keyframes) writeMap(command, *map, sheet);
+    command.judgePoints(*map->points);
+    command.endTimes(writer);
+    if (has_keyframes) writePage(command, *map, pictures);
+    const int status = command.conclude(run.error());
+    watchers.wait(command.interruption);
+    return status;
+  } catch (...) {
+    command.rethrow(written);
   }
-  std::unique_ptr<MapWatcher> frames;
-  if (!arguments.record_frames.empty()) {
-    std::vector<std::filesystem::path> inputs = inputsOf(sourceOf(arguments, reader, job.options));
-    if (!arguments.config.empty()) inputs.push_back(findConfig(arguments.config));
-    refuseToReplace(arguments.record_frames, inputs);
-    frames = mrptLibrary("--record-frames").recordFrames(arguments.record_frames, arguments.force);
-    job.watchers.push_back(frames.get());
-  }
-  const bool refined = job.options.refinement.enabled;
-  KeyframeSheet sheet;
-  const auto take = [&](MapOutput& output, const KeyframeDepthMap& keyframe) {
-    output.writeKeyframe(keyframe);
-    sheet.add(keyframe.window.t_ref_ns, keyframe.map.depth);
-  };
-  const auto write = [&](MapOutput& output, MappingOutcome& outcome) {
-    const DepthPlanesOptions& limits = outcome.report.options.mapper.keyframe.planes;
-    StageTimes& times = outcome.report.times;
-    const SecondsScope scope(times.real.map, times.cpu.output);
-    writeAll(outcome,
-             {[&] { output.writeCloud("map.pcd", *outcome.points); },
-              [&] {
-                if (!job.options.ply) return;
-                output.writeColouredCloud(*outcome.points, upwardOf(outcome.trajectory));
-              },
-              [&] { writeSimpleMap(output, outcome.keyframes); },
-              [&] { output.writeTrajectory("trajectory.txt", outcome.trajectory); },
-              [&] {
-                if (!refined) return;
-                output.writeTrajectory("trajectory_tracker.txt", outcome.tracker_trajectory);
-              },
-              [&] {
-                if (outcome.trajectory.empty()) return;  // nothing to draw
-                output.writePicture("map.png", drawMap(*outcome.points, outcome.trajectory,
-                                                       outcome.report.options.cloud.voxel_size_m));
-                output.writePicture("overview.png", sheet.draw(limits));
-              }});
-  };
-  const int status = runJob(arguments, reader, job, OutputKind::kMap, take, write);
-  const bool interactive = isatty(STDIN_FILENO) == 1 && isatty(STDERR_FILENO) == 1;
-  if (window && interactive && window->isOpen()) {
-    std::cerr << "event-fusion: the window stays until it is closed or a key is pressed in it\n";
-    window->wait(job.stop_requested);
-  }
-  return status;
 }
 
 int runDepth(const DepthArguments& arguments) {
-  const Interruption interruption;
-  const OptionReader reader = readerOf(arguments);
-  MappingJob job;
-  job.options = optionsOf(arguments, reader);
-  job.verbosity = arguments.verbosity;
-  job.options.mapper.only_window = windowOf(arguments, sourceOf(arguments, reader, job.options),
-                                            job.options.mapper.policy.reference);
-  asUsage([&] { job.options.mapper.validate(); });
-  const EventFusionOptions options = job.options;
-  std::unique_ptr<NpyDsiFile> dsi;
-  if (arguments.save_dsi) {
-    job.make_dsi_sink = [&](const ReferenceView& view, int num_planes) {
-      dsi = std::make_unique<NpyDsiFile>(outputFolder(arguments, OutputKind::kDepth) / "dsi.npy",
-                                         num_planes, view);
-      return dsi.get();
-    };
+  MapCommand command(arguments, OutputKind::kDepth);
+  EventFusionOptions& options = command.options;
+  options.mapper.only_window =
+      windowOf(arguments, command.source(), options.mapper.policy.reference);
+  asUsage([&] { options.mapper.validate(); });
+  std::atomic<int> written = 0;
+  try {
+    command.begin();
+    MapCloud::ConstPtr points;
+    KeyframeWriter writer([&](const KeyframeDepthMap& keyframe) {
+      command.output->writeImages(keyframe);
+      const std::vector<CloudPoint> in_world =
+          pointsInWorld(options.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe),
+                        keyframe.T_world_ref);
+      points =
+          mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
+      ++written;
+    });
+    bool made = false;
+    MappingRun run(*command.recording, options, command.chosen, arguments.verbosity,
+                   [&](const KeyframeDepthMap& keyframe, const MappingRun&) {
+                     made = true;
+                     writer.add(keyframe);
+                   });
+    run.mapper().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
+    const std::unique_ptr<NpyDsiFile> dsi = dsiFile(command, arguments);
+    run.mapper().setSink(dsi.get());
+    while (run.mapNext()) {  // a part of the window is no result; a keyframe is
+      if (!made) command.interruption.check();
+    }
+    run.finish();
+    writer.finish();
+
+    const auto map = command.describe(run, false);
+    if (points) {
+      describePoints(*points, command.report);
+      command.write([&] { command.output->writeCloud("points.pcd", *points); });
+      if (dsi) command.write([&] { command.output->add(dsi->finish()); });
+    }
+    command.judgePoints(*map->points);
+    command.endTimes(writer);
+    return command.conclude(run.error());
+  } catch (...) {
+    command.rethrow(written);
   }
-  bool made = false;
-  // A part of the window is no result. A keyframe that is made is written.
-  job.on_keyframe = [&](const KeyframeDepthMap&) { made = true; };
-  job.stop_requested = [&] {
-    if (!made) interruption.check();
-    return false;
-  };
-  MapCloud::ConstPtr points;
-  const auto take = [&](MapOutput& output, const KeyframeDepthMap& keyframe) {
-    output.writeImages(keyframe);
-    const std::vector<CloudPoint> in_world =
-        pointsInWorld(options.late_fusion ? lateFusionPoints(keyframe) : viewPoints(keyframe),
-                      keyframe.T_world_ref);
-    points =
-        mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
-  };
-  const auto write = [&](MapOutput& output, MappingOutcome& outcome) {
-    describePoints(*points, outcome.report);
-    writeAll(outcome, {[&] { output.writeCloud("points.pcd", *points); },
-                       [&] {
-                         if (dsi) output.add(dsi->finish());
-                       }});
-  };
-  return runJob(arguments, reader, job, OutputKind::kDepth, take, write);
 }
 
 }  // namespace efm

@@ -26,26 +26,6 @@ bool failStrictly(const std::vector<Warning>& warnings) {
   return true;
 }
 
-namespace {
-
-/// Times of the first and the last event of the whole recording.
-std::optional<std::pair<std::int64_t, std::int64_t>> eventSpan(RecordingSource source) {
-  source.limits = {};
-  const std::unique_ptr<Recording> recording = openRecording(source);
-  std::optional<std::pair<std::int64_t, std::int64_t>> span_ns;
-  while (const std::optional<Sample> sample = recording->next()) {
-    const auto* packet = std::get_if<EventPacket>(&*sample);
-    if (!packet || packet->events.empty()) continue;
-    const std::int64_t first_ns = packet->events.front().t_ns;
-    const std::int64_t last_ns = packet->events.back().t_ns;
-    if (!span_ns) span_ns.emplace(first_ns, last_ns);
-    span_ns = {std::min(span_ns->first, first_ns), std::max(span_ns->second, last_ns)};
-  }
-  return span_ns;
-}
-
-}  // namespace
-
 std::int64_t RecordingTimes::start() {
   if (start_ns_) return *start_ns_;
   RecordingSource events;  // their times need no pose and no transform
@@ -93,14 +73,19 @@ std::optional<std::string> readAll(Recording& recording, const std::function<voi
   }
 }
 
-void refuseLimitsWithoutEvents(const RecordingSource& source) {
-  const TimeLimits& limits = source.limits;
-  if (!limits.t0_ns && !limits.t1_ns) return;
-  const auto span_ns = eventSpan(source);
-  if (!span_ns) return;  // a recording without events may have other observations
-  throw std::runtime_error(fmt::format("no event {}: the recording has events from {} s to {} s",
-                                       limitsText(limits), formatSeconds(span_ns->first),
-                                       formatSeconds(span_ns->second)));
+std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts) {
+  std::string nearest;
+  for (const auto& t_ns : {counts.nearest_before_ns, counts.nearest_after_ns}) {
+    if (t_ns) nearest += (nearest.empty() ? "" : " and ") + formatSeconds(*t_ns) + " s";
+  }
+  return fmt::format("no event {}: {}", limitsText(limits),
+                     nearest.empty() ? "event-fusion info tells the recording's times"
+                                     : "the nearest events lie at " + nearest);
+}
+
+void refuseLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording) {
+  if ((!limits.t0_ns && !limits.t1_ns) || recording.rig().cameras.empty()) return;
+  throw std::runtime_error(noEventText(limits, recording.counts()));
 }
 
 int failAfter(const std::string& damage, std::uint64_t events, std::uint64_t poses,

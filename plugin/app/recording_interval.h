@@ -57,8 +57,12 @@ class RecordingTimes {
 /// @return the error of the recording, if it was not read to its end.
 std::optional<std::string> readAll(Recording& recording, const std::function<void(Sample)>& take);
 
-/// Refuses time limits without events: they may be mistyped. A recording without any event passes.
-void refuseLimitsWithoutEvents(const RecordingSource& source);
+/// Why an interval of a recording has no events: the times of the nearest ones that were read.
+std::string noEventText(const TimeLimits& limits, const RecordingCounts& counts);
+
+/// Rejects time limits without events: they may be mistyped. A recording without cameras passes.
+/// @param recording which was read, and had no event.
+void refuseLimitsWithoutEvents(const TimeLimits& limits, const Recording& recording);
 
 /// Reports the damage that ended a recording, after all before it was written.
 /// @return the process's exit status.

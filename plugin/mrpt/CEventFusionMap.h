@@ -17,7 +17,7 @@
 #include "maps/cloud/keyframe_cloud.h"
 #include "maps/cloud/map_point.h"
 #include "plugin/mrpt/mrpt_point_maps.h"
-#include "plugin/session/hosted_mapping.h"
+#include "plugin/session/mapper.h"
 
 namespace efm {
 

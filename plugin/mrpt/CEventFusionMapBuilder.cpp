@@ -53,33 +53,38 @@ CEventFusionMapBuilder::CEventFusionMapBuilder(const EventFusionOptions& builder
 
 // While all members are there: the mapping's thread may be in a callback that uses the builder.
 CEventFusionMapBuilder::~CEventFusionMapBuilder() {
-  if (mapping_) mapping_->stop();
+  if (mapper_) mapper_->stop();
 }
 
-std::shared_ptr<HostedMapping> CEventFusionMapBuilder::mapping() const {
+std::shared_ptr<Mapper> CEventFusionMapBuilder::mapper() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return mapping_;
+  return mapper_;
 }
 
 /// @param earlier keyframes of an initial map.
 void CEventFusionMapBuilder::restart(const EventFusionOptions& builder_options,
                                      std::vector<StoredKeyframe> earlier) {
   // Before the lock: who has it may wait for the end of this very callback.
-  if (const auto current = mapping(); current && !current->mayStopHere()) {
+  if (const auto current = mapper(); current && current->runsHere()) {
     throw std::logic_error("the builder cannot start over from its own callback");
   }
   const std::lock_guard<std::mutex> restart_lock(restart_mutex_);
-  auto next = hostMapping(builder_options, std::move(earlier), callbacks());
+  auto next = std::make_shared<Mapper>(
+      builder_options,
+      Mapper::Callbacks{hosts(&CEventFusionMapBuilder::callback_),
+                        hosts(&CEventFusionMapBuilder::map_callback_),
+                        [this](const std::string& text) { MRPT_LOG_WARN(text); },
+                        [this](const std::string& text) { MRPT_LOG_INFO(text); }},
+      earlier);
   // Without the lock: its thread may run a callback that uses the builder.
-  if (const auto former = mapping()) former->stop();
+  if (const auto former = mapper()) former->stop();
   const std::lock_guard<std::mutex> lock(mutex_);
-  mapping_ = std::move(next);
-  mapping_->setSink(sink_);
+  mapper_ = std::move(next);
+  mapper_->setSink(sink_);
   tracker_poses_.clear();
   options_ = builder_options;
   ignored_observations_ = 0;
   reckoning_ = {};
-  silent_cameras_.clear();
   warned_of_rounding_ = false;
 }
 
@@ -103,53 +108,24 @@ void CEventFusionMapBuilder::setMapCallback(MapCallback callback) {
   map_callback_ = std::move(callback);
 }
 
-HostedMapping::Callbacks CEventFusionMapBuilder::callbacks() {
-  HostedMapping::Callbacks callbacks;
-  callbacks.on_keyframe = [this](const KeyframeDepthMap& keyframe) {
-    std::vector<std::string> warnings;
-    KeyframeCallback callback;
+/// Calls the host's callback of this moment: it may be replaced while the mapper runs.
+template <typename Argument>
+std::function<void(const Argument&)> CEventFusionMapBuilder::hosts(
+    std::function<void(const Argument&)> CEventFusionMapBuilder::*callback) {
+  return [this, callback](const Argument& argument) {
+    std::function<void(const Argument&)> call;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      warnings = warningsOfSilence(keyframe);
-      callback = callback_;
+      call = this->*callback;
     }
-    // A callback of the log that throws takes no keyframe from the host.
-    const std::exception_ptr error = exceptionOf([&] {
-      for (const std::string& warning : warnings) MRPT_LOG_WARN(warning);
-    });
-    if (callback) callback(keyframe);
-    if (error) std::rethrow_exception(error);
+    if (call) call(argument);
   };
-  callbacks.on_map = [this](const std::shared_ptr<const MapSnapshot>& map) {
-    MapCallback callback;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      callback = map_callback_;
-    }
-    warnOfRounding(*map->points);
-    if (callback) callback(map);
-  };
-  callbacks.info = [this](const std::string& text) { MRPT_LOG_INFO(text); };
-  callbacks.warn = [this](const std::string& text) { MRPT_LOG_WARN(text); };
-  return callbacks;
 }
 
 void CEventFusionMapBuilder::setDsiSink(DsiSink* sink) {
   const std::lock_guard<std::mutex> lock(mutex_);
   sink_ = sink;
-  mapping_->setSink(sink);
-}
-
-/// One warning per camera. `status` counts the silent keyframes.
-std::vector<std::string> CEventFusionMapBuilder::warningsOfSilence(
-    const KeyframeDepthMap& keyframe) {
-  std::vector<std::string> warnings;
-  for (const int camera : keyframe.silent_cameras) {
-    if (!silent_cameras_.insert(camera).second) continue;
-    warnings.push_back(fmt::format("camera {} had no event for the keyframe at {} s", camera,
-                                   formatSeconds(keyframe.window.t_ref_ns)));
-  }
-  return warnings;
+  mapper_->setSink(sink);
 }
 
 void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::Ptr& observation) {
@@ -158,12 +134,17 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
     EventPacket packet{events->camera_index, calibrationOf(*events), events->events,
                        events->covered_until_ns};
     if (options.enableMapUpdating) {  // MRPT's, of every map builder
-      mapping()->addEvents(std::move(packet));
+      mapper()->add(std::move(packet));
     } else {
-      mapping()->skipEvents(packet);
+      mapper()->skip(packet);
     }
-  } else if (poseSourceOf(*observation)) {
-    addPose(*observation);
+  } else if (const auto pose = poseIn(*observation)) {
+    const auto mapper = this->mapper();
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      tracker_poses_.add(*observation, *pose, rigPose(*pose, mapper->T_body_rig()));
+    }
+    mapper->add(*pose);
   } else if (isFinish(*observation)) {
     finish();
   } else {
@@ -172,38 +153,28 @@ void CEventFusionMapBuilder::processObservation(const mrpt::obs::CObservation::P
   }
 }
 
-void CEventFusionMapBuilder::addPose(const mrpt::obs::CObservation& observation) {
-  const auto mapping = this->mapping();
-  const PoseSample pose = *poseIn(observation);
-  {
-    const Rigid3 T_world_rig = rigPose(pose, mapping->T_body_rig());
-    const std::lock_guard<std::mutex> lock(mutex_);
-    tracker_poses_.add(observation, pose, T_world_rig);
-  }
-  mapping->addPose(pose);
-}
-
-void CEventFusionMapBuilder::finish() { mapping()->finish(); }
+void CEventFusionMapBuilder::finish() { mapper()->finish(); }
 
 std::shared_ptr<const MapSnapshot> CEventFusionMapBuilder::snapshot() const {
-  return mapping()->snapshot();
+  const auto map = mapper()->keyframes();
+  return map->points ? map : nullptr;
 }
 
-SessionStatus CEventFusionMapBuilder::status() const { return mapping()->status(); }
+SessionStatus CEventFusionMapBuilder::status() const { return mapper()->status(); }
 
 std::uint64_t CEventFusionMapBuilder::ignoredObservations() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return ignored_observations_;
 }
 
-MapCloud::ConstPtr CEventFusionMapBuilder::points() const { return mapping()->points(); }
+MapCloud::ConstPtr CEventFusionMapBuilder::points() const { return mapper()->points(); }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trajectory() const {
-  return mapping()->keyframePoses().in_map;
+  return mapper()->keyframes()->trajectory;
 }
 
 std::vector<StampedPose> CEventFusionMapBuilder::trackerTrajectory() const {
-  return mapping()->keyframePoses().by_tracker;
+  return mapper()->keyframes()->tracker_trajectory;
 }
 
 // --- mrpt::config::CLoadableOptions ----------------------------------------------------------
@@ -250,32 +221,35 @@ void CEventFusionMapBuilder::processActionObservation(mrpt::obs::CActionCollecti
   // One bad observation takes no other one with it.
   std::exception_ptr error;
   const auto process = [&](const mrpt::obs::CObservation::Ptr& observation) {
-    const std::exception_ptr refusal = exceptionOf([&] { processObservation(observation); });
-    if (!error) error = refusal;
+    try {
+      processObservation(observation);
+    } catch (...) {
+      if (!error) error = std::current_exception();
+    }
   };
   if (pose) process(pose);
   for (const mrpt::obs::CObservation::Ptr& observation : observations) process(observation);
   if (error) std::rethrow_exception(error);
 }
 
-/// Forgets what was made of another mapping. Under made_mutex_.
-std::shared_ptr<HostedMapping> CEventFusionMapBuilder::mappingOfMade() const {
-  const auto mapping = this->mapping();
-  if (made_of_.lock() == mapping) return mapping;
-  made_of_ = mapping;
+/// Forgets what was made of another mapper. Under made_mutex_.
+std::shared_ptr<Mapper> CEventFusionMapBuilder::mapperOfMade() const {
+  const auto mapper = this->mapper();
+  if (made_of_.lock() == mapper) return mapper;
+  made_of_ = mapper;
   clouds_.clear();
   metric_map_ = nullptr;
   shown_points_ = nullptr;
   event_map_ = nullptr;
-  return mapping;
+  return mapper;
 }
 
 void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_map) const {
   out_map.clear();
   const std::lock_guard<std::mutex> lock(made_mutex_);
-  const std::vector<StoredKeyframe> keyframes = mappingOfMade()->keyframes();
+  const auto map = mapperOfMade()->keyframes();
   decltype(clouds_) clouds;  // without those of keyframes that are forgotten
-  for (const StoredKeyframe& keyframe : keyframes) {
+  for (const StoredKeyframe& keyframe : map->keyframes) {
     auto& cloud = clouds[keyframe.points];
     const auto known = clouds_.find(keyframe.points);
     cloud = known != clouds_.end() ? known->second : cloudOf(keyframe);
@@ -285,20 +259,19 @@ void CEventFusionMapBuilder::getCurrentlyBuiltMap(mrpt::maps::CSimpleMap& out_ma
 }
 
 unsigned int CEventFusionMapBuilder::getCurrentlyBuiltMapSize() {
-  return static_cast<unsigned int>(mapping()->numKeyframes());
+  return static_cast<unsigned int>(mapper()->numKeyframes());
 }
 
 const mrpt::maps::CMultiMetricMap* CEventFusionMapBuilder::getCurrentlyBuiltMetricMap() const {
   std::unique_lock<std::mutex> lock(made_mutex_);
-  const auto mapping = mappingOfMade();
+  const auto mapper = mapperOfMade();
   const GlobalCloudOptions cloud_options = usedOptions().cloud;
-  const auto snapshot = mapping->snapshot();
-  const std::vector<StoredKeyframe> keyframes =
-      snapshot ? std::vector<StoredKeyframe>() : mapping->keyframes();
-  MapCloud::ConstPtr points = snapshot ? snapshot->points : shown_points_;
-  if (!snapshot) {
+  const auto map_so_far = mapper->keyframes();
+  MapCloud::ConstPtr points = map_so_far->points;  // null in playback
+  if (!points) {
+    points = shown_points_;
     if (!event_map_) event_map_ = std::make_shared<CEventFusionMap>(cloud_options);
-    const bool changed = bringUpToDate(*event_map_, keyframes);
+    const bool changed = bringUpToDate(*event_map_, map_so_far->keyframes);
     if (changed || !points) points = event_map_->cloud().points();
   }
   if (!metric_map_ || points != shown_points_) {
@@ -322,7 +295,7 @@ void CEventFusionMapBuilder::warnOfRounding(const MapCloud& points) const {
 
 void CEventFusionMapBuilder::saveCurrentEstimationToImage(const std::string& file,
                                                           bool /*format_emf_bmp*/) {
-  const auto [depth, planes] = mapping()->newestDepth();
+  const auto [depth, planes] = mapper()->newestDepth();
   if (depth.empty()) throw std::logic_error("there is no keyframe to save an image of yet");
   const cv::Mat3b picture = depthPicture(depth, planes, Palette::kBrightToDark);
   writeAtomically(file, [&](const std::filesystem::path& temporary) {

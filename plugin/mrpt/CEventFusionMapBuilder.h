@@ -13,7 +13,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -21,7 +20,7 @@
 #include "plugin/mrpt/CEventFusionMap.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/options/option_file.h"
-#include "plugin/session/hosted_mapping.h"
+#include "plugin/session/mapper.h"
 
 namespace efm {
 
@@ -51,7 +50,7 @@ namespace efm {
 /// a recording under a second whose rig is not declared, and those that end in the last 10 ms.
 ///
 /// In live operation (`[live] enabled`) all of this happens in a thread of the builder's own, and
-/// no call but `finish` waits for it: see LiveMapping and plugin/README.md.
+/// no call but `finish` waits for it: see Mapper and plugin/README.md.
 ///
 /// Thread-safe. In playback a call that needs the map waits while a keyframe is made, but not while
 /// one is delivered or a message is logged: callbacks of both may use the builder.
@@ -158,12 +157,12 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
 
  private:
   void restart(const EventFusionOptions& builder_options, std::vector<StoredKeyframe> earlier = {});
-  std::shared_ptr<HostedMapping> mapping() const;
-  HostedMapping::Callbacks callbacks();
-  void addPose(const mrpt::obs::CObservation& observation);
+  std::shared_ptr<Mapper> mapper() const;
+  template <typename Argument>
+  std::function<void(const Argument&)> hosts(
+      std::function<void(const Argument&)> CEventFusionMapBuilder::*callback);
   void warnOfRounding(const MapCloud& points) const;
-  std::shared_ptr<HostedMapping> mappingOfMade() const;
-  std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
+  std::shared_ptr<Mapper> mapperOfMade() const;
 
   std::mutex restart_mutex_;  // one at a time starts over
   mutable std::mutex mutex_;  // protects all members below
@@ -174,11 +173,10 @@ class CEventFusionMapBuilder : public mrpt::slam::CMetricMapBuilder,
   DsiSink* sink_ = nullptr;
   std::uint64_t ignored_observations_ = 0;
   TrackerPoses tracker_poses_;
-  DeadReckoning reckoning_;                 // of the actions
-  std::set<int> silent_cameras_;            // with a warning in the log
-  std::shared_ptr<HostedMapping> mapping_;  // never null; used without the lock
-  mutable std::mutex made_mutex_;  // locked before mutex_; protects what MRPT's getters have made:
-  mutable std::weak_ptr<HostedMapping> made_of_;
+  DeadReckoning reckoning_;         // of the actions
+  std::shared_ptr<Mapper> mapper_;  // never null; used without the lock
+  mutable std::mutex made_mutex_;   // locked before mutex_; protects what MRPT's getters have made:
+  mutable std::weak_ptr<Mapper> made_of_;
   mutable std::map<std::shared_ptr<const std::vector<ViewPoint>>, mrpt::maps::CPointsMapXYZI::Ptr>
       clouds_;
   mutable std::shared_ptr<mrpt::maps::CMultiMetricMap> metric_map_;

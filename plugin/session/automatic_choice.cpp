@@ -7,15 +7,10 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "plugin/session/mapping_session.h"
-#include "plugin/session/recording_survey.h"
 
 namespace efm {
 namespace {
 
-/// In live operation, automatic options are chosen from the first window of this length. After a
-/// jump of the tracker it begins at a multiple of the stride.
-constexpr double kFirstWindowS = 1;
-constexpr double kFirstStrideS = 0.1;
 /// What a jump of the tracker or a clock reset leaves of such a window is enough if it is as long
 /// as this.
 constexpr double kMinFirstWindowS = 0.2;
@@ -44,25 +39,14 @@ void noteSource(const WindowData& data, std::vector<ChosenOption>& chosen) {
 
 }  // namespace
 
-/// Late fusion needs the maps of single cameras; a choice of options needs windows to look at.
-FusionMapperOptions MappingSession::mapperOptions(const EventFusionOptions& options) {
-  FusionMapperOptions mapper = options.mapper;
-  if (options.late_fusion) mapper.keyframe.camera_maps = true;
-  if (options.live.enabled) mapper.fill_last_window = false;
-  if (!options.automatic.any()) return mapper;
-  mapper = surveyOptions(mapper, kFirstWindowS);
-  mapper.policy.stride_s = kFirstStrideS;
-  return mapper;
-}
-
 /// Chooses automatic options as soon as a window shows the scene, or where none does so for too
 /// long. A second choice keeps the first one's options where it sees no scene. @return whether none
 /// is left.
 bool MappingSession::chooseAutomatic() {
-  if (surveyor_) return chooseFromSurvey();
+  if (first_look_) return chooseFromFirstLook();
   const bool is_first = status_.choices == 0;
   while (options_.automatic.any()) {
-    const std::optional<WindowData> data = firstLook();
+    const std::optional<WindowData> data = dataToChooseFrom();
     if (!data && is_first && pieceEnds() && !looksTooLong() && endPiece()) continue;
     if (!data && !finished_ && !pieceEnds()) return false;
     std::vector<WindowSample> samples;
@@ -97,10 +81,10 @@ void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice
   if (!choice.found_scene && status_.choices > 0) return keepOptions();
   if (data) {
     if (!choice.found_scene) choice = chooseWideDepths(options_.automatic, chosen);
-    const std::int64_t begin_ns = std::min(stretch_.begin_ns, data->window.t0_ns);
-    const double stretch_s = secondsBetween(begin_ns, data->window.t1_ns);
-    if (stretchEnds() && stretch_s < kFirstWindowS) {
-      limitWindow(stretch_s / 2, kBetweenJumps, chosen.policy, choice.options);
+    const std::int64_t begin_ns = std::min(segment_.begin_ns, data->window.t0_ns);
+    const double segment_s = secondsBetween(begin_ns, data->window.t1_ns);
+    if (segmentEnds() && segment_s < kFirstWindowS) {
+      limitWindow(segment_s / 2, kBetweenJumps, chosen.policy, choice.options);
     }
     fitIntoQueue(options_.live, eventRate(*data), chosen.policy, choice.options);
     noteSource(*data, choice.options);
@@ -109,10 +93,10 @@ void MappingSession::useLook(const std::optional<WindowData>& data, OptionChoice
 }
 
 /// In playback: as soon as the recording has ended, or there is too much of it.
-bool MappingSession::chooseFromSurvey() {
+bool MappingSession::chooseFromFirstLook() {
   const double held_mb = static_cast<double>(mapper_.heldEvents() * sizeof(Event)) / 1e6;
-  if (!finished_ && !survey_ends_ && held_mb <= options_.live.max_queue_mb) return false;
-  const RecordingSurvey survey = std::exchange(surveyor_, nullptr)->finish();
+  if (!finished_ && !first_look_ends_ && held_mb <= options_.live.max_queue_mb) return false;
+  const RecordingSurvey survey = std::exchange(first_look_, nullptr)->finish();
   FusionMapperOptions chosen = options_.mapper;
   OptionChoice choice = chooseOptions(options_.automatic, survey.rig, survey.samples,
                                       finished_ ? survey.duration_s : std::nullopt, chosen);
@@ -125,7 +109,8 @@ bool MappingSession::chooseFromSurvey() {
   for (ChosenOption& option : choice.options) {
     option.reason += fmt::format(
         "; from the first {:.3g} s of a stream{}", survey.duration_s.value_or(0),
-        survey_ends_ ? "" : fmt::format(", {:.0f} MB of events ([live] max_queue_mb)", held_mb));
+        first_look_ends_ ? ""
+                         : fmt::format(", {:.0f} MB of events ([live] max_queue_mb)", held_mb));
   }
   use(std::move(choice), chosen);
   return true;
@@ -133,7 +118,7 @@ bool MappingSession::chooseFromSurvey() {
 
 /// A window to choose from. At a jump of the tracker or a clock reset, what it leaves of the
 /// window.
-std::optional<WindowData> MappingSession::firstLook() {
+std::optional<WindowData> MappingSession::dataToChooseFrom() {
   std::optional<WindowData> data = mapper_.window();
   if (data || !pieceEnds()) return data;
   data = mapper_.rest();
@@ -179,14 +164,14 @@ bool MappingSession::shortenWindows(double events_per_s) {
   return useShorter(former_s);
 }
 
-/// Where two stretches in a row between jumps of the tracker were too short for a window that was
+/// Where two segments in a row between jumps of the tracker were too short for a window that was
 /// chosen: chooses a shorter one.
-void MappingSession::fitIntoStretches(std::int64_t end_ns) {
-  const double length_s = secondsBetween(stretch_.begin_ns, end_ns);
+void MappingSession::fitIntoSegments(std::int64_t end_ns) {
+  const double length_s = secondsBetween(segment_.begin_ns, end_ns);
   const std::uint64_t keyframes = earlier_counts_.keyframes + mapper_.counts().keyframes;
-  const bool fits = keyframes > stretch_.keyframes || length_s < kMinFirstWindowS;
-  stretch_ = {end_ns, keyframes, fits ? 0 : stretch_.too_short + 1};
-  if (stretch_.too_short < 2 || options_.automatic.any()) return;
+  const bool fits = keyframes > segment_.keyframes || length_s < kMinFirstWindowS;
+  segment_ = {end_ns, keyframes, fits ? 0 : segment_.too_short + 1};
+  if (segment_.too_short < 2 || options_.automatic.any()) return;
   KeyframePolicyOptions& policy = options_.mapper.policy;
   const double former_s = policy.window_s;
   limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "mapping/base/named_choice.h"
+#include "maps/cloud/keyframe_cloud.h"
 
 namespace efm {
 
@@ -23,6 +24,21 @@ void EventFusionOptions::validate() const {
   cloud.validate();
   refinement.validate();
   live.validate();
+}
+
+std::size_t EventFusionOptions::movableKeyframes() const {
+  if (!refinement.enabled) return 0;
+  return live.enabled ? static_cast<std::size_t>(live.max_keyframes) : RefinedCloud::kAll;
+}
+
+FusionMapperOptions mapperOptions(const EventFusionOptions& options) {
+  FusionMapperOptions mapper = options.mapper;
+  if (options.late_fusion) mapper.keyframe.camera_maps = true;
+  if (options.live.enabled) mapper.fill_last_window = false;
+  if (!options.automatic.any()) return mapper;
+  mapper = surveyOptions(mapper, kFirstWindowS);
+  mapper.policy.stride_s = kFirstStrideS;
+  return mapper;
 }
 
 void LiveOptions::validate() const {

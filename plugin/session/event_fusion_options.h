@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -86,8 +87,18 @@ struct EventFusionOptions {
   LiveOptions live;
   bool ply = false;  ///< `map` also writes map.ply, coloured by height.
 
+  /// How many of the newest keyframes the refinement may move.
+  std::size_t movableKeyframes() const;
   void validate() const;
 };
+
+/// Until automatic options are chosen in live operation, windows have this length and stride:
+/// options are chosen from the first one.
+inline constexpr double kFirstWindowS = 1;
+inline constexpr double kFirstStrideS = 0.1;
+
+/// The mapper's options, with what live operation and late fusion need.
+FusionMapperOptions mapperOptions(const EventFusionOptions& options);
 
 /// The options of a program that was told nothing: what can be chosen from the data is.
 inline EventFusionOptions defaultOptions() {

@@ -217,14 +217,14 @@ void InputQueue::skip(const EventPacket& packet) {
   changed_.notify_one();
 }
 
-void InputQueue::add(QueuedPose pose) {
+void InputQueue::add(PoseSample pose) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (ended_) {
     ++refused_poses_;
     return;
   }
-  Stream<QueuedPose>& stream = pose_streams_[pose.source];
-  const std::int64_t t_ns = pose.pose.t_ns;
+  Stream<PoseSample>& stream = pose_streams_[pose.source];
+  const std::int64_t t_ns = pose.t_ns;
   if (auto waited = stream.settle(!isFarAfter(stream.ahead_ns, t_ns), refused_poses_)) {
     poses_.push_back(std::move(*waited));
   }
@@ -293,7 +293,6 @@ InputQueue::Batch InputQueue::takeLocked() {
   events_ = 0;
   bytes_ = 0;
   batch.ended = ended_;
-  batch.stopped = stopped_;
   return batch;
 }
 

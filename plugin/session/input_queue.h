@@ -49,13 +49,6 @@ class EventBudget {
   std::uint64_t thinned_ = 0;
 };
 
-/// A pose on its way to a session.
-struct QueuedPose {
-  StampedPose pose;
-  PoseSourceId source;
-  std::optional<PoseNoise> noise;
-};
-
 /// The input of a mapping that runs in another thread: thinned to the budget, and bounded in events
 /// and in bytes. Where it is full, the oldest packets are dropped, never poses. Any thread adds;
 /// one takes. Adding never waits for the mapping.
@@ -69,21 +62,20 @@ class InputQueue {
   /// @throws std::invalid_argument where an event lies outside the sensor, or the calibration is
   /// not that of the camera's earlier packets: the packet is refused.
   void add(EventPacket packet);
-  void add(QueuedPose pose);
+  void add(PoseSample pose);
   /// Counts a packet that is not to be mapped.
   void skip(const EventPacket& packet);
   /// No more input will come. Packets and poses that are added afterwards are counted.
   void end();
-  /// Wakes up the taking thread for good.
+  /// Wakes up the thread that takes, for good.
   void stop();
 
   struct Batch {
-    std::vector<QueuedPose> poses;  ///< In the order they came.
+    std::vector<PoseSample> poses;  ///< In the order they came.
     std::vector<EventPacket> packets;
     /// The cameras with dropped or skipped packets.
     std::map<int, MissingEvents> missing;
     bool ended = false;
-    bool stopped = false;
   };
   using Clock = std::chrono::steady_clock;
   /// Waits for input, at most until then.
@@ -135,8 +127,8 @@ class InputQueue {
   std::condition_variable changed_;
   std::map<int, Camera> cameras_;
   std::deque<EventPacket> packets_;
-  std::vector<QueuedPose> poses_;
-  std::map<PoseSourceId, Stream<QueuedPose>> pose_streams_;
+  std::vector<PoseSample> poses_;
+  std::map<PoseSourceId, Stream<PoseSample>> pose_streams_;
   std::uint64_t refused_poses_ = 0;
   std::map<int, MissingEvents> missing_;
   std::uint64_t events_ = 0;  // in packets_

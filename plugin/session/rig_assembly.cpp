@@ -23,16 +23,25 @@ bool areNear(const Rigid3& T_a_b, const Rigid3& T_a_c) {
   return T_b_c.translation.norm() < kRounding && T_b_c.rotation.vec().norm() < kRounding;
 }
 
+void requireSame(const RigCamera& first, const EventPacket& packet) {
+  if (isSame(first, packet.calibration)) return;
+  throw std::invalid_argument(
+      fmt::format("camera {}: its calibration or its pose on the rig differs from that of its "
+                  "first packet",
+                  packet.camera));
+}
+
 }  // namespace
 
 RigAssembly::RigAssembly(const EventFusionOptions& options)
     : selected_cameras_(options.mapper.cameras),
       reference_camera_(options.mapper.keyframe.reference_camera),
+      declares_(options.live.enabled),
       time_offsets_ns_(options.rig.time_offsets_ns),
       setup_(readRigSetup(options.rig)) {}
 
 void RigAssembly::declare(FusionMapper& mapper) {
-  if (!setup_.calibration) return;
+  if (!declares_ || !setup_.calibration) return;
   const std::vector<RigCamera>& cameras = setup_.calibration->rig.cameras;
   const auto has_size = [](const RigCamera& camera) { return camera.model.width > 0; };
   if (!std::all_of(cameras.begin(), cameras.end(), has_size)) return;
@@ -59,6 +68,8 @@ std::vector<EventPacket> RigAssembly::add(EventPacket packet, FusionMapper& mapp
   if (is_new) {
     requireIncomplete(packet.camera);
     addCamera(packet.calibration, mapper);
+  } else {
+    requireSame(mapper.rig().cameras[static_cast<std::size_t>(packet.camera)], packet);
   }
   ready.push_back(std::move(packet));
   if (!is_new) return ready;
@@ -104,9 +115,17 @@ void RigAssembly::noteAnnouncement(const EventPacket& packet) {
                announced_ns_.size() == static_cast<std::size_t>(num_cameras_);
 }
 
+bool RigAssembly::isReady(std::int64_t begin_ns, bool has_poses) {
+  constexpr std::int64_t kCompletesNs = kNanosecondsPerSecond;
+  first_ns_ = std::min(first_ns_.value_or(begin_ns), begin_ns);
+  newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
+  return (has_poses && isKnown()) || *newest_begin_ns_ - *first_ns_ > kCompletesNs;
+}
+
+/// Whether no further camera can come.
 bool RigAssembly::isKnown() const {
   const auto count = static_cast<std::size_t>(num_cameras_);
-  if (anyCameraWaits() || count == 0) return false;
+  if (!waiting_.empty() || count == 0) return false;
   return announced_.value_or(false) || time_offsets_ns_.size() == count ||
          (setup_.calibration && setup_.calibration->rig.cameras.size() == count);
 }
@@ -122,13 +141,15 @@ void RigAssembly::letWait(EventPacket packet) {
   if (complete_ && waiting_.count(camera) != 0) refuseWithoutNext(camera);
   requireIncomplete(camera);
   packet.calibration.validate();
+  const auto waiting = waiting_.find(camera);
+  if (waiting != waiting_.end()) requireSame(waiting->second.front().calibration, packet);
   if (!packet.events.empty()) {
     const std::int64_t first_ns =
         std::clamp(packet.events.front().t_ns, -kEndOfTimeNs, kEndOfTimeNs);  // not yet checked
     const std::int64_t begin_ns = first_ns + packet.calibration.time_offset_ns;
     if (!waiting_since_ns_) waiting_since_ns_ = begin_ns;
     if (begin_ns - *waiting_since_ns_ > kMaxWaitNs) refuseWithoutNext(camera);
-  } else if (waiting_.count(camera) != 0) {
+  } else if (waiting != waiting_.end()) {
     return;  // the first one has the calibration
   }
   waiting_[camera].push_back(std::move(packet));

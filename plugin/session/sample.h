@@ -77,6 +77,8 @@ struct RecordingCounts {
   std::uint64_t skipped_events = 0;  ///< Bad ones, left out: see `BadEvents`.
   std::string first_skipped;         ///< The error of the first of them.
   std::vector<Warning> warnings;     ///< Of the readers: see `EventStream::warnings`.
+  /// The events nearest to the time limits that were read, on the clock of the poses.
+  std::optional<std::int64_t> nearest_before_ns, nearest_after_ns;
 };
 
 /// A recording as a stream of samples in the order of time. A pose comes before the packets that

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <ctime>
@@ -127,6 +128,13 @@ struct TimeSpan {
   std::int64_t last_ns = 0;
 };
 
+/// Extends a span to a time.
+inline void extend(std::optional<TimeSpan>& span, std::int64_t t_ns) {
+  if (!span) span = TimeSpan{t_ns, t_ns};
+  span->first_ns = std::min(span->first_ns, t_ns);
+  span->last_ns = std::max(span->last_ns, t_ns);
+}
+
 /// What became of one camera's events before the mapping, in live operation:
 /// received = thinned + held + queued + dropped + paused + refused + after_end + taken.
 struct QueueCounts {
@@ -174,6 +182,7 @@ struct SessionStatus {
   std::map<int, std::uint64_t> refused_events;
   /// Playback: events that came while map updating was disabled, by camera.
   std::map<int, std::uint64_t> paused_events;
+  std::uint64_t held_events = 0;  ///< Windows may still need them.
   std::optional<TimeSpan> events;
   std::optional<TimeSpan> poses;
   std::optional<PoseSourceId> pose_source;            ///< The source whose poses are used.

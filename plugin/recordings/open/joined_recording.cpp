@@ -95,7 +95,17 @@ class JoinedRecording : public Recording {
     counts.warnings = parts_.warnings;
     counts.skipped_events = bad_->count();
     counts.first_skipped = bad_->first();
-    for (const EventPackets& camera : parts_.cameras) {
+    for (std::size_t i = 0; i < parts_.cameras.size(); ++i) {
+      const EventPackets& camera = parts_.cameras[i];
+      if (const auto t_ns = camera.nearestBefore()) {
+        const std::int64_t before_ns = *t_ns + parts_.offsets_ns[i];
+        counts.nearest_before_ns =
+            std::max(counts.nearest_before_ns.value_or(before_ns), before_ns);
+      }
+      if (const auto t_ns = camera.nearestAfter()) {
+        const std::int64_t after_ns = *t_ns + parts_.offsets_ns[i];
+        counts.nearest_after_ns = std::min(counts.nearest_after_ns.value_or(after_ns), after_ns);
+      }
       counts.sorted_events += camera.sortedEvents();
       counts.lost_packets += camera.stream().lostPackets();
       counts.undated_events += camera.stream().undatedEvents();

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "plugin/recordings/streams/recording_parts.h"
-#include "plugin/session/hosted_mapping.h"
+#include "plugin/session/mapper.h"
 #include "plugin/session/map_watcher.h"
 #include "plugin/session/sample.h"
 

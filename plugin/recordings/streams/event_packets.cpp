@@ -148,7 +148,13 @@ void EventPackets::take(const Event& event) {
     disordered_ = true;
     ++sorted_events_;
   }
-  if (event.t_ns >= start_ns_ && event.t_ns < stop_ns_) events_.push_back(event);
+  if (event.t_ns < start_ns_) {
+    before_ns_ = std::max(before_ns_.value_or(event.t_ns), event.t_ns);
+  } else if (event.t_ns >= stop_ns_) {
+    after_ns_ = std::min(after_ns_.value_or(event.t_ns), event.t_ns);
+  } else {
+    events_.push_back(event);
+  }
 }
 
 void EventPackets::takeBlock() {

@@ -53,6 +53,9 @@ class EventPackets {
   /// The number of events after a newer one.
   std::uint64_t sortedEvents() const { return sorted_events_; }
   const EventStream& stream() const { return *stream_; }
+  /// The newest event before `startAt` and the first one from `stopAt` on, of those that were read.
+  std::optional<std::int64_t> nearestBefore() const { return before_ns_; }
+  std::optional<std::int64_t> nearestAfter() const { return after_ns_; }
 
  private:
   void readAhead();
@@ -74,6 +77,7 @@ class EventPackets {
   BadEvents* bad_ = nullptr;
   std::int64_t start_ns_ = -kEndOfTimeNs;
   std::int64_t stop_ns_ = kEndOfTimeNs;
+  std::optional<std::int64_t> before_ns_, after_ns_;
   bool ended_ = false;
   std::exception_ptr error_;  // of the wrong event
 

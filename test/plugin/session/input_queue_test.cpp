@@ -149,7 +149,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
       miss(one);
     } else if (kind != kTake) {
       queue.add(packet(camera, one.t_ns, one.events));
-      queue.add(QueuedPose{{t_ns, {}}, {}, {}});
+      queue.add(PoseSample{{}, t_ns, {}, {}});
       ++poses;
       waiting.push_back(one);
       while (sum(events_of) > static_cast<std::uint64_t>(options.max_queue_events) ||
@@ -199,7 +199,7 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   std::uint64_t wrong = 0;
   const auto add = [&](std::int64_t t_ns) {
     next.events.push_back({t_ns, 0, 0, true});
-    queue.add(QueuedPose{{t_ns, {}}, {}, {}});
+    queue.add(PoseSample{{}, t_ns, {}, {}});
   };
   add(0);
   for (const auto& [gap_ns, ends_packet, ahead] : steps) {
@@ -221,7 +221,7 @@ RC_GTEST_PROP(InputQueue, RefusesAloneWhatIsFarAheadOfItsStream, ()) {
   for (const EventPacket& one : batch.packets) {
     for (const Event& event : one.events) events_ns.push_back(event.t_ns);
   }
-  for (const QueuedPose& pose : batch.poses) poses_ns.push_back(pose.pose.t_ns);
+  for (const PoseSample& pose : batch.poses) poses_ns.push_back(pose.t_ns);
   RC_ASSERT(events_ns == expected);
   RC_ASSERT(poses_ns == expected);
   RC_ASSERT(queue.counts().at(0).refused == wrong);
@@ -248,7 +248,7 @@ TEST(InputQueue, EndPassesTheHeldEvents) {
   EXPECT_EQ(queue.counts().at(0).paused, 5U);
   EXPECT_EQ(queue.counts().at(0).received, 65U);
   EXPECT_TRUE(queue.take().missing.empty()) << "after the end";
-  queue.add(QueuedPose{{1, {}}, {}, {}});
+  queue.add(PoseSample{{}, 1, {}, {}});
   EXPECT_EQ(queue.refusedPoses(), 1U);
   EXPECT_TRUE(queue.take().poses.empty());
 }

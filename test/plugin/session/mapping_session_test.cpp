@@ -9,7 +9,7 @@
 
 #include "mapping/geometry/timestamp.h"
 #include "maps/metrics/depth_metrics.h"
-#include "plugin/session/recording_survey.h"
+#include "plugin/session/first_look.h"
 #include "test/mapping/base/refused_option.h"
 #include "test/plugin/session/session_driver.h"
 #include "test/plugin/temporary_folder.h"
@@ -68,8 +68,8 @@ EventFusionOptions automaticOptions() {
 }
 
 RecordingSurvey surveyOf(const SyntheticRecording& recording, const EventFusionOptions& options) {
-  RecordingSurveyor surveyor(options);
-  for (const StampedPose& pose : recording.poses) surveyor.addPose(pose, {}, {});
+  FirstLook surveyor(options);
+  for (const StampedPose& pose : recording.poses) surveyor.addPose(sampleOf(pose));
   for (double begin_s = 0; begin_s < 5; begin_s += 0.1) {
     for (const int c : {0, 1}) surveyor.addEvents(pieceOf(recording, c, begin_s, begin_s + 0.1));
   }
@@ -117,7 +117,7 @@ TEST(MappingSession, InPlaybackAStreamSaysWhatItsOptionsWereChosenFrom) {
     EventFusionOptions options = automaticOptions();
     if (is_full) options.live.max_queue_mb = kMaxMb;
     MappingSession session(options);
-    if (!is_full) session.endSurvey();
+    if (!is_full) session.noteMissing(0, {kMinTimeNs, &WindowsGivenUp::paused});
     EXPECT_THAT(mapUnfinished(session, recording, 10), Not(IsEmpty())) << is_full;
     ASSERT_EQ(session.status().chosen.size(), 5U);
     for (const ChosenOption& option : session.status().chosen) {
@@ -157,7 +157,7 @@ TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
     for (Event& event : events) event.t_ns -= kBackNs;
   }
   const auto feed = [](MappingSession& session, const SyntheticRecording& part, double shift_s) {
-    for (const StampedPose& pose : part.poses) messageOf([&] { session.addPose(pose); });
+    for (const StampedPose& pose : part.poses) messageOf([&] { session.addPose(sampleOf(pose)); });
     for (int i = 0; i < 131; ++i) {
       for (int c = 0; c < 2; ++c) {
         EventPacket packet = pieceOf(part, c, shift_s + 0.01 * i, shift_s + 0.01 * (i + 1));
@@ -180,7 +180,7 @@ TEST(MappingSession, AClockResetFirstMapsTheWindowsThatAreComplete) {
     const std::size_t made = mapRest(session).size();
     EXPECT_EQ(session.status().live->clock_steps, 1U);
     EXPECT_GE(made, complete + (is_automatic ? 0 : 1)) << "those before it, and some after it";
-    EXPECT_EQ(session.heldEvents(), 0U);
+    EXPECT_EQ(session.status().held_events, 0U);
     std::uint64_t refused = 0;
     for (const auto& [camera, events] : session.status().refused_events) refused += events;
     expectEventsAddUp(session.status(), recording.totalEvents() + later.totalEvents() - refused);
@@ -248,7 +248,7 @@ TEST(MappingSession, TheChoiceOfOptionsWaitsForAScene) {
     const std::vector<KeyframeDepthMap> keyframes = mapUnfinished(session, recording, 50);
 
     ASSERT_FALSE(keyframes.empty()) << rest_s;
-    const DepthPlanesOptions& planes = session.planes();
+    const DepthPlanesOptions& planes = session.chosen().planes;
     const double pixel = 1 / (recording.cameras[0].model.fx * kSpeedMS);  // in a window of 1 s
     const double step = std::max(
         pixel, (1 / planes.min_depth_m - 1 / planes.max_depth_m) / (planes.num_planes - 1));

@@ -42,8 +42,14 @@ struct AlwaysFailingSink : DsiSink {
   }
 };
 
+/// A pose of the rig as a tracker's sample.
+inline PoseSample sampleOf(const StampedPose& pose, const PoseSourceId& source = {},
+                           const std::optional<PoseNoise>& noise = std::nullopt) {
+  return {source, pose.t_ns, pose.T_world_rig, {}, noise};
+}
+
 inline void addPoses(MappingSession& session, const SyntheticRecording& recording) {
-  for (const StampedPose& pose : recording.poses) session.addPose(pose);
+  for (const StampedPose& pose : recording.poses) session.addPose(sampleOf(pose));
 }
 
 inline void addEvents(MappingSession& session, const SyntheticRecording& recording) {
@@ -79,7 +85,7 @@ inline std::vector<KeyframeDepthMap> mapUnfinished(MappingSession& session,
   std::vector<KeyframeDepthMap> keyframes;
   std::vector<std::size_t> begin(recording.cameras.size(), 0);
   for (std::size_t p = 0; p < recording.poses.size(); ++p) {
-    session.addPose(recording.poses[p]);
+    session.addPose(sampleOf(recording.poses[p]));
     const std::int64_t until_ns = recording.poses[p].t_ns;
     const bool last = p + 1 == recording.poses.size();
     const std::int64_t passed_ms = (until_ns - SyntheticRecording::kStartNs) / 1'000'000;

@@ -482,7 +482,6 @@ enum Trouble {
   kMappingFails,
   kStoringFails,
   kTooMuchWaits,
-  kFarTooMuchWaits,
   kMemoryFails,  // of an input: not in the model
   kNumTroubles
 };
@@ -516,11 +515,11 @@ class Run {
     queue_.end();
     taking_ = true;
     step({kHealthy, 0, 1});
-    RC_ASSERT(session_.heldEvents() == 0U);
+    RC_ASSERT(session_.status().held_events == 0U);
     for (const auto& [camera, counts] : queue_.counts()) RC_ASSERT(counts.held == 0U);
     const RefinementState refinement = session_.status().refinement.value_or(RefinementState{});
     RC_ASSERT(refinement.waiting + refinement.failures == 0U);
-    queue_.add(QueuedPose{recording_.poses[0], {}, {}});
+    queue_.add(sampleOf(recording_.poses[0]));
     queue_.add(EventPacket{0, recording_.cameras[0], {{0, 1, 1, true}}, {}});
     RC_ASSERT(queue_.counts().at(0).after_end == 1U);
     RC_ASSERT(queue_.refusedPoses() >= 1U);
@@ -552,10 +551,10 @@ class Run {
     if (fault == kTrackerLost) return;
     if (fault == kTrackerClockBack) pose.t_ns -= 3007 * kMs;  // at no other time again
     if (fault == kBadPoses) pose.T_world_rig.translation.x() = std::nan("");
-    if (fault == kPosesTwice) queue_.add(QueuedPose{pose, source_, {}});
-    queue_.add(QueuedPose{pose, source_, {}});
+    if (fault == kPosesTwice) queue_.add(sampleOf(pose, source_));
+    queue_.add(sampleOf(pose, source_));
     pose.t_ns -= 505 * kMs;
-    if (fault == kLatePoses) queue_.add(QueuedPose{pose, source_, {}});
+    if (fault == kLatePoses) queue_.add(sampleOf(pose, source_));
   }
 
   void addPacket(int c, int fault, bool last) {
@@ -621,9 +620,9 @@ class Run {
       stopFailing();
       return taken;
     };
-    for (const QueuedPose& pose : batch.poses) {
-      refused_poses_ += add([&] { session_.addPose(pose.pose, pose.source); }) ? 0 : 1;
-      model_.addPose(pose.pose, source_.kind != PoseKind::kPose);
+    for (const PoseSample& pose : batch.poses) {
+      refused_poses_ += add([&] { session_.addPose(pose); }) ? 0 : 1;
+      model_.addPose({pose.t_ns, pose.T_world_body}, source_.kind != PoseKind::kPose);
     }
     for (const auto& [camera, missing] : batch.missing) {
       session_.noteMissing(camera, missing);
@@ -639,27 +638,27 @@ class Run {
       session_.finish();
       model_.finish();
     }
-    const bool knows_rig = !predicts_ || model_.rigIsComplete();
-    if (phase.fault == kFarTooMuchWaits && knows_rig && !session_.nextWindow()) {
-      RC_ASSERT(!predicts_ || !model_.oldestWindow());
-      messageOf([&] { session_.giveUpOlderHalf(); });
-      model_.giveUpOlderHalf();
-    }
+    if (phase.fault == kTooMuchWaits) limitHeld();
     while (mapNext(phase.fault)) {
     }
     if (predicts_) model_.wait();
     compare();
   }
 
-  bool mapNext(int fault) {
-    if (fault == kTooMuchWaits) {
-      const std::optional<Window> oldest = predicts_ ? model_.oldestWindow() : std::nullopt;
-      const bool given_up =
-          oldest && model_.eventsCompleteNs() >= 2 * oldest->t1_ns - oldest->t0_ns;
-      if (given_up) model_.map(*oldest, Model::Outcome::kTooMuch);
-      const bool gives_up = session_.giveUpOldestWindow();
-      RC_ASSERT(!predicts_ || gives_up == given_up);
+  /// Nothing may wait: all windows that newer events follow are dropped.
+  void limitHeld() {
+    if (predicts_ && !model_.rigIsComplete()) return;
+    messageOf([&] { session_.limitHeld(-1); });
+    if (!predicts_) return;
+    std::optional<Window> oldest = model_.oldestWindow();
+    while (oldest && model_.eventsCompleteNs() >= 2 * oldest->t1_ns - oldest->t0_ns) {
+      model_.map(*oldest, Model::Outcome::kTooMuch);
+      oldest = model_.oldestWindow();
     }
+    if (!oldest) model_.giveUpOlderHalf();
+  }
+
+  bool mapNext(int fault) {
     AlwaysFailingSink sink;
     using Outcome = Model::Outcome;
     const auto outcome = fault == kMappingFails   ? Outcome::kMappingFails
@@ -673,10 +672,11 @@ class Run {
       expected = model_.map(*mapped, outcome);
     }
     try {
-      const auto keyframe =
-          session_.next(fault == kMappingFails ? &sink : nullptr, processSeconds, [&](const auto&) {
-            if (fault == kStoringFails) throw std::runtime_error("disk full");
-          });
+      const auto keyframe = session_.next(fault == kMappingFails ? &sink : nullptr, processSeconds,
+                                          [&](const auto&, const auto&) {
+                                            if (fault == kStoringFails)
+                                              throw std::runtime_error("disk full");
+                                          });
       RC_ASSERT(!predicts_ || keyframe.has_value() == expected);
       if (keyframe && mapped) RC_ASSERT(keyframe->window.t0_ns == mapped->t0_ns);
       keyframes_ += keyframe ? 1 : 0;
@@ -696,8 +696,8 @@ class Run {
       RC_ASSERT(differences(table, tableOf(model_.status)) == std::vector<std::string>{});
     }
     const EventCounts all = status.counts.total();
-    RC_ASSERT(all.read == all.used + all.without_pose + all.outside_window + all.dropped +
-                              session_.heldEvents());
+    RC_ASSERT(all.read ==
+              all.used + all.without_pose + all.outside_window + all.dropped + status.held_events);
     RC_ASSERT(status.counts.keyframes == keyframes_);
     RC_ASSERT(session_.T_odom_ref().size() == keyframes_);
     RC_ASSERT(session_.T_world_ref().size() == keyframes_);

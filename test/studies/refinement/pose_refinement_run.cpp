@@ -52,7 +52,9 @@ PoseRefinementRun mapRefined(const Recording& recording, const EventFusionOption
   auto pose = poses.begin();
   for (std::int64_t t_ns = simulation.start_ns; t_ns <= simulation.endNs(); t_ns += kPacketNs) {
     const Window packet{t_ns, t_ns + kPacketNs, t_ns};
-    for (; pose != poses.end() && pose->t_ns < packet.t1_ns; ++pose) session.addPose(*pose);
+    for (; pose != poses.end() && pose->t_ns < packet.t1_ns; ++pose) {
+      session.addPose({{}, pose->t_ns, pose->T_world_rig, {}});
+    }
     for (std::size_t c = 0; c < recording.events.size(); ++c) {
       const EventSpan events = recording.eventsOf(c, packet);
       session.addEvents({static_cast<int>(c),

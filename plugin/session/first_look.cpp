@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "plugin/session/recording_survey.h"
+#include "plugin/session/first_look.h"
 
 #include <fmt/format.h>
 
@@ -28,15 +28,6 @@ EventPacket thinnedOut(const EventPacket& packet) {
   const auto limit = static_cast<std::size_t>(std::max(1e3, kMaxEventsPerSecond * length_s));
   return {packet.camera,           packet.calibration, chosenEvenly(packet.events, limit),
           packet.covered_until_ns, packet.t_ns,        packet.checked};
-}
-
-/// Not in live operation, which maps windows and forgets them.
-EventFusionOptions surveyOptions(EventFusionOptions options) {
-  options.live.enabled = false;
-  options.automatic = {};
-  options.refinement.enabled = false;
-  options.mapper = surveyOptions(options.mapper, kWindowS);
-  return options;
 }
 
 /// A mistake that is named says more than that depths disagree.
@@ -88,59 +79,96 @@ double eventRate(const WindowData& data) {
   return static_cast<double>(events) / secondsBetween(data.window.t0_ns, data.window.t1_ns);
 }
 
-RecordingSurveyor::RecordingSurveyor(const EventFusionOptions& options)
-    : session_(surveyOptions(options)) {}
+std::unique_ptr<FirstLook> firstLookFor(const EventFusionOptions& options) {
+  if (options.live.enabled || !options.automatic.any()) return nullptr;
+  return std::make_unique<FirstLook>(options);
+}
 
-void RecordingSurveyor::add(const Sample& sample) {
+FirstLook::FirstLook(const EventFusionOptions& options)
+    : rig_(options),
+      pose_source_(options.rig.pose_source),
+      mapper_(surveyOptions(options.mapper, kWindowS)) {}
+
+void FirstLook::add(const Sample& sample) {
   if (const auto* packet = std::get_if<EventPacket>(&sample)) {
     addEvents(*packet);
   } else if (const auto* pose = std::get_if<PoseSample>(&sample)) {
-    const std::optional<Rigid3>& given = session_.setup().T_body_rig;
-    addPose({pose->t_ns, rigPose(*pose, given)}, pose->source, given.value_or(pose->T_body_rig));
+    addPose(*pose);
   }
 }
 
-void RecordingSurveyor::addEvents(const EventPacket& packet) {
+void FirstLook::addEvents(const EventPacket& packet) {
   received_ += packet.events.size();
-  session_.addEvents(thinnedOut(packet));
+  for (EventPacket& ready : rig_.add(thinnedOut(packet), mapper_)) feed(std::move(ready));
   takeWindows();
 }
 
-void RecordingSurveyor::addPose(const StampedPose& pose, const PoseSourceId& source,
-                                const Rigid3& T_body_rig) {
-  lever_m_ = std::max(lever_m_, T_body_rig.translation.norm());
-  session_.addPose(pose, source);
+void FirstLook::feed(EventPacket packet) {
+  const std::int64_t offset_ns = packet.calibration.time_offset_ns;
+  const bool empty = packet.events.empty();
+  const std::int64_t begin_ns = empty ? 0 : packet.events.front().t_ns + offset_ns;
+  const std::int64_t last_ns = empty ? 0 : packet.events.back().t_ns + offset_ns;
+  mapper_.addEvents(packet.camera, std::move(packet.events), packet.checked);
+  if (packet.covered_until_ns) mapper_.coverUntil(packet.camera, *packet.covered_until_ns);
+  if (empty) return;
+  extend(events_, begin_ns);
+  extend(events_, last_ns);
+  if (rig_.isReady(begin_ns, pose_source_.selected().has_value())) completeRig();
+}
+
+void FirstLook::addPose(const PoseSample& pose) {
+  const std::optional<Rigid3>& given = rig_.setup().T_body_rig;
+  lever_m_ = std::max(lever_m_, given.value_or(pose.T_body_rig).translation.norm());
+  usePoses(pose_source_.add(pose.source, {pose.t_ns, rigPose(pose, given)}));
   takeWindows();
 }
 
-void RecordingSurveyor::takeWindows() {
-  while (const std::optional<WindowData> data = session_.window()) {
-    take(*data);
-    session_.skipWindow(data->window);
+void FirstLook::usePoses(const std::vector<StampedPose>& poses) {
+  for (const StampedPose& pose : poses) {
+    mapper_.addPose(pose);
+    extend(poses_, pose.t_ns);
   }
 }
 
-void RecordingSurveyor::take(const WindowData& data) {
+void FirstLook::completeRig() {
+  if (rig_.isComplete()) return;
+  rig_.requireOptionsFit();
+  usePoses(pose_source_.select());
+  rig_.complete();
+}
+
+void FirstLook::takeWindows() {
+  if (!rig_.isComplete()) return;
+  while (const std::optional<WindowData> data = mapper_.window()) {
+    take(*data);
+    mapper_.skipWindow(data->window);
+  }
+}
+
+void FirstLook::take(const WindowData& data) {
   samples_.add(data);
   most_events_per_s_ = std::max(most_events_per_s_, eventRate(data));
 }
 
-RecordingSurvey RecordingSurveyor::finish() {
+RecordingSurvey FirstLook::finish() {
   try {
-    session_.finish();
+    usePoses(pose_source_.select());
+    mapper_.finish();
+    completeRig();
+    rig_.requireNoneWaits();
     if (samples_.samples().empty()) {
-      if (const std::optional<WindowData> rest = session_.window()) take(*rest);
+      if (const std::optional<WindowData> rest = mapper_.window()) take(*rest);
     }
-  } catch (const std::exception&) {
+  } catch (const std::exception&) {  // the pass that maps reports it
   }
-  const SessionStatus status = session_.status();
-  RecordingSurvey result{status.rig, samples_.take(), std::nullopt, most_events_per_s_, lever_m_};
-  if (const std::uint64_t chosen = status.counts.total().read) {
+  RecordingSurvey result{mapper_.rig(), samples_.take(), std::nullopt, most_events_per_s_,
+                         lever_m_};
+  if (const std::uint64_t chosen = mapper_.readEvents()) {
     result.most_events_per_s *= static_cast<double>(received_) / static_cast<double>(chosen);
   }
-  if (status.events && status.poses) {
-    result.duration_s = secondsBetween(std::max(status.events->first_ns, status.poses->first_ns),
-                                       std::min(status.events->last_ns, status.poses->last_ns));
+  if (events_ && poses_) {
+    result.duration_s = secondsBetween(std::max(events_->first_ns, poses_->first_ns),
+                                       std::min(events_->last_ns, poses_->last_ns));
   }
   return result;
 }

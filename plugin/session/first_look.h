@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "mapping/base/text.h"
 #include "mapping/survey/scene_depths.h"
-#include "plugin/session/mapping_session.h"
+#include "plugin/session/event_fusion_options.h"
+#include "plugin/session/pose_source_selector.h"
+#include "plugin/session/rig_assembly.h"
+#include "plugin/session/sample.h"
+#include "plugin/session/session_status.h"
 
 namespace efm {
 
@@ -20,7 +25,7 @@ struct PoseVerdict {
 /// Events per second of all cameras together.
 double eventRate(const WindowData& data);
 
-/// What a first pass over a recording found: its cameras and some of its windows, evenly spread.
+/// What a first look at a recording found: its cameras and some of its windows, evenly spread.
 struct RecordingSurvey {
   Rig rig;
   std::vector<WindowSample> samples;
@@ -36,29 +41,39 @@ struct RecordingSurvey {
   PoseVerdict judgePoses(const FusionMapperOptions& options) const;
 };
 
-/// Surveys a recording in one pass, from the same calls as a MappingSession. Memory does not grow
-/// with its length: of more than a million events per second and camera, some are chosen evenly.
-class RecordingSurveyor {
+/// A first pass over a recording: takes some of its windows, evenly spread, without mapping them.
+/// Memory does not grow with the recording's length: of more than a million events per second and
+/// camera, some are chosen evenly.
+class FirstLook {
  public:
-  explicit RecordingSurveyor(const EventFusionOptions& options);
+  explicit FirstLook(const EventFusionOptions& options);
 
   /// @throws std::exception where a MappingSession does; then nothing more may be added.
   void add(const Sample& sample);
   void addEvents(const EventPacket& packet);
-  /// @param T_body_rig that the pose was made with.
-  void addPose(const StampedPose& pose, const PoseSourceId& source, const Rigid3& T_body_rig);
-  /// Once: after the last data, or after an error.
+  void addPose(const PoseSample& pose);
+  /// To be called once: after the last data, or after an error.
   RecordingSurvey finish();
 
  private:
+  void feed(EventPacket packet);
+  void usePoses(const std::vector<StampedPose>& poses);
+  void completeRig();
   void takeWindows();
   void take(const WindowData& data);
 
-  MappingSession session_;
+  RigAssembly rig_;
+  PoseSourceSelector pose_source_;
+  FusionMapper mapper_;
   SpreadSamples samples_;
+  std::optional<TimeSpan> events_, poses_;  // that the mapper took
   std::uint64_t received_ = 0;
   double lever_m_ = 0;
   double most_events_per_s_ = 0;  // of those that were chosen
 };
+
+/// The first look of a playback with automatic options; null in live operation, which cannot look
+/// ahead.
+std::unique_ptr<FirstLook> firstLookFor(const EventFusionOptions& options);
 
 }  // namespace efm

@@ -1,0 +1,486 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/mapper.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "mapping/geometry/timestamp.h"
+#include "plugin/session/health_checks.h"
+
+namespace efm {
+namespace {
+
+/// Making snapshots of the map may take this part of the time.
+constexpr int kMapCostDivisor = 20;
+
+std::string errorText() {
+  try {
+    throw;
+  } catch (const std::exception& error) {
+    return error.what();
+  } catch (...) {
+    return "an exception of another type";
+  }
+}
+
+EventFusionOptions withSetup(EventFusionOptions options, std::shared_ptr<const RigSetup> setup) {
+  options.rig.setup = std::move(setup);
+  return options;
+}
+
+}  // namespace
+
+Mapper::Mapper(const EventFusionOptions& options, Callbacks callbacks,
+               const std::vector<StoredKeyframe>& earlier)
+    : options_(options.live),
+      callbacks_(std::move(callbacks)),
+      setup_(std::make_shared<RigSetup>(readRigSetup(options.rig))),
+      session_(withSetup(options, setup_)) {
+  for (const StoredKeyframe& keyframe : earlier) {
+    session_.insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
+    keep(keyframe);
+  }
+  if (!options_.enabled) return;
+  queue_ = std::make_unique<InputQueue>(options_);
+  status_ = session_.status();
+  map_ = makeSnapshot(true);
+  thread_ = std::thread([this] {
+    run();
+    const auto last = std::move(alone_);
+  });
+}
+
+Mapper::~Mapper() { stop(); }
+
+// --- Input -------------------------------------------------------------------------------------
+
+void Mapper::add(Sample sample) {
+  auto* const packet = std::get_if<EventPacket>(&sample);
+  auto* const pose = std::get_if<PoseSample>(&sample);
+  if (queue_) {
+    if (packet) queue_->add(std::move(*packet));
+    if (pose) queue_->add(std::move(*pose));
+    return;
+  }
+  Batch batch;
+  if (packet) batch.packets.push_back(std::move(*packet));
+  if (pose) batch.poses.push_back(std::move(*pose));
+  workHere(std::move(batch));
+}
+
+void Mapper::skip(const EventPacket& packet) {
+  if (queue_) return queue_->skip(packet);
+  if (packet.events.empty()) return;
+  Batch batch;
+  batch.missing[packet.camera] = {packet.events.back().t_ns + 1, &WindowsGivenUp::paused};
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    paused_events_[packet.camera] += packet.events.size();
+  }
+  workHere(std::move(batch));
+}
+
+void Mapper::finish() {
+  if (!queue_) {
+    Batch end;
+    end.ended = true;
+    return workHere(std::move(end));
+  }
+  if (runsHere()) throw std::logic_error("the mapping cannot be finished from its own callback");
+  queue_->end();
+  std::unique_lock<std::mutex> lock(mutex_);
+  ended_changed_.wait(lock, [this] { return ended_; });
+  if (end_error_) std::rethrow_exception(std::exchange(end_error_, nullptr));
+}
+
+void Mapper::stop() {
+  if (!queue_) {
+    const std::lock_guard<std::mutex> lock(session_mutex_);  // after the current keyframe
+    stopped_ = true;
+    return;
+  }
+  stopped_ = true;
+  queue_->stop();
+  if (runsHere()) {
+    alone_ = shared_from_this();
+    thread_.detach();
+  } else if (thread_.joinable()) {
+    thread_.join();
+  }
+}
+
+// --- The worker --------------------------------------------------------------------------------
+
+/// One turn in the caller's thread.
+void Mapper::workHere(Batch batch) {
+  std::exception_ptr error;
+  feed(std::move(batch), error);
+  while (mapNext(error)) {  // a rejected sample does not stop the mapping of earlier ones
+  }
+  if (error) std::rethrow_exception(error);
+}
+
+void Mapper::run() {
+  std::exception_ptr error;
+  for (bool goes_on = true; goes_on;) {
+    attempt(error, Fault::kMapping, "the input", [&] { goes_on = runOnce(); });  // no memory
+  }
+  endRun(nullptr);  // stopped: nobody waits for the end any more
+}
+
+/// @return whether more may come.
+bool Mapper::runOnce() {
+  std::exception_ptr error;
+  // A snapshot that was put off is made as soon as it may be.
+  Batch batch =
+      map_changed_ ? queue_->wait(map_renewed_ + kMapCostDivisor * map_cost_) : queue_->wait();
+  do {
+    if (stopped_) return false;
+    if (batch.ended) {
+      std::exception_ptr end_error;
+      feed(std::move(batch), end_error);
+      while (mapNext(error) && !stopped_) {
+      }
+      publishMap(true, error);
+      publishState(error);
+      endRun(end_error);
+      return false;
+    }
+    feed(std::move(batch), error);
+    if (!mapNext(error)) break;
+    batch = queue_->take();
+  } while (true);
+  publishMap(false, error);
+  warnOfLosses();
+  return true;
+}
+
+void Mapper::endRun(std::exception_ptr error) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (std::exchange(ended_, true)) return;
+  end_error_ = std::move(error);
+  ended_changed_.notify_all();
+}
+
+/// Feeds the session.
+/// @param error receives the first error; in live operation that of the end alone.
+void Mapper::feed(Batch batch, std::exception_ptr& error) {
+  std::exception_ptr ignored;
+  std::exception_ptr& of_input = queue_ ? ignored : error;
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    if (finished_ && !queue_) throw std::logic_error("input after the end: `finish` was called");
+    for (const PoseSample& pose : batch.poses) {
+      attempt(of_input, Fault::kPose, "", [&] { session_.addPose(pose); });
+    }
+    for (const auto& missing : batch.missing) {
+      attempt(of_input, Fault::kMapping, "the choice of options",
+              [&] { session_.noteMissing(missing.first, missing.second); });
+    }
+    for (EventPacket& packet : batch.packets) {
+      attempt(of_input, Fault::kEvents, "", [&] { session_.addEvents(std::move(packet)); });
+    }
+    if (batch.ended) {
+      finished_ = true;
+      attempt(error, Fault::kMapping, "the end of the input", [&] { session_.finish(); });
+    }
+  }
+  publishState(of_input);
+}
+
+/// @return whether it made a keyframe, or dropped one in live operation.
+bool Mapper::mapNext(std::exception_ptr& error) {
+  std::optional<KeyframeDepthMap> keyframe;
+  std::vector<std::string> warnings;
+  bool goes_on = false;
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    // Within a callback in playback, the caller of the callback goes on mapping.
+    if (stopped_ || delivering_.count(std::this_thread::get_id()) != 0) return false;
+    if (queue_) {  // the newest input wins: what waits is bounded
+      attempt(error, Fault::kMapping, "the input that waits", [&] {
+        session_.limitHeld(options_.queueEvents() - static_cast<double>(queue_->queuedEvents()));
+      });
+    }
+    DsiSink* sink = nullptr;
+    ProcessorClock clock;
+    {
+      const std::lock_guard<std::mutex> settings(mutex_);
+      sink = sink_;
+      clock = clock_;
+    }
+    const std::size_t kept = map_so_far_.trajectory.size();
+    const std::size_t kept_keyframes = map_so_far_.keyframes.size();
+    const auto store = [this](const KeyframeDepthMap& made, const std::vector<ViewPoint>& points) {
+      keep({made.window.t_ref_ns, made.T_world_ref,
+            std::make_shared<const std::vector<ViewPoint>>(points)});
+    };
+    const bool mapped = attempt(error, Fault::kMapping, "a keyframe",
+                                [&] { keyframe = session_.next(sink, clock, store); });
+    if (!mapped) {  // the session does not have this keyframe
+      map_so_far_.trajectory.resize(kept);
+      map_so_far_.tracker_trajectory.resize(std::min(map_so_far_.tracker_trajectory.size(), kept));
+      map_so_far_.keyframes.resize(std::min(map_so_far_.keyframes.size(), kept_keyframes));
+      goes_on = queue_ && session_.giveUpFailed();
+    }
+    if (keyframe) {
+      goes_on = true;
+      map_changed_ = true;
+      warnings = warningsOfSilence(*keyframe);
+      std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
+      if (queue_ && keyframes.size() > static_cast<std::size_t>(options_.max_keyframes)) {
+        keyframes.erase(keyframes.begin());
+      }
+      const std::lock_guard<std::mutex> published(mutex_);
+      live_.failing = false;
+      newest_depth_ = keyframe->map.depth;
+      newest_planes_ = session_.chosen().planes;
+    }
+  }
+  if (keyframe && queue_) publishMap(false, error);
+  publishState(error);
+  for (const std::string& text : warnings) warn(text, error);
+  if (keyframe && callbacks_.on_keyframe) {
+    callBack(error, "the callback of a keyframe", [&] { callbacks_.on_keyframe(*keyframe); });
+  }
+  return goes_on;
+}
+
+/// One warning per camera. The status counts the keyframes that lack its events.
+std::vector<std::string> Mapper::warningsOfSilence(const KeyframeDepthMap& keyframe) {
+  std::vector<std::string> warnings;
+  for (const int camera : keyframe.silent_cameras) {
+    if (!silent_cameras_.insert(camera).second) continue;
+    warnings.push_back(fmt::format("camera {} had no event for the keyframe at {} s", camera,
+                                   formatSeconds(keyframe.window.t_ref_ns)));
+  }
+  return warnings;
+}
+
+/// Adds a keyframe to the map so far; nothing if memory ends.
+void Mapper::keep(StoredKeyframe keyframe) {
+  const StampedPose pose{keyframe.t_ref_ns, keyframe.T_world_ref};
+  map_so_far_.trajectory.push_back(pose);
+  map_so_far_.tracker_trajectory.push_back(pose);
+  map_so_far_.keyframes.push_back(std::move(keyframe));
+}
+
+// --- What callers see --------------------------------------------------------------------------
+
+/// Moves cloud and keyframes to their refined poses, so that all parts agree.
+std::shared_ptr<MapSnapshot> Mapper::makeSnapshot(bool with_points) {
+  session_.applyPending();
+  const std::vector<Rigid3>& T_world_ref = session_.T_world_ref();
+  std::vector<StampedPose>& trajectory = map_so_far_.trajectory;
+  std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
+  const std::size_t earlier = trajectory.size() - T_world_ref.size();
+  const std::size_t forgotten = trajectory.size() - keyframes.size();
+  for (std::size_t i = earlier; i < trajectory.size(); ++i) {
+    if (isSame(trajectory[i].T_world_rig, T_world_ref[i - earlier])) continue;
+    trajectory[i].T_world_rig = T_world_ref[i - earlier];
+    if (i >= forgotten) keyframes[i - forgotten].T_world_ref = T_world_ref[i - earlier];
+  }
+  auto map = std::make_shared<MapSnapshot>(map_so_far_);
+  if (with_points) map->points = session_.cloud().points();
+  return map;
+}
+
+std::shared_ptr<const MapSnapshot> Mapper::mapSoFar(bool with_points) {
+  if (queue_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return map_;
+  }
+  const std::lock_guard<std::mutex> lock(session_mutex_);
+  return makeSnapshot(with_points);
+}
+
+/// Live operation: renews the snapshot, unless this would take too large a part of the time.
+void Mapper::publishMap(bool at_once, std::exception_ptr& error) {
+  const Clock::time_point begin = Clock::now();
+  const bool is_due = map_changed_ && begin - map_renewed_ >= kMapCostDivisor * map_cost_;
+  if (!is_due && !at_once) return;
+  std::shared_ptr<const MapSnapshot> made;
+  const bool done = attempt(error, Fault::kMapping, "the snapshot of the map", [&] {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    made = makeSnapshot(true);
+  });
+  map_renewed_ = Clock::now();
+  map_cost_ = map_renewed_ - begin;
+  if (!done) return;  // the next try costs as much
+  map_changed_ = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    map_ = made;
+  }
+  if (!callbacks_.on_map) return;
+  callBack(error, "the callback of the map", [&] { callbacks_.on_map(made); });
+}
+
+/// Logs a choice of options. In live operation renews the state, and logs failed refinements, which
+/// the caller gets in playback.
+void Mapper::publishState(std::exception_ptr& error) {
+  SessionStatus status;
+  bool is_new_choice = false;
+  {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    const std::uint64_t choices = session_.chosen().choices;
+    is_new_choice = std::exchange(logged_choices_, choices) != choices;
+    if (!queue_ && !is_new_choice) return;
+    status = session_.status();
+  }
+  if (queue_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_ = status;
+  }
+  if (is_new_choice) {
+    callBack(error, "the callback of the log", [&] {
+      if (callbacks_.info) callbacks_.info(choiceText(status));
+      if (!status.scene_unknown || !callbacks_.warn) return;
+      const Warning warning = noSceneWarning();
+      callbacks_.warn(warning.name + ": " + warning.text);
+    });
+  }
+  if (!queue_ || !status.refinement) return;
+  const std::uint64_t failures = status.refinement->failures;
+  if (std::exchange(warned_failures_, failures) < failures) {
+    warn("refinement: " + status.refinement->last_error, error);
+  }
+}
+
+SessionStatus Mapper::status() const {
+  if (!queue_) {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    SessionStatus status = session_.status();
+    status.paused_events = paused_events_;
+    return status;
+  }
+  std::map<int, QueueCounts> cameras = queue_->counts();
+  const std::uint64_t rejected_poses = queue_->refusedPoses();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  SessionStatus status = status_;
+  LiveStatus& live = *status.live;
+  for (const auto& [camera, counts] : live.cameras) cameras[camera].lost = counts.lost;
+  live.cameras = std::move(cameras);
+  live.refused_poses += live_.refused_poses + rejected_poses;
+  live.errors = live_.errors;
+  live.last_error = live_.last_error;
+  live.failing = live_.failing;
+  return status;
+}
+
+std::size_t Mapper::numKeyframes() const {
+  if (queue_) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return map_->keyframes.size();
+  }
+  const std::lock_guard<std::mutex> lock(session_mutex_);
+  return map_so_far_.keyframes.size();
+}
+
+std::pair<cv::Mat1f, DepthPlanesOptions> Mapper::newestDepth() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return {newest_depth_, newest_planes_};
+}
+
+void Mapper::setSink(DsiSink* sink) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  sink_ = sink;
+}
+
+void Mapper::setClock(ProcessorClock clock) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  clock_ = std::move(clock);
+}
+
+// --- Errors and losses -------------------------------------------------------------------------
+
+/// Runs a step. What it throws is the caller's in playback; in live operation it is counted.
+/// @param error keeps the first one.
+template <typename Step>
+bool Mapper::attempt(std::exception_ptr& error, Fault fault, const char* doing, const Step& step) {
+  try {
+    step();
+    return true;
+  } catch (...) {
+    if (!error) error = std::current_exception();
+    if (queue_) noteError(doing, fault);
+    return false;
+  }
+}
+
+/// Calls the host, which may drop its last reference to the mapper.
+template <typename Call>
+void Mapper::callBack(std::exception_ptr& error, const char* name, const Call& call) {
+  if (alone_) return;
+  const auto self = weak_from_this().lock();
+  const auto thread = std::this_thread::get_id();
+  const auto mark = [&](bool begins) {
+    const std::lock_guard<std::mutex> lock(session_mutex_);
+    begins ? void(delivering_.insert(thread)) : void(delivering_.erase(thread));
+  };
+  if (!queue_) mark(true);
+  attempt(error, Fault::kCallback, name, call);
+  if (!queue_) mark(false);
+  if (queue_ && !alone_ && self.use_count() == 1) stop();
+}
+
+/// A line in the host's log.
+void Mapper::warn(const std::string& text, std::exception_ptr& error) {
+  if (!callbacks_.warn) return;
+  callBack(error, "the callback of the log", [&] { callbacks_.warn(text); });
+}
+
+/// Within a handler. Throws nothing, even without memory: the thread has nobody to catch it.
+void Mapper::noteError(const char* doing, Fault fault) noexcept {
+  const bool is_input = fault == Fault::kEvents || fault == Fault::kPose;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!is_input) ++live_.errors;
+    if (fault == Fault::kPose) ++live_.refused_poses;
+    if (fault == Fault::kMapping) live_.failing = true;
+  }
+  try {
+    const std::string text = errorText();
+    bool is_new = false;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      is_new = live_.last_error != text;
+      live_.last_error = text;
+    }
+    // A callback is named once, rejected events at most once a second, rejected poses never.
+    const Clock::time_point now = Clock::now();
+    if (fault == Fault::kCallback) is_new = logged_callbacks_.insert(doing).second;
+    if (fault == Fault::kEvents && now - rejection_logged_ < std::chrono::seconds(1)) return;
+    if (!is_new || fault == Fault::kPose) return;
+    if (is_input) rejection_logged_ = now;
+    std::exception_ptr ignored;
+    warn(is_input ? text : std::string(doing) + ": " + text, ignored);
+  } catch (...) {  // no memory: it is counted
+  }
+}
+
+/// At most once a second.
+void Mapper::warnOfLosses() {
+  const Clock::time_point now = Clock::now();
+  if (now - warned_ < std::chrono::seconds(1)) return;
+  std::uint64_t losses = 0;
+  std::string text;
+  const SessionStatus status = this->status();
+  for (const auto& [camera, counts] : status.live->cameras) {
+    losses += counts.dropped + counts.thinned + counts.refused + counts.lost;
+    text += fmt::format(
+        "; camera {}: {} dropped, {} thinned, {} refused, {} lost afterwards, of {} events", camera,
+        counts.dropped, counts.thinned, counts.refused, counts.lost, counts.received);
+  }
+  const WindowsGivenUp& given_up = status.counts.windows_given_up;
+  if (losses == warned_losses_ && given_up.total() == warned_given_up_) return;
+  warned_ = now;
+  warned_losses_ = losses;
+  warned_given_up_ = given_up.total();
+  std::exception_ptr ignored;
+  warn(fmt::format("so far {}{}", asText(given_up), text), ignored);
+}
+
+}  // namespace efm

@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "maps/cloud/keyframe_cloud.h"
+#include "maps/cloud/map_point.h"
+#include "plugin/session/input_queue.h"
+#include "plugin/session/mapping_session.h"
+#include "plugin/session/sample.h"
+
+namespace efm {
+
+/// The points of a keyframe in its reference view, and the pose of the view. 20 bytes a point.
+/// Transformed to the world, they are the points of the map again, bit for bit.
+struct StoredKeyframe {
+  std::int64_t t_ref_ns = 0;
+  Rigid3 T_world_ref;
+  std::shared_ptr<const std::vector<ViewPoint>> points;  ///< Never null; shared, never changed.
+};
+
+/// The map at one moment.
+struct MapSnapshot {
+  /// T_world_ref of all keyframes at t_ref; the keyframes of the initial map come first.
+  std::vector<StampedPose> trajectory;
+  /// The same poses by the tracker. They differ for refined keyframes.
+  std::vector<StampedPose> tracker_trajectory;
+  std::vector<StoredKeyframe> keyframes;  ///< In playback all, in live operation the newest.
+  MapCloud::ConstPtr points;              ///< The exported points.
+};
+
+/// Turns the samples of a recording or of a sensor into keyframes and one map. Thread-safe.
+///
+/// In playback the caller's thread maps: `add` returns when the windows that became complete are
+/// mapped, so the same samples give the same map, bit for bit. The caller gets the first error,
+/// after the other complete windows are mapped. If a window cannot be mapped (no memory, a sink
+/// that throws), it is tried again by the next call. A query waits while a keyframe is made, but
+/// not while it is delivered.
+///
+/// In live operation (`[live] enabled`) a thread of the mapper maps. `add` never waits, and queries
+/// return the newest published state. If the mapping falls behind until the waiting input is as
+/// large as the queue may be, the oldest windows are dropped. Errors of the mapping, the refinement
+/// and the callbacks are counted and logged (LiveStatus); the window is dropped and the next one is
+/// tried. The snapshot of the map is renewed after each keyframe, as long as this takes at most a
+/// twentieth of the time.
+class Mapper : public std::enable_shared_from_this<Mapper> {
+ public:
+  /// All run without a lock, in the thread that maps. They may use the mapper. In live operation
+  /// they may drop the last reference to it.
+  struct Callbacks {
+    std::function<void(const KeyframeDepthMap&)> on_keyframe;
+    /// Live operation: receives each new snapshot of the map.
+    std::function<void(const std::shared_ptr<const MapSnapshot>&)> on_map;
+    std::function<void(const std::string&)> warn;
+    std::function<void(const std::string&)> info;
+  };
+
+  /// @param earlier keyframes of an initial map.
+  /// @throws std::runtime_error if a file that the options name cannot be read.
+  explicit Mapper(const EventFusionOptions& options, Callbacks callbacks = {},
+                  const std::vector<StoredKeyframe>& earlier = {});
+  /// Ends without mapping the rest.
+  ~Mapper();
+  Mapper(const Mapper&) = delete;
+  Mapper& operator=(const Mapper&) = delete;
+
+  /// Adds a packet of events or a pose; an OtherSample is ignored.
+  /// @throws std::invalid_argument if the sample contradicts its sensor or earlier samples;
+  /// std::logic_error after `finish` in playback (in live operation it is counted).
+  void add(Sample sample);
+  /// Counts a packet that is not to be mapped. The windows that need its events are dropped.
+  void skip(const EventPacket& packet);
+  /// Maps the rest of the input; in live operation it waits for that.
+  /// @throws std::logic_error in live operation within a callback; the error of the rig, if an
+  /// option or a camera does not fit.
+  void finish();
+  /// Ends without mapping the rest: later input is lost. It waits for the current keyframe, and no
+  /// callback comes after that. Within a callback of live operation it does not wait: the mapper's
+  /// thread ends once the callback returns.
+  void stop();
+  /// Returns whether this is the mapper's own thread: a callback of live operation.
+  bool runsHere() const { return std::this_thread::get_id() == thread_.get_id(); }
+
+  /// @param sink receives every fused plane; may be null. Not owned. The current keyframe may still
+  /// use the former sink.
+  void setSink(DsiSink* sink);
+  /// @param clock measures the stages of the mapping. Default: the processor time of the process.
+  void setClock(ProcessorClock clock);
+
+  /// The pose of the rig on the tracked body, from the options.
+  const std::optional<Rigid3>& T_body_rig() const { return setup_->T_body_rig; }
+  SessionStatus status() const;
+  /// The map so far; in live operation the newest snapshot. Never null.
+  std::shared_ptr<const MapSnapshot> snapshot() { return mapSoFar(true); }
+  MapCloud::ConstPtr points() { return snapshot()->points; }
+  /// The same without the points, which cost an export of the map in playback.
+  std::shared_ptr<const MapSnapshot> keyframes() { return mapSoFar(false); }
+  std::size_t numKeyframes() const;
+  /// The newest keyframe's depth map, empty before the first one, and its planes.
+  std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
+
+ private:
+  /// What was thrown: by the mapping, by a host's callback, or for a sample that is rejected.
+  enum class Fault { kMapping, kCallback, kEvents, kPose };
+  using Batch = InputQueue::Batch;
+  using Clock = std::chrono::steady_clock;
+
+  // The worker: a caller in playback, otherwise the thread.
+  void workHere(Batch batch);
+  void run();
+  bool runOnce();
+  void feed(Batch batch, std::exception_ptr& error);
+  bool mapNext(std::exception_ptr& error);
+  void endRun(std::exception_ptr error);
+  void keep(StoredKeyframe keyframe);
+  std::shared_ptr<MapSnapshot> makeSnapshot(bool with_points);
+  std::shared_ptr<const MapSnapshot> mapSoFar(bool with_points);
+  void publishState(std::exception_ptr& error);
+  void publishMap(bool at_once, std::exception_ptr& error);
+  std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
+  template <typename Step>
+  bool attempt(std::exception_ptr& error, Fault fault, const char* doing, const Step& step);
+  template <typename Call>
+  void callBack(std::exception_ptr& error, const char* name, const Call& call);
+  void warn(const std::string& text, std::exception_ptr& error);
+  void noteError(const char* doing, Fault fault) noexcept;
+  void warnOfLosses();
+
+  const LiveOptions options_;
+  const Callbacks callbacks_;
+  const std::shared_ptr<const RigSetup> setup_;
+  std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
+  std::atomic<bool> stopped_ = false;
+
+  mutable std::mutex
+      session_mutex_;  // of the worker and its members; held while a keyframe is made
+  MappingSession session_;
+  MapSnapshot map_so_far_;  // without points
+  std::map<int, std::uint64_t> paused_events_;
+  std::set<std::thread::id> delivering_;  // the threads within a callback in playback
+  std::set<int> silent_cameras_;          // logged
+  std::uint64_t logged_choices_ = 0;
+  bool finished_ = false;
+
+  // Of the mapper's thread.
+  bool map_changed_ = false;
+  Clock::time_point map_renewed_;
+  Clock::duration map_cost_{};
+  Clock::time_point warned_;
+  Clock::time_point rejection_logged_;
+  std::set<std::string> logged_callbacks_;  // that threw
+  std::uint64_t warned_losses_ = 0;
+  std::uint64_t warned_given_up_ = 0;
+  std::uint64_t warned_failures_ = 0;
+  std::shared_ptr<Mapper> alone_;  // after `stop` within a callback, whose owner may be gone
+
+  mutable std::mutex mutex_;  // of the members below; held for copies alone
+  std::condition_variable ended_changed_;
+  DsiSink* sink_ = nullptr;
+  ProcessorClock clock_ = processSeconds;
+  SessionStatus status_;
+  LiveStatus live_;
+  std::shared_ptr<const MapSnapshot> map_;
+  cv::Mat1f newest_depth_;
+  DepthPlanesOptions newest_planes_;
+  bool ended_ = false;
+  std::exception_ptr end_error_;
+
+  std::thread thread_;  // last: it uses the others
+};
+
+/// p_world = T_world_ref * p_ref.
+inline std::vector<CloudPoint> worldPointsOf(const StoredKeyframe& keyframe) {
+  return pointsInWorld(*keyframe.points, keyframe.T_world_ref);
+}
+
+}  // namespace efm
