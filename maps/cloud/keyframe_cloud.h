@@ -73,8 +73,7 @@ class RefinedCloud {
   /// oldest first, and at most `max_count` of them. A tolerance of 0 moves all, bit for bit.
   /// @throws std::invalid_argument as GlobalCloud::insert does. That keyframe keeps its old pose,
   /// and its request is dropped.
-  void applyPending(double tolerance_m,
-                    std::size_t max_count = std::numeric_limits<std::size_t>::max());
+  void applyPending(double tolerance_m, std::size_t max_count = kAll);
 
   const GlobalCloud& cloud() const { return cloud_; }
   /// The poses of the keyframes in the cloud, without those of an earlier map.

@@ -115,7 +115,7 @@ void warnOfFarPoints(const MapCloud& cloud, MapReport& report) {
                    *step_m, origin.x(), origin.y(), origin.z())});
 }
 
-/// Not where MRPT is missing: a note says so.
+/// Without MRPT, prints a note instead.
 void writeSimpleMap(MapOutput& output, const std::vector<StoredKeyframe>& keyframes) {
   const MrptLibrary* library = nullptr;
   try {
@@ -260,7 +260,7 @@ class MapCommand {
   std::optional<double> sequenceMaximum();
   std::string stays() const;
 
-  std::size_t told_warnings_ = 0;
+  std::size_t printed_warnings_ = 0;
   std::optional<std::string> write_error_;
   const double start_cpu_s_ = processSeconds();
   std::chrono::steady_clock::time_point began_;
@@ -280,7 +280,7 @@ void MapCommand::begin() {
   output.emplace(folder, kind, options.mapper.keyframe.planes,
                  arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure,
                  namesOf(first));
-  told_warnings_ = report.warnings.size();
+  printed_warnings_ = report.warnings.size();
 }
 
 /// Chooses the automatic options, and warns of poses that do not explain the events.
@@ -291,7 +291,7 @@ std::unique_ptr<Recording> MapCommand::firstLook() {
   Progress progress("first look", arguments.verbosity);
   std::exception_ptr damage;  // the mapping reports it
   const auto next = [&]() -> std::optional<Sample> {
-    if (interruption.requested()) throw Interrupted();
+    interruption.check();
     try {
       return held->read().next();
     } catch (const std::exception&) {
@@ -353,9 +353,8 @@ std::optional<double> MapCommand::sequenceMaximum() {
         maximum.add(keyframe.max_confidence);
       },
       "first pass");
-  while (!interruption.requested() && pass.mapNext()) {
-  }
-  pass.finish();
+  while (pass.mapNext()) interruption.check();
+  pass.finish();  // the mapping reports its error
   return maximum.value();
 }
 
@@ -419,7 +418,7 @@ int MapCommand::conclude(std::optional<std::string> error) {
     if (!error) error = write_error_;
   }
   if (output->keepsEarlier() && error) *error += stays();
-  printWarnings({report.warnings.begin() + static_cast<std::ptrdiff_t>(told_warnings_),
+  printWarnings({report.warnings.begin() + static_cast<std::ptrdiff_t>(printed_warnings_),
                  report.warnings.end()});
   const bool quiet = arguments.verbosity == Verbosity::kQuiet;
   if (report.counts.keyframes > 0 && !quiet && !output->keepsEarlier()) {
@@ -580,7 +579,8 @@ int runMap(const MapArguments& arguments) {
                    });
     run.mapper().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
     bool stopped = false;
-    while (!stopped && run.mapNext()) stopped = command.interruption.requested();
+    while (!(stopped = command.interruption.requested()) && run.mapNext()) {
+    }
     run.finish();
     watchers.show(run, true);
     writer.finish();
@@ -618,6 +618,7 @@ int runDepth(const DepthArguments& arguments) {
           mapCloudOf(removeOutliers(in_world, options.cloud.outliers), options.cloud.voxel_size_m);
       ++written;
     });
+    const std::unique_ptr<NpyDsiFile> dsi = dsiFile(command, arguments);  // outlives the run
     bool made = false;
     MappingRun run(*command.recording, options, command.chosen, arguments.verbosity,
                    [&](const KeyframeDepthMap& keyframe, const MappingRun&) {
@@ -625,7 +626,6 @@ int runDepth(const DepthArguments& arguments) {
                      writer.add(keyframe);
                    });
     run.mapper().setClock([&] { return processSeconds() - writer.cpuSeconds(); });
-    const std::unique_ptr<NpyDsiFile> dsi = dsiFile(command, arguments);
     run.mapper().setSink(dsi.get());
     while (run.mapNext()) {  // a part of the window is no result; a keyframe is
       if (!made) command.interruption.check();

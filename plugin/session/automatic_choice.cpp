@@ -11,8 +11,8 @@
 namespace efm {
 namespace {
 
-/// What a jump of the tracker or a clock reset leaves of such a window is enough if it is as long
-/// as this.
+/// The shortest window to choose from, if a jump of the tracker or a clock reset cuts the first
+/// window.
 constexpr double kMinFirstWindowS = 0.2;
 /// Without a scene, the choice waits so long, and for at most `max_queue_events` events.
 constexpr std::int64_t kMaxSceneWaitNs = 10 * kNanosecondsPerSecond;
@@ -39,14 +39,16 @@ void noteSource(const WindowData& data, std::vector<ChosenOption>& chosen) {
 
 }  // namespace
 
-/// Chooses automatic options as soon as a window shows the scene, or where none does so for too
-/// long. A second choice keeps the first one's options where it sees no scene. @return whether none
-/// is left.
+/// Chooses automatic options as soon as a window shows the scene, or after 10 s without a scene. A
+/// second choice keeps the options of the first one if it sees no scene.
+/// @return true if all automatic options are chosen.
 bool MappingSession::chooseAutomatic() {
   if (first_look_) return chooseFromFirstLook();
   const bool is_first = status_.choices == 0;
   while (options_.automatic.any()) {
     const std::optional<WindowData> data = dataToChooseFrom();
+    // No window yet: at the end of a piece of the input, try the next piece; otherwise wait for
+    // more data; at the end of the input, choose without data.
     if (!data && is_first && pieceEnds() && !looksTooLong() && endPiece()) continue;
     if (!data && !finished_ && !pieceEnds()) return false;
     std::vector<WindowSample> samples;

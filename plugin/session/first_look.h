@@ -48,7 +48,7 @@ class FirstLook {
  public:
   explicit FirstLook(const EventFusionOptions& options);
 
-  /// @throws std::exception where a MappingSession does; then nothing more may be added.
+  /// @throws std::exception for a sample that a MappingSession rejects, too.
   void add(const Sample& sample);
   void addEvents(const EventPacket& packet);
   void addPose(const PoseSample& pose);

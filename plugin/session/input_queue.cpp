@@ -196,15 +196,19 @@ void InputQueue::dropOldest() {
   events_ -= oldest.events.size();
   bytes_ -= bytesOf(oldest);
   cameraOf(oldest.camera).counts.dropped += oldest.events.size();
-  noteMissing(oldest, &WindowsGivenUp::overload);
+  if (!oldest.events.empty() || oldest.skipped_until_ns) {
+    const std::int64_t until_ns =
+        oldest.skipped_until_ns ? *oldest.skipped_until_ns : oldest.events.back().t_ns + 1;
+    MissingEvents& missing = missing_[oldest.camera];
+    missing.until_ns = std::max(missing.until_ns, until_ns);
+  }
   packets_.pop_front();
 }
 
-void InputQueue::noteMissing(const EventPacket& packet, GiveUpReason reason) {
-  if (packet.events.empty()) return;
-  MissingEvents& missing = missing_[packet.camera];
-  missing.until_ns = std::max(missing.until_ns, packet.events.back().t_ns + 1);
-  missing.reason = reason;
+EventPacket skippedPacket(const EventPacket& packet) {
+  EventPacket skipped{packet.camera, packet.calibration, {}};
+  skipped.skipped_until_ns = packet.events.back().t_ns + 1;
+  return skipped;
 }
 
 void InputQueue::skip(const EventPacket& packet) {
@@ -212,9 +216,7 @@ void InputQueue::skip(const EventPacket& packet) {
   QueueCounts& counts = cameraOf(packet.camera).counts;
   counts.received += packet.events.size();
   counts.paused += packet.events.size();
-  if (ended_) return;
-  noteMissing(packet, &WindowsGivenUp::paused);
-  changed_.notify_one();
+  if (!ended_ && !packet.events.empty()) push(skippedPacket(packet));
 }
 
 void InputQueue::add(PoseSample pose) {

@@ -49,6 +49,9 @@ class EventBudget {
   std::uint64_t thinned_ = 0;
 };
 
+/// Takes the place of a packet that is not to be mapped.
+EventPacket skippedPacket(const EventPacket& packet);
+
 /// The input of a mapping that runs in another thread: thinned to the budget, and bounded in events
 /// and in bytes. Where it is full, the oldest packets are dropped, never poses. Any thread adds;
 /// one takes. Adding never waits for the mapping.
@@ -63,7 +66,7 @@ class InputQueue {
   /// not that of the camera's earlier packets: the packet is refused.
   void add(EventPacket packet);
   void add(PoseSample pose);
-  /// Counts a packet that is not to be mapped.
+  /// Counts a packet that is not to be mapped. A `skippedPacket` takes its place.
   void skip(const EventPacket& packet);
   /// No more input will come. Packets and poses that are added afterwards are counted.
   void end();
@@ -73,7 +76,7 @@ class InputQueue {
   struct Batch {
     std::vector<PoseSample> poses;  ///< In the order they came.
     std::vector<EventPacket> packets;
-    /// The cameras with dropped or skipped packets.
+    /// The cameras with dropped packets, which are older than `packets`.
     std::map<int, MissingEvents> missing;
     bool ended = false;
   };
@@ -117,7 +120,6 @@ class InputQueue {
   void pass(Camera& camera, EventPacket packet);
   void push(EventPacket packet);
   void dropOldest();
-  void noteMissing(const EventPacket& packet, GiveUpReason reason);
   bool isFull() const;
   Batch takeLocked();
 

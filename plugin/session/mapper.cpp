@@ -41,18 +41,33 @@ Mapper::Mapper(const EventFusionOptions& options, Callbacks callbacks,
   for (const StoredKeyframe& keyframe : earlier) {
     session_.insertEarlier(worldPointsOf(keyframe), keyframe.T_world_ref);
     keep(keyframe);
+    forgetOldest();
   }
   if (!options_.enabled) return;
   queue_ = std::make_unique<InputQueue>(options_);
   status_ = session_.status();
   map_ = makeSnapshot(true);
-  thread_ = std::thread([this] {
+  thread_ = std::thread([this] {  // it waits: nobody can add input before this returns
+    worker_ = std::this_thread::get_id();
     run();
-    const auto last = std::move(alone_);
+    worker_ = std::thread::id();
+    const auto last = std::move(self_);  // may destroy this
   });
 }
 
-Mapper::~Mapper() { stop(); }
+std::shared_ptr<Mapper> Mapper::make(const EventFusionOptions& options, Callbacks callbacks,
+                                     const std::vector<StoredKeyframe>& earlier) {
+  const auto mapper = std::make_shared<Mapper>(options, std::move(callbacks), earlier);
+  if (mapper->queue_) mapper->self_ = mapper;
+  return {mapper.get(), [mapper](Mapper*) {
+            mapper->stop();
+            if (mapper->runsHere()) mapper->thread_.detach();
+          }};
+}
+
+Mapper::~Mapper() {
+  if (!runsHere()) stop();
+}
 
 // --- Input -------------------------------------------------------------------------------------
 
@@ -74,7 +89,7 @@ void Mapper::skip(const EventPacket& packet) {
   if (queue_) return queue_->skip(packet);
   if (packet.events.empty()) return;
   Batch batch;
-  batch.missing[packet.camera] = {packet.events.back().t_ns + 1, &WindowsGivenUp::paused};
+  batch.packets.push_back(skippedPacket(packet));
   {
     const std::lock_guard<std::mutex> lock(session_mutex_);
     paused_events_[packet.camera] += packet.events.size();
@@ -103,12 +118,9 @@ void Mapper::stop() {
   }
   stopped_ = true;
   queue_->stop();
-  if (runsHere()) {
-    alone_ = shared_from_this();
-    thread_.detach();
-  } else if (thread_.joinable()) {
-    thread_.join();
-  }
+  if (runsHere()) return;
+  const std::lock_guard<std::mutex> lock(join_mutex_);
+  if (thread_.joinable()) thread_.join();
 }
 
 // --- The worker --------------------------------------------------------------------------------
@@ -145,15 +157,16 @@ bool Mapper::runOnce() {
       }
       publishMap(true, error);
       publishState(error);
+      warnOfLosses();
       endRun(end_error);
       return false;
     }
     feed(std::move(batch), error);
+    warnOfLosses();
     if (!mapNext(error)) break;
     batch = queue_->take();
   } while (true);
   publishMap(false, error);
-  warnOfLosses();
   return true;
 }
 
@@ -165,13 +178,16 @@ void Mapper::endRun(std::exception_ptr error) {
 }
 
 /// Feeds the session.
-/// @param error receives the first error; in live operation that of the end alone.
+/// @param error receives the first error. In live operation, where `attempt` counts and logs
+/// errors, it is that of the end alone.
 void Mapper::feed(Batch batch, std::exception_ptr& error) {
   std::exception_ptr ignored;
   std::exception_ptr& of_input = queue_ ? ignored : error;
   {
     const std::lock_guard<std::mutex> lock(session_mutex_);
-    if (finished_ && !queue_) throw std::logic_error("input after the end: `finish` was called");
+    if (finished_ && !queue_ && !batch.ended) {
+      throw std::logic_error("input after the end: `finish` was called");
+    }
     for (const PoseSample& pose : batch.poses) {
       attempt(of_input, Fault::kPose, "", [&] { session_.addPose(pose); });
     }
@@ -180,10 +196,15 @@ void Mapper::feed(Batch batch, std::exception_ptr& error) {
               [&] { session_.noteMissing(missing.first, missing.second); });
     }
     for (EventPacket& packet : batch.packets) {
-      attempt(of_input, Fault::kEvents, "", [&] { session_.addEvents(std::move(packet)); });
+      attempt(of_input, Fault::kEvents, "", [&] {
+        if (packet.skipped_until_ns) {
+          session_.noteMissing(packet.camera, {*packet.skipped_until_ns, &WindowsGivenUp::paused});
+        } else {
+          session_.addEvents(std::move(packet));
+        }
+      });
     }
-    if (batch.ended) {
-      finished_ = true;
+    if (batch.ended && !std::exchange(finished_, true)) {
       attempt(error, Fault::kMapping, "the end of the input", [&] { session_.finish(); });
     }
   }
@@ -228,11 +249,9 @@ bool Mapper::mapNext(std::exception_ptr& error) {
     if (keyframe) {
       goes_on = true;
       map_changed_ = true;
-      warnings = warningsOfSilence(*keyframe);
-      std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
-      if (queue_ && keyframes.size() > static_cast<std::size_t>(options_.max_keyframes)) {
-        keyframes.erase(keyframes.begin());
-      }
+      attempt(error, Fault::kMapping, "a warning",
+              [&] { warnings = warningsOfSilence(*keyframe); });
+      forgetOldest();
       const std::lock_guard<std::mutex> published(mutex_);
       live_.failing = false;
       newest_depth_ = keyframe->map.depth;
@@ -259,12 +278,19 @@ std::vector<std::string> Mapper::warningsOfSilence(const KeyframeDepthMap& keyfr
   return warnings;
 }
 
-/// Adds a keyframe to the map so far; nothing if memory ends.
+/// Adds a keyframe to the map so far. If memory runs out, the caller undoes what was added.
 void Mapper::keep(StoredKeyframe keyframe) {
   const StampedPose pose{keyframe.t_ref_ns, keyframe.T_world_ref};
   map_so_far_.trajectory.push_back(pose);
   map_so_far_.tracker_trajectory.push_back(pose);
   map_so_far_.keyframes.push_back(std::move(keyframe));
+}
+
+/// Live operation: the clouds of the newest keyframes are kept.
+void Mapper::forgetOldest() {
+  std::vector<StoredKeyframe>& keyframes = map_so_far_.keyframes;
+  if (!options_.enabled || keyframes.size() <= std::size_t(options_.max_keyframes)) return;
+  keyframes.erase(keyframes.begin());
 }
 
 // --- What callers see --------------------------------------------------------------------------
@@ -287,7 +313,7 @@ std::shared_ptr<MapSnapshot> Mapper::makeSnapshot(bool with_points) {
   return map;
 }
 
-std::shared_ptr<const MapSnapshot> Mapper::mapSoFar(bool with_points) {
+std::shared_ptr<const MapSnapshot> Mapper::newest(bool with_points) {
   if (queue_) {
     const std::lock_guard<std::mutex> lock(mutex_);
     return map_;
@@ -330,10 +356,6 @@ void Mapper::publishState(std::exception_ptr& error) {
     if (!queue_ && !is_new_choice) return;
     status = session_.status();
   }
-  if (queue_) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    status_ = status;
-  }
   if (is_new_choice) {
     callBack(error, "the callback of the log", [&] {
       if (callbacks_.info) callbacks_.info(choiceText(status));
@@ -342,11 +364,17 @@ void Mapper::publishState(std::exception_ptr& error) {
       callbacks_.warn(warning.name + ": " + warning.text);
     });
   }
-  if (!queue_ || !status.refinement) return;
-  const std::uint64_t failures = status.refinement->failures;
-  if (std::exchange(warned_failures_, failures) < failures) {
-    warn("refinement: " + status.refinement->last_error, error);
+  if (!queue_) return;
+  std::string failure;
+  if (status.refinement && status.refinement->failures > warned_failures_) {
+    warned_failures_ = status.refinement->failures;
+    failure = "refinement: " + status.refinement->last_error;
   }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status_ = std::move(status);
+  }
+  if (!failure.empty()) warn(failure, error);
 }
 
 SessionStatus Mapper::status() const {
@@ -410,20 +438,25 @@ bool Mapper::attempt(std::exception_ptr& error, Fault fault, const char* doing, 
   }
 }
 
-/// Calls the host, which may drop its last reference to the mapper.
+/// Calls the host, without a lock that another thread needs.
 template <typename Call>
 void Mapper::callBack(std::exception_ptr& error, const char* name, const Call& call) {
-  if (alone_) return;
-  const auto self = weak_from_this().lock();
+  if (stopped_) return;
+  if (queue_) {
+    attempt(error, Fault::kCallback, name, call);
+    return;
+  }
   const auto thread = std::this_thread::get_id();
-  const auto mark = [&](bool begins) {
-    const std::lock_guard<std::mutex> lock(session_mutex_);
-    begins ? void(delivering_.insert(thread)) : void(delivering_.erase(thread));
-  };
-  if (!queue_) mark(true);
-  attempt(error, Fault::kCallback, name, call);
-  if (!queue_) mark(false);
-  if (queue_ && !alone_ && self.use_count() == 1) stop();
+  bool is_outer = false;
+  attempt(error, Fault::kCallback, name, [&] {
+    {
+      const std::lock_guard<std::mutex> lock(session_mutex_);
+      is_outer = delivering_.insert(thread).second;
+    }
+    call();
+  });
+  const std::lock_guard<std::mutex> lock(session_mutex_);
+  if (is_outer) delivering_.erase(thread);
 }
 
 /// A line in the host's log.

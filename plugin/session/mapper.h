@@ -48,21 +48,21 @@ struct MapSnapshot {
 /// Turns the samples of a recording or of a sensor into keyframes and one map. Thread-safe.
 ///
 /// In playback the caller's thread maps: `add` returns when the windows that became complete are
-/// mapped, so the same samples give the same map, bit for bit. The caller gets the first error,
-/// after the other complete windows are mapped. If a window cannot be mapped (no memory, a sink
-/// that throws), it is tried again by the next call. A query waits while a keyframe is made, but
-/// not while it is delivered.
+/// mapped, so the same samples give the same map, bit for bit. The caller gets the first error. If
+/// a window cannot be mapped (no memory, a sink that throws), the next call tries it again; if its
+/// keyframe cannot be stored, the window is dropped. A query waits while a keyframe is made, but
+/// not while it is delivered. If several threads add samples, keyframes may be delivered at the
+/// same time. Within a callback `add` and `finish` only take the input: the caller of the callback
+/// maps it.
 ///
 /// In live operation (`[live] enabled`) a thread of the mapper maps. `add` never waits, and queries
-/// return the newest published state. If the mapping falls behind until the waiting input is as
-/// large as the queue may be, the oldest windows are dropped. Errors of the mapping, the refinement
-/// and the callbacks are counted and logged (LiveStatus); the window is dropped and the next one is
-/// tried. The snapshot of the map is renewed after each keyframe, as long as this takes at most a
-/// twentieth of the time.
-class Mapper : public std::enable_shared_from_this<Mapper> {
+/// return the newest published state. When more input waits than the queue may hold, the oldest
+/// windows are dropped. Errors of the mapping, the refinement and the callbacks are counted and
+/// logged (LiveStatus); the window is dropped and the next one is tried. The snapshot of the map is
+/// renewed after each keyframe, as long as this takes at most a twentieth of the time.
+class Mapper {
  public:
-  /// All run without a lock, in the thread that maps. They may use the mapper. In live operation
-  /// they may drop the last reference to it.
+  /// All run in the thread that maps, and may use the mapper.
   struct Callbacks {
     std::function<void(const KeyframeDepthMap&)> on_keyframe;
     /// Live operation: receives each new snapshot of the map.
@@ -75,6 +75,9 @@ class Mapper : public std::enable_shared_from_this<Mapper> {
   /// @throws std::runtime_error if a file that the options name cannot be read.
   explicit Mapper(const EventFusionOptions& options, Callbacks callbacks = {},
                   const std::vector<StoredKeyframe>& earlier = {});
+  /// The same, for callbacks that may drop the last reference to the mapper in live operation.
+  static std::shared_ptr<Mapper> make(const EventFusionOptions& options, Callbacks callbacks = {},
+                                      const std::vector<StoredKeyframe>& earlier = {});
   /// Ends without mapping the rest.
   ~Mapper();
   Mapper(const Mapper&) = delete;
@@ -86,31 +89,33 @@ class Mapper : public std::enable_shared_from_this<Mapper> {
   void add(Sample sample);
   /// Counts a packet that is not to be mapped. The windows that need its events are dropped.
   void skip(const EventPacket& packet);
-  /// Maps the rest of the input; in live operation it waits for that.
+  /// Ends the input, and maps the rest; in live operation it waits for that. In playback it may be
+  /// called again after an error.
   /// @throws std::logic_error in live operation within a callback; the error of the rig, if an
   /// option or a camera does not fit.
   void finish();
   /// Ends without mapping the rest: later input is lost. It waits for the current keyframe, and no
-  /// callback comes after that. Within a callback of live operation it does not wait: the mapper's
+  /// callback begins after that. Within a callback of live operation it does not wait: the mapper's
   /// thread ends once the callback returns.
   void stop();
   /// Returns whether this is the mapper's own thread: a callback of live operation.
-  bool runsHere() const { return std::this_thread::get_id() == thread_.get_id(); }
+  bool runsHere() const { return std::this_thread::get_id() == worker_; }
 
-  /// @param sink receives every fused plane; may be null. Not owned. The current keyframe may still
-  /// use the former sink.
+  /// @param sink receives every fused plane; may be null. Not owned, and must not use the mapper.
+  /// The current keyframe may still use the former sink.
   void setSink(DsiSink* sink);
-  /// @param clock measures the stages of the mapping. Default: the processor time of the process.
+  /// @param clock measures the stages of the mapping; must not use the mapper. Default: the
+  /// processor time of the process.
   void setClock(ProcessorClock clock);
 
   /// The pose of the rig on the tracked body, from the options.
   const std::optional<Rigid3>& T_body_rig() const { return setup_->T_body_rig; }
   SessionStatus status() const;
   /// The map so far; in live operation the newest snapshot. Never null.
-  std::shared_ptr<const MapSnapshot> snapshot() { return mapSoFar(true); }
+  std::shared_ptr<const MapSnapshot> snapshot() { return newest(true); }
   MapCloud::ConstPtr points() { return snapshot()->points; }
-  /// The same without the points, which cost an export of the map in playback.
-  std::shared_ptr<const MapSnapshot> keyframes() { return mapSoFar(false); }
+  /// The same. In playback it has no points, because they cost an export of the map.
+  std::shared_ptr<const MapSnapshot> keyframes() { return newest(false); }
   std::size_t numKeyframes() const;
   /// The newest keyframe's depth map, empty before the first one, and its planes.
   std::pair<cv::Mat1f, DepthPlanesOptions> newestDepth() const;
@@ -129,8 +134,9 @@ class Mapper : public std::enable_shared_from_this<Mapper> {
   bool mapNext(std::exception_ptr& error);
   void endRun(std::exception_ptr error);
   void keep(StoredKeyframe keyframe);
+  void forgetOldest();
   std::shared_ptr<MapSnapshot> makeSnapshot(bool with_points);
-  std::shared_ptr<const MapSnapshot> mapSoFar(bool with_points);
+  std::shared_ptr<const MapSnapshot> newest(bool with_points);
   void publishState(std::exception_ptr& error);
   void publishMap(bool at_once, std::exception_ptr& error);
   std::vector<std::string> warningsOfSilence(const KeyframeDepthMap& keyframe);
@@ -147,9 +153,12 @@ class Mapper : public std::enable_shared_from_this<Mapper> {
   const std::shared_ptr<const RigSetup> setup_;
   std::unique_ptr<InputQueue> queue_;  // null in playback: a batch is one sample
   std::atomic<bool> stopped_ = false;
+  std::atomic<std::thread::id> worker_{};  // of live operation
+  std::mutex join_mutex_;                  // of thread_
 
-  mutable std::mutex
-      session_mutex_;  // of the worker and its members; held while a keyframe is made
+  // Of the worker and the members below; held while a keyframe is made, and locked before mutex_.
+  // In live operation the mapper's thread alone locks it.
+  mutable std::mutex session_mutex_;
   MappingSession session_;
   MapSnapshot map_so_far_;  // without points
   std::map<int, std::uint64_t> paused_events_;
@@ -168,7 +177,7 @@ class Mapper : public std::enable_shared_from_this<Mapper> {
   std::uint64_t warned_losses_ = 0;
   std::uint64_t warned_given_up_ = 0;
   std::uint64_t warned_failures_ = 0;
-  std::shared_ptr<Mapper> alone_;  // after `stop` within a callback, whose owner may be gone
+  std::shared_ptr<Mapper> self_;  // of `make`, until the thread ends: its owner may be gone
 
   mutable std::mutex mutex_;  // of the members below; held for copies alone
   std::condition_variable ended_changed_;

@@ -71,7 +71,7 @@ void MappingSession::addEvents(EventPacket packet) {
       status_.refused_events[ready_camera] += complete - mapper_.readEvents();
       if (!rejection) rejection = std::current_exception();
       if (older_ns) guard_.noteOlder(ready_camera, *older_ns);
-      if (!rig_.isComplete()) beginClock();
+      if (!rig_.isComplete()) beginClock();  // `next` does it once the rig is complete
     }
   }
   if (rejection) std::rethrow_exception(rejection);
@@ -109,7 +109,7 @@ void MappingSession::feed(EventPacket packet) {
 void MappingSession::completeRig() {
   if (rig_.isComplete()) return;
   rig_.requireOptionsFit();
-  for (const StampedPose& pose : pose_source_.select()) useWaiting({pose, std::nullopt});
+  useSelected();
   rig_.complete();
 }
 
@@ -158,13 +158,24 @@ void MappingSession::usePose(const NoisyPose& pose) {
   guard_.notePose(pose.pose);
 }
 
-/// In live operation a rejected pose takes no other one with it.
-void MappingSession::useWaiting(const NoisyPose& pose) {
-  try {
-    usePose(pose);
-  } catch (const std::invalid_argument&) {
-    if (!guard_.countRejectedPose()) throw;
+/// A rejected pose takes no other one with it. In playback the first error is thrown at the end.
+void MappingSession::useWaiting(const std::vector<NoisyPose>& poses) {
+  std::exception_ptr error;
+  for (const NoisyPose& pose : poses) {
+    try {
+      usePose(pose);
+    } catch (const std::invalid_argument&) {
+      if (!guard_.countRejectedPose() && !error) error = std::current_exception();
+    }
   }
+  if (error) std::rethrow_exception(error);
+}
+
+/// Selects a source of poses, if there is none yet, and uses its waiting poses.
+void MappingSession::useSelected() {
+  std::vector<NoisyPose> poses;
+  for (const StampedPose& pose : pose_source_.select()) poses.push_back({pose, std::nullopt});
+  useWaiting(poses);
 }
 
 void MappingSession::noteMissing(int camera, const MissingEvents& missing) {
@@ -192,8 +203,8 @@ bool MappingSession::beginSegment() {
   const std::int64_t begin_ns = guard_.afterJumpNs();
   mapper_.giveUpBefore(begin_ns, &WindowsGivenUp::jump);
   fitIntoSegments(begin_ns);
-  for (const NoisyPose& pose : guard_.beginSegment()) useWaiting(pose);
-  finishMapper();
+  useWaiting(guard_.beginSegment());
+  finishMapper();  // `finish` could not do it while poses were held
   return true;
 }
 
@@ -214,12 +225,12 @@ bool MappingSession::beginClock() {
 
 /// Maps on the new clock from now on, with the map so far.
 void MappingSession::restartMapper() {
-  FusionMapper anew(mapperOptions(options_));  // complete before it is used: memory may fail
-  for (const RigCamera& rig_camera : mapper_.rig().cameras) anew.addCamera(rig_camera);
-  if (depth_follower_) anew.setPlanes(depth_follower_->planes());
+  FusionMapper fresh(mapperOptions(options_));  // complete before it is used: memory may fail
+  for (const RigCamera& rig_camera : mapper_.rig().cameras) fresh.addCamera(rig_camera);
+  if (depth_follower_) fresh.setPlanes(depth_follower_->planes());
   mapper_.giveUpAll(&WindowsGivenUp::clock_reset);
   earlier_counts_ += mapper_.counts();
-  mapper_ = std::move(anew);
+  mapper_ = std::move(fresh);
   rig_.beginClock();
   segment_ = {};
   status_.events.reset();
@@ -245,10 +256,16 @@ void MappingSession::finish() {
   for (const auto& [camera, events] : rig_.waitingEvents()) {
     status_.refused_events[camera] += events;
   }
-  for (const StampedPose& pose : pose_source_.select()) useWaiting({pose, std::nullopt});
+  std::exception_ptr error;
+  try {
+    useSelected();
+  } catch (const std::invalid_argument&) {  // the other poses are used
+    error = std::current_exception();
+  }
   finishMapper();
   completeRig();
   rig_.requireNoneWaits();
+  if (error) std::rethrow_exception(error);
 }
 
 // --- What waits ----------------------------------------------------------------------------------
@@ -333,10 +350,12 @@ std::optional<KeyframeDepthMap> MappingSession::next(DsiSink* sink, const Proces
     return std::nullopt;
   }
   StageTimer timer(status_.times, clock);
+  const DepthPlanesOptions used = planes();
   std::optional<KeyframeDepthMap> keyframe = mapper_.next(sink, &timer);
   while (!keyframe && endPiece()) keyframe = mapper_.next(sink, &timer);
   if (!keyframe) limitWaits();
   if (keyframe) {
+    newest_planes_ = used;
     try {
       if (depth_follower_ && depth_follower_->follow(keyframe->map.depth)) {
         mapper_.setPlanes(depth_follower_->planes());
@@ -391,14 +410,13 @@ void MappingSession::insert(KeyframeDepthMap& keyframe, const KeyframeStore& sto
   }
 }
 
-/// Moves keyframes in the cloud to their refined poses; in live operation a few at a time, because
-/// the mapping goes on.
+/// Moves keyframes in the cloud to their refined poses; while a background thread refines, a few at
+/// a time, because the mapping goes on.
 void MappingSession::moveKeyframes(double tolerance_m) {
-  constexpr std::size_t kMaxMovesWhenLive = 16;
+  constexpr std::size_t kMaxMoves = 16;
   cloud_.move(refinement_->takeMoved());
-  const bool live = options_.refinement.background && tolerance_m > 0;
-  cloud_.applyPending(tolerance_m,
-                      live ? kMaxMovesWhenLive : std::numeric_limits<std::size_t>::max());
+  const bool in_background = options_.refinement.background && tolerance_m > 0;
+  cloud_.applyPending(tolerance_m, in_background ? kMaxMoves : RefinedCloud::kAll);
 }
 
 void MappingSession::applyPending() {

@@ -26,10 +26,11 @@ namespace efm {
 /// cloud: puts the rig together as its cameras appear, feeds the mapper and inserts its keyframes.
 /// Not thread-safe. Knows nothing of MRPT.
 ///
-/// In playback, automatic options are chosen from the whole recording, by the code that chooses
-/// them for a program that reads it twice: nothing is mapped before `finish`, and all events are
-/// held. A recording with more events than `[live] max_queue_mb` holds is a stream: the options are
-/// chosen from what is there, and then the depth limits follow the keyframes.
+/// In playback, automatic options are chosen from the whole recording, with the same code as
+/// `event-fusion map`, which reads the recording twice. Nothing is mapped before `finish`, and all
+/// events are kept in memory. If they need more than `[live] max_queue_mb`, the recording is a
+/// stream: the options are chosen from the data so far, and then the depth limits follow the
+/// keyframes.
 ///
 /// Use: add data, and after each call `next` until it returns nothing; at the end `finish`, and
 /// `next` again.
@@ -56,12 +57,12 @@ class MappingSession {
   /// Receives a keyframe at its pose by the tracker, and its points in the cloud: those of its
   /// fused map, or by option of its cameras' maps.
   using KeyframeStore = std::function<void(const KeyframeDepthMap&, const std::vector<ViewPoint>&)>;
-  /// Maps the next window that is covered, if there is one, and inserts it into the cloud. By
-  /// option refines its pose, and moves the keyframes that this moves. Data in the order of time
-  /// may be added in between: they change no window that is covered. Where this throws, the earlier
-  /// keyframes stay as they are. Where a refinement fails, its keyframe is returned with the
-  /// tracker's motion. Without the background thread the call that finds no further window throws
-  /// the error then.
+  /// Maps the next window that is covered, if there is one, and inserts it into the cloud. If an
+  /// option says so, the pose is refined, and the earlier keyframes that the refinement changes are
+  /// moved. Data in the order of time may be added in between: they change no window that is
+  /// covered. After an exception the earlier keyframes are unchanged. If the refinement fails, the
+  /// keyframe keeps the tracker's motion; without a background thread, the call that finds no
+  /// further window throws that error.
   /// @param sink receives every fused plane; may be null.
   /// @param clock the processor time of the threads that map.
   /// @param store called before the keyframe is inserted. If it throws, the keyframe is not
@@ -82,8 +83,8 @@ class MappingSession {
   /// @throws std::invalid_argument if a given window is so large: the first time, and if it is much
   /// larger than when this was last reported.
   void limitHeld(double max_events);
-  /// After `next` has thrown: gives up the window that it was mapping.
-  /// @return whether it goes on to another window. Otherwise it was none that failed.
+  /// After `next` has thrown: drops the window that it was mapping.
+  /// @return true if a window was dropped; false if the error did not belong to a window.
   bool giveUpFailed();
 
   /// Moves all keyframes in the cloud to their refined poses.
@@ -93,12 +94,13 @@ class MappingSession {
   /// The poses of this session's keyframes, in their order: in the cloud, and by the tracker.
   const std::vector<Rigid3>& T_world_ref() const { return cloud_.T_world_ref(); }
   const std::vector<Rigid3>& T_odom_ref() const { return T_odom_ref_; }
-  /// The depth planes of the next keyframe, and how often options were chosen.
+  /// The depth planes of the newest keyframe (of the first one if there is none), and how often
+  /// options were chosen.
   struct Chosen {
     DepthPlanesOptions planes;
     std::uint64_t choices = 0;
   };
-  Chosen chosen() const { return {planes(), status_.choices}; }
+  Chosen chosen() const { return {newest_planes_.value_or(planes()), status_.choices}; }
   SessionStatus status() const;
 
  private:
@@ -110,7 +112,8 @@ class MappingSession {
   void feed(EventPacket packet);
   void completeRig();
   void usePose(const NoisyPose& pose);
-  void useWaiting(const NoisyPose& pose);
+  void useWaiting(const std::vector<NoisyPose>& poses);
+  void useSelected();
   void finishMapper();
   std::optional<PoseNoise> noiseAt(std::int64_t t_ns);
   void limitWaits();
@@ -154,6 +157,7 @@ class MappingSession {
   std::unique_ptr<FirstLook> first_look_;  // in playback, until options are chosen
   bool first_look_ends_ = false;
   std::optional<DepthFollower> depth_follower_;  // where depth limits are automatic
+  std::optional<DepthPlanesOptions> newest_planes_;
   std::optional<std::int64_t> no_scene_since_ns_;
   std::size_t events_without_scene_ = 0;
   std::int64_t look_again_ns_ = kMinTimeNs;  // not before

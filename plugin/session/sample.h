@@ -30,6 +30,8 @@ struct EventPacket {
   /// EventPackets has checked the events: they lie inside the sensor, in the order of time.
   bool checked = false;
   std::string label = {};  ///< The sensor's name; empty: not known.
+  /// Set instead of events that the host leaves out: until this time of the camera's clock.
+  std::optional<std::int64_t> skipped_until_ns = std::nullopt;
   /// The camera's first packet in the rawlog (a CObservationEvents); null for other formats.
   std::shared_ptr<const void> original = nullptr;
 };

@@ -83,7 +83,7 @@ TEST(RefinedBuilder, AllQueriesAgreeAtAnyTimeAndChangeNothing) {
     if (i % 23 == 7) expectQueriesToAgree(builder, i % 2 == 0);
   }
   builder.finish();
-  EXPECT_THROW(builder.finish(), std::logic_error) << "it changes nothing";
+  builder.finish();  // it changes nothing
   expectQueriesToAgree(builder, true);
   EXPECT_GE(taken, 10U);
   EXPECT_EQ(builder.trajectory().size(), taken);

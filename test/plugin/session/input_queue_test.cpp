@@ -118,6 +118,7 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
     int camera;
     std::size_t events;
     std::int64_t t_ns;
+    bool skipped = false;
   };
   std::deque<Waiting> waiting;
   std::map<int, std::int64_t> missing_ns;
@@ -133,7 +134,8 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
     return sizeof(EventPacket) + one.events * sizeof(Event);
   };
   const auto miss = [&](const Waiting& one) {
-    if (one.events > 0) missing_ns[one.camera] = std::max(missing_ns[one.camera], one.t_ns + 1);
+    if (one.events == 0 && !one.skipped) return;
+    missing_ns[one.camera] = std::max(missing_ns[one.camera], one.t_ns + 1);
   };
   enum { kTake = 8, kPause };
   const auto steps = *rc::gen::container<std::vector<std::tuple<int, int, int>>>(rc::gen::tuple(
@@ -143,15 +145,17 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
     const Waiting one{camera, static_cast<std::size_t>(events), kind == 0 ? t_ns - 5 : ++t_ns};
     QueueCounts& counts = expected[camera];
     counts.received += kind == kTake ? 0 : one.events;
-    if (kind == kPause) {
-      queue.skip(packet(camera, one.t_ns, one.events));
-      counts.paused += one.events;
-      miss(one);
-    } else if (kind != kTake) {
-      queue.add(packet(camera, one.t_ns, one.events));
-      queue.add(PoseSample{{}, t_ns, {}, {}});
-      ++poses;
-      waiting.push_back(one);
+    if (kind != kTake) {
+      if (kind == kPause) {
+        queue.skip(packet(camera, one.t_ns, one.events));
+        counts.paused += one.events;
+        if (one.events > 0) waiting.push_back({one.camera, 0, one.t_ns, true});
+      } else {
+        queue.add(packet(camera, one.t_ns, one.events));
+        queue.add(PoseSample{{}, t_ns, {}, {}});
+        ++poses;
+        waiting.push_back(one);
+      }
       while (sum(events_of) > static_cast<std::uint64_t>(options.max_queue_events) ||
              static_cast<double>(sum(bytes_of)) > options.max_queue_mb * 1e6) {
         expected[waiting.front().camera].dropped += waiting.front().events;
@@ -165,6 +169,8 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
       for (std::size_t i = 0; i < waiting.size(); ++i) {
         RC_ASSERT(batch.packets[i].camera == waiting[i].camera);
         RC_ASSERT(batch.packets[i].events.size() == waiting[i].events);
+        RC_ASSERT(batch.packets[i].skipped_until_ns ==
+                  (waiting[i].skipped ? std::optional(waiting[i].t_ns + 1) : std::nullopt));
         expected[waiting[i].camera].taken += waiting[i].events;
       }
       RC_ASSERT(batch.missing.size() == missing_ns.size());

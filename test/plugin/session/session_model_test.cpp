@@ -629,6 +629,12 @@ class Run {
       model_.noteMissing(camera, missing);
     }
     for (const EventPacket& packet : batch.packets) {
+      if (packet.skipped_until_ns) {
+        const MissingEvents missing{*packet.skipped_until_ns, &WindowsGivenUp::paused};
+        session_.noteMissing(packet.camera, missing);
+        model_.noteMissing(packet.camera, missing);
+        continue;
+      }
       taken_[std::size_t(packet.camera)] += packet.events.size();
       EventPacket copy = packet;
       add([&] { session_.addEvents(std::move(copy)); });
