@@ -277,6 +277,7 @@ void MapCommand::begin() {
   options.mapper.keyframe.sequence_maximum = sequenceMaximum();
   const bool changes = source().faults.perturbation.keyframe.any();  // by the chosen stride
   if (!recording || changes) recording = openRecording(source());
+  interruption.check();
   output.emplace(folder, kind, options.mapper.keyframe.planes,
                  arguments.plain_pictures ? PictureStyle::kPlain : PictureStyle::kFigure,
                  namesOf(first));
