@@ -1,46 +1,187 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/mrpt/CEventFusionMapBuilder.h"
+
 #include <gmock/gmock.h>
 #include <mrpt/config/CConfigFile.h>
 #include <mrpt/config/CConfigFileMemory.h>
 #include <mrpt/maps/CPointsMapXYZI.h>
 #include <mrpt/maps/CSimpleMap.h>
 #include <mrpt/obs/CObservationComment.h>
-#include <mrpt/obs/CObservationRobotPose.h>
 #include <mrpt/obs/CSensoryFrame.h>
+#include <mrpt/poses/CPose3DPDFGaussian.h>
 
+#include <Eigen/Eigenvalues>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <future>
-#include <map>
 #include <sstream>
-#include <string>
 #include <thread>
 
-#include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/host_options.h"
 #include "test/plugin/mrpt/observations.h"
-#include "test/plugin/session/synthetic_recording.h"
 #include "test/plugin/temporary_folder.h"
 
 namespace efm {
 namespace {
 
+using mrpt::config::CConfigFileMemory;
 using mrpt::obs::CObservation;
+using mrpt::obs::CObservationPointCloud;
+using testing::HasSubstr;
 
-MapCloud::ConstPtr mapOf(const std::vector<CObservation::Ptr>& observations,
-                         const EventFusionOptions& options = syntheticOptions()) {
-  CEventFusionMapBuilder builder(options);
-  play(builder, observations);
-  return builder.points();
+void feed(CEventFusionMapBuilder& builder, const std::vector<CObservation::Ptr>& observations) {
+  for (const auto& observation : observations) builder.processObservation(observation);
+}
+
+void play(CEventFusionMapBuilder& builder, const std::vector<CObservation::Ptr>& observations) {
+  feed(builder, observations);
+  builder.finish();
+}
+
+MapSnapshot snapshotOf(const CEventFusionMapBuilder& builder) {
+  return {builder.trajectory(), builder.trackerTrajectory(), {}, builder.points()};
+}
+
+mrpt::poses::CPose3DPDFGaussian estimateOf(const CEventFusionMapBuilder& builder) {
+  return dynamic_cast<const mrpt::poses::CPose3DPDFGaussian&>(*builder.getCurrentPoseEstimation());
+}
+
+/// The poses are random, and their noise alternates between keyframes.
+Samples noisySamples() {
+  Samples samples = samplesOf(shaken(SyntheticRecording(1.3)));
+  for (Sample& sample : samples) {
+    auto* const pose = std::get_if<PoseSample>(&sample);
+    if (pose == nullptr) continue;
+    const bool is_certain = (pose->t_ns - SyntheticRecording::kStartNs) / kShakenWindowNs % 2 == 0;
+    pose->noise = is_certain ? PoseNoise{0x1p-13, 0x1p-16} : PoseNoise{0x1p-4, 0x1p-6};
+  }
+  return samples;
+}
+
+/// MRPT's maps hold the builder's map.
+void expectGettersAgree(CEventFusionMapBuilder& builder) {
+  const MapCloud::ConstPtr points = builder.points();
+  const std::vector<StampedPose> trajectory = builder.trajectory();
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), trajectory.size());
+  mrpt::maps::CSimpleMap simple;
+  builder.getCurrentlyBuiltMap(simple);
+  ASSERT_EQ(simple.size(), trajectory.size());
+  GlobalCloud cloud(builder.usedOptions().cloud);
+  std::size_t number = 0;
+  for (const StoredKeyframe& keyframe : keyframesOf(simple)) {
+    const Rigid3& T_world_ref = trajectory[number].T_world_rig;
+    EXPECT_LT(std::abs(keyframe.t_ref_ns - trajectory[number].t_ns), kTickNs);
+    EXPECT_EQ(keyframe.T_world_ref.translation, T_world_ref.translation);
+    EXPECT_LT(keyframe.T_world_ref.rotation.angularDistance(T_world_ref.rotation), 1e-14);
+    // The simplemap's angles may round: the cloud is compared at the exact pose.
+    cloud.insert(number++, pointsInWorld(*keyframe.points, T_world_ref), T_world_ref);
+  }
+  auto expected = pcl::make_shared<MapCloud>(*points);  // a simplemap has no place for sigma
+  for (MapPoint& point : *expected) point.sigma = MapPoint().sigma;
+  expectSameBits(cloud.points(), expected);
+
+  const auto* const metric = builder.getCurrentlyBuiltMetricMap();
+  const auto event_map = metric->mapByClass<CEventFusionMap>();
+  EXPECT_EQ(event_map == nullptr, builder.usedOptions().live.enabled);
+  if (event_map) expectSameBits(event_map->cloud().points(), points);
+  const auto map = metric->mapByClass<mrpt::maps::CPointsMapXYZI>();
+  ASSERT_TRUE(map);
+  ASSERT_EQ(map->size(), points->size());
+  for (std::size_t i = 0; i < points->size(); i += 7) {
+    mrpt::math::TPoint3Df point;
+    map->getPoint(i, point.x, point.y, point.z);
+    EXPECT_EQ(point.z, points->at(i).z);
+    EXPECT_EQ(map->getPointIntensity(i), points->at(i).intensity);
+  }
+}
+
+class BuilderInEitherMode : public testing::TestWithParam<bool> {
+ protected:
+  static EventFusionOptions in(EventFusionOptions options = syntheticOptions()) {
+    options.live.enabled = GetParam();
+    return options;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Live, BuilderInEitherMode, testing::Bool());
+
+TEST_P(BuilderInEitherMode, GivesTheMapOfTheMapperWhileAThreadAsks) {
+  Samples samples = noisySamples();
+  const auto observations = observationsOf(samples);
+  for (std::size_t i = 0; i < samples.size(); ++i) {  // MRPT's classes round the poses
+    if (const auto pose = poseIn(*observations[i])) samples[i] = *pose;
+  }
+  for (const bool is_refined : {false, true}) {
+    EventFusionOptions options = in(refinedOptions());
+    options.refinement.enabled = is_refined;
+    options.refinement.refiner.adapt_tracker = false;
+    CEventFusionMapBuilder builder(options);
+    play(builder, observations);
+    mrpt::maps::CSimpleMap initial;
+    builder.getCurrentlyBuiltMap(initial);
+    Mapper mapper(options, {}, keyframesOf(initial));
+    play(mapper, samples);
+
+    builder.initialize(initial);
+    for (const auto& [pose, frame] : initial) {  // the builder has copies
+      frame->getObservationByClass<CObservationPointCloud>()->pointcloud->clear();
+    }
+    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 12U);
+    std::atomic<bool> done = false;
+    std::thread querier([&] {
+      while (!done) {
+        mrpt::maps::CSimpleMap simple;
+        builder.getCurrentlyBuiltMap(simple);
+        EXPECT_EQ(keyframesOf(simple).size(), simple.size());
+        builder.getCurrentlyBuiltMetricMap();
+        estimateOf(builder);
+      }
+    });
+    play(builder, observations);
+    done = true;
+    querier.join();
+    expectSameMap(snapshotOf(builder), *mapper.snapshot());
+    EXPECT_EQ(builder.trajectory().size(), 24U);
+    expectGettersAgree(builder);
+    if (is_refined) continue;
+    const PoseSample& newest = std::get<PoseSample>(samples.back());
+    const Rigid3 T_world_rig = rigidFrom(estimateOf(builder).mean);
+    EXPECT_LT((T_world_rig.translation - newest.T_world_body.translation).norm(), 1e-12);
+    EXPECT_LT(T_world_rig.rotation.angularDistance(newest.T_world_body.rotation), 1e-12);
+    for (int i = 0; i < 6; ++i) {
+      EXPECT_EQ(estimateOf(builder).cov(i, i),
+                std::pow(i < 3 ? newest.noise->noise_m : newest.noise->noise_rad, 2));
+    }
+  }
+}
+
+TEST(CEventFusionMapBuilder, RefinedKeyframesMoveInMrptsMapsAndCorrectThePose) {
+  const Samples samples = noisySamples();
+  CEventFusionMapBuilder builder(refinedOptions());
+  EXPECT_TRUE(isSame(rigidFrom(estimateOf(builder).mean), Rigid3{}));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    feed(builder, observationsOf({samples[i]}));
+    if (i % 23 == 7) expectGettersAgree(builder);
+    const auto* const pose = std::get_if<PoseSample>(&samples[i]);
+    if (pose == nullptr) continue;
+    const Rigid3 T_world_rig =
+        builder.status().refinement.value().T_world_odom * pose->T_world_body;
+    const auto estimate = estimateOf(builder);
+    EXPECT_LT((rigidFrom(estimate.mean).translation - T_world_rig.translation).norm(), 1e-9);
+    EXPECT_LT(rigidFrom(estimate.mean).rotation.angularDistance(T_world_rig.rotation), 1e-9);
+    if (builder.trajectory().size() < 2) continue;
+    const Matrix6d covariance = estimate.cov.asEigen();
+    EXPECT_LT((covariance - covariance.transpose()).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(covariance).eigenvalues()(0), 0);
+    EXPECT_LT(covariance.diagonal().maxCoeff(), 0.01);
+  }
+  EXPECT_GT(builder.status().refinement->T_world_odom.translation.norm(), 1e-4);
 }
 
 TEST(CEventFusionMapBuilder, ThePoseOfTheSensorOnTheRigIsRemoved) {
-  // A tracker half a metre above the rig, turned by 90 degrees: the same map.
-  const SyntheticRecording recording;
-  auto observations = observationsOf(recording);
+  const Samples samples = samplesOf(SyntheticRecording());
+  const auto observations = observationsOf(samples);
   const mrpt::poses::CPose3D sensor_on_rig(0.1, -0.5, 0.2, 1.5, 0, 0);
   for (const auto& observation : observations) {
     auto pose = std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(observation);
@@ -48,244 +189,171 @@ TEST(CEventFusionMapBuilder, ThePoseOfTheSensorOnTheRigIsRemoved) {
     pose->sensorPose = sensor_on_rig;
     pose->pose.mean = pose->pose.mean + sensor_on_rig;
   }
-
-  const auto expected = mapOf(observationsOf(recording));
-  const auto points = mapOf(observations);
-
-  expectNear(points, expected, 1e-6);
-}
-
-TEST(CEventFusionMapBuilder, ReturnsMrptsMaps) {
   CEventFusionMapBuilder builder(syntheticOptions());
-  const SyntheticRecording recording;
-  play(builder, observationsOf(recording));
-
-  const auto* metric = builder.getCurrentlyBuiltMetricMap();
-  const auto event_map = metric->mapByClass<CEventFusionMap>();
-  ASSERT_TRUE(event_map);
-  expectSameBits(event_map->cloud().points(), builder.points());
-  const auto map = metric->mapByClass<mrpt::maps::CPointsMapXYZI>();
-  ASSERT_TRUE(map);
-  const auto points = builder.points();
-  ASSERT_EQ(map->size(), points->size());
-  float x = 0;
-  float y = 0;
-  float z = 0;
-  map->getPoint(3, x, y, z);
-  EXPECT_EQ(z, points->at(3).z);
-  EXPECT_EQ(map->getPointIntensity(3), points->at(3).intensity);
-
-  mrpt::maps::CSimpleMap simple;
-  builder.getCurrentlyBuiltMap(simple);
-  EXPECT_EQ(simple.size(), builder.getCurrentlyBuiltMapSize());
-
-  mrpt::poses::CPose3D pose;
-  builder.getCurrentPoseEstimation()->getMean(pose);
-  EXPECT_NEAR(pose.x(), recording.poses.back().T_world_rig.translation.x(), 1e-12);
+  play(builder, observations);
+  expectNear(builder.points(), mapOf(syntheticOptions(), samples)->points, 1e-6);
 }
 
-TEST(CEventFusionMapBuilder, RefusesWhatItCannotUse) {
+TEST(CEventFusionMapBuilder, RejectsWhatItCannotUseAndDoesNotStartOver) {
   CEventFusionMapBuilder builder(syntheticOptions());
   EXPECT_THROW(builder.processObservation(nullptr), std::invalid_argument);
   EXPECT_EQ(builder.ignoredObservations(), 0U);
   builder.processObservation(mrpt::obs::CObservationComment::Create());
-  EXPECT_EQ(builder.ignoredObservations(), 1U);
+  EXPECT_THROW(builder.saveCurrentEstimationToImage("never.png"), std::logic_error)
+      << "before the first keyframe";
   EventFusionOptions wrong = syntheticOptions();
   wrong.live.max_queue_mb = 0;
   EXPECT_THROW(builder.setOptions(wrong), std::invalid_argument);
-  EXPECT_EQ(builder.ignoredObservations(), 1U) << "it does not start over";
-  const auto* metric = builder.getCurrentlyBuiltMetricMap();
-  ASSERT_EQ(metric->maps.size(), 2U);
-  EXPECT_TRUE(metric->isEmpty());
-}
+  EXPECT_EQ(builder.getCurrentlyBuiltMetricMap()->maps.size(), 2U);
+  EXPECT_TRUE(builder.getCurrentlyBuiltMetricMap()->isEmpty());
 
-TEST(CEventFusionMapBuilder, StartsOver) {
-  const auto observations = observationsOf(SyntheticRecording());
-  CEventFusionMapBuilder builder(syntheticOptions());
-  builder.processObservation(mrpt::obs::CObservationComment::Create());
-  play(builder, observations);
-  const auto first = builder.points();
-  EXPECT_THROW(builder.processObservation(observations[0]), std::logic_error) << "after its end";
-
-  builder.initialize();
-  EXPECT_TRUE(builder.points()->empty());
-  EXPECT_EQ(builder.ignoredObservations(), 0U);
-  EXPECT_EQ(builder.getCurrentPoseEstimation()->getMeanVal().x(), 0);
-  play(builder, observations);
-
-  expectSameBits(builder.points(), first);
-}
-
-// --- Failures of mapping -----------------------------------------------------------------------
-
-/// Takes the planes of a number of keyframes, then fails.
-class FullDisk : public DsiSink {
- public:
-  explicit FullDisk(int keyframes)
-      : planes_(keyframes * syntheticOptions().mapper.keyframe.planes.num_planes) {}
-  void addPlane(int /*plane*/, const float* /*values*/) override {
-    if (planes_-- <= 0) throw std::runtime_error("the disk is full");
-  }
-
- private:
-  std::atomic<int> planes_;
-};
-
-TEST(CEventFusionMapBuilder, KeyframesBeforeAFailureStayAndAreDelivered) {
-  FullDisk disk(2);
-  CEventFusionMapBuilder builder(syntheticOptions());
-  builder.setDsiSink(&disk);
-  std::size_t delivered = 0;
-  builder.setKeyframeCallback([&](const KeyframeDepthMap&) { ++delivered; });
-  feed(builder, observationsOf(SyntheticRecording()));
-
-  EXPECT_THROW(builder.finish(), std::runtime_error);
-
-  EXPECT_EQ(delivered, 2U);
-  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U) << "a query after the error";
-  EXPECT_EQ(builder.status().counts.keyframes, 2U);
-  const auto event_map = builder.getCurrentlyBuiltMetricMap()->mapByClass<CEventFusionMap>();
-  expectSameBits(event_map->cloud().points(), builder.points());
-  EXPECT_EQ(delivered, 2U);
-}
-
-TEST(CEventFusionMapBuilder, OfARefusalAndAFailureTheRefusalIsThrown) {
-  const SyntheticRecording recording(1.2);
-  FullDisk disk(0);
-  CEventFusionMapBuilder builder(syntheticOptions());
-  builder.setDsiSink(&disk);
-  std::size_t failures = 0;
-  for (const auto& observation : observationsOf(recording)) {
-    try {
-      builder.processObservation(observation);
-    } catch (const std::runtime_error&) {
-      ++failures;
-    }
-  }
-  EXPECT_GT(failures, 0U);
-  auto outside = packetObservation(recording, 0);
-  const std::int64_t t_ns = recording.poses.back().t_ns + 1;
-  outside->timestamp = mrptTimeFrom(t_ns);
-  outside->events = {{t_ns, 120, 0, true}};
-  EXPECT_THROW(builder.processObservation(outside), std::invalid_argument);
-
-  builder.setDsiSink(nullptr);
-  builder.finish();
-  expectSameBits(builder.points(), mapOf(observationsOf(recording)));
-}
-
-TEST(CEventFusionMapBuilder, EachKeyframeIsDeliveredBeforeTheNextIsMade) {
-  // Poses come last: all keyframes become due at once.
-  std::vector<CObservation::Ptr> poses;
-  CEventFusionMapBuilder builder(syntheticOptions());
-  std::size_t delivered = 0;
-  std::int64_t newest_ns = 0;
-  builder.setKeyframeCallback([&](const KeyframeDepthMap& keyframe) {
-    ++delivered;
-    EXPECT_GT(keyframe.window.t_ref_ns, newest_ns);
-    newest_ns = keyframe.window.t_ref_ns;
-    EXPECT_EQ(builder.status().counts.keyframes, delivered);
-    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), delivered) << "the map up to this keyframe";
-    throw std::runtime_error("no room " + std::to_string(delivered));
-  });
-  const auto observations = observationsOf(SyntheticRecording());
-  for (const auto& observation : observations) {
-    if (IS_CLASS(*observation, mrpt::obs::CObservationRobotPose)) {
-      poses.push_back(observation);
-    } else {
-      builder.processObservation(observation);
-    }
-  }
-  feed(builder, poses);
-  EXPECT_EQ(delivered, 0U);
-  EXPECT_EQ(messageOf([&] { builder.finish(); }), "no room 1") << "the first error, at the end";
-  EXPECT_EQ(delivered, 3U);
-  expectSameBits(builder.points(), mapOf(observations));
-}
-
-// --- Threads -----------------------------------------------------------------------------------
-
-TEST(CEventFusionMapBuilder, ACallbackOfTheLogMayQueryTheBuilder) {
-  SyntheticRecording recording;
-  recording.events[1].resize(1);
-  CEventFusionMapBuilder builder(syntheticOptions());
-  builder.logging_enable_console_output = false;
-  std::size_t warnings = 0;
-  builder.logRegisterCallback([&](std::string_view message, auto&&...) {
-    ++warnings;
-    EXPECT_THAT(std::string(message), testing::HasSubstr("camera 1 had no event"));
-    // The first keyframe saw the one event. Another thread may ask, too, while this one waits.
-    EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 2U);
-    const auto ask = [&] { return builder.status().counts.keyframes; };
-    EXPECT_EQ(std::async(std::launch::async, ask).get(), 2U);
-  });
-  play(builder, observationsOf(recording));
-  EXPECT_EQ(warnings, 1U);
-}
-
-/// Asks the builder from other threads while the sweep runs, which holds the lock.
-class QueryingSink : public DsiSink {
- public:
-  using Queries = std::map<std::string, std::function<void()>>;
-  explicit QueryingSink(Queries questions) : queries_(std::move(questions)) {}
-
-  void addPlane(int /*plane*/, const float* /*values*/) override {
-    if (asked_.exchange(true)) return;
-    std::map<std::string, std::future<void>> answers;
-    for (const auto& [name, ask] : queries_) {
-      answers[name] = std::async(std::launch::async, ask);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(150));
-    for (auto& [name, answer] : answers) {
-      if (answer.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-        answered_in_between.push_back(name);
-      }
-    }
-    answers_ = std::move(answers);  // wait for the end of the sweep
-  }
-
-  std::vector<std::string> answered_in_between;
-
- private:
-  Queries queries_;
-  std::atomic<bool> asked_ = false;
-  std::map<std::string, std::future<void>> answers_;
-};
-
-TEST(CEventFusionMapBuilder, NoQueryIsAnsweredWhileAKeyframeIsMade) {
-  CEventFusionMapBuilder builder(syntheticOptions());
-  QueryingSink sink({{"status", [&] { builder.status(); }},
-                     {"points", [&] { builder.points(); }},
-                     {"trajectory", [&] { builder.trajectory(); }},
-                     {"trackerTrajectory", [&] { builder.trackerTrajectory(); }},
-                     {"getCurrentPoseEstimation", [&] { builder.getCurrentPoseEstimation(); }},
-                     {"getCurrentlyBuiltMapSize", [&] { builder.getCurrentlyBuiltMapSize(); }}});
-  builder.setDsiSink(&sink);
-  play(builder, observationsOf(SyntheticRecording()));
-  EXPECT_THAT(sink.answered_in_between, testing::IsEmpty()) << "without the lock";
-}
-
-// --- Keyframes and their clouds ----------------------------------------------------------------
-
-TEST(CEventFusionMapBuilder, AFrameWithoutAKeyframeIsAnError) {
-  CEventFusionMapBuilder builder(syntheticOptions());
   play(builder, observationsOf(SyntheticRecording()));
   mrpt::maps::CSimpleMap map;
   builder.getCurrentlyBuiltMap(map);
   const auto [pose, frame] = map.get(1);
   EXPECT_EQ(frame->getObservationByIndex(0)->sensorLabel, "keyframe");
   map.insert(mrpt::poses::CPose3DPDFGaussian::Create(), mrpt::obs::CSensoryFrame::Create());
-  EXPECT_THAT(messageOf([&] { builder.initialize(map); }),
-              testing::HasSubstr("frame 3 of the simplemap"));
+  EXPECT_THAT(messageOf([&] { builder.initialize(map); }), HasSubstr("frame 3 of the simplemap"));
+  EXPECT_EQ(builder.ignoredObservations(), 1U);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
 }
 
-TEST(CEventFusionMapBuilder, ThereIsNoPictureBeforeTheFirstKeyframe) {
-  CEventFusionMapBuilder builder(syntheticOptions());
-  EXPECT_THROW(builder.saveCurrentEstimationToImage("never.png"), std::logic_error);
+// --- Start over --------------------------------------------------------------------------------
+
+TEST_P(BuilderInEitherMode, StartsOverAtAnyTimeWithTheSameCallbacksAndSink) {
+  struct CountingSink : DsiSink {
+    std::atomic<int> planes{0};
+    void addPlane(int /*plane*/, const float* /*values*/) override { ++planes; }
+  } sink;
+  const Samples samples = samplesOf(SyntheticRecording(1.3));
+  const auto observations = observationsOf(samples);
+  CEventFusionMapBuilder builder(in(refinedOptions()));  // keyframes wait for the refinement
+  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+  builder.setDsiSink(&sink);
+  std::atomic<int> keyframes{0};
+  std::atomic<int> maps{0};
+  builder.setMapCallback([&](const auto&) { ++maps; });
+  builder.setKeyframeCallback([&](const KeyframeDepthMap&) {
+    ++keyframes;
+    if (!GetParam()) return;
+    EXPECT_THROW(builder.initialize(), std::logic_error) << "its own thread";
+  });
+  builder.processObservation(mrpt::obs::CObservationComment::Create());
+  feed(builder, observations);
+  while (keyframes == 0) std::this_thread::yield();
+  auto finished = std::async(std::launch::async, [&] { builder.finish(); });
+  builder.initialize();
+  ASSERT_EQ(finished.wait_for(std::chrono::seconds(60)), std::future_status::ready);
+  EXPECT_EQ(builder.ignoredObservations(), 0U);
+  builder.initialize();  // the other thread may have finished the new map
+  feed(builder, observations);
+  builder.setOptions(in());
+  EXPECT_TRUE(builder.points()->empty());
+  EXPECT_EQ(estimateOf(builder).mean.x(), 0);
+  EXPECT_EQ(builder.status().counts.keyframes, 0U);
+
+  keyframes = maps = sink.planes = 0;
+  play(builder, observations);
+  EXPECT_EQ(keyframes, 11);
+  EXPECT_EQ(sink.planes, 11 * 30);
+  EXPECT_EQ(maps > 0, GetParam());
+  expectSameMap(snapshotOf(builder), *mapOf(syntheticOptions(), samples));
 }
 
-using mrpt::config::CConfigFileMemory;
-using testing::HasSubstr;
+TEST(CEventFusionMapBuilder, AHostMayDropItsLastReferenceInACallback) {
+  auto builder = std::make_shared<CEventFusionMapBuilder>(live());
+  std::promise<void> fed;
+  std::promise<void> dropped;
+  builder->setKeyframeCallback([&](const KeyframeDepthMap&) {
+    fed.get_future().wait();
+    builder.reset();
+    dropped.set_value();
+  });
+  auto is_dropped = dropped.get_future();
+  for (const auto& observation : observationsOf(announced(SyntheticRecording()))) {
+    builder->processObservation(observation);
+  }
+  EXPECT_NEAR(estimateOf(*builder).mean.x(), 0.4, 1e-9) << "the pose does not wait";
+  fed.set_value();
+  is_dropped.wait();
+  EXPECT_EQ(builder, nullptr);
+}
+
+// --- Hosts that know MRPT alone ----------------------------------------------------------------
+
+TEST_P(BuilderInEitherMode, WhileUpdatingIsDisabledPacketsAreSkippedAndThePoseGoesOn) {
+  const SyntheticRecording recording(0.4);
+  CEventFusionMapBuilder builder(in());
+  builder.enableMapUpdating(false);
+  play(builder, observationsOf(recording));
+  const SessionStatus status = builder.status();
+  std::uint64_t paused = 0;
+  for (const auto& [camera, count] : status.paused_events) paused += count;
+  if (GetParam()) paused = status.live->cameras.at(0).paused + status.live->cameras.at(1).paused;
+  EXPECT_GT(paused, 100U);
+  EXPECT_EQ(status.counts.total().read, 0U);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 0U);
+  EXPECT_NEAR(estimateOf(builder).mean.x(), 0.8 * 0.4, 1e-9);
+}
+
+TEST_P(BuilderInEitherMode, ACommentEndsTheRecording) {
+  CEventFusionMapBuilder builder(in());
+  feed(builder, observationsOf(SyntheticRecording(0.215)));  // its window ends with the recording
+  auto comment = mrpt::obs::CObservationComment::Create();
+  comment->text = "event_fusion: finish";
+  builder.processObservation(comment);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 1U);
+  EXPECT_EQ(builder.ignoredObservations(), 0U);
+}
+
+TEST_P(BuilderInEitherMode, ABadObservationInAFrameTakesNoOtherWithIt) {
+  const SyntheticRecording recording;
+  CEventFusionMapBuilder builder(in());
+  builder.setVerbosityLevel(mrpt::system::LVL_ERROR);
+  mrpt::obs::CActionCollection action;
+  int errors = 0;
+  for (const auto& observation : observationsOf(recording)) {
+    const std::int64_t t_ns = nanosecondsFrom(observation->timestamp);
+    mrpt::obs::CSensoryFrame frame;
+    frame.insert(observationOf(EventPacket{0, recording.cameras[0], {{t_ns, 120, 0, true}}, t_ns}));
+    frame.insert(observation);
+    try {
+      builder.processActionObservation(action, frame);
+    } catch (const std::invalid_argument&) {
+      ++errors;
+    }
+  }
+  builder.finish();
+  EXPECT_GT(errors, 100);
+  EXPECT_EQ(builder.getCurrentlyBuiltMapSize(), 3U);
+}
+
+TEST_P(BuilderInEitherMode, LogsChoicesOfOptionsAndOnceRoundedPoints) {
+  for (const bool rests : {false, true}) {  // by its poses: one camera alone sees no scene then
+    SyntheticRecording recording(1.5, rests ? 1 : 2);
+    for (StampedPose& pose : recording.poses) {
+      pose.T_world_rig.translation.x() = 5e6 + (rests ? 0 : pose.T_world_rig.translation.x());
+    }
+    EventFusionOptions options = in();
+    options.automatic = defaultOptions().automatic;
+    CEventFusionMapBuilder builder(options);
+    builder.logging_enable_console_output = false;
+    MapperLog log;
+    builder.logRegisterCallback(
+        [&](std::string_view text, auto&&...) { log.lines.emplace_back(text); });
+    play(builder, observationsOf(recording));
+    for (int i = 0; i < 2; ++i) builder.getCurrentlyBuiltMetricMap();
+    const std::uint64_t choices = builder.status().choices;
+    EXPECT_GE(choices, 1U);
+    EXPECT_EQ(log.count("options chosen from the data: "), choices);
+    EXPECT_EQ(log.count("no-scene: "), rests ? choices : 0U);
+    if (rests) continue;
+    EXPECT_FALSE(builder.points()->empty());
+    EXPECT_EQ(log.count("MRPT's maps have float points"), 1U);
+  }
+}
+
+// --- Options -----------------------------------------------------------------------------------
 
 EventFusionOptions optionsOf(const std::string& text, const std::string& prefix) {
   OptionReader reader;
@@ -398,5 +466,4 @@ TEST(HostOptions, ABuilderDumpsAllOptions) {
 }
 
 }  // namespace
-
 }  // namespace efm

@@ -4,65 +4,59 @@
 #include <gtest/gtest.h>
 #include <mrpt/obs/CObservationRobotPose.h>
 
-#include <cstddef>
-#include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/CObservationEvents.h"
 #include "plugin/mrpt/pose_observation.h"
-#include "test/maps/cloud/cloud_points.h"
-#include "test/plugin/session/synthetic_recording.h"
+#include "test/plugin/session/mapper_driver.h"
 
 namespace efm {
 
-inline CObservationEvents::Ptr packetObservation(const SyntheticRecording& recording, int camera) {
-  const RigCamera& calibration = recording.cameras[static_cast<std::size_t>(camera)];
-  auto packet = CObservationEvents::Create();
-  packet->sensorLabel = "cam" + std::to_string(camera);
-  packet->camera_index = camera;
-  packet->camera = calibration.model;
-  packet->camera_pose = mrptPoseFrom(calibration.T_rig_cam);
-  return packet;
+/// A packet of events as in a rawlog.
+inline CObservationEvents::Ptr observationOf(const EventPacket& packet) {
+  auto observation = CObservationEvents::Create();
+  observation->sensorLabel = "cam" + std::to_string(packet.camera);
+  observation->timestamp = mrptTimeFrom(packet.covered_until_ns.value_or(0));
+  observation->camera_index = packet.camera;
+  observation->camera = packet.calibration.model;
+  observation->camera_pose = mrptPoseFrom(packet.calibration.T_rig_cam);
+  observation->events = packet.events;
+  observation->covered_until_ns = packet.covered_until_ns;
+  return observation;
 }
 
-/// The recording as in a rawlog: packets of 10 ms of each camera, then the pose at their end.
-inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(
-    const SyntheticRecording& recording) {
+/// A pose with its noise as a covariance.
+inline mrpt::obs::CObservation::Ptr observationOf(const PoseSample& pose) {
+  auto observation =
+      std::dynamic_pointer_cast<mrpt::obs::CObservationRobotPose>(poseObservation(pose));
+  for (int i = 0; pose.noise && i < 6; ++i) {
+    const double sigma = i < 3 ? pose.noise->noise_m : pose.noise->noise_rad;
+    observation->pose.cov(i, i) = sigma * sigma;
+  }
+  return observation;
+}
+
+/// The samples of the recording as in a rawlog.
+inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(const Samples& samples) {
   std::vector<mrpt::obs::CObservation::Ptr> observations;
-  std::vector<std::size_t> begin(recording.cameras.size(), 0);
-  for (const StampedPose& pose : recording.poses) {
-    for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
-      auto packet = packetObservation(recording, static_cast<int>(c));
-      packet->timestamp = mrptTimeFrom(pose.t_ns);
-      packet->covered_until_ns = pose.t_ns;
-      const std::vector<Event>& events = recording.events[c];
-      for (; begin[c] < events.size() && events[begin[c]].t_ns < pose.t_ns; ++begin[c]) {
-        packet->events.push_back(events[begin[c]]);
-      }
-      observations.push_back(packet);
+  for (const Sample& sample : samples) {
+    if (const auto* const packet = std::get_if<EventPacket>(&sample)) {
+      observations.push_back(observationOf(*packet));
+    } else {
+      observations.push_back(observationOf(std::get<PoseSample>(sample)));
     }
-    auto robot = mrpt::obs::CObservationRobotPose::Create();
-    robot->timestamp = mrptTimeFrom(pose.t_ns);
-    robot->sensorLabel = "pose";
-    robot->pose.mean = mrptPoseFrom(pose.T_world_rig);
-    observations.push_back(robot);
   }
   return observations;
+}
+inline std::vector<mrpt::obs::CObservation::Ptr> observationsOf(
+    const SyntheticRecording& recording) {
+  return observationsOf(samplesOf(recording));
 }
 
 inline void expectSameBits(const MapCloud::ConstPtr& a, const MapCloud::ConstPtr& b) {
   EXPECT_EQ(a->size(), b->size());
   EXPECT_TRUE(test::sameBits(*a, *b));
-}
-
-/// A simplemap has no place for the sigma of its points.
-inline MapCloud::ConstPtr withoutSigma(const MapCloud::ConstPtr& cloud) {
-  auto copy = pcl::make_shared<MapCloud>(*cloud);
-  for (MapPoint& point : *copy) point.sigma = MapPoint().sigma;
-  return copy;
 }
 
 /// The same points up to a distance, with the same support.
@@ -73,17 +67,6 @@ inline void expectNear(const MapCloud::ConstPtr& a, const MapCloud::ConstPtr& b,
     EXPECT_LT((positionIn(*a, a->at(i)) - positionIn(*b, b->at(i))).norm(), tolerance_m);
     EXPECT_EQ(a->at(i).support, b->at(i).support);
   }
-}
-
-inline void feed(CEventFusionMapBuilder& builder,
-                 const std::vector<mrpt::obs::CObservation::Ptr>& observations) {
-  for (const auto& observation : observations) builder.processObservation(observation);
-}
-/// Feeds a whole recording.
-inline void play(CEventFusionMapBuilder& builder,
-                 const std::vector<mrpt::obs::CObservation::Ptr>& observations) {
-  feed(builder, observations);
-  builder.finish();
 }
 
 }  // namespace efm

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "plugin/session/mapper.h"
+#include "test/maps/cloud/cloud_points.h"
+#include "test/plugin/session/session_driver.h"
+#include "test/plugin/session/synthetic_recording.h"
+
+namespace efm {
+
+using Samples = std::vector<Sample>;
+
+inline constexpr std::int64_t kMsNs = 1'000'000;
+
+/// Packets of 10 ms of each camera, then the pose at their end.
+/// @param announced the first packets announce the cameras: the empty packets before a camera's
+/// first event are complete until this event.
+inline Samples samplesOf(const SyntheticRecording& recording, bool announced = false) {
+  Samples samples;
+  std::vector<std::size_t> begin(recording.cameras.size(), 0);
+  for (const StampedPose& pose : recording.poses) {
+    for (std::size_t c = 0; c < recording.cameras.size(); ++c) {
+      EventPacket packet{static_cast<int>(c), recording.cameras[c], {}, pose.t_ns};
+      const std::vector<Event>& events = recording.events[c];
+      for (; begin[c] < events.size() && events[begin[c]].t_ns < pose.t_ns; ++begin[c]) {
+        packet.events.push_back(events[begin[c]]);
+      }
+      if (announced && begin[c] == 0) packet.covered_until_ns = events.at(0).t_ns;
+      samples.emplace_back(std::move(packet));
+    }
+    samples.emplace_back(sampleOf(pose, {PoseKind::kPose, "pose"}));
+  }
+  return samples;
+}
+inline Samples announced(const SyntheticRecording& recording) { return samplesOf(recording, true); }
+
+inline std::size_t numEvents(const Sample& sample) {
+  const auto* const packet = std::get_if<EventPacket>(&sample);
+  return packet == nullptr ? 0 : packet->events.size();
+}
+
+inline EventFusionOptions live(EventFusionOptions options = syntheticOptions()) {
+  options.live.enabled = true;
+  return options;
+}
+
+/// Adds a sample when the mapping has taken the sample before. So the queue never overflows, even
+/// on a slow machine.
+inline void addPatiently(Mapper& mapper, const Samples& samples) {
+  const auto waits = [&] {
+    const SessionStatus status = mapper.status();
+    return status.live && std::any_of(status.live->cameras.begin(), status.live->cameras.end(),
+                                      [](const auto& camera) { return camera.second.queued > 0; });
+  };
+  for (const Sample& sample : samples) {
+    mapper.add(sample);
+    while (waits()) std::this_thread::yield();
+  }
+}
+
+inline void play(Mapper& mapper, const Samples& samples) {
+  addPatiently(mapper, samples);
+  mapper.finish();
+}
+
+inline std::shared_ptr<const MapSnapshot> mapOf(const EventFusionOptions& options,
+                                                const Samples& samples) {
+  Mapper mapper(options);
+  play(mapper, samples);
+  return mapper.snapshot();
+}
+
+/// The counts of a camera; none if all its packets were rejected, since the rig lacks it then.
+inline EventCounts countsOf(const SessionStatus& status, int camera) {
+  const auto index = static_cast<std::size_t>(camera);
+  return index < status.counts.cameras.size() ? status.counts.cameras[index] : EventCounts{};
+}
+
+/// Live operation: each event has one count.
+inline void expectSumsAgree(const SessionStatus& status) {
+  for (const auto& [camera, queue] : status.live->cameras) {
+    EXPECT_EQ(queue.received, queue.thinned + queue.held + queue.queued + queue.dropped +
+                                  queue.paused + queue.refused + queue.after_end + queue.taken);
+    const EventCounts counts = countsOf(status, camera);
+    const auto rejected = status.refused_events.find(camera);
+    EXPECT_EQ(queue.taken,
+              counts.read + (rejected == status.refused_events.end() ? 0 : rejected->second));
+    EXPECT_EQ(counts.read, counts.used + counts.without_pose + counts.outside_window +
+                               counts.dropped + counts.filtered + counts.outside_lens +
+                               counts.over_budget);
+  }
+}
+
+inline std::set<std::int64_t> timesOf(const MapSnapshot& map) {
+  std::set<std::int64_t> times;
+  for (const StampedPose& pose : map.trajectory) times.insert(pose.t_ns);
+  return times;
+}
+
+/// The same poses of all keyframes, and the same points, bit for bit.
+inline void expectSameMap(const MapSnapshot& map, const MapSnapshot& expected) {
+  for (const auto trajectory : {&MapSnapshot::trajectory, &MapSnapshot::tracker_trajectory}) {
+    const std::vector<StampedPose>& poses = map.*trajectory;
+    ASSERT_EQ(poses.size(), (expected.*trajectory).size());
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      const StampedPose& other = (expected.*trajectory)[i];
+      EXPECT_EQ(poses[i].t_ns, other.t_ns);
+      EXPECT_TRUE(isSame(poses[i].T_world_rig, other.T_world_rig)) << "keyframe " << i;
+    }
+  }
+  EXPECT_EQ(map.points->size(), expected.points->size());
+  EXPECT_TRUE(test::sameBits(*map.points, *expected.points));
+}
+
+/// The lines of a mapper's log.
+struct MapperLog {
+  std::vector<std::string> lines;
+
+  /// Callbacks that write into this log.
+  Mapper::Callbacks callbacks() {
+    Mapper::Callbacks callbacks;
+    callbacks.warn = callbacks.info = [this](const std::string& line) { lines.push_back(line); };
+    return callbacks;
+  }
+  std::size_t count(const std::string& part) const {
+    return static_cast<std::size_t>(std::count_if(
+        lines.begin(), lines.end(),
+        [&](const std::string& line) { return line.find(part) != std::string::npos; }));
+  }
+};
+
+}  // namespace efm

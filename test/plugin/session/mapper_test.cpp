@@ -1,0 +1,426 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin/session/mapper.h"
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <new>
+
+#include "test/memory/failing_allocation.h"
+#include "test/plugin/session/mapper_driver.h"
+
+namespace efm {
+namespace {
+
+using testing::HasSubstr;
+
+class MapperInEitherMode : public testing::TestWithParam<bool> {
+ protected:
+  static bool isLive() { return GetParam(); }
+  static EventFusionOptions in(EventFusionOptions options) {
+    options.live.enabled = isLive();
+    return options;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Live, MapperInEitherMode, testing::Bool());
+
+/// @return how many samples threw this error.
+template <typename Error>
+std::size_t addAll(Mapper& mapper, const Samples& samples) {
+  std::size_t errors = 0;
+  for (const Sample& sample : samples) {
+    try {
+      addPatiently(mapper, {sample});
+    } catch (const Error&) {
+      ++errors;
+    }
+  }
+  return errors;
+}
+
+/// The parts of a map agree: its points are the points of its keyframes at the poses of the
+/// trajectory.
+void expectConsistent(const MapSnapshot& map, const GlobalCloudOptions& options) {
+  ASSERT_EQ(map.trajectory.size(), map.keyframes.size());
+  ASSERT_EQ(map.tracker_trajectory.size(), map.keyframes.size());
+  GlobalCloud cloud(options);
+  for (std::size_t i = 0; i < map.keyframes.size(); ++i) {
+    const StoredKeyframe& keyframe = map.keyframes[i];
+    EXPECT_EQ(keyframe.t_ref_ns, map.trajectory[i].t_ns);
+    EXPECT_TRUE(isSame(keyframe.T_world_ref, map.trajectory[i].T_world_rig)) << "keyframe " << i;
+    cloud.insert(i, worldPointsOf(keyframe), keyframe.T_world_ref);
+  }
+  EXPECT_TRUE(test::sameBits(*cloud.points(), *map.points));
+}
+
+TEST_P(MapperInEitherMode, AnEarlierMapStaysAndEachSnapshotOfARefinedMapIsConsistent) {
+  const Samples samples = samplesOf(shaken(SyntheticRecording(1.3)));
+  const EventFusionOptions options = in(refinedOptions());
+  const auto first = mapOf(refinedOptions(), samples);  // playback
+  const std::size_t count = first->keyframes.size();
+  std::shared_ptr<Mapper> mapper;
+  std::size_t delivered = 0;
+  Mapper::Callbacks callbacks;
+  callbacks.on_keyframe = [&](const KeyframeDepthMap& keyframe) {
+    ++delivered;
+    const auto map = mapper->snapshot();
+    expectConsistent(*map, options.cloud);
+    if (isLive()) return;
+    EXPECT_EQ(map->trajectory.back().t_ns, keyframe.window.t_ref_ns);
+    EXPECT_TRUE(isSame(map->trajectory.back().T_world_rig, keyframe.T_world_ref));
+    EXPECT_EQ(mapper->keyframes()->points, nullptr) << "they cost an export";
+  };
+  callbacks.on_map = [&](const auto& map) { expectConsistent(*map, options.cloud); };
+  mapper = Mapper::make(options, callbacks, first->keyframes);
+  EXPECT_EQ(mapper->snapshot()->trajectory.size(), count);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    mapper->add(samples[i]);
+    if (i % 23 == 7) expectConsistent(*mapper->snapshot(), options.cloud);  // changes nothing
+  }
+  mapper->finish();
+
+  EXPECT_EQ(delivered, count);
+  const auto map = mapper->snapshot();
+  expectConsistent(*map, options.cloud);
+  ASSERT_EQ(map->trajectory.size(), 2 * count);
+  const auto isAt = [](const StampedPose& pose, const StampedPose& expected) {
+    return isSame(pose.T_world_rig, expected.T_world_rig);
+  };
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    EXPECT_TRUE(isAt(map->trajectory[i], first->trajectory[i]));
+    EXPECT_TRUE(isAt(map->tracker_trajectory[i], first->trajectory[i]));
+    EXPECT_TRUE(isAt(map->trajectory[count + i], first->trajectory[i]));
+    EXPECT_TRUE(isAt(map->tracker_trajectory[count + i], first->tracker_trajectory[i]));
+    moved += isAt(first->trajectory[i], first->tracker_trajectory[i]) ? 0 : 1;
+  }
+  EXPECT_GT(moved, count / 2);
+}
+
+// --- Pause and end -----------------------------------------------------------------------------
+
+TEST_P(MapperInEitherMode, SkippedPacketsAreCountedAndTheirWindowsDropped) {
+  const Samples samples = samplesOf(SyntheticRecording(3));  // three in 10 ms
+  std::uint64_t fed = 0;
+  Mapper mapper(in(syntheticOptions()));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    fed += numEvents(samples[i]);
+    const auto* const packet = std::get_if<EventPacket>(&samples[i]);
+    if (packet != nullptr && i >= 450 && i < 750) {
+      mapper.skip(*packet);
+    } else {
+      addPatiently(mapper, {samples[i]});
+    }
+  }
+  mapper.finish();
+
+  const std::set<std::int64_t> times = timesOf(*mapper.snapshot());
+  for (const std::int64_t t_ns : times) {
+    const double t_s = 1e-9 * static_cast<double>(t_ns - SyntheticRecording::kStartNs);
+    EXPECT_TRUE(t_s < 1.4 || t_s > 2.6) << t_s << " s: in the middle of a window of 0.2 s";
+  }
+  EXPECT_EQ(times.size(), 13U + 3U);
+  const SessionStatus status = mapper.status();
+  std::uint64_t paused = 0;
+  for (const auto& [camera, count] : status.paused_events) paused += count;
+  if (isLive()) paused = status.live->cameras.at(0).paused + status.live->cameras.at(1).paused;
+  EXPECT_GT(paused, 0U);
+  EXPECT_EQ(paused + status.counts.total().read, fed);
+  EXPECT_EQ(status.counts.windows_given_up.total(), status.counts.windows_given_up.paused);
+}
+
+TEST_P(MapperInEitherMode, InputAfterTheEndChangesNothing) {
+  const Samples samples = samplesOf(SyntheticRecording());
+  Mapper mapper(in(syntheticOptions()));
+  play(mapper, samples);
+  const auto map = mapper.snapshot();
+  std::uint64_t events = 0;
+  std::uint64_t poses = 0;
+  for (const Sample& sample : samples) {
+    events += numEvents(sample);
+    poses += std::holds_alternative<PoseSample>(sample) ? 1 : 0;
+    const std::string error = messageOf([&] { mapper.add(sample); });
+    EXPECT_THAT(error, HasSubstr(isLive() ? "no error" : "input after the end"));
+  }
+  EXPECT_EQ(messageOf([&] { mapper.finish(); }).empty(), false);
+  expectSameMap(*mapper.snapshot(), *map);
+  const SessionStatus status = mapper.status();
+  EXPECT_EQ(status.counts.total().read, events);
+  if (!isLive()) return;
+  expectSumsAgree(status);
+  EXPECT_EQ(status.live->cameras.at(0).after_end + status.live->cameras.at(1).after_end, events);
+  EXPECT_EQ(status.live->refused_poses, poses);
+  EXPECT_DOUBLE_EQ(status.live->dropRatio(), 0.5);
+}
+
+TEST_P(MapperInEitherMode, FinishThrowsTheErrorOfTheRig) {
+  Mapper mapper(in(syntheticOptions()));
+  for (const Sample& sample : samplesOf(SyntheticRecording())) {
+    const auto* const packet = std::get_if<EventPacket>(&sample);
+    if (packet == nullptr || packet->camera == 1) mapper.add(sample);
+  }
+  EXPECT_THROW(mapper.finish(), std::invalid_argument) << "there is no camera 0";
+  EXPECT_EQ(mapper.numKeyframes(), 0U);
+}
+
+TEST_P(MapperInEitherMode, StopInACallbackEndsTheMapping) {
+  std::shared_ptr<Mapper> mapper;
+  std::atomic<int> calls{0};
+  Mapper::Callbacks callbacks;
+  callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
+    ++calls;
+    EXPECT_EQ(mapper->runsHere(), isLive());
+    if (isLive()) {
+      EXPECT_THROW(mapper->finish(), std::logic_error) << "it would wait for itself";
+    }
+    mapper->stop();
+  };
+  mapper = Mapper::make(in(syntheticOptions()), callbacks);
+  for (const Sample& sample : announced(SyntheticRecording())) mapper->add(sample);
+  mapper->finish();
+  EXPECT_EQ(calls, 1) << "of three";
+  EXPECT_EQ(mapper->status().counts.keyframes, 1U);
+}
+
+// --- Errors ------------------------------------------------------------------------------------
+
+TEST_P(MapperInEitherMode, ErrorsOfCallbacksAreCountedOrTheFirstIsThrown) {
+  SyntheticRecording recording;
+  recording.events[1].clear();  // the log warns of its silence before the first keyframe is given
+  const Samples samples = samplesOf(recording);
+  const EventFusionOptions options = in(syntheticOptions());
+  const auto expected = mapOf(options, samples);
+  for (const bool log_throws : {false, true}) {
+    std::shared_ptr<Mapper> mapper;
+    MapperLog log;
+    std::size_t thrown = 0;
+    std::size_t keyframes = 0;
+    const auto madeKeyframes = [&] {  // another thread may ask, too
+      const auto ask = [&] { return mapper->status().counts.keyframes; };
+      return std::async(std::launch::async, ask).get();
+    };
+    Mapper::Callbacks callbacks;
+    callbacks.warn = [&](const std::string& text) {
+      log.lines.push_back(text);
+      EXPECT_GE(madeKeyframes(), isLive() ? 0U : 1U);
+      if (log_throws && ++thrown > 0) throw std::runtime_error("the log is full");
+    };
+    callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
+      EXPECT_EQ(madeKeyframes(), ++keyframes) << "the next one is made later";
+      EXPECT_TRUE(isLive() || mapper->numKeyframes() == keyframes);
+      ++thrown;
+      throw std::runtime_error("keyframe " + std::to_string(keyframes));
+    };
+    callbacks.on_map = [&](const auto&) {
+      ++thrown;
+      throw 5;
+    };
+    mapper = Mapper::make(options, callbacks);
+    addPatiently(*mapper, samples);
+    const std::string error = messageOf([&] { mapper->finish(); });
+
+    EXPECT_EQ(error, isLive() ? "no error" : log_throws ? "the log is full" : "keyframe 1");
+    EXPECT_EQ(keyframes, 3U) << "after an error of the log, too";
+    expectSameMap(*mapper->snapshot(), *expected);
+    EXPECT_EQ(log.count("camera 1 had no event"), 1U);
+    EXPECT_EQ(log.count("the callback of a keyframe: "), isLive() ? 1U : 0U);
+    EXPECT_EQ(log.count("the callback of the map: an exception of another type"),
+              isLive() ? 1U : 0U);
+    EXPECT_EQ(log.count("the callback of the log: the log is full"),
+              isLive() && log_throws ? 1U : 0U);
+    if (!isLive()) continue;
+    EXPECT_EQ(mapper->status().live->errors, thrown);
+    EXPECT_FALSE(mapper->status().live->failing);
+  }
+}
+
+/// The mapping goes on after an error: in live operation with the next window, in playback with the
+/// same window.
+TEST_P(MapperInEitherMode, AfterAnErrorOfTheSinkTheMappingGoesOn) {
+  struct FullDisk : DsiSink {
+    std::atomic<int> planes{0};
+    int last = isLive() ? 40 : 1'000'000'000;
+    void addPlane(int /*plane*/, const float* /*values*/) override {
+      if (const int number = planes++; number >= 40 && number <= last) {
+        throw std::runtime_error("the disk is full");
+      }
+    }
+  } disk;
+  const SyntheticRecording recording;
+  const Samples samples = announced(recording);
+  std::size_t delivered = 0;
+  Mapper::Callbacks callbacks;
+  callbacks.on_keyframe = [&](const KeyframeDepthMap&) { ++delivered; };
+  Mapper mapper(in(syntheticOptions()), callbacks);
+  mapper.setSink(&disk);
+  const std::size_t errors = addAll<std::runtime_error>(mapper, samples);
+  if (!isLive()) {
+    EXPECT_GT(errors, 10U) << "each sample tries the window again";
+    EXPECT_EQ(delivered, 1U);
+    EXPECT_EQ(mapper.snapshot()->trajectory.size(), 1U);
+    EXPECT_EQ(mapper.status().counts.keyframes, 1U);
+    const std::int64_t t_ns = recording.poses.back().t_ns + 1;
+    EXPECT_THROW(mapper.add(EventPacket{0, recording.cameras[0], {{t_ns, 120, 0, true}}, {}}),
+                 std::invalid_argument)
+        << "of two errors the first";
+    mapper.setSink(nullptr);
+  }
+  mapper.finish();
+  const auto expected = mapOf(syntheticOptions(), samples);
+  if (!isLive()) return expectSameMap(*mapper.snapshot(), *expected);
+  const SessionStatus status = mapper.status();
+  expectSumsAgree(status);
+  EXPECT_EQ(status.live->errors, 1U);
+  EXPECT_FALSE(status.live->failing);
+  EXPECT_THAT(status.live->last_error, HasSubstr("the disk is full"));
+  EXPECT_EQ(status.counts.windows_given_up.error, 1U);
+  EXPECT_EQ(delivered, 2U) << "of three";
+  std::set<std::int64_t> times = timesOf(*expected);
+  times.erase(std::next(times.begin()));
+  EXPECT_EQ(timesOf(*mapper.snapshot()), times);
+}
+
+TEST_P(MapperInEitherMode, IfMemoryEndsKeyframesAndPointsStayConsistent) {
+  struct FailingSink : DsiSink {
+    std::size_t skipped = std::size_t(-1);
+    int keyframes = 0;
+    void addPlane(int plane, const float* /*values*/) override {
+      if (plane == 29 && ++keyframes == 2) failAllocation(Allocating::kThisThread, skipped);
+    }
+  };
+  const Samples samples = announced(SyntheticRecording());
+  EventFusionOptions options = in(syntheticOptions());
+  options.mapper.keyframe.sweep.threads = 1;  // the sink is called by the thread that maps
+  const auto run = [&](std::size_t skipped) {
+    FailingSink sink;
+    sink.skipped = skipped;
+    std::vector<std::size_t> allocations;
+    Mapper::Callbacks callbacks;
+    callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
+      if (sink.keyframes == 2) allocations = stopFailing();
+    };
+    Mapper mapper(options, callbacks);
+    mapper.setSink(&sink);
+    std::size_t errors = addAll<std::bad_alloc>(mapper, samples);
+    mapper.finish();
+    stopFailing();
+
+    const SessionStatus status = mapper.status();
+    if (isLive()) errors = status.live->errors;
+    EXPECT_LE(errors, skipped == std::size_t(-1) ? 0U : 1U);
+    const auto map = mapper.snapshot();
+    EXPECT_GE(map->keyframes.size(), 2U) << "of three";
+    EXPECT_EQ(status.counts.keyframes, map->keyframes.size());
+    expectConsistent(*map, options.cloud);
+    return allocations;
+  };
+  const std::vector<std::size_t> rare = rareOnes(run(std::size_t(-1)));
+  ASSERT_GT(rare.size(), 10U);
+  for (std::size_t i = 0; i < rare.size(); i += rare.size() / 30 + 1) {
+    SCOPED_TRACE("allocation " + std::to_string(rare[i]));
+    run(rare[i]);
+    if (HasFailure()) return;
+  }
+}
+
+// --- Threads -----------------------------------------------------------------------------------
+
+/// Asks the mapper from other threads during the first sweep.
+struct QueryingSink : DsiSink {
+  std::vector<std::function<void()>> queries;
+  std::chrono::milliseconds patience{150};
+  std::size_t answered = 0;  ///< During the sweep.
+  std::atomic<bool> has_asked{false};
+  std::vector<std::future<void>> answers;
+
+  void addPlane(int /*plane*/, const float* /*values*/) override {
+    if (has_asked.exchange(true)) return;
+    for (const auto& ask : queries) answers.push_back(std::async(std::launch::async, ask));
+    const auto until = std::chrono::steady_clock::now() + patience;
+    for (auto& answer : answers) {
+      answered += answer.wait_until(until) == std::future_status::ready ? 1 : 0;
+    }
+  }
+};
+
+TEST_P(MapperInEitherMode, QueriesAreAnsweredDuringASweepInLiveOperationAlone) {
+  QueryingSink sink;
+  Mapper mapper(in(syntheticOptions()));
+  sink.queries = {[&] { mapper.status(); }, [&] { mapper.points(); }, [&] { mapper.keyframes(); },
+                  [&] { mapper.numKeyframes(); }};
+  if (isLive()) sink.queries.emplace_back([&] { mapper.skip({}); });
+  if (isLive()) sink.patience = std::chrono::seconds(60);
+  mapper.setSink(&sink);
+  play(mapper, samplesOf(SyntheticRecording()));
+  sink.answers.clear();  // waits for the threads
+  EXPECT_EQ(sink.answered, isLive() ? sink.queries.size() : 0U);
+}
+
+TEST(Mapper, PlaybackMapsInputFromACallbackAfterIt) {
+  const Samples samples = announced(SyntheticRecording());
+  std::size_t next = 0;
+  int running = 0;
+  int delivered = 0;
+  std::unique_ptr<Mapper> mapper;
+  Mapper::Callbacks callbacks;
+  callbacks.on_keyframe = [&](const KeyframeDepthMap&) {
+    EXPECT_EQ(++running, 1) << "a callback within a callback";
+    for (++delivered; next < samples.size(); ++next) mapper->add(samples[next]);
+    --running;
+  };
+  mapper = std::make_unique<Mapper>(syntheticOptions(), callbacks);
+  while (next < samples.size()) mapper->add(samples[next++]);
+  EXPECT_EQ(delivered, 3) << "before the call returns";
+  mapper->finish();
+  expectSameMap(*mapper->snapshot(), *mapOf(syntheticOptions(), samples));
+}
+
+TEST_P(MapperInEitherMode, ThreadsMayAddAndAsk) {
+  // All poses and a packet of each camera come first, then a thread per camera adds the rest. The
+  // mapper waits a second for a camera, and the recording is shorter.
+  const Samples samples = samplesOf(shaken(SyntheticRecording(0.9)));
+  for (const bool is_refined : {false, true}) {
+    EventFusionOptions options = refinedOptions();
+    options.refinement.enabled = is_refined;
+    options.refinement.background = false;
+    const auto expected = mapOf(options, samples);
+    options.refinement.background = true;
+    std::atomic<std::size_t> delivered = 0;
+    Mapper::Callbacks callbacks;
+    callbacks.on_keyframe = [&](const KeyframeDepthMap&) { ++delivered; };
+    Mapper mapper(in(options), callbacks);
+    std::vector<EventPacket> packets;
+    for (const Sample& sample : samples) {
+      const auto* const packet = std::get_if<EventPacket>(&sample);
+      packet != nullptr ? packets.push_back(*packet) : mapper.add(sample);
+    }
+    mapper.add(packets[0]);
+    mapper.add(packets[1]);
+    std::vector<std::thread> feeders;
+    for (const std::size_t camera : {0U, 1U}) {
+      feeders.emplace_back([&, camera] {
+        for (std::size_t i = 2 + camera; i < packets.size(); i += 2) mapper.add(packets[i]);
+      });
+    }
+    std::atomic<bool> done = false;
+    std::thread querier([&] {
+      while (!done) {
+        expectConsistent(*mapper.snapshot(), options.cloud);
+        mapper.status();
+        mapper.newestDepth();
+      }
+    });
+    for (std::thread& feeder : feeders) feeder.join();
+    mapper.finish();
+    done = true;
+    querier.join();
+    EXPECT_EQ(delivered, 8U);
+    EXPECT_EQ(mapper.numKeyframes(), delivered);
+    expectSameMap(*mapper.snapshot(), *expected);
+  }
+}
+
+}  // namespace
+}  // namespace efm
