@@ -49,7 +49,7 @@ bool MappingSession::chooseAutomatic() {
     const std::optional<WindowData> data = dataToChooseFrom();
     // No window yet: at the end of a piece of the input, try the next piece; otherwise wait for
     // more data; at the end of the input, choose without data.
-    if (!data && is_first && pieceEnds() && !looksTooLong() && endPiece()) continue;
+    if (!data && is_first && pieceEnds() && !hasWaitedTooLong() && endPiece()) continue;
     if (!data && !finished_ && !pieceEnds()) return false;
     std::vector<WindowSample> samples;
     std::optional<double> duration_s;  // where all of it is known
@@ -127,15 +127,16 @@ std::optional<WindowData> MappingSession::dataToChooseFrom() {
   return data && lengthOf(*data) >= kMinFirstWindowS ? data : std::nullopt;
 }
 
-/// Whether the tracker jumps so often that no window could be looked at for too long.
-bool MappingSession::looksTooLong() {
+/// Whether the tracker has jumped so often for 10 s that there was no window to choose from. The
+/// first call begins the wait.
+bool MappingSession::hasWaitedTooLong() {
   if (!status_.events) return false;
   if (!no_scene_since_ns_) no_scene_since_ns_ = status_.events->last_ns;
   return status_.events->last_ns - *no_scene_since_ns_ >= kMaxSceneWaitNs;
 }
 
-/// Gives up a window that shows no scene, unless that has lasted too long or nothing comes after
-/// it. @return whether it did.
+/// Drops a window that shows no scene, or goes on to the next piece of the input if this one ends
+/// with it. @return false if the wait for a scene has lasted too long, or nothing comes after it.
 bool MappingSession::skipWithoutScene(const WindowData& data) {
   const Window& window = data.window;
   if (!no_scene_since_ns_) no_scene_since_ns_ = window.t0_ns;
@@ -150,7 +151,7 @@ bool MappingSession::skipWithoutScene(const WindowData& data) {
 }
 
 /// Goes on with the window of the options, where it was shortened. @return whether it was.
-bool MappingSession::useShorter(double former_s) {
+bool MappingSession::applyShorterWindow(double former_s) {
   if (options_.mapper.policy.window_s == former_s) return false;
   mapper_.configure(options_.mapper.policy, planes());
   ++status_.choices;
@@ -163,7 +164,7 @@ bool MappingSession::shortenWindows(double events_per_s) {
   KeyframePolicyOptions& policy = options_.mapper.policy;
   const double former_s = policy.window_s;
   fitIntoQueue(options_.live, events_per_s, policy, status_.chosen);
-  return useShorter(former_s);
+  return applyShorterWindow(former_s);
 }
 
 /// Where two segments in a row between jumps of the tracker were too short for a window that was
@@ -177,7 +178,7 @@ void MappingSession::fitIntoSegments(std::int64_t end_ns) {
   KeyframePolicyOptions& policy = options_.mapper.policy;
   const double former_s = policy.window_s;
   limitWindow(length_s / 2, kBetweenJumps, policy, status_.chosen);
-  useShorter(former_s);
+  applyShorterWindow(former_s);
 }
 
 /// Goes on with the options of the first choice.

@@ -100,6 +100,7 @@ void MappingSession::feed(EventPacket packet) {
   extend(status_.events, last_ns + offset_ns);
   newest_begin_ns_ = std::max(newest_begin_ns_.value_or(begin_ns), begin_ns);
   guard_.dropOverdue(mapper_, *newest_begin_ns_);
+  if (rig_.isComplete()) return;
   std::uint64_t held = mapper_.heldEvents();
   for (const auto& [camera, events] : rig_.waitingEvents()) held += events;
   const bool ready = rig_.isReady(begin_ns, pose_source_.selected().has_value());

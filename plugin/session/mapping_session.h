@@ -136,9 +136,9 @@ class MappingSession {
                FusionMapperOptions chosen);
   void use(OptionChoice choice, const FusionMapperOptions& chosen);
   std::optional<WindowData> dataToChooseFrom();
-  bool looksTooLong();
+  bool hasWaitedTooLong();
   bool skipWithoutScene(const WindowData& data);
-  bool useShorter(double former_s);
+  bool applyShorterWindow(double former_s);
   bool shortenWindows(double events_per_s);
   void fitIntoSegments(std::int64_t end_ns);
   void keepOptions();
