@@ -275,26 +275,29 @@ InputQueue::Batch InputQueue::wait(std::optional<Clock::time_point> until) {
   } else {
     changed_.wait(lock, has_input);
   }
-  return takeLocked();
+  return takeLocked(true);
 }
 
-InputQueue::Batch InputQueue::take() {
+InputQueue::Batch InputQueue::take(bool all_mapped) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return takeLocked();
+  return takeLocked(all_mapped);
 }
 
-InputQueue::Batch InputQueue::takeLocked() {
+InputQueue::Batch InputQueue::takeLocked(bool all_mapped) {
   Batch batch;
   batch.poses = std::exchange(poses_, {});
-  batch.packets.assign(std::move_iterator(packets_.begin()), std::move_iterator(packets_.end()));
-  packets_.clear();
-  for (const EventPacket& packet : batch.packets) {
-    cameraOf(packet.camera).counts.taken += packet.events.size();
-  }
   batch.missing = std::exchange(missing_, {});
-  events_ = 0;
-  bytes_ = 0;
-  batch.ended = ended_;
+  bool may_skip = all_mapped;  // until the first packet with events
+  while (!packets_.empty() && (may_skip || !packets_.front().skipped_until_ns)) {
+    EventPacket& next = packets_.front();
+    may_skip = may_skip && next.skipped_until_ns;
+    events_ -= next.events.size();
+    bytes_ -= bytesOf(next);
+    cameraOf(next.camera).counts.taken += next.events.size();
+    batch.packets.push_back(std::move(next));
+    packets_.pop_front();
+  }
+  batch.ended = ended_ && packets_.empty();
   return batch;
 }
 

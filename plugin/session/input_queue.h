@@ -81,10 +81,12 @@ class InputQueue {
     bool ended = false;
   };
   using Clock = std::chrono::steady_clock;
-  /// Waits for input, at most until then.
+  /// Waits for input, at most until then. Gives packets up to the next skipped one: the windows
+  /// before the gap are mapped before it.
   Batch wait(std::optional<Clock::time_point> until = std::nullopt);
-  /// The input that is there.
-  Batch take();
+  /// The input that is there, up to the next skipped packet. Skipped packets themselves are given
+  /// if all complete windows are mapped, as they are before `wait`.
+  Batch take(bool all_mapped = false);
 
   std::uint64_t queuedEvents() const;
   std::map<int, QueueCounts> counts() const;
@@ -121,7 +123,7 @@ class InputQueue {
   void push(EventPacket packet);
   void dropOldest();
   bool isFull() const;
-  Batch takeLocked();
+  Batch takeLocked(bool all_mapped);
 
   const LiveOptions options_;
 

@@ -163,21 +163,26 @@ RC_GTEST_PROP(InputQueue, KeepsTheNewestPacketsThatFitIntoEventsAndMemoryAndAllP
         waiting.pop_front();
       }
     } else {
-      const InputQueue::Batch batch = queue.take();
+      const bool all_mapped = camera > 0;
+      const InputQueue::Batch batch = queue.take(all_mapped);
       RC_ASSERT(batch.poses.size() == std::exchange(poses, 0));
-      RC_ASSERT(batch.packets.size() == waiting.size());
-      for (std::size_t i = 0; i < waiting.size(); ++i) {
-        RC_ASSERT(batch.packets[i].camera == waiting[i].camera);
-        RC_ASSERT(batch.packets[i].events.size() == waiting[i].events);
-        RC_ASSERT(batch.packets[i].skipped_until_ns ==
-                  (waiting[i].skipped ? std::optional(waiting[i].t_ns + 1) : std::nullopt));
-        expected[waiting[i].camera].taken += waiting[i].events;
+      bool may_skip = all_mapped;  // skipped packets come first, and end the batch
+      for (const EventPacket& taken : batch.packets) {
+        const Waiting next = waiting.front();
+        waiting.pop_front();
+        RC_ASSERT(may_skip || !next.skipped);
+        may_skip = may_skip && next.skipped;
+        RC_ASSERT(taken.camera == next.camera);
+        RC_ASSERT(taken.events.size() == next.events);
+        RC_ASSERT(taken.skipped_until_ns ==
+                  (next.skipped ? std::optional(next.t_ns + 1) : std::nullopt));
+        expected[next.camera].taken += next.events;
       }
+      RC_ASSERT(waiting.empty() || waiting.front().skipped);
       RC_ASSERT(batch.missing.size() == missing_ns.size());
       for (const auto& [index, until_ns] : missing_ns) {
         RC_ASSERT(batch.missing.at(index).until_ns == until_ns);
       }
-      waiting.clear();
       missing_ns.clear();
     }
     RC_ASSERT(queue.queuedEvents() == sum(events_of));

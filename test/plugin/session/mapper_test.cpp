@@ -101,34 +101,45 @@ TEST_P(MapperInEitherMode, AnEarlierMapStaysAndEachSnapshotOfARefinedMapIsConsis
 
 // --- Pause and end -----------------------------------------------------------------------------
 
+/// Whether the mapping keeps up or gets most of the input at once.
 TEST_P(MapperInEitherMode, SkippedPacketsAreCountedAndTheirWindowsDropped) {
   const Samples samples = samplesOf(SyntheticRecording(3));  // three in 10 ms
-  std::uint64_t fed = 0;
-  Mapper mapper(in(syntheticOptions()));
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    fed += numEvents(samples[i]);
-    const auto* const packet = std::get_if<EventPacket>(&samples[i]);
-    if (packet != nullptr && i >= 450 && i < 750) {
-      mapper.skip(*packet);
-    } else {
-      addPatiently(mapper, {samples[i]});
+  for (const bool at_once : {false, isLive()}) {
+    std::uint64_t fed = 0;
+    std::promise<void> all_fed;
+    Mapper::Callbacks callbacks;
+    callbacks.on_keyframe = [&, wait = at_once](const KeyframeDepthMap&) mutable {
+      if (std::exchange(wait, false)) all_fed.get_future().wait();
+    };
+    Mapper mapper(in(syntheticOptions()), callbacks);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      fed += numEvents(samples[i]);
+      const auto* const packet = std::get_if<EventPacket>(&samples[i]);
+      if (packet != nullptr && i >= 450 && i < 750) {
+        mapper.skip(*packet);
+      } else if (at_once) {
+        mapper.add(samples[i]);
+      } else {
+        addPatiently(mapper, {samples[i]});
+      }
     }
-  }
-  mapper.finish();
+    all_fed.set_value();
+    mapper.finish();
 
-  const std::set<std::int64_t> times = timesOf(*mapper.snapshot());
-  for (const std::int64_t t_ns : times) {
-    const double t_s = 1e-9 * static_cast<double>(t_ns - SyntheticRecording::kStartNs);
-    EXPECT_TRUE(t_s < 1.4 || t_s > 2.6) << t_s << " s: in the middle of a window of 0.2 s";
+    const std::set<std::int64_t> times = timesOf(*mapper.snapshot());
+    for (const std::int64_t t_ns : times) {
+      const double t_s = 1e-9 * static_cast<double>(t_ns - SyntheticRecording::kStartNs);
+      EXPECT_TRUE(t_s < 1.4 || t_s > 2.6) << t_s << " s: in the middle of a window of 0.2 s";
+    }
+    EXPECT_EQ(times.size(), 13U + 3U) << at_once;
+    const SessionStatus status = mapper.status();
+    std::uint64_t paused = 0;
+    for (const auto& [camera, count] : status.paused_events) paused += count;
+    if (isLive()) paused = status.live->cameras.at(0).paused + status.live->cameras.at(1).paused;
+    EXPECT_GT(paused, 0U);
+    EXPECT_EQ(paused + status.counts.total().read, fed);
+    EXPECT_EQ(status.counts.windows_given_up.total(), status.counts.windows_given_up.paused);
   }
-  EXPECT_EQ(times.size(), 13U + 3U);
-  const SessionStatus status = mapper.status();
-  std::uint64_t paused = 0;
-  for (const auto& [camera, count] : status.paused_events) paused += count;
-  if (isLive()) paused = status.live->cameras.at(0).paused + status.live->cameras.at(1).paused;
-  EXPECT_GT(paused, 0U);
-  EXPECT_EQ(paused + status.counts.total().read, fed);
-  EXPECT_EQ(status.counts.windows_given_up.total(), status.counts.windows_given_up.paused);
 }
 
 TEST_P(MapperInEitherMode, InputAfterTheEndChangesNothing) {
