@@ -209,10 +209,6 @@ TEST(DeadReckoning, AMovementWithoutATimeHasTheTimeOfItsFrame) {
   EXPECT_EQ(poseIn(DeadReckoning().poseAfter(action, frame)).t_ns, 5000);
 }
 
-TEST(DeadReckoning, ActionsWithoutMovementGiveNoPose) {
-  EXPECT_EQ(DeadReckoning().poseAfter(CActionCollection(), {}), nullptr);
-}
-
 TEST(PoseObservation, OdometryIsAPoseInThePlane) {
   mrpt::obs::CObservationOdometry odometry;
   odometry.sensorLabel = "wheels";

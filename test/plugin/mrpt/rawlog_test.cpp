@@ -12,8 +12,9 @@
 #include <mrpt/obs/CSensoryFrame.h>
 #include <mrpt/serialization/CArchive.h>
 
-#include <cstring>
+#include <sstream>
 
+#include "maps/io/point_cloud_file.h"
 #include "plugin/mrpt/CEventFusionMapBuilder.h"
 #include "plugin/mrpt/pose_observation.h"
 #include "plugin/mrpt/rawlog.h"
@@ -399,31 +400,19 @@ class RawlogKinds : public ProgramTest {
     return rawlog;
   }
 
-  /// The points of a binary PCD file with the fields x y z intensity.
-  std::vector<Eigen::Vector4f> pointsOfMap() const {
-    const std::string pcd = contentOf("out/map.pcd");
-    const std::string last_of_header = "DATA binary\n";
-    const std::size_t begin = pcd.find(last_of_header) + last_of_header.size();
-    std::vector<Eigen::Vector4f> points((pcd.size() - begin) / sizeof(Eigen::Vector4f));
-    std::memcpy(static_cast<void*>(points.data()), pcd.data() + begin,
-                points.size() * sizeof(Eigen::Vector4f));
-    return points;
-  }
-
-  std::vector<Eigen::Vector4f> mapOf(const std::string& rawlog,
-                                     const std::string& options = "") const {
-    const Result result = run("map rig.ini " + rawlog + " --out out " + options);
-    EXPECT_EQ(result.status, 0) << result.err;
-    return pointsOfMap();
-  }
-
   const SyntheticRecording recording;
 };
 
-void expectNear(const std::vector<Eigen::Vector4f>& a, const std::vector<Eigen::Vector4f>& b) {
-  ASSERT_EQ(a.size(), b.size());
-  ASSERT_GT(a.size(), 30U);
-  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_LT((a[i] - b[i]).norm(), 1e-4);
+/// @param a, b as map.pcd.
+void expectNearPcd(const std::string& a, const std::string& b) {
+  const std::vector<CloudPoint> points = parsePcd(a).points;
+  const std::vector<CloudPoint> expected = parsePcd(b).points;
+  ASSERT_EQ(points.size(), expected.size());
+  ASSERT_GT(points.size(), 30U);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_LT((points[i].p_world - expected[i].p_world).norm(), 1e-4);
+    EXPECT_NEAR(points[i].confidence, expected[i].confidence, 1e-4);
+  }
 }
 
 TEST_F(RawlogKinds, OdometryAndMovementsGiveTheMapThatPosesGive) {
@@ -434,11 +423,10 @@ TEST_F(RawlogKinds, OdometryAndMovementsGiveTheMapThatPosesGive) {
   save(pairs(Says::kPoses), "pairs.rawlog");
   ASSERT_EQ(run("import planar.rawlog --out imported.rawlog").status, 0);
   const auto map = mapOf("poses.rawlog");
-  mapOf("pairs.rawlog");
-  EXPECT_TRUE(pointsOfMap() == map) << "to the bit";
+  EXPECT_TRUE(mapOf("pairs.rawlog") == map) << "to the bit";
   for (const char* name : {"odometry", "planar", "spatial", "imported"}) {
     SCOPED_TRACE(name);
-    expectNear(mapOf(name + std::string(".rawlog")), map);
+    expectNearPcd(mapOf(name + std::string(".rawlog")), map);
   }
   EXPECT_THAT(run("info imported.rawlog").out, HasSubstr("actions:\n  51 poses from 10.0"));
   EXPECT_THAT(run("info odometry.rawlog --t1 10.2").out,
@@ -448,7 +436,7 @@ TEST_F(RawlogKinds, OdometryAndMovementsGiveTheMapThatPosesGive) {
 TEST_F(RawlogKinds, TheBuilderMapsBothAsMrptReadsThem) {
   save(observationsOnly(Says::kPoses), "observations.rawlog");
   save(pairs(Says::kMovements3d), "pairs.rawlog");
-  std::vector<std::vector<Eigen::Vector4f>> maps;
+  std::vector<std::string> maps;
   for (const char* name : {"observations.rawlog", "pairs.rawlog"}) {
     mrpt::io::CFileGZInputStream file((folder() / name).string());
     auto archive = mrpt::serialization::archiveFrom<mrpt::io::CStream>(file);
@@ -466,16 +454,14 @@ TEST_F(RawlogKinds, TheBuilderMapsBothAsMrptReadsThem) {
       }
     }
     builder.finish();
-    std::vector<Eigen::Vector4f>& map = maps.emplace_back();
-    const MapCloud::ConstPtr points = builder.points();
-    for (const MapPoint& point : *points) {
-      map.emplace_back(point.x, point.y, point.z, point.intensity);
-    }
+    std::ostringstream map;
+    writePcdTo(map, *builder.points());
+    maps.push_back(map.str());
     mrpt::poses::CPose3D pose;
     builder.getCurrentPoseEstimation()->getMean(pose);
     EXPECT_NEAR(pose.x(), recording.poses.back().T_world_rig.translation.x(), 1e-9);
   }
-  expectNear(maps[0], maps[1]);
+  expectNearPcd(maps[0], maps[1]);
 }
 
 TEST_F(RawlogKinds, ARawlogThatIsImportedKeepsLabelsDigitsCovariancesAndAllElse) {
@@ -520,10 +506,9 @@ TEST_F(RawlogKinds, ARawlogThatIsImportedKeepsLabelsDigitsCovariancesAndAllElse)
 }
 
 TEST_F(RawlogKinds, AHandEyeTransformAppliesToOdometryToo) {
-  std::ofstream(folder() / "up.yaml")
-      << "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
+  write("up.yaml", "T_body_rig: [[1, 0, 0, 0], [0, 1, 0, 7], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
   save(observationsOnly(Says::kOdometry), "odometry.rawlog");
-  mapOf("odometry.rawlog", "--hand-eye up.yaml");
+  mapOf("odometry.rawlog --hand-eye up.yaml");
   EXPECT_NEAR(readTumTrajectory(folder() / "out/trajectory.txt")[0].T_world_rig.translation.y(), 7,
               1e-9);
   const Result result = run("import odometry.rawlog --out r.rawlog --hand-eye up.yaml");

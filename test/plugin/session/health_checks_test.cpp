@@ -61,12 +61,8 @@ void rotate(SyntheticRecording& recording, double rate) {
   }
 }
 
-void keepStill(SyntheticRecording& recording) {
-  for (StampedPose& pose : recording.poses) pose.T_world_rig.translation.setZero();
-}
-
 void turnAtRest(SyntheticRecording& recording, double rate) {
-  keepStill(recording);
+  for (StampedPose& pose : recording.poses) pose.T_world_rig.translation.setZero();
   rotate(recording, rate);
 }
 
@@ -119,49 +115,19 @@ const std::vector<Fault> kFaults = {
        r.poses.erase(r.poses.begin(), r.poses.begin() + 8);
      },
      ""},
-    {"poses of another clock", [](auto& r) { delay(r, 1'700'000'000'000'000'000); },
-     "clock-overlap: the poses cover 0.0 % of"},
-    {"a lost tracker", [](auto& r) { r.poses.erase(r.poses.begin() + 51, r.poses.begin() + 90); },
-     "pose-gap: the largest gap between two poses is 0.4 s, after 10.500000000 s (+0.498 s): "
-     "events in gaps of more than 0.25 s are not used"},
-    {"no motion", keepStill,
-     "no-motion: the poses move by at most 0 m and 0 degrees within a window: depth needs a shift "
-     "of 0.005 m or more for points at 0.5 m;"},
     {"4.99 mm in a second", [](auto& r) { multiply(r, 0.00499 / 0.8); },
-     "no-motion: the poses move by at most 0.00499 m and 0 degrees"},
+     "no-motion: the poses move by at most 0.00499 m and 0 degrees within a window: depth needs a "
+     "shift of 0.005 m or more for points at 0.5 m;"},
     {"5.01 mm in a second", [](auto& r) { multiply(r, 0.00501 / 0.8); }, ""},
-    {"rotation alone", [](auto& r) { turnAtRest(r, 0.5); },
-     "rotation-only: the poses move by at most 0 m and 28.6 degrees within a window"},
     {"under a degree in a second", [](auto& r) { turnAtRest(r, 0.0174); },
      "no-motion: the poses move by at most 0 m and 0.997 degrees"},
     {"over a degree in a second", [](auto& r) { turnAtRest(r, 0.0176); }, "rotation-only: "},
-    {"positions in millimetres", [](auto& r) { multiply(r, 1000); },
-     "speed: the poses move at up to 800 m/s: expected at most 50;"},
     {"49.9 m/s", [](auto& r) { multiply(r, 49.9 / 0.8); }, ""},
     {"50.1 m/s", [](auto& r) { multiply(r, 50.1 / 0.8); },
      "speed: the poses move at up to 50.1 m/s"},
     {"19.9 rad/s", [](auto& r) { rotate(r, 19.9); }, ""},
     {"20.1 rad/s", [](auto& r) { rotate(r, 20.1); },
      "rotation-rate: the poses rotate at up to 20.1 rad/s: expected at most 20;"},
-    {"one column of hot pixels",
-     [](auto& r) {
-       for (Event& event : r.events[0]) event.x = 7;
-     },
-     "hot-pixels: 100 % of the events of camera 0 come from 1 % of its pixels"},
-    {"a camera with a clock 2 s ahead, and poses of both times",
-     [](auto& r) {
-       for (Event& event : r.events[1]) event.t_ns += 2'000'000'000;
-       const std::vector<StampedPose> poses = r.poses;
-       for (StampedPose pose : poses) {
-         pose.t_ns += 2'000'000'000;
-         pose.T_world_rig.translation += poses.back().T_world_rig.translation;
-         r.poses.push_back(pose);
-       }
-     },
-     "camera-clocks: camera 0 has events from 10.002000000 to 12.000000000 s, camera 1 from "
-     "12.002000000 to 14.000000000 s"},
-    {"one file of events twice", [](auto& r) { r.events[1] = r.events[0]; },
-     "same-events: cameras 0 and 1 have the same events"},
     {"no poses", [](auto& r) { r.poses.clear(); }, "no-poses: "},
     {"no events", [](auto& r) { r.events.assign(2, {}); }, "no-events: "},
     {"no calibration", [](auto& r) { r.cameras[1].model.fx = 0; },
@@ -459,14 +425,12 @@ TEST(HealthChecks, EventsThatOccupyAPartOfTheSensorAreSeen) {
   for (int x = 0; x < 120; ++x) fading.fill({x, x + 1}, all_rows, std::min(1.0, 0.02 * x));
   const std::vector<Row> rows = {
       {"all", Sensor().fill(all_columns, all_rows), ""},
-      {"cropped at the right", Sensor().fill({0, 80}, all_rows), "columns 0 to 79 of 0 to 119"},
       {"cropped at the left", Sensor().fill({40, 120}, all_rows), "columns 40 to 119 of 0"},
       {"at both sides", Sensor().fill({20, 100}, all_rows), "columns 20 to 99 of 0 to 119"},
       {"below", Sensor().fill(all_columns, {0, 70}), "rows 0 to 69 of 0 to 89"},
       {"above", Sensor().fill(all_columns, {20, 90}), "rows 20 to 89 of 0 to 89"},
       {"by 9 columns", Sensor().fill({0, 111}, all_rows), "columns 0 to 110 of"},
       {"by 8 columns", Sensor().fill({0, 112}, all_rows), ""},
-      {"binned", Sensor().fill({0, 60}, {0, 45}), "columns 0 to 59 of 0 to 119 and rows 0 to 44 "},
       {"binned, with stray events",
        Sensor().fill(all_columns, all_rows, 0.003).fill({0, 60}, {0, 45}),
        "columns 0 to 59 of 0 to 119 and rows 0 to 44 "},
@@ -558,9 +522,6 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
     std::function<void(SessionStatus&, FusionMapperOptions&)> make;
     const char* expected;
   };
-  const auto counts = [](const std::function<void(MapperCounts&)>& change) {
-    return [change](SessionStatus& status, auto&) { change(status.counts); };
-  };
   const auto unused = [](std::uint64_t EventCounts::*kind, std::uint64_t events, std::uint64_t drop,
                          const std::function<void(FusionMapperOptions&)>& change = {}) {
     return [=](SessionStatus& status, FusionMapperOptions& options) {
@@ -583,10 +544,6 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
   };
   const Row rows[] = {
       {[](auto&, auto&) {}, ""},
-      {counts([](auto& c) { c.sorted_events = 3; }),
-       "sorted-events: 3 events came later than newer ones and were sorted"},
-      {counts([](auto& c) { c.cameras[1].outside_lens = 4; }),
-       "outside-lens: 4 of 30 events of camera 1 were not used"},
       {unused(&EventCounts::without_pose, 35, 0), ""},
       {unused(&EventCounts::without_pose, 36, 0),
        "events-without-pose: 51 of 100 events have no pose"},
@@ -605,21 +562,16 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
                 o.policy.policy = KeyframePolicyKind::kEvents;
               }),
        "events-outside-windows: 51 of 100"},
-      {[](auto& s, auto&) { s.silent_keyframes[1] = 2; },
-       "silent-keyframes: camera 1 had no event in 2 of 7 keyframes: rules that ask all cameras"},
       {[](auto& s, auto& o) {
          s.silent_keyframes[1] = 2;
          o.keyframe.exclude_silent = true;
        },
        "silent-keyframes: camera 1 had no event in 2 of 7 keyframes: the others were fused "
        "without"},
-      {counts([](auto& c) { c.silent_subintervals = 8; }),
-       "silent-subintervals: 8 sub-intervals of a camera had no event"},
       {[](auto& s, auto&) {
          s.other_poses[{PoseKind::kOdometry, "wheels"}] = 5;
        },
        "unused-poses: 5 poses were not used: odometry 'wheels', beside poses 'pose' ("},
-      {counts([](auto& c) { c.duplicate_poses = 9; }), "duplicate-poses: 9 poses had the time"},
       {refined([](auto&) {}), ""},
       {refined([](auto& r) { r.counts.registered = 4; }),
        "unregistered-keyframes: 2 of 7 keyframes found no place"},
@@ -629,8 +581,6 @@ TEST(HealthChecks, ASessionSaysWhatItDidNotUse) {
        }),
        "refinement-failures: the refinement failed 2 times, the last time with: why;"},
       {refined([](auto& r) { r.counts.failed_solves = 3; }), "failed-solves: 3 minima of"},
-      {counts([](auto& c) { c.keyframes_without_pose = 4; }), "windows-without-pose: 4 windows"},
-      {counts([](auto& c) { c.windows_without_events = 5; }), "windows-without-events: 5 windows"},
       {[](auto& s, auto&) { s.scene_unknown = true; }, "no-scene: "},
       {live([](auto&) {}), ""},
       {live([](auto& s) {
@@ -694,23 +644,12 @@ TEST(PoseWarning, SaysWhatMendsTheMistake) {
   rig.cameras.resize(2);
   rig.cameras[1].time_offset_ns = 2'000'000;
   PoseFinding finding;
-  finding.gain = 2.25;
-  finding.R_body_rig << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   const auto text = [&](Mistake mistake, double shift_s = 0) {
     finding.mistake = mistake;
     finding.shift_s = shift_s;
     return linesOf({poseWarning(finding, rig)}).at(0);
   };
-  EXPECT_THAT(text(Mistake::kInverted),
-              StartsWith("poses-inverted: the events are 2.2 times as sharp with each pose inv"));
-  EXPECT_THAT(text(Mistake::kQuaternionOrder), StartsWith("quaternion-order: "));
-  EXPECT_THAT(text(Mistake::kStereoInverted), StartsWith("cameras-swapped: "));
   EXPECT_THAT(text(Mistake::kUnknown), StartsWith("poses-unexplained: the poses do not explain"));
-  EXPECT_THAT(text(Mistake::kAxes),
-              AllOf(StartsWith("axis-convention: "),
-                    HasSubstr("x, y, z are the axes -y, -z, x of the poses; give a file with "
-                              "T_body_rig: [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], "
-                              "[0, 0, 0, 1]] (")));
   EXPECT_THAT(text(Mistake::kTimeShift, -0.0125),
               HasSubstr("with the poses 0.013 s later; --set rig.time_offsets_s=-0.013,-0.011"));
   EXPECT_THAT(text(Mistake::kTimeShift, 0.25),

@@ -36,14 +36,7 @@ constexpr std::int64_t kFirstNs = 1'700'000'000'000'000'123;
 class Mcap : public TemporaryFolder {
  protected:
   Mcap() : file_(folder() / "recording.mcap") {
-    CameraModel model;
-    model.width = 640;
-    model.height = 480;
-    model.fx = 500;
-    model.fy = 501;
-    model.cx = 320.5;
-    model.cy = 240.5;
-    model.distortion = DistortionModel::kEquidistant;
+    CameraModel model{640, 480, 500, 501, 320.5, 240.5, DistortionModel::kEquidistant, {}};
     model.coefficients = {0.1, -0.2, 0.3, -0.4};
     rig_.cameras.push_back({model, {}, 0});
   }

@@ -446,81 +446,64 @@ TEST(Hdf5CrashNote, EndsAProgramWithTheNameOfTheFileAndNoHost) {
 }
 
 TEST_F(Hdf5Events, AFileThatCannotBeReadNamesTheDataSetAndWhatIsExpected) {
-  struct Case {
-    std::function<void(Writing&)> write;
-    std::vector<std::string> parts;
+  struct DataSet {
+    const char* path;
+    hid_t type;
+    std::vector<double> numbers;
+    std::vector<hsize_t> sides{};
+    std::optional<H5Z_filter_t> filter{};  ///< In chunks of three; 0: none.
   };
-  const Numbers three = {1, 2, 3};
-  const auto chunked = [](H5Z_filter_t filter) {
-    Hdf5Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-    const hsize_t side = 3;
-    H5Pset_chunk(creation.get(), 1, &side);
-    if (filter != 0) H5Pset_filter(creation.get(), filter, H5Z_FLAG_OPTIONAL, 0, nullptr);
-    return creation;
+  const std::vector<double> three = {1, 2, 3};
+  const std::vector<double> sixteen(16, 0.5);
+  const char* const mvsec = "davis/left/events";
+  const auto with_rest = [&](const DataSet& x) {
+    return std::vector<DataSet>{x,
+                                {"events/y", H5T_STD_U16LE, three},
+                                {"events/t", H5T_STD_I64LE, three},
+                                {"events/p", H5T_STD_U8LE, three}};
   };
-  const auto rest = [three](Writing& writing) {
-    writing.add("events/y", H5T_STD_U16LE, three);
-    writing.add("events/t", H5T_STD_I64LE, three);
-    writing.add("events/p", H5T_STD_U8LE, three);
-  };
-  const std::vector<Case> cases = {
-      {[&](Writing& writing) { writing.add("rectify_map", H5T_IEEE_F32LE, three); },
+  const std::pair<std::vector<DataSet>, std::vector<std::string>> cases[] = {
+      {{{"rectify_map", H5T_IEEE_F32LE, three}},
        {"without events or poses", "/events/x (DSEC", "/CD/events (Metavision)", "/Cn_T_C0"}},
-      {[&](Writing& writing) { writing.add("events/x", H5T_STD_U16LE, three); },
+      {{{"events/x", H5T_STD_U16LE, three}},
        {":/events/y: cannot be opened", "expected a data set"}},
-      {[&](Writing& writing) {
-         writing.add("events/x", H5T_STD_U16LE, Numbers{1, 2});
-         rest(writing);
-       },
+      {with_rest({"events/x", H5T_STD_U16LE, {1, 2}}),
        {":/events/y: 3 numbers: expected 2, as many as /events/x has"}},
-      {[&](Writing& writing) { writing.add("events/x", H5T_STD_U16BE, three); },
+      {{{"events/x", H5T_STD_U16BE, three}},
        {":/events/x: expected whole numbers", "little-endian"}},
-      {[&](Writing& writing) {
-         const Hdf5Id ecf = chunked(0x8ECF);
-         writing.add("CD/events", H5T_STD_U16LE, three, {}, ecf.get());
-       },
+      {{{"CD/events", H5T_STD_U16LE, three, {}, 0x8ECF}},
        {":/CD/events: it is compressed with Prophesee's ECF (0x8ECF)", "hdf5_ecf"}},
-      {[&](Writing& writing) {
-         const Hdf5Id lz4 = chunked(32004);
-         writing.add("events/x", H5T_STD_U16LE, three, {}, lz4.get());
-       },
+      {{{"events/x", H5T_STD_U16LE, three, {}, 32004}},
        {":/events/x: it is compressed with filter 32004", "HDF5_PLUGIN_PATH"}},
-      {[&](Writing& writing) { writing.add("CD/events", H5T_STD_U16LE, three); },
+      {{{"CD/events", H5T_STD_U16LE, three}},
        {":/CD/events: expected a list of compound values with a field x"}},
-      {[&](Writing& writing) {
-         const Hdf5Id plain = chunked(0);
-         writing.add("events/x", H5T_STD_U16LE, Numbers{}, {3}, plain.get());
-         rest(writing);
-       },
+      {with_rest({"events/x", H5T_STD_U16LE, {}, {3}, 0}),
        {":/events/x[0]: the chunk is missing: expected a complete file"}},
-      {[&](Writing& writing) {
-         writing.add("davis/left/events", H5T_IEEE_F64LE, std::vector<double>{1, 2, 3}, {1, 3});
-       },
+      {{{mvsec, H5T_IEEE_F64LE, three, {1, 3}}},
        {":/davis/left/events: 3 columns: expected 4 or more"}},
-      {[&](Writing& writing) {
-         writing.add("davis/left/events", H5T_IEEE_F64LE,
-                     std::vector<double>{1, 2, std::nan(""), 1}, {1, 4});
-       },
+      {{{mvsec, H5T_IEEE_F64LE, {1, 2, std::nan(""), 1}, {1, 4}}},
        {":/davis/left/events[0]: t = 'nan': expected a time"}},
-      {[&](Writing& writing) {
-         writing.add("Cn_T_C0", H5T_IEEE_F64LE, std::vector<double>(16, 0.5), {1, 4, 4});
-         writing.add("ts", H5T_STD_I64LE, Numbers{1});
-       },
+      {{{"Cn_T_C0", H5T_IEEE_F64LE, sixteen, {1, 4, 4}}, {"ts", H5T_STD_I64LE, {1}}},
        {":/Cn_T_C0[0]: expected a 4x4 matrix of a rotation and a translation"}},
-      {[&](Writing& writing) {
-         writing.add("Cn_T_C0", H5T_IEEE_F64LE, std::vector<double>(16, 0.5), {1, 4, 4});
-         writing.add("ts", H5T_STD_I64LE, three);
-       },
+      {{{"Cn_T_C0", H5T_IEEE_F64LE, sixteen, {1, 4, 4}}, {"ts", H5T_STD_I64LE, three}},
        {":/Cn_T_C0: 1 rows of 16 numbers: expected 3 matrices of 4x4 numbers, as many as /ts has"}},
   };
-  for (const Case& wrong : cases) {
+  for (const auto& [sets, parts] : cases) {
     {
       Writing writing(file());
-      wrong.write(writing);
+      for (const DataSet& set : sets) {
+        const Hdf5Id creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+        const hsize_t side = 3;
+        if (set.filter) H5Pset_chunk(creation.get(), 1, &side);
+        if (set.filter.value_or(0) != 0) {
+          H5Pset_filter(creation.get(), *set.filter, H5Z_FLAG_OPTIONAL, 0, nullptr);
+        }
+        writing.add(set.path, set.type, set.numbers, set.sides, creation.get());
+      }
     }
     const std::string error = errorOfFile();
     EXPECT_THAT(error, StartsWith(file().string()));
-    for (const std::string& part : wrong.parts) EXPECT_THAT(error, HasSubstr(part));
+    for (const std::string& part : parts) EXPECT_THAT(error, HasSubstr(part));
   }
   writeFile(file(), "x y t p\n");
   EXPECT_EQ(errorOfFile(), file().string() +

@@ -17,6 +17,25 @@ namespace {
 
 using testing::HasSubstr;
 
+constexpr const char* kCamera =
+    "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
+    "resolution: [346, 260]}\n";
+
+/// Two cameras of 240 x 180 pixels. @param shift_ms of the clock of the second one.
+std::string twoCamchain(int shift_ms = 0) {
+  std::string text;
+  for (const char* name : {"cam0", "cam1"}) {
+    text += name +
+            std::string(
+                ":\n  camera_model: pinhole\n  intrinsics: [200, 200, 120, 90]\n"
+                "  distortion_model: none\n  resolution: [240, 180]\n"
+                "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
+                "  timeshift_cam_imu: ") +
+            std::to_string(name[3] == '1' ? 1e-3 * shift_ms : 0) + "\n";
+  }
+  return text;
+}
+
 class OpenRecording : public TemporaryFolder {
  protected:
   static std::string errorOf(const std::vector<std::filesystem::path>& sources,
@@ -111,12 +130,9 @@ Opened openedOf(const RecordingSource& source) {
 }
 
 TEST_F(OpenRecording, TheOnlyCalibrationAndTheOnlyPosesOfAFolderAreTakenAndSaid) {
-  const std::string camera =
-      "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
-      "resolution: [346, 260]}\n";
   write("events.txt", "0.1 300 2 0\n0.2 1 2 1\n");
   write("imu.txt", "0.1 1 2 3 4 5 6\n");
-  write("my rig.yaml", camera);
+  write("my rig.yaml", kCamera);
   write("tracker.csv", "t_ns,x,y,z,qx,qy,qz,qw\n5,1,2,3,0,0,0,1\n");
   RecordingSource source;
   source.files = {folder()};
@@ -129,7 +145,7 @@ TEST_F(OpenRecording, TheOnlyCalibrationAndTheOnlyPosesOfAFolderAreTakenAndSaid)
   };
   EXPECT_THAT(opened.warnings, testing::ElementsAre(said("my rig.yaml", "--calibration"),
                                                     said("tracker.csv", "--poses")));
-  write("other.yaml", camera);
+  write("other.yaml", kCamera);
   EXPECT_THAT(
       errorOf({folder()}),
       HasSubstr("no calibration: expected calib.txt (not clear: my rig.yaml, other.yaml), or "
@@ -162,19 +178,6 @@ TEST_F(OpenRecording, TheSensorsSizeMayBeTold) {
 }
 
 TEST_F(OpenRecording, AnIntervalIsOnTheClockOfThePoses) {
-  const auto camchain = [](int shift_ms) {
-    std::string text;
-    for (const char* name : {"cam0", "cam1"}) {
-      text += name +
-              std::string(
-                  ":\n  camera_model: pinhole\n  intrinsics: [200, 200, 120, 90]\n"
-                  "  distortion_model: none\n  resolution: [240, 180]\n"
-                  "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n"
-                  "  timeshift_cam_imu: ") +
-              std::to_string(name[3] == '1' ? 1e-3 * shift_ms : 0) + "\n";
-    }
-    return text;
-  };
   std::string events;  // one each ms
   for (int i = 1000; i < 2000; ++i) {
     events += "1." + std::to_string(i).substr(1) + " " + std::to_string(i % 240) + " 1 0\n";
@@ -193,12 +196,12 @@ TEST_F(OpenRecording, AnIntervalIsOnTheClockOfThePoses) {
                                                            {-50, {}, 450, 650},
                                                            {0, 80, 320, 520},
                                                            {50, -80, 480, 680}}) {
-    write("camchain.yaml", camchain(own_ms));
+    write("camchain.yaml", twoCamchain(own_ms));
     RecordingSource source;
     source.files = {folder()};
     source.limits = {1'400'000'000, 1'600'000'000};
     if (given_ms) {
-      write("given.yaml", camchain(*given_ms));
+      write("given.yaml", twoCamchain(*given_ms));
       source.calibration = folder() / "given.yaml";
     }
     std::vector<Event> found[2];
@@ -217,15 +220,12 @@ TEST_F(OpenRecording, AnIntervalIsOnTheClockOfThePoses) {
 }
 
 TEST_F(OpenRecording, SourcesThatDoNotFitTogetherAreErrors) {
-  const std::string camera =
-      "cam0: {camera_model: pinhole, intrinsics: [200, 201, 120, 90], distortion_model: none, "
-      "resolution: [240, 180]}\n";
   for (const char* name : {"uzh/events.txt", "a/cam0/events.txt", "b/cam0/events.txt"}) {
     write(name, "0.1 1 2 0\n");
   }
   write("uzh/calib.txt", "200 200 120 90 0 0 0 0 0\n");
-  write("a/camchain.yaml", camera);
-  write("b/camchain.yaml", camera);
+  write("a/camchain.yaml", kCamera);
+  write("b/camchain.yaml", kCamera);
   write("r.rawlog",
         "\x8d"
         "CObservationGPS");
@@ -279,14 +279,7 @@ class TextFolder : public TemporaryFolder {
 class DatasetFolder : public TextFolder {
  protected:
   DatasetFolder() : TextFolder("folder") {
-    std::string camchain;
-    for (const char* name : {"cam0", "cam1"}) {
-      camchain += std::string(name) +
-                  ":\n  camera_model: pinhole\n  intrinsics: [200, 200, 120, 90]\n"
-                  "  distortion_model: none\n  resolution: [240, 180]\n"
-                  "  T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n";
-    }
-    write("camchain.yaml", camchain);
+    write("camchain.yaml", twoCamchain());
     write("cam0/events.txt", "0.1 239 179 1\n");
     write("cam1/events.txt", "0.2 0 0 0\n");
     write("poses.txt", "0.3 1 2 3 0 0 0 1\n0.0 0 2 3 0 0 0 1\n");

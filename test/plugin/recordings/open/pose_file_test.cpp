@@ -13,6 +13,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 class PoseFile : public TemporaryFolder {
  protected:
@@ -21,17 +22,16 @@ class PoseFile : public TemporaryFolder {
   static void expectTwo(const std::vector<StampedPose>& poses, std::int64_t t0_ns,
                         std::int64_t t1_ns, const std::string& what) {
     ASSERT_EQ(poses.size(), 2U) << what;
-    EXPECT_EQ(poses[0].t_ns, t0_ns) << what;
-    EXPECT_EQ(poses[1].t_ns, t1_ns) << what;
-    EXPECT_EQ(poses[0].T_world_rig.translation, Eigen::Vector3d(1, 2, 3)) << what;
-    EXPECT_EQ(poses[1].T_world_rig.translation, Eigen::Vector3d(4, 5, 6)) << what;
-    const Eigen::Vector4d q0 = poses[0].T_world_rig.rotation.coeffs();
-    const Eigen::Vector4d q1 = poses[1].T_world_rig.rotation.coeffs();
-    EXPECT_LT(std::min((q0 - Eigen::Vector4d(0.5, 0.5, 0.5, 0.5)).norm(),
-                       (q0 + Eigen::Vector4d(0.5, 0.5, 0.5, 0.5)).norm()),
-              1e-12)
-        << what;
-    EXPECT_LT((q1 - Eigen::Vector4d(0.8, 0, 0, 0.6)).norm(), 1e-12) << what;
+    const StampedPose expected[] = {{t0_ns, {{0.5, 0.5, 0.5, 0.5}, {1, 2, 3}}},
+                                    {t1_ns, {{0.6, 0.8, 0, 0}, {4, 5, 6}}}};
+    for (const std::size_t i : {0, 1}) {
+      const Rigid3& T_world_rig = poses[i].T_world_rig;
+      const Rigid3& T_expected = expected[i].T_world_rig;
+      EXPECT_EQ(poses[i].t_ns, expected[i].t_ns) << what;
+      EXPECT_EQ(T_world_rig.translation, T_expected.translation) << what;
+      EXPECT_LT((T_world_rig.rotation.conjugate() * T_expected.rotation).vec().norm(), 1e-12)
+          << what;
+    }
   }
   std::filesystem::path write(const std::string& name, const std::string& bytes) const {
     writeFile(folder() / name, bytes);
@@ -167,9 +167,7 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
     const char* error;
   } cases[] = {
       {"a.txt", "", "a.txt: an empty file"},
-      {"a.txt", "# nothing\n", "a.txt: no poses"},
       {"a.txt", "1 2 3\n", "a.txt:1: 3 fields: expected 8, t tx ty"},
-      {"a.txt", "# x\n1.5 1 2 3 0 0 0 2\n", "a.txt:2: qx qy qz qw = '0 0 0 2', of length 2"},
       {"a.txt", "1.5 1 2 3 0 0 0 1\nabc 1 2 3 0 0 0 1\n", "a.txt:2: 'abc 1 2 3 0 0 0 1': expected"},
       {"a.txt", "1.5,1,2,3,0,0,0,1\n", "a.txt:1: commas without a header"},
       {"a.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 9 0 1 0 0 0 0 1 0\n",
@@ -177,10 +175,7 @@ TEST_F(PoseFile, AnErrorNamesTheFileThePlaceAndTheExpectedValue) {
       {"a.csv", "#t [us], tx, ty, tz, qx, qy, qz\n", "there is no column qw"},
       {"a.csv", "t_us,x [ft],y [ft],z [ft],qx,qy,qz,qw\n",
        "a.csv:1: the unit 'ft' of tx: expected"},
-      {"a.csv", "t_us,x,y,z,roll,pitch,yaw\n", "angles are not read, because"},
       {"a.txt", "1.5 1 2 3 10 20 30\n", "7 fields: expected 8, t tx ty tz qx qy qz qw (angles are"},
-      {"a.txt", "1.5 1 0 0 0 1 2 3\n", "is the order t qx qy qz qw tx ty tz? A header names"},
-      {"a.txt", "1.5 1 2 3 0 45 0 0\n", "are the columns t tx ty tz qx qy qz qw? A header names"},
       {"a.csv", header + "1,1,2,3,0,0,0\n", "a.csv:2: 7 fields: expected 8, as in the header"},
       {"a.csv", header + "1,1,2,3,0,0,0,z\n", "a.csv:2: qw = 'z': expected a finite number"},
       {"a.bin", std::string("\x7f\0ELF", 5), "a.bin: not a file of poses: expected text"},
@@ -224,12 +219,6 @@ class UnreadFormats : public TemporaryFolder {
   }
 };
 
-/// @return whether `text` begins with `start`.
-testing::AssertionResult begins(const std::string& text, const std::string& start) {
-  if (text.compare(0, start.size(), start) == 0) return testing::AssertionSuccess();
-  return testing::AssertionFailure() << "'" << text << "' begins not with '" << start << "'";
-}
-
 TEST_F(UnreadFormats, AreNamedByTheirFirstBytes) {
   const std::pair<std::string, const char*> cases[] = {
       {"version https://git-lfs.github.com/spec/v1\noid sha256:1\n", "a pointer of git-LFS"},
@@ -261,24 +250,26 @@ TEST_F(UnreadFormats, AreNamedByTheirFirstBytes) {
       {"", "an empty file"},
       {std::string(512, '\0'), "a file of zeros"},
   };
-  for (const auto& [bytes, name] : cases) EXPECT_TRUE(begins(nameOf(bytes), name));
+  for (const auto& [bytes, name] : cases) EXPECT_THAT(nameOf(bytes), StartsWith(name));
 }
 
 TEST_F(UnreadFormats, OwnResultsSayWhatShowsThem) {
   const std::string what =
       ": expected a recording; `event-fusion view` shows a map, `event-fusion ev";
   const std::string report = R"({"version": "1", "votes_per_second": 1})";
-  EXPECT_TRUE(begins(nameOf(report), "the report of an earlier run" + what));
+  EXPECT_THAT(nameOf(report), StartsWith("the report of an earlier run" + what));
   EXPECT_EQ(nameOf(R"({"version": "1"})"), "");
-  EXPECT_TRUE(begins(nameOf("<!DOCTYPE html>\n<meta name=\"generator\" content=\"event-fusion\">"),
-                     "the page of a map" + what));
-  EXPECT_TRUE(begins(nameOf("# .PCD v0.7 - Point Cloud Data\n"), "a point cloud (PCD)" + what));
+  EXPECT_THAT(nameOf("<!DOCTYPE html>\n<meta name=\"generator\" content=\"event-fusion\">"),
+              StartsWith("the page of a map" + what));
+  EXPECT_THAT(nameOf("# .PCD v0.7 - Point Cloud Data\n"), StartsWith("a point cloud (PCD)" + what));
   std::filesystem::remove(folder() / "file");
   writeFile(folder() / "map.html", "<!DOCTYPE html>");
   writeFile(folder() / "report.json", "{}");
-  EXPECT_TRUE(begins(unreadFormat(folder()).value_or(""), "a folder; map.html in it is an HTML"));
+  EXPECT_THAT(unreadFormat(folder()).value_or(""),
+              StartsWith("a folder; map.html in it is an HTML"));
   writeFile(folder() / "report.json", report);
-  EXPECT_TRUE(begins(unreadFormat(folder()).value_or(""), "the result of an earlier run" + what));
+  EXPECT_THAT(unreadFormat(folder()).value_or(""),
+              StartsWith("the result of an earlier run" + what));
 }
 
 TEST_F(UnreadFormats, AreNamedWithinCompressedFiles) {
@@ -287,14 +278,15 @@ TEST_F(UnreadFormats, AreNamedWithinCompressedFiles) {
     writeZip(file, members);
     return unreadFormat(file).value_or("");
   };
-  EXPECT_TRUE(
-      begins(name_of_zip({{"a.txt", "1 2"}, {"b.txt", "1 2"}}), "a zip archive: unpack it"));
-  EXPECT_TRUE(begins(name_of_zip({{"a.bag", "#ROSBAG V2.0\n"}}), "a compressed ROS 1 bag: unpack"));
-  EXPECT_TRUE(begins(name_of_zip({{"a.png", "\x89PNG\r\n"}}), "a PNG picture"));
+  EXPECT_THAT(name_of_zip({{"a.txt", "1 2"}, {"b.txt", "1 2"}}),
+              StartsWith("a zip archive: unpack it"));
+  EXPECT_THAT(name_of_zip({{"a.bag", "#ROSBAG V2.0\n"}}),
+              StartsWith("a compressed ROS 1 bag: unpack"));
+  EXPECT_THAT(name_of_zip({{"a.png", "\x89PNG\r\n"}}), StartsWith("a PNG picture"));
   writeGzip(file, "\x89HDF\r\n\x1a\n");
-  EXPECT_TRUE(begins(unreadFormat(file).value_or(""), "a compressed HDF5 file: unpack it"));
+  EXPECT_THAT(unreadFormat(file).value_or(""), StartsWith("a compressed HDF5 file: unpack it"));
   writeGzip(file, "a.bag" + std::string(252, '\0') + "ustar");
-  EXPECT_TRUE(begins(unreadFormat(file).value_or(""), "a tar archive: unpack it"));
+  EXPECT_THAT(unreadFormat(file).value_or(""), StartsWith("a tar archive: unpack it"));
 }
 
 TEST_F(UnreadFormats, OthersHaveNoName) {
@@ -314,14 +306,16 @@ TEST_F(UnreadFormats, AFolderIsNamedByTheFilesInIt) {
     return unreadFormat(folder() / "in").value_or("");
   };
   EXPECT_EQ(folder_of("", ""), "an empty folder: expected a recording");
-  EXPECT_TRUE(begins(folder_of("1.png", "\x89PNG\r\n\x1a\n"), "a folder; 1.png in it is a PNG pi"));
-  EXPECT_TRUE(begins(folder_of("0.mcap", "\x89MCAP0\r\n"),
-                     "a folder: give its files themselves (0.mcap is a ROS 2 bag"));
+  EXPECT_THAT(folder_of("1.png", "\x89PNG\r\n\x1a\n"),
+              StartsWith("a folder; 1.png in it is a PNG pi"));
+  EXPECT_THAT(folder_of("0.mcap", "\x89MCAP0\r\n"),
+              StartsWith("a folder: give its files themselves (0.mcap is a ROS 2 bag"));
   EXPECT_EQ(folder_of("readme", "words"), "");
   for (const char* name : {"m.png", "b.png", "a", "aa", "ab", "ac", "h.png"}) {  // the first known
     writeFile(folder() / "in" / name, name[0] == 'a' ? "words" : "\x89PNG\r\n\x1a\n");
   }
-  EXPECT_TRUE(begins(unreadFormat(folder() / "in").value_or(""), "a folder; b.png in it is a PNG"));
+  EXPECT_THAT(unreadFormat(folder() / "in").value_or(""),
+              StartsWith("a folder; b.png in it is a PNG"));
 }
 
 }  // namespace

@@ -21,27 +21,22 @@ std::vector<std::string> textsOf(const AxisRange& range, int max_ticks) {
   return texts;
 }
 
-TEST(PlotAxis, TicksAreRoundNumbers) {
+TEST(PlotAxis, TicksAreRoundNumbersAndOnLogarithmicAxesPowersOfTenOrValuesBetweenThem) {
   EXPECT_THAT(textsOf({0, 1}, 6), ElementsAre("0", "0.2", "0.4", "0.6", "0.8", "1"));
   EXPECT_THAT(textsOf({0, 102}, 6), ElementsAre("0", "20", "40", "60", "80", "100"));
   EXPECT_THAT(textsOf({-0.7, 2.3}, 5), ElementsAre("0", "1", "2"));
   EXPECT_THAT(textsOf({12.3, 12.9}, 4), ElementsAre("12.4", "12.6", "12.8"));
   EXPECT_THAT(textsOf({0, 1}, 5), ElementsAre("0", "0.5", "1"));
   EXPECT_THAT(textsOf({0, 1}, 2), ElementsAre("0", "1"));
-}
-
-TEST(PlotAxis, LogarithmicTicksArePowersOfTenAndValuesBetweenThem) {
   EXPECT_THAT(textsOf({0.01, 1, AxisScale::kLogarithmic}, 7),
               ElementsAre("0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1"));
   EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 7),
               ElementsAre("1", "10", "100", "1000", "10000", "100000", "1e+06"));
   EXPECT_THAT(textsOf({1, 1e6, AxisScale::kLogarithmic}, 4),
               ElementsAre("1", "100", "10000", "1e+06"));
-}
-
-TEST(PlotAxis, AShortLogarithmicAxisHasTicksEvenlyApart) {
   EXPECT_THAT(textsOf({0.7, 3.2, AxisScale::kLogarithmic}, 5),
-              ElementsAre("1", "1.5", "2", "2.5", "3"));
+              ElementsAre("1", "1.5", "2", "2.5", "3"))
+      << "a short axis: evenly apart";
 }
 
 TEST(PlotAxis, ALogarithmicAxisHasEqualFactorsOnEqualLengths) {
