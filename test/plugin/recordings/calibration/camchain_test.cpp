@@ -104,18 +104,7 @@ TEST_F(Camchain, AnErrorNamesTheFile) {
   EXPECT_THAT(errorOfText("cam0: 5\n"), HasSubstr("cam0: expected keys"));
 }
 
-TEST_F(Camchain, AnErrorNamesTheCameraOfAMissingKey) {
-  const std::string cam1 = replaced(replaced(kCam1, "model: none", "model: radtan"),
-                                    "distortion_coeffs: []", "distortion_coeffs: [0, 0, 0, 0]");
-  for (const std::string key : {"camera_model", "intrinsics", "distortion_model",
-                                "distortion_coeffs", "resolution", "T_cn_cnm1"}) {
-    EXPECT_THAT(
-        errorOfText(kCam0 + replaced(cam1, key, "no_" + key)),
-        AllOf(StartsWith(file().string() + ":"), HasSubstr("cam1: " + key + " is missing")));
-  }
-}
-
-TEST_F(Camchain, AnErrorNamesFileLineCameraAndKeyOfAWrongValue) {
+TEST_F(Camchain, AnErrorNamesFileLineCameraAndKeyOfAWrongOrMissingValue) {
   const struct {
     const char* from;
     const char* to;
@@ -155,6 +144,13 @@ TEST_F(Camchain, AnErrorNamesFileLineCameraAndKeyOfAWrongValue) {
   for (const auto& row : cases) {
     EXPECT_THAT(errorOfText(replaced(kCam0 + kCam1, row.from, row.to)),
                 AllOf(StartsWith(file().string() + ":"), HasSubstr(row.error)));
+  }
+  for (const std::string key : {"camera_model", "intrinsics", "distortion_model",
+                                "distortion_coeffs", "resolution", "T_cn_cnm1"}) {
+    const std::string camera = key == "T_cn_cnm1" ? "cam1" : "cam0";
+    EXPECT_THAT(
+        errorOfText(replaced(kCam0 + kCam1, key, "no_" + key)),
+        AllOf(StartsWith(file().string() + ":"), HasSubstr(camera + ": " + key + " is missing")));
   }
   EXPECT_NO_THROW(read(replaced(kCam0, "-0.002]", "-0.002, 0.1]")));
   const Rig limits = read(replaced(kCam0, "[240, 180]", "[65535, 1]"));
