@@ -298,9 +298,10 @@ TEST(SensorClock, TheLeastDelayIsTheOffsetForTheWholeRecording) {
               HasSubstr("-1.000000001 s from the sensor's clock"));
   SensorClock host(0);  // which does not begin again
   EXPECT_FALSE(host.isHostClock()) << "it was not observed";
-  for (const auto& [offset_ns, is_host] :
-       {std::make_pair(1'000 * kMs, true), std::make_pair(-1'000 * kMs, true),
-        std::make_pair(1'000 * kMs + 1, false), std::make_pair(-1'000 * kMs - 1, false)}) {
+  for (const auto& [offset_ns, is_host] : {std::pair(1'000 * kMs, true),
+                                           {-1'000 * kMs, true},
+                                           {1'000 * kMs + 1, false},
+                                           {-1'000 * kMs - 1, false}}) {
     SensorClock observed(0);
     observed.observe(kUnixNs + offset_ns, kUnixNs);
     EXPECT_EQ(observed.isHostClock(), is_host) << offset_ns;
@@ -312,11 +313,14 @@ TEST(SensorClock, SynchronisedCamerasShareAnOffset) {
   first.observe(kUnixNs, 0);
   EXPECT_FALSE(SensorClock(kWrapNs).share(first, 10 * kMs)) << "it was not observed";
   EXPECT_FALSE(SensorClock(first).share(SensorClock(kWrapNs), 10 * kMs));
-  for (const auto& [difference_ns, shared] :
-       {std::make_pair(3 * kMs, true), std::make_pair(2 * kWrapNs - 3 * kMs, true),
-        std::make_pair(10 * kMs, true), std::make_pair(-10 * kMs, true),
-        std::make_pair(-3 * kWrapNs - 10 * kMs, true), std::make_pair(10 * kMs + 1, false),
-        std::make_pair(-10 * kMs - 1, false), std::make_pair(5'000 * kMs, false)}) {
+  for (const auto& [difference_ns, shared] : {std::pair(3 * kMs, true),
+                                              {2 * kWrapNs - 3 * kMs, true},
+                                              {10 * kMs, true},
+                                              {-10 * kMs, true},
+                                              {-3 * kWrapNs - 10 * kMs, true},
+                                              {10 * kMs + 1, false},
+                                              {-10 * kMs - 1, false},
+                                              {5'000 * kMs, false}}) {
     SensorClock other_wrap(kWrapNs * 2);
     other_wrap.observe(kUnixNs + difference_ns, 0);
     EXPECT_FALSE(other_wrap.share(first, 10 * kMs));

@@ -6,7 +6,6 @@
 #include <lz4frame.h>
 #include <zstd.h>
 
-#include <array>
 #include <cstring>
 #include <utility>
 
@@ -21,15 +20,17 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
+using Packing = Aedat4Compression;
+
 constexpr std::int64_t kStartUs = 1'600'000'000'000'000;
 
 std::string textOf(const void* data, std::size_t size) {
   return {static_cast<const char*>(data), size};
 }
 
-std::string compressed(Aedat4Compression compression, const std::string& bytes) {
-  if (compression == Aedat4Compression::kNone) return bytes;
-  if (compression == Aedat4Compression::kLz4 || compression == Aedat4Compression::kLz4High) {
+std::string compressed(Packing compression, const std::string& bytes) {
+  if (compression == Packing::kNone) return bytes;
+  if (compression == Packing::kLz4 || compression == Packing::kLz4High) {
     std::string packed(LZ4F_compressFrameBound(bytes.size(), nullptr), '\0');
     packed.resize(
         LZ4F_compressFrame(packed.data(), packed.size(), bytes.data(), bytes.size(), nullptr));
@@ -65,27 +66,26 @@ std::string shifted(std::string bytes, std::uint32_t skip) {
   return bytes.insert(12, skip, '\0');  // behind the identifier
 }
 
-struct Entry {
-  std::int64_t byte;
-  std::array<std::int32_t, 2> packet;  // stream, size
-  std::int64_t count;
-  std::int64_t first_us;
-  std::int64_t last_us;
-};
-
 struct PacketInfo {
   std::int32_t stream;
   std::int32_t size;
+};
+
+struct Entry {
+  std::int64_t byte;
+  PacketInfo packet;
+  std::int64_t count;
+  std::int64_t first_us;
+  std::int64_t last_us;
 };
 
 std::string indexOf(const std::vector<Entry>& entries) {
   flatbuffers::FlatBufferBuilder builder;
   std::vector<flatbuffers::Offset<flatbuffers::Table>> tables;
   for (const Entry& entry : entries) {
-    const PacketInfo packet = {entry.packet[0], entry.packet[1]};
     const auto table = builder.StartTable();
     builder.AddElement(4, entry.byte, std::int64_t{0});
-    builder.AddStruct(6, &packet);
+    builder.AddStruct(6, &entry.packet);
     builder.AddElement(8, entry.count, std::int64_t{0});
     builder.AddElement(10, entry.first_us, std::int64_t{0});
     builder.AddElement(12, entry.last_us, std::int64_t{0});
@@ -97,7 +97,7 @@ std::string indexOf(const std::vector<Entry>& entries) {
   return finished(builder, builder.EndTable(table), "FTAB");
 }
 
-std::string headerOf(Aedat4Compression compression, std::int64_t index, const std::string& xml,
+std::string headerOf(Packing compression, std::int64_t index, const std::string& xml,
                      std::uint32_t skip = 0) {
   flatbuffers::FlatBufferBuilder builder;
   builder.ForceDefaults(true);  // so that its size is the same for every index
@@ -158,7 +158,7 @@ std::string packetBytes(std::int32_t stream, const std::string& data) {
   return textOf(&stream, 4) + textOf(&size, 4) + data;
 }
 
-std::string recording(Aedat4Compression compression, bool with_index, std::uint32_t skip = 0) {
+std::string recording(Packing compression, bool with_index, std::uint32_t skip = 0) {
   const std::string begin = headerOf(compression, -1, twoCameras(), skip);
   std::string packets;
   std::vector<Entry> entries;
@@ -207,7 +207,7 @@ class Aedat4 : public TemporaryFolder {
 TEST_F(Aedat4, EachStreamOfEventsIsACameraWhereverItsFlatBuffersAreAligned) {
   for (std::uint32_t skip = 0; skip < 8; ++skip) {
     const bool with_index = skip % 3 != 1;
-    writeFile(file(), recording(static_cast<Aedat4Compression>(skip % 5), with_index, skip));
+    writeFile(file(), recording(static_cast<Packing>(skip % 5), with_index, skip));
     ASSERT_NE(detectFormat(file()), nullptr);
     EXPECT_EQ(detectFormat(file())->name, "aedat4");
     RecordingParts parts = open();
@@ -244,7 +244,7 @@ TEST_F(Aedat4, EachPositionInAFlatBufferIsChecked) {
 }
 
 TEST_F(Aedat4, StreamsAreChosenByCameraOutputOrNumber) {
-  writeFile(file(), recording(Aedat4Compression::kLz4, false));
+  writeFile(file(), recording(Packing::kLz4, false));
   ReaderOptions options;
   options.topics = {"right", "0"};
   RecordingParts parts = open(options);
@@ -263,14 +263,14 @@ TEST_F(Aedat4, TheSensorHas65535PixelsAtMost) {
                                     std::pair("0", false), std::pair("65536", false)}) {
     for (const char* other : {"640", "480"}) {
       const std::string xml = replaced(streamXml(0, "EVTS", "a"), other, side);
-      writeFile(file(), headerOf(Aedat4Compression::kNone, -1, outInfo(xml)));
+      writeFile(file(), headerOf(Packing::kNone, -1, outInfo(xml)));
       EXPECT_EQ(open().cameras.at(0)->size().has_value(), known) << side << " for " << other;
     }
   }
 }
 
 TEST_F(Aedat4, ASeekStartsAtThePacketOfItsTime) {
-  writeFile(file(), recording(Aedat4Compression::kZstd, true));
+  writeFile(file(), recording(Packing::kZstd, true));
   for (const auto& [t_us, packet] : {std::pair<std::int64_t, int>{0, 0},
                                      {kStartUs, 0},
                                      {kStartUs + 17'500, 17},
@@ -282,7 +282,7 @@ TEST_F(Aedat4, ASeekStartsAtThePacketOfItsTime) {
     EXPECT_TRUE(readStream(*parts.cameras[1]) == streamEvents(3, packet)) << t_us;
   }
   // With an index that does not fit, all is read.
-  std::string damaged = recording(Aedat4Compression::kZstd, true);
+  std::string damaged = recording(Packing::kZstd, true);
   damaged[damaged.size() - 100] ^= 1;
   writeFile(file(), damaged);
   RecordingParts parts = open();
@@ -291,9 +291,9 @@ TEST_F(Aedat4, ASeekStartsAtThePacketOfItsTime) {
 }
 
 TEST_F(Aedat4, WrongDataAreErrorsThatNameTheirPosition) {
-  const std::string good = recording(Aedat4Compression::kLz4, false);
-  const std::size_t packets = headerOf(Aedat4Compression::kLz4, -1, twoCameras()).size();
-  const auto with_packet = [&](Aedat4Compression compression, const std::string& data) {
+  const std::string good = recording(Packing::kLz4, false);
+  const std::size_t packets = headerOf(Packing::kLz4, -1, twoCameras()).size();
+  const auto with_packet = [&](Packing compression, const std::string& data) {
     return headerOf(compression, -1, twoCameras()) + packetBytes(0, data);
   };
   std::string wrong_size = good;
@@ -309,28 +309,25 @@ TEST_F(Aedat4, WrongDataAreErrorsThatNameTheirPosition) {
       {"#!AER-DAT3.1\r\n", {"byte 0: expected '#!AER-DAT4.0'"}},
       {good.substr(0, 16), {"byte 14: a header of", "up to the end"}},
       {huge_header, {"byte 14: a header of 4294967295 bytes: expected at most"}},
-      {headerOf(static_cast<Aedat4Compression>(9), -1, twoCameras()),
+      {headerOf(static_cast<Packing>(9), -1, twoCameras()),
        {"byte 14: compression = 9: expected 0 (none), 1 or 2 (LZ4)"}},
-      {headerOf(Aedat4Compression::kNone, -1, "<dv><node"), {"expected XML"}},
-      {headerOf(Aedat4Compression::kNone, -1, "<dv/>"), {"no node 'outInfo'"}},
-      {headerOf(Aedat4Compression::kNone, -1, outInfo(streamXml(0, "FRME", "a"))),
-       {"no stream of events"}},
-      {headerOf(Aedat4Compression::kNone, -1,
+      {headerOf(Packing::kNone, -1, "<dv><node"), {"expected XML"}},
+      {headerOf(Packing::kNone, -1, "<dv/>"), {"no node 'outInfo'"}},
+      {headerOf(Packing::kNone, -1, outInfo(streamXml(0, "FRME", "a"))), {"no stream of events"}},
+      {headerOf(Packing::kNone, -1,
                 outInfo(replaced(streamXml(0, "EVTS", "a"), "name=\"0\"", "name=\"a\""))),
        {"a stream of events: expected a number as its name"}},
       {wrong_size, {at_packet + "a packet of 2147483647 bytes: expected at most"}},
       {good.substr(0, good.size() - 1), {"a packet of", "expected at most"}},
-      {with_packet(Aedat4Compression::kLz4, "not a frame"), {at_packet, "expected an LZ4 frame"}},
-      {with_packet(Aedat4Compression::kZstd, "not a frame"), {at_packet, "Zstandard frame"}},
-      {with_packet(Aedat4Compression::kLz4,
-                   compressed(Aedat4Compression::kLz4, eventPacket({{}})).substr(0, 30)),
+      {with_packet(Packing::kLz4, "not a frame"), {at_packet, "expected an LZ4 frame"}},
+      {with_packet(Packing::kZstd, "not a frame"), {at_packet, "Zstandard frame"}},
+      {with_packet(Packing::kLz4, compressed(Packing::kLz4, eventPacket({{}})).substr(0, 30)),
        {at_packet, "compressed data of 30 bytes: expected more"}},
-      {with_packet(Aedat4Compression::kZstd,
-                   compressed(Aedat4Compression::kZstd, std::string(300 << 20, '\0'))),
+      {with_packet(Packing::kZstd, compressed(Packing::kZstd, std::string(300 << 20, '\0'))),
        {at_packet, "expected at most 256 MiB"}},
-      {with_packet(Aedat4Compression::kNone, eventPacket({{}}).substr(0, 40)),
+      {with_packet(Packing::kNone, eventPacket({{}}).substr(0, 40)),
        {at_packet, "expected a FlatBuffer 'EVTS'"}},
-      {with_packet(Aedat4Compression::kNone, eventPacket({{}, {INT64_MAX, 0, 0, 0, {}}})),
+      {with_packet(Packing::kNone, eventPacket({{}, {INT64_MAX, 0, 0, 0, {}}})),
        {"packet at " + at_packet + "event 1: t = '9223372036854775807': expected a time"}}};
   for (const Case& wrong : cases) {
     const std::string error = errorOfBytes(wrong.bytes);
@@ -341,8 +338,7 @@ TEST_F(Aedat4, WrongDataAreErrorsThatNameTheirPosition) {
 }
 
 TEST_F(Aedat4, DamagedFilesAreReadOrRefused) {
-  for (const auto compression :
-       {Aedat4Compression::kNone, Aedat4Compression::kLz4, Aedat4Compression::kZstd}) {
+  for (const auto compression : {Packing::kNone, Packing::kLz4, Packing::kZstd}) {
     readDamaged(recording(compression, true), file(), "aedat4");
   }
 }

@@ -11,6 +11,7 @@
 #include "plugin/recordings/streams/event_packets.h"
 #include "test/plugin/recordings/streams/reading.h"
 #include "test/plugin/temporary_folder.h"
+#include "tracking_stub/truth/dataset_writer.h"
 
 namespace efm {
 
@@ -28,15 +29,6 @@ using testing::StartsWith;
 
 EventPackets open(const std::filesystem::path& file) {
   return EventPackets(std::make_unique<EventTextStream>(file), {240, 180});
-}
-
-std::string textOf(const std::vector<Event>& events) {
-  std::string text;
-  for (const Event& event : events) {
-    text += formatSeconds(event.t_ns) + " " + std::to_string(event.x) + " " +
-            std::to_string(event.y) + (event.polarity ? " 1\n" : " 0\n");
-  }
-  return text;
 }
 
 class EventText : public TemporaryFolder {
@@ -128,7 +120,8 @@ TEST_F(EventText, EventsAboveAWrongLineComeBeforeTheError) {
     const std::int64_t late_ms = i % 7 == 0 ? 3 : 0;
     events.push_back({(i - late_ms) * 1'000'000, static_cast<std::uint16_t>(i % 240), 7, true});
   }
-  const std::string good = textOf(events);
+  writeEvents(file(), events);
+  const std::string good = readText(file());
   std::stable_sort(events.begin(), events.end(),
                    [](const Event& a, const Event& b) { return a.t_ns < b.t_ns; });
   for (const std::string& bad :
@@ -174,7 +167,7 @@ RC_GTEST_PROP(EventTextProperty, WrittenEventsAreReadBackInTimeOrder, ()) {
     events.push_back({t_ns, *rc::gen::inRange<std::uint16_t>(0, 240),
                       *rc::gen::inRange<std::uint16_t>(0, 180), *rc::gen::arbitrary<bool>()});
   }
-  writeFile(propertyFile(), textOf(events));
+  writeEvents(propertyFile(), events);
 
   EventPackets reader = open(propertyFile());
   const std::vector<Event> read = readPackets(reader);
