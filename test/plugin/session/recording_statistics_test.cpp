@@ -169,10 +169,6 @@ TEST(WhyNoKeyframe, SaysTheGapBetweenPosesAndEvents) {
   const auto with_poses = [](std::int64_t first_ns, std::int64_t last_ns) {
     return why([&](auto& status, auto&) { status.poses = TimeSpan{first_ns, last_ns}; });
   };
-  EXPECT_EQ(with_poses(15'000 * kMsNs, 15'400 * kMsNs),
-            kEvents +
-                ", the poses 15.000000000 to 15.400000000 s (+5 to +5.4 s): they miss each other "
-                "by 4.500000000 s");
   EXPECT_THAT(with_poses(9'000 * kMsNs, 9'750 * kMsNs),
               HasSubstr("miss each other by 0.250000000 s"));
   EXPECT_THAT(with_poses(10'500 * kMsNs + 1, 11'000 * kMsNs), HasSubstr("other by 0.000000001 s"));
