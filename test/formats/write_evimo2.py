@@ -5,7 +5,7 @@
   write_evimo2.py DATASET_FOLDER OUT
 
 OUT/left_camera/sfm/eval/scene_00, OUT/right_camera/… and, for further cameras, OUT/camera_2/…, each with
-dataset_events_{t,xy,p}.npy, dataset_info.npz with the camera's K and D and a pickled `meta` that has the poses, and
+dataset_events_{t,xy,p}.npy, dataset_info.npz with the camera's K and D and a pickled `meta`, and
 poses.txt of the rig, exported from there. The calibration of all cameras is the folder's: --calibration camchain.yaml.
 """
 import pathlib
@@ -14,22 +14,14 @@ import sys
 import numpy as np
 import yaml
 
-from dataset_folder import cameras_of, read_events, read_poses
+from dataset_folder import cameras_of, read_events
 
 NAMES = ("left_camera", "right_camera")
-
-
-def meta_of(poses):
-    def pose(values):
-        return {"pos": {"t": dict(zip("xyz", values[:3])), "q": dict(zip("xyzw", values[3:]))}}
-
-    return {"full_trajectory": [{"ts": t_ns * 1e-9, "id": k, "cam": pose(v)} for k, (t_ns, v) in enumerate(poses)]}
 
 
 def main():
     folder, out = map(pathlib.Path, sys.argv[1:3])
     chain = yaml.safe_load(open(folder / "camchain.yaml"))
-    meta = meta_of(read_poses(folder))
     for index, source in enumerate(cameras_of(folder)):
         to = out / (NAMES[index] if index < 2 else f"camera_{index}") / "sfm" / "eval" / "scene_00"
         to.mkdir(parents=True, exist_ok=True)
@@ -41,7 +33,7 @@ def main():
         fx, fy, cx, cy = camera["intrinsics"]
         distortion = camera.get("distortion_coeffs") or [0, 0, 0, 0]
         np.savez(to / "dataset_info.npz", K=np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], dtype="f8"),
-                 D=np.array(distortion, dtype="f8"), meta=np.array(meta, dtype=object))
+                 D=np.array(distortion, dtype="f8"), meta=np.array({"frames": []}, dtype=object))
         (to / "poses.txt").write_text((folder / "poses.txt").read_text())
 
 

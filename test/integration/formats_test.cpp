@@ -34,7 +34,7 @@ struct Recorded {
 
 void PrintTo(const Recorded& recorded, std::ostream* stream) { *stream << recorded.name; }
 
-class FormatsByOption : public AppTest {
+class Formats : public AppTest, public testing::WithParamInterface<Recorded> {
  protected:
   /// The depth map and the confidence map of a window in the middle of the recording.
   std::string mapsOf(const std::string& recording) const {
@@ -48,10 +48,7 @@ class FormatsByOption : public AppTest {
     static const std::string maps = mapsOf(folderRecording());
     return maps;
   }
-};
 
-class Formats : public FormatsByOption, public testing::WithParamInterface<Recorded> {
- protected:
   static RecordingSource source() {
     RecordingSource source;
     std::istringstream paths(GetParam().sources);
@@ -136,19 +133,6 @@ TEST_P(Formats, APartIsWhatTheWholeHasThere) {
           << "camera " << index << " from " << start_ns << " to " << end_ns << ": "
           << found[index].size() << " events instead of " << expected[index].size();
     }
-  }
-}
-
-TEST_F(FormatsByOption, TextInOtherColumnsGivesTheSameDepthMap) {
-  EXPECT_TRUE(mapsOf((kFormats / "text/us").string() + " --event-columns x,y,p,t --time-unit us") ==
-              mapsOfFolder());
-}
-
-TEST_F(FormatsByOption, PosesOfAnyKindGiveTheSameDepthMap) {
-  for (const char* poses : {"poses_euroc.csv", "poses_mocap_data.txt", "poses.npz"}) {
-    EXPECT_TRUE(mapsOf(folderRecording() + " --poses " + (kFormats / "text" / poses).string()) ==
-                mapsOfFolder())
-        << poses;
   }
 }
 

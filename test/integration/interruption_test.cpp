@@ -1,27 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `map` is stopped at random times, by signals that it can catch and by one that it cannot. What it
 // leaves is complete and agrees, or does not look complete.
-#include <fcntl.h>
-#include <gtest/gtest.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <random>
 #include <set>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "mapping/geometry/timestamp.h"
-#include "mapping/geometry/trajectory.h"
 #include "maps/io/point_cloud_file.h"
-#include "test/paths.h"
-#include "test/plugin/temporary_folder.h"
+#include "test/plugin/app/app_test.h"
 
 namespace efm {
 namespace {
@@ -29,60 +20,35 @@ namespace {
 namespace fs = std::filesystem;
 using Seconds = std::chrono::duration<double>;
 
+const std::string kDesk = EFM_RECORDINGS "/desk_stereo";
 /// Two maps that differ in their keyframes.
 constexpr const char* kStride[] = {"keyframes.stride_s=0.1", "keyframes.stride_s=0.15"};
 
-class Interruption : public TemporaryFolder {
+class Interruption : public AppTest {
  protected:
   void SetUp() override {
-    if (!fs::exists(EFM_RECORDINGS "/desk_stereo")) GTEST_SKIP() << "the desk is not simulated";
-    const int status =
-        run({"import", EFM_RECORDINGS "/desk_stereo", "--duration", "1.2", "--out", recording()});
-    ASSERT_EQ(status, 0);
+    if (!fs::exists(kDesk)) GTEST_SKIP() << "the desk is not simulated";
+    ASSERT_EQ(run("import " + kDesk + " --duration 1.2 --out desk.rawlog").status, 0);
   }
 
-  std::string recording() const { return (folder() / "desk.rawlog").string(); }
   fs::path out() const { return folder() / "out"; }
 
-  pid_t start(std::vector<std::string> arguments) const {
-    const pid_t child = fork();
-    if (child != 0) return child;
-    for (const int number : {SIGINT, SIGTERM})
-      std::signal(number, SIG_DFL);  // the parent may ignore
-    const int null = open("/dev/null", O_RDWR);
-    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) dup2(null, stream);
-    arguments.insert(arguments.begin(), EFM_EVENT_FUSION);
-    std::vector<char*> words;
-    for (std::string& argument : arguments) words.push_back(argument.data());
-    words.push_back(nullptr);
-    execv(EFM_EVENT_FUSION, words.data());
-    _exit(127);
-  }
-  /// @return as waitpid has it.
-  static int end(pid_t child) {
-    int status = -1;
-    EXPECT_EQ(waitpid(child, &status, 0), child);
-    return status;
-  }
-  int run(const std::vector<std::string>& arguments) const { return end(start(arguments)); }
-
-  std::vector<std::string> mapArguments(const std::string& stride, bool refined) const {
-    return {"map",
-            EFM_SOURCE_DIR "/config/simulated_stereo.ini",
-            recording(),
-            "--out",
-            out().string(),
-            "--set",
-            stride,
-            "--set",
-            std::string("refinement.enabled=") + (refined ? "true" : "false")};
+  static std::string mapArguments(const std::string& stride, bool refined) {
+    return "map " EFM_SOURCE_DIR "/config/simulated_stereo.ini desk.rawlog --out out --set " +
+           stride + " --set refinement.enabled=" + (refined ? "true" : "false");
   }
 
   /// The time of a run that nothing interrupts.
   Seconds timeOfARun() const {
     const auto begin = std::chrono::steady_clock::now();
-    EXPECT_EQ(run(mapArguments(kStride[0], true)), 0);
+    EXPECT_EQ(run(mapArguments(kStride[0], true)).status, 0);
     return std::chrono::steady_clock::now() - begin;
+  }
+  /// @return the status of a run that gets a signal after a delay.
+  int statusAfter(Seconds delay, int signal, const std::string& arguments) const {
+    const auto end = std::chrono::steady_clock::now() + delay;
+    const auto is_over = [&] { return std::chrono::steady_clock::now() >= end; };
+    return interrupted(arguments, is_over, signal).status;
   }
 
   std::set<std::string> files() const {
@@ -94,13 +60,10 @@ class Interruption : public TemporaryFolder {
     return files;
   }
   bool has(const char* file) const { return fs::exists(out() / file); }
-  nlohmann::json report() const {
-    return nlohmann::json::parse(std::ifstream(out() / "report.json"));
-  }
 
   /// A folder with a report: every file is whole, and all are of one run.
   void expectCompleteAndAgreeing() const {
-    const nlohmann::json report = this->report();
+    const nlohmann::json report = reportIn("out");
     const std::size_t keyframes = report["keyframes"];
     std::set<std::string> expected = {"report.json"};
     if (keyframes > 0) {
@@ -131,44 +94,37 @@ TEST_F(Interruption, ASignalEndsAMapWithWhatIsMade) {
     const Seconds delay = std::uniform_real_distribution<>(0, 1.02)(random_) * whole;
     SCOPED_TRACE(testing::Message()
                  << trial << ": after " << delay.count() << " s of " << whole.count());
-    const pid_t child = start(mapArguments(kStride[0], trial % 2 == 0));
-    std::this_thread::sleep_for(delay);
-    kill(child, trial % 4 < 2 ? SIGINT : SIGTERM);
-    const int status = end(child);
+    const int status = statusAfter(delay, trial % 4 < 2 ? SIGINT : SIGTERM,
+                                   mapArguments(kStride[0], trial % 2 == 0));
     if (!has("report.json")) {
       EXPECT_NE(status, 0) << "before the first pass ended";
       EXPECT_EQ(files(), std::set<std::string>());
       continue;
     }
     expectCompleteAndAgreeing();
-    const bool was_stopped = WIFEXITED(status) && WEXITSTATUS(status) == 130;
-    EXPECT_EQ(report().contains("stopped_at"), was_stopped) << status;
+    const bool was_stopped = status == 130;
+    EXPECT_EQ(reportIn("out").contains("stopped_at"), was_stopped) << status;
     stopped += was_stopped ? 1 : 0;
-    with_keyframes += was_stopped && report()["keyframes"] > 0 ? 1 : 0;
+    with_keyframes += was_stopped && reportIn("out")["keyframes"] > 0 ? 1 : 0;
   }
   EXPECT_GE(stopped, 5) << "at random times of a run, most signals find it at work";
   EXPECT_GE(with_keyframes, 3);
 }
 
 TEST_F(Interruption, AMapWithoutKeyframesKeepsTheEarlierResult) {
-  ASSERT_EQ(run(mapArguments(kStride[0], false)), 0);
+  ASSERT_EQ(run(mapArguments(kStride[0], false)).status, 0);
   const std::set<std::string> earlier = files();
   // Of a killed run: the next one removes it before it reads.
   const auto partial = out() / "map.partial-1.pcd";
   std::ofstream(partial) << "half";
   std::ofstream(out() / "report.partial.json") << R"({"recording": [], "process": 1})";
   // Packets of single events are slow to read.
-  const std::string slow = (folder() / "slow.rawlog").string();
-  ASSERT_EQ(run({"import", EFM_RECORDINGS "/desk_stereo", "--packet-s", "0.00001", "--out", slow}),
-            0);
-  const pid_t child =
-      start({"map", slow, "--out", out().string(), "--set", "keyframes.window_s=30"});
-  while (fs::exists(partial)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  kill(child, SIGINT);
-  const int status = end(child);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 130) << status;
+  ASSERT_EQ(run("import " + kDesk + " --packet-s 0.00001 --out slow.rawlog").status, 0);
+  const Result result = interrupted("map slow.rawlog --out out --set keyframes.window_s=30",
+                                    [&] { return !fs::exists(partial); });
+  EXPECT_EQ(result.status, 130) << result.err;
   EXPECT_EQ(files(), earlier);
-  EXPECT_FALSE(report().contains("stopped_at"));
+  EXPECT_FALSE(reportIn("out").contains("stopped_at"));
   expectCompleteAndAgreeing();
 }
 
@@ -182,13 +138,10 @@ TEST_F(Interruption, AKilledMapLooksCompleteOnlyIfItIs) {
     const bool replaces = trial % 2 == 1;
     fs::remove_all(out());
     if (replaces) {
-      ASSERT_EQ(run(mapArguments(kStride[0], false)), 0);
+      ASSERT_EQ(run(mapArguments(kStride[0], false)).status, 0);
     }
     const std::set<std::string> earlier = files();
-    const pid_t child = start(mapArguments(kStride[1], trial % 4 < 2));
-    std::this_thread::sleep_for(delay);
-    kill(child, SIGKILL);
-    end(child);
+    statusAfter(delay, SIGKILL, mapArguments(kStride[1], trial % 4 < 2));
     if (has("map.pcd")) {
       EXPECT_NO_THROW(readPointCloud(out() / "map.pcd"));
     }
@@ -202,7 +155,7 @@ TEST_F(Interruption, AKilledMapLooksCompleteOnlyIfItIs) {
     }
   }
   EXPECT_GE(incomplete, 2) << "at random times of a run, most signals find it writing keyframes";
-  ASSERT_EQ(run(mapArguments(kStride[1], true)), 0);
+  ASSERT_EQ(run(mapArguments(kStride[1], true)).status, 0);
   expectCompleteAndAgreeing();
 }
 

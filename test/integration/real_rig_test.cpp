@@ -3,30 +3,19 @@
 // runs it: simulate, map with the rig's own option file, compare with the exact truth.
 #include <gmock/gmock.h>
 
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 
 #include "mapping/geometry/reference_view.h"
 #include "plugin/evaluation/depth_evaluation.h"
-#include "test/paths.h"
-#include "test/plugin/temporary_folder.h"
+#include "test/plugin/program_test.h"
 
 namespace efm {
 namespace {
 
-class RealRig : public TemporaryFolder {
- protected:
-  int run(const std::string& arguments) const {
-    const std::string command = "cd '" + folder().string() + "' && '" EFM_EVENT_FUSION "' " +
-                                arguments + " >output.txt 2>&1 </dev/null";
-    return std::system(command.c_str());
-  }
-};
+using RealRig = ProgramTest;
 
 TEST_F(RealRig, MvsecsDroneMapsASimulatedRoom) {
   const std::filesystem::path data = EFM_SHARED_DATA;
@@ -36,9 +25,10 @@ TEST_F(RealRig, MvsecsDroneMapsASimulatedRoom) {
     GTEST_SKIP() << "there is no real trajectory at " << trajectory;
   }
   ASSERT_EQ(run("simulate --scene room --trajectory '" + trajectory.string() + "' --calibration '" +
-                calibration.string() + "' --duration 2.1 --out room"),
+                calibration.string() + "' --duration 2.1 --out room")
+                .status,
             0);
-  ASSERT_EQ(run("map '" EFM_SOURCE_DIR "/config/davis346_mvsec.ini' room --out out"), 0);
+  ASSERT_EQ(run("map '" EFM_SOURCE_DIR "/config/davis346_mvsec.ini' room --out out").status, 0);
 
   DepthEvaluationOptions options;
   options.pairing.tolerance_px = 1;
@@ -61,12 +51,12 @@ class RealRecording : public RealRig {
                   const std::string& options = "") const {
     const auto data = std::filesystem::path(EFM_SHARED_DATA) / "real_small" / name;
     if (!exists(data)) return "";
-    EXPECT_EQ(run("map '" + (data / events).string() + "' --poses '" +
-                  (data / "poses.txt").string() + "' --calibration '" +
-                  (data / "calibration.yaml").string() + "' --out out --force " + options),
-              0);
-    std::ifstream output(folder() / "output.txt");
-    return {std::istreambuf_iterator<char>(output), {}};
+    const Result result =
+        run("map '" + (data / events).string() + "' --poses '" + (data / "poses.txt").string() +
+            "' --calibration '" + (data / "calibration.yaml").string() + "' --out out --force " +
+            options);
+    EXPECT_EQ(result.status, 0);
+    return result.out + result.err;
   }
 };
 
